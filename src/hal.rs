@@ -1,0 +1,165 @@
+//! The board as the tasks see it: one trait, each method with unit, freshness
+//! and failure. `src/board` implements it on the STM32G474, the tests with
+//! mocks, the virtual rig with its plant.
+
+use crate::log::Entry;
+use crate::sense::raw::{AdcCode, AngleFrame, BusFault, EncoderCount};
+use crate::supervise::Command;
+
+/// The wheel encoder's counter.
+pub trait WheelEncoder {
+    /// The counter as it stands now; positive counts in the direction of
+    /// deployment. Cannot fail: a lost line shows as a counter that stands still.
+    fn count(&mut self) -> EncoderCount;
+}
+
+/// One analogue sensor behind its converter.
+pub trait AnalogInput {
+    /// Converts and returns one oversampled code, at most 0.2 ms old on return.
+    ///
+    /// # Errors
+    /// [`BusFault`] if the conversion or its transfer failed; the next call
+    /// starts afresh.
+    async fn sample(&mut self) -> Result<AdcCode, BusFault>;
+}
+
+/// The arm's angle sensor on its bus.
+pub trait AngleBus {
+    /// Reads one frame, undecoded; the angle in it was latched at most 0.2 ms ago.
+    ///
+    /// # Errors
+    /// [`BusFault`] if the transfer failed. Parity and the sensor's own error
+    /// flag are judged by the caller.
+    async fn frame(&mut self) -> Result<AngleFrame, BusFault>;
+}
+
+/// Signed duty of a bridge, Q15: -32768 is full reverse, 32767 full forward,
+/// LSB 3.1e-5. Forward deploys (drive) or raises the preload (pre-tightener).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub struct Duty(i16);
+
+impl Duty {
+    /// No torque.
+    pub const ZERO: Self = Self(0);
+
+    /// A duty from its Q15 bits.
+    #[must_use]
+    pub const fn from_bits(bits: i16) -> Self {
+        Self(bits)
+    }
+
+    /// The Q15 bits.
+    #[must_use]
+    pub const fn to_bits(self) -> i16 {
+        self.0
+    }
+}
+
+/// What one motor's bridge is to do until the next call.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub struct MotorCommand {
+    /// Signed duty.
+    pub duty: Duty,
+    /// Bridge enabled. Disabled, the bridge is off and the self-locking gears
+    /// hold the mechanism where it is; the duty is then ignored.
+    pub enable: bool,
+}
+
+impl MotorCommand {
+    /// Bridge off: the safe state of either motor.
+    pub const OFF: Self = Self { duty: Duty::ZERO, enable: false };
+}
+
+/// Both motors' bridges.
+pub trait Motors {
+    /// Sets both bridges; takes effect at the next PWM period (at most 50 us).
+    /// Never blocks and cannot fail.
+    fn apply(&mut self, drive: MotorCommand, preload: MotorCommand);
+}
+
+/// The independent watchdog.
+pub trait Watchdog {
+    /// Restarts the time-out (100 ms on the board).
+    fn feed(&mut self);
+}
+
+/// A source of operator commands: the board button or the log channel.
+pub trait CommandSource {
+    /// Waits for the next command. Malformed input is dropped by the source.
+    async fn next(&mut self) -> Command;
+}
+
+/// Where log entries go.
+pub trait Journal {
+    /// Writes one entry without blocking; what does not fit is dropped and
+    /// counted by the transport.
+    fn write(&mut self, entry: &Entry);
+}
+
+/// What the board's light shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Light {
+    /// Idle, complete or starting: off.
+    #[default]
+    Off,
+    /// Moving or building preload: on.
+    On,
+    /// Fault held: blinking, 4 Hz.
+    Alarm,
+}
+
+/// The board's light.
+pub trait Indicator {
+    /// Sets the light.
+    fn show(&mut self, light: Light);
+}
+
+/// A board: one implementation of each part.
+pub trait Board {
+    /// Wheel encoder.
+    type Wheel: WheelEncoder;
+    /// Load cell.
+    type LoadCell: AnalogInput;
+    /// Tread displacement sensor.
+    type Tread: AnalogInput;
+    /// Arm angle sensor.
+    type Arm: AngleBus;
+    /// Motor bridges.
+    type Motors: Motors;
+    /// Watchdog.
+    type Watchdog: Watchdog;
+    /// Board button.
+    type Button: CommandSource;
+    /// Command input on the log channel.
+    type Console: CommandSource;
+    /// Log output.
+    type Journal: Journal;
+    /// Light.
+    type Light: Indicator;
+}
+
+/// A board taken apart, so that each task owns what it uses and nothing else.
+pub struct Parts<B: Board> {
+    /// For the speed task.
+    pub wheel: B::Wheel,
+    /// For the pressure task.
+    pub load_cell: B::LoadCell,
+    /// For the displacement task.
+    pub tread: B::Tread,
+    /// For the angle task.
+    pub arm: B::Arm,
+    /// For the motor task.
+    pub motors: B::Motors,
+    /// For the motor task, which feeds it when all tasks have checked in.
+    pub watchdog: B::Watchdog,
+    /// For the first operator task.
+    pub button: B::Button,
+    /// For the second operator task.
+    pub console: B::Console,
+    /// For the logging task.
+    pub journal: B::Journal,
+    /// For the logging task.
+    pub light: B::Light,
+}

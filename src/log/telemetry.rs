@@ -1,0 +1,43 @@
+//! The controller's state as one row a tick.
+
+use crate::estimate::ContactStage;
+use crate::hal::Duty;
+use crate::supervise::Mode;
+use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Ratio, Tick};
+
+/// All control-rate quantities of one tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Telemetry {
+    /// Tick of the row.
+    pub at: Tick,
+    /// Mode after the tick.
+    pub mode: Mode,
+    /// Contact stage.
+    pub stage: ContactStage,
+    /// Estimated axial position, mm.
+    pub position: Millimetres,
+    /// Estimated speed, mm/s.
+    pub speed: MillimetresPerSecond,
+    /// Speed asked for by the profile, mm/s.
+    pub speed_ref: MillimetresPerSecond,
+    /// Measured preload, N.
+    pub preload: Newtons,
+    /// Preload asked for, N.
+    pub preload_ref: Newtons,
+    /// Measured tread compression, mm.
+    pub compression: Millimetres,
+    /// Wheel centre's distance from the pillar axis, from the arm angle, mm.
+    pub radius: Millimetres,
+    /// Sleeve level: 0 at the outermost wall, one more per step.
+    pub level: u8,
+    /// Gap predicted for the step ahead, mm.
+    pub gap_predicted: Millimetres,
+    /// Friction left unused, by the model for the present contact.
+    pub slip_margin: Ratio,
+    /// Distance to the next corner touch, mm; 32767 when none is expected.
+    pub distance: Millimetres,
+    /// Drive duty.
+    pub drive: Duty,
+    /// Pre-tightener duty.
+    pub pretightener: Duty,
+}

@@ -1,0 +1,204 @@
+//! The checks that a parameter set must pass before anything is built from it.
+
+use super::Rig;
+
+/// What is wrong with a parameter set: the key, its value, what was expected.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RigError {
+    /// A value lies outside its range.
+    OutOfRange {
+        /// Key of the parameter, as in a scenario file.
+        key: &'static str,
+        /// The value found.
+        value: f64,
+        /// Least value allowed.
+        min: f64,
+        /// Largest value allowed.
+        max: f64,
+    },
+    /// The step table is not ascending with room for a wheel between the steps.
+    StepOrder {
+        /// Position of the offending step in the table, from 1.
+        step: usize,
+        /// Its position, mm.
+        position_mm: f64,
+        /// Least position allowed there, mm.
+        least_mm: f64,
+    },
+    /// The preload limit lies below the cruise preload.
+    LimitBelowCruise {
+        /// The limit, N.
+        limit_n: f64,
+        /// The cruise preload, N.
+        cruise_n: f64,
+    },
+    /// The arm cannot reach a wall at this radius.
+    OutOfReach {
+        /// Wheel-centre radius asked for, mm.
+        radius_mm: f64,
+        /// Smallest radius the arm reaches, mm.
+        min_mm: f64,
+        /// Largest radius the arm reaches, mm.
+        max_mm: f64,
+    },
+}
+
+impl core::fmt::Display for RigError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match *self {
+            Self::OutOfRange { key, value, min, max } => {
+                write!(f, "{key} = {value}: expected a value from {min} to {max}")
+            }
+            Self::StepOrder { step, position_mm, least_mm } => write!(
+                f,
+                "rig.step_positions_mm: step {step} stands at {position_mm} mm, expected at least {least_mm} mm (ascending, inside the travel, with room for the wheel)"
+            ),
+            Self::LimitBelowCruise { limit_n, cruise_n } => write!(
+                f,
+                "preload.limit_n = {limit_n}: expected at least preload.cruise_n = {cruise_n}"
+            ),
+            Self::OutOfReach { radius_mm, min_mm, max_mm } => write!(
+                f,
+                "rig.arm_length_mm: the arm reaches wheel-centre radii from {min_mm:.1} to {max_mm:.1} mm, expected to include {radius_mm:.1} mm"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for RigError {}
+
+impl Rig {
+    /// Checks every value against its range and the values against one another.
+    ///
+    /// # Errors
+    /// The first [`RigError`] found.
+    pub fn validate(&self) -> Result<(), RigError> {
+        self.ranges()?;
+        self.step_table()?;
+        if self.preload.limit_n < self.preload.cruise_n {
+            return Err(RigError::LimitBelowCruise {
+                limit_n: self.preload.limit_n,
+                cruise_n: self.preload.cruise_n,
+            });
+        }
+        self.reach()
+    }
+
+    /// Wheel-centre radius with an undeformed wheel on the wall of `level`, mm.
+    #[must_use]
+    pub fn centre_radius_mm(&self, level: usize) -> f64 {
+        self.rig.wall_radius_mm - self.rig.step_height_mm * level as f64 - self.rig.wheel_radius_mm
+    }
+
+    fn ranges(&self) -> Result<(), RigError> {
+        let table: [(&'static str, f64, f64, f64); 45] = [
+            ("rig.wheel_radius_mm", self.rig.wheel_radius_mm, 5.0, 200.0),
+            ("rig.wheel_width_mm", self.rig.wheel_width_mm, 1.0, 200.0),
+            ("rig.step_height_mm", self.rig.step_height_mm, 0.5, 8.0),
+            ("rig.step_tolerance_mm", self.rig.step_tolerance_mm, 0.05, 5.0),
+            ("rig.travel_mm", self.rig.travel_mm, 1.0, 2000.0),
+            ("rig.wall_radius_mm", self.rig.wall_radius_mm, 50.0, 1000.0),
+            ("rig.arm_length_mm", self.rig.arm_length_mm, 20.0, 1000.0),
+            ("rig.arm_pivot_radius_mm", self.rig.arm_pivot_radius_mm, 0.0, 500.0),
+            ("tread.k_inf_pa_per_m", self.tread.k_inf_pa_per_m, 1e7, 1e11),
+            ("tread.stiffening", self.tread.stiffening, 1.0, 20.0),
+            ("tread.tau_s", self.tread.tau_s, 1e-3, 10.0),
+            ("plant.mu", self.plant.mu, 0.0, 3.0),
+            ("plant.top_load_n", self.plant.top_load_n, 0.0, 200.0),
+            ("plant.top_load_share", self.plant.top_load_share, 0.0, 1.0),
+            ("plant.moved_mass_kg", self.plant.moved_mass_kg, 0.01, 100.0),
+            ("plant.arm_coupling", self.plant.arm_coupling, -1.0, 1.0),
+            ("plant.elastic_creep", self.plant.elastic_creep, 1e-4, 0.2),
+            ("preload.cruise_n", self.preload.cruise_n, 5.0, 180.0),
+            ("preload.limit_n", self.preload.limit_n, 5.0, 180.0),
+            ("preload.spring_n_per_mm", self.preload.spring_n_per_mm, 0.1, 50.0),
+            ("preload.slew_n_per_s", self.preload.slew_n_per_s, 1.0, 500.0),
+            ("preload.delay_s", self.preload.delay_s, 0.0, 0.25),
+            ("preload.lag_s", self.preload.lag_s, 0.005, 1.0),
+            ("drive.no_load_speed_mm_s", self.drive.no_load_speed_mm_s, 5.0, 300.0),
+            ("drive.stall_force_n", self.drive.stall_force_n, 5.0, 5000.0),
+            ("drive.force_limit_n", self.drive.force_limit_n, 5.0, 5000.0),
+            ("drive.reflected_mass_kg", self.drive.reflected_mass_kg, 0.1, 1000.0),
+            ("drive.cruise_speed_mm_s", self.drive.cruise_speed_mm_s, 3.0, 100.0),
+            ("drive.min_crossing_speed_mm_s", self.drive.min_crossing_speed_mm_s, 0.5, 20.0),
+            ("drive.acceleration_mm_s2", self.drive.acceleration_mm_s2, 5.0, 2000.0),
+            ("drive.jerk_mm_s3", self.drive.jerk_mm_s3, 50.0, 30_000.0),
+            ("drive.ripple_pitch_mm", self.drive.ripple_pitch_mm, 0.01, 100.0),
+            ("drive.guard_band", self.drive.guard_band, 0.0, 0.5),
+            ("sense.encoder_counts", self.sense.encoder_counts, 64.0, 65_536.0),
+            ("sense.load_cell_full_scale_n", self.sense.load_cell_full_scale_n, 20.0, 2000.0),
+            ("sense.tread_full_scale_mm", self.sense.tread_full_scale_mm, 0.5, 50.0),
+            ("sense.angle_zero_code", self.sense.angle_zero_code, 0.0, 16_383.0),
+            ("sense.stale_after_s", self.sense.stale_after_s, 0.005, 1.0),
+            ("control.gap_ref_mm", self.control.gap_ref_mm, 0.0, 10.0),
+            ("control.safe_speed_mm_s", self.control.safe_speed_mm_s, 0.5, 100.0),
+            ("control.gap_reserve", self.control.gap_reserve, 0.0, 0.5),
+            ("control.slip_margin", self.control.slip_margin, 0.0, 1.0),
+            ("control.adaptation_range", self.control.adaptation_range, 0.0, 0.9),
+            ("control.adaptation_gain", self.control.adaptation_gain, 0.0, 1.0),
+            (
+                "control.safe_speed_mm_s",
+                self.control.safe_speed_mm_s,
+                self.drive.min_crossing_speed_mm_s,
+                self.drive.cruise_speed_mm_s,
+            ),
+        ];
+        for (key, value, min, max) in table {
+            // Written so that a NaN fails.
+            if !(value >= min && value <= max) {
+                return Err(RigError::OutOfRange { key, value, min, max });
+            }
+        }
+        for &mode in &self.drive.modes_hz {
+            if !(0.1..=10_000.0).contains(&mode) {
+                return Err(RigError::OutOfRange {
+                    key: "drive.modes_hz",
+                    value: mode,
+                    min: 0.1,
+                    max: 10_000.0,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Steps ascend, with the contact run of a whole wheel between them and before
+    /// the first, and lie inside the travel.
+    fn step_table(&self) -> Result<(), RigError> {
+        let radius = self.rig.wheel_radius_mm;
+        let below = radius - self.rig.step_height_mm;
+        if below <= 0.0 {
+            return Err(RigError::OutOfRange {
+                key: "rig.step_height_mm",
+                value: self.rig.step_height_mm,
+                min: 0.5,
+                max: radius,
+            });
+        }
+        let run = libm::sqrt(radius * radius - below * below);
+        let mut least = run + 2.0 * self.rig.step_tolerance_mm;
+        for (index, &position) in self.rig.step_positions_mm.iter().enumerate() {
+            if !(position >= least && position <= self.rig.travel_mm) {
+                return Err(RigError::StepOrder {
+                    step: index + 1,
+                    position_mm: position,
+                    least_mm: least,
+                });
+            }
+            least = position + run + 2.0 * self.rig.step_tolerance_mm;
+        }
+        Ok(())
+    }
+
+    fn reach(&self) -> Result<(), RigError> {
+        let min_mm = self.rig.arm_pivot_radius_mm + 0.1 * self.rig.arm_length_mm;
+        let max_mm = self.rig.arm_pivot_radius_mm + 0.9 * self.rig.arm_length_mm;
+        for level in [0, self.rig.step_positions_mm.len()] {
+            let radius_mm = self.centre_radius_mm(level);
+            if !(radius_mm >= min_mm && radius_mm <= max_mm) {
+                return Err(RigError::OutOfReach { radius_mm, min_mm, max_mm });
+            }
+        }
+        Ok(())
+    }
+}

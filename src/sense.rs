@@ -1,0 +1,3 @@
+//! From raw codes to checked quantities.
+
+pub mod raw;

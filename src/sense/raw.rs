@@ -1,0 +1,103 @@
+//! Raw codes as the peripherals deliver them, one type each, and their time stamp.
+
+use crate::units::Tick;
+
+/// Quadrature counter of the wheel encoder: 16 bits, wraps. Differences between
+/// two readings are taken with wrapping arithmetic, so at most half a turn of
+/// the counter (32767 counts, 628 mm) may lie between them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub struct EncoderCount(u16);
+
+impl EncoderCount {
+    /// A counter value as read from the timer.
+    #[must_use]
+    pub const fn new(count: u16) -> Self {
+        Self(count)
+    }
+
+    /// Counts from `earlier` to `self`, positive in the direction of deployment.
+    #[must_use]
+    pub const fn since(self, earlier: Self) -> i16 {
+        self.0.wrapping_sub(earlier.0) as i16
+    }
+
+    /// The bare counter value.
+    #[must_use]
+    pub const fn get(self) -> u16 {
+        self.0
+    }
+}
+
+/// Result of an oversampled conversion, left-justified to 16 bits whatever the
+/// oversampling: 0 is the negative reference, 65535 the positive one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub struct AdcCode(u16);
+
+impl AdcCode {
+    /// A code as read from the converter.
+    #[must_use]
+    pub const fn new(code: u16) -> Self {
+        Self(code)
+    }
+
+    /// The bare code, 0 to 65535.
+    #[must_use]
+    pub const fn get(self) -> u16 {
+        self.0
+    }
+}
+
+/// A 16-bit frame of the magnetic angle encoder, undecoded: bit 15 even parity
+/// over the frame, bit 14 error flag, bits 13 to 0 the angle (16384 a turn).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub struct AngleFrame(u16);
+
+impl AngleFrame {
+    /// A frame as shifted in from the bus.
+    #[must_use]
+    pub const fn new(frame: u16) -> Self {
+        Self(frame)
+    }
+
+    /// The bare frame.
+    #[must_use]
+    pub const fn get(self) -> u16 {
+        self.0
+    }
+}
+
+/// Why a sensor gave no code this time. The last good one stays in force and ages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub enum BusFault {
+    /// The transfer did not end in time.
+    Timeout,
+    /// The peripheral reported an error (overrun, framing, DMA).
+    Transfer,
+}
+
+/// A raw code with the tick at which it was taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sample<T> {
+    /// The code.
+    pub code: T,
+    /// When it was taken.
+    pub at: Tick,
+}
+
+/// The latest code of each sensor as the control tick finds them; `None` until a
+/// sensor has answered for the first time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SensorFrame {
+    /// Wheel encoder.
+    pub wheel: Option<Sample<EncoderCount>>,
+    /// Load cell between pre-tightener and arm.
+    pub load_cell: Option<Sample<AdcCode>>,
+    /// Tread displacement between arm and wheel.
+    pub tread: Option<Sample<AdcCode>>,
+    /// Arm angle at the pillar.
+    pub arm: Option<Sample<AngleFrame>>,
+}

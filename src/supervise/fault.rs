@@ -1,0 +1,154 @@
+//! Latched faults (codes 100 to 199) and active limits (200 to 299). Codes are
+//! stable: a number is never given a second meaning.
+
+/// A latched fault: the drive holds until it is reset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+#[repr(u16)]
+pub enum Fault {
+    /// The wheel encoder stopped answering.
+    SpeedStale = 101,
+    /// The load cell stopped answering.
+    PressureStale = 102,
+    /// The tread displacement sensor stopped answering.
+    DisplacementStale = 103,
+    /// The arm angle sensor stopped answering or answers with errors.
+    AngleStale = 104,
+    /// The load cell reads outside its range.
+    PressureRange = 112,
+    /// The tread displacement sensor reads outside its range.
+    DisplacementRange = 113,
+    /// The arm angle lies outside the arm's reach.
+    AngleRange = 114,
+    /// The preload exceeded its limit by more than the regulation band.
+    Overpressure = 120,
+    /// The preload did not reach its reference in time.
+    PreloadNotReached = 121,
+    /// The wheel stands still although driven.
+    DriveStalled = 122,
+    /// The wheel turns against the command or far faster than asked.
+    DriveRunaway = 123,
+    /// Odometry and arm disagree on the sleeve level at the end of travel.
+    LevelMismatch = 131,
+    /// A sensor was not at rest or not at zero in the self-test.
+    SelfTest = 150,
+    /// The control tick was late by more than a period.
+    TickOverrun = 160,
+}
+
+impl Fault {
+    /// Every fault, in the order of codes.
+    pub const ALL: [Self; 14] = [
+        Self::SpeedStale,
+        Self::PressureStale,
+        Self::DisplacementStale,
+        Self::AngleStale,
+        Self::PressureRange,
+        Self::DisplacementRange,
+        Self::AngleRange,
+        Self::Overpressure,
+        Self::PreloadNotReached,
+        Self::DriveStalled,
+        Self::DriveRunaway,
+        Self::LevelMismatch,
+        Self::SelfTest,
+        Self::TickOverrun,
+    ];
+
+    /// The stable code.
+    #[must_use]
+    pub const fn code(self) -> u16 {
+        self as u16
+    }
+
+    /// One sentence for the operator.
+    #[must_use]
+    pub const fn sentence(self) -> &'static str {
+        match self {
+            Self::SpeedStale => "the wheel encoder stopped answering",
+            Self::PressureStale => "the load cell stopped answering",
+            Self::DisplacementStale => "the tread displacement sensor stopped answering",
+            Self::AngleStale => "the arm angle sensor stopped answering or answers with errors",
+            Self::PressureRange => "the load cell reads outside its range",
+            Self::DisplacementRange => "the tread displacement sensor reads outside its range",
+            Self::AngleRange => "the arm angle lies outside the arm's reach",
+            Self::Overpressure => "the preload exceeded its limit",
+            Self::PreloadNotReached => "the preload did not reach its reference in time",
+            Self::DriveStalled => "the wheel stands still although driven",
+            Self::DriveRunaway => "the wheel turns otherwise than commanded",
+            Self::LevelMismatch => "the arm does not confirm the sleeve level at the end of travel",
+            Self::SelfTest => "a sensor was not at rest or not at zero in the self-test",
+            Self::TickOverrun => "the control tick came more than a period late",
+        }
+    }
+}
+
+/// An active limit: reported, acted on, gone when its cause is gone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+#[repr(u16)]
+pub enum Limit {
+    /// A corner was met before its window.
+    StepEarly = 201,
+    /// A window passed without a corner; the search goes on at crossing speed.
+    StepLate = 202,
+    /// A step of the table was not found.
+    StepMissing = 203,
+    /// A corner was met where the table has none.
+    StepExtra = 204,
+    /// The preload that the gap asks for exceeds the limit: the crossing is slowed.
+    PreloadLimited = 205,
+    /// Even the least crossing speed does not hold the gap within the preload limit.
+    SpeedFloor = 206,
+    /// A speed was moved out of a mode's band.
+    ResonanceAvoided = 207,
+    /// The stiffness estimate reached the end of its range.
+    AdaptationBounded = 208,
+    /// The drive waits before a corner for the preload to stand.
+    PreloadWait = 209,
+    /// The friction utilisation leaves less than the wanted margin.
+    SlipMarginLow = 210,
+}
+
+impl Limit {
+    /// Every limit, in the order of codes.
+    pub const ALL: [Self; 10] = [
+        Self::StepEarly,
+        Self::StepLate,
+        Self::StepMissing,
+        Self::StepExtra,
+        Self::PreloadLimited,
+        Self::SpeedFloor,
+        Self::ResonanceAvoided,
+        Self::AdaptationBounded,
+        Self::PreloadWait,
+        Self::SlipMarginLow,
+    ];
+
+    /// The stable code.
+    #[must_use]
+    pub const fn code(self) -> u16 {
+        self as u16
+    }
+
+    /// One sentence for the operator.
+    #[must_use]
+    pub const fn sentence(self) -> &'static str {
+        match self {
+            Self::StepEarly => "a corner was met before its window",
+            Self::StepLate => {
+                "a step's window passed without a corner; searching on at crossing speed"
+            }
+            Self::StepMissing => "a step of the table was not found",
+            Self::StepExtra => "a corner was met where the step table has none",
+            Self::PreloadLimited => "the preload limit was reached: the crossing is slowed",
+            Self::SpeedFloor => {
+                "the least crossing speed does not hold the gap within the preload limit"
+            }
+            Self::ResonanceAvoided => "a speed was moved out of a structural mode's band",
+            Self::AdaptationBounded => "the stiffness estimate reached the end of its range",
+            Self::PreloadWait => "waiting before a corner for the preload to stand",
+            Self::SlipMarginLow => "the friction utilisation leaves less than the wanted margin",
+        }
+    }
+}

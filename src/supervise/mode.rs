@@ -1,0 +1,84 @@
+//! What the drive is doing, and what an operator may ask for.
+
+use super::Fault;
+
+/// An operator's command, from the board button or the log channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub enum Command {
+    /// Deploy from where the wheel stands.
+    Start,
+    /// Come to rest and hold.
+    Stop,
+    /// Retract from where the wheel stands.
+    Retract,
+    /// Leave the fault hold, or zero the sensors anew when idle at the stow end.
+    Reset,
+}
+
+/// Sense of axial motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub enum Direction {
+    /// Outwards, onto the smaller radius: the wheel climbs the steps.
+    Deploy,
+    /// Back: the wheel drops off the steps.
+    Retract,
+}
+
+impl Direction {
+    /// +1 outwards, -1 back.
+    #[must_use]
+    pub const fn sign(self) -> i32 {
+        match self {
+            Self::Deploy => 1,
+            Self::Retract => -1,
+        }
+    }
+}
+
+/// Part of a run between two steps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub enum Leg {
+    /// On the continuous wall, no step inside the horizon.
+    Cruise,
+    /// A step lies ahead: preload is raised and the speed brought to crossing speed.
+    Approach,
+    /// The wheel touches the corner.
+    Crossing,
+    /// On the next wall: preload returns to cruise, the ledger is closed.
+    Settle,
+}
+
+/// What the drive is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub enum Mode {
+    /// Waiting for every sensor's first reading.
+    Boot,
+    /// Checking that readings are in range and at rest.
+    SelfTest,
+    /// Averaging the zero of pressure and displacement, unloaded.
+    Zero,
+    /// At rest, bridges off, gears holding.
+    Idle,
+    /// Bringing the preload to cruise before moving.
+    Preload(Direction),
+    /// Under way.
+    Run(Direction, Leg),
+    /// Braking to rest on command.
+    Stopping(Direction),
+    /// Arrived at the end of travel; bridges off, gears holding.
+    Complete(Direction),
+    /// A fault is latched; bridges off, gears holding, preload in the spring.
+    FaultHold(Fault),
+}
+
+impl Mode {
+    /// Whether the drive may turn in this mode.
+    #[must_use]
+    pub const fn moves(self) -> bool {
+        matches!(self, Self::Run(..) | Self::Stopping(_))
+    }
+}

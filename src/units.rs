@@ -1,0 +1,108 @@
+//! Fixed-point quantities, named by what they measure.
+//!
+//! Every quantity of the control path is a [`Q16`]: 32 bits, 16 of them
+//! fraction, saturating in every operation. One format keeps the tick in single
+//! 32 x 32 -> 64 multiplies and makes the same bits on host and target. Range
+//! and resolution are stated per alias; what needs more is an accumulator of its
+//! own (see [`Travel`]).
+
+use fixed::types::{I16F16, I32F32};
+
+pub use fixed::Saturating;
+
+/// Saturating Q15.16: range -32768 to 32767.99998, LSB 2^-16 = 15.3e-6.
+pub type Q16 = Saturating<I16F16>;
+
+/// Length or position, mm. LSB 15 nm; the rig spans 0.4 m, headroom 80-fold.
+pub type Millimetres = Q16;
+
+/// Speed, mm/s. LSB 15 nm/s; the drive ends at 100 mm/s, headroom 300-fold.
+pub type MillimetresPerSecond = Q16;
+
+/// Acceleration, mm/s^2. LSB 15 nm/s^2; limits lie below 2000, headroom 16-fold.
+pub type MillimetresPerSecond2 = Q16;
+
+/// Force, N. LSB 15 uN; sensors end at 200 N, headroom 160-fold.
+pub type Newtons = Q16;
+
+/// Rate of force, N/s. LSB 15 uN/s; slews lie below 200 N/s, headroom 160-fold.
+pub type NewtonsPerSecond = Q16;
+
+/// Duration, s. LSB 15 us; horizons lie below 600 s, headroom 50-fold.
+pub type Seconds = Q16;
+
+/// Dimensionless ratio: friction, utilisation, stiffness scale, Deborah number.
+pub type Ratio = Q16;
+
+/// Accumulated position, mm, Q31.32: LSB 0.23 pm, so that a millisecond at
+/// 1 mm/s (4.3e6 LSB) is integrated without a rounding drift. Wraps never:
+/// 2^31 mm is 2000 km.
+pub type Travel = I32F32;
+
+/// Time in control ticks of one millisecond since boot; wraps after 49.7 days,
+/// compared by wrapping difference only.
+pub type Tick = u32;
+
+/// Control ticks in a second, the rate of the motor task.
+pub const TICK_HZ: u32 = 1000;
+
+/// A constant [`Q16`] from millionths, rounded towards zero: `q16(1_500_000)` is 1.5.
+///
+/// Range of the argument: +-32_767_000_000; outside it the build fails when used
+/// in a constant.
+#[must_use]
+pub const fn q16(millionths: i64) -> Q16 {
+    let bits = millionths * 65_536 / 1_000_000;
+    assert!(bits >= i32::MIN as i64 && bits <= i32::MAX as i64);
+    Saturating(I16F16::from_bits(bits as i32))
+}
+
+/// Distance covered in one tick at `speed`, mm, exact to half an LSB of [`Travel`].
+#[must_use]
+pub fn per_tick(speed: MillimetresPerSecond) -> Travel {
+    // 2^32 / 1000 rounded: Q16 x Q32 -> Q48, shifted to Q32.
+    const TICK_Q32: i64 = 4_294_967;
+    Travel::from_bits((i64::from(speed.0.to_bits()) * TICK_Q32) >> 16)
+}
+
+/// A duration in whole ticks as seconds, saturating at 32767 s.
+#[must_use]
+pub fn ticks_to_seconds(ticks: u32) -> Seconds {
+    // 2^16 / 1000 = 65.536 = 8_589_935 / 2^17 within 4e-9.
+    let bits = (u64::from(ticks) * 8_589_935) >> 17;
+    Saturating(I16F16::from_bits(i32::try_from(bits).unwrap_or(i32::MAX)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn constants_are_exact_where_they_can_be() {
+        assert_eq!(q16(1_500_000).to_num::<f64>(), 1.5);
+        assert_eq!(q16(-250_000).to_num::<f64>(), -0.25);
+    }
+
+    proptest! {
+        #[test]
+        fn a_tick_of_travel_is_speed_times_a_millisecond(bits in any::<i32>()) {
+            let speed = Saturating(I16F16::from_bits(bits));
+            let exact = speed.to_num::<f64>() * 1e-3;
+            let got = per_tick(speed).to_num::<f64>();
+            // The reciprocal is 7e-8 short of 2^32/1000; the shift floors.
+            prop_assert!((got - exact).abs() <= exact.abs() * 8e-8 + 2.4e-10);
+        }
+
+        #[test]
+        fn seconds_of_ticks_are_right_or_saturated(ticks in any::<u32>()) {
+            let exact = f64::from(ticks) * 1e-3;
+            let got = ticks_to_seconds(ticks).to_num::<f64>();
+            if exact < 32_767.0 {
+                prop_assert!((got - exact).abs() <= 1.6e-5 + exact * 4e-8);
+            } else {
+                prop_assert!(got >= 32_767.0 - 0.01);
+            }
+        }
+    }
+}
