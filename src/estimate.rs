@@ -1,5 +1,7 @@
 //! From readings to the state of motion and contact.
 
+pub mod crossing;
+pub mod odometry;
 mod stage;
 
 pub use stage::ContactStage;

@@ -1,1 +1,168 @@
-fn main() {}
+//! The firmware: clocks, resource split, spawn. Everything it runs is in the
+//! library; what is particular to the board is in [`board`].
+
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+#[cfg(target_os = "none")]
+mod board;
+
+/// The image is for the board alone; on a host this says where to go.
+#[cfg(not(target_os = "none"))]
+fn main() -> std::process::ExitCode {
+    eprintln!("interstage is firmware for the NUCLEO-G474RE and does not run here.");
+    eprintln!("Flash it with `cargo flash`, or try it without a board: `cargo rig deploy`.");
+    std::process::ExitCode::from(2)
+}
+
+#[cfg(target_os = "none")]
+mod firmware {
+    use embassy_executor::{InterruptExecutor, Spawner};
+    use embassy_stm32::gpio::AnyPin;
+    use embassy_stm32::interrupt::{self, InterruptExt, Priority};
+    use embassy_stm32::{Peri, Peripherals};
+    use interstage::control::Controller;
+    use interstage::hal::{Board, Parts};
+    use interstage::model::Planner;
+    use interstage::rig::{Rig, RigError};
+    use interstage::tasks::{self, Exchange};
+    use panic_probe as _;
+    use rtt_target::DownChannel;
+    use static_cell::StaticCell;
+
+    use crate::board::{
+        self, Nucleo, analog::Analog, angle::Angle, bridge::Bridge, bridge::Bridges,
+    };
+    use crate::board::{button::Button, console::Console, guard, guard::Guard, journal::Lines};
+    use crate::board::{light, light::Lamp, rtt, wheel::Wheel};
+
+    static EXCHANGE: Exchange = Exchange::new();
+    static CONTROLLER: StaticCell<Controller> = StaticCell::new();
+    static PLANNER: StaticCell<Planner> = StaticCell::new();
+
+    /// Runs the control tick and the sensors, above everything that may take long.
+    ///
+    /// The deadline is the next tick, 1 ms on. What can delay this executor: the
+    /// interrupts above it, which only wake tasks (time driver, four DMA channels,
+    /// button), and critical sections, of which the longest encodes one log frame,
+    /// bounded by its buffer. What can delay the tick on it: the four sensor tasks,
+    /// each of which starts or fetches one transfer and then waits. Model, log and
+    /// operator run in thread mode and are preempted, however long they take. The
+    /// tick measures its own lateness, and a whole period of it is a fault.
+    static CONTROL: InterruptExecutor = InterruptExecutor::new();
+
+    /// The board has no use for UART5; its vector carries [`CONTROL`].
+    #[embassy_stm32::interrupt]
+    unsafe fn UART5() {
+        // SAFETY: this is the executor's handler, unmasked by `start` alone.
+        unsafe { CONTROL.on_interrupt() }
+    }
+
+    #[embassy_executor::main]
+    async fn main(threads: Spawner) {
+        let channels = rtt::init();
+        let p = embassy_stm32::init(board::clocks());
+        defmt::info!("interstage {=str}", env!("CARGO_PKG_VERSION"));
+        guard::report_restart();
+        guard::arm();
+        let (parts, lamp) = split(p, channels.console);
+        threads.spawn(light::show(lamp).unwrap());
+        match build() {
+            Ok((controller, planner)) => start(threads, parts, controller, planner),
+            Err(error) => threads.spawn(board::hold(parts, error).unwrap()),
+        }
+    }
+
+    /// The rig's parameters in machine units, in place for good.
+    fn build() -> Result<(&'static Controller, &'static Planner), RigError> {
+        let rig = Rig::prototype();
+        let controller = CONTROLLER.init(Controller::try_build(&rig)?);
+        let planner = PLANNER.init(Planner::try_build(&rig)?);
+        Ok((controller, planner))
+    }
+
+    /// Who gets which peripheral and pin; the bridges come up off.
+    fn split(p: Peripherals, console: DownChannel) -> (Parts<Nucleo>, Peri<'static, AnyPin>) {
+        let parts = Parts {
+            wheel: Wheel::new(p.TIM5, p.PA0, p.PA1),
+            load_cell: Analog::new(p.ADC1, p.PC2, p.DMA1_CH1),
+            tread: Analog::new(p.ADC2, p.PC3, p.DMA1_CH2),
+            arm: Angle::new(p.SPI1, (p.PB3, p.PA7, p.PA6), (p.DMA1_CH4, p.DMA1_CH3), p.PB10.into()),
+            motors: Bridges {
+                drive: Bridge::new(p.TIM1, p.PA8, p.PA9.into(), p.PA10.into(), p.PB12),
+                preload: Bridge::new(p.TIM8, p.PC6, p.PC8.into(), p.PC9.into(), p.PB7),
+            },
+            watchdog: Guard::new(p.IWDG),
+            button: Button::new(p.PC13, p.EXTI13),
+            console: Console::new(console),
+            journal: Lines::default(),
+            light: Lamp,
+        };
+        (parts, p.PA5.into())
+    }
+
+    /// Hands every part to its task.
+    fn start(
+        threads: Spawner,
+        mut parts: Parts<Nucleo>,
+        controller: &'static Controller,
+        planner: &'static Planner,
+    ) {
+        interrupt::UART5.set_priority(Priority::P6);
+        let control = CONTROL.start(interrupt::UART5);
+        parts.watchdog.start();
+        control.spawn(speed(parts.wheel).unwrap());
+        control.spawn(pressure(parts.load_cell).unwrap());
+        control.spawn(displacement(parts.tread).unwrap());
+        control.spawn(angle(parts.arm).unwrap());
+        control.spawn(motors(parts.motors, parts.watchdog, controller).unwrap());
+        threads.spawn(model(planner).unwrap());
+        threads.spawn(pressed(parts.button).unwrap());
+        threads.spawn(typed(parts.console).unwrap());
+        threads.spawn(journal(parts.journal, parts.light).unwrap());
+    }
+
+    #[embassy_executor::task]
+    async fn speed(wheel: Wheel) -> ! {
+        tasks::speed(wheel, &EXCHANGE).await
+    }
+
+    #[embassy_executor::task]
+    async fn pressure(input: <Nucleo as Board>::LoadCell) -> ! {
+        tasks::pressure(input, &EXCHANGE).await
+    }
+
+    #[embassy_executor::task]
+    async fn displacement(input: <Nucleo as Board>::Tread) -> ! {
+        tasks::displacement(input, &EXCHANGE).await
+    }
+
+    #[embassy_executor::task]
+    async fn angle(bus: Angle) -> ! {
+        tasks::angle(bus, &EXCHANGE).await
+    }
+
+    #[embassy_executor::task]
+    async fn motors(motors: Bridges, watchdog: Guard, controller: &'static Controller) -> ! {
+        tasks::motors(motors, watchdog, controller, &EXCHANGE).await
+    }
+
+    #[embassy_executor::task]
+    async fn model(planner: &'static Planner) -> ! {
+        tasks::model(planner, &EXCHANGE).await
+    }
+
+    #[embassy_executor::task]
+    async fn pressed(button: Button) -> ! {
+        tasks::operator(button, &EXCHANGE).await
+    }
+
+    #[embassy_executor::task]
+    async fn typed(console: Console) -> ! {
+        tasks::operator(console, &EXCHANGE).await
+    }
+
+    #[embassy_executor::task]
+    async fn journal(journal: Lines, light: Lamp) -> ! {
+        tasks::journal(journal, light, &EXCHANGE).await
+    }
+}

@@ -1,5 +1,12 @@
 //! The reduced collision-vibration model and the schedule made from it.
 
+pub mod constants;
+pub mod formula;
+pub mod guard;
 mod plan;
+pub mod planner;
+pub mod reduced;
+pub mod timing;
 
-pub use plan::{Plan, PlanRequest, Planner};
+pub use plan::{Outcome, Plan, PlanRequest, Review, Strategy};
+pub use planner::Planner;

@@ -120,10 +120,11 @@ pub struct Pretightener {
     /// Largest radial preload, N. Published: 50 on the rig; a third more than that
     /// of the study's scale (150) there.
     pub limit_n: f64,
-    /// Spring rate seen at the wheel, N/mm. Derived: the limit within the 20 mm that
-    /// remain of the published extension of 12 to 35 mm.
+    /// Spring rate seen at the wheel, N/mm. Derived: the pre-tightener acts half-way
+    /// along the arm, and the limit must lie within the published 23 mm of extension:
+    /// 2 x 50 N / 23 mm x 1/4 = 1.1, taken as 1.2.
     pub spring_n_per_mm: f64,
-    /// Largest rate of preload, N/s. Chosen: 10 mm/s of screw.
+    /// Largest rate of preload, N/s. Chosen: 10 mm/s of screw at that stiffness.
     pub slew_n_per_s: f64,
     /// Dead time between command and screw, s. Chosen.
     pub delay_s: f64,

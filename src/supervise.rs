@@ -2,6 +2,10 @@
 
 mod fault;
 mod mode;
+mod monitor;
+mod transition;
 
 pub use fault::{Fault, Limit};
 pub use mode::{Command, Direction, Leg, Mode};
+pub use monitor::{Monitor, MonitorState, Observed};
+pub use transition::{Trigger, next};

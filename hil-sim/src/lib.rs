@@ -1,4 +1,12 @@
 //! The virtual rig: a physical plant for the controller, the scenarios it is run
 //! in, and what is shown of a run.
 
+pub mod constants;
+pub mod export;
+pub mod plant;
+pub mod progress;
 pub mod record;
+pub mod reference;
+pub mod report;
+pub mod scenario;
+pub mod table;

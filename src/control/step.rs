@@ -1,15 +1,35 @@
 //! One tick of the controller.
 
-use crate::hal::MotorCommand;
-use crate::log::Entry;
+#![deny(clippy::float_arithmetic)]
+
+mod build;
+mod crossing;
+mod modes;
+mod state;
+
+use super::preload_loop::PreloadLoop;
+use super::profile::Profile;
+use super::rise::Rise;
+use super::schedule::{Course, Schedule, Targets};
+use super::speed_loop::SpeedLoop;
+use crate::estimate::ContactStage;
+use crate::estimate::crossing::{Contact, CrossingWatch};
+use crate::hal::{Duty, MotorCommand};
+use crate::log::{Entry, Event, Telemetry};
 use crate::model::{Plan, PlanRequest};
-use crate::rig::{Rig, RigError};
+use crate::rig::MAX_STEPS;
 use crate::sense::raw::SensorFrame;
-use crate::supervise::Command;
-use crate::units::Tick;
+use crate::sense::{SensedState, Senses};
+use crate::supervise::{Command, Direction, Leg, Mode, Monitor, Observed, Trigger};
+use crate::units::{Millimetres, Newtons, NewtonsPerSecond, Q16, Ratio, Seconds, Tick, q16};
+
+pub use state::State;
 
 /// Most log entries one tick can give.
 pub const EVENTS_PER_TICK: usize = 8;
+
+/// Log entries of one tick.
+pub type Events = heapless::Vec<Entry, EVENTS_PER_TICK>;
 
 /// What a tick is given.
 #[derive(Clone, Copy, Debug, Default)]
@@ -22,6 +42,8 @@ pub struct Input {
     pub command: Option<Command>,
     /// Answer to an earlier [`Output::request`].
     pub plan: Option<Plan>,
+    /// This tick starts more than a period late.
+    pub overrun: bool,
 }
 
 /// What a tick gives.
@@ -34,31 +56,259 @@ pub struct Output {
     /// Work for the model task: the schedule of the segment ahead.
     pub request: Option<PlanRequest>,
     /// What happened.
-    pub events: heapless::Vec<Entry, EVENTS_PER_TICK>,
+    pub events: Events,
     /// State after the tick.
-    pub telemetry: crate::log::Telemetry,
+    pub telemetry: Telemetry,
 }
 
 /// The controller's configuration in machine units; its state is apart.
 #[derive(Clone, Debug)]
-pub struct Controller {}
+pub struct Controller {
+    senses: Senses,
+    monitor: Monitor,
+    watch: CrossingWatch,
+    rise: Rise,
+    schedule: Schedule,
+    profile: Profile,
+    speed_loop: SpeedLoop,
+    preload_loop: PreloadLoop,
+    /// Step positions, mm, from the stow end.
+    steps: heapless::Vec<Millimetres, MAX_STEPS>,
+    travel: Millimetres,
+    /// Spring rate of the pre-tightener, N/mm.
+    spring: Q16,
+    /// Dead time and lag of the pre-tightener, s.
+    foresight: Seconds,
+    /// Axial load on this wheel, N.
+    load: Newtons,
+    /// Radial force per axial load and tangent of the arm angle.
+    coupling: Ratio,
+    friction: Ratio,
+}
 
-/// What the controller remembers between ticks.
-#[derive(Clone, Debug, Default)]
-pub struct State {}
+/// What one tick carries from stage to stage.
+struct Pass<'a> {
+    now: Tick,
+    sensed: &'a SensedState,
+    position: Millimetres,
+    events: Events,
+    request: Option<PlanRequest>,
+}
+
+impl Pass<'_> {
+    fn log(&mut self, event: Event) {
+        // A tick that has more to say than fits says the first eight.
+        let _ = self.events.push(Entry { at: self.now, event });
+    }
+}
 
 impl Controller {
-    /// Turns a rig into machine units, once.
-    ///
-    /// # Errors
-    /// [`RigError`] if a parameter is out of range or does not fit the others.
-    pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
-        rig.validate()?;
-        Ok(Self {})
+    /// One tick: sensors, faults, command, mode, phase, schedule, loops.
+    pub fn step(&self, state: &mut State, input: &Input) -> Output {
+        let acceleration = state.acceleration();
+        let sensed =
+            self.senses.step(&mut state.senses, input.now, &input.sensors, acceleration);
+        let mut pass = Pass {
+            now: input.now,
+            sensed: &sensed,
+            position: state.odometry.position(sensed.travel),
+            events: Events::new(),
+            request: None,
+        };
+        self.take_plan(state, &mut pass, input.plan);
+        self.look_for_faults(state, &mut pass, input.overrun);
+        self.take_command(state, &mut pass, input.command);
+        self.advance_mode(state, &mut pass);
+        self.follow_contact(state, &mut pass);
+        let targets = self.targets(state, &mut pass);
+        let (drive, preload) = self.actuate(state, &pass, &targets);
+        self.note_stage(state, &mut pass);
+        let telemetry = self.telemetry(state, &pass, &targets, drive, preload);
+        Output { drive, preload, request: pass.request, events: pass.events, telemetry }
     }
 
-    /// One tick.
-    pub fn step(&self, _state: &mut State, _input: &Input) -> Output {
-        unimplemented!()
+    fn look_for_faults(&self, state: &mut State, pass: &mut Pass<'_>, overrun: bool) {
+        let observed = Observed {
+            mode: state.mode,
+            sensed: pass.sensed,
+            speed_ref: state.signed_speed(),
+            preload_due: state.preload_loop.due(),
+            overrun,
+        };
+        if let Some(fault) = self.monitor.step(&mut state.monitor, &observed) {
+            self.trigger(state, pass, Trigger::Fault(fault));
+        }
+    }
+
+    fn take_command(&self, state: &mut State, pass: &mut Pass<'_>, command: Option<Command>) {
+        let Some(command) = command else { return };
+        if self.trigger(state, pass, Trigger::Command(command)) {
+            pass.log(Event::Command(command));
+        } else {
+            pass.log(Event::Refused(command));
+        }
+    }
+
+    /// Where the wheel is on its way.
+    fn course(&self, state: &State, pass: &Pass<'_>, direction: Direction) -> Course {
+        let distance = self.step_position(state.next_step).map(|face| match direction {
+            Direction::Deploy => face - pass.position,
+            Direction::Retract => pass.position - face,
+        });
+        Course {
+            direction,
+            distance,
+            remaining: self.schedule.remaining(direction, pass.position),
+            critical: state.critical(),
+            preload: pass.sensed.preload_filtered,
+        }
+    }
+
+    /// Schedule of this tick; holds what stands where nothing runs.
+    fn targets(&self, state: &mut State, pass: &mut Pass<'_>) -> Targets {
+        let hold = Targets {
+            speed: Q16::ZERO,
+            preload: state.preload_loop.reference(),
+            approaching: false,
+            waiting: false,
+        };
+        let (direction, running) = match state.mode {
+            Mode::Preload(direction) => (direction, false),
+            Mode::Run(direction, _) => (direction, true),
+            _ => return hold,
+        };
+        let Some(plan) = state.plan else { return hold };
+        let course = self.course(state, pass, direction);
+        let mut targets = self.schedule.targets(&self.rise, &plan, &course);
+        if !running {
+            targets.speed = Q16::ZERO;
+            return targets;
+        }
+        self.watch_expectation(state, pass, &course);
+        if state.slow_down() {
+            targets.speed = targets.speed.min(plan.cross_speed);
+            targets.preload = plan.cross_preload;
+        }
+        self.note_preload(state, pass, &plan, &targets);
+        let leg = state.leg(targets.approaching);
+        if state.mode != Mode::Run(direction, leg) {
+            self.trigger(state, pass, Trigger::Leg(leg));
+        }
+        targets
+    }
+
+    /// Loops and bridges.
+    fn actuate(
+        &self,
+        state: &mut State,
+        pass: &Pass<'_>,
+        targets: &Targets,
+    ) -> (MotorCommand, MotorCommand) {
+        let direction = match state.mode {
+            Mode::Run(direction, _) | Mode::Stopping(direction) => direction,
+            Mode::Preload(_) => {
+                state.profile.halt();
+                state.speed_loop.reset();
+                let preload = self.regulate(state, pass, targets, Q16::ZERO);
+                return (MotorCommand::OFF, preload);
+            }
+            _ => {
+                state.halt();
+                return (MotorCommand::OFF, MotorCommand::OFF);
+            }
+        };
+        self.profile.step(&mut state.profile, targets.speed);
+        state.direction = direction;
+        let ahead = self.ahead(state, pass, Q16::ZERO);
+        let slope = self.rise.slope(ahead);
+        let pressed = pass.sensed.preload_filtered + self.wedge(pass);
+        let load = self.load + pressed * slope;
+        let (wanted, measured) = (state.signed_speed(), pass.sensed.speed.value);
+        let duty = self.speed_loop.step(&mut state.speed_loop, wanted, measured, load);
+        // The slope under the wheel when this tick's duty moves the screw.
+        let later = self.ahead(state, pass, wanted * self.foresight);
+        let drift = self.spring * self.rise.slope(later) * wanted;
+        let preload = self.regulate(state, pass, targets, drift);
+        (MotorCommand { duty, enable: true }, preload)
+    }
+
+    fn regulate(
+        &self,
+        state: &mut State,
+        pass: &Pass<'_>,
+        targets: &Targets,
+        drift: NewtonsPerSecond,
+    ) -> MotorCommand {
+        let measured = pass.sensed.preload.value;
+        let duty =
+            self.preload_loop.step(&mut state.preload_loop, targets.preload, measured, drift);
+        MotorCommand { duty, enable: true }
+    }
+
+    /// Distance outwards from where the centre will be after `way` to the nearest
+    /// face that is ahead of it, mm; large if there is none.
+    fn ahead(&self, state: &State, pass: &Pass<'_>, way: Millimetres) -> Millimetres {
+        let at = pass.position + way;
+        let near = |face: &&Millimetres| **face > at;
+        let table = self.steps.iter().find(near).map(|face| *face - at);
+        state.extra_face(at).or(table).unwrap_or(Q16::MAX)
+    }
+
+    /// Radial force that the arm's inclination adds to the preload, N.
+    fn wedge(&self, pass: &Pass<'_>) -> Newtons {
+        self.coupling * self.load * pass.sensed.tan_arm
+    }
+
+    fn step_position(&self, step: u8) -> Option<Millimetres> {
+        self.steps.get(usize::from(step).checked_sub(1)?).copied()
+    }
+
+    fn note_stage(&self, state: &mut State, pass: &mut Pass<'_>) {
+        let stage = match (state.mode, state.watch.contact) {
+            (Mode::Run(..) | Mode::Stopping(_), Contact::Both) => ContactStage::StaticFriction,
+            (Mode::Run(..) | Mode::Stopping(_), Contact::Corner) => ContactStage::Sliding,
+            (Mode::Run(..) | Mode::Stopping(_), Contact::Leaving) => ContactStage::Rolling,
+            (Mode::Run(..) | Mode::Stopping(_), Contact::Wall) => ContactStage::Continuous,
+            (Mode::Preload(_), _) => ContactStage::Preloaded,
+            _ if pass.sensed.preload_filtered > q16(1_000_000) => state.stage,
+            _ => ContactStage::Initial,
+        };
+        if stage != state.stage {
+            state.stage = stage;
+            pass.log(Event::Stage(stage));
+        }
+    }
+
+    fn telemetry(
+        &self,
+        state: &State,
+        pass: &Pass<'_>,
+        targets: &Targets,
+        drive: MotorCommand,
+        preload: MotorCommand,
+    ) -> Telemetry {
+        let duty = |command: MotorCommand| if command.enable { command.duty } else { Duty::ZERO };
+        let crossing = matches!(state.mode, Mode::Run(_, Leg::Crossing | Leg::Approach));
+        let planned = state.plan.map_or(self.friction, |plan| plan.slip_margin);
+        let pressed = pass.sensed.preload_filtered + self.wedge(pass);
+        let rolling = self.friction - crate::numeric::divide(self.load, pressed);
+        Telemetry {
+            at: pass.now,
+            mode: state.mode,
+            stage: state.stage,
+            position: pass.position,
+            speed: pass.sensed.speed.value,
+            speed_ref: state.signed_speed(),
+            preload: pass.sensed.preload.value,
+            preload_ref: targets.preload,
+            compression: pass.sensed.compression.value,
+            radius: pass.sensed.radius.value,
+            level: state.level,
+            gap_predicted: state.plan.map_or(Q16::ZERO, |plan| plan.gap),
+            slip_margin: if crossing { planned.min(rolling) } else { rolling },
+            distance: self.course(state, pass, state.direction).distance.unwrap_or(Q16::MAX),
+            drive: duty(drive),
+            pretightener: duty(preload),
+        }
     }
 }

@@ -1,38 +1,96 @@
-//! The schedule of one segment: from the present position over the next step.
+//! What the tick asks the model task, and what it is answered.
 
-use crate::rig::{Rig, RigError};
+use crate::supervise::{Direction, Limit};
+use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Ratio};
 
-/// What the tick asks the model task for.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// How preload and speed are chosen. The product is [`Strategy::Scheduled`]; the
+/// others are what it is compared with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Strategy {
+    /// Preload raised ahead of each step as far as the speed needs.
+    #[default]
+    Scheduled,
+    /// Cruise preload throughout.
+    Constant,
+    /// The preload limit throughout.
+    Limit,
+    /// Preload raised when the step is felt.
+    Reactive,
+}
+
+/// A closed crossing, for the model to compare with its prediction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Review {
+    /// Way of the crossing.
+    pub direction: Direction,
+    /// Speed at lift-off, mm/s.
+    pub speed: MillimetresPerSecond,
+    /// Measured preload at lift-off, N.
+    pub preload: Newtons,
+    /// Tangent of the arm angle at lift-off.
+    pub tan_arm: Ratio,
+    /// Measured gap, mm.
+    pub gap: Millimetres,
+    /// Whether the gap may correct the stiffness: not after an odd crossing.
+    pub trusted: bool,
+}
+
+/// What the tick asks for: the schedule of the step ahead, and first the review of
+/// the step behind.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlanRequest {
     /// Numbers the requests, so that a late answer is told from a current one.
     pub sequence: u32,
+    /// Way of the run.
+    pub direction: Direction,
+    /// Step ahead, from 1 at the outermost sleeve; 0 when none is left.
+    pub step: u8,
+    /// Estimated over nominal stiffness.
+    pub scale: Ratio,
+    /// The crossing just closed.
+    pub review: Option<Review>,
 }
 
-/// Speed and preload for one segment.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// What the model makes of a review.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Outcome {
+    /// Gap that the model gives for the reviewed speed and preload, mm.
+    pub gap_predicted: Millimetres,
+    /// Friction left unused at that point.
+    pub slip_margin: Ratio,
+    /// Corrected stiffness scale.
+    pub scale: Ratio,
+    /// Whether the correction met the end of its range.
+    pub bounded: bool,
+}
+
+/// Speed and preload for the way to the next step and over it.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan {
     /// Sequence of the request answered.
     pub sequence: u32,
-}
-
-/// The model side of the schedule; runs outside the tick.
-#[derive(Clone, Debug)]
-pub struct Planner {}
-
-impl Planner {
-    /// Turns a rig into machine units, once.
-    ///
-    /// # Errors
-    /// [`RigError`] if a parameter is out of range.
-    pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
-        rig.validate()?;
-        Ok(Self {})
-    }
-
-    /// Answers a request.
-    #[must_use]
-    pub fn plan(&self, request: &PlanRequest) -> Plan {
-        Plan { sequence: request.sequence }
-    }
+    /// Step that it is for; 0 when none is left.
+    pub step: u8,
+    /// Way of the run.
+    pub direction: Direction,
+    /// Speed between the steps, mm/s.
+    pub cruise_speed: MillimetresPerSecond,
+    /// Speed at the step, mm/s.
+    pub cross_speed: MillimetresPerSecond,
+    /// Preload between the steps, N.
+    pub cruise_preload: Newtons,
+    /// Preload at the step, N.
+    pub cross_preload: Newtons,
+    /// Gap that this gives, mm.
+    pub gap: Millimetres,
+    /// Friction left unused at the step.
+    pub slip_margin: Ratio,
+    /// Way that braking from cruise to crossing speed takes, mm.
+    pub brake_way: Millimetres,
+    /// Way before the window at which the preload starts to rise, mm.
+    pub ramp_way: Millimetres,
+    /// Limits met, in the order found.
+    pub limits: [Option<Limit>; 3],
+    /// Review of the step behind.
+    pub outcome: Option<Outcome>,
 }

@@ -35,7 +35,7 @@ impl Rig {
             preload: Pretightener {
                 cruise_n: 33.3,
                 limit_n: 50.0,
-                spring_n_per_mm: 2.5,
+                spring_n_per_mm: 1.2,
                 slew_n_per_s: 25.0,
                 delay_s: 0.080,
                 lag_s: 0.060,
@@ -80,7 +80,7 @@ impl Rig {
         rig.plant.moved_mass_kg = 3.0;
         rig.preload.cruise_n = 100.0;
         rig.preload.limit_n = 150.0;
-        rig.preload.spring_n_per_mm = 7.5;
+        rig.preload.spring_n_per_mm = 3.6;
         rig.preload.slew_n_per_s = 75.0;
         rig.drive.stall_force_n = 480.0;
         rig.drive.force_limit_n = 240.0;

@@ -1,0 +1,15 @@
+//! Hands the linker the memory layout; the host build needs nothing.
+
+use std::{env, error::Error, fs, path::PathBuf};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rerun-if-changed=memory.x");
+    if env::var("CARGO_CFG_TARGET_OS")? == "none" {
+        // Copied, so that the linker finds it from whichever directory it runs in.
+        let out = PathBuf::from(env::var("OUT_DIR")?);
+        fs::copy("memory.x", out.join("memory.x"))?;
+        println!("cargo::rustc-link-search={}", out.display());
+    }
+    Ok(())
+}

@@ -1,0 +1,14 @@
+//! The rig as physics, in f64; lengths in mm, forces in N, times in s. It knows
+//! nothing of the controller's reduced model.
+
+pub mod actuators;
+pub mod arm;
+pub mod balance;
+pub mod crossing;
+pub mod draw;
+pub mod ledger;
+pub mod rig;
+pub mod ring;
+pub mod rolling;
+pub mod sensors;
+pub mod wall;

@@ -1,0 +1,160 @@
+//! The two motors: the drive with gearbox and current limit, the pre-tightener
+//! with dead time, lag, slew and spring.
+
+use std::collections::VecDeque;
+
+/// Drive motor with self-locking gearbox; forces and masses seen at the tread.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DriveMotor {
+    /// Tread speed at full duty without load, mm/s.
+    pub no_load_mm_s: f64,
+    /// Force at full duty and standstill without current limit, N.
+    pub stall_n: f64,
+    /// Force at the current limit, N.
+    pub limit_n: f64,
+    /// Rotor and gears as mass at the tread, kg.
+    pub mass_kg: f64,
+    /// Coulomb friction of the gearbox, N.
+    pub friction_n: f64,
+}
+
+impl DriveMotor {
+    /// Tread speed after `dt_s` at `duty` (-1 to 1) against `load_n` from speed
+    /// `speed`, and the motor's force, N. Exact between the current limits.
+    ///
+    /// A disabled bridge leaves the worm gear locked: the wheel stops within a few
+    /// milliseconds and holds.
+    #[must_use]
+    pub fn step(
+        &self,
+        speed: f64,
+        duty: f64,
+        enabled: bool,
+        load_n: f64,
+        dt_s: f64,
+    ) -> (f64, f64) {
+        if !enabled {
+            let stopped = speed * (-dt_s / 0.003).exp();
+            return (if stopped.abs() < 1e-3 { 0.0 } else { stopped }, 0.0);
+        }
+        let force = (self.stall_n * (duty - speed / self.no_load_mm_s))
+            .clamp(-self.limit_n, self.limit_n);
+        let free = force - load_n;
+        // Stiction of the gearbox holds a resting wheel.
+        if speed == 0.0 && free.abs() <= self.friction_n {
+            return (0.0, force);
+        }
+        let sense = if speed != 0.0 { speed.signum() } else { free.signum() };
+        let resist = load_n + sense * self.friction_n;
+        let acceleration = 1000.0 / self.mass_kg;
+        let next = if force.abs() < self.limit_n {
+            let rate = acceleration * self.stall_n / self.no_load_mm_s;
+            let rest = self.no_load_mm_s * (duty - resist / self.stall_n);
+            rest + (speed - rest) * (-rate * dt_s).exp()
+        } else {
+            speed + acceleration * (force - resist) * dt_s
+        };
+        // Friction brakes to rest, never through it; nor can the load drive the worm.
+        if next * sense <= 0.0 && duty * sense <= 0.0 { (0.0, force) } else { (next, force) }
+    }
+}
+
+/// Pre-tightener: duty commands screw speed; the spring turns way into force.
+#[derive(Clone, Debug)]
+pub struct Pretightener {
+    /// Force rate at full duty, N/s, as seen at the wheel.
+    slew: f64,
+    /// Time constant of the screw's speed, s.
+    lag: f64,
+    /// Force of the screw's position alone, N.
+    seat: f64,
+    /// Present rate, N/s.
+    rate: f64,
+    /// Duties on their way, oldest first.
+    pipeline: VecDeque<f64>,
+    /// Bounds of the screw as force at level 0, N.
+    range: (f64, f64),
+}
+
+impl Pretightener {
+    /// A pre-tightener at `seat_n`, for a step of `dt_s`.
+    #[must_use]
+    pub fn new(slew: f64, lag: f64, delay_s: f64, dt_s: f64, seat_n: f64, range: (f64, f64)) -> Self {
+        let depth = (delay_s / dt_s).round() as usize;
+        Self {
+            slew,
+            lag,
+            seat: seat_n,
+            rate: 0.0,
+            pipeline: std::iter::repeat_n(0.0, depth).collect(),
+            range,
+        }
+    }
+
+    /// Advances by the step at `duty` (-1 to 1); a disabled bridge leaves the screw
+    /// self-locked, at once.
+    pub fn step(&mut self, duty: f64, enabled: bool, dt_s: f64) {
+        self.pipeline.push_back(if enabled { duty.clamp(-1.0, 1.0) } else { 0.0 });
+        let delayed = self.pipeline.pop_front().unwrap_or(0.0);
+        if !enabled {
+            self.rate = 0.0;
+            return;
+        }
+        // Exact for the lag under a held command.
+        let target = delayed * self.slew;
+        let keep = (-dt_s / self.lag).exp();
+        let moved = target * dt_s + (self.rate - target) * self.lag * (1.0 - keep);
+        self.rate = target + (self.rate - target) * keep;
+        let next = self.seat + moved;
+        self.seat = next.clamp(self.range.0, self.range.1);
+        if next != self.seat {
+            self.rate = 0.0;
+        }
+    }
+
+    /// Force of the screw's position at the undeformed wheel on level 0, N; the
+    /// spring adds its rate times what the wheel has moved inwards.
+    #[must_use]
+    pub fn seat_n(&self) -> f64 {
+        self.seat
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_drive_settles_where_torque_meets_load() {
+        let drive = DriveMotor {
+            no_load_mm_s: 60.0,
+            stall_n: 160.0,
+            limit_n: 80.0,
+            mass_kg: 40.0,
+            friction_n: 2.0,
+        };
+        let mut speed = 0.0;
+        for _ in 0..2000 {
+            speed = drive.step(speed, 0.5, true, 10.0, 1e-3).0;
+        }
+        assert!((speed - 60.0 * (0.5 - 12.0 / 160.0)).abs() < 1e-6, "{speed}");
+        for _ in 0..50 {
+            speed = drive.step(speed, 0.5, false, 10.0, 1e-3).0;
+        }
+        assert_eq!(speed, 0.0);
+    }
+
+    #[test]
+    fn the_screw_waits_lags_and_slews() {
+        let mut screw = Pretightener::new(25.0, 0.06, 0.08, 1e-3, 0.0, (0.0, 60.0));
+        let mut at = Vec::new();
+        for _ in 0..1000 {
+            screw.step(1.0, true, 1e-3);
+            at.push(screw.seat_n());
+        }
+        assert_eq!(at[79], 0.0);
+        assert!(at[100] > 0.0);
+        // Ramp minus delay and lag: 25 * (1 - 0.08 - 0.06).
+        assert!((at[999] - 21.5).abs() < 0.05, "{}", at[999]);
+    }
+}

@@ -1,0 +1,181 @@
+//! One rig as built: the nominal parameters with the mismatch of a seed.
+
+use interstage::rig::Rig;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::actuators::DriveMotor;
+use super::arm::Arm;
+use super::ring::RingParameters;
+use super::wall::{Step, Wall};
+use crate::scenario::{Noise, Scenario};
+
+/// Elements of the ring in a deployment: the gap is within 0.1 % of a ring eight
+/// times as fine.
+pub const ELEMENTS: usize = 1440;
+
+/// The parameters of one plant.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlantParameters {
+    /// Wheel and rubber.
+    pub ring: RingParameters,
+    /// The steps as machined.
+    pub wall: Wall,
+    /// Arm.
+    pub arm: Arm,
+    /// Radius of the outermost wall, mm.
+    pub wall_radius_mm: f64,
+    /// Travel between the end stops, mm.
+    pub stops_mm: (f64, f64),
+    /// Friction of tread on wall.
+    pub mu: f64,
+    /// Creepage at 63 % of friction.
+    pub elastic_creep: f64,
+    /// Axial load on this wheel, N.
+    pub load_n: f64,
+    /// Moved mass, kg.
+    pub mass_kg: f64,
+    /// Drive motor.
+    pub drive: DriveMotor,
+    /// Rate of the preload spring, N/mm.
+    pub spring_n_per_mm: f64,
+    /// Largest rate of preload, N/s.
+    pub slew_n_per_s: f64,
+    /// Lag of the screw, s.
+    pub lag_s: f64,
+    /// Dead time of the screw, s.
+    pub delay_s: f64,
+    /// Largest force of the screw's position, N.
+    pub seat_max_n: f64,
+    /// Modes of the arm, Hz.
+    pub modes_hz: Vec<f64>,
+    /// Torque ripple: amplitude, N, and its pitch at the tread, mm.
+    pub ripple: (f64, f64),
+    /// Sensors as calibrated and as they are.
+    pub sensors: SensorParameters,
+}
+
+/// Sensors of one plant.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SensorParameters {
+    /// Encoder counts per turn.
+    pub counts_per_turn: f64,
+    /// Full scale at 90 % of the converter, N.
+    pub load_cell_full_scale_n: f64,
+    /// Gain error factor.
+    pub load_cell_gain: f64,
+    /// Full scale at 90 % of the converter, mm.
+    pub tread_full_scale_mm: f64,
+    /// Gain error factor.
+    pub tread_gain: f64,
+    /// Code with the arm along the pillar.
+    pub angle_zero_code: f64,
+    /// Zero error, rad.
+    pub angle_zero_rad: f64,
+    /// Noise and delays.
+    pub noise: Noise,
+}
+
+/// Draws from the spread, each kind of number from its own place in the stream, so
+/// that a new parameter does not change the others.
+struct Draw(ChaCha8Rng);
+
+impl Draw {
+    /// A factor around 1 with this relative standard deviation, cut at three of them.
+    fn factor(&mut self, deviation: f64) -> f64 {
+        let normal: f64 = StandardNormal.sample(&mut self.0);
+        1.0 + deviation * normal.clamp(-3.0, 3.0)
+    }
+
+    /// An offset within this half-width.
+    fn offset(&mut self, half_width: f64) -> f64 {
+        half_width * (2.0 * self.0.random::<f64>() - 1.0)
+    }
+
+    /// A number from 0 to this.
+    fn up_to(&mut self, most: f64) -> f64 {
+        most * self.0.random::<f64>()
+    }
+}
+
+impl PlantParameters {
+    /// The plant of the scenario's seed. Seed 0 is the nominal rig without mismatch;
+    /// its sensors still quantise and make noise.
+    #[must_use]
+    pub fn draw(scenario: &Scenario) -> Self {
+        let nominal = crate::scenario::Spread::none();
+        let spread = if scenario.run.seed == 0 { &nominal } else { &scenario.spread };
+        let rig: &Rig = &scenario.rig;
+        let mut draw = Draw(ChaCha8Rng::seed_from_u64(scenario.run.seed));
+        let k_inf = rig.tread.k_inf_pa_per_m * 1e-9 * draw.factor(spread.k_inf_rel);
+        let stiffening = 1.0 + (rig.tread.stiffening - 1.0) * draw.factor(spread.stiffening_rel);
+        let tau_s = rig.tread.tau_s * draw.factor(spread.tau_rel);
+        let mu = rig.plant.mu * draw.factor(spread.mu_rel);
+        let load =
+            rig.plant.top_load_n * rig.plant.top_load_share * draw.factor(spread.top_load_rel);
+        let spring_n_per_mm = rig.preload.spring_n_per_mm * draw.factor(spread.spring_rel);
+        let delay_s = (rig.preload.delay_s * draw.factor(spread.delay_rel)).max(0.0);
+        let lag_s = rig.preload.lag_s * draw.factor(spread.lag_rel);
+        let slew_n_per_s = rig.preload.slew_n_per_s * draw.factor(spread.slew_rel);
+        let radius_mm = rig.rig.wheel_radius_mm + draw.offset(spread.wheel_radius_mm)
+            - draw.up_to(spread.wear_mm);
+        let load_cell_gain = draw.factor(spread.load_cell_gain_rel);
+        let tread_gain = draw.factor(spread.tread_gain_rel);
+        let angle_zero_rad = draw.offset(spread.arm_zero_deg).to_radians();
+        let steps = scenario
+            .true_steps_mm()
+            .into_iter()
+            .map(|position| Step {
+                position_mm: position + draw.offset(spread.step_position_mm),
+                height_mm: rig.rig.step_height_mm + draw.offset(spread.step_height_mm),
+            })
+            .collect();
+        Self {
+            ring: RingParameters {
+                radius_mm,
+                width_mm: rig.rig.wheel_width_mm,
+                k_inf,
+                k_0: k_inf * stiffening,
+                tau_s,
+                elements: ELEMENTS,
+            },
+            wall: Wall::new(steps),
+            arm: Arm {
+                length_mm: rig.rig.arm_length_mm,
+                pivot_mm: rig.rig.arm_pivot_radius_mm,
+                coupling: rig.plant.arm_coupling,
+            },
+            wall_radius_mm: rig.rig.wall_radius_mm,
+            stops_mm: (0.0, rig.rig.travel_mm + 5.0),
+            mu,
+            elastic_creep: rig.plant.elastic_creep,
+            load_n: load,
+            mass_kg: rig.plant.moved_mass_kg,
+            drive: DriveMotor {
+                no_load_mm_s: rig.drive.no_load_speed_mm_s,
+                stall_n: rig.drive.stall_force_n,
+                limit_n: rig.drive.force_limit_n,
+                mass_kg: rig.drive.reflected_mass_kg,
+                friction_n: 0.02 * rig.drive.stall_force_n,
+            },
+            spring_n_per_mm,
+            slew_n_per_s,
+            lag_s,
+            delay_s,
+            seat_max_n: 1.25 * rig.preload.limit_n,
+            modes_hz: rig.drive.modes_hz.to_vec(),
+            ripple: (0.006 * rig.drive.force_limit_n, rig.drive.ripple_pitch_mm),
+            sensors: SensorParameters {
+                counts_per_turn: rig.sense.encoder_counts,
+                load_cell_full_scale_n: rig.sense.load_cell_full_scale_n,
+                load_cell_gain,
+                tread_full_scale_mm: rig.sense.tread_full_scale_mm,
+                tread_gain,
+                angle_zero_code: rig.sense.angle_zero_code,
+                angle_zero_rad,
+                noise: scenario.noise.clone(),
+            },
+        }
+    }
+}

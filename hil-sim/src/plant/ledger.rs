@@ -1,0 +1,160 @@
+//! The plant's own record of each crossing: what really happened.
+
+use super::wall::Step;
+
+/// What is looked at every ring step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moment {
+    /// Time, s.
+    pub time_s: f64,
+    /// Axial position of the centre, mm.
+    pub position_mm: f64,
+    /// Height of the centre above the outermost wall, mm.
+    pub height_mm: f64,
+    /// Height of the wall under the centre, mm.
+    pub base_mm: f64,
+    /// Axial speed, mm/s.
+    pub speed_mm_s: f64,
+    /// Preload, N.
+    pub preload_n: f64,
+    /// Friction utilisation.
+    pub utilisation: f64,
+    /// Gross slip so far, mm.
+    pub slip_mm: f64,
+    /// Force of corner and face, N.
+    pub corner_n: f64,
+    /// Largest pressure on the lower wall, negative when it carries nothing, N/mm^2.
+    pub floor_pressure: f64,
+}
+
+/// One crossing, in either direction.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Crossing {
+    /// Step number, from 1 at the outermost sleeve.
+    pub index: usize,
+    /// Where the step stands, mm.
+    pub step_mm: f64,
+    /// Whether it was climbed (else dropped off).
+    pub climbing: bool,
+    /// First touch of the corner, s; on retract, the centre passing the edge.
+    pub touch_s: f64,
+    /// Lower wall stopped (retract: began) to carry, s.
+    pub lift_s: f64,
+    /// Clearance of the step root from the undeformed wheel at that instant, mm.
+    pub gap_mm: f64,
+    /// Speed at that instant, mm/s.
+    pub speed_mm_s: f64,
+    /// Preload at that instant, N.
+    pub preload_n: f64,
+    /// Largest force of corner and face, N.
+    pub corner_n: f64,
+    /// Largest preload, N.
+    pub peak_preload_n: f64,
+    /// Largest friction utilisation.
+    pub peak_utilisation: f64,
+    /// Gross slip in the crossing, mm.
+    pub slip_mm: f64,
+}
+
+/// All crossings of a run.
+#[derive(Clone, Debug, Default)]
+pub struct Ledger {
+    steps: Vec<Step>,
+    radius_mm: f64,
+    done: Vec<Crossing>,
+    open: Option<Open>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Open {
+    crossing: Crossing,
+    slip_before: f64,
+    last: Moment,
+}
+
+impl Ledger {
+    /// A ledger over these steps for a wheel of this radius, mm.
+    #[must_use]
+    pub fn new(steps: Vec<Step>, radius_mm: f64) -> Self {
+        Self { steps, radius_mm, done: Vec::new(), open: None }
+    }
+
+    /// Crossings whose gap is known, in the order they happened.
+    #[must_use]
+    pub fn crossings(&self) -> &[Crossing] {
+        &self.done
+    }
+
+    /// Looks at one moment.
+    pub fn record(&mut self, now: &Moment) {
+        match self.open.take() {
+            None => self.open = self.begin(now),
+            Some(open) => self.open = self.go_on(open, now),
+        }
+        if let Some(last) = self.done.last_mut() {
+            // The wheel is still on the corner after lift-off.
+            let away = (now.position_mm - last.step_mm).abs();
+            if now.corner_n > 0.0 && away < self.radius_mm {
+                last.corner_n = last.corner_n.max(now.corner_n);
+                last.peak_preload_n = last.peak_preload_n.max(now.preload_n);
+                last.peak_utilisation = last.peak_utilisation.max(now.utilisation.abs());
+            }
+        }
+    }
+
+    fn begin(&self, now: &Moment) -> Option<Open> {
+        let (index, step) = self
+            .steps
+            .iter()
+            .enumerate()
+            .find(|(_, step)| {
+                let ahead = step.position_mm - now.position_mm;
+                ahead > 0.0 && ahead < self.radius_mm
+            })?;
+        if now.corner_n <= 0.0 {
+            return None;
+        }
+        // Carried by the lower wall as well: a climb begins. By the corner alone: the
+        // wheel has just come back over the edge.
+        let climbing = now.floor_pressure > 0.0;
+        Some(Open {
+            crossing: Crossing {
+                index: index + 1,
+                step_mm: step.position_mm,
+                climbing,
+                touch_s: now.time_s,
+                ..Crossing::default()
+            },
+            slip_before: now.slip_mm,
+            last: *now,
+        })
+    }
+
+    fn go_on(&mut self, mut open: Open, now: &Moment) -> Option<Open> {
+        let crossing = &mut open.crossing;
+        crossing.corner_n = crossing.corner_n.max(now.corner_n);
+        crossing.peak_preload_n = crossing.peak_preload_n.max(now.preload_n);
+        crossing.peak_utilisation = crossing.peak_utilisation.max(now.utilisation.abs());
+        // Left without lift-off: the wheel turned back.
+        if now.corner_n <= 0.0 || now.position_mm >= crossing.step_mm {
+            return None;
+        }
+        let (a, b) = (open.last.floor_pressure, now.floor_pressure);
+        let event = if crossing.climbing { a > 0.0 && b <= 0.0 } else { a <= 0.0 && b > 0.0 };
+        if !event {
+            open.last = *now;
+            return Some(open);
+        }
+        let part = a / (a - b);
+        let mix = |from: f64, to: f64| from + part * (to - from);
+        let ahead = crossing.step_mm - mix(open.last.position_mm, now.position_mm);
+        let height = mix(open.last.height_mm, now.height_mm) - now.base_mm;
+        crossing.gap_mm = ahead.hypot(height) - self.radius_mm;
+        crossing.lift_s = mix(open.last.time_s, now.time_s);
+        crossing.speed_mm_s = mix(open.last.speed_mm_s, now.speed_mm_s).abs();
+        crossing.preload_n = mix(open.last.preload_n, now.preload_n);
+        crossing.slip_mm = now.slip_mm - open.slip_before;
+        self.done.push(*crossing);
+        None
+    }
+}

@@ -1,0 +1,102 @@
+//! The four sensors: from what is true to the codes that the converters give.
+
+use interstage::sense::raw::{AdcCode, AngleFrame, EncoderCount};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+use super::draw::SensorParameters;
+
+/// What the sensors look at.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sensed {
+    /// Angle the wheel has turned, rad.
+    pub rotation_rad: f64,
+    /// Radial preload, N.
+    pub preload_n: f64,
+    /// Largest tread depth, mm.
+    pub depth_mm: f64,
+    /// Arm angle from the pillar, rad.
+    pub arm_rad: f64,
+}
+
+/// The codes of one millisecond.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Codes {
+    /// Wheel encoder.
+    pub wheel: EncoderCount,
+    /// Load cell.
+    pub load_cell: AdcCode,
+    /// Tread displacement.
+    pub tread: AdcCode,
+    /// Arm angle.
+    pub arm: AngleFrame,
+}
+
+/// Sensors with their noise.
+#[derive(Clone, Debug)]
+pub struct Sensors {
+    parameters: SensorParameters,
+    noise: ChaCha8Rng,
+    before: Option<Sensed>,
+}
+
+/// Part of the converter's range at which a bridge reads zero.
+const ZERO: f64 = 0.05;
+/// Part of the converter's range at which it reads full scale.
+const FULL: f64 = 0.90;
+
+impl Sensors {
+    /// Sensors whose noise follows `seed`.
+    #[must_use]
+    pub fn new(parameters: SensorParameters, seed: u64) -> Self {
+        // Another stream than the plant's draw, which has the seed itself.
+        let noise = ChaCha8Rng::seed_from_u64(seed ^ 0x005e_4504_0153_0000);
+        Self { parameters, noise, before: None }
+    }
+
+    /// Codes of what is true now, `dt_s` after the last call.
+    pub fn read(&mut self, now: Sensed, dt_s: f64) -> Codes {
+        let before = self.before.replace(now).unwrap_or(now);
+        let p = self.parameters.clone();
+        let aged = |from: f64, to: f64, delay: f64| to + (from - to) * (delay / dt_s).min(1.0);
+        let noise = &p.noise;
+        let turns = now.rotation_rad / std::f64::consts::TAU;
+        let counts = turns * p.counts_per_turn + self.normal(noise.encoder_jitter_counts);
+        let preload = aged(before.preload_n, now.preload_n, noise.load_cell_delay_s)
+            * p.load_cell_gain
+            + self.normal(noise.load_cell_n);
+        let depth = aged(before.depth_mm, now.depth_mm, noise.tread_delay_s) * p.tread_gain
+            + self.normal(noise.tread_mm);
+        let arm = aged(before.arm_rad, now.arm_rad, noise.angle_delay_s) + p.angle_zero_rad;
+        let code = arm / std::f64::consts::TAU * 16_384.0
+            + p.angle_zero_code
+            + self.normal(noise.angle_lsb);
+        Codes {
+            wheel: EncoderCount::new((counts.floor() as i64) as u16),
+            load_cell: bridge(preload / p.load_cell_full_scale_n),
+            tread: bridge(depth / p.tread_full_scale_mm),
+            arm: frame(code),
+        }
+    }
+
+    fn normal(&mut self, deviation: f64) -> f64 {
+        if deviation == 0.0 {
+            return 0.0;
+        }
+        let normal: f64 = StandardNormal.sample(&mut self.noise);
+        deviation * normal
+    }
+}
+
+/// Converter code of a bridge at this part of its full scale.
+fn bridge(part: f64) -> AdcCode {
+    let code = (ZERO + (FULL - ZERO) * part) * 65_535.0;
+    AdcCode::new(code.round().clamp(0.0, 65_535.0) as u16)
+}
+
+/// Frame of the magnetic encoder: 14 bits of angle, no error, even parity.
+fn frame(code: f64) -> AngleFrame {
+    let bits = ((code.floor() as i64) & 0x3fff) as u16;
+    AngleFrame::new(bits | (((bits.count_ones() & 1) as u16) << 15))
+}

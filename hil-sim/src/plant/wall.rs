@@ -1,0 +1,162 @@
+//! The inner wall of the sleeve along one meridian: level pieces with steps
+//! between them, and what a ray from the wheel centre meets.
+
+/// A step: the wall rises by `height_mm` towards the pillar at `position_mm`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// Axial position of the face, mm.
+    pub position_mm: f64,
+    /// Height, mm.
+    pub height_mm: f64,
+}
+
+/// The wall's profile: ascending steps, level 0 before the first.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Wall {
+    steps: Vec<Step>,
+}
+
+/// The wall as the wheel sees it: heights relative to the wall under the centre.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LocalWall {
+    /// Height of the wall under the centre above level 0, mm.
+    pub base_mm: f64,
+    /// Number of steps behind (below) the centre.
+    pub level: usize,
+    /// Distance to the face ahead, mm; infinite if there is none.
+    pub ahead_mm: f64,
+    /// Height of the step ahead, mm.
+    pub rise_mm: f64,
+    /// Distance back to the edge behind, mm; infinite if there is none.
+    pub behind_mm: f64,
+    /// Height of the step behind, mm.
+    pub drop_mm: f64,
+}
+
+/// What a ray meets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Facet {
+    /// The wall under the centre, or the one behind and below it.
+    Floor,
+    /// Face or top of the step ahead.
+    Step,
+}
+
+impl Wall {
+    /// A wall with these steps, sorted by position.
+    #[must_use]
+    pub fn new(mut steps: Vec<Step>) -> Self {
+        steps.sort_by(|a, b| a.position_mm.total_cmp(&b.position_mm));
+        Self { steps }
+    }
+
+    /// The steps, ascending.
+    #[must_use]
+    pub fn steps(&self) -> &[Step] {
+        &self.steps
+    }
+
+    /// The wall around axial position `x_mm`.
+    #[must_use]
+    pub fn local(&self, x_mm: f64) -> LocalWall {
+        let mut local = LocalWall {
+            base_mm: 0.0,
+            level: 0,
+            ahead_mm: f64::INFINITY,
+            rise_mm: 0.0,
+            behind_mm: f64::INFINITY,
+            drop_mm: 0.0,
+        };
+        for step in &self.steps {
+            if step.position_mm <= x_mm {
+                local.base_mm += step.height_mm;
+                local.level += 1;
+                local.behind_mm = x_mm - step.position_mm;
+                local.drop_mm = step.height_mm;
+            } else {
+                local.ahead_mm = step.position_mm - x_mm;
+                local.rise_mm = step.height_mm;
+                break;
+            }
+        }
+        local
+    }
+}
+
+impl LocalWall {
+    /// Distance from the centre, `y` mm above the wall under it, to the wall along
+    /// the ray at angle psi from straight down (positive ahead), given its sine and
+    /// cosine (> 0), and which part of the wall it meets.
+    #[inline]
+    #[must_use]
+    pub fn ray(&self, y: f64, sin: f64, cos: f64) -> (f64, Facet) {
+        let run = y * sin;
+        if run > self.ahead_mm * cos {
+            // Past the root of the step ahead: its face below the corner, else its top.
+            if (y - self.rise_mm) * sin <= self.ahead_mm * cos {
+                (self.ahead_mm / sin, Facet::Step)
+            } else {
+                ((y - self.rise_mm) / cos, Facet::Step)
+            }
+        } else if -run > self.behind_mm * cos {
+            ((y + self.drop_mm) / cos, Facet::Floor)
+        } else {
+            (y / cos, Facet::Floor)
+        }
+    }
+
+    /// Derivative of that distance by `y`.
+    #[inline]
+    #[must_use]
+    pub fn slope(&self, y: f64, sin: f64, cos: f64) -> f64 {
+        let on_face =
+            y * sin > self.ahead_mm * cos && (y - self.rise_mm) * sin <= self.ahead_mm * cos;
+        if on_face { 0.0 } else { 1.0 / cos }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rays_meet_floor_face_and_top_in_turn() {
+        let wall = Wall::new(vec![Step { position_mm: 10.0, height_mm: 4.0 }]);
+        let local = wall.local(0.0);
+        let at = |degrees: f64| {
+            let a = degrees.to_radians();
+            local.ray(25.0, a.sin(), a.cos())
+        };
+        assert_eq!(at(0.0), (25.0, Facet::Floor));
+        // Root at atan(10/25) = 21.8 deg, corner at atan(10/21) = 25.46 deg.
+        assert_eq!(at(21.0).1, Facet::Floor);
+        let face = at(23.0);
+        assert_eq!(face.1, Facet::Step);
+        assert!((face.0 - 10.0 / 23f64.to_radians().sin()).abs() < 1e-12);
+        let top = at(30.0);
+        assert!((top.0 - 21.0 / 30f64.to_radians().cos()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_distance_is_continuous_at_root_and_corner() {
+        let local = Wall::new(vec![Step { position_mm: 12.0, height_mm: 4.0 }]).local(0.0);
+        for corner in [(12f64 / 24.5).atan(), (12f64 / 20.5).atan()] {
+            let (a, b) = (corner - 1e-9, corner + 1e-9);
+            let near = local.ray(24.5, a.sin(), a.cos()).0;
+            let far = local.ray(24.5, b.sin(), b.cos()).0;
+            assert!((near - far).abs() < 1e-6, "{near} {far}");
+        }
+    }
+
+    #[test]
+    fn behind_an_edge_the_lower_wall_is_met() {
+        let wall = Wall::new(vec![Step { position_mm: 10.0, height_mm: 4.0 }]);
+        let local = wall.local(11.0);
+        assert_eq!(local.level, 1);
+        assert_eq!(local.base_mm, 4.0);
+        let a = -10f64.to_radians();
+        let (distance, facet) = local.ray(24.0, a.sin(), a.cos());
+        assert_eq!(facet, Facet::Floor);
+        assert!((distance - 28.0 / a.cos()).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,311 @@
+//! The wave roots against the classical frequency equations, their limits and ranges.
+
+use proptest::prelude::*;
+
+use super::waves::turned_determinant;
+use super::*;
+
+const CLAMPED_PINNED: [f64; 3] = [3.926_602_312, 7.068_582_745, 10.210_176_123];
+
+/// The arm with a tip in beam masses and EI / L^3.
+fn roots_of(ends: Ends, mass: f64, spring: f64, count: usize) -> Vec<f64> {
+    let arm = Beam::drive_arm();
+    let unit = arm.bending_stiffness_n_m2() / arm.length_m.powi(3);
+    let tip = Tip { mass_kg: mass * arm.mass_kg(), spring_n_per_m: spring * unit };
+    let modes = arm.modes(ends, tip, count).unwrap();
+    modes.into_iter().map(|mode| mode.beta_l).collect()
+}
+
+#[track_caller]
+fn assert_close(found: f64, wanted: f64, tolerance: f64) {
+    let error = (found - wanted).abs();
+    assert!(error <= tolerance, "{found} is {error:e} from {wanted}, allowed {tolerance:e}");
+}
+
+/// The classical frequency equation, from `W'' = 0` and `W''' = z W` at B put into the
+/// trigonometric solution, times `e^{-x}`. Near x = 0 its leading terms cancel, so the
+/// first two terms of the load that it asks for take over there.
+fn classical(ends: Ends, mass: f64, spring: f64, x: f64) -> f64 {
+    let (s, c) = x.sin_cos();
+    let fall = (-2.0 * x).exp();
+    let (one, sinh, cosh) = ((-x).exp(), 0.5 * (1.0 - fall), 0.5 * (1.0 + fall));
+    let z = spring / x.powi(3) - mass * x;
+    if x < 0.1 {
+        return match ends {
+            Ends::ClampedFree => z + 3.0 / x.powi(3) * (1.0 - 11.0 / 140.0 * x.powi(4)),
+            Ends::PinnedFree => z - x / 3.0 * (1.0 + 2.0 / 315.0 * x.powi(4)),
+            Ends::FreeFree => z - x / 4.0 * (1.0 + x.powi(4) / 420.0),
+        };
+    }
+    match ends {
+        Ends::ClampedFree => one + c * cosh - z * (c * sinh - s * cosh),
+        Ends::PinnedFree => s * cosh - c * sinh - 2.0 * z * s * sinh,
+        Ends::FreeFree => one - c * cosh - z * (s * cosh - c * sinh),
+    }
+}
+
+#[test]
+fn bare_ends_have_the_classical_roots() {
+    let classical = [
+        (Ends::ClampedFree, [1.875_104_068_7, 4.694_091_133_0, 7.854_757_438_2]),
+        (Ends::PinnedFree, [3.926_602_312_0, 7.068_582_745_6, 10.210_176_122_8]),
+        (Ends::FreeFree, [4.730_040_744_9, 7.853_204_624_1, 10.995_607_838_0]),
+    ];
+    for (ends, wanted) in classical {
+        for (found, wanted) in roots_of(ends, 0.0, 0.0, 3).into_iter().zip(wanted) {
+            assert_close(found, wanted, 1e-9);
+        }
+    }
+}
+
+#[test]
+fn twentieth_root_reaches_its_asymptote() {
+    for (ends, shift) in
+        [(Ends::ClampedFree, -0.5), (Ends::PinnedFree, 0.25), (Ends::FreeFree, 0.5)]
+    {
+        let roots = roots_of(ends, 0.0, 0.0, MAX_COUNT);
+        assert_eq!(roots.len(), MAX_COUNT);
+        assert_close(roots[MAX_COUNT - 1], (MAX_COUNT as f64 + shift) * PI, 1e-9);
+    }
+}
+
+#[test]
+fn reflection_of_a_loaded_end_spans_free_to_pinned() {
+    assert_close((Load::FREE.reflection() - End::Free.reflection()).norm(), 0.0, 1e-15);
+    assert_close((Load::PINNED.reflection() - End::Pinned.reflection()).norm(), 0.0, 1e-15);
+}
+
+#[test]
+fn reflected_waves_meet_the_conditions_of_a_loaded_end() {
+    let load = Load::mass_and_spring(0.7, 30.0, 2.3);
+    let z = 30.0 / 2.3_f64.powi(3) - 0.7 * 2.3;
+    let r = load.reflection();
+    let i = nalgebra::Complex::I;
+    for column in 0..2 {
+        // (propagating, evanescent) arriving and leaving, at the end itself.
+        let (a, n) = if column == 0 { (1.0, 0.0) } else { (0.0, 1.0) };
+        let (b, m) = (r[(0, column)], r[(1, column)]);
+        let deflection = b + m + a + n;
+        let moment = -b + m - a + n;
+        let shear = -i * b + m + i * a - n;
+        assert_close(moment.norm(), 0.0, 1e-14);
+        assert_close((shear - deflection * z).norm(), 0.0, 1e-14);
+    }
+}
+
+#[test]
+fn an_end_that_does_no_work_returns_the_propagating_wave_in_full() {
+    for z_mass in [0.0, 0.3, 5.0, 1e4] {
+        let r = Load::mass_and_spring(z_mass, 2.0, 1.7).reflection();
+        assert_close(r[(0, 0)].norm(), 1.0, 1e-14);
+    }
+}
+
+#[test]
+fn turned_determinant_is_imaginary() {
+    for end in [End::Clamped, End::Pinned, End::Free] {
+        for step in 1..200 {
+            let beta_l = 0.1 * f64::from(step);
+            let load = Load::mass_and_spring(0.8, 12.0, beta_l);
+            let determinant = turned_determinant(end, load, beta_l);
+            assert_close(determinant.re, 0.0, 1e-14);
+        }
+    }
+}
+
+#[test]
+fn frequency_function_is_the_classical_one_scaled() {
+    for step in 2..100 {
+        let x = 0.1 * f64::from(step);
+        let z = 30.0 / x.powi(3) - 0.7 * x;
+        let found = frequency_function(End::Clamped, Load::mass_and_spring(0.7, 30.0, x), x);
+        let wanted = -8.0 / z.hypot(1.0) * classical(Ends::ClampedFree, 0.7, 30.0, x);
+        assert_close(found, wanted, 1e-13);
+    }
+}
+
+#[test]
+fn small_mass_leaves_the_bare_root_and_every_mass_lowers_it() {
+    assert_close(roots_of(Ends::ClampedFree, 1e-12, 0.0, 1)[0], 1.875_104_068_7, 1e-9);
+    let mut last = f64::INFINITY;
+    for mass in [0.0, 0.01, 0.1, 0.5, 1.0, 5.0, 100.0, 1e4, 1e6] {
+        let root = roots_of(Ends::ClampedFree, mass, 0.0, 1)[0];
+        assert!(root < last, "{root} at {mass} beam masses is not below {last}");
+        last = root;
+    }
+}
+
+#[test]
+fn heavy_tip_pins_the_end_of_all_modes_but_the_first() {
+    let roots = roots_of(Ends::ClampedFree, MAX_MASS_RATIO, 0.0, 4);
+    // The first becomes that of a mass on the arm's spring, 3 EI / L^3.
+    assert_close(roots[0], (3.0 / (MAX_MASS_RATIO + 33.0 / 140.0)).powf(0.25), 1e-9);
+    for (root, pinned) in roots[1..].iter().zip(CLAMPED_PINNED) {
+        assert_close(*root, pinned, 1e-6);
+    }
+}
+
+#[test]
+fn rayleigh_quotient_bounds_the_loaded_cantilever_closely() {
+    // The static shape under a tip force: m_eff = m + 33/140 of the beam. An upper bound.
+    for mass in [0.2, 1.0, 5.0] {
+        let root = roots_of(Ends::ClampedFree, mass, 0.0, 1)[0];
+        let bound = (3.0 / (mass + 33.0 / 140.0)).powf(0.25);
+        assert!(root < bound && root > 0.995 * bound, "{root} against {bound}");
+    }
+}
+
+#[test]
+fn stiff_spring_pins_the_end() {
+    let stiffest = SPRING_RATIOS.1;
+    for ends in [Ends::ClampedFree, Ends::FreeFree] {
+        for (root, pinned) in roots_of(ends, 0.0, stiffest, 3).iter().zip(CLAMPED_PINNED) {
+            assert_close(*root, pinned, 1e-9);
+        }
+    }
+    for (j, root) in roots_of(Ends::PinnedFree, 0.0, stiffest, 3).iter().enumerate() {
+        assert_close(*root, (j + 1) as f64 * PI, 1e-9);
+    }
+}
+
+#[test]
+fn soft_spring_gives_the_rigid_arm_on_it() {
+    let softest = SPRING_RATIOS.0;
+    let on_pivot = roots_of(Ends::PinnedFree, 0.0, softest, 2);
+    assert_close(on_pivot[0] / (3.0 * softest).powf(0.25), 1.0, 1e-8);
+    assert_close(on_pivot[1], 3.926_602_312, 1e-6);
+    let afloat = roots_of(Ends::FreeFree, 0.0, softest, 2);
+    assert_close(afloat[0] / (4.0 * softest).powf(0.25), 1.0, 1e-8);
+    assert_close(afloat[1], 4.730_040_745, 1e-6);
+}
+
+#[test]
+fn two_roots_at_a_tip_resonance_are_both_found() {
+    // Mass and spring cancel at the pinned root itself: one mode on either side of it.
+    let mass = 1e6;
+    let resonance = CLAMPED_PINNED[1];
+    let roots = roots_of(Ends::ClampedFree, mass, mass * resonance.powi(4), 3);
+    assert!(roots[1] < resonance && resonance < roots[2], "{roots:?}");
+    assert!(roots[2] - roots[1] < 5e-3, "{roots:?}");
+}
+
+/// No load, or one anywhere in its range.
+fn ratio(low_exponent: f64, high_exponent: f64) -> impl Strategy<Value = f64> {
+    prop_oneof![
+        1 => Just(0.0),
+        4 => (low_exponent..high_exponent).prop_map(|exponent| 10_f64.powf(exponent)),
+    ]
+}
+
+proptest! {
+    #[test]
+    fn roots_are_those_of_the_classical_equation_and_none_is_missed(
+        ends in prop::sample::select(Ends::ALL.to_vec()),
+        mass in ratio(-3.0, 5.99),
+        spring in ratio(-5.99, 11.99),
+    ) {
+        let roots = roots_of(ends, mass, spring, MAX_COUNT);
+        let sign = |x| classical(ends, mass, spring, x).signum();
+        for &root in &roots {
+            let (below, above) = (sign(root * (1.0 - 1e-9)), sign(root * (1.0 + 1e-9)));
+            prop_assert!(below != above, "no root of the classical equation at {}", root);
+        }
+        // Bare rigid motion makes the equation vanish at 0; look from beside it.
+        let from = if roots[0] > 0.5 { 0.3 } else { roots[0] };
+        let edges = [&[from], roots.as_slice()].concat();
+        for pair in edges.windows(2) {
+            let (low, high) = (pair[0] * (1.0 + 1e-8), pair[1] * (1.0 - 1e-8));
+            if low >= high || (low < 0.1) != (high < 0.1) {
+                continue;
+            }
+            for step in 0..=60 {
+                let x = low + (high - low) * f64::from(step) / 60.0;
+                prop_assert_eq!(sign(x), sign(high), "a root near {} is missing", x);
+            }
+        }
+    }
+
+    #[test]
+    fn tip_mass_for_closes(part in 0.01_f64..1.0) {
+        for arm in [Beam::drive_arm(), Beam::drive_arm().turned()] {
+            let bare_hz = first_hz(arm, 0.0);
+            let mass_kg = arm.tip_mass_for(part * bare_hz).unwrap();
+            prop_assert!((first_hz(arm, mass_kg) / (part * bare_hz) - 1.0).abs() < 1e-10);
+        }
+    }
+}
+
+fn first_hz(arm: Beam, mass_kg: f64) -> f64 {
+    let tip = Tip { mass_kg, spring_n_per_m: 0.0 };
+    arm.modes(Ends::ClampedFree, tip, 1).unwrap()[0].frequency_hz
+}
+
+#[test]
+fn drive_arm_has_these_frequencies_and_meets_276_hz_with_this_mass() {
+    let deep = Beam::drive_arm();
+    assert_close(deep.mass_kg(), 0.072_558, 1e-12);
+    assert_close(deep.bending_stiffness_n_m2(), 244.6875, 1e-9);
+    // sqrt(EI / rho A) / (2 pi L^2) (beta L)^2 by hand.
+    let scale = (244.6875_f64 / 0.5004).sqrt() / (2.0 * PI * 0.145 * 0.145);
+    assert_close(first_hz(deep, 0.0), scale * 1.875_104_068_7_f64.powi(2), 1e-6);
+    let flat = deep.turned();
+    assert_close(first_hz(flat, 0.0), 0.8 * first_hz(deep, 0.0), 1e-9);
+    for (arm, bare_hz, wanted_kg) in [(deep, 588.548, 0.062_857), (flat, 470.839, 0.033_972)] {
+        assert_close(first_hz(arm, 0.0), bare_hz, 5e-4);
+        let mass_kg = arm.tip_mass_for(276.0).unwrap();
+        assert_close(mass_kg, wanted_kg, 5e-7);
+        assert_close(first_hz(arm, mass_kg), 276.0, 1e-9);
+    }
+}
+
+#[test]
+fn bare_arm_held_or_not_lies_far_above_the_published_modes() {
+    let first = |ends| Beam::drive_arm().modes(ends, Tip::default(), 1).unwrap()[0].frequency_hz;
+    assert_close(first(Ends::PinnedFree), 2580.865, 5e-4);
+    assert_close(first(Ends::FreeFree), 3745.080, 5e-4);
+}
+
+#[test]
+fn tip_mass_for_the_bare_frequency_is_nothing() {
+    let arm = Beam::drive_arm();
+    assert_close(arm.tip_mass_for(first_hz(arm, 0.0)).unwrap(), 0.0, 1e-12);
+}
+
+#[test]
+fn arguments_out_of_range_are_named() {
+    let arm = Beam::drive_arm();
+    let tip = |mass_kg, spring_n_per_m| Tip { mass_kg, spring_n_per_m };
+    let modes = |tip, count| arm.modes(Ends::ClampedFree, tip, count).unwrap_err();
+    let cases = [
+        ("tip.mass_kg", modes(tip(-0.1, 0.0), 1)),
+        ("tip.mass_kg", modes(tip(f64::NAN, 0.0), 1)),
+        ("tip.mass_kg", modes(tip(1e9, 0.0), 1)),
+        ("tip.spring_n_per_m", modes(tip(0.0, -1.0), 1)),
+        ("tip.spring_n_per_m", modes(tip(0.0, f64::INFINITY), 1)),
+        ("tip.spring_n_per_m", modes(tip(0.0, 1e-9), 1)),
+        ("count", modes(Tip::default(), 0)),
+        ("count", modes(Tip::default(), MAX_COUNT + 1)),
+        ("frequency_hz", arm.tip_mass_for(1000.0).unwrap_err()),
+        ("frequency_hz", arm.tip_mass_for(0.0).unwrap_err()),
+        ("frequency_hz", arm.tip_mass_for(f64::NAN).unwrap_err()),
+        ("length_m", Beam { length_m: 0.0, ..arm }.tip_mass_for(276.0).unwrap_err()),
+        ("e_pa", Beam { e_pa: f64::NAN, ..arm }.tip_mass_for(276.0).unwrap_err()),
+    ];
+    for (wanted, error) in cases {
+        let BeamError::OutOfRange { argument, .. } = &error else { panic!("{error}") };
+        assert_eq!(*argument, wanted, "{error}");
+    }
+    assert_eq!(modes(Tip::default(), 0).to_string(), "count is 0, expected 1 to 20 modes");
+}
+
+#[test]
+fn names_of_the_ends_read_back() {
+    for ends in Ends::ALL {
+        assert_eq!(ends.to_string().parse::<Ends>(), Ok(ends));
+    }
+    let error = "clamped".parse::<Ends>().unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "ends is `clamped`, expected clamped-free, pinned-free or free-free"
+    );
+}

@@ -1,0 +1,41 @@
+//! A run as one self-contained HTML page: verdict, ledger of the crossings, plots
+//! over time and over position, each crossing enlarged, log, faults, parameters.
+
+mod axis;
+mod band;
+mod crossings;
+mod decimate;
+#[cfg(test)]
+pub(crate) mod example;
+mod overview;
+mod page;
+mod palette;
+mod panel;
+mod panels;
+mod svg;
+mod tables;
+pub(crate) mod verdict;
+
+use std::path::Path;
+
+use crate::export::{ExportError, write_text};
+use crate::record::Recording;
+
+pub use overview::overview_svg;
+
+/// The page of `recording`. It needs no other file and no script.
+#[must_use]
+pub fn html(recording: &Recording) -> String {
+    page::html(recording)
+}
+
+/// Writes the page of `recording` to `path`.
+///
+/// # Errors
+/// [`ExportError::File`] with the reason.
+pub fn write_html(recording: &Recording, path: &Path) -> Result<(), ExportError> {
+    write_text(path, &html(recording))
+}
+
+#[cfg(test)]
+mod tests;

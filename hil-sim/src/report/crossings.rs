@@ -1,0 +1,97 @@
+//! Each crossing enlarged: half a second before the corner touches until just after
+//! lift-off.
+
+use super::axis;
+use super::palette;
+use super::panel::{Look, Panel};
+use super::panels::{Across, View};
+use super::svg;
+use crate::record::{CrossingLine, Recording};
+
+/// Shown before the corner touches, s.
+const BEFORE_S: f64 = 0.5;
+/// Shown after lift-off, s.
+const AFTER_S: f64 = 0.8;
+/// Size of a plot, CSS pixels.
+const SIZE: (u32, u32) = (540, 250);
+
+/// The enlarged plots of every crossing, as HTML.
+pub(super) fn html(recording: &Recording) -> String {
+    let crossings = &recording.summary.crossings;
+    if crossings.is_empty() {
+        return "<p>No step was crossed.</p>\n".to_owned();
+    }
+    crossings.iter().map(|line| one(recording, line)).collect()
+}
+
+fn one(recording: &Recording, line: &CrossingLine) -> String {
+    let mut html = format!("<h3>Crossing {}: step at {:.2} mm</h3>\n", line.index, line.step_mm);
+    let view = view(recording, line);
+    if view.rows.is_empty() {
+        return html + "<p>No rows were recorded around it.</p>\n";
+    }
+    html += "<div class=\"grid\">\n";
+    for panel in panels(&view) {
+        let name = format!("Crossing {}: {}", line.index, panel.title);
+        html += &format!("<figure>{}</figure>\n", svg::fluid(SIZE, &name, |area| panel.draw(area)));
+    }
+    html + "</div>\n"
+}
+
+/// The rows around `line`.
+fn view<'a>(recording: &'a Recording, line: &CrossingLine) -> View<'a> {
+    let (first, last) = (line.touch_s.min(line.lift_s), line.touch_s.max(line.lift_s));
+    let x = (-BEFORE_S, last - first + AFTER_S);
+    let rows = &recording.rows;
+    let from = rows.partition_point(|row| row.t_s < first + x.0);
+    let to = rows.partition_point(|row| row.t_s <= first + x.1).max(from);
+    View { rows: &rows[from..to], x, ..View::new(recording, Across::Since(first)) }
+}
+
+fn panels(view: &View) -> [Panel; 6] {
+    let mut clearance = view.gap();
+    clearance.title = "Clearance at the step root".to_owned();
+    let mut forces = view.panel("Forces of corner and lower wall", "force, N");
+    forces.lines = vec![
+        view.line("corner", Look::Truth, |row| row.corner_force_n),
+        view.line("lower wall", Look::Other(palette::FLOOR), |row| row.floor_force_n),
+    ];
+    let mut preload = view.preload();
+    // The limit may lie far above; it is in the plot of the whole run.
+    let shown = preload.lines.iter().flat_map(|line| &line.points).map(|point| point.1);
+    let range = axis::padded(axis::extent(shown).unwrap_or((0.0, 1.0)), 0.08);
+    preload.levels.retain(|level| level.2 <= range.1 + 0.5 * (range.1 - range.0));
+    [preload, view.speed(), clearance, forces, view.compression(), view.slip_margin()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::example;
+
+    #[test]
+    fn every_crossing_has_its_plots() {
+        let recording = example::deploy();
+        let html = html(&recording);
+        assert_eq!(html.matches("<h3>").count(), 3);
+        assert_eq!(html.matches("<svg").count(), 18);
+    }
+
+    #[test]
+    fn the_window_holds_the_crossing() {
+        let recording = example::deploy();
+        let line = &recording.summary.crossings[1];
+        let view = view(&recording, line);
+        assert!((view.rows[0].t_s - (line.touch_s - BEFORE_S)).abs() < 2e-3);
+        assert!((view.rows[view.rows.len() - 1].t_s - (line.lift_s + AFTER_S)).abs() < 2e-3);
+    }
+
+    #[test]
+    fn a_crossing_without_rows_is_said_to_have_none() {
+        let mut recording = example::deploy();
+        recording.rows.clear();
+        assert_eq!(html(&recording).matches("No rows were recorded").count(), 3);
+        recording.summary.crossings.clear();
+        assert!(html(&recording).contains("No step was crossed"));
+    }
+}

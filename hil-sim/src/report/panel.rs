@@ -1,0 +1,283 @@
+//! One plot: lines, marks, levels and shaded spans on one pair of axes, with the
+//! title and the legend above it, where they cover no data.
+
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, VPos};
+
+use super::axis::{self, Scale};
+use super::decimate::{Pieces, decimate};
+use super::palette;
+use super::svg::{Area, Drawn, SCALE, font, size, text_width};
+
+const S: i32 = SCALE as i32;
+/// Height of the row with title and legend.
+pub(super) const HEAD: i32 = 30 * S;
+/// Left of everything.
+const MARGIN: i32 = 4 * S;
+/// Left of the plot: tick labels and the name of the axis.
+pub(super) const LEFT: i32 = 72 * S;
+/// Right of the plot: half a tick label.
+pub(super) const RIGHT: i32 = 18 * S;
+/// Height of the row of a legend that stands below the title.
+const LEGEND: i32 = 20 * S;
+const TITLE_PX: f64 = 14.0;
+pub(super) const TEXT_PX: f64 = 12.0;
+
+/// What a line stands for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Look {
+    /// What a sensor said: thin, below the others.
+    Measured(RGBColor),
+    /// What the plant did: dark and wide.
+    Truth,
+    /// Something else that the plant did.
+    Other(RGBColor),
+    /// What the controller believes: thin, above the truth.
+    Estimate(RGBColor),
+    /// What was asked for: dashed.
+    Wanted,
+    /// A bound: dashed, red.
+    Limit,
+}
+
+impl Look {
+    /// Order of drawing: what is wide or noisy stays below what is thin.
+    fn layer(self) -> u8 {
+        match self {
+            Self::Measured(_) => 0,
+            Self::Other(_) => 1,
+            Self::Truth => 2,
+            Self::Estimate(_) => 3,
+            Self::Wanted => 4,
+            Self::Limit => 5,
+        }
+    }
+
+    fn style(self) -> ShapeStyle {
+        match self {
+            Self::Measured(colour) => colour.stroke_width(2),
+            Self::Truth => palette::TRUTH.stroke_width(5),
+            Self::Other(colour) => colour.stroke_width(4),
+            Self::Estimate(colour) => colour.stroke_width(3),
+            Self::Wanted => palette::WANTED.stroke_width(3),
+            Self::Limit => palette::LIMIT.stroke_width(2),
+        }
+    }
+}
+
+/// A line of a plot.
+pub(super) struct Line {
+    /// Its name in the legend.
+    pub(super) name: &'static str,
+    pub(super) look: Look,
+    pub(super) points: Vec<(f64, f64)>,
+}
+
+/// Shape of a mark.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Shape {
+    Dot,
+    Ring,
+    Triangle,
+}
+
+/// Marks of a plot.
+pub(super) struct Marks {
+    pub(super) name: &'static str,
+    pub(super) shape: Shape,
+    pub(super) colour: RGBColor,
+    /// Shift to the right, drawing units, so that marks of one place stand side by side.
+    pub(super) shift: i32,
+    pub(super) points: Vec<(f64, f64)>,
+}
+
+/// One plot.
+pub(super) struct Panel {
+    pub(super) title: String,
+    /// Name of the vertical axis, with its unit.
+    pub(super) y_name: &'static str,
+    /// Name of the horizontal axis, with its unit; none hides the axis.
+    pub(super) x_name: Option<&'static str>,
+    pub(super) x: (f64, f64),
+    /// Vertical range, where the data are not to decide.
+    pub(super) y: Option<(f64, f64)>,
+    /// Least vertical span, so that noise is not blown up.
+    pub(super) least_span: f64,
+    pub(super) lines: Vec<Line>,
+    pub(super) marks: Vec<Marks>,
+    /// Horizontal lines with their names.
+    pub(super) levels: Vec<(&'static str, Look, f64)>,
+    /// Spans of x that are shaded.
+    pub(super) shades: Vec<(f64, f64)>,
+}
+
+impl Panel {
+    /// Draws it into `area`.
+    pub(super) fn draw(&self, area: &Area) -> Drawn {
+        let (head, body) = area.split_vertically(self.head_height(area));
+        self.draw_head(&head)?;
+        let y = self.y_range();
+        let (wide, high) = body.dim_in_pixel();
+        let bottom = if self.x_name.is_some() { 40 * S } else { 6 * S };
+        let most_x = (wide as i32 / (75 * S)).max(2) as usize;
+        let most_y = (high as i32 / (27 * S)).clamp(2, 7) as usize;
+        let (x_ticks, x_decimals) = axis::ticks(self.x, most_x);
+        let (y_ticks, y_decimals) = axis::ticks(y, most_y);
+        let mut chart = ChartBuilder::on(&body)
+            .margin_left(MARGIN)
+            .margin_right(RIGHT)
+            .margin_top(2 * S)
+            .x_label_area_size(bottom)
+            .y_label_area_size(LEFT - MARGIN)
+            .build_cartesian_2d(Scale::new(self.x, x_ticks), Scale::new(y, y_ticks))?;
+        for &(from, to) in &self.shades {
+            let (from, to) = (from.max(self.x.0), to.min(self.x.1));
+            if from < to {
+                let span = Rectangle::new([(from, y.0), (to, y.1)], palette::SHADE.filled());
+                chart.draw_series([span])?;
+            }
+        }
+        chart
+            .configure_mesh()
+            .light_line_style(TRANSPARENT)
+            .bold_line_style(palette::GRID.stroke_width(2))
+            .axis_style(palette::AXIS.stroke_width(2))
+            .x_label_style(("sans-serif", size(TEXT_PX), &palette::TEXT))
+            .y_label_style(("sans-serif", size(TEXT_PX), &palette::TEXT))
+            .axis_desc_style(("sans-serif", size(TEXT_PX), &palette::TEXT))
+            .x_label_formatter(&|x| match self.x_name {
+                Some(_) => axis::label(*x, x_decimals),
+                None => String::new(),
+            })
+            .y_label_formatter(&|y| axis::label(*y, y_decimals))
+            .x_desc(self.x_name.unwrap_or_default())
+            .y_desc(self.y_name)
+            .draw()?;
+        for &(_, look, level) in &self.levels {
+            let ends = [(self.x.0, level), (self.x.1, level)];
+            chart.draw_series([PathElement::new(ends, look.style())])?;
+        }
+        let columns = (wide as i32 - LEFT - RIGHT).max(1) as usize / 2;
+        for line in self.layers() {
+            for piece in self.pieces(line, y, columns) {
+                chart.draw_series([PathElement::new(piece, line.look.style())])?;
+            }
+        }
+        for marks in &self.marks {
+            let shown = marks.points.iter().filter(|point| inside(**point, self.x, y));
+            for &point in shown {
+                let [rim, body] = mark(marks, (marks.shift, 0));
+                chart.draw_series([EmptyElement::at(point) + rim + body])?;
+            }
+        }
+        Ok(())
+    }
+
+    fn layers(&self) -> Vec<&Line> {
+        let mut lines: Vec<&Line> = self.lines.iter().collect();
+        lines.sort_by_key(|line| line.look.layer());
+        lines
+    }
+
+    fn pieces(&self, line: &Line, y: (f64, f64), columns: usize) -> Pieces {
+        decimate(line.points.iter().copied(), self.x, y, columns)
+    }
+
+    /// Vertical range of all that is shown.
+    fn y_range(&self) -> (f64, f64) {
+        if let Some(range) = self.y {
+            return range;
+        }
+        let points = self.lines.iter().flat_map(|line| &line.points);
+        let marks = self.marks.iter().flat_map(|marks| &marks.points);
+        let shown = points.chain(marks).filter(|point| point.0 >= self.x.0 && point.0 <= self.x.1);
+        let levels = self.levels.iter().map(|level| level.2);
+        let range = axis::extent(shown.map(|point| point.1).chain(levels)).unwrap_or((0.0, 1.0));
+        let missing = (0.5 * (self.least_span - (range.1 - range.0))).max(0.0);
+        axis::padded((range.0 - missing, range.1 + missing), 0.06)
+    }
+
+    /// Everything that the legend names, in its order.
+    fn legend(&self) -> Vec<(&'static str, Sign<'_>)> {
+        let lines = self.lines.iter().map(|line| (line.name, Sign::Line(line.look)));
+        let levels = self.levels.iter().map(|&(name, look, _)| (name, Sign::Line(look)));
+        let marks = self.marks.iter().map(|marks| (marks.name, Sign::Mark(marks)));
+        lines.chain(levels).chain(marks).collect()
+    }
+
+    /// One row, or two where title and legend do not fit side by side.
+    fn head_height(&self, area: &Area) -> i32 {
+        let legend: i32 = self.legend().iter().map(Sign::width).sum();
+        let title = text_width(&self.title, TITLE_PX);
+        let fits = title + legend + RIGHT + 24 * S <= area.dim_in_pixel().0 as i32;
+        if fits { HEAD } else { HEAD + LEGEND }
+    }
+
+    /// Title on the left, legend on the right or below.
+    fn draw_head(&self, head: &Area) -> Drawn {
+        let (wide, high) = head.dim_in_pixel();
+        let style = font(TITLE_PX, palette::TRUTH, HPos::Left, VPos::Center);
+        head.draw(&Text::new(self.title.clone(), (8 * S, HEAD / 2), style))?;
+        let middle = if high as i32 > HEAD { HEAD - 4 * S + LEGEND / 2 } else { HEAD / 2 };
+        let mut right = wide as i32 - RIGHT;
+        for entry in self.legend().iter().rev() {
+            let (name, sign) = entry;
+            let style = font(TEXT_PX, palette::TEXT, HPos::Left, VPos::Center);
+            let text = right - text_width(name, TEXT_PX);
+            head.draw(&Text::new(*name, (text, middle), style))?;
+            match sign {
+                Sign::Line(look) => {
+                    let ends = [(text - 32 * S, middle), (text - 6 * S, middle)];
+                    head.draw(&PathElement::new(ends, look.style()))?;
+                }
+                Sign::Mark(marks) => {
+                    for part in mark(marks, (text - 13 * S, middle)) {
+                        head.draw(&part)?;
+                    }
+                }
+            }
+            right -= Sign::width(entry);
+        }
+        Ok(())
+    }
+}
+
+/// What stands before a name in the legend.
+enum Sign<'a> {
+    Line(Look),
+    Mark(&'a Marks),
+}
+
+impl Sign<'_> {
+    /// Width of an entry of the legend with the room before it, in drawing units.
+    fn width((name, sign): &(&str, Self)) -> i32 {
+        let room = match sign {
+            Self::Line(_) => 44 * S,
+            Self::Mark(_) => 34 * S,
+        };
+        room + text_width(name, TEXT_PX)
+    }
+}
+
+fn inside(point: (f64, f64), x: (f64, f64), y: (f64, f64)) -> bool {
+    point.0 >= x.0 && point.0 <= x.1 && point.1 >= y.0 && point.1 <= y.1
+}
+
+/// One mark with a white rim at `at`.
+fn mark<'a>(marks: &Marks, at: (i32, i32)) -> [DynElement<'static, SVGBackend<'a>, (i32, i32)>; 2] {
+    const R: i32 = 5 * S;
+    match marks.shape {
+        Shape::Dot => [
+            Circle::new(at, R + 2, WHITE.filled()).into_dyn(),
+            Circle::new(at, R, marks.colour.filled()).into_dyn(),
+        ],
+        Shape::Ring => [
+            Circle::new(at, R - 1, WHITE.filled()).into_dyn(),
+            Circle::new(at, R - 1, marks.colour.stroke_width(4)).into_dyn(),
+        ],
+        Shape::Triangle => [
+            TriangleMarker::new(at, R + 4, WHITE.filled()).into_dyn(),
+            TriangleMarker::new(at, R + 1, marks.colour.filled()).into_dyn(),
+        ],
+    }
+}

@@ -1,0 +1,255 @@
+//! The plots of a whole run, over time or over position.
+
+use plotters::style::RGBColor;
+
+use super::axis;
+use super::palette;
+use super::panel::{Line, Look, Marks, Panel, Shape};
+use crate::record::{CrossingLine, Recording, Row};
+
+/// From one mark of a crossing to the next, drawing units.
+const SIDE: i32 = 22;
+
+/// What the horizontal axis shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Across {
+    /// Time since boot.
+    Time,
+    /// Time since this time, the first touch of a corner, s.
+    Since(f64),
+    /// True axial position; by odometry where there is no truth.
+    Position,
+}
+
+impl Across {
+    /// Name of the axis, with its unit.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Time => "time since boot, s",
+            Self::Since(_) => "time since the corner touched, s",
+            Self::Position => "axial position, mm",
+        }
+    }
+
+    /// Where `row` stands on the axis.
+    pub(super) fn of(self, row: &Row) -> f64 {
+        match self {
+            Self::Time => row.t_s,
+            Self::Since(start_s) => row.t_s - start_s,
+            Self::Position if row.position_true_mm.is_finite() => row.position_true_mm,
+            Self::Position => row.position_est_mm,
+        }
+    }
+
+    /// Where the time `t_s` stands on the axis.
+    fn at(self, rows: &[Row], t_s: f64) -> f64 {
+        let place = rows.partition_point(|row| row.t_s < t_s).min(rows.len().saturating_sub(1));
+        match self {
+            Self::Time => t_s,
+            Self::Since(start_s) => t_s - start_s,
+            Self::Position => rows.get(place).map_or(f64::NAN, |row| self.of(row)),
+        }
+    }
+
+    /// Range of all rows.
+    pub(super) fn range(self, rows: &[Row]) -> (f64, f64) {
+        let range = axis::extent(rows.iter().map(|row| self.of(row))).unwrap_or((0.0, 1.0));
+        match self {
+            Self::Time | Self::Since(_) => (range.0, range.1.max(range.0 + 1e-3)),
+            Self::Position => axis::padded(range, 0.01),
+        }
+    }
+}
+
+/// The run as the plots need it.
+pub(super) struct View<'a> {
+    pub(super) recording: &'a Recording,
+    pub(super) rows: &'a [Row],
+    pub(super) across: Across,
+    pub(super) x: (f64, f64),
+    pub(super) shades: Vec<(f64, f64)>,
+    /// Largest preload, N, if the parameters tell it.
+    pub(super) limit_n: Option<f64>,
+}
+
+impl<'a> View<'a> {
+    /// The whole of `recording`.
+    pub(super) fn new(recording: &'a Recording, across: Across) -> Self {
+        let rows = &recording.rows[..];
+        let span = |c: &CrossingLine| {
+            let (from, to) = (across.at(rows, c.touch_s), across.at(rows, c.lift_s));
+            (from.min(to), from.max(to))
+        };
+        Self {
+            recording,
+            rows,
+            across,
+            x: across.range(rows),
+            shades: recording.summary.crossings.iter().map(span).collect(),
+            limit_n: parameter(&recording.parameters, "preload", "limit_n"),
+        }
+    }
+
+    /// An empty plot.
+    pub(super) fn panel(&self, title: &str, y_name: &'static str) -> Panel {
+        Panel {
+            title: title.to_owned(),
+            y_name,
+            x_name: Some(self.across.name()),
+            x: self.x,
+            y: None,
+            least_span: 0.0,
+            lines: Vec::new(),
+            marks: Vec::new(),
+            levels: Vec::new(),
+            shades: self.shades.clone(),
+        }
+    }
+
+    /// A line of one field.
+    pub(super) fn line(&self, name: &'static str, look: Look, of: impl Fn(&Row) -> f64) -> Line {
+        let points = self.rows.iter().map(|row| (self.across.of(row), of(row))).collect();
+        Line { name, look, points }
+    }
+
+    /// Marks at lift-off of the crossings that have the value.
+    fn marks(
+        &self,
+        name: &'static str,
+        (shape, colour, shift): (Shape, RGBColor, i32),
+        of: impl Fn(&CrossingLine) -> Option<f64>,
+    ) -> Marks {
+        let crossings = &self.recording.summary.crossings;
+        let at = |c: &CrossingLine| Some((self.across.at(self.rows, c.lift_s), of(c)?));
+        Marks { name, shape, colour, shift, points: crossings.iter().filter_map(at).collect() }
+    }
+
+    /// Every plot of the run, in the order of the page.
+    pub(super) fn all(&self) -> Vec<Panel> {
+        vec![
+            self.speed(),
+            self.preload(),
+            self.gap(),
+            self.radius(),
+            self.slip_margin(),
+            self.compression(),
+        ]
+    }
+
+    pub(super) fn speed(&self) -> Panel {
+        let mut panel = self.panel("Speed", "speed, mm/s");
+        panel.least_span = 2.0;
+        panel.lines = vec![
+            self.line("wanted", Look::Wanted, |row| row.speed_ref_mm_s),
+            self.line("estimated", Look::Estimate(palette::SPEED), |row| row.speed_est_mm_s),
+            self.line("true", Look::Truth, |row| row.speed_true_mm_s),
+        ];
+        panel
+    }
+
+    pub(super) fn preload(&self) -> Panel {
+        let mut panel = self.panel("Preload", "preload, N");
+        panel.least_span = 4.0;
+        panel.lines = vec![
+            self.line("wanted", Look::Wanted, |row| row.preload_ref_n),
+            self.line("measured", Look::Measured(palette::PRELOAD), |row| row.preload_meas_n),
+            self.line("true", Look::Truth, |row| row.preload_true_n),
+        ];
+        panel.levels = self.limit_n.iter().map(|&n| ("limit", Look::Limit, n)).collect();
+        panel
+    }
+
+    pub(super) fn gap(&self) -> Panel {
+        let summary = &self.recording.summary;
+        let mut panel = self.panel("Clearance at the step root, and the gap", "clearance, mm");
+        panel.lines = vec![self.line("clearance", Look::Truth, |row| row.root_clearance_mm)];
+        panel.marks = vec![
+            self.marks("predicted", (Shape::Triangle, palette::FLOOR, -SIDE), |c| {
+                c.gap_predicted_mm
+            }),
+            self.marks("true gap", (Shape::Dot, palette::TRUTH, 0), |c| Some(c.gap_mm)),
+            self.marks("measured", (Shape::Ring, palette::GAP, SIDE), |c| c.gap_measured_mm),
+        ];
+        if summary.gap_ref_mm > 0.0 {
+            panel.levels = vec![("reference", Look::Limit, summary.gap_ref_mm)];
+        }
+        // The clearance before touch and after the climb says nothing about the gap.
+        let gaps = panel.marks.iter().flat_map(|marks| &marks.points).map(|point| point.1);
+        let shown = gaps.chain([summary.gap_ref_mm, summary.max_gap_mm]).filter(|&gap| gap > 0.0);
+        panel.y = axis::extent(shown).map(|range| (0.7 * range.0, 1.25 * range.1));
+        panel
+    }
+
+    pub(super) fn radius(&self) -> Panel {
+        let mut panel = self.panel("Radial position of the wheel centre", "radius, mm");
+        panel.lines = vec![
+            self.line("from the arm angle", Look::Estimate(palette::RADIUS), |row| {
+                row.radius_est_mm
+            }),
+            self.line("true", Look::Truth, |row| row.radius_true_mm),
+        ];
+        panel
+    }
+
+    pub(super) fn slip_margin(&self) -> Panel {
+        let mut panel = self.panel("Slip margin", "friction left unused");
+        panel.least_span = 0.2;
+        panel.lines = vec![
+            self.line("by the model", Look::Estimate(palette::SLIP), |row| row.slip_margin_est),
+            self.line("true", Look::Truth, |row| row.slip_margin_true),
+        ];
+        panel.levels = vec![("slip", Look::Limit, 0.0)];
+        panel
+    }
+
+    pub(super) fn compression(&self) -> Panel {
+        let mut panel = self.panel("Tread compression", "compression, mm");
+        panel.least_span = 0.1;
+        panel.lines = vec![
+            self.line("measured", Look::Measured(palette::COMPRESSION), |row| {
+                row.compression_meas_mm
+            }),
+            self.line("true", Look::Truth, |row| row.compression_true_mm),
+        ];
+        panel
+    }
+}
+
+/// The number at `section.name` of parameters written as TOML.
+pub(super) fn parameter(parameters: &str, section: &str, name: &str) -> Option<f64> {
+    let table: toml::Table = parameters.parse().ok()?;
+    let value = table.get(section)?.get(name)?;
+    value.as_float().or_else(|| value.as_integer().map(|n| n as f64))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::example;
+
+    #[test]
+    fn parameters_are_found_by_section_and_name() {
+        let recording = example::deploy();
+        assert_eq!(parameter(&recording.parameters, "preload", "limit_n"), Some(50.0));
+        assert_eq!(parameter("", "preload", "limit_n"), None);
+        assert_eq!(parameter("[preload]\nlimit_n = 50", "preload", "limit_n"), Some(50.0));
+    }
+
+    #[test]
+    fn crossings_are_shaded_on_both_axes() {
+        let recording = example::deploy();
+        let time = View::new(&recording, Across::Time);
+        let position = View::new(&recording, Across::Position);
+        let crossings = &recording.summary.crossings;
+        for ((line, time), position) in crossings.iter().zip(&time.shades).zip(&position.shades) {
+            assert_eq!(*time, (line.touch_s, line.lift_s));
+            assert!(position.0 < position.1 && position.1 < line.step_mm);
+        }
+    }
+
+    #[test]
+    fn a_run_without_rows_still_has_plots() {
+        let recording = Recording::default();
+        assert_eq!(View::new(&recording, Across::Position).all().len(), 6);
+    }
+}

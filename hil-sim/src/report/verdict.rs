@@ -1,0 +1,117 @@
+//! A run in one sentence.
+
+use crate::record::Summary;
+
+/// How a run went.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Grade {
+    /// It completed, with every gap within the reference and no gross slip.
+    Good,
+    /// It completed, but a gap was larger than the reference or is unknown, or the wheel
+    /// slipped.
+    Fair,
+    /// It did not complete or ended in a fault.
+    Bad,
+}
+
+/// Gross slip from which a run no longer counts as free of slip, mm.
+pub(crate) const SLIP_SEEN_MM: f64 = 0.05;
+
+impl Grade {
+    /// Grade of a run.
+    pub(crate) fn of(summary: &Summary) -> Self {
+        if !summary.completed || !summary.faults.is_empty() {
+            Self::Bad
+        } else if gap_excess(summary).is_some_and(|excess| excess > 0.0 || excess.is_nan())
+            || summary.slip_mm > SLIP_SEEN_MM
+        {
+            Self::Fair
+        } else {
+            Self::Good
+        }
+    }
+}
+
+/// Worst gap over the reference, relative: positive is worse. None without reference.
+pub(crate) fn gap_excess(summary: &Summary) -> Option<f64> {
+    (summary.gap_ref_mm > 0.0).then(|| summary.max_gap_mm / summary.gap_ref_mm - 1.0)
+}
+
+/// The headline: what came of the run.
+pub(crate) fn headline(summary: &Summary) -> String {
+    let verb = if summary.direction == "retract" { "Retracted" } else { "Deployed" };
+    let crossings = match summary.crossings.len() {
+        1 => "1 crossing".to_owned(),
+        n => format!("{n} crossings"),
+    };
+    let way = format!("{:.1} mm in {:.2} s, {crossings}", summary.travel_mm, summary.duration_s);
+    match (summary.completed, summary.faults.first()) {
+        (true, None) => format!("{verb} {way}"),
+        (true, Some(fault)) => format!("{verb} {way}, with fault {}: {}", fault.code, fault.text),
+        (false, None) => format!("Did not complete: {way}"),
+        (false, Some(fault)) => {
+            format!("Did not complete: fault {} after {way}: {}", fault.code, fault.text)
+        }
+    }
+}
+
+/// The worst gap beside the reference, as a half-sentence.
+pub(crate) fn gap_sentence(summary: &Summary) -> String {
+    if !summary.max_gap_mm.is_finite() {
+        return "worst gap unknown".to_owned();
+    }
+    let worst = format!("worst gap {:.3} mm", summary.max_gap_mm);
+    match gap_excess(summary) {
+        None => worst,
+        Some(excess) => format!(
+            "{worst}, {:.1} % {} the reference of {:.3} mm",
+            100.0 * excess.abs(),
+            if excess > 0.0 { "above" } else { "below" },
+            summary.gap_ref_mm
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::example;
+
+    #[test]
+    fn a_completed_run_below_the_reference_is_good() {
+        let mut summary = example::deploy().summary;
+        summary.max_gap_mm = 1.59;
+        assert_eq!(Grade::of(&summary), Grade::Good);
+        assert!(headline(&summary).starts_with("Deployed 80.0 mm in "));
+        assert_eq!(
+            gap_sentence(&summary),
+            "worst gap 1.590 mm, 1.9 % below the reference of 1.620 mm"
+        );
+        summary.max_gap_mm = 1.7;
+        assert_eq!(Grade::of(&summary), Grade::Fair);
+        summary.max_gap_mm = 1.59;
+        summary.slip_mm = 0.2;
+        assert_eq!(Grade::of(&summary), Grade::Fair);
+    }
+
+    #[test]
+    fn a_fault_is_bad_and_named() {
+        let summary = example::faulted().summary;
+        assert_eq!(Grade::of(&summary), Grade::Bad);
+        assert!(headline(&summary).contains("fault 121"), "{}", headline(&summary));
+    }
+
+    #[test]
+    fn without_a_reference_the_gap_stands_alone() {
+        let summary = Summary { max_gap_mm: 1.0, ..Summary::default() };
+        assert_eq!(gap_sentence(&summary), "worst gap 1.000 mm");
+    }
+
+    #[test]
+    fn an_unknown_gap_is_not_good() {
+        let mut summary = example::deploy().summary;
+        summary.max_gap_mm = f64::NAN;
+        assert_eq!(Grade::of(&summary), Grade::Fair);
+        assert_eq!(gap_sentence(&summary), "worst gap unknown");
+    }
+}

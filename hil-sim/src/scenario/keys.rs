@@ -1,0 +1,165 @@
+//! The keys of a scenario: what each takes and in which unit.
+
+use toml::Value;
+
+use super::{ControllerKind, Direction, PRESETS, Scenario, docs};
+
+/// One key of a scenario.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct KeyInfo {
+    /// Dotted path, as in `--set`.
+    pub key: String,
+    /// Unit of its value; empty if it has none.
+    pub unit: &'static str,
+    /// Its value, as in TOML.
+    pub value: String,
+    /// What it takes.
+    pub expected: String,
+    /// What it is.
+    pub description: String,
+}
+
+/// What a key takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// A finite number.
+    Number,
+    /// A whole number, not negative.
+    Whole,
+    /// A list of at most so many numbers.
+    Numbers(usize),
+    /// One of these words.
+    Word(&'static [&'static str]),
+    /// A list of step anomalies.
+    Anomalies,
+}
+
+impl Kind {
+    /// What the key at `path` takes, known by its value in the preset.
+    pub(super) fn of(path: &str, value: &Value) -> Self {
+        match (path, value) {
+            ("preset", _) => Self::Word(&PRESETS),
+            ("run.direction", _) => Self::Word(&Direction::NAMES),
+            ("run.controller", _) => Self::Word(&ControllerKind::NAMES),
+            ("run.anomalies", _) => Self::Anomalies,
+            ("drive.modes_hz", _) => Self::Numbers(interstage::rig::MAX_MODES),
+            (_, Value::Array(_)) => Self::Numbers(interstage::rig::MAX_STEPS),
+            (_, Value::Integer(_)) => Self::Whole,
+            _ => Self::Number,
+        }
+    }
+
+    /// Half a sentence: what the key takes.
+    pub(super) fn expected(self, path: &str) -> String {
+        let unit = match unit(path) {
+            "" => String::new(),
+            unit => format!(" in {unit}"),
+        };
+        match self {
+            Self::Number => format!("a number{unit}"),
+            Self::Whole => "a whole number, 0 or more".to_owned(),
+            Self::Numbers(most) => format!("a list of at most {most} numbers{unit}"),
+            Self::Word(words) => {
+                words.iter().map(|w| format!("\"{w}\"")).collect::<Vec<_>>().join(" or ")
+            }
+            Self::Anomalies => {
+                "a list such as [{ kind = \"late\", step = 2, offset_mm = 1.0 }]".to_owned()
+            }
+        }
+    }
+}
+
+/// Units by the end of a key, the longer ends first.
+const UNITS: [(&str, &str); 18] = [
+    ("_pa_per_m", "Pa/m"),
+    ("_n_per_mm", "N/mm"),
+    ("_n_per_s", "N/s"),
+    ("_mm_s3", "mm/s^3"),
+    ("_mm_s2", "mm/s^2"),
+    ("_mm_s", "mm/s"),
+    ("_m_s", "m/s"),
+    ("_mm", "mm"),
+    ("_um", "um"),
+    ("_ms", "ms"),
+    ("_kg", "kg"),
+    ("_hz", "Hz"),
+    ("_deg", "degrees"),
+    ("_rad", "rad"),
+    ("_lsb", "LSB"),
+    ("_counts", "counts"),
+    ("_n", "N"),
+    ("_s", "s"),
+];
+
+/// Unit that the end of the key's name says; empty if none.
+pub(super) fn unit(path: &str) -> &'static str {
+    UNITS.iter().find(|(end, _)| path.ends_with(end)).map_or("", |(_, unit)| unit)
+}
+
+/// The key's name without its unit.
+pub(super) fn stem(name: &str) -> &str {
+    UNITS.iter().find_map(|(end, _)| name.strip_suffix(end)).unwrap_or(name)
+}
+
+/// Every leaf of `table` with its dotted path.
+pub(super) fn leaves(table: &toml::Table) -> Vec<(String, &Value)> {
+    let mut found = Vec::new();
+    for (name, value) in table {
+        match value {
+            Value::Table(section) => found.extend(
+                leaves(section).into_iter().map(|(rest, leaf)| (format!("{name}.{rest}"), leaf)),
+            ),
+            leaf => found.push((name.clone(), leaf)),
+        }
+    }
+    found
+}
+
+/// Every key of `scenario`, in the order of declaration.
+pub(super) fn list(scenario: &Scenario) -> Vec<KeyInfo> {
+    let table = super::merge::table_of(scenario);
+    let docs = docs::all();
+    let place = |key: &str| docs.iter().position(|(name, _)| name == key);
+    let mut keys: Vec<KeyInfo> = leaves(&table)
+        .into_iter()
+        .map(|(key, value)| KeyInfo {
+            unit: unit(&key),
+            value: value.to_string(),
+            expected: Kind::of(&key, value).expected(&key),
+            description: place(&key).map(|i| docs[i].1.clone()).unwrap_or_default(),
+            key,
+        })
+        .collect();
+    keys.sort_by_key(|info| place(&info.key));
+    keys
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_key_has_a_description() {
+        for key in Scenario::default().keys() {
+            assert!(key.description.len() > 4, "{} has no description", key.key);
+        }
+    }
+
+    #[test]
+    fn every_description_belongs_to_a_key() {
+        let keys: Vec<String> = Scenario::default().keys().into_iter().map(|k| k.key).collect();
+        for (key, _) in docs::all() {
+            assert!(keys.contains(&key), "{key} is described but is no key");
+        }
+    }
+
+    #[test]
+    fn units_come_from_the_end_of_the_name() {
+        assert_eq!(unit("drive.jerk_mm_s3"), "mm/s^3");
+        assert_eq!(unit("tread.tau_s"), "s");
+        assert_eq!(unit("tread.k_inf_pa_per_m"), "Pa/m");
+        assert_eq!(unit("sense.encoder_counts"), "counts");
+        assert_eq!(unit("tread.stiffening"), "");
+        assert_eq!(stem("tau_ms"), stem("tau_s"));
+    }
+}

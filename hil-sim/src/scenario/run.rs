@@ -1,0 +1,190 @@
+//! How a scenario is run: direction, controller, seed, and steps that do not stand
+//! where the step table says.
+
+use serde::{Deserialize, Serialize};
+
+/// Options of one run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunOptions {
+    /// Sense of motion.
+    pub direction: Direction,
+    /// Preload and speed strategy.
+    pub controller: ControllerKind,
+    /// Seed of the plant's draw and of the noise; 0 draws the nominal plant.
+    pub seed: u64,
+    /// Steps that do not stand where the step table says.
+    pub anomalies: Vec<StepAnomaly>,
+}
+
+/// Sense of motion of a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Direction {
+    /// Outwards, onto the smaller radius.
+    #[default]
+    Deploy,
+    /// Back, dropping off the steps.
+    Retract,
+}
+
+impl Direction {
+    /// Names as written in scenarios and summaries.
+    pub const NAMES: [&str; 2] = ["deploy", "retract"];
+
+    /// Its name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Deploy => Self::NAMES[0],
+            Self::Retract => Self::NAMES[1],
+        }
+    }
+}
+
+impl From<Direction> for interstage::supervise::Direction {
+    fn from(direction: Direction) -> Self {
+        match direction {
+            Direction::Deploy => Self::Deploy,
+            Direction::Retract => Self::Retract,
+        }
+    }
+}
+
+/// Preload and speed strategy of a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ControllerKind {
+    /// Preload raised ahead of each step by the reduced model.
+    #[default]
+    Scheduled,
+    /// Cruise preload throughout, at the largest speed that it allows.
+    Constant,
+    /// The preload limit throughout.
+    Limit,
+    /// Preload raised when the step is felt.
+    Reactive,
+}
+
+impl ControllerKind {
+    /// Names as written in scenarios and summaries.
+    pub const NAMES: [&str; 4] = ["scheduled", "constant", "limit", "reactive"];
+
+    /// Its name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Scheduled => Self::NAMES[0],
+            Self::Constant => Self::NAMES[1],
+            Self::Limit => Self::NAMES[2],
+            Self::Reactive => Self::NAMES[3],
+        }
+    }
+}
+
+/// One step that does not stand where the step table says. Steps count from 1 on
+/// the way out.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
+pub enum StepAnomaly {
+    /// The step stands nearer to the stow end than the table says.
+    Early {
+        /// Which step.
+        step: u8,
+        /// By how much, mm, positive.
+        offset_mm: f64,
+    },
+    /// The step stands farther out than the table says.
+    Late {
+        /// Which step.
+        step: u8,
+        /// By how much, mm, positive.
+        offset_mm: f64,
+    },
+    /// The step is not there.
+    Missing {
+        /// Which step.
+        step: u8,
+    },
+    /// A step that the table does not know.
+    Extra {
+        /// Where it stands, mm.
+        position_mm: f64,
+    },
+}
+
+impl StepAnomaly {
+    /// Names as written in scenarios.
+    pub(super) const NAMES: [&'static str; 4] = ["early", "late", "missing", "extra"];
+
+    /// Keys beside `kind` of the anomaly of this name.
+    pub(super) fn fields(kind: &str) -> &'static [&'static str] {
+        match kind {
+            "missing" => &["step"],
+            "extra" => &["position_mm"],
+            _ => &["step", "offset_mm"],
+        }
+    }
+}
+
+/// The step table `steps`, mm, with the anomalies applied, ascending.
+pub(super) fn apply(steps: &[f64], anomalies: &[StepAnomaly]) -> Vec<f64> {
+    let mut found: Vec<Option<f64>> = steps.iter().copied().map(Some).collect();
+    let mut extra = Vec::new();
+    for anomaly in anomalies {
+        let (step, change) = match *anomaly {
+            StepAnomaly::Early { step, offset_mm } => (step, Some(-offset_mm)),
+            StepAnomaly::Late { step, offset_mm } => (step, Some(offset_mm)),
+            StepAnomaly::Missing { step } => (step, None),
+            StepAnomaly::Extra { position_mm } => {
+                extra.push(position_mm);
+                continue;
+            }
+        };
+        if let Some(place) = usize::from(step).checked_sub(1).and_then(|i| found.get_mut(i)) {
+            *place = place.zip(change).map(|(position, by)| position + by);
+        }
+    }
+    let mut all: Vec<f64> = found.into_iter().flatten().chain(extra).collect();
+    all.sort_by(f64::total_cmp);
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn anomalies_move_remove_and_add_steps() {
+        let anomalies = [
+            StepAnomaly::Early { step: 1, offset_mm: 1.0 },
+            StepAnomaly::Late { step: 3, offset_mm: 2.0 },
+            StepAnomaly::Missing { step: 2 },
+            StepAnomaly::Extra { position_mm: 45.0 },
+        ];
+        assert_eq!(apply(&[18.0, 40.0, 62.0], &anomalies), [17.0, 45.0, 64.0]);
+    }
+
+    #[test]
+    fn a_missing_step_stays_missing_whatever_else_is_said_of_it() {
+        let anomalies =
+            [StepAnomaly::Missing { step: 1 }, StepAnomaly::Late { step: 1, offset_mm: 2.0 }];
+        assert_eq!(apply(&[18.0, 40.0], &anomalies), [40.0]);
+    }
+
+    #[test]
+    fn names_are_those_of_the_serialised_form() {
+        for (kind, name) in [
+            (ControllerKind::Scheduled, "scheduled"),
+            (ControllerKind::Constant, "constant"),
+            (ControllerKind::Limit, "limit"),
+            (ControllerKind::Reactive, "reactive"),
+        ] {
+            assert_eq!(kind.name(), name);
+            assert_eq!(serde_json::to_value(kind).unwrap(), name);
+        }
+        for direction in [Direction::Deploy, Direction::Retract] {
+            assert_eq!(serde_json::to_value(direction).unwrap(), direction.name());
+        }
+    }
+}

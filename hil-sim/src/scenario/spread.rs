@@ -1,0 +1,141 @@
+//! How far the plant may differ from the rig that the controller believes in, and
+//! how its sensors err.
+
+use serde::{Deserialize, Serialize};
+
+/// Width of the per-seed draw of the plant. Keys in `_rel` are standard deviations
+/// relative to the nominal value; keys with a unit are half-widths about it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Spread {
+    /// Relaxed stiffness of the tread, relative.
+    pub k_inf_rel: f64,
+    /// Stiffening of the tread, relative.
+    pub stiffening_rel: f64,
+    /// Relaxation time of the tread, relative.
+    pub tau_rel: f64,
+    /// Friction of tread on wall, relative.
+    pub mu_rel: f64,
+    /// Top load, relative.
+    pub top_load_rel: f64,
+    /// Position of each step, mm.
+    pub step_position_mm: f64,
+    /// Height of each step, mm.
+    pub step_height_mm: f64,
+    /// Wheel radius as made, mm.
+    pub wheel_radius_mm: f64,
+    /// Loss of wheel radius by wear, mm: drawn from 0 to this.
+    pub wear_mm: f64,
+    /// Rate of the preload spring, relative.
+    pub spring_rel: f64,
+    /// Dead time of the pre-tightener, relative.
+    pub delay_rel: f64,
+    /// Lag of the pre-tightener, relative.
+    pub lag_rel: f64,
+    /// Largest rate of the pre-tightener, relative.
+    pub slew_rel: f64,
+    /// Gain of the load cell, relative.
+    pub load_cell_gain_rel: f64,
+    /// Gain of the tread displacement sensor, relative.
+    pub tread_gain_rel: f64,
+    /// Zero of the arm angle sensor, degrees.
+    pub arm_zero_deg: f64,
+}
+
+impl Default for Spread {
+    fn default() -> Self {
+        Self {
+            k_inf_rel: 0.04,
+            stiffening_rel: 0.03,
+            tau_rel: 0.05,
+            mu_rel: 0.03,
+            top_load_rel: 0.05,
+            step_position_mm: 0.3,
+            step_height_mm: 0.05,
+            wheel_radius_mm: 0.05,
+            wear_mm: 0.05,
+            spring_rel: 0.05,
+            delay_rel: 0.15,
+            lag_rel: 0.15,
+            slew_rel: 0.05,
+            load_cell_gain_rel: 0.005,
+            tread_gain_rel: 0.005,
+            arm_zero_deg: 0.05,
+        }
+    }
+}
+
+impl Spread {
+    /// No spread: every seed draws the nominal plant.
+    #[must_use]
+    pub const fn none() -> Self {
+        Self {
+            k_inf_rel: 0.0,
+            stiffening_rel: 0.0,
+            tau_rel: 0.0,
+            mu_rel: 0.0,
+            top_load_rel: 0.0,
+            step_position_mm: 0.0,
+            step_height_mm: 0.0,
+            wheel_radius_mm: 0.0,
+            wear_mm: 0.0,
+            spring_rel: 0.0,
+            delay_rel: 0.0,
+            lag_rel: 0.0,
+            slew_rel: 0.0,
+            load_cell_gain_rel: 0.0,
+            tread_gain_rel: 0.0,
+            arm_zero_deg: 0.0,
+        }
+    }
+}
+
+/// Noise of the sensors, one standard deviation, and their conversion delays.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Noise {
+    /// Load cell, N.
+    pub load_cell_n: f64,
+    /// Tread displacement, mm.
+    pub tread_mm: f64,
+    /// Arm angle, steps of its 14-bit code.
+    pub angle_lsb: f64,
+    /// Edges of the wheel encoder, counts.
+    pub encoder_jitter_counts: f64,
+    /// Age of a load-cell reading when it is handed over, s.
+    pub load_cell_delay_s: f64,
+    /// Age of a displacement reading when it is handed over, s.
+    pub tread_delay_s: f64,
+    /// Age of an angle reading when it is handed over, s.
+    pub angle_delay_s: f64,
+}
+
+impl Default for Noise {
+    fn default() -> Self {
+        Self {
+            load_cell_n: 0.05,
+            tread_mm: 0.002,
+            angle_lsb: 0.5,
+            encoder_jitter_counts: 0.0,
+            load_cell_delay_s: 0.000_5,
+            tread_delay_s: 0.000_5,
+            angle_delay_s: 0.000_1,
+        }
+    }
+}
+
+impl Noise {
+    /// Ideal sensors: quantised, but without noise and delay.
+    #[must_use]
+    pub const fn none() -> Self {
+        Self {
+            load_cell_n: 0.0,
+            tread_mm: 0.0,
+            angle_lsb: 0.0,
+            encoder_jitter_counts: 0.0,
+            load_cell_delay_s: 0.0,
+            tread_delay_s: 0.0,
+            angle_delay_s: 0.0,
+        }
+    }
+}

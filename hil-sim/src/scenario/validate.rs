@@ -1,0 +1,103 @@
+//! The checks of a whole scenario, after the rig's own.
+
+use super::merge::Provenance;
+use super::{Scenario, ScenarioError, StepAnomaly};
+
+/// Largest offset of an early or late step, mm.
+const MAX_OFFSET_MM: f64 = 20.0;
+
+/// Checks every value against its range and the values against one another.
+pub(super) fn check(scenario: &Scenario, from: &Provenance) -> Result<(), ScenarioError> {
+    scenario.rig.validate().map_err(|error| ScenarioError::Rig {
+        origin: from.of_message(&error.to_string()),
+        error,
+    })?;
+    for (key, value, min, max) in ranges(scenario) {
+        // Written so that a NaN fails.
+        if !(value >= min && value <= max) {
+            let (origin, key) = (from.of(key), key.to_owned());
+            return Err(ScenarioError::OutOfRange { origin, key, value, min, max });
+        }
+    }
+    anomalies(scenario, from)?;
+    spacing(scenario, from)
+}
+
+fn ranges(scenario: &Scenario) -> [(&'static str, f64, f64, f64); 24] {
+    let (s, n) = (&scenario.spread, &scenario.noise);
+    [
+        ("spread.k_inf_rel", s.k_inf_rel, 0.0, 0.3),
+        ("spread.stiffening_rel", s.stiffening_rel, 0.0, 0.3),
+        ("spread.tau_rel", s.tau_rel, 0.0, 0.3),
+        ("spread.mu_rel", s.mu_rel, 0.0, 0.3),
+        ("spread.top_load_rel", s.top_load_rel, 0.0, 0.3),
+        ("spread.step_position_mm", s.step_position_mm, 0.0, 5.0),
+        ("spread.step_height_mm", s.step_height_mm, 0.0, 0.5),
+        ("spread.wheel_radius_mm", s.wheel_radius_mm, 0.0, 1.0),
+        ("spread.wear_mm", s.wear_mm, 0.0, 2.0),
+        ("spread.spring_rel", s.spring_rel, 0.0, 0.3),
+        ("spread.delay_rel", s.delay_rel, 0.0, 0.3),
+        ("spread.lag_rel", s.lag_rel, 0.0, 0.3),
+        ("spread.slew_rel", s.slew_rel, 0.0, 0.3),
+        ("spread.load_cell_gain_rel", s.load_cell_gain_rel, 0.0, 0.1),
+        ("spread.tread_gain_rel", s.tread_gain_rel, 0.0, 0.1),
+        ("spread.arm_zero_deg", s.arm_zero_deg, 0.0, 2.0),
+        ("noise.load_cell_n", n.load_cell_n, 0.0, 10.0),
+        ("noise.tread_mm", n.tread_mm, 0.0, 0.5),
+        ("noise.angle_lsb", n.angle_lsb, 0.0, 50.0),
+        ("noise.encoder_jitter_counts", n.encoder_jitter_counts, 0.0, 10.0),
+        ("noise.load_cell_delay_s", n.load_cell_delay_s, 0.0, 0.02),
+        ("noise.tread_delay_s", n.tread_delay_s, 0.0, 0.02),
+        ("noise.angle_delay_s", n.angle_delay_s, 0.0, 0.02),
+        // TOML has no larger integer.
+        ("run.seed", scenario.run.seed as f64, 0.0, i64::MAX as f64),
+    ]
+}
+
+fn anomalies(scenario: &Scenario, from: &Provenance) -> Result<(), ScenarioError> {
+    let steps = scenario.rig.rig.step_positions_mm.len();
+    for (index, anomaly) in scenario.run.anomalies.iter().enumerate() {
+        let (step, length) = match *anomaly {
+            StepAnomaly::Early { step, offset_mm } | StepAnomaly::Late { step, offset_mm } => {
+                (Some(step), Some(("offset_mm", offset_mm, MAX_OFFSET_MM)))
+            }
+            StepAnomaly::Missing { step } => (Some(step), None),
+            StepAnomaly::Extra { position_mm } => {
+                (None, Some(("position_mm", position_mm, scenario.rig.rig.travel_mm)))
+            }
+        };
+        let step = step.map(|n| ("step", f64::from(n), 1.0, steps as f64));
+        let length = length.map(|(name, value, max)| (name, value, 0.0, max));
+        for (name, value, min, max) in step.into_iter().chain(length) {
+            if !(value >= min && value <= max) {
+                return Err(ScenarioError::OutOfRange {
+                    origin: from.of("run.anomalies"),
+                    key: format!("run.anomalies[{}].{name}", index + 1),
+                    value,
+                    min,
+                    max,
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The wheel finishes one step before it touches the next, with the anomalies too.
+fn spacing(scenario: &Scenario, from: &Provenance) -> Result<(), ScenarioError> {
+    if scenario.run.anomalies.is_empty() {
+        return Ok(());
+    }
+    let geometry = &scenario.rig.rig;
+    let radius = geometry.wheel_radius_mm;
+    let least_mm = (radius * radius - (radius - geometry.step_height_mm).powi(2)).sqrt();
+    let mut first_mm = 0.0;
+    for second_mm in scenario.true_steps_mm() {
+        if second_mm - first_mm < least_mm {
+            let origin = from.of("run.anomalies");
+            return Err(ScenarioError::StepsTooClose { origin, first_mm, second_mm, least_mm });
+        }
+        first_mm = second_mm;
+    }
+    Ok(())
+}

@@ -1,0 +1,167 @@
+//! A run on the terminal: verdict, ledger, faults and limits, and where the files
+//! are. At most [`WIDTH`] columns wide.
+
+use std::path::PathBuf;
+
+use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
+use comfy_table::{Cell, CellAlignment, ContentArrangement, Table, TableComponent};
+
+use crate::record::{CrossingLine, Report, Summary};
+use crate::report::verdict::{gap_sentence, headline};
+
+/// Most columns that the output takes.
+pub const WIDTH: u16 = 100;
+
+/// The run of `summary` as text, with the paths of `files` at the end. Ends with a
+/// line feed.
+#[must_use]
+pub fn run(summary: &Summary, files: &[PathBuf]) -> String {
+    let mut text = wrapped(&headline(summary), "");
+    text += &wrapped(&details(summary), "  ");
+    if !summary.crossings.is_empty() {
+        text += &format!("{}\n", ledger(&summary.crossings));
+    }
+    for (kind, reports) in [("fault", &summary.faults), ("limit", &summary.limits)] {
+        for report in reports {
+            text += &wrapped(&report_line(kind, report), "  ");
+        }
+    }
+    for file in files {
+        // Paths are not wrapped, so that they can be copied.
+        text += &format!("  wrote {}\n", file.display());
+    }
+    text
+}
+
+/// A table of `head` and `rows` in the style of the others, its first column on the
+/// left and the rest on the right.
+#[must_use]
+pub fn plain(head: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> Table {
+    let mut table = Table::new();
+    table
+        .load_preset(UTF8_HORIZONTAL_ONLY)
+        .remove_style(TableComponent::HorizontalLines)
+        .remove_style(TableComponent::MiddleIntersections)
+        .remove_style(TableComponent::LeftBorderIntersections)
+        .remove_style(TableComponent::RightBorderIntersections)
+        .set_content_arrangement(ContentArrangement::Dynamic)
+        .set_width(WIDTH)
+        .set_header(head.iter().enumerate().map(|(column, text)| cell(column, (*text).to_owned())));
+    for row in rows {
+        table.add_row(row.into_iter().enumerate().map(|(column, text)| cell(column, text)));
+    }
+    table
+}
+
+fn cell(column: usize, text: String) -> Cell {
+    let side = if column == 0 { CellAlignment::Left } else { CellAlignment::Right };
+    Cell::new(text).set_alignment(side)
+}
+
+fn details(s: &Summary) -> String {
+    format!(
+        "{}; gross slip {:.3} mm; {} controller on {}, rig {}, seed {}; {:.0} times real time",
+        gap_sentence(s),
+        s.slip_mm,
+        s.controller,
+        s.target,
+        s.rig,
+        s.seed,
+        s.real_time_factor
+    )
+}
+
+fn ledger(crossings: &[CrossingLine]) -> Table {
+    const HEAD: [&str; 10] = [
+        "step",
+        "speed\nmm/s",
+        "preload\nN",
+        "gap\nmm",
+        "predicted\nmm",
+        "measured\nmm",
+        "corner\nN",
+        "lead\ns",
+        "slip\nmm",
+        "step at (found)\nmm",
+    ];
+    plain(&HEAD, crossings.iter().map(ledger_row))
+}
+
+fn ledger_row(c: &CrossingLine) -> Vec<String> {
+    vec![
+        c.index.to_string(),
+        number(c.speed_mm_s, 2),
+        number(c.preload_n, 1),
+        number(c.gap_mm, 3),
+        number(c.gap_predicted_mm, 3),
+        number(c.gap_measured_mm, 3),
+        number(c.corner_force_n, 1),
+        number(c.lead_time_s, 3),
+        number(c.slip_mm, 3),
+        format!("{} ({})", number(c.step_mm, 2), number(c.step_found_mm, 2)),
+    ]
+}
+
+/// `value` with `decimals`; a dash if it is missing or no number.
+#[must_use]
+pub fn number(value: impl Into<Option<f64>>, decimals: usize) -> String {
+    let value = value.into().filter(|value| value.is_finite());
+    value.map_or_else(|| "-".to_owned(), |value| format!("{value:.decimals$}"))
+}
+
+fn report_line(kind: &str, report: &Report) -> String {
+    format!("{kind} {} at {:.3} s: {}", report.code, report.t_s, report.text)
+}
+
+/// `text` broken at blanks to the width, each line after `indent`.
+fn wrapped(text: &str, indent: &str) -> String {
+    let most = usize::from(WIDTH) - indent.len();
+    let mut lines = vec![String::new()];
+    for word in text.split_whitespace() {
+        let line = lines.last_mut().expect("there is always one");
+        if line.is_empty() {
+            line.push_str(word);
+        } else if line.chars().count() + 1 + word.chars().count() <= most {
+            line.push(' ');
+            line.push_str(word);
+        } else {
+            lines.push(word.to_owned());
+        }
+    }
+    lines.iter().map(|line| format!("{indent}{line}\n")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::example;
+
+    #[test]
+    fn nothing_is_wider_than_the_terminal() {
+        for recording in [example::deploy(), example::faulted()] {
+            let text = run(&recording.summary, &[]);
+            for line in text.lines() {
+                assert!(line.chars().count() <= usize::from(WIDTH), "{line}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_ledger_line_takes_one_line_of_text() {
+        let summary = example::deploy().summary;
+        let text = run(&summary, &[PathBuf::from("out/run/report.html")]);
+        let c = &summary.crossings[1];
+        let line = text.lines().find(|line| line.contains("39.80 (39.68)")).expect(&text);
+        assert!(line.contains(&format!("{:.3}", c.gap_mm)), "{line}");
+        assert!(line.contains(" - "), "the missing measurement is shown: {line}");
+        assert!(text.ends_with("  wrote out/run/report.html\n"));
+    }
+
+    #[test]
+    fn faults_and_limits_are_listed() {
+        let text = run(&example::faulted().summary, &[]);
+        assert!(text.starts_with("Did not complete: fault 121"));
+        assert!(text.contains("  fault 121 at "));
+        assert!(text.contains("  limit 201 at "));
+    }
+}

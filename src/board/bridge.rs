@@ -1,0 +1,105 @@
+//! The two motor bridges, each driven by PWM, direction and enable, and the
+//! emergency stop on the timers' break inputs.
+
+use embassy_stm32::Peri;
+use embassy_stm32::gpio::{AfType, AnyPin, Flex, Level, Output, OutputType, Pull, Speed};
+use embassy_stm32::peripherals::{TIM1, TIM8};
+use embassy_stm32::time::khz;
+use embassy_stm32::timer::complementary_pwm::{
+    BreakInputPolarity, ComplementaryPwm, FilterValue, Ossi,
+};
+use embassy_stm32::timer::low_level::CountingMode;
+use embassy_stm32::timer::simple_pwm::{PwmPin, PwmPinConfig};
+use embassy_stm32::timer::{
+    AdvancedInstance4Channel, BkIn1, BreakInputPin, Ch1, Channel, TimerPin,
+};
+use interstage::hal::{MotorCommand, Motors};
+
+/// One bridge in phase/enable control: PWM chops, the direction line chooses the
+/// sense, the enable line wakes the bridge.
+pub(crate) struct Bridge<T: AdvancedInstance4Channel> {
+    pwm: ComplementaryPwm<'static, T>,
+    forward: Output<'static>,
+    enable: Output<'static>,
+    _stop: Flex<'static>,
+}
+
+impl<T: AdvancedInstance4Channel> Bridge<T> {
+    /// A bridge that is off.
+    ///
+    /// `stop` is the emergency stop: a contact to ground that opens. High, and so
+    /// a broken wire too, takes the PWM away in hardware, whatever the software does.
+    pub(crate) fn new<S: BreakInputPin<T, BkIn1>>(
+        timer: Peri<'static, T>,
+        pwm: Peri<'static, impl TimerPin<T, Ch1>>,
+        forward: Peri<'static, AnyPin>,
+        enable: Peri<'static, AnyPin>,
+        stop: Peri<'static, S>,
+    ) -> Self {
+        let enable = Output::new(enable, Level::Low, Speed::Low);
+        let forward = Output::new(forward, Level::Low, Speed::Low);
+        let pin =
+            PwmPinConfig { output_type: OutputType::PushPull, speed: Speed::Low, pull: Pull::Down };
+        let pin = PwmPin::new_with_config(pwm, pin);
+        // The plain PWM driver has no break input; of the complementary one the
+        // second output of each pair simply has no pin.
+        let mut pwm = ComplementaryPwm::new(
+            timer,
+            Some(pin),
+            None,
+            None,
+            None,
+            None,
+            None,
+            None,
+            None,
+            khz(20),
+            CountingMode::EdgeAlignedUp,
+        );
+        let alternate = stop.af_num();
+        let mut stop = Flex::new(stop);
+        stop.set_as_af_unchecked(alternate, AfType::input(Pull::Up));
+        pwm.set_break_polarity(BreakInputPolarity::ACTIVE_HIGH);
+        pwm.set_break_filter(FilterValue::FDTS_DIV32_N8);
+        pwm.set_break_input_pin_enable(true);
+        // With the outputs off the timer goes on holding the PWM line low.
+        pwm.set_off_state_selection_idle(Ossi::IDLE_LEVEL);
+        pwm.set_duty(Channel::Ch1, 0);
+        pwm.enable(Channel::Ch1);
+        pwm.set_break_enable(true);
+        Self { pwm, forward, enable, _stop: stop }
+    }
+
+    /// Sets direction at once and duty at the next period.
+    fn set(&mut self, command: MotorCommand) {
+        if !command.enable {
+            self.enable.set_low();
+            self.pwm.set_duty(Channel::Ch1, 0);
+            // After an emergency stop the outputs stay off until the controller
+            // has let go of the motor: releasing the button starts nothing.
+            self.pwm.set_master_output_enable(true);
+            return;
+        }
+        let duty = command.duty.to_bits();
+        // |duty| <= 2^15 and a period of 8500 counts: the product stays below 2^29.
+        let counts = (u32::from(duty.unsigned_abs()) * self.pwm.get_max_duty()) >> 15;
+        self.forward.set_level(if duty < 0 { Level::Low } else { Level::High });
+        self.pwm.set_duty(Channel::Ch1, counts);
+        self.enable.set_high();
+    }
+}
+
+/// Both bridges.
+pub(crate) struct Bridges {
+    /// The wheel's motor.
+    pub(crate) drive: Bridge<TIM1>,
+    /// The pre-tightener's motor.
+    pub(crate) preload: Bridge<TIM8>,
+}
+
+impl Motors for Bridges {
+    fn apply(&mut self, drive: MotorCommand, preload: MotorCommand) {
+        self.drive.set(drive);
+        self.preload.set(preload);
+    }
+}

@@ -1,0 +1,114 @@
+//! The blue button B1 as a source of commands.
+//!
+//! | gesture | command | given |
+//! |---|---|---|
+//! | short press | start | 0.4 s after release, when no second press came |
+//! | two short presses | retract | at the second release |
+//! | held for 1 s | stop | while still held: a stop does not wait for a release |
+//! | held on to 3 s | reset | while still held, after the stop |
+
+use embassy_stm32::Peri;
+use embassy_stm32::exti::ExtiInput;
+use embassy_stm32::gpio::Pull;
+use embassy_stm32::mode::Async;
+use embassy_stm32::peripherals::{EXTI13, PC13};
+use embassy_time::{Duration, Timer, with_timeout};
+use interstage::hal::CommandSource;
+use interstage::supervise::Command;
+
+use super::Irqs;
+
+/// Contacts have come to rest after this.
+const BOUNCE: Duration = Duration::from_millis(20);
+
+/// A second press within this after a release makes the two one gesture.
+const DOUBLE: Duration = Duration::from_millis(400);
+
+/// Holding for this long stops.
+const STOP: Duration = Duration::from_secs(1);
+
+/// Holding on for this much longer resets.
+const RESET: Duration = Duration::from_secs(2);
+
+/// What the finger last did.
+#[derive(Clone, Copy)]
+enum Finger {
+    /// Nothing, or its gesture is complete.
+    Up,
+    /// Held the button until stop was given, and has not let go.
+    Holding,
+    /// Held it until reset was given too.
+    Done,
+}
+
+/// B1.
+pub(crate) struct Button {
+    pin: ExtiInput<'static, Async>,
+    finger: Finger,
+}
+
+impl Button {
+    /// The button; on this board it connects the pin to the supply.
+    pub(crate) fn new(pin: Peri<'static, PC13>, line: Peri<'static, EXTI13>) -> Self {
+        Self { pin: ExtiInput::new(pin, line, Pull::Down, Irqs), finger: Finger::Up }
+    }
+
+    async fn pressed(&mut self) {
+        self.settled(true).await;
+    }
+
+    async fn released(&mut self) {
+        self.settled(false).await;
+    }
+
+    /// Waits until the pin stands at a level and still does after the bounce.
+    async fn settled(&mut self, high: bool) {
+        loop {
+            if high {
+                self.pin.wait_for_high().await;
+            } else {
+                self.pin.wait_for_low().await;
+            }
+            Timer::after(BOUNCE).await;
+            if self.pin.is_high() == high {
+                return;
+            }
+        }
+    }
+}
+
+impl CommandSource for Button {
+    async fn next(&mut self) -> Command {
+        loop {
+            match self.finger {
+                Finger::Up => {
+                    self.pressed().await;
+                    let mut tapped = Command::Start;
+                    loop {
+                        if with_timeout(STOP, self.released()).await.is_err() {
+                            self.finger = Finger::Holding;
+                            return Command::Stop;
+                        }
+                        if tapped == Command::Retract
+                            || with_timeout(DOUBLE, self.pressed()).await.is_err()
+                        {
+                            return tapped;
+                        }
+                        tapped = Command::Retract;
+                    }
+                }
+                Finger::Holding => {
+                    if with_timeout(RESET, self.released()).await.is_err() {
+                        self.finger = Finger::Done;
+                        return Command::Reset;
+                    }
+                    self.finger = Finger::Up;
+                }
+                Finger::Done => {
+                    self.released().await;
+                    self.finger = Finger::Up;
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,43 @@
+//! Single letters from the debug probe as commands.
+
+use embassy_time::{Duration, Timer};
+use interstage::hal::CommandSource;
+use interstage::supervise::Command;
+use rtt_target::DownChannel;
+
+/// The probe writes into memory without telling the core: look this often.
+const POLL: Duration = Duration::from_millis(20);
+
+/// RTT down channel 0.
+pub(crate) struct Console(DownChannel);
+
+impl Console {
+    /// Reads from `channel`.
+    pub(crate) fn new(channel: DownChannel) -> Self {
+        Self(channel)
+    }
+}
+
+impl CommandSource for Console {
+    async fn next(&mut self) -> Command {
+        loop {
+            let mut letter = [0];
+            if self.0.read(&mut letter) == 0 {
+                Timer::after(POLL).await;
+            } else if let Some(command) = decode(letter[0]) {
+                return command;
+            }
+        }
+    }
+}
+
+/// The command of a letter; line ends and mistypings have none.
+fn decode(letter: u8) -> Option<Command> {
+    match letter {
+        b's' => Some(Command::Start),
+        b'x' => Some(Command::Stop),
+        b'r' => Some(Command::Retract),
+        b'0' => Some(Command::Reset),
+        _ => None,
+    }
+}

@@ -1,0 +1,50 @@
+//! LD2. Blinking needs time of its own, so a task turns the pin and the
+//! indicator only leaves word what to show.
+
+use embassy_futures::select::{Either, select};
+use embassy_stm32::Peri;
+use embassy_stm32::gpio::{AnyPin, Level, Output, Speed};
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::signal::Signal;
+use embassy_time::{Duration, Timer};
+use interstage::hal::{Indicator, Light};
+
+/// Half a period of 4 Hz.
+const HALF_PERIOD: Duration = Duration::from_millis(125);
+
+static WANTED: Signal<CriticalSectionRawMutex, Light> = Signal::new();
+
+/// Leaves word for [`show`].
+pub(crate) struct Lamp;
+
+impl Indicator for Lamp {
+    fn show(&mut self, light: Light) {
+        WANTED.signal(light);
+    }
+}
+
+/// Shows on `pin` what [`Lamp`] asks for.
+#[embassy_executor::task]
+pub(crate) async fn show(pin: Peri<'static, AnyPin>) -> ! {
+    let mut pin = Output::new(pin, Level::Low, Speed::Low);
+    let mut light = Light::Off;
+    loop {
+        light = match light {
+            Light::Off => {
+                pin.set_low();
+                WANTED.wait().await
+            }
+            Light::On => {
+                pin.set_high();
+                WANTED.wait().await
+            }
+            Light::Alarm => {
+                pin.toggle();
+                match select(WANTED.wait(), Timer::after(HALF_PERIOD)).await {
+                    Either::First(wanted) => wanted,
+                    Either::Second(()) => Light::Alarm,
+                }
+            }
+        };
+    }
+}

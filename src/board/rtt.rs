@@ -1,0 +1,138 @@
+//! Real-time transfer to the debug probe: log, telemetry and console.
+//!
+//! A probe that attaches may switch the log channel to blocking, and once it has
+//! left, the first full buffer would stall the core until the watchdog bites.
+//! So the log has a logger of its own here: it gathers a frame, puts the channel
+//! back to skipping, and writes the frame whole or not at all. What is lost is
+//! counted.
+
+use core::cell::UnsafeCell;
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use critical_section::RestoreState;
+use defmt::Encoder;
+use rtt_target::{ChannelMode, DownChannel, UpChannel, rtt_init};
+
+/// Longest frame, bytes: a panic message with its place.
+const FRAME: usize = 512;
+
+static LOST: AtomicU32 = AtomicU32::new(0);
+
+/// The channels that are not the log.
+pub(crate) struct Channels {
+    /// Up 1: binary records.
+    #[expect(dead_code, reason = "named and sized for the host; no record is written yet")]
+    pub(crate) telemetry: UpChannel,
+    /// Down 0: operator's letters.
+    pub(crate) console: DownChannel,
+}
+
+/// Sets up the channels; the log works from here on. Call once, first of all.
+pub(crate) fn init() -> Channels {
+    let channels = rtt_init! {
+        up: {
+            0: { size: 2048, mode: ChannelMode::NoBlockSkip, name: "defmt" }
+            1: { size: 4096, mode: ChannelMode::NoBlockSkip, name: "telemetry" }
+        }
+        down: {
+            0: { size: 16, name: "console" }
+        }
+    };
+    // SAFETY: in the critical section no frame is open, so nobody else holds the state.
+    critical_section::with(|_| unsafe { (*STATE.0.get()).channel = Some(channels.up.0) });
+    Channels { telemetry: channels.up.1, console: channels.down.0 }
+}
+
+/// Log frames lost since boot; wraps.
+pub(crate) fn lost() -> u32 {
+    LOST.load(Ordering::Relaxed)
+}
+
+/// The frame under way.
+struct State {
+    channel: Option<UpChannel>,
+    encoder: Encoder,
+    bytes: [u8; FRAME],
+    length: usize,
+    cut: bool,
+    restore: RestoreState,
+}
+
+impl State {
+    /// Runs one call of the encoder, its output appended to the frame.
+    fn encode(&mut self, call: impl FnOnce(&mut Encoder, &mut dyn FnMut(&[u8]))) {
+        let Self { encoder, bytes, length, cut, .. } = self;
+        call(encoder, &mut |part| match bytes.get_mut(*length..*length + part.len()) {
+            Some(room) => {
+                room.copy_from_slice(part);
+                *length += part.len();
+            }
+            None => *cut = true,
+        });
+    }
+
+    fn send(&mut self) {
+        let Some(channel) = &mut self.channel else { return };
+        channel.set_mode(ChannelMode::NoBlockSkip);
+        if self.cut || channel.write(&self.bytes[..self.length]) < self.length {
+            LOST.store(lost().wrapping_add(1), Ordering::Relaxed);
+        }
+    }
+}
+
+struct Shared(UnsafeCell<State>);
+
+// SAFETY: touched only between `acquire` and `release` of the logger and in
+// `init`, always inside a critical section; this chip has one core.
+unsafe impl Sync for Shared {}
+
+static STATE: Shared = Shared(UnsafeCell::new(State {
+    channel: None,
+    encoder: Encoder::new(),
+    bytes: [0; FRAME],
+    length: 0,
+    cut: false,
+    restore: RestoreState::invalid(),
+}));
+
+#[defmt::global_logger]
+struct Logger;
+
+// SAFETY: `acquire` opens a critical section that `release` closes, so the
+// methods in between have the state to themselves.
+unsafe impl defmt::Logger for Logger {
+    fn acquire() {
+        // SAFETY: paired with `release`. A frame that is open already was broken
+        // off by a panic and is never released: it is given up.
+        let state = unsafe {
+            let restore = critical_section::acquire();
+            let state = &mut *STATE.0.get();
+            state.restore = restore;
+            state
+        };
+        state.length = 0;
+        state.cut = false;
+        state.encode(|encoder, out| encoder.start_frame(out));
+    }
+
+    unsafe fn flush() {
+        // Would wait for the probe.
+    }
+
+    unsafe fn write(bytes: &[u8]) {
+        // SAFETY: between `acquire` and `release`.
+        let state = unsafe { &mut *STATE.0.get() };
+        state.encode(|encoder, out| encoder.write(bytes, out));
+    }
+
+    unsafe fn release() {
+        // SAFETY: paired with `acquire`; the state is let go before the section ends.
+        unsafe {
+            let state = &mut *STATE.0.get();
+            state.encode(|encoder, out| encoder.end_frame(out));
+            state.send();
+            let restore = state.restore;
+            critical_section::release(restore);
+        }
+    }
+}

@@ -1,0 +1,187 @@
+//! Preload loop: the reference runs at the actuator's slew, its rate is fed
+//! forward, and feedback acts only on what a model of the actuator did not expect.
+//!
+//! The pre-tightener integrates duty into force behind a dead time and a lag, so
+//! plain feedback would have to be slow. Here the reference goes through the same
+//! dead time and lag in a model, and the loop corrects the difference between that
+//! and the load cell (Smith 1957).
+
+#![deny(clippy::float_arithmetic)]
+
+use super::saturate::duty;
+use crate::hal::Duty;
+use crate::model::timing::SLEW_PART;
+use crate::numeric::{LowPass, LowPassState, checked};
+use crate::rig::{Rig, RigError};
+use crate::units::{Newtons, NewtonsPerSecond, Q16, TICK_HZ, q16};
+
+/// Longest dead time modelled, ticks; the rig's parameters end there.
+pub const LONGEST_DELAY: usize = 256;
+/// Rate of correction per error, 1/s: a third of what dead time and lag allow.
+const CORRECTION_PER_S: Q16 = q16(3_000_000);
+
+/// The actuator as known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PreloadLoop {
+    /// Change of the reference in a tick, N.
+    step: Newtons,
+    /// Duty per rate, s/N.
+    per_rate: Q16,
+    delay: usize,
+    lag: LowPass,
+}
+
+/// Reference and model.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PreloadLoopState {
+    /// Reference after the slew limit, N.
+    reference: Newtons,
+    /// References on their way through the dead time.
+    pipeline: [Newtons; LONGEST_DELAY],
+    head: usize,
+    model: LowPassState,
+    running: bool,
+}
+
+impl Default for PreloadLoopState {
+    fn default() -> Self {
+        Self {
+            reference: Q16::ZERO,
+            pipeline: [Q16::ZERO; LONGEST_DELAY],
+            head: 0,
+            model: LowPassState::default(),
+            running: false,
+        }
+    }
+}
+
+impl PreloadLoop {
+    /// The actuator of a rig.
+    ///
+    /// # Errors
+    /// [`RigError`] if a parameter is out of range.
+    #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
+    pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
+        let slew = rig.preload.slew_n_per_s;
+        let ticks = libm::round(rig.preload.delay_s * f64::from(TICK_HZ)) as usize;
+        Ok(Self {
+            step: checked("preload.slew_n_per_s", slew * 1e-3)? * SLEW_PART,
+            per_rate: checked("preload.slew_n_per_s", 1.0 / slew)?,
+            delay: ticks.min(LONGEST_DELAY - 1),
+            lag: LowPass::build(rig.preload.lag_s),
+        })
+    }
+
+    /// One tick towards `target` at `measured`, both N. `drift` is the rate at which
+    /// the wheel's own motion will change the spring's force when this tick's duty
+    /// takes effect, N/s.
+    pub fn step(
+        &self,
+        state: &mut PreloadLoopState,
+        target: Newtons,
+        measured: Newtons,
+        drift: NewtonsPerSecond,
+    ) -> Duty {
+        if !state.running {
+            state.start(measured);
+        }
+        let change = (target - state.reference).clamp(-self.step, self.step);
+        state.reference += change;
+        let delayed = state.exchange(self.delay);
+        let expected = self.lag.step(&mut state.model, delayed);
+        let rate = change * Q16::from_num(TICK_HZ as i16) - drift;
+        let correction = (expected - measured) * CORRECTION_PER_S;
+        duty((rate + correction) * self.per_rate)
+    }
+}
+
+impl PreloadLoopState {
+    /// Stops the loop; it starts again from the preload that it then finds.
+    pub fn halt(&mut self) {
+        self.running = false;
+    }
+
+    /// Reference after the slew limit, N.
+    #[must_use]
+    pub const fn reference(&self) -> Newtons {
+        self.reference
+    }
+
+    /// Preload that the actuator should have reached by now, N.
+    #[must_use]
+    pub fn due(&self) -> Newtons {
+        if self.running { self.model.output() } else { Q16::ZERO }
+    }
+
+    fn start(&mut self, measured: Newtons) {
+        self.reference = measured;
+        self.pipeline = [measured; LONGEST_DELAY];
+        self.model = LowPassState::at(measured);
+        self.running = true;
+    }
+
+    /// Puts the reference in and takes out the one of `delay` ticks ago.
+    fn exchange(&mut self, delay: usize) -> Newtons {
+        self.head = (self.head + 1) % LONGEST_DELAY;
+        if let Some(slot) = self.pipeline.get_mut(self.head) {
+            *slot = self.reference;
+        }
+        let past = (self.head + LONGEST_DELAY - delay) % LONGEST_DELAY;
+        self.pipeline.get(past).copied().unwrap_or(self.reference)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Pre-tightener with dead time, lag and slew off by the given factors.
+    fn run(target: f64, delay: f64, lag: f64, slew: f64, seconds: f64) -> Vec<f64> {
+        let rig = Rig::prototype();
+        let control = PreloadLoop::try_build(&rig).unwrap();
+        let mut state = PreloadLoopState::default();
+        let depth = (rig.preload.delay_s * delay * 1e3).round() as usize;
+        let mut way: std::collections::VecDeque<f64> = vec![0.0; depth].into();
+        let (mut force, mut rate) = (33.3, 0.0);
+        (0..(seconds * 1e3) as usize)
+            .map(|_| {
+                let out =
+                    control.step(&mut state, Q16::from_num(target), Q16::from_num(force), Q16::ZERO);
+                way.push_back(f64::from(out.to_bits()) / 32768.0);
+                let command = way.pop_front().unwrap() * rig.preload.slew_n_per_s * slew;
+                rate += (command - rate) * 1e-3 / (rig.preload.lag_s * lag);
+                force += rate * 1e-3;
+                force
+            })
+            .collect()
+    }
+
+    proptest! {
+        #[test]
+        fn the_preload_arrives_without_much_overshoot_on_any_drawn_actuator(
+            target in 10.0..49.0f64,
+            delay in 0.6..1.45f64,
+            lag in 0.6..1.45f64,
+            slew in 0.86..1.15f64,
+        ) {
+            let force = run(target, delay, lag, slew, 3.0);
+            let end = *force.last().unwrap();
+            prop_assert!((end - target).abs() < 0.1, "{end}");
+            let beyond = force.iter().map(|f| (f - target) * (target - 33.3).signum());
+            let overshoot = beyond.fold(f64::MIN, f64::max);
+            prop_assert!(overshoot < 1.6, "{overshoot}");
+        }
+    }
+
+    #[test]
+    fn the_nominal_actuator_follows_the_slew_and_stands_in_the_time_allowed() {
+        let force = run(48.0, 1.0, 1.0, 1.0, 2.0);
+        let rig = Rig::prototype();
+        let timing = crate::model::timing::Timing::try_build(&rig).unwrap();
+        let allowed = timing.preload_change(Q16::from_num(48.0 - 33.3)).to_num::<f64>();
+        let stands = force.iter().position(|f| *f > 47.5).unwrap() as f64 * 1e-3;
+        assert!(stands <= allowed, "{stands} {allowed}");
+        assert!(force.iter().all(|f| *f < 48.3));
+    }
+}

@@ -1,0 +1,141 @@
+//! Jerk-limited speed profile.
+
+#![deny(clippy::float_arithmetic)]
+
+use crate::numeric::{checked, sqrt};
+use crate::rig::{Rig, RigError};
+use crate::units::{MillimetresPerSecond, MillimetresPerSecond2, Q16, Travel, per_tick};
+use fixed::types::I16F16;
+
+/// Limits of the profile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Profile {
+    acceleration: MillimetresPerSecond2,
+    /// Change of acceleration in a tick, mm/s^2.
+    jerk_per_tick: MillimetresPerSecond2,
+    /// Square root of twice the jerk, (mm/s^3)^1/2.
+    root_jerk: Q16,
+}
+
+/// Where the profile stands: speed not negative, along the run's way.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ProfileState {
+    /// Speed, mm/s, Q31.32.
+    speed: Travel,
+    /// Acceleration, mm/s^2.
+    acceleration: MillimetresPerSecond2,
+}
+
+impl Profile {
+    /// Limits of a rig.
+    ///
+    /// # Errors
+    /// [`RigError`] if a limit is out of range.
+    #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
+    pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
+        let jerk = rig.drive.jerk_mm_s3;
+        Ok(Self {
+            acceleration: checked("drive.acceleration_mm_s2", rig.drive.acceleration_mm_s2)?,
+            jerk_per_tick: checked("drive.jerk_mm_s3", jerk * 1e-3)?,
+            root_jerk: checked("drive.jerk_mm_s3", libm::sqrt(2.0 * jerk))?,
+        })
+    }
+
+    /// One tick towards `target`, mm/s, not negative.
+    ///
+    /// The acceleration wanted is the one from which full jerk just reaches the
+    /// target at zero acceleration, `a = sqrt(2 j |dv|)`, within the limit; the
+    /// acceleration follows it by the jerk. Source: time-optimal control of a double
+    /// integrator.
+    pub fn step(&self, state: &mut ProfileState, target: MillimetresPerSecond) {
+        let target = target.max(Q16::ZERO);
+        let missing = target - state.speed();
+        if missing.abs() <= self.snap() && state.acceleration.abs() <= self.jerk_per_tick {
+            state.speed = Travel::from_num(target.0);
+            state.acceleration = Q16::ZERO;
+            return;
+        }
+        let size = (self.root_jerk * sqrt(missing.abs())).min(self.acceleration);
+        let wanted = if missing < Q16::ZERO { -size } else { size };
+        let change =
+            (wanted - state.acceleration).clamp(-self.jerk_per_tick, self.jerk_per_tick);
+        state.acceleration += change;
+        state.speed = state.speed.saturating_add(per_tick(state.acceleration)).max(Travel::ZERO);
+    }
+
+    /// Speed error that one more tick of full jerk would overshoot, mm/s.
+    fn snap(&self) -> MillimetresPerSecond {
+        fixed::Saturating(per_tick(self.jerk_per_tick).to_num::<I16F16>()) + Q16::DELTA
+    }
+}
+
+impl ProfileState {
+    /// Speed, mm/s.
+    #[must_use]
+    pub fn speed(&self) -> MillimetresPerSecond {
+        fixed::Saturating(I16F16::saturating_from_num(self.speed))
+    }
+
+    /// Acceleration, mm/s^2.
+    #[must_use]
+    pub const fn acceleration(&self) -> MillimetresPerSecond2 {
+        self.acceleration
+    }
+
+    /// At rest, now.
+    pub fn halt(&mut self) {
+        *self = Self::default();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn q(x: f64) -> Q16 {
+        Q16::from_num(x)
+    }
+
+    #[test]
+    fn a_change_takes_the_time_of_the_s_curve() {
+        let rig = Rig::prototype();
+        let profile = Profile::try_build(&rig).unwrap();
+        for (from, to) in [(0.0, 30.0), (30.0, 12.0), (12.0, 0.0), (5.0, 8.0)] {
+            let mut state = ProfileState { speed: Travel::from_num(from), ..Default::default() };
+            let mut ticks = 0;
+            while state.speed() != q(to) || state.acceleration != Q16::ZERO {
+                profile.step(&mut state, q(to));
+                ticks += 1;
+                assert!(ticks < 2000);
+            }
+            let (a, j) = (rig.drive.acceleration_mm_s2, rig.drive.jerk_mm_s3);
+            let change = f64::abs(to - from);
+            let exact =
+                if change > a * a / j { change / a + a / j } else { 2.0 * (change / j).sqrt() };
+            let taken = f64::from(ticks) * 1e-3;
+            assert!((taken - exact).abs() < 0.006 + 0.02 * exact, "{from} {to} {taken} {exact}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn limits_hold_whatever_the_targets(targets in proptest::collection::vec(0.0..60.0f64, 1..20)) {
+            let rig = Rig::prototype();
+            let profile = Profile::try_build(&rig).unwrap();
+            let mut state = ProfileState::default();
+            for target in targets {
+                for _ in 0..60 {
+                    let before = state;
+                    profile.step(&mut state, q(target));
+                    let a = state.acceleration.to_num::<f64>();
+                    let jerk = (a - before.acceleration.to_num::<f64>()) * 1e3;
+                    prop_assert!(a.abs() <= rig.drive.acceleration_mm_s2 + 1e-3);
+                    prop_assert!(jerk.abs() <= rig.drive.jerk_mm_s3 * 1.001);
+                    prop_assert!(state.speed() >= Q16::ZERO);
+                    prop_assert!(state.speed() <= q(61.0));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,198 @@
+//! From the plan and the way to the step: speed and preload asked for in this tick.
+
+#![deny(clippy::float_arithmetic)]
+
+use super::rise::Rise;
+use crate::model::Plan;
+use crate::model::timing::SLEW_PART;
+use crate::numeric::{checked, divide, sqrt};
+use crate::rig::{Rig, RigError};
+use crate::supervise::Direction;
+use crate::units::{
+    Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, NewtonsPerSecond, Q16,
+    Seconds, q16,
+};
+
+/// Short of the wanted preload by no more than this, it stands, N.
+pub const STANDS_WITHIN: Newtons = q16(700_000);
+/// Way by which braking starts early, for the tick and the loop's lag, mm.
+const BRAKE_RESERVE: Millimetres = q16(300_000);
+/// Time that a preload needs after its reference, kept before a window, s.
+const SETTLING: Seconds = q16(150_000);
+/// Part of the acceleration that is used to stop at the end, so that the jerk limit
+/// can follow.
+const END_PART: Q16 = q16(250_000);
+/// Speed at which the last hundredths of a millimetre are covered, mm/s.
+const END_CREEP: MillimetresPerSecond = q16(500_000);
+/// Way to the end that counts as arrived, mm.
+const ARRIVED_WITHIN: Millimetres = q16(20_000);
+/// Way after a late step over which it is still searched, mm.
+const SEARCH: Millimetres = q16(6_000_000);
+
+/// Limits of a rig.
+#[derive(Clone, Debug)]
+pub struct Schedule {
+    tolerance: Millimetres,
+    /// Distance to the face by which a step must have been felt, out and back, mm.
+    felt_by: [Millimetres; 2],
+    end_acceleration: MillimetresPerSecond2,
+    rate: NewtonsPerSecond,
+    travel: Millimetres,
+}
+
+/// Where the wheel is on its way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Course {
+    /// Way of the run.
+    pub direction: Direction,
+    /// Axial way to the face of the step ahead, along the run; none if no step is left.
+    pub distance: Option<Millimetres>,
+    /// Axial way to the end of travel, along the run, mm.
+    pub remaining: Millimetres,
+    /// A corner is felt and the lower wall has not been left (retract: reached).
+    pub critical: bool,
+    /// Measured preload, N.
+    pub preload: Newtons,
+}
+
+/// What is asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Targets {
+    /// Speed along the run, mm/s.
+    pub speed: MillimetresPerSecond,
+    /// Preload, N.
+    pub preload: Newtons,
+    /// The step ahead already has an effect.
+    pub approaching: bool,
+    /// The speed is held back because the preload does not stand yet.
+    pub waiting: bool,
+}
+
+/// What has become of the step expected.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Expectation {
+    /// Its window lies ahead.
+    Ahead,
+    /// Inside its window.
+    Due,
+    /// Past its window, still searched.
+    Late,
+    /// Given up.
+    Missing,
+}
+
+impl Schedule {
+    /// Limits of a rig.
+    ///
+    /// # Errors
+    /// [`RigError`] if a limit is out of range.
+    #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
+    pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
+        let (r, h) = (rig.rig.wheel_radius_mm, rig.rig.step_height_mm);
+        // Way out: at lift-off with the tread as deep as a step's half. Way back: where
+        // the edge has let the wheel down by a tenth of the step.
+        let deep = r - 0.5 * h;
+        let out = libm::sqrt((deep * deep - (r - h) * (r - h)).max(0.0));
+        let back = libm::sqrt(r * r - (r - 0.1 * h) * (r - 0.1 * h));
+        Ok(Self {
+            tolerance: checked("rig.step_tolerance_mm", rig.rig.step_tolerance_mm)?,
+            felt_by: [
+                checked("rig.step_height_mm", out)?,
+                -checked("rig.step_height_mm", back)?,
+            ],
+            end_acceleration: checked(
+                "drive.acceleration_mm_s2",
+                2.0 * rig.drive.acceleration_mm_s2,
+            )? * END_PART,
+            rate: checked("preload.slew_n_per_s", rig.preload.slew_n_per_s)? * SLEW_PART,
+            travel: checked("rig.travel_mm", rig.rig.travel_mm)?,
+        })
+    }
+
+    /// Way to the end of travel from `position`, along the run, mm.
+    #[must_use]
+    pub fn remaining(&self, direction: Direction, position: Millimetres) -> Millimetres {
+        match direction {
+            Direction::Deploy => self.travel - position,
+            Direction::Retract => position,
+        }
+    }
+
+    /// Whether the way to the end is covered.
+    #[must_use]
+    pub fn arrived(&self, remaining: Millimetres) -> bool {
+        remaining <= ARRIVED_WITHIN
+    }
+
+    /// Way to where the corner may first be felt, tolerance included, mm.
+    #[must_use]
+    pub fn to_window(&self, rise: &Rise, course: &Course) -> Option<Millimetres> {
+        let first = rise.first_contact(course.direction) + self.tolerance;
+        course.distance.map(|distance| distance - first)
+    }
+
+    /// What to ask for.
+    #[must_use]
+    pub fn targets(&self, rise: &Rise, plan: &Plan, course: &Course) -> Targets {
+        let to_window = self.to_window(rise, course);
+        let within = |way: Millimetres| to_window.is_some_and(|ahead| ahead <= way);
+        let braking = course.critical || within(plan.brake_way + BRAKE_RESERVE);
+        let ramping = course.critical || within(plan.ramp_way);
+        let preload = if ramping { plan.cross_preload } else { plan.cruise_preload };
+        let mut speed = if braking { plan.cross_speed } else { plan.cruise_speed };
+        let mut waiting = false;
+        let short = plan.cross_preload - course.preload;
+        if let (false, true, Some(ahead)) = (course.critical, ramping, to_window) {
+            if short > STANDS_WITHIN && ahead > -self.tolerance {
+                // Arrive no sooner than the preload: at the window, not at the corner.
+                let needed = divide(short, self.rate) + SETTLING;
+                let allowed = divide(ahead.max(Q16::ZERO), needed);
+                if allowed < speed {
+                    speed = allowed;
+                    waiting = allowed < plan.cross_speed;
+                }
+            }
+        }
+        Targets {
+            speed: speed.min(self.end_speed(course.remaining)),
+            preload,
+            approaching: braking || ramping,
+            waiting,
+        }
+    }
+
+    /// Whether the step ahead is still to come.
+    #[must_use]
+    pub fn expectation(&self, rise: &Rise, course: &Course) -> Expectation {
+        let Some(distance) = course.distance else { return Expectation::Ahead };
+        let by = match course.direction {
+            Direction::Deploy => self.felt_by[0],
+            Direction::Retract => self.felt_by[1],
+        } - self.tolerance;
+        if self.to_window(rise, course).is_some_and(|ahead| ahead > Q16::ZERO) {
+            Expectation::Ahead
+        } else if distance > by {
+            Expectation::Due
+        } else if distance > by - SEARCH {
+            Expectation::Late
+        } else {
+            Expectation::Missing
+        }
+    }
+
+    /// Whether a corner felt at this distance is the step of the table rather than
+    /// one that the table lacks.
+    #[must_use]
+    pub fn belongs(&self, rise: &Rise, course: &Course) -> bool {
+        self.to_window(rise, course).is_some_and(|ahead| ahead <= SEARCH)
+    }
+
+    /// Speed from which the end is reached at rest, mm/s: `sqrt(2 a d)`.
+    fn end_speed(&self, remaining: Millimetres) -> MillimetresPerSecond {
+        if self.arrived(remaining) {
+            Q16::ZERO
+        } else {
+            sqrt(self.end_acceleration * remaining).max(END_CREEP)
+        }
+    }
+}

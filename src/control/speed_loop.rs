@@ -1,0 +1,147 @@
+//! Speed loop of the drive: feed-forward of speed and load, PI on the rest.
+
+#![deny(clippy::float_arithmetic)]
+
+use super::saturate::duty;
+use crate::hal::Duty;
+use crate::numeric::checked;
+use crate::rig::{Rig, RigError};
+use crate::units::{MillimetresPerSecond, Newtons, Q16, Ratio, Travel, per_tick, q16};
+
+/// Crossover of the integral part, rad/s: a third of the speed observer's bandwidth.
+const CROSSOVER_RAD_S: f64 = 20.0;
+/// Proportional part, as a fraction of the inverse motor gain.
+const PROPORTIONAL: f64 = 0.3;
+/// Full duty.
+const FULL: Ratio = q16(1_000_000);
+/// Most that the integral part may contribute, duty.
+const INTEGRAL_LIMIT: Ratio = q16(500_000);
+
+/// Gains.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SpeedLoop {
+    /// Duty per speed, s/mm: the motor's inverse gain.
+    per_speed: Q16,
+    /// Duty per load, 1/N, times 256 for resolution.
+    per_load: Q16,
+    proportional: Q16,
+    /// Integral gain, duty per mm.
+    integral: Q16,
+}
+
+/// The integral part, duty, Q31.32.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SpeedLoopState {
+    integral: Travel,
+}
+
+impl SpeedLoop {
+    /// Gains of a rig.
+    ///
+    /// # Errors
+    /// [`RigError`] if a gain is out of range.
+    #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
+    pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
+        let inverse = 1.0 / rig.drive.no_load_speed_mm_s;
+        Ok(Self {
+            per_speed: checked("drive.no_load_speed_mm_s", inverse)?,
+            per_load: checked("drive.stall_force_n", 256.0 / rig.drive.stall_force_n)?,
+            proportional: checked("drive.no_load_speed_mm_s", PROPORTIONAL * inverse)?,
+            integral: checked("drive.no_load_speed_mm_s", CROSSOVER_RAD_S * inverse)?,
+        })
+    }
+
+    /// Duty for `wanted` speed at `measured` speed against `load`, all signed
+    /// outwards. The integral stands still while the duty saturates the same way.
+    pub fn step(
+        &self,
+        state: &mut SpeedLoopState,
+        wanted: MillimetresPerSecond,
+        measured: MillimetresPerSecond,
+        load: Newtons,
+    ) -> Duty {
+        let error = wanted - measured;
+        let load_part = fixed::Saturating((load * self.per_load).0 >> 8);
+        let forward = wanted * self.per_speed + load_part;
+        let whole = forward + self.proportional * error + state.value();
+        let pushing = if error < Q16::ZERO { whole > -FULL } else { whole < FULL };
+        if pushing {
+            let limit = Travel::from_num(INTEGRAL_LIMIT.0);
+            state.integral = state
+                .integral
+                .saturating_add(per_tick(self.integral * error))
+                .clamp(-limit, limit);
+        }
+        duty(whole)
+    }
+}
+
+impl SpeedLoopState {
+    /// Forgets the integral part.
+    pub fn reset(&mut self) {
+        self.integral = Travel::ZERO;
+    }
+
+    fn value(&self) -> Ratio {
+        fixed::Saturating(fixed::types::I16F16::saturating_from_num(self.integral))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// A first-order motor with the rig's gain under the loop.
+    fn settle(load: f64, wanted: f64, seconds: f64) -> f64 {
+        let rig = Rig::prototype();
+        let control = SpeedLoop::try_build(&rig).unwrap();
+        let mut state = SpeedLoopState::default();
+        let mut speed = 0.0;
+        for _ in 0..(seconds * 1e3) as usize {
+            let out = control.step(&mut state, Q16::from_num(wanted), Q16::from_num(speed), Q16::ZERO);
+            let rest = rig.drive.no_load_speed_mm_s
+                * (f64::from(out.to_bits()) / 32768.0 - load / rig.drive.stall_force_n);
+            speed += (rest - speed) * 0.1;
+        }
+        speed
+    }
+
+    #[test]
+    fn an_unknown_load_is_regulated_away() {
+        for wanted in [3.0, 12.0, -20.0] {
+            let speed = settle(25.0, wanted, 1.0);
+            assert!((speed - wanted).abs() < 0.02, "{speed} {wanted}");
+        }
+    }
+
+    #[test]
+    fn the_integral_does_not_wind_up_against_a_wall() {
+        let rig = Rig::prototype();
+        let control = SpeedLoop::try_build(&rig).unwrap();
+        let mut state = SpeedLoopState::default();
+        for _ in 0..20_000 {
+            control.step(&mut state, Q16::from_num(60), Q16::ZERO, Q16::ZERO);
+        }
+        assert!(state.value() <= INTEGRAL_LIMIT);
+        // Released, it comes back within a fraction of a second.
+        let mut ticks = 0;
+        while control.step(&mut state, Q16::from_num(10), Q16::from_num(30), Q16::ZERO).to_bits() > 0 {
+            ticks += 1;
+            assert!(ticks < 200);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn no_input_overflows(wanted in any::<i32>(), measured in any::<i32>(), load in any::<i32>()) {
+            let control = SpeedLoop::try_build(&Rig::prototype()).unwrap();
+            let mut state = SpeedLoopState::default();
+            let at = |bits| fixed::Saturating(fixed::types::I16F16::from_bits(bits));
+            for _ in 0..3 {
+                control.step(&mut state, at(wanted), at(measured), at(load));
+            }
+            prop_assert!(state.value().abs() <= INTEGRAL_LIMIT);
+        }
+    }
+}

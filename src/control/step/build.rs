@@ -1,0 +1,54 @@
+//! From a rig to the controller's machine units, once at start.
+
+use super::Controller;
+use crate::control::preload_loop::PreloadLoop;
+use crate::control::profile::Profile;
+use crate::control::rise::Rise;
+use crate::control::schedule::Schedule;
+use crate::control::speed_loop::SpeedLoop;
+use crate::estimate::crossing::CrossingWatch;
+use crate::numeric::checked;
+use crate::rig::{Rig, RigError};
+use crate::sense::{Senses, Tuning};
+use crate::supervise::Monitor;
+
+/// Bandwidth of the speed observer, rad/s: three times the speed loop's crossover;
+/// an encoder count every 2 ms at crossing speed leaves it quiet enough.
+const OBSERVER_RAD_S: f64 = 60.0;
+
+impl Controller {
+    /// Turns a rig into machine units, once.
+    ///
+    /// # Errors
+    /// [`RigError`] if a parameter is out of range or does not fit the others.
+    #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
+    pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
+        rig.validate()?;
+        let mut steps = heapless::Vec::new();
+        for &position in &rig.rig.step_positions_mm {
+            // Never full: both lists hold as many.
+            let _ = steps.push(checked("rig.step_positions_mm", position)?);
+        }
+        let tuning = Tuning { speed_bandwidth_rad_s: OBSERVER_RAD_S, ..Tuning::default() };
+        Ok(Self {
+            senses: Senses::try_build_tuned(rig, &tuning)?,
+            monitor: Monitor::try_build(rig)?,
+            watch: CrossingWatch::try_build(rig)?,
+            rise: Rise::try_build(rig)?,
+            schedule: Schedule::try_build(rig)?,
+            profile: Profile::try_build(rig)?,
+            speed_loop: SpeedLoop::try_build(rig)?,
+            preload_loop: PreloadLoop::try_build(rig)?,
+            steps,
+            travel: checked("rig.travel_mm", rig.rig.travel_mm)?,
+            spring: checked("preload.spring_n_per_mm", rig.preload.spring_n_per_mm)?,
+            foresight: checked("preload.delay_s", rig.preload.delay_s + rig.preload.lag_s)?,
+            load: checked(
+                "plant.top_load_n",
+                rig.plant.top_load_n * rig.plant.top_load_share,
+            )?,
+            coupling: checked("plant.arm_coupling", rig.plant.arm_coupling)?,
+            friction: checked("plant.mu", rig.plant.mu)?,
+        })
+    }
+}

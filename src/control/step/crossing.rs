@@ -1,0 +1,183 @@
+//! Following a crossing: what the watch notices becomes odometry, ledger, review.
+
+use super::state::{LiftPoint, OpenCrossing};
+use super::{Controller, Pass, State};
+use crate::control::schedule::{Course, Expectation};
+use crate::estimate::crossing::{Contact, Lift, Sign};
+use crate::log::{CrossingRecord, Event};
+use crate::model::{Outcome, Review};
+use crate::supervise::{Direction, Limit, Mode};
+use crate::units::{Millimetres, Q16, Seconds, ticks_to_seconds};
+
+impl Controller {
+    /// Lets the watch look at the tick while the drive moves.
+    pub(super) fn follow_contact(&self, state: &mut State, pass: &mut Pass<'_>) {
+        let direction = match state.mode {
+            Mode::Run(direction, _) | Mode::Stopping(direction) => direction,
+            _ => return,
+        };
+        let seen = self.seen(state, pass);
+        let sign = self.watch.step(&mut state.watch, direction, &seen);
+        if let Some(open) = state.crossing.as_mut() {
+            open.peak_preload = open.peak_preload.max(pass.sensed.preload_filtered);
+        }
+        match sign {
+            None => {}
+            Some(Sign::Touched) => self.touched(state, pass, direction),
+            Some(Sign::Released) => state.crossing = None,
+            Some(Sign::Lifted(lift)) => self.lifted(state, pass, direction, lift),
+            Some(Sign::Over) => {
+                // The controller's own count of levels; the arm confirms it at the end.
+                state.level = match direction {
+                    Direction::Deploy => state.level.saturating_add(1),
+                    Direction::Retract => state.level.saturating_sub(1),
+                };
+            }
+            Some(Sign::Closed { gap, .. }) => self.closed(state, pass, gap),
+        }
+    }
+
+    fn touched(&self, state: &mut State, pass: &mut Pass<'_>, direction: Direction) {
+        let course = self.course(state, pass, direction);
+        let expectation = self.schedule.expectation(&self.rise, &course);
+        let belongs = self.schedule.belongs(&self.rise, &course);
+        if !belongs {
+            pass.log(Event::Limit(Limit::StepExtra));
+        } else if expectation == Expectation::Ahead {
+            pass.log(Event::Limit(Limit::StepEarly));
+        }
+        state.crossing = Some(OpenCrossing {
+            step: if belongs { state.next_step } else { 0 },
+            direction,
+            expected: belongs && expectation != Expectation::Ahead,
+            touched_at: pass.now,
+            standing_since: state.standing_since,
+            peak_preload: pass.sensed.preload_filtered,
+            lift: None,
+            gap: Millimetres::ZERO,
+            deepest: Millimetres::ZERO,
+        });
+    }
+
+    fn lifted(&self, state: &mut State, pass: &mut Pass<'_>, direction: Direction, lift: Lift) {
+        let Some(mut open) = state.crossing else { return };
+        let face = pass.position + lift.distance;
+        let residual = self.step_position(open.step).map_or(Q16::ZERO, |table| face - table);
+        open.lift = Some(LiftPoint {
+            lift,
+            at: pass.now,
+            speed: pass.sensed.speed.value.abs(),
+            preload: pass.sensed.preload_filtered,
+            tan_arm: pass.sensed.tan_arm,
+            face,
+            residual,
+        });
+        state.crossing = Some(open);
+        if open.step > 0 {
+            if open.expected {
+                state.odometry.correct(residual);
+                pass.position = state.odometry.position(pass.sensed.travel);
+            }
+            self.advance(state, direction);
+        }
+        self.ask(state, pass, None);
+    }
+
+    /// The crossing is behind: hands it to the model for review.
+    fn closed(&self, state: &mut State, pass: &mut Pass<'_>, gap: Millimetres) {
+        let Some(mut open) = state.crossing.take() else { return };
+        open.gap = gap;
+        open.deepest = state.watch.deepest;
+        let Some(point) = open.lift else { return };
+        state.review = Some(open);
+        let review = Review {
+            direction: open.direction,
+            speed: point.speed,
+            preload: point.preload,
+            tan_arm: point.tan_arm,
+            gap,
+            trusted: open.expected,
+        };
+        self.ask(state, pass, Some(review));
+    }
+
+    /// Completes the ledger line with the model's review.
+    pub(super) fn close_line(&self, state: &mut State, pass: &mut Pass<'_>, outcome: &Outcome) {
+        let Some(open) = state.review.take() else { return };
+        let Some(point) = open.lift else { return };
+        pass.log(Event::Crossing(CrossingRecord {
+            index: open.step,
+            direction: open.direction,
+            position: point.face,
+            residual: point.residual,
+            speed: point.speed,
+            preload: point.preload,
+            peak_preload: open.peak_preload,
+            compression: open.deepest,
+            gap_predicted: outcome.gap_predicted,
+            gap_measured: open.gap,
+            lead_time: lead_time(&open, point.at),
+            slip_margin: outcome.slip_margin,
+            stiffness_scale: outcome.scale,
+        }));
+    }
+
+    /// Late and missing steps.
+    pub(super) fn watch_expectation(&self, state: &mut State, pass: &mut Pass<'_>, course: &Course) {
+        if state.watch.contact != Contact::Wall {
+            return;
+        }
+        match self.schedule.expectation(&self.rise, course) {
+            Expectation::Ahead | Expectation::Due => {}
+            Expectation::Late => {
+                if !state.late {
+                    state.late = true;
+                    pass.log(Event::Limit(Limit::StepLate));
+                }
+            }
+            Expectation::Missing => {
+                pass.log(Event::Limit(Limit::StepMissing));
+                self.advance(state, course.direction);
+                self.ask(state, pass, None);
+            }
+        }
+    }
+
+    /// Whether the wheel has left the corner of the last step behind.
+    pub(super) fn clear_of(&self, state: &State, pass: &Pass<'_>) -> bool {
+        let Some(point) = state.crossing.and_then(|open| open.lift) else { return true };
+        let past = match state.direction {
+            Direction::Deploy => pass.position - point.face,
+            Direction::Retract => point.face - pass.position,
+        };
+        // The patch must be clear of the edge: on the upper wall behind the centre, on
+        // the lower wall ahead of it.
+        let other = match state.direction {
+            Direction::Deploy => Direction::Retract,
+            Direction::Retract => Direction::Deploy,
+        };
+        past > self.rise.first_contact(other)
+    }
+
+    /// On to the next step.
+    fn advance(&self, state: &mut State, direction: Direction) {
+        let steps = self.steps.len() as u8;
+        state.next_step = match direction {
+            Direction::Deploy if state.next_step < steps => state.next_step + 1,
+            Direction::Deploy => 0,
+            Direction::Retract => state.next_step.saturating_sub(1),
+        };
+        state.late = false;
+        state.waited = false;
+        state.standing_since = None;
+    }
+}
+
+/// How long the preload stood before the corner was felt; negative by how long it
+/// was still missing.
+fn lead_time(open: &OpenCrossing, lifted_at: crate::units::Tick) -> Seconds {
+    match open.standing_since {
+        Some(since) => ticks_to_seconds(open.touched_at.wrapping_sub(since)),
+        None => -ticks_to_seconds(lifted_at.wrapping_sub(open.touched_at)),
+    }
+}

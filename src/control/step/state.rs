@@ -1,0 +1,177 @@
+//! What the controller remembers between ticks.
+
+use crate::control::preload_loop::PreloadLoopState;
+use crate::control::profile::ProfileState;
+use crate::control::speed_loop::SpeedLoopState;
+use crate::estimate::ContactStage;
+use crate::estimate::crossing::{Contact, Lift, WatchState};
+use crate::estimate::odometry::Odometry;
+use crate::model::Plan;
+use crate::sense::SensesState;
+use crate::supervise::{Direction, Leg, Mode, MonitorState};
+use crate::units::{
+    Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, Ratio, Tick, q16,
+};
+
+/// State of the controller.
+#[derive(Clone, Debug)]
+pub struct State {
+    pub(super) mode: Mode,
+    /// Ticks since the mode was entered.
+    pub(super) in_mode: u32,
+    pub(super) senses: SensesState,
+    pub(super) monitor: MonitorState,
+    pub(super) odometry: Odometry,
+    /// Whether the odometry has been given an origin.
+    pub(super) located: bool,
+    pub(super) watch: WatchState,
+    pub(super) stage: ContactStage,
+    /// Level by steps recognised.
+    pub(super) level: u8,
+    /// Step ahead, from 1; 0 when none is left.
+    pub(super) next_step: u8,
+    pub(super) direction: Direction,
+    pub(super) profile: ProfileState,
+    pub(super) speed_loop: SpeedLoopState,
+    pub(super) preload_loop: PreloadLoopState,
+    pub(super) plan: Option<Plan>,
+    /// Sequence of the newest request.
+    pub(super) sequence: u32,
+    pub(super) scale: Ratio,
+    /// The crossing under way or just behind.
+    pub(super) crossing: Option<OpenCrossing>,
+    /// Its line, waiting for the model's review.
+    pub(super) review: Option<OpenCrossing>,
+    /// Since when the crossing preload has stood.
+    pub(super) standing_since: Option<Tick>,
+    /// The step ahead is late and has been reported.
+    pub(super) late: bool,
+    /// Waiting for the preload has been reported for this step.
+    pub(super) waited: bool,
+}
+
+/// A crossing under way.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct OpenCrossing {
+    /// Step of the table; 0 if the table lacks it.
+    pub step: u8,
+    pub direction: Direction,
+    /// Felt inside its window, so that baseline and preload were ready.
+    pub expected: bool,
+    pub touched_at: Tick,
+    pub standing_since: Option<Tick>,
+    pub peak_preload: Newtons,
+    pub lift: Option<LiftPoint>,
+    /// Gap and compression when closed.
+    pub gap: Millimetres,
+    pub deepest: Millimetres,
+}
+
+/// The instant of lift-off.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LiftPoint {
+    pub lift: Lift,
+    pub at: Tick,
+    pub speed: MillimetresPerSecond,
+    pub preload: Newtons,
+    pub tan_arm: Ratio,
+    /// Where the face was found, mm.
+    pub face: Millimetres,
+    /// Found minus table, mm.
+    pub residual: Millimetres,
+}
+
+impl Default for State {
+    fn default() -> Self {
+        Self {
+            mode: Mode::Boot,
+            in_mode: 0,
+            senses: SensesState::default(),
+            monitor: MonitorState::default(),
+            odometry: Odometry::default(),
+            located: false,
+            watch: WatchState::default(),
+            stage: ContactStage::Initial,
+            level: 0,
+            next_step: 0,
+            direction: Direction::Deploy,
+            profile: ProfileState::default(),
+            speed_loop: SpeedLoopState::default(),
+            preload_loop: PreloadLoopState::default(),
+            plan: None,
+            sequence: 0,
+            scale: q16(1_000_000),
+            crossing: None,
+            review: None,
+            standing_since: None,
+            late: false,
+            waited: false,
+        }
+    }
+}
+
+impl State {
+    /// What the drive is doing.
+    #[must_use]
+    pub const fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// Estimated over nominal stiffness of the tread.
+    #[must_use]
+    pub const fn stiffness_scale(&self) -> Ratio {
+        self.scale
+    }
+
+    /// Speed reference, signed outwards.
+    pub(super) fn signed_speed(&self) -> MillimetresPerSecond {
+        match self.direction {
+            Direction::Deploy => self.profile.speed(),
+            Direction::Retract => -self.profile.speed(),
+        }
+    }
+
+    /// Acceleration reference, signed outwards.
+    pub(super) fn acceleration(&self) -> MillimetresPerSecond2 {
+        match self.direction {
+            Direction::Deploy => self.profile.acceleration(),
+            Direction::Retract => -self.profile.acceleration(),
+        }
+    }
+
+    /// A corner is felt and the lower wall not yet left (retract: not yet reached).
+    pub(super) fn critical(&self) -> bool {
+        let on_corner = matches!(self.watch.contact, Contact::Both | Contact::Corner);
+        on_corner && self.crossing.is_some_and(|crossing| crossing.lift.is_none())
+    }
+
+    /// Whether something unexpected asks for crossing speed.
+    pub(super) fn slow_down(&self) -> bool {
+        self.late || self.critical()
+    }
+
+    /// Leg of the run.
+    pub(super) fn leg(&self, approaching: bool) -> Leg {
+        match self.watch.contact {
+            Contact::Both | Contact::Corner => Leg::Crossing,
+            Contact::Leaving => Leg::Settle,
+            Contact::Wall if approaching || self.late => Leg::Approach,
+            Contact::Wall => Leg::Cruise,
+        }
+    }
+
+    /// Outward distance from `at` to the face of a step that the table lacks, while
+    /// the wheel is on it.
+    pub(super) fn extra_face(&self, at: Millimetres) -> Option<Millimetres> {
+        let crossing = self.crossing.filter(|crossing| crossing.step == 0)?;
+        let face = crossing.lift?.face;
+        (face > at).then_some(face - at)
+    }
+
+    /// Stops loops and profile where they are.
+    pub(super) fn halt(&mut self) {
+        self.profile.halt();
+        self.speed_loop.reset();
+        self.preload_loop.halt();
+    }
+}

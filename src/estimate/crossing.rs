@@ -1,0 +1,293 @@
+//! Recognises a step by what it does to arm and tread, and measures the gap.
+//!
+//! On the continuous wall the wheel centre's radius less the tread's compression is
+//! constant: the baseline. A corner that carries lifts the wheel off it. When the
+//! radius itself passes the baseline, the centre stands its undeformed radius above
+//! the lower wall, where that wall stops carrying; then the compression c, which is
+//! the corner's depth, gives the gap without odometry:
+//! `gap = sqrt((R-c)^2 + R^2 - (R-h)^2) - R`.
+//! The clearance is stationary in that instant, so the few hundredths of a
+//! millimetre that the tread's memory holds the wheel lower cost a few micrometres.
+
+#![deny(clippy::float_arithmetic)]
+
+mod build;
+
+use crate::numeric::{LowPass, LowPassState, sqrt};
+use crate::supervise::Direction;
+use crate::units::{Millimetres, Q16, q16};
+
+/// Rise above which the baseline is held, mm: two steps of the angle code.
+const HOLD: Millimetres = q16(80_000);
+/// Rise above the baseline that counts as a corner, mm: four steps of the angle code.
+const TOUCH: Millimetres = q16(160_000);
+/// Ticks that it must last.
+const TOUCH_TICKS: u8 = 3;
+/// Rise below which a corner is taken for a false alarm, mm.
+const RELEASE: Millimetres = q16(60_000);
+/// Ticks that this must last.
+const RELEASE_TICKS: u8 = 60;
+/// Short of the whole step height, the wheel counts as over the corner, mm.
+const OVER: Millimetres = q16(400_000);
+/// Ticks over which the new wall's baseline is averaged.
+const SETTLE_TICKS: u8 = 60;
+
+/// Geometry of the measurement.
+#[derive(Clone, Debug)]
+pub struct CrossingWatch {
+    radius: Millimetres,
+    step: Millimetres,
+    /// R^2 - (R-h)^2, mm^2 as Q16.
+    chord: Q16,
+    baseline: LowPass,
+    settle: LowPass,
+}
+
+/// Who carries the wheel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Contact {
+    /// The continuous wall.
+    #[default]
+    Wall,
+    /// Lower wall and corner.
+    Both,
+    /// The corner alone.
+    Corner,
+    /// The next wall, the corner being left; its baseline is not known yet.
+    Leaving,
+}
+
+/// State of the watch.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct WatchState {
+    /// Who carries.
+    pub contact: Contact,
+    /// Radius less compression on the wall, mm.
+    baseline: LowPassState,
+    /// The same on the next wall.
+    next: LowPassState,
+    ticks: u8,
+    /// Largest compression of the crossing, mm.
+    pub deepest: Millimetres,
+    lift: Option<Lift>,
+}
+
+/// The instant at which the lower wall stops (retract: begins) to carry.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lift {
+    /// Tread depth at the corner, mm.
+    pub depth: Millimetres,
+    /// Gap with the nominal step height, mm.
+    pub gap: Millimetres,
+    /// Axial distance between wheel centre and face, mm.
+    pub distance: Millimetres,
+}
+
+/// What the watch noticed in a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Sign {
+    /// The corner carries.
+    Touched,
+    /// What looked like a corner is gone.
+    Released,
+    /// The lower wall stopped (retract: began) to carry.
+    Lifted(Lift),
+    /// The wheel has left the corner for the next wall.
+    Over,
+    /// The next wall's baseline is known: step height and the gap with it, mm.
+    Closed {
+        /// Measured step height.
+        height: Millimetres,
+        /// Gap with that height.
+        gap: Millimetres,
+    },
+}
+
+/// Sensor values of a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Seen {
+    /// Wheel centre's distance from the pillar axis, mm.
+    pub radius: Millimetres,
+    /// Tread compression, mm.
+    pub compression: Millimetres,
+    /// A step is expected here: hold the baseline.
+    pub near: bool,
+    /// The wheel is clear of the step behind.
+    pub clear: bool,
+}
+
+impl CrossingWatch {
+    /// Takes the wall under the resting wheel as baseline.
+    pub fn rest(&self, state: &mut WatchState, seen: &Seen) {
+        if state.contact == Contact::Wall {
+            self.baseline.step(&mut state.baseline, seen.radius - seen.compression);
+        }
+    }
+
+    /// Starts afresh on the wall under the wheel.
+    pub fn begin(&self, state: &mut WatchState, seen: &Seen) {
+        *state = WatchState {
+            baseline: LowPassState::at(seen.radius - seen.compression),
+            ..WatchState::default()
+        };
+    }
+
+    /// Turns back: what was climbed is now dropped off, or the other way round.
+    pub fn reverse(&self, state: &mut WatchState, direction: Direction) {
+        let shift = match direction {
+            Direction::Retract => -self.step,
+            Direction::Deploy => self.step,
+        };
+        match state.contact {
+            Contact::Both | Contact::Corner => {
+                state.baseline = LowPassState::at(state.baseline.output() + shift);
+                state.contact = match state.contact {
+                    Contact::Both => Contact::Leaving,
+                    _ => Contact::Corner,
+                };
+                state.lift = None;
+            }
+            // On or next to the upper wall already: the old baseline no longer counts.
+            Contact::Leaving | Contact::Wall => state.contact = Contact::Wall,
+        }
+    }
+
+    /// How far the wheel stands off its baseline in the direction of the step, mm.
+    #[must_use]
+    pub fn rise(&self, state: &WatchState, direction: Direction, seen: &Seen) -> Millimetres {
+        let rise = state.baseline.output() - (seen.radius - seen.compression);
+        match direction {
+            Direction::Deploy => rise,
+            Direction::Retract => -rise,
+        }
+    }
+
+    /// One tick.
+    pub fn step(
+        &self,
+        state: &mut WatchState,
+        direction: Direction,
+        seen: &Seen,
+    ) -> Option<Sign> {
+        let rise = self.rise(state, direction, seen);
+        if state.contact != Contact::Wall {
+            state.deepest = state.deepest.max(seen.compression);
+        }
+        match state.contact {
+            Contact::Wall => self.on_wall(state, direction, seen, rise),
+            Contact::Both | Contact::Corner => self.on_corner(state, direction, seen, rise),
+            Contact::Leaving => self.leave(state, seen),
+        }
+    }
+
+    fn on_wall(
+        &self,
+        state: &mut WatchState,
+        direction: Direction,
+        seen: &Seen,
+        rise: Millimetres,
+    ) -> Option<Sign> {
+        if rise < TOUCH {
+            state.ticks = 0;
+            // What already looks like the foot of a step must not drag the baseline along.
+            if !seen.near && rise < HOLD {
+                self.baseline.step(&mut state.baseline, seen.radius - seen.compression);
+            }
+            return None;
+        }
+        state.ticks += 1;
+        if state.ticks < TOUCH_TICKS {
+            return None;
+        }
+        state.ticks = 0;
+        state.deepest = seen.compression;
+        state.lift = None;
+        // On the way back the wheel stands on the edge alone as soon as it dips.
+        state.contact = match direction {
+            Direction::Deploy => Contact::Both,
+            Direction::Retract => Contact::Corner,
+        };
+        Some(Sign::Touched)
+    }
+
+    fn on_corner(
+        &self,
+        state: &mut WatchState,
+        direction: Direction,
+        seen: &Seen,
+        rise: Millimetres,
+    ) -> Option<Sign> {
+        let free = match direction {
+            Direction::Deploy => seen.radius <= state.baseline.output(),
+            Direction::Retract => seen.radius >= state.baseline.output() + self.step,
+        };
+        // A step lower than its table is over before the arm says so.
+        if state.lift.is_none() && (free || rise >= self.step - OVER) {
+            state.contact = match direction {
+                Direction::Deploy => Contact::Corner,
+                Direction::Retract => Contact::Both,
+            };
+            let lift = self.measure(seen.compression);
+            state.lift = Some(lift);
+            return Some(Sign::Lifted(lift));
+        }
+        if state.lift.is_some() && rise >= self.step - OVER {
+            state.contact = Contact::Leaving;
+            state.ticks = 0;
+            return Some(Sign::Over);
+        }
+        if rise < RELEASE {
+            state.ticks = state.ticks.saturating_add(1);
+            if state.ticks >= RELEASE_TICKS {
+                state.contact = Contact::Wall;
+                state.ticks = 0;
+                return Some(Sign::Released);
+            }
+        } else {
+            state.ticks = 0;
+        }
+        None
+    }
+
+    fn leave(&self, state: &mut WatchState, seen: &Seen) -> Option<Sign> {
+        if !seen.clear {
+            state.ticks = 0;
+            return None;
+        }
+        let ground = seen.radius - seen.compression;
+        if state.ticks == 0 {
+            state.next = LowPassState::at(ground);
+        }
+        self.settle.step(&mut state.next, ground);
+        state.ticks += 1;
+        if state.ticks < SETTLE_TICKS {
+            return None;
+        }
+        let height = (state.baseline.output() - state.next.output()).abs();
+        let depth = state.lift.map_or(Millimetres::ZERO, |lift| lift.depth);
+        let gap = self.gap(depth, height);
+        state.baseline = state.next;
+        state.contact = Contact::Wall;
+        state.ticks = 0;
+        Some(Sign::Closed { height, gap })
+    }
+
+    fn measure(&self, depth: Millimetres) -> Lift {
+        let reach = self.radius - depth;
+        let below = self.radius - self.step;
+        Lift {
+            depth,
+            gap: self.gap(depth, self.step),
+            distance: sqrt((reach * reach - below * below).max(Q16::ZERO)),
+        }
+    }
+
+    /// Gap with this depth at the corner of a step of this height, mm.
+    fn gap(&self, depth: Millimetres, height: Millimetres) -> Millimetres {
+        let reach = self.radius - depth;
+        // R^2 - (R-h)^2 changes by 2 (R-h) per height.
+        let below = self.radius - self.step;
+        let chord = self.chord + (height - self.step) * (below + below);
+        sqrt((reach * reach + chord).max(Q16::ZERO)) - self.radius
+    }
+}

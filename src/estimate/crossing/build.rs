@@ -1,0 +1,138 @@
+//! Geometry of the crossing watch, once at start.
+
+use super::CrossingWatch;
+use crate::numeric::{LowPass, checked};
+use crate::rig::{Rig, RigError};
+
+/// Low-pass of the baseline on the continuous wall, s: averages the steps of the
+/// angle code.
+const BASELINE_S: f64 = 0.1;
+/// Low-pass of the next wall's baseline, s.
+const SETTLE_S: f64 = 0.02;
+
+impl CrossingWatch {
+    /// The watch of a rig.
+    ///
+    /// # Errors
+    /// [`RigError`] if a length is out of range.
+    pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
+        let (r, h) = (rig.rig.wheel_radius_mm, rig.rig.step_height_mm);
+        Ok(Self {
+            radius: checked("rig.wheel_radius_mm", r)?,
+            step: checked("rig.step_height_mm", h)?,
+            chord: checked("rig.step_height_mm", 2.0 * r * h - h * h)?,
+            baseline: LowPass::build(BASELINE_S),
+            settle: LowPass::build(SETTLE_S),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Contact, Seen, Sign, WatchState};
+    use super::*;
+    use crate::supervise::Direction;
+    use crate::units::Q16;
+    use proptest::prelude::*;
+
+    fn seen(radius: f64, compression: f64) -> Seen {
+        Seen {
+            radius: Q16::from_num(radius),
+            compression: Q16::from_num(compression),
+            near: false,
+            clear: true,
+        }
+    }
+
+    /// Rolls a wheel with constant corner depth over a step and returns the signs.
+    fn roll(depth: f64, height: f64, direction: Direction) -> Vec<Sign> {
+        let watch = CrossingWatch::try_build(&Rig::prototype()).unwrap();
+        let mut state = WatchState::default();
+        let flat = 0.3;
+        let reach = 25.0 - depth;
+        let mut signs = Vec::new();
+        let track: Vec<f64> = (0..4000).map(|i| -20.0 + 0.01 * f64::from(i)).collect();
+        let walk: Vec<f64> = match direction {
+            Direction::Deploy => track,
+            Direction::Retract => track.into_iter().rev().collect(),
+        };
+        for (index, x) in walk.into_iter().enumerate() {
+            // Height above the lower wall: resting on it, on the corner, on the upper.
+            let over_corner =
+                if x < 0.0 && x > -reach { height + (reach * reach - x * x).sqrt() } else { 0.0 };
+            let flat_low = 25.0 - flat;
+            let flat_high = if x >= 0.0 { height + 25.0 - flat } else { 0.0 };
+            let y = over_corner.max(flat_low).max(flat_high);
+            let compression = if x < 0.0 && over_corner > flat_low { depth } else { flat };
+            let clear = match direction {
+                Direction::Deploy => x > 4.0,
+                Direction::Retract => x < -15.0,
+            };
+            let near = x.abs() < 16.0;
+            let now = Seen { near, clear, ..seen(150.0 - y, compression) };
+            if index == 0 {
+                watch.begin(&mut state, &now);
+            }
+            if let Some(sign) = watch.step(&mut state, direction, &now) {
+                signs.push(sign);
+            }
+        }
+        assert_eq!(state.contact, Contact::Wall, "{direction:?} {depth} {height} {signs:?} {state:?}");
+        signs
+    }
+
+    #[test]
+    fn a_step_gives_its_signs_once_in_order() {
+        for direction in [Direction::Deploy, Direction::Retract] {
+            let signs = roll(0.7, 4.0, direction);
+            assert!(
+                matches!(
+                    signs[..],
+                    [Sign::Touched, Sign::Lifted(_), Sign::Over, Sign::Closed { .. }]
+                ),
+                "{direction:?} {signs:?}"
+            );
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn gap_and_height_are_measured_by_geometry(
+            depth in 0.4..1.6f64,
+            height in 3.8..4.2f64,
+            back in any::<bool>(),
+        ) {
+            let direction = if back { Direction::Retract } else { Direction::Deploy };
+            let exact = ((25.0 - depth).powi(2) + 2.0 * 25.0 * height - height * height).sqrt() - 25.0;
+            for sign in roll(depth, height, direction) {
+                match sign {
+                    Sign::Lifted(lift) => {
+                        let distance = ((25.0 - depth).powi(2) - 21.0f64.powi(2)).sqrt();
+                        prop_assert!((lift.distance.to_num::<f64>() - distance).abs() < 1e-3);
+                    }
+                    Sign::Closed { height: h, gap } => {
+                        prop_assert!((h.to_num::<f64>() - height).abs() < 0.02);
+                        prop_assert!((gap.to_num::<f64>() - exact).abs() < 0.02, "{gap} {exact}");
+                    }
+                    _ => {}
+                }
+            }
+        }
+
+        #[test]
+        fn noise_below_the_threshold_is_no_step(seed in any::<u64>()) {
+            let watch = CrossingWatch::try_build(&Rig::prototype()).unwrap();
+            let mut state = WatchState::default();
+            let mut x = seed | 1;
+            watch.begin(&mut state, &seen(125.3, 0.3));
+            for _ in 0..2000 {
+                x ^= x << 13;
+                x ^= x >> 7;
+                x ^= x << 17;
+                let noise = (x % 1000) as f64 * 1.2e-4 - 0.06;
+                let sign = watch.step(&mut state, Direction::Deploy, &seen(125.3 + noise, 0.3));
+                prop_assert_eq!(sign, None);
+            }
+        }
+    }
+}

@@ -1,0 +1,233 @@
+//! The schedule: speed and preload that hold the gap at the next step.
+
+#![deny(clippy::float_arithmetic)]
+
+mod build;
+
+use super::guard::Guard;
+use super::plan::{Outcome, Plan, PlanRequest, Review, Strategy};
+use super::reduced::{Point, ReducedModel};
+use super::timing::Timing;
+use crate::rig::MAX_STEPS;
+use crate::supervise::{Direction, Limit};
+use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Ratio, q16};
+
+/// Largest correction of the stiffness scale by one crossing.
+const LARGEST_CORRECTION: Ratio = q16(100_000);
+
+/// Halvings of the gap until the slip margin holds, at 1/16 of the gap each.
+const SLIP_TRIES: usize = 8;
+
+/// The model side of the schedule; runs outside the tick.
+#[derive(Clone, Debug)]
+pub struct Planner {
+    model: ReducedModel,
+    guard: Guard,
+    timing: Timing,
+    strategy: Strategy,
+    /// Axial load on this wheel, N.
+    load: Newtons,
+    /// Radial force per preload and wall level that the arm's wedge adds, N, by step.
+    wedge: heapless::Vec<Newtons, MAX_STEPS>,
+    /// Coupling times load: wedge per tangent of the arm angle, N.
+    coupling: Newtons,
+    /// Gap to hold, way out and way back, mm.
+    gap_ref: [Millimetres; 2],
+    /// Gap aimed at, a reserve below it, mm.
+    target: [Millimetres; 2],
+    cruise_speed: MillimetresPerSecond,
+    least_speed: MillimetresPerSecond,
+    safe_speed: MillimetresPerSecond,
+    /// Crossing speed that a comparison prescribes, mm/s.
+    prescribed_speed: Option<MillimetresPerSecond>,
+    /// Whether the crossing speed holds between the steps as well.
+    uniform: bool,
+    cruise_preload: Newtons,
+    /// Preload that the plan may ask for, N.
+    most_preload: Newtons,
+    /// Friction of tread on wall as far as known.
+    friction: Ratio,
+    /// The part of it that may be used.
+    usable: Ratio,
+    scale_range: (Ratio, Ratio),
+    gain: Ratio,
+}
+
+impl Planner {
+    /// Answers a request.
+    #[must_use]
+    pub fn plan(&self, request: &PlanRequest) -> Plan {
+        let outcome = request.review.map(|review| self.review(&review, request.scale));
+        let scale = outcome.map_or(request.scale, |o| o.scale);
+        let (cruise_speed, moved) = self.guard.below(self.cruise_speed);
+        let mut limits = Limits::default();
+        if moved {
+            limits.add(Limit::ResonanceAvoided);
+        }
+        let mut plan = Plan {
+            sequence: request.sequence,
+            step: request.step,
+            direction: request.direction,
+            cruise_speed,
+            cross_speed: cruise_speed,
+            cruise_preload: self.between_steps(),
+            cross_preload: self.between_steps(),
+            gap: self.target_of(request.direction),
+            slip_margin: self.usable,
+            brake_way: Millimetres::ZERO,
+            ramp_way: Millimetres::ZERO,
+            limits: [None; 3],
+            outcome,
+        };
+        if request.step > 0 {
+            self.crossing(request, scale, &mut plan, &mut limits);
+        }
+        if self.uniform {
+            plan.cruise_speed = plan.cross_speed;
+        }
+        self.ways(&mut plan);
+        plan.limits = limits.0;
+        plan
+    }
+
+    /// Gap that the schedule holds on this way, mm.
+    #[must_use]
+    pub fn gap_ref(&self, direction: Direction) -> Millimetres {
+        self.gap_ref[way(direction)]
+    }
+
+    /// Speed and preload at the step.
+    fn crossing(&self, request: &PlanRequest, scale: Ratio, plan: &mut Plan, limits: &mut Limits) {
+        let at = Point {
+            direction: request.direction,
+            speed: self.least_speed,
+            load: self.load,
+            scale,
+        };
+        let wedge = self.wedge_at(request.step);
+        let most = match self.strategy {
+            Strategy::Scheduled | Strategy::Limit => self.most_preload,
+            Strategy::Constant | Strategy::Reactive => self.cruise_preload,
+        };
+        let gap = self.gripping_gap(&at, request.direction);
+        let ceiling = self.prescribed_speed.unwrap_or(plan.cruise_speed);
+        let floor = self.least_speed;
+        let found = self.model.speed(&at, gap, most + wedge, floor.min(ceiling), ceiling);
+        let speed = self.prescribed_speed.unwrap_or(found);
+        let (speed, moved) = self.guard.below(speed.max(floor));
+        if moved {
+            limits.add(Limit::ResonanceAvoided);
+        }
+        let at = Point { speed, ..at };
+        let wanted = self.model.force(&at, gap) - wedge;
+        plan.cross_speed = speed;
+        if wanted > most && speed <= floor {
+            limits.add(Limit::SpeedFloor);
+        } else if wanted >= most * q16(980_000) && speed < self.safe_speed {
+            limits.add(Limit::PreloadLimited);
+        }
+        plan.cross_preload = match self.strategy {
+            Strategy::Scheduled => wanted.clamp(self.cruise_preload, most),
+            Strategy::Constant => self.cruise_preload,
+            Strategy::Limit => self.most_preload,
+            Strategy::Reactive => wanted.clamp(self.cruise_preload, self.most_preload),
+        };
+        let carried = plan.cross_preload.min(most) + wedge;
+        plan.gap = self.model.gap(&at, carried);
+        let margin = self.friction - self.model.utilisation(&at, plan.gap);
+        plan.slip_margin = margin;
+        if margin < self.friction - self.usable {
+            limits.add(Limit::SlipMarginLow);
+        }
+    }
+
+    /// The target gap, or the largest below it that leaves the slip margin.
+    fn gripping_gap(&self, at: &Point, direction: Direction) -> Millimetres {
+        let mut gap = self.target_of(direction);
+        for _ in 0..SLIP_TRIES {
+            if self.model.utilisation(at, gap) <= self.usable {
+                break;
+            }
+            gap -= gap * q16(62_500);
+        }
+        gap
+    }
+
+    /// How far before the step braking and preload must begin.
+    fn ways(&self, plan: &mut Plan) {
+        plan.brake_way = self.timing.brake_way(plan.cruise_speed, plan.cross_speed);
+        let brake = self.timing.speed_change(plan.cruise_speed - plan.cross_speed);
+        let ramp = self.timing.preload_change(plan.cross_preload - plan.cruise_preload);
+        let ahead = if plan.cross_preload > plan.cruise_preload && ramp > brake {
+            (ramp - brake) * plan.cruise_speed
+        } else {
+            Millimetres::ZERO
+        };
+        plan.ramp_way = match self.strategy {
+            // Without look-ahead the preload rises when the step is felt, never before.
+            Strategy::Reactive => Millimetres::MIN,
+            _ => plan.brake_way + ahead,
+        };
+    }
+
+    /// Compares a crossing with the model and corrects the stiffness, bounded.
+    fn review(&self, review: &Review, scale: Ratio) -> Outcome {
+        let at = Point {
+            direction: review.direction,
+            speed: review.speed,
+            load: self.load,
+            scale,
+        };
+        let force = review.preload + self.coupling * review.tan_arm;
+        let gap_predicted = self.model.gap(&at, force);
+        let slip_margin = self.friction - self.model.utilisation(&at, gap_predicted);
+        if !review.trusted {
+            return Outcome { gap_predicted, slip_margin, scale, bounded: false };
+        }
+        let observed = self.model.observed_scale(&at, review.gap, force);
+        let step = ((observed - scale) * self.gain).clamp(-LARGEST_CORRECTION, LARGEST_CORRECTION);
+        let (low, high) = self.scale_range;
+        let wanted = scale + step;
+        let scale = wanted.clamp(low, high);
+        Outcome { gap_predicted, slip_margin, scale, bounded: scale != wanted }
+    }
+
+    fn wedge_at(&self, step: u8) -> Newtons {
+        let index = usize::from(step).saturating_sub(1);
+        self.wedge.get(index).copied().unwrap_or(Newtons::ZERO)
+    }
+
+    fn between_steps(&self) -> Newtons {
+        match self.strategy {
+            Strategy::Limit => self.most_preload,
+            _ => self.cruise_preload,
+        }
+    }
+
+    fn target_of(&self, direction: Direction) -> Millimetres {
+        self.target[way(direction)]
+    }
+
+}
+
+/// Limits met, at most three.
+#[derive(Default)]
+struct Limits([Option<Limit>; 3]);
+
+impl Limits {
+    fn add(&mut self, limit: Limit) {
+        if self.0.contains(&Some(limit)) {
+            return;
+        }
+        if let Some(free) = self.0.iter_mut().find(|slot| slot.is_none()) {
+            *free = Some(limit);
+        }
+    }
+}
+
+const fn way(direction: Direction) -> usize {
+    match direction {
+        Direction::Deploy => 0,
+        Direction::Retract => 1,
+    }
+}

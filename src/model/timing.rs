@@ -1,0 +1,112 @@
+//! How long speed and preload take to change, and how far the wheel rolls meanwhile.
+
+#![deny(clippy::float_arithmetic)]
+
+use crate::numeric::{checked, divide, sqrt};
+use crate::rig::{Rig, RigError};
+use crate::units::{
+    Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, NewtonsPerSecond, Q16,
+    Seconds, q16,
+};
+
+/// Part of the actuator's slew that the reference uses; the rest is for feedback
+/// and for a spring that moves with the climb.
+pub const SLEW_PART: Q16 = q16(850_000);
+
+/// Limits of the speed profile and of the pre-tightener.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Timing {
+    acceleration: MillimetresPerSecond2,
+    /// Time to reach full acceleration, s.
+    build_up: Seconds,
+    /// Speed change below which full acceleration is not reached, mm/s.
+    knee: MillimetresPerSecond,
+    /// Rate of the preload reference, N/s.
+    rate: NewtonsPerSecond,
+    /// From command to settled force, without the ramp: dead time, lags, reserve, s.
+    latency: Seconds,
+}
+
+impl Timing {
+    /// Limits of a rig.
+    ///
+    /// # Errors
+    /// [`RigError`] if a limit is out of range.
+    #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
+    pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
+        let (a, j) = (rig.drive.acceleration_mm_s2, rig.drive.jerk_mm_s3);
+        // The reserve covers an actuator whose times are half as long again.
+        let times = rig.preload.delay_s + 4.0 * rig.preload.lag_s;
+        Ok(Self {
+            acceleration: checked("drive.acceleration_mm_s2", a)?,
+            build_up: checked("drive.jerk_mm_s3", a / j)?,
+            knee: checked("drive.jerk_mm_s3", (a * a / j).min(30_000.0))?,
+            rate: checked("preload.slew_n_per_s", rig.preload.slew_n_per_s)? * SLEW_PART,
+            latency: checked("preload.delay_s", times + 0.5 * (rig.preload.delay_s + rig.preload.lag_s))?,
+        })
+    }
+
+    /// Duration of a jerk-limited change of speed, s: `D/a + a/j`, or
+    /// `2 sqrt(D/j)` below the knee `a^2/j`. Source: S-curve kinematics.
+    #[must_use]
+    pub fn speed_change(&self, change: MillimetresPerSecond) -> Seconds {
+        let change = if change < Q16::ZERO { -change } else { change };
+        if change >= self.knee {
+            divide(change, self.acceleration) + self.build_up
+        } else {
+            // 2 (a/j) sqrt(D / (a^2/j)).
+            let part = sqrt(divide(change, self.knee));
+            self.build_up * part * q16(2_000_000)
+        }
+    }
+
+    /// Way of that change between two speeds, mm: the S-curve is symmetric, so its
+    /// duration times the mean speed.
+    #[must_use]
+    pub fn brake_way(&self, from: MillimetresPerSecond, to: MillimetresPerSecond) -> Millimetres {
+        let mean = (from + to) * q16(500_000);
+        self.speed_change(from - to) * mean
+    }
+
+    /// Time from the command until a preload change stands, s.
+    #[must_use]
+    pub fn preload_change(&self, change: Newtons) -> Seconds {
+        let change = if change < Q16::ZERO { -change } else { change };
+        self.latency + divide(change, self.rate)
+    }
+
+    /// Rate of the preload reference, N/s.
+    #[must_use]
+    pub const fn rate(&self) -> NewtonsPerSecond {
+        self.rate
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn the_latency_covers_delay_and_lag() {
+        let timing = Timing::try_build(&Rig::prototype()).unwrap();
+        let still = timing.preload_change(Q16::ZERO).to_num::<f64>();
+        assert!((still - 0.39).abs() < 1e-3, "{still}");
+    }
+
+    proptest! {
+        #[test]
+        fn speed_changes_match_the_s_curve(from in 0.0..100.0f64, to in 0.0..100.0f64) {
+            let rig = Rig::prototype();
+            let timing = Timing::try_build(&rig).unwrap();
+            let (a, j) = (rig.drive.acceleration_mm_s2, rig.drive.jerk_mm_s3);
+            let change = (from - to).abs();
+            let exact =
+                if change >= a * a / j { change / a + a / j } else { 2.0 * (change / j).sqrt() };
+            let got = timing.speed_change(Q16::from_num(from - to)).to_num::<f64>();
+            prop_assert!((got - exact).abs() < 2e-4 + 1e-3 * exact, "{got} {exact}");
+            let way = timing.brake_way(Q16::from_num(from), Q16::from_num(to)).to_num::<f64>();
+            prop_assert!((way - exact * 0.5 * (from + to)).abs() < 0.02 + 1e-3 * way, "{way}");
+        }
+    }
+}

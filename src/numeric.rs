@@ -1,0 +1,19 @@
+//! Fixed-point primitives that [`fixed`] does not give cheaply on a 32-bit core:
+//! division, square root, tabulated functions and a low-pass, all exact to the
+//! bit on every machine.
+//!
+//! Nothing here divides 64-bit numbers, loops without a bound or panics. The
+//! conversion from SI numbers, which does use floats, is in one place
+//! ([`checked`], [`Table::build`], [`LowPass::build`]) and runs at start only.
+
+mod build;
+mod divide;
+mod low_pass;
+mod root;
+mod table;
+
+pub use build::checked;
+pub use divide::{divide, reciprocal};
+pub use low_pass::{LowPass, LowPassState};
+pub use root::sqrt;
+pub use table::Table;

@@ -1,0 +1,78 @@
+//! From SI numbers to machine units: the only floats of this module, used once
+//! at start.
+
+use super::{LowPass, Table};
+use crate::rig::RigError;
+use crate::units::{Q16, TICK_HZ};
+use fixed::types::I16F16;
+
+/// `value` as a [`Q16`], rounded to nearest.
+///
+/// # Errors
+/// [`RigError::OutOfRange`] with `key` if the value is not finite or exceeds the
+/// range of the format.
+pub fn checked(key: &'static str, value: f64) -> Result<Q16, RigError> {
+    I16F16::checked_from_num(value).map(fixed::Saturating).ok_or(RigError::OutOfRange {
+        key,
+        value,
+        min: I16F16::MIN.to_num(),
+        max: I16F16::MAX.to_num(),
+    })
+}
+
+impl<const N: usize> Table<N> {
+    /// Samples `f` at N points evenly from `lo` to `hi`.
+    ///
+    /// `None` if the range is empty or not representable, if a sample is not, or
+    /// if `f` bends so hard between the points that the interpolation could
+    /// overflow.
+    pub fn build(lo: f64, hi: f64, f: impl Fn(f64) -> f64) -> Option<Self> {
+        let (lo, hi) = (I16F16::checked_from_num(lo)?, I16F16::checked_from_num(hi)?);
+        // From the rounded ends, so that samples stand where they are looked up.
+        let (start, end) = (lo.to_num::<f64>(), hi.to_num::<f64>());
+        let last = N.checked_sub(1)? as f64;
+        let mut samples = [0; N];
+        for (index, sample) in samples.iter_mut().enumerate() {
+            let x = start + (end - start) * (index as f64 / last);
+            *sample = I16F16::checked_from_num(f(x))?.to_bits();
+        }
+        Self::checked_from_bits(lo.to_bits(), hi.to_bits(), samples)
+    }
+}
+
+impl LowPass {
+    /// A low-pass of time constant `tau_s`, s; none at all if it is not positive.
+    /// Longest useful: 20 s, where the gain is three LSB.
+    #[must_use]
+    pub fn build(tau_s: f64) -> Self {
+        let gain =
+            if tau_s > 0.0 { -libm::expm1(-1.0 / (f64::from(TICK_HZ) * tau_s)) } else { 1.0 };
+        Self { gain: libm::round(gain * 65_536.0).clamp(1.0, 65_536.0) as u32 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_outside_the_format_are_refused_by_name() {
+        assert_eq!(checked("a.b", 1.5), Ok(Q16::from_num(1.5)));
+        for value in [40_000.0, -40_000.0, f64::NAN, f64::INFINITY] {
+            let error = checked("a.b", value).expect_err("refused");
+            assert!(matches!(error, RigError::OutOfRange { key: "a.b", .. }));
+        }
+    }
+
+    #[test]
+    fn a_table_that_cannot_be_is_refused() {
+        assert!(Table::<8>::build(0.0, 1.0, |x| x).is_some());
+        assert!(Table::<8>::build(1.0, 1.0, |x| x).is_none(), "empty range");
+        assert!(Table::<8>::build(0.0, 1e6, |x| x).is_none(), "range not representable");
+        assert!(Table::<8>::build(0.0, 1.0, |x| 1e6 * x).is_none(), "samples not representable");
+        assert!(Table::<8>::build(0.0, 1.0, |x| 1.0 / (x - x)).is_none(), "not finite");
+        assert!(Table::<3>::build(0.0, 1.0, |x| x).is_none(), "too few points");
+        let zigzag = |x: f64| if libm::round(7.0 * x) as i32 % 2 == 0 { 3e4 } else { -3e4 };
+        assert!(Table::<8>::build(0.0, 1.0, zigzag).is_none(), "bends too hard");
+    }
+}

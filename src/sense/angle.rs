@@ -1,0 +1,193 @@
+//! The arm's angle from the magnetic encoder's frames.
+
+#![deny(clippy::float_arithmetic)]
+
+use super::freshness::{Freshness, Reading, Reason};
+use super::raw::{AngleFrame, Sample};
+use crate::numeric::{LowPass, LowPassState};
+use crate::units::{Q16, Tick};
+use fixed::types::I16F16;
+
+/// Angle from the pillar in codes of the sensor, 16384 a turn: range +-8192 codes,
+/// LSB 2^-16 code = 5.9 nrad. The arm lies along the pillar at 0 and leans
+/// outwards as the angle grows.
+pub type Codes = Q16;
+
+/// Checks a frame and gives its 14-bit code.
+///
+/// # Errors
+/// [`Reason::Parity`] if the 16 bits do not have even parity, then
+/// [`Reason::SensorError`] if bit 14 is set.
+pub const fn decode(frame: AngleFrame) -> Result<u16, Reason> {
+    let frame = frame.get();
+    if !frame.count_ones().is_multiple_of(2) {
+        return Err(Reason::Parity);
+    }
+    if frame & 1 << 14 != 0 {
+        return Err(Reason::SensorError);
+    }
+    Ok(frame & 0x3FFF)
+}
+
+/// The angle sensor: frame to angle, range check, low-pass.
+///
+/// `angle = code - zero`, wrapping at half a turn. Error: half a code (192 urad)
+/// of quantisation, 2 LSB of rounding. Cost: one filter.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AngleSensor {
+    /// Code of the zero; 2^32 is a turn.
+    zero: u32,
+    /// Least and largest angle the arm can take.
+    lo: Codes,
+    hi: Codes,
+    filter: LowPass,
+}
+
+/// State of an [`AngleSensor`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AngleState {
+    freshness: Freshness,
+    angle: Codes,
+    filter: Option<LowPassState>,
+    bad_frames: u32,
+}
+
+/// What an [`AngleSensor`] gives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Angle {
+    /// The newest good angle.
+    pub reading: Reading<Codes>,
+    /// The same through the low-pass.
+    pub filtered: Codes,
+}
+
+impl AngleSensor {
+    /// A sensor reading `zero_code` with the arm along the pillar, for arms that
+    /// move from `lo` to `hi`.
+    #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
+    #[must_use]
+    pub fn build(zero_code: f64, lo: Codes, hi: Codes, tau_s: f64) -> Self {
+        // Reduced to a turn by the cast's wrap from 64 bits.
+        let zero = libm::round(zero_code * f64::from(1_u32 << 18)) as i64 as u32;
+        Self { zero, lo, hi, filter: LowPass::build(tau_s) }
+    }
+
+    /// One tick with the latest sample, which may be one already seen; `limit` is
+    /// the largest age, ticks.
+    pub fn step(
+        &self,
+        state: &mut AngleState,
+        now: Tick,
+        sample: Option<Sample<AngleFrame>>,
+        limit: u32,
+    ) -> Angle {
+        if let Some(sample) = state.freshness.take(sample) {
+            let verdict = decode(sample.code).and_then(|code| self.within(code));
+            if let Ok(angle) = verdict {
+                state.angle = angle;
+            } else {
+                state.bad_frames = state.bad_frames.saturating_add(1);
+            }
+            state.freshness.judge(verdict.map(|_| ()));
+        }
+        let filtered = match &mut state.filter {
+            Some(filter) => self.filter.step(filter, state.angle),
+            none => {
+                *none = state.freshness.good().map(|_| LowPassState::at(state.angle));
+                state.angle
+            }
+        };
+        Angle { reading: state.freshness.reading(state.angle, now, limit), filtered }
+    }
+
+    /// A code as an angle that the arm can take.
+    fn within(&self, code: u16) -> Result<Codes, Reason> {
+        let angle = (u32::from(code) << 18).wrapping_sub(self.zero) as i32;
+        let angle = fixed::Saturating(I16F16::from_bits(angle >> 2));
+        if (self.lo..=self.hi).contains(&angle) { Ok(angle) } else { Err(Reason::OutOfRange) }
+    }
+}
+
+impl AngleState {
+    /// Frames refused since boot: parity, error flag or out of reach.
+    #[must_use]
+    pub const fn bad_frames(&self) -> u32 {
+        self.bad_frames
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
+mod tests {
+    use super::super::freshness::Validity;
+    use super::*;
+
+    const LIMIT: u32 = 20;
+
+    /// A whole frame of a code.
+    fn frame(code: u16) -> AngleFrame {
+        let parity = (code.count_ones() % 2) as u16;
+        AngleFrame::new(code | parity << 15)
+    }
+
+    fn sensor(zero: f64) -> AngleSensor {
+        AngleSensor::build(zero, Codes::from_num(100), Codes::from_num(4000), 0.0)
+    }
+
+    #[test]
+    fn every_frame_is_told_good_from_bad() {
+        for bits in 0..=u16::MAX {
+            let ones = (0..16).filter(|bit| bits >> bit & 1 == 1).count();
+            let expected = if ones % 2 == 1 {
+                Err(Reason::Parity)
+            } else if bits >> 14 & 1 == 1 {
+                Err(Reason::SensorError)
+            } else {
+                Ok(bits % 16_384)
+            };
+            assert_eq!(decode(AngleFrame::new(bits)), expected);
+        }
+    }
+
+    #[test]
+    fn every_code_gives_its_angle_from_any_zero() {
+        for zero in [0.0, 2000.0, 2000.37, 15_000.0, 16_383.0] {
+            let sensor = sensor(zero);
+            for code in 0..16_384 {
+                let mut state = AngleState::default();
+                let sample = Some(Sample { code: frame(code), at: 1 });
+                let angle = sensor.step(&mut state, 1, sample, LIMIT);
+                let exact = (f64::from(code) - zero + 8192.0).rem_euclid(16_384.0) - 8192.0;
+                if (100.001..=3999.999).contains(&exact) {
+                    assert!((angle.reading.value.to_num::<f64>() - exact).abs() <= 2.0 / 65_536.0);
+                    assert_eq!(angle.reading.validity, Validity::Valid);
+                } else if !(99.999..=4000.001).contains(&exact) {
+                    assert_eq!(angle.reading.validity, Validity::Invalid(Reason::OutOfRange));
+                    assert_eq!(state.bad_frames(), 1);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn bad_frames_hold_the_angle_and_are_counted() {
+        let sensor = sensor(2000.0);
+        let mut state = AngleState::default();
+        sensor.step(&mut state, 0, Some(Sample { code: frame(3000), at: 0 }), LIMIT);
+        let parity = AngleFrame::new(frame(3500).get() ^ 1);
+        let flagged = AngleFrame::new(frame(3500).get() ^ 0xC000);
+        for (now, code, reason) in [(2, parity, Reason::Parity), (4, flagged, Reason::SensorError)]
+        {
+            let angle = sensor.step(&mut state, now, Some(Sample { code, at: now }), LIMIT);
+            assert_eq!(angle.reading.validity, Validity::Held(reason));
+            assert_eq!(angle.reading.value, Codes::from_num(1000));
+            assert_eq!(angle.reading.at, 0);
+        }
+        assert_eq!(state.bad_frames(), 2);
+        // Repeating the tick with the same frame counts nothing.
+        sensor.step(&mut state, 5, Some(Sample { code: flagged, at: 4 }), LIMIT);
+        assert_eq!(state.bad_frames(), 2);
+        let angle = sensor.step(&mut state, 21, Some(Sample { code: flagged, at: 20 }), LIMIT);
+        assert_eq!(angle.reading.validity, Validity::Invalid(Reason::SensorError));
+    }
+}

@@ -1,0 +1,202 @@
+//! How far a value can be trusted: when it was taken and whether its sensor
+//! still answers.
+
+#![deny(clippy::float_arithmetic)]
+
+use super::raw::Sample;
+use crate::units::Tick;
+
+/// A value with its time and validity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reading<T> {
+    /// The last good value; the type's default before there was one.
+    pub value: T,
+    /// When that value was taken.
+    pub at: Tick,
+    /// Whether it may be used.
+    pub validity: Validity,
+}
+
+impl<T> Reading<T> {
+    /// Ticks since the value was taken.
+    #[must_use]
+    pub fn age(&self, now: Tick) -> u32 {
+        age(now, self.at)
+    }
+
+    /// Whether the value may be acted on: taken lately, by a sensor that answers.
+    #[must_use]
+    pub fn is_usable(&self) -> bool {
+        self.validity.is_usable()
+    }
+}
+
+/// Whether a value may be used.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub enum Validity {
+    /// No reading since boot.
+    #[default]
+    Absent,
+    /// The newest code is good.
+    Valid,
+    /// The newest code is bad, but the value before it is young enough to go on with.
+    Held(Reason),
+    /// No code has come for longer than the limit.
+    Stale,
+    /// Codes come, but no good one for longer than the limit.
+    Invalid(Reason),
+}
+
+impl Validity {
+    /// Whether the value may be acted on.
+    #[must_use]
+    pub const fn is_usable(self) -> bool {
+        matches!(self, Self::Valid | Self::Held(_))
+    }
+}
+
+/// What is wrong with a code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub enum Reason {
+    /// Outside what the sensor can give when it is whole, or the arm can reach.
+    OutOfRange,
+    /// Further from the code before than the mechanism can move.
+    Implausible,
+    /// The frame's parity is wrong.
+    Parity,
+    /// The sensor reports an error of its own.
+    SensorError,
+}
+
+/// Ticks from `at` to `now`. A time stamp up to a second ahead counts as zero, so
+/// that a sensor task running between two ticks never looks ancient.
+#[must_use]
+pub const fn age(now: Tick, at: Tick) -> u32 {
+    let age = now.wrapping_sub(at);
+    if age > u32::MAX - 1000 { 0 } else { age }
+}
+
+/// What is remembered of one sensor's codes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Freshness {
+    newest: Option<Tick>,
+    good: Option<Tick>,
+    fault: Option<Reason>,
+}
+
+impl Freshness {
+    /// The sample, if it is not the one already seen.
+    pub fn take<T>(&mut self, sample: Option<Sample<T>>) -> Option<Sample<T>> {
+        let sample = sample?;
+        if self.newest == Some(sample.at) {
+            return None;
+        }
+        self.newest = Some(sample.at);
+        Some(sample)
+    }
+
+    /// Judges the code taken last.
+    pub fn judge(&mut self, verdict: Result<(), Reason>) {
+        self.fault = verdict.err();
+        if self.fault.is_none() {
+            self.good = self.newest;
+        }
+    }
+
+    /// Time of the last good code.
+    #[must_use]
+    pub const fn good(&self) -> Option<Tick> {
+        self.good
+    }
+
+    /// `value` as a reading at `now`, with `limit` as the largest age, ticks.
+    #[must_use]
+    pub fn reading<T>(&self, value: T, now: Tick, limit: u32) -> Reading<T> {
+        let young = |at: Tick| age(now, at) <= limit;
+        let validity = match (self.newest, self.fault) {
+            (None, _) => Validity::Absent,
+            (Some(newest), _) if !young(newest) => Validity::Stale,
+            (_, None) => Validity::Valid,
+            (_, Some(reason)) if self.good.is_some_and(young) => Validity::Held(reason),
+            (_, Some(reason)) => Validity::Invalid(reason),
+        };
+        Reading { value, at: self.good.unwrap_or_default(), validity }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIMIT: u32 = 20;
+
+    fn validity(freshness: &Freshness, now: Tick) -> Validity {
+        freshness.reading((), now, LIMIT).validity
+    }
+
+    fn sample(at: Tick) -> Option<Sample<()>> {
+        Some(Sample { code: (), at })
+    }
+
+    #[test]
+    fn a_reading_ages_from_valid_to_stale() {
+        let mut freshness = Freshness::default();
+        assert_eq!(validity(&freshness, 0), Validity::Absent);
+        assert!(freshness.take(sample(5)).is_some());
+        freshness.judge(Ok(()));
+        assert_eq!(validity(&freshness, 5), Validity::Valid);
+        assert_eq!(validity(&freshness, 25), Validity::Valid);
+        assert_eq!(validity(&freshness, 26), Validity::Stale);
+        assert_eq!(freshness.reading((), 26, LIMIT).age(26), 21);
+    }
+
+    #[test]
+    fn a_sample_is_taken_once() {
+        let mut freshness = Freshness::default();
+        assert!(freshness.take(sample(5)).is_some());
+        assert!(freshness.take(sample(5)).is_none());
+        assert!(freshness.take::<()>(None).is_none());
+        assert!(freshness.take(sample(6)).is_some());
+    }
+
+    #[test]
+    fn bad_codes_hold_the_last_good_value_and_then_invalidate_it() {
+        let mut freshness = Freshness::default();
+        freshness.take(sample(100));
+        freshness.judge(Ok(()));
+        for at in 101..200 {
+            freshness.take(sample(at));
+            freshness.judge(Err(Reason::Parity));
+            let expected = if at <= 120 {
+                Validity::Held(Reason::Parity)
+            } else {
+                Validity::Invalid(Reason::Parity)
+            };
+            let reading = freshness.reading((), at, LIMIT);
+            assert_eq!(reading.validity, expected);
+            assert_eq!(reading.is_usable(), at <= 120);
+            assert_eq!(reading.at, 100);
+        }
+        freshness.take(sample(200));
+        freshness.judge(Ok(()));
+        assert_eq!(validity(&freshness, 200), Validity::Valid);
+    }
+
+    #[test]
+    fn a_first_code_that_is_bad_is_invalid_at_once() {
+        let mut freshness = Freshness::default();
+        freshness.take(sample(1));
+        freshness.judge(Err(Reason::OutOfRange));
+        assert_eq!(validity(&freshness, 1), Validity::Invalid(Reason::OutOfRange));
+    }
+
+    #[test]
+    fn time_wraps_and_may_run_ahead() {
+        assert_eq!(age(3, u32::MAX - 1), 5);
+        assert_eq!(age(7, 8), 0);
+        assert_eq!(age(0, 1000), 0);
+        assert_eq!(age(8, 7), 1);
+    }
+}

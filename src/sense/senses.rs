@@ -1,0 +1,369 @@
+//! All four sensors of one tick.
+
+#![deny(clippy::float_arithmetic)]
+
+use super::analog::{AnalogChannel, AnalogState, Zeroing};
+use super::angle::{AngleSensor, AngleState};
+use super::arm::Arm;
+use super::freshness::Reading;
+use super::raw::SensorFrame;
+use super::speed::{SpeedState, Speedometer};
+use super::{displacement, pressure, speed};
+use crate::rig::{Rig, RigError};
+use crate::units::{
+    Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, Ratio, TICK_HZ, Tick, Travel,
+};
+
+/// Choices of the filters; the defaults hold for both rigs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tuning {
+    /// Bandwidth of the speed observer, rad/s.
+    pub speed_bandwidth_rad_s: f64,
+    /// Low-pass of the load cell, s.
+    pub load_cell_tau_s: f64,
+    /// Low-pass of the displacement sensor, s.
+    pub tread_tau_s: f64,
+    /// Low-pass of the arm angle, s. A code is 0.04 mm of radius; 5 ms smooths the
+    /// staircase of a climb (3 mm/s, a code every 13 ms) and lags it by 0.015 mm.
+    pub arm_tau_s: f64,
+}
+
+impl Default for Tuning {
+    fn default() -> Self {
+        Self {
+            speed_bandwidth_rad_s: speed::BANDWIDTH_RAD_S,
+            load_cell_tau_s: pressure::FILTER_S,
+            tread_tau_s: displacement::FILTER_S,
+            arm_tau_s: 0.005,
+        }
+    }
+}
+
+/// The four sensors in machine units.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Senses {
+    wheel: Speedometer,
+    load_cell: AnalogChannel,
+    tread: AnalogChannel,
+    angle: AngleSensor,
+    arm: Arm,
+    /// Largest age of a reading, ticks.
+    limit: u32,
+}
+
+/// State of [`Senses`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SensesState {
+    /// Wheel encoder.
+    pub wheel: SpeedState,
+    /// Load cell.
+    pub load_cell: AnalogState,
+    /// Tread displacement sensor.
+    pub tread: AnalogState,
+    /// Arm angle sensor.
+    pub angle: AngleState,
+    level: Option<u8>,
+}
+
+/// What the sensors say in one tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SensedState {
+    /// Odometry since the first reading, mm, positive outwards, exact.
+    pub travel: Travel,
+    /// The same in the control format, mm.
+    pub position: Millimetres,
+    /// Speed along the sleeve, mm/s; its validity is the odometry's too.
+    pub speed: Reading<MillimetresPerSecond>,
+    /// Radial preload, N.
+    pub preload: Reading<Newtons>,
+    /// The same through its low-pass, N.
+    pub preload_filtered: Newtons,
+    /// Tread compression, mm.
+    pub compression: Reading<Millimetres>,
+    /// The same through its low-pass, mm.
+    pub compression_filtered: Millimetres,
+    /// Wheel centre's distance from the pillar axis, mm, through the low-pass of
+    /// the angle.
+    pub radius: Reading<Millimetres>,
+    /// Tangent of the arm angle.
+    pub tan_arm: Ratio,
+    /// Wall under the wheel above the outermost one, in steps, not rounded.
+    pub steps_up: Ratio,
+    /// Sleeve level; valid as far as radius and compression are.
+    pub level: u8,
+}
+
+impl Senses {
+    /// The sensors of `rig` with the default filters.
+    ///
+    /// # Errors
+    /// [`RigError`] if a parameter is out of range.
+    pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
+        Self::try_build_tuned(rig, &Tuning::default())
+    }
+
+    /// The sensors of `rig` with chosen filters.
+    ///
+    /// # Errors
+    /// [`RigError`] if a parameter is out of range.
+    #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
+    pub fn try_build_tuned(rig: &Rig, tuning: &Tuning) -> Result<Self, RigError> {
+        let arm = Arm::try_build(rig)?;
+        let (lo, hi) = arm.reach();
+        Ok(Self {
+            wheel: Speedometer::try_build(rig, tuning.speed_bandwidth_rad_s)?,
+            load_cell: pressure::load_cell(rig, tuning.load_cell_tau_s)?,
+            tread: displacement::tread(rig, tuning.tread_tau_s)?,
+            angle: AngleSensor::build(rig.sense.angle_zero_code, lo, hi, tuning.arm_tau_s),
+            arm,
+            limit: libm::round(rig.sense.stale_after_s * f64::from(TICK_HZ)) as u32,
+        })
+    }
+
+    /// One tick: `frame` holds the latest codes, new or not; `acceleration` is
+    /// what the speed profile asks for in this tick, mm/s^2.
+    pub fn step(
+        &self,
+        state: &mut SensesState,
+        now: Tick,
+        frame: &SensorFrame,
+        acceleration: MillimetresPerSecond2,
+    ) -> SensedState {
+        let motion = self.wheel.step(&mut state.wheel, now, frame.wheel, acceleration, self.limit);
+        let preload = self.load_cell.step(&mut state.load_cell, now, frame.load_cell, self.limit);
+        let tread = self.tread.step(&mut state.tread, now, frame.tread, self.limit);
+        let angle = self.angle.step(&mut state.angle, now, frame.arm, self.limit);
+        let radius = self.arm.radius(angle.filtered);
+        let level = self.arm.level(state.level, radius, tread.filtered);
+        if angle.reading.is_usable() && tread.reading.is_usable() {
+            state.level = Some(level);
+        }
+        SensedState {
+            travel: motion.travel,
+            position: motion.position,
+            speed: motion.speed,
+            preload: preload.reading,
+            preload_filtered: preload.filtered,
+            compression: tread.reading,
+            compression_filtered: tread.filtered,
+            radius: Reading {
+                value: radius,
+                at: angle.reading.at,
+                validity: angle.reading.validity,
+            },
+            tan_arm: self.arm.tangent(angle.filtered),
+            steps_up: self.arm.steps_up(radius, tread.filtered),
+            level: state.level.unwrap_or(0),
+        }
+    }
+
+    /// Geometry of the arm.
+    #[must_use]
+    pub const fn arm(&self) -> &Arm {
+        &self.arm
+    }
+}
+
+impl SensesState {
+    /// Starts taking the zero of load cell and displacement sensor.
+    pub fn begin_zero(&mut self) {
+        self.load_cell.begin_zero();
+        self.tread.begin_zero();
+    }
+
+    /// Whether the zeros of both are in: `None` while under way, then whether both
+    /// were accepted.
+    #[must_use]
+    pub const fn zeroed(&self) -> Option<bool> {
+        match (self.load_cell.zeroing(), self.tread.zeroing()) {
+            (Zeroing::Done { .. }, Zeroing::Done { .. }) => Some(true),
+            (Zeroing::Running { .. } | Zeroing::Off, _)
+            | (_, Zeroing::Running { .. } | Zeroing::Off) => None,
+            _ => Some(false),
+        }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
+mod tests {
+    use super::super::freshness::{Reason, Validity};
+    use super::super::raw::{AdcCode, AngleFrame, EncoderCount, Sample};
+    use super::*;
+
+    /// What the sensors of the prototype give in a state of the mechanism.
+    #[derive(Clone, Copy)]
+    struct Truth {
+        position_mm: f64,
+        preload_n: f64,
+        compression_mm: f64,
+        radius_mm: f64,
+    }
+
+    const STOWED: Truth =
+        Truth { position_mm: 0.0, preload_n: 0.0, compression_mm: 0.0, radius_mm: 125.0 };
+
+    fn theta(radius_mm: f64) -> f64 {
+        ((radius_mm - 20.0) / 145.0).asin()
+    }
+
+    fn frame(truth: &Truth, at: Tick) -> SensorFrame {
+        let count_mm = 2.0 * core::f64::consts::PI * 25.0 / 8192.0;
+        let counts = (truth.position_mm / count_mm).floor() as i64 as u16;
+        let analog = |part: f64| AdcCode::new((65_535.0 * (0.05 + 0.85 * part)).round() as u16);
+        let angle = theta(truth.radius_mm) / (2.0 * core::f64::consts::PI) * 16_384.0 + 2000.0;
+        let code = angle.round() as u16;
+        let parity = (code.count_ones() % 2) as u16;
+        SensorFrame {
+            wheel: Some(Sample { code: EncoderCount::new(counts), at }),
+            load_cell: Some(Sample { code: analog(truth.preload_n / 200.0), at }),
+            tread: Some(Sample { code: analog(truth.compression_mm / 5.0), at }),
+            arm: Some(Sample { code: AngleFrame::new(code | parity << 15), at }),
+        }
+    }
+
+    fn build() -> Senses {
+        Senses::try_build(&Rig::prototype()).expect("in range")
+    }
+
+    fn still(senses: &Senses, state: &mut SensesState, now: Tick, truth: &Truth) -> SensedState {
+        senses.step(state, now, &frame(truth, now), Default::default())
+    }
+
+    #[test]
+    fn every_quantity_comes_out_as_it_went_in() {
+        let senses = build();
+        let mut state = SensesState::default();
+        let mut sensed = still(&senses, &mut state, 0, &STOWED);
+        let mut truth = Truth { preload_n: 33.3, compression_mm: 0.8, ..STOWED };
+        for now in 1..=3000 {
+            truth.position_mm = 12.0 * f64::from(now) * 1e-3;
+            truth.radius_mm = 121.8;
+            sensed = still(&senses, &mut state, now, &truth);
+        }
+        let near = |got: crate::units::Q16, exact: f64, bound: f64| {
+            let error = (got.to_num::<f64>() - exact).abs();
+            assert!(error <= bound, "{got} for {exact}");
+        };
+        near(sensed.position, 36.0, 0.02);
+        near(sensed.speed.value, 12.0, 0.02);
+        near(sensed.preload.value, 33.3, 0.002);
+        near(sensed.preload_filtered, 33.3, 0.002);
+        near(sensed.compression.value, 0.8, 5e-5);
+        near(sensed.compression_filtered, 0.8, 7e-5);
+        near(sensed.radius.value, 121.8, 0.0215);
+        near(sensed.tan_arm, theta(121.8).tan(), 4e-4);
+        near(sensed.steps_up, 1.0, 0.006);
+        assert_eq!(sensed.level, 1);
+        assert!((sensed.travel.to_num::<f64>() - 36.0).abs() <= 0.02);
+        for validity in [
+            sensed.speed.validity,
+            sensed.preload.validity,
+            sensed.compression.validity,
+            sensed.radius.validity,
+        ] {
+            assert_eq!(validity, Validity::Valid);
+        }
+    }
+
+    #[test]
+    fn each_sensor_becomes_stale_on_its_own() {
+        let senses = build();
+        for silent in 0..4 {
+            let mut state = SensesState::default();
+            let mut sensed = still(&senses, &mut state, 0, &STOWED);
+            for now in 1..=21 {
+                let (old, new) = (frame(&STOWED, 0), frame(&STOWED, now));
+                let mixed = SensorFrame {
+                    wheel: if silent == 0 { old.wheel } else { new.wheel },
+                    load_cell: if silent == 1 { old.load_cell } else { new.load_cell },
+                    tread: if silent == 2 { old.tread } else { new.tread },
+                    arm: if silent == 3 { old.arm } else { new.arm },
+                };
+                sensed = senses.step(&mut state, now, &mixed, Default::default());
+            }
+            let validities = [
+                sensed.speed.validity,
+                sensed.preload.validity,
+                sensed.compression.validity,
+                sensed.radius.validity,
+            ];
+            for (sensor, validity) in validities.into_iter().enumerate() {
+                let expected = if sensor == silent { Validity::Stale } else { Validity::Valid };
+                assert_eq!(validity, expected, "sensor {sensor}, silent {silent}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_level_changes_once_on_the_way_up_and_once_on_the_way_down() {
+        let senses = build();
+        let mut state = SensesState::default();
+        let mut changes = Vec::new();
+        let mut level = still(&senses, &mut state, 0, &STOWED).level;
+        for now in 1..=4000_u32 {
+            // Up a step and down again, trembling by 0.15 mm all the while.
+            let climb = 4.0 - (f64::from(now) - 2000.0).abs() / 500.0;
+            let tremble = 0.15 * (f64::from(now) * 0.01).sin();
+            let truth = Truth { radius_mm: 125.0 - climb + tremble, ..STOWED };
+            let sensed = still(&senses, &mut state, now, &truth);
+            if sensed.level != level {
+                level = sensed.level;
+                changes.push((level, climb));
+            }
+        }
+        assert_eq!(changes.iter().map(|(level, _)| *level).collect::<Vec<_>>(), [1, 0]);
+        assert!((2.2..=2.6).contains(&changes[0].1), "{changes:?}");
+        assert!((1.4..=1.8).contains(&changes[1].1), "{changes:?}");
+    }
+
+    #[test]
+    fn a_bad_angle_changes_neither_radius_nor_level() {
+        let senses = build();
+        let mut state = SensesState::default();
+        let before = still(&senses, &mut state, 0, &STOWED);
+        for now in 1..=60 {
+            let mut bad = frame(&Truth { radius_mm: 117.0, ..STOWED }, now);
+            bad.arm = bad.arm.map(|s| Sample { code: AngleFrame::new(s.code.get() ^ 1), ..s });
+            let sensed = senses.step(&mut state, now, &bad, Default::default());
+            assert_eq!((sensed.radius.value, sensed.level), (before.radius.value, before.level));
+            let held = now <= 20;
+            assert_eq!(sensed.radius.is_usable(), held);
+            if !held {
+                assert_eq!(sensed.radius.validity, Validity::Invalid(Reason::Parity));
+            }
+        }
+        assert_eq!(state.angle.bad_frames(), 60);
+    }
+
+    #[test]
+    fn zeroing_waits_for_both_and_says_when_it_failed() {
+        let senses = build();
+        for (preload_n, compression_mm, accepted) in
+            [(2.0, 0.05, true), (20.0, 0.05, false), (2.0, 0.5, false)]
+        {
+            let truth = Truth { preload_n, compression_mm, ..STOWED };
+            let mut state = SensesState::default();
+            assert_eq!(state.zeroed(), None);
+            state.begin_zero();
+            for now in 0..256 {
+                assert_eq!(state.zeroed(), None);
+                still(&senses, &mut state, now, &truth);
+            }
+            assert_eq!(state.zeroed(), Some(accepted));
+            if accepted {
+                let sensed = still(&senses, &mut state, 256, &truth);
+                assert_eq!(sensed.preload.value, Newtons::ZERO);
+                assert_eq!(sensed.compression.value, Millimetres::ZERO);
+            }
+        }
+    }
+
+    #[test]
+    fn both_rigs_build() {
+        for name in ["prototype", "fe"] {
+            let rig = Rig::named(name).expect("a preset");
+            assert!(Senses::try_build(&rig).is_ok(), "{name}");
+        }
+    }
+}

@@ -1,0 +1,161 @@
+//! The one table of transitions.
+
+use super::{Command, Direction, Fault, Leg, Mode};
+
+/// What can move the drive from one mode to another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Trigger {
+    /// Every sensor has answered.
+    SensorsAnswer,
+    /// The self-test passed; `stowed` tells whether the wheel is at the stow end and
+    /// unloaded, so that the zeros can be taken.
+    TestPassed {
+        /// At the stow end and unloaded.
+        stowed: bool,
+    },
+    /// The zeros are in.
+    Zeroed,
+    /// An operator's command.
+    Command(Command),
+    /// The preload stands.
+    PreloadStands,
+    /// The run enters this leg.
+    Leg(Leg),
+    /// The wheel has come to rest.
+    AtRest,
+    /// The end of travel is reached and the arm confirms the level.
+    Arrived,
+    /// A fault was found.
+    Fault(Fault),
+}
+
+/// The mode after `trigger` in `mode`; `None` if the mode does not take it.
+///
+/// A fault leads to the fault hold from everywhere, and the first fault is kept.
+#[must_use]
+pub const fn next(mode: Mode, trigger: Trigger) -> Option<Mode> {
+    use Command::{Reset, Retract, Start, Stop};
+    use Direction::{Deploy, Retract as Back};
+    use Mode as M;
+    use Trigger as T;
+    Some(match (mode, trigger) {
+        (M::FaultHold(_), T::Fault(_)) => return None,
+        (_, T::Fault(fault)) => M::FaultHold(fault),
+        (M::FaultHold(_), T::Command(Reset)) => M::SelfTest,
+        (M::Boot, T::SensorsAnswer) => M::SelfTest,
+        (M::SelfTest, T::TestPassed { stowed: true }) => M::Zero,
+        (M::SelfTest, T::TestPassed { stowed: false }) => M::Idle,
+        (M::Zero, T::Zeroed) => M::Idle,
+        (M::Idle | M::Complete(_), T::Command(Reset)) => M::SelfTest,
+        (M::Idle | M::Complete(Back), T::Command(Start)) => M::Preload(Deploy),
+        (M::Idle | M::Complete(Deploy), T::Command(Retract)) => M::Preload(Back),
+        (M::Preload(direction), T::PreloadStands) => M::Run(direction, Leg::Cruise),
+        (M::Preload(_), T::Command(Stop)) => M::Idle,
+        (M::Run(direction, _), T::Leg(leg)) => M::Run(direction, leg),
+        (M::Run(direction, _), T::Command(Stop)) => M::Stopping(direction),
+        (M::Run(direction, _), T::Arrived) => M::Complete(direction),
+        (M::Stopping(_), T::AtRest) => M::Idle,
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn modes() -> Vec<Mode> {
+        let mut all = vec![Mode::Boot, Mode::SelfTest, Mode::Zero, Mode::Idle];
+        for direction in [Direction::Deploy, Direction::Retract] {
+            all.extend([
+                Mode::Preload(direction),
+                Mode::Stopping(direction),
+                Mode::Complete(direction),
+            ]);
+            for leg in [Leg::Cruise, Leg::Approach, Leg::Crossing, Leg::Settle] {
+                all.push(Mode::Run(direction, leg));
+            }
+        }
+        all.extend(Fault::ALL.map(Mode::FaultHold));
+        all
+    }
+
+    fn triggers() -> Vec<Trigger> {
+        let mut all = vec![
+            Trigger::SensorsAnswer,
+            Trigger::TestPassed { stowed: true },
+            Trigger::TestPassed { stowed: false },
+            Trigger::Zeroed,
+            Trigger::PreloadStands,
+            Trigger::AtRest,
+            Trigger::Arrived,
+        ];
+        all.extend(
+            [Command::Start, Command::Stop, Command::Retract, Command::Reset]
+                .map(Trigger::Command),
+        );
+        all.extend(
+            [Leg::Cruise, Leg::Approach, Leg::Crossing, Leg::Settle].map(Trigger::Leg),
+        );
+        all.extend(Fault::ALL.map(Trigger::Fault));
+        all
+    }
+
+    #[test]
+    fn a_fault_holds_from_every_mode_and_the_first_is_kept() {
+        for mode in modes() {
+            for fault in Fault::ALL {
+                match mode {
+                    Mode::FaultHold(_) => assert_eq!(next(mode, Trigger::Fault(fault)), None),
+                    _ => assert_eq!(
+                        next(mode, Trigger::Fault(fault)),
+                        Some(Mode::FaultHold(fault))
+                    ),
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn only_a_standing_preload_starts_motion() {
+        for mode in modes() {
+            for trigger in triggers() {
+                if let Some(after) = next(mode, trigger) {
+                    if after.moves() && !mode.moves() {
+                        assert_eq!(trigger, Trigger::PreloadStands, "{mode:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_mode_can_be_left_and_every_mode_is_reached() {
+        let mut reached = vec![Mode::Boot];
+        let mut at = 0;
+        while let Some(&mode) = reached.get(at) {
+            let ways: Vec<Mode> =
+                triggers().into_iter().filter_map(|t| next(mode, t)).filter(|m| *m != mode).collect();
+            assert!(!ways.is_empty(), "{mode:?} is a trap");
+            for way in ways {
+                if !reached.contains(&way) {
+                    reached.push(way);
+                }
+            }
+            at += 1;
+        }
+        assert_eq!(reached.len(), modes().len());
+    }
+
+    #[test]
+    fn a_stop_from_motion_never_leads_back_into_it_by_itself() {
+        for direction in [Direction::Deploy, Direction::Retract] {
+            let stopping = next(
+                Mode::Run(direction, Leg::Crossing),
+                Trigger::Command(Command::Stop),
+            );
+            assert_eq!(stopping, Some(Mode::Stopping(direction)));
+            assert_eq!(next(Mode::Stopping(direction), Trigger::AtRest), Some(Mode::Idle));
+            assert_eq!(next(Mode::Stopping(direction), Trigger::Leg(Leg::Cruise)), None);
+        }
+    }
+}

@@ -1,0 +1,17 @@
+//! The planning task.
+
+use super::exchange::{Exchange, Station};
+use super::{ROUND, uptime};
+use crate::model::Planner;
+use embassy_time::with_timeout;
+
+/// Answers the tick's requests for a plan, below the control rate and for as long
+/// as it takes; of several requests meanwhile, the latest counts.
+pub async fn model(planner: &Planner, exchange: &Exchange) -> ! {
+    loop {
+        exchange.check_in(Station::Model, uptime());
+        if let Ok(request) = with_timeout(ROUND, exchange.request.wait()).await {
+            exchange.answer.signal(planner.plan(&request));
+        }
+    }
+}

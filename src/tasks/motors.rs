@@ -1,0 +1,34 @@
+//! The control tick's task.
+
+use super::beat::Beat;
+use super::exchange::Exchange;
+use crate::control::{Controller, State};
+use crate::hal::{MotorCommand, Motors, Watchdog};
+
+/// Runs the control tick at 1 kHz: latest codes, command and plan in; bridges,
+/// request, log entries and telemetry out. Feeds the watchdog while every task is
+/// alive.
+///
+/// It waits for nothing but time. A tick that starts more than a period late is
+/// marked as an overrun and the ticks missed are left out; the tick number is
+/// always that of the clock.
+pub async fn motors(
+    mut motors: impl Motors,
+    mut watchdog: impl Watchdog,
+    controller: &Controller,
+    exchange: &Exchange,
+) -> ! {
+    motors.apply(MotorCommand::OFF, MotorCommand::OFF);
+    let mut state = State::default();
+    let mut beat = Beat::<1>::new();
+    loop {
+        let due = beat.next().await;
+        let input = exchange.input(due.tick, due.missed > 0);
+        let output = controller.step(&mut state, &input);
+        motors.apply(output.drive, output.preload);
+        exchange.publish(&output);
+        if exchange.all_checked_in(due.tick) {
+            watchdog.feed();
+        }
+    }
+}

@@ -1,0 +1,77 @@
+//! One task a sensor: read, stamp, publish, check in.
+
+use super::beat::Beat;
+use super::exchange::{Exchange, Station};
+use crate::hal::{AnalogInput, AngleBus, WheelEncoder};
+use crate::sense::raw::{AdcCode, BusFault, Sample};
+use crate::units::Tick;
+use embassy_time::{Duration, with_timeout};
+
+/// After this long a reading is given up and begun anew: ten times what the board
+/// takes. The task lives on and checks in; the reading ages.
+pub const SENSOR_TIMEOUT: Duration = Duration::from_millis(2);
+
+/// Publishes the wheel counter at 1 kHz.
+pub async fn speed(mut wheel: impl WheelEncoder, exchange: &Exchange) -> ! {
+    let mut beat = Beat::<1>::new();
+    loop {
+        let at = beat.next().await.tick;
+        exchange.wheel.sender().send(Sample { code: wheel.count(), at });
+        exchange.check_in(Station::Speed, at);
+    }
+}
+
+/// Publishes the load cell's code at 1 kHz.
+pub async fn pressure(input: impl AnalogInput, exchange: &Exchange) -> ! {
+    let publish = |sample| exchange.load_cell.sender().send(sample);
+    analog(input, Station::Pressure, publish, exchange).await
+}
+
+/// Publishes the tread displacement sensor's code at 1 kHz.
+pub async fn displacement(input: impl AnalogInput, exchange: &Exchange) -> ! {
+    let publish = |sample| exchange.tread.sender().send(sample);
+    analog(input, Station::Displacement, publish, exchange).await
+}
+
+/// Publishes the arm angle sensor's frame at 500 Hz, good or bad: the tick judges.
+pub async fn angle(mut bus: impl AngleBus, exchange: &Exchange) -> ! {
+    let mut beat = Beat::<2>::new();
+    loop {
+        let at = beat.next().await.tick;
+        let publish = |sample| exchange.arm.sender().send(sample);
+        settle(bounded(bus.frame()).await, at, Station::Angle, publish, exchange);
+    }
+}
+
+async fn analog(
+    mut input: impl AnalogInput,
+    station: Station,
+    publish: impl Fn(Sample<AdcCode>),
+    exchange: &Exchange,
+) -> ! {
+    let mut beat = Beat::<1>::new();
+    loop {
+        let at = beat.next().await.tick;
+        settle(bounded(input.sample()).await, at, station, &publish, exchange);
+    }
+}
+
+/// A reading that ends one way or the other.
+async fn bounded<T>(reading: impl Future<Output = Result<T, BusFault>>) -> Result<T, BusFault> {
+    with_timeout(SENSOR_TIMEOUT, reading).await.unwrap_or(Err(BusFault::Timeout))
+}
+
+/// Publishes a reading or counts its failure.
+fn settle<T>(
+    reading: Result<T, BusFault>,
+    at: Tick,
+    station: Station,
+    publish: impl Fn(Sample<T>),
+    exchange: &Exchange,
+) {
+    match reading {
+        Ok(code) => publish(Sample { code, at }),
+        Err(BusFault::Timeout | BusFault::Transfer) => exchange.count_bus_fault(station),
+    }
+    exchange.check_in(station, at);
+}

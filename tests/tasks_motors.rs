@@ -1,0 +1,261 @@
+//! The motor task with the shipped controller and all other tasks around it.
+
+mod common;
+
+use common::{
+    Answer, Bench, Operator, Record, Sensor, UNLOADED, arm_frame, forever, load_cell_code, now_ms,
+};
+use interstage::control::Controller;
+use interstage::hal::{Light, MotorCommand};
+use interstage::log::{Entry, Event};
+use interstage::model::Planner;
+use interstage::rig::Rig;
+use interstage::supervise::{Command, Direction, Fault, Mode};
+use interstage::tasks::{self, CHECK_IN_TICKS, Exchange, Station};
+
+/// All tasks of the firmware on a mocked board: at rest, unloaded, stowed.
+struct Board {
+    bench: Bench,
+    exchange: &'static Exchange,
+    wheel: Sensor,
+    load_cell: Sensor,
+    tread: Sensor,
+    arm: Sensor,
+    operator: Operator,
+    motors: Record<(MotorCommand, MotorCommand)>,
+    watchdog: Record<()>,
+    journal: Record<Entry>,
+    light: Record<Light>,
+}
+
+impl Board {
+    fn new() -> Self {
+        Self::without(&[])
+    }
+
+    /// A board on which some tasks never get the processor.
+    fn without(missing: &[Station]) -> Self {
+        let rig = Rig::prototype();
+        let controller = forever(Controller::try_build(&rig).expect("the prototype is valid"));
+        let planner = forever(Planner::try_build(&rig).expect("the prototype is valid"));
+        let mut board = Self {
+            bench: Bench::new(),
+            exchange: forever(Exchange::new()),
+            wheel: Sensor::new(0),
+            load_cell: Sensor::new(UNLOADED),
+            tread: Sensor::new(UNLOADED),
+            arm: Sensor::new(arm_frame(0)),
+            operator: Operator::default(),
+            motors: Record::default(),
+            watchdog: Record::default(),
+            journal: Record::default(),
+            light: Record::default(),
+        };
+        let exchange = board.exchange;
+        let runs = |station| !missing.contains(&station);
+        let bench = &mut board.bench;
+        if runs(Station::Speed) {
+            let wheel = board.wheel.clone();
+            bench.spawn(async { tasks::speed(wheel, exchange).await });
+        }
+        if runs(Station::Pressure) {
+            let load_cell = board.load_cell.clone();
+            bench.spawn(async { tasks::pressure(load_cell, exchange).await });
+        }
+        if runs(Station::Displacement) {
+            let tread = board.tread.clone();
+            bench.spawn(async { tasks::displacement(tread, exchange).await });
+        }
+        if runs(Station::Angle) {
+            let arm = board.arm.clone();
+            bench.spawn(async { tasks::angle(arm, exchange).await });
+        }
+        let (motors, watchdog) = (board.motors.clone(), board.watchdog.clone());
+        bench.spawn(async { tasks::motors(motors, watchdog, controller, exchange).await });
+        if runs(Station::Model) {
+            bench.spawn(async { tasks::model(planner, exchange).await });
+        }
+        if runs(Station::Operator(0)) {
+            let operator = board.operator.clone();
+            bench.spawn(async { tasks::operator(operator, exchange).await });
+        }
+        if runs(Station::Journal) {
+            let (journal, light) = (board.journal.clone(), board.light.clone());
+            bench.spawn(async { tasks::journal(journal, light, exchange).await });
+        }
+        board
+    }
+
+    fn mode(&self) -> Mode {
+        self.exchange.telemetry().expect("a tick has run").mode
+    }
+
+    /// Lets the tasks run until that mode; gives up after `limit_ms`.
+    fn reach(&mut self, mode: Mode, limit_ms: u32) {
+        let end = now_ms() + limit_ms;
+        while now_ms() < end {
+            self.bench.run_ms(1);
+            if self.mode() == mode {
+                return;
+            }
+        }
+        panic!("{mode:?} not reached in {limit_ms} ms, but {:?}", self.mode());
+    }
+
+    fn idle() -> Self {
+        let mut board = Self::new();
+        board.reach(Mode::Idle, 3000);
+        board
+    }
+
+    fn bridges_are_off(&self) -> bool {
+        self.motors.items().last() == Some(&(MotorCommand::OFF, MotorCommand::OFF))
+    }
+}
+
+#[test]
+fn bridges_are_off_from_the_first_instant_until_a_command() {
+    let mut board = Board::new();
+    board.bench.poll();
+    assert_eq!(board.motors.all(), [(0, (MotorCommand::OFF, MotorCommand::OFF))]);
+    board.reach(Mode::Idle, 3000);
+    board.bench.run_ms(1000);
+    assert_eq!(board.mode(), Mode::Idle);
+    for (at, bridges) in board.motors.all() {
+        assert_eq!(bridges, (MotorCommand::OFF, MotorCommand::OFF), "{at} ms");
+    }
+    assert!(board.light.items().iter().all(|&light| light == Light::Off));
+}
+
+#[test]
+fn the_tick_runs_at_a_kilohertz_and_is_numbered_by_the_clock() {
+    let mut board = Board::new();
+    for expected in 1..=500 {
+        board.bench.run_ms(1);
+        assert_eq!(board.exchange.telemetry().map(|row| row.at), Some(expected));
+    }
+    // One call before the first tick, then one a tick.
+    assert_eq!(board.motors.times(), (0..=500).collect::<Vec<_>>());
+}
+
+#[test]
+fn start_raises_the_preload_before_the_drive_moves() {
+    let mut board = Board::idle();
+    board.motors.clear();
+    board.operator.gives(&[Command::Start]);
+    board.reach(Mode::Preload(Direction::Deploy), 20);
+    board.bench.run_ms(100);
+    assert_eq!(board.mode(), Mode::Preload(Direction::Deploy));
+    let bridges = board.motors.items();
+    assert!(bridges.iter().all(|(drive, _)| !drive.enable));
+    let (_, preload) = bridges.last().expect("ticks ran");
+    assert!(preload.enable && preload.duty.to_bits() > 0, "{preload:?}");
+    assert_eq!(board.exchange.light(), Light::On);
+}
+
+#[test]
+fn the_watchdog_is_fed_every_tick_while_all_tasks_live() {
+    let mut board = Board::new();
+    board.bench.run_ms(1000);
+    assert_eq!(board.watchdog.times(), (1..=1000).collect::<Vec<_>>());
+}
+
+#[test]
+fn the_watchdog_starves_when_any_task_is_dead() {
+    for station in [
+        Station::Speed,
+        Station::Pressure,
+        Station::Displacement,
+        Station::Angle,
+        Station::Model,
+        Station::Journal,
+    ] {
+        let mut board = Board::without(&[station]);
+        board.bench.run_ms(500);
+        let last = board.watchdog.times().last().copied();
+        assert_eq!(last, Some(CHECK_IN_TICKS), "{station:?}");
+    }
+}
+
+#[test]
+fn a_hanging_sensor_is_a_fault_and_stops_neither_tick_nor_watchdog() {
+    type Pick = fn(&Board) -> &Sensor;
+    let sensors: [(Pick, Fault); 3] = [
+        (|board| &board.load_cell, Fault::PressureStale),
+        (|board| &board.tread, Fault::DisplacementStale),
+        (|board| &board.arm, Fault::AngleStale),
+    ];
+    for (sensor, fault) in sensors {
+        let mut board = Board::idle();
+        let hung = now_ms();
+        sensor(&board).answers(Answer::Hang);
+        board.reach(Mode::FaultHold(fault), 100);
+        assert!(board.bridges_are_off());
+        board.bench.run_ms(500);
+        assert_eq!(board.exchange.light(), Light::Alarm);
+        let ticks: Vec<u32> = board.motors.times().into_iter().filter(|&at| at > hung).collect();
+        assert_eq!(ticks, (hung + 1..=now_ms()).collect::<Vec<_>>(), "{fault:?}");
+        assert_eq!(board.watchdog.times().last(), Some(&now_ms()), "{fault:?}");
+        let told = board.journal.items().iter().any(|entry| entry.event == Event::Fault(fault));
+        assert!(told, "{fault:?} is in the log");
+    }
+}
+
+#[test]
+fn a_dead_model_task_does_not_hold_up_the_tick() {
+    let mut board = Board::without(&[Station::Model]);
+    board.reach(Mode::Idle, 3000);
+    board.operator.gives(&[Command::Start]);
+    board.reach(Mode::Preload(Direction::Deploy), 20);
+    // The preload comes up, but no plan: the drive has nothing to follow.
+    board.load_cell.answers(Answer::Code(load_cell_code(33.3)));
+    let before = now_ms();
+    board.bench.run_ms(300);
+    let ticks: Vec<u32> = board.motors.times().into_iter().filter(|&at| at > before).collect();
+    assert_eq!(ticks, (before + 1..=before + 300).collect::<Vec<_>>());
+}
+
+#[test]
+fn a_late_tick_is_a_fault_and_is_not_made_up() {
+    let mut board = Board::idle();
+    board.bench.freeze_ms(6);
+    board.bench.poll();
+    let row = board.exchange.telemetry().expect("a tick has run");
+    assert_eq!(row.at, now_ms());
+    assert_eq!(row.mode, Mode::FaultHold(Fault::TickOverrun));
+    let ticks = board.motors.times().into_iter().filter(|&at| at == now_ms()).count();
+    assert_eq!(ticks, 1);
+    board.bench.run_ms(3);
+    assert_eq!(board.exchange.telemetry().map(|row| row.at), Some(now_ms()));
+}
+
+#[test]
+fn a_tick_late_by_less_than_a_period_is_none() {
+    let mut board = Board::idle();
+    for _ in 0..50 {
+        embassy_time::MockDriver::get().advance(embassy_time::Duration::from_micros(1900));
+        board.bench.poll();
+        embassy_time::MockDriver::get().advance(embassy_time::Duration::from_micros(100));
+        board.bench.poll();
+    }
+    assert_eq!(board.mode(), Mode::Idle);
+}
+
+#[test]
+fn commands_are_answered_in_their_order_one_a_tick() {
+    let mut board = Board::idle();
+    board.journal.clear();
+    let given = [Command::Stop, Command::Start, Command::Stop, Command::Retract, Command::Stop];
+    board.operator.gives(&given);
+    board.bench.run_ms(40);
+    let answered: Vec<Command> = board
+        .journal
+        .items()
+        .iter()
+        .filter_map(|entry| match entry.event {
+            Event::Command(command) | Event::Refused(command) => Some(command),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(answered, given);
+}
