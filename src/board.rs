@@ -1,37 +1,46 @@
 //! The NUCLEO-G474RE behind [`interstage::hal::Board`]: one driver a file. Pins
 //! are chosen in `main.rs` and listed in `docs/HARDWARE.md`.
 
-pub(crate) mod analog;
-pub(crate) mod angle;
-pub(crate) mod bridge;
-pub(crate) mod button;
-pub(crate) mod console;
+mod analog;
+mod angle;
+mod bridge;
+mod button;
+pub(crate) mod config;
+mod console;
 pub(crate) mod guard;
-pub(crate) mod journal;
+mod journal;
 pub(crate) mod light;
 pub(crate) mod rtt;
-pub(crate) mod wheel;
+mod wheel;
+
+pub(crate) use analog::Analog;
+pub(crate) use angle::Angle;
+pub(crate) use bridge::{Bridge, Bridges};
+pub(crate) use button::Button;
+pub(crate) use console::Console;
+pub(crate) use guard::Guard;
+pub(crate) use journal::Lines;
+pub(crate) use light::Lamp;
+pub(crate) use wheel::Wheel;
 
 use embassy_stm32::peripherals::{ADC1, ADC2, DMA1_CH1, DMA1_CH2, DMA1_CH3, DMA1_CH4};
 use embassy_stm32::{Config, bind_interrupts, dma, exti, interrupt, rcc};
-use embassy_time::Timer;
-use interstage::hal::{Board, Indicator, Light, MotorCommand, Motors, Parts};
-use interstage::rig::RigError;
+use interstage::hal::Board;
 
 /// The board.
 pub(crate) struct Nucleo;
 
 impl Board for Nucleo {
-    type Wheel = wheel::Wheel;
-    type LoadCell = analog::Analog<ADC1, DMA1_CH1>;
-    type Tread = analog::Analog<ADC2, DMA1_CH2>;
-    type Arm = angle::Angle;
-    type Motors = bridge::Bridges;
-    type Watchdog = guard::Guard;
-    type Button = button::Button;
-    type Console = console::Console;
-    type Journal = journal::Lines;
-    type Light = light::Lamp;
+    type Wheel = Wheel;
+    type LoadCell = Analog<ADC1, DMA1_CH1>;
+    type Tread = Analog<ADC2, DMA1_CH2>;
+    type Arm = Angle;
+    type Motors = Bridges;
+    type Watchdog = Guard;
+    type Button = Button;
+    type Console = Console;
+    type Journal = Lines;
+    type Light = Lamp;
 }
 
 bind_interrupts!(pub(crate) struct Irqs {
@@ -61,15 +70,4 @@ pub(crate) fn clocks() -> Config {
     // Both converters from the system clock; the driver divides it by four.
     config.rcc.mux.adc12sel = rcc::mux::Adcsel::SYS;
     config
-}
-
-/// No controller can be built from the parameters: stays off and says so.
-#[embassy_executor::task]
-pub(crate) async fn hold(mut parts: Parts<Nucleo>, error: RigError) -> ! {
-    parts.motors.apply(MotorCommand::OFF, MotorCommand::OFF);
-    parts.light.show(Light::Alarm);
-    loop {
-        journal::rig_error(&error);
-        Timer::after_secs(1).await;
-    }
 }

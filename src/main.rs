@@ -23,21 +23,15 @@ mod firmware {
     use interstage::control::Controller;
     use interstage::hal::{Board, Parts};
     use interstage::model::Planner;
-    use interstage::rig::{Rig, RigError};
     use interstage::tasks::{self, Exchange};
     use panic_probe as _;
     use rtt_target::DownChannel;
-    use static_cell::StaticCell;
 
-    use crate::board::{
-        self, Nucleo, analog::Analog, angle::Angle, bridge::Bridge, bridge::Bridges,
-    };
-    use crate::board::{button::Button, console::Console, guard, guard::Guard, journal::Lines};
-    use crate::board::{light, light::Lamp, rtt, wheel::Wheel};
+    use crate::board::{self, config, guard, light, rtt};
+    use crate::board::{Analog, Angle, Bridge, Bridges, Button, Console, Guard, Lamp, Lines};
+    use crate::board::{Nucleo, Wheel};
 
     static EXCHANGE: Exchange = Exchange::new();
-    static CONTROLLER: StaticCell<Controller> = StaticCell::new();
-    static PLANNER: StaticCell<Planner> = StaticCell::new();
 
     /// Runs the control tick and the sensors, above everything that may take long.
     ///
@@ -66,18 +60,10 @@ mod firmware {
         guard::arm();
         let (parts, lamp) = split(p, channels.console);
         threads.spawn(light::show(lamp).unwrap());
-        match build() {
+        match config::build() {
             Ok((controller, planner)) => start(threads, parts, controller, planner),
-            Err(error) => threads.spawn(board::hold(parts, error).unwrap()),
+            Err(error) => threads.spawn(config::hold(parts, error).unwrap()),
         }
-    }
-
-    /// The rig's parameters in machine units, in place for good.
-    fn build() -> Result<(&'static Controller, &'static Planner), RigError> {
-        let rig = Rig::prototype();
-        let controller = CONTROLLER.init(Controller::try_build(&rig)?);
-        let planner = PLANNER.init(Planner::try_build(&rig)?);
-        Ok((controller, planner))
     }
 
     /// Who gets which peripheral and pin; the bridges come up off.

@@ -68,8 +68,8 @@ pub fn per_tick(speed: MillimetresPerSecond) -> Travel {
 /// A duration in whole ticks as seconds, saturating at 32767 s.
 #[must_use]
 pub fn ticks_to_seconds(ticks: u32) -> Seconds {
-    // 2^16 / 1000 = 65.536 = 8_589_935 / 2^17 within 4e-9.
-    let bits = (u64::from(ticks) * 8_589_935) >> 17;
+    // 2^16 / 1000 = 65.536 = 1_099_511_628 / 2^24 within 3e-10.
+    let bits = (u64::from(ticks) * 1_099_511_628) >> 24;
     Saturating(I16F16::from_bits(i32::try_from(bits).unwrap_or(i32::MAX)))
 }
 
@@ -99,7 +99,7 @@ mod tests {
             let exact = f64::from(ticks) * 1e-3;
             let got = ticks_to_seconds(ticks).to_num::<f64>();
             if exact < 32_767.0 {
-                prop_assert!((got - exact).abs() <= 1.6e-5 + exact * 4e-8);
+                prop_assert!((got - exact).abs() <= 1.6e-5 + exact * 1e-9);
             } else {
                 prop_assert!(got >= 32_767.0 - 0.01);
             }

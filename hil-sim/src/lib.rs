@@ -9,4 +9,5 @@ pub mod record;
 pub mod reference;
 pub mod report;
 pub mod scenario;
+pub mod sil;
 pub mod table;

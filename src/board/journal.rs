@@ -42,6 +42,12 @@ impl Journal for Lines {
             Event::Limit(limit) => {
                 warn!("[{=u32} ms] limit {=u16}: {=str}", at, limit.code(), limit.sentence());
             }
+            Event::Lost(entries) => {
+                warn!("[{=u32} ms] {=u32} log entries lost", at, entries);
+            }
+            Event::Lost(count) => {
+                warn!("[{=u32} ms] {=u32} entries lost: too many at once", at, count)
+            }
             Event::Crossing(record) => crossing(at, &record),
         }
     }

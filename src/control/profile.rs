@@ -15,6 +15,10 @@ pub struct Profile {
     jerk_per_tick: MillimetresPerSecond2,
     /// Square root of twice the jerk, (mm/s^3)^1/2.
     root_jerk: Q16,
+    /// Half the change of acceleration in a tick, mm/s^2.
+    half_jerk: MillimetresPerSecond2,
+    /// Speed that half of it squared stands for, j T^2 / 8, mm/s.
+    quantum: MillimetresPerSecond,
 }
 
 /// Where the profile stands: speed not negative, along the run's way.
@@ -38,15 +42,17 @@ impl Profile {
             acceleration: checked("drive.acceleration_mm_s2", rig.drive.acceleration_mm_s2)?,
             jerk_per_tick: checked("drive.jerk_mm_s3", jerk * 1e-3)?,
             root_jerk: checked("drive.jerk_mm_s3", libm::sqrt(2.0 * jerk))?,
+            half_jerk: checked("drive.jerk_mm_s3", jerk * 0.5e-3)?,
+            quantum: checked("drive.jerk_mm_s3", jerk * 1e-6 / 8.0)?,
         })
     }
 
     /// One tick towards `target`, mm/s, not negative.
     ///
-    /// The acceleration wanted is the one from which full jerk just reaches the
-    /// target at zero acceleration, `a = sqrt(2 j |dv|)`, within the limit; the
-    /// acceleration follows it by the jerk. Source: time-optimal control of a double
-    /// integrator.
+    /// The acceleration wanted is the one from which full jerk J in each tick T just
+    /// reaches the target at zero acceleration, `a (a + J) T / 2J = |dv|`, within the
+    /// limit; the acceleration follows it by the jerk. Source: time-optimal control
+    /// of a double integrator, in steps.
     pub fn step(&self, state: &mut ProfileState, target: MillimetresPerSecond) {
         let target = target.max(Q16::ZERO);
         let missing = target - state.speed();
@@ -55,7 +61,8 @@ impl Profile {
             state.acceleration = Q16::ZERO;
             return;
         }
-        let size = (self.root_jerk * sqrt(missing.abs())).min(self.acceleration);
+        let start = sqrt(missing.abs() + self.quantum);
+        let size = (self.root_jerk * start - self.half_jerk).clamp(Q16::ZERO, self.acceleration);
         let wanted = if missing < Q16::ZERO { -size } else { size };
         let change =
             (wanted - state.acceleration).clamp(-self.jerk_per_tick, self.jerk_per_tick);

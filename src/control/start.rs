@@ -6,7 +6,7 @@ use crate::sense::SensedState;
 use crate::units::{Millimetres, MillimetresPerSecond, Newtons, q16};
 
 /// Ticks of rest that the self-test watches.
-pub const TEST_TICKS: u32 = 100;
+pub(super) const TEST_TICKS: u32 = 100;
 /// Speed that still counts as rest, mm/s.
 const REST: MillimetresPerSecond = q16(500_000);
 /// Preload that still counts as none, N: the load cell's zero before calibration.
@@ -15,7 +15,7 @@ const UNLOADED: Newtons = q16(3_000_000);
 const UNPRESSED: Millimetres = q16(100_000);
 
 /// Whether all sensors have answered with good codes.
-pub fn all_answer(sensed: &SensedState) -> bool {
+pub(super) fn all_answer(sensed: &SensedState) -> bool {
     sensed.speed.is_usable()
         && sensed.preload.is_usable()
         && sensed.compression.is_usable()
@@ -23,12 +23,12 @@ pub fn all_answer(sensed: &SensedState) -> bool {
 }
 
 /// Whether the wheel rests.
-pub fn at_rest(sensed: &SensedState) -> bool {
+pub(super) fn at_rest(sensed: &SensedState) -> bool {
     sensed.speed.value.abs() < REST
 }
 
 /// Whether the wheel lies unloaded on the outermost wall, so that zeros can be taken.
-pub fn stowed(sensed: &SensedState) -> bool {
+pub(super) fn stowed(sensed: &SensedState) -> bool {
     sensed.level == 0
         && sensed.preload_filtered.abs() < UNLOADED
         && sensed.compression_filtered.abs() < UNPRESSED

@@ -29,7 +29,7 @@ pub use state::State;
 pub const EVENTS_PER_TICK: usize = 8;
 
 /// Log entries of one tick.
-pub type Events = heapless::Vec<Entry, EVENTS_PER_TICK>;
+pub(crate) type Events = heapless::Vec<Entry, EVENTS_PER_TICK>;
 
 /// What a tick is given.
 #[derive(Clone, Copy, Debug, Default)]

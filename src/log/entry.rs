@@ -30,6 +30,8 @@ pub enum Event {
     Limit(Limit),
     /// A crossing's ledger line was closed.
     Crossing(CrossingRecord),
+    /// So many log entries were dropped here because the journal did not keep up.
+    Lost(u32),
 }
 
 /// Ledger line of one crossing as the controller saw it.

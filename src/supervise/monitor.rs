@@ -5,7 +5,7 @@
 use super::{Fault, Mode};
 use crate::numeric::checked;
 use crate::rig::{Rig, RigError};
-use crate::sense::{SensedState, Validity};
+use crate::sense::{Reason, SensedState, Validity};
 use crate::units::{MillimetresPerSecond, Newtons, q16};
 
 /// Preload above the limit that counts as overpressure, relative: regulation and
@@ -122,7 +122,8 @@ fn sensor_fault(sensed: &SensedState) -> Option<Fault> {
     let judge = |validity: Validity, stale: Fault, range: Fault| match validity {
         Validity::Valid | Validity::Held(_) => None,
         Validity::Absent | Validity::Stale => Some(stale),
-        Validity::Invalid(_) => Some(range),
+        Validity::Invalid(Reason::OutOfRange) => Some(range),
+        Validity::Invalid(_) => Some(stale),
     };
     judge(sensed.speed.validity, Fault::SpeedStale, Fault::SpeedStale)
         .or(judge(sensed.preload.validity, Fault::PressureStale, Fault::PressureRange))

@@ -3,6 +3,7 @@
 use super::exchange::{ENTRIES, Exchange, Station};
 use super::{ROUND, uptime};
 use crate::hal::{Indicator, Journal, Light};
+use crate::log::{Entry, Event};
 use embassy_time::with_timeout;
 
 /// Writes log entries in their order and shows the light when it changes.
@@ -12,6 +13,7 @@ pub async fn journal(
     exchange: &Exchange,
 ) -> ! {
     let mut shown = Light::default();
+    let mut reported = 0;
     light.show(shown);
     loop {
         exchange.check_in(Station::Journal, uptime());
@@ -25,6 +27,13 @@ pub async fn journal(
             for _ in 1..ENTRIES {
                 let Ok(entry) = exchange.entries.try_receive() else { break };
                 journal.write(&entry);
+            }
+            let lost = exchange.lost_entries();
+            if lost != reported {
+                // The newest are the ones dropped, so their count stands behind the rest.
+                let event = Event::Lost(lost.wrapping_sub(reported));
+                journal.write(&Entry { at: uptime(), event });
+                reported = lost;
             }
         }
     }

@@ -52,6 +52,8 @@ pub struct Truth {
     pub corner_n: f64,
     /// Force of the wall under the wheel, N.
     pub floor_n: f64,
+    /// Friction of tread on wall.
+    pub friction: f64,
     /// Friction utilisation.
     pub utilisation: f64,
     /// Clearance of the nearest step root from the undeformed wheel, mm, if near.
@@ -148,6 +150,8 @@ impl VirtualRig {
             truth: Truth {
                 position_mm,
                 height_mm: local.base_mm + rest.height_mm,
+                depth_mm: radius - rest.height_mm,
+                friction: parameters.mu,
                 ..Truth::default()
             },
             sliding: false,
@@ -302,7 +306,7 @@ impl VirtualRig {
         let local = self.parameters.wall.local(position_mm);
         let height = self.truth.height_mm - local.base_mm;
         let table = rolling::profile(&self.parameters.ring, height, self.truth.tread_mm_s);
-        let turned = self.truth.rotation_rad;
+        // A fresh ring counts its own turns; only the angle to the wall matters.
         self.ring = Ring::new(self.parameters.ring);
         let interpolate = |angle: f64| {
             let at = table.partition_point(|node| node.0 < angle);
@@ -314,8 +318,6 @@ impl VirtualRig {
                 _ => (0.0, 0.0),
             }
         };
-        // The ring counts its own turns; only the angle relative to the wall matters.
-        let _ = turned;
         self.ring.seed(self.truth.time_s, interpolate);
         self.awake = true;
     }

@@ -64,7 +64,6 @@ impl Controller {
         let face = pass.position + lift.distance;
         let residual = self.step_position(open.step).map_or(Q16::ZERO, |table| face - table);
         open.lift = Some(LiftPoint {
-            lift,
             at: pass.now,
             speed: pass.sensed.speed.value.abs(),
             preload: pass.sensed.preload_filtered,
@@ -80,7 +79,7 @@ impl Controller {
             }
             self.advance(state, direction);
         }
-        self.ask(state, pass, None);
+        self.ask(state, pass);
     }
 
     /// The crossing is behind: hands it to the model for review.
@@ -89,21 +88,22 @@ impl Controller {
         open.gap = gap;
         open.deepest = state.watch.deepest;
         let Some(point) = open.lift else { return };
-        state.review = Some(open);
-        let review = Review {
+        state.line = Some(open);
+        state.review = Some(Review {
             direction: open.direction,
             speed: point.speed,
             preload: point.preload,
             tan_arm: point.tan_arm,
             gap,
             trusted: open.expected,
-        };
-        self.ask(state, pass, Some(review));
+        });
+        self.ask(state, pass);
     }
 
     /// Completes the ledger line with the model's review.
     pub(super) fn close_line(&self, state: &mut State, pass: &mut Pass<'_>, outcome: &Outcome) {
-        let Some(open) = state.review.take() else { return };
+        state.review = None;
+        let Some(open) = state.line.take() else { return };
         let Some(point) = open.lift else { return };
         pass.log(Event::Crossing(CrossingRecord {
             index: open.step,
@@ -138,7 +138,7 @@ impl Controller {
             Expectation::Missing => {
                 pass.log(Event::Limit(Limit::StepMissing));
                 self.advance(state, course.direction);
-                self.ask(state, pass, None);
+                self.ask(state, pass);
             }
         }
     }

@@ -5,7 +5,7 @@ use crate::control::schedule::{STANDS_WITHIN, Targets};
 use crate::control::start::{TEST_TICKS, all_answer, at_rest, stowed};
 use crate::estimate::crossing::Seen;
 use crate::log::Event;
-use crate::model::{Plan, PlanRequest, Review};
+use crate::model::{Plan, PlanRequest};
 use crate::supervise::{Direction, Fault, Limit, Mode, Trigger, next};
 use crate::units::{Millimetres, Q16, q16};
 
@@ -116,7 +116,7 @@ impl Controller {
         state.late = false;
         state.waited = false;
         state.standing_since = None;
-        self.ask(state, pass, None);
+        self.ask(state, pass);
     }
 
     fn await_preload(&self, state: &mut State, pass: &mut Pass<'_>, direction: Direction) {
@@ -149,7 +149,7 @@ impl Controller {
     }
 
     /// Asks the model for the schedule of the step ahead.
-    pub(super) fn ask(&self, state: &mut State, pass: &mut Pass<'_>, review: Option<Review>) {
+    pub(super) fn ask(&self, state: &mut State, pass: &mut Pass<'_>) {
         state.sequence = state.sequence.wrapping_add(1);
         if state.plan.is_some_and(|plan| plan.direction != state.direction) {
             state.plan = None;
@@ -159,7 +159,7 @@ impl Controller {
             direction: state.direction,
             step: state.next_step,
             scale: state.scale,
-            review,
+            review: state.review,
         });
     }
 

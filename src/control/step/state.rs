@@ -4,9 +4,9 @@ use crate::control::preload_loop::PreloadLoopState;
 use crate::control::profile::ProfileState;
 use crate::control::speed_loop::SpeedLoopState;
 use crate::estimate::ContactStage;
-use crate::estimate::crossing::{Contact, Lift, WatchState};
+use crate::estimate::crossing::{Contact, WatchState};
 use crate::estimate::odometry::Odometry;
-use crate::model::Plan;
+use crate::model::{Plan, Review};
 use crate::sense::SensesState;
 use crate::supervise::{Direction, Leg, Mode, MonitorState};
 use crate::units::{
@@ -41,7 +41,9 @@ pub struct State {
     /// The crossing under way or just behind.
     pub(super) crossing: Option<OpenCrossing>,
     /// Its line, waiting for the model's review.
-    pub(super) review: Option<OpenCrossing>,
+    pub(super) line: Option<OpenCrossing>,
+    /// The review asked for and not yet answered; goes with every request until then.
+    pub(super) review: Option<Review>,
     /// Since when the crossing preload has stood.
     pub(super) standing_since: Option<Tick>,
     /// The step ahead is late and has been reported.
@@ -70,7 +72,6 @@ pub(super) struct OpenCrossing {
 /// The instant of lift-off.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LiftPoint {
-    pub lift: Lift,
     pub at: Tick,
     pub speed: MillimetresPerSecond,
     pub preload: Newtons,
@@ -102,6 +103,7 @@ impl Default for State {
             sequence: 0,
             scale: q16(1_000_000),
             crossing: None,
+            line: None,
             review: None,
             standing_since: None,
             late: false,

@@ -1,0 +1,43 @@
+//! From the rig's parameters to what the tasks run on.
+
+use embassy_time::Timer;
+use interstage::control::Controller;
+use interstage::hal::{Indicator, Light, MotorCommand, Motors, Parts};
+use interstage::model::Planner;
+use interstage::rig::{Rig, RigError};
+use static_cell::StaticCell;
+
+use super::{Nucleo, journal};
+
+static CONTROLLER: StaticCell<Controller> = StaticCell::new();
+static PLANNER: StaticCell<Planner> = StaticCell::new();
+
+/// Controller and planner for the prototype, in place for good. Call once.
+pub(crate) fn build() -> Result<(&'static Controller, &'static Planner), RigError> {
+    let rig = Rig::prototype();
+    let controller = place(&CONTROLLER, Controller::try_build, &rig)?;
+    let planner = place(&PLANNER, Planner::try_build, &rig)?;
+    Ok((controller, planner))
+}
+
+/// Builds one of them in a frame of its own: the frames are the largest there
+/// are, and inlined into the caller they would add up.
+#[inline(never)]
+fn place<T>(
+    cell: &'static StaticCell<T>,
+    try_build: fn(&Rig) -> Result<T, RigError>,
+    rig: &Rig,
+) -> Result<&'static T, RigError> {
+    Ok(cell.init(try_build(rig)?))
+}
+
+/// No controller can be built from the parameters: stays off and says so.
+#[embassy_executor::task]
+pub(crate) async fn hold(mut parts: Parts<Nucleo>, error: RigError) -> ! {
+    parts.motors.apply(MotorCommand::OFF, MotorCommand::OFF);
+    parts.light.show(Light::Alarm);
+    loop {
+        journal::rig_error(&error);
+        Timer::after_secs(1).await;
+    }
+}
