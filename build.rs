@@ -6,10 +6,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rerun-if-changed=memory.x");
     if env::var("CARGO_CFG_TARGET_OS")? == "none" {
-        // Copied, so that the linker finds it from whichever directory it runs in.
+        // A copy, so that the linker finds it from whichever directory it runs in.
         let out = PathBuf::from(env::var("OUT_DIR")?);
         fs::copy("memory.x", out.join("memory.x"))?;
         println!("cargo::rustc-link-search={}", out.display());
+        if env::var("PROFILE")? == "debug" {
+            // Without link-time optimisation the frames are about twice as deep.
+            println!("cargo::rustc-link-arg-bins=--defsym=_stack_size=20K");
+        }
     }
     Ok(())
 }

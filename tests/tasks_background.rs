@@ -152,8 +152,11 @@ fn entries_that_do_not_fit_are_counted_and_the_others_kept() {
     }
     assert_eq!(exchange.lost_entries(), 9);
     bench.run_ms(1);
-    let times: Vec<u32> = written.items().iter().map(|entry| entry.at).collect();
+    let items = written.items();
+    let times: Vec<u32> = items.iter().take(ENTRIES).map(|entry| entry.at).collect();
     assert_eq!(times, (0..ENTRIES as u32).collect::<Vec<_>>());
+    let events: Vec<Event> = items.iter().skip(ENTRIES).map(|entry| entry.event).collect();
+    assert_eq!(events, [Event::Lost(9)], "behind what was kept, once");
     exchange.log(entry(5000));
     bench.run_ms(1);
     assert_eq!(written.items().last().map(|entry| entry.at), Some(5000));

@@ -1,8 +1,12 @@
 //! The virtual rig: a physical plant for the controller, the scenarios it is run
 //! in, and what is shown of a run.
 
+pub mod cli;
+pub mod compare;
 pub mod constants;
 pub mod export;
+pub mod firmware;
+pub mod montecarlo;
 pub mod plant;
 pub mod progress;
 pub mod record;
@@ -11,3 +15,4 @@ pub mod report;
 pub mod scenario;
 pub mod sil;
 pub mod table;
+pub mod testing;

@@ -20,15 +20,20 @@ pub(crate) fn build() -> Result<(&'static Controller, &'static Planner), RigErro
     Ok((controller, planner))
 }
 
-/// Builds one of them in a frame of its own: the frames are the largest there
-/// are, and inlined into the caller they would add up.
+/// Builds one of them in a frame of its own and moves it once: these frames are
+/// the deepest the stack ever sees. Inlined into the caller they would add up, and
+/// `init` with `?` keeps two more copies of the value.
 #[inline(never)]
 fn place<T>(
     cell: &'static StaticCell<T>,
     try_build: fn(&Rig) -> Result<T, RigError>,
     rig: &Rig,
 ) -> Result<&'static T, RigError> {
-    Ok(cell.init(try_build(rig)?))
+    let place = cell.uninit();
+    match try_build(rig) {
+        Ok(value) => Ok(place.write(value)),
+        Err(error) => Err(error),
+    }
 }
 
 /// No controller can be built from the parameters: stays off and says so.

@@ -45,9 +45,6 @@ impl Journal for Lines {
             Event::Lost(entries) => {
                 warn!("[{=u32} ms] {=u32} log entries lost", at, entries);
             }
-            Event::Lost(count) => {
-                warn!("[{=u32} ms] {=u32} entries lost: too many at once", at, count)
-            }
             Event::Crossing(record) => crossing(at, &record),
         }
     }

@@ -9,20 +9,25 @@ use crate::rig::{Rig, RigError};
 use crate::supervise::Direction;
 use crate::units::{Millimetres, Q16, Ratio};
 
-/// Tread depth at the corner that the profile assumes, as a part of the free run's
-/// largest; it varies little over the preloads of a crossing.
-const DEPTH_PART: f64 = 0.2;
+/// Tread depth at the corner, as a part of the step height; it varies little over
+/// the preloads of a crossing.
+const CORNER_PART: f64 = 0.28;
+/// Tread depth on the continuous wall, likewise.
+const WALL_PART: f64 = 0.08;
 
 /// Rise of the centre per axial way over the distance to the face, dimensionless:
-/// `dy/dx = d / sqrt((R-c)^2 - d^2)` on the corner, run in linearly from the first
-/// touch to lift-off. Source: circle of radius R - c rolling about a point.
+/// on the corner a circle of radius R - c rolls about a point,
+/// `dy/dx = d / sqrt((R-c)^2 - d^2)`, while the tread recovers from its depth at
+/// the corner to that on the wall, as a triangle that ends half a patch behind the
+/// edge; from the first touch it runs in with the square of the way.
 #[derive(Clone, Debug)]
 pub struct Rise {
-    slope: Table<65>,
+    slope: Table<97>,
     /// Distance of first touch, mm.
     touch: Millimetres,
-    /// Distance at which the wheel lies on the edge again, seen from the upper wall, mm.
-    edge: Millimetres,
+    /// Half the patch on the continuous wall: distance behind the edge at which it is
+    /// clear of it, mm.
+    patch: Millimetres,
 }
 
 impl Rise {
@@ -34,19 +39,26 @@ impl Rise {
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         let (r, h) = (rig.rig.wheel_radius_mm, rig.rig.step_height_mm);
         let formula = Formula::new(rig);
-        let depth = DEPTH_PART * h;
-        let reach = r - depth;
-        let below = r - h;
-        let lift = libm::sqrt((reach * reach - below * below).max(0.01));
-        // A tread compressed by a seventh of the step touches earlier than a free one.
-        let low = r - h - h / 7.0;
+        let (corner, wall) = (CORNER_PART * h, WALL_PART * h);
+        let reach = r - corner;
+        let low = r - h - wall;
         let touch = libm::sqrt(r * r - low * low).max(formula.free_run_mm());
-        let on_corner = |d: f64| d / libm::sqrt(reach * reach - d * d);
-        let slope = Table::build(0.0, touch, |d| {
-            if d <= lift {
-                on_corner(d)
+        let patch = 1.4 * libm::sqrt(r * r - (r - wall) * (r - wall));
+        // Lift-off, and where the circle has taken over from the run-in.
+        let lift = libm::sqrt((reach * reach - (r - h) * (r - h)).max(0.01));
+        let rolls = 0.93 * lift;
+        let on_corner = |d: f64| if d > 0.0 { d / libm::sqrt(reach * reach - d * d) } else { 0.0 };
+        let most = 2.0 * (corner - wall) / (rolls + patch);
+        let recovery = |d: f64| {
+            let part = if d > 0.0 { 1.0 - d / rolls } else { 1.0 + d / patch };
+            most * part.max(0.0)
+        };
+        let slope = Table::build(-patch, touch, |d| {
+            if d <= rolls {
+                on_corner(d) + recovery(d)
             } else {
-                on_corner(lift) * (touch - d) / (touch - lift)
+                let part = (touch - d) / (touch - rolls);
+                on_corner(rolls) * part * part
             }
         })
         .ok_or(RigError::OutOfRange {
@@ -55,12 +67,10 @@ impl Rise {
             min: 0.5,
             max: 8.0,
         })?;
-        // Half the patch on the smooth wall at a tenth of the step's height in depth.
-        let patch = libm::sqrt(r * r - (r - 0.1 * h) * (r - 0.1 * h));
         Ok(Self {
             slope,
             touch: checked("rig.step_height_mm", touch)?,
-            edge: checked("rig.wheel_radius_mm", patch)?,
+            patch: checked("rig.wheel_radius_mm", patch)?,
         })
     }
 
@@ -69,15 +79,21 @@ impl Rise {
     pub const fn first_contact(&self, direction: Direction) -> Millimetres {
         match direction {
             Direction::Deploy => self.touch,
-            Direction::Retract => self.edge,
+            Direction::Retract => self.patch,
         }
     }
 
-    /// Rise per axial way outwards with the face `ahead` mm outwards of the centre;
-    /// zero away from a corner.
+    /// Way behind an edge after which the patch is clear of it, mm.
+    #[must_use]
+    pub const fn patch(&self) -> Millimetres {
+        self.patch
+    }
+
+    /// Rise per axial way outwards with the face `ahead` mm outwards of the centre,
+    /// negative behind the edge; zero away from a corner.
     #[must_use]
     pub fn slope(&self, ahead: Millimetres) -> Ratio {
-        if ahead <= Q16::ZERO || ahead >= self.touch {
+        if ahead <= -self.patch || ahead >= self.touch {
             Q16::ZERO
         } else {
             self.slope.eval(ahead)
@@ -93,10 +109,9 @@ mod tests {
     fn the_slope_integrates_to_the_step_height() {
         let rise = Rise::try_build(&Rig::prototype()).unwrap();
         let mut height = 0.0;
-        for i in 0..16_000 {
+        for i in -8_000..16_000 {
             height += rise.slope(Q16::from_num(f64::from(i) * 1e-3)).to_num::<f64>() * 1e-3;
         }
-        // From the compressed tread before to the corner's depth at the top.
-        assert!((height - 4.0).abs() < 0.4, "{height}");
+        assert!((height - 4.0).abs() < 0.2, "{height}");
     }
 }

@@ -13,8 +13,9 @@ use crate::units::{
     Seconds, q16,
 };
 
-/// Short of the wanted preload by no more than this, it stands, N.
-pub const STANDS_WITHIN: Newtons = q16(700_000);
+/// Short of the wanted preload by no more than this part of the limit, it stands:
+/// worth 1.2 % of the gap, less than the schedule's reserve.
+const STANDS_PART: Q16 = q16(20_000);
 /// Way by which braking starts early, for the tick and the loop's lag, mm.
 const BRAKE_RESERVE: Millimetres = q16(300_000);
 /// Time that a preload needs after its reference, kept before a window, s.
@@ -36,7 +37,11 @@ pub struct Schedule {
     /// Distance to the face by which a step must have been felt, out and back, mm.
     felt_by: [Millimetres; 2],
     end_acceleration: MillimetresPerSecond2,
+    /// Short of the wanted preload by no more than this, it stands, N.
+    stands_within: Newtons,
     rate: NewtonsPerSecond,
+    /// Time per preload at that rate, s/N.
+    per_rate: Q16,
     travel: Millimetres,
 }
 
@@ -51,6 +56,10 @@ pub struct Course {
     pub remaining: Millimetres,
     /// A corner is felt and the lower wall has not been left (retract: reached).
     pub critical: bool,
+    /// The preload is already being raised for this step.
+    pub ramping: bool,
+    /// Preload reference as far as it has come, N.
+    pub reference: Newtons,
     /// Measured preload, N.
     pub preload: Newtons,
 }
@@ -62,6 +71,8 @@ pub struct Targets {
     pub speed: MillimetresPerSecond,
     /// Preload, N.
     pub preload: Newtons,
+    /// The preload is raised for the step ahead; once so, until the step is behind.
+    pub ramping: bool,
     /// The step ahead already has an effect.
     pub approaching: bool,
     /// The speed is held back because the preload does not stand yet.
@@ -104,9 +115,20 @@ impl Schedule {
                 "drive.acceleration_mm_s2",
                 2.0 * rig.drive.acceleration_mm_s2,
             )? * END_PART,
+            stands_within: checked("preload.limit_n", rig.preload.limit_n)? * STANDS_PART,
             rate: checked("preload.slew_n_per_s", rig.preload.slew_n_per_s)? * SLEW_PART,
+            per_rate: divide(
+                q16(1_000_000),
+                checked("preload.slew_n_per_s", rig.preload.slew_n_per_s)? * SLEW_PART,
+            ),
             travel: checked("rig.travel_mm", rig.rig.travel_mm)?,
         })
+    }
+
+    /// Short of the wanted preload by no more than this, it stands, N.
+    #[must_use]
+    pub const fn stands_within(&self) -> Newtons {
+        self.stands_within
     }
 
     /// Way to the end of travel from `position`, along the run, mm.
@@ -137,13 +159,14 @@ impl Schedule {
         let to_window = self.to_window(rise, course);
         let within = |way: Millimetres| to_window.is_some_and(|ahead| ahead <= way);
         let braking = course.critical || within(plan.brake_way + BRAKE_RESERVE);
-        let ramping = course.critical || within(plan.ramp_way);
+        let ramping =
+            course.ramping || course.critical || within(self.ramp_way(plan, course.reference));
         let preload = if ramping { plan.cross_preload } else { plan.cruise_preload };
         let mut speed = if braking { plan.cross_speed } else { plan.cruise_speed };
         let mut waiting = false;
         let short = plan.cross_preload - course.preload;
         if let (false, true, Some(ahead)) = (course.critical, ramping, to_window) {
-            if short > STANDS_WITHIN && ahead > -self.tolerance {
+            if short > self.stands_within && ahead > -self.tolerance {
                 // Arrive no sooner than the preload: at the window, not at the corner.
                 let needed = divide(short, self.rate) + SETTLING;
                 let allowed = divide(ahead.max(Q16::ZERO), needed);
@@ -156,9 +179,22 @@ impl Schedule {
         Targets {
             speed: speed.min(self.end_speed(course.remaining)),
             preload,
+            ramping,
             approaching: braking || ramping,
             waiting,
         }
+    }
+
+    /// Way before the window at which a preload now referenced at `reference` must
+    /// start to rise, mm: what it takes longer than the braking is driven at cruise
+    /// speed.
+    fn ramp_way(&self, plan: &Plan, reference: Newtons) -> Millimetres {
+        let missing = plan.cross_preload - reference;
+        if !plan.look_ahead || plan.cross_preload <= plan.cruise_preload {
+            return if plan.look_ahead { plan.brake_way } else { Q16::MIN };
+        }
+        let needed = plan.latency + missing.max(Q16::ZERO) * self.per_rate;
+        plan.brake_way + (needed - plan.brake_time).max(Q16::ZERO) * plan.cruise_speed
     }
 
     /// Whether the step ahead is still to come.

@@ -3,6 +3,7 @@
 #![deny(clippy::float_arithmetic)]
 
 use crate::sense::SensedState;
+use crate::supervise::Fault;
 use crate::units::{Millimetres, MillimetresPerSecond, Newtons, q16};
 
 /// Ticks of rest that the self-test watches.
@@ -20,6 +21,19 @@ pub(super) fn all_answer(sensed: &SensedState) -> bool {
         && sensed.preload.is_usable()
         && sensed.compression.is_usable()
         && sensed.radius.is_usable()
+}
+
+/// The fault of the first sensor that has not answered.
+pub(super) fn silent(sensed: &SensedState) -> Fault {
+    if !sensed.speed.is_usable() {
+        Fault::SpeedStale
+    } else if !sensed.preload.is_usable() {
+        Fault::PressureStale
+    } else if !sensed.compression.is_usable() {
+        Fault::DisplacementStale
+    } else {
+        Fault::AngleStale
+    }
 }
 
 /// Whether the wheel rests.

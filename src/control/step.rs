@@ -83,6 +83,8 @@ pub struct Controller {
     load: Newtons,
     /// Radial force per axial load and tangent of the arm angle.
     coupling: Ratio,
+    /// Rotor, gears and carriage seen at the tread, N s^2/mm.
+    inertia: Q16,
     friction: Ratio,
 }
 
@@ -160,6 +162,8 @@ impl Controller {
             distance,
             remaining: self.schedule.remaining(direction, pass.position),
             critical: state.critical(),
+            ramping: state.ramping,
+            reference: state.preload_loop.reference(),
             preload: pass.sensed.preload_filtered,
         }
     }
@@ -169,6 +173,7 @@ impl Controller {
         let hold = Targets {
             speed: Q16::ZERO,
             preload: state.preload_loop.reference(),
+            ramping: state.ramping,
             approaching: false,
             waiting: false,
         };
@@ -180,6 +185,7 @@ impl Controller {
         let Some(plan) = state.plan else { return hold };
         let course = self.course(state, pass, direction);
         let mut targets = self.schedule.targets(&self.rise, &plan, &course);
+        state.ramping = targets.ramping;
         if !running {
             targets.speed = Q16::ZERO;
             return targets;
@@ -222,7 +228,7 @@ impl Controller {
         let ahead = self.ahead(state, pass, Q16::ZERO);
         let slope = self.rise.slope(ahead);
         let pressed = pass.sensed.preload_filtered + self.wedge(pass);
-        let load = self.load + pressed * slope;
+        let load = self.load + pressed * slope + self.inertia * state.acceleration();
         let (wanted, measured) = (state.signed_speed(), pass.sensed.speed.value);
         let duty = self.speed_loop.step(&mut state.speed_loop, wanted, measured, load);
         // The slope under the wheel when this tick's duty moves the screw.
@@ -245,11 +251,11 @@ impl Controller {
         MotorCommand { duty, enable: true }
     }
 
-    /// Distance outwards from where the centre will be after `way` to the nearest
-    /// face that is ahead of it, mm; large if there is none.
+    /// Distance outwards from where the centre will be after `way` to the face that
+    /// it is on or that is next, mm; large if there is none.
     fn ahead(&self, state: &State, pass: &Pass<'_>, way: Millimetres) -> Millimetres {
         let at = pass.position + way;
-        let near = |face: &&Millimetres| **face > at;
+        let near = |face: &&Millimetres| **face + self.rise.patch() > at;
         let table = self.steps.iter().find(near).map(|face| *face - at);
         state.extra_face(at).or(table).unwrap_or(Q16::MAX)
     }

@@ -1,13 +1,11 @@
 //! Recognises a step by what it does to arm and tread, and measures the gap.
 //!
 //! On the continuous wall the wheel centre's radius less the tread's compression is
-//! constant: the baseline. A corner that carries lifts the wheel off it. When the
-//! radius itself passes the baseline, the centre stands its undeformed radius above
-//! the lower wall, where that wall stops carrying; then the compression c, which is
-//! the corner's depth, gives the gap without odometry:
-//! `gap = sqrt((R-c)^2 + R^2 - (R-h)^2) - R`.
-//! The clearance is stationary in that instant, so the few hundredths of a
-//! millimetre that the tread's memory holds the wheel lower cost a few micrometres.
+//! constant: the baseline. A corner that carries lifts the wheel off it. The lower
+//! wall stops carrying when the centre stands y above it: the undeformed radius R on
+//! the way back, and on the way out less by what the tread's memory keeps of its
+//! compression before. Then the compression c, which is the corner's depth, gives the
+//! gap without odometry: `gap = sqrt((R-c)^2 + y^2 - (y-h)^2) - R`.
 
 #![deny(clippy::float_arithmetic)]
 
@@ -15,7 +13,7 @@ mod build;
 
 use crate::numeric::{LowPass, LowPassState, sqrt};
 use crate::supervise::Direction;
-use crate::units::{Millimetres, Q16, q16};
+use crate::units::{Millimetres, Q16, Ratio, q16};
 
 /// Rise above which the baseline is held, mm: two steps of the angle code.
 const HOLD: Millimetres = q16(80_000);
@@ -32,13 +30,16 @@ const OVER: Millimetres = q16(400_000);
 /// Ticks over which the new wall's baseline is averaged.
 const SETTLE_TICKS: u8 = 60;
 
+/// Part of the compression before a step that the tread still has when the lower wall
+/// stops carrying. On the converged ring it lies between 0.25 and 0.5 over 3 to
+/// 30 mm/s and 33 to 150 N; the gap is nearly stationary in it.
+const MEMORY: Ratio = q16(400_000);
+
 /// Geometry of the measurement.
 #[derive(Clone, Debug)]
 pub struct CrossingWatch {
     radius: Millimetres,
     step: Millimetres,
-    /// R^2 - (R-h)^2, mm^2 as Q16.
-    chord: Q16,
     baseline: LowPass,
     settle: LowPass,
 }
@@ -69,6 +70,8 @@ pub struct WatchState {
     ticks: u8,
     /// Largest compression of the crossing, mm.
     pub deepest: Millimetres,
+    /// Compression on the wall before the step, mm.
+    flat: Millimetres,
     lift: Option<Lift>,
 }
 
@@ -77,6 +80,8 @@ pub struct WatchState {
 pub struct Lift {
     /// Tread depth at the corner, mm.
     pub depth: Millimetres,
+    /// Height of the centre above the lower wall, mm.
+    pub height: Millimetres,
     /// Gap with the nominal step height, mm.
     pub gap: Millimetres,
     /// Axial distance between wheel centre and face, mm.
@@ -189,6 +194,9 @@ impl CrossingWatch {
     ) -> Option<Sign> {
         if rise < TOUCH {
             state.ticks = 0;
+            if rise < HOLD {
+                state.flat = seen.compression;
+            }
             // What already looks like the foot of a step must not drag the baseline along.
             if !seen.near && rise < HOLD {
                 self.baseline.step(&mut state.baseline, seen.radius - seen.compression);
@@ -217,8 +225,13 @@ impl CrossingWatch {
         seen: &Seen,
         rise: Millimetres,
     ) -> Option<Sign> {
+        // Height of the centre that the tread's memory still lacks at this instant.
+        let short = match direction {
+            Direction::Deploy => state.flat * MEMORY,
+            Direction::Retract => Q16::ZERO,
+        };
         let free = match direction {
-            Direction::Deploy => seen.radius <= state.baseline.output(),
+            Direction::Deploy => seen.radius <= state.baseline.output() + short,
             Direction::Retract => seen.radius >= state.baseline.output() + self.step,
         };
         // A step lower than its table is over before the arm says so.
@@ -227,7 +240,7 @@ impl CrossingWatch {
                 Direction::Deploy => Contact::Corner,
                 Direction::Retract => Contact::Both,
             };
-            let lift = self.measure(seen.compression);
+            let lift = self.measure(seen.compression, self.radius - short);
             state.lift = Some(lift);
             return Some(Sign::Lifted(lift));
         }
@@ -264,30 +277,29 @@ impl CrossingWatch {
             return None;
         }
         let height = (state.baseline.output() - state.next.output()).abs();
-        let depth = state.lift.map_or(Millimetres::ZERO, |lift| lift.depth);
-        let gap = self.gap(depth, height);
+        let gap = state.lift.map_or(Q16::ZERO, |lift| self.gap(lift.depth, lift.height, height));
         state.baseline = state.next;
         state.contact = Contact::Wall;
         state.ticks = 0;
         Some(Sign::Closed { height, gap })
     }
 
-    fn measure(&self, depth: Millimetres) -> Lift {
+    fn measure(&self, depth: Millimetres, height: Millimetres) -> Lift {
         let reach = self.radius - depth;
-        let below = self.radius - self.step;
+        let over = height - self.step;
         Lift {
             depth,
-            gap: self.gap(depth, self.step),
-            distance: sqrt((reach * reach - below * below).max(Q16::ZERO)),
+            height,
+            gap: self.gap(depth, height, self.step),
+            distance: sqrt((reach * reach - over * over).max(Q16::ZERO)),
         }
     }
 
-    /// Gap with this depth at the corner of a step of this height, mm.
-    fn gap(&self, depth: Millimetres, height: Millimetres) -> Millimetres {
+    /// Gap with this depth at the corner and the centre this high above the lower
+    /// wall, for a step of height h, mm: `y^2 - (y-h)^2 = h (2y - h)`.
+    fn gap(&self, depth: Millimetres, height: Millimetres, step: Millimetres) -> Millimetres {
         let reach = self.radius - depth;
-        // R^2 - (R-h)^2 changes by 2 (R-h) per height.
-        let below = self.radius - self.step;
-        let chord = self.chord + (height - self.step) * (below + below);
+        let chord = step * (height + height - step);
         sqrt((reach * reach + chord).max(Q16::ZERO)) - self.radius
     }
 }

@@ -1,7 +1,7 @@
 //! What the tick asks the model task, and what it is answered.
 
 use crate::supervise::{Direction, Limit};
-use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Ratio};
+use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Ratio, Seconds};
 
 /// How preload and speed are chosen. The product is [`Strategy::Scheduled`]; the
 /// others are what it is compared with.
@@ -87,8 +87,12 @@ pub struct Plan {
     pub slip_margin: Ratio,
     /// Way that braking from cruise to crossing speed takes, mm.
     pub brake_way: Millimetres,
-    /// Way before the window at which the preload starts to rise, mm.
-    pub ramp_way: Millimetres,
+    /// Time that this braking takes, s.
+    pub brake_time: Seconds,
+    /// Time from a preload reference until the preload stands, without the ramp, s.
+    pub latency: Seconds,
+    /// Whether the preload is raised ahead of the step.
+    pub look_ahead: bool,
     /// Limits met, in the order found.
     pub limits: [Option<Limit>; 3],
     /// Review of the step behind.

@@ -10,7 +10,7 @@ use super::reduced::{Point, ReducedModel};
 use super::timing::Timing;
 use crate::rig::MAX_STEPS;
 use crate::supervise::{Direction, Limit};
-use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Ratio, q16};
+use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Ratio, Seconds, q16};
 
 /// Largest correction of the stiffness scale by one crossing.
 const LARGEST_CORRECTION: Ratio = q16(100_000);
@@ -75,7 +75,10 @@ impl Planner {
             gap: self.target_of(request.direction),
             slip_margin: self.usable,
             brake_way: Millimetres::ZERO,
-            ramp_way: Millimetres::ZERO,
+            brake_time: Seconds::ZERO,
+            latency: self.timing.preload_change(Newtons::ZERO),
+            // Without look-ahead the preload rises when the step is felt, never before.
+            look_ahead: self.strategy != Strategy::Reactive,
             limits: [None; 3],
             outcome,
         };
@@ -153,21 +156,10 @@ impl Planner {
         gap
     }
 
-    /// How far before the step braking and preload must begin.
+    /// How far and how long before the step braking must begin.
     fn ways(&self, plan: &mut Plan) {
         plan.brake_way = self.timing.brake_way(plan.cruise_speed, plan.cross_speed);
-        let brake = self.timing.speed_change(plan.cruise_speed - plan.cross_speed);
-        let ramp = self.timing.preload_change(plan.cross_preload - plan.cruise_preload);
-        let ahead = if plan.cross_preload > plan.cruise_preload && ramp > brake {
-            (ramp - brake) * plan.cruise_speed
-        } else {
-            Millimetres::ZERO
-        };
-        plan.ramp_way = match self.strategy {
-            // Without look-ahead the preload rises when the step is felt, never before.
-            Strategy::Reactive => Millimetres::MIN,
-            _ => plan.brake_way + ahead,
-        };
+        plan.brake_time = self.timing.speed_change(plan.cruise_speed - plan.cross_speed);
     }
 
     /// Compares a crossing with the model and corrects the stiffness, bounded.

@@ -65,11 +65,14 @@ pub struct Ledger {
     open: Option<Open>,
 }
 
+/// A crossing while the corner carries.
 #[derive(Clone, Copy, Debug)]
 struct Open {
     crossing: Crossing,
     slip_before: f64,
     last: Moment,
+    /// The gap is known: the line stands at the end of the list.
+    listed: bool,
 }
 
 impl Ledger {
@@ -87,30 +90,64 @@ impl Ledger {
 
     /// Looks at one moment.
     pub fn record(&mut self, now: &Moment) {
-        match self.open.take() {
-            None => self.open = self.begin(now),
-            Some(open) => self.open = self.go_on(open, now),
+        let Some(mut open) = self.open.take().or_else(|| self.begin(now)) else { return };
+        // Off the corner, over the edge or back where it came from.
+        if now.corner_n <= 0.0 || now.position_mm >= open.crossing.step_mm {
+            return;
         }
-        if let Some(last) = self.done.last_mut() {
-            // The wheel is still on the corner after lift-off.
-            let away = (now.position_mm - last.step_mm).abs();
-            if now.corner_n > 0.0 && away < self.radius_mm {
-                last.corner_n = last.corner_n.max(now.corner_n);
-                last.peak_preload_n = last.peak_preload_n.max(now.preload_n);
-                last.peak_utilisation = last.peak_utilisation.max(now.utilisation.abs());
+        let crossing = &mut open.crossing;
+        crossing.corner_n = crossing.corner_n.max(now.corner_n);
+        crossing.peak_preload_n = crossing.peak_preload_n.max(now.preload_n);
+        crossing.peak_utilisation = crossing.peak_utilisation.max(now.utilisation.abs());
+        crossing.slip_mm = now.slip_mm - open.slip_before;
+        let (a, b) = (open.last.floor_pressure, now.floor_pressure);
+        // A floor that carries by jerks is left with the last lift-off and met with the
+        // first touch-down.
+        let event = if crossing.climbing {
+            a > 0.0 && b <= 0.0
+        } else {
+            a <= 0.0 && b > 0.0 && !open.listed
+        };
+        if event {
+            self.measure(&mut open, now);
+        }
+        if open.listed {
+            if event && open.crossing.lift_s > 0.0 && !self.is_last(&open.crossing) {
+                self.done.push(open.crossing);
+            } else if let Some(line) = self.done.last_mut() {
+                *line = open.crossing;
             }
         }
+        open.last = *now;
+        self.open = Some(open);
+    }
+
+    /// Whether the last line is of this very crossing.
+    fn is_last(&self, crossing: &Crossing) -> bool {
+        self.done.last().is_some_and(|line| line.touch_s == crossing.touch_s)
+    }
+
+    /// Gap, speed and preload at the instant the lower wall stops or begins to carry.
+    fn measure(&self, open: &mut Open, now: &Moment) {
+        let (a, b) = (open.last.floor_pressure, now.floor_pressure);
+        let part = a / (a - b);
+        let mix = |from: f64, to: f64| from + part * (to - from);
+        let crossing = &mut open.crossing;
+        let ahead = crossing.step_mm - mix(open.last.position_mm, now.position_mm);
+        let height = mix(open.last.height_mm, now.height_mm) - now.base_mm;
+        crossing.gap_mm = ahead.hypot(height) - self.radius_mm;
+        crossing.lift_s = mix(open.last.time_s, now.time_s);
+        crossing.speed_mm_s = mix(open.last.speed_mm_s, now.speed_mm_s).abs();
+        crossing.preload_n = mix(open.last.preload_n, now.preload_n);
+        open.listed = true;
     }
 
     fn begin(&self, now: &Moment) -> Option<Open> {
-        let (index, step) = self
-            .steps
-            .iter()
-            .enumerate()
-            .find(|(_, step)| {
-                let ahead = step.position_mm - now.position_mm;
-                ahead > 0.0 && ahead < self.radius_mm
-            })?;
+        let near = |(_, step): &(usize, &Step)| {
+            let ahead = step.position_mm - now.position_mm;
+            ahead > 0.0 && ahead < self.radius_mm
+        };
+        let (index, step) = self.steps.iter().enumerate().find(near)?;
         if now.corner_n <= 0.0 {
             return None;
         }
@@ -127,34 +164,7 @@ impl Ledger {
             },
             slip_before: now.slip_mm,
             last: *now,
+            listed: false,
         })
-    }
-
-    fn go_on(&mut self, mut open: Open, now: &Moment) -> Option<Open> {
-        let crossing = &mut open.crossing;
-        crossing.corner_n = crossing.corner_n.max(now.corner_n);
-        crossing.peak_preload_n = crossing.peak_preload_n.max(now.preload_n);
-        crossing.peak_utilisation = crossing.peak_utilisation.max(now.utilisation.abs());
-        // Left without lift-off: the wheel turned back.
-        if now.corner_n <= 0.0 || now.position_mm >= crossing.step_mm {
-            return None;
-        }
-        let (a, b) = (open.last.floor_pressure, now.floor_pressure);
-        let event = if crossing.climbing { a > 0.0 && b <= 0.0 } else { a <= 0.0 && b > 0.0 };
-        if !event {
-            open.last = *now;
-            return Some(open);
-        }
-        let part = a / (a - b);
-        let mix = |from: f64, to: f64| from + part * (to - from);
-        let ahead = crossing.step_mm - mix(open.last.position_mm, now.position_mm);
-        let height = mix(open.last.height_mm, now.height_mm) - now.base_mm;
-        crossing.gap_mm = ahead.hypot(height) - self.radius_mm;
-        crossing.lift_s = mix(open.last.time_s, now.time_s);
-        crossing.speed_mm_s = mix(open.last.speed_mm_s, now.speed_mm_s).abs();
-        crossing.preload_n = mix(open.last.preload_n, now.preload_n);
-        crossing.slip_mm = now.slip_mm - open.slip_before;
-        self.done.push(*crossing);
-        None
     }
 }

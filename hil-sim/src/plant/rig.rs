@@ -349,7 +349,7 @@ impl VirtualRig {
         self.ring.commit(&Motion { height_mm: solved.height_mm, ..motion });
         let contact = solved.contact;
         self.truth.height_mm = solved.height_mm + local.base_mm;
-        self.truth.depth_mm = contact.depth_mm;
+        self.truth.depth_mm = contact.depth_mm.max(0.0);
         self.truth.corner_n = contact.step_force_n();
         self.truth.floor_n = contact.floor_n;
         self.truth.utilisation = solved.utilisation;

@@ -39,7 +39,8 @@ pub struct Contact {
     pub step_cosine_n: f64,
     /// Sum of p sin(psi) over face and top of the step ahead, N.
     pub step_sine_n: f64,
-    /// Largest depth, mm.
+    /// Largest depth, at the point of the wall nearest to the centre, mm; negative is
+    /// clearance.
     pub depth_mm: f64,
     /// Arc in contact times width, mm^2.
     pub area_mm2: f64,
@@ -136,7 +137,6 @@ impl Ring {
             if facet == Facet::Floor {
                 floor_pressure = floor_pressure.max(pressure);
             }
-            contact.depth_mm = contact.depth_mm.max(depth);
             if pressure <= 0.0 {
                 return;
             }
@@ -155,6 +155,7 @@ impl Ring {
             contact.slope.0 += slope * cos;
             contact.slope.1 += slope * sin;
         });
+        contact.depth_mm = self.parameters.radius_mm - motion.wall.nearest(motion.height_mm);
         contact.floor_pressure = if floor_pressure.is_finite() {
             floor_pressure
         } else {

@@ -105,7 +105,14 @@ impl LocalWall {
         }
     }
 
-    /// Derivative of that distance by `y`.
+    /// Distance from the centre, `y` mm above the wall under it, to the nearest point
+    /// of the wall: straight down or the corner ahead.
+    #[must_use]
+    pub fn nearest(&self, y: f64) -> f64 {
+        y.min(self.ahead_mm.hypot(y - self.rise_mm))
+    }
+
+    /// Derivative of a ray's distance by `y`.
     #[inline]
     #[must_use]
     pub fn slope(&self, y: f64, sin: f64, cos: f64) -> f64 {

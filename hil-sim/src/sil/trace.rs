@@ -12,8 +12,9 @@ use crate::plant::rig::{Truth, VirtualRig};
 use crate::record::{CrossingLine, LogLine, Recording, Report, Row, Summary};
 use crate::scenario::Scenario;
 
-/// Short of the wanted preload by no more than this, it stands, N.
-const STANDS_WITHIN_N: f64 = 1.0;
+/// Short of the wanted preload by no more than this part of it, it stands: what the
+/// controller allows of measured preload, and three deviations of the load cell.
+const STANDS_PART: f64 = 0.035;
 
 /// A run's record as it grows.
 pub(super) struct Trace {
@@ -165,11 +166,11 @@ impl Trace {
         }
     }
 
-    /// How long the true preload had stood within a newton of the wanted one when
+    /// How long the true preload had stood close to the wanted one when
     /// the corner touched, s; negative by how long it still took.
     fn lead_time(&self, touch_s: f64, wanted: f64) -> f64 {
         let touch = ((touch_s / TICK_S) as usize).min(self.preload.len().saturating_sub(1));
-        let stands = |n: &f32| f64::from(*n) >= wanted - STANDS_WITHIN_N;
+        let stands = |n: &f32| f64::from(*n) >= wanted * (1.0 - STANDS_PART);
         if self.preload.get(touch).is_some_and(stands) {
             let since = self.preload[..touch].iter().rposition(|n| !stands(n)).map_or(0, |i| i + 1);
             (touch - since) as f64 * TICK_S

@@ -48,6 +48,10 @@ impl Controller {
                 rig.plant.top_load_n * rig.plant.top_load_share,
             )?,
             coupling: checked("plant.arm_coupling", rig.plant.arm_coupling)?,
+            inertia: checked(
+                "drive.reflected_mass_kg",
+                (rig.drive.reflected_mass_kg + rig.plant.moved_mass_kg) * 1e-3,
+            )?,
             friction: checked("plant.mu", rig.plant.mu)?,
         })
     }

@@ -167,6 +167,7 @@ impl Controller {
             Direction::Deploy => 0,
             Direction::Retract => state.next_step.saturating_sub(1),
         };
+        state.ramping = false;
         state.late = false;
         state.waited = false;
         state.standing_since = None;

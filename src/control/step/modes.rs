@@ -1,8 +1,8 @@
 //! What each mode waits for, and what entering a mode does.
 
 use super::{Controller, Pass, State};
-use crate::control::schedule::{STANDS_WITHIN, Targets};
-use crate::control::start::{TEST_TICKS, all_answer, at_rest, stowed};
+use crate::control::schedule::Targets;
+use crate::control::start::{TEST_TICKS, all_answer, at_rest, silent, stowed};
 use crate::estimate::crossing::Seen;
 use crate::log::Event;
 use crate::model::{Plan, PlanRequest};
@@ -11,6 +11,8 @@ use crate::units::{Millimetres, Q16, q16};
 
 /// Ticks that a preload must stand before the drive starts.
 const STANDING_TICKS: u32 = 60;
+/// Ticks after which a sensor that has not answered since boot counts as missing.
+const BOOT_TICKS: u32 = 2000;
 /// Ticks after which a zero that does not come in counts as failed.
 const ZERO_TICKS: u32 = 2000;
 
@@ -48,6 +50,10 @@ impl Controller {
         match state.mode {
             Mode::Boot if all_answer(pass.sensed) => {
                 self.trigger(state, pass, Trigger::SensorsAnswer);
+            }
+            Mode::Boot if state.in_mode >= BOOT_TICKS => {
+                let fault = silent(pass.sensed);
+                self.trigger(state, pass, Trigger::Fault(fault));
             }
             Mode::SelfTest if !at_rest(pass.sensed) => state.in_mode = 0,
             Mode::SelfTest if state.in_mode >= TEST_TICKS => {
@@ -113,6 +119,7 @@ impl Controller {
             };
             state.crossing = None;
         }
+        state.ramping = false;
         state.late = false;
         state.waited = false;
         state.standing_since = None;
@@ -129,7 +136,7 @@ impl Controller {
         let course = self.course(state, pass, direction);
         let wanted = self.schedule.targets(&self.rise, &plan, &course).preload;
         let off = (pass.sensed.preload_filtered - wanted).abs();
-        if off > STANDS_WITHIN {
+        if off > self.schedule.stands_within() {
             state.in_mode = 0;
         } else if state.in_mode >= STANDING_TICKS {
             self.trigger(state, pass, Trigger::PreloadStands);
@@ -190,7 +197,7 @@ impl Controller {
         plan: &Plan,
         targets: &Targets,
     ) {
-        let stands = plan.cross_preload - pass.sensed.preload_filtered <= STANDS_WITHIN;
+        let stands = plan.cross_preload - pass.sensed.preload_filtered <= self.schedule.stands_within();
         state.standing_since = match state.standing_since {
             Some(since) if stands => Some(since),
             _ if stands => Some(pass.now),

@@ -44,6 +44,8 @@ pub struct State {
     pub(super) line: Option<OpenCrossing>,
     /// The review asked for and not yet answered; goes with every request until then.
     pub(super) review: Option<Review>,
+    /// The preload is being raised for the step ahead.
+    pub(super) ramping: bool,
     /// Since when the crossing preload has stood.
     pub(super) standing_since: Option<Tick>,
     /// The step ahead is late and has been reported.
@@ -105,6 +107,7 @@ impl Default for State {
             crossing: None,
             line: None,
             review: None,
+            ramping: false,
             standing_since: None,
             late: false,
             waited: false,

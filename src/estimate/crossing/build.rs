@@ -20,7 +20,6 @@ impl CrossingWatch {
         Ok(Self {
             radius: checked("rig.wheel_radius_mm", r)?,
             step: checked("rig.step_height_mm", h)?,
-            chord: checked("rig.step_height_mm", 2.0 * r * h - h * h)?,
             baseline: LowPass::build(BASELINE_S),
             settle: LowPass::build(SETTLE_S),
         })
@@ -103,11 +102,13 @@ mod tests {
             back in any::<bool>(),
         ) {
             let direction = if back { Direction::Retract } else { Direction::Deploy };
-            let exact = ((25.0 - depth).powi(2) + 2.0 * 25.0 * height - height * height).sqrt() - 25.0;
+            // Height at which the watch takes the lower wall for left.
+            let y = if back { 25.0 } else { 25.0 - 0.4 * 0.3 };
+            let exact = ((25.0 - depth).powi(2) + height * (2.0 * y - height)).sqrt() - 25.0;
             for sign in roll(depth, height, direction) {
                 match sign {
                     Sign::Lifted(lift) => {
-                        let distance = ((25.0 - depth).powi(2) - 21.0f64.powi(2)).sqrt();
+                        let distance = ((25.0 - depth).powi(2) - (y - 4.0).powi(2)).sqrt();
                         prop_assert!((lift.distance.to_num::<f64>() - distance).abs() < 1e-3);
                     }
                     Sign::Closed { height: h, gap } => {

@@ -10,9 +10,10 @@ use crate::numeric::checked;
 use crate::rig::{Rig, RigError};
 use crate::supervise::Direction;
 
-/// Preload kept free below the limit for regulation, relative to the limit: noise
-/// and gain of the load cell, and the spring that the climb compresses.
-const REGULATION_PART: f64 = 0.02;
+/// Preload kept free below the limit for regulation, relative to the limit: gain of
+/// the load cell, and what the climb compresses the spring beyond the feed-forward
+/// on a rig at the end of its tolerances. With it no drawn rig exceeds the limit.
+const REGULATION_PART: f64 = 0.04;
 
 impl Planner {
     /// The scheduler of a rig.

@@ -1,0 +1,99 @@
+//! The `rig` command. A verb is one file with its `Args` and its `run`; what they
+//! share is in `scenario`, `output` and `failure`.
+//!
+//! Results go to standard output, progress and errors to standard error. The exit
+//! code is 0 if all is well, 1 if what was run did not end well, 2 if it could not
+//! be run as asked; an error is one line.
+
+mod constants;
+mod crossing;
+mod deploy;
+mod failure;
+mod keys;
+mod modes;
+mod montecarlo;
+mod output;
+mod parse;
+mod scenario;
+mod size;
+mod test;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use failure::{Failure, Outcome};
+
+/// Virtual rig for a rubber-wheeled drive that climbs the steps of a telescoping
+/// sleeve.
+#[derive(Debug, Parser)]
+#[command(name = "rig", bin_name = "cargo rig", version, disable_help_subcommand = true)]
+struct Cli {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(Debug, Subcommand)]
+enum Verb {
+    Deploy(deploy::Args),
+    Crossing(crossing::Args),
+    Modes(modes::Args),
+    Montecarlo(montecarlo::Args),
+    Keys(keys::Args),
+    Size(size::Args),
+    Constants(constants::Args),
+    Test(test::Args),
+}
+
+impl Verb {
+    fn run(&self) -> Result<Outcome, Failure> {
+        match self {
+            Self::Deploy(args) => deploy::run(args),
+            Self::Crossing(args) => crossing::run(args),
+            Self::Modes(args) => modes::run(args),
+            Self::Montecarlo(args) => montecarlo::run(args),
+            Self::Keys(args) => keys::run(args),
+            Self::Size(args) => size::run(args),
+            Self::Constants(args) => constants::run(args),
+            Self::Test(args) => test::run(args),
+        }
+    }
+}
+
+/// Runs the command with the arguments of this process.
+#[must_use]
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => return parse::report(&error),
+    };
+    match cli.verb.run() {
+        Ok(outcome) => outcome.code(),
+        Err(failure) => {
+            eprintln!("error: {failure}");
+            failure.code()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_arguments_are_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn every_verb_and_option_has_help() {
+        for verb in Cli::command().get_subcommands() {
+            assert!(verb.get_about().is_some(), "{}", verb.get_name());
+            for arg in verb.get_arguments() {
+                assert!(arg.get_help().is_some(), "{} {}", verb.get_name(), arg.get_id());
+            }
+        }
+    }
+}

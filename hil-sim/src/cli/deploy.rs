@@ -1,0 +1,145 @@
+//! `rig deploy`: a whole deployment, or the way back.
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::failure::{Failure, Outcome};
+use super::output;
+use super::scenario::RunArgs;
+use crate::record::{Recording, Summary};
+use crate::scenario::Scenario;
+use crate::{export, progress, report, sil, table};
+
+/// Targets that this build can drive.
+const TARGETS: [&str; 1] = ["sil"];
+
+/// A whole deployment in closed loop, or the way back.
+///
+/// Writes report, logs and summary. The exit code is 1 if the run ends in a fault or
+/// does not complete.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    #[command(flatten)]
+    run: RunArgs,
+
+    /// What runs the controller: sil, the shipping control tick on this host.
+    #[arg(long, value_name = "TARGET", default_value = "sil")]
+    target: String,
+
+    /// Directory of the files; by default one in `out`, named after the run.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+
+    /// Writes no files.
+    #[arg(long, conflicts_with = "out")]
+    no_files: bool,
+
+    /// Prints the summary as one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Printed<'a> {
+    #[serde(flatten)]
+    summary: &'a Summary,
+    files: &'a [PathBuf],
+}
+
+pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
+    check_target(&args.target)?;
+    let scenario = args.run.resolve()?;
+    let directory = if args.no_files { None } else { Some(directory(args, &scenario)?) };
+    let recording = {
+        let _progress = progress::spinner(scenario.run.direction.name());
+        sil::run(&scenario, sil::Options { rows: directory.is_some(), speed: None })?
+    };
+    let files = match &directory {
+        Some(directory) => write(&recording, directory)?,
+        None => Vec::new(),
+    };
+    let summary = &recording.summary;
+    let printed = Printed { summary, files: &files };
+    output::result(args.json, &printed, || table::run(summary, &files))?;
+    Ok(Outcome::of(summary.completed && summary.faults.is_empty()))
+}
+
+fn check_target(target: &str) -> Result<(), Failure> {
+    if TARGETS.contains(&target) {
+        return Ok(());
+    }
+    let available = TARGETS.join(", ");
+    Err(Failure::input(format!("--target {target}: not available; available targets: {available}")))
+}
+
+/// Where the files go: as asked, or named after what distinguishes the run.
+fn directory(args: &Args, scenario: &Scenario) -> Result<PathBuf, Failure> {
+    let directory = args.out.clone().unwrap_or_else(|| {
+        let file = args.run.scenario.file().and_then(Path::file_stem);
+        let rig = file.map_or(scenario.preset.as_str().into(), |stem| stem.to_string_lossy());
+        let (way, controller) = (scenario.run.direction.name(), scenario.run.controller.name());
+        Path::new("out").join(format!("{way}-{rig}-{controller}-{}", scenario.run.seed))
+    });
+    // Told before the run rather than after it.
+    if directory.exists() && !directory.is_dir() {
+        let path = directory.display();
+        return Err(Failure::input(format!("--out {path}: exists and is not a directory")));
+    }
+    Ok(directory)
+}
+
+fn write(recording: &Recording, directory: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let mut files = export::write_all(recording, directory)?;
+    let page = directory.join("report.html");
+    report::write_html(recording, &page)?;
+    files.insert(0, page);
+    Ok(files)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Only {
+        #[command(flatten)]
+        args: Args,
+    }
+
+    fn default_directory(arguments: &[&str]) -> PathBuf {
+        let all = std::iter::once("rig").chain(arguments.iter().copied());
+        let args = Only::try_parse_from(all).unwrap().args;
+        directory(&args, &args.run.resolve().unwrap()).unwrap()
+    }
+
+    #[test]
+    fn the_directory_is_named_after_the_run() {
+        assert_eq!(default_directory(&[]), Path::new("out/deploy-prototype-scheduled-0"));
+        assert_eq!(
+            default_directory(&[
+                "--retract",
+                "--rig",
+                "fe",
+                "--controller",
+                "limit",
+                "--seed",
+                "7"
+            ]),
+            Path::new("out/retract-fe-limit-7")
+        );
+        assert_eq!(default_directory(&["--out", "here"]), Path::new("here"));
+    }
+
+    #[test]
+    fn a_target_that_is_not_there_is_refused_with_those_that_are() {
+        assert!(check_target("sil").is_ok());
+        for target in ["board", "probe", "moon"] {
+            let error = check_target(target).unwrap_err().to_string();
+            assert!(error.contains(target) && error.ends_with("available targets: sil"), "{error}");
+        }
+    }
+}

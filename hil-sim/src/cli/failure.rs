@@ -1,0 +1,139 @@
+//! How a verb ends.
+
+use std::fmt;
+use std::process::ExitCode;
+
+use interstage::rig::RigError;
+
+use crate::export::ExportError;
+use crate::firmware::FirmwareError;
+use crate::plant::balance::BalanceError;
+use crate::scenario::ScenarioError;
+use crate::sil::RunError;
+
+/// How a verb ended that did its work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Outcome {
+    /// All is well.
+    Good,
+    /// What was run did not end well: a fault, a stale file, a size above budget.
+    Bad,
+    /// As a program that was started ended.
+    Code(u8),
+}
+
+impl Outcome {
+    /// Good or bad.
+    pub(super) fn of(good: bool) -> Self {
+        if good { Self::Good } else { Self::Bad }
+    }
+
+    /// The exit code.
+    pub(super) fn code(self) -> ExitCode {
+        match self {
+            Self::Good => ExitCode::SUCCESS,
+            Self::Bad => ExitCode::from(1),
+            Self::Code(code) => ExitCode::from(code),
+        }
+    }
+}
+
+/// Why a verb did not do its work. Displays as one line.
+#[derive(Debug)]
+pub(super) enum Failure {
+    /// It was asked for something that cannot be: exit code 2.
+    Input(String),
+    /// It broke off under way: exit code 1.
+    Run(String),
+}
+
+impl Failure {
+    /// A failure of the input.
+    pub(super) fn input(error: impl fmt::Display) -> Self {
+        Self::Input(error.to_string())
+    }
+
+    /// A failure under way.
+    pub(super) fn run(error: impl fmt::Display) -> Self {
+        Self::Run(error.to_string())
+    }
+
+    /// The exit code.
+    pub(super) fn code(&self) -> ExitCode {
+        match self {
+            Self::Input(_) => ExitCode::from(2),
+            Self::Run(_) => ExitCode::from(1),
+        }
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (Self::Input(text) | Self::Run(text)) = self;
+        f.write_str(&one_line(text))
+    }
+}
+
+/// `text` with every run of white space that breaks a line as one blank.
+pub(super) fn one_line(text: &str) -> String {
+    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+    lines.collect::<Vec<_>>().join(" ")
+}
+
+impl From<ScenarioError> for Failure {
+    fn from(error: ScenarioError) -> Self {
+        Self::input(error)
+    }
+}
+
+impl From<RigError> for Failure {
+    fn from(error: RigError) -> Self {
+        Self::input(error)
+    }
+}
+
+impl From<ExportError> for Failure {
+    fn from(error: ExportError) -> Self {
+        Self::input(error)
+    }
+}
+
+impl From<RunError> for Failure {
+    fn from(error: RunError) -> Self {
+        match error {
+            RunError::Rig(error) => error.into(),
+            RunError::Plant(_) => Self::run(error),
+        }
+    }
+}
+
+impl From<BalanceError> for Failure {
+    fn from(error: BalanceError) -> Self {
+        Self::run(error)
+    }
+}
+
+impl From<FirmwareError> for Failure {
+    fn from(error: FirmwareError) -> Self {
+        Self::run(error)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failure_is_one_line() {
+        let failure = Failure::input("first\n  second\n\nthird\n");
+        assert_eq!(failure.to_string(), "first second third");
+    }
+
+    #[test]
+    fn a_rig_that_cannot_be_built_is_bad_input_and_a_plant_that_fails_is_not() {
+        let rig = RigError::LimitBelowCruise { limit_n: 1.0, cruise_n: 2.0 };
+        assert!(matches!(Failure::from(RunError::Rig(rig)), Failure::Input(_)));
+        let balance = BalanceError { preload_n: 1.0, residual_n: 1.0, height_mm: 1.0 };
+        assert!(matches!(Failure::from(balance), Failure::Run(_)));
+    }
+}

@@ -1,0 +1,105 @@
+//! `rig montecarlo`: many random rigs.
+
+use super::failure::{Failure, Outcome};
+use super::output;
+use super::scenario::RunArgs;
+use crate::montecarlo::{self, Least, Quantiles, Shard};
+use crate::progress;
+use crate::table::{number, plain};
+
+/// Runs many random rigs, each drawn from its own seed, and shows what limits them.
+///
+/// The outcome depends on the seeds alone, not on the number of processors. The exit
+/// code is 1 if a run does not complete.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// How many: the seeds that follow --seed.
+    #[arg(short = 'n', value_name = "N", default_value_t = 100,
+          value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    count: u64,
+
+    /// Runs every n-th of the seeds alone, beginning with the i-th.
+    #[arg(long, value_name = "I/N", default_value_t = Shard::WHOLE)]
+    shard: Shard,
+
+    #[command(flatten)]
+    run: RunArgs,
+
+    /// Prints the outcome as one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
+    let scenario = args.run.resolve()?;
+    let seeds = args.shard.seeds(scenario.run.seed, args.count);
+    let lines = {
+        let bar = progress::bar("runs", seeds.len() as u64);
+        montecarlo::run(&scenario, &seeds, &|| bar.advance(1))?
+    };
+    let outcome = montecarlo::Outcome::of(&lines);
+    let head = format!(
+        "{} runs of {}, {} controller, rig {}: {} completed, {} slip events\n",
+        outcome.runs,
+        scenario.run.direction.name(),
+        scenario.run.controller.name(),
+        scenario.preset,
+        outcome.completed,
+        outcome.slip_events
+    );
+    output::result(args.json, &outcome, || head + &human(&outcome))?;
+    Ok(Outcome::of(outcome.completed == outcome.runs))
+}
+
+fn human(outcome: &montecarlo::Outcome) -> String {
+    let mut text = format!("{}\n", figures(outcome));
+    for fault in &outcome.faults {
+        let code = fault.code.map_or("failure".to_owned(), |code| format!("fault {code}"));
+        text += &format!("  {code} in seed {}: {}\n", fault.seed, fault.text);
+    }
+    if !outcome.incomplete.is_empty() {
+        let seeds: Vec<String> = outcome.incomplete.iter().map(u64::to_string).collect();
+        text += &format!("  incomplete: seeds {}\n", seeds.join(", "));
+    }
+    text += "What limits it\n";
+    for limit in &outcome.limits {
+        let (runs, all) = (limit.runs, outcome.runs);
+        text += &format!("  limit {} in {runs} of {all} runs: {}\n", limit.code, limit.text);
+    }
+    if outcome.limits.is_empty() {
+        text += "  no limit was met\n";
+    }
+    let seed = outcome.incomplete.first().copied().or(outcome.worst_gap_seed);
+    if let Some(seed) = seed {
+        text += &format!(
+            "`cargo rig deploy --seed {seed}` with the same options shows that run in full\n"
+        );
+    }
+    text
+}
+
+fn figures(outcome: &montecarlo::Outcome) -> comfy_table::Table {
+    let dash = || "-".to_owned();
+    let seed = |seed: Option<u64>| seed.map_or_else(dash, |seed| seed.to_string());
+    let spread = |name: &str, figure: Option<Quantiles>, decimals| {
+        let number = |pick: fn(Quantiles) -> f64| number(figure.map(pick), decimals);
+        let quantiles = [number(|f| f.p50), number(|f| f.p95), number(|f| f.max)];
+        let seed = seed(figure.map(|f| f.seed));
+        [vec![name.to_owned()], quantiles.to_vec(), vec![seed]].concat()
+    };
+    let least = |name: &str, figure: Option<Least>| {
+        let worst = number(figure.map(|f| f.min), 3);
+        vec![name.to_owned(), dash(), dash(), worst, seed(figure.map(|f| f.seed))]
+    };
+    let gap = number(outcome.worst_gap_mm, 3);
+    plain(
+        &["", "median", "95 %", "worst", "its seed"],
+        [
+            spread("duration, s", outcome.duration_s, 2),
+            spread("gap over reference", outcome.gap_over_ref, 3),
+            vec!["gap, mm".to_owned(), dash(), dash(), gap, seed(outcome.worst_gap_seed)],
+            least("lead time, s", outcome.lead_time_s),
+            least("slip margin", outcome.slip_margin),
+        ],
+    )
+}

@@ -1,0 +1,114 @@
+//! The options that choose a rig and how it is run.
+
+use std::path::{Path, PathBuf};
+
+use clap::builder::PossibleValuesParser;
+
+use super::failure::Failure;
+use crate::scenario::{ControllerKind, PRESETS, Scenario};
+
+/// Which rig.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub(super) struct ScenarioArgs {
+    /// Rig preset; by default that of the file.
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(PRESETS))]
+    rig: Option<String>,
+
+    /// Overrides a parameter, any number of times; `rig keys` lists them.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+
+    /// Scenario file, TOML.
+    #[arg(long, value_name = "FILE")]
+    scenario: Option<PathBuf>,
+
+    /// Scenario file, TOML; the same as --scenario.
+    #[arg(value_name = "FILE", conflicts_with = "scenario")]
+    file: Option<PathBuf>,
+}
+
+impl ScenarioArgs {
+    /// The file, however it was given.
+    pub(super) fn file(&self) -> Option<&Path> {
+        self.scenario.as_deref().or(self.file.as_deref())
+    }
+
+    /// The scenario: preset, then file, then overrides.
+    pub(super) fn resolve(&self) -> Result<Scenario, Failure> {
+        self.resolve_with(&[])
+    }
+
+    fn resolve_with(&self, last: &[String]) -> Result<Scenario, Failure> {
+        let sets = [&self.set, last].concat();
+        Ok(Scenario::resolve(self.rig.as_deref(), self.file(), &sets)?)
+    }
+}
+
+/// Which rig, and how it is run.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub(super) struct RunArgs {
+    #[command(flatten)]
+    pub(super) scenario: ScenarioArgs,
+
+    /// The way back: from the end of travel, dropping off the steps.
+    #[arg(long)]
+    retract: bool,
+
+    /// How preload and speed are chosen; by default scheduled.
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(ControllerKind::NAMES))]
+    controller: Option<String>,
+
+    /// Seed of plant and noise; 0, the default, is the nominal plant.
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+}
+
+impl RunArgs {
+    /// The scenario; the options come after every `--set`.
+    pub(super) fn resolve(&self) -> Result<Scenario, Failure> {
+        let mut sets = Vec::new();
+        if self.retract {
+            sets.push("run.direction=retract".to_owned());
+        }
+        if let Some(controller) = &self.controller {
+            sets.push(format!("run.controller={controller}"));
+        }
+        if let Some(seed) = self.seed {
+            sets.push(format!("run.seed={seed}"));
+        }
+        self.scenario.resolve_with(&sets)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::Direction;
+
+    #[test]
+    fn options_override_what_was_set() {
+        let args = RunArgs {
+            scenario: ScenarioArgs {
+                rig: Some("fe".into()),
+                set: vec!["run.seed=3".into(), "tread.tau_s=0.2".into()],
+                ..ScenarioArgs::default()
+            },
+            retract: true,
+            controller: Some("limit".into()),
+            seed: Some(5),
+        };
+        let scenario = args.resolve().unwrap();
+        assert_eq!(scenario.preset, "fe");
+        assert_eq!(scenario.rig.tread.tau_s, 0.2);
+        assert_eq!(scenario.run.seed, 5);
+        assert_eq!(scenario.run.direction, Direction::Retract);
+        assert_eq!(scenario.run.controller, ControllerKind::Limit);
+    }
+
+    #[test]
+    fn a_seed_beyond_the_largest_is_refused_by_name() {
+        let args = RunArgs { seed: Some(u64::MAX), ..RunArgs::default() };
+        let error = args.resolve().unwrap_err();
+        assert!(error.to_string().contains("run.seed"), "{error}");
+    }
+}

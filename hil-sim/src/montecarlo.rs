@@ -1,0 +1,182 @@
+//! Many random rigs: one run a seed, in parallel, and what limits them.
+
+mod outcome;
+mod shard;
+
+use interstage::supervise::Limit;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::plant::draw::PlantParameters;
+use crate::record::{Report, Summary};
+use crate::report::verdict::SLIP_SEEN_MM;
+use crate::scenario::Scenario;
+use crate::sil::{self, Options, RunError};
+
+pub use outcome::{Least, LimitCount, Outcome, Quantiles, SeedReport};
+pub use shard::{Shard, ShardError};
+
+/// What is kept of one run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct RunLine {
+    /// Seed of the plant.
+    pub seed: u64,
+    /// Whether it reached the end of travel with every step crossed and no fault.
+    pub completed: bool,
+    /// From the start of motion to the end, s.
+    pub duration_s: f64,
+    /// Largest gap at a step, or separation elsewhere, mm.
+    pub max_gap_mm: f64,
+    /// The same over the reference gap; none without reference.
+    pub gap_over_ref: Option<f64>,
+    /// Crossings with gross slip, or 1 if the run slipped but none of them did.
+    pub slip_events: usize,
+    /// Least time for which the wanted preload stood before a corner touched, s.
+    pub least_lead_s: Option<f64>,
+    /// Least of the plant's friction less the utilisation at its peak in a crossing.
+    pub least_slip_margin: Option<f64>,
+    /// Faults.
+    pub faults: Vec<Report>,
+    /// Codes of the limits that occurred, each once, ascending.
+    pub limits: Vec<u16>,
+    /// Why the plant failed, if it did.
+    pub error: Option<String>,
+    /// SHA-256 over the controller's trace.
+    pub trace_digest: String,
+}
+
+impl RunLine {
+    /// The line of a finished run on a plant with friction `mu`.
+    #[must_use]
+    pub fn new(summary: Summary, mu: f64) -> Self {
+        let crossings = &summary.crossings;
+        let least = |values: &mut dyn Iterator<Item = f64>| values.min_by(f64::total_cmp);
+        let mut limits: Vec<u16> = summary.limits.iter().map(|limit| limit.code).collect();
+        limits.sort_unstable();
+        limits.dedup();
+        Self {
+            seed: summary.seed,
+            completed: summary.completed && summary.faults.is_empty(),
+            duration_s: summary.duration_s,
+            max_gap_mm: summary.max_gap_mm,
+            gap_over_ref: (summary.gap_ref_mm > 0.0)
+                .then(|| summary.max_gap_mm / summary.gap_ref_mm),
+            slip_events: slip_events(&summary),
+            least_lead_s: least(&mut crossings.iter().filter_map(|c| c.lead_time_s)),
+            least_slip_margin: least(&mut crossings.iter().map(|c| mu - c.peak_utilisation)),
+            faults: summary.faults,
+            limits,
+            error: None,
+            trace_digest: summary.trace_digest,
+        }
+    }
+}
+
+/// Crossings with gross slip; a run that slipped elsewhere alone counts as one.
+#[must_use]
+pub fn slip_events(summary: &Summary) -> usize {
+    let crossings = summary.crossings.iter().filter(|c| c.slip_mm > SLIP_SEEN_MM).count();
+    crossings.max(usize::from(summary.slip_mm > SLIP_SEEN_MM))
+}
+
+/// Runs `scenario` once for each of `seeds`, on all processors, and calls `done`
+/// after each run. The lines stand in the order of the seeds and do not depend on
+/// the number of processors.
+///
+/// # Errors
+/// [`RunError::Rig`] if the parameters make no controller. A plant that fails is a
+/// line with an error.
+pub fn run(
+    scenario: &Scenario,
+    seeds: &[u64],
+    done: &(dyn Fn() + Sync),
+) -> Result<Vec<RunLine>, RunError> {
+    seeds
+        .par_iter()
+        .map(|&seed| {
+            let line = one(scenario, seed);
+            done();
+            line
+        })
+        .collect()
+}
+
+fn one(scenario: &Scenario, seed: u64) -> Result<RunLine, RunError> {
+    let mut scenario = scenario.clone();
+    scenario.run.seed = seed;
+    match sil::run(&scenario, Options::default()) {
+        Ok(recording) => Ok(RunLine::new(recording.summary, PlantParameters::draw(&scenario).mu)),
+        Err(RunError::Plant(error)) => {
+            Ok(RunLine { seed, error: Some(error.to_string()), ..RunLine::default() })
+        }
+        Err(error) => Err(error),
+    }
+}
+
+/// What a limit's code stands for.
+fn limit_text(code: u16) -> &'static str {
+    let known = Limit::ALL.into_iter().find(|limit| limit.code() == code);
+    known.map_or("unknown limit", Limit::sentence)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::CrossingLine;
+
+    fn crossing(slip_mm: f64, lead: Option<f64>, peak_utilisation: f64) -> CrossingLine {
+        CrossingLine { slip_mm, lead_time_s: lead, peak_utilisation, ..CrossingLine::default() }
+    }
+
+    fn limit(code: u16) -> Report {
+        Report { t_s: 1.0, code, text: String::new() }
+    }
+
+    #[test]
+    fn slip_counts_by_crossing_and_else_by_run() {
+        let crossings =
+            vec![crossing(0.2, None, 0.0), crossing(0.01, None, 0.0), crossing(0.06, None, 0.0)];
+        let slipped = Summary { slip_mm: 0.3, crossings, ..Summary::default() };
+        assert_eq!(slip_events(&slipped), 2);
+        let elsewhere = Summary { slip_mm: 0.3, ..Summary::default() };
+        assert_eq!(slip_events(&elsewhere), 1);
+        assert_eq!(slip_events(&Summary { slip_mm: 0.05, ..Summary::default() }), 0);
+    }
+
+    #[test]
+    fn a_line_keeps_the_worst_of_its_crossings() {
+        let summary = Summary {
+            completed: true,
+            max_gap_mm: 2.0,
+            gap_ref_mm: 2.5,
+            limits: vec![limit(205), limit(201), limit(205)],
+            crossings: vec![crossing(0.0, Some(0.3), 0.7), crossing(0.0, Some(-0.1), 0.9)],
+            ..Summary::default()
+        };
+        let line = RunLine::new(summary, 1.0);
+        assert_eq!(line.gap_over_ref, Some(0.8));
+        assert_eq!(line.least_lead_s, Some(-0.1));
+        assert!((line.least_slip_margin.unwrap() - 0.1).abs() < 1e-12);
+        assert_eq!(line.limits, [201, 205]);
+    }
+
+    #[test]
+    fn every_limit_has_a_text() {
+        for limit in Limit::ALL {
+            assert_eq!(limit_text(limit.code()), limit.sentence());
+        }
+        assert_eq!(limit_text(1), "unknown limit");
+    }
+
+    #[test]
+    fn lines_do_not_depend_on_the_number_of_threads() {
+        let scenario = Scenario::default();
+        let with = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| run(&scenario, &[3, 1, 2], &|| {}).unwrap())
+        };
+        let lines = with(1);
+        assert_eq!(lines.iter().map(|line| line.seed).collect::<Vec<_>>(), [3, 1, 2]);
+        assert_eq!(lines, with(3));
+    }
+}

@@ -1,0 +1,192 @@
+//! What a campaign shows.
+
+use serde::Serialize;
+
+use super::{RunLine, limit_text};
+
+/// Middle, nearly all, and worst of a figure over the runs that have it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Quantiles {
+    /// Half of the runs lie at or below.
+    pub p50: f64,
+    /// 95 of a hundred lie at or below.
+    pub p95: f64,
+    /// Largest.
+    pub max: f64,
+    /// Seed of the largest; the lowest of several.
+    pub seed: u64,
+}
+
+/// Least of a figure over the runs that have it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Least {
+    /// The figure.
+    pub min: f64,
+    /// Its seed; the lowest of several.
+    pub seed: u64,
+}
+
+/// A fault or failure, and in which run.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct SeedReport {
+    /// The run's seed.
+    pub seed: u64,
+    /// The fault's code; none if the plant failed.
+    pub code: Option<u16>,
+    /// Sentence.
+    pub text: String,
+}
+
+/// How many runs met a limit.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct LimitCount {
+    /// The limit's code.
+    pub code: u16,
+    /// Sentence.
+    pub text: &'static str,
+    /// Runs in which it occurred.
+    pub runs: usize,
+}
+
+/// A whole campaign; `rig montecarlo --json` prints it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Outcome {
+    /// Runs made.
+    pub runs: usize,
+    /// Runs that reached the end of travel with every step crossed and no fault.
+    pub completed: usize,
+    /// Largest gap at a step, or separation elsewhere, mm.
+    pub worst_gap_mm: Option<f64>,
+    /// Its seed.
+    pub worst_gap_seed: Option<u64>,
+    /// Crossings with gross slip, and runs that slipped elsewhere.
+    pub slip_events: usize,
+    /// Faults, in the order of seeds.
+    pub faults: Vec<SeedReport>,
+    /// Seeds of the runs that did not complete.
+    pub incomplete: Vec<u64>,
+    /// Duration of the completed runs, s.
+    pub duration_s: Option<Quantiles>,
+    /// Worst gap of each run over the reference.
+    pub gap_over_ref: Option<Quantiles>,
+    /// Least time for which the wanted preload stood before a corner touched, s.
+    pub lead_time_s: Option<Least>,
+    /// Least of the plant's friction less its utilisation.
+    pub slip_margin: Option<Least>,
+    /// Limits that occurred, by code.
+    pub limits: Vec<LimitCount>,
+}
+
+impl Outcome {
+    /// The campaign of these runs.
+    #[must_use]
+    pub fn of(lines: &[RunLine]) -> Self {
+        let figure = |pick: &dyn Fn(&RunLine) -> Option<f64>| -> Vec<(f64, u64)> {
+            lines.iter().filter_map(|line| Some((pick(line)?, line.seed))).collect()
+        };
+        // A plant that failed has no gap.
+        let gaps = quantiles(figure(&|line| line.error.is_none().then_some(line.max_gap_mm)));
+        Self {
+            runs: lines.len(),
+            completed: lines.iter().filter(|line| line.completed).count(),
+            worst_gap_mm: gaps.map(|gaps| gaps.max),
+            worst_gap_seed: gaps.map(|gaps| gaps.seed),
+            slip_events: lines.iter().map(|line| line.slip_events).sum(),
+            faults: lines.iter().flat_map(faults).collect(),
+            incomplete: lines.iter().filter(|line| !line.completed).map(|l| l.seed).collect(),
+            duration_s: quantiles(figure(&|line| line.completed.then_some(line.duration_s))),
+            gap_over_ref: quantiles(figure(&|line| line.gap_over_ref)),
+            lead_time_s: least(figure(&|line| line.least_lead_s)),
+            slip_margin: least(figure(&|line| line.least_slip_margin)),
+            limits: limits(lines),
+        }
+    }
+}
+
+fn faults(line: &RunLine) -> impl Iterator<Item = SeedReport> {
+    let seed = line.seed;
+    let reported = line.faults.iter().map(move |fault| SeedReport {
+        seed,
+        code: Some(fault.code),
+        text: fault.text.clone(),
+    });
+    let failed =
+        line.error.iter().map(move |text| SeedReport { seed, code: None, text: text.clone() });
+    reported.chain(failed)
+}
+
+fn limits(lines: &[RunLine]) -> Vec<LimitCount> {
+    let mut codes: Vec<u16> = lines.iter().flat_map(|line| line.limits.iter().copied()).collect();
+    codes.sort_unstable();
+    codes
+        .chunk_by(|a, b| a == b)
+        .map(|same| LimitCount { code: same[0], text: limit_text(same[0]), runs: same.len() })
+        .collect()
+}
+
+/// Nearest-rank quantiles: each is the figure of one of the runs.
+fn quantiles(mut figures: Vec<(f64, u64)>) -> Option<Quantiles> {
+    figures.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
+    let (max, seed) = *figures.last()?;
+    let at = |percent: usize| figures[(figures.len() * percent).div_ceil(100) - 1].0;
+    Some(Quantiles { p50: at(50), p95: at(95), max, seed })
+}
+
+fn least(figures: Vec<(f64, u64)>) -> Option<Least> {
+    figures
+        .into_iter()
+        .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
+        .map(|(min, seed)| Least { min, seed })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::Report;
+
+    fn line(seed: u64, max_gap_mm: f64) -> RunLine {
+        RunLine { seed, completed: true, duration_s: 4.0, max_gap_mm, ..RunLine::default() }
+    }
+
+    #[test]
+    fn quantiles_are_figures_of_runs() {
+        let figures = (1..=20).map(|seed| (seed as f64, seed)).collect();
+        let found = quantiles(figures).unwrap();
+        assert_eq!((found.p50, found.p95, found.max, found.seed), (10.0, 19.0, 20.0, 20));
+        let one = quantiles(vec![(3.0, 7)]).unwrap();
+        assert_eq!((one.p50, one.p95, one.max, one.seed), (3.0, 3.0, 3.0, 7));
+        assert_eq!(quantiles(Vec::new()), None);
+    }
+
+    #[test]
+    fn among_equals_the_lowest_seed_is_named() {
+        assert_eq!(quantiles(vec![(1.0, 2), (1.0, 5)]).unwrap().seed, 2);
+        assert_eq!(least(vec![(1.0, 5), (1.0, 2)]).unwrap().seed, 2);
+    }
+
+    #[test]
+    fn a_campaign_counts_faults_limits_and_failures() {
+        let fault = Report { t_s: 1.0, code: 121, text: "late".into() };
+        let lines = [
+            RunLine { limits: vec![205, 209], slip_events: 2, ..line(1, 2.0) },
+            RunLine { completed: false, faults: vec![fault], limits: vec![205], ..line(2, 1.0) },
+            RunLine { seed: 3, error: Some("not finite".into()), ..RunLine::default() },
+        ];
+        let outcome = Outcome::of(&lines);
+        assert_eq!((outcome.runs, outcome.completed, outcome.slip_events), (3, 1, 2));
+        assert_eq!((outcome.worst_gap_mm, outcome.worst_gap_seed), (Some(2.0), Some(1)));
+        assert_eq!(outcome.incomplete, [2, 3]);
+        let codes: Vec<_> = outcome.faults.iter().map(|f| (f.seed, f.code)).collect();
+        assert_eq!(codes, [(2, Some(121)), (3, None)]);
+        let limits: Vec<_> = outcome.limits.iter().map(|l| (l.code, l.runs)).collect();
+        assert_eq!(limits, [(205, 2), (209, 1)]);
+        assert_eq!(outcome.duration_s.map(|d| d.max), Some(4.0));
+        assert_eq!(outcome.lead_time_s, None);
+    }
+
+    #[test]
+    fn nothing_run_is_nothing_shown() {
+        let outcome = Outcome::of(&[]);
+        assert_eq!((outcome.runs, outcome.worst_gap_mm), (0, None));
+    }
+}

@@ -1,0 +1,135 @@
+//! `rig deploy`.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::{code, good, is_empty, object, rig, rig_in, said};
+
+/// Keys of the summary that others rely on.
+const KEYS: [&str; 12] = [
+    "completed",
+    "target",
+    "controller",
+    "seed",
+    "duration_s",
+    "travel_mm",
+    "max_gap_mm",
+    "slip_mm",
+    "faults",
+    "real_time_factor",
+    "trace_digest",
+    "crossings",
+];
+
+/// The same of each crossing.
+const CROSSING_KEYS: [&str; 9] = [
+    "index",
+    "speed_mm_s",
+    "preload_n",
+    "gap_mm",
+    "gap_predicted_mm",
+    "gap_measured_mm",
+    "corner_force_n",
+    "lead_time_s",
+    "slip_mm",
+];
+
+fn assert_keys(value: &Value, keys: &[&str]) {
+    for key in keys {
+        assert!(value.get(key).is_some(), "{key} is missing in {value}");
+    }
+}
+
+#[test]
+fn writes_its_files_and_prints_every_key() {
+    let directory = tempfile::tempdir().unwrap();
+    let output = rig_in(directory.path(), &["deploy", "--json"]);
+    assert_eq!(code(&output), 0);
+    let summary = object(&output);
+    assert_keys(&summary, &KEYS);
+    assert_eq!(summary["completed"], true);
+    assert_eq!((&summary["target"], &summary["seed"]), (&Value::from("sil"), &Value::from(0)));
+    let crossings = summary["crossings"].as_array().unwrap();
+    assert_eq!(crossings.len(), 3);
+    for crossing in crossings {
+        assert_keys(crossing, &CROSSING_KEYS);
+    }
+    let files = summary["files"].as_array().unwrap();
+    assert_eq!(files.len(), 4);
+    let run = Path::new("out/deploy-prototype-scheduled-0");
+    for name in ["report.html", "log.mcap", "log.csv", "summary.json"] {
+        let file = run.join(name);
+        assert!(files.contains(&Value::from(file.to_str().unwrap())), "{name}");
+        assert!(directory.path().join(&file).metadata().unwrap().len() > 100, "{name}");
+    }
+    let written = std::fs::read(directory.path().join(run).join("summary.json")).unwrap();
+    let written: Value = serde_json::from_slice(&written).unwrap();
+    assert_eq!(written["trace_digest"], summary["trace_digest"]);
+}
+
+#[test]
+fn a_directory_of_ones_own_and_a_table_for_people() {
+    let directory = tempfile::tempdir().unwrap();
+    let output = rig_in(directory.path(), &["deploy", "--out", "mine/run"]);
+    assert_eq!(code(&output), 0);
+    let text = said(&output);
+    assert!(text.starts_with("Deployed "), "{text}");
+    assert!(text.contains("wrote mine/run/report.html"), "{text}");
+    assert!(directory.path().join("mine/run/log.csv").is_file());
+    assert!(!directory.path().join("out").exists());
+}
+
+#[test]
+fn without_files_nothing_is_written() {
+    let directory = tempfile::tempdir().unwrap();
+    let output = rig_in(directory.path(), &["deploy", "--no-files", "--json"]);
+    assert_eq!(code(&output), 0);
+    assert_eq!(object(&output)["files"], serde_json::json!([]));
+    assert!(is_empty(directory.path()));
+}
+
+#[test]
+fn a_seed_decides_the_run() {
+    let digest = |seed: &str| {
+        good(&["deploy", "--no-files", "--json", "--seed", seed])["trace_digest"].clone()
+    };
+    assert_eq!(digest("7"), digest("7"));
+    assert_ne!(digest("7"), digest("8"));
+}
+
+#[test]
+fn the_way_back_completes() {
+    let summary = good(&["deploy", "--retract", "--no-files", "--json"]);
+    assert_keys(&summary, &KEYS);
+    assert_eq!(summary["direction"], "retract");
+    assert_eq!(summary["completed"], true);
+    let steps: Vec<_> = summary["crossings"].as_array().unwrap().iter().collect();
+    assert_eq!(steps.iter().map(|c| c["index"].as_i64().unwrap()).collect::<Vec<_>>(), [3, 2, 1]);
+}
+
+#[test]
+fn a_scenario_file_stands_in_either_place() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("bench.toml");
+    std::fs::write(&path, "[run]\nseed = 5\ncontroller = \"limit\"\n").unwrap();
+    let run = |arguments: &[&str]| {
+        let output = rig_in(directory.path(), &[&["deploy", "--json"], arguments].concat());
+        assert_eq!(code(&output), 0);
+        object(&output)
+    };
+    let named = run(&["--scenario", "bench.toml", "--no-files"]);
+    assert_eq!((&named["seed"], &named["controller"]), (&Value::from(5), &Value::from("limit")));
+    let plain = run(&["bench.toml"]);
+    assert_eq!(plain["trace_digest"], named["trace_digest"]);
+    assert!(directory.path().join("out/deploy-bench-limit-5/report.html").is_file());
+}
+
+#[test]
+fn a_run_that_does_not_complete_ends_with_one() {
+    // On ice no controller climbs.
+    let arguments = ["deploy", "--no-files", "--json", "--set", "plant.mu=0.05"];
+    let output = rig(&arguments);
+    assert_eq!(code(&output), 1);
+    assert_eq!(object(&output)["completed"], false);
+}
