@@ -5,6 +5,7 @@
 //! code is 0 if all is well, 1 if what was run did not end well, 2 if it could not
 //! be run as asked; an error is one line.
 
+mod compare;
 mod constants;
 mod crossing;
 mod deploy;
@@ -38,6 +39,7 @@ enum Verb {
     Deploy(deploy::Args),
     Crossing(crossing::Args),
     Modes(modes::Args),
+    Compare(compare::Args),
     Montecarlo(montecarlo::Args),
     Keys(keys::Args),
     Size(size::Args),
@@ -51,6 +53,7 @@ impl Verb {
             Self::Deploy(args) => deploy::run(args),
             Self::Crossing(args) => crossing::run(args),
             Self::Modes(args) => modes::run(args),
+            Self::Compare(args) => compare::run(args),
             Self::Montecarlo(args) => montecarlo::run(args),
             Self::Keys(args) => keys::run(args),
             Self::Size(args) => size::run(args),

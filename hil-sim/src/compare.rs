@@ -122,9 +122,11 @@ pub fn compare(
     .into_iter()
     .map(|kind| {
         let reserve = scenario.rig.control.gap_reserve;
-        bench.evaluate(kind, Policy::StepAware, Some(speed), reserve)
+        let entry = bench.evaluate(kind, Policy::StepAware, Some(speed), reserve)?;
+        // Nothing to tune: all cross at the same speed.
+        Ok(Entry { tuned: true, ..entry })
     })
-    .collect::<Result<_, _>>()?;
+    .collect::<Result<_, RunError>>()?;
     Ok(Comparison { runs, gap_ref_mm: reference, equal_gap, equal_speed })
 }
 
@@ -211,10 +213,8 @@ impl Bench<'_> {
         speed: Option<f64>,
         reserve: f64,
     ) -> Result<Entry, RunError> {
-        let options = Options {
-            rows: false,
-            speed: speed.map(|speed| (speed, policy == Policy::OneSpeed)),
-        };
+        let options =
+            Options { rows: false, speed: speed.map(|speed| (speed, policy == Policy::OneSpeed)) };
         let summaries = (0..self.runs as u64)
             .into_par_iter()
             .map(|offset| {

@@ -45,7 +45,8 @@ pub fn generate(progress: &(dyn Fn() + Sync)) -> Result<(String, [(f64, f64); 2]
         let points = points(direction, progress)?;
         let (table, error) = fit(&points).context("stiffening fit is singular")?;
         errors[slot] = error;
-        let _ = write!(source, "\n/// {doc}\n#[rustfmt::skip]\npub const {name}: [i32; {ENTRIES}] = [");
+        let _ =
+            write!(source, "\n/// {doc}\n#[rustfmt::skip]\npub const {name}: [i32; {ENTRIES}] = [");
         for (index, value) in table.iter().enumerate() {
             let _ = write!(source, "{}{value},", if index % 8 == 0 { "\n    " } else { " " });
         }
@@ -127,9 +128,7 @@ fn fit(points: &[Point]) -> Option<([i32; ENTRIES], (f64, f64))> {
     });
     let right = DVector::from_fn(rows, |r, _| points[r].felt / points[r].stiffness);
     let solution = matrix.svd(true, true).solve(&right, 1e-12).ok()?;
-    let value = |x: f64| {
-        solution.iter().rev().fold(0.0, |sum, c| (sum + c) * x)
-    };
+    let value = |x: f64| solution.iter().rev().fold(0.0, |sum, c| (sum + c) * x);
     let mut table = [0; ENTRIES];
     for (index, entry) in table.iter_mut().enumerate() {
         let x = index as f64 / (ENTRIES - 1) as f64;
@@ -140,9 +139,8 @@ fn fit(points: &[Point]) -> Option<([i32; ENTRIES], (f64, f64))> {
         table[index] = table[index].max(table[index - 1]);
     }
     let excess = Formula::new(&Rig::fe()).stiffening - 1.0;
-    let errors = points.iter().map(|p| {
-        ((value(z(p.deborah)) - p.felt) * excess / p.stiffness).abs()
-    });
+    let errors =
+        points.iter().map(|p| ((value(z(p.deborah)) - p.felt) * excess / p.stiffness).abs());
     let worst = errors.clone().fold(0.0, f64::max);
     let rms = (errors.map(|e| e * e).sum::<f64>() / rows as f64).sqrt();
     Some((table, (worst, rms)))

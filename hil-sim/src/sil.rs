@@ -201,8 +201,8 @@ fn report(t_s: f64, event: &Event) -> (LogLine, Option<(bool, Report)>) {
         Event::Limit(limit) => Some((false, limit.code(), limit.sentence())),
         _ => None,
     };
-    let found = found
-        .map(|(latched, code, text)| (latched, Report { t_s, code, text: text.to_owned() }));
+    let found =
+        found.map(|(latched, code, text)| (latched, Report { t_s, code, text: text.to_owned() }));
     (line, found)
 }
 

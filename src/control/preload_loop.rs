@@ -133,6 +133,7 @@ impl PreloadLoopState {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
     use proptest::prelude::*;
@@ -147,8 +148,12 @@ mod tests {
         let (mut force, mut rate) = (33.3, 0.0);
         (0..(seconds * 1e3) as usize)
             .map(|_| {
-                let out =
-                    control.step(&mut state, Q16::from_num(target), Q16::from_num(force), Q16::ZERO);
+                let out = control.step(
+                    &mut state,
+                    Q16::from_num(target),
+                    Q16::from_num(force),
+                    Q16::ZERO,
+                );
                 way.push_back(f64::from(out.to_bits()) / 32768.0);
                 let command = way.pop_front().unwrap() * rig.preload.slew_n_per_s * slew;
                 rate += (command - rate) * 1e-3 / (rig.preload.lag_s * lag);

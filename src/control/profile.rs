@@ -64,8 +64,7 @@ impl Profile {
         let start = sqrt(missing.abs() + self.quantum);
         let size = (self.root_jerk * start - self.half_jerk).clamp(Q16::ZERO, self.acceleration);
         let wanted = if missing < Q16::ZERO { -size } else { size };
-        let change =
-            (wanted - state.acceleration).clamp(-self.jerk_per_tick, self.jerk_per_tick);
+        let change = (wanted - state.acceleration).clamp(-self.jerk_per_tick, self.jerk_per_tick);
         state.acceleration += change;
         state.speed = state.speed.saturating_add(per_tick(state.acceleration)).max(Travel::ZERO);
     }
@@ -96,6 +95,7 @@ impl ProfileState {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
     use proptest::prelude::*;

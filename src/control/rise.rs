@@ -93,15 +93,12 @@ impl Rise {
     /// negative behind the edge; zero away from a corner.
     #[must_use]
     pub fn slope(&self, ahead: Millimetres) -> Ratio {
-        if ahead <= -self.patch || ahead >= self.touch {
-            Q16::ZERO
-        } else {
-            self.slope.eval(ahead)
-        }
+        if ahead <= -self.patch || ahead >= self.touch { Q16::ZERO } else { self.slope.eval(ahead) }
     }
 }
 
 #[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
 

@@ -14,6 +14,7 @@ pub fn duty(ratio: Ratio) -> Duty {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
     use crate::units::Q16;

@@ -107,10 +107,7 @@ impl Schedule {
         let back = libm::sqrt(r * r - (r - 0.1 * h) * (r - 0.1 * h));
         Ok(Self {
             tolerance: checked("rig.step_tolerance_mm", rig.rig.step_tolerance_mm)?,
-            felt_by: [
-                checked("rig.step_height_mm", out)?,
-                -checked("rig.step_height_mm", back)?,
-            ],
+            felt_by: [checked("rig.step_height_mm", out)?, -checked("rig.step_height_mm", back)?],
             end_acceleration: checked(
                 "drive.acceleration_mm_s2",
                 2.0 * rig.drive.acceleration_mm_s2,
@@ -123,6 +120,12 @@ impl Schedule {
             ),
             travel: checked("rig.travel_mm", rig.rig.travel_mm)?,
         })
+    }
+
+    /// Half-width of the window in which a step is expected, mm.
+    #[must_use]
+    pub const fn tolerance(&self) -> Millimetres {
+        self.tolerance
     }
 
     /// Short of the wanted preload by no more than this, it stands, N.
@@ -165,15 +168,16 @@ impl Schedule {
         let mut speed = if braking { plan.cross_speed } else { plan.cruise_speed };
         let mut waiting = false;
         let short = plan.cross_preload - course.preload;
-        if let (false, true, Some(ahead)) = (course.critical, ramping, to_window) {
-            if short > self.stands_within && ahead > -self.tolerance {
-                // Arrive no sooner than the preload: at the window, not at the corner.
-                let needed = divide(short, self.rate) + SETTLING;
-                let allowed = divide(ahead.max(Q16::ZERO), needed);
-                if allowed < speed {
-                    speed = allowed;
-                    waiting = allowed < plan.cross_speed;
-                }
+        if let (false, true, Some(ahead)) = (course.critical, ramping, to_window)
+            && short > self.stands_within
+            && ahead > -self.tolerance
+        {
+            // Arrive no sooner than the preload: at the window, not at the corner.
+            let needed = divide(short, self.rate) + SETTLING;
+            let allowed = divide(ahead.max(Q16::ZERO), needed);
+            if allowed < speed {
+                speed = allowed;
+                waiting = allowed < plan.cross_speed;
             }
         }
         Targets {

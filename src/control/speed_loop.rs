@@ -67,10 +67,8 @@ impl SpeedLoop {
         let pushing = if error < Q16::ZERO { whole > -FULL } else { whole < FULL };
         if pushing {
             let limit = Travel::from_num(INTEGRAL_LIMIT.0);
-            state.integral = state
-                .integral
-                .saturating_add(per_tick(self.integral * error))
-                .clamp(-limit, limit);
+            state.integral =
+                state.integral.saturating_add(per_tick(self.integral * error)).clamp(-limit, limit);
         }
         duty(whole)
     }
@@ -88,6 +86,7 @@ impl SpeedLoopState {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
     use proptest::prelude::*;
@@ -99,7 +98,8 @@ mod tests {
         let mut state = SpeedLoopState::default();
         let mut speed = 0.0;
         for _ in 0..(seconds * 1e3) as usize {
-            let out = control.step(&mut state, Q16::from_num(wanted), Q16::from_num(speed), Q16::ZERO);
+            let out =
+                control.step(&mut state, Q16::from_num(wanted), Q16::from_num(speed), Q16::ZERO);
             let rest = rig.drive.no_load_speed_mm_s
                 * (f64::from(out.to_bits()) / 32768.0 - load / rig.drive.stall_force_n);
             speed += (rest - speed) * 0.1;
@@ -126,7 +126,9 @@ mod tests {
         assert!(state.value() <= INTEGRAL_LIMIT);
         // Released, it comes back within a fraction of a second.
         let mut ticks = 0;
-        while control.step(&mut state, Q16::from_num(10), Q16::from_num(30), Q16::ZERO).to_bits() > 0 {
+        while control.step(&mut state, Q16::from_num(10), Q16::from_num(30), Q16::ZERO).to_bits()
+            > 0
+        {
             ticks += 1;
             assert!(ticks < 200);
         }

@@ -2,6 +2,7 @@
 
 #![deny(clippy::float_arithmetic)]
 
+#[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
 mod build;
 mod crossing;
 mod modes;
@@ -108,8 +109,7 @@ impl Controller {
     /// One tick: sensors, faults, command, mode, phase, schedule, loops.
     pub fn step(&self, state: &mut State, input: &Input) -> Output {
         let acceleration = state.acceleration();
-        let sensed =
-            self.senses.step(&mut state.senses, input.now, &input.sensors, acceleration);
+        let sensed = self.senses.step(&mut state.senses, input.now, &input.sensors, acceleration);
         let mut pass = Pass {
             now: input.now,
             sensed: &sensed,

@@ -9,6 +9,7 @@
 
 #![deny(clippy::float_arithmetic)]
 
+#[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
 mod build;
 
 use crate::numeric::{LowPass, LowPassState, sqrt};
@@ -27,8 +28,14 @@ const RELEASE: Millimetres = q16(60_000);
 const RELEASE_TICKS: u8 = 60;
 /// Short of the whole step height, the wheel counts as over the corner, mm.
 const OVER: Millimetres = q16(400_000);
+/// Rise above the wall expected behind a step that counts as the next corner, mm: a
+/// height tolerance more than a corner on a measured wall.
+const AGAIN: Millimetres = q16(320_000);
+/// Deviation of a measured step height from the table that a sleeve may have, with the
+/// error of the arm, mm; more tells that the wall was not yet reached.
+const HEIGHT_TOLERANCE: Millimetres = q16(120_000);
 /// Ticks over which the new wall's baseline is averaged.
-const SETTLE_TICKS: u8 = 60;
+const SETTLE_TICKS: u8 = 50;
 
 /// Part of the compression before a step that the tread still has when the lower wall
 /// stops carrying. On the converged ring it lies between 0.25 and 0.5 over 3 to
@@ -68,6 +75,8 @@ pub struct WatchState {
     /// The same on the next wall.
     next: LowPassState,
     ticks: u8,
+    /// Ticks for which the next corner has been felt while leaving the last.
+    again: u8,
     /// Largest compression of the crossing, mm.
     pub deepest: Millimetres,
     /// Compression on the wall before the step, mm.
@@ -103,7 +112,15 @@ pub enum Sign {
     Closed {
         /// Measured step height.
         height: Millimetres,
-        /// Gap with that height.
+        /// Gap with that height; with the nominal one if that is not plausible.
+        gap: Millimetres,
+        /// The height lies within what a sleeve may be off.
+        plausible: bool,
+    },
+    /// The next corner carries before the wall between was measured; the gap of the
+    /// last one with the nominal height, mm.
+    Again {
+        /// Gap.
         gap: Millimetres,
     },
 }
@@ -168,12 +185,7 @@ impl CrossingWatch {
     }
 
     /// One tick.
-    pub fn step(
-        &self,
-        state: &mut WatchState,
-        direction: Direction,
-        seen: &Seen,
-    ) -> Option<Sign> {
+    pub fn step(&self, state: &mut WatchState, direction: Direction, seen: &Seen) -> Option<Sign> {
         let rise = self.rise(state, direction, seen);
         if state.contact != Contact::Wall {
             state.deepest = state.deepest.max(seen.compression);
@@ -181,7 +193,7 @@ impl CrossingWatch {
         match state.contact {
             Contact::Wall => self.on_wall(state, direction, seen, rise),
             Contact::Both | Contact::Corner => self.on_corner(state, direction, seen, rise),
-            Contact::Leaving => self.leave(state, seen),
+            Contact::Leaving => self.leave(state, direction, seen, rise),
         }
     }
 
@@ -207,14 +219,7 @@ impl CrossingWatch {
         if state.ticks < TOUCH_TICKS {
             return None;
         }
-        state.ticks = 0;
-        state.deepest = seen.compression;
-        state.lift = None;
-        // On the way back the wheel stands on the edge alone as soon as it dips.
-        state.contact = match direction {
-            Direction::Deploy => Contact::Both,
-            Direction::Retract => Contact::Corner,
-        };
+        self.touch(state, direction, seen);
         Some(Sign::Touched)
     }
 
@@ -262,12 +267,32 @@ impl CrossingWatch {
         None
     }
 
-    fn leave(&self, state: &mut WatchState, seen: &Seen) -> Option<Sign> {
+    fn leave(
+        &self,
+        state: &mut WatchState,
+        direction: Direction,
+        seen: &Seen,
+        rise: Millimetres,
+    ) -> Option<Sign> {
+        let ground = seen.radius - seen.compression;
+        // Off the wall that the table promises: the next corner is already felt.
+        let beyond = rise - self.step;
+        state.again = if beyond > AGAIN { state.again + 1 } else { 0 };
+        if state.again >= TOUCH_TICKS {
+            let shift = match direction {
+                Direction::Deploy => -self.step,
+                Direction::Retract => self.step,
+            };
+            let base = state.baseline.output() + shift;
+            let gap = state.lift.map_or(Q16::ZERO, |lift| lift.gap);
+            state.baseline = LowPassState::at(base);
+            self.touch(state, direction, seen);
+            return Some(Sign::Again { gap });
+        }
         if !seen.clear {
             state.ticks = 0;
             return None;
         }
-        let ground = seen.radius - seen.compression;
         if state.ticks == 0 {
             state.next = LowPassState::at(ground);
         }
@@ -277,11 +302,26 @@ impl CrossingWatch {
             return None;
         }
         let height = (state.baseline.output() - state.next.output()).abs();
-        let gap = state.lift.map_or(Q16::ZERO, |lift| self.gap(lift.depth, lift.height, height));
+        let plausible = (height - self.step).abs() <= HEIGHT_TOLERANCE;
+        let used = if plausible { height } else { self.step };
+        let gap = state.lift.map_or(Q16::ZERO, |lift| self.gap(lift.depth, lift.height, used));
         state.baseline = state.next;
         state.contact = Contact::Wall;
         state.ticks = 0;
-        Some(Sign::Closed { height, gap })
+        Some(Sign::Closed { height, gap, plausible })
+    }
+
+    /// A corner begins to carry.
+    fn touch(&self, state: &mut WatchState, direction: Direction, seen: &Seen) {
+        state.ticks = 0;
+        state.again = 0;
+        state.deepest = seen.compression;
+        state.lift = None;
+        // On the way back the wheel stands on the edge alone as soon as it dips.
+        state.contact = match direction {
+            Direction::Deploy => Contact::Both,
+            Direction::Retract => Contact::Corner,
+        };
     }
 
     fn measure(&self, depth: Millimetres, height: Millimetres) -> Lift {

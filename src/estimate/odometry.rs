@@ -44,6 +44,7 @@ impl Odometry {
 pub const STOW: Millimetres = Q16::ZERO;
 
 #[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
     use proptest::prelude::*;

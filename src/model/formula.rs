@@ -154,8 +154,7 @@ impl Formula {
         p1 + 0.5
             * t
             * ((p2 - p0)
-                + t * ((2.0 * p0 - 5.0 * p1 + 4.0 * p2 - p3)
-                    + t * (3.0 * p1 - 3.0 * p2 + p3 - p0)))
+                + t * ((2.0 * p0 - 5.0 * p1 + 4.0 * p2 - p3) + t * (3.0 * p1 - 3.0 * p2 + p3 - p0)))
     }
 
     /// Effective stiffness over k_inf for a crossing with this gap.

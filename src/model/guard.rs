@@ -51,6 +51,7 @@ impl Guard {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
     use crate::units::Q16;

@@ -2,6 +2,7 @@
 
 #![deny(clippy::float_arithmetic)]
 
+#[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
 mod build;
 
 use super::guard::Guard;
@@ -101,12 +102,8 @@ impl Planner {
 
     /// Speed and preload at the step.
     fn crossing(&self, request: &PlanRequest, scale: Ratio, plan: &mut Plan, limits: &mut Limits) {
-        let at = Point {
-            direction: request.direction,
-            speed: self.least_speed,
-            load: self.load,
-            scale,
-        };
+        let at =
+            Point { direction: request.direction, speed: self.least_speed, load: self.load, scale };
         let wedge = self.wedge_at(request.step);
         let most = match self.strategy {
             Strategy::Scheduled | Strategy::Limit => self.most_preload,
@@ -164,12 +161,7 @@ impl Planner {
 
     /// Compares a crossing with the model and corrects the stiffness, bounded.
     fn review(&self, review: &Review, scale: Ratio) -> Outcome {
-        let at = Point {
-            direction: review.direction,
-            speed: review.speed,
-            load: self.load,
-            scale,
-        };
+        let at = Point { direction: review.direction, speed: review.speed, load: self.load, scale };
         let force = review.preload + self.coupling * review.tan_arm;
         let gap_predicted = self.model.gap(&at, force);
         let slip_margin = self.friction - self.model.utilisation(&at, gap_predicted);
@@ -199,7 +191,6 @@ impl Planner {
     fn target_of(&self, direction: Direction) -> Millimetres {
         self.target[way(direction)]
     }
-
 }
 
 /// Limits met, at most three.

@@ -3,6 +3,7 @@
 
 #![deny(clippy::float_arithmetic)]
 
+#[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
 mod build;
 
 use crate::numeric::{Table, divide};

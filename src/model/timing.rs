@@ -44,7 +44,10 @@ impl Timing {
             build_up: checked("drive.jerk_mm_s3", a / j)?,
             knee: checked("drive.jerk_mm_s3", (a * a / j).min(30_000.0))?,
             rate: checked("preload.slew_n_per_s", rig.preload.slew_n_per_s)? * SLEW_PART,
-            latency: checked("preload.delay_s", times + 0.5 * (rig.preload.delay_s + rig.preload.lag_s))?,
+            latency: checked(
+                "preload.delay_s",
+                times + 0.5 * (rig.preload.delay_s + rig.preload.lag_s),
+            )?,
         })
     }
 
@@ -85,6 +88,7 @@ impl Timing {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
     use proptest::prelude::*;

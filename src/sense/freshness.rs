@@ -127,6 +127,7 @@ impl Freshness {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
 

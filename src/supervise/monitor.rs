@@ -127,10 +127,6 @@ fn sensor_fault(sensed: &SensedState) -> Option<Fault> {
     };
     judge(sensed.speed.validity, Fault::SpeedStale, Fault::SpeedStale)
         .or(judge(sensed.preload.validity, Fault::PressureStale, Fault::PressureRange))
-        .or(judge(
-            sensed.compression.validity,
-            Fault::DisplacementStale,
-            Fault::DisplacementRange,
-        ))
+        .or(judge(sensed.compression.validity, Fault::DisplacementStale, Fault::DisplacementRange))
         .or(judge(sensed.radius.validity, Fault::AngleStale, Fault::AngleRange))
 }

@@ -90,12 +90,9 @@ mod tests {
             Trigger::Arrived,
         ];
         all.extend(
-            [Command::Start, Command::Stop, Command::Retract, Command::Reset]
-                .map(Trigger::Command),
+            [Command::Start, Command::Stop, Command::Retract, Command::Reset].map(Trigger::Command),
         );
-        all.extend(
-            [Leg::Cruise, Leg::Approach, Leg::Crossing, Leg::Settle].map(Trigger::Leg),
-        );
+        all.extend([Leg::Cruise, Leg::Approach, Leg::Crossing, Leg::Settle].map(Trigger::Leg));
         all.extend(Fault::ALL.map(Trigger::Fault));
         all
     }
@@ -106,10 +103,9 @@ mod tests {
             for fault in Fault::ALL {
                 match mode {
                     Mode::FaultHold(_) => assert_eq!(next(mode, Trigger::Fault(fault)), None),
-                    _ => assert_eq!(
-                        next(mode, Trigger::Fault(fault)),
-                        Some(Mode::FaultHold(fault))
-                    ),
+                    _ => {
+                        assert_eq!(next(mode, Trigger::Fault(fault)), Some(Mode::FaultHold(fault)))
+                    }
                 }
             }
         }
@@ -119,11 +115,8 @@ mod tests {
     fn only_a_standing_preload_starts_motion() {
         for mode in modes() {
             for trigger in triggers() {
-                if let Some(after) = next(mode, trigger) {
-                    if after.moves() && !mode.moves() {
-                        assert_eq!(trigger, Trigger::PreloadStands, "{mode:?}");
-                    }
-                }
+                let starts = next(mode, trigger).is_some_and(Mode::moves) && !mode.moves();
+                assert!(!starts || trigger == Trigger::PreloadStands, "{mode:?} {trigger:?}");
             }
         }
     }
@@ -133,8 +126,11 @@ mod tests {
         let mut reached = vec![Mode::Boot];
         let mut at = 0;
         while let Some(&mode) = reached.get(at) {
-            let ways: Vec<Mode> =
-                triggers().into_iter().filter_map(|t| next(mode, t)).filter(|m| *m != mode).collect();
+            let ways: Vec<Mode> = triggers()
+                .into_iter()
+                .filter_map(|t| next(mode, t))
+                .filter(|m| *m != mode)
+                .collect();
             assert!(!ways.is_empty(), "{mode:?} is a trap");
             for way in ways {
                 if !reached.contains(&way) {
@@ -149,10 +145,8 @@ mod tests {
     #[test]
     fn a_stop_from_motion_never_leads_back_into_it_by_itself() {
         for direction in [Direction::Deploy, Direction::Retract] {
-            let stopping = next(
-                Mode::Run(direction, Leg::Crossing),
-                Trigger::Command(Command::Stop),
-            );
+            let stopping =
+                next(Mode::Run(direction, Leg::Crossing), Trigger::Command(Command::Stop));
             assert_eq!(stopping, Some(Mode::Stopping(direction)));
             assert_eq!(next(Mode::Stopping(direction), Trigger::AtRest), Some(Mode::Idle));
             assert_eq!(next(Mode::Stopping(direction), Trigger::Leg(Leg::Cruise)), None);

@@ -25,20 +25,13 @@ impl DriveMotor {
     /// A disabled bridge leaves the worm gear locked: the wheel stops within a few
     /// milliseconds and holds.
     #[must_use]
-    pub fn step(
-        &self,
-        speed: f64,
-        duty: f64,
-        enabled: bool,
-        load_n: f64,
-        dt_s: f64,
-    ) -> (f64, f64) {
+    pub fn step(&self, speed: f64, duty: f64, enabled: bool, load_n: f64, dt_s: f64) -> (f64, f64) {
         if !enabled {
             let stopped = speed * (-dt_s / 0.003).exp();
             return (if stopped.abs() < 1e-3 { 0.0 } else { stopped }, 0.0);
         }
-        let force = (self.stall_n * (duty - speed / self.no_load_mm_s))
-            .clamp(-self.limit_n, self.limit_n);
+        let force =
+            (self.stall_n * (duty - speed / self.no_load_mm_s)).clamp(-self.limit_n, self.limit_n);
         let free = force - load_n;
         // Stiction of the gearbox holds a resting wheel.
         if speed == 0.0 && free.abs() <= self.friction_n {
@@ -79,7 +72,14 @@ pub struct Pretightener {
 impl Pretightener {
     /// A pre-tightener at `seat_n`, for a step of `dt_s`.
     #[must_use]
-    pub fn new(slew: f64, lag: f64, delay_s: f64, dt_s: f64, seat_n: f64, range: (f64, f64)) -> Self {
+    pub fn new(
+        slew: f64,
+        lag: f64,
+        delay_s: f64,
+        dt_s: f64,
+        seat_n: f64,
+        range: (f64, f64),
+    ) -> Self {
         let depth = (delay_s / dt_s).round() as usize;
         Self {
             slew,

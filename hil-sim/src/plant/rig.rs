@@ -139,8 +139,7 @@ impl VirtualRig {
             seat,
             range,
         );
-        let modes =
-            parameters.modes_hz.iter().map(|&hz| Mode::new(hz, 0.02, 0.2)).collect();
+        let modes = parameters.modes_hz.iter().map(|&hz| Mode::new(hz, 0.02, 0.2)).collect();
         let mut rig = Self {
             ring: Ring::new(parameters.ring),
             ledger: Ledger::new(parameters.wall.steps().to_vec(), radius),
@@ -270,7 +269,8 @@ impl VirtualRig {
         self.sliding = true;
         let missing = mu * needed.signum() * self.cosine_n - self.sine_n - self.parameters.load_n;
         let speed = self.truth.speed_mm_s + 1000.0 * missing / self.parameters.mass_kg * dt_s;
-        let caught = needed.abs() < mu && (speed - gripped) * (self.truth.speed_mm_s - gripped) <= 0.0
+        let caught = needed.abs() < mu
+            && (speed - gripped) * (self.truth.speed_mm_s - gripped) <= 0.0
             || needed.abs() < mu && (speed - gripped).abs() < 0.05;
         if caught {
             self.sliding = false;
@@ -284,11 +284,8 @@ impl VirtualRig {
     /// it, the arm's wedge and the modes included.
     fn pressing(&self, local: &LocalWall) -> f64 {
         let seat = self.preload.seat_n() + self.parameters.spring_n_per_mm * local.base_mm;
-        let thrust = if self.parked {
-            0.0
-        } else {
-            self.truth.utilisation * self.cosine_n - self.sine_n
-        };
+        let thrust =
+            if self.parked { 0.0 } else { self.truth.utilisation * self.cosine_n - self.sine_n };
         let wedge = self.parameters.arm.wedge(self.truth.radius_mm) * thrust;
         (seat + wedge - self.modes.first().map_or(0.0, Mode::force_n)).max(0.0)
     }
@@ -387,10 +384,9 @@ impl VirtualRig {
             Axial::Driven(_) => 0.0,
         };
         let guess = self.truth.height_mm - self.base_mm;
-        let contact =
-            rolling::solve(&self.parameters.ring, self.truth.tread_mm_s, guess, |c| {
-                c.cosine_n + used(c) * c.sine_n - pressing - spring * (c.height_mm - radius)
-            });
+        let contact = rolling::solve(&self.parameters.ring, self.truth.tread_mm_s, guess, |c| {
+            c.cosine_n + used(c) * c.sine_n - pressing - spring * (c.height_mm - radius)
+        });
         self.base_mm = local.base_mm;
         self.truth.height_mm = contact.height_mm + local.base_mm;
         self.truth.depth_mm = radius - contact.height_mm;
@@ -439,9 +435,8 @@ impl VirtualRig {
         truth.arm_rad = self.parameters.arm.angle(truth.radius_mm);
         let radius = self.parameters.ring.radius_mm;
         let local = self.parameters.wall.local(truth.position_mm);
-        truth.root_clearance_mm = (local.ahead_mm < radius).then(|| {
-            local.ahead_mm.hypot(truth.height_mm - local.base_mm) - radius
-        });
+        truth.root_clearance_mm = (local.ahead_mm < radius)
+            .then(|| local.ahead_mm.hypot(truth.height_mm - local.base_mm) - radius);
         self.truth.preload_n = self.preload_now();
     }
 

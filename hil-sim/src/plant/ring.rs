@@ -212,11 +212,7 @@ impl Ring {
         for element in first..=last {
             let index = element.rem_euclid(count as i64) as usize;
             let (sin, cos) = (self.sin[index], self.cos[index]);
-            visit(
-                index,
-                sin * turned_cos - cos * turned_sin,
-                cos * turned_cos + sin * turned_sin,
-            );
+            visit(index, sin * turned_cos - cos * turned_sin, cos * turned_cos + sin * turned_sin);
         }
     }
 

@@ -157,12 +157,8 @@ mod tests {
             let mut height = 24.8;
             let mut contact = None;
             for _ in 0..2500 {
-                let motion = Motion {
-                    wall,
-                    height_mm: height,
-                    turn_rad: dx / 25.0,
-                    dt_s: dx / speed,
-                };
+                let motion =
+                    Motion { wall, height_mm: height, turn_rad: dx / 25.0, dt_s: dx / speed };
                 let solved = balance.solve(&rolled, motion).unwrap();
                 height = solved.height_mm;
                 rolled.commit(&Motion { height_mm: height, ..motion });

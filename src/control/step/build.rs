@@ -21,7 +21,6 @@ impl Controller {
     ///
     /// # Errors
     /// [`RigError`] if a parameter is out of range or does not fit the others.
-    #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         rig.validate()?;
         let mut steps = heapless::Vec::new();
@@ -43,10 +42,7 @@ impl Controller {
             travel: checked("rig.travel_mm", rig.rig.travel_mm)?,
             spring: checked("preload.spring_n_per_mm", rig.preload.spring_n_per_mm)?,
             foresight: checked("preload.delay_s", rig.preload.delay_s + rig.preload.lag_s)?,
-            load: checked(
-                "plant.top_load_n",
-                rig.plant.top_load_n * rig.plant.top_load_share,
-            )?,
+            load: checked("plant.top_load_n", rig.plant.top_load_n * rig.plant.top_load_share)?,
             coupling: checked("plant.arm_coupling", rig.plant.arm_coupling)?,
             inertia: checked(
                 "drive.reflected_mass_kg",

@@ -33,15 +33,22 @@ impl Controller {
                     Direction::Retract => state.level.saturating_sub(1),
                 };
             }
-            Some(Sign::Closed { gap, .. }) => self.closed(state, pass, gap),
+            Some(Sign::Closed { gap, plausible, .. }) => self.closed(state, pass, gap, plausible),
+            Some(Sign::Again { gap }) => {
+                self.closed(state, pass, gap, false);
+                self.touched(state, pass, direction);
+            }
         }
     }
 
     fn touched(&self, state: &mut State, pass: &mut Pass<'_>, direction: Direction) {
         let course = self.course(state, pass, direction);
         let expectation = self.schedule.expectation(&self.rise, &course);
-        let belongs = self.schedule.belongs(&self.rise, &course);
-        if !belongs {
+        let searching = state.searching && state.next_step > 0;
+        let belongs = searching || self.schedule.belongs(&self.rise, &course);
+        if searching {
+            // Any step found now is the one that tells where the wheel is.
+        } else if !belongs {
             pass.log(Event::Limit(Limit::StepExtra));
         } else if expectation == Expectation::Ahead {
             pass.log(Event::Limit(Limit::StepEarly));
@@ -49,7 +56,7 @@ impl Controller {
         state.crossing = Some(OpenCrossing {
             step: if belongs { state.next_step } else { 0 },
             direction,
-            expected: belongs && expectation != Expectation::Ahead,
+            expected: belongs && !searching && expectation != Expectation::Ahead,
             touched_at: pass.now,
             standing_since: state.standing_since,
             peak_preload: pass.sensed.preload_filtered,
@@ -73,17 +80,21 @@ impl Controller {
         });
         state.crossing = Some(open);
         if open.step > 0 {
-            if open.expected {
+            if state.searching {
+                state.odometry.set(pass.sensed.travel, pass.position - residual);
+                state.searching = false;
+            } else if residual.abs() <= self.schedule.tolerance() {
+                // Farther off, it is the step that is displaced, not the odometry.
                 state.odometry.correct(residual);
-                pass.position = state.odometry.position(pass.sensed.travel);
             }
+            pass.position = state.odometry.position(pass.sensed.travel);
             self.advance(state, direction);
         }
         self.ask(state, pass);
     }
 
     /// The crossing is behind: hands it to the model for review.
-    fn closed(&self, state: &mut State, pass: &mut Pass<'_>, gap: Millimetres) {
+    fn closed(&self, state: &mut State, pass: &mut Pass<'_>, gap: Millimetres, sure: bool) {
         let Some(mut open) = state.crossing.take() else { return };
         open.gap = gap;
         open.deepest = state.watch.deepest;
@@ -95,7 +106,7 @@ impl Controller {
             preload: point.preload,
             tan_arm: point.tan_arm,
             gap,
-            trusted: open.expected,
+            trusted: open.expected && sure,
         });
         self.ask(state, pass);
     }
@@ -123,8 +134,13 @@ impl Controller {
     }
 
     /// Late and missing steps.
-    pub(super) fn watch_expectation(&self, state: &mut State, pass: &mut Pass<'_>, course: &Course) {
-        if state.watch.contact != Contact::Wall {
+    pub(super) fn watch_expectation(
+        &self,
+        state: &mut State,
+        pass: &mut Pass<'_>,
+        course: &Course,
+    ) {
+        if state.watch.contact != Contact::Wall || state.searching {
             return;
         }
         match self.schedule.expectation(&self.rise, course) {

@@ -79,8 +79,8 @@ impl Controller {
     }
 
     /// Gives the odometry its origin: the arm tells the level, and a level at either
-    /// end tells the position. Between the ends the middle of the level is taken and
-    /// the next step finds the rest.
+    /// end tells the position. Between the ends the middle of the level is taken for
+    /// want of better, and the next step is searched for.
     fn locate(&self, state: &mut State, pass: &mut Pass<'_>) {
         state.level = pass.sensed.level;
         if state.located {
@@ -90,9 +90,12 @@ impl Controller {
         let low = level.checked_sub(1).and_then(|i| self.steps.get(i)).copied();
         let high = self.steps.get(level).copied();
         let position = match (low, high) {
-            (None, _) => Millimetres::ZERO,
-            (Some(_), None) => self.travel,
-            (Some(low), Some(high)) => (low + high) * q16(500_000),
+            _ if level == 0 => Millimetres::ZERO,
+            (_, None) | (None, _) => self.travel,
+            (Some(low), Some(high)) => {
+                state.searching = true;
+                (low + high) * q16(500_000)
+            }
         };
         state.odometry.set(pass.sensed.travel, position);
         state.located = true;
@@ -148,7 +151,8 @@ impl Controller {
         if !self.schedule.arrived(remaining) || state.profile.speed() != Q16::ZERO {
             return;
         }
-        if pass.sensed.level == state.level {
+        let home = direction == Direction::Deploy || pass.sensed.level == 0;
+        if pass.sensed.level == state.level && home {
             self.trigger(state, pass, Trigger::Arrived);
         } else {
             self.trigger(state, pass, Trigger::Fault(Fault::LevelMismatch));
@@ -197,7 +201,8 @@ impl Controller {
         plan: &Plan,
         targets: &Targets,
     ) {
-        let stands = plan.cross_preload - pass.sensed.preload_filtered <= self.schedule.stands_within();
+        let stands =
+            plan.cross_preload - pass.sensed.preload_filtered <= self.schedule.stands_within();
         state.standing_since = match state.standing_since {
             Some(since) if stands => Some(since),
             _ if stands => Some(pass.now),
@@ -212,10 +217,8 @@ impl Controller {
     /// What the crossing watch looks at.
     pub(super) fn seen(&self, state: &State, pass: &Pass<'_>) -> Seen {
         let course = self.course(state, pass, state.direction);
-        let near = self
-            .schedule
-            .to_window(&self.rise, &course)
-            .is_some_and(|ahead| ahead <= Q16::ZERO);
+        let near =
+            self.schedule.to_window(&self.rise, &course).is_some_and(|ahead| ahead <= Q16::ZERO);
         Seen {
             radius: pass.sensed.radius.value,
             compression: pass.sensed.compression_filtered,

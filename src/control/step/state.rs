@@ -24,6 +24,9 @@ pub struct State {
     pub(super) odometry: Odometry,
     /// Whether the odometry has been given an origin.
     pub(super) located: bool,
+    /// That origin is a guess: the next step found tells where the wheel is, and until
+    /// then the drive goes as if the step came at once.
+    pub(super) searching: bool,
     pub(super) watch: WatchState,
     pub(super) stage: ContactStage,
     /// Level by steps recognised.
@@ -93,6 +96,7 @@ impl Default for State {
             monitor: MonitorState::default(),
             odometry: Odometry::default(),
             located: false,
+            searching: false,
             watch: WatchState::default(),
             stage: ContactStage::Initial,
             level: 0,
@@ -152,7 +156,7 @@ impl State {
 
     /// Whether something unexpected asks for crossing speed.
     pub(super) fn slow_down(&self) -> bool {
-        self.late || self.critical()
+        self.late || self.searching && self.next_step > 0 || self.critical()
     }
 
     /// Leg of the run.

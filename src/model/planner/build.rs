@@ -32,8 +32,8 @@ impl Planner {
         let model = ReducedModel::try_build(rig)?;
         let load = rig.plant.top_load_n * rig.plant.top_load_share;
         let tangents = (0..rig.rig.step_positions_mm.len()).map(|level| {
-            let sine = (rig.centre_radius_mm(level) - rig.rig.arm_pivot_radius_mm)
-                / rig.rig.arm_length_mm;
+            let sine =
+                (rig.centre_radius_mm(level) - rig.rig.arm_pivot_radius_mm) / rig.rig.arm_length_mm;
             sine / libm::sqrt(1.0 - sine * sine)
         });
         let coupling = rig.plant.arm_coupling * load;

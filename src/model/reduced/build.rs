@@ -22,8 +22,8 @@ impl ReducedModel {
         rig.validate()?;
         let formula = Formula::new(rig);
         let reach = formula.free_run_mm() - SHORTEST_RUN_MM;
-        let highest = libm::sqrt(reach * reach + formula.radius_mm * formula.radius_mm)
-            - formula.radius_mm;
+        let highest =
+            libm::sqrt(reach * reach + formula.radius_mm * formula.radius_mm) - formula.radius_mm;
         let lowest = LEAST_PART * formula.largest_gap_mm();
         let table = |f: &dyn Fn(f64) -> f64| {
             Table::<GAP_POINTS>::build(lowest, highest, f).ok_or(RigError::OutOfRange {

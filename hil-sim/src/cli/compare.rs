@@ -1,0 +1,122 @@
+//! `rig compare`: the four strategies on the same random rigs.
+
+use serde_json::{Map, Value, json};
+
+use super::failure::{Failure, Outcome};
+use super::output;
+use super::scenario::RunArgs;
+use crate::compare::{self, Comparison, EQUAL_SPEED_MM_S, Entry, Policy};
+use crate::progress;
+use crate::table::{number, plain};
+
+/// Compares four preload strategies on the same random rigs: constant at cruise,
+/// constant at the limit, reactive, scheduled.
+///
+/// Each is tuned until its worst gap over all rigs is the reference; then the times
+/// are comparable. Once with the step-aware speed for all, once with one speed
+/// throughout for those without look-ahead. A second table crosses at equal speed.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// How many rigs: the seeds that follow --seed.
+    #[arg(short = 'n', value_name = "N", default_value_t = 200,
+          value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    count: u64,
+
+    #[command(flatten)]
+    run: RunArgs,
+
+    /// Prints the outcome as one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
+    let scenario = args.run.resolve()?;
+    let rigs = args.count as usize;
+    let comparison = {
+        let bar = progress::bar("runs at most", compare::most_runs(rigs) as u64);
+        compare::compare(&scenario, scenario.run.seed + 1, rigs, &|| bar.advance(1))?
+    };
+    output::result(args.json, &machine(&comparison), || human(&comparison))?;
+    Ok(Outcome::of(true))
+}
+
+/// The JSON object: per controller under `controllers`, the other tables beside it.
+fn machine(comparison: &Comparison) -> Value {
+    let pick = |entries: &[Entry], policy: Policy| -> Map<String, Value> {
+        let of_policy = entries.iter().filter(|entry| entry.policy == policy);
+        of_policy.map(|entry| (entry.controller.clone(), json!(entry))).collect()
+    };
+    let aims: Vec<Value> = compare::aims(comparison)
+        .into_iter()
+        .map(|(aim, holds)| json!({ "aim": aim, "holds": holds }))
+        .collect();
+    json!({
+        "runs": comparison.runs,
+        "gap_ref_mm": comparison.gap_ref_mm,
+        "controllers": pick(&comparison.equal_gap, Policy::StepAware),
+        "one_speed": pick(&comparison.equal_gap, Policy::OneSpeed),
+        "equal_speed": pick(&comparison.equal_speed, Policy::StepAware),
+        "aims": aims,
+    })
+}
+
+fn human(comparison: &Comparison) -> String {
+    let mut text = format!(
+        "{} rigs, each strategy tuned to a worst gap of {:.3} mm\n{}\n",
+        comparison.runs,
+        comparison.gap_ref_mm,
+        table(&comparison.equal_gap)
+    );
+    text += &format!(
+        "The same rigs, all crossing at {EQUAL_SPEED_MM_S} mm/s\n{}\n",
+        table(&comparison.equal_speed)
+    );
+    text += "Scheduled, at equal worst gap\n";
+    for (aim, holds) in compare::aims(comparison) {
+        text += &format!("  {} {aim}\n", if holds { "yes" } else { "no " });
+    }
+    if comparison.equal_gap.iter().any(|entry| !entry.tuned) {
+        text += "~ could not be brought to the reference gap within its range of speeds\n";
+    }
+    text
+}
+
+fn table(entries: &[Entry]) -> comfy_table::Table {
+    let head = [
+        "controller",
+        "speed",
+        "crossing mm/s",
+        "time s",
+        "worst gap",
+        "slips",
+        "incomplete",
+        "preload N",
+        "energy J",
+        "wear mJ",
+    ];
+    let rows = entries.iter().map(|entry| {
+        let mark = if entry.tuned { "" } else { "~" };
+        let speed = match entry.policy {
+            Policy::StepAware => "step-aware",
+            Policy::OneSpeed => "one",
+        };
+        let crossing = entry.crossing_speed_mm_s.map_or_else(
+            || format!("reserve {:.1} %", entry.gap_reserve * 100.0),
+            |v| format!("{v:.2}"),
+        );
+        vec![
+            entry.controller.clone(),
+            speed.to_owned(),
+            crossing,
+            number(Some(entry.deploy_time_s), 2),
+            format!("{mark}{}", number(Some(entry.worst_gap_mm), 3)),
+            entry.slip_events.to_string(),
+            entry.incomplete.to_string(),
+            number(Some(entry.mean_preload_n), 1),
+            number(Some(entry.energy_j), 2),
+            number(Some(entry.wear_j * 1e3), 2),
+        ]
+    });
+    plain(&head, rows)
+}
