@@ -9,6 +9,7 @@ mod compare;
 mod constants;
 mod crossing;
 mod deploy;
+mod docs;
 mod failure;
 mod keys;
 mod modes;
@@ -44,6 +45,7 @@ enum Verb {
     Keys(keys::Args),
     Size(size::Args),
     Constants(constants::Args),
+    Docs(docs::Args),
     Test(test::Args),
 }
 
@@ -58,6 +60,7 @@ impl Verb {
             Self::Keys(args) => keys::run(args),
             Self::Size(args) => size::run(args),
             Self::Constants(args) => constants::run(args),
+            Self::Docs(args) => docs::run(args),
             Self::Test(args) => test::run(args),
         }
     }

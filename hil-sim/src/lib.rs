@@ -4,6 +4,7 @@
 pub mod cli;
 pub mod compare;
 pub mod constants;
+pub mod docs;
 pub mod export;
 pub mod firmware;
 pub mod montecarlo;

@@ -15,6 +15,14 @@ const CORNER_PART: f64 = 0.28;
 /// Tread depth on the continuous wall, likewise.
 const WALL_PART: f64 = 0.08;
 
+/// Motor force over radial force times the corner's inclination: part of the radial
+/// force comes from traction itself, `1/(cos + u sin)` against `1/cos` at the
+/// utilisation of a crossing.
+const LEAN_PART: f64 = 0.85;
+
+/// Way from touch-down until the corner is free, over that from touch to lift-off.
+const BACK_PART: f64 = 0.3;
+
 /// Rise of the centre per axial way over the distance to the face, dimensionless:
 /// on the corner a circle of radius R - c rolls about a point,
 /// `dy/dx = d / sqrt((R-c)^2 - d^2)`, while the tread recovers from its depth at
@@ -23,6 +31,9 @@ const WALL_PART: f64 = 0.08;
 #[derive(Clone, Debug)]
 pub struct Rise {
     slope: Table<97>,
+    /// Tangent of the contact's mean inclination: what the climb costs the motor, per
+    /// radial force. It runs ahead of the rise by the energy that the tread stores.
+    lean: [Table<65>; 2],
     /// Distance of first touch, mm.
     touch: Millimetres,
     /// Half the patch on the continuous wall: distance behind the edge at which it is
@@ -67,8 +78,25 @@ impl Rise {
             min: 0.5,
             max: 8.0,
         })?;
+        // The load passes from wall to corner between first touch and lift-off, and back
+        // within a few tenths of that way: the relaxed tread is still deep at the corner.
+        let lean = |ends: f64| {
+            Table::build(0.0, touch, |d| {
+                let whole = LEAN_PART * on_corner(d.min(lift));
+                let part = ((ends - d) / (ends - lift)).clamp(0.0, 1.0);
+                whole * part
+            })
+            .ok_or(RigError::OutOfRange {
+                key: "rig.step_height_mm",
+                value: h,
+                min: 0.5,
+                max: 8.0,
+            })
+        };
+        let back = lift + BACK_PART * (touch - lift);
         Ok(Self {
             slope,
+            lean: [lean(touch)?, lean(back)?],
             touch: checked("rig.step_height_mm", touch)?,
             patch: checked("rig.wheel_radius_mm", patch)?,
         })
@@ -87,6 +115,20 @@ impl Rise {
     #[must_use]
     pub const fn patch(&self) -> Millimetres {
         self.patch
+    }
+
+    /// Motor force per radial force that a corner `ahead` mm outwards of the centre
+    /// costs; zero away from it.
+    #[must_use]
+    pub fn lean(&self, direction: Direction, ahead: Millimetres) -> Ratio {
+        let [out, back] = &self.lean;
+        if ahead <= Q16::ZERO || ahead >= self.touch {
+            return Q16::ZERO;
+        }
+        match direction {
+            Direction::Deploy => out.eval(ahead),
+            Direction::Retract => back.eval(ahead),
+        }
     }
 
     /// Rise per axial way outwards with the face `ahead` mm outwards of the centre,

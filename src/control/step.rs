@@ -226,9 +226,10 @@ impl Controller {
         self.profile.step(&mut state.profile, targets.speed);
         state.direction = direction;
         let ahead = self.ahead(state, pass, Q16::ZERO);
-        let slope = self.rise.slope(ahead);
         let pressed = pass.sensed.preload_filtered + self.wedge(pass);
-        let load = self.load + pressed * slope + self.inertia * state.acceleration();
+        let load = self.load
+            + pressed * self.rise.lean(direction, ahead)
+            + self.inertia * state.acceleration();
         let (wanted, measured) = (state.signed_speed(), pass.sensed.speed.value);
         let duty = self.speed_loop.step(&mut state.speed_loop, wanted, measured, load);
         // The slope under the wheel when this tick's duty moves the screw.

@@ -75,7 +75,48 @@ pub enum Mode {
     FaultHold(Fault),
 }
 
+impl Command {
+    /// Every command.
+    pub const ALL: [Self; 4] = [Self::Start, Self::Stop, Self::Retract, Self::Reset];
+}
+
+impl Direction {
+    /// Both ways.
+    pub const ALL: [Self; 2] = [Self::Deploy, Self::Retract];
+}
+
+impl Leg {
+    /// Every leg, in the order of a run.
+    pub const ALL: [Self; 4] = [Self::Cruise, Self::Approach, Self::Crossing, Self::Settle];
+}
+
 impl Mode {
+    /// Every mode but the fault holds, of which there is one per [`Fault`].
+    pub const WITHOUT_FAULT: [Self; 18] = {
+        use Direction::{Deploy, Retract};
+        use Leg::{Approach, Crossing, Cruise, Settle};
+        [
+            Self::Boot,
+            Self::SelfTest,
+            Self::Zero,
+            Self::Idle,
+            Self::Preload(Deploy),
+            Self::Run(Deploy, Cruise),
+            Self::Run(Deploy, Approach),
+            Self::Run(Deploy, Crossing),
+            Self::Run(Deploy, Settle),
+            Self::Stopping(Deploy),
+            Self::Complete(Deploy),
+            Self::Preload(Retract),
+            Self::Run(Retract, Cruise),
+            Self::Run(Retract, Approach),
+            Self::Run(Retract, Crossing),
+            Self::Run(Retract, Settle),
+            Self::Stopping(Retract),
+            Self::Complete(Retract),
+        ]
+    };
+
     /// Whether the drive may turn in this mode.
     #[must_use]
     pub const fn moves(self) -> bool {

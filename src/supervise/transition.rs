@@ -29,6 +29,27 @@ pub enum Trigger {
     Fault(Fault),
 }
 
+impl Trigger {
+    /// Every trigger but the faults, of which there is one per [`Fault`].
+    pub const WITHOUT_FAULT: [Self; 15] = [
+        Self::SensorsAnswer,
+        Self::TestPassed { stowed: true },
+        Self::TestPassed { stowed: false },
+        Self::Zeroed,
+        Self::Command(Command::Start),
+        Self::Command(Command::Stop),
+        Self::Command(Command::Retract),
+        Self::Command(Command::Reset),
+        Self::PreloadStands,
+        Self::Leg(Leg::Cruise),
+        Self::Leg(Leg::Approach),
+        Self::Leg(Leg::Crossing),
+        Self::Leg(Leg::Settle),
+        Self::AtRest,
+        Self::Arrived,
+    ];
+}
+
 /// The mode after `trigger` in `mode`; `None` if the mode does not take it.
 ///
 /// A fault leads to the fault hold from everywhere, and the first fault is kept.
@@ -64,37 +85,13 @@ mod tests {
     use super::*;
 
     fn modes() -> Vec<Mode> {
-        let mut all = vec![Mode::Boot, Mode::SelfTest, Mode::Zero, Mode::Idle];
-        for direction in [Direction::Deploy, Direction::Retract] {
-            all.extend([
-                Mode::Preload(direction),
-                Mode::Stopping(direction),
-                Mode::Complete(direction),
-            ]);
-            for leg in [Leg::Cruise, Leg::Approach, Leg::Crossing, Leg::Settle] {
-                all.push(Mode::Run(direction, leg));
-            }
-        }
-        all.extend(Fault::ALL.map(Mode::FaultHold));
-        all
+        let holds = Fault::ALL.map(Mode::FaultHold);
+        Mode::WITHOUT_FAULT.into_iter().chain(holds).collect()
     }
 
     fn triggers() -> Vec<Trigger> {
-        let mut all = vec![
-            Trigger::SensorsAnswer,
-            Trigger::TestPassed { stowed: true },
-            Trigger::TestPassed { stowed: false },
-            Trigger::Zeroed,
-            Trigger::PreloadStands,
-            Trigger::AtRest,
-            Trigger::Arrived,
-        ];
-        all.extend(
-            [Command::Start, Command::Stop, Command::Retract, Command::Reset].map(Trigger::Command),
-        );
-        all.extend([Leg::Cruise, Leg::Approach, Leg::Crossing, Leg::Settle].map(Trigger::Leg));
-        all.extend(Fault::ALL.map(Trigger::Fault));
-        all
+        let faults = Fault::ALL.map(Trigger::Fault);
+        Trigger::WITHOUT_FAULT.into_iter().chain(faults).collect()
     }
 
     #[test]

@@ -61,7 +61,7 @@ fn machine(comparison: &Comparison) -> Value {
     })
 }
 
-fn human(comparison: &Comparison) -> String {
+pub(super) fn human(comparison: &Comparison) -> String {
     let mut text = format!(
         "{} rigs, each strategy tuned to a worst gap of {:.3} mm\n{}\n",
         comparison.runs,
@@ -72,7 +72,9 @@ fn human(comparison: &Comparison) -> String {
         "The same rigs, all crossing at {EQUAL_SPEED_MM_S} mm/s\n{}\n",
         table(&comparison.equal_speed)
     );
-    text += "Scheduled, at equal worst gap\n";
+    text += "speed: by steps, slow at the steps alone; one, the same throughout. crossing: speed \
+             in mm/s, or\nthe reserve below the reference gap that the schedule aims at. short: \
+             incomplete runs.\n\nScheduled, at equal worst gap\n";
     for (aim, holds) in compare::aims(comparison) {
         text += &format!("  {} {aim}\n", if holds { "yes" } else { "no " });
     }
@@ -86,25 +88,24 @@ fn table(entries: &[Entry]) -> comfy_table::Table {
     let head = [
         "controller",
         "speed",
-        "crossing mm/s",
+        "crossing",
         "time s",
-        "worst gap",
+        "gap mm",
         "slips",
-        "incomplete",
-        "preload N",
-        "energy J",
+        "short",
+        "mean N",
+        "J",
         "wear mJ",
     ];
     let rows = entries.iter().map(|entry| {
         let mark = if entry.tuned { "" } else { "~" };
         let speed = match entry.policy {
-            Policy::StepAware => "step-aware",
+            Policy::StepAware => "by steps",
             Policy::OneSpeed => "one",
         };
-        let crossing = entry.crossing_speed_mm_s.map_or_else(
-            || format!("reserve {:.1} %", entry.gap_reserve * 100.0),
-            |v| format!("{v:.2}"),
-        );
+        let crossing = entry
+            .crossing_speed_mm_s
+            .map_or_else(|| format!("-{:.1} %", entry.gap_reserve * 100.0), |v| format!("{v:.2}"));
         vec![
             entry.controller.clone(),
             speed.to_owned(),

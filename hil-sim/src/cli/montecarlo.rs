@@ -51,7 +51,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     Ok(Outcome::of(outcome.completed == outcome.runs))
 }
 
-fn human(outcome: &montecarlo::Outcome) -> String {
+pub(super) fn human(outcome: &montecarlo::Outcome) -> String {
     let mut text = format!("{}\n", figures(outcome));
     for fault in &outcome.faults {
         let code = fault.code.map_or("failure".to_owned(), |code| format!("fault {code}"));
