@@ -139,7 +139,6 @@ impl Run {
         }
         self.trace.look(&output, self.plant.truth(), self.options.rows);
         self.plant.step(&drives(output.drive, output.preload), TICK_S)?;
-        self.trace.crossings(self.plant.ledger().crossings(), &output.telemetry);
         self.tick += 1;
         let ended = matches!(self.state.mode(), Mode::Complete(_) | Mode::FaultHold(_));
         Ok(!ended && f64::from(self.tick) * TICK_S < LONGEST_S)

@@ -26,8 +26,8 @@ pub(super) struct Trace {
     reported: Vec<Reported>,
     /// True preload of every tick, N.
     preload: Vec<f32>,
-    /// Preload asked for when each crossing's lift-off was seen, N.
-    wanted: Vec<f64>,
+    /// Preload asked for in every tick, N.
+    wanted: Vec<f32>,
     gap_ref: f64,
     start_mm: f64,
     run_started: Option<f64>,
@@ -79,6 +79,7 @@ impl Trace {
             }
         }
         self.preload.push(truth.preload_n as f32);
+        self.wanted.push(seen.preload_ref.to_num());
         if seen.mode.moves() {
             self.run_started.get_or_insert(t_s);
             self.run_ended = t_s;
@@ -91,13 +92,6 @@ impl Trace {
         }
     }
 
-    /// Notes what was asked for when a new crossing shows in the plant's ledger.
-    pub(super) fn crossings(&mut self, crossings: &[Crossing], seen: &Telemetry) {
-        if crossings.len() > self.wanted.len() {
-            self.wanted.push(seen.preload_ref.to_num());
-        }
-    }
-
     pub(super) fn finish(
         self,
         scenario: &Scenario,
@@ -107,13 +101,8 @@ impl Trace {
         wall_s: f64,
     ) -> Recording {
         let truth = plant.truth();
-        let crossings: Vec<CrossingLine> = plant
-            .ledger()
-            .crossings()
-            .iter()
-            .zip(&self.wanted)
-            .map(|(crossing, wanted)| self.line(crossing, *wanted))
-            .collect();
+        let crossings: Vec<CrossingLine> =
+            plant.ledger().crossings().iter().map(|crossing| self.line(crossing)).collect();
         let worst = crossings.iter().map(|c| c.gap_mm).fold(self.worst_separation, f64::max);
         let total_s = f64::from(self.ticks) * TICK_S;
         let summary = Summary {
@@ -143,7 +132,7 @@ impl Trace {
 
     /// Ledger line: the plant's truth with what the controller reported of the same
     /// step beside it.
-    fn line(&self, crossing: &Crossing, wanted: f64) -> CrossingLine {
+    fn line(&self, crossing: &Crossing) -> CrossingLine {
         let near = |r: &&Reported| (r.position.to_num::<f64>() - crossing.step_mm).abs() < 5.0;
         let reported = self.reported.iter().find(near);
         let num = |f: fn(&Reported) -> Q16| reported.map(|r| f(r).to_num::<f64>());
@@ -155,7 +144,7 @@ impl Trace {
             gap_predicted_mm: num(|r| r.gap_predicted),
             gap_measured_mm: num(|r| r.gap_measured),
             corner_force_n: crossing.corner_n,
-            lead_time_s: Some(self.lead_time(crossing.touch_s, wanted)),
+            lead_time_s: Some(self.lead_time(crossing.touch_s)),
             slip_mm: crossing.slip_mm,
             touch_s: crossing.touch_s,
             lift_s: crossing.lift_s,
@@ -166,10 +155,11 @@ impl Trace {
         }
     }
 
-    /// How long the true preload had stood close to the wanted one when
+    /// How long the true preload had stood close to the one then wanted when
     /// the corner touched, s; negative by how long it still took.
-    fn lead_time(&self, touch_s: f64, wanted: f64) -> f64 {
+    fn lead_time(&self, touch_s: f64) -> f64 {
         let touch = ((touch_s / TICK_S) as usize).min(self.preload.len().saturating_sub(1));
+        let wanted = self.wanted.get(touch).copied().map_or(0.0, f64::from);
         let stands = |n: &f32| f64::from(*n) >= wanted * (1.0 - STANDS_PART);
         if self.preload.get(touch).is_some_and(stands) {
             let since = self.preload[..touch].iter().rposition(|n| !stands(n)).map_or(0, |i| i + 1);
