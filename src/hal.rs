@@ -77,6 +77,14 @@ pub trait Motors {
     /// Sets both bridges; takes effect at the next PWM period (at most 50 us).
     /// Never blocks and cannot fail.
     fn apply(&mut self, drive: MotorCommand, preload: MotorCommand);
+
+    /// Whether the emergency stop has cut a bridge since the last [`Motors::rearm`].
+    /// While it has, bridges stay without power whatever is applied.
+    fn stopped(&mut self) -> bool;
+
+    /// Gives the bridges back their power after an emergency stop, if its contact is
+    /// closed again. Called only with both bridges commanded off.
+    fn rearm(&mut self);
 }
 
 /// The independent watchdog.

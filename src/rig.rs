@@ -9,6 +9,7 @@
 mod presets;
 mod validate;
 
+pub(crate) use validate::REGULATION_PART;
 pub use validate::RigError;
 
 /// Most steps a step table may hold.

@@ -70,14 +70,21 @@ impl<T: AdvancedInstance4Channel> Bridge<T> {
         Self { pwm, forward, enable, _stop: stop }
     }
 
+    /// Whether the break input has taken the outputs away.
+    fn stopped(&self) -> bool {
+        !self.pwm.get_master_output_enable()
+    }
+
+    /// Gives the outputs back; without effect while the break input is active.
+    fn rearm(&mut self) {
+        self.pwm.set_master_output_enable(true);
+    }
+
     /// Sets direction at once and duty at the next period.
     fn set(&mut self, command: MotorCommand) {
         if !command.enable {
             self.enable.set_low();
             self.pwm.set_duty(Channel::Ch1, 0);
-            // After an emergency stop the outputs stay off until the controller
-            // has let go of the motor: releasing the button starts nothing.
-            self.pwm.set_master_output_enable(true);
             return;
         }
         let duty = command.duty.to_bits();
@@ -101,5 +108,16 @@ impl Motors for Bridges {
     fn apply(&mut self, drive: MotorCommand, preload: MotorCommand) {
         self.drive.set(drive);
         self.preload.set(preload);
+    }
+
+    fn stopped(&mut self) -> bool {
+        self.drive.stopped() || self.preload.stopped()
+    }
+
+    // Only a reset out of the fault hold comes here: releasing the button starts
+    // nothing.
+    fn rearm(&mut self) {
+        self.drive.rearm();
+        self.preload.rearm();
     }
 }

@@ -14,12 +14,18 @@ use crate::hal::Duty;
 use crate::model::timing::SLEW_PART;
 use crate::numeric::{LowPass, LowPassState, checked};
 use crate::rig::{Rig, RigError};
-use crate::units::{Newtons, NewtonsPerSecond, Q16, TICK_HZ, q16};
+use crate::units::{Newtons, NewtonsPerSecond, Q16, TICK_HZ};
 
 /// Longest dead time modelled, ticks; the rig's parameters end there.
 pub const LONGEST_DELAY: usize = 256;
-/// Rate of correction per error, 1/s: a third of what dead time and lag allow.
-const CORRECTION_PER_S: Q16 = q16(3_000_000);
+/// Rate of correction per error times dead time and lag: what an integrating actuator
+/// bears with these off by half.
+const CORRECTION: f64 = 0.4;
+/// Fastest correction, 1/s.
+const FASTEST_CORRECTION: f64 = 3.0;
+/// Part of the slew that the correction may use: a load cell that lies cannot make the
+/// preload run away faster than it is noticed.
+const CORRECTION_PART: f64 = 0.3;
 
 /// The actuator as known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,6 +34,10 @@ pub struct PreloadLoop {
     step: Newtons,
     /// Duty per rate, s/N.
     per_rate: Q16,
+    /// Rate of correction per error, 1/s.
+    correction: Q16,
+    /// Largest rate of correction, N/s.
+    most_correction: NewtonsPerSecond,
     delay: usize,
     lag: LowPass,
 }
@@ -68,6 +78,11 @@ impl PreloadLoop {
         Ok(Self {
             step: checked("preload.slew_n_per_s", slew * 1e-3)? * SLEW_PART,
             per_rate: checked("preload.slew_n_per_s", 1.0 / slew)?,
+            correction: checked(
+                "preload.delay_s",
+                (CORRECTION / (rig.preload.delay_s + rig.preload.lag_s)).min(FASTEST_CORRECTION),
+            )?,
+            most_correction: checked("preload.slew_n_per_s", slew * CORRECTION_PART)?,
             delay: ticks.min(LONGEST_DELAY - 1),
             lag: LowPass::build(rig.preload.lag_s),
         })
@@ -91,7 +106,8 @@ impl PreloadLoop {
         let delayed = state.exchange(self.delay);
         let expected = self.lag.step(&mut state.model, delayed);
         let rate = change * Q16::from_num(TICK_HZ as i16) - drift;
-        let correction = (expected - measured) * CORRECTION_PER_S;
+        let correction = ((expected - measured) * self.correction)
+            .clamp(-self.most_correction, self.most_correction);
         duty((rate + correction) * self.per_rate)
     }
 }

@@ -4,13 +4,12 @@
 
 use super::rise::Rise;
 use crate::model::Plan;
-use crate::model::timing::SLEW_PART;
-use crate::numeric::{checked, divide, sqrt};
+use crate::model::timing::Timing;
+use crate::numeric::{checked, divide};
 use crate::rig::{Rig, RigError};
 use crate::supervise::Direction;
 use crate::units::{
-    Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, NewtonsPerSecond, Q16,
-    Seconds, q16,
+    Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, Q16, Seconds, q16,
 };
 
 /// Short of the wanted preload by no more than this part of the limit, it stands:
@@ -20,13 +19,10 @@ const STANDS_PART: Q16 = q16(20_000);
 const BRAKE_RESERVE: Millimetres = q16(300_000);
 /// Time that a preload needs after its reference, kept before a window, s.
 const SETTLING: Seconds = q16(150_000);
-/// Part of the acceleration that is used to stop at the end, so that the jerk limit
-/// can follow.
-const END_PART: Q16 = q16(250_000);
-/// Speed at which the last hundredths of a millimetre are covered, mm/s.
-const END_CREEP: MillimetresPerSecond = q16(500_000);
+/// Speed at which the last tenths of a millimetre are covered, mm/s.
+const END_CREEP: MillimetresPerSecond = q16(1_500_000);
 /// Way to the end that counts as arrived, mm.
-const ARRIVED_WITHIN: Millimetres = q16(20_000);
+const ARRIVED_WITHIN: Millimetres = q16(50_000);
 /// Way after a late step over which it is still searched, mm.
 const SEARCH: Millimetres = q16(6_000_000);
 
@@ -36,12 +32,9 @@ pub struct Schedule {
     tolerance: Millimetres,
     /// Distance to the face by which a step must have been felt, out and back, mm.
     felt_by: [Millimetres; 2],
-    end_acceleration: MillimetresPerSecond2,
+    timing: Timing,
     /// Short of the wanted preload by no more than this, it stands, N.
     stands_within: Newtons,
-    rate: NewtonsPerSecond,
-    /// Time per preload at that rate, s/N.
-    per_rate: Q16,
     travel: Millimetres,
 }
 
@@ -58,6 +51,12 @@ pub struct Course {
     pub critical: bool,
     /// The preload is already being raised for this step.
     pub ramping: bool,
+    /// The speed is already being brought down for this step.
+    pub braking: bool,
+    /// Speed and acceleration of the profile, along the run, mm/s and mm/s^2.
+    pub speed: MillimetresPerSecond,
+    /// See `speed`.
+    pub acceleration: MillimetresPerSecond2,
     /// Preload reference as far as it has come, N.
     pub reference: Newtons,
     /// Measured preload, N.
@@ -73,6 +72,8 @@ pub struct Targets {
     pub preload: Newtons,
     /// The preload is raised for the step ahead; once so, until the step is behind.
     pub ramping: bool,
+    /// The speed is brought down for the step ahead; likewise.
+    pub braking: bool,
     /// The step ahead already has an effect.
     pub approaching: bool,
     /// The speed is held back because the preload does not stand yet.
@@ -108,16 +109,8 @@ impl Schedule {
         Ok(Self {
             tolerance: checked("rig.step_tolerance_mm", rig.rig.step_tolerance_mm)?,
             felt_by: [checked("rig.step_height_mm", out)?, -checked("rig.step_height_mm", back)?],
-            end_acceleration: checked(
-                "drive.acceleration_mm_s2",
-                2.0 * rig.drive.acceleration_mm_s2,
-            )? * END_PART,
+            timing: Timing::try_build(rig)?,
             stands_within: checked("preload.limit_n", rig.preload.limit_n)? * STANDS_PART,
-            rate: checked("preload.slew_n_per_s", rig.preload.slew_n_per_s)? * SLEW_PART,
-            per_rate: divide(
-                q16(1_000_000),
-                checked("preload.slew_n_per_s", rig.preload.slew_n_per_s)? * SLEW_PART,
-            ),
             travel: checked("rig.travel_mm", rig.rig.travel_mm)?,
         })
     }
@@ -161,7 +154,9 @@ impl Schedule {
     pub fn targets(&self, rise: &Rise, plan: &Plan, course: &Course) -> Targets {
         let to_window = self.to_window(rise, course);
         let within = |way: Millimetres| to_window.is_some_and(|ahead| ahead <= way);
-        let braking = course.critical || within(plan.brake_way + BRAKE_RESERVE);
+        let braking = course.braking
+            || course.critical
+            || within(self.brake_way(course, plan.cross_speed) + BRAKE_RESERVE);
         let ramping =
             course.ramping || course.critical || within(self.ramp_way(plan, course.reference));
         let preload = if ramping { plan.cross_preload } else { plan.cruise_preload };
@@ -173,7 +168,7 @@ impl Schedule {
             && ahead > -self.tolerance
         {
             // Arrive no sooner than the preload: at the window, not at the corner.
-            let needed = divide(short, self.rate) + SETTLING;
+            let needed = divide(short, self.timing.rate()) + SETTLING;
             let allowed = divide(ahead.max(Q16::ZERO), needed);
             if allowed < speed {
                 speed = allowed;
@@ -181,9 +176,10 @@ impl Schedule {
             }
         }
         Targets {
-            speed: speed.min(self.end_speed(course.remaining)),
+            speed: speed.min(self.end_speed(course)),
             preload,
             ramping,
+            braking,
             approaching: braking || ramping,
             waiting,
         }
@@ -197,7 +193,7 @@ impl Schedule {
         if !plan.look_ahead || plan.cross_preload <= plan.cruise_preload {
             return if plan.look_ahead { plan.brake_way } else { Q16::MIN };
         }
-        let needed = plan.latency + missing.max(Q16::ZERO) * self.per_rate;
+        let needed = self.timing.preload_change(missing.max(Q16::ZERO));
         plan.brake_way + (needed - plan.brake_time).max(Q16::ZERO) * plan.cruise_speed
     }
 
@@ -227,12 +223,24 @@ impl Schedule {
         self.to_window(rise, course).is_some_and(|ahead| ahead <= SEARCH)
     }
 
-    /// Speed from which the end is reached at rest, mm/s: `sqrt(2 a d)`.
-    fn end_speed(&self, remaining: Millimetres) -> MillimetresPerSecond {
-        if self.arrived(remaining) {
+    /// Way in which the profile comes from where it stands to `speed`, mm. Acceleration
+    /// still under way is first taken back: until then the speed rises to a peak.
+    fn brake_way(&self, course: &Course, speed: MillimetresPerSecond) -> Millimetres {
+        let rising = course.acceleration.max(Q16::ZERO);
+        let until_peak = self.timing.until_level(rising);
+        let peak = course.speed + rising * until_peak * q16(500_000);
+        peak * until_peak + self.timing.brake_way(peak, speed)
+    }
+
+    /// Speed towards the end of travel, mm/s: free until braking must begin, then a creep
+    /// that is left within a few hundredths of a millimetre.
+    fn end_speed(&self, course: &Course) -> MillimetresPerSecond {
+        if self.arrived(course.remaining) {
             Q16::ZERO
+        } else if course.remaining <= self.brake_way(course, END_CREEP) + BRAKE_RESERVE {
+            END_CREEP
         } else {
-            sqrt(self.end_acceleration * remaining).max(END_CREEP)
+            Q16::MAX
         }
     }
 }

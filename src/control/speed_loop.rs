@@ -12,6 +12,9 @@ use crate::units::{MillimetresPerSecond, Newtons, Q16, Ratio, Travel, per_tick, 
 const CROSSOVER_RAD_S: f64 = 20.0;
 /// Proportional part, as a fraction of the inverse motor gain.
 const PROPORTIONAL: f64 = 0.3;
+/// Largest error that is integrated, mm/s: a wheel that no longer answers must not wind
+/// the drive up before it is noticed.
+const MOST_ERROR: MillimetresPerSecond = q16(4_000_000);
 /// Full duty.
 const FULL: Ratio = q16(1_000_000);
 /// Most that the integral part may contribute, duty.
@@ -67,8 +70,10 @@ impl SpeedLoop {
         let pushing = if error < Q16::ZERO { whole > -FULL } else { whole < FULL };
         if pushing {
             let limit = Travel::from_num(INTEGRAL_LIMIT.0);
-            state.integral =
-                state.integral.saturating_add(per_tick(self.integral * error)).clamp(-limit, limit);
+            state.integral = state
+                .integral
+                .saturating_add(per_tick(self.integral * error.clamp(-MOST_ERROR, MOST_ERROR)))
+                .clamp(-limit, limit);
         }
         duty(whole)
     }

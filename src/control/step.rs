@@ -6,6 +6,8 @@
 mod build;
 mod crossing;
 mod modes;
+mod plans;
+mod runs;
 mod state;
 
 use super::preload_loop::PreloadLoop;
@@ -22,12 +24,20 @@ use crate::rig::MAX_STEPS;
 use crate::sense::raw::SensorFrame;
 use crate::sense::{SensedState, Senses};
 use crate::supervise::{Command, Direction, Leg, Mode, Monitor, Observed, Trigger};
-use crate::units::{Millimetres, Newtons, NewtonsPerSecond, Q16, Ratio, Seconds, Tick, q16};
+use crate::units::{
+    Millimetres, MillimetresPerSecond, Newtons, NewtonsPerSecond, Q16, Ratio, Seconds, Tick, q16,
+};
 
 pub use state::State;
 
 /// Most log entries one tick can give.
 pub const EVENTS_PER_TICK: usize = 8;
+
+/// Slope below which a corner does not limit the speed.
+const LEVEL_SLOPE: Ratio = q16(50_000);
+
+/// Ticks that a fault hold lasts at least.
+const HOLD_TICKS: u32 = 100;
 
 /// Log entries of one tick.
 pub(crate) type Events = heapless::Vec<Entry, EVENTS_PER_TICK>;
@@ -45,6 +55,8 @@ pub struct Input {
     pub plan: Option<Plan>,
     /// This tick starts more than a period late.
     pub overrun: bool,
+    /// The emergency stop has cut the bridges.
+    pub emergency_stop: bool,
 }
 
 /// What a tick gives.
@@ -56,6 +68,8 @@ pub struct Output {
     pub preload: MotorCommand,
     /// Work for the model task: the schedule of the segment ahead.
     pub request: Option<PlanRequest>,
+    /// Give the bridges their power back after an emergency stop.
+    pub rearm: bool,
     /// What happened.
     pub events: Events,
     /// State after the tick.
@@ -76,6 +90,12 @@ pub struct Controller {
     /// Step positions, mm, from the stow end.
     steps: heapless::Vec<Millimetres, MAX_STEPS>,
     travel: Millimetres,
+    /// Ticks within which any preload can be reached.
+    patience: u32,
+    /// Speed times slope of the corner at which the spring uses the actuator up, mm/s.
+    rise_speed: MillimetresPerSecond,
+    /// Wheel travel on a corner beyond which the wheel slips, mm.
+    corner_way: Millimetres,
     /// Spring rate of the pre-tightener, N/mm.
     spring: Q16,
     /// Dead time and lag of the pre-tightener, s.
@@ -96,6 +116,7 @@ struct Pass<'a> {
     position: Millimetres,
     events: Events,
     request: Option<PlanRequest>,
+    rearm: bool,
 }
 
 impl Pass<'_> {
@@ -116,9 +137,10 @@ impl Controller {
             position: state.odometry.position(sensed.travel),
             events: Events::new(),
             request: None,
+            rearm: false,
         };
         self.take_plan(state, &mut pass, input.plan);
-        self.look_for_faults(state, &mut pass, input.overrun);
+        self.look_for_faults(state, &mut pass, input);
         self.take_command(state, &mut pass, input.command);
         self.advance_mode(state, &mut pass);
         self.follow_contact(state, &mut pass);
@@ -126,16 +148,24 @@ impl Controller {
         let (drive, preload) = self.actuate(state, &pass, &targets);
         self.note_stage(state, &mut pass);
         let telemetry = self.telemetry(state, &pass, &targets, drive, preload);
-        Output { drive, preload, request: pass.request, events: pass.events, telemetry }
+        Output {
+            drive,
+            preload,
+            request: pass.request,
+            rearm: pass.rearm,
+            events: pass.events,
+            telemetry,
+        }
     }
 
-    fn look_for_faults(&self, state: &mut State, pass: &mut Pass<'_>, overrun: bool) {
+    fn look_for_faults(&self, state: &mut State, pass: &mut Pass<'_>, input: &Input) {
         let observed = Observed {
             mode: state.mode,
             sensed: pass.sensed,
             speed_ref: state.signed_speed(),
             preload_due: state.preload_loop.due(),
-            overrun,
+            overrun: input.overrun,
+            emergency_stop: input.emergency_stop,
         };
         if let Some(fault) = self.monitor.step(&mut state.monitor, &observed) {
             self.trigger(state, pass, Trigger::Fault(fault));
@@ -144,7 +174,9 @@ impl Controller {
 
     fn take_command(&self, state: &mut State, pass: &mut Pass<'_>, command: Option<Command>) {
         let Some(command) = command else { return };
-        if self.trigger(state, pass, Trigger::Command(command)) {
+        // A reset that was already on its way must not clear a fault unseen.
+        let hasty = matches!(state.mode, Mode::FaultHold(_)) && state.in_mode < HOLD_TICKS;
+        if !hasty && self.trigger(state, pass, Trigger::Command(command)) {
             pass.log(Event::Command(command));
         } else {
             pass.log(Event::Refused(command));
@@ -163,6 +195,9 @@ impl Controller {
             remaining: self.schedule.remaining(direction, pass.position),
             critical: state.critical(),
             ramping: state.ramping,
+            braking: state.braking,
+            speed: state.profile.speed(),
+            acceleration: state.profile.acceleration(),
             reference: state.preload_loop.reference(),
             preload: pass.sensed.preload_filtered,
         }
@@ -174,6 +209,7 @@ impl Controller {
             speed: Q16::ZERO,
             preload: state.preload_loop.reference(),
             ramping: state.ramping,
+            braking: state.braking,
             approaching: false,
             waiting: false,
         };
@@ -186,12 +222,14 @@ impl Controller {
         let course = self.course(state, pass, direction);
         let mut targets = self.schedule.targets(&self.rise, &plan, &course);
         state.ramping = targets.ramping;
+        state.braking = targets.braking;
         if !running {
             targets.speed = Q16::ZERO;
             return targets;
         }
         self.watch_expectation(state, pass, &course);
-        if state.slow_down() {
+        self.limit_climb(state, pass, &mut targets);
+        if state.slow_down() || plan.step != state.next_step {
             targets.speed = targets.speed.min(plan.cross_speed);
             targets.preload = plan.cross_preload;
         }
@@ -201,6 +239,15 @@ impl Controller {
             self.trigger(state, pass, Trigger::Leg(leg));
         }
         targets
+    }
+
+    /// On a corner the wheel's rise moves the spring: no faster than the pre-tightener
+    /// can follow.
+    fn limit_climb(&self, state: &State, pass: &Pass<'_>, targets: &mut Targets) {
+        let slope = self.rise.slope(self.ahead(state, pass, Q16::ZERO));
+        if slope > LEVEL_SLOPE {
+            targets.speed = targets.speed.min(crate::numeric::divide(self.rise_speed, slope));
+        }
     }
 
     /// Loops and bridges.

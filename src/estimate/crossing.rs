@@ -37,16 +37,14 @@ const HEIGHT_TOLERANCE: Millimetres = q16(120_000);
 /// Ticks over which the new wall's baseline is averaged.
 const SETTLE_TICKS: u8 = 50;
 
-/// Part of the compression before a step that the tread still has when the lower wall
-/// stops carrying. On the converged ring it lies between 0.25 and 0.5 over 3 to
-/// 30 mm/s and 33 to 150 N; the gap is nearly stationary in it.
-const MEMORY: Ratio = q16(400_000);
-
 /// Geometry of the measurement.
 #[derive(Clone, Debug)]
 pub struct CrossingWatch {
     radius: Millimetres,
     step: Millimetres,
+    /// Part of the compression before a step that the tread still has when the lower
+    /// wall stops carrying.
+    memory: Ratio,
     baseline: LowPass,
     settle: LowPass,
 }
@@ -154,24 +152,34 @@ impl CrossingWatch {
         };
     }
 
-    /// Turns back: what was climbed is now dropped off, or the other way round.
+    /// Turns back, from now on in `direction`: what was climbed is dropped off again,
+    /// or the other way round. The baseline is that of the wall which the wheel now
+    /// comes from.
     pub fn reverse(&self, state: &mut WatchState, direction: Direction) {
-        let shift = match direction {
-            Direction::Retract => -self.step,
-            Direction::Deploy => self.step,
+        let other_wall = state.baseline.output()
+            + match direction {
+                Direction::Retract => -self.step,
+                Direction::Deploy => self.step,
+            };
+        let (contact, baseline) = match (state.contact, direction) {
+            (Contact::Wall, _) => (Contact::Wall, state.baseline.output()),
+            // Still carried by the wall it came from, and going back onto it.
+            (Contact::Both, Direction::Retract) => (Contact::Wall, state.baseline.output()),
+            // On the edge alone and going back up: over it, without a lift-off.
+            (Contact::Corner, Direction::Deploy) => (Contact::Leaving, other_wall),
+            // On the edge and on down, or down already and up again: a crossing.
+            (Contact::Corner, Direction::Retract) => (Contact::Corner, other_wall),
+            (Contact::Both, Direction::Deploy) => (Contact::Both, other_wall),
+            // Past the corner: on the wall behind it, whose baseline is not yet measured.
+            (Contact::Leaving, _) => (Contact::Wall, other_wall),
         };
-        match state.contact {
-            Contact::Both | Contact::Corner => {
-                state.baseline = LowPassState::at(state.baseline.output() + shift);
-                state.contact = match state.contact {
-                    Contact::Both => Contact::Leaving,
-                    _ => Contact::Corner,
-                };
-                state.lift = None;
-            }
-            // On or next to the upper wall already: the old baseline no longer counts.
-            Contact::Leaving | Contact::Wall => state.contact = Contact::Wall,
-        }
+        *state = WatchState {
+            contact,
+            baseline: LowPassState::at(baseline),
+            flat: state.flat,
+            deepest: state.deepest,
+            ..WatchState::default()
+        };
     }
 
     /// How far the wheel stands off its baseline in the direction of the step, mm.
@@ -232,7 +240,7 @@ impl CrossingWatch {
     ) -> Option<Sign> {
         // Height of the centre that the tread's memory still lacks at this instant.
         let short = match direction {
-            Direction::Deploy => state.flat * MEMORY,
+            Direction::Deploy => state.flat * self.memory,
             Direction::Retract => Q16::ZERO,
         };
         let free = match direction {

@@ -2,7 +2,7 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use crate::units::{Millimetres, Q16, Ratio, Travel, q16};
+use crate::units::{Millimetres, Ratio, Travel, q16};
 use fixed::types::I16F16;
 
 /// Part of a step's residual that is taken for odometry error; the rest is left to
@@ -40,13 +40,11 @@ impl Odometry {
     }
 }
 
-/// Position 0 as a constant of the control format.
-pub const STOW: Millimetres = Q16::ZERO;
-
 #[cfg(test)]
 #[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
+    use crate::units::Q16;
     use proptest::prelude::*;
 
     proptest! {

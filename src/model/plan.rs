@@ -89,8 +89,6 @@ pub struct Plan {
     pub brake_way: Millimetres,
     /// Time that this braking takes, s.
     pub brake_time: Seconds,
-    /// Time from a preload reference until the preload stands, without the ramp, s.
-    pub latency: Seconds,
     /// Whether the preload is raised ahead of the step.
     pub look_ahead: bool,
     /// Limits met, in the order found.

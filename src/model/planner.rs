@@ -16,7 +16,10 @@ use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Ratio, Seconds, q
 /// Largest correction of the stiffness scale by one crossing.
 const LARGEST_CORRECTION: Ratio = q16(100_000);
 
-/// Halvings of the gap until the slip margin holds, at 1/16 of the gap each.
+/// Relative difference of an observed stiffness beyond which it is not believed.
+const OUTLIER: Ratio = q16(350_000);
+
+/// Sixteenths of the gap taken off until the slip margin holds, at most.
 const SLIP_TRIES: usize = 8;
 
 /// The model side of the schedule; runs outside the tick.
@@ -39,6 +42,8 @@ pub struct Planner {
     cruise_speed: MillimetresPerSecond,
     least_speed: MillimetresPerSecond,
     safe_speed: MillimetresPerSecond,
+    /// Speed at which the pre-tightener just follows the spring at lift-off, mm/s.
+    climb_speed: MillimetresPerSecond,
     /// Crossing speed that a comparison prescribes, mm/s.
     prescribed_speed: Option<MillimetresPerSecond>,
     /// Whether the crossing speed holds between the steps as well.
@@ -77,7 +82,6 @@ impl Planner {
             slip_margin: self.usable,
             brake_way: Millimetres::ZERO,
             brake_time: Seconds::ZERO,
-            latency: self.timing.preload_change(Newtons::ZERO),
             // Without look-ahead the preload rises when the step is felt, never before.
             look_ahead: self.strategy != Strategy::Reactive,
             limits: [None; 3],
@@ -111,13 +115,17 @@ impl Planner {
         };
         let gap = self.gripping_gap(&at, request.direction);
         let ceiling = self.prescribed_speed.unwrap_or(plan.cruise_speed);
-        let floor = self.least_speed;
+        let floor = self.least_speed.min(plan.cruise_speed);
+        // No faster than the pre-tightener can follow the spring over the corner.
+        let ceiling = ceiling.min(self.climb_speed.max(floor));
         let found = self.model.speed(&at, gap, most + wedge, floor.min(ceiling), ceiling);
         let speed = self.prescribed_speed.unwrap_or(found);
         let (speed, moved) = self.guard.below(speed.max(floor));
         if moved {
             limits.add(Limit::ResonanceAvoided);
         }
+        // A band that reaches below the floor is crossed in: too slow is worse.
+        let speed = speed.max(floor);
         let at = Point { speed, ..at };
         let wanted = self.model.force(&at, gap) - wedge;
         plan.cross_speed = speed;
@@ -169,6 +177,10 @@ impl Planner {
             return Outcome { gap_predicted, slip_margin, scale, bounded: false };
         }
         let observed = self.model.observed_scale(&at, review.gap, force);
+        // Farther off than any tread or tolerance, it is the measurement that is wrong.
+        if (observed - scale).abs() > OUTLIER * scale {
+            return Outcome { gap_predicted, slip_margin, scale, bounded: false };
+        }
         let step = ((observed - scale) * self.gain).clamp(-LARGEST_CORRECTION, LARGEST_CORRECTION);
         let (low, high) = self.scale_range;
         let wanted = scale + step;

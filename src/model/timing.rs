@@ -73,6 +73,12 @@ impl Timing {
         self.speed_change(from - to) * mean
     }
 
+    /// Time in which the jerk takes this acceleration back, s.
+    #[must_use]
+    pub fn until_level(&self, acceleration: MillimetresPerSecond2) -> Seconds {
+        divide(acceleration, self.acceleration) * self.build_up
+    }
+
     /// Time from the command until a preload change stands, s.
     #[must_use]
     pub fn preload_change(&self, change: Newtons) -> Seconds {

@@ -2,6 +2,14 @@
 
 use super::Rig;
 
+/// Preload kept free below the limit for regulation, relative to the limit: gain of
+/// the load cell, and what a climb compresses the spring beyond the feed-forward.
+/// On the presets no rig drawn within its tolerances exceeds the limit with it.
+pub(crate) const REGULATION_PART: f64 = 0.04;
+
+/// Least speed of the unloaded motor over the cruise speed: what it needs to regulate.
+const TOP_SPEED_RESERVE: f64 = 1.2;
+
 /// What is wrong with a parameter set: the key, its value, what was expected.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RigError {
@@ -25,12 +33,14 @@ pub enum RigError {
         /// Least position allowed there, mm.
         least_mm: f64,
     },
-    /// The preload limit lies below the cruise preload.
+    /// The preload limit does not lie above the cruise preload by what regulation needs.
     LimitBelowCruise {
         /// The limit, N.
         limit_n: f64,
         /// The cruise preload, N.
         cruise_n: f64,
+        /// Least limit for it, N.
+        least_n: f64,
     },
     /// The arm cannot reach a wall at this radius.
     OutOfReach {
@@ -53,9 +63,9 @@ impl core::fmt::Display for RigError {
                 f,
                 "rig.step_positions_mm: step {step} stands at {position_mm} mm, expected at least {least_mm} mm (ascending, inside the travel, with room for the wheel)"
             ),
-            Self::LimitBelowCruise { limit_n, cruise_n } => write!(
+            Self::LimitBelowCruise { limit_n, cruise_n, least_n } => write!(
                 f,
-                "preload.limit_n = {limit_n}: expected at least preload.cruise_n = {cruise_n}"
+                "preload.limit_n = {limit_n}: expected at least {least_n:.1}, that is preload.cruise_n = {cruise_n} and room to regulate"
             ),
             Self::OutOfReach { radius_mm, min_mm, max_mm } => write!(
                 f,
@@ -75,10 +85,18 @@ impl Rig {
     pub fn validate(&self) -> Result<(), RigError> {
         self.ranges()?;
         self.step_table()?;
-        if self.preload.limit_n < self.preload.cruise_n {
-            return Err(RigError::LimitBelowCruise {
-                limit_n: self.preload.limit_n,
-                cruise_n: self.preload.cruise_n,
+        let (limit_n, cruise_n) = (self.preload.limit_n, self.preload.cruise_n);
+        let least_n = cruise_n / (1.0 - REGULATION_PART);
+        if limit_n < least_n {
+            return Err(RigError::LimitBelowCruise { limit_n, cruise_n, least_n });
+        }
+        let (top, cruise) = (self.drive.no_load_speed_mm_s, self.drive.cruise_speed_mm_s);
+        if top < TOP_SPEED_RESERVE * cruise {
+            return Err(RigError::OutOfRange {
+                key: "drive.no_load_speed_mm_s",
+                value: top,
+                min: TOP_SPEED_RESERVE * cruise,
+                max: 300.0,
             });
         }
         self.reach()
@@ -92,15 +110,15 @@ impl Rig {
 
     fn ranges(&self) -> Result<(), RigError> {
         let table: [(&'static str, f64, f64, f64); 45] = [
-            ("rig.wheel_radius_mm", self.rig.wheel_radius_mm, 5.0, 200.0),
+            ("rig.wheel_radius_mm", self.rig.wheel_radius_mm, 10.0, 150.0),
             ("rig.wheel_width_mm", self.rig.wheel_width_mm, 1.0, 200.0),
-            ("rig.step_height_mm", self.rig.step_height_mm, 0.5, 8.0),
+            ("rig.step_height_mm", self.rig.step_height_mm, 1.5, 8.0),
             ("rig.step_tolerance_mm", self.rig.step_tolerance_mm, 0.05, 5.0),
             ("rig.travel_mm", self.rig.travel_mm, 1.0, 2000.0),
             ("rig.wall_radius_mm", self.rig.wall_radius_mm, 50.0, 1000.0),
             ("rig.arm_length_mm", self.rig.arm_length_mm, 20.0, 1000.0),
             ("rig.arm_pivot_radius_mm", self.rig.arm_pivot_radius_mm, 0.0, 500.0),
-            ("tread.k_inf_pa_per_m", self.tread.k_inf_pa_per_m, 1e7, 1e11),
+            ("tread.k_inf_pa_per_m", self.tread.k_inf_pa_per_m, 1e7, 5e10),
             ("tread.stiffening", self.tread.stiffening, 1.0, 20.0),
             ("tread.tau_s", self.tread.tau_s, 1e-3, 10.0),
             ("plant.mu", self.plant.mu, 0.0, 3.0),
@@ -111,7 +129,7 @@ impl Rig {
             ("plant.elastic_creep", self.plant.elastic_creep, 1e-4, 0.2),
             ("preload.cruise_n", self.preload.cruise_n, 5.0, 180.0),
             ("preload.limit_n", self.preload.limit_n, 5.0, 180.0),
-            ("preload.spring_n_per_mm", self.preload.spring_n_per_mm, 0.1, 50.0),
+            ("preload.spring_n_per_mm", self.preload.spring_n_per_mm, 0.1, 20.0),
             ("preload.slew_n_per_s", self.preload.slew_n_per_s, 1.0, 500.0),
             ("preload.delay_s", self.preload.delay_s, 0.0, 0.25),
             ("preload.lag_s", self.preload.lag_s, 0.005, 1.0),
@@ -125,7 +143,7 @@ impl Rig {
             ("drive.jerk_mm_s3", self.drive.jerk_mm_s3, 50.0, 30_000.0),
             ("drive.ripple_pitch_mm", self.drive.ripple_pitch_mm, 0.01, 100.0),
             ("drive.guard_band", self.drive.guard_band, 0.0, 0.5),
-            ("sense.encoder_counts", self.sense.encoder_counts, 64.0, 65_536.0),
+            ("sense.encoder_counts", self.sense.encoder_counts, 1024.0, 65_536.0),
             ("sense.load_cell_full_scale_n", self.sense.load_cell_full_scale_n, 20.0, 2000.0),
             ("sense.tread_full_scale_mm", self.sense.tread_full_scale_mm, 0.5, 50.0),
             ("sense.angle_zero_code", self.sense.angle_zero_code, 0.0, 16_383.0),

@@ -30,15 +30,25 @@ pub enum Fault {
     DriveRunaway = 123,
     /// Odometry and arm disagree on the sleeve level at the end of travel.
     LevelMismatch = 131,
+    /// Two steps of the table in a row were not found.
+    StepsLost = 132,
+    /// The wheel turns at a corner without getting over it.
+    WheelSlips = 133,
+    /// The position is not known and no step lies ahead that could tell it.
+    PositionUnknown = 134,
+    /// The model task does not answer.
+    ModelSilent = 141,
     /// A sensor was not at rest or not at zero in the self-test.
     SelfTest = 150,
+    /// The emergency stop cut the bridges.
+    EmergencyStop = 151,
     /// The control tick was late by more than a period.
     TickOverrun = 160,
 }
 
 impl Fault {
     /// Every fault, in the order of codes.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 19] = [
         Self::SpeedStale,
         Self::PressureStale,
         Self::DisplacementStale,
@@ -51,7 +61,12 @@ impl Fault {
         Self::DriveStalled,
         Self::DriveRunaway,
         Self::LevelMismatch,
+        Self::StepsLost,
+        Self::WheelSlips,
+        Self::PositionUnknown,
+        Self::ModelSilent,
         Self::SelfTest,
+        Self::EmergencyStop,
         Self::TickOverrun,
     ];
 
@@ -77,6 +92,13 @@ impl Fault {
             Self::DriveStalled => "the wheel stands still although driven",
             Self::DriveRunaway => "the wheel turns otherwise than commanded",
             Self::LevelMismatch => "the arm does not confirm the sleeve level at the end of travel",
+            Self::StepsLost => "two steps of the table in a row were not found",
+            Self::WheelSlips => "the wheel turns at a corner without getting over it",
+            Self::PositionUnknown => {
+                "the position is not known and no step lies ahead that could tell it: go the other way"
+            }
+            Self::ModelSilent => "the model task does not answer",
+            Self::EmergencyStop => "the emergency stop cut the bridges",
             Self::SelfTest => "a sensor was not at rest or not at zero in the self-test",
             Self::TickOverrun => "the control tick came more than a period late",
         }

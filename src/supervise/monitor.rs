@@ -6,19 +6,23 @@ use super::{Fault, Mode};
 use crate::numeric::checked;
 use crate::rig::{Rig, RigError};
 use crate::sense::{Reason, SensedState, Validity};
-use crate::units::{MillimetresPerSecond, Newtons, q16};
+use crate::units::{MillimetresPerSecond, Newtons, Q16, Ratio, q16};
 
 /// Preload above the limit that counts as overpressure, relative: regulation and
 /// the spring that a climb compresses stay below it.
 const OVERPRESSURE_PART: f64 = 0.10;
 /// Ticks that overpressure must last: noise does not.
 const OVERPRESSURE_TICKS: u16 = 10;
-/// Ticks without motion under a moving reference.
-const STALL_TICKS: u16 = 300;
-/// Ticks of motion beyond the reference.
+/// Ticks without motion under a moving reference: longer than the wheel takes to start.
+const STALL_TICKS: u16 = 150;
+/// Ticks of motion beyond the reference or against it.
 const RUNAWAY_TICKS: u16 = 30;
-/// Ticks that a preload may be short of its reference.
-const PRELOAD_TICKS: u16 = 3000;
+/// Ticks that a preload may be short of what the actuator should have reached: dead time
+/// and lag are in that already, so these are for their tolerance.
+const PRELOAD_TICKS: u16 = 400;
+
+/// One half.
+const HALF: Ratio = q16(500_000);
 
 /// Bounds of a rig.
 #[derive(Clone, Debug)]
@@ -26,8 +30,8 @@ pub struct Monitor {
     overpressure: Newtons,
     /// Speed below which the wheel counts as standing, mm/s.
     standing: MillimetresPerSecond,
-    /// Speed error that counts as runaway, mm/s.
-    runaway: MillimetresPerSecond,
+    /// Speed that the wheel may have beyond one and a half times its reference, mm/s.
+    beyond: MillimetresPerSecond,
     /// Preload error that counts as short, N.
     short: Newtons,
 }
@@ -54,6 +58,8 @@ pub struct Observed<'a> {
     pub preload_due: Newtons,
     /// The tick came more than a period late.
     pub overrun: bool,
+    /// The emergency stop has cut the bridges.
+    pub emergency_stop: bool,
 }
 
 impl Monitor {
@@ -69,9 +75,24 @@ impl Monitor {
                 rig.preload.limit_n * (1.0 + OVERPRESSURE_PART),
             )?,
             standing: q16(200_000),
-            runaway: checked("drive.cruise_speed_mm_s", 0.3 * rig.drive.cruise_speed_mm_s)?,
+            beyond: q16(5_000_000),
             short: checked("preload.cruise_n", 0.1 * rig.preload.cruise_n)?,
         })
+    }
+
+    /// Whether the wheel turns against its reference or far beyond it.
+    fn runs_away(
+        &self,
+        mode: Mode,
+        speed: MillimetresPerSecond,
+        wanted: MillimetresPerSecond,
+    ) -> bool {
+        let (along, asked) = if wanted < Q16::ZERO { (-speed, -wanted) } else { (speed, wanted) };
+        if driven(mode) {
+            along < -self.standing - self.standing || along > asked + asked * HALF + self.beyond
+        } else {
+            speed.abs() > self.beyond
+        }
     }
 
     /// The fault of this tick, if any; the gravest first.
@@ -82,19 +103,21 @@ impl Monitor {
         }
         let preload = seen.sensed.preload.value;
         let speed = seen.sensed.speed.value;
-        let error = speed - seen.speed_ref;
-        let driven = seen.mode.moves();
-        lasting(&mut state.overpressure, preload > self.overpressure);
-        lasting(&mut state.short, {
-            let acting = driven || matches!(seen.mode, Mode::Preload(_));
-            acting && seen.preload_due - preload > self.short
-        });
+        let acting = driven(seen.mode) || matches!(seen.mode, Mode::Preload(_));
+        // With the bridges off nothing here could relieve it; while it falls as it should,
+        // it is being relieved.
+        let pressed = preload > self.overpressure
+            && (driven(seen.mode) || acting && preload - seen.preload_due > self.short);
+        lasting(&mut state.overpressure, pressed);
+        lasting(&mut state.short, acting && seen.preload_due - preload > self.short);
         let asked = seen.speed_ref.abs() > self.standing + self.standing;
-        lasting(&mut state.stall, driven && asked && speed.abs() < self.standing);
-        let moved = if driven { error.abs() > self.runaway } else { speed.abs() > self.runaway };
-        lasting(&mut state.runaway, moved);
+        let stands = speed.abs() < self.standing;
+        lasting(&mut state.stall, driven(seen.mode) && asked && stands);
+        lasting(&mut state.runaway, self.runs_away(seen.mode, speed, seen.speed_ref));
         let lost = sensor_fault(seen.sensed);
-        if seen.overrun {
+        if seen.emergency_stop {
+            Some(Fault::EmergencyStop)
+        } else if seen.overrun {
             Some(Fault::TickOverrun)
         } else if state.overpressure >= OVERPRESSURE_TICKS {
             Some(Fault::Overpressure)
@@ -110,6 +133,11 @@ impl Monitor {
             None
         }
     }
+}
+
+/// Whether the drive's bridge is on.
+fn driven(mode: Mode) -> bool {
+    mode.moves()
 }
 
 /// Counts ticks while a condition lasts.

@@ -52,7 +52,9 @@ impl Trigger {
 
 /// The mode after `trigger` in `mode`; `None` if the mode does not take it.
 ///
-/// A fault leads to the fault hold from everywhere, and the first fault is kept.
+/// A fault leads to the fault hold from everywhere, and the first fault is kept. While
+/// something moves, start and retract mean stop: whoever presses the button then
+/// wants it to end.
 #[must_use]
 pub const fn next(mode: Mode, trigger: Trigger) -> Option<Mode> {
     use Command::{Reset, Retract, Start, Stop};
@@ -71,9 +73,10 @@ pub const fn next(mode: Mode, trigger: Trigger) -> Option<Mode> {
         (M::Idle | M::Complete(Back), T::Command(Start)) => M::Preload(Deploy),
         (M::Idle | M::Complete(Deploy), T::Command(Retract)) => M::Preload(Back),
         (M::Preload(direction), T::PreloadStands) => M::Run(direction, Leg::Cruise),
-        (M::Preload(_), T::Command(Stop)) => M::Idle,
+        // A press of the button stops whatever moves.
+        (M::Preload(_), T::Command(Stop | Start | Retract)) => M::Idle,
         (M::Run(direction, _), T::Leg(leg)) => M::Run(direction, leg),
-        (M::Run(direction, _), T::Command(Stop)) => M::Stopping(direction),
+        (M::Run(direction, _), T::Command(Stop | Start | Retract)) => M::Stopping(direction),
         (M::Run(direction, _), T::Arrived) => M::Complete(direction),
         (M::Stopping(_), T::AtRest) => M::Idle,
         _ => return None,

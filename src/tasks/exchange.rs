@@ -115,6 +115,7 @@ impl Exchange {
             command: self.commands.try_receive().ok(),
             plan: self.answer.try_take(),
             overrun,
+            emergency_stop: false,
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::beat::Beat;
 use super::exchange::Exchange;
-use crate::control::{Controller, State};
+use crate::control::{Controller, Input, State};
 use crate::hal::{MotorCommand, Motors, Watchdog};
 
 /// Runs the control tick at 1 kHz: latest codes, command and plan in; bridges,
@@ -23,9 +23,13 @@ pub async fn motors(
     let mut beat = Beat::<1>::new();
     loop {
         let due = beat.next().await;
-        let input = exchange.input(due.tick, due.missed > 0);
+        let input =
+            Input { emergency_stop: motors.stopped(), ..exchange.input(due.tick, due.missed > 0) };
         let output = controller.step(&mut state, &input);
         motors.apply(output.drive, output.preload);
+        if output.rearm {
+            motors.rearm();
+        }
         exchange.publish(&output);
         if exchange.all_checked_in(due.tick) {
             watchdog.feed();

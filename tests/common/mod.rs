@@ -202,6 +202,12 @@ impl Motors for Record<(MotorCommand, MotorCommand)> {
     fn apply(&mut self, drive: MotorCommand, preload: MotorCommand) {
         self.push((drive, preload));
     }
+
+    fn stopped(&mut self) -> bool {
+        false
+    }
+
+    fn rearm(&mut self) {}
 }
 
 impl Watchdog for Record<()> {

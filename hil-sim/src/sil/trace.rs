@@ -1,8 +1,8 @@
 //! What is kept of a run while it goes on.
 
 use interstage::control::Output;
-use interstage::log::{Event, Telemetry};
-use interstage::supervise::{Leg, Mode};
+use interstage::log::{CrossingRecord, Event, Telemetry};
+use interstage::supervise::{Direction, Leg, Mode};
 use interstage::units::Q16;
 use sha2::{Digest, Sha256};
 
@@ -15,6 +15,9 @@ use crate::scenario::Scenario;
 /// Short of the wanted preload by no more than this part of it, it stands: what the
 /// controller allows of measured preload, and three deviations of the load cell.
 const STANDS_PART: f64 = 0.035;
+/// How far from the end of travel a run that arrived may stand, mm: twice what creep and
+/// wheel radius leave on the drawn rigs.
+const ARRIVED_WITHIN_MM: f64 = 1.0;
 
 /// A run's record as it grows.
 pub(super) struct Trace {
@@ -75,7 +78,7 @@ impl Trace {
                 None => {}
             }
             if let Event::Crossing(record) = entry.event {
-                self.reported.push(record);
+                self.reported.push((t_s, record));
             }
         }
         self.preload.push(truth.preload_n as f32);
@@ -92,21 +95,30 @@ impl Trace {
         }
     }
 
+    /// The record of a run that `arrived` at the end of this way by the controller's
+    /// word, if it did, and took `wall_s` to compute.
     pub(super) fn finish(
         self,
         scenario: &Scenario,
         plant: &VirtualRig,
-        arrived: bool,
-        steps: usize,
+        arrived: Option<Direction>,
         wall_s: f64,
     ) -> Recording {
         let truth = plant.truth();
+        let steps = plant.parameters().wall.steps().len();
+        let there = arrived.is_some_and(|way| {
+            let end_mm = match way {
+                Direction::Deploy => scenario.rig.rig.travel_mm,
+                Direction::Retract => 0.0,
+            };
+            (truth.position_mm - end_mm).abs() <= ARRIVED_WITHIN_MM
+        });
         let crossings: Vec<CrossingLine> =
             plant.ledger().crossings().iter().map(|crossing| self.line(crossing)).collect();
         let worst = crossings.iter().map(|c| c.gap_mm).fold(self.worst_separation, f64::max);
         let total_s = f64::from(self.ticks) * TICK_S;
         let summary = Summary {
-            completed: arrived && crossings.len() == steps && self.faults.is_empty(),
+            completed: there && crossings.len() == steps && self.faults.is_empty(),
             target: "sil".into(),
             controller: scenario.run.controller.name().into(),
             direction: scenario.run.direction.name().into(),
@@ -133,9 +145,15 @@ impl Trace {
     /// Ledger line: the plant's truth with what the controller reported of the same
     /// step beside it.
     fn line(&self, crossing: &Crossing) -> CrossingLine {
-        let near = |r: &&Reported| (r.position.to_num::<f64>() - crossing.step_mm).abs() < 5.0;
-        let reported = self.reported.iter().find(near);
-        let num = |f: fn(&Reported) -> Q16| reported.map(|r| f(r).to_num::<f64>());
+        let climbed = |way: Direction| (way == Direction::Deploy) == crossing.climbing;
+        // Reported when the crossing is closed: the first of this step after lift-off.
+        let same = |(t_s, r): &&Reported| {
+            *t_s >= crossing.lift_s
+                && climbed(r.direction)
+                && (r.position.to_num::<f64>() - crossing.step_mm).abs() < 5.0
+        };
+        let reported = self.reported.iter().find(same);
+        let num = |f: fn(&CrossingRecord) -> Q16| reported.map(|(_, r)| f(r).to_num::<f64>());
         CrossingLine {
             index: crossing.index as u8,
             speed_mm_s: crossing.speed_mm_s,

@@ -11,10 +11,18 @@ use crate::numeric::checked;
 use crate::rig::{Rig, RigError};
 use crate::sense::{Senses, Tuning};
 use crate::supervise::Monitor;
+use crate::units::TICK_HZ;
 
 /// Bandwidth of the speed observer, rad/s: three times the speed loop's crossover;
 /// an encoder count every 2 ms at crossing speed leaves it quiet enough.
 const OBSERVER_RAD_S: f64 = 60.0;
+
+/// Part of the pre-tightener's slew that the spring may use up while the wheel climbs.
+const CLIMB_PART: f64 = 0.9;
+
+/// Way of the wheel between touching a corner and leaving it, over its radius, beyond
+/// which it turns without getting over: twice the way of a crossing.
+const CORNER_PART: f64 = 1.5;
 
 impl Controller {
     /// Turns a rig into machine units, once.
@@ -40,6 +48,13 @@ impl Controller {
             preload_loop: PreloadLoop::try_build(rig)?,
             steps,
             travel: checked("rig.travel_mm", rig.rig.travel_mm)?,
+            patience: ((2.0 * rig.preload.limit_n / rig.preload.slew_n_per_s + 1.0)
+                * f64::from(TICK_HZ)) as u32,
+            rise_speed: checked(
+                "preload.spring_n_per_mm",
+                (CLIMB_PART * rig.preload.slew_n_per_s / rig.preload.spring_n_per_mm).min(1000.0),
+            )?,
+            corner_way: checked("rig.wheel_radius_mm", CORNER_PART * rig.rig.wheel_radius_mm)?,
             spring: checked("preload.spring_n_per_mm", rig.preload.spring_n_per_mm)?,
             foresight: checked("preload.delay_s", rig.preload.delay_s + rig.preload.lag_s)?,
             load: checked("plant.top_load_n", rig.plant.top_load_n * rig.plant.top_load_share)?,

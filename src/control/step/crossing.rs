@@ -3,11 +3,11 @@
 use super::state::{LiftPoint, OpenCrossing};
 use super::{Controller, Pass, State};
 use crate::control::schedule::{Course, Expectation};
-use crate::estimate::crossing::{Contact, Lift, Sign};
+use crate::estimate::crossing::{Contact, Lift, Seen, Sign};
 use crate::log::{CrossingRecord, Event};
 use crate::model::{Outcome, Review};
-use crate::supervise::{Direction, Limit, Mode};
-use crate::units::{Millimetres, Q16, Seconds, ticks_to_seconds};
+use crate::supervise::{Direction, Fault, Limit, Mode};
+use crate::units::{Millimetres, Q16, Seconds, Tick, Travel, ticks_to_seconds};
 
 impl Controller {
     /// Lets the watch look at the tick while the drive moves.
@@ -16,6 +16,7 @@ impl Controller {
             Mode::Run(direction, _) | Mode::Stopping(direction) => direction,
             _ => return,
         };
+        self.watch_slip(state, pass);
         let seen = self.seen(state, pass);
         let sign = self.watch.step(&mut state.watch, direction, &seen);
         if let Some(open) = state.crossing.as_mut() {
@@ -26,17 +27,27 @@ impl Controller {
             Some(Sign::Touched) => self.touched(state, pass, direction),
             Some(Sign::Released) => state.crossing = None,
             Some(Sign::Lifted(lift)) => self.lifted(state, pass, direction, lift),
-            Some(Sign::Over) => {
-                // The controller's own count of levels; the arm confirms it at the end.
-                state.level = match direction {
-                    Direction::Deploy => state.level.saturating_add(1),
-                    Direction::Retract => state.level.saturating_sub(1),
-                };
-            }
+            Some(Sign::Over) => self.over(state, direction),
             Some(Sign::Closed { gap, plausible, .. }) => self.closed(state, pass, gap, plausible),
             Some(Sign::Again { gap }) => {
                 self.closed(state, pass, gap, false);
                 self.touched(state, pass, direction);
+            }
+        }
+    }
+
+    /// One level on; the arm confirms the count at the end.
+    fn over(&self, state: &mut State, direction: Direction) {
+        let unknown = state.crossing.is_some_and(|open| open.step == 0);
+        state.lost_in_a_row = 0;
+        match direction {
+            Direction::Deploy => {
+                state.level = state.level.saturating_add(1);
+                state.extra = state.extra.saturating_add(u8::from(unknown));
+            }
+            Direction::Retract => {
+                state.level = state.level.saturating_sub(1);
+                state.extra = state.extra.saturating_sub(u8::from(unknown));
             }
         }
     }
@@ -53,17 +64,24 @@ impl Controller {
         } else if expectation == Expectation::Ahead {
             pass.log(Event::Limit(Limit::StepEarly));
         }
+        let step = if belongs { state.next_step } else { 0 };
+        let expected = belongs && !searching && expectation != Expectation::Ahead;
         state.crossing = Some(OpenCrossing {
-            step: if belongs { state.next_step } else { 0 },
-            direction,
-            expected: belongs && !searching && expectation != Expectation::Ahead,
-            touched_at: pass.now,
             standing_since: state.standing_since,
             peak_preload: pass.sensed.preload_filtered,
-            lift: None,
-            gap: Millimetres::ZERO,
-            deepest: Millimetres::ZERO,
+            ..OpenCrossing::begin(step, direction, expected, pass.now)
         });
+    }
+
+    /// A wheel that turns on a corner far longer than a crossing takes does not get over.
+    fn watch_slip(&self, state: &mut State, pass: &mut Pass<'_>) {
+        let on_corner = matches!(state.watch.contact, Contact::Both | Contact::Corner);
+        let Some(open) = state.crossing.as_mut().filter(|_| on_corner) else { return };
+        let from = *open.from.get_or_insert(pass.sensed.travel);
+        let way = pass.sensed.travel.saturating_sub(from).saturating_abs();
+        if way > Travel::from_num(self.corner_way.0) {
+            self.give_up(state, pass, Fault::WheelSlips);
+        }
     }
 
     fn lifted(&self, state: &mut State, pass: &mut Pass<'_>, direction: Direction, lift: Lift) {
@@ -153,14 +171,35 @@ impl Controller {
             }
             Expectation::Missing => {
                 pass.log(Event::Limit(Limit::StepMissing));
+                state.lost_in_a_row = state.lost_in_a_row.saturating_add(1);
+                state.given_up = match course.direction {
+                    Direction::Deploy => state.given_up.saturating_add(1),
+                    Direction::Retract => state.given_up.saturating_sub(1),
+                };
                 self.advance(state, course.direction);
                 self.ask(state, pass);
+                if state.lost_in_a_row > 1 {
+                    self.give_up(state, pass, Fault::StepsLost);
+                }
             }
         }
     }
 
+    /// What the crossing watch looks at.
+    pub(super) fn seen(&self, state: &State, pass: &Pass<'_>) -> Seen {
+        let course = self.course(state, pass, state.direction);
+        let near =
+            self.schedule.to_window(&self.rise, &course).is_some_and(|ahead| ahead <= Q16::ZERO);
+        Seen {
+            radius: pass.sensed.radius.value,
+            compression: pass.sensed.compression_filtered,
+            near,
+            clear: self.clear_of(state, pass),
+        }
+    }
+
     /// Whether the wheel has left the corner of the last step behind.
-    pub(super) fn clear_of(&self, state: &State, pass: &Pass<'_>) -> bool {
+    fn clear_of(&self, state: &State, pass: &Pass<'_>) -> bool {
         let Some(point) = state.crossing.and_then(|open| open.lift) else { return true };
         let past = match state.direction {
             Direction::Deploy => pass.position - point.face,
@@ -184,6 +223,7 @@ impl Controller {
             Direction::Retract => state.next_step.saturating_sub(1),
         };
         state.ramping = false;
+        state.braking = false;
         state.late = false;
         state.waited = false;
         state.standing_since = None;
@@ -192,7 +232,7 @@ impl Controller {
 
 /// How long the preload stood before the corner was felt; negative by how long it
 /// was still missing.
-fn lead_time(open: &OpenCrossing, lifted_at: crate::units::Tick) -> Seconds {
+fn lead_time(open: &OpenCrossing, lifted_at: Tick) -> Seconds {
     match open.standing_since {
         Some(since) => ticks_to_seconds(open.touched_at.wrapping_sub(since)),
         None => -ticks_to_seconds(lifted_at.wrapping_sub(open.touched_at)),

@@ -10,7 +10,7 @@ use crate::model::{Plan, Review};
 use crate::sense::SensesState;
 use crate::supervise::{Direction, Leg, Mode, MonitorState};
 use crate::units::{
-    Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, Ratio, Tick, q16,
+    Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, Ratio, Tick, Travel, q16,
 };
 
 /// State of the controller.
@@ -19,6 +19,8 @@ pub struct State {
     pub(super) mode: Mode,
     /// Ticks since the mode was entered.
     pub(super) in_mode: u32,
+    /// Ticks for which what the mode waits for has stood.
+    pub(super) stood: u32,
     pub(super) senses: SensesState,
     pub(super) monitor: MonitorState,
     pub(super) odometry: Odometry,
@@ -40,6 +42,8 @@ pub struct State {
     pub(super) plan: Option<Plan>,
     /// Sequence of the newest request.
     pub(super) sequence: u32,
+    /// Ticks for which it has waited for its answer, from 1; 0 when answered.
+    pub(super) asked: u32,
     pub(super) scale: Ratio,
     /// The crossing under way or just behind.
     pub(super) crossing: Option<OpenCrossing>,
@@ -49,12 +53,22 @@ pub struct State {
     pub(super) review: Option<Review>,
     /// The preload is being raised for the step ahead.
     pub(super) ramping: bool,
+    /// The speed is being brought down for the step ahead.
+    pub(super) braking: bool,
     /// Since when the crossing preload has stood.
     pub(super) standing_since: Option<Tick>,
     /// The step ahead is late and has been reported.
     pub(super) late: bool,
     /// Waiting for the preload has been reported for this step.
     pub(super) waited: bool,
+    /// Ticks for which the drive has waited for the preload.
+    pub(super) waiting: u32,
+    /// Steps of the table given up since the stow end.
+    pub(super) given_up: u8,
+    /// Steps given up since the last one found.
+    pub(super) lost_in_a_row: u8,
+    /// Steps climbed that the table lacks, since the stow end.
+    pub(super) extra: u8,
 }
 
 /// A crossing under way.
@@ -66,12 +80,32 @@ pub(super) struct OpenCrossing {
     /// Felt inside its window, so that baseline and preload were ready.
     pub expected: bool,
     pub touched_at: Tick,
+    /// Odometry when the corner was first felt.
+    pub from: Option<Travel>,
     pub standing_since: Option<Tick>,
     pub peak_preload: Newtons,
     pub lift: Option<LiftPoint>,
     /// Gap and compression when closed.
     pub gap: Millimetres,
     pub deepest: Millimetres,
+}
+
+impl OpenCrossing {
+    /// A crossing that begins now.
+    pub(super) fn begin(step: u8, direction: Direction, expected: bool, now: Tick) -> Self {
+        Self {
+            step,
+            direction,
+            expected,
+            touched_at: now,
+            from: None,
+            standing_since: None,
+            peak_preload: Newtons::ZERO,
+            lift: None,
+            gap: Millimetres::ZERO,
+            deepest: Millimetres::ZERO,
+        }
+    }
 }
 
 /// The instant of lift-off.
@@ -92,6 +126,7 @@ impl Default for State {
         Self {
             mode: Mode::Boot,
             in_mode: 0,
+            stood: 0,
             senses: SensesState::default(),
             monitor: MonitorState::default(),
             odometry: Odometry::default(),
@@ -107,14 +142,20 @@ impl Default for State {
             preload_loop: PreloadLoopState::default(),
             plan: None,
             sequence: 0,
+            asked: 0,
             scale: q16(1_000_000),
             crossing: None,
             line: None,
             review: None,
             ramping: false,
+            braking: false,
             standing_since: None,
             late: false,
             waited: false,
+            waiting: 0,
+            given_up: 0,
+            lost_in_a_row: 0,
+            extra: 0,
         }
     }
 }

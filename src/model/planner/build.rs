@@ -7,13 +7,17 @@ use crate::model::plan::Strategy;
 use crate::model::reduced::ReducedModel;
 use crate::model::timing::Timing;
 use crate::numeric::checked;
-use crate::rig::{Rig, RigError};
+use crate::rig::{REGULATION_PART, Rig, RigError};
 use crate::supervise::Direction;
 
-/// Preload kept free below the limit for regulation, relative to the limit: gain of
-/// the load cell, and what the climb compresses the spring beyond the feed-forward
-/// on a rig at the end of its tolerances. With it no drawn rig exceeds the limit.
-const REGULATION_PART: f64 = 0.04;
+/// Part of the pre-tightener's slew that the spring may use up while the wheel climbs.
+const CLIMB_PART: f64 = 0.9;
+/// Steepest rise of the wheel over a corner, that behind lift-off.
+const LIFT_SLOPE: f64 = 0.5;
+
+/// What the least planned speed lies above the least useful one, relative: creep of
+/// the tread and the dip under the load of the corner take up to a tenth.
+const DIP_PART: f64 = 0.12;
 
 impl Planner {
     /// The scheduler of a rig.
@@ -69,15 +73,21 @@ impl Planner {
             cruise_speed: checked("drive.cruise_speed_mm_s", rig.drive.cruise_speed_mm_s)?,
             least_speed: checked(
                 "drive.min_crossing_speed_mm_s",
-                rig.drive.min_crossing_speed_mm_s,
+                rig.drive.min_crossing_speed_mm_s * (1.0 + DIP_PART),
             )?,
             safe_speed: checked("control.safe_speed_mm_s", rig.control.safe_speed_mm_s)?,
+            climb_speed: checked(
+                "preload.spring_n_per_mm",
+                (CLIMB_PART * rig.preload.slew_n_per_s
+                    / (rig.preload.spring_n_per_mm * LIFT_SLOPE))
+                    .min(1000.0),
+            )?,
             prescribed_speed: None,
             uniform: false,
             cruise_preload: checked("preload.cruise_n", rig.preload.cruise_n)?,
             most_preload: checked(
                 "preload.limit_n",
-                (rig.preload.limit_n * (1.0 - REGULATION_PART)).max(rig.preload.cruise_n),
+                rig.preload.limit_n * (1.0 - REGULATION_PART),
             )?,
             friction: checked("plant.mu", rig.plant.mu)?,
             usable: checked("control.slip_margin", rig.plant.mu - rig.control.slip_margin)?,

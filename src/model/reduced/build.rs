@@ -30,7 +30,7 @@ impl ReducedModel {
                 key: "tread.k_inf_pa_per_m",
                 value: rig.tread.k_inf_pa_per_m,
                 min: 1e7,
-                max: 1e11,
+                max: 5e10,
             })
         };
         let slope = |gap: f64| {

@@ -1,0 +1,182 @@
+//! A run under way: controller and plant, a tick at a time, with commands and sensor
+//! failures given from outside.
+
+use interstage::control::{Controller, Input, Output, State};
+use interstage::hal::MotorCommand;
+use interstage::model::{Plan, Planner};
+use interstage::sense::raw::{Sample, SensorFrame};
+use interstage::supervise::{Command, Direction, Mode};
+use interstage::units::Tick;
+
+use super::trace::Trace;
+use super::{Options, RunError, TICK_S};
+use crate::plant::draw::PlantParameters;
+use crate::plant::rig::{Drives, VirtualRig};
+use crate::plant::sensors::{Codes, Sensed, Sensors};
+use crate::record::Recording;
+use crate::scenario::Scenario;
+
+/// The angle sensor is read every second tick.
+const ANGLE_EVERY: Tick = 2;
+
+/// A run under way.
+///
+/// [`Session::step`] is one millisecond. Who wants to tamper with what the controller
+/// gets takes its two halves apart: [`Session::sense`] and [`Session::advance`].
+pub struct Session {
+    scenario: Scenario,
+    options: Options,
+    controller: Controller,
+    planner: Planner,
+    state: State,
+    plant: VirtualRig,
+    sensors: Sensors,
+    frame: SensorFrame,
+    tick: Tick,
+    plan: Option<Plan>,
+    trace: Trace,
+}
+
+impl Session {
+    /// A session before its first tick: for deployment with the wheel unloaded at the
+    /// stow end, for retraction pressed at the end of travel.
+    ///
+    /// # Errors
+    /// [`RunError::Rig`] if the parameters do not make a controller.
+    pub fn new(scenario: &Scenario, options: Options) -> Result<Self, RunError> {
+        let strategy = scenario.run.controller.into();
+        let mut planner = Planner::try_build_as(&scenario.rig, strategy)?;
+        if let Some((speed, uniform)) = options.speed {
+            planner = planner.with_speed(speed, uniform)?;
+        }
+        let direction = scenario.run.direction.into();
+        let parameters = PlantParameters::draw(scenario);
+        // The way back begins where the way out ended: at the end of travel, pressed.
+        let (position, preload) = match direction {
+            Direction::Deploy => (0.0, 0.0),
+            Direction::Retract => (scenario.rig.rig.travel_mm, scenario.rig.preload.cruise_n),
+        };
+        Ok(Self {
+            controller: Controller::try_build(&scenario.rig)?,
+            trace: Trace::new(planner.gap_ref(direction).to_num(), position),
+            planner,
+            state: State::default(),
+            sensors: Sensors::new(parameters.sensors.clone(), scenario.run.seed),
+            plant: VirtualRig::new(parameters, position, preload, TICK_S),
+            frame: SensorFrame::default(),
+            tick: 0,
+            plan: None,
+            scenario: scenario.clone(),
+            options,
+        })
+    }
+
+    /// One millisecond with an operator's command or none.
+    ///
+    /// # Errors
+    /// [`RunError::Plant`] if the plant leaves the set of meaningful states.
+    pub fn step(&mut self, command: Option<Command>) -> Result<Output, RunError> {
+        let frame = self.sense();
+        self.advance(&frame, command)
+    }
+
+    /// Reads the sensors: the latest code of each at the present tick. Once a tick,
+    /// before [`Session::advance`].
+    pub fn sense(&mut self) -> SensorFrame {
+        let codes = read(&mut self.sensors, &self.plant);
+        let at = self.tick;
+        self.frame.wheel = Some(Sample { code: codes.wheel, at });
+        self.frame.load_cell = Some(Sample { code: codes.load_cell, at });
+        self.frame.tread = Some(Sample { code: codes.tread, at });
+        if at.is_multiple_of(ANGLE_EVERY) {
+            self.frame.arm = Some(Sample { code: codes.arm, at });
+        }
+        self.frame
+    }
+
+    /// The control tick on what `sensors` holds, then the plant's millisecond under
+    /// its output.
+    ///
+    /// # Errors
+    /// [`RunError::Plant`] if the plant leaves the set of meaningful states.
+    pub fn advance(
+        &mut self,
+        sensors: &SensorFrame,
+        command: Option<Command>,
+    ) -> Result<Output, RunError> {
+        let input = Input {
+            now: self.tick,
+            sensors: *sensors,
+            command,
+            plan: self.plan.take(),
+            ..Input::default()
+        };
+        let output = self.controller.step(&mut self.state, &input);
+        if let Some(request) = output.request {
+            // The model task runs between the ticks.
+            self.plan = Some(self.planner.plan(&request));
+        }
+        self.trace.look(&output, self.plant.truth(), self.options.rows);
+        self.plant.step(&drives(output.drive, output.preload), TICK_S)?;
+        self.tick += 1;
+        Ok(output)
+    }
+
+    /// Power lost and back: the controller forgets everything, the rig stays where it is.
+    pub fn reboot(&mut self) {
+        self.state = State::default();
+        self.plan = None;
+    }
+
+    /// What the drive is doing.
+    #[must_use]
+    pub const fn mode(&self) -> Mode {
+        self.state.mode()
+    }
+
+    /// Time since boot, s.
+    #[must_use]
+    pub fn time_s(&self) -> f64 {
+        f64::from(self.tick) * TICK_S
+    }
+
+    /// The plant.
+    #[must_use]
+    pub const fn plant(&self) -> &VirtualRig {
+        &self.plant
+    }
+
+    /// What is left behind if the session ends here; it took `wall_s` to compute.
+    #[must_use]
+    pub fn finish(self, wall_s: f64) -> Recording {
+        let arrived = match self.state.mode() {
+            Mode::Complete(way) => Some(way),
+            _ => None,
+        };
+        self.trace.finish(&self.scenario, &self.plant, arrived, wall_s)
+    }
+}
+
+/// What the sensors of this plant read now, a tick after the last call.
+pub fn read(sensors: &mut Sensors, plant: &VirtualRig) -> Codes {
+    let truth = plant.truth();
+    let sensed = Sensed {
+        rotation_rad: truth.rotation_rad,
+        preload_n: truth.preload_n,
+        depth_mm: truth.depth_mm,
+        arm_rad: truth.arm_rad,
+    };
+    sensors.read(sensed, TICK_S)
+}
+
+/// Bridge commands as the plant sees them.
+#[must_use]
+pub fn drives(drive: MotorCommand, preload: MotorCommand) -> Drives {
+    let duty = |command: MotorCommand| f64::from(command.duty.to_bits()) / 32_768.0;
+    Drives {
+        drive: duty(drive),
+        drive_on: drive.enable,
+        preload: duty(preload),
+        preload_on: preload.enable,
+    }
+}

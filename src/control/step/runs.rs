@@ -1,0 +1,144 @@
+//! Before and at the end of a run: where the wheel is, what lies ahead, whether it
+//! has arrived.
+
+use super::state::OpenCrossing;
+use super::{Controller, Pass, State};
+use crate::estimate::crossing::Contact;
+use crate::supervise::{Direction, Fault, Trigger};
+use crate::units::{Millimetres, Q16, q16};
+
+impl Controller {
+    /// Gives the odometry its origin. Only the stow end, found unloaded, is certain;
+    /// elsewhere the arm tells the level, a place on it is assumed, and the next step is
+    /// searched for.
+    pub(super) fn locate(&self, state: &mut State, pass: &mut Pass<'_>, stowed: bool) {
+        if stowed {
+            state.odometry.set(pass.sensed.travel, Millimetres::ZERO);
+            state.located = true;
+            state.searching = false;
+            state.crossing = None;
+            state.level = 0;
+            (state.given_up, state.extra) = (0, 0);
+            pass.position = Millimetres::ZERO;
+            return;
+        }
+        if state.located {
+            return;
+        }
+        state.level = pass.sensed.level;
+        let level = usize::from(state.level);
+        let low = level.checked_sub(1).and_then(|i| self.steps.get(i)).copied();
+        let high = self.steps.get(level).copied();
+        let position = match (low, high) {
+            _ if level == 0 => Millimetres::ZERO,
+            (Some(low), Some(high)) => (low + high) * q16(500_000),
+            _ => self.travel,
+        };
+        state.odometry.set(pass.sensed.travel, position);
+        state.located = true;
+        state.searching = true;
+        pass.position = position;
+    }
+
+    /// Before a run: step ahead, baseline, plan.
+    pub(super) fn prepare(&self, state: &mut State, pass: &mut Pass<'_>, direction: Direction) {
+        let turned = state.direction != direction;
+        state.direction = direction;
+        if turned {
+            self.turn(state, pass, direction);
+        } else if state.crossing.is_none() {
+            self.start_afresh(state, pass, direction);
+        }
+        state.ramping = false;
+        state.braking = false;
+        state.late = false;
+        state.waited = false;
+        state.standing_since = None;
+        state.lost_in_a_row = 0;
+        self.ask(state, pass);
+        if state.searching && state.next_step == 0 {
+            self.give_up(state, pass, Fault::PositionUnknown);
+        }
+    }
+
+    fn start_afresh(&self, state: &mut State, pass: &Pass<'_>, direction: Direction) {
+        state.next_step = self.step_ahead(state, pass, direction);
+        let seen = self.seen(state, pass);
+        self.watch.begin(&mut state.watch, &seen);
+    }
+
+    /// Turning back, perhaps on a corner.
+    fn turn(&self, state: &mut State, pass: &mut Pass<'_>, direction: Direction) {
+        let open = state.crossing.take();
+        let before = state.watch.contact;
+        self.watch.reverse(&mut state.watch, direction);
+        let Some(open) = open else {
+            self.start_afresh(state, pass, direction);
+            return;
+        };
+        let steps = self.steps.len() as u8;
+        let beyond = if open.step < steps { open.step + 1 } else { 0 };
+        let again = OpenCrossing::begin(open.step, direction, false, pass.now);
+        match (before, direction) {
+            // Off the corner onto the wall it came from.
+            (Contact::Both, Direction::Retract) => {
+                state.next_step = open.step.saturating_sub(1);
+            }
+            (Contact::Corner, Direction::Deploy) => state.next_step = beyond,
+            // The other way over the same corner.
+            (Contact::Corner, Direction::Retract) => {
+                state.level = state.level.saturating_add(1);
+                state.next_step = open.step;
+                state.crossing = Some(again);
+            }
+            (Contact::Both, Direction::Deploy) => {
+                state.level = state.level.saturating_sub(1);
+                state.next_step = open.step;
+                state.crossing = Some(again);
+            }
+            (Contact::Leaving | Contact::Wall, _) => state.next_step = open.step,
+        }
+        if open.step == 0 {
+            state.next_step = self.step_ahead(state, pass, direction);
+        }
+    }
+
+    /// Number of the step ahead, by position, or by level while that is not known; 0 if
+    /// there is none.
+    fn step_ahead(&self, state: &State, pass: &Pass<'_>, direction: Direction) -> u8 {
+        let behind = if state.searching {
+            usize::from(state.level).min(self.steps.len())
+        } else {
+            self.steps.iter().take_while(|face| **face <= pass.position).count()
+        };
+        match direction {
+            Direction::Deploy if behind < self.steps.len() => behind as u8 + 1,
+            Direction::Deploy => 0,
+            Direction::Retract => behind as u8,
+        }
+    }
+
+    /// The end of travel, confirmed by the arm.
+    pub(super) fn await_arrival(
+        &self,
+        state: &mut State,
+        pass: &mut Pass<'_>,
+        direction: Direction,
+    ) {
+        let remaining = self.schedule.remaining(direction, pass.position);
+        if !self.schedule.arrived(remaining) || state.profile.speed() != Q16::ZERO {
+            return;
+        }
+        let steps = self.steps.len() as u8;
+        let expected = match direction {
+            Direction::Deploy => (steps + state.extra).saturating_sub(state.given_up),
+            Direction::Retract => 0,
+        };
+        let on_wall = matches!(state.watch.contact, Contact::Wall | Contact::Leaving);
+        if on_wall && pass.sensed.level == expected && !state.searching {
+            self.trigger(state, pass, Trigger::Arrived);
+        } else {
+            self.give_up(state, pass, Fault::LevelMismatch);
+        }
+    }
+}
