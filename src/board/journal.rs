@@ -84,10 +84,10 @@ pub(crate) fn rig_error(error: &RigError) {
         RigError::StepOrder { step, position_mm, least_mm } => {
             error!("step {=usize} at {=f64} mm: expected >= {=f64}", step, position_mm, least_mm);
         }
-        RigError::LimitBelowCruise { limit_n, cruise_n } => {
+        RigError::LimitBelowCruise { limit_n, cruise_n, least_n } => {
             error!(
-                "preload limit {=f64} N is below the cruise preload {=f64} N",
-                limit_n, cruise_n
+                "preload limit {=f64} N: expected >= {=f64} for a cruise preload of {=f64} N",
+                limit_n, least_n, cruise_n
             );
         }
         RigError::OutOfReach { radius_mm, min_mm, max_mm } => {

@@ -94,6 +94,8 @@ pub struct Controller {
     patience: u32,
     /// Speed times slope of the corner at which the spring uses the actuator up, mm/s.
     rise_speed: MillimetresPerSecond,
+    /// Way of the wheel over a corner, mm.
+    corner_reach: Millimetres,
     /// Wheel travel on a corner beyond which the wheel slips, mm.
     corner_way: Millimetres,
     /// Spring rate of the pre-tightener, N/mm.
@@ -245,7 +247,7 @@ impl Controller {
     /// can follow.
     fn limit_climb(&self, state: &State, pass: &Pass<'_>, targets: &mut Targets) {
         let slope = self.rise.slope(self.ahead(state, pass, Q16::ZERO));
-        if slope > LEVEL_SLOPE {
+        if state.on_corner() && slope > LEVEL_SLOPE {
             targets.speed = targets.speed.min(crate::numeric::divide(self.rise_speed, slope));
         }
     }
@@ -272,16 +274,20 @@ impl Controller {
         };
         self.profile.step(&mut state.profile, targets.speed);
         state.direction = direction;
-        let ahead = self.ahead(state, pass, Q16::ZERO);
+        // Corners that are not felt are not fed forward: the table may be wrong.
+        let (lean, later) = if state.on_corner() {
+            let lean = self.rise.lean(direction, self.ahead(state, pass, Q16::ZERO));
+            // The slope under the wheel when this tick's duty moves the screw.
+            let way = state.signed_speed() * self.foresight;
+            (lean, self.rise.slope(self.ahead(state, pass, way)))
+        } else {
+            (Ratio::ZERO, Ratio::ZERO)
+        };
         let pressed = pass.sensed.preload_filtered + self.wedge(pass);
-        let load = self.load
-            + pressed * self.rise.lean(direction, ahead)
-            + self.inertia * state.acceleration();
+        let load = self.load + pressed * lean + self.inertia * state.acceleration();
         let (wanted, measured) = (state.signed_speed(), pass.sensed.speed.value);
         let duty = self.speed_loop.step(&mut state.speed_loop, wanted, measured, load);
-        // The slope under the wheel when this tick's duty moves the screw.
-        let later = self.ahead(state, pass, wanted * self.foresight);
-        let drift = self.spring * self.rise.slope(later) * wanted;
+        let drift = self.spring * later * wanted;
         let preload = self.regulate(state, pass, targets, drift);
         (MotorCommand { duty, enable: true }, preload)
     }
@@ -318,7 +324,7 @@ impl Controller {
     }
 
     fn note_stage(&self, state: &mut State, pass: &mut Pass<'_>) {
-        let stage = match (state.mode, state.watch.contact) {
+        let stage = match (state.mode, state.contact()) {
             (Mode::Run(..) | Mode::Stopping(_), Contact::Both) => ContactStage::StaticFriction,
             (Mode::Run(..) | Mode::Stopping(_), Contact::Corner) => ContactStage::Sliding,
             (Mode::Run(..) | Mode::Stopping(_), Contact::Leaving) => ContactStage::Rolling,

@@ -42,6 +42,8 @@ const SETTLE_TICKS: u8 = 50;
 pub struct CrossingWatch {
     radius: Millimetres,
     step: Millimetres,
+    /// Baseline of the outermost wall by the table, mm.
+    outermost: Millimetres,
     /// Part of the compression before a step that the tread still has when the lower
     /// wall stops carrying.
     memory: Ratio,
@@ -137,9 +139,10 @@ pub struct Seen {
 }
 
 impl CrossingWatch {
-    /// Takes the wall under the resting wheel as baseline.
+    /// Takes the wall under the resting wheel as baseline, unless it stands on a corner.
     pub fn rest(&self, state: &mut WatchState, seen: &Seen) {
-        if state.contact == Contact::Wall {
+        let off = state.baseline.output() - (seen.radius - seen.compression);
+        if state.contact == Contact::Wall && off.abs() < HOLD {
             self.baseline.step(&mut state.baseline, seen.radius - seen.compression);
         }
     }
@@ -148,6 +151,22 @@ impl CrossingWatch {
     pub fn begin(&self, state: &mut WatchState, seen: &Seen) {
         *state = WatchState {
             baseline: LowPassState::at(seen.radius - seen.compression),
+            ..WatchState::default()
+        };
+    }
+
+    /// Starts on a corner, on the way to the wall of `level`: nothing is measured until
+    /// the wheel stands on that wall.
+    pub fn begin_on_corner(&self, state: &mut WatchState, direction: Direction, level: u8) {
+        let below = Millimetres::from_num(level) * self.step;
+        let wall = self.outermost - below;
+        let from = match direction {
+            Direction::Deploy => wall + self.step,
+            Direction::Retract => wall - self.step,
+        };
+        *state = WatchState {
+            contact: Contact::Leaving,
+            baseline: LowPassState::at(from),
             ..WatchState::default()
         };
     }
@@ -214,11 +233,13 @@ impl CrossingWatch {
     ) -> Option<Sign> {
         if rise < TOUCH {
             state.ticks = 0;
-            if rise < HOLD {
+            let level = rise.abs() < HOLD;
+            if level {
                 state.flat = seen.compression;
             }
-            // What already looks like the foot of a step must not drag the baseline along.
-            if !seen.near && rise < HOLD {
+            // What looks like the foot of a step, or a wheel rolling back off one, must not
+            // drag the baseline along.
+            if level && !seen.near {
                 self.baseline.step(&mut state.baseline, seen.radius - seen.compression);
             }
             return None;

@@ -2,11 +2,11 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use super::{Fault, Mode};
+use super::{Direction, Fault, Mode};
 use crate::numeric::checked;
 use crate::rig::{Rig, RigError};
 use crate::sense::{Reason, SensedState, Validity};
-use crate::units::{MillimetresPerSecond, Newtons, Q16, Ratio, q16};
+use crate::units::{MillimetresPerSecond, Newtons, Ratio, q16};
 
 /// Preload above the limit that counts as overpressure, relative: regulation and
 /// the spring that a climb compresses stay below it.
@@ -30,7 +30,8 @@ pub struct Monitor {
     overpressure: Newtons,
     /// Speed below which the wheel counts as standing, mm/s.
     standing: MillimetresPerSecond,
-    /// Speed that the wheel may have beyond one and a half times its reference, mm/s.
+    /// Speed that the wheel may have against its way, or beyond one and a half times its
+    /// reference, mm/s: what the speed observer swings when the load jumps.
     beyond: MillimetresPerSecond,
     /// Preload error that counts as short, N.
     short: Newtons,
@@ -87,12 +88,15 @@ impl Monitor {
         speed: MillimetresPerSecond,
         wanted: MillimetresPerSecond,
     ) -> bool {
-        let (along, asked) = if wanted < Q16::ZERO { (-speed, -wanted) } else { (speed, wanted) };
-        if driven(mode) {
-            along < -self.standing - self.standing || along > asked + asked * HALF + self.beyond
-        } else {
-            speed.abs() > self.beyond
-        }
+        let way = match mode {
+            Mode::Run(way, _) | Mode::Stopping(way) => way,
+            _ => return speed.abs() > self.beyond,
+        };
+        let (along, asked) = match way {
+            Direction::Deploy => (speed, wanted),
+            Direction::Retract => (-speed, -wanted),
+        };
+        along < -self.beyond || along > asked + asked * HALF + self.beyond
     }
 
     /// The fault of this tick, if any; the gravest first.

@@ -170,11 +170,11 @@ fn a_step_table_out_of_order_is_refused() {
 fn a_preload_limit_below_the_cruise_preload_or_the_minimum_is_refused() {
     assert_eq!(
         error("[preload]\nlimit_n = 30\n"),
-        "bench.toml: preload.limit_n = 30: expected at least preload.cruise_n = 33.3"
+        "bench.toml: preload.limit_n = 30: expected at least 34.7, that is preload.cruise_n = 33.3 and room to regulate"
     );
     assert_eq!(
         error("[preload]\ncruise_n = 60\n"),
-        "bench.toml: preload.limit_n = 50: expected at least preload.cruise_n = 60"
+        "bench.toml: preload.limit_n = 50: expected at least 62.5, that is preload.cruise_n = 60 and room to regulate"
     );
     assert_eq!(
         set_error("preload.limit_n=2"),

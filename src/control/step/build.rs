@@ -7,6 +7,7 @@ use crate::control::rise::Rise;
 use crate::control::schedule::Schedule;
 use crate::control::speed_loop::SpeedLoop;
 use crate::estimate::crossing::CrossingWatch;
+use crate::model::formula::Formula;
 use crate::numeric::checked;
 use crate::rig::{Rig, RigError};
 use crate::sense::{Senses, Tuning};
@@ -54,6 +55,7 @@ impl Controller {
                 "preload.spring_n_per_mm",
                 (CLIMB_PART * rig.preload.slew_n_per_s / rig.preload.spring_n_per_mm).min(1000.0),
             )?,
+            corner_reach: checked("rig.step_height_mm", Formula::new(rig).free_run_mm())?,
             corner_way: checked("rig.wheel_radius_mm", CORNER_PART * rig.rig.wheel_radius_mm)?,
             spring: checked("preload.spring_n_per_mm", rig.preload.spring_n_per_mm)?,
             foresight: checked("preload.delay_s", rig.preload.delay_s + rig.preload.lag_s)?,

@@ -69,6 +69,7 @@ impl Controller {
         state.crossing = Some(OpenCrossing {
             standing_since: state.standing_since,
             peak_preload: pass.sensed.preload_filtered,
+            told: expectation == Expectation::Ahead,
             ..OpenCrossing::begin(step, direction, expected, pass.now)
         });
     }
@@ -90,6 +91,7 @@ impl Controller {
         let residual = self.step_position(open.step).map_or(Q16::ZERO, |table| face - table);
         open.lift = Some(LiftPoint {
             at: pass.now,
+            gap: lift.gap,
             speed: pass.sensed.speed.value.abs(),
             preload: pass.sensed.preload_filtered,
             tan_arm: pass.sensed.tan_arm,
@@ -98,12 +100,8 @@ impl Controller {
         });
         state.crossing = Some(open);
         if open.step > 0 {
-            if state.searching {
-                state.odometry.set(pass.sensed.travel, pass.position - residual);
-                state.searching = false;
-            } else if residual.abs() <= self.schedule.tolerance() {
-                // Farther off, it is the step that is displaced, not the odometry.
-                state.odometry.correct(residual);
+            if !open.turned {
+                self.correct(state, pass, direction, residual);
             }
             pass.position = state.odometry.position(pass.sensed.travel);
             self.advance(state, direction);
@@ -111,12 +109,64 @@ impl Controller {
         self.ask(state, pass);
     }
 
+    /// Odometry by a step's residual.
+    fn correct(
+        &self,
+        state: &mut State,
+        pass: &mut Pass<'_>,
+        direction: Direction,
+        residual: Millimetres,
+    ) {
+        let tolerance = self.schedule.tolerance();
+        let alike = |other: Millimetres| (residual - other).abs() <= tolerance;
+        if state.searching {
+            state.odometry.set(pass.sensed.travel, pass.position - residual);
+            state.searching = false;
+        } else if residual.abs() <= tolerance {
+            state.odometry.correct(residual);
+            state.displaced = None;
+        } else if state.displaced.is_some_and(alike) {
+            // Two in a row off by the same: it is the odometry.
+            state.odometry.set(pass.sensed.travel, pass.position - residual);
+            state.displaced = None;
+        } else {
+            // One alone: it is the step that is displaced.
+            state.displaced = Some(residual);
+            self.report_displaced(state, pass, direction, residual);
+        }
+    }
+
+    /// A step outside its window, unless it has been reported already.
+    fn report_displaced(
+        &self,
+        state: &State,
+        pass: &mut Pass<'_>,
+        direction: Direction,
+        residual: Millimetres,
+    ) {
+        let early = match direction {
+            Direction::Deploy => residual < Q16::ZERO,
+            Direction::Retract => residual > Q16::ZERO,
+        };
+        let told = state.crossing.is_some_and(|open| open.told) || state.late;
+        if !told {
+            pass.log(Event::Limit(if early { Limit::StepEarly } else { Limit::StepLate }));
+        }
+    }
+
     /// The crossing is behind: hands it to the model for review.
-    fn closed(&self, state: &mut State, pass: &mut Pass<'_>, gap: Millimetres, sure: bool) {
+    pub(super) fn closed(
+        &self,
+        state: &mut State,
+        pass: &mut Pass<'_>,
+        gap: Millimetres,
+        sure: bool,
+    ) {
         let Some(mut open) = state.crossing.take() else { return };
         open.gap = gap;
         open.deepest = state.watch.deepest;
-        let Some(point) = open.lift else { return };
+        // Half a crossing has no line of its own.
+        let Some(point) = open.lift.filter(|_| !open.turned) else { return };
         state.line = Some(open);
         state.review = Some(Review {
             direction: open.direction,
@@ -200,10 +250,11 @@ impl Controller {
 
     /// Whether the wheel has left the corner of the last step behind.
     fn clear_of(&self, state: &State, pass: &Pass<'_>) -> bool {
-        let Some(point) = state.crossing.and_then(|open| open.lift) else { return true };
+        let followed = state.crossing.and_then(|open| open.lift).map(|point| point.face);
+        let Some(face) = followed.or(state.leaving) else { return true };
         let past = match state.direction {
-            Direction::Deploy => pass.position - point.face,
-            Direction::Retract => point.face - pass.position,
+            Direction::Deploy => pass.position - face,
+            Direction::Retract => face - pass.position,
         };
         // The patch must be clear of the edge: on the upper wall behind the centre, on
         // the lower wall ahead of it.

@@ -5,7 +5,11 @@ use super::state::OpenCrossing;
 use super::{Controller, Pass, State};
 use crate::estimate::crossing::Contact;
 use crate::supervise::{Direction, Fault, Trigger};
-use crate::units::{Millimetres, Q16, q16};
+use crate::units::{Millimetres, Q16, Ratio, q16};
+
+/// Off a whole number of steps by no more than this, the arm shows a level: half the
+/// hysteresis of a corner, and the sleeve's and the arm's tolerance.
+const LEVEL_WITHIN: Ratio = q16(120_000);
 
 impl Controller {
     /// Gives the odometry its origin. Only the stow end, found unloaded, is certain;
@@ -44,7 +48,10 @@ impl Controller {
     pub(super) fn prepare(&self, state: &mut State, pass: &mut Pass<'_>, direction: Direction) {
         let turned = state.direction != direction;
         state.direction = direction;
-        if turned {
+        state.leaving = None;
+        if state.searching {
+            self.start_searching(state, pass, direction);
+        } else if turned {
             self.turn(state, pass, direction);
         } else if state.crossing.is_none() {
             self.start_afresh(state, pass, direction);
@@ -67,18 +74,53 @@ impl Controller {
         self.watch.begin(&mut state.watch, &seen);
     }
 
+    /// After a restart away from the stow end the wheel may stand on a corner: off it
+    /// first, towards the wall that the arm shows, then search.
+    fn start_searching(&self, state: &mut State, pass: &Pass<'_>, direction: Direction) {
+        let steps = self.steps.len() as u8;
+        let up = pass.sensed.steps_up.max(Q16::ZERO);
+        let level = match direction {
+            // Up to the next whole step, or down to the last.
+            Direction::Deploy => up + (q16(1_000_000) - LEVEL_WITHIN),
+            Direction::Retract => up + LEVEL_WITHIN,
+        };
+        let level = level.0.int().to_num::<u8>();
+        state.crossing = None;
+        state.level = level;
+        state.next_step = match direction {
+            Direction::Deploy if level < steps => level + 1,
+            Direction::Deploy => 0,
+            Direction::Retract => level.min(steps),
+        };
+        // As if the wheel had just come onto a corner: clear of that it surely is then.
+        state.leaving = Some(match direction {
+            Direction::Deploy => pass.position + self.corner_reach,
+            Direction::Retract => pass.position,
+        });
+        self.watch.begin_on_corner(&mut state.watch, direction, level);
+    }
+
     /// Turning back, perhaps on a corner.
     fn turn(&self, state: &mut State, pass: &mut Pass<'_>, direction: Direction) {
         let open = state.crossing.take();
         let before = state.watch.contact;
         self.watch.reverse(&mut state.watch, direction);
         let Some(open) = open else {
-            self.start_afresh(state, pass, direction);
+            if before == Contact::Wall {
+                self.start_afresh(state, pass, direction);
+            } else {
+                state.next_step = self.step_ahead(state, pass, direction);
+            }
             return;
         };
+        let table = self.step_position(open.step);
+        state.leaving = open.lift.map(|point| point.face).or(table);
         let steps = self.steps.len() as u8;
         let beyond = if open.step < steps { open.step + 1 } else { 0 };
-        let again = OpenCrossing::begin(open.step, direction, false, pass.now);
+        let again = OpenCrossing {
+            turned: true,
+            ..OpenCrossing::begin(open.step, direction, false, pass.now)
+        };
         match (before, direction) {
             // Off the corner onto the wall it came from.
             (Contact::Both, Direction::Retract) => {
@@ -103,13 +145,14 @@ impl Controller {
         }
     }
 
-    /// Number of the step ahead, by position, or by level while that is not known; 0 if
-    /// there is none.
+    /// Number of the step ahead, 0 if there is none.
     fn step_ahead(&self, state: &State, pass: &Pass<'_>, direction: Direction) -> u8 {
-        let behind = if state.searching {
-            usize::from(state.level).min(self.steps.len())
-        } else {
-            self.steps.iter().take_while(|face| **face <= pass.position).count()
+        let behind = self.steps.iter().take_while(|face| **face <= pass.position).count();
+        // On the way back a step is behind only once the wheel is down.
+        let up = usize::from((state.level + state.given_up).saturating_sub(state.extra));
+        let behind = match direction {
+            Direction::Retract if up == behind + 1 => up.min(self.steps.len()),
+            _ => behind,
         };
         match direction {
             Direction::Deploy if behind < self.steps.len() => behind as u8 + 1,
@@ -127,6 +170,13 @@ impl Controller {
     ) {
         let remaining = self.schedule.remaining(direction, pass.position);
         if !self.schedule.arrived(remaining) || state.profile.speed() != Q16::ZERO {
+            return;
+        }
+        // A crossing still open gets its line first.
+        if let Some(point) = state.crossing.and_then(|open| open.lift) {
+            self.closed(state, pass, point.gap, false);
+        }
+        if state.line.is_some() {
             return;
         }
         let steps = self.steps.len() as u8;

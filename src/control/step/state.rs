@@ -61,6 +61,10 @@ pub struct State {
     pub(super) late: bool,
     /// Waiting for the preload has been reported for this step.
     pub(super) waited: bool,
+    /// Residual of the last step found, if it was beyond the tolerance, mm.
+    pub(super) displaced: Option<Millimetres>,
+    /// Face of the step being left although its crossing is not followed, mm.
+    pub(super) leaving: Option<Millimetres>,
     /// Ticks for which the drive has waited for the preload.
     pub(super) waiting: u32,
     /// Steps of the table given up since the stow end.
@@ -79,6 +83,10 @@ pub(super) struct OpenCrossing {
     pub direction: Direction,
     /// Felt inside its window, so that baseline and preload were ready.
     pub expected: bool,
+    /// The wheel turned back on this very corner: its first half is not seen.
+    pub turned: bool,
+    /// That it was not where the table has it has been reported.
+    pub told: bool,
     pub touched_at: Tick,
     /// Odometry when the corner was first felt.
     pub from: Option<Travel>,
@@ -97,6 +105,8 @@ impl OpenCrossing {
             step,
             direction,
             expected,
+            turned: false,
+            told: false,
             touched_at: now,
             from: None,
             standing_since: None,
@@ -112,6 +122,8 @@ impl OpenCrossing {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LiftPoint {
     pub at: Tick,
+    /// Gap with the nominal step height, mm.
+    pub gap: Millimetres,
     pub speed: MillimetresPerSecond,
     pub preload: Newtons,
     pub tan_arm: Ratio,
@@ -152,6 +164,8 @@ impl Default for State {
             standing_since: None,
             late: false,
             waited: false,
+            displaced: None,
+            leaving: None,
             waiting: 0,
             given_up: 0,
             lost_in_a_row: 0,
@@ -195,14 +209,26 @@ impl State {
         on_corner && self.crossing.is_some_and(|crossing| crossing.lift.is_none())
     }
 
+    /// A corner is felt.
+    pub(super) fn on_corner(&self) -> bool {
+        self.watch.contact != Contact::Wall
+    }
+
     /// Whether something unexpected asks for crossing speed.
     pub(super) fn slow_down(&self) -> bool {
         self.late || self.searching && self.next_step > 0 || self.critical()
     }
 
+    /// Who carries the wheel, as shown; a wheel that searches after a restart is taken to
+    /// be on the wall until a corner is felt.
+    pub(super) fn contact(&self) -> Contact {
+        let followed = self.crossing.is_some();
+        if self.searching && !followed { Contact::Wall } else { self.watch.contact }
+    }
+
     /// Leg of the run.
     pub(super) fn leg(&self, approaching: bool) -> Leg {
-        match self.watch.contact {
+        match self.contact() {
             Contact::Both | Contact::Corner => Leg::Crossing,
             Contact::Leaving => Leg::Settle,
             Contact::Wall if approaching || self.late => Leg::Approach,

@@ -27,6 +27,7 @@ impl CrossingWatch {
         Ok(Self {
             radius: checked("rig.wheel_radius_mm", r)?,
             step: checked("rig.step_height_mm", h)?,
+            outermost: checked("rig.wall_radius_mm", rig.centre_radius_mm(0))?,
             memory: checked(
                 "tread.stiffening",
                 MEMORY * (1.0 - 1.0 / rig.tread.stiffening) / (1.0 - 1.0 / MEMORY_STIFFENING),

@@ -1,0 +1,493 @@
+//! An operator and failing sensors in the middle of a run: stop, go on, turn back,
+//! reset, and commands that the mode does not take.
+
+mod common;
+
+use common::{Bench, Moment, NO_SLIP_MM, RIGS, WAYS, back, check_each, end_mm, scenario, starter};
+use hil_sim::scenario::{Direction, Scenario};
+use interstage::estimate::ContactStage as Stage;
+use interstage::log::Event;
+use interstage::sense::raw::SensorFrame;
+use interstage::supervise::{Command, Fault, Leg, Mode, Trigger, next};
+
+/// Where in a run something happens.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Place {
+    /// On the wall behind the last step.
+    Cruise,
+    /// Before the second step of the way.
+    Approach,
+    /// On that step, the corner not alone in carrying (retract: alone).
+    FirstHalf,
+    /// On that step, the corner alone in carrying (retract: not alone).
+    SecondHalf,
+    /// Behind that step, before its line is closed.
+    Settle,
+}
+
+impl Place {
+    fn is_at(self, way: Direction, now: &Moment) -> bool {
+        let (before, halves) = match way {
+            Direction::Deploy => (1, [Stage::StaticFriction, Stage::Sliding]),
+            Direction::Retract => (2, [Stage::Sliding, Stage::StaticFriction]),
+        };
+        let (level, stage) = (now.seen.level, now.seen.stage);
+        let behind = if way == Direction::Deploy { before + 1 } else { before - 1 };
+        let moving = now.truth.speed_mm_s.abs() > 5.0;
+        let leg = |leg: Leg| now.seen.mode == Mode::Run(way.into(), leg);
+        match self {
+            Self::Cruise => leg(Leg::Cruise) && moving,
+            Self::Approach => leg(Leg::Approach) && moving && level == before,
+            Self::FirstHalf => stage == halves[0] && level == before,
+            Self::SecondHalf => stage == halves[1] && level == before,
+            Self::Settle => leg(Leg::Settle) && level == behind,
+        }
+    }
+}
+
+/// A run in which something happens so many milliseconds after a place.
+struct Case {
+    scenario: Scenario,
+    place: Place,
+    later_ms: u32,
+    name: String,
+}
+
+/// Every rig and way, each place and so many milliseconds later.
+fn cases(places: &[Place], later_ms: &[u32]) -> Vec<Case> {
+    let mut all = Vec::new();
+    for rig in RIGS {
+        for way in WAYS {
+            for &place in places {
+                for &later_ms in later_ms {
+                    let name = format!("{rig} {} {place:?} and {later_ms} ms", way.name());
+                    let scenario = scenario(rig, way, 0);
+                    all.push(Case { scenario, place, later_ms, name });
+                }
+            }
+        }
+    }
+    all
+}
+
+/// An approach lasts a tenth of a second at least.
+fn between_steps() -> Vec<Case> {
+    cases(&[Place::Cruise, Place::Approach], &[0, 40, 80])
+}
+
+fn on_a_step() -> Vec<Case> {
+    cases(&[Place::FirstHalf, Place::SecondHalf, Place::Settle], &[0, 60, 120, 180, 240])
+}
+
+fn everywhere() -> Vec<Case> {
+    between_steps().into_iter().chain(on_a_step()).collect()
+}
+
+/// The run up to that place and time.
+fn run_to(case: &Case) -> Bench {
+    let way = case.scenario.run.direction;
+    let mut bench = Bench::idle(&case.scenario);
+    bench.give(starter(way));
+    bench.until(&case.name, 20.0, |now| case.place.is_at(way, now));
+    bench.run_s(f64::from(case.later_ms) * 1e-3);
+    bench
+}
+
+/// Stopped there, at rest for half a second.
+fn stopped(case: &Case) -> Bench {
+    let mut bench = run_to(case);
+    bench.give(Command::Stop);
+    bench.until(&format!("idle after {}", case.name), 0.4, |now| now.seen.mode == Mode::Idle);
+    bench.run_s(0.5);
+    bench
+}
+
+#[test]
+fn a_stop_brings_the_drive_to_rest_and_holds_what_stands() {
+    check_each(everywhere(), |case| {
+        let name = &case.name;
+        let mut bench = run_to(case);
+        bench.give(Command::Stop);
+        assert!(matches!(bench.mode(), Mode::Stopping(_)), "{name}");
+        let after = |what: &str| format!("{what} after {name}");
+        bench.until(&after("rest"), 0.3, |now| now.truth.speed_mm_s.abs() < 0.5);
+        bench.until(&after("idle"), 0.1, |now| now.seen.mode == Mode::Idle);
+        // The worm brakes what is left.
+        bench.until(&after("standstill"), 0.025, Moment::is_still);
+        let (at, pressed) = (bench.position_mm(), bench.now().truth.preload_n);
+        let from = bench.moments.len();
+        bench.run_s(1.0);
+        for now in &bench.moments[from..] {
+            assert!(now.is_off() && now.is_still(), "{name}");
+            assert_eq!(now.truth.position_mm, at, "{name}");
+            // The tread relaxes into the wall and takes some spring with it.
+            let kept = now.truth.preload_n / pressed;
+            assert!((0.985..1.001).contains(&kept), "{name}: {kept}");
+        }
+        assert_eq!(bench.mode(), Mode::Idle, "{name}");
+        assert!(bench.faults().is_empty(), "{name}");
+    });
+}
+
+/// Arrived at the end of `way`, unharmed, having met no step out of place.
+fn assert_arrived(bench: &Bench, scenario: &Scenario, way: Direction, name: &str) {
+    let limit = scenario.rig.preload.limit_n;
+    assert_eq!(bench.mode(), Mode::Complete(way.into()), "{name}");
+    let off = bench.position_mm() - end_mm(scenario, way);
+    assert!(off.abs() < 0.5, "{name}: {off} mm from the end");
+    let level = if way == Direction::Deploy { 3 } else { 0 };
+    assert_eq!(bench.now().seen.level, level, "{name}");
+    assert!(bench.step_codes().is_empty(), "{name}: {:?}", bench.step_codes());
+    assert!(bench.now().truth.slip_mm < NO_SLIP_MM, "{name}");
+    assert!(bench.peak_preload_n() <= limit, "{name}: {} N", bench.peak_preload_n());
+}
+
+/// Three crossings one way, each recorded once and near the reference gap.
+fn assert_three_crossings(bench: &Bench, scenario: &Scenario, name: &str) {
+    let way = scenario.run.direction;
+    let order = if way == Direction::Deploy { [1, 2, 3] } else { [3, 2, 1] };
+    let truly: Vec<usize> = bench.crossings().iter().map(|crossing| crossing.index).collect();
+    assert_eq!(truly, order, "{name}");
+    let recorded: Vec<_> = bench.records().iter().map(|r| usize::from(r.index)).collect();
+    assert_eq!(recorded, order, "{name}");
+    for record in bench.records() {
+        assert_eq!(record.direction, way.into(), "{name}");
+        let residual = record.residual.to_num::<f64>();
+        assert!(residual.abs() < 0.5, "{name} step {}: {residual}", record.index);
+    }
+    for crossing in bench.crossings() {
+        // A tread that has rested on the corner is softer: less gap, hardly ever more.
+        let part = crossing.gap_mm / gap_ref(scenario);
+        assert!((0.65..1.04).contains(&part), "{name} step {}: {part}", crossing.index);
+    }
+}
+
+/// Reference gap of a run, mm.
+fn gap_ref(scenario: &Scenario) -> f64 {
+    let planner = interstage::model::Planner::try_build(&scenario.rig).expect("a sound rig");
+    planner.gap_ref(scenario.run.direction.into()).to_num()
+}
+
+#[test]
+fn a_run_stopped_anywhere_goes_on_to_its_end() {
+    check_each(everywhere(), |case| {
+        let Case { scenario, name, .. } = case;
+        let way = scenario.run.direction;
+        let mut bench = stopped(case);
+        bench.give(starter(way));
+        bench.finish();
+        assert_arrived(&bench, scenario, way, name);
+        assert_three_crossings(&bench, scenario, name);
+    });
+}
+
+#[test]
+fn a_run_stopped_while_the_preload_builds_starts_again() {
+    for way in WAYS {
+        let scenario = scenario("prototype", way, 0);
+        let mut bench = Bench::idle(&scenario);
+        bench.give(starter(way));
+        bench.run_s(0.4);
+        assert_eq!(bench.mode(), Mode::Preload(way.into()));
+        bench.give(Command::Stop);
+        assert_eq!(bench.mode(), Mode::Idle);
+        assert!(bench.now().is_off());
+        bench.run_s(0.5);
+        bench.give(starter(way));
+        bench.finish();
+        assert_arrived(&bench, &scenario, way, way.name());
+        assert_three_crossings(&bench, &scenario, way.name());
+    }
+}
+
+/// Stopped at the place and sent back to where the run began.
+fn turned_back(case: &Case) -> Bench {
+    let mut bench = stopped(case);
+    bench.give(starter(back(case.scenario.run.direction)));
+    bench.finish();
+    bench
+}
+
+/// Every line of the controller's ledger is of a step where the table has it, and no
+/// gap in it is out of the world.
+fn assert_sound_records(bench: &Bench, scenario: &Scenario, name: &str) {
+    for record in bench.records() {
+        let residual = record.residual.to_num::<f64>();
+        assert!(residual.abs() < 0.5, "{name}: {record:?}");
+        let mut way = scenario.clone();
+        way.run.direction = match record.direction {
+            interstage::supervise::Direction::Deploy => Direction::Deploy,
+            interstage::supervise::Direction::Retract => Direction::Retract,
+        };
+        let part = record.gap_measured.to_num::<f64>() / gap_ref(&way);
+        assert!((0.65..1.05).contains(&part), "{name}: {part} {record:?}");
+    }
+}
+
+#[test]
+fn a_run_turned_back_between_two_steps_returns() {
+    check_each(between_steps(), |case| {
+        let Case { scenario, name, .. } = case;
+        let bench = turned_back(case);
+        assert_arrived(&bench, scenario, back(scenario.run.direction), name);
+        assert_sound_records(&bench, scenario, name);
+    });
+}
+
+#[test]
+fn a_run_turned_back_on_a_step_returns() {
+    check_each(on_a_step(), |case| {
+        let Case { scenario, name, .. } = case;
+        let bench = turned_back(case);
+        assert_arrived(&bench, scenario, back(scenario.run.direction), name);
+        assert_sound_records(&bench, scenario, name);
+    });
+}
+
+#[test]
+fn a_whole_session_goes_out_back_and_out_again() {
+    for rig in RIGS {
+        let scenario = scenario(rig, Direction::Deploy, 0);
+        let mut bench = Bench::idle(&scenario);
+        for way in [Direction::Deploy, Direction::Retract, Direction::Deploy] {
+            bench.give(starter(way));
+            bench.finish();
+            assert_arrived(&bench, &scenario, way, rig);
+            bench.run_s(1.0);
+            assert!(bench.now().is_off(), "{rig}");
+        }
+        let order: Vec<_> = bench.crossings().iter().map(|c| (c.index, c.climbing)).collect();
+        let out = [(1, true), (2, true), (3, true)];
+        let home = [(3, false), (2, false), (1, false)];
+        assert_eq!(order, [out, home, out].concat(), "{rig}");
+        let records = bench.records();
+        assert_eq!(records.len(), 9, "{rig}");
+        for (record, crossing) in records.iter().zip(bench.crossings()) {
+            assert_eq!(usize::from(record.index), crossing.index, "{rig}");
+            let off = |gap: f64| gap / crossing.gap_mm - 1.0;
+            let measured = off(record.gap_measured.to_num());
+            let predicted = off(record.gap_predicted.to_num());
+            assert!(measured.abs() < 0.03, "{rig} {crossing:?}: {measured}");
+            assert!(predicted.abs() < 0.05, "{rig} {crossing:?}: {predicted}");
+        }
+    }
+}
+
+/// Commands that this mode does not take, by the table of transitions.
+fn refused_in(mode: Mode) -> Vec<Command> {
+    let refused = |command: &Command| next(mode, Trigger::Command(*command)).is_none();
+    Command::ALL.into_iter().filter(refused).collect()
+}
+
+/// A session through every mode: late sensors, a start, a stop on the way, the rest of
+/// the way, and a fault at its end. With `pester`, each tick that needs no command is
+/// given one that its mode does not take; returns how many those were.
+fn through_every_mode(way: Direction, pester: bool) -> (Bench, usize) {
+    let mut bench = Bench::new(&scenario("prototype", way, 0));
+    let (mut stopped, mut waited, mut pestered) = (false, 0, 0);
+    let mut last = None;
+    for tick in 0..20_000_usize {
+        let mode = bench.mode();
+        let approaching = bench.moments.last().is_some_and(|now| Place::Approach.is_at(way, now));
+        let wanted = match mode {
+            Mode::Idle if waited >= 20 => Some(starter(way)),
+            Mode::Run(..) if approaching && !stopped => Some(Command::Stop),
+            _ => None,
+        };
+        stopped |= wanted == Some(Command::Stop);
+        let rests = matches!(mode, Mode::Idle | Mode::Complete(_) | Mode::FaultHold(_));
+        waited = if rests { waited + 1 } else { 0 };
+        if waited > 200 {
+            break;
+        }
+        let refused = refused_in(mode);
+        assert!(!refused.is_empty(), "{mode:?} takes every command");
+        let unwanted = refused[tick % refused.len()];
+        let command = if pester { wanted.or(Some(unwanted)) } else { wanted };
+        pestered += usize::from(pester && wanted.is_none());
+        bench.spoiled(command, |frame| {
+            if tick < 50 {
+                frame.arm = None;
+            }
+            if matches!(mode, Mode::Complete(_) | Mode::FaultHold(_)) && waited > 50 {
+                *frame = *last.get_or_insert(*frame);
+            }
+        });
+    }
+    (bench, pestered)
+}
+
+#[test]
+fn commands_in_the_wrong_mode_are_refused_and_change_nothing() {
+    for way in WAYS {
+        let ((quiet, _), (pestered, times)) =
+            (through_every_mode(way, false), through_every_mode(way, true));
+        assert_eq!(quiet.moments, pestered.moments, "{}", way.name());
+        let refusals = |bench: &Bench| {
+            bench.log.iter().filter(|entry| matches!(entry.event, Event::Refused(_))).count()
+        };
+        assert_eq!((refusals(&quiet), refusals(&pestered)), (0, times), "{}", way.name());
+        let mut rest = pestered.log.clone();
+        rest.retain(|entry| !matches!(entry.event, Event::Refused(_)));
+        assert_eq!(quiet.log, rest, "{}", way.name());
+        let visited = |is: fn(&Mode) -> bool| {
+            let ticks = quiet.moments.iter().filter(|now| is(&now.seen.mode)).count();
+            assert!(ticks > 10, "{}: {ticks}", way.name());
+        };
+        visited(|mode| *mode == Mode::Boot);
+        visited(|mode| *mode == Mode::SelfTest);
+        visited(|mode| *mode == Mode::Idle);
+        visited(|mode| matches!(mode, Mode::Preload(_)));
+        visited(|mode| matches!(mode, Mode::Run(..)));
+        visited(|mode| matches!(mode, Mode::Stopping(_)));
+        visited(|mode| matches!(mode, Mode::Complete(_)));
+        visited(|mode| matches!(mode, Mode::FaultHold(_)));
+    }
+}
+
+/// A sensor that can fall silent: its name, how its newest code is replaced by an old
+/// one, and the fault that tells of it.
+type Silence = (&'static str, fn(&mut SensorFrame, &SensorFrame), Fault);
+
+const SENSORS: [Silence; 4] = [
+    ("wheel", |now, old| now.wheel = old.wheel, Fault::SpeedStale),
+    ("load cell", |now, old| now.load_cell = old.load_cell, Fault::PressureStale),
+    ("tread", |now, old| now.tread = old.tread, Fault::DisplacementStale),
+    ("arm", |now, old| now.arm = old.arm, Fault::AngleStale),
+];
+
+/// The sensor is silent for so long from now on.
+fn silence(bench: &mut Bench, sensor: &Silence, ms: u32) {
+    let mut last = None;
+    for _ in 0..ms {
+        bench.spoiled(None, |frame| {
+            let old = *last.get_or_insert(*frame);
+            sensor.1(frame, &old);
+        });
+    }
+}
+
+#[test]
+fn a_sensor_that_falls_silent_stops_everything_at_once() {
+    for sensor in SENSORS {
+        for case in everywhere().into_iter().filter(|case| case.later_ms == 0) {
+            let name = format!("{}, {}", case.name, sensor.0);
+            let scenario = &case.scenario;
+            let mut bench = run_to(&case);
+            let from = bench.moments.len();
+            silence(&mut bench, &sensor, 300);
+            assert_eq!(bench.faults(), [sensor.2], "{name}");
+            let held = |now: &Moment| matches!(now.seen.mode, Mode::FaultHold(_));
+            let found = bench.moments[from..].iter().position(held).expect("a fault hold");
+            let limit = (scenario.rig.sense.stale_after_s * 1e3) as usize;
+            // The arm answers every second tick only.
+            assert!((limit..=limit + 3).contains(&found), "{name}: {found} ms");
+            let (moving, stopped) = bench.moments[from..].split_at(found);
+            assert!(moving.iter().all(|now| now.drive.enable && now.preload.enable), "{name}");
+            assert!(stopped.iter().all(Moment::is_off), "{name}");
+            let rests = stopped[20].truth.position_mm;
+            let moved = stopped[20..].iter().map(|now| (now.truth.position_mm - rests).abs());
+            assert!(moved.fold(0.0, f64::max) < 1e-3, "{name}");
+            assert!(stopped[60].is_still(), "{name}");
+            let pressed = stopped[0].truth.preload_n;
+            let kept = stopped.iter().map(|now| now.truth.preload_n / pressed);
+            assert!(kept.clone().fold(f64::MAX, f64::min) > 0.98, "{name}");
+            assert!(kept.fold(0.0, f64::max) < 1.02, "{name}");
+            assert!(bench.peak_preload_n() <= scenario.rig.preload.limit_n, "{name}");
+        }
+    }
+}
+
+#[test]
+fn a_sensor_silent_for_less_than_its_limit_is_ridden_out() {
+    let all = cases(&[Place::FirstHalf], &[20]);
+    for case in all.iter().filter(|case| case.scenario.preset == "prototype") {
+        for sensor in SENSORS {
+            let name = format!("{}, {}", case.name, sensor.0);
+            let mut bench = run_to(case);
+            silence(&mut bench, &sensor, 15);
+            bench.finish();
+            assert!(bench.faults().is_empty(), "{name}");
+            assert_arrived(&bench, &case.scenario, case.scenario.run.direction, &name);
+            assert_three_crossings(&bench, &case.scenario, &name);
+        }
+    }
+}
+
+/// The run ended in a fault at that place, was reset, and was sent on.
+fn reset(case: &Case, sensor: &Silence) -> Bench {
+    let mut bench = run_to(case);
+    silence(&mut bench, sensor, 100);
+    assert_eq!(bench.mode(), Mode::FaultHold(sensor.2));
+    bench.run_s(0.5);
+    assert_eq!(bench.mode(), Mode::FaultHold(sensor.2), "a fault never clears itself");
+    bench.give(Command::Reset);
+    bench.until("idle", 1.0, |now| now.seen.mode == Mode::Idle);
+    assert!(bench.now().is_off());
+    bench.give(starter(case.scenario.run.direction));
+    bench.finish();
+    bench
+}
+
+fn assert_goes_on(cases: Vec<Case>) {
+    check_each(cases.iter().zip(SENSORS.iter().cycle()), |(case, sensor)| {
+        let Case { scenario, .. } = case;
+        let name = format!("{}, {}", case.name, sensor.0);
+        let bench = reset(case, sensor);
+        assert_arrived(&bench, scenario, scenario.run.direction, &name);
+        assert_three_crossings(&bench, scenario, &name);
+    });
+}
+
+#[test]
+fn a_run_reset_after_a_fault_between_two_steps_goes_on() {
+    assert_goes_on(between_steps());
+}
+
+#[test]
+fn a_run_reset_after_a_fault_on_a_step_goes_on() {
+    assert_goes_on(on_a_step());
+}
+
+/// Stopped at that place of the sleeve on the way out, powered down and up again, and
+/// sent one way or the other.
+fn after_power_loss(at_mm: f64, way: Direction) -> Bench {
+    let mut bench = Bench::idle(&scenario("prototype", Direction::Deploy, 0));
+    bench.give(Command::Start);
+    bench.until("place", 20.0, |now| now.truth.position_mm >= at_mm);
+    bench.give(Command::Stop);
+    bench.until("idle", 0.4, |now| now.seen.mode == Mode::Idle);
+    bench.session.reboot();
+    bench.tick();
+    bench.until("idle", 1.0, |now| now.seen.mode == Mode::Idle);
+    bench.give(starter(way));
+    bench.finish();
+    bench
+}
+
+#[test]
+fn after_power_loss_between_two_steps_the_next_step_tells_the_place() {
+    // Clear of the corners at 18, 40 and 62 mm.
+    for at_mm in [20.0, 22.0, 41.0, 44.0] {
+        for way in WAYS {
+            let bench = after_power_loss(at_mm, way);
+            let scenario = scenario("prototype", way, 0);
+            assert_arrived(&bench, &scenario, way, &format!("{at_mm} mm, {}", way.name()));
+        }
+    }
+}
+
+#[test]
+fn after_power_loss_an_end_is_not_claimed_before_it_is_reached() {
+    let mut wrong = Vec::new();
+    for at_mm in [2.0, 4.0, 12.0, 28.0, 32.0, 51.0, 56.0, 64.0, 70.0, 76.0] {
+        for way in WAYS {
+            let bench = after_power_loss(at_mm, way);
+            let off = bench.position_mm() - end_mm(&scenario("prototype", way, 0), way);
+            if bench.faults().is_empty() && off.abs() > 1.0 {
+                wrong.push(format!("{at_mm} mm, {}: {off:+.1} mm", way.name()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "complete, but away from the end: {wrong:?}");
+}
