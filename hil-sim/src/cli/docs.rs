@@ -1,6 +1,6 @@
 //! `rig docs`: the generated pages and pictures of `docs/`.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::failure::{Failure, Outcome};
 use super::{compare as compare_verb, montecarlo as montecarlo_verb, output};
@@ -49,7 +49,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     Ok(Outcome::of(true))
 }
 
-fn shown(path: &PathBuf) -> String {
+fn shown(path: &Path) -> String {
     format!("{}\n", path.display())
 }
 

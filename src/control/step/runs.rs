@@ -148,12 +148,9 @@ impl Controller {
     /// Number of the step ahead, 0 if there is none.
     fn step_ahead(&self, state: &State, pass: &Pass<'_>, direction: Direction) -> u8 {
         let behind = self.steps.iter().take_while(|face| **face <= pass.position).count();
-        // On the way back a step is behind only once the wheel is down.
+        // Close to a face the level decides: a step is behind once the wheel is up.
         let up = usize::from((state.level + state.given_up).saturating_sub(state.extra));
-        let behind = match direction {
-            Direction::Retract if up == behind + 1 => up.min(self.steps.len()),
-            _ => behind,
-        };
+        let behind = if up == behind + 1 { up.min(self.steps.len()) } else { behind };
         match direction {
             Direction::Deploy if behind < self.steps.len() => behind as u8 + 1,
             Direction::Deploy => 0,
