@@ -274,15 +274,13 @@ impl Controller {
         };
         self.profile.step(&mut state.profile, targets.speed);
         state.direction = direction;
-        // Corners that are not felt are not fed forward: the table may be wrong.
-        let (lean, later) = if state.on_corner() {
-            let lean = self.rise.lean(direction, self.ahead(state, pass, Q16::ZERO));
-            // The slope under the wheel when this tick's duty moves the screw.
-            let way = state.signed_speed() * self.foresight;
-            (lean, self.rise.slope(self.ahead(state, pass, way)))
-        } else {
-            (Ratio::ZERO, Ratio::ZERO)
-        };
+        // Corners that are not felt are not fed forward: the table may be wrong. One that
+        // is felt is blended in, or the drive would jump.
+        let felt = state.feel_corner();
+        let lean = felt * self.rise.lean(direction, self.ahead(state, pass, Q16::ZERO));
+        // The slope under the wheel when this tick's duty moves the screw.
+        let way = state.signed_speed() * self.foresight;
+        let later = felt * self.rise.slope(self.ahead(state, pass, way));
         let pressed = pass.sensed.preload_filtered + self.wedge(pass);
         let load = self.load + pressed * lean + self.inertia * state.acceleration();
         let (wanted, measured) = (state.signed_speed(), pass.sensed.speed.value);

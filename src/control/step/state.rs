@@ -13,6 +13,9 @@ use crate::units::{
     Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, Ratio, Tick, Travel, q16,
 };
 
+/// Ticks over which a felt corner is blended into the feed-forward.
+const BLEND_TICKS: u8 = 32;
+
 /// State of the controller.
 #[derive(Clone, Debug)]
 pub struct State {
@@ -61,6 +64,8 @@ pub struct State {
     pub(super) late: bool,
     /// Waiting for the preload has been reported for this step.
     pub(super) waited: bool,
+    /// Ticks for which a corner has been felt, up to [`BLEND_TICKS`].
+    felt: u8,
     /// Residual of the last step found, if it was beyond the tolerance, mm.
     pub(super) displaced: Option<Millimetres>,
     /// Face of the step being left although its crossing is not followed, mm.
@@ -164,6 +169,7 @@ impl Default for State {
             standing_since: None,
             late: false,
             waited: false,
+            felt: 0,
             displaced: None,
             leaving: None,
             waiting: 0,
@@ -207,6 +213,17 @@ impl State {
     pub(super) fn critical(&self) -> bool {
         let on_corner = matches!(self.watch.contact, Contact::Both | Contact::Corner);
         on_corner && self.crossing.is_some_and(|crossing| crossing.lift.is_none())
+    }
+
+    /// How far a felt corner is blended in, 0 to 1: a tick towards it or away from it.
+    pub(super) fn feel_corner(&mut self) -> Ratio {
+        self.felt = if self.on_corner() {
+            self.felt.saturating_add(1).min(BLEND_TICKS)
+        } else {
+            self.felt.saturating_sub(1)
+        };
+        // BLEND_TICKS is 2^5: bits of Q16 shifted.
+        fixed::Saturating(fixed::types::I16F16::from_bits(i32::from(self.felt) << 11))
     }
 
     /// A corner is felt.
