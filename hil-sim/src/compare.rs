@@ -302,3 +302,99 @@ pub fn aims(comparison: &Comparison) -> Vec<(String, bool)> {
     out.push(("scheduled without slip and without an incomplete run".into(), clean));
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use super::*;
+
+    #[test]
+    fn all_meet_the_reference_and_none_is_faster_than_the_schedule() {
+        let runs = AtomicUsize::new(0);
+        let count = || {
+            runs.fetch_add(1, Ordering::Relaxed);
+        };
+        let comparison = compare(&Scenario::default(), 1, 2, &count).unwrap();
+        let runs = runs.into_inner();
+        assert!((50..=most_runs(2)).contains(&runs), "{runs}");
+        assert_eq!((comparison.equal_gap.len(), comparison.equal_speed.len()), (7, 4));
+        let scheduled = comparison.find(ControllerKind::Scheduled, Policy::StepAware).unwrap();
+        for entry in &comparison.equal_gap {
+            let off = entry.worst_gap_mm / comparison.gap_ref_mm - 1.0;
+            assert!(entry.tuned && off.abs() < 0.005, "{entry:?}");
+            assert_eq!((entry.slip_events, entry.incomplete), (0, 0), "{entry:?}");
+            // The limit throughout is as fast, at a higher preload.
+            let slack = if entry.controller == "limit" { 1.02 } else { 1.0 };
+            assert!(scheduled.deploy_time_s <= slack * entry.deploy_time_s, "{entry:?}");
+            assert!(entry.controller != "limit" || entry.mean_preload_n > scheduled.mean_preload_n);
+        }
+        for policy in [Policy::StepAware, Policy::OneSpeed] {
+            assert!(comparison.speed_up(ControllerKind::Constant, policy).unwrap() > 1.3);
+        }
+        // At the same speed what counts is the preload that stands at the step.
+        let gap = |name| {
+            let entry = comparison.equal_speed.iter().find(|e| e.controller == name).unwrap();
+            assert_eq!(entry.crossing_speed_mm_s, Some(EQUAL_SPEED_MM_S));
+            entry.worst_gap_mm / comparison.gap_ref_mm
+        };
+        assert!((gap("scheduled") - gap("limit")).abs() < 0.005);
+        assert!((1.03..1.08).contains(&(gap("constant") / gap("scheduled"))));
+        assert!((1.03..1.08).contains(&(gap("reactive") / gap("scheduled"))));
+        assert!(aims(&comparison).iter().any(|(aim, met)| aim.contains("without slip") && *met));
+    }
+
+    /// Tunes a worst gap that is this function of the variable, between 3 and 30, and
+    /// returns the entry with the number of evaluations.
+    fn tuned(gap: impl Fn(f64) -> f64) -> (Entry, usize) {
+        let scenario = Scenario::default();
+        let bench = Bench { scenario: &scenario, first_seed: 1, runs: 0, progress: &|| {} };
+        let tries = Cell::new(0);
+        let entry = bench.tune(2.0, (3.0, 30.0), |speed| {
+            tries.set(tries.get() + 1);
+            Ok(Entry {
+                controller: "constant".into(),
+                policy: Policy::StepAware,
+                crossing_speed_mm_s: Some(speed),
+                gap_reserve: 0.0,
+                tuned: false,
+                deploy_time_s: 80.0 / speed,
+                worst_gap_mm: gap(speed),
+                slip_events: 0,
+                incomplete: 0,
+                mean_preload_n: 0.0,
+                energy_j: 0.0,
+                wear_j: 0.0,
+            })
+        });
+        (entry.unwrap(), tries.get())
+    }
+
+    #[test]
+    fn the_tuning_finds_the_speed_of_the_reference() {
+        let curves: [fn(f64) -> f64; 3] =
+            [|v| 1.5 + 0.05 * v, |v| 1.0 + 0.35 * v.sqrt(), |v| 2.6 - 4.0 / v];
+        for gap in curves {
+            let (entry, tries) = tuned(gap);
+            assert!(entry.tuned && tries <= MOST_TRIES, "{entry:?} {tries}");
+            assert!((entry.worst_gap_mm / 2.0 - 1.0).abs() <= TUNED_WITHIN, "{entry:?}");
+        }
+    }
+
+    #[test]
+    fn a_reference_out_of_reach_is_told() {
+        // Always too large: the slowest. Always below: the fastest.
+        for (gap, speed) in [(2.5, 3.0), (1.5, 30.0)] {
+            let (entry, _) = tuned(|_| gap);
+            assert!(!entry.tuned);
+            assert_eq!(entry.crossing_speed_mm_s, Some(speed));
+        }
+        // Met at an end.
+        assert!(tuned(|v| if v < 3.5 { 2.0 } else { 2.5 }).0.tuned);
+        // Jumped over: the fastest that keeps it.
+        let (entry, tries) = tuned(|v| if v < 11.0 { 1.9 } else { 2.1 });
+        assert!(!entry.tuned && entry.worst_gap_mm < 2.0 && tries == MOST_TRIES, "{entry:?}");
+        assert!(entry.crossing_speed_mm_s > Some(9.0), "{entry:?}");
+    }
+}

@@ -145,3 +145,67 @@ fn fit(points: &[Point]) -> Option<([i32; ENTRIES], (f64, f64))> {
     let rms = (errors.map(|e| e * e).sum::<f64>() / rows as f64).sqrt();
     Some((table, (worst, rms)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points on a known law of z, with the stiffness that it gives.
+    fn on(law: impl Fn(f64) -> f64) -> Vec<Point> {
+        let excess = Formula::new(&Rig::fe()).stiffening - 1.0;
+        (1..200)
+            .map(|i| {
+                let deborah = 0.05 * f64::from(i);
+                let felt = law(deborah / (1.0 + deborah));
+                Point { deborah, felt, stiffness: 1.0 + excess * felt }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_polynomial_is_found_again() {
+        let law = |z: f64| z * (0.4 + z * (0.9 - 0.3 * z));
+        let (table, (worst, rms)) = fit(&on(law)).unwrap();
+        assert!(worst < 1e-9 && rms <= worst, "{worst} {rms}");
+        for (index, value) in table.into_iter().enumerate() {
+            let exact = law(index as f64 / (ENTRIES - 1) as f64) * 1e6;
+            assert!((f64::from(value) - exact).abs() <= 0.51, "{index}: {value} {exact}");
+        }
+    }
+
+    #[test]
+    fn what_bends_down_beyond_the_data_is_held() {
+        let (table, _) = fit(&on(|z| z * (2.0 - z * z))).unwrap();
+        assert_eq!(table[0], 0);
+        assert!(table[ENTRIES / 2..].windows(2).all(|pair| pair[1] >= pair[0]), "{table:?}");
+    }
+
+    #[test]
+    fn the_error_is_that_of_the_stiffness() {
+        let mut points = on(|z| z);
+        points[60].felt += 0.01;
+        let excess = Formula::new(&Rig::fe()).stiffening - 1.0;
+        let (_, (worst, _)) = fit(&points).unwrap();
+        let expected = 0.01 * excess / points[60].stiffness;
+        assert!((worst / expected - 1.0).abs() < 0.2, "{worst} {expected}");
+    }
+
+    #[test]
+    fn the_fit_covers_both_rigs_and_what_rubber_holds() {
+        let cases = cases();
+        assert_eq!(crossings(), 2 * cases.len());
+        for rig in [Rig::prototype(), Rig::fe()] {
+            let load = rig.plant.top_load_n * rig.plant.top_load_share;
+            let speeds = [rig.drive.min_crossing_speed_mm_s, rig.drive.cruise_speed_mm_s];
+            let forces = [rig.preload.cruise_n, rig.preload.limit_n];
+            for (value, of) in speeds.map(|s| (s, 0)).into_iter().chain(forces.map(|f| (f, 1))) {
+                let found = cases.iter().map(|case| if of == 0 { case.0 } else { case.1 });
+                let (least, most) =
+                    found.fold((f64::MAX, 0.0f64), |(a, b), x| (a.min(x), b.max(x)));
+                assert!((least..=most).contains(&value), "{value} outside {least} to {most}");
+            }
+            assert!(cases.iter().any(|case| case.2.is_some_and(|l| (l - load).abs() < 0.1)));
+        }
+        assert!(cases.iter().all(|&(_, force, load)| load.is_none_or(|l| l <= force / 3.6)));
+    }
+}

@@ -55,7 +55,7 @@ pub struct Row {
     pub slip_margin_est: f64,
     /// Gross slip so far, mm.
     pub slip_mm: f64,
-    /// Deflection of the arm's first mode, um.
+    /// Deflection of the arm by its modes, um.
     pub vibration_um: f64,
     /// Drive duty, -1 to 1.
     pub drive_duty: f64,

@@ -22,8 +22,9 @@ impl DriveMotor {
     /// Tread speed after `dt_s` at `duty` (-1 to 1) against `load_n` from speed
     /// `speed`, and the motor's force, N. Exact between the current limits.
     ///
-    /// A disabled bridge leaves the worm gear locked: the wheel stops within a few
-    /// milliseconds and holds.
+    /// The worm gear locks itself: a load against the motion resists it, one along the
+    /// motion does not help, and none turns a resting wheel. A disabled bridge stops
+    /// the wheel within a few milliseconds.
     #[must_use]
     pub fn step(&self, speed: f64, duty: f64, enabled: bool, load_n: f64, dt_s: f64) -> (f64, f64) {
         if !enabled {
@@ -32,13 +33,12 @@ impl DriveMotor {
         }
         let force =
             (self.stall_n * (duty - speed / self.no_load_mm_s)).clamp(-self.limit_n, self.limit_n);
-        let free = force - load_n;
-        // Stiction of the gearbox holds a resting wheel.
-        if speed == 0.0 && free.abs() <= self.friction_n {
+        let sense = if speed != 0.0 { speed.signum() } else { force.signum() };
+        let against = (load_n * sense).max(0.0) + self.friction_n;
+        if speed == 0.0 && force * sense <= against {
             return (0.0, force);
         }
-        let sense = if speed != 0.0 { speed.signum() } else { free.signum() };
-        let resist = load_n + sense * self.friction_n;
+        let resist = sense * against;
         let acceleration = 1000.0 / self.mass_kg;
         let next = if force.abs() < self.limit_n {
             let rate = acceleration * self.stall_n / self.no_load_mm_s;
@@ -47,8 +47,8 @@ impl DriveMotor {
         } else {
             speed + acceleration * (force - resist) * dt_s
         };
-        // Friction brakes to rest, never through it; nor can the load drive the worm.
-        if next * sense <= 0.0 && duty * sense <= 0.0 { (0.0, force) } else { (next, force) }
+        // Load and friction brake to rest, never through it.
+        (if next * sense <= 0.0 { 0.0 } else { next }, force)
     }
 }
 
@@ -142,6 +142,71 @@ mod tests {
             speed = drive.step(speed, 0.5, false, 10.0, 1e-3).0;
         }
         assert_eq!(speed, 0.0);
+    }
+
+    #[test]
+    fn a_load_resists_but_never_drives() {
+        let drive = DriveMotor {
+            no_load_mm_s: 60.0,
+            stall_n: 160.0,
+            limit_n: 80.0,
+            mass_kg: 40.0,
+            friction_n: 2.0,
+        };
+        let settled = |duty: f64, load: f64| {
+            (0..3000).fold(0.0, |speed, _| drive.step(speed, duty, true, load, 1e-3).0)
+        };
+        // At rest no load turns it, nor does a motor weaker than load and friction.
+        for load in [0.0, 30.0, -30.0, 500.0] {
+            assert_eq!(settled(0.0, load), 0.0);
+        }
+        assert_eq!(settled(0.1, 15.0), 0.0);
+        assert_eq!(settled(-0.1, -15.0), 0.0);
+        // Along the motion a load does not help.
+        assert_eq!(settled(0.5, -30.0), settled(0.5, 0.0));
+        assert!((settled(-0.5, 30.0) + settled(0.5, 0.0)).abs() < 1e-12);
+        // Beyond the current limit it stalls, from speed too.
+        let stalled = (0..3000).fold(30.0, |v, _| drive.step(v, 1.0, true, 79.0, 1e-3).0);
+        assert_eq!(stalled, 0.0);
+    }
+
+    #[test]
+    fn the_current_limit_bounds_force_and_acceleration() {
+        let drive = DriveMotor {
+            no_load_mm_s: 60.0,
+            stall_n: 160.0,
+            limit_n: 80.0,
+            mass_kg: 40.0,
+            friction_n: 2.0,
+        };
+        let (speed, force) = drive.step(0.0, 1.0, true, 0.0, 1e-3);
+        assert_eq!(force, 80.0);
+        assert!((speed - 78.0 / 40.0).abs() < 1e-12, "{speed}");
+        let (speed, force) = drive.step(50.0, -1.0, true, 0.0, 1e-3);
+        assert_eq!(force, -80.0);
+        assert!((speed - (50.0 - 82.0 / 40.0)).abs() < 1e-12, "{speed}");
+    }
+
+    #[test]
+    fn the_screw_keeps_within_its_ends_and_when_switched_off() {
+        let mut screw = Pretightener::new(25.0, 0.06, 0.0, 1e-3, 10.0, (-5.0, 12.0));
+        for _ in 0..1000 {
+            screw.step(1.0, true, 1e-3);
+        }
+        assert_eq!(screw.seat_n(), 12.0);
+        for _ in 0..100 {
+            screw.step(-1.0, true, 1e-3);
+        }
+        let held = screw.seat_n();
+        assert!(held < 12.0);
+        for _ in 0..100 {
+            screw.step(-1.0, false, 1e-3);
+        }
+        assert_eq!(screw.seat_n(), held);
+        for _ in 0..2000 {
+            screw.step(-1.0, true, 1e-3);
+        }
+        assert_eq!(screw.seat_n(), -5.0);
     }
 
     #[test]

@@ -12,6 +12,13 @@ pub enum Axial {
     Driven(f64),
     /// Given friction utilisation, from a slip law or a sliding wheel.
     Utilised(f64),
+    /// The same, on an arm that turns axial thrust into radial force.
+    Wedged {
+        /// Friction utilisation, traction over normal force.
+        utilisation: f64,
+        /// Radial force per axial thrust.
+        wedge: f64,
+    },
 }
 
 /// Radial load and how the wheel is moved.
@@ -52,14 +59,23 @@ pub struct BalanceError {
 }
 
 impl Balance {
-    /// Residual of the radial balance, N, its slope, N/mm, and the utilisation.
-    fn residual(&self, contact: &Contact, lift_mm: f64) -> (f64, f64, f64) {
-        let (c, s) = (contact.cosine_n, contact.sine_n);
-        let (dc, ds) = contact.slope;
+    /// Residual of the radial balance, N, its slope, N/mm, and the utilisation, from
+    /// the contact's cosine and sine sums, N, and their derivatives by height, N/mm.
+    pub(super) fn residual(
+        &self,
+        (c, s): (f64, f64),
+        (dc, ds): (f64, f64),
+        lift_mm: f64,
+    ) -> (f64, f64, f64) {
         let pressed = self.preload_n + self.spring_n_per_mm * lift_mm;
         let (force, slope, used) = match self.axial {
             Axial::Pushed => (c, dc, 0.0),
             Axial::Utilised(u) => (c + u * s, dc + u * ds, u),
+            // The thrust u c - s presses the wheel by its wedge.
+            Axial::Wedged { utilisation: u, wedge: w } => {
+                let (on_c, on_s) = (1.0 - u * w, u + w);
+                (on_c * c + on_s * s, on_c * dc + on_s * ds, u)
+            }
             Axial::Driven(_) if c <= 0.0 => (0.0, 0.0, 0.0),
             Axial::Driven(load) => {
                 let u = (load + s) / c;
@@ -84,13 +100,19 @@ impl Balance {
         let mut best_residual = f64::INFINITY;
         for _ in 0..80 {
             let contact = ring.trial(&Motion { height_mm: height, ..motion });
-            let (residual, slope, utilisation) = self.residual(&contact, height - radius);
+            let forces = (contact.cosine_n, contact.sine_n);
+            let (residual, slope, utilisation) =
+                self.residual(forces, contact.slope, height - radius);
             if residual.abs() < best_residual {
                 best_residual = residual.abs();
                 best = Solved { height_mm: height, contact, utilisation };
             }
-            if residual.abs() <= tolerance || high - low < 1e-13 * radius {
+            if residual.abs() <= tolerance {
                 return Ok(best);
+            }
+            // Closed in on a kink, or on an end without a balance.
+            if high - low < 1e-13 * radius {
+                break;
             }
             // Too much force: the centre must stand higher.
             if residual > 0.0 {
@@ -113,5 +135,74 @@ impl Balance {
             residual_n: best_residual,
             height_mm: best.height_mm,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::ring::RingParameters;
+    use crate::plant::wall::{Step, Wall};
+
+    /// A ring on both floor and corner, and a motion that leaves it there.
+    fn climbing() -> (Ring, Motion) {
+        let ring = Ring::new(RingParameters {
+            radius_mm: 25.0,
+            width_mm: 28.0,
+            k_inf: 0.6044,
+            k_0: 0.6044 * 4.2235,
+            tau_s: 0.1059,
+            elements: 1440,
+        });
+        let wall = Wall::new(vec![Step { position_mm: 13.0, height_mm: 4.0 }]).local(0.0);
+        (ring, Motion { wall, height_mm: 24.8, turn_rad: 0.0, dt_s: 0.2 })
+    }
+
+    fn solve(preload_n: f64, spring_n_per_mm: f64, axial: Axial) -> Solved {
+        let (ring, motion) = climbing();
+        Balance { preload_n, spring_n_per_mm, axial }.solve(&ring, motion).unwrap()
+    }
+
+    #[test]
+    fn the_forces_balance() {
+        let [rate, load, used, wedge] = [1.2, 6.7, 0.8, 0.6];
+        for preload in [60.0, 150.0] {
+            for axial in [
+                Axial::Pushed,
+                Axial::Driven(load),
+                Axial::Utilised(used),
+                Axial::Wedged { utilisation: used, wedge },
+            ] {
+                let solved = solve(preload, rate, axial);
+                let (c, s) = (solved.contact.cosine_n, solved.contact.sine_n);
+                assert!(solved.contact.floor_n > 0.0 && solved.contact.step_sine_n > 0.0);
+                let thrust = solved.utilisation * c - s;
+                let mut pressed = preload + rate * (solved.height_mm - 25.0);
+                match axial {
+                    Axial::Driven(_) => assert!((thrust - load).abs() < 1e-6),
+                    Axial::Wedged { .. } => pressed += wedge * thrust,
+                    _ => {}
+                }
+                let carried = c + solved.utilisation * s;
+                assert!((carried - pressed).abs() < 1e-5, "{axial:?}: {carried} {pressed}");
+            }
+        }
+    }
+
+    #[test]
+    fn without_a_wedge_it_is_the_given_utilisation() {
+        for used in [-1.1, 0.0, 0.7] {
+            let wedged = solve(33.3, 0.0, Axial::Wedged { utilisation: used, wedge: 0.0 });
+            assert_eq!(wedged, solve(33.3, 0.0, Axial::Utilised(used)));
+        }
+    }
+
+    #[test]
+    fn a_preload_that_nothing_carries_is_told() {
+        let (ring, motion) = climbing();
+        let balance = Balance { preload_n: 1e9, spring_n_per_mm: 0.0, axial: Axial::Pushed };
+        let error = balance.solve(&ring, motion).unwrap_err();
+        assert_eq!(error.preload_n, 1e9);
+        assert!(error.to_string().starts_with("radial balance: no wheel height carries"));
     }
 }

@@ -82,7 +82,8 @@ impl Ledger {
         Self { steps, radius_mm, done: Vec::new(), open: None }
     }
 
-    /// Crossings whose gap is known, in the order they happened.
+    /// Crossings whose gap is known, in the order they happened; one under way is taken
+    /// off again if the wheel slides back where it came from.
     #[must_use]
     pub fn crossings(&self) -> &[Crossing] {
         &self.done
@@ -92,7 +93,12 @@ impl Ledger {
     pub fn record(&mut self, now: &Moment) {
         let Some(mut open) = self.open.take().or_else(|| self.begin(now)) else { return };
         // Off the corner, over the edge or back where it came from.
-        if now.corner_n <= 0.0 || now.position_mm >= open.crossing.step_mm {
+        let over = now.position_mm >= open.crossing.step_mm;
+        if now.corner_n <= 0.0 || over {
+            // A wheel that slid back has not crossed.
+            if open.listed && over != open.crossing.climbing {
+                self.done.pop();
+            }
             return;
         }
         let crossing = &mut open.crossing;
@@ -166,5 +172,82 @@ impl Ledger {
             last: *now,
             listed: false,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Looks at a wheel 0.5 mm above its undeformed height: position, force of the
+    /// corner, largest pressure on the lower wall.
+    fn look(ledger: &mut Ledger, moments: &[(f64, f64, f64)]) {
+        for &(position_mm, corner_n, floor_pressure) in moments {
+            ledger.record(&Moment {
+                // Distinct times, in the order of the looks.
+                time_s: ledger.seen(),
+                position_mm,
+                height_mm: if position_mm >= 20.0 { 29.5 } else { 25.5 },
+                base_mm: if position_mm >= 20.0 { 4.0 } else { 0.0 },
+                speed_mm_s: 5.0,
+                preload_n: 40.0,
+                utilisation: 0.7,
+                slip_mm: 0.0,
+                corner_n,
+                floor_pressure,
+            });
+        }
+    }
+
+    impl Ledger {
+        fn seen(&self) -> f64 {
+            self.open.map_or(0.0, |open| open.last.time_s) + 1.0
+        }
+    }
+
+    fn ledger() -> Ledger {
+        Ledger::new(vec![Step { position_mm: 20.0, height_mm: 4.0 }], 25.0)
+    }
+
+    #[test]
+    fn a_climb_is_measured_where_the_lower_wall_lets_go() {
+        let mut ledger = ledger();
+        look(&mut ledger, &[(6.0, 0.0, 0.4), (7.0, 5.0, 0.3), (8.0, 9.0, 0.1), (8.5, 9.0, -0.1)]);
+        let [crossing] = ledger.crossings() else { panic!("{ledger:?}") };
+        // Half way between the last two looks.
+        assert!((crossing.gap_mm - (11.75f64.hypot(25.5) - 25.0)).abs() < 1e-12);
+        assert!(crossing.climbing && crossing.index == 1);
+        look(&mut ledger, &[(15.0, 12.0, -0.2), (20.0, 0.0, 0.5)]);
+        assert_eq!(ledger.crossings().len(), 1);
+        assert_eq!(ledger.crossings()[0].corner_n, 12.0);
+    }
+
+    #[test]
+    fn the_last_of_several_lift_offs_counts() {
+        let mut ledger = ledger();
+        look(&mut ledger, &[(7.0, 5.0, 0.3), (8.0, 9.0, -0.1), (8.1, 9.0, 0.1), (8.3, 9.0, -0.1)]);
+        let [crossing] = ledger.crossings() else { panic!("{ledger:?}") };
+        assert!((crossing.gap_mm - (11.8f64.hypot(25.5) - 25.0)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_wheel_that_slides_back_has_not_crossed() {
+        let mut ledger = ledger();
+        look(&mut ledger, &[(7.0, 5.0, 0.3), (8.0, 9.0, -0.1)]);
+        assert_eq!(ledger.crossings().len(), 1);
+        look(&mut ledger, &[(7.0, 5.0, 0.2), (6.0, 0.0, 0.4)]);
+        assert!(ledger.crossings().is_empty());
+        look(&mut ledger, &[(7.0, 5.0, 0.3), (8.0, 9.0, -0.1), (20.0, 0.0, 0.5)]);
+        assert_eq!(ledger.crossings().len(), 1);
+    }
+
+    #[test]
+    fn a_drop_is_measured_at_its_first_touch_down() {
+        let mut ledger = ledger();
+        look(&mut ledger, &[(20.5, 0.0, 0.4), (19.0, 30.0, -2.0), (9.0, 9.0, -0.1)]);
+        look(&mut ledger, &[(8.5, 9.0, 0.1), (8.4, 9.0, -0.1), (8.0, 5.0, 0.2), (5.0, 0.0, 0.4)]);
+        let [crossing] = ledger.crossings() else { panic!("{ledger:?}") };
+        assert!(!crossing.climbing);
+        assert!((crossing.gap_mm - (11.25f64.hypot(25.5) - 25.0)).abs() < 1e-12);
     }
 }

@@ -1,16 +1,35 @@
 //! The whole rig, a millisecond at a time.
 
+mod contact;
+mod traction;
+
 use super::actuators::Pretightener;
 use super::arm::Mode;
-use super::balance::{Axial, Balance, BalanceError};
+use super::balance::BalanceError;
 use super::draw::PlantParameters;
-use super::ledger::{Ledger, Moment};
-use super::ring::{Motion, Ring};
+use super::ledger::Ledger;
+use super::ring::Ring;
 use super::rolling;
-use super::wall::LocalWall;
+use contact::Calm;
+use traction::Gait;
 
-/// Longest axial way of one ring step, mm.
-const STRIDE_MM: f64 = 0.02;
+/// Most ring steps in a call: 5 mm of way at the usual stride.
+const MOST_STRIDES: f64 = 256.0;
+
+/// How finely the rig is computed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Resolution {
+    /// Longest axial way of one ring step, mm.
+    pub stride_mm: f64,
+    /// Resolves the ring on the smooth wall too, instead of steady rolling there.
+    pub always_awake: bool,
+}
+
+impl Default for Resolution {
+    fn default() -> Self {
+        Self { stride_mm: 0.02, always_awake: false }
+    }
+}
 
 /// What the bridges are driven with.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -62,7 +81,7 @@ pub struct Truth {
     pub separation_mm: f64,
     /// Gross slip so far, mm.
     pub slip_mm: f64,
-    /// Deflection of the first mode, mm.
+    /// Deflection of the arm by its modes, mm.
     pub vibration_mm: f64,
     /// Mechanical work of the drive so far, mJ.
     pub work_mj: f64,
@@ -99,8 +118,10 @@ pub enum PlantError {
 #[derive(Clone, Debug)]
 pub struct VirtualRig {
     parameters: PlantParameters,
+    resolution: Resolution,
     ring: Ring,
     awake: bool,
+    calm: Calm,
     preload: Pretightener,
     modes: Vec<Mode>,
     truth: Truth,
@@ -109,13 +130,16 @@ pub struct VirtualRig {
     sliding: bool,
     /// Resting on the stop or latch that carries the load until the drive first turns.
     parked: bool,
-    /// Base of the wall under the centre, to notice when it changes, mm.
+    /// Tread speed of the last steady rolling, mm/s.
+    rolled_mm_s: f64,
+    /// Base of the wall under the centre in the last stride, mm.
     base_mm: f64,
-    /// Contact forces of the last step: normal, cosine, sine, N.
-    normal_n: f64,
-    cosine_n: f64,
-    sine_n: f64,
+    /// Contact forces of the last stride: normal, cosine and sine sums, N.
+    forces: (f64, f64, f64),
+    /// Acceleration of the tread, mm/s^2.
     acceleration: f64,
+    /// Rise of the centre per axial way in the last stride.
+    slope: f64,
 }
 
 impl VirtualRig {
@@ -141,9 +165,11 @@ impl VirtualRig {
         );
         let modes = parameters.modes_hz.iter().map(|&hz| Mode::new(hz, 0.02, 0.2)).collect();
         let mut rig = Self {
+            resolution: Resolution::default(),
             ring: Ring::new(parameters.ring),
             ledger: Ledger::new(parameters.wall.steps().to_vec(), radius),
             awake: false,
+            calm: Calm { tread_mm_s: 0.0, pressing_n: preload_n, for_s: f64::INFINITY },
             preload,
             modes,
             truth: Truth {
@@ -155,15 +181,22 @@ impl VirtualRig {
             },
             sliding: false,
             parked: true,
+            rolled_mm_s: 0.0,
             base_mm: local.base_mm,
-            normal_n: rest.normal_n,
-            cosine_n: rest.cosine_n,
-            sine_n: 0.0,
+            forces: (rest.normal_n, rest.cosine_n, 0.0),
             acceleration: 0.0,
+            slope: 0.0,
             parameters,
         };
         rig.derive();
         rig
+    }
+
+    /// The same rig computed at another resolution.
+    #[must_use]
+    pub fn with_resolution(mut self, resolution: Resolution) -> Self {
+        self.resolution = resolution;
+        self
     }
 
     /// What is true now.
@@ -191,8 +224,9 @@ impl VirtualRig {
     pub fn step(&mut self, drives: &Drives, dt_s: f64) -> Result<(), PlantError> {
         self.preload.step(drives.preload, drives.preload_on, dt_s);
         self.turn_wheel(drives, dt_s);
+        self.check()?;
         let way = self.truth.tread_mm_s.abs().max(self.truth.speed_mm_s.abs()) * dt_s;
-        let parts = (way / STRIDE_MM).ceil().clamp(1.0, 64.0);
+        let parts = (way / self.resolution.stride_mm).ceil().clamp(1.0, MOST_STRIDES);
         for _ in 0..parts as usize {
             self.roll(dt_s / parts)?;
         }
@@ -205,7 +239,7 @@ impl VirtualRig {
     /// Motor and gearbox: the wheel's spin.
     fn turn_wheel(&mut self, drives: &Drives, dt_s: f64) {
         let before = self.truth.tread_mm_s;
-        let load = if self.parked { 0.0 } else { self.truth.utilisation * self.normal_n };
+        let load = self.drive_load(drives.drive);
         let drive = &self.parameters.drive;
         let (after, force) = drive.step(before, drives.drive, drives.drive_on, load, dt_s);
         self.truth.tread_mm_s = after;
@@ -218,186 +252,36 @@ impl VirtualRig {
 
     /// One stride: axial motion by grip or slip, then the radial balance.
     fn roll(&mut self, dt_s: f64) -> Result<(), PlantError> {
-        let inertia = 1e-3 * self.parameters.mass_kg * self.acceleration;
-        let load = self.parameters.load_n + inertia;
-        let (speed, axial) = self.traction(load, dt_s);
-        let mut position = self.truth.position_mm + speed * dt_s;
+        let Gait { mut speed, gripped, mut axial } = self.traction(dt_s);
+        let before = self.truth.position_mm;
         let (low, high) = self.parameters.stops_mm;
-        let mut speed = speed;
+        let mut position = before + speed * dt_s;
         if position < low || position > high {
             position = position.clamp(low, high);
             speed = 0.0;
+            if gripped != 0.0 {
+                axial = self.sliding_towards(gripped).unwrap_or(axial);
+            }
         }
-        let turn = self.truth.tread_mm_s * dt_s / self.parameters.ring.radius_mm;
-        let creep = (self.truth.tread_mm_s - speed).abs() * dt_s;
-        self.truth.wear_mj += self.truth.utilisation.abs() * self.normal_n * creep;
-        let before = self.truth.position_mm;
+        let tread = self.truth.tread_mm_s;
+        self.truth.slip_mm += (gripped - speed).abs() * dt_s;
+        let creep = (tread - speed).abs() * dt_s;
+        self.truth.wear_mj += self.truth.utilisation.abs() * self.forces.0 * creep;
         self.truth.position_mm = position;
         self.truth.speed_mm_s = speed;
+        let turn = tread * dt_s / self.parameters.ring.radius_mm;
         self.truth.rotation_rad += turn;
         let local = self.parameters.wall.local(position);
-        if self.near_step(&local) {
+        let settled = self.settled(&local, axial, dt_s);
+        if self.resolution.always_awake || !settled || self.near_step(&local) {
             if !self.awake {
                 self.wake(before);
             }
             self.resolve(&local, axial, turn, dt_s)
         } else {
             self.awake = false;
-            self.roll_steadily(&local, axial);
-            Ok(())
+            self.roll_steadily(&local, axial)
         }
-    }
-
-    /// Axial speed and how the contact's friction is used, from the forces of the
-    /// last stride.
-    fn traction(&mut self, load: f64, dt_s: f64) -> (f64, Axial) {
-        let spin = self.truth.tread_mm_s;
-        if self.parked || self.cosine_n <= 0.0 {
-            return (0.0, Axial::Utilised(0.0));
-        }
-        let mu = self.parameters.mu;
-        let needed = (load + self.sine_n) / self.cosine_n;
-        let used = needed.clamp(-mu, mu);
-        // Creep of the tread under traction, 63 % of friction at `elastic_creep`.
-        let part = (used.abs() / mu).min(0.999);
-        let creep = -self.parameters.elastic_creep * (1.0 - part).ln() * used.signum();
-        let gripped = spin - spin.abs() * creep;
-        if needed.abs() < mu && !self.sliding {
-            return (gripped, Axial::Driven(load));
-        }
-        // Sliding: friction is spent and what is missing accelerates the carriage.
-        self.sliding = true;
-        let missing = mu * needed.signum() * self.cosine_n - self.sine_n - self.parameters.load_n;
-        let speed = self.truth.speed_mm_s + 1000.0 * missing / self.parameters.mass_kg * dt_s;
-        let caught = needed.abs() < mu
-            && (speed - gripped) * (self.truth.speed_mm_s - gripped) <= 0.0
-            || needed.abs() < mu && (speed - gripped).abs() < 0.05;
-        if caught {
-            self.sliding = false;
-            return (gripped, Axial::Driven(load));
-        }
-        self.truth.slip_mm += (gripped - speed).abs() * dt_s;
-        (speed, Axial::Utilised(mu * needed.signum()))
-    }
-
-    /// Preload with the wheel's centre at its undeformed height over the wall under
-    /// it, the arm's wedge and the modes included.
-    fn pressing(&self, local: &LocalWall) -> f64 {
-        let seat = self.preload.seat_n() + self.parameters.spring_n_per_mm * local.base_mm;
-        let thrust =
-            if self.parked { 0.0 } else { self.truth.utilisation * self.cosine_n - self.sine_n };
-        let wedge = self.parameters.arm.wedge(self.truth.radius_mm) * thrust;
-        (seat + wedge - self.modes.first().map_or(0.0, Mode::force_n)).max(0.0)
-    }
-
-    fn near_step(&self, local: &LocalWall) -> bool {
-        let radius = self.parameters.ring.radius_mm;
-        let patch = (radius * radius - (radius - 1.5).powi(2)).sqrt();
-        let below = radius - local.rise_mm;
-        let run = (radius * radius - below * below).max(0.0).sqrt();
-        local.ahead_mm < run + 2.0 || local.behind_mm < patch + 1.0
-    }
-
-    /// Brings the ring into the state of steady rolling.
-    fn wake(&mut self, position_mm: f64) {
-        let local = self.parameters.wall.local(position_mm);
-        let height = self.truth.height_mm - local.base_mm;
-        let table = rolling::profile(&self.parameters.ring, height, self.truth.tread_mm_s);
-        // A fresh ring counts its own turns; only the angle to the wall matters.
-        self.ring = Ring::new(self.parameters.ring);
-        let interpolate = |angle: f64| {
-            let at = table.partition_point(|node| node.0 < angle);
-            match (at.checked_sub(1).and_then(|i| table.get(i)), table.get(at)) {
-                (Some(a), Some(b)) => {
-                    let part = (angle - a.0) / (b.0 - a.0);
-                    (a.1 + part * (b.1 - a.1), a.2 + part * (b.2 - a.2))
-                }
-                _ => (0.0, 0.0),
-            }
-        };
-        self.ring.seed(self.truth.time_s, interpolate);
-        self.awake = true;
-    }
-
-    /// Radial balance with the ring resolved.
-    fn resolve(
-        &mut self,
-        local: &LocalWall,
-        axial: Axial,
-        turn: f64,
-        dt_s: f64,
-    ) -> Result<(), PlantError> {
-        let motion = Motion {
-            wall: *local,
-            height_mm: self.truth.height_mm - local.base_mm,
-            turn_rad: turn,
-            dt_s,
-        };
-        let balance = Balance {
-            preload_n: self.pressing(local),
-            spring_n_per_mm: self.parameters.spring_n_per_mm,
-            axial,
-        };
-        let solved = balance.solve(&self.ring, motion).map_err(|source| PlantError::Balance {
-            time_s: self.truth.time_s,
-            position_mm: self.truth.position_mm,
-            source,
-        })?;
-        self.ring.commit(&Motion { height_mm: solved.height_mm, ..motion });
-        let contact = solved.contact;
-        self.truth.height_mm = solved.height_mm + local.base_mm;
-        self.truth.depth_mm = contact.depth_mm.max(0.0);
-        self.truth.corner_n = contact.step_force_n();
-        self.truth.floor_n = contact.floor_n;
-        self.truth.utilisation = solved.utilisation;
-        self.truth.separation_mm =
-            if contact.depth_mm > 0.0 { 0.0 } else { self.separation(solved.height_mm) };
-        self.normal_n = contact.normal_n;
-        self.cosine_n = contact.cosine_n;
-        self.sine_n = contact.sine_n;
-        self.truth.ring_awake = true;
-        self.truth.preload_n = self.preload_now();
-        self.ledger.record(&Moment {
-            time_s: self.truth.time_s,
-            position_mm: self.truth.position_mm,
-            height_mm: self.truth.height_mm,
-            base_mm: local.base_mm,
-            speed_mm_s: self.truth.speed_mm_s,
-            preload_n: self.truth.preload_n,
-            utilisation: self.truth.utilisation,
-            slip_mm: self.truth.slip_mm,
-            corner_n: self.truth.corner_n,
-            floor_pressure: contact.floor_pressure,
-        });
-        Ok(())
-    }
-
-    /// Radial balance of steady rolling on the continuous wall.
-    fn roll_steadily(&mut self, local: &LocalWall, axial: Axial) {
-        let radius = self.parameters.ring.radius_mm;
-        let pressing = self.pressing(local);
-        let spring = self.parameters.spring_n_per_mm;
-        let used = |c: &rolling::Rolling| match axial {
-            Axial::Pushed => 0.0,
-            Axial::Utilised(u) => u,
-            Axial::Driven(load) if c.cosine_n > 0.0 => (load + c.sine_n) / c.cosine_n,
-            Axial::Driven(_) => 0.0,
-        };
-        let guess = self.truth.height_mm - self.base_mm;
-        let contact = rolling::solve(&self.parameters.ring, self.truth.tread_mm_s, guess, |c| {
-            c.cosine_n + used(c) * c.sine_n - pressing - spring * (c.height_mm - radius)
-        });
-        self.base_mm = local.base_mm;
-        self.truth.height_mm = contact.height_mm + local.base_mm;
-        self.truth.depth_mm = radius - contact.height_mm;
-        self.truth.corner_n = 0.0;
-        self.truth.floor_n = contact.cosine_n;
-        self.truth.utilisation = used(&contact);
-        self.truth.separation_mm = 0.0;
-        self.normal_n = contact.normal_n;
-        self.cosine_n = contact.cosine_n;
-        self.sine_n = contact.sine_n;
-        self.truth.ring_awake = false;
     }
 
     /// Modes of the arm, forced by the torque ripple of motor and gearbox.
@@ -415,17 +299,13 @@ impl VirtualRig {
                 mode.step(force, part);
             }
         }
-        self.truth.vibration_mm = self.modes.first().map_or(0.0, Mode::deflection_mm);
+        self.truth.vibration_mm = self.modes.iter().map(Mode::deflection_mm).sum();
     }
 
     /// Preload of spring and screw at the present height.
     fn preload_now(&self) -> f64 {
         let rise = self.truth.height_mm - self.parameters.ring.radius_mm;
         (self.preload.seat_n() + self.parameters.spring_n_per_mm * rise).max(0.0)
-    }
-
-    fn separation(&self, height_mm: f64) -> f64 {
-        (height_mm - self.parameters.ring.radius_mm).max(0.0)
     }
 
     /// What follows from the state.
@@ -442,13 +322,19 @@ impl VirtualRig {
 
     fn check(&self) -> Result<(), PlantError> {
         let t = &self.truth;
+        let vibration = self.modes.iter().map(Mode::force_n).sum();
+        // Causes first, so that the name is that of the origin.
         let states = [
-            ("position", t.position_mm),
-            ("speed", t.speed_mm_s),
             ("tread speed", t.tread_mm_s),
+            ("screw", self.preload.seat_n()),
+            ("vibration", vibration),
+            ("speed", t.speed_mm_s),
+            ("position", t.position_mm),
+            ("rotation", t.rotation_rad),
             ("height", t.height_mm),
-            ("preload", t.preload_n),
-            ("vibration", t.vibration_mm),
+            ("utilisation", t.utilisation),
+            ("slip", t.slip_mm),
+            ("work", t.work_mj + t.wear_mj),
         ];
         match states.into_iter().find(|(_, value)| !value.is_finite()) {
             Some((name, _)) => Err(PlantError::NotFinite { time_s: t.time_s, name }),

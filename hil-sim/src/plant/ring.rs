@@ -5,7 +5,7 @@
 //! p >= 0: the three-parameter solid per area. Elements turn with the wheel.
 //! Within a step delta runs linearly, and q is integrated exactly for it.
 
-use super::wall::{Facet, LocalWall};
+use super::wall::{Edge, Facet, LocalWall};
 
 /// Wheel and rubber.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -123,11 +123,10 @@ impl Ring {
         let mut contact = Contact::default();
         let law = Law::new(&self.parameters, motion.dt_s);
         let mut floor_pressure = f64::NEG_INFINITY;
-        let pitch = std::f64::consts::TAU / self.parameters.elements as f64;
-        let patch = pitch * self.parameters.radius_mm * self.parameters.width_mm;
+        let edge = motion.wall.edge(motion.height_mm);
+        let patch = self.pitch() * self.parameters.radius_mm * self.parameters.width_mm;
         self.sweep(motion, |index, sin, cos| {
-            let (distance, facet) = motion.wall.ray(motion.height_mm, sin, cos);
-            let depth = self.parameters.radius_mm - distance;
+            let (depth, facet, covered) = self.meets(motion, &edge, sin, cos);
             if depth <= 0.0 {
                 return;
             }
@@ -140,6 +139,7 @@ impl Ring {
             if pressure <= 0.0 {
                 return;
             }
+            let patch = patch * covered;
             let force = pressure * patch;
             contact.normal_n += force;
             contact.cosine_n += force * cos;
@@ -168,10 +168,10 @@ impl Ring {
     pub fn commit(&mut self, motion: &Motion) {
         let law = Law::new(&self.parameters, motion.dt_s);
         let end = self.time + motion.dt_s;
+        let edge = motion.wall.edge(motion.height_mm);
         let mut touched = Vec::with_capacity(512);
         self.sweep(motion, |index, sin, cos| {
-            let (distance, _) = motion.wall.ray(motion.height_mm, sin, cos);
-            let depth = (self.parameters.radius_mm - distance).max(0.0);
+            let depth = self.meets(motion, &edge, sin, cos).0.max(0.0);
             let element = &self.elements[index];
             if depth > 0.0 || element.depth > 0.0 {
                 let (q, before) = element.at_start(self.time, &law);
@@ -188,8 +188,7 @@ impl Ring {
     /// Puts the ring into the state that `profile` gives for an angle from straight
     /// down (rad): depth and internal displacement, both mm, at time `time_s`.
     pub fn seed(&mut self, time_s: f64, profile: impl Fn(f64) -> (f64, f64)) {
-        let count = self.parameters.elements;
-        let pitch = std::f64::consts::TAU / count as f64;
+        let pitch = self.pitch();
         for (index, element) in self.elements.iter_mut().enumerate() {
             let angle = index as f64 * pitch - self.rotation;
             let angle = angle - std::f64::consts::TAU * (angle / std::f64::consts::TAU).round();
@@ -199,11 +198,27 @@ impl Ring {
         self.time = time_s;
     }
 
+    /// Depth of an element, what it meets, and the part of its width that does.
+    #[inline]
+    fn meets(&self, motion: &Motion, edge: &Edge, sin: f64, cos: f64) -> (f64, Facet, f64) {
+        let covered = edge.covered(sin, cos, self.pitch());
+        let (distance, facet) = if covered > 0.0 && covered < 1.0 {
+            (motion.height_mm / cos, Facet::Floor)
+        } else {
+            motion.wall.ray(motion.height_mm, sin, cos)
+        };
+        (self.parameters.radius_mm - distance, facet, covered)
+    }
+
+    /// Angle between two elements, rad.
+    fn pitch(&self) -> f64 {
+        std::f64::consts::TAU / self.parameters.elements as f64
+    }
+
     /// Calls `visit` with index, sine and cosine of every element within reach of
     /// the wall after the turn.
     fn sweep(&self, motion: &Motion, mut visit: impl FnMut(usize, f64, f64)) {
-        let count = self.parameters.elements;
-        let pitch = std::f64::consts::TAU / count as f64;
+        let (count, pitch) = (self.parameters.elements, self.pitch());
         let turned = self.rotation + motion.turn_rad;
         let (ahead, behind) = self.reach(motion);
         let first = ((turned - behind) / pitch).ceil() as i64;

@@ -1,5 +1,7 @@
 //! The four sensors: from what is true to the codes that the converters give.
 
+use std::collections::VecDeque;
+
 use interstage::sense::raw::{AdcCode, AngleFrame, EncoderCount};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -38,8 +40,12 @@ pub struct Codes {
 pub struct Sensors {
     parameters: SensorParameters,
     noise: ChaCha8Rng,
-    before: Option<Sensed>,
+    /// What was true at the last calls, newest first.
+    past: VecDeque<Sensed>,
 }
+
+/// Oldest reading that may be handed over, in calls.
+const LONGEST: usize = 256;
 
 /// Part of the converter's range at which a bridge reads zero.
 const ZERO: f64 = 0.05;
@@ -52,23 +58,31 @@ impl Sensors {
     pub fn new(parameters: SensorParameters, seed: u64) -> Self {
         // Another stream than the plant's draw, which has the seed itself.
         let noise = ChaCha8Rng::seed_from_u64(seed ^ 0x005e_4504_0153_0000);
-        Self { parameters, noise, before: None }
+        Self { parameters, noise, past: VecDeque::new() }
     }
 
-    /// Codes of what is true now, `dt_s` after the last call.
+    /// Codes of what is true now, `dt_s` after the last call; a reading handed over late
+    /// is interpolated between the calls around its time.
     pub fn read(&mut self, now: Sensed, dt_s: f64) -> Codes {
-        let before = self.before.replace(now).unwrap_or(now);
+        self.past.push_front(now);
+        self.past.truncate(LONGEST);
         let p = self.parameters.clone();
-        let aged = |from: f64, to: f64, delay: f64| to + (from - to) * (delay / dt_s).min(1.0);
+        let past = &self.past;
+        let aged = |of: fn(&Sensed) -> f64, delay_s: f64| {
+            let oldest = past.len() - 1;
+            let back = (delay_s / dt_s).clamp(0.0, oldest as f64);
+            let at = back as usize;
+            let (newer, older) = (of(&past[at]), of(&past[(at + 1).min(oldest)]));
+            newer + (older - newer) * (back - at as f64)
+        };
         let noise = &p.noise;
+        let preload = aged(|s| s.preload_n, noise.load_cell_delay_s) * p.load_cell_gain;
+        let depth = aged(|s| s.depth_mm, noise.tread_delay_s) * p.tread_gain;
+        let arm = aged(|s| s.arm_rad, noise.angle_delay_s) + p.angle_zero_rad;
         let turns = now.rotation_rad / std::f64::consts::TAU;
         let counts = turns * p.counts_per_turn + self.normal(noise.encoder_jitter_counts);
-        let preload = aged(before.preload_n, now.preload_n, noise.load_cell_delay_s)
-            * p.load_cell_gain
-            + self.normal(noise.load_cell_n);
-        let depth = aged(before.depth_mm, now.depth_mm, noise.tread_delay_s) * p.tread_gain
-            + self.normal(noise.tread_mm);
-        let arm = aged(before.arm_rad, now.arm_rad, noise.angle_delay_s) + p.angle_zero_rad;
+        let preload = preload + self.normal(noise.load_cell_n);
+        let depth = depth + self.normal(noise.tread_mm);
         let code = arm / std::f64::consts::TAU * 16_384.0
             + p.angle_zero_code
             + self.normal(noise.angle_lsb);
@@ -97,6 +111,6 @@ fn bridge(part: f64) -> AdcCode {
 
 /// Frame of the magnetic encoder: 14 bits of angle, no error, even parity.
 fn frame(code: f64) -> AngleFrame {
-    let bits = ((code.floor() as i64) & 0x3fff) as u16;
+    let bits = ((code.round() as i64) & 0x3fff) as u16;
     AngleFrame::new(bits | (((bits.count_ones() & 1) as u16) << 15))
 }

@@ -33,6 +33,26 @@ pub struct LocalWall {
     pub drop_mm: f64,
 }
 
+/// Direction of the edge behind, from straight down towards the back.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Edge {
+    sin: f64,
+    cos: f64,
+}
+
+impl Edge {
+    /// Part of an element `pitch` wide (rad) that does not reach past the edge, given
+    /// sine and cosine of its angle. The wall ends there at once; without this a whole
+    /// element would.
+    #[inline]
+    #[must_use]
+    pub fn covered(&self, sin: f64, cos: f64, pitch: f64) -> f64 {
+        // Sine of the angle from the edge to the element.
+        let within = self.sin * cos + self.cos * sin;
+        (0.5 + within / pitch).clamp(0.0, 1.0)
+    }
+}
+
 /// What a ray meets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Facet {
@@ -105,6 +125,16 @@ impl LocalWall {
         }
     }
 
+    /// The edge behind as seen from the centre, `y` mm above the wall under it.
+    #[must_use]
+    pub fn edge(&self, y: f64) -> Edge {
+        if self.behind_mm == f64::INFINITY {
+            return Edge { sin: 1.0, cos: 0.0 };
+        }
+        let away = self.behind_mm.hypot(y);
+        Edge { sin: self.behind_mm / away, cos: y / away }
+    }
+
     /// Distance from the centre, `y` mm above the wall under it, to the nearest point
     /// of the wall: straight down or the corner ahead.
     #[must_use]
@@ -153,6 +183,21 @@ mod tests {
             let far = local.ray(24.5, b.sin(), b.cos()).0;
             assert!((near - far).abs() < 1e-6, "{near} {far}");
         }
+    }
+
+    #[test]
+    fn an_element_reaches_past_the_edge_by_and_by() {
+        let local = Wall::new(vec![Step { position_mm: 10.0, height_mm: 4.0 }]).local(11.0);
+        let (edge, pitch) = (local.edge(24.0), 0.01);
+        let covered = |angle: f64| edge.covered(angle.sin(), angle.cos(), pitch);
+        let corner = -(1f64 / 24.0).atan();
+        assert!((covered(corner) - 0.5).abs() < 1e-12);
+        assert!((covered(corner + 0.2 * pitch) - 0.7).abs() < 1e-4);
+        assert_eq!((covered(corner + 0.6 * pitch), covered(corner - 0.6 * pitch)), (1.0, 0.0));
+        assert_eq!((covered(0.3), covered(-0.3)), (1.0, 0.0));
+        // Without an edge every element lies on the wall.
+        let edge = Wall::default().local(0.0).edge(24.0);
+        assert_eq!((edge.covered(0.3, 0.95, pitch), edge.covered(-0.3, 0.95, pitch)), (1.0, 1.0));
     }
 
     #[test]

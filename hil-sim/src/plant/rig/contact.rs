@@ -1,0 +1,243 @@
+//! How wheel and wall bear on each other: the ring near a step, steady rolling
+//! elsewhere, and the radial balance of both.
+
+use super::traction::JAMMED_BELOW;
+use super::{PlantError, VirtualRig};
+use crate::plant::arm::Mode;
+use crate::plant::balance::{Axial, Balance, BalanceError, Solved};
+use crate::plant::ledger::Moment;
+use crate::plant::ring::{Contact, Motion, Ring};
+use crate::plant::rolling::{self, Rolling};
+use crate::plant::wall::LocalWall;
+
+/// Axial reach kept around step and edge when the ring wakes, mm.
+const REACH_MM: f64 = 1.0;
+
+/// Depth that the tread may gain on its way to a step, mm.
+const SUNK_MM: f64 = 1.5;
+
+/// Change of tread speed or radial force that ends steady rolling, relative, and for the
+/// speed also absolute, mm/s.
+const UNSTEADY_PART: f64 = 0.03;
+const UNSTEADY_MM_S: f64 = 0.01;
+
+/// Relaxation times after which the tread has forgotten what came before.
+const FORGETS: f64 = 6.0;
+
+/// What the wheel has been rolling at, and for how long.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Calm {
+    pub(super) tread_mm_s: f64,
+    pub(super) pressing_n: f64,
+    pub(super) for_s: f64,
+}
+
+impl VirtualRig {
+    /// Whether speed and radial force have stood long enough for steady rolling.
+    pub(super) fn settled(&mut self, local: &LocalWall, axial: Axial, dt_s: f64) -> bool {
+        let (tread, pressing) = (self.truth.tread_mm_s, self.balance(local, axial).preload_n);
+        let calm = &mut self.calm;
+        let most = UNSTEADY_PART * calm.tread_mm_s.abs() + UNSTEADY_MM_S;
+        let same = (tread - calm.tread_mm_s).abs() <= most
+            && (pressing - calm.pressing_n).abs() <= UNSTEADY_PART * calm.pressing_n;
+        if same {
+            calm.for_s += dt_s;
+        } else {
+            *calm = Calm { tread_mm_s: tread, pressing_n: pressing, for_s: 0.0 };
+        }
+        calm.for_s > FORGETS * self.parameters.ring.tau_s
+    }
+
+    /// Radial balance over this wall: screw, spring, arm modes, and the wedge of a
+    /// gripping wheel's thrust.
+    fn balance(&self, local: &LocalWall, axial: Axial) -> Balance {
+        let seat = self.preload.seat_n() + self.parameters.spring_n_per_mm * local.base_mm;
+        let thrust = match axial {
+            Axial::Driven(load) => load,
+            _ => 0.0,
+        };
+        let vibration = self.modes.iter().map(Mode::force_n).sum::<f64>();
+        let shared = vibration / self.modes.len().max(1) as f64;
+        Balance {
+            preload_n: (seat + self.wedge() * thrust - shared).max(0.0),
+            spring_n_per_mm: self.parameters.spring_n_per_mm,
+            axial,
+        }
+    }
+
+    /// Whether the wheel may touch a step, or an edge may lie under its patch.
+    pub(super) fn near_step(&self, local: &LocalWall) -> bool {
+        let radius = self.parameters.ring.radius_mm;
+        let sunk = self.truth.depth_mm.max(SUNK_MM);
+        let patch = (radius * radius - (radius - sunk).powi(2)).sqrt();
+        let below = (radius - sunk - local.rise_mm).max(0.0);
+        let run = (radius * radius - below * below).sqrt();
+        local.ahead_mm < run + REACH_MM || local.behind_mm < patch + REACH_MM
+    }
+
+    /// Brings the ring into the state of steady rolling.
+    pub(super) fn wake(&mut self, position_mm: f64) {
+        let local = self.parameters.wall.local(position_mm);
+        let height = self.truth.height_mm - local.base_mm;
+        let table = rolling::profile(&self.parameters.ring, height, self.rolled_mm_s);
+        // A fresh ring counts its own turns; only the angle to the wall matters.
+        self.ring = Ring::new(self.parameters.ring);
+        let interpolate = |angle: f64| {
+            let at = table.partition_point(|node| node.0 < angle);
+            match (at.checked_sub(1).and_then(|i| table.get(i)), table.get(at)) {
+                (Some(a), Some(b)) => {
+                    let part = (angle - a.0) / (b.0 - a.0);
+                    (a.1 + part * (b.1 - a.1), a.2 + part * (b.2 - a.2))
+                }
+                _ => (0.0, 0.0),
+            }
+        };
+        self.ring.seed(self.truth.time_s, interpolate);
+        self.awake = true;
+    }
+
+    /// Radial balance with the ring resolved.
+    pub(super) fn resolve(
+        &mut self,
+        local: &LocalWall,
+        axial: Axial,
+        turn: f64,
+        dt_s: f64,
+    ) -> Result<(), PlantError> {
+        let motion = Motion {
+            wall: *local,
+            height_mm: self.truth.height_mm - local.base_mm,
+            turn_rad: turn,
+            dt_s,
+        };
+        let solved =
+            self.bear(axial, |rig, axial| rig.balance(local, axial).solve(&rig.ring, motion))?;
+        self.ring.commit(&Motion { height_mm: solved.height_mm, ..motion });
+        let way = self.truth.speed_mm_s * dt_s;
+        if way.abs() > 1e-6 {
+            let rise = solved.height_mm + local.base_mm - self.truth.height_mm;
+            self.slope = rise / way;
+        }
+        self.take(local, &solved);
+        self.truth.ring_awake = true;
+        self.truth.preload_n = self.preload_now();
+        self.ledger.record(&Moment {
+            time_s: self.truth.time_s,
+            position_mm: self.truth.position_mm,
+            height_mm: self.truth.height_mm,
+            base_mm: local.base_mm,
+            speed_mm_s: self.truth.speed_mm_s,
+            preload_n: self.truth.preload_n,
+            utilisation: self.truth.utilisation,
+            slip_mm: self.truth.slip_mm,
+            corner_n: self.truth.corner_n,
+            floor_pressure: solved.contact.floor_pressure,
+        });
+        Ok(())
+    }
+
+    /// Radial balance of steady rolling on the continuous wall.
+    pub(super) fn roll_steadily(
+        &mut self,
+        local: &LocalWall,
+        axial: Axial,
+    ) -> Result<(), PlantError> {
+        let guess = self.truth.height_mm - self.base_mm;
+        let solved = self.bear(axial, |rig, axial| rig.roll_balanced(local, axial, guess))?;
+        self.rolled_mm_s = self.truth.tread_mm_s;
+        self.slope = 0.0;
+        self.take(local, &solved);
+        self.truth.ring_awake = false;
+        Ok(())
+    }
+
+    fn roll_balanced(
+        &self,
+        local: &LocalWall,
+        axial: Axial,
+        guess_mm: f64,
+    ) -> Result<Solved, BalanceError> {
+        let ring = &self.parameters.ring;
+        let balance = self.balance(local, axial);
+        let residual = |c: &Rolling| {
+            let lift = c.height_mm - ring.radius_mm;
+            balance.residual((c.cosine_n, c.sine_n), (0.0, 0.0), lift)
+        };
+        let rolling = rolling::solve(ring, self.truth.tread_mm_s, guess_mm, |c| residual(c).0);
+        let (residual_n, _, utilisation) = residual(&rolling);
+        let height_mm = rolling.height_mm;
+        if residual_n.abs() > 1e-3 * balance.preload_n.max(1.0) {
+            let preload_n = balance.preload_n;
+            return Err(BalanceError { preload_n, residual_n, height_mm });
+        }
+        let contact = Contact {
+            normal_n: rolling.normal_n,
+            cosine_n: rolling.cosine_n,
+            sine_n: rolling.sine_n,
+            floor_n: rolling.cosine_n,
+            depth_mm: ring.radius_mm - height_mm,
+            area_mm2: rolling.area_mm2,
+            ..Contact::default()
+        };
+        Ok(Solved { height_mm, contact, utilisation })
+    }
+
+    /// Solves with the friction asked for, or with what is possible: no more than there
+    /// is, none where the arm would jam a sliding wheel.
+    fn bear(
+        &mut self,
+        axial: Axial,
+        solve: impl Fn(&Self, Axial) -> Result<Solved, BalanceError>,
+    ) -> Result<Solved, PlantError> {
+        let mu = self.parameters.mu;
+        let slides = |sense: f64| {
+            let axial = Axial::Wedged { utilisation: mu.copysign(sense), wedge: self.wedge() };
+            solve(self, axial).ok().filter(|solved| {
+                let c = &solved.contact;
+                let forces = (c.normal_n, c.cosine_n, c.sine_n);
+                self.freedom(mu.copysign(sense), forces) >= JAMMED_BELOW
+            })
+        };
+        let jammed =
+            |solved: Solved| Solved { utilisation: solved.utilisation.clamp(-mu, mu), ..solved };
+        let solved = match axial {
+            Axial::Driven(load) => match solve(self, axial) {
+                Ok(solved) if solved.utilisation.abs() <= mu => Ok(solved),
+                Ok(solved) => Ok(slides(solved.utilisation).unwrap_or(jammed(solved))),
+                Err(error) => slides(load).ok_or(error),
+            },
+            Axial::Wedged { utilisation, .. } => match slides(utilisation) {
+                Some(solved) => Ok(solved),
+                None => {
+                    self.sliding = false;
+                    solve(self, Axial::Driven(self.parameters.load_n)).map(jammed)
+                }
+            },
+            Axial::Pushed | Axial::Utilised(_) => solve(self, axial),
+        };
+        // Hardly pressed, a wheel on a corner may find no balance with any friction.
+        solved.or_else(|_| solve(self, Axial::Utilised(0.0))).map_err(|source| {
+            PlantError::Balance {
+                time_s: self.truth.time_s,
+                position_mm: self.truth.position_mm,
+                source,
+            }
+        })
+    }
+
+    fn take(&mut self, local: &LocalWall, solved: &Solved) {
+        let contact = &solved.contact;
+        self.base_mm = local.base_mm;
+        self.truth.height_mm = solved.height_mm + local.base_mm;
+        self.truth.depth_mm = contact.depth_mm.max(0.0);
+        self.truth.corner_n = contact.step_force_n();
+        self.truth.floor_n = contact.floor_n;
+        self.truth.utilisation = solved.utilisation;
+        self.truth.separation_mm = if contact.depth_mm > 0.0 {
+            0.0
+        } else {
+            (solved.height_mm - self.parameters.ring.radius_mm).max(0.0)
+        };
+        self.forces = (contact.normal_n, contact.cosine_n, contact.sine_n);
+    }
+}

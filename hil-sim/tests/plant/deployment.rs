@@ -1,0 +1,179 @@
+//! Whole deployments and retractions of the plant alone.
+
+use hil_sim::plant::balance::Axial;
+use hil_sim::plant::rig::{Resolution, Truth};
+use hil_sim::plant::wall::{Step, Wall};
+
+use crate::bench::{TICK_S, close, crossed, deploy, elastic, fine, ideal, nominal, off, pairs};
+
+/// As runs are computed.
+const USUAL: Resolution = Resolution { stride_mm: 0.02, always_awake: false };
+/// With the ring resolved everywhere.
+const AWAKE: Resolution = Resolution { always_awake: true, ..USUAL };
+/// For four times the elements.
+const FINE: Resolution = Resolution { stride_mm: 0.005, ..USUAL };
+
+/// Presets with their cruise preload, N.
+const PRESETS: [(&str, f64); 2] = [("prototype", 33.3), ("fe", 100.0)];
+
+#[test]
+fn every_crossing_of_a_deployment_is_the_isolated_one() {
+    for (preset, speed, preload) in
+        [("prototype", 5.0, 33.3), ("prototype", 20.0, 48.0), ("fe", 12.0, 100.0)]
+    {
+        for speed in [speed, -speed] {
+            let plant = ideal(preset);
+            let alone = crossed(&fine(speed, preload, Axial::Driven(plant.load_n)));
+            let rig = deploy(plant, USUAL, speed, preload, |_| {});
+            assert_eq!(rig.ledger().crossings().len(), 3);
+            for crossing in rig.ledger().crossings() {
+                assert_eq!(crossing.climbing, speed > 0.0);
+                close(crossing.gap_mm, alone.gap_mm, 0.004);
+                close(crossing.peak_utilisation, alone.mu_needed, 0.004);
+                close(crossing.speed_mm_s, speed.abs(), 1e-3);
+            }
+        }
+    }
+}
+
+#[test]
+fn elements_and_stride_converge() {
+    for (preset, preload) in PRESETS {
+        for speed in [6.0, 20.0, 30.0, -6.0, -30.0] {
+            let usual = deploy(nominal(preset), USUAL, speed, preload, |_| {});
+            let mut plant = nominal(preset);
+            plant.ring.elements *= 4;
+            let fine = deploy(plant, FINE, speed, preload, |_| {});
+            for (usual, fine) in pairs(&usual, &fine) {
+                close(usual.gap_mm, fine.gap_mm, 0.004);
+                close(usual.corner_n, fine.corner_n, 0.004);
+                close(usual.speed_mm_s, fine.speed_mm_s, 0.004);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_sleeping_ring_changes_nothing() {
+    for (preset, preload) in PRESETS {
+        for speed in [6.0, 30.0, -6.0, -30.0] {
+            let (mut slept, mut woke) = (Vec::new(), Vec::new());
+            let usual =
+                deploy(nominal(preset), USUAL, speed, preload, |rig| slept.push(*rig.truth()));
+            let awake =
+                deploy(nominal(preset), AWAKE, speed, preload, |rig| woke.push(*rig.truth()));
+            for (usual, awake) in pairs(&usual, &awake) {
+                close(usual.gap_mm, awake.gap_mm, 0.001);
+                close(usual.corner_n, awake.corner_n, 0.005);
+            }
+            assert_alike(&slept, &woke);
+        }
+    }
+}
+
+#[test]
+fn on_a_long_wall_the_ring_sleeps() {
+    let mut plant = nominal("prototype");
+    plant.wall = Wall::new(vec![Step { position_mm: 70.0, height_mm: 4.0 }]);
+    let (mut slept, mut woke) = (Vec::new(), Vec::new());
+    let usual = deploy(plant.clone(), USUAL, 10.0, 33.3, |rig| slept.push(*rig.truth()));
+    let awake = deploy(plant, AWAKE, 10.0, 33.3, |rig| woke.push(*rig.truth()));
+    let asleep = slept.iter().filter(|truth| !truth.ring_awake).count();
+    assert!(asleep * 2 > slept.len(), "asleep for {asleep} of {}", slept.len());
+    let gaps = [&usual, &awake].map(|rig| rig.ledger().crossings()[0].gap_mm);
+    // Apart by where in the patch the ring's elements happen to stand.
+    close(gaps[0], gaps[1], 0.003);
+    assert_alike(&slept, &woke);
+}
+
+/// Asserts that two runs are the same but for the element that enters the patch.
+fn assert_alike(a: &[Truth], b: &[Truth]) {
+    assert!(a.len().abs_diff(b.len()) <= 1, "{} {}", a.len(), b.len());
+    for (a, b) in a.iter().zip(b) {
+        assert!((a.position_mm - b.position_mm).abs() < 0.002, "{a:?} {b:?}");
+        assert!((a.height_mm - b.height_mm).abs() < 0.02, "{a:?} {b:?}");
+        assert!((a.utilisation - b.utilisation).abs() < 0.02, "{a:?} {b:?}");
+    }
+}
+
+#[test]
+fn the_spring_gives_the_preload_that_the_climb_puts_in() {
+    let plant = nominal("prototype");
+    let (rate, radius) = (plant.spring_n_per_mm, plant.ring.radius_mm);
+    let mut levels = [0.0f64; 4];
+    let rig = deploy(plant, USUAL, 10.0, 33.3, |rig| {
+        let truth = rig.truth();
+        let seat = truth.preload_n - rate * (truth.height_mm - radius);
+        // The locked screw keeps its seat, which is the preload of the unloaded wheel.
+        assert!((33.3..34.0).contains(&seat), "{seat}");
+        if truth.corner_n == 0.0 {
+            levels[((truth.height_mm - 24.0) / 4.0) as usize] = truth.preload_n;
+        }
+    });
+    for pair in levels.windows(2) {
+        // A little less than the step's height, for the tread yields.
+        let gained = (pair[1] - pair[0]) / (4.0 * rate);
+        assert!((0.98..1.0).contains(&gained), "{levels:?}");
+    }
+    assert!(rig.ledger().crossings().windows(2).all(|c| c[1].gap_mm < c[0].gap_mm));
+}
+
+#[test]
+fn the_arm_follows_the_wheel() {
+    let plant = nominal("prototype");
+    let (length, pivot, wall) = (plant.arm.length_mm, plant.arm.pivot_mm, plant.wall_radius_mm);
+    let mut last = f64::INFINITY;
+    let rig = deploy(plant, USUAL, 30.0, 33.3, |rig| {
+        let truth = rig.truth();
+        assert!((wall - truth.height_mm - truth.radius_mm).abs() < 1e-9);
+        assert!((length * truth.arm_rad.sin() - (truth.radius_mm - pivot)).abs() < 1e-9);
+        last = truth.arm_rad;
+    });
+    // Three steps inwards: the arm has folded by what 12 mm of radius take.
+    let expected = ((wall - 12.0 - rig.parameters().ring.radius_mm - pivot) / length).asin();
+    assert!((last - expected).abs() < 0.005, "{last} {expected}");
+}
+
+#[test]
+fn radial_inertia_may_be_neglected() {
+    // Quasi-static radially: what it takes to accelerate the moved mass inwards.
+    for (preset, preload) in PRESETS {
+        let mut heights = Vec::new();
+        deploy(ideal(preset), USUAL, 30.0, preload, |rig| heights.push(rig.truth().height_mm));
+        let span = 10;
+        let squared = (span as f64 * TICK_S).powi(2);
+        let most = (span..heights.len() - span)
+            .map(|i| heights[i + span] - 2.0 * heights[i] + heights[i - span])
+            .fold(0.0f64, |most, bend| most.max(bend.abs() / squared));
+        let force = 1e-3 * most * nominal(preset).mass_kg;
+        assert!(force < 0.03 * preload, "{force}");
+    }
+}
+
+#[test]
+fn a_climb_that_slows_creates_no_work() {
+    for preload in [33.3, 100.0] {
+        let rig = |slows| {
+            let mut plant = ideal("prototype");
+            plant.drive = nominal("prototype").drive;
+            plant.drive.friction_n = 0.0;
+            plant.ring = elastic(5760);
+            plant.climb_slows = slows;
+            deploy(plant, FINE, 10.0, preload, |_| {})
+        };
+        let gain = |rig: &hil_sim::plant::rig::VirtualRig| {
+            let truth = rig.truth();
+            let lifted = rig.parameters().load_n * truth.position_mm;
+            off(truth.work_mj, lifted + preload * 12.0)
+        };
+        let (slowed, alike) = (rig(true), rig(false));
+        // The rest is the motor's own kinetic energy and the patch's inner slip.
+        assert!((0.0..0.008).contains(&gain(&slowed)), "{}", gain(&slowed));
+        assert!((-0.035..-0.02).contains(&gain(&alike)), "{}", gain(&alike));
+        let truth = slowed.truth();
+        let longer = truth.rotation_rad * 25.0 - truth.position_mm;
+        assert!((0.45..0.65).contains(&(longer / 3.0)), "{longer}");
+        let truth = alike.truth();
+        assert!((truth.rotation_rad * 25.0 - truth.position_mm).abs() < 0.01);
+    }
+}

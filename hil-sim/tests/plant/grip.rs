@@ -1,0 +1,285 @@
+//! Friction and its end: slip, stall, stops, the worm gear, the inclined arm.
+
+use hil_sim::plant::rig::{Drives, PlantError, Resolution, VirtualRig};
+use hil_sim::plant::wall::Wall;
+use hil_sim::scenario::Scenario;
+use hil_sim::sil::{Options, run};
+
+use crate::bench::{TICK_S, close, deploy, drive, ideal, nominal, roll};
+
+/// The scenario of a preset with these overrides.
+fn scenario(preset: &str, sets: &[&str]) -> Scenario {
+    let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
+    Scenario::resolve(Some(preset), None, &sets).unwrap()
+}
+
+#[test]
+fn with_too_little_friction_a_run_does_not_complete() {
+    for (preset, friction) in
+        [("prototype", 0.0), ("prototype", 0.3), ("prototype", 0.6), ("fe", 0.3), ("fe", 0.5)]
+    {
+        let set = format!("plant.mu={friction}");
+        let options = Options { rows: true, ..Options::default() };
+        let recording = run(&scenario(preset, &[&set]), options).unwrap();
+        let summary = &recording.summary;
+        assert!(!summary.completed, "{preset} at {friction}");
+        assert!(summary.slip_mm > 10.0, "{}", summary.slip_mm);
+        for row in &recording.rows {
+            let numbers = [row.position_true_mm, row.corner_force_n, row.floor_force_n];
+            assert!(numbers.iter().all(|x| x.is_finite()), "{row:?}");
+            assert!(row.utilisation.abs() <= friction + 1e-12, "{row:?}");
+            assert!((-2.5..18.0).contains(&row.position_true_mm), "{row:?}");
+        }
+        assert!(summary.max_gap_mm < 3.2, "{}", summary.max_gap_mm);
+    }
+}
+
+#[test]
+fn friction_decides_at_what_the_climb_needs() {
+    // The isolated crossing needs 0.924.
+    for (friction, climbs) in [(0.90, false), (0.94, true)] {
+        let mut plant = ideal("prototype");
+        plant.mu = friction;
+        let mut rig = VirtualRig::new(plant, 0.0, 33.3, TICK_S);
+        let over = roll(&mut rig, 5.0, 24.0, 20.0, |rig| {
+            assert!(rig.truth().utilisation <= friction);
+        });
+        assert_eq!(over, Ok(climbs), "{:?}", rig.truth());
+        assert_eq!(rig.truth().slip_mm > 1.0, !climbs);
+        assert_eq!(rig.truth().position_mm < 18.0, !climbs);
+        assert!(rig.ledger().crossings().len() <= 1);
+    }
+}
+
+#[test]
+fn slip_is_the_way_of_the_tread_beyond_its_creep() {
+    let mut plant = ideal("prototype");
+    plant.mu = 0.8;
+    let mut rig = VirtualRig::new(plant, 0.0, 33.3, TICK_S);
+    assert_eq!(roll(&mut rig, 5.0, 30.0, 20.0, |_| {}), Ok(false));
+    let truth = rig.truth();
+    let longer = truth.rotation_rad * rig.parameters().ring.radius_mm - truth.position_mm;
+    assert!(truth.slip_mm > 80.0);
+    close(truth.slip_mm, longer, 1e-3);
+}
+
+#[test]
+fn one_wheel_does_not_lift_the_whole_load_by_friction_alone() {
+    let over = |coupling, friction, preload| {
+        let mut plant = ideal("prototype");
+        plant.load_n = 20.0;
+        plant.arm.coupling = coupling;
+        plant.mu = friction;
+        let mut rig = VirtualRig::new(plant, 0.0, preload, TICK_S);
+        roll(&mut rig, 5.0, 30.0, 20.0, |_| {}).unwrap()
+    };
+    assert!(!over(0.0, 1.1, 33.3));
+    assert!(!over(0.0, 1.1, 50.0));
+    assert!(over(0.0, 2.0, 33.3));
+    // A leading arm lifts the wheel off; a trailing one presses it by the load itself.
+    assert!(!over(-1.0, 2.0, 33.3));
+    assert!(!over(1.0, 1.0, 33.3));
+    assert!(over(1.0, 1.3, 33.3));
+    assert!(over(1.0, 1.1, 50.0));
+}
+
+#[test]
+fn the_whole_load_stops_a_run_unless_the_arm_helps() {
+    let summary = |coupling: &str| {
+        let sets = ["plant.top_load_share=1", coupling];
+        run(&scenario("prototype", &sets), Options::default()).unwrap().summary
+    };
+    for coupling in ["plant.arm_coupling=0", "plant.arm_coupling=-1"] {
+        let stuck = summary(coupling);
+        assert!(!stuck.completed && stuck.slip_mm > 10.0, "{coupling}: {stuck:?}");
+    }
+    let helped = summary("plant.arm_coupling=1");
+    assert!(helped.completed && helped.slip_mm == 0.0, "{helped:?}");
+    let most = helped.crossings.iter().map(|c| c.peak_utilisation).fold(0.0, f64::max);
+    assert!((1.0..1.1).contains(&most), "{most}");
+}
+
+#[test]
+fn thrust_turns_into_radial_force_by_the_arm() {
+    let mut gaps = Vec::new();
+    for coupling in [-1.0, 0.0, 1.0] {
+        let mut plant = ideal("prototype");
+        plant.arm.coupling = coupling;
+        let load = plant.load_n;
+        let rig = deploy(plant, Resolution::default(), 10.0, 33.3, |rig| {
+            let truth = rig.truth();
+            if truth.corner_n == 0.0 && (2.0..4.0).contains(&truth.position_mm) {
+                let expected = 33.3 + coupling * load * truth.arm_rad.tan();
+                close(truth.floor_n, expected, 0.025);
+            }
+        });
+        gaps.push(rig.ledger().crossings()[0].gap_mm);
+        for direction in ["deploy", "retract"] {
+            let sets =
+                [format!("plant.arm_coupling={coupling}"), format!("run.direction={direction}")];
+            let sets: Vec<&str> = sets.iter().map(String::as_str).collect();
+            let summary = run(&scenario("prototype", &sets), Options::default()).unwrap().summary;
+            assert!(summary.completed && summary.slip_mm == 0.0, "{sets:?}: {summary:?}");
+        }
+    }
+    assert!(gaps[0] > gaps[1] && gaps[1] > gaps[2], "{gaps:?}");
+}
+
+#[test]
+fn a_trailing_arm_jams_before_its_wheel_slides() {
+    // mu tan(arm) is above 1: on the smooth wall the load holds itself.
+    let mut plant = nominal("prototype");
+    plant.wall = Wall::new(Vec::new());
+    let jams = |friction: f64| {
+        let mut plant = plant.clone();
+        plant.mu = friction;
+        let mut rig = VirtualRig::new(plant, 40.0, 0.5, TICK_S);
+        roll(&mut rig, 2.0, 45.0, 10.0, |_| {}).unwrap() && rig.truth().slip_mm < 1e-6
+    };
+    assert!(jams(1.1));
+    assert!(!jams(0.5));
+}
+
+#[test]
+fn the_load_does_not_turn_the_worm() {
+    for drive_on in [true, false] {
+        for load in [6.7, -6.7, 60.0] {
+            let mut plant = ideal("prototype");
+            plant.drive = nominal("prototype").drive;
+            plant.load_n = load;
+            plant.mu = 3.0;
+            let mut rig = VirtualRig::new(plant, 40.0, 33.3, TICK_S);
+            // Off the latch first.
+            roll(&mut rig, 5.0, 41.0, 10.0, |_| {}).unwrap();
+            let idle = Drives { drive_on, ..Drives::default() };
+            for _ in 0..200 {
+                rig.step(&idle, TICK_S).unwrap();
+            }
+            let held = rig.truth().position_mm;
+            for _ in 0..1000 {
+                rig.step(&idle, TICK_S).unwrap();
+            }
+            assert_eq!(rig.truth().tread_mm_s, 0.0);
+            assert_eq!(rig.truth().position_mm, held);
+        }
+    }
+}
+
+#[test]
+fn the_latch_holds_until_the_drive_turns() {
+    let mut plant = ideal("prototype");
+    plant.drive = nominal("prototype").drive;
+    let mut rig = VirtualRig::new(plant, 0.0, 0.0, TICK_S);
+    for _ in 0..500 {
+        rig.step(&Drives::default(), TICK_S).unwrap();
+    }
+    assert_eq!(rig.truth().position_mm, 0.0);
+    // Unpressed, it then falls to the stop.
+    let drives = drive(rig.parameters(), 20.0);
+    for _ in 0..500 {
+        rig.step(&drives, TICK_S).unwrap();
+    }
+    assert_eq!(rig.truth().position_mm, rig.parameters().stops_mm.0);
+    assert!(rig.truth().slip_mm > 2.5);
+}
+
+#[test]
+fn a_wheel_let_go_slides_down_to_the_stop() {
+    let mut plant = nominal("prototype");
+    plant.arm.coupling = 0.0;
+    let mut rig = VirtualRig::new(plant, 2.0, 33.3, TICK_S);
+    roll(&mut rig, 2.0, 3.0, 10.0, |_| {}).unwrap();
+    let release = Drives { preload: -1.0, preload_on: true, ..Drives::default() };
+    let mut gripped = f64::INFINITY;
+    for _ in 0..2500 {
+        rig.step(&release, TICK_S).unwrap();
+        let truth = rig.truth();
+        if truth.slip_mm == 0.0 {
+            gripped = truth.preload_n;
+        }
+    }
+    // Friction holds the load down to T/mu, within what the screw runs in 20 ms.
+    let least = rig.parameters().load_n / rig.parameters().mu;
+    assert!((least - 0.1..least + 0.5).contains(&gripped), "{gripped} {least}");
+    assert_eq!(rig.truth().position_mm, -2.5);
+    assert_eq!(rig.truth().speed_mm_s, 0.0);
+}
+
+#[test]
+fn the_stops_hold() {
+    for speed in [30.0, -30.0] {
+        for coupling in [0.0, 1.0] {
+            let mut plant = nominal("prototype");
+            plant.arm.coupling = coupling;
+            plant.wall = Wall::new(Vec::new());
+            let stops = plant.stops_mm;
+            let stop = if speed > 0.0 { stops.1 } else { stops.0 };
+            let mut rig = VirtualRig::new(plant, 40.0, 33.3, TICK_S);
+            let gone = roll(&mut rig, speed, 1e3 * speed, 4.0, |rig| {
+                let position = rig.truth().position_mm;
+                assert!((stops.0..=stops.1).contains(&position), "{position}");
+            });
+            assert_eq!(gone, Ok(false));
+            let truth = rig.truth();
+            assert_eq!((truth.position_mm, truth.speed_mm_s), (stop, 0.0));
+            // Jammed, the motor stalls; else the tread slides.
+            let slides = (truth.tread_mm_s * speed) > 0.0;
+            let jams = coupling == 1.0 && speed > 0.0;
+            assert_eq!(slides, !jams, "{truth:?}");
+            assert_eq!(truth.slip_mm > 1.0, slides, "{truth:?}");
+            // And the way back is free.
+            assert_eq!(roll(&mut rig, -speed, 40.0, 10.0, |_| {}), Ok(true));
+        }
+    }
+}
+
+#[test]
+fn the_guarded_speed_shakes_the_arm() {
+    let rig = Scenario::default().rig;
+    let amplitude = |speed: f64| {
+        let mut plant = ideal("prototype");
+        plant.ripple = nominal("prototype").ripple;
+        plant.wall = Wall::new(Vec::new());
+        let (mut deflection, mut least, mut most) = (0.0f64, f64::INFINITY, 0.0f64);
+        let mut rig = VirtualRig::new(plant, 0.0, 33.3, TICK_S);
+        roll(&mut rig, speed, 60.0, 60.0, |rig| {
+            let truth = rig.truth();
+            if truth.position_mm > 30.0 {
+                deflection = deflection.max(truth.vibration_mm.abs());
+                least = least.min(truth.floor_n);
+                most = most.max(truth.floor_n);
+            }
+        })
+        .unwrap();
+        (deflection, 0.5 * (most - least))
+    };
+    for &mode in &rig.drive.modes_hz {
+        let resonant = mode * rig.drive.ripple_pitch_mm;
+        let at = amplitude(resonant);
+        let (low, high) = (1.0 - rig.drive.guard_band, 1.0 + rig.drive.guard_band);
+        for part in [low, high] {
+            let off = amplitude(resonant * part);
+            // At the edge of the band a third; the mode's quality is 25.
+            assert!(at.0 > 2.5 * off.0 && at.1 > 2.5 * off.1, "{mode} Hz: {at:?} {off:?}");
+        }
+        // A fifth of the preload, by which the wall's force then swings.
+        assert!((4.0..9.0).contains(&at.1), "{at:?}");
+    }
+}
+
+#[test]
+fn what_is_not_a_number_ends_the_run_by_name() {
+    let end = |drives: Drives| {
+        let mut rig = VirtualRig::new(nominal("prototype"), 0.0, 33.3, TICK_S);
+        (0..500).find_map(|_| rig.step(&drives, TICK_S).err()).unwrap()
+    };
+    let on = Drives { drive_on: true, preload_on: true, ..Drives::default() };
+    let name = |error| match error {
+        PlantError::NotFinite { name, .. } => name,
+        PlantError::Balance { .. } => "balance",
+    };
+    assert_eq!(name(end(Drives { drive: f64::NAN, ..on })), "tread speed");
+    assert_eq!(name(end(Drives { preload: f64::NAN, ..on })), "screw");
+    let text = end(Drives { drive: f64::NAN, ..on }).to_string();
+    assert_eq!(text, "plant at 0.000 s: tread speed is not finite");
+}

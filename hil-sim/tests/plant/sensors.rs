@@ -1,0 +1,174 @@
+//! The emulated sensors through the firmware's own conversion.
+
+use hil_sim::plant::draw::SensorParameters;
+use hil_sim::plant::sensors::{Codes, Sensed, Sensors};
+use hil_sim::scenario::Noise;
+use interstage::rig::Rig;
+use interstage::sense::raw::{Sample, SensorFrame};
+use interstage::sense::{SensedState, Senses, SensesState, Tuning, Validity};
+use interstage::units::MillimetresPerSecond2;
+
+use crate::bench::{TICK_S, nominal};
+
+/// The firmware's sensors without filters, and the plant's, ideal but for `noise`.
+struct Chain {
+    plant: Sensors,
+    firmware: Senses,
+    state: SensesState,
+    now: u32,
+}
+
+impl Chain {
+    fn new(noise: Noise) -> Self {
+        let tuning =
+            Tuning { load_cell_tau_s: 0.0, tread_tau_s: 0.0, arm_tau_s: 0.0, ..Tuning::default() };
+        let parameters = SensorParameters { noise, ..nominal("prototype").sensors };
+        Self {
+            plant: Sensors::new(parameters, 1),
+            firmware: Senses::try_build_tuned(&Rig::prototype(), &tuning).unwrap(),
+            state: SensesState::default(),
+            now: 0,
+        }
+    }
+
+    fn read(&mut self, sensed: Sensed) -> Codes {
+        self.plant.read(sensed, TICK_S)
+    }
+
+    fn sense(&mut self, sensed: Sensed) -> SensedState {
+        let codes = self.read(sensed);
+        let at = self.now;
+        let frame = SensorFrame {
+            wheel: Some(Sample { code: codes.wheel, at }),
+            load_cell: Some(Sample { code: codes.load_cell, at }),
+            tread: Some(Sample { code: codes.tread, at }),
+            arm: Some(Sample { code: codes.arm, at }),
+        };
+        self.now += 1;
+        let rest = MillimetresPerSecond2::from_num(0);
+        self.firmware.step(&mut self.state, at, &frame, rest)
+    }
+}
+
+/// Arm angle at this distance of the wheel centre from the pillar axis.
+fn arm_rad(radius_mm: f64) -> f64 {
+    ((radius_mm - 20.0) / 145.0).asin()
+}
+
+#[test]
+fn every_quantity_comes_back_within_its_quantisation() {
+    let mut chain = Chain::new(Noise::none());
+    let mut offset = [0.0f64; 2];
+    for i in 0..4000 {
+        let part = f64::from(i) / 4000.0;
+        let (preload, depth, radius) = (190.0 * part, 4.8 * part, 112.0 + 14.0 * part);
+        // Forwards and back again, slowly enough for a wheel.
+        let travel = 60.0 * (part * 6.0).sin();
+        let seen = chain.sense(Sensed {
+            rotation_rad: travel / 25.0,
+            preload_n: preload,
+            depth_mm: depth,
+            arm_rad: arm_rad(radius),
+        });
+        assert_eq!(seen.preload.validity, Validity::Valid);
+        assert_eq!(seen.compression.validity, Validity::Valid);
+        assert_eq!(seen.radius.validity, Validity::Valid);
+        // Half a code: 0.0018 N, 45 nm, 22 um.
+        let error = |got: f64, exact: f64| (got - exact).abs();
+        assert!(error(seen.preload.value.to_num(), preload) < 0.0019);
+        assert!(error(seen.compression.value.to_num(), depth) < 7e-5);
+        let off = seen.radius.value.to_num::<f64>() - radius;
+        assert!(off.abs() < 0.024, "{off} at {radius}");
+        offset[0] += off;
+        // A whole count, 19 um, from where the wheel started.
+        let off = travel - seen.travel.to_num::<f64>();
+        assert!((-1e-6..0.0193).contains(&off), "{off} at {travel}");
+        offset[1] += off;
+    }
+    // Angles are rounded to the nearest code, counts are passed.
+    assert!((offset[0] / 4000.0).abs() < 1e-3, "{offset:?}");
+    assert!((offset[1] / 4000.0 - 0.0096).abs() < 1e-3, "{offset:?}");
+}
+
+#[test]
+fn a_reading_is_as_old_as_its_delay() {
+    for ticks in [0.0, 0.4, 1.0, 3.5, 20.0] {
+        let delay = ticks * TICK_S;
+        let noise = Noise {
+            load_cell_delay_s: delay,
+            tread_delay_s: delay,
+            angle_delay_s: delay,
+            ..Noise::none()
+        };
+        let mut chain = Chain::new(noise);
+        for i in 0..200 {
+            // Ramps of 0.5 N, 0.01 mm and 0.05 mm a millisecond.
+            let at = f64::from(i);
+            let seen = chain.sense(Sensed {
+                rotation_rad: 0.0,
+                preload_n: 0.5 * at,
+                depth_mm: 0.01 * at,
+                arm_rad: arm_rad(125.0 - 0.05 * at),
+            });
+            // Before there was anything older, the oldest.
+            let then = (at - ticks).max(0.0);
+            let radius = 125.0 - 0.05 * then;
+            assert!((seen.preload.value.to_num::<f64>() - 0.5 * then).abs() < 0.002, "{ticks}");
+            assert!((seen.compression.value.to_num::<f64>() - 0.01 * then).abs() < 1e-4);
+            assert!((seen.radius.value.to_num::<f64>() - radius).abs() < 0.024, "{ticks}");
+        }
+    }
+}
+
+#[test]
+fn noise_has_its_deviation_and_no_bias() {
+    let noise = Noise { load_cell_n: 0.05, tread_mm: 0.002, angle_lsb: 2.0, ..Noise::none() };
+    let mut chain = Chain::new(noise);
+    let (count, radius) = (5000, 120.0);
+    let mut sums = [(0.0, 0.0); 3];
+    for _ in 0..count {
+        let seen = chain.sense(Sensed {
+            rotation_rad: 0.0,
+            preload_n: 40.0,
+            depth_mm: 0.8,
+            arm_rad: arm_rad(radius),
+        });
+        let off = [
+            seen.preload.value.to_num::<f64>() - 40.0,
+            seen.compression.value.to_num::<f64>() - 0.8,
+            seen.radius.value.to_num::<f64>() - radius,
+        ];
+        for (sum, off) in sums.iter_mut().zip(off) {
+            *sum = (sum.0 + off, sum.1 + off * off);
+        }
+    }
+    // Two codes of angle and their rounding, as radius.
+    let per_code = 145.0 * arm_rad(radius).cos() * std::f64::consts::TAU / 16_384.0;
+    let angle = per_code * (4.0f64 + 1.0 / 12.0).sqrt();
+    for (sum, deviation) in sums.into_iter().zip([0.05, 0.002, angle]) {
+        let found = (sum.1 / f64::from(count)).sqrt();
+        assert!((found / deviation - 1.0).abs() < 0.04, "{found} for {deviation}");
+        assert!((sum.0 / f64::from(count)).abs() < 0.05 * deviation + per_code * 0.01);
+    }
+}
+
+#[test]
+fn codes_stop_at_the_converters_ends() {
+    let mut chain = Chain::new(Noise::none());
+    let mut codes = |preload_n| {
+        let codes = chain.read(Sensed { preload_n, ..Sensed::default() });
+        codes.load_cell.get()
+    };
+    assert_eq!((codes(1e6), codes(-1e6)), (u16::MAX, 0));
+}
+
+#[test]
+fn the_same_seed_makes_the_same_noise() {
+    let parameters = nominal("prototype").sensors;
+    let read = |seed| {
+        let mut sensors = Sensors::new(parameters.clone(), seed);
+        (0..50).map(|_| sensors.read(Sensed::default(), TICK_S)).collect::<Vec<_>>()
+    };
+    assert_eq!(read(3), read(3));
+    assert_ne!(read(3), read(4));
+}
