@@ -81,14 +81,7 @@ fn cases() -> Vec<(f64, f64, Option<f64>)> {
 fn points(direction: Direction, progress: &(dyn Fn() + Sync)) -> Result<Vec<Point>> {
     let rig = Rig::fe();
     let formula = Formula::new(&rig);
-    let ring = RingParameters {
-        radius_mm: formula.radius_mm,
-        width_mm: formula.width_mm,
-        k_inf: formula.k_inf,
-        k_0: formula.k_inf * formula.stiffening,
-        tau_s: formula.tau_s,
-        elements: 2880,
-    };
+    let ring = RingParameters::of(&rig, 2880);
     cases()
         .into_par_iter()
         // The rig never goes back without its load.

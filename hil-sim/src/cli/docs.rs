@@ -101,7 +101,6 @@ fn results(args: &Args, deployed: &crate::record::Recording) -> Result<String, F
 /// fitted to, the forces are not.
 fn published() -> Result<String, Failure> {
     let rig = interstage::rig::Rig::fe();
-    let k_inf = rig.tread.k_inf_pa_per_m * 1e-9;
     let cases = [
         (5.0, 100.0, 1.7079, 56.5261),
         (5.0, 120.0, 1.5567, 51.2358),
@@ -110,14 +109,7 @@ fn published() -> Result<String, Failure> {
     let mut rows = Vec::new();
     for (speed, preload, gap, force) in cases {
         let result = cross(&CrossingCase {
-            ring: RingParameters {
-                radius_mm: rig.rig.wheel_radius_mm,
-                width_mm: rig.rig.wheel_width_mm,
-                k_inf,
-                k_0: k_inf * rig.tread.stiffening,
-                tau_s: rig.tread.tau_s,
-                elements: 5760,
-            },
+            ring: RingParameters::of(&rig, 5760),
             step_height_mm: rig.rig.step_height_mm,
             speed_mm_s: speed,
             preload_n: preload,

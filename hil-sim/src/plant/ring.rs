@@ -5,6 +5,8 @@
 //! p >= 0: the three-parameter solid per area. Elements turn with the wheel.
 //! Within a step delta runs linearly, and q is integrated exactly for it.
 
+use interstage::rig::Rig;
+
 use super::wall::{Edge, Facet, LocalWall};
 
 /// Wheel and rubber.
@@ -22,6 +24,23 @@ pub struct RingParameters {
     pub tau_s: f64,
     /// Elements around the ring.
     pub elements: usize,
+}
+
+impl RingParameters {
+    /// Wheel and rubber of a rig, by this many elements.
+    #[must_use]
+    pub fn of(rig: &Rig, elements: usize) -> Self {
+        // Pa/m to N/mm^3.
+        let k_inf = rig.tread.k_inf_pa_per_m * 1e-9;
+        Self {
+            radius_mm: rig.rig.wheel_radius_mm,
+            width_mm: rig.rig.wheel_width_mm,
+            k_inf,
+            k_0: k_inf * rig.tread.stiffening,
+            tau_s: rig.tread.tau_s,
+            elements,
+        }
+    }
 }
 
 /// Resultants of the contact pressure.

@@ -33,16 +33,8 @@ pub(super) fn ring(rig: &Rig, case: &Case) -> Result<Figures, Failure> {
 }
 
 fn ring_of(rig: &Rig, case: &Case, elements: usize, stride_mm: f64) -> Result<Figures, Failure> {
-    let k_inf = rig.tread.k_inf_pa_per_m * 1e-9;
     let result = cross(&CrossingCase {
-        ring: RingParameters {
-            radius_mm: rig.rig.wheel_radius_mm,
-            width_mm: rig.rig.wheel_width_mm,
-            k_inf,
-            k_0: k_inf * rig.tread.stiffening,
-            tau_s: rig.tread.tau_s,
-            elements,
-        },
+        ring: RingParameters::of(rig, elements),
         step_height_mm: rig.rig.step_height_mm,
         speed_mm_s: case.speed_mm_s * f64::from(case.direction.sign()),
         preload_n: case.preload_n,
