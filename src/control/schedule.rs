@@ -244,3 +244,104 @@ impl Schedule {
         }
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
+mod tests {
+    use super::*;
+    use crate::model::{PlanRequest, Planner};
+    use proptest::prelude::*;
+
+    fn setting(back: bool) -> (Rig, Schedule, Rise, Plan) {
+        let rig = Rig::prototype();
+        let direction = if back { Direction::Retract } else { Direction::Deploy };
+        let plan = Planner::try_build(&rig).unwrap().plan(&PlanRequest {
+            sequence: 1,
+            direction,
+            step: 2,
+            scale: q16(1_000_000),
+            review: None,
+        });
+        (rig.clone(), Schedule::try_build(&rig).unwrap(), Rise::try_build(&rig).unwrap(), plan)
+    }
+
+    fn course(plan: &Plan, distance: f64, speed: f64, preload: f64) -> Course {
+        Course {
+            direction: plan.direction,
+            distance: Some(Q16::from_num(distance)),
+            remaining: Q16::from_num(500),
+            critical: false,
+            ramping: false,
+            braking: false,
+            speed: Q16::from_num(speed),
+            acceleration: Q16::ZERO,
+            reference: Q16::from_num(preload),
+            preload: Q16::from_num(preload),
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn targets_stay_between_the_plan_s_ends(
+            back in any::<bool>(),
+            distance in -30.0..60.0f64,
+            speed in 0.0..40.0f64,
+            preload in 0.0..60.0f64,
+        ) {
+            let (_, schedule, rise, plan) = setting(back);
+            let got = schedule.targets(&rise, &plan, &course(&plan, distance, speed, preload));
+            prop_assert!(got.speed >= Q16::ZERO && got.speed <= plan.cruise_speed);
+            prop_assert!(got.preload == plan.cruise_preload || got.preload == plan.cross_preload);
+        }
+
+        #[test]
+        fn inside_the_window_speed_and_preload_are_those_of_the_crossing(
+            back in any::<bool>(),
+            into in 0.0..3.0f64,
+        ) {
+            let (_, schedule, rise, plan) = setting(back);
+            let edge = rise.first_contact(plan.direction) + schedule.tolerance();
+            let distance = edge.to_num::<f64>() - into;
+            let standing = plan.cross_preload.to_num::<f64>();
+            let got = schedule.targets(&rise, &plan, &course(&plan, distance, 8.0, standing));
+            prop_assert_eq!(got.speed, plan.cross_speed);
+            prop_assert_eq!(got.preload, plan.cross_preload);
+            prop_assert!(got.approaching && !got.waiting);
+        }
+
+        #[test]
+        fn without_its_preload_the_wheel_does_not_enter_the_window(
+            back in any::<bool>(),
+            ahead in 0.0..2.0f64,
+        ) {
+            let (rig, schedule, rise, plan) = setting(back);
+            let edge = rise.first_contact(plan.direction) + schedule.tolerance();
+            let distance = edge.to_num::<f64>() + ahead;
+            let got = schedule.targets(&rise, &plan, &course(&plan, distance, 8.0, 33.3));
+            // At most so fast that the missing preload is there first.
+            let missing = plan.cross_preload.to_num::<f64>() - 33.3;
+            let bound = ahead / (missing / rig.preload.slew_n_per_s);
+            prop_assert!(got.speed.to_num::<f64>() <= bound + 1e-3, "{} {bound}", got.speed);
+        }
+
+        #[test]
+        fn the_end_is_approached_at_a_speed_that_the_profile_can_stop_from(
+            remaining in 0.06..40.0f64,
+            speed in 0.0..30.0f64,
+        ) {
+            let (_, schedule, rise, plan) = setting(false);
+            let at = Course {
+                remaining: Q16::from_num(remaining),
+                distance: None,
+                ..course(&plan, 0.0, speed, 33.3)
+            };
+            let got = schedule.targets(&rise, &plan, &at).speed.to_num::<f64>();
+            let way = schedule.timing.brake_way(Q16::from_num(speed), END_CREEP).to_num::<f64>();
+            if remaining < way {
+                prop_assert_eq!(got, END_CREEP.to_num::<f64>());
+            } else if remaining > way + 0.4 {
+                prop_assert_eq!(got, plan.cruise_speed.to_num::<f64>());
+            }
+        }
+    }
+}

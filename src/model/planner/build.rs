@@ -110,3 +110,100 @@ impl Planner {
         Ok(self)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::plan::{PlanRequest, Review, Strategy};
+    use crate::units::Q16;
+    use proptest::prelude::*;
+
+    const ALL: [Strategy; 4] =
+        [Strategy::Scheduled, Strategy::Constant, Strategy::Limit, Strategy::Reactive];
+
+    fn request(back: bool, step: u8, scale: f64) -> PlanRequest {
+        PlanRequest {
+            sequence: 1,
+            direction: if back { Direction::Retract } else { Direction::Deploy },
+            step,
+            scale: Q16::from_num(scale),
+            review: None,
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn no_plan_leaves_the_limits(
+            strategy in 0..4usize,
+            back in any::<bool>(),
+            step in 0..4u8,
+            scale in 0.75..1.25f64,
+        ) {
+            let rig = Rig::prototype();
+            let planner = Planner::try_build_as(&rig, ALL[strategy]).unwrap();
+            let plan = planner.plan(&request(back, step, scale));
+            let (least, most) = (rig.drive.min_crossing_speed_mm_s, rig.drive.cruise_speed_mm_s);
+            let speed = plan.cross_speed.to_num::<f64>();
+            prop_assert!((least..=most).contains(&speed), "{speed}");
+            for preload in [plan.cross_preload, plan.cruise_preload] {
+                let preload = preload.to_num::<f64>();
+                prop_assert!(preload >= rig.preload.cruise_n - 1e-3);
+                prop_assert!(preload <= rig.preload.limit_n * (1.0 - REGULATION_PART) + 1e-3);
+            }
+            prop_assert!(plan.brake_way >= Q16::ZERO && plan.brake_time >= Q16::ZERO);
+        }
+
+        #[test]
+        fn a_scheduled_preload_holds_the_target_gap_by_the_formulas(
+            back in any::<bool>(),
+            step in 1..4u8,
+            scale in 0.85..1.15f64,
+        ) {
+            let rig = Rig::prototype();
+            let planner = Planner::try_build(&rig).unwrap();
+            let request = request(back, step, scale);
+            let plan = planner.plan(&request);
+            let mut formula = Formula::new(&rig);
+            formula.k_inf *= scale;
+            let load = rig.plant.top_load_n * rig.plant.top_load_share;
+            let sine = (rig.centre_radius_mm(usize::from(step) - 1)
+                - rig.rig.arm_pivot_radius_mm)
+                / rig.rig.arm_length_mm;
+            let force = plan.cross_preload.to_num::<f64>()
+                + load * rig.plant.arm_coupling * sine / (1.0 - sine * sine).sqrt();
+            let speed = plan.cross_speed.to_num::<f64>();
+            let gap = formula.gap_mm(request.direction, speed, force, Some(load));
+            let target = planner.gap_ref(request.direction).to_num::<f64>()
+                * (1.0 - rig.control.gap_reserve);
+            // At the least speed the limit may not suffice; else the target is met, or
+            // undercut where the cruise preload alone does.
+            let floor = speed < rig.drive.min_crossing_speed_mm_s * (1.0 + DIP_PART) + 0.01;
+            prop_assert!(floor || gap < target * 1.002, "{gap} {target}");
+        }
+
+        #[test]
+        fn adaptation_stays_in_its_range_whatever_is_measured(
+            gap in -5.0..10.0f64,
+            preload in 0.0..80.0f64,
+            speed in 0.0..60.0f64,
+            scale in 0.75..1.25f64,
+        ) {
+            let rig = Rig::prototype();
+            let planner = Planner::try_build(&rig).unwrap();
+            let q = Q16::from_num::<f64>;
+            let review = Review {
+                direction: Direction::Deploy,
+                speed: q(speed),
+                preload: q(preload),
+                tan_arm: q(1.0),
+                gap: q(gap),
+                trusted: true,
+            };
+            let plan = planner.plan(&PlanRequest { review: Some(review), ..request(false, 1, scale) });
+            let after = plan.outcome.unwrap().scale.to_num::<f64>();
+            let range = rig.control.adaptation_range + 1e-3;
+            prop_assert!((after - 1.0).abs() <= range, "{after}");
+            prop_assert!((after - scale).abs() <= 0.1 + 1e-3, "{after} {scale}");
+        }
+    }
+}
