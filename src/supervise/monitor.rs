@@ -162,3 +162,109 @@ fn sensor_fault(sensed: &SensedState) -> Option<Fault> {
         .or(judge(sensed.compression.validity, Fault::DisplacementStale, Fault::DisplacementRange))
         .or(judge(sensed.radius.validity, Fault::AngleStale, Fault::AngleRange))
 }
+
+#[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
+mod tests {
+    use super::*;
+    use crate::sense::Reading;
+    use crate::supervise::Leg;
+    use crate::units::{Millimetres, Q16, Travel};
+    use proptest::prelude::*;
+
+    const RUN: Mode = Mode::Run(Direction::Deploy, Leg::Cruise);
+
+    fn sensed(speed: f64, preload: f64) -> SensedState {
+        let reading =
+            |value: f64| Reading { value: Q16::from_num(value), at: 0, validity: Validity::Valid };
+        SensedState {
+            travel: Travel::ZERO,
+            position: Millimetres::ZERO,
+            speed: reading(speed),
+            preload: reading(preload),
+            preload_filtered: Q16::from_num(preload),
+            compression: reading(0.3),
+            compression_filtered: Q16::from_num(0.3),
+            radius: reading(125.0),
+            tan_arm: Q16::from_num(1),
+            steps_up: Q16::ZERO,
+            level: 0,
+        }
+    }
+
+    /// Ticks until a fault under a condition that lasts; `None` within five seconds.
+    fn found(
+        mode: Mode,
+        speed: f64,
+        wanted: f64,
+        preload: f64,
+        due: f64,
+    ) -> Option<(Fault, usize)> {
+        let monitor = Monitor::try_build(&Rig::prototype()).unwrap();
+        let mut state = MonitorState::default();
+        let sensed = sensed(speed, preload);
+        let seen = Observed {
+            mode,
+            sensed: &sensed,
+            speed_ref: Q16::from_num(wanted),
+            preload_due: Q16::from_num(due),
+            overrun: false,
+            emergency_stop: false,
+        };
+        (1..5000).find_map(|tick| monitor.step(&mut state, &seen).map(|fault| (fault, tick)))
+    }
+
+    #[test]
+    fn each_condition_is_found_in_its_time() {
+        let press = usize::from(OVERPRESSURE_TICKS);
+        assert_eq!(found(RUN, 8.0, 8.0, 56.0, 48.0), Some((Fault::Overpressure, press)));
+        let stall = usize::from(STALL_TICKS);
+        assert_eq!(found(RUN, 0.0, 8.0, 48.0, 48.0), Some((Fault::DriveStalled, stall)));
+        let run = usize::from(RUNAWAY_TICKS);
+        assert_eq!(found(RUN, 30.0, 8.0, 48.0, 48.0), Some((Fault::DriveRunaway, run)));
+        assert_eq!(found(RUN, -8.0, 8.0, 48.0, 48.0), Some((Fault::DriveRunaway, run)));
+        let short = usize::from(PRELOAD_TICKS);
+        assert_eq!(found(RUN, 8.0, 8.0, 40.0, 48.0), Some((Fault::PreloadNotReached, short)));
+    }
+
+    #[test]
+    fn a_preload_left_over_can_be_relieved() {
+        assert_eq!(found(Mode::Idle, 0.0, 0.0, 60.0, 0.0), None);
+        let preload = Mode::Preload(Direction::Deploy);
+        assert_eq!(found(preload, 0.0, 0.0, 60.0, 60.0), None);
+        assert!(found(preload, 0.0, 0.0, 60.0, 40.0).is_some());
+    }
+
+    #[test]
+    fn a_late_tick_and_the_emergency_stop_are_faults_at_once() {
+        let monitor = Monitor::try_build(&Rig::prototype()).unwrap();
+        let sensed = sensed(0.0, 0.0);
+        let mut seen = Observed {
+            mode: Mode::Idle,
+            sensed: &sensed,
+            speed_ref: Q16::ZERO,
+            preload_due: Q16::ZERO,
+            overrun: true,
+            emergency_stop: false,
+        };
+        let mut state = MonitorState::default();
+        assert_eq!(monitor.step(&mut state, &seen), Some(Fault::TickOverrun));
+        seen.emergency_stop = true;
+        assert_eq!(monitor.step(&mut state, &seen), Some(Fault::EmergencyStop));
+        seen.mode = Mode::FaultHold(Fault::TickOverrun);
+        assert_eq!(monitor.step(&mut state, &seen), None);
+    }
+
+    proptest! {
+        #[test]
+        fn a_drive_near_its_references_raises_no_alarm(
+            wanted in 1.0..30.0f64,
+            off in -0.15..0.3f64,
+            preload in 33.0..50.0f64,
+            lag in -3.0..3.0f64,
+        ) {
+            let speed = wanted * (1.0 + off);
+            prop_assert_eq!(found(RUN, speed, wanted, preload, preload + lag), None);
+        }
+    }
+}
