@@ -3,7 +3,8 @@
 mod common;
 
 use common::{
-    Answer, Bench, Operator, Record, Sensor, UNLOADED, arm_frame, forever, load_cell_code, now_ms,
+    Answer, Bench, Bridges, Operator, Record, Sensor, UNLOADED, arm_frame, forever, load_cell_code,
+    now_ms,
 };
 use interstage::control::Controller;
 use interstage::hal::{Light, MotorCommand};
@@ -23,6 +24,7 @@ struct Board {
     arm: Sensor,
     operator: Operator,
     motors: Record<(MotorCommand, MotorCommand)>,
+    bridges: Bridges,
     watchdog: Record<()>,
     journal: Record<Entry>,
     light: Record<Light>,
@@ -38,6 +40,7 @@ impl Board {
         let rig = Rig::prototype();
         let controller = forever(Controller::try_build(&rig).expect("the prototype is valid"));
         let planner = forever(Planner::try_build(&rig).expect("the prototype is valid"));
+        let bridges = Bridges::default();
         let mut board = Self {
             bench: Bench::new(),
             exchange: forever(Exchange::new()),
@@ -46,7 +49,8 @@ impl Board {
             tread: Sensor::new(UNLOADED),
             arm: Sensor::new(arm_frame(0)),
             operator: Operator::default(),
-            motors: Record::default(),
+            motors: bridges.applied.clone(),
+            bridges,
             watchdog: Record::default(),
             journal: Record::default(),
             light: Record::default(),
@@ -70,7 +74,7 @@ impl Board {
             let arm = board.arm.clone();
             bench.spawn(async { tasks::angle(arm, exchange).await });
         }
-        let (motors, watchdog) = (board.motors.clone(), board.watchdog.clone());
+        let (motors, watchdog) = (board.bridges.clone(), board.watchdog.clone());
         bench.spawn(async { tasks::motors(motors, watchdog, controller, exchange).await });
         if runs(Station::Model) {
             bench.spawn(async { tasks::model(planner, exchange).await });
@@ -213,6 +217,38 @@ fn a_dead_model_task_does_not_hold_up_the_tick() {
     board.bench.run_ms(300);
     let ticks: Vec<u32> = board.motors.times().into_iter().filter(|&at| at > before).collect();
     assert_eq!(ticks, (before + 1..=before + 300).collect::<Vec<_>>());
+    // Nor is it waited for without end.
+    board.reach(Mode::FaultHold(Fault::ModelSilent), 300);
+    board.bench.run_ms(1);
+    assert!(board.bridges_are_off());
+}
+
+#[test]
+fn the_emergency_stop_holds_and_only_a_reset_gives_the_bridges_back() {
+    let mut board = Board::idle();
+    board.operator.gives(&[Command::Start]);
+    board.reach(Mode::Preload(Direction::Deploy), 20);
+    board.bench.run_ms(50);
+    board.bridges.open.set(true);
+    board.bench.run_ms(3);
+    let held = Mode::FaultHold(Fault::EmergencyStop);
+    assert_eq!(board.mode(), held);
+    assert!(board.bridges_are_off());
+    // Released: nothing comes back by itself.
+    board.bridges.open.set(false);
+    board.bench.run_ms(500);
+    assert!(board.bridges.cut.get() && board.bridges_are_off());
+    assert_eq!(board.mode(), held);
+    // Reset while it is pressed: held again.
+    board.bridges.open.set(true);
+    board.operator.gives(&[Command::Reset]);
+    board.bench.run_ms(50);
+    assert_eq!(board.mode(), held);
+    board.bridges.open.set(false);
+    board.bench.run_ms(150);
+    board.operator.gives(&[Command::Reset]);
+    board.reach(Mode::Idle, 3000);
+    assert!(!board.bridges.cut.get() && board.bridges_are_off());
 }
 
 #[test]

@@ -198,16 +198,29 @@ impl<T: Clone> Record<T> {
     }
 }
 
-impl Motors for Record<(MotorCommand, MotorCommand)> {
+/// Mocked bridges with an emergency stop; clones share the record and the contact.
+#[derive(Clone, Default)]
+pub(crate) struct Bridges {
+    pub(crate) applied: Record<(MotorCommand, MotorCommand)>,
+    /// The contact is open now.
+    pub(crate) open: Rc<Cell<bool>>,
+    /// It has cut the bridges.
+    pub(crate) cut: Rc<Cell<bool>>,
+}
+
+impl Motors for Bridges {
     fn apply(&mut self, drive: MotorCommand, preload: MotorCommand) {
-        self.push((drive, preload));
+        self.applied.push((drive, preload));
     }
 
     fn stopped(&mut self) -> bool {
-        false
+        self.cut.set(self.cut.get() || self.open.get());
+        self.cut.get()
     }
 
-    fn rearm(&mut self) {}
+    fn rearm(&mut self) {
+        self.cut.set(self.open.get());
+    }
 }
 
 impl Watchdog for Record<()> {

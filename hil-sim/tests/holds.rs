@@ -1,0 +1,60 @@
+//! Runs that cannot end well: each holds in the fault that says why, bridges off.
+
+mod common;
+
+use common::{Bench, starter};
+use hil_sim::scenario::{Direction, Scenario};
+use interstage::supervise::{Command, Fault, Mode};
+
+/// The prototype with these overrides, run to its end this way.
+fn run(sets: &[&str], way: Direction) -> Bench {
+    let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
+    let mut scenario = Scenario::resolve(None, None, &sets).expect("a sound scenario");
+    scenario.run.direction = way;
+    let mut bench = Bench::idle(&scenario);
+    bench.give(starter(way));
+    bench.finish();
+    bench
+}
+
+fn assert_held(mut bench: Bench, fault: Fault) {
+    assert_eq!(bench.mode(), Mode::FaultHold(fault));
+    assert_eq!(bench.faults(), [fault]);
+    bench.run_s(0.05);
+    let at = bench.position_mm();
+    bench.run_s(0.2);
+    assert!(bench.now().is_off());
+    assert!((bench.position_mm() - at).abs() < 1e-6, "moved in the hold");
+    // No command but a reset leads out.
+    for command in [Command::Start, Command::Retract, Command::Stop] {
+        bench.give(command);
+        assert_eq!(bench.mode(), Mode::FaultHold(fault), "{command:?}");
+    }
+    bench.give(Command::Reset);
+    assert_eq!(bench.mode(), Mode::SelfTest);
+}
+
+#[test]
+fn a_wheel_that_turns_at_a_corner_is_noticed() {
+    assert_held(run(&["plant.mu=0.3"], Direction::Deploy), Fault::WheelSlips);
+}
+
+#[test]
+fn a_wheel_that_turns_on_the_spot_finds_no_steps() {
+    assert_held(run(&["plant.mu=0"], Direction::Deploy), Fault::StepsLost);
+}
+
+#[test]
+fn nothing_moves_where_no_step_can_tell_the_position() {
+    let bench = run(&["rig.step_positions_mm=[]"], Direction::Retract);
+    let from = bench.moments.first().expect("a tick").truth.position_mm;
+    assert_eq!(bench.position_mm(), from);
+    assert_held(bench, Fault::PositionUnknown);
+}
+
+#[test]
+fn a_reset_that_was_on_its_way_does_not_clear_a_fault_unseen() {
+    let mut bench = run(&["plant.mu=0.3"], Direction::Deploy);
+    bench.give(Command::Reset);
+    assert_eq!(bench.mode(), Mode::FaultHold(Fault::WheelSlips));
+}
