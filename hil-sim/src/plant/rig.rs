@@ -16,6 +16,10 @@ use traction::Gait;
 /// Most ring steps in a call: 5 mm of way at the usual stride.
 const MOST_STRIDES: f64 = 256.0;
 
+/// Way after which motor, friction and wall exchange their forces, if the step of time is
+/// longer than that, mm.
+const EXCHANGE_MM: f64 = 1.0;
+
 /// How finely the rig is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Resolution {
@@ -199,6 +203,16 @@ impl VirtualRig {
         self
     }
 
+    /// The same rig, its wheel already rolling at this speed, mm/s.
+    #[must_use]
+    pub fn with_speed(mut self, speed_mm_s: f64) -> Self {
+        self.truth.tread_mm_s = speed_mm_s;
+        self.truth.speed_mm_s = speed_mm_s;
+        self.rolled_mm_s = speed_mm_s;
+        self.parked = false;
+        self
+    }
+
     /// What is true now.
     #[must_use]
     pub fn truth(&self) -> &Truth {
@@ -223,17 +237,35 @@ impl VirtualRig {
     /// [`PlantError`] when the state stops meaning anything.
     pub fn step(&mut self, drives: &Drives, dt_s: f64) -> Result<(), PlantError> {
         self.preload.step(drives.preload, drives.preload_on, dt_s);
-        self.turn_wheel(drives, dt_s);
-        self.check()?;
-        let way = self.truth.tread_mm_s.abs().max(self.truth.speed_mm_s.abs()) * dt_s;
-        let parts = (way / self.resolution.stride_mm).ceil().clamp(1.0, MOST_STRIDES);
-        for _ in 0..parts as usize {
-            self.roll(dt_s / parts)?;
+        let mut left_s = dt_s;
+        while left_s > 0.0 {
+            let part_s = self.exchange(left_s);
+            self.turn_wheel(drives, part_s);
+            self.check()?;
+            let way = self.truth.tread_mm_s.abs().max(self.truth.speed_mm_s.abs()) * part_s;
+            let parts = (way / self.resolution.stride_mm).ceil().clamp(1.0, MOST_STRIDES);
+            for _ in 0..parts as usize {
+                self.roll(part_s / parts)?;
+            }
+            left_s -= part_s;
         }
         self.vibrate(dt_s);
         self.truth.time_s += dt_s;
         self.derive();
         self.check()
+    }
+
+    /// How long motor and wall may go on with the forces that they have, up to `left_s`:
+    /// until wheel or carriage have moved by [`EXCHANGE_MM`].
+    fn exchange(&self, left_s: f64) -> f64 {
+        let drive = &self.parameters.drive;
+        let (tread, speed) = (self.truth.tread_mm_s.abs(), self.truth.speed_mm_s.abs());
+        // The most that motor and carriage can gain.
+        let gain = 1000.0 * drive.limit_n / drive.mass_kg * left_s;
+        let spin = (tread + gain).min(tread.max(drive.no_load_mm_s));
+        let slide = if self.sliding { speed + self.sliding_gain() * left_s } else { speed };
+        let way = spin.max(slide) * left_s;
+        if way <= EXCHANGE_MM { left_s } else { left_s / (way / EXCHANGE_MM).ceil() }
     }
 
     /// Motor and gearbox: the wheel's spin.
