@@ -18,7 +18,7 @@ const MOST_STRIDES: f64 = 256.0;
 
 /// Way after which motor, friction and wall exchange their forces, if the step of time is
 /// longer than that, mm.
-const EXCHANGE_MM: f64 = 1.0;
+pub const EXCHANGE_MM: f64 = 1.0;
 
 /// How finely the rig is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]

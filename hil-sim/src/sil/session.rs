@@ -71,6 +71,14 @@ impl Session {
         })
     }
 
+    /// The same session with every stage of the controller run in every tick, needed or
+    /// not.
+    #[must_use]
+    pub fn without_skipping(mut self) -> Self {
+        self.controller = self.controller.without_skipping();
+        self
+    }
+
     /// One millisecond with an operator's command or none.
     ///
     /// # Errors

@@ -5,7 +5,7 @@ use super::cases::{Case, Course};
 use super::roll::{self, RADIUS_MM};
 use crate::plant::actuators::DriveMotor;
 use crate::plant::draw::{ELEMENTS, PlantParameters};
-use crate::plant::rig::{Drives, PlantError, Truth, VirtualRig};
+use crate::plant::rig::{Drives, EXCHANGE_MM, PlantError, Truth, VirtualRig};
 use crate::plant::wall::{Step, Wall};
 use crate::scenario::Scenario;
 
@@ -73,7 +73,7 @@ pub(super) fn run(case: &Case, plant: &PlantParameters) -> Result<Drove, PlantEr
     let mut out = Drove::default();
     let mut before = *rig.truth();
     let (first, rest_mm) = (mechanical(plant, &before), before.depth_mm);
-    let (mut wedged, mut lift, mut kinetic) = (0.0, 0.0, 0.0f64);
+    let (mut wedged, mut lift, mut kinetic, mut force) = (0.0, 0.0, 0.0f64, 0.0f64);
     for tick in 0..ticks {
         let part = tick as f64 / ticks as f64;
         let speed = case.course.speed(part) * case.speed_mm_s;
@@ -86,6 +86,7 @@ pub(super) fn run(case: &Case, plant: &PlantParameters) -> Result<Drove, PlantEr
         let lean = plant.arm.coupling * 0.5 * (now.arm_rad.tan() + before.arm_rad.tan());
         wedged += plant.load_n * lean * rise;
         lift += rise.abs();
+        force = force.max(now.floor_n + now.corner_n);
         kinetic = kinetic.max(0.5e-3 * plant.mass_kg * now.speed_mm_s.powi(2));
         let gained = mechanical(plant, &now) + wedged - first - now.work_mj;
         out.created_mj = if gained.is_nan() { f64::NAN } else { out.created_mj.max(gained) };
@@ -95,12 +96,14 @@ pub(super) fn run(case: &Case, plant: &PlantParameters) -> Result<Drove, PlantEr
         out.overspeed = out.overspeed.max(now.tread_mm_s.abs() / top);
         before = now;
     }
-    // The tread's own store; the ring's resolution; creep, which follows traction at once
-    // though it is up to 7 % of the speed; heights and work by trapezoids of a tick.
+    // The tread's own store; heights to the ring's elements, forces to the way after which
+    // motor and wall exchange them; work by trapezoids of a tick; creep, which follows
+    // traction at once though it is up to 7 % of the speed.
     let pressed = case.preload_n + 1.1 * case.coupling.abs() * case.load_n;
     let stored = pressed * (rest_mm + out.depth_mm.min(1.0));
     let grain = std::f64::consts::TAU * RADIUS_MM / ELEMENTS as f64;
-    out.allowed_mj = stored + pressed * (grain + 0.03 * lift) + 0.15 * kinetic;
+    let exchanged = (case.speed_mm_s * case.dt_s).min(EXCHANGE_MM);
+    out.allowed_mj = stored + force * (grain + exchanged) + 0.03 * pressed * lift + 0.15 * kinetic;
     Ok(out)
 }
 
