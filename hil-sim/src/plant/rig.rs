@@ -3,13 +3,15 @@
 mod contact;
 mod traction;
 
+use std::f64::consts::TAU;
+
 use super::actuators::Pretightener;
-use super::arm::Mode;
+use super::arm::{Mode, Ripple};
 use super::balance::BalanceError;
 use super::draw::PlantParameters;
 use super::ledger::Ledger;
 use super::ring::Ring;
-use super::rolling;
+use super::rolling::{self, Steady};
 use contact::Calm;
 use traction::Gait;
 
@@ -124,10 +126,15 @@ pub struct VirtualRig {
     parameters: PlantParameters,
     resolution: Resolution,
     ring: Ring,
+    steady: Steady,
     awake: bool,
     calm: Calm,
     preload: Pretightener,
     modes: Vec<Mode>,
+    /// Sine and cosine of the ripple's phase.
+    phase: (f64, f64),
+    /// Elastic force of the modes, their mean, N.
+    vibration_n: f64,
     truth: Truth,
     ledger: Ledger,
     /// Sliding bodily over the wall.
@@ -171,11 +178,14 @@ impl VirtualRig {
         let mut rig = Self {
             resolution: Resolution::default(),
             ring: Ring::new(parameters.ring),
+            steady: Steady::default(),
             ledger: Ledger::new(parameters.wall.steps().to_vec(), radius),
             awake: false,
             calm: Calm { tread_mm_s: 0.0, pressing_n: preload_n, for_s: f64::INFINITY },
             preload,
             modes,
+            phase: (0.0, 1.0),
+            vibration_n: 0.0,
             truth: Truth {
                 position_mm,
                 height_mm: local.base_mm + rest.height_mm,
@@ -318,20 +328,24 @@ impl VirtualRig {
 
     /// Modes of the arm, forced by the torque ripple of motor and gearbox.
     fn vibrate(&mut self, dt_s: f64) {
-        const PARTS: usize = 4;
         let (amplitude, pitch) = self.parameters.ripple;
         let spin = self.truth.tread_mm_s;
-        let part = dt_s / PARTS as f64;
         let tread = self.truth.rotation_rad * self.parameters.ring.radius_mm;
-        for index in 0..PARTS {
-            let back = (PARTS - 1 - index) as f64 * part;
-            let phase = (tread - spin * back) / pitch * std::f64::consts::TAU;
-            let force = if spin == 0.0 { 0.0 } else { amplitude * phase.sin() };
-            for mode in &mut self.modes {
-                mode.step(force, part);
-            }
+        let to = (TAU * (tread / pitch).fract()).sin_cos();
+        let force = Ripple {
+            amplitude_n: if spin == 0.0 { 0.0 } else { amplitude },
+            omega: TAU * spin / pitch,
+            from: std::mem::replace(&mut self.phase, to),
+            to,
+        };
+        let (mut deflection, mut sum) = (0.0, 0.0);
+        for mode in &mut self.modes {
+            mode.step(&force, dt_s);
+            deflection += mode.deflection_mm();
+            sum += mode.force_n();
         }
-        self.truth.vibration_mm = self.modes.iter().map(Mode::deflection_mm).sum();
+        self.truth.vibration_mm = deflection;
+        self.vibration_n = sum / self.modes.len().max(1) as f64;
     }
 
     /// Preload of spring and screw at the present height.
@@ -348,18 +362,17 @@ impl VirtualRig {
         let radius = self.parameters.ring.radius_mm;
         let local = self.parameters.wall.local(truth.position_mm);
         truth.root_clearance_mm = (local.ahead_mm < radius)
-            .then(|| local.ahead_mm.hypot(truth.height_mm - local.base_mm) - radius);
+            .then(|| away(local.ahead_mm, truth.height_mm - local.base_mm) - radius);
         self.truth.preload_n = self.preload_now();
     }
 
     fn check(&self) -> Result<(), PlantError> {
         let t = &self.truth;
-        let vibration = self.modes.iter().map(Mode::force_n).sum();
         // Causes first, so that the name is that of the origin.
         let states = [
             ("tread speed", t.tread_mm_s),
             ("screw", self.preload.seat_n()),
-            ("vibration", vibration),
+            ("vibration", self.vibration_n),
             ("speed", t.speed_mm_s),
             ("position", t.position_mm),
             ("rotation", t.rotation_rad),
@@ -368,9 +381,18 @@ impl VirtualRig {
             ("slip", t.slip_mm),
             ("work", t.work_mj + t.wear_mj),
         ];
+        // One look at all of them: none finite makes the other finite again.
+        if states.iter().map(|(_, value)| value * 0.0).sum::<f64>() == 0.0 {
+            return Ok(());
+        }
         match states.into_iter().find(|(_, value)| !value.is_finite()) {
             Some((name, _)) => Err(PlantError::NotFinite { time_s: t.time_s, name }),
             None => Ok(()),
         }
     }
+}
+
+/// Length of the hypotenuse, for lengths far from the ends of the range.
+fn away(x: f64, y: f64) -> f64 {
+    (x * x + y * y).sqrt()
 }

@@ -3,10 +3,9 @@
 
 use super::traction::JAMMED_BELOW;
 use super::{PlantError, VirtualRig};
-use crate::plant::arm::Mode;
 use crate::plant::balance::{Axial, Balance, BalanceError, Solved};
 use crate::plant::ledger::Moment;
-use crate::plant::ring::{Contact, Motion, Ring};
+use crate::plant::ring::{Contact, Motion};
 use crate::plant::rolling::{self, Rolling};
 use crate::plant::wall::LocalWall;
 
@@ -21,7 +20,8 @@ const SUNK_MM: f64 = 1.5;
 const UNSTEADY_PART: f64 = 0.03;
 const UNSTEADY_MM_S: f64 = 0.01;
 
-/// Relaxation times after which the tread has forgotten what came before.
+/// Relaxation times after which the tread has forgotten what came before; it knows
+/// nothing from before it came into the patch.
 const FORGETS: f64 = 6.0;
 
 /// What the wheel has been rolling at, and for how long.
@@ -56,10 +56,8 @@ impl VirtualRig {
             Axial::Driven(load) => load,
             _ => 0.0,
         };
-        let vibration = self.modes.iter().map(Mode::force_n).sum::<f64>();
-        let shared = vibration / self.modes.len().max(1) as f64;
         Balance {
-            preload_n: (seat + self.wedge() * thrust - shared).max(0.0),
+            preload_n: (seat + self.wedge() * thrust - self.vibration_n).max(0.0),
             spring_n_per_mm: self.parameters.spring_n_per_mm,
             axial,
         }
@@ -80,8 +78,7 @@ impl VirtualRig {
         let local = self.parameters.wall.local(position_mm);
         let height = self.truth.height_mm - local.base_mm;
         let table = rolling::profile(&self.parameters.ring, height, self.rolled_mm_s);
-        // A fresh ring counts its own turns; only the angle to the wall matters.
-        self.ring = Ring::new(self.parameters.ring);
+        // The ring starts its turns afresh; only the angle to the wall matters.
         let interpolate = |angle: f64| {
             let at = table.partition_point(|node| node.0 < angle);
             match (at.checked_sub(1).and_then(|i| table.get(i)), table.get(at)) {
@@ -92,7 +89,8 @@ impl VirtualRig {
                 _ => (0.0, 0.0),
             }
         };
-        self.ring.seed(self.truth.time_s, interpolate);
+        let within = table.last().map_or(0.0, |node| node.0);
+        self.ring.seed(self.truth.time_s, within, interpolate);
         self.awake = true;
     }
 
@@ -104,16 +102,16 @@ impl VirtualRig {
         turn: f64,
         dt_s: f64,
     ) -> Result<(), PlantError> {
+        let way = self.truth.speed_mm_s * dt_s;
         let motion = Motion {
             wall: *local,
-            height_mm: self.truth.height_mm - local.base_mm,
+            height_mm: self.truth.height_mm - local.base_mm + self.slope * way,
             turn_rad: turn,
             dt_s,
         };
         let solved =
-            self.bear(axial, |rig, axial| rig.balance(local, axial).solve(&rig.ring, motion))?;
+            self.bear(axial, |rig, axial| rig.balance(local, axial).solve(&mut rig.ring, motion))?;
         self.ring.commit(&Motion { height_mm: solved.height_mm, ..motion });
-        let way = self.truth.speed_mm_s * dt_s;
         if way.abs() > 1e-6 {
             let rise = solved.height_mm + local.base_mm - self.truth.height_mm;
             self.slope = rise / way;
@@ -152,18 +150,19 @@ impl VirtualRig {
     }
 
     fn roll_balanced(
-        &self,
+        &mut self,
         local: &LocalWall,
         axial: Axial,
         guess_mm: f64,
     ) -> Result<Solved, BalanceError> {
-        let ring = &self.parameters.ring;
+        let ring = self.parameters.ring;
         let balance = self.balance(local, axial);
         let residual = |c: &Rolling| {
             let lift = c.height_mm - ring.radius_mm;
             balance.residual((c.cosine_n, c.sine_n), (0.0, 0.0), lift)
         };
-        let rolling = rolling::solve(ring, self.truth.tread_mm_s, guess_mm, |c| residual(c).0);
+        let speed = self.truth.tread_mm_s;
+        let rolling = self.steady.solve(&ring, speed, guess_mm, |c| residual(c).0);
         let (residual_n, _, utilisation) = residual(&rolling);
         let height_mm = rolling.height_mm;
         if residual_n.abs() > 1e-3 * balance.preload_n.max(1.0) {
@@ -187,15 +186,15 @@ impl VirtualRig {
     fn bear(
         &mut self,
         axial: Axial,
-        solve: impl Fn(&Self, Axial) -> Result<Solved, BalanceError>,
+        solve: impl Fn(&mut Self, Axial) -> Result<Solved, BalanceError>,
     ) -> Result<Solved, PlantError> {
         let mu = self.parameters.mu;
-        let slides = |sense: f64| {
-            let axial = Axial::Wedged { utilisation: mu.copysign(sense), wedge: self.wedge() };
-            solve(self, axial).ok().filter(|solved| {
+        let slides = |rig: &mut Self, sense: f64| {
+            let axial = Axial::Wedged { utilisation: mu.copysign(sense), wedge: rig.wedge() };
+            solve(rig, axial).ok().filter(|solved| {
                 let c = &solved.contact;
                 let forces = (c.normal_n, c.cosine_n, c.sine_n);
-                self.freedom(mu.copysign(sense), forces) >= JAMMED_BELOW
+                rig.freedom(mu.copysign(sense), forces) >= JAMMED_BELOW
             })
         };
         let jammed =
@@ -203,10 +202,10 @@ impl VirtualRig {
         let solved = match axial {
             Axial::Driven(load) => match solve(self, axial) {
                 Ok(solved) if solved.utilisation.abs() <= mu => Ok(solved),
-                Ok(solved) => Ok(slides(solved.utilisation).unwrap_or(jammed(solved))),
-                Err(error) => slides(load).ok_or(error),
+                Ok(solved) => Ok(slides(self, solved.utilisation).unwrap_or(jammed(solved))),
+                Err(error) => slides(self, load).ok_or(error),
             },
-            Axial::Wedged { utilisation, .. } => match slides(utilisation) {
+            Axial::Wedged { utilisation, .. } => match slides(self, utilisation) {
                 Some(solved) => Ok(solved),
                 None => {
                     self.sliding = false;
