@@ -12,7 +12,8 @@ use fixed::types::I16F16;
 /// [`RigError::OutOfRange`] with `key` if the value is not finite or exceeds the
 /// range of the format.
 pub fn checked(key: &'static str, value: f64) -> Result<Q16, RigError> {
-    I16F16::checked_from_num(value).map(fixed::Saturating).ok_or(RigError::OutOfRange {
+    let number = I16F16::checked_from_num(value);
+    number.map(|n| Q16::from_bits(n.to_bits())).ok_or(RigError::OutOfRange {
         key,
         value,
         min: I16F16::MIN.to_num(),

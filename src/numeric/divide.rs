@@ -3,10 +3,9 @@
 #![deny(clippy::float_arithmetic)]
 
 use crate::units::Q16;
-use fixed::types::I16F16;
 
 /// One.
-const ONE: Q16 = fixed::Saturating(I16F16::ONE);
+const ONE: Q16 = Q16::ONE;
 
 /// Quotient `a / b`, rounded to nearest, halves away from zero.
 ///
@@ -18,7 +17,7 @@ const ONE: Q16 = fixed::Saturating(I16F16::ONE);
 /// Source: schoolbook division in base 2^16, Knuth, TAOCP 2, 4.3.1, algorithm D.
 #[must_use]
 pub fn divide(a: Q16, b: Q16) -> Q16 {
-    let (a, b) = (a.0.to_bits(), b.0.to_bits());
+    let (a, b) = (a.to_bits(), b.to_bits());
     if a == 0 {
         return Q16::ZERO;
     }
@@ -33,7 +32,7 @@ pub fn divide(a: Q16, b: Q16) -> Q16 {
     } else {
         i32::try_from(magnitude).unwrap_or(i32::MAX)
     };
-    fixed::Saturating(I16F16::from_bits(bits))
+    Q16::from_bits(bits)
 }
 
 /// Reciprocal `1 / x`, rounded to nearest.
@@ -87,7 +86,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn q(bits: i32) -> Q16 {
-        fixed::Saturating(I16F16::from_bits(bits))
+        Q16::from_bits(bits)
     }
 
     /// The quotient in 128 bits, rounded to nearest, saturated.
@@ -112,7 +111,7 @@ mod tests {
             .collect::<Vec<_>>();
         for &a in &corners {
             for &b in &corners {
-                assert_eq!(divide(q(a), q(b)).0.to_bits(), exact(a, b), "{a} / {b}");
+                assert_eq!(divide(q(a), q(b)).to_bits(), exact(a, b), "{a} / {b}");
             }
         }
     }
@@ -128,7 +127,7 @@ mod tests {
             b_shift in 0_u32..31,
         ) {
             let (a, b) = (a >> a_shift, b >> b_shift);
-            prop_assert_eq!(divide(q(a), q(b)).0.to_bits(), exact(a, b));
+            prop_assert_eq!(divide(q(a), q(b)).to_bits(), exact(a, b));
         }
 
         #[test]

@@ -7,7 +7,7 @@ use crate::estimate::crossing::{Contact, Lift, Seen, Sign};
 use crate::log::{CrossingRecord, Event};
 use crate::model::{Outcome, Review};
 use crate::supervise::{Direction, Fault, Limit, Mode};
-use crate::units::{Millimetres, Q16, Seconds, Tick, Travel, ticks_to_seconds};
+use crate::units::{Millimetres, Q16, Seconds, Tick, ticks_to_seconds};
 
 impl Controller {
     /// Lets the watch look at the tick while the drive moves.
@@ -80,7 +80,7 @@ impl Controller {
         let Some(open) = state.crossing.as_mut().filter(|_| on_corner) else { return };
         let from = *open.from.get_or_insert(pass.sensed.travel);
         let way = pass.sensed.travel.saturating_sub(from).saturating_abs();
-        if way > Travel::from_num(self.corner_way.0) {
+        if way > self.corner_way.widen() {
             self.give_up(state, pass, Fault::WheelSlips);
         }
     }

@@ -84,7 +84,7 @@ impl Controller {
             Direction::Deploy => up + (q16(1_000_000) - LEVEL_WITHIN),
             Direction::Retract => up + LEVEL_WITHIN,
         };
-        let level = level.0.int().to_num::<u8>();
+        let level = level.floor().clamp(0, 255) as u8;
         state.crossing = None;
         state.level = level;
         state.next_step = match direction {

@@ -10,7 +10,8 @@ use crate::model::{Plan, Review};
 use crate::sense::SensesState;
 use crate::supervise::{Direction, Leg, Mode, MonitorState};
 use crate::units::{
-    Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, Ratio, Tick, Travel, q16,
+    Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, Q16, Ratio, Tick, Travel,
+    q16,
 };
 
 /// Ticks over which a felt corner is blended into the feed-forward.
@@ -223,7 +224,7 @@ impl State {
             self.felt.saturating_sub(1)
         };
         // BLEND_TICKS is 2^5: bits of Q16 shifted.
-        fixed::Saturating(fixed::types::I16F16::from_bits(i32::from(self.felt) << 11))
+        Q16::from_bits(i32::from(self.felt) << 11)
     }
 
     /// A corner is felt.
