@@ -4,16 +4,18 @@
 //!
 //! Nothing here divides 64-bit numbers, loops without a bound or panics. The
 //! conversion from SI numbers, which does use floats, is in one place
-//! ([`checked`], [`Table::build`], [`LowPass::build`]) and runs at start only.
+//! ([`checked`], [`Divisor::build`], [`Table::build`], [`LowPass::build`]) and runs at start only.
 
 mod build;
 mod divide;
+mod divisor;
 mod low_pass;
 mod root;
 mod table;
 
 pub use build::checked;
-pub use divide::{divide, reciprocal};
+pub use divide::{divide, part, reciprocal};
+pub use divisor::Divisor;
 pub use low_pass::{LowPass, LowPassState};
 pub use root::sqrt;
 pub use table::Table;

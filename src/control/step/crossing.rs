@@ -38,7 +38,7 @@ impl Controller {
 
     /// One level on; the arm confirms the count at the end.
     fn over(&self, state: &mut State, direction: Direction) {
-        let unknown = state.crossing.is_some_and(|open| open.step == 0);
+        let unknown = state.crossing.as_ref().is_some_and(|open| open.step == 0);
         state.lost_in_a_row = 0;
         match direction {
             Direction::Deploy => {
@@ -250,7 +250,8 @@ impl Controller {
 
     /// Whether the wheel has left the corner of the last step behind.
     fn clear_of(&self, state: &State, pass: &Pass<'_>) -> bool {
-        let followed = state.crossing.and_then(|open| open.lift).map(|point| point.face);
+        let followed =
+            state.crossing.as_ref().and_then(|open| open.lift.as_ref()).map(|point| point.face);
         let Some(face) = followed.or(state.leaving) else { return true };
         let past = match state.direction {
             Direction::Deploy => pass.position - face,

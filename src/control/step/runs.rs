@@ -170,7 +170,7 @@ impl Controller {
             return;
         }
         // A crossing still open gets its line first.
-        if let Some(point) = state.crossing.and_then(|open| open.lift) {
+        if let Some(point) = state.crossing.as_ref().and_then(|open| open.lift) {
             self.closed(state, pass, point.gap, false);
         }
         if state.line.is_some() {
