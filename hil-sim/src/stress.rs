@@ -4,4 +4,5 @@
 pub mod cases;
 mod drive;
 pub mod plant;
+pub mod primitives;
 mod roll;

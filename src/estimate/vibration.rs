@@ -6,8 +6,7 @@
 #![deny(clippy::float_arithmetic)]
 
 use crate::rig::{Rig, RigError};
-use crate::units::{Millimetres, TICK_HZ};
-use fixed::types::I16F16;
+use crate::units::{Millimetres, Q16, TICK_HZ};
 
 /// Distance of the observer's poles from the origin. Chosen: an answer within 30 ms,
 /// which is a tenth of the shortest crossing, and a third of the sensor's noise.
@@ -123,7 +122,7 @@ impl VibrationObserver {
 
     /// One tick: the mode's amplitude, mm, 0 to 2 % below that of the observed state.
     pub fn step(&self, state: &mut VibrationState, compression: Millimetres) -> Millimetres {
-        let change = (compression - state.last).0.to_bits().clamp(-LARGEST, LARGEST);
+        let change = (compression - state.last).to_bits().clamp(-LARGEST, LARGEST);
         state.last = compression;
         let input = change << (STATE_BITS - 16);
         let (z1, z2) = state.z;
@@ -135,7 +134,7 @@ impl VibrationObserver {
         let (z1, z2) = state.z;
         let quadrature = cut(wide(self.second.0, z1) + wide(self.second.1, z2));
         let bits = length(z1, quadrature) >> (STATE_BITS - 16);
-        fixed::Saturating(I16F16::from_bits(bits))
+        Q16::from_bits(bits)
     }
 }
 
@@ -163,7 +162,6 @@ fn length(a: i32, b: i32) -> i32 {
 #[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
-    use crate::units::Q16;
     use proptest::prelude::*;
 
     const LSB: f64 = 1.0 / 65_536.0;
@@ -338,7 +336,7 @@ mod tests {
                 // Full swing at about the mode, or garbage.
                 let tone = (tick as f64 * hz * 1e-3 * 2.0).floor() as i64 % 2 == 0;
                 let bits = if shake { if tone { i32::MAX } else { i32::MIN } } else { bits };
-                let shown = observer.step(&mut state, fixed::Saturating(I16F16::from_bits(bits)));
+                let shown = observer.step(&mut state, Q16::from_bits(bits));
                 prop_assert!(shown >= Q16::ZERO && shown < mm(4.0));
                 prop_assert!(state.z.0.unsigned_abs() < 1 << 30);
                 prop_assert!(state.z.1.unsigned_abs() < 1 << 30);

@@ -3,7 +3,6 @@
 #![deny(clippy::float_arithmetic)]
 
 use crate::units::Q16;
-use fixed::types::I16F16;
 
 /// First-order low-pass `y += a (x - y)`, one call a tick, `a = 1 - exp(-T / tau)`
 /// with the tick T = 1 ms, so that the step response is that of the continuous
@@ -29,21 +28,21 @@ impl LowPassState {
     /// A filter at rest at `value`.
     #[must_use]
     pub fn at(value: Q16) -> Self {
-        Self { output: i64::from(value.0.to_bits()) << 16 }
+        Self { output: i64::from(value.to_bits()) << 16 }
     }
 
     /// The present output.
     #[must_use]
     pub fn output(&self) -> Q16 {
         let bits = (self.output + (1 << 15)) >> 16;
-        fixed::Saturating(I16F16::from_bits(i32::try_from(bits).unwrap_or(i32::MAX)))
+        Q16::from_bits(i32::try_from(bits).unwrap_or(i32::MAX))
     }
 }
 
 impl LowPass {
     /// One tick with input `x`.
     pub fn step(&self, state: &mut LowPassState, x: Q16) -> Q16 {
-        let error = (i64::from(x.0.to_bits()) << 16) - state.output;
+        let error = (i64::from(x.to_bits()) << 16) - state.output;
         // |error| < 2^49 and the gain is at most 2^16; four bits less keep the
         // product inside 63 and leave a resolution of 2^-28.
         state.output += ((error >> 4) * i64::from(self.gain)) >> 12;
@@ -82,8 +81,8 @@ mod tests {
         #[test]
         fn a_constant_is_reached_to_the_last_bit(start in any::<i32>(), end in any::<i32>()) {
             let filter = LowPass::build(0.005);
-            let mut state = LowPassState::at(fixed::Saturating(I16F16::from_bits(start)));
-            let end = fixed::Saturating(I16F16::from_bits(end));
+            let mut state = LowPassState::at(Q16::from_bits(start));
+            let end = Q16::from_bits(end);
             for _ in 0..300 {
                 filter.step(&mut state, end);
             }

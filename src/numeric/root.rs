@@ -3,7 +3,6 @@
 #![deny(clippy::float_arithmetic)]
 
 use crate::units::Q16;
-use fixed::types::I16F16;
 
 /// Square root, rounded to nearest.
 ///
@@ -14,7 +13,7 @@ use fixed::types::I16F16;
 /// Source: the binary digit-by-digit method, e.g. Warren, Hacker's Delight, 11-1.
 #[must_use]
 pub fn sqrt(x: Q16) -> Q16 {
-    let Ok(bits) = u32::try_from(x.0.to_bits()) else {
+    let Ok(bits) = u32::try_from(x.to_bits()) else {
         return Q16::ZERO;
     };
     // The root of x in Q16 is the integer root of bits 2^16: 24 binary digits,
@@ -39,7 +38,7 @@ pub fn sqrt(x: Q16) -> Q16 {
     if rest > root {
         root += 1;
     }
-    fixed::Saturating(I16F16::from_bits(i32::try_from(root).unwrap_or(i32::MAX)))
+    Q16::from_bits(i32::try_from(root).unwrap_or(i32::MAX))
 }
 
 #[cfg(test)]
@@ -49,7 +48,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn q(bits: i32) -> Q16 {
-        fixed::Saturating(I16F16::from_bits(bits))
+        Q16::from_bits(bits)
     }
 
     #[test]
@@ -59,7 +58,7 @@ mod tests {
         }
         assert_eq!(sqrt(q(-1)), Q16::ZERO);
         assert_eq!(sqrt(q(i32::MIN)), Q16::ZERO);
-        assert_eq!(sqrt(q(1)).0.to_bits(), 256);
+        assert_eq!(sqrt(q(1)).to_bits(), 256);
     }
 
     proptest! {

@@ -97,7 +97,7 @@ impl Arm {
         let steps = self.steps_up(radius, compression);
         match previous {
             Some(level) if (steps - Ratio::from_num(level)).abs() <= LEVEL_SWITCH => level,
-            _ => steps.round().to_num::<i32>().clamp(0, MAX_STEPS as i32 + 1) as u8,
+            _ => steps.round().clamp(0, MAX_STEPS as i32 + 1) as u8,
         }
     }
 }
@@ -188,7 +188,7 @@ mod tests {
 
         #[test]
         fn any_radius_stays_without_panic(r in any::<i32>(), c in any::<i32>(), p in any::<u8>()) {
-            let q = |bits| fixed::Saturating(fixed::types::I16F16::from_bits(bits));
+            let q = |bits| Q16::from_bits(bits);
             let _ = arm().level(Some(p), q(r), q(c));
         }
     }

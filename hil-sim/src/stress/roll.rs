@@ -77,7 +77,7 @@ pub(super) fn run(case: &Case) -> Result<Roll, BalanceError> {
         let local = wall.local(x);
         let height_mm = y - local.base_mm;
         let motion = Motion { wall: local, height_mm, turn_rad: dx / RADIUS_MM, dt_s };
-        let solved = balance.solve(&ring, motion)?;
+        let solved = balance.solve(&mut ring, motion)?;
         ring.commit(&Motion { height_mm: solved.height_mm, ..motion });
         let height = solved.height_mm + local.base_mm;
         let contact = solved.contact;
