@@ -18,6 +18,7 @@ mod output;
 mod parse;
 mod scenario;
 mod size;
+mod stress;
 mod test;
 
 use std::process::ExitCode;
@@ -43,6 +44,7 @@ enum Verb {
     Compare(compare::Args),
     Montecarlo(montecarlo::Args),
     Keys(keys::Args),
+    Stress(stress::Args),
     Size(size::Args),
     Constants(constants::Args),
     Docs(docs::Args),
@@ -58,6 +60,7 @@ impl Verb {
             Self::Compare(args) => compare::run(args),
             Self::Montecarlo(args) => montecarlo::run(args),
             Self::Keys(args) => keys::run(args),
+            Self::Stress(args) => stress::run(args),
             Self::Size(args) => size::run(args),
             Self::Constants(args) => constants::run(args),
             Self::Docs(args) => docs::run(args),

@@ -3,6 +3,9 @@
 
 pub mod cases;
 mod drive;
+pub mod hostile;
 pub mod plant;
 pub mod primitives;
+pub mod refine;
 mod roll;
+pub mod settle;

@@ -112,7 +112,7 @@ fn mechanical(plant: &PlantParameters, truth: &Truth) -> f64 {
     let rise = truth.height_mm - RADIUS_MM;
     let spring = plant.spring_n_per_mm;
     let seat = truth.preload_n - spring * rise;
-    let kinetic = plant.mass_kg * truth.speed_mm_s.powi(2)
-        + plant.drive.mass_kg * truth.tread_mm_s.powi(2);
+    let kinetic =
+        plant.mass_kg * truth.speed_mm_s.powi(2) + plant.drive.mass_kg * truth.tread_mm_s.powi(2);
     0.5e-3 * kinetic + plant.load_n * truth.position_mm + (seat + 0.5 * spring * rise) * rise
 }

@@ -148,9 +148,13 @@ fn sweeps() -> Vec<Sweep> {
                 (i64::from(got) - exact as i64) as f64 - rest as f64 / n as f64
             }),
         },
-        whole("sqrt_fraction", (-1.5, 0.0), Box::new(|x| {
-            f64::from(numeric::sqrt_fraction(x as u32)) - 65_536.0 * (x as f64).sqrt()
-        })),
+        whole(
+            "sqrt_fraction",
+            (-1.5, 0.0),
+            Box::new(|x| {
+                f64::from(numeric::sqrt_fraction(x as u32)) - 65_536.0 * (x as f64).sqrt()
+            }),
+        ),
         whole("table", (-1.5, 1.5), table()),
         arm("arm radius", 8e-5, Arm::radius, |codes, rig: &Rig| {
             let angle = codes * std::f64::consts::TAU / 16_384.0;
@@ -196,8 +200,8 @@ fn divide(a: u32, b: u32) -> f64 {
     let (a, b) = (a as i32, b as i32);
     let got = i64::from(numeric::divide(Q16::from_bits(a), Q16::from_bits(b)).to_bits());
     if b == 0 {
-        return (got - i64::from(a.signum()).max(-1) * i64::from(i32::MAX)
-            + i64::from(a < 0)) as f64;
+        return (got - i64::from(a.signum()).max(-1) * i64::from(i32::MAX) + i64::from(a < 0))
+            as f64;
     }
     let (n, b) = (i64::from(a) << 16, i64::from(b));
     let (exact, rest) = (n / b, n % b);

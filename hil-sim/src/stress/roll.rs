@@ -56,8 +56,11 @@ pub(super) fn run(case: &Case) -> Result<Roll, BalanceError> {
     let (dt_s, stride) = (case.dt_s / parts, per_tick / parts);
     let reach = reach(case.step_mm);
     let longest = 2.0 * reach + RADIUS_MM;
-    let steps =
-        if stride > 0.0 { (longest / stride).ceil().min(BUDGET as f64) as usize } else { BUDGET / 4 };
+    let steps = if stride > 0.0 {
+        (longest / stride).ceil().min(BUDGET as f64) as usize
+    } else {
+        BUDGET / 4
+    };
     // A run too short for the whole step begins somewhere on its way over it.
     let way = stride * steps as f64;
     let lead = (way * 0.4).min(0.5 * RADIUS_MM);
@@ -92,7 +95,8 @@ pub(super) fn run(case: &Case) -> Result<Roll, BalanceError> {
         }
         (y, forces) = (height, now);
         // Written so that what is not a number shows.
-        out.created_mj = if given.is_nan() { f64::NAN } else { out.created_mj.max(-given - stored) };
+        out.created_mj =
+            if given.is_nan() { f64::NAN } else { out.created_mj.max(-given - stored) };
         out.depth_mm = if y.is_nan() { f64::NAN } else { out.depth_mm.max(contact.depth_mm) };
     }
     // A corner between two elements is met by neither: the wheel knows heights to the
