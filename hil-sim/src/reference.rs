@@ -11,6 +11,8 @@
 pub mod beam;
 mod case;
 pub mod collision;
+pub mod impact;
 pub mod solid;
+pub mod vibration;
 
 pub use case::{Case, ReferenceError, Resolution};

@@ -24,7 +24,8 @@ pub struct Sample {
     pub corner_n: f64,
     /// Mean pressure of the contact, Pa; 0 without contact.
     pub pressure_pa: f64,
-    /// Contact area, mm^2.
+    /// Contact area, mm^2, averaged over the way of one element: elements enter and leave
+    /// whole.
     pub area_mm2: f64,
     /// Largest depth of the tread, mm: the embedding depth.
     pub depth_mm: f64,
@@ -53,9 +54,6 @@ pub struct Crossing {
     pub lift: Option<Lift>,
     /// Mean contact pressure of steady rolling before the step, Pa.
     pub cruise_pressure_pa: f64,
-    /// Stiffness of the rolling contact before the step against a quick radial
-    /// motion, N/m: what a spring in its place would have.
-    pub contact_n_per_m: f64,
 }
 
 impl Crossing {
@@ -136,7 +134,6 @@ impl Recorder {
         contact: &Contact,
         utilisation: f64,
     ) {
-        let mean = contact.normal_n / contact.area_mm2;
         let sample = Sample {
             t_s,
             x_mm,
@@ -145,7 +142,8 @@ impl Recorder {
             radial_n: contact.cosine_n + utilisation * contact.sine_n,
             floor_n: contact.floor_n,
             corner_n: contact.step_force_n(),
-            pressure_pa: if contact.area_mm2 > 0.0 { mean * 1e6 } else { 0.0 },
+            // The normal force, until the area is averaged.
+            pressure_pa: contact.normal_n,
             area_mm2: contact.area_mm2,
             depth_mm: contact.depth_mm,
             clearance_mm: x_mm.hypot(y_mm) - way.radius_mm,
@@ -174,17 +172,40 @@ impl Recorder {
     }
 
     /// The crossing, its time counted from the touch.
-    pub(super) fn finish(mut self, cruise: &Contact) -> Crossing {
-        for sample in &mut self.samples {
+    pub(super) fn finish(mut self, case: &Case) -> Crossing {
+        let ring = case.ring();
+        let pitch_mm = std::f64::consts::TAU * ring.radius_mm / ring.elements as f64;
+        let areas = averaged(&self.samples, pitch_mm);
+        for (sample, area_mm2) in self.samples.iter_mut().zip(areas) {
             sample.t_s -= self.touch_s;
+            sample.area_mm2 = area_mm2;
+            let mean_pa = 1e6 * sample.pressure_pa / area_mm2;
+            sample.pressure_pa = if area_mm2 > 0.0 { mean_pa } else { 0.0 };
         }
+        // Steady until the touch.
+        let cruise: Vec<f64> =
+            self.samples.iter().filter(|s| s.t_s < 0.0).map(|s| s.pressure_pa).collect();
+        let cruise_pressure_pa = cruise.iter().sum::<f64>() / cruise.len().max(1) as f64;
         Crossing {
             samples: self.samples,
             lift: self.lift.map(|lift| Lift { t_s: lift.t_s - self.touch_s, ..lift }),
-            cruise_pressure_pa: 1e6 * cruise.normal_n / cruise.area_mm2,
-            contact_n_per_m: -1e3 * cruise.slope.0,
+            cruise_pressure_pa,
         }
     }
+}
+
+/// The contact area over way, averaged over `way_mm` around each sample.
+fn averaged(samples: &[Sample], way_mm: f64) -> Vec<f64> {
+    let mut sums = vec![0.0];
+    for sample in samples {
+        sums.push(sums[sums.len() - 1] + sample.area_mm2);
+    }
+    let within = |sample: &Sample| {
+        let from = samples.partition_point(|s| s.x_mm <= sample.x_mm - 0.5 * way_mm);
+        let to = samples.partition_point(|s| s.x_mm <= sample.x_mm + 0.5 * way_mm);
+        (sums[to] - sums[from]) / (to - from).max(1) as f64
+    };
+    samples.iter().map(within).collect()
 }
 
 /// A ring at rest.

@@ -32,7 +32,6 @@ pub fn dynamic(case: &Case) -> Result<Crossing, ReferenceError> {
     let way = Way::of(case);
     let mut rolling = Rolling::start(case, &way);
     rolling.run(case, &way, way.shown_mm, |_| {})?;
-    let cruise = rolling.contact;
     let mut mass = Mass::on(case, rolling.y_mm);
     let mut recorder = Recorder::default();
     let (mut x, mut t) = (rolling.x_mm, rolling.t_s);
@@ -47,7 +46,7 @@ pub fn dynamic(case: &Case) -> Result<Crossing, ReferenceError> {
         rolling.ring.commit(&Motion { height_mm, ..motion });
         recorder.take(&way, case, (t, x, mass.y_mm), &contact, utilisation);
     }
-    Ok(recorder.finish(&cruise))
+    Ok(recorder.finish(case))
 }
 
 /// The radial motion of what moves.

@@ -89,10 +89,9 @@ pub fn quasi_static(case: &Case) -> Result<Crossing, ReferenceError> {
     let way = Way::of(case);
     let mut rolling = Rolling::start(case, &way);
     rolling.run(case, &way, way.shown_mm, |_| {})?;
-    let cruise = rolling.contact;
     let mut recorder = Recorder::default();
     rolling.run(case, &way, way.end_mm, |now| {
         recorder.take(&way, case, (now.t_s, now.x_mm, now.y_mm), &now.contact, now.utilisation);
     })?;
-    Ok(recorder.finish(&cruise))
+    Ok(recorder.finish(case))
 }
