@@ -12,6 +12,7 @@ mod page;
 mod palette;
 mod panel;
 mod panels;
+mod published;
 mod svg;
 mod tables;
 pub(crate) mod verdict;
@@ -22,6 +23,7 @@ use crate::export::{ExportError, write_text};
 use crate::record::Recording;
 
 pub use overview::overview_svg;
+pub use published::{Published, published_svg};
 
 /// The page of `recording`. It needs no other file and no script.
 #[must_use]
