@@ -88,7 +88,7 @@ fn published(figures: &[Figures]) -> String {
     for (printed, ours) in PRINTED.iter().zip(figures) {
         let _ = writeln!(
             text,
-            "| {} mm/s, {} N | {:.4} | {:.3} | {:.1} | {:.1} | {:.3} | {:.3} |",
+            "| {} mm/s, {} N | {:.4} | {:.3} | {:.1} | {:.1} | {:.2} | {:.2} |",
             printed.at.0,
             printed.at.1,
             printed.gap_mm,
