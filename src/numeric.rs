@@ -15,6 +15,7 @@ mod high;
 mod low_pass;
 mod quotient;
 mod root;
+mod sine;
 mod table;
 
 pub use build::checked;
@@ -26,4 +27,5 @@ pub(crate) use high::{horner, horner_with_slope};
 pub use low_pass::{LowPass, LowPassState};
 pub use quotient::{fraction, reciprocal_of_normalised};
 pub use root::sqrt;
+pub use sine::sin_cos;
 pub use table::Table;
