@@ -1,0 +1,72 @@
+//! The control tick and its planner, one call each.
+
+use interstage::control::{Controller, Input, Output, State};
+use interstage::model::{Plan, Planner};
+use interstage::rig::Rig;
+use interstage_images::tick::{Given, Preset, Taken};
+
+use super::slot::Slot;
+
+static CONTROLLER: Slot<Controller> = Slot::new();
+static PLANNER: Slot<Planner> = Slot::new();
+static STATE: Slot<State> = Slot::new();
+static INPUT: Slot<Input> = Slot::new();
+static OUTPUT: Slot<Output> = Slot::new();
+static PLAN: Slot<Plan> = Slot::new();
+
+/// Controller and planner of a preset, and a state as after power-up. Returns 1 if
+/// they can be built.
+#[unsafe(no_mangle)]
+pub(super) extern "C" fn tick_build(preset: u32) -> u32 {
+    let Some(preset) = Preset::ALL.into_iter().find(|p| *p as u32 == preset) else { return 0 };
+    let Some(rig) = Rig::named(preset.name()) else { return 0 };
+    controller(&rig);
+    planner(&rig);
+    *STATE.get() = Some(State::default());
+    *PLAN.get() = None;
+    (CONTROLLER.get().is_some() && PLANNER.get().is_some()).into()
+}
+
+/// In a frame of its own: together they would be deeper than the stack.
+#[inline(never)]
+fn controller(rig: &Rig) {
+    *CONTROLLER.get() = Controller::try_build(rig).ok();
+}
+
+#[inline(never)]
+fn planner(rig: &Rig) {
+    *PLANNER.get() = Planner::try_build(rig).ok();
+}
+
+/// Takes the next tick's input from `given`, and the plan that waits.
+#[unsafe(no_mangle)]
+pub(super) extern "C" fn tick_load(given: &Given) {
+    *INPUT.get() = Some(given.input(PLAN.get().take()));
+}
+
+/// The control tick.
+#[unsafe(no_mangle)]
+pub(super) extern "C" fn tick_step() {
+    if let (Some(controller), Some(state), Some(input)) =
+        (CONTROLLER.get(), STATE.get(), INPUT.get())
+    {
+        *OUTPUT.get() = Some(controller.step(state, input));
+    }
+}
+
+/// Answers the tick's request, if there is one; returns whether there was.
+#[unsafe(no_mangle)]
+pub(super) extern "C" fn tick_plan() -> u32 {
+    let (Some(planner), Some(output)) = (PLANNER.get(), OUTPUT.get()) else { return 0 };
+    let Some(request) = output.request else { return 0 };
+    *PLAN.get() = Some(planner.plan(&request));
+    1
+}
+
+/// Writes what is looked at of the tick's output to `taken`.
+#[unsafe(no_mangle)]
+pub(super) extern "C" fn tick_save(taken: &mut Taken) {
+    if let Some(output) = OUTPUT.get() {
+        *taken = Taken::of(output);
+    }
+}
