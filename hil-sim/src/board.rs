@@ -4,5 +4,6 @@
 pub mod account;
 pub mod core;
 pub mod image;
+pub mod model;
 pub mod thumb;
 pub mod timing;

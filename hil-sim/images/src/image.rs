@@ -1,5 +1,6 @@
 //! Start, panic and the list of what can be called.
 
+mod model;
 mod slot;
 mod tick;
 
@@ -12,6 +13,10 @@ use embassy_stm32 as _;
 fn main() -> ! {
     // Keeps what only the host calls.
     core::hint::black_box([
+        model::model_build as *const (),
+        model::model_forward as *const (),
+        model::model_inverse_preload as *const (),
+        model::model_inverse_speed as *const (),
         tick::tick_build as *const (),
         tick::tick_load as *const (),
         tick::tick_step as *const (),

@@ -4,4 +4,5 @@
 #![no_std]
 
 pub mod digest;
+pub mod model;
 pub mod tick;

@@ -74,30 +74,41 @@ pub struct Share {
 }
 
 impl Account {
-    /// Gives the run of `scenario` to the image at `elf`.
+    /// Gives the run of `scenario` to the image.
     ///
     /// # Errors
     /// [`AccountError`] if either cannot be run, or they differ.
     pub fn add(&mut self, image: &mut Image, scenario: &Scenario) -> Result<(), AccountError> {
-        let direction = scenario.run.direction.name();
         let preset = preset(scenario)?;
         let ticks = record(scenario)?;
-        let [build, load, step, plan, save] =
-            ["tick_build", "tick_load", "tick_step", "tick_plan", "tick_save"]
-                .map(|name| image.function(name));
-        let (build, load, step, plan, save) = (build?, load?, step?, plan?, save?);
-        image.call(build, &[preset as u32])?;
+        self.replay(image, scenario.run.direction.name(), preset, &ticks)
+    }
+
+    /// Gives these ticks to the image, whose controller is built afresh from this
+    /// preset.
+    ///
+    /// # Errors
+    /// [`AccountError::Differs`] at the first tick that the image answers otherwise.
+    pub fn replay(
+        &mut self,
+        image: &mut Image,
+        direction: &'static str,
+        preset: Preset,
+        ticks: &[Recorded],
+    ) -> Result<(), AccountError> {
+        let calls = Calls::of(image)?;
+        image.call(calls.build, &[preset as u32])?;
         for (number, tick) in ticks.iter().enumerate() {
             image.put(ARGUMENTS, &tick.given.words())?;
-            image.call(load, &[ARGUMENTS])?;
+            image.call(calls.load, &[ARGUMENTS])?;
             image.take_heat();
-            let cost = image.call(step, &[])?.meter;
+            let cost = image.call(calls.step, &[])?.meter;
             self.note(tick, cost, image.take_heat());
-            let planned = image.call(plan, &[])?;
+            let planned = image.call(calls.plan, &[])?;
             if planned.value != 0 {
                 self.plan.note(planned.meter, number);
             }
-            image.call(save, &[ANSWERS])?;
+            image.call(calls.save, &[ANSWERS])?;
             if Taken::from_words(image.get(ANSWERS)?) != tick.taken {
                 return Err(AccountError::Differs { direction, tick: number });
             }
@@ -150,8 +161,32 @@ impl Account {
     }
 }
 
+/// Addresses of the image's functions for the tick.
+struct Calls {
+    build: u32,
+    load: u32,
+    step: u32,
+    plan: u32,
+    save: u32,
+}
+
+impl Calls {
+    fn of(image: &Image) -> Result<Self, ImageError> {
+        Ok(Self {
+            build: image.function("tick_build")?,
+            load: image.function("tick_load")?,
+            step: image.function("tick_step")?,
+            plan: image.function("tick_plan")?,
+            save: image.function("tick_save")?,
+        })
+    }
+}
+
 /// The preset that this scenario's controller is built from.
-fn preset(scenario: &Scenario) -> Result<Preset, AccountError> {
+///
+/// # Errors
+/// [`AccountError::Rig`] if it is none of the presets, unchanged.
+pub fn preset(scenario: &Scenario) -> Result<Preset, AccountError> {
     let none = || AccountError::Rig(scenario.preset.clone());
     let preset = Preset::named(&scenario.preset).ok_or_else(none)?;
     let unchanged = interstage::rig::Rig::named(preset.name()).as_ref() == Some(&scenario.rig);

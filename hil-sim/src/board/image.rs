@@ -12,6 +12,7 @@ mod names;
 
 use names::Names;
 
+use super::account::Spread;
 use super::core::unicorn::{Access, Counted, Memory, UnicornCore};
 use super::core::{Core, CoreError, Heat, Meter, Register, Stop};
 use super::{thumb, timing};
@@ -188,6 +189,29 @@ impl Image {
                 Err(ImageError::Lost { function, at: self.name(at).to_owned() })
             }
         }
+    }
+
+    /// Calls a function once for each input, given by reference: its words stand in the
+    /// mailbox. Returns what the calls gave, and what they took; `dearest` of that is
+    /// the index of an input.
+    ///
+    /// # Errors
+    /// As [`Image::call`], and [`ImageError::Missing`].
+    pub fn measure<const N: usize>(
+        &mut self,
+        function: &str,
+        inputs: &[[u32; N]],
+    ) -> Result<(Vec<u32>, Spread), ImageError> {
+        let function = self.function(function)?;
+        let mut values = Vec::with_capacity(inputs.len());
+        let mut spread = Spread::default();
+        for (index, words) in inputs.iter().enumerate() {
+            self.put(ARGUMENTS, words)?;
+            let call = self.call(function, &[ARGUMENTS])?;
+            values.push(call.value);
+            spread.note(call.meter, index);
+        }
+        Ok((values, spread))
     }
 
     /// Cycles by block since the last time this was asked.

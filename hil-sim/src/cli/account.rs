@@ -36,7 +36,8 @@ pub(super) fn run(_: &Args) -> Result<Outcome, Failure> {
 
 #[cfg(feature = "board")]
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
-    use crate::board::account::{IMAGE, both_ways};
+    use crate::board::account::{IMAGE, both_ways, preset};
+    use crate::board::model::measure;
     use crate::firmware::{Footprint, Profile, build_binary};
 
     let scenario = args.scenario.resolve()?;
@@ -48,9 +49,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     });
     let (package, binary) = IMAGE;
     let elf = build_binary(package, binary, Profile::Release, &Vec::from_iter(level.clone()))?;
-    let (account, image) = both_ways(&elf, &scenario).map_err(Failure::run)?;
+    let (account, mut image) = both_ways(&elf, &scenario).map_err(Failure::run)?;
+    let preset = preset(&scenario).map_err(Failure::run)?;
+    let model = measure(&mut image, preset).map_err(Failure::run)?;
     let firmware =
         build_binary("interstage", "interstage", Profile::Release, &Vec::from_iter(level))?;
     let flash = Footprint::of_file(&firmware)?.flash();
-    table::show(args, &account, &image, flash)
+    table::show(args, &table::Found { account: &account, model: &model, image: &image, flash })
 }

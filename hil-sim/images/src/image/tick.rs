@@ -20,28 +20,27 @@ static PLAN: Slot<Plan> = Slot::new();
 pub(super) extern "C" fn tick_build(preset: u32) -> u32 {
     let Some(preset) = Preset::ALL.into_iter().find(|p| *p as u32 == preset) else { return 0 };
     let Some(rig) = Rig::named(preset.name()) else { return 0 };
-    controller(&rig);
-    planner(&rig);
-    *STATE.get() = Some(State::default());
-    *PLAN.get() = None;
-    (CONTROLLER.get().is_some() && PLANNER.get().is_some()).into()
+    STATE.put(State::default);
+    PLAN.take();
+    (controller(&rig) && planner(&rig)).into()
 }
 
 /// In a frame of its own: together they would be deeper than the stack.
 #[inline(never)]
-fn controller(rig: &Rig) {
-    *CONTROLLER.get() = Controller::try_build(rig).ok();
+fn controller(rig: &Rig) -> bool {
+    let built = Controller::try_build(rig);
+    built.map(|controller| CONTROLLER.put(|| controller)).is_ok()
 }
 
 #[inline(never)]
-fn planner(rig: &Rig) {
-    *PLANNER.get() = Planner::try_build(rig).ok();
+fn planner(rig: &Rig) -> bool {
+    Planner::try_build(rig).map(|planner| PLANNER.put(|| planner)).is_ok()
 }
 
 /// Takes the next tick's input from `given`, and the plan that waits.
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn tick_load(given: &Given) {
-    *INPUT.get() = Some(given.input(PLAN.get().take()));
+    INPUT.put(|| given.input(PLAN.take()));
 }
 
 /// The control tick.
@@ -50,7 +49,8 @@ pub(super) extern "C" fn tick_step() {
     if let (Some(controller), Some(state), Some(input)) =
         (CONTROLLER.get(), STATE.get(), INPUT.get())
     {
-        *OUTPUT.get() = Some(controller.step(state, input));
+        // As the motor task has it: in place, without a copy into an option.
+        OUTPUT.put(|| controller.step(state, input));
     }
 }
 
@@ -59,7 +59,7 @@ pub(super) extern "C" fn tick_step() {
 pub(super) extern "C" fn tick_plan() -> u32 {
     let (Some(planner), Some(output)) = (PLANNER.get(), OUTPUT.get()) else { return 0 };
     let Some(request) = output.request else { return 0 };
-    *PLAN.get() = Some(planner.plan(&request));
+    PLAN.put(|| planner.plan(&request));
     1
 }
 

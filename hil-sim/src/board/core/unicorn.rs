@@ -304,3 +304,6 @@ impl Core for UnicornCore {
         heat
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -7,6 +7,7 @@ use super::super::output;
 use super::Args;
 use crate::board::account::{Account, Phase, PhaseCost, Share, Spread};
 use crate::board::image::Image;
+use crate::board::model::Measured;
 use crate::table::{number, plain};
 
 /// Most functions listed on the terminal.
@@ -17,6 +18,7 @@ const LISTED: usize = 15;
 struct Printed<'a> {
     #[serde(flatten)]
     account: &'a Account,
+    model: &'a [Measured],
     firmware_flash_bytes: u64,
     busiest: Option<Phase>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -30,12 +32,17 @@ struct Profile {
     functions: Vec<Share>,
 }
 
-pub(super) fn show(
-    args: &Args,
-    account: &Account,
-    image: &Image,
-    flash: u64,
-) -> Result<Outcome, Failure> {
+/// What was found out.
+pub(super) struct Found<'a> {
+    pub(super) account: &'a Account,
+    pub(super) model: &'a [Measured],
+    pub(super) image: &'a Image,
+    /// Flash that the firmware takes, bytes.
+    pub(super) flash: u64,
+}
+
+pub(super) fn show(args: &Args, found: &Found<'_>) -> Result<Outcome, Failure> {
+    let Found { account, model, image, flash } = *found;
     let mut profiles = Vec::new();
     if args.profile_functions {
         for cost in account.busiest().into_iter().chain(account.smooth()) {
@@ -45,6 +52,7 @@ pub(super) fn show(
     }
     let printed = Printed {
         account,
+        model,
         firmware_flash_bytes: flash,
         busiest: account.busiest().map(|cost| cost.phase),
         profiles,
@@ -58,7 +66,8 @@ fn text(printed: &Printed<'_>) -> String {
     let whole = [("control tick", &account.tick), ("plan", &account.plan)];
     let phases =
         account.phases.iter().map(|PhaseCost { phase, tick }| row(phase.to_string(), tick));
-    let rows = phases.chain(whole.map(|(name, spread)| row(name.to_owned(), spread)));
+    let model = printed.model.iter().map(|m| row(m.function.to_owned(), &m.cost));
+    let rows = phases.chain(whole.map(|(name, spread)| row(name.to_owned(), spread))).chain(model);
     let head = ["phase", "calls", "least", "mean", "most", "instructions", "dearest"];
     let mut text = format!("{}\n", plain(&head, rows));
     text += &format!(
