@@ -76,11 +76,11 @@ fn a_function_that_is_not_there_is_named() {
 }
 
 #[test]
-fn a_call_that_panics_is_lost_and_says_where() {
+fn a_call_that_faults_is_an_error_and_spoils_nothing() {
     let mut image = Image::open(&image()).expect("an image");
-    let save = image.function("tick_load").expect("there");
+    let load = image.function("tick_load").expect("there");
     // Far outside every memory.
-    assert!(image.call(save, &[0x9000_0000]).is_err());
+    assert!(image.call(load, &[0x9000_0000]).is_err());
     // The image is still good.
     image.put(ARGUMENTS, &[1, 2, 3]).expect("a mailbox");
     assert_eq!(image.get(ARGUMENTS).expect("a mailbox"), [1, 2, 3]);

@@ -34,7 +34,7 @@ pub enum AccountError {
     #[error(transparent)]
     Image(#[from] ImageError),
     /// The image knows the presets alone.
-    #[error("the measurement image has no rig `{0}`, it has prototype and fe as they are")]
+    #[error("the measurement image has the rigs prototype and fe as they are, not `{0}` changed")]
     Rig(String),
     /// The core answered otherwise than the host.
     #[error("tick {tick} of the {direction} run differs between host and core")]

@@ -41,6 +41,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     use crate::firmware::{Footprint, Profile, build_binary};
 
     let scenario = args.scenario.resolve()?;
+    let preset = preset(&scenario).map_err(Failure::input)?;
     // A package's own level goes before the profile's.
     let level = args.opt_level.as_deref().map(|level| {
         let quoted =
@@ -50,7 +51,6 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let (package, binary) = IMAGE;
     let elf = build_binary(package, binary, Profile::Release, &Vec::from_iter(level.clone()))?;
     let (account, mut image) = both_ways(&elf, &scenario).map_err(Failure::run)?;
-    let preset = preset(&scenario).map_err(Failure::run)?;
     let model = measure(&mut image, preset).map_err(Failure::run)?;
     let firmware =
         build_binary("interstage", "interstage", Profile::Release, &Vec::from_iter(level))?;
