@@ -301,9 +301,8 @@ fn function<'a>(symbol: &impl ObjectSymbol<'a>) -> Option<Function> {
 /// Where instructions stand in flash: from each `$t` to the next mapping symbol.
 fn code(file: &ElfFile32<'_, Endianness>) -> Vec<Range<u32>> {
     let kind = |name: &str| match name.as_bytes() {
-        [b'$', kind @ (b't' | b'd' | b'a'), rest @ ..] if matches!(rest, [] | [b'.', ..]) => {
-            Some(*kind)
-        }
+        [b'$', kind @ (b't' | b'd' | b'a')] => Some(*kind),
+        [b'$', kind @ (b't' | b'd' | b'a'), b'.', ..] => Some(*kind),
         _ => None,
     };
     let flash = FLASH.base..FLASH.base + FLASH.size;

@@ -21,6 +21,7 @@ pub(super) extern "C" fn tick_build(preset: u32) -> u32 {
     let Some(preset) = Preset::ALL.into_iter().find(|p| *p as u32 == preset) else { return 0 };
     let Some(rig) = Rig::named(preset.name()) else { return 0 };
     STATE.put(State::default);
+    OUTPUT.put(Output::default);
     PLAN.take();
     (controller(&rig) && planner(&rig)).into()
 }
@@ -43,14 +44,13 @@ pub(super) extern "C" fn tick_load(given: &Given) {
     INPUT.put(|| given.input(PLAN.take()));
 }
 
-/// The control tick.
+/// The control tick, as the motor task calls it.
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn tick_step() {
-    if let (Some(controller), Some(state), Some(input)) =
-        (CONTROLLER.get(), STATE.get(), INPUT.get())
+    if let (Some(controller), Some(state), Some(input), Some(output)) =
+        (CONTROLLER.get(), STATE.get(), INPUT.get(), OUTPUT.get())
     {
-        // As the motor task has it: in place, without a copy into an option.
-        OUTPUT.put(|| controller.step(state, input));
+        controller.step_into(state, input, output);
     }
 }
 
