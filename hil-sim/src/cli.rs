@@ -5,6 +5,7 @@
 //! code is 0 if all is well, 1 if what was run did not end well, 2 if it could not
 //! be run as asked; an error is one line.
 
+mod account;
 mod compare;
 mod constants;
 mod crossing;
@@ -44,6 +45,7 @@ enum Verb {
     Montecarlo(montecarlo::Args),
     Keys(keys::Args),
     Size(size::Args),
+    Account(account::Args),
     Constants(constants::Args),
     Docs(docs::Args),
     Test(test::Args),
@@ -59,6 +61,7 @@ impl Verb {
             Self::Montecarlo(args) => montecarlo::run(args),
             Self::Keys(args) => keys::run(args),
             Self::Size(args) => size::run(args),
+            Self::Account(args) => account::run(args),
             Self::Constants(args) => constants::run(args),
             Self::Docs(args) => docs::run(args),
             Self::Test(args) => test::run(args),
