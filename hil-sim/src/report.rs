@@ -7,12 +7,12 @@ mod crossings;
 mod decimate;
 #[cfg(test)]
 pub(crate) mod example;
+mod gaps;
 mod overview;
 mod page;
 mod palette;
 mod panel;
 mod panels;
-mod published;
 mod svg;
 mod tables;
 pub(crate) mod verdict;
@@ -22,8 +22,8 @@ use std::path::Path;
 use crate::export::{ExportError, write_text};
 use crate::record::Recording;
 
+pub use gaps::{Published, published_svg};
 pub use overview::overview_svg;
-pub use published::{Published, published_svg};
 
 /// The page of `recording`. It needs no other file and no script.
 #[must_use]
