@@ -38,19 +38,20 @@ fn coarse(case: Case) -> Case {
 fn without_memory_the_ring_is_its_closed_form() {
     for preload in [40.0, 100.0, 150.0] {
         let (case, elastic) = without_memory(5.0, preload);
+        let case = Case { resolution: Resolution::FIGURE, ..case };
         let crossing = quasi_static(&case).unwrap();
         let lift = crossing.lift.unwrap();
         let gap = elastic.gap_mm(preload).unwrap();
-        assert!((lift.gap_mm / gap - 1.0).abs() < 2e-3, "{} {gap}", lift.gap_mm);
+        assert!((lift.gap_mm / gap - 1.0).abs() < 5e-5, "{} {gap}", lift.gap_mm);
         let peak = crossing.peak_n();
         let mut worst = (0.0_f64, 0.0_f64);
-        for sample in crossing.samples.iter().filter(|s| s.x_mm < -0.1).step_by(10) {
+        for sample in crossing.samples.iter().filter(|s| s.x_mm < -1.0).step_by(10) {
             let height = elastic.height_mm(sample.x_mm, preload);
             let forces = elastic.forces(sample.x_mm, height);
             worst.0 = worst.0.max((sample.y_mm - height).abs());
             worst.1 = worst.1.max((sample.axial_n - forces.axial_n).abs() / peak);
         }
-        assert!(worst.0 < 2e-3 && worst.1 < 2e-3, "{worst:?}");
+        assert!(worst.0 < 5e-4 && worst.1 < 5e-4, "{worst:?}");
     }
 }
 
@@ -64,7 +65,7 @@ fn finer_rings_come_closer_to_the_closed_form() {
         (crossing.lift.unwrap().gap_mm / gap - 1.0).abs()
     };
     let (few, more, many) = (error(720), error(1440), error(5760));
-    assert!(few < 1e-2 && more < 5e-3 && many < 1e-3 && many < 0.5 * few, "{few} {more} {many}");
+    assert!(few < 2e-3 && more < 5e-4 && many < 5e-5, "{few} {more} {many}");
 }
 
 #[test]
@@ -85,8 +86,8 @@ fn the_two_resolutions_are_converged() {
 #[test]
 fn the_closed_form_climbs_with_the_work_of_lifting_the_preload() {
     let (_, elastic) = without_memory(5.0, 100.0);
-    // From before the touch to over the edge: the path does not matter, only its ends,
-    // so the last piece, where the edge lies under the patch, is what is missing of it.
+    // From before the touch to the face; the rest, where the edge passes under the patch,
+    // from the ring. Short of P h by what the rays lean from the wall's normal.
     let count = 40_000;
     let from = -15.9;
     let h = -from / f64::from(count);
@@ -102,8 +103,9 @@ fn the_closed_form_climbs_with_the_work_of_lifting_the_preload() {
         .filter(|pair| pair[0].x_mm >= 0.0)
         .map(|p| 0.5 * (p[0].axial_n + p[1].axial_n) * (p[1].x_mm - p[0].x_mm))
         .sum();
-    assert!(((work + after) / 400.0 - 1.0).abs() < 2e-3, "{work} {after}");
-    assert!((crossing.work_mj() / 400.0 - 1.0).abs() < 2e-3, "{}", crossing.work_mj());
+    for work in [work + after, crossing.work_mj()] {
+        assert!((0.999..1.0).contains(&(work / 400.0)), "{work}");
+    }
 }
 
 #[test]
