@@ -44,7 +44,7 @@ pub fn history(case: &Case) -> Result<Vec<(f64, f64)>, ReferenceError> {
     Ok(course.iter().map(|now| (now.t_s, now.deflection_mm)).collect())
 }
 
-/// [`history`] of a crossing of `case` that has been computed already, with its
+/// [`history()`] of a crossing of `case` that has been computed already, with its
 /// vibration apart.
 ///
 /// # Errors

@@ -42,7 +42,7 @@ pub fn history(case: &Case) -> Result<Vec<(f64, f64)>, ReferenceError> {
     history_of(case, &dynamic(case)?)
 }
 
-/// [`history`] of a crossing of `case` that has been computed already.
+/// [`history()`] of a crossing of `case` that has been computed already.
 ///
 /// # Errors
 /// [`ReferenceError`] if the tread is none of a passive solid.
