@@ -4,7 +4,8 @@
 //!
 //! Nothing here divides 64-bit numbers, loops without a bound or panics. The
 //! conversion from SI numbers, which does use floats, is in one place
-//! ([`checked`], [`Divisor::build`], [`Table::build`], [`LowPass::build`]) and runs at start only.
+//! ([`checked`], [`Divisor::build`], [`Table::build`], [`LowPass::build`]) and runs at
+//! start only.
 
 mod build;
 mod divide;
@@ -14,6 +15,7 @@ mod high;
 mod low_pass;
 mod quotient;
 mod root;
+mod sine;
 mod table;
 
 pub use build::checked;
@@ -25,4 +27,5 @@ pub(crate) use high::{horner, horner_with_slope};
 pub use low_pass::{LowPass, LowPassState};
 pub use quotient::{fraction, reciprocal_of_normalised};
 pub use root::sqrt;
+pub use sine::sin_cos;
 pub use table::Table;
