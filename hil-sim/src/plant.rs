@@ -8,6 +8,7 @@ pub mod crossing;
 pub mod draw;
 pub mod ledger;
 pub mod limits;
+pub mod precision;
 pub mod rig;
 pub mod ring;
 pub mod rolling;

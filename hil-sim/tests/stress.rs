@@ -2,6 +2,7 @@
 
 use hil_sim::scenario::{Direction, Scenario};
 use hil_sim::sil::{Options, Session};
+use hil_sim::stress::plant::{self, Figure};
 use interstage::control::Output;
 use interstage::supervise::{Command, Leg, Mode};
 
@@ -67,4 +68,20 @@ fn a_crossing_at_resonance_is_seen_to_shake() {
     loud.rig.drive.ripple_pitch_mm = 8.0 / 276.0;
     let loud = shaken(&loud);
     assert!(loud.iter().all(|&um| um > 6.0), "{loud:?}");
+}
+
+#[test]
+fn the_plant_stands_the_corners_of_its_ranges() {
+    let report = plant::run(200, 1, &|| {});
+    assert_eq!(report.cases, 200);
+    assert!(report.failures.is_empty(), "{:#?}", report.failures);
+    // Refused is what cannot be, each with its parameters and its limit.
+    let refused: usize = report.refusals.values().sum();
+    assert!(refused < report.cases, "{:?}", report.refusals);
+    assert!(report.refused.values().all(|message| message.contains("at most")));
+    // The figures are looked at: somewhere each comes near its limit.
+    for figure in [Figure::Energy, Figure::Penetration, Figure::Overspeed] {
+        let worst = report.worst.iter().find(|worst| worst.figure == figure).unwrap();
+        assert!(worst.value > 0.2, "{worst:?}");
+    }
 }

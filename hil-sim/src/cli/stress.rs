@@ -121,7 +121,23 @@ fn gather(
     let mut failed: Vec<String> = report
         .failures
         .iter()
-        .map(|failure| format!("case {}: {}", failure.case.index, failure.why))
+        .map(|failure| {
+            let case = &failure.case;
+            format!(
+                "case {}: {}: {:.1e} Pa/m x {:.0}, {:.0e} s, step {:.0e} s, {:.0} mm/s {:?}, {:.1} mm, mu {:.2}, arm {}",
+                case.index,
+                failure.why,
+                case.k_inf_pa_per_m,
+                case.stiffening,
+                case.tau_s,
+                case.dt_s,
+                case.speed_mm_s,
+                case.course,
+                case.step_mm,
+                case.mu,
+                case.coupling
+            )
+        })
         .collect();
     let refine = refined.iter().filter(|line| !line.holds);
     failed.extend(refine.map(|line| format!("{}: order {:?}", line.name, line.order)));

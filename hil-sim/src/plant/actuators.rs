@@ -61,7 +61,7 @@ impl DriveMotor {
         let both_kg = self.mass_kg + load.mass_kg;
         let driving = sense * force - self.friction_n - load.force_n * sense;
         let (mass_kg, against) = if load.force_n * sense * both_kg + load.mass_kg * driving >= 0.0 {
-            (both_kg, load.force_n * sense + self.friction_n)
+            (both_kg, against)
         } else {
             (self.mass_kg, self.friction_n)
         };

@@ -1,6 +1,7 @@
 //! The whole rig, a millisecond at a time.
 
 mod contact;
+mod phases;
 mod traction;
 
 use std::f64::consts::TAU;
@@ -15,7 +16,9 @@ use super::rolling::{self, Steady};
 use contact::Calm;
 use traction::Gait;
 
-/// Most ring steps in a call: 5 mm of way at the usual stride.
+pub use phases::{PHASES, Phase, PhaseWork};
+
+/// Most ring steps in a call: 10 mm of way at the usual stride.
 const MOST_STRIDES: f64 = 256.0;
 
 /// Way after which motor, friction and wall exchange their forces, if the step of time is
@@ -33,7 +36,7 @@ pub struct Resolution {
 
 impl Default for Resolution {
     fn default() -> Self {
-        Self { stride_mm: 0.02, always_awake: false }
+        Self { stride_mm: 0.04, always_awake: false }
     }
 }
 
@@ -132,7 +135,7 @@ pub struct VirtualRig {
     preload: Pretightener,
     modes: Vec<Mode>,
     /// Sine and cosine of the ripple's phase.
-    phase: (f64, f64),
+    ripple_phase: (f64, f64),
     /// Elastic force of the modes, their mean, N.
     vibration_n: f64,
     truth: Truth,
@@ -145,12 +148,21 @@ pub struct VirtualRig {
     rolled_mm_s: f64,
     /// Base of the wall under the centre in the last stride, mm.
     base_mm: f64,
+    /// What was computed in each phase.
+    phases: [PhaseWork; PHASES.len()],
+    phase: Phase,
     /// Contact forces of the last stride: normal, cosine and sine sums, N.
     forces: (f64, f64, f64),
     /// Acceleration of the tread, mm/s^2.
     acceleration: f64,
     /// Rise of the centre per axial way in the last stride.
     slope: f64,
+    /// The part of it that no change of load explains.
+    drift: f64,
+    /// Rise that no change of load explains while the wheel stands, mm/s.
+    creep: f64,
+    /// Derivatives of the resolved contact's cosine and sine sums by the height, N/mm.
+    stiffness: Option<(f64, f64)>,
 }
 
 impl VirtualRig {
@@ -184,7 +196,7 @@ impl VirtualRig {
             calm: Calm { tread_mm_s: 0.0, pressing_n: preload_n, for_s: f64::INFINITY },
             preload,
             modes,
-            phase: (0.0, 1.0),
+            ripple_phase: (0.0, 1.0),
             vibration_n: 0.0,
             truth: Truth {
                 position_mm,
@@ -197,9 +209,14 @@ impl VirtualRig {
             parked: true,
             rolled_mm_s: 0.0,
             base_mm: local.base_mm,
+            phases: Default::default(),
+            phase: Phase::Smooth,
             forces: (rest.normal_n, rest.cosine_n, 0.0),
             acceleration: 0.0,
             slope: 0.0,
+            drift: 0.0,
+            creep: 0.0,
+            stiffness: None,
             parameters,
         };
         rig.derive();
@@ -220,6 +237,14 @@ impl VirtualRig {
         self.truth.speed_mm_s = speed_mm_s;
         self.rolled_mm_s = speed_mm_s;
         self.parked = false;
+        self
+    }
+
+    /// The same rig with every ring element visited that faces the wall, in reach or not.
+    /// No bit of any result depends on it: it proves that what is skipped is not needed.
+    #[must_use]
+    pub fn visiting_all(mut self) -> Self {
+        self.ring = self.ring.whole(true);
         self
     }
 
@@ -247,6 +272,7 @@ impl VirtualRig {
     /// [`PlantError`] when the state stops meaning anything.
     pub fn step(&mut self, drives: &Drives, dt_s: f64) -> Result<(), PlantError> {
         self.preload.step(drives.preload, drives.preload_on, dt_s);
+        let before = self.work();
         let mut left_s = dt_s;
         while left_s > 0.0 {
             let part_s = self.exchange(left_s);
@@ -259,6 +285,7 @@ impl VirtualRig {
             }
             left_s -= part_s;
         }
+        self.count(&before, dt_s);
         self.vibrate(dt_s);
         self.truth.time_s += dt_s;
         self.derive();
@@ -315,7 +342,7 @@ impl VirtualRig {
         self.truth.rotation_rad += turn;
         let local = self.parameters.wall.local(position);
         let settled = self.settled(&local, axial, dt_s);
-        if self.resolution.always_awake || !settled || self.near_step(&local) {
+        if self.resolution.always_awake || !settled {
             if !self.awake {
                 self.wake(before);
             }
@@ -335,7 +362,7 @@ impl VirtualRig {
         let force = Ripple {
             amplitude_n: if spin == 0.0 { 0.0 } else { amplitude },
             omega: TAU * spin / pitch,
-            from: std::mem::replace(&mut self.phase, to),
+            from: std::mem::replace(&mut self.ripple_phase, to),
             to,
         };
         let (mut deflection, mut sum) = (0.0, 0.0);

@@ -12,6 +12,13 @@ use serde::Serialize;
 /// LSB of [`Q16`].
 const LSB: f64 = 1.0 / 65_536.0;
 
+/// Bound of the table below: 1.5 LSB, and 64 intervals times 2^-32 of the steepest
+/// interval's slope, 1.1e8 LSB.
+const TABLE_BOUND: f64 = 3.2;
+
+/// Bound of the quotient of numbers below 1.
+const FRACTION_BOUND: f64 = 24.0;
+
 /// Inputs of a chunk.
 const CHUNK: u64 = 1 << 20;
 
@@ -155,24 +162,43 @@ fn sweeps() -> Vec<Sweep> {
                 f64::from(numeric::sqrt_fraction(x as u32)) - 65_536.0 * (x as f64).sqrt()
             }),
         ),
-        whole("table", (-1.5, 1.5), table()),
-        arm("arm radius", 8e-5, Arm::radius, |codes, rig: &Rig| {
-            let angle = codes * std::f64::consts::TAU / 16_384.0;
-            rig.rig.arm_pivot_radius_mm + rig.rig.arm_length_mm * angle.sin()
-        }),
-        arm("arm tangent", 2.5e-4, Arm::tangent, |codes, _: &Rig| {
-            (codes * std::f64::consts::TAU / 16_384.0).tan()
-        }),
+        whole("table", (-TABLE_BOUND, TABLE_BOUND), table()),
+        whole(
+            "sin_cos",
+            (-7.0, 7.0),
+            Box::new(|angle| {
+                let (sine, cosine) = numeric::sin_cos(angle as u32);
+                let exact = (angle as f64 / 4_294_967_296.0 * std::f64::consts::TAU).sin_cos();
+                let scale = f64::from(1 << 30);
+                let off = (f64::from(sine) - scale * exact.0, f64::from(cosine) - scale * exact.1);
+                if off.0.abs() > off.1.abs() { off.0 } else { off.1 }
+            }),
+        ),
+        arm(
+            "arm radius",
+            |arm, angle| arm.stance(angle).0,
+            |codes, rig: &Rig| {
+                let angle = codes * std::f64::consts::TAU / 16_384.0;
+                rig.rig.arm_pivot_radius_mm + rig.rig.arm_length_mm * angle.sin()
+            },
+        ),
+        arm(
+            "arm tangent",
+            |arm, angle| arm.stance(angle).1,
+            |codes, _: &Rig| (codes * std::f64::consts::TAU / 16_384.0).tan(),
+        ),
         pairs("divide", (-0.5, 0.5), divide),
-        pairs("fraction", (-20.0, 0.0), |a, b| {
-            let got = numeric::fraction(a, b);
-            if a >= b {
-                return f64::from(got) - f64::from(u32::MAX);
-            }
-            let exact = (u64::from(a) << 32) / u64::from(b);
-            let rest = (u64::from(a) << 32) % u64::from(b);
-            (i64::from(got) - exact as i64) as f64 - rest as f64 / f64::from(b)
-        }),
+        // The error of a quotient grows with its numerator: the largest for every
+        // denominator; a shift brings the others there.
+        Sweep {
+            name: "fraction, largest",
+            from: 1 << 31,
+            to: all,
+            bound: (-FRACTION_BOUND, 0.0),
+            whole: true,
+            error: Box::new(|b| fraction(b as u32 - 1, b as u32)),
+        },
+        pairs("fraction", (-FRACTION_BOUND, 0.0), fraction),
     ]
 }
 
@@ -194,6 +220,15 @@ fn sqrt(input: u64) -> f64 {
     let x = input as u32 as i32;
     let got = bits(numeric::sqrt(q(input)));
     if x <= 0 { got } else { got - (f64::from(x) * 65_536.0).sqrt() }
+}
+
+fn fraction(a: u32, b: u32) -> f64 {
+    let got = numeric::fraction(a, b);
+    if a >= b {
+        return f64::from(got) - f64::from(u32::MAX);
+    }
+    let (exact, rest) = ((u64::from(a) << 32) / u64::from(b), (u64::from(a) << 32) % u64::from(b));
+    (i64::from(got) - exact as i64) as f64 - rest as f64 / f64::from(b)
 }
 
 fn divide(a: u32, b: u32) -> f64 {
@@ -281,10 +316,9 @@ fn table() -> Box<dyn Fn(u64) -> f64 + Sync> {
     })
 }
 
-/// A table of the arm over all codes of its reach, against the geometry.
+/// The arm over all angles of its reach, against the geometry: within 2e-5 mm and 2e-5.
 fn arm(
     name: &'static str,
-    bound: f64,
     eval: impl Fn(&Arm, Q16) -> Q16 + Sync + 'static,
     exact: impl Fn(f64, &Rig) -> f64 + Sync + 'static,
 ) -> Sweep {
@@ -295,7 +329,7 @@ fn arm(
         name,
         from: u64::from(lo.to_bits() as u32),
         to: u64::from(hi.to_bits() as u32) + 1,
-        bound: (-bound / LSB, bound / LSB),
+        bound: (-2e-5 / LSB, 2e-5 / LSB),
         whole: true,
         error: Box::new(move |input| {
             let codes = bits(q(input)) * LSB;

@@ -19,7 +19,7 @@ use crate::scenario::Scenario;
 const LEAST_ORDER: f64 = 0.8;
 
 /// Differences below this part of the value are rounding and the ring's grain.
-const GRAIN: f64 = 1e-4;
+const GRAIN: f64 = 2e-4;
 
 /// A quantity on three resolutions, each half of the one before.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -65,7 +65,7 @@ pub fn run(quick: bool) -> Vec<Line> {
                     k_inf,
                     k_0: k_inf * stiffening,
                     tau_s,
-                    elements: 2880,
+                    elements: 11_520,
                 },
                 step_height_mm: 4.0,
                 speed_mm_s: speed,
