@@ -141,7 +141,7 @@ fn sweeps() -> Vec<Sweep> {
     };
     vec![
         whole("reciprocal", (-0.5, 0.5), Box::new(reciprocal)),
-        whole("sqrt", (-0.5, 0.5), Box::new(sqrt)),
+        whole("sqrt", (-0.51, 0.51), Box::new(sqrt)),
         Sweep {
             name: "reciprocal_of_normalised",
             from: 1 << 31,
