@@ -91,27 +91,21 @@ impl Balance {
     ///
     /// # Errors
     /// [`BalanceError`] if the preload cannot be carried.
-    pub fn solve(&self, ring: &Ring, motion: Motion) -> Result<Solved, BalanceError> {
+    pub fn solve(&self, ring: &mut Ring, motion: Motion) -> Result<Solved, BalanceError> {
         let radius = ring.parameters().radius_mm;
         let (mut low, mut high) = (0.2 * radius, 1.1 * radius + motion.wall.rise_mm);
         let tolerance = 1e-9 * self.preload_n.max(1.0);
         let mut height = motion.height_mm.clamp(low, high);
-        let mut best = Solved { height_mm: height, contact: Contact::default(), utilisation: 0.0 };
-        let mut best_residual = f64::INFINITY;
+        let (mut best, mut best_residual) = ((height, 0.0), f64::INFINITY);
         for _ in 0..80 {
-            let contact = ring.trial(&Motion { height_mm: height, ..motion });
-            let forces = (contact.cosine_n, contact.sine_n);
-            let (residual, slope, utilisation) =
-                self.residual(forces, contact.slope, height - radius);
+            let (forces, slopes) = ring.forces(&Motion { height_mm: height, ..motion });
+            let (residual, slope, utilisation) = self.residual(forces, slopes, height - radius);
             if residual.abs() < best_residual {
                 best_residual = residual.abs();
-                best = Solved { height_mm: height, contact, utilisation };
+                best = (height, utilisation);
             }
-            if residual.abs() <= tolerance {
-                return Ok(best);
-            }
-            // Closed in on a kink, or on an end without a balance.
-            if high - low < 1e-13 * radius {
+            // Carried; or closed in on a kink, or on an end without a balance.
+            if residual.abs() <= tolerance || high - low < 1e-13 * radius {
                 break;
             }
             // Too much force: the centre must stand higher.
@@ -127,14 +121,13 @@ impl Balance {
                 0.5 * (low + high)
             };
         }
-        if best_residual <= 1e-3 * self.preload_n.max(1.0) {
-            return Ok(best);
+        let (height_mm, utilisation) = best;
+        if best_residual > 1e-3 * self.preload_n.max(1.0) {
+            let preload_n = self.preload_n;
+            return Err(BalanceError { preload_n, residual_n: best_residual, height_mm });
         }
-        Err(BalanceError {
-            preload_n: self.preload_n,
-            residual_n: best_residual,
-            height_mm: best.height_mm,
-        })
+        let contact = ring.trial(&Motion { height_mm, ..motion });
+        Ok(Solved { height_mm, contact, utilisation })
     }
 }
 
@@ -159,8 +152,8 @@ mod tests {
     }
 
     fn solve(preload_n: f64, spring_n_per_mm: f64, axial: Axial) -> Solved {
-        let (ring, motion) = climbing();
-        Balance { preload_n, spring_n_per_mm, axial }.solve(&ring, motion).unwrap()
+        let (mut ring, motion) = climbing();
+        Balance { preload_n, spring_n_per_mm, axial }.solve(&mut ring, motion).unwrap()
     }
 
     #[test]
@@ -199,9 +192,9 @@ mod tests {
 
     #[test]
     fn a_preload_that_nothing_carries_is_told() {
-        let (ring, motion) = climbing();
+        let (mut ring, motion) = climbing();
         let balance = Balance { preload_n: 1e9, spring_n_per_mm: 0.0, axial: Axial::Pushed };
-        let error = balance.solve(&ring, motion).unwrap_err();
+        let error = balance.solve(&mut ring, motion).unwrap_err();
         assert_eq!(error.preload_n, 1e9);
         assert!(error.to_string().starts_with("radial balance: no wheel height carries"));
     }

@@ -192,7 +192,7 @@ mod tests {
             for _ in 0..2500 {
                 let motion =
                     Motion { wall, height_mm: height, turn_rad: dx / 25.0, dt_s: dx / speed };
-                let solved = balance.solve(&rolled, motion).unwrap();
+                let solved = balance.solve(&mut rolled, motion).unwrap();
                 height = solved.height_mm;
                 rolled.commit(&Motion { height_mm: height, ..motion });
                 contact = Some(solved.contact);

@@ -6,7 +6,7 @@ use super::{PlantError, VirtualRig};
 use crate::plant::arm::Mode;
 use crate::plant::balance::{Axial, Balance, BalanceError, Solved};
 use crate::plant::ledger::Moment;
-use crate::plant::ring::{Contact, Motion, Ring};
+use crate::plant::ring::{Contact, Motion};
 use crate::plant::rolling::{self, Rolling};
 use crate::plant::wall::LocalWall;
 
@@ -80,8 +80,7 @@ impl VirtualRig {
         let local = self.parameters.wall.local(position_mm);
         let height = self.truth.height_mm - local.base_mm;
         let table = rolling::profile(&self.parameters.ring, height, self.rolled_mm_s);
-        // A fresh ring counts its own turns; only the angle to the wall matters.
-        self.ring = Ring::new(self.parameters.ring);
+        // The ring starts its turns afresh; only the angle to the wall matters.
         let interpolate = |angle: f64| {
             let at = table.partition_point(|node| node.0 < angle);
             match (at.checked_sub(1).and_then(|i| table.get(i)), table.get(at)) {
@@ -92,7 +91,8 @@ impl VirtualRig {
                 _ => (0.0, 0.0),
             }
         };
-        self.ring.seed(self.truth.time_s, interpolate);
+        let within = table.last().map_or(0.0, |node| node.0);
+        self.ring.seed(self.truth.time_s, within, interpolate);
         self.awake = true;
     }
 
@@ -111,7 +111,7 @@ impl VirtualRig {
             dt_s,
         };
         let solved =
-            self.bear(axial, |rig, axial| rig.balance(local, axial).solve(&rig.ring, motion))?;
+            self.bear(axial, |rig, axial| rig.balance(local, axial).solve(&mut rig.ring, motion))?;
         self.ring.commit(&Motion { height_mm: solved.height_mm, ..motion });
         let way = self.truth.speed_mm_s * dt_s;
         if way.abs() > 1e-6 {
@@ -187,15 +187,15 @@ impl VirtualRig {
     fn bear(
         &mut self,
         axial: Axial,
-        solve: impl Fn(&Self, Axial) -> Result<Solved, BalanceError>,
+        solve: impl Fn(&mut Self, Axial) -> Result<Solved, BalanceError>,
     ) -> Result<Solved, PlantError> {
         let mu = self.parameters.mu;
-        let slides = |sense: f64| {
-            let axial = Axial::Wedged { utilisation: mu.copysign(sense), wedge: self.wedge() };
-            solve(self, axial).ok().filter(|solved| {
+        let slides = |rig: &mut Self, sense: f64| {
+            let axial = Axial::Wedged { utilisation: mu.copysign(sense), wedge: rig.wedge() };
+            solve(rig, axial).ok().filter(|solved| {
                 let c = &solved.contact;
                 let forces = (c.normal_n, c.cosine_n, c.sine_n);
-                self.freedom(mu.copysign(sense), forces) >= JAMMED_BELOW
+                rig.freedom(mu.copysign(sense), forces) >= JAMMED_BELOW
             })
         };
         let jammed =
@@ -203,10 +203,10 @@ impl VirtualRig {
         let solved = match axial {
             Axial::Driven(load) => match solve(self, axial) {
                 Ok(solved) if solved.utilisation.abs() <= mu => Ok(solved),
-                Ok(solved) => Ok(slides(solved.utilisation).unwrap_or(jammed(solved))),
-                Err(error) => slides(load).ok_or(error),
+                Ok(solved) => Ok(slides(self, solved.utilisation).unwrap_or(jammed(solved))),
+                Err(error) => slides(self, load).ok_or(error),
             },
-            Axial::Wedged { utilisation, .. } => match slides(utilisation) {
+            Axial::Wedged { utilisation, .. } => match slides(self, utilisation) {
                 Some(solved) => Ok(solved),
                 None => {
                     self.sliding = false;
