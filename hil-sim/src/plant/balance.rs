@@ -95,19 +95,14 @@ impl Balance {
         let radius = ring.parameters().radius_mm;
         let (mut low, mut high) = (0.2 * radius, 1.1 * radius + motion.wall.rise_mm);
         let tolerance = 1e-9 * self.preload_n.max(1.0);
+        let at = |height_mm: f64| Motion { height_mm, ..motion };
         let mut height = motion.height_mm.clamp(low, high);
-        let (mut best, mut best_residual) = ((height, 0.0), f64::INFINITY);
+        // The guess seldom balances: only what the next height needs.
+        let (forces, slopes) = ring.forces(&at(height));
+        let mut trial = self.residual(forces, slopes, height - radius);
+        let (mut best, mut best_residual) = (None, f64::INFINITY);
         for _ in 0..80 {
-            let (forces, slopes) = ring.forces(&Motion { height_mm: height, ..motion });
-            let (residual, slope, utilisation) = self.residual(forces, slopes, height - radius);
-            if residual.abs() < best_residual {
-                best_residual = residual.abs();
-                best = (height, utilisation);
-            }
-            // Carried; or closed in on a kink, or on an end without a balance.
-            if residual.abs() <= tolerance || high - low < 1e-13 * radius {
-                break;
-            }
+            let (residual, slope, _) = trial;
             // Too much force: the centre must stand higher.
             if residual > 0.0 {
                 low = height;
@@ -115,19 +110,30 @@ impl Balance {
                 high = height;
             }
             let newton = height - residual / slope;
-            height = if slope < 0.0 && newton > low && newton < high {
+            height = if slope < 0.0 && newton >= low && newton <= high {
                 newton
             } else {
                 0.5 * (low + high)
             };
+            let contact = ring.trial(&at(height));
+            let forces = (contact.cosine_n, contact.sine_n);
+            trial = self.residual(forces, contact.slope, height - radius);
+            let (residual, _, utilisation) = trial;
+            if residual.abs() < best_residual {
+                best_residual = residual.abs();
+                best = Some(Solved { height_mm: height, contact, utilisation });
+            }
+            // Carried; or closed in on a kink, or on an end without a balance.
+            if residual.abs() <= tolerance || high - low < 1e-13 * radius {
+                break;
+            }
         }
-        let (height_mm, utilisation) = best;
-        if best_residual > 1e-3 * self.preload_n.max(1.0) {
-            let preload_n = self.preload_n;
-            return Err(BalanceError { preload_n, residual_n: best_residual, height_mm });
-        }
-        let contact = ring.trial(&Motion { height_mm, ..motion });
-        Ok(Solved { height_mm, contact, utilisation })
+        let allowed = 1e-3 * self.preload_n.max(1.0);
+        best.filter(|_| best_residual <= allowed).ok_or(BalanceError {
+            preload_n: self.preload_n,
+            residual_n: best_residual,
+            height_mm: best.map_or(height, |solved| solved.height_mm),
+        })
     }
 }
 

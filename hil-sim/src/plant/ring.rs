@@ -144,6 +144,8 @@ struct Ready {
     lowest: f64,
     window: Window,
     blocks: Vec<Block>,
+    /// Where the blocks are kept.
+    indices: Vec<usize>,
     rise: Option<f64>,
     edge: bool,
 }
@@ -261,10 +263,10 @@ impl Ring {
         let end = self.time + motion.dt_s;
         let Self { ready, active, law, q, depth, at, .. } = self;
         let count = q.len() as i64;
-        for (number, block) in ready.window.blocks().zip(&ready.blocks) {
-            let index = number.rem_euclid(count) as usize;
-            (depth[index], q[index]) = sweep::advance(block, &place, law);
-        }
+        sweep::advance(&ready.blocks, &place, law, |number, depths, qs| {
+            let index = ready.indices[number];
+            (depth[index], q[index]) = (depths, qs);
+        });
         // Out of reach: let go of within this step.
         for number in active.blocks().filter(|number| !ready.window.contains(*number)) {
             let index = number.rem_euclid(count) as usize;
@@ -393,6 +395,7 @@ impl Ring {
         let (turned_sin, turned_cos) = turned.sin_cos();
         let step = ready.rise.is_some();
         ready.blocks.clear();
+        ready.indices.clear();
         for number in ready.window.blocks() {
             let index = number.rem_euclid(count) as usize;
             let mut block = Block::default();
@@ -418,6 +421,7 @@ impl Ring {
                 }
             }
             ready.blocks.push(block);
+            ready.indices.push(index);
         }
     }
 }

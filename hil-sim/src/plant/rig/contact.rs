@@ -3,7 +3,6 @@
 
 use super::traction::JAMMED_BELOW;
 use super::{PlantError, VirtualRig};
-use crate::plant::arm::Mode;
 use crate::plant::balance::{Axial, Balance, BalanceError, Solved};
 use crate::plant::ledger::Moment;
 use crate::plant::ring::{Contact, Motion};
@@ -21,7 +20,8 @@ const SUNK_MM: f64 = 1.5;
 const UNSTEADY_PART: f64 = 0.03;
 const UNSTEADY_MM_S: f64 = 0.01;
 
-/// Relaxation times after which the tread has forgotten what came before.
+/// Relaxation times after which the tread has forgotten what came before; it knows
+/// nothing from before it came into the patch.
 const FORGETS: f64 = 6.0;
 
 /// What the wheel has been rolling at, and for how long.
@@ -56,10 +56,8 @@ impl VirtualRig {
             Axial::Driven(load) => load,
             _ => 0.0,
         };
-        let vibration = self.modes.iter().map(Mode::force_n).sum::<f64>();
-        let shared = vibration / self.modes.len().max(1) as f64;
         Balance {
-            preload_n: (seat + self.wedge() * thrust - shared).max(0.0),
+            preload_n: (seat + self.wedge() * thrust - self.vibration_n).max(0.0),
             spring_n_per_mm: self.parameters.spring_n_per_mm,
             axial,
         }
@@ -104,16 +102,16 @@ impl VirtualRig {
         turn: f64,
         dt_s: f64,
     ) -> Result<(), PlantError> {
+        let way = self.truth.speed_mm_s * dt_s;
         let motion = Motion {
             wall: *local,
-            height_mm: self.truth.height_mm - local.base_mm,
+            height_mm: self.truth.height_mm - local.base_mm + self.slope * way,
             turn_rad: turn,
             dt_s,
         };
         let solved =
             self.bear(axial, |rig, axial| rig.balance(local, axial).solve(&mut rig.ring, motion))?;
         self.ring.commit(&Motion { height_mm: solved.height_mm, ..motion });
-        let way = self.truth.speed_mm_s * dt_s;
         if way.abs() > 1e-6 {
             let rise = solved.height_mm + local.base_mm - self.truth.height_mm;
             self.slope = rise / way;
@@ -152,18 +150,19 @@ impl VirtualRig {
     }
 
     fn roll_balanced(
-        &self,
+        &mut self,
         local: &LocalWall,
         axial: Axial,
         guess_mm: f64,
     ) -> Result<Solved, BalanceError> {
-        let ring = &self.parameters.ring;
+        let ring = self.parameters.ring;
         let balance = self.balance(local, axial);
         let residual = |c: &Rolling| {
             let lift = c.height_mm - ring.radius_mm;
             balance.residual((c.cosine_n, c.sine_n), (0.0, 0.0), lift)
         };
-        let rolling = rolling::solve(ring, self.truth.tread_mm_s, guess_mm, |c| residual(c).0);
+        let speed = self.truth.tread_mm_s;
+        let rolling = self.steady.solve(&ring, speed, guess_mm, |c| residual(c).0);
         let (residual_n, _, utilisation) = residual(&rolling);
         let height_mm = rolling.height_mm;
         if residual_n.abs() > 1e-3 * balance.preload_n.max(1.0) {

@@ -183,24 +183,27 @@ fn totals_of<const STEP: bool, const EDGE: bool>(
     }
 }
 
-/// New depth and internal displacement of a block.
+/// Hands over the new depths and internal displacements, block after block.
 #[inline(always)]
 fn advance_of<const STEP: bool, const EDGE: bool>(
-    block: &Block,
+    blocks: &[Block],
     place: &Place,
     law: &Law,
-) -> (Lanes, Lanes) {
-    let (mut depths, mut qs) = ([0.0; LANES], [0.0; LANES]);
-    for lane in 0..LANES {
-        let met = meet::<STEP, EDGE>(block, lane, place);
-        let depth = if EDGE && met.covered <= 0.0 { met.behind } else { met.depth };
-        let depth = if depth > 0.0 { depth } else { 0.0 };
-        let q = block.carried[lane] + law.from_new * depth;
-        depths[lane] = depth;
-        // What has all but decayed is gone, before it turns denormal and slow.
-        qs[lane] = if q.abs() > 1e-200 { q } else { 0.0 };
+    mut store: impl FnMut(usize, Lanes, Lanes),
+) {
+    for (index, block) in blocks.iter().enumerate() {
+        let (mut depths, mut qs) = ([0.0; LANES], [0.0; LANES]);
+        for lane in 0..LANES {
+            let met = meet::<STEP, EDGE>(block, lane, place);
+            let depth = if EDGE && met.covered <= 0.0 { met.behind } else { met.depth };
+            let depth = if depth > 0.0 { depth } else { 0.0 };
+            let q = block.carried[lane] + law.from_new * depth;
+            depths[lane] = depth;
+            // What has all but decayed is gone, before it turns denormal and slow.
+            qs[lane] = if q.abs() > 1e-200 { q } else { 0.0 };
+        }
+        store(index, depths, qs);
     }
-    (depths, qs)
 }
 
 macro_rules! by_wall {
@@ -222,6 +225,11 @@ pub(super) fn totals(blocks: &[Block], place: &Place, law: &Law) -> Totals {
     by_wall!(place, totals_of, blocks, place, law)
 }
 
-pub(super) fn advance(block: &Block, place: &Place, law: &Law) -> (Lanes, Lanes) {
-    by_wall!(place, advance_of, block, place, law)
+pub(super) fn advance(
+    blocks: &[Block],
+    place: &Place,
+    law: &Law,
+    store: impl FnMut(usize, Lanes, Lanes),
+) {
+    by_wall!(place, advance_of, blocks, place, law, store);
 }
