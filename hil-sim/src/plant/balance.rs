@@ -94,15 +94,36 @@ impl Balance {
     pub fn solve(&self, ring: &mut Ring, motion: Motion) -> Result<Solved, BalanceError> {
         let radius = ring.parameters().radius_mm;
         let (mut low, mut high) = (0.2 * radius, 1.1 * radius + motion.wall.rise_mm);
-        let tolerance = 1e-9 * self.preload_n.max(1.0);
-        let at = |height_mm: f64| Motion { height_mm, ..motion };
+        let scale = self.preload_n.max(1.0);
         let mut height = motion.height_mm.clamp(low, high);
-        // The guess seldom balances: only what the next height needs.
-        let (forces, slopes) = ring.forces(&at(height));
-        let mut trial = self.residual(forces, slopes, height - radius);
         let (mut best, mut best_residual) = (None, f64::INFINITY);
+        // So far off, the next height will not balance either: only what leads on from it
+        // is computed.
+        let mut far = true;
         for _ in 0..80 {
-            let (residual, slope, _) = trial;
+            let at = Motion { height_mm: height, ..motion };
+            let whole = if far { None } else { Some(ring.trial(&at)) };
+            let (forces, slopes) = match &whole {
+                Some(contact) => ((contact.cosine_n, contact.sine_n), contact.slope),
+                None => ring.forces(&at),
+            };
+            let (residual, slope, utilisation) = self.residual(forces, slopes, height - radius);
+            if let Some(contact) = whole
+                && residual.abs() < best_residual
+            {
+                best_residual = residual.abs();
+                best = Some(Solved { height_mm: height, contact, utilisation });
+            }
+            // Carried; or closed in on a kink, or on an end without a balance.
+            let closed = high - low < 1e-13 * radius;
+            if !far && (residual.abs() <= 1e-9 * scale || closed) {
+                break;
+            }
+            if far && (residual.abs() <= 1e-9 * scale || closed) {
+                far = false;
+                continue;
+            }
+            far = residual.abs() > 1e-4 * scale;
             // Too much force: the centre must stand higher.
             if residual > 0.0 {
                 low = height;
@@ -110,26 +131,13 @@ impl Balance {
                 high = height;
             }
             let newton = height - residual / slope;
-            height = if slope < 0.0 && newton >= low && newton <= high {
+            height = if slope < 0.0 && newton > low && newton < high {
                 newton
             } else {
                 0.5 * (low + high)
             };
-            let contact = ring.trial(&at(height));
-            let forces = (contact.cosine_n, contact.sine_n);
-            trial = self.residual(forces, contact.slope, height - radius);
-            let (residual, _, utilisation) = trial;
-            if residual.abs() < best_residual {
-                best_residual = residual.abs();
-                best = Some(Solved { height_mm: height, contact, utilisation });
-            }
-            // Carried; or closed in on a kink, or on an end without a balance.
-            if residual.abs() <= tolerance || high - low < 1e-13 * radius {
-                break;
-            }
         }
-        let allowed = 1e-3 * self.preload_n.max(1.0);
-        best.filter(|_| best_residual <= allowed).ok_or(BalanceError {
+        best.filter(|_| best_residual <= 1e-3 * scale).ok_or(BalanceError {
             preload_n: self.preload_n,
             residual_n: best_residual,
             height_mm: best.map_or(height, |solved| solved.height_mm),

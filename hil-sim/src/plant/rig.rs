@@ -1,6 +1,7 @@
 //! The whole rig, a millisecond at a time.
 
 mod contact;
+mod phases;
 mod traction;
 
 use std::f64::consts::TAU;
@@ -14,6 +15,8 @@ use super::ring::Ring;
 use super::rolling::{self, Steady};
 use contact::Calm;
 use traction::Gait;
+
+pub use phases::{PHASES, Phase, PhaseWork};
 
 /// Most ring steps in a call: 5 mm of way at the usual stride.
 const MOST_STRIDES: f64 = 256.0;
@@ -143,12 +146,18 @@ pub struct VirtualRig {
     rolled_mm_s: f64,
     /// Base of the wall under the centre in the last stride, mm.
     base_mm: f64,
+    /// What was computed in each phase.
+    phases: [PhaseWork; PHASES.len()],
     /// Contact forces of the last stride: normal, cosine and sine sums, N.
     forces: (f64, f64, f64),
     /// Acceleration of the tread, mm/s^2.
     acceleration: f64,
     /// Rise of the centre per axial way in the last stride.
     slope: f64,
+    /// The part of it that no change of load explains.
+    drift: f64,
+    /// Derivatives of the resolved contact's cosine and sine sums by the height, N/mm.
+    stiffness: Option<(f64, f64)>,
 }
 
 impl VirtualRig {
@@ -196,9 +205,12 @@ impl VirtualRig {
             parked: true,
             rolled_mm_s: 0.0,
             base_mm: local.base_mm,
+            phases: Default::default(),
             forces: (rest.normal_n, rest.cosine_n, 0.0),
             acceleration: 0.0,
             slope: 0.0,
+            drift: 0.0,
+            stiffness: None,
             parameters,
         };
         rig.derive();
@@ -209,6 +221,14 @@ impl VirtualRig {
     #[must_use]
     pub fn with_resolution(mut self, resolution: Resolution) -> Self {
         self.resolution = resolution;
+        self
+    }
+
+    /// The same rig with every ring element visited that faces the wall, in reach or not.
+    /// No bit of any result depends on it: it proves that what is skipped is not needed.
+    #[must_use]
+    pub fn visiting_all(mut self) -> Self {
+        self.ring = self.ring.whole(true);
         self
     }
 
@@ -240,9 +260,11 @@ impl VirtualRig {
         self.check()?;
         let way = self.truth.tread_mm_s.abs().max(self.truth.speed_mm_s.abs()) * dt_s;
         let parts = (way / self.resolution.stride_mm).ceil().clamp(1.0, MOST_STRIDES);
+        let before = self.work();
         for _ in 0..parts as usize {
             self.roll(dt_s / parts)?;
         }
+        self.count(&before, dt_s);
         self.vibrate(dt_s);
         self.truth.time_s += dt_s;
         self.derive();
@@ -290,7 +312,7 @@ impl VirtualRig {
         self.truth.rotation_rad += turn;
         let local = self.parameters.wall.local(position);
         let settled = self.settled(&local, axial, dt_s);
-        if self.resolution.always_awake || !settled || self.near_step(&local) {
+        if self.resolution.always_awake || !settled {
             if !self.awake {
                 self.wake(before);
             }

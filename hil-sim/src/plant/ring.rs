@@ -111,6 +111,18 @@ impl std::ops::AddAssign for Work {
     }
 }
 
+impl std::ops::Sub for Work {
+    type Output = Self;
+
+    fn sub(self, before: Self) -> Self {
+        Self {
+            strides: self.strides - before.strides,
+            iterations: self.iterations - before.iterations,
+            elements: self.elements - before.elements,
+        }
+    }
+}
+
 /// The ring's elements and how far the wheel has turned.
 #[derive(Clone, Debug)]
 pub struct Ring {
@@ -178,13 +190,15 @@ impl Ring {
         let pitch = TAU / count as f64;
         let lanes = |of: fn(f64) -> f64| -> Vec<Lanes> {
             let at = |i: usize| if i < count { of(i as f64 * pitch) } else { 0.0 };
-            (0..blocks).map(|block| std::array::from_fn(|lane| at(block * LANES + lane))).collect()
+            (0..blocks)
+                .map(|block| std::array::from_fn(|lane| at(block * LANES + lane)).into())
+                .collect()
         };
         Self {
             sin: lanes(f64::sin),
             cos: lanes(f64::cos),
-            q: vec![[0.0; LANES]; blocks],
-            depth: vec![[0.0; LANES]; blocks],
+            q: vec![Lanes::ZERO; blocks],
+            depth: vec![Lanes::ZERO; blocks],
             at: vec![0.0; blocks],
             active: Window::default(),
             rotation: 0.0,
@@ -270,10 +284,9 @@ impl Ring {
         // Out of reach: let go of within this step.
         for number in active.blocks().filter(|number| !ready.window.contains(*number)) {
             let index = number.rem_euclid(count) as usize;
-            for lane in 0..LANES {
-                q[index][lane] = law.carried(q[index][lane], depth[index][lane]);
-            }
-            depth[index] = [0.0; LANES];
+            q[index] =
+                Lanes::splat(law.keep) * q[index] + Lanes::splat(law.from_old) * depth[index];
+            depth[index] = Lanes::ZERO;
             at[index] = end;
         }
         self.active = self.ready.window;
@@ -287,8 +300,8 @@ impl Ring {
     /// down (rad) of at most `within_rad`: depth and internal displacement, both mm, at
     /// time `time_s`. Elsewhere it is unloaded and fresh.
     pub fn seed(&mut self, time_s: f64, within_rad: f64, profile: impl Fn(f64) -> (f64, f64)) {
-        self.q.fill([0.0; LANES]);
-        self.depth.fill([0.0; LANES]);
+        self.q.fill(Lanes::ZERO);
+        self.depth.fill(Lanes::ZERO);
         self.at.fill(time_s);
         self.rotation = 0.0;
         self.time = time_s;
@@ -299,14 +312,16 @@ impl Ring {
         let pitch = self.pitch();
         for number in self.active.blocks() {
             let index = number.rem_euclid(self.q.len() as i64) as usize;
+            let (mut depths, mut qs) = ([0.0; LANES], [0.0; LANES]);
             for lane in 0..LANES {
                 let element = index * LANES + lane;
                 if element < self.parameters.elements {
                     let angle = element as f64 * pitch;
                     let angle = angle - TAU * (angle / TAU).round();
-                    (self.depth[index][lane], self.q[index][lane]) = profile(angle);
+                    (depths[lane], qs[lane]) = profile(angle);
                 }
             }
+            (self.depth[index], self.q[index]) = (depths.into(), qs.into());
         }
         self.ready.of = None;
     }
@@ -393,34 +408,37 @@ impl Ring {
         let Self { ready, active, law, q, depth, at, sin, cos, parameters, time, .. } = self;
         let count = q.len() as i64;
         let (turned_sin, turned_cos) = turned.sin_cos();
+        let (turned_sin, turned_cos) = (Lanes::splat(turned_sin), Lanes::splat(turned_cos));
+        let (keep, from_old) = (Lanes::splat(law.keep), Lanes::splat(law.from_old));
+        let (radius, ahead) = (Lanes::splat(parameters.radius_mm), Lanes::splat(ahead));
+        let (away, facing) = (Lanes::splat(AWAY), Lanes::splat(0.05));
         let step = ready.rise.is_some();
         ready.blocks.clear();
         ready.indices.clear();
         for number in ready.window.blocks() {
             let index = number.rem_euclid(count) as usize;
-            let mut block = Block::default();
-            if !active.contains(number) && q[index] != [0.0; LANES] {
+            if !active.contains(number) && q[index] != Lanes::ZERO {
                 // Out of contact since: only the memory has decayed.
-                let keep = (-(*time - at[index]) / parameters.tau_s).exp();
-                q[index] = q[index].map(|q| if (q * keep).abs() > 1e-200 { q * keep } else { 0.0 });
+                let kept = (-(*time - at[index]) / parameters.tau_s).exp();
+                let decayed = q[index] * Lanes::splat(kept);
+                q[index] = decayed & decayed.abs().simd_gt(Lanes::splat(1e-200));
                 at[index] = *time;
             }
-            for lane in 0..LANES {
-                let (s, c) = (sin[index][lane], cos[index][lane]);
-                let (sin, cos) = (s * turned_cos - c * turned_sin, c * turned_cos + s * turned_sin);
-                block.sin[lane] = sin;
-                block.cos[lane] = cos;
-                block.sec[lane] = if cos > 0.05 { 1.0 / cos } else { AWAY };
-                block.carried[lane] = law.carried(q[index][lane], depth[index][lane]);
-            }
-            if step {
-                for lane in 0..LANES {
-                    let sin = block.sin[lane];
-                    block.face[lane] =
-                        if sin > 1e-9 { parameters.radius_mm - ahead / sin } else { -AWAY };
-                }
-            }
-            ready.blocks.push(block);
+            let (s, c) = (sin[index], cos[index]);
+            let (sin, cos) = (s * turned_cos - c * turned_sin, c * turned_cos + s * turned_sin);
+            let face = if step {
+                let depth = radius - ahead / sin;
+                sin.simd_gt(Lanes::splat(1e-9)).bitselect(depth, -away)
+            } else {
+                -away
+            };
+            ready.blocks.push(Block {
+                cos,
+                sin,
+                sec: cos.simd_gt(facing).bitselect(Lanes::ONE / cos, away),
+                face,
+                carried: keep * q[index] + from_old * depth[index],
+            });
             ready.indices.push(index);
         }
     }

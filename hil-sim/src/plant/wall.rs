@@ -41,6 +41,13 @@ pub struct Edge {
 }
 
 impl Edge {
+    /// Its sine and cosine.
+    #[inline]
+    #[must_use]
+    pub(super) fn direction(&self) -> (f64, f64) {
+        (self.sin, self.cos)
+    }
+
     /// Part of an element `pitch` wide (rad) that does not reach past the edge, given
     /// sine and cosine of its angle. The wall ends there at once; without this a whole
     /// element would.

@@ -9,11 +9,12 @@ use crate::plant::ring::{Contact, Motion};
 use crate::plant::rolling::{self, Rolling};
 use crate::plant::wall::LocalWall;
 
-/// Axial reach kept around step and edge when the ring wakes, mm.
-const REACH_MM: f64 = 1.0;
+/// Distance kept from corner and edge when the ring wakes, mm: more than the wheel sinks
+/// or rolls in a stride.
+const REACH_MM: f64 = 0.5;
 
-/// Depth that the tread may gain on its way to a step, mm.
-const SUNK_MM: f64 = 1.5;
+/// Largest change of height in a stride that is foreseen by the last contact, mm.
+const FORESEEN_MM: f64 = 0.05;
 
 /// Change of tread speed or radial force that ends steady rolling, relative, and for the
 /// speed also absolute, mm/s.
@@ -33,19 +34,24 @@ pub(super) struct Calm {
 }
 
 impl VirtualRig {
-    /// Whether speed and radial force have stood long enough for steady rolling.
+    /// Whether speed and radial force have stood long enough, and away from any step, for
+    /// steady rolling.
     pub(super) fn settled(&mut self, local: &LocalWall, axial: Axial, dt_s: f64) -> bool {
         let (tread, pressing) = (self.truth.tread_mm_s, self.balance(local, axial).preload_n);
+        let near = self.near_step(local);
         let calm = &mut self.calm;
         let most = UNSTEADY_PART * calm.tread_mm_s.abs() + UNSTEADY_MM_S;
         let same = (tread - calm.tread_mm_s).abs() <= most
             && (pressing - calm.pressing_n).abs() <= UNSTEADY_PART * calm.pressing_n;
-        if same {
+        if same && !near {
             calm.for_s += dt_s;
         } else {
             *calm = Calm { tread_mm_s: tread, pressing_n: pressing, for_s: 0.0 };
         }
-        calm.for_s > FORGETS * self.parameters.ring.tau_s
+        let for_s = calm.for_s;
+        // What is now under the wheel came in since.
+        let patch = self.patch_mm(self.truth.height_mm - self.base_mm);
+        for_s > FORGETS * self.parameters.ring.tau_s || for_s * tread.abs() > 2.0 * patch
     }
 
     /// Radial balance over this wall: screw, spring, arm modes, and the wedge of a
@@ -63,14 +69,21 @@ impl VirtualRig {
         }
     }
 
-    /// Whether the wheel may touch a step, or an edge may lie under its patch.
+    /// Whether the wheel all but touches a step, or an edge all but lies under its patch.
     pub(super) fn near_step(&self, local: &LocalWall) -> bool {
+        let reach = self.parameters.ring.radius_mm + REACH_MM;
+        let height = self.truth.height_mm - local.base_mm;
+        let over = height - local.rise_mm;
+        let (ahead, behind) = (local.ahead_mm, local.behind_mm - REACH_MM);
+        // By the corner, or by the face where the centre is lower than that.
+        let corner = if over > 0.0 { over * over } else { 0.0 };
+        ahead * ahead + corner < reach * reach || behind < self.patch_mm(height)
+    }
+
+    /// Half the length of the patch at this height above the wall, mm.
+    pub(super) fn patch_mm(&self, height_mm: f64) -> f64 {
         let radius = self.parameters.ring.radius_mm;
-        let sunk = self.truth.depth_mm.max(SUNK_MM);
-        let patch = (radius * radius - (radius - sunk).powi(2)).sqrt();
-        let below = (radius - sunk - local.rise_mm).max(0.0);
-        let run = (radius * radius - below * below).sqrt();
-        local.ahead_mm < run + REACH_MM || local.behind_mm < patch + REACH_MM
+        (radius * radius - height_mm * height_mm).max(0.0).sqrt()
     }
 
     /// Brings the ring into the state of steady rolling.
@@ -103,9 +116,12 @@ impl VirtualRig {
         dt_s: f64,
     ) -> Result<(), PlantError> {
         let way = self.truth.speed_mm_s * dt_s;
+        // Foreseen: what the way has brought, and what the new load brings by the last
+        // contact's stiffness.
+        let sunk = self.sinks(local, axial);
         let motion = Motion {
             wall: *local,
-            height_mm: self.truth.height_mm - local.base_mm + self.slope * way,
+            height_mm: self.truth.height_mm - local.base_mm + self.drift * way + sunk,
             turn_rad: turn,
             dt_s,
         };
@@ -115,7 +131,9 @@ impl VirtualRig {
         if way.abs() > 1e-6 {
             let rise = solved.height_mm + local.base_mm - self.truth.height_mm;
             self.slope = rise / way;
+            self.drift = (rise - sunk) / way;
         }
+        self.stiffness = Some(solved.contact.slope);
         self.take(local, &solved);
         self.truth.ring_awake = true;
         self.truth.preload_n = self.preload_now();
@@ -134,6 +152,17 @@ impl VirtualRig {
         Ok(())
     }
 
+    /// Change of the height, mm, by which the last contact would carry the present load.
+    fn sinks(&self, local: &LocalWall, axial: Axial) -> f64 {
+        let Some(slopes) = self.stiffness else { return 0.0 };
+        let (_, cosine, sine) = self.forces;
+        let lift = self.truth.height_mm - local.base_mm - self.parameters.ring.radius_mm;
+        let (residual, slope, _) =
+            self.balance(local, axial).residual((cosine, sine), slopes, lift);
+        let change = -residual / slope;
+        if change.abs() < FORESEEN_MM { change } else { 0.0 }
+    }
+
     /// Radial balance of steady rolling on the continuous wall.
     pub(super) fn roll_steadily(
         &mut self,
@@ -143,7 +172,7 @@ impl VirtualRig {
         let guess = self.truth.height_mm - self.base_mm;
         let solved = self.bear(axial, |rig, axial| rig.roll_balanced(local, axial, guess))?;
         self.rolled_mm_s = self.truth.tread_mm_s;
-        self.slope = 0.0;
+        (self.slope, self.drift, self.stiffness) = (0.0, 0.0, None);
         self.take(local, &solved);
         self.truth.ring_awake = false;
         Ok(())

@@ -37,12 +37,6 @@ impl Law {
         let tangent = parameters.k_inf + excess * (1.0 - from_new);
         Self { dt_s, excess, keep, from_old, from_new, tangent }
     }
-
-    /// Internal displacement at the step's end but for the part of the new depth.
-    #[inline]
-    pub(super) fn carried(&self, q: f64, old: f64) -> f64 {
-        self.keep * q + self.from_old * old
-    }
 }
 
 #[cfg(test)]
@@ -55,7 +49,7 @@ mod tests {
     }
 
     fn advance(law: &Law, q: f64, old: f64, new: f64) -> f64 {
-        law.carried(q, old) + law.from_new * new
+        law.keep * q + law.from_old * old + law.from_new * new
     }
 
     proptest! {

@@ -6,12 +6,13 @@
 //! once a step, and every height tried costs one pass over it. The lanes are added up by
 //! their place in the block, so that blocks which do not touch change no bit of a sum.
 
+use wide::f64x4;
+
 use super::super::wall::Edge;
 use super::law::Law;
-use super::window::LANES;
 
 /// A number per element of a block.
-pub(super) type Lanes = [f64; LANES];
+pub(super) type Lanes = f64x4;
 
 /// What a block brings into a step.
 #[derive(Clone, Copy, Debug, Default)]
@@ -39,43 +40,79 @@ pub(super) struct Place {
     pub(super) edge: Option<(Edge, f64, f64)>,
 }
 
-/// Depth of an element, what of its width it is met on, and the depth of the rest.
+/// Place and law, a number for every lane.
+#[derive(Clone, Copy)]
+struct Given {
+    radius: Lanes,
+    height: Lanes,
+    rise: Lanes,
+    edge: (Lanes, Lanes),
+    drop: Lanes,
+    per_pitch: Lanes,
+    tangent: Lanes,
+    excess: Lanes,
+    from_new: Lanes,
+}
+
+impl Given {
+    fn new(place: &Place, law: &Law) -> Self {
+        let ((sin, cos), drop, pitch) = place
+            .edge
+            .map_or(((1.0, 0.0), 0.0, 1.0), |(edge, drop, pitch)| (edge.direction(), drop, pitch));
+        Self {
+            radius: Lanes::splat(place.radius),
+            height: Lanes::splat(place.height),
+            rise: Lanes::splat(place.rise.unwrap_or(0.0)),
+            edge: (Lanes::splat(sin), Lanes::splat(cos)),
+            drop: Lanes::splat(drop),
+            per_pitch: Lanes::splat(1.0 / pitch),
+            tangent: Lanes::splat(law.tangent),
+            excess: Lanes::splat(law.excess),
+            from_new: Lanes::splat(law.from_new),
+        }
+    }
+}
+
+/// Depth of the elements, what they meet, and of the edge behind: what of their width it
+/// leaves on the near wall, and their depth at the wall behind.
 #[derive(Clone, Copy)]
 struct Met {
-    depth: f64,
-    /// On the step ahead, and there on its face.
-    step: bool,
-    face: bool,
-    covered: f64,
-    /// Depth at the wall behind the edge, mm.
-    behind: f64,
+    depth: Lanes,
+    /// Mask: on the step ahead.
+    step: Lanes,
+    /// Mask: there on its face.
+    face: Lanes,
+    covered: Lanes,
+    behind: Lanes,
 }
 
 #[inline(always)]
-fn meet<const STEP: bool, const EDGE: bool>(block: &Block, lane: usize, place: &Place) -> Met {
-    let sec = block.sec[lane];
-    let floor = place.radius - place.height * sec;
-    let mut met = Met { depth: floor, step: false, face: false, covered: 1.0, behind: 0.0 };
+fn meet<const STEP: bool, const EDGE: bool>(block: &Block, g: &Given) -> Met {
+    let floor = g.radius - g.height * block.sec;
+    let none = Lanes::ZERO;
+    let mut met = Met { depth: floor, step: none, face: none, covered: Lanes::ONE, behind: none };
     if STEP {
-        let top = floor + place.rise.unwrap_or(0.0) * sec;
-        let face = block.face[lane];
-        let step = if face < top { face } else { top };
-        met.step = step > floor;
-        met.face = met.step & (face < top);
-        met.depth = if met.step { step } else { floor };
+        let top = floor + g.rise * block.sec;
+        let on_face = block.face.simd_lt(top);
+        let step = on_face.bitselect(block.face, top);
+        met.step = step.simd_gt(floor);
+        met.face = met.step & on_face;
+        met.depth = met.step.bitselect(step, floor);
     }
-    if EDGE && let Some((edge, drop, pitch)) = &place.edge {
-        met.covered = edge.covered(block.sin[lane], block.cos[lane], *pitch);
-        met.behind = floor - drop * sec;
+    if EDGE {
+        let within = (g.edge.0 * block.cos + g.edge.1 * block.sin) * g.per_pitch;
+        met.covered = (within + Lanes::HALF).fast_max(Lanes::ZERO).fast_min(Lanes::ONE);
+        met.behind = floor - g.drop * block.sec;
     }
     met
 }
 
-/// Pressure, nought where there is no depth or no pressure.
+/// Pressure, and the mask of where there is some: depth, and nothing pulls.
 #[inline(always)]
-fn press(law: &Law, depth: f64, carried: f64) -> f64 {
-    let pressure = law.tangent * depth - law.excess * carried;
-    if (depth > 0.0) & (pressure > 0.0) { pressure } else { 0.0 }
+fn press(g: &Given, depth: Lanes, carried: Lanes) -> (Lanes, Lanes) {
+    let pressure = g.tangent * depth - g.excess * carried;
+    let touches = depth.simd_gt(Lanes::ZERO) & pressure.simd_gt(Lanes::ZERO);
+    (pressure & touches, touches)
 }
 
 /// Cosine and sine sums of the pressure, N/mm^2, and their derivatives by height.
@@ -98,33 +135,40 @@ pub(super) struct Totals {
     pub(super) floor_pressure: f64,
 }
 
-fn total(lanes: &Lanes) -> f64 {
-    lanes.iter().sum()
+fn total(lanes: Lanes) -> f64 {
+    lanes.to_array().iter().sum()
+}
+
+/// Pressure of a block, its stiffness against the height, and its part in contact.
+#[inline(always)]
+fn bear<const EDGE: bool>(block: &Block, g: &Given, met: &Met) -> (Lanes, Lanes, Lanes) {
+    let (mut pressure, touches) = press(g, met.depth, block.carried);
+    // On the face the depth does not change with the height.
+    let mut moves = g.tangent & touches & !met.face;
+    let mut part = Lanes::ONE & touches;
+    if EDGE {
+        let (behind, there) = press(g, met.behind, block.carried);
+        let rest = Lanes::ONE - met.covered;
+        pressure = met.covered * pressure + rest * behind;
+        moves = met.covered * moves + rest * (g.tangent & there);
+        part = met.covered * part + (rest & there);
+    }
+    (pressure, moves, part)
 }
 
 #[inline(always)]
 fn sums_of<const STEP: bool, const EDGE: bool>(blocks: &[Block], place: &Place, law: &Law) -> Sums {
-    let [mut c, mut s, mut dc, mut ds] = [[0.0; LANES]; 4];
+    let g = Given::new(place, law);
+    let [mut c, mut s, mut dc, mut ds] = [Lanes::ZERO; 4];
     for block in blocks {
-        for lane in 0..LANES {
-            let met = meet::<STEP, EDGE>(block, lane, place);
-            let mut pressure = press(law, met.depth, block.carried[lane]);
-            // On the face the depth does not change with the height.
-            let mut moves = if (pressure > 0.0) & !met.face { law.tangent } else { 0.0 };
-            if EDGE {
-                let behind = press(law, met.behind, block.carried[lane]);
-                let rest = 1.0 - met.covered;
-                let also = if behind > 0.0 { law.tangent } else { 0.0 };
-                pressure = met.covered * pressure + rest * behind;
-                moves = met.covered * moves + rest * also;
-            }
-            c[lane] += pressure * block.cos[lane];
-            s[lane] += pressure * block.sin[lane];
-            dc[lane] -= moves;
-            ds[lane] -= moves * (block.sin[lane] * block.sec[lane]);
-        }
+        let met = meet::<STEP, EDGE>(block, &g);
+        let (pressure, moves, _) = bear::<EDGE>(block, &g, &met);
+        c += pressure * block.cos;
+        s += pressure * block.sin;
+        dc -= moves;
+        ds -= moves * (block.sin * block.sec);
     }
-    Sums { forces: (total(&c), total(&s)), slope: (total(&dc), total(&ds)) }
+    Sums { forces: (total(c), total(s)), slope: (total(dc), total(ds)) }
 }
 
 #[inline(always)]
@@ -133,53 +177,41 @@ fn totals_of<const STEP: bool, const EDGE: bool>(
     place: &Place,
     law: &Law,
 ) -> Totals {
-    let [mut normal, mut fc, mut fs, mut sc, mut ss] = [[0.0; LANES]; 5];
-    let [mut dc, mut ds, mut count] = [[0.0; LANES]; 3];
-    let mut highest = [f64::NEG_INFINITY; LANES];
+    let g = Given::new(place, law);
+    let least = Lanes::splat(f64::NEG_INFINITY);
+    let [mut normal, mut fc, mut fs, mut sc, mut ss] = [Lanes::ZERO; 5];
+    let [mut dc, mut ds, mut count] = [Lanes::ZERO; 3];
+    let mut highest = least;
     for block in blocks {
-        for lane in 0..LANES {
-            let (sin, cos) = (block.sin[lane], block.cos[lane]);
-            let met = meet::<STEP, EDGE>(block, lane, place);
-            let raw = law.tangent * met.depth - law.excess * block.carried[lane];
-            let mut pressure = press(law, met.depth, block.carried[lane]);
-            let mut one = if pressure > 0.0 { 1.0 } else { 0.0 };
-            let mut moves = if (pressure > 0.0) & !met.face { law.tangent } else { 0.0 };
-            let on_floor = (met.depth > 0.0) & !met.step;
-            let mut top = if on_floor { raw } else { f64::NEG_INFINITY };
-            if EDGE {
-                let behind = press(law, met.behind, block.carried[lane]);
-                let rest = 1.0 - met.covered;
-                if met.covered <= 0.0 {
-                    top = if behind > 0.0 { behind } else { f64::NEG_INFINITY };
-                }
-                let also = if behind > 0.0 { 1.0 } else { 0.0 };
-                pressure = met.covered * pressure + rest * behind;
-                moves = met.covered * moves + rest * also * law.tangent;
-                one = met.covered * one + rest * also;
-            }
-            let (floor, step) = if met.step { (0.0, pressure) } else { (pressure, 0.0) };
-            normal[lane] += pressure;
-            fc[lane] += floor * cos;
-            fs[lane] += floor * sin;
-            sc[lane] += step * cos;
-            ss[lane] += step * sin;
-            count[lane] += one;
-            dc[lane] -= moves;
-            ds[lane] -= moves * (sin * block.sec[lane]);
-            highest[lane] = if top > highest[lane] { top } else { highest[lane] };
-        }
+        let met = meet::<STEP, EDGE>(block, &g);
+        let (pressure, moves, part) = bear::<EDGE>(block, &g, &met);
+        let (floor, step) = (pressure & !met.step, pressure & met.step);
+        normal += pressure;
+        fc += floor * block.cos;
+        fs += floor * block.sin;
+        sc += step * block.cos;
+        ss += step * block.sin;
+        dc -= moves;
+        ds -= moves * (block.sin * block.sec);
+        count += part;
+        // Before the cut: what is in the floor, pressing or pulling.
+        let depth = if EDGE {
+            met.covered.simd_gt(Lanes::ZERO).bitselect(met.depth, met.behind)
+        } else {
+            met.depth
+        };
+        let raw = g.tangent * depth - g.excess * block.carried;
+        let on_floor = depth.simd_gt(Lanes::ZERO) & !met.step;
+        highest = highest.fast_max(on_floor.bitselect(raw, least));
     }
-    let (floor, step) = ((total(&fc), total(&fs)), (total(&sc), total(&ss)));
+    let (floor, step) = ((total(fc), total(fs)), (total(sc), total(ss)));
     Totals {
-        sums: Sums {
-            forces: (floor.0 + step.0, floor.1 + step.1),
-            slope: (total(&dc), total(&ds)),
-        },
-        normal: total(&normal),
+        sums: Sums { forces: (floor.0 + step.0, floor.1 + step.1), slope: (total(dc), total(ds)) },
+        normal: total(normal),
         floor,
         step,
-        count: total(&count),
-        floor_pressure: highest.into_iter().fold(f64::NEG_INFINITY, f64::max),
+        count: total(count),
+        floor_pressure: highest.to_array().into_iter().fold(f64::NEG_INFINITY, f64::max),
     }
 }
 
@@ -191,21 +223,23 @@ fn advance_of<const STEP: bool, const EDGE: bool>(
     law: &Law,
     mut store: impl FnMut(usize, Lanes, Lanes),
 ) {
+    let g = Given::new(place, law);
+    // What has all but decayed is gone, before it turns denormal and slow.
+    let gone = Lanes::splat(1e-200);
     for (index, block) in blocks.iter().enumerate() {
-        let (mut depths, mut qs) = ([0.0; LANES], [0.0; LANES]);
-        for lane in 0..LANES {
-            let met = meet::<STEP, EDGE>(block, lane, place);
-            let depth = if EDGE && met.covered <= 0.0 { met.behind } else { met.depth };
-            let depth = if depth > 0.0 { depth } else { 0.0 };
-            let q = block.carried[lane] + law.from_new * depth;
-            depths[lane] = depth;
-            // What has all but decayed is gone, before it turns denormal and slow.
-            qs[lane] = if q.abs() > 1e-200 { q } else { 0.0 };
-        }
-        store(index, depths, qs);
+        let met = meet::<STEP, EDGE>(block, &g);
+        let depth = if EDGE {
+            met.covered.simd_gt(Lanes::ZERO).bitselect(met.depth, met.behind)
+        } else {
+            met.depth
+        };
+        let depth = depth & depth.simd_gt(Lanes::ZERO);
+        let q = block.carried + g.from_new * depth;
+        store(index, depth, q & q.abs().simd_gt(gone));
     }
 }
 
+/// Picks the pass that looks at no more than what is in reach.
 macro_rules! by_wall {
     ($place:expr, $of:ident, $($argument:expr),*) => {
         match ($place.rise.is_some(), $place.edge.is_some()) {
@@ -225,6 +259,7 @@ pub(super) fn totals(blocks: &[Block], place: &Place, law: &Law) -> Totals {
     by_wall!(place, totals_of, blocks, place, law)
 }
 
+/// Calls with the block's number, its depths and its internal displacements.
 pub(super) fn advance(
     blocks: &[Block],
     place: &Place,
