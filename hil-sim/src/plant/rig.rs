@@ -18,7 +18,7 @@ use traction::Gait;
 
 pub use phases::{PHASES, Phase, PhaseWork};
 
-/// Most ring steps in a call: 5 mm of way at the usual stride.
+/// Most ring steps in a call: 10 mm of way at the usual stride.
 const MOST_STRIDES: f64 = 256.0;
 
 /// How finely the rig is computed.
@@ -32,7 +32,7 @@ pub struct Resolution {
 
 impl Default for Resolution {
     fn default() -> Self {
-        Self { stride_mm: 0.02, always_awake: false }
+        Self { stride_mm: 0.04, always_awake: false }
     }
 }
 
@@ -131,7 +131,7 @@ pub struct VirtualRig {
     preload: Pretightener,
     modes: Vec<Mode>,
     /// Sine and cosine of the ripple's phase.
-    phase: (f64, f64),
+    ripple_phase: (f64, f64),
     /// Elastic force of the modes, their mean, N.
     vibration_n: f64,
     /// Step, s, and what the drive keeps of its speed over it.
@@ -148,6 +148,7 @@ pub struct VirtualRig {
     base_mm: f64,
     /// What was computed in each phase.
     phases: [PhaseWork; PHASES.len()],
+    phase: Phase,
     /// Contact forces of the last stride: normal, cosine and sine sums, N.
     forces: (f64, f64, f64),
     /// Acceleration of the tread, mm/s^2.
@@ -191,7 +192,7 @@ impl VirtualRig {
             calm: Calm { tread_mm_s: 0.0, pressing_n: preload_n, for_s: f64::INFINITY },
             preload,
             modes,
-            phase: (0.0, 1.0),
+            ripple_phase: (0.0, 1.0),
             vibration_n: 0.0,
             keeps: (0.0, 1.0),
             truth: Truth {
@@ -206,6 +207,7 @@ impl VirtualRig {
             rolled_mm_s: 0.0,
             base_mm: local.base_mm,
             phases: Default::default(),
+            phase: Phase::Smooth,
             forces: (rest.normal_n, rest.cosine_n, 0.0),
             acceleration: 0.0,
             slope: 0.0,
@@ -332,7 +334,7 @@ impl VirtualRig {
         let force = Ripple {
             amplitude_n: if spin == 0.0 { 0.0 } else { amplitude },
             omega: TAU * spin / pitch,
-            from: std::mem::replace(&mut self.phase, to),
+            from: std::mem::replace(&mut self.ripple_phase, to),
             to,
         };
         let (mut deflection, mut sum) = (0.0, 0.0);

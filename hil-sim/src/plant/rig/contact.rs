@@ -16,10 +16,11 @@ const REACH_MM: f64 = 0.5;
 /// Largest change of height in a stride that is foreseen by the last contact, mm.
 const FORESEEN_MM: f64 = 0.05;
 
-/// Change of tread speed or radial force that ends steady rolling, relative, and for the
-/// speed also absolute, mm/s.
+/// Change of tread speed or radial force that ends steady rolling, relative and
+/// absolute, mm/s and N.
 const UNSTEADY_PART: f64 = 0.03;
 const UNSTEADY_MM_S: f64 = 0.01;
+const UNSTEADY_N: f64 = 1e-3;
 
 /// Relaxation times after which the tread has forgotten what came before; it knows
 /// nothing from before it came into the patch.
@@ -42,7 +43,7 @@ impl VirtualRig {
         let calm = &mut self.calm;
         let most = UNSTEADY_PART * calm.tread_mm_s.abs() + UNSTEADY_MM_S;
         let same = (tread - calm.tread_mm_s).abs() <= most
-            && (pressing - calm.pressing_n).abs() <= UNSTEADY_PART * calm.pressing_n;
+            && (pressing - calm.pressing_n).abs() <= UNSTEADY_PART * calm.pressing_n + UNSTEADY_N;
         if same && !near {
             calm.for_s += dt_s;
         } else {
@@ -169,10 +170,11 @@ impl VirtualRig {
         local: &LocalWall,
         axial: Axial,
     ) -> Result<(), PlantError> {
-        let guess = self.truth.height_mm - self.base_mm;
+        let guess = self.truth.height_mm - self.base_mm + self.sinks(local, axial);
         let solved = self.bear(axial, |rig, axial| rig.roll_balanced(local, axial, guess))?;
         self.rolled_mm_s = self.truth.tread_mm_s;
-        (self.slope, self.drift, self.stiffness) = (0.0, 0.0, None);
+        (self.slope, self.drift) = (0.0, 0.0);
+        self.stiffness = Some(solved.contact.slope);
         self.take(local, &solved);
         self.truth.ring_awake = false;
         Ok(())
@@ -191,7 +193,8 @@ impl VirtualRig {
             balance.residual((c.cosine_n, c.sine_n), (0.0, 0.0), lift)
         };
         let speed = self.truth.tread_mm_s;
-        let rolling = self.steady.solve(&ring, speed, guess_mm, |c| residual(c).0);
+        let spring = -balance.spring_n_per_mm;
+        let rolling = self.steady.solve(&ring, speed, guess_mm, spring, |c| residual(c).0);
         let (residual_n, _, utilisation) = residual(&rolling);
         let height_mm = rolling.height_mm;
         if residual_n.abs() > 1e-3 * balance.preload_n.max(1.0) {
@@ -205,6 +208,7 @@ impl VirtualRig {
             floor_n: rolling.cosine_n,
             depth_mm: ring.radius_mm - height_mm,
             area_mm2: rolling.area_mm2,
+            slope: (rolling.slope, rolling.slope * rolling.sine_n / rolling.cosine_n.max(1e-9)),
             ..Contact::default()
         };
         Ok(Solved { height_mm, contact, utilisation })

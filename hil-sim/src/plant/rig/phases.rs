@@ -44,9 +44,13 @@ pub struct PhaseWork {
 }
 
 impl VirtualRig {
-    /// What the contact is doing.
+    /// What the contact did in the last step.
     #[must_use]
     pub fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    fn doing(&self) -> Phase {
         let truth = &self.truth;
         let local = self.parameters.wall.local(truth.position_mm);
         let edge = || local.behind_mm < self.patch_mm(truth.height_mm - local.base_mm);
@@ -75,7 +79,8 @@ impl VirtualRig {
     /// Books what was computed since `before` under the present phase.
     pub(super) fn count(&mut self, before: &PhaseWork, dt_s: f64) {
         let now = self.work();
-        let phase = &mut self.phases[self.phase() as usize];
+        self.phase = self.doing();
+        let phase = &mut self.phases[self.phase as usize];
         phase.simulated_s += dt_s;
         phase.ring += now.ring - before.ring;
         phase.steady_computed += now.steady_computed - before.steady_computed;
