@@ -65,7 +65,14 @@ impl From<ControllerKind> for Strategy {
 /// [`RunError`] if the parameters are out of range or the plant fails. A run that
 /// ends in a fault is a result, not an error.
 pub fn run(scenario: &Scenario, options: Options) -> Result<Recording, RunError> {
-    let mut session = Session::new(scenario, options)?;
+    run_session(Session::new(scenario, options)?, scenario)
+}
+
+/// [`run`] of a session that has been made ready for this scenario.
+///
+/// # Errors
+/// [`RunError::Plant`] if the plant fails.
+pub fn run_session(mut session: Session, scenario: &Scenario) -> Result<Recording, RunError> {
     let mut start = Some(start_of(scenario));
     let started = Instant::now();
     while tick(&mut session, &mut start)?.is_some() {}

@@ -443,3 +443,6 @@ impl Ring {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -358,4 +358,43 @@ mod tests {
             );
         }
     }
+
+    #[test]
+    fn a_tangent_stands_in_for_what_is_near() {
+        for depth in [0.05, 0.3, 1.0] {
+            for speed in [0.0, 0.3, 8.0, 40.0, -8.0, 2000.0] {
+                let tangent = Tangent::new(&ring(), 25.0 - depth, speed).unwrap();
+                for (deeper, faster) in [(0.03, 0.03), (-0.03, 0.03), (0.03, -0.03), (0.0, 0.0)] {
+                    let (height, speed) = (25.0 - depth * (1.0 + deeper), speed * (1.0 + faster));
+                    assert!(tangent.holds(&ring(), height, speed * 0.9999));
+                    let (near, exact) =
+                        (tangent.at(&ring(), height, speed), at_height(&ring(), height, speed));
+                    let part = (near.cosine_n / exact.cosine_n - 1.0).abs();
+                    assert!(part < 2e-4, "{part} at {depth} mm, {speed} mm/s");
+                    assert!((near.sine_n - exact.sine_n).abs() < 2e-4 * exact.cosine_n);
+                    assert!((near.normal_n / exact.normal_n - 1.0).abs() < 2e-4);
+                    assert!((near.area_mm2 / exact.area_mm2 - 1.0).abs() < 0.04);
+                }
+                assert!(!tangent.holds(&ring(), 25.0 - 1.04 * depth, speed));
+            }
+        }
+        assert!(Tangent::new(&ring(), 25.0, 5.0).is_none());
+    }
+
+    #[test]
+    fn solved_again_and_again_it_stays_with_the_solution() {
+        let mut steady = Steady::default();
+        let mut height = 24.9;
+        for i in 0..2000 {
+            let t = f64::from(i) / 2000.0;
+            let (preload, speed) = (30.0 + 90.0 * t + 0.5 * (300.0 * t).sin(), 3.0 + 20.0 * t * t);
+            let at = steady.solve(&ring(), speed, height, 0.0, |c| c.cosine_n - preload);
+            height = at.height_mm;
+            assert!((at.cosine_n - preload).abs() < 1e-4 * preload, "{at:?} {preload}");
+            let exact = solve(&ring(), speed, height, |c| c.cosine_n - preload);
+            let part = (25.0 - height) / (25.0 - exact.height_mm) - 1.0;
+            assert!(part.abs() < 3e-4, "{part} at {preload} N, {speed} mm/s");
+        }
+        assert!(steady.work().0 < 100, "{:?}", steady.work());
+    }
 }
