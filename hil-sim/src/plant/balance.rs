@@ -58,6 +58,9 @@ pub struct BalanceError {
     pub height_mm: f64,
 }
 
+/// Part of the preload that is left unbalanced at most: a height of 1e-8 mm.
+const TOLERANCE: f64 = 3e-8;
+
 impl Balance {
     /// Residual of the radial balance, N, its slope, N/mm, and the utilisation, from
     /// the contact's cosine and sine sums, N, and their derivatives by height, N/mm.
@@ -95,6 +98,7 @@ impl Balance {
         let radius = ring.parameters().radius_mm;
         let (mut low, mut high) = (0.2 * radius, 1.1 * radius + motion.wall.rise_mm);
         let scale = self.preload_n.max(1.0);
+        let tolerance = TOLERANCE * scale;
         let mut height = motion.height_mm.clamp(low, high);
         let (mut best, mut best_residual) = (None, f64::INFINITY);
         // So far off, the next height will not balance either: only what leads on from it
@@ -116,10 +120,10 @@ impl Balance {
             }
             // Carried; or closed in on a kink, or on an end without a balance.
             let closed = high - low < 1e-13 * radius;
-            if !far && (residual.abs() <= 1e-9 * scale || closed) {
+            if !far && (residual.abs() <= tolerance || closed) {
                 break;
             }
-            if far && (residual.abs() <= 1e-9 * scale || closed) {
+            if far && (residual.abs() <= tolerance || closed) {
                 far = false;
                 continue;
             }

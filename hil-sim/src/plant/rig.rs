@@ -157,6 +157,8 @@ pub struct VirtualRig {
     slope: f64,
     /// The part of it that no change of load explains.
     drift: f64,
+    /// Rise that no change of load explains while the wheel stands, mm/s.
+    creep: f64,
     /// Derivatives of the resolved contact's cosine and sine sums by the height, N/mm.
     stiffness: Option<(f64, f64)>,
 }
@@ -212,6 +214,7 @@ impl VirtualRig {
             acceleration: 0.0,
             slope: 0.0,
             drift: 0.0,
+            creep: 0.0,
             stiffness: None,
             parameters,
         };

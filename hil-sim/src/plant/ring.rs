@@ -410,6 +410,7 @@ impl Ring {
         let (turned_sin, turned_cos) = turned.sin_cos();
         let (turned_sin, turned_cos) = (Lanes::splat(turned_sin), Lanes::splat(turned_cos));
         let (keep, from_old) = (Lanes::splat(law.keep), Lanes::splat(law.from_old));
+        let on_face = Lanes::splat(ahead / parameters.radius_mm).fast_max(Lanes::splat(1e-9));
         let (radius, ahead) = (Lanes::splat(parameters.radius_mm), Lanes::splat(ahead));
         let (away, facing) = (Lanes::splat(AWAY), Lanes::splat(0.05));
         let step = ready.rise.is_some();
@@ -426,9 +427,10 @@ impl Ring {
             }
             let (s, c) = (sin[index], cos[index]);
             let (sin, cos) = (s * turned_cos - c * turned_sin, c * turned_cos + s * turned_sin);
-            let face = if step {
-                let depth = radius - ahead / sin;
-                sin.simd_gt(Lanes::splat(1e-9)).bitselect(depth, -away)
+            // The face is touched where it is nearer than the radius.
+            let near = sin.simd_gt(on_face);
+            let face = if step && near.any() {
+                near.bitselect(radius - ahead / sin, -away)
             } else {
                 -away
             };

@@ -122,17 +122,22 @@ impl VirtualRig {
         let sunk = self.sinks(local, axial);
         let motion = Motion {
             wall: *local,
-            height_mm: self.truth.height_mm - local.base_mm + self.drift * way + sunk,
+            height_mm: self.truth.height_mm - local.base_mm
+                + self.drift * way
+                + self.creep * dt_s
+                + sunk,
             turn_rad: turn,
             dt_s,
         };
         let solved =
             self.bear(axial, |rig, axial| rig.balance(local, axial).solve(&mut rig.ring, motion))?;
         self.ring.commit(&Motion { height_mm: solved.height_mm, ..motion });
+        let rise = solved.height_mm + local.base_mm - self.truth.height_mm;
         if way.abs() > 1e-6 {
-            let rise = solved.height_mm + local.base_mm - self.truth.height_mm;
             self.slope = rise / way;
-            self.drift = (rise - sunk) / way;
+            (self.drift, self.creep) = ((rise - sunk) / way, 0.0);
+        } else {
+            (self.drift, self.creep) = (0.0, (rise - sunk) / dt_s);
         }
         self.stiffness = Some(solved.contact.slope);
         self.take(local, &solved);
@@ -173,7 +178,7 @@ impl VirtualRig {
         let guess = self.truth.height_mm - self.base_mm + self.sinks(local, axial);
         let solved = self.bear(axial, |rig, axial| rig.roll_balanced(local, axial, guess))?;
         self.rolled_mm_s = self.truth.tread_mm_s;
-        (self.slope, self.drift) = (0.0, 0.0);
+        (self.slope, self.drift, self.creep) = (0.0, 0.0, 0.0);
         self.stiffness = Some(solved.contact.slope);
         self.take(local, &solved);
         self.truth.ring_awake = false;

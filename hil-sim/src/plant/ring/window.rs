@@ -37,10 +37,7 @@ impl Window {
     }
 
     pub(super) fn blocks(self) -> impl Iterator<Item = i64> {
-        let [a, b] = self.ranges;
-        let second = if self.used > 1 { b.0..=b.1 } else { 1..=0 };
-        let first = if self.used > 0 { a.0..=a.1 } else { 1..=0 };
-        first.chain(second)
+        self.ranges.into_iter().take(self.used).flat_map(|(first, last)| first..=last)
     }
 
     /// At most this many blocks: a ring of few elements is all of it, once.
