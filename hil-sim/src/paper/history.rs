@@ -1,0 +1,212 @@
+//! Collision, impact and vibration over the three transitions of a deployment, from all
+//! three sources.
+
+use interstage::model::formula::Formula;
+use interstage::supervise::Direction;
+
+use super::case::Case;
+use super::experiment::{Experiment, Line, STAGES, groups};
+use super::figure::{Panel, Series, Source};
+use super::published::LOG_S;
+use super::simulation::{self, Moment};
+use super::theory::{self, Drive};
+use super::vibration::ArmResponse;
+use crate::plant::balance::BalanceError;
+
+/// Interval of theory and simulation, s.
+const INTERVAL_S: f64 = 0.02;
+
+/// Way behind a step within which the wheel has left its edge, mm.
+const LEFT_MM: f64 = 2.0;
+
+/// Points: time, s, and value.
+pub type Points = Vec<(f64, f64)>;
+
+/// What is followed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Axial force of corner and face, N.
+    Collision,
+    /// That force over the surface that the step cuts off, kPa.
+    Impact,
+    /// Deflection of the arm, um.
+    Vibration,
+}
+
+impl Quantity {
+    /// All three, in the order of cause and effect.
+    pub const ALL: [Self; 3] = [Self::Collision, Self::Impact, Self::Vibration];
+
+    /// Name and unit.
+    #[must_use]
+    pub const fn axis(self) -> &'static str {
+        match self {
+            Self::Collision => "collision, N",
+            Self::Impact => "impact, kPa",
+            Self::Vibration => "vibration, µm",
+        }
+    }
+
+    const fn index(self) -> usize {
+        self as usize
+    }
+}
+
+/// The histories of one case.
+#[derive(Clone, Debug)]
+pub struct Histories {
+    /// The case.
+    pub case: Case,
+    /// Of each quantity: reduced model, ring, and four means of the virtual rig.
+    of: [(Points, Points, Vec<Points>); 3],
+    /// Clearance from the root of the first step until the centre passes it: theory and
+    /// simulation.
+    pub clearance: (Points, Points),
+    /// The same from the virtual rig, four means.
+    pub clearance_means: Vec<Points>,
+    /// When the first step has been passed, s.
+    pub first_passed_s: f64,
+}
+
+impl Histories {
+    /// Theory and simulation of the experiment's case, and its four means.
+    ///
+    /// # Errors
+    /// [`BalanceError`] if a crossing of the ring cannot be balanced.
+    pub fn new(experiment: &Experiment) -> Result<Self, BalanceError> {
+        let case = experiment.case;
+        let rig = case.loads.rig();
+        let formula = Formula::new(&rig);
+        let gap = theory::mean_lift(&case, Drive::Driven).gap_mm;
+        let stiffness = formula.stiffness(Direction::Deploy, case.speed_mm_s, gap);
+        let deployed =
+            |elastic| simulation::deployment(&case, Drive::Driven, elastic, INTERVAL_S);
+        let (theory, ring) = (deployed(Some(stiffness))?, deployed(None)?);
+        let modes = rig.drive.modes_hz.to_vec();
+        let first_passed_s = rig.rig.step_positions_mm[0] / case.speed_mm_s;
+        let of = Quantity::ALL.map(|quantity| {
+            let history = |moments| follow(quantity, moments, &modes);
+            (history(&theory), history(&ring), means(experiment, |line| Some(pick(quantity, line))))
+        });
+        let clearance = |moments: &[Moment]| {
+            let before = moments.iter().take_while(|m| m.time_s < first_passed_s);
+            before.filter_map(|m| Some((m.time_s, m.clearance_mm?))).collect()
+        };
+        let clearance_means = means(experiment, |line| {
+            line.clearance_mm.filter(|_| line.time_s < first_passed_s - 0.2)
+        });
+        Ok(Self {
+            case,
+            of,
+            clearance: (clearance(&theory), clearance(&ring)),
+            clearance_means,
+            first_passed_s,
+        })
+    }
+
+    /// Values of a quantity from a source; of the experiment the mean of its means.
+    #[must_use]
+    pub fn points(&self, quantity: Quantity, source: Source) -> Points {
+        let (theory, simulation, means) = &self.of[quantity.index()];
+        match source {
+            Source::Theory => theory.clone(),
+            Source::Simulation => simulation.clone(),
+            _ => {
+                let count = means.len() as f64;
+                let sum = |i: usize| means.iter().map(|mean| mean[i].1).sum::<f64>();
+                (0..means[0].len()).map(|i| (means[0][i].0, sum(i) / count)).collect()
+            }
+        }
+    }
+
+    /// Largest value in each of the three transitions, and when it is reached.
+    #[must_use]
+    pub fn peaks(&self, quantity: Quantity, source: Source) -> [(f64, f64); STAGES] {
+        let points = self.points(quantity, source);
+        let steps = self.case.loads.rig().rig.step_positions_mm;
+        let ends: Vec<f64> =
+            steps.iter().map(|step| (step + LEFT_MM) / self.case.speed_mm_s).collect();
+        std::array::from_fn(|stage| {
+            let from = if stage == 0 { 0.0 } else { ends[stage - 1] };
+            let within = points.iter().filter(|p| p.0 >= from && p.0 < ends[stage]);
+            within.copied().fold((from, 0.0), |most, p| if p.1 > most.1 { p } else { most })
+        })
+    }
+
+    /// Largest value after the third transition over the largest of all.
+    #[must_use]
+    pub fn left_over(&self, quantity: Quantity, source: Source) -> f64 {
+        let points = self.points(quantity, source);
+        let steps = self.case.loads.rig().rig.step_positions_mm;
+        // A wheel's patch behind the last edge, and the arm's ring-down.
+        let after = (steps[STAGES - 1] + 3.0 * LEFT_MM) / self.case.speed_mm_s + 0.2;
+        let most = |from: f64| {
+            points.iter().filter(|p| p.0 >= from).map(|p| p.1.abs()).fold(0.0, f64::max)
+        };
+        most(after) / most(0.0)
+    }
+
+    /// The quantity as a plot.
+    #[must_use]
+    pub fn panel(&self, quantity: Quantity, title: String) -> Panel {
+        let (theory, simulation, means) = &self.of[quantity.index()];
+        let mut panel = Panel::new(title, "time, s", quantity.axis());
+        panel.series.push(Series::new(Source::Theory, theory.clone()));
+        panel.series.push(Series::new(Source::Simulation, simulation.clone()));
+        panel.series.extend(named(means));
+        panel
+    }
+
+    /// The clearance at the first step as a plot.
+    #[must_use]
+    pub fn clearance_panel(&self, title: String) -> Panel {
+        let mut panel = Panel::new(title, "time, s", "root clearance, mm");
+        panel.series.push(Series::new(Source::Theory, self.clearance.0.clone()));
+        panel.series.push(Series::new(Source::Simulation, self.clearance.1.clone()));
+        panel.series.extend(named(&self.clearance_means));
+        panel
+    }
+}
+
+fn named(means: &[Points]) -> impl Iterator<Item = Series> {
+    means.iter().enumerate().map(|(index, points)| Series {
+        name: format!("mean {}", index + 1),
+        ..Series::new(Source::Experiment, points.clone())
+    })
+}
+
+/// A quantity along a deployment of the ring.
+fn follow(quantity: Quantity, moments: &[Moment], modes_hz: &[f64]) -> Points {
+    let mut arm = ArmResponse::new(modes_hz);
+    let value = |moment: &Moment| match quantity {
+        Quantity::Collision => moment.collision_n,
+        Quantity::Impact => moment.impact_kpa,
+        Quantity::Vibration => 1e3 * arm.step(moment.collision_n, INTERVAL_S).abs(),
+    };
+    moments.iter().map(|moment| moment.time_s).zip(moments.iter().map(value)).collect()
+}
+
+fn pick(quantity: Quantity, line: &Line) -> f64 {
+    match quantity {
+        Quantity::Collision => line.collision_n,
+        Quantity::Impact => line.impact_kpa,
+        Quantity::Vibration => line.vibration_um,
+    }
+}
+
+/// The four means of a quantity of the log, as long as every run has it.
+fn means(experiment: &Experiment, pick: impl Fn(&Line) -> Option<f64>) -> Vec<Points> {
+    let runs = &experiment.runs;
+    let lines = runs.iter().map(|run| run.log.len()).min().unwrap_or(0);
+    let mean = |group: &Vec<usize>| {
+        (0..lines)
+            .filter_map(|line| {
+                let values: Option<Vec<f64>> =
+                    group.iter().map(|&rig| pick(&runs[rig].log[line])).collect();
+                let values = values?;
+                Some((line as f64 * LOG_S, values.iter().sum::<f64>() / values.len() as f64))
+            })
+            .collect()
+    };
+    groups().iter().map(mean).collect()
+}
