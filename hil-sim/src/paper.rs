@@ -106,7 +106,7 @@ pub fn regenerate(done: &(dyn Fn() + Sync)) -> Result<Study, StudyError> {
     };
     let four = histories(&cases::cases())?;
     let three = histories(&transitions::cases())?;
-    let amplitudes = Amplitudes::new(&find(&cases::cases()), &four)?;
+    let amplitudes = Amplitudes::new(&find(&cases::cases()))?;
     let modes = Modes::new()?;
     let preload = Sweep::new(Variable::Preload, &find(&Variable::Preload.cases()))?;
     let speed = Sweep::new(Variable::Speed, &find(&Variable::Speed.cases()))?;

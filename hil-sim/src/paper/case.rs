@@ -72,8 +72,7 @@ impl Case {
     pub fn pressing_n(&self, level: usize) -> f64 {
         let rig = self.loads.rig();
         let step = rig.rig.step_height_mm;
-        let centre =
-            rig.rig.wall_radius_mm - rig.rig.wheel_radius_mm - step * level as f64;
+        let centre = rig.rig.wall_radius_mm - rig.rig.wheel_radius_mm - step * level as f64;
         let arm = crate::plant::arm::Arm {
             length_mm: rig.rig.arm_length_mm,
             pivot_mm: rig.rig.arm_pivot_radius_mm,
@@ -92,6 +91,9 @@ impl Case {
         preload.cruise_n = self.preload_n;
         preload.limit_n = preload.limit_n.max(1.25 * self.preload_n);
         scenario.rig.drive.cruise_speed_mm_s = self.speed_mm_s;
+        // The safe speed may not lie above it; nothing here asks for a reference gap.
+        let safe = &mut scenario.rig.control.safe_speed_mm_s;
+        *safe = safe.min(self.speed_mm_s);
         scenario.run.controller = ControllerKind::Constant;
         scenario.run.seed = seed;
         scenario
@@ -115,6 +117,7 @@ mod tests {
         for case in [Case::new(Loads::Fe, 3.0, 120.0), Case::new(Loads::Prototype, 8.0, 50.0)] {
             let scenario = case.scenario(7);
             scenario.validate().unwrap();
+            interstage::model::Planner::try_build(&scenario.rig).unwrap();
             assert_eq!(scenario.rig.preload.cruise_n, case.preload_n);
         }
     }

@@ -13,8 +13,9 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use super::case::Case;
-use super::published::{LOG_S, RUNS, RUNS_OF_A_MEAN};
+use super::figure::Series;
 use super::measure::{CollisionGauge, impact_kpa};
+use super::published::{LOG_S, RUNS, RUNS_OF_A_MEAN};
 use super::theory::area_of_depth_mm2;
 use super::vibration::ArmResponse;
 use crate::plant::rig::VirtualRig;
@@ -103,6 +104,18 @@ pub fn groups() -> Vec<Vec<usize>> {
     let mut all: Vec<usize> = (0..RUNS).collect();
     all.shuffle(&mut ChaCha8Rng::seed_from_u64(CHOICE));
     all.chunks(RUNS_OF_A_MEAN).map(<[usize]>::to_vec).collect()
+}
+
+/// Adds the four means of `all`, by run, and their range to the marks at `x`.
+pub fn marks(x: f64, all: &[f64], series: &mut Series) {
+    for group in groups() {
+        let of: Vec<f64> = group.iter().filter_map(|&run| all.get(run).copied()).collect();
+        series.points.push((x, of.iter().sum::<f64>() / of.len() as f64));
+    }
+    let (low, high) = all
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| (low.min(*y), high.max(*y)));
+    series.range.push((x, low, high));
 }
 
 /// Runs every case on forty rigs; `done` is called after each run.
@@ -212,9 +225,8 @@ impl Watch {
             };
             let since = ((crossing.touch_s / 1e-3) as usize).min(tick);
             let preloads = self.ticks[since..=tick].iter().map(|tick| f64::from(tick.1));
-            let (low, high) = preloads.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), n| {
-                (a.min(n), b.max(n))
-            });
+            let (low, high) =
+                preloads.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), n| (a.min(n), b.max(n)));
             // The experimenter knows the drawing, not the rig as built.
             let depth_mm = f64::from(depth);
             self.run.crossings.push(Reading {

@@ -14,7 +14,10 @@ use super::vibration::ArmResponse;
 use crate::plant::balance::BalanceError;
 
 /// Interval of theory and simulation, s.
-const INTERVAL_S: f64 = 0.02;
+const INTERVAL_S: f64 = 0.01;
+
+/// Points of theory and simulation of which one is shown.
+const SHOWN_OF: usize = 4;
 
 /// Way behind a step within which the wheel has left its edge, mm.
 const LEFT_MM: f64 = 2.0;
@@ -45,6 +48,13 @@ impl Quantity {
             Self::Impact => "impact, kPa",
             Self::Vibration => "vibration, µm",
         }
+    }
+
+    /// Title of its plot for a case.
+    #[must_use]
+    pub fn title(self, case: &Case) -> String {
+        let letter = ["(a)", "(b)", "(c)"][self.index()];
+        format!("{letter} {}", case.name())
     }
 
     const fn index(self) -> usize {
@@ -79,8 +89,7 @@ impl Histories {
         let formula = Formula::new(&rig);
         let gap = theory::mean_lift(&case, Drive::Driven).gap_mm;
         let stiffness = formula.stiffness(Direction::Deploy, case.speed_mm_s, gap);
-        let deployed =
-            |elastic| simulation::deployment(&case, Drive::Driven, elastic, INTERVAL_S);
+        let deployed = |elastic| simulation::deployment(&case, Drive::Driven, elastic, INTERVAL_S);
         let (theory, ring) = (deployed(Some(stiffness))?, deployed(None)?);
         let modes = rig.drive.modes_hz.to_vec();
         let first_passed_s = rig.rig.step_positions_mm[0] / case.speed_mm_s;
@@ -123,9 +132,7 @@ impl Histories {
     #[must_use]
     pub fn peaks(&self, quantity: Quantity, source: Source) -> [(f64, f64); STAGES] {
         let points = self.points(quantity, source);
-        let steps = self.case.loads.rig().rig.step_positions_mm;
-        let ends: Vec<f64> =
-            steps.iter().map(|step| (step + LEFT_MM) / self.case.speed_mm_s).collect();
+        let ends = stage_ends_s(&self.case);
         std::array::from_fn(|stage| {
             let from = if stage == 0 { 0.0 } else { ends[stage - 1] };
             let within = points.iter().filter(|p| p.0 >= from && p.0 < ends[stage]);
@@ -137,9 +144,9 @@ impl Histories {
     #[must_use]
     pub fn left_over(&self, quantity: Quantity, source: Source) -> f64 {
         let points = self.points(quantity, source);
-        let steps = self.case.loads.rig().rig.step_positions_mm;
         // A wheel's patch behind the last edge, and the arm's ring-down.
-        let after = (steps[STAGES - 1] + 3.0 * LEFT_MM) / self.case.speed_mm_s + 0.2;
+        let after =
+            stage_ends_s(&self.case)[STAGES - 1] + 2.0 * LEFT_MM / self.case.speed_mm_s + 0.2;
         let most = |from: f64| {
             points.iter().filter(|p| p.0 >= from).map(|p| p.1.abs()).fold(0.0, f64::max)
         };
@@ -151,8 +158,8 @@ impl Histories {
     pub fn panel(&self, quantity: Quantity, title: String) -> Panel {
         let (theory, simulation, means) = &self.of[quantity.index()];
         let mut panel = Panel::new(title, "time, s", quantity.axis());
-        panel.series.push(Series::new(Source::Theory, theory.clone()));
-        panel.series.push(Series::new(Source::Simulation, simulation.clone()));
+        panel.series.push(Series::new(Source::Theory, thin(theory)));
+        panel.series.push(Series::new(Source::Simulation, thin(simulation)));
         panel.series.extend(named(means));
         panel
     }
@@ -161,11 +168,32 @@ impl Histories {
     #[must_use]
     pub fn clearance_panel(&self, title: String) -> Panel {
         let mut panel = Panel::new(title, "time, s", "root clearance, mm");
-        panel.series.push(Series::new(Source::Theory, self.clearance.0.clone()));
-        panel.series.push(Series::new(Source::Simulation, self.clearance.1.clone()));
+        panel.series.push(Series::new(Source::Theory, thin(&self.clearance.0)));
+        panel.series.push(Series::new(Source::Simulation, thin(&self.clearance.1)));
         panel.series.extend(named(&self.clearance_means));
         panel
     }
+}
+
+/// The largest of every few points, so that no peak is lost, without those that lie
+/// between equal ones.
+fn thin(points: &[(f64, f64)]) -> Points {
+    let largest = |some: &[(f64, f64)]| {
+        some.iter().copied().reduce(|most, p| if p.1 > most.1 { p } else { most })
+    };
+    let shown: Points = points.chunks(SHOWN_OF).filter_map(largest).collect();
+    let last = shown.len().saturating_sub(1);
+    let flat = |i: usize| {
+        i > 0 && i < last && shown[i - 1].1 == shown[i].1 && shown[i].1 == shown[i + 1].1
+    };
+    (0..shown.len()).filter(|&i| !flat(i)).map(|i| shown[i]).collect()
+}
+
+/// When the wheel has left each of the steps behind, s.
+#[must_use]
+pub fn stage_ends_s(case: &Case) -> [f64; STAGES] {
+    let steps = case.loads.rig().rig.step_positions_mm;
+    std::array::from_fn(|stage| (steps[stage] + LEFT_MM) / case.speed_mm_s)
 }
 
 fn named(means: &[Points]) -> impl Iterator<Item = Series> {
@@ -209,4 +237,20 @@ fn means(experiment: &Experiment, pick: impl Fn(&Line) -> Option<f64>) -> Vec<Po
             .collect()
     };
     groups().iter().map(mean).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thinned_points_keep_peaks_and_the_ends_of_what_is_flat() {
+        let value =
+            |i: usize| if (40..60).contains(&i) { 10.0 - (i as f64 - 50.0).abs() } else { 0.0 };
+        let points: Points = (0..100).map(|i| (i as f64, value(i))).collect();
+        let shown = thin(&points);
+        assert!(shown.contains(&(50.0, 10.0)) && shown.len() < 14, "{shown:?}");
+        assert_eq!((shown[0].1, shown[shown.len() - 1].1), (0.0, 0.0));
+        assert!(shown.windows(2).all(|pair| pair[1].0 > pair[0].0));
+    }
 }

@@ -6,7 +6,7 @@ use interstage::rig::Rig;
 use interstage::supervise::Direction;
 
 use super::case::{Case, Loads};
-use super::experiment::{Experiment, Reading};
+use super::experiment::{Experiment, Reading, marks};
 use super::figure::{Claim, Figure, Panel, Series, Source};
 use super::published::{CONSTRAINED_HZ, FREE_HZ, LEAST_PRELOAD_N, LEAST_SPEED_MM_S, RIG_PRELOAD_N};
 use super::simulation;
@@ -40,6 +40,8 @@ pub struct Hold {
     preload: (Vec<(f64, f64)>, Vec<(f64, f64)>),
     /// Gaps of [`CASES`] from the three sources, mm.
     gaps: [[f64; 3]; 3],
+    /// Gaps of [`CASES`] in every run, mm.
+    read: Vec<Vec<f64>>,
     /// Preload below which one wheel cannot lift its share of the study's top load, N.
     least_preload_n: f64,
     /// Friction that lifting the rig's whole top load takes at cruise preload.
@@ -61,12 +63,14 @@ impl Hold {
         let case = |index: usize| Case::new(Loads::Prototype, CASES[index].0, CASES[index].1);
         let simulated = |case: &Case| simulation::lift(case, Drive::Driven, 1).map(|l| l.gap_mm);
         let mut gaps = [[0.0; 3]; 3];
+        let mut all_read = Vec::new();
         for (index, experiment) in experiments.iter().enumerate() {
             let read: Vec<f64> =
                 experiment.runs.iter().filter_map(|run| run.mean(|r| r.gap_mm)).collect();
             gaps[0][index] = theory::mean_lift(&case(index), Drive::Driven).gap_mm;
             gaps[1][index] = simulated(&case(index))?;
             gaps[2][index] = read.iter().sum::<f64>() / read.len() as f64;
+            all_read.push(read);
         }
         let formula = Formula::new(&Loads::Prototype.rig());
         let wedged = case(0).pressing_n(1) - case(0).preload_n;
@@ -84,6 +88,7 @@ impl Hold {
         Ok(Self {
             preload: (theory, simulation),
             gaps,
+            read: all_read,
             least_preload_n: least_preload_n()?,
             friction_alone: friction_alone()?,
         })
@@ -96,12 +101,18 @@ impl Hold {
             Panel::new("Preload that holds the gap of 5 mm/s, 33.3 N", "speed, mm/s", "preload, N");
         preload.series.push(Series::new(Source::Theory, self.preload.0.clone()));
         preload.series.push(Series::new(Source::Simulation, self.preload.1.clone()));
-        let mut gap = Panel::new("Gap without and with more preload", "speed and preload", "gap, mm");
+        let mut gap =
+            Panel::new("Gap without and with more preload", "speed and preload", "gap, mm");
         gap.categories = CASES.map(|(v, p)| format!("{v} mm/s, {p} N")).to_vec();
-        for (source, gaps) in SOURCES.into_iter().zip(self.gaps) {
+        for (source, gaps) in SOURCES.into_iter().zip(self.gaps).take(2) {
             let points = gaps.into_iter().enumerate().map(|(i, gap)| (i as f64, gap)).collect();
             gap.series.push(Series::new(source, points));
         }
+        let mut experiment = Series::new(Source::Experiment, Vec::new());
+        for (x, read) in self.read.iter().enumerate() {
+            marks(x as f64, read, &mut experiment);
+        }
+        gap.series.push(experiment);
         Figure {
             id: "conclusion",
             file: "conclusion.svg".into(),
@@ -142,7 +153,8 @@ impl Hold {
         let (from, to) = (gap.at[0], gap.at[gap.at.len() - 1]);
         let pitch = rig.drive.ripple_pitch_mm;
         let least_hz = LEAST_SPEED_MM_S / pitch;
-        let (resonant, at_fastest) = (response_um(CONSTRAINED_HZ.min(FREE_HZ)), response_um(8.0 / pitch));
+        let (resonant, at_fastest) =
+            (response_um(CONSTRAINED_HZ.min(FREE_HZ)), response_um(8.0 / pitch));
         vec![
             of(DISCUSSED, "preload-holds-the-gap").judged(
                 "A faster wheel keeps the gap if the radial preload is raised at the transition.",
@@ -157,7 +169,7 @@ impl Hold {
                 "",
             ),
             of(DISCUSSED, "gap-as-on-the-continuous-surface").judged(
-                "With that, the gap in the transition is that of the continuous surface.",
+                "Raising the preload makes the gap in the transition that of the continuous surface.",
                 readings().map(|r| r.true_gap_mm).fold(0.0, f64::max) <= separation,
                 format!(
                     "On the continuous wall wheel and wall never part (largest separation {separation:.3} \
@@ -203,7 +215,7 @@ impl Hold {
                 self.friction_alone > rig.plant.mu,
                 format!(
                     "One wheel that lifts the rig's whole 20 N at 5 mm/s and 33.3 N between parallel guides \
-                     needs a friction of {:.2}; rubber has about {}.",
+                     needs a friction of {:.2}; ours has {}.",
                     self.friction_alone, rig.plant.mu
                 ),
                 "",

@@ -41,9 +41,8 @@ impl Means {
         let curves: Vec<Option<Curve>> = (0..rigs)
             .map(|rig| {
                 let readings = sweep.iter().zip(&places);
-                let points: Vec<(f64, f64)> = readings
-                    .filter_map(|(e, &x)| Some((x, e.runs[rig].mean(&figure)?)))
-                    .collect();
+                let points: Vec<(f64, f64)> =
+                    readings.filter_map(|(e, &x)| Some((x, e.runs[rig].mean(&figure)?))).collect();
                 parabola(&points)
             })
             .collect();
@@ -95,15 +94,10 @@ impl Means {
         middle[middle.len() - 1] - middle[0]
     }
 
-    /// Largest distance of the mean of means from the straight line between its ends,
-    /// over its rise: 0 for a line.
+    /// [`bend`] of each mean.
     #[must_use]
-    pub fn bend(&self) -> f64 {
-        let middle = self.middle();
-        let last = middle.len() - 1;
-        let off = |i: usize| middle[i] - middle[0] - self.rise() * i as f64 / last as f64;
-        let most = (0..=last).map(off).fold(0.0_f64, |most, d| if d.abs() > most.abs() { d } else { most });
-        most / self.rise().abs()
+    pub fn bends(&self) -> Vec<f64> {
+        self.curves.iter().map(|curve| bend(curve)).collect()
     }
 
     /// Whether every mean goes the same way from each place to the next: up for a
@@ -128,6 +122,17 @@ impl Means {
             })
             .collect()
     }
+}
+
+/// Largest distance of evenly spaced values from the straight line between their ends,
+/// over the distance between these: 0 for a line, positive above it.
+#[must_use]
+pub fn bend(values: &[f64]) -> f64 {
+    let last = values.len() - 1;
+    let rise = values[last] - values[0];
+    let off = |i: usize| values[i] - values[0] - rise * i as f64 / last as f64;
+    let farther = |a: f64, b: f64| if b.abs() > a.abs() { b } else { a };
+    (0..=last).map(off).fold(0.0, farther) / rise.abs()
 }
 
 /// Least-squares parabola through the points; none through fewer than three places.
@@ -199,7 +204,7 @@ mod tests {
         assert!(found.spread() < 1e-12);
         assert!((found.rise() - (0.5 - 0.004 * 55.0)).abs() < 1e-9);
         assert!(found.all_go(1.0) && !found.all_go(-1.0));
-        assert!(found.bend() > 0.05);
+        assert!(found.bends().iter().all(|&bend| bend > 0.05));
         assert_eq!(found.series().len(), 4);
     }
 
@@ -207,7 +212,7 @@ mod tests {
     fn the_spread_is_that_of_the_means() {
         let found = means(&sweep(|rig, x| x + if rig == 0 { 1.0 } else { 0.0 }));
         assert!((found.spread() - 0.1).abs() < 1e-9, "{}", found.spread());
-        assert!(found.bend().abs() < 1e-9);
+        assert!(found.bends().iter().all(|bend| bend.abs() < 1e-9));
         let widest = found.range.iter().map(|(a, b)| b - a).fold(0.0, f64::max);
         assert!((widest - 1.0).abs() < 1e-9);
     }

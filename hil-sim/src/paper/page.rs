@@ -75,7 +75,8 @@ fn section(page: &mut String, figure: &Figure, claims: &[Claim]) {
     *page += "\n| the study says | in its section | | in ours |\n|---|---|---|---|\n";
     for claim in claims.iter().filter(|claim| claim.figure == figure.id) {
         let verdict = if claim.holds { "holds" } else { "**does not hold**" };
-        let _ = writeln!(page, "| {} | {} | {verdict} | {} |", claim.claim, claim.section, claim.why);
+        let _ =
+            writeln!(page, "| {} | {} | {verdict} | {} |", claim.claim, claim.section, claim.why);
     }
 }
 

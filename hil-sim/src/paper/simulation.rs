@@ -44,7 +44,10 @@ fn loading(case: &Case, drive: Drive, level: usize) -> (Axial, f64) {
 }
 
 /// The ring's crossing from sleeve `level`, at the instant at which the lower wall stops
-/// carrying.
+/// carrying; the collision is the largest of the crossing.
+///
+/// The area is the part of the wheel that the step cuts off, as a compression sensor
+/// would have it: elements of the ring enter and leave whole.
 ///
 /// # Errors
 /// [`BalanceError`] if no height of the centre balances the preload.
@@ -66,7 +69,7 @@ pub fn lift(case: &Case, drive: Drive, level: usize) -> Result<Lift, BalanceErro
     Ok(Lift {
         gap_mm: result.gap_mm,
         depth_mm: result.lift_depth_mm,
-        area_mm2: result.lift_area_mm2,
+        area_mm2: area,
         collision_n: result.corner_force_n,
         impact_kpa: stress_kpa(result.corner_force_n, area),
     })
@@ -126,8 +129,7 @@ pub fn deployment(
             collision_n,
             impact_kpa: stress_kpa(collision_n, area),
             depth_mm: solved.contact.depth_mm,
-            clearance_mm: (local.ahead_mm < radius)
-                .then(|| local.ahead_mm.hypot(height) - radius),
+            clearance_mm: (local.ahead_mm < radius).then(|| local.ahead_mm.hypot(height) - radius),
         });
     }
     Ok(moments)

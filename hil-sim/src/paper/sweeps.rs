@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::case::{Case, Loads};
 use super::experiment::{Experiment, Reading};
 use super::figure::{Claim, Figure, Mark, Panel, Series, Source};
-use super::means::Means;
+use super::means::{Means, bend};
 use super::published::{AREA_SPREAD_MM2, DEPTH_SPREAD_MM, GAP_SPREAD_MM};
 use super::simulation;
 use super::theory::{self, Drive, Lift};
@@ -153,7 +153,7 @@ impl Sweep {
         };
         let panels = vec![
             self.panel("Contact gap", "gap, mm", &self.gap),
-            self.differences("The same as difference from the mean of means", "difference, mm", &self.gap),
+            self.differences("gap", "mm", published, &self.gap),
         ];
         self.figure(id, title, panels, vec![spread_mark("gap", "mm", published, &self.gap)])
     }
@@ -178,6 +178,8 @@ impl Sweep {
         let panels = vec![
             self.panel("(a) Embedding depth", "depth, mm", &self.depth),
             self.panel("(b) Contact area", "area, mm²", &self.area),
+            self.differences("depth", "mm", depth, &self.depth),
+            self.differences("area", "mm²", area, &self.area),
         ];
         let marks = vec![
             spread_mark("embedding depth", "mm", depth, &self.depth),
@@ -200,14 +202,15 @@ impl Sweep {
              tolerances, each value as its sensors give it, mean of the three transitions of \
              a deployment, a parabola fitted to each rig's readings, four means of ten. The \
              study prints no value of these curves but the largest difference between its \
-             means.",
+             means, by which the two marks are apart.",
             self.variable.fixed()
         );
         Figure { id, file: format!("{id}.svg"), title, caption, columns: 2, panels, published }
     }
 
     fn panel(&self, title: &str, y: &str, curves: &Curves) -> Panel {
-        let pairs = |values: &[f64]| curves.at.iter().copied().zip(values.iter().copied()).collect();
+        let pairs =
+            |values: &[f64]| curves.at.iter().copied().zip(values.iter().copied()).collect();
         let mut panel =
             Panel::new(format!("{title}, {}", self.variable.fixed()), self.variable.axis(), y);
         panel.series.push(Series::new(Source::Theory, pairs(&curves.theory)));
@@ -216,9 +219,14 @@ impl Sweep {
         panel
     }
 
-    /// The means alone, enlarged about their middle.
-    fn differences(&self, title: &str, y: &str, curves: &Curves) -> Panel {
-        let mut panel = Panel::new(title, self.variable.axis(), y);
+    /// The means alone, about their middle, between two marks that are as far apart as the
+    /// published means are at most.
+    fn differences(&self, what: &str, unit: &str, published: f64, curves: &Curves) -> Panel {
+        let mut panel = Panel::new(
+            format!("Differences between the means of the {what}"),
+            self.variable.axis(),
+            &format!("off the mean, {unit}"),
+        );
         let middle = curves.experiment.middle();
         for mut series in curves.experiment.series() {
             let off = |(point, middle): ((f64, f64), &f64)| (point.0, point.1 - middle);
@@ -226,6 +234,9 @@ impl Sweep {
             series.range.clear();
             panel.series.push(series);
         }
+        let x = 0.5 * (curves.at[0] + curves.at[GRID - 1]);
+        let half = 0.5 * published;
+        panel.series.push(Series::new(Source::Published, vec![(x, -half), (x, half)]));
         panel
     }
 }
@@ -275,26 +286,16 @@ fn all_go(curves: &Curves, sense: f64) -> bool {
     goes(&curves.theory) && goes(&curves.simulation) && curves.experiment.all_go(sense)
 }
 
-/// The bend over the rise of theory, simulation and experiment.
+/// The bend over the rise of theory, simulation and the mean of means.
 fn bends(curves: &Curves) -> [f64; 3] {
-    let bend = |values: &[f64]| {
-        let last = values.len() - 1;
-        let rise = values[last] - values[0];
-        let off = |i: usize| values[i] - values[0] - rise * i as f64 / last as f64;
-        (0..=last).map(off).fold(0.0_f64, |a, d| if d.abs() > a.abs() { d } else { a })
-            / rise.abs()
-    };
-    [bend(&curves.theory), bend(&curves.simulation), curves.experiment.bend()]
+    [&curves.theory, &curves.simulation, &curves.experiment.middle()].map(|values| bend(values))
 }
 
-/// Least bend over rise that counts as nonlinear: above what fit and noise leave of a
-/// line.
-const NONLINEAR: f64 = 0.02;
-
+/// Whether theory, simulation and all four means bend the same way off a straight line.
 fn nonlinear(curves: &Curves) -> bool {
-    let bends = bends(curves);
-    bends.iter().all(|bend| bend.abs() > NONLINEAR)
-        && bends.iter().all(|bend| bend.signum() == bends[0].signum())
+    let [theory, simulation, _] = bends(curves);
+    let means = curves.experiment.bends();
+    [theory, simulation].iter().chain(&means).all(|bend| bend * theory > 0.0)
 }
 
 fn bent(curves: &Curves) -> String {
@@ -344,7 +345,7 @@ pub fn preload_claims(sweep: &Sweep) -> Vec<Claim> {
             "At constant speed the embedding depth grows with the preload, nonlinearly.",
             all_go(depth, 1.0) && nonlinear(depth),
             format!("{} {}", ends(depth, 3, "mm"), bent(depth)),
-            "It grows, but over this range so nearly along a line that no curvature stands out.",
+            "It grows, but not all six curves bend the same way.",
         ),
         of("fig22", "area-grows-with-depth-preload").judged(
             "As the embedding depth grows with the preload, so does the contact area.",

@@ -41,8 +41,7 @@ pub fn lift(case: &Case, drive: Drive, level: usize) -> Lift {
         Drive::Driven => (case.pressing_n(level), Some(case.load_n())),
     };
     let gap = formula.gap_mm(Direction::Deploy, case.speed_mm_s, force, load);
-    let stiffness =
-        formula.k_inf * formula.stiffness(Direction::Deploy, case.speed_mm_s, gap);
+    let stiffness = formula.k_inf * formula.stiffness(Direction::Deploy, case.speed_mm_s, gap);
     let area = area_of_gap_mm2(&formula, gap);
     let collision = stiffness * formula.contact(gap).axial;
     Lift {
