@@ -61,7 +61,7 @@ pub struct BalanceError {
 impl Balance {
     /// Residual of the radial balance, N, its slope, N/mm, and the utilisation, from
     /// the contact's cosine and sine sums, N, and their derivatives by height, N/mm.
-    pub(super) fn residual(
+    pub(crate) fn residual(
         &self,
         (c, s): (f64, f64),
         (dc, ds): (f64, f64),

@@ -1,4 +1,5 @@
-//! Natural frequencies of the drive arm by the wave-vector method.
+//! The drive arm by the wave-vector method: natural frequencies here, their [`Shape`]s
+//! (55), the forced response ([`Forcing`], 56), discontinuities ([`junction`], 46-51).
 //!
 //! An Euler-Bernoulli beam with end A at the pillar and end B at the wheel; end B may
 //! carry a mass and press on a spring to ground (the contact). A wave that runs from A
@@ -8,7 +9,10 @@
 //! times as long as it is thick the frequencies come out somewhat high, the more so
 //! the higher the mode.
 
+mod forced;
+pub mod junction;
 mod roots;
+mod shapes;
 pub mod waves;
 
 #[cfg(test)]
@@ -22,6 +26,9 @@ use interstage::rig::Rig;
 use thiserror::Error;
 
 use waves::{End, Load, frequency_function};
+
+pub use forced::Forcing;
+pub use shapes::Shape;
 
 /// Most modes that may be asked for.
 pub const MAX_COUNT: usize = 20;

@@ -1,5 +1,9 @@
 //! The wave roots against the classical frequency equations, their limits and ranges.
 
+mod forced;
+mod junction;
+mod shapes;
+
 use proptest::prelude::*;
 
 use super::waves::turned_determinant;

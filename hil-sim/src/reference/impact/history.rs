@@ -1,0 +1,117 @@
+//! The stress that a crossing sends through the tread.
+
+use super::Rubber;
+use super::rod::{Face, Rod};
+use super::rubber::THICKNESS_MM;
+use crate::reference::beam::Beam;
+use crate::reference::case::{Case, ReferenceError, positive};
+use crate::reference::collision::dynamic;
+
+/// Cells across the tread.
+const CELLS: usize = 16;
+
+/// Time between the instants that are given, s.
+const SAMPLE_S: f64 = 1e-3;
+
+/// Part of a wave's pressure that a hub of the arm's alloy sends back:
+/// `(Z_hub - Z)/(Z_hub + Z)`, 0.98: it has a hundred times the impedance of rubber.
+#[must_use]
+pub fn hub_reflection(rubber: &Rubber) -> f64 {
+    let alloy = Beam::drive_arm();
+    let hub = (alloy.e_pa * alloy.rho_kg_m3).sqrt();
+    (hub - rubber.impedance()) / (hub + rubber.impedance())
+}
+
+/// The tread of a case as a rod.
+fn tread(case: &Case, cells: usize) -> Result<Rod, ReferenceError> {
+    let rubber = Rubber::of(case)?;
+    Rod::new(rubber, THICKNESS_MM * 1e-3, cells, hub_reflection(&rubber))
+}
+
+/// Time, s, from the touch of the corner on, and the stress increment at the hub, Pa:
+/// the mean pressure of the contact above that of steady rolling (the study: what the
+/// collision adds to the preload), sent through the tread as positive and negative waves.
+///
+/// A crossing lasts seconds and a transit a tenth of a millisecond, so that the stress at
+/// the hub is that on the face to 1e-4 or so; what the waves themselves do at the touch is
+/// [`touch`].
+///
+/// # Errors
+/// [`ReferenceError`] if an argument is out of range or the preload cannot be carried.
+pub fn history(case: &Case) -> Result<Vec<(f64, f64)>, ReferenceError> {
+    let crossing = dynamic(case)?;
+    let mut rod = tread(case, CELLS)?;
+    let Some(first) = crossing.samples.first() else { return Ok(Vec::new()) };
+    let (mut t, mut next) = (first.t_s, first.t_s);
+    let mut course = Vec::new();
+    for pair in crossing.samples.windows(2) {
+        let rate = (pair[1].pressure_pa - pair[0].pressure_pa) / (pair[1].t_s - pair[0].t_s);
+        while t < pair[1].t_s {
+            let pressure = pair[0].pressure_pa + rate * (t - pair[0].t_s);
+            rod.step(Face::Pressure(pressure - crossing.cruise_pressure_pa));
+            t += rod.step_s();
+            if t >= next {
+                course.push((t, rod.hub_pa()));
+                next += SAMPLE_S;
+            }
+        }
+    }
+    Ok(course)
+}
+
+/// The first `duration_s` after the touch: time, s, and the stress, Pa, on face and hub
+/// if corner and tread closed at `v sin(phi)` at once over the whole face. An upper
+/// bound: the ring's patch at the corner grows from nothing.
+///
+/// # Errors
+/// [`ReferenceError`] if an argument is out of range.
+pub fn touch(case: &Case, duration_s: f64) -> Result<Vec<(f64, f64, f64)>, ReferenceError> {
+    case.check()?;
+    positive("duration_s", duration_s)?;
+    let mut rod = tread(case, 4 * CELLS)?;
+    let speed = case.closing_speed_mm_s() * 1e-3;
+    let steps = (duration_s / rod.step_s()).ceil() as usize;
+    let instants = (1..=steps).map(|step| {
+        rod.step(Face::Speed(speed));
+        (rod.step_s() * step as f64, rod.face_pa(), rod.hub_pa())
+    });
+    Ok(instants.collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_touch_begins_with_the_jump_of_the_closing_speed() {
+        let case = Case::study()[0].clone();
+        let waves = touch(&case, 2e-4).unwrap();
+        let rubber = Rubber::of(&case).unwrap();
+        let jump = rubber.impedance() * case.closing_speed_mm_s() * 1e-3;
+        // Hundreds of pascals: a thousandth of the contact pressure.
+        assert!((waves[0].1 / jump - 1.0).abs() < 1e-6 && (200.0..600.0).contains(&jump));
+        let transit = THICKNESS_MM * 1e-3 / rubber.front_speed_m_s();
+        let arrival = waves.iter().find(|wave| wave.2 > 0.0).unwrap();
+        assert!((arrival.0 - transit).abs() < 2.0 * transit / 64.0, "{} {transit}", arrival.0);
+        assert!((arrival.2 / (jump * (1.0 + hub_reflection(&rubber))) - 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn the_hub_bears_what_the_face_does_a_transit_later() {
+        let case = Case::study()[2].clone();
+        let crossing = dynamic(&case).unwrap();
+        let course = history(&case).unwrap();
+        let peak = course.iter().map(|point| point.1).fold(0.0, f64::max);
+        let mut worst = 0.0_f64;
+        for &(t, hub) in course.iter().filter(|(t, _)| *t > 0.05) {
+            let after = crossing.samples.partition_point(|s| s.t_s < t).max(1);
+            let Some(next) = crossing.samples.get(after) else { break };
+            // Past the edge the ring shakes.
+            if next.x_mm > -0.2 {
+                break;
+            }
+            worst = worst.max((hub - (next.pressure_pa - crossing.cruise_pressure_pa)).abs());
+        }
+        assert!(peak > 1e4 && worst < 0.02 * peak, "{worst} of {peak}");
+    }
+}
