@@ -10,6 +10,7 @@
 pub mod amplitudes;
 pub mod case;
 pub mod cases;
+pub mod course;
 pub mod draw;
 pub mod experiment;
 pub mod figure;
@@ -24,7 +25,6 @@ pub mod simulation;
 pub mod sweeps;
 pub mod theory;
 pub mod transitions;
-pub mod vibration;
 
 use interstage::rig::Rig;
 use rayon::prelude::*;
@@ -40,6 +40,7 @@ use modes::Modes;
 use sweeps::{Sweep, Variable};
 
 use crate::plant::balance::BalanceError;
+use crate::reference::ReferenceError;
 use crate::reference::beam::BeamError;
 use crate::sil::RunError;
 
@@ -61,6 +62,9 @@ pub enum StudyError {
     /// A crossing of the ring could not be balanced.
     #[error(transparent)]
     Balance(#[from] BalanceError),
+    /// A reference model refused.
+    #[error(transparent)]
+    Reference(#[from] ReferenceError),
     /// The arm refused.
     #[error(transparent)]
     Beam(#[from] BeamError),
@@ -139,7 +143,7 @@ pub fn regenerate(done: &(dyn Fn() + Sync)) -> Result<Study, StudyError> {
     Ok(Study { figures, claims })
 }
 
-/// The study's figures and claims as JSON, values to six figures: what a comparison
+/// The study's figures and claims as JSON, values to four figures: what a comparison
 /// across builds can rely on.
 ///
 /// # Errors
@@ -150,12 +154,12 @@ pub fn json(study: &Study) -> serde_json::Result<String> {
     serde_json::to_string(&value)
 }
 
-/// Rounds every number to six figures.
+/// Rounds every number to four figures.
 fn round(value: &mut serde_json::Value) {
     use serde_json::Value;
     match value {
         Value::Number(number) => {
-            let rounded = number.as_f64().and_then(|x| format!("{x:.5e}").parse::<f64>().ok());
+            let rounded = number.as_f64().and_then(|x| format!("{x:.3e}").parse::<f64>().ok());
             if let Some(shorter) = rounded.and_then(serde_json::Number::from_f64) {
                 *number = shorter;
             }

@@ -3,6 +3,7 @@
 use interstage::rig::Rig;
 use serde::Serialize;
 
+use crate::plant::arm::Arm;
 use crate::scenario::{ControllerKind, Scenario};
 
 /// Loads of the study.
@@ -66,18 +67,31 @@ impl Case {
         plant.top_load_n * plant.top_load_share
     }
 
-    /// Radial force on a wheel that lifts its load from sleeve `level`, N: the preload,
-    /// and what the inclined arm makes of the thrust.
-    #[must_use]
-    pub fn pressing_n(&self, level: usize) -> f64 {
+    /// Arm, and the radius of a wheel that stands on sleeve `level`, mm.
+    fn arm(&self, level: usize) -> (Arm, f64) {
         let rig = self.loads.rig();
         let step = rig.rig.step_height_mm;
         let centre = rig.rig.wall_radius_mm - rig.rig.wheel_radius_mm - step * level as f64;
-        let arm = crate::plant::arm::Arm {
+        let arm = Arm {
             length_mm: rig.rig.arm_length_mm,
             pivot_mm: rig.rig.arm_pivot_radius_mm,
             coupling: rig.plant.arm_coupling,
         };
+        (arm, centre)
+    }
+
+    /// Angle of the arm from the pillar with the wheel on sleeve `level`, rad.
+    #[must_use]
+    pub fn arm_rad(&self, level: usize) -> f64 {
+        let (arm, centre) = self.arm(level);
+        arm.angle(centre)
+    }
+
+    /// Radial force on a wheel that lifts its load from sleeve `level`, N: the preload,
+    /// and what the inclined arm makes of the thrust.
+    #[must_use]
+    pub fn pressing_n(&self, level: usize) -> f64 {
+        let (arm, centre) = self.arm(level);
         self.preload_n + arm.wedge(centre) * self.load_n()
     }
 

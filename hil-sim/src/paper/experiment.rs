@@ -12,14 +12,17 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
+use super::StudyError;
 use super::case::Case;
+use super::course::Arms;
 use super::figure::Series;
 use super::measure::{CollisionGauge, impact_kpa};
 use super::published::{LOG_S, RUNS, RUNS_OF_A_MEAN};
 use super::theory::area_of_depth_mm2;
-use super::vibration::ArmResponse;
 use crate::plant::rig::VirtualRig;
-use crate::sil::{Options, RunError, Session};
+use crate::reference::ReferenceError;
+use crate::reference::vibration::modal::Modal;
+use crate::sil::{Options, Session};
 
 /// Crossings of a deployment.
 pub const STAGES: usize = 3;
@@ -29,6 +32,9 @@ pub const MEANS: usize = RUNS / RUNS_OF_A_MEAN;
 
 /// Longest run, s: the whole travel at the slowest case, with room.
 const LONGEST_S: f64 = 60.0;
+
+/// A tick of the session, s.
+const TICK_S: f64 = 1e-3;
 
 /// Seed of the choice of runs for the means.
 const CHOICE: u64 = 40;
@@ -121,8 +127,8 @@ pub fn marks(x: f64, all: &[f64], series: &mut Series) {
 /// Runs every case on forty rigs; `done` is called after each run.
 ///
 /// # Errors
-/// [`RunError`] if a case makes no controller or a plant fails.
-pub fn run_all(cases: &[Case], done: &(dyn Fn() + Sync)) -> Result<Vec<Experiment>, RunError> {
+/// [`StudyError`] if a case makes no controller or a plant fails.
+pub fn run_all(cases: &[Case], done: &(dyn Fn() + Sync)) -> Result<Vec<Experiment>, StudyError> {
     let pairs: Vec<(Case, u64)> =
         cases.iter().flat_map(|case| (1..=RUNS as u64).map(move |seed| (*case, seed))).collect();
     let runs: Vec<Run> = pairs
@@ -132,7 +138,7 @@ pub fn run_all(cases: &[Case], done: &(dyn Fn() + Sync)) -> Result<Vec<Experimen
             done();
             run
         })
-        .collect::<Result<_, _>>()?;
+        .collect::<Result<_, StudyError>>()?;
     let by_case = cases.iter().zip(runs.chunks(RUNS));
     Ok(by_case.map(|(case, runs)| Experiment { case: *case, runs: runs.to_vec() }).collect())
 }
@@ -140,12 +146,12 @@ pub fn run_all(cases: &[Case], done: &(dyn Fn() + Sync)) -> Result<Vec<Experimen
 /// One deployment of the rig that `seed` draws.
 ///
 /// # Errors
-/// [`RunError`] if the case makes no controller or the plant fails.
-pub fn run(case: &Case, seed: u64) -> Result<Run, RunError> {
+/// [`StudyError`] if the case makes no controller or the plant fails.
+pub fn run(case: &Case, seed: u64) -> Result<Run, StudyError> {
     let scenario = case.scenario(seed);
     let options = Options { speed: Some((case.speed_mm_s, true)), ..Options::default() };
     let mut session = Session::new(&scenario, options)?;
-    let mut watch = Watch::new(session.plant());
+    let mut watch = Watch::new(case, session.plant())?;
     let mut start = Some(Command::Start);
     while session.time_s() < LONGEST_S {
         let command = if session.mode() == Mode::Idle { start.take() } else { None };
@@ -173,22 +179,25 @@ struct Watch {
     /// Measured compression and true preload of every tick.
     ticks: Vec<(f32, f32)>,
     gauge: CollisionGauge,
-    arm: ArmResponse,
+    arms: Arms,
+    arm: Modal,
     moving_since: Option<f64>,
     largest_um: f64,
 }
 
 impl Watch {
-    fn new(plant: &VirtualRig) -> Self {
-        Self {
+    fn new(case: &Case, plant: &VirtualRig) -> Result<Self, ReferenceError> {
+        let arms = Arms::of(case)?;
+        Ok(Self {
             run: Run::default(),
             measured: Vec::new(),
             ticks: Vec::new(),
-            gauge: CollisionGauge::default(),
-            arm: ArmResponse::new(&plant.parameters().modes_hz),
+            gauge: CollisionGauge::new(plant, case.speed_mm_s, case.pressing_n(1)),
+            arm: arms.modal()?,
+            arms,
             moving_since: None,
             largest_um: 0.0,
-        }
+        })
     }
 
     /// Looks at one millisecond.
@@ -196,8 +205,11 @@ impl Watch {
         let truth = plant.truth();
         self.ticks.push((compression_mm as f32, truth.preload_n as f32));
         let axial = self.gauge.read_n(plant);
-        let deflection = self.arm.step(axial, 1e-3) + truth.vibration_mm;
-        self.largest_um = self.largest_um.max(deflection.abs() * 1e3);
+        let level = plant.parameters().wall.local(truth.position_mm).level;
+        self.arm.step(self.arms.across_n(level, axial), TICK_S);
+        // The plant's own vibration is that of the torque ripple.
+        let deflection_um = 1e6 * self.arm.deflection_m() + 1e3 * truth.vibration_mm;
+        self.largest_um = self.largest_um.max(deflection_um.abs());
         if moves {
             self.run.duration_s = truth.time_s - *self.moving_since.get_or_insert(truth.time_s);
         }
@@ -218,12 +230,12 @@ impl Watch {
 
     fn finish(mut self, case: &Case, plant: &VirtualRig) -> Run {
         for crossing in plant.ledger().crossings() {
-            let tick = (crossing.lift_s / 1e-3) as usize;
+            let tick = (crossing.lift_s / TICK_S) as usize;
             let gap = self.measured.iter().find(|(index, _)| *index == crossing.index);
             let (Some(&(_, gap_mm)), Some(&(depth, _))) = (gap, self.ticks.get(tick)) else {
                 continue;
             };
-            let since = ((crossing.touch_s / 1e-3) as usize).min(tick);
+            let since = ((crossing.touch_s / TICK_S) as usize).min(tick);
             let preloads = self.ticks[since..=tick].iter().map(|tick| f64::from(tick.1));
             let (low, high) =
                 preloads.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), n| (a.min(n), b.max(n)));

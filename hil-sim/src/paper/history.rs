@@ -1,36 +1,32 @@
 //! Collision, impact and vibration over the three transitions of a deployment, from all
 //! three sources.
 
-use interstage::model::formula::Formula;
-use interstage::supervise::Direction;
-
 use super::case::Case;
+use super::course::{Arms, Course, Points};
 use super::experiment::{Experiment, Line, STAGES, groups};
 use super::figure::{Panel, Series, Source};
 use super::published::LOG_S;
-use super::simulation::{self, Moment};
-use super::theory::{self, Drive};
-use super::vibration::ArmResponse;
-use crate::plant::balance::BalanceError;
-
-/// Interval of theory and simulation, s.
-const INTERVAL_S: f64 = 0.01;
+use super::{simulation, theory};
+use crate::reference::ReferenceError;
 
 /// Points of theory and simulation of which one is shown.
 const SHOWN_OF: usize = 4;
 
+/// Way over which its patch does, mm.
+const LEAVES_MM: f64 = 8.0;
+
+/// Way of a deployment before the first corner is touched, mm.
+const BEFORE_MM: f64 = 3.0;
+
 /// Way behind a step within which the wheel has left its edge, mm.
 const LEFT_MM: f64 = 2.0;
-
-/// Points: time, s, and value.
-pub type Points = Vec<(f64, f64)>;
 
 /// What is followed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
-    /// Axial force of corner and face, N.
+    /// Axial force of the contact beyond rolling resistance, N.
     Collision,
-    /// That force over the surface that the step cuts off, kPa.
+    /// That force over the surface that the step cuts off, at the hub, kPa.
     Impact,
     /// Deflection of the arm, um.
     Vibration,
@@ -55,6 +51,15 @@ impl Quantity {
     pub fn title(self, case: &Case) -> String {
         let letter = ["(a)", "(b)", "(c)"][self.index()];
         format!("{letter} {}", case.name())
+    }
+
+    /// It in a course.
+    fn of(self, course: &Course) -> &Points {
+        match self {
+            Self::Collision => &course.collision,
+            Self::Impact => &course.impact,
+            Self::Vibration => &course.vibration,
+        }
     }
 
     const fn index(self) -> usize {
@@ -82,32 +87,24 @@ impl Histories {
     /// Theory and simulation of the experiment's case, and its four means.
     ///
     /// # Errors
-    /// [`BalanceError`] if a crossing of the ring cannot be balanced.
-    pub fn new(experiment: &Experiment) -> Result<Self, BalanceError> {
+    /// [`ReferenceError`] if a crossing cannot be computed.
+    pub fn new(experiment: &Experiment) -> Result<Self, ReferenceError> {
         let case = experiment.case;
-        let rig = case.loads.rig();
-        let formula = Formula::new(&rig);
-        let gap = theory::mean_lift(&case, Drive::Driven).gap_mm;
-        let stiffness = formula.stiffness(Direction::Deploy, case.speed_mm_s, gap);
-        let deployed = |elastic| simulation::deployment(&case, Drive::Driven, elastic, INTERVAL_S);
-        let (theory, ring) = (deployed(Some(stiffness))?, deployed(None)?);
-        let modes = rig.drive.modes_hz.to_vec();
-        let first_passed_s = rig.rig.step_positions_mm[0] / case.speed_mm_s;
+        let arms = Arms::of(&case)?;
+        let theory = theory::deployment(&case, &arms)?;
+        let simulation = simulation::deployment(&case, &arms)?;
+        let first_passed_s = case.loads.rig().rig.step_positions_mm[0] / case.speed_mm_s;
         let of = Quantity::ALL.map(|quantity| {
-            let history = |moments| follow(quantity, moments, &modes);
-            (history(&theory), history(&ring), means(experiment, |line| Some(pick(quantity, line))))
+            let pair = (quantity.of(&theory).clone(), quantity.of(&simulation).clone());
+            (pair.0, pair.1, means(experiment, |line| Some(pick(quantity, line))))
         });
-        let clearance = |moments: &[Moment]| {
-            let before = moments.iter().take_while(|m| m.time_s < first_passed_s);
-            before.filter_map(|m| Some((m.time_s, m.clearance_mm?))).collect()
-        };
         let clearance_means = means(experiment, |line| {
             line.clearance_mm.filter(|_| line.time_s < first_passed_s - 0.2)
         });
         Ok(Self {
             case,
             of,
-            clearance: (clearance(&theory), clearance(&ring)),
+            clearance: (theory.clearance, simulation.clearance),
             clearance_means,
             first_passed_s,
         })
@@ -140,17 +137,20 @@ impl Histories {
         })
     }
 
-    /// Largest value after the third transition over the largest of all.
+    /// Largest value after the third transition, beyond the largest before the first, over
+    /// the largest of all.
     #[must_use]
     pub fn left_over(&self, quantity: Quantity, source: Source) -> f64 {
         let points = self.points(quantity, source);
-        // A wheel's patch behind the last edge, and the arm's ring-down.
-        let after =
-            stage_ends_s(&self.case)[STAGES - 1] + 2.0 * LEFT_MM / self.case.speed_mm_s + 0.2;
-        let most = |from: f64| {
-            points.iter().filter(|p| p.0 >= from).map(|p| p.1.abs()).fold(0.0, f64::max)
+        let speed = self.case.speed_mm_s;
+        // The wheel's patch behind the last edge, and the arm's ring-down.
+        let after = stage_ends_s(&self.case)[STAGES - 1] + LEAVES_MM / speed + 0.2;
+        let before = BEFORE_MM / speed;
+        let most = |from: f64, to: f64| {
+            let within = points.iter().filter(|p| (from..=to).contains(&p.0));
+            within.map(|p| p.1.abs()).fold(0.0, f64::max)
         };
-        most(after) / most(0.0)
+        (most(after, f64::INFINITY) - most(0.0, before)).max(0.0) / most(0.0, f64::INFINITY)
     }
 
     /// The quantity as a plot.
@@ -201,17 +201,6 @@ fn named(means: &[Points]) -> impl Iterator<Item = Series> {
         name: format!("mean {}", index + 1),
         ..Series::new(Source::Experiment, points.clone())
     })
-}
-
-/// A quantity along a deployment of the ring.
-fn follow(quantity: Quantity, moments: &[Moment], modes_hz: &[f64]) -> Points {
-    let mut arm = ArmResponse::new(modes_hz);
-    let value = |moment: &Moment| match quantity {
-        Quantity::Collision => moment.collision_n,
-        Quantity::Impact => moment.impact_kpa,
-        Quantity::Vibration => 1e3 * arm.step(moment.collision_n, INTERVAL_S).abs(),
-    };
-    moments.iter().map(|moment| moment.time_s).zip(moments.iter().map(value)).collect()
 }
 
 fn pick(quantity: Quantity, line: &Line) -> f64 {

@@ -2,7 +2,7 @@
 
 use super::figure::{Claim, Figure, Mark, Panel, Series, Source};
 use super::published::{CONSTRAINED_HZ, FREE_HZ};
-use crate::reference::beam::{Beam, BeamError, Ends, Tip};
+use crate::reference::beam::{Beam, BeamError, Ends, Shape, Tip};
 
 const SECTION: &str = "Experiment scheme";
 
@@ -24,6 +24,8 @@ pub struct Modes {
     /// First bending mode of the free arm, the seventh after six of a rigid body, the
     /// same.
     free: [(f64, f64); 2],
+    /// Their shapes by the waves.
+    shapes: [Shape; 2],
     /// The same two frequencies of the bare arm, Hz.
     bare_hz: (f64, f64),
 }
@@ -37,12 +39,14 @@ impl Modes {
         let beam = Beam::drive_arm();
         let tip_mass_kg = beam.tip_mass_for(CONSTRAINED_HZ)?;
         let first = |ends, mass_kg| {
-            let mode = beam.modes(ends, Tip { mass_kg, ..Tip::default() }, 1)?[0];
-            Ok::<_, BeamError>((mode.beta_l, mode.frequency_hz))
+            let shapes = beam.shapes(ends, Tip { mass_kg, ..Tip::default() }, 1)?;
+            Ok::<_, BeamError>(shapes[0].clone())
         };
-        let (constrained, free) =
-            (first(Ends::ClampedFree, tip_mass_kg)?, first(Ends::FreeFree, tip_mass_kg)?);
-        let bare_hz = (first(Ends::ClampedFree, 0.0)?.1, first(Ends::FreeFree, 0.0)?.1);
+        let pair = |shape: &Shape| (shape.mode.beta_l, shape.mode.frequency_hz);
+        let shapes = [first(Ends::ClampedFree, tip_mass_kg)?, first(Ends::FreeFree, tip_mass_kg)?];
+        let [constrained, free] = [pair(&shapes[0]), pair(&shapes[1])];
+        let bare_hz =
+            (pair(&first(Ends::ClampedFree, 0.0)?).1, pair(&first(Ends::FreeFree, 0.0)?).1);
         // The classical frequency equations, in products of the two ends' functions.
         let ratio = tip_mass_kg / beam.mass_kg();
         let hz = |beta_l: f64| constrained.1 * (beta_l / constrained.0).powi(2);
@@ -52,7 +56,7 @@ impl Modes {
         };
         let constrained = [classical(clamped_equation, (0.2, 2.0)), constrained];
         let free = [classical(free_equation, (3.5, 5.0)), free];
-        Ok(Self { beam, tip_mass_kg, constrained, free, bare_hz })
+        Ok(Self { beam, tip_mass_kg, constrained, free, shapes, bare_hz })
     }
 
     /// The figure.
@@ -67,18 +71,19 @@ impl Modes {
         hertz.series.push(Series::new(Source::Fitted, vec![(0.0, CONSTRAINED_HZ)]));
         hertz.series.push(Series::new(Source::Published, vec![(1.0, FREE_HZ)]));
         hertz.least_y = Some((0.0, 0.0));
-        let shapes = [
-            ("First constrained mode", clamped as fn(f64, f64) -> f64, self.constrained),
-            ("Seventh free mode", free as fn(f64, f64) -> f64, self.free),
+        let classical: [(&str, fn(f64, f64) -> f64, f64); 2] = [
+            ("First constrained mode", clamped, self.constrained[0].0),
+            ("Seventh free mode", free, self.free[0].0),
         ];
         let mut panels = vec![hertz];
-        panels.extend(shapes.map(|(title, shape, modes)| {
+        for ((title, shape, beta_l), waves) in classical.into_iter().zip(&self.shapes) {
             let mut panel = Panel::new(title, "along the arm, mm", "deflection over largest");
-            for (source, mode) in [Source::Theory, Source::Simulation].into_iter().zip(modes) {
-                panel.series.push(Series::new(source, self.shape(shape, mode.0)));
-            }
-            panel
-        }));
+            let theory = self.shape(|part| shape(beta_l, part));
+            let simulation = self.shape(|part| waves.at(part * self.beam.length_m));
+            panel.series.push(Series::new(Source::Theory, theory));
+            panel.series.push(Series::new(Source::Simulation, simulation));
+            panels.push(panel);
+        }
         let mark = |what: &str, published, fitted, of: [(f64, f64); 2]| Mark {
             what: what.into(),
             unit: "Hz",
@@ -93,7 +98,7 @@ impl Modes {
             caption: format!(
                 "The arm with {:.1} g at the wheel's end, the mass with which its first constrained mode is \
                  the published one: fitted. Theory: the classical frequency equations of a beam with a point \
-                 mass. Simulation: the wave-vector method (equation 54). The free arm's seventh mode is its \
+                 mass. Simulation: the wave-vector method (equations 54 and 55). The free arm's seventh mode is its \
                  first bending mode, after six of a rigid body. The virtual rig is given the two \
                  published frequencies as parameters and is no test of them; the study's table of six \
                  constrained modes is not published.",
@@ -109,9 +114,9 @@ impl Modes {
     }
 
     /// Shape of a mode over the arm, mm, its largest deflection 1.
-    fn shape(&self, shape: fn(f64, f64) -> f64, beta_l: f64) -> Vec<(f64, f64)> {
+    fn shape(&self, shape: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
         let along = |i: usize| i as f64 / (POINTS - 1) as f64;
-        let values: Vec<f64> = (0..POINTS).map(|i| shape(beta_l, along(i))).collect();
+        let values: Vec<f64> = (0..POINTS).map(|i| shape(along(i))).collect();
         let most =
             values.iter().fold(0.0, |most: f64, w| if w.abs() > most.abs() { *w } else { most });
         let length = self.beam.length_m * 1e3;

@@ -1,38 +1,29 @@
-//! The ring with memory rolled over the three steps at constant speed: the reference
-//! for gap, depth, area and collision force, and for their histories.
-
-use crate::plant::balance::{Axial, Balance, BalanceError};
-use crate::plant::crossing::{CrossingCase, cross};
-use crate::plant::ring::{Motion, Ring, RingParameters};
-use crate::plant::wall::{Step, Wall};
+//! What the reference models say: gap, depth and area of the converged ring with memory,
+//! and a whole deployment as ring with inertia, waves in the tread and bending of the arm.
 
 use super::case::Case;
-use super::measure::stress_kpa;
-use super::theory::{Drive, Lift, corner_area_mm2};
+use super::course::{Arms, Course, Instant};
+use super::measure::{corner_area_mm2, stress_kpa};
+use super::theory::{Drive, Lift};
+use crate::plant::balance::{Axial, BalanceError};
+use crate::plant::crossing::{CrossingCase, cross};
+use crate::plant::ring::RingParameters;
+use crate::reference::collision::dynamic;
+use crate::reference::impact::rod::{Face, Rod};
+use crate::reference::impact::rubber::THICKNESS_MM;
+use crate::reference::impact::{Rubber, hub_reflection};
+use crate::reference::{Case as Reference, ReferenceError};
 
 /// Elements of the ring and axial way of a step, mm, of single crossings: the gap is
 /// within 0.2 % of the converged one.
 const ELEMENTS: usize = 2880;
 const STRIDE_MM: f64 = 0.01;
 
-/// The same of whole deployments, of which only forces are shown.
-const COARSE: (usize, f64) = (1440, 0.02);
+/// Way before a step at which its crossing begins, mm: touch, and a tenth of a radius.
+const BEGINS_MM: f64 = 16.1;
 
-/// A moment of a deployment.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Moment {
-    /// Time since the motion began, s.
-    pub time_s: f64,
-    /// Axial force of corner and face against the motion, N.
-    pub collision_n: f64,
-    /// That force over the surface that the step cuts off, kPa.
-    pub impact_kpa: f64,
-    /// Tread depth, mm.
-    pub depth_mm: f64,
-    /// Clearance of the undeformed wheel from the root of the step ahead, mm; none
-    /// farther than a radius from it.
-    pub clearance_mm: Option<f64>,
-}
+/// Longest time that waves and arm are followed over where nothing happens, s.
+const QUIET_S: f64 = 1e-3;
 
 /// Axial forces of a wheel that crosses from sleeve `level`, and the force that presses
 /// it, N.
@@ -65,7 +56,7 @@ pub fn lift(case: &Case, drive: Drive, level: usize) -> Result<Lift, BalanceErro
         stride_mm: STRIDE_MM,
     })?;
     let (x, y) = result.lift;
-    let area = corner_area_mm2(ring.radius_mm, ring.width_mm, -x, y - step);
+    let area = corner_area_mm2((ring.radius_mm, ring.width_mm), -x, y - step);
     Ok(Lift {
         gap_mm: result.gap_mm,
         depth_mm: result.lift_depth_mm,
@@ -75,62 +66,65 @@ pub fn lift(case: &Case, drive: Drive, level: usize) -> Result<Lift, BalanceErro
     })
 }
 
-/// A whole deployment, one moment an `interval_s`.
-///
-/// `ring` is the tread: that of the rig, or an elastic one of the effective stiffness.
+/// Cells of the tread in which waves run to the hub.
+const CELLS: usize = 4;
+
+/// A whole deployment of the driven wheel by the reference models, a crossing a step: the
+/// ring with memory and inertia, the waves that its stress sends through the tread, and the
+/// arm that it bends.
 ///
 /// # Errors
-/// [`BalanceError`] if no height of the centre balances the preload.
-pub fn deployment(
-    case: &Case,
-    drive: Drive,
-    elastic: Option<f64>,
-    interval_s: f64,
-) -> Result<Vec<Moment>, BalanceError> {
+/// [`ReferenceError`] if an argument is out of range or the preload cannot be carried.
+pub fn deployment(case: &Case, arms: &Arms) -> Result<Course, ReferenceError> {
     let rig = case.loads.rig();
-    let mut parameters = RingParameters::of(&rig, COARSE.0);
-    if let Some(stiffness) = elastic {
-        parameters.k_inf *= stiffness;
-        parameters.k_0 = parameters.k_inf;
-    }
-    let height_mm = rig.rig.step_height_mm;
-    let steps = rig.rig.step_positions_mm.iter();
-    let wall = Wall::new(steps.map(|&position_mm| Step { position_mm, height_mm }).collect());
-    let mut ring = Ring::new(parameters);
-    let radius = parameters.radius_mm;
-    let stride = COARSE.1;
-    let dt_s = stride / case.speed_mm_s;
-    // Put down a wheel's radius before the travel begins, so that it is forgotten there.
-    let lead = (radius / stride).ceil();
-    let count = (rig.rig.travel_mm / stride + lead) as usize;
-    let mut height = radius - 0.01;
-    let mut base = 0.0;
-    let mut moments = Vec::new();
-    for index in 0..count {
-        let x = (index as f64 + 1.0 - lead) * stride;
-        let local = wall.local(x);
-        height += base - local.base_mm;
-        base = local.base_mm;
-        let (axial, preload_n) = loading(case, drive, local.level);
-        let balance = Balance { preload_n, spring_n_per_mm: 0.0, axial };
-        let motion = Motion { wall: local, height_mm: height, turn_rad: stride / radius, dt_s };
-        let solved = balance.solve(&ring, motion)?;
-        height = solved.height_mm;
-        ring.commit(&Motion { height_mm: height, ..motion });
-        let time_s = x / case.speed_mm_s;
-        if time_s < moments.len() as f64 * interval_s - 1e-9 {
-            continue;
+    let size = (rig.rig.wheel_radius_mm, rig.rig.wheel_width_mm);
+    let steps = rig.rig.step_positions_mm.clone();
+    let mut course = Course::default();
+    let mut modal = arms.modal()?;
+    let mut last_s = 0.0;
+    for (level, &step) in steps.iter().enumerate() {
+        let reference =
+            Reference::new(rig.clone(), case.speed_mm_s, case.pressing_n(level)).driven();
+        let crossing = dynamic(&reference)?;
+        let rubber = Rubber::of(&reference)?;
+        let mut rod = Rod::new(rubber, THICKNESS_MM * 1e-3, CELLS, hub_reflection(&rubber))?;
+        let before = crossing.samples.iter().filter(|sample| sample.t_s < 0.0);
+        let (axial, floor) =
+            before.fold((0.0, 0.0), |(a, b), sample| (a + sample.axial_n, b + sample.floor_n));
+        let resistance = if floor > 0.0 { axial / floor } else { 0.0 };
+        // Until the next crossing begins.
+        let next = steps.get(level + 1).map_or(rig.rig.travel_mm, |next| next - BEGINS_MM);
+        for sample in crossing.samples.iter().filter(|sample| step + sample.x_mm < next) {
+            let time_s = (step + sample.x_mm) / case.speed_mm_s;
+            let dt_s = time_s - last_s;
+            if dt_s <= 0.0 {
+                continue;
+            }
+            last_s = time_s;
+            let collision_n = (sample.axial_n - resistance * sample.floor_n).max(0.0);
+            let top = sample.y_mm - rig.rig.step_height_mm;
+            let stress = stress_kpa(collision_n, corner_area_mm2(size, -sample.x_mm, top));
+            let waves = (dt_s.min(QUIET_S) / rod.step_s()).ceil();
+            for _ in 0..waves as usize {
+                rod.step(Face::Pressure(1e3 * stress));
+            }
+            modal.step(arms.across_n(level, collision_n), dt_s);
+            course.push(&Instant {
+                time_s,
+                collision_n,
+                impact_kpa: 1e-3 * rod.hub_pa(),
+                arm_um: 1e6 * modal.deflection_m(),
+                clearance_mm: (level == 0 && sample.x_mm < 0.0).then_some(sample.clearance_mm),
+            });
         }
-        let collision_n = solved.contact.step_sine_n.max(0.0);
-        let above = height - local.rise_mm;
-        let area = corner_area_mm2(radius, parameters.width_mm, local.ahead_mm, above);
-        moments.push(Moment {
-            time_s,
-            collision_n,
-            impact_kpa: stress_kpa(collision_n, area),
-            depth_mm: solved.contact.depth_mm,
-            clearance_mm: (local.ahead_mm < radius).then(|| local.ahead_mm.hypot(height) - radius),
-        });
     }
-    Ok(moments)
+    // The rest of the way, on the last sleeve.
+    let end_s = rig.rig.travel_mm / case.speed_mm_s;
+    while last_s < end_s {
+        last_s += QUIET_S;
+        modal.step(0.0, QUIET_S);
+        let arm_um = 1e6 * modal.deflection_m();
+        course.push(&Instant { time_s: last_s, arm_um, ..Instant::default() });
+    }
+    Ok(course)
 }

@@ -6,6 +6,11 @@ use interstage::model::formula::Formula;
 use interstage::supervise::Direction;
 
 use super::case::Case;
+use super::course::{Arms, Course, Instant};
+use super::measure::{corner_area_mm2, stress_kpa};
+use crate::plant::balance::{Axial, Balance, BalanceError};
+use crate::plant::ring::{Motion, Ring, RingParameters};
+use crate::plant::wall::{Step, Wall};
 
 /// Whether the wheel is pushed without friction, as in the study's theory, or drives
 /// itself against its load, as on a rig.
@@ -49,7 +54,7 @@ pub fn lift(case: &Case, drive: Drive, level: usize) -> Lift {
         depth_mm: formula.depth_mm(gap),
         area_mm2: area,
         collision_n: collision,
-        impact_kpa: super::measure::stress_kpa(collision, area),
+        impact_kpa: stress_kpa(collision, area),
     }
 }
 
@@ -70,22 +75,7 @@ pub fn mean_lift(case: &Case, drive: Drive) -> Lift {
 /// Contact area at lift-off with this gap, mm^2.
 fn area_of_gap_mm2(formula: &Formula, gap_mm: f64) -> f64 {
     let above = formula.radius_mm - formula.step_mm;
-    corner_area_mm2(formula.radius_mm, formula.width_mm, formula.distance_mm(gap_mm), above)
-}
-
-/// Part of the undeformed wheel's surface that face and top of a step cut off, mm^2.
-///
-/// Equation: `A = R L (acos(u/R) - asin(d/R))`, d the way to the face and u the height
-/// of the centre above the top, both mm. Range: 0 where the corner stands outside the
-/// wheel. Memory lets the trailing part of it go earlier: the true area is smaller.
-#[must_use]
-pub fn corner_area_mm2(radius_mm: f64, width_mm: f64, ahead_mm: f64, above_mm: f64) -> f64 {
-    if ahead_mm.hypot(above_mm) >= radius_mm || above_mm < 0.0 {
-        return 0.0;
-    }
-    let start = (ahead_mm.max(0.0) / radius_mm).min(1.0).asin();
-    let end = (above_mm / radius_mm).min(1.0).acos();
-    radius_mm * width_mm * (end - start)
+    corner_area_mm2((formula.radius_mm, formula.width_mm), formula.distance_mm(gap_mm), above)
 }
 
 /// Contact area that belongs to a tread depth at lift-off, mm^2, by the nominal
@@ -96,7 +86,63 @@ pub fn area_of_depth_mm2(case: &Case, depth_mm: f64) -> f64 {
     let above = formula.radius_mm - formula.step_mm;
     let reach = formula.radius_mm - depth_mm;
     let ahead = (reach * reach - above * above).max(0.0).sqrt();
-    corner_area_mm2(formula.radius_mm, formula.width_mm, ahead, above)
+    corner_area_mm2((formula.radius_mm, formula.width_mm), ahead, above)
+}
+
+/// Elements of the elastic ring of a whole deployment and its axial way per step, mm.
+const COARSE: (usize, f64) = (1440, 0.02);
+
+/// A whole deployment of the driven wheel as the reduced model has it: an elastic ring of the
+/// stiffness that is effective at lift-off, and an arm that bends as under a still force.
+///
+/// # Errors
+/// [`BalanceError`] if no height of the centre balances the preload.
+pub fn deployment(case: &Case, arms: &Arms) -> Result<Course, BalanceError> {
+    let rig = case.loads.rig();
+    let formula = Formula::new(&rig);
+    let gap = mean_lift(case, Drive::Driven).gap_mm;
+    let mut tread = RingParameters::of(&rig, COARSE.0);
+    tread.k_inf *= formula.stiffness(Direction::Deploy, case.speed_mm_s, gap);
+    tread.k_0 = tread.k_inf;
+    let height_mm = rig.rig.step_height_mm;
+    let steps = rig.rig.step_positions_mm.iter();
+    let wall = Wall::new(steps.map(|&position_mm| Step { position_mm, height_mm }).collect());
+    let mut ring = Ring::new(tread);
+    let (radius, stride) = (tread.radius_mm, COARSE.1);
+    let (dt_s, turn_rad) = (stride / case.speed_mm_s, stride / radius);
+    let mut height = radius - 0.01;
+    let mut base = 0.0;
+    let mut course = Course::default();
+    for index in 0..(rig.rig.travel_mm / stride) as usize {
+        let x = (index + 1) as f64 * stride;
+        let local = wall.local(x);
+        height += base - local.base_mm;
+        base = local.base_mm;
+        let balance = Balance {
+            preload_n: case.pressing_n(local.level),
+            spring_n_per_mm: 0.0,
+            axial: Axial::Driven(case.load_n()),
+        };
+        let motion = Motion { wall: local, height_mm: height, turn_rad, dt_s };
+        let solved = balance.solve(&ring, motion)?;
+        height = solved.height_mm;
+        ring.commit(&Motion { height_mm: height, ..motion });
+        // Nothing resists the rolling of an elastic wheel.
+        let collision_n = solved.contact.sine_n.max(0.0);
+        let size = (radius, tread.width_mm);
+        let ahead = corner_area_mm2(size, local.ahead_mm, height - local.rise_mm);
+        let area =
+            if ahead > 0.0 { ahead } else { corner_area_mm2(size, -local.behind_mm, height) };
+        course.push(&Instant {
+            time_s: x / case.speed_mm_s,
+            collision_n,
+            impact_kpa: stress_kpa(collision_n, area),
+            arm_um: 1e3 * arms.still_mm(local.level, collision_n),
+            clearance_mm: (local.ahead_mm < radius && local.level == 0)
+                .then(|| local.ahead_mm.hypot(height) - radius),
+        });
+    }
+    Ok(course)
 }
 
 #[cfg(test)]
@@ -112,26 +158,6 @@ mod tests {
             let area = area_of_depth_mm2(&case, lift.depth_mm);
             assert!((area / lift.area_mm2 - 1.0).abs() < 1e-9, "{area} {lift:?}");
         }
-    }
-
-    #[test]
-    fn the_area_is_that_of_a_fine_sum() {
-        let (radius, width, ahead, above) = (25.0, 28.0, 10.0, 21.0);
-        let n = 200_000;
-        let pitch = 1.2 / f64::from(n);
-        let inside = (0..n)
-            .map(|i| (f64::from(i) + 0.5) * pitch)
-            .filter(|psi: &f64| {
-                // The ray meets the face first, or passes over the corner to the top.
-                let face = ahead / psi.sin();
-                let at_face = radius.min(face) * psi.cos();
-                let reach = if at_face >= above { face } else { above / psi.cos() };
-                reach < radius
-            })
-            .count();
-        let sum = inside as f64 * pitch * radius * width;
-        let area = corner_area_mm2(radius, width, ahead, above);
-        assert!((area / sum - 1.0).abs() < 1e-3, "{area} {sum}");
     }
 
     #[test]

@@ -34,13 +34,16 @@ pub fn figure(all: &[Histories]) -> Figure {
         all.iter().map(move |one| one.panel(quantity, quantity.title(&one.case)))
     });
     let caption = "Three transitions at rig loads (20 N on top, of which this wheel lifts a \
-                   third). Collision: axial force of corner and face on the wheel. Impact: that \
-                   force over the part of the wheel that the step cuts off. Vibration: deflection \
-                   of the arm by the collision and, in the experiment, by the drive's torque \
-                   ripple. Theory: an elastic ring of the reduced model's effective stiffness. \
-                   Simulation: the ring with memory. Experiment: the virtual rig logged every \
-                   0.1 s, four means of ten; collision and impact are the plant's own, for which \
-                   the rig has no sensor. At 8 mm/s the three transitions take the 10 s of the \
+                   third). (a) Collision: axial force of the contact against the motion, beyond \
+                   rolling resistance. (b) Impact: that force over the part of the wheel that the \
+                   step cuts off. (c) Vibration: deflection of the arm at the wheel by the part of the \
+                   collision that lies across it. Theory: an elastic ring of the reduced model's \
+                   effective stiffness, the arm as under a still force. Simulation: the reference \
+                   models, a ring with memory and inertia, waves in the tread to the hub, six modes \
+                   of the arm. Experiment: the virtual rig logged every 0.1 s, four means of ten; \
+                   forces are the plant's own, for which the rig has no sensor, and the arm's \
+                   deflection, the largest since the last line of the log, includes the shaking by \
+                   the drive's torque ripple. At 8 mm/s the three transitions take the 10 s of the \
                    study; its own table of cases is not published, and no value of its curves is \
                    printed."
         .to_owned();
@@ -157,12 +160,12 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
             "After the third transition the values approach zero: contact is smooth.",
             left.iter().all(|&part| part < 0.05),
             format!(
-                "Largest value after it over the largest of all: theory {:.3}, simulation {:.3}, \
-                 experiment {:.3}.",
+                "Largest value after it, beyond that before the first, over the largest of all: theory \
+                 {:.3}, simulation {:.3}, experiment {:.3}. What is there before and after is the \
+                 drive's torque ripple, which shakes the arm between the steps as well.",
                 left[0], left[1], left[2]
             ),
-            "Collision and impact are zero; the arm keeps trembling with the torque ripple of \
-             motor and gearbox as it does between the steps.",
+            "",
         ),
         of("collision-before-2-s").judged(
             "The largest collision comes in the first transition, before 2 s.",
@@ -180,7 +183,7 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
                 seconds(hit),
                 seconds(collided)
             ),
-            "The stress peaks first, while the corner still presses on a narrow part of the tread. A \
+            "The stress peaks no later than the force: the corner then presses on a narrow part of the tread. A \
              stress wave crosses the tread in about 0.1 ms: it cannot hold anything up by tenths of \
              a second.",
         ),
@@ -195,7 +198,7 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
                 humps[2],
                 seconds(shaken)
             ),
-            "The arm follows the collision within milliseconds (its modes are 163 and 276 Hz) and has \
+            "The arm follows the collision within milliseconds (its first mode is 276 Hz) and has \
              one peak with it; no second one arises from stress waves.",
         ),
         of("collision-grows-with-speed-rig").judged(
