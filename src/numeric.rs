@@ -4,16 +4,28 @@
 //!
 //! Nothing here divides 64-bit numbers, loops without a bound or panics. The
 //! conversion from SI numbers, which does use floats, is in one place
-//! ([`checked`], [`Table::build`], [`LowPass::build`]) and runs at start only.
+//! ([`checked`], [`Divisor::build`], [`Table::build`], [`LowPass::build`]) and runs at
+//! start only.
 
 mod build;
 mod divide;
+mod divisor;
+mod fraction_root;
+mod high;
 mod low_pass;
+mod quotient;
 mod root;
+mod sine;
 mod table;
 
 pub use build::checked;
-pub use divide::{divide, reciprocal};
+pub use divide::{divide, part, reciprocal};
+pub use divisor::Divisor;
+pub use fraction_root::sqrt_fraction;
+pub use high::{fits, fits_with_slope, high};
+pub(crate) use high::{horner, horner_with_slope};
 pub use low_pass::{LowPass, LowPassState};
+pub use quotient::{fraction, reciprocal_of_normalised};
 pub use root::sqrt;
+pub use sine::sin_cos;
 pub use table::Table;

@@ -6,12 +6,11 @@
 //! and resolution are stated per alias; what needs more is an accumulator of its
 //! own (see [`Travel`]).
 
-use fixed::types::{I16F16, I32F32};
+mod q16;
 
-pub use fixed::Saturating;
+use fixed::types::I32F32;
 
-/// Saturating Q15.16: range -32768 to 32767.99998, LSB 2^-16 = 15.3e-6.
-pub type Q16 = Saturating<I16F16>;
+pub use q16::Q16;
 
 /// Length or position, mm. LSB 15 nm; the rig spans 0.4 m, headroom 80-fold.
 pub type Millimetres = Q16;
@@ -54,7 +53,7 @@ pub const TICK_HZ: u32 = 1000;
 pub const fn q16(millionths: i64) -> Q16 {
     let bits = millionths * 65_536 / 1_000_000;
     assert!(bits >= i32::MIN as i64 && bits <= i32::MAX as i64);
-    Saturating(I16F16::from_bits(bits as i32))
+    Q16::from_bits(bits as i32)
 }
 
 /// Distance covered in one tick at `speed`, mm, exact to half an LSB of [`Travel`].
@@ -62,7 +61,7 @@ pub const fn q16(millionths: i64) -> Q16 {
 pub fn per_tick(speed: MillimetresPerSecond) -> Travel {
     // 2^32 / 1000 rounded: Q16 x Q32 -> Q48, shifted to Q32.
     const TICK_Q32: i64 = 4_294_967;
-    Travel::from_bits((i64::from(speed.0.to_bits()) * TICK_Q32) >> 16)
+    Travel::from_bits((i64::from(speed.to_bits()) * TICK_Q32) >> 16)
 }
 
 /// A duration in whole ticks as seconds, saturating at 32767 s.
@@ -70,7 +69,7 @@ pub fn per_tick(speed: MillimetresPerSecond) -> Travel {
 pub fn ticks_to_seconds(ticks: u32) -> Seconds {
     // 2^16 / 1000 = 65.536 = 1_099_511_628 / 2^24 within 3e-10.
     let bits = (u64::from(ticks) * 1_099_511_628) >> 24;
-    Saturating(I16F16::from_bits(i32::try_from(bits).unwrap_or(i32::MAX)))
+    Q16::from_bits(i32::try_from(bits).unwrap_or(i32::MAX))
 }
 
 #[cfg(test)]
@@ -87,7 +86,7 @@ mod tests {
     proptest! {
         #[test]
         fn a_tick_of_travel_is_speed_times_a_millisecond(bits in any::<i32>()) {
-            let speed = Saturating(I16F16::from_bits(bits));
+            let speed = Q16::from_bits(bits);
             let exact = speed.to_num::<f64>() * 1e-3;
             let got = per_tick(speed).to_num::<f64>();
             // The reciprocal is 7e-8 short of 2^32/1000; the shift floors.

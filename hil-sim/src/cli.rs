@@ -5,6 +5,7 @@
 //! code is 0 if all is well, 1 if what was run did not end well, 2 if it could not
 //! be run as asked; an error is one line.
 
+mod account;
 mod compare;
 mod constants;
 mod crossing;
@@ -46,6 +47,7 @@ enum Verb {
     Paper(paper::Args),
     Keys(keys::Args),
     Size(size::Args),
+    Account(account::Args),
     Constants(constants::Args),
     Docs(docs::Args),
     Test(test::Args),
@@ -62,6 +64,7 @@ impl Verb {
             Self::Paper(args) => paper::run(args),
             Self::Keys(args) => keys::run(args),
             Self::Size(args) => size::run(args),
+            Self::Account(args) => account::run(args),
             Self::Constants(args) => constants::run(args),
             Self::Docs(args) => docs::run(args),
             Self::Test(args) => test::run(args),

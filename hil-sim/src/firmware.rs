@@ -45,9 +45,9 @@ pub enum FirmwareError {
     /// cargo did not build the image; its own messages have gone to stderr.
     #[error("building the firmware failed ({0})")]
     Build(std::process::ExitStatus),
-    /// cargo built something, but named no image.
-    #[error("cargo reported no executable for {PACKAGE}")]
-    NoExecutable,
+    /// cargo built something, but not this.
+    #[error("cargo reported no executable for {0}")]
+    NoExecutable(String),
     /// The image could not be read.
     #[error("could not read {path}: {source}")]
     Read {
@@ -100,22 +100,25 @@ impl Profile {
 }
 
 /// The workspace that this tool was built from.
-fn workspace() -> &'static Path {
+pub(crate) fn workspace() -> &'static Path {
     let package = Path::new(env!("CARGO_MANIFEST_DIR"));
     package.parent().unwrap_or(package)
+}
+
+/// The directory of build results, if nothing but `CARGO_TARGET_DIR` moves it.
+pub(crate) fn target_directory() -> PathBuf {
+    env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace().join("target"), PathBuf::from)
 }
 
 /// Where cargo leaves the image if nothing but `CARGO_TARGET_DIR` says otherwise;
 /// [`build`] returns the place that cargo itself names.
 #[must_use]
 pub fn elf_path(profile: Profile) -> PathBuf {
-    let target =
-        env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace().join("target"), PathBuf::from);
-    target.join(TARGET).join(profile.folder()).join(PACKAGE)
+    target_directory().join(TARGET).join(profile.folder()).join(PACKAGE)
 }
 
 /// A tool of the toolchain that runs this program, if it is known.
-fn tool(variable: &str, name: &str) -> OsString {
+pub(crate) fn tool(variable: &str, name: &str) -> OsString {
     env::var_os(variable).unwrap_or_else(|| name.into())
 }
 
@@ -159,12 +162,27 @@ pub fn ensure_target() -> Result<(), FirmwareError> {
 /// # Errors
 /// [`FirmwareError`] if the target cannot be had or the build fails.
 pub fn build(profile: Profile) -> Result<PathBuf, FirmwareError> {
+    build_binary(PACKAGE, PACKAGE, profile, &[])
+}
+
+/// Builds a binary for the board as [`build`] does the firmware, with these settings
+/// of cargo (`key=value`) instead of the workspace's.
+///
+/// # Errors
+/// As [`build`].
+pub fn build_binary(
+    package: &str,
+    binary: &str,
+    profile: Profile,
+    settings: &[String],
+) -> Result<PathBuf, FirmwareError> {
     ensure_target()?;
     let mut cargo = Command::new(tool("CARGO", "cargo"));
     cargo
         .current_dir(workspace())
-        .args(["build", "--package", PACKAGE, "--bin", PACKAGE, "--target", TARGET])
+        .args(["build", "--package", package, "--bin", binary, "--target", TARGET])
         .args(["--message-format", "json-render-diagnostics"])
+        .args(settings.iter().flat_map(|setting| ["--config", setting]))
         // Flags from the environment would displace the linker arguments of
         // `.cargo/config.toml`.
         .env_remove("RUSTFLAGS")
@@ -177,7 +195,8 @@ pub fn build(profile: Profile) -> Result<PathBuf, FirmwareError> {
     if !built.status.success() {
         return Err(FirmwareError::Build(built.status));
     }
-    executable(&String::from_utf8_lossy(&built.stdout)).ok_or(FirmwareError::NoExecutable)
+    executable(&String::from_utf8_lossy(&built.stdout), binary)
+        .ok_or_else(|| FirmwareError::NoExecutable(binary.to_owned()))
 }
 
 /// The part of a cargo message that names an executable.
@@ -193,11 +212,11 @@ struct ArtifactTarget {
 }
 
 /// The image's path from cargo's messages, one JSON object a line.
-fn executable(messages: &str) -> Option<PathBuf> {
+pub(crate) fn executable(messages: &str, binary: &str) -> Option<PathBuf> {
     messages
         .lines()
         .filter_map(|line| serde_json::from_str::<Artifact>(line).ok())
-        .filter(|artifact| artifact.target.name == PACKAGE)
+        .filter(|artifact| artifact.target.name == binary)
         .find_map(|artifact| artifact.executable)
 }
 
@@ -432,7 +451,7 @@ mod tests {
 {"reason":"compiler-artifact","target":{"name":"interstage"},"executable":null}
 {"reason":"compiler-artifact","target":{"name":"interstage"},"executable":"/t/interstage"}
 {"reason":"build-finished","success":true}"#;
-        assert_eq!(executable(messages), Some(PathBuf::from("/t/interstage")));
-        assert_eq!(executable(""), None);
+        assert_eq!(executable(messages, "interstage"), Some(PathBuf::from("/t/interstage")));
+        assert_eq!(executable("", "interstage"), None);
     }
 }

@@ -1,6 +1,8 @@
 //! The virtual rig: a physical plant for the controller, the scenarios it is run
 //! in, and what is shown of a run.
 
+#[cfg(feature = "board")]
+pub mod board;
 pub mod cli;
 pub mod compare;
 pub mod constants;
@@ -11,6 +13,7 @@ pub mod montecarlo;
 pub mod paper;
 pub mod plant;
 pub mod progress;
+pub mod provision;
 pub mod record;
 pub mod reference;
 pub mod report;

@@ -12,6 +12,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, ensure};
 
 use crate::firmware::{self, Budget, Footprint, Profile, TARGET};
+use crate::provision::Tools;
 
 /// How a step ended.
 enum Ended {
@@ -29,15 +30,21 @@ struct Step {
 }
 
 /// In order of time taken, so that the cheap ones fail first.
-const STEPS: [Step; 7] = [
+const STEPS: [Step; 9] = [
     Step { name: "Toolchain", run: toolchain },
     Step { name: "Format", run: format },
+    Step { name: "Tools of the emulator", run: tools },
     Step { name: "Lints", run: lints },
+    Step { name: "Lints without emulator", run: plain_lints },
     Step { name: "Lints of the firmware", run: firmware_lints },
     Step { name: "Documentation", run: documentation },
     Step { name: "Firmware, debug", run: |root| image(root, Profile::Debug) },
     Step { name: "Firmware, release", run: |root| image(root, Profile::Release) },
 ];
+
+/// The emulated board in every step that can have it, so that its core, which takes
+/// minutes, is built once for all of them.
+const WITH_BOARD: [&str; 2] = ["--features", "hil-sim/board"];
 
 /// Runs every step and then `cargo test` with `arguments`, and returns the exit code
 /// of the first that failed, or 0. Headings, times and cargo's messages go to
@@ -67,7 +74,10 @@ pub fn run(arguments: &[String]) -> Result<u8> {
     heading("Tests");
     // Here, because nothing may follow cargo's own lines.
     eprint!("{summary}");
-    let status = run_cargo(cargo(&root).args(["test", "--workspace"]).args(arguments))?;
+    let mut tests = cargo(&root);
+    tests.args(["test", "--workspace"]).args(WITH_BOARD).args(arguments);
+    provided(&mut tests)?;
+    let status = run_cargo(&mut tests)?;
     Ok(if status.success() { 0 } else { code(status) })
 }
 
@@ -127,11 +137,41 @@ fn format(root: &Path) -> Result<Ended> {
     step(cargo(root).args(["fmt", "--all", "--check"]))
 }
 
+/// Fetches what the emulator is built with. Where that cannot be had, this fails: a
+/// suite that left the board out would say more than it has seen.
+fn tools(_root: &Path) -> Result<Ended> {
+    match Tools::ready() {
+        Ok(_) => Ok(Ended::Passed),
+        Err(error) => {
+            eprintln!("{}", error.to_string().replace('\n', " "));
+            Ok(Ended::Failed(1))
+        }
+    }
+}
+
+/// Tells `command` where the emulator's tools are.
+fn provided(command: &mut Command) -> Result<()> {
+    Tools::ready()?.apply(command);
+    Ok(())
+}
+
 fn lints(root: &Path) -> Result<Ended> {
     if !has(root, "clippy") {
         return Ok(Ended::Skipped("clippy is not installed"));
     }
-    step(cargo(root).args(["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]))
+    let mut clippy = cargo(root);
+    clippy.args(["clippy", "--workspace", "--all-targets"]).args(WITH_BOARD);
+    provided(&mut clippy)?;
+    step(clippy.args(["--", "-D", "warnings"]))
+}
+
+/// The package as those have it who never ask for the emulated board.
+fn plain_lints(root: &Path) -> Result<Ended> {
+    if !has(root, "clippy") {
+        return Ok(Ended::Skipped("clippy is not installed"));
+    }
+    let mut clippy = cargo(root);
+    step(clippy.args(["clippy", "--package", "hil-sim", "--lib", "--bins", "--", "-D", "warnings"]))
 }
 
 fn firmware_lints(root: &Path) -> Result<Ended> {
@@ -141,12 +181,16 @@ fn firmware_lints(root: &Path) -> Result<Ended> {
     step(
         cargo(root)
             .args(["clippy", "--package", "interstage", "--lib", "--bin", "interstage"])
+            .args(["--package", "interstage-images", "--bin", "measure"])
             .args(["--target", TARGET, "--", "-D", "warnings"]),
     )
 }
 
 fn documentation(root: &Path) -> Result<Ended> {
-    step(cargo(root).env("RUSTDOCFLAGS", "-D warnings").args(["doc", "--workspace", "--no-deps"]))
+    let mut doc = cargo(root);
+    doc.env("RUSTDOCFLAGS", "-D warnings").args(["doc", "--workspace", "--no-deps"]);
+    provided(&mut doc)?;
+    step(doc.args(WITH_BOARD))
 }
 
 /// What the image of this profile may take: the one that is flashed its budget, the

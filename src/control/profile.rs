@@ -5,7 +5,6 @@
 use crate::numeric::{checked, sqrt};
 use crate::rig::{Rig, RigError};
 use crate::units::{MillimetresPerSecond, MillimetresPerSecond2, Q16, Travel, per_tick};
-use fixed::types::I16F16;
 
 /// Limits of the profile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,7 +56,7 @@ impl Profile {
         let target = target.max(Q16::ZERO);
         let missing = target - state.speed();
         if missing.abs() <= self.snap() && state.acceleration.abs() <= self.jerk_per_tick {
-            state.speed = Travel::from_num(target.0);
+            state.speed = target.widen();
             state.acceleration = Q16::ZERO;
             return;
         }
@@ -71,7 +70,7 @@ impl Profile {
 
     /// Speed error that one more tick of full jerk would overshoot, mm/s.
     fn snap(&self) -> MillimetresPerSecond {
-        fixed::Saturating(per_tick(self.jerk_per_tick).to_num::<I16F16>()) + Q16::DELTA
+        Q16::narrow(per_tick(self.jerk_per_tick)) + Q16::DELTA
     }
 }
 
@@ -79,7 +78,7 @@ impl ProfileState {
     /// Speed, mm/s.
     #[must_use]
     pub fn speed(&self) -> MillimetresPerSecond {
-        fixed::Saturating(I16F16::saturating_from_num(self.speed))
+        Q16::narrow(self.speed)
     }
 
     /// Acceleration, mm/s^2.

@@ -158,7 +158,7 @@ mod tests {
         #[test]
         fn slopes_are_those_of_a_wheel_whatever_the_distance(bits in proptest::prelude::any::<i32>()) {
             let rise = Rise::try_build(&Rig::prototype()).unwrap();
-            let ahead = fixed::Saturating(fixed::types::I16F16::from_bits(bits));
+            let ahead = Q16::from_bits(bits);
             let within = |x: Ratio| (-0.01..1.0).contains(&x.to_num::<f64>());
             proptest::prop_assert!(within(rise.slope(ahead)));
             for way in Direction::ALL {

@@ -9,7 +9,7 @@ use crate::units::Ratio;
 #[must_use]
 pub fn duty(ratio: Ratio) -> Duty {
     // Q16 to Q15.
-    let bits = ratio.0.to_bits() >> 1;
+    let bits = ratio.to_bits() >> 1;
     Duty::from_bits(bits.clamp(-32_767, 32_767) as i16)
 }
 

@@ -154,9 +154,11 @@ impl Schedule {
     pub fn targets(&self, rise: &Rise, plan: &Plan, course: &Course) -> Targets {
         let to_window = self.to_window(rise, course);
         let within = |way: Millimetres| to_window.is_some_and(|ahead| ahead <= way);
+        // Out of sight of a step no braking can be due, whatever the speed is doing.
+        let sight = self.sight(plan, course);
         let braking = course.braking
             || course.critical
-            || within(self.brake_way(course, plan.cross_speed) + BRAKE_RESERVE);
+            || within(sight) && within(self.brake_way(course, plan.cross_speed) + BRAKE_RESERVE);
         let ramping =
             course.ramping || course.critical || within(self.ramp_way(plan, course.reference));
         let preload = if ramping { plan.cross_preload } else { plan.cruise_preload };
@@ -168,7 +170,7 @@ impl Schedule {
             && ahead > -self.tolerance
         {
             // Arrive no sooner than the preload: at the window, not at the corner.
-            let needed = divide(short, self.timing.rate()) + SETTLING;
+            let needed = self.timing.ramp(short) + SETTLING;
             let allowed = divide(ahead.max(Q16::ZERO), needed);
             if allowed < speed {
                 speed = allowed;
@@ -176,7 +178,7 @@ impl Schedule {
             }
         }
         Targets {
-            speed: speed.min(self.end_speed(course)),
+            speed: speed.min(self.end_speed(course, sight)),
             preload,
             ramping,
             braking,
@@ -223,6 +225,15 @@ impl Schedule {
         self.to_window(rise, course).is_some_and(|ahead| ahead <= SEARCH)
     }
 
+    /// Way within which a step or the end can ask for another speed, mm.
+    fn sight(&self, plan: &Plan, course: &Course) -> Millimetres {
+        if course.speed <= plan.cruise_speed.max(plan.cross_speed) {
+            plan.brake_horizon + BRAKE_RESERVE
+        } else {
+            Q16::MAX
+        }
+    }
+
     /// Way in which the profile comes from where it stands to `speed`, mm. Acceleration
     /// still under way is first taken back: until then the speed rises to a peak.
     fn brake_way(&self, course: &Course, speed: MillimetresPerSecond) -> Millimetres {
@@ -234,8 +245,10 @@ impl Schedule {
 
     /// Speed towards the end of travel, mm/s: free until braking must begin, then a creep
     /// that is left within a few hundredths of a millimetre.
-    fn end_speed(&self, course: &Course) -> MillimetresPerSecond {
-        if self.arrived(course.remaining) {
+    fn end_speed(&self, course: &Course, sight: Millimetres) -> MillimetresPerSecond {
+        if course.remaining > sight {
+            Q16::MAX
+        } else if self.arrived(course.remaining) {
             Q16::ZERO
         } else if course.remaining <= self.brake_way(course, END_CREEP) + BRAKE_RESERVE {
             END_CREEP

@@ -64,12 +64,12 @@ impl SpeedLoop {
         load: Newtons,
     ) -> Duty {
         let error = wanted - measured;
-        let load_part = fixed::Saturating((load * self.per_load).0 >> 8);
+        let load_part = Q16::from_bits((load * self.per_load).to_bits() >> 8);
         let forward = wanted * self.per_speed + load_part;
         let whole = forward + self.proportional * error + state.value();
         let pushing = if error < Q16::ZERO { whole > -FULL } else { whole < FULL };
         if pushing {
-            let limit = Travel::from_num(INTEGRAL_LIMIT.0);
+            let limit = INTEGRAL_LIMIT.widen();
             state.integral = state
                 .integral
                 .saturating_add(per_tick(self.integral * error.clamp(-MOST_ERROR, MOST_ERROR)))
@@ -86,7 +86,7 @@ impl SpeedLoopState {
     }
 
     fn value(&self) -> Ratio {
-        fixed::Saturating(fixed::types::I16F16::saturating_from_num(self.integral))
+        Q16::narrow(self.integral)
     }
 }
 
@@ -144,7 +144,7 @@ mod tests {
         fn no_input_overflows(wanted in any::<i32>(), measured in any::<i32>(), load in any::<i32>()) {
             let control = SpeedLoop::try_build(&Rig::prototype()).unwrap();
             let mut state = SpeedLoopState::default();
-            let at = |bits| fixed::Saturating(fixed::types::I16F16::from_bits(bits));
+            let at = |bits| Q16::from_bits(bits);
             for _ in 0..3 {
                 control.step(&mut state, at(wanted), at(measured), at(load));
             }

@@ -20,6 +20,7 @@ use crate::estimate::crossing::{Contact, CrossingWatch};
 use crate::hal::{Duty, MotorCommand};
 use crate::log::{Entry, Event, Telemetry};
 use crate::model::{Plan, PlanRequest};
+use crate::numeric::part;
 use crate::rig::MAX_STEPS;
 use crate::sense::raw::SensorFrame;
 use crate::sense::{SensedState, Senses};
@@ -60,7 +61,7 @@ pub struct Input {
 }
 
 /// What a tick gives.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Output {
     /// Drive bridge.
     pub drive: MotorCommand,
@@ -104,8 +105,8 @@ pub struct Controller {
     foresight: Seconds,
     /// Axial load on this wheel, N.
     load: Newtons,
-    /// Radial force per axial load and tangent of the arm angle.
-    coupling: Ratio,
+    /// Radial force per tangent of the arm angle: coupling times axial load, N.
+    full_wedge: Newtons,
     /// Rotor, gears and carriage seen at the tread, N s^2/mm.
     inertia: Q16,
     friction: Ratio,
@@ -116,32 +117,42 @@ struct Pass<'a> {
     now: Tick,
     sensed: &'a SensedState,
     position: Millimetres,
-    events: Events,
-    request: Option<PlanRequest>,
-    rearm: bool,
+    /// Radial force that the arm's inclination adds to the preload, N.
+    wedge: Newtons,
+    output: &'a mut Output,
 }
 
 impl Pass<'_> {
     fn log(&mut self, event: Event) {
         // A tick that has more to say than fits says the first eight.
-        let _ = self.events.push(Entry { at: self.now, event });
+        let _ = self.output.events.push(Entry { at: self.now, event });
     }
 }
 
 impl Controller {
     /// One tick: sensors, faults, command, mode, phase, schedule, loops.
     pub fn step(&self, state: &mut State, input: &Input) -> Output {
+        let mut output = Output::default();
+        self.step_into(state, input, &mut output);
+        output
+    }
+
+    /// The same with the output where it is wanted: it is too large to be moved in every
+    /// tick. What it held before is forgotten.
+    pub fn step_into(&self, state: &mut State, input: &Input, output: &mut Output) {
+        output.request = None;
+        output.rearm = false;
+        output.events.clear();
         let acceleration = state.acceleration();
         let sensed = self.senses.step(&mut state.senses, input.now, &input.sensors, acceleration);
         let mut pass = Pass {
             now: input.now,
             sensed: &sensed,
             position: state.odometry.position(sensed.travel),
-            events: Events::new(),
-            request: None,
-            rearm: false,
+            wedge: self.full_wedge * sensed.tan_arm,
+            output,
         };
-        self.take_plan(state, &mut pass, input.plan);
+        self.take_plan(state, &mut pass, input.plan.as_ref());
         self.look_for_faults(state, &mut pass, input);
         self.take_command(state, &mut pass, input.command);
         self.advance_mode(state, &mut pass);
@@ -149,15 +160,9 @@ impl Controller {
         let targets = self.targets(state, &mut pass);
         let (drive, preload) = self.actuate(state, &pass, &targets);
         self.note_stage(state, &mut pass);
-        let telemetry = self.telemetry(state, &pass, &targets, drive, preload);
-        Output {
-            drive,
-            preload,
-            request: pass.request,
-            rearm: pass.rearm,
-            events: pass.events,
-            telemetry,
-        }
+        pass.output.drive = drive;
+        pass.output.preload = preload;
+        pass.output.telemetry = self.telemetry(state, &pass, &targets);
     }
 
     fn look_for_faults(&self, state: &mut State, pass: &mut Pass<'_>, input: &Input) {
@@ -185,15 +190,24 @@ impl Controller {
         }
     }
 
-    /// Where the wheel is on its way.
-    fn course(&self, state: &State, pass: &Pass<'_>, direction: Direction) -> Course {
-        let distance = self.step_position(state.next_step).map(|face| match direction {
+    /// Axial way to the face of the step ahead, mm; none if no step is left.
+    fn distance(
+        &self,
+        state: &State,
+        pass: &Pass<'_>,
+        direction: Direction,
+    ) -> Option<Millimetres> {
+        self.step_position(state.next_step).map(|face| match direction {
             Direction::Deploy => face - pass.position,
             Direction::Retract => pass.position - face,
-        });
+        })
+    }
+
+    /// Where the wheel is on its way.
+    fn course(&self, state: &State, pass: &Pass<'_>, direction: Direction) -> Course {
         Course {
             direction,
-            distance,
+            distance: self.distance(state, pass, direction),
             remaining: self.schedule.remaining(direction, pass.position),
             critical: state.critical(),
             ramping: state.ramping,
@@ -220,9 +234,10 @@ impl Controller {
             Mode::Run(direction, _) => (direction, true),
             _ => return hold,
         };
-        let Some(plan) = state.plan else { return hold };
+        let Some(plan) = state.plan.as_ref() else { return hold };
         let course = self.course(state, pass, direction);
-        let mut targets = self.schedule.targets(&self.rise, &plan, &course);
+        let mut targets = self.schedule.targets(&self.rise, plan, &course);
+        let (step, cross_speed, cross_preload) = (plan.step, plan.cross_speed, plan.cross_preload);
         state.ramping = targets.ramping;
         state.braking = targets.braking;
         if !running {
@@ -231,11 +246,11 @@ impl Controller {
         }
         self.watch_expectation(state, pass, &course);
         self.limit_climb(state, pass, &mut targets);
-        if state.slow_down() || plan.step != state.next_step {
-            targets.speed = targets.speed.min(plan.cross_speed);
-            targets.preload = plan.cross_preload;
+        if state.slow_down() || step != state.next_step {
+            targets.speed = targets.speed.min(cross_speed);
+            targets.preload = cross_preload;
         }
-        self.note_preload(state, pass, &plan, &targets);
+        self.note_preload(state, pass, cross_preload, &targets);
         let leg = state.leg(targets.approaching);
         if state.mode != Mode::Run(direction, leg) {
             self.trigger(state, pass, Trigger::Leg(leg));
@@ -246,8 +261,11 @@ impl Controller {
     /// On a corner the wheel's rise moves the spring: no faster than the pre-tightener
     /// can follow.
     fn limit_climb(&self, state: &State, pass: &Pass<'_>, targets: &mut Targets) {
+        if !state.on_corner() {
+            return;
+        }
         let slope = self.rise.slope(self.ahead(state, pass, Q16::ZERO));
-        if state.on_corner() && slope > LEVEL_SLOPE {
+        if slope > LEVEL_SLOPE {
             targets.speed = targets.speed.min(crate::numeric::divide(self.rise_speed, slope));
         }
     }
@@ -277,17 +295,34 @@ impl Controller {
         // Corners that are not felt are not fed forward: the table may be wrong. One that
         // is felt is blended in, or the drive would jump.
         let felt = state.feel_corner();
+        let wanted = state.signed_speed();
+        let (climb, drift) = if felt == Q16::ZERO {
+            (Q16::ZERO, Q16::ZERO)
+        } else {
+            self.corner(state, pass, direction, felt)
+        };
+        let load = self.load + climb + self.inertia * state.acceleration();
+        let measured = pass.sensed.speed.value;
+        let duty = self.speed_loop.step(&mut state.speed_loop, wanted, measured, load);
+        let preload = self.regulate(state, pass, targets, drift);
+        (MotorCommand { duty, enable: true }, preload)
+    }
+
+    /// What a felt corner asks of the drive, N, and the rate at which it will move the
+    /// spring, N/s.
+    fn corner(
+        &self,
+        state: &State,
+        pass: &Pass<'_>,
+        direction: Direction,
+        felt: Ratio,
+    ) -> (Newtons, NewtonsPerSecond) {
         let lean = felt * self.rise.lean(direction, self.ahead(state, pass, Q16::ZERO));
         // The slope under the wheel when this tick's duty moves the screw.
         let way = state.signed_speed() * self.foresight;
         let later = felt * self.rise.slope(self.ahead(state, pass, way));
-        let pressed = pass.sensed.preload_filtered + self.wedge(pass);
-        let load = self.load + pressed * lean + self.inertia * state.acceleration();
-        let (wanted, measured) = (state.signed_speed(), pass.sensed.speed.value);
-        let duty = self.speed_loop.step(&mut state.speed_loop, wanted, measured, load);
-        let drift = self.spring * later * wanted;
-        let preload = self.regulate(state, pass, targets, drift);
-        (MotorCommand { duty, enable: true }, preload)
+        let pressed = pass.sensed.preload_filtered + pass.wedge;
+        (pressed * lean, self.spring * later * state.signed_speed())
     }
 
     fn regulate(
@@ -312,11 +347,6 @@ impl Controller {
         state.extra_face(at).or(table).unwrap_or(Q16::MAX)
     }
 
-    /// Radial force that the arm's inclination adds to the preload, N.
-    fn wedge(&self, pass: &Pass<'_>) -> Newtons {
-        self.coupling * self.load * pass.sensed.tan_arm
-    }
-
     fn step_position(&self, step: u8) -> Option<Millimetres> {
         self.steps.get(usize::from(step).checked_sub(1)?).copied()
     }
@@ -337,19 +367,12 @@ impl Controller {
         }
     }
 
-    fn telemetry(
-        &self,
-        state: &State,
-        pass: &Pass<'_>,
-        targets: &Targets,
-        drive: MotorCommand,
-        preload: MotorCommand,
-    ) -> Telemetry {
+    fn telemetry(&self, state: &State, pass: &Pass<'_>, targets: &Targets) -> Telemetry {
         let duty = |command: MotorCommand| if command.enable { command.duty } else { Duty::ZERO };
         let crossing = matches!(state.mode, Mode::Run(_, Leg::Crossing | Leg::Approach));
-        let planned = state.plan.map_or(self.friction, |plan| plan.slip_margin);
-        let pressed = pass.sensed.preload_filtered + self.wedge(pass);
-        let rolling = self.friction - crate::numeric::divide(self.load, pressed);
+        let planned = state.plan.as_ref().map_or(self.friction, |plan| plan.slip_margin);
+        let pressed = pass.sensed.preload_filtered + pass.wedge;
+        let rolling = self.friction - part(self.load, pressed);
         Telemetry {
             at: pass.now,
             mode: state.mode,
@@ -362,11 +385,11 @@ impl Controller {
             compression: pass.sensed.compression.value,
             radius: pass.sensed.radius.value,
             level: state.level,
-            gap_predicted: state.plan.map_or(Q16::ZERO, |plan| plan.gap),
+            gap_predicted: state.plan.as_ref().map_or(Q16::ZERO, |plan| plan.gap),
             slip_margin: if crossing { planned.min(rolling) } else { rolling },
-            distance: self.course(state, pass, state.direction).distance.unwrap_or(Q16::MAX),
-            drive: duty(drive),
-            pretightener: duty(preload),
+            distance: self.distance(state, pass, state.direction).unwrap_or(Q16::MAX),
+            drive: duty(pass.output.drive),
+            pretightener: duty(pass.output.preload),
         }
     }
 }

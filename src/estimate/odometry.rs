@@ -2,8 +2,7 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use crate::units::{Millimetres, Ratio, Travel, q16};
-use fixed::types::I16F16;
+use crate::units::{Millimetres, Q16, Ratio, Travel, q16};
 
 /// Part of a step's residual that is taken for odometry error; the rest is left to
 /// the step's own tolerance. Half: creep over 22 mm and the machining of a sleeve
@@ -24,19 +23,19 @@ impl Odometry {
     #[must_use]
     pub fn position(&self, travel: Travel) -> Millimetres {
         let position = travel.saturating_add(self.offset);
-        fixed::Saturating(I16F16::saturating_from_num(position))
+        Q16::narrow(position)
     }
 
     /// Declares that the wheel stands at `position`.
     pub fn set(&mut self, travel: Travel, position: Millimetres) {
-        self.offset = Travel::from_num(position.0).saturating_sub(travel);
+        self.offset = position.widen().saturating_sub(travel);
     }
 
     /// Takes over part of the difference between where a step was found and where
     /// the table has it, mm.
     pub fn correct(&mut self, residual: Millimetres) {
         let share = (residual * CORRECTION).clamp(-LARGEST, LARGEST);
-        self.offset = self.offset.saturating_sub(Travel::from_num(share.0));
+        self.offset = self.offset.saturating_sub(share.widen());
     }
 }
 

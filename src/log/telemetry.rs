@@ -6,7 +6,7 @@ use crate::supervise::Mode;
 use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Ratio, Tick};
 
 /// All control-rate quantities of one tick.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Telemetry {
     /// Tick of the row.
     pub at: Tick,

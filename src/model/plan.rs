@@ -89,6 +89,8 @@ pub struct Plan {
     pub brake_way: Millimetres,
     /// Time that this braking takes, s.
     pub brake_time: Seconds,
+    /// Way before a step or the end within which braking can be due, mm.
+    pub brake_horizon: Millimetres,
     /// Whether the preload is raised ahead of the step.
     pub look_ahead: bool,
     /// Limits met, in the order found.

@@ -82,6 +82,7 @@ impl Planner {
             slip_margin: self.usable,
             brake_way: Millimetres::ZERO,
             brake_time: Seconds::ZERO,
+            brake_horizon: Millimetres::ZERO,
             // Without look-ahead the preload rises when the step is felt, never before.
             look_ahead: self.strategy != Strategy::Reactive,
             limits: [None; 3],
@@ -163,6 +164,7 @@ impl Planner {
 
     /// How far and how long before the step braking must begin.
     fn ways(&self, plan: &mut Plan) {
+        plan.brake_horizon = self.timing.longest_brake_way(plan.cruise_speed.max(plan.cross_speed));
         plan.brake_way = self.timing.brake_way(plan.cruise_speed, plan.cross_speed);
         plan.brake_time = self.timing.speed_change(plan.cruise_speed - plan.cross_speed);
     }

@@ -165,7 +165,7 @@ impl ReducedModel {
 }
 
 fn half(x: Q16) -> Q16 {
-    fixed::Saturating(x.0 >> 1)
+    x.half()
 }
 
 const fn way(direction: Direction) -> usize {

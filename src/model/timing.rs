@@ -2,11 +2,10 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use crate::numeric::{checked, divide, sqrt};
+use crate::numeric::{Divisor, checked, sqrt};
 use crate::rig::{Rig, RigError};
 use crate::units::{
-    Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, NewtonsPerSecond, Q16,
-    Seconds, q16,
+    Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, Q16, Seconds, q16,
 };
 
 /// Part of the actuator's slew that the reference uses; the rest is for feedback
@@ -17,12 +16,14 @@ pub const SLEW_PART: Q16 = q16(850_000);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Timing {
     acceleration: MillimetresPerSecond2,
+    /// Division by the acceleration, by the knee and by the rate.
+    by_acceleration: Divisor,
+    by_knee: Divisor,
+    by_rate: Divisor,
     /// Time to reach full acceleration, s.
     build_up: Seconds,
     /// Speed change below which full acceleration is not reached, mm/s.
     knee: MillimetresPerSecond,
-    /// Rate of the preload reference, N/s.
-    rate: NewtonsPerSecond,
     /// From command to settled force, without the ramp: dead time, lags, reserve, s.
     latency: Seconds,
 }
@@ -38,12 +39,15 @@ impl Timing {
         // Behind the end of a ramp the force lags by slew x lag, which two more lags
         // bring to a few tenths of a newton; the reserve covers an actuator whose times
         // are half as long again.
+        let rate_part = SLEW_PART.to_num::<f64>();
         let times = rig.preload.delay_s + 2.0 * rig.preload.lag_s;
         Ok(Self {
             acceleration: checked("drive.acceleration_mm_s2", a)?,
+            by_acceleration: Divisor::build("drive.acceleration_mm_s2", a)?,
+            by_knee: Divisor::build("drive.jerk_mm_s3", (a * a / j).clamp(1e-4, 30_000.0))?,
+            by_rate: Divisor::build("preload.slew_n_per_s", rig.preload.slew_n_per_s * rate_part)?,
             build_up: checked("drive.jerk_mm_s3", a / j)?,
             knee: checked("drive.jerk_mm_s3", (a * a / j).min(30_000.0))?,
-            rate: checked("preload.slew_n_per_s", rig.preload.slew_n_per_s)? * SLEW_PART,
             latency: checked(
                 "preload.delay_s",
                 times + 0.5 * (rig.preload.delay_s + rig.preload.lag_s),
@@ -57,10 +61,10 @@ impl Timing {
     pub fn speed_change(&self, change: MillimetresPerSecond) -> Seconds {
         let change = if change < Q16::ZERO { -change } else { change };
         if change >= self.knee {
-            divide(change, self.acceleration) + self.build_up
+            self.by_acceleration.divide(change) + self.build_up
         } else {
             // 2 (a/j) sqrt(D / (a^2/j)).
-            let part = sqrt(divide(change, self.knee));
+            let part = sqrt(self.by_knee.divide(change));
             self.build_up * part * q16(2_000_000)
         }
     }
@@ -76,20 +80,29 @@ impl Timing {
     /// Time in which the jerk takes this acceleration back, s.
     #[must_use]
     pub fn until_level(&self, acceleration: MillimetresPerSecond2) -> Seconds {
-        divide(acceleration, self.acceleration) * self.build_up
+        self.by_acceleration.divide(acceleration) * self.build_up
     }
 
     /// Time from the command until a preload change stands, s.
     #[must_use]
     pub fn preload_change(&self, change: Newtons) -> Seconds {
         let change = if change < Q16::ZERO { -change } else { change };
-        self.latency + divide(change, self.rate)
+        self.latency + self.by_rate.divide(change)
     }
 
-    /// Rate of the preload reference, N/s.
+    /// Time in which the reference runs through a preload change, s.
     #[must_use]
-    pub const fn rate(&self) -> NewtonsPerSecond {
-        self.rate
+    pub fn ramp(&self, change: Newtons) -> Seconds {
+        self.by_rate.divide(change)
+    }
+
+    /// Way that no braking from up to `cruise` exceeds, whatever the acceleration still
+    /// under way, mm: the speed that this leads to at most, for as long as it takes to
+    /// lose all of it.
+    #[must_use]
+    pub fn longest_brake_way(&self, cruise: MillimetresPerSecond) -> Millimetres {
+        let peak = cruise + (self.acceleration * self.build_up).half();
+        self.speed_change(peak) * peak + q16(100_000)
     }
 }
 
@@ -107,6 +120,24 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn no_braking_takes_longer_than_the_longest(
+            cruise in 0.0..100.0f64,
+            part in 0.0..1.0f64,
+            to in 0.0..1.0f64,
+            rising in 0.0..1.0f64,
+        ) {
+            let rig = Rig::prototype();
+            let timing = Timing::try_build(&rig).unwrap();
+            let q = Q16::from_num::<f64>;
+            let rising = q(rising * rig.drive.acceleration_mm_s2);
+            let until = timing.until_level(rising);
+            let peak = q(cruise * part) + (rising * until).half();
+            let way = (peak * until) + timing.brake_way(peak, q(cruise * to));
+            let longest = timing.longest_brake_way(q(cruise));
+            prop_assert!(way <= longest, "{way} {longest}");
+        }
+
         #[test]
         fn speed_changes_match_the_s_curve(from in 0.0..100.0f64, to in 0.0..100.0f64) {
             let rig = Rig::prototype();

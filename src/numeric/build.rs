@@ -1,7 +1,7 @@
 //! From SI numbers to machine units: the only floats of this module, used once
 //! at start.
 
-use super::{LowPass, Table};
+use super::{Divisor, LowPass, Table};
 use crate::rig::RigError;
 use crate::units::{Q16, TICK_HZ};
 use fixed::types::I16F16;
@@ -12,7 +12,8 @@ use fixed::types::I16F16;
 /// [`RigError::OutOfRange`] with `key` if the value is not finite or exceeds the
 /// range of the format.
 pub fn checked(key: &'static str, value: f64) -> Result<Q16, RigError> {
-    I16F16::checked_from_num(value).map(fixed::Saturating).ok_or(RigError::OutOfRange {
+    let number = I16F16::checked_from_num(value);
+    number.map(|n| Q16::from_bits(n.to_bits())).ok_or(RigError::OutOfRange {
         key,
         value,
         min: I16F16::MIN.to_num(),
@@ -37,6 +38,23 @@ impl<const N: usize> Table<N> {
             *sample = I16F16::checked_from_num(f(x))?.to_bits();
         }
         Self::checked_from_bits(lo.to_bits(), hi.to_bits(), samples)
+    }
+}
+
+impl Divisor {
+    /// A division by `value`.
+    ///
+    /// # Errors
+    /// [`RigError::OutOfRange`] with `key` if the value is not within 2^-14 to 2^15.
+    pub fn build(key: &'static str, value: f64) -> Result<Self, RigError> {
+        let (min, max) = (1.0 / 16_384.0, 32_768.0);
+        if !(value >= min && value <= max) {
+            return Err(RigError::OutOfRange { key, value, min, max });
+        }
+        // 1/d = part 2^exponent with a part of at least a half.
+        let (part, exponent) = libm::frexp(1.0 / value);
+        let factor = libm::round(libm::ldexp(part, 31)).min(2_147_483_647.0);
+        Ok(Self::from_parts(factor as i32, (31 - exponent) as u32))
     }
 }
 

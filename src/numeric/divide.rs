@@ -3,10 +3,9 @@
 #![deny(clippy::float_arithmetic)]
 
 use crate::units::Q16;
-use fixed::types::I16F16;
 
 /// One.
-const ONE: Q16 = fixed::Saturating(I16F16::ONE);
+const ONE: Q16 = Q16::ONE;
 
 /// Quotient `a / b`, rounded to nearest, halves away from zero.
 ///
@@ -18,7 +17,7 @@ const ONE: Q16 = fixed::Saturating(I16F16::ONE);
 /// Source: schoolbook division in base 2^16, Knuth, TAOCP 2, 4.3.1, algorithm D.
 #[must_use]
 pub fn divide(a: Q16, b: Q16) -> Q16 {
-    let (a, b) = (a.0.to_bits(), b.0.to_bits());
+    let (a, b) = (a.to_bits(), b.to_bits());
     if a == 0 {
         return Q16::ZERO;
     }
@@ -33,7 +32,29 @@ pub fn divide(a: Q16, b: Q16) -> Q16 {
     } else {
         i32::try_from(magnitude).unwrap_or(i32::MAX)
     };
-    fixed::Saturating(I16F16::from_bits(bits))
+    Q16::from_bits(bits)
+}
+
+/// Quotient `a / b` of numbers that are not negative, with one 32-bit division where
+/// `a` is not above `b`, rounded down.
+///
+/// Range: as [`divide`], which does what is outside. Error: within `[-1, 0]` LSB and
+/// 2^-15 relative upwards, since `b` is cut to the bits that the quotient resolves.
+/// Cost: about 25 cycles; as [`divide`] for quotients above one.
+#[must_use]
+pub fn part(a: Q16, b: Q16) -> Q16 {
+    let (Ok(a_bits), Ok(b_bits)) = (u32::try_from(a.to_bits()), u32::try_from(b.to_bits())) else {
+        return divide(a, b);
+    };
+    if a_bits > b_bits {
+        return divide(a, b);
+    }
+    // a is at most 2^31: as far up as it goes, b down by the rest of the 16 places.
+    let up = a_bits.leading_zeros().min(16);
+    let divisor = b_bits >> (16 - up);
+    // b is not below a, so that the divisor keeps at least 16 bits, or b is zero.
+    let bits = (a_bits << up).checked_div(divisor).unwrap_or(0);
+    Q16::from_bits(bits as i32)
 }
 
 /// Reciprocal `1 / x`, rounded to nearest.
@@ -87,7 +108,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn q(bits: i32) -> Q16 {
-        fixed::Saturating(I16F16::from_bits(bits))
+        Q16::from_bits(bits)
     }
 
     /// The quotient in 128 bits, rounded to nearest, saturated.
@@ -112,7 +133,30 @@ mod tests {
             .collect::<Vec<_>>();
         for &a in &corners {
             for &b in &corners {
-                assert_eq!(divide(q(a), q(b)).0.to_bits(), exact(a, b), "{a} / {b}");
+                assert_eq!(divide(q(a), q(b)).to_bits(), exact(a, b), "{a} / {b}");
+            }
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(20_000))]
+
+        #[test]
+        fn parts_stay_in_their_bound(
+            a in 0..=i32::MAX,
+            b in 0..=i32::MAX,
+            a_shift in 0_u32..31,
+            b_shift in 0_u32..31,
+        ) {
+            let (a, b) = (a >> a_shift, b >> b_shift);
+            let got = part(q(a), q(b)).to_bits();
+            if a > b || b == 0 {
+                prop_assert_eq!(got, exact(a, b));
+            } else {
+                let quotient = f64::from(a) / f64::from(b) * 65_536.0;
+                let got = f64::from(got);
+                prop_assert!(got > quotient - 1.0, "{got} {quotient}");
+                prop_assert!(got <= quotient * (1.0 + 1.0 / 32_768.0), "{got} {quotient}");
             }
         }
     }
@@ -128,7 +172,7 @@ mod tests {
             b_shift in 0_u32..31,
         ) {
             let (a, b) = (a >> a_shift, b >> b_shift);
-            prop_assert_eq!(divide(q(a), q(b)).0.to_bits(), exact(a, b));
+            prop_assert_eq!(divide(q(a), q(b)).to_bits(), exact(a, b));
         }
 
         #[test]

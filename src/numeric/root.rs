@@ -2,44 +2,21 @@
 
 #![deny(clippy::float_arithmetic)]
 
+use super::sqrt_fraction;
 use crate::units::Q16;
-use fixed::types::I16F16;
 
-/// Square root, rounded to nearest.
+/// Square root.
 ///
-/// Range: 0 to 32768 gives 0 to 181.02; negative arguments give 0. Error: 0.5 LSB,
-/// the exact root rounded once. Cost: at most 24 rounds of shift, compare and
-/// subtract on 32-bit numbers; no division.
+/// Range: 0 to 32768 gives 0 to 181.02; negative arguments give 0. Error: 0.51 LSB, the
+/// root with eight more bits rounded once. Cost: about 40 cycles.
 ///
-/// Source: the binary digit-by-digit method, e.g. Warren, Hacker's Delight, 11-1.
+/// Source: as [`sqrt_fraction`].
+#[inline]
 #[must_use]
 pub fn sqrt(x: Q16) -> Q16 {
-    let Ok(bits) = u32::try_from(x.0.to_bits()) else {
-        return Q16::ZERO;
-    };
-    // The root of x in Q16 is the integer root of bits 2^16: 24 binary digits,
-    // each from two bits of the radicand. Leading pairs of zeros give leading
-    // zero digits and are skipped.
-    let radicand = u64::from(bits) << 16;
-    let skipped = (radicand.leading_zeros() & !1).min(62);
-    let mut feed = radicand << skipped;
-    let mut root = 0_u32;
-    let mut rest = 0_u32;
-    for _ in 0..(64 - skipped) / 2 {
-        rest = rest << 2 | (feed >> 62) as u32;
-        feed <<= 2;
-        let trial = root << 2 | 1;
-        root <<= 1;
-        if rest >= trial {
-            rest -= trial;
-            root |= 1;
-        }
-    }
-    // rest = radicand - root^2; above root, the next integer is nearer.
-    if rest > root {
-        root += 1;
-    }
-    fixed::Saturating(I16F16::from_bits(i32::try_from(root).unwrap_or(i32::MAX)))
+    let bits = u32::try_from(x.to_bits()).unwrap_or(0);
+    // 2^16 sqrt(bits) is the root in Q24; at most 1.5 LSB of that too small.
+    Q16::from_bits(((sqrt_fraction(bits) + 129) >> 8) as i32)
 }
 
 #[cfg(test)]
@@ -49,7 +26,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn q(bits: i32) -> Q16 {
-        fixed::Saturating(I16F16::from_bits(bits))
+        Q16::from_bits(bits)
     }
 
     #[test]
@@ -59,17 +36,17 @@ mod tests {
         }
         assert_eq!(sqrt(q(-1)), Q16::ZERO);
         assert_eq!(sqrt(q(i32::MIN)), Q16::ZERO);
-        assert_eq!(sqrt(q(1)).0.to_bits(), 256);
+        assert_eq!(sqrt(q(1)).to_bits(), 256);
     }
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(20_000))]
 
         #[test]
-        fn roots_are_the_exact_ones_rounded_once(bits in 0..i32::MAX, shift in 0_u32..31) {
+        fn roots_are_within_their_bound(bits in 0..i32::MAX, shift in 0_u32..31) {
             let x = q(bits >> shift);
             let got = sqrt(x).to_num::<f64>();
-            prop_assert!((got - x.to_num::<f64>().sqrt()).abs() <= 0.501 / 65_536.0);
+            prop_assert!((got - x.to_num::<f64>().sqrt()).abs() <= 0.51 / 65_536.0);
         }
     }
 }

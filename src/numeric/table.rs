@@ -3,7 +3,6 @@
 #![deny(clippy::float_arithmetic)]
 
 use crate::units::Q16;
-use fixed::types::I16F16;
 
 /// A function sampled at N evenly spaced points and interpolated by Catmull-Rom
 /// splines: through every sample, continuous in slope, exact for parabolas.
@@ -95,25 +94,25 @@ impl<const N: usize> Table<N> {
     /// Least argument.
     #[must_use]
     pub const fn lo(&self) -> Q16 {
-        fixed::Saturating(I16F16::from_bits(self.lo))
+        Q16::from_bits(self.lo)
     }
 
     /// Largest argument.
     #[must_use]
     pub const fn hi(&self) -> Q16 {
-        fixed::Saturating(I16F16::from_bits(self.hi))
+        Q16::from_bits(self.hi)
     }
 
     /// Whether `x` lies inside the table.
     #[must_use]
     pub fn contains(&self, x: Q16) -> bool {
-        (self.lo..=self.hi).contains(&x.0.to_bits())
+        (self.lo..=self.hi).contains(&x.to_bits())
     }
 
     /// Value at `x`; that of the nearer end outside.
     #[must_use]
     pub fn eval(&self, x: Q16) -> Q16 {
-        fixed::Saturating(I16F16::from_bits(self.eval_bits(x.0.to_bits())))
+        Q16::from_bits(self.eval_bits(x.to_bits()))
     }
 
     /// Argument at which the table reaches `y`, for tables that rise or fall
@@ -123,7 +122,7 @@ impl<const N: usize> Table<N> {
     /// `y`. Cost: at most 32 times [`eval`](Self::eval); not meant for the tick.
     #[must_use]
     pub fn solve(&self, y: Q16) -> Q16 {
-        let y = y.0.to_bits();
+        let y = y.to_bits();
         let (first, last) = (self.eval_bits(self.lo), self.eval_bits(self.hi));
         let rising = first <= last;
         let reached = |value: i32| if rising { value >= y } else { value <= y };
@@ -147,7 +146,7 @@ impl<const N: usize> Table<N> {
                 before = middle;
             }
         }
-        fixed::Saturating(I16F16::from_bits(at))
+        Q16::from_bits(at)
     }
 
     fn eval_bits(&self, x: i32) -> i32 {
@@ -202,7 +201,7 @@ mod tests {
     const LSB: f64 = 1.0 / 65_536.0;
 
     fn q(bits: i32) -> Q16 {
-        fixed::Saturating(I16F16::from_bits(bits))
+        Q16::from_bits(bits)
     }
 
     /// Largest errors in units of `h^3 max|f'''|` beyond 1.5 LSB, inside and at

@@ -7,7 +7,6 @@ use super::raw::{AdcCode, Sample};
 use crate::numeric::{LowPass, LowPassState};
 use crate::rig::RigError;
 use crate::units::{Q16, Tick};
-use fixed::types::I16F16;
 
 /// Part of the converter at which the sensor reads zero.
 pub const ZERO_AT: f64 = 0.05;
@@ -163,14 +162,14 @@ impl AnalogChannel {
         let above = i64::from((i32::from(code) << 8) - self.zero);
         // Q8 x Q32 = Q40 to Q16, rounded.
         let bits = (above * i64::from(self.gain) + (1 << 23)) >> 24;
-        fixed::Saturating(I16F16::from_bits(bits.clamp(i32::MIN.into(), i32::MAX.into()) as i32))
+        Q16::saturating_from_bits(bits)
     }
 
     fn accumulate(&self, state: &mut AnalogState) {
         let Zeroing::Running { sum, count, least, largest } = &mut state.zeroing else {
             return;
         };
-        *sum += i64::from(state.uncorrected.0.to_bits());
+        *sum += i64::from(state.uncorrected.to_bits());
         *count += 1;
         *least = (*least).min(state.uncorrected);
         *largest = (*largest).max(state.uncorrected);
@@ -178,7 +177,7 @@ impl AnalogChannel {
             return;
         }
         let mean = (*sum + i64::from(ZERO_SAMPLES / 2)) >> ZERO_SHIFT;
-        let offset = fixed::Saturating(I16F16::from_bits(mean as i32));
+        let offset = Q16::from_bits(mean as i32);
         state.zeroing = if offset.abs() <= self.zero_limit {
             state.offset = offset;
             Zeroing::Done { offset, spread: *largest - *least }

@@ -6,7 +6,6 @@ use super::freshness::{Freshness, Reading, Reason};
 use super::raw::{AngleFrame, Sample};
 use crate::numeric::{LowPass, LowPassState};
 use crate::units::{Q16, Tick};
-use fixed::types::I16F16;
 
 /// Angle from the pillar in codes of the sensor, 16384 a turn: range +-8192 codes,
 /// LSB 2^-16 code = 5.9 nrad. The arm lies along the pillar at 0 and leans
@@ -103,7 +102,7 @@ impl AngleSensor {
     /// A code as an angle that the arm can take.
     fn within(&self, code: u16) -> Result<Codes, Reason> {
         let angle = (u32::from(code) << 18).wrapping_sub(self.zero) as i32;
-        let angle = fixed::Saturating(I16F16::from_bits(angle >> 2));
+        let angle = Q16::from_bits(angle >> 2);
         if (self.lo..=self.hi).contains(&angle) { Ok(angle) } else { Err(Reason::OutOfRange) }
     }
 }

@@ -3,12 +3,9 @@
 #![deny(clippy::float_arithmetic)]
 
 use super::angle::Codes;
-use crate::numeric::{Table, checked};
+use crate::numeric::{checked, reciprocal_of_normalised, sin_cos};
 use crate::rig::{MAX_STEPS, Rig, RigError};
 use crate::units::{Millimetres, Q16, Ratio, q16};
-
-/// Points of the tables over the arm's reach.
-const POINTS: usize = 65;
 
 /// Least and largest sine of the arm angle that is not taken for a sensor fault:
 /// the reach that the parameters are checked against is 0.1 to 0.9.
@@ -22,12 +19,14 @@ const LEVEL_SWITCH: Ratio = q16(600_000);
 ///
 /// `r = r_pivot + L sin(angle)`: distance of the wheel centre from the pillar
 /// axis, mm, growing outwards. Error against the formula over the whole reach of the
-/// prototype: 8e-5 mm in the radius, 2.5e-4 in the tangent (3e-5 up to 60
-/// degrees); the sensor's half code is 0.019 to 0.022 mm. Cost: a table each.
+/// prototype: 2e-5 mm in the radius, 2e-5 in the tangent; the sensor's half code is 0.019
+/// to 0.022 mm. Cost: a sine, a cosine and a reciprocal, about 80 cycles.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Arm {
-    radius: Table<POINTS>,
-    tangent: Table<POINTS>,
+    /// Least and largest angle that is not taken for a sensor fault.
+    reach: (Codes, Codes),
+    pivot: Millimetres,
+    length: Millimetres,
     /// Wheel-centre radius on the outermost wall without compression.
     outermost: Millimetres,
     /// One over the step height, 1/mm.
@@ -44,19 +43,10 @@ impl Arm {
         let geometry = &rig.rig;
         let radians = 2.0 * core::f64::consts::PI / 16_384.0;
         let (lo, hi) = (libm::asin(SINE.0) / radians, libm::asin(SINE.1) / radians);
-        let outside = RigError::OutOfRange {
-            key: "rig.arm_length_mm",
-            value: geometry.arm_length_mm,
-            min: 20.0,
-            max: 1000.0,
-        };
-        let radius = Table::build(lo, hi, |codes| {
-            geometry.arm_pivot_radius_mm + geometry.arm_length_mm * libm::sin(codes * radians)
-        });
-        let tangent = Table::build(lo, hi, |codes| libm::tan(codes * radians));
         Ok(Self {
-            radius: radius.ok_or(outside)?,
-            tangent: tangent.ok_or(outside)?,
+            reach: (checked("rig.arm_length_mm", lo)?, checked("rig.arm_length_mm", hi)?),
+            pivot: checked("rig.arm_pivot_radius_mm", geometry.arm_pivot_radius_mm)?,
+            length: checked("rig.arm_length_mm", geometry.arm_length_mm)?,
             outermost: checked("rig.wall_radius_mm", rig.centre_radius_mm(0))?,
             per_step: checked("rig.step_height_mm", 1.0 / geometry.step_height_mm)?,
         })
@@ -64,20 +54,28 @@ impl Arm {
 
     /// Least and largest angle that the arm can take.
     #[must_use]
-    pub fn reach(&self) -> (Codes, Codes) {
-        (self.radius.lo(), self.radius.hi())
+    pub const fn reach(&self) -> (Codes, Codes) {
+        self.reach
     }
 
-    /// Distance of the wheel centre from the pillar axis, mm.
+    /// Distance of the wheel centre from the pillar axis, mm, and the tangent of the arm
+    /// angle: radial force per axial thrust through the arm. Outside its reach the arm is
+    /// taken to stand at the end of it.
+    #[inline]
     #[must_use]
-    pub fn radius(&self, angle: Codes) -> Millimetres {
-        self.radius.eval(angle)
-    }
-
-    /// Tangent of the arm angle: radial force per axial thrust through the arm.
-    #[must_use]
-    pub fn tangent(&self, angle: Codes) -> Ratio {
-        self.tangent.eval(angle)
+    pub fn stance(&self, angle: Codes) -> (Millimetres, Ratio) {
+        let angle = angle.clamp(self.reach.0, self.reach.1);
+        // A turn is 2^14 codes of Q16, so 2^30: to 2^32.
+        let (sine, cosine) = sin_cos((angle.to_bits() as u32) << 2);
+        let lever = (i64::from(self.length.to_bits()) * i64::from(sine) + (1 << 29)) >> 30;
+        // Inside the reach the cosine is positive; said again for the shift.
+        let cosine = cosine.max(1) as u32;
+        let shift = cosine.leading_zeros();
+        let tangent = u64::from(reciprocal_of_normalised(cosine << shift)) * sine.max(0) as u64;
+        (
+            self.pivot + Q16::saturating_from_bits(lever),
+            Q16::saturating_from_bits((tangent >> (47 - shift)) as i64),
+        )
     }
 
     /// Height of the wall under the wheel above the outermost one, in steps, not
@@ -93,11 +91,14 @@ impl Arm {
     /// only when the wheel stands 0.6 steps from that, so that it does not flutter
     /// half way up a step.
     #[must_use]
-    pub fn level(&self, previous: Option<u8>, radius: Millimetres, compression: Millimetres) -> u8 {
-        let steps = self.steps_up(radius, compression);
+    pub fn level(&self, previous: Option<u8>, steps: Ratio) -> u8 {
         match previous {
-            Some(level) if (steps - Ratio::from_num(level)).abs() <= LEVEL_SWITCH => level,
-            _ => steps.round().to_num::<i32>().clamp(0, MAX_STEPS as i32 + 1) as u8,
+            Some(level)
+                if (steps - Ratio::from_bits(i32::from(level) << 16)).abs() <= LEVEL_SWITCH =>
+            {
+                level
+            }
+            _ => steps.round().clamp(0, MAX_STEPS as i32 + 1) as u8,
         }
     }
 }
@@ -118,22 +119,18 @@ mod tests {
     fn radius_and_tangent_follow_the_geometry_over_the_whole_reach() {
         let arm = arm();
         let (lo, hi) = arm.reach();
-        let (mut worst_r, mut worst_t, mut worst_t60) = (0.0_f64, 0.0_f64, 0.0_f64);
+        let (mut worst_r, mut worst_t) = (0.0_f64, 0.0_f64);
         let mut angle = lo;
         while angle <= hi {
             let theta = angle.to_num::<f64>() * RADIANS;
             let r = 20.0 + 145.0 * theta.sin();
-            worst_r = worst_r.max((arm.radius(angle).to_num::<f64>() - r).abs());
-            let error = (arm.tangent(angle).to_num::<f64>() - theta.tan()).abs();
+            worst_r = worst_r.max((arm.stance(angle).0.to_num::<f64>() - r).abs());
+            let error = (arm.stance(angle).1.to_num::<f64>() - theta.tan()).abs();
             worst_t = worst_t.max(error);
-            if theta <= core::f64::consts::FRAC_PI_3 {
-                worst_t60 = worst_t60.max(error);
-            }
             angle += Codes::from_num(0.37);
         }
-        assert!(worst_r <= 8e-5, "{worst_r}");
-        assert!(worst_t <= 2.5e-4, "{worst_t}");
-        assert!(worst_t60 <= 3e-5, "{worst_t60}");
+        assert!(worst_r <= 2e-5, "{worst_r}");
+        assert!(worst_t <= 2e-5, "{worst_t}");
     }
 
     #[test]
@@ -144,7 +141,7 @@ mod tests {
             let theta = ((r - 20.0) / 145.0).asin();
             let angle = Codes::from_num(theta / RADIANS);
             let half = Codes::from_num(0.5);
-            let step = (arm.radius(angle + half) - arm.radius(angle)).to_num::<f64>();
+            let step = (arm.stance(angle + half).0 - arm.stance(angle).0).to_num::<f64>();
             assert!((0.019..=0.022).contains(&step), "{step}");
         }
     }
@@ -154,14 +151,14 @@ mod tests {
         let arm = arm();
         let zero = Millimetres::ZERO;
         let at = |mm: f64| Millimetres::from_num(mm);
-        assert_eq!(arm.level(None, at(125.0), zero), 0);
-        assert_eq!(arm.level(None, at(122.9), zero), 1);
-        assert_eq!(arm.level(Some(0), at(122.7), zero), 0);
-        assert_eq!(arm.level(Some(0), at(122.5), zero), 1);
-        assert_eq!(arm.level(Some(1), at(123.3), zero), 1);
-        assert_eq!(arm.level(Some(1), at(123.5), zero), 0);
-        assert_eq!(arm.level(None, at(140.0), zero), 0);
-        assert_eq!(arm.level(None, at(60.0), zero), MAX_STEPS as u8 + 1);
+        assert_eq!(arm.level(None, arm.steps_up(at(125.0), zero)), 0);
+        assert_eq!(arm.level(None, arm.steps_up(at(122.9), zero)), 1);
+        assert_eq!(arm.level(Some(0), arm.steps_up(at(122.7), zero)), 0);
+        assert_eq!(arm.level(Some(0), arm.steps_up(at(122.5), zero)), 1);
+        assert_eq!(arm.level(Some(1), arm.steps_up(at(123.3), zero)), 1);
+        assert_eq!(arm.level(Some(1), arm.steps_up(at(123.5), zero)), 0);
+        assert_eq!(arm.level(None, arm.steps_up(at(140.0), zero)), 0);
+        assert_eq!(arm.level(None, arm.steps_up(at(60.0), zero)), MAX_STEPS as u8 + 1);
     }
 
     #[test]
@@ -170,7 +167,7 @@ mod tests {
         // On level 2 (centre at 117 mm) with 1.5 mm of compression.
         let (r, c) = (Millimetres::from_num(118.5), Millimetres::from_num(1.5));
         assert_eq!(arm.steps_up(r, c), Ratio::from_num(2));
-        assert_eq!(arm.level(None, r, c), 2);
+        assert_eq!(arm.level(None, arm.steps_up(r, c)), 2);
     }
 
     proptest! {
@@ -182,14 +179,16 @@ mod tests {
         ) {
             let arm = arm();
             let r = Rig::prototype().centre_radius_mm(level) + compression + noise;
-            let got = arm.level(None, Millimetres::from_num(r), Millimetres::from_num(compression));
+            let up = arm.steps_up(Millimetres::from_num(r), Millimetres::from_num(compression));
+            let got = arm.level(None, up);
             prop_assert_eq!(usize::from(got), level);
         }
 
         #[test]
         fn any_radius_stays_without_panic(r in any::<i32>(), c in any::<i32>(), p in any::<u8>()) {
-            let q = |bits| fixed::Saturating(fixed::types::I16F16::from_bits(bits));
-            let _ = arm().level(Some(p), q(r), q(c));
+            let q = |bits| Q16::from_bits(bits);
+            let _ = arm().level(Some(p), arm().steps_up(q(r), q(c)));
+            let _ = arm().stance(q(r));
         }
     }
 }

@@ -114,6 +114,18 @@ impl Freshness {
     /// `value` as a reading at `now`, with `limit` as the largest age, ticks.
     #[must_use]
     pub fn reading<T>(&self, value: T, now: Tick, limit: u32) -> Reading<T> {
+        // In nearly every tick: a good code, taken just now.
+        if let (Some(newest), None) = (self.newest, self.fault)
+            && age(now, newest) <= limit
+        {
+            return Reading { value, at: newest, validity: Validity::Valid };
+        }
+        self.doubtful(value, now, limit)
+    }
+
+    /// The same where the newest code is old, bad or has not come yet.
+    #[inline(never)]
+    fn doubtful<T>(&self, value: T, now: Tick, limit: u32) -> Reading<T> {
         let young = |at: Tick| age(now, at) <= limit;
         let validity = match (self.newest, self.fault) {
             (None, _) => Validity::Absent,

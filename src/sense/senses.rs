@@ -133,8 +133,9 @@ impl Senses {
         let preload = self.load_cell.step(&mut state.load_cell, now, frame.load_cell, self.limit);
         let tread = self.tread.step(&mut state.tread, now, frame.tread, self.limit);
         let angle = self.angle.step(&mut state.angle, now, frame.arm, self.limit);
-        let radius = self.arm.radius(angle.filtered);
-        let level = self.arm.level(state.level, radius, tread.filtered);
+        let (radius, tan_arm) = self.arm.stance(angle.filtered);
+        let steps_up = self.arm.steps_up(radius, tread.filtered);
+        let level = self.arm.level(state.level, steps_up);
         if angle.reading.is_usable() && tread.reading.is_usable() {
             state.level = Some(level);
         }
@@ -151,8 +152,8 @@ impl Senses {
                 at: angle.reading.at,
                 validity: angle.reading.validity,
             },
-            tan_arm: self.arm.tangent(angle.filtered),
-            steps_up: self.arm.steps_up(radius, tread.filtered),
+            tan_arm,
+            steps_up,
             level: state.level.unwrap_or(0),
         }
     }

@@ -6,8 +6,7 @@ use super::freshness::{Freshness, Reading, Reason, age};
 use super::raw::{EncoderCount, Sample};
 use crate::numeric::checked;
 use crate::rig::{Rig, RigError};
-use crate::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Tick, Travel};
-use fixed::types::I16F16;
+use crate::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Q16, Tick, Travel};
 
 /// Default bandwidth of the observer, rad/s. Chosen: the fastest that keeps the
 /// ripple of the counts within 1 % from 3 to 30 mm/s, also where counts and ticks
@@ -160,7 +159,7 @@ impl Speedometer {
 fn predict(state: &mut SpeedState, acceleration: MillimetresPerSecond2) {
     // 1e-6 s^2 in Q48: mm/s^2 in Q16 to mm/tick^2 in Q48.
     const TICK_SQUARED: i64 = 281_474_977;
-    let gained = (i64::from(acceleration.0.to_bits()) * TICK_SQUARED) >> 16;
+    let gained = (i64::from(acceleration.to_bits()) * TICK_SQUARED) >> 16;
     let moved = state.speed + (gained >> 1);
     state.error = (state.error - moved).clamp(-ERROR_LIMIT, ERROR_LIMIT);
     state.speed = (state.speed + gained).clamp(-SPEED_LIMIT, SPEED_LIMIT);
@@ -172,13 +171,13 @@ const ERROR_LIMIT: i64 = 4096 << 48;
 /// mm per tick, Q48, as mm/s.
 fn speed_mm_s(speed: i64) -> MillimetresPerSecond {
     let bits = ((speed >> 16) * i64::from(crate::units::TICK_HZ) + (1 << 15)) >> 16;
-    fixed::Saturating(I16F16::from_bits(bits.clamp(i32::MIN.into(), i32::MAX.into()) as i32))
+    Q16::saturating_from_bits(bits)
 }
 
 /// Travel in the control format, saturated.
 fn millimetres(travel: Travel) -> Millimetres {
     let bits = travel.to_bits() >> 16;
-    fixed::Saturating(I16F16::from_bits(bits.clamp(i32::MIN.into(), i32::MAX.into()) as i32))
+    Q16::saturating_from_bits(bits)
 }
 
 #[cfg(test)]
@@ -468,7 +467,7 @@ mod tests {
             let meter = build();
             let mut state = SpeedState::default();
             for (code, at, acceleration) in inputs {
-                let acceleration = fixed::Saturating(I16F16::from_bits(acceleration));
+                let acceleration = Q16::from_bits(acceleration);
                 let sample = Some(Sample { code: EncoderCount::new(code), at });
                 meter.step(&mut state, at.wrapping_add(2), sample, acceleration, LIMIT);
             }

@@ -52,10 +52,11 @@ pub enum Leg {
 }
 
 /// What the drive is doing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub enum Mode {
     /// Waiting for every sensor's first reading.
+    #[default]
     Boot,
     /// Checking that readings are in range and at rest.
     SelfTest,

@@ -150,7 +150,20 @@ fn lasting(count: &mut u16, condition: bool) {
 }
 
 /// The fault of a sensor that cannot be used any more.
+#[inline]
 fn sensor_fault(sensed: &SensedState) -> Option<Fault> {
+    let all = [
+        sensed.speed.validity,
+        sensed.preload.validity,
+        sensed.compression.validity,
+        sensed.radius.validity,
+    ];
+    if all.iter().all(|validity| *validity == Validity::Valid) { None } else { judge(sensed) }
+}
+
+/// The same where not every sensor's newest code is good.
+#[inline(never)]
+fn judge(sensed: &SensedState) -> Option<Fault> {
     let judge = |validity: Validity, stale: Fault, range: Fault| match validity {
         Validity::Valid | Validity::Held(_) => None,
         Validity::Absent | Validity::Stale => Some(stale),

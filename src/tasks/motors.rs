@@ -2,7 +2,7 @@
 
 use super::beat::Beat;
 use super::exchange::Exchange;
-use crate::control::{Controller, Input, State};
+use crate::control::{Controller, Input, Output, State};
 use crate::hal::{MotorCommand, Motors, Watchdog};
 
 /// Runs the control tick at 1 kHz: latest codes, command and plan in; bridges,
@@ -20,12 +20,13 @@ pub async fn motors(
 ) -> ! {
     motors.apply(MotorCommand::OFF, MotorCommand::OFF);
     let mut state = State::default();
+    let mut output = Output::default();
     let mut beat = Beat::<1>::new();
     loop {
         let due = beat.next().await;
         let input =
             Input { emergency_stop: motors.stopped(), ..exchange.input(due.tick, due.missed > 0) };
-        let output = controller.step(&mut state, &input);
+        controller.step_into(&mut state, &input, &mut output);
         motors.apply(output.drive, output.preload);
         if output.rearm {
             motors.rearm();

@@ -8,6 +8,7 @@ use interstage::rig::RigError;
 use crate::export::ExportError;
 use crate::firmware::FirmwareError;
 use crate::plant::balance::BalanceError;
+use crate::provision::ProvisionError;
 use crate::scenario::ScenarioError;
 use crate::sil::RunError;
 
@@ -115,6 +116,12 @@ impl From<BalanceError> for Failure {
 
 impl From<FirmwareError> for Failure {
     fn from(error: FirmwareError) -> Self {
+        Self::run(error)
+    }
+}
+
+impl From<ProvisionError> for Failure {
+    fn from(error: ProvisionError) -> Self {
         Self::run(error)
     }
 }

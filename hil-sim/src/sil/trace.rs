@@ -205,7 +205,7 @@ fn digest(digest: &mut Sha256, seen: &Telemetry) {
     ];
     digest.update(seen.at.to_le_bytes());
     for quantity in quantities {
-        digest.update(quantity.0.to_bits().to_le_bytes());
+        digest.update(quantity.to_bits().to_le_bytes());
     }
     digest.update([mode_number(seen.mode), seen.stage as u8, seen.level]);
     digest.update(seen.drive.to_bits().to_le_bytes());

@@ -60,7 +60,10 @@ impl Controller {
             spring: checked("preload.spring_n_per_mm", rig.preload.spring_n_per_mm)?,
             foresight: checked("preload.delay_s", rig.preload.delay_s + rig.preload.lag_s)?,
             load: checked("plant.top_load_n", rig.plant.top_load_n * rig.plant.top_load_share)?,
-            coupling: checked("plant.arm_coupling", rig.plant.arm_coupling)?,
+            full_wedge: checked(
+                "plant.arm_coupling",
+                rig.plant.arm_coupling * rig.plant.top_load_n * rig.plant.top_load_share,
+            )?,
             inertia: checked(
                 "drive.reflected_mass_kg",
                 (rig.drive.reflected_mass_kg + rig.plant.moved_mass_kg) * 1e-3,

@@ -7,7 +7,7 @@ use crate::estimate::crossing::{Contact, Lift, Seen, Sign};
 use crate::log::{CrossingRecord, Event};
 use crate::model::{Outcome, Review};
 use crate::supervise::{Direction, Fault, Limit, Mode};
-use crate::units::{Millimetres, Q16, Seconds, Tick, Travel, ticks_to_seconds};
+use crate::units::{Millimetres, Q16, Seconds, Tick, ticks_to_seconds};
 
 impl Controller {
     /// Lets the watch look at the tick while the drive moves.
@@ -38,7 +38,7 @@ impl Controller {
 
     /// One level on; the arm confirms the count at the end.
     fn over(&self, state: &mut State, direction: Direction) {
-        let unknown = state.crossing.is_some_and(|open| open.step == 0);
+        let unknown = state.crossing.as_ref().is_some_and(|open| open.step == 0);
         state.lost_in_a_row = 0;
         match direction {
             Direction::Deploy => {
@@ -80,7 +80,7 @@ impl Controller {
         let Some(open) = state.crossing.as_mut().filter(|_| on_corner) else { return };
         let from = *open.from.get_or_insert(pass.sensed.travel);
         let way = pass.sensed.travel.saturating_sub(from).saturating_abs();
-        if way > Travel::from_num(self.corner_way.0) {
+        if way > self.corner_way.widen() {
             self.give_up(state, pass, Fault::WheelSlips);
         }
     }
@@ -250,7 +250,8 @@ impl Controller {
 
     /// Whether the wheel has left the corner of the last step behind.
     fn clear_of(&self, state: &State, pass: &Pass<'_>) -> bool {
-        let followed = state.crossing.and_then(|open| open.lift).map(|point| point.face);
+        let followed =
+            state.crossing.as_ref().and_then(|open| open.lift.as_ref()).map(|point| point.face);
         let Some(face) = followed.or(state.leaving) else { return true };
         let past = match state.direction {
             Direction::Deploy => pass.position - face,

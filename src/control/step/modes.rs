@@ -37,7 +37,7 @@ impl Controller {
 
     fn enter(&self, state: &mut State, pass: &mut Pass<'_>, before: Mode) {
         match state.mode {
-            Mode::SelfTest => pass.rearm = matches!(before, Mode::FaultHold(_)),
+            Mode::SelfTest => pass.output.rearm = matches!(before, Mode::FaultHold(_)),
             Mode::Zero => state.senses.begin_zero(),
             Mode::Preload(direction) => self.prepare(state, pass, direction),
             Mode::Idle if matches!(before, Mode::SelfTest | Mode::Zero) => {
@@ -98,9 +98,9 @@ impl Controller {
     fn await_preload(&self, state: &mut State, pass: &mut Pass<'_>, direction: Direction) {
         let seen = self.seen(state, pass);
         self.watch.rest(&mut state.watch, &seen);
-        let stands = state.plan.is_some_and(|plan| {
+        let stands = state.plan.as_ref().is_some_and(|plan| {
             let course = self.course(state, pass, direction);
-            let wanted = self.schedule.targets(&self.rise, &plan, &course).preload;
+            let wanted = self.schedule.targets(&self.rise, plan, &course).preload;
             let off = (pass.sensed.preload_filtered - wanted).abs();
             off <= self.schedule.stands_within()
         });

@@ -5,6 +5,7 @@ use crate::control::schedule::Targets;
 use crate::log::Event;
 use crate::model::{Plan, PlanRequest};
 use crate::supervise::{Fault, Limit, Mode};
+use crate::units::Newtons;
 
 /// Ticks within which the model task must answer.
 const ANSWER_TICKS: u32 = 500;
@@ -14,10 +15,10 @@ impl Controller {
     pub(super) fn ask(&self, state: &mut State, pass: &mut Pass<'_>) {
         state.sequence = state.sequence.wrapping_add(1);
         state.asked = 1;
-        if state.plan.is_some_and(|plan| plan.direction != state.direction) {
+        if state.plan.as_ref().is_some_and(|plan| plan.direction != state.direction) {
             state.plan = None;
         }
-        pass.request = Some(PlanRequest {
+        pass.output.request = Some(PlanRequest {
             sequence: state.sequence,
             direction: state.direction,
             step: state.next_step,
@@ -27,26 +28,26 @@ impl Controller {
     }
 
     /// Takes the model's answer if it is the one waited for.
-    pub(super) fn take_plan(&self, state: &mut State, pass: &mut Pass<'_>, plan: Option<Plan>) {
+    pub(super) fn take_plan(&self, state: &mut State, pass: &mut Pass<'_>, plan: Option<&Plan>) {
         let Some(plan) = plan.filter(|plan| plan.sequence == state.sequence) else {
             self.await_answer(state, pass);
             return;
         };
         state.asked = 0;
         for limit in plan.limits.into_iter().flatten() {
-            let known = state.plan.is_some_and(|old| old.limits.contains(&Some(limit)));
+            let known = state.plan.as_ref().is_some_and(|old| old.limits.contains(&Some(limit)));
             if !known {
                 pass.log(Event::Limit(limit));
             }
         }
-        if let Some(outcome) = plan.outcome {
+        if let Some(outcome) = plan.outcome.as_ref() {
             state.scale = outcome.scale;
             if outcome.bounded {
                 pass.log(Event::Limit(Limit::AdaptationBounded));
             }
-            self.close_line(state, pass, &outcome);
+            self.close_line(state, pass, outcome);
         }
-        state.plan = Some(plan);
+        state.plan = Some(*plan);
     }
 
     fn await_answer(&self, state: &mut State, pass: &mut Pass<'_>) {
@@ -65,10 +66,10 @@ impl Controller {
         &self,
         state: &mut State,
         pass: &mut Pass<'_>,
-        plan: &Plan,
+        cross_preload: Newtons,
         targets: &Targets,
     ) {
-        let missing = plan.cross_preload - pass.sensed.preload_filtered;
+        let missing = cross_preload - pass.sensed.preload_filtered;
         let stands = missing <= self.schedule.stands_within();
         state.standing_since = match state.standing_since {
             Some(since) if stands => Some(since),

@@ -84,7 +84,7 @@ impl Controller {
             Direction::Deploy => up + (q16(1_000_000) - LEVEL_WITHIN),
             Direction::Retract => up + LEVEL_WITHIN,
         };
-        let level = level.0.int().to_num::<u8>();
+        let level = level.floor().clamp(0, 255) as u8;
         state.crossing = None;
         state.level = level;
         state.next_step = match direction {
@@ -170,7 +170,7 @@ impl Controller {
             return;
         }
         // A crossing still open gets its line first.
-        if let Some(point) = state.crossing.and_then(|open| open.lift) {
+        if let Some(point) = state.crossing.as_ref().and_then(|open| open.lift) {
             self.closed(state, pass, point.gap, false);
         }
         if state.line.is_some() {

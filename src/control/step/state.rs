@@ -10,7 +10,8 @@ use crate::model::{Plan, Review};
 use crate::sense::SensesState;
 use crate::supervise::{Direction, Leg, Mode, MonitorState};
 use crate::units::{
-    Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, Ratio, Tick, Travel, q16,
+    Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, Q16, Ratio, Tick, Travel,
+    q16,
 };
 
 /// Ticks over which a felt corner is blended into the feed-forward.
@@ -212,7 +213,7 @@ impl State {
     /// A corner is felt and the lower wall not yet left (retract: not yet reached).
     pub(super) fn critical(&self) -> bool {
         let on_corner = matches!(self.watch.contact, Contact::Both | Contact::Corner);
-        on_corner && self.crossing.is_some_and(|crossing| crossing.lift.is_none())
+        on_corner && self.crossing.as_ref().is_some_and(|crossing| crossing.lift.is_none())
     }
 
     /// How far a felt corner is blended in, 0 to 1: a tick towards it or away from it.
@@ -223,7 +224,7 @@ impl State {
             self.felt.saturating_sub(1)
         };
         // BLEND_TICKS is 2^5: bits of Q16 shifted.
-        fixed::Saturating(fixed::types::I16F16::from_bits(i32::from(self.felt) << 11))
+        Q16::from_bits(i32::from(self.felt) << 11)
     }
 
     /// A corner is felt.
@@ -256,8 +257,8 @@ impl State {
     /// Outward distance from `at` to the face of a step that the table lacks, while
     /// the wheel is on it.
     pub(super) fn extra_face(&self, at: Millimetres) -> Option<Millimetres> {
-        let crossing = self.crossing.filter(|crossing| crossing.step == 0)?;
-        let face = crossing.lift?.face;
+        let crossing = self.crossing.as_ref().filter(|crossing| crossing.step == 0)?;
+        let face = crossing.lift.as_ref()?.face;
         (face > at).then_some(face - at)
     }
 

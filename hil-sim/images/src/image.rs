@@ -1,0 +1,37 @@
+//! Start, panic and the list of what can be called.
+
+mod model;
+mod slot;
+mod tick;
+
+use cortex_m::asm::bkpt;
+use defmt as _;
+use embassy_stm32 as _;
+
+/// Runs once; the host takes over at the breakpoint.
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    // Keeps what only the host calls.
+    core::hint::black_box([
+        model::model_build as *const (),
+        model::model_forward as *const (),
+        model::model_inverse_preload as *const (),
+        model::model_inverse_speed as *const (),
+        tick::tick_build as *const (),
+        tick::tick_load as *const (),
+        tick::tick_step as *const (),
+        tick::tick_plan as *const (),
+        tick::tick_save as *const (),
+    ]);
+    loop {
+        bkpt();
+    }
+}
+
+/// Tells the host: a breakpoint anywhere but in `main` ends the measurement.
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+    loop {
+        bkpt();
+    }
+}

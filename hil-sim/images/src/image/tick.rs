@@ -1,0 +1,72 @@
+//! The control tick and its planner, one call each.
+
+use interstage::control::{Controller, Input, Output, State};
+use interstage::model::{Plan, Planner};
+use interstage::rig::Rig;
+use interstage_images::tick::{Given, Preset, Taken};
+
+use super::slot::Slot;
+
+static CONTROLLER: Slot<Controller> = Slot::new();
+static PLANNER: Slot<Planner> = Slot::new();
+static STATE: Slot<State> = Slot::new();
+static INPUT: Slot<Input> = Slot::new();
+static OUTPUT: Slot<Output> = Slot::new();
+static PLAN: Slot<Plan> = Slot::new();
+
+/// Controller and planner of a preset, and a state as after power-up. Returns 1 if
+/// they can be built.
+#[unsafe(no_mangle)]
+pub(super) extern "C" fn tick_build(preset: u32) -> u32 {
+    let Some(preset) = Preset::ALL.into_iter().find(|p| *p as u32 == preset) else { return 0 };
+    let Some(rig) = Rig::named(preset.name()) else { return 0 };
+    STATE.put(State::default);
+    OUTPUT.put(Output::default);
+    PLAN.take();
+    (controller(&rig) && planner(&rig)).into()
+}
+
+/// In a frame of its own: together they would be deeper than the stack.
+#[inline(never)]
+fn controller(rig: &Rig) -> bool {
+    let built = Controller::try_build(rig);
+    built.map(|controller| CONTROLLER.put(|| controller)).is_ok()
+}
+
+#[inline(never)]
+fn planner(rig: &Rig) -> bool {
+    Planner::try_build(rig).map(|planner| PLANNER.put(|| planner)).is_ok()
+}
+
+/// Takes the next tick's input from `given`, and the plan that waits.
+#[unsafe(no_mangle)]
+pub(super) extern "C" fn tick_load(given: &Given) {
+    INPUT.put(|| given.input(PLAN.take()));
+}
+
+/// The control tick, as the motor task calls it.
+#[unsafe(no_mangle)]
+pub(super) extern "C" fn tick_step() {
+    if let (Some(controller), Some(state), Some(input), Some(output)) =
+        (CONTROLLER.get(), STATE.get(), INPUT.get(), OUTPUT.get())
+    {
+        controller.step_into(state, input, output);
+    }
+}
+
+/// Answers the tick's request, if there is one; returns whether there was.
+#[unsafe(no_mangle)]
+pub(super) extern "C" fn tick_plan() -> u32 {
+    let (Some(planner), Some(output)) = (PLANNER.get(), OUTPUT.get()) else { return 0 };
+    let Some(request) = output.request else { return 0 };
+    PLAN.put(|| planner.plan(&request));
+    1
+}
+
+/// Writes what is looked at of the tick's output to `taken`.
+#[unsafe(no_mangle)]
+pub(super) extern "C" fn tick_save(taken: &mut Taken) {
+    if let Some(output) = OUTPUT.get() {
+        *taken = Taken::of(output);
+    }
+}

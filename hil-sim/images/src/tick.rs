@@ -1,0 +1,207 @@
+//! One control tick as words: what goes in, and what is looked at of what comes out.
+
+use interstage::control::{Input, Output};
+use interstage::model::Plan;
+use interstage::sense::raw::{AdcCode, AngleFrame, EncoderCount, Sample, SensorFrame};
+use interstage::supervise::Command;
+
+use crate::digest::Digest;
+
+/// A sensor's code with its tick.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Code {
+    /// 1 if the sensor has answered at all.
+    pub valid: u32,
+    /// The code.
+    pub code: u32,
+    /// When it was taken, ticks.
+    pub at: u32,
+}
+
+/// What a tick is given, apart from the plan, which the image works out itself.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Given {
+    /// Time, ticks.
+    pub now: u32,
+    /// Wheel, load cell, tread, arm.
+    pub codes: [Code; 4],
+    /// Index into [`Command::ALL`], from 1; 0 for none.
+    pub command: u32,
+    /// 1 if the tick is late.
+    pub overrun: u32,
+    /// 1 if the emergency stop has cut the bridges.
+    pub emergency_stop: u32,
+}
+
+/// What is looked at of a tick's output.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Taken {
+    /// Low and high half of the digest over the whole output.
+    pub digest: [u32; 2],
+    /// Q15 duty of the drive, 0x1_0000 if the bridge is off.
+    pub drive: u32,
+    /// Q15 duty of the pre-tightener, 0x1_0000 if the bridge is off.
+    pub preload: u32,
+}
+
+/// Which rig's controller an image is to build.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Preset {
+    /// The 1:1 prototype.
+    Prototype = 0,
+    /// The study's own loads.
+    Fe = 1,
+}
+
+impl Preset {
+    /// Every preset.
+    pub const ALL: [Self; 2] = [Self::Prototype, Self::Fe];
+
+    /// The preset of this name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|preset| preset.name() == name)
+    }
+
+    /// Its name, as [`interstage::rig::Rig::named`] takes it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Prototype => "prototype",
+            Self::Fe => "fe",
+        }
+    }
+}
+
+fn code<T>(sample: Option<Sample<T>>, get: impl Fn(T) -> u16) -> Code {
+    sample.map_or(Code::default(), |s| Code { valid: 1, code: get(s.code).into(), at: s.at })
+}
+
+fn sample<T>(code: &Code, new: impl Fn(u16) -> T) -> Option<Sample<T>> {
+    (code.valid != 0).then(|| Sample { code: new(code.code as u16), at: code.at })
+}
+
+impl Given {
+    /// The words of an input.
+    #[must_use]
+    pub fn of(input: &Input) -> Self {
+        let frame = input.sensors;
+        let position =
+            |command| Command::ALL.iter().position(|c| *c == command).map_or(0, |at| at as u32 + 1);
+        Self {
+            now: input.now,
+            codes: [
+                code(frame.wheel, EncoderCount::get),
+                code(frame.load_cell, AdcCode::get),
+                code(frame.tread, AdcCode::get),
+                code(frame.arm, AngleFrame::get),
+            ],
+            command: input.command.map_or(0, position),
+            overrun: input.overrun.into(),
+            emergency_stop: input.emergency_stop.into(),
+        }
+    }
+
+    /// The input of these words with this plan.
+    #[must_use]
+    pub fn input(&self, plan: Option<Plan>) -> Input {
+        let [wheel, load_cell, tread, arm] = &self.codes;
+        Input {
+            now: self.now,
+            sensors: SensorFrame {
+                wheel: sample(wheel, EncoderCount::new),
+                load_cell: sample(load_cell, AdcCode::new),
+                tread: sample(tread, AdcCode::new),
+                arm: sample(arm, AngleFrame::new),
+            },
+            command: Command::ALL.get((self.command as usize).wrapping_sub(1)).copied(),
+            plan,
+            overrun: self.overrun != 0,
+            emergency_stop: self.emergency_stop != 0,
+        }
+    }
+
+    /// The words as the image's memory holds them.
+    #[must_use]
+    pub fn words(&self) -> [u32; 16] {
+        let [w, l, t, a] = self.codes;
+        let [head, tail] = [self.now, self.command];
+        [
+            head,
+            w.valid,
+            w.code,
+            w.at,
+            l.valid,
+            l.code,
+            l.at,
+            t.valid,
+            t.code,
+            t.at,
+            a.valid,
+            a.code,
+            a.at,
+            tail,
+            self.overrun,
+            self.emergency_stop,
+        ]
+    }
+}
+
+impl Taken {
+    /// What is looked at of this output.
+    #[must_use]
+    pub fn of(output: &Output) -> Self {
+        let digest = Digest::of(output);
+        let duty = |command: interstage::hal::MotorCommand| {
+            if command.enable { u32::from(command.duty.to_bits() as u16) } else { 0x1_0000 }
+        };
+        Self {
+            digest: [digest as u32, (digest >> 32) as u32],
+            drive: duty(output.drive),
+            preload: duty(output.preload),
+        }
+    }
+
+    /// From the words of the image's memory.
+    #[must_use]
+    pub const fn from_words(words: [u32; 4]) -> Self {
+        let [low, high, drive, preload] = words;
+        Self { digest: [low, high], drive, preload }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_input_survives_its_words() {
+        let at = 7;
+        let input = Input {
+            now: 9,
+            sensors: SensorFrame {
+                wheel: Some(Sample { code: EncoderCount::new(65_535), at }),
+                load_cell: None,
+                tread: Some(Sample { code: AdcCode::new(1), at }),
+                arm: Some(Sample { code: AngleFrame::new(0x8001), at: 6 }),
+            },
+            command: Some(Command::Retract),
+            plan: None,
+            overrun: true,
+            emergency_stop: false,
+        };
+        let back = Given::of(&input).input(None);
+        assert_eq!(Digest::of(&back), Digest::of(&input));
+        assert_eq!(back.sensors, input.sensors);
+    }
+
+    #[test]
+    fn the_words_lie_as_the_structure_does() {
+        assert_eq!(size_of::<Given>(), size_of_val(&Given::default().words()));
+        assert_eq!(core::mem::offset_of!(Given, command), 13 * 4);
+    }
+}

@@ -1,0 +1,323 @@
+//! A measurement image on the core: its functions called from the host, each call with
+//! its cycles.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use object::read::elf::{ElfFile32, ProgramHeader};
+use object::{Endianness, Object, ObjectSymbol, SymbolKind, elf};
+
+mod names;
+
+use names::Names;
+
+use super::account::Spread;
+use super::core::unicorn::{Access, Counted, Memory, UnicornCore};
+use super::core::{Core, CoreError, Heat, Meter, Register, Stop};
+use super::{thumb, timing};
+
+/// The chip's flash.
+const FLASH: Memory = Memory { base: 0x0800_0000, size: 512 * 1024, access: Access::Code };
+/// SRAM1, SRAM2 and the alias of the CCM SRAM behind them.
+const RAM: Memory = Memory { base: 0x2000_0000, size: 128 * 1024, access: Access::Data };
+/// System control space: the start-up code writes it and nothing is measured in it.
+const SYSTEM: Memory = Memory { base: 0xE000_0000, size: 1024 * 1024, access: Access::Data };
+/// Where the host leaves arguments, in the chip's window for external memory.
+const MAILBOX: Memory = Memory { base: 0x6000_0000, size: 1024 * 1024, access: Access::Data };
+/// Where calls return to: a breakpoint at the mailbox's end.
+const RETURN: u32 = MAILBOX.base + MAILBOX.size - 4;
+/// First address for arguments.
+pub const ARGUMENTS: u32 = MAILBOX.base;
+/// Cycles after which a call has lost its way: ten seconds of the chip's time.
+const PATIENCE: u64 = 1_700_000_000;
+/// The breakpoint instruction.
+const BKPT: [u8; 2] = [0x00, 0xBE];
+
+/// What can go wrong with an image.
+#[derive(Debug, thiserror::Error)]
+pub enum ImageError {
+    /// The file could not be read.
+    #[error("could not read {path}: {source}")]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// It is no image of the board.
+    #[error("not an image of the board: {0}")]
+    Form(String),
+    /// It lacks a function.
+    #[error("the image has no function {0}")]
+    Missing(String),
+    /// The core stopped.
+    #[error(transparent)]
+    Core(#[from] CoreError),
+    /// A call ended where it should not have: it panicked, or did not end at all.
+    #[error("{function} ended in {at}")]
+    Lost {
+        /// What was called.
+        function: String,
+        /// The function it ended in.
+        at: String,
+    },
+}
+
+/// A function of the image.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Function {
+    range: Range<u32>,
+    name: String,
+}
+
+/// An image's memory and names.
+struct Loaded {
+    flash: Vec<u8>,
+    code: Vec<Range<u32>>,
+    /// In the order of their addresses.
+    functions: Vec<Function>,
+}
+
+/// What one call took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Call {
+    /// What it returned.
+    pub value: u32,
+    /// What it took.
+    pub meter: Meter,
+}
+
+/// An image that has started and waits to be called.
+pub struct Image {
+    core: UnicornCore,
+    functions: Vec<Function>,
+    stack: u32,
+    elf: Vec<u8>,
+}
+
+impl Image {
+    /// Loads the image at `path` and runs its start-up code.
+    ///
+    /// # Errors
+    /// [`ImageError`] if it is no image, or does not come up.
+    pub fn open(path: &Path) -> Result<Self, ImageError> {
+        let bytes = std::fs::read(path)
+            .map_err(|source| ImageError::Read { path: path.to_owned(), source })?;
+        Self::start(&bytes)
+    }
+
+    /// Loads the image in `elf` and runs its start-up code.
+    ///
+    /// # Errors
+    /// As [`Image::open`].
+    pub fn start(elf: &[u8]) -> Result<Self, ImageError> {
+        let loaded = load(elf)?;
+        let counted = Counted { base: FLASH.base, bytes: &loaded.flash, code: &loaded.code };
+        let mut core = UnicornCore::new(&[FLASH, RAM, SYSTEM, MAILBOX], &counted)?;
+        core.write(RETURN, &BKPT)?;
+        let vector = |at: usize| {
+            let bytes: [u8; 4] = loaded.flash[at..at + 4].try_into().unwrap_or_default();
+            u32::from_le_bytes(bytes)
+        };
+        let (stack, reset) = (vector(0), vector(4));
+        core.set_register(Register::Sp, stack)?;
+        let mut image = Self { core, functions: loaded.functions, stack, elf: elf.to_vec() };
+        let stop = image.core.run(reset, PATIENCE)?;
+        match stop {
+            Stop::Breakpoint(at) if image.name(at).contains("main") => Ok(image),
+            Stop::Breakpoint(at) | Stop::Spent(at) => {
+                let at = image.name(at).to_owned();
+                Err(ImageError::Lost { function: "start-up".to_owned(), at })
+            }
+        }
+    }
+
+    /// Writes words to the mailbox from `address` on.
+    ///
+    /// # Errors
+    /// [`ImageError::Core`] if the mailbox is too small.
+    pub fn put(&mut self, address: u32, words: &[u32]) -> Result<(), ImageError> {
+        let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        Ok(self.core.write(address, &bytes)?)
+    }
+
+    /// Reads words from the mailbox.
+    ///
+    /// # Errors
+    /// [`ImageError::Core`] if nothing lies there.
+    pub fn get<const N: usize>(&self, address: u32) -> Result<[u32; N], ImageError> {
+        let mut words = [0; N];
+        for (index, word) in words.iter_mut().enumerate() {
+            let mut bytes = [0; 4];
+            self.core.read(address + 4 * index as u32, &mut bytes)?;
+            *word = u32::from_le_bytes(bytes);
+        }
+        Ok(words)
+    }
+
+    /// Address of a function, for [`Image::call`].
+    ///
+    /// # Errors
+    /// [`ImageError::Missing`] if the image has none of this name.
+    pub fn function(&self, name: &str) -> Result<u32, ImageError> {
+        let found = self.functions.iter().find(|function| function.name == name);
+        found
+            .map(|function| function.range.start)
+            .ok_or_else(|| ImageError::Missing(name.to_owned()))
+    }
+
+    /// Calls a function with at most four arguments.
+    ///
+    /// # Errors
+    /// [`ImageError::Lost`] if it panics or does not return, [`ImageError::Core`] if it
+    /// faults.
+    pub fn call(&mut self, function: u32, arguments: &[u32]) -> Result<Call, ImageError> {
+        for (number, value) in arguments.iter().enumerate() {
+            self.core.set_register(Register::R(number as u8), *value)?;
+        }
+        self.core.set_register(Register::Sp, self.stack)?;
+        self.core.set_register(Register::Lr, RETURN | 1)?;
+        let before = self.core.meter();
+        match self.core.run(function, PATIENCE)? {
+            Stop::Breakpoint(at) if at & !3 == RETURN => Ok(Call {
+                value: self.core.register(Register::R(0))?,
+                meter: self.core.meter().since(before),
+            }),
+            Stop::Breakpoint(at) | Stop::Spent(at) => {
+                let function = self.name(function).to_owned();
+                Err(ImageError::Lost { function, at: self.name(at).to_owned() })
+            }
+        }
+    }
+
+    /// Calls a function once for each input, given by reference: its words stand in the
+    /// mailbox. Returns what the calls gave, and what they took; `dearest` of that is
+    /// the index of an input.
+    ///
+    /// # Errors
+    /// As [`Image::call`], and [`ImageError::Missing`].
+    pub fn measure<const N: usize>(
+        &mut self,
+        function: &str,
+        inputs: &[[u32; N]],
+    ) -> Result<(Vec<u32>, Spread), ImageError> {
+        let function = self.function(function)?;
+        let mut values = Vec::with_capacity(inputs.len());
+        let mut spread = Spread::default();
+        for (index, words) in inputs.iter().enumerate() {
+            self.put(ARGUMENTS, words)?;
+            let call = self.call(function, &[ARGUMENTS])?;
+            values.push(call.value);
+            spread.note(call.meter, index);
+        }
+        Ok((values, spread))
+    }
+
+    /// Cycles by block since the last time this was asked.
+    pub fn take_heat(&mut self) -> Heat {
+        self.core.take_heat()
+    }
+
+    /// Cycles by function as the source has it, those inlined into others on their own,
+    /// the most expensive first. A block's cycles go to its instructions in proportion
+    /// to what they cost by themselves.
+    ///
+    /// # Errors
+    /// [`ImageError::Form`] if the image's debug information cannot be read.
+    pub fn by_function(&self, heat: &Heat) -> Result<Vec<(String, u64)>, ImageError> {
+        let names = Names::read(&self.elf)?;
+        let mut sums = BTreeMap::<String, f64>::new();
+        for (&(address, size), &cycles) in heat {
+            let costs = self.costs(address, size);
+            let whole: u64 = costs.iter().map(|(_, cost)| cost).sum();
+            for (at, cost) in costs {
+                let name = names.at(at).unwrap_or_else(|| self.name(at).to_owned());
+                *sums.entry(name).or_default() += cycles as f64 * cost as f64 / whole as f64;
+            }
+        }
+        let mut sums: Vec<_> =
+            sums.into_iter().map(|(name, cycles)| (name, cycles.round() as u64)).collect();
+        sums.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
+        Ok(sums)
+    }
+
+    /// Instructions of a block with what each costs by itself.
+    fn costs(&self, address: u32, size: u32) -> Vec<(u32, u64)> {
+        let mut code = vec![0; size as usize];
+        if self.core.read(address, &mut code).is_err() {
+            return Vec::new();
+        }
+        let costs = thumb::sweep(&code, address);
+        costs.map(|(at, found, _)| (at, 1 + timing::extra(found.kind))).collect()
+    }
+
+    /// Name of the function at an address.
+    fn name(&self, address: u32) -> &str {
+        let after = self.functions.partition_point(|f| f.range.start <= address);
+        let found = self.functions[..after].last().filter(|f| f.range.contains(&address));
+        found.map_or("nowhere", |f| &f.name)
+    }
+}
+
+fn form(error: impl ToString) -> ImageError {
+    ImageError::Form(error.to_string())
+}
+
+/// What of the image goes to flash, and what its symbols say.
+fn load(elf: &[u8]) -> Result<Loaded, ImageError> {
+    let file = ElfFile32::<Endianness>::parse(elf).map_err(form)?;
+    let endian = file.endian();
+    let mut flash = vec![0xFF; FLASH.size as usize];
+    for segment in file.elf_program_headers() {
+        let data = segment.data(endian, elf).map_err(|()| form("a segment is cut off"))?;
+        if segment.p_type(endian) != elf::PT_LOAD || data.is_empty() {
+            continue;
+        }
+        let at = segment.p_paddr(endian).wrapping_sub(FLASH.base) as usize;
+        let place = flash.get_mut(at..at + data.len());
+        place.ok_or_else(|| form("a segment lies outside the flash"))?.copy_from_slice(data);
+    }
+    let mut functions: Vec<Function> = file.symbols().filter_map(|s| function(&s)).collect();
+    functions.sort_by_key(|f| f.range.start);
+    functions.dedup_by_key(|f| f.range.start);
+    let code = code(&file);
+    if code.is_empty() {
+        return Err(form("its code is not marked by mapping symbols"));
+    }
+    Ok(Loaded { flash, code, functions })
+}
+
+fn function<'a>(symbol: &impl ObjectSymbol<'a>) -> Option<Function> {
+    if symbol.kind() != SymbolKind::Text || symbol.size() == 0 {
+        return None;
+    }
+    // Bit 0 says that it is Thumb code.
+    let start = symbol.address() as u32 & !1;
+    let name = format!("{:#}", rustc_demangle::demangle(symbol.name().ok()?));
+    Some(Function { range: start..start + symbol.size() as u32, name })
+}
+
+/// Where instructions stand in flash: from each `$t` to the next mapping symbol.
+fn code(file: &ElfFile32<'_, Endianness>) -> Vec<Range<u32>> {
+    let kind = |name: &str| match name.as_bytes() {
+        [b'$', kind @ (b't' | b'd' | b'a')] => Some(*kind),
+        [b'$', kind @ (b't' | b'd' | b'a'), b'.', ..] => Some(*kind),
+        _ => None,
+    };
+    let flash = FLASH.base..FLASH.base + FLASH.size;
+    let mut marks: Vec<(u32, u8)> = file
+        .symbols()
+        .filter_map(|s| Some((s.address() as u32, kind(s.name().ok()?)?)))
+        .filter(|(address, _)| flash.contains(address))
+        .collect();
+    marks.sort_unstable();
+    let text = file.symbols().filter_map(|s| function(&s)).map(|f| f.range.end).max();
+    let end = (text.unwrap_or(flash.start), b'd');
+    marks.push(end);
+    marks
+        .windows(2)
+        .filter(|pair| pair[0].1 == b't' && pair[0].0 < pair[1].0)
+        .map(|pair| pair[0].0..pair[1].0)
+        .collect()
+}

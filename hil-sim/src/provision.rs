@@ -1,0 +1,106 @@
+//! The emulated board on a machine that has never built it: the tools that its core
+//! needs, and the `rig` binary with the core in it.
+//!
+//! The core is C behind generated bindings, so that cmake, ninja and libclang are
+//! needed. They come as wheels from PyPI into a virtual environment in the target
+//! directory; nothing is installed elsewhere, and nothing but the builds started here
+//! sees them. Whoever never asks for the emulated board needs none of it.
+
+mod tools;
+
+use std::env;
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+
+use crate::firmware;
+
+pub use tools::Tools;
+
+/// Package and feature that carry the emulated board.
+const FEATURE: &str = "board";
+/// The binary with the feature.
+const BINARY: &str = "rig-board";
+
+/// Why the emulated board cannot be had. Each is one line.
+#[derive(Debug, thiserror::Error)]
+pub enum ProvisionError {
+    /// A program that has to be there is not.
+    #[error("the emulated board needs {program}, which could not be started: {source}")]
+    Program {
+        /// The program.
+        program: String,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The tools could not be fetched.
+    #[error(
+        "could not set up cmake, ninja and libclang for the emulated board in {place}: {why} \
+         (it takes Python 3 with venv or pip, and PyPI within reach)"
+    )]
+    Tools {
+        /// Where they were to go.
+        place: PathBuf,
+        /// The last that was said.
+        why: String,
+    },
+    /// The compiler does not tell where its headers are.
+    #[error("the C compiler `{0}` does not tell where its headers are")]
+    Headers(String),
+    /// A file could not be written.
+    #[error("{path}: {source}")]
+    File {
+        /// The file or directory.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The build failed; cargo's own messages have gone to standard error.
+    #[error("building `rig` with the emulated board failed ({0})")]
+    Build(std::process::ExitStatus),
+    /// cargo built something, but not that binary.
+    #[error("cargo reported no executable for {BINARY}")]
+    NoExecutable,
+}
+
+/// Builds `rig` with the emulated board, setting up what it needs, and returns the
+/// binary. A second call finds everything there. cargo's messages go to standard
+/// error.
+///
+/// # Errors
+/// [`ProvisionError`] if tools cannot be had or the build fails.
+pub fn featured() -> Result<PathBuf, ProvisionError> {
+    let tools = Tools::ready()?;
+    let mut cargo = Command::new(firmware::tool("CARGO", "cargo"));
+    cargo
+        .current_dir(firmware::workspace())
+        .args(["build", "--profile", "host", "--package", env!("CARGO_PKG_NAME")])
+        .args(["--bin", BINARY, "--features", FEATURE])
+        .args(["--message-format", "json-render-diagnostics"])
+        .stderr(Stdio::inherit());
+    tools.apply(&mut cargo);
+    let built = cargo.output().map_err(|source| started("cargo", source))?;
+    if !built.status.success() {
+        return Err(ProvisionError::Build(built.status));
+    }
+    firmware::executable(&String::from_utf8_lossy(&built.stdout), BINARY)
+        .ok_or(ProvisionError::NoExecutable)
+}
+
+/// Goes on with the arguments of this process in `rig` with the emulated board, which
+/// is built first if need be, and returns its exit code. Standard output is its own.
+///
+/// # Errors
+/// As [`featured`].
+pub fn go_on() -> Result<u8, ProvisionError> {
+    eprintln!("this needs the emulated board; the first time it takes some minutes to build");
+    let binary = featured()?;
+    let mut command = Command::new(&binary);
+    command.args(env::args_os().skip(1));
+    let program = || binary.display().to_string();
+    let status = command.status().map_err(|source| started(&program(), source))?;
+    Ok(status.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(1))
+}
+
+fn started(program: &str, source: std::io::Error) -> ProvisionError {
+    ProvisionError::Program { program: program.to_owned(), source }
+}

@@ -1,0 +1,204 @@
+//! cmake, ninja and libclang in a virtual environment.
+
+use std::env;
+use std::ffi::OsString;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use super::{ProvisionError, started};
+use crate::firmware;
+
+/// The wheels, as tried.
+const WHEELS: [&str; 3] = ["cmake==4.4.4", "ninja==1.13.2", "libclang==18.1.1"];
+/// Folder in the target directory.
+const FOLDER: &str = "board-tools";
+/// Written last: says which wheels are there.
+const COMPLETE: &str = "complete";
+
+/// The tools, and what a build has to be told to use them.
+///
+/// What is told stays the same from build to build, or cargo would build the core
+/// anew each time.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Tools {
+    /// Folder of the programs.
+    programs: PathBuf,
+    /// Folder of libclang.
+    libclang: PathBuf,
+    /// Folder of the compiler's own headers, which libclang as a wheel lacks.
+    headers: PathBuf,
+}
+
+impl Tools {
+    /// The tools, fetched first if they are not there.
+    ///
+    /// # Errors
+    /// [`ProvisionError`] if they cannot be fetched or the C compiler is missing.
+    pub fn ready() -> Result<Self, ProvisionError> {
+        let headers = headers()?;
+        let place = firmware::target_directory().join(FOLDER);
+        if !is_complete(&place) {
+            eprintln!("fetching cmake, ninja and libclang into {}", place.display());
+            fetch(&place)?;
+        }
+        Self::at(&place, headers)
+    }
+
+    fn at(place: &Path, headers: PathBuf) -> Result<Self, ProvisionError> {
+        let libclang = find(place, "libclang").ok_or_else(|| ProvisionError::Tools {
+            place: place.to_owned(),
+            why: "no libclang in its wheel".to_owned(),
+        })?;
+        Ok(Self { programs: place.join("bin"), libclang, headers })
+    }
+
+    /// Tells a build started by `command` where the tools are.
+    pub fn apply(&self, command: &mut Command) {
+        let old = env::var_os("PATH").unwrap_or_default();
+        let paths = std::iter::once(self.programs.clone())
+            .chain(env::split_paths(&old).filter(|path| *path != self.programs));
+        // A path with a separator in it cannot have been in PATH.
+        let path = env::join_paths(paths).unwrap_or(old);
+        let mut include = OsString::from("-I");
+        include.push(&self.headers);
+        command
+            .env("PATH", path)
+            .env("LIBCLANG_PATH", &self.libclang)
+            .env("BINDGEN_EXTRA_CLANG_ARGS", include);
+    }
+}
+
+/// Whether these very wheels have been put there.
+fn is_complete(place: &Path) -> bool {
+    fs::read_to_string(place.join(COMPLETE)).is_ok_and(|text| text == WHEELS.join("\n"))
+}
+
+/// Puts the wheels there: into a virtual environment or, where Python has come without
+/// that, by pip into a plain folder.
+fn fetch(place: &Path) -> Result<(), ProvisionError> {
+    let file = |source| ProvisionError::File { path: place.to_owned(), source };
+    if place.exists() {
+        fs::remove_dir_all(place).map_err(file)?;
+    }
+    fs::create_dir_all(place).map_err(file)?;
+    let made = run(Command::new("python3").args(["-m", "venv"]).arg(place))?;
+    let installed = if made.status.success() {
+        let python = place.join("bin").join("python3");
+        run(Command::new(python).args(PIP).args(WHEELS))?
+    } else {
+        let target = [OsString::from("--target"), place.into()];
+        run(Command::new("python3").args(PIP).args(target).args(WHEELS))?
+    };
+    if !installed.status.success() {
+        // What is half there must not be taken for whole.
+        let _ = fs::remove_dir_all(place);
+        return Err(ProvisionError::Tools { place: place.to_owned(), why: last_line(&installed) });
+    }
+    fs::write(place.join(COMPLETE), WHEELS.join("\n")).map_err(file)
+}
+
+/// pip without questions, without talk, and without waiting for a network that is not
+/// there.
+const PIP: [&str; 9] = [
+    "-m",
+    "pip",
+    "install",
+    "--quiet",
+    "--disable-pip-version-check",
+    "--no-input",
+    "--only-binary=:all:",
+    "--retries=2",
+    "--timeout=15",
+];
+
+fn run(command: &mut Command) -> Result<Output, ProvisionError> {
+    let program = command.get_program().to_string_lossy().into_owned();
+    command.output().map_err(|source| started(&program, source))
+}
+
+/// The last that a program said.
+fn last_line(output: &Output) -> String {
+    let text = String::from_utf8_lossy(&output.stderr);
+    let last = text.lines().rev().map(str::trim).find(|line| !line.is_empty());
+    last.unwrap_or("it did not say why").to_owned()
+}
+
+/// The folder below `place` in which a file begins with `name` and is a library.
+fn find(place: &Path, name: &str) -> Option<PathBuf> {
+    let is_library = |file: &str| {
+        file.starts_with(name) && [".so", ".dylib", ".dll"].iter().any(|end| file.contains(end))
+    };
+    let mut below = Vec::new();
+    for entry in fs::read_dir(place).ok()?.flatten() {
+        if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+            below.push(entry.path());
+        } else if entry.file_name().to_str().is_some_and(is_library) {
+            return Some(place.to_owned());
+        }
+    }
+    below.sort();
+    below.iter().find_map(|folder| find(folder, name))
+}
+
+/// Where the C compiler has `stddef.h` and the like.
+fn headers() -> Result<PathBuf, ProvisionError> {
+    let compiler = env::var("CC").unwrap_or_else(|_| "cc".to_owned());
+    let said = run(Command::new(&compiler).arg("-print-file-name=include"))?;
+    let folder = PathBuf::from(String::from_utf8_lossy(&said.stdout).trim());
+    if folder.is_absolute() && folder.is_dir() {
+        Ok(folder)
+    } else {
+        Err(ProvisionError::Headers(compiler))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_library_is_found_wherever_the_wheel_has_it() {
+        let place = tempfile::tempdir().unwrap();
+        let deep = place.path().join("lib").join("clang").join("native");
+        fs::create_dir_all(&deep).unwrap();
+        assert_eq!(find(place.path(), "libclang"), None);
+        fs::write(deep.join("libclang.so"), "").unwrap();
+        fs::write(place.path().join("libclang.txt"), "").unwrap();
+        assert_eq!(find(place.path(), "libclang"), Some(deep));
+    }
+
+    #[test]
+    fn what_was_fetched_for_other_versions_is_not_complete() {
+        let place = tempfile::tempdir().unwrap();
+        assert!(!is_complete(place.path()));
+        fs::write(place.path().join(COMPLETE), "cmake==1").unwrap();
+        assert!(!is_complete(place.path()));
+        fs::write(place.path().join(COMPLETE), WHEELS.join("\n")).unwrap();
+        assert!(is_complete(place.path()));
+    }
+
+    #[test]
+    fn a_build_is_told_where_everything_is() {
+        let place = tempfile::tempdir().unwrap();
+        let tools = Tools {
+            programs: place.path().join("bin"),
+            libclang: place.path().join("clang"),
+            headers: place.path().join("include"),
+        };
+        let mut command = Command::new("cargo");
+        tools.apply(&mut command);
+        let told = |name: &str| {
+            let found = command.get_envs().find(|(key, _)| *key == name);
+            found.and_then(|(_, value)| value).unwrap().to_string_lossy().into_owned()
+        };
+        assert!(told("PATH").starts_with(&tools.programs.display().to_string()));
+        assert_eq!(told("LIBCLANG_PATH"), tools.libclang.display().to_string());
+        assert_eq!(told("BINDGEN_EXTRA_CLANG_ARGS"), format!("-I{}", tools.headers.display()));
+    }
+
+    #[test]
+    fn the_compiler_tells_its_headers() {
+        assert!(headers().unwrap().join("stddef.h").is_file());
+    }
+}
