@@ -1,7 +1,10 @@
 //! The parts of the documentation that are written by `cargo rig docs`.
 
+pub mod blocks;
+pub mod model;
 mod modes;
 
+pub use model::{fill_model, model_svg};
 pub use modes::modes;
 
 /// Head of a generated page.

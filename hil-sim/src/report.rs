@@ -7,6 +7,7 @@ mod crossings;
 mod decimate;
 #[cfg(test)]
 pub(crate) mod example;
+mod gaps;
 mod overview;
 mod page;
 pub(crate) mod palette;
@@ -21,6 +22,7 @@ use std::path::Path;
 use crate::export::{ExportError, write_text};
 use crate::record::Recording;
 
+pub use gaps::{Published, published_svg};
 pub use overview::overview_svg;
 
 /// The page of `recording`. It needs no other file and no script.

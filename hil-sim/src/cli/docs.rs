@@ -18,11 +18,16 @@ use crate::sil;
 use crate::table;
 
 /// Writes the generated parts of `docs/`: modes and codes, the picture of a
-/// deployment, and the results that the other pages refer to.
+/// deployment, the results that the other pages refer to, and figures and plot of the
+/// page on the model.
 ///
 /// Takes several minutes; the lengths are for trying it out.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
+    /// Writes this part alone.
+    #[arg(long, value_name = "PART")]
+    only: Option<Part>,
+
     /// Random rigs of the campaign, each way.
     #[arg(long, value_name = "N", default_value_t = 1000)]
     runs: u64,
@@ -30,6 +35,17 @@ pub(super) struct Args {
     /// Random rigs of the comparison of strategies.
     #[arg(long, value_name = "N", default_value_t = 200)]
     rigs: usize,
+}
+
+/// Parts that can be written alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Part {
+    /// Modes, faults and limits.
+    Modes,
+    /// The results, and the picture of a deployment.
+    Results,
+    /// The generated blocks of the page on the model, and its plot.
+    Model,
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
@@ -41,10 +57,20 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         written.push(path);
         Ok(())
     };
-    write("MODES.md", &docs::modes())?;
-    let recording = deploy(&[])?;
-    write("deployment.svg", &report::overview_svg(&recording))?;
-    write("RESULTS.md", &results(args, &recording)?)?;
+    let wanted = |part| args.only.is_none_or(|only| only == part);
+    if wanted(Part::Modes) {
+        write("MODES.md", &docs::modes())?;
+    }
+    if wanted(Part::Model) {
+        let page = std::fs::read_to_string(folder.join("MODEL.md")).map_err(Failure::run)?;
+        write("MODEL.md", &docs::fill_model(&page).map_err(Failure::run)?)?;
+        write("model.svg", &docs::model_svg().map_err(Failure::run)?)?;
+    }
+    if wanted(Part::Results) {
+        let recording = deploy(&[])?;
+        write("deployment.svg", &report::overview_svg(&recording))?;
+        write("RESULTS.md", &results(args, &recording)?)?;
+    }
     output::print(&written.iter().map(|path| shown(path)).collect::<String>())?;
     Ok(Outcome::of(true))
 }

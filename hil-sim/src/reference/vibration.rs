@@ -40,18 +40,19 @@ pub struct Bending {
 /// # Errors
 /// [`ReferenceError`] if an argument is out of range or the preload cannot be carried.
 pub fn history(case: &Case) -> Result<Vec<(f64, f64)>, ReferenceError> {
-    Ok(bending(case)?.iter().map(|now| (now.t_s, now.deflection_mm)).collect())
+    let course = bending(case, &dynamic(case)?)?;
+    Ok(course.iter().map(|now| (now.t_s, now.deflection_mm)).collect())
 }
 
-/// [`history`], with its vibration apart.
+/// [`history`] of a crossing of `case` that has been computed already, with its
+/// vibration apart.
 ///
 /// # Errors
-/// As [`history`].
-pub fn bending(case: &Case) -> Result<Vec<Bending>, ReferenceError> {
-    let crossing = dynamic(case)?;
+/// [`ReferenceError`] if the rig's arm is out of range.
+pub fn bending(case: &Case, crossing: &Crossing) -> Result<Vec<Bending>, ReferenceError> {
     let arm = Arm::of(case)?;
     let mut modal = arm.modal(MODES)?;
-    let forces = across(case, &arm, &crossing);
+    let forces = across(case, &arm, crossing);
     let mut course = Vec::new();
     let mut next = f64::NEG_INFINITY;
     let mut last: Option<(f64, f64)> = None;
@@ -91,7 +92,7 @@ mod tests {
         let compliance = Arm::of(&case).unwrap().compliance_m_per_n();
         let crossing = dynamic(&case).unwrap();
         let climb = crossing.peak_n() - crossing.samples[0].axial_n;
-        (bending(&case).unwrap(), climb * compliance * 1e3)
+        (bending(&case, &crossing).unwrap(), climb * compliance * 1e3)
     }
 
     #[test]

@@ -67,6 +67,21 @@ fn finer_rings_come_closer_to_the_closed_form() {
 }
 
 #[test]
+fn the_two_resolutions_are_converged() {
+    let at = |elements: usize| {
+        let resolution = Resolution { elements, stride_mm: 28.8 / elements as f64, step_s: 1e-4 };
+        let crossing = quasi_static(&Case { resolution, ..Case::study()[0].clone() }).unwrap();
+        (crossing.lift.unwrap().gap_mm, crossing.peak_n())
+    };
+    let (rough, fine, finest) = (at(2880), at(5760), at(11520));
+    for (rough, fine, finest) in [(rough.0, fine.0, finest.0), (rough.1, fine.1, finest.1)] {
+        assert!((rough / finest - 1.0).abs() < 1e-3, "{rough} {finest}");
+        assert!((fine / finest - 1.0).abs() < 2e-4, "{fine} {finest}");
+    }
+    assert_eq!(28.8 / 5760.0, Resolution::FIGURE.stride_mm);
+}
+
+#[test]
 fn the_closed_form_climbs_with_the_work_of_lifting_the_preload() {
     let (_, elastic) = without_memory(5.0, 100.0);
     // From before the touch to over the edge: the path does not matter, only its ends,

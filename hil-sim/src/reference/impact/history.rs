@@ -5,7 +5,7 @@ use super::rod::{Face, Rod};
 use super::rubber::THICKNESS_MM;
 use crate::reference::beam::Beam;
 use crate::reference::case::{Case, ReferenceError, positive};
-use crate::reference::collision::dynamic;
+use crate::reference::collision::{Crossing, dynamic};
 
 /// Cells across the tread.
 const CELLS: usize = 16;
@@ -39,7 +39,14 @@ fn tread(case: &Case, cells: usize) -> Result<Rod, ReferenceError> {
 /// # Errors
 /// [`ReferenceError`] if an argument is out of range or the preload cannot be carried.
 pub fn history(case: &Case) -> Result<Vec<(f64, f64)>, ReferenceError> {
-    let crossing = dynamic(case)?;
+    history_of(case, &dynamic(case)?)
+}
+
+/// [`history`] of a crossing of `case` that has been computed already.
+///
+/// # Errors
+/// [`ReferenceError`] if the tread is none of a passive solid.
+pub fn history_of(case: &Case, crossing: &Crossing) -> Result<Vec<(f64, f64)>, ReferenceError> {
     let mut rod = tread(case, CELLS)?;
     let Some(first) = crossing.samples.first() else { return Ok(Vec::new()) };
     let (mut t, mut next) = (first.t_s, first.t_s);
@@ -100,7 +107,7 @@ mod tests {
     fn the_hub_bears_what_the_face_does_a_transit_later() {
         let case = Case::study()[2].clone();
         let crossing = dynamic(&case).unwrap();
-        let course = history(&case).unwrap();
+        let course = history_of(&case, &crossing).unwrap();
         let peak = course.iter().map(|point| point.1).fold(0.0, f64::max);
         let mut worst = 0.0_f64;
         for &(t, hub) in course.iter().filter(|(t, _)| *t > 0.05) {
