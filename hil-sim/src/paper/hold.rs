@@ -6,6 +6,7 @@ use interstage::rig::Rig;
 use interstage::supervise::Direction;
 
 use super::case::{Case, Loads};
+use super::course::Points;
 use super::experiment::{Experiment, Reading, marks};
 use super::figure::{Claim, Figure, Panel, Series, Source};
 use super::published::{CONSTRAINED_HZ, FREE_HZ, LEAST_PRELOAD_N, LEAST_SPEED_MM_S, RIG_PRELOAD_N};
@@ -39,7 +40,7 @@ const DISCUSSED: &str = "Analysis and discussion of test results";
 #[derive(Clone, Debug)]
 pub struct Hold {
     /// Preload that holds the gap of the safe point against speed: theory, simulation.
-    preload: (Vec<(f64, f64)>, Vec<(f64, f64)>),
+    preload: (Points, Points),
     /// Gaps of [`CASES`] from the three sources, mm.
     gaps: [[f64; 3]; 3],
     /// Gaps of [`CASES`] in every run, mm.

@@ -12,6 +12,9 @@ const POINTS: usize = 60;
 /// Frequencies that are nearly met, relative.
 const NEAR: f64 = 0.1;
 
+/// Shape or frequency equation of a beam.
+type Classical = fn(f64, f64) -> f64;
+
 /// The modes of the figure.
 #[derive(Clone, Debug)]
 pub struct Modes {
@@ -50,7 +53,7 @@ impl Modes {
         // The classical frequency equations, in products of the two ends' functions.
         let ratio = tip_mass_kg / beam.mass_kg();
         let hz = |beta_l: f64| constrained.1 * (beta_l / constrained.0).powi(2);
-        let classical = |equation: fn(f64, f64) -> f64, range| {
+        let classical = |equation: Classical, range| {
             let beta_l = root(|b| equation(b, ratio), range);
             (beta_l, hz(beta_l))
         };
@@ -71,8 +74,8 @@ impl Modes {
         hertz.series.push(Series::new(Source::Fitted, vec![(0.0, CONSTRAINED_HZ)]));
         hertz.series.push(Series::new(Source::Published, vec![(1.0, FREE_HZ)]));
         hertz.least_y = Some((0.0, 0.0));
-        let classical: [(&str, fn(f64, f64) -> f64, f64); 2] = [
-            ("First constrained mode", clamped, self.constrained[0].0),
+        let classical = [
+            ("First constrained mode", clamped as Classical, self.constrained[0].0),
             ("Seventh free mode", free, self.free[0].0),
         ];
         let mut panels = vec![hertz];

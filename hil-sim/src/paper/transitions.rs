@@ -265,26 +265,23 @@ fn humps(one: &Histories, quantity: Quantity, source: Source) -> usize {
     count_humps(&values, 0.05)
 }
 
-/// Local maxima that stand out of their surroundings by this part of the largest value.
+/// Local maxima that stand out of what is before and after them by this part of the
+/// largest value.
 pub(super) fn count_humps(values: &[f64], part: f64) -> usize {
     let least = part * values.iter().copied().fold(0.0, f64::max);
-    let (mut low, mut high, mut rising, mut count) = (f64::INFINITY, f64::NEG_INFINITY, true, 0);
+    let first = values.first().copied().unwrap_or(0.0);
+    // The valley before, and the extreme since.
+    let (mut valley, mut extreme, mut rising, mut count) = (first, first, true, 0);
     for &value in values {
-        if rising {
-            low = low.min(value);
-            high = high.max(value);
-            if high - low > least && high - value > least {
-                count += 1;
-                (rising, low) = (false, value);
-            } else if value - low <= least {
-                high = value;
-            }
-        } else {
-            low = low.min(value);
-            if value - low > least {
-                (rising, high) = (true, value);
-            }
+        extreme = if rising { f64::max(extreme, value) } else { f64::min(extreme, value) };
+        if (value - extreme).abs() <= least {
+            continue;
         }
+        if rising && extreme - valley > least {
+            count += 1;
+        }
+        valley = extreme;
+        (rising, extreme) = (!rising, value);
     }
     count
 }
