@@ -2,8 +2,8 @@
 //!
 //! The study models it as a cone that is pressed into the tread (14-29). What the wheel
 //! meets is a straight edge as wide as itself, and at millimetres per second it meets it
-//! quasi-statically, so the models that count are those of the ring: [`quasi_static`],
-//! [`dynamic`] with the inertia of what moves, and [`elastic`], their limit without memory,
+//! quasi-statically, so the models that count are those of the ring: [`quasi_static()`],
+//! [`dynamic()`] with the inertia of what moves, and [`elastic`], their limit without memory,
 //! in closed form. The study's own laws in their corrected form stand beside them:
 //! [`hereditary`] (15, 16, 29), [`hunt_crossley`] (14), and, to show what it does,
 //! [`as_printed`] (17, 28).

@@ -3,7 +3,7 @@
 //! The study turns the stress waves of the impact into the excitation of a beam (41-56)
 //! and takes the amplitude of that beam for the contact gap. Here the arm is [`beam`] with
 //! the wheel as a mass at its tip, the collision force bends it, and the amplitude is what
-//! it is: tenths of a millimetre of still bending, micrometres of vibration. The published
+//! it is: tenths of a millimetre of still bending, less than a micrometre of vibration. The published
 //! millimetres are the clearance at the step root, see [`collision`].
 //!
 //! [`beam`]: super::beam
@@ -44,7 +44,7 @@ pub fn history(case: &Case) -> Result<Vec<(f64, f64)>, ReferenceError> {
     Ok(course.iter().map(|now| (now.t_s, now.deflection_mm)).collect())
 }
 
-/// [`history`] of a crossing of `case` that has been computed already, with its
+/// [`history()`] of a crossing of `case` that has been computed already, with its
 /// vibration apart.
 ///
 /// # Errors

@@ -4,7 +4,7 @@
 //! degrees that the study takes them at, `tan theta` has no bound: (17) divides by it
 //! and (28), which should follow from (17), multiplies by it. One gives no force
 //! whatever the preload, the other an unbounded one. [`super::hereditary`] has the cone
-//! with the angle counted from the surface, [`super::quasi_static`] the straight edge.
+//! with the angle counted from the surface, [`super::quasi_static()`] the straight edge.
 
 use std::f64::consts::PI;
 

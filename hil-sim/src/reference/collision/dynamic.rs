@@ -17,13 +17,13 @@ const ITERATIONS: usize = 60;
 /// The crossing with inertia.
 ///
 /// Equation: `m y'' = C(y, memory) - P`, C the radial contact force of
-/// [`super::quasi_static`], by the trapezoidal rule, implicitly: second order, without
+/// [`super::quasi_static()`], by the trapezoidal rule, implicitly: second order, without
 /// damping of its own.
 /// Sign: y away from the wall. Units: as the fields say.
 /// Range: that of [`Case::check`]. Error: second order in the time step; the frequency
 /// of wheel on tread comes out low by `(omega dt)^2/12`, 0.2 % at 0.2 ms and 800 rad/s.
 /// Cost: some 10^4 steps of a few hundred elements.
-/// Source: derived; as the mass or the speed falls it becomes [`super::quasi_static`].
+/// Source: derived; as the mass or the speed falls it becomes [`super::quasi_static()`].
 ///
 /// # Errors
 /// [`ReferenceError`] if an argument is out of range or the preload cannot be carried.

@@ -74,7 +74,7 @@ impl Rolling {
 /// Equation: `sum of p cos(psi) R dpsi L = P` over ring elements with the memory of the
 /// three-parameter solid, p >= 0; the collision force is the same sum with sin(psi).
 /// Sign: force against the motion positive. Units: as the fields say.
-/// Range: that of [`Case::check`]; inertia must not matter, see [`super::dynamic`].
+/// Range: that of [`Case::check`]; inertia must not matter, see [`super::dynamic()`].
 /// Error: gap and force within 0.1 % of the converged ring at [`Resolution::HISTORY`],
 /// 0.02 % at [`Resolution::FIGURE`]. Cost: some 10^4 strides of a few hundred elements.
 /// Source: derived; without memory it is [`super::elastic`].

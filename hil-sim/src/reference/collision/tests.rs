@@ -9,6 +9,7 @@ use proptest::prelude::*;
 use super::dynamic::Mass;
 use super::elastic::{Elastic, rigid_climb_n};
 use super::*;
+use crate::plant::balance::{Axial, Balance};
 use crate::plant::ring::{Motion, Ring};
 use crate::plant::wall::Wall;
 use crate::reference::Resolution;
@@ -37,19 +38,20 @@ fn coarse(case: Case) -> Case {
 fn without_memory_the_ring_is_its_closed_form() {
     for preload in [40.0, 100.0, 150.0] {
         let (case, elastic) = without_memory(5.0, preload);
+        let case = Case { resolution: Resolution::FIGURE, ..case };
         let crossing = quasi_static(&case).unwrap();
         let lift = crossing.lift.unwrap();
         let gap = elastic.gap_mm(preload).unwrap();
-        assert!((lift.gap_mm / gap - 1.0).abs() < 2e-3, "{} {gap}", lift.gap_mm);
+        assert!((lift.gap_mm / gap - 1.0).abs() < 5e-5, "{} {gap}", lift.gap_mm);
         let peak = crossing.peak_n();
         let mut worst = (0.0_f64, 0.0_f64);
-        for sample in crossing.samples.iter().filter(|s| s.x_mm < -0.1).step_by(10) {
+        for sample in crossing.samples.iter().filter(|s| s.x_mm < -1.0).step_by(10) {
             let height = elastic.height_mm(sample.x_mm, preload);
             let forces = elastic.forces(sample.x_mm, height);
             worst.0 = worst.0.max((sample.y_mm - height).abs());
             worst.1 = worst.1.max((sample.axial_n - forces.axial_n).abs() / peak);
         }
-        assert!(worst.0 < 2e-3 && worst.1 < 2e-3, "{worst:?}");
+        assert!(worst.0 < 5e-4 && worst.1 < 5e-4, "{worst:?}");
     }
 }
 
@@ -63,7 +65,7 @@ fn finer_rings_come_closer_to_the_closed_form() {
         (crossing.lift.unwrap().gap_mm / gap - 1.0).abs()
     };
     let (few, more, many) = (error(720), error(1440), error(5760));
-    assert!(few < 1e-2 && more < 5e-3 && many < 1e-3 && many < 0.5 * few, "{few} {more} {many}");
+    assert!(few < 2e-3 && more < 5e-4 && many < 5e-5, "{few} {more} {many}");
 }
 
 #[test]
@@ -84,8 +86,8 @@ fn the_two_resolutions_are_converged() {
 #[test]
 fn the_closed_form_climbs_with_the_work_of_lifting_the_preload() {
     let (_, elastic) = without_memory(5.0, 100.0);
-    // From before the touch to over the edge: the path does not matter, only its ends,
-    // so the last piece, where the edge lies under the patch, is what is missing of it.
+    // From before the touch to the face; the rest, where the edge passes under the patch,
+    // from the ring. Short of P h by what the rays lean from the wall's normal.
     let count = 40_000;
     let from = -15.9;
     let h = -from / f64::from(count);
@@ -101,8 +103,9 @@ fn the_closed_form_climbs_with_the_work_of_lifting_the_preload() {
         .filter(|pair| pair[0].x_mm >= 0.0)
         .map(|p| 0.5 * (p[0].axial_n + p[1].axial_n) * (p[1].x_mm - p[0].x_mm))
         .sum();
-    assert!(((work + after) / 400.0 - 1.0).abs() < 2e-3, "{work} {after}");
-    assert!((crossing.work_mj() / 400.0 - 1.0).abs() < 2e-3, "{}", crossing.work_mj());
+    for work in [work + after, crossing.work_mj()] {
+        assert!((0.999..1.0).contains(&(work / 400.0)), "{work}");
+    }
 }
 
 #[test]
@@ -160,51 +163,137 @@ fn inertia_is_small_at_millimetres_per_second_and_grows_with_speed() {
     assert!(slow < medium && medium < fast && fast > 10.0, "{slow} {medium} {fast}");
 }
 
-#[test]
-fn a_wheel_at_rest_rings_on_its_tread_at_the_frequency_of_a_mass_on_the_solid() {
-    // A small blow on a wheel that has settled: m s^2 + K(s) = 0 with
-    // K = K_inf + (K_0 - K_inf) s tau/(1 + s tau), a cubic in s.
-    let mut case = Case::new(Rig::fe(), 5.0, 100.0);
-    case.rig.tread.tau_s = 2e-3;
-    let (ring_of, way) = (case.ring(), Wall::default());
-    let mut ring = Ring::new(ring_of);
-    let at = |y: f64, dt_s: f64| Motion { wall: way.local(0.0), height_mm: y, turn_rad: 0.0, dt_s };
-    let balance = crate::plant::balance::Balance {
-        preload_n: 100.0,
-        spring_n_per_mm: 0.0,
-        axial: crate::plant::balance::Axial::Pushed,
-    };
-    let rest = balance.solve(&ring, at(24.5, 10.0)).unwrap();
-    ring.commit(&at(rest.height_mm, 10.0));
-    let rest = balance.solve(&ring, at(rest.height_mm, 10.0)).unwrap();
-    ring.commit(&at(rest.height_mm, 10.0));
-    let k_inf = -1e3 * rest.contact.slope.0;
-    let (k_0, tau, m) = (k_inf * 4.2235, 2e-3, 3.0);
-    let mut mass = Mass::on(&case, rest.height_mm);
-    mass.rate_mm_s = 0.02;
-    let dt = 2e-5;
-    // The cubic m tau s^3 + m s^2 + K_0 tau s + K_inf: its state (u, v, f).
-    let (mut u, mut v, mut q) = (0.0_f64, 0.02_f64, 0.0_f64);
-    let mut worst = 0.0_f64;
-    let mut largest = 0.0_f64;
-    for _ in 0..2000 {
-        let motion = at(mass.y_mm, dt);
+/// A wheel that has settled on the level wall with this relaxation time, its ring, and
+/// the relaxed stiffness it stands on, N/m.
+fn settled(tau_s: f64) -> (Mass, Ring, f64) {
+    let mut case = Case::study()[0].clone();
+    case.rig.tread.tau_s = tau_s;
+    let mut ring = Ring::new(case.ring());
+    let balance = Balance { preload_n: case.preload_n, spring_n_per_mm: 0.0, axial: Axial::Pushed };
+    let (mut height, mut stiffness) = (24.5, 0.0);
+    for _ in 0..3 {
+        let rest = balance.solve(&ring, level(height, 1e4 * tau_s)).unwrap();
+        (height, stiffness) = (rest.height_mm, -1e3 * rest.contact.slope.0);
+        ring.commit(&level(height, 1e4 * tau_s));
+    }
+    (Mass::on(&case, height), ring, stiffness)
+}
+
+/// On the level wall, without rolling.
+fn level(height_mm: f64, dt_s: f64) -> Motion {
+    Motion { wall: Wall::default().local(0.0), height_mm, turn_rad: 0.0, dt_s }
+}
+
+/// Heights above rest over `time_s` after a blow so small that no element comes or goes.
+fn ringing(tau_s: f64, blow_mm_s: f64, dt_s: f64, time_s: f64) -> Vec<f64> {
+    let (mut mass, mut ring, _) = settled(tau_s);
+    let rest = mass.y_mm;
+    mass.rate_mm_s = blow_mm_s;
+    let steps = (time_s / dt_s).round() as usize;
+    let heights = (0..steps).map(|_| {
+        let motion = level(mass.y_mm, dt_s);
         mass.step(&ring, motion);
         ring.commit(&Motion { height_mm: mass.y_mm, ..motion });
-        // The same linear system, finely.
-        for _ in 0..20 {
-            let h = dt / 20.0;
-            let rate = |u: f64, v: f64, q: f64| {
-                (v, -(k_inf * u + (k_0 - k_inf) * (u - q)) / m, (u - q) / tau)
-            };
-            let a = rate(u, v, q);
-            let b = rate(u + 0.5 * h * a.0, v + 0.5 * h * a.1, q + 0.5 * h * a.2);
-            (u, v, q) = (u + h * b.0, v + h * b.1, q + h * b.2);
-        }
-        worst = worst.max((mass.y_mm - rest.height_mm - u).abs());
-        largest = largest.max(u.abs());
+        mass.y_mm - rest
+    });
+    heights.collect()
+}
+
+#[test]
+fn a_wheel_at_rest_rings_on_its_tread_at_the_frequency_of_a_mass_on_the_solid() {
+    // m s^2 + K(s) = 0 with K = K_inf + (K_0 - K_inf) s tau/(1 + s tau): three exponentials,
+    // the roots of m tau s^3 + m s^2 + K_0 tau s + K_inf, from the blow v:
+    // u = v sum of (tau s + 1) m e^{s t}/(derivative of the cubic at s).
+    let tau = 2e-3;
+    let (_, _, k_inf) = settled(tau);
+    let (k_0, m) = (k_inf * Case::study()[0].rig.tread.stiffening, 3.0);
+    let cubic = nalgebra::Matrix3::new(
+        -1.0 / tau,
+        -k_0 / m,
+        -k_inf / (m * tau),
+        1.0,
+        0.0,
+        0.0,
+        0.0,
+        1.0,
+        0.0,
+    );
+    let roots = cubic.complex_eigenvalues();
+    let exact = |t: f64| -> f64 {
+        let parts = roots.iter().map(|s| {
+            let slope = s * s * (3.0 * m * tau) + s * (2.0 * m) + k_0 * tau;
+            ((s * tau + 1.0) * m * (s * t).exp() / slope).re
+        });
+        1e-4 * parts.sum::<f64>()
+    };
+    let dt = 2e-5;
+    let heights = ringing(tau, 1e-4, dt, 0.04);
+    let largest = heights.iter().fold(0.0_f64, |most, u| most.max(u.abs()));
+    for (step, u) in heights.iter().enumerate() {
+        let wanted = exact(dt * (step + 1) as f64);
+        assert!((u - wanted).abs() < 1e-3 * largest, "{step}: {u:e} {wanted:e} of {largest:e}");
     }
-    assert!(worst < 0.02 * largest, "{worst:e} of {largest:e}");
+}
+
+#[test]
+fn the_dynamic_form_is_of_second_order_in_its_step() {
+    let end = |dt: f64| *ringing(2e-3, 1e-4, dt, 0.016).last().unwrap();
+    let [a, b, c] = [2e-4, 1e-4, 5e-5].map(end);
+    let ratio = (a - b) / (b - c);
+    assert!((3.5..4.5).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn without_memory_a_ringing_wheel_keeps_its_energy() {
+    let mut case = Case::study()[0].clone();
+    case.rig.tread.stiffening = 1.0;
+    let mut ring = Ring::new(case.ring());
+    let balance = Balance { preload_n: case.preload_n, spring_n_per_mm: 0.0, axial: Axial::Pushed };
+    let rest = balance.solve(&ring, level(24.5, 1.0)).unwrap();
+    ring.commit(&level(rest.height_mm, 1.0));
+    let mut mass = Mass::on(&case, rest.height_mm);
+    mass.rate_mm_s = 1e-3;
+    // Kinetic, mJ, and that of the contact linearised about rest.
+    let energy = |mass: &Mass| {
+        let u = mass.y_mm - rest.height_mm;
+        0.5 * (3e-3 * mass.rate_mm_s.powi(2) - rest.contact.slope.0 * u * u)
+    };
+    let first = energy(&mass);
+    for _ in 0..20_000 {
+        let motion = level(mass.y_mm, 1e-4);
+        mass.step(&ring, motion);
+        ring.commit(&Motion { height_mm: mass.y_mm, ..motion });
+    }
+    assert!((energy(&mass) / first - 1.0).abs() < 1e-2, "{}", energy(&mass) / first);
+}
+
+#[test]
+fn memory_costs_work_and_a_driven_wheel_opens_a_wider_gap() {
+    let pushed = coarse(Case::study()[0].clone());
+    let (free, driven) = (quasi_static(&pushed).unwrap(), quasi_static(&pushed.driven()).unwrap());
+    assert!(free.work_mj() > 1.05 * 400.0, "{}", free.work_mj());
+    assert!(driven.lift.unwrap().gap_mm > 1.05 * free.lift.unwrap().gap_mm);
+    let used = driven.samples.iter().map(|s| s.utilisation).fold(0.0, f64::max);
+    // 20 N on this wheel at (5, 100).
+    assert!((used - 0.86).abs() < 0.05, "{used}");
+    assert!(free.samples.iter().all(|s| s.utilisation == 0.0));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+
+    #[test]
+    fn the_gap_falls_with_preload_and_grows_with_speed(
+        speed in 1.0..30.0_f64, preload in 20.0..120.0_f64, factor in 1.15..1.5_f64,
+    ) {
+        let gap = |speed, preload| {
+            let case = coarse(Case::new(Rig::fe(), speed, preload));
+            quasi_static(&case).unwrap().lift.unwrap().gap_mm
+        };
+        let here = gap(speed, preload);
+        prop_assert!(gap(speed, factor * preload) < here);
+        prop_assert!(gap(factor * speed, preload) > here);
+    }
 }
 
 proptest! {
