@@ -380,12 +380,10 @@ fn marks(
     fitted: bool,
     ours: impl Fn(Source, usize) -> f64,
 ) -> Vec<Mark> {
-    let mark = |(index, &published): (usize, &f64)| Mark {
-        what: format!("{what} at {} mm/s, {} N", CASES[index].0, CASES[index].1),
-        unit,
-        published,
-        fitted,
-        ours: SOURCES.map(|source| (source, ours(source, index))).to_vec(),
+    let mark = |(index, &published): (usize, &f64)| {
+        let what = format!("{what} at {} mm/s, {} N", CASES[index].0, CASES[index].1);
+        let ours = SOURCES.map(|source| (source, ours(source, index)));
+        Mark::new(what, unit, (published, fitted), &ours)
     };
     published.iter().enumerate().map(mark).collect()
 }

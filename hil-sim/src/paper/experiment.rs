@@ -84,6 +84,8 @@ pub struct Run {
     pub stages: [bool; 6],
     /// From the start of motion to the end of travel, s.
     pub duration_s: f64,
+    /// Gross slip, mm.
+    pub slip_mm: f64,
 }
 
 impl Run {
@@ -229,6 +231,7 @@ impl Watch {
     }
 
     fn finish(mut self, case: &Case, plant: &VirtualRig) -> Run {
+        self.run.slip_mm = plant.truth().slip_mm;
         for crossing in plant.ledger().crossings() {
             let tick = (crossing.lift_s / TICK_S) as usize;
             let gap = self.measured.iter().find(|(index, _)| *index == crossing.index);

@@ -98,14 +98,35 @@ pub struct Mark {
     /// Whether a parameter of ours is fitted to it.
     pub fitted: bool,
     /// Ours by source.
-    pub ours: Vec<(Source, f64)>,
+    pub ours: Vec<Ours>,
+}
+
+/// One of ours beside a published number.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Ours {
+    /// Where from.
+    pub source: Source,
+    /// Ours.
+    pub value: f64,
+    /// Deviation from the published number, relative.
+    pub deviation: f64,
 }
 
 impl Mark {
-    /// Deviation of one of ours from the published number, relative.
+    /// A published number, and ours by source.
     #[must_use]
-    pub fn deviation(&self, value: f64) -> f64 {
-        value / self.published - 1.0
+    pub fn new(
+        what: String,
+        unit: &'static str,
+        (published, fitted): (f64, bool),
+        ours: &[(Source, f64)],
+    ) -> Self {
+        let of = |&(source, value): &(Source, f64)| Ours {
+            source,
+            value,
+            deviation: value / published - 1.0,
+        };
+        Self { what, unit, published, fitted, ours: ours.iter().map(of).collect() }
     }
 }
 

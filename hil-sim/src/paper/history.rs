@@ -10,7 +10,7 @@ use super::{simulation, theory};
 use crate::reference::ReferenceError;
 
 /// Points of theory and simulation of which one is shown.
-const SHOWN_OF: usize = 4;
+const SHOWN_OF: usize = 8;
 
 /// Way over which its patch does, mm.
 const LEAVES_MM: f64 = 8.0;
@@ -168,8 +168,8 @@ impl Histories {
     #[must_use]
     pub fn clearance_panel(&self, title: String) -> Panel {
         let mut panel = Panel::new(title, "time, s", "root clearance, mm");
-        panel.series.push(Series::new(Source::Theory, thin(&self.clearance.0)));
-        panel.series.push(Series::new(Source::Simulation, thin(&self.clearance.1)));
+        panel.series.push(Series::new(Source::Theory, every(&self.clearance.0)));
+        panel.series.push(Series::new(Source::Simulation, every(&self.clearance.1)));
         panel.series.extend(named(&self.clearance_means));
         panel
     }
@@ -187,6 +187,11 @@ fn thin(points: &[(f64, f64)]) -> Points {
         i > 0 && i < last && shown[i - 1].1 == shown[i].1 && shown[i].1 == shown[i + 1].1
     };
     (0..shown.len()).filter(|&i| !flat(i)).map(|i| shown[i]).collect()
+}
+
+/// One of every few points.
+fn every(points: &[(f64, f64)]) -> Points {
+    points.iter().copied().step_by(SHOWN_OF).collect()
 }
 
 /// When the wheel has left each of the steps behind, s.

@@ -87,12 +87,9 @@ impl Modes {
             panel.series.push(Series::new(Source::Simulation, simulation));
             panels.push(panel);
         }
-        let mark = |what: &str, published, fitted, of: [(f64, f64); 2]| Mark {
-            what: what.into(),
-            unit: "Hz",
-            published,
-            fitted,
-            ours: vec![(Source::Theory, of[0].1), (Source::Simulation, of[1].1)],
+        let mark = |what: &str, published, of: [(f64, f64); 2]| {
+            let ours = [(Source::Theory, of[0].1), (Source::Simulation, of[1].1)];
+            Mark::new(what.into(), "Hz", published, &ours)
         };
         Figure {
             id: "fig19",
@@ -110,8 +107,8 @@ impl Modes {
             columns: 3,
             panels,
             published: vec![
-                mark("first constrained mode", CONSTRAINED_HZ, true, self.constrained),
-                mark("seventh free mode", FREE_HZ, false, self.free),
+                mark("first constrained mode", (CONSTRAINED_HZ, true), self.constrained),
+                mark("seventh free mode", (FREE_HZ, false), self.free),
             ],
         }
     }

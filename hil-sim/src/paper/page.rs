@@ -92,8 +92,8 @@ fn mark_row(mark: &Mark) -> String {
     let fitted = if mark.fitted { " (fitted)" } else { "" };
     let unit = if mark.unit.is_empty() { String::new() } else { format!(" {}", mark.unit) };
     let ours = |source: Source| {
-        mark.ours.iter().find(|(of, _)| *of == source).map_or_else(String::new, |&(_, value)| {
-            format!("{} ({:+.1} %)", figures(value), 100.0 * mark.deviation(value))
+        mark.ours.iter().find(|ours| ours.source == source).map_or_else(String::new, |ours| {
+            format!("{} ({:+.1} %)", figures(ours.value), 100.0 * ours.deviation)
         })
     };
     format!(
