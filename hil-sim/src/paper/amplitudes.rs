@@ -8,6 +8,7 @@ use super::history::{Histories, Quantity};
 use super::published::{AMPLITUDE_MM, CASES, COLLISION_N, STRESS};
 use super::simulation;
 use super::theory::{self, Drive, Lift};
+use super::transitions::at;
 use crate::reference::impact::Rubber;
 use crate::reference::{Case as Reference, ReferenceError};
 
@@ -341,8 +342,8 @@ fn resemblance(all: &[Histories]) -> f64 {
         let (theory, simulation) = &one.clearance;
         let least = theory.iter().enumerate().min_by(|a, b| a.1.1.total_cmp(&b.1.1));
         let from = least.map_or(0, |(index, _)| index);
-        let pairs = theory.iter().zip(simulation).skip(from);
-        pairs.map(|(a, b)| (b.1 / a.1 - 1.0).abs()).fold(0.0, f64::max)
+        let apart = |&(t, y): &(f64, f64)| Some((at(simulation, t)? / y - 1.0).abs());
+        theory[from..].iter().filter_map(apart).fold(0.0, f64::max)
     };
     all[..3].iter().map(of).fold(0.0, f64::max)
 }

@@ -316,7 +316,7 @@ fn least_following(all: &[Histories], quantity: Quantity) -> f64 {
 }
 
 /// Value at a time, linear between points; none outside.
-fn at(points: &[(f64, f64)], time: f64) -> Option<f64> {
+pub(super) fn at(points: &[(f64, f64)], time: f64) -> Option<f64> {
     let next = points.partition_point(|p| p.0 < time);
     let (a, b) = (points.get(next.checked_sub(1)?)?, points.get(next)?);
     Some(a.1 + (time - a.0) / (b.0 - a.0) * (b.1 - a.1))
