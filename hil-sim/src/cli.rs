@@ -16,6 +16,7 @@ mod keys;
 mod modes;
 mod montecarlo;
 mod output;
+mod paper;
 mod parse;
 mod scenario;
 mod size;
@@ -43,6 +44,7 @@ enum Verb {
     Modes(modes::Args),
     Compare(compare::Args),
     Montecarlo(montecarlo::Args),
+    Paper(paper::Args),
     Keys(keys::Args),
     Size(size::Args),
     Account(account::Args),
@@ -59,6 +61,7 @@ impl Verb {
             Self::Modes(args) => modes::run(args),
             Self::Compare(args) => compare::run(args),
             Self::Montecarlo(args) => montecarlo::run(args),
+            Self::Paper(args) => paper::run(args),
             Self::Keys(args) => keys::run(args),
             Self::Size(args) => size::run(args),
             Self::Account(args) => account::run(args),
