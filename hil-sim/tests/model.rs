@@ -55,10 +55,10 @@ fn is(figure: f64, expected: f64, within: f64) {
 fn every_gap_held_out_is_within_one_per_cent_or_ten_micrometres() {
     // Largest and RMS error in parts of that, by kind and step height from 2, 3, 4, 5 mm.
     let stated = [
-        (DRIVEN_CLIMB, [(0.0, 0.0); 4]),
-        (PUSHED_CLIMB, [(0.0, 0.0); 4]),
-        (DRIVEN_DROP, [(0.0, 0.0); 4]),
-        (PUSHED_DROP, [(0.0, 0.0); 4]),
+        (DRIVEN_CLIMB, [(0.506, 0.169), (0.294, 0.108), (0.203, 0.087), (0.203, 0.080)]),
+        (PUSHED_CLIMB, [(0.467, 0.148), (0.170, 0.069), (0.138, 0.062), (0.133, 0.053)]),
+        (DRIVEN_DROP, [(0.346, 0.132), (0.360, 0.137), (0.190, 0.082), (0.233, 0.079)]),
+        (PUSHED_DROP, [(0.225, 0.096), (0.240, 0.107), (0.217, 0.072), (0.104, 0.052)]),
     ];
     for (kind, by_step) in stated {
         for (index, (most, rms)) in by_step.into_iter().enumerate() {
@@ -67,7 +67,6 @@ fn every_gap_held_out_is_within_one_per_cent_or_ten_micrometres() {
             assert!(rows.len() >= 20, "{kind:?} from {low} mm: {}", rows.len());
             let errors: Vec<f64> = rows.iter().map(|row| fit::gap_error(&formula(), row)).collect();
             let found = max_and_rms(&errors);
-            println!("{kind:?} {low} mm, {}: {found:.3?}", rows.len());
             assert!(found.0 < 1.0, "{kind:?} from {low} mm: {found:?}");
             is(found.0, most, 0.005);
             is(found.1, rms, 0.005);
@@ -80,7 +79,10 @@ fn friction_and_corner_force_follow_the_ring() {
     // The model takes the slope of the elastic contact; memory tilts the true one.
     // Friction needed at lift-off, least and largest error; corner force against the
     // ring's largest over the whole crossing, relative.
-    let stated = [(DRIVEN_CLIMB, (0.0, 0.0), (0.0, 0.0)), (DRIVEN_DROP, (0.0, 0.0), (0.0, 0.0))];
+    let stated = [
+        (DRIVEN_CLIMB, (-0.052, 0.003), (-0.097, 0.0)),
+        (DRIVEN_DROP, (-0.022, 0.010), (-0.008, 0.023)),
+    ];
     for (kind, friction, corner) in stated {
         let rows = held_out(kind, 2.0..6.1);
         let errors: Vec<(f64, f64)> = rows
@@ -99,7 +101,6 @@ fn friction_and_corner_force_follow_the_ring() {
         let range = |of: fn(&(f64, f64)) -> f64| {
             errors.iter().map(of).fold((f64::MAX, f64::MIN), |(a, b), e| (a.min(e), b.max(e)))
         };
-        println!("{kind:?} {:.3?} {:.3?}", range(|e| e.0), range(|e| e.1));
         let (low, high) = range(|e| e.0);
         is(low, friction.0, 0.002);
         is(high, friction.1, 0.002);
@@ -123,7 +124,6 @@ fn the_ring_behind_it_is_converged() {
         })
         .collect();
     let (most, _) = max_and_rms(&moved);
-    println!("{most}");
     assert!(most < 0.1, "{moved:?}");
 }
 
@@ -143,12 +143,12 @@ fn other_rubber_is_predicted_worse_the_stiffer_it_gets_at_speed() {
     // its product with the speed counts. Largest error of the gap, relative, at 4 mm and
     // 6.7 N over nine working points, way out and way back.
     let stated = [
-        (2.0, 0.1059, 0.0, 0.0),
-        (3.0, 0.1059, 0.0, 0.0),
-        (6.0, 0.1059, 0.0, 0.0),
-        (8.0, 0.1059, 0.0, 0.0),
-        (4.2235, 0.05, 0.0, 0.0),
-        (4.2235, 0.2, 0.0, 0.0),
+        (2.0, 0.1059, 0.0086, 0.0176),
+        (3.0, 0.1059, 0.0063, 0.0155),
+        (6.0, 0.1059, 0.0096, 0.0276),
+        (8.0, 0.1059, 0.0144, 0.0529),
+        (4.2235, 0.05, 0.0018, 0.0017),
+        (4.2235, 0.2, 0.0020, 0.0022),
     ];
     for (stiffening, tau_s, out, back) in stated {
         let rubber = Formula { stiffening, tau_s, ..formula() };
@@ -178,7 +178,6 @@ fn other_rubber_is_predicted_worse_the_stiffer_it_gets_at_speed() {
                 })
                 .collect();
             let (most, _) = max_and_rms(&errors);
-            println!("s {stiffening} tau {tau_s} {direction:?} {most:.4}");
             is(most, expected, 0.1 * expected + 2e-4);
         }
     }

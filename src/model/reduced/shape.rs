@@ -1,18 +1,11 @@
 //! What a rig's geometry and load make of a run over the corner; the same on both ways.
 
 use super::centred;
-use super::way::Row;
-use crate::numeric::{
-    fraction, high, horner, horner_with_slope, reciprocal_of_normalised, sqrt_fraction,
-};
+use crate::numeric::{fraction, high, horner, inverse_sqrt_normalised, sqrt_fraction};
 use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio};
 
 /// A function of the centred run, a quartic.
 pub(super) type Quartic = [i32; 5];
-
-/// Halley's weight of the residual, Q32: half of how much more than 1 the force's power
-/// of the run is, which lies between 1.5 and 2 over the fit.
-const CURVATURE: i32 = (0.35 * 4_294_967_296.0) as i32;
 
 /// Fastest speed that vibration and impact tell apart, 2048 mm/s.
 const MOST_SPEED: i32 = 2048 << 16;
@@ -28,8 +21,8 @@ pub(super) struct Shape {
     /// that, Q31.
     pub(super) longest_shift: u32,
     pub(super) longest_inverse: u32,
-    /// Shortest run, Q32.
-    pub(super) least: u32,
+    /// Shortest run, Q31.
+    pub(super) least: i32,
     /// R/2, mm, Q19, and 1/R, 1/mm, Q33.
     pub(super) half_radius: i32,
     pub(super) inverse_radius: i32,
@@ -67,29 +60,34 @@ pub(super) struct Shape {
     pub(super) deflection_shift: u32,
 }
 
-/// Where the wheel lifts off.
+/// A force and twice its root.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Lifted {
-    /// Run, Q32.
-    pub(super) run: u32,
+pub(super) struct Root {
+    /// The force, Q30.
+    force: i32,
+    /// Twice its root, Q32.
+    pub(super) root: u32,
+    /// Inverse of the root, normalised by an even shift, Q29.
+    inverse: u32,
+    shift: u32,
 }
 
 impl Shape {
     /// Shortest run, Q32.
     pub(super) const fn least_run(&self) -> u32 {
-        self.least
+        (self.least as u32) << 1
     }
 
     /// Longest run, Q32.
     pub(super) const fn most_run(&self) -> u32 {
-        u32::MAX
+        (i32::MAX as u32) << 1
     }
 
     /// A force as part of the unit, Q30, from 0 to a quarter: beyond what the longest run
     /// takes at rest.
     #[inline(always)]
     pub(super) fn part(&self, force: Newtons) -> i32 {
-        let bits = force.to_bits().clamp(0, self.most_force);
+        let bits = force.to_bits().min(self.most_force).max(0);
         high(bits << self.unit_shift, self.inverse_unit) << 1
     }
 
@@ -124,7 +122,7 @@ impl Shape {
         let run = self.free.saturating_sub(distance).min(self.longest - 1);
         let normalised = run << self.longest_shift;
         let part = (u64::from(normalised) * u64::from(self.longest_inverse)) >> 31;
-        (part.min(u64::from(u32::MAX)) as u32).max(self.least)
+        (part.min(u64::from(self.most_run())) as u32).max(self.least_run())
     }
 
     /// Distance of the wheel's centre from the face over R, Q32.
@@ -181,15 +179,17 @@ impl Shape {
     /// `T / C + s` of a driven wheel, from the radial reaction.
     #[inline(always)]
     pub(super) fn utilisation(&self, radial: i32, slope: i32) -> Ratio {
-        // Of four times the reaction: up to 4, beyond any friction.
-        let lifting = fraction((self.load >> 2) as u32, radial.max(1) as u32) >> 14;
-        Q16::from_bits(lifting as i32 + (slope >> 14))
+        // Q30 to Q34 over Q18. A reaction below 4e-6 is none.
+        let lifting = ((self.load as u32) << 4) / ((radial >> 12) as u32 | 1);
+        Q16::from_bits((lifting.min(1 << 24) as i32) + (slope >> 14))
     }
 
-    /// Elastic force after this run at a speed, Q30, not negative.
+    /// Elastic force after this run with a stiffness, Q26, over the instant one; Q30, not
+    /// negative.
     #[inline(always)]
-    pub(super) fn elastic(&self, run: u32, row: &Row) -> i32 {
-        elastic(self.relaxed(run), row.stiffness(centred(run)))
+    pub(super) fn elastic(&self, run: u32, stiffness: i32) -> i32 {
+        let wide = i64::from(self.relaxed(run)) * i64::from(stiffness.clamp(0, (1 << 27) - 1));
+        ((wide >> 24) as i32).clamp(0, (1 << 29) - 1)
     }
 
     /// Stiffness over the instant one that carries an elastic force, Q30, after this run;
@@ -205,43 +205,49 @@ impl Shape {
     fn relaxed(&self, run: u32) -> i32 {
         let [a0, a1, a2, a3, a4] = self.force;
         let half = (run >> 1) as i32;
-        relaxed(high(half, half), horner!(centred(run); a0, a1, a2, a3, a4))
+        let quartic = horner!(centred(run); a0, a1, a2, a3, a4);
+        high(high(half, half) << 1, quartic).clamp(0, (1 << 28) - 1)
     }
 
-    /// What the guess of the run is taken from: twice the root of the force beyond the
-    /// lift of the load on the steepest slope, Q32.
+    /// The force beyond the lift of the load on the steepest slope, which goes nearly with
+    /// the square of the run; up to a quarter of the unit.
     #[inline(always)]
-    pub(super) fn root_of(&self, sought: i32) -> u32 {
-        let elastic = (sought - self.most_lifting).clamp(0, (1 << 28) - 1);
-        sqrt_fraction((elastic as u32) << 4)
+    pub(super) fn beyond_lift(&self, sought: i32) -> Root {
+        // From 0.06 N on the published wheel, so that the shifts below stay small.
+        let force = (sought - self.most_lifting).clamp(1 << 16, (1 << 28) - 1);
+        let (shift, inverse) = inverse_sqrt_normalised((force as u32) << 4);
+        let normalised = (force as u32) << 4 << shift;
+        let root = ((u64::from(normalised) * u64::from(inverse << 1)) >> 32) as u32;
+        Root { force, root: (root << 2) >> (shift / 2), inverse, shift }
     }
 
-    /// One step of Halley's method from `guess` towards the run whose force is `sought`.
+    /// From a guess of the run to the run of the force `sought`, Q30.
+    ///
+    /// With the relative residual y of the force and what run and force change in
+    /// proportion by, N, a power law gives `dr/r = N y (1 + (1 + N)/2 y)` to third order.
     #[inline(always)]
-    pub(super) fn refine(&self, guess: u32, sought: i32, row: &Row) -> Lifted {
-        let [a0, a1, a2, a3, a4] = self.force;
-        let [s0, s1, s2, s3, s4] = self.slope;
+    pub(super) fn refine(
+        &self,
+        guess: u32,
+        sought: i32,
+        beyond: &Root,
+        stiffness: i32,
+        yielding: i32,
+    ) -> u32 {
         let w = centred(guess);
-        let run = (guess >> 1) as i32;
-        let square = high(run, run);
-        let (force, force_slope) = horner_with_slope!(w; a0, a1, a2, a3, a4);
-        let (slope, slope_slope) = horner_with_slope!(w; s0, s1, s2, s3, s4);
-        let (stiffness, stiffness_slope) = row.stiffness_with_slope(w);
-        let elastic = elastic(relaxed(square, force), stiffness);
-        let lacking = sought - elastic - (high(self.load, slope) << 2);
-        // r F' = 2 F + r^3 (a' k + a k') + r T s', each brought to Q30.
-        let bend = (high(force_slope, stiffness) >> 4) + high(force, stiffness_slope);
-        let cubic = high(high(square << 1, run) << 1, bend) << 12;
-        // The force goes with a power of the run between one and three.
-        let cubic = cubic.clamp(-elastic, elastic);
-        let lifting = high(high(self.load, slope_slope) << 2, run) << 1;
-        let rise = 2 * elastic + cubic + lifting + high(lacking, CURVATURE);
-        let rise = rise.max(1 << 20);
-        let lacking = lacking.clamp(-(rise >> 1), rise >> 1);
-        let shift = (rise as u32).leading_zeros();
-        let inverse = (reciprocal_of_normalised((rise as u32) << shift) >> 1) as i32;
-        let step = high(high(lacking, run), inverse) << (shift + 3);
-        Lifted { run: guess.saturating_add_signed(step).max(self.least) }
+        let lacking = sought - self.elastic(guess, stiffness) - self.lifting(w);
+        let limit = beyond.force >> 2;
+        let lacking = lacking.clamp(-limit, limit);
+        // Over four times the force, whose inverse is that of the root, squared. Q30.
+        let inverse = ((u64::from(beyond.inverse) * u64::from(beyond.inverse)) >> 32) as i32;
+        let residual = high(lacking, inverse) << (8 + beyond.shift);
+        let first = high(residual, yielding);
+        let second = high(residual, -(1 << 30) - (yielding >> 1));
+        let part = first - (high(first << 2, second) << 1);
+        // Q31, which saturates where the run ends.
+        let half = (guess >> 1) as i32;
+        let half = half.saturating_add(high(part, half) << 3);
+        (half.max(self.least) as u32) << 1
     }
 
     /// Impact stress, kPa.
@@ -253,24 +259,14 @@ impl Shape {
     /// Vibration that is left, um.
     #[inline(always)]
     pub(super) fn vibration(&self, speed: MillimetresPerSecond, radial: i32, run: u32) -> Q16 {
-        let speed = speed.to_bits().clamp(0, MOST_SPEED) as u32;
-        let ramp = (u64::from(speed) * u64::from(self.ramp)) >> 16;
-        let ramp = fraction(ramp.min(u64::from(u32::MAX)) as u32, run);
+        // From 0.008 mm/s, brought to the top; over the run, Q16, that leaves 23 bits.
+        let speed = speed.to_bits().clamp(1 << 9, MOST_SPEED) as u32;
+        let places = speed.leading_zeros();
+        let pace = (speed << places) / (run >> 16 | 1);
+        let ramp = ((u64::from(pace << 9) * u64::from(self.ramp)) >> 32) as u32;
+        // Times 2^(9 + places); what is left of a sudden force, Q31.
+        let ramp = (ramp.min((1 << (9 + places)) - 1) << (22 - places)) as i32;
         let still = high(radial, self.deflection);
-        Q16::saturating_from_bits((i64::from(still) * i64::from(ramp)) >> self.deflection_shift)
+        Q16::from_bits((high(still, ramp) << 4) >> self.deflection_shift)
     }
-}
-
-/// Relaxed force, Q28, from 0 to below 1: the square of the run, Q30, times the quartic.
-#[inline(always)]
-fn relaxed(square: i32, quartic: i32) -> i32 {
-    high(square << 1, quartic).clamp(0, (1 << 28) - 1)
-}
-
-/// Elastic force, Q30, from 0 to below one half, from the relaxed one, Q28, and the
-/// stiffness over the instant one, Q26, of which 0 to 2 counts.
-#[inline(always)]
-fn elastic(relaxed: i32, stiffness: i32) -> i32 {
-    let wide = i64::from(relaxed) * i64::from(stiffness.clamp(0, (1 << 27) - 1));
-    ((wide >> 24) as i32).clamp(0, (1 << 29) - 1)
 }

@@ -7,8 +7,11 @@ use crate::units::{MillimetresPerSecond, Q16};
 /// Coefficients of `(s - 1)/s E`, Q23: `u^i w^j` for i/5 + j/6 at most 1, by j and then i.
 pub(super) const TERMS: usize = 22;
 
-/// Coefficients of a guess: total degree 5, by the second variable and then the first.
-pub(super) const GUESS_TERMS: usize = 21;
+/// Coefficients of a surface of total degree 3, by the second variable and then the first.
+pub(super) const CUBIC_TERMS: usize = 10;
+
+/// The same of total degree 5.
+pub(super) const QUINTIC_TERMS: usize = 21;
 
 /// Residual of the stiffness, Q26, beyond which there is no speed: 1 % of the instant one.
 const NO_SPEED: i32 = (1 << 26) / 100;
@@ -27,37 +30,12 @@ pub(super) struct Way {
     /// 1/s, Q26.
     pub(super) relaxed: i32,
     pub(super) felt: [i32; TERMS],
-    /// Run over twice the root of the elastic force by centred x and root, Q26.
-    pub(super) run_guess: [i32; GUESS_TERMS],
+    /// Run over the root of the force by centred x and root, Q26.
+    pub(super) run_guess: [i32; QUINTIC_TERMS],
+    /// Relative change of the run by that of the force by centred x and root, Q26.
+    pub(super) yielding: [i32; CUBIC_TERMS],
     /// Fast part by centred stiffness and run, Q26.
-    pub(super) speed_guess: [i32; GUESS_TERMS],
-}
-
-/// The felt stiffening at one speed, a polynomial in the centred run.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Row {
-    terms: [i32; 7],
-    /// x, Q31.
-    x: i32,
-    /// 1/s, Q26.
-    relaxed: i32,
-}
-
-impl Row {
-    /// Effective over instant stiffness, Q26.
-    #[inline(always)]
-    pub(super) fn stiffness(&self, w: i32) -> i32 {
-        let [c0, c1, c2, c3, c4, c5, c6] = self.terms;
-        self.relaxed + high(horner!(w; c0, c1, c2, c3, c4, c5, c6) << 4, self.x)
-    }
-
-    /// The same, and its derivative by the run, Q22.
-    #[inline(always)]
-    pub(super) fn stiffness_with_slope(&self, w: i32) -> (i32, i32) {
-        let [c0, c1, c2, c3, c4, c5, c6] = self.terms;
-        let (felt, slope) = horner_with_slope!(w; c0, c1, c2, c3, c4, c5, c6);
-        (self.relaxed + high(felt << 4, self.x), high(slope, self.x))
-    }
+    pub(super) speed_guess: [i32; QUINTIC_TERMS],
 }
 
 impl Way {
@@ -68,26 +46,24 @@ impl Way {
         fraction(speed, speed + self.half_speed)
     }
 
-    /// The stiffening at one fast part.
+    /// Effective over instant stiffness at a fast part and a centred run, Q26.
     #[inline(always)]
-    pub(super) fn along_run(&self, x: u32) -> Row {
+    pub(super) fn stiffness(&self, x: u32, w: i32) -> i32 {
         #[rustfmt::skip]
         let [a0, a1, a2, a3, a4, a5, b0, b1, b2, b3, b4, c0, c1, c2, c3, d0, d1, d2, e0, e1, f0,
             g0] = self.felt;
         let u = centred(x);
-        Row {
-            terms: [
-                horner!(u; a0, a1, a2, a3, a4, a5),
-                horner!(u; b0, b1, b2, b3, b4),
-                horner!(u; c0, c1, c2, c3),
-                horner!(u; d0, d1, d2),
-                horner!(u; e0, e1),
-                f0,
-                g0,
-            ],
-            x: (x >> 1) as i32,
-            relaxed: self.relaxed,
-        }
+        let felt = horner!(
+            w;
+            horner!(u; a0, a1, a2, a3, a4, a5),
+            horner!(u; b0, b1, b2, b3, b4),
+            horner!(u; c0, c1, c2, c3),
+            horner!(u; d0, d1, d2),
+            horner!(u; e0, e1),
+            f0,
+            g0
+        );
+        self.relaxed + high(felt << 4, (x >> 1) as i32)
     }
 
     /// The stiffening after one run, by the centred fast part.
@@ -106,13 +82,19 @@ impl Way {
         ]
     }
 
-    /// Guess of the run, Q32, from the fast part and the root of the elastic force.
+    /// Guess of the run, Q32, from the fast part and the root of the force.
     #[inline(always)]
     pub(super) fn guess_run(&self, x: u32, root: u32) -> u32 {
-        let per_root = guess(&self.run_guess, centred(x), centred(root)).max(0) as u32;
-        let wide = (u64::from(per_root) * u64::from(root)) >> 26;
-        // Away from 1, where the step needs room.
-        wide.min(0xFFFF_0000) as u32
+        let per_root = quintic(&self.run_guess, centred(x), centred(root)).max(0) as u32;
+        // Q26, below 1.
+        let run = ((u64::from(per_root) * u64::from(root)) >> 32) as u32;
+        run.min((1 << 26) - 1) << 6
+    }
+
+    /// Relative change of the run by that of the force, Q31.
+    #[inline(always)]
+    pub(super) fn yielding(&self, x: u32, root: u32) -> i32 {
+        cubic(&self.yielding, centred(x), centred(root)) << 5
     }
 
     /// Speed at which the stiffness after this run is the given one, Q26; none if it is
@@ -123,18 +105,25 @@ impl Way {
         // Stiffnesses up to that at no pause for relaxation.
         let part = (stiffness.clamp(0, (1 << 26) - 1) as u32) << 6;
         let first =
-            guess(&self.speed_guess, centred(part), w).clamp(1 << 16, (1 << 26) - (1 << 16));
+            quintic(&self.speed_guess, centred(part), w).clamp(1 << 16, (1 << 26) - (1 << 16));
         let first = (first as u32) << 6;
-        let (value, slope) = self.at(&terms, first);
+        let (second, _) = self.nearer(&terms, first, stiffness);
+        let (x, lacking) = self.nearer(&terms, second, stiffness);
+        if lacking < -NO_SPEED { None } else { Some(self.speed_of(x)) }
+    }
+
+    /// One step of Newton's method towards a stiffness, by at most a quarter, and what was
+    /// lacking before it, Q26.
+    #[inline(always)]
+    fn nearer(&self, terms: &[i32; 6], x: u32, stiffness: i32) -> (u32, i32) {
+        let (value, slope) = self.at(terms, x);
+        let lacking = stiffness - value;
         let slope = slope.max(LEAST_SLOPE);
         let shift = (slope as u32).leading_zeros();
         let inverse = (reciprocal_of_normalised((slope as u32) << shift) >> 1) as i32;
-        // Q26 over Q24, as Q32, up to a quarter.
-        let step = |lacking: i32| high(lacking.clamp(-slope, slope), inverse) << shift;
-        let second = bounded(first, step(stiffness - value));
-        let lacking = stiffness - self.at(&terms, second).0;
-        let x = bounded(second, step(lacking));
-        if lacking < -NO_SPEED { None } else { Some(self.speed_of(x)) }
+        // Q26 over Q24, as Q32.
+        let step = high(lacking.clamp(-slope, slope), inverse) << shift;
+        (bounded(x, step), lacking)
     }
 
     /// Stiffness at a fast part, Q26, and its derivative by it, Q24.
@@ -166,9 +155,22 @@ fn bounded(x: u32, step: i32) -> u32 {
     x.saturating_add_signed(step).clamp(1 << 16, u32::MAX - (1 << 16))
 }
 
+/// A polynomial of total degree 3 in two centred variables.
+#[inline(always)]
+fn cubic(terms: &[i32; CUBIC_TERMS], p: i32, q: i32) -> i32 {
+    let [a0, a1, a2, a3, b0, b1, b2, c0, c1, d0] = *terms;
+    horner!(
+        q;
+        horner!(p; a0, a1, a2, a3),
+        horner!(p; b0, b1, b2),
+        horner!(p; c0, c1),
+        d0
+    )
+}
+
 /// A polynomial of total degree 5 in two centred variables.
 #[inline(always)]
-fn guess(terms: &[i32; GUESS_TERMS], p: i32, q: i32) -> i32 {
+fn quintic(terms: &[i32; QUINTIC_TERMS], p: i32, q: i32) -> i32 {
     #[rustfmt::skip]
     let [a0, a1, a2, a3, a4, a5, b0, b1, b2, b3, b4, c0, c1, c2, c3, d0, d1, d2, e0, e1, f0] =
         *terms;

@@ -78,8 +78,11 @@ pub(super) fn reduced(rig: &Rig, case: &Case) -> Result<Figures, Failure> {
 /// The reduced model as the firmware runs it.
 pub(super) fn fixed(rig: &Rig, case: &Case) -> Result<Figures, Failure> {
     let model = ReducedModel::try_build_for(rig, case.load_n)?;
-    let point =
-        Point { direction: case.direction, speed: Q16::from_num(case.speed_mm_s), scale: Q16::ONE };
+    let point = Point {
+        direction: case.direction,
+        speed: Q16::from_num(case.speed_mm_s),
+        scale: Scale::NOMINAL,
+    };
     let crossing = model.crossing(&point, Q16::from_num(case.preload_n));
     Ok(Figures {
         gap_mm: crossing.gap.to_num(),
