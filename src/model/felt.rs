@@ -122,7 +122,7 @@ pub fn run_values(run: f64) -> [f64; RUN_DEGREE + 1] {
 #[must_use]
 pub fn step_values(step: f64) -> [f64; SLOW_DEGREE + 1] {
     let (low, high) = STEP_RANGE;
-    chebyshev(2.0 * (step.clamp(low, high) - low) / (high - low) - 1.0)
+    chebyshev(2.0 * (step.max(low).min(high) - low) / (high - low) - 1.0)
 }
 
 /// Chebyshev values in the load over k_inf R^2 L, held at the ends.

@@ -217,7 +217,10 @@ impl<'a> Start<'a> {
         let root = |force: f64| 2.0 * libm::sqrt(force);
         let grip = (1.0 + steepest * steepest) / (MOST_UTILISATION - steepest);
         let low = root((load * grip).max(LEAST_FORCE_N / self.unit_n)).max(LEAST_ROOT);
-        let high = root(value(&self.force, 0.5) / self.formula.stiffening).clamp(low + 0.2, 1.0);
+        let high = root(value(&self.force, 0.5) / self.formula.stiffening)
+            // Not clamped: what that says of its ends would bring the printing of floats.
+            .max(low + 0.2)
+            .min(1.0);
         // Beyond the longest run as at its end, so that the surface stays smooth.
         let force = |x: f64, run: f64| {
             let w = (run - 0.5).min(0.5);
