@@ -16,6 +16,7 @@ mod keys;
 mod modes;
 mod montecarlo;
 mod output;
+mod paper;
 mod parse;
 mod scenario;
 mod size;
@@ -44,6 +45,7 @@ enum Verb {
     Modes(modes::Args),
     Compare(compare::Args),
     Montecarlo(montecarlo::Args),
+    Paper(paper::Args),
     Keys(keys::Args),
     Stress(stress::Args),
     Size(size::Args),
@@ -61,6 +63,7 @@ impl Verb {
             Self::Modes(args) => modes::run(args),
             Self::Compare(args) => compare::run(args),
             Self::Montecarlo(args) => montecarlo::run(args),
+            Self::Paper(args) => paper::run(args),
             Self::Keys(args) => keys::run(args),
             Self::Stress(args) => stress::run(args),
             Self::Size(args) => size::run(args),

@@ -10,6 +10,7 @@ pub mod docs;
 pub mod export;
 pub mod firmware;
 pub mod montecarlo;
+pub mod paper;
 pub mod plant;
 pub mod progress;
 pub mod provision;

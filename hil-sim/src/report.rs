@@ -1,7 +1,7 @@
 //! A run as one self-contained HTML page: verdict, ledger of the crossings, plots
 //! over time and over position, each crossing enlarged, log, faults, parameters.
 
-mod axis;
+pub(crate) mod axis;
 mod band;
 mod crossings;
 mod decimate;
@@ -10,10 +10,10 @@ pub(crate) mod example;
 mod gaps;
 mod overview;
 mod page;
-mod palette;
+pub(crate) mod palette;
 mod panel;
 mod panels;
-mod svg;
+pub(crate) mod svg;
 mod tables;
 pub(crate) mod verdict;
 

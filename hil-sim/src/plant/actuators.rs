@@ -232,11 +232,48 @@ mod tests {
             friction_n: 2.0,
         };
         let (speed, force) = drive.step(0.0, 1.0, true, Load::default(), 1e-3);
-        assert_eq!(force, 80.0);
+        assert!((force - 80.0).abs() < 1e-9, "{force}");
         assert!((speed - 78.0 / 40.0).abs() < 1e-12, "{speed}");
         let (speed, force) = drive.step(50.0, -1.0, true, Load::default(), 1e-3);
-        assert_eq!(force, -80.0);
+        assert!((force + 80.0).abs() < 1e-9, "{force}");
         assert!((speed - (50.0 - 82.0 / 40.0)).abs() < 1e-12, "{speed}");
+    }
+
+    #[test]
+    fn one_long_step_is_many_short_ones_across_the_limit() {
+        for mass_kg in [0.01, 1.0, 40.0] {
+            let drive = DriveMotor {
+                no_load_mm_s: 60.0,
+                stall_n: 160.0,
+                limit_n: 80.0,
+                mass_kg,
+                friction_n: 2.0,
+            };
+            for load in [Load::force(10.0), Load { force_n: 10.0, mass_kg: 30.0 }] {
+                let step = |speed: f64, dt_s| drive.step(speed, 0.9, true, load, dt_s).0;
+                let long = step(0.0, 20e-3);
+                let short = (0..2000).fold(0.0, |speed, _| step(speed, 10e-6));
+                assert!((long - short).abs() < 1e-3 * short, "{long} {short}");
+                assert!(long < 60.0, "{long}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_carried_mass_is_accelerated_but_drives_nothing() {
+        let drive = DriveMotor {
+            no_load_mm_s: 60.0,
+            stall_n: 160.0,
+            limit_n: 80.0,
+            mass_kg: 1.0,
+            friction_n: 2.0,
+        };
+        let carried = Load { force_n: 0.0, mass_kg: 99.0 };
+        let (speed, force) = drive.step(0.0, 1.0, true, carried, 1e-3);
+        assert!((speed - 0.78).abs() < 1e-12 && (force - 80.0).abs() < 1e-9, "{speed}");
+        // Braking, the worm holds it: only the rotor is braked.
+        let (speed, _) = drive.step(50.0, 0.0, true, carried, 1e-4);
+        assert!((speed - (50.0 - 8.2)).abs() < 1e-9, "{speed}");
     }
 
     #[test]

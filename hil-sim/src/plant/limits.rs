@@ -82,7 +82,7 @@ impl Refusal {
 /// Depth of a right-angled corner in the relaxed tread under this force, mm: two faces
 /// at 45 degrees, `F = k L d^2`.
 fn corner_depth(plant: &PlantParameters, force_n: f64) -> f64 {
-    (force_n.max(0.0) / (plant.ring.k_inf * plant.ring.width_mm)).sqrt()
+    (force_n / (plant.ring.k_inf * plant.ring.width_mm)).sqrt()
 }
 
 impl PlantParameters {
@@ -117,5 +117,55 @@ impl PlantParameters {
             return Ok(());
         }
         Err(Refusal::Wedges { thrust_n, wedge, k_inf_pa_per_m, depth_mm, most_mm })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::Scenario;
+
+    fn nominal() -> PlantParameters {
+        PlantParameters::draw(&Scenario::default())
+    }
+
+    #[test]
+    fn the_presets_are_far_from_every_refusal() {
+        for (preset, preload) in [("prototype", 50.0), ("fe", 150.0)] {
+            let plant = PlantParameters::draw(&Scenario::named(preset).unwrap());
+            assert_eq!(plant.check(preload), Ok(()));
+            assert_eq!(plant.check(5.0 * preload), Ok(()));
+        }
+    }
+
+    #[test]
+    fn each_refusal_names_what_is_too_much() {
+        let mut soft = nominal();
+        soft.ring.k_inf = 1e-3;
+        let refusal = soft.check(50.0).unwrap_err();
+        assert!(matches!(refusal, Refusal::Sinks { .. }));
+        assert!(refusal.to_string().contains("50.0 N on a tread of 1.000e6 Pa/m"), "{refusal}");
+        let mut high = nominal();
+        high.wall = crate::plant::wall::Wall::new(vec![crate::plant::wall::Step {
+            position_mm: 20.0,
+            height_mm: 20.5,
+        }]);
+        assert!(matches!(high.check(50.0), Err(Refusal::Towers { .. })));
+        assert_eq!(high.check(5.0), Ok(()));
+        let mut heavy = nominal();
+        heavy.mass_kg = 200.0;
+        heavy.drive.mass_kg = 0.2;
+        assert!(matches!(heavy.check(50.0), Err(Refusal::Wedges { .. })));
+        // An arm that does not lock transmits no more than friction.
+        heavy.mu = 0.5;
+        assert_eq!(heavy.check(50.0), Ok(()));
+    }
+
+    #[test]
+    fn what_is_not_a_number_is_refused() {
+        let mut plant = nominal();
+        plant.ring.k_inf = f64::NAN;
+        assert!(plant.check(50.0).is_err());
+        assert!(nominal().check(f64::NAN).is_err());
     }
 }

@@ -7,24 +7,24 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::palette;
 
 /// A drawing area of an SVG.
-pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+pub(crate) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 /// What drawing may end in; into a text it cannot fail.
-pub(super) type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
+pub(crate) type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
 
 /// Drawing units to one CSS pixel. The backend draws in whole units, so that lines
 /// are placed to half a pixel.
-pub(super) const SCALE: u32 = 2;
+pub(crate) const SCALE: u32 = 2;
 
 /// An SVG of `size` CSS pixels that is as wide as its surroundings and as bright, with
 /// `name` for those who do not see it.
-pub(super) fn fluid(size: (u32, u32), name: &str, draw: impl FnOnce(&Area) -> Drawn) -> String {
+pub(crate) fn fluid(size: (u32, u32), name: &str, draw: impl FnOnce(&Area) -> Drawn) -> String {
     let attributes = format!(r#"role="img" aria-label="{}""#, escape(name));
     picture(size, &attributes, draw)
 }
 
 /// An SVG of just `size` CSS pixels on white ground.
-pub(super) fn fixed(size: (u32, u32), draw: impl FnOnce(&Area) -> Drawn) -> String {
+pub(crate) fn fixed(size: (u32, u32), draw: impl FnOnce(&Area) -> Drawn) -> String {
     let attributes = format!(r#"width="{}" height="{}""#, size.0, size.1);
     picture(size, &attributes, |area| {
         area.fill(&WHITE)?;
@@ -50,22 +50,22 @@ fn picture(size: (u32, u32), attributes: &str, draw: impl FnOnce(&Area) -> Drawn
 }
 
 /// Text of `px` CSS pixels.
-pub(super) fn font(px: f64, colour: RGBColor, h: HPos, v: VPos) -> TextStyle<'static> {
+pub(crate) fn font(px: f64, colour: RGBColor, h: HPos, v: VPos) -> TextStyle<'static> {
     ("sans-serif", size(px)).into_font().color(&colour).pos(Pos::new(h, v))
 }
 
 /// The backend's font size for text of `px` CSS pixels.
-pub(super) fn size(px: f64) -> f64 {
+pub(crate) fn size(px: f64) -> f64 {
     px * f64::from(SCALE) * 1.24
 }
 
 /// Estimated width of `text` of `px` CSS pixels, in drawing units, on the wide side.
-pub(super) fn text_width(text: &str, px: f64) -> i32 {
+pub(crate) fn text_width(text: &str, px: f64) -> i32 {
     (0.60 * px * f64::from(SCALE) * text.chars().count() as f64).ceil() as i32
 }
 
 /// `text` with what HTML would read as mark-up escaped.
-pub(super) fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
@@ -75,7 +75,9 @@ mod tests {
 
     #[test]
     fn dashed_colours_get_their_dashes() {
-        for (colour, (text, _)) in [palette::WANTED, palette::LIMIT].iter().zip(palette::DASHES) {
+        let dashed = [palette::WANTED, palette::LIMIT, palette::SIMULATED];
+        assert_eq!(dashed.len(), palette::DASHES.len());
+        for (colour, (text, _)) in dashed.iter().zip(palette::DASHES) {
             assert_eq!(format!("#{:02X}{:02X}{:02X}", colour.0, colour.1, colour.2), text);
         }
         let svg =

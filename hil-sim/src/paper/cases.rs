@@ -1,0 +1,187 @@
+//! Figure 11: collision, impact and vibration of the study's four cases, at its own
+//! loads.
+
+use super::case::{Case, Loads};
+use super::figure::{Claim, Figure, Series, Source};
+use super::history::{Histories, Quantity};
+use super::published::{CASES, COLLISION_N};
+use super::transitions::{SOURCES, count_humps, first_rises, peaks_text};
+
+const SECTION: &str = "Vibration transmission model";
+
+/// Part of a peak that is as good as nothing.
+const GONE: f64 = 0.02;
+
+/// Two forces no farther apart than this, relative, are nearly identical.
+const NEARLY: f64 = 0.03;
+
+/// The study's four cases.
+#[must_use]
+pub fn cases() -> Vec<Case> {
+    CASES.map(|(speed, preload)| Case::new(Loads::Fe, speed, preload)).to_vec()
+}
+
+/// The figure.
+#[must_use]
+pub fn figure(all: &[Histories]) -> Figure {
+    let mut panels: Vec<_> = Quantity::ALL
+        .into_iter()
+        .flat_map(|quantity| {
+            all.iter().map(move |one| one.panel(quantity, quantity.title(&one.case)))
+        })
+        .collect();
+    for ((panel, one), force) in panels.iter_mut().zip(all).zip(COLLISION_N) {
+        let when = one.peaks(Quantity::Collision, Source::Simulation)[0].0;
+        panel.series.push(Series::new(Source::Published, vec![(when, force)]));
+    }
+    let caption =
+        "The study's four cases at its own loads (60 N on top, of which this wheel lifts a \
+                   third), over the three transitions; quantities and sources as in figure 24. The \
+                   study's figure has theory alone. The published marks are its finite-element \
+                   collision forces of the first transition (figure 13), drawn at the time of our \
+                   peak; it prints no other value of these curves."
+            .to_owned();
+    Figure {
+        id: "fig11",
+        file: "fig11.svg".into(),
+        title: "Collision, impact and vibration of the four cases",
+        caption,
+        columns: CASES.len(),
+        panels,
+        published: Vec::new(),
+    }
+}
+
+/// The claims about it; `all` in the order of [`CASES`].
+#[must_use]
+pub fn claims(all: &[Histories]) -> Vec<Claim> {
+    let of = |id| Claim::of("fig11", SECTION, id);
+    let [slow, pressed, fast, slowest] = [&all[0], &all[1], &all[2], &all[3]];
+    let two = |a: &Histories, b: &Histories, quantity| {
+        format!(
+            "{}; {} (theory; simulation; experiment, by stage).",
+            peaks_text(a, quantity),
+            peaks_text(b, quantity)
+        )
+    };
+    let (collision, impact, vibration) =
+        (Quantity::Collision, Quantity::Impact, Quantity::Vibration);
+    let stage = |number: usize| {
+        SOURCES.map(|source| {
+            let peak = |one: &Histories| one.peaks(collision, source)[number].1;
+            peak(pressed) / peak(slow) - 1.0
+        })
+    };
+    let percent = |parts: [f64; 3]| parts.map(|part| format!("{:+.1} %", 100.0 * part)).join(", ");
+    let humps = all
+        .iter()
+        .map(|one| {
+            let points = one.points(collision, Source::Simulation);
+            let values: Vec<f64> = points.iter().map(|p| p.1).collect();
+            count_humps(&values, 0.02)
+        })
+        .max()
+        .unwrap_or(0);
+    vec![
+        of("collision-decays-periodically").judged(
+            "The collision force decays periodically, because the tread is elastic.",
+            humps > 3,
+            format!("At most {humps} peaks in a deployment with three transitions, in the simulation."),
+            "One peak a transition. The wheel closes in on the corner at 2 to 4 mm/s and never leaves it: \
+             it climbs and does not bounce.",
+        ),
+        of("collision-falls-with-preload").judged(
+            "At 5 mm/s the collision force of the first transition is smaller at 120 N than at 100 N.",
+            first_rises(slow, pressed, collision, -1.0),
+            two(slow, pressed, collision),
+            "It is larger, as climbing must be: the axial force is the pressing force times the tangent of \
+             the angle at which the corner bears. The study contradicts itself here between its first and \
+             its second transition.",
+        ),
+        of("collision-grows-with-speed").judged(
+            "At 100 N the collision is larger at 8 mm/s than at 5 mm/s.",
+            first_rises(slow, fast, collision, 1.0),
+            two(slow, fast, collision),
+            "",
+        ),
+        of("collision-grows-with-speed-120").judged(
+            "At 120 N, too, the collision grows with the speed (5 mm/s against 3 mm/s).",
+            first_rises(slowest, pressed, collision, 1.0),
+            two(slowest, pressed, collision),
+            "",
+        ),
+        of("second-collision-grows-with-preload").judged(
+            "In the second transition more preload makes for a larger force.",
+            stage(1).iter().all(|&part| part > 0.0),
+            format!("{} from 100 to 120 N at 5 mm/s (theory, simulation, experiment).", percent(stage(1))),
+            "",
+        ),
+        of("third-collision-equal").judged(
+            "In the third transition 20 N more preload make no difference: the peaks are nearly identical.",
+            stage(2).iter().all(|part| part.abs() < NEARLY),
+            format!("{} from 100 to 120 N at 5 mm/s (theory, simulation, experiment).", percent(stage(2))),
+            "Nothing in the third transition differs but the inclination of the arm, by two degrees from the \
+             second: more preload has the same effect in all three.",
+        ),
+        of("stress-of-collision-less-preload").judged(
+            "The stress wave is determined by the difference between collision force and preload.",
+            SOURCES.into_iter().all(|source| {
+                let of = |quantity| all.iter().map(move |one: &Histories| one.peaks(quantity, source)[0].1);
+                let less = of(collision).zip(all).map(|(force, one)| force - one.case.preload_n);
+                order(&less.collect::<Vec<_>>()) == order(&of(impact).collect::<Vec<_>>())
+            }),
+            format!(
+                "Collision less preload and impact of the four cases (simulation): {}.",
+                all.iter()
+                    .map(|one| {
+                        let peak = |quantity| one.peaks(quantity, Source::Simulation)[0].1;
+                        format!("{:.1} N, {:.0} kPa", peak(collision) - one.case.preload_n, peak(impact))
+                    })
+                    .collect::<Vec<_>>()
+                    .join("; ")
+            ),
+            "The two do not even stand in the same order: the speed stiffens the tread and narrows the contact, \
+             which raises the stress at nearly the same force.",
+        ),
+        of("impact-decays-to-zero").judged(
+            "The impact load decays to zero.",
+            all.iter().all(|one| {
+                SOURCES.into_iter().all(|source| one.left_over(impact, source) < GONE)
+            }),
+            format!(
+                "Once the wheel stands on the last sleeve at most {:.3} of the peak is left, in any case and \
+                 source.",
+                all.iter()
+                    .flat_map(|one| SOURCES.map(|source| one.left_over(impact, source)))
+                    .fold(0.0, f64::max)
+            ),
+            "",
+        ),
+        of("impact-falls-with-preload").judged(
+            "More preload makes for a smaller impact in the first transition.",
+            first_rises(slow, pressed, impact, -1.0),
+            two(slow, pressed, impact),
+            "The force grows more than the area on which it acts.",
+        ),
+        of("vibration-grows-with-speed").judged(
+            "At the same load and preload the vibration amplitude grows with the speed.",
+            first_rises(slow, fast, vibration, 1.0),
+            two(slow, fast, vibration),
+            "",
+        ),
+        of("vibration-falls-with-preload").judged(
+            "At the same load and speed more preload makes for a smaller vibration amplitude.",
+            first_rises(slow, pressed, vibration, -1.0),
+            two(slow, pressed, vibration),
+            "The arm's deflection follows the collision force, which grows. What does fall is the gap, which \
+             the study equates with the amplitude: figures 15 and 16.",
+        ),
+    ]
+}
+
+/// Places of the values in ascending order.
+fn order(values: &[f64]) -> Vec<usize> {
+    let mut places: Vec<usize> = (0..values.len()).collect();
+    places.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+    places
+}

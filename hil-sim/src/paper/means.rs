@@ -1,0 +1,219 @@
+//! Four means of ten: a curve is fitted to each rig's readings, and the curves of ten
+//! rigs are averaged, as the study did.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::experiment::{Experiment, Reading, groups};
+use super::figure::{Series, Source};
+
+/// A parabola.
+type Curve = [f64; 3];
+
+/// A sweep of the experiment as four mean curves and the range of all rigs.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Means {
+    /// Where the curves are given.
+    pub at: Vec<f64>,
+    /// The four means there.
+    pub curves: Vec<Vec<f64>>,
+    /// Least and largest of the rigs' own curves there.
+    pub range: Vec<(f64, f64)>,
+}
+
+impl Means {
+    /// Means of `figure` over the sweep, whose variable `x` picks from the case, on a
+    /// grid of `count`.
+    ///
+    /// Rigs that lack a reading are fitted without it; one with fewer than three is left
+    /// out.
+    #[must_use]
+    pub fn of(
+        sweep: &[&Experiment],
+        x: impl Fn(&Experiment) -> f64,
+        figure: impl Fn(&Reading) -> f64,
+        count: usize,
+    ) -> Self {
+        let places: Vec<f64> = sweep.iter().map(|experiment| x(experiment)).collect();
+        let (from, to) = (places[0], places[places.len() - 1]);
+        let at: Vec<f64> =
+            (0..count).map(|i| from + (to - from) * i as f64 / (count - 1) as f64).collect();
+        let rigs = sweep.iter().map(|experiment| experiment.runs.len()).min().unwrap_or(0);
+        let curves: Vec<Option<Curve>> = (0..rigs)
+            .map(|rig| {
+                let readings = sweep.iter().zip(&places);
+                let points: Vec<(f64, f64)> =
+                    readings.filter_map(|(e, &x)| Some((x, e.runs[rig].mean(&figure)?))).collect();
+                parabola(&points)
+            })
+            .collect();
+        let value = |curve: &Curve, x: f64| curve[0] + x * (curve[1] + x * curve[2]);
+        let mean = |group: &Vec<usize>, x: f64| {
+            let of: Vec<f64> = group
+                .iter()
+                .filter_map(|&rig| curves.get(rig)?.as_ref().map(|curve| value(curve, x)))
+                .collect();
+            of.iter().sum::<f64>() / of.len() as f64
+        };
+        let range = at
+            .iter()
+            .map(|&x| {
+                let all = curves.iter().flatten().map(|curve| value(curve, x));
+                all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), y| (a.min(y), b.max(y)))
+            })
+            .collect();
+        let curves =
+            groups().iter().map(|group| at.iter().map(|&x| mean(group, x)).collect()).collect();
+        Self { at, curves, range }
+    }
+
+    /// Mean of the four means.
+    #[must_use]
+    pub fn middle(&self) -> Vec<f64> {
+        let count = self.curves.len() as f64;
+        (0..self.at.len())
+            .map(|i| self.curves.iter().map(|curve| curve[i]).sum::<f64>() / count)
+            .collect()
+    }
+
+    /// Largest difference between two of the means at one place.
+    #[must_use]
+    pub fn spread(&self) -> f64 {
+        let difference = |i: usize| {
+            let all = self.curves.iter().map(|curve| curve[i]);
+            let (low, high) =
+                all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), y| (a.min(y), b.max(y)));
+            high - low
+        };
+        (0..self.at.len()).map(difference).fold(0.0, f64::max)
+    }
+
+    /// Rise from the first place to the last, of the mean of means.
+    #[must_use]
+    pub fn rise(&self) -> f64 {
+        let middle = self.middle();
+        middle[middle.len() - 1] - middle[0]
+    }
+
+    /// [`bend`] of each mean.
+    #[must_use]
+    pub fn bends(&self) -> Vec<f64> {
+        self.curves.iter().map(|curve| bend(curve)).collect()
+    }
+
+    /// Whether every mean goes the same way from each place to the next: up for a
+    /// positive `sense`.
+    #[must_use]
+    pub fn all_go(&self, sense: f64) -> bool {
+        self.curves.iter().all(|curve| curve.windows(2).all(|w| sense * (w[1] - w[0]) > 0.0))
+    }
+
+    /// The means as series, the first with the range over all rigs.
+    #[must_use]
+    pub fn series(&self) -> Vec<Series> {
+        let band = self.at.iter().zip(&self.range).map(|(&x, &(low, high))| (x, low, high));
+        let mut range: Vec<_> = band.collect();
+        let curves = self.curves.iter().enumerate();
+        curves
+            .map(|(index, curve)| Series {
+                source: Source::Experiment,
+                name: format!("mean {}", index + 1),
+                points: self.at.iter().copied().zip(curve.iter().copied()).collect(),
+                range: std::mem::take(&mut range),
+            })
+            .collect()
+    }
+}
+
+/// Largest distance of evenly spaced values from the straight line between their ends,
+/// over the distance between these: 0 for a line, positive above it.
+#[must_use]
+pub fn bend(values: &[f64]) -> f64 {
+    let last = values.len() - 1;
+    let rise = values[last] - values[0];
+    let off = |i: usize| values[i] - values[0] - rise * i as f64 / last as f64;
+    let farther = |a: f64, b: f64| if b.abs() > a.abs() { b } else { a };
+    (0..=last).map(off).fold(0.0, farther) / rise.abs()
+}
+
+/// Least-squares parabola through the points; none through fewer than three places.
+fn parabola(points: &[(f64, f64)]) -> Option<Curve> {
+    if points.len() < 3 {
+        return None;
+    }
+    // About the middle, where the normal equations are well conditioned.
+    let middle = points.iter().map(|p| p.0).sum::<f64>() / points.len() as f64;
+    let (mut matrix, mut right) = (Matrix3::zeros(), Vector3::zeros());
+    for &(x, y) in points {
+        let row = Vector3::new(1.0, x - middle, (x - middle).powi(2));
+        matrix += row * row.transpose();
+        right += row * y;
+    }
+    let [a, b, c] = matrix.cholesky()?.solve(&right).into();
+    Some([a - b * middle + c * middle * middle, b - 2.0 * c * middle, c])
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::paper::case::{Case, Loads};
+    use crate::paper::experiment::Run;
+
+    proptest! {
+        #[test]
+        fn a_parabola_is_found_again(a in -3.0..3.0, b in -1.0..1.0, c in -0.1..0.1f64) {
+            let points: Vec<(f64, f64)> =
+                [33.0, 36.0, 40.0, 45.0, 50.0].map(|x| (x, a + x * (b + c * x))).to_vec();
+            let found = parabola(&points).unwrap();
+            for (x, y) in points {
+                let value = found[0] + x * (found[1] + x * found[2]);
+                prop_assert!((value - y).abs() < 1e-8, "{} {}", value, y);
+            }
+        }
+    }
+
+    #[test]
+    fn two_places_make_no_parabola() {
+        assert_eq!(parabola(&[(1.0, 2.0), (2.0, 3.0)]), None);
+        assert_eq!(parabola(&[(1.0, 2.0), (1.0, 3.0), (1.0, 4.0)]), None);
+    }
+
+    /// A sweep on which rig r reads `figure(r, x)`.
+    fn sweep(figure: impl Fn(usize, f64) -> f64) -> Vec<Experiment> {
+        let at = |x: f64| Experiment {
+            case: Case::new(Loads::Prototype, x, 40.0),
+            runs: (0..40)
+                .map(|rig| Run {
+                    crossings: vec![Reading { gap_mm: figure(rig, x), ..Reading::default() }],
+                    ..Run::default()
+                })
+                .collect(),
+        };
+        [3.0, 5.0, 8.0].map(at).to_vec()
+    }
+
+    fn means(experiments: &[Experiment]) -> Means {
+        let all: Vec<&Experiment> = experiments.iter().collect();
+        Means::of(&all, |e| e.case.speed_mm_s, |reading| reading.gap_mm, 11)
+    }
+
+    #[test]
+    fn equal_rigs_have_equal_means() {
+        let found = means(&sweep(|_, x| 2.0 + 0.1 * x - 0.004 * x * x));
+        assert!(found.spread() < 1e-12);
+        assert!((found.rise() - (0.5 - 0.004 * 55.0)).abs() < 1e-9);
+        assert!(found.all_go(1.0) && !found.all_go(-1.0));
+        assert!(found.bends().iter().all(|&bend| bend > 0.05));
+        assert_eq!(found.series().len(), 4);
+    }
+
+    #[test]
+    fn the_spread_is_that_of_the_means() {
+        let found = means(&sweep(|rig, x| x + if rig == 0 { 1.0 } else { 0.0 }));
+        assert!((found.spread() - 0.1).abs() < 1e-9, "{}", found.spread());
+        assert!(found.bends().iter().all(|bend| bend.abs() < 1e-9));
+        let widest = found.range.iter().map(|(a, b)| b - a).fold(0.0, f64::max);
+        assert!((widest - 1.0).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,238 @@
+//! Figure 19: modes of the drive arm.
+
+use super::figure::{Claim, Figure, Mark, Panel, Series, Source};
+use super::published::{CONSTRAINED_HZ, FREE_HZ};
+use crate::reference::beam::{Beam, BeamError, Ends, Shape, Tip};
+
+const SECTION: &str = "Experiment scheme";
+
+/// Points of a mode shape.
+const POINTS: usize = 60;
+
+/// Frequencies that are nearly met, relative.
+const NEAR: f64 = 0.1;
+
+/// Shape or frequency equation of a beam.
+type Classical = fn(f64, f64) -> f64;
+
+/// The modes of the figure.
+#[derive(Clone, Debug)]
+pub struct Modes {
+    beam: Beam,
+    /// Tip mass that the published constrained mode takes, kg.
+    pub tip_mass_kg: f64,
+    /// First constrained mode with that mass, from theory and simulation: wave number
+    /// times length, Hz.
+    constrained: [(f64, f64); 2],
+    /// First bending mode of the free arm, the seventh after six of a rigid body, the
+    /// same.
+    free: [(f64, f64); 2],
+    /// Their shapes by the waves.
+    shapes: [Shape; 2],
+    /// The same two frequencies of the bare arm, Hz.
+    bare_hz: (f64, f64),
+}
+
+impl Modes {
+    /// Modes of the drive arm.
+    ///
+    /// # Errors
+    /// [`BeamError`] if the arm refuses.
+    pub fn new() -> Result<Self, BeamError> {
+        let beam = Beam::drive_arm();
+        let tip_mass_kg = beam.tip_mass_for(CONSTRAINED_HZ)?;
+        let first = |ends, mass_kg| {
+            let shapes = beam.shapes(ends, Tip { mass_kg, ..Tip::default() }, 1)?;
+            Ok::<_, BeamError>(shapes[0].clone())
+        };
+        let pair = |shape: &Shape| (shape.mode.beta_l, shape.mode.frequency_hz);
+        let shapes = [first(Ends::ClampedFree, tip_mass_kg)?, first(Ends::FreeFree, tip_mass_kg)?];
+        let [constrained, free] = [pair(&shapes[0]), pair(&shapes[1])];
+        let bare_hz =
+            (pair(&first(Ends::ClampedFree, 0.0)?).1, pair(&first(Ends::FreeFree, 0.0)?).1);
+        // The classical frequency equations, in products of the two ends' functions.
+        let ratio = tip_mass_kg / beam.mass_kg();
+        let hz = |beta_l: f64| constrained.1 * (beta_l / constrained.0).powi(2);
+        let classical = |equation: Classical, range| {
+            let beta_l = root(|b| equation(b, ratio), range);
+            (beta_l, hz(beta_l))
+        };
+        let constrained = [classical(clamped_equation, (0.2, 2.0)), constrained];
+        let free = [classical(free_equation, (3.5, 5.0)), free];
+        Ok(Self { beam, tip_mass_kg, constrained, free, shapes, bare_hz })
+    }
+
+    /// The figure.
+    #[must_use]
+    pub fn figure(&self) -> Figure {
+        let mut hertz = Panel::new("Natural frequency", "mode", "frequency, Hz");
+        hertz.categories = vec!["first constrained".into(), "seventh free".into()];
+        for (source, index) in [(Source::Theory, 0), (Source::Simulation, 1)] {
+            let points = vec![(0.0, self.constrained[index].1), (1.0, self.free[index].1)];
+            hertz.series.push(Series::new(source, points));
+        }
+        hertz.series.push(Series::new(Source::Fitted, vec![(0.0, CONSTRAINED_HZ)]));
+        hertz.series.push(Series::new(Source::Published, vec![(1.0, FREE_HZ)]));
+        hertz.least_y = Some((0.0, 0.0));
+        let classical = [
+            ("First constrained mode", clamped as Classical, self.constrained[0].0),
+            ("Seventh free mode", free, self.free[0].0),
+        ];
+        let mut panels = vec![hertz];
+        for ((title, shape, beta_l), waves) in classical.into_iter().zip(&self.shapes) {
+            let mut panel = Panel::new(title, "along the arm, mm", "deflection over largest");
+            let theory = self.shape(|part| shape(beta_l, part));
+            let simulation = self.shape(|part| waves.at(part * self.beam.length_m));
+            panel.series.push(Series::new(Source::Theory, theory));
+            panel.series.push(Series::new(Source::Simulation, simulation));
+            panels.push(panel);
+        }
+        let mark = |what: &str, published, of: [(f64, f64); 2]| {
+            let ours = [(Source::Theory, of[0].1), (Source::Simulation, of[1].1)];
+            Mark::new(what.into(), "Hz", published, &ours)
+        };
+        Figure {
+            id: "fig19",
+            file: "fig19.svg".into(),
+            title: "Modes of the drive arm",
+            caption: format!(
+                "The arm with {:.1} g at the wheel's end, the mass with which its first constrained mode is \
+                 the published one: fitted. Theory: the classical frequency equations of a beam with a point \
+                 mass. Simulation: the wave-vector method (equations 54 and 55). The free arm's seventh mode is its \
+                 first bending mode, after six of a rigid body. The virtual rig is given the two \
+                 published frequencies as parameters and is no test of them; the study's table of six \
+                 constrained modes is not published.",
+                self.tip_mass_kg * 1e3
+            ),
+            columns: 3,
+            panels,
+            published: vec![
+                mark("first constrained mode", (CONSTRAINED_HZ, true), self.constrained),
+                mark("seventh free mode", (FREE_HZ, false), self.free),
+            ],
+        }
+    }
+
+    /// Shape of a mode over the arm, mm, its largest deflection 1.
+    fn shape(&self, shape: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
+        let along = |i: usize| i as f64 / (POINTS - 1) as f64;
+        let values: Vec<f64> = (0..POINTS).map(|i| shape(along(i))).collect();
+        let most =
+            values.iter().fold(0.0, |most: f64, w| if w.abs() > most.abs() { *w } else { most });
+        let length = self.beam.length_m * 1e3;
+        values.iter().enumerate().map(|(i, w)| (along(i) * length, w / most)).collect()
+    }
+
+    /// The claims about it; `ripple_hz` excites the arm between these speeds of the study.
+    #[must_use]
+    pub fn claims(&self, ripple_hz: (f64, f64)) -> Vec<Claim> {
+        let of = |id| Claim::of("fig19", SECTION, id);
+        let (constrained, free) = (self.constrained[1].1, self.free[1].1);
+        let near = |hz: f64, published: f64| (hz / published - 1.0).abs() < NEAR;
+        let apart = ripple_hz.1 < 0.8 * FREE_HZ.min(CONSTRAINED_HZ);
+        vec![
+            of("first-constrained-276").judged(
+                "The first constrained mode is 276 Hz.",
+                near(constrained, CONSTRAINED_HZ),
+                format!(
+                    "{:.1} Hz with {:.1} g at the wheel's end, a mass that is fitted to it and stands for \
+                     wheel, axle and what yields in the clamp; {:.1} Hz without.",
+                    constrained, self.tip_mass_kg * 1e3, self.bare_hz.0
+                ),
+                "",
+            ),
+            of("seventh-free-163").judged(
+                "The seventh free mode is 163 Hz.",
+                near(free, FREE_HZ) || near(self.bare_hz.1, FREE_HZ),
+                format!("{free:.0} Hz with the mass at the wheel's end, {:.0} Hz without.", self.bare_hz.1),
+                "The arm alone is far too stiff for it. The published mode is that of the whole device, \
+                 whose masses and joints the study does not give; a free body softer than the clamped arm \
+                 bends somewhere else.",
+            ),
+            of("no-coupling").judged(
+                "The design introduces no coupling: the excitation keeps away from the modes.",
+                apart,
+                format!(
+                    "The drive's torque ripple excites with {:.0} to {:.0} Hz at the study's 3 to 8 mm/s, \
+                     below {FREE_HZ} Hz.",
+                    ripple_hz.0, ripple_hz.1
+                ),
+                "",
+            ),
+        ]
+    }
+}
+
+/// Frequency equation of a beam clamped at one end with a point mass, in beam masses, at
+/// the other (Blevins, Formulas for Natural Frequency and Mode Shape, table 8-8).
+fn clamped_equation(b: f64, mass: f64) -> f64 {
+    1.0 + b.cos() * b.cosh() + mass * b * (b.cos() * b.sinh() - b.sin() * b.cosh())
+}
+
+/// Frequency equation of a free beam with a point mass, in beam masses, at one end.
+fn free_equation(b: f64, mass: f64) -> f64 {
+    1.0 - b.cos() * b.cosh() - mass * b * (b.cos() * b.sinh() - b.sin() * b.cosh())
+}
+
+/// Root of a function that changes sign once in `range`, to the last bit or so.
+fn root(f: impl Fn(f64) -> f64, (mut low, mut high): (f64, f64)) -> f64 {
+    let rising = f(high) > f(low);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if (f(middle) > 0.0) == rising {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    0.5 * (low + high)
+}
+
+/// Shape of a beam clamped at 0 with a free end or a point mass at 1.
+fn clamped(beta_l: f64, x: f64) -> f64 {
+    let b = beta_l;
+    let part = (b.cosh() + b.cos()) / (b.sinh() + b.sin());
+    let at = b * x;
+    (at.cosh() - at.cos()) - part * (at.sinh() - at.sin())
+}
+
+/// Shape of a beam free at 0 with a free end or a point mass at 1.
+fn free(beta_l: f64, x: f64) -> f64 {
+    let b = beta_l;
+    let part = (b.cosh() - b.cos()) / (b.sinh() - b.sin());
+    let at = b * x;
+    (at.cosh() + at.cos()) - part * (at.sinh() + at.sin())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_classical_equations_give_what_the_waves_do() {
+        let modes = Modes::new().unwrap();
+        for [classical, waves] in [modes.constrained, modes.free] {
+            assert!((classical.0 / waves.0 - 1.0).abs() < 1e-9, "{classical:?} {waves:?}");
+        }
+        assert!((root(|b| free_equation(b, 0.0), (3.5, 5.0)) - 4.730_040_745).abs() < 1e-9);
+        assert!((root(|b| clamped_equation(b, 0.0), (0.2, 2.0)) - 1.875_104_069).abs() < 1e-9);
+    }
+
+    #[test]
+    fn shapes_meet_their_ends() {
+        let second = |shape: fn(f64, f64) -> f64, beta_l: f64, x: f64| {
+            let h = 1e-4;
+            (shape(beta_l, x + h) - 2.0 * shape(beta_l, x) + shape(beta_l, x - h)) / (h * h)
+        };
+        let modes = Modes::new().unwrap();
+        for (beta_l, _) in modes.constrained {
+            assert!(clamped(beta_l, 0.0).abs() < 1e-12 && clamped(beta_l, 1e-5).abs() < 1e-8);
+            let bend = second(clamped, beta_l, 1.0) / second(clamped, beta_l, 0.0);
+            assert!(bend.abs() < 1e-5, "{bend}");
+        }
+        for (beta_l, _) in modes.free {
+            let bend = second(free, beta_l, 0.0) / second(free, beta_l, 0.5);
+            assert!(bend.abs() < 1e-5, "{bend}");
+        }
+    }
+}
