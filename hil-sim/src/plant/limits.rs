@@ -95,13 +95,12 @@ impl PlantParameters {
         let k_inf_pa_per_m = self.ring.k_inf * 1e9;
         let most_mm = DEEPEST * radius_mm;
         let depth_mm = corner_depth(self, preload_n);
-        // Written so that a NaN fails.
-        if !(depth_mm <= most_mm) {
+        if depth_mm > most_mm || depth_mm.is_nan() {
             return Err(Refusal::Sinks { force_n: preload_n, k_inf_pa_per_m, depth_mm, most_mm });
         }
         let step_mm = self.wall.steps().iter().fold(0.0f64, |most, s| most.max(s.height_mm));
         let highest = HIGHEST * radius_mm;
-        if !(step_mm + depth_mm <= highest) {
+        if step_mm + depth_mm > highest {
             return Err(Refusal::Towers { step_mm, depth_mm, radius_mm, most_mm: highest });
         }
         let wedge = self.arm.wedge(self.wall_radius_mm - radius_mm).abs();

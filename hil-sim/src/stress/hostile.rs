@@ -8,7 +8,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use interstage::control::{Controller, Input, Output, State};
-use interstage::model::reduced::{Point, ReducedModel};
+use interstage::model::reduced::{Point, ReducedModel, Scale};
 use interstage::model::{Plan, PlanRequest, Planner, Review};
 use interstage::rig::Rig;
 use interstage::sense::raw::{AdcCode, AngleFrame, EncoderCount, Sample, SensorFrame};
@@ -127,7 +127,7 @@ fn fed(
         let input = Input {
             now,
             sensors: frame(feed, tick, now, &mut random),
-            command: (tick % 97 == 0).then(|| {
+            command: tick.is_multiple_of(97).then(|| {
                 let all = [Command::Start, Command::Reset, Command::Retract, Command::Stop];
                 all[random.random_range(0..4)]
             }),
@@ -180,7 +180,7 @@ fn frame(feed: Feed, tick: u32, now: Tick, random: &mut ChaCha8Rng) -> SensorFra
     match feed {
         Feed::Least => made(0, 0, 0, 0),
         Feed::Largest => made(u16::MAX, u16::MAX, u16::MAX, u16::MAX),
-        Feed::Alternating if tick % 2 == 0 => made(0, 1311, 1311, even(0)),
+        Feed::Alternating if tick.is_multiple_of(2) => made(0, 1311, 1311, even(0)),
         Feed::Alternating => made(0x8000, 64_224, 64_224, even(u16::MAX)),
         Feed::Jumping => made(
             (tick as u16).wrapping_mul(random.random_range(0..12)),
@@ -240,42 +240,33 @@ fn wild(request: &PlanRequest, planner: &Planner, random: &mut ChaCha8Rng) -> Pl
     plan
 }
 
-/// The model at the corners of its arguments: bounded to its table's range.
+/// The model at the corners of its arguments: bounded to its range.
 fn asked(planner: &Planner, model: &ReducedModel) -> Option<String> {
     let ends = [Q16::MIN, Q16::from_num(-1), Q16::ZERO, Q16::DELTA, Q16::from_num(1), Q16::MAX];
     let (low, high) = model.gap_range();
+    let pairs = ends.into_iter().flat_map(|a| ends.into_iter().map(move |b| (a, b)));
     for direction in [Direction::Deploy, Direction::Retract] {
-        for speed in ends {
-            for load in ends {
-                for scale in ends {
-                    let point = Point { direction, speed, load, scale };
-                    for force in ends {
-                        let gap = model.gap(&point, force);
-                        if gap < low || gap > high {
-                            return Some(format!("gap {gap} at {point:?}, {force}"));
-                        }
-                        let _ = (model.force(&point, force), model.utilisation(&point, force));
-                        let _ = model.observed_scale(&point, force, load);
-                        let found = model.speed(&point, force, load, speed, scale);
-                        let _ = (found, model.depth(force), model.climbing_force(force, load));
+        for (speed, ratio) in pairs.clone() {
+            let point = Point { direction, speed, scale: Scale::new(ratio) };
+            for (a, b) in pairs.clone() {
+                let crossing = model.crossing(&point, a);
+                for gap in [model.gap(&point, a), crossing.gap] {
+                    if gap < low || gap > high {
+                        return Some(format!("gap {gap} at {point:?}, {a} N"));
                     }
-                    let review = Review {
-                        direction,
-                        speed,
-                        preload: load,
-                        tan_arm: scale,
-                        gap: speed,
-                        trusted: true,
-                    };
-                    let request = PlanRequest {
-                        sequence: 1,
-                        direction,
-                        step: 2,
-                        scale,
-                        review: Some(review),
-                    };
-                    let _ = planner.plan(&request);
                 }
+                let _ = (model.force(&point, a), model.utilisation(&point, a), model.depth(a));
+                let _ = model.observed_scale(&point, a, b);
+                let review =
+                    Review { direction, speed, preload: a, tan_arm: b, gap: ratio, trusted: true };
+                let request = PlanRequest {
+                    sequence: 1,
+                    direction,
+                    step: 2,
+                    scale: ratio,
+                    review: Some(review),
+                };
+                let _ = planner.plan(&request);
             }
         }
     }

@@ -148,8 +148,7 @@ fn gather(ended: Vec<(Case, Ended)>) -> Report {
             Ended::Failed(why) => report.failures.push(Failure { why, case }),
             Ended::Ran(found) => {
                 for (figure, value) in found {
-                    // Written so that a NaN fails.
-                    if !(value <= 1.0) {
+                    if value > 1.0 || value.is_nan() {
                         let why = format!("{figure:?} at {value:.3} of its limit");
                         report.failures.push(Failure { why, case });
                     }

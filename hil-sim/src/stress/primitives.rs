@@ -19,6 +19,9 @@ const TABLE_BOUND: f64 = 3.2;
 /// Bound of the quotient of numbers below 1.
 const FRACTION_BOUND: f64 = 24.0;
 
+/// Bound of the inverse root, LSB: 1e-5 of its least value, 2^29.
+const INVERSE_BOUND: f64 = 5368.0;
+
 /// Inputs of a chunk.
 const CHUNK: u64 = 1 << 20;
 
@@ -83,7 +86,7 @@ fn line(sweep: &Sweep, stride: u64, done: &(dyn Fn(u64) + Sync)) -> Line {
                 let off = error(input);
                 let largest = found.0.abs().max(found.1.abs());
                 // A NaN is the worst there is.
-                if found.3 == 0 || !(off.abs() <= largest) {
+                if found.3 == 0 || off.abs() > largest || off.is_nan() {
                     found.2 = input;
                 }
                 found.0 = if off.is_nan() { off } else { found.0.min(off) };
@@ -163,6 +166,15 @@ fn sweeps() -> Vec<Sweep> {
             }),
         ),
         whole("table", (-TABLE_BOUND, TABLE_BOUND), table()),
+        whole(
+            "inverse_sqrt_normalised",
+            (-INVERSE_BOUND, INVERSE_BOUND),
+            Box::new(|x| {
+                let (shift, got) = numeric::inverse_sqrt_normalised(x as u32);
+                let m = (x.max(1) << shift) as f64 / 4_294_967_296.0;
+                f64::from(got) - 536_870_912.0 / m.sqrt()
+            }),
+        ),
         whole(
             "sin_cos",
             (-7.0, 7.0),
