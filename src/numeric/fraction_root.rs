@@ -33,7 +33,8 @@ pub const fn sqrt_fraction(x: u32) -> u32 {
 /// The even shift that brings `x / 2^32` to `m` between a quarter and one, and
 /// `1 / sqrt(m)` in Q29, from 2^29 to 2^30.
 ///
-/// Range: all arguments; 0 is taken for 1. Error: 1e-5 relative. Cost: about 20
+/// Range: all arguments; 0 gives a number without meaning, from 2^29 to 2^30. Error: 1e-5
+/// relative. Cost: about 20
 /// instructions, no division, no branch.
 ///
 /// Source: a quartic of least relative error and one step of Newton's iteration.

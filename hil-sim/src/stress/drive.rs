@@ -74,6 +74,7 @@ pub(super) fn run(case: &Case, plant: &PlantParameters) -> Result<Drove, PlantEr
     let mut before = *rig.truth();
     let (first, rest_mm) = (mechanical(plant, &before), before.depth_mm);
     let (mut wedged, mut lift, mut kinetic, mut force) = (0.0, 0.0, 0.0f64, 0.0f64);
+    let mut fastest = case.speed_mm_s;
     for tick in 0..ticks {
         let part = tick as f64 / ticks as f64;
         let speed = case.course.speed(part) * case.speed_mm_s;
@@ -87,6 +88,7 @@ pub(super) fn run(case: &Case, plant: &PlantParameters) -> Result<Drove, PlantEr
         wedged += plant.load_n * lean * rise;
         lift += rise.abs();
         force = force.max(now.floor_n + now.corner_n);
+        fastest = fastest.max(now.speed_mm_s.abs()).max(now.tread_mm_s.abs());
         kinetic = kinetic.max(0.5e-3 * plant.mass_kg * now.speed_mm_s.powi(2));
         let gained = mechanical(plant, &now) + wedged - first - now.work_mj;
         out.created_mj = if gained.is_nan() { f64::NAN } else { out.created_mj.max(gained) };
@@ -102,7 +104,7 @@ pub(super) fn run(case: &Case, plant: &PlantParameters) -> Result<Drove, PlantEr
     let pressed = case.preload_n + 1.1 * case.coupling.abs() * case.load_n;
     let stored = pressed * (rest_mm + out.depth_mm.min(1.0));
     let grain = std::f64::consts::TAU * RADIUS_MM / ELEMENTS as f64;
-    let exchanged = (case.speed_mm_s * case.dt_s).min(EXCHANGE_MM);
+    let exchanged = (fastest * case.dt_s).min(EXCHANGE_MM);
     out.allowed_mj = stored + force * (grain + exchanged) + 0.03 * pressed * lift + 0.15 * kinetic;
     Ok(out)
 }

@@ -89,8 +89,8 @@ fn line(sweep: &Sweep, stride: u64, done: &(dyn Fn(u64) + Sync)) -> Line {
                 if found.3 == 0 || off.abs() > largest || off.is_nan() {
                     found.2 = input;
                 }
-                found.0 = if off.is_nan() { off } else { found.0.min(off) };
-                found.1 = if off.is_nan() { off } else { found.1.max(off) };
+                found.0 = lower(found.0, off);
+                found.1 = -lower(-found.1, -off);
                 found.3 += 1;
             }
             done(to - from);
@@ -103,7 +103,7 @@ fn line(sweep: &Sweep, stride: u64, done: &(dyn Fn(u64) + Sync)) -> Line {
                     if f.3 == 0 { f64::NEG_INFINITY } else { f.0.abs().max(f.1.abs()) }
                 };
                 let worst = if size(&a) >= size(&b) { a.2 } else { b.2 };
-                (a.0.min(b.0), a.1.max(b.1), worst, a.3 + b.3)
+                (lower(a.0, b.0), -lower(-a.1, -b.1), worst, a.3 + b.3)
             },
         );
     Line {
@@ -117,6 +117,11 @@ fn line(sweep: &Sweep, stride: u64, done: &(dyn Fn(u64) + Sync)) -> Line {
         // Written so that a NaN fails.
         holds: least >= sweep.bound.0 && most <= sweep.bound.1,
     }
+}
+
+/// The lower of two numbers; a NaN if there is one.
+fn lower(a: f64, b: f64) -> f64 {
+    if a < b || a.is_nan() { a } else { b }
 }
 
 fn q(bits: u64) -> Q16 {
@@ -166,15 +171,18 @@ fn sweeps() -> Vec<Sweep> {
             }),
         ),
         whole("table", (-TABLE_BOUND, TABLE_BOUND), table()),
-        whole(
-            "inverse_sqrt_normalised",
-            (-INVERSE_BOUND, INVERSE_BOUND),
-            Box::new(|x| {
+        Sweep {
+            name: "inverse_sqrt_normalised",
+            from: 1,
+            to: all,
+            bound: (-INVERSE_BOUND, INVERSE_BOUND),
+            whole: true,
+            error: Box::new(|x| {
                 let (shift, got) = numeric::inverse_sqrt_normalised(x as u32);
-                let m = (x.max(1) << shift) as f64 / 4_294_967_296.0;
+                let m = (x << shift) as f64 / 4_294_967_296.0;
                 f64::from(got) - 536_870_912.0 / m.sqrt()
             }),
-        ),
+        },
         whole(
             "sin_cos",
             (-7.0, 7.0),

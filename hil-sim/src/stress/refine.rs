@@ -18,8 +18,9 @@ use crate::scenario::Scenario;
 /// Least order by Richardson's quotient that still counts as the first.
 const LEAST_ORDER: f64 = 0.8;
 
-/// Differences below this part of the value are rounding and the ring's grain.
-const GRAIN: f64 = 2e-4;
+/// Differences below this part of the value are the ring's grain, and the ends of the way
+/// over which work is summed, known to a stride.
+const GRAIN: f64 = 5e-4;
 
 /// A quantity on three resolutions, each half of the one before.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -91,10 +91,11 @@ impl Shape {
         high(bits << self.unit_shift, self.inverse_unit) << 1
     }
 
-    /// What force has the same run on the unscaled tread, Q30.
+    /// What force has the same run on the unscaled tread, Q30; what exceeds the format
+    /// lies beyond the model anyway and saturates.
     #[inline(always)]
     pub(super) fn unscaled(&self, force: i32, inverse_scale: i32) -> i32 {
-        (high(force - self.middle_lifting, inverse_scale) << 4) + self.middle_lifting
+        (high(force - self.middle_lifting, inverse_scale) << 4).saturating_add(self.middle_lifting)
     }
 
     /// What force has the same run on the scaled tread, Q30, below one half.
