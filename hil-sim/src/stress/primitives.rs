@@ -180,7 +180,8 @@ fn sweeps() -> Vec<Sweep> {
             error: Box::new(|x| {
                 let (shift, got) = numeric::inverse_sqrt_normalised(x as u32);
                 let m = (x << shift) as f64 / 4_294_967_296.0;
-                f64::from(got) - 536_870_912.0 / m.sqrt()
+                // Relative, as the bound is.
+                f64::from(got) * m.sqrt() - 536_870_912.0
             }),
         },
         whole(
