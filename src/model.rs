@@ -1,8 +1,10 @@
 //! The reduced collision-vibration model and the schedule made from it.
 
 pub mod constants;
+pub mod felt;
 pub mod formula;
 pub mod guard;
+pub mod impact;
 mod plan;
 pub mod planner;
 pub mod reduced;

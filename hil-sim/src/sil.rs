@@ -1,11 +1,13 @@
 //! A run in software: the shipping control tick in closed loop with the plant, a
 //! millisecond at a time, as fast as the host goes.
 
+mod account;
 mod session;
 mod trace;
 
 use std::time::Instant;
 
+use interstage::control::Output;
 use interstage::log::{CrossingRecord, Event};
 use interstage::model::Strategy;
 use interstage::rig::RigError;
@@ -15,6 +17,7 @@ use crate::plant::rig::PlantError;
 use crate::record::{LogLine, Recording, Report, Row};
 use crate::scenario::{ControllerKind, Direction, Scenario};
 
+pub use account::{PhaseAccount, PlantAccount, account};
 pub use session::{Session, drives, read};
 pub use trace::text;
 
@@ -62,20 +65,36 @@ impl From<ControllerKind> for Strategy {
 /// [`RunError`] if the parameters are out of range or the plant fails. A run that
 /// ends in a fault is a result, not an error.
 pub fn run(scenario: &Scenario, options: Options) -> Result<Recording, RunError> {
-    let mut session = Session::new(scenario, options)?;
-    let mut start = Some(match scenario.run.direction {
+    run_session(Session::new(scenario, options)?, scenario)
+}
+
+/// [`run`] of a session that has been made ready for this scenario.
+///
+/// # Errors
+/// [`RunError::Plant`] if the plant fails.
+pub fn run_session(mut session: Session, scenario: &Scenario) -> Result<Recording, RunError> {
+    let mut start = Some(start_of(scenario));
+    let started = Instant::now();
+    while tick(&mut session, &mut start)?.is_some() {}
+    Ok(session.finish(started.elapsed().as_secs_f64()))
+}
+
+/// The command that sets a run going.
+fn start_of(scenario: &Scenario) -> Command {
+    match scenario.run.direction {
         Direction::Deploy => Command::Start,
         Direction::Retract => Command::Retract,
-    });
-    let started = Instant::now();
-    while session.time_s() < LONGEST_S {
-        let command = if session.mode() == Mode::Idle { start.take() } else { None };
-        session.step(command)?;
-        if matches!(session.mode(), Mode::Complete(_) | Mode::FaultHold(_)) {
-            break;
-        }
     }
-    Ok(session.finish(started.elapsed().as_secs_f64()))
+}
+
+/// A tick of a run that gets `start` as soon as the drive is idle; none at its end.
+fn tick(session: &mut Session, start: &mut Option<Command>) -> Result<Option<Output>, RunError> {
+    let over = matches!(session.mode(), Mode::Complete(_) | Mode::FaultHold(_));
+    if over || session.time_s() >= LONGEST_S {
+        return Ok(None);
+    }
+    let command = if session.mode() == Mode::Idle { start.take() } else { None };
+    session.step(command).map(Some)
 }
 
 /// Kept for the ledger: when, and what the controller reported of a crossing.

@@ -1,29 +1,21 @@
-//! The reduced model in f64: what the fixed-point tables are built from and
-//! compared with.
+//! The reduced model in f64: the definition that the fixed-point model follows.
 //!
 //! At the instant the lower wall stops carrying, the centre of an elastic ring
 //! stands at its undeformed height R above it, so the contact with face and corner
-//! is a closed form in the gap. Memory enters as an effective stiffness that
-//! depends on the Deborah number of the run over the corner. Friction that lifts
-//! the top load is taken as equally used over the contact.
+//! is a closed form in the gap. Memory enters as an effective stiffness
+//! ([`felt`](super::felt)), fitted to the ring. Friction that lifts the top load is
+//! taken as equally used over the contact.
 
-use super::constants::{DEPLOY, RETRACT};
+use super::felt::{self, FORCE_END, Folded, Kind, RUN_END};
+use super::impact::Impact;
 use crate::rig::Rig;
 use crate::supervise::Direction;
 
-/// Reference length of the Deborah number, mm: makes the generalised run
-/// `a^e l^(1-e)` a length.
-const RUN_REFERENCE_MM: f64 = 3.0;
+/// Shortest run of the model over R: 0.1 mm on the published wheel.
+pub const LEAST_RUN: f64 = 0.004;
 
-/// Exponent of the contact run in the Deborah number. Derived: least scatter of the
-/// effective stiffness over the ring's crossings; on the way back the run matters
-/// less, since the corner carries long before the touch-down.
-const fn run_exponent(direction: Direction) -> f64 {
-    match direction {
-        Direction::Deploy => 1.2,
-        Direction::Retract => 0.5,
-    }
-}
+/// Longest run over the free one: there the gap is all but closed.
+const MOST_RUN_PART: f64 = 0.99;
 
 /// Contact integrals of the elastic ring at the instant of lift-off, per unit of
 /// stiffness, mm^3: over `delta cos psi` and `delta sin psi` times the wheel's width.
@@ -33,6 +25,14 @@ pub struct Contact {
     pub radial: f64,
     /// Axial part, mm^3.
     pub axial: f64,
+}
+
+impl Contact {
+    /// Axial over radial part: tangent of the contact's mean inclination.
+    #[must_use]
+    pub fn slope(&self) -> f64 {
+        if self.radial > 0.0 { self.axial / self.radial } else { 0.0 }
+    }
 }
 
 /// Geometry and material of the reduced model.
@@ -50,6 +50,24 @@ pub struct Formula {
     pub stiffening: f64,
     /// Relaxation time, s.
     pub tau_s: f64,
+    /// What the corner does to tread and arm.
+    pub impact: Impact,
+}
+
+/// What the model says of a crossing, at the instant at which the lower wall stops
+/// (on the way back: begins) to carry.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Crossing {
+    /// Clearance between the root of the step and the undeformed wheel, mm.
+    pub gap_mm: f64,
+    /// Axial force of the step's contact on the wheel, N.
+    pub corner_force_n: f64,
+    /// Stress by which the corner's first touch exceeds the quasi-static one, Pa.
+    pub impact_stress_pa: f64,
+    /// Amplitude of the arm's first mode that the crossing leaves, mm.
+    pub vibration_mm: f64,
+    /// Friction that the lift of the load uses; 0 if pushed.
+    pub utilisation: f64,
 }
 
 impl Formula {
@@ -63,14 +81,20 @@ impl Formula {
             k_inf: rig.tread.k_inf_pa_per_m * 1e-9,
             stiffening: rig.tread.stiffening,
             tau_s: rig.tread.tau_s,
+            impact: Impact::new(rig),
         }
+    }
+
+    /// Unit of force of the fit, `k_inf R^2 L`, N.
+    #[must_use]
+    pub fn unit_force_n(&self) -> f64 {
+        self.k_inf * self.radius_mm * self.radius_mm * self.width_mm
     }
 
     /// Gap of the unloaded wheel, mm: the circle just touches floor and corner.
     #[must_use]
     pub fn largest_gap_mm(&self) -> f64 {
-        let free = self.free_run_mm();
-        libm::sqrt(free * free + self.radius_mm * self.radius_mm) - self.radius_mm
+        self.gap_after_mm(0.0)
     }
 
     /// Axial distance of the corner from the centre at which the undeformed wheel
@@ -92,6 +116,13 @@ impl Formula {
     #[must_use]
     pub fn run_mm(&self, gap_mm: f64) -> f64 {
         self.free_run_mm() - self.distance_mm(gap_mm)
+    }
+
+    /// Gap with which the wheel lifts off after this run, mm.
+    #[must_use]
+    pub fn gap_after_mm(&self, run_mm: f64) -> f64 {
+        let d = self.free_run_mm() - run_mm;
+        libm::sqrt(d * d + self.radius_mm * self.radius_mm) - self.radius_mm
     }
 
     /// Tread depth at the corner at lift-off, mm.
@@ -125,47 +156,54 @@ impl Formula {
         Contact { radial: radial * strip, axial: axial * strip }
     }
 
-    /// Inverse pace of the crossing, s/mm: times the speed it is the Deborah number.
+    /// Radial force of the relaxed ring that lifts off with this gap, without load, N.
     #[must_use]
-    pub fn deborah_per_speed(&self, direction: Direction, gap_mm: f64) -> f64 {
-        let e = run_exponent(direction);
-        let run = self.run_mm(gap_mm).max(1e-3);
-        self.tau_s / (libm::pow(run, e) * libm::pow(RUN_REFERENCE_MM, 1.0 - e))
+    pub fn relaxed_force_n(&self, kind: Kind, gap_mm: f64) -> f64 {
+        let contact = self.contact(gap_mm);
+        // Traction on the contact's slope carries the rest of a driven wheel's force.
+        let traction = if kind.driven { contact.slope() * contact.axial } else { 0.0 };
+        self.k_inf * (contact.radial + traction)
     }
 
-    /// Part g of the stiffening that is felt at this Deborah number, 0 to 1.
+    /// Longest run of the model, mm: where the fit ends, be it by the run, by the
+    /// relaxed force, or because the gap closes.
     #[must_use]
-    pub fn felt(direction: Direction, deborah: f64) -> f64 {
-        let table = match direction {
-            Direction::Deploy => &DEPLOY,
-            Direction::Retract => &RETRACT,
-        };
-        let last = table.len() - 1;
-        let position = deborah / (1.0 + deborah) * last as f64;
-        let index = (position as usize).min(last - 1);
-        let t = position - index as f64;
-        // Catmull-Rom, as the fixed-point table does it; beyond the ends the parabola
-        // through the last three.
-        let at = |i: usize| f64::from(table[i]) * 1e-6;
-        let p1 = at(index);
-        let p2 = at(index + 1);
-        let p0 = if index > 0 { at(index - 1) } else { 3.0 * (p1 - p2) + at(index + 2) };
-        let p3 = if index + 2 <= last { at(index + 2) } else { 3.0 * (p2 - p1) + at(index - 1) };
-        p1 + 0.5
-            * t
-            * ((p2 - p0)
-                + t * ((2.0 * p0 - 5.0 * p1 + 4.0 * p2 - p3) + t * (3.0 * p1 - 3.0 * p2 + p3 - p0)))
+    pub fn largest_run_mm(&self, kind: Kind) -> f64 {
+        let most = (RUN_END * self.radius_mm).min(MOST_RUN_PART * self.free_run_mm());
+        let limit = FORCE_END * self.unit_force_n();
+        let beyond = |run| self.relaxed_force_n(kind, self.gap_after_mm(run)) > limit;
+        if beyond(most) { halve(0.0, most, 30, |run| !beyond(run)) } else { most }
     }
 
-    /// Effective stiffness over k_inf for a crossing with this gap.
+    /// Speed at which half the crossing is fast, mm/s.
     #[must_use]
-    pub fn stiffness(&self, direction: Direction, speed_mm_s: f64, gap_mm: f64) -> f64 {
-        let deborah = speed_mm_s * self.deborah_per_speed(direction, gap_mm);
-        1.0 + (self.stiffening - 1.0) * Self::felt(direction, deborah)
+    pub fn half_speed_mm_s(&self, kind: Kind) -> f64 {
+        kind.half_pace() * self.radius_mm / self.tau_s
     }
 
-    /// Radial force on the wheel that gives this gap, N. `load_n` is the axial load
-    /// lifted by friction; `None` pushes a frictionless wheel.
+    /// Part of the crossing that is fast, `v / (v + v_half)`.
+    #[must_use]
+    pub fn fast_part(&self, kind: Kind, speed_mm_s: f64) -> f64 {
+        speed_mm_s / (speed_mm_s + self.half_speed_mm_s(kind))
+    }
+
+    /// The felt stiffening at this rig's step and this load.
+    #[must_use]
+    pub fn fold(&self, kind: Kind, load_n: f64) -> Folded {
+        kind.fold(self.step_mm / self.radius_mm, load_n / self.unit_force_n())
+    }
+
+    /// Effective stiffness over k_inf, `1 + (s - 1) x E`.
+    #[must_use]
+    pub fn stiffness(&self, kind: Kind, folded: &Folded, speed_mm_s: f64, gap_mm: f64) -> f64 {
+        let x = self.fast_part(kind, speed_mm_s);
+        let run = self.run_mm(gap_mm) / self.radius_mm;
+        1.0 + (self.stiffening - 1.0) * x * felt::value(folded, x, run)
+    }
+
+    /// Radial force on the wheel that gives this gap, N: `k (I_r + s I_a) + T s` with
+    /// `s = I_a / I_r`, pushed `k I_r`. `load_n` is the axial load lifted by friction;
+    /// `None` pushes a frictionless wheel.
     #[must_use]
     pub fn force_n(
         &self,
@@ -174,33 +212,26 @@ impl Formula {
         gap_mm: f64,
         load_n: Option<f64>,
     ) -> f64 {
-        let stiffness = self.k_inf * self.stiffness(direction, speed_mm_s, gap_mm);
-        let contact = self.contact(gap_mm);
-        if contact.radial <= 0.0 {
-            return 0.0;
-        }
-        let slope = contact.axial / contact.radial;
-        match load_n {
-            None => stiffness * contact.radial,
-            Some(load) => stiffness * (contact.radial + slope * contact.axial) + load * slope,
-        }
+        let kind = Kind { direction, driven: load_n.is_some() };
+        let folded = self.fold(kind, load_n.unwrap_or(0.0));
+        self.folded_force_n(kind, &folded, speed_mm_s, gap_mm, load_n.unwrap_or(0.0))
     }
 
-    /// Friction that the lift of `load_n` uses at that instant.
-    #[must_use]
-    pub fn utilisation(
+    fn folded_force_n(
         &self,
-        direction: Direction,
+        kind: Kind,
+        folded: &Folded,
         speed_mm_s: f64,
         gap_mm: f64,
         load_n: f64,
     ) -> f64 {
-        let stiffness = self.k_inf * self.stiffness(direction, speed_mm_s, gap_mm);
-        let contact = self.contact(gap_mm);
-        (load_n / stiffness + contact.axial) / contact.radial
+        let relaxed = self.relaxed_force_n(kind, gap_mm);
+        let stiffness = self.stiffness(kind, folded, speed_mm_s, gap_mm);
+        stiffness * relaxed + load_n * self.contact(gap_mm).slope()
     }
 
-    /// Gap at this speed and radial force, mm, by bisection to 1e-9 mm.
+    /// Gap at this speed and radial force, mm, by 40 halvings of the run; at the ends of
+    /// the model the gap there.
     #[must_use]
     pub fn gap_mm(
         &self,
@@ -209,26 +240,96 @@ impl Formula {
         force_n: f64,
         load_n: Option<f64>,
     ) -> f64 {
-        let (mut low, mut high) = (0.0, self.largest_gap_mm());
-        for _ in 0..40 {
-            let middle = 0.5 * (low + high);
-            if self.force_n(direction, speed_mm_s, middle, load_n) > force_n {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        0.5 * (low + high)
+        let kind = Kind { direction, driven: load_n.is_some() };
+        let load_n = load_n.unwrap_or(0.0);
+        let folded = self.fold(kind, load_n);
+        let carries = |run: f64| {
+            let gap = self.gap_after_mm(run);
+            self.folded_force_n(kind, &folded, speed_mm_s, gap, load_n) > force_n
+        };
+        let (least, most) = (LEAST_RUN * self.radius_mm, self.largest_run_mm(kind));
+        self.gap_after_mm(halve(least, most, 40, |run| !carries(run)))
     }
+
+    /// Largest speed up to `ceiling_mm_s` at which this radial force still holds the gap,
+    /// mm/s; 0 if none does.
+    #[must_use]
+    pub fn speed_mm_s(
+        &self,
+        direction: Direction,
+        gap_mm: f64,
+        force_n: f64,
+        load_n: Option<f64>,
+        ceiling_mm_s: f64,
+    ) -> f64 {
+        let holds = |speed| self.force_n(direction, speed, gap_mm, load_n) <= force_n;
+        if holds(ceiling_mm_s) { ceiling_mm_s } else { halve(0.0, ceiling_mm_s, 40, holds) }
+    }
+
+    /// Friction that the lift of `load_n` uses at that instant: `T / C + s`, with the
+    /// radial reaction `C = (P - T s) / (1 + s^2)`.
+    #[must_use]
+    pub fn utilisation(
+        &self,
+        direction: Direction,
+        speed_mm_s: f64,
+        gap_mm: f64,
+        load_n: f64,
+    ) -> f64 {
+        let force = self.force_n(direction, speed_mm_s, gap_mm, Some(load_n));
+        let slope = self.contact(gap_mm).slope();
+        load_n * (1.0 + slope * slope) / (force - load_n * slope) + slope
+    }
+
+    /// Everything that the model says of a crossing.
+    #[must_use]
+    pub fn crossing(
+        &self,
+        direction: Direction,
+        speed_mm_s: f64,
+        force_n: f64,
+        load_n: Option<f64>,
+    ) -> Crossing {
+        let gap_mm = self.gap_mm(direction, speed_mm_s, force_n, load_n);
+        let slope = self.contact(gap_mm).slope();
+        let radial_n = match load_n {
+            None => force_n,
+            Some(load) => (force_n - load * slope) / (1.0 + slope * slope),
+        };
+        Crossing {
+            gap_mm,
+            corner_force_n: slope * radial_n,
+            impact_stress_pa: self.impact.stress_pa(speed_mm_s),
+            vibration_mm: self.impact.vibration_mm(speed_mm_s, radial_n, self.run_mm(gap_mm)),
+            utilisation: load_n.map_or(0.0, |load| load / radial_n + slope),
+        }
+    }
+}
+
+/// Halves an interval `count` times towards where `below` ceases to hold.
+fn halve(low: f64, high: f64, count: usize, below: impl Fn(f64) -> bool) -> f64 {
+    let (mut low, mut high) = (low, high);
+    for _ in 0..count {
+        let middle = 0.5 * (low + high);
+        if below(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     fn formula() -> Formula {
         Formula::new(&Rig::fe())
     }
+
+    const WAYS: [Direction; 2] = [Direction::Deploy, Direction::Retract];
 
     #[test]
     fn the_contact_integrals_agree_with_a_fine_sum() {
@@ -254,26 +355,109 @@ mod tests {
     }
 
     #[test]
-    fn gap_and_force_are_inverse() {
+    fn the_longest_run_ends_by_run_force_or_gap() {
+        let kind = Kind { direction: Direction::Deploy, driven: false };
+        let high = Formula { step_mm: 5.0, ..formula() };
+        let force = high.relaxed_force_n(kind, high.gap_after_mm(high.largest_run_mm(kind)));
+        assert!((force / (FORCE_END * high.unit_force_n()) - 1.0).abs() < 1e-6, "{force}");
+        let low = Formula { step_mm: 2.0, ..formula() };
+        assert_eq!(low.largest_run_mm(kind), RUN_END * low.radius_mm);
+        let lower = Formula { step_mm: 1.0, ..formula() };
+        assert_eq!(lower.largest_run_mm(kind), MOST_RUN_PART * lower.free_run_mm());
+    }
+
+    #[test]
+    fn at_rest_the_ring_is_relaxed() {
         let f = formula();
-        for direction in [Direction::Deploy, Direction::Retract] {
-            for (speed, force, load) in
-                [(3.0, 33.3, Some(6.7)), (12.0, 50.0, None), (40.0, 120.0, Some(20.0))]
-            {
-                let gap = f.gap_mm(direction, speed, force, load);
-                let back = f.force_n(direction, speed, gap, load);
-                assert!((back / force - 1.0).abs() < 1e-6, "{back} {force}");
+        for direction in WAYS {
+            for (load, kind) in [(None, false), (Some(0.0), true)] {
+                let kind = Kind { direction, driven: kind };
+                let (at_rest, relaxed) =
+                    (f.force_n(direction, 0.0, 2.0, load), f.relaxed_force_n(kind, 2.0));
+                assert!((at_rest / relaxed - 1.0).abs() < 1e-12);
             }
         }
     }
 
     #[test]
-    fn the_gap_grows_with_speed_and_falls_with_force() {
+    fn scaled_alike_the_model_is_the_same() {
+        // Twice the lengths at twice the speed and eight times the forces.
         let f = formula();
-        let gap = |v, p| f.gap_mm(Direction::Deploy, v, p, Some(6.7));
-        for v in [2.0, 5.0, 10.0, 20.0, 40.0] {
-            assert!(gap(1.2 * v, 40.0) > gap(v, 40.0));
-            assert!(gap(v, 44.0) < gap(v, 40.0));
+        let twice = Formula {
+            radius_mm: 2.0 * f.radius_mm,
+            width_mm: 2.0 * f.width_mm,
+            step_mm: 2.0 * f.step_mm,
+            ..f
+        };
+        for direction in WAYS {
+            let (a, b) = (
+                f.gap_mm(direction, 7.0, 45.0, Some(6.0)),
+                twice.gap_mm(direction, 14.0, 360.0, Some(48.0)),
+            );
+            assert!((b / a - 2.0).abs() < 1e-9, "{a} {b}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn gap_force_and_speed_are_inverse(
+            back in any::<bool>(),
+            speed in 3.0..100.0f64,
+            force in 20.0..150.0f64,
+            step_mm in 2.5..6.0f64,
+            load in prop::option::of(0.0..6.0f64),
+        ) {
+            let f = Formula { step_mm, ..formula() };
+            let direction = WAYS[usize::from(back)];
+            let gap = f.gap_mm(direction, speed, force, load);
+            let again = f.force_n(direction, speed, gap, load);
+            prop_assert!((again / force - 1.0).abs() < 1e-8, "{again} {force}");
+            // On the way back the force falls with the speed before it rises.
+            if !back || speed > 15.0 {
+                let fastest = f.speed_mm_s(direction, gap, force, load, 200.0);
+                let held = f.force_n(direction, fastest, gap, load);
+                prop_assert!((held / force - 1.0).abs() < 1e-8, "{fastest} {speed}");
+            }
+        }
+
+        #[test]
+        fn the_gap_falls_with_force(
+            back in any::<bool>(),
+            speed in 0.5..150.0f64,
+            force in 15.0..150.0f64,
+            step_mm in 2.0..6.0f64,
+            load in prop::option::of(0.0..3.0f64),
+        ) {
+            let f = Formula { step_mm, ..formula() };
+            let direction = WAYS[usize::from(back)];
+            let gap = |force| f.gap_mm(direction, speed, force, load);
+            prop_assert!(gap(1.05 * force) <= gap(force));
+        }
+
+        #[test]
+        fn on_the_way_out_the_gap_grows_with_speed(
+            speed in 0.5..100.0f64,
+            force in 20.0..120.0f64,
+        ) {
+            let f = formula();
+            let gap = |speed| f.gap_mm(Direction::Deploy, speed, force, Some(6.0));
+            prop_assert!(gap(1.1 * speed) > gap(speed));
+        }
+
+        #[test]
+        fn axial_and_radial_forces_balance(
+            back in any::<bool>(),
+            speed in 1.0..100.0f64,
+            force in 25.0..150.0f64,
+            load in 0.0..8.0f64,
+        ) {
+            let f = formula();
+            let crossing = f.crossing(WAYS[usize::from(back)], speed, force, Some(load));
+            let slope = f.contact(crossing.gap_mm).slope();
+            let (used, axial) = (crossing.utilisation, crossing.corner_force_n);
+            let radial = axial / slope;
+            prop_assert!((used * radial - axial - load).abs() < 1e-9);
+            prop_assert!((radial + used * axial - force).abs() < 1e-9);
         }
     }
 }

@@ -7,7 +7,7 @@ mod build;
 
 use super::guard::Guard;
 use super::plan::{Outcome, Plan, PlanRequest, Review, Strategy};
-use super::reduced::{Point, ReducedModel};
+use super::reduced::{Point, ReducedModel, Scale};
 use super::timing::Timing;
 use crate::rig::MAX_STEPS;
 use crate::supervise::{Direction, Limit};
@@ -29,8 +29,6 @@ pub struct Planner {
     guard: Guard,
     timing: Timing,
     strategy: Strategy,
-    /// Axial load on this wheel, N.
-    load: Newtons,
     /// Radial force per preload and wall level that the arm's wedge adds, N, by step.
     wedge: heapless::Vec<Newtons, MAX_STEPS>,
     /// Coupling times load: wedge per tangent of the arm angle, N.
@@ -107,8 +105,8 @@ impl Planner {
 
     /// Speed and preload at the step.
     fn crossing(&self, request: &PlanRequest, scale: Ratio, plan: &mut Plan, limits: &mut Limits) {
-        let at =
-            Point { direction: request.direction, speed: self.least_speed, load: self.load, scale };
+        let scale = Scale::new(scale);
+        let at = Point { direction: request.direction, speed: self.least_speed, scale };
         let wedge = self.wedge_at(request.step);
         let most = match self.strategy {
             Strategy::Scheduled | Strategy::Limit => self.most_preload,
@@ -142,8 +140,9 @@ impl Planner {
             Strategy::Reactive => wanted.clamp(self.cruise_preload, self.most_preload),
         };
         let carried = plan.cross_preload.min(most) + wedge;
-        plan.gap = self.model.gap(&at, carried);
-        let margin = self.friction - self.model.utilisation(&at, plan.gap);
+        let crossing = self.model.crossing(&at, carried);
+        plan.gap = crossing.gap;
+        let margin = crossing.slip_margin;
         plan.slip_margin = margin;
         if margin < self.friction - self.usable {
             limits.add(Limit::SlipMarginLow);
@@ -171,10 +170,11 @@ impl Planner {
 
     /// Compares a crossing with the model and corrects the stiffness, bounded.
     fn review(&self, review: &Review, scale: Ratio) -> Outcome {
-        let at = Point { direction: review.direction, speed: review.speed, load: self.load, scale };
+        let at =
+            Point { direction: review.direction, speed: review.speed, scale: Scale::new(scale) };
         let force = review.preload + self.coupling * review.tan_arm;
-        let gap_predicted = self.model.gap(&at, force);
-        let slip_margin = self.friction - self.model.utilisation(&at, gap_predicted);
+        let crossing = self.model.crossing(&at, force);
+        let (gap_predicted, slip_margin) = (crossing.gap, crossing.slip_margin);
         if !review.trusted {
             return Outcome { gap_predicted, slip_margin, scale, bounded: false };
         }

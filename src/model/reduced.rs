@@ -1,38 +1,75 @@
-//! The reduced model in fixed point: forward (speed and force to gap) and inverse
-//! (gap to force, force to speed).
+//! The reduced model in fixed point: forward (speed and force to gap and what goes with
+//! it) and inverse (gap to force, gap and force to speed).
+//!
+//! For one rig the fitted polynomial depends on two things only: how fast the crossing is
+//! and how far the wheel runs over the corner. Both inverses are therefore one polynomial
+//! in one variable, of which the zero is found from a good guess in two steps. No table,
+//! no loop, at most four 32-bit divisions.
+//!
+//! Formats inside: lengths over R and parts of a whole in Q32 without sign, so that a
+//! difference from one half is a Q32 with sign as [`horner`] wants it; forces over the
+//! unit of [`Shape`] in Q30.
 
 #![deny(clippy::float_arithmetic)]
 
 #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
 mod build;
+mod shape;
+mod way;
 
-use crate::numeric::{Table, divide};
+use crate::numeric::{fraction, high, reciprocal_of_normalised};
 use crate::supervise::Direction;
-use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, q16};
+use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio};
 
-/// Points of the tables over the gap.
-pub const GAP_POINTS: usize = 65;
+use shape::Shape;
+use way::Way;
 
-/// Tables over the gap and over the Deborah number for one rig.
+/// Estimated over nominal stiffness of the tread, with its reciprocal: it changes once a
+/// crossing and is used many times.
 ///
-/// The gap's range is that from a quarter of the unloaded gap to where the run over
-/// the corner is 0.25 mm; outside it the nearer end holds.
+/// Range: 1/4 to 4, the nearer end outside. Error of the reciprocal: 1e-8 relative.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Scale {
+    ratio: Ratio,
+    /// Q28.
+    inverse: i32,
+}
+
+impl Scale {
+    /// Nominal stiffness.
+    pub const NOMINAL: Self = Self { ratio: Ratio::ONE, inverse: 1 << 28 };
+
+    /// From the ratio.
+    #[must_use]
+    pub fn new(ratio: Ratio) -> Self {
+        let bits = ratio.to_bits().clamp(1 << 14, 1 << 18);
+        let shift = (bits as u32).leading_zeros();
+        let reciprocal = reciprocal_of_normalised((bits as u32) << shift);
+        let inverse = (reciprocal.saturating_add(1 << (18 - shift)) >> (19 - shift)) as i32;
+        Self { ratio: Ratio::from_bits(bits), inverse }
+    }
+
+    /// The ratio.
+    #[must_use]
+    pub const fn ratio(self) -> Ratio {
+        self.ratio
+    }
+}
+
+/// The reduced model of one rig under one load.
+///
+/// Range: speeds from 0, forces up to the unit of force over the scale; gaps and forces
+/// beyond the fit give its nearer end. Error against [`Formula`](super::formula::Formula)
+/// beyond one LSB of the result, relative: force of a gap 5e-6; gap of a force 2e-5 for
+/// steps of 3 mm and more, 5e-3 for 2 mm, where 150 N all but close it.
 #[derive(Clone, Debug)]
 pub struct ReducedModel {
-    /// k_inf times the radial contact integral, N.
-    radial: Table<GAP_POINTS>,
-    /// k_inf times radial plus slope times axial integral, N: the driven wheel.
-    driven: Table<GAP_POINTS>,
-    /// Axial over radial integral: tangent of the contact's mean inclination.
-    slope: Table<GAP_POINTS>,
-    /// Deborah number per speed, s/mm, way out and way back.
-    pace: [Table<GAP_POINTS>; 2],
-    /// Tread depth at the corner, mm.
-    depth: Table<GAP_POINTS>,
-    /// Part of the stiffening felt over z, way out and way back.
-    felt: [Table<33>; 2],
-    /// Stiffening less one.
-    excess: Ratio,
+    shape: Shape,
+    ways: [Way; 2],
+    /// Whether friction drives the wheel; else it is pushed and needs none.
+    driven: bool,
+    /// Friction of tread on wall.
+    friction: Ratio,
 }
 
 /// A crossing's working point.
@@ -42,80 +79,99 @@ pub struct Point {
     pub direction: Direction,
     /// Speed at lift-off, mm/s, not negative.
     pub speed: MillimetresPerSecond,
-    /// Axial load lifted by friction, N.
-    pub load: Newtons,
     /// Estimated over nominal stiffness of the tread.
-    pub scale: Ratio,
+    pub scale: Scale,
 }
 
-const ONE: Ratio = q16(1_000_000);
+/// What the model says of a crossing, see [`formula::Crossing`](super::formula::Crossing).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Crossing {
+    /// Clearance at the root of the step, mm.
+    pub gap: Millimetres,
+    /// Axial force of the step's contact on the wheel, N.
+    pub corner_force: Newtons,
+    /// Stress increment of the first touch, kPa.
+    pub impact_stress_kpa: Q16,
+    /// Amplitude of the arm's first mode afterwards, um.
+    pub vibration_um: Q16,
+    /// Friction that lifting the load uses; 0 if pushed.
+    pub utilisation: Ratio,
+    /// Friction left unused.
+    pub slip_margin: Ratio,
+    /// Whether the gap is that at an end of the model, not that of the force.
+    pub at_end: bool,
+}
 
 impl ReducedModel {
-    /// Least and largest gap of the tables, mm.
+    /// Least and largest gap of the model, mm.
     #[must_use]
     pub fn gap_range(&self) -> (Millimetres, Millimetres) {
-        (self.radial.lo(), self.radial.hi())
+        (self.shape.gap(self.shape.most_run()), self.shape.gap(self.shape.least_run()))
     }
 
-    /// Effective stiffness over nominal k_inf, `scale (1 + (s - 1) g(De))`.
+    /// Everything about the crossing at this radial force, N.
+    ///
+    /// Equation: the run r with `F(x, r) + T s(r) = P` by two steps from a
+    /// polynomial guess; then [`Formula::crossing`](super::formula::Formula::crossing). A
+    /// scale multiplies what the force exceeds the lift of the load on the mean slope by.
     #[must_use]
-    pub fn stiffness(&self, point: &Point, gap: Millimetres) -> Ratio {
-        let way = way(point.direction);
-        let deborah = point.speed * self.pace[way].eval(gap);
-        // De/(1 + De) without cancellation at large De.
-        let z = divide(deborah, ONE + deborah);
-        point.scale * (ONE + self.excess * self.felt[way].eval(z))
+    #[inline]
+    pub fn crossing(&self, point: &Point, force: Newtons) -> Crossing {
+        let (shape, way) = (&self.shape, self.way(point.direction));
+        let wanted = shape.part(force);
+        let sought = shape.unscaled(wanted, point.scale.inverse);
+        let x = way.fast_part(point.speed);
+        let beyond = shape.beyond_lift(sought);
+        let guess = way.guess_run(x, beyond.root);
+        let yielding = way.yielding(x, beyond.root);
+        let stiffness = way.stiffness(x, centred(guess));
+        let run = shape.refine(guess, sought, &beyond, stiffness, yielding);
+        let stiffness = way.stiffness(x, centred(run));
+        let run = shape.refine(run, sought, &beyond, stiffness, yielding);
+        let w = centred(run);
+        let slope = shape.slope(w);
+        let radial = shape.radial_part(wanted, slope, w);
+        let used = self.used(radial, slope);
+        Crossing {
+            gap: shape.gap(run),
+            corner_force: shape.newtons(high(radial, slope) << 2),
+            impact_stress_kpa: shape.impact_stress(point.speed),
+            vibration_um: shape.vibration(point.speed, radial, run),
+            utilisation: used,
+            slip_margin: self.friction - used,
+            at_end: run == shape.least_run() || run == shape.most_run(),
+        }
     }
 
-    /// Radial force on the driven wheel that gives this gap, N:
-    /// `k (I_r + s I_a) + T s` with `s = I_a / I_r`.
-    #[must_use]
-    pub fn force(&self, point: &Point, gap: Millimetres) -> Newtons {
-        self.stiffness(point, gap) * self.driven.eval(gap) + point.load * self.slope.eval(gap)
-    }
-
-    /// Radial force on the frictionless wheel that gives this gap, N: `k I_r`.
-    #[must_use]
-    pub fn pushed_force(&self, point: &Point, gap: Millimetres) -> Newtons {
-        self.stiffness(point, gap) * self.radial.eval(gap)
-    }
-
-    /// Gap of the driven wheel under this radial force, mm: 17 halvings of the
-    /// table's range, so within 1e-5 of it.
+    /// Gap under this radial force, mm.
     #[must_use]
     pub fn gap(&self, point: &Point, force: Newtons) -> Millimetres {
-        self.halve(|gap| self.force(point, gap) > force)
+        self.crossing(point, force).gap
     }
 
-    /// Gap of the frictionless wheel under this radial force, mm.
+    /// Radial force that gives this gap, N: `F + T s`, scaled.
     #[must_use]
-    pub fn pushed_gap(&self, point: &Point, force: Newtons) -> Millimetres {
-        self.halve(|gap| self.pushed_force(point, gap) > force)
+    #[inline]
+    pub fn force(&self, point: &Point, gap: Millimetres) -> Newtons {
+        self.shape.newtons(self.force_part(point, self.shape.run(gap)))
     }
 
-    /// Friction that lifting the load uses at lift-off: `T/(k I_r) + I_a/I_r`.
+    /// Friction that lifting the load uses at this gap: `T / C + s`; 0 if pushed.
     #[must_use]
     pub fn utilisation(&self, point: &Point, gap: Millimetres) -> Ratio {
-        let carried = self.stiffness(point, gap) * self.radial.eval(gap);
-        divide(point.load, carried) + self.slope.eval(gap)
+        let run = self.shape.run(gap);
+        let force = self.force_part(point, run);
+        let slope = self.shape.slope(centred(run));
+        self.used(self.shape.radial_part(force, slope, centred(run)), slope)
     }
 
-    /// Axial part of the contact's reaction under this radial force, N: what the
-    /// climb costs.
+    /// Largest speed from `floor` to `ceiling` at which `force` still holds the gap, mm/s;
+    /// `floor` if none does.
+    ///
+    /// Equation: the fast part x with `F(x, r) = P - T s`, by two steps of Newton's
+    /// method from a polynomial guess; then `v = v_half x / (1 - x)`.
     #[must_use]
-    pub fn climbing_force(&self, gap: Millimetres, force: Newtons) -> Newtons {
-        force * self.slope.eval(gap)
-    }
-
-    /// Tread depth at the corner at lift-off, mm.
-    #[must_use]
-    pub fn depth(&self, gap: Millimetres) -> Millimetres {
-        self.depth.eval(gap)
-    }
-
-    /// Largest speed up to `ceiling` at which `force` still holds the gap, mm/s, and
-    /// not below `floor`: 16 halvings, since the force rises with the speed.
-    #[must_use]
+    #[inline]
     pub fn speed(
         &self,
         point: &Point,
@@ -124,53 +180,61 @@ impl ReducedModel {
         floor: MillimetresPerSecond,
         ceiling: MillimetresPerSecond,
     ) -> MillimetresPerSecond {
-        let holds = |speed| self.force(&Point { speed, ..*point }, gap) <= force;
-        if holds(ceiling) {
-            return ceiling;
+        let (shape, way) = (&self.shape, self.way(point.direction));
+        let run = shape.run(gap);
+        let w = centred(run);
+        let sought = shape.unscaled(shape.part(force), point.scale.inverse);
+        let stiffness = shape.stiffness_for(sought - shape.lifting(w), run);
+        match way.speed(stiffness, w) {
+            Some(speed) => speed.min(ceiling).max(floor),
+            None => floor,
         }
-        let (mut low, mut high) = (floor, ceiling);
-        for _ in 0..16 {
-            let middle = half(low + high);
-            if holds(middle) {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        low
     }
 
     /// Scale of the stiffness that explains this gap under this radial force.
     #[must_use]
     pub fn observed_scale(&self, point: &Point, gap: Millimetres, force: Newtons) -> Ratio {
-        let nominal = Point { scale: ONE, ..*point };
-        let elastic = self.stiffness(&nominal, gap) * self.driven.eval(gap);
-        divide(force - point.load * self.slope.eval(gap), elastic)
+        let nominal = Point { scale: Scale::NOMINAL, ..*point };
+        let shape = &self.shape;
+        let nominal = self.force_part(&nominal, shape.run(gap)) - shape.middle_lifting;
+        let excess = (shape.part(force) - shape.middle_lifting).max(0);
+        // Of four times the nominal force, so up to 4.
+        let part = fraction((excess as u32) >> 2, nominal.max(1) as u32);
+        Q16::from_bits((part >> 14) as i32)
     }
 
-    /// Halves the gap's range 17 times; `above` tells whether the force at a gap is
-    /// still too large, so that the gap sought is larger.
-    fn halve(&self, above: impl Fn(Millimetres) -> bool) -> Millimetres {
-        let (mut low, mut high) = self.gap_range();
-        for _ in 0..17 {
-            let middle = half(low + high);
-            if above(middle) {
-                low = middle;
-            } else {
-                high = middle;
-            }
+    /// Tread depth at the corner at lift-off, mm.
+    #[must_use]
+    pub fn depth(&self, gap: Millimetres) -> Millimetres {
+        self.shape.depth(self.shape.run(gap))
+    }
+
+    /// Radial force after this run, Q30.
+    #[inline(always)]
+    fn force_part(&self, point: &Point, run: u32) -> i32 {
+        let (shape, way) = (&self.shape, self.way(point.direction));
+        let w = centred(run);
+        let stiffness = way.stiffness(way.fast_part(point.speed), w);
+        let force = shape.elastic(run, stiffness) + shape.lifting(w);
+        shape.scaled(force, point.scale.ratio)
+    }
+
+    /// Friction used under a radial reaction on this slope, both Q30.
+    #[inline(always)]
+    fn used(&self, radial: i32, slope: i32) -> Ratio {
+        if self.driven { self.shape.utilisation(radial, slope) } else { Ratio::ZERO }
+    }
+
+    fn way(&self, direction: Direction) -> &Way {
+        match direction {
+            Direction::Deploy => &self.ways[0],
+            Direction::Retract => &self.ways[1],
         }
-        half(low + high)
     }
 }
 
-fn half(x: Q16) -> Q16 {
-    x.half()
-}
-
-const fn way(direction: Direction) -> usize {
-    match direction {
-        Direction::Deploy => 0,
-        Direction::Retract => 1,
-    }
+/// A part of a whole, Q32 without sign, as its difference from one half, Q32 with sign.
+#[inline(always)]
+const fn centred(part: u32) -> i32 {
+    (part ^ 0x8000_0000) as i32
 }

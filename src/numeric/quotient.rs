@@ -60,7 +60,7 @@ mod tests {
             let error = reciprocal_error(n);
             (least, most) = (least.min(error), most.max(error));
         }
-        assert!(least >= -16.0 && least < -8.0, "{least}");
+        assert!((-16.0..-8.0).contains(&least), "{least}");
         assert!(most <= 0.0 && most > -1.0, "{most}");
     }
 
@@ -85,7 +85,8 @@ mod tests {
         #[test]
         fn quotients_agree_with_f64(a in any::<u32>(), b in any::<u32>(), shift in 0_u32..31) {
             let (a, b) = (a >> shift, b >> (shift / 2));
-            prop_assume!(a < b);
+            let (a, b) = (a.min(b), a.max(b).max(1));
+            let a = a.min(b - 1);
             let exact = f64::from(a) / f64::from(b) * 2f64.powi(32);
             let error = f64::from(fraction(a, b)) - exact;
             prop_assert!((-20.0..=0.0).contains(&error), "{error}");

@@ -1,6 +1,6 @@
 //! One call of the reduced model as words.
 
-use interstage::model::reduced::{Point, ReducedModel};
+use interstage::model::reduced::{Point, ReducedModel, Scale};
 use interstage::supervise::Direction;
 use interstage::units::{Q16, q16};
 
@@ -42,8 +42,7 @@ impl Given {
         Point {
             direction: direction.unwrap_or(Direction::Deploy),
             speed: Q16::from_bits(self.speed),
-            load: Q16::from_bits(self.load),
-            scale: Q16::from_bits(self.scale),
+            scale: Scale::new(Q16::from_bits(self.scale)),
         }
     }
 

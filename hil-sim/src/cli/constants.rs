@@ -2,23 +2,36 @@
 
 use std::path::{Path, PathBuf};
 
-use interstage::supervise::Direction;
+use interstage::model::felt::Kind;
+use interstage::model::formula::Formula;
+use interstage::rig::Rig;
 use serde::Serialize;
 
 use super::failure::{Failure, Outcome};
 use super::output;
-use crate::constants::{crossings, generate};
+use crate::constants::data::{self, Row};
+use crate::constants::design::Use;
+use crate::constants::{fit, plan, source, stored, sweep, verify};
 use crate::export::write_text;
 use crate::progress;
 use crate::table::{number, plain};
 
+/// Of how many stored crossings `--check` runs one again.
+const CHECKED_ONE_IN: usize = 50;
+
 /// Regenerates the constants of the reduced model from crossings of the ring.
 ///
-/// Writes `src/model/constants.rs` of the workspace.
+/// Runs all crossings, which takes some minutes, writes them to
+/// `hil-sim/data/crossings.csv`, fits the model and writes `src/model/constants.rs`.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// Writes nothing; exit code 1 if the file in place is stale.
+    /// Fits the stored crossings again without running them.
     #[arg(long)]
+    refit: bool,
+
+    /// Writes nothing; exit code 1 if a sample of the crossings or the constants are
+    /// stale.
+    #[arg(long, conflicts_with = "refit")]
     check: bool,
 
     /// Prints the result as one JSON object.
@@ -26,55 +39,115 @@ pub(super) struct Args {
     json: bool,
 }
 
-/// What `--json` prints; errors are those of the effective stiffness, relative, way
-/// out and way back.
+/// What `--json` prints.
 #[derive(Serialize)]
 struct Printed {
     path: PathBuf,
     current: bool,
     written: bool,
-    max_rel_error: [f64; 2],
-    rms_rel_error: [f64; 2],
+    crossings: usize,
+    kinds: Vec<Quality>,
+}
+
+/// How well the constants in the program fit the crossings: effective stiffness over the
+/// fitted ones, relative, and gap over those left out of the fit, in parts of 1 % or
+/// 10 um, whichever is larger.
+#[derive(Serialize)]
+struct Quality {
+    kind: &'static str,
+    fitted: usize,
+    stiffness_max: f64,
+    stiffness_rms: f64,
+    held: usize,
+    gap_max: f64,
+    gap_rms: f64,
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
+    let failed = |error: anyhow::Error| Failure::run(format!("{error:#}"));
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).with_file_name("src/model/constants.rs");
     let old = std::fs::read_to_string(&path)
         .map_err(|error| Failure::input(format!("{}: {error}", path.display())))?;
-    let (new, errors) = {
-        let bar = progress::bar("crossings", crossings() as u64);
-        generate(&|| bar.advance(1)).map_err(|error| Failure::run(format!("{error:#}")))?
+    let rows = if args.refit || args.check {
+        stored().map_err(failed)?
+    } else {
+        let bar = progress::bar("crossings", plan().len() as u64);
+        sweep(&|| bar.advance(1)).map_err(failed)?
     };
-    let current = old == new;
+    let fresh = if args.check {
+        let bar = progress::bar("crossings", rows.len().div_ceil(CHECKED_ONE_IN) as u64);
+        verify(&rows, CHECKED_ONE_IN, &|| bar.advance(1))
+    } else {
+        Ok(())
+    };
+    let new = source(&rows).map_err(failed)?;
+    let current = old == new && fresh.is_ok();
     let written = !current && !args.check;
     if written {
+        write_text(&data::path(), &data::write(&rows))?;
         write_text(&path, &new)?;
     }
     let printed = Printed {
         path,
         current,
         written,
-        max_rel_error: errors.map(|(max, _)| max),
-        rms_rel_error: errors.map(|(_, rms)| rms),
+        crossings: rows.len(),
+        kinds: Kind::ALL.map(|kind| quality(kind, &rows)).into(),
     };
     output::result(args.json, &printed, || human(&printed))?;
+    fresh.map_err(failed)?;
     Ok(Outcome::of(current || written))
 }
 
+/// Errors of the constants built into this program.
+fn quality(kind: Kind, rows: &[Row]) -> Quality {
+    let formula = Formula::new(&Rig::fe());
+    let stiffness: Vec<f64> = rows
+        .iter()
+        .filter(|row| row.case.kind == kind && fit::takes_part(row) && row.of == Use::Fit)
+        .map(|row| fit::stiffness_error(&formula, row))
+        .collect();
+    let gap: Vec<f64> = rows
+        .iter()
+        .filter(|row| row.case.kind == kind && row.of == Use::Hold)
+        .map(|row| fit::gap_error(&formula, row))
+        .collect();
+    let most = |errors: &[f64]| errors.iter().fold(0.0, |most: f64, e| most.max(e.abs()));
+    let rms = |errors: &[f64]| {
+        (errors.iter().map(|e| e * e).sum::<f64>() / errors.len().max(1) as f64).sqrt()
+    };
+    Quality {
+        kind: data::kind_name(kind),
+        fitted: stiffness.len(),
+        stiffness_max: most(&stiffness),
+        stiffness_rms: rms(&stiffness),
+        held: gap.len(),
+        gap_max: most(&gap),
+        gap_rms: rms(&gap),
+    }
+}
+
 fn human(printed: &Printed) -> String {
-    let rows = [Direction::Deploy, Direction::Retract].iter().enumerate().map(|(index, way)| {
-        let percent = |errors: [f64; 2]| number(100.0 * errors[index], 2);
-        let name = if *way == Direction::Deploy { "way out" } else { "way back" };
-        vec![name.to_owned(), percent(printed.max_rel_error), percent(printed.rms_rel_error)]
+    let rows = printed.kinds.iter().map(|quality| {
+        vec![
+            quality.kind.to_owned(),
+            quality.fitted.to_string(),
+            number(100.0 * quality.stiffness_max, 2),
+            number(100.0 * quality.stiffness_rms, 2),
+            quality.held.to_string(),
+            number(quality.gap_max, 2),
+            number(quality.gap_rms, 2),
+        ]
     });
     let state = match (printed.current, printed.written) {
         (true, _) => "is current",
-        (false, true) => "rewritten",
+        (false, true) => "rewritten: the errors above are those of the constants before",
         (false, false) => "is stale: run `cargo rig constants`",
     };
+    let columns = ["", "fitted", "stiffness max %", "RMS %", "held out", "gap max", "RMS"];
     format!(
-        "Error of the effective stiffness against the ring\n{}\n{} {state}\n",
-        plain(&["", "max %", "RMS %"], rows),
+        "Constants in this program against the ring; gap in parts of 1 % or 10 um\n{}\n{} {state}\n",
+        plain(&columns, rows),
         printed.path.display()
     )
 }

@@ -90,9 +90,15 @@ struct Figures {
     embedding_mm: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     mu_needed: Option<f64>,
-    /// The gap lies beyond the table of the firmware, which holds its end.
+    /// Stress increment of the first touch; the quasi-static ring has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    impact_stress_pa: Option<f64>,
+    /// Amplitude of the arm's first mode afterwards.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    vibration_um: Option<f64>,
+    /// The gap lies beyond the reduced model, which holds its end.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
-    at_table_end: bool,
+    at_model_end: bool,
 }
 
 /// What `--json` prints.
@@ -171,8 +177,14 @@ fn human(printed: &Printed<'_>) -> String {
         let mu = if mu < 100.0 { number(mu, 3) } else { "> 100".to_owned() };
         rows.push(("friction needed", mu, ""));
     }
-    let note = if figures.at_table_end {
-        "the gap lies beyond the firmware's table, which holds its end\n"
+    if let Some(stress) = figures.impact_stress_pa {
+        rows.push(("impact stress", number(stress, 0), "Pa"));
+    }
+    if let Some(vibration) = figures.vibration_um {
+        rows.push(("vibration of the arm", number(vibration, 2), "um"));
+    }
+    let note = if figures.at_model_end {
+        "the gap lies beyond the reduced model, which holds its end\n"
     } else {
         ""
     };

@@ -2,6 +2,7 @@
 //! of a crossing in closed form, and its history as that of an elastic ring of the
 //! effective stiffness.
 
+use interstage::model::felt::Kind;
 use interstage::model::formula::Formula;
 use interstage::supervise::Direction;
 
@@ -46,7 +47,9 @@ pub fn lift(case: &Case, drive: Drive, level: usize) -> Lift {
         Drive::Driven => (case.pressing_n(level), Some(case.load_n())),
     };
     let gap = formula.gap_mm(Direction::Deploy, case.speed_mm_s, force, load);
-    let stiffness = formula.k_inf * formula.stiffness(Direction::Deploy, case.speed_mm_s, gap);
+    let kind = Kind { direction: Direction::Deploy, driven: load.is_some() };
+    let folded = formula.fold(kind, load.unwrap_or(0.0));
+    let stiffness = formula.k_inf * formula.stiffness(kind, &folded, case.speed_mm_s, gap);
     let area = area_of_gap_mm2(&formula, gap);
     let collision = stiffness * formula.contact(gap).axial;
     Lift {
@@ -102,7 +105,9 @@ pub fn deployment(case: &Case, arms: &Arms) -> Result<Course, BalanceError> {
     let formula = Formula::new(&rig);
     let gap = mean_lift(case, Drive::Driven).gap_mm;
     let mut tread = RingParameters::of(&rig, COARSE.0);
-    tread.k_inf *= formula.stiffness(Direction::Deploy, case.speed_mm_s, gap);
+    let kind = Kind { direction: Direction::Deploy, driven: true };
+    let folded = formula.fold(kind, case.load_n());
+    tread.k_inf *= formula.stiffness(kind, &folded, case.speed_mm_s, gap);
     tread.k_0 = tread.k_inf;
     let height_mm = rig.rig.step_height_mm;
     let steps = rig.rig.step_positions_mm.iter();
@@ -124,7 +129,7 @@ pub fn deployment(case: &Case, arms: &Arms) -> Result<Course, BalanceError> {
             axial: Axial::Driven(case.load_n()),
         };
         let motion = Motion { wall: local, height_mm: height, turn_rad, dt_s };
-        let solved = balance.solve(&ring, motion)?;
+        let solved = balance.solve(&mut ring, motion)?;
         height = solved.height_mm;
         ring.commit(&Motion { height_mm: height, ..motion });
         // Nothing resists the rolling of an elastic wheel.

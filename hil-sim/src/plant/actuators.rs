@@ -27,6 +27,24 @@ impl DriveMotor {
     /// the wheel within a few milliseconds.
     #[must_use]
     pub fn step(&self, speed: f64, duty: f64, enabled: bool, load_n: f64, dt_s: f64) -> (f64, f64) {
+        self.step_keeping(self.keeps(dt_s), speed, duty, enabled, load_n, dt_s)
+    }
+
+    /// What is left after `dt_s` of a speed that is not the one it settles at.
+    pub(super) fn keeps(&self, dt_s: f64) -> f64 {
+        (-1000.0 / self.mass_kg * self.stall_n / self.no_load_mm_s * dt_s).exp()
+    }
+
+    /// [`DriveMotor::step`] with what [`DriveMotor::keeps`] says of it.
+    pub(super) fn step_keeping(
+        &self,
+        keeps: f64,
+        speed: f64,
+        duty: f64,
+        enabled: bool,
+        load_n: f64,
+        dt_s: f64,
+    ) -> (f64, f64) {
         if !enabled {
             let stopped = speed * (-dt_s / 0.003).exp();
             return (if stopped.abs() < 1e-3 { 0.0 } else { stopped }, 0.0);
@@ -41,9 +59,8 @@ impl DriveMotor {
         let resist = sense * against;
         let acceleration = 1000.0 / self.mass_kg;
         let next = if force.abs() < self.limit_n {
-            let rate = acceleration * self.stall_n / self.no_load_mm_s;
             let rest = self.no_load_mm_s * (duty - resist / self.stall_n);
-            rest + (speed - rest) * (-rate * dt_s).exp()
+            rest + (speed - rest) * keeps
         } else {
             speed + acceleration * (force - resist) * dt_s
         };
@@ -67,6 +84,8 @@ pub struct Pretightener {
     pipeline: VecDeque<f64>,
     /// Bounds of the screw as force at level 0, N.
     range: (f64, f64),
+    /// Step, s, and what the lag keeps over it.
+    keeps: (f64, f64),
 }
 
 impl Pretightener {
@@ -88,6 +107,7 @@ impl Pretightener {
             rate: 0.0,
             pipeline: std::iter::repeat_n(0.0, depth).collect(),
             range,
+            keeps: (dt_s, (-dt_s / lag).exp()),
         }
     }
 
@@ -102,7 +122,10 @@ impl Pretightener {
         }
         // Exact for the lag under a held command.
         let target = delayed * self.slew;
-        let keep = (-dt_s / self.lag).exp();
+        if self.keeps.0 != dt_s {
+            self.keeps = (dt_s, (-dt_s / self.lag).exp());
+        }
+        let keep = self.keeps.1;
         let moved = target * dt_s + (self.rate - target) * self.lag * (1.0 - keep);
         self.rate = target + (self.rate - target) * keep;
         let next = self.seat + moved;

@@ -21,12 +21,26 @@ impl Arm {
     /// Radial force that an axial thrust adds, per unit of thrust.
     #[must_use]
     pub fn wedge(&self, radius_mm: f64) -> f64 {
-        self.coupling * self.angle(radius_mm).tan()
+        // Tangent of the angle from its sine.
+        let sine = ((radius_mm - self.pivot_mm) / self.length_mm).clamp(-1.0, 1.0);
+        self.coupling * sine / (1.0 - sine * sine).sqrt()
     }
 }
 
-/// One mode of the arm: a damped oscillator, integrated exactly for a force held
-/// over the step.
+/// A sinusoidal force over a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ripple {
+    /// Amplitude, N.
+    pub amplitude_n: f64,
+    /// Circular frequency, rad/s; signed.
+    pub omega: f64,
+    /// Sine and cosine of the phase at the step's start.
+    pub from: (f64, f64),
+    /// Sine and cosine of the phase at its end.
+    pub to: (f64, f64),
+}
+
+/// One mode of the arm: a damped oscillator, integrated exactly for a sinusoidal force.
 #[derive(Clone, Copy, Debug)]
 pub struct Mode {
     /// Circular frequency, rad/s.
@@ -41,7 +55,7 @@ pub struct Mode {
     rate: f64,
     /// Step that the propagator is made for, s.
     step: f64,
-    /// Propagator of (deflection - static, rate).
+    /// Propagator of the free motion (deflection, rate).
     propagator: [[f64; 2]; 2],
 }
 
@@ -61,16 +75,28 @@ impl Mode {
         }
     }
 
-    /// Advances by `dt_s` under `force_n`, held over the step.
-    pub fn step(&mut self, force_n: f64, dt_s: f64) {
+    /// Advances by `dt_s` under `force`: what is not the steady response to it dies away
+    /// freely. With x = Omega/omega the response to sin is
+    /// ((1 - x^2) sin - 2 zeta x cos) / ((1 - x^2)^2 + (2 zeta x)^2) of the static one.
+    pub fn step(&mut self, force: &Ripple, dt_s: f64) {
+        if force.amplitude_n == 0.0 && self.deflection == 0.0 && self.rate == 0.0 {
+            return;
+        }
         if self.step != dt_s {
             self.prepare(dt_s);
         }
-        let rest = force_n / self.stiffness;
-        let (u, v) = (self.deflection - rest, self.rate);
+        let x = force.omega / self.omega;
+        let (spring, damper) = (1.0 - x * x, 2.0 * self.zeta * x);
+        let each = force.amplitude_n / (self.stiffness * (spring * spring + damper * damper));
+        let response = |(sin, cos): (f64, f64)| {
+            let deflection = each * (spring * sin - damper * cos);
+            (deflection, each * force.omega * (spring * cos + damper * sin))
+        };
+        let (before, after) = (response(force.from), response(force.to));
+        let (u, v) = (self.deflection - before.0, self.rate - before.1);
         let m = &self.propagator;
-        self.deflection = rest + m[0][0] * u + m[0][1] * v;
-        self.rate = m[1][0] * u + m[1][1] * v;
+        self.deflection = after.0 + m[0][0] * u + m[0][1] * v;
+        self.rate = after.1 + m[1][0] * u + m[1][1] * v;
     }
 
     /// Deflection, mm.
@@ -103,18 +129,42 @@ impl Mode {
 mod tests {
     use super::*;
 
+    /// A force of this amplitude and circular frequency from `t` to `t + dt`.
+    fn ripple(amplitude_n: f64, omega: f64, phase: f64, t: f64, dt: f64) -> Ripple {
+        let at = |t: f64| (omega * t + phase).sin_cos();
+        Ripple { amplitude_n, omega, from: at(t), to: at(t + dt) }
+    }
+
     #[test]
     fn a_step_force_rings_down_to_its_static_deflection() {
         let mut mode = Mode::new(276.0, 0.02, 0.2);
         let rest = 5.0 / (0.2 * (std::f64::consts::TAU * 276.0).powi(2) * 1e-3);
+        // A sine of no frequency at its crest.
+        let held = ripple(5.0, 0.0, std::f64::consts::FRAC_PI_2, 0.0, 2.5e-4);
         let mut peak = 0.0f64;
         for _ in 0..4000 {
-            mode.step(5.0, 2.5e-4);
+            mode.step(&held, 2.5e-4);
             peak = peak.max(mode.deflection_mm());
         }
         let overshoot = 1.0 + (-std::f64::consts::PI * 0.02 / (1.0f64 - 4e-4).sqrt()).exp();
         assert!((peak / rest - overshoot).abs() < 0.02, "{}", peak / rest);
         assert!((mode.deflection_mm() / rest - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_step_does_not_matter() {
+        for omega in [0.0, 40.0, -1020.0, 1734.0, 1e5] {
+            let [coarse, fine] = [1usize, 50].map(|parts| {
+                let mut mode = Mode::new(276.0, 0.02, 0.2);
+                let dt = 1e-3 / parts as f64;
+                for i in 0..100 * parts {
+                    mode.step(&ripple(0.5, omega, 0.3, i as f64 * dt, dt), dt);
+                }
+                (mode.deflection_mm(), mode.rate)
+            });
+            assert!((coarse.0 - fine.0).abs() < 1e-12, "{coarse:?} {fine:?}");
+            assert!((coarse.1 - fine.1).abs() < 1e-8, "{coarse:?} {fine:?}");
+        }
     }
 
     #[test]

@@ -58,6 +58,9 @@ pub struct BalanceError {
     pub height_mm: f64,
 }
 
+/// Part of the preload that is left unbalanced at most: a height of 1e-8 mm.
+const TOLERANCE: f64 = 3e-8;
+
 impl Balance {
     /// Residual of the radial balance, N, its slope, N/mm, and the utilisation, from
     /// the contact's cosine and sine sums, N, and their derivatives by height, N/mm.
@@ -91,29 +94,40 @@ impl Balance {
     ///
     /// # Errors
     /// [`BalanceError`] if the preload cannot be carried.
-    pub fn solve(&self, ring: &Ring, motion: Motion) -> Result<Solved, BalanceError> {
+    pub fn solve(&self, ring: &mut Ring, motion: Motion) -> Result<Solved, BalanceError> {
         let radius = ring.parameters().radius_mm;
         let (mut low, mut high) = (0.2 * radius, 1.1 * radius + motion.wall.rise_mm);
-        let tolerance = 1e-9 * self.preload_n.max(1.0);
+        let scale = self.preload_n.max(1.0);
+        let tolerance = TOLERANCE * scale;
         let mut height = motion.height_mm.clamp(low, high);
-        let mut best = Solved { height_mm: height, contact: Contact::default(), utilisation: 0.0 };
-        let mut best_residual = f64::INFINITY;
+        let (mut best, mut best_residual) = (None, f64::INFINITY);
+        // So far off, the next height will not balance either: only what leads on from it
+        // is computed.
+        let mut far = true;
         for _ in 0..80 {
-            let contact = ring.trial(&Motion { height_mm: height, ..motion });
-            let forces = (contact.cosine_n, contact.sine_n);
-            let (residual, slope, utilisation) =
-                self.residual(forces, contact.slope, height - radius);
-            if residual.abs() < best_residual {
+            let at = Motion { height_mm: height, ..motion };
+            let whole = if far { None } else { Some(ring.trial(&at)) };
+            let (forces, slopes) = match &whole {
+                Some(contact) => ((contact.cosine_n, contact.sine_n), contact.slope),
+                None => ring.forces(&at),
+            };
+            let (residual, slope, utilisation) = self.residual(forces, slopes, height - radius);
+            if let Some(contact) = whole
+                && residual.abs() < best_residual
+            {
                 best_residual = residual.abs();
-                best = Solved { height_mm: height, contact, utilisation };
+                best = Some(Solved { height_mm: height, contact, utilisation });
             }
-            if residual.abs() <= tolerance {
-                return Ok(best);
-            }
-            // Closed in on a kink, or on an end without a balance.
-            if high - low < 1e-13 * radius {
+            // Carried; or closed in on a kink, or on an end without a balance.
+            let closed = high - low < 1e-13 * radius;
+            if !far && (residual.abs() <= tolerance || closed) {
                 break;
             }
+            if far && (residual.abs() <= tolerance || closed) {
+                far = false;
+                continue;
+            }
+            far = residual.abs() > 1e-4 * scale;
             // Too much force: the centre must stand higher.
             if residual > 0.0 {
                 low = height;
@@ -127,13 +141,10 @@ impl Balance {
                 0.5 * (low + high)
             };
         }
-        if best_residual <= 1e-3 * self.preload_n.max(1.0) {
-            return Ok(best);
-        }
-        Err(BalanceError {
+        best.filter(|_| best_residual <= 1e-3 * scale).ok_or(BalanceError {
             preload_n: self.preload_n,
             residual_n: best_residual,
-            height_mm: best.height_mm,
+            height_mm: best.map_or(height, |solved| solved.height_mm),
         })
     }
 }
@@ -159,8 +170,8 @@ mod tests {
     }
 
     fn solve(preload_n: f64, spring_n_per_mm: f64, axial: Axial) -> Solved {
-        let (ring, motion) = climbing();
-        Balance { preload_n, spring_n_per_mm, axial }.solve(&ring, motion).unwrap()
+        let (mut ring, motion) = climbing();
+        Balance { preload_n, spring_n_per_mm, axial }.solve(&mut ring, motion).unwrap()
     }
 
     #[test]
@@ -199,9 +210,9 @@ mod tests {
 
     #[test]
     fn a_preload_that_nothing_carries_is_told() {
-        let (ring, motion) = climbing();
+        let (mut ring, motion) = climbing();
         let balance = Balance { preload_n: 1e9, spring_n_per_mm: 0.0, axial: Axial::Pushed };
-        let error = balance.solve(&ring, motion).unwrap_err();
+        let error = balance.solve(&mut ring, motion).unwrap_err();
         assert_eq!(error.preload_n, 1e9);
         assert!(error.to_string().starts_with("radial balance: no wheel height carries"));
     }

@@ -78,7 +78,7 @@ pub fn cross(case: &CrossingCase) -> Result<CrossingResult, BalanceError> {
         height += base - local.base_mm;
         base = local.base_mm;
         let motion = Motion { wall: local, height_mm: height, turn_rad: dx / radius, dt_s: dt };
-        let solved = balance.solve(&ring, motion)?;
+        let solved = balance.solve(&mut ring, motion)?;
         height = solved.height_mm;
         ring.commit(&Motion { height_mm: height, ..motion });
         let absolute = height + base;

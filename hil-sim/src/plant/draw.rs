@@ -11,8 +11,9 @@ use super::ring::RingParameters;
 use super::wall::{Step, Wall};
 use crate::scenario::{Noise, Scenario};
 
-/// Elements of the ring in a deployment: the gap is within 0.1 % of a ring eight
-/// times as fine.
+/// Elements of the ring in a deployment. With the usual stride the gap is within 0.2 %,
+/// the largest force within 0.3 % of a ring twenty times as fine. Two thirds of them keep
+/// the gap as well, but not the friction at which a sliding wheel still climbs.
 pub const ELEMENTS: usize = 1440;
 
 /// Room between each end of the travel and its stop, mm: the 85 mm of the sliding

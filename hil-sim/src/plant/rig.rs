@@ -1,19 +1,24 @@
 //! The whole rig, a millisecond at a time.
 
 mod contact;
+mod phases;
 mod traction;
 
+use std::f64::consts::TAU;
+
 use super::actuators::Pretightener;
-use super::arm::Mode;
+use super::arm::{Mode, Ripple};
 use super::balance::BalanceError;
 use super::draw::PlantParameters;
 use super::ledger::Ledger;
 use super::ring::Ring;
-use super::rolling;
+use super::rolling::{self, Steady};
 use contact::Calm;
 use traction::Gait;
 
-/// Most ring steps in a call: 5 mm of way at the usual stride.
+pub use phases::{PHASES, Phase, PhaseWork};
+
+/// Most ring steps in a call: 10 mm of way at the usual stride.
 const MOST_STRIDES: f64 = 256.0;
 
 /// How finely the rig is computed.
@@ -27,7 +32,7 @@ pub struct Resolution {
 
 impl Default for Resolution {
     fn default() -> Self {
-        Self { stride_mm: 0.02, always_awake: false }
+        Self { stride_mm: 0.04, always_awake: false }
     }
 }
 
@@ -120,10 +125,17 @@ pub struct VirtualRig {
     parameters: PlantParameters,
     resolution: Resolution,
     ring: Ring,
+    steady: Steady,
     awake: bool,
     calm: Calm,
     preload: Pretightener,
     modes: Vec<Mode>,
+    /// Sine and cosine of the ripple's phase.
+    ripple_phase: (f64, f64),
+    /// Elastic force of the modes, their mean, N.
+    vibration_n: f64,
+    /// Step, s, and what the drive keeps of its speed over it.
+    keeps: (f64, f64),
     truth: Truth,
     ledger: Ledger,
     /// Sliding bodily over the wall.
@@ -134,12 +146,21 @@ pub struct VirtualRig {
     rolled_mm_s: f64,
     /// Base of the wall under the centre in the last stride, mm.
     base_mm: f64,
+    /// What was computed in each phase.
+    phases: [PhaseWork; PHASES.len()],
+    phase: Phase,
     /// Contact forces of the last stride: normal, cosine and sine sums, N.
     forces: (f64, f64, f64),
     /// Acceleration of the tread, mm/s^2.
     acceleration: f64,
     /// Rise of the centre per axial way in the last stride.
     slope: f64,
+    /// The part of it that no change of load explains.
+    drift: f64,
+    /// Rise that no change of load explains while the wheel stands, mm/s.
+    creep: f64,
+    /// Derivatives of the resolved contact's cosine and sine sums by the height, N/mm.
+    stiffness: Option<(f64, f64)>,
 }
 
 impl VirtualRig {
@@ -167,11 +188,15 @@ impl VirtualRig {
         let mut rig = Self {
             resolution: Resolution::default(),
             ring: Ring::new(parameters.ring),
+            steady: Steady::default(),
             ledger: Ledger::new(parameters.wall.steps().to_vec(), radius),
             awake: false,
             calm: Calm { tread_mm_s: 0.0, pressing_n: preload_n, for_s: f64::INFINITY },
             preload,
             modes,
+            ripple_phase: (0.0, 1.0),
+            vibration_n: 0.0,
+            keeps: (0.0, 1.0),
             truth: Truth {
                 position_mm,
                 height_mm: local.base_mm + rest.height_mm,
@@ -183,9 +208,14 @@ impl VirtualRig {
             parked: true,
             rolled_mm_s: 0.0,
             base_mm: local.base_mm,
+            phases: Default::default(),
+            phase: Phase::Smooth,
             forces: (rest.normal_n, rest.cosine_n, 0.0),
             acceleration: 0.0,
             slope: 0.0,
+            drift: 0.0,
+            creep: 0.0,
+            stiffness: None,
             parameters,
         };
         rig.derive();
@@ -196,6 +226,14 @@ impl VirtualRig {
     #[must_use]
     pub fn with_resolution(mut self, resolution: Resolution) -> Self {
         self.resolution = resolution;
+        self
+    }
+
+    /// The same rig with every ring element visited that faces the wall, in reach or not.
+    /// No bit of any result depends on it: it proves that what is skipped is not needed.
+    #[must_use]
+    pub fn visiting_all(mut self) -> Self {
+        self.ring = self.ring.whole(true);
         self
     }
 
@@ -227,9 +265,11 @@ impl VirtualRig {
         self.check()?;
         let way = self.truth.tread_mm_s.abs().max(self.truth.speed_mm_s.abs()) * dt_s;
         let parts = (way / self.resolution.stride_mm).ceil().clamp(1.0, MOST_STRIDES);
+        let before = self.work();
         for _ in 0..parts as usize {
             self.roll(dt_s / parts)?;
         }
+        self.count(&before, dt_s);
         self.vibrate(dt_s);
         self.truth.time_s += dt_s;
         self.derive();
@@ -241,7 +281,11 @@ impl VirtualRig {
         let before = self.truth.tread_mm_s;
         let load = self.drive_load(drives.drive);
         let drive = &self.parameters.drive;
-        let (after, force) = drive.step(before, drives.drive, drives.drive_on, load, dt_s);
+        if self.keeps.0 != dt_s {
+            self.keeps = (dt_s, drive.keeps(dt_s));
+        }
+        let (after, force) =
+            drive.step_keeping(self.keeps.1, before, drives.drive, drives.drive_on, load, dt_s);
         self.truth.tread_mm_s = after;
         self.truth.work_mj += (force * 0.5 * (before + after) * dt_s).max(0.0);
         self.acceleration = (after - before) / dt_s;
@@ -273,7 +317,7 @@ impl VirtualRig {
         self.truth.rotation_rad += turn;
         let local = self.parameters.wall.local(position);
         let settled = self.settled(&local, axial, dt_s);
-        if self.resolution.always_awake || !settled || self.near_step(&local) {
+        if self.resolution.always_awake || !settled {
             if !self.awake {
                 self.wake(before);
             }
@@ -286,20 +330,24 @@ impl VirtualRig {
 
     /// Modes of the arm, forced by the torque ripple of motor and gearbox.
     fn vibrate(&mut self, dt_s: f64) {
-        const PARTS: usize = 4;
         let (amplitude, pitch) = self.parameters.ripple;
         let spin = self.truth.tread_mm_s;
-        let part = dt_s / PARTS as f64;
         let tread = self.truth.rotation_rad * self.parameters.ring.radius_mm;
-        for index in 0..PARTS {
-            let back = (PARTS - 1 - index) as f64 * part;
-            let phase = (tread - spin * back) / pitch * std::f64::consts::TAU;
-            let force = if spin == 0.0 { 0.0 } else { amplitude * phase.sin() };
-            for mode in &mut self.modes {
-                mode.step(force, part);
-            }
+        let to = (TAU * (tread / pitch).fract()).sin_cos();
+        let force = Ripple {
+            amplitude_n: if spin == 0.0 { 0.0 } else { amplitude },
+            omega: TAU * spin / pitch,
+            from: std::mem::replace(&mut self.ripple_phase, to),
+            to,
+        };
+        let (mut deflection, mut sum) = (0.0, 0.0);
+        for mode in &mut self.modes {
+            mode.step(&force, dt_s);
+            deflection += mode.deflection_mm();
+            sum += mode.force_n();
         }
-        self.truth.vibration_mm = self.modes.iter().map(Mode::deflection_mm).sum();
+        self.truth.vibration_mm = deflection;
+        self.vibration_n = sum / self.modes.len().max(1) as f64;
     }
 
     /// Preload of spring and screw at the present height.
@@ -316,18 +364,17 @@ impl VirtualRig {
         let radius = self.parameters.ring.radius_mm;
         let local = self.parameters.wall.local(truth.position_mm);
         truth.root_clearance_mm = (local.ahead_mm < radius)
-            .then(|| local.ahead_mm.hypot(truth.height_mm - local.base_mm) - radius);
+            .then(|| away(local.ahead_mm, truth.height_mm - local.base_mm) - radius);
         self.truth.preload_n = self.preload_now();
     }
 
     fn check(&self) -> Result<(), PlantError> {
         let t = &self.truth;
-        let vibration = self.modes.iter().map(Mode::force_n).sum();
         // Causes first, so that the name is that of the origin.
         let states = [
             ("tread speed", t.tread_mm_s),
             ("screw", self.preload.seat_n()),
-            ("vibration", vibration),
+            ("vibration", self.vibration_n),
             ("speed", t.speed_mm_s),
             ("position", t.position_mm),
             ("rotation", t.rotation_rad),
@@ -336,9 +383,18 @@ impl VirtualRig {
             ("slip", t.slip_mm),
             ("work", t.work_mj + t.wear_mj),
         ];
+        // One look at all of them: none finite makes the other finite again.
+        if states.iter().map(|(_, value)| value * 0.0).sum::<f64>() == 0.0 {
+            return Ok(());
+        }
         match states.into_iter().find(|(_, value)| !value.is_finite()) {
             Some((name, _)) => Err(PlantError::NotFinite { time_s: t.time_s, name }),
             None => Ok(()),
         }
     }
+}
+
+/// Length of the hypotenuse, for lengths far from the ends of the range.
+fn away(x: f64, y: f64) -> f64 {
+    (x * x + y * y).sqrt()
 }

@@ -4,10 +4,23 @@
 //! carries p = k_inf delta + (k_0 - k_inf)(delta - q), q' = (delta - q)/tau,
 //! p >= 0: the three-parameter solid per area. Elements turn with the wheel.
 //! Within a step delta runs linearly, and q is integrated exactly for it.
+//!
+//! Only elements that can touch are visited ([`window`]), four side by side
+//! ([`sweep`]); the memory of the others decays unvisited, and is brought up to date in
+//! closed form when they come back.
+
+mod law;
+mod sweep;
+mod window;
+
+use std::f64::consts::TAU;
 
 use interstage::rig::Rig;
 
-use super::wall::{Edge, Facet, LocalWall};
+use super::wall::LocalWall;
+use law::Law;
+use sweep::{Block, Lanes, Place, Sums};
+use window::{LANES, WIDEST, Window};
 
 /// Wheel and rubber.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,7 +77,8 @@ pub struct Contact {
     /// Arc in contact times width, mm^2.
     pub area_mm2: f64,
     /// Largest pressure on the floor before it is cut off at zero, N/mm^2; where no
-    /// element reaches the floor, minus k_inf times the clearance.
+    /// element reaches the floor, minus what a fresh one would carry as deep in it as it
+    /// is away, so that the instant of a touch-down lies on a straight line.
     pub floor_pressure: f64,
     /// Derivatives of `cosine_n` and `sine_n` by the centre's height, N/mm.
     pub slope: (f64, f64),
@@ -78,27 +92,74 @@ impl Contact {
     }
 }
 
+/// What a ring has been made to compute.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Work {
+    /// Steps.
+    pub strides: u64,
+    /// Heights tried.
+    pub iterations: u64,
+    /// Elements visited, once for every height tried.
+    pub elements: u64,
+}
+
+impl std::ops::AddAssign for Work {
+    fn add_assign(&mut self, other: Self) {
+        self.strides += other.strides;
+        self.iterations += other.iterations;
+        self.elements += other.elements;
+    }
+}
+
+impl std::ops::Sub for Work {
+    type Output = Self;
+
+    fn sub(self, before: Self) -> Self {
+        Self {
+            strides: self.strides - before.strides,
+            iterations: self.iterations - before.iterations,
+            elements: self.elements - before.elements,
+        }
+    }
+}
+
 /// The ring's elements and how far the wheel has turned.
 #[derive(Clone, Debug)]
 pub struct Ring {
     parameters: RingParameters,
-    cos: Vec<f64>,
-    sin: Vec<f64>,
-    elements: Vec<Element>,
+    /// Sine and cosine of the elements' angles, by blocks; nought beyond the last.
+    sin: Vec<Lanes>,
+    cos: Vec<Lanes>,
+    /// Internal displacement and depth, mm.
+    q: Vec<Lanes>,
+    depth: Vec<Lanes>,
+    /// When a block that is not active was last brought up to date, s.
+    at: Vec<f64>,
+    /// Blocks that are up to date.
+    active: Window,
     /// Angle turned since the start, rad; positive rolls forwards.
     rotation: f64,
     /// Time of the last step's end, s.
     time: f64,
+    law: Law,
+    ready: Ready,
+    whole: bool,
+    work: Work,
 }
 
-#[derive(Clone, Copy, Debug, Default)]
-struct Element {
-    /// Internal displacement, mm.
-    q: f64,
-    /// Depth at `at`, mm.
-    depth: f64,
-    /// When the two were last brought up to date, s.
-    at: f64,
+/// The step that the blocks are laid out for.
+#[derive(Clone, Debug, Default)]
+struct Ready {
+    /// Wall, turn and length of the step.
+    of: Option<(LocalWall, f64, f64)>,
+    /// Least height that the window allows, mm.
+    lowest: f64,
+    window: Window,
+    blocks: Vec<Block>,
+    /// Where the blocks are kept.
+    indices: Vec<usize>,
+    rise: Option<f64>,
+    edge: bool,
 }
 
 /// One trial step: where the ring is taken to.
@@ -114,20 +175,48 @@ pub struct Motion {
     pub dt_s: f64,
 }
 
+/// How far below the height asked for the window still holds, per radius.
+const SLACK: f64 = 5e-4;
+
+/// Secant of elements that look away from the wall: none touches.
+const AWAY: f64 = 1e9;
+
 impl Ring {
     /// A ring at rest and unloaded.
     #[must_use]
     pub fn new(parameters: RingParameters) -> Self {
-        let pitch = std::f64::consts::TAU / parameters.elements as f64;
-        let angles = (0..parameters.elements).map(|i| i as f64 * pitch);
+        let count = parameters.elements;
+        let blocks = count.div_ceil(LANES);
+        let pitch = TAU / count as f64;
+        let lanes = |of: fn(f64) -> f64| -> Vec<Lanes> {
+            let at = |i: usize| if i < count { of(i as f64 * pitch) } else { 0.0 };
+            (0..blocks)
+                .map(|block| std::array::from_fn(|lane| at(block * LANES + lane)).into())
+                .collect()
+        };
         Self {
-            parameters,
-            cos: angles.clone().map(f64::cos).collect(),
-            sin: angles.map(f64::sin).collect(),
-            elements: vec![Element::default(); parameters.elements],
+            sin: lanes(f64::sin),
+            cos: lanes(f64::cos),
+            q: vec![Lanes::ZERO; blocks],
+            depth: vec![Lanes::ZERO; blocks],
+            at: vec![0.0; blocks],
+            active: Window::default(),
             rotation: 0.0,
             time: 0.0,
+            law: Law::new(&parameters, 0.0),
+            ready: Ready::default(),
+            whole: false,
+            work: Work::default(),
+            parameters,
         }
+    }
+
+    /// The same ring, visiting every element that faces the wall, in reach or not: for
+    /// proof that the others change nothing.
+    #[must_use]
+    pub fn whole(mut self, whole: bool) -> Self {
+        self.whole = whole;
+        self
     }
 
     /// Wheel and rubber.
@@ -136,186 +225,226 @@ impl Ring {
         &self.parameters
     }
 
-    /// Contact after `motion`, leaving the ring as it is.
+    /// What has been computed so far.
     #[must_use]
-    pub fn trial(&self, motion: &Motion) -> Contact {
-        let mut contact = Contact::default();
-        let law = Law::new(&self.parameters, motion.dt_s);
-        let mut floor_pressure = f64::NEG_INFINITY;
-        let edge = motion.wall.edge(motion.height_mm);
-        let patch = self.pitch() * self.parameters.radius_mm * self.parameters.width_mm;
-        self.sweep(motion, |index, sin, cos| {
-            let (depth, facet, covered) = self.meets(motion, &edge, sin, cos);
-            if depth <= 0.0 {
-                return;
-            }
-            let element = &self.elements[index];
-            let (q, before) = element.at_start(self.time, &law);
-            let pressure = law.pressure(depth, law.advance(q, before, depth));
-            if facet == Facet::Floor {
-                floor_pressure = floor_pressure.max(pressure);
-            }
-            if pressure <= 0.0 {
-                return;
-            }
-            let patch = patch * covered;
-            let force = pressure * patch;
-            contact.normal_n += force;
-            contact.cosine_n += force * cos;
-            contact.sine_n += force * sin;
-            contact.area_mm2 += patch;
-            if facet == Facet::Floor {
-                contact.floor_n += force * cos;
-            } else {
-                contact.step_cosine_n += force * cos;
-                contact.step_sine_n += force * sin;
-            }
-            let slope = -law.tangent * motion.wall.slope(motion.height_mm, sin, cos) * patch;
-            contact.slope.0 += slope * cos;
-            contact.slope.1 += slope * sin;
-        });
-        contact.depth_mm = self.parameters.radius_mm - motion.wall.nearest(motion.height_mm);
-        contact.floor_pressure = if floor_pressure.is_finite() {
-            floor_pressure
+    pub fn work(&self) -> Work {
+        self.work
+    }
+
+    /// Contact after `motion`, leaving the elements as they are.
+    #[must_use]
+    pub fn trial(&mut self, motion: &Motion) -> Contact {
+        self.prepare(motion);
+        self.count();
+        let place = self.place(motion);
+        let p = &self.parameters;
+        let totals = sweep::totals(&self.ready.blocks, &place, &self.law);
+        let patch = self.patch();
+        let floor_pressure = if totals.floor_pressure > f64::NEG_INFINITY {
+            totals.floor_pressure
         } else {
-            -self.parameters.k_inf * (motion.height_mm - self.parameters.radius_mm).abs()
+            -self.law.tangent * (motion.height_mm - p.radius_mm).abs()
         };
-        contact
+        Contact {
+            normal_n: patch * totals.normal,
+            cosine_n: patch * totals.sums.forces.0,
+            sine_n: patch * totals.sums.forces.1,
+            floor_n: patch * totals.floor.0,
+            step_cosine_n: patch * totals.step.0,
+            step_sine_n: patch * totals.step.1,
+            depth_mm: p.radius_mm - motion.wall.nearest(motion.height_mm),
+            area_mm2: patch * totals.count,
+            floor_pressure,
+            slope: (patch * totals.sums.slope.0, patch * totals.sums.slope.1),
+        }
+    }
+
+    /// Cosine and sine sums after `motion`, N, and their derivatives by the height, N/mm:
+    /// the part of [`Ring::trial`] that a balance needs.
+    pub(super) fn forces(&mut self, motion: &Motion) -> ((f64, f64), (f64, f64)) {
+        self.prepare(motion);
+        self.count();
+        let patch = self.patch();
+        let Sums { forces: (c, s), slope: (dc, ds) } =
+            sweep::sums(&self.ready.blocks, &self.place(motion), &self.law);
+        ((patch * c, patch * s), (patch * dc, patch * ds))
     }
 
     /// Takes the ring through `motion`.
     pub fn commit(&mut self, motion: &Motion) {
-        let law = Law::new(&self.parameters, motion.dt_s);
+        self.prepare(motion);
+        let place = self.place(motion);
         let end = self.time + motion.dt_s;
-        let edge = motion.wall.edge(motion.height_mm);
-        let mut touched = Vec::with_capacity(512);
-        self.sweep(motion, |index, sin, cos| {
-            let depth = self.meets(motion, &edge, sin, cos).0.max(0.0);
-            let element = &self.elements[index];
-            if depth > 0.0 || element.depth > 0.0 {
-                let (q, before) = element.at_start(self.time, &law);
-                touched.push((index, law.advance(q, before, depth), depth));
-            }
+        let Self { ready, active, law, q, depth, at, .. } = self;
+        let count = q.len() as i64;
+        sweep::advance(&ready.blocks, &place, law, |number, depths, qs| {
+            let index = ready.indices[number];
+            (depth[index], q[index]) = (depths, qs);
         });
-        for (index, q, depth) in touched {
-            self.elements[index] = Element { q, depth, at: end };
+        // Out of reach: let go of within this step.
+        for number in active.blocks().filter(|number| !ready.window.contains(*number)) {
+            let index = number.rem_euclid(count) as usize;
+            q[index] =
+                Lanes::splat(law.keep) * q[index] + Lanes::splat(law.from_old) * depth[index];
+            depth[index] = Lanes::ZERO;
+            at[index] = end;
         }
+        self.active = self.ready.window;
+        self.ready.of = None;
         self.time = end;
         self.rotation += motion.turn_rad;
+        self.work.strides += 1;
     }
 
     /// Puts the ring into the state that `profile` gives for an angle from straight
-    /// down (rad): depth and internal displacement, both mm, at time `time_s`.
-    pub fn seed(&mut self, time_s: f64, profile: impl Fn(f64) -> (f64, f64)) {
-        let pitch = self.pitch();
-        for (index, element) in self.elements.iter_mut().enumerate() {
-            let angle = index as f64 * pitch - self.rotation;
-            let angle = angle - std::f64::consts::TAU * (angle / std::f64::consts::TAU).round();
-            let (depth, q) = profile(angle);
-            *element = Element { q, depth, at: time_s };
-        }
+    /// down (rad) of at most `within_rad`: depth and internal displacement, both mm, at
+    /// time `time_s`. Elsewhere it is unloaded and fresh.
+    pub fn seed(&mut self, time_s: f64, within_rad: f64, profile: impl Fn(f64) -> (f64, f64)) {
+        self.q.fill(Lanes::ZERO);
+        self.depth.fill(Lanes::ZERO);
+        self.at.fill(time_s);
+        self.rotation = 0.0;
         self.time = time_s;
-    }
-
-    /// Depth of an element, what it meets, and the part of its width that does.
-    #[inline]
-    fn meets(&self, motion: &Motion, edge: &Edge, sin: f64, cos: f64) -> (f64, Facet, f64) {
-        let covered = edge.covered(sin, cos, self.pitch());
-        let (distance, facet) = if covered > 0.0 && covered < 1.0 {
-            (motion.height_mm / cos, Facet::Floor)
-        } else {
-            motion.wall.ray(motion.height_mm, sin, cos)
-        };
-        (self.parameters.radius_mm - distance, facet, covered)
+        self.active = Window::default();
+        let (first, last) = self.span(0.0, -within_rad, within_rad);
+        self.active.add(first, last);
+        self.active.limit(self.q.len() as i64);
+        let pitch = self.pitch();
+        for number in self.active.blocks() {
+            let index = number.rem_euclid(self.q.len() as i64) as usize;
+            let (mut depths, mut qs) = ([0.0; LANES], [0.0; LANES]);
+            for lane in 0..LANES {
+                let element = index * LANES + lane;
+                if element < self.parameters.elements {
+                    let angle = element as f64 * pitch;
+                    let angle = angle - TAU * (angle / TAU).round();
+                    (depths[lane], qs[lane]) = profile(angle);
+                }
+            }
+            (self.depth[index], self.q[index]) = (depths.into(), qs.into());
+        }
+        self.ready.of = None;
     }
 
     /// Angle between two elements, rad.
     fn pitch(&self) -> f64 {
-        std::f64::consts::TAU / self.parameters.elements as f64
+        TAU / self.parameters.elements as f64
     }
 
-    /// Calls `visit` with index, sine and cosine of every element within reach of
-    /// the wall after the turn.
-    fn sweep(&self, motion: &Motion, mut visit: impl FnMut(usize, f64, f64)) {
-        let (count, pitch) = (self.parameters.elements, self.pitch());
-        let turned = self.rotation + motion.turn_rad;
-        let (ahead, behind) = self.reach(motion);
-        let first = ((turned - behind) / pitch).ceil() as i64;
-        let last = ((turned + ahead) / pitch).floor() as i64;
-        let (turned_sin, turned_cos) = turned.sin_cos();
-        for element in first..=last {
-            let index = element.rem_euclid(count as i64) as usize;
-            let (sin, cos) = (self.sin[index], self.cos[index]);
-            visit(index, sin * turned_cos - cos * turned_sin, cos * turned_cos + sin * turned_sin);
+    /// Area of an element, mm^2.
+    fn patch(&self) -> f64 {
+        self.pitch() * self.parameters.radius_mm * self.parameters.width_mm
+    }
+
+    fn count(&mut self) {
+        self.work.iterations += 1;
+        self.work.elements += (self.ready.blocks.len() * LANES) as u64;
+    }
+
+    fn place(&self, motion: &Motion) -> Place {
+        let (y, wall) = (motion.height_mm, &motion.wall);
+        Place {
+            radius: self.parameters.radius_mm,
+            height: y,
+            rise: self.ready.rise,
+            edge: self.ready.edge.then(|| (wall.edge(y), wall.drop_mm, self.pitch())),
         }
     }
 
-    /// Half-angles within which an element can touch, or touched a step ago, rad.
-    fn reach(&self, motion: &Motion) -> (f64, f64) {
-        let radius = self.parameters.radius_mm;
-        let half = |height: f64| (height / radius).clamp(-1.0, 1.0).acos();
-        let floor = half(motion.height_mm);
-        let margin = motion.turn_rad.abs() + 0.02;
-        let ahead = if motion.wall.ahead_mm < radius {
-            floor.max(half(motion.height_mm - motion.wall.rise_mm))
-        } else {
-            floor
+    /// Blocks between two angles from straight down, rad, once the wheel has turned.
+    fn span(&self, turned: f64, from: f64, to: f64) -> (i64, i64) {
+        let pitch = self.pitch();
+        let (count, blocks) = (self.parameters.elements as i64, self.q.len() as i64);
+        // Blocks are numbered on over the turns, the last of each may not be full.
+        let block = |element: i64| {
+            element.div_euclid(count) * blocks + element.rem_euclid(count) / LANES as i64
         };
-        ((ahead + margin).min(1.5), (floor + margin).min(1.5))
+        let (first, last) = ((turned + from) / pitch, (turned + to) / pitch);
+        (block(first.ceil() as i64), block(last.floor() as i64))
     }
-}
 
-impl Element {
-    /// Internal displacement and depth at the start of the step that begins at `time`.
-    #[inline]
-    fn at_start(&self, time: f64, law: &Law) -> (f64, f64) {
-        let idle = time - self.at;
-        if idle <= 0.0 || self.q == 0.0 {
-            (self.q, self.depth)
+    /// Lays the blocks out for a step, unless they are.
+    fn prepare(&mut self, motion: &Motion) {
+        let of = (motion.wall, motion.turn_rad, motion.dt_s);
+        if self.ready.of == Some(of) && motion.height_mm >= self.ready.lowest {
+            return;
+        }
+        let radius = self.parameters.radius_mm;
+        // Lower than foreseen: by as much again.
+        let more =
+            if self.ready.of == Some(of) { self.ready.lowest - motion.height_mm } else { 0.0 };
+        let lowest = motion.height_mm - SLACK * radius - more;
+        if self.law.dt_s != motion.dt_s {
+            self.law = Law::new(&self.parameters, motion.dt_s);
+        }
+        let turned = self.rotation + motion.turn_rad;
+        let (floor, step) = window::reach(&motion.wall, lowest, radius);
+        let mut window = Window::default();
+        if self.whole {
+            let (first, last) = self.span(turned, -WIDEST, WIDEST);
+            window.add(first, last);
         } else {
-            // Out of contact since `at`: only the memory decays.
-            (self.q * (-idle / law.tau).exp(), 0.0)
+            let (first, last) = self.span(turned, -floor, floor);
+            window.add(first, last);
+            if let Some((from, to)) = step {
+                let (first, last) = self.span(turned, from, to);
+                window.add(first, last);
+            }
+        }
+        window.limit(self.q.len() as i64);
+        // Where the patch may end on the floor, and half an element more.
+        let chord = (radius * radius - lowest * lowest).max(0.0).sqrt();
+        let margin = radius * self.pitch() / floor.cos().max(0.05);
+        self.ready.rise = (self.whole || step.is_some()).then_some(motion.wall.rise_mm);
+        self.ready.edge = motion.wall.behind_mm < chord + margin
+            || (self.whole && motion.wall.behind_mm < f64::INFINITY);
+        self.ready.window = window;
+        self.ready.lowest = lowest;
+        self.ready.of = Some(of);
+        self.lay_out(turned, motion.wall.ahead_mm);
+    }
+
+    fn lay_out(&mut self, turned: f64, ahead: f64) {
+        let Self { ready, active, law, q, depth, at, sin, cos, parameters, time, .. } = self;
+        let count = q.len() as i64;
+        let (turned_sin, turned_cos) = turned.sin_cos();
+        let (turned_sin, turned_cos) = (Lanes::splat(turned_sin), Lanes::splat(turned_cos));
+        let (keep, from_old) = (Lanes::splat(law.keep), Lanes::splat(law.from_old));
+        let on_face = Lanes::splat(ahead / parameters.radius_mm).fast_max(Lanes::splat(1e-9));
+        let (radius, ahead) = (Lanes::splat(parameters.radius_mm), Lanes::splat(ahead));
+        let (away, facing) = (Lanes::splat(AWAY), Lanes::splat(0.05));
+        let step = ready.rise.is_some();
+        ready.blocks.clear();
+        ready.indices.clear();
+        for number in ready.window.blocks() {
+            let index = number.rem_euclid(count) as usize;
+            if !active.contains(number) && q[index] != Lanes::ZERO {
+                // Out of contact since: only the memory has decayed.
+                let kept = (-(*time - at[index]) / parameters.tau_s).exp();
+                let decayed = q[index] * Lanes::splat(kept);
+                q[index] = decayed & decayed.abs().simd_gt(Lanes::splat(1e-200));
+                at[index] = *time;
+            }
+            let (s, c) = (sin[index], cos[index]);
+            let (sin, cos) = (s * turned_cos - c * turned_sin, c * turned_cos + s * turned_sin);
+            // The face is touched where it is nearer than the radius.
+            let near = sin.simd_gt(on_face);
+            let face = if step && near.any() {
+                near.bitselect(radius - ahead / sin, -away)
+            } else {
+                -away
+            };
+            ready.blocks.push(Block {
+                cos,
+                sin,
+                sec: cos.simd_gt(facing).bitselect(Lanes::ONE / cos, away),
+                face,
+                carried: keep * q[index] + from_old * depth[index],
+            });
+            ready.indices.push(index);
         }
     }
 }
 
-/// The three-parameter solid over one step.
-struct Law {
-    k_inf: f64,
-    excess: f64,
-    tau: f64,
-    keep: f64,
-    from_old: f64,
-    from_new: f64,
-    /// dp/d(depth) at the step's end.
-    tangent: f64,
-}
-
-impl Law {
-    fn new(parameters: &RingParameters, dt_s: f64) -> Self {
-        let ratio = dt_s / parameters.tau_s;
-        let keep = (-ratio).exp();
-        // Mean of the kernel over the step; series where the quotient cancels.
-        let mean = if ratio < 1e-5 { 1.0 - 0.5 * ratio } else { -(-ratio).exp_m1() / ratio };
-        let excess = parameters.k_0 - parameters.k_inf;
-        Self {
-            k_inf: parameters.k_inf,
-            excess,
-            tau: parameters.tau_s,
-            keep,
-            from_old: mean - keep,
-            from_new: 1.0 - mean,
-            tangent: parameters.k_inf + excess * mean,
-        }
-    }
-
-    #[inline]
-    fn advance(&self, q: f64, old: f64, new: f64) -> f64 {
-        self.keep * q + self.from_old * old + self.from_new * new
-    }
-
-    #[inline]
-    fn pressure(&self, depth: f64, q: f64) -> f64 {
-        self.k_inf * depth + self.excess * (depth - q)
-    }
-}
+#[cfg(test)]
+mod tests;

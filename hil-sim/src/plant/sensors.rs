@@ -66,8 +66,7 @@ impl Sensors {
     pub fn read(&mut self, now: Sensed, dt_s: f64) -> Codes {
         self.past.push_front(now);
         self.past.truncate(LONGEST);
-        let p = self.parameters.clone();
-        let past = &self.past;
+        let (p, past) = (&self.parameters, &self.past);
         let aged = |of: fn(&Sensed) -> f64, delay_s: f64| {
             let oldest = past.len() - 1;
             let back = (delay_s / dt_s).clamp(0.0, oldest as f64);
@@ -76,30 +75,29 @@ impl Sensors {
             newer + (older - newer) * (back - at as f64)
         };
         let noise = &p.noise;
+        let random = &mut self.noise;
+        let mut normal = |deviation: f64| {
+            if deviation == 0.0 {
+                return 0.0;
+            }
+            let normal: f64 = StandardNormal.sample(random);
+            deviation * normal
+        };
         let preload = aged(|s| s.preload_n, noise.load_cell_delay_s) * p.load_cell_gain;
         let depth = aged(|s| s.depth_mm, noise.tread_delay_s) * p.tread_gain;
         let arm = aged(|s| s.arm_rad, noise.angle_delay_s) + p.angle_zero_rad;
         let turns = now.rotation_rad / std::f64::consts::TAU;
-        let counts = turns * p.counts_per_turn + self.normal(noise.encoder_jitter_counts);
-        let preload = preload + self.normal(noise.load_cell_n);
-        let depth = depth + self.normal(noise.tread_mm);
-        let code = arm / std::f64::consts::TAU * 16_384.0
-            + p.angle_zero_code
-            + self.normal(noise.angle_lsb);
+        let counts = turns * p.counts_per_turn + normal(noise.encoder_jitter_counts);
+        let preload = preload + normal(noise.load_cell_n);
+        let depth = depth + normal(noise.tread_mm);
+        let code =
+            arm / std::f64::consts::TAU * 16_384.0 + p.angle_zero_code + normal(noise.angle_lsb);
         Codes {
             wheel: EncoderCount::new((counts.floor() as i64) as u16),
             load_cell: bridge(preload / p.load_cell_full_scale_n),
             tread: bridge(depth / p.tread_full_scale_mm),
             arm: frame(code),
         }
-    }
-
-    fn normal(&mut self, deviation: f64) -> f64 {
-        if deviation == 0.0 {
-            return 0.0;
-        }
-        let normal: f64 = StandardNormal.sample(&mut self.noise);
-        deviation * normal
     }
 }
 

@@ -41,6 +41,13 @@ pub struct Edge {
 }
 
 impl Edge {
+    /// Its sine and cosine.
+    #[inline]
+    #[must_use]
+    pub(super) fn direction(&self) -> (f64, f64) {
+        (self.sin, self.cos)
+    }
+
     /// Part of an element `pitch` wide (rad) that does not reach past the edge, given
     /// sine and cosine of its angle. The wall ends there at once; without this a whole
     /// element would.
@@ -131,7 +138,7 @@ impl LocalWall {
         if self.behind_mm == f64::INFINITY {
             return Edge { sin: 1.0, cos: 0.0 };
         }
-        let away = self.behind_mm.hypot(y);
+        let away = (self.behind_mm * self.behind_mm + y * y).sqrt();
         Edge { sin: self.behind_mm / away, cos: y / away }
     }
 
@@ -139,7 +146,8 @@ impl LocalWall {
     /// of the wall: straight down or the corner ahead.
     #[must_use]
     pub fn nearest(&self, y: f64) -> f64 {
-        y.min(self.ahead_mm.hypot(y - self.rise_mm))
+        let over = y - self.rise_mm;
+        y.min((self.ahead_mm * self.ahead_mm + over * over).sqrt())
     }
 
     /// Derivative of a ray's distance by `y`.

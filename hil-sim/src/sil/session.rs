@@ -56,19 +56,28 @@ impl Session {
             Direction::Deploy => (0.0, 0.0),
             Direction::Retract => (scenario.rig.rig.travel_mm, scenario.rig.preload.cruise_n),
         };
+        let sensors = Sensors::new(parameters.sensors.clone(), scenario.run.seed);
+        let plant = VirtualRig::new(parameters, position, preload, TICK_S);
         Ok(Self {
             controller: Controller::try_build(&scenario.rig)?,
             trace: Trace::new(planner.gap_ref(direction).to_num(), position),
             planner,
             state: State::default(),
-            sensors: Sensors::new(parameters.sensors.clone(), scenario.run.seed),
-            plant: VirtualRig::new(parameters, position, preload, TICK_S),
+            sensors,
+            plant,
             frame: SensorFrame::default(),
             tick: 0,
             plan: None,
             scenario: scenario.clone(),
             options,
         })
+    }
+
+    /// The same with every ring element visited, see [`VirtualRig::visiting_all`].
+    #[must_use]
+    pub fn visiting_all(mut self) -> Self {
+        self.plant = self.plant.visiting_all();
+        self
     }
 
     /// One millisecond with an operator's command or none.

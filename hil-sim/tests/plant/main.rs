@@ -4,5 +4,7 @@ mod bench;
 mod crossing;
 mod deployment;
 mod grip;
+mod precision;
 mod sensors;
+mod skipping;
 mod spread;

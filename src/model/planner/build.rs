@@ -65,7 +65,6 @@ impl Planner {
             guard: Guard::try_build(rig)?,
             timing: Timing::try_build(rig)?,
             strategy,
-            load: checked("plant.top_load_n", load)?,
             wedge,
             coupling: checked("plant.arm_coupling", coupling)?,
             gap_ref: [gap(references[0])?, gap(references[1])?],

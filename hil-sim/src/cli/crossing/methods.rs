@@ -1,10 +1,11 @@
 //! The three ways to compute a crossing.
 
-use interstage::model::formula::Formula;
-use interstage::model::reduced::{Point, ReducedModel};
+use interstage::model::felt::Kind;
+use interstage::model::formula::{Formula, LEAST_RUN};
+use interstage::model::reduced::{Point, ReducedModel, Scale};
 use interstage::rig::Rig;
 use interstage::supervise::Direction;
-use interstage::units::{Q16, q16};
+use interstage::units::Q16;
 
 use super::{Case, Figures};
 use crate::cli::failure::Failure;
@@ -17,11 +18,8 @@ use crate::plant::ring::RingParameters;
 const ELEMENTS: usize = 5760;
 const STRIDE_MM: f64 = 0.005;
 
-/// Gap from the end of the firmware's table within which it is at that end: 6e-5 mm.
-const NEAR_END: Q16 = q16(62);
-
-/// Gap below which the closed form is at its end, mm.
-const LEAST_GAP_MM: f64 = 1e-6;
+/// Gap from an end of the model within which it is at that end, mm.
+const NEAR_END_MM: f64 = 1e-7;
 
 /// Why there is no gap.
 const SUNK: &str = "the wheel sinks in so far that the lower wall carries until the step lies \
@@ -50,7 +48,9 @@ fn ring_of(rig: &Rig, case: &Case, elements: usize, stride_mm: f64) -> Result<Fi
         climb_work_mj: result.climb_work_mj,
         embedding_mm: result.embedding_mm,
         mu_needed: case.load_n.map(|_| result.mu_needed),
-        at_table_end: false,
+        impact_stress_pa: None,
+        vibration_um: None,
+        at_model_end: false,
     })
 }
 
@@ -58,48 +58,41 @@ fn ring_of(rig: &Rig, case: &Case, elements: usize, stride_mm: f64) -> Result<Fi
 pub(super) fn reduced(rig: &Rig, case: &Case) -> Result<Figures, Failure> {
     let formula = Formula::new(rig);
     let Case { speed_mm_s, preload_n, direction, load_n } = *case;
-    let gap_mm = formula.gap_mm(direction, speed_mm_s, preload_n, load_n);
-    if gap_mm < LEAST_GAP_MM {
-        return Err(Failure::run(SUNK));
-    }
-    let stiffness = formula.k_inf * formula.stiffness(direction, speed_mm_s, gap_mm);
+    let crossing = formula.crossing(direction, speed_mm_s, preload_n, load_n);
+    let kind = Kind { direction, driven: load_n.is_some() };
+    let least_run = LEAST_RUN * formula.radius_mm;
+    let (least, most) =
+        (formula.gap_after_mm(formula.largest_run_mm(kind)), formula.gap_after_mm(least_run));
     Ok(Figures {
-        gap_mm,
-        // Pushed, this is the preload times axial over radial integral; the driven
-        // contact carries less, as the traction on its slope carries the rest.
-        corner_force_n: stiffness * formula.contact(gap_mm).axial,
+        gap_mm: crossing.gap_mm,
+        corner_force_n: crossing.corner_force_n,
         climb_work_mj: elastic_work(rig, case),
-        embedding_mm: formula.depth_mm(gap_mm),
-        mu_needed: load_n.map(|load| formula.utilisation(direction, speed_mm_s, gap_mm, load)),
-        at_table_end: false,
+        embedding_mm: formula.depth_mm(crossing.gap_mm),
+        mu_needed: load_n.map(|_| crossing.utilisation),
+        impact_stress_pa: Some(crossing.impact_stress_pa),
+        vibration_um: Some(1e3 * crossing.vibration_mm),
+        at_model_end: !(least + NEAR_END_MM..=most - NEAR_END_MM).contains(&crossing.gap_mm),
     })
 }
 
 /// The reduced model as the firmware runs it.
 pub(super) fn fixed(rig: &Rig, case: &Case) -> Result<Figures, Failure> {
-    let model = ReducedModel::try_build(rig)?;
+    let model = ReducedModel::try_build_for(rig, case.load_n)?;
     let point = Point {
         direction: case.direction,
         speed: Q16::from_num(case.speed_mm_s),
-        load: Q16::from_num(case.load_n.unwrap_or(0.0)),
-        scale: Q16::from_num(1),
+        scale: Scale::NOMINAL,
     };
-    let force = Q16::from_num(case.preload_n);
-    let gap = match case.load_n {
-        Some(_) => model.gap(&point, force),
-        None => model.pushed_gap(&point, force),
-    };
-    // The search closes in on an end of the table without reaching it.
-    let (low, high) = model.gap_range();
-    let (least, most) = (low + NEAR_END, high - NEAR_END);
-    let carried = model.pushed_force(&point, gap);
+    let crossing = model.crossing(&point, Q16::from_num(case.preload_n));
     Ok(Figures {
-        gap_mm: gap.to_num(),
-        corner_force_n: model.climbing_force(gap, carried).to_num(),
+        gap_mm: crossing.gap.to_num(),
+        corner_force_n: crossing.corner_force.to_num(),
         climb_work_mj: elastic_work(rig, case),
-        embedding_mm: model.depth(gap).to_num(),
-        mu_needed: case.load_n.map(|_| model.utilisation(&point, gap).to_num()),
-        at_table_end: least > gap || gap > most,
+        embedding_mm: model.depth(crossing.gap).to_num(),
+        mu_needed: case.load_n.map(|_| crossing.utilisation.to_num()),
+        impact_stress_pa: Some(1e3 * crossing.impact_stress_kpa.to_num::<f64>()),
+        vibration_um: Some(crossing.vibration_um.to_num()),
+        at_model_end: crossing.at_end,
     })
 }
 
@@ -152,19 +145,20 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_beyond_the_table_is_told() {
+    fn a_gap_beyond_the_model_is_told() {
         let rig = Rig::prototype();
-        let beyond = |preload_n| fixed(&rig, &case(5.0, preload_n, None)).unwrap().at_table_end;
-        assert!(beyond(1000.0) && beyond(1.0));
-        assert!(!beyond(33.3));
+        for method in [reduced, fixed] {
+            let beyond =
+                |preload_n| method(&rig, &case(5.0, preload_n, None)).unwrap().at_model_end;
+            assert!(beyond(1000.0) && beyond(0.01));
+            assert!(!beyond(33.3));
+        }
     }
 
     #[test]
     fn a_wheel_that_sinks_in_has_no_gap() {
         let sunk = case(5.0, 1000.0, None);
-        for method in [ring, reduced] {
-            assert!(matches!(method(&Rig::prototype(), &sunk), Err(Failure::Run(_))));
-        }
+        assert!(matches!(ring(&Rig::prototype(), &sunk), Err(Failure::Run(_))));
     }
 
     #[test]

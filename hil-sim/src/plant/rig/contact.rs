@@ -3,25 +3,27 @@
 
 use super::traction::JAMMED_BELOW;
 use super::{PlantError, VirtualRig};
-use crate::plant::arm::Mode;
 use crate::plant::balance::{Axial, Balance, BalanceError, Solved};
 use crate::plant::ledger::Moment;
-use crate::plant::ring::{Contact, Motion, Ring};
+use crate::plant::ring::{Contact, Motion};
 use crate::plant::rolling::{self, Rolling};
 use crate::plant::wall::LocalWall;
 
-/// Axial reach kept around step and edge when the ring wakes, mm.
-const REACH_MM: f64 = 1.0;
+/// Distance kept from corner and edge when the ring wakes, mm: more than the wheel sinks
+/// or rolls in a stride.
+const REACH_MM: f64 = 0.5;
 
-/// Depth that the tread may gain on its way to a step, mm.
-const SUNK_MM: f64 = 1.5;
+/// Largest change of height in a stride that is foreseen by the last contact, mm.
+const FORESEEN_MM: f64 = 0.05;
 
-/// Change of tread speed or radial force that ends steady rolling, relative, and for the
-/// speed also absolute, mm/s.
+/// Change of tread speed or radial force that ends steady rolling, relative and
+/// absolute, mm/s and N.
 const UNSTEADY_PART: f64 = 0.03;
 const UNSTEADY_MM_S: f64 = 0.01;
+const UNSTEADY_N: f64 = 1e-3;
 
-/// Relaxation times after which the tread has forgotten what came before.
+/// Relaxation times after which the tread has forgotten what came before; it knows
+/// nothing from before it came into the patch.
 const FORGETS: f64 = 6.0;
 
 /// What the wheel has been rolling at, and for how long.
@@ -33,19 +35,24 @@ pub(super) struct Calm {
 }
 
 impl VirtualRig {
-    /// Whether speed and radial force have stood long enough for steady rolling.
+    /// Whether speed and radial force have stood long enough, and away from any step, for
+    /// steady rolling.
     pub(super) fn settled(&mut self, local: &LocalWall, axial: Axial, dt_s: f64) -> bool {
         let (tread, pressing) = (self.truth.tread_mm_s, self.balance(local, axial).preload_n);
+        let near = self.near_step(local);
         let calm = &mut self.calm;
         let most = UNSTEADY_PART * calm.tread_mm_s.abs() + UNSTEADY_MM_S;
         let same = (tread - calm.tread_mm_s).abs() <= most
-            && (pressing - calm.pressing_n).abs() <= UNSTEADY_PART * calm.pressing_n;
-        if same {
+            && (pressing - calm.pressing_n).abs() <= UNSTEADY_PART * calm.pressing_n + UNSTEADY_N;
+        if same && !near {
             calm.for_s += dt_s;
         } else {
             *calm = Calm { tread_mm_s: tread, pressing_n: pressing, for_s: 0.0 };
         }
-        calm.for_s > FORGETS * self.parameters.ring.tau_s
+        let for_s = calm.for_s;
+        // What is now under the wheel came in since.
+        let patch = self.patch_mm(self.truth.height_mm - self.base_mm);
+        for_s > FORGETS * self.parameters.ring.tau_s || for_s * tread.abs() > 2.0 * patch
     }
 
     /// Radial balance over this wall: screw, spring, arm modes, and the wedge of a
@@ -56,23 +63,28 @@ impl VirtualRig {
             Axial::Driven(load) => load,
             _ => 0.0,
         };
-        let vibration = self.modes.iter().map(Mode::force_n).sum::<f64>();
-        let shared = vibration / self.modes.len().max(1) as f64;
         Balance {
-            preload_n: (seat + self.wedge() * thrust - shared).max(0.0),
+            preload_n: (seat + self.wedge() * thrust - self.vibration_n).max(0.0),
             spring_n_per_mm: self.parameters.spring_n_per_mm,
             axial,
         }
     }
 
-    /// Whether the wheel may touch a step, or an edge may lie under its patch.
+    /// Whether the wheel all but touches a step, or an edge all but lies under its patch.
     pub(super) fn near_step(&self, local: &LocalWall) -> bool {
+        let reach = self.parameters.ring.radius_mm + REACH_MM;
+        let height = self.truth.height_mm - local.base_mm;
+        let over = height - local.rise_mm;
+        let (ahead, behind) = (local.ahead_mm, local.behind_mm - REACH_MM);
+        // By the corner, or by the face where the centre is lower than that.
+        let corner = if over > 0.0 { over * over } else { 0.0 };
+        ahead * ahead + corner < reach * reach || behind < self.patch_mm(height)
+    }
+
+    /// Half the length of the patch at this height above the wall, mm.
+    pub(super) fn patch_mm(&self, height_mm: f64) -> f64 {
         let radius = self.parameters.ring.radius_mm;
-        let sunk = self.truth.depth_mm.max(SUNK_MM);
-        let patch = (radius * radius - (radius - sunk).powi(2)).sqrt();
-        let below = (radius - sunk - local.rise_mm).max(0.0);
-        let run = (radius * radius - below * below).sqrt();
-        local.ahead_mm < run + REACH_MM || local.behind_mm < patch + REACH_MM
+        (radius * radius - height_mm * height_mm).max(0.0).sqrt()
     }
 
     /// Brings the ring into the state of steady rolling.
@@ -80,8 +92,7 @@ impl VirtualRig {
         let local = self.parameters.wall.local(position_mm);
         let height = self.truth.height_mm - local.base_mm;
         let table = rolling::profile(&self.parameters.ring, height, self.rolled_mm_s);
-        // A fresh ring counts its own turns; only the angle to the wall matters.
-        self.ring = Ring::new(self.parameters.ring);
+        // The ring starts its turns afresh; only the angle to the wall matters.
         let interpolate = |angle: f64| {
             let at = table.partition_point(|node| node.0 < angle);
             match (at.checked_sub(1).and_then(|i| table.get(i)), table.get(at)) {
@@ -92,7 +103,8 @@ impl VirtualRig {
                 _ => (0.0, 0.0),
             }
         };
-        self.ring.seed(self.truth.time_s, interpolate);
+        let within = table.last().map_or(0.0, |node| node.0);
+        self.ring.seed(self.truth.time_s, within, interpolate);
         self.awake = true;
     }
 
@@ -104,20 +116,30 @@ impl VirtualRig {
         turn: f64,
         dt_s: f64,
     ) -> Result<(), PlantError> {
+        let way = self.truth.speed_mm_s * dt_s;
+        // Foreseen: what the way has brought, and what the new load brings by the last
+        // contact's stiffness.
+        let sunk = self.sinks(local, axial);
         let motion = Motion {
             wall: *local,
-            height_mm: self.truth.height_mm - local.base_mm,
+            height_mm: self.truth.height_mm - local.base_mm
+                + self.drift * way
+                + self.creep * dt_s
+                + sunk,
             turn_rad: turn,
             dt_s,
         };
         let solved =
-            self.bear(axial, |rig, axial| rig.balance(local, axial).solve(&rig.ring, motion))?;
+            self.bear(axial, |rig, axial| rig.balance(local, axial).solve(&mut rig.ring, motion))?;
         self.ring.commit(&Motion { height_mm: solved.height_mm, ..motion });
-        let way = self.truth.speed_mm_s * dt_s;
+        let rise = solved.height_mm + local.base_mm - self.truth.height_mm;
         if way.abs() > 1e-6 {
-            let rise = solved.height_mm + local.base_mm - self.truth.height_mm;
             self.slope = rise / way;
+            (self.drift, self.creep) = ((rise - sunk) / way, 0.0);
+        } else {
+            (self.drift, self.creep) = (0.0, (rise - sunk) / dt_s);
         }
+        self.stiffness = Some(solved.contact.slope);
         self.take(local, &solved);
         self.truth.ring_awake = true;
         self.truth.preload_n = self.preload_now();
@@ -136,34 +158,48 @@ impl VirtualRig {
         Ok(())
     }
 
+    /// Change of the height, mm, by which the last contact would carry the present load.
+    fn sinks(&self, local: &LocalWall, axial: Axial) -> f64 {
+        let Some(slopes) = self.stiffness else { return 0.0 };
+        let (_, cosine, sine) = self.forces;
+        let lift = self.truth.height_mm - local.base_mm - self.parameters.ring.radius_mm;
+        let (residual, slope, _) =
+            self.balance(local, axial).residual((cosine, sine), slopes, lift);
+        let change = -residual / slope;
+        if change.abs() < FORESEEN_MM { change } else { 0.0 }
+    }
+
     /// Radial balance of steady rolling on the continuous wall.
     pub(super) fn roll_steadily(
         &mut self,
         local: &LocalWall,
         axial: Axial,
     ) -> Result<(), PlantError> {
-        let guess = self.truth.height_mm - self.base_mm;
+        let guess = self.truth.height_mm - self.base_mm + self.sinks(local, axial);
         let solved = self.bear(axial, |rig, axial| rig.roll_balanced(local, axial, guess))?;
         self.rolled_mm_s = self.truth.tread_mm_s;
-        self.slope = 0.0;
+        (self.slope, self.drift, self.creep) = (0.0, 0.0, 0.0);
+        self.stiffness = Some(solved.contact.slope);
         self.take(local, &solved);
         self.truth.ring_awake = false;
         Ok(())
     }
 
     fn roll_balanced(
-        &self,
+        &mut self,
         local: &LocalWall,
         axial: Axial,
         guess_mm: f64,
     ) -> Result<Solved, BalanceError> {
-        let ring = &self.parameters.ring;
+        let ring = self.parameters.ring;
         let balance = self.balance(local, axial);
         let residual = |c: &Rolling| {
             let lift = c.height_mm - ring.radius_mm;
             balance.residual((c.cosine_n, c.sine_n), (0.0, 0.0), lift)
         };
-        let rolling = rolling::solve(ring, self.truth.tread_mm_s, guess_mm, |c| residual(c).0);
+        let speed = self.truth.tread_mm_s;
+        let spring = -balance.spring_n_per_mm;
+        let rolling = self.steady.solve(&ring, speed, guess_mm, spring, |c| residual(c).0);
         let (residual_n, _, utilisation) = residual(&rolling);
         let height_mm = rolling.height_mm;
         if residual_n.abs() > 1e-3 * balance.preload_n.max(1.0) {
@@ -177,6 +213,7 @@ impl VirtualRig {
             floor_n: rolling.cosine_n,
             depth_mm: ring.radius_mm - height_mm,
             area_mm2: rolling.area_mm2,
+            slope: (rolling.slope, rolling.slope * rolling.sine_n / rolling.cosine_n.max(1e-9)),
             ..Contact::default()
         };
         Ok(Solved { height_mm, contact, utilisation })
@@ -187,15 +224,15 @@ impl VirtualRig {
     fn bear(
         &mut self,
         axial: Axial,
-        solve: impl Fn(&Self, Axial) -> Result<Solved, BalanceError>,
+        solve: impl Fn(&mut Self, Axial) -> Result<Solved, BalanceError>,
     ) -> Result<Solved, PlantError> {
         let mu = self.parameters.mu;
-        let slides = |sense: f64| {
-            let axial = Axial::Wedged { utilisation: mu.copysign(sense), wedge: self.wedge() };
-            solve(self, axial).ok().filter(|solved| {
+        let slides = |rig: &mut Self, sense: f64| {
+            let axial = Axial::Wedged { utilisation: mu.copysign(sense), wedge: rig.wedge() };
+            solve(rig, axial).ok().filter(|solved| {
                 let c = &solved.contact;
                 let forces = (c.normal_n, c.cosine_n, c.sine_n);
-                self.freedom(mu.copysign(sense), forces) >= JAMMED_BELOW
+                rig.freedom(mu.copysign(sense), forces) >= JAMMED_BELOW
             })
         };
         let jammed =
@@ -203,10 +240,10 @@ impl VirtualRig {
         let solved = match axial {
             Axial::Driven(load) => match solve(self, axial) {
                 Ok(solved) if solved.utilisation.abs() <= mu => Ok(solved),
-                Ok(solved) => Ok(slides(solved.utilisation).unwrap_or(jammed(solved))),
-                Err(error) => slides(load).ok_or(error),
+                Ok(solved) => Ok(slides(self, solved.utilisation).unwrap_or(jammed(solved))),
+                Err(error) => slides(self, load).ok_or(error),
             },
-            Axial::Wedged { utilisation, .. } => match slides(utilisation) {
+            Axial::Wedged { utilisation, .. } => match slides(self, utilisation) {
                 Some(solved) => Ok(solved),
                 None => {
                     self.sliding = false;

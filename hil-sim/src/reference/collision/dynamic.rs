@@ -41,7 +41,7 @@ pub fn dynamic(case: &Case) -> Result<Crossing, ReferenceError> {
         x += stride;
         t += dt;
         let motion = way.motion(x, mass.y_mm, stride / way.radius_mm, dt);
-        let (contact, utilisation) = mass.step(&rolling.ring, motion);
+        let (contact, utilisation) = mass.step(&mut rolling.ring, motion);
         let height_mm = mass.y_mm - motion.wall.base_mm;
         rolling.ring.commit(&Motion { height_mm, ..motion });
         recorder.take(&way, case, (t, x, mass.y_mm), &contact, utilisation);
@@ -73,14 +73,15 @@ impl Mass {
     }
 
     /// One step; the contact at its end and the friction utilisation there.
-    pub(super) fn step(&mut self, ring: &Ring, motion: Motion) -> (Contact, f64) {
+    pub(super) fn step(&mut self, ring: &mut Ring, motion: Motion) -> (Contact, f64) {
         let dt = motion.dt_s;
         // mm/s^2 per N, and mm per N within the step.
         let per_n = 1e3 / self.mass_kg;
         let gain = 0.25 * dt * dt * per_n;
         let drift = self.y_mm + dt * (self.rate_mm_s + 0.25 * dt * self.acceleration_mm_s2);
         let base = motion.wall.base_mm;
-        let at = |y: f64| {
+        let radius = ring.parameters().radius_mm;
+        let mut at = |y: f64| {
             let contact = ring.trial(&Motion { height_mm: y - base, ..motion });
             let forces = (contact.cosine_n, contact.sine_n);
             let (force, slope, used) = self.balance.residual(forces, contact.slope, 0.0);
@@ -93,7 +94,7 @@ impl Mass {
         let mut found = at(y);
         for _ in 0..ITERATIONS {
             let error = y - drift - gain * found.1;
-            if error.abs() < 1e-13 * ring.parameters().radius_mm {
+            if error.abs() < 1e-13 * radius {
                 break;
             }
             if error > 0.0 {

@@ -42,7 +42,7 @@ impl Rolling {
         let motion = way.motion(x, self.y_mm, stride / way.radius_mm, dt);
         let balance =
             Balance { preload_n: case.preload_n, spring_n_per_mm: 0.0, axial: case.axial };
-        let solved = balance.solve(&self.ring, motion)?;
+        let solved = balance.solve(&mut self.ring, motion)?;
         self.ring.commit(&Motion { height_mm: solved.height_mm, ..motion });
         self.t_s += dt;
         self.x_mm = x;

@@ -172,7 +172,7 @@ fn settled(tau_s: f64) -> (Mass, Ring, f64) {
     let balance = Balance { preload_n: case.preload_n, spring_n_per_mm: 0.0, axial: Axial::Pushed };
     let (mut height, mut stiffness) = (24.5, 0.0);
     for _ in 0..3 {
-        let rest = balance.solve(&ring, level(height, 1e4 * tau_s)).unwrap();
+        let rest = balance.solve(&mut ring, level(height, 1e4 * tau_s)).unwrap();
         (height, stiffness) = (rest.height_mm, -1e3 * rest.contact.slope.0);
         ring.commit(&level(height, 1e4 * tau_s));
     }
@@ -192,7 +192,7 @@ fn ringing(tau_s: f64, blow_mm_s: f64, dt_s: f64, time_s: f64) -> Vec<f64> {
     let steps = (time_s / dt_s).round() as usize;
     let heights = (0..steps).map(|_| {
         let motion = level(mass.y_mm, dt_s);
-        mass.step(&ring, motion);
+        mass.step(&mut ring, motion);
         ring.commit(&Motion { height_mm: mass.y_mm, ..motion });
         mass.y_mm - rest
     });
@@ -249,7 +249,7 @@ fn without_memory_a_ringing_wheel_keeps_its_energy() {
     case.rig.tread.stiffening = 1.0;
     let mut ring = Ring::new(case.ring());
     let balance = Balance { preload_n: case.preload_n, spring_n_per_mm: 0.0, axial: Axial::Pushed };
-    let rest = balance.solve(&ring, level(24.5, 1.0)).unwrap();
+    let rest = balance.solve(&mut ring, level(24.5, 1.0)).unwrap();
     ring.commit(&level(rest.height_mm, 1.0));
     let mut mass = Mass::on(&case, rest.height_mm);
     mass.rate_mm_s = 1e-3;
@@ -261,7 +261,7 @@ fn without_memory_a_ringing_wheel_keeps_its_energy() {
     let first = energy(&mass);
     for _ in 0..20_000 {
         let motion = level(mass.y_mm, 1e-4);
-        mass.step(&ring, motion);
+        mass.step(&mut ring, motion);
         ring.commit(&Motion { height_mm: mass.y_mm, ..motion });
     }
     assert!((energy(&mass) / first - 1.0).abs() < 1e-2, "{}", energy(&mass) / first);

@@ -1,0 +1,158 @@
+//! Error against cost of the ring: the same crossings at every setting, measured on a
+//! setting twenty times as fine.
+
+use std::time::Instant;
+
+use interstage::rig::Rig;
+use serde::Serialize;
+
+use super::balance::{Axial, BalanceError};
+use super::crossing::{CrossingCase, cross};
+use super::draw::{ELEMENTS, PlantParameters};
+use super::ledger::Crossing;
+use super::rig::{Drives, PlantError, Resolution, VirtualRig};
+use super::ring::RingParameters;
+
+/// How much finer the measure is, in elements and in stride.
+pub const FINER: usize = 20;
+
+/// How finely a ring is computed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Setting {
+    /// Elements around the ring.
+    pub elements: usize,
+    /// Longest axial way of a step, mm.
+    pub stride_mm: f64,
+}
+
+impl Setting {
+    /// As deployments are computed.
+    #[must_use]
+    pub fn usual() -> Self {
+        Self { elements: ELEMENTS, stride_mm: Resolution::default().stride_mm }
+    }
+
+    /// This much finer in both.
+    #[must_use]
+    pub fn finer(self, times: usize) -> Self {
+        Self { elements: self.elements * times, stride_mm: self.stride_mm / times as f64 }
+    }
+
+    /// From coarse to fine: the settings of the curve.
+    #[must_use]
+    pub fn sweep() -> Vec<Self> {
+        let strides = [0.08, 0.04, 0.02, 0.01];
+        let of = |elements| strides.map(|stride_mm| Self { elements, stride_mm });
+        [360, 720, 1440, 2880].into_iter().flat_map(of).collect()
+    }
+}
+
+/// A point of the curve: error of the worst crossing, cost of the mean one.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Point {
+    /// Elements around the ring.
+    pub elements: usize,
+    /// Axial way of a step, mm.
+    pub stride_mm: f64,
+    /// Largest relative error of the gap.
+    pub gap_error: f64,
+    /// Largest relative error of the largest climbing force.
+    pub force_error: f64,
+    /// Time of a crossing, ns; the least of several.
+    pub wall_ns: f64,
+}
+
+/// The crossings that the error is measured on: both loads, both ways, pushed and driven.
+#[must_use]
+pub fn cases() -> Vec<(f64, f64, Axial)> {
+    let mut all = Vec::new();
+    for (speed, preload) in [(5.0, 100.0), (8.0, 40.0), (25.0, 60.0)] {
+        for axial in [Axial::Pushed, Axial::Driven(6.7)] {
+            all.extend([(speed, preload, axial), (-speed, preload, axial)]);
+        }
+    }
+    all
+}
+
+fn case(rig: &Rig, setting: Setting, (speed, preload, axial): (f64, f64, Axial)) -> CrossingCase {
+    CrossingCase {
+        ring: RingParameters::of(rig, setting.elements),
+        step_height_mm: rig.rig.step_height_mm,
+        speed_mm_s: speed,
+        preload_n: preload,
+        axial,
+        stride_mm: setting.stride_mm,
+    }
+}
+
+/// Errors of isolated crossings at these settings, against the usual one made
+/// [`FINER`] times as fine; `done` is called after every crossing of the measure.
+///
+/// # Errors
+/// [`BalanceError`] if a crossing cannot be made.
+pub fn work_precision(
+    rig: &Rig,
+    settings: &[Setting],
+    repeats: usize,
+    done: impl Fn(),
+) -> Result<Vec<Point>, BalanceError> {
+    let measure = Setting::usual().finer(FINER);
+    let mut exact = Vec::new();
+    for of in cases() {
+        let result = cross(&case(rig, measure, of))?;
+        exact.push((of, result.gap_mm, result.corner_force_n));
+        done();
+    }
+    let point = |&setting: &Setting| {
+        let mut point = Point {
+            elements: setting.elements,
+            stride_mm: setting.stride_mm,
+            gap_error: 0.0,
+            force_error: 0.0,
+            wall_ns: 0.0,
+        };
+        for &(of, gap_mm, force_n) in &exact {
+            let mut least = f64::INFINITY;
+            for _ in 0..repeats.max(1) {
+                let started = Instant::now();
+                let result = cross(&case(rig, setting, of))?;
+                least = least.min(started.elapsed().as_nanos() as f64);
+                point.gap_error = point.gap_error.max((result.gap_mm / gap_mm - 1.0).abs());
+                let force = (result.corner_force_n / force_n - 1.0).abs();
+                point.force_error = point.force_error.max(force);
+            }
+            point.wall_ns += least / exact.len() as f64;
+        }
+        Ok(point)
+    };
+    settings.iter().map(point).collect()
+}
+
+/// The crossings of a whole way, out (speed above nought) or back, of the plant alone:
+/// duty and screw held, the drive a hundred times as strong as it is so that it does not
+/// yield: nothing but the setting and the tick differs.
+///
+/// # Errors
+/// [`PlantError`] if the plant leaves the set of meaningful states.
+pub fn crossings(
+    parameters: &PlantParameters,
+    setting: Setting,
+    tick_s: f64,
+    (speed_mm_s, preload_n): (f64, f64),
+) -> Result<Vec<Crossing>, PlantError> {
+    let mut parameters = parameters.clone();
+    parameters.ring.elements = setting.elements;
+    parameters.drive.stall_n *= 100.0;
+    parameters.drive.limit_n *= 100.0;
+    let duty = speed_mm_s / parameters.drive.no_load_mm_s;
+    let (low, high) = parameters.stops_mm;
+    let (from, to) = if speed_mm_s > 0.0 { (0.0, high - 1.0) } else { (high - 2.0, low + 1.0) };
+    let longest_s = 5.0 * (high - low) / speed_mm_s.abs();
+    let resolution = Resolution { stride_mm: setting.stride_mm, ..Resolution::default() };
+    let mut rig = VirtualRig::new(parameters, from, preload_n, tick_s).with_resolution(resolution);
+    let drives = Drives { drive: duty, drive_on: true, ..Drives::default() };
+    while (rig.truth().position_mm - to) * speed_mm_s < 0.0 && rig.truth().time_s < longest_s {
+        rig.step(&drives, tick_s)?;
+    }
+    Ok(rig.ledger().crossings().to_vec())
+}

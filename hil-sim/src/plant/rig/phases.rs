@@ -1,0 +1,89 @@
+//! Which stages of the plant ran when: counted always, timed by who asks.
+
+use super::VirtualRig;
+use crate::plant::ring::Work;
+
+/// What the contact is doing, by what it costs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// Steady rolling on the continuous wall; the ring sleeps.
+    Smooth,
+    /// The ring is resolved on the continuous wall: before a step, behind one, or while
+    /// load or speed change.
+    Awake,
+    /// A corner, a face or an edge bears on the wheel.
+    Crossing,
+}
+
+/// All phases.
+pub const PHASES: [Phase; 3] = [Phase::Smooth, Phase::Awake, Phase::Crossing];
+
+impl Phase {
+    /// Name for tables.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Smooth => "smooth wall",
+            Self::Awake => "ring awake",
+            Self::Crossing => "crossing",
+        }
+    }
+}
+
+/// What was computed in a phase.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PhaseWork {
+    /// Simulated time, s.
+    pub simulated_s: f64,
+    /// Ring steps, heights tried on the ring, elements visited.
+    pub ring: Work,
+    /// Steady contacts computed node by node.
+    pub steady_computed: u64,
+    /// Heights tried on the tangent of one.
+    pub steady_iterations: u64,
+}
+
+impl VirtualRig {
+    /// What the contact did in the last step.
+    #[must_use]
+    pub fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    fn doing(&self) -> Phase {
+        let truth = &self.truth;
+        let local = self.parameters.wall.local(truth.position_mm);
+        let edge = || local.behind_mm < self.patch_mm(truth.height_mm - local.base_mm);
+        if !truth.ring_awake {
+            Phase::Smooth
+        } else if truth.corner_n > 0.0 || edge() {
+            Phase::Crossing
+        } else {
+            Phase::Awake
+        }
+    }
+
+    /// What has been computed so far in each phase, in the order of [`PHASES`].
+    #[must_use]
+    pub fn phases(&self) -> &[PhaseWork; PHASES.len()] {
+        &self.phases
+    }
+
+    /// Everything computed so far.
+    pub(super) fn work(&self) -> PhaseWork {
+        let (steady_computed, steady_iterations) = self.steady.work();
+        let ring = self.ring.work();
+        PhaseWork { simulated_s: 0.0, ring, steady_computed, steady_iterations }
+    }
+
+    /// Books what was computed since `before` under the present phase.
+    pub(super) fn count(&mut self, before: &PhaseWork, dt_s: f64) {
+        let now = self.work();
+        self.phase = self.doing();
+        let phase = &mut self.phases[self.phase as usize];
+        phase.simulated_s += dt_s;
+        phase.ring += now.ring - before.ring;
+        phase.steady_computed += now.steady_computed - before.steady_computed;
+        phase.steady_iterations += now.steady_iterations - before.steady_iterations;
+    }
+}

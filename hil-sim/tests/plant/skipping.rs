@@ -1,0 +1,107 @@
+//! What is not computed is not needed: bit for bit.
+
+use hil_sim::plant::rig::{PHASES, Phase, Resolution, Truth, VirtualRig};
+use hil_sim::plant::wall::{Step, Wall};
+use hil_sim::scenario::Scenario;
+use hil_sim::sil::{Options, Session, account, run_session};
+
+use crate::bench::{TICK_S, nominal, roll};
+
+/// All states of a way out or back, and the crossings.
+fn states(all: bool, speed: f64) -> (Vec<Truth>, VirtualRig) {
+    let (from, to) = if speed > 0.0 { (0.0, 80.0) } else { (80.0, 0.0) };
+    let mut rig = VirtualRig::new(nominal("prototype"), from, 45.0, TICK_S);
+    if all {
+        rig = rig.visiting_all();
+    }
+    let mut states = Vec::new();
+    assert_eq!(roll(&mut rig, speed, to, 60.0, |rig| states.push(*rig.truth())), Ok(true));
+    (states, rig)
+}
+
+#[test]
+fn elements_out_of_reach_change_no_bit() {
+    for speed in [8.0, 30.0, -8.0, -30.0] {
+        let (few, rig) = states(false, speed);
+        let (all, whole) = states(true, speed);
+        assert_eq!(few, all);
+        assert_eq!(rig.ledger().crossings(), whole.ledger().crossings());
+        let visited = |rig: &VirtualRig| rig.phases().map(|work| work.ring.elements).iter().sum();
+        let (some, every): (u64, u64) = (visited(&rig), visited(&whole));
+        assert!(some * 5 < every, "{some} of {every}");
+    }
+}
+
+#[test]
+fn a_run_is_the_same_with_skipping_and_without() {
+    for direction in ["deploy", "retract"] {
+        let set = vec![format!("run.direction={direction}")];
+        let scenario = Scenario::resolve(Some("prototype"), None, &set).unwrap();
+        let made = |options, all| {
+            let session = Session::new(&scenario, options).unwrap();
+            let session = if all { session.visiting_all() } else { session };
+            let mut recording = run_session(session, &scenario).unwrap();
+            recording.summary.real_time_factor = 0.0;
+            recording
+        };
+        let usual = made(Options::default(), false);
+        let all = made(Options::default(), true);
+        assert_eq!((&usual.summary, &usual.log), (&all.summary, &all.log));
+        // Nor do the rows that were not asked for.
+        let rows = made(Options { rows: true, ..Options::default() }, false);
+        assert_eq!((&usual.summary, &usual.log), (&rows.summary, &rows.log));
+        assert!(usual.rows.is_empty() && !rows.rows.is_empty());
+    }
+}
+
+#[test]
+fn memory_is_the_same_looked_at_late() {
+    // Back and forth, so that elements come back with what they remember: closed form
+    // against step by step.
+    let ends = [false, true].map(|all| {
+        let mut plant = nominal("prototype");
+        plant.wall = Wall::new(vec![Step { position_mm: 50.0, height_mm: 4.0 }]);
+        plant.ring.tau_s = 3.0;
+        let awake = Resolution { always_awake: true, ..Resolution::default() };
+        let mut rig = VirtualRig::new(plant, 10.0, 40.0, TICK_S).with_resolution(awake);
+        if all {
+            rig = rig.visiting_all();
+        }
+        for to in [22.0, 12.0, 24.0] {
+            let speed = if to > rig.truth().position_mm { 20.0 } else { -20.0 };
+            assert_eq!(roll(&mut rig, speed, to, 10.0, |_| {}), Ok(true));
+        }
+        *rig.truth()
+    });
+    let [late, ever] = ends;
+    assert!((late.height_mm - ever.height_mm).abs() < 1e-9, "{late:?} {ever:?}");
+    assert!((late.utilisation - ever.utilisation).abs() < 1e-8, "{late:?} {ever:?}");
+}
+
+#[test]
+fn the_account_adds_up() {
+    let scenario = Scenario::named("prototype").unwrap();
+    let account = account(&scenario, 1).unwrap();
+    let total: f64 = account.phases.iter().map(|phase| phase.simulated_s).sum();
+    assert!((total - account.simulated_s).abs() < 1e-6, "{account:?}");
+    let [smooth, awake, crossing] = PHASES.map(|phase| account.phases[phase as usize]);
+    assert_eq!(crossing.name, Phase::Crossing.name());
+    assert!(smooth.ring_strides == 0 && smooth.steady_iterations > 0, "{smooth:?}");
+    assert!(awake.ring_strides > 0 && crossing.ring_strides > 0, "{account:?}");
+    // Foreseen well enough for two or three heights a stride.
+    assert!(crossing.newton_iterations < 3 * crossing.ring_strides, "{crossing:?}");
+}
+
+#[test]
+fn on_the_smooth_wall_hardly_anything_is_computed() {
+    let mut plant = nominal("prototype");
+    plant.wall = Wall::new(Vec::new());
+    let mut rig = VirtualRig::new(plant, 0.0, 33.3, TICK_S);
+    assert_eq!(roll(&mut rig, 8.0, 80.0, 60.0, |_| {}), Ok(true));
+    let [smooth, awake, crossing] = *rig.phases();
+    assert!(smooth.simulated_s > 8.0 && crossing.simulated_s == 0.0);
+    assert!(awake.simulated_s < 1.5, "{awake:?}");
+    assert!(smooth.steady_computed < 10, "{smooth:?}");
+    let ticks = (smooth.simulated_s / TICK_S) as u64;
+    assert!(smooth.steady_iterations <= ticks + ticks / 5, "{smooth:?}");
+}
