@@ -11,7 +11,7 @@ use super::ring::RingParameters;
 use super::wall::{Step, Wall};
 use crate::scenario::{Noise, Scenario};
 
-/// Elements of the ring in a deployment. With the usual stride the gap is within 0.2 %,
+/// Elements of the ring in a deployment. With the usual stride the gap is within 0.25 %,
 /// the largest force within 0.3 % of a ring twenty times as fine. Two thirds of them keep
 /// the gap as well, but not the friction at which a sliding wheel still climbs.
 pub const ELEMENTS: usize = 1440;

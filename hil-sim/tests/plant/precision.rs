@@ -14,14 +14,14 @@ fn an_isolated_crossing_is_within_its_error() {
 
 #[test]
 fn a_crossing_inside_a_deployment_is_within_its_error() {
-    for way in [(25.0, 48.0), (-8.0, 33.3)] {
+    for way in [(25.0, 48.0), (8.0, 33.3), (-8.0, 33.3)] {
         let plant = nominal("prototype");
         let usual = crossings(&plant, Setting::usual(), TICK_S, way).unwrap();
         let tick = TICK_S / FINER as f64;
         let fine = crossings(&plant, Setting::usual().finer(FINER), tick, way).unwrap();
         assert_eq!((usual.len(), fine.len()), (3, 3));
         for (usual, fine) in usual.iter().zip(&fine) {
-            assert!(off(usual.gap_mm, fine.gap_mm).abs() < 2e-3, "{usual:?} {fine:?}");
+            assert!(off(usual.gap_mm, fine.gap_mm).abs() < 2.5e-3, "{usual:?} {fine:?}");
             assert!(off(usual.corner_n, fine.corner_n).abs() < 3e-3, "{usual:?} {fine:?}");
         }
     }
