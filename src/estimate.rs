@@ -3,5 +3,6 @@
 pub mod crossing;
 pub mod odometry;
 mod stage;
+pub mod vibration;
 
 pub use stage::ContactStage;

@@ -20,6 +20,7 @@ mod paper;
 mod parse;
 mod scenario;
 mod size;
+mod stress;
 mod test;
 
 use std::process::ExitCode;
@@ -46,6 +47,7 @@ enum Verb {
     Montecarlo(montecarlo::Args),
     Paper(paper::Args),
     Keys(keys::Args),
+    Stress(stress::Args),
     Size(size::Args),
     Account(account::Args),
     Constants(constants::Args),
@@ -63,6 +65,7 @@ impl Verb {
             Self::Montecarlo(args) => montecarlo::run(args),
             Self::Paper(args) => paper::run(args),
             Self::Keys(args) => keys::run(args),
+            Self::Stress(args) => stress::run(args),
             Self::Size(args) => size::run(args),
             Self::Account(args) => account::run(args),
             Self::Constants(args) => constants::run(args),

@@ -19,5 +19,6 @@ pub mod reference;
 pub mod report;
 pub mod scenario;
 pub mod sil;
+pub mod stress;
 pub mod table;
 pub mod testing;

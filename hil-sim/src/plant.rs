@@ -7,6 +7,7 @@ pub mod balance;
 pub mod crossing;
 pub mod draw;
 pub mod ledger;
+pub mod limits;
 pub mod precision;
 pub mod rig;
 pub mod ring;

@@ -17,6 +17,7 @@ use super::schedule::{Course, Schedule, Targets};
 use super::speed_loop::SpeedLoop;
 use crate::estimate::ContactStage;
 use crate::estimate::crossing::{Contact, CrossingWatch};
+use crate::estimate::vibration::VibrationObserver;
 use crate::hal::{Duty, MotorCommand};
 use crate::log::{Entry, Event, Telemetry};
 use crate::model::{Plan, PlanRequest};
@@ -83,6 +84,9 @@ pub struct Controller {
     senses: Senses,
     monitor: Monitor,
     watch: CrossingWatch,
+    vibration: VibrationObserver,
+    /// Stages that the phase does not need are left out.
+    skipping: bool,
     rise: Rise,
     schedule: Schedule,
     profile: Profile,
@@ -160,6 +164,7 @@ impl Controller {
         let targets = self.targets(state, &mut pass);
         let (drive, preload) = self.actuate(state, &pass, &targets);
         self.note_stage(state, &mut pass);
+        self.follow_vibration(state, &pass);
         pass.output.drive = drive;
         pass.output.preload = preload;
         pass.output.telemetry = self.telemetry(state, &pass, &targets);
@@ -351,6 +356,25 @@ impl Controller {
         self.steps.get(usize::from(step).checked_sub(1)?).copied()
     }
 
+    /// Listens to the arm's mode from the approach to a step until it is behind. The
+    /// observer starts afresh each time, so that what it did before does not matter.
+    fn follow_vibration(&self, state: &mut State, pass: &Pass<'_>) {
+        let awake = matches!(state.mode, Mode::Run(_, Leg::Approach | Leg::Crossing));
+        let shaking = &mut state.vibration;
+        let compression = pass.sensed.compression.value;
+        if awake && !shaking.awake {
+            self.vibration.reset(&mut shaking.observer, compression);
+            shaking.peak = Q16::ZERO;
+        }
+        shaking.awake = awake;
+        if awake || !self.skipping {
+            let amplitude = self.vibration.step(&mut shaking.observer, compression);
+            if awake {
+                shaking.peak = shaking.peak.max(amplitude);
+            }
+        }
+    }
+
     fn note_stage(&self, state: &mut State, pass: &mut Pass<'_>) {
         let stage = match (state.mode, state.contact()) {
             (Mode::Run(..) | Mode::Stopping(_), Contact::Both) => ContactStage::StaticFriction,
@@ -387,6 +411,7 @@ impl Controller {
             level: state.level,
             gap_predicted: state.plan.as_ref().map_or(Q16::ZERO, |plan| plan.gap),
             slip_margin: if crossing { planned.min(rolling) } else { rolling },
+            vibration: state.vibration.peak,
             distance: self.distance(state, pass, state.direction).unwrap_or(Q16::MAX),
             drive: duty(pass.output.drive),
             pretightener: duty(pass.output.preload),

@@ -34,6 +34,9 @@ pub struct Telemetry {
     pub gap_predicted: Millimetres,
     /// Friction left unused, by the model for the present contact.
     pub slip_margin: Ratio,
+    /// Amplitude of the arm's mode: its largest since the approach to the latest step
+    /// began, mm.
+    pub vibration: Millimetres,
     /// Distance to the next corner touch, mm; 32767 when none is expected.
     pub distance: Millimetres,
     /// Drive duty.

@@ -13,7 +13,8 @@ use crate::units::Q16;
 ///
 /// Any units. Range: the argument is clamped to the table's; N is at least 4.
 /// Error: `0.017 h^3 max|f'''|` inside, six times that in the first and last interval,
-/// h being the spacing, plus 1.5 LSB of arithmetic; [`Table::solve`] accordingly.
+/// h being the spacing, plus 1.5 LSB of arithmetic and `2^-32 (N - 1)` of the largest slope
+/// per interval, for the argument's place; [`Table::solve`] accordingly.
 /// Cost of a value: four wide multiplies and about a hundred other instructions.
 ///
 /// Source: Catmull and Rom 1974; the error constant is that of the central slope

@@ -18,33 +18,33 @@ pub struct DriveMotor {
     pub friction_n: f64,
 }
 
+/// What the drive works against, at the tread.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Load {
+    /// Force at constant speed, N, signed as the speed that it resists.
+    pub force_n: f64,
+    /// Mass that moves with the tread, kg.
+    pub mass_kg: f64,
+}
+
+impl Load {
+    /// A force without inertia.
+    #[must_use]
+    pub const fn force(force_n: f64) -> Self {
+        Self { force_n, mass_kg: 0.0 }
+    }
+}
+
 impl DriveMotor {
-    /// Tread speed after `dt_s` at `duty` (-1 to 1) against `load_n` from speed
-    /// `speed`, and the motor's force, N. Exact between the current limits.
+    /// Tread speed after `dt_s` at `duty` (-1 to 1) against `load` from speed
+    /// `speed`, and the motor's mean force, N. Exact for a constant load, across the
+    /// current limit too.
     ///
     /// The worm gear locks itself: a load against the motion resists it, one along the
     /// motion does not help, and none turns a resting wheel. A disabled bridge stops
     /// the wheel within a few milliseconds.
     #[must_use]
-    pub fn step(&self, speed: f64, duty: f64, enabled: bool, load_n: f64, dt_s: f64) -> (f64, f64) {
-        self.step_keeping(self.keeps(dt_s), speed, duty, enabled, load_n, dt_s)
-    }
-
-    /// What is left after `dt_s` of a speed that is not the one it settles at.
-    pub(super) fn keeps(&self, dt_s: f64) -> f64 {
-        (-1000.0 / self.mass_kg * self.stall_n / self.no_load_mm_s * dt_s).exp()
-    }
-
-    /// [`DriveMotor::step`] with what [`DriveMotor::keeps`] says of it.
-    pub(super) fn step_keeping(
-        &self,
-        keeps: f64,
-        speed: f64,
-        duty: f64,
-        enabled: bool,
-        load_n: f64,
-        dt_s: f64,
-    ) -> (f64, f64) {
+    pub fn step(&self, speed: f64, duty: f64, enabled: bool, load: Load, dt_s: f64) -> (f64, f64) {
         if !enabled {
             let stopped = speed * (-dt_s / 0.003).exp();
             return (if stopped.abs() < 1e-3 { 0.0 } else { stopped }, 0.0);
@@ -52,20 +52,47 @@ impl DriveMotor {
         let force =
             (self.stall_n * (duty - speed / self.no_load_mm_s)).clamp(-self.limit_n, self.limit_n);
         let sense = if speed != 0.0 { speed.signum() } else { force.signum() };
-        let against = (load_n * sense).max(0.0) + self.friction_n;
+        let against = (load.force_n * sense).max(0.0) + self.friction_n;
         if speed == 0.0 && force * sense <= against {
             return (0.0, force);
         }
-        let resist = sense * against;
-        let acceleration = 1000.0 / self.mass_kg;
-        let next = if force.abs() < self.limit_n {
-            let rest = self.no_load_mm_s * (duty - resist / self.stall_n);
-            rest + (speed - rest) * keeps
+        // What the load carries is accelerated with the wheel, but cannot drive it: only
+        // while load and inertia together resist.
+        let both_kg = self.mass_kg + load.mass_kg;
+        let driving = sense * force - self.friction_n - load.force_n * sense;
+        let (mass_kg, against) = if load.force_n * sense * both_kg + load.mass_kg * driving >= 0.0 {
+            (both_kg, against)
         } else {
-            speed + acceleration * (force - resist) * dt_s
+            (self.mass_kg, self.friction_n)
         };
+        let resist = sense * against;
+        let next = self.accelerate(speed, duty, resist, mass_kg, dt_s);
         // Load and friction brake to rest, never through it.
-        (if next * sense <= 0.0 { 0.0 } else { next }, force)
+        if next * sense <= 0.0 {
+            return (0.0, force);
+        }
+        (next, resist + 1e-3 * mass_kg * (next - speed) / dt_s)
+    }
+
+    /// Speed after `dt_s` against a constant force: at the current limit evenly
+    /// accelerated as far as that goes, then as the motor's own lag has it.
+    fn accelerate(&self, speed: f64, duty: f64, resist: f64, mass_kg: f64, dt_s: f64) -> f64 {
+        let free = self.stall_n * (duty - speed / self.no_load_mm_s);
+        let force = free.clamp(-self.limit_n, self.limit_n);
+        let (mut speed, mut left_s) = (speed, dt_s);
+        if free != force {
+            let rate = 1000.0 / mass_kg * (force - resist);
+            // Speed at which the limit no longer binds.
+            let knee = self.no_load_mm_s * (duty - force / self.stall_n);
+            let until_s = (knee - speed) / rate;
+            if !(until_s >= 0.0 && until_s < dt_s) {
+                return speed + rate * dt_s;
+            }
+            (speed, left_s) = (knee, dt_s - until_s);
+        }
+        let rate = 1000.0 / mass_kg * self.stall_n / self.no_load_mm_s;
+        let rest = self.no_load_mm_s * (duty - resist / self.stall_n);
+        rest + (speed - rest) * (-rate * left_s).exp()
     }
 }
 
@@ -158,11 +185,11 @@ mod tests {
         };
         let mut speed = 0.0;
         for _ in 0..2000 {
-            speed = drive.step(speed, 0.5, true, 10.0, 1e-3).0;
+            speed = drive.step(speed, 0.5, true, Load::force(10.0), 1e-3).0;
         }
         assert!((speed - 60.0 * (0.5 - 12.0 / 160.0)).abs() < 1e-6, "{speed}");
         for _ in 0..50 {
-            speed = drive.step(speed, 0.5, false, 10.0, 1e-3).0;
+            speed = drive.step(speed, 0.5, false, Load::force(10.0), 1e-3).0;
         }
         assert_eq!(speed, 0.0);
     }
@@ -177,6 +204,7 @@ mod tests {
             friction_n: 2.0,
         };
         let settled = |duty: f64, load: f64| {
+            let load = Load::force(load);
             (0..3000).fold(0.0, |speed, _| drive.step(speed, duty, true, load, 1e-3).0)
         };
         // At rest no load turns it, nor does a motor weaker than load and friction.
@@ -189,7 +217,8 @@ mod tests {
         assert_eq!(settled(0.5, -30.0), settled(0.5, 0.0));
         assert!((settled(-0.5, 30.0) + settled(0.5, 0.0)).abs() < 1e-12);
         // Beyond the current limit it stalls, from speed too.
-        let stalled = (0..3000).fold(30.0, |v, _| drive.step(v, 1.0, true, 79.0, 1e-3).0);
+        let load = Load::force(79.0);
+        let stalled = (0..3000).fold(30.0, |v, _| drive.step(v, 1.0, true, load, 1e-3).0);
         assert_eq!(stalled, 0.0);
     }
 
@@ -202,12 +231,49 @@ mod tests {
             mass_kg: 40.0,
             friction_n: 2.0,
         };
-        let (speed, force) = drive.step(0.0, 1.0, true, 0.0, 1e-3);
-        assert_eq!(force, 80.0);
+        let (speed, force) = drive.step(0.0, 1.0, true, Load::default(), 1e-3);
+        assert!((force - 80.0).abs() < 1e-9, "{force}");
         assert!((speed - 78.0 / 40.0).abs() < 1e-12, "{speed}");
-        let (speed, force) = drive.step(50.0, -1.0, true, 0.0, 1e-3);
-        assert_eq!(force, -80.0);
+        let (speed, force) = drive.step(50.0, -1.0, true, Load::default(), 1e-3);
+        assert!((force + 80.0).abs() < 1e-9, "{force}");
         assert!((speed - (50.0 - 82.0 / 40.0)).abs() < 1e-12, "{speed}");
+    }
+
+    #[test]
+    fn one_long_step_is_many_short_ones_across_the_limit() {
+        for mass_kg in [0.01, 1.0, 40.0] {
+            let drive = DriveMotor {
+                no_load_mm_s: 60.0,
+                stall_n: 160.0,
+                limit_n: 80.0,
+                mass_kg,
+                friction_n: 2.0,
+            };
+            for load in [Load::force(10.0), Load { force_n: 10.0, mass_kg: 30.0 }] {
+                let step = |speed: f64, dt_s| drive.step(speed, 0.9, true, load, dt_s).0;
+                let long = step(0.0, 20e-3);
+                let short = (0..2000).fold(0.0, |speed, _| step(speed, 10e-6));
+                assert!((long - short).abs() < 1e-3 * short, "{long} {short}");
+                assert!(long < 60.0, "{long}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_carried_mass_is_accelerated_but_drives_nothing() {
+        let drive = DriveMotor {
+            no_load_mm_s: 60.0,
+            stall_n: 160.0,
+            limit_n: 80.0,
+            mass_kg: 1.0,
+            friction_n: 2.0,
+        };
+        let carried = Load { force_n: 0.0, mass_kg: 99.0 };
+        let (speed, force) = drive.step(0.0, 1.0, true, carried, 1e-3);
+        assert!((speed - 0.78).abs() < 1e-12 && (force - 80.0).abs() < 1e-9, "{speed}");
+        // Braking, the worm holds it: only the rotor is braked.
+        let (speed, _) = drive.step(50.0, 0.0, true, carried, 1e-4);
+        assert!((speed - (50.0 - 8.2)).abs() < 1e-9, "{speed}");
     }
 
     #[test]

@@ -21,6 +21,10 @@ pub use phases::{PHASES, Phase, PhaseWork};
 /// Most ring steps in a call: 10 mm of way at the usual stride.
 const MOST_STRIDES: f64 = 256.0;
 
+/// Way after which motor, friction and wall exchange their forces, if the step of time is
+/// longer than that, mm.
+pub const EXCHANGE_MM: f64 = 1.0;
+
 /// How finely the rig is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Resolution {
@@ -134,8 +138,6 @@ pub struct VirtualRig {
     ripple_phase: (f64, f64),
     /// Elastic force of the modes, their mean, N.
     vibration_n: f64,
-    /// Step, s, and what the drive keeps of its speed over it.
-    keeps: (f64, f64),
     truth: Truth,
     ledger: Ledger,
     /// Sliding bodily over the wall.
@@ -196,7 +198,6 @@ impl VirtualRig {
             modes,
             ripple_phase: (0.0, 1.0),
             vibration_n: 0.0,
-            keeps: (0.0, 1.0),
             truth: Truth {
                 position_mm,
                 height_mm: local.base_mm + rest.height_mm,
@@ -226,6 +227,16 @@ impl VirtualRig {
     #[must_use]
     pub fn with_resolution(mut self, resolution: Resolution) -> Self {
         self.resolution = resolution;
+        self
+    }
+
+    /// The same rig, its wheel already rolling at this speed, mm/s.
+    #[must_use]
+    pub fn with_speed(mut self, speed_mm_s: f64) -> Self {
+        self.truth.tread_mm_s = speed_mm_s;
+        self.truth.speed_mm_s = speed_mm_s;
+        self.rolled_mm_s = speed_mm_s;
+        self.parked = false;
         self
     }
 
@@ -261,13 +272,18 @@ impl VirtualRig {
     /// [`PlantError`] when the state stops meaning anything.
     pub fn step(&mut self, drives: &Drives, dt_s: f64) -> Result<(), PlantError> {
         self.preload.step(drives.preload, drives.preload_on, dt_s);
-        self.turn_wheel(drives, dt_s);
-        self.check()?;
-        let way = self.truth.tread_mm_s.abs().max(self.truth.speed_mm_s.abs()) * dt_s;
-        let parts = (way / self.resolution.stride_mm).ceil().clamp(1.0, MOST_STRIDES);
         let before = self.work();
-        for _ in 0..parts as usize {
-            self.roll(dt_s / parts)?;
+        let mut left_s = dt_s;
+        while left_s > 0.0 {
+            let part_s = self.exchange(left_s);
+            self.turn_wheel(drives, part_s);
+            self.check()?;
+            let way = self.truth.tread_mm_s.abs().max(self.truth.speed_mm_s.abs()) * part_s;
+            let parts = (way / self.resolution.stride_mm).ceil().clamp(1.0, MOST_STRIDES);
+            for _ in 0..parts as usize {
+                self.roll(part_s / parts)?;
+            }
+            left_s -= part_s;
         }
         self.count(&before, dt_s);
         self.vibrate(dt_s);
@@ -276,16 +292,25 @@ impl VirtualRig {
         self.check()
     }
 
+    /// How long motor and wall may go on with the forces that they have, up to `left_s`:
+    /// until wheel or carriage have moved by [`EXCHANGE_MM`].
+    fn exchange(&self, left_s: f64) -> f64 {
+        let drive = &self.parameters.drive;
+        let (tread, speed) = (self.truth.tread_mm_s.abs(), self.truth.speed_mm_s.abs());
+        // The most that motor and carriage can gain.
+        let gain = 1000.0 * drive.limit_n / drive.mass_kg * left_s;
+        let spin = (tread + gain).min(tread.max(drive.no_load_mm_s));
+        let slide = if self.sliding { speed + self.sliding_gain() * left_s } else { speed };
+        let way = spin.max(slide) * left_s;
+        if way <= EXCHANGE_MM { left_s } else { left_s / (way / EXCHANGE_MM).ceil() }
+    }
+
     /// Motor and gearbox: the wheel's spin.
     fn turn_wheel(&mut self, drives: &Drives, dt_s: f64) {
         let before = self.truth.tread_mm_s;
         let load = self.drive_load(drives.drive);
         let drive = &self.parameters.drive;
-        if self.keeps.0 != dt_s {
-            self.keeps = (dt_s, drive.keeps(dt_s));
-        }
-        let (after, force) =
-            drive.step_keeping(self.keeps.1, before, drives.drive, drives.drive_on, load, dt_s);
+        let (after, force) = drive.step(before, drives.drive, drives.drive_on, load, dt_s);
         self.truth.tread_mm_s = after;
         self.truth.work_mj += (force * 0.5 * (before + after) * dt_s).max(0.0);
         self.acceleration = (after - before) / dt_s;

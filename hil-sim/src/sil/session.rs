@@ -73,6 +73,14 @@ impl Session {
         })
     }
 
+    /// The same session with every stage of the controller run in every tick, needed or
+    /// not.
+    #[must_use]
+    pub fn without_skipping(mut self) -> Self {
+        self.controller = self.controller.without_skipping();
+        self
+    }
+
     /// The same with every ring element visited, see [`VirtualRig::visiting_all`].
     #[must_use]
     pub fn visiting_all(mut self) -> Self {

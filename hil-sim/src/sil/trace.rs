@@ -201,6 +201,7 @@ fn digest(digest: &mut Sha256, seen: &Telemetry) {
         seen.radius,
         seen.gap_predicted,
         seen.slip_margin,
+        seen.vibration,
         seen.distance,
     ];
     digest.update(seen.at.to_le_bytes());

@@ -7,6 +7,7 @@ use crate::control::rise::Rise;
 use crate::control::schedule::Schedule;
 use crate::control::speed_loop::SpeedLoop;
 use crate::estimate::crossing::CrossingWatch;
+use crate::estimate::vibration::VibrationObserver;
 use crate::model::formula::Formula;
 use crate::numeric::checked;
 use crate::rig::{Rig, RigError};
@@ -42,6 +43,8 @@ impl Controller {
             senses: Senses::try_build_tuned(rig, &tuning)?,
             monitor: Monitor::try_build(rig)?,
             watch: CrossingWatch::try_build(rig)?,
+            vibration: VibrationObserver::try_build(rig)?,
+            skipping: true,
             rise: Rise::try_build(rig)?,
             schedule: Schedule::try_build(rig)?,
             profile: Profile::try_build(rig)?,
@@ -70,5 +73,13 @@ impl Controller {
             )?,
             friction: checked("plant.mu", rig.plant.mu)?,
         })
+    }
+
+    /// The same controller with every stage run in every tick, needed or not: what it
+    /// puts out is the same to the bit.
+    #[must_use]
+    pub fn without_skipping(mut self) -> Self {
+        self.skipping = false;
+        self
     }
 }

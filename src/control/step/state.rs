@@ -6,6 +6,7 @@ use crate::control::speed_loop::SpeedLoopState;
 use crate::estimate::ContactStage;
 use crate::estimate::crossing::{Contact, WatchState};
 use crate::estimate::odometry::Odometry;
+use crate::estimate::vibration::VibrationState;
 use crate::model::{Plan, Review};
 use crate::sense::SensesState;
 use crate::supervise::{Direction, Leg, Mode, MonitorState};
@@ -35,6 +36,7 @@ pub struct State {
     pub(super) searching: bool,
     pub(super) watch: WatchState,
     pub(super) stage: ContactStage,
+    pub(super) vibration: Shaking,
     /// Level by steps recognised.
     pub(super) level: u8,
     /// Step ahead, from 1; 0 when none is left.
@@ -79,6 +81,16 @@ pub struct State {
     pub(super) lost_in_a_row: u8,
     /// Steps climbed that the table lacks, since the stow end.
     pub(super) extra: u8,
+}
+
+/// What is known of the arm's vibration.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Shaking {
+    pub observer: VibrationState,
+    /// The observer is being listened to.
+    pub awake: bool,
+    /// Largest amplitude since it woke, mm.
+    pub peak: Millimetres,
 }
 
 /// A crossing under way.
@@ -152,6 +164,7 @@ impl Default for State {
             searching: false,
             watch: WatchState::default(),
             stage: ContactStage::Initial,
+            vibration: Shaking::default(),
             level: 0,
             next_step: 0,
             direction: Direction::Deploy,

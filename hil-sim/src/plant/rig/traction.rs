@@ -2,6 +2,7 @@
 //! while it slides, and what the climb, the arm and the end stops do to both.
 
 use super::VirtualRig;
+use crate::plant::actuators::Load;
 use crate::plant::balance::Axial;
 
 /// Carrying less of its friction than this part for radial load, a sliding wheel is as
@@ -29,23 +30,37 @@ impl VirtualRig {
         if self.parked { 0.0 } else { self.parameters.arm.wedge(self.truth.radius_mm) }
     }
 
-    /// Load on the drive at the tread, N: traction, or an end stop in its way.
-    pub(super) fn drive_load(&self, duty: f64) -> f64 {
+    /// Load on the drive at the tread: traction, or an end stop in its way. What a
+    /// gripping wheel carries along is a mass to the drive; taken as a force, a tick
+    /// late, a carriage heavier than the rotor would shake it ever more.
+    pub(super) fn drive_load(&self, duty: f64) -> Load {
         if self.parked {
-            return 0.0;
+            return Load::default();
         }
-        let traction = self.truth.utilisation * self.forces.0;
+        let (normal, cosine, _) = self.forces;
+        let traction = self.truth.utilisation * normal;
         let (low, high) = self.parameters.stops_mm;
         let position = self.truth.position_mm;
         if (position < high || duty <= 0.0) && (position > low || duty >= 0.0) {
-            return traction;
+            if self.sliding || cosine <= 0.0 {
+                return Load::force(traction);
+            }
+            let mass_kg = self.parameters.mass_kg * normal / cosine;
+            return Load { force_n: traction - 1e-3 * mass_kg * self.acceleration, mass_kg };
         }
         let friction = self.parameters.mu.copysign(duty);
         if self.truth.utilisation == friction {
-            return traction;
+            return Load::force(traction);
         }
         // What it takes to slide; jammed by the arm it does not.
-        friction * self.forces.0 / self.freedom(friction, self.forces).max(JAMMED_BELOW)
+        Load::force(friction * normal / self.freedom(friction, self.forces).max(JAMMED_BELOW))
+    }
+
+    /// Largest acceleration of a sliding carriage, mm/s^2.
+    pub(super) fn sliding_gain(&self) -> f64 {
+        let (_, cosine, sine) = self.forces;
+        let most = self.parameters.mu * cosine + sine.abs() + self.parameters.load_n.abs();
+        1000.0 * most / self.parameters.mass_kg
     }
 
     /// How the wheel moves in a stride, from the forces of the last.
@@ -63,19 +78,27 @@ impl VirtualRig {
         let gripped = self.gripped(needed.clamp(-mu, mu));
         let grips = needed.abs() < mu;
         let gripping = Gait { speed: gripped, gripped, axial: Axial::Driven(load) };
-        if grips && !self.sliding {
+        // Friction has to bring the carriage to the speed at which the tread grips.
+        let missing = sine + self.parameters.load_n;
+        let short = 1e-3 * self.parameters.mass_kg * (gripped - self.truth.speed_mm_s) / dt_s;
+        let reached = (short + missing).abs() <= mu * cosine;
+        if grips && reached && !self.sliding {
             return gripping;
         }
         // Sliding: friction is spent against the slip, and what is missing accelerates
         // the carriage.
         let slip = gripped - self.truth.speed_mm_s;
         let sense = if slip.abs() > 1e-9 { slip.signum() } else { needed.signum() };
+        let per_force = 1000.0 / self.parameters.mass_kg * dt_s;
         let Some(axial) = self.sliding_towards(sense) else {
             self.sliding = false;
-            return gripping;
+            // Jammed, the arm presses as hard as it takes, but not at once.
+            let most = per_force * mu * cosine.max(0.0);
+            let wanted = slip + per_force * missing;
+            let change = wanted.clamp(-most, most) - per_force * missing;
+            return Gait { speed: self.truth.speed_mm_s + change, ..gripping };
         };
-        let missing = mu * sense * cosine - sine - self.parameters.load_n;
-        let speed = self.truth.speed_mm_s + 1000.0 * missing / self.parameters.mass_kg * dt_s;
+        let speed = self.truth.speed_mm_s + per_force * (mu * sense * cosine - missing);
         let left = gripped - speed;
         if grips && (left * slip <= 0.0 || left.abs() < GRIPS_WITHIN) {
             self.sliding = false;

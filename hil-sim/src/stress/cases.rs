@@ -1,0 +1,238 @@
+//! What the plant is stressed with: all corners of the ranges, and a low-discrepancy
+//! sequence between them.
+
+use serde::Serialize;
+
+/// Range of a parameter, and how it is filled.
+#[derive(Clone, Copy, Debug)]
+enum Range {
+    /// Evenly.
+    Even(f64, f64),
+    /// Evenly in the logarithm.
+    Decades(f64, f64),
+}
+
+impl Range {
+    /// The value at this part of the range.
+    fn at(self, part: f64) -> f64 {
+        match self {
+            Self::Even(low, high) => low + part * (high - low),
+            Self::Decades(low, high) if part >= 1.0 => low.max(high),
+            Self::Decades(low, high) => low * (high / low).powf(part),
+        }
+    }
+}
+
+/// Contact stiffness, Pa/m.
+const STIFFNESS: Range = Range::Decades(1e6, 1e12);
+/// Stiffening, dimensionless.
+const STIFFENING: Range = Range::Decades(1.0, 100.0);
+/// Relaxation time, s.
+const TAU: Range = Range::Decades(1e-6, 1e3);
+/// Step of time, s.
+const STEP_OF_TIME: Range = Range::Decades(1e-6, 20e-3);
+/// Moved mass over the drive's reflected mass.
+const MASS_RATIO: Range = Range::Decades(1e-3, 1e3);
+/// Speed of the tread, mm/s. Squared, so that slow runs have their share.
+const SPEED: Range = Range::Even(0.0, 2000.0);
+/// Height of the step, mm.
+const STEP: Range = Range::Even(0.0, 20.0);
+/// Friction.
+const FRICTION: Range = Range::Even(0.0, 3.0);
+/// Preload, N.
+const PRELOAD: Range = Range::Decades(5.0, 150.0);
+/// Axial load, N.
+const LOAD: Range = Range::Even(0.0, 60.0);
+
+/// Parameters whose ends are all combined as corners.
+const ENDS: usize = 8;
+
+/// Dimensions of a case.
+const DIMENSIONS: usize = 13;
+
+/// How the wheel is driven.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Course {
+    /// At constant speed outwards.
+    Forward,
+    /// At constant speed back.
+    Back,
+    /// Outwards, then back over the same way.
+    Reversing,
+    /// To and fro, four times.
+    Rocking,
+    /// Outwards, then the bridge is switched off.
+    Coasting,
+}
+
+impl Course {
+    /// All of them.
+    pub const ALL: [Self; 5] =
+        [Self::Forward, Self::Back, Self::Reversing, Self::Rocking, Self::Coasting];
+
+    /// Speed in parts of the full one at this part of the run.
+    #[must_use]
+    pub fn speed(self, part: f64) -> f64 {
+        match self {
+            Self::Forward => 1.0,
+            Self::Back => -1.0,
+            Self::Reversing if part < 0.5 => 1.0,
+            Self::Reversing => -1.0,
+            Self::Rocking if (4.0 * part).fract() < 0.5 => 1.0,
+            Self::Rocking => -1.0,
+            Self::Coasting if part < 0.5 => 1.0,
+            Self::Coasting => 0.0,
+        }
+    }
+}
+
+/// One set of parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Case {
+    /// Its number.
+    pub index: usize,
+    /// Relaxed stiffness of the contact, Pa/m.
+    pub k_inf_pa_per_m: f64,
+    /// Stiffening.
+    pub stiffening: f64,
+    /// Relaxation time, s.
+    pub tau_s: f64,
+    /// Step of time, s.
+    pub dt_s: f64,
+    /// Moved mass over reflected mass.
+    pub mass_ratio: f64,
+    /// Moved mass, kg.
+    pub mass_kg: f64,
+    /// Speed, mm/s.
+    pub speed_mm_s: f64,
+    /// Height of the step, mm.
+    pub step_mm: f64,
+    /// Friction.
+    pub mu: f64,
+    /// Preload, N.
+    pub preload_n: f64,
+    /// Axial load, N.
+    pub load_n: f64,
+    /// Sense of the arm's coupling.
+    pub coupling: f64,
+    /// How it is driven.
+    pub course: Course,
+    /// Where the run begins, parts of the way over the step before the touch.
+    pub phase: f64,
+}
+
+/// The first `count` cases of the stress with this seed: every fourth corner of the
+/// eight ranges for small counts, all corners from a thousand cases on, the rest from
+/// the sequence.
+#[must_use]
+pub fn draw(count: usize, seed: u64) -> Vec<Case> {
+    let every = if count < 1000 { 4 } else { 1 };
+    let corners = (0..1 << ENDS).step_by(every).map(corner);
+    let sequence = Sequence::new(seed);
+    let inside = (0..).map(|n| of(&sequence.point(n)));
+    let all = corners.chain(inside).take(count).enumerate();
+    all.map(|(index, case)| Case { index, ..case }).collect()
+}
+
+fn corner(bits: usize) -> Case {
+    // The dimensions that have no ends cycle through their middle values.
+    let cycle = |of: usize| ((bits * 7 + of * 3) % 10) as f64 / 10.0 + 0.05;
+    let mut parts: [f64; DIMENSIONS] = std::array::from_fn(cycle);
+    for (dimension, part) in parts.iter_mut().enumerate().take(ENDS) {
+        *part = f64::from(u8::from(bits >> dimension & 1 == 1));
+    }
+    of(&parts)
+}
+
+fn of(parts: &[f64; DIMENSIONS]) -> Case {
+    let [k, s, tau, dt, ratio, v, h, mu, preload, load, arm, course, phase] = *parts;
+    let mass_ratio = MASS_RATIO.at(ratio);
+    Case {
+        index: 0,
+        k_inf_pa_per_m: STIFFNESS.at(k),
+        // A fifth of the treads is without damping.
+        stiffening: STIFFENING.at((1.25 * s - 0.25).max(0.0)),
+        tau_s: TAU.at(tau),
+        dt_s: STEP_OF_TIME.at(dt),
+        mass_ratio,
+        // Both masses move away from 40 kg and 1 kg by half of the ratio's decades.
+        mass_kg: 6.0 * mass_ratio.sqrt(),
+        speed_mm_s: SPEED.at(v * v * v),
+        step_mm: STEP.at(h),
+        mu: FRICTION.at(mu),
+        preload_n: PRELOAD.at(preload),
+        load_n: LOAD.at(load * load),
+        coupling: [1.0, 1.0, 0.0, 0.0, 0.0, -1.0][((arm * 6.0) as usize).min(5)],
+        course: Course::ALL[((course * 5.0) as usize).min(4)],
+        phase,
+    }
+}
+
+/// The additive recurrence with the powers of the generalised golden ratio, from an
+/// offset drawn from the seed.
+///
+/// Source: Roberts, The unreasonable effectiveness of quasirandom sequences, 2018.
+struct Sequence {
+    offset: [f64; DIMENSIONS],
+    step: [f64; DIMENSIONS],
+}
+
+impl Sequence {
+    fn new(seed: u64) -> Self {
+        use rand::{Rng, SeedableRng};
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+        // The real root of x^(d+1) = x + 1.
+        let mut root = 1.0f64;
+        for _ in 0..64 {
+            root = (1.0 + root).powf(1.0 / (DIMENSIONS as f64 + 1.0));
+        }
+        Self {
+            offset: std::array::from_fn(|_| random.random()),
+            step: std::array::from_fn(|d| root.powi(-(d as i32) - 1)),
+        }
+    }
+
+    fn point(&self, n: u64) -> [f64; DIMENSIONS] {
+        std::array::from_fn(|d| (self.offset[d] + n as f64 * self.step[d]).fract())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_range_is_reached_from_end_to_end() {
+        let cases = draw(4000, 1);
+        type Pick = fn(&Case) -> f64;
+        let ranges: [(Pick, f64, f64); 8] = [
+            (|c| c.k_inf_pa_per_m, 1e6, 1e12),
+            (|c| c.stiffening, 1.0, 100.0),
+            (|c| c.tau_s, 1e-6, 1e3),
+            (|c| c.dt_s, 1e-6, 20e-3),
+            (|c| c.mass_ratio, 1e-3, 1e3),
+            (|c| c.speed_mm_s, 0.0, 2000.0),
+            (|c| c.step_mm, 0.0, 20.0),
+            (|c| c.mu, 0.0, 3.0),
+        ];
+        for (index, (pick, low, high)) in ranges.into_iter().enumerate() {
+            let values = || cases.iter().map(pick);
+            assert_eq!(values().fold(f64::INFINITY, f64::min), low, "{index}");
+            assert_eq!(values().fold(0.0, f64::max), high, "{index}");
+            let tenth = low + 0.1 * (high - low);
+            assert!(values().filter(|&v| v > low && v < tenth).count() > 100, "{index}");
+        }
+        for course in Course::ALL {
+            assert!(cases.iter().filter(|case| case.course == course).count() > 400);
+        }
+        assert!(cases.iter().filter(|case| case.stiffening == 1.0).count() > 500);
+    }
+
+    #[test]
+    fn a_seed_is_a_set_of_cases() {
+        assert_eq!(draw(500, 3), draw(500, 3));
+        assert_ne!(draw(500, 3)[400], draw(500, 4)[400]);
+        assert_eq!(draw(500, 3)[..64], draw(64, 9)[..]);
+    }
+}

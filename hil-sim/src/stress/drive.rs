@@ -1,0 +1,118 @@
+//! A case on the whole rig: motor, arm, screw, friction and ring, along its course over
+//! the step, with its energies accounted for.
+
+use super::cases::{Case, Course};
+use super::roll::{self, RADIUS_MM};
+use crate::plant::actuators::DriveMotor;
+use crate::plant::draw::{ELEMENTS, PlantParameters};
+use crate::plant::rig::{Drives, EXCHANGE_MM, PlantError, Truth, VirtualRig};
+use crate::plant::wall::{Step, Wall};
+use crate::scenario::Scenario;
+
+/// Ring steps of a run, about.
+const BUDGET: f64 = 1000.0;
+
+/// Least number of steps of time.
+const LEAST_TICKS: f64 = 20.0;
+
+/// What a run shows.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Drove {
+    /// Largest depth of the tread, mm.
+    pub depth_mm: f64,
+    /// Largest separation of wheel and wall away from the step, mm.
+    pub separation_mm: f64,
+    /// Largest speed of the tread over that of the unloaded motor.
+    pub overspeed: f64,
+    /// Energy that nothing put in, mJ.
+    pub created_mj: f64,
+    /// What the stated approximations can account for, mJ.
+    pub allowed_mj: f64,
+}
+
+/// The rig of a case: the nominal one with the case's parameters.
+pub(super) fn plant(case: &Case) -> PlantParameters {
+    let mut plant = PlantParameters::draw(&Scenario::default());
+    // Strong enough to climb.
+    let limit_n = 2.0 * (case.load_n + case.preload_n);
+    plant.ring = roll::rubber(case);
+    plant.wall = Wall::new(vec![Step { position_mm: 0.0, height_mm: case.step_mm }]);
+    plant.arm.coupling = case.coupling;
+    plant.stops_mm = (-100.0, 100.0);
+    plant.mu = case.mu;
+    // The convention that keeps energy.
+    plant.climb_slows = true;
+    plant.load_n = case.load_n;
+    plant.mass_kg = case.mass_kg;
+    plant.drive = DriveMotor {
+        no_load_mm_s: (1.25 * case.speed_mm_s).max(1.0),
+        stall_n: 2.0 * limit_n,
+        limit_n,
+        mass_kg: case.mass_kg / case.mass_ratio,
+        friction_n: 0.02 * limit_n,
+    };
+    plant
+}
+
+fn ticks(case: &Case) -> usize {
+    let per_tick = case.speed_mm_s * case.dt_s;
+    let way = 2.0 * roll::reach(case.step_mm) + RADIUS_MM;
+    let strides = (per_tick / 0.02).ceil().clamp(1.0, BUDGET / LEAST_TICKS);
+    (way / per_tick).ceil().clamp(LEAST_TICKS, BUDGET / strides) as usize
+}
+
+/// Drives `case`.
+pub(super) fn run(case: &Case, plant: &PlantParameters) -> Result<Drove, PlantError> {
+    let ticks = ticks(case);
+    let way = case.speed_mm_s * case.dt_s * ticks as f64;
+    let lead = (0.3 * way).clamp(0.01, 0.5 * RADIUS_MM);
+    let start =
+        if case.course == Course::Back { lead } else { -roll::reach(case.step_mm) - 2.0 - lead };
+    let mut rig = VirtualRig::new(plant.clone(), start, case.preload_n, case.dt_s)
+        .with_speed(case.course.speed(0.0) * case.speed_mm_s);
+    let mut out = Drove::default();
+    let mut before = *rig.truth();
+    let (first, rest_mm) = (mechanical(plant, &before), before.depth_mm);
+    let (mut wedged, mut lift, mut kinetic, mut force) = (0.0, 0.0, 0.0f64, 0.0f64);
+    for tick in 0..ticks {
+        let part = tick as f64 / ticks as f64;
+        let speed = case.course.speed(part) * case.speed_mm_s;
+        let drive_on = !(case.course == Course::Coasting && part >= 0.5);
+        let drive = speed / plant.drive.no_load_mm_s;
+        rig.step(&Drives { drive, drive_on, ..Drives::default() }, case.dt_s)?;
+        let now = *rig.truth();
+        let rise = now.height_mm - before.height_mm;
+        // An arm that leans carries its load along as the wheel rises.
+        let lean = plant.arm.coupling * 0.5 * (now.arm_rad.tan() + before.arm_rad.tan());
+        wedged += plant.load_n * lean * rise;
+        lift += rise.abs();
+        force = force.max(now.floor_n + now.corner_n);
+        kinetic = kinetic.max(0.5e-3 * plant.mass_kg * now.speed_mm_s.powi(2));
+        let gained = mechanical(plant, &now) + wedged - first - now.work_mj;
+        out.created_mj = if gained.is_nan() { f64::NAN } else { out.created_mj.max(gained) };
+        out.depth_mm = out.depth_mm.max(now.depth_mm);
+        out.separation_mm = out.separation_mm.max(now.separation_mm);
+        let top = plant.drive.no_load_mm_s;
+        out.overspeed = out.overspeed.max(now.tread_mm_s.abs() / top);
+        before = now;
+    }
+    // The tread's own store; heights to the ring's elements, forces to the way after which
+    // motor and wall exchange them; work by trapezoids of a tick; creep, which follows
+    // traction at once though it is up to 7 % of the speed.
+    let pressed = case.preload_n + 1.1 * case.coupling.abs() * case.load_n;
+    let stored = pressed * (rest_mm + out.depth_mm.min(1.0));
+    let grain = std::f64::consts::TAU * RADIUS_MM / ELEMENTS as f64;
+    let exchanged = (case.speed_mm_s * case.dt_s).min(EXCHANGE_MM);
+    out.allowed_mj = stored + force * (grain + exchanged) + 0.03 * pressed * lift + 0.15 * kinetic;
+    Ok(out)
+}
+
+/// Kinetic and potential energy of masses, load and spring, mJ.
+fn mechanical(plant: &PlantParameters, truth: &Truth) -> f64 {
+    let rise = truth.height_mm - RADIUS_MM;
+    let spring = plant.spring_n_per_mm;
+    let seat = truth.preload_n - spring * rise;
+    let kinetic =
+        plant.mass_kg * truth.speed_mm_s.powi(2) + plant.drive.mass_kg * truth.tread_mm_s.powi(2);
+    0.5e-3 * kinetic + plant.load_n * truth.position_mm + (seat + 0.5 * spring * rise) * rise
+}

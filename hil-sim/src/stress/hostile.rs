@@ -1,0 +1,350 @@
+//! The controller under hostile inputs: on rigs at the ends of every parameter, with the
+//! least and largest codes, alternating ones and garbage, silent and lying clocks, plans
+//! that no planner would give. Nothing panics, and no bridge is on where none may be.
+//!
+//! Whether a sum wraps that was not meant to shows where overflow is checked: in the
+//! tests; the command runs the same without.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use interstage::control::{Controller, Input, Output, State};
+use interstage::model::reduced::{Point, ReducedModel, Scale};
+use interstage::model::{Plan, PlanRequest, Planner, Review};
+use interstage::rig::Rig;
+use interstage::sense::raw::{AdcCode, AngleFrame, EncoderCount, Sample, SensorFrame};
+use interstage::supervise::{Command, Direction, Mode};
+use interstage::units::{Q16, Tick};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// What is fed to the controller.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Feed {
+    /// Every code at its least.
+    Least,
+    /// Every code at its largest.
+    Largest,
+    /// Least and largest by turns.
+    Alternating,
+    /// Codes that mean something, of a rig that jumps about.
+    Jumping,
+    /// Any codes at any times.
+    Garbage,
+    /// Plausible codes at rest, plans and commands as wild as they come.
+    Plans,
+}
+
+impl Feed {
+    /// All of them.
+    pub const ALL: [Self; 6] =
+        [Self::Least, Self::Largest, Self::Alternating, Self::Jumping, Self::Garbage, Self::Plans];
+}
+
+/// A run that broke something.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Broken {
+    /// Which rig.
+    pub rig: String,
+    /// What was fed.
+    pub feed: String,
+    /// What happened.
+    pub why: String,
+}
+
+/// What the controller stands.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Report {
+    /// Rigs that make a controller.
+    pub rigs: usize,
+    /// Rigs that are refused, by their message.
+    pub refused: Vec<String>,
+    /// Ticks run.
+    pub ticks: u64,
+    /// Runs that broke something.
+    pub broken: Vec<Broken>,
+}
+
+/// Runs every feed on every corner rig for this many ticks.
+#[must_use]
+pub fn run(ticks: u32, seed: u64) -> Report {
+    let mut report = Report::default();
+    let mut rigs = Vec::new();
+    for (name, rig) in corner_rigs() {
+        match (Controller::try_build(&rig), Planner::try_build(&rig), ReducedModel::try_build(&rig))
+        {
+            (Ok(controller), Ok(planner), Ok(model)) => {
+                rigs.push((name, controller, planner, model));
+            }
+            (Err(error), ..) | (_, Err(error), _) | (.., Err(error)) => {
+                report.refused.push(format!("{name}: {error}"));
+            }
+        }
+    }
+    report.rigs = rigs.len();
+    report.ticks = (rigs.len() * Feed::ALL.len()) as u64 * u64::from(ticks);
+    report.broken = rigs
+        .par_iter()
+        .flat_map_iter(|(name, controller, planner, model)| {
+            let fed = Feed::ALL.iter().filter_map(move |&feed| {
+                let why = guarded(|| fed(controller, planner, feed, ticks, seed))?;
+                Some(Broken { rig: name.clone(), feed: format!("{feed:?}"), why })
+            });
+            let asked = guarded(|| asked(planner, model));
+            let asked =
+                asked.map(|why| Broken { rig: name.clone(), feed: "model".to_owned(), why });
+            fed.chain(asked)
+        })
+        .collect();
+    report
+}
+
+/// What `check` finds wrong, or how it panicked.
+fn guarded(check: impl FnOnce() -> Option<String>) -> Option<String> {
+    catch_unwind(AssertUnwindSafe(check)).unwrap_or_else(|panic| {
+        let text = panic.downcast_ref::<String>().cloned();
+        let text = text.or_else(|| panic.downcast_ref::<&str>().map(|&text| text.to_owned()));
+        Some(format!("panic: {}", text.unwrap_or_default()))
+    })
+}
+
+fn fed(
+    controller: &Controller,
+    planner: &Planner,
+    feed: Feed,
+    ticks: u32,
+    seed: u64,
+) -> Option<String> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed ^ feed as u64);
+    let mut state = State::default();
+    let mut answer: Option<Plan> = None;
+    // Across the wrap of the clock.
+    let start = u32::MAX - ticks / 3;
+    for tick in 0..ticks {
+        let now = start.wrapping_add(tick);
+        let input = Input {
+            now,
+            sensors: frame(feed, tick, now, &mut random),
+            command: tick.is_multiple_of(97).then(|| {
+                let all = [Command::Start, Command::Reset, Command::Retract, Command::Stop];
+                all[random.random_range(0..4)]
+            }),
+            plan: answer.take(),
+            overrun: feed == Feed::Garbage && random.random_range(0..50) == 0,
+            emergency_stop: feed == Feed::Garbage && random.random_range(0..400) == 0,
+        };
+        let output = controller.step(&mut state, &input);
+        answer = output.request.as_ref().map(|request| match feed {
+            Feed::Plans => wild(request, planner, &mut random),
+            _ => planner.plan(request),
+        });
+        if let Some(why) = unsafe_output(&output) {
+            return Some(format!("{why} in tick {tick}"));
+        }
+    }
+    None
+}
+
+/// What must not be put out whatever comes in.
+fn unsafe_output(output: &Output) -> Option<String> {
+    let mode = output.telemetry.mode;
+    let drives = matches!(mode, Mode::Run(..) | Mode::Stopping(_));
+    let presses = drives || matches!(mode, Mode::Preload(_));
+    if output.drive.enable && !drives {
+        return Some(format!("the drive is on in {mode:?}"));
+    }
+    if output.preload.enable && !presses {
+        return Some(format!("the pre-tightener is on in {mode:?}"));
+    }
+    for command in [output.drive, output.preload] {
+        if command.duty.to_bits() == i16::MIN {
+            return Some("a duty beyond full".to_owned());
+        }
+    }
+    (output.telemetry.vibration < Q16::ZERO).then(|| "a negative amplitude".to_owned())
+}
+
+fn frame(feed: Feed, tick: u32, now: Tick, random: &mut ChaCha8Rng) -> SensorFrame {
+    let made = |wheel: u16, load: u16, tread: u16, arm: u16| SensorFrame {
+        wheel: Some(Sample { code: EncoderCount::new(wheel), at: now }),
+        load_cell: Some(Sample { code: AdcCode::new(load), at: now }),
+        tread: Some(Sample { code: AdcCode::new(tread), at: now }),
+        arm: Some(Sample { code: AngleFrame::new(arm), at: now }),
+    };
+    let even = |angle: u16| {
+        let angle = angle & 0x3FFF;
+        angle | ((angle.count_ones() & 1) as u16) << 15
+    };
+    match feed {
+        Feed::Least => made(0, 0, 0, 0),
+        Feed::Largest => made(u16::MAX, u16::MAX, u16::MAX, u16::MAX),
+        Feed::Alternating if tick.is_multiple_of(2) => made(0, 1311, 1311, even(0)),
+        Feed::Alternating => made(0x8000, 64_224, 64_224, even(u16::MAX)),
+        Feed::Jumping => made(
+            (tick as u16).wrapping_mul(random.random_range(0..12)),
+            random.random_range(1311..64_225),
+            random.random_range(1311..64_225),
+            even(random.random_range(2600..5000)),
+        ),
+        Feed::Garbage => {
+            let mut frame =
+                made(random.random(), random.random(), random.random(), random.random());
+            let time = |at: &mut Tick, random: &mut ChaCha8Rng| match random.random_range(0..8) {
+                0 => *at = random.random(),
+                1 => *at = now.wrapping_sub(random.random_range(0..60)),
+                2 => *at = now.wrapping_add(random.random_range(0..2000)),
+                _ => {}
+            };
+            if let Some(sample) = &mut frame.wheel {
+                time(&mut sample.at, random);
+            }
+            if let Some(sample) = &mut frame.arm {
+                time(&mut sample.at, random);
+            }
+            if random.random_range(0..20) == 0 {
+                frame.load_cell = None;
+            }
+            frame
+        }
+        // At rest at the stow end, then rolling on with a load.
+        Feed::Plans if tick < 3000 => made(0, 3277, 3277, even(4111)),
+        Feed::Plans => {
+            made((tick / 4) as u16, 12_500, 6000, even(4111 - (tick / 200) as u16 % 600))
+        }
+    }
+}
+
+/// A plan of extremes.
+fn wild(request: &PlanRequest, planner: &Planner, random: &mut ChaCha8Rng) -> Plan {
+    let mut any = || match random.random_range(0..4) {
+        0 => Q16::MIN,
+        1 => Q16::MAX,
+        2 => Q16::ZERO,
+        _ => Q16::from_bits(random.random()),
+    };
+    let mut plan = planner.plan(request);
+    for field in [
+        &mut plan.cruise_speed,
+        &mut plan.cross_speed,
+        &mut plan.cruise_preload,
+        &mut plan.cross_preload,
+        &mut plan.gap,
+        &mut plan.slip_margin,
+        &mut plan.brake_way,
+        &mut plan.brake_time,
+    ] {
+        *field = any();
+    }
+    plan
+}
+
+/// The model at the corners of its arguments: bounded to its range.
+fn asked(planner: &Planner, model: &ReducedModel) -> Option<String> {
+    let ends = [Q16::MIN, Q16::from_num(-1), Q16::ZERO, Q16::DELTA, Q16::from_num(1), Q16::MAX];
+    let (low, high) = model.gap_range();
+    let pairs = ends.into_iter().flat_map(|a| ends.into_iter().map(move |b| (a, b)));
+    for direction in [Direction::Deploy, Direction::Retract] {
+        for (speed, ratio) in pairs.clone() {
+            let point = Point { direction, speed, scale: Scale::new(ratio) };
+            for (a, b) in pairs.clone() {
+                let crossing = model.crossing(&point, a);
+                for gap in [model.gap(&point, a), crossing.gap] {
+                    if gap < low || gap > high {
+                        return Some(format!("gap {gap} at {point:?}, {a} N"));
+                    }
+                }
+                let _ = (model.force(&point, a), model.utilisation(&point, a), model.depth(a));
+                let _ = model.observed_scale(&point, a, b);
+                let review =
+                    Review { direction, speed, preload: a, tan_arm: b, gap: ratio, trusted: true };
+                let request = PlanRequest {
+                    sequence: 1,
+                    direction,
+                    step: 2,
+                    scale: ratio,
+                    review: Some(review),
+                };
+                let _ = planner.plan(&request);
+            }
+        }
+    }
+    None
+}
+
+/// A parameter and its ends.
+type Ends = (&'static str, fn(&mut Rig) -> &mut f64, f64, f64);
+
+/// The parameters and their ends, as the rig's validation has them.
+const ENDS: [Ends; 31] = [
+    ("rig.wheel_radius_mm", |r| &mut r.rig.wheel_radius_mm, 10.0, 30.0),
+    ("rig.wheel_width_mm", |r| &mut r.rig.wheel_width_mm, 1.0, 200.0),
+    ("rig.step_height_mm", |r| &mut r.rig.step_height_mm, 1.5, 8.0),
+    ("rig.step_tolerance_mm", |r| &mut r.rig.step_tolerance_mm, 0.05, 1.0),
+    ("rig.wall_radius_mm", |r| &mut r.rig.wall_radius_mm, 70.0, 170.0),
+    ("rig.arm_length_mm", |r| &mut r.rig.arm_length_mm, 120.0, 900.0),
+    ("tread.k_inf_pa_per_m", |r| &mut r.tread.k_inf_pa_per_m, 1e7, 5e10),
+    ("tread.stiffening", |r| &mut r.tread.stiffening, 1.0, 20.0),
+    ("tread.tau_s", |r| &mut r.tread.tau_s, 1e-3, 10.0),
+    ("plant.mu", |r| &mut r.plant.mu, 0.0, 3.0),
+    ("plant.top_load_n", |r| &mut r.plant.top_load_n, 0.0, 200.0),
+    ("plant.moved_mass_kg", |r| &mut r.plant.moved_mass_kg, 0.01, 100.0),
+    ("plant.arm_coupling", |r| &mut r.plant.arm_coupling, -1.0, 1.0),
+    ("preload.cruise_n", |r| &mut r.preload.cruise_n, 5.0, 48.0),
+    ("preload.limit_n", |r| &mut r.preload.limit_n, 35.0, 180.0),
+    ("preload.spring_n_per_mm", |r| &mut r.preload.spring_n_per_mm, 0.1, 20.0),
+    ("preload.slew_n_per_s", |r| &mut r.preload.slew_n_per_s, 1.0, 500.0),
+    ("preload.delay_s", |r| &mut r.preload.delay_s, 0.0, 0.25),
+    ("preload.lag_s", |r| &mut r.preload.lag_s, 0.005, 1.0),
+    ("drive.no_load_speed_mm_s", |r| &mut r.drive.no_load_speed_mm_s, 37.0, 300.0),
+    ("drive.stall_force_n", |r| &mut r.drive.stall_force_n, 5.0, 5000.0),
+    ("drive.force_limit_n", |r| &mut r.drive.force_limit_n, 5.0, 5000.0),
+    ("drive.reflected_mass_kg", |r| &mut r.drive.reflected_mass_kg, 0.1, 1000.0),
+    ("drive.cruise_speed_mm_s", |r| &mut r.drive.cruise_speed_mm_s, 5.0, 50.0),
+    ("drive.acceleration_mm_s2", |r| &mut r.drive.acceleration_mm_s2, 5.0, 2000.0),
+    ("drive.jerk_mm_s3", |r| &mut r.drive.jerk_mm_s3, 50.0, 30_000.0),
+    ("drive.ripple_pitch_mm", |r| &mut r.drive.ripple_pitch_mm, 0.01, 100.0),
+    ("sense.encoder_counts", |r| &mut r.sense.encoder_counts, 1024.0, 65_536.0),
+    ("sense.load_cell_full_scale_n", |r| &mut r.sense.load_cell_full_scale_n, 60.0, 2000.0),
+    ("sense.tread_full_scale_mm", |r| &mut r.sense.tread_full_scale_mm, 0.5, 50.0),
+    ("control.gap_ref_mm", |r| &mut r.control.gap_ref_mm, 0.0, 10.0),
+];
+
+/// Both presets, and each with each parameter at each of its ends.
+fn corner_rigs() -> Vec<(String, Rig)> {
+    let mut rigs = Vec::new();
+    for preset in ["prototype", "fe"] {
+        let Some(base) = Rig::named(preset) else { continue };
+        rigs.push((preset.to_owned(), base.clone()));
+        for (key, at, low, high) in ENDS {
+            for value in [low, high] {
+                let mut rig = base.clone();
+                *at(&mut rig) = value;
+                rigs.push((format!("{preset}, {key} = {value}"), rig));
+            }
+        }
+    }
+    rigs
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_breaks_and_sums_do_not_wrap() {
+        // Overflow is checked in this build: a wrap that was not meant to panics.
+        let report = run(4000, 1);
+        assert!(report.broken.is_empty(), "{:#?}", report.broken);
+        assert!(report.rigs > 90, "{:#?}", report.refused);
+        // A refusal names the parameter.
+        assert!(report.refused.iter().all(|text| text.contains("_n") || text.contains("_mm")));
+    }
+
+    #[test]
+    fn a_panic_is_told() {
+        assert_eq!(guarded(|| panic!("at {}", 3)).as_deref(), Some("panic: at 3"));
+        assert_eq!(guarded(|| None), None);
+    }
+}

@@ -1,0 +1,87 @@
+//! Stress of plant and controller, and what may be left out of a tick without a trace.
+
+use hil_sim::scenario::{Direction, Scenario};
+use hil_sim::sil::{Options, Session};
+use hil_sim::stress::plant::{self, Figure};
+use interstage::control::Output;
+use interstage::supervise::{Command, Leg, Mode};
+
+/// A whole run of `scenario`: `look` at every output.
+fn run(scenario: &Scenario, without_skipping: bool, mut look: impl FnMut(&Output)) {
+    let mut session = Session::new(scenario, Options::default()).unwrap();
+    if without_skipping {
+        session = session.without_skipping();
+    }
+    let mut start = Some(match scenario.run.direction {
+        Direction::Deploy => Command::Start,
+        Direction::Retract => Command::Retract,
+    });
+    while !matches!(session.mode(), Mode::Complete(_)) {
+        assert!(session.time_s() < 60.0, "{:?}", session.mode());
+        let command = if session.mode() == Mode::Idle { start.take() } else { None };
+        look(&session.step(command).unwrap());
+    }
+}
+
+#[test]
+fn a_stage_that_is_skipped_leaves_no_trace_in_the_outputs() {
+    for direction in [Direction::Deploy, Direction::Retract] {
+        let mut scenario = Scenario::default();
+        scenario.run.direction = direction;
+        let outputs = |without_skipping| {
+            let mut outputs = Vec::new();
+            run(&scenario, without_skipping, |output| outputs.push(format!("{output:?}")));
+            outputs
+        };
+        let (skipping, not) = (outputs(false), outputs(true));
+        assert!(skipping.len() > 3000);
+        assert_eq!(skipping.len(), not.len());
+        for (a, b) in skipping.iter().zip(&not) {
+            assert_eq!(a, b);
+        }
+    }
+}
+
+/// Vibration observed in each crossing, um.
+fn shaken(scenario: &Scenario) -> Vec<f64> {
+    let mut peaks = Vec::new();
+    let mut crossing = false;
+    run(scenario, false, |output| {
+        let now = matches!(output.telemetry.mode, Mode::Run(_, Leg::Crossing));
+        if crossing && !now {
+            peaks.push(output.telemetry.vibration.to_num::<f64>() * 1e3);
+        }
+        crossing = now;
+    });
+    peaks
+}
+
+#[test]
+fn a_crossing_at_resonance_is_seen_to_shake() {
+    // Kept away from the modes, the arm shakes less than the sensor's noise, 2 um.
+    let quiet = shaken(&Scenario::default());
+    assert_eq!(quiet.len(), 3);
+    assert!(quiet.iter().all(|&um| um > 0.0 && um < 2.5), "{quiet:?}");
+    // Without the guard, and with a gearbox whose ripple at crossing speed is the mode.
+    let mut loud = Scenario::default();
+    loud.rig.drive.guard_band = 0.0;
+    loud.rig.drive.ripple_pitch_mm = 8.0 / 276.0;
+    let loud = shaken(&loud);
+    assert!(loud.iter().all(|&um| um > 6.0), "{loud:?}");
+}
+
+#[test]
+fn the_plant_stands_the_corners_of_its_ranges() {
+    let report = plant::run(200, 1, &|| {});
+    assert_eq!(report.cases, 200);
+    assert!(report.failures.is_empty(), "{:#?}", report.failures);
+    // Refused is what cannot be, each with its parameters and its limit.
+    let refused: usize = report.refusals.values().sum();
+    assert!(refused < report.cases, "{:?}", report.refusals);
+    assert!(report.refused.values().all(|message| message.contains("at most")));
+    // The figures are looked at: somewhere each comes near its limit.
+    for figure in [Figure::Energy, Figure::Penetration, Figure::Overspeed] {
+        let worst = report.worst.iter().find(|worst| worst.figure == figure).unwrap();
+        assert!(worst.value > 0.2, "{worst:?}");
+    }
+}
