@@ -145,13 +145,12 @@ impl Formula {
         if corner <= start || end <= corner {
             return Contact { radial: 0.0, axial: 0.0 };
         }
-        let (sin, cos) = (libm::sin, libm::cos);
-        let radial = r * (sin(end) - sin(start))
-            - d * libm::log(sin(corner) / sin(start))
-            - above * (end - corner);
-        let axial = r * (cos(start) - cos(end))
-            - d * (corner - start)
-            - above * libm::log(cos(corner) / cos(end));
+        // r sin(start) = d, r cos(end) = above, and the corner lies at (d, above).
+        let away = libm::sqrt(d * d + above * above);
+        let end_sine = libm::sqrt(r * r - above * above);
+        let start_cosine = libm::sqrt((r * r - d * d).max(0.0));
+        let radial = end_sine - d - d * libm::log(r / away) - above * (end - corner);
+        let axial = start_cosine - above - d * (corner - start) - above * libm::log(r / away);
         let strip = r * self.width_mm;
         Contact { radial: radial * strip, axial: axial * strip }
     }
