@@ -4,14 +4,15 @@
 use std::hint::black_box;
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
-use hil_sim::bench::problem::{Mesh, Problem};
+use hil_sim::bench::problem::Problem;
 use hil_sim::plant::crossing::cross;
 use hil_sim::plant::draw::PlantParameters;
+use hil_sim::plant::precision::Setting;
 use hil_sim::plant::rig::VirtualRig;
 use hil_sim::scenario::Scenario;
 use hil_sim::sil::{self, Options, Session};
 use interstage::model::formula::Formula;
-use interstage::model::reduced::{Point, ReducedModel};
+use interstage::model::reduced::{Point, ReducedModel, Scale};
 use interstage::rig::Rig;
 use interstage::supervise::{Command, Direction};
 use interstage::units::q16;
@@ -43,17 +44,13 @@ fn reduced(c: &mut Criterion) {
     let rig = Rig::prototype();
     let model = ReducedModel::try_build(&rig).expect("the rig builds");
     let formula = Formula::new(&rig);
-    let point = Point {
-        direction: Direction::Deploy,
-        speed: q16(8_000_000),
-        load: q16(6_700_000),
-        scale: q16(1_000_000),
-    };
+    let point =
+        Point { direction: Direction::Deploy, speed: q16(8_000_000), scale: Scale::NOMINAL };
     let force = q16(48_000_000);
     let gap = model.gap(&point, force);
     assert!((gap.to_num::<f64>() - 2.58).abs() < 0.1, "{gap}");
-    c.bench_function("reduced model, fixed point, force to gap", |b| {
-        b.iter(|| model.gap(black_box(&point), black_box(force)));
+    c.bench_function("reduced model, fixed point, force to a crossing", |b| {
+        b.iter(|| model.crossing(black_box(&point), black_box(force)));
     });
     c.bench_function("reduced model, fixed point, gap to force", |b| {
         b.iter(|| model.force(black_box(&point), black_box(gap)));
@@ -64,7 +61,7 @@ fn reduced(c: &mut Criterion) {
 }
 
 fn ring(c: &mut Criterion) {
-    let case = Problem::published().case(Mesh::usual());
+    let case = Problem::published().case(Setting::usual());
     c.bench_function("crossing of the ring, default resolution", |b| {
         b.iter(|| cross(black_box(&case)).expect("it balances").gap_mm);
     });

@@ -1,40 +1,46 @@
-//! Run time against error, measured: the plant's resolution, other engines and
-//! solvers on one identical crossing, and what skipping saves.
+//! Run time against error, measured: the reduced model in five arithmetics, the plant's
+//! resolution, other engines and solvers on one identical crossing, and what skipping
+//! saves.
 //!
 //! Times are processor time of one thread, the least of several runs from the same
 //! state, with the answer used and checked. They depend on the machine; the ratios
 //! within one run hardly do, and errors and counts do not at all. The last are held
 //! by `budget.toml`, the first two are kept in the history.
 
+pub mod arithmetic;
 pub mod budget;
 pub mod chart;
 pub mod clock;
 pub mod history;
 pub mod machine;
-pub mod mesh;
 pub mod page;
 pub mod peers;
 pub mod problem;
 pub mod run;
 
 use anyhow::Result;
+use interstage::rig::Rig;
 use serde::Serialize;
 
+use arithmetic::{Arithmetics, Variant};
 use budget::{Budget, Line};
 use machine::Machine;
-use mesh::Precision;
 use peers::Peers;
 use problem::{Problem, Truth};
 use run::Costs;
 
-/// How much finer than the default the converged run of a quick measurement is.
-const QUICK_FINER: usize = 4;
+use crate::plant::precision::{FINER, Point, Setting, work_precision};
+
+/// Crossings at a setting of which the fastest counts.
+const REPEATS: usize = 5;
 
 /// What is measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Options {
     /// The other engines and solvers too; sets up what they need.
     pub peers: bool,
+    /// Cycles on the emulated core, if this binary has it.
+    pub cycles: bool,
     /// Fewer resolutions against a less converged run: for trying it out.
     pub quick: bool,
 }
@@ -46,6 +52,10 @@ pub struct Report {
     pub version: &'static str,
     /// What it was measured on.
     pub machine: Machine,
+    /// The reduced model in five arithmetics.
+    pub variants: Vec<Variant>,
+    /// How they were compared.
+    pub arithmetics: Arithmetics,
     /// The plant.
     pub plant: Plant,
     /// The others, if they were asked for and could be had.
@@ -59,21 +69,23 @@ pub struct Report {
 /// Work and precision of the plant.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Plant {
-    /// How much finer than the default the converged answers are.
+    /// How much finer the measure of the errors is, in elements and in stride.
     pub finer: usize,
-    /// Largest doubt about a converged answer, relative.
-    pub doubt: f64,
-    /// Resolutions.
-    pub meshes: Vec<Precision>,
+    /// What it runs with unless told otherwise.
+    pub default: Setting,
+    /// Error and cost by setting.
+    pub settings: Vec<Point>,
     /// Whole runs.
     pub costs: Costs,
 }
 
 impl Plant {
-    /// The resolution that the plant runs with unless told otherwise.
+    /// The default setting's errors and cost.
     #[must_use]
-    pub fn default_mesh(&self) -> Option<&Precision> {
-        self.meshes.iter().find(|mesh| mesh.default)
+    pub fn usual(&self) -> Option<&Point> {
+        self.settings.iter().find(|point| {
+            (point.elements, point.stride_mm) == (self.default.elements, self.default.stride_mm)
+        })
     }
 }
 
@@ -82,24 +94,22 @@ impl Plant {
 /// # Errors
 /// If a crossing cannot be balanced or a run does not complete.
 pub fn measure(options: Options, say: &(dyn Fn(&str) + Sync)) -> Result<Report> {
+    say("arithmetics");
+    let mut arithmetics = arithmetic::measure(options.quick, options.cycles)?;
+    let variants = std::mem::take(&mut arithmetics.variants);
     say("whole runs");
-    let costs = run::measure()?;
-    say("converged crossings");
-    let problems = Problem::all();
-    let finer = if options.quick { QUICK_FINER } else { problem::FINER };
-    let truths = problem::converged(&problems, finer)?;
+    let costs = run::measure(options.quick)?;
     say("resolutions");
-    let meshes = if options.quick { mesh::few() } else { mesh::meshes() };
-    let meshes: Result<Vec<Precision>, _> = meshes
-        .into_iter()
-        .map(|(sweep, mesh)| mesh::measure(sweep, mesh, &problems, &truths))
-        .collect();
-    let doubt = truths.iter().map(|truth| truth.doubt).fold(0.0, f64::max);
-    let plant = Plant { finer, doubt, meshes: meshes?, costs };
-    let (peers, peers_left_out) = peers_if(options.peers, &truths[0], say);
+    let default = Setting::usual();
+    let (sweep, repeats) = if options.quick { (few(), 1) } else { (Setting::sweep(), REPEATS) };
+    let settings = work_precision(&Rig::prototype(), &sweep, repeats, || ())?;
+    let plant = Plant { finer: FINER, default, settings, costs };
+    let (peers, peers_left_out) = peers_if(options.peers, say);
     let mut report = Report {
         version: env!("CARGO_PKG_VERSION"),
         machine: Machine::here(),
+        variants,
+        arithmetics,
         plant,
         peers,
         peers_left_out,
@@ -110,26 +120,23 @@ pub fn measure(options: Options, say: &(dyn Fn(&str) + Sync)) -> Result<Report> 
 }
 
 /// The peers, or in one line why not.
-fn peers_if(
-    wanted: bool,
-    truth: &Truth,
-    say: &(dyn Fn(&str) + Sync),
-) -> (Option<Peers>, Option<String>) {
+fn peers_if(wanted: bool, say: &(dyn Fn(&str) + Sync)) -> (Option<Peers>, Option<String>) {
     if !wanted {
         return (None, Some("not asked for: `rig bench --peers` sets them up".to_owned()));
     }
-    match peers::compare(truth, &|what| say(what)) {
+    say("converged crossing");
+    let found = Problem::published()
+        .converged()
+        .map_err(anyhow::Error::from)
+        .and_then(|truth: Truth| peers::compare(&truth, &|what| say(what)));
+    match found {
         Ok(peers) => (Some(peers), None),
         Err(error) => (None, Some(format!("{error:#}").replace('\n', " "))),
     }
 }
 
-/// Errors of the default resolution alone, as a full measurement has them.
-///
-/// # Errors
-/// If a crossing cannot be balanced.
-pub fn default_precision() -> Result<Precision> {
-    let problems = Problem::all();
-    let truths = problem::converged(&problems, problem::FINER)?;
-    Ok(mesh::measure("both", problem::Mesh::usual(), &problems, &truths)?)
+/// The default setting and a coarse one.
+fn few() -> Vec<Setting> {
+    let usual = Setting::usual();
+    vec![Setting { elements: usual.elements / 4, stride_mm: 4.0 * usual.stride_mm }, usual]
 }

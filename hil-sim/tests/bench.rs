@@ -4,7 +4,8 @@
 use std::process::{Command, Output};
 
 use hil_sim::bench::budget::Budget;
-use hil_sim::bench::default_precision;
+use hil_sim::plant::precision::{Setting, work_precision};
+use interstage::rig::Rig;
 use serde_json::Value;
 
 fn rig(arguments: &[&str]) -> Output {
@@ -14,26 +15,33 @@ fn rig(arguments: &[&str]) -> Output {
 #[test]
 fn the_default_resolution_keeps_its_budget() {
     let budget = Budget::shipped().unwrap();
-    let reached = default_precision().unwrap();
-    for line in budget.plant.lines(reached.max_gap_error, reached.max_force_error) {
+    let reached = work_precision(&Rig::prototype(), &[Setting::usual()], 1, || ()).unwrap();
+    for line in budget.plant.lines(reached[0].gap_error, reached[0].force_error) {
         assert!(line.holds, "{line:?}");
     }
 }
 
 #[test]
 fn a_quick_measurement_prints_one_object_with_its_keys() {
-    let output = rig(&["bench", "--quick", "--json"]);
+    let output = rig(&["bench", "--quick", "--host", "--json"]);
     assert!(output.status.success(), "{output:?}");
     let object: Value = serde_json::from_slice(&output.stdout).unwrap();
-    for key in ["plant", "peers", "budgets", "machine", "version"] {
+    for key in ["variants", "plant", "peers", "budgets", "machine", "version"] {
         assert!(object.get(key).is_some(), "{key}");
     }
-    let meshes = object["plant"]["meshes"].as_array().unwrap();
-    let [coarse, usual] = &meshes[..] else { panic!("two resolutions: {meshes:?}") };
-    assert_eq!((&coarse["default"], &usual["default"]), (&false.into(), &true.into()));
-    let number = |mesh: &Value, key: &str| mesh[key].as_f64().unwrap();
-    assert!(number(coarse, "max_gap_error") > number(usual, "max_gap_error"));
-    assert!(number(coarse, "crossing_ms") < number(usual, "crossing_ms"));
+    let variants = object["variants"].as_array().unwrap();
+    assert_eq!(variants.len(), 5);
+    for variant in variants {
+        let number = |key: &str| variant[key].as_f64().unwrap();
+        assert!(number("max_rel_error") >= number("rms_rel_error") && number("host_ns") > 0.0);
+        assert!(variant["name"].is_string() && variant["cycles"].is_null(), "{variant}");
+    }
+    let settings = object["plant"]["settings"].as_array().unwrap();
+    let [coarse, usual] = &settings[..] else { panic!("two resolutions: {settings:?}") };
+    assert_eq!(usual["elements"], object["plant"]["default"]["elements"]);
+    let number = |point: &Value, key: &str| point[key].as_f64().unwrap();
+    assert!(number(coarse, "gap_error") > number(usual, "gap_error"));
+    assert!(number(coarse, "wall_ns") < number(usual, "wall_ns"));
     assert!(number(&object["plant"]["costs"], "plant_real_time_factor") > 1.0);
     // Left out, and why, in one line.
     assert!(object["peers"].is_null());

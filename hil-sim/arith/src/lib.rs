@@ -10,5 +10,5 @@
 mod model;
 mod number;
 
-pub use model::{Answer, COEFFICIENTS, Given, Model, Shared, WAY, Way};
+pub use model::{Answer, COEFFICIENTS, FELT, Given, Model, Shared, WAY, Way};
 pub use number::{Double, Fixed, Libm, Micro, Number};

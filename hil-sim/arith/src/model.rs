@@ -6,7 +6,10 @@
 use crate::number::Number;
 
 /// Coefficients of one way: see [`Way`].
-pub const WAY: usize = 2 + 36 + 21;
+pub const WAY: usize = 2 + FELT + 21;
+
+/// Terms of the felt stiffening.
+pub const FELT: usize = 22;
 
 /// Coefficients of both ways and of what they share.
 pub const COEFFICIENTS: usize = 34 + 2 * WAY;
@@ -19,8 +22,6 @@ pub struct Given {
     pub direction: u32,
     /// Speed at lift-off, mm/s.
     pub speed: i32,
-    /// Stiffness scale.
-    pub scale: i32,
     /// Radial force, N, forwards; gap, mm, for the inverse.
     pub wanted: i32,
 }
@@ -46,8 +47,8 @@ pub struct Answer {
 impl Given {
     /// The words as memory holds them.
     #[must_use]
-    pub const fn words(&self) -> [u32; 4] {
-        [self.direction, self.speed as u32, self.scale as u32, self.wanted as u32]
+    pub const fn words(&self) -> [u32; 3] {
+        [self.direction, self.speed as u32, self.wanted as u32]
     }
 }
 
@@ -99,8 +100,8 @@ pub struct Way<N = f64> {
     pub half_speed: N,
     /// Relaxed over instant stiffness.
     pub relaxed: N,
-    /// Felt stiffening `(s - 1)/s E`: `u^i t^j` for i + j at most 7, by j and then i.
-    pub felt: [N; 36],
+    /// Felt stiffening `(s - 1)/s E`: `u^i t^j` for i/5 + j/6 at most 1, by j and then i.
+    pub felt: [N; FELT],
     /// Run over twice the root of the elastic force: total degree 5, by the root and then
     /// by the fast part.
     pub guess: [N; 21],
@@ -111,6 +112,10 @@ pub struct Way<N = f64> {
 pub struct Model<N> {
     shared: Shared<N>,
     ways: [Way<N>; 2],
+    /// Estimated over nominal stiffness of the tread, and its reciprocal: both change once
+    /// a crossing.
+    scale: N,
+    inverse_scale: N,
 }
 
 macro_rules! horner {
@@ -197,7 +202,7 @@ impl<N: Number> Model<N> {
                 guess: list(&mut next)?,
             })
         };
-        Some(Self { shared, ways: [way()?, way()?] })
+        Some(Self { shared, ways: [way()?, way()?], scale: N::ONE, inverse_scale: N::ONE })
     }
 
     /// Everything about the crossing at this radial force.
@@ -205,11 +210,11 @@ impl<N: Number> Model<N> {
     pub fn crossing(&self, given: &Given) -> Answer {
         let (shared, way) = (&self.shared, self.way(given.direction));
         let speed = N::input(given.speed, 7);
-        let scale = N::input(given.scale, 0);
         let wanted = N::input(given.wanted, 7) * shared.parts_per_128_n;
         let fast = speed / (speed + way.half_speed);
         let row = way.row(fast);
-        let (load, sought) = (shared.load / scale, wanted / scale);
+        let load = shared.load * self.inverse_scale;
+        let sought = wanted * self.inverse_scale;
         let elastic = (sought - shared.least_lifting).at_least(N::ZERO);
         let root = (elastic + elastic + elastic + elastic).at_most(N::ONE).sqrt();
         let guess = (way.guess(fast, root) * root).at_least(shared.least).at_most(N::ONE);
@@ -235,7 +240,6 @@ impl<N: Number> Model<N> {
     pub fn force(&self, given: &Given) -> i32 {
         let (shared, way) = (&self.shared, self.way(given.direction));
         let speed = N::input(given.speed, 7);
-        let scale = N::input(given.scale, 0);
         let gap = N::input(given.wanted, 0) * shared.inverse_radius;
         let distance = (gap * gap + gap + gap).sqrt();
         let quarter = (shared.free - distance) * shared.inverse_longest_4;
@@ -245,7 +249,7 @@ impl<N: Number> Model<N> {
         let row = way.row(speed / (speed + way.half_speed));
         let elastic = run * run * quartic(&shared.force, t) * row.stiffness(t);
         let lifting = shared.load * quartic(&shared.slope, t);
-        ((elastic * scale + lifting) * shared.unit_128_n).output(7)
+        ((elastic * self.scale + lifting) * shared.unit_128_n).output(7)
     }
 
     #[inline(always)]
@@ -256,7 +260,7 @@ impl<N: Number> Model<N> {
 
 /// The stiffening at one speed: polynomial in the run.
 struct Row<N> {
-    terms: [N; 8],
+    terms: [N; 7],
     fast: N,
     relaxed: N,
 }
@@ -264,14 +268,14 @@ struct Row<N> {
 impl<N: Number> Row<N> {
     #[inline(always)]
     fn stiffness(&self, t: N) -> N {
-        let [c0, c1, c2, c3, c4, c5, c6, c7] = self.terms;
-        self.relaxed + self.fast * (horner!(t; c0, c1, c2, c3, c4, c5, c6, c7))
+        let [c0, c1, c2, c3, c4, c5, c6] = self.terms;
+        self.relaxed + self.fast * (horner!(t; c0, c1, c2, c3, c4, c5, c6))
     }
 
     #[inline(always)]
     fn stiffness_with_slope(&self, t: N) -> (N, N) {
-        let [c0, c1, c2, c3, c4, c5, c6, c7] = self.terms;
-        let (felt, slope) = horner_with_slope!(t; c0, c1, c2, c3, c4, c5, c6, c7);
+        let [c0, c1, c2, c3, c4, c5, c6] = self.terms;
+        let (felt, slope) = horner_with_slope!(t; c0, c1, c2, c3, c4, c5, c6);
         (self.relaxed + self.fast * felt, self.fast * slope)
     }
 }
@@ -280,19 +284,18 @@ impl<N: Number> Way<N> {
     #[inline(always)]
     fn row(&self, fast: N) -> Row<N> {
         #[rustfmt::skip]
-        let [a0, a1, a2, a3, a4, a5, a6, a7, b0, b1, b2, b3, b4, b5, b6, c0, c1, c2, c3, c4, c5,
-            d0, d1, d2, d3, d4, e0, e1, e2, e3, f0, f1, f2, g0, g1, h0] = self.felt;
+        let [a0, a1, a2, a3, a4, a5, b0, b1, b2, b3, b4, c0, c1, c2, c3, d0, d1, d2, e0, e1, f0,
+            g0] = self.felt;
         let u = fast + fast - N::ONE;
         Row {
             terms: [
-                horner!(u; a0, a1, a2, a3, a4, a5, a6, a7),
-                horner!(u; b0, b1, b2, b3, b4, b5, b6),
-                horner!(u; c0, c1, c2, c3, c4, c5),
-                horner!(u; d0, d1, d2, d3, d4),
-                horner!(u; e0, e1, e2, e3),
-                horner!(u; f0, f1, f2),
-                horner!(u; g0, g1),
-                h0,
+                horner!(u; a0, a1, a2, a3, a4, a5),
+                horner!(u; b0, b1, b2, b3, b4),
+                horner!(u; c0, c1, c2, c3),
+                horner!(u; d0, d1, d2),
+                horner!(u; e0, e1),
+                f0,
+                g0,
             ],
             fast,
             relaxed: self.relaxed,

@@ -4,18 +4,34 @@ use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 
 use super::Report;
+use super::arithmetic::Variant;
 
 /// The bounds.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Budget {
+    /// Of the shipping reduced model.
+    pub model: ModelBudget,
     /// Of the plant.
     pub plant: PlantBudget,
     /// What depends on the machine.
     pub aims: Aims,
 }
 
-/// Largest errors of the plant's default resolution, relative.
+/// The shipping reduced model: largest relative errors against the formulas, and
+/// textbook cycles at worst.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModelBudget {
+    /// Of the gap, forwards, and of the force, back.
+    pub max_rel_error: f64,
+    /// Forwards: everything of a crossing from speed and force.
+    pub forward_cycles: f64,
+    /// Back: force from speed and gap.
+    pub inverse_cycles: f64,
+}
+
+/// Largest errors of the plant's default resolution, relative, and what skipping saves.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlantBudget {
@@ -23,6 +39,8 @@ pub struct PlantBudget {
     pub max_gap_error: f64,
     /// Of the largest axial force.
     pub max_force_error: f64,
+    /// Least factor by which letting the ring sleep saves elements visited.
+    pub least_saving_of_elements: f64,
 }
 
 /// Least factors that depend on the machine.
@@ -60,6 +78,12 @@ impl Line {
         Self { name: name.to_owned(), bound, at_least: false, reached, holds, machine: false }
     }
 
+    /// At least `bound`, whatever the machine.
+    #[must_use]
+    pub fn at_least(name: &str, bound: f64, reached: f64) -> Self {
+        Self { machine: false, ..Self::aim(name, bound, reached) }
+    }
+
     /// At least `bound`, depending on the machine.
     #[must_use]
     pub fn aim(name: &str, bound: f64, reached: f64) -> Self {
@@ -87,11 +111,19 @@ impl Budget {
     #[must_use]
     pub fn lines(&self, report: &Report) -> Vec<Line> {
         let mut lines = Vec::new();
-        if let Some(mesh) = report.plant.default_mesh() {
-            lines.extend(self.plant.lines(mesh.max_gap_error, mesh.max_force_error));
+        if let Some(shipping) = report.variants.first() {
+            lines.extend(self.model.lines(shipping));
+        }
+        if let Some(usual) = report.plant.usual() {
+            lines.extend(self.plant.lines(usual.gap_error, usual.force_error));
         }
         let costs = &report.plant.costs;
         let aims = &self.aims;
+        lines.push(Line::at_least(
+            "plant, elements visited without skipping over with",
+            self.plant.least_saving_of_elements,
+            costs.saving_of_elements,
+        ));
         lines.push(Line::aim(
             "plant, times real time",
             aims.plant_real_time_factor,
@@ -100,8 +132,32 @@ impl Budget {
         lines.push(Line::aim(
             "cost of a crossing over the smooth wall",
             aims.crossing_over_smooth,
-            costs.crossing_over_smooth,
+            costs.crossing_over_smooth.unwrap_or(f64::NAN),
         ));
+        lines
+    }
+}
+
+impl ModelBudget {
+    /// Its lines for the shipping model; those of cycles if they are known.
+    #[must_use]
+    pub fn lines(&self, shipping: &Variant) -> Vec<Line> {
+        let mut lines = Vec::new();
+        for (name, course, cycles) in [
+            ("forward", &shipping.forward, self.forward_cycles),
+            ("inverse", &shipping.inverse, self.inverse_cycles),
+        ] {
+            let error = format!("model, {name}, error");
+            lines.push(Line::at_most(&error, self.max_rel_error, course.max_rel_error));
+            if let Some(reached) = course.cycles {
+                let name = format!("model, {name}, cycles");
+                lines.push(Line::at_most(&name, cycles, reached as f64));
+            }
+        }
+        if shipping.forward.cycles.is_some() {
+            let off = f64::from(u8::from(!shipping.on_front));
+            lines.push(Line::at_most("model, off the front of the five", 0.0, off));
+        }
         lines
     }
 }

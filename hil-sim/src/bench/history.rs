@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Report;
 use super::machine::Machine;
+use super::run;
 
 /// Change of a time or of a ratio of times that is told; less is noise.
 const TOLD_TIME: f64 = 0.25;
@@ -51,16 +52,31 @@ impl Entry {
                 figures.insert(name, value);
             }
         };
-        if let Some(mesh) = report.plant.default_mesh() {
-            put("plant.max_gap_error".into(), mesh.max_gap_error);
-            put("plant.max_force_error".into(), mesh.max_force_error);
-            put("plant.crossing_ms".into(), mesh.crossing_ms);
+        for variant in &report.variants {
+            for (way, course) in [("forward", &variant.forward), ("inverse", &variant.inverse)] {
+                let name = |what: &str| format!("model.{}.{way}.{what}", variant.name);
+                put(name("max_error"), course.max_rel_error);
+                if let Some(cycles) = course.cycles {
+                    put(name("cycles"), cycles as f64);
+                }
+                put(name("host_ns"), course.host_ns);
+            }
+        }
+        if let Some(usual) = report.plant.usual() {
+            put("plant.max_gap_error".into(), usual.gap_error);
+            put("plant.max_force_error".into(), usual.force_error);
+            put("plant.crossing_ns".into(), usual.wall_ns);
         }
         let costs = &report.plant.costs;
-        put("plant.ring_awake_part".into(), costs.ring_awake_s / costs.simulated_s);
+        put("plant.smooth_part".into(), run::part(&costs.account, "smooth wall"));
+        put("plant.elements".into(), run::elements(&costs.account) as f64);
+        put("plant.saving_of_elements".into(), costs.saving_of_elements);
         put("ratio.plant.real_time".into(), costs.plant_real_time_factor);
         put("ratio.plant.run_real_time".into(), costs.run_real_time_factor);
-        put("ratio.plant.crossing_over_smooth".into(), costs.crossing_over_smooth);
+        put("ratio.plant.saving".into(), costs.saving);
+        if let Some(ratio) = costs.crossing_over_smooth {
+            put("ratio.plant.crossing_over_smooth".into(), ratio);
+        }
         for ratio in report.peers.iter().flat_map(|peers| &peers.ratios) {
             if let Some(value) = ratio.time_ratio {
                 put(format!("ratio.peer.{} at {}", ratio.name, ratio.level), value);

@@ -2,15 +2,20 @@
 
 use std::fmt::Write as _;
 
-use super::chart::{Chart, Series};
+use super::arithmetic::{Course, Variant};
+use super::chart::{Bars, Chart, Series};
 use super::peers::{Peers, RING, Setting};
+use super::run::Costs;
 use super::{Plant, Report};
+use crate::plant::precision::Point;
+use crate::sil::PlantAccount;
 use crate::table::plain;
 
 /// The tables of a report, for the terminal.
 #[must_use]
 pub fn tables(report: &Report) -> String {
-    let mut text = meshes(&report.plant);
+    let mut text = format!("{}\n", arithmetics(report));
+    text += &settings(&report.plant);
     text += &format!("\n{}", runs(&report.plant));
     match (&report.peers, &report.peers_left_out) {
         (Some(found), _) => {
@@ -30,6 +35,9 @@ pub fn files(report: &Report) -> Vec<(String, String)> {
     let mut files = vec![
         ("PERFORMANCE.md".to_owned(), page(report)),
         ("performance/plant.svg".to_owned(), plant_chart(&report.plant).svg()),
+        ("performance/plant-phases.svg".to_owned(), phases_bars(&report.plant.costs).svg()),
+        ("performance/arithmetic-cycles.svg".to_owned(), cycles_chart(&report.variants).svg()),
+        ("performance/arithmetic-host.svg".to_owned(), host_chart(&report.variants).svg()),
     ];
     if let Some(peers) = &report.peers {
         files.push(("performance/peers.svg".to_owned(), peers_chart(peers).svg()));
@@ -52,22 +60,40 @@ fn page(report: &Report) -> String {
         let _ = write!(page, "\n## {title}\n\n{text}\n\n```text\n{}\n```\n", block.trim_end());
     };
     section(
+        "The reduced model: five arithmetics",
+        "The same steps with the same coefficients: speed and force to everything of a \
+         crossing, and speed and gap to force, on the points of a Sobol sequence over speed \
+         (1 to 100 mm/s), force (15 to 150 N) and way, for both presets and steps of 2 to \
+         6 mm. Errors are those of the gap (of the force for the inverse) against the \
+         formulas of [`formula.rs`](../src/model/formula.rs) solved to convergence in f64; \
+         how far the formulas are from the ring is stated beside them. Cycles are \
+         [textbook Cortex-M4 cycles](EMULATION.md) of an image built like the firmware, its \
+         answers checked against the host's. Each is tuned: polynomials unrolled, the format \
+         of the `fixed` crate with the least error, micromath's root brought to all bits by \
+         two of Heron's steps.\n\n\
+         ![Error against cycles](performance/arithmetic-cycles.svg)\n\n\
+         ![Error against time on the host](performance/arithmetic-host.svg)",
+        &arithmetics(report),
+    );
+    section(
         "The plant: resolution",
         &format!(
-            "Gap and largest axial force of four crossings (published; driven out and back; \
-             fast) against the ring at {} times the default's resolution, both ways. The error \
-             is the largest of the four and of three element counts a few apart: where the \
-             elements happen to stand at the instant of lift-off is luck.\n\n\
+            "Gap and largest axial force of twelve crossings (three speeds and preloads; pushed \
+             and driven; out and back) against the ring at {} times the default's resolution \
+             in elements and in stride. The error is that of the worst crossing, the time that \
+             of the mean one.\n\n\
              ![Error of gap and force against the time of a crossing](performance/plant.svg)",
             report.plant.finer
         ),
-        &meshes(&report.plant),
+        &settings(&report.plant),
     );
     section(
         "The plant: whole runs",
-        "A deployment at 8 mm/s throughout. The plant alone repeats the bridge commands of a \
-         closed-loop run. On the smooth wall the steady solution stands in for the ring, which \
-         is woken before a step; *always resolved* shows what that saves.",
+        "A deployment that cruises at 8 mm/s, about the study's ten seconds. The plant alone \
+         repeats the bridge commands of the closed-loop run. On the smooth wall the steady \
+         solution stands in for the ring, which is woken before a step; elements out \
+         of reach are not visited. The bars show what each saves.\n\n\
+         ![Time of the plant by phase](performance/plant-phases.svg)",
         &runs(&report.plant),
     );
     if let Some(found) = &report.peers {
@@ -96,44 +122,110 @@ fn page(report: &Report) -> String {
     page
 }
 
-fn meshes(plant: &Plant) -> String {
-    let rows = plant.meshes.iter().map(|mesh| {
+fn arithmetics(report: &Report) -> String {
+    let cost = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.0}"));
+    let row = |name: String, course: &Course, front: &str| {
         vec![
-            format!("{}{}", mesh.sweep, if mesh.default { " (default)" } else { "" }),
-            mesh.elements.to_string(),
-            format!("{}", mesh.stride_mm),
-            percent(mesh.max_gap_error),
-            percent(mesh.max_force_error),
-            short(mesh.crossing_ms),
+            name,
+            format!("{:.1e}", course.max_rel_error),
+            format!("{:.1e}", course.rms_rel_error),
+            cost(course.cycles.map(|cycles| cycles as f64)),
+            cost(course.mean_cycles),
+            format!("{:.1}", course.host_ns),
+            front.to_owned(),
+        ]
+    };
+    let forwards = report.variants.iter().map(|variant| {
+        let front = if variant.on_front { "yes" } else { "" };
+        row(variant.name.to_owned(), &variant.forward, front)
+    });
+    let back = report.variants.iter().map(|v| row(format!("{}, inverse", v.name), &v.inverse, ""));
+    let head = [
+        "reduced model",
+        "max error",
+        "RMS error",
+        "cycles\nat worst",
+        "cycles\nmean",
+        "host ns",
+        "on the\nfront",
+    ];
+    let how = &report.arithmetics;
+    let ring = &how.ring;
+    let mut text = format!(
+        "Reduced model in five arithmetics, {} points ({} more lie beyond the model or what friction lifts)\n\
+         {}\nThe model itself against {} crossings of the ring: gap within {} %, RMS {} %, at most \
+         {} mm;\nin the shipping arithmetic within {} %\n",
+        how.points,
+        how.beyond,
+        plain(&head, forwards.chain(back)),
+        ring.crossings,
+        percent(ring.max_rel_error),
+        percent(ring.rms_rel_error),
+        short(ring.max_error_mm),
+        percent(ring.shipping_max_rel_error),
+    );
+    if let Some(why) = &how.cycles_left_out {
+        let _ = writeln!(text, "cycles left out: {why}");
+    }
+    text
+}
+
+fn settings(plant: &Plant) -> String {
+    let usual = plant.usual();
+    let rows = plant.settings.iter().map(|point| {
+        let mark = if usual == Some(point) { " (default)" } else { "" };
+        vec![
+            format!("{}{mark}", point.elements),
+            format!("{}", point.stride_mm),
+            percent(point.gap_error),
+            percent(point.force_error),
+            short(1e-6 * point.wall_ns),
         ]
     });
-    let head = ["sweep", "elements", "stride mm", "gap error %", "force error %", "crossing ms"];
-    format!(
-        "Plant: resolution, elements and stride together and each alone\n{}\n\
-         the converged answers differ by {} % from those at half their resolution\n",
-        plain(&head, rows),
-        percent(plant.doubt)
-    )
+    let head = ["elements", "stride mm", "gap error %", "force error %", "crossing ms"];
+    format!("Plant: error against cost of a crossing\n{}\n", plain(&head, rows))
 }
 
 fn runs(plant: &Plant) -> String {
     let costs = &plant.costs;
-    let row = |name: &str, value: f64, unit: &str| vec![name.into(), short(value), unit.into()];
-    let rows = [
-        row("simulated", costs.simulated_s, "s"),
-        row("of that with the ring resolved", costs.ring_awake_s, "s"),
-        row("plant alone", costs.plant_real_time_factor, "x real time"),
-        row(
-            "plant alone, ring always resolved",
-            costs.always_awake_real_time_factor,
-            "x real time",
-        ),
-        row("controller, sensors and plant", costs.run_real_time_factor, "x real time"),
-        row("a second on the smooth wall", 1e3 * costs.smooth_s_per_s, "ms"),
-        row("a second of a crossing", 1e3 * costs.crossing_s_per_s, "ms"),
-        row("crossing over smooth wall", costs.crossing_over_smooth, ""),
+    let phases = costs.account.phases.iter().map(|phase| {
+        vec![
+            phase.name.to_owned(),
+            short(phase.simulated_s),
+            short(1e3 * phase.wall_s),
+            percent(phase.wall_s / costs.account.plant_wall_s),
+            phase.cost().map_or_else(|| "-".to_owned(), |cost| short(1e3 * cost)),
+            phase.ring_strides.to_string(),
+            phase.newton_iterations.to_string(),
+            phase.elements.to_string(),
+            phase.steady_computed.to_string(),
+        ]
+    });
+    let head = [
+        "phase of the plant",
+        "simulated\ns",
+        "ms",
+        "% of\nthe time",
+        "ms per\nsecond",
+        "ring\nsteps",
+        "heights\ntried",
+        "elements\nvisited",
+        "steady\ncontacts",
     ];
-    format!("Plant: whole runs, one core\n{}\n", plain(&["", "value", "unit"], rows))
+    let over = costs.crossing_over_smooth.map_or_else(|| "-".to_owned(), short);
+    format!(
+        "Plant: a deployment of {} s, one core\n{}\n\
+         plant alone {} times real time; controller, sensors and plant {} times\n\
+         a second of a crossing costs {over} times one on the smooth wall\n\
+         skipping: with the ring always resolved and all its elements visited the plant takes {} \
+         times\nas long and visits {} times as many\n",
+        short(costs.account.simulated_s),
+        plain(&head, phases),
+        short(costs.plant_real_time_factor),
+        short(costs.run_real_time_factor),
+        short(costs.saving),
+        short(costs.saving_of_elements),
+    )
 }
 
 fn peers(peers: &Peers) -> String {
@@ -243,33 +335,79 @@ fn budgets(report: &Report) -> String {
     format!("Bounds\n{}\n", plain(&["", "bound", "reached", "kept"], rows))
 }
 
-fn plant_chart(plant: &Plant) -> Chart {
-    let of = |sweep: &str, name: &str, error: fn(&super::Precision) -> f64| {
-        let mut points: Vec<_> = plant
-            .meshes
-            .iter()
-            .filter(|mesh| mesh.sweep == sweep || mesh.default)
-            .map(|mesh| (mesh.crossing_ms, 100.0 * error(mesh)))
-            .collect();
-        points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        Series { name: name.to_owned(), points }
-    };
-    let gap = |mesh: &super::Precision| mesh.max_gap_error;
-    let force = |mesh: &super::Precision| mesh.max_force_error;
+/// From root mean square to largest error of each arithmetic, above its cost.
+fn variants_chart(
+    variants: &[Variant],
+    (title, x_name): (&str, &'static str),
+    cost: impl Fn(&Course) -> Option<f64>,
+) -> Chart {
+    let series = variants.iter().map(|variant| {
+        let course = &variant.forward;
+        let at = cost(course).unwrap_or(f64::NAN);
+        let points = vec![(at, course.rms_rel_error), (at, course.max_rel_error)];
+        Series { name: variant.name.to_owned(), points }
+    });
+    let shipping = variants.first().and_then(|variant| {
+        Some(("shipped", (cost(&variant.forward)?, variant.forward.max_rel_error)))
+    });
     Chart {
-        title: "Ring: error of gap and force against the time of a crossing".to_owned(),
-        x_name: "processor time of a crossing, ms",
+        title: title.to_owned(),
+        x_name,
+        y_name: "relative error of the gap, RMS and largest",
+        series: series.collect(),
+        ringed: shipping,
+        bound: Some(("allowed", 1e-4)),
+    }
+}
+
+fn cycles_chart(variants: &[Variant]) -> Chart {
+    let names = (
+        "Reduced model, speed and force to a crossing: error against cycles",
+        "textbook Cortex-M4 cycles at worst",
+    );
+    variants_chart(variants, names, |course| course.cycles.map(|cycles| cycles as f64))
+}
+
+fn host_chart(variants: &[Variant]) -> Chart {
+    let names = (
+        "Reduced model, speed and force to a crossing: error against time on this host",
+        "processor time of a call, ns",
+    );
+    variants_chart(variants, names, |course| Some(course.host_ns))
+}
+
+fn plant_chart(plant: &Plant) -> Chart {
+    let mut series: Vec<Series> = Vec::new();
+    let mut counts: Vec<usize> = plant.settings.iter().map(|point| point.elements).collect();
+    counts.dedup();
+    for (what, error) in
+        [("gap", (|p| p.gap_error) as fn(&Point) -> f64), ("force", |p| p.force_error)]
+    {
+        for &count in &counts {
+            let points = plant.settings.iter().filter(|point| point.elements == count);
+            let points = points.map(|p| (1e-6 * p.wall_ns, 100.0 * error(p))).collect();
+            series.push(Series { name: format!("{what}, {count} elements"), points });
+        }
+    }
+    Chart {
+        title: "Ring: error against the time of a crossing, by elements and stride".to_owned(),
+        x_name: "time of a crossing, ms",
         y_name: "largest relative error, %",
-        series: vec![
-            of("both", "gap, both finer", gap),
-            of("elements", "gap, more elements", gap),
-            of("stride", "gap, shorter stride", gap),
-            of("both", "force, both finer", force),
-        ],
-        ringed: plant
-            .default_mesh()
-            .map(|mesh| ("default", (mesh.crossing_ms, 100.0 * mesh.max_gap_error))),
+        series,
+        ringed: plant.usual().map(|p| ("default", (1e-6 * p.wall_ns, 100.0 * p.gap_error))),
         bound: Some(("allowed for the gap", 0.5)),
+    }
+}
+
+fn phases_bars(costs: &Costs) -> Bars {
+    let row = |name: &str, account: &PlantAccount| {
+        (name.to_owned(), account.phases.iter().map(|phase| 1e3 * phase.wall_s).collect())
+    };
+    Bars {
+        title: "The plant over ten seconds of deployment: time by phase".to_owned(),
+        x_name: "ms",
+        kinds: costs.account.phases.iter().map(|phase| phase.name.to_owned()).collect(),
+        rows: vec![row("as run", &costs.account), row("ring always resolved", &costs.always_awake)],
     }
 }
 

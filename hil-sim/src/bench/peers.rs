@@ -14,8 +14,9 @@ use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
 
 use super::clock::{Effort, least};
-use super::problem::{Figures, Mesh, Problem, Truth};
+use super::problem::{Figures, Problem, Truth, lucks};
 use crate::plant::crossing::cross;
+use crate::plant::precision::Setting as Mesh;
 use crate::plant::rolling;
 
 /// Element counts that the solvers are run with.
@@ -187,17 +188,24 @@ pub fn compare(truth: &Truth, say: &dyn Fn(&str)) -> Result<Peers> {
     })
 }
 
-/// The ring itself, both resolutions together.
+/// Settings of the ring: elements and stride finer together.
+fn meshes() -> Vec<Mesh> {
+    let usual = Mesh::usual();
+    let by = |factor: f64| Mesh {
+        elements: (usual.elements as f64 * factor).round() as usize,
+        stride_mm: usual.stride_mm / factor,
+    };
+    [0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0].into_iter().map(by).collect()
+}
+
+/// The ring itself.
 fn own(problem: &Problem, truth: &Truth) -> Result<Vec<Setting>> {
     let mut settings = Vec::new();
-    for (sweep, mesh) in super::mesh::meshes() {
-        if sweep != "both" {
-            continue;
-        }
+    for mesh in meshes() {
         let timed = least(Effort::USUAL, || problem.case(mesh), |case| cross(&case));
         let mut errors = (0.0_f64, 0.0_f64);
         let mut found = vec![Figures::from(timed.answer?)];
-        for other in mesh.lucks() {
+        for other in lucks(mesh) {
             found.push(cross(&problem.case(other))?.into());
         }
         for figures in found {

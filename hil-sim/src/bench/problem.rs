@@ -1,90 +1,36 @@
-//! The crossings that resolutions, solvers and engines are compared on, and their
-//! converged answers.
+//! The one crossing that engines and solvers are compared on, and its converged answer.
 
 use interstage::rig::Rig;
-use rayon::prelude::*;
 
 use crate::plant::balance::{Axial, BalanceError};
 use crate::plant::crossing::{CrossingCase, CrossingResult, cross};
-use crate::plant::draw::ELEMENTS;
-use crate::plant::rig::Resolution;
+use crate::plant::precision::{FINER, Setting};
 use crate::plant::ring::RingParameters;
-
-/// How much finer than the default the converged run is, in elements and in stride.
-pub const FINER: usize = 20;
-
-/// Elements around the ring and axial way per step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Mesh {
-    /// Elements around the ring.
-    pub elements: usize,
-    /// Axial way per step, mm.
-    pub stride_mm: f64,
-}
-
-impl Mesh {
-    /// What the plant runs with unless told otherwise.
-    #[must_use]
-    pub fn usual() -> Self {
-        Self { elements: ELEMENTS, stride_mm: Resolution::default().stride_mm }
-    }
-
-    /// That many times as fine.
-    #[must_use]
-    pub fn finer(self, times: usize) -> Self {
-        Self { elements: self.elements * times, stride_mm: self.stride_mm / times as f64 }
-    }
-
-    /// The same with other element counts nearby: where the elements stand when the
-    /// lower wall stops carrying is luck, and differs by about a third of their pitch
-    /// from one to the next.
-    #[must_use]
-    pub fn lucks(self) -> [Self; 3] {
-        [self.elements - 3, self.elements, self.elements + 3]
-            .map(|elements| Self { elements, ..self })
-    }
-}
 
 /// One crossing, apart from how finely it is computed.
 #[derive(Clone, Copy, Debug)]
 pub struct Problem {
-    /// Wheel and rubber; its element count is set by the mesh.
+    /// Wheel and rubber; its element count is set by the setting.
     pub ring: RingParameters,
     /// Height of the step, mm.
     pub step_height_mm: f64,
-    /// Axial speed, mm/s; negative retracts.
+    /// Axial speed, mm/s.
     pub speed_mm_s: f64,
     /// Radial preload, N.
     pub preload_n: f64,
-    /// How the wheel is moved.
-    pub axial: Axial,
 }
 
 impl Problem {
-    /// The one that engines and solvers are compared on: the published case of 5 mm/s
-    /// under 100 N, frictionless and quasi-static.
+    /// The published case of 5 mm/s under 100 N, frictionless and quasi-static.
     #[must_use]
     pub fn published() -> Self {
-        Self::of(&Rig::fe(), 5.0, 100.0, Axial::Pushed)
-    }
-
-    /// What the plant's resolution has to hold on: the published case, a driven
-    /// crossing of the prototype and its way back, and a fast one.
-    #[must_use]
-    pub fn all() -> [Self; 4] {
-        let rig = Rig::prototype();
-        let load = Axial::Driven(rig.plant.top_load_n * rig.plant.top_load_share);
-        [
-            Self::published(),
-            Self::of(&rig, 8.0, 48.0, load),
-            Self::of(&rig, -8.0, 48.0, load),
-            Self::of(&rig, 30.0, 50.0, Axial::Pushed),
-        ]
-    }
-
-    fn of(rig: &Rig, speed_mm_s: f64, preload_n: f64, axial: Axial) -> Self {
-        let ring = RingParameters::of(rig, ELEMENTS);
-        Self { ring, step_height_mm: rig.rig.step_height_mm, speed_mm_s, preload_n, axial }
+        let rig = Rig::fe();
+        Self {
+            ring: RingParameters::of(&rig, Setting::usual().elements),
+            step_height_mm: rig.rig.step_height_mm,
+            speed_mm_s: 5.0,
+            preload_n: 100.0,
+        }
     }
 
     /// The same at another preload.
@@ -93,38 +39,40 @@ impl Problem {
         Self { preload_n, ..self }
     }
 
-    /// The crossing at this resolution.
+    /// The crossing at this setting.
     #[must_use]
-    pub fn case(&self, mesh: Mesh) -> CrossingCase {
+    pub fn case(&self, setting: Setting) -> CrossingCase {
         CrossingCase {
-            ring: RingParameters { elements: mesh.elements, ..self.ring },
+            ring: RingParameters { elements: setting.elements, ..self.ring },
             step_height_mm: self.step_height_mm,
             speed_mm_s: self.speed_mm_s,
             preload_n: self.preload_n,
-            axial: self.axial,
-            stride_mm: mesh.stride_mm,
+            axial: Axial::Pushed,
+            stride_mm: setting.stride_mm,
         }
     }
 
-    /// Gap and force of the converged ring: this many times finer than the default.
+    /// Gap and force of the converged ring: finer than the usual setting as the plant's
+    /// own precision is measured.
     ///
     /// # Errors
     /// [`BalanceError`] if no height of the centre balances the preload.
-    pub fn converged(&self, finer: usize) -> Result<Truth, BalanceError> {
-        let at = |times| cross(&self.case(Mesh::usual().finer(times))).map(Figures::from);
-        let (half, full) = rayon::join(|| at(finer / 2), || at(finer));
+    pub fn converged(&self) -> Result<Truth, BalanceError> {
+        let at = |times| cross(&self.case(Setting::usual().finer(times))).map(Figures::from);
+        let (half, full) = rayon::join(|| at(FINER / 2), || at(FINER));
         let (half, full) = (half?, full?);
         let doubt = half.errors(&full);
         Ok(Truth { figures: full, doubt: doubt.0.max(doubt.1) })
     }
 }
 
-/// The converged answers of some problems.
-///
-/// # Errors
-/// [`BalanceError`] if no height of the centre balances a preload.
-pub fn converged(problems: &[Problem], finer: usize) -> Result<Vec<Truth>, BalanceError> {
-    problems.par_iter().map(|problem| problem.converged(finer)).collect()
+/// The same setting with other element counts nearby: where the elements stand when the
+/// lower wall stops carrying is luck, and differs by about a third of their pitch from one
+/// to the next.
+#[must_use]
+pub fn lucks(setting: Setting) -> [Setting; 3] {
+    [setting.elements - 3, setting.elements, setting.elements + 3]
+        .map(|elements| Setting { elements, ..setting })
 }
 
 /// What is compared of a crossing.
@@ -156,7 +104,7 @@ impl Figures {
 pub struct Truth {
     /// Gap and force.
     pub figures: Figures,
-    /// Largest relative difference of both from those at half that.
+    /// Largest relative difference of both from those at half the resolution.
     pub doubt: f64,
 }
 
@@ -172,16 +120,10 @@ mod tests {
     }
 
     #[test]
-    fn a_finer_mesh_is_finer_both_ways() {
-        let mesh = Mesh { elements: 100, stride_mm: 0.1 }.finer(4);
-        assert_eq!(mesh, Mesh { elements: 400, stride_mm: 0.025 });
-    }
-
-    #[test]
-    fn the_problems_cover_both_ways_with_and_without_friction() {
-        let problems = Problem::all();
-        assert!(problems.iter().any(|p| p.speed_mm_s < 0.0));
-        assert!(problems.iter().any(|p| p.axial == Axial::Pushed));
-        assert!(problems.iter().any(|p| matches!(p.axial, Axial::Driven(load) if load > 5.0)));
+    fn the_crossing_is_the_one_that_the_rubber_was_fitted_to() {
+        let fine = Setting { elements: 2880, stride_mm: 0.02 };
+        let found = Figures::from(cross(&Problem::published().case(fine)).unwrap());
+        assert!((found.gap_mm - 1.744).abs() < 0.002, "{found:?}");
+        assert!((found.force_n - 53.72).abs() < 0.05, "{found:?}");
     }
 }
