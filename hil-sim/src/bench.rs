@@ -17,6 +17,7 @@ pub mod page;
 pub mod peers;
 pub mod problem;
 pub mod run;
+pub mod skipping;
 
 use anyhow::Result;
 use interstage::rig::Rig;
@@ -28,6 +29,7 @@ use machine::Machine;
 use peers::Peers;
 use problem::{Problem, Truth};
 use run::Costs;
+use skipping::Firmware;
 
 use crate::plant::precision::{FINER, Point, Setting, work_precision};
 
@@ -56,6 +58,8 @@ pub struct Report {
     pub variants: Vec<Variant>,
     /// How they were compared.
     pub arithmetics: Arithmetics,
+    /// Cycles of the control tick by phase and stage, if they were measured.
+    pub account: Option<Firmware>,
     /// The plant.
     pub plant: Plant,
     /// The others, if they were asked for and could be had.
@@ -97,6 +101,8 @@ pub fn measure(options: Options, say: &(dyn Fn(&str) + Sync)) -> Result<Report> 
     say("arithmetics");
     let mut arithmetics = arithmetic::measure(options.quick, options.cycles)?;
     let variants = std::mem::take(&mut arithmetics.variants);
+    say("control tick");
+    let account = firmware(options.cycles)?;
     say("whole runs");
     let costs = run::measure(options.quick)?;
     say("resolutions");
@@ -110,6 +116,7 @@ pub fn measure(options: Options, say: &(dyn Fn(&str) + Sync)) -> Result<Report> 
         machine: Machine::here(),
         variants,
         arithmetics,
+        account,
         plant,
         peers,
         peers_left_out,
@@ -133,6 +140,16 @@ fn peers_if(wanted: bool, say: &(dyn Fn(&str) + Sync)) -> (Option<Peers>, Option
         Ok(peers) => (Some(peers), None),
         Err(error) => (None, Some(format!("{error:#}").replace('\n', " "))),
     }
+}
+
+#[cfg(feature = "board")]
+fn firmware(wanted: bool) -> Result<Option<Firmware>> {
+    wanted.then(skipping::measure).transpose()
+}
+
+#[cfg(not(feature = "board"))]
+fn firmware(_: bool) -> Result<Option<Firmware>> {
+    Ok(None)
 }
 
 /// The default setting and a coarse one.

@@ -1,4 +1,4 @@
-//! The reduced model of a crossing, the same steps as the shipping one, in whatever
+//! The reduced model of a crossing, the same polynomials as the shipping one, in whatever
 //! arithmetic: what would it cost and how exact would it be in another? Builds for the
 //! host and for the board.
 //!

@@ -1,4 +1,5 @@
-//! The steps of the shipping model, once for all arithmetics.
+//! The polynomials of the shipping model, solved by one step of Halley's method, once for
+//! all arithmetics.
 //!
 //! Lengths over R and forces over a unit; the run over the corner as part of the
 //! longest. Polynomials in parts of a whole are in `2 part - 1`, from -1 to 1.

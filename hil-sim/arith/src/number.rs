@@ -143,7 +143,8 @@ macro_rules! float {
 
             #[inline(always)]
             fn output(self, places: u32) -> i32 {
-                (self.0 * (1_u64 << (16 + places)) as $float) as i32
+                // To the nearest, for what is not negative.
+                (self.0 * (1_u64 << (16 + places)) as $float + 0.5) as i32
             }
         }
     };

@@ -1,10 +1,11 @@
 //! The reduced model in five arithmetics on the same points: what each costs on the
 //! board's core and on this host, and how far each is from the formulas.
 //!
-//! All take the same steps with the same coefficients. The shipping model's formats are
-//! chosen number by number; the others take what their arithmetic gives
-//! (`interstage-arith`), each tuned: the format of the `fixed` crate with the least
-//! error, polynomials unrolled, micromath's root brought to all bits.
+//! All evaluate the same polynomials. The shipping model's formats are chosen number by
+//! number, and it solves without a division; the others take what their arithmetic gives
+//! (`interstage-arith`), each tuned: one step of Halley's method, the format of the
+//! `fixed` crate with the least error, polynomials unrolled, micromath's root brought to
+//! all bits.
 
 #[cfg(feature = "board")]
 mod cycles;

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Report;
 use super::arithmetic::Variant;
+use super::skipping::Firmware;
 
 /// The bounds.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -12,6 +13,8 @@ use super::arithmetic::Variant;
 pub struct Budget {
     /// Of the shipping reduced model.
     pub model: ModelBudget,
+    /// Of the control tick.
+    pub tick: TickBudget,
     /// Of the plant.
     pub plant: PlantBudget,
     /// What depends on the machine.
@@ -29,6 +32,16 @@ pub struct ModelBudget {
     pub forward_cycles: f64,
     /// Back: force from speed and gap.
     pub inverse_cycles: f64,
+}
+
+/// Textbook cycles of the control tick at worst.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TickBudget {
+    /// In any phase.
+    pub cycles: f64,
+    /// On the smooth wall.
+    pub smooth_cycles: f64,
 }
 
 /// Largest errors of the plant's default resolution, relative, and what skipping saves.
@@ -114,6 +127,9 @@ impl Budget {
         if let Some(shipping) = report.variants.first() {
             lines.extend(self.model.lines(shipping));
         }
+        if let Some(account) = &report.account {
+            lines.extend(self.tick.lines(account));
+        }
         if let Some(usual) = report.plant.usual() {
             lines.extend(self.plant.lines(usual.gap_error, usual.force_error));
         }
@@ -159,6 +175,18 @@ impl ModelBudget {
             lines.push(Line::at_most("model, off the front of the five", 0.0, off));
         }
         lines
+    }
+}
+
+impl TickBudget {
+    /// Its lines for this account.
+    #[must_use]
+    pub fn lines(&self, account: &Firmware) -> [Line; 2] {
+        let smooth = account.smooth_most() as f64;
+        [
+            Line::at_most("control tick, cycles", self.cycles, account.most as f64),
+            Line::at_most("control tick on the smooth wall, cycles", self.smooth_cycles, smooth),
+        ]
     }
 }
 

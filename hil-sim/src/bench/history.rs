@@ -62,6 +62,11 @@ impl Entry {
                 put(name("host_ns"), course.host_ns);
             }
         }
+        if let Some(account) = &report.account {
+            put("tick.cycles.mean".into(), account.mean);
+            put("tick.cycles.most".into(), account.most as f64);
+            put("tick.cycles.smooth_most".into(), account.smooth_most() as f64);
+        }
         if let Some(usual) = report.plant.usual() {
             put("plant.max_gap_error".into(), usual.gap_error);
             put("plant.max_force_error".into(), usual.force_error);

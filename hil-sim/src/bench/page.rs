@@ -6,6 +6,7 @@ use super::arithmetic::{Course, Variant};
 use super::chart::{Bars, Chart, Series};
 use super::peers::{Peers, RING, Setting};
 use super::run::Costs;
+use super::skipping::Firmware;
 use super::{Plant, Report};
 use crate::plant::precision::Point;
 use crate::sil::PlantAccount;
@@ -15,6 +16,9 @@ use crate::table::plain;
 #[must_use]
 pub fn tables(report: &Report) -> String {
     let mut text = format!("{}\n", arithmetics(report));
+    if let Some(account) = &report.account {
+        text += &format!("{}\n", firmware(account));
+    }
     text += &settings(&report.plant);
     text += &format!("\n{}", runs(&report.plant));
     match (&report.peers, &report.peers_left_out) {
@@ -39,6 +43,9 @@ pub fn files(report: &Report) -> Vec<(String, String)> {
         ("performance/arithmetic-cycles.svg".to_owned(), cycles_chart(&report.variants).svg()),
         ("performance/arithmetic-host.svg".to_owned(), host_chart(&report.variants).svg()),
     ];
+    if let Some(account) = &report.account {
+        files.push(("performance/tick-stages.svg".to_owned(), stages_bars(account).svg()));
+    }
     if let Some(peers) = &report.peers {
         files.push(("performance/peers.svg".to_owned(), peers_chart(peers).svg()));
     }
@@ -61,20 +68,33 @@ fn page(report: &Report) -> String {
     };
     section(
         "The reduced model: five arithmetics",
-        "The same steps with the same coefficients: speed and force to everything of a \
+        "The same polynomials in five arithmetics: speed and force to everything of a \
          crossing, and speed and gap to force, on the points of a Sobol sequence over speed \
          (1 to 100 mm/s), force (15 to 150 N) and way, for both presets and steps of 2 to \
          6 mm. Errors are those of the gap (of the force for the inverse) against the \
          formulas of [`formula.rs`](../src/model/formula.rs) solved to convergence in f64; \
          how far the formulas are from the ring is stated beside them. Cycles are \
          [textbook Cortex-M4 cycles](EMULATION.md) of an image built like the firmware, its \
-         answers checked against the host's. Each is tuned: polynomials unrolled, the format \
-         of the `fixed` crate with the least error, micromath's root brought to all bits by \
-         two of Heron's steps.\n\n\
+         answers checked against the host's. Each is tuned: the shipping model has its formats \
+         chosen number by number and avoids divisions; the others take one step of Halley's \
+         method with a division, polynomials unrolled, the format of the `fixed` crate with \
+         the least error, micromath's root brought to all bits by two of Heron's steps.\n\n\
          ![Error against cycles](performance/arithmetic-cycles.svg)\n\n\
          ![Error against time on the host](performance/arithmetic-host.svg)",
         &arithmetics(report),
     );
+    if let Some(account) = &report.account {
+        section(
+            "The control tick: stages by phase",
+            "Textbook Cortex-M4 cycles of the tick over a deployment and a retraction of the \
+             prototype, each tick with the same output on host and core. What is inlined counts \
+             where its source is; *primitives* are the square roots, tables and products that \
+             all stages use. What a phase does not need is not run: outputs are the same to the \
+             bit with and without, by test.\n\n\
+             ![Cycles of the tick by phase and stage](performance/tick-stages.svg)",
+            &firmware(account),
+        );
+    }
     section(
         "The plant: resolution",
         &format!(
@@ -168,6 +188,43 @@ fn arithmetics(report: &Report) -> String {
         let _ = writeln!(text, "cycles left out: {why}");
     }
     text
+}
+
+fn firmware(account: &Firmware) -> String {
+    let head: Vec<&str> = ["phase", "ticks", "mean", "most"]
+        .into_iter()
+        .chain(["senses", "odo-\nmetry", "vibra-\ntion", "super-\nvision"])
+        .chain(["sched-\nule", "loops", "tick", "primi-\ntives"])
+        .collect();
+    let rows = account.phases.iter().map(|phase| {
+        let shares =
+            phase.stages.iter().map(|cycles| format!("{:.0}", 100.0 * cycles / phase.mean));
+        let start = [
+            phase.phase.clone(),
+            phase.ticks.to_string(),
+            format!("{:.0}", phase.mean),
+            phase.most.to_string(),
+        ];
+        start.into_iter().chain(shares).collect()
+    });
+    format!(
+        "Control tick by phase: textbook cycles, and shares of the stages in %\n{}\n\
+         mean {:.0}, at worst {}; on the smooth wall at worst {}; a plan between ticks at worst {}\n",
+        plain(&head, rows),
+        account.mean,
+        account.most,
+        account.smooth_most(),
+        account.plan_most
+    )
+}
+
+fn stages_bars(account: &Firmware) -> Bars {
+    Bars {
+        title: "Control tick: mean cycles by phase and stage".to_owned(),
+        x_name: "textbook Cortex-M4 cycles",
+        kinds: account.stages.iter().map(|&stage| stage.to_owned()).collect(),
+        rows: account.phases.iter().map(|p| (p.phase.clone(), p.stages.to_vec())).collect(),
+    }
 }
 
 fn settings(plant: &Plant) -> String {

@@ -1,5 +1,5 @@
-//! What the controller leaves out where it is not needed: cycles of the tick by phase
-//! and stage, with skipping and without. The outputs are the same to the bit.
+//! Which stages of the control tick run in which phase, with their share of its cycles
+//! on the emulated core: what a phase does not need costs it nothing.
 
 use serde::Serialize;
 
@@ -55,8 +55,6 @@ pub struct PhaseCycles {
     pub most: u64,
     /// Mean cycles by stage, in the order of [`STAGES`].
     pub stages: [f64; STAGES.len()],
-    /// Mean cycles without skipping.
-    pub mean_without: f64,
 }
 
 /// The account of a deployment and a retraction on the emulated core.
@@ -68,8 +66,6 @@ pub struct Firmware {
     pub phases: Vec<PhaseCycles>,
     /// Mean cycles of a tick over both runs.
     pub mean: f64,
-    /// The same without skipping.
-    pub mean_without: f64,
     /// Cycles of the dearest tick.
     pub most: u64,
     /// Cycles of the dearest answer of the planner, between the ticks.
@@ -83,10 +79,10 @@ impl Firmware {
         self.phases.iter().filter(|phase| phase.smooth).map(|phase| phase.most).max().unwrap_or(0)
     }
 
-    /// Part of the cycles that skipping saves.
+    /// Mean cycles in the busiest phase.
     #[must_use]
-    pub fn saving(&self) -> f64 {
-        1.0 - self.mean / self.mean_without
+    pub fn busiest_mean(&self) -> f64 {
+        self.phases.iter().map(|phase| phase.mean).fold(0.0, f64::max)
     }
 }
 
@@ -96,24 +92,16 @@ impl Firmware {
 /// If the image cannot be built, or core and host differ in a bit of the output.
 #[cfg(feature = "board")]
 pub fn measure() -> anyhow::Result<Firmware> {
-    use crate::board::account::{Account, IMAGE};
-    use crate::board::image::Image;
+    use crate::board::account::{IMAGE, both_ways};
     use crate::firmware::{Profile, build_binary};
-    use crate::scenario::{Direction, Scenario};
+    use crate::scenario::Scenario;
 
     let elf = build_binary(IMAGE.0, IMAGE.1, Profile::Release, &[])?;
-    let mut image = Image::open(&elf)?;
-    let (mut with, mut without) = (Account::default(), Account::without_skipping());
-    for direction in [Direction::Deploy, Direction::Retract] {
-        let mut scenario = Scenario::default();
-        scenario.run.direction = direction;
-        with.add(&mut image, &scenario)?;
-        without.add(&mut image, &scenario)?;
-    }
+    let (account, image) = both_ways(&elf, &Scenario::default())?;
     let mut phases = Vec::new();
-    for (cost, whole) in with.phases.iter().zip(&without.phases) {
+    for cost in &account.phases {
         let mut stages = [0.0; STAGES.len()];
-        for share in with.profile(&image, &cost.phase)? {
+        for share in account.profile(&image, &cost.phase)? {
             stages[stage(&share.function)] += share.cycles;
         }
         phases.push(PhaseCycles {
@@ -123,16 +111,14 @@ pub fn measure() -> anyhow::Result<Firmware> {
             mean: cost.tick.mean(),
             most: cost.tick.most,
             stages,
-            mean_without: whole.tick.mean(),
         });
     }
     Ok(Firmware {
         stages: STAGES,
         phases,
-        mean: with.tick.mean(),
-        mean_without: without.tick.mean(),
-        most: with.tick.most,
-        plan_most: with.plan.most,
+        mean: account.tick.mean(),
+        most: account.tick.most,
+        plan_most: account.plan.most,
     })
 }
 
@@ -159,25 +145,23 @@ mod tests {
     }
 
     #[test]
-    fn what_is_saved_is_a_part_of_the_whole() {
-        let phase = |smooth: bool, most: u64| PhaseCycles {
+    fn the_smooth_wall_and_the_busiest_phase_are_found() {
+        let phase = |smooth: bool, mean: f64, most: u64| PhaseCycles {
             phase: String::new(),
             smooth,
             ticks: 1,
-            mean: 100.0,
+            mean,
             most,
             stages: [0.0; STAGES.len()],
-            mean_without: 125.0,
         };
         let firmware = Firmware {
             stages: STAGES,
-            phases: vec![phase(false, 900), phase(true, 300), phase(true, 400)],
-            mean: 100.0,
-            mean_without: 125.0,
+            phases: vec![phase(false, 90.0, 900), phase(true, 20.0, 300), phase(true, 30.0, 400)],
+            mean: 50.0,
             most: 900,
             plan_most: 5000,
         };
         assert_eq!(firmware.smooth_most(), 400);
-        assert!((firmware.saving() - 0.2).abs() < 1e-12);
+        assert_eq!(firmware.busiest_mean(), 90.0);
     }
 }

@@ -125,13 +125,13 @@ fn nodes(count: usize) -> impl Iterator<Item = f64> {
     (0..count).map(move |k| 0.5 * (1.0 - angle(k).cos()))
 }
 
-/// Quartic in `2 part - 1` with the least relative error of `of` from `least` to 1.
+/// Quartic in `2 part - 1` with the least error of `of` from `least` to 1.
 fn quartic(least: f64, of: impl Fn(f64) -> f64) -> Option<[f64; 5]> {
     let parts: Vec<f64> = nodes(NODES).map(|node| least + (1.0 - least) * node).collect();
-    let matrix = DMatrix::from_fn(NODES, 5, |row, power| {
-        (2.0 * parts[row] - 1.0).powi(power as i32) / of(parts[row])
-    });
-    let solution = matrix.svd(true, true).solve(&DVector::repeat(NODES, 1.0), 1e-14).ok()?;
+    let matrix =
+        DMatrix::from_fn(NODES, 5, |row, power| (2.0 * parts[row] - 1.0).powi(power as i32));
+    let right = DVector::from_fn(NODES, |row, _| of(parts[row]));
+    let solution = matrix.svd(true, true).solve(&right, 1e-14).ok()?;
     Some(std::array::from_fn(|power| solution[power]))
 }
 
@@ -184,12 +184,12 @@ mod tests {
     }
 
     #[test]
-    fn a_quartic_has_the_least_relative_error() {
+    fn a_quartic_follows_what_is_smooth() {
         let of = |part: f64| (1.0 + part).exp();
         let found = quartic(0.01, of).unwrap();
         for part in [0.01, 0.2, 0.6, 1.0] {
             let value = found.iter().rev().fold(0.0, |sum, c| sum * (2.0 * part - 1.0) + c);
-            assert!((value / of(part) - 1.0).abs() < 3e-5, "{part}");
+            assert!((value / of(part) - 1.0).abs() < 1e-4, "{part}");
         }
     }
 }
