@@ -17,7 +17,7 @@ pub struct Budget {
     pub tick: TickBudget,
     /// Of the plant.
     pub plant: PlantBudget,
-    /// What depends on the machine.
+    /// What is aimed at.
     pub aims: Aims,
 }
 
@@ -56,10 +56,16 @@ pub struct PlantBudget {
     pub least_saving_of_elements: f64,
 }
 
-/// Least factors that depend on the machine.
+/// What is aimed at: factors that depend on the machine, and what is not reached yet.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Aims {
+    /// Largest relative error of the reduced model in fixed point.
+    pub model_error: f64,
+    /// Cycles of the reduced model, either direction.
+    pub model_cycles: f64,
+    /// Cycles of the tick on the smooth wall.
+    pub smooth_tick_cycles: f64,
     /// Times faster than real time, the plant alone.
     pub plant_real_time_factor: f64,
     /// Cost of a crossing over that of the smooth wall.
@@ -79,8 +85,9 @@ pub struct Line {
     pub reached: f64,
     /// Whether the bound is kept.
     pub holds: bool,
-    /// Whether the machine decides: then it is an aim, and fails nothing.
-    pub machine: bool,
+    /// Whether it is an aim, and fails nothing: the machine decides, or it is not reached
+    /// yet.
+    pub aim: bool,
 }
 
 impl Line {
@@ -88,26 +95,32 @@ impl Line {
     #[must_use]
     pub fn at_most(name: &str, bound: f64, reached: f64) -> Self {
         let holds = reached <= bound;
-        Self { name: name.to_owned(), bound, at_least: false, reached, holds, machine: false }
+        Self { name: name.to_owned(), bound, at_least: false, reached, holds, aim: false }
     }
 
     /// At least `bound`, whatever the machine.
     #[must_use]
     pub fn at_least(name: &str, bound: f64, reached: f64) -> Self {
-        Self { machine: false, ..Self::aim(name, bound, reached) }
+        Self { aim: false, ..Self::aim(name, bound, reached) }
     }
 
-    /// At least `bound`, depending on the machine.
+    /// At most `bound`, aimed at.
+    #[must_use]
+    pub fn aim_below(name: &str, bound: f64, reached: f64) -> Self {
+        Self { aim: true, ..Self::at_most(name, bound, reached) }
+    }
+
+    /// At least `bound`, aimed at.
     #[must_use]
     pub fn aim(name: &str, bound: f64, reached: f64) -> Self {
         let holds = reached >= bound;
-        Self { name: name.to_owned(), bound, at_least: true, reached, holds, machine: true }
+        Self { name: name.to_owned(), bound, at_least: true, reached, holds, aim: true }
     }
 
-    /// Whether it is broken and the machine is no excuse.
+    /// Whether it is broken and no aim.
     #[must_use]
     pub fn broken(&self) -> bool {
-        !self.holds && !self.machine
+        !self.holds && !self.aim
     }
 }
 
@@ -126,9 +139,15 @@ impl Budget {
         let mut lines = Vec::new();
         if let Some(shipping) = report.variants.first() {
             lines.extend(self.model.lines(shipping));
+            lines.extend(self.aims.model(shipping));
         }
         if let Some(account) = &report.account {
             lines.extend(self.tick.lines(account));
+            lines.push(Line::aim_below(
+                "control tick on the smooth wall, cycles",
+                self.aims.smooth_tick_cycles,
+                account.smooth_most() as f64,
+            ));
         }
         if let Some(usual) = report.plant.usual() {
             lines.extend(self.plant.lines(usual.gap_error, usual.force_error));
@@ -170,9 +189,20 @@ impl ModelBudget {
                 lines.push(Line::at_most(&name, cycles, reached as f64));
             }
         }
-        if shipping.forward.cycles.is_some() {
+        lines
+    }
+}
+
+impl Aims {
+    /// Those for the shipping model.
+    fn model(&self, shipping: &Variant) -> Vec<Line> {
+        let (forward, inverse) = (&shipping.forward, &shipping.inverse);
+        let error = forward.max_rel_error.max(inverse.max_rel_error);
+        let mut lines = vec![Line::aim_below("model, error", self.model_error, error)];
+        if let Some(cycles) = forward.cycles.max(inverse.cycles) {
             let off = f64::from(u8::from(!shipping.on_front));
-            lines.push(Line::at_most("model, off the front of the five", 0.0, off));
+            lines.push(Line::aim_below("model, cycles", self.model_cycles, cycles as f64));
+            lines.push(Line::aim_below("model, off the front of the five", 0.0, off));
         }
         lines
     }

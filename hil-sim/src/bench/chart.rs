@@ -90,8 +90,8 @@ impl Chart {
             .x_label_style(("sans-serif", size(TEXT_PX), &TEXT))
             .y_label_style(("sans-serif", size(TEXT_PX), &TEXT))
             .axis_desc_style(("sans-serif", size(TEXT_PX), &TEXT))
-            .x_label_formatter(&|value| number(*value))
-            .y_label_formatter(&|value| number(*value))
+            .x_label_formatter(&|value| round_number(*value))
+            .y_label_formatter(&|value| round_number(*value))
             .x_desc(self.x_name)
             .y_desc(self.y_name)
             .draw()?;
@@ -232,6 +232,13 @@ fn decades(range: Option<(f64, f64)>) -> (f64, f64) {
     (low / 1.6, high * 1.6)
 }
 
+/// A mark of a logarithmic axis: 1, 2 or 5 in its decade, or nothing.
+fn round_number(value: f64) -> String {
+    let first = value / 10_f64.powf(value.abs().log10().floor());
+    let round = [1.0, 2.0, 5.0, 10.0].iter().any(|mark| (first / mark - 1.0).abs() < 1e-6);
+    if round { number(value) } else { String::new() }
+}
+
 /// A short number: plain where that is short, otherwise a power of ten.
 fn number(value: f64) -> String {
     if value == 0.0 {
@@ -269,6 +276,12 @@ mod tests {
         ] {
             assert_eq!(number(value), text);
         }
+    }
+
+    #[test]
+    fn a_logarithmic_axis_has_few_marks() {
+        let marks: Vec<String> = (1..=10).map(|n| round_number(0.01 * f64::from(n))).collect();
+        assert_eq!(marks, ["0.01", "0.02", "", "", "0.05", "", "", "", "", "0.1"]);
     }
 
     #[test]
