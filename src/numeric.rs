@@ -18,7 +18,7 @@ mod root;
 mod sine;
 mod table;
 
-pub use build::checked;
+pub use build::{checked, cosine_of_turns};
 pub use divide::{divide, part, reciprocal};
 pub use divisor::Divisor;
 pub use fraction_root::{inverse_sqrt_normalised, sqrt_fraction};

@@ -6,6 +6,7 @@
 //! be run as asked; an error is one line.
 
 mod account;
+mod bench;
 mod compare;
 mod constants;
 mod crossing;
@@ -43,6 +44,7 @@ enum Verb {
     Deploy(deploy::Args),
     Crossing(crossing::Args),
     Modes(modes::Args),
+    Bench(bench::Args),
     Compare(compare::Args),
     Montecarlo(montecarlo::Args),
     Paper(paper::Args),
@@ -61,6 +63,7 @@ impl Verb {
             Self::Deploy(args) => deploy::run(args),
             Self::Crossing(args) => crossing::run(args),
             Self::Modes(args) => modes::run(args),
+            Self::Bench(args) => bench::run(args),
             Self::Compare(args) => compare::run(args),
             Self::Montecarlo(args) => montecarlo::run(args),
             Self::Paper(args) => paper::run(args),

@@ -17,7 +17,7 @@ use crate::plant::rig::PlantError;
 use crate::record::{LogLine, Recording, Report, Row};
 use crate::scenario::{ControllerKind, Direction, Scenario};
 
-pub use account::{PhaseAccount, PlantAccount, account};
+pub use account::{PhaseAccount, PlantAccount, account, account_of};
 pub use session::{Session, drives, read};
 pub use trace::text;
 

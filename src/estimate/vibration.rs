@@ -5,6 +5,7 @@
 
 #![deny(clippy::float_arithmetic)]
 
+use crate::numeric::cosine_of_turns;
 use crate::rig::{Rig, RigError};
 use crate::units::{Millimetres, Q16, TICK_HZ};
 
@@ -88,10 +89,11 @@ impl VibrationObserver {
     /// An observer of a mode of this frequency.
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     fn of_mode(hz: f64) -> Result<Self, RigError> {
-        let angle = 2.0 * core::f64::consts::PI * hz / f64::from(TICK_HZ);
-        let (sin, cos, p) = (libm::sin(angle), libm::cos(angle), RADIUS);
+        let (cosine, sine) = (cosine_of_turns, |turns: f64| cosine_of_turns(turns - 0.25));
+        let turns = hz / f64::from(TICK_HZ);
+        let (sin, cos, p) = (sine(turns), cosine(turns), RADIUS);
         // What differencing makes of the amplitude.
-        let difference = 2.0 * libm::sin(0.5 * angle);
+        let difference = 2.0 * sine(0.5 * turns);
         let first = 2.0 * cos * (1.0 - p);
         let second = (1.0 - p * p - first * cos) / sin;
         let lean = -(1.0 - p) * cos / sin;

@@ -145,13 +145,12 @@ impl Formula {
         if corner <= start || end <= corner {
             return Contact { radial: 0.0, axial: 0.0 };
         }
-        let (sin, cos) = (libm::sin, libm::cos);
-        let radial = r * (sin(end) - sin(start))
-            - d * libm::log(sin(corner) / sin(start))
-            - above * (end - corner);
-        let axial = r * (cos(start) - cos(end))
-            - d * (corner - start)
-            - above * libm::log(cos(corner) / cos(end));
+        // r sin(start) = d, r cos(end) = above, and the corner lies at (d, above).
+        let away = libm::sqrt(d * d + above * above);
+        let end_sine = libm::sqrt(r * r - above * above);
+        let start_cosine = libm::sqrt((r * r - d * d).max(0.0));
+        let radial = end_sine - d - d * libm::log(r / away) - above * (end - corner);
+        let axial = start_cosine - above - d * (corner - start) - above * libm::log(r / away);
         let strip = r * self.width_mm;
         Contact { radial: radial * strip, axial: axial * strip }
     }
@@ -193,9 +192,22 @@ impl Formula {
         kind.fold(self.step_mm / self.radius_mm, load_n / self.unit_force_n())
     }
 
-    /// Effective stiffness over k_inf, `1 + (s - 1) x E`.
+    /// Effective stiffness over k_inf, `1 + (s - 1) x E`, of a crossing with this gap;
+    /// `load_n` as in [`force_n`](Self::force_n).
     #[must_use]
-    pub fn stiffness(&self, kind: Kind, folded: &Folded, speed_mm_s: f64, gap_mm: f64) -> f64 {
+    pub fn stiffness(
+        &self,
+        direction: Direction,
+        speed_mm_s: f64,
+        gap_mm: f64,
+        load_n: Option<f64>,
+    ) -> f64 {
+        let kind = Kind { direction, driven: load_n.is_some() };
+        let folded = self.fold(kind, load_n.unwrap_or(0.0));
+        self.folded_stiffness(kind, &folded, speed_mm_s, gap_mm)
+    }
+
+    fn folded_stiffness(&self, kind: Kind, folded: &Folded, speed_mm_s: f64, gap_mm: f64) -> f64 {
         let x = self.fast_part(kind, speed_mm_s);
         let run = self.run_mm(gap_mm) / self.radius_mm;
         1.0 + (self.stiffening - 1.0) * x * felt::value(folded, x, run)
@@ -226,7 +238,7 @@ impl Formula {
         load_n: f64,
     ) -> f64 {
         let relaxed = self.relaxed_force_n(kind, gap_mm);
-        let stiffness = self.stiffness(kind, folded, speed_mm_s, gap_mm);
+        let stiffness = self.folded_stiffness(kind, folded, speed_mm_s, gap_mm);
         stiffness * relaxed + load_n * self.contact(gap_mm).slope()
     }
 

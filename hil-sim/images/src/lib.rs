@@ -3,6 +3,7 @@
 
 #![no_std]
 
+pub mod arith;
 pub mod digest;
 pub mod model;
 pub mod tick;

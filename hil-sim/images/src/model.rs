@@ -12,8 +12,6 @@ pub struct Given {
     pub direction: u32,
     /// Speed at lift-off, mm/s.
     pub speed: i32,
-    /// Axial load, N.
-    pub load: i32,
     /// Stiffness scale.
     pub scale: i32,
     /// Gap, mm, for the inverse.
@@ -48,9 +46,9 @@ impl Given {
 
     /// The words as the image's memory holds them.
     #[must_use]
-    pub const fn words(&self) -> [u32; 6] {
-        let Self { direction, speed, load, scale, gap, force } = *self;
-        [direction, speed as u32, load as u32, scale as u32, gap as u32, force as u32]
+    pub const fn words(&self) -> [u32; 5] {
+        let Self { direction, speed, scale, gap, force } = *self;
+        [direction, speed as u32, scale as u32, gap as u32, force as u32]
     }
 }
 
@@ -81,7 +79,7 @@ mod tests {
     #[test]
     fn the_words_lie_as_the_structure_does() {
         assert_eq!(size_of::<Given>(), size_of_val(&Given::default().words()));
-        assert_eq!(core::mem::offset_of!(Given, force), 5 * 4);
+        assert_eq!(core::mem::offset_of!(Given, force), 4 * 4);
     }
 
     #[test]

@@ -52,7 +52,7 @@ pub struct Measured {
 /// 150 N in equal ratios, both ways, stiffness scales from 0.75 to 1.25; each with the
 /// gap that the model gives there.
 #[must_use]
-pub fn points(model: &ReducedModel, load_n: f64) -> Vec<Given> {
+pub fn points(model: &ReducedModel) -> Vec<Given> {
     const STEPS: u32 = 12;
     let bits = |value: f64| (value * ONE).round() as i32;
     let between = |low: f64, high: f64, at: u32| {
@@ -65,7 +65,6 @@ pub fn points(model: &ReducedModel, load_n: f64) -> Vec<Given> {
                 let mut given = Given {
                     direction,
                     speed: bits(between(1.0, 100.0, speed)),
-                    load: bits(load_n),
                     scale: bits(scale),
                     gap: 0,
                     force: bits(between(15.0, 150.0, force)),
@@ -87,7 +86,7 @@ pub fn measure(image: &mut Image, preset: Preset) -> Result<Vec<Measured>, Model
     let model = ReducedModel::try_build(&rig)?;
     let build = image.function("model_build")?;
     image.call(build, &[preset as u32])?;
-    let points = points(&model, rig.plant.top_load_n * rig.plant.top_load_share);
+    let points = points(&model);
     let words: Vec<_> = points.iter().map(Given::words).collect();
     let mut measured = Vec::new();
     for (function, host) in FUNCTIONS {

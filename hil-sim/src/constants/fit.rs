@@ -95,8 +95,9 @@ fn weight(shape: &Formula, row: &Row, stiffness: f64) -> f64 {
 pub fn stiffness_error(formula: &Formula, row: &Row) -> f64 {
     let Case { kind, step_mm, speed_mm_s, load_n, .. } = row.case;
     let shape = Formula { step_mm, ..*formula };
-    let folded = shape.fold(kind, load_n);
-    shape.stiffness(kind, &folded, speed_mm_s, row.gap_mm) / observed_stiffness(formula, row) - 1.0
+    let load = kind.driven.then_some(load_n);
+    let stiffness = shape.stiffness(kind.direction, speed_mm_s, row.gap_mm, load);
+    stiffness / observed_stiffness(formula, row) - 1.0
 }
 
 /// Error of the built-in constants' gap at a crossing, in parts of 1 % of the gap or

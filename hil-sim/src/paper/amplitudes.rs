@@ -257,20 +257,20 @@ impl Amplitudes {
                 text(stress, 2, 0, "kPa"),
                 "",
             ),
-            of("fig15-16", "amplitude-falls-with-preload").judged(
+            of("fig15-16", "amplitude-falls-with-preload").fitted().judged(
                 "The vibration amplitude (gap) falls from 1.708 mm to 1.557 mm when the preload rises from \
                  100 N to 120 N.",
                 goes(gap, 1, -1.0),
                 text(gap, 1, 3, "mm"),
                 "",
             ),
-            of("fig15-16", "amplitude-grows-with-speed").judged(
+            of("fig15-16", "amplitude-grows-with-speed").fitted().judged(
                 "The vibration amplitude (gap) grows from 1.708 mm to 1.901 mm when the speed rises from 5 mm/s to 8 mm/s.",
                 goes(gap, 2, 1.0),
                 text(gap, 2, 3, "mm"),
                 "",
             ),
-            of("fig15-16", "amplitude-values").judged(
+            of("fig15-16", "amplitude-values").fitted().judged(
                 "The three amplitudes are 1.7079, 1.5567 and 1.9014 mm.",
                 largest(gaps) < 0.03,
                 format!(

@@ -162,15 +162,29 @@ pub struct Claim {
     pub claim: &'static str,
     /// Whether it holds in ours.
     pub holds: bool,
+    /// Whether a parameter of ours is fitted to just this, so that holding proves nothing.
+    pub fitted: bool,
     /// What was found, and if it does not hold, why.
     pub why: String,
+}
+
+impl Claim {
+    /// The verdict, as the page has it.
+    #[must_use]
+    pub const fn verdict(&self) -> &'static str {
+        match (self.holds, self.fitted) {
+            (true, false) => "holds",
+            (true, true) => "holds (fitted)",
+            (false, _) => "**does not hold**",
+        }
+    }
 }
 
 impl Claim {
     /// A claim of `figure`, made in `section`.
     #[must_use]
     pub const fn of(figure: &'static str, section: &'static str, id: &'static str) -> Open {
-        Open { figure, section, id }
+        Open { figure, section, id, fitted: false }
     }
 }
 
@@ -180,14 +194,22 @@ pub struct Open {
     figure: &'static str,
     section: &'static str,
     id: &'static str,
+    fitted: bool,
 }
 
 impl Open {
+    /// The same, with a parameter of ours fitted to it.
+    #[must_use]
+    pub const fn fitted(self) -> Self {
+        Self { fitted: true, ..self }
+    }
+
     /// What the claim says, whether it holds, what was found, and why it does not hold
     /// if it does not.
     #[must_use]
     pub fn judged(self, claim: &'static str, holds: bool, found: String, but: &str) -> Claim {
         let why = if holds || but.is_empty() { found } else { format!("{found} {but}") };
-        Claim { id: self.id, figure: self.figure, section: self.section, claim, holds, why }
+        let Self { figure, section, id, fitted } = self;
+        Claim { id, figure, section, claim, holds, fitted, why }
     }
 }

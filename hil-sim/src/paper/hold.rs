@@ -129,8 +129,7 @@ impl Hold {
             title: "The gap held by raising the preload at the step",
             caption: "The study's conclusion, at rig loads: the preload with which a faster wheel keeps \
                       the gap of 5 mm/s and 33.3 N. Theory: the reduced model in closed form, as the \
-                      controller uses it. Simulation: the ring, solved for the preload. Experiment: means \
-                      of all forty runs. The study has no figure of this."
+                      controller uses it. Simulation: the ring, solved for the preload. Experiment: forty runs, mean of the three transitions. The study has no figure of this."
                 .into(),
             columns: 2,
             panels: vec![preload, gap],

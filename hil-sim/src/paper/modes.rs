@@ -131,7 +131,7 @@ impl Modes {
         let near = |hz: f64, published: f64| (hz / published - 1.0).abs() < NEAR;
         let apart = ripple_hz.1 < 0.8 * FREE_HZ.min(CONSTRAINED_HZ);
         vec![
-            of("first-constrained-276").judged(
+            of("first-constrained-276").fitted().judged(
                 "The first constrained mode is 276 Hz.",
                 near(constrained, CONSTRAINED_HZ),
                 format!(

@@ -32,6 +32,7 @@ const NOT_JUDGED: [(&str, &str); 4] = [
 #[must_use]
 pub fn markdown(study: &Study) -> String {
     let held = study.claims.iter().filter(|claim| claim.holds).count();
+    let fitted = study.claims.iter().filter(|claim| claim.holds && claim.fitted).count();
     let mut page = format!(
         "# The study's figures, regenerated\n\nWritten by `cargo rig paper`; do not edit.\n\n\
          Every result that the text of the study describes, three times: **theory**, the reduced model \
@@ -41,7 +42,7 @@ pub fn markdown(study: &Study) -> String {
          among them to which a parameter is fitted: three gaps, to which stiffness, stiffening and relaxation time of \
          the tread are, and one frequency, to which a tip mass is. Nothing else is fitted, and nothing is \
          tuned so that a claim would hold.\n\n\
-         Of {} claims {held} hold and {} do not. Each is judged by code from the data of its figure; \
+         Of {} claims {held} hold, {fitted} of these because something is fitted to them, and {} do not. Each is judged by code from the data of its figure; \
          a test fails if a verdict changes. The data are in [paper.json](paper.json).\n",
         study.claims.len(),
         study.claims.len() - held,
@@ -74,7 +75,7 @@ fn section(page: &mut String, figure: &Figure, claims: &[Claim]) {
     }
     *page += "\n| the study says | in its section | | in ours |\n|---|---|---|---|\n";
     for claim in claims.iter().filter(|claim| claim.figure == figure.id) {
-        let verdict = if claim.holds { "holds" } else { "**does not hold**" };
+        let verdict = claim.verdict();
         let _ =
             writeln!(page, "| {} | {} | {verdict} | {} |", claim.claim, claim.section, claim.why);
     }

@@ -2,7 +2,6 @@
 //! of a crossing in closed form, and its history as that of an elastic ring of the
 //! effective stiffness.
 
-use interstage::model::felt::Kind;
 use interstage::model::formula::Formula;
 use interstage::supervise::Direction;
 
@@ -46,12 +45,10 @@ pub fn lift(case: &Case, drive: Drive, level: usize) -> Lift {
         Drive::Pushed => (case.preload_n, None),
         Drive::Driven => (case.pressing_n(level), Some(case.load_n())),
     };
-    let gap = formula.gap_mm(Direction::Deploy, case.speed_mm_s, force, load);
-    let kind = Kind { direction: Direction::Deploy, driven: load.is_some() };
-    let folded = formula.fold(kind, load.unwrap_or(0.0));
-    let stiffness = formula.k_inf * formula.stiffness(kind, &folded, case.speed_mm_s, gap);
+    let crossing = formula.crossing(Direction::Deploy, case.speed_mm_s, force, load);
+    let gap = crossing.gap_mm;
     let area = area_of_gap_mm2(&formula, gap);
-    let collision = stiffness * formula.contact(gap).axial;
+    let collision = crossing.corner_force_n;
     Lift {
         gap_mm: gap,
         depth_mm: formula.depth_mm(gap),
@@ -105,9 +102,7 @@ pub fn deployment(case: &Case, arms: &Arms) -> Result<Course, BalanceError> {
     let formula = Formula::new(&rig);
     let gap = mean_lift(case, Drive::Driven).gap_mm;
     let mut tread = RingParameters::of(&rig, COARSE.0);
-    let kind = Kind { direction: Direction::Deploy, driven: true };
-    let folded = formula.fold(kind, case.load_n());
-    tread.k_inf *= formula.stiffness(kind, &folded, case.speed_mm_s, gap);
+    tread.k_inf *= formula.stiffness(Direction::Deploy, case.speed_mm_s, gap, Some(case.load_n()));
     tread.k_0 = tread.k_inf;
     let height_mm = rig.rig.step_height_mm;
     let steps = rig.rig.step_positions_mm.iter();

@@ -1,5 +1,7 @@
 //! Interpolation at Chebyshev's nodes, as powers of a variable from -1/2 to 1/2.
 
+use crate::numeric::cosine_of_turns;
+
 /// Nodes of each axis of a surface.
 const NODES: usize = 8;
 
@@ -29,13 +31,17 @@ pub(super) fn rows<const N: usize>(scale: f64, shift: f64) -> [[f64; N]; N] {
 
 /// Node `index` of `count`, from -1 to 1.
 fn node(index: usize, count: usize) -> f64 {
-    libm::cos(core::f64::consts::PI * (index as f64 + 0.5) / count as f64)
+    cosine(2 * index + 1, 4 * count)
 }
 
 /// Weight of node `index` of `count` in the coefficient of T_n.
 fn weight(n: usize, index: usize, count: usize) -> f64 {
-    let angle = core::f64::consts::PI * n as f64 * (index as f64 + 0.5) / count as f64;
-    (if n == 0 { 1.0 } else { 2.0 }) / count as f64 * libm::cos(angle)
+    (if n == 0 { 1.0 } else { 2.0 }) / count as f64 * cosine(n * (2 * index + 1), 4 * count)
+}
+
+/// Cosine of a part of a turn.
+fn cosine(part: usize, of: usize) -> f64 {
+    cosine_of_turns(part as f64 / of as f64)
 }
 
 /// Value by powers.
