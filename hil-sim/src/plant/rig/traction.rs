@@ -92,11 +92,7 @@ impl VirtualRig {
         let per_force = 1000.0 / self.parameters.mass_kg * dt_s;
         let Some(axial) = self.sliding_towards(sense) else {
             self.sliding = false;
-            // Jammed, the arm presses as hard as it takes, but not at once.
-            let most = per_force * mu * cosine.max(0.0);
-            let wanted = slip + per_force * missing;
-            let change = wanted.clamp(-most, most) - per_force * missing;
-            return Gait { speed: self.truth.speed_mm_s + change, ..gripping };
+            return gripping;
         };
         let speed = self.truth.speed_mm_s + per_force * (mu * sense * cosine - missing);
         let left = gripped - speed;
