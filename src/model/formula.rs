@@ -3,7 +3,7 @@
 //! At the instant the lower wall stops carrying, the centre of an elastic ring
 //! stands at its undeformed height R above it, so the contact with face and corner
 //! is a closed form in the gap. Memory enters as an effective stiffness
-//! ([`felt`](super::felt)), fitted to the ring. Friction that lifts the top load is
+//! ([`super::felt`]), fitted to the ring. Friction that lifts the top load is
 //! taken as equally used over the contact.
 
 use super::felt::{self, FORCE_END, Folded, Kind, RUN_END};

@@ -7,8 +7,8 @@
 //! no loop, at most four 32-bit divisions.
 //!
 //! Formats inside: lengths over R and parts of a whole in Q32 without sign, so that a
-//! difference from one half is a Q32 with sign as [`horner`] wants it; forces over the
-//! unit of [`Shape`] in Q30.
+//! difference from one half is a Q32 with sign as `horner` wants it; forces over the
+//! unit of `Shape` in Q30.
 
 #![deny(clippy::float_arithmetic)]
 

@@ -45,13 +45,13 @@ macro_rules! horner_with_slope {
 
 pub(crate) use {horner, horner_with_slope};
 
-/// Whether no `t` makes [`horner`] overflow with these coefficients, in any step.
+/// Whether no `t` makes `horner` overflow with these coefficients, in any step.
 #[must_use]
 pub fn fits(coefficients: &[i32]) -> bool {
     bounds(coefficients).0
 }
 
-/// Whether no `t` makes [`horner_with_slope`] overflow with these coefficients.
+/// Whether no `t` makes `horner_with_slope` overflow with these coefficients.
 #[must_use]
 pub fn fits_with_slope(coefficients: &[i32]) -> bool {
     let (value, slope) = bounds(coefficients);

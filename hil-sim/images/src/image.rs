@@ -31,6 +31,7 @@ fn main() -> ! {
         model::model_inverse_preload as *const (),
         model::model_inverse_speed as *const (),
         tick::tick_build as *const (),
+        tick::tick_skip_nothing as *const (),
         tick::tick_load as *const (),
         tick::tick_step as *const (),
         tick::tick_plan as *const (),

@@ -274,9 +274,9 @@ mod tests {
         let [shipping, fixed, micro, libm, double] = &found.variants[..] else {
             panic!("five: {found:?}")
         };
-        // The coefficients' fit is what f64 is off by; the rest is rounding.
+        // The fit of guess and quartics is what f64 is off by; the rest is rounding.
         for (variant, most) in
-            [(shipping, 1e-4), (fixed, 3e-4), (micro, 3e-4), (libm, 3e-4), (double, 1e-4)]
+            [(shipping, 2e-4), (fixed, 3e-4), (micro, 3e-4), (libm, 3e-4), (double, 2e-4)]
         {
             assert!(variant.forward.max_rel_error < most, "{variant:?}");
             assert!(variant.inverse.max_rel_error < most, "{variant:?}");

@@ -64,6 +64,8 @@ pub struct Aims {
     pub model_error: f64,
     /// Cycles of the reduced model, either direction.
     pub model_cycles: f64,
+    /// Cycles of the tick.
+    pub tick_cycles: f64,
     /// Cycles of the tick on the smooth wall.
     pub smooth_tick_cycles: f64,
     /// Times faster than real time, the plant alone.
@@ -143,6 +145,8 @@ impl Budget {
         }
         if let Some(account) = &report.account {
             lines.extend(self.tick.lines(account));
+            let most = account.most as f64;
+            lines.push(Line::aim_below("control tick, cycles", self.aims.tick_cycles, most));
             lines.push(Line::aim_below(
                 "control tick on the smooth wall, cycles",
                 self.aims.smooth_tick_cycles,

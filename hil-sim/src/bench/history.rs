@@ -64,6 +64,7 @@ impl Entry {
         }
         if let Some(account) = &report.account {
             put("tick.cycles.mean".into(), account.mean);
+            put("tick.cycles.mean_whole".into(), account.mean_whole);
             put("tick.cycles.most".into(), account.most as f64);
             put("tick.cycles.smooth_most".into(), account.smooth_most() as f64);
         }

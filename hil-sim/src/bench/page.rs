@@ -195,8 +195,10 @@ fn arithmetics(report: &Report) -> String {
 }
 
 fn firmware(account: &Firmware) -> String {
-    let head =
-        ["phase", "ticks", "mean", "most", "senses", "contact", "super", "plan", "tick", "prims"];
+    let head = [
+        "phase", "ticks", "mean", "whole", "most", "senses", "contact", "super", "plan", "tick",
+        "prims",
+    ];
     let rows = account.phases.iter().map(|phase| {
         let [senses, odometry, vibration, supervision, schedule, loops, tick, primitives] =
             phase.stages;
@@ -206,6 +208,7 @@ fn firmware(account: &Firmware) -> String {
             phase.phase.clone(),
             phase.ticks.to_string(),
             format!("{:.0}", phase.mean),
+            format!("{:.0}", phase.mean_whole),
             phase.most.to_string(),
         ];
         let shares = shares.map(|cycles| format!("{:.0}", 100.0 * cycles / phase.mean));
@@ -215,12 +218,16 @@ fn firmware(account: &Firmware) -> String {
         "Control tick by phase: textbook cycles; % of them in senses, odometry and contact with \
          the\nvibration observer, supervision, schedule and loops, the tick itself with its \
          telemetry, and\nprimitives\n{}\n\
-         mean {:.0}, at worst {}; on the smooth wall at worst {}; a plan between ticks at worst {}\n",
+         mean {:.0}, at worst {}; on the smooth wall at worst {}; a plan between ticks at worst {}\n\
+         skipping: whole is the mean with every stage run in every tick: {:.0} over all; on the \
+         smooth\nwall skipping saves {} %\n",
         plain(&head, rows),
         account.mean,
         account.most,
         account.smooth_most(),
-        account.plan_most
+        account.plan_most,
+        account.mean_whole,
+        percent(account.smooth_saving()),
     )
 }
 
@@ -520,14 +527,15 @@ fn percent(part: f64) -> String {
 }
 
 /// Three significant digits.
-fn short(value: f64) -> String {
+#[must_use]
+pub fn short(value: f64) -> String {
     if !value.is_finite() {
         return "-".to_owned();
     }
     if value == 0.0 {
         return "0".to_owned();
     }
-    let decimals = (2.0 - value.abs().log10().floor()).clamp(0.0, 6.0) as usize;
+    let decimals = (2.0 - value.abs().log10().floor()).clamp(0.0, 9.0) as usize;
     format!("{value:.decimals$}")
 }
 

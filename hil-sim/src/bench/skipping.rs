@@ -1,5 +1,6 @@
 //! Which stages of the control tick run in which phase, with their share of its cycles
-//! on the emulated core: what a phase does not need costs it nothing.
+//! on the emulated core, and what it would cost to run them all in every tick. The
+//! outputs are the same to the bit.
 
 use serde::Serialize;
 
@@ -55,6 +56,8 @@ pub struct PhaseCycles {
     pub most: u64,
     /// Mean cycles by stage, in the order of [`STAGES`].
     pub stages: [f64; STAGES.len()],
+    /// Mean cycles with nothing skipped.
+    pub mean_whole: f64,
 }
 
 /// The account of a deployment and a retraction on the emulated core.
@@ -66,6 +69,8 @@ pub struct Firmware {
     pub phases: Vec<PhaseCycles>,
     /// Mean cycles of a tick over both runs.
     pub mean: f64,
+    /// The same with nothing skipped.
+    pub mean_whole: f64,
     /// Cycles of the dearest tick.
     pub most: u64,
     /// Cycles of the dearest answer of the planner, between the ticks.
@@ -77,6 +82,16 @@ impl Firmware {
     #[must_use]
     pub fn smooth_most(&self) -> u64 {
         self.phases.iter().filter(|phase| phase.smooth).map(|phase| phase.most).max().unwrap_or(0)
+    }
+
+    /// Part of the cycles of a tick that skipping saves on the smooth wall.
+    #[must_use]
+    pub fn smooth_saving(&self) -> f64 {
+        let sum = |of: fn(&PhaseCycles) -> f64| -> f64 {
+            let smooth = self.phases.iter().filter(|phase| phase.smooth);
+            smooth.map(|phase| phase.ticks as f64 * of(phase)).sum()
+        };
+        1.0 - sum(|phase| phase.mean) / sum(|phase| phase.mean_whole)
     }
 
     /// Mean cycles in the busiest phase.
@@ -92,14 +107,22 @@ impl Firmware {
 /// If the image cannot be built, or core and host differ in a bit of the output.
 #[cfg(feature = "board")]
 pub fn measure() -> anyhow::Result<Firmware> {
-    use crate::board::account::{IMAGE, both_ways};
+    use crate::board::account::{Account, IMAGE};
+    use crate::board::image::Image;
     use crate::firmware::{Profile, build_binary};
-    use crate::scenario::Scenario;
+    use crate::scenario::{Direction, Scenario};
 
     let elf = build_binary(IMAGE.0, IMAGE.1, Profile::Release, &[])?;
-    let (account, image) = both_ways(&elf, &Scenario::default())?;
+    let mut image = Image::open(&elf)?;
+    let (mut account, mut whole) = (Account::default(), Account::without_skipping());
+    for direction in [Direction::Deploy, Direction::Retract] {
+        let mut scenario = Scenario::default();
+        scenario.run.direction = direction;
+        account.add(&mut image, &scenario)?;
+        whole.add(&mut image, &scenario)?;
+    }
     let mut phases = Vec::new();
-    for cost in &account.phases {
+    for (cost, whole) in account.phases.iter().zip(&whole.phases) {
         let mut stages = [0.0; STAGES.len()];
         for share in account.profile(&image, &cost.phase)? {
             stages[stage(&share.function)] += share.cycles;
@@ -111,12 +134,14 @@ pub fn measure() -> anyhow::Result<Firmware> {
             mean: cost.tick.mean(),
             most: cost.tick.most,
             stages,
+            mean_whole: whole.tick.mean(),
         });
     }
     Ok(Firmware {
         stages: STAGES,
         phases,
         mean: account.tick.mean(),
+        mean_whole: whole.tick.mean(),
         most: account.tick.most,
         plan_most: account.plan.most,
     })
@@ -153,15 +178,18 @@ mod tests {
             mean,
             most,
             stages: [0.0; STAGES.len()],
+            mean_whole: 1.25 * mean,
         };
         let firmware = Firmware {
             stages: STAGES,
             phases: vec![phase(false, 90.0, 900), phase(true, 20.0, 300), phase(true, 30.0, 400)],
             mean: 50.0,
+            mean_whole: 60.0,
             most: 900,
             plan_most: 5000,
         };
         assert_eq!(firmware.smooth_most(), 400);
         assert_eq!(firmware.busiest_mean(), 90.0);
+        assert!((firmware.smooth_saving() - 0.2).abs() < 1e-12);
     }
 }

@@ -60,6 +60,9 @@ pub struct Account {
     /// Cycles by block and phase, for [`Account::profile`].
     #[serde(skip)]
     heat: Vec<Heat>,
+    /// Every stage is run in every tick.
+    #[serde(skip)]
+    whole: bool,
 }
 
 /// A function's share of a phase.
@@ -74,6 +77,12 @@ pub struct Share {
 }
 
 impl Account {
+    /// An account of a controller that skips nothing.
+    #[must_use]
+    pub fn without_skipping() -> Self {
+        Self { whole: true, ..Self::default() }
+    }
+
     /// Gives the run of `scenario` to the image.
     ///
     /// # Errors
@@ -98,6 +107,9 @@ impl Account {
     ) -> Result<(), AccountError> {
         let calls = Calls::of(image)?;
         image.call(calls.build, &[preset as u32])?;
+        if self.whole {
+            image.call(calls.skip_nothing, &[])?;
+        }
         for (number, tick) in ticks.iter().enumerate() {
             image.put(ARGUMENTS, &tick.given.words())?;
             image.call(calls.load, &[ARGUMENTS])?;
@@ -164,6 +176,7 @@ impl Account {
 /// Addresses of the image's functions for the tick.
 struct Calls {
     build: u32,
+    skip_nothing: u32,
     load: u32,
     step: u32,
     plan: u32,
@@ -174,6 +187,7 @@ impl Calls {
     fn of(image: &Image) -> Result<Self, ImageError> {
         Ok(Self {
             build: image.function("tick_build")?,
+            skip_nothing: image.function("tick_skip_nothing")?,
             load: image.function("tick_load")?,
             step: image.function("tick_step")?,
             plan: image.function("tick_plan")?,

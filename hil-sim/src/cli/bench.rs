@@ -102,7 +102,7 @@ fn human(printed: &Printed<'_>) -> String {
         text += "\nMoved since the last record\n";
         for change in printed.changes {
             let Change { name, before, now } = change;
-            text += &format!("  {name}: {before:.4} to {now:.4}\n");
+            text += &format!("  {name}: {} to {}\n", page::short(*before), page::short(*now));
         }
     }
     for path in &printed.written {
