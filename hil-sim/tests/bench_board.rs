@@ -25,7 +25,8 @@ fn the_control_tick_keeps_its_budget_and_every_cycle_has_a_stage() {
     let account = skipping::measure().unwrap();
     for phase in &account.phases {
         let sum: f64 = phase.stages.iter().sum();
-        assert!((sum / phase.mean - 1.0).abs() < 1e-3, "{phase:?}");
+        // A function's cycles over all ticks of a phase are whole; there are at most 200.
+        assert!((sum - phase.mean).abs() < 100.0 / phase.ticks as f64 + 1e-6, "{phase:?}");
     }
     check(Budget::shipped().unwrap().tick.lines(&account));
 }
