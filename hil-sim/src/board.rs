@@ -1,9 +1,14 @@
-//! The emulated board: the processor core, what its instructions cost, and images that
-//! run on it.
+//! The emulated board: the processor core, what its instructions cost, the chip around
+//! it, and images that run on it.
 
 pub mod account;
+pub mod chip;
 pub mod core;
+pub mod elf;
+pub mod exceptions;
 pub mod image;
+pub mod machine;
 pub mod model;
+pub mod peripherals;
 pub mod thumb;
 pub mod timing;
