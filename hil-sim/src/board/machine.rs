@@ -15,10 +15,10 @@ use super::image::ImageError;
 use super::peripherals::rcc::Cause as Restart;
 use super::peripherals::system::Cause;
 
-pub use profile::{Profile, Share};
+pub use profile::{Profile, Share, THREAD};
 
 /// What RAM holds when power comes up.
-const BLANK: u8 = 0xA5;
+pub const BLANK: u8 = 0xA5;
 /// Cycles of an exception's entry and return, and of going from one to the next.
 const ENTRY: u64 = 12;
 const EXIT: u64 = 10;

@@ -1,0 +1,50 @@
+//! `rig deploy --target board`: the firmware itself, on the emulated board.
+
+use std::path::Path;
+
+use super::Args;
+use crate::cli::failure::{Failure, Outcome};
+use crate::scenario::Scenario;
+
+/// Without the emulated board: go on with a binary that has it.
+#[cfg(not(feature = "board"))]
+pub(super) fn run(_: &Args, _: &Scenario, _: Option<&Path>) -> Result<Outcome, Failure> {
+    Ok(Outcome::Code(crate::provision::go_on()?))
+}
+
+#[cfg(feature = "board")]
+pub(super) fn run(
+    args: &Args,
+    scenario: &Scenario,
+    directory: Option<&Path>,
+) -> Result<Outcome, Failure> {
+    use crate::board::run;
+    use crate::cli::output;
+    use crate::firmware::{self, Profile};
+    use crate::{progress, table};
+
+    run::check(scenario).map_err(Failure::input)?;
+    let elf = firmware::build(Profile::Release)?;
+    let image = std::fs::read(&elf)
+        .map_err(|source| firmware::FirmwareError::Read { path: elf.clone(), source })?;
+    let (recording, machine) = {
+        let _progress = (!args.log).then(|| progress::spinner(scenario.run.direction.name()));
+        let show = |t_s: f64, line: &crate::board::log::Line| {
+            if args.log {
+                eprintln!("[{t_s:8.3}] {:<5} {}", line.level, line.text);
+            }
+        };
+        run::run(&image, scenario, directory.is_some(), show).map_err(Failure::run)?
+    };
+    let files = match directory {
+        Some(directory) => super::write(&recording, directory)?,
+        None => Vec::new(),
+    };
+    let summary = &recording.summary;
+    let printed = super::Printed { summary, files: &files };
+    for stray in machine.chip().strays().iter() {
+        eprintln!("{stray}");
+    }
+    output::result(args.json, &printed, || table::run(summary, &files))?;
+    Ok(Outcome::of(summary.completed && summary.faults.is_empty()))
+}
