@@ -8,6 +8,7 @@ pub mod core;
 pub mod elf;
 pub mod exceptions;
 pub mod image;
+pub mod load;
 pub mod log;
 pub mod machine;
 pub mod model;

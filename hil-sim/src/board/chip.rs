@@ -209,6 +209,28 @@ impl Chip {
     /// Lets everything that follows from a change follow: pins, lines, deadlines.
     fn settle(&mut self, now: u64) {
         self.settle_pins(now);
+        self.settle_lines(now);
+    }
+
+    /// The same after an access to one block: what cannot have changed is left alone.
+    fn settle_after(&mut self, block: Block, offset: u32, write: bool, now: u64) {
+        match block {
+            Block::Port(_) | Block::Syscfg | Block::Motor(_) | Block::Exti if write => {
+                self.settle(now);
+            }
+            // A converter's or a bus's data register is changed by being read.
+            Block::Adc | Block::Spi => self.settle_lines(now),
+            Block::Time | Block::Dma | Block::Mux | Block::Watchdog if write => {
+                self.settle_lines(now);
+            }
+            // The interrupt controller keeps its own account.
+            Block::System if write && !(0x100..0x500).contains(&offset) => self.settle_lines(now),
+            _ => {}
+        }
+    }
+
+    /// Interrupt lines, and when something is due next.
+    fn settle_lines(&mut self, now: u64) {
         if self.system.control.wants_reset {
             self.reset = Some(Cause::Software);
         }
@@ -277,7 +299,9 @@ impl Chip {
             self.strays.note((map::name(block), offset), access, false, Why::NoClock);
             return 0;
         }
-        match self.block(block).read(offset, access.now) {
+        let value = self.block(block).read(offset, access.now);
+        self.settle_after(block, offset, false, access.now);
+        match value {
             Some(value) => value,
             None => {
                 self.strays.note((map::name(block), offset), access, false, Why::NoModel);
@@ -294,7 +318,6 @@ impl Bus for Chip {
 
     fn read(&mut self, access: Access) -> u32 {
         let word = self.read_word(access);
-        self.settle(access.now);
         let kept = if access.size >= 4 { u32::MAX } else { (1 << (8 * access.size)) - 1 };
         word >> (8 * (access.address & 3)) & kept
     }
@@ -315,7 +338,7 @@ impl Bus for Chip {
         if !sticks && self.block(block).write(offset, write, access.now).is_none() {
             self.strays.note((map::name(block), offset), access, true, Why::NoModel);
         }
-        self.settle(access.now);
+        self.settle_after(block, offset, true, access.now);
     }
 
     fn deadline(&self) -> u64 {

@@ -117,6 +117,17 @@ impl Meter {
     }
 }
 
+/// The program has come to a marked address.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mark {
+    /// Cycles so far, the block that begins there included.
+    pub cycles: u64,
+    /// Where.
+    pub address: u32,
+    /// What R0 held.
+    pub r0: u32,
+}
+
 /// Cycles by the basic block that spent them, given as address and bytes.
 pub type Heat = BTreeMap<(u32, u32), u64>;
 
@@ -240,6 +251,15 @@ pub trait Core {
 
     /// What has been executed so far.
     fn meter(&self) -> Meter;
+
+    /// Notes from now on whenever the program comes to this address.
+    ///
+    /// # Errors
+    /// [`CoreError::Engine`] if the engine refuses.
+    fn mark(&mut self, address: u32) -> Result<(), CoreError>;
+
+    /// Moves the notes taken since the last call into `marks`, in their order.
+    fn take_marks(&mut self, marks: &mut Vec<Mark>);
 
     /// Takes the cycles by block since the last call, or since the start.
     fn take_heat(&mut self) -> Heat;

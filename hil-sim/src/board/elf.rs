@@ -71,6 +71,11 @@ impl Loaded {
     Ok(Loaded { flash, code, functions, symbols })
 }
 
+    /// Symbols with their values, in the order of their names.
+    pub fn symbols(&self) -> impl Iterator<Item = (&str, u32)> {
+        self.symbols.iter().map(|(name, value)| (name.as_str(), *value))
+    }
+
     /// Value of a symbol.
     ///
     /// # Errors

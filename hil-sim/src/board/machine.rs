@@ -3,19 +3,22 @@
 
 mod frame;
 mod profile;
+mod tasks;
 
 use std::path::Path;
 
 use super::chip::Chip;
 use super::core::unicorn::{Counted, UnicornCore};
-use super::core::{Access, Bus, Core, CoreError, Register, Stop, passes};
+use super::core::{Access, Bus, Core, CoreError, Mark, Register, Stop, passes};
 use super::elf::{FLASH, Function, Loaded, RAM, named};
 use super::exceptions::number::{HARD_FAULT, SV_CALL};
 use super::image::ImageError;
 use super::peripherals::rcc::Cause as Restart;
 use super::peripherals::system::Cause;
 
-pub use profile::{Profile, Share, THREAD};
+pub use profile::{Poll, Profile, Share, THREAD};
+
+use tasks::Tasks;
 
 /// What RAM holds when power comes up.
 pub const BLANK: u8 = 0xA5;
@@ -41,6 +44,8 @@ pub struct Machine {
     pc: u32,
     asleep: Option<Asleep>,
     profile: Profile,
+    tasks: Tasks,
+    marks: Vec<Mark>,
     functions: Vec<Function>,
     restarts: Vec<(u64, Restart)>,
     /// Symbols of the image.
@@ -73,10 +78,15 @@ impl Machine {
             pc: 0,
             asleep: None,
             profile: Profile::default(),
+            tasks: Tasks::of(&loaded),
+            marks: Vec::new(),
             functions: loaded.functions.clone(),
             restarts: Vec::new(),
             loaded,
         };
+        for address in machine.tasks.marks() {
+            machine.core.mark(address)?;
+        }
         machine.start()?;
         Ok(machine)
     }
@@ -102,6 +112,17 @@ impl Machine {
     #[must_use]
     pub const fn profile(&self) -> &Profile {
         &self.profile
+    }
+
+    /// The same, to take what has gathered.
+    pub fn profile_mut(&mut self) -> &mut Profile {
+        &mut self.profile
+    }
+
+    /// Names of the tasks, by their numbers in the profile.
+    #[must_use]
+    pub fn tasks(&self) -> Vec<&str> {
+        self.tasks.names().collect()
     }
 
     /// Restarts so far: when, and why.
@@ -212,7 +233,9 @@ impl Machine {
                 self.enter(number, self.pc, false)?;
                 continue;
             }
-            match self.core.run(self.pc, cycle - self.now())? {
+            let stop = self.core.run(self.pc, cycle - self.now())?;
+            self.note_tasks();
+            match stop {
                 Stop::Spent(at) | Stop::Urgent(at) => self.pc = at,
                 Stop::Breakpoint(at) => {
                     self.pc = at;
@@ -256,6 +279,17 @@ impl Machine {
             self.fault(Cause::Program(super::core::Fault::Undefined), self.pc)?;
         }
         Ok(())
+    }
+
+    /// Books the tasks that have begun and ended.
+    fn note_tasks(&mut self) {
+        self.core.take_marks(&mut self.marks);
+        for mark in self.marks.drain(..) {
+            match self.tasks.begins(mark.address, mark.r0) {
+                Some(task) => self.profile.begin(task, mark.cycles),
+                None => self.profile.end(mark.cycles),
+            }
+        }
     }
 
     /// Everything of the chip that is due.

@@ -4,10 +4,12 @@ mod trace;
 
 use std::time::Instant;
 
-use super::bench::{Bench, BenchError, STEP};
+use super::bench::{Bench, BenchError};
 use super::elf::RAM;
+use super::load::{Gathered, Load};
 use super::log::{Line, Strings};
 use super::machine::Machine;
+use crate::firmware::{FirmwareError, Footprint};
 use crate::record::Recording;
 use crate::scenario::{ControllerKind, Direction, Scenario};
 
@@ -24,9 +26,22 @@ pub enum RunError {
     /// The bench.
     #[error(transparent)]
     Bench(#[from] BenchError),
+    /// The image's sections.
+    #[error(transparent)]
+    Image(#[from] FirmwareError),
     /// The image has its parameters built in.
     #[error("the firmware is built for the rig `prototype` as it is: {0}")]
     Rig(String),
+}
+
+/// A run that was made.
+pub struct Ran {
+    /// Summary, ledger, rows, log.
+    pub recording: Recording,
+    /// What it cost.
+    pub load: Load,
+    /// The board as it was left.
+    pub machine: Machine,
 }
 
 /// What the firmware can be asked to do.
@@ -56,8 +71,9 @@ pub fn run(
     scenario: &Scenario,
     rows: bool,
     mut watch: impl FnMut(f64, &Line),
-) -> Result<(Recording, Machine), RunError> {
+) -> Result<Ran, RunError> {
     check(scenario)?;
+    let footprint = Footprint::of_elf(elf)?;
     let strings = Strings::of(elf).map_err(BenchError::from)?;
     let mut bench = Bench::new(elf, &strings, scenario).map_err(BenchError::from)?;
     let mut trace = Trace::new(scenario, bench.plant());
@@ -67,25 +83,30 @@ pub fn run(
     });
     let started = Instant::now();
     let mut after = AFTER;
+    let mut gathered = Gathered::default();
     while bench.time_s() < LONGEST_S && after > 0 {
         if trace.is_idle()
             && let Some(letter) = start
             && bench.send(letter)?
         {
             start = None;
+            gathered.begin(bench.machine_mut());
         }
         let before = bench.plant().truth().time_s;
         let (passed, lines) = bench.step()?;
         for line in &lines {
             watch(bench.time_s(), line);
         }
+        gathered.gather(bench.machine_mut(), trace.mode());
         trace.look(before, &passed, &lines, bench.plant().truth(), rows);
         if trace.is_over() {
             after -= 1;
         }
     }
     let recording = trace.finish(scenario, bench.plant(), started.elapsed().as_secs_f64());
-    Ok((recording, bench.into_machine()))
+    let machine = bench.into_machine();
+    let load = gathered.close(&machine, &footprint, stack_used(&machine)?);
+    Ok(Ran { recording, load, machine })
 }
 
 /// Bytes of the stack that were used, deepest since power came up.
@@ -99,10 +120,4 @@ pub fn stack_used(machine: &Machine) -> Result<u32, BenchError> {
     machine.peek(end, &mut stack)?;
     let untouched = stack.iter().take_while(|byte| **byte == super::machine::BLANK).count();
     Ok(stack.len() as u32 - untouched as u32)
-}
-
-/// Milliseconds since power came up.
-#[must_use]
-pub fn milliseconds(machine: &Machine) -> u64 {
-    machine.now() / STEP
 }

@@ -8,7 +8,7 @@ use std::collections::HashSet;
 
 use unicorn_engine::{Arch, ArmCpuModel, Mode, Prot, RegisterARM, Unicorn, uc_error};
 
-use super::{Access as Touch, Bus, Core, CoreError, Fault, Heat, Meter, NoBus, Register, Stop, passes};
+use super::{Access as Touch, Bus, Core, CoreError, Fault, Heat, Mark, Meter, NoBus, Register, Stop, passes};
 use crate::board::thumb::{self, Kind};
 use crate::board::timing::{self, REFILL};
 
@@ -94,6 +94,7 @@ struct Count {
 struct Inside<B> {
     count: Count,
     bus: B,
+    marks: Vec<Mark>,
 }
 
 impl Count {
@@ -205,7 +206,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
         bus: B,
     ) -> Result<Self, CoreError> {
         let ranges = bus.ranges();
-        let inside = Inside { count: Count::new(counted), bus };
+        let inside = Inside { count: Count::new(counted), bus, marks: Vec::new() };
         // The flag for the microcontroller profile would select another core.
         let new = Unicorn::new_with_data(Arch::ARM, Mode::THUMB, inside);
         let mut core = Self { engine: engine("start", new)? };
@@ -259,7 +260,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
     fn hook(&mut self, counted: &Counted<'_>) -> Result<(), CoreError> {
         let uc = &mut self.engine;
         let blocks = uc.add_block_hook(1, 0, |uc, address, size| {
-            let Inside { count, bus } = uc.get_data_mut();
+            let Inside { count, bus, .. } = uc.get_data_mut();
             let now = count.meter.cycles;
             // What stops here is not executed and so not counted.
             if now >= count.limit || now >= bus.deadline() {
@@ -423,6 +424,21 @@ impl<B: Bus + 'static> Core for UnicornCore<B> {
 
     fn meter(&self) -> Meter {
         self.engine.get_data().count.meter
+    }
+
+    fn mark(&mut self, address: u32) -> Result<(), CoreError> {
+        let at = u64::from(address & !1);
+        let hooked = self.engine.add_code_hook(at, at, |uc, address, _| {
+            let r0 = uc.reg_read(RegisterARM::R0).unwrap_or_default() as u32;
+            let inside = uc.get_data_mut();
+            let cycles = inside.count.meter.cycles;
+            inside.marks.push(Mark { cycles, address: address as u32, r0 });
+        });
+        engine("hook an instruction", hooked).map(|_| ())
+    }
+
+    fn take_marks(&mut self, marks: &mut Vec<Mark>) {
+        marks.append(&mut self.engine.get_data_mut().marks);
     }
 
     fn take_heat(&mut self) -> Heat {

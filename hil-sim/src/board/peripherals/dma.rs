@@ -168,10 +168,14 @@ impl Peripheral for Dma {
     }
 }
 
+/// Request of a channel; number of requests let through at a time, and whether others
+/// hear of it.
+const REQUEST: u32 = 0x7F;
+const COUNT: u32 = 0x1F << 19 | 1 << 9;
 /// Requests of every channel of both controllers, and the flags of synchronisation,
 /// which is not used.
 const MUX: [Kept; 18] = {
-    let mut kept = [Kept { offset: 0, reset: 0, mask: 0x7F }; 18];
+    let mut kept = [Kept { offset: 0, reset: 0, mask: REQUEST | COUNT }; 18];
     let mut index = 0;
     while index < 16 {
         kept[index].offset = 4 * index as u32;
@@ -196,7 +200,7 @@ impl Dmamux {
     /// The request that channel `index` of DMA1 listens to; 0 is none.
     #[must_use]
     pub fn request(&self, index: usize) -> u32 {
-        self.0.get(4 * index as u32)
+        self.0.get(4 * index as u32) & REQUEST
     }
 }
 
@@ -206,8 +210,9 @@ impl Peripheral for Dmamux {
     }
 
     fn write(&mut self, offset: u32, write: Write, _: u64) -> Option<()> {
-        // Synchronisation and events of the multiplexer are not modelled.
-        if offset < 0x40 && write.ones() & !0x7F != 0 {
+        // Synchronisation and events of the multiplexer are not modelled; how many
+        // requests one of them would let through does not matter then.
+        if offset < 0x40 && write.ones() & !(REQUEST | COUNT) != 0 {
             return None;
         }
         self.0.write(offset, write)

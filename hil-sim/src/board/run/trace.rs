@@ -31,6 +31,8 @@ const MODES: [(&str, u8); 11] = [
 const COMPLETE: u8 = 10;
 const FAULT_HOLD: u8 = 11;
 const IDLE: u8 = 3;
+/// Under way or coming to rest.
+const MOVING: std::ops::Range<u8> = 5..10;
 
 /// Values of the log's line about a crossing, in their order: milliseconds, step,
 /// position, residual, speed, preload, peak, lead, tread, gap measured, predicted, slip
@@ -91,6 +93,11 @@ impl Trace {
         }
     }
 
+    /// What it does, as a number in [`crate::record::MODE_NAMES`].
+    pub(super) const fn mode(&self) -> u8 {
+        self.mode
+    }
+
     /// Waiting for a command, by its own word.
     pub(super) const fn is_idle(&self) -> bool {
         self.mode == IDLE
@@ -116,7 +123,7 @@ impl Trace {
             self.digest.update(line.text.as_bytes());
             self.read(t_s, line);
         }
-        if (4..10).contains(&self.mode) {
+        if MOVING.contains(&self.mode) {
             self.run_started.get_or_insert(t_s);
             self.run_ended = t_s;
             self.preload_sum += truth.preload_n;

@@ -1,5 +1,8 @@
 //! `rig deploy --target board`: the firmware itself, on the emulated board.
 
+#[cfg(feature = "board")]
+mod account;
+
 use std::path::Path;
 
 use super::Args;
@@ -10,6 +13,16 @@ use crate::scenario::Scenario;
 #[cfg(not(feature = "board"))]
 pub(super) fn run(_: &Args, _: &Scenario, _: Option<&Path>) -> Result<Outcome, Failure> {
     Ok(Outcome::Code(crate::provision::go_on()?))
+}
+
+/// What `--json` prints.
+#[cfg(feature = "board")]
+#[derive(serde::Serialize)]
+struct Printed<'a> {
+    #[serde(flatten)]
+    summary: &'a crate::record::Summary,
+    account: &'a crate::board::load::Load,
+    files: &'a [std::path::PathBuf],
 }
 
 #[cfg(feature = "board")]
@@ -27,7 +40,7 @@ pub(super) fn run(
     let elf = firmware::build(Profile::Release)?;
     let image = std::fs::read(&elf)
         .map_err(|source| firmware::FirmwareError::Read { path: elf.clone(), source })?;
-    let (recording, machine) = {
+    let ran = {
         let _progress = (!args.log).then(|| progress::spinner(scenario.run.direction.name()));
         let show = |t_s: f64, line: &crate::board::log::Line| {
             if args.log {
@@ -37,14 +50,15 @@ pub(super) fn run(
         run::run(&image, scenario, directory.is_some(), show).map_err(Failure::run)?
     };
     let files = match directory {
-        Some(directory) => super::write(&recording, directory)?,
+        Some(directory) => super::write(&ran.recording, directory)?,
         None => Vec::new(),
     };
-    let summary = &recording.summary;
-    let printed = super::Printed { summary, files: &files };
-    for stray in machine.chip().strays().iter() {
-        eprintln!("{stray}");
+    let summary = &ran.recording.summary;
+    for stray in &ran.load.unmodelled {
+        eprintln!("warning: {stray}");
     }
-    output::result(args.json, &printed, || table::run(summary, &files))?;
-    Ok(Outcome::of(summary.completed && summary.faults.is_empty()))
+    let printed = Printed { summary, account: &ran.load, files: &files };
+    output::result(args.json, &printed, || table::run(summary, &files) + &account::text(&ran.load))?;
+    let clean = ran.load.unmodelled.is_empty();
+    Ok(Outcome::of(summary.completed && summary.faults.is_empty() && clean))
 }
