@@ -234,11 +234,8 @@ impl Chip {
         if self.system.control.wants_reset {
             self.reset = Some(Cause::Software);
         }
-        let lines = [
-            (23, self.exti.asks(0x03E0)),
-            (28, self.time.asks()),
-            (40, self.exti.asks(0xFC00)),
-        ];
+        let lines =
+            [(23, self.exti.asks(0x03E0)), (28, self.time.asks()), (40, self.exti.asks(0xFC00))];
         let exceptions = &mut self.system.exceptions;
         for (interrupt, high) in lines {
             exceptions.set_line(interrupt, high, now);

@@ -45,31 +45,31 @@ impl Loaded {
     /// # Errors
     /// [`ImageError::Form`] if it is no image of the board.
     pub fn of(elf: &[u8]) -> Result<Self, ImageError> {
-    let file = ElfFile32::<Endianness>::parse(elf).map_err(form)?;
-    let endian = file.endian();
-    let mut flash = vec![0xFF; FLASH.size as usize];
-    for segment in file.elf_program_headers() {
-        let data = segment.data(endian, elf).map_err(|()| form("a segment is cut off"))?;
-        if segment.p_type(endian) != elf::PT_LOAD || data.is_empty() {
-            continue;
+        let file = ElfFile32::<Endianness>::parse(elf).map_err(form)?;
+        let endian = file.endian();
+        let mut flash = vec![0xFF; FLASH.size as usize];
+        for segment in file.elf_program_headers() {
+            let data = segment.data(endian, elf).map_err(|()| form("a segment is cut off"))?;
+            if segment.p_type(endian) != elf::PT_LOAD || data.is_empty() {
+                continue;
+            }
+            let at = segment.p_paddr(endian).wrapping_sub(FLASH.base) as usize;
+            let place = flash.get_mut(at..at + data.len());
+            place.ok_or_else(|| form("a segment lies outside the flash"))?.copy_from_slice(data);
         }
-        let at = segment.p_paddr(endian).wrapping_sub(FLASH.base) as usize;
-        let place = flash.get_mut(at..at + data.len());
-        place.ok_or_else(|| form("a segment lies outside the flash"))?.copy_from_slice(data);
+        let mut functions: Vec<Function> = file.symbols().filter_map(|s| function(&s)).collect();
+        functions.sort_by_key(|f| f.range.start);
+        functions.dedup_by_key(|f| f.range.start);
+        let code = code(&file);
+        if code.is_empty() {
+            return Err(form("its code is not marked by mapping symbols"));
+        }
+        let named = |s: &object::read::elf::ElfSymbol32<'_, '_, _>| {
+            Some((s.name().ok()?.to_owned(), s.address() as u32))
+        };
+        let symbols = file.symbols().filter_map(|s| named(&s)).collect();
+        Ok(Loaded { flash, code, functions, symbols })
     }
-    let mut functions: Vec<Function> = file.symbols().filter_map(|s| function(&s)).collect();
-    functions.sort_by_key(|f| f.range.start);
-    functions.dedup_by_key(|f| f.range.start);
-    let code = code(&file);
-    if code.is_empty() {
-        return Err(form("its code is not marked by mapping symbols"));
-    }
-    let named = |s: &object::read::elf::ElfSymbol32<'_, '_, _>| {
-        Some((s.name().ok()?.to_owned(), s.address() as u32))
-    };
-    let symbols = file.symbols().filter_map(|s| named(&s)).collect();
-    Ok(Loaded { flash, code, functions, symbols })
-}
 
     /// Symbols with their values, in the order of their names.
     pub fn symbols(&self) -> impl Iterator<Item = (&str, u32)> {

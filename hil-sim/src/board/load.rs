@@ -162,10 +162,8 @@ impl Gathered {
         let cycles = machine.now() - from;
         let idle = (machine.profile().slept() - slept) as f64 / cycles.max(1) as f64;
         let names = machine.tasks();
-        let named = |name: &str, cost: Cost| Named {
-            name: name.to_owned(),
-            cost: cost.closed(cycles),
-        };
+        let named =
+            |name: &str, cost: Cost| Named { name: name.to_owned(), cost: cost.closed(cycles) };
         let task = |(number, cost): (&usize, &Cost)| {
             named(names.get(*number).copied().unwrap_or("unknown"), *cost)
         };
@@ -241,7 +239,7 @@ impl Load {
         const MEMORY: u64 = 96 * 1024;
         let left = MEMORY - (self.ram - self.stack);
         let worst = self.tick.worst as f64 / PERIOD as f64;
-        let stack = f64::from(self.stack_used) / left.min(self.stack) as f64;
+        let stack = f64::from(self.stack_used) / left as f64;
         let checks = [
             ("mean load", self.load, MEAN_LOAD),
             ("worst tick, part of its period", worst, WORST_TICK),

@@ -175,6 +175,18 @@ impl Machine {
         self.core.write(address, bytes)
     }
 
+    /// Writes a word to a peripheral's register, as a debug probe does.
+    pub fn poke_register(&mut self, address: u32, value: u32) {
+        let access = Access { address, size: 4, pc: self.pc, now: self.now() };
+        self.chip_mut().write(access, value);
+    }
+
+    /// Reads a word from a peripheral's register, with what reading it does.
+    pub fn peek_register(&mut self, address: u32) -> u32 {
+        let access = Access { address, size: 4, pc: self.pc, now: self.now() };
+        self.chip_mut().read(access)
+    }
+
     /// A register of the core.
     ///
     /// # Errors

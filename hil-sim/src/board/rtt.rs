@@ -53,8 +53,7 @@ impl Probe {
         let ups = machine.word(self.block + 16)?;
         let at = self.block + HEAD + CHANNEL * (if down { ups } else { 0 } + index);
         let word = |offset: u32| machine.word(at + offset);
-        let ring =
-            Ring { at, buffer: word(4)?, size: word(8)?, write: word(12)?, read: word(16)? };
+        let ring = Ring { at, buffer: word(4)?, size: word(8)?, write: word(12)?, read: word(16)? };
         let sound = ring.size <= LARGEST && ring.write < ring.size && ring.read < ring.size;
         Ok(sound.then_some(ring))
     }

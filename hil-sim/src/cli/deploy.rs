@@ -30,7 +30,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "TARGET", default_value = "sil")]
     target: String,
 
-    /// Shows the board's log as it comes, on standard error.
+    /// Shows the controller's log on standard error.
     #[arg(long)]
     log: bool,
 
@@ -66,6 +66,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         let _progress = progress::spinner(scenario.run.direction.name());
         sil::run(&scenario, sil::Options { rows: directory.is_some(), speed: None })?
     };
+    if args.log {
+        for line in &recording.log {
+            eprintln!("[{:8.3}] {}", line.t_s, line.text);
+        }
+    }
     let files = match &directory {
         Some(directory) => write(&recording, directory)?,
         None => Vec::new(),

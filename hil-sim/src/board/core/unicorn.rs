@@ -8,7 +8,9 @@ use std::collections::HashSet;
 
 use unicorn_engine::{Arch, ArmCpuModel, Mode, Prot, RegisterARM, Unicorn, uc_error};
 
-use super::{Access as Touch, Bus, Core, CoreError, Fault, Heat, Mark, Meter, NoBus, Register, Stop, passes};
+use super::{
+    Access as Touch, Bus, Core, CoreError, Fault, Heat, Mark, Meter, NoBus, Register, Stop, passes,
+};
 use crate::board::thumb::{self, Kind};
 use crate::board::timing::{self, REFILL};
 
@@ -200,11 +202,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
     ///
     /// # Errors
     /// As [`UnicornCore::new`].
-    pub fn with_bus(
-        memories: &[Memory],
-        counted: &Counted<'_>,
-        bus: B,
-    ) -> Result<Self, CoreError> {
+    pub fn with_bus(memories: &[Memory], counted: &Counted<'_>, bus: B) -> Result<Self, CoreError> {
         let ranges = bus.ranges();
         let inside = Inside { count: Count::new(counted), bus, marks: Vec::new() };
         // The flag for the microcontroller profile would select another core.
@@ -311,9 +309,8 @@ impl<B: Bus + 'static> UnicornCore<B> {
                 let at = (address - range.start) as usize;
                 if instruction.size == 2 && code.get(at..at + 2) == Some(&SEV[..]) {
                     let at = u64::from(address);
-                    let sent = self
-                        .engine
-                        .add_code_hook(at, at, |uc, _, _| uc.get_data_mut().bus.event());
+                    let sent =
+                        self.engine.add_code_hook(at, at, |uc, _, _| uc.get_data_mut().bus.event());
                     engine("hook an instruction", sent)?;
                 }
             }
@@ -379,7 +376,14 @@ impl<B: Bus + 'static> Core for UnicornCore<B> {
     }
 
     fn write(&mut self, address: u32, bytes: &[u8]) -> Result<(), CoreError> {
-        engine("write memory", self.engine.mem_write(address.into(), bytes))
+        engine("write memory", self.engine.mem_write(address.into(), bytes))?;
+        let count = &self.engine.get_data().count;
+        if (address.wrapping_sub(count.base) as usize) < count.bytes.len() {
+            // Code that was translated already must not go on as it was.
+            let (from, to) = (u64::from(address & !0xFFF), u64::from(address) + bytes.len() as u64);
+            return engine("forget code", self.engine.ctl_remove_cache(from, to));
+        }
+        Ok(())
     }
 
     fn register(&self, register: Register) -> Result<u32, CoreError> {

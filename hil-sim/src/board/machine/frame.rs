@@ -24,14 +24,8 @@ const RETURN_BASIC: u32 = 1 << 4;
 const RETURN_THREAD: u32 = 1 << 3;
 const RETURN_PROCESS: u32 = 1 << 2;
 
-const SAVED: [Register; 6] = [
-    Register::R(0),
-    Register::R(1),
-    Register::R(2),
-    Register::R(3),
-    Register::R(12),
-    Register::Lr,
-];
+const SAVED: [Register; 6] =
+    [Register::R(0), Register::R(1), Register::R(2), Register::R(3), Register::R(12), Register::Lr];
 
 /// Pushes a frame that goes on at `back`. False if there is no memory for it.
 pub(super) fn push(core: &mut impl Core, back: u32) -> Result<bool, CoreError> {

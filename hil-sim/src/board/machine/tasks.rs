@@ -59,8 +59,11 @@ impl Tasks {
 /// Addresses behind calls through a register in the executor's functions.
 fn ends(image: &Loaded) -> Vec<u32> {
     let executor = |name: &str| {
-        name.contains("Executor::poll") || name.contains("Executor::on_interrupt")
-            || name.contains("Executor::run") || name.contains("UART5") || name.contains("main")
+        name.contains("Executor::poll")
+            || name.contains("Executor::on_interrupt")
+            || name.contains("Executor::run")
+            || name.contains("UART5")
+            || name.contains("main")
     };
     let mut found = Vec::new();
     for function in image.functions.iter().filter(|f| executor(&f.name)) {

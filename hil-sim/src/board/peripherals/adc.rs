@@ -190,11 +190,7 @@ pub struct Adc {
 
 impl Default for Adc {
     fn default() -> Self {
-        Self {
-            converters: [Converter::new(), Converter::new()],
-            common: 0,
-            inputs: [[0; 20]; 2],
-        }
+        Self { converters: [Converter::new(), Converter::new()], common: 0, inputs: [[0; 20]; 2] }
     }
 }
 

@@ -118,9 +118,8 @@ fn place(offset: u32) -> Option<(usize, u32)> {
 impl Peripheral for Dma {
     fn read(&mut self, offset: u32, _: u64) -> Option<u32> {
         if offset == ISR {
-            let word = |(index, c): (usize, &Channel)| {
-                (c.flags | u32::from(c.flags != 0)) << (4 * index)
-            };
+            let word =
+                |(index, c): (usize, &Channel)| (c.flags | u32::from(c.flags != 0)) << (4 * index);
             return Some(self.channels.iter().enumerate().map(word).fold(0, |a, b| a | b));
         }
         if offset == IFCR {

@@ -146,9 +146,7 @@ mod tests {
 
     fn ready(mode: u32) -> Encoder {
         let mut encoder = Encoder::new(at(0));
-        for (offset, value) in
-            [(ARR, 0xFFFF), (CCMR1, 0xF1F1), (CCER, 0), (SMCR, mode), (CR1, 1)]
-        {
+        for (offset, value) in [(ARR, 0xFFFF), (CCMR1, 0xF1F1), (CCER, 0), (SMCR, mode), (CR1, 1)] {
             encoder.write(offset, Write { value, mask: ALL }, 0).expect("modelled");
         }
         encoder

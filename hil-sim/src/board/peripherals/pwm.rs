@@ -183,9 +183,7 @@ impl Peripheral for Pwm {
         match offset {
             SR => Some(self.flags),
             EGR => Some(0),
-            CNT if self.runs() => {
-                Some(((now - self.origin) / self.prescaler % self.period) as u32)
-            }
+            CNT if self.runs() => Some(((now - self.origin) / self.prescaler % self.period) as u32),
             CNT => Some(0),
             _ => self.registers.read(offset),
         }

@@ -63,10 +63,8 @@ impl Registers {
 mod tests {
     use super::*;
 
-    const TWO: [Kept; 2] = [
-        Kept { offset: 0, reset: 0xF0, mask: 0xFF },
-        Kept { offset: 8, reset: 1, mask: u32::MAX },
-    ];
+    const TWO: [Kept; 2] =
+        [Kept { offset: 0, reset: 0xF0, mask: 0xFF }, Kept { offset: 8, reset: 1, mask: u32::MAX }];
 
     #[test]
     fn only_the_bits_that_can_be_written_change() {

@@ -54,13 +54,7 @@ pub struct TimeBase {
 
 impl Default for TimeBase {
     fn default() -> Self {
-        Self {
-            registers: Registers::new(&REGISTERS),
-            flags: 0,
-            origin: 0,
-            seen: 0,
-            prescaler: 1,
-        }
+        Self { registers: Registers::new(&REGISTERS), flags: 0, origin: 0, seen: 0, prescaler: 1 }
     }
 }
 

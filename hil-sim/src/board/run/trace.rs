@@ -138,9 +138,7 @@ impl Trace {
     /// Adds every bit that went into the board and came out of it.
     fn digest_pins(&mut self, passed: &Passed) {
         let Passed { codes, drives } = passed;
-        for code in
-            [codes.wheel.get(), codes.load_cell.get(), codes.tread.get(), codes.arm.get()]
-        {
+        for code in [codes.wheel.get(), codes.load_cell.get(), codes.tread.get(), codes.arm.get()] {
             self.digest.update(code.to_le_bytes());
         }
         for duty in [drives.drive, drives.preload] {
@@ -161,8 +159,7 @@ impl Trace {
         } else if line.text.contains("] step ") {
             self.reported.extend(crossing(line));
         } else {
-            for (kind, reports) in
-                [("] fault ", &mut self.faults), ("] limit ", &mut self.limits)]
+            for (kind, reports) in [("] fault ", &mut self.faults), ("] limit ", &mut self.limits)]
             {
                 let said = line.behind(kind).and_then(|rest| rest.split_once(": "));
                 if let Some((code, text)) = said
@@ -216,7 +213,8 @@ impl Trace {
             Direction::Deploy => scenario.rig.rig.travel_mm,
             Direction::Retract => 0.0,
         };
-        let there = self.mode == COMPLETE && (truth.position_mm - end_mm).abs() <= ARRIVED_WITHIN_MM;
+        let there =
+            self.mode == COMPLETE && (truth.position_mm - end_mm).abs() <= ARRIVED_WITHIN_MM;
         let crossings: Vec<CrossingLine> =
             plant.ledger().crossings().iter().map(|crossing| self.line(crossing)).collect();
         let worst = crossings.iter().map(|c| c.gap_mm).fold(self.worst_separation, f64::max);

@@ -49,16 +49,24 @@ pub(super) fn run(
         };
         run::run(&image, scenario, directory.is_some(), show).map_err(Failure::run)?
     };
-    let files = match directory {
-        Some(directory) => super::write(&ran.recording, directory)?,
-        None => Vec::new(),
-    };
+    let mut files = Vec::new();
+    if let Some(directory) = directory {
+        files = super::write(&ran.recording, directory)?;
+        let log = directory.join("log.txt");
+        let lines = ran.recording.log.iter();
+        let text: String =
+            lines.map(|line| format!("[{:8.3}] {}\n", line.t_s, line.text)).collect();
+        crate::export::write_text(&log, &text)?;
+        files.push(log);
+    }
     let summary = &ran.recording.summary;
     for stray in &ran.load.unmodelled {
         eprintln!("warning: {stray}");
     }
     let printed = Printed { summary, account: &ran.load, files: &files };
-    output::result(args.json, &printed, || table::run(summary, &files) + &account::text(&ran.load))?;
+    output::result(args.json, &printed, || {
+        table::run(summary, &files) + &account::text(&ran.load)
+    })?;
     let clean = ran.load.unmodelled.is_empty();
     Ok(Outcome::of(summary.completed && summary.faults.is_empty() && clean))
 }

@@ -3,9 +3,7 @@
 use super::Write;
 use crate::board::core::Fault;
 use crate::board::exceptions::Exceptions;
-use crate::board::exceptions::number::{
-    BUS_FAULT, HARD_FAULT, PEND_SV, SYS_TICK, USAGE_FAULT,
-};
+use crate::board::exceptions::number::{BUS_FAULT, HARD_FAULT, PEND_SV, SYS_TICK, USAGE_FAULT};
 
 const CPUID: u32 = 0xD00;
 const ICSR: u32 = 0xD04;

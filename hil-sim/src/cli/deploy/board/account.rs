@@ -41,9 +41,10 @@ pub(super) fn text(load: &Load) -> String {
     };
     let phases = load.phases.iter().map(|p| row("tick in", &p.name, &p.cost, None));
     let tasks = load.tasks.iter().map(|t| row("task", &t.name, &t.cost, None));
-    let interrupts = load.interrupts.iter().map(|i| {
-        row("interrupt", &i.name, &i.cost, Some((i.latency_mean, i.latency_worst)))
-    });
+    let interrupts = load
+        .interrupts
+        .iter()
+        .map(|i| row("interrupt", &i.name, &i.cost, Some((i.latency_mean, i.latency_worst))));
     let head = ["cycles of", "runs", "mean", "worst", "time", "latency", "worst"];
     let _ = writeln!(text, "{}", plain(&head, phases.chain(tasks).chain(interrupts)));
     for missed in load.missed() {
