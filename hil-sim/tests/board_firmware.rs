@@ -48,7 +48,7 @@ impl Board {
     /// Powered up and idle.
     fn idle(sets: &[&str]) -> Self {
         let mut board = Self::off(sets);
-        board.until("mode: idle", 1000);
+        board.until("mode: idle", 3000);
         board
     }
 
@@ -200,7 +200,7 @@ fn a_retraction_is_that_of_the_software_three_times_alike() {
 #[test]
 fn power_comes_up_to_idle_with_the_bridges_off() {
     let mut board = Board::off(&[]);
-    assert!(!board.drives(700), "nothing may move before a command");
+    assert!(!board.drives(3000), "nothing may move before a command");
     for text in ["interstage", "mode: self-test", "mode: zeroing", "mode: idle"] {
         assert!(board.said(text), "{text}: {:#?}", board.log);
     }
@@ -274,7 +274,7 @@ fn power_lost_in_the_middle_of_a_crossing_is_survived() {
     board.send(b's');
     board.until("sliding on the corner", 8000);
     board.bench.machine_mut().restart(Cause::Power).expect("restarts");
-    assert!(!board.drives(900), "nothing moves before a command");
+    assert!(!board.drives(3000), "nothing moves before a command");
     assert!(board.said("mode: idle") && !board.said("restarted by the watchdog"));
     board.send(b's');
     board.until("mode: deployed", 40_000);

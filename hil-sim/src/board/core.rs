@@ -246,6 +246,14 @@ pub trait Core {
     /// [`CoreError::Engine`] if the engine fails.
     fn run(&mut self, address: u32, cycles: u64) -> Result<Stop, CoreError>;
 
+    /// Runs from `address` until the program comes to `until`, or as [`Core::run`].
+    ///
+    /// Slow: code is translated anew for the place to stop at.
+    ///
+    /// # Errors
+    /// As [`Core::run`].
+    fn run_to(&mut self, address: u32, cycles: u64, until: u32) -> Result<Stop, CoreError>;
+
     /// Lets time pass in which no instruction is executed.
     fn pass(&mut self, cycles: u64);
 

@@ -304,6 +304,39 @@ impl Machine {
         }
     }
 
+    /// Runs up to this address, in any place of the code, or until the cycle. False if
+    /// the program did not come there.
+    ///
+    /// # Errors
+    /// As [`Machine::run_until`].
+    pub fn run_to(&mut self, address: u32, cycle: u64) -> Result<bool, CoreError> {
+        while self.now() < cycle {
+            self.look_after()?;
+            if let Some(number) = self.takeable()? {
+                self.enter(number, self.pc, false)?;
+                continue;
+            }
+            match self.core.run_to(self.pc, cycle - self.now(), address)? {
+                Stop::Spent(at) | Stop::Urgent(at) => self.pc = at & !1,
+                Stop::Return(value) => self.leave(value)?,
+                Stop::Breakpoint(at) => {
+                    self.pc = at;
+                    return Ok(false);
+                }
+                _ => return Ok(false),
+            }
+            if self.pc == address {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Goes on behind the breakpoint instruction that the core stands at.
+    pub fn step_over_breakpoint(&mut self) {
+        self.pc += 2;
+    }
+
     /// Everything of the chip that is due.
     fn look_after(&mut self) -> Result<(), CoreError> {
         let now = self.now();

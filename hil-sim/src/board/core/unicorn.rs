@@ -335,6 +335,28 @@ impl<B: Bus + 'static> UnicornCore<B> {
     }
 }
 
+impl<B: Bus + 'static> UnicornCore<B> {
+    /// Runs from `address` until a hook stops it, or it comes to `until`.
+    fn go(&mut self, address: u32, cycles: u64, until: u64) -> Result<Stop, CoreError> {
+        let count = &mut self.engine.get_data_mut().count;
+        count.stop = None;
+        count.limit = count.meter.cycles.saturating_add(cycles);
+        count.current = UNSEEN;
+        // Where the host starts the program, nothing has branched.
+        count.next = address & !1;
+        let ended = self.engine.emu_start(u64::from(address | 1), until, 0, 0);
+        if let Some(stop) = self.engine.get_data_mut().count.stop.take() {
+            return Ok(stop);
+        }
+        let at = self.register(Register::Pc)?;
+        Ok(match ended {
+            // Only waiting for an interrupt ends it without a hook.
+            Ok(()) => Stop::Wait(at),
+            Err(error) => Stop::Fault { at, fault: fault(error) },
+        })
+    }
+}
+
 /// Whether the masks let an exception of this priority through.
 fn unmasked<B>(uc: &Hooked<'_, B>, priority: i16) -> bool {
     let read = |register: RegisterARM| uc.reg_read(register).unwrap_or_default() as u32;
@@ -404,21 +426,16 @@ impl<B: Bus + 'static> Core for UnicornCore<B> {
     }
 
     fn run(&mut self, address: u32, cycles: u64) -> Result<Stop, CoreError> {
-        let count = &mut self.engine.get_data_mut().count;
-        count.stop = None;
-        count.limit = count.meter.cycles.saturating_add(cycles);
-        count.current = UNSEEN;
-        // Where the host starts the program, nothing has branched.
-        count.next = address & !1;
-        let ended = self.engine.emu_start(u64::from(address | 1), u64::MAX, 0, 0);
-        if let Some(stop) = self.engine.get_data_mut().count.stop.take() {
-            return Ok(stop);
-        }
-        let at = self.register(Register::Pc)?;
-        Ok(match ended {
-            // Only waiting for an interrupt ends it without a hook.
-            Ok(()) => Stop::Wait(at),
-            Err(error) => Stop::Fault { at, fault: fault(error) },
+        self.go(address, cycles, u64::MAX)
+    }
+
+    fn run_to(&mut self, address: u32, cycles: u64, until: u32) -> Result<Stop, CoreError> {
+        engine("forget code", self.engine.ctl_flush_tb())?;
+        let stop = self.go(address, cycles, u64::from(until & !1))?;
+        engine("forget code", self.engine.ctl_flush_tb())?;
+        Ok(match stop {
+            Stop::Wait(at) if at & !1 == until & !1 => Stop::Spent(at),
+            stop => stop,
         })
     }
 
