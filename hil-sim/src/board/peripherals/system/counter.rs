@@ -27,7 +27,8 @@ impl Peripheral for Counter {
     fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
         let value = self.read(CYCCNT, now)?;
         match offset {
-            CTRL if write.ones() & !1 == 0 => {
+            // What the unit has is read-only.
+            CTRL if write.ones() & !(1 | 0xFF << 24) == 0 => {
                 self.on = write.onto(u32::from(self.on)) & 1 != 0;
                 self.held = value;
             }
@@ -48,7 +49,7 @@ mod tests {
         let mut counter = Counter::default();
         let all = |value| Write { value, mask: u32::MAX };
         assert_eq!(counter.read(CYCCNT, 500), Some(0));
-        counter.write(CTRL, all(1), 1000).expect("modelled");
+        counter.write(CTRL, all(4 << 28 | 1), 1000).expect("modelled");
         assert_eq!(counter.read(CYCCNT, 1250), Some(250));
         counter.write(CYCCNT, all(7), 2000).expect("modelled");
         assert_eq!(counter.read(CYCCNT, 2003), Some(10));
