@@ -15,15 +15,63 @@ pub enum Register {
     Lr,
     /// Program counter.
     Pc,
+    /// Stack pointer of the thread on a stack of its own.
+    Psp,
+    /// Flags, state of a conditional block, number of the exception.
+    Xpsr,
+    /// Which stack, whether the floating-point context is live.
+    Control,
+    /// Shuts out every exception with a priority that can be set.
+    Primask,
+    /// Shuts out exceptions of this priority and less urgent ones.
+    Basepri,
+    /// Shuts out all but the non-maskable interrupt.
+    Faultmask,
+    /// S0 to S31.
+    Float(u8),
+    /// Flags and modes of the floating-point unit.
+    Fpscr,
 }
 
-/// Why the core stopped.
+/// Why the core stopped, and where it goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
     /// At this breakpoint instruction.
     Breakpoint(u32),
-    /// The cycles allowed were used up, at this address.
+    /// The cycles allowed were used up, or the bus wants to be looked after.
     Spent(u32),
+    /// An exception wants to be taken that no mask shuts out.
+    Urgent(u32),
+    /// Behind a supervisor call.
+    Call(u32),
+    /// An exception handler returned, with this value.
+    Return(u32),
+    /// Waiting for an event.
+    Event(u32),
+    /// Waiting for an interrupt.
+    Wait(u32),
+    /// The program did what a processor faults on.
+    Fault {
+        /// Program counter.
+        at: u32,
+        /// What it did.
+        fault: Fault,
+    },
+}
+
+/// What a processor faults on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// An instruction that is none.
+    Undefined,
+    /// Nothing to run there.
+    Fetch,
+    /// Reading where nothing answers.
+    Read,
+    /// Writing where nothing takes it.
+    Write,
+    /// Something else that the engine does not name.
+    Other,
 }
 
 /// What can go wrong on the core.
@@ -69,8 +117,99 @@ impl Meter {
     }
 }
 
+/// The program has come to a marked address.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mark {
+    /// Cycles so far, the block that begins there included.
+    pub cycles: u64,
+    /// Where.
+    pub address: u32,
+    /// What R0 held.
+    pub r0: u32,
+}
+
 /// Cycles by the basic block that spent them, given as address and bytes.
 pub type Heat = BTreeMap<(u32, u32), u64>;
+
+/// An access to an address that holds no memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Access {
+    /// Where.
+    pub address: u32,
+    /// Bytes: 1, 2 or 4.
+    pub size: u32,
+    /// The program counter, as near as the core tells it.
+    pub pc: u32,
+    /// Cycles since the start.
+    pub now: u64,
+}
+
+/// What answers the addresses that hold no memory, and interrupts the core.
+pub trait Bus {
+    /// Ranges that it answers: first address and bytes, a multiple of 4096.
+    fn ranges(&self) -> Vec<(u32, u32)>;
+
+    /// Reads.
+    fn read(&mut self, access: Access) -> u32;
+
+    /// Writes.
+    fn write(&mut self, access: Access, value: u32);
+
+    /// Cycle at which something happens by itself; the core stops no earlier than its
+    /// next block after it.
+    fn deadline(&self) -> u64;
+
+    /// Priority of the exception that is to be taken next, if it preempts what runs
+    /// and no mask shuts it out.
+    fn urgent(&self) -> Option<i16>;
+
+    /// The program has sent an event.
+    fn event(&mut self);
+}
+
+/// A core by itself: nothing answers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NoBus;
+
+impl Bus for NoBus {
+    fn ranges(&self) -> Vec<(u32, u32)> {
+        Vec::new()
+    }
+
+    fn read(&mut self, _: Access) -> u32 {
+        0
+    }
+
+    fn write(&mut self, _: Access, _: u32) {}
+
+    fn deadline(&self) -> u64 {
+        u64::MAX
+    }
+
+    fn urgent(&self) -> Option<i16> {
+        None
+    }
+
+    fn event(&mut self) {}
+}
+
+/// Whether an exception of this priority passes the masks.
+///
+/// Source: ARMv7-M Architecture Reference Manual, B1.5.4 (`ExecutionPriority`).
+#[must_use]
+pub fn passes(priority: i16, primask: u32, basepri: u32, faultmask: u32) -> bool {
+    let mut level = i16::MAX;
+    if basepri & 0xFF != 0 {
+        level = (basepri & 0xFF) as i16;
+    }
+    if primask & 1 != 0 {
+        level = 0;
+    }
+    if faultmask & 1 != 0 {
+        level = -1;
+    }
+    priority < level
+}
 
 /// A Cortex-M4 with its memory: registers, running, counting.
 ///
@@ -101,14 +240,34 @@ pub trait Core {
     /// [`CoreError::Engine`] if the engine does not take it.
     fn set_register(&mut self, register: Register, value: u32) -> Result<(), CoreError>;
 
-    /// Runs from `address` until a breakpoint instruction, or until `cycles` have gone.
+    /// Runs from `address` until something stops the core, `cycles` at most.
     ///
     /// # Errors
-    /// [`CoreError::Fault`] if the program faults.
+    /// [`CoreError::Engine`] if the engine fails.
     fn run(&mut self, address: u32, cycles: u64) -> Result<Stop, CoreError>;
+
+    /// Runs from `address` until the program comes to `until`, or as [`Core::run`].
+    ///
+    /// Slow: code is translated anew for the place to stop at.
+    ///
+    /// # Errors
+    /// As [`Core::run`].
+    fn run_to(&mut self, address: u32, cycles: u64, until: u32) -> Result<Stop, CoreError>;
+
+    /// Lets time pass in which no instruction is executed.
+    fn pass(&mut self, cycles: u64);
 
     /// What has been executed so far.
     fn meter(&self) -> Meter;
+
+    /// Notes from now on whenever the program comes to this address.
+    ///
+    /// # Errors
+    /// [`CoreError::Engine`] if the engine refuses.
+    fn mark(&mut self, address: u32) -> Result<(), CoreError>;
+
+    /// Moves the notes taken since the last call into `marks`, in their order.
+    fn take_marks(&mut self, marks: &mut Vec<Mark>);
 
     /// Takes the cycles by block since the last call, or since the start.
     fn take_heat(&mut self) -> Heat;

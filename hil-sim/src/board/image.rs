@@ -2,11 +2,7 @@
 //! its cycles.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 use std::path::{Path, PathBuf};
-
-use object::read::elf::{ElfFile32, ProgramHeader};
-use object::{Endianness, Object, ObjectSymbol, SymbolKind, elf};
 
 mod names;
 
@@ -15,12 +11,9 @@ use names::Names;
 use super::account::Spread;
 use super::core::unicorn::{Access, Counted, Memory, UnicornCore};
 use super::core::{Core, CoreError, Heat, Meter, Register, Stop};
+use super::elf::{FLASH, Function, Loaded, RAM, named};
 use super::{thumb, timing};
 
-/// The chip's flash.
-const FLASH: Memory = Memory { base: 0x0800_0000, size: 512 * 1024, access: Access::Code };
-/// SRAM1, SRAM2 and the alias of the CCM SRAM behind them.
-const RAM: Memory = Memory { base: 0x2000_0000, size: 128 * 1024, access: Access::Data };
 /// System control space: the start-up code writes it and nothing is measured in it.
 const SYSTEM: Memory = Memory { base: 0xE000_0000, size: 1024 * 1024, access: Access::Data };
 /// Where the host leaves arguments, in the chip's window for external memory.
@@ -64,21 +57,6 @@ pub enum ImageError {
     },
 }
 
-/// A function of the image.
-#[derive(Clone, Debug, PartialEq, Eq)]
-struct Function {
-    range: Range<u32>,
-    name: String,
-}
-
-/// An image's memory and names.
-struct Loaded {
-    flash: Vec<u8>,
-    code: Vec<Range<u32>>,
-    /// In the order of their addresses.
-    functions: Vec<Function>,
-}
-
 /// What one call took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Call {
@@ -112,7 +90,7 @@ impl Image {
     /// # Errors
     /// As [`Image::open`].
     pub fn start(elf: &[u8]) -> Result<Self, ImageError> {
-        let loaded = load(elf)?;
+        let loaded = Loaded::of(elf)?;
         let counted = Counted { base: FLASH.base, bytes: &loaded.flash, code: &loaded.code };
         let mut core = UnicornCore::new(&[FLASH, RAM, SYSTEM, MAILBOX], &counted)?;
         core.write(RETURN, &BKPT)?;
@@ -123,13 +101,9 @@ impl Image {
         let (stack, reset) = (vector(0), vector(4));
         core.set_register(Register::Sp, stack)?;
         let mut image = Self { core, functions: loaded.functions, stack, elf: elf.to_vec() };
-        let stop = image.core.run(reset, PATIENCE)?;
-        match stop {
+        match image.core.run(reset, PATIENCE)? {
             Stop::Breakpoint(at) if image.name(at).contains("main") => Ok(image),
-            Stop::Breakpoint(at) | Stop::Spent(at) => {
-                let at = image.name(at).to_owned();
-                Err(ImageError::Lost { function: "start-up".to_owned(), at })
-            }
+            stop => Err(image.lost("start-up", stop)),
         }
     }
 
@@ -184,11 +158,27 @@ impl Image {
                 value: self.core.register(Register::R(0))?,
                 meter: self.core.meter().since(before),
             }),
-            Stop::Breakpoint(at) | Stop::Spent(at) => {
-                let function = self.name(function).to_owned();
-                Err(ImageError::Lost { function, at: self.name(at).to_owned() })
-            }
+            stop => Err(self.lost(self.name(function), stop)),
         }
+    }
+
+    /// What a stop means where a call should have ended.
+    fn lost(&self, function: &str, stop: Stop) -> ImageError {
+        let at = match stop {
+            Stop::Fault { at, fault } => {
+                let lr = self.core.register(Register::Lr).unwrap_or_default();
+                let why = format!("{fault:?}");
+                return CoreError::Fault { at, lr, why }.into();
+            }
+            Stop::Breakpoint(at)
+            | Stop::Spent(at)
+            | Stop::Urgent(at)
+            | Stop::Call(at)
+            | Stop::Return(at)
+            | Stop::Event(at)
+            | Stop::Wait(at) => at,
+        };
+        ImageError::Lost { function: function.to_owned(), at: self.name(at).to_owned() }
     }
 
     /// Calls a function once for each input, given by reference: its words stand in the
@@ -254,70 +244,6 @@ impl Image {
 
     /// Name of the function at an address.
     fn name(&self, address: u32) -> &str {
-        let after = self.functions.partition_point(|f| f.range.start <= address);
-        let found = self.functions[..after].last().filter(|f| f.range.contains(&address));
-        found.map_or("nowhere", |f| &f.name)
+        named(&self.functions, address)
     }
-}
-
-fn form(error: impl ToString) -> ImageError {
-    ImageError::Form(error.to_string())
-}
-
-/// What of the image goes to flash, and what its symbols say.
-fn load(elf: &[u8]) -> Result<Loaded, ImageError> {
-    let file = ElfFile32::<Endianness>::parse(elf).map_err(form)?;
-    let endian = file.endian();
-    let mut flash = vec![0xFF; FLASH.size as usize];
-    for segment in file.elf_program_headers() {
-        let data = segment.data(endian, elf).map_err(|()| form("a segment is cut off"))?;
-        if segment.p_type(endian) != elf::PT_LOAD || data.is_empty() {
-            continue;
-        }
-        let at = segment.p_paddr(endian).wrapping_sub(FLASH.base) as usize;
-        let place = flash.get_mut(at..at + data.len());
-        place.ok_or_else(|| form("a segment lies outside the flash"))?.copy_from_slice(data);
-    }
-    let mut functions: Vec<Function> = file.symbols().filter_map(|s| function(&s)).collect();
-    functions.sort_by_key(|f| f.range.start);
-    functions.dedup_by_key(|f| f.range.start);
-    let code = code(&file);
-    if code.is_empty() {
-        return Err(form("its code is not marked by mapping symbols"));
-    }
-    Ok(Loaded { flash, code, functions })
-}
-
-fn function<'a>(symbol: &impl ObjectSymbol<'a>) -> Option<Function> {
-    if symbol.kind() != SymbolKind::Text || symbol.size() == 0 {
-        return None;
-    }
-    // Bit 0 says that it is Thumb code.
-    let start = symbol.address() as u32 & !1;
-    let name = format!("{:#}", rustc_demangle::demangle(symbol.name().ok()?));
-    Some(Function { range: start..start + symbol.size() as u32, name })
-}
-
-/// Where instructions stand in flash: from each `$t` to the next mapping symbol.
-fn code(file: &ElfFile32<'_, Endianness>) -> Vec<Range<u32>> {
-    let kind = |name: &str| match name.as_bytes() {
-        [b'$', kind @ (b't' | b'd' | b'a')] => Some(*kind),
-        [b'$', kind @ (b't' | b'd' | b'a'), b'.', ..] => Some(*kind),
-        _ => None,
-    };
-    let flash = FLASH.base..FLASH.base + FLASH.size;
-    let mut marks: Vec<(u32, u8)> = file
-        .symbols()
-        .filter_map(|s| Some((s.address() as u32, kind(s.name().ok()?)?)))
-        .filter(|(address, _)| flash.contains(address))
-        .collect();
-    marks.sort_unstable();
-    let text = file.symbols().filter_map(|s| function(&s)).map(|f| f.range.end).max();
-    let end = (text.unwrap_or(flash.start), b'd');
-    marks.push(end);
-    marks
-        .windows(2)
-        .filter(|pair| pair[0].1 == b't' && pair[0].0 < pair[1].0)
-        .map(|pair| pair[0].0..pair[1].0)
-        .collect()
 }

@@ -1,5 +1,7 @@
 //! `rig deploy`: a whole deployment, or the way back.
 
+mod board;
+
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -12,7 +14,7 @@ use crate::scenario::Scenario;
 use crate::{export, progress, report, sil, table};
 
 /// Targets that this build can drive.
-const TARGETS: [&str; 1] = ["sil"];
+const TARGETS: [&str; 2] = ["sil", "board"];
 
 /// A whole deployment in closed loop, or the way back.
 ///
@@ -23,9 +25,14 @@ pub(super) struct Args {
     #[command(flatten)]
     run: RunArgs,
 
-    /// What runs the controller: sil, the shipping control tick on this host.
+    /// What runs the controller: sil, the shipping control tick on this host; or board,
+    /// the firmware itself on an emulated board.
     #[arg(long, value_name = "TARGET", default_value = "sil")]
     target: String,
+
+    /// Shows the controller's log on standard error.
+    #[arg(long)]
+    log: bool,
 
     /// Directory of the files; by default one in `out`, named after the run.
     #[arg(long, value_name = "DIR")]
@@ -52,10 +59,18 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     check_target(&args.target)?;
     let scenario = args.run.resolve()?;
     let directory = if args.no_files { None } else { Some(directory(args, &scenario)?) };
+    if args.target == "board" {
+        return board::run(args, &scenario, directory.as_deref());
+    }
     let recording = {
         let _progress = progress::spinner(scenario.run.direction.name());
         sil::run(&scenario, sil::Options { rows: directory.is_some(), speed: None })?
     };
+    if args.log {
+        for line in &recording.log {
+            eprintln!("[{:8.3}] {}", line.t_s, line.text);
+        }
+    }
     let files = match &directory {
         Some(directory) => write(&recording, directory)?,
         None => Vec::new(),
@@ -80,7 +95,8 @@ fn directory(args: &Args, scenario: &Scenario) -> Result<PathBuf, Failure> {
         let file = args.run.scenario.file().and_then(Path::file_stem);
         let rig = file.map_or(scenario.preset.as_str().into(), |stem| stem.to_string_lossy());
         let (way, controller) = (scenario.run.direction.name(), scenario.run.controller.name());
-        Path::new("out").join(format!("{way}-{rig}-{controller}-{}", scenario.run.seed))
+        let board = if args.target == "sil" { String::new() } else { format!("-{}", args.target) };
+        Path::new("out").join(format!("{way}-{rig}-{controller}-{}{board}", scenario.run.seed))
     });
     // Told before the run rather than after it.
     if directory.exists() && !directory.is_dir() {
@@ -131,15 +147,20 @@ mod tests {
             ]),
             Path::new("out/retract-fe-limit-7")
         );
+        assert_eq!(
+            default_directory(&["--target", "board"]),
+            Path::new("out/deploy-prototype-scheduled-0-board")
+        );
         assert_eq!(default_directory(&["--out", "here"]), Path::new("here"));
     }
 
     #[test]
     fn a_target_that_is_not_there_is_refused_with_those_that_are() {
-        assert!(check_target("sil").is_ok());
-        for target in ["board", "probe", "moon"] {
+        assert!(check_target("sil").is_ok() && check_target("board").is_ok());
+        for target in ["probe", "moon"] {
             let error = check_target(target).unwrap_err().to_string();
-            assert!(error.contains(target) && error.ends_with("available targets: sil"), "{error}");
+            let there = error.ends_with("available targets: sil, board");
+            assert!(error.contains(target) && there, "{error}");
         }
     }
 }

@@ -50,8 +50,7 @@ fn options_are_checked_by_name() {
     refused(&["deploy", "--seed", "x"], &["--seed", "'x'"]);
     refused(&["deploy", "--seed", "-1"], &["-1"]);
     refused(&["deploy", "--seed", "18446744073709551615"], &["run.seed"]);
-    refused(&["deploy", "--target", "board"], &["--target board", "available targets: sil"]);
-    refused(&["deploy", "--target", "moon"], &["--target moon", "available targets: sil"]);
+    refused(&["deploy", "--target", "moon"], &["--target moon", "available targets: sil, board"]);
     refused(&["deploy", "--sead", "1"], &["--sead"]);
     refused(&["deploy", "--out", "a", "--no-files"], &["--out", "--no-files"]);
     refused(&["fly"], &["fly"]);

@@ -6,9 +6,11 @@
 
 use std::collections::HashSet;
 
-use unicorn_engine::{Arch, ArmCpuModel, Mode, Prot, RegisterARM, Unicorn};
+use unicorn_engine::{Arch, ArmCpuModel, Mode, Prot, RegisterARM, Unicorn, uc_error};
 
-use super::{Core, CoreError, Heat, Meter, Register, Stop};
+use super::{
+    Access as Touch, Bus, Core, CoreError, Fault, Heat, Mark, Meter, NoBus, Register, Stop, passes,
+};
 use crate::board::thumb::{self, Kind};
 use crate::board::timing::{self, REFILL};
 
@@ -43,8 +45,17 @@ pub struct Counted<'a> {
     pub code: &'a [std::ops::Range<u32>],
 }
 
-/// Interrupt number by which the engine reports a breakpoint instruction.
+/// Interrupt number by which the engine reports a supervisor call.
+const CALL: u32 = 2;
+/// The same of a breakpoint instruction.
 const BREAKPOINT: u32 = 7;
+/// The same of a return from an exception.
+const RETURN: u32 = 8;
+/// Bits of a return value that the program counter does not keep.
+const RETURN_BITS: u32 = 0xFFFF_FF01;
+/// `WFE`, `WFI` and `SEV`, as they stand in memory.
+const WFE: [u8; 2] = [0x20, 0xBF];
+const SEV: [u8; 2] = [0x40, 0xBF];
 /// Marks a halfword at which no block has begun yet.
 const UNSEEN: u32 = u32::MAX;
 
@@ -77,7 +88,15 @@ struct Count {
     meter: Meter,
     /// Cycles at which to stop.
     limit: u64,
-    breakpoint: Option<u32>,
+    /// Why a hook stopped the engine.
+    stop: Option<Stop>,
+}
+
+/// What the engine carries.
+struct Inside<B> {
+    count: Count,
+    bus: B,
+    marks: Vec<Mark>,
 }
 
 impl Count {
@@ -93,7 +112,7 @@ impl Count {
             next: 0,
             meter: Meter::default(),
             limit: u64::MAX,
-            breakpoint: None,
+            stop: None,
         }
     }
 
@@ -108,11 +127,8 @@ impl Count {
         }
     }
 
-    /// Counts the block that begins here; false if the cycles allowed are used up.
-    fn enter(&mut self, address: u32, size: u32) -> bool {
-        if self.meter.cycles >= self.limit {
-            return false;
-        }
+    /// Counts the block that begins here.
+    fn enter(&mut self, address: u32, size: u32) {
         if self.next != address {
             // The branch belongs to the block that ends with it.
             self.spend(REFILL);
@@ -120,13 +136,12 @@ impl Count {
         self.next = address.wrapping_add(size);
         let Some(index) = self.block(address, size) else {
             self.current = UNSEEN;
-            return true;
+            return;
         };
         let Block { instructions, cycles, .. } = self.blocks[index as usize];
         self.current = index;
         self.meter.instructions += instructions;
         self.spend(cycles);
-        true
     }
 
     /// The block of this place, decoded when first seen.
@@ -153,23 +168,45 @@ impl Count {
 }
 
 /// A Cortex-M4 on Unicorn.
-pub struct UnicornCore {
-    engine: Unicorn<'static, Count>,
+pub struct UnicornCore<B: Bus + 'static = NoBus> {
+    engine: Unicorn<'static, Inside<B>>,
 }
+
+/// The engine as a hook sees it.
+type Hooked<'a, B> = Unicorn<'a, Inside<B>>;
 
 /// Gives an engine's error its place.
 fn engine<T>(what: &'static str, result: Result<T, impl std::fmt::Debug>) -> Result<T, CoreError> {
     result.map_err(|error| CoreError::Engine { what, why: format!("{error:?}") })
 }
 
+/// Stops the engine from inside a hook.
+fn halt<B>(uc: &mut Hooked<'_, B>, stop: Stop) {
+    uc.get_data_mut().count.stop = Some(stop);
+    // Stopping can only fail if nothing runs.
+    let _ = uc.emu_stop();
+}
+
 impl UnicornCore {
-    /// A core with these memories, counting the cycles of `counted`.
+    /// A core with these memories and nothing else, counting the cycles of `counted`.
     ///
     /// # Errors
     /// [`CoreError::Engine`] if the engine cannot be had or a memory overlaps.
     pub fn new(memories: &[Memory], counted: &Counted<'_>) -> Result<Self, CoreError> {
+        Self::with_bus(memories, counted, NoBus)
+    }
+}
+
+impl<B: Bus + 'static> UnicornCore<B> {
+    /// A core with these memories and a bus, counting the cycles of `counted`.
+    ///
+    /// # Errors
+    /// As [`UnicornCore::new`].
+    pub fn with_bus(memories: &[Memory], counted: &Counted<'_>, bus: B) -> Result<Self, CoreError> {
+        let ranges = bus.ranges();
+        let inside = Inside { count: Count::new(counted), bus, marks: Vec::new() };
         // The flag for the microcontroller profile would select another core.
-        let new = Unicorn::new_with_data(Arch::ARM, Mode::THUMB, Count::new(counted));
+        let new = Unicorn::new_with_data(Arch::ARM, Mode::THUMB, inside);
         let mut core = Self { engine: engine("start", new)? };
         let uc = &mut core.engine;
         engine("select the core", uc.ctl_set_cpu_model(ArmCpuModel::CORTEX_M4 as i32))?;
@@ -181,36 +218,100 @@ impl UnicornCore {
             let mapped = uc.mem_map(memory.base.into(), memory.size.into(), access);
             engine("map a memory", mapped)?;
         }
+        for (base, size) in ranges {
+            core.map_bus(base, size)?;
+        }
         core.write(counted.base, counted.bytes)?;
         core.hook(counted)?;
         Ok(core)
     }
 
+    /// The bus.
+    pub fn bus(&self) -> &B {
+        &self.engine.get_data().bus
+    }
+
+    /// The bus, to be changed between two runs.
+    pub fn bus_mut(&mut self) -> &mut B {
+        &mut self.engine.get_data_mut().bus
+    }
+
+    fn map_bus(&mut self, base: u32, size: u32) -> Result<(), CoreError> {
+        let touch = move |uc: &Hooked<'_, B>, offset: u64, size: usize| Touch {
+            address: base + offset as u32,
+            size: size as u32,
+            pc: uc.pc_read().unwrap_or_default() as u32 & !1,
+            now: uc.get_data().count.meter.cycles,
+        };
+        let read = move |uc: &mut Hooked<'_, B>, offset: u64, size: usize| {
+            let access = touch(uc, offset, size);
+            u64::from(uc.get_data_mut().bus.read(access))
+        };
+        let write = move |uc: &mut Hooked<'_, B>, offset: u64, size: usize, value: u64| {
+            let access = touch(uc, offset, size);
+            uc.get_data_mut().bus.write(access, value as u32);
+        };
+        let mapped = self.engine.mmio_map(base.into(), size.into(), Some(read), Some(write));
+        engine("map the bus", mapped)
+    }
+
     fn hook(&mut self, counted: &Counted<'_>) -> Result<(), CoreError> {
         let uc = &mut self.engine;
         let blocks = uc.add_block_hook(1, 0, |uc, address, size| {
-            if !uc.get_data_mut().enter(address as u32, size) {
-                // Stopping can only fail if nothing runs.
-                let _ = uc.emu_stop();
+            let Inside { count, bus, .. } = uc.get_data_mut();
+            let now = count.meter.cycles;
+            // What stops here is not executed and so not counted.
+            if now >= count.limit || now >= bus.deadline() {
+                halt(uc, Stop::Spent(address as u32));
+                return;
             }
+            if let Some(priority) = bus.urgent()
+                && unmasked(uc, priority)
+            {
+                halt(uc, Stop::Urgent(address as u32));
+                return;
+            }
+            uc.get_data_mut().count.enter(address as u32, size);
         });
         engine("hook blocks", blocks)?;
         let traps = uc.add_intr_hook(|uc, number| {
             let at = uc.pc_read().unwrap_or_default() as u32;
-            if number == BREAKPOINT {
-                uc.get_data_mut().breakpoint = Some(at);
-            }
-            let _ = uc.emu_stop();
+            let stop = match number {
+                CALL => Stop::Call(at),
+                BREAKPOINT => Stop::Breakpoint(at),
+                RETURN => Stop::Return(at | RETURN_BITS),
+                _ => Stop::Fault { at, fault: Fault::Other },
+            };
+            halt(uc, stop);
         });
         engine("hook interrupts", traps)?;
+        // Waiting for an event arrives here, with the program counter behind it.
+        let invalid = uc.add_insn_invalid_hook(|uc| {
+            let at = uc.pc_read().unwrap_or_default() as u32 & !1;
+            let mut before = [0; 2];
+            let read = uc.mem_read(u64::from(at.wrapping_sub(2)), &mut before);
+            if read.is_ok() && before == WFE {
+                halt(uc, Stop::Event(at));
+                return true;
+            }
+            false
+        });
+        engine("hook waiting", invalid)?;
         for range in counted.code {
             let bytes = (range.start.wrapping_sub(counted.base) as usize)
                 ..(range.end.wrapping_sub(counted.base) as usize);
             let code = counted.bytes.get(bytes).unwrap_or_default();
             for (address, instruction, conditional) in thumb::sweep(code, range.start) {
                 if timing::is_late(&instruction, conditional) {
-                    self.engine.get_data_mut().late.insert(address);
+                    self.engine.get_data_mut().count.late.insert(address);
                     self.hook_late(address, instruction.kind)?;
+                }
+                let at = (address - range.start) as usize;
+                if instruction.size == 2 && code.get(at..at + 2) == Some(&SEV[..]) {
+                    let at = u64::from(address);
+                    let sent =
+                        self.engine.add_code_hook(at, at, |uc, _, _| uc.get_data_mut().bus.event());
+                    engine("hook an instruction", sent)?;
                 }
             }
         }
@@ -224,14 +325,47 @@ impl UnicornCore {
             self.engine.add_code_hook(at, at, move |uc, _, _| {
                 let value = |number| uc.reg_read(general(number)).unwrap_or_default() as u32;
                 let cycles = timing::division(signed, value(n), value(m)) - 1;
-                uc.get_data_mut().spend(cycles);
+                uc.get_data_mut().count.spend(cycles);
             })
         } else {
             let extra = timing::extra(kind);
-            self.engine.add_code_hook(at, at, move |uc, _, _| uc.get_data_mut().spend(extra))
+            self.engine.add_code_hook(at, at, move |uc, _, _| uc.get_data_mut().count.spend(extra))
         };
         engine("hook an instruction", hooked).map(|_| ())
     }
+}
+
+impl<B: Bus + 'static> UnicornCore<B> {
+    /// Runs from `address` until a hook stops it, or it comes to `until`.
+    fn go(&mut self, address: u32, cycles: u64, until: u64) -> Result<Stop, CoreError> {
+        let count = &mut self.engine.get_data_mut().count;
+        count.stop = None;
+        count.limit = count.meter.cycles.saturating_add(cycles);
+        count.current = UNSEEN;
+        // Where the host starts the program, nothing has branched.
+        count.next = address & !1;
+        let ended = self.engine.emu_start(u64::from(address | 1), until, 0, 0);
+        if let Some(stop) = self.engine.get_data_mut().count.stop.take() {
+            return Ok(stop);
+        }
+        let at = self.register(Register::Pc)?;
+        Ok(match ended {
+            // Only waiting for an interrupt ends it without a hook.
+            Ok(()) => Stop::Wait(at),
+            Err(error) => Stop::Fault { at, fault: fault(error) },
+        })
+    }
+}
+
+/// Whether the masks let an exception of this priority through.
+fn unmasked<B>(uc: &Hooked<'_, B>, priority: i16) -> bool {
+    let read = |register: RegisterARM| uc.reg_read(register).unwrap_or_default() as u32;
+    passes(
+        priority,
+        read(RegisterARM::PRIMASK),
+        read(RegisterARM::BASEPRI),
+        read(RegisterARM::FAULTMASK),
+    )
 }
 
 /// The engine's name of R0 to R12.
@@ -246,16 +380,32 @@ fn name(register: Register) -> i32 {
         Register::Sp => RegisterARM::SP as i32,
         Register::Lr => RegisterARM::LR as i32,
         Register::Pc => RegisterARM::PC as i32,
+        Register::Psp => RegisterARM::PSP as i32,
+        Register::Xpsr => RegisterARM::XPSR as i32,
+        Register::Control => RegisterARM::CONTROL as i32,
+        Register::Primask => RegisterARM::PRIMASK as i32,
+        Register::Basepri => RegisterARM::BASEPRI as i32,
+        Register::Faultmask => RegisterARM::FAULTMASK as i32,
+        // S0 to S31 too.
+        Register::Float(number) => RegisterARM::S0 as i32 + i32::from(number),
+        Register::Fpscr => RegisterARM::FPSCR as i32,
     }
 }
 
-impl Core for UnicornCore {
+impl<B: Bus + 'static> Core for UnicornCore<B> {
     fn read(&self, address: u32, into: &mut [u8]) -> Result<(), CoreError> {
         engine("read memory", self.engine.mem_read(address.into(), into))
     }
 
     fn write(&mut self, address: u32, bytes: &[u8]) -> Result<(), CoreError> {
-        engine("write memory", self.engine.mem_write(address.into(), bytes))
+        engine("write memory", self.engine.mem_write(address.into(), bytes))?;
+        let count = &self.engine.get_data().count;
+        if (address.wrapping_sub(count.base) as usize) < count.bytes.len() {
+            // Code that was translated already must not go on as it was.
+            let (from, to) = (u64::from(address & !0xFFF), u64::from(address) + bytes.len() as u64);
+            return engine("forget code", self.engine.ctl_remove_cache(from, to));
+        }
+        Ok(())
     }
 
     fn register(&self, register: Register) -> Result<u32, CoreError> {
@@ -264,37 +414,56 @@ impl Core for UnicornCore {
     }
 
     fn set_register(&mut self, register: Register, value: u32) -> Result<(), CoreError> {
-        engine("set a register", self.engine.reg_write(name(register), value.into()))
+        let uc = &mut self.engine;
+        if register == Register::Xpsr {
+            // This name takes every field; the plain one leaves some out. Only the
+            // other makes the engine look at the new mode and state.
+            let whole = uc.reg_write(RegisterARM::XPSR_NZCVQG, value.into());
+            engine("set a register", whole)?;
+            return engine("set flags", uc.reg_write(RegisterARM::APSR_NZCV, value.into()));
+        }
+        engine("set a register", uc.reg_write(name(register), value.into()))
     }
 
     fn run(&mut self, address: u32, cycles: u64) -> Result<Stop, CoreError> {
-        let count = self.engine.get_data_mut();
-        count.breakpoint = None;
-        count.limit = count.meter.cycles.saturating_add(cycles);
-        count.current = UNSEEN;
-        // Where the host starts the program, nothing has branched.
-        count.next = address & !1;
-        let ended = self.engine.emu_start(u64::from(address | 1), u64::MAX, 0, 0);
-        if let Some(at) = self.engine.get_data_mut().breakpoint.take() {
-            return Ok(Stop::Breakpoint(at));
-        }
-        let at = self.register(Register::Pc)?;
-        let count = self.engine.get_data();
-        match ended {
-            Ok(()) if count.meter.cycles >= count.limit => Ok(Stop::Spent(at)),
-            ended => {
-                let why = ended.map_or_else(|e| format!("{e:?}"), |()| "it gave up".to_owned());
-                Err(CoreError::Fault { at, lr: self.register(Register::Lr)?, why })
-            }
-        }
+        self.go(address, cycles, u64::MAX)
+    }
+
+    fn run_to(&mut self, address: u32, cycles: u64, until: u32) -> Result<Stop, CoreError> {
+        engine("forget code", self.engine.ctl_flush_tb())?;
+        let stop = self.go(address, cycles, u64::from(until & !1))?;
+        engine("forget code", self.engine.ctl_flush_tb())?;
+        Ok(match stop {
+            Stop::Wait(at) if at & !1 == until & !1 => Stop::Spent(at),
+            stop => stop,
+        })
+    }
+
+    fn pass(&mut self, cycles: u64) {
+        self.engine.get_data_mut().count.meter.cycles += cycles;
     }
 
     fn meter(&self) -> Meter {
-        self.engine.get_data().meter
+        self.engine.get_data().count.meter
+    }
+
+    fn mark(&mut self, address: u32) -> Result<(), CoreError> {
+        let at = u64::from(address & !1);
+        let hooked = self.engine.add_code_hook(at, at, |uc, address, _| {
+            let r0 = uc.reg_read(RegisterARM::R0).unwrap_or_default() as u32;
+            let inside = uc.get_data_mut();
+            let cycles = inside.count.meter.cycles;
+            inside.marks.push(Mark { cycles, address: address as u32, r0 });
+        });
+        engine("hook an instruction", hooked).map(|_| ())
+    }
+
+    fn take_marks(&mut self, marks: &mut Vec<Mark>) {
+        marks.append(&mut self.engine.get_data_mut().marks);
     }
 
     fn take_heat(&mut self) -> Heat {
-        let count = self.engine.get_data_mut();
+        let count = &mut self.engine.get_data_mut().count;
         let mut heat = Heat::new();
         for index in std::mem::take(&mut count.warm) {
             let block = &mut count.blocks[index as usize];
@@ -302,6 +471,17 @@ impl Core for UnicornCore {
                 std::mem::take(&mut block.heat);
         }
         heat
+    }
+}
+
+/// What a processor makes of an engine's error.
+fn fault(error: uc_error) -> Fault {
+    match error {
+        uc_error::INSN_INVALID => Fault::Undefined,
+        uc_error::FETCH_UNMAPPED | uc_error::FETCH_PROT | uc_error::FETCH_UNALIGNED => Fault::Fetch,
+        uc_error::READ_UNMAPPED | uc_error::READ_PROT | uc_error::READ_UNALIGNED => Fault::Read,
+        uc_error::WRITE_UNMAPPED | uc_error::WRITE_PROT | uc_error::WRITE_UNALIGNED => Fault::Write,
+        _ => Fault::Other,
     }
 }
 

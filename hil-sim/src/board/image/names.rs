@@ -6,7 +6,8 @@ use gimli::{Dwarf, EndianSlice, LittleEndian, SectionId};
 use object::read::elf::ElfFile32;
 use object::{Endianness, Object, ObjectSection};
 
-use super::{ImageError, form};
+use super::ImageError;
+use crate::board::elf::form;
 
 type Slice<'a> = EndianSlice<'a, LittleEndian>;
 

@@ -1,0 +1,174 @@
+//! The board on its test bench: the plant at the other end of its pins.
+//!
+//! The plant advances by whole milliseconds under the mean of what the bridges' lines
+//! said meanwhile; then its sensors speak anew. In between, the chip's clock goes on
+//! cycle by cycle and takes the voltages, edges and frames as they stand.
+
+use super::chip::Motor;
+use super::image::ImageError;
+use super::log::{Line, Reader, Strings};
+use super::machine::Machine;
+use super::peripherals::HZ;
+use super::rtt::Probe;
+use crate::plant::draw::PlantParameters;
+use crate::plant::rig::{Drives, PlantError, VirtualRig};
+use crate::plant::sensors::{Codes, Sensed, Sensors};
+use crate::scenario::{Direction, Scenario};
+
+/// Step of the plant, s and cycles.
+const STEP_S: f64 = 1e-3;
+/// Cycles of a millisecond.
+pub const STEP: u64 = HZ / 1000;
+
+/// What can go wrong on the bench.
+#[derive(Debug, thiserror::Error)]
+pub enum BenchError {
+    /// The image or the core.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    /// The plant left the set of meaningful states.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
+}
+
+impl From<super::core::CoreError> for BenchError {
+    fn from(error: super::core::CoreError) -> Self {
+        Self::Image(error.into())
+    }
+}
+
+/// What passed at the pins in a millisecond.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Passed {
+    /// What the sensors said throughout.
+    pub codes: Codes,
+    /// What the bridges were driven with.
+    pub drives: Drives,
+}
+
+/// A board and its plant.
+pub struct Bench<'a> {
+    machine: Machine,
+    plant: VirtualRig,
+    sensors: Sensors,
+    probe: Probe,
+    reader: Reader<'a>,
+    codes: Codes,
+    /// The wheel's position in counts, beyond the 16 bits of a code.
+    wheel: i64,
+    millisecond: u64,
+}
+
+impl<'a> Bench<'a> {
+    /// A board with this image, off, and the plant of a scenario: for deployment with
+    /// the wheel unloaded at the stow end, for retraction pressed at the end of travel.
+    ///
+    /// # Errors
+    /// [`ImageError`] if the image is none, or lacks its log.
+    pub fn new(elf: &[u8], strings: &'a Strings, scenario: &Scenario) -> Result<Self, ImageError> {
+        let parameters = PlantParameters::draw(scenario);
+        let (position, preload) = match scenario.run.direction {
+            Direction::Deploy => (0.0, 0.0),
+            Direction::Retract => (scenario.rig.rig.travel_mm, scenario.rig.preload.cruise_n),
+        };
+        let machine = Machine::new(elf)?;
+        let mut sensors = Sensors::new(parameters.sensors.clone(), scenario.run.seed);
+        let plant = VirtualRig::new(parameters, position, preload, STEP_S);
+        let codes = sensors.read(sensed(&plant), STEP_S);
+        let mut bench = Self {
+            probe: Probe::of(&machine)?,
+            machine,
+            plant,
+            sensors,
+            reader: strings.reader(),
+            codes,
+            wheel: 0,
+            millisecond: 0,
+        };
+        bench.speak(codes);
+        Ok(bench)
+    }
+
+    /// One millisecond. Returns what passed at the pins, and what was logged.
+    ///
+    /// # Errors
+    /// [`BenchError`] if the engine or the plant fails.
+    pub fn step(&mut self) -> Result<(Passed, Vec<Line>), BenchError> {
+        self.millisecond += 1;
+        self.machine.run_on(self.millisecond * STEP)?;
+        let now = self.machine.now();
+        let [drive, preload] = self.machine.chip_mut().take_motors(now);
+        let on = |motor: Motor| motor.enabled > 0.5;
+        let drives = Drives {
+            drive: drive.duty,
+            drive_on: on(drive),
+            preload: preload.duty,
+            preload_on: on(preload),
+        };
+        let passed = Passed { codes: self.codes, drives };
+        self.plant.step(&drives, STEP_S)?;
+        let codes = self.sensors.read(sensed(&self.plant), STEP_S);
+        self.speak(codes);
+        let bytes = self.probe.up(&mut self.machine, 0)?;
+        Ok((passed, self.reader.read(&bytes)))
+    }
+
+    /// The sensors' lines take on these codes.
+    fn speak(&mut self, codes: Codes) {
+        let turned = codes.wheel.since(self.codes.wheel);
+        self.wheel += i64::from(turned);
+        self.codes = codes;
+        let chip = self.machine.chip_mut();
+        chip.set_analog([codes.load_cell.get(), codes.tread.get()]);
+        chip.angle.angle = codes.arm.get();
+        chip.turn_wheel(self.wheel, STEP);
+    }
+
+    /// Sends a letter to the board's console; false if it does not listen yet.
+    ///
+    /// # Errors
+    /// [`BenchError`] if the engine fails.
+    pub fn send(&mut self, letter: u8) -> Result<bool, BenchError> {
+        Ok(self.probe.down(&mut self.machine, 0, letter)?)
+    }
+
+    /// The board.
+    #[must_use]
+    pub const fn machine(&self) -> &Machine {
+        &self.machine
+    }
+
+    /// The board, to be tampered with.
+    pub fn machine_mut(&mut self) -> &mut Machine {
+        &mut self.machine
+    }
+
+    /// The board alone, for what is to be asked of it after the run.
+    #[must_use]
+    pub fn into_machine(self) -> Machine {
+        self.machine
+    }
+
+    /// The plant.
+    #[must_use]
+    pub const fn plant(&self) -> &VirtualRig {
+        &self.plant
+    }
+
+    /// Time since power came up, s.
+    #[must_use]
+    pub fn time_s(&self) -> f64 {
+        self.millisecond as f64 * STEP_S
+    }
+}
+
+/// What the sensors look at.
+fn sensed(plant: &VirtualRig) -> Sensed {
+    let truth = plant.truth();
+    Sensed {
+        rotation_rad: truth.rotation_rad,
+        preload_n: truth.preload_n,
+        depth_mm: truth.depth_mm,
+        arm_rad: truth.arm_rad,
+    }
+}

@@ -1,0 +1,352 @@
+//! The chip around the core: every peripheral at its address, and what leads from one
+//! to another: clocks, interrupt lines, DMA requests, pins.
+
+mod map;
+mod pins;
+mod stray;
+
+use super::core::{Access, Bus};
+use super::peripherals::adc::Adc;
+use super::peripherals::dbgmcu::Dbgmcu;
+use super::peripherals::dma::{CHANNELS, Dma, Dmamux, Move};
+use super::peripherals::encoder::Encoder;
+use super::peripherals::exti::Exti;
+use super::peripherals::flash::Flash;
+use super::peripherals::gpio::Gpio;
+use super::peripherals::iwdg::Iwdg;
+use super::peripherals::pwm::Pwm;
+use super::peripherals::pwr::Pwr;
+use super::peripherals::rcc::{Cause, Rcc};
+use super::peripherals::spi::{AngleSensor, Spi};
+use super::peripherals::syscfg::Syscfg;
+use super::peripherals::system::{Counter, System};
+use super::peripherals::time_base::TimeBase;
+use super::peripherals::{Peripheral, Write};
+
+pub use pins::{Bridge, Motor, Pin};
+pub use stray::{Stray, Strays, Why};
+
+use map::Block;
+
+/// Requests of the multiplexer: ADC1, ADC2, SPI1 in and out.
+const REQUESTS: [u32; 4] = [5, 36, 10, 11];
+
+/// Faults of the hardware that a test or a campaign may switch on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Defects {
+    /// Lines of the wheel encoder that are broken: the pull-up holds them high.
+    pub encoder_lines: [bool; 2],
+    /// The converter of this index gives this code whatever the voltage.
+    pub stuck_codes: [Option<u16>; 2],
+    /// DMA moves nothing.
+    pub dma_stalled: bool,
+    /// Clearing the flags of the time driver's timer has no effect.
+    pub timer_flags_stick: bool,
+}
+
+/// The chip.
+pub struct Chip {
+    /// The core's own registers.
+    pub system: System,
+    counter: Counter,
+    /// Reset and clock control.
+    pub rcc: Rcc,
+    pwr: Pwr,
+    flash: Flash,
+    syscfg: Syscfg,
+    exti: Exti,
+    ports: [Gpio; 7],
+    time: TimeBase,
+    encoder: Encoder,
+    /// The timers of drive and pre-tightener.
+    motors: [Pwm; 2],
+    adc: Adc,
+    dma: Dma,
+    mux: Dmamux,
+    spi: Spi,
+    /// Independent watchdog.
+    pub watchdog: Iwdg,
+    debug: Dbgmcu,
+    /// The angle sensor.
+    pub angle: AngleSensor,
+    /// The select line was high during the frame under way.
+    deselected: bool,
+    /// The wheel encoder's position, in quarters of a line pair.
+    wheel: i64,
+    inputs: [u16; 2],
+    bridges: [Bridge; 2],
+    /// Faults of the hardware.
+    pub defects: Defects,
+    strays: Strays,
+    reset: Option<Cause>,
+    deadline: u64,
+}
+
+impl Chip {
+    /// The chip as power comes up, with the vectors at `vectors`: emergency stop closed,
+    /// button released.
+    #[must_use]
+    pub fn new(vectors: u32) -> Self {
+        let ports: [Gpio; 7] = std::array::from_fn(|port| {
+            let outside = pins::OUTSIDE[port];
+            Gpio::new(port, outside.0, outside.1)
+        });
+        let mut chip = Self {
+            system: System::new(vectors),
+            counter: Counter::default(),
+            rcc: Rcc::new(Cause::Power, 0),
+            pwr: Pwr::default(),
+            flash: Flash::default(),
+            syscfg: Syscfg::default(),
+            exti: Exti::new(0),
+            ports,
+            time: TimeBase::default(),
+            encoder: Encoder::new(pins::lines_at(0)),
+            motors: [Pwm::new(false), Pwm::new(false)],
+            adc: Adc::default(),
+            dma: Dma::default(),
+            mux: Dmamux::default(),
+            spi: Spi::default(),
+            watchdog: Iwdg::default(),
+            debug: Dbgmcu::default(),
+            angle: AngleSensor::default(),
+            deselected: false,
+            wheel: 0,
+            inputs: [0; 2],
+            bridges: [Bridge::default(); 2],
+            defects: Defects::default(),
+            strays: Strays::default(),
+            reset: None,
+            deadline: 0,
+        };
+        chip.settle(0);
+        chip
+    }
+
+    /// Starts every register afresh. What is outside the chip stays as it is.
+    pub fn reset(&mut self, cause: Cause, vectors: u32, now: u64) {
+        let old = std::mem::replace(self, Self::new(vectors));
+        // Power that was lost takes the flags of earlier resets with it.
+        let earlier = if cause == Cause::Power { 0 } else { old.rcc.flags() };
+        self.rcc = Rcc::new(cause, earlier);
+        for (port, (driven, levels)) in old.ports.iter().map(Gpio::outside).enumerate() {
+            self.ports[port] = Gpio::new(port, driven, levels);
+        }
+        self.angle = old.angle;
+        self.wheel = old.wheel;
+        self.encoder = Encoder::new(pins::lines_at(old.wheel));
+        self.bridges = old.bridges;
+        self.defects = old.defects;
+        self.strays = old.strays;
+        self.inputs = old.inputs;
+        self.settle(now);
+    }
+
+    /// A reset that the chip wants, once.
+    pub fn take_reset(&mut self) -> Option<Cause> {
+        self.reset.take()
+    }
+
+    /// Accesses that no model has answered.
+    #[must_use]
+    pub const fn strays(&self) -> &Strays {
+        &self.strays
+    }
+
+    /// Does what is due at `now`.
+    pub fn advance(&mut self, now: u64) {
+        self.system.advance(now);
+        self.time.advance(now);
+        for motor in &mut self.motors {
+            motor.advance(now);
+        }
+        self.adc.advance(now);
+        if let Some(frame) = self.spi.over(now) {
+            let answer = self.exchange(frame);
+            self.spi.answer(answer, now);
+        }
+        if self.watchdog.has_bitten(now) {
+            self.reset = Some(Cause::Watchdog);
+        }
+        self.settle(now);
+    }
+
+    /// The core has locked up.
+    pub fn lock_up(&mut self, now: u64) {
+        if self.syscfg.lockup_breaks() {
+            for motor in &mut self.motors {
+                motor.lock_up(now);
+            }
+            self.advance(now);
+        }
+    }
+
+    /// The transfer that DMA makes next.
+    #[must_use]
+    pub fn next_move(&self) -> Option<Move> {
+        if self.defects.dma_stalled {
+            return None;
+        }
+        let asked = [
+            self.adc.wants_dma(0),
+            self.adc.wants_dma(1),
+            self.spi.has_word(),
+            self.spi.wants_word(),
+        ];
+        (0..CHANNELS).find_map(|channel| {
+            let request = self.mux.request(channel);
+            let source = REQUESTS.iter().position(|known| *known == request)?;
+            if asked[source] { self.dma.due(channel) } else { None }
+        })
+    }
+
+    /// A transfer is done, or met an address where nothing lies.
+    pub fn moved(&mut self, channel: usize, found: bool, now: u64) {
+        self.dma.moved(channel, found);
+        self.settle(now);
+    }
+
+    /// Lets everything that follows from a change follow: pins, lines, deadlines.
+    fn settle(&mut self, now: u64) {
+        self.settle_pins(now);
+        self.settle_lines(now);
+    }
+
+    /// The same after an access to one block: what cannot have changed is left alone.
+    fn settle_after(&mut self, block: Block, offset: u32, write: bool, now: u64) {
+        match block {
+            Block::Port(_) | Block::Syscfg | Block::Motor(_) | Block::Exti if write => {
+                self.settle(now);
+            }
+            // A converter's or a bus's data register is changed by being read.
+            Block::Adc | Block::Spi => self.settle_lines(now),
+            Block::Time | Block::Dma | Block::Mux | Block::Watchdog if write => {
+                self.settle_lines(now);
+            }
+            // The interrupt controller keeps its own account.
+            Block::System if write && !(0x100..0x500).contains(&offset) => self.settle_lines(now),
+            _ => {}
+        }
+    }
+
+    /// Interrupt lines, and when something is due next.
+    fn settle_lines(&mut self, now: u64) {
+        if self.system.control.wants_reset {
+            self.reset = Some(Cause::Software);
+        }
+        let lines =
+            [(23, self.exti.asks(0x03E0)), (28, self.time.asks()), (40, self.exti.asks(0xFC00))];
+        let exceptions = &mut self.system.exceptions;
+        for (interrupt, high) in lines {
+            exceptions.set_line(interrupt, high, now);
+        }
+        for line in 0..5 {
+            exceptions.set_line(6 + line, self.exti.asks(1 << line), now);
+        }
+        for channel in 0..CHANNELS as u8 {
+            // Channel 8 has its interrupt elsewhere.
+            let interrupt = if channel == 7 { 96 } else { 11 + channel };
+            exceptions.set_line(interrupt, self.dma.asks(channel.into()), now);
+        }
+        let due = [
+            self.system.deadline(),
+            self.time.deadline(),
+            self.motors[0].deadline(),
+            self.motors[1].deadline(),
+            self.adc.deadline(),
+            self.spi.deadline(),
+            self.watchdog.deadline(),
+        ];
+        self.deadline = due.into_iter().min().unwrap_or(u64::MAX);
+        if self.reset.is_some() || self.next_move().is_some() {
+            self.deadline = now;
+        }
+    }
+
+    /// The registers of a block.
+    fn block(&mut self, block: Block) -> &mut dyn Peripheral {
+        match block {
+            Block::Time => &mut self.time,
+            Block::Encoder => &mut self.encoder,
+            Block::Motor(index) => &mut self.motors[index],
+            Block::Watchdog => &mut self.watchdog,
+            Block::Pwr => &mut self.pwr,
+            Block::Syscfg => &mut self.syscfg,
+            Block::Exti => &mut self.exti,
+            Block::Spi => &mut self.spi,
+            Block::Dma => &mut self.dma,
+            Block::Mux => &mut self.mux,
+            Block::Rcc => &mut self.rcc,
+            Block::Flash => &mut self.flash,
+            Block::Port(index) => &mut self.ports[index],
+            Block::Adc => &mut self.adc,
+            Block::Counter => &mut self.counter,
+            Block::System => &mut self.system,
+            Block::Debug => &mut self.debug,
+        }
+    }
+
+    /// Reads the word that holds an address.
+    fn read_word(&mut self, access: Access) -> u32 {
+        let Some((block, offset)) = map::find(access.address & !3) else {
+            self.strays.note(map::nobody(access.address), access, false, Why::NoModel);
+            return 0;
+        };
+        if !map::is_clocked(block, &self.rcc) {
+            self.strays.note((map::name(block), offset), access, false, Why::NoClock);
+            return 0;
+        }
+        let value = self.block(block).read(offset, access.now);
+        self.settle_after(block, offset, false, access.now);
+        match value {
+            Some(value) => value,
+            None => {
+                self.strays.note((map::name(block), offset), access, false, Why::NoModel);
+                0
+            }
+        }
+    }
+}
+
+impl Bus for Chip {
+    fn ranges(&self) -> Vec<(u32, u32)> {
+        map::RANGES.to_vec()
+    }
+
+    fn read(&mut self, access: Access) -> u32 {
+        let word = self.read_word(access);
+        let kept = if access.size >= 4 { u32::MAX } else { (1 << (8 * access.size)) - 1 };
+        word >> (8 * (access.address & 3)) & kept
+    }
+
+    fn write(&mut self, access: Access, value: u32) {
+        let shift = 8 * (access.address & 3);
+        let kept = if access.size >= 4 { u32::MAX } else { (1 << (8 * access.size)) - 1 };
+        let write = Write { value: (value & kept) << shift, mask: kept << shift };
+        let Some((block, offset)) = map::find(access.address & !3) else {
+            self.strays.note(map::nobody(access.address), access, true, Why::NoModel);
+            return;
+        };
+        if !map::is_clocked(block, &self.rcc) {
+            self.strays.note((map::name(block), offset), access, true, Why::NoClock);
+            return;
+        }
+        let sticks = self.defects.timer_flags_stick && (block, offset) == (Block::Time, 0x10);
+        if !sticks && self.block(block).write(offset, write, access.now).is_none() {
+            self.strays.note((map::name(block), offset), access, true, Why::NoModel);
+        }
+        self.settle_after(block, offset, true, access.now);
+    }
+
+    fn deadline(&self) -> u64 {
+        self.deadline
+    }
+
+    fn urgent(&self) -> Option<i16> {
+        self.system.exceptions.urgent().map(|(_, priority)| priority)
+    }
+
+    fn event(&mut self) {
+        self.system.exceptions.event = true;
+    }
+}

@@ -1,0 +1,128 @@
+//! An image of the board: what goes to flash, where code stands, what things are called.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use object::read::elf::{ElfFile32, ProgramHeader};
+use object::{Endianness, Object, ObjectSymbol, SymbolKind, elf};
+
+use super::core::unicorn::{Access, Memory};
+use super::image::ImageError;
+
+/// The chip's flash.
+pub const FLASH: Memory = Memory { base: 0x0800_0000, size: 512 * 1024, access: Access::Code };
+/// SRAM1, SRAM2 and the alias of the CCM SRAM behind them.
+pub const RAM: Memory = Memory { base: 0x2000_0000, size: 128 * 1024, access: Access::Data };
+
+/// A function of the image.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Function {
+    /// Its code.
+    pub range: Range<u32>,
+    /// Its name, as in the source.
+    pub name: String,
+}
+
+/// An image's memory and names.
+pub struct Loaded {
+    /// The whole flash.
+    pub flash: Vec<u8>,
+    /// Where instructions stand.
+    pub code: Vec<Range<u32>>,
+    /// In the order of their addresses.
+    pub functions: Vec<Function>,
+    /// Every symbol with its value.
+    symbols: BTreeMap<String, u32>,
+}
+
+pub(super) fn form(error: impl ToString) -> ImageError {
+    ImageError::Form(error.to_string())
+}
+
+impl Loaded {
+    /// What of the image goes to flash, and what its symbols say.
+    ///
+    /// # Errors
+    /// [`ImageError::Form`] if it is no image of the board.
+    pub fn of(elf: &[u8]) -> Result<Self, ImageError> {
+        let file = ElfFile32::<Endianness>::parse(elf).map_err(form)?;
+        let endian = file.endian();
+        let mut flash = vec![0xFF; FLASH.size as usize];
+        for segment in file.elf_program_headers() {
+            let data = segment.data(endian, elf).map_err(|()| form("a segment is cut off"))?;
+            if segment.p_type(endian) != elf::PT_LOAD || data.is_empty() {
+                continue;
+            }
+            let at = segment.p_paddr(endian).wrapping_sub(FLASH.base) as usize;
+            let place = flash.get_mut(at..at + data.len());
+            place.ok_or_else(|| form("a segment lies outside the flash"))?.copy_from_slice(data);
+        }
+        let mut functions: Vec<Function> = file.symbols().filter_map(|s| function(&s)).collect();
+        functions.sort_by_key(|f| f.range.start);
+        functions.dedup_by_key(|f| f.range.start);
+        let code = code(&file);
+        if code.is_empty() {
+            return Err(form("its code is not marked by mapping symbols"));
+        }
+        let named = |s: &object::read::elf::ElfSymbol32<'_, '_, _>| {
+            Some((s.name().ok()?.to_owned(), s.address() as u32))
+        };
+        let symbols = file.symbols().filter_map(|s| named(&s)).collect();
+        Ok(Loaded { flash, code, functions, symbols })
+    }
+
+    /// Symbols with their values, in the order of their names.
+    pub fn symbols(&self) -> impl Iterator<Item = (&str, u32)> {
+        self.symbols.iter().map(|(name, value)| (name.as_str(), *value))
+    }
+
+    /// Value of a symbol.
+    ///
+    /// # Errors
+    /// [`ImageError::Missing`] if the image has none of this name.
+    pub fn symbol(&self, name: &str) -> Result<u32, ImageError> {
+        self.symbols.get(name).copied().ok_or_else(|| ImageError::Missing(name.to_owned()))
+    }
+}
+
+/// Name of the function at an address, of functions in the order of their addresses.
+#[must_use]
+pub fn named(functions: &[Function], address: u32) -> &str {
+    let after = functions.partition_point(|f| f.range.start <= address);
+    let found = functions[..after].last().filter(|f| f.range.contains(&address));
+    found.map_or("nowhere", |f| &f.name)
+}
+
+fn function<'a>(symbol: &impl ObjectSymbol<'a>) -> Option<Function> {
+    if symbol.kind() != SymbolKind::Text || symbol.size() == 0 {
+        return None;
+    }
+    // Bit 0 says that it is Thumb code.
+    let start = symbol.address() as u32 & !1;
+    let name = format!("{:#}", rustc_demangle::demangle(symbol.name().ok()?));
+    Some(Function { range: start..start + symbol.size() as u32, name })
+}
+
+/// Where instructions stand in flash: from each `$t` to the next mapping symbol.
+fn code(file: &ElfFile32<'_, Endianness>) -> Vec<Range<u32>> {
+    let kind = |name: &str| match name.as_bytes() {
+        [b'$', kind @ (b't' | b'd' | b'a')] => Some(*kind),
+        [b'$', kind @ (b't' | b'd' | b'a'), b'.', ..] => Some(*kind),
+        _ => None,
+    };
+    let flash = FLASH.base..FLASH.base + FLASH.size;
+    let mut marks: Vec<(u32, u8)> = file
+        .symbols()
+        .filter_map(|s| Some((s.address() as u32, kind(s.name().ok()?)?)))
+        .filter(|(address, _)| flash.contains(address))
+        .collect();
+    marks.sort_unstable();
+    let text = file.symbols().filter_map(|s| function(&s)).map(|f| f.range.end).max();
+    let end = (text.unwrap_or(flash.start), b'd');
+    marks.push(end);
+    marks
+        .windows(2)
+        .filter(|pair| pair[0].1 == b't' && pair[0].0 < pair[1].0)
+        .map(|pair| pair[0].0..pair[1].0)
+        .collect()
+}

@@ -1,0 +1,327 @@
+//! Exceptions of the core: what is pending, enabled and active, and which is next.
+//!
+//! Source: ARMv7-M Architecture Reference Manual, B1.5 and B3.4.
+
+/// Exceptions of this chip: 16 of the core and 102 interrupts.
+const COUNT: usize = 16 + 102;
+
+/// Exceptions with a number of their own in the architecture.
+pub mod number {
+    /// Hard fault.
+    pub const HARD_FAULT: u8 = 3;
+    /// Memory management fault.
+    pub const MEM_MANAGE: u8 = 4;
+    /// Bus fault.
+    pub const BUS_FAULT: u8 = 5;
+    /// Usage fault.
+    pub const USAGE_FAULT: u8 = 6;
+    /// Supervisor call.
+    pub const SV_CALL: u8 = 11;
+    /// Pendable service.
+    pub const PEND_SV: u8 = 14;
+    /// System timer.
+    pub const SYS_TICK: u8 = 15;
+    /// First interrupt of the chip.
+    pub const INTERRUPT: u8 = 16;
+}
+
+/// Priority of thread mode: less urgent than any that can be set.
+const THREAD: i16 = 256;
+/// Bits of a priority that this chip implements.
+const PRIORITY_BITS: u8 = 0xF0;
+
+/// State of every exception.
+#[derive(Clone, Debug)]
+pub struct Exceptions {
+    pending: u128,
+    enabled: u128,
+    lines: u128,
+    /// Active ones, the one that runs last.
+    active: Vec<u8>,
+    priorities: [u8; COUNT],
+    /// `PRIGROUP`: bits of a priority, from 0 to this, that do not preempt.
+    group: u8,
+    /// When each became pending, cycles.
+    since: [u64; COUNT],
+    urgent: Option<(u8, i16)>,
+    /// The event register.
+    pub event: bool,
+}
+
+impl Default for Exceptions {
+    fn default() -> Self {
+        Self {
+            pending: 0,
+            // What the architecture numbers is always enabled; whether a fault is, its
+            // handler control decides before it becomes pending.
+            enabled: 0xFFFF,
+            lines: 0,
+            active: Vec::new(),
+            priorities: [0; COUNT],
+            group: 0,
+            since: [0; COUNT],
+            urgent: None,
+            event: false,
+        }
+    }
+}
+
+/// Numbers of the bits that are set.
+fn bits(mut set: u128) -> impl Iterator<Item = u8> {
+    std::iter::from_fn(move || {
+        let next = set.trailing_zeros();
+        set &= set.wrapping_sub(1);
+        (next < 128).then_some(next as u8)
+    })
+}
+
+impl Exceptions {
+    /// Makes an exception pending.
+    pub fn pend(&mut self, number: u8, now: u64) {
+        if usize::from(number) < COUNT && self.pending >> number & 1 == 0 {
+            self.pending |= 1 << number;
+            self.since[usize::from(number)] = now;
+            self.refresh();
+        }
+    }
+
+    /// Takes the request back.
+    pub fn clear(&mut self, number: u8) {
+        self.pending &= !(1 << number);
+        self.refresh();
+    }
+
+    /// Sets the level of an interrupt line. While it is high the interrupt becomes
+    /// pending again as soon as it is not active.
+    pub fn set_line(&mut self, interrupt: u8, high: bool, now: u64) {
+        let number = number::INTERRUPT + interrupt;
+        if !high {
+            self.lines &= !(1 << number);
+        } else if self.lines >> number & 1 == 0 {
+            self.lines |= 1 << number;
+            if !self.active.contains(&number) {
+                self.pend(number, now);
+            }
+        }
+    }
+
+    /// Enables or disables interrupts by a word of the enable registers.
+    pub fn enable(&mut self, word: u32, set: u32, on: bool) {
+        let mask = u128::from(set) << (16 + 32 * word);
+        if on {
+            self.enabled |= mask;
+        } else {
+            self.enabled &= !mask;
+        }
+        self.refresh();
+    }
+
+    /// A word of the enable registers.
+    #[must_use]
+    pub fn enabled(&self, word: u32) -> u32 {
+        (self.enabled >> (16 + 32 * word)) as u32
+    }
+
+    /// A word of the pending registers.
+    #[must_use]
+    pub fn pending(&self, word: u32) -> u32 {
+        (self.pending >> (16 + 32 * word)) as u32
+    }
+
+    /// A word of the active registers.
+    #[must_use]
+    pub fn active(&self, word: u32) -> u32 {
+        let set = self.active.iter().fold(0_u128, |set, number| set | 1 << number);
+        (set >> (16 + 32 * word)) as u32
+    }
+
+    /// Whether an exception is pending.
+    #[must_use]
+    pub fn is_pending(&self, number: u8) -> bool {
+        self.pending >> number & 1 != 0
+    }
+
+    /// Whether an exception is active.
+    #[must_use]
+    pub fn is_active(&self, number: u8) -> bool {
+        self.active.contains(&number)
+    }
+
+    /// The exception that runs; 0 in thread mode.
+    #[must_use]
+    pub fn running(&self) -> u8 {
+        self.active.last().copied().unwrap_or(0)
+    }
+
+    /// How many are active.
+    #[must_use]
+    pub fn depth(&self) -> usize {
+        self.active.len()
+    }
+
+    /// Sets the priority of an exception, of which the chip keeps the upper four bits.
+    pub fn set_priority(&mut self, number: u8, priority: u8) {
+        if let Some(kept) = self.priorities.get_mut(usize::from(number)) {
+            *kept = priority & PRIORITY_BITS;
+            self.refresh();
+        }
+    }
+
+    /// The priority of an exception.
+    #[must_use]
+    pub fn priority_set(&self, number: u8) -> u8 {
+        self.priorities.get(usize::from(number)).copied().unwrap_or(0)
+    }
+
+    /// Sets `PRIGROUP`.
+    pub fn set_group(&mut self, group: u8) {
+        self.group = group & 7;
+        self.refresh();
+    }
+
+    /// `PRIGROUP`.
+    #[must_use]
+    pub fn group(&self) -> u8 {
+        self.group
+    }
+
+    /// Priority with its whole number of bits.
+    fn whole(&self, number: u8) -> i16 {
+        match number {
+            2 => -2,
+            number::HARD_FAULT => -1,
+            _ => i16::from(self.priorities[usize::from(number)]),
+        }
+    }
+
+    /// The part of a priority that preempts.
+    fn preempts(&self, number: u8) -> i16 {
+        let whole = self.whole(number);
+        if whole < 0 { whole } else { whole & !((1 << (self.group + 1)) - 1) }
+    }
+
+    /// Priority at which the core executes, masks apart.
+    #[must_use]
+    pub fn level(&self) -> i16 {
+        self.active.iter().map(|number| self.preempts(*number)).min().unwrap_or(THREAD)
+    }
+
+    fn refresh(&mut self) {
+        let next = bits(self.pending & self.enabled).min_by_key(|n| (self.whole(*n), *n));
+        let next = next.map(|number| (number, self.preempts(number)));
+        self.urgent = next.filter(|(_, priority)| *priority < self.level());
+    }
+
+    /// The exception to be taken next with the priority that the masks have to let
+    /// through, if it preempts what runs.
+    #[must_use]
+    pub fn urgent(&self) -> Option<(u8, i16)> {
+        self.urgent
+    }
+
+    /// Takes an exception: it runs from now on. Returns since when it had been pending.
+    pub fn enter(&mut self, number: u8) -> u64 {
+        self.pending &= !(1 << number);
+        self.active.push(number);
+        self.event = true;
+        self.refresh();
+        self.since[usize::from(number)]
+    }
+
+    /// The exception that runs has returned.
+    pub fn leave(&mut self, now: u64) -> u8 {
+        let left = self.active.pop().unwrap_or(0);
+        self.event = true;
+        if self.lines >> left & 1 != 0 {
+            self.pend(left, now);
+        }
+        self.refresh();
+        left
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::number::INTERRUPT;
+    use super::*;
+
+    fn with(priorities: &[(u8, u8)]) -> Exceptions {
+        let mut exceptions = Exceptions::default();
+        for &(interrupt, priority) in priorities {
+            exceptions.enable(0, 1 << interrupt, true);
+            exceptions.set_priority(INTERRUPT + interrupt, priority);
+        }
+        exceptions
+    }
+
+    fn next(exceptions: &Exceptions) -> Option<u8> {
+        exceptions.urgent().map(|(number, _)| number - INTERRUPT)
+    }
+
+    #[test]
+    fn the_most_urgent_goes_first_and_among_equals_the_lowest_number() {
+        let mut e = with(&[(3, 0x40), (5, 0x20), (7, 0x20)]);
+        for interrupt in [7, 3, 5] {
+            e.pend(INTERRUPT + interrupt, 0);
+        }
+        for wanted in [5, 7, 3] {
+            assert_eq!(next(&e), Some(wanted));
+            e.enter(INTERRUPT + wanted);
+            assert_eq!(next(&e), None, "none preempts its equal");
+            e.leave(0);
+        }
+        assert_eq!(next(&e), None);
+    }
+
+    #[test]
+    fn a_more_urgent_one_preempts() {
+        let mut e = with(&[(3, 0x40), (5, 0x20)]);
+        e.pend(INTERRUPT + 3, 0);
+        e.enter(INTERRUPT + 3);
+        e.pend(INTERRUPT + 5, 9);
+        assert_eq!(next(&e), Some(5));
+        assert_eq!(e.enter(INTERRUPT + 5), 9);
+        assert_eq!((e.depth(), e.running()), (2, INTERRUPT + 5));
+        assert_eq!(e.leave(0), INTERRUPT + 5);
+        assert_eq!(e.running(), INTERRUPT + 3);
+    }
+
+    #[test]
+    fn only_the_upper_four_bits_count_and_the_group_decides_about_preemption() {
+        let mut e = with(&[(3, 0x5F), (5, 0x4F)]);
+        assert_eq!(e.priority_set(INTERRUPT + 3), 0x50);
+        e.pend(INTERRUPT + 3, 0);
+        e.enter(INTERRUPT + 3);
+        e.pend(INTERRUPT + 5, 0);
+        assert_eq!(next(&e), Some(5));
+        // With bits 4 to 0 as subpriority, 0x40 and 0x50 are one group.
+        e.set_group(4);
+        assert_eq!(next(&e), None);
+    }
+
+    #[test]
+    fn a_line_that_stays_high_brings_its_interrupt_back() {
+        let mut e = with(&[(3, 0x40)]);
+        e.set_line(3, true, 1);
+        e.enter(INTERRUPT + 3);
+        assert_eq!(next(&e), None);
+        e.leave(2);
+        assert_eq!(next(&e), Some(3), "its cause was not cleared");
+        e.enter(INTERRUPT + 3);
+        e.set_line(3, false, 3);
+        e.leave(4);
+        assert_eq!(next(&e), None);
+    }
+
+    #[test]
+    fn what_is_disabled_waits() {
+        let mut e = with(&[]);
+        e.pend(INTERRUPT + 40, 0);
+        assert_eq!(next(&e), None);
+        assert_eq!(e.pending(1), 1 << 8);
+        e.enable(1, 1 << 8, true);
+        assert_eq!(next(&e), Some(40));
+        e.clear(INTERRUPT + 40);
+        assert_eq!(next(&e), None);
+    }
+}

@@ -1,0 +1,84 @@
+//! The board's log, decoded by defmt's own decoder.
+
+use defmt_decoder::{DecodeError, StreamDecoder, Table};
+
+use super::image::ImageError;
+
+/// A line of the log.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Line {
+    /// Level, in lower case; empty for plain output.
+    pub level: String,
+    /// The message.
+    pub text: String,
+    /// The message in parts: text and values in turn.
+    parts: Vec<String>,
+}
+
+impl Line {
+    /// Numbers among the values, in their order.
+    #[must_use]
+    pub fn numbers(&self) -> Vec<f64> {
+        self.parts.iter().filter_map(|part| part.trim().parse().ok()).collect()
+    }
+
+    /// What stands behind `mark` in the message.
+    #[must_use]
+    pub fn behind(&self, mark: &str) -> Option<&str> {
+        self.text.split_once(mark).map(|(_, rest)| rest)
+    }
+}
+
+/// What is needed to read an image's log.
+pub struct Strings(Table);
+
+impl Strings {
+    /// Reads the strings that the image has interned.
+    ///
+    /// # Errors
+    /// [`ImageError::Form`] if it has none, or of another version.
+    pub fn of(elf: &[u8]) -> Result<Self, ImageError> {
+        let table = Table::parse(elf).map_err(|error| ImageError::Form(format!("{error:#}")))?;
+        table.map(Self).ok_or_else(|| ImageError::Form("it logs nothing".to_owned()))
+    }
+
+    /// A reader at the beginning of a log.
+    #[must_use]
+    pub fn reader(&self) -> Reader<'_> {
+        Reader { decoder: self.0.new_stream_decoder(), broken: 0 }
+    }
+}
+
+/// Reads a log as it comes.
+pub struct Reader<'a> {
+    decoder: Box<dyn StreamDecoder + Send + Sync + 'a>,
+    broken: u64,
+}
+
+impl Reader<'_> {
+    /// Frames that could not be read: a reset cuts the last one off.
+    #[must_use]
+    pub const fn broken(&self) -> u64 {
+        self.broken
+    }
+
+    /// The lines that are complete with these bytes.
+    pub fn read(&mut self, bytes: &[u8]) -> Vec<Line> {
+        let mut lines = Vec::new();
+        if bytes.is_empty() {
+            return lines;
+        }
+        self.decoder.received(bytes);
+        loop {
+            match self.decoder.decode() {
+                Ok(frame) => lines.push(Line {
+                    level: frame.level().map_or("", |level| level.as_str()).to_owned(),
+                    text: frame.display_message().to_string(),
+                    parts: frame.display_fragments().collect(),
+                }),
+                Err(DecodeError::UnexpectedEof) => return lines,
+                Err(DecodeError::Malformed) => self.broken += 1,
+            }
+        }
+    }
+}

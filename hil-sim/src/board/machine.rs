@@ -1,0 +1,506 @@
+//! The board under way: core and chip in lockstep, exceptions taken and returned from,
+//! sleep passed over to the next event.
+
+mod frame;
+mod profile;
+mod tasks;
+
+use std::path::Path;
+
+use super::chip::Chip;
+use super::core::unicorn::{Counted, UnicornCore};
+use super::core::{Access, Bus, Core, CoreError, Mark, Register, Stop, passes};
+use super::elf::{FLASH, Function, Loaded, RAM, named};
+use super::exceptions::number::{HARD_FAULT, SV_CALL};
+use super::image::ImageError;
+use super::peripherals::rcc::Cause as Restart;
+use super::peripherals::system::Cause;
+
+pub use profile::{Poll, Profile, Share, THREAD};
+
+use tasks::Tasks;
+
+/// What RAM holds when power comes up.
+pub const BLANK: u8 = 0xA5;
+/// Cycles of an exception's entry and return, and of going from one to the next.
+const ENTRY: u64 = 12;
+const EXIT: u64 = 10;
+const CHAIN: u64 = 6;
+
+/// Why the core does not execute.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Asleep {
+    /// Until an event.
+    Event,
+    /// Until an interrupt.
+    Interrupt,
+    /// For good: it has locked up.
+    Locked,
+}
+
+/// A board that runs an image.
+pub struct Machine {
+    core: UnicornCore<Chip>,
+    pc: u32,
+    asleep: Option<Asleep>,
+    profile: Profile,
+    tasks: Tasks,
+    marks: Vec<Mark>,
+    functions: Vec<Function>,
+    restarts: Vec<(u64, Restart)>,
+    /// Symbols of the image.
+    loaded: Loaded,
+}
+
+impl Machine {
+    /// A board with the image at `path` in its flash, before its first instruction.
+    ///
+    /// # Errors
+    /// [`ImageError`] if it is no image of the board.
+    pub fn open(path: &Path) -> Result<Self, ImageError> {
+        let bytes = std::fs::read(path)
+            .map_err(|source| ImageError::Read { path: path.to_owned(), source })?;
+        Self::new(&bytes)
+    }
+
+    /// The same with the image in `elf`.
+    ///
+    /// # Errors
+    /// As [`Machine::open`].
+    pub fn new(elf: &[u8]) -> Result<Self, ImageError> {
+        let loaded = Loaded::of(elf)?;
+        let counted = Counted { base: FLASH.base, bytes: &loaded.flash, code: &loaded.code };
+        let chip = Chip::new(FLASH.base);
+        let mut core = UnicornCore::with_bus(&[FLASH, RAM], &counted, chip)?;
+        core.write(RAM.base, &vec![BLANK; RAM.size as usize])?;
+        let mut machine = Self {
+            core,
+            pc: 0,
+            asleep: None,
+            profile: Profile::default(),
+            tasks: Tasks::of(&loaded),
+            marks: Vec::new(),
+            functions: loaded.functions.clone(),
+            restarts: Vec::new(),
+            loaded,
+        };
+        for address in machine.tasks.marks() {
+            machine.core.mark(address)?;
+        }
+        machine.start()?;
+        Ok(machine)
+    }
+
+    /// Cycles since the start.
+    #[must_use]
+    pub fn now(&self) -> u64 {
+        self.core.meter().cycles
+    }
+
+    /// The chip.
+    #[must_use]
+    pub fn chip(&self) -> &Chip {
+        self.core.bus()
+    }
+
+    /// The chip, to work its pins.
+    pub fn chip_mut(&mut self) -> &mut Chip {
+        self.core.bus_mut()
+    }
+
+    /// What the core has spent its time on.
+    #[must_use]
+    pub const fn profile(&self) -> &Profile {
+        &self.profile
+    }
+
+    /// The same, to take what has gathered.
+    pub fn profile_mut(&mut self) -> &mut Profile {
+        &mut self.profile
+    }
+
+    /// Names of the tasks, by their numbers in the profile.
+    #[must_use]
+    pub fn tasks(&self) -> Vec<&str> {
+        self.tasks.names().collect()
+    }
+
+    /// Restarts so far: when, and why.
+    #[must_use]
+    pub fn restarts(&self) -> &[(u64, Restart)] {
+        &self.restarts
+    }
+
+    /// The image.
+    #[must_use]
+    pub const fn image(&self) -> &Loaded {
+        &self.loaded
+    }
+
+    /// Name of the function that the core is in.
+    #[must_use]
+    pub fn place(&self) -> &str {
+        named(&self.functions, self.pc)
+    }
+
+    /// Whether the core has locked up.
+    #[must_use]
+    pub fn is_locked_up(&self) -> bool {
+        self.asleep == Some(Asleep::Locked)
+    }
+
+    /// Reads memory, as a debug probe does.
+    ///
+    /// # Errors
+    /// [`CoreError::Engine`] if nothing lies there.
+    pub fn peek(&self, address: u32, into: &mut [u8]) -> Result<(), CoreError> {
+        self.core.read(address, into)
+    }
+
+    /// A word of memory.
+    ///
+    /// # Errors
+    /// [`CoreError::Engine`] if nothing lies there.
+    pub fn word(&self, address: u32) -> Result<u32, CoreError> {
+        let mut bytes = [0; 4];
+        self.core.read(address, &mut bytes)?;
+        Ok(u32::from_le_bytes(bytes))
+    }
+
+    /// Writes memory, as a debug probe does.
+    ///
+    /// # Errors
+    /// [`CoreError::Engine`] if nothing lies there.
+    pub fn poke(&mut self, address: u32, bytes: &[u8]) -> Result<(), CoreError> {
+        self.core.write(address, bytes)
+    }
+
+    /// Writes a word to a peripheral's register, as a debug probe does.
+    pub fn poke_register(&mut self, address: u32, value: u32) {
+        let access = Access { address, size: 4, pc: self.pc, now: self.now() };
+        self.chip_mut().write(access, value);
+    }
+
+    /// Reads a word from a peripheral's register, with what reading it does.
+    pub fn peek_register(&mut self, address: u32) -> u32 {
+        let access = Access { address, size: 4, pc: self.pc, now: self.now() };
+        self.chip_mut().read(access)
+    }
+
+    /// A register of the core.
+    ///
+    /// # Errors
+    /// [`CoreError::Engine`] if the engine does not tell.
+    pub fn register(&self, register: Register) -> Result<u32, CoreError> {
+        self.core.register(register)
+    }
+
+    /// Power lost and back, or another restart from outside.
+    ///
+    /// # Errors
+    /// [`CoreError::Engine`] if the engine fails.
+    pub fn restart(&mut self, cause: Restart) -> Result<(), CoreError> {
+        let now = self.now();
+        self.restarts.push((now, cause));
+        self.chip_mut().reset(cause, FLASH.base, now);
+        if cause == Restart::Power {
+            self.core.write(RAM.base, &vec![BLANK; RAM.size as usize])?;
+        }
+        self.start()
+    }
+
+    /// Puts the core to its state after a reset.
+    fn start(&mut self) -> Result<(), CoreError> {
+        // Thread mode on the main stack, no mask, floating point without a context.
+        self.core.set_register(Register::Xpsr, 1 << 24)?;
+        for register in
+            [Register::Control, Register::Primask, Register::Basepri, Register::Faultmask]
+        {
+            self.core.set_register(register, 0)?;
+        }
+        self.core.set_register(Register::Fpscr, 0)?;
+        self.core.set_register(Register::Lr, u32::MAX)?;
+        let stack = self.word(FLASH.base)?;
+        self.core.set_register(Register::Sp, stack)?;
+        self.pc = self.word(FLASH.base + 4)? & !1;
+        self.asleep = None;
+        self.profile.restart(self.core.meter().cycles);
+        Ok(())
+    }
+
+    /// Runs until this cycle, or the first block behind it. Returns early at a
+    /// breakpoint instruction, with its address.
+    ///
+    /// # Errors
+    /// [`CoreError`] if the engine fails. What a processor faults on is the program's
+    /// to handle.
+    pub fn run_until(&mut self, cycle: u64) -> Result<Option<u32>, CoreError> {
+        while self.now() < cycle {
+            self.look_after()?;
+            if self.asleep.is_some() {
+                self.sleep(cycle);
+                continue;
+            }
+            if let Some(number) = self.takeable()? {
+                self.enter(number, self.pc, false)?;
+                continue;
+            }
+            let stop = self.core.run(self.pc, cycle - self.now())?;
+            self.note_tasks();
+            match stop {
+                Stop::Spent(at) | Stop::Urgent(at) => self.pc = at,
+                Stop::Breakpoint(at) => {
+                    self.pc = at;
+                    return Ok(Some(at));
+                }
+                Stop::Call(at) => {
+                    self.pc = at;
+                    let now = self.now();
+                    self.chip_mut().system.exceptions.pend(SV_CALL, now);
+                    if self.takeable()? != Some(SV_CALL) {
+                        // Masked or no more urgent than what runs: not to be waited for.
+                        self.chip_mut().system.exceptions.clear(SV_CALL);
+                        self.fault(Cause::Program(super::core::Fault::Undefined), at)?;
+                    }
+                }
+                Stop::Return(value) => self.leave(value)?,
+                Stop::Event(at) => {
+                    self.pc = at;
+                    let exceptions = &mut self.chip_mut().system.exceptions;
+                    if !std::mem::take(&mut exceptions.event) {
+                        self.fall_asleep(Asleep::Event);
+                    }
+                }
+                Stop::Wait(at) => {
+                    self.pc = at;
+                    self.fall_asleep(Asleep::Interrupt);
+                }
+                Stop::Fault { at, fault } => self.fault(Cause::Program(fault), at)?,
+            }
+        }
+        Ok(None)
+    }
+
+    /// Runs until this cycle whatever the program does at breakpoints.
+    ///
+    /// # Errors
+    /// As [`Machine::run_until`].
+    pub fn run_on(&mut self, cycle: u64) -> Result<(), CoreError> {
+        while self.run_until(cycle)?.is_some() {
+            // Without a debugger a breakpoint is a fault.
+            self.fault(Cause::Program(super::core::Fault::Undefined), self.pc)?;
+        }
+        Ok(())
+    }
+
+    /// Books the tasks that have begun and ended.
+    fn note_tasks(&mut self) {
+        self.core.take_marks(&mut self.marks);
+        for mark in self.marks.drain(..) {
+            match self.tasks.begins(mark.address, mark.r0) {
+                Some(task) => self.profile.begin(task, mark.cycles),
+                None => self.profile.end(mark.cycles),
+            }
+        }
+    }
+
+    /// Runs up to this address, in any place of the code, or until the cycle. False if
+    /// the program did not come there.
+    ///
+    /// # Errors
+    /// As [`Machine::run_until`].
+    pub fn run_to(&mut self, address: u32, cycle: u64) -> Result<bool, CoreError> {
+        while self.now() < cycle {
+            self.look_after()?;
+            if let Some(number) = self.takeable()? {
+                self.enter(number, self.pc, false)?;
+                continue;
+            }
+            match self.core.run_to(self.pc, cycle - self.now(), address)? {
+                Stop::Spent(at) | Stop::Urgent(at) => self.pc = at & !1,
+                Stop::Return(value) => self.leave(value)?,
+                Stop::Breakpoint(at) => {
+                    self.pc = at;
+                    return Ok(false);
+                }
+                _ => return Ok(false),
+            }
+            if self.pc == address {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Goes on behind the breakpoint instruction that the core stands at.
+    pub fn step_over_breakpoint(&mut self) {
+        self.pc += 2;
+    }
+
+    /// Everything of the chip that is due.
+    fn look_after(&mut self) -> Result<(), CoreError> {
+        let now = self.now();
+        if self.chip().deadline() > now {
+            return Ok(());
+        }
+        self.chip_mut().advance(now);
+        while let Some(due) = self.chip().next_move() {
+            let found = self.carry(due)?;
+            self.chip_mut().moved(due.channel, found, now);
+        }
+        if let Some(cause) = self.chip_mut().take_reset() {
+            self.restart(cause)?;
+        }
+        Ok(())
+    }
+
+    /// Carries a word for DMA. False if nothing lies at an address.
+    fn carry(&mut self, due: super::peripherals::dma::Move) -> Result<bool, CoreError> {
+        let now = self.now();
+        let (memory, bytes) = due.memory;
+        let (address, size) = due.peripheral;
+        let access = Access { address, size, pc: 0, now };
+        let mut word = [0; 4];
+        if due.from_memory {
+            let found = self.core.read(memory, &mut word[..bytes as usize]).is_ok();
+            if found {
+                self.chip_mut().write(access, u32::from_le_bytes(word));
+            }
+            return Ok(found);
+        }
+        word = self.chip_mut().read(access).to_le_bytes();
+        Ok(self.core.write(memory, &word[..bytes as usize]).is_ok())
+    }
+
+    fn fall_asleep(&mut self, how: Asleep) {
+        self.asleep = Some(how);
+        let now = self.now();
+        self.profile.sleep(now);
+    }
+
+    /// Passes time up to the next event, `cycle` at most, and wakes if something is
+    /// there to wake for.
+    fn sleep(&mut self, cycle: u64) {
+        let exceptions = &mut self.core.bus_mut().system.exceptions;
+        let wakes = match self.asleep {
+            // What would be taken if the interrupt mask were open wakes the core.
+            Some(Asleep::Event) => {
+                std::mem::take(&mut exceptions.event) || exceptions.urgent().is_some()
+            }
+            Some(Asleep::Interrupt) => exceptions.urgent().is_some(),
+            Some(Asleep::Locked) => false,
+            None => true,
+        };
+        let now = self.now();
+        if wakes {
+            self.asleep = None;
+            self.profile.wake(now);
+            return;
+        }
+        let next = self.chip().deadline().clamp(now, cycle);
+        self.core.pass(next - now);
+    }
+
+    /// The exception to be taken now.
+    fn takeable(&self) -> Result<Option<u8>, CoreError> {
+        let Some((number, priority)) = self.chip().system.exceptions.urgent() else {
+            return Ok(None);
+        };
+        let primask = self.core.register(Register::Primask)?;
+        let basepri = self.core.register(Register::Basepri)?;
+        let faultmask = self.core.register(Register::Faultmask)?;
+        Ok(passes(priority, primask, basepri, faultmask).then_some(number))
+    }
+
+    /// Takes an exception; the program goes on at `back` afterwards. `chained`: straight
+    /// from another one, whose frame stands already.
+    fn enter(&mut self, number: u8, back: u32, chained: bool) -> Result<(), CoreError> {
+        let now = self.now();
+        if !chained {
+            if !frame::push(&mut self.core, back)? {
+                return self.stacking_failed(number, back);
+            }
+            let depth = self.chip().system.exceptions.depth();
+            frame::go_to_handler(&mut self.core, number, depth > 0)?;
+        } else {
+            frame::change_handler(&mut self.core, number)?;
+        }
+        self.core.pass(if chained { CHAIN } else { ENTRY });
+        let since = self.chip_mut().system.exceptions.enter(number);
+        self.profile.enter(number, since, now, self.core.meter().cycles);
+        let vector = self.chip().system.control.vector(number);
+        self.pc = self.word(vector)? & !1;
+        Ok(())
+    }
+
+    /// Returns from the exception that runs.
+    fn leave(&mut self, value: u32) -> Result<(), CoreError> {
+        let now = self.now();
+        let left = self.chip_mut().system.exceptions.leave(now);
+        self.profile.leave(now);
+        if left == HARD_FAULT {
+            self.core.set_register(Register::Faultmask, 0)?;
+        }
+        if let Some(next) = self.takeable()? {
+            // The frame stays where it is.
+            frame::keep_return(&mut self.core, value)?;
+            return self.enter(next, 0, true);
+        }
+        self.core.pass(EXIT);
+        let depth = self.chip().system.exceptions.depth();
+        match frame::pop(&mut self.core, value)? {
+            Some(pc) => self.pc = pc,
+            None => return self.fault(Cause::Unstacking, value),
+        }
+        if depth == 0 && self.chip().system.control.sleeps_on_exit() {
+            self.fall_asleep(Asleep::Interrupt);
+        }
+        Ok(())
+    }
+
+    /// The program did at `at` what a processor faults on.
+    fn fault(&mut self, cause: Cause, at: u32) -> Result<(), CoreError> {
+        let masked = self.core.register(Register::Primask)? & 1 != 0;
+        let system = &mut self.chip_mut().system;
+        let exceptions = system.exceptions.clone();
+        match system.control.fault(cause, &exceptions, masked) {
+            Some(number) => {
+                let now = self.now();
+                self.chip_mut().system.exceptions.pend(number, now);
+                self.enter(number, at, false)
+            }
+            None => {
+                self.pc = at;
+                self.lock_up();
+                Ok(())
+            }
+        }
+    }
+
+    /// There is no memory for the frame of exception `number`.
+    fn stacking_failed(&mut self, number: u8, back: u32) -> Result<(), CoreError> {
+        let exceptions = self.chip().system.exceptions.clone();
+        let fault = self.chip_mut().system.control.fault(Cause::Stacking, &exceptions, true);
+        if number == HARD_FAULT || fault.is_none() {
+            self.pc = back;
+            self.lock_up();
+            return Ok(());
+        }
+        // The hard fault is taken with what there is of a stack: it does not return.
+        let depth = self.chip().system.exceptions.depth();
+        let now = self.now();
+        frame::go_to_handler(&mut self.core, HARD_FAULT, depth > 0)?;
+        self.core.pass(ENTRY);
+        self.chip_mut().system.exceptions.enter(HARD_FAULT);
+        self.profile.enter(HARD_FAULT, now, now, now + ENTRY);
+        let vector = self.chip().system.control.vector(HARD_FAULT);
+        self.pc = self.word(vector)? & !1;
+        Ok(())
+    }
+
+    fn lock_up(&mut self) {
+        let now = self.now();
+        self.chip_mut().lock_up(now);
+        self.fall_asleep(Asleep::Locked);
+    }
+}

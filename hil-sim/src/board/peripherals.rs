@@ -1,0 +1,66 @@
+//! The peripherals that the firmware uses, one a file, from the register descriptions
+//! of the reference manual (ST, RM0440).
+//!
+//! A peripheral answers accesses to its registers and says by itself when something of
+//! its own is due. What leads from one to another (interrupt lines, DMA requests, pins)
+//! is [`super::chip`]'s.
+
+pub mod adc;
+pub mod dbgmcu;
+pub mod dma;
+pub mod encoder;
+pub mod exti;
+pub mod flash;
+pub mod gpio;
+pub mod iwdg;
+pub mod pwm;
+pub mod pwr;
+pub mod rcc;
+pub mod registers;
+pub mod spi;
+pub mod syscfg;
+pub mod system;
+pub mod time_base;
+
+/// The core's clock, Hz.
+pub const HZ: u64 = 170_000_000;
+
+/// A write to a register: the word with the bytes in place, and which of them count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Write {
+    /// The word.
+    pub value: u32,
+    /// Bits that were written.
+    pub mask: u32,
+}
+
+impl Write {
+    /// The register afterwards.
+    #[must_use]
+    pub const fn onto(self, old: u32) -> u32 {
+        old & !self.mask | self.value & self.mask
+    }
+
+    /// The bits written as 1, for registers in which the others do nothing.
+    #[must_use]
+    pub const fn ones(self) -> u32 {
+        self.value & self.mask
+    }
+}
+
+/// A block of registers.
+pub trait Peripheral {
+    /// Reads the word at this offset; `None` if no model has it.
+    fn read(&mut self, offset: u32, now: u64) -> Option<u32>;
+
+    /// Writes to the word at this offset; `None` if no model has it.
+    fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()>;
+
+    /// Cycle at which something is due by itself.
+    fn deadline(&self) -> u64 {
+        u64::MAX
+    }
+
+    /// Does what is due.
+    fn advance(&mut self, _now: u64) {}
+}

@@ -1,0 +1,340 @@
+//! The pair of analogue converters ADC1 and ADC2 with their common registers.
+//!
+//! Modelled: regulator, calibration, software start, single regular conversions with
+//! sampling time and oversampling, requests to DMA. The code is taken from the pin when
+//! the conversion is done.
+
+use super::registers::{Kept, Registers};
+use super::{Peripheral, Write};
+
+const ISR: u32 = 0x00;
+const CR: u32 = 0x08;
+const CFGR: u32 = 0x0C;
+const CFGR2: u32 = 0x10;
+const SMPR1: u32 = 0x14;
+const SQR1: u32 = 0x30;
+const DR: u32 = 0x40;
+const COMMON: u32 = 0x300;
+const CCR: u32 = 0x308;
+
+const ALL: u32 = u32::MAX;
+
+const ENABLE: u32 = 1;
+const DISABLE: u32 = 1 << 1;
+const START: u32 = 1 << 2;
+const STOP: u32 = 1 << 4;
+const REGULATOR: u32 = 1 << 28;
+const DEEP: u32 = 1 << 29;
+const CALIBRATE: u32 = 1 << 31;
+const READY: u32 = 1;
+const END: u32 = 1 << 2;
+const END_OF_SEQUENCE: u32 = 1 << 3;
+const OVERRUN: u32 = 1 << 4;
+/// Converter clocks that a calibration takes.
+const CALIBRATION: u64 = 116;
+
+/// IER, CFGR, CFGR2, sampling times, watchdogs, sequence, DIFSEL, CALFACT.
+const REGISTERS: [Kept; 16] = [
+    Kept { offset: 0x04, reset: 0, mask: 0x7FF },
+    Kept { offset: CFGR, reset: 0x8000_0000, mask: ALL },
+    Kept { offset: CFGR2, reset: 0, mask: 0x0E0F_07FF },
+    Kept { offset: SMPR1, reset: 0, mask: 0xBFFF_FFFF },
+    Kept { offset: SMPR1 + 4, reset: 0, mask: 0x07FF_FFFF },
+    Kept { offset: 0x20, reset: 0x0FFF_0000, mask: 0x0FFF_7FFF },
+    Kept { offset: 0x24, reset: 0x00FF_0000, mask: 0x00FF_00FF },
+    Kept { offset: 0x28, reset: 0x00FF_0000, mask: 0x00FF_00FF },
+    Kept { offset: SQR1, reset: 0, mask: 0x1F7D_F7CF },
+    Kept { offset: SQR1 + 4, reset: 0, mask: 0x1F7D_F7DF },
+    Kept { offset: SQR1 + 8, reset: 0, mask: 0x1F7D_F7DF },
+    Kept { offset: SQR1 + 12, reset: 0, mask: 0x7DF },
+    Kept { offset: 0xB0, reset: 0, mask: 0x0007_FFFF },
+    Kept { offset: 0xB4, reset: 0, mask: 0x007F_007F },
+    Kept { offset: 0xA0, reset: 0, mask: 0 },
+    Kept { offset: 0xA4, reset: 0, mask: 0 },
+];
+
+/// One converter.
+#[derive(Clone, Debug)]
+struct Converter {
+    registers: Registers,
+    control: u32,
+    flags: u32,
+    data: u32,
+    /// Cycle at which the calibration or the conversion under way is done.
+    done: u64,
+    wants_dma: bool,
+}
+
+impl Converter {
+    fn new() -> Self {
+        Self {
+            registers: Registers::new(&REGISTERS),
+            control: DEEP,
+            flags: 0,
+            data: 0,
+            done: u64::MAX,
+            wants_dma: false,
+        }
+    }
+
+    fn channel(&self) -> u32 {
+        self.registers.get(SQR1) >> 6 & 0x1F
+    }
+
+    /// Conversions that make one code.
+    fn ratio(&self) -> u64 {
+        let setting = self.registers.get(CFGR2);
+        if setting & 1 == 0 { 1 } else { 2 << (setting >> 2 & 7) }
+    }
+
+    /// Half clocks of the converter that one conversion into 12 bits takes: sampling and
+    /// 12.5 clocks.
+    fn half_clocks(&self) -> u64 {
+        const SAMPLING: [u64; 8] = [5, 13, 25, 49, 95, 185, 495, 1281];
+        let channel = self.channel();
+        let word = self.registers.get(SMPR1 + channel / 10 * 4);
+        SAMPLING[(word >> (channel % 10 * 3) & 7) as usize] + 25
+    }
+
+    /// The code of `sixteen`, the voltage at the pin in parts of 2^16 of the reference.
+    ///
+    /// The noise at a real pin is worth more than a step of 12 bits, so that the mean of
+    /// many conversions has more than 12; here one conversion after the other reads
+    /// evenly through the step, and the sum is exact to one part of 2^16.
+    fn code(&self, sixteen: u16) -> u32 {
+        let setting = self.registers.get(CFGR2);
+        let sum = u64::from(sixteen) * self.ratio() / 16;
+        let shift = if setting & 1 == 0 { 0 } else { setting >> 5 & 0xF };
+        (sum >> shift) as u32 & 0xFFFF
+    }
+
+    fn write_control(&mut self, write: Write, clock: u64, now: u64) -> Option<()> {
+        let ones = write.ones();
+        if ones & !(ENABLE | DISABLE | START | STOP | REGULATOR | DEEP | 1 << 30 | CALIBRATE) != 0 {
+            return None;
+        }
+        let level = REGULATOR | DEEP | 1 << 30;
+        self.control = self.control & !level | write.onto(self.control) & level;
+        let ready = self.control & REGULATOR != 0 && self.control & DEEP == 0;
+        let idle = self.control & (START | CALIBRATE) == 0;
+        if ones & CALIBRATE != 0 && ready && self.control & ENABLE == 0 {
+            self.control |= CALIBRATE;
+            self.done = now + CALIBRATION * clock;
+        }
+        if ones & ENABLE != 0 && ready && idle {
+            self.control |= ENABLE;
+            self.flags |= READY;
+        }
+        if ones & DISABLE != 0 && idle {
+            self.control &= !ENABLE;
+            self.flags &= !READY;
+        }
+        if ones & STOP != 0 {
+            self.control &= !START;
+            self.done = u64::MAX;
+        }
+        if ones & START != 0 && self.control & ENABLE != 0 && idle {
+            // A sequence of several, or started by hardware, is not modelled.
+            let (sequence, config) = (self.registers.get(SQR1), self.registers.get(CFGR));
+            if sequence & 0xF != 0 || config & (3 << 10 | 1 << 13 | 3 << 3) != 0 {
+                return None;
+            }
+            self.control |= START;
+            self.done = now + (self.ratio() * self.half_clocks() * clock).div_ceil(2);
+        }
+        Some(())
+    }
+
+    fn read(&mut self, offset: u32) -> Option<u32> {
+        match offset {
+            ISR => Some(self.flags),
+            CR => Some(self.control),
+            DR => {
+                self.flags &= !END;
+                self.wants_dma = false;
+                Some(self.data)
+            }
+            _ => self.registers.read(offset),
+        }
+    }
+
+    /// What was under way is done, with this at each channel.
+    fn finish(&mut self, voltage: u16) {
+        self.done = u64::MAX;
+        if self.control & CALIBRATE != 0 {
+            self.control &= !CALIBRATE;
+            return;
+        }
+        self.control &= !START;
+        if self.flags & END != 0 {
+            self.flags |= OVERRUN;
+            // Without `OVRMOD` the old code is kept.
+            if self.registers.get(CFGR) >> 12 & 1 == 0 {
+                return;
+            }
+        }
+        self.data = self.code(voltage);
+        self.flags |= END | END_OF_SEQUENCE;
+        self.wants_dma = self.registers.get(CFGR) & 1 != 0;
+    }
+}
+
+/// The pair.
+#[derive(Clone, Debug)]
+pub struct Adc {
+    converters: [Converter; 2],
+    common: u32,
+    /// Codes of 16 bits at the inputs: converter, channel.
+    inputs: [[u16; 20]; 2],
+}
+
+impl Default for Adc {
+    fn default() -> Self {
+        Self { converters: [Converter::new(), Converter::new()], common: 0, inputs: [[0; 20]; 2] }
+    }
+}
+
+impl Adc {
+    /// Sets the voltage at a converter's input, in parts of 2^16 of the reference.
+    pub fn set_input(&mut self, converter: usize, channel: usize, sixteen: u16) {
+        self.inputs[converter][channel] = sixteen;
+    }
+
+    /// Whether a converter asks DMA to take its code.
+    #[must_use]
+    pub const fn wants_dma(&self, converter: usize) -> bool {
+        self.converters[converter].wants_dma
+    }
+
+    /// Cycles of the core in a clock of the converters.
+    fn clock(&self) -> u64 {
+        const PRESCALERS: [u64; 12] = [1, 2, 4, 6, 8, 10, 12, 16, 32, 64, 128, 256];
+        match self.common >> 16 & 3 {
+            0 => PRESCALERS.get((self.common >> 18 & 0xF) as usize).copied().unwrap_or(256),
+            mode => 1 << (mode - 1),
+        }
+    }
+}
+
+impl Peripheral for Adc {
+    fn read(&mut self, offset: u32, _: u64) -> Option<u32> {
+        match offset {
+            CCR => Some(self.common),
+            0..COMMON => self.converters.get_mut((offset >> 8) as usize)?.read(offset & 0xFF),
+            _ => None,
+        }
+    }
+
+    fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
+        if offset == CCR {
+            self.common = write.onto(self.common);
+            return Some(());
+        }
+        let clock = self.clock();
+        let converter = self.converters.get_mut((offset >> 8) as usize)?;
+        match offset & 0xFF {
+            ISR => {
+                converter.flags &= !write.ones();
+                Some(())
+            }
+            CR => converter.write_control(write, clock, now),
+            offset => converter.registers.write(offset, write),
+        }
+    }
+
+    fn deadline(&self) -> u64 {
+        self.converters[0].done.min(self.converters[1].done)
+    }
+
+    fn advance(&mut self, now: u64) {
+        for (converter, inputs) in self.converters.iter_mut().zip(&self.inputs) {
+            if converter.done <= now {
+                let channel = converter.channel() as usize;
+                converter.finish(inputs.get(channel).copied().unwrap_or(0));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn write(adc: &mut Adc, offset: u32, value: u32, now: u64) -> Option<()> {
+        adc.write(offset, Write { value, mask: ALL }, now)
+    }
+
+    /// ADC2 on channel 9, 256 conversions of 12.5 + 12.5 clocks at a quarter of the
+    /// core's, DMA on.
+    fn ready() -> Adc {
+        let mut adc = Adc::default();
+        for (offset, value) in [
+            (CCR, 2 << 18),
+            (0x100 + CR, REGULATOR),
+            (0x100 + CR, REGULATOR | ENABLE),
+            (0x100 + CFGR, 1),
+            (0x100 + CFGR2, 0x9D),
+            (0x100 + SMPR1, 2 << 27),
+            (0x100 + SQR1, 9 << 6),
+        ] {
+            write(&mut adc, offset, value, 0).expect("modelled");
+        }
+        adc
+    }
+
+    #[test]
+    fn a_code_is_the_mean_of_its_conversions_and_takes_their_time() {
+        let mut adc = ready();
+        adc.set_input(1, 9, 51_234);
+        write(&mut adc, 0x100 + CR, REGULATOR | START, 1000).expect("modelled");
+        let due = 1000 + 256 * 25 * 4;
+        assert_eq!(adc.deadline(), due);
+        adc.advance(due - 1);
+        assert!(!adc.wants_dma(1));
+        adc.advance(due);
+        assert!(adc.wants_dma(1) && !adc.wants_dma(0));
+        assert_eq!(adc.read(0x100 + DR, due), Some(51_234));
+        assert!(!adc.wants_dma(1));
+    }
+
+    #[test]
+    fn without_oversampling_there_are_twelve_bits() {
+        let mut adc = ready();
+        write(&mut adc, 0x100 + CFGR2, 0, 0).expect("modelled");
+        adc.set_input(1, 9, 51_234);
+        write(&mut adc, 0x100 + CR, REGULATOR | START, 0).expect("modelled");
+        adc.advance(adc.deadline());
+        assert_eq!(adc.read(0x100 + DR, 0), Some(51_234 / 16));
+    }
+
+    #[test]
+    fn a_code_that_no_one_took_is_kept_and_the_next_is_lost() {
+        let mut adc = ready();
+        for code in [1600, 3200] {
+            adc.set_input(1, 9, code);
+            write(&mut adc, 0x100 + CR, REGULATOR | START, 0).expect("modelled");
+            adc.advance(adc.deadline());
+        }
+        assert_eq!(adc.read(0x100 + ISR, 0).map(|flags| flags & OVERRUN), Some(OVERRUN));
+        assert_eq!(adc.read(0x100 + DR, 0), Some(1600));
+    }
+
+    #[test]
+    fn calibration_wants_the_regulator_and_its_time() {
+        let mut adc = Adc::default();
+        write(&mut adc, CR, CALIBRATE | DEEP, 0).expect("modelled");
+        assert_eq!(adc.read(CR, 0).map(|control| control & CALIBRATE), Some(0));
+        write(&mut adc, CR, REGULATOR, 0).expect("modelled");
+        write(&mut adc, CR, REGULATOR | CALIBRATE, 10).expect("modelled");
+        assert_eq!(adc.deadline(), 10 + CALIBRATION);
+        adc.advance(10 + CALIBRATION);
+        assert_eq!(adc.read(CR, 0), Some(REGULATOR));
+    }
+
+    #[test]
+    fn a_sequence_is_not_modelled() {
+        let mut adc = ready();
+        write(&mut adc, 0x100 + SQR1, 9 << 6 | 1, 0).expect("modelled");
+        assert_eq!(write(&mut adc, 0x100 + CR, REGULATOR | START, 0), None);
+    }
+}

@@ -1,0 +1,95 @@
+//! External interrupts: edges at the pins that the system configuration selects.
+
+use super::registers::{Kept, Registers};
+use super::{Peripheral, Write};
+
+const IMR: u32 = 0x00;
+const RTSR: u32 = 0x08;
+const FTSR: u32 = 0x0C;
+const SWIER: u32 = 0x10;
+const PR: u32 = 0x14;
+
+const ALL: u32 = u32::MAX;
+
+/// Both banks of masks and edges; nothing here drives the lines of the second.
+const REGISTERS: [Kept; 10] = [
+    Kept { offset: IMR, reset: 0x1F84_0000, mask: ALL },
+    Kept { offset: 0x04, reset: 0, mask: ALL },
+    Kept { offset: RTSR, reset: 0, mask: ALL },
+    Kept { offset: FTSR, reset: 0, mask: ALL },
+    Kept { offset: 0x20, reset: 0xFF88, mask: ALL },
+    Kept { offset: 0x24, reset: 0, mask: ALL },
+    Kept { offset: 0x28, reset: 0, mask: ALL },
+    Kept { offset: 0x2C, reset: 0, mask: ALL },
+    Kept { offset: 0x30, reset: 0, mask: 0 },
+    Kept { offset: 0x34, reset: 0, mask: 0 },
+];
+
+/// External interrupts.
+#[derive(Clone, Debug)]
+pub struct Exti {
+    registers: Registers,
+    pending: u32,
+    levels: u32,
+}
+
+impl Exti {
+    /// After reset, with these levels at the lines.
+    #[must_use]
+    pub fn new(levels: u32) -> Self {
+        Self { registers: Registers::new(&REGISTERS), pending: 0, levels }
+    }
+
+    /// Levels of lines 0 to 15 as they stand now.
+    pub fn look(&mut self, levels: u32) {
+        let rising = levels & !self.levels & self.registers.get(RTSR);
+        let falling = !levels & self.levels & self.registers.get(FTSR);
+        self.pending |= rising | falling;
+        self.levels = levels;
+    }
+
+    /// Whether one of these lines asks for an interrupt.
+    #[must_use]
+    pub fn asks(&self, lines: u32) -> bool {
+        self.pending & self.registers.get(IMR) & lines != 0
+    }
+}
+
+impl Peripheral for Exti {
+    fn read(&mut self, offset: u32, _: u64) -> Option<u32> {
+        match offset {
+            PR => Some(self.pending),
+            SWIER => Some(0),
+            _ => self.registers.read(offset),
+        }
+    }
+
+    fn write(&mut self, offset: u32, write: Write, _: u64) -> Option<()> {
+        match offset {
+            PR => self.pending &= !write.ones(),
+            SWIER => self.pending |= write.ones() & self.registers.get(IMR),
+            _ => return self.registers.write(offset, write),
+        }
+        Some(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_edge_asked_for_is_kept_until_it_is_cleared() {
+        let mut exti = Exti::new(0);
+        let bit = 1 << 13;
+        let all = |value| Write { value, mask: ALL };
+        exti.write(RTSR, all(bit), 0).expect("modelled");
+        exti.look(bit);
+        assert!(!exti.asks(bit), "masked");
+        exti.write(IMR, all(bit), 0).expect("modelled");
+        assert!(exti.asks(0xFC00) && !exti.asks(0x3E0));
+        exti.write(PR, all(bit), 0).expect("modelled");
+        exti.look(0);
+        assert!(!exti.asks(bit), "the other edge was not asked for");
+    }
+}

@@ -1,0 +1,110 @@
+//! The system timer.
+
+use super::Write;
+
+const CSR: u32 = 0x10;
+const RVR: u32 = 0x14;
+const CVR: u32 = 0x18;
+const CALIB: u32 = 0x1C;
+
+const ENABLE: u32 = 1;
+const INTERRUPT: u32 = 2;
+const CORE_CLOCK: u32 = 4;
+
+/// A counter of 24 bits that counts down.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SysTick {
+    control: u32,
+    reload: u32,
+    /// Cycle at which it next counts from 1 to 0.
+    zero: u64,
+    /// It has reached 0 since the control register was last read.
+    reached: bool,
+}
+
+impl Default for SysTick {
+    fn default() -> Self {
+        Self { control: 0, reload: 0, zero: u64::MAX, reached: false }
+    }
+}
+
+impl SysTick {
+    /// Cycles of the core in a count.
+    const fn step(&self) -> u64 {
+        if self.control & CORE_CLOCK != 0 { 1 } else { 8 }
+    }
+
+    fn period(&self) -> u64 {
+        (u64::from(self.reload) + 1) * self.step()
+    }
+
+    const fn runs(&self) -> bool {
+        self.control & ENABLE != 0 && self.reload != 0
+    }
+
+    pub(super) fn read(&mut self, offset: u32, now: u64) -> Option<u32> {
+        Some(match offset {
+            CSR => {
+                let reached = std::mem::take(&mut self.reached);
+                self.control | u32::from(reached) << 16
+            }
+            RVR => self.reload,
+            CVR if self.runs() => (self.zero.saturating_sub(now) / self.step()) as u32,
+            CVR => 0,
+            // No reference clock is calibrated.
+            CALIB => 1 << 31 | 1 << 30,
+            _ => return None,
+        })
+    }
+
+    pub(super) fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
+        let ran = self.runs();
+        match offset {
+            CSR => self.control = write.onto(self.control) & 7,
+            RVR => self.reload = write.onto(self.reload) & 0x00FF_FFFF,
+            CVR => self.reached = false,
+            CALIB => {}
+            _ => return None,
+        }
+        if !self.runs() {
+            self.zero = u64::MAX;
+        } else if !ran || offset == CVR {
+            self.zero = now + self.period();
+        }
+        Some(())
+    }
+
+    pub(super) fn deadline(&self) -> u64 {
+        if self.control & INTERRUPT != 0 { self.zero } else { u64::MAX }
+    }
+
+    /// Whether it asks for its exception.
+    pub(super) fn advance(&mut self, now: u64) -> bool {
+        if self.zero > now {
+            return false;
+        }
+        self.reached = true;
+        self.zero += ((now - self.zero) / self.period() + 1) * self.period();
+        self.control & INTERRUPT != 0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_asks_every_period() {
+        let mut tick = SysTick::default();
+        let all = |value| Write { value, mask: u32::MAX };
+        tick.write(RVR, all(999), 0).expect("modelled");
+        tick.write(CSR, all(ENABLE | INTERRUPT | CORE_CLOCK), 100).expect("modelled");
+        assert_eq!(tick.deadline(), 1100);
+        assert_eq!(tick.read(CVR, 600), Some(500));
+        assert!(!tick.advance(1099));
+        assert!(tick.advance(1100));
+        assert_eq!(tick.deadline(), 2100);
+        assert_eq!(tick.read(CSR, 1100).map(|csr| csr >> 16), Some(1));
+        assert_eq!(tick.read(CSR, 1100).map(|csr| csr >> 16), Some(0));
+    }
+}

@@ -1,0 +1,96 @@
+//! Real-time transfer as a debug probe does it: rings in the board's memory, read and
+//! written without the program taking part.
+//!
+//! Source: SEGGER, RTT implementation (wiki, "Real Time Transfer"), layout of the
+//! control block.
+
+use super::core::CoreError;
+use super::image::ImageError;
+use super::machine::Machine;
+
+/// Symbol of the control block.
+const SYMBOL: &str = "_SEGGER_RTT";
+/// Its first bytes once the program has set it up.
+const MARK: &[u8; 16] = b"SEGGER RTT\0\0\0\0\0\0";
+/// Bytes before the channels, and of a channel.
+const HEAD: u32 = 24;
+const CHANNEL: u32 = 24;
+/// Largest ring believed.
+const LARGEST: u32 = 64 * 1024;
+
+/// A probe that knows where the control block is.
+#[derive(Clone, Copy, Debug)]
+pub struct Probe {
+    block: u32,
+}
+
+/// A ring: where it is, bytes, and where the next are written and read.
+struct Ring {
+    at: u32,
+    buffer: u32,
+    size: u32,
+    write: u32,
+    read: u32,
+}
+
+impl Probe {
+    /// Looks the control block up in the image.
+    ///
+    /// # Errors
+    /// [`ImageError::Missing`] if it has none.
+    pub fn of(machine: &Machine) -> Result<Self, ImageError> {
+        Ok(Self { block: machine.image().symbol(SYMBOL)? })
+    }
+
+    /// The ring of a channel, upwards or downwards; none before the program has set it
+    /// up.
+    fn ring(self, machine: &Machine, index: u32, down: bool) -> Result<Option<Ring>, CoreError> {
+        let mut mark = [0; 16];
+        machine.peek(self.block, &mut mark)?;
+        if mark != *MARK {
+            return Ok(None);
+        }
+        let ups = machine.word(self.block + 16)?;
+        let at = self.block + HEAD + CHANNEL * (if down { ups } else { 0 } + index);
+        let word = |offset: u32| machine.word(at + offset);
+        let ring = Ring { at, buffer: word(4)?, size: word(8)?, write: word(12)?, read: word(16)? };
+        let sound = ring.size <= LARGEST && ring.write < ring.size && ring.read < ring.size;
+        Ok(sound.then_some(ring))
+    }
+
+    /// Takes what channel `index` has sent.
+    ///
+    /// # Errors
+    /// [`CoreError`] if the ring does not lie in memory.
+    pub fn up(self, machine: &mut Machine, index: u32) -> Result<Vec<u8>, CoreError> {
+        let Some(ring) = self.ring(machine, index, false)? else { return Ok(Vec::new()) };
+        let mut taken = Vec::new();
+        let mut read = ring.read;
+        while read != ring.write {
+            let end = if ring.write > read { ring.write } else { ring.size };
+            let mut part = vec![0; (end - read) as usize];
+            machine.peek(ring.buffer + read, &mut part)?;
+            taken.extend(part);
+            read = end % ring.size;
+        }
+        if !taken.is_empty() {
+            machine.poke(ring.at + 16, &read.to_le_bytes())?;
+        }
+        Ok(taken)
+    }
+
+    /// Sends a byte down channel `index`; false if there is no room.
+    ///
+    /// # Errors
+    /// As [`Probe::up`].
+    pub fn down(self, machine: &mut Machine, index: u32, byte: u8) -> Result<bool, CoreError> {
+        let Some(ring) = self.ring(machine, index, true)? else { return Ok(false) };
+        let next = (ring.write + 1) % ring.size;
+        if next == ring.read {
+            return Ok(false);
+        }
+        machine.poke(ring.buffer + ring.write, &[byte])?;
+        machine.poke(ring.at + 12, &next.to_le_bytes())?;
+        Ok(true)
+    }
+}

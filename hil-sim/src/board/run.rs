@@ -1,0 +1,123 @@
+//! A whole run on the emulated board: power up, one command, arrival.
+
+mod trace;
+
+use std::time::Instant;
+
+use super::bench::{Bench, BenchError};
+use super::elf::RAM;
+use super::load::{Gathered, Load};
+use super::log::{Line, Strings};
+use super::machine::Machine;
+use crate::firmware::{FirmwareError, Footprint};
+use crate::record::Recording;
+use crate::scenario::{ControllerKind, Direction, Scenario};
+
+use trace::Trace;
+
+/// Longest run, s: as in software.
+const LONGEST_S: f64 = 120.0;
+/// How long the board is watched after it has arrived, ms.
+const AFTER: u32 = 100;
+
+/// A run that cannot be made on the board.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The bench.
+    #[error(transparent)]
+    Bench(#[from] BenchError),
+    /// The image's sections.
+    #[error(transparent)]
+    Image(#[from] FirmwareError),
+    /// The image has its parameters built in.
+    #[error("the firmware is built for the rig `prototype` as it is: {0}")]
+    Rig(String),
+}
+
+/// A run that was made.
+pub struct Ran {
+    /// Summary, ledger, rows, log.
+    pub recording: Recording,
+    /// What it cost.
+    pub load: Load,
+    /// The board as it was left.
+    pub machine: Machine,
+}
+
+/// What the firmware can be asked to do.
+///
+/// # Errors
+/// [`RunError::Rig`] if the scenario wants another rig or controller than the image has
+/// built in.
+pub fn check(scenario: &Scenario) -> Result<(), RunError> {
+    let built = interstage::rig::Rig::prototype();
+    if scenario.rig != built {
+        return Err(RunError::Rig(format!("not for `{}` or changed parameters", scenario.preset)));
+    }
+    if scenario.run.controller != ControllerKind::Scheduled {
+        let name = scenario.run.controller.name();
+        return Err(RunError::Rig(format!("with the controller scheduled, not {name}")));
+    }
+    Ok(())
+}
+
+/// Runs a scenario on the board with the image in `elf`; rows are kept if asked. Each
+/// line of the log is shown to `watch` as it comes.
+///
+/// # Errors
+/// [`RunError`] if the run cannot be made. One that ends in a fault is a result.
+pub fn run(
+    elf: &[u8],
+    scenario: &Scenario,
+    rows: bool,
+    mut watch: impl FnMut(f64, &Line),
+) -> Result<Ran, RunError> {
+    check(scenario)?;
+    let footprint = Footprint::of_elf(elf)?;
+    let strings = Strings::of(elf).map_err(BenchError::from)?;
+    let mut bench = Bench::new(elf, &strings, scenario).map_err(BenchError::from)?;
+    let mut trace = Trace::new(scenario, bench.plant());
+    let mut start = Some(match scenario.run.direction {
+        Direction::Deploy => b's',
+        Direction::Retract => b'r',
+    });
+    let started = Instant::now();
+    let mut after = AFTER;
+    let mut gathered = Gathered::default();
+    while bench.time_s() < LONGEST_S && after > 0 {
+        if trace.is_idle()
+            && let Some(letter) = start
+            && bench.send(letter)?
+        {
+            start = None;
+            gathered.begin(bench.machine_mut());
+        }
+        let before = bench.plant().truth().time_s;
+        let (passed, lines) = bench.step()?;
+        for line in &lines {
+            watch(bench.time_s(), line);
+        }
+        gathered.gather(bench.machine_mut(), trace.mode());
+        trace.look(before, &passed, &lines, bench.plant().truth(), rows);
+        if trace.is_over() {
+            after -= 1;
+        }
+    }
+    let recording = trace.finish(scenario, bench.plant(), started.elapsed().as_secs_f64());
+    let machine = bench.into_machine();
+    let load = gathered.close(&machine, &footprint, stack_used(&machine)?);
+    Ok(Ran { recording, load, machine })
+}
+
+/// Bytes of the stack that were used, deepest since power came up.
+///
+/// # Errors
+/// [`BenchError`] if the image does not say where its stack is.
+pub fn stack_used(machine: &Machine) -> Result<u32, BenchError> {
+    let end = machine.image().symbol("_stack_end")?;
+    let start = machine.image().symbol("_stack_start")?;
+    let mut stack = vec![0; start.saturating_sub(end.max(RAM.base)) as usize];
+    machine.peek(end, &mut stack)?;
+    let untouched = stack.iter().take_while(|byte| **byte == super::machine::BLANK).count();
+    Ok(stack.len() as u32 - untouched as u32)
+}

@@ -1,0 +1,72 @@
+//! `rig deploy --target board`: the firmware itself, on the emulated board.
+
+#[cfg(feature = "board")]
+mod account;
+
+use std::path::Path;
+
+use super::Args;
+use crate::cli::failure::{Failure, Outcome};
+use crate::scenario::Scenario;
+
+/// Without the emulated board: go on with a binary that has it.
+#[cfg(not(feature = "board"))]
+pub(super) fn run(_: &Args, _: &Scenario, _: Option<&Path>) -> Result<Outcome, Failure> {
+    Ok(Outcome::Code(crate::provision::go_on()?))
+}
+
+/// What `--json` prints.
+#[cfg(feature = "board")]
+#[derive(serde::Serialize)]
+struct Printed<'a> {
+    #[serde(flatten)]
+    summary: &'a crate::record::Summary,
+    account: &'a crate::board::load::Load,
+    files: &'a [std::path::PathBuf],
+}
+
+#[cfg(feature = "board")]
+pub(super) fn run(
+    args: &Args,
+    scenario: &Scenario,
+    directory: Option<&Path>,
+) -> Result<Outcome, Failure> {
+    use crate::board::run;
+    use crate::cli::output;
+    use crate::firmware::{self, Profile};
+    use crate::{progress, table};
+
+    run::check(scenario).map_err(Failure::input)?;
+    let elf = firmware::build(Profile::Release)?;
+    let image = std::fs::read(&elf)
+        .map_err(|source| firmware::FirmwareError::Read { path: elf.clone(), source })?;
+    let ran = {
+        let _progress = (!args.log).then(|| progress::spinner(scenario.run.direction.name()));
+        let show = |t_s: f64, line: &crate::board::log::Line| {
+            if args.log {
+                eprintln!("[{t_s:8.3}] {:<5} {}", line.level, line.text);
+            }
+        };
+        run::run(&image, scenario, directory.is_some(), show).map_err(Failure::run)?
+    };
+    let mut files = Vec::new();
+    if let Some(directory) = directory {
+        files = super::write(&ran.recording, directory)?;
+        let log = directory.join("log.txt");
+        let lines = ran.recording.log.iter();
+        let text: String =
+            lines.map(|line| format!("[{:8.3}] {}\n", line.t_s, line.text)).collect();
+        crate::export::write_text(&log, &text)?;
+        files.push(log);
+    }
+    let summary = &ran.recording.summary;
+    for stray in &ran.load.unmodelled {
+        eprintln!("warning: {stray}");
+    }
+    let printed = Printed { summary, account: &ran.load, files: &files };
+    output::result(args.json, &printed, || {
+        table::run(summary, &files) + &account::text(&ran.load)
+    })?;
+    let clean = ran.load.unmodelled.is_empty();
+    Ok(Outcome::of(summary.completed && summary.faults.is_empty() && clean))
+}
