@@ -270,7 +270,8 @@ impl Controller {
             return;
         }
         let slope = self.rise.slope(self.ahead(state, pass, Q16::ZERO));
-        if slope > LEVEL_SLOPE {
+        // Divided only where it limits: the quotient is dear.
+        if slope > LEVEL_SLOPE && targets.speed * slope > self.rise_speed {
             targets.speed = targets.speed.min(crate::numeric::divide(self.rise_speed, slope));
         }
     }
