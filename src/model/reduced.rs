@@ -139,7 +139,7 @@ impl ReducedModel {
             vibration_um: shape.vibration(point.speed, radial, run),
             utilisation: used,
             slip_margin: self.friction - used,
-            at_end: run == shape.least_run() || run == shape.most_run(),
+            at_end: run == shape.least_run() || run == shape.most_run() || shape.is_beyond(force),
         }
     }
 

@@ -91,6 +91,12 @@ impl Shape {
         high(bits << self.unit_shift, self.inverse_unit) << 1
     }
 
+    /// Whether a force exceeds what [`part`](Self::part) can tell.
+    #[inline(always)]
+    pub(super) fn is_beyond(&self, force: Newtons) -> bool {
+        force.to_bits() > self.most_force
+    }
+
     /// What force has the same run on the unscaled tread, Q30; what exceeds the format
     /// lies beyond the model anyway and saturates.
     #[inline(always)]
