@@ -18,6 +18,7 @@ mod modes;
 mod montecarlo;
 mod output;
 mod paper;
+mod params;
 mod parse;
 mod scenario;
 mod size;
@@ -49,6 +50,7 @@ enum Verb {
     Montecarlo(montecarlo::Args),
     Paper(paper::Args),
     Keys(keys::Args),
+    Params(params::Args),
     Stress(stress::Args),
     Size(size::Args),
     Account(account::Args),
@@ -68,6 +70,7 @@ impl Verb {
             Self::Montecarlo(args) => montecarlo::run(args),
             Self::Paper(args) => paper::run(args),
             Self::Keys(args) => keys::run(args),
+            Self::Params(args) => params::run(args),
             Self::Stress(args) => stress::run(args),
             Self::Size(args) => size::run(args),
             Self::Account(args) => account::run(args),

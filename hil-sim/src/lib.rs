@@ -12,6 +12,7 @@ pub mod export;
 pub mod firmware;
 pub mod montecarlo;
 pub mod paper;
+pub mod params;
 pub mod plant;
 pub mod progress;
 pub mod provision;

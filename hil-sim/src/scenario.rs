@@ -142,6 +142,26 @@ impl Scenario {
         Self::resolve_layers(None, vec![(Origin::File(name.into()), table)], sets)
     }
 
+    /// The scenario of a rig that is near this preset's, with the usual spread and noise.
+    #[must_use]
+    pub fn of_rig(preset: &str, rig: Rig) -> Self {
+        Self::from_rig(preset, rig)
+    }
+
+    /// This scenario with overrides, each `key=value`; then every check.
+    ///
+    /// # Errors
+    /// The first thing found wrong.
+    pub fn with(self, sets: &[String]) -> Result<Self, ScenarioError> {
+        let mut merged = merge::Merged::new(&self);
+        for text in sets {
+            merged.set(text)?;
+        }
+        let (scenario, provenance) = merged.finish();
+        validate::check(&scenario, &provenance)?;
+        Ok(scenario)
+    }
+
     /// Every key with its unit, value, what it takes, and its description.
     #[must_use]
     pub fn keys(&self) -> Vec<KeyInfo> {

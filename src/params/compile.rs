@@ -46,24 +46,21 @@ pub fn compile(name: &str, rig: &Rig, room: &mut [u8]) -> Result<usize, CompileE
     let controller = Controller::try_build(rig)?;
     let planner = Planner::try_build(rig)?;
     let name = heapless::String::try_from(name).map_err(|_| CompileError::Name)?;
-    let parameters = hash(rig, room)?;
-    let calibration = hash(&rig.sense, room)?;
-    let header = Header { schema: SCHEMA, name, parameters, calibration };
-    let length = put(&(header, controller, planner, rig), room)?;
+    let calibration = checksum(part(&rig.sense, room)?);
+    let parameters = part(rig, room)?;
+    let rig_length = parameters.len() as u16;
+    let parameters = checksum(parameters);
+    let header = Header { schema: SCHEMA, name, rig_length, parameters, calibration };
+    let length = part(&(header, rig, controller, planner), room)?.len();
     let sum = checksum(&room[..length]).to_le_bytes();
     let check = room.get_mut(length..length + sum.len()).ok_or(CompileError::Room)?;
     check.copy_from_slice(&sum);
     Ok(length + sum.len())
 }
 
-/// CRC-32 of a part of the rig as postcard, written to `room` on the way.
-fn hash(part: &impl Serialize, room: &mut [u8]) -> Result<u32, CompileError> {
-    let length = put(part, room)?;
-    Ok(checksum(&room[..length]))
-}
-
-fn put(value: &impl Serialize, room: &mut [u8]) -> Result<usize, CompileError> {
-    postcard::to_slice(value, room).map(|written| written.len()).map_err(|_| CompileError::Room)
+/// A value as postcard, at the start of `room`.
+fn part<'r>(value: &impl Serialize, room: &'r mut [u8]) -> Result<&'r [u8], CompileError> {
+    postcard::to_slice(value, room).map(|written| &*written).map_err(|_| CompileError::Room)
 }
 
 #[cfg(test)]

@@ -1,9 +1,10 @@
-//! A set of parameters as bytes: what it is, the constants, the rig behind them, a check.
+//! A set of parameters as bytes: what it is, the rig, the constants made of it, a check.
 //!
 //! ```text
-//! header | controller | planner | rig | CRC-32 of all before it, little end first
+//! header | rig | controller | planner | CRC-32 of all before it, little end first
 //! ```
-//! All but the last four bytes is postcard.
+//! All but the last four bytes is postcard. The rig stands first, so that the host can
+//! read it out of a set whose constants are of another schema, and make the set anew.
 
 use core::fmt;
 
@@ -34,6 +35,8 @@ pub struct Header {
     pub schema: u16,
     /// Name of the rig.
     pub name: heapless::String<MAX_NAME>,
+    /// Bytes of the rig.
+    pub rig_length: u16,
     /// CRC-32 of the rig's parameters, postcard.
     pub parameters: u32,
     /// CRC-32 of its sensors' parameters alone: ranges, offsets, scales.
@@ -85,8 +88,9 @@ impl core::error::Error for SetError {}
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ParameterSet<'a> {
     header: Header,
-    /// Behind the header, without the check.
-    body: &'a [u8],
+    rig: &'a [u8],
+    /// Behind the rig, without the check.
+    constants: &'a [u8],
 }
 
 impl<'a> ParameterSet<'a> {
@@ -102,7 +106,8 @@ impl<'a> ParameterSet<'a> {
         }
     }
 
-    /// The same for any layout: of another one, only [`header`](Self::header) is known.
+    /// The same for any layout: of another one, the constants mean nothing here, but
+    /// [`header`](Self::header) and [`rig`](Self::rig) do.
     ///
     /// # Errors
     /// [`SetError`] if the bytes are not a whole set.
@@ -111,8 +116,10 @@ impl<'a> ParameterSet<'a> {
         if checksum(content) != u32::from_le_bytes(*sum) {
             return Err(SetError::Damaged);
         }
-        let (header, body) = take(content)?;
-        Ok(Self { header, body })
+        let (header, body) = take::<Header>(content)?;
+        let parts = body.split_at_checked(header.rig_length.into());
+        let (rig, constants) = parts.ok_or(SetError::Content)?;
+        Ok(Self { header, rig, constants })
     }
 
     /// What the set says of itself.
@@ -121,12 +128,13 @@ impl<'a> ParameterSet<'a> {
         &self.header
     }
 
-    /// The controller, and what is left of the body.
+    /// The controller, and what is left of the constants.
     ///
     /// # Errors
     /// [`SetError::Content`] if the bytes are not one.
+    #[inline(never)]
     pub fn controller(&self) -> Result<(Controller, Rest<'a>), SetError> {
-        take(self.body).map(|(controller, rest)| (controller, Rest(rest)))
+        take(self.constants).map(|(controller, rest)| (controller, Rest(rest)))
     }
 
     /// The rig that the constants were made from, SI.
@@ -134,16 +142,11 @@ impl<'a> ParameterSet<'a> {
     /// # Errors
     /// [`SetError::Content`] if the bytes are not one.
     pub fn rig(&self) -> Result<Rig, SetError> {
-        let (_, Rest(rest)) = self.controller()?;
-        let (_, rest) = take::<Planner>(rest)?;
-        match take(rest)? {
-            (rig, []) => Ok(rig),
-            _ => Err(SetError::Content),
-        }
+        whole(self.rig)
     }
 }
 
-/// The body of a set behind its controller.
+/// The constants of a set behind the controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rest<'a>(&'a [u8]);
 
@@ -152,8 +155,9 @@ impl Rest<'_> {
     ///
     /// # Errors
     /// [`SetError::Content`] if the bytes are not one.
+    #[inline(never)]
     pub fn planner(self) -> Result<Planner, SetError> {
-        take(self.0).map(|(planner, _)| planner)
+        whole(self.0)
     }
 }
 
@@ -165,6 +169,13 @@ pub(crate) fn checksum(bytes: &[u8]) -> u32 {
 
 fn take<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<(T, &'a [u8]), SetError> {
     postcard::take_from_bytes(bytes).map_err(|_| SetError::Content)
+}
+
+fn whole<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, SetError> {
+    match take(bytes)? {
+        (value, []) => Ok(value),
+        _ => Err(SetError::Content),
+    }
 }
 
 #[cfg(test)]
@@ -212,7 +223,9 @@ mod tests {
         let sum = checksum(&bytes[..end]).to_le_bytes();
         bytes[end..].copy_from_slice(&sum);
         assert_eq!(ParameterSet::open(&bytes), Err(SetError::Schema { found: SCHEMA + 1 }));
-        assert_eq!(ParameterSet::open_any(&bytes).unwrap().header().name.as_str(), "a");
+        let old = ParameterSet::open_any(&bytes).unwrap();
+        assert_eq!(old.header().name.as_str(), "a");
+        assert_eq!(old.rig().unwrap(), Rig::prototype());
     }
 
     #[test]

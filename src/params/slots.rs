@@ -218,6 +218,18 @@ impl Draft {
     }
 }
 
+/// A place as it stands with this set in force under this sequence number, for flash
+/// that is written from outside; none if the set is too long.
+#[must_use]
+pub fn place(set: &[u8], sequence: u32) -> Option<[u8; SLOT_BYTES]> {
+    let length = u32::try_from(set.len()).ok()?;
+    let mut bytes = [0xFF; SLOT_BYTES];
+    bytes.get_mut(..WORD_BYTES)?.copy_from_slice(&pair(MAGIC, sequence));
+    bytes.get_mut(WORD_BYTES..PREFIX)?.copy_from_slice(&pair(length, !length));
+    bytes.get_mut(PREFIX..PREFIX + set.len())?.copy_from_slice(set);
+    Some(bytes)
+}
+
 fn pair(low: u32, high: u32) -> [u8; WORD_BYTES] {
     (u64::from(high) << 32 | u64::from(low)).to_le_bytes()
 }

@@ -132,6 +132,27 @@ impl<'a> Bench<'a> {
         Ok(self.probe.down(&mut self.machine, 0, letter)?)
     }
 
+    /// Sends bytes down the binary line; gives how many there was room for.
+    ///
+    /// # Errors
+    /// [`BenchError`] if the engine fails.
+    pub fn line_send(&mut self, bytes: &[u8]) -> Result<usize, BenchError> {
+        for (sent, byte) in bytes.iter().enumerate() {
+            if !self.probe.down(&mut self.machine, 1, *byte)? {
+                return Ok(sent);
+            }
+        }
+        Ok(bytes.len())
+    }
+
+    /// What the board has sent up its binary line.
+    ///
+    /// # Errors
+    /// [`BenchError`] if the engine fails.
+    pub fn line_take(&mut self) -> Result<Vec<u8>, BenchError> {
+        Ok(self.probe.up(&mut self.machine, 2)?)
+    }
+
     /// The board.
     #[must_use]
     pub const fn machine(&self) -> &Machine {

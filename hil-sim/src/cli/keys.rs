@@ -57,7 +57,7 @@ fn key(info: &KeyInfo) -> Key<'_> {
 }
 
 /// A TOML value as JSON.
-fn value(text: &str) -> Value {
+pub(super) fn value(text: &str) -> Value {
     let table: Result<Value, _> = toml::from_str(&format!("value = {text}"));
     match table {
         Ok(Value::Object(mut fields)) => fields.remove("value").unwrap_or_default(),

@@ -117,6 +117,15 @@ fn sets_take_turns() {
 }
 
 #[test]
+fn a_place_written_from_outside_is_the_same() {
+    let mut flash = Flash::blank();
+    let set = set("mine");
+    block_on(save(&mut flash, &set)).unwrap();
+    assert_eq!(place(&set, 1).unwrap(), *flash.bytes(Slot::A));
+    assert_eq!(place(&[0; MAX_SET + 1], 1), None);
+}
+
+#[test]
 fn the_sequence_may_wrap() {
     let mut flash = Flash::blank();
     block_on(save(&mut flash, &set("old"))).unwrap();

@@ -1,0 +1,276 @@
+//! `rig params`: the parameters that a board, or a file, holds.
+
+#[cfg(feature = "board")]
+mod board;
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use serde_json::{Map, Value};
+
+use super::failure::{Failure, Outcome};
+use super::output;
+use crate::export::write_text;
+use crate::params::{Held, SetFile, Store, StoreError, set_of};
+use crate::scenario::{KeyInfo, PRESETS, Scenario};
+use crate::table::plain;
+
+/// Sections of a scenario that a board does not hold.
+const ELSEWHERE: [&str; 4] = ["preset", "spread", "noise", "run"];
+
+/// Reads and changes the parameters that a board, or a file, holds.
+///
+/// A change is checked as a whole before it is sent, sent beside what is in force, and
+/// takes force at once or not at all; a board runs on it from its next start.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    #[command(subcommand)]
+    action: Action,
+
+    /// The place: a file with one set of parameters.
+    #[arg(long, global = true, value_name = "FILE", conflicts_with_all = ["target", "flash"])]
+    file: Option<PathBuf>,
+
+    /// The place: board, the firmware on the emulated board, over its binary line.
+    #[arg(long, global = true, value_name = "TARGET", value_parser = ["board"])]
+    target: Option<String>,
+
+    /// File that keeps the emulated board's flash from one time to the next.
+    #[arg(long, global = true, value_name = "FILE", default_value = "out/board.flash")]
+    flash: PathBuf,
+
+    /// Prints the result as one JSON object.
+    #[arg(long, global = true)]
+    json: bool,
+}
+
+#[derive(Debug, clap::Subcommand)]
+enum Action {
+    /// Shows parameters: these, or all.
+    Get {
+        /// Keys such as tread.tau_s; `rig keys` lists them.
+        keys: Vec<String>,
+    },
+    /// Changes parameters and puts them in force.
+    Set {
+        /// Keys and their values.
+        #[arg(required = true, value_name = "KEY=VALUE")]
+        sets: Vec<String>,
+        /// Gives the set another name.
+        #[arg(long)]
+        name: Option<String>,
+    },
+    /// Writes the parameters to a scenario file, TOML.
+    Save {
+        /// The file.
+        to: PathBuf,
+    },
+    /// Puts the defaults in force, or the parameters of a scenario file.
+    Restore {
+        /// The file.
+        from: Option<PathBuf>,
+    },
+    /// Shows what differs from the defaults, or from a scenario file.
+    Diff {
+        /// The file.
+        from: Option<PathBuf>,
+    },
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Printed {
+    name: String,
+    origin: String,
+    schema: u16,
+    hash: String,
+    changed: bool,
+    parameters: Map<String, Value>,
+    /// With `diff` and `set`: what it was compared with.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    before: Option<Map<String, Value>>,
+}
+
+pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
+    match (&args.file, args.target.as_deref()) {
+        (Some(file), _) => act(args, &mut SetFile::new(file)),
+        (None, Some(_)) => on_board(args),
+        (None, None) => Err(Failure::input("where? expected --file FILE or --target board")),
+    }
+}
+
+#[cfg(not(feature = "board"))]
+fn on_board(_: &Args) -> Result<Outcome, Failure> {
+    Ok(Outcome::Code(crate::provision::go_on()?))
+}
+
+#[cfg(feature = "board")]
+fn on_board(args: &Args) -> Result<Outcome, Failure> {
+    board::with(&args.flash, |store| act(args, store))
+}
+
+fn act(args: &Args, store: &mut impl Store) -> Result<Outcome, Failure> {
+    let held = store.held()?;
+    let scenario = scenario_of(&held);
+    match &args.action {
+        Action::Get { keys } => {
+            let rows = chosen(&scenario, keys)?;
+            show(args, &held, false, rows, None)
+        }
+        Action::Set { sets, name } => {
+            let new = scenario.clone().with(sets)?;
+            let name = name.as_deref().unwrap_or(&held.name);
+            if new.run != scenario.run
+                || new.spread != scenario.spread
+                || new.noise != scenario.noise
+                || new.preset != scenario.preset
+            {
+                return Err(not_here(sets));
+            }
+            replace(args, store, &scenario, &new, name)
+        }
+        Action::Save { to } => {
+            write_text(to, &scenario.to_toml())?;
+            show(args, &held, false, Vec::new(), None)
+        }
+        Action::Restore { from: Some(path) } => {
+            let new = Scenario::resolve(None, Some(path), &[])?;
+            replace(args, store, &scenario, &new, &stem(path))
+        }
+        Action::Restore { from: None } => {
+            store.restore()?;
+            let now = store.held()?;
+            let (before, after) = differing(&scenario, &scenario_of(&now));
+            show(args, &now, true, after, Some(before))
+        }
+        Action::Diff { from } => {
+            let other = match from {
+                Some(path) => Scenario::resolve(None, Some(path), &[])?,
+                None => Scenario::named(&scenario.preset)?,
+            };
+            let (before, after) = differing(&other, &scenario);
+            show(args, &held, false, after, Some(before))
+        }
+    }
+}
+
+/// Puts the rig of `new` in force and shows what has changed.
+fn replace(
+    args: &Args,
+    store: &mut impl Store,
+    old: &Scenario,
+    new: &Scenario,
+    name: &str,
+) -> Result<Outcome, Failure> {
+    let set = set_of(name, &new.rig).map_err(Failure::input)?;
+    store.put(&set)?;
+    let now = store.held()?;
+    if now.rig != new.rig {
+        return Err(Failure::run("what is in force is not what was put there"));
+    }
+    let (before, after) = differing(old, new);
+    show(args, &now, true, after, Some(before))
+}
+
+/// The scenario of a rig that a place holds; a name that is no preset's is compared with
+/// the prototype.
+fn scenario_of(held: &Held) -> Scenario {
+    let preset = PRESETS.iter().find(|preset| **preset == held.name).unwrap_or(&PRESETS[0]);
+    Scenario::of_rig(preset, held.rig.clone())
+}
+
+fn not_here(sets: &[String]) -> Failure {
+    let key = |set: &&String| ELSEWHERE.iter().any(|section| set.trim().starts_with(section));
+    let set = sets.iter().find(key).map_or("", String::as_str);
+    Failure::input(format!("{set}: belongs to a scenario, not to what a board holds"))
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().map_or_else(|| "rig".to_owned(), |stem| stem.to_string_lossy().into_owned())
+}
+
+/// The keys that a board holds.
+fn held_keys(scenario: &Scenario) -> Vec<KeyInfo> {
+    let section = |key: &str| key.split('.').next().unwrap_or_default().to_owned();
+    let here = |info: &KeyInfo| !ELSEWHERE.contains(&section(&info.key).as_str());
+    scenario.keys().into_iter().filter(here).collect()
+}
+
+/// These keys, or all.
+fn chosen(scenario: &Scenario, keys: &[String]) -> Result<Vec<KeyInfo>, Failure> {
+    let all = held_keys(scenario);
+    if keys.is_empty() {
+        return Ok(all);
+    }
+    keys.iter()
+        .map(|key| {
+            let found = all.iter().find(|info| info.key == *key).cloned();
+            found.ok_or_else(|| {
+                Failure::input(format!("{key}: no such parameter; `rig keys` lists them"))
+            })
+        })
+        .collect()
+}
+
+/// The keys whose values differ, as they were and as they are.
+fn differing(old: &Scenario, new: &Scenario) -> (Vec<KeyInfo>, Vec<KeyInfo>) {
+    let pairs = held_keys(old).into_iter().zip(held_keys(new));
+    pairs.filter(|(old, new)| old.value != new.value).unzip()
+}
+
+fn show(
+    args: &Args,
+    held: &Held,
+    changed: bool,
+    rows: Vec<KeyInfo>,
+    before: Option<Vec<KeyInfo>>,
+) -> Result<Outcome, Failure> {
+    let printed = Printed {
+        name: held.name.clone(),
+        origin: held.origin.clone(),
+        schema: held.schema,
+        hash: format!("{:08x}", held.hash),
+        changed,
+        parameters: values(&rows),
+        before: before.as_deref().map(values),
+    };
+    output::result(args.json, &printed, || human(held, &rows, before.as_deref()))?;
+    Ok(Outcome::Good)
+}
+
+fn values(rows: &[KeyInfo]) -> Map<String, Value> {
+    rows.iter().map(|info| (info.key.clone(), super::keys::value(&info.value))).collect()
+}
+
+fn human(held: &Held, rows: &[KeyInfo], before: Option<&[KeyInfo]>) -> String {
+    let mut text = format!("{}, {:08x}, from {}\n", held.name, held.hash, held.origin);
+    if !held.is_current() {
+        text += "its constants are of another schema: `set` or `restore` makes them anew\n";
+    }
+    match before {
+        Some([]) => text += "no difference\n",
+        Some(before) => {
+            let rows = before.iter().zip(rows).map(|(old, new)| {
+                vec![new.key.clone(), old.value.clone(), new.value.clone(), new.unit.to_owned()]
+            });
+            text += &format!("{}\n", plain(&["key", "was", "is", "unit"], rows));
+        }
+        None if rows.is_empty() => {}
+        None => {
+            let rows = rows
+                .iter()
+                .map(|info| vec![info.key.clone(), info.value.clone(), info.unit.to_owned()]);
+            text += &format!("{}\n", plain(&["key", "value", "unit"], rows));
+        }
+    }
+    text
+}
+
+impl From<StoreError> for Failure {
+    fn from(error: StoreError) -> Self {
+        match error {
+            StoreError::Set { .. } | StoreError::Compile(_) => Self::input(error),
+            _ => Self::run(error),
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! Stored parameters from the host's side: read, change, put in force, wherever they lie.
+//!
+//! A board keeps its parameters as a set that this program makes
+//! ([`interstage::params`]). A file may hold one as well, so that everything that can be
+//! done to a board can be tried without one.
+
+#[cfg(feature = "board")]
+pub mod board;
+mod file;
+mod line;
+
+use interstage::params::{CompileError, MAX_SET, ParameterSet, SCHEMA, SetError, compile};
+use interstage::rig::Rig;
+
+pub use file::SetFile;
+pub use line::{Client, Wire};
+
+/// What went wrong. Each is one line.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// A file could not be read or written.
+    #[error("{path}: {source}")]
+    File {
+        /// The file.
+        path: String,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The set there is none.
+    #[error("{place}: {source}")]
+    Set {
+        /// Where.
+        place: String,
+        /// Why.
+        source: SetError,
+    },
+    /// No set could be made of the rig.
+    #[error(transparent)]
+    Compile(#[from] CompileError),
+    /// The board does not answer.
+    #[error("the board does not answer within {seconds} s")]
+    Silent {
+        /// How long it was waited for.
+        seconds: f64,
+    },
+    /// The board refuses; what was in force still is.
+    #[error("the board refuses: {0}")]
+    Refused(&'static str),
+    /// The board answered another question.
+    #[error("the board answered something else than it was asked")]
+    Answer,
+    /// The way to the board failed.
+    #[error("{0}")]
+    Wire(String),
+}
+
+/// The parameters in force at a place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Held {
+    /// Name of the rig.
+    pub name: String,
+    /// The rig.
+    pub rig: Rig,
+    /// Layout of its constants; if it is not [`SCHEMA`], they have to be made anew.
+    pub schema: u16,
+    /// Hash of the parameters.
+    pub hash: u32,
+    /// Where it lies, in words.
+    pub origin: String,
+}
+
+impl Held {
+    /// From the bytes of a set of any schema.
+    ///
+    /// # Errors
+    /// [`SetError`] if they are none.
+    pub fn of(set: &[u8], origin: String) -> Result<Self, SetError> {
+        let set = ParameterSet::open_any(set)?;
+        let header = set.header();
+        Ok(Self {
+            name: header.name.as_str().to_owned(),
+            rig: set.rig()?,
+            schema: header.schema,
+            hash: header.parameters,
+            origin,
+        })
+    }
+
+    /// Whether this program's constants are the ones that it holds.
+    #[must_use]
+    pub const fn is_current(&self) -> bool {
+        self.schema == SCHEMA
+    }
+}
+
+/// A place that holds parameters.
+pub trait Store {
+    /// What is in force there.
+    ///
+    /// # Errors
+    /// [`StoreError`] if it cannot be told.
+    fn held(&mut self) -> Result<Held, StoreError>;
+
+    /// Puts a set in force: all of it or nothing.
+    ///
+    /// # Errors
+    /// [`StoreError`]; what was in force still is.
+    fn put(&mut self, set: &[u8]) -> Result<(), StoreError>;
+
+    /// Puts the defaults back in force.
+    ///
+    /// # Errors
+    /// As [`put`](Self::put).
+    fn restore(&mut self) -> Result<(), StoreError>;
+}
+
+/// The set of a rig.
+///
+/// # Errors
+/// [`CompileError`] if the rig is not sound.
+pub fn set_of(name: &str, rig: &Rig) -> Result<Vec<u8>, CompileError> {
+    let mut room = [0; MAX_SET];
+    let length = compile(name, rig, &mut room)?;
+    Ok(room[..length].to_vec())
+}

@@ -1,0 +1,255 @@
+//! A board's parameters over its binary line.
+
+use interstage::link::{Gatherer, ToBoard, ToHost, frame};
+use interstage::params::service::{Description, Origin, PIECE, Piece, Request, Response};
+
+use super::{Held, Store, StoreError};
+
+/// How long an answer is waited for, ms of the board's time: erasing takes 50.
+const PATIENCE_MS: u32 = 1000;
+
+/// Steps of waiting, ms.
+const STEP_MS: u32 = 5;
+
+/// The line to a board: bytes down, bytes up, and time that passes.
+pub trait Wire {
+    /// Sends bytes; as many as there is room for.
+    ///
+    /// # Errors
+    /// Why the line is broken.
+    fn send(&mut self, bytes: &[u8]) -> Result<usize, String>;
+
+    /// Lets so many milliseconds pass and gives what has come.
+    ///
+    /// # Errors
+    /// Why the line is broken.
+    fn receive(&mut self, milliseconds: u32) -> Result<Vec<u8>, String>;
+}
+
+/// Asks a board about its parameters.
+#[derive(Debug)]
+pub struct Client<W> {
+    wire: W,
+    gatherer: Gatherer,
+    number: u16,
+}
+
+impl<W: Wire> Client<W> {
+    /// Over this line.
+    pub const fn new(wire: W) -> Self {
+        Self { wire, gatherer: Gatherer::new(), number: 0 }
+    }
+
+    /// The line.
+    pub fn into_wire(self) -> W {
+        self.wire
+    }
+
+    /// One request, one answer; answers to earlier ones are passed over.
+    ///
+    /// # Errors
+    /// [`StoreError`] if the line is broken, the board silent or refusing.
+    pub fn ask(&mut self, request: Request) -> Result<Response, StoreError> {
+        self.number = self.number.wrapping_add(1);
+        let message = ToBoard::Parameters(self.number, request);
+        let bytes = frame(&message).ok_or(StoreError::Answer)?;
+        let mut left = bytes.as_slice();
+        for _ in 0..PATIENCE_MS / STEP_MS {
+            left = &left[self.wire.send(left).map_err(StoreError::Wire)?..];
+            for byte in self.wire.receive(STEP_MS).map_err(StoreError::Wire)? {
+                match self.gatherer.take(byte) {
+                    Some(ToHost::Parameters(number, response)) if number == self.number => {
+                        return match response {
+                            Response::Refused(refusal) => {
+                                Err(StoreError::Refused(refusal.sentence()))
+                            }
+                            response => Ok(response),
+                        };
+                    }
+                    _ => {}
+                }
+            }
+        }
+        Err(StoreError::Silent { seconds: f64::from(PATIENCE_MS) / 1000.0 })
+    }
+
+    fn done(&mut self, request: Request) -> Result<(), StoreError> {
+        match self.ask(request)? {
+            Response::Done => Ok(()),
+            _ => Err(StoreError::Answer),
+        }
+    }
+
+    /// What the board says of its parameters.
+    ///
+    /// # Errors
+    /// As [`ask`](Self::ask).
+    pub fn describe(&mut self) -> Result<Description, StoreError> {
+        match self.ask(Request::Describe)? {
+            Response::Description(description) => Ok(description),
+            _ => Err(StoreError::Answer),
+        }
+    }
+
+    /// Starts the board anew.
+    ///
+    /// # Errors
+    /// As [`ask`](Self::ask).
+    pub fn restart(&mut self) -> Result<(), StoreError> {
+        self.done(Request::Restart)
+    }
+
+    fn read(&mut self, length: usize) -> Result<Vec<u8>, StoreError> {
+        let mut set = Vec::new();
+        while set.len() < length {
+            match self.ask(Request::Read { offset: set.len() as u16 })? {
+                Response::Piece(piece) if !piece.is_empty() => set.extend(piece),
+                _ => return Err(StoreError::Answer),
+            }
+        }
+        Ok(set)
+    }
+}
+
+impl<W: Wire> Store for Client<W> {
+    fn held(&mut self) -> Result<Held, StoreError> {
+        let description = self.describe()?;
+        let origin = match description.origin {
+            Origin::Image => "the image: nothing is stored".to_owned(),
+            Origin::Stored { sequence } => format!("flash, set number {sequence}"),
+        };
+        let set = self.read(description.length.into())?;
+        Held::of(&set, origin).map_err(|source| StoreError::Set { place: "board".into(), source })
+    }
+
+    fn put(&mut self, set: &[u8]) -> Result<(), StoreError> {
+        let length = u16::try_from(set.len()).map_err(|_| StoreError::Answer)?;
+        self.done(Request::Begin { length })?;
+        for piece in set.chunks(PIECE) {
+            let piece = Piece::from_slice(piece).map_err(|_| StoreError::Answer)?;
+            self.done(Request::Append(piece))?;
+        }
+        self.done(Request::Seal)
+    }
+
+    fn restore(&mut self) -> Result<(), StoreError> {
+        self.done(Request::Restore)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::params::set_of;
+    use interstage::params::service::Service;
+    use interstage::params::slots::{
+        FlashFault, PAGE_BYTES, SLOT_BYTES, SetMemory, Slot, WORD_BYTES,
+    };
+    use interstage::rig::Rig;
+
+    struct Flash([Vec<u8>; 2]);
+
+    impl SetMemory for Flash {
+        fn bytes(&self, slot: Slot) -> &[u8] {
+            &self.0[slot as usize]
+        }
+
+        async fn erase(&mut self, slot: Slot, page: usize) -> Result<(), FlashFault> {
+            self.0[slot as usize][page * PAGE_BYTES..][..PAGE_BYTES].fill(0xFF);
+            Ok(())
+        }
+
+        async fn program(
+            &mut self,
+            slot: Slot,
+            offset: usize,
+            word: [u8; WORD_BYTES],
+        ) -> Result<(), FlashFault> {
+            self.0[slot as usize][offset..][..WORD_BYTES].copy_from_slice(&word);
+            Ok(())
+        }
+    }
+
+    /// A board's end of the line, with a narrow buffer and lost bytes.
+    struct Board {
+        service: Service<Flash>,
+        gatherer: Gatherer,
+        answers: Vec<u8>,
+        at_rest: bool,
+        /// Every so many bytes down are lost; 0 for none.
+        loses: usize,
+        seen: usize,
+    }
+
+    impl Board {
+        fn new() -> Self {
+            let image = set_of("prototype", &Rig::prototype()).unwrap().leak();
+            let flash = Flash([vec![0xFF; SLOT_BYTES], vec![0xFF; SLOT_BYTES]]);
+            Self {
+                service: Service::new(flash, image, 0),
+                gatherer: Gatherer::new(),
+                answers: Vec::new(),
+                at_rest: true,
+                loses: 0,
+                seen: 0,
+            }
+        }
+    }
+
+    impl Wire for Board {
+        fn send(&mut self, bytes: &[u8]) -> Result<usize, String> {
+            let taken = bytes.len().min(7);
+            for byte in &bytes[..taken] {
+                self.seen += 1;
+                if self.loses > 0 && self.seen.is_multiple_of(self.loses) {
+                    continue;
+                }
+                if let Some(ToBoard::Parameters(number, request)) = self.gatherer.take(*byte) {
+                    let answer = self.service.answer(request, self.at_rest);
+                    let response = embassy_futures::block_on(answer);
+                    let message = ToHost::Parameters(number, response);
+                    self.answers.extend(frame(&message).unwrap());
+                }
+            }
+            Ok(taken)
+        }
+
+        fn receive(&mut self, _: u32) -> Result<Vec<u8>, String> {
+            let half = self.answers.len().div_ceil(2);
+            Ok(self.answers.drain(..half).collect())
+        }
+    }
+
+    #[test]
+    fn parameters_go_there_and_back() {
+        let mut client = Client::new(Board::new());
+        assert_eq!(client.held().unwrap().rig, Rig::prototype());
+        client.put(&set_of("fe", &Rig::fe()).unwrap()).unwrap();
+        let held = client.held().unwrap();
+        assert_eq!((held.name.as_str(), &held.rig), ("fe", &Rig::fe()));
+        assert!(held.origin.contains("number 1"), "{}", held.origin);
+        client.restore().unwrap();
+        assert_eq!(client.held().unwrap().rig, Rig::prototype());
+    }
+
+    #[test]
+    fn a_refusal_is_told_in_words() {
+        let mut board = Board::new();
+        board.at_rest = false;
+        let mut client = Client::new(board);
+        let error = client.restore().unwrap_err().to_string();
+        assert!(error.contains("not at rest"), "{error}");
+        assert_eq!(client.held().unwrap().rig, Rig::prototype());
+    }
+
+    #[test]
+    fn a_line_that_loses_bytes_ends_in_an_error_and_changes_nothing() {
+        let mut board = Board::new();
+        board.loses = 400;
+        let mut client = Client::new(board);
+        let error = client.put(&set_of("fe", &Rig::fe()).unwrap()).unwrap_err();
+        assert!(matches!(error, StoreError::Silent { .. }), "{error}");
+        client.wire.loses = 0;
+        assert_eq!(client.held().unwrap().rig, Rig::prototype());
+    }
+}
