@@ -270,9 +270,17 @@ impl Controller {
             return;
         }
         let slope = self.rise.slope(self.ahead(state, pass, Q16::ZERO));
+        targets.speed = self.followed(targets.speed, slope);
+    }
+
+    /// `speed`, or the largest below it at which the pre-tightener still follows a spring
+    /// that moves on this slope, mm/s: `v s <= v_rise`.
+    fn followed(&self, speed: MillimetresPerSecond, slope: Ratio) -> MillimetresPerSecond {
         // Divided only where it limits: the quotient is dear.
-        if slope > LEVEL_SLOPE && targets.speed * slope > self.rise_speed {
-            targets.speed = targets.speed.min(crate::numeric::divide(self.rise_speed, slope));
+        if slope > LEVEL_SLOPE && speed * slope > self.rise_speed {
+            speed.min(crate::numeric::divide(self.rise_speed, slope))
+        } else {
+            speed
         }
     }
 
@@ -416,6 +424,50 @@ impl Controller {
             distance: self.distance(state, pass, state.direction).unwrap_or(Q16::MAX),
             drive: duty(pass.output.drive),
             pretightener: duty(pass.output.preload),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rig::Rig;
+    use proptest::prelude::*;
+
+    /// With a stiff spring, whose pre-tightener follows at 6 mm/s of rise.
+    fn stiff() -> Controller {
+        let mut rig = Rig::prototype();
+        rig.preload.spring_n_per_mm = 0.9 * rig.preload.slew_n_per_s / 6.0;
+        Controller::try_build(&rig).expect("a sound rig")
+    }
+
+    #[test]
+    fn on_a_steep_corner_the_spring_limits_the_speed() {
+        let controller = stiff();
+        let limited = controller.followed(q16(20_000_000), q16(600_000));
+        assert!((limited - q16(10_000_000)).abs() < q16(1_000), "{limited}");
+        assert_eq!(controller.followed(q16(8_000_000), q16(600_000)), q16(8_000_000));
+        // Level wall, and down behind the edge.
+        assert_eq!(controller.followed(q16(20_000_000), Q16::ZERO), q16(20_000_000));
+        assert_eq!(controller.followed(q16(20_000_000), q16(-600_000)), q16(20_000_000));
+    }
+
+    proptest! {
+        #[test]
+        fn the_rise_stays_within_what_the_pretightener_follows(
+            speed in 0..100 << 16_i32,
+            slope in -(1 << 16)..1 << 16_i32,
+        ) {
+            let controller = stiff();
+            let (speed, slope) = (Q16::from_bits(speed), Q16::from_bits(slope));
+            let followed = controller.followed(speed, slope);
+            prop_assert!(followed >= Q16::ZERO && followed <= speed);
+            if slope > LEVEL_SLOPE {
+                prop_assert!(followed * slope <= controller.rise_speed + Q16::DELTA);
+            }
+            if speed * slope <= controller.rise_speed {
+                prop_assert_eq!(followed, speed);
+            }
         }
     }
 }
