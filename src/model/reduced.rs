@@ -21,7 +21,7 @@ use crate::numeric::{fraction, high, reciprocal_of_normalised};
 use crate::supervise::Direction;
 use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio};
 
-use shape::Shape;
+use shape::{Refined, Shape};
 use way::Way;
 
 /// Estimated over nominal stiffness of the tread, with its reciprocal: it changes once a
@@ -121,15 +121,11 @@ impl ReducedModel {
         let wanted = shape.part(force);
         let sought = shape.unscaled(wanted, point.scale.inverse);
         let x = way.fast_part(point.speed);
-        let beyond = shape.beyond_lift(sought);
-        let guess = way.guess_run(x, beyond.root);
-        let yielding = way.yielding(x, beyond.root);
-        let stiffness = way.stiffness(x, centred(guess));
-        let run = shape.refine(guess, sought, &beyond, stiffness, yielding);
-        let stiffness = way.stiffness(x, centred(run));
-        let run = shape.refine(run, sought, &beyond, stiffness, yielding);
+        let excess = shape.beyond_lift(sought);
+        let guess = way.guess_run(x, &excess);
+        let stiffness = way.stiffness_with_slope(x, centred(guess));
+        let Refined { run, slope } = shape.refine(guess, sought, &excess, stiffness);
         let w = centred(run);
-        let slope = shape.slope(w);
         let radial = shape.radial_part(wanted, slope, w);
         let used = self.used(radial, slope);
         Crossing {

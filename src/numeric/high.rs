@@ -43,7 +43,27 @@ macro_rules! horner_with_slope {
     }};
 }
 
-pub(crate) use {horner, horner_with_slope};
+/// The same polynomial, its derivative and half its second derivative by `t`.
+///
+/// Range: as [`horner_with_slope`], and half the second derivative's sums must fit, which
+/// they do where those of the derivative stay below a quarter of the range. Error: below 2,
+/// 6 and 14 LSB. Cost: three instructions a degree less three, and the loads.
+macro_rules! horner_with_curvature {
+    ($t:expr; $c0:expr, $c1:expr, $c2:expr) => {{
+        let (value, slope) = $crate::numeric::horner_with_slope!($t; $c0, $c1, $c2);
+        (value, slope, $c2)
+    }};
+    ($t:expr; $c:expr, $($rest:expr),+) => {{
+        let (value, slope, bend) = $crate::numeric::horner_with_curvature!($t; $($rest),+);
+        (
+            $c + $crate::numeric::high(value, $t),
+            value + $crate::numeric::high(slope, $t),
+            slope + $crate::numeric::high(bend, $t),
+        )
+    }};
+}
+
+pub(crate) use {horner, horner_with_curvature, horner_with_slope};
 
 /// Whether no `t` makes `horner` overflow with these coefficients, in any step.
 #[must_use]

@@ -1,26 +1,18 @@
 //! Specialises the formulas to a rig and its load, once at start.
 
+mod cells;
+mod least_squares;
 mod polynomial;
 
 use super::ReducedModel;
 use super::shape::Shape;
-use super::way::{CUBIC_TERMS, QUINTIC_TERMS, TERMS, Way};
+use super::way::{TERMS, Way};
 use crate::model::felt::{FAST_DEGREE, FORCE_END, Folded, Kind, RUN_DEGREE, RUN_END};
 use crate::model::formula::{Formula, LEAST_RUN};
-use crate::numeric::{checked, fits, fits_with_slope};
+use crate::numeric::{checked, fits_with_slope};
 use crate::rig::{Rig, RigError};
 use crate::supervise::Direction;
-use polynomial::{interpolate, interpolate_surface, rows, value};
-
-/// Least elastic force, N on the published wheel, and root of it that the guess serves.
-const LEAST_FORCE_N: f64 = 9.0;
-const LEAST_ROOT: f64 = 0.14;
-
-/// Speeds between which the guess is good, mm/s.
-const SPEEDS_MM_S: (f64, f64) = (0.5, 130.0);
-
-/// Friction up to which the guess is good.
-const MOST_UTILISATION: f64 = 1.7;
+use polynomial::{interpolate, rows, value};
 
 /// 2 to a power.
 const fn two_to(power: u32) -> f64 {
@@ -152,29 +144,24 @@ impl<'a> Start<'a> {
         let f = self.formula;
         let kind = Kind { direction, driven: self.driven };
         let stiff = || refused("tread.stiffening", rig.tread.stiffening, 1.0, 20.0);
-        let slow = || refused("tread.tau_s", rig.tread.tau_s, 1e-3, 10.0);
         let felt = self.felt(&f.fold(kind, self.load_n));
         let mut terms = [0; TERMS];
         for (slot, value) in terms.iter_mut().zip(triangle(&felt)) {
             *slot = bits(value, 23).ok_or_else(stiff)?;
         }
-        if !holds(&felt) {
+        if !holds(&felt) { std::eprintln!("holds {felt:?}");
             return Err(stiff());
         }
         let half_speed = (f.half_speed_mm_s(kind) * two_to(16)).clamp(1.0, two_to(31) - 1.0) as u32;
         let half_speed_shift = half_speed.leading_zeros();
-        let part = |speed_mm_s| f.fast_part(kind, speed_mm_s);
-        let (run_guess, yielding) =
-            self.run_guess(&felt, (part(SPEEDS_MM_S.0), part(SPEEDS_MM_S.1)));
         Ok(Way {
             half_speed,
             half_speed_normalised: half_speed << half_speed_shift,
             half_speed_shift,
             relaxed: (two_to(26) / f.stiffening) as i32,
             felt: terms,
-            run_guess: surface_bits(run_guess).ok_or_else(slow)?,
-            yielding: surface_bits(yielding).ok_or_else(slow)?,
-            speed_guess: surface_bits(self.speed_guess(&felt)).ok_or_else(slow)?,
+            run_cells: self.run_cells(&felt).ok_or_else(stiff)?,
+            speed_cells: self.speed_cells(&felt).ok_or_else(stiff)?,
         })
     }
 
@@ -197,77 +184,22 @@ impl<'a> Start<'a> {
         felt
     }
 
-    /// Stiffness over the instant one.
+    /// Stiffness over the instant one, at a fast part by powers of w.
+    fn stiffness_by_run(&self, felt: &Folded, x: f64) -> [f64; RUN_DEGREE + 1] {
+        let mut row = [0.0; RUN_DEGREE + 1];
+        for terms in felt.iter().rev() {
+            for (sum, c) in row.iter_mut().zip(terms) {
+                *sum = *sum * (x - 0.5) + c;
+            }
+        }
+        row = row.map(|c| x * c);
+        row[0] += 1.0 / self.formula.stiffening;
+        row
+    }
+
+    /// The same at one run.
     fn stiffness(&self, felt: &Folded, x: f64, w: f64) -> f64 {
-        let row = felt.map(|row| value(&row, w));
-        1.0 / self.formula.stiffening + x * value(&row, x - 0.5)
-    }
-
-    /// Run over the root of the force, and relative change of the run by that of the
-    /// force, by centred fast part and root.
-    fn run_guess(
-        &self,
-        felt: &Folded,
-        fast: (f64, f64),
-    ) -> ([f64; QUINTIC_TERMS], [f64; CUBIC_TERMS]) {
-        let load = self.load_n / self.unit_n;
-        let steepest = value(&self.slope, -0.5);
-        // From what the least force of the fit, or the friction that rubber holds, leaves
-        // for the tread, to what the longest run takes at rest.
-        let root = |force: f64| 2.0 * libm::sqrt(force);
-        let grip = (1.0 + steepest * steepest) / (MOST_UTILISATION - steepest);
-        let low = root((load * grip).max(LEAST_FORCE_N / self.unit_n)).max(LEAST_ROOT);
-        let high = root(value(&self.force, 0.5) / self.formula.stiffening)
-            // Not clamped: what that says of its ends would bring the printing of floats.
-            .max(low + 0.2)
-            .min(1.0);
-        // Beyond the longest run as at its end, so that the surface stays smooth.
-        let force = |x: f64, run: f64| {
-            let w = (run - 0.5).min(0.5);
-            let stiffness = self.stiffness(felt, x, w).max(0.1);
-            let elastic = run * run * value(&self.force, w) * stiffness;
-            elastic + load * (value(&self.slope, w) - steepest)
-        };
-        let solve = |x: f64, root: f64| {
-            let sought = 0.25 * root * root;
-            let mut run = 0.6 * root;
-            // The force goes nearly with the square of the run.
-            for _ in 0..12 {
-                let ratio = sought / force(x, run).max(0.01 * sought);
-                run = (run * libm::sqrt(ratio)).clamp(1e-3, 1.5);
-            }
-            run
-        };
-        let guess = interpolate_surface(fast, (low, high), |x, root| solve(x, root) / root);
-        let yielding = interpolate_surface(fast, (low, high), |x, root| {
-            let run = solve(x, root);
-            let little = 1e-3 * run;
-            let rise = force(x, run + little) - force(x, run - little);
-            (2e-3 * 0.25 * root * root / rise).clamp(0.3, 0.9)
-        });
-        (guess, yielding)
-    }
-
-    /// Fast part by centred stiffness and w; on the branch that rises with the speed.
-    fn speed_guess(&self, felt: &Folded) -> [f64; QUINTIC_TERMS] {
-        let slowest = (1.0 / self.formula.stiffening).min(0.9);
-        interpolate_surface((slowest, 1.0), (0.0, 1.0), |stiffness, run| {
-            let w = run - 0.5;
-            let at = |x: f64| self.stiffness(felt, x, w);
-            let mut low = 0.0;
-            for step in 1..8 {
-                let x = 0.05 * f64::from(step);
-                if at(x) < at(low) {
-                    low = x;
-                }
-            }
-            let mut high = 1.0;
-            for _ in 0..12 {
-                let middle = 0.5 * (low + high);
-                if at(middle) < stiffness { low = middle } else { high = middle }
-            }
-            0.5 * (low + high)
-        })
+        value(&self.stiffness_by_run(felt, x), w)
     }
 }
 
@@ -295,8 +227,9 @@ fn holds(felt: &Folded) -> bool {
     }
     let most = by_run.iter().rev().fold(0.0, |sum, c| bound(sum, *c));
     let fit = |bits: Option<&[i32]>| bits.is_some_and(fits_with_slope);
-    fit(to_bits(by_speed, 23).as_ref().map(<[i32; 6]>::as_slice))
-        && fit(to_bits(by_run, 23).as_ref().map(<[i32; 7]>::as_slice))
+    // Two places to spare for what is made from the derivatives.
+    fit(to_bits(by_speed, 25).as_ref().map(<[i32; 6]>::as_slice))
+        && fit(to_bits(by_run, 25).as_ref().map(<[i32; 7]>::as_slice))
         && most < 16.0
 }
 
@@ -312,20 +245,6 @@ fn to_bits<const N: usize>(values: [f64; N], places: u32) -> Option<[i32; N]> {
         *slot = bits(value, places)?;
     }
     Some(all)
-}
-
-/// A surface in Q26, if no point makes it overflow.
-fn surface_bits<const TERMS: usize>(values: [f64; TERMS]) -> Option<[i32; TERMS]> {
-    let all = to_bits(values, 26)?;
-    let (mut rest, mut bounds) = (&all[..], [0; 6]);
-    let total = (1..=6).find(|n| n * (n + 1) / 2 >= TERMS)?;
-    for (bound, length) in bounds.iter_mut().zip((1..=total).rev()) {
-        let (row, after) = rest.split_at_checked(length)?;
-        let sum = row.iter().rev().fold(0, |sum: i64, c| (sum + 1) / 2 + i64::from(c.abs()));
-        *bound = i32::try_from(sum).ok()?;
-        rest = after;
-    }
-    fits(&bounds).then_some(all)
 }
 
 /// Bits of Q16 brought to 2^30 and more, and by how many places.
