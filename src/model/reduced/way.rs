@@ -22,7 +22,7 @@ pub(super) const LOWEST_OCTAVE: u32 = 8;
 pub(super) type RunCell = [i16; 9];
 
 /// Equal parts of the range of the stiffness with a guess of the speed each.
-pub(super) const STIFFNESS_CELLS: usize = 4;
+pub(super) const STIFFNESS_CELLS: usize = 8;
 
 /// Coefficients of a guess of the fast part in its cell, Q26: by the run and then the
 /// stiffness, 3, 2 and 1 of them.
@@ -178,8 +178,8 @@ impl Way {
     fn guess_fast_part(&self, stiffness: i32, w: i32) -> u32 {
         // Stiffnesses up to that at no pause for relaxation.
         let part = (stiffness.clamp(0, (1 << 26) - 1) as u32) << 6;
-        let [a0, a1, a2, b0, b1, c0] = self.speed_cells[(part >> 30) as usize % STIFFNESS_CELLS];
-        let p = centred(part << 2);
+        let [a0, a1, a2, b0, b1, c0] = self.speed_cells[(part >> 29) as usize % STIFFNESS_CELLS];
+        let p = centred(part << 3);
         let x = horner!(w; horner!(p; a0, a1, a2), horner!(p; b0, b1), c0);
         (x.clamp(1 << 10, (1 << 26) - (1 << 10)) as u32) << 6
     }

@@ -49,7 +49,6 @@ impl Start<'_> {
                     terms.map(|(c, weight)| libm::fabs(c * weight)).sum::<f64>()
                 };
                 if most(&run_terms(0.5, 0.5), 0) >= 1.99 || most(&run_terms(0.5, 1.0), 4) >= 1.99 {
-                    std::eprintln!("cell {index} {found:?}");
                     return None;
                 }
                 *cell = found.map(|c| libm::round(c * 16_384.0) as i16);
@@ -119,7 +118,7 @@ impl Start<'_> {
         for (cell, fit) in cells.iter_mut().zip(fits) {
             let found = fit.solve();
             // No sum exceeds the format.
-            if found.iter().map(|c| libm::fabs(*c)).sum::<f64>() >= 31.0 { std::eprintln!("speed cell {found:?}");
+            if found.iter().map(|c| libm::fabs(*c)).sum::<f64>() >= 31.0 {
                 return None;
             }
             for (slot, c) in cell.iter_mut().zip(found) {
