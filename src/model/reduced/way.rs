@@ -40,7 +40,7 @@ const MOST_BEND: i32 = (1 << 28) - 1;
 const LEAST_SLOPE: i32 = 1 << 21;
 
 /// One way of one rig.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Way {
     /// Speed at which half the crossing is fast, mm/s, Q16; its normalised bits, and by
     /// how many places they were shifted.
