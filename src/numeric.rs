@@ -25,7 +25,7 @@ pub use fraction_root::{inverse_sqrt_normalised, sqrt_fraction};
 pub use high::{fits, fits_with_slope, high};
 pub(crate) use high::{horner, horner_with_curvature, horner_with_slope};
 pub use low_pass::{LowPass, LowPassState};
-pub use quotient::{fraction, reciprocal_of_normalised};
+pub use quotient::{fraction, part_of_sum, reciprocal_of_normalised};
 pub use root::sqrt;
 pub use sine::sin_cos;
 pub use table::Table;

@@ -123,16 +123,19 @@ impl ReducedModel {
         let x = way.fast_part(point.speed);
         let excess = shape.beyond_lift(sought);
         let guess = way.guess_run(x, &excess);
-        let stiffness = way.stiffness_with_slope(x, centred(guess));
-        let Refined { run, slope } = shape.refine(guess, sought, &excess, stiffness);
+        let stiffness = way.stiffness(x, centred(guess.run));
+        let Refined { run, slope } = shape.refine(&guess, sought, &excess, stiffness);
         let w = centred(run);
         let radial = shape.radial_part(wanted, slope, w);
         let used = self.used(radial, slope);
+        let corner_force = shape.newtons(high(radial, slope) << 2);
+        let vibration_um = shape.vibration(point.speed, radial, run);
+        let impact_stress_kpa = shape.impact_stress(point.speed);
         Crossing {
             gap: shape.gap(run),
-            corner_force: shape.newtons(high(radial, slope) << 2),
-            impact_stress_kpa: shape.impact_stress(point.speed),
-            vibration_um: shape.vibration(point.speed, radial, run),
+            corner_force,
+            impact_stress_kpa,
+            vibration_um,
             utilisation: used,
             slip_margin: self.friction - used,
             at_end: run == shape.least_run() || run == shape.most_run() || shape.is_beyond(force),
@@ -221,11 +224,11 @@ impl ReducedModel {
         if self.driven { self.shape.utilisation(radial, slope) } else { Ratio::ZERO }
     }
 
+    /// One address, from which all coefficients are read; a choice of two references would
+    /// be made anew for each.
+    #[inline(always)]
     fn way(&self, direction: Direction) -> &Way {
-        match direction {
-            Direction::Deploy => &self.ways[0],
-            Direction::Retract => &self.ways[1],
-        }
+        &self.ways[direction as usize % 2]
     }
 }
 

@@ -3,7 +3,7 @@
 use super::centred;
 use super::shape::Excess;
 use crate::numeric::{
-    fraction, high, horner, horner_with_curvature, horner_with_slope, inverse_sqrt_normalised,
+    high, horner, horner_with_curvature, horner_with_slope, inverse_sqrt_normalised, part_of_sum,
     reciprocal_of_normalised,
 };
 use crate::units::{MillimetresPerSecond, Q16};
@@ -18,8 +18,28 @@ pub(super) const FORCE_CELLS: usize = 10;
 pub(super) const LOWEST_OCTAVE: u32 = 8;
 
 /// Coefficients of a guess of the run in its cell, Q14: `u^i m^j`, by the mantissa m of
-/// the force and then the part u of the range of x: 4, 3 and 2 of them.
-pub(super) type RunCell = [i16; 9];
+/// the force and then the part u of the range of x: 4, 3 and 3 of them, two to a word.
+pub(super) type RunCell = [Pair; 5];
+
+/// Two numbers in a word, 16 bits each: what one access brings costs half.
+///
+/// The upper one is read with the lower one behind its point, half a unit at most: no more
+/// than it was rounded by.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub(super) struct Pair(#[serde(with = "postcard::fixint::le")] i32);
+
+impl Pair {
+    /// Of an upper and a lower number.
+    pub(super) const fn new(upper: i16, lower: i16) -> Self {
+        Self(((upper as i32) << 16).wrapping_add(lower as i32))
+    }
+
+    /// Both, 2^16 times.
+    #[inline(always)]
+    const fn both(self) -> (i32, i32) {
+        (self.0, self.0 << 16)
+    }
+}
 
 /// Equal parts of the range of the stiffness with a guess of the speed each.
 pub(super) const STIFFNESS_CELLS: usize = 8;
@@ -54,12 +74,15 @@ pub(super) struct Way {
     pub(super) speed_cells: [SpeedCell; STIFFNESS_CELLS],
 }
 
-/// Effective over instant stiffness at a fast part and a run, Q26, and its derivative by
-/// the run, Q22.
+/// Guess of the run.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Stiffness {
-    pub(super) value: i32,
-    pub(super) slope: i32,
+pub(super) struct Guess {
+    /// The run, Q32.
+    pub(super) run: u32,
+    /// Its derivative by the mantissa of the force, of which a half octave is the whole, Q30.
+    pub(super) by_force: i32,
+    /// Places to the right for what follows from the derivative.
+    pub(super) places: u32,
 }
 
 impl Way {
@@ -67,7 +90,7 @@ impl Way {
     #[inline(always)]
     pub(super) fn fast_part(&self, speed: MillimetresPerSecond) -> u32 {
         let speed = speed.to_bits().max(0) as u32;
-        fraction(speed, speed + self.half_speed)
+        part_of_sum(speed, self.half_speed)
     }
 
     /// Effective over instant stiffness at a fast part and a centred run, Q26.
@@ -90,27 +113,6 @@ impl Way {
         self.relaxed + high(felt << 4, (x >> 1) as i32)
     }
 
-    /// The same with its derivative by the run.
-    #[inline(always)]
-    pub(super) fn stiffness_with_slope(&self, x: u32, w: i32) -> Stiffness {
-        #[rustfmt::skip]
-        let [a0, a1, a2, a3, a4, a5, b0, b1, b2, b3, b4, c0, c1, c2, c3, d0, d1, d2, e0, e1, f0,
-            g0] = self.felt;
-        let u = centred(x);
-        let (felt, slope) = horner_with_slope!(
-            w;
-            horner!(u; a0, a1, a2, a3, a4, a5),
-            horner!(u; b0, b1, b2, b3, b4),
-            horner!(u; c0, c1, c2, c3),
-            horner!(u; d0, d1, d2),
-            horner!(u; e0, e1),
-            f0,
-            g0
-        );
-        let half = (x >> 1) as i32;
-        Stiffness { value: self.relaxed + high(felt << 4, half), slope: high(slope, half) }
-    }
-
     /// The stiffening after one run, by the centred fast part.
     #[inline(always)]
     fn along_speed(&self, w: i32) -> [i32; 6] {
@@ -131,22 +133,23 @@ impl Way {
     ///
     /// Below the lowest octave as there, with the run by the root of the force.
     #[inline(always)]
-    pub(super) fn guess_run(&self, x: u32, excess: &Excess) -> u32 {
+    pub(super) fn guess_run(&self, x: u32, excess: &Excess) -> Guess {
         let below = (excess.octave.max(LOWEST_OCTAVE) - LOWEST_OCTAVE + 1) & !1;
         let half = excess.normalised >> 30 & 1;
         let row = (2 * (LOWEST_OCTAVE + below - excess.octave) + half) as usize;
         // Both within their ranges as they are; said again for the compiler.
         let cells = &self.run_cells[(x >> 30) as usize % FAST_CELLS];
-        let [a0, a1, a2, a3, b0, b1, b2, c0, c1] =
-            cells[row.min(FORCE_CELLS - 1)].map(|c| i32::from(c) << 16);
+        let [p, q, r, s, t] = cells[row.min(FORCE_CELLS - 1)];
         let (u, m) = (centred(x << 2), centred(excess.normalised << 2));
-        let run = horner!(
-            m;
-            horner!(u; a0, a1, a2, a3),
-            horner!(u; b0, b1, b2),
-            horner!(u; c0, c1)
-        );
-        ((run.clamp(0, (1 << 30) - 1) as u32) << 2) >> (below / 2)
+        let ((a0, a1), (a2, a3)) = (p.both(), q.both());
+        let level = horner!(u; a0, a1, a2, a3);
+        let ((b0, b1), (b2, c0), (c1, c2)) = (r.both(), s.both(), t.both());
+        let bend = high(horner!(u; c0, c1, c2), m);
+        let rise = horner!(u; b0, b1, b2) + bend;
+        let run = level + high(rise, m);
+        let places = below / 2;
+        let run = ((run.clamp(0, (1 << 30) - 1) as u32) << 2) >> places;
+        Guess { run, by_force: rise + bend, places }
     }
 
     /// Speed at which the stiffness after this run is the given one, Q26; none if it is

@@ -6,7 +6,7 @@ use super::polynomial::{node, value};
 use super::{Start, bits};
 use crate::model::felt::Folded;
 use crate::model::reduced::way::{
-    FAST_CELLS, FORCE_CELLS, LOWEST_OCTAVE, RunCell, STIFFNESS_CELLS, SpeedCell,
+    FAST_CELLS, FORCE_CELLS, LOWEST_OCTAVE, Pair, RunCell, STIFFNESS_CELLS, SpeedCell,
 };
 
 /// Runs, in equal ratios, and fast parts in a cell that a guess of the run is fitted at.
@@ -25,12 +25,15 @@ const FAST_STEPS: usize = 96;
 /// the stiffness.
 const TAME: f64 = 1e-2;
 
+type RunFit = LeastSquares<10, 55>;
+type SpeedFit = LeastSquares<6, 21>;
+
 impl Start<'_> {
     /// Guesses of the run; none if one does not fit its format.
     pub(super) fn run_cells(&self, felt: &Folded) -> Option<[[RunCell; FORCE_CELLS]; FAST_CELLS]> {
-        let mut cells = [[[0; 9]; FORCE_CELLS]; FAST_CELLS];
+        let mut cells = [[RunCell::default(); FORCE_CELLS]; FAST_CELLS];
         for (index, row) in cells.iter_mut().enumerate() {
-            let mut fits = [LeastSquares::<9>::new(); FORCE_CELLS];
+            let mut fits = [RunFit::new(); FORCE_CELLS];
             for k in 0..FAST_NODES {
                 let u = 0.5 * node(k, FAST_NODES);
                 let x = (index as f64 + 0.5 + u) / FAST_CELLS as f64;
@@ -44,14 +47,17 @@ impl Start<'_> {
             for (cell, fit) in row.iter_mut().zip(fits) {
                 let found = fit.solve();
                 // Neither the whole nor a row of it reaches twice the longest run.
-                let most = |weights: &[f64; 9], from: usize| {
+                let most = |weights: &[f64; 10], from: usize| {
                     let terms = found.iter().zip(weights).skip(from);
                     terms.map(|(c, weight)| libm::fabs(c * weight)).sum::<f64>()
                 };
                 if most(&run_terms(0.5, 0.5), 0) >= 1.99 || most(&run_terms(0.5, 1.0), 4) >= 1.99 {
                     return None;
                 }
-                *cell = found.map(|c| libm::round(c * 16_384.0) as i16);
+                for (pair, of) in cell.iter_mut().zip(found.chunks_exact(2)) {
+                    let bits = |c: f64| libm::round(c * 16_384.0) as i16;
+                    *pair = Pair::new(bits(of[0]), bits(of[1]));
+                }
             }
         }
         Some(cells)
@@ -88,7 +94,7 @@ impl Start<'_> {
 
     /// Guesses of the fast part; none if one does not fit its format.
     pub(super) fn speed_cells(&self, felt: &Folded) -> Option<[SpeedCell; STIFFNESS_CELLS]> {
-        let mut fits = [LeastSquares::<6>::new(); STIFFNESS_CELLS];
+        let mut fits = [SpeedFit::new(); STIFFNESS_CELLS];
         let mut add = |stiffness: f64, w: f64, x: f64, weight: f64| {
             let part = stiffness * STIFFNESS_CELLS as f64;
             if let Some(fit) = fits.get_mut(part as usize) {
@@ -130,16 +136,13 @@ impl Start<'_> {
 }
 
 /// `u^i m^j` in the order of [`RunCell`].
-fn run_terms(u: f64, m: f64) -> [f64; 9] {
+fn run_terms(u: f64, m: f64) -> [f64; 10] {
     let square = u * u;
-    [1.0, u, square, square * u, m, m * u, m * square, m * m, m * m * u]
+    [1.0, u, square, square * u, m, m * u, m * square, m * m, m * m * u, m * m * square]
 }
 
 /// The cell of a force, and the centred mantissa in it.
-fn force_cell<const T: usize>(
-    excess: f64,
-    fits: &mut [LeastSquares<T>; FORCE_CELLS],
-) -> Option<(&mut LeastSquares<T>, f64)> {
+fn force_cell(excess: f64, fits: &mut [RunFit; FORCE_CELLS]) -> Option<(&mut RunFit, f64)> {
     // From 1/2 to 1 times 2^exponent.
     let (part, exponent) = libm::frexp(excess);
     let zeros = 2 - exponent;
