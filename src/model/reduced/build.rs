@@ -9,7 +9,7 @@ use super::shape::Shape;
 use super::way::{TERMS, Way};
 use crate::model::felt::{FAST_DEGREE, FORCE_END, Folded, Kind, RUN_DEGREE, RUN_END};
 use crate::model::formula::{Formula, LEAST_RUN};
-use crate::numeric::{checked, fits_with_slope};
+use crate::numeric::{checked, fits, fits_with_slope};
 use crate::rig::{Rig, RigError};
 use crate::supervise::Direction;
 use polynomial::{interpolate, rows, value};
@@ -52,9 +52,9 @@ struct Start<'a> {
     driven: bool,
     load_n: f64,
     longest_mm: f64,
-    /// Unit of force, N: the largest relaxed one of the fit, times s.
+    /// Unit of force, N: the power of two above the largest relaxed one of the fit times s.
     unit_n: f64,
-    /// Relaxed force over r^2 and the fit's largest, slope of the contact: by w.
+    /// Relaxed force times s over r^2 and the unit, slope of the contact: by w.
     force: [f64; 5],
     slope: [f64; 5],
 }
@@ -63,17 +63,19 @@ impl<'a> Start<'a> {
     fn new(formula: &'a Formula, load_n: Option<f64>) -> Self {
         let kind = Kind { direction: Direction::Deploy, driven: load_n.is_some() };
         let longest_mm = formula.largest_run_mm(kind);
-        let most = FORCE_END * formula.unit_force_n();
+        let most = FORCE_END * formula.unit_force_n() * formula.stiffening;
+        let unit_n = libm::exp2(libm::ceil(libm::log2(most)));
+        let unit_at_rest_n = unit_n / formula.stiffening;
         let gap = |w: f64| formula.gap_after_mm(longest_mm * (w + 0.5));
         Self {
             formula,
             driven: load_n.is_some(),
             load_n: load_n.unwrap_or(0.0),
             longest_mm,
-            unit_n: most * formula.stiffening,
+            unit_n,
             force: interpolate(|w| {
                 let run = w + 0.5;
-                formula.relaxed_force_n(kind, gap(w)) / (most * run * run)
+                formula.relaxed_force_n(kind, gap(w)) / (unit_at_rest_n * run * run)
             }),
             slope: interpolate(|w| formula.contact(gap(w)).slope()),
         }
@@ -91,14 +93,16 @@ impl<'a> Start<'a> {
         let longest_bits = (longest * two_to(32)) as u32;
         let longest_shift = longest_bits.leading_zeros();
         let normalised = longest_bits << longest_shift;
-        let (unit, unit_shift) = normalised_q16(self.unit_n).ok_or_else(stiff)?;
-        // The result of a product is brought back by two places at least.
-        let unit_shift = u32::try_from(unit_shift).ok().filter(|s| *s >= 2).ok_or_else(stiff)?;
-        let (deflection, places) =
-            normalised_q16(1e3 * self.unit_n / f.impact.arm_n_per_mm).ok_or_else(stiff)?;
+        let places = 14 - libm::log2(self.unit_n) as i32;
+        let force_places = u32::try_from(places).ok().filter(|p| *p < 28).ok_or_else(stiff)?;
+        let deflection_um = 1e3 * self.unit_n / f.impact.arm_n_per_mm;
         let at = |w: f64| self.longest_mm * (w + 0.5);
         let part = |force_n: f64| (force_n / self.unit_n * two_to(30)) as i32;
-        let ramp = 2.0 / (f.impact.mode_rad_s * self.longest_mm);
+        // A rig without modes has nothing that could swing.
+        let swings = f.impact.mode_rad_s > 0.0;
+        let ramp = if swings { 2.0 / (f.impact.mode_rad_s * self.longest_mm) } else { 0.0 };
+        let deflection_um = if swings { deflection_um } else { 0.0 };
+        let swing = Swing::new(deflection_um * ramp).ok_or_else(stiff)?;
         let slope_at = |w: f64| value(&self.slope, w);
         let driven = self.driven;
         Ok(Shape {
@@ -111,32 +115,29 @@ impl<'a> Start<'a> {
             inverse_radius: (two_to(33) / radius) as i32,
             force: quartic(self.force, 29)?,
             slope: quartic(self.slope, 30)?,
-            cosine: quartic(
+            cosine: to_bits(
                 interpolate(|w| {
                     let slope = if driven { slope_at(w) } else { 0.0 };
                     1.0 / (1.0 + slope * slope)
                 }),
                 30,
-            )?,
-            gap: quartic(
-                interpolate(|w| {
-                    let distance = f.free_run_mm() - at(w);
-                    2.0 * radius * f.gap_after_mm(at(w)) / (distance * distance)
-                }),
-                30,
-            )?,
+            )
+            .filter(|bits| fits(bits))
+            .ok_or_else(stiff)?,
+            gap: to_bits(interpolate(|w| f.gap_after_mm(at(w))), 27)
+                .filter(|bits| fits(bits))
+                .ok_or_else(stiff)?,
             depth: quartic(interpolate(|w| f.depth_mm(f.gap_after_mm(at(w))) / at(w)), 30)?,
             load: part(self.load_n),
             most_lifting: part(self.load_n * slope_at(-0.5)),
             middle_lifting: part(self.load_n * slope_at(0.0)),
-            unit_shift,
-            unit,
-            most_force: (unit >> unit_shift) >> 2,
-            inverse_unit: (two_to(61) / f64::from(unit)).min(two_to(31) - 1.0) as i32,
+            force_places,
+            most_force: (1 << 28) >> force_places,
             stress: (f.impact.stress_per_speed * 1e-3 * two_to(32)).min(two_to(31) - 1.0) as i32,
-            ramp: (ramp * two_to(32)).min(two_to(32) - 1.0) as u32,
-            deflection,
-            deflection_shift: u32::try_from(places + 1).map_err(|_| stiff())?,
+            deflection: bits(deflection_um, 15).ok_or_else(stiff)?,
+            swing: swing.bits,
+            swing_right: swing.right,
+            swing_left: swing.left,
         })
     }
 
@@ -247,21 +248,28 @@ fn to_bits<const N: usize>(values: [f64; N], places: u32) -> Option<[i32; N]> {
     Some(all)
 }
 
-/// Bits of Q16 brought to 2^30 and more, and by how many places.
-fn normalised_q16(value: f64) -> Option<(i32, i32)> {
-    let (mut bits, mut places) = (value * two_to(16), 0);
-    if !(bits > 1.0 && bits < two_to(60)) {
-        return None;
+/// A swing, um s/mm, in the format of [`Shape`].
+struct Swing {
+    bits: i32,
+    right: u32,
+    left: u32,
+}
+
+impl Swing {
+    fn new(swing: f64) -> Option<Self> {
+        if swing <= 0.0 {
+            return Some(Self { bits: 0, right: 0, left: 0 });
+        }
+        // From 1/2 to 1 times 2^exponent, so 2^30 and more by 31 - exponent places.
+        let (part, exponent) = libm::frexp(swing);
+        let places = 31 - exponent;
+        (0..50).contains(&places).then(|| Self {
+            bits: (part * two_to(31)).min(two_to(31) - 1.0) as i32,
+            // A swing in places and a pace in 2^(p - 1) make 2^16 by places + p - 38.
+            right: (places - 30).max(0) as u32,
+            left: (30 - places).max(0) as u32,
+        })
     }
-    while bits < two_to(30) {
-        bits *= 2.0;
-        places += 1;
-    }
-    while bits >= two_to(31) {
-        bits *= 0.5;
-        places -= 1;
-    }
-    Some((bits as i32, places))
 }
 
 const fn refused(key: &'static str, value: f64, min: f64, max: f64) -> RigError {

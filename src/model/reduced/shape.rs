@@ -8,8 +8,9 @@ use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio};
 /// A function of the centred run, a quartic.
 pub(super) type Quartic = [i32; 5];
 
-/// Fastest speed that vibration and impact tell apart, 2048 mm/s.
+/// Fastest speed that impact tells apart, 2048 mm/s, and vibration, 128 mm/s.
 const MOST_SPEED: i32 = 2048 << 16;
+const MOST_SWING_SPEED: i32 = (128 << 16) - 1;
 
 /// Geometry, units and load of one rig. The run r is a part of the longest one.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -33,9 +34,9 @@ pub(super) struct Shape {
     pub(super) slope: Quartic,
     /// Radial reaction over the driven wheel's elastic force, `1 / (1 + s^2)`, Q30; 1 if
     /// pushed.
-    pub(super) cosine: Quartic,
-    /// `2 R gap / d^2`, Q30.
-    pub(super) gap: Quartic,
+    pub(super) cosine: [i32; 4],
+    /// Gap, mm, Q27.
+    pub(super) gap: [i32; 6],
     /// Depth over run, Q30.
     pub(super) depth: Quartic,
     /// Load, Q30.
@@ -44,30 +45,26 @@ pub(super) struct Shape {
     /// force, and what of it a scale changes.
     pub(super) most_lifting: i32,
     pub(super) middle_lifting: i32,
-    /// Unit of force: its bits of Q16 are brought to 2^30 and more by this shift; these,
-    /// and 2^61 over them.
-    pub(super) unit_shift: u32,
-    pub(super) unit: i32,
-    pub(super) inverse_unit: i32,
+    /// The unit of force is a power of two: places from Q16, N, to Q30 of the unit.
+    pub(super) force_places: u32,
     /// A quarter of the unit, Q16.
     pub(super) most_force: i32,
     /// Impact stress per speed, kPa s/mm, Q32.
     pub(super) stress: i32,
-    /// `2 / (omega longest run)`, s/mm, Q32.
-    pub(super) ramp: u32,
-    /// Unit of force over the arm's stiffness, um: Q16 brought to 2^30 and more, and by
-    /// how many places the product with a force and a part of a whole is too large.
+    /// Deflection of the arm by the unit of force, um, Q15.
     pub(super) deflection: i32,
-    pub(super) deflection_shift: u32,
+    /// Swing that the unit of force leaves after the longest run, um s/mm, 2^30 and more;
+    /// by how many places its product is too large at 128 mm/s, and too small.
+    pub(super) swing: i32,
+    pub(super) swing_right: u32,
+    pub(super) swing_left: u32,
 }
 
 /// What a force exceeds the lift of the load on the steepest slope by: it goes nearly with
 /// the square of the run.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Excess {
-    /// Q30, up to a quarter.
-    force: i32,
-    /// Its leading zeros, and it without them.
+    /// Leading zeros of its Q30, and that without them.
     pub(super) octave: u32,
     pub(super) normalised: u32,
 }
@@ -94,8 +91,7 @@ impl Shape {
     /// takes at rest.
     #[inline(always)]
     pub(super) fn part(&self, force: Newtons) -> i32 {
-        let bits = force.to_bits().min(self.most_force).max(0);
-        high(bits << self.unit_shift, self.inverse_unit) << 1
+        force.to_bits().min(self.most_force).max(0) << self.force_places
     }
 
     /// Whether a force exceeds what [`part`](Self::part) can tell.
@@ -122,7 +118,7 @@ impl Shape {
     /// A part of the unit, Q30, as a force.
     #[inline(always)]
     pub(super) fn newtons(&self, part: i32) -> Newtons {
-        Q16::from_bits(high(part, self.unit) >> (self.unit_shift - 2))
+        Q16::from_bits(part >> self.force_places)
     }
 
     /// Run with this gap, Q32, within the model.
@@ -139,20 +135,12 @@ impl Shape {
         (part.min(u64::from(self.most_run())) as u32).max(self.least_run())
     }
 
-    /// Distance of the wheel's centre from the face over R, Q32.
-    #[inline(always)]
-    fn distance(&self, run: u32) -> u32 {
-        self.free - ((u64::from(run) * u64::from(self.longest)) >> 32) as u32
-    }
-
     /// Gap after this run, mm.
     #[inline(always)]
     pub(super) fn gap(&self, run: u32) -> Millimetres {
-        let [c0, c1, c2, c3, c4] = self.gap;
-        let distance = self.distance(run);
-        let square = ((u64::from(distance) * u64::from(distance)) >> 33) as i32;
-        let twice = high(square, horner!(centred(run); c0, c1, c2, c3, c4));
-        Q16::from_bits(((i64::from(twice) * i64::from(self.half_radius) + (1 << 31)) >> 32) as i32)
+        let [c0, c1, c2, c3, c4, c5] = self.gap;
+        let gap = horner!(centred(run); c0, c1, c2, c3, c4, c5);
+        Q16::from_bits((gap + (1 << 10)) >> 11)
     }
 
     /// Depth after this run, mm.
@@ -173,8 +161,8 @@ impl Shape {
     /// Radial reaction over elastic force, Q30.
     #[inline(always)]
     pub(super) fn cosine(&self, w: i32) -> i32 {
-        let [c0, c1, c2, c3, c4] = self.cosine;
-        horner!(w; c0, c1, c2, c3, c4)
+        let [c0, c1, c2, c3] = self.cosine;
+        horner!(w; c0, c1, c2, c3)
     }
 
     /// What the lift of the load adds to the radial force, Q30.
@@ -190,20 +178,24 @@ impl Shape {
         high(elastic.max(0), self.cosine(w)) << 2
     }
 
-    /// `T / C + s` of a driven wheel, from the radial reaction.
+    /// `T / C + s` of a driven wheel, from the radial reaction; a lift of more than twice the
+    /// reaction counts as twice.
     #[inline(always)]
     pub(super) fn utilisation(&self, radial: i32, slope: i32) -> Ratio {
-        // Q30 to Q34 over Q18. A reaction below 4e-6 is none.
-        let lifting = ((self.load as u32) << 4) / ((radial >> 12) as u32 | 1);
-        Q16::from_bits((lifting.min(1 << 24) as i32) + (slope >> 14))
+        let radial = (radial.max(self.load >> 1) | 1) as u32;
+        // To 15 bits, rounded; the load below four times 2^30, so that the quotient is Q15.
+        let places = radial.leading_zeros();
+        let divisor = ((radial << places >> 16) + 1) >> 1;
+        let lifting = ((self.load as u32) << (places - 2)) / divisor;
+        Q16::from_bits(((lifting << 1) as i32) + (slope >> 14))
     }
 
     /// Elastic force after this run with a stiffness, Q26, over the instant one; Q30, not
     /// negative.
     #[inline(always)]
     pub(super) fn elastic(&self, run: u32, stiffness: i32) -> i32 {
-        let wide = i64::from(self.relaxed(run)) * i64::from(stiffness.clamp(0, (1 << 27) - 1));
-        ((wide >> 24) as i32).clamp(0, (1 << 29) - 1)
+        let stiffness = stiffness.clamp(0, (1 << 27) - 1);
+        high(self.relaxed(run) << 3, stiffness << 4) << 1
     }
 
     /// Stiffness over the instant one that carries an elastic force, Q30, after this run;
@@ -227,10 +219,9 @@ impl Shape {
     /// unit.
     #[inline(always)]
     pub(super) fn beyond_lift(&self, sought: i32) -> Excess {
-        // From 0.06 N on the published wheel, so that the shifts below stay small.
-        let force = (sought - self.most_lifting).clamp(1 << 16, (1 << 28) - 1);
+        let force = (sought - self.most_lifting).clamp(0, (1 << 28) - 1) | 1;
         let octave = (force as u32).leading_zeros();
-        Excess { force, octave, normalised: (force as u32) << octave }
+        Excess { octave, normalised: (force as u32) << octave }
     }
 
     /// From a guess of the run to the run of the force `sought`, Q30.
@@ -250,10 +241,10 @@ impl Shape {
         let [s0, s1, s2, s3, s4] = self.slope;
         let (slope, tilt) = horner_with_slope!(w; s0, s1, s2, s3, s4);
         let lacking = sought - elastic - (high(self.load, slope) << 2);
-        let limit = excess.force >> 3;
-        let lacking = lacking.clamp(-limit, limit) << excess.octave;
+        // Less than the excess itself, which fits with one place less.
+        let lacking = lacking << (excess.octave - 1);
         // Q31, as the run's half.
-        let step = (high(guess.by_force, lacking) >> guess.places) << 3;
+        let step = (high(guess.by_force, lacking) >> guess.places) << 4;
         let half = ((guess.run >> 1) as i32).saturating_add(step).max(self.least);
         let run = (half as u32) << 1;
         Refined { run, slope: slope + high(tilt, run.wrapping_sub(guess.run) as i32) }
@@ -268,14 +259,14 @@ impl Shape {
     /// Vibration that is left, um.
     #[inline(always)]
     pub(super) fn vibration(&self, speed: MillimetresPerSecond, radial: i32, run: u32) -> Q16 {
-        // From 0.008 mm/s, brought to the top; over the run, Q16, that leaves 23 bits.
-        let speed = speed.to_bits().clamp(1 << 9, MOST_SPEED) as u32;
+        let force = radial << 2;
+        // From 0.008 mm/s, brought to the top; over the run, 17 bits and rounded.
+        let speed = speed.to_bits().clamp(1 << 9, MOST_SWING_SPEED) as u32;
         let places = speed.leading_zeros();
-        let pace = (speed << places) / (run >> 16 | 1);
-        let ramp = ((u64::from(pace << 9) * u64::from(self.ramp)) >> 32) as u32;
-        // Times 2^(9 + places); what is left of a sudden force, Q31.
-        let ramp = (ramp.min((1 << (9 + places)) - 1) << (22 - places)) as i32;
-        let still = high(radial, self.deflection);
-        Q16::from_bits((high(still, ramp) << 4) >> self.deflection_shift)
+        let pace = (speed << places) / ((run >> 14).wrapping_add(1) >> 1 | 1);
+        let swing = high(high(force, self.swing), (pace << 11) as i32);
+        let swing = swing >> (self.swing_right + places - 8) << self.swing_left;
+        // No more than a sudden force.
+        Q16::from_bits(swing.min(high(force, self.deflection) << 1))
     }
 }
