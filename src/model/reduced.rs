@@ -22,7 +22,7 @@ use crate::supervise::Direction;
 use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio};
 
 use shape::{Refined, Shape};
-use way::Way;
+use way::{Guess, Way};
 
 /// Estimated over nominal stiffness of the tread, with its reciprocal: it changes once a
 /// crossing and is used many times.
@@ -123,8 +123,12 @@ impl ReducedModel {
         let x = way.fast_part(point.speed);
         let excess = shape.beyond_lift(sought);
         let guess = way.guess_run(x, &excess);
-        let stiffness = way.stiffness(x, centred(guess.run));
-        let Refined { run, slope } = shape.refine(&guess, sought, &excess, stiffness);
+        let mut found = shape.refine(way, x, &guess, sought, &excess);
+        if !self.driven {
+            // Without friction a low step all but sinks under the force: once more.
+            found = shape.refine(way, x, &Guess { run: found.run, ..guess }, sought, &excess);
+        }
+        let Refined { run, slope } = found;
         let w = centred(run);
         let radial = shape.radial_part(wanted, slope, w);
         let used = self.used(radial, slope);

@@ -332,6 +332,7 @@ mod tests {
                 let gap = beyond(got.gap, exact.gap_mm, 1.0);
                 if gap > errors.gap {
                     errors.gap = gap;
+                    println!("GAP {gap} {direction:?} {speed} {force} {exact:?} {got:?}");
                 }
                 errors.corner =
                     errors.corner.max(beyond(got.corner_force, exact.corner_force_n, 1.0));

@@ -1,7 +1,7 @@
 //! What a rig's geometry and load make of a run over the corner; the same on both ways.
 
 use super::centred;
-use super::way::Guess;
+use super::way::{Guess, Way};
 use crate::numeric::{fraction, high, horner, horner_with_slope, sqrt_fraction};
 use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio};
 
@@ -231,13 +231,14 @@ impl Shape {
     #[inline(always)]
     pub(super) fn refine(
         &self,
+        way: &Way,
+        x: u32,
         guess: &Guess,
         sought: i32,
         excess: &Excess,
-        stiffness: i32,
     ) -> Refined {
         let w = centred(guess.run);
-        let elastic = self.elastic(guess.run, stiffness);
+        let elastic = self.elastic(guess.run, way.stiffness(x, w));
         let [s0, s1, s2, s3, s4] = self.slope;
         let (slope, tilt) = horner_with_slope!(w; s0, s1, s2, s3, s4);
         let lacking = sought - elastic - (high(self.load, slope) << 2);

@@ -3,7 +3,7 @@
 use super::centred;
 use super::shape::Excess;
 use crate::numeric::{
-    high, horner, horner_with_curvature, horner_with_slope, inverse_sqrt_normalised, part_of_sum,
+    high, horner, horner_with_curvature, inverse_sqrt_normalised, part_of_sum,
     reciprocal_of_normalised,
 };
 use crate::units::{MillimetresPerSecond, Q16};
@@ -94,7 +94,7 @@ impl Way {
     }
 
     /// Effective over instant stiffness at a fast part and a centred run, Q26.
-    #[inline(always)]
+    #[inline(never)]
     pub(super) fn stiffness(&self, x: u32, w: i32) -> i32 {
         #[rustfmt::skip]
         let [a0, a1, a2, a3, a4, a5, b0, b1, b2, b3, b4, c0, c1, c2, c3, d0, d1, d2, e0, e1, f0,

@@ -21,9 +21,13 @@ const RUN_RANGE: (f64, f64) = (0.04, 1.05);
 const RUN_NODES: usize = 9;
 const FAST_STEPS: usize = 96;
 
-/// Weight of points that only keep a guess tame: where no run has the force, or no speed
-/// the stiffness.
-const TAME: f64 = 1e-2;
+/// Largest force, over k_inf R^2 L, that the guess of the run has to be good for: 160 N on
+/// the published wheel.
+const FORCE_OF_USE: f64 = 0.0151;
+
+/// Weight of points that only keep a guess tame: beyond that force, where no run has the
+/// force, and where no speed has the stiffness.
+const TAME: f64 = 1e-4;
 
 type RunFit = LeastSquares<10, 55>;
 type SpeedFit = LeastSquares<6, 21>;
@@ -39,8 +43,7 @@ impl Start<'_> {
                 let x = (index as f64 + 0.5 + u) / FAST_CELLS as f64;
                 self.along_runs(felt, x, |excess, run, weight| {
                     if let Some((fit, m)) = force_cell(excess, &mut fits) {
-                        let relative = weight / (run * run);
-                        fit.add(&run_terms(u, m), run, relative);
+                        fit.add(&run_terms(u, m), run, weight / (run * run));
                     }
                 });
             }
@@ -67,6 +70,7 @@ impl Start<'_> {
     /// runs at a fast part.
     fn along_runs(&self, felt: &Folded, x: f64, mut at: impl FnMut(f64, f64, f64)) {
         let load = self.load_n / self.unit_n;
+        let most_of_use = FORCE_OF_USE * self.formula.unit_force_n() / self.unit_n;
         let steepest = value(&self.slope, -0.5);
         let by_run = self.stiffness_by_run(felt, x);
         let (first, last) = RUN_RANGE;
@@ -77,7 +81,8 @@ impl Start<'_> {
             let elastic = run * run * value(&self.force, w) * value(&by_run, w);
             let excess = elastic + load * (value(&self.slope, w) - steepest);
             if excess > most {
-                at(excess, run, 1.0);
+                let used = excess + load * steepest < most_of_use;
+                at(excess, run, if used { 1.0 } else { TAME });
                 most = excess;
             } else if most > 0.0 {
                 break;
