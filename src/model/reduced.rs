@@ -17,17 +17,18 @@ mod build;
 mod shape;
 mod way;
 
-use crate::numeric::{fraction, high, reciprocal_of_normalised};
+use crate::numeric::{fraction, high};
 use crate::supervise::Direction;
 use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio};
 
 use shape::{Refined, Shape};
-use way::{Guess, Way};
+use way::Way;
 
 /// Estimated over nominal stiffness of the tread, with its reciprocal: it changes once a
 /// crossing and is used many times.
 ///
-/// Range: 1/4 to 4, the nearer end outside. Error of the reciprocal: 1e-8 relative.
+/// Range: 1/4 to 4, the nearer end outside. Error of the reciprocal: 1 LSB, 1.5e-8 relative
+/// at most.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Scale {
     ratio: Ratio,
@@ -43,9 +44,10 @@ impl Scale {
     #[must_use]
     pub fn new(ratio: Ratio) -> Self {
         let bits = ratio.to_bits().clamp(1 << 14, 1 << 18);
-        let shift = (bits as u32).leading_zeros();
-        let reciprocal = reciprocal_of_normalised((bits as u32) << shift);
-        let inverse = (reciprocal.saturating_add(1 << (18 - shift)) >> (19 - shift)) as i32;
+        // 2^44 over the bits, in two digits of 31 and 13 places.
+        let divisor = bits as u32;
+        let (digit, rest) = ((1 << 31) / divisor, (1 << 31) % divisor);
+        let inverse = (digit << 13 | (rest << 13) / divisor) as i32;
         Self { ratio: Ratio::from_bits(bits), inverse }
     }
 
@@ -111,8 +113,8 @@ impl ReducedModel {
 
     /// Everything about the crossing at this radial force, N.
     ///
-    /// Equation: the run r with `F(x, r) + T s(r) = P` by two steps from a
-    /// polynomial guess; then [`Formula::crossing`](super::formula::Formula::crossing). A
+    /// Equation: the run r with `F(x, r) + T s(r) = P` by one step from
+    /// a guess in cells of x and P; then [`Formula::crossing`](super::formula::Formula::crossing). A
     /// scale multiplies what the force exceeds the lift of the load on the mean slope by.
     #[must_use]
     #[inline]
@@ -123,25 +125,19 @@ impl ReducedModel {
         let x = way.fast_part(point.speed);
         let excess = shape.beyond_lift(sought);
         let guess = way.guess_run(x, &excess);
-        let mut found = shape.refine(way, x, &guess, sought, &excess);
-        if !self.driven {
-            // Without friction a low step all but sinks under the force: once more.
-            found = shape.refine(way, x, &Guess { run: found.run, ..guess }, sought, &excess);
-        }
-        let Refined { run, slope } = found;
+        let Refined { run, slope } = shape.refine(way, x, &guess, sought, &excess);
         let w = centred(run);
         let radial = shape.radial_part(wanted, slope, w);
-        let used = self.used(radial, slope);
         let corner_force = shape.newtons(high(radial, slope) << 2);
+        let utilisation = self.used(radial, slope);
         let vibration_um = shape.vibration(point.speed, radial, run);
-        let impact_stress_kpa = shape.impact_stress(point.speed);
         Crossing {
             gap: shape.gap(run),
             corner_force,
-            impact_stress_kpa,
+            impact_stress_kpa: shape.impact_stress(point.speed),
             vibration_um,
-            utilisation: used,
-            slip_margin: self.friction - used,
+            utilisation,
+            slip_margin: self.friction - utilisation,
             at_end: run == shape.least_run() || run == shape.most_run() || shape.is_beyond(force),
         }
     }

@@ -258,13 +258,13 @@ impl Shape {
     }
 
     /// Vibration that is left, um.
-    #[inline(always)]
+    #[inline(never)]
     pub(super) fn vibration(&self, speed: MillimetresPerSecond, radial: i32, run: u32) -> Q16 {
         let force = radial << 2;
-        // From 0.008 mm/s, brought to the top; over the run, 17 bits and rounded.
+        // From 0.008 mm/s, brought to the top; over 17 bits of the run.
         let speed = speed.to_bits().clamp(1 << 9, MOST_SWING_SPEED) as u32;
         let places = speed.leading_zeros();
-        let pace = (speed << places) / ((run >> 14).wrapping_add(1) >> 1 | 1);
+        let pace = (speed << places) / (run >> 15 | 1);
         let swing = high(high(force, self.swing), (pace << 11) as i32);
         let swing = swing >> (self.swing_right + places - 8) << self.swing_left;
         // No more than a sudden force.

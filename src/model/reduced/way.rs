@@ -94,7 +94,7 @@ impl Way {
     }
 
     /// Effective over instant stiffness at a fast part and a centred run, Q26.
-    #[inline(never)]
+    #[inline(always)]
     pub(super) fn stiffness(&self, x: u32, w: i32) -> i32 {
         #[rustfmt::skip]
         let [a0, a1, a2, a3, a4, a5, b0, b1, b2, b3, b4, c0, c1, c2, c3, d0, d1, d2, e0, e1, f0,
