@@ -68,8 +68,8 @@ impl Scale {
 pub struct ReducedModel {
     shape: Shape,
     ways: [Way; 2],
-    /// Whether friction drives the wheel; else it is pushed and needs none.
-    driven: bool,
+    /// All bits if friction drives the wheel; none if it is pushed and needs none.
+    driven: i32,
     /// Friction of tread on wall.
     friction: Ratio,
 }
@@ -122,7 +122,8 @@ impl ReducedModel {
         let (shape, way) = (&self.shape, self.way(point.direction));
         let wanted = shape.part(force);
         let sought = shape.unscaled(wanted, point.scale.inverse);
-        let x = way.fast_part(point.speed);
+        let speed = shape::speed(point.speed);
+        let x = way.fast_part(speed);
         let excess = shape.beyond_lift(sought);
         let guess = way.guess_run(x, &excess);
         let Refined { run, slope } = shape.refine(way, x, &guess, sought, &excess);
@@ -130,15 +131,18 @@ impl ReducedModel {
         let radial = shape.radial_part(wanted, slope, w);
         let corner_force = shape.newtons(high(radial, slope) << 2);
         let utilisation = self.used(radial, slope);
-        let vibration_um = shape.vibration(point.speed, radial, run);
+        let vibration_um = shape.vibration(speed, radial, run);
         Crossing {
             gap: shape.gap(run),
             corner_force,
-            impact_stress_kpa: shape.impact_stress(point.speed),
+            impact_stress_kpa: shape.impact_stress(speed),
             vibration_um,
             utilisation,
             slip_margin: self.friction - utilisation,
-            at_end: run == shape.least_run() || run == shape.most_run() || shape.is_beyond(force),
+            at_end: run == shape.least_run()
+                || run == shape.most_run()
+                || shape.is_beyond(force)
+                || shape.is_below(sought),
         }
     }
 
@@ -213,7 +217,7 @@ impl ReducedModel {
     fn force_part(&self, point: &Point, run: u32) -> i32 {
         let (shape, way) = (&self.shape, self.way(point.direction));
         let w = centred(run);
-        let stiffness = way.stiffness(way.fast_part(point.speed), w);
+        let stiffness = way.stiffness(way.fast_part(shape::speed(point.speed)), w);
         let force = shape.elastic(run, stiffness) + shape.lifting(w);
         shape.scaled(force, point.scale.ratio)
     }
@@ -221,7 +225,7 @@ impl ReducedModel {
     /// Friction used under a radial reaction on this slope, both Q30.
     #[inline(always)]
     fn used(&self, radial: i32, slope: i32) -> Ratio {
-        if self.driven { self.shape.utilisation(radial, slope) } else { Ratio::ZERO }
+        Ratio::from_bits(self.shape.utilisation(radial, slope).to_bits() & self.driven)
     }
 
     /// One address, from which all coefficients are read; a choice of two references would

@@ -50,7 +50,7 @@ pub const fn fraction(a: u32, b: u32) -> u32 {
 #[must_use]
 pub const fn part_of_sum(a: u32, b: u32) -> u32 {
     let sum = a.wrapping_add(b);
-    let shift = (sum | 1).leading_zeros();
+    let shift = sum.leading_zeros() & 31;
     let reciprocal = reciprocal_of_normalised(sum << shift);
     (((a << shift) as u64 * reciprocal as u64) >> 32 << 1) as u32
 }

@@ -14,6 +14,9 @@ use crate::rig::{Rig, RigError};
 use crate::supervise::Direction;
 use polynomial::{interpolate, rows, value};
 
+/// Largest unit of force, N: forces from 8 to 256 N are told, of which no rig needs more.
+const MOST_UNIT_N: f64 = 1024.0;
+
 /// 2 to a power.
 const fn two_to(power: u32) -> f64 {
     (1_u64 << power) as f64
@@ -40,7 +43,7 @@ impl ReducedModel {
         Ok(Self {
             ways: [start.way(rig, Direction::Deploy)?, start.way(rig, Direction::Retract)?],
             shape,
-            driven: load_n.is_some(),
+            driven: if load_n.is_some() { -1 } else { 0 },
             friction: checked("plant.mu", rig.plant.mu)?,
         })
     }
@@ -62,9 +65,20 @@ struct Start<'a> {
 impl<'a> Start<'a> {
     fn new(formula: &'a Formula, load_n: Option<f64>) -> Self {
         let kind = Kind { direction: Direction::Deploy, driven: load_n.is_some() };
-        let longest_mm = formula.largest_run_mm(kind);
         let most = FORCE_END * formula.unit_force_n() * formula.stiffening;
-        let unit_n = libm::exp2(libm::ceil(libm::log2(most)));
+        let unit_n = libm::exp2(libm::ceil(libm::log2(most))).min(MOST_UNIT_N);
+        // No further than to where the unit is reached.
+        let within = |run: f64| {
+            formula.relaxed_force_n(kind, formula.gap_after_mm(run)) * formula.stiffening <= unit_n
+        };
+        let mut longest_mm = formula.largest_run_mm(kind);
+        if !within(longest_mm) {
+            let mut low = 0.0;
+            for _ in 0..40 {
+                let middle = 0.5 * (low + longest_mm);
+                if within(middle) { low = middle } else { longest_mm = middle }
+            }
+        }
         let unit_at_rest_n = unit_n / formula.stiffening;
         let gap = |w: f64| formula.gap_after_mm(longest_mm * (w + 0.5));
         Self {
@@ -94,7 +108,7 @@ impl<'a> Start<'a> {
         let longest_shift = longest_bits.leading_zeros();
         let normalised = longest_bits << longest_shift;
         let places = 14 - libm::log2(self.unit_n) as i32;
-        let force_places = u32::try_from(places).ok().filter(|p| *p < 28).ok_or_else(stiff)?;
+        let force_places = u32::try_from(places).map_err(|_| stiff())?;
         let deflection_um = 1e3 * self.unit_n / f.impact.arm_n_per_mm;
         let at = |w: f64| self.longest_mm * (w + 0.5);
         let part = |force_n: f64| (force_n / self.unit_n * two_to(30)) as i32;
@@ -102,7 +116,6 @@ impl<'a> Start<'a> {
         let swings = f.impact.mode_rad_s > 0.0;
         let ramp = if swings { 2.0 / (f.impact.mode_rad_s * self.longest_mm) } else { 0.0 };
         let deflection_um = if swings { deflection_um } else { 0.0 };
-        let swing = Swing::new(deflection_um * ramp).ok_or_else(stiff)?;
         let slope_at = |w: f64| value(&self.slope, w);
         let driven = self.driven;
         Ok(Shape {
@@ -135,9 +148,7 @@ impl<'a> Start<'a> {
             most_force: (1 << 28) >> force_places,
             stress: (f.impact.stress_per_speed * 1e-3 * two_to(32)).min(two_to(31) - 1.0) as i32,
             deflection: bits(deflection_um, 15).ok_or_else(stiff)?,
-            swing: swing.bits,
-            swing_right: swing.right,
-            swing_left: swing.left,
+            swing: bits(deflection_um * ramp, 27).ok_or_else(stiff)?,
         })
     }
 
@@ -246,30 +257,6 @@ fn to_bits<const N: usize>(values: [f64; N], places: u32) -> Option<[i32; N]> {
         *slot = bits(value, places)?;
     }
     Some(all)
-}
-
-/// A swing, um s/mm, in the format of [`Shape`].
-struct Swing {
-    bits: i32,
-    right: u32,
-    left: u32,
-}
-
-impl Swing {
-    fn new(swing: f64) -> Option<Self> {
-        if swing <= 0.0 {
-            return Some(Self { bits: 0, right: 0, left: 0 });
-        }
-        // From 1/2 to 1 times 2^exponent, so 2^30 and more by 31 - exponent places.
-        let (part, exponent) = libm::frexp(swing);
-        let places = 31 - exponent;
-        (0..50).contains(&places).then(|| Self {
-            bits: (part * two_to(31)).min(two_to(31) - 1.0) as i32,
-            // A swing in places and a pace in 2^(p - 1) make 2^16 by places + p - 38.
-            right: (places - 30).max(0) as u32,
-            left: (30 - places).max(0) as u32,
-        })
-    }
 }
 
 const fn refused(key: &'static str, value: f64, min: f64, max: f64) -> RigError {

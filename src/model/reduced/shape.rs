@@ -1,16 +1,15 @@
 //! What a rig's geometry and load make of a run over the corner; the same on both ways.
 
 use super::centred;
-use super::way::{Guess, Way};
+use super::way::{Guess, LOWEST_OCTAVE, Way};
 use crate::numeric::{fraction, high, horner, horner_with_slope, sqrt_fraction};
 use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio};
 
 /// A function of the centred run, a quartic.
 pub(super) type Quartic = [i32; 5];
 
-/// Fastest speed that impact tells apart, 2048 mm/s, and vibration, 128 mm/s.
-const MOST_SPEED: i32 = 2048 << 16;
-const MOST_SWING_SPEED: i32 = (128 << 16) - 1;
+/// Least excess of a guess, Q30: the lower end of its lowest octave.
+const LEAST_EXCESS: i32 = 1 << (31 - LOWEST_OCTAVE);
 
 /// Geometry, units and load of one rig. The run r is a part of the longest one.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -53,11 +52,8 @@ pub(super) struct Shape {
     pub(super) stress: i32,
     /// Deflection of the arm by the unit of force, um, Q15.
     pub(super) deflection: i32,
-    /// Swing that the unit of force leaves after the longest run, um s/mm, 2^30 and more;
-    /// by how many places its product is too large at 128 mm/s, and too small.
+    /// Swing that the unit of force leaves after the longest run, um s/mm, Q27.
     pub(super) swing: i32,
-    pub(super) swing_right: u32,
-    pub(super) swing_left: u32,
 }
 
 /// What a force exceeds the lift of the load on the steepest slope by: it goes nearly with
@@ -98,6 +94,12 @@ impl Shape {
     #[inline(always)]
     pub(super) fn is_beyond(&self, force: Newtons) -> bool {
         force.to_bits() > self.most_force
+    }
+
+    /// Whether a force on the unscaled tread is less than any that a guess serves.
+    #[inline(always)]
+    pub(super) fn is_below(&self, sought: i32) -> bool {
+        sought - self.most_lifting < LEAST_EXCESS
     }
 
     /// What force has the same run on the unscaled tread, Q30; what exceeds the format
@@ -183,10 +185,9 @@ impl Shape {
     #[inline(always)]
     pub(super) fn utilisation(&self, radial: i32, slope: i32) -> Ratio {
         let radial = (radial.max(self.load >> 1) | 1) as u32;
-        // To 15 bits, rounded; the load below four times 2^30, so that the quotient is Q15.
+        // To 15 bits; the load below four times 2^30, so that the quotient is Q15.
         let places = radial.leading_zeros();
-        let divisor = ((radial << places >> 16) + 1) >> 1;
-        let lifting = ((self.load as u32) << (places - 2)) / divisor;
+        let lifting = ((self.load as u32) << (places - 2)) / (radial << places >> 17 | 1);
         Q16::from_bits(((lifting << 1) as i32) + (slope >> 14))
     }
 
@@ -215,11 +216,11 @@ impl Shape {
         high(high(half, half) << 1, quartic).clamp(0, (1 << 28) - 1)
     }
 
-    /// The force beyond the lift of the load on the steepest slope, up to a quarter of the
-    /// unit.
+    /// The force beyond the lift of the load on the steepest slope, from 2^-7 to a quarter of
+    /// the unit.
     #[inline(always)]
     pub(super) fn beyond_lift(&self, sought: i32) -> Excess {
-        let force = (sought - self.most_lifting).clamp(0, (1 << 28) - 1) | 1;
+        let force = (sought - self.most_lifting).clamp(LEAST_EXCESS, (1 << 28) - 1);
         let octave = (force as u32).leading_zeros();
         Excess { octave, normalised: (force as u32) << octave }
     }
@@ -245,29 +246,35 @@ impl Shape {
         // Less than the excess itself, which fits with one place less.
         let lacking = lacking << (excess.octave - 1);
         // Q31, as the run's half.
-        let step = (high(guess.by_force, lacking) >> guess.places) << 4;
+        let step = high(guess.by_force, lacking) << 4;
         let half = ((guess.run >> 1) as i32).saturating_add(step).max(self.least);
         let run = (half as u32) << 1;
         Refined { run, slope: slope + high(tilt, run.wrapping_sub(guess.run) as i32) }
     }
 
-    /// Impact stress, kPa.
+    /// Impact stress, kPa, at a speed of [`speed`].
     #[inline(always)]
-    pub(super) fn impact_stress(&self, speed: MillimetresPerSecond) -> Q16 {
-        Q16::from_bits(high(speed.to_bits().clamp(0, MOST_SPEED), self.stress))
+    pub(super) fn impact_stress(&self, speed: u32) -> Q16 {
+        Q16::from_bits(high(speed as i32, self.stress))
     }
 
-    /// Vibration that is left, um.
-    #[inline(never)]
-    pub(super) fn vibration(&self, speed: MillimetresPerSecond, radial: i32, run: u32) -> Q16 {
-        let force = radial << 2;
-        // From 0.008 mm/s, brought to the top; over 17 bits of the run.
-        let speed = speed.to_bits().clamp(1 << 9, MOST_SWING_SPEED) as u32;
+    /// Vibration that is left, um, at a speed of [`speed`].
+    #[inline(always)]
+    pub(super) fn vibration(&self, speed: u32, radial: i32, run: u32) -> Q16 {
+        // Brought to the top; over 17 bits of the run.
+        let speed = speed | 1;
         let places = speed.leading_zeros();
         let pace = (speed << places) / (run >> 15 | 1);
-        let swing = high(high(force, self.swing), (pace << 11) as i32);
-        let swing = swing >> (self.swing_right + places - 8) << self.swing_left;
+        // Q28, then Q15 by 9 places for the fastest speed and one more for each half of it.
+        let swing = high(high(radial << 3, self.swing), (pace << 11) as i32);
+        let swing = swing >> (places - 9) << 1;
         // No more than a sudden force.
-        Q16::from_bits(swing.min(high(force, self.deflection) << 1))
+        Q16::from_bits(swing.min(high(radial << 2, self.deflection) << 1))
     }
+}
+
+/// Bits of a speed, mm/s, from 0 to 128, the nearer end outside.
+#[inline(always)]
+pub(super) fn speed(speed: MillimetresPerSecond) -> u32 {
+    speed.to_bits().clamp(0, (1 << 23) - 1) as u32
 }

@@ -81,15 +81,12 @@ pub(super) struct Guess {
     pub(super) run: u32,
     /// Its derivative by the mantissa of the force, of which a half octave is the whole, Q30.
     pub(super) by_force: i32,
-    /// Places to the right for what follows from the derivative.
-    pub(super) places: u32,
 }
 
 impl Way {
-    /// Part of the crossing that is fast, `v / (v + v_half)`, Q32.
+    /// Part of the crossing that is fast at the bits of a speed, `v / (v + v_half)`, Q32.
     #[inline(always)]
-    pub(super) fn fast_part(&self, speed: MillimetresPerSecond) -> u32 {
-        let speed = speed.to_bits().max(0) as u32;
+    pub(super) fn fast_part(&self, speed: u32) -> u32 {
         part_of_sum(speed, self.half_speed)
     }
 
@@ -130,13 +127,10 @@ impl Way {
     }
 
     /// Guess of the run, Q32, from the fast part and what the force exceeds the lift by.
-    ///
-    /// Below the lowest octave as there, with the run by the root of the force.
     #[inline(always)]
     pub(super) fn guess_run(&self, x: u32, excess: &Excess) -> Guess {
-        let below = (excess.octave.max(LOWEST_OCTAVE) - LOWEST_OCTAVE + 1) & !1;
         let half = excess.normalised >> 30 & 1;
-        let row = (2 * (LOWEST_OCTAVE + below - excess.octave) + half) as usize;
+        let row = (2 * (LOWEST_OCTAVE - excess.octave) + half) as usize;
         // Both within their ranges as they are; said again for the compiler.
         let cells = &self.run_cells[(x >> 30) as usize % FAST_CELLS];
         let [p, q, r, s, t] = cells[row.min(FORCE_CELLS - 1)];
@@ -147,9 +141,7 @@ impl Way {
         let bend = high(horner!(u; c0, c1, c2), m);
         let rise = horner!(u; b0, b1, b2) + bend;
         let run = level + high(rise, m);
-        let places = below / 2;
-        let run = ((run.clamp(0, (1 << 30) - 1) as u32) << 2) >> places;
-        Guess { run, by_force: rise + bend, places }
+        Guess { run: (run.clamp(0, (1 << 30) - 1) as u32) << 2, by_force: rise + bend }
     }
 
     /// Speed at which the stiffness after this run is the given one, Q26; none if it is
