@@ -236,6 +236,22 @@ impl ReducedModel {
     }
 }
 
+/// `value`, where it is `beyond` what the model knows the `bound`.
+///
+/// A branch that is hardly ever taken is cheaper than a choice. And the coefficients behind
+/// it are not loaded before it, where they would not fit the registers.
+#[inline(always)]
+fn unless(beyond: bool, bound: i32, value: i32) -> i32 {
+    if beyond { end(bound) } else { value }
+}
+
+#[cold]
+#[inline(never)]
+fn end(bound: i32) -> i32 {
+    // Unseen, or it would be a choice after all.
+    core::hint::black_box(bound)
+}
+
 /// A part of a whole, Q32 without sign, as its difference from one half, Q32 with sign.
 #[inline(always)]
 const fn centred(part: u32) -> i32 {

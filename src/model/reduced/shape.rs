@@ -1,7 +1,7 @@
 //! What a rig's geometry and load make of a run over the corner; the same on both ways.
 
-use super::centred;
 use super::way::{Guess, LOWEST_OCTAVE, Way};
+use super::{centred, unless};
 use crate::numeric::{fraction, high, horner, horner_with_slope, sqrt_fraction};
 use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio};
 
@@ -87,7 +87,8 @@ impl Shape {
     /// takes at rest.
     #[inline(always)]
     pub(super) fn part(&self, force: Newtons) -> i32 {
-        force.to_bits().min(self.most_force).max(0) << self.force_places
+        let bits = force.to_bits().max(0);
+        unless(bits > self.most_force, self.most_force, bits) << self.force_places
     }
 
     /// Whether a force exceeds what [`part`](Self::part) can tell.
@@ -184,7 +185,8 @@ impl Shape {
     /// reaction counts as twice.
     #[inline(always)]
     pub(super) fn utilisation(&self, radial: i32, slope: i32) -> Ratio {
-        let radial = (radial.max(self.load >> 1) | 1) as u32;
+        let least = self.load >> 1;
+        let radial = (unless(radial < least, least, radial) | 1) as u32;
         // To 15 bits; the load below four times 2^30, so that the quotient is Q15.
         let places = radial.leading_zeros();
         let lifting = ((self.load as u32) << (places - 2)) / (radial << places >> 17 | 1);
@@ -220,7 +222,8 @@ impl Shape {
     /// the unit.
     #[inline(always)]
     pub(super) fn beyond_lift(&self, sought: i32) -> Excess {
-        let force = (sought - self.most_lifting).clamp(LEAST_EXCESS, (1 << 28) - 1);
+        let force = (sought - self.most_lifting).min((1 << 28) - 1);
+        let force = unless(force < LEAST_EXCESS, LEAST_EXCESS, force);
         let octave = (force as u32).leading_zeros();
         Excess { octave, normalised: (force as u32) << octave }
     }
@@ -247,7 +250,8 @@ impl Shape {
         let lacking = lacking << (excess.octave - 1);
         // Q31, as the run's half.
         let step = high(guess.by_force, lacking) << 4;
-        let half = ((guess.run >> 1) as i32).saturating_add(step).max(self.least);
+        let half = ((guess.run >> 1) as i32).saturating_add(step);
+        let half = unless(half < self.least, self.least, half);
         let run = (half as u32) << 1;
         Refined { run, slope: slope + high(tilt, run.wrapping_sub(guess.run) as i32) }
     }
@@ -269,7 +273,8 @@ impl Shape {
         let swing = high(high(radial << 3, self.swing), (pace << 11) as i32);
         let swing = swing >> (places - 9) << 1;
         // No more than a sudden force.
-        Q16::from_bits(swing.min(high(radial << 2, self.deflection) << 1))
+        let sudden = high(radial << 2, self.deflection) << 1;
+        Q16::from_bits(unless(swing > sudden, sudden, swing))
     }
 }
 
