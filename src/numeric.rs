@@ -21,7 +21,7 @@ mod table;
 pub use build::{checked, cosine_of_turns};
 pub use divide::{divide, part, reciprocal};
 pub use divisor::Divisor;
-pub use fraction_root::{inverse_sqrt_normalised, sqrt_fraction};
+pub use fraction_root::{inverse_sqrt_guess, inverse_sqrt_normalised, sqrt_fraction};
 pub use high::{fits, fits_with_slope, high};
 pub(crate) use high::{horner, horner_with_curvature, horner_with_slope};
 pub use low_pass::{LowPass, LowPassState};

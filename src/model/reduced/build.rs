@@ -148,7 +148,7 @@ impl<'a> Start<'a> {
             most_force: (1 << 28) >> force_places,
             stress: (f.impact.stress_per_speed * 1e-3 * two_to(32)).min(two_to(31) - 1.0) as i32,
             deflection: bits(deflection_um, 15).ok_or_else(stiff)?,
-            swing: bits(deflection_um * ramp, 27).ok_or_else(stiff)?,
+            swing: bits(deflection_um * ramp, 28).ok_or_else(stiff)?,
         })
     }
 
@@ -284,7 +284,7 @@ mod tests {
         speed: f64,
         scaled: f64,
         vibration: f64,
-        worst: String,
+        lost: usize,
     }
 
     fn errors(rig: &Rig, load: Option<f64>) -> Errors {
@@ -319,7 +319,6 @@ mod tests {
                 let gap = beyond(got.gap, exact.gap_mm, 1.0);
                 if gap > errors.gap {
                     errors.gap = gap;
-                    println!("GAP {gap} {direction:?} {speed} {force} {exact:?} {got:?}");
                 }
                 errors.corner =
                     errors.corner.max(beyond(got.corner_force, exact.corner_force_n, 1.0));
@@ -332,15 +331,11 @@ mod tests {
                 errors.force = errors.force.max(beyond(model.force(&at, near), held, 1.0));
                 let fastest = model.speed(&at, near, wanted, Q16::ZERO, Q16::from_num(200));
                 let needs = formula.force_n(direction, fastest.to_num(), near.to_num(), load);
-                // From zero on the way back, where the force falls with the speed first.
                 if fastest > Q16::ZERO {
-                    let off = (needs / force - 1.0).abs();
-                    if off > errors.speed {
-                        errors.speed = off;
-                        errors.worst = format!("{direction:?} {speed} {force} {fastest} {near}");
-                    }
+                    errors.speed = errors.speed.max((needs / force - 1.0).abs());
                 } else {
-                    println!("NONE {direction:?} {speed} {force} {near}");
+                    // The force that has this gap holds it at the speed that it has it at.
+                    errors.lost += 1;
                 }
                 for scale in [0.8, 1.25] {
                     let at = Point { scale: Scale::new(Q16::from_num(scale)), ..at };
@@ -353,6 +348,10 @@ mod tests {
                     let kind = Kind { direction, driven: load.is_some() };
                     let middle = formula.gap_after_mm(0.5 * formula.largest_run_mm(kind));
                     let lifting = load.unwrap_or(0.0) * formula.contact(middle).slope();
+                    // The forces of the domain, as the unscaled tread feels them.
+                    if !(15.0..=150.0).contains(&((force - lifting) / scale + lifting)) {
+                        continue;
+                    }
                     let excess = formula.force_n(direction, speed, gap, load) - lifting;
                     let off = ((scale * excess + lifting) / force - 1.0).abs();
                     errors.scaled = errors.scaled.max(off);
@@ -369,23 +368,21 @@ mod tests {
                 let mut rig = Rig::prototype();
                 rig.rig.step_height_mm = step_mm;
                 let errors = errors(&rig, load);
-                // At 2 mm the largest forces all but close the gap.
-                let low = step_mm < 3.0;
+                // Pushed over 2 mm, 150 N all but sink the wheel.
+                let pushed = step_mm < 3.0 && load.is_none();
                 let bounds = [
-                    (errors.gap, if low { 5e-3 } else { 2e-5 }),
+                    (errors.gap, if pushed { 1e-3 } else { 1e-5 }),
                     (errors.force, 5e-6),
-                    (errors.corner, if low { 1e-3 } else { 1e-5 }),
-                    (errors.used, 5e-4),
-                    (errors.speed, if low { 1e-2 } else { 5e-3 }),
-                    (errors.scaled, if low { 4e-2 } else { 2e-4 }),
-                    (errors.vibration, 1e-3),
+                    (errors.corner, if pushed { 2e-4 } else { 5e-5 }),
+                    (errors.used, 1e-4),
+                    (errors.speed, if pushed { 4e-3 } else { 2e-3 }),
+                    (errors.scaled, if pushed { 1e-2 } else { 2e-4 }),
+                    (errors.vibration, if pushed { 3e-4 } else { 1e-4 }),
                 ];
-                println!("{step_mm} {load:?} {errors:?}");
                 for (error, bound) in bounds {
-                    if !(error < bound) {
-                        println!("BAD {step_mm} {load:?} {bound} {error}");
-                    }
+                    assert!(error < bound, "{step_mm} {load:?} {bound} {errors:?}");
                 }
+                assert_eq!(errors.lost, 0, "{step_mm} {load:?}");
             }
         }
     }

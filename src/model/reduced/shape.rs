@@ -52,7 +52,7 @@ pub(super) struct Shape {
     pub(super) stress: i32,
     /// Deflection of the arm by the unit of force, um, Q15.
     pub(super) deflection: i32,
-    /// Swing that the unit of force leaves after the longest run, um s/mm, Q27.
+    /// Swing that the unit of force leaves after the longest run, um s/mm, Q28.
     pub(super) swing: i32,
 }
 
@@ -134,8 +134,8 @@ impl Shape {
         let distance = sqrt_fraction(square.saturating_add(part << 1));
         let run = self.free.saturating_sub(distance).min(self.longest - 1);
         let normalised = run << self.longest_shift;
-        let part = (u64::from(normalised) * u64::from(self.longest_inverse)) >> 31;
-        (part.min(u64::from(self.most_run())) as u32).max(self.least_run())
+        let half = (u64::from(normalised) * u64::from(self.longest_inverse)) >> 32;
+        ((half as u32).min(i32::MAX as u32) << 1).max(self.least_run())
     }
 
     /// Gap after this run, mm.
@@ -187,9 +187,10 @@ impl Shape {
     pub(super) fn utilisation(&self, radial: i32, slope: i32) -> Ratio {
         let least = self.load >> 1;
         let radial = (unless(radial < least, least, radial) | 1) as u32;
-        // To 15 bits; the load below four times 2^30, so that the quotient is Q15.
+        // To 15 bits, rounded; the load below four times 2^30, so that the quotient is Q15.
         let places = radial.leading_zeros();
-        let lifting = ((self.load as u32) << (places - 2)) / (radial << places >> 17 | 1);
+        let divisor = ((radial << places >> 16) + 1) >> 1;
+        let lifting = ((self.load as u32) << (places - 2)) / divisor;
         Q16::from_bits(((lifting << 1) as i32) + (slope >> 14))
     }
 
@@ -265,13 +266,15 @@ impl Shape {
     /// Vibration that is left, um, at a speed of [`speed`].
     #[inline(always)]
     pub(super) fn vibration(&self, speed: u32, radial: i32, run: u32) -> Q16 {
-        // Brought to the top; over 17 bits of the run.
+        // Brought to the top; over 18 bits of the run, Q(p - 2), in the middle of what it may
+        // be.
         let speed = speed | 1;
         let places = speed.leading_zeros();
-        let pace = (speed << places) / (run >> 15 | 1);
-        // Q28, then Q15 by 9 places for the fastest speed and one more for each half of it.
-        let swing = high(high(radial << 3, self.swing), (pace << 11) as i32);
-        let swing = swing >> (places - 9) << 1;
+        let pace = (speed << places) / (run >> 14 | 1);
+        let pace = pace << 12 | 1 << 11;
+        // Q16 by 9 places for the fastest speed and one more for each half of it.
+        let swing = high(radial << 3, self.swing).max(0) as u32;
+        let swing = (((u64::from(swing) * u64::from(pace)) >> 32) >> (places - 9)) as i32;
         // No more than a sudden force.
         let sudden = high(radial << 2, self.deflection) << 1;
         Q16::from_bits(unless(swing > sudden, sudden, swing))

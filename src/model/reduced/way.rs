@@ -3,8 +3,7 @@
 use super::centred;
 use super::shape::Excess;
 use crate::numeric::{
-    high, horner, horner_with_curvature, inverse_sqrt_normalised, part_of_sum,
-    reciprocal_of_normalised,
+    high, horner, horner_with_curvature, inverse_sqrt_guess, part_of_sum, reciprocal_of_normalised,
 };
 use crate::units::{MillimetresPerSecond, Q16};
 
@@ -48,15 +47,11 @@ pub(super) const STIFFNESS_CELLS: usize = 8;
 /// stiffness, 3, 2 and 1 of them.
 pub(super) type SpeedCell = [i32; 6];
 
-/// What the stiffness exceeds the given one by, Q26, beyond which there is no speed: 0.2 %
-/// of the instant one.
-const NO_SPEED: i32 = (1 << 26) / 500;
+/// What the square of a slope lacks to reach down to a stiffness, Q24, beyond which there is
+/// no speed: 1/256, where the stiffness stays some 6e-4 of the instant one above it.
+const NO_SPEED: i32 = (1 << 24) / 256;
 
-/// Largest residual of the stiffness, Q26, largest slope of it by x, Q24, and largest
-/// bend, Q23, that a step is taken with; least mean slope over the step, Q27.
-const MOST_LACKING: i32 = (1 << 24) - 1;
-const MOST_SLOPE: i32 = (1 << 27) - 1;
-const MOST_BEND: i32 = (1 << 28) - 1;
+/// Least mean slope of the stiffness by x, Q27, that a step is taken with.
 const LEAST_SLOPE: i32 = 1 << 21;
 
 /// One way of one rig.
@@ -157,15 +152,11 @@ impl Way {
         let (felt, slope, bend) = horner_with_curvature!(centred(guess); c0, c1, c2, c3, c4, c5);
         let half = (guess >> 1) as i32;
         let lacking = stiffness - self.relaxed - high(felt << 4, half);
-        let lacking = lacking.clamp(-MOST_LACKING, MOST_LACKING);
         // Of the stiffness by x: derivative, Q24, and half the second, Q23.
         let bend = slope + (high(bend, half) << 1);
         let slope = (felt << 1) + (high(slope, half) << 2);
-        let step = step(slope, bend, lacking);
-        let x = guess.saturating_add_signed(step).clamp(1 << 16, u32::MAX - (1 << 16));
-        let felt = horner!(centred(x); c0, c1, c2, c3, c4, c5);
-        let value = self.relaxed + high(felt << 4, (x >> 1) as i32);
-        if value - stiffness > NO_SPEED { None } else { Some(self.speed_of(x)) }
+        let half = half.saturating_add(step(slope, bend, lacking)?).max(1 << 15);
+        Some(self.speed_of((half as u32) << 1))
     }
 
     /// Guess of the fast part, Q32, from the stiffness and the run.
@@ -193,17 +184,24 @@ impl Way {
     }
 }
 
-/// The step of x, Q32, that makes up for a lacking stiffness, Q26, from its slope, Q24, and
-/// half its second derivative, Q23; by a quarter at most.
+/// The step of x, Q31, that makes up for a lacking stiffness, Q26, from its slope, Q24, and
+/// half its second derivative, Q23; by a quarter at most. None where the parabola stays
+/// above.
 #[inline(always)]
-fn step(slope: i32, bend: i32, lacking: i32) -> i32 {
-    let slope = slope.clamp(-MOST_SLOPE, MOST_SLOPE) << 4;
-    let bend = bend.clamp(-MOST_BEND, MOST_BEND);
-    // Q24; none where the parabola does not reach so far.
-    let square = (high(slope, slope) + (high(bend << 2, lacking << 6) << 1)).max(0) as u32;
-    let (shift, inverse) = inverse_sqrt_normalised(square);
+fn step(slope: i32, bend: i32, lacking: i32) -> Option<i32> {
+    // Up to 8, 32 and a quarter: to the next power of two, which takes one instruction.
+    let slope = slope.clamp(-(1 << 27), (1 << 27) - 1) << 4;
+    let bend = bend.clamp(-(1 << 28), (1 << 28) - 1) << 2;
+    let lacking = lacking.clamp(-(1 << 24), (1 << 24) - 1) << 6;
+    // Q24.
+    let square = high(slope, slope) + (high(bend, lacking) << 1);
+    if square < -NO_SPEED {
+        return None;
+    }
+    let square = square.max(0) as u32;
+    let (shift, inverse) = inverse_sqrt_guess(square);
     let root = ((u64::from(square << shift) * u64::from(inverse << 1)) >> 32) as u32;
     // Half the sum, Q27, then Q14.
-    let mean = ((slope >> 2) + (root >> (shift / 2)) as i32).max(LEAST_SLOPE) >> 13;
-    ((lacking << 6) / mean).clamp(-(1 << 16), (1 << 16) - 1) << 14
+    let mean = ((slope >> 2) + (root >> (shift / 2)) as i32).max(LEAST_SLOPE) as u32 >> 13;
+    Some((lacking / mean as i32).clamp(-(1 << 16), (1 << 16) - 1) << 13)
 }
