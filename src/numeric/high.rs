@@ -126,6 +126,25 @@ mod tests {
         }
 
         #[test]
+        fn curvatures_are_within_their_bounds(
+            c in prop::array::uniform6(any::<i32>()),
+            shift in 4_u32..10,
+            t in any::<i32>(),
+        ) {
+            let c = c.map(|x| x >> shift);
+            prop_assume!(fits_with_slope(&c.map(|x| x.saturating_mul(4))));
+            let [a, b, d, e, f, g] = c;
+            let x = f64::from(t) / 2f64.powi(32);
+            let bend = (2..6).rev().fold(0.0, |sum, i| {
+                sum * x + 0.5 * (i * (i - 1)) as f64 * f64::from(c[i])
+            });
+            let (value, rise, half) = horner_with_curvature!(t; a, b, d, e, f, g);
+            let (same, slope) = horner_with_slope!(t; a, b, d, e, f, g);
+            prop_assert_eq!((value, rise), (same, slope));
+            prop_assert!((f64::from(half) - bend).abs() < 14.0, "{half} {bend}");
+        }
+
+        #[test]
         fn what_fits_never_overflows(
             c in prop::array::uniform5(any::<i32>()),
             shift in 0_u32..4,
