@@ -142,10 +142,7 @@ impl ReducedModel {
             vibration_um,
             utilisation,
             slip_margin: self.friction - utilisation,
-            at_end: run == shape.least_run()
-                || run == shape.most_run()
-                || shape.is_beyond(force)
-                || shape.is_below(sought),
+            at_end: shape.is_at_end(force, sought, run),
         }
     }
 

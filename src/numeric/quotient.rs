@@ -52,7 +52,8 @@ pub const fn part_of_sum(a: u32, b: u32) -> u32 {
     let sum = a.wrapping_add(b);
     let shift = sum.leading_zeros() & 31;
     let reciprocal = reciprocal_of_normalised(sum << shift);
-    (((a << shift) as u64 * reciprocal as u64) >> 32 << 1) as u32
+    let half = (((a << shift) as u64 * reciprocal as u64) >> 32) as u32;
+    half << 1
 }
 
 #[cfg(test)]

@@ -146,7 +146,7 @@ impl<'a> Start<'a> {
             middle_lifting: part(self.load_n * slope_at(0.0)),
             force_places,
             most_force: (1 << 28) >> force_places,
-            stress: (f.impact.stress_per_speed * 1e-3 * two_to(32)).min(two_to(31) - 1.0) as i32,
+            stress: (f.impact.stress_per_speed * 1e-3 * two_to(32)).min(two_to(32) - 1.0) as u32,
             deflection: bits(deflection_um, 15).ok_or_else(stiff)?,
             swing: bits(deflection_um * ramp, 28).ok_or_else(stiff)?,
         })

@@ -49,7 +49,7 @@ pub(super) struct Shape {
     /// A quarter of the unit, Q16.
     pub(super) most_force: i32,
     /// Impact stress per speed, kPa s/mm, Q32.
-    pub(super) stress: i32,
+    pub(super) stress: u32,
     /// Deflection of the arm by the unit of force, um, Q15.
     pub(super) deflection: i32,
     /// Swing that the unit of force leaves after the longest run, um s/mm, Q28.
@@ -91,16 +91,15 @@ impl Shape {
         unless(bits > self.most_force, self.most_force, bits) << self.force_places
     }
 
-    /// Whether a force exceeds what [`part`](Self::part) can tell.
+    /// Whether a force, the same on the unscaled tread or the run that it gives is beyond
+    /// what the model knows: one of four differences is negative.
     #[inline(always)]
-    pub(super) fn is_beyond(&self, force: Newtons) -> bool {
-        force.to_bits() > self.most_force
-    }
-
-    /// Whether a force on the unscaled tread is less than any that a guess serves.
-    #[inline(always)]
-    pub(super) fn is_below(&self, sought: i32) -> bool {
-        sought - self.most_lifting < LEAST_EXCESS
+    pub(super) fn is_at_end(&self, force: Newtons, sought: i32, run: u32) -> bool {
+        let half = (run >> 1) as i32;
+        let force = self.most_force.saturating_sub(force.to_bits());
+        let excess = sought - self.most_lifting - LEAST_EXCESS;
+        let (short, long) = (half - self.least - 1, i32::MAX - 1 - half);
+        (force | excess | short | long) < 0
     }
 
     /// What force has the same run on the unscaled tread, Q30; what exceeds the format
@@ -260,7 +259,7 @@ impl Shape {
     /// Impact stress, kPa, at a speed of [`speed`].
     #[inline(always)]
     pub(super) fn impact_stress(&self, speed: u32) -> Q16 {
-        Q16::from_bits(high(speed as i32, self.stress))
+        Q16::from_bits(((u64::from(speed) * u64::from(self.stress)) >> 32) as i32)
     }
 
     /// Vibration that is left, um, at a speed of [`speed`].
@@ -274,7 +273,8 @@ impl Shape {
         let pace = pace << 12 | 1 << 11;
         // Q16 by 9 places for the fastest speed and one more for each half of it.
         let swing = high(radial << 3, self.swing).max(0) as u32;
-        let swing = (((u64::from(swing) * u64::from(pace)) >> 32) >> (places - 9)) as i32;
+        let swing = ((u64::from(swing) * u64::from(pace)) >> 32) as u32;
+        let swing = (swing >> (places - 9)) as i32;
         // No more than a sudden force.
         let sudden = high(radial << 2, self.deflection) << 1;
         Q16::from_bits(unless(swing > sudden, sudden, swing))

@@ -115,23 +115,7 @@ impl Bench {
             let mut points = vec![Vec::new(); FORCE_CELLS];
             for node in nodes(FAST_NODES) {
                 let x = (column as f64 + node) / FAST_CELLS as f64;
-                let mut most = 0.0;
-                for k in 0..RUNS {
-                    let part = 0.03 * (1.03_f64 / 0.03).powf(k as f64 / (RUNS - 1) as f64);
-                    let gap = f.gap_after_mm(part * self.longest_mm);
-                    let stiffness = 1.0 / f.stiffening + x * felt_at(x, part);
-                    let elastic = f.relaxed_force_n(kind, gap) * f.stiffening * stiffness;
-                    let sought = elastic / self.unit_n + load * slope_after(part);
-                    let excess = sought - most_lifting;
-                    // On to where the force falls again.
-                    if excess <= most {
-                        if most > 0.0 {
-                            break;
-                        }
-                        continue;
-                    }
-                    most = excess;
-                    let weight = if sought < most_of_use { 1.0 } else { TAME };
+                let mut add = |excess: f64, part: f64, weight: f64| {
                     let octave = excess.log2().floor();
                     let mantissa = excess / octave.exp2();
                     let half = f64::from(mantissa >= 1.5);
@@ -140,13 +124,33 @@ impl Bench {
                         let m = 2.0 * (mantissa - 1.0) - half;
                         points[row as usize].push((node, m, part, weight / part));
                     }
+                };
+                let ratio = (1.03_f64 / 0.03).powf(1.0 / (RUNS - 1) as f64);
+                let (mut part, mut most) = (0.03, 0.0);
+                for _ in 0..RUNS {
+                    let gap = f.gap_after_mm(part * self.longest_mm);
+                    let stiffness = 1.0 / f.stiffening + x * felt_at(x, part);
+                    let elastic = f.relaxed_force_n(kind, gap) * f.stiffening * stiffness;
+                    let sought = elastic / self.unit_n + load * slope_after(part);
+                    let excess = sought - most_lifting;
+                    if excess > most {
+                        add(excess, part, if sought < most_of_use { 1.0 } else { TAME });
+                        most = excess;
+                    } else if most > 0.0 {
+                        // Beyond it the force falls again.
+                        break;
+                    }
+                    part *= ratio;
+                }
+                // On as the root of the force, so that every cell is tame.
+                while most > 0.0 && most < 0.25 {
+                    most *= ratio * ratio;
+                    add(most, part, TAME);
+                    part *= ratio;
                 }
             }
             for (cell, points) in cells.iter_mut().zip(points) {
-                // A cell that no run reaches is not asked for either.
-                if points.len() >= 2 * CELL {
-                    *cell = surface(&POWERS, points.into_iter())?;
-                }
+                *cell = surface(&POWERS, points.into_iter())?;
             }
         }
         Some(guess)
