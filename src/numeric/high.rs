@@ -43,7 +43,27 @@ macro_rules! horner_with_slope {
     }};
 }
 
-pub(crate) use {horner, horner_with_slope};
+/// The same polynomial, its derivative and half its second derivative by `t`.
+///
+/// Range: as [`horner_with_slope`], and half the second derivative's sums must fit, which
+/// they do where those of the derivative stay below a quarter of the range. Error: below 2,
+/// 6 and 14 LSB. Cost: three instructions a degree less three, and the loads.
+macro_rules! horner_with_curvature {
+    ($t:expr; $c0:expr, $c1:expr, $c2:expr) => {{
+        let (value, slope) = $crate::numeric::horner_with_slope!($t; $c0, $c1, $c2);
+        (value, slope, $c2)
+    }};
+    ($t:expr; $c:expr, $($rest:expr),+) => {{
+        let (value, slope, bend) = $crate::numeric::horner_with_curvature!($t; $($rest),+);
+        (
+            $c + $crate::numeric::high(value, $t),
+            value + $crate::numeric::high(slope, $t),
+            slope + $crate::numeric::high(bend, $t),
+        )
+    }};
+}
+
+pub(crate) use {horner, horner_with_curvature, horner_with_slope};
 
 /// Whether no `t` makes `horner` overflow with these coefficients, in any step.
 #[must_use]
@@ -103,6 +123,25 @@ mod tests {
             let (value, rise) = horner_with_slope!(t; a, b, d, e, f, g, h);
             prop_assert_eq!(f64::from(value), got);
             prop_assert!((f64::from(rise) - slope).abs() < 6.0, "{rise} {slope}");
+        }
+
+        #[test]
+        fn curvatures_are_within_their_bounds(
+            c in prop::array::uniform6(any::<i32>()),
+            shift in 4_u32..10,
+            t in any::<i32>(),
+        ) {
+            let c = c.map(|x| x >> shift);
+            prop_assume!(fits_with_slope(&c.map(|x| x.saturating_mul(4))));
+            let [a, b, d, e, f, g] = c;
+            let x = f64::from(t) / 2f64.powi(32);
+            let bend = (2..6).rev().fold(0.0, |sum, i| {
+                sum * x + 0.5 * (i * (i - 1)) as f64 * f64::from(c[i])
+            });
+            let (value, rise, half) = horner_with_curvature!(t; a, b, d, e, f, g);
+            let (same, slope) = horner_with_slope!(t; a, b, d, e, f, g);
+            prop_assert_eq!((value, rise), (same, slope));
+            prop_assert!((f64::from(half) - bend).abs() < 14.0, "{half} {bend}");
         }
 
         #[test]

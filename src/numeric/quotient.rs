@@ -42,6 +42,20 @@ pub const fn fraction(a: u32, b: u32) -> u32 {
     (((a << shift) as u64 * reciprocal as u64) >> 31) as u32
 }
 
+/// Part `2^32 a / (a + b)` that one number is of a sum.
+///
+/// Range: `b` from 1, `a + b` below 2^32; outside it a number without meaning. Error: 0 to
+/// 24 LSB too small, so 5.6e-9 absolute. Cost: as [`fraction`], without its branch.
+#[inline(always)]
+#[must_use]
+pub const fn part_of_sum(a: u32, b: u32) -> u32 {
+    let sum = a.wrapping_add(b);
+    let shift = sum.leading_zeros() & 31;
+    let reciprocal = reciprocal_of_normalised(sum << shift);
+    let half = (((a << shift) as u64 * reciprocal as u64) >> 32) as u32;
+    half << 1
+}
+
 #[cfg(test)]
 #[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
@@ -80,6 +94,19 @@ mod tests {
         fn reciprocals_agree_with_f64(n in 1_u32 << 31..) {
             let error = reciprocal_error(n);
             prop_assert!((-16.0..=0.0).contains(&error), "{error}");
+        }
+
+        #[test]
+        fn parts_of_sums_agree_with_f64(
+            a in any::<u32>(),
+            b in 1_u32..,
+            a_shift in 1_u32..32,
+            b_shift in 1_u32..31,
+        ) {
+            let (a, b) = (a >> a_shift, (b >> b_shift).max(1));
+            let exact = f64::from(a) / (f64::from(a) + f64::from(b)) * 2f64.powi(32);
+            let error = f64::from(part_of_sum(a, b)) - exact;
+            prop_assert!((-24.0..=0.0).contains(&error), "{error}");
         }
 
         #[test]

@@ -10,5 +10,7 @@
 mod model;
 mod number;
 
-pub use model::{Answer, COEFFICIENTS, FELT, Given, Model, Shared, WAY, Way};
-pub use number::{Double, Fixed, Libm, Micro, Number};
+pub use model::{
+    Answer, CELL, COEFFICIENTS, FAST_CELLS, FELT, FORCE_CELLS, Given, Model, Shared, WAY, Way,
+};
+pub use number::{Double, Fixed, HalfOctave, Libm, Micro, Number};

@@ -1,19 +1,27 @@
-//! The polynomials of the shipping model, solved by one step of Halley's method, once for
-//! all arithmetics.
+//! The polynomials of the shipping model, solved as it does by one step from a guess in
+//! cells, once for all arithmetics.
 //!
-//! Lengths over R and forces over a unit; the run over the corner as part of the
-//! longest. Polynomials in parts of a whole are in `2 part - 1`, from -1 to 1.
+//! Lengths over R and forces over a unit, a power of two; the run over the corner as part
+//! of the longest. Polynomials in parts of a whole are in `2 part - 1`, from -1 to 1.
 
-use crate::number::Number;
+use crate::number::{HalfOctave, Number};
 
 /// Coefficients of one way: see [`Way`].
-pub const WAY: usize = 2 + FELT + 21;
+pub const WAY: usize = 2 + FELT + FAST_CELLS * FORCE_CELLS * CELL;
 
 /// Terms of the felt stiffening.
 pub const FELT: usize = 22;
 
+/// Equal parts of the range of the fast part, and half octaves of the force from
+/// 2^-7 to 2^-2, with a guess of the run each, and terms of that.
+pub const FAST_CELLS: usize = 4;
+/// See [`FAST_CELLS`].
+pub const FORCE_CELLS: usize = 10;
+/// See [`FAST_CELLS`].
+pub const CELL: usize = 10;
+
 /// Coefficients of both ways and of what they share.
-pub const COEFFICIENTS: usize = 34 + 2 * WAY;
+pub const COEFFICIENTS: usize = 32 + 2 * WAY;
 
 /// A working point, bits of Q15.16.
 #[repr(C)]
@@ -60,22 +68,18 @@ pub struct Shared<N = f64> {
     pub parts_per_128_n: N,
     /// Unit of force over 128 N.
     pub unit_128_n: N,
-    /// Free and longest run over R, shortest over longest.
+    /// Free run over R, shortest over longest.
     pub free: N,
-    /// See `free`.
-    pub longest: N,
     /// See `free`.
     pub least: N,
     /// 1 over the longest run over R, over 4.
     pub inverse_longest_4: N,
-    /// R/2 over 16 mm.
-    pub half_radius_16: N,
     /// 1/R, 1/mm.
     pub inverse_radius: N,
-    /// Load, and what its least slope takes off every force, over the unit.
+    /// Load, and what its largest slope takes off every force, over the unit.
     pub load: N,
     /// See `load`.
-    pub least_lifting: N,
+    pub most_lifting: N,
     /// Impact stress at 128 mm/s over 16 kPa.
     pub stress: N,
     /// `2 v / (omega r)` at 128 mm/s and the longest run.
@@ -89,9 +93,9 @@ pub struct Shared<N = f64> {
     /// Slope of the contact.
     pub slope: [N; 5],
     /// Radial reaction over elastic force.
-    pub cosine: [N; 5],
-    /// `2 R gap / d^2`.
-    pub gap: [N; 5],
+    pub cosine: [N; 4],
+    /// Gap over 16 mm.
+    pub gap: [N; 6],
 }
 
 /// Coefficients of one way.
@@ -103,9 +107,9 @@ pub struct Way<N = f64> {
     pub relaxed: N,
     /// Felt stiffening `(s - 1)/s E`: `u^i t^j` for i/5 + j/6 at most 1, by j and then i.
     pub felt: [N; FELT],
-    /// Run over twice the root of the elastic force: total degree 5, by the root and then
-    /// by the fast part.
-    pub guess: [N; 21],
+    /// Run by cells of the fast part and of the force: `u^i m^j`, by the mantissa m and then
+    /// the part u, 4, 3 and 3 terms.
+    pub guess: [[[N; CELL]; FORCE_CELLS]; FAST_CELLS],
 }
 
 /// The model of one rig.
@@ -139,26 +143,24 @@ impl Shared {
             self.parts_per_128_n,
             self.unit_128_n,
             self.free,
-            self.longest,
             self.least,
             self.inverse_longest_4,
-            self.half_radius_16,
             self.inverse_radius,
             self.load,
-            self.least_lifting,
+            self.most_lifting,
             self.stress,
             self.ramp,
             self.deflection,
             self.friction,
         ];
-        let quartics = [self.force, self.slope, self.cosine, self.gap];
-        single.into_iter().chain(quartics.into_iter().flatten())
+        single.into_iter().chain(self.force).chain(self.slope).chain(self.cosine).chain(self.gap)
     }
 }
 
 impl Way {
     fn list(&self) -> impl Iterator<Item = f64> {
-        [self.half_speed, self.relaxed].into_iter().chain(self.felt).chain(self.guess)
+        let guess = self.guess.into_iter().flatten().flatten();
+        [self.half_speed, self.relaxed].into_iter().chain(self.felt).chain(guess)
     }
 }
 
@@ -179,13 +181,11 @@ impl<N: Number> Model<N> {
             parts_per_128_n: next()?,
             unit_128_n: next()?,
             free: next()?,
-            longest: next()?,
             least: next()?,
             inverse_longest_4: next()?,
-            half_radius_16: next()?,
             inverse_radius: next()?,
             load: next()?,
-            least_lifting: next()?,
+            most_lifting: next()?,
             stress: next()?,
             ramp: next()?,
             deflection: next()?,
@@ -200,7 +200,7 @@ impl<N: Number> Model<N> {
                 half_speed: next()?,
                 relaxed: next()?,
                 felt: list(&mut next)?,
-                guess: list(&mut next)?,
+                guess: cells(&mut next)?,
             })
         };
         Some(Self { shared, ways: [way()?, way()?], scale: N::ONE, inverse_scale: N::ONE })
@@ -213,21 +213,20 @@ impl<N: Number> Model<N> {
         let speed = N::input(given.speed, 7);
         let wanted = N::input(given.wanted, 7) * shared.parts_per_128_n;
         let fast = speed / (speed + way.half_speed);
-        let row = way.row(fast);
         let load = shared.load * self.inverse_scale;
         let sought = wanted * self.inverse_scale;
-        let elastic = (sought - shared.least_lifting).at_least(N::ZERO);
-        let root = (elastic + elastic + elastic + elastic).at_most(N::ONE).sqrt();
-        let guess = (way.guess(fast, root) * root).at_least(shared.least).at_most(N::ONE);
-        let run = shared.refine(guess, sought, load, &row);
+        let excess = (sought - shared.most_lifting).half_octave();
+        let guess = way.guess(fast, &excess);
+        let (run, slope) = shared.refine(&guess, sought, load, way, fast, &excess);
         let t = run + run - N::ONE;
-        let slope = quartic(&shared.slope, t);
         let reaction = (wanted - shared.load * slope).at_least(N::ZERO);
-        let radial = reaction * quartic(&shared.cosine, t);
-        let used = shared.load / radial.at_least(shared.least) + slope;
+        let [c0, c1, c2, c3] = shared.cosine;
+        let radial = reaction * (horner!(t; c0, c1, c2, c3));
+        let used = shared.load / radial.at_least(shared.load * N::HALF) + slope;
+        let [g0, g1, g2, g3, g4, g5] = shared.gap;
         let ramp = (speed * shared.ramp / run).at_most(N::ONE);
         Answer {
-            gap: shared.gap_after(run, t),
+            gap: (horner!(t; g0, g1, g2, g3, g4, g5)).output(4),
             corner_force: (radial * slope * shared.unit_128_n).output(7),
             impact_stress_kpa: (speed * shared.stress).output(4),
             vibration_um: (radial * shared.deflection * ramp).output(12),
@@ -247,110 +246,80 @@ impl<N: Number> Model<N> {
         let run = quarter + quarter + quarter + quarter;
         let run = run.at_least(shared.least).at_most(N::ONE);
         let t = run + run - N::ONE;
-        let row = way.row(speed / (speed + way.half_speed));
-        let elastic = run * run * quartic(&shared.force, t) * row.stiffness(t);
+        let fast = speed / (speed + way.half_speed);
+        let elastic = run * run * quartic(&shared.force, t) * way.stiffness(fast, t);
         let lifting = shared.load * quartic(&shared.slope, t);
         ((elastic * self.scale + lifting) * shared.unit_128_n).output(7)
     }
 
     #[inline(always)]
     fn way(&self, direction: u32) -> &Way<N> {
-        if direction == 0 { &self.ways[0] } else { &self.ways[1] }
+        // One address: a choice of two references would be made anew for each coefficient.
+        &self.ways[(direction & 1) as usize]
     }
 }
 
-/// The stiffening at one speed: polynomial in the run.
-struct Row<N> {
-    terms: [N; 7],
-    fast: N,
-    relaxed: N,
-}
-
-impl<N: Number> Row<N> {
-    #[inline(always)]
-    fn stiffness(&self, t: N) -> N {
-        let [c0, c1, c2, c3, c4, c5, c6] = self.terms;
-        self.relaxed + self.fast * (horner!(t; c0, c1, c2, c3, c4, c5, c6))
-    }
-
-    #[inline(always)]
-    fn stiffness_with_slope(&self, t: N) -> (N, N) {
-        let [c0, c1, c2, c3, c4, c5, c6] = self.terms;
-        let (felt, slope) = horner_with_slope!(t; c0, c1, c2, c3, c4, c5, c6);
-        (self.relaxed + self.fast * felt, self.fast * slope)
-    }
+/// A guess of the run, and its derivative by the mantissa of the force.
+struct Guess<N> {
+    run: N,
+    by_force: N,
 }
 
 impl<N: Number> Way<N> {
+    /// Effective over instant stiffness.
     #[inline(always)]
-    fn row(&self, fast: N) -> Row<N> {
+    fn stiffness(&self, fast: N, t: N) -> N {
         #[rustfmt::skip]
         let [a0, a1, a2, a3, a4, a5, b0, b1, b2, b3, b4, c0, c1, c2, c3, d0, d1, d2, e0, e1, f0,
             g0] = self.felt;
         let u = fast + fast - N::ONE;
-        Row {
-            terms: [
-                horner!(u; a0, a1, a2, a3, a4, a5),
-                horner!(u; b0, b1, b2, b3, b4),
-                horner!(u; c0, c1, c2, c3),
-                horner!(u; d0, d1, d2),
-                horner!(u; e0, e1),
-                f0,
-                g0,
-            ],
-            fast,
-            relaxed: self.relaxed,
-        }
+        let felt = horner!(
+            t;
+            (horner!(u; a0, a1, a2, a3, a4, a5)),
+            (horner!(u; b0, b1, b2, b3, b4)),
+            (horner!(u; c0, c1, c2, c3)),
+            (horner!(u; d0, d1, d2)),
+            (horner!(u; e0, e1)),
+            f0,
+            g0
+        );
+        self.relaxed + fast * felt
     }
 
     #[inline(always)]
-    fn guess(&self, fast: N, root: N) -> N {
-        #[rustfmt::skip]
-        let [a0, a1, a2, a3, a4, a5, b0, b1, b2, b3, b4, c0, c1, c2, c3, d0, d1, d2, e0, e1, f0] =
-            self.guess;
-        let (p, q) = (fast + fast - N::ONE, root + root - N::ONE);
-        horner!(
-            q;
-            (horner!(p; a0, a1, a2, a3, a4, a5)),
-            (horner!(p; b0, b1, b2, b3, b4)),
-            (horner!(p; c0, c1, c2, c3)),
-            (horner!(p; d0, d1, d2)),
-            (horner!(p; e0, e1)),
-            f0
-        )
+    fn guess(&self, fast: N, excess: &HalfOctave<N>) -> Guess<N> {
+        let (column, u) = fast.quarter();
+        let cells = &self.guess[column.min(FAST_CELLS - 1)];
+        let [a0, a1, a2, a3, b0, b1, b2, c0, c1, c2] = cells[excess.row.min(FORCE_CELLS - 1)];
+        let m = excess.mantissa;
+        let bend = m * (horner!(u; c0, c1, c2));
+        let rise = (horner!(u; b0, b1, b2)) + bend;
+        Guess { run: (horner!(u; a0, a1, a2, a3)) + m * rise, by_force: rise + bend }
     }
 }
 
 impl<N: Number> Shared<N> {
-    /// One step of Halley's method towards the run whose force is `sought`:
-    /// `dr = r d / (r F' + 0.35 d)`.
+    /// One step towards the run whose force is `sought`, by the guess's own derivative;
+    /// also the slope of the contact there.
     #[inline(always)]
-    fn refine(&self, guess: N, sought: N, load: N, row: &Row<N>) -> N {
-        let [a0, a1, a2, a3, a4] = self.force;
+    fn refine(
+        &self,
+        guess: &Guess<N>,
+        sought: N,
+        load: N,
+        way: &Way<N>,
+        fast: N,
+        excess: &HalfOctave<N>,
+    ) -> (N, N) {
+        let run = guess.run.at_least(self.least).at_most(N::ONE);
+        let t = run + run - N::ONE;
         let [s0, s1, s2, s3, s4] = self.slope;
-        let t = guess + guess - N::ONE;
-        let square = guess * guess;
-        let (force, force_slope) = horner_with_slope!(t; a0, a1, a2, a3, a4);
-        let (slope, slope_slope) = horner_with_slope!(t; s0, s1, s2, s3, s4);
-        let (stiffness, stiffness_slope) = row.stiffness_with_slope(t);
-        let elastic = square * force * stiffness;
-        let lacking = sought - elastic - load * slope;
-        // Slopes are by t, which grows twice as fast as the run.
-        let bend = force_slope * stiffness + force * stiffness_slope;
-        let cubic = square * guess * bend + load * guess * slope_slope;
-        let rise = elastic + elastic + cubic + cubic + N::CURVATURE * lacking;
-        // By half the run at most.
-        let half = rise * N::HALF;
-        let lacking = lacking.at_most(half).at_least(N::ZERO - half);
-        (guess + guess * (lacking / rise.at_least(self.least * self.least * self.least)))
-            .at_least(self.least)
-            .at_most(N::ONE)
-    }
-
-    #[inline(always)]
-    fn gap_after(&self, run: N, t: N) -> i32 {
-        let distance = self.free - self.longest * run;
-        (distance * distance * quartic(&self.gap, t) * self.half_radius_16).output(4)
+        let (slope, tilt) = horner_with_slope!(t; s0, s1, s2, s3, s4);
+        let elastic = run * run * quartic(&self.force, t) * way.stiffness(fast, t);
+        let lacking = (sought - elastic - load * slope).by_places(excess.places);
+        let better = (run + guess.by_force * lacking).at_least(self.least).at_most(N::ONE);
+        let step = better - run;
+        (better, slope + tilt * (step + step))
     }
 }
 
@@ -358,6 +327,17 @@ impl<N: Number> Shared<N> {
 fn quartic<N: Number>(coefficients: &[N; 5], t: N) -> N {
     let [c0, c1, c2, c3, c4] = *coefficients;
     horner!(t; c0, c1, c2, c3, c4)
+}
+
+/// The next cells.
+fn cells<N: Number, const R: usize, const Q: usize>(
+    next: &mut impl FnMut() -> Option<N>,
+) -> Option<[[[N; CELL]; R]; Q]> {
+    let mut all = [[[N::ZERO; CELL]; R]; Q];
+    for cell in all.iter_mut().flatten() {
+        *cell = list(next)?;
+    }
+    Some(all)
 }
 
 /// The next so many coefficients.

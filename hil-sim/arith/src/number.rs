@@ -5,6 +5,17 @@ use core::ops::{Add, Div, Mul, Sub};
 use fixed::types::I4F28;
 use micromath::F32Ext;
 
+/// A number as mantissa in a half octave.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HalfOctave<N> {
+    /// Half octaves above 2^-7; what is below counts as there.
+    pub row: usize,
+    /// Where in the half octave, from -1 to 1.
+    pub mantissa: N,
+    /// Places that make a difference of numbers one of mantissas.
+    pub places: u32,
+}
+
 /// Numbers that the model can be computed with.
 pub trait Number:
     Copy
@@ -20,14 +31,20 @@ pub trait Number:
     const ONE: Self;
     /// 1/2.
     const HALF: Self;
-    /// Halley's weight of the residual, 0.35.
-    const CURVATURE: Self;
-
     /// From a coefficient; none if it is out of range.
     fn of(value: f64) -> Option<Self>;
 
     /// Square root of a number that is not negative.
     fn sqrt(self) -> Self;
+
+    /// Which quarter of the numbers from 0 to 1, and where in it, from -1 to 1.
+    fn quarter(self) -> (usize, Self);
+
+    /// Which half octave between 2^-7 and 2^-2, held at these, and where in it.
+    fn half_octave(self) -> HalfOctave<Self>;
+
+    /// Times 2^`places`, from 2 to 29.
+    fn by_places(self, places: u32) -> Self;
 
     /// From the bits of a Q15.16, over 2^`places`.
     fn input(bits: i32, places: u32) -> Self;
@@ -94,7 +111,6 @@ impl Number for Fixed {
     const ZERO: Self = Self(I4F28::ZERO);
     const ONE: Self = Self(I4F28::ONE);
     const HALF: Self = Self(I4F28::from_bits(1 << 27));
-    const CURVATURE: Self = Self(I4F28::lit("0.35"));
 
     fn of(value: f64) -> Option<Self> {
         I4F28::checked_from_num(value).map(Self)
@@ -103,6 +119,32 @@ impl Number for Fixed {
     #[inline(always)]
     fn sqrt(self) -> Self {
         Self(self.0.checked_sqrt().unwrap_or(I4F28::ZERO))
+    }
+
+    #[inline(always)]
+    fn quarter(self) -> (usize, Self) {
+        let part = (self.0.to_bits() as u32) << 4;
+        // A quarter is 2^26: brought to one above -1.
+        let centred = ((part << 2) ^ 0x8000_0000) as i32;
+        ((part >> 30) as usize, Self(I4F28::from_bits(centred >> 3)))
+    }
+
+    #[inline(always)]
+    fn half_octave(self) -> HalfOctave<Self> {
+        let bits = self.0.to_bits().clamp(1 << 21, (1 << 26) - 1) as u32;
+        let zeros = bits.leading_zeros();
+        let normalised = bits << zeros;
+        let centred = ((normalised << 2) ^ 0x8000_0000) as i32;
+        HalfOctave {
+            row: (2 * (10 - zeros) + (normalised >> 30 & 1)) as usize,
+            mantissa: Self(I4F28::from_bits(centred >> 3)),
+            places: zeros - 1,
+        }
+    }
+
+    #[inline(always)]
+    fn by_places(self, places: u32) -> Self {
+        Self(I4F28::from_bits(self.0.to_bits() << places))
     }
 
     #[inline(always)]
@@ -119,12 +161,11 @@ impl Number for Fixed {
 }
 
 macro_rules! float {
-    ($number:ident, $float:ident, $sqrt:expr) => {
+    ($number:ident, $float:ident, $bits:ident, $mantissa:literal, $sqrt:expr) => {
         impl Number for $number {
             const ZERO: Self = Self(0.0);
             const ONE: Self = Self(1.0);
             const HALF: Self = Self(0.5);
-            const CURVATURE: Self = Self(0.35);
 
             fn of(value: f64) -> Option<Self> {
                 Some(Self(value as $float))
@@ -133,6 +174,33 @@ macro_rules! float {
             #[inline(always)]
             fn sqrt(self) -> Self {
                 Self($sqrt(self.0))
+            }
+
+            #[inline(always)]
+            fn quarter(self) -> (usize, Self) {
+                let fourfold = 4.0 * self.0;
+                let whole = fourfold as i32;
+                (whole as usize, Self(2.0 * (fourfold - whole as $float) - 1.0))
+            }
+
+            #[inline(always)]
+            fn half_octave(self) -> HalfOctave<Self> {
+                const ONE: $bits = (1.0 as $float).to_bits();
+                let bits = self.0.clamp(1.0 / 128.0, 0.249_999_99).to_bits();
+                // Exponent and upper bit of the mantissa count half octaves.
+                let row = (bits >> ($mantissa - 1)) - ((ONE >> ($mantissa - 1)) - 14);
+                let within = (bits << 1 & ((1 << $mantissa) - 1)) | ONE;
+                HalfOctave {
+                    row: row as usize,
+                    mantissa: Self(2.0 * $float::from_bits(within) - 3.0),
+                    places: 9 - (row >> 1) as u32,
+                }
+            }
+
+            #[inline(always)]
+            fn by_places(self, places: u32) -> Self {
+                let bits = (1.0 as $float).to_bits() + ((places as $bits) << $mantissa);
+                Self(self.0 * $float::from_bits(bits))
             }
 
             #[inline(always)]
@@ -150,14 +218,14 @@ macro_rules! float {
     };
 }
 
-float!(Micro, f32, |x: f32| {
+float!(Micro, f32, u32, 23, |x: f32| {
     // 5 % off; each of Heron's steps squares that.
     let guess = F32Ext::sqrt(x);
     let better = 0.5 * (guess + x / guess);
     0.5 * (better + x / better)
 });
-float!(Libm, f32, libm::sqrtf);
-float!(Double, f64, libm::sqrt);
+float!(Libm, f32, u32, 23, libm::sqrtf);
+float!(Double, f64, u64, 52, libm::sqrt);
 
 #[cfg(test)]
 mod tests {

@@ -36,9 +36,8 @@ pub const FUNCTIONS: [Function; 3] = [
 
 impl Given {
     fn point(&self) -> Point {
-        let direction = Direction::ALL.into_iter().nth(self.direction as usize);
         Point {
-            direction: direction.unwrap_or(Direction::Deploy),
+            direction: if self.direction == 1 { Direction::Retract } else { Direction::Deploy },
             speed: Q16::from_bits(self.speed),
             scale: Scale::new(Q16::from_bits(self.scale)),
         }

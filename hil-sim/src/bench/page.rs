@@ -72,13 +72,15 @@ fn page(report: &Report) -> String {
          crossing, and speed and gap to force, on the points of a Sobol sequence over speed \
          (1 to 100 mm/s), force (15 to 150 N) and way, for both presets and steps of 2 to \
          6 mm. Errors are those of the gap (of the force for the inverse) against the \
-         formulas of [`formula.rs`](../src/model/formula.rs) solved to convergence in f64; \
-         how far the formulas are from the ring is stated beside them. Cycles are \
+         formulas of [`formula.rs`](../src/model/formula.rs) solved to convergence in f64, \
+         relative to the gap or 0.1 mm, whichever is larger: an answer has a resolution of \
+         15 nm, and its rounding alone is 7.6e-5 of that. How far the formulas are from the \
+         ring is stated beside them. Cycles are \
          [textbook Cortex-M4 cycles](EMULATION.md) of an image built like the firmware, its \
          answers checked against the host's. Each is tuned: the shipping model has its formats \
-         chosen number by number and avoids divisions; the others take one step of Halley's \
-         method with a division, polynomials unrolled, the format of the `fixed` crate with \
-         the least error, micromath's root brought to all bits by two of Heron's steps.\n\n\
+         chosen number by number; the others find the cells of their guess by exponent and \
+         mantissa, with polynomials unrolled, the format of the `fixed` crate with the least \
+         error, micromath's root brought to all bits by two of Heron's steps.\n\n\
          ![Error against cycles](performance/arithmetic-cycles.svg)\n\n\
          ![Error against time on the host](performance/arithmetic-host.svg)",
         &arithmetics(report),

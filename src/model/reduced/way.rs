@@ -1,23 +1,58 @@
 //! The felt stiffening of one way, for one rig, step and load.
 
 use super::centred;
-use crate::numeric::{fraction, high, horner, horner_with_slope, reciprocal_of_normalised};
+use super::shape::Excess;
+use crate::numeric::{
+    high, horner, horner_with_curvature, inverse_sqrt_guess, part_of_sum, reciprocal_of_normalised,
+};
 use crate::units::{MillimetresPerSecond, Q16};
 
 /// Coefficients of `(s - 1)/s E`, Q23: `u^i w^j` for i/5 + j/6 at most 1, by j and then i.
 pub(super) const TERMS: usize = 22;
 
-/// Coefficients of a surface of total degree 3, by the second variable and then the first.
-pub(super) const CUBIC_TERMS: usize = 10;
+/// Equal parts of the range of x, and half octaves of the force, with a guess of the run
+/// each; lowest octave of them as leading zeros of the force, Q30.
+pub(super) const FAST_CELLS: usize = 4;
+pub(super) const FORCE_CELLS: usize = 10;
+pub(super) const LOWEST_OCTAVE: u32 = 8;
 
-/// The same of total degree 5.
-pub(super) const QUINTIC_TERMS: usize = 21;
+/// Coefficients of a guess of the run in its cell, Q14: `u^i m^j`, by the mantissa m of
+/// the force and then the part u of the range of x: 4, 3 and 3 of them, two to a word.
+pub(super) type RunCell = [Pair; 5];
 
-/// Residual of the stiffness, Q26, beyond which there is no speed: 1 % of the instant one.
-const NO_SPEED: i32 = (1 << 26) / 100;
+/// Two numbers in a word, 16 bits each: what one access brings costs half.
+///
+/// The upper one is read with the lower one behind its point, half a unit at most: no more
+/// than it was rounded by.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub(super) struct Pair(#[serde(with = "postcard::fixint::le")] i32);
 
-/// Least slope of the stiffness by x that a step is taken with, Q24.
-const LEAST_SLOPE: i32 = (1 << 24) / 64;
+impl Pair {
+    /// Of an upper and a lower number.
+    pub(super) const fn new(upper: i16, lower: i16) -> Self {
+        Self(((upper as i32) << 16).wrapping_add(lower as i32))
+    }
+
+    /// Both, 2^16 times.
+    #[inline(always)]
+    const fn both(self) -> (i32, i32) {
+        (self.0, self.0 << 16)
+    }
+}
+
+/// Equal parts of the range of the stiffness with a guess of the speed each.
+pub(super) const STIFFNESS_CELLS: usize = 8;
+
+/// Coefficients of a guess of the fast part in its cell, Q26: by the run and then the
+/// stiffness, 3, 2 and 1 of them.
+pub(super) type SpeedCell = [i32; 6];
+
+/// What the square of a slope lacks to reach down to a stiffness, Q24, beyond which there is
+/// no speed: 1/256, where the stiffness stays some 6e-4 of the instant one above it.
+const NO_SPEED: i32 = (1 << 24) / 256;
+
+/// Least mean slope of the stiffness by x, Q27, that a step is taken with.
+const LEAST_SLOPE: i32 = 1 << 21;
 
 /// One way of one rig.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -30,20 +65,24 @@ pub(super) struct Way {
     /// 1/s, Q26.
     pub(super) relaxed: i32,
     pub(super) felt: [i32; TERMS],
-    /// Run over the root of the force by centred x and root, Q26.
-    pub(super) run_guess: [i32; QUINTIC_TERMS],
-    /// Relative change of the run by that of the force by centred x and root, Q26.
-    pub(super) yielding: [i32; CUBIC_TERMS],
-    /// Fast part by centred stiffness and run, Q26.
-    pub(super) speed_guess: [i32; QUINTIC_TERMS],
+    pub(super) run_cells: [[RunCell; FORCE_CELLS]; FAST_CELLS],
+    pub(super) speed_cells: [SpeedCell; STIFFNESS_CELLS],
+}
+
+/// Guess of the run.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Guess {
+    /// The run, Q32.
+    pub(super) run: u32,
+    /// Its derivative by the mantissa of the force, of which a half octave is the whole, Q30.
+    pub(super) by_force: i32,
 }
 
 impl Way {
-    /// Part of the crossing that is fast, `v / (v + v_half)`, Q32.
+    /// Part of the crossing that is fast at the bits of a speed, `v / (v + v_half)`, Q32.
     #[inline(always)]
-    pub(super) fn fast_part(&self, speed: MillimetresPerSecond) -> u32 {
-        let speed = speed.to_bits().max(0) as u32;
-        fraction(speed, speed + self.half_speed)
+    pub(super) fn fast_part(&self, speed: u32) -> u32 {
+        part_of_sum(speed, self.half_speed)
     }
 
     /// Effective over instant stiffness at a fast part and a centred run, Q26.
@@ -82,57 +121,53 @@ impl Way {
         ]
     }
 
-    /// Guess of the run, Q32, from the fast part and the root of the force.
+    /// Guess of the run, Q32, from the fast part and what the force exceeds the lift by.
     #[inline(always)]
-    pub(super) fn guess_run(&self, x: u32, root: u32) -> u32 {
-        let per_root = quintic(&self.run_guess, centred(x), centred(root)).max(0) as u32;
-        // Q26, below 1.
-        let run = ((u64::from(per_root) * u64::from(root)) >> 32) as u32;
-        run.min((1 << 26) - 1) << 6
-    }
-
-    /// Relative change of the run by that of the force, Q31.
-    #[inline(always)]
-    pub(super) fn yielding(&self, x: u32, root: u32) -> i32 {
-        cubic(&self.yielding, centred(x), centred(root)) << 5
+    pub(super) fn guess_run(&self, x: u32, excess: &Excess) -> Guess {
+        let half = excess.normalised >> 30 & 1;
+        let row = (2 * (LOWEST_OCTAVE - excess.octave) + half) as usize;
+        // Both within their ranges as they are; said again for the compiler.
+        let cells = &self.run_cells[(x >> 30) as usize % FAST_CELLS];
+        let [p, q, r, s, t] = cells[row.min(FORCE_CELLS - 1)];
+        let (u, m) = (centred(x << 2), centred(excess.normalised << 2));
+        let ((a0, a1), (a2, a3)) = (p.both(), q.both());
+        let level = horner!(u; a0, a1, a2, a3);
+        let ((b0, b1), (b2, c0), (c1, c2)) = (r.both(), s.both(), t.both());
+        let bend = high(horner!(u; c0, c1, c2), m);
+        let rise = horner!(u; b0, b1, b2) + bend;
+        let run = level + high(rise, m);
+        Guess { run: (run.clamp(0, (1 << 30) - 1) as u32) << 2, by_force: rise + bend }
     }
 
     /// Speed at which the stiffness after this run is the given one, Q26; none if it is
     /// not reached. Where it is reached twice, the larger.
+    ///
+    /// Equation: from a guess, the step `2 d / (S' + sqrt(S'^2 + 2 S'' d))` to where the
+    /// parabola has the residual d made up for, which holds up to where the stiffness is
+    /// least.
     #[inline(always)]
     pub(super) fn speed(&self, stiffness: i32, w: i32) -> Option<MillimetresPerSecond> {
-        let terms = self.along_speed(w);
+        let [c0, c1, c2, c3, c4, c5] = self.along_speed(w);
+        let guess = self.guess_fast_part(stiffness, w);
+        let (felt, slope, bend) = horner_with_curvature!(centred(guess); c0, c1, c2, c3, c4, c5);
+        let half = (guess >> 1) as i32;
+        let lacking = stiffness - self.relaxed - high(felt << 4, half);
+        // Of the stiffness by x: derivative, Q24, and half the second, Q23.
+        let bend = slope + (high(bend, half) << 1);
+        let slope = (felt << 1) + (high(slope, half) << 2);
+        let half = half.saturating_add(step(slope, bend, lacking)?).max(1 << 15);
+        Some(self.speed_of((half as u32) << 1))
+    }
+
+    /// Guess of the fast part, Q32, from the stiffness and the run.
+    #[inline(always)]
+    fn guess_fast_part(&self, stiffness: i32, w: i32) -> u32 {
         // Stiffnesses up to that at no pause for relaxation.
         let part = (stiffness.clamp(0, (1 << 26) - 1) as u32) << 6;
-        let first =
-            quintic(&self.speed_guess, centred(part), w).clamp(1 << 16, (1 << 26) - (1 << 16));
-        let first = (first as u32) << 6;
-        let (second, _) = self.nearer(&terms, first, stiffness);
-        let (x, lacking) = self.nearer(&terms, second, stiffness);
-        if lacking < -NO_SPEED { None } else { Some(self.speed_of(x)) }
-    }
-
-    /// One step of Newton's method towards a stiffness, by at most a quarter, and what was
-    /// lacking before it, Q26.
-    #[inline(always)]
-    fn nearer(&self, terms: &[i32; 6], x: u32, stiffness: i32) -> (u32, i32) {
-        let (value, slope) = self.at(terms, x);
-        let lacking = stiffness - value;
-        let slope = slope.max(LEAST_SLOPE);
-        let shift = (slope as u32).leading_zeros();
-        let inverse = (reciprocal_of_normalised((slope as u32) << shift) >> 1) as i32;
-        // Q26 over Q24, as Q32.
-        let step = high(lacking.clamp(-slope, slope), inverse) << shift;
-        (bounded(x, step), lacking)
-    }
-
-    /// Stiffness at a fast part, Q26, and its derivative by it, Q24.
-    #[inline(always)]
-    fn at(&self, terms: &[i32; 6], x: u32) -> (i32, i32) {
-        let [c0, c1, c2, c3, c4, c5] = *terms;
-        let (felt, slope) = horner_with_slope!(centred(x); c0, c1, c2, c3, c4, c5);
-        let half = (x >> 1) as i32;
-        (self.relaxed + high(felt << 4, half), (felt << 1) + (high(slope, half) << 2))
+        let [a0, a1, a2, b0, b1, c0] = self.speed_cells[(part >> 29) as usize % STIFFNESS_CELLS];
+        let p = centred(part << 3);
+        let x = horner!(w; horner!(p; a0, a1, a2), horner!(p; b0, b1), c0);
+        (x.clamp(1 << 10, (1 << 26) - (1 << 10)) as u32) << 6
     }
 
     /// Speed at this fast part, `v_half x / (1 - x)`, saturating.
@@ -149,38 +184,24 @@ impl Way {
     }
 }
 
-/// A fast part after a step, away from the ends.
+/// The step of x, Q31, that makes up for a lacking stiffness, Q26, from its slope, Q24, and
+/// half its second derivative, Q23; by a quarter at most. None where the parabola stays
+/// above.
 #[inline(always)]
-fn bounded(x: u32, step: i32) -> u32 {
-    x.saturating_add_signed(step).clamp(1 << 16, u32::MAX - (1 << 16))
-}
-
-/// A polynomial of total degree 3 in two centred variables.
-#[inline(always)]
-fn cubic(terms: &[i32; CUBIC_TERMS], p: i32, q: i32) -> i32 {
-    let [a0, a1, a2, a3, b0, b1, b2, c0, c1, d0] = *terms;
-    horner!(
-        q;
-        horner!(p; a0, a1, a2, a3),
-        horner!(p; b0, b1, b2),
-        horner!(p; c0, c1),
-        d0
-    )
-}
-
-/// A polynomial of total degree 5 in two centred variables.
-#[inline(always)]
-fn quintic(terms: &[i32; QUINTIC_TERMS], p: i32, q: i32) -> i32 {
-    #[rustfmt::skip]
-    let [a0, a1, a2, a3, a4, a5, b0, b1, b2, b3, b4, c0, c1, c2, c3, d0, d1, d2, e0, e1, f0] =
-        *terms;
-    horner!(
-        q;
-        horner!(p; a0, a1, a2, a3, a4, a5),
-        horner!(p; b0, b1, b2, b3, b4),
-        horner!(p; c0, c1, c2, c3),
-        horner!(p; d0, d1, d2),
-        horner!(p; e0, e1),
-        f0
-    )
+fn step(slope: i32, bend: i32, lacking: i32) -> Option<i32> {
+    // Up to 8, 32 and a quarter: to the next power of two, which takes one instruction.
+    let slope = slope.clamp(-(1 << 27), (1 << 27) - 1) << 4;
+    let bend = bend.clamp(-(1 << 28), (1 << 28) - 1) << 2;
+    let lacking = lacking.clamp(-(1 << 24), (1 << 24) - 1) << 6;
+    // Q24.
+    let square = high(slope, slope) + (high(bend, lacking) << 1);
+    if square < -NO_SPEED {
+        return None;
+    }
+    let square = square.max(0) as u32;
+    let (shift, inverse) = inverse_sqrt_guess(square);
+    let root = ((u64::from(square << shift) * u64::from(inverse << 1)) >> 32) as u32;
+    // Half the sum, Q27, then Q14.
+    let mean = ((slope >> 2) + (root >> (shift / 2)) as i32).max(LEAST_SLOPE) as u32 >> 13;
+    Some((lacking / mean as i32).clamp(-(1 << 16), (1 << 16) - 1) << 13)
 }

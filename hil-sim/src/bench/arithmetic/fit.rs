@@ -5,15 +5,20 @@ use interstage::model::felt::{self, FORCE_END, Kind};
 use interstage::model::formula::{Formula, LEAST_RUN};
 use interstage::rig::Rig;
 use interstage::supervise::Direction;
-use interstage_arith::{Shared, Way};
+use interstage_arith::{CELL, FAST_CELLS, FORCE_CELLS, Shared, Way};
 use nalgebra::{DMatrix, DVector};
 
-/// Unit of force over the largest elastic force: leaves it at a quarter.
-const UNIT_OVER_LARGEST: f64 = 4.0;
-
-/// Least elastic force, N, and most friction that the guess serves, as the shipping one.
-const LEAST_ELASTIC_N: f64 = 9.0;
+/// Most friction of the points compared.
 pub(super) const MOST_UTILISATION: f64 = 1.7;
+
+/// Largest force of a guess's fit over k_inf R^2 L, and weight of the points beyond it, as
+/// the shipping one.
+const FORCE_OF_USE: f64 = 0.0151;
+const TAME: f64 = 1e-2;
+
+/// Runs and fast parts of a cell that its guess is fitted at.
+const RUNS: usize = 300;
+const FAST_NODES: usize = 8;
 
 /// Nodes of a fit in one variable; of each in two.
 const NODES: usize = 64;
@@ -28,7 +33,7 @@ pub(super) fn coefficients(rig: &Rig) -> Option<(Shared, [Way; 2])> {
         formula,
         load_n,
         longest_mm: formula.largest_run_mm(kind(Direction::Deploy)),
-        unit_n: UNIT_OVER_LARGEST * FORCE_END * formula.unit_force_n(),
+        unit_n: (FORCE_END * formula.unit_force_n() * formula.stiffening).log2().ceil().exp2(),
     };
     let way = |direction| bench.way(kind(direction));
     Some((bench.shared(rig)?, [way(Direction::Deploy)?, way(Direction::Retract)?]))
@@ -48,22 +53,17 @@ impl Bench {
         let gap = |part: f64| f.gap_after_mm(part * self.longest_mm);
         let slope = |part: f64| f.contact(gap(part)).slope();
         let impact = &f.impact;
-        let distance = |part: f64| f.free_run_mm() - part * self.longest_mm;
         let least = LEAST_RUN * f.radius_mm / self.longest_mm;
-        let fitted = |of: &dyn Fn(f64) -> f64| quartic(least, of);
-        let slopes = fitted(&slope)?;
         let load = self.load_n / self.unit_n;
         Some(Shared {
             parts_per_128_n: 128.0 / self.unit_n,
             unit_128_n: self.unit_n / 128.0,
             free: f.free_run_mm() / f.radius_mm,
-            longest: self.longest_mm / f.radius_mm,
             least,
             inverse_longest_4: 0.25 * f.radius_mm / self.longest_mm,
-            half_radius_16: 0.5 * f.radius_mm / 16.0,
             inverse_radius: 1.0 / f.radius_mm,
             load,
-            least_lifting: load * slope(1.0).min(slope(least)),
+            most_lifting: load * slope(least),
             stress: 128.0 * impact.stress_per_speed * 1e-3 / 16.0,
             ramp: if impact.mode_rad_s > 0.0 {
                 2.0 * 128.0 / (impact.mode_rad_s * self.longest_mm)
@@ -72,12 +72,12 @@ impl Bench {
             },
             deflection: 1e3 * self.unit_n / impact.arm_n_per_mm / 4096.0,
             friction: rig.plant.mu,
-            force: fitted(&|part| {
+            force: polynomial(least, |part| {
                 f.relaxed_force_n(kind, gap(part)) * f.stiffening / (self.unit_n * part * part)
             })?,
-            slope: slopes,
-            cosine: fitted(&|part| 1.0 / (1.0 + slope(part) * slope(part)))?,
-            gap: fitted(&|part| 2.0 * f.radius_mm * gap(part) / distance(part).powi(2))?,
+            slope: polynomial(least, slope)?,
+            cosine: polynomial(least, |part| 1.0 / (1.0 + slope(part) * slope(part)))?,
+            gap: polynomial(least, |part| gap(part) / 16.0)?,
         })
     }
 
@@ -91,33 +91,73 @@ impl Bench {
         let grid: Vec<(f64, f64)> =
             nodes(GRID).flat_map(|x| nodes(GRID).map(move |part| (x, part))).collect();
         let felt_points = grid.iter().map(|&(x, part)| (x, part, felt_at(x, part), 1.0));
-        // Elastic forces from what the domain's least force or the friction that rubber
-        // holds leaves, to the unit's quarter, which the root can tell.
-        let slope_after = |part: f64| f.contact(f.gap_after_mm(part * self.longest_mm)).slope();
-        let least = LEAST_RUN * f.radius_mm / self.longest_mm;
-        let least_slope = slope_after(least).min(slope_after(1.0));
-        let load = self.load_n / self.unit_n;
-        let steepest = f.contact(f.gap_after_mm(LEAST_RUN * f.radius_mm)).slope();
-        let grip = (1.0 + steepest * steepest) / (MOST_UTILISATION - steepest);
-        let least_root = 2.0 * ((self.load_n * grip).max(LEAST_ELASTIC_N) / self.unit_n).sqrt();
-        let guess_points = grid.iter().filter_map(|&(x, part)| {
-            let part = part.max(least);
-            let gap = f.gap_after_mm(part * self.longest_mm);
-            let stiffness = 1.0 / f.stiffening + x * felt_at(x, part);
-            let elastic = f.relaxed_force_n(kind, gap) * f.stiffening * stiffness / self.unit_n;
-            // The load's least part is taken off before the root; what its slope adds is not.
-            let slope = f.contact(gap).slope();
-            let root = 2.0 * (elastic + load * (slope - least_slope)).sqrt();
-            (least_root..=1.0).contains(&root).then(|| (x, root, part / root, root / part))
-        });
         Some(Way {
             half_speed: f.half_speed_mm_s(kind) / 128.0,
             relaxed: 1.0 / f.stiffening,
             felt: surface(&powers(felt::FAST_DEGREE, felt::RUN_DEGREE), felt_points)?,
-            guess: surface(&powers(5, 5), guess_points)?,
+            guess: self.guess(kind, &felt_at)?,
         })
     }
 }
+
+impl Bench {
+    /// The guess of the run in each cell.
+    fn guess(&self, kind: Kind, felt_at: &dyn Fn(f64, f64) -> f64) -> Option<Guess> {
+        const POWERS: [(i32, i32); CELL] =
+            [(0, 0), (1, 0), (2, 0), (3, 0), (0, 1), (1, 1), (2, 1), (0, 2), (1, 2), (2, 2)];
+        let f = &self.formula;
+        let load = self.load_n / self.unit_n;
+        let slope_after = |part: f64| f.contact(f.gap_after_mm(part * self.longest_mm)).slope();
+        let most_lifting = load * slope_after(LEAST_RUN * f.radius_mm / self.longest_mm);
+        let most_of_use = FORCE_OF_USE * f.unit_force_n() / self.unit_n;
+        let mut guess = [[[0.0; CELL]; FORCE_CELLS]; FAST_CELLS];
+        for (column, cells) in guess.iter_mut().enumerate() {
+            let mut points = vec![Vec::new(); FORCE_CELLS];
+            for node in nodes(FAST_NODES) {
+                let x = (column as f64 + node) / FAST_CELLS as f64;
+                let mut add = |excess: f64, part: f64, weight: f64| {
+                    let octave = excess.log2().floor();
+                    let mantissa = excess / octave.exp2();
+                    let half = f64::from(mantissa >= 1.5);
+                    let row = 2.0 * (octave + 7.0) + half;
+                    if (0.0..FORCE_CELLS as f64).contains(&row) {
+                        let m = 2.0 * (mantissa - 1.0) - half;
+                        points[row as usize].push((node, m, part, weight / part));
+                    }
+                };
+                let ratio = (1.03_f64 / 0.03).powf(1.0 / (RUNS - 1) as f64);
+                let (mut part, mut most) = (0.03, 0.0);
+                for _ in 0..RUNS {
+                    let gap = f.gap_after_mm(part * self.longest_mm);
+                    let stiffness = 1.0 / f.stiffening + x * felt_at(x, part);
+                    let elastic = f.relaxed_force_n(kind, gap) * f.stiffening * stiffness;
+                    let sought = elastic / self.unit_n + load * slope_after(part);
+                    let excess = sought - most_lifting;
+                    if excess > most {
+                        add(excess, part, if sought < most_of_use { 1.0 } else { TAME });
+                        most = excess;
+                    } else if most > 0.0 {
+                        // Beyond it the force falls again.
+                        break;
+                    }
+                    part *= ratio;
+                }
+                // On as the root of the force, so that every cell is tame.
+                while most > 0.0 && most < 0.25 {
+                    most *= ratio * ratio;
+                    add(most, part, TAME);
+                    part *= ratio;
+                }
+            }
+            for (cell, points) in cells.iter_mut().zip(points) {
+                *cell = surface(&POWERS, points.into_iter())?;
+            }
+        }
+        Some(guess)
+    }
+}
+
+type Guess = [[[f64; CELL]; FORCE_CELLS]; FAST_CELLS];
 
 /// Chebyshev's nodes from 0 to 1.
 fn nodes(count: usize) -> impl Iterator<Item = f64> {
@@ -125,11 +165,11 @@ fn nodes(count: usize) -> impl Iterator<Item = f64> {
     (0..count).map(move |k| 0.5 * (1.0 - angle(k).cos()))
 }
 
-/// Quartic in `2 part - 1` with the least error of `of` from `least` to 1.
-fn quartic(least: f64, of: impl Fn(f64) -> f64) -> Option<[f64; 5]> {
+/// Polynomial in `2 part - 1` with the least error of `of` from `least` to 1.
+fn polynomial<const TERMS: usize>(least: f64, of: impl Fn(f64) -> f64) -> Option<[f64; TERMS]> {
     let parts: Vec<f64> = nodes(NODES).map(|node| least + (1.0 - least) * node).collect();
     let matrix =
-        DMatrix::from_fn(NODES, 5, |row, power| (2.0 * parts[row] - 1.0).powi(power as i32));
+        DMatrix::from_fn(NODES, TERMS, |row, power| (2.0 * parts[row] - 1.0).powi(power as i32));
     let right = DVector::from_fn(NODES, |row, _| of(parts[row]));
     let solution = matrix.svd(true, true).solve(&right, 1e-14).ok()?;
     Some(std::array::from_fn(|power| solution[power]))
@@ -184,9 +224,9 @@ mod tests {
     }
 
     #[test]
-    fn a_quartic_follows_what_is_smooth() {
+    fn a_polynomial_follows_what_is_smooth() {
         let of = |part: f64| (1.0 + part).exp();
-        let found = quartic(0.01, of).unwrap();
+        let found: [f64; 5] = polynomial(0.01, of).unwrap();
         for part in [0.01, 0.2, 0.6, 1.0] {
             let value = found.iter().rev().fold(0.0, |sum, c| sum * (2.0 * part - 1.0) + c);
             assert!((value / of(part) - 1.0).abs() < 1e-4, "{part}");

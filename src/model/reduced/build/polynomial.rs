@@ -2,12 +2,6 @@
 
 use crate::numeric::cosine_of_turns;
 
-/// Nodes of each axis of a surface.
-const NODES: usize = 8;
-
-/// Powers of one variable of a surface, at most.
-const POWERS: usize = 6;
-
 /// Chebyshev's polynomials T_0 to T_(N-1) of `scale t + shift` by powers of t.
 pub(super) fn rows<const N: usize>(scale: f64, shift: f64) -> [[f64; N]; N] {
     let mut rows = [[0.0; N]; N];
@@ -30,7 +24,7 @@ pub(super) fn rows<const N: usize>(scale: f64, shift: f64) -> [[f64; N]; N] {
 }
 
 /// Node `index` of `count`, from -1 to 1.
-fn node(index: usize, count: usize) -> f64 {
+pub(super) fn node(index: usize, count: usize) -> f64 {
     cosine(2 * index + 1, 4 * count)
 }
 
@@ -68,46 +62,6 @@ pub(super) fn interpolate<const N: usize>(f: impl Fn(f64) -> f64) -> [f64; N] {
     powers
 }
 
-/// The part of a total degree up to 5, that with TERMS terms, of the polynomial through
-/// `f` at 8 by 8 nodes over two ranges within 0 to 1, by powers of the differences from
-/// 1/2; by those of the second variable and then the first.
-pub(super) fn interpolate_surface<const TERMS: usize>(
-    first: (f64, f64),
-    second: (f64, f64),
-    f: impl Fn(f64, f64) -> f64,
-) -> [f64; TERMS] {
-    let total = (0..POWERS).find(|n| (n + 1) * (n + 2) / 2 >= TERMS).unwrap_or(POWERS - 1);
-    let at =
-        |(low, high): (f64, f64), index| 0.5 * (low + high + (high - low) * node(index, NODES));
-    let mut chebyshev = [[0.0; POWERS]; POWERS];
-    for (k, l) in (0..NODES).flat_map(|k| (0..NODES).map(move |l| (k, l))) {
-        let y = f(at(first, k), at(second, l));
-        for (i, row) in chebyshev.iter_mut().enumerate() {
-            for (j, c) in row.iter_mut().enumerate() {
-                *c += weight(i, k, NODES) * weight(j, l, NODES) * y;
-            }
-        }
-    }
-    let centred = |(low, high): (f64, f64)| {
-        rows::<POWERS>(2.0 / (high - low), (1.0 - low - high) / (high - low))
-    };
-    let (by_first, by_second) = (centred(first), centred(second));
-    let mut powers = [[0.0; POWERS]; POWERS];
-    for (i, j) in (0..=total).flat_map(|i| (0..=total - i).map(move |j| (i, j))) {
-        for (row, p) in powers.iter_mut().zip(&by_first[i]) {
-            for (out, q) in row.iter_mut().zip(&by_second[j]) {
-                *out += chebyshev[i][j] * p * q;
-            }
-        }
-    }
-    let mut terms = [0.0; TERMS];
-    let order = (0..=total).flat_map(|j| (0..=total - j).map(move |i| (i, j)));
-    for (slot, (i, j)) in terms.iter_mut().zip(order) {
-        *slot = powers[i][j];
-    }
-    terms
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -128,15 +82,6 @@ mod tests {
         let powers: [f64; 5] = interpolate(|t| 1.0 + t * (2.0 - t * (3.0 + t * t)));
         for (got, exact) in powers.into_iter().zip([1.0, 2.0, -3.0, 0.0, -1.0]) {
             assert!((got - exact).abs() < 1e-12, "{powers:?}");
-        }
-        let terms: [f64; 21] = interpolate_surface((0.2, 1.0), (0.0, 0.7), |p, q| {
-            let (p, q) = (p - 0.5, q - 0.5);
-            1.0 + p + 3.0 * p * p * q - q * q * q * q * q
-        });
-        let expected = [(0, 1.0), (1, 1.0), (8, 3.0), (20, -1.0)];
-        for (index, got) in terms.into_iter().enumerate() {
-            let exact = expected.iter().find(|(i, _)| *i == index).map_or(0.0, |(_, v)| *v);
-            assert!((got - exact).abs() < 1e-11, "{index}: {got}");
         }
     }
 }
