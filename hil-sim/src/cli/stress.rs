@@ -45,6 +45,10 @@ pub(super) struct Args {
     #[arg(long)]
     primitives: bool,
 
+    /// The cases of the plant alone.
+    #[arg(long, conflicts_with = "primitives")]
+    plant: bool,
+
     /// Prints the result as one JSON object.
     #[arg(long)]
     json: bool,
@@ -78,7 +82,9 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     }
     let cases = if args.quick { args.cases.min(QUICK_CASES) } else { args.cases };
     let stride = if args.quick { QUICK_STRIDE } else { 1 };
-    let primitives = {
+    let primitives = if args.plant {
+        Vec::new()
+    } else {
         let bar = progress::bar("fixed-point inputs", primitives::inputs());
         primitives::run(stride, &|inputs| bar.advance(inputs))
     };
@@ -96,6 +102,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
             let bar = progress::bar("cases of the plant", cases as u64);
             plant::run(cases, args.seed, &|| bar.advance(1))
         };
+        if args.plant {
+            let rest = hostile::Report::default();
+            let printed = gather(report, vec![], vec![], vec![], None, rest);
+            return print(args, &printed);
+        }
         let _spinner = progress::spinner("refinement, hostile inputs, rest and drift");
         let (drift_ticks, hostile_ticks) =
             if args.quick { (1_000_000, 2000) } else { (DRIFT_TICKS, HOSTILE_TICKS) };
@@ -106,7 +117,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         let (refined, settling, hostile) = rest;
         gather(report, refined, primitives, settling, Some(drift), hostile)
     };
-    output::result(args.json, &printed, || human(&printed))?;
+    print(args, &printed)
+}
+
+fn print(args: &Args, printed: &Printed) -> Result<Outcome, Failure> {
+    output::result(args.json, printed, || human(printed))?;
     Ok(Outcome::of(printed.failures == 0))
 }
 
