@@ -22,14 +22,14 @@ const HOSTILE_TICKS: u32 = 20_000;
 
 /// Plant, controller and fixed-point primitives at the ends of every range.
 ///
-/// Every case of the plant is refused by name before the run, or stays finite, with
-/// bounded penetration and without creating energy. Hostile codes and plans panic no
+/// Every case of the plant stays finite, in radial balance, with bounded penetration and
+/// without creating energy; what cannot be is refused by name before the run. Hostile codes and plans panic no
 /// controller and switch no bridge on where none may be. Constant inputs come to rest to
 /// the last bit, a thousand million ticks leave no drift. Every primitive is held against
 /// exact arithmetic over all its inputs.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// Cases of the plant, not counting those refused.
+    /// Cases of the plant, not counting those that have to be refused.
     #[arg(short = 'n', long = "cases", value_name = "CASES", default_value_t = 10_000)]
     cases: usize,
 
@@ -186,6 +186,9 @@ fn human(printed: &Printed) -> String {
     if printed.cases > 0 {
         text += &the_plant(printed);
     }
+    if printed.primitives.is_empty() {
+        return text + &failures(printed);
+    }
     let rows = printed.primitives.iter().map(|line| {
         vec![
             line.name.to_owned(),
@@ -226,10 +229,13 @@ fn human(printed: &Printed) -> String {
             printed.hostile.broken.len()
         );
     }
-    for failed in &printed.failed {
-        text += &format!("  failed: {failed}\n");
-    }
-    text + &format!("{} failures\n", printed.failures)
+    text + &failures(printed)
+}
+
+fn failures(printed: &Printed) -> String {
+    let failed: String =
+        printed.failed.iter().map(|failed| format!("  failed: {failed}\n")).collect();
+    failed + &format!("{} failures\n", printed.failures)
 }
 
 fn the_plant(printed: &Printed) -> String {
@@ -262,6 +268,9 @@ fn the_plant(printed: &Printed) -> String {
     for (name, count) in &printed.refusals {
         let message = printed.refused.get(name).map_or("", String::as_str);
         text += &format!("  refused {count}: {name}, as: {message}\n");
+    }
+    if printed.refined.is_empty() {
+        return text;
     }
     let orders = printed.refined.iter().filter_map(|line| line.order);
     let least = orders.clone().fold(f64::INFINITY, f64::min);

@@ -166,10 +166,12 @@ pub struct VirtualRig {
     owed_mm: (f64, f64),
     /// Force that resisted the tread in the last stride, N, signed as its speed.
     resists_n: f64,
-    /// Rise of the centre per axial way in the last stride.
-    slope: f64,
-    /// The part of it that no change of load explains.
+    /// Static thrust on the arm, N: the load, or at an end stop what the wheel pushes with.
+    thrust_n: f64,
+    /// Rise of the centre per axial way in the last stride that no change of load explains.
     drift: f64,
+    /// Rise per axial way beyond that along the step's force, for what the tread takes in.
+    swells: f64,
     /// Rise that no change of load explains while the wheel stands, mm/s.
     creep: f64,
     /// Derivatives of the resolved contact's cosine and sine sums by the height, N/mm.
@@ -225,8 +227,9 @@ impl VirtualRig {
             forces: (rest.normal_n, rest.cosine_n, 0.0),
             owed_mm: (0.0, 0.0),
             resists_n: 0.0,
-            slope: 0.0,
+            thrust_n: parameters.load_n,
             drift: 0.0,
+            swells: 0.0,
             creep: 0.0,
             stiffness: None,
             parameters,
@@ -337,6 +340,9 @@ impl VirtualRig {
     fn stride(&mut self, drives: &Drives, dt_s: f64, finer: bool) -> Result<bool, PlantError> {
         let (truth, calm, parked) = (self.truth, self.calm, self.parked);
         let stride = self.set_out(drives, dt_s);
+        if !stride.tread_mm_s.is_finite() {
+            return Err(PlantError::NotFinite { time_s: truth.time_s, name: "tread speed" });
+        }
         self.truth.position_mm = stride.position_mm;
         self.truth.rotation_rad += stride.turn_rad;
         let local = self.parameters.wall.local(stride.position_mm);

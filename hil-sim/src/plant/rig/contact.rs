@@ -61,12 +61,12 @@ impl VirtualRig {
     }
 
     /// Force of screw and spring at the undeformed radius over this wall, N, and what arm
-    /// modes and load, through the arm, add to it. What the carriage's inertia would add is
+    /// modes and thrust, through the arm, add to it. What the carriage's inertia would add is
     /// left out: with it, the arm's swing would have to carry the carriage along as the wheel
     /// rises.
     fn pressing(&self, local: &LocalWall) -> (f64, f64) {
         let seat = self.preload.seat_n() + self.parameters.spring_n_per_mm * local.base_mm;
-        (seat, self.wedge() * self.parameters.load_n - self.vibration_n)
+        (seat, self.wedge() * self.thrust_n - self.vibration_n)
     }
 
     /// Radial balance over this wall.
@@ -137,8 +137,8 @@ impl VirtualRig {
         }
         self.ring.commit(&Motion { height_mm: solved.height_mm, ..motion });
         let rise = solved.height_mm + local.base_mm - self.truth.height_mm;
+        self.learn_rise(&solved.contact, way_mm, rise);
         if way_mm.abs() > 1e-6 {
-            self.slope = rise / way_mm;
             (self.drift, self.creep) = ((rise - sunk) / way_mm, 0.0);
         } else {
             (self.drift, self.creep) = (0.0, (rise - sunk) / dt_s);
@@ -188,7 +188,7 @@ impl VirtualRig {
             return Ok(false);
         }
         self.rolled_mm_s = speed;
-        (self.slope, self.drift, self.creep) = (0.0, 0.0, 0.0);
+        (self.drift, self.creep, self.swells) = (0.0, 0.0, 0.0);
         self.stiffness = Some(solved.contact.slope);
         self.take(local, &solved, &stride);
         self.truth.ring_awake = false;

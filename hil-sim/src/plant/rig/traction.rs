@@ -5,6 +5,14 @@ use super::{Drives, VirtualRig};
 use crate::plant::actuators::Turn;
 use crate::plant::balance::{Axial, Solved};
 use crate::plant::grip::Grip;
+use crate::plant::ring::Contact;
+
+/// Carrying less of its friction than this part for radial load, a wheel that spins at an
+/// end stop is as good as jammed by the arm: it stands.
+const JAMMED_BELOW: f64 = 0.25;
+
+/// Way over which the wheel's rise is learnt, mm.
+const LEARNT_MM: f64 = 1.0;
 
 /// Farthest that a stride may end from where it was foreseen, mm.
 const ASTRAY_MM: f64 = 0.01;
@@ -14,8 +22,8 @@ const ASTRAY_MM: f64 = 0.01;
 pub(super) enum Moves {
     /// The stop or latch that carries the load until the drive first turns.
     Parked,
-    /// An end stop holds the carriage, the wheel spins with this utilisation.
-    Stopped(f64),
+    /// An end stop holds the carriage, and the wheel spins with this utilisation.
+    Spins(f64),
     /// Motor, friction and inertia.
     Driven(Grip),
 }
@@ -34,6 +42,8 @@ pub(super) struct Stride {
     turn: Turn,
     /// Speeds of carriage and tread, mm/s, as foreseen.
     foreseen: (f64, f64),
+    /// An end stop holds the carriage.
+    stopped: bool,
 }
 
 impl Stride {
@@ -41,7 +51,7 @@ impl Stride {
     pub(super) fn axial(&self) -> Axial {
         match self.moves {
             Moves::Parked => Axial::Utilised(0.0),
-            Moves::Stopped(utilisation) => Axial::Utilised(utilisation),
+            Moves::Spins(utilisation) => Axial::Utilised(utilisation),
             Moves::Driven(grip) => Axial::Carried(grip),
         }
     }
@@ -92,23 +102,32 @@ impl VirtualRig {
             moves: Moves::Parked,
             turn,
             foreseen: (ended.speed, ended.tread),
+            stopped: false,
         };
         if self.parked {
             return stride;
         }
         stride.moves = Moves::Driven(grip);
+        self.thrust_n = p.load_n;
         stride.way_mm = ended.speed * dt_s + self.owed_mm.0;
         let (low, high) = p.stops_mm;
         let position = self.truth.position_mm + stride.way_mm;
         if position < low || position > high {
             stride.way_mm = position.clamp(low, high) - self.truth.position_mm;
-            // The stop carries what the wheel's friction leaves.
-            let friction = if grip.tread == 0.0 { 0.0 } else { p.mu.copysign(grip.tread) };
+            let friction = p.mu.copysign(grip.tread);
             let slower = grip.tread - grip.yields * friction * normal;
-            let tread = if slower * grip.tread <= 0.0 { 0.0 } else { slower };
-            stride.moves = Moves::Stopped(friction);
+            // The wheel spins, and presses itself in by what it pushes with; or it stands.
+            let spins = slower * grip.tread > 0.0 && self.freedom(friction) >= JAMMED_BELOW;
+            let tread = if spins { slower } else { 0.0 };
+            stride.moves = if spins {
+                Moves::Spins(friction)
+            } else {
+                Moves::Driven(Grip { tread: 0.0, speed: 0.0, ..grip })
+            };
             stride.tread_mm_s = tread;
             stride.foreseen = (0.0, tread);
+            stride.stopped = true;
+            self.thrust_n = if spins { friction * cosine - sine } else { p.load_n };
         }
         stride.position_mm = self.truth.position_mm + stride.way_mm;
         let rolled = stride.tread_mm_s * dt_s + self.owed_mm.1;
@@ -118,7 +137,7 @@ impl VirtualRig {
 
     /// Whether the stride ends far from where it was foreseen.
     pub(super) fn astray(&self, stride: &Stride, solved: &Solved) -> bool {
-        let Moves::Driven(grip) = stride.moves else { return false };
+        let (Moves::Driven(grip), false) = (stride.moves, stride.stopped) else { return false };
         let ended = grip.at(solved.contact.cosine_n, solved.contact.sine_n);
         (ended.speed - stride.foreseen.0).abs() * stride.dt_s > ASTRAY_MM
     }
@@ -132,14 +151,15 @@ impl VirtualRig {
         truth.speed_mm_s = 0.0;
         match stride.moves {
             Moves::Parked => truth.tread_mm_s = 0.0,
-            Moves::Stopped(utilisation) => {
+            Moves::Spins(utilisation) => {
                 truth.tread_mm_s = stride.tread_mm_s;
                 resists_n = utilisation * normal;
                 sliding = stride.tread_mm_s.abs();
             }
             Moves::Driven(grip) => {
                 let ended = grip.at(cosine, sine);
-                (truth.speed_mm_s, truth.tread_mm_s) = (ended.speed, ended.tread);
+                truth.speed_mm_s = if stride.stopped { 0.0 } else { ended.speed };
+                truth.tread_mm_s = ended.tread;
                 resists_n = ended.resists_n;
                 sliding = grip.slides(&ended);
             }
@@ -161,10 +181,34 @@ impl VirtualRig {
 
     /// Axial way of a gripping wheel per way of its tread. With equal utilisation all
     /// over the contact, traction does the motor's work on the axle if
-    /// `c v_x + s v_y = N omega R`, c and s being the cosine and sine sums.
+    /// `c v_x + s v_y = N omega R`, c and s being the cosine and sine sums. A step whose axial
+    /// force is t lifts the wheel by t/c of its way where it does no work on the tread;
+    /// what it does is known from the way just behind.
     fn advance(&self) -> f64 {
         let (normal, cosine, sine) = self.forces;
-        let along = cosine + sine * self.slope;
-        if self.parameters.climb_slows && along > normal { normal / along } else { 1.0 }
+        if !self.parameters.climb_slows || cosine <= 0.0 {
+            return 1.0;
+        }
+        let step = sine - self.truth.resistance_n;
+        let along = cosine + step * (step / cosine + self.swells);
+        if along > normal { normal / along } else { 1.0 }
+    }
+
+    /// Learns how much more than by the direction of the step's force the wheel has risen.
+    pub(super) fn learn_rise(&mut self, contact: &Contact, way_mm: f64, rise_mm: f64) {
+        if self.parameters.climb_slows && contact.cosine_n > 0.0 {
+            let leans = contact.step_sine_n / contact.cosine_n;
+            let more = rise_mm - (leans + self.swells) * way_mm;
+            self.swells += more * way_mm.signum() / way_mm.abs().max(LEARNT_MM);
+        }
+    }
+
+    /// Radial load that a wheel at an end stop carries with this utilisation, per normal
+    /// force: the less there is, the more the arm presses it.
+    fn freedom(&self, used: f64) -> f64 {
+        let (normal, cosine, sine) = self.forces;
+        let wedge = self.wedge();
+        let carried = (1.0 - used * wedge) * cosine + (used + wedge) * sine;
+        if normal > 0.0 { carried / normal } else { 1.0 }
     }
 }
