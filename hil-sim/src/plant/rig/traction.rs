@@ -109,7 +109,7 @@ impl VirtualRig {
         }
         stride.moves = Moves::Driven(grip);
         self.thrust_n = p.load_n;
-        stride.way_mm = ended.speed * dt_s + self.owed_mm.0;
+        stride.way_mm = 0.5 * (self.truth.speed_mm_s + ended.speed) * dt_s + self.owed_mm.0;
         let (low, high) = p.stops_mm;
         let position = self.truth.position_mm + stride.way_mm;
         if position < low || position > high {
@@ -130,7 +130,7 @@ impl VirtualRig {
             self.thrust_n = if spins { friction * cosine - sine } else { p.load_n };
         }
         stride.position_mm = self.truth.position_mm + stride.way_mm;
-        let rolled = stride.tread_mm_s * dt_s + self.owed_mm.1;
+        let rolled = 0.5 * (tread + stride.tread_mm_s) * dt_s + self.owed_mm.1;
         stride.turn_rad = rolled / p.ring.radius_mm;
         stride
     }
@@ -166,8 +166,8 @@ impl VirtualRig {
         }
         let dt_s = stride.dt_s;
         self.owed_mm = (
-            (truth.speed_mm_s - stride.foreseen.0) * dt_s,
-            (truth.tread_mm_s - stride.foreseen.1) * dt_s,
+            0.5 * (truth.speed_mm_s - stride.foreseen.0) * dt_s,
+            0.5 * (truth.tread_mm_s - stride.foreseen.1) * dt_s,
         );
         self.sliding = sliding > 0.0;
         self.resists_n = resists_n;
