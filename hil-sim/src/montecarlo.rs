@@ -84,8 +84,8 @@ pub fn slip_events(summary: &Summary) -> usize {
 /// the number of processors.
 ///
 /// # Errors
-/// [`RunError::Rig`] if the parameters make no controller. A plant that fails is a
-/// line with an error.
+/// [`RunError::Rig`] if the parameters make no controller. A plant that fails, or is
+/// refused, is a line with an error.
 pub fn run(
     scenario: &Scenario,
     seeds: &[u64],
@@ -106,7 +106,7 @@ fn one(scenario: &Scenario, seed: u64) -> Result<RunLine, RunError> {
     scenario.run.seed = seed;
     match sil::run(&scenario, Options::default()) {
         Ok(recording) => Ok(RunLine::new(recording.summary, PlantParameters::draw(&scenario).mu)),
-        Err(RunError::Plant(error)) => {
+        Err(error @ (RunError::Plant(_) | RunError::Refused(_))) => {
             Ok(RunLine { seed, error: Some(error.to_string()), ..RunLine::default() })
         }
         Err(error) => Err(error),

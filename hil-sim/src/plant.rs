@@ -6,6 +6,7 @@ pub mod arm;
 pub mod balance;
 pub mod crossing;
 pub mod draw;
+pub mod grip;
 pub mod ledger;
 pub mod limits;
 pub mod precision;

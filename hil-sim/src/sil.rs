@@ -13,6 +13,7 @@ use interstage::model::Strategy;
 use interstage::rig::RigError;
 use interstage::supervise::{Command, Mode};
 
+use crate::plant::limits::Refusal;
 use crate::plant::rig::PlantError;
 use crate::record::{LogLine, Recording, Report, Row};
 use crate::scenario::{ControllerKind, Direction, Scenario};
@@ -42,6 +43,9 @@ pub enum RunError {
     /// The parameters do not make a controller.
     #[error("{0}")]
     Rig(#[from] RigError),
+    /// The plant of this seed cannot be computed, because it cannot be.
+    #[error("plant: {0}")]
+    Refused(#[from] Refusal),
     /// The plant left the set of meaningful states.
     #[error("{0}")]
     Plant(#[from] PlantError),

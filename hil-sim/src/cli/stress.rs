@@ -22,14 +22,14 @@ const HOSTILE_TICKS: u32 = 20_000;
 
 /// Plant, controller and fixed-point primitives at the ends of every range.
 ///
-/// Every case of the plant is refused by name before the run, or stays finite, with
-/// bounded penetration and without creating energy. Hostile codes and plans panic no
+/// Every case of the plant stays finite, in radial balance, with bounded penetration and
+/// without creating energy; what cannot be is refused by name before the run. Hostile codes and plans panic no
 /// controller and switch no bridge on where none may be. Constant inputs come to rest to
 /// the last bit, a thousand million ticks leave no drift. Every primitive is held against
 /// exact arithmetic over all its inputs.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// Cases of the plant, not counting those refused.
+    /// Cases of the plant, not counting those that have to be refused.
     #[arg(short = 'n', long = "cases", value_name = "CASES", default_value_t = 10_000)]
     cases: usize,
 
@@ -44,6 +44,10 @@ pub(super) struct Args {
     /// The fixed-point primitives alone.
     #[arg(long)]
     primitives: bool,
+
+    /// The cases of the plant alone.
+    #[arg(long, conflicts_with = "primitives")]
+    plant: bool,
 
     /// Prints the result as one JSON object.
     #[arg(long)]
@@ -78,7 +82,9 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     }
     let cases = if args.quick { args.cases.min(QUICK_CASES) } else { args.cases };
     let stride = if args.quick { QUICK_STRIDE } else { 1 };
-    let primitives = {
+    let primitives = if args.plant {
+        Vec::new()
+    } else {
         let bar = progress::bar("fixed-point inputs", primitives::inputs());
         primitives::run(stride, &|inputs| bar.advance(inputs))
     };
@@ -96,6 +102,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
             let bar = progress::bar("cases of the plant", cases as u64);
             plant::run(cases, args.seed, &|| bar.advance(1))
         };
+        if args.plant {
+            let rest = hostile::Report::default();
+            let printed = gather(report, vec![], vec![], vec![], None, rest);
+            return print(args, &printed);
+        }
         let _spinner = progress::spinner("refinement, hostile inputs, rest and drift");
         let (drift_ticks, hostile_ticks) =
             if args.quick { (1_000_000, 2000) } else { (DRIFT_TICKS, HOSTILE_TICKS) };
@@ -106,7 +117,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         let (refined, settling, hostile) = rest;
         gather(report, refined, primitives, settling, Some(drift), hostile)
     };
-    output::result(args.json, &printed, || human(&printed))?;
+    print(args, &printed)
+}
+
+fn print(args: &Args, printed: &Printed) -> Result<Outcome, Failure> {
+    output::result(args.json, printed, || human(printed))?;
     Ok(Outcome::of(printed.failures == 0))
 }
 
@@ -171,6 +186,9 @@ fn human(printed: &Printed) -> String {
     if printed.cases > 0 {
         text += &the_plant(printed);
     }
+    if printed.primitives.is_empty() {
+        return text + &failures(printed);
+    }
     let rows = printed.primitives.iter().map(|line| {
         vec![
             line.name.to_owned(),
@@ -211,10 +229,13 @@ fn human(printed: &Printed) -> String {
             printed.hostile.broken.len()
         );
     }
-    for failed in &printed.failed {
-        text += &format!("  failed: {failed}\n");
-    }
-    text + &format!("{} failures\n", printed.failures)
+    text + &failures(printed)
+}
+
+fn failures(printed: &Printed) -> String {
+    let failed: String =
+        printed.failed.iter().map(|failed| format!("  failed: {failed}\n")).collect();
+    failed + &format!("{} failures\n", printed.failures)
 }
 
 fn the_plant(printed: &Printed) -> String {
@@ -247,6 +268,9 @@ fn the_plant(printed: &Printed) -> String {
     for (name, count) in &printed.refusals {
         let message = printed.refused.get(name).map_or("", String::as_str);
         text += &format!("  refused {count}: {name}, as: {message}\n");
+    }
+    if printed.refined.is_empty() {
+        return text;
     }
     let orders = printed.refined.iter().filter_map(|line| line.order);
     let least = orders.clone().fold(f64::INFINITY, f64::min);

@@ -121,6 +121,7 @@ pub fn deployment(case: &Case, arms: &Arms) -> Result<Course, BalanceError> {
         let balance = Balance {
             preload_n: case.pressing_n(local.level),
             spring_n_per_mm: 0.0,
+            arm_n: 0.0,
             axial: Axial::Driven(case.load_n()),
         };
         let motion = Motion { wall: local, height_mm: height, turn_rad, dt_s };

@@ -3,6 +3,9 @@
 
 use std::collections::VecDeque;
 
+/// Time constant with which a wheel stops whose bridge is switched off, s.
+pub(super) const STOPS_IN_S: f64 = 0.003;
+
 /// Drive motor with self-locking gearbox; forces and masses seen at the tread.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DriveMotor {
@@ -18,70 +21,74 @@ pub struct DriveMotor {
     pub friction_n: f64,
 }
 
-/// What the drive works against, at the tread.
+/// What the drive does in a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Load {
-    /// Force at constant speed, N, signed as the speed that it resists.
+pub struct Turn {
+    /// Tread speed at its end if nothing resists, mm/s.
+    pub free_mm_s: f64,
+    /// What a resisting newton takes off it, mm/s.
+    pub yields: f64,
+    /// Coulomb friction and the motor's part in accelerating the rotor: its mean force if
+    /// nothing resists, N.
     pub force_n: f64,
-    /// Mass that moves with the tread, kg.
-    pub mass_kg: f64,
-}
-
-impl Load {
-    /// A force without inertia.
-    #[must_use]
-    pub const fn force(force_n: f64) -> Self {
-        Self { force_n, mass_kg: 0.0 }
-    }
+    /// By how much that rises per resisting newton.
+    pub force_rises: f64,
 }
 
 impl DriveMotor {
-    /// Tread speed after `dt_s` at `duty` (-1 to 1) against `load` from speed
-    /// `speed`, and the motor's mean force, N. Exact for a constant load, across the
-    /// current limit too.
+    /// The drive over `dt_s` at `duty` (-1 to 1) from tread speed `speed`. Exact for a
+    /// constant load; across the current limit for the load `expected_n`, signed as the
+    /// speed that it resists.
     ///
     /// The worm gear locks itself: a load against the motion resists it, one along the
     /// motion does not help, and none turns a resting wheel. A disabled bridge stops
     /// the wheel within a few milliseconds.
     #[must_use]
-    pub fn step(&self, speed: f64, duty: f64, enabled: bool, load: Load, dt_s: f64) -> (f64, f64) {
+    pub fn turn(&self, speed: f64, duty: f64, enabled: bool, expected_n: f64, dt_s: f64) -> Turn {
         if !enabled {
-            let stopped = speed * (-dt_s / 0.003).exp();
-            return (if stopped.abs() < 1e-3 { 0.0 } else { stopped }, 0.0);
+            let stopped = speed * (-dt_s / STOPS_IN_S).exp();
+            let free_mm_s = if stopped.abs() < 1e-3 { 0.0 } else { stopped };
+            return Turn { free_mm_s, ..Turn::default() };
         }
-        let force =
-            (self.stall_n * (duty - speed / self.no_load_mm_s)).clamp(-self.limit_n, self.limit_n);
-        let sense = if speed != 0.0 { speed.signum() } else { force.signum() };
-        let against = (load.force_n * sense).max(0.0) + self.friction_n;
-        if speed == 0.0 && force * sense <= against {
-            return (0.0, force);
+        let ideal = self.stall_n * (duty - speed / self.no_load_mm_s);
+        let force_n = ideal.clamp(-self.limit_n, self.limit_n);
+        let sense = if speed != 0.0 { speed.signum() } else { force_n.signum() };
+        if speed == 0.0 && force_n * sense <= self.friction_n {
+            return Turn { force_n, ..Turn::default() };
         }
-        // What the load carries is accelerated with the wheel, but cannot drive it: only
-        // while load and inertia together resist.
-        let both_kg = self.mass_kg + load.mass_kg;
-        let driving = sense * force - self.friction_n - load.force_n * sense;
-        let (mass_kg, against) = if load.force_n * sense * both_kg + load.mass_kg * driving >= 0.0 {
-            (both_kg, against)
+        let friction = sense * self.friction_n;
+        let (free, yields) = if ideal == force_n {
+            let rate = 1000.0 / self.mass_kg * self.stall_n / self.no_load_mm_s;
+            let gone = -(-rate * dt_s).exp_m1();
+            let rest = self.no_load_mm_s * (duty - friction / self.stall_n);
+            (speed + (rest - speed) * gone, self.no_load_mm_s / self.stall_n * gone)
         } else {
-            (self.mass_kg, self.friction_n)
+            let load = (expected_n * sense).max(0.01 * self.limit_n);
+            let free = self.accelerate(speed, duty, friction, dt_s);
+            let loaded = self.accelerate(speed, duty, friction + sense * load, dt_s);
+            (free, (free - loaded) * sense / load)
         };
-        let resist = sense * against;
-        let next = self.accelerate(speed, duty, resist, mass_kg, dt_s);
-        // Load and friction brake to rest, never through it.
-        if next * sense <= 0.0 {
-            return (0.0, force);
+        // Friction brakes to rest, never through it.
+        if free * sense <= 0.0 {
+            return Turn { force_n, ..Turn::default() };
         }
-        (next, resist + 1e-3 * mass_kg * (next - speed) / dt_s)
+        let kick = 1e-3 * self.mass_kg / dt_s;
+        Turn {
+            free_mm_s: free,
+            yields,
+            force_n: friction + kick * (free - speed),
+            force_rises: 1.0 - kick * yields,
+        }
     }
 
     /// Speed after `dt_s` against a constant force: at the current limit evenly
     /// accelerated as far as that goes, then as the motor's own lag has it.
-    fn accelerate(&self, speed: f64, duty: f64, resist: f64, mass_kg: f64, dt_s: f64) -> f64 {
+    fn accelerate(&self, speed: f64, duty: f64, resist: f64, dt_s: f64) -> f64 {
         let free = self.stall_n * (duty - speed / self.no_load_mm_s);
         let force = free.clamp(-self.limit_n, self.limit_n);
         let (mut speed, mut left_s) = (speed, dt_s);
         if free != force {
-            let rate = 1000.0 / mass_kg * (force - resist);
+            let rate = 1000.0 / self.mass_kg * (force - resist);
             // Speed at which the limit no longer binds.
             let knee = self.no_load_mm_s * (duty - force / self.stall_n);
             let until_s = (knee - speed) / rate;
@@ -90,7 +97,7 @@ impl DriveMotor {
             }
             (speed, left_s) = (knee, dt_s - until_s);
         }
-        let rate = 1000.0 / mass_kg * self.stall_n / self.no_load_mm_s;
+        let rate = 1000.0 / self.mass_kg * self.stall_n / self.no_load_mm_s;
         let rest = self.no_load_mm_s * (duty - resist / self.stall_n);
         rest + (speed - rest) * (-rate * left_s).exp()
     }
@@ -174,39 +181,34 @@ impl Pretightener {
 mod tests {
     use super::*;
 
+    const DRIVE: DriveMotor = DriveMotor {
+        no_load_mm_s: 60.0,
+        stall_n: 160.0,
+        limit_n: 80.0,
+        mass_kg: 40.0,
+        friction_n: 2.0,
+    };
+
+    /// Speed after a step against a constant load.
+    fn against(drive: &DriveMotor, speed: f64, duty: f64, load_n: f64, dt_s: f64) -> f64 {
+        let turn = drive.turn(speed, duty, true, load_n, dt_s);
+        let sense = turn.free_mm_s.signum();
+        let next = turn.free_mm_s - sense * turn.yields * (load_n * sense).max(0.0);
+        if next * sense <= 0.0 { 0.0 } else { next }
+    }
+
     #[test]
     fn the_drive_settles_where_torque_meets_load() {
-        let drive = DriveMotor {
-            no_load_mm_s: 60.0,
-            stall_n: 160.0,
-            limit_n: 80.0,
-            mass_kg: 40.0,
-            friction_n: 2.0,
-        };
-        let mut speed = 0.0;
-        for _ in 0..2000 {
-            speed = drive.step(speed, 0.5, true, Load::force(10.0), 1e-3).0;
-        }
+        let speed = (0..2000).fold(0.0, |v, _| against(&DRIVE, v, 0.5, 10.0, 1e-3));
         assert!((speed - 60.0 * (0.5 - 12.0 / 160.0)).abs() < 1e-6, "{speed}");
-        for _ in 0..50 {
-            speed = drive.step(speed, 0.5, false, Load::force(10.0), 1e-3).0;
-        }
-        assert_eq!(speed, 0.0);
+        let stopped = (0..50).fold(speed, |v, _| DRIVE.turn(v, 0.5, false, 10.0, 1e-3).free_mm_s);
+        assert_eq!(stopped, 0.0);
     }
 
     #[test]
     fn a_load_resists_but_never_drives() {
-        let drive = DriveMotor {
-            no_load_mm_s: 60.0,
-            stall_n: 160.0,
-            limit_n: 80.0,
-            mass_kg: 40.0,
-            friction_n: 2.0,
-        };
-        let settled = |duty: f64, load: f64| {
-            let load = Load::force(load);
-            (0..3000).fold(0.0, |speed, _| drive.step(speed, duty, true, load, 1e-3).0)
-        };
+        let settled =
+            |duty: f64, load| (0..3000).fold(0.0, |v, _| against(&DRIVE, v, duty, load, 1e-3));
         // At rest no load turns it, nor does a motor weaker than load and friction.
         for load in [0.0, 30.0, -30.0, 500.0] {
             assert_eq!(settled(0.0, load), 0.0);
@@ -217,63 +219,43 @@ mod tests {
         assert_eq!(settled(0.5, -30.0), settled(0.5, 0.0));
         assert!((settled(-0.5, 30.0) + settled(0.5, 0.0)).abs() < 1e-12);
         // Beyond the current limit it stalls, from speed too.
-        let load = Load::force(79.0);
-        let stalled = (0..3000).fold(30.0, |v, _| drive.step(v, 1.0, true, load, 1e-3).0);
-        assert_eq!(stalled, 0.0);
+        assert_eq!((0..3000).fold(30.0, |v, _| against(&DRIVE, v, 1.0, 79.0, 1e-3)), 0.0);
     }
 
     #[test]
     fn the_current_limit_bounds_force_and_acceleration() {
-        let drive = DriveMotor {
-            no_load_mm_s: 60.0,
-            stall_n: 160.0,
-            limit_n: 80.0,
-            mass_kg: 40.0,
-            friction_n: 2.0,
-        };
-        let (speed, force) = drive.step(0.0, 1.0, true, Load::default(), 1e-3);
-        assert!((force - 80.0).abs() < 1e-9, "{force}");
-        assert!((speed - 78.0 / 40.0).abs() < 1e-12, "{speed}");
-        let (speed, force) = drive.step(50.0, -1.0, true, Load::default(), 1e-3);
-        assert!((force + 80.0).abs() < 1e-9, "{force}");
-        assert!((speed - (50.0 - 82.0 / 40.0)).abs() < 1e-12, "{speed}");
+        let turn = DRIVE.turn(0.0, 1.0, true, 0.0, 1e-3);
+        assert!((turn.force_n - 80.0).abs() < 1e-9, "{turn:?}");
+        assert!((turn.free_mm_s - 78.0 / 40.0).abs() < 1e-12, "{turn:?}");
+        // What resists takes from the acceleration, not from the motor.
+        assert!(turn.force_rises.abs() < 1e-9 && (turn.yields - 1.0 / 40.0).abs() < 1e-12);
+        let turn = DRIVE.turn(50.0, -1.0, true, 0.0, 1e-3);
+        assert!((turn.force_n + 80.0).abs() < 1e-9, "{turn:?}");
+        assert!((turn.free_mm_s - (50.0 - 82.0 / 40.0)).abs() < 1e-12, "{turn:?}");
     }
 
     #[test]
     fn one_long_step_is_many_short_ones_across_the_limit() {
         for mass_kg in [0.01, 1.0, 40.0] {
-            let drive = DriveMotor {
-                no_load_mm_s: 60.0,
-                stall_n: 160.0,
-                limit_n: 80.0,
-                mass_kg,
-                friction_n: 2.0,
-            };
-            for load in [Load::force(10.0), Load { force_n: 10.0, mass_kg: 30.0 }] {
-                let step = |speed: f64, dt_s| drive.step(speed, 0.9, true, load, dt_s).0;
-                let long = step(0.0, 20e-3);
-                let short = (0..2000).fold(0.0, |speed, _| step(speed, 10e-6));
-                assert!((long - short).abs() < 1e-3 * short, "{long} {short}");
-                assert!(long < 60.0, "{long}");
-            }
+            let drive = DriveMotor { mass_kg, ..DRIVE };
+            let step = |speed: f64, dt_s| against(&drive, speed, 0.9, 10.0, dt_s);
+            let long = step(0.0, 20e-3);
+            let short = (0..2000).fold(0.0, |speed, _| step(speed, 10e-6));
+            assert!((long - short).abs() < 1e-3 * short, "{long} {short}");
+            assert!(long < 60.0, "{long}");
         }
     }
 
     #[test]
-    fn a_carried_mass_is_accelerated_but_drives_nothing() {
-        let drive = DriveMotor {
-            no_load_mm_s: 60.0,
-            stall_n: 160.0,
-            limit_n: 80.0,
-            mass_kg: 1.0,
-            friction_n: 2.0,
-        };
-        let carried = Load { force_n: 0.0, mass_kg: 99.0 };
-        let (speed, force) = drive.step(0.0, 1.0, true, carried, 1e-3);
-        assert!((speed - 0.78).abs() < 1e-12 && (force - 80.0).abs() < 1e-9, "{speed}");
-        // Braking, the worm holds it: only the rotor is braked.
-        let (speed, _) = drive.step(50.0, 0.0, true, carried, 1e-4);
-        assert!((speed - (50.0 - 8.2)).abs() < 1e-9, "{speed}");
+    fn the_mean_force_is_the_one_that_the_rotor_shows() {
+        for (speed, load) in [(20.0, 0.0), (20.0, 30.0), (0.0, 30.0), (29.0, 5.0)] {
+            let turn = DRIVE.turn(speed, 0.5, true, load, 1e-3);
+            let next = against(&DRIVE, speed, 0.5, load, 1e-3);
+            let shown = 2.0 + load + 1e-3 * 40.0 * (next - speed) / 1e-3;
+            let force = turn.force_n + turn.force_rises * load;
+            assert!((force - shown).abs() < 1e-9, "{force} {shown}");
+            assert!(force.abs() <= 80.0 + 1e-9);
+        }
     }
 
     #[test]

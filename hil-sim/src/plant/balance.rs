@@ -1,5 +1,6 @@
 //! Radial balance of the wheel: the height at which contact carries the preload.
 
+use super::grip::Grip;
 use super::ring::{Contact, Motion, Ring};
 
 /// How the wheel is moved along the sleeve.
@@ -12,13 +13,8 @@ pub enum Axial {
     Driven(f64),
     /// Given friction utilisation, from a slip law or a sliding wheel.
     Utilised(f64),
-    /// The same, on an arm that turns axial thrust into radial force.
-    Wedged {
-        /// Friction utilisation, traction over normal force.
-        utilisation: f64,
-        /// Radial force per axial thrust.
-        wedge: f64,
-    },
+    /// Turned by a motor, with the inertia of rotor and carriage, over a step of time.
+    Carried(Grip),
 }
 
 /// Radial load and how the wheel is moved.
@@ -27,8 +23,12 @@ pub struct Balance {
     /// Radial force that presses the wheel to the wall when its centre stands at
     /// its undeformed radius above the wall, N.
     pub preload_n: f64,
-    /// How that force grows as the centre rises, N/mm: the pre-tightener's spring.
+    /// How that force grows as the centre rises, N/mm: the pre-tightener's spring. A slack
+    /// spring does not pull.
     pub spring_n_per_mm: f64,
+    /// What presses it beside the spring, N: load and vibration through the arm. It may lift
+    /// the wheel, which then is pressed by nothing.
+    pub arm_n: f64,
     /// How it is moved.
     pub axial: Axial,
 }
@@ -70,14 +70,15 @@ impl Balance {
         (dc, ds): (f64, f64),
         lift_mm: f64,
     ) -> (f64, f64, f64) {
-        let pressed = self.preload_n + self.spring_n_per_mm * lift_mm;
+        let (pressed, rate) = self.pressed(lift_mm);
         let (force, slope, used) = match self.axial {
             Axial::Pushed => (c, dc, 0.0),
             Axial::Utilised(u) => (c + u * s, dc + u * ds, u),
-            // The thrust u c - s presses the wheel by its wedge.
-            Axial::Wedged { utilisation: u, wedge: w } => {
-                let (on_c, on_s) = (1.0 - u * w, u + w);
-                (on_c * c + on_s * s, on_c * dc + on_s * ds, u)
+            Axial::Carried(grip) => {
+                let traction = grip.at(c, s);
+                let u = traction.utilisation;
+                let du = traction.slope.0 * dc + traction.slope.1 * ds;
+                (c + u * s, dc + u * ds + du * s, u)
             }
             Axial::Driven(_) if c <= 0.0 => (0.0, 0.0, 0.0),
             Axial::Driven(load) => {
@@ -86,20 +87,31 @@ impl Balance {
                 (c + u * s, dc + u * ds + du * s, u)
             }
         };
-        (force - pressed, slope - self.spring_n_per_mm, used)
+        (force - pressed, slope - rate, used)
+    }
+
+    /// What presses the wheel at this lift, N, and how that grows, N/mm.
+    #[must_use]
+    pub fn pressed(&self, lift_mm: f64) -> (f64, f64) {
+        let spring = (self.preload_n + self.spring_n_per_mm * lift_mm).max(0.0);
+        let pressed = (spring + self.arm_n).max(0.0);
+        let taut = spring > 0.0 && pressed > 0.0;
+        (pressed, if taut { self.spring_n_per_mm } else { 0.0 })
     }
 
     /// Solves for the height, starting from the one in `motion`: Newton's method
-    /// inside a bracket, which is halved when the step leaves it.
+    /// inside a bracket, which is halved when the step leaves it. A wheel that nothing
+    /// presses stays there, or gives way to the wall as far as it has to.
     ///
     /// # Errors
     /// [`BalanceError`] if the preload cannot be carried.
     pub fn solve(&self, ring: &mut Ring, motion: Motion) -> Result<Solved, BalanceError> {
         let radius = ring.parameters().radius_mm;
         let (mut low, mut high) = (0.2 * radius, 1.1 * radius + motion.wall.rise_mm);
-        let scale = self.preload_n.max(1.0);
+        let scale = (self.preload_n + self.arm_n).max(1.0);
         let tolerance = TOLERANCE * scale;
-        let mut height = motion.height_mm.clamp(low, high);
+        let start = motion.height_mm.clamp(low, high);
+        let mut height = start;
         let (mut best, mut best_residual) = (None, f64::INFINITY);
         // So far off, the next height will not balance either: only what leads on from it
         // is computed.
@@ -112,14 +124,20 @@ impl Balance {
                 None => ring.forces(&at),
             };
             let (residual, slope, utilisation) = self.residual(forces, slopes, height - radius);
+            // Carried; or closed in on a kink, or on an end without a balance.
+            let closed = high - low < 1e-13 * radius;
+            if residual == 0.0 && forces.0 == 0.0 && height > start && !closed {
+                // Nothing presses, and nothing is touched: lower.
+                high = height;
+                height = 0.5 * (low + high);
+                continue;
+            }
             if let Some(contact) = whole
                 && residual.abs() < best_residual
             {
                 best_residual = residual.abs();
                 best = Some(Solved { height_mm: height, contact, utilisation });
             }
-            // Carried; or closed in on a kink, or on an end without a balance.
-            let closed = high - low < 1e-13 * radius;
             if !far && (residual.abs() <= tolerance || closed) {
                 break;
             }
@@ -171,27 +189,46 @@ mod tests {
 
     fn solve(preload_n: f64, spring_n_per_mm: f64, axial: Axial) -> Solved {
         let (mut ring, motion) = climbing();
-        Balance { preload_n, spring_n_per_mm, axial }.solve(&mut ring, motion).unwrap()
+        Balance { preload_n, spring_n_per_mm, arm_n: 0.0, axial }.solve(&mut ring, motion).unwrap()
+    }
+
+    /// A wheel that has just met a corner and loses speed against it.
+    fn carried(load_n: f64) -> Grip {
+        Grip {
+            mu: 0.9,
+            creep: 0.01,
+            rolling: 8.0,
+            load_n,
+            inertia: 1.0,
+            speed: 8.0,
+            tread: 8.0,
+            yields: 0.025,
+            advance: 1.0,
+            normal: 1.02,
+        }
     }
 
     #[test]
     fn the_forces_balance() {
-        let [rate, load, used, wedge] = [1.2, 6.7, 0.8, 0.6];
+        let [rate, load, used] = [1.2, 6.7, 0.8];
         for preload in [60.0, 150.0] {
             for axial in [
                 Axial::Pushed,
                 Axial::Driven(load),
                 Axial::Utilised(used),
-                Axial::Wedged { utilisation: used, wedge },
+                Axial::Carried(carried(load)),
             ] {
                 let solved = solve(preload, rate, axial);
                 let (c, s) = (solved.contact.cosine_n, solved.contact.sine_n);
                 assert!(solved.contact.floor_n > 0.0 && solved.contact.step_sine_n > 0.0);
                 let thrust = solved.utilisation * c - s;
-                let mut pressed = preload + rate * (solved.height_mm - 25.0);
+                let pressed = preload + rate * (solved.height_mm - 25.0);
                 match axial {
                     Axial::Driven(_) => assert!((thrust - load).abs() < 1e-6),
-                    Axial::Wedged { .. } => pressed += wedge * thrust,
+                    Axial::Carried(grip) => {
+                        let speed = grip.speed + (thrust - load) / grip.inertia;
+                        assert!((grip.at(c, s).speed - speed).abs() < 1e-6);
+                    }
                     _ => {}
                 }
                 let carried = c + solved.utilisation * s;
@@ -201,17 +238,10 @@ mod tests {
     }
 
     #[test]
-    fn without_a_wedge_it_is_the_given_utilisation() {
-        for used in [-1.1, 0.0, 0.7] {
-            let wedged = solve(33.3, 0.0, Axial::Wedged { utilisation: used, wedge: 0.0 });
-            assert_eq!(wedged, solve(33.3, 0.0, Axial::Utilised(used)));
-        }
-    }
-
-    #[test]
     fn a_preload_that_nothing_carries_is_told() {
         let (mut ring, motion) = climbing();
-        let balance = Balance { preload_n: 1e9, spring_n_per_mm: 0.0, axial: Axial::Pushed };
+        let balance =
+            Balance { preload_n: 1e9, spring_n_per_mm: 0.0, arm_n: 0.0, axial: Axial::Pushed };
         let error = balance.solve(&mut ring, motion).unwrap_err();
         assert_eq!(error.preload_n, 1e9);
         assert!(error.to_string().starts_with("radial balance: no wheel height carries"));

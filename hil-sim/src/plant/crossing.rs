@@ -54,7 +54,8 @@ pub fn cross(case: &CrossingCase) -> Result<CrossingResult, BalanceError> {
     let forward = case.speed_mm_s > 0.0;
     let wall = Wall::new(vec![Step { position_mm: 0.0, height_mm: case.step_height_mm }]);
     let mut ring = Ring::new(case.ring);
-    let balance = Balance { preload_n: case.preload_n, spring_n_per_mm: 0.0, axial: case.axial };
+    let balance =
+        Balance { preload_n: case.preload_n, spring_n_per_mm: 0.0, arm_n: 0.0, axial: case.axial };
     // Far enough before the corner to forget how the wheel was put down, and past
     // it until the patch has left the edge.
     let below = radius - case.step_height_mm;

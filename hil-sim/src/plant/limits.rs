@@ -3,6 +3,7 @@
 //! corner at the height of the hub is a wall.
 
 use super::draw::PlantParameters;
+use super::ring::RingParameters;
 
 /// Deepest that a corner may be pressed into the tread, parts of the wheel's radius.
 /// The radial law ends where the depth is no longer small against the radius.
@@ -12,18 +13,12 @@ pub const DEEPEST: f64 = 0.4;
 /// radius: from there the face leans on the wheel at the height of its axle.
 pub const HIGHEST: f64 = 0.85;
 
-/// Utilisation times tangent of the arm angle from which an arm wedges itself tight.
-const SELF_LOCKING: f64 = 0.75;
-
-/// Time in which a wheel whose bridge is switched off stops, s.
-const STOPS_WITHIN_S: f64 = 0.003;
-
 /// A combination of parameters that cannot be computed, because it cannot be.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Refusal {
     /// Preload on the corner.
     #[error(
-        "preload of {force_n:.1} N on a tread of {k_inf_pa_per_m:.3e} Pa/m presses a corner {depth_mm:.1} mm deep: at most {most_mm:.1} mm"
+        "preload.limit_n, with the load through the arm {force_n:.1} N, on tread.k_inf_pa_per_m = {k_inf_pa_per_m:.3e} presses a corner {depth_mm:.1} mm deep: at most {most_mm:.1} mm"
     )]
     Sinks {
         /// Radial force, N.
@@ -35,25 +30,27 @@ pub enum Refusal {
         /// Largest depth, mm.
         most_mm: f64,
     },
-    /// Thrust of motor and inertia through the arm.
+    /// Momentum and friction together.
     #[error(
-        "thrust of {thrust_n:.1} N through an arm that presses the wheel by {wedge:.2} of it, on a tread of {k_inf_pa_per_m:.3e} Pa/m, presses a corner {depth_mm:.1} mm deep: at most {most_mm:.1} mm"
+        "plant.mu = {mu:.2} on a corner that leans by {tangent:.2} drags a wheel down that is braked, and plant.moved_mass_kg = {mass_kg:.3} at {speed_mm_s:.0} mm/s brings {energy_mj:.0} mJ, of which the tread takes at most {most_mj:.0} mJ"
     )]
-    Wedges {
-        /// Largest axial thrust, N.
-        thrust_n: f64,
-        /// Radial force per thrust.
-        wedge: f64,
-        /// Relaxed stiffness, Pa/m.
-        k_inf_pa_per_m: f64,
-        /// Depth, mm.
-        depth_mm: f64,
-        /// Largest depth, mm.
-        most_mm: f64,
+    Digs {
+        /// Friction.
+        mu: f64,
+        /// Tangent of the direction to the corner.
+        tangent: f64,
+        /// Moved mass, kg.
+        mass_kg: f64,
+        /// Largest speed, mm/s.
+        speed_mm_s: f64,
+        /// Kinetic energy, mJ.
+        energy_mj: f64,
+        /// Energy that the tread takes, mJ.
+        most_mj: f64,
     },
     /// Step and depth together.
     #[error(
-        "a step of {step_mm:.1} mm, its corner {depth_mm:.1} mm deep in the tread, stands as high as the hub of a wheel of {radius_mm:.1} mm: at most {most_mm:.1} mm together"
+        "rig.step_height_mm = {step_mm:.1}, the corner {depth_mm:.1} mm deep in the tread, stands as high as the hub of a wheel of {radius_mm:.1} mm: at most {most_mm:.1} mm together"
     )]
     Towers {
         /// Step, mm.
@@ -73,7 +70,7 @@ impl Refusal {
     pub const fn name(&self) -> &'static str {
         match self {
             Self::Sinks { .. } => "preload sinks the wheel",
-            Self::Wedges { .. } => "arm wedges the wheel in",
+            Self::Digs { .. } => "braked wheel digs itself in",
             Self::Towers { .. } => "corner as high as the hub",
         }
     }
@@ -94,29 +91,43 @@ impl PlantParameters {
         let radius_mm = self.ring.radius_mm;
         let k_inf_pa_per_m = self.ring.k_inf * 1e9;
         let most_mm = DEEPEST * radius_mm;
-        let depth_mm = corner_depth(self, preload_n);
+        let wedge = self.arm.wedge(self.wall_radius_mm - radius_mm);
+        let force_n = preload_n + (wedge * self.load_n).max(0.0);
+        let depth_mm = corner_depth(self, force_n);
         if depth_mm > most_mm || depth_mm.is_nan() {
-            return Err(Refusal::Sinks { force_n: preload_n, k_inf_pa_per_m, depth_mm, most_mm });
+            return Err(Refusal::Sinks { force_n, k_inf_pa_per_m, depth_mm, most_mm });
         }
         let step_mm = self.wall.steps().iter().fold(0.0f64, |most, s| most.max(s.height_mm));
-        let highest = HIGHEST * radius_mm;
-        if step_mm + depth_mm > highest {
-            return Err(Refusal::Towers { step_mm, depth_mm, radius_mm, most_mm: highest });
+        let most_mm = HIGHEST * radius_mm;
+        if step_mm + depth_mm > most_mm {
+            return Err(Refusal::Towers { step_mm, depth_mm, radius_mm, most_mm });
         }
-        let wedge = self.arm.wedge(self.wall_radius_mm - radius_mm).abs();
-        // Only an arm that wedges itself tight transmits more than friction.
-        if wedge * self.mu < SELF_LOCKING {
-            return Ok(());
+        let tangent = leans(radius_mm, step_mm + depth_mm);
+        let (mass_kg, speed_mm_s) = (self.mass_kg, self.drive.no_load_mm_s);
+        let energy_mj = 0.5e-3 * mass_kg * speed_mm_s * speed_mm_s;
+        let most_mj = takes(&self.ring, step_mm);
+        if self.mu * tangent >= 1.0 && energy_mj > most_mj {
+            let mu = self.mu;
+            return Err(Refusal::Digs { mu, tangent, mass_kg, speed_mm_s, energy_mj, most_mj });
         }
-        let drive = &self.drive;
-        let brakes = drive.limit_n / drive.mass_kg + 1e-3 * drive.no_load_mm_s / STOPS_WITHIN_S;
-        let thrust_n = drive.limit_n + self.load_n.abs() + self.mass_kg * brakes;
-        let depth_mm = corner_depth(self, preload_n + wedge * thrust_n);
-        if depth_mm <= most_mm {
-            return Ok(());
-        }
-        Err(Refusal::Wedges { thrust_n, wedge, k_inf_pa_per_m, depth_mm, most_mm })
+        Ok(())
     }
+}
+
+/// Tangent of the direction from the wheel's centre to a corner this far above the lowest
+/// point of its rim, mm: axial over radial force of a frictionless contact there.
+#[must_use]
+pub fn leans(radius_mm: f64, above_mm: f64) -> f64 {
+    let over = radius_mm - above_mm;
+    (radius_mm * radius_mm - over * over).max(0.0).sqrt() / over.max(1e-9)
+}
+
+/// Energy that a corner of a step may bring into the tread, mJ: a fourth of what takes it to
+/// the depth allowed, `k L d^3/3`, for the rest of the tread is not as stiff.
+#[must_use]
+pub fn takes(ring: &RingParameters, step_mm: f64) -> f64 {
+    let depth = (DEEPEST * ring.radius_mm).min(HIGHEST * ring.radius_mm - step_mm);
+    ring.k_inf * ring.width_mm * depth.powi(3) / 12.0
 }
 
 #[cfg(test)]
@@ -143,21 +154,23 @@ mod tests {
         soft.ring.k_inf = 1e-3;
         let refusal = soft.check(50.0).unwrap_err();
         assert!(matches!(refusal, Refusal::Sinks { .. }));
-        assert!(refusal.to_string().contains("50.0 N on a tread of 1.000e6 Pa/m"), "{refusal}");
+        assert!(refusal.to_string().contains("on tread.k_inf_pa_per_m = 1.000e6"), "{refusal}");
         let mut high = nominal();
         high.wall = crate::plant::wall::Wall::new(vec![crate::plant::wall::Step {
             position_mm: 20.0,
             height_mm: 20.5,
         }]);
         assert!(matches!(high.check(50.0), Err(Refusal::Towers { .. })));
+        high.load_n = 0.0;
         assert_eq!(high.check(5.0), Ok(()));
+        // The load presses too, through a trailing arm.
         let mut heavy = nominal();
-        heavy.mass_kg = 200.0;
-        heavy.drive.mass_kg = 0.2;
-        assert!(matches!(heavy.check(50.0), Err(Refusal::Wedges { .. })));
-        // An arm that does not lock transmits no more than friction.
-        heavy.mu = 0.5;
-        assert_eq!(heavy.check(50.0), Ok(()));
+        heavy.ring.k_inf = 0.02;
+        assert_eq!(heavy.check(48.0), Ok(()));
+        heavy.load_n = 20.0;
+        assert!(matches!(heavy.check(48.0), Err(Refusal::Sinks { .. })));
+        heavy.arm.coupling = -1.0;
+        assert_eq!(heavy.check(48.0), Ok(()));
     }
 
     #[test]

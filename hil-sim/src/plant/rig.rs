@@ -14,16 +14,19 @@ use super::ledger::Ledger;
 use super::ring::Ring;
 use super::rolling::{self, Steady};
 use contact::Calm;
-use traction::Gait;
+use traction::Stride;
 
 pub use phases::{PHASES, Phase, PhaseWork};
 
 /// Most ring steps in a call: 10 mm of way at the usual stride.
 const MOST_STRIDES: f64 = 256.0;
 
-/// Way after which motor, friction and wall exchange their forces, if the step of time is
-/// longer than that, mm.
-pub const EXCHANGE_MM: f64 = 1.0;
+/// Way after which the stride is fitted anew to the speed, if the step of time is longer
+/// than that, mm.
+const EXCHANGE_MM: f64 = 1.0;
+
+/// Most parts that a stride is halved into.
+const MOST_HALVINGS: f64 = 4096.0;
 
 /// How finely the rig is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -88,6 +91,11 @@ pub struct Truth {
     pub root_clearance_mm: Option<f64>,
     /// Separation of wheel and wall away from steps, mm.
     pub separation_mm: f64,
+    /// Axial force of the wall under the wheel against the motion of its tread, N.
+    pub resistance_n: f64,
+    /// Radial force of the contact beyond what presses the wheel, N: nought but for what the
+    /// solution leaves.
+    pub unbalanced_n: f64,
     /// Gross slip so far, mm.
     pub slip_mm: f64,
     /// Deflection of the arm by its modes, mm.
@@ -153,12 +161,17 @@ pub struct VirtualRig {
     phase: Phase,
     /// Contact forces of the last stride: normal, cosine and sine sums, N.
     forces: (f64, f64, f64),
-    /// Acceleration of the tread, mm/s^2.
-    acceleration: f64,
-    /// Rise of the centre per axial way in the last stride.
-    slope: f64,
-    /// The part of it that no change of load explains.
+    /// Way that the speeds of the last stride gave beyond the one foreseen: of the carriage
+    /// and of the tread, mm.
+    owed_mm: (f64, f64),
+    /// Force that resisted the tread in the last stride, N, signed as its speed.
+    resists_n: f64,
+    /// Static thrust on the arm, N: the load, or at an end stop what the wheel pushes with.
+    thrust_n: f64,
+    /// Rise of the centre per axial way in the last stride that no change of load explains.
     drift: f64,
+    /// Rise per axial way beyond that along the step's force, for what the tread takes in.
+    swells: f64,
     /// Rise that no change of load explains while the wheel stands, mm/s.
     creep: f64,
     /// Derivatives of the resolved contact's cosine and sine sums by the height, N/mm.
@@ -212,9 +225,11 @@ impl VirtualRig {
             phases: Default::default(),
             phase: Phase::Smooth,
             forces: (rest.normal_n, rest.cosine_n, 0.0),
-            acceleration: 0.0,
-            slope: 0.0,
+            owed_mm: (0.0, 0.0),
+            resists_n: 0.0,
+            thrust_n: parameters.load_n,
             drift: 0.0,
+            swells: 0.0,
             creep: 0.0,
             stiffness: None,
             parameters,
@@ -275,14 +290,15 @@ impl VirtualRig {
         let before = self.work();
         let mut left_s = dt_s;
         while left_s > 0.0 {
-            let part_s = self.exchange(left_s);
-            self.turn_wheel(drives, part_s);
-            self.check()?;
-            let way = self.truth.tread_mm_s.abs().max(self.truth.speed_mm_s.abs()) * part_s;
-            let parts = (way / self.resolution.stride_mm).ceil().clamp(1.0, MOST_STRIDES);
+            let way = self.farthest(left_s);
+            let exchanges = (way / EXCHANGE_MM).ceil().max(1.0);
+            let part_s = left_s / exchanges;
+            let parts = way / exchanges / self.resolution.stride_mm;
+            let parts = parts.ceil().clamp(1.0, MOST_STRIDES);
             for _ in 0..parts as usize {
-                self.roll(part_s / parts)?;
+                self.roll(drives, part_s / parts)?;
             }
+            self.check()?;
             left_s -= part_s;
         }
         self.count(&before, dt_s);
@@ -292,65 +308,59 @@ impl VirtualRig {
         self.check()
     }
 
-    /// How long motor and wall may go on with the forces that they have, up to `left_s`:
-    /// until wheel or carriage have moved by [`EXCHANGE_MM`].
-    fn exchange(&self, left_s: f64) -> f64 {
+    /// Farthest that wheel or carriage can come in this time, mm.
+    fn farthest(&self, left_s: f64) -> f64 {
         let drive = &self.parameters.drive;
         let (tread, speed) = (self.truth.tread_mm_s.abs(), self.truth.speed_mm_s.abs());
         // The most that motor and carriage can gain.
         let gain = 1000.0 * drive.limit_n / drive.mass_kg * left_s;
         let spin = (tread + gain).min(tread.max(drive.no_load_mm_s));
         let slide = if self.sliding { speed + self.sliding_gain() * left_s } else { speed };
-        let way = spin.max(slide) * left_s;
-        if way <= EXCHANGE_MM { left_s } else { left_s / (way / EXCHANGE_MM).ceil() }
+        spin.max(slide) * left_s
     }
 
-    /// Motor and gearbox: the wheel's spin.
-    fn turn_wheel(&mut self, drives: &Drives, dt_s: f64) {
-        let before = self.truth.tread_mm_s;
-        let load = self.drive_load(drives.drive);
-        let drive = &self.parameters.drive;
-        let (after, force) = drive.step(before, drives.drive, drives.drive_on, load, dt_s);
-        self.truth.tread_mm_s = after;
-        self.truth.work_mj += (force * 0.5 * (before + after) * dt_s).max(0.0);
-        self.acceleration = (after - before) / dt_s;
-        if after != 0.0 {
-            self.parked = false;
+    /// Strides of this time together: shorter ones where the forces that are found move the
+    /// wheel far from where it was foreseen.
+    fn roll(&mut self, drives: &Drives, dt_s: f64) -> Result<(), PlantError> {
+        let shortest_s = dt_s / MOST_HALVINGS;
+        let (mut left_s, mut part_s) = (dt_s, dt_s);
+        while left_s > 0.0 {
+            if self.stride(drives, part_s, part_s > shortest_s)? {
+                left_s -= part_s;
+                part_s = left_s.min(2.0 * part_s);
+            } else {
+                part_s *= 0.5;
+            }
         }
+        Ok(())
     }
 
-    /// One stride: axial motion by grip or slip, then the radial balance.
-    fn roll(&mut self, dt_s: f64) -> Result<(), PlantError> {
-        let Gait { mut speed, gripped, mut axial } = self.traction(dt_s);
-        let before = self.truth.position_mm;
-        let (low, high) = self.parameters.stops_mm;
-        let mut position = before + speed * dt_s;
-        if position < low || position > high {
-            position = position.clamp(low, high);
-            speed = 0.0;
-            if gripped != 0.0 {
-                axial = self.sliding_towards(gripped).unwrap_or(axial);
-            }
+    /// One stride: motor, traction and radial balance at once. Unless it would have to go
+    /// `finer`: then nothing has happened.
+    fn stride(&mut self, drives: &Drives, dt_s: f64, finer: bool) -> Result<bool, PlantError> {
+        let (truth, calm, parked) = (self.truth, self.calm, self.parked);
+        let stride = self.set_out(drives, dt_s);
+        if !stride.tread_mm_s.is_finite() {
+            return Err(PlantError::NotFinite { time_s: truth.time_s, name: "tread speed" });
         }
-        let tread = self.truth.tread_mm_s;
-        self.truth.slip_mm += (gripped - speed).abs() * dt_s;
-        let creep = (tread - speed).abs() * dt_s;
-        self.truth.wear_mj += self.truth.utilisation.abs() * self.forces.0 * creep;
-        self.truth.position_mm = position;
-        self.truth.speed_mm_s = speed;
-        let turn = tread * dt_s / self.parameters.ring.radius_mm;
-        self.truth.rotation_rad += turn;
-        let local = self.parameters.wall.local(position);
-        let settled = self.settled(&local, axial, dt_s);
-        if self.resolution.always_awake || !settled {
-            if !self.awake {
-                self.wake(before);
-            }
-            self.resolve(&local, axial, turn, dt_s)
+        self.truth.position_mm = stride.position_mm;
+        self.truth.rotation_rad += stride.turn_rad;
+        let local = self.parameters.wall.local(stride.position_mm);
+        let settled = self.settled(&local, dt_s);
+        let awake = self.resolution.always_awake || !settled;
+        if awake && !self.awake {
+            self.wake(truth.position_mm);
+        }
+        self.awake = awake;
+        let done = if awake {
+            self.resolve(&local, stride, finer)?
         } else {
-            self.awake = false;
-            self.roll_steadily(&local, axial)
+            self.roll_steadily(&local, stride, finer)?
+        };
+        if !done {
+            (self.truth, self.calm, self.parked) = (truth, calm, parked);
         }
+        Ok(done)
     }
 
     /// Modes of the arm, forced by the torque ripple of motor and gearbox.

@@ -59,11 +59,22 @@ pub fn solve(
     guess_mm: f64,
     balance: impl Fn(&Rolling) -> f64,
 ) -> Rolling {
+    solve_by(ring, speed_mm_s, guess_mm, |contact| (balance(contact), contact.slope))
+}
+
+/// The same with the residual's derivative by the height, N/mm, beside it. The residual may
+/// rise with the height where it is below nought.
+fn solve_by(
+    ring: &RingParameters,
+    speed_mm_s: f64,
+    guess_mm: f64,
+    balance: impl Fn(&Rolling) -> (f64, f64),
+) -> Rolling {
     let (mut low, mut high) = (0.5 * ring.radius_mm, ring.radius_mm);
     let mut height = guess_mm.clamp(low, high - 1e-9);
     let mut best = at_height(ring, height, speed_mm_s);
     for _ in 0..60 {
-        let residual = balance(&best);
+        let (residual, slope) = balance(&best);
         if residual.abs() < 1e-6 || high - low < 1e-12 {
             break;
         }
@@ -72,8 +83,9 @@ pub fn solve(
         } else {
             high = height;
         }
-        let newton = height - residual / best.slope;
-        height = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        let newton = height - residual / slope;
+        height =
+            if slope < 0.0 && newton > low && newton < high { newton } else { 0.5 * (low + high) };
         best = at_height(ring, height, speed_mm_s);
     }
     best
@@ -183,15 +195,13 @@ pub struct Steady {
 }
 
 impl Steady {
-    /// As [`solve`], by tangents within the error named there; `slope` is the balance's
-    /// derivative by the height but for the contact's own, N/mm.
+    /// As [`solve`], by tangents within the error named there.
     pub fn solve(
         &mut self,
         ring: &RingParameters,
         speed_mm_s: f64,
         guess_mm: f64,
-        slope: f64,
-        balance: impl Fn(&Rolling) -> f64,
+        balance: impl Fn(&Rolling) -> (f64, f64),
     ) -> Rolling {
         if let Some(tangent) = self.tangent {
             let mut height = guess_mm;
@@ -201,8 +211,11 @@ impl Steady {
                 }
                 let at = tangent.at(ring, height, speed_mm_s);
                 self.iterations += 1;
-                let residual = balance(&at);
-                let change = -residual / (at.slope + slope);
+                let (residual, slope) = balance(&at);
+                if slope >= 0.0 {
+                    break;
+                }
+                let change = -residual / slope;
                 // So close, the last step needs no contact of its own.
                 if change.abs() <= CLOSE * tangent.depth {
                     return at.moved(ring, change);
@@ -211,7 +224,7 @@ impl Steady {
             }
         }
         self.computed += 1;
-        let solved = solve(ring, speed_mm_s, guess_mm, balance);
+        let solved = solve_by(ring, speed_mm_s, guess_mm, balance);
         self.tangent = Tangent::new(ring, solved.height_mm, speed_mm_s);
         solved
     }
@@ -331,8 +344,12 @@ mod tests {
             let steady = solve(&ring(), speed, 24.8, |c| c.cosine_n - preload);
             let mut rolled = Ring::new(ring());
             let wall = Wall::default().local(0.0);
-            let balance =
-                Balance { preload_n: preload, spring_n_per_mm: 0.0, axial: Axial::Pushed };
+            let balance = Balance {
+                preload_n: preload,
+                spring_n_per_mm: 0.0,
+                arm_n: 0.0,
+                axial: Axial::Pushed,
+            };
             let dx = 0.01f64.copysign(speed);
             let mut height = 24.8;
             let mut contact = None;
@@ -390,7 +407,7 @@ mod tests {
         for i in 0..2000 {
             let t = f64::from(i) / 2000.0;
             let (preload, speed) = (30.0 + 90.0 * t + 0.5 * (300.0 * t).sin(), 3.0 + 20.0 * t * t);
-            let at = steady.solve(&ring(), speed, height, 0.0, |c| c.cosine_n - preload);
+            let at = steady.solve(&ring(), speed, height, |c| (c.cosine_n - preload, c.slope));
             height = at.height_mm;
             assert!((at.cosine_n - preload).abs() < 1e-4 * preload, "{at:?} {preload}");
             let exact = solve(&ring(), speed, height, |c| c.cosine_n - preload);

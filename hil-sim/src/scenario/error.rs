@@ -124,6 +124,14 @@ pub enum ScenarioError {
         /// Least distance, mm.
         least_mm: f64,
     },
+    /// Values that are each possible and together make no plant.
+    #[error("{origin}: {refusal}")]
+    Refused {
+        /// Where the offending value was written.
+        origin: Origin,
+        /// What is wrong with them.
+        refusal: crate::plant::limits::Refusal,
+    },
     /// The rig's own checks failed.
     #[error("{origin}: {error}")]
     Rig {

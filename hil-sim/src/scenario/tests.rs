@@ -241,3 +241,11 @@ fn keys_tell_unit_value_and_description() {
     assert!(keys.iter().any(|k| k.key == "run.anomalies"));
     assert_eq!(keys[0].key, "preset");
 }
+
+#[test]
+fn values_that_make_no_plant_are_told_with_the_one_to_change() {
+    let text = set_error("tread.k_inf_pa_per_m=1e7");
+    assert!(text.starts_with("command line: preload.limit_n, with the load"), "{text}");
+    assert!(text.contains("tread.k_inf_pa_per_m = 1.000e7") && text.contains("at most"), "{text}");
+    assert_eq!(text.lines().count(), 1);
+}

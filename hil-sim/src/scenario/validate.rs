@@ -2,6 +2,7 @@
 
 use super::merge::Provenance;
 use super::{Scenario, ScenarioError, StepAnomaly};
+use crate::plant::draw::PlantParameters;
 
 /// Largest offset of an early or late step, mm.
 const MAX_OFFSET_MM: f64 = 20.0;
@@ -20,7 +21,10 @@ pub(super) fn check(scenario: &Scenario, from: &Provenance) -> Result<(), Scenar
         }
     }
     anomalies(scenario, from)?;
-    spacing(scenario, from)
+    spacing(scenario, from)?;
+    PlantParameters::draw(scenario).check(scenario.rig.preload.limit_n).map_err(|refusal| {
+        ScenarioError::Refused { origin: from.of_message(&refusal.to_string()), refusal }
+    })
 }
 
 fn ranges(scenario: &Scenario) -> [(&'static str, f64, f64, f64); 24] {

@@ -42,7 +42,8 @@ impl Session {
     /// stow end, for retraction pressed at the end of travel.
     ///
     /// # Errors
-    /// [`RunError::Rig`] if the parameters do not make a controller.
+    /// [`RunError::Rig`] if the parameters do not make a controller, [`RunError::Refused`] if
+    /// they do not make a plant.
     pub fn new(scenario: &Scenario, options: Options) -> Result<Self, RunError> {
         let strategy = scenario.run.controller.into();
         let mut planner = Planner::try_build_as(&scenario.rig, strategy)?;
@@ -51,6 +52,7 @@ impl Session {
         }
         let direction = scenario.run.direction.into();
         let parameters = PlantParameters::draw(scenario);
+        parameters.check(scenario.rig.preload.limit_n)?;
         // The way back begins where the way out ended: at the end of travel, pressed.
         let (position, preload) = match direction {
             Direction::Deploy => (0.0, 0.0),

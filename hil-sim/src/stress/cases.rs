@@ -1,7 +1,14 @@
 //! What the plant is stressed with: all corners of the ranges, and a low-discrepancy
 //! sequence between them.
+//!
+//! Every case can be: preload, load and spring press no more than the tread carries under
+//! the corner of its step. What cannot be is drawn apart, to see it refused.
 
 use serde::Serialize;
+
+use super::roll::{RADIUS_MM, WIDTH_MM};
+use super::{drive, roll};
+use crate::plant::limits::{DEEPEST, HIGHEST, leans, takes};
 
 /// Range of a parameter, and how it is filled.
 #[derive(Clone, Copy, Debug)]
@@ -118,9 +125,17 @@ pub struct Case {
     pub coupling: f64,
     /// How it is driven.
     pub course: Course,
+    /// Rate of the preload spring, N/mm.
+    pub spring_n_per_mm: f64,
     /// Where the run begins, parts of the way over the step before the touch.
     pub phase: f64,
 }
+
+/// Rate of the preload spring where the tread is stiff enough for it, N/mm.
+const SPRING: f64 = 1.2;
+
+/// Parts of what a tread carries that preload, spring and load may press it with at most.
+const PARTS: (f64, f64, f64) = (0.4, 0.3, 0.2);
 
 /// The first `count` cases of the stress with this seed: every fourth corner of the
 /// eight ranges for small counts, all corners from a thousand cases on, the rest from
@@ -133,6 +148,45 @@ pub fn draw(count: usize, seed: u64) -> Vec<Case> {
     let inside = (0..).map(|n| of(&sequence.point(n)));
     let all = corners.chain(inside).take(count).enumerate();
     all.map(|(index, case)| Case { index, ..case }).collect()
+}
+
+/// Largest force on a corner of the step with this tread, N: relaxed, `F = k L d^2`.
+fn carries(k_inf_pa_per_m: f64, step_mm: f64) -> f64 {
+    1e-9 * k_inf_pa_per_m * WIDTH_MM * deepest(step_mm).powi(2)
+}
+
+/// Deepest that a corner of the step may come into the tread, mm.
+fn deepest(step_mm: f64) -> f64 {
+    (DEEPEST * RADIUS_MM).min(HIGHEST * RADIUS_MM - step_mm)
+}
+
+/// Cases that cannot be, each with the name of its refusal: the first `count`, pressed with
+/// more than the tread carries, or braked with more momentum than it takes.
+#[must_use]
+pub fn beyond(count: usize, seed: u64) -> Vec<(Case, &'static str)> {
+    let changed = |case: Case| {
+        if case.index.is_multiple_of(3) {
+            let mu = 1.05 / leans(RADIUS_MM, case.step_mm.max(2.0));
+            let case = Case { mu, step_mm: case.step_mm.max(2.0), load_n: 0.0, ..case };
+            let most = takes(&roll::rubber(&case), case.step_mm);
+            let mass_kg = 2.1e3 * most / drive::top(case.speed_mm_s).powi(2);
+            return (Case { mass_kg, ..case }, "braked wheel digs itself in");
+        }
+        let most = carries(case.k_inf_pa_per_m, case.step_mm);
+        // Where a deep corner is refused before a high one.
+        let deep = (DEEPEST * RADIUS_MM / deepest(case.step_mm)).powi(2);
+        let sinks = case.phase < 0.5;
+        let (name, force_n) = if sinks {
+            ("preload sinks the wheel", 1.05 * deep * most)
+        } else if deep > 1.1 {
+            ("corner as high as the hub", (1.0 + 0.5 * (deep - 1.0)) * most)
+        } else {
+            ("preload sinks the wheel", 2.0 * most)
+        };
+        let case = Case { preload_n: force_n, load_n: 0.0, spring_n_per_mm: 1e-6, ..case };
+        (case, name)
+    };
+    draw(count, seed).into_iter().map(changed).collect()
 }
 
 fn corner(bits: usize) -> Case {
@@ -148,9 +202,11 @@ fn corner(bits: usize) -> Case {
 fn of(parts: &[f64; DIMENSIONS]) -> Case {
     let [k, s, tau, dt, ratio, v, h, mu, preload, load, arm, course, phase] = *parts;
     let mass_ratio = MASS_RATIO.at(ratio);
-    Case {
+    let (stiffness, step_mm) = (STIFFNESS.at(k), STEP.at(h));
+    let carried_n = carries(stiffness, step_mm);
+    let mut case = Case {
         index: 0,
-        k_inf_pa_per_m: STIFFNESS.at(k),
+        k_inf_pa_per_m: stiffness,
         // A fifth of the treads is without damping.
         stiffening: STIFFENING.at((1.25 * s - 0.25).max(0.0)),
         tau_s: TAU.at(tau),
@@ -159,14 +215,23 @@ fn of(parts: &[f64; DIMENSIONS]) -> Case {
         // Both masses move away from 40 kg and 1 kg by half of the ratio's decades.
         mass_kg: 6.0 * mass_ratio.sqrt(),
         speed_mm_s: SPEED.at(v * v * v),
-        step_mm: STEP.at(h),
+        step_mm,
         mu: FRICTION.at(mu),
-        preload_n: PRELOAD.at(preload),
-        load_n: LOAD.at(load * load),
+        preload_n: PRELOAD.at(preload).min(PARTS.0 * carried_n),
+        load_n: LOAD.at(load * load).min(PARTS.2 * carried_n),
         coupling: [1.0, 1.0, 0.0, 0.0, 0.0, -1.0][((arm * 6.0) as usize).min(5)],
         course: Course::ALL[((course * 5.0) as usize).min(4)],
+        spring_n_per_mm: SPRING.min(PARTS.1 * carried_n / step_mm.max(1.0)),
         phase,
+    };
+    // A braked wheel with more momentum than its tread takes digs itself in, unless it slides.
+    let top = drive::top(case.speed_mm_s);
+    if 0.5e-3 * case.mass_kg * top * top > takes(&roll::rubber(&case), step_mm) {
+        let pressed_n = PARTS.0 + PARTS.1 + 1.2 * PARTS.2;
+        let depth_mm = deepest(step_mm) * pressed_n.sqrt();
+        case.mu = case.mu.min(0.95 / leans(RADIUS_MM, step_mm + depth_mm));
     }
+    case
 }
 
 /// The additive recurrence with the powers of the generalised golden ratio, from an

@@ -5,7 +5,7 @@ use super::cases::{Case, Course};
 use super::roll::{self, RADIUS_MM};
 use crate::plant::actuators::DriveMotor;
 use crate::plant::draw::{ELEMENTS, PlantParameters};
-use crate::plant::rig::{Drives, EXCHANGE_MM, PlantError, Truth, VirtualRig};
+use crate::plant::rig::{Drives, PlantError, Truth, VirtualRig};
 use crate::plant::wall::{Step, Wall};
 use crate::scenario::Scenario;
 
@@ -15,13 +15,24 @@ const BUDGET: f64 = 1000.0;
 /// Least number of steps of time.
 const LEAST_TICKS: f64 = 20.0;
 
+/// Speed of the unloaded motor for a case at this speed, mm/s.
+pub(super) fn top(speed_mm_s: f64) -> f64 {
+    (1.25 * speed_mm_s).max(1.0)
+}
+
+/// Force that is known no better than to the tolerance of the balance, N.
+const LEAST_N: f64 = 1e-2;
+
+/// Longest stride, mm: the way of the fastest and longest step in as many as the plant takes.
+const LONGEST_MM: f64 = 0.16;
+
 /// What a run shows.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Drove {
     /// Largest depth of the tread, mm.
     pub depth_mm: f64,
-    /// Largest separation of wheel and wall away from the step, mm.
-    pub separation_mm: f64,
+    /// Largest radial force left unbalanced over what is balanced.
+    pub unbalanced: f64,
     /// Largest speed of the tread over that of the unloaded motor.
     pub overspeed: f64,
     /// Energy that nothing put in, mJ.
@@ -40,12 +51,14 @@ pub(super) fn plant(case: &Case) -> PlantParameters {
     plant.arm.coupling = case.coupling;
     plant.stops_mm = (-100.0, 100.0);
     plant.mu = case.mu;
+    plant.ripple.0 = 0.006 * limit_n;
     // The convention that keeps energy.
     plant.climb_slows = true;
     plant.load_n = case.load_n;
+    plant.spring_n_per_mm = case.spring_n_per_mm;
     plant.mass_kg = case.mass_kg;
     plant.drive = DriveMotor {
-        no_load_mm_s: (1.25 * case.speed_mm_s).max(1.0),
+        no_load_mm_s: top(case.speed_mm_s),
         stall_n: 2.0 * limit_n,
         limit_n,
         mass_kg: case.mass_kg / case.mass_ratio,
@@ -72,8 +85,10 @@ pub(super) fn run(case: &Case, plant: &PlantParameters) -> Result<Drove, PlantEr
         .with_speed(case.course.speed(0.0) * case.speed_mm_s);
     let mut out = Drove::default();
     let mut before = *rig.truth();
-    let (first, rest_mm) = (mechanical(plant, &before), before.depth_mm);
-    let (mut wedged, mut lift, mut kinetic, mut force) = (0.0, 0.0, 0.0f64, 0.0f64);
+    // The screw stands.
+    let seat_n = before.preload_n - plant.spring_n_per_mm * (before.height_mm - RADIUS_MM);
+    let (mut first, rest_mm) = (0.0, before.depth_mm);
+    let (mut wedged, mut misplaced, mut force) = (0.0, 0.0, 0.0f64);
     let mut fastest = case.speed_mm_s;
     for tick in 0..ticks {
         let part = tick as f64 / ticks as f64;
@@ -86,35 +101,46 @@ pub(super) fn run(case: &Case, plant: &PlantParameters) -> Result<Drove, PlantEr
         // An arm that leans carries its load along as the wheel rises.
         let lean = plant.arm.coupling * 0.5 * (now.arm_rad.tan() + before.arm_rad.tan());
         wedged += plant.load_n * lean * rise;
-        lift += rise.abs();
-        force = force.max(now.floor_n + now.corner_n);
+        force = force.max(force_of(&now));
         fastest = fastest.max(now.speed_mm_s.abs()).max(now.tread_mm_s.abs());
-        kinetic = kinetic.max(0.5e-3 * plant.mass_kg * now.speed_mm_s.powi(2));
-        let gained = mechanical(plant, &now) + wedged - first - now.work_mj;
+        // Rolling resistance is taken from the carriage, that of a sliding wheel too, whose
+        // tread it would have to be taken from.
+        let slid = (now.tread_mm_s - now.speed_mm_s) * case.dt_s;
+        misplaced += (now.resistance_n * slid).max(0.0);
+        let held = mechanical(plant, &now, seat_n) + wedged - now.work_mj;
+        if tick == 0 {
+            // Brought to its speed in no time, the wheel rises in the first step.
+            first = held;
+        }
+        let gained = held - first;
         out.created_mj = if gained.is_nan() { f64::NAN } else { out.created_mj.max(gained) };
         out.depth_mm = out.depth_mm.max(now.depth_mm);
-        out.separation_mm = out.separation_mm.max(now.separation_mm);
+        let unbalanced = now.unbalanced_n.abs() / force_of(&now).max(LEAST_N);
+        out.unbalanced =
+            if unbalanced.is_nan() { f64::NAN } else { out.unbalanced.max(unbalanced) };
         let top = plant.drive.no_load_mm_s;
         out.overspeed = out.overspeed.max(now.tread_mm_s.abs() / top);
         before = now;
     }
-    // The tread's own store; heights to the ring's elements, forces to the way after which
-    // motor and wall exchange them; work by trapezoids of a tick; creep, which follows
-    // traction at once though it is up to 7 % of the speed.
+    // The tread's own store; heights to the ring's elements and forces to a stride.
     let pressed = case.preload_n + 1.1 * case.coupling.abs() * case.load_n;
     let stored = pressed * (rest_mm + out.depth_mm.min(1.0));
     let grain = std::f64::consts::TAU * RADIUS_MM / ELEMENTS as f64;
-    let exchanged = (fastest * case.dt_s).min(EXCHANGE_MM);
-    out.allowed_mj = stored + force * (grain + exchanged) + 0.03 * pressed * lift + 0.15 * kinetic;
+    let stride = (fastest * case.dt_s).min(LONGEST_MM);
+    out.allowed_mj = stored + force * (grain + stride) + misplaced;
     Ok(out)
 }
 
+fn force_of(truth: &Truth) -> f64 {
+    truth.floor_n + truth.corner_n
+}
+
 /// Kinetic and potential energy of masses, load and spring, mJ.
-fn mechanical(plant: &PlantParameters, truth: &Truth) -> f64 {
-    let rise = truth.height_mm - RADIUS_MM;
+fn mechanical(plant: &PlantParameters, truth: &Truth, seat_n: f64) -> f64 {
     let spring = plant.spring_n_per_mm;
-    let seat = truth.preload_n - spring * rise;
+    // A spring that is slack pulls nothing.
+    let pressed = (seat_n + spring * (truth.height_mm - RADIUS_MM)).max(0.0);
     let kinetic =
         plant.mass_kg * truth.speed_mm_s.powi(2) + plant.drive.mass_kg * truth.tread_mm_s.powi(2);
-    0.5e-3 * kinetic + plant.load_n * truth.position_mm + (seat + 0.5 * spring * rise) * rise
+    0.5e-3 * kinetic + plant.load_n * truth.position_mm + 0.5 * pressed * pressed / spring
 }

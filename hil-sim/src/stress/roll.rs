@@ -9,7 +9,7 @@ use crate::plant::wall::{Step, Wall};
 
 /// Radius and width of the wheel, mm.
 pub(super) const RADIUS_MM: f64 = 25.0;
-const WIDTH_MM: f64 = 28.0;
+pub(super) const WIDTH_MM: f64 = 28.0;
 
 /// Way of a ring step, mm, and the most ring steps in a step of time: as the plant has
 /// it for itself.
@@ -69,7 +69,12 @@ pub(super) fn run(case: &Case) -> Result<Roll, BalanceError> {
     let mut x = first + sense * case.phase * (longest - way).max(0.0);
     let wall = Wall::new(vec![Step { position_mm: 0.0, height_mm: case.step_mm }]);
     let mut ring = Ring::new(rubber(case));
-    let balance = Balance { preload_n: case.preload_n, spring_n_per_mm: 0.0, axial: Axial::Pushed };
+    let balance = Balance {
+        preload_n: case.preload_n,
+        spring_n_per_mm: 0.0,
+        arm_n: 0.0,
+        axial: Axial::Pushed,
+    };
     let mut y = RADIUS_MM + wall.local(x).base_mm;
     let mut out = Roll::default();
     let (mut given, mut stored, mut lift) = (0.0f64, 0.0, 0.0);

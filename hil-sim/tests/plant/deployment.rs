@@ -152,7 +152,7 @@ fn radial_inertia_may_be_neglected() {
 
 #[test]
 fn a_climb_that_slows_creates_no_work() {
-    for preload in [33.3, 100.0] {
+    for (preload, farther) in [(33.3, 0.52..0.60), (100.0, 0.39..0.45)] {
         let rig = |slows| {
             let mut plant = ideal("prototype");
             plant.drive = nominal("prototype").drive;
@@ -168,11 +168,11 @@ fn a_climb_that_slows_creates_no_work() {
         };
         let (slowed, alike) = (rig(true), rig(false));
         // The rest is the motor's own kinetic energy and the patch's inner slip.
-        assert!((0.0..0.008).contains(&gain(&slowed)), "{}", gain(&slowed));
+        assert!((0.0..0.003).contains(&gain(&slowed)), "{}", gain(&slowed));
         assert!((-0.035..-0.02).contains(&gain(&alike)), "{}", gain(&alike));
         let truth = slowed.truth();
         let longer = truth.rotation_rad * 25.0 - truth.position_mm;
-        assert!((0.45..0.65).contains(&(longer / 3.0)), "{longer}");
+        assert!(farther.contains(&(longer / 3.0)), "{longer}");
         let truth = alike.truth();
         assert!((truth.rotation_rad * 25.0 - truth.position_mm).abs() < 0.01);
     }

@@ -1,8 +1,7 @@
 //! How wheel and wall bear on each other: the ring near a step, steady rolling
 //! elsewhere, and the radial balance of both.
 
-use super::traction::JAMMED_BELOW;
-use super::{PlantError, VirtualRig};
+use super::{PlantError, Stride, VirtualRig};
 use crate::plant::balance::{Axial, Balance, BalanceError, Solved};
 use crate::plant::ledger::Moment;
 use crate::plant::ring::{Contact, Motion};
@@ -22,6 +21,9 @@ const UNSTEADY_PART: f64 = 0.03;
 const UNSTEADY_MM_S: f64 = 0.01;
 const UNSTEADY_N: f64 = 1e-3;
 
+/// Separation from the wall up to which an unpressed wheel is on it, mm.
+const OFF_MM: f64 = 1e-6;
+
 /// Relaxation times after which the tread has forgotten what came before; it knows
 /// nothing from before it came into the patch.
 const FORGETS: f64 = 6.0;
@@ -37,14 +39,17 @@ pub(super) struct Calm {
 impl VirtualRig {
     /// Whether speed and radial force have stood long enough, and away from any step, for
     /// steady rolling.
-    pub(super) fn settled(&mut self, local: &LocalWall, axial: Axial, dt_s: f64) -> bool {
-        let (tread, pressing) = (self.truth.tread_mm_s, self.balance(local, axial).preload_n);
+    pub(super) fn settled(&mut self, local: &LocalWall, dt_s: f64) -> bool {
+        let tread = self.truth.tread_mm_s;
+        let (seat, added) = self.pressing(local);
+        let pressing = (seat + added).max(0.0);
         let near = self.near_step(local);
         let calm = &mut self.calm;
         let most = UNSTEADY_PART * calm.tread_mm_s.abs() + UNSTEADY_MM_S;
         let same = (tread - calm.tread_mm_s).abs() <= most
             && (pressing - calm.pressing_n).abs() <= UNSTEADY_PART * calm.pressing_n + UNSTEADY_N;
-        if same && !near {
+        // Nor does a wheel roll that is off the wall.
+        if same && !near && self.truth.separation_mm < OFF_MM {
             calm.for_s += dt_s;
         } else {
             *calm = Calm { tread_mm_s: tread, pressing_n: pressing, for_s: 0.0 };
@@ -55,19 +60,19 @@ impl VirtualRig {
         for_s > FORGETS * self.parameters.ring.tau_s || for_s * tread.abs() > 2.0 * patch
     }
 
-    /// Radial balance over this wall: screw, spring, arm modes, and the wedge of a
-    /// gripping wheel's thrust.
-    fn balance(&self, local: &LocalWall, axial: Axial) -> Balance {
+    /// Force of screw and spring at the undeformed radius over this wall, N, and what arm
+    /// modes and thrust, through the arm, add to it. What the carriage's inertia would add is
+    /// left out: with it, the arm's swing would have to carry the carriage along as the wheel
+    /// rises.
+    fn pressing(&self, local: &LocalWall) -> (f64, f64) {
         let seat = self.preload.seat_n() + self.parameters.spring_n_per_mm * local.base_mm;
-        let thrust = match axial {
-            Axial::Driven(load) => load,
-            _ => 0.0,
-        };
-        Balance {
-            preload_n: (seat + self.wedge() * thrust - self.vibration_n).max(0.0),
-            spring_n_per_mm: self.parameters.spring_n_per_mm,
-            axial,
-        }
+        (seat, self.wedge() * self.thrust_n - self.vibration_n)
+    }
+
+    /// Radial balance over this wall.
+    fn balance(&self, local: &LocalWall, axial: Axial) -> Balance {
+        let (preload_n, arm_n) = self.pressing(local);
+        Balance { preload_n, spring_n_per_mm: self.parameters.spring_n_per_mm, arm_n, axial }
     }
 
     /// Whether the wheel all but touches a step, or an edge all but lies under its patch.
@@ -112,35 +117,34 @@ impl VirtualRig {
     pub(super) fn resolve(
         &mut self,
         local: &LocalWall,
-        axial: Axial,
-        turn: f64,
-        dt_s: f64,
-    ) -> Result<(), PlantError> {
-        let way = self.truth.speed_mm_s * dt_s;
+        stride: Stride,
+        finer: bool,
+    ) -> Result<bool, PlantError> {
+        let Stride { way_mm, turn_rad, dt_s, .. } = stride;
         // Foreseen: what the way has brought, and what the new load brings by the last
         // contact's stiffness.
-        let sunk = self.sinks(local, axial);
-        let motion = Motion {
-            wall: *local,
-            height_mm: self.truth.height_mm - local.base_mm
-                + self.drift * way
-                + self.creep * dt_s
-                + sunk,
-            turn_rad: turn,
-            dt_s,
-        };
-        let solved =
-            self.bear(axial, |rig, axial| rig.balance(local, axial).solve(&mut rig.ring, motion))?;
+        let sunk = self.sinks(local, stride.axial());
+        let balance = self.balance(local, stride.axial());
+        let stands = self.truth.height_mm - local.base_mm;
+        let pressed = balance.pressed(stands - self.parameters.ring.radius_mm).0 > 0.0;
+        let foreseen = stands + self.drift * way_mm + self.creep * dt_s + sunk;
+        let height_mm = if pressed { foreseen } else { stands };
+        let motion = Motion { wall: *local, height_mm, turn_rad, dt_s };
+        let solved = balance.solve(&mut self.ring, motion);
+        let solved = solved.map_err(|source| self.unbalanced(source))?;
+        if finer && self.astray(&stride, &solved) {
+            return Ok(false);
+        }
         self.ring.commit(&Motion { height_mm: solved.height_mm, ..motion });
         let rise = solved.height_mm + local.base_mm - self.truth.height_mm;
-        if way.abs() > 1e-6 {
-            self.slope = rise / way;
-            (self.drift, self.creep) = ((rise - sunk) / way, 0.0);
+        self.learn_rise(&solved.contact, way_mm, rise);
+        if way_mm.abs() > 1e-6 {
+            (self.drift, self.creep) = ((rise - sunk) / way_mm, 0.0);
         } else {
             (self.drift, self.creep) = (0.0, (rise - sunk) / dt_s);
         }
         self.stiffness = Some(solved.contact.slope);
-        self.take(local, &solved);
+        self.take(local, &solved, &stride);
         self.truth.ring_awake = true;
         self.truth.preload_n = self.preload_now();
         self.ledger.record(&Moment {
@@ -155,7 +159,7 @@ impl VirtualRig {
             corner_n: self.truth.corner_n,
             floor_pressure: solved.contact.floor_pressure,
         });
-        Ok(())
+        Ok(true)
     }
 
     /// Change of the height, mm, by which the last contact would carry the present load.
@@ -173,37 +177,45 @@ impl VirtualRig {
     pub(super) fn roll_steadily(
         &mut self,
         local: &LocalWall,
-        axial: Axial,
-    ) -> Result<(), PlantError> {
-        let guess = self.truth.height_mm - self.base_mm + self.sinks(local, axial);
-        let solved = self.bear(axial, |rig, axial| rig.roll_balanced(local, axial, guess))?;
-        self.rolled_mm_s = self.truth.tread_mm_s;
-        (self.slope, self.drift, self.creep) = (0.0, 0.0, 0.0);
+        stride: Stride,
+        finer: bool,
+    ) -> Result<bool, PlantError> {
+        let guess = self.truth.height_mm - self.base_mm + self.sinks(local, stride.axial());
+        let speed = stride.tread_mm_s;
+        let solved = self.roll_balanced(local, stride.axial(), speed, guess);
+        let solved = solved.map_err(|source| self.unbalanced(source))?;
+        if finer && self.astray(&stride, &solved) {
+            return Ok(false);
+        }
+        self.rolled_mm_s = speed;
+        (self.drift, self.creep, self.swells) = (0.0, 0.0, 0.0);
         self.stiffness = Some(solved.contact.slope);
-        self.take(local, &solved);
+        self.take(local, &solved, &stride);
         self.truth.ring_awake = false;
-        Ok(())
+        Ok(true)
     }
 
     fn roll_balanced(
         &mut self,
         local: &LocalWall,
         axial: Axial,
+        speed_mm_s: f64,
         guess_mm: f64,
     ) -> Result<Solved, BalanceError> {
         let ring = self.parameters.ring;
         let balance = self.balance(local, axial);
         let residual = |c: &Rolling| {
             let lift = c.height_mm - ring.radius_mm;
-            balance.residual((c.cosine_n, c.sine_n), (0.0, 0.0), lift)
+            balance.residual((c.cosine_n, c.sine_n), slopes(c), lift)
         };
-        let speed = self.truth.tread_mm_s;
-        let spring = -balance.spring_n_per_mm;
-        let rolling = self.steady.solve(&ring, speed, guess_mm, spring, |c| residual(c).0);
+        let rolling = self.steady.solve(&ring, speed_mm_s, guess_mm, |c| {
+            let (force, slope, _) = residual(c);
+            (force, slope)
+        });
         let (residual_n, _, utilisation) = residual(&rolling);
         let height_mm = rolling.height_mm;
-        if residual_n.abs() > 1e-3 * balance.preload_n.max(1.0) {
-            let preload_n = balance.preload_n;
+        let preload_n = balance.preload_n + balance.arm_n;
+        if residual_n.abs() > 1e-3 * preload_n.max(1.0) {
             return Err(BalanceError { preload_n, residual_n, height_mm });
         }
         let contact = Contact {
@@ -213,62 +225,28 @@ impl VirtualRig {
             floor_n: rolling.cosine_n,
             depth_mm: ring.radius_mm - height_mm,
             area_mm2: rolling.area_mm2,
-            slope: (rolling.slope, rolling.slope * rolling.sine_n / rolling.cosine_n.max(1e-9)),
+            slope: slopes(&rolling),
             ..Contact::default()
         };
         Ok(Solved { height_mm, contact, utilisation })
     }
 
-    /// Solves with the friction asked for, or with what is possible: no more than there
-    /// is, none where the arm would jam a sliding wheel.
-    fn bear(
-        &mut self,
-        axial: Axial,
-        solve: impl Fn(&mut Self, Axial) -> Result<Solved, BalanceError>,
-    ) -> Result<Solved, PlantError> {
-        let mu = self.parameters.mu;
-        let slides = |rig: &mut Self, sense: f64| {
-            let axial = Axial::Wedged { utilisation: mu.copysign(sense), wedge: rig.wedge() };
-            solve(rig, axial).ok().filter(|solved| {
-                let c = &solved.contact;
-                let forces = (c.normal_n, c.cosine_n, c.sine_n);
-                rig.freedom(mu.copysign(sense), forces) >= JAMMED_BELOW
-            })
-        };
-        let jammed =
-            |solved: Solved| Solved { utilisation: solved.utilisation.clamp(-mu, mu), ..solved };
-        let solved = match axial {
-            Axial::Driven(load) => match solve(self, axial) {
-                Ok(solved) if solved.utilisation.abs() <= mu => Ok(solved),
-                Ok(solved) => Ok(slides(self, solved.utilisation).unwrap_or(jammed(solved))),
-                Err(error) => slides(self, load).ok_or(error),
-            },
-            Axial::Wedged { utilisation, .. } => match slides(self, utilisation) {
-                Some(solved) => Ok(solved),
-                None => {
-                    self.sliding = false;
-                    solve(self, Axial::Driven(self.parameters.load_n)).map(jammed)
-                }
-            },
-            Axial::Pushed | Axial::Utilised(_) => solve(self, axial),
-        };
-        // Hardly pressed, a wheel on a corner may find no balance with any friction.
-        solved.or_else(|_| solve(self, Axial::Utilised(0.0))).map_err(|source| {
-            PlantError::Balance {
-                time_s: self.truth.time_s,
-                position_mm: self.truth.position_mm,
-                source,
-            }
-        })
+    fn unbalanced(&self, source: BalanceError) -> PlantError {
+        PlantError::Balance {
+            time_s: self.truth.time_s,
+            position_mm: self.truth.position_mm,
+            source,
+        }
     }
 
-    fn take(&mut self, local: &LocalWall, solved: &Solved) {
+    fn take(&mut self, local: &LocalWall, solved: &Solved, stride: &Stride) {
         let contact = &solved.contact;
         self.base_mm = local.base_mm;
         self.truth.height_mm = solved.height_mm + local.base_mm;
         self.truth.depth_mm = contact.depth_mm.max(0.0);
         self.truth.corner_n = contact.step_force_n();
         self.truth.floor_n = contact.floor_n;
+        self.truth.resistance_n = contact.sine_n - contact.step_sine_n;
         self.truth.utilisation = solved.utilisation;
         self.truth.separation_mm = if contact.depth_mm > 0.0 {
             0.0
@@ -276,5 +254,16 @@ impl VirtualRig {
             (solved.height_mm - self.parameters.ring.radius_mm).max(0.0)
         };
         self.forces = (contact.normal_n, contact.cosine_n, contact.sine_n);
+        let lift = solved.height_mm - self.parameters.ring.radius_mm;
+        let (seat, added) = self.pressing(local);
+        let spring = (seat + self.parameters.spring_n_per_mm * lift).max(0.0);
+        let carried = contact.cosine_n + solved.utilisation * contact.sine_n;
+        self.truth.unbalanced_n = carried - (spring + added).max(0.0);
+        self.arrive(stride);
     }
+}
+
+/// Derivatives of the cosine and sine sums of steady rolling by the height, N/mm.
+fn slopes(rolling: &Rolling) -> (f64, f64) {
+    (rolling.slope, rolling.slope * rolling.sine_n / rolling.cosine_n.max(1e-9))
 }

@@ -1,59 +1,66 @@
-//! How the wheel moves along the wall: creep while the tread grips, Coulomb friction
-//! while it slides, and what the climb, the arm and the end stops do to both.
+//! How the wheel moves along the wall: what motor, friction and carriage make of a stride,
+//! and what the climb, the arm and the end stops do to it.
 
-use super::VirtualRig;
-use crate::plant::actuators::Load;
-use crate::plant::balance::Axial;
+use super::{Drives, VirtualRig};
+use crate::plant::actuators::Turn;
+use crate::plant::balance::{Axial, Solved};
+use crate::plant::grip::Grip;
+use crate::plant::ring::Contact;
 
-/// Carrying less of its friction than this part for radial load, a sliding wheel is as
-/// good as jammed by the arm: it grips at once.
-pub(super) const JAMMED_BELOW: f64 = 0.25;
+/// Carrying less of its friction than this part for radial load, a wheel that spins at an
+/// end stop is as good as jammed by the arm: it stands.
+const JAMMED_BELOW: f64 = 0.25;
 
-/// Difference of tread and wall below which a sliding wheel that could grip does,
-/// mm/s.
-const GRIPS_WITHIN: f64 = 0.05;
+/// Way over which the wheel's rise is learnt, mm.
+const LEARNT_MM: f64 = 1.0;
 
-/// Motion of a stride.
+/// Farthest that a stride may end from where it was foreseen, mm.
+const ASTRAY_MM: f64 = 0.01;
+
+/// What holds or moves the wheel in a stride.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Gait {
-    /// Axial speed, mm/s.
-    pub(super) speed: f64,
-    /// Axial speed had the tread gripped, mm/s.
-    pub(super) gripped: f64,
+pub(super) enum Moves {
+    /// The stop or latch that carries the load until the drive first turns.
+    Parked,
+    /// An end stop holds the carriage, and the wheel spins with this utilisation.
+    Spins(f64),
+    /// Motor, friction and inertia.
+    Driven(Grip),
+}
+
+/// A stride as foreseen by the forces of the last.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stride {
+    pub(super) dt_s: f64,
+    /// Where the carriage comes to, and by what way, mm.
+    pub(super) position_mm: f64,
+    pub(super) way_mm: f64,
+    /// Angle that the wheel turns, rad, and the speed of its tread, mm/s.
+    pub(super) turn_rad: f64,
+    pub(super) tread_mm_s: f64,
+    pub(super) moves: Moves,
+    turn: Turn,
+    /// Speeds of carriage and tread, mm/s, as foreseen.
+    foreseen: (f64, f64),
+    /// An end stop holds the carriage.
+    stopped: bool,
+}
+
+impl Stride {
     /// How friction is used.
-    pub(super) axial: Axial,
+    pub(super) fn axial(&self) -> Axial {
+        match self.moves {
+            Moves::Parked => Axial::Utilised(0.0),
+            Moves::Spins(utilisation) => Axial::Utilised(utilisation),
+            Moves::Driven(grip) => Axial::Carried(grip),
+        }
+    }
 }
 
 impl VirtualRig {
     /// Radial force per axial thrust: none while a latch holds the carriage.
     pub(super) fn wedge(&self) -> f64 {
         if self.parked { 0.0 } else { self.parameters.arm.wedge(self.truth.radius_mm) }
-    }
-
-    /// Load on the drive at the tread: traction, or an end stop in its way. What a
-    /// gripping wheel carries along is a mass to the drive; taken as a force, a tick
-    /// late, a carriage heavier than the rotor would shake it ever more.
-    pub(super) fn drive_load(&self, duty: f64) -> Load {
-        if self.parked {
-            return Load::default();
-        }
-        let (normal, cosine, _) = self.forces;
-        let traction = self.truth.utilisation * normal;
-        let (low, high) = self.parameters.stops_mm;
-        let position = self.truth.position_mm;
-        if (position < high || duty <= 0.0) && (position > low || duty >= 0.0) {
-            if self.sliding || cosine <= 0.0 {
-                return Load::force(traction);
-            }
-            let mass_kg = self.parameters.mass_kg * normal / cosine;
-            return Load { force_n: traction - 1e-3 * mass_kg * self.acceleration, mass_kg };
-        }
-        let friction = self.parameters.mu.copysign(duty);
-        if self.truth.utilisation == friction {
-            return Load::force(traction);
-        }
-        // What it takes to slide; jammed by the arm it does not.
-        Load::force(friction * normal / self.freedom(friction, self.forces).max(JAMMED_BELOW))
     }
 
     /// Largest acceleration of a sliding carriage, mm/s^2.
@@ -63,76 +70,143 @@ impl VirtualRig {
         1000.0 * most / self.parameters.mass_kg
     }
 
-    /// How the wheel moves in a stride, from the forces of the last.
-    pub(super) fn traction(&mut self, dt_s: f64) -> Gait {
-        if self.parked {
-            return Gait { speed: 0.0, gripped: 0.0, axial: Axial::Utilised(0.0) };
+    /// What the motor makes of the next `dt_s`, and where the forces of the last stride
+    /// would take the wheel.
+    pub(super) fn set_out(&mut self, drives: &Drives, dt_s: f64) -> Stride {
+        let p = &self.parameters;
+        let tread = self.truth.tread_mm_s;
+        let turn = p.drive.turn(tread, drives.drive, drives.drive_on, self.resists_n, dt_s);
+        if turn.free_mm_s != 0.0 {
+            self.parked = false;
         }
-        let inertia = 1e-3 * self.parameters.mass_kg * self.acceleration;
-        let load = self.parameters.load_n + inertia;
-        let mu = self.parameters.mu;
-        let (_, cosine, sine) = self.forces;
-        // A wheel off the wall holds nothing.
-        let needed =
-            if cosine > 0.0 { (load + sine) / cosine } else { f64::INFINITY.copysign(load) };
-        let gripped = self.gripped(needed.clamp(-mu, mu));
-        let grips = needed.abs() < mu;
-        let gripping = Gait { speed: gripped, gripped, axial: Axial::Driven(load) };
-        // Friction has to bring the carriage to the speed at which the tread grips.
-        let missing = sine + self.parameters.load_n;
-        let short = 1e-3 * self.parameters.mass_kg * (gripped - self.truth.speed_mm_s) / dt_s;
-        let reached = (short + missing).abs() <= mu * cosine;
-        if grips && reached && !self.sliding {
-            return gripping;
-        }
-        // Sliding: friction is spent against the slip, and what is missing accelerates
-        // the carriage.
-        let slip = gripped - self.truth.speed_mm_s;
-        let sense = if slip.abs() > 1e-9 { slip.signum() } else { needed.signum() };
-        let per_force = 1000.0 / self.parameters.mass_kg * dt_s;
-        let Some(axial) = self.sliding_towards(sense) else {
-            self.sliding = false;
-            return gripping;
+        let (normal, cosine, sine) = self.forces;
+        let grip = Grip {
+            mu: p.mu,
+            creep: p.elastic_creep,
+            rolling: tread.abs(),
+            load_n: p.load_n,
+            inertia: 1e-3 * p.mass_kg / dt_s,
+            speed: self.truth.speed_mm_s,
+            tread: turn.free_mm_s,
+            yields: turn.yields,
+            advance: self.advance(),
+            normal: if cosine > 0.0 { normal / cosine } else { 1.0 },
         };
-        let speed = self.truth.speed_mm_s + per_force * (mu * sense * cosine - missing);
-        let left = gripped - speed;
-        if grips && (left * slip <= 0.0 || left.abs() < GRIPS_WITHIN) {
-            self.sliding = false;
-            return gripping;
+        let ended = grip.at(cosine, sine);
+        let mut stride = Stride {
+            dt_s,
+            position_mm: self.truth.position_mm,
+            way_mm: 0.0,
+            turn_rad: 0.0,
+            tread_mm_s: ended.tread,
+            moves: Moves::Parked,
+            turn,
+            foreseen: (ended.speed, ended.tread),
+            stopped: false,
+        };
+        if self.parked {
+            return stride;
         }
-        self.sliding = true;
-        Gait { speed, gripped, axial }
+        stride.moves = Moves::Driven(grip);
+        self.thrust_n = p.load_n;
+        stride.way_mm = 0.5 * (self.truth.speed_mm_s + ended.speed) * dt_s + self.owed_mm.0;
+        let (low, high) = p.stops_mm;
+        let position = self.truth.position_mm + stride.way_mm;
+        if position < low || position > high {
+            stride.way_mm = position.clamp(low, high) - self.truth.position_mm;
+            let friction = p.mu.copysign(grip.tread);
+            let slower = grip.tread - grip.yields * friction * normal;
+            // The wheel spins, and presses itself in by what it pushes with; or it stands.
+            let spins = slower * grip.tread > 0.0 && self.freedom(friction) >= JAMMED_BELOW;
+            let tread = if spins { slower } else { 0.0 };
+            stride.moves = if spins {
+                Moves::Spins(friction)
+            } else {
+                Moves::Driven(Grip { tread: 0.0, speed: 0.0, ..grip })
+            };
+            stride.tread_mm_s = tread;
+            stride.foreseen = (0.0, tread);
+            stride.stopped = true;
+            self.thrust_n = if spins { friction * cosine - sine } else { p.load_n };
+        }
+        stride.position_mm = self.truth.position_mm + stride.way_mm;
+        let rolled = 0.5 * (tread + stride.tread_mm_s) * dt_s + self.owed_mm.1;
+        stride.turn_rad = rolled / p.ring.radius_mm;
+        stride
     }
 
-    /// Friction of a wheel that slides with traction of this sign, unless jammed.
-    pub(super) fn sliding_towards(&self, sense: f64) -> Option<Axial> {
-        let friction = self.parameters.mu.copysign(sense);
-        (self.freedom(friction, self.forces) >= JAMMED_BELOW)
-            .then(|| Axial::Wedged { utilisation: friction, wedge: self.wedge() })
+    /// Whether the stride ends far from where it was foreseen.
+    pub(super) fn astray(&self, stride: &Stride, solved: &Solved) -> bool {
+        let (Moves::Driven(grip), false) = (stride.moves, stride.stopped) else { return false };
+        let ended = grip.at(solved.contact.cosine_n, solved.contact.sine_n);
+        (ended.speed - stride.foreseen.0).abs() * stride.dt_s > ASTRAY_MM
     }
 
-    /// Axial speed of a wheel that grips with this utilisation.
-    fn gripped(&self, used: f64) -> f64 {
-        // Creep of the tread under traction, 63 % of friction at `elastic_creep`.
-        let part = (used.abs() / self.parameters.mu).min(0.999);
-        let creep = -self.parameters.elastic_creep * (1.0 - part).ln() * used.signum();
-        let spin = self.truth.tread_mm_s * self.advance();
-        spin - spin.abs() * creep
+    /// Books what the stride came to in the contact that was found for it.
+    pub(super) fn arrive(&mut self, stride: &Stride) {
+        let (normal, cosine, sine) = self.forces;
+        let truth = &mut self.truth;
+        let before = truth.tread_mm_s;
+        let (mut resists_n, mut sliding) = (0.0, 0.0);
+        truth.speed_mm_s = 0.0;
+        match stride.moves {
+            Moves::Parked => truth.tread_mm_s = 0.0,
+            Moves::Spins(utilisation) => {
+                truth.tread_mm_s = stride.tread_mm_s;
+                resists_n = utilisation * normal;
+                sliding = stride.tread_mm_s.abs();
+            }
+            Moves::Driven(grip) => {
+                let ended = grip.at(cosine, sine);
+                truth.speed_mm_s = if stride.stopped { 0.0 } else { ended.speed };
+                truth.tread_mm_s = ended.tread;
+                resists_n = ended.resists_n;
+                sliding = grip.slides(&ended);
+            }
+        }
+        let dt_s = stride.dt_s;
+        self.owed_mm = (
+            0.5 * (truth.speed_mm_s - stride.foreseen.0) * dt_s,
+            0.5 * (truth.tread_mm_s - stride.foreseen.1) * dt_s,
+        );
+        self.sliding = sliding > 0.0;
+        self.resists_n = resists_n;
+        truth.slip_mm += sliding * dt_s;
+        let creep = (truth.tread_mm_s - truth.speed_mm_s).abs() * dt_s;
+        truth.wear_mj += truth.utilisation.abs() * normal * creep;
+        let force = stride.turn.force_n + stride.turn.force_rises * resists_n;
+        let rolled = 0.5 * (before + truth.tread_mm_s) * dt_s;
+        truth.work_mj += (force * rolled).max(0.0);
     }
 
     /// Axial way of a gripping wheel per way of its tread. With equal utilisation all
     /// over the contact, traction does the motor's work on the axle if
-    /// `c v_x + s v_y = N omega R`, c and s being the cosine and sine sums.
+    /// `c v_x + s v_y = N omega R`, c and s being the cosine and sine sums. A step whose axial
+    /// force is t lifts the wheel by t/c of its way where it does no work on the tread;
+    /// what it does is known from the way just behind.
     fn advance(&self) -> f64 {
         let (normal, cosine, sine) = self.forces;
-        let along = cosine + sine * self.slope;
-        if self.parameters.climb_slows && along > normal { normal / along } else { 1.0 }
+        if !self.parameters.climb_slows || cosine <= 0.0 {
+            return 1.0;
+        }
+        let step = sine - self.truth.resistance_n;
+        let along = cosine + step * (step / cosine + self.swells);
+        if along > normal { normal / along } else { 1.0 }
     }
 
-    /// Radial load that a wheel sliding with this utilisation carries, per normal
-    /// force: the less there is, the more the arm presses it. From the contact's forces:
-    /// normal, cosine and sine sums, N.
-    pub(super) fn freedom(&self, used: f64, (normal, cosine, sine): (f64, f64, f64)) -> f64 {
+    /// Learns how much more than by the direction of the step's force the wheel has risen.
+    pub(super) fn learn_rise(&mut self, contact: &Contact, way_mm: f64, rise_mm: f64) {
+        if self.parameters.climb_slows && contact.cosine_n > 0.0 {
+            let leans = contact.step_sine_n / contact.cosine_n;
+            let more = rise_mm - (leans + self.swells) * way_mm;
+            self.swells += more * way_mm.signum() / way_mm.abs().max(LEARNT_MM);
+        }
+    }
+
+    /// Radial load that a wheel at an end stop carries with this utilisation, per normal
+    /// force: the less there is, the more the arm presses it.
+    fn freedom(&self, used: f64) -> f64 {
+        let (normal, cosine, sine) = self.forces;
         let wedge = self.wedge();
         let carried = (1.0 - used * wedge) * cosine + (used + wedge) * sine;
         if normal > 0.0 { carried / normal } else { 1.0 }

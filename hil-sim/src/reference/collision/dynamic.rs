@@ -61,8 +61,12 @@ pub(super) struct Mass {
 impl Mass {
     /// At rest at `y_mm`, in balance.
     pub(super) fn on(case: &Case, y_mm: f64) -> Self {
-        let balance =
-            Balance { preload_n: case.preload_n, spring_n_per_mm: 0.0, axial: case.axial };
+        let balance = Balance {
+            preload_n: case.preload_n,
+            spring_n_per_mm: 0.0,
+            arm_n: 0.0,
+            axial: case.axial,
+        };
         Self {
             balance,
             mass_kg: case.rig.plant.moved_mass_kg,

@@ -40,8 +40,12 @@ impl Rolling {
         let dt = stride / case.speed_mm_s;
         let x = self.x_mm + stride;
         let motion = way.motion(x, self.y_mm, stride / way.radius_mm, dt);
-        let balance =
-            Balance { preload_n: case.preload_n, spring_n_per_mm: 0.0, axial: case.axial };
+        let balance = Balance {
+            preload_n: case.preload_n,
+            spring_n_per_mm: 0.0,
+            arm_n: 0.0,
+            axial: case.axial,
+        };
         let solved = balance.solve(&mut self.ring, motion)?;
         self.ring.commit(&Motion { height_mm: solved.height_mm, ..motion });
         self.t_s += dt;

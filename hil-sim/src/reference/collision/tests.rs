@@ -169,7 +169,12 @@ fn settled(tau_s: f64) -> (Mass, Ring, f64) {
     let mut case = Case::study()[0].clone();
     case.rig.tread.tau_s = tau_s;
     let mut ring = Ring::new(case.ring());
-    let balance = Balance { preload_n: case.preload_n, spring_n_per_mm: 0.0, axial: Axial::Pushed };
+    let balance = Balance {
+        preload_n: case.preload_n,
+        spring_n_per_mm: 0.0,
+        arm_n: 0.0,
+        axial: Axial::Pushed,
+    };
     let (mut height, mut stiffness) = (24.5, 0.0);
     for _ in 0..3 {
         let rest = balance.solve(&mut ring, level(height, 1e4 * tau_s)).unwrap();
@@ -248,7 +253,12 @@ fn without_memory_a_ringing_wheel_keeps_its_energy() {
     let mut case = Case::study()[0].clone();
     case.rig.tread.stiffening = 1.0;
     let mut ring = Ring::new(case.ring());
-    let balance = Balance { preload_n: case.preload_n, spring_n_per_mm: 0.0, axial: Axial::Pushed };
+    let balance = Balance {
+        preload_n: case.preload_n,
+        spring_n_per_mm: 0.0,
+        arm_n: 0.0,
+        axial: Axial::Pushed,
+    };
     let rest = balance.solve(&mut ring, level(24.5, 1.0)).unwrap();
     ring.commit(&level(rest.height_mm, 1.0));
     let mut mass = Mass::on(&case, rest.height_mm);
