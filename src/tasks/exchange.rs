@@ -4,7 +4,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 use crate::control::{Input, Output};
 use crate::hal::Light;
-use crate::log::{Entry, Telemetry};
+use crate::log::{Entry, Tape, Telemetry};
 use crate::model::{Plan, PlanRequest};
 use crate::sense::freshness::age;
 use crate::sense::raw::{AdcCode, AngleFrame, EncoderCount, Sample, SensorFrame};
@@ -77,7 +77,7 @@ pub struct Exchange {
     pub(super) answer: Signal<CriticalSectionRawMutex, Plan>,
     pub(super) commands: Channel<CriticalSectionRawMutex, Command, COMMANDS>,
     pub(super) entries: Channel<CriticalSectionRawMutex, Entry, ENTRIES>,
-    telemetry: Slot<Telemetry>,
+    pub(super) tape: Tape,
     light: Slot<Light>,
     lost_entries: AtomicU32,
     bus_faults: [AtomicU32; 4],
@@ -98,7 +98,7 @@ impl Exchange {
             answer: Signal::new(),
             commands: Channel::new(),
             entries: Channel::new(),
-            telemetry: Slot::new(),
+            tape: Tape::new(),
             light: Slot::new(),
             lost_entries: AtomicU32::new(0),
             bus_faults: [const { AtomicU32::new(0) }; 4],
@@ -119,15 +119,16 @@ impl Exchange {
         }
     }
 
-    /// Passes on what a tick gave, except the motors' part.
-    pub fn publish(&self, output: &Output) {
+    /// Passes on what a tick gave, except the motors' part, and keeps the tick for the
+    /// log.
+    pub fn publish(&self, input: &Input, output: &Output) {
         if let Some(request) = output.request {
             self.request_plan(request);
         }
         for &entry in &output.events {
             self.log(entry);
         }
-        self.telemetry.sender().send(output.telemetry);
+        self.tape.keep(input, output);
         self.show(light_of(output.telemetry.mode));
     }
 
@@ -162,7 +163,7 @@ impl Exchange {
     /// The row of the latest tick; none before the first.
     #[must_use]
     pub fn telemetry(&self) -> Option<Telemetry> {
-        self.telemetry.anon_receiver().try_get()
+        self.tape.latest()
     }
 
     /// What the light is to show.

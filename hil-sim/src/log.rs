@@ -1,0 +1,15 @@
+//! Logs of the controller: from the bytes of the binary channel, or a file that holds
+//! them, to rows with names and units.
+//!
+//! One decoder serves every source: the emulated board, a probe, the controller on this
+//! host, a recorded stream. [`Run`] is what is left of a whole log.
+
+mod decoder;
+mod file;
+mod row;
+mod run;
+
+pub use decoder::{Decoder, Item, Mark, Tally};
+pub use file::{FRAMES, ReadError};
+pub use row::Row;
+pub use run::{Header, Run};
