@@ -4,6 +4,7 @@
 mod analog;
 mod angle;
 mod bridge;
+pub(crate) mod build;
 mod button;
 pub(crate) mod config;
 mod console;

@@ -25,9 +25,9 @@ mod firmware {
     use interstage::model::Planner;
     use interstage::tasks::{self, Exchange};
     use panic_probe as _;
-    use rtt_target::DownChannel;
 
-    use crate::board::{self, config, guard, light, rtt};
+    use crate::board::rtt::Channels;
+    use crate::board::{self, build, config, guard, light, rtt};
     use crate::board::{Analog, Angle, Bridge, Bridges, Button, Console, Guard, Lamp, Lines};
     use crate::board::{Nucleo, Wheel};
 
@@ -58,7 +58,7 @@ mod firmware {
         defmt::info!("interstage {=str}", env!("CARGO_PKG_VERSION"));
         guard::report_restart();
         guard::arm();
-        let (parts, lamp) = split(p, channels.console);
+        let (parts, lamp) = split(p, channels);
         threads.spawn(light::show(lamp).unwrap());
         match config::build() {
             Ok((controller, planner)) => start(threads, parts, controller, planner),
@@ -67,7 +67,7 @@ mod firmware {
     }
 
     /// Who gets which peripheral and pin; the bridges come up off.
-    fn split(p: Peripherals, console: DownChannel) -> (Parts<Nucleo>, Peri<'static, AnyPin>) {
+    fn split(p: Peripherals, channels: Channels) -> (Parts<Nucleo>, Peri<'static, AnyPin>) {
         let parts = Parts {
             wheel: Wheel::new(p.TIM5, p.PA0, p.PA1),
             load_cell: Analog::new(p.ADC1, p.PC2, p.DMA1_CH1),
@@ -79,8 +79,8 @@ mod firmware {
             },
             watchdog: Guard::new(p.IWDG),
             button: Button::new(p.PC13, p.EXTI13),
-            console: Console::new(console),
-            journal: Lines::default(),
+            console: Console::new(channels.console),
+            journal: Lines::new(channels.telemetry),
             light: Lamp,
         };
         (parts, p.PA5.into())
@@ -96,6 +96,7 @@ mod firmware {
         interrupt::UART5.set_priority(Priority::P6);
         let control = CONTROL.start(interrupt::UART5);
         parts.watchdog.start();
+        parts.journal.introduce(config::identity(controller, build::id()));
         control.spawn(speed(parts.wheel).unwrap());
         control.spawn(pressure(parts.load_cell).unwrap());
         control.spawn(displacement(parts.tread).unwrap());

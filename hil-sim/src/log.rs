@@ -4,12 +4,14 @@
 //! One decoder serves every source: the emulated board, a probe, the controller on this
 //! host, a recorded stream. [`Run`] is what is left of a whole log.
 
+mod complete;
 mod decoder;
 mod file;
 mod row;
 mod run;
 
+pub use complete::complete;
 pub use decoder::{Decoder, Item, Mark, Tally};
-pub use file::{FRAMES, ReadError};
+pub use file::{FRAMES, ReadError, timed};
 pub use row::Row;
 pub use run::{Header, Run};

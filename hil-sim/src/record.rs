@@ -1,6 +1,7 @@
 //! What a run leaves behind: one row a tick, one ledger line a crossing, and the
 //! summary. Sensed, estimated and true values stand side by side.
 
+use interstage::supervise::{Leg, Mode};
 use serde::{Deserialize, Serialize};
 
 /// One millisecond of a run.
@@ -79,6 +80,25 @@ pub const MODE_NAMES: [&str; 13] = [
     "fault hold",
     "off",
 ];
+
+/// Index into [`MODE_NAMES`].
+#[must_use]
+pub fn mode_number(mode: Mode) -> u8 {
+    match mode {
+        Mode::Boot => 0,
+        Mode::SelfTest => 1,
+        Mode::Zero => 2,
+        Mode::Idle => 3,
+        Mode::Preload(_) => 4,
+        Mode::Run(_, Leg::Cruise) => 5,
+        Mode::Run(_, Leg::Approach) => 6,
+        Mode::Run(_, Leg::Crossing) => 7,
+        Mode::Run(_, Leg::Settle) => 8,
+        Mode::Stopping(_) => 9,
+        Mode::Complete(_) => 10,
+        Mode::FaultHold(_) => 11,
+    }
+}
 
 /// Names of the contact stages, from number 1.
 pub const STAGE_NAMES: [&str; 6] =
@@ -195,4 +215,6 @@ pub struct Recording {
     pub log: Vec<LogLine>,
     /// Parameters used, as TOML.
     pub parameters: String,
+    /// The binary log as it lay on its channel; empty if it was not kept.
+    pub stream: Vec<u8>,
 }

@@ -3,6 +3,7 @@
 use embassy_time::Timer;
 use interstage::control::Controller;
 use interstage::hal::{Indicator, Light, MotorCommand, Motors, Parts};
+use interstage::log::{Identity, identity};
 use interstage::model::Planner;
 use interstage::rig::{Rig, RigError};
 use static_cell::StaticCell;
@@ -18,6 +19,20 @@ pub(crate) fn build() -> Result<(&'static Controller, &'static Planner), RigErro
     let controller = place(&CONTROLLER, Controller::try_build, &rig)?;
     let planner = place(&PLANNER, Planner::try_build, &rig)?;
     Ok((controller, planner))
+}
+
+/// What the binary log begins with.
+pub(crate) fn identity(controller: &Controller, build: [u8; 8]) -> Identity {
+    let rig = Rig::prototype();
+    Identity {
+        schema: identity::SCHEMA,
+        version: identity::text(env!("CARGO_PKG_VERSION")),
+        build,
+        rig: identity::text("prototype"),
+        parameters: identity::fingerprint(&rig),
+        calibration: identity::fingerprint(&rig.sense),
+        corner: controller.corner_reach(),
+    }
 }
 
 /// Builds one of them in a frame of its own and moves it once: these frames are

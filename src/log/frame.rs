@@ -125,10 +125,13 @@ impl<'a> Writer<'a> {
 impl Flavor for &mut Writer<'_> {
     type Output = ();
 
+    #[inline(never)]
     fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
         self.try_extend(&[byte])
     }
 
+    /// Not inlined, or its body would stand wherever a number is written.
+    #[inline(never)]
     fn try_extend(&mut self, bytes: &[u8]) -> postcard::Result<()> {
         if !self.has_room(bytes.len()) {
             return Err(postcard::Error::SerializeBufferFull);

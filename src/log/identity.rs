@@ -57,6 +57,7 @@ pub fn fingerprint(value: &impl Serialize) -> u32 {
     impl postcard::ser_flavors::Flavor for Sum {
         type Output = u32;
 
+        #[inline(never)]
         fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
             self.0.update(&[byte]);
             Ok(())

@@ -94,6 +94,7 @@ impl Scribe {
     }
 
     /// A frame of one value.
+    #[inline(never)]
     fn one(
         &mut self,
         kind: Kind,

@@ -47,7 +47,8 @@ pub async fn journal(
     }
 }
 
-/// An entry as a line and as a frame.
+/// An entry as a line and as a frame; once in the image, however often it is called.
+#[inline(never)]
 fn write(journal: &mut impl Journal, scribe: &mut Scribe, entry: &Entry) {
     journal.write(entry);
     scribe.entry(entry, &mut |frame| journal.send(frame));

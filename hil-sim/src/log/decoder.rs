@@ -61,6 +61,11 @@ pub enum Mark {
         /// How many.
         ticks: u32,
     },
+    /// The log does not begin with the target's first frame; so many went before.
+    Joined {
+        /// How many.
+        frames: u32,
+    },
     /// The target started anew.
     Restart,
     /// A frame of another layout than this reader knows.
@@ -79,6 +84,9 @@ impl std::fmt::Display for Mark {
             Self::Garbage { bytes } => write!(f, "{bytes} bytes that are no frame"),
             Self::Skipped { ticks } => write!(f, "{ticks} ticks not logged"),
             Self::Overrun { ticks } => write!(f, "{ticks} ticks did not run"),
+            Self::Joined { frames } => {
+                write!(f, "the log begins {frames} frames after the target's first")
+            }
             Self::Restart => write!(f, "the target started anew"),
             Self::Schema { found } => {
                 write!(f, "frames of schema {found}, this reader knows {SCHEMA}")
@@ -233,6 +241,8 @@ impl Decoder {
             } else {
                 self.lose(ahead as u32, head.dropped.wrapping_sub(dropped), take);
             }
+        } else if head.sequence > 0 {
+            take(Item::Mark(Mark::Joined { frames: head.sequence }));
         }
         self.due = Some((head.sequence.wrapping_add(1), head.dropped));
     }

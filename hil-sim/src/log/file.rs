@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::decoder::Decoder;
+use super::decoder::{Decoder, Item};
 use super::row::Row;
 use super::run::Run;
 
@@ -33,6 +33,21 @@ pub enum ReadError {
         /// What is wrong with it.
         why: String,
     },
+}
+
+/// The frames of a stream, each with its zero and the time at which it was written, s:
+/// that of the newest tick up to it. What follows the last zero is no frame.
+pub fn timed(stream: &[u8]) -> impl DoubleEndedIterator<Item = (f64, &[u8])> {
+    let (mut decoder, mut now, mut frames) = (Decoder::new(), 0.0, Vec::new());
+    for frame in stream.split_inclusive(|byte| *byte == 0).filter(|frame| frame.ends_with(&[0])) {
+        decoder.read(frame, &mut |item| {
+            if let Item::Tick(record, _) = item {
+                now = f64::from(record.at()) * 1e-3;
+            }
+        });
+        frames.push((now, frame));
+    }
+    frames.into_iter()
 }
 
 impl Run {
