@@ -4,11 +4,11 @@
 mod analog;
 mod angle;
 mod bridge;
-pub(crate) mod build;
 mod button;
 pub(crate) mod config;
 mod console;
 pub(crate) mod guard;
+mod image;
 mod journal;
 pub(crate) mod light;
 pub(crate) mod rtt;

@@ -27,7 +27,7 @@ mod firmware {
     use panic_probe as _;
 
     use crate::board::rtt::Channels;
-    use crate::board::{self, build, config, guard, light, rtt};
+    use crate::board::{self, config, guard, light, rtt};
     use crate::board::{Analog, Angle, Bridge, Bridges, Button, Console, Guard, Lamp, Lines};
     use crate::board::{Nucleo, Wheel};
 
@@ -58,10 +58,13 @@ mod firmware {
         defmt::info!("interstage {=str}", env!("CARGO_PKG_VERSION"));
         guard::report_restart();
         guard::arm();
-        let (parts, lamp) = split(p, channels);
+        let (mut parts, lamp) = split(p, channels);
         threads.spawn(light::show(lamp).unwrap());
         match config::build() {
-            Ok((controller, planner)) => start(threads, parts, controller, planner),
+            Ok((controller, planner, identity)) => {
+                parts.journal.introduce(identity);
+                start(threads, parts, controller, planner);
+            }
             Err(error) => threads.spawn(config::hold(parts, error).unwrap()),
         }
     }
@@ -96,7 +99,6 @@ mod firmware {
         interrupt::UART5.set_priority(Priority::P6);
         let control = CONTROL.start(interrupt::UART5);
         parts.watchdog.start();
-        parts.journal.introduce(config::identity(controller, build::id()));
         control.spawn(speed(parts.wheel).unwrap());
         control.spawn(pressure(parts.load_cell).unwrap());
         control.spawn(displacement(parts.tread).unwrap());

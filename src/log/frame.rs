@@ -93,6 +93,7 @@ pub struct Writer<'a> {
 
 impl<'a> Writer<'a> {
     /// Begins a frame. There is always room for the head.
+    #[inline(never)]
     fn new(room: &'a mut [u8], head: Head) -> Self {
         let mut writer = Self { cobs: CobsEncoder::new(room), digest: CRC.digest(), written: 0 };
         let _ = writer.put(&(head.kind, head.sequence, head.dropped));
@@ -114,6 +115,7 @@ impl<'a> Writer<'a> {
     }
 
     /// Appends the check; the frame is the first so many bytes.
+    #[inline(never)]
     fn close(self) -> usize {
         let Self { mut cobs, digest, .. } = self;
         // Room for it has been kept by `has_room`.

@@ -39,7 +39,7 @@ impl Scribe {
     }
 
     /// Writes what is on the tape. `send` takes a frame whole, or says that it did not.
-    pub fn read(&mut self, tape: &Tape, send: &mut impl FnMut(&[u8]) -> bool) {
+    pub fn read(&mut self, tape: &Tape, send: &mut dyn FnMut(&[u8]) -> bool) {
         if let Some((at, request)) = tape.take_request() {
             self.one(Kind::Request, &(at, request), send);
         }
@@ -59,7 +59,7 @@ impl Scribe {
     }
 
     /// Writes a log entry; of a crossing, its line of the ledger as well.
-    pub fn entry(&mut self, entry: &Entry, send: &mut impl FnMut(&[u8]) -> bool) {
+    pub fn entry(&mut self, entry: &Entry, send: &mut dyn FnMut(&[u8]) -> bool) {
         self.one(Kind::Event, entry, send);
         if let Event::Crossing(crossing) = &entry.event {
             let line = self.ledger.close(entry.at, crossing);
@@ -68,7 +68,7 @@ impl Scribe {
     }
 
     /// Says who speaks, if it is time.
-    fn introduce(&mut self, tape: &Tape, send: &mut impl FnMut(&[u8]) -> bool) {
+    fn introduce(&mut self, tape: &Tape, send: &mut dyn FnMut(&[u8]) -> bool) {
         let Some(now) = tape.latest().map(|latest| latest.at) else { return };
         let due = |last: Tick| now.wrapping_sub(last) >= IDENTITY_EVERY;
         if self.introduced.is_none_or(due) {
@@ -79,7 +79,7 @@ impl Scribe {
     }
 
     /// One frame of ticks.
-    fn ticks(&mut self, tape: &Tape, send: &mut impl FnMut(&[u8]) -> bool) {
+    fn ticks(&mut self, tape: &Tape, send: &mut dyn FnMut(&[u8]) -> bool) {
         let head = self.head(Kind::Ticks);
         let (capture, ledger, corner) = (&mut self.capture, &mut self.ledger, self.identity.corner);
         let next = || {
@@ -99,7 +99,7 @@ impl Scribe {
         &mut self,
         kind: Kind,
         value: &impl Serialize,
-        send: &mut impl FnMut(&[u8]) -> bool,
+        send: &mut dyn FnMut(&[u8]) -> bool,
     ) -> bool {
         let head = self.head(kind);
         let frame = frame::write(&mut self.bytes, head, |writer| {

@@ -8,68 +8,64 @@ use super::telemetry::Telemetry;
 use crate::hal::Duty;
 use crate::units::Q16;
 
+/// Numbers of a record.
+const NUMBERS: usize = 21;
+
 /// A record as whole numbers, or the difference of two. postcard writes each in as many
 /// bytes as it needs, 1 to 5.
 ///
 /// Differences wrap, so that any two records have one and no bit is lost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct Wire {
-    at: u32,
-    codes: [i16; 4],
-    /// The arm's age lowest: read every second tick, it is the one that changes.
-    ages: i32,
-    /// Mode, stage, level.
-    state: i32,
-    flags: i16,
-    quantities: [i32; 11],
-    duties: [i16; 2],
-}
+pub(super) struct Wire([i32; NUMBERS]);
 
 /// Most bytes that a [`Wire`] takes.
-pub(super) const LONGEST: usize = 5 + 4 * 3 + 5 + 5 + 3 + 11 * 5 + 2 * 3;
+pub(super) const LONGEST: usize = 5 * NUMBERS;
 
 impl Wire {
     /// The record as numbers.
-    #[must_use]
+    #[inline(never)]
     pub(super) fn of(record: &Record) -> Self {
         let Record { telemetry: t, codes: [wheel, load_cell, tread, arm], ages, flags } = record;
         let [wheel_age, load_cell_age, tread_age, arm_age] = *ages;
-        Self {
-            at: t.at,
+        Self([
+            t.at as i32,
+            i32::from(*wheel),
+            i32::from(*load_cell),
+            i32::from(*tread),
             // The frame's parity, its highest bit, jumps: as the lowest it weighs little.
-            codes: [*wheel, *load_cell, *tread, arm.rotate_left(1)].map(|code| code as i16),
-            ages: i32::from_le_bytes([arm_age, wheel_age, load_cell_age, tread_age]),
-            state: i32::from_le_bytes([t.level, t.stage as u8, number::of_mode(t.mode), 0]),
-            flags: flags.to_bits() as i16,
-            quantities: [
-                t.position,
-                t.speed,
-                t.speed_ref,
-                t.preload,
-                t.preload_ref,
-                t.compression,
-                t.radius,
-                t.gap_predicted,
-                t.slip_margin,
-                t.vibration,
-                t.distance,
-            ]
-            .map(Q16::to_bits),
-            duties: [t.drive, t.pretightener].map(Duty::to_bits),
-        }
+            i32::from(arm.rotate_left(1)),
+            // The arm's age lowest: read every second tick, it is the one that changes.
+            i32::from_le_bytes([arm_age, wheel_age, load_cell_age, tread_age]),
+            i32::from_le_bytes([t.level, t.stage as u8, number::of_mode(t.mode), 0]),
+            i32::from(flags.to_bits()),
+            t.position.to_bits(),
+            t.speed.to_bits(),
+            t.speed_ref.to_bits(),
+            t.preload.to_bits(),
+            t.preload_ref.to_bits(),
+            t.compression.to_bits(),
+            t.radius.to_bits(),
+            t.gap_predicted.to_bits(),
+            t.slip_margin.to_bits(),
+            t.vibration.to_bits(),
+            t.distance.to_bits(),
+            i32::from(t.drive.to_bits()),
+            i32::from(t.pretightener.to_bits()),
+        ])
     }
 
-    /// The record of the numbers; none if mode or stage have no meaning.
-    #[must_use]
+    /// The record of the numbers; none if one of them has no meaning.
     pub(super) fn record(&self) -> Option<Record> {
-        let [arm_age, wheel_age, load_cell_age, tread_age] = self.ages.to_le_bytes();
-        let [level, stage, mode, _] = self.state.to_le_bytes();
-        let [wheel, load_cell, tread, arm] = self.codes.map(|code| code as u16);
-        let q = self.quantities.map(Q16::from_bits);
-        let [drive, pretightener] = self.duties.map(Duty::from_bits);
+        let [at, wheel, load_cell, tread, arm, ages, state, flags, q @ .., drive, pretightener] =
+            self.0;
+        let q: [Q16; 11] = q.map(Q16::from_bits);
+        let [arm_age, wheel_age, load_cell_age, tread_age] = ages.to_le_bytes();
+        let [level, stage, mode, _] = state.to_le_bytes();
+        let code = |number: i32| u16::try_from(number).ok();
+        let duty = |number: i32| i16::try_from(number).ok().map(Duty::from_bits);
         Some(Record {
             telemetry: Telemetry {
-                at: self.at,
+                at: at as u32,
                 mode: number::mode(mode)?,
                 stage: number::stage(stage)?,
                 position: q[0],
@@ -84,49 +80,31 @@ impl Wire {
                 slip_margin: q[8],
                 vibration: q[9],
                 distance: q[10],
-                drive,
-                pretightener,
+                drive: duty(drive)?,
+                pretightener: duty(pretightener)?,
             },
-            codes: [wheel, load_cell, tread, arm.rotate_right(1)],
+            codes: [code(wheel)?, code(load_cell)?, code(tread)?, code(arm)?.rotate_right(1)],
             ages: [wheel_age, load_cell_age, tread_age, arm_age],
-            flags: Flags::from_bits(self.flags as u16),
+            flags: Flags::from_bits(code(flags)?),
         })
     }
 
     /// The difference to what came before.
-    #[must_use]
     pub(super) fn since(&self, before: &Self) -> Self {
-        self.with(before, u32::wrapping_sub, i32::wrapping_sub, i16::wrapping_sub)
+        let mut difference = *self;
+        for (number, before) in difference.0.iter_mut().zip(before.0) {
+            *number = number.wrapping_sub(before);
+        }
+        difference
     }
 
     /// What has this difference to what came before.
-    #[must_use]
     pub(super) fn after(&self, before: &Self) -> Self {
-        before.with(self, u32::wrapping_add, i32::wrapping_add, i16::wrapping_add)
-    }
-
-    fn with(
-        &self,
-        other: &Self,
-        time: fn(u32, u32) -> u32,
-        long: fn(i32, i32) -> i32,
-        short: fn(i16, i16) -> i16,
-    ) -> Self {
-        let mut result = *self;
-        result.at = time(self.at, other.at);
-        result.ages = long(self.ages, other.ages);
-        result.state = long(self.state, other.state);
-        result.flags = short(self.flags, other.flags);
-        for (one, other) in result.codes.iter_mut().zip(other.codes) {
-            *one = short(*one, other);
+        let mut sum = *self;
+        for (number, before) in sum.0.iter_mut().zip(before.0) {
+            *number = number.wrapping_add(before);
         }
-        for (one, other) in result.quantities.iter_mut().zip(other.quantities) {
-            *one = long(*one, other);
-        }
-        for (one, other) in result.duties.iter_mut().zip(other.duties) {
-            *one = short(*one, other);
-        }
-        result
+        sum
     }
 }
 
@@ -170,9 +148,14 @@ mod tests {
 
     #[test]
     fn numbers_without_meaning_are_no_record() {
-        let meaningless = Wire { state: i32::from_le_bytes([0, 0, 0, 0]), ..Wire::default() };
-        assert_eq!(meaningless.record(), None);
-        let meaningless = Wire { state: i32::from_le_bytes([0, 1, 99, 0]), ..Wire::default() };
-        assert_eq!(meaningless.record(), None);
+        let sound = Wire::of(&Record::empty());
+        assert!(sound.record().is_some());
+        // Stage 0, mode 99, a code and a duty beyond 16 bits.
+        let state = |mode, stage| i32::from_le_bytes([0, stage, mode, 0]);
+        for (place, number) in [(6, state(0, 0)), (6, state(99, 1)), (1, 65_536), (20, 32_768)] {
+            let mut meaningless = sound;
+            meaningless.0[place] = number;
+            assert_eq!(meaningless.record(), None, "{place}");
+        }
     }
 }

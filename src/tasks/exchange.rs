@@ -17,7 +17,7 @@ use embassy_sync::watch::Watch;
 
 /// Log entries that wait for the journal at most; beyond, new ones are dropped and
 /// counted.
-pub const ENTRIES: usize = 64;
+pub const ENTRIES: usize = 32;
 
 /// Commands that wait for the tick at most; beyond, their source waits.
 pub const COMMANDS: usize = 4;

@@ -7,11 +7,11 @@ unsafe extern "C" {
 }
 
 /// First eight bytes of the image's hash. `readelf -n` shows the whole of it.
-pub(crate) fn id() -> [u8; 8] {
+pub(super) fn id() -> [u8; 8] {
     let mut id = [0; 8];
     // SAFETY: the linker script keeps the note, which is longer than what is read, in
     // flash, where nothing changes it.
-    let note = unsafe { &*(&raw const __build_id) };
+    let note = unsafe { &__build_id };
     id.copy_from_slice(&note[16..]);
     id
 }
