@@ -2,9 +2,9 @@
 //! been read.
 //!
 //! The stream of ticks tells more while someone reads it. The capture is for when nobody
-//! does, or too slowly: it keeps raw codes and both bridges' duties at 100 Hz from a third
-//! of a second before its trigger to a second after it, and holds them until they have
-//! found room on the channel.
+//! does, or too slowly: it keeps raw codes and both bridges' duties at 100 Hz from 0.3 s
+//! before its trigger to 0.9 s after it, and holds them until they have found room on
+//! the channel.
 
 #![deny(clippy::float_arithmetic)]
 
@@ -20,10 +20,10 @@ use crate::units::{Millimetres, Q16, Tick, q16};
 pub const EVERY: u32 = 10;
 
 /// Shots that a capture has.
-pub const SHOTS: usize = 128;
+pub const SHOTS: usize = 120;
 
 /// Shots after the trigger; the others are history.
-pub const AFTER: u8 = 96;
+pub const AFTER: u8 = 90;
 
 /// Shots in a frame.
 pub const IN_FRAME: usize = 16;
