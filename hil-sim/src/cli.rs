@@ -7,6 +7,7 @@
 
 mod account;
 mod bench;
+mod capture;
 mod compare;
 mod constants;
 mod crossing;
@@ -19,6 +20,8 @@ mod montecarlo;
 mod output;
 mod paper;
 mod parse;
+mod replay;
+mod report;
 mod scenario;
 mod size;
 mod stress;
@@ -42,6 +45,9 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Verb {
     Deploy(deploy::Args),
+    Capture(capture::Args),
+    Replay(replay::Args),
+    Report(report::Args),
     Crossing(crossing::Args),
     Modes(modes::Args),
     Bench(bench::Args),
@@ -61,6 +67,9 @@ impl Verb {
     fn run(&self) -> Result<Outcome, Failure> {
         match self {
             Self::Deploy(args) => deploy::run(args),
+            Self::Capture(args) => capture::run(args),
+            Self::Replay(args) => replay::run(args),
+            Self::Report(args) => report::run(args),
             Self::Crossing(args) => crossing::run(args),
             Self::Modes(args) => modes::run(args),
             Self::Bench(args) => bench::run(args),

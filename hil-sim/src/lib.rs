@@ -4,6 +4,7 @@
 pub mod bench;
 #[cfg(feature = "board")]
 pub mod board;
+pub mod capture;
 pub mod cli;
 pub mod compare;
 pub mod constants;
@@ -18,6 +19,7 @@ pub mod progress;
 pub mod provision;
 pub mod record;
 pub mod reference;
+pub mod replay;
 pub mod report;
 pub mod scenario;
 pub mod sil;

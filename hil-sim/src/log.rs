@@ -7,11 +7,15 @@
 mod complete;
 mod decoder;
 mod file;
+mod ledger;
+mod recording;
 mod row;
 mod run;
 
 pub use complete::complete;
 pub use decoder::{Decoder, Item, Mark, Tally};
 pub use file::{FRAMES, ReadError, timed};
+pub use ledger::LedgerLine;
+pub use recording::recording;
 pub use row::Row;
 pub use run::{Header, Run};

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// One millisecond of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default = "Row::unknown")]
 pub struct Row {
     /// Time since boot, s.
     pub t_s: f64,
@@ -62,6 +63,43 @@ pub struct Row {
     pub drive_duty: f64,
     /// Pre-tightener duty, -1 to 1.
     pub preload_duty: f64,
+}
+
+impl Row {
+    /// A row of which nothing is known.
+    #[must_use]
+    pub const fn unknown() -> Self {
+        let unknown = f64::NAN;
+        Self {
+            t_s: unknown,
+            mode: 12,
+            stage: 1,
+            level: 0,
+            position_true_mm: unknown,
+            position_est_mm: unknown,
+            speed_true_mm_s: unknown,
+            speed_est_mm_s: unknown,
+            speed_ref_mm_s: unknown,
+            preload_true_n: unknown,
+            preload_meas_n: unknown,
+            preload_ref_n: unknown,
+            radius_true_mm: unknown,
+            radius_est_mm: unknown,
+            compression_true_mm: unknown,
+            compression_meas_mm: unknown,
+            root_clearance_mm: unknown,
+            gap_predicted_mm: unknown,
+            corner_force_n: unknown,
+            floor_force_n: unknown,
+            utilisation: unknown,
+            slip_margin_true: unknown,
+            slip_margin_est: unknown,
+            slip_mm: unknown,
+            vibration_um: unknown,
+            drive_duty: unknown,
+            preload_duty: unknown,
+        }
+    }
 }
 
 /// Names of the mode numbers in [`Row::mode`].

@@ -45,6 +45,35 @@ pub(crate) fn schema(title: &str, example: &Value, required: &[&str]) -> Value {
     json!({ "title": title, "type": "object", "properties": properties, "required": required })
 }
 
+/// The form of a log line that viewers show in their log panel.
+pub(crate) fn log_schema() -> Value {
+    let time = json!({
+        "type": "object",
+        "title": "time",
+        "properties": { "sec": { "type": "integer" }, "nsec": { "type": "integer" } },
+    });
+    json!({
+        "title": "foxglove.Log",
+        "type": "object",
+        "properties": {
+            "timestamp": time,
+            "level": { "type": "integer" },
+            "message": { "type": "string" },
+            "name": { "type": "string" },
+        },
+    })
+}
+
+/// A log line of this form, at `ns` nanoseconds.
+pub(crate) fn log_message(ns: u64, level: u8, text: &str) -> Value {
+    json!({
+        "timestamp": { "sec": ns / 1_000_000_000, "nsec": ns % 1_000_000_000 },
+        "level": level,
+        "message": text,
+        "name": "interstage",
+    })
+}
+
 fn kind(value: &Value) -> &'static str {
     match value {
         Value::Bool(_) => "boolean",

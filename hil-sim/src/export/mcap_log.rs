@@ -7,7 +7,7 @@ use std::path::Path;
 
 use mcap::WriteOptions;
 use mcap::records::{MessageHeader, Metadata};
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use super::whole::{self, Failure};
 use super::{ExportError, json};
@@ -70,14 +70,10 @@ struct Event {
 /// Crossings and log lines, each from the last to the first.
 fn events<W: Write + Seek>(log: &mut Log<W>, recording: &Recording) -> Result<Vec<Event>, Failure> {
     let crossing = log.channel("/crossing", &crossing_schema()?)?;
-    let lines = log.channel("/log", &log_schema())?;
+    let lines = log.channel("/log", &json::log_schema())?;
     let mut events = Vec::new();
     for line in recording.log.iter().rev() {
-        events.push(Event {
-            t_s: line.t_s,
-            channel: lines,
-            body: serde_json::to_vec(&log_message(line))?,
-        });
+        events.push(Event { t_s: line.t_s, channel: lines, body: log_line(line)? });
     }
     for line in recording.summary.crossings.iter().rev() {
         events.push(Event { t_s: line.lift_s, channel: crossing, body: json::bytes(line)? });
@@ -108,34 +104,9 @@ fn crossing_schema() -> Result<Value, Failure> {
     Ok(json::schema("interstage.Crossing", &example, &["index", "gap_mm", "touch_s", "lift_s"]))
 }
 
-/// The form of a log line that viewers show in their log panel.
-fn log_schema() -> Value {
-    let time = json!({
-        "type": "object",
-        "title": "time",
-        "properties": { "sec": { "type": "integer" }, "nsec": { "type": "integer" } },
-    });
-    json!({
-        "title": "foxglove.Log",
-        "type": "object",
-        "properties": {
-            "timestamp": time,
-            "level": { "type": "integer" },
-            "message": { "type": "string" },
-            "name": { "type": "string" },
-        },
-    })
-}
-
-fn log_message(line: &LogLine) -> Value {
+fn log_line(line: &LogLine) -> Result<Vec<u8>, Failure> {
     const INFO: u8 = 2;
-    let ns = nanoseconds(line.t_s);
-    json!({
-        "timestamp": { "sec": ns / 1_000_000_000, "nsec": ns % 1_000_000_000 },
-        "level": INFO,
-        "message": line.text,
-        "name": "interstage",
-    })
+    Ok(serde_json::to_vec(&json::log_message(nanoseconds(line.t_s), INFO, &line.text))?)
 }
 
 fn metadata(recording: &Recording) -> [Metadata; 2] {

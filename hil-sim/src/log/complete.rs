@@ -14,7 +14,7 @@ pub fn complete(recording: &mut Recording, run: &Run) {
     }
 }
 
-fn believe(place: &mut record::Row, row: &Row) {
+pub(super) fn believe(place: &mut record::Row, row: &Row) {
     place.mode = row.telemetry().map_or(place.mode, |seen| record::mode_number(seen.mode));
     place.stage = row.stage;
     place.level = row.level;

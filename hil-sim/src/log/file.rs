@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 use super::decoder::{Decoder, Item};
 use super::row::Row;
 use super::run::Run;
+use mcap::read::Options;
 
 /// Topic of the MCAP file that carries the frames as they lay on the channel.
 pub const FRAMES: &str = "/frames";
 
 /// First bytes of an MCAP file.
-const MCAP: &[u8] = b"\x89MCAP";
+pub(super) const MCAP: &[u8] = b"\x89MCAP";
 /// First bytes of a CSV file of rows.
 const CSV: &[u8] = b"tick,";
 
@@ -77,9 +78,8 @@ impl Run {
 
 /// Reads messages up to the end, or to where the file was cut off.
 fn of_mcap(bytes: &[u8]) -> mcap::McapResult<Run> {
-    let options = mcap::read::Options::IgnoreEndMagic.into();
     let (mut decoder, mut run) = (Decoder::new(), Run::default());
-    for message in mcap::MessageStream::new_with_options(bytes, options)? {
+    for message in mcap::MessageStream::new_with_options(bytes, Options::IgnoreEndMagic.into())? {
         // A file without its end is read as far as it goes.
         let Ok(message) = message else { break };
         if message.channel.topic == FRAMES {
@@ -93,9 +93,9 @@ fn of_mcap(bytes: &[u8]) -> mcap::McapResult<Run> {
 }
 
 /// The parameters that stand beside the messages.
-fn parameters(bytes: &[u8]) -> Option<String> {
-    let options = mcap::read::Options::IgnoreEndMagic.into();
-    let records = mcap::read::LinearReader::new_with_options(bytes, options).ok()?;
+pub(super) fn parameters(bytes: &[u8]) -> Option<String> {
+    let records =
+        mcap::read::LinearReader::new_with_options(bytes, Options::IgnoreEndMagic.into()).ok()?;
     records.map_while(Result::ok).find_map(|record| match record {
         mcap::records::Record::Metadata(metadata) if metadata.name == "parameters" => {
             metadata.metadata.get("toml").cloned()

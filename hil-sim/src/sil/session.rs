@@ -173,6 +173,11 @@ impl Session {
         &self.plant
     }
 
+    /// The binary log since the last call; empty if it is not kept.
+    pub fn take_stream(&mut self) -> Vec<u8> {
+        self.stream.as_mut().map(Stream::take).unwrap_or_default()
+    }
+
     /// What is left behind if the session ends here; it took `wall_s` to compute.
     #[must_use]
     pub fn finish(self, wall_s: f64) -> Recording {
