@@ -208,7 +208,7 @@ mod tests {
     const CORNER: Millimetres = q16(13_500_000);
 
     fn row(at: Tick, mode: Mode, distance_mm: f64) -> Record {
-        let mut record = Record::empty();
+        let mut record = Record::EMPTY;
         record.telemetry.at = at;
         record.telemetry.mode = mode;
         record.telemetry.distance = Q16::from_num(distance_mm);

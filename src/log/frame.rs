@@ -9,9 +9,8 @@
 //! frames since boot, those that found no room too; `dropped` counts these.
 
 use cobs::CobsEncoder;
-use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
-use postcard::ser_flavors::Flavor;
-use serde::{Deserialize, Serialize};
+use crc::{CRC_32_ISO_HDLC, Crc, Table};
+use serde::Deserialize;
 
 use super::capture::Shots;
 use super::entry::Entry;
@@ -74,78 +73,36 @@ pub struct Head {
     pub dropped: u32,
 }
 
-/// Writes a frame into `bytes` and returns it with the zero that ends it.
-pub fn write(bytes: &mut [u8; LONGEST], head: Head, fill: impl FnOnce(&mut Writer<'_>)) -> &[u8] {
-    // The last byte is kept for the end.
-    let mut writer = Writer::new(&mut bytes[..LONGEST - 1], head);
-    fill(&mut writer);
-    let length = writer.close();
+/// Longest body, bytes. With head, check, stuffing and end it just fits into a frame.
+pub const BODY: usize = LONGEST - HEAD - CHECK - STUFFING - 1;
+
+/// Longest head: kind, sequence, dropped.
+const HEAD: usize = 1 + 5 + 5;
+
+/// What COBS adds at most: a byte, and one for every 254.
+const STUFFING: usize = 1 + LONGEST / 254;
+
+/// Writes a frame into `bytes` and returns it with the zero that ends it; of a body longer
+/// than [`BODY`], only so much.
+pub fn write<'a>(bytes: &'a mut [u8; LONGEST], head: Head, body: &[u8]) -> &'a [u8] {
+    let body = &body[..body.len().min(BODY)];
+    let mut start = [0; HEAD];
+    let start = match postcard::to_slice(&(head.kind, head.sequence, head.dropped), &mut start) {
+        Ok(start) => &*start,
+        // It has room for the largest.
+        Err(_) => &[],
+    };
+    let mut digest = CRC.digest();
+    let mut cobs = CobsEncoder::new(&mut bytes[..LONGEST - 1]);
+    for part in [start, body] {
+        digest.update(part);
+        // There is room, see [`BODY`].
+        let _ = cobs.push(part);
+    }
+    let _ = cobs.push(&digest.finalize().to_le_bytes());
+    let length = cobs.finalize();
     bytes[length] = 0;
     &bytes[..=length]
-}
-
-/// A frame that is being written.
-pub struct Writer<'a> {
-    cobs: CobsEncoder<'a>,
-    digest: Digest<'static, u32, Table<1>>,
-    written: usize,
-}
-
-impl<'a> Writer<'a> {
-    /// Begins a frame. There is always room for the head.
-    #[inline(never)]
-    fn new(room: &'a mut [u8], head: Head) -> Self {
-        let mut writer = Self { cobs: CobsEncoder::new(room), digest: CRC.digest(), written: 0 };
-        let _ = writer.put(&(head.kind, head.sequence, head.dropped));
-        writer
-    }
-
-    /// Appends a value. False if it did not fit; the frame is then spoilt.
-    #[must_use]
-    pub fn put(&mut self, value: &impl Serialize) -> bool {
-        postcard::serialize_with_flavor(value, &mut *self).is_ok()
-    }
-
-    /// Whether a value of so many bytes will fit.
-    #[must_use]
-    pub fn has_room(&self, bytes: usize) -> bool {
-        // COBS adds a byte to the first and to every 254; the check comes last.
-        let whole = self.written + bytes + CHECK;
-        whole + whole / 254 + 1 < LONGEST
-    }
-
-    /// Appends the check; the frame is the first so many bytes.
-    #[inline(never)]
-    fn close(self) -> usize {
-        let Self { mut cobs, digest, .. } = self;
-        // Room for it has been kept by `has_room`.
-        let _ = cobs.push(&digest.finalize().to_le_bytes());
-        cobs.finalize()
-    }
-}
-
-impl Flavor for &mut Writer<'_> {
-    type Output = ();
-
-    #[inline(never)]
-    fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
-        self.try_extend(&[byte])
-    }
-
-    /// Not inlined, or its body would stand wherever a number is written.
-    #[inline(never)]
-    fn try_extend(&mut self, bytes: &[u8]) -> postcard::Result<()> {
-        if !self.has_room(bytes.len()) {
-            return Err(postcard::Error::SerializeBufferFull);
-        }
-        self.digest.update(bytes);
-        self.written += bytes.len();
-        self.cobs.push(bytes).map_err(|_| postcard::Error::SerializeBufferFull)
-    }
-
-    fn finalize(self) -> postcard::Result<()> {
-        Ok(())
-    }
 }
 
 /// Why bytes are not a frame.
@@ -262,15 +219,16 @@ impl Iterator for Ticks<'_> {
     }
 }
 
-/// Appends ticks to a frame until it has no more room for one or there are none.
-pub(super) fn put_ticks(writer: &mut Writer<'_>, mut next: impl FnMut() -> Option<Record>) {
-    let mut before = Wire::default();
-    while writer.has_room(wire::LONGEST) {
-        let Some(record) = next() else { return };
+/// Makes a body of ticks until it is full or there are none; its length.
+pub(super) fn put_ticks(body: &mut [u8; BODY], mut next: impl FnMut() -> Option<Record>) -> usize {
+    let (mut before, mut length) = (Wire::default(), 0);
+    while let Some(room) = body.get_mut(length..length + wire::LONGEST) {
+        let Some(record) = next() else { break };
         let wire = Wire::of(&record);
-        let _ = writer.put(&wire.since(&before));
+        length += wire.since(&before).put(room);
         before = wire;
     }
+    length
 }
 
 #[cfg(test)]
@@ -297,10 +255,9 @@ mod tests {
                 put += usize::from(next.is_some());
                 next
             };
-            let length = write(&mut bytes, head(Kind::Ticks, sequence), |writer| {
-                put_ticks(writer, next);
-            })
-            .len();
+            let mut body = [0; BODY];
+            let used = put_ticks(&mut body, next);
+            let length = write(&mut bytes, head(Kind::Ticks, sequence), &body[..used]).len();
             let (end, frame) = bytes[..length].split_last_mut().unwrap();
             prop_assert_eq!(*end, 0);
             prop_assert!(!frame.contains(&0), "a zero inside");
@@ -316,10 +273,9 @@ mod tests {
         fn a_flipped_bit_is_found(record in any_record(), at in any::<prop::sample::Index>(), bit in 0..8) {
             let mut bytes = [0; LONGEST];
             let mut once = Some(record);
-            let whole = write(&mut bytes, head(Kind::Ticks, 9), |writer| {
-                put_ticks(writer, || once.take());
-            });
-            let length = whole.len() - 1;
+            let mut body = [0; BODY];
+            let used = put_ticks(&mut body, || once.take());
+            let length = write(&mut bytes, head(Kind::Ticks, 9), &body[..used]).len() - 1;
             let frame = &mut bytes[..length];
             frame[at.index(length)] ^= 1_u8 << bit;
             prop_assert!(Frame::open(frame).is_err());
@@ -348,18 +304,16 @@ mod tests {
     }
 
     #[test]
-    fn a_value_that_does_not_fit_is_refused() {
-        let mut bytes = [0; LONGEST];
-        let whole = write(&mut bytes, head(Kind::Event, 0), |writer| {
-            assert!(writer.put(&[7_u8; 32]));
-            while writer.has_room(32) {
-                assert!(writer.put(&[7_u8; 32]));
-            }
-            assert!(!writer.put(&[7_u8; 32]));
-            while writer.put(&7_u8) {}
-        });
-        assert!(whole.len() > LONGEST - 4);
-        let (_, frame) = whole.split_last().unwrap();
-        assert!(Frame::open(&mut frame.to_vec()).is_ok());
+    fn the_longest_body_fits_whatever_it_is() {
+        let most = Head { kind: u8::MAX, sequence: u32::MAX, dropped: u32::MAX };
+        for byte in [0, 1, 255] {
+            let (mut bytes, body) = ([0xA5; LONGEST], [byte; BODY + 7]);
+            let whole = write(&mut bytes, most, &body);
+            let (end, frame) = whole.split_last().unwrap();
+            assert!(*end == 0 && !frame.contains(&0));
+            let mut frame = frame.to_vec();
+            let frame = Frame::open(&mut frame).unwrap();
+            assert_eq!((frame.head, frame.body), (most, &body[..BODY]));
+        }
     }
 }

@@ -130,7 +130,7 @@ pub(super) mod tests {
     }
 
     fn row(stage: ContactStage, speed: f64, speed_ref: f64) -> Record {
-        let mut record = Record::empty();
+        let mut record = Record::EMPTY;
         record.telemetry.mode = Mode::Run(Direction::Retract, Leg::Crossing);
         record.telemetry.stage = stage;
         record.telemetry.speed = Q16::from_num(speed);

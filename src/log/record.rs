@@ -4,7 +4,7 @@
 use super::number;
 use super::telemetry::Telemetry;
 use crate::control::{Input, Output};
-use crate::hal::{Duty, MotorCommand};
+use crate::hal::MotorCommand;
 use crate::sense::raw::{AdcCode, AngleFrame, EncoderCount, Sample, SensorFrame};
 use crate::supervise::Command;
 use crate::units::Tick;
@@ -135,17 +135,21 @@ impl Record {
     /// The record of a tick.
     #[must_use]
     pub fn of(input: &Input, output: &Output) -> Self {
+        let mut record = Self::EMPTY;
+        record.set(input, output);
+        record
+    }
+
+    /// Makes it the record of a tick, where it stands: it is copied once.
+    #[inline]
+    pub(super) fn set(&mut self, input: &Input, output: &Output) {
+        self.telemetry = output.telemetry;
         let SensorFrame { wheel, load_cell, tread, arm } = &input.sensors;
-        let (wheel, wheel_age) = pack(input.now, wheel.as_ref(), EncoderCount::get);
-        let (load_cell, load_cell_age) = pack(input.now, load_cell.as_ref(), AdcCode::get);
-        let (tread, tread_age) = pack(input.now, tread.as_ref(), AdcCode::get);
-        let (arm, arm_age) = pack(input.now, arm.as_ref(), AngleFrame::get);
-        Self {
-            telemetry: output.telemetry,
-            codes: [wheel, load_cell, tread, arm],
-            ages: [wheel_age, load_cell_age, tread_age, arm_age],
-            flags: Flags::of(input, output),
-        }
+        (self.codes[0], self.ages[0]) = pack(input.now, wheel.as_ref(), EncoderCount::get);
+        (self.codes[1], self.ages[1]) = pack(input.now, load_cell.as_ref(), AdcCode::get);
+        (self.codes[2], self.ages[2]) = pack(input.now, tread.as_ref(), AdcCode::get);
+        (self.codes[3], self.ages[3]) = pack(input.now, arm.as_ref(), AngleFrame::get);
+        self.flags = Flags::of(input, output);
     }
 
     /// Time of the tick.
@@ -201,20 +205,9 @@ impl Record {
         MotorCommand { duty: self.telemetry.pretightener, enable: self.flags.preload() }
     }
 
-    /// A record of nothing, from which differences begin.
-    #[must_use]
-    pub fn empty() -> Self {
-        Self {
-            telemetry: Telemetry {
-                drive: Duty::ZERO,
-                pretightener: Duty::ZERO,
-                ..Telemetry::default()
-            },
-            codes: [0; 4],
-            ages: [0; 4],
-            flags: Flags::default(),
-        }
-    }
+    /// A record of nothing.
+    pub const EMPTY: Self =
+        Self { telemetry: Telemetry::EMPTY, codes: [0; 4], ages: [0; 4], flags: Flags(0) };
 }
 
 /// Code and age of a sample as they travel.
@@ -238,6 +231,7 @@ fn unpack<T>(
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::hal::Duty;
     use crate::supervise::Mode;
     use crate::units::Q16;
     use proptest::prelude::*;

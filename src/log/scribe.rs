@@ -2,7 +2,7 @@
 
 use super::capture::Capture;
 use super::entry::{Entry, Event};
-use super::frame::{self, Head, Kind, LONGEST, put_ticks};
+use super::frame::{self, BODY, Head, Kind, LONGEST, put_ticks};
 use super::identity::Identity;
 use super::ledger::Ledger;
 use super::tape::Tape;
@@ -80,17 +80,15 @@ impl Scribe {
 
     /// One frame of ticks.
     fn ticks(&mut self, tape: &Tape, send: &mut dyn FnMut(&[u8]) -> bool) {
-        let head = self.head(Kind::Ticks);
+        let mut body = [0; BODY];
         let (capture, ledger, corner) = (&mut self.capture, &mut self.ledger, self.identity.corner);
-        let next = || {
+        let length = put_ticks(&mut body, || {
             let record = tape.take()?;
             capture.look(&record, corner);
             ledger.look(&record);
             Some(record)
-        };
-        let frame = frame::write(&mut self.bytes, head, |writer| put_ticks(writer, next));
-        let room = send(frame);
-        self.count(room);
+        });
+        self.send(Kind::Ticks, &body[..length], send);
     }
 
     /// A frame of one value.
@@ -101,21 +99,17 @@ impl Scribe {
         value: &impl Serialize,
         send: &mut dyn FnMut(&[u8]) -> bool,
     ) -> bool {
-        let head = self.head(kind);
-        let frame = frame::write(&mut self.bytes, head, |writer| {
-            // All of them fit, see the test.
-            let _ = writer.put(value);
-        });
-        let room = send(frame);
-        self.count(room)
+        let mut body = [0; BODY];
+        // All of them fit, see the test.
+        let length = postcard::to_slice(value, &mut body).map_or(0, |used| used.len());
+        self.send(kind, &body[..length], send)
     }
 
-    fn head(&self, kind: Kind) -> Head {
-        Head { kind: kind as u8, sequence: self.sequence, dropped: self.dropped }
-    }
-
-    /// A frame has been written, and there was room for it or not.
-    fn count(&mut self, room: bool) -> bool {
+    /// Writes a frame; whether there was room for it.
+    #[inline(never)]
+    fn send(&mut self, kind: Kind, body: &[u8], send: &mut dyn FnMut(&[u8]) -> bool) -> bool {
+        let head = Head { kind: kind as u8, sequence: self.sequence, dropped: self.dropped };
+        let room = send(frame::write(&mut self.bytes, head, body));
         self.sequence = self.sequence.wrapping_add(1);
         self.dropped = self.dropped.wrapping_add(u32::from(!room));
         room

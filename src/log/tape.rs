@@ -5,7 +5,7 @@ use core::cell::RefCell;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
-use heapless::{HistoryBuf, Vec};
+use heapless::Vec;
 
 use super::record::Record;
 use super::telemetry::Telemetry;
@@ -28,8 +28,12 @@ pub struct Tape {
 }
 
 struct Inner {
-    rows: HistoryBuf<Record, TAPE>,
-    unread: u32,
+    /// A ring once it has filled; filled as it goes, so that an empty tape is all zeros
+    /// and takes no room in flash.
+    rows: Vec<Record, TAPE>,
+    /// Ticks kept and ticks taken since boot; they wrap.
+    written: u32,
+    read: u32,
     lost: u32,
     /// The latest that the tick was given; at most one between two batches.
     plan: Vec<(Tick, Plan), 1>,
@@ -37,13 +41,16 @@ struct Inner {
     request: Vec<(Tick, PlanRequest), 1>,
 }
 
+const _: () = assert!(TAPE.is_power_of_two(), "wrapping counters are places in it");
+
 impl Tape {
     /// An empty tape.
     #[must_use]
     pub const fn new() -> Self {
         let inner = Inner {
-            rows: HistoryBuf::new(),
-            unread: 0,
+            rows: Vec::new(),
+            written: 0,
+            read: 0,
             lost: 0,
             plan: Vec::new(),
             request: Vec::new(),
@@ -54,10 +61,16 @@ impl Tape {
     /// Keeps a tick. Cost: the copying of [`Record`], and of plan and request in the few
     /// ticks that have them.
     pub fn keep(&self, input: &Input, output: &Output) {
-        let record = Record::of(input, output);
         let unread = self.inner.lock(|inner| {
-            let mut inner = inner.borrow_mut();
-            inner.rows.write(record);
+            let inner = &mut *inner.borrow_mut();
+            let place = inner.written as usize % TAPE;
+            if inner.rows.len() <= place {
+                let _ = inner.rows.push(Record::EMPTY);
+            }
+            if let Some(row) = inner.rows.get_mut(place) {
+                row.set(input, output);
+            }
+            inner.written = inner.written.wrapping_add(1);
             if let Some(plan) = input.plan {
                 inner.plan.clear();
                 let _ = inner.plan.push((input.now, plan));
@@ -66,12 +79,12 @@ impl Tape {
                 inner.request.clear();
                 let _ = inner.request.push((input.now, request));
             }
-            inner.unread += 1;
-            if inner.unread > TAPE as u32 {
-                inner.unread = TAPE as u32;
+            let unread = inner.written.wrapping_sub(inner.read);
+            if unread > TAPE as u32 {
+                inner.read = inner.read.wrapping_add(1);
                 inner.lost = inner.lost.wrapping_add(1);
             }
-            inner.unread
+            unread
         });
         if unread == BATCH {
             self.ready.signal(());
@@ -86,13 +99,13 @@ impl Tape {
     /// The oldest tick not yet taken.
     pub fn take(&self) -> Option<Record> {
         self.inner.lock(|inner| {
-            let mut inner = inner.borrow_mut();
-            let newest = inner.rows.recent_index()?;
-            let back = (inner.unread as usize).checked_sub(1)?;
-            inner.unread -= 1;
-            // The ring is full whenever the index would fall below 0.
-            let index = if newest >= back { newest - back } else { newest + TAPE - back };
-            inner.rows.as_slice().get(index).copied()
+            let inner = &mut *inner.borrow_mut();
+            if inner.read == inner.written {
+                return None;
+            }
+            let place = inner.read as usize % TAPE;
+            inner.read = inner.read.wrapping_add(1);
+            inner.rows.get(place).copied()
         })
     }
 
@@ -109,7 +122,10 @@ impl Tape {
     /// Ticks not yet taken.
     #[must_use]
     pub fn unread(&self) -> u32 {
-        self.inner.lock(|inner| inner.borrow().unread)
+        self.inner.lock(|inner| {
+            let inner = inner.borrow();
+            inner.written.wrapping_sub(inner.read)
+        })
     }
 
     /// Ticks lost since boot because the journal came too late; wraps.
@@ -121,7 +137,11 @@ impl Tape {
     /// State after the latest tick; none before the first.
     #[must_use]
     pub fn latest(&self) -> Option<Telemetry> {
-        self.inner.lock(|inner| inner.borrow().rows.recent().map(|record| record.telemetry))
+        self.inner.lock(|inner| {
+            let inner = inner.borrow();
+            let place = inner.written.wrapping_sub(1) as usize % TAPE;
+            inner.rows.get(place).map(|record| record.telemetry)
+        })
     }
 }
 

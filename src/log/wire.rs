@@ -89,6 +89,11 @@ impl Wire {
         })
     }
 
+    /// Writes it; so many bytes.
+    pub(super) fn put(&self, room: &mut [u8]) -> usize {
+        postcard::to_slice(self, room).map_or(0, |used| used.len())
+    }
+
     /// The difference to what came before.
     pub(super) fn since(&self, before: &Self) -> Self {
         let mut difference = *self;
@@ -135,7 +140,7 @@ mod tests {
 
     #[test]
     fn a_tick_without_news_takes_a_byte_a_number() {
-        let before = Record::empty();
+        let before = Record::EMPTY;
         let mut after = before;
         after.telemetry.at += 1;
         // Parity and age of the arm's frame alternate.
@@ -148,7 +153,7 @@ mod tests {
 
     #[test]
     fn numbers_without_meaning_are_no_record() {
-        let sound = Wire::of(&Record::empty());
+        let sound = Wire::of(&Record::EMPTY);
         assert!(sound.record().is_some());
         // Stage 0, mode 99, a code and a duty beyond 16 bits.
         let state = |mode, stage| i32::from_le_bytes([0, stage, mode, 0]);

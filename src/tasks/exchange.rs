@@ -1,6 +1,6 @@
 //! What the tasks hand to one another.
 
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 
 use crate::control::{Input, Output};
 use crate::hal::Light;
@@ -12,7 +12,6 @@ use crate::supervise::{Command, Mode};
 use crate::units::Tick;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
-use embassy_sync::signal::Signal;
 use embassy_sync::watch::Watch;
 
 /// Log entries that wait for the journal at most; beyond, new ones are dropped and
@@ -73,12 +72,12 @@ pub struct Exchange {
     pub(super) load_cell: Slot<Sample<AdcCode>>,
     pub(super) tread: Slot<Sample<AdcCode>>,
     pub(super) arm: Slot<Sample<AngleFrame>>,
-    pub(super) request: Signal<CriticalSectionRawMutex, PlanRequest>,
-    pub(super) answer: Signal<CriticalSectionRawMutex, Plan>,
+    pub(super) request: Channel<CriticalSectionRawMutex, PlanRequest, 1>,
+    pub(super) answer: Channel<CriticalSectionRawMutex, Plan, 1>,
     pub(super) commands: Channel<CriticalSectionRawMutex, Command, COMMANDS>,
     pub(super) entries: Channel<CriticalSectionRawMutex, Entry, ENTRIES>,
     pub(super) tape: Tape,
-    light: Slot<Light>,
+    light: AtomicU8,
     lost_entries: AtomicU32,
     bus_faults: [AtomicU32; 4],
     check_ins: [AtomicU32; Station::FIXED + OPERATORS],
@@ -94,12 +93,12 @@ impl Exchange {
             load_cell: Slot::new(),
             tread: Slot::new(),
             arm: Slot::new(),
-            request: Signal::new(),
-            answer: Signal::new(),
+            request: Channel::new(),
+            answer: Channel::new(),
             commands: Channel::new(),
             entries: Channel::new(),
             tape: Tape::new(),
-            light: Slot::new(),
+            light: AtomicU8::new(Light::Off as u8),
             lost_entries: AtomicU32::new(0),
             bus_faults: [const { AtomicU32::new(0) }; 4],
             check_ins: [const { AtomicU32::new(0) }; Station::FIXED + OPERATORS],
@@ -113,7 +112,7 @@ impl Exchange {
             now,
             sensors: self.sensors(),
             command: self.commands.try_receive().ok(),
-            plan: self.answer.try_take(),
+            plan: self.answer.try_receive().ok(),
             overrun,
             emergency_stop: false,
         }
@@ -134,7 +133,7 @@ impl Exchange {
 
     /// Asks the model task for a plan; replaces a request not yet begun.
     pub fn request_plan(&self, request: PlanRequest) {
-        self.request.signal(request);
+        latest(&self.request, request);
     }
 
     /// Puts an entry in the log's queue, or counts it as lost.
@@ -146,7 +145,7 @@ impl Exchange {
 
     /// Sets what the light is to show.
     pub fn show(&self, light: Light) {
-        self.light.sender().send(light);
+        self.light.store(light as u8, Ordering::Relaxed);
     }
 
     /// The latest code of each sensor.
@@ -169,7 +168,11 @@ impl Exchange {
     /// What the light is to show.
     #[must_use]
     pub fn light(&self) -> Light {
-        self.light.anon_receiver().try_get().unwrap_or_default()
+        match self.light.load(Ordering::Relaxed) {
+            light if light == Light::On as u8 => Light::On,
+            light if light == Light::Alarm as u8 => Light::Alarm,
+            _ => Light::Off,
+        }
     }
 
     /// Log entries dropped since boot because the journal did not keep up.
@@ -222,6 +225,13 @@ impl Default for Exchange {
     fn default() -> Self {
         Self::new()
     }
+}
+
+/// Puts a value in a place for one, instead of the one that may be there. For one writer.
+pub(super) fn latest<T>(place: &Channel<CriticalSectionRawMutex, T, 1>, value: T) {
+    place.clear();
+    // Nobody else writes, so there is room.
+    let _ = place.try_send(value);
 }
 
 /// What the light shows in a mode.

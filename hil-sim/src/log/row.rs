@@ -194,7 +194,7 @@ mod tests {
                 pretightener: Duty::from_bits(duties[1]),
                 ..Telemetry::default()
             };
-            let record = Record { telemetry, ..Record::empty() };
+            let record = Record { telemetry, ..Record::EMPTY };
             let row = Row::of(&record, &SensorFrame::default());
             prop_assert_eq!(row.telemetry(), Some(telemetry));
             // JSON keeps it too.
