@@ -23,13 +23,18 @@ mod firmware {
     use interstage::control::Controller;
     use interstage::hal::{Board, Parts};
     use interstage::model::Planner;
+    use interstage::params::service::Service;
     use interstage::tasks::{self, Exchange};
     use panic_probe as _;
+    use rtt_target::DownChannel;
 
-    use crate::board::rtt::Channels;
+    use crate::board::rtt::Frames;
     use crate::board::{self, config, guard, light, rtt};
-    use crate::board::{Analog, Angle, Bridge, Bridges, Button, Console, Guard, Lamp, Lines};
-    use crate::board::{Nucleo, Wheel};
+    use crate::board::{Analog, Angle, Bridge, Bridges, Button, Console, Guard, HostLine, Lamp};
+    use crate::board::{Lines, Nucleo, Pages, Wheel};
+
+    /// Any pin.
+    type Pin = Peri<'static, AnyPin>;
 
     static EXCHANGE: Exchange = Exchange::new();
 
@@ -58,9 +63,12 @@ mod firmware {
         defmt::info!("interstage {=str}", env!("CARGO_PKG_VERSION"));
         guard::report_restart();
         guard::arm();
-        let (mut parts, lamp) = split(p, channels);
+        let (console, line) = (channels.console, channels.line);
+        let (mut parts, lamp, pages) = split(p, console, channels.telemetry);
         threads.spawn(light::show(lamp).unwrap());
-        match config::build() {
+        let (constants, service) = config::build(pages);
+        threads.spawn(link(HostLine::new(line), service).unwrap());
+        match constants {
             Ok((controller, planner, identity)) => {
                 parts.journal.introduce(identity);
                 start(threads, parts, controller, planner);
@@ -70,7 +78,7 @@ mod firmware {
     }
 
     /// Who gets which peripheral and pin; the bridges come up off.
-    fn split(p: Peripherals, channels: Channels) -> (Parts<Nucleo>, Peri<'static, AnyPin>) {
+    fn split(p: Peripherals, console: DownChannel, frames: Frames) -> (Parts<Nucleo>, Pin, Pages) {
         let parts = Parts {
             wheel: Wheel::new(p.TIM5, p.PA0, p.PA1),
             load_cell: Analog::new(p.ADC1, p.PC2, p.DMA1_CH1),
@@ -82,11 +90,11 @@ mod firmware {
             },
             watchdog: Guard::new(p.IWDG),
             button: Button::new(p.PC13, p.EXTI13),
-            console: Console::new(channels.console),
-            journal: Lines::new(channels.telemetry),
+            console: Console::new(console),
+            journal: Lines::new(frames),
             light: Lamp,
         };
-        (parts, p.PA5.into())
+        (parts, p.PA5.into(), Pages::new(p.FLASH))
     }
 
     /// Hands every part to its task.
@@ -148,6 +156,11 @@ mod firmware {
     #[embassy_executor::task]
     async fn typed(console: Console) -> ! {
         tasks::operator(console, &EXCHANGE).await
+    }
+
+    #[embassy_executor::task]
+    async fn link(line: HostLine, service: Service<Pages>) -> ! {
+        tasks::link(line, service, &EXCHANGE).await
     }
 
     #[embassy_executor::task]

@@ -1,6 +1,6 @@
 //! What the tasks hand to one another.
 
-use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
 use crate::control::{Input, Output};
 use crate::hal::Light;
@@ -78,6 +78,8 @@ pub struct Exchange {
     pub(super) entries: Channel<CriticalSectionRawMutex, Entry, ENTRIES>,
     pub(super) tape: Tape,
     light: AtomicU8,
+    /// Nothing is driven.
+    at_rest: AtomicBool,
     lost_entries: AtomicU32,
     bus_faults: [AtomicU32; 4],
     check_ins: [AtomicU32; Station::FIXED + OPERATORS],
@@ -99,6 +101,7 @@ impl Exchange {
             entries: Channel::new(),
             tape: Tape::new(),
             light: AtomicU8::new(Light::Off as u8),
+            at_rest: AtomicBool::new(true),
             lost_entries: AtomicU32::new(0),
             bus_faults: [const { AtomicU32::new(0) }; 4],
             check_ins: [const { AtomicU32::new(0) }; Station::FIXED + OPERATORS],
@@ -128,7 +131,9 @@ impl Exchange {
             self.log(entry);
         }
         self.tape.keep(input, output);
-        self.show(light_of(output.telemetry.mode));
+        let mode = output.telemetry.mode;
+        self.at_rest.store(mode.is_at_rest(), Ordering::Relaxed);
+        self.show(light_of(mode));
     }
 
     /// Asks the model task for a plan; replaces a request not yet begun.
@@ -173,6 +178,12 @@ impl Exchange {
             light if light == Light::Alarm as u8 => Light::Alarm,
             _ => Light::Off,
         }
+    }
+
+    /// Whether nothing is driven, as of the latest tick.
+    #[must_use]
+    pub fn at_rest(&self) -> bool {
+        self.at_rest.load(Ordering::Relaxed)
     }
 
     /// Log entries dropped since boot because the journal did not keep up.
