@@ -78,8 +78,9 @@ pub struct Exchange {
     pub(super) entries: Channel<CriticalSectionRawMutex, Entry, ENTRIES>,
     pub(super) tape: Tape,
     light: AtomicU8,
-    /// Nothing is driven.
-    at_rest: AtomicBool,
+    /// Something is driven. Like everything here it begins as zero, so that none of it
+    /// takes room in flash.
+    driven: AtomicBool,
     lost_entries: AtomicU32,
     bus_faults: [AtomicU32; 4],
     check_ins: [AtomicU32; Station::FIXED + OPERATORS],
@@ -101,7 +102,7 @@ impl Exchange {
             entries: Channel::new(),
             tape: Tape::new(),
             light: AtomicU8::new(Light::Off as u8),
-            at_rest: AtomicBool::new(true),
+            driven: AtomicBool::new(false),
             lost_entries: AtomicU32::new(0),
             bus_faults: [const { AtomicU32::new(0) }; 4],
             check_ins: [const { AtomicU32::new(0) }; Station::FIXED + OPERATORS],
@@ -132,7 +133,7 @@ impl Exchange {
         }
         self.tape.keep(input, output);
         let mode = output.telemetry.mode;
-        self.at_rest.store(mode.is_at_rest(), Ordering::Relaxed);
+        self.driven.store(!mode.is_at_rest(), Ordering::Relaxed);
         self.show(light_of(mode));
     }
 
@@ -183,7 +184,7 @@ impl Exchange {
     /// Whether nothing is driven, as of the latest tick.
     #[must_use]
     pub fn at_rest(&self) -> bool {
-        self.at_rest.load(Ordering::Relaxed)
+        !self.driven.load(Ordering::Relaxed)
     }
 
     /// Log entries dropped since boot because the journal did not keep up.
