@@ -318,9 +318,10 @@ mod tests {
     #[test]
     fn another_rig_differs() {
         let mut rig = Rig::prototype();
-        rig.preload.cruise_n += 1.0;
+        rig.sense.angle_zero_code += 2.0;
         let result = replay(&Run::of_stream(stream()), &rig).unwrap();
         assert!(!result.is_equal());
+        assert_eq!(result.difference.map(|difference| difference.quantity), Some("radius, mm"));
     }
 
     #[test]

@@ -28,7 +28,7 @@ const FLUSH_TICKS: u64 = 1000;
 
 /// Why writing came to an end. What had been handed over before stays readable.
 #[derive(Debug, thiserror::Error)]
-#[error("writing stopped after {ticks} ticks, of which {kept} are safe: {source}")]
+#[error("writing stopped after {ticks} ticks, of which {kept} are safe: {}", chain(&**source))]
 pub struct WriteError {
     /// Ticks that had come.
     pub ticks: u64,
@@ -36,6 +36,14 @@ pub struct WriteError {
     pub kept: u64,
     /// What the system said.
     source: Box<dyn std::error::Error + Send + Sync>,
+}
+
+/// An error and what is behind it: the system's word stands last.
+fn chain(error: &(dyn std::error::Error + 'static)) -> String {
+    let causes = std::iter::successors(Some(error), |error| error.source());
+    let mut texts: Vec<String> = causes.map(ToString::to_string).collect();
+    texts.dedup();
+    texts.join(": ")
 }
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;

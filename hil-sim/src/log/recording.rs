@@ -51,7 +51,7 @@ fn with_truth(bytes: &[u8]) -> Option<Recording> {
             "/log" => {
                 let line = read::<Value>(data)?;
                 let text = line["message"].as_str().unwrap_or_default().to_owned();
-                recording.log.push(LogLine { t_s: message.log_time as f64 * 1e-9, text });
+                recording.log.push(LogLine { t_s: message.log_time as f64 / 1e9, text });
             }
             _ => {}
         }
@@ -182,7 +182,11 @@ mod tests {
         let read = recording(&path).unwrap();
         assert_eq!(read.summary, written.summary);
         assert_eq!(format!("{:?}", read.rows), format!("{:?}", written.rows));
-        assert_eq!(read.log, written.log);
+        assert_eq!(read.log.len(), written.log.len());
+        for (read, written) in read.log.iter().zip(&written.log) {
+            assert_eq!(read.text, written.text);
+            assert!((read.t_s - written.t_s).abs() < 1e-9);
+        }
         assert_eq!(read.parameters, written.parameters);
     }
 
