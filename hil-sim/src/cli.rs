@@ -15,6 +15,7 @@ mod deploy;
 mod docs;
 mod failure;
 mod keys;
+mod live;
 mod modes;
 mod montecarlo;
 mod output;
@@ -46,6 +47,7 @@ struct Cli {
 enum Verb {
     Deploy(deploy::Args),
     Capture(capture::Args),
+    Live(live::Args),
     Replay(replay::Args),
     Report(report::Args),
     Crossing(crossing::Args),
@@ -68,6 +70,7 @@ impl Verb {
         match self {
             Self::Deploy(args) => deploy::run(args),
             Self::Capture(args) => capture::run(args),
+            Self::Live(args) => live::run(args),
             Self::Replay(args) => replay::run(args),
             Self::Report(args) => report::run(args),
             Self::Crossing(args) => crossing::run(args),

@@ -54,10 +54,16 @@ impl View {
         true
     }
 
-    /// The state as a few lines.
+    /// The latest tick.
     #[must_use]
-    pub fn text(&self, tally: &Tally) -> String {
-        let mut text = format!(
+    pub const fn row(&self) -> Option<&Row> {
+        self.row.as_ref()
+    }
+
+    /// Rig, rates and losses as one line.
+    #[must_use]
+    pub fn rates_text(&self, tally: &Tally) -> String {
+        format!(
             "rig {}  {} ticks  {:.0} ticks/s  {:.1} kB/s  lost {} frames, {} ticks  starts anew {}",
             self.rig,
             tally.ticks,
@@ -66,7 +72,13 @@ impl View {
             tally.lost_frames,
             tally.lost_ticks,
             tally.restarts,
-        );
+        )
+    }
+
+    /// The state as a few lines.
+    #[must_use]
+    pub fn text(&self, tally: &Tally) -> String {
+        let mut text = self.rates_text(tally);
         if let Some(row) = &self.row {
             let mode = row.telemetry().map_or("?", |seen| mode_name(seen.mode));
             let stage = STAGE_NAMES.get(usize::from(row.stage).wrapping_sub(1)).unwrap_or(&"?");

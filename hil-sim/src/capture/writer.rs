@@ -4,22 +4,15 @@
 //! chunks, so that a file which is cut off there, by a full disk or a lost supply, is
 //! read up to its last second.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::io::{Seek, Write};
 
-use interstage::log::Entry;
 use mcap::WriteOptions;
 use mcap::records::{MessageHeader, Metadata};
-use serde_json::{Value, json};
 
-use crate::export::json;
+use super::message::messages;
+use crate::live::Topic;
 use crate::log::{Decoder, FRAMES, Header, Item, Mark, Row, Tally};
-use crate::sil;
-
-/// Levels of a log line, as viewers know them.
-const INFO: u8 = 2;
-const WARNING: u8 = 3;
-const ERROR: u8 = 4;
 
 /// Nanoseconds of a tick.
 const TICK_NS: u64 = 1_000_000;
@@ -165,9 +158,8 @@ struct Messages<M: Write + Seek> {
     out: mcap::Writer<M>,
     counts: BTreeMap<u16, u32>,
     frames: u16,
-    rows: Option<u16>,
-    ledger: u16,
-    lines: u16,
+    /// Channels of what is written beside the frames.
+    channels: HashMap<Topic, u16>,
     header: Option<Header>,
     /// Time of the latest message, ns; it never goes back.
     now: u64,
@@ -189,16 +181,18 @@ impl<M: Write + Seek> Messages<M> {
         }
         let none = BTreeMap::new();
         let frames = out.add_channel(0, FRAMES, "interstage-frames", &none)?;
-        let mut channel = |topic: &str, schema: &Value| -> Result<u16, Failure> {
-            let name = schema["title"].as_str().unwrap_or(topic);
-            let schema = out.add_schema(name, "jsonschema", &serde_json::to_vec(schema)?)?;
-            Ok(out.add_channel(schema, topic, "json", &none)?)
-        };
-        let rows = if decoded { Some(channel("/controller", &row_schema()?)?) } else { None };
-        let ledger = channel("/ledger", &ledger_schema())?;
-        let lines = channel("/log", &json::log_schema())?;
+        let mut channels = HashMap::new();
+        for topic in Topic::ALL {
+            if topic == Topic::Controller && !decoded {
+                continue;
+            }
+            let schema = topic.schema();
+            let name = schema["title"].as_str().unwrap_or(topic.name());
+            let schema = out.add_schema(name, "jsonschema", &serde_json::to_vec(&schema)?)?;
+            channels.insert(topic, out.add_channel(schema, topic.name(), "json", &none)?);
+        }
         let (counts, header) = (BTreeMap::new(), None);
-        Ok(Self { out, counts, frames, rows, ledger, lines, header, now: 0, start: 0 })
+        Ok(Self { out, counts, frames, channels, header, now: 0, start: 0 })
     }
 
     fn message(&mut self, channel_id: u16, body: &[u8]) -> Result<(), Failure> {
@@ -215,12 +209,10 @@ impl<M: Write + Seek> Messages<M> {
 
     fn item(&mut self, item: &Item) -> Result<(), Failure> {
         match item {
-            Item::Tick(record, sensors) => {
+            Item::Tick(record, _) => {
                 self.now = self.now.max(self.start + u64::from(record.at()) * TICK_NS);
-                if let Some(rows) = self.rows {
-                    self.message(rows, &json::bytes(&Row::of(record, sensors))?)?;
-                }
             }
+            Item::Mark(Mark::Restart) => self.start = self.now,
             Item::Identity(identity) => {
                 let header = Header::from(identity);
                 if self.header.as_ref() != Some(&header) {
@@ -228,38 +220,13 @@ impl<M: Write + Seek> Messages<M> {
                     self.header = Some(header);
                 }
             }
-            Item::Event(entry) => self.line(level(entry), &text(entry))?,
-            Item::Ledger(line) => {
-                let line = crate::log::LedgerLine::from(line);
-                self.message(self.ledger, &json::bytes(&line)?)?;
-            }
-            Item::Mark(mark) => {
-                if *mark == Mark::Restart {
-                    self.start = self.now;
-                }
-                self.line(WARNING, &mark.to_string())?;
-            }
-            Item::Plan(..) | Item::Request(..) | Item::Shots(_) => {}
+            _ => {}
         }
-        Ok(())
-    }
-
-    fn line(&mut self, level: u8, text: &str) -> Result<(), Failure> {
-        let body = serde_json::to_vec(&json::log_message(self.now, level, text))?;
-        self.message(self.lines, &body)
-    }
-}
-
-fn text(entry: &Entry) -> String {
-    sil::text(&entry.event)
-}
-
-fn level(entry: &Entry) -> u8 {
-    use interstage::log::Event;
-    match entry.event {
-        Event::Fault(_) => ERROR,
-        Event::Limit(_) | Event::Lost(_) | Event::Refused(_) => WARNING,
-        _ => INFO,
+        let Some((topic, body)) = messages(item) else { return Ok(()) };
+        match self.channels.get(&topic).copied() {
+            Some(channel) => self.message(channel, &body),
+            None => Ok(()),
+        }
     }
 }
 
@@ -271,26 +238,6 @@ fn of_header(header: &Header) -> Result<Metadata, Failure> {
     Ok(Metadata { name: "identity".to_owned(), metadata: pairs.collect() })
 }
 
-fn row_schema() -> Result<Value, Failure> {
-    let example = serde_json::to_value(Row {
-        wheel_code: Some(0),
-        wheel_at: Some(0),
-        load_cell_code: Some(0),
-        load_cell_at: Some(0),
-        tread_code: Some(0),
-        tread_at: Some(0),
-        arm_code: Some(0),
-        arm_at: Some(0),
-        ..Row::default()
-    })?;
-    Ok(json::schema("interstage.Controller", &example, &["tick", "t_s", "mode"]))
-}
-
-fn ledger_schema() -> Value {
-    let example = json!(crate::log::LedgerLine::default());
-    json::schema("interstage.Ledger", &example, &["index", "count"])
-}
-
 #[cfg(test)]
 mod tests {
     use std::io::{Cursor, Error, ErrorKind, SeekFrom};
@@ -299,6 +246,7 @@ mod tests {
     use super::*;
     use crate::log::Run;
     use crate::scenario::Scenario;
+    use crate::sil;
 
     /// A disk of so many bytes.
     #[derive(Clone)]
