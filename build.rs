@@ -10,6 +10,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let out = PathBuf::from(env::var("OUT_DIR")?);
         fs::copy("memory.x", out.join("memory.x"))?;
         println!("cargo::rustc-link-search={}", out.display());
+        println!("cargo::rustc-link-arg-bins=--build-id=sha1");
         if env::var("PROFILE")? == "debug" {
             // Without link-time optimisation the frames are about twice as deep.
             println!("cargo::rustc-link-arg-bins=--defsym=_stack_size=20K");

@@ -9,6 +9,7 @@ pub(crate) mod config;
 mod console;
 mod flash;
 pub(crate) mod guard;
+mod image;
 mod journal;
 pub(crate) mod light;
 mod line;

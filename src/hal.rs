@@ -2,7 +2,7 @@
 //! and failure. `src/board` implements it on the STM32G474, the tests with
 //! mocks, the virtual rig with its plant.
 
-use crate::log::Entry;
+use crate::log::{Entry, Identity};
 use crate::sense::raw::{AdcCode, AngleFrame, BusFault, EncoderCount};
 use crate::supervise::Command;
 
@@ -116,6 +116,18 @@ pub trait Journal {
     /// Writes one entry without blocking; what does not fit is dropped and
     /// counted by the transport.
     fn write(&mut self, entry: &Entry);
+
+    /// Takes a frame of the binary log, whole or not at all, without blocking; says
+    /// whether it did. A journal without a channel for them takes none.
+    fn send(&mut self, frame: &[u8]) -> bool {
+        let _ = frame;
+        false
+    }
+
+    /// Who speaks, for the head of the binary log.
+    fn identity(&self) -> Identity {
+        Identity::default()
+    }
 }
 
 /// What the board's light shows.

@@ -28,6 +28,7 @@ mod firmware {
     use panic_probe as _;
     use rtt_target::DownChannel;
 
+    use crate::board::rtt::Frames;
     use crate::board::{self, config, guard, light, rtt};
     use crate::board::{Analog, Angle, Bridge, Bridges, Button, Console, Guard, HostLine, Lamp};
     use crate::board::{Lines, Nucleo, Pages, Wheel};
@@ -62,18 +63,22 @@ mod firmware {
         defmt::info!("interstage {=str}", env!("CARGO_PKG_VERSION"));
         guard::report_restart();
         guard::arm();
-        let (parts, lamp, pages) = split(p, channels.console);
+        let (console, line) = (channels.console, channels.line);
+        let (mut parts, lamp, pages) = split(p, console, channels.telemetry);
         threads.spawn(light::show(lamp).unwrap());
         let (constants, service) = config::build(pages);
-        threads.spawn(link(HostLine::new(channels.line), service).unwrap());
+        threads.spawn(link(HostLine::new(line), service).unwrap());
         match constants {
-            Ok((controller, planner)) => start(threads, parts, controller, planner),
+            Ok((controller, planner, identity)) => {
+                parts.journal.introduce(identity);
+                start(threads, parts, controller, planner);
+            }
             Err(error) => threads.spawn(config::hold(parts, error).unwrap()),
         }
     }
 
     /// Who gets which peripheral and pin; the bridges come up off.
-    fn split(p: Peripherals, console: DownChannel) -> (Parts<Nucleo>, Pin, Pages) {
+    fn split(p: Peripherals, console: DownChannel, frames: Frames) -> (Parts<Nucleo>, Pin, Pages) {
         let parts = Parts {
             wheel: Wheel::new(p.TIM5, p.PA0, p.PA1),
             load_cell: Analog::new(p.ADC1, p.PC2, p.DMA1_CH1),
@@ -86,7 +91,7 @@ mod firmware {
             watchdog: Guard::new(p.IWDG),
             button: Button::new(p.PC13, p.EXTI13),
             console: Console::new(console),
-            journal: Lines::default(),
+            journal: Lines::new(frames),
             light: Lamp,
         };
         (parts, p.PA5.into(), Pages::new(p.FLASH))

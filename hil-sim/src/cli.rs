@@ -7,6 +7,7 @@
 
 mod account;
 mod bench;
+mod capture;
 mod compare;
 mod constants;
 mod crossing;
@@ -14,12 +15,15 @@ mod deploy;
 mod docs;
 mod failure;
 mod keys;
+mod live;
 mod modes;
 mod montecarlo;
 mod output;
 mod paper;
 mod params;
 mod parse;
+mod replay;
+mod report;
 mod scenario;
 mod size;
 mod stress;
@@ -43,6 +47,10 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Verb {
     Deploy(deploy::Args),
+    Capture(capture::Args),
+    Live(live::Args),
+    Replay(replay::Args),
+    Report(report::Args),
     Crossing(crossing::Args),
     Modes(modes::Args),
     Bench(bench::Args),
@@ -63,6 +71,10 @@ impl Verb {
     fn run(&self) -> Result<Outcome, Failure> {
         match self {
             Self::Deploy(args) => deploy::run(args),
+            Self::Capture(args) => capture::run(args),
+            Self::Live(args) => live::run(args),
+            Self::Replay(args) => replay::run(args),
+            Self::Report(args) => report::run(args),
             Self::Crossing(args) => crossing::run(args),
             Self::Modes(args) => modes::run(args),
             Self::Bench(args) => bench::run(args),

@@ -5,7 +5,7 @@
 //! end, so that a file of the final name is always whole.
 
 mod csv_log;
-mod json;
+pub(crate) mod json;
 mod mcap_log;
 mod whole;
 

@@ -4,12 +4,15 @@
 pub mod bench;
 #[cfg(feature = "board")]
 pub mod board;
+pub mod capture;
 pub mod cli;
 pub mod compare;
 pub mod constants;
 pub mod docs;
 pub mod export;
 pub mod firmware;
+pub mod live;
+pub mod log;
 pub mod montecarlo;
 pub mod paper;
 pub mod params;
@@ -18,6 +21,7 @@ pub mod progress;
 pub mod provision;
 pub mod record;
 pub mod reference;
+pub mod replay;
 pub mod report;
 pub mod scenario;
 pub mod sil;

@@ -1,10 +1,12 @@
 //! What a run leaves behind: one row a tick, one ledger line a crossing, and the
 //! summary. Sensed, estimated and true values stand side by side.
 
+use interstage::supervise::{Leg, Mode};
 use serde::{Deserialize, Serialize};
 
 /// One millisecond of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default = "Row::unknown")]
 pub struct Row {
     /// Time since boot, s.
     pub t_s: f64,
@@ -63,6 +65,43 @@ pub struct Row {
     pub preload_duty: f64,
 }
 
+impl Row {
+    /// A row of which nothing is known.
+    #[must_use]
+    pub const fn unknown() -> Self {
+        let unknown = f64::NAN;
+        Self {
+            t_s: unknown,
+            mode: 12,
+            stage: 1,
+            level: 0,
+            position_true_mm: unknown,
+            position_est_mm: unknown,
+            speed_true_mm_s: unknown,
+            speed_est_mm_s: unknown,
+            speed_ref_mm_s: unknown,
+            preload_true_n: unknown,
+            preload_meas_n: unknown,
+            preload_ref_n: unknown,
+            radius_true_mm: unknown,
+            radius_est_mm: unknown,
+            compression_true_mm: unknown,
+            compression_meas_mm: unknown,
+            root_clearance_mm: unknown,
+            gap_predicted_mm: unknown,
+            corner_force_n: unknown,
+            floor_force_n: unknown,
+            utilisation: unknown,
+            slip_margin_true: unknown,
+            slip_margin_est: unknown,
+            slip_mm: unknown,
+            vibration_um: unknown,
+            drive_duty: unknown,
+            preload_duty: unknown,
+        }
+    }
+}
+
 /// Names of the mode numbers in [`Row::mode`].
 pub const MODE_NAMES: [&str; 13] = [
     "boot",
@@ -79,6 +118,25 @@ pub const MODE_NAMES: [&str; 13] = [
     "fault hold",
     "off",
 ];
+
+/// Index into [`MODE_NAMES`].
+#[must_use]
+pub fn mode_number(mode: Mode) -> u8 {
+    match mode {
+        Mode::Boot => 0,
+        Mode::SelfTest => 1,
+        Mode::Zero => 2,
+        Mode::Idle => 3,
+        Mode::Preload(_) => 4,
+        Mode::Run(_, Leg::Cruise) => 5,
+        Mode::Run(_, Leg::Approach) => 6,
+        Mode::Run(_, Leg::Crossing) => 7,
+        Mode::Run(_, Leg::Settle) => 8,
+        Mode::Stopping(_) => 9,
+        Mode::Complete(_) => 10,
+        Mode::FaultHold(_) => 11,
+    }
+}
 
 /// Names of the contact stages, from number 1.
 pub const STAGE_NAMES: [&str; 6] =
@@ -195,4 +253,6 @@ pub struct Recording {
     pub log: Vec<LogLine>,
     /// Parameters used, as TOML.
     pub parameters: String,
+    /// The binary log as it lay on its channel; empty if it was not kept.
+    pub stream: Vec<u8>,
 }

@@ -3,6 +3,7 @@
 
 pub(crate) mod axis;
 mod band;
+mod compare;
 mod crossings;
 mod decimate;
 #[cfg(test)]
@@ -22,6 +23,7 @@ use std::path::Path;
 use crate::export::{ExportError, write_text};
 use crate::record::Recording;
 
+pub use compare::{Difference, compare_html, differences};
 pub use gaps::{Published, published_svg};
 pub use overview::overview_svg;
 

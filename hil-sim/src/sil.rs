@@ -3,6 +3,7 @@
 
 mod account;
 mod session;
+mod stream;
 mod trace;
 
 use std::time::Instant;
@@ -20,6 +21,7 @@ use crate::scenario::{ControllerKind, Direction, Scenario};
 
 pub use account::{PhaseAccount, PlantAccount, account, account_of};
 pub use session::{Session, drives, read};
+pub use stream::Stream;
 pub use trace::text;
 
 /// Control period, s.

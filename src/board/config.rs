@@ -3,12 +3,13 @@
 use embassy_time::Timer;
 use interstage::control::Controller;
 use interstage::hal::{Indicator, Light, MotorCommand, Motors, Parts};
+use interstage::log::{Identity, identity};
 use interstage::model::Planner;
 use interstage::params::service::{Service, in_force};
 use interstage::params::{Header, ParameterSet, SetError};
 use static_cell::StaticCell;
 
-use super::{Nucleo, Pages};
+use super::{Nucleo, Pages, image};
 
 /// The set that the image carries: the prototype, written by `cargo rig constants`.
 static PROTOTYPE: &[u8] = include_bytes!("../params/prototype.set");
@@ -16,8 +17,8 @@ static PROTOTYPE: &[u8] = include_bytes!("../params/prototype.set");
 static CONTROLLER: StaticCell<Controller> = StaticCell::new();
 static PLANNER: StaticCell<Planner> = StaticCell::new();
 
-/// What the tasks run on.
-pub(crate) type Constants = (&'static Controller, &'static Planner);
+/// What the tasks run on, and what the binary log begins with.
+pub(crate) type Constants = (&'static Controller, &'static Planner, Identity);
 
 /// Controller and planner of the set in force, in place for good, and the service that
 /// can replace it. Call once.
@@ -36,7 +37,19 @@ fn constants(set: &[u8]) -> Result<Constants, SetError> {
     let controller = CONTROLLER.init(controller);
     let planner = PLANNER.init(rest.planner()?);
     announce(set.header());
-    Ok((controller, planner))
+    Ok((controller, planner, identity(set.header(), controller)))
+}
+
+fn identity(header: &Header, controller: &Controller) -> Identity {
+    Identity {
+        schema: identity::SCHEMA,
+        version: identity::text(env!("CARGO_PKG_VERSION")),
+        build: image::id(),
+        rig: header.name.clone(),
+        parameters: header.parameters,
+        calibration: header.calibration,
+        corner: controller.corner_reach(),
+    }
 }
 
 /// Which parameters these are, for whoever reads the log.

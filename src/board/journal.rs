@@ -1,21 +1,42 @@
-//! Log entries as lines on the debug probe.
+//! Log entries as lines on the debug probe, and the binary log beside them.
 
 use defmt::{error, info, warn};
 use interstage::estimate::ContactStage;
 use interstage::hal::Journal;
-use interstage::log::{CrossingRecord, Entry, Event};
+use interstage::log::{CrossingRecord, Entry, Event, Identity};
 use interstage::supervise::{Command, Direction, Leg, Mode};
 use interstage::units::Q16;
 
-use super::rtt;
+use super::rtt::{self, Frames};
 
-/// Writes entries, and owns up to what was lost.
-#[derive(Default)]
+/// Writes entries, and owns up to what was lost; passes frames on.
 pub(crate) struct Lines {
+    frames: Frames,
+    identity: Identity,
     lost: u32,
 }
 
+impl Lines {
+    /// Lines on the log's channel, frames on their own.
+    pub(crate) fn new(frames: Frames) -> Self {
+        Self { frames, identity: Identity::default(), lost: 0 }
+    }
+
+    /// Says what the frames are to begin with; before the journal starts.
+    pub(crate) fn introduce(&mut self, identity: Identity) {
+        self.identity = identity;
+    }
+}
+
 impl Journal for Lines {
+    fn send(&mut self, frame: &[u8]) -> bool {
+        self.frames.send(frame)
+    }
+
+    fn identity(&self) -> Identity {
+        self.identity.clone()
+    }
+
     fn write(&mut self, entry: &Entry) {
         let lost = rtt::lost();
         if lost != self.lost {

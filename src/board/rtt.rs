@@ -20,9 +20,8 @@ static LOST: AtomicU32 = AtomicU32::new(0);
 
 /// The channels that are not the log.
 pub(crate) struct Channels {
-    /// Up 1: binary records.
-    #[expect(dead_code, reason = "named and sized for the host; no record is written yet")]
-    pub(crate) telemetry: UpChannel,
+    /// Up 1: frames of the binary log.
+    pub(crate) telemetry: Frames,
     /// Down 0: operator's letters.
     pub(crate) console: DownChannel,
     /// Up 2 and down 1: the binary line.
@@ -45,9 +44,21 @@ pub(crate) fn init() -> Channels {
     // SAFETY: in the critical section no frame is open, so nobody else holds the state.
     critical_section::with(|_| unsafe { (*STATE.0.get()).channel = Some(channels.up.0) });
     Channels {
-        telemetry: channels.up.1,
+        telemetry: Frames(channels.up.1),
         console: channels.down.0,
         line: (channels.up.2, channels.down.1),
+    }
+}
+
+/// The binary log's channel.
+pub(crate) struct Frames(UpChannel);
+
+impl Frames {
+    /// Writes a frame whole, or not at all; says which. What a probe may have set the
+    /// channel to does not matter.
+    pub(crate) fn send(&mut self, frame: &[u8]) -> bool {
+        self.0.set_mode(ChannelMode::NoBlockSkip);
+        self.0.write(frame) == frame.len()
     }
 }
 

@@ -134,6 +134,12 @@ impl Pass<'_> {
 }
 
 impl Controller {
+    /// Way of the wheel over a corner, mm.
+    #[must_use]
+    pub const fn corner_reach(&self) -> Millimetres {
+        self.corner_reach
+    }
+
     /// One tick: sensors, faults, command, mode, phase, schedule, loops.
     pub fn step(&self, state: &mut State, input: &Input) -> Output {
         let mut output = Output::default();

@@ -1,7 +1,7 @@
 //! The six contact stages of the study.
 
 /// Stage of the contact between wheel and sleeve, as the study numbers them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 #[repr(u8)]
 pub enum ContactStage {
@@ -18,4 +18,16 @@ pub enum ContactStage {
     Rolling = 5,
     /// 6: rolling on the continuous wall with viscoelastic friction.
     Continuous = 6,
+}
+
+impl ContactStage {
+    /// Every stage, in the study's order.
+    pub const ALL: [Self; 6] = [
+        Self::Initial,
+        Self::Preloaded,
+        Self::StaticFriction,
+        Self::Sliding,
+        Self::Rolling,
+        Self::Continuous,
+    ];
 }

@@ -5,7 +5,7 @@ use crate::supervise::{Command, Direction, Fault, Limit, Mode};
 use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Ratio, Seconds, Tick};
 
 /// One line of the log.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Entry {
     /// When.
     pub at: Tick,
@@ -14,7 +14,7 @@ pub struct Entry {
 }
 
 /// What can happen.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Event {
     /// The mode changed to this.
     Mode(Mode),
@@ -35,7 +35,7 @@ pub enum Event {
 }
 
 /// Ledger line of one crossing as the controller saw it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CrossingRecord {
     /// Step number, 1 at the outermost sleeve; 0 for a step that the table lacks.
     pub index: u8,

@@ -3,7 +3,7 @@
 use crate::estimate::ContactStage;
 use crate::hal::Duty;
 use crate::supervise::Mode;
-use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Ratio, Tick};
+use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Tick};
 
 /// All control-rate quantities of one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -43,4 +43,27 @@ pub struct Telemetry {
     pub drive: Duty,
     /// Pre-tightener duty.
     pub pretightener: Duty,
+}
+
+impl Telemetry {
+    /// The state before the first tick.
+    pub const EMPTY: Self = Self {
+        at: 0,
+        mode: Mode::Boot,
+        stage: ContactStage::Initial,
+        position: Q16::ZERO,
+        speed: Q16::ZERO,
+        speed_ref: Q16::ZERO,
+        preload: Q16::ZERO,
+        preload_ref: Q16::ZERO,
+        compression: Q16::ZERO,
+        radius: Q16::ZERO,
+        level: 0,
+        gap_predicted: Q16::ZERO,
+        slip_margin: Q16::ZERO,
+        vibration: Q16::ZERO,
+        distance: Q16::ZERO,
+        drive: Duty::ZERO,
+        pretightener: Duty::ZERO,
+    };
 }

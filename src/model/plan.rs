@@ -19,7 +19,7 @@ pub enum Strategy {
 }
 
 /// A closed crossing, for the model to compare with its prediction.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Review {
     /// Way of the crossing.
     pub direction: Direction,
@@ -37,7 +37,7 @@ pub struct Review {
 
 /// What the tick asks for: the schedule of the step ahead, and first the review of
 /// the step behind.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct PlanRequest {
     /// Numbers the requests, so that a late answer is told from a current one.
     pub sequence: u32,
@@ -52,7 +52,7 @@ pub struct PlanRequest {
 }
 
 /// What the model makes of a review.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Outcome {
     /// Gap that the model gives for the reviewed speed and preload, mm.
     pub gap_predicted: Millimetres,
@@ -65,7 +65,7 @@ pub struct Outcome {
 }
 
 /// Speed and preload for the way to the next step and over it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Plan {
     /// Sequence of the request answered.
     pub sequence: u32,

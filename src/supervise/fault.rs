@@ -2,7 +2,9 @@
 //! stable: a number is never given a second meaning.
 
 /// A latched fault: the drive holds until it is reset.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
+)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 #[repr(u16)]
 pub enum Fault {
@@ -106,7 +108,9 @@ impl Fault {
 }
 
 /// An active limit: reported, acted on, gone when its cause is gone.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
+)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 #[repr(u16)]
 pub enum Limit {

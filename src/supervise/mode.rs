@@ -3,7 +3,7 @@
 use super::Fault;
 
 /// An operator's command, from the board button or the log channel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub enum Command {
     /// Deploy from where the wheel stands.
@@ -17,7 +17,7 @@ pub enum Command {
 }
 
 /// Sense of axial motion.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub enum Direction {
     /// Outwards, onto the smaller radius: the wheel climbs the steps.
@@ -38,7 +38,7 @@ impl Direction {
 }
 
 /// Part of a run between two steps.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub enum Leg {
     /// On the continuous wall, no step inside the horizon.
@@ -52,7 +52,7 @@ pub enum Leg {
 }
 
 /// What the drive is doing.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub enum Mode {
     /// Waiting for every sensor's first reading.

@@ -1,10 +1,10 @@
 //! What the tasks hand to one another.
 
-use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
 use crate::control::{Input, Output};
 use crate::hal::Light;
-use crate::log::{Entry, Telemetry};
+use crate::log::{Entry, Tape, Telemetry};
 use crate::model::{Plan, PlanRequest};
 use crate::sense::freshness::age;
 use crate::sense::raw::{AdcCode, AngleFrame, EncoderCount, Sample, SensorFrame};
@@ -12,12 +12,11 @@ use crate::supervise::{Command, Mode};
 use crate::units::Tick;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
-use embassy_sync::signal::Signal;
 use embassy_sync::watch::Watch;
 
 /// Log entries that wait for the journal at most; beyond, new ones are dropped and
 /// counted.
-pub const ENTRIES: usize = 64;
+pub const ENTRIES: usize = 32;
 
 /// Commands that wait for the tick at most; beyond, their source waits.
 pub const COMMANDS: usize = 4;
@@ -73,14 +72,15 @@ pub struct Exchange {
     pub(super) load_cell: Slot<Sample<AdcCode>>,
     pub(super) tread: Slot<Sample<AdcCode>>,
     pub(super) arm: Slot<Sample<AngleFrame>>,
-    pub(super) request: Signal<CriticalSectionRawMutex, PlanRequest>,
-    pub(super) answer: Signal<CriticalSectionRawMutex, Plan>,
+    pub(super) request: Channel<CriticalSectionRawMutex, PlanRequest, 1>,
+    pub(super) answer: Channel<CriticalSectionRawMutex, Plan, 1>,
     pub(super) commands: Channel<CriticalSectionRawMutex, Command, COMMANDS>,
     pub(super) entries: Channel<CriticalSectionRawMutex, Entry, ENTRIES>,
-    telemetry: Slot<Telemetry>,
-    light: Slot<Light>,
-    /// Nothing is driven.
-    at_rest: AtomicBool,
+    pub(super) tape: Tape,
+    light: AtomicU8,
+    /// Something is driven. Like everything here it begins as zero, so that none of it
+    /// takes room in flash.
+    driven: AtomicBool,
     lost_entries: AtomicU32,
     bus_faults: [AtomicU32; 4],
     check_ins: [AtomicU32; Station::FIXED + OPERATORS],
@@ -96,13 +96,13 @@ impl Exchange {
             load_cell: Slot::new(),
             tread: Slot::new(),
             arm: Slot::new(),
-            request: Signal::new(),
-            answer: Signal::new(),
+            request: Channel::new(),
+            answer: Channel::new(),
             commands: Channel::new(),
             entries: Channel::new(),
-            telemetry: Slot::new(),
-            light: Slot::new(),
-            at_rest: AtomicBool::new(true),
+            tape: Tape::new(),
+            light: AtomicU8::new(Light::Off as u8),
+            driven: AtomicBool::new(false),
             lost_entries: AtomicU32::new(0),
             bus_faults: [const { AtomicU32::new(0) }; 4],
             check_ins: [const { AtomicU32::new(0) }; Station::FIXED + OPERATORS],
@@ -116,29 +116,30 @@ impl Exchange {
             now,
             sensors: self.sensors(),
             command: self.commands.try_receive().ok(),
-            plan: self.answer.try_take(),
+            plan: self.answer.try_receive().ok(),
             overrun,
             emergency_stop: false,
         }
     }
 
-    /// Passes on what a tick gave, except the motors' part.
-    pub fn publish(&self, output: &Output) {
+    /// Passes on what a tick gave, except the motors' part, and keeps the tick for the
+    /// log.
+    pub fn publish(&self, input: &Input, output: &Output) {
         if let Some(request) = output.request {
             self.request_plan(request);
         }
         for &entry in &output.events {
             self.log(entry);
         }
-        self.telemetry.sender().send(output.telemetry);
+        self.tape.keep(input, output);
         let mode = output.telemetry.mode;
-        self.at_rest.store(mode.is_at_rest(), Ordering::Relaxed);
+        self.driven.store(!mode.is_at_rest(), Ordering::Relaxed);
         self.show(light_of(mode));
     }
 
     /// Asks the model task for a plan; replaces a request not yet begun.
     pub fn request_plan(&self, request: PlanRequest) {
-        self.request.signal(request);
+        latest(&self.request, request);
     }
 
     /// Puts an entry in the log's queue, or counts it as lost.
@@ -150,7 +151,7 @@ impl Exchange {
 
     /// Sets what the light is to show.
     pub fn show(&self, light: Light) {
-        self.light.sender().send(light);
+        self.light.store(light as u8, Ordering::Relaxed);
     }
 
     /// The latest code of each sensor.
@@ -167,19 +168,23 @@ impl Exchange {
     /// The row of the latest tick; none before the first.
     #[must_use]
     pub fn telemetry(&self) -> Option<Telemetry> {
-        self.telemetry.anon_receiver().try_get()
+        self.tape.latest()
     }
 
     /// What the light is to show.
     #[must_use]
     pub fn light(&self) -> Light {
-        self.light.anon_receiver().try_get().unwrap_or_default()
+        match self.light.load(Ordering::Relaxed) {
+            light if light == Light::On as u8 => Light::On,
+            light if light == Light::Alarm as u8 => Light::Alarm,
+            _ => Light::Off,
+        }
     }
 
     /// Whether nothing is driven, as of the latest tick.
     #[must_use]
     pub fn at_rest(&self) -> bool {
-        self.at_rest.load(Ordering::Relaxed)
+        !self.driven.load(Ordering::Relaxed)
     }
 
     /// Log entries dropped since boot because the journal did not keep up.
@@ -232,6 +237,13 @@ impl Default for Exchange {
     fn default() -> Self {
         Self::new()
     }
+}
+
+/// Puts a value in a place for one, instead of the one that may be there. For one writer.
+pub(super) fn latest<T>(place: &Channel<CriticalSectionRawMutex, T, 1>, value: T) {
+    place.clear();
+    // Nobody else writes, so there is room.
+    let _ = place.try_send(value);
 }
 
 /// What the light shows in a mode.

@@ -3,10 +3,15 @@
 use super::exchange::{ENTRIES, Exchange, Station};
 use super::{ROUND, uptime};
 use crate::hal::{Indicator, Journal, Light};
-use crate::log::{Entry, Event};
+use crate::log::{Entry, Event, Scribe};
+use embassy_futures::select::{Either, select};
 use embassy_time::with_timeout;
 
-/// Writes log entries in their order and shows the light when it changes.
+/// Writes log entries in their order and every tick as a record of the binary log; shows
+/// the light when it changes.
+///
+/// All encoding is done here, below the control rate. It waits for the tick, which wakes
+/// it once a frame's worth of records is there.
 pub async fn journal(
     mut journal: impl Journal,
     mut light: impl Indicator,
@@ -14,6 +19,7 @@ pub async fn journal(
 ) -> ! {
     let mut shown = Light::default();
     let mut reported = 0;
+    let mut scribe = Scribe::new(journal.identity());
     light.show(shown);
     loop {
         exchange.check_in(Station::Journal, uptime());
@@ -21,20 +27,29 @@ pub async fn journal(
             shown = exchange.light();
             light.show(shown);
         }
-        if let Ok(entry) = with_timeout(ROUND, exchange.entries.receive()).await {
-            journal.write(&entry);
+        let news = select(exchange.entries.receive(), exchange.tape.ready());
+        if let Ok(Either::First(entry)) = with_timeout(ROUND, news).await {
+            write(&mut journal, &mut scribe, &entry);
             // At most a queue full before the next check-in.
             for _ in 1..ENTRIES {
                 let Ok(entry) = exchange.entries.try_receive() else { break };
-                journal.write(&entry);
+                write(&mut journal, &mut scribe, &entry);
             }
             let lost = exchange.lost_entries();
             if lost != reported {
                 // The newest are the ones dropped, so their count stands behind the rest.
                 let event = Event::Lost(lost.wrapping_sub(reported));
-                journal.write(&Entry { at: uptime(), event });
+                write(&mut journal, &mut scribe, &Entry { at: uptime(), event });
                 reported = lost;
             }
         }
+        scribe.read(&exchange.tape, &mut |frame| journal.send(frame));
     }
+}
+
+/// An entry as a line and as a frame; once in the image, however often it is called.
+#[inline(never)]
+fn write(journal: &mut impl Journal, scribe: &mut Scribe, entry: &Entry) {
+    journal.write(entry);
+    scribe.entry(entry, &mut |frame| journal.send(frame));
 }

@@ -1,6 +1,6 @@
 //! The planning task.
 
-use super::exchange::{Exchange, Station};
+use super::exchange::{Exchange, Station, latest};
 use super::{ROUND, uptime};
 use crate::model::Planner;
 use embassy_time::with_timeout;
@@ -10,8 +10,8 @@ use embassy_time::with_timeout;
 pub async fn model(planner: &Planner, exchange: &Exchange) -> ! {
     loop {
         exchange.check_in(Station::Model, uptime());
-        if let Ok(request) = with_timeout(ROUND, exchange.request.wait()).await {
-            exchange.answer.signal(planner.plan(&request));
+        if let Ok(request) = with_timeout(ROUND, exchange.request.receive()).await {
+            latest(&exchange.answer, planner.plan(&request));
         }
     }
 }

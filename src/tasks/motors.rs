@@ -31,7 +31,7 @@ pub async fn motors(
         if output.rearm {
             motors.rearm();
         }
-        exchange.publish(&output);
+        exchange.publish(&input, &output);
         if exchange.all_checked_in(due.tick) {
             watchdog.feed();
         }

@@ -57,6 +57,8 @@ pub struct Bench<'a> {
     /// The wheel's position in counts, beyond the 16 bits of a code.
     wheel: i64,
     millisecond: u64,
+    /// What has come on the binary log's channel; none if nobody listens.
+    frames: Option<Vec<u8>>,
 }
 
 impl<'a> Bench<'a> {
@@ -84,6 +86,7 @@ impl<'a> Bench<'a> {
             codes,
             wheel: 0,
             millisecond: 0,
+            frames: Some(Vec::new()),
         };
         bench.speak(codes);
         Ok(bench)
@@ -109,6 +112,9 @@ impl<'a> Bench<'a> {
         self.plant.step(&drives, STEP_S)?;
         let codes = self.sensors.read(sensed(&self.plant), STEP_S);
         self.speak(codes);
+        if let Some(frames) = &mut self.frames {
+            frames.extend(self.probe.up(&mut self.machine, 1)?);
+        }
         let bytes = self.probe.up(&mut self.machine, 0)?;
         Ok((passed, self.reader.read(&bytes)))
     }
@@ -151,6 +157,16 @@ impl<'a> Bench<'a> {
     /// [`BenchError`] if the engine fails.
     pub fn line_take(&mut self) -> Result<Vec<u8>, BenchError> {
         Ok(self.probe.up(&mut self.machine, 2)?)
+    }
+
+    /// What has come on the binary log's channel since the last call.
+    pub fn take_frames(&mut self) -> Vec<u8> {
+        self.frames.as_mut().map(std::mem::take).unwrap_or_default()
+    }
+
+    /// Whether the binary log's channel is read from now on; it is until told otherwise.
+    pub fn listen(&mut self, listen: bool) {
+        self.frames = listen.then(|| self.take_frames());
     }
 
     /// The board.

@@ -10,6 +10,7 @@ use super::load::{Gathered, Load};
 use super::log::{Line, Strings};
 use super::machine::Machine;
 use crate::firmware::{FirmwareError, Footprint};
+use crate::log;
 use crate::record::Recording;
 use crate::scenario::{ControllerKind, Direction, Scenario};
 
@@ -84,6 +85,7 @@ pub fn run(
     let started = Instant::now();
     let mut after = AFTER;
     let mut gathered = Gathered::default();
+    let mut stream = Vec::new();
     while bench.time_s() < LONGEST_S && after > 0 {
         if trace.is_idle()
             && let Some(letter) = start
@@ -98,12 +100,15 @@ pub fn run(
             watch(bench.time_s(), line);
         }
         gathered.gather(bench.machine_mut(), trace.mode());
+        stream.extend(bench.take_frames());
         trace.look(before, &passed, &lines, bench.plant().truth(), rows);
         if trace.is_over() {
             after -= 1;
         }
     }
-    let recording = trace.finish(scenario, bench.plant(), started.elapsed().as_secs_f64());
+    let mut recording = trace.finish(scenario, bench.plant(), started.elapsed().as_secs_f64());
+    log::complete(&mut recording, &log::Run::of_stream(&stream));
+    recording.stream = stream;
     let machine = bench.into_machine();
     let load = gathered.close(&machine, &footprint, stack_used(&machine)?);
     Ok(Ran { recording, load, machine })

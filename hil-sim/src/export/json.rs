@@ -20,7 +20,7 @@ pub fn write_summary(summary: &Summary, path: &Path) -> Result<(), ExportError> 
 }
 
 /// `message` as a JSON object without the fields that have no value.
-pub(super) fn object(message: &impl Serialize) -> serde_json::Result<Value> {
+pub(crate) fn object(message: &impl Serialize) -> serde_json::Result<Value> {
     let mut value = serde_json::to_value(message)?;
     if let Value::Object(fields) = &mut value {
         fields.retain(|_, field| !field.is_null());
@@ -28,9 +28,14 @@ pub(super) fn object(message: &impl Serialize) -> serde_json::Result<Value> {
     Ok(value)
 }
 
+/// The bytes of [`object`].
+pub(crate) fn bytes(message: &impl Serialize) -> serde_json::Result<Vec<u8>> {
+    serde_json::to_vec(&object(message)?)
+}
+
 /// A JSON schema named `title` of flat objects like `example`, in which every field
 /// has a value. Fields outside `required` may be left out of a message.
-pub(super) fn schema(title: &str, example: &Value, required: &[&str]) -> Value {
+pub(crate) fn schema(title: &str, example: &Value, required: &[&str]) -> Value {
     let properties: Map<String, Value> = example
         .as_object()
         .into_iter()
@@ -38,6 +43,35 @@ pub(super) fn schema(title: &str, example: &Value, required: &[&str]) -> Value {
         .map(|(name, value)| (name.clone(), json!({ "type": kind(value) })))
         .collect();
     json!({ "title": title, "type": "object", "properties": properties, "required": required })
+}
+
+/// The form of a log line that viewers show in their log panel.
+pub(crate) fn log_schema() -> Value {
+    let time = json!({
+        "type": "object",
+        "title": "time",
+        "properties": { "sec": { "type": "integer" }, "nsec": { "type": "integer" } },
+    });
+    json!({
+        "title": "foxglove.Log",
+        "type": "object",
+        "properties": {
+            "timestamp": time,
+            "level": { "type": "integer" },
+            "message": { "type": "string" },
+            "name": { "type": "string" },
+        },
+    })
+}
+
+/// A log line of this form, at `ns` nanoseconds.
+pub(crate) fn log_message(ns: u64, level: u8, text: &str) -> Value {
+    json!({
+        "timestamp": { "sec": ns / 1_000_000_000, "nsec": ns % 1_000_000_000 },
+        "level": level,
+        "message": text,
+        "name": "interstage",
+    })
 }
 
 fn kind(value: &Value) -> &'static str {

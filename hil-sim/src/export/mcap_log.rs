@@ -7,16 +7,17 @@ use std::path::Path;
 
 use mcap::WriteOptions;
 use mcap::records::{MessageHeader, Metadata};
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use super::whole::{self, Failure};
 use super::{ExportError, json};
+use crate::log::{self, FRAMES};
 use crate::record::{CrossingLine, LogLine, Recording, Row};
 
 /// Writes `recording` to `path`: a message a row on `/telemetry`, one a ledger line
 /// on `/crossing` at the time of lift-off, one a line on `/log`, one at the end on
-/// `/summary`, and the parameters, version and seed as metadata. Times count from
-/// boot.
+/// `/summary`, the controller's own log frame by frame on [`FRAMES`], and the parameters,
+/// version and seed as metadata. Times count from boot.
 ///
 /// # Errors
 /// [`ExportError::File`] with the reason.
@@ -38,6 +39,9 @@ fn fill<W: Write + Seek>(log: &mut Log<W>, recording: &Recording) -> Result<(), 
     }
     let telemetry = log.channel("/telemetry", &telemetry_schema()?)?;
     let mut events = events(log, recording)?;
+    let frames = log.out.add_channel(0, FRAMES, "interstage-frames", &BTreeMap::new())?;
+    let timed = log::timed(&recording.stream).rev();
+    events.extend(timed.map(|(t_s, frame)| Event { t_s, channel: frames, body: frame.to_vec() }));
     // The earliest stands last, to be popped first; the sort is stable, so that lines of
     // one time keep their order.
     events.sort_by(|a, b| b.t_s.total_cmp(&a.t_s));
@@ -45,7 +49,7 @@ fn fill<W: Write + Seek>(log: &mut Log<W>, recording: &Recording) -> Result<(), 
         while let Some(event) = events.pop_if(|event| event.t_s < row.t_s) {
             log.message(event.channel, event.t_s, &event.body)?;
         }
-        log.message(telemetry, row.t_s, &json::object(row)?)?;
+        log.message(telemetry, row.t_s, &json::bytes(row)?)?;
     }
     while let Some(event) = events.pop() {
         log.message(event.channel, event.t_s, &event.body)?;
@@ -53,26 +57,26 @@ fn fill<W: Write + Seek>(log: &mut Log<W>, recording: &Recording) -> Result<(), 
     let end_s = recording.rows.last().map_or(recording.summary.total_s, |row| row.t_s);
     let summary = json::object(&recording.summary)?;
     let channel = log.channel("/summary", &json::schema("interstage.Summary", &summary, &[]))?;
-    log.message(channel, end_s, &summary)
+    log.message(channel, end_s, &serde_json::to_vec(&summary)?)
 }
 
 /// A message between the rows.
 struct Event {
     t_s: f64,
     channel: u16,
-    body: Value,
+    body: Vec<u8>,
 }
 
 /// Crossings and log lines, each from the last to the first.
 fn events<W: Write + Seek>(log: &mut Log<W>, recording: &Recording) -> Result<Vec<Event>, Failure> {
     let crossing = log.channel("/crossing", &crossing_schema()?)?;
-    let lines = log.channel("/log", &log_schema())?;
+    let lines = log.channel("/log", &json::log_schema())?;
     let mut events = Vec::new();
     for line in recording.log.iter().rev() {
-        events.push(Event { t_s: line.t_s, channel: lines, body: log_message(line) });
+        events.push(Event { t_s: line.t_s, channel: lines, body: log_line(line)? });
     }
     for line in recording.summary.crossings.iter().rev() {
-        events.push(Event { t_s: line.lift_s, channel: crossing, body: json::object(line)? });
+        events.push(Event { t_s: line.lift_s, channel: crossing, body: json::bytes(line)? });
     }
     Ok(events)
 }
@@ -100,34 +104,9 @@ fn crossing_schema() -> Result<Value, Failure> {
     Ok(json::schema("interstage.Crossing", &example, &["index", "gap_mm", "touch_s", "lift_s"]))
 }
 
-/// The form of a log line that viewers show in their log panel.
-fn log_schema() -> Value {
-    let time = json!({
-        "type": "object",
-        "title": "time",
-        "properties": { "sec": { "type": "integer" }, "nsec": { "type": "integer" } },
-    });
-    json!({
-        "title": "foxglove.Log",
-        "type": "object",
-        "properties": {
-            "timestamp": time,
-            "level": { "type": "integer" },
-            "message": { "type": "string" },
-            "name": { "type": "string" },
-        },
-    })
-}
-
-fn log_message(line: &LogLine) -> Value {
+fn log_line(line: &LogLine) -> Result<Vec<u8>, Failure> {
     const INFO: u8 = 2;
-    let ns = nanoseconds(line.t_s);
-    json!({
-        "timestamp": { "sec": ns / 1_000_000_000, "nsec": ns % 1_000_000_000 },
-        "level": INFO,
-        "message": line.text,
-        "name": "interstage",
-    })
+    Ok(serde_json::to_vec(&json::log_message(nanoseconds(line.t_s), INFO, &line.text))?)
 }
 
 fn metadata(recording: &Recording) -> [Metadata; 2] {
@@ -171,13 +150,13 @@ impl<W: Write + Seek> Log<W> {
         Ok(self.out.add_channel(schema, topic, "json", &BTreeMap::new())?)
     }
 
-    fn message(&mut self, channel_id: u16, t_s: f64, body: &Value) -> Result<(), Failure> {
+    fn message(&mut self, channel_id: u16, t_s: f64, body: &[u8]) -> Result<(), Failure> {
         let sequence = self.counts.entry(channel_id).or_default();
         let log_time = nanoseconds(t_s);
         let header =
             MessageHeader { channel_id, sequence: *sequence, log_time, publish_time: log_time };
         *sequence += 1;
-        Ok(self.out.write_to_known_channel(&header, &serde_json::to_vec(body)?)?)
+        Ok(self.out.write_to_known_channel(&header, body)?)
     }
 }
 
@@ -202,6 +181,9 @@ mod tests {
             assert!(message.log_time >= last, "{} went back in time", message.channel.topic);
             last = message.log_time;
             *counts.entry(message.channel.topic.clone()).or_insert(0) += 1;
+            if message.channel.topic == FRAMES {
+                continue;
+            }
             assert_eq!(message.channel.schema.as_ref().unwrap().encoding, "jsonschema");
             let body: Value = serde_json::from_slice(&message.data).unwrap();
             if message.channel.topic == "/telemetry" {

@@ -50,7 +50,13 @@ pub(crate) fn deploy() -> Recording {
         crossings,
         ..Summary::default()
     };
-    Recording { summary, rows, log, parameters: Scenario::default().to_toml() }
+    Recording {
+        summary,
+        rows,
+        log,
+        parameters: Scenario::default().to_toml(),
+        ..Recording::default()
+    }
 }
 
 /// The same, ended by a fault between the first and the second step.

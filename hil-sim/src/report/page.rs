@@ -6,7 +6,7 @@ use super::verdict::{Grade, gap_sentence, headline};
 use super::{band, crossings, tables};
 use crate::record::Recording;
 
-const STYLE: &str = include_str!("style.css");
+pub(super) const STYLE: &str = include_str!("style.css");
 /// Size of a plot of the whole run, CSS pixels.
 const SIZE: (u32, u32) = (1100, 240);
 /// Size of the bands, CSS pixels.
@@ -65,7 +65,7 @@ before the corner touched.</p>\n",
     page
 }
 
-fn section(title: &str, body: &str) -> String {
+pub(super) fn section(title: &str, body: &str) -> String {
     format!("<section>\n<h2>{title}</h2>\n{body}</section>\n")
 }
 

@@ -7,7 +7,7 @@ use crate::record::{CrossingLine, LogLine, Report, Summary};
 const NONE: &str = "–";
 
 /// `value` with `decimals`; a dash if it is missing or no number.
-fn number(value: impl Into<Option<f64>>, decimals: usize) -> String {
+pub(super) fn number(value: impl Into<Option<f64>>, decimals: usize) -> String {
     let value = value.into().filter(|value| value.is_finite());
     value.map_or(NONE.to_owned(), |value| format!("{value:.decimals$}"))
 }

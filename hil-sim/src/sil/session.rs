@@ -8,6 +8,7 @@ use interstage::sense::raw::{Sample, SensorFrame};
 use interstage::supervise::{Command, Direction, Mode};
 use interstage::units::Tick;
 
+use super::stream::Stream;
 use super::trace::Trace;
 use super::{Options, RunError, TICK_S};
 use crate::plant::draw::PlantParameters;
@@ -35,6 +36,7 @@ pub struct Session {
     tick: Tick,
     plan: Option<Plan>,
     trace: Trace,
+    stream: Option<Stream>,
 }
 
 impl Session {
@@ -60,8 +62,10 @@ impl Session {
         };
         let sensors = Sensors::new(parameters.sensors.clone(), scenario.run.seed);
         let plant = VirtualRig::new(parameters, position, preload, TICK_S);
+        let controller = Controller::try_build(&scenario.rig)?;
         Ok(Self {
-            controller: Controller::try_build(&scenario.rig)?,
+            stream: options.rows.then(|| Stream::new(scenario, &controller)),
+            controller,
             trace: Trace::new(planner.gap_ref(direction).to_num(), position),
             planner,
             state: State::default(),
@@ -135,6 +139,9 @@ impl Session {
             // The model task runs between the ticks.
             self.plan = Some(self.planner.plan(&request));
         }
+        if let Some(stream) = &mut self.stream {
+            stream.keep(&input, &output);
+        }
         self.trace.look(&output, self.plant.truth(), self.options.rows);
         self.plant.step(&drives(output.drive, output.preload), TICK_S)?;
         self.tick += 1;
@@ -145,6 +152,9 @@ impl Session {
     pub fn reboot(&mut self) {
         self.state = State::default();
         self.plan = None;
+        if let Some(stream) = &mut self.stream {
+            stream.restart(&self.scenario, &self.controller);
+        }
     }
 
     /// What the drive is doing.
@@ -165,6 +175,11 @@ impl Session {
         &self.plant
     }
 
+    /// The binary log since the last call; empty if it is not kept.
+    pub fn take_stream(&mut self) -> Vec<u8> {
+        self.stream.as_mut().map(Stream::take).unwrap_or_default()
+    }
+
     /// What is left behind if the session ends here; it took `wall_s` to compute.
     #[must_use]
     pub fn finish(self, wall_s: f64) -> Recording {
@@ -172,7 +187,9 @@ impl Session {
             Mode::Complete(way) => Some(way),
             _ => None,
         };
-        self.trace.finish(&self.scenario, &self.plant, arrived, wall_s)
+        let mut recording = self.trace.finish(&self.scenario, &self.plant, arrived, wall_s);
+        recording.stream = self.stream.map(Stream::finish).unwrap_or_default();
+        recording
     }
 }
 

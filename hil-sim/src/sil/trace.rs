@@ -2,14 +2,14 @@
 
 use interstage::control::Output;
 use interstage::log::{CrossingRecord, Event, Telemetry};
-use interstage::supervise::{Direction, Leg, Mode};
+use interstage::supervise::Direction;
 use interstage::units::Q16;
 use sha2::{Digest, Sha256};
 
 use super::{Reported, Rows, TICK_S, report};
 use crate::plant::ledger::Crossing;
 use crate::plant::rig::{Truth, VirtualRig};
-use crate::record::{CrossingLine, LogLine, Recording, Report, Row, Summary};
+use crate::record::{CrossingLine, LogLine, Recording, Report, Row, Summary, mode_number};
 use crate::scenario::Scenario;
 
 /// Short of the wanted preload by no more than this part of it, it stands: what the
@@ -139,7 +139,13 @@ impl Trace {
             trace_digest: self.digest.finalize().iter().map(|b| format!("{b:02x}")).collect(),
             crossings,
         };
-        Recording { summary, rows: self.rows, log: self.log, parameters: scenario.to_toml() }
+        Recording {
+            summary,
+            rows: self.rows,
+            log: self.log,
+            parameters: scenario.to_toml(),
+            stream: Vec::new(),
+        }
     }
 
     /// Ledger line: the plant's truth with what the controller reported of the same
@@ -211,24 +217,6 @@ fn digest(digest: &mut Sha256, seen: &Telemetry) {
     digest.update([mode_number(seen.mode), seen.stage as u8, seen.level]);
     digest.update(seen.drive.to_bits().to_le_bytes());
     digest.update(seen.pretightener.to_bits().to_le_bytes());
-}
-
-/// Index into [`crate::record::MODE_NAMES`].
-fn mode_number(mode: Mode) -> u8 {
-    match mode {
-        Mode::Boot => 0,
-        Mode::SelfTest => 1,
-        Mode::Zero => 2,
-        Mode::Idle => 3,
-        Mode::Preload(_) => 4,
-        Mode::Run(_, Leg::Cruise) => 5,
-        Mode::Run(_, Leg::Approach) => 6,
-        Mode::Run(_, Leg::Crossing) => 7,
-        Mode::Run(_, Leg::Settle) => 8,
-        Mode::Stopping(_) => 9,
-        Mode::Complete(_) => 10,
-        Mode::FaultHold(_) => 11,
-    }
 }
 
 fn row(t_s: f64, seen: &Telemetry, truth: &Truth) -> Row {

@@ -3,6 +3,7 @@
 mod crossing;
 mod deploy;
 mod input;
+mod logs;
 mod montecarlo;
 mod others;
 

@@ -241,7 +241,13 @@ impl Trace {
             trace_digest: self.digest.finalize().iter().map(|b| format!("{b:02x}")).collect(),
             crossings,
         };
-        Recording { summary, rows: self.rows, log: self.log, parameters: scenario.to_toml() }
+        Recording {
+            summary,
+            rows: self.rows,
+            log: self.log,
+            parameters: scenario.to_toml(),
+            stream: Vec::new(),
+        }
     }
 
     /// Ledger line: the plant's truth with what the firmware logged of the same step.

@@ -1,0 +1,16 @@
+//! A log as it comes: decoded, written to files that stay readable whatever happens, and
+//! shown while it grows.
+
+mod message;
+pub(crate) mod schemas;
+mod source;
+mod view;
+mod writer;
+
+pub(crate) use message::messages;
+#[cfg(feature = "board")]
+pub use source::Emulated;
+pub use source::{Bytes, Source, SourceError, Virtual, letter};
+pub use view::View;
+pub(crate) use view::mode_name;
+pub use writer::{WriteError, Writer};

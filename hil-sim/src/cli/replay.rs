@@ -1,0 +1,104 @@
+//! `rig replay`: recorded logs through the controller again, bit by bit.
+
+use std::path::{Path, PathBuf};
+
+use interstage::log::identity::fingerprint;
+use interstage::rig::Rig;
+use serde::Serialize;
+
+use super::failure::{Failure, Outcome};
+use super::output;
+use crate::log::{Mark, Run};
+use crate::replay::{Replayed, replay};
+use crate::scenario::Scenario;
+
+/// Runs recorded logs through the controller again; it must give the same bits.
+///
+/// The parameters are those that the log has with it, or the preset that it names. The
+/// exit code is 1 at the first difference, which is shown, or if a part of a log could
+/// not be run again because something before it is missing.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// Logs: MCAP, CSV of rows, or bytes of the channel.
+    #[arg(required = true, value_name = "LOG")]
+    logs: Vec<PathBuf>,
+
+    /// Overrides a parameter, any number of times; for logs that do not have theirs with
+    /// them.
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+
+    /// Prints the results as one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Printed {
+    equal: bool,
+    logs: Vec<Log>,
+}
+
+#[derive(Serialize)]
+struct Log {
+    file: PathBuf,
+    equal: bool,
+    #[serde(flatten)]
+    result: Replayed,
+}
+
+pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
+    let mut logs = Vec::new();
+    for file in &args.logs {
+        let run = Run::read(file).map_err(Failure::input)?;
+        let rig = parameters(file, &run, &args.set)?;
+        let result = replay(&run, &rig)?;
+        logs.push(Log { file: file.clone(), equal: result.is_equal(), result });
+    }
+    let printed = Printed { equal: logs.iter().all(|log| log.equal), logs };
+    output::result(args.json, &printed, || printed.logs.iter().map(human).collect())?;
+    Ok(Outcome::of(printed.equal))
+}
+
+/// The parameters of the controller that made a log.
+fn parameters(file: &Path, run: &Run, sets: &[String]) -> Result<Rig, Failure> {
+    let header = run.header.as_ref();
+    let rig = match (&run.parameters, header) {
+        (Some(toml), _) => Scenario::parse("parameters of the log", toml, sets)?.rig,
+        (None, header) => {
+            let name = header.map_or("prototype", |header| header.rig.as_str());
+            Scenario::resolve(Some(name), None, sets)?.rig
+        }
+    };
+    let made = header.map(|header| header.parameters.clone());
+    let here = format!("{:08x}", fingerprint(&rig));
+    match made {
+        Some(made) if made != here => Err(Failure::input(format!(
+            "{}: made with parameters {made}, these are {here}: give the others with --set",
+            file.display()
+        ))),
+        _ => Ok(rig),
+    }
+}
+
+fn human(log: &Log) -> String {
+    let (file, result) = (log.file.display(), &log.result);
+    let mut text = match &result.difference {
+        Some(difference) => format!("{file}: differs at {difference}\n"),
+        None if log.equal => {
+            format!("{file}: {} ticks and {} entries, equal\n", result.ticks, result.events)
+        }
+        None => format!("{file}: {} ticks equal\n", result.ticks),
+    };
+    if let Some((tick, mark)) = result.missing {
+        let why = match mark {
+            Mark::Joined { .. } => "it does not begin with the target's start",
+            _ => "the controller's state is not known behind a gap",
+        };
+        text += &format!("  {} ticks from {tick} on not run again: {why} ({mark})\n", result.blind);
+    } else if result.blind > 0 {
+        text += &format!("  {} ticks not run again: the log begins under way\n", result.blind);
+    }
+    text
+}

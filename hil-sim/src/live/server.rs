@@ -1,0 +1,350 @@
+//! The log over a WebSocket in the Foxglove protocol, which Foxglove, Lichtblick and
+//! PlotJuggler read.
+//!
+//! Source: Foxglove, WebSocket protocol, version 1 (`ws-protocol`, `docs/spec.md`):
+//! a `serverInfo` and an `advertise` object as text once a client has come; from then on
+//! a binary message for each subscription: 1, its number, the time in nanoseconds, the
+//! body.
+
+use std::collections::HashMap;
+use std::io::{self, ErrorKind};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+use std::time::Duration;
+
+use serde_json::{Value, json};
+use tungstenite::handshake::server::{ErrorResponse, Request, Response};
+use tungstenite::http::{HeaderValue, StatusCode, header::SEC_WEBSOCKET_PROTOCOL};
+use tungstenite::{Message, WebSocket};
+
+use crate::capture::schemas;
+use crate::export::json;
+
+/// Names of the protocol that clients ask for.
+const PROTOCOLS: [&str; 2] = ["foxglove.websocket.v1", "foxglove.sdk.v1"];
+/// Messages that wait for a client at most; beyond, the newest are dropped.
+const WAITING: usize = 4096;
+/// How long a client is listened to before it is sent to again.
+const LISTEN: Duration = Duration::from_millis(5);
+/// First byte of a message of data.
+const DATA: u8 = 1;
+
+/// What a message is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Topic {
+    /// A [`crate::log::Row`].
+    Controller,
+    /// A line of the log.
+    Log,
+    /// A [`crate::log::LedgerLine`].
+    Ledger,
+}
+
+impl Topic {
+    /// Every topic.
+    pub const ALL: [Self; 3] = [Self::Controller, Self::Log, Self::Ledger];
+
+    /// Its number on the wire.
+    const fn channel(self) -> u32 {
+        match self {
+            Self::Controller => 1,
+            Self::Log => 2,
+            Self::Ledger => 3,
+        }
+    }
+
+    /// Its name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Controller => "/controller",
+            Self::Log => "/log",
+            Self::Ledger => "/ledger",
+        }
+    }
+
+    /// Schema of its messages.
+    pub(crate) fn schema(self) -> Value {
+        match self {
+            Self::Controller => schemas::rows(),
+            Self::Log => json::log_schema(),
+            Self::Ledger => schemas::ledger(),
+        }
+    }
+
+    fn advertised(self) -> Value {
+        let schema = self.schema();
+        json!({
+            "id": self.channel(),
+            "topic": self.name(),
+            "encoding": "json",
+            "schemaName": schema["title"],
+            "schema": schema.to_string(),
+            "schemaEncoding": "jsonschema",
+        })
+    }
+}
+
+/// A message on its way to the clients.
+struct Published {
+    topic: Topic,
+    time_ns: u64,
+    body: Vec<u8>,
+}
+
+/// A server that publishes to whoever comes.
+pub struct Server {
+    address: SocketAddr,
+    clients: Arc<Mutex<Vec<SyncSender<Arc<Published>>>>>,
+}
+
+impl Server {
+    /// Listens at `address`.
+    ///
+    /// # Errors
+    /// If the address cannot be had.
+    pub fn bind(address: &str) -> io::Result<Self> {
+        let listener = TcpListener::bind(address)?;
+        let address = listener.local_addr()?;
+        let clients = Arc::new(Mutex::new(Vec::new()));
+        let shared = Arc::clone(&clients);
+        thread::spawn(move || {
+            for stream in listener.incoming().map_while(Result::ok) {
+                let (sender, receiver) = sync_channel(WAITING);
+                lock(&shared).push(sender);
+                thread::spawn(move || serve(stream, &receiver));
+            }
+        });
+        Ok(Self { address, clients })
+    }
+
+    /// Where it listens.
+    #[must_use]
+    pub const fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Clients that have come and not gone.
+    #[must_use]
+    pub fn clients(&self) -> usize {
+        lock(&self.clients).len()
+    }
+
+    /// Sends a message to every client that has subscribed to its topic. One that does
+    /// not keep up loses messages; it holds up nobody.
+    pub fn publish(&self, topic: Topic, time_ns: u64, body: Vec<u8>) {
+        let message = Arc::new(Published { topic, time_ns, body });
+        lock(&self.clients).retain(|client| {
+            !matches!(client.try_send(Arc::clone(&message)), Err(TrySendError::Disconnected(_)))
+        });
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Serves a client until it goes.
+fn serve(stream: TcpStream, messages: &Receiver<Arc<Published>>) {
+    let Ok(mut socket) = tungstenite::accept_hdr(stream, agree) else { return };
+    // A client that goes ends in an error of whatever was under way.
+    let _ = greet(&mut socket).and_then(|()| talk(&mut socket, messages));
+}
+
+/// Takes the first of the protocol's names that the client offers.
+#[expect(clippy::result_large_err, reason = "the type of the callback is the library's")]
+fn agree(request: &Request, mut response: Response) -> Result<Response, ErrorResponse> {
+    let offered = request.headers().get_all(SEC_WEBSOCKET_PROTOCOL).iter();
+    let offered: Vec<&str> = offered
+        .filter_map(|value| value.to_str().ok())
+        .flat_map(|value| value.split(','))
+        .map(str::trim)
+        .collect();
+    let Some(name) = PROTOCOLS.into_iter().find(|name| offered.contains(name)) else {
+        let mut refused = ErrorResponse::new(Some(format!("expected {}", PROTOCOLS.join(" or "))));
+        *refused.status_mut() = StatusCode::BAD_REQUEST;
+        return Err(refused);
+    };
+    response.headers_mut().insert(SEC_WEBSOCKET_PROTOCOL, HeaderValue::from_static(name));
+    Ok(response)
+}
+
+fn greet(socket: &mut WebSocket<TcpStream>) -> tungstenite::Result<()> {
+    let info = json!({
+        "op": "serverInfo",
+        "name": concat!("interstage ", env!("CARGO_PKG_VERSION")),
+        "capabilities": [],
+    });
+    let channels = Topic::ALL.map(Topic::advertised);
+    let advertise = json!({ "op": "advertise", "channels": channels });
+    socket.send(Message::text(info.to_string()))?;
+    socket.send(Message::text(advertise.to_string()))
+}
+
+fn talk(
+    socket: &mut WebSocket<TcpStream>,
+    messages: &Receiver<Arc<Published>>,
+) -> tungstenite::Result<()> {
+    socket.get_ref().set_read_timeout(Some(LISTEN))?;
+    // Subscription numbers by channel.
+    let mut subscribed: HashMap<u32, Vec<u32>> = HashMap::new();
+    loop {
+        match socket.read() {
+            Ok(Message::Text(text)) => listen(&text, &mut subscribed),
+            Ok(Message::Close(_)) => return Ok(()),
+            Ok(_) => {}
+            Err(tungstenite::Error::Io(error))
+                if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
+            Err(error) => return Err(error),
+        }
+        for message in messages.try_iter() {
+            for number in subscribed.get(&message.topic.channel()).into_iter().flatten() {
+                socket.write(Message::binary(data(*number, &message)))?;
+            }
+        }
+        socket.flush()?;
+    }
+}
+
+/// Takes a client's wish in; what is none is passed over.
+fn listen(text: &str, subscribed: &mut HashMap<u32, Vec<u32>>) {
+    let Ok(wish) = serde_json::from_str::<Value>(text) else { return };
+    let number = |value: &Value| value.as_u64().and_then(|number| u32::try_from(number).ok());
+    match wish["op"].as_str() {
+        Some("subscribe") => {
+            for one in wish["subscriptions"].as_array().into_iter().flatten() {
+                if let (Some(id), Some(channel)) = (number(&one["id"]), number(&one["channelId"])) {
+                    subscribed.entry(channel).or_default().push(id);
+                }
+            }
+        }
+        Some("unsubscribe") => {
+            let gone: Vec<u32> = wish["subscriptionIds"]
+                .as_array()
+                .into_iter()
+                .flatten()
+                .filter_map(number)
+                .collect();
+            for ids in subscribed.values_mut() {
+                ids.retain(|id| !gone.contains(id));
+            }
+        }
+        _ => {}
+    }
+}
+
+fn data(subscription: u32, message: &Published) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(13 + message.body.len());
+    bytes.push(DATA);
+    bytes.extend(subscription.to_le_bytes());
+    bytes.extend(message.time_ns.to_le_bytes());
+    bytes.extend(&message.body);
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use tungstenite::client::IntoClientRequest;
+
+    use super::*;
+
+    type Client = WebSocket<TcpStream>;
+
+    fn connect(server: &Server, protocol: &str) -> Result<Client, Box<tungstenite::Error>> {
+        let stream = TcpStream::connect(server.address()).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
+        let mut request = format!("ws://{}/", server.address()).into_client_request().unwrap();
+        let value = HeaderValue::from_str(protocol).unwrap();
+        request.headers_mut().insert(SEC_WEBSOCKET_PROTOCOL, value);
+        match tungstenite::client(request, stream) {
+            Ok((client, response)) => {
+                let agreed = response.headers().get(SEC_WEBSOCKET_PROTOCOL).unwrap();
+                assert!(protocol.contains(agreed.to_str().unwrap()));
+                Ok(client)
+            }
+            Err(tungstenite::HandshakeError::Failure(error)) => Err(Box::new(error)),
+            Err(tungstenite::HandshakeError::Interrupted(_)) => panic!("interrupted"),
+        }
+    }
+
+    fn text(client: &mut Client) -> Value {
+        let message = client.read().unwrap();
+        serde_json::from_str(message.to_text().unwrap()).unwrap()
+    }
+
+    #[test]
+    fn a_client_is_told_the_channels_and_gets_what_it_subscribes_to() {
+        let server = Server::bind("127.0.0.1:0").unwrap();
+        let mut client = connect(&server, "other, foxglove.websocket.v1").unwrap();
+        assert_eq!(text(&mut client)["op"], "serverInfo");
+        let advertised = text(&mut client);
+        let channels = advertised["channels"].as_array().unwrap();
+        assert_eq!(channels.len(), 3);
+        for channel in channels {
+            let schema: Value = serde_json::from_str(channel["schema"].as_str().unwrap()).unwrap();
+            assert_eq!(schema["type"], "object");
+            assert_eq!(channel["encoding"], "json");
+        }
+        let id = &channels.iter().find(|c| c["topic"] == "/ledger").unwrap()["id"];
+        let wish = json!({
+            "op": "subscribe",
+            "subscriptions": [{ "id": 77, "channelId": id }],
+        });
+        client.send(Message::text(wish.to_string())).unwrap();
+        // Until the wish has been heard the messages go to nobody.
+        let server = Arc::new(server);
+        let publisher = Arc::clone(&server);
+        let (stop, stopped) = sync_channel::<()>(1);
+        let feeding = thread::spawn(move || {
+            while stopped.try_recv().is_err() {
+                publisher.publish(Topic::Controller, 1, b"{}".to_vec());
+                publisher.publish(Topic::Ledger, 123_456_789, b"{\"index\":2}".to_vec());
+                thread::sleep(Duration::from_millis(2));
+            }
+        });
+        let message = client.read().unwrap().into_data();
+        stop.send(()).unwrap();
+        feeding.join().unwrap();
+        assert_eq!(message[0], 1);
+        assert_eq!(message[1..5], 77_u32.to_le_bytes());
+        assert_eq!(message[5..13], 123_456_789_u64.to_le_bytes());
+        assert_eq!(&message[13..], b"{\"index\":2}");
+    }
+
+    #[test]
+    fn a_client_of_another_protocol_is_refused() {
+        let server = Server::bind("127.0.0.1:0").unwrap();
+        assert!(connect(&server, "chat").is_err());
+    }
+
+    #[test]
+    fn wishes_are_taken_back_and_nonsense_is_passed_over() {
+        let mut subscribed = HashMap::new();
+        for text in [
+            "nonsense",
+            "{\"op\":\"subscribe\"}",
+            "{\"op\":\"subscribe\",\"subscriptions\":[{\"id\":1,\"channelId\":1},{\"id\":-1}]}",
+            "{\"op\":\"subscribe\",\"subscriptions\":[{\"id\":2,\"channelId\":1}]}",
+            "{\"op\":\"unsubscribe\",\"subscriptionIds\":[1]}",
+        ] {
+            listen(text, &mut subscribed);
+        }
+        assert_eq!(subscribed, HashMap::from([(1, vec![2])]));
+    }
+
+    #[test]
+    fn a_client_that_goes_is_forgotten() {
+        let server = Server::bind("127.0.0.1:0").unwrap();
+        let client = connect(&server, PROTOCOLS[1]).unwrap();
+        assert_eq!(server.clients(), 1);
+        drop(client);
+        let gone = (0..500).any(|_| {
+            server.publish(Topic::Log, 0, Vec::new());
+            thread::sleep(Duration::from_millis(10));
+            server.clients() == 0
+        });
+        assert!(gone);
+    }
+}

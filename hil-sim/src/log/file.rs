@@ -1,0 +1,169 @@
+//! Logs as files: MCAP, CSV, or the bare bytes of the channel.
+
+use std::path::{Path, PathBuf};
+
+use super::decoder::{Decoder, Item};
+use super::row::Row;
+use super::run::Run;
+use mcap::read::Options;
+
+/// Topic of the MCAP file that carries the frames as they lay on the channel.
+pub const FRAMES: &str = "/frames";
+
+/// First bytes of an MCAP file.
+pub(super) const MCAP: &[u8] = b"\x89MCAP";
+/// First bytes of a CSV file of rows.
+const CSV: &[u8] = b"tick,";
+
+/// A log that cannot be read; displays as one line with its path.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadError {
+    /// The file cannot be read.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// It is no log.
+    #[error("{}: no log of the controller: {why}", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
+}
+
+/// The frames of a stream, each with its zero and the time at which it was written, s:
+/// that of the newest tick up to it. What follows the last zero is no frame.
+pub fn timed(stream: &[u8]) -> impl DoubleEndedIterator<Item = (f64, &[u8])> {
+    let (mut decoder, mut now, mut frames) = (Decoder::new(), 0.0, Vec::new());
+    for frame in stream.split_inclusive(|byte| *byte == 0).filter(|frame| frame.ends_with(&[0])) {
+        decoder.read(frame, &mut |item| {
+            if let Item::Tick(record, _) = item {
+                now = f64::from(record.at()) * 1e-3;
+            }
+        });
+        frames.push((now, frame));
+    }
+    frames.into_iter()
+}
+
+impl Run {
+    /// Reads a log of any form: MCAP with the controller's frames, CSV of rows, or the
+    /// bytes of the channel. What was cut off is missing and everything before it is
+    /// there.
+    ///
+    /// # Errors
+    /// [`ReadError`] if the file cannot be read or holds no tick.
+    pub fn read(path: &Path) -> Result<Self, ReadError> {
+        let bytes = std::fs::read(path)
+            .map_err(|source| ReadError::File { path: path.to_owned(), source })?;
+        let content = |why: String| ReadError::Content { path: path.to_owned(), why };
+        let run = if bytes.starts_with(MCAP) {
+            of_mcap(&bytes).map_err(|error| content(error.to_string()))?
+        } else if bytes.starts_with(CSV) {
+            of_csv(&bytes).map_err(|error| content(error.to_string()))?
+        } else {
+            Self::of_stream(&bytes)
+        };
+        if run.rows.is_empty() {
+            return Err(content("it holds no tick".to_owned()));
+        }
+        Ok(run)
+    }
+}
+
+/// Reads messages up to the end, or to where the file was cut off.
+fn of_mcap(bytes: &[u8]) -> mcap::McapResult<Run> {
+    let (mut decoder, mut run) = (Decoder::new(), Run::default());
+    for message in mcap::MessageStream::new_with_options(bytes, Options::IgnoreEndMagic.into())? {
+        // A file without its end is read as far as it goes.
+        let Ok(message) = message else { break };
+        if message.channel.topic == FRAMES {
+            decoder.read(&message.data, &mut |item| run.add(&item));
+        }
+    }
+    decoder.finish(&mut |item| run.add(&item));
+    run.tally = *decoder.tally();
+    run.parameters = parameters(bytes);
+    Ok(run)
+}
+
+/// The parameters that stand beside the messages.
+pub(super) fn parameters(bytes: &[u8]) -> Option<String> {
+    let records =
+        mcap::read::LinearReader::new_with_options(bytes, Options::IgnoreEndMagic.into()).ok()?;
+    records.map_while(Result::ok).find_map(|record| match record {
+        mcap::records::Record::Metadata(metadata) if metadata.name == "parameters" => {
+            metadata.metadata.get("toml").cloned()
+        }
+        _ => None,
+    })
+}
+
+/// Reads rows; a last one that was cut off is left out.
+fn of_csv(bytes: &[u8]) -> Result<Run, csv::Error> {
+    let mut run = Run::default();
+    let mut reader = csv::Reader::from_reader(bytes);
+    let mut rows = reader.deserialize::<Row>().peekable();
+    while let Some(row) = rows.next() {
+        match row {
+            Ok(row) => run.rows.push(row),
+            Err(_) if rows.peek().is_none() => break,
+            Err(error) => return Err(error),
+        }
+    }
+    run.tally.bytes = bytes.len() as u64;
+    run.tally.ticks = run.rows.len() as u64;
+    Ok(run)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::decoder::tests::frames;
+    use super::*;
+
+    fn file(bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("log");
+        std::fs::write(&path, bytes).unwrap();
+        (directory, path)
+    }
+
+    #[test]
+    fn the_bytes_of_the_channel_are_a_log() {
+        let (_directory, path) = file(&frames(0, 80).concat());
+        let run = Run::read(&path).unwrap();
+        assert_eq!(run.rows.len(), 80);
+        assert!(run.is_whole());
+        assert_eq!(run.header.unwrap().rig, "test");
+    }
+
+    #[test]
+    fn rows_come_back_from_csv_even_if_it_was_cut() {
+        let run = Run::of_stream(&frames(0, 80).concat());
+        let mut csv = csv::Writer::from_writer(Vec::new());
+        for row in &run.rows {
+            csv.serialize(row).unwrap();
+        }
+        let bytes = csv.into_inner().unwrap();
+        let (_directory, path) = file(&bytes);
+        assert_eq!(Run::read(&path).unwrap().rows, run.rows);
+        let (_directory, path) = file(&bytes[..bytes.len() - 40]);
+        assert_eq!(Run::read(&path).unwrap().rows, run.rows[..79]);
+    }
+
+    #[test]
+    fn what_is_no_log_is_refused_in_one_line() {
+        for bytes in [&b""[..], b"hello", b"\x89MCAP0\r\n", &[7; 900]] {
+            let (_directory, path) = file(bytes);
+            let error = Run::read(&path).unwrap_err().to_string();
+            assert!(error.contains("no log") && error.lines().count() == 1, "{error}");
+        }
+        let missing = Run::read(Path::new("/nowhere/log.mcap")).unwrap_err();
+        assert!(matches!(missing, ReadError::File { .. }));
+    }
+}

@@ -1,0 +1,341 @@
+//! A log run again: the recorded inputs through the controller on this host, whose
+//! outputs must be the recorded ones to the bit.
+
+use interstage::control::{Controller, Input, Output, State};
+use interstage::log::{Entry, Event, Record, Telemetry};
+use interstage::model::{Plan, PlanRequest, Planner};
+use interstage::rig::{Rig, RigError};
+use interstage::supervise::Mode;
+use serde::Serialize;
+
+use crate::log::{Mark, Row, Run};
+use crate::record::STAGE_NAMES;
+
+/// What came of a replay.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Replayed {
+    /// Ticks run again.
+    pub ticks: u64,
+    /// Ticks that could not be, because something before them is missing.
+    pub blind: u64,
+    /// The first thing missing that made them so, and the tick before which it is.
+    pub missing: Option<(u32, Mark)>,
+    /// Log entries compared.
+    pub events: u64,
+    /// Plans that were in the log, and plans that had to be worked out again.
+    pub plans: (u64, u64),
+    /// The first difference.
+    pub difference: Option<Difference>,
+}
+
+impl Replayed {
+    /// Every tick of the log was run again and gave what was recorded.
+    #[must_use]
+    pub const fn is_equal(&self) -> bool {
+        self.difference.is_none() && self.blind == 0 && self.ticks > 0
+    }
+}
+
+/// Where replay and log part.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Difference {
+    /// The tick.
+    pub tick: u32,
+    /// Its contact stage, as recorded.
+    pub contact: &'static str,
+    /// The stage of the tick that gave the quantity.
+    pub stage: &'static str,
+    /// The quantity.
+    pub quantity: &'static str,
+    /// What was recorded.
+    pub recorded: String,
+    /// What came out this time.
+    pub replayed: String,
+}
+
+impl std::fmt::Display for Difference {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { tick, contact, stage, quantity, recorded, replayed } = self;
+        write!(
+            f,
+            "tick {tick} ({contact}): {stage}: {quantity} was {recorded} and is now {replayed}"
+        )
+    }
+}
+
+/// Runs a log again on the controller of `rig`, up to the first difference.
+///
+/// After a gap in the log the controller's state is not known: ticks from there to the
+/// next start of the target are counted as blind.
+///
+/// # Errors
+/// [`RigError`] if the parameters do not make a controller.
+pub fn replay(run: &Run, rig: &Rig) -> Result<Replayed, RigError> {
+    let controller = Controller::try_build(rig)?;
+    let mut replay = Replay {
+        planner: Planner::try_build(rig)?,
+        run,
+        state: State::default(),
+        request: None,
+        result: Replayed::default(),
+    };
+    let (mut marks, mut blind) = (run.marks.iter().peekable(), starts_late(run));
+    for (place, row) in run.rows.iter().enumerate() {
+        while let Some((_, mark)) = marks.next_if(|(at, _)| *at <= place) {
+            match mark {
+                Mark::Restart => {
+                    (replay.state, replay.request, blind) = (State::default(), None, false);
+                }
+                // What is no frame was none before either; ticks that never ran are
+                // told by the flag of the one that did.
+                Mark::Garbage { .. } | Mark::Overrun { .. } => {}
+                Mark::Lost { .. }
+                | Mark::Skipped { .. }
+                | Mark::Joined { .. }
+                | Mark::Schema { .. } => {
+                    blind = true;
+                    replay.result.missing.get_or_insert((row.tick, *mark));
+                }
+            }
+        }
+        if blind {
+            replay.result.blind += 1;
+            continue;
+        }
+        replay.result.ticks += 1;
+        replay.result.difference = replay.tick(&controller, row);
+        if replay.result.difference.is_some() {
+            break;
+        }
+    }
+    Ok(replay.result)
+}
+
+/// A table of rows does not say where it begins; its first mode does.
+fn starts_late(run: &Run) -> bool {
+    let first = run.rows.first().and_then(Row::telemetry);
+    first.is_some_and(|seen| !matches!(seen.mode, Mode::Boot | Mode::SelfTest))
+}
+
+/// A replay under way.
+struct Replay<'a> {
+    planner: Planner,
+    run: &'a Run,
+    state: State,
+    /// The latest request, for a plan that is not in the log.
+    request: Option<PlanRequest>,
+    result: Replayed,
+}
+
+impl Replay<'_> {
+    /// Runs a tick again; the first thing that differs.
+    fn tick(&mut self, controller: &Controller, row: &Row) -> Option<Difference> {
+        let flags = row.flags();
+        let input = Input {
+            now: row.tick,
+            sensors: row.sensors(),
+            command: flags.command(),
+            plan: flags.plan().then(|| self.plan(row.tick)).flatten(),
+            overrun: flags.overrun(),
+            emergency_stop: flags.emergency_stop(),
+        };
+        let output = controller.step(&mut self.state, &input);
+        if let Some(request) = output.request {
+            self.request = Some(request);
+        }
+        self.compare(row, &input, &output)
+    }
+
+    /// The plan that the tick was given: that of the log, or the planner's own.
+    fn plan(&mut self, tick: u32) -> Option<Plan> {
+        let logged = self.run.plans.iter().find(|(at, _)| *at == tick);
+        if let Some((_, plan)) = logged {
+            self.result.plans.0 += 1;
+            return Some(*plan);
+        }
+        self.result.plans.1 += 1;
+        self.request.map(|request| self.planner.plan(&request))
+    }
+
+    fn compare(&mut self, row: &Row, input: &Input, output: &Output) -> Option<Difference> {
+        let differs = |stage, quantity, recorded: String, replayed: String| Difference {
+            tick: row.tick,
+            contact: STAGE_NAMES
+                .get(usize::from(row.stage).wrapping_sub(1))
+                .copied()
+                .unwrap_or("unknown stage"),
+            stage,
+            quantity,
+            recorded,
+            replayed,
+        };
+        let Some(seen) = row.telemetry() else {
+            let numbers = format!("mode {}, stage {}", row.mode, row.stage);
+            return Some(differs("log", "mode and stage", numbers, "a meaning".to_owned()));
+        };
+        for Quantity { stage, name, of } in QUANTITIES {
+            let (recorded, replayed) = (of(&seen), of(&output.telemetry));
+            if recorded != replayed {
+                return Some(differs(stage, name, recorded.to_string(), replayed.to_string()));
+            }
+        }
+        let again = Record::of(input, output).flags;
+        if again != row.flags() {
+            let bits = |bits: u16| format!("{bits:#018b}");
+            let (recorded, replayed) = (bits(row.flags), bits(again.to_bits()));
+            return Some(differs("bridges, requests and entries", "flags", recorded, replayed));
+        }
+        let asked = self.run.requests.iter().find(|(at, _)| *at == row.tick);
+        if let (Some((_, recorded)), Some(replayed)) = (asked, output.request)
+            && *recorded != replayed
+        {
+            let (recorded, replayed) = (format!("{recorded:?}"), format!("{replayed:?}"));
+            return Some(differs("request", "request for a plan", recorded, replayed));
+        }
+        let (recorded, replayed) = self.events(row.tick, output);
+        (recorded != replayed).then(|| {
+            let (recorded, replayed) = (format!("{recorded:?}"), format!("{replayed:?}"));
+            differs("log entries", "entries", recorded, replayed)
+        })
+    }
+
+    /// Entries of a tick in the log, and those of the replay; none of either if they are
+    /// not in the log.
+    fn events(&mut self, tick: u32, output: &Output) -> (Vec<Entry>, Vec<Entry>) {
+        let from = self.run.events.iter().filter(|entry| entry.at == tick);
+        let logged: Vec<Entry> =
+            from.filter(|entry| !matches!(entry.event, Event::Lost(_))).copied().collect();
+        if logged.len() != output.events.len() {
+            return (Vec::new(), Vec::new());
+        }
+        self.result.events += logged.len() as u64;
+        (logged, output.events.to_vec())
+    }
+}
+
+/// A quantity of the state after a tick, and the stage of the tick that gives it.
+struct Quantity {
+    stage: &'static str,
+    name: &'static str,
+    of: fn(&Telemetry) -> Value,
+}
+
+/// A value of a quantity: shown as it reads, compared by its bits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Value {
+    Fixed(interstage::units::Q16),
+    Whole(i32),
+    Mode(Mode),
+}
+
+impl std::fmt::Display for Value {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Fixed(value) => {
+                write!(f, "{:.6} ({:#010x})", value.to_num::<f64>(), value.to_bits())
+            }
+            Self::Whole(value) => write!(f, "{value}"),
+            Self::Mode(mode) => write!(f, "{mode:?}"),
+        }
+    }
+}
+
+/// In the order of the tick's stages.
+const QUANTITIES: [Quantity; 16] = {
+    use Value::{Fixed, Mode, Whole};
+    const fn of(stage: &'static str, name: &'static str, of: fn(&Telemetry) -> Value) -> Quantity {
+        Quantity { stage, name, of }
+    }
+    [
+        of("sensing", "speed, mm/s", |t| Fixed(t.speed)),
+        of("sensing", "preload, N", |t| Fixed(t.preload)),
+        of("sensing", "compression, mm", |t| Fixed(t.compression)),
+        of("sensing", "radius, mm", |t| Fixed(t.radius)),
+        of("odometry", "position, mm", |t| Fixed(t.position)),
+        of("mode", "mode", |t| Mode(t.mode)),
+        of("contact", "contact stage", |t| Whole(t.stage as i32)),
+        of("contact", "level", |t| Whole(i32::from(t.level))),
+        of("contact", "distance, mm", |t| Fixed(t.distance)),
+        of("plan", "gap predicted, mm", |t| Fixed(t.gap_predicted)),
+        of("schedule", "preload wanted, N", |t| Fixed(t.preload_ref)),
+        of("schedule", "speed wanted, mm/s", |t| Fixed(t.speed_ref)),
+        of("schedule", "slip margin", |t| Fixed(t.slip_margin)),
+        of("loops", "drive duty, Q15", |t| Whole(i32::from(t.drive.to_bits()))),
+        of("loops", "pre-tightener duty, Q15", |t| Whole(i32::from(t.pretightener.to_bits()))),
+        of("vibration", "amplitude, mm", |t| Fixed(t.vibration)),
+    ]
+};
+
+#[cfg(test)]
+mod tests {
+    use std::sync::OnceLock;
+
+    use super::*;
+    use crate::scenario::Scenario;
+    use crate::sil;
+
+    fn stream() -> &'static [u8] {
+        static STREAM: OnceLock<Vec<u8>> = OnceLock::new();
+        STREAM.get_or_init(|| {
+            let sets = ["run.seed=4".to_owned()];
+            let scenario = Scenario::resolve(Some("prototype"), None, &sets).unwrap();
+            let options = sil::Options { rows: true, ..sil::Options::default() };
+            sil::run(&scenario, options).unwrap().stream
+        })
+    }
+
+    #[test]
+    fn a_run_gives_the_same_bits_again() {
+        let run = Run::of_stream(stream());
+        let result = replay(&run, &Rig::prototype()).unwrap();
+        assert!(result.is_equal(), "{result:?}");
+        assert_eq!(result.ticks as usize, run.rows.len());
+        assert!(result.plans.0 >= 4 && result.plans.1 == 0, "{:?}", result.plans);
+        assert_eq!(result.events as usize, run.events.len());
+    }
+
+    #[test]
+    fn rows_alone_do_and_the_planner_makes_up_for_the_plans() {
+        let run = Run::of_stream(stream());
+        let rows = Run { rows: run.rows.clone(), ..Run::default() };
+        let result = replay(&rows, &Rig::prototype()).unwrap();
+        assert!(result.is_equal(), "{result:?}");
+        assert_eq!(result.plans, (0, replay(&run, &Rig::prototype()).unwrap().plans.0));
+    }
+
+    #[test]
+    fn a_changed_code_is_found_where_it_first_matters() {
+        let mut run = Run::of_stream(stream());
+        let place = run.rows.len() / 2;
+        run.rows[place].tread_code = run.rows[place].tread_code.map(|code| code ^ 0x20);
+        let result = replay(&run, &Rig::prototype()).unwrap();
+        let difference = result.difference.expect("different");
+        assert_eq!((difference.tick, difference.stage), (run.rows[place].tick, "sensing"));
+        assert_eq!(difference.quantity, "compression, mm");
+        assert_eq!(result.ticks as usize, place + 1);
+    }
+
+    #[test]
+    fn another_rig_differs() {
+        let mut rig = Rig::prototype();
+        rig.sense.angle_zero_code += 2.0;
+        let result = replay(&Run::of_stream(stream()), &rig).unwrap();
+        assert!(!result.is_equal());
+        assert_eq!(result.difference.map(|difference| difference.quantity), Some("radius, mm"));
+    }
+
+    #[test]
+    fn ticks_behind_a_gap_are_not_taken_for_equal() {
+        let frames: Vec<&[u8]> = stream().split_inclusive(|byte| *byte == 0).collect();
+        let torn = [&frames[..40], &frames[41..]].concat().concat();
+        let run = Run::of_stream(&torn);
+        let result = replay(&run, &Rig::prototype()).unwrap();
+        assert!(result.difference.is_none() && !result.is_equal());
+        assert!(matches!(result.missing, Some((_, Mark::Lost { frames: 1, .. }))));
+        assert_eq!(result.ticks + result.blind, run.rows.len() as u64);
+        // A target that starts anew is known again.
+        let twice = [&torn[..], stream()].concat();
+        let result = replay(&Run::of_stream(&twice), &Rig::prototype()).unwrap();
+        assert!(result.ticks > result.blind && result.difference.is_none());
+    }
+}

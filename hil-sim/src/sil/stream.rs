@@ -1,0 +1,72 @@
+//! The binary log of a run in software: the firmware's own tape and scribe, so that one
+//! decoder serves both.
+
+use interstage::control::{Controller, Input, Output};
+use interstage::log::{BATCH, Identity, Scribe, Tape, identity};
+
+use crate::scenario::Scenario;
+
+/// The binary log as it grows. Its channel has room for everything.
+pub struct Stream {
+    tape: Tape,
+    scribe: Scribe,
+    bytes: Vec<u8>,
+}
+
+impl Stream {
+    /// A log of this controller from its first tick on.
+    #[must_use]
+    pub fn new(scenario: &Scenario, controller: &Controller) -> Self {
+        let scribe = Scribe::new(of(scenario, controller));
+        Self { tape: Tape::new(), scribe, bytes: Vec::new() }
+    }
+
+    /// Keeps a tick and what happened in it, as the journal does on the board.
+    pub fn keep(&mut self, input: &Input, output: &Output) {
+        let mut send = |frame: &[u8]| {
+            self.bytes.extend_from_slice(frame);
+            true
+        };
+        self.tape.keep(input, output);
+        for entry in &output.events {
+            self.scribe.entry(entry, &mut send);
+        }
+        if self.tape.unread() >= BATCH {
+            self.scribe.read(&self.tape, &mut send);
+        }
+    }
+
+    /// What has come since the last call.
+    pub fn take(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.bytes)
+    }
+
+    /// The controller starts anew; what it had not yet passed on is lost with it.
+    pub(super) fn restart(&mut self, scenario: &Scenario, controller: &Controller) {
+        let bytes = self.take();
+        *self = Self { bytes, ..Self::new(scenario, controller) };
+    }
+
+    /// The whole log.
+    #[must_use]
+    pub fn finish(mut self) -> Vec<u8> {
+        self.scribe.read(&self.tape, &mut |frame: &[u8]| {
+            self.bytes.extend_from_slice(frame);
+            true
+        });
+        self.bytes
+    }
+}
+
+/// Who speaks when the controller runs on this host.
+fn of(scenario: &Scenario, controller: &Controller) -> Identity {
+    Identity {
+        schema: identity::SCHEMA,
+        version: identity::text(env!("CARGO_PKG_VERSION")),
+        build: [0; 8],
+        rig: identity::text(&scenario.preset),
+        parameters: identity::fingerprint(&scenario.rig),
+        calibration: identity::fingerprint(&scenario.rig.sense),
+        corner: controller.corner_reach(),
+    }
+}

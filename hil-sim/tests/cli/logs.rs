@@ -1,0 +1,159 @@
+//! `rig capture`, `rig replay`, `rig report`, `rig live`.
+
+use std::path::{Path, PathBuf};
+
+use hil_sim::scenario::Scenario;
+use hil_sim::sil;
+use serde_json::Value;
+
+use crate::{code, good, number, object, rig, rig_in, said};
+
+/// The frames of a deployment.
+fn frames() -> Vec<Vec<u8>> {
+    let options = sil::Options { rows: true, ..sil::Options::default() };
+    let stream = sil::run(&Scenario::default(), options).expect("a run").stream;
+    stream.split_inclusive(|byte| *byte == 0).map(<[u8]>::to_vec).collect()
+}
+
+/// A directory with a file in it.
+fn file(name: &str, bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
+    let directory = tempfile::tempdir().expect("a directory");
+    let path = directory.path().join(name);
+    std::fs::write(&path, bytes).expect("written");
+    (directory, path)
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().expect("a name of text")
+}
+
+fn refused(arguments: &[&str], part: &str) {
+    let output = rig(arguments);
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(code(&output), 2, "{arguments:?}: {error}");
+    assert!(error.contains(part) && error.trim_end().lines().count() == 1, "{error}");
+}
+
+#[test]
+fn a_recorded_stream_becomes_files_that_give_the_same_bits() {
+    let (directory, stream) = file("line.bin", &frames().concat());
+    let out = text(directory.path()).to_owned() + "/out";
+    let caught = good(&["capture", "--stream", text(&stream), "--out", &out, "--json"]);
+    assert!(number(&caught, "ticks") > 5000.0);
+    assert_eq!(number(&caught, "lost_frames"), 0.0);
+    for ending in ["mcap", "csv"] {
+        let replayed = good(&["replay", &format!("{out}/log.{ending}"), "--json"]);
+        assert_eq!(replayed["equal"], true);
+        assert_eq!(number(&replayed["logs"][0], "ticks"), number(&caught, "ticks"));
+    }
+}
+
+#[test]
+fn what_is_missing_is_told_by_the_exit_code_and_in_the_log() {
+    let mut frames = frames();
+    frames.remove(300);
+    let (directory, stream) = file("line.bin", &frames.concat());
+    let out = text(directory.path()).to_owned() + "/out";
+    let output = rig(&["capture", "--stream", text(&stream), "--out", &out, "--json"]);
+    assert_eq!(code(&output), 1);
+    let caught = object(&output);
+    assert_eq!((number(&caught, "lost_frames"), number(&caught, "lost_ticks")), (1.0, 8.0));
+    // What stands behind the gap cannot be run again, and is not called equal.
+    let output = rig(&["replay", &format!("{out}/log.mcap")]);
+    assert_eq!(code(&output), 1);
+    assert!(said(&output).contains("1 frames lost"), "{}", said(&output));
+}
+
+#[test]
+fn a_log_that_was_tampered_with_shows_its_first_difference() {
+    let (directory, stream) = file("line.bin", &frames().concat());
+    let out = text(directory.path()).to_owned();
+    good(&["capture", "--stream", text(&stream), "--out", &out, "--json"]);
+    let csv = directory.path().join("log.csv");
+    let table = std::fs::read_to_string(&csv).expect("readable");
+    let mut lines: Vec<String> = table.lines().map(str::to_owned).collect();
+    let column = lines[0].split(',').position(|name| name == "load_cell_code").expect("there");
+    let mut cells: Vec<String> = lines[3001].split(',').map(str::to_owned).collect();
+    let tick = cells[0].clone();
+    let code_before: u16 = cells[column].parse().expect("a code");
+    cells[column] = (code_before ^ 0x100).to_string();
+    lines[3001] = cells.join(",");
+    std::fs::write(&csv, lines.join("\n")).expect("written");
+    let output = rig(&["replay", text(&csv)]);
+    assert_eq!(code(&output), 1);
+    let told = said(&output);
+    assert!(told.contains(&format!("differs at tick {tick} ")), "{told}");
+    assert!(told.contains("sensing: preload, N was "), "{told}");
+}
+
+#[test]
+fn a_log_has_its_report_and_two_logs_their_comparison() {
+    let directory = tempfile::tempdir().expect("a directory");
+    for (seed, name) in [("1", "a"), ("2", "b")] {
+        let output = rig_in(directory.path(), &["deploy", "--seed", seed, "--out", name, "--json"]);
+        assert_eq!(code(&output), 0);
+    }
+    let a = rig_in(directory.path(), &["report", "a/log.mcap", "--out", "page.html", "--json"]);
+    let summary: Value = serde_json::from_slice(
+        &std::fs::read(directory.path().join("a/summary.json")).expect("there"),
+    )
+    .expect("JSON");
+    assert_eq!(object(&a)["crossings"], summary["crossings"]);
+    let page = |name: &str| std::fs::read_to_string(directory.path().join(name)).expect("a page");
+    assert_eq!(page("page.html"), page("a/report.html"), "the page of the deployment itself");
+    let both = rig_in(directory.path(), &["report", "a/log.mcap", "b/log.mcap", "--json"]);
+    let differences = object(&both)["differences"].as_array().expect("a list").clone();
+    let gap = differences.iter().find(|d| d["index"] == 2 && d["quantity"] == "gap").expect("gap");
+    let change = number(gap, "b") - number(gap, "a");
+    assert!(change != 0.0 && (number(gap, "change") - change).abs() < 1e-12);
+    assert!(page("a/log.compare.html").contains("B - A"));
+}
+
+#[test]
+fn a_view_without_terminal_ends_by_itself_and_leaves_its_picture() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let arguments =
+        ["live", "--headless", "--fast", "--listen", "127.0.0.1:0", "--picture", "view.svg"];
+    let output = rig_in(directory.path(), &arguments);
+    assert_eq!(code(&output), 0, "{}", String::from_utf8_lossy(&output.stderr));
+    let picture = std::fs::read_to_string(directory.path().join("view.svg")).expect("a picture");
+    assert!(picture.contains("complete") && picture.contains("preload, N"));
+    refused(&["live"], "no terminal");
+    refused(&["live", "--headless", "--listen", "nowhere"], "--listen nowhere");
+}
+
+#[test]
+fn what_is_no_log_is_refused() {
+    let (_directory, path) = file("log.mcap", b"hello");
+    refused(&["replay", text(&path)], "no log");
+    refused(&["report", text(&path)], "no log");
+    refused(&["replay", "/nowhere/log.mcap"], "/nowhere/log.mcap");
+    refused(&["capture", "--stream", "/nowhere/line.bin"], "/nowhere/line.bin");
+    refused(&["capture", "--target", "moon"], "--target moon");
+}
+
+#[test]
+fn a_log_of_other_parameters_is_refused_until_they_are_given() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let set = ["--set", "tread.tau_s=0.11"];
+    let mut arguments = vec!["capture", "--bare", "--out", "."];
+    arguments.extend(set);
+    assert_eq!(code(&rig_in(directory.path(), &arguments)), 0);
+    // With its parameters beside it the log can be run again as it is.
+    assert_eq!(code(&rig_in(directory.path(), &["replay", "log.mcap"])), 0);
+    // The bare stream has nothing but their hash.
+    let bytes = std::fs::read(directory.path().join("log.mcap")).expect("there");
+    let frames: Vec<u8> = mcap::MessageStream::new(&bytes)
+        .expect("a file")
+        .map(|message| message.expect("whole"))
+        .filter(|message| message.channel.topic == hil_sim::log::FRAMES)
+        .flat_map(|message| message.data.to_vec())
+        .collect();
+    std::fs::write(directory.path().join("line.bin"), frames).expect("written");
+    let output = rig_in(directory.path(), &["replay", "line.bin"]);
+    assert_eq!(code(&output), 2);
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(told.contains("made with parameters"), "{told}");
+    let output = rig_in(directory.path(), &["replay", "line.bin", set[0], set[1]]);
+    assert_eq!(code(&output), 0);
+}

@@ -1,0 +1,103 @@
+//! What every log begins with: who speaks, with which parameters.
+
+use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
+use serde::{Deserialize, Serialize};
+
+use crate::units::Millimetres;
+
+/// Layout of the frames. Raised with every change of it; a reader of another number says
+/// so and decodes nothing.
+pub const SCHEMA: u16 = 1;
+
+/// Longest version, build and name, bytes.
+pub const MAX_TEXT: usize = 24;
+
+/// A short text.
+pub type Text = heapless::String<MAX_TEXT>;
+
+/// Who speaks. Sent first and every second, so that a reader that comes late knows.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Identity {
+    /// Layout of the frames, [`SCHEMA`].
+    pub schema: u16,
+    /// Version of the firmware.
+    pub version: Text,
+    /// Hash of the image, first eight bytes; zero on a host.
+    pub build: [u8; 8],
+    /// Name of the rig.
+    pub rig: Text,
+    /// CRC-32 of the rig's parameters.
+    pub parameters: u32,
+    /// CRC-32 of its sensors' parameters alone.
+    pub calibration: u32,
+    /// Way of the wheel over a corner, mm.
+    pub corner: Millimetres,
+}
+
+/// As much of a text as fits.
+#[must_use]
+pub fn text(from: &str) -> Text {
+    let mut text = Text::new();
+    for letter in from.chars() {
+        if text.push(letter).is_err() {
+            break;
+        }
+    }
+    text
+}
+
+/// CRC-32 (ISO-HDLC) of what postcard makes of `value`.
+#[must_use]
+pub fn fingerprint(value: &impl Serialize) -> u32 {
+    /// Without a table: it runs once.
+    static CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
+
+    struct Sum(crc::Digest<'static, u32, NoTable>);
+
+    impl postcard::ser_flavors::Flavor for Sum {
+        type Output = u32;
+
+        #[inline(never)]
+        fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
+            self.0.update(&[byte]);
+            Ok(())
+        }
+
+        fn finalize(self) -> postcard::Result<u32> {
+            Ok(self.0.finalize())
+        }
+    }
+
+    // Nothing that is summed up can run out of room.
+    postcard::serialize_with_flavor(value, Sum(CRC.digest())).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rig::Rig;
+
+    #[test]
+    fn a_fingerprint_is_the_checksum_of_the_bytes() {
+        let crc = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+        let mut bytes = [0; 16];
+        let value = (7_u32, -3_i16, "wheel");
+        let used = postcard::to_slice(&value, &mut bytes).unwrap();
+        assert_eq!(fingerprint(&value), crc.checksum(used));
+    }
+
+    #[test]
+    fn rigs_differ_by_it_and_calibrations_too() {
+        let (one, mut other) = (Rig::prototype(), Rig::prototype());
+        other.drive.cruise_speed_mm_s += 0.001;
+        assert_ne!(fingerprint(&one), fingerprint(&other));
+        assert_eq!(fingerprint(&one.sense), fingerprint(&other.sense));
+    }
+
+    #[test]
+    fn a_long_text_is_cut_between_letters() {
+        assert_eq!(text("prototype").as_str(), "prototype");
+        assert_eq!(text("eine Länge über alles ä").len(), 24 + 1 - 1);
+        assert_eq!(text(&"ä".repeat(20)).as_str(), "ä".repeat(12));
+    }
+}

@@ -1,0 +1,74 @@
+//! Modes, stages and commands as numbers of the log. Numbers are stable: none is ever
+//! given a second meaning.
+
+use crate::estimate::ContactStage;
+use crate::supervise::{Command, Fault, Mode};
+
+/// Number of a mode: its place in [`Mode::WITHOUT_FAULT`], or the code of the fault that
+/// is held, 101 to 160.
+#[must_use]
+pub fn of_mode(mode: Mode) -> u8 {
+    match mode {
+        Mode::FaultHold(fault) => fault.code() as u8,
+        other => Mode::WITHOUT_FAULT.iter().position(|known| *known == other).unwrap_or(0) as u8,
+    }
+}
+
+/// The mode of a number; none if the number has no meaning.
+#[must_use]
+pub fn mode(number: u8) -> Option<Mode> {
+    let plain = Mode::WITHOUT_FAULT.get(usize::from(number)).copied();
+    plain.or_else(|| {
+        let held = Fault::ALL.iter().find(|fault| fault.code() == u16::from(number));
+        held.map(|fault| Mode::FaultHold(*fault))
+    })
+}
+
+/// The contact stage of a number, 1 to 6.
+#[must_use]
+pub fn stage(number: u8) -> Option<ContactStage> {
+    ContactStage::ALL.into_iter().find(|stage| *stage as u8 == number)
+}
+
+/// Number of a command, from 1 in the order of [`Command::ALL`]; 0 for none.
+#[must_use]
+pub const fn of_command(command: Option<Command>) -> u8 {
+    match command {
+        None => 0,
+        Some(command) => command as u8 + 1,
+    }
+}
+
+/// The command of a number; none for 0 and for what has no meaning.
+#[must_use]
+pub fn command(number: u8) -> Option<Command> {
+    Command::ALL.get(usize::from(number).checked_sub(1)?).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_mode_has_its_number() {
+        let held = Fault::ALL.into_iter().map(Mode::FaultHold);
+        let all: Vec<Mode> = Mode::WITHOUT_FAULT.into_iter().chain(held).collect();
+        for known in &all {
+            assert_eq!(mode(of_mode(*known)), Some(*known));
+        }
+        let known = (0..=u8::MAX).filter(|number| mode(*number).is_some()).count();
+        assert_eq!(known, all.len());
+    }
+
+    #[test]
+    fn stages_and_commands_have_theirs() {
+        for known in ContactStage::ALL {
+            assert_eq!(stage(known as u8), Some(known));
+        }
+        assert_eq!((stage(0), stage(7)), (None, None));
+        for known in Command::ALL {
+            assert_eq!(command(of_command(Some(known))), Some(known));
+        }
+        assert_eq!((of_command(None), command(0), command(5)), (0, None, None));
+    }
+}

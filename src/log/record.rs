@@ -1,0 +1,335 @@
+//! One tick as the log keeps it: all that the tick was given and all that it gave, so
+//! that a host can run it again and compare bits.
+
+use super::number;
+use super::telemetry::Telemetry;
+use crate::control::{Input, Output};
+use crate::hal::MotorCommand;
+use crate::sense::raw::{AdcCode, AngleFrame, EncoderCount, Sample, SensorFrame};
+use crate::supervise::Command;
+use crate::units::Tick;
+
+/// Age of a code that was taken at its tick, and so the farthest ahead that one may be.
+const NOW: u32 = 8;
+/// Age of a code that is older than can be said; the time of the one before holds.
+const OLD: u8 = 254;
+/// Age of a code that never came.
+const NEVER: u8 = 255;
+
+/// A tick's input and output in 84 bytes. Plan, request and log entries, of which a run
+/// has few, go beside it; flags tell that they were there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Record {
+    /// State after the tick; its time is that of the input.
+    pub telemetry: Telemetry,
+    /// Codes of wheel, load cell, tread and arm; 0 for one that never came.
+    pub codes: [u16; 4],
+    /// Ages of the codes as they travel, see [`Record::sensors`].
+    pub ages: [u8; 4],
+    /// What else there was.
+    pub flags: Flags,
+}
+
+/// What a tick was given and gave beside codes and state.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Flags(u16);
+
+impl Flags {
+    const COMMAND: u16 = 0b111;
+    const PLAN: u16 = 1 << 3;
+    const OVERRUN: u16 = 1 << 4;
+    const EMERGENCY: u16 = 1 << 5;
+    const REQUEST: u16 = 1 << 6;
+    const REARM: u16 = 1 << 7;
+    const DRIVE: u16 = 1 << 8;
+    const PRELOAD: u16 = 1 << 9;
+    const EVENTS: u32 = 10;
+
+    fn of(input: &Input, output: &Output) -> Self {
+        let bit = |set: bool, bit: u16| if set { bit } else { 0 };
+        Self(
+            u16::from(number::of_command(input.command))
+                | bit(input.plan.is_some(), Self::PLAN)
+                | bit(input.overrun, Self::OVERRUN)
+                | bit(input.emergency_stop, Self::EMERGENCY)
+                | bit(output.request.is_some(), Self::REQUEST)
+                | bit(output.rearm, Self::REARM)
+                | bit(output.drive.enable, Self::DRIVE)
+                | bit(output.preload.enable, Self::PRELOAD)
+                | (output.events.len() as u16) << Self::EVENTS,
+        )
+    }
+
+    /// Flags from their bits.
+    #[must_use]
+    pub const fn from_bits(bits: u16) -> Self {
+        Self(bits)
+    }
+
+    /// Their bits.
+    #[must_use]
+    pub const fn to_bits(self) -> u16 {
+        self.0
+    }
+
+    const fn has(self, bit: u16) -> bool {
+        self.0 & bit != 0
+    }
+
+    /// The command that the tick was given.
+    #[must_use]
+    pub fn command(self) -> Option<Command> {
+        number::command((self.0 & Self::COMMAND) as u8)
+    }
+
+    /// The tick was given a plan.
+    #[must_use]
+    pub const fn plan(self) -> bool {
+        self.has(Self::PLAN)
+    }
+
+    /// It began more than a period late.
+    #[must_use]
+    pub const fn overrun(self) -> bool {
+        self.has(Self::OVERRUN)
+    }
+
+    /// The emergency stop had cut the bridges.
+    #[must_use]
+    pub const fn emergency_stop(self) -> bool {
+        self.has(Self::EMERGENCY)
+    }
+
+    /// It asked for a plan.
+    #[must_use]
+    pub const fn request(self) -> bool {
+        self.has(Self::REQUEST)
+    }
+
+    /// It gave the bridges their power back.
+    #[must_use]
+    pub const fn rearm(self) -> bool {
+        self.has(Self::REARM)
+    }
+
+    /// The drive's bridge is on.
+    #[must_use]
+    pub const fn drive(self) -> bool {
+        self.has(Self::DRIVE)
+    }
+
+    /// The pre-tightener's bridge is on.
+    #[must_use]
+    pub const fn preload(self) -> bool {
+        self.has(Self::PRELOAD)
+    }
+
+    /// Log entries that it gave.
+    #[must_use]
+    pub const fn events(self) -> u16 {
+        self.0 >> Self::EVENTS
+    }
+}
+
+impl Record {
+    /// The record of a tick.
+    #[must_use]
+    pub fn of(input: &Input, output: &Output) -> Self {
+        let mut record = Self::EMPTY;
+        record.set(input, output);
+        record
+    }
+
+    /// Makes it the record of a tick, where it stands: it is copied once.
+    #[inline]
+    pub(super) fn set(&mut self, input: &Input, output: &Output) {
+        self.telemetry = output.telemetry;
+        let SensorFrame { wheel, load_cell, tread, arm } = &input.sensors;
+        (self.codes[0], self.ages[0]) = pack(input.now, wheel.as_ref(), EncoderCount::get);
+        (self.codes[1], self.ages[1]) = pack(input.now, load_cell.as_ref(), AdcCode::get);
+        (self.codes[2], self.ages[2]) = pack(input.now, tread.as_ref(), AdcCode::get);
+        (self.codes[3], self.ages[3]) = pack(input.now, arm.as_ref(), AngleFrame::get);
+        self.flags = Flags::of(input, output);
+    }
+
+    /// Time of the tick.
+    #[must_use]
+    pub const fn at(&self) -> Tick {
+        self.telemetry.at
+    }
+
+    /// The codes with their times. A code older than 245 ticks does not tell when it was
+    /// taken: it is then the one of the tick `before`.
+    #[must_use]
+    pub fn sensors(&self, before: &SensorFrame) -> SensorFrame {
+        let [wheel, load_cell, tread, arm] = [0, 1, 2, 3].map(|sensor| {
+            let taken = match self.ages[sensor] {
+                NEVER => return None,
+                OLD => None,
+                age => Some(self.at().wrapping_add(NOW).wrapping_sub(u32::from(age))),
+            };
+            Some((self.codes[sensor], taken))
+        });
+        let oldest = self.at().wrapping_add(NOW).wrapping_sub(u32::from(OLD));
+        SensorFrame {
+            wheel: unpack(wheel, before.wheel, EncoderCount::new, oldest),
+            load_cell: unpack(load_cell, before.load_cell, AdcCode::new, oldest),
+            tread: unpack(tread, before.tread, AdcCode::new, oldest),
+            arm: unpack(arm, before.arm, AngleFrame::new, oldest),
+        }
+    }
+
+    /// What the tick was given, apart from the plan; `before` as for
+    /// [`Record::sensors`].
+    #[must_use]
+    pub fn input(&self, before: &SensorFrame) -> Input {
+        Input {
+            now: self.at(),
+            sensors: self.sensors(before),
+            command: self.flags.command(),
+            plan: None,
+            overrun: self.flags.overrun(),
+            emergency_stop: self.flags.emergency_stop(),
+        }
+    }
+
+    /// What the drive's bridge was told.
+    #[must_use]
+    pub fn drive(&self) -> MotorCommand {
+        MotorCommand { duty: self.telemetry.drive, enable: self.flags.drive() }
+    }
+
+    /// What the pre-tightener's bridge was told.
+    #[must_use]
+    pub fn preload(&self) -> MotorCommand {
+        MotorCommand { duty: self.telemetry.pretightener, enable: self.flags.preload() }
+    }
+
+    /// A record of nothing.
+    pub const EMPTY: Self =
+        Self { telemetry: Telemetry::EMPTY, codes: [0; 4], ages: [0; 4], flags: Flags(0) };
+}
+
+/// Code and age of a sample as they travel.
+fn pack<T: Copy>(now: Tick, sample: Option<&Sample<T>>, code: impl Fn(T) -> u16) -> (u16, u8) {
+    let Some(sample) = sample else { return (0, NEVER) };
+    let age = now.wrapping_sub(sample.at).wrapping_add(NOW);
+    (code(sample.code), if age < u32::from(OLD) { age as u8 } else { OLD })
+}
+
+fn unpack<T>(
+    packed: Option<(u16, Option<Tick>)>,
+    before: Option<Sample<T>>,
+    code: impl Fn(u16) -> T,
+    oldest: Tick,
+) -> Option<Sample<T>> {
+    let (bits, taken) = packed?;
+    let at = taken.or(before.map(|sample| sample.at)).unwrap_or(oldest);
+    Some(Sample { code: code(bits), at })
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::hal::Duty;
+    use crate::supervise::Mode;
+    use crate::units::Q16;
+    use proptest::prelude::*;
+
+    /// Any record that a tick can leave.
+    pub(in crate::log) fn any_record() -> impl Strategy<Value = Record> {
+        let quantities = prop::array::uniform11(any::<i32>());
+        (
+            (any::<u32>(), 0..18_usize, 1..=6_u8, any::<u8>(), quantities, any::<[i16; 2]>()),
+            (any::<[u16; 4]>(), any::<[u8; 4]>(), 0..1_u16 << 14),
+        )
+            .prop_map(|((at, mode, stage, level, q, duties), (codes, ages, flags))| {
+                Record {
+                    telemetry: Telemetry {
+                        at,
+                        mode: Mode::WITHOUT_FAULT[mode],
+                        stage: number::stage(stage).unwrap(),
+                        position: Q16::from_bits(q[0]),
+                        speed: Q16::from_bits(q[1]),
+                        speed_ref: Q16::from_bits(q[2]),
+                        preload: Q16::from_bits(q[3]),
+                        preload_ref: Q16::from_bits(q[4]),
+                        compression: Q16::from_bits(q[5]),
+                        radius: Q16::from_bits(q[6]),
+                        level,
+                        gap_predicted: Q16::from_bits(q[7]),
+                        slip_margin: Q16::from_bits(q[8]),
+                        vibration: Q16::from_bits(q[9]),
+                        distance: Q16::from_bits(q[10]),
+                        drive: Duty::from_bits(duties[0]),
+                        pretightener: Duty::from_bits(duties[1]),
+                    },
+                    codes,
+                    ages,
+                    flags: Flags::from_bits(flags),
+                }
+            })
+    }
+
+    fn sample<T>(code: T, at: Tick) -> Option<Sample<T>> {
+        Some(Sample { code, at })
+    }
+
+    proptest! {
+        #[test]
+        fn what_a_tick_was_given_comes_back(
+            now in any::<u32>(),
+            codes in any::<[u16; 4]>(),
+            ages in prop::array::uniform4(prop::option::of(-8..=245_i32)),
+            command in prop::option::of(0..4_usize),
+            overrun in any::<bool>(),
+            emergency_stop in any::<bool>(),
+        ) {
+            let at = |sensor: usize| ages[sensor].map(|age| now.wrapping_sub(age as u32));
+            let sensors = SensorFrame {
+                wheel: at(0).and_then(|at| sample(EncoderCount::new(codes[0]), at)),
+                load_cell: at(1).and_then(|at| sample(AdcCode::new(codes[1]), at)),
+                tread: at(2).and_then(|at| sample(AdcCode::new(codes[2]), at)),
+                arm: at(3).and_then(|at| sample(AngleFrame::new(codes[3]), at)),
+            };
+            let command = command.map(|index| Command::ALL[index]);
+            let input =
+                Input { now, sensors, command, plan: None, overrun, emergency_stop };
+            let output = Output {
+                telemetry: Telemetry { at: now, ..Telemetry::default() },
+                ..Output::default()
+            };
+            let back = Record::of(&input, &output).input(&SensorFrame::default());
+            prop_assert_eq!(back.sensors, input.sensors);
+            prop_assert_eq!((back.now, back.command), (now, command));
+            prop_assert_eq!((back.overrun, back.emergency_stop), (overrun, emergency_stop));
+        }
+
+        #[test]
+        fn a_code_too_old_to_tell_keeps_its_time(now in 1000..u32::MAX, age in 246..900_u32) {
+            let old = sample(AdcCode::new(7), now - age);
+            let frame = SensorFrame { tread: old, ..SensorFrame::default() };
+            let input = Input { now, sensors: frame, ..Input::default() };
+            let output = Output {
+                telemetry: Telemetry { at: now, ..Telemetry::default() },
+                ..Output::default()
+            };
+            let record = Record::of(&input, &output);
+            prop_assert_eq!(record.sensors(&frame), frame);
+            // Without a tick before, it is at least old.
+            let alone = record.sensors(&SensorFrame::default()).tread.unwrap();
+            prop_assert_eq!(now - alone.at, 246);
+        }
+    }
+
+    #[test]
+    fn bridges_and_flags_come_back() {
+        let on = |bits| MotorCommand { duty: Duty::from_bits(bits), enable: true };
+        let mut output = Output { drive: on(-5), rearm: true, ..Output::default() };
+        output.telemetry.drive = output.drive.duty;
+        let record = Record::of(&Input::default(), &output);
+        assert_eq!((record.drive(), record.preload()), (on(-5), MotorCommand::OFF));
+        assert!(record.flags.rearm() && !record.flags.request() && !record.flags.plan());
+        assert_eq!(record.flags.events(), 0);
+    }
+}
