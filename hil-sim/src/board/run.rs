@@ -92,13 +92,12 @@ pub fn run(
             start = None;
             gathered.begin(bench.machine_mut());
         }
-        let before = bench.plant().truth().time_s;
         let (passed, lines) = bench.step()?;
         for line in &lines {
             watch(bench.time_s(), line);
         }
         gathered.gather(bench.machine_mut(), trace.mode());
-        trace.look(before, &passed, &lines, bench.plant().truth(), rows);
+        trace.look(&passed, &lines, bench.plant().truth(), rows);
         if trace.is_over() {
             after -= 1;
         }
