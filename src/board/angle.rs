@@ -19,8 +19,9 @@ const READ_ANGLE: u16 = 0xFFFF;
 /// 170 MHz / 32. The sensor takes 10 MHz; the next divider would give 10.6.
 const CLOCK: Hertz = Hertz(5_312_500);
 
-/// Core cycles of 350 ns: least time from select to clock, and between frames.
-const SELECT_CYCLES: u32 = 60;
+/// Least time from select to clock, and between frames, is 350 ns or 60 cycles. The
+/// delay counts two for a round that takes this core three at least.
+const SELECT_CYCLES: u32 = 40;
 
 /// The sensor on its bus.
 pub(crate) struct Angle {

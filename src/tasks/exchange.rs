@@ -2,6 +2,7 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
+use super::beat::Pulse;
 use crate::control::{Input, Output};
 use crate::hal::Light;
 use crate::log::{Entry, Telemetry};
@@ -54,7 +55,7 @@ impl Station {
     /// Stations that must always be manned.
     const FIXED: usize = 6;
 
-    const fn index(self) -> usize {
+    pub(super) const fn index(self) -> usize {
         match self {
             Self::Speed => 0,
             Self::Pressure => 1,
@@ -69,6 +70,7 @@ impl Station {
 
 /// Everything the tasks share: one in a `static`, or one per test.
 pub struct Exchange {
+    pub(super) pulse: Pulse,
     pub(super) wheel: Slot<Sample<EncoderCount>>,
     pub(super) load_cell: Slot<Sample<AdcCode>>,
     pub(super) tread: Slot<Sample<AdcCode>>,
@@ -90,6 +92,7 @@ impl Exchange {
     #[must_use]
     pub const fn new() -> Self {
         Self {
+            pulse: Pulse::new(),
             wheel: Slot::new(),
             load_cell: Slot::new(),
             tread: Slot::new(),

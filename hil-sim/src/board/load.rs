@@ -8,6 +8,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::chip::Stray;
+use super::heat::by_function;
+use super::image::ImageError;
 use super::machine::{Machine, Poll, Share, THREAD};
 use super::peripherals::HZ;
 use crate::firmware::Footprint;
@@ -78,6 +80,15 @@ pub struct Interrupt {
     pub latency_worst: u64,
 }
 
+/// A function of the source.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Spent {
+    /// Its name.
+    pub function: String,
+    /// Cycles by itself, per millisecond.
+    pub cycles_per_ms: f64,
+}
+
 /// When the control tick begins, against an even beat.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Start {
@@ -108,6 +119,9 @@ pub struct Load {
     pub tasks: Vec<Named>,
     /// Every exception that was taken.
     pub interrupts: Vec<Interrupt>,
+    /// Cycles by function of the source, what was inlined by itself; the most expensive
+    /// first, as many as make up nearly all.
+    pub functions: Vec<Spent>,
     /// Bytes of the stack that were used, and those set apart for it.
     pub stack_used: u32,
     /// See [`Load::stack_used`].
@@ -135,6 +149,7 @@ impl Gathered {
     pub fn begin(&mut self, machine: &mut Machine) {
         let now = machine.now();
         machine.profile_mut().clear(now);
+        machine.take_heat();
         *self = Self { from: Some((now, machine.profile().slept())), ..Self::default() };
     }
 
@@ -155,9 +170,19 @@ impl Gathered {
         }
     }
 
-    /// The account.
-    #[must_use]
-    pub fn close(self, machine: &Machine, footprint: &Footprint, stack_used: u32) -> Load {
+    /// The account of a run of the image in `elf`.
+    ///
+    /// # Errors
+    /// [`ImageError`] if its debug information cannot be read.
+    pub fn close(
+        self,
+        machine: &mut Machine,
+        elf: &[u8],
+        footprint: &Footprint,
+        stack_used: u32,
+    ) -> Result<Load, ImageError> {
+        let heat = machine.take_heat();
+        let functions = by_function(elf, machine.image(), &heat)?;
         let (from, slept) = self.from.unwrap_or_default();
         let cycles = machine.now() - from;
         let idle = (machine.profile().slept() - slept) as f64 / cycles.max(1) as f64;
@@ -180,7 +205,7 @@ impl Gathered {
                 latency_worst: share.worst_latency,
             }
         };
-        Load {
+        Ok(Load {
             clock_hz: HZ,
             cycles,
             load: 1.0 - idle,
@@ -195,13 +220,30 @@ impl Gathered {
                 .filter(|(number, _)| *number != THREAD)
                 .map(interrupt)
                 .collect(),
+            functions: spent(functions, cycles),
             stack_used,
             stack: footprint.stack(),
             flash: footprint.flash(),
             ram: footprint.ram(),
             unmodelled: machine.chip().strays().iter().copied().collect(),
-        }
+        })
     }
+}
+
+/// Functions per millisecond of `cycles`, down to those that hardly count.
+fn spent(functions: Vec<(String, u64)>, cycles: u64) -> Vec<Spent> {
+    /// Of all that was spent, what is left out.
+    const REST: f64 = 0.02;
+    let mut left = functions.iter().map(|(_, spent)| *spent as f64).sum::<f64>();
+    let rest = REST * left;
+    let counts = |(_, spent): &(String, u64)| {
+        let counts = left > rest;
+        left -= *spent as f64;
+        counts
+    };
+    let ms = cycles as f64 / PERIOD as f64;
+    let found = functions.into_iter().take_while(counts);
+    found.map(|(function, spent)| Spent { function, cycles_per_ms: spent as f64 / ms }).collect()
 }
 
 /// Beginnings of the tick against a beat of one period.

@@ -9,7 +9,7 @@ use std::path::Path;
 
 use super::chip::Chip;
 use super::core::unicorn::{Counted, UnicornCore};
-use super::core::{Access, Bus, Core, CoreError, Mark, Register, Stop, passes};
+use super::core::{Access, Bus, Core, CoreError, Heat, Mark, Register, Stop, passes};
 use super::elf::{FLASH, Function, Loaded, RAM, named};
 use super::exceptions::number::{HARD_FAULT, SV_CALL};
 use super::image::ImageError;
@@ -117,6 +117,11 @@ impl Machine {
     /// The same, to take what has gathered.
     pub fn profile_mut(&mut self) -> &mut Profile {
         &mut self.profile
+    }
+
+    /// Takes the cycles by block of code since the last call, or since the start.
+    pub fn take_heat(&mut self) -> Heat {
+        self.core.take_heat()
     }
 
     /// Names of the tasks, by their numbers in the profile.

@@ -103,8 +103,9 @@ pub fn run(
         }
     }
     let recording = trace.finish(scenario, bench.plant(), started.elapsed().as_secs_f64());
-    let machine = bench.into_machine();
-    let load = gathered.close(&machine, &footprint, stack_used(&machine)?);
+    let mut machine = bench.into_machine();
+    let stack = stack_used(&machine)?;
+    let load = gathered.close(&mut machine, elf, &footprint, stack).map_err(BenchError::from)?;
     Ok(Ran { recording, load, machine })
 }
 
