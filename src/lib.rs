@@ -18,6 +18,7 @@ pub mod hal;
 pub mod log;
 pub mod model;
 pub mod numeric;
+pub mod params;
 pub mod rig;
 pub mod sense;
 pub mod supervise;

@@ -12,7 +12,9 @@ use fixed::types::{I16F16, I32F32};
 /// infinity, then saturate. Cost on a Cortex-M4: one instruction a sum, about eight
 /// a product, a third of what the same costs through [`fixed`], whose
 /// conversions from and to other formats are used.
-#[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(
+    Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize,
+)]
 #[repr(transparent)]
 pub struct Q16(i32);
 
