@@ -6,7 +6,7 @@ mod pins;
 mod stray;
 
 use super::core::{Access, Bus};
-use super::peripherals::adc::Adc;
+use super::peripherals::adc::{self, Adc};
 use super::peripherals::dbgmcu::Dbgmcu;
 use super::peripherals::dma::{CHANNELS, Dma, Dmamux, Move};
 use super::peripherals::encoder::Encoder;
@@ -17,7 +17,7 @@ use super::peripherals::iwdg::Iwdg;
 use super::peripherals::pwm::Pwm;
 use super::peripherals::pwr::Pwr;
 use super::peripherals::rcc::{Cause, Rcc};
-use super::peripherals::spi::{AngleSensor, Spi};
+use super::peripherals::spi::{self, AngleSensor, Spi};
 use super::peripherals::syscfg::Syscfg;
 use super::peripherals::system::{Counter, System};
 use super::peripherals::time_base::TimeBase;
@@ -157,9 +157,6 @@ impl Chip {
     pub fn advance(&mut self, now: u64) {
         self.system.advance(now);
         self.time.advance(now);
-        for motor in &mut self.motors {
-            motor.advance(now);
-        }
         self.adc.advance(now);
         if let Some(frame) = self.spi.over(now) {
             let answer = self.exchange(frame);
@@ -168,7 +165,17 @@ impl Chip {
         if self.watchdog.has_bitten(now) {
             self.reset = Some(Cause::Watchdog);
         }
-        self.settle(now);
+        let mut turned = false;
+        for motor in &mut self.motors {
+            if motor.deadline() <= now {
+                motor.advance(now);
+                turned = true;
+            }
+        }
+        if turned {
+            self.settle_pins(now);
+        }
+        self.settle_lines(now);
     }
 
     /// The core has locked up.
@@ -178,6 +185,7 @@ impl Chip {
                 motor.lock_up(now);
             }
             self.advance(now);
+            self.settle(now);
         }
     }
 
@@ -193,6 +201,9 @@ impl Chip {
             self.spi.has_word(),
             self.spi.wants_word(),
         ];
+        if asked == [false; REQUESTS.len()] {
+            return None;
+        }
         (0..CHANNELS).find_map(|channel| {
             let request = self.mux.request(channel);
             let source = REQUESTS.iter().position(|known| *known == request)?;
@@ -203,7 +214,7 @@ impl Chip {
     /// A transfer is done, or met an address where nothing lies.
     pub fn moved(&mut self, channel: usize, found: bool, now: u64) {
         self.dma.moved(channel, found);
-        self.settle(now);
+        self.settle_lines(now);
     }
 
     /// Lets everything that follows from a change follow: pins, lines, deadlines.
@@ -218,8 +229,10 @@ impl Chip {
             Block::Port(_) | Block::Syscfg | Block::Motor(_) | Block::Exti if write => {
                 self.settle(now);
             }
-            // A converter's or a bus's data register is changed by being read.
-            Block::Adc | Block::Spi => self.settle_lines(now),
+            Block::Adc | Block::Spi if write => self.settle_lines(now),
+            // Their data registers are changed by being read.
+            Block::Adc if offset & 0xFF == adc::DR => self.settle_lines(now),
+            Block::Spi if offset == spi::DR => self.settle_lines(now),
             Block::Time | Block::Dma | Block::Mux | Block::Watchdog if write => {
                 self.settle_lines(now);
             }

@@ -13,7 +13,8 @@ const CFGR: u32 = 0x0C;
 const CFGR2: u32 = 0x10;
 const SMPR1: u32 = 0x14;
 const SQR1: u32 = 0x30;
-const DR: u32 = 0x40;
+/// Data register.
+pub(in crate::board) const DR: u32 = 0x40;
 const COMMON: u32 = 0x300;
 const CCR: u32 = 0x308;
 

@@ -22,6 +22,8 @@ struct Printed<'a> {
     #[serde(flatten)]
     summary: &'a crate::record::Summary,
     account: &'a crate::board::load::Load,
+    /// Budgets that the account misses.
+    missed: &'a [String],
     files: &'a [std::path::PathBuf],
 }
 
@@ -31,6 +33,7 @@ pub(super) fn run(
     scenario: &Scenario,
     directory: Option<&Path>,
 ) -> Result<Outcome, Failure> {
+    use crate::bench::budget::Budget;
     use crate::board::run;
     use crate::cli::output;
     use crate::firmware::{self, Profile};
@@ -63,9 +66,10 @@ pub(super) fn run(
     for stray in &ran.load.unmodelled {
         eprintln!("warning: {stray}");
     }
-    let printed = Printed { summary, account: &ran.load, files: &files };
+    let missed = ran.load.missed(&Budget::shipped().map_err(Failure::run)?.board);
+    let printed = Printed { summary, account: &ran.load, missed: &missed, files: &files };
     output::result(args.json, &printed, || {
-        table::run(summary, &files) + &account::text(&ran.load)
+        table::run(summary, &files) + &account::text(&ran.load, &missed)
     })?;
     let clean = ran.load.unmodelled.is_empty();
     Ok(Outcome::of(summary.completed && summary.faults.is_empty() && clean))
