@@ -7,9 +7,10 @@ use std::sync::OnceLock;
 use hil_sim::bench::budget::Budget;
 use hil_sim::board::bench::Bench;
 use hil_sim::board::chip::Pin;
+use hil_sim::board::faults::Fault;
 use hil_sim::board::log::{Line, Strings};
 use hil_sim::board::peripherals::rcc::Cause;
-use hil_sim::board::run::{self, Ran};
+use hil_sim::board::run::{self, Asked, Ran};
 use hil_sim::firmware::{self, Profile};
 use hil_sim::record::{CrossingLine, Summary};
 use hil_sim::scenario::{Direction, Scenario};
@@ -108,7 +109,7 @@ impl Board {
 }
 
 fn ran(sets: &[&str]) -> Ran {
-    run::run(elf(), &scenario(sets), false, |_, _| {}).expect("a run")
+    run::run(elf(), &scenario(sets), &Asked::default(), |_, _| {}).expect("a run")
 }
 
 /// The software on the same rig, started at several moments: sensor noise differs, and
@@ -323,15 +324,60 @@ fn an_interrupt_flag_that_is_not_cleared_is_caught() {
 #[test]
 fn a_lost_angle_sensor_is_a_fault_of_its_own() {
     let mut board = Board::idle(&[]);
-    board.bench.machine_mut().chip_mut().angle.lost = true;
+    Fault::AngleLost.strike(board.bench.machine_mut()).expect("strikes");
     board.until("fault 104", 200);
 }
 
 #[test]
 fn a_dma_that_stands_still_is_a_fault_and_no_hang() {
     let mut board = Board::idle(&[]);
-    board.bench.machine_mut().chip_mut().defects.dma_stalled = true;
+    Fault::DmaStalled.strike(board.bench.machine_mut()).expect("strikes");
     board.until("] fault ", 200);
     board.run(300);
     assert!(board.bench.machine().restarts().is_empty(), "the tasks go on");
+}
+
+/// A run with a fault that comes when this is logged; what is logged after that.
+fn struck(text: &str, fault: Fault, milliseconds: u32) -> (Board, Vec<String>) {
+    let mut board = Board::idle(&[]);
+    board.send(b's');
+    board.until(text, 8000);
+    let from = board.log.len();
+    fault.strike(board.bench.machine_mut()).expect("strikes");
+    board.run(milliseconds);
+    let lines = board.log[from..].iter().map(|line| line.text.clone()).collect();
+    (board, lines)
+}
+
+#[test]
+fn a_broken_sensor_under_way_stops_the_drive_with_a_fault() {
+    for fault in [
+        Fault::StuckCode(0, 0xFFFF),
+        Fault::StuckCode(1, 0),
+        Fault::BitErrors(1 << 9),
+        Fault::AngleLost,
+        Fault::EncoderLine(1),
+        Fault::DmaStalled,
+    ] {
+        let (mut board, lines) = struck("deploying: approach", fault, 1500);
+        assert!(lines.iter().any(|line| line.contains("] fault ")), "{fault}: {lines:#?}");
+        assert!(!board.drives(300), "{fault}");
+        assert!(board.bench.machine().restarts().is_empty(), "{fault}: the tasks live on");
+    }
+}
+
+#[test]
+fn bit_errors_that_pass_are_ridden_out() {
+    let mut board = Board::idle(&[]);
+    board.send(b's');
+    board.until("deploying: approach", 8000);
+    for _ in 0..5 {
+        let fault = Fault::BitErrors(1 << 5);
+        fault.strike(board.bench.machine_mut()).expect("strikes");
+        board.run(3);
+        fault.heal(board.bench.machine_mut());
+        board.run(40);
+    }
+    assert!(!board.said("] fault "), "{:#?}", board.log);
+    board.until("mode: deployed", 20_000);
 }

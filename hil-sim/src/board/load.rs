@@ -3,6 +3,8 @@
 //! Cycles are textbook ones, see [`super::timing`]. The start of the program, which
 //! builds the controller's tables, is left out: counting begins when the drive is idle.
 
+pub mod page;
+
 use std::collections::BTreeMap;
 
 use serde::Serialize;

@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use super::bench::{Bench, BenchError};
 use super::elf::RAM;
+use super::faults::Timed;
 use super::load::{Gathered, Load};
 use super::log::{Line, Strings};
 use super::machine::Machine;
@@ -61,15 +62,24 @@ pub fn check(scenario: &Scenario) -> Result<(), RunError> {
     Ok(())
 }
 
-/// Runs a scenario on the board with the image in `elf`; rows are kept if asked. Each
-/// line of the log is shown to `watch` as it comes.
+/// What is asked of a run beside its scenario.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Asked {
+    /// Keep one row a millisecond.
+    pub rows: bool,
+    /// Faults of the hardware that come while it goes on.
+    pub faults: Vec<Timed>,
+}
+
+/// Runs a scenario on the board with the image in `elf`. Each line of the log is shown to
+/// `watch` as it comes.
 ///
 /// # Errors
 /// [`RunError`] if the run cannot be made. One that ends in a fault is a result.
 pub fn run(
     elf: &[u8],
     scenario: &Scenario,
-    rows: bool,
+    asked: &Asked,
     mut watch: impl FnMut(f64, &Line),
 ) -> Result<Ran, RunError> {
     check(scenario)?;
@@ -84,7 +94,12 @@ pub fn run(
     let started = Instant::now();
     let mut after = AFTER;
     let mut gathered = Gathered::default();
+    let mut faults = asked.faults.clone();
     while bench.time_s() < LONGEST_S && after > 0 {
+        let now = bench.time_s();
+        for due in faults.extract_if(.., |due| due.at_s <= now) {
+            due.fault.strike(bench.machine_mut()).map_err(BenchError::from)?;
+        }
         if trace.is_idle()
             && let Some(letter) = start
             && bench.send(letter)?
@@ -97,7 +112,7 @@ pub fn run(
             watch(bench.time_s(), line);
         }
         gathered.gather(bench.machine_mut(), trace.mode());
-        trace.look(&passed, &lines, bench.plant().truth(), rows);
+        trace.look(&passed, &lines, bench.plant().truth(), asked.rows);
         if trace.is_over() {
             after -= 1;
         }

@@ -7,7 +7,8 @@
 use std::collections::HashSet;
 
 use unicorn_engine::{
-    Arch, ArmCpuModel, MemType, Mode, Prot, RegisterARM, TlbEntry, TlbType, Unicorn, uc_error,
+    Arch, ArmCpuModel, HookType, MemType, Mode, Prot, RegisterARM, TlbEntry, TlbType, Unicorn,
+    uc_error,
 };
 
 use super::{
@@ -334,6 +335,19 @@ impl<B: Bus + 'static> UnicornCore<B> {
             false
         });
         engine("hook waiting", invalid)?;
+        let (first, last) = (counted.base, counted.base + (counted.bytes.len() as u32 - 1));
+        let (first, last) = (first.into(), last.into());
+        let kind = HookType::MEM_WRITE_PROT;
+        let protected = uc.add_mem_hook(kind, first, last, |uc, _, address, size, value| {
+            let access = Touch {
+                address: address as u32,
+                size: size as u32,
+                pc: uc.pc_read().unwrap_or_default() as u32 & !1,
+                now: uc.get_data().count.meter.cycles,
+            };
+            uc.get_data_mut().bus.write_code(access, value as u32)
+        });
+        engine("hook writes to code", protected)?;
         for range in counted.code {
             let bytes = (range.start.wrapping_sub(counted.base) as usize)
                 ..(range.end.wrapping_sub(counted.base) as usize);

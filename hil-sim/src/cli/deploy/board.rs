@@ -34,12 +34,17 @@ pub(super) fn run(
     directory: Option<&Path>,
 ) -> Result<Outcome, Failure> {
     use crate::bench::budget::Budget;
-    use crate::board::run;
+    use crate::board::load::page;
+    use crate::board::run::{self, Asked};
     use crate::cli::output;
     use crate::firmware::{self, Profile};
+    use crate::report::Section;
     use crate::{progress, table};
 
     run::check(scenario).map_err(Failure::input)?;
+    let faults: Result<Vec<_>, _> = args.board_fault.iter().map(|text| text.parse()).collect();
+    let faults = faults.map_err(|error| Failure::input(format!("--board-fault {error}")))?;
+    let asked = Asked { rows: directory.is_some(), faults };
     let elf = firmware::build(Profile::Release)?;
     let image = std::fs::read(&elf)
         .map_err(|source| firmware::FirmwareError::Read { path: elf.clone(), source })?;
@@ -50,11 +55,13 @@ pub(super) fn run(
                 eprintln!("[{t_s:8.3}] {:<5} {}", line.level, line.text);
             }
         };
-        run::run(&image, scenario, directory.is_some(), show).map_err(Failure::run)?
+        run::run(&image, scenario, &asked, show).map_err(Failure::run)?
     };
+    let missed = ran.load.missed(&Budget::shipped().map_err(Failure::run)?.board);
     let mut files = Vec::new();
     if let Some(directory) = directory {
-        files = super::write(&ran.recording, directory)?;
+        let account = Section { title: page::TITLE, body: page::html(&ran.load, &missed) };
+        files = super::write(&ran.recording, &[account], directory)?;
         let log = directory.join("log.txt");
         let lines = ran.recording.log.iter();
         let text: String =
@@ -66,7 +73,6 @@ pub(super) fn run(
     for stray in &ran.load.unmodelled {
         eprintln!("warning: {stray}");
     }
-    let missed = ran.load.missed(&Budget::shipped().map_err(Failure::run)?.board);
     let printed = Printed { summary, account: &ran.load, missed: &missed, files: &files };
     output::result(args.json, &printed, || {
         table::run(summary, &files) + &account::text(&ran.load, &missed)
