@@ -4,10 +4,11 @@ use embassy_time::Timer;
 use interstage::control::Controller;
 use interstage::hal::{Indicator, Light, MotorCommand, Motors, Parts};
 use interstage::model::Planner;
+use interstage::params::service::{Service, in_force};
 use interstage::params::{Header, ParameterSet, SetError};
 use static_cell::StaticCell;
 
-use super::Nucleo;
+use super::{Nucleo, Pages};
 
 /// The set that the image carries: the prototype, written by `cargo rig constants`.
 static PROTOTYPE: &[u8] = include_bytes!("../params/prototype.set");
@@ -15,9 +16,22 @@ static PROTOTYPE: &[u8] = include_bytes!("../params/prototype.set");
 static CONTROLLER: StaticCell<Controller> = StaticCell::new();
 static PLANNER: StaticCell<Planner> = StaticCell::new();
 
-/// Controller and planner of the set, in place for good. Call once.
-pub(crate) fn build() -> Result<(&'static Controller, &'static Planner), SetError> {
-    let set = ParameterSet::open(PROTOTYPE)?;
+/// What the tasks run on.
+pub(crate) type Constants = (&'static Controller, &'static Planner);
+
+/// Controller and planner of the set in force, in place for good, and the service that
+/// can replace it. Call once.
+///
+/// A stored set that the firmware cannot run is not passed over for another one: the
+/// drive would move by parameters that nobody chose.
+pub(crate) fn build(pages: Pages) -> (Result<Constants, SetError>, Service<Pages>) {
+    let (_, set) = in_force(&pages, PROTOTYPE);
+    let running = ParameterSet::open_any(set).map_or(0, |set| set.header().parameters);
+    (constants(set), Service::new(pages, PROTOTYPE, running))
+}
+
+fn constants(set: &[u8]) -> Result<Constants, SetError> {
+    let set = ParameterSet::open(set)?;
     let (controller, rest) = set.controller()?;
     let controller = CONTROLLER.init(controller);
     let planner = PLANNER.init(rest.planner()?);

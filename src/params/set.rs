@@ -159,7 +159,7 @@ impl Rest<'_> {
 
 /// CRC-32 (ISO-HDLC).
 #[must_use]
-pub(super) fn checksum(bytes: &[u8]) -> u32 {
+pub(crate) fn checksum(bytes: &[u8]) -> u32 {
     CRC.checksum(bytes)
 }
 
