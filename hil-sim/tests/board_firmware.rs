@@ -311,12 +311,15 @@ fn an_interrupt_flag_that_is_not_cleared_is_caught() {
     machine.peek(range.start, &mut code).expect("flash");
     let half = |at: usize| u16::from_le_bytes([code[at], code[at + 1]]);
     let inverts = |half: u16| half & 0xFFC0 == 0x43C0;
-    let stores = |half: u16| half & 0xF800 == 0x6000;
+    // The long or the short form of a store.
+    let stores = |half: u16| half & 0xFFF0 == 0xF8C0 || half & 0xF800 == 0x6000;
     let place = (0..code.len() - 2)
         .step_by(2)
         .find(|at| inverts(half(*at)) && stores(half(*at + 2)))
         .expect("the write");
-    machine.poke(range.start + place as u32 + 2, &[0x00, 0xBF]).expect("flash");
+    let nop: &[u8] =
+        if half(place + 2) & 0xFFF0 == 0xF8C0 { &[0xAF, 0xF3, 0x00, 0x80] } else { &[0x00, 0xBF] };
+    machine.poke(range.start + place as u32 + 2, nop).expect("flash");
     board.run(2000);
     assert!(!board.said("mode: idle"), "it came up as if nothing were: {:#?}", board.log);
 }

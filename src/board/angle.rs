@@ -19,9 +19,9 @@ const READ_ANGLE: u16 = 0xFFFF;
 /// 170 MHz / 32. The sensor takes 10 MHz; the next divider would give 10.6.
 const CLOCK: Hertz = Hertz(5_312_500);
 
-/// Least time from select to clock, and between frames, is 350 ns or 60 cycles. The
-/// delay counts two for a round that takes this core three at least.
-const SELECT_CYCLES: u32 = 40;
+/// Least time from select to clock, and between frames, is 350 ns or 60 cycles: the
+/// delay goes round once more than this, and a round takes the core three at least.
+const SELECT_ROUNDS: u32 = 20;
 
 /// The sensor on its bus.
 pub(crate) struct Angle {
@@ -54,7 +54,7 @@ impl Angle {
     fn exchange(&mut self) -> Result<u16, BusFault> {
         let mut word = [READ_ANGLE];
         self.select.set_low();
-        cortex_m::asm::delay(SELECT_CYCLES);
+        cortex_m::asm::delay(SELECT_ROUNDS);
         let done = self.bus.blocking_transfer_in_place(&mut word);
         self.select.set_high();
         done.map(|()| word[0]).map_err(|_| BusFault::Transfer)
@@ -66,7 +66,7 @@ impl AngleBus for Angle {
         // Two frames, because the answer to the last call's command is a whole
         // sampling period old.
         self.exchange()?;
-        cortex_m::asm::delay(SELECT_CYCLES);
+        cortex_m::asm::delay(SELECT_ROUNDS);
         self.exchange().map(AngleFrame::new)
     }
 }

@@ -223,6 +223,9 @@ fn compares_under_interrupts() -> bool {
     above == same && wide == also && float == 12_500.0 && BEATS.load(Ordering::Relaxed) > 1000
 }
 
+/// The emulator counts the cycles of a straight piece of code as a whole: it has to end
+/// behind the reading.
+#[inline(never)]
 fn cycle_counter() -> bool {
     // SAFETY: the counter is this check's own.
     let mut core = unsafe { Peripherals::steal() };
