@@ -193,7 +193,7 @@ mod tests {
     fn truth(preload_n: f64, separation_mm: f64) -> Truth {
         let scenario = Scenario::resolve(Some("prototype"), None, &[]).expect("a scenario");
         let plant = VirtualRig::new(PlantParameters::draw(&scenario), 0.0, 0.0, TICK_S);
-        Truth { preload_n, separation_mm, ..plant.truth().clone() }
+        Truth { preload_n, separation_mm, ..*plant.truth() }
     }
 
     #[test]
