@@ -40,11 +40,23 @@ pub struct Section {
     pub body: String,
 }
 
-/// Writes the page of `recording` with these sections more to `path`.
+/// Writes the page of `recording` to `path`.
 ///
 /// # Errors
 /// [`ExportError::File`] with the reason.
-pub fn write_html(recording: &Recording, more: &[Section], path: &Path) -> Result<(), ExportError> {
+pub fn write_html(recording: &Recording, path: &Path) -> Result<(), ExportError> {
+    write_html_with(recording, &[], path)
+}
+
+/// The same with these sections more.
+///
+/// # Errors
+/// As [`write_html`].
+pub fn write_html_with(
+    recording: &Recording,
+    more: &[Section],
+    path: &Path,
+) -> Result<(), ExportError> {
     write_text(path, &page::html(recording, more))
 }
 

@@ -10,7 +10,7 @@ use hil_sim::board::chip::Pin;
 use hil_sim::board::faults::Fault;
 use hil_sim::board::log::{Line, Strings};
 use hil_sim::board::peripherals::rcc::Cause;
-use hil_sim::board::run::{self, Asked, Ran};
+use hil_sim::board::run::{self, Ran};
 use hil_sim::firmware::{self, Profile};
 use hil_sim::record::{CrossingLine, Summary};
 use hil_sim::scenario::{Direction, Scenario};
@@ -109,7 +109,7 @@ impl Board {
 }
 
 fn ran(sets: &[&str]) -> Ran {
-    run::run(elf(), &scenario(sets), &Asked::default(), |_, _| {}).expect("a run")
+    run::run(elf(), &scenario(sets), false, |_, _| {}).expect("a run")
 }
 
 /// The software on the same rig, started at several moments: sensor noise differs, and

@@ -182,19 +182,9 @@ impl Gathered {
         }
     }
 
-    /// The account of a run of the image in `elf`.
-    ///
-    /// # Errors
-    /// [`ImageError`] if its debug information cannot be read.
-    pub fn close(
-        self,
-        machine: &mut Machine,
-        elf: &[u8],
-        footprint: &Footprint,
-        stack_used: u32,
-    ) -> Result<Load, ImageError> {
-        let heat = machine.take_heat();
-        let functions = by_function(elf, machine.image(), &heat)?;
+    /// The account; functions are not told apart yet.
+    #[must_use]
+    pub fn close(self, machine: &Machine, footprint: &Footprint, stack_used: u32) -> Load {
         let (from, slept) = self.from.unwrap_or_default();
         let cycles = machine.now() - from;
         let idle = (machine.profile().slept() - slept) as f64 / cycles.max(1) as f64;
@@ -217,7 +207,7 @@ impl Gathered {
                 latency_worst: share.worst_latency,
             }
         };
-        Ok(Load {
+        Load {
             clock_hz: HZ,
             cycles,
             load: 1.0 - idle,
@@ -232,13 +222,13 @@ impl Gathered {
                 .filter(|(number, _)| *number != THREAD)
                 .map(interrupt)
                 .collect(),
-            functions: spent(functions, cycles),
+            functions: Vec::new(),
             stack_used,
             stack: footprint.stack(),
             flash: footprint.flash(),
             ram: footprint.ram(),
             unmodelled: machine.chip().strays().iter().copied().collect(),
-        })
+        }
     }
 }
 
@@ -286,6 +276,17 @@ fn vector(number: u8) -> String {
 }
 
 impl Load {
+    /// Tells apart the functions that the cycles since the account's beginning went to;
+    /// `elf` is the image.
+    ///
+    /// # Errors
+    /// [`ImageError`] if its debug information cannot be read.
+    pub fn name_functions(&mut self, machine: &mut Machine, elf: &[u8]) -> Result<(), ImageError> {
+        let heat = machine.take_heat();
+        self.functions = spent(by_function(elf, machine.image(), &heat)?, self.cycles);
+        Ok(())
+    }
+
     /// Holds the account against its budgets; says which is missed.
     #[must_use]
     pub fn missed(&self, budget: &BoardBudget) -> Vec<String> {

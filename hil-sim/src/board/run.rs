@@ -71,12 +71,25 @@ pub struct Asked {
     pub faults: Vec<Timed>,
 }
 
-/// Runs a scenario on the board with the image in `elf`. Each line of the log is shown to
-/// `watch` as it comes.
+/// Runs a scenario on the board with the image in `elf`; rows are kept if asked. Each
+/// line of the log is shown to `watch` as it comes.
 ///
 /// # Errors
 /// [`RunError`] if the run cannot be made. One that ends in a fault is a result.
 pub fn run(
+    elf: &[u8],
+    scenario: &Scenario,
+    rows: bool,
+    watch: impl FnMut(f64, &Line),
+) -> Result<Ran, RunError> {
+    run_with(elf, scenario, &Asked { rows, ..Asked::default() }, watch)
+}
+
+/// The same with all that may be asked.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_with(
     elf: &[u8],
     scenario: &Scenario,
     asked: &Asked,
@@ -120,7 +133,8 @@ pub fn run(
     let recording = trace.finish(scenario, bench.plant(), started.elapsed().as_secs_f64());
     let mut machine = bench.into_machine();
     let stack = stack_used(&machine)?;
-    let load = gathered.close(&mut machine, elf, &footprint, stack).map_err(BenchError::from)?;
+    let mut load = gathered.close(&machine, &footprint, stack);
+    load.name_functions(&mut machine, elf).map_err(BenchError::from)?;
     Ok(Ran { recording, load, machine })
 }
 

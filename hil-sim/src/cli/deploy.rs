@@ -123,7 +123,7 @@ fn write(
 ) -> Result<Vec<PathBuf>, Failure> {
     let mut files = export::write_all(recording, directory)?;
     let page = directory.join("report.html");
-    report::write_html(recording, more, &page)?;
+    report::write_html_with(recording, more, &page)?;
     files.insert(0, page);
     Ok(files)
 }

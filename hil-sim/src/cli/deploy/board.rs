@@ -55,7 +55,7 @@ pub(super) fn run(
                 eprintln!("[{t_s:8.3}] {:<5} {}", line.level, line.text);
             }
         };
-        run::run(&image, scenario, &asked, show).map_err(Failure::run)?
+        run::run_with(&image, scenario, &asked, show).map_err(Failure::run)?
     };
     let missed = ran.load.missed(&Budget::shipped().map_err(Failure::run)?.board);
     let mut files = Vec::new();
