@@ -16,7 +16,7 @@ mod line;
 pub(crate) mod rtt;
 mod wheel;
 
-pub(crate) use analog::Analog;
+pub(crate) use analog::{Analog, Ring};
 pub(crate) use angle::Angle;
 pub(crate) use bridge::{Bridge, Bridges};
 pub(crate) use button::Button;
@@ -28,7 +28,7 @@ pub(crate) use light::Lamp;
 pub(crate) use line::HostLine;
 pub(crate) use wheel::Wheel;
 
-use embassy_stm32::peripherals::{ADC1, ADC2, DMA1_CH1, DMA1_CH2, DMA1_CH3, DMA1_CH4};
+use embassy_stm32::peripherals::{ADC1, ADC2, DMA1_CH1, DMA1_CH2};
 use embassy_stm32::{Config, bind_interrupts, dma, exti, flash as flash_driver, interrupt, rcc};
 use interstage::hal::Board;
 
@@ -37,8 +37,8 @@ pub(crate) struct Nucleo;
 
 impl Board for Nucleo {
     type Wheel = Wheel;
-    type LoadCell = Analog<ADC1, DMA1_CH1>;
-    type Tread = Analog<ADC2, DMA1_CH2>;
+    type LoadCell = Analog<ADC1>;
+    type Tread = Analog<ADC2>;
     type Arm = Angle;
     type Motors = Bridges;
     type Watchdog = Guard;
@@ -51,8 +51,6 @@ impl Board for Nucleo {
 bind_interrupts!(pub(crate) struct Irqs {
     DMA1_CHANNEL1 => dma::InterruptHandler<DMA1_CH1>;
     DMA1_CHANNEL2 => dma::InterruptHandler<DMA1_CH2>;
-    DMA1_CHANNEL3 => dma::InterruptHandler<DMA1_CH3>;
-    DMA1_CHANNEL4 => dma::InterruptHandler<DMA1_CH4>;
     FLASH => flash_driver::InterruptHandler;
     EXTI15_10 => exti::InterruptHandler<interrupt::typelevel::EXTI15_10>;
 });

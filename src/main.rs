@@ -19,7 +19,7 @@ mod firmware {
     use embassy_executor::{InterruptExecutor, Spawner};
     use embassy_stm32::gpio::AnyPin;
     use embassy_stm32::interrupt::{self, InterruptExt, Priority};
-    use embassy_stm32::{Peri, Peripherals};
+    use embassy_stm32::{Peri, Peripherals, pac};
     use interstage::control::Controller;
     use interstage::hal::{Board, Parts};
     use interstage::model::Planner;
@@ -31,20 +31,22 @@ mod firmware {
     use crate::board::rtt::Frames;
     use crate::board::{self, config, guard, light, rtt};
     use crate::board::{Analog, Angle, Bridge, Bridges, Button, Console, Guard, HostLine, Lamp};
-    use crate::board::{Lines, Nucleo, Pages, Wheel};
+    use crate::board::{Lines, Nucleo, Pages, Ring, Wheel};
 
     /// Any pin.
     type Pin = Peri<'static, AnyPin>;
 
     static EXCHANGE: Exchange = Exchange::new();
+    static LOAD_CELL: Ring = Ring::new();
+    static TREAD: Ring = Ring::new();
 
     /// Runs the control tick and the sensors, above everything that may take long.
     ///
     /// The deadline is the next tick, 1 ms on. What can delay this executor: the
-    /// interrupts above it, which only wake tasks (time driver, four DMA channels,
+    /// interrupts above it, which only wake tasks (time driver, two DMA channels,
     /// button), and critical sections, of which the longest encodes one log frame,
     /// bounded by its buffer. What can delay the tick on it: the four sensor tasks,
-    /// each of which starts or fetches one transfer and then waits. Model, log and
+    /// of which the longest exchanges two frames of 3 us. Model, log and
     /// operator run in thread mode and are preempted, however long they take. The
     /// tick measures its own lateness, and a whole period of it is a fault.
     static CONTROL: InterruptExecutor = InterruptExecutor::new();
@@ -81,9 +83,9 @@ mod firmware {
     fn split(p: Peripherals, console: DownChannel, frames: Frames) -> (Parts<Nucleo>, Pin, Pages) {
         let parts = Parts {
             wheel: Wheel::new(p.TIM5, p.PA0, p.PA1),
-            load_cell: Analog::new(p.ADC1, p.PC2, p.DMA1_CH1),
-            tread: Analog::new(p.ADC2, p.PC3, p.DMA1_CH2),
-            arm: Angle::new(p.SPI1, (p.PB3, p.PA7, p.PA6), (p.DMA1_CH4, p.DMA1_CH3), p.PB10.into()),
+            load_cell: Analog::new((p.ADC1, pac::ADC1), p.PC2, p.DMA1_CH1, &LOAD_CELL),
+            tread: Analog::new((p.ADC2, pac::ADC2), p.PC3, p.DMA1_CH2, &TREAD),
+            arm: Angle::new(p.SPI1, (p.PB3, p.PA7, p.PA6), p.PB10.into()),
             motors: Bridges {
                 drive: Bridge::new(p.TIM1, p.PA8, p.PA9.into(), p.PA10.into(), p.PB12),
                 preload: Bridge::new(p.TIM8, p.PC6, p.PC8.into(), p.PC9.into(), p.PB7),

@@ -7,6 +7,8 @@ pub mod chip;
 pub mod core;
 pub mod elf;
 pub mod exceptions;
+pub mod faults;
+pub mod heat;
 pub mod image;
 pub mod load;
 pub mod log;

@@ -30,7 +30,16 @@ pub use overview::overview_svg;
 /// The page of `recording`. It needs no other file and no script.
 #[must_use]
 pub fn html(recording: &Recording) -> String {
-    page::html(recording)
+    page::html(recording, &[])
+}
+
+/// A section of a page beside those that every run has.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Section {
+    /// Its heading.
+    pub title: &'static str,
+    /// What stands in it, as HTML.
+    pub body: String,
 }
 
 /// Writes the page of `recording` to `path`.
@@ -38,7 +47,19 @@ pub fn html(recording: &Recording) -> String {
 /// # Errors
 /// [`ExportError::File`] with the reason.
 pub fn write_html(recording: &Recording, path: &Path) -> Result<(), ExportError> {
-    write_text(path, &html(recording))
+    write_html_with(recording, &[], path)
+}
+
+/// The same with these sections more.
+///
+/// # Errors
+/// As [`write_html`].
+pub fn write_html_with(
+    recording: &Recording,
+    more: &[Section],
+    path: &Path,
+) -> Result<(), ExportError> {
+    write_text(path, &page::html(recording, more))
 }
 
 #[cfg(test)]

@@ -16,7 +16,7 @@ use interstage::supervise::{Command, Mode};
 
 use crate::plant::limits::Refusal;
 use crate::plant::rig::PlantError;
-use crate::record::{LogLine, Recording, Report, Row};
+use crate::record::{LogLine, Recording, Report};
 use crate::scenario::{ControllerKind, Direction, Scenario};
 
 pub use account::{PhaseAccount, PlantAccount, account, account_of};
@@ -118,6 +118,3 @@ fn report(t_s: f64, event: &Event) -> (LogLine, Option<(bool, Report)>) {
         found.map(|(latched, code, text)| (latched, Report { t_s, code, text: text.to_owned() }));
     (line, found)
 }
-
-/// Row of a tick.
-type Rows = Vec<Row>;

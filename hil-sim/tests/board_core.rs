@@ -7,7 +7,7 @@ use hil_sim::board::machine::Machine;
 use hil_sim::firmware::{Profile, build_binary};
 
 /// What the program checks, in its order.
-const CHECKS: [&str; 15] = [
+const CHECKS: [&str; 16] = [
     "supervisor calls",
     "conditional blocks",
     "floating point kept across an interrupt",
@@ -23,6 +23,7 @@ const CHECKS: [&str; 15] = [
     "square root, quotient, conversion",
     "compares while a timer interrupts",
     "cycle counter",
+    "programming and erasing the flash",
 ];
 
 /// Enough for all of them.

@@ -11,8 +11,9 @@ use std::cell::{Cell, RefCell};
 use std::future::{Future, pending, poll_fn};
 use std::pin::Pin;
 use std::rc::Rc;
-use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::task::{Context, Poll, Waker};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::task::{Context, Poll, Wake, Waker};
 
 use common::{Bench, Moment, NO_SLIP_MM, RIGS, STEP_CODES, WAYS, back, end_mm, scenario, starter};
 use embassy_time::{Duration, Instant, MockDriver};
@@ -155,6 +156,15 @@ struct Board {
     _clock: MutexGuard<'static, ()>,
 }
 
+/// Whether the task that runs has asked to be run again.
+struct Again(AtomicBool);
+
+impl Wake for Again {
+    fn wake(self: Arc<Self>) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
 /// Something that lives as long as the test process, as a `static` would.
 fn forever<T>(value: T) -> &'static T {
     Box::leak(Box::new(value))
@@ -208,10 +218,16 @@ impl Board {
         }
     }
 
+    /// Lets every task run once, and those again that have woken themselves meanwhile.
     fn poll(&mut self) {
-        let mut context = Context::from_waker(Waker::noop());
+        let again = Arc::new(Again(AtomicBool::new(false)));
+        let waker = Waker::from(again.clone());
+        let mut context = Context::from_waker(&waker);
         for task in &mut self.tasks {
-            assert_eq!(task.as_mut().poll(&mut context), Poll::Pending, "a task returned");
+            again.0.store(true, Ordering::Relaxed);
+            while again.0.swap(false, Ordering::Relaxed) {
+                assert_eq!(task.as_mut().poll(&mut context), Poll::Pending, "a task returned");
+            }
         }
     }
 

@@ -1,15 +1,22 @@
 //! The two analogue sensors: one converter and one DMA channel each, so that
 //! neither waits for the other.
+//!
+//! Each converts without end and DMA puts its codes into a ring; who samples takes the
+//! latest and goes on. Nothing is started and nothing waited for, so that a sample costs
+//! no interrupt and no second turn of its task.
 
 use embassy_stm32::adc::{
-    Adc, AdcChannel, AdcConfig, AnyAdcChannel, DefaultInstance, Resolution, Rovsm, RxDma,
-    SampleTime, Trovs,
+    Adc, AdcChannel, AdcConfig, CONTINUOUS, DefaultInstance, Resolution, RingBufferedAdc, Rovsm,
+    RxDma, SampleTime, Trovs,
 };
 use embassy_stm32::interrupt::typelevel::Binding;
-use embassy_stm32::{Peri, PeripheralType, dma};
-use embassy_time::{Duration, with_timeout};
+use embassy_stm32::pac::adc::Adc as Registers;
+use embassy_stm32::pac::adc::vals::Exten;
+use embassy_stm32::{Peri, dma};
+use embassy_time::{Duration, Timer};
 use interstage::hal::AnalogInput;
 use interstage::sense::raw::{AdcCode, BusFault};
+use static_cell::StaticCell;
 
 use super::Irqs;
 
@@ -23,20 +30,37 @@ const SHIFT: u8 = 4;
 /// three times that will not come.
 const LIMIT: Duration = Duration::from_micros(500);
 
-/// One sensor on its converter.
-pub(crate) struct Analog<T: DefaultInstance, D: PeripheralType + 'static> {
-    adc: Adc<'static, T>,
-    channel: AnyAdcChannel<'static, T>,
-    dma: Peri<'static, D>,
+/// Codes in a ring: 9.6 ms of them. DMA interrupts twice in that time.
+const RING: usize = 64;
+
+/// Where DMA puts the codes of a sensor.
+pub(crate) struct Ring(StaticCell<[u16; RING]>);
+
+impl Ring {
+    /// An empty one.
+    pub(crate) const fn new() -> Self {
+        Self(StaticCell::new())
+    }
 }
 
-impl<T: DefaultInstance, D: PeripheralType + 'static> Analog<T, D> {
-    /// Calibrates the converter and takes `pin` as its one channel.
-    pub(crate) fn new(
-        adc: Peri<'static, T>,
+/// One sensor on its converter.
+pub(crate) struct Analog<T: DefaultInstance> {
+    registers: Registers,
+    codes: RingBufferedAdc<'static, T>,
+}
+
+impl<T: DefaultInstance> Analog<T> {
+    /// Calibrates the converter with these registers and has it convert `pin` from now
+    /// on. Each ring serves once.
+    pub(crate) fn new<D: RxDma<T>>(
+        (adc, registers): (Peri<'static, T>, Registers),
         pin: impl AdcChannel<T> + 'static,
         dma: Peri<'static, D>,
-    ) -> Self {
+        ring: &'static Ring,
+    ) -> Self
+    where
+        Irqs: Binding<D::Interrupt, dma::InterruptHandler<D>>,
+    {
         let config = AdcConfig {
             resolution: Some(Resolution::BITS12),
             oversampling_ratio: Some(RATIO_256),
@@ -44,21 +68,38 @@ impl<T: DefaultInstance, D: PeripheralType + 'static> Analog<T, D> {
             oversampling_mode: Some((Rovsm::CONTINUED, Trovs::AUTOMATIC, true)),
             ..AdcConfig::default()
         };
-        Self { adc: Adc::new(adc, config), channel: pin.degrade_adc(), dma }
+        // The amplifiers are buffered: the shortest sampling time that the slow
+        // channels allow suffices, and the average counts for more.
+        let sequence = [(pin.degrade_adc(), SampleTime::CYCLES12_5)];
+        let ring = ring.0.init([0; RING]);
+        let mut codes = Adc::new(adc, config).into_ring_buffered(
+            dma,
+            ring,
+            Irqs,
+            sequence.into_iter(),
+            CONTINUOUS,
+            Exten::DISABLED,
+        );
+        codes.start();
+        Self { registers, codes }
+    }
+
+    /// The latest code, if one has come since this was last asked.
+    fn latest(&mut self) -> Option<AdcCode> {
+        let mut code = [0];
+        (self.codes.read_latest(&mut code) == 1).then(|| AdcCode::new(code[0]))
     }
 }
 
-impl<T: DefaultInstance, D: RxDma<T>> AnalogInput for Analog<T, D>
-where
-    Irqs: Binding<D::Interrupt, dma::InterruptHandler<D>>,
-{
+impl<T: DefaultInstance> AnalogInput for Analog<T> {
     async fn sample(&mut self) -> Result<AdcCode, BusFault> {
-        let mut code = [0];
-        // The amplifiers are buffered: the shortest sampling time that the slow
-        // channels allow suffices, and the average counts for more.
-        let sequence = [(&mut self.channel, SampleTime::CYCLES12_5)];
-        let read = self.adc.read(self.dma.reborrow(), Irqs, sequence.into_iter(), &mut code);
-        with_timeout(LIMIT, read).await.map_err(|_| BusFault::Timeout)?;
-        Ok(AdcCode::new(code[0]))
+        if let Some(code) = self.latest() {
+            return Ok(code);
+        }
+        // Just started, or DMA did not keep up: after an overrun the converter keeps its
+        // codes to itself until told that it was seen.
+        self.registers.isr().write(|w| w.set_ovr(true));
+        Timer::after(LIMIT).await;
+        self.latest().ok_or(BusFault::Timeout)
     }
 }

@@ -1,17 +1,17 @@
 //! The arm's angle sensor, an AS5048A: 16-bit frames on SPI1, mode 1.
+//!
+//! A frame takes 3 us. To wait for it costs half of what it would to have DMA move it and
+//! wake the task; and the bus clocks by itself, so that the wait always ends.
 
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AnyPin, Level, Output, Pull, Speed};
-use embassy_stm32::mode::Async;
-use embassy_stm32::peripherals::{DMA1_CH3, DMA1_CH4, PA6, PA7, PB3, SPI1};
+use embassy_stm32::mode::Blocking;
+use embassy_stm32::peripherals::{PA6, PA7, PB3, SPI1};
 use embassy_stm32::spi::mode::Master;
 use embassy_stm32::spi::{Config, MODE_1, Spi};
 use embassy_stm32::time::Hertz;
-use embassy_time::{Duration, with_timeout};
 use interstage::hal::AngleBus;
 use interstage::sense::raw::{AngleFrame, BusFault};
-
-use super::Irqs;
 
 /// Read, register 0x3FFF (angle), even parity.
 const READ_ANGLE: u16 = 0xFFFF;
@@ -19,25 +19,21 @@ const READ_ANGLE: u16 = 0xFFFF;
 /// 170 MHz / 32. The sensor takes 10 MHz; the next divider would give 10.6.
 const CLOCK: Hertz = Hertz(5_312_500);
 
-/// A frame takes 3 us.
-const LIMIT: Duration = Duration::from_micros(200);
-
-/// Core cycles of 350 ns: least time from select to clock, and between frames.
-const SELECT_CYCLES: u32 = 60;
+/// Least time from select to clock, and between frames, is 350 ns or 60 cycles: the
+/// delay goes round once more than this, and a round takes the core three at least.
+const SELECT_ROUNDS: u32 = 20;
 
 /// The sensor on its bus.
 pub(crate) struct Angle {
-    bus: Spi<'static, Async, Master>,
+    bus: Spi<'static, Blocking, Master>,
     select: Output<'static>,
 }
 
 impl Angle {
-    /// The bus with its pins (clock, controller out, controller in), its DMA
-    /// channels (out, in) and the select line.
+    /// The bus with its pins (clock, controller out, controller in) and the select line.
     pub(crate) fn new(
         spi: Peri<'static, SPI1>,
         (clock, out, input): (Peri<'static, PB3>, Peri<'static, PA7>, Peri<'static, PA6>),
-        (dma_out, dma_in): (Peri<'static, DMA1_CH4>, Peri<'static, DMA1_CH3>),
         select: Peri<'static, AnyPin>,
     ) -> Self {
         let mut config = Config::default();
@@ -48,24 +44,20 @@ impl Angle {
         // 0x0000 would pass for an angle of zero with right parity.
         config.miso_pull = Pull::Up;
         Self {
-            bus: Spi::new(spi, clock, out, input, dma_out, dma_in, Irqs, config),
+            bus: Spi::new_blocking(spi, clock, out, input, config),
             select: Output::new(select, Level::High, Speed::Medium),
         }
     }
 
     /// Sends the read command and returns what comes back meanwhile: the answer
     /// to the command before.
-    async fn exchange(&mut self) -> Result<u16, BusFault> {
+    fn exchange(&mut self) -> Result<u16, BusFault> {
         let mut word = [READ_ANGLE];
         self.select.set_low();
-        cortex_m::asm::delay(SELECT_CYCLES);
-        let done = with_timeout(LIMIT, self.bus.transfer_in_place(&mut word)).await;
+        cortex_m::asm::delay(SELECT_ROUNDS);
+        let done = self.bus.blocking_transfer_in_place(&mut word);
         self.select.set_high();
-        match done {
-            Ok(Ok(())) => Ok(word[0]),
-            Ok(Err(_)) => Err(BusFault::Transfer),
-            Err(_) => Err(BusFault::Timeout),
-        }
+        done.map(|()| word[0]).map_err(|_| BusFault::Transfer)
     }
 }
 
@@ -73,8 +65,8 @@ impl AngleBus for Angle {
     async fn frame(&mut self) -> Result<AngleFrame, BusFault> {
         // Two frames, because the answer to the last call's command is a whole
         // sampling period old.
-        self.exchange().await?;
-        cortex_m::asm::delay(SELECT_CYCLES);
-        self.exchange().await.map(AngleFrame::new)
+        self.exchange()?;
+        cortex_m::asm::delay(SELECT_ROUNDS);
+        self.exchange().map(AngleFrame::new)
     }
 }

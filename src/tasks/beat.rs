@@ -1,10 +1,51 @@
 //! Wake-ups on whole ticks.
+//!
+//! The control tick's task alone waits for the clock and wakes the sensor tasks: a timer
+//! for each of them costs a walk through the queue of timers to set and another to end,
+//! which together is as much as half a tick.
 
+use super::exchange::Station;
 use crate::units::{TICK_HZ, Tick};
+use core::future::poll_fn;
+use core::task::Poll;
+use embassy_sync::waitqueue::AtomicWaker;
 use embassy_time::{Duration, Instant, TICK_HZ as CLOCK_HZ, Timer};
 
 /// Clock ticks of the time driver in a control tick.
 const CLOCKS: u32 = (CLOCK_HZ / TICK_HZ as u64) as u32;
+
+/// Ticks between two readings of the sensors, by [`Station`].
+const PERIODS: [u32; 4] = [1, 1, 1, ANGLE_PERIOD];
+
+/// The same of the arm's angle.
+pub(super) const ANGLE_PERIOD: u32 = 2;
+
+/// What wakes the sensor tasks.
+///
+/// They and the control tick's task run on one executor, so that none is woken between
+/// looking at the clock and going to sleep.
+pub(super) struct Pulse([AtomicWaker; PERIODS.len()]);
+
+impl Pulse {
+    /// Nobody to wake yet.
+    pub(super) const fn new() -> Self {
+        Self([const { AtomicWaker::new() }; PERIODS.len()])
+    }
+
+    /// Wakes the sensor tasks that are due in this tick.
+    fn beat(&self, tick: Tick) {
+        for (waker, period) in self.0.iter().zip(PERIODS) {
+            if tick.is_multiple_of(period) {
+                waker.wake();
+            }
+        }
+    }
+
+    /// The waker of a sensor's task; that of the last for stations that are none.
+    fn of(&self, station: Station) -> &AtomicWaker {
+        &self.0[station.index().min(PERIODS.len() - 1)]
+    }
+}
 
 /// Wakes every N ticks, at ticks divisible by N.
 ///
@@ -35,10 +76,45 @@ impl<const N: u32> Beat<N> {
         Self { due: Instant::from_millis(first), tick: first as Tick }
     }
 
-    /// Waits for the next wake-up.
-    pub(super) async fn next(&mut self) -> Due {
+    /// Waits for the next wake-up by the clock; then lets the sensor tasks run first.
+    ///
+    /// They do because this task is put in line before them, and the executor serves a
+    /// line from its end. Would it not, the tick would find codes one tick older.
+    pub(super) async fn lead(&mut self, pulse: &Pulse) -> Due {
         Timer::at(self.due).await;
-        let late = Instant::now().saturating_duration_since(self.due).as_ticks();
+        let mut beaten = false;
+        let now = poll_fn(|context| {
+            if beaten {
+                return Poll::Ready(Instant::now());
+            }
+            beaten = true;
+            context.waker().wake_by_ref();
+            pulse.beat(self.tick);
+            Poll::Pending
+        });
+        let now = now.await;
+        self.advance(now)
+    }
+
+    /// Waits for the next wake-up by the pulse.
+    pub(super) async fn follow(&mut self, pulse: &Pulse, station: Station) -> Due {
+        let waker = pulse.of(station);
+        let due = self.due;
+        let now = poll_fn(|context| {
+            let now = Instant::now();
+            if now >= due {
+                return Poll::Ready(now);
+            }
+            waker.register(context.waker());
+            Poll::Pending
+        });
+        let now = now.await;
+        self.advance(now)
+    }
+
+    /// The wake-up that has come, and on to the next.
+    fn advance(&mut self, now: Instant) -> Due {
+        let late = now.saturating_duration_since(self.due).as_ticks();
         // A 32-bit division; an hour of lateness counts as an hour.
         let missed = u32::try_from(late).unwrap_or(u32::MAX) / Self::PERIOD;
         let tick = self.tick.wrapping_add(missed.wrapping_mul(N));

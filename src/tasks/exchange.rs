@@ -2,6 +2,7 @@
 
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
+use super::beat::Pulse;
 use crate::control::{Input, Output};
 use crate::hal::Light;
 use crate::log::{Entry, Tape, Telemetry};
@@ -53,7 +54,7 @@ impl Station {
     /// Stations that must always be manned.
     const FIXED: usize = 6;
 
-    const fn index(self) -> usize {
+    pub(super) const fn index(self) -> usize {
         match self {
             Self::Speed => 0,
             Self::Pressure => 1,
@@ -68,6 +69,7 @@ impl Station {
 
 /// Everything the tasks share: one in a `static`, or one per test.
 pub struct Exchange {
+    pub(super) pulse: Pulse,
     pub(super) wheel: Slot<Sample<EncoderCount>>,
     pub(super) load_cell: Slot<Sample<AdcCode>>,
     pub(super) tread: Slot<Sample<AdcCode>>,
@@ -92,6 +94,7 @@ impl Exchange {
     #[must_use]
     pub const fn new() -> Self {
         Self {
+            pulse: Pulse::new(),
             wheel: Slot::new(),
             load_cell: Slot::new(),
             tread: Slot::new(),

@@ -9,7 +9,7 @@ use crate::hal::{MotorCommand, Motors, Watchdog};
 /// request, log entries and telemetry out. Feeds the watchdog while every task is
 /// alive.
 ///
-/// It waits for nothing but time. A tick that starts more than a period late is
+/// It waits for nothing but time, and wakes the sensor tasks when it has come. A tick that starts more than a period late is
 /// marked as an overrun and the ticks missed are left out; the tick number is
 /// always that of the clock.
 pub async fn motors(
@@ -23,7 +23,7 @@ pub async fn motors(
     let mut output = Output::default();
     let mut beat = Beat::<1>::new();
     loop {
-        let due = beat.next().await;
+        let due = beat.lead(&exchange.pulse).await;
         let input =
             Input { emergency_stop: motors.stopped(), ..exchange.input(due.tick, due.missed > 0) };
         controller.step_into(&mut state, &input, &mut output);

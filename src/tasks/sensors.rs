@@ -1,11 +1,12 @@
 //! One task a sensor: read, stamp, publish, check in.
 
-use super::beat::Beat;
+use super::beat::{ANGLE_PERIOD, Beat};
 use super::exchange::{Exchange, Station};
 use crate::hal::{AnalogInput, AngleBus, WheelEncoder};
 use crate::sense::raw::{AdcCode, BusFault, Sample};
 use crate::units::Tick;
-use embassy_time::{Duration, with_timeout};
+use embassy_futures::select::{Either, select};
+use embassy_time::{Duration, Timer};
 
 /// After this long a reading is given up and begun anew: ten times what the board
 /// takes. The task lives on and checks in; the reading ages.
@@ -15,7 +16,7 @@ pub const SENSOR_TIMEOUT: Duration = Duration::from_millis(2);
 pub async fn speed(mut wheel: impl WheelEncoder, exchange: &Exchange) -> ! {
     let mut beat = Beat::<1>::new();
     loop {
-        let at = beat.next().await.tick;
+        let at = beat.follow(&exchange.pulse, Station::Speed).await.tick;
         exchange.wheel.sender().send(Sample { code: wheel.count(), at });
         exchange.check_in(Station::Speed, at);
     }
@@ -35,9 +36,9 @@ pub async fn displacement(input: impl AnalogInput, exchange: &Exchange) -> ! {
 
 /// Publishes the arm angle sensor's frame at 500 Hz, good or bad: the tick judges.
 pub async fn angle(mut bus: impl AngleBus, exchange: &Exchange) -> ! {
-    let mut beat = Beat::<2>::new();
+    let mut beat = Beat::<ANGLE_PERIOD>::new();
     loop {
-        let at = beat.next().await.tick;
+        let at = beat.follow(&exchange.pulse, Station::Angle).await.tick;
         let publish = |sample| exchange.arm.sender().send(sample);
         settle(bounded(bus.frame()).await, at, Station::Angle, publish, exchange);
     }
@@ -51,14 +52,18 @@ async fn analog(
 ) -> ! {
     let mut beat = Beat::<1>::new();
     loop {
-        let at = beat.next().await.tick;
+        let at = beat.follow(&exchange.pulse, station).await.tick;
         settle(bounded(input.sample()).await, at, station, &publish, exchange);
     }
 }
 
-/// A reading that ends one way or the other.
+/// A reading that ends one way or the other. One that is there at once costs no timer.
 async fn bounded<T>(reading: impl Future<Output = Result<T, BusFault>>) -> Result<T, BusFault> {
-    with_timeout(SENSOR_TIMEOUT, reading).await.unwrap_or(Err(BusFault::Timeout))
+    let limit = async { Timer::after(SENSOR_TIMEOUT).await };
+    match select(reading, limit).await {
+        Either::First(done) => done,
+        Either::Second(()) => Err(BusFault::Timeout),
+    }
 }
 
 /// Publishes a reading or counts its failure.

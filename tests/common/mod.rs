@@ -7,8 +7,9 @@ use std::collections::VecDeque;
 use std::future::{Future, pending, poll_fn};
 use std::pin::Pin;
 use std::rc::Rc;
-use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::task::{Context, Poll, Waker};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::task::{Context, Poll, Wake, Waker};
 
 use embassy_time::{Duration, Instant, MockDriver, Timer};
 use interstage::hal::{
@@ -22,6 +23,15 @@ use interstage::supervise::Command;
 
 /// The clock is one for the whole process: one bench at a time.
 static CLOCK: Mutex<()> = Mutex::new(());
+
+/// Whether the task that runs has asked to be run again.
+struct Again(AtomicBool);
+
+impl Wake for Again {
+    fn wake(self: Arc<Self>) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
 
 /// Runs tasks under virtual time, always in the same order, from time 0.
 pub(crate) struct Bench {
@@ -44,11 +54,16 @@ impl Bench {
         self.tasks.push(Box::pin(task));
     }
 
-    /// Lets every task run once.
+    /// Lets every task run once, and those again that have woken themselves meanwhile.
     pub(crate) fn poll(&mut self) {
-        let mut context = Context::from_waker(Waker::noop());
+        let again = Arc::new(Again(AtomicBool::new(false)));
+        let waker = Waker::from(again.clone());
+        let mut context = Context::from_waker(&waker);
         for task in &mut self.tasks {
-            assert_eq!(task.as_mut().poll(&mut context), Poll::Pending, "a task returned");
+            again.0.store(true, Ordering::Relaxed);
+            while again.0.swap(false, Ordering::Relaxed) {
+                assert_eq!(task.as_mut().poll(&mut context), Poll::Pending, "a task returned");
+            }
         }
     }
 

@@ -17,6 +17,8 @@ pub struct Budget {
     pub tick: TickBudget,
     /// Of the plant.
     pub plant: PlantBudget,
+    /// Of the whole firmware on the emulated board.
+    pub board: BoardBudget,
     /// What is aimed at.
     pub aims: Aims,
 }
@@ -54,6 +56,18 @@ pub struct PlantBudget {
     pub max_force_error: f64,
     /// Least factor by which letting the ring sleep saves elements visited.
     pub least_saving_of_elements: f64,
+}
+
+/// The whole firmware on the emulated board, over a deployment or the way back.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BoardBudget {
+    /// Part of the time in which the core does not sleep.
+    pub mean_load: f64,
+    /// Longest control tick, part of its period.
+    pub worst_tick: f64,
+    /// Most of the stack, part of the memory that the statics leave.
+    pub stack: f64,
 }
 
 /// What is aimed at: factors that depend on the machine, and what is not reached yet.

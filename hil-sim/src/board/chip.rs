@@ -6,18 +6,18 @@ mod pins;
 mod stray;
 
 use super::core::{Access, Bus};
-use super::peripherals::adc::Adc;
+use super::peripherals::adc::{self, Adc};
 use super::peripherals::dbgmcu::Dbgmcu;
 use super::peripherals::dma::{CHANNELS, Dma, Dmamux, Move};
 use super::peripherals::encoder::Encoder;
 use super::peripherals::exti::Exti;
-use super::peripherals::flash::Flash;
+use super::peripherals::flash::{Change, Flash};
 use super::peripherals::gpio::Gpio;
 use super::peripherals::iwdg::Iwdg;
 use super::peripherals::pwm::Pwm;
 use super::peripherals::pwr::Pwr;
 use super::peripherals::rcc::{Cause, Rcc};
-use super::peripherals::spi::{AngleSensor, Spi};
+use super::peripherals::spi::{self, AngleSensor, Spi};
 use super::peripherals::syscfg::Syscfg;
 use super::peripherals::system::{Counter, System};
 use super::peripherals::time_base::TimeBase;
@@ -52,7 +52,8 @@ pub struct Chip {
     /// Reset and clock control.
     pub rcc: Rcc,
     pwr: Pwr,
-    flash: Flash,
+    /// The flash's interface.
+    pub flash: Flash,
     syscfg: Syscfg,
     exti: Exti,
     ports: [Gpio; 7],
@@ -123,8 +124,10 @@ impl Chip {
         chip
     }
 
-    /// Starts every register afresh. What is outside the chip stays as it is.
-    pub fn reset(&mut self, cause: Cause, vectors: u32, now: u64) {
+    /// Starts every register afresh. What is outside the chip stays as it is. Returns what
+    /// the flash was at, as far as it came.
+    pub fn reset(&mut self, cause: Cause, vectors: u32, now: u64) -> Option<Change> {
+        let torn = self.flash.reset();
         let old = std::mem::replace(self, Self::new(vectors));
         // Power that was lost takes the flags of earlier resets with it.
         let earlier = if cause == Cause::Power { 0 } else { old.rcc.flags() };
@@ -139,7 +142,9 @@ impl Chip {
         self.defects = old.defects;
         self.strays = old.strays;
         self.inputs = old.inputs;
+        self.flash = old.flash;
         self.settle(now);
+        torn
     }
 
     /// A reset that the chip wants, once.
@@ -157,18 +162,29 @@ impl Chip {
     pub fn advance(&mut self, now: u64) {
         self.system.advance(now);
         self.time.advance(now);
-        for motor in &mut self.motors {
-            motor.advance(now);
-        }
         self.adc.advance(now);
         if let Some(frame) = self.spi.over(now) {
             let answer = self.exchange(frame);
             self.spi.answer(answer, now);
         }
+        self.flash.advance(now);
+        if self.flash.takes_power() {
+            self.reset = Some(Cause::Power);
+        }
         if self.watchdog.has_bitten(now) {
             self.reset = Some(Cause::Watchdog);
         }
-        self.settle(now);
+        let mut turned = false;
+        for motor in &mut self.motors {
+            if motor.deadline() <= now {
+                motor.advance(now);
+                turned = true;
+            }
+        }
+        if turned {
+            self.settle_pins(now);
+        }
+        self.settle_lines(now);
     }
 
     /// The core has locked up.
@@ -178,6 +194,7 @@ impl Chip {
                 motor.lock_up(now);
             }
             self.advance(now);
+            self.settle(now);
         }
     }
 
@@ -193,6 +210,9 @@ impl Chip {
             self.spi.has_word(),
             self.spi.wants_word(),
         ];
+        if asked == [false; REQUESTS.len()] {
+            return None;
+        }
         (0..CHANNELS).find_map(|channel| {
             let request = self.mux.request(channel);
             let source = REQUESTS.iter().position(|known| *known == request)?;
@@ -203,7 +223,7 @@ impl Chip {
     /// A transfer is done, or met an address where nothing lies.
     pub fn moved(&mut self, channel: usize, found: bool, now: u64) {
         self.dma.moved(channel, found);
-        self.settle(now);
+        self.settle_lines(now);
     }
 
     /// Lets everything that follows from a change follow: pins, lines, deadlines.
@@ -218,9 +238,11 @@ impl Chip {
             Block::Port(_) | Block::Syscfg | Block::Motor(_) | Block::Exti if write => {
                 self.settle(now);
             }
-            // A converter's or a bus's data register is changed by being read.
-            Block::Adc | Block::Spi => self.settle_lines(now),
-            Block::Time | Block::Dma | Block::Mux | Block::Watchdog if write => {
+            Block::Adc | Block::Spi if write => self.settle_lines(now),
+            // Their data registers are changed by being read.
+            Block::Adc if offset & 0xFF == adc::DR => self.settle_lines(now),
+            Block::Spi if offset == spi::DR => self.settle_lines(now),
+            Block::Time | Block::Dma | Block::Mux | Block::Watchdog | Block::Flash if write => {
                 self.settle_lines(now);
             }
             // The interrupt controller keeps its own account.
@@ -234,8 +256,12 @@ impl Chip {
         if self.system.control.wants_reset {
             self.reset = Some(Cause::Software);
         }
-        let lines =
-            [(23, self.exti.asks(0x03E0)), (28, self.time.asks()), (40, self.exti.asks(0xFC00))];
+        let lines = [
+            (4, self.flash.asks()),
+            (23, self.exti.asks(0x03E0)),
+            (28, self.time.asks()),
+            (40, self.exti.asks(0xFC00)),
+        ];
         let exceptions = &mut self.system.exceptions;
         for (interrupt, high) in lines {
             exceptions.set_line(interrupt, high, now);
@@ -256,6 +282,7 @@ impl Chip {
             self.adc.deadline(),
             self.spi.deadline(),
             self.watchdog.deadline(),
+            self.flash.deadline(),
         ];
         self.deadline = due.into_iter().min().unwrap_or(u64::MAX);
         if self.reset.is_some() || self.next_move().is_some() {
@@ -336,6 +363,12 @@ impl Bus for Chip {
             self.strays.note((map::name(block), offset), access, true, Why::NoModel);
         }
         self.settle_after(block, offset, true, access.now);
+    }
+
+    fn write_code(&mut self, access: Access, value: u32) -> bool {
+        self.flash.store(access.address, access.size, value);
+        self.settle_lines(access.now);
+        true
     }
 
     fn deadline(&self) -> u64 {

@@ -155,6 +155,12 @@ pub trait Bus {
     /// Writes.
     fn write(&mut self, access: Access, value: u32);
 
+    /// Writes where code lies, which may not be written as memory. False if nothing takes
+    /// it: a fault.
+    fn write_code(&mut self, _access: Access, _value: u32) -> bool {
+        false
+    }
+
     /// Cycle at which something happens by itself; the core stops no earlier than its
     /// next block after it.
     fn deadline(&self) -> u64;

@@ -1,18 +1,13 @@
 //! A measurement image on the core: its functions called from the host, each call with
 //! its cycles.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-
-mod names;
-
-use names::Names;
 
 use super::account::Spread;
 use super::core::unicorn::{Access, Counted, Memory, UnicornCore};
 use super::core::{Core, CoreError, Heat, Meter, Register, Stop};
-use super::elf::{FLASH, Function, Loaded, RAM, named};
-use super::{thumb, timing};
+use super::elf::{FLASH, Loaded, RAM, named};
+use super::heat;
 
 /// System control space: the start-up code writes it and nothing is measured in it.
 const SYSTEM: Memory = Memory { base: 0xE000_0000, size: 1024 * 1024, access: Access::Data };
@@ -69,7 +64,7 @@ pub struct Call {
 /// An image that has started and waits to be called.
 pub struct Image {
     core: UnicornCore,
-    functions: Vec<Function>,
+    loaded: Loaded,
     stack: u32,
     elf: Vec<u8>,
 }
@@ -100,7 +95,7 @@ impl Image {
         };
         let (stack, reset) = (vector(0), vector(4));
         core.set_register(Register::Sp, stack)?;
-        let mut image = Self { core, functions: loaded.functions, stack, elf: elf.to_vec() };
+        let mut image = Self { core, loaded, stack, elf: elf.to_vec() };
         match image.core.run(reset, PATIENCE)? {
             Stop::Breakpoint(at) if image.name(at).contains("main") => Ok(image),
             stop => Err(image.lost("start-up", stop)),
@@ -135,7 +130,7 @@ impl Image {
     /// # Errors
     /// [`ImageError::Missing`] if the image has none of this name.
     pub fn function(&self, name: &str) -> Result<u32, ImageError> {
-        let found = self.functions.iter().find(|function| function.name == name);
+        let found = self.loaded.functions.iter().find(|function| function.name == name);
         found
             .map(|function| function.range.start)
             .ok_or_else(|| ImageError::Missing(name.to_owned()))
@@ -216,34 +211,11 @@ impl Image {
     /// # Errors
     /// [`ImageError::Form`] if the image's debug information cannot be read.
     pub fn by_function(&self, heat: &Heat) -> Result<Vec<(String, u64)>, ImageError> {
-        let names = Names::read(&self.elf)?;
-        let mut sums = BTreeMap::<String, f64>::new();
-        for (&(address, size), &cycles) in heat {
-            let costs = self.costs(address, size);
-            let whole: u64 = costs.iter().map(|(_, cost)| cost).sum();
-            for (at, cost) in costs {
-                let name = names.at(at).unwrap_or_else(|| self.name(at).to_owned());
-                *sums.entry(name).or_default() += cycles as f64 * cost as f64 / whole as f64;
-            }
-        }
-        let mut sums: Vec<_> =
-            sums.into_iter().map(|(name, cycles)| (name, cycles.round() as u64)).collect();
-        sums.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
-        Ok(sums)
-    }
-
-    /// Instructions of a block with what each costs by itself.
-    fn costs(&self, address: u32, size: u32) -> Vec<(u32, u64)> {
-        let mut code = vec![0; size as usize];
-        if self.core.read(address, &mut code).is_err() {
-            return Vec::new();
-        }
-        let costs = thumb::sweep(&code, address);
-        costs.map(|(at, found, _)| (at, 1 + timing::extra(found.kind))).collect()
+        heat::by_function(&self.elf, &self.loaded, heat)
     }
 
     /// Name of the function at an address.
     fn name(&self, address: u32) -> &str {
-        named(&self.functions, address)
+        named(&self.loaded.functions, address)
     }
 }

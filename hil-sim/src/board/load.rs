@@ -3,13 +3,18 @@
 //! Cycles are textbook ones, see [`super::timing`]. The start of the program, which
 //! builds the controller's tables, is left out: counting begins when the drive is idle.
 
+pub mod page;
+
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
 use super::chip::Stray;
+use super::heat::by_function;
+use super::image::ImageError;
 use super::machine::{Machine, Poll, Share, THREAD};
 use super::peripherals::HZ;
+use crate::bench::budget::BoardBudget;
 use crate::firmware::Footprint;
 use crate::record::MODE_NAMES;
 
@@ -17,13 +22,6 @@ use crate::record::MODE_NAMES;
 const PERIOD: u64 = HZ / 1000;
 /// Name of the task that runs the control tick.
 const TICK: &str = "motors";
-
-/// Largest mean load, part of the time.
-pub const MEAN_LOAD: f64 = 0.05;
-/// Longest tick, part of its period.
-pub const WORST_TICK: f64 = 0.20;
-/// Most of the stack, part of the memory that the statics leave.
-pub const STACK: f64 = 0.5;
 
 /// Runs of something with their cycles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -78,6 +76,15 @@ pub struct Interrupt {
     pub latency_worst: u64,
 }
 
+/// A function of the source.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Spent {
+    /// Its name.
+    pub function: String,
+    /// Cycles by itself, per millisecond.
+    pub cycles_per_ms: f64,
+}
+
 /// When the control tick begins, against an even beat.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Start {
@@ -98,7 +105,7 @@ pub struct Load {
     pub load: f64,
     /// Part of the time in which it slept.
     pub idle: f64,
-    /// The control tick with its task.
+    /// The control tick with its task, the waking of the sensors' tasks included.
     pub tick: Cost,
     /// When it begins.
     pub start: Start,
@@ -108,6 +115,9 @@ pub struct Load {
     pub tasks: Vec<Named>,
     /// Every exception that was taken.
     pub interrupts: Vec<Interrupt>,
+    /// Cycles by function of the source, what was inlined by itself; the most expensive
+    /// first, as many as make up nearly all.
+    pub functions: Vec<Spent>,
     /// Bytes of the stack that were used, and those set apart for it.
     pub stack_used: u32,
     /// See [`Load::stack_used`].
@@ -128,6 +138,8 @@ pub struct Gathered {
     phases: BTreeMap<u8, Cost>,
     tick: Cost,
     starts: Vec<u64>,
+    /// The turn of the tick's task that wakes the sensors, before the one that ticks.
+    lead: Option<Poll>,
 }
 
 impl Gathered {
@@ -135,6 +147,7 @@ impl Gathered {
     pub fn begin(&mut self, machine: &mut Machine) {
         let now = machine.now();
         machine.profile_mut().clear(now);
+        machine.take_heat();
         *self = Self { from: Some((now, machine.profile().slept())), ..Self::default() };
     }
 
@@ -147,7 +160,9 @@ impl Gathered {
         let tick = machine.tasks().iter().position(|name| *name == TICK);
         for Poll { task, began, cycles } in polls {
             self.tasks.entry(task).or_default().note(cycles);
-            if Some(task) == tick {
+            if Some(task) == tick
+                && let Some(cycles) = self.ticked(Poll { task, began, cycles })
+            {
                 self.tick.note(cycles);
                 self.phases.entry(phase).or_default().note(cycles);
                 self.starts.push(began);
@@ -155,7 +170,19 @@ impl Gathered {
         }
     }
 
-    /// The account.
+    /// Cycles of the tick if this turn of its task makes one: the second of the two that
+    /// it gets in a period.
+    fn ticked(&mut self, turn: Poll) -> Option<u64> {
+        match self.lead.take() {
+            Some(lead) if turn.began - lead.began < PERIOD / 2 => Some(lead.cycles + turn.cycles),
+            _ => {
+                self.lead = Some(turn);
+                None
+            }
+        }
+    }
+
+    /// The account; functions are not told apart yet.
     #[must_use]
     pub fn close(self, machine: &Machine, footprint: &Footprint, stack_used: u32) -> Load {
         let (from, slept) = self.from.unwrap_or_default();
@@ -195,6 +222,7 @@ impl Gathered {
                 .filter(|(number, _)| *number != THREAD)
                 .map(interrupt)
                 .collect(),
+            functions: Vec::new(),
             stack_used,
             stack: footprint.stack(),
             flash: footprint.flash(),
@@ -202,6 +230,22 @@ impl Gathered {
             unmodelled: machine.chip().strays().iter().copied().collect(),
         }
     }
+}
+
+/// Functions per millisecond of `cycles`, down to those that hardly count.
+fn spent(functions: Vec<(String, u64)>, cycles: u64) -> Vec<Spent> {
+    /// Of all that was spent, what is left out.
+    const REST: f64 = 0.02;
+    let mut left = functions.iter().map(|(_, spent)| *spent as f64).sum::<f64>();
+    let rest = REST * left;
+    let counts = |(_, spent): &(String, u64)| {
+        let counts = left > rest;
+        left -= *spent as f64;
+        counts
+    };
+    let ms = cycles as f64 / PERIOD as f64;
+    let found = functions.into_iter().take_while(counts);
+    found.map(|(function, spent)| Spent { function, cycles_per_ms: spent as f64 / ms }).collect()
 }
 
 /// Beginnings of the tick against a beat of one period.
@@ -232,18 +276,29 @@ fn vector(number: u8) -> String {
 }
 
 impl Load {
+    /// Tells apart the functions that the cycles since the account's beginning went to;
+    /// `elf` is the image.
+    ///
+    /// # Errors
+    /// [`ImageError`] if its debug information cannot be read.
+    pub fn name_functions(&mut self, machine: &mut Machine, elf: &[u8]) -> Result<(), ImageError> {
+        let heat = machine.take_heat();
+        self.functions = spent(by_function(elf, machine.image(), &heat)?, self.cycles);
+        Ok(())
+    }
+
     /// Holds the account against its budgets; says which is missed.
     #[must_use]
-    pub fn missed(&self) -> Vec<String> {
+    pub fn missed(&self, budget: &BoardBudget) -> Vec<String> {
         /// SRAM1 and SRAM2.
         const MEMORY: u64 = 96 * 1024;
         let left = MEMORY - (self.ram - self.stack);
         let worst = self.tick.worst as f64 / PERIOD as f64;
         let stack = f64::from(self.stack_used) / left as f64;
         let checks = [
-            ("mean load", self.load, MEAN_LOAD),
-            ("worst tick, part of its period", worst, WORST_TICK),
-            ("stack, part of what is left", stack, STACK),
+            ("mean load", self.load, budget.mean_load),
+            ("worst tick, part of its period", worst, budget.worst_tick),
+            ("stack, part of what is left", stack, budget.stack),
         ];
         let missed = checks.into_iter().filter(|(_, value, most)| value > most);
         missed.map(|(what, value, most)| format!("{what}: {value:.3}, at most {most}")).collect()
@@ -260,6 +315,18 @@ mod tests {
         let start = start(&starts);
         assert_eq!(start.jitter, 50);
         assert_eq!(start.late_mean, (10.0 + 50.0 + 0.0 + 10.0) / 4.0);
+    }
+
+    #[test]
+    fn a_tick_is_the_second_turn_of_its_task_with_the_first_added() {
+        let mut gathered = Gathered::default();
+        let turn = |began, cycles| Poll { task: 0, began, cycles };
+        // One is cut off by the beginning of the account.
+        assert_eq!(gathered.ticked(turn(2000, 70)), None);
+        for beat in 1..4 {
+            assert_eq!(gathered.ticked(turn(beat * PERIOD, 300)), None);
+            assert_eq!(gathered.ticked(turn(beat * PERIOD + 2500, 4000)), Some(4300));
+        }
     }
 
     #[test]

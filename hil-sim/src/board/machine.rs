@@ -9,10 +9,11 @@ use std::path::Path;
 
 use super::chip::Chip;
 use super::core::unicorn::{Counted, UnicornCore};
-use super::core::{Access, Bus, Core, CoreError, Mark, Register, Stop, passes};
+use super::core::{Access, Bus, Core, CoreError, Heat, Mark, Register, Stop, passes};
 use super::elf::{FLASH, Function, Loaded, RAM, named};
 use super::exceptions::number::{HARD_FAULT, SV_CALL};
 use super::image::ImageError;
+use super::peripherals::flash::Change;
 use super::peripherals::rcc::Cause as Restart;
 use super::peripherals::system::Cause;
 
@@ -119,6 +120,11 @@ impl Machine {
         &mut self.profile
     }
 
+    /// Takes the cycles by block of code since the last call, or since the start.
+    pub fn take_heat(&mut self) -> Heat {
+        self.core.take_heat()
+    }
+
     /// Names of the tasks, by their numbers in the profile.
     #[must_use]
     pub fn tasks(&self) -> Vec<&str> {
@@ -202,7 +208,9 @@ impl Machine {
     pub fn restart(&mut self, cause: Restart) -> Result<(), CoreError> {
         let now = self.now();
         self.restarts.push((now, cause));
-        self.chip_mut().reset(cause, FLASH.base, now);
+        if let Some(change) = self.chip_mut().reset(cause, FLASH.base, now) {
+            self.take_over(change)?;
+        }
         if cause == Restart::Power {
             self.core.write(RAM.base, &vec![BLANK; RAM.size as usize])?;
         }
@@ -348,10 +356,30 @@ impl Machine {
             let found = self.carry(due)?;
             self.chip_mut().moved(due.channel, found, now);
         }
+        if let Some(place) = self.chip().flash.asks_for() {
+            let mut before = [0; 8];
+            self.core.read(place, &mut before)?;
+            self.chip_mut().flash.found(before, now);
+            self.chip_mut().advance(now);
+        }
+        if let Some(change) = self.chip_mut().flash.take_change() {
+            self.take_over(change)?;
+            self.chip_mut().advance(now);
+        }
         if let Some(cause) = self.chip_mut().take_reset() {
             self.restart(cause)?;
         }
         Ok(())
+    }
+
+    /// Puts into memory what the flash was told to.
+    fn take_over(&mut self, change: Change) -> Result<(), CoreError> {
+        match change {
+            Change::Programmed { address, bytes } => self.core.write(address, &bytes),
+            Change::Erased { address, size } => {
+                self.core.write(address, &vec![0xFF; size as usize])
+            }
+        }
     }
 
     /// Carries a word for DMA. False if nothing lies at an address.

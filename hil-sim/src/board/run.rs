@@ -6,11 +6,17 @@ use std::time::Instant;
 
 use super::bench::{Bench, BenchError};
 use super::elf::RAM;
+use super::faults::Timed;
 use super::load::{Gathered, Load};
 use super::log::{Line, Strings};
 use super::machine::Machine;
+use interstage::params::{CompileError, slots};
+use interstage::rig::Rig;
+
 use crate::firmware::{FirmwareError, Footprint};
 use crate::log;
+use crate::params::board::PLACES;
+use crate::params::set_of;
 use crate::record::Recording;
 use crate::scenario::{ControllerKind, Direction, Scenario};
 
@@ -30,9 +36,12 @@ pub enum RunError {
     /// The image's sections.
     #[error(transparent)]
     Image(#[from] FirmwareError),
-    /// The image has its parameters built in.
-    #[error("the firmware is built for the rig `prototype` as it is: {0}")]
-    Rig(String),
+    /// The firmware has one controller.
+    #[error("the firmware schedules: --controller {0} runs in software alone")]
+    Controller(String),
+    /// The rig cannot be put into the board's flash.
+    #[error(transparent)]
+    Parameters(#[from] CompileError),
 }
 
 /// A run that was made.
@@ -48,18 +57,34 @@ pub struct Ran {
 /// What the firmware can be asked to do.
 ///
 /// # Errors
-/// [`RunError::Rig`] if the scenario wants another rig or controller than the image has
-/// built in.
+/// [`RunError::Controller`] if the scenario wants another controller than the firmware's.
 pub fn check(scenario: &Scenario) -> Result<(), RunError> {
-    let built = interstage::rig::Rig::prototype();
-    if scenario.rig != built {
-        return Err(RunError::Rig(format!("not for `{}` or changed parameters", scenario.preset)));
+    if scenario.run.controller == ControllerKind::Scheduled {
+        Ok(())
+    } else {
+        Err(RunError::Controller(scenario.run.controller.name().to_owned()))
     }
-    if scenario.run.controller != ControllerKind::Scheduled {
-        let name = scenario.run.controller.name();
-        return Err(RunError::Rig(format!("with the controller scheduled, not {name}")));
+}
+
+/// Puts the parameters of a rig that is not the image's own into the board's flash, as
+/// `rig params` would have.
+fn store(machine: &mut Machine, scenario: &Scenario) -> Result<(), RunError> {
+    if scenario.rig == Rig::prototype() {
+        return Ok(());
     }
+    let set = set_of(&scenario.preset, &scenario.rig)?;
+    let place = slots::place(&set, 1).ok_or(CompileError::Room)?;
+    machine.poke(PLACES, &place).map_err(BenchError::from)?;
     Ok(())
+}
+
+/// What is asked of a run beside its scenario.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Asked {
+    /// Keep one row a millisecond.
+    pub rows: bool,
+    /// Faults of the hardware that come while it goes on.
+    pub faults: Vec<Timed>,
 }
 
 /// Runs a scenario on the board with the image in `elf`; rows are kept if asked. Each
@@ -71,12 +96,26 @@ pub fn run(
     elf: &[u8],
     scenario: &Scenario,
     rows: bool,
+    watch: impl FnMut(f64, &Line),
+) -> Result<Ran, RunError> {
+    run_with(elf, scenario, &Asked { rows, ..Asked::default() }, watch)
+}
+
+/// The same with all that may be asked.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_with(
+    elf: &[u8],
+    scenario: &Scenario,
+    asked: &Asked,
     mut watch: impl FnMut(f64, &Line),
 ) -> Result<Ran, RunError> {
     check(scenario)?;
     let footprint = Footprint::of_elf(elf)?;
     let strings = Strings::of(elf).map_err(BenchError::from)?;
     let mut bench = Bench::new(elf, &strings, scenario).map_err(BenchError::from)?;
+    store(bench.machine_mut(), scenario)?;
     let mut trace = Trace::new(scenario, bench.plant());
     let mut start = Some(match scenario.run.direction {
         Direction::Deploy => b's',
@@ -86,7 +125,12 @@ pub fn run(
     let mut after = AFTER;
     let mut gathered = Gathered::default();
     let mut stream = Vec::new();
+    let mut faults = asked.faults.clone();
     while bench.time_s() < LONGEST_S && after > 0 {
+        let now = bench.time_s();
+        for due in faults.extract_if(.., |due| due.at_s <= now) {
+            due.fault.strike(bench.machine_mut()).map_err(BenchError::from)?;
+        }
         if trace.is_idle()
             && let Some(letter) = start
             && bench.send(letter)?
@@ -94,14 +138,13 @@ pub fn run(
             start = None;
             gathered.begin(bench.machine_mut());
         }
-        let before = bench.plant().truth().time_s;
         let (passed, lines) = bench.step()?;
         for line in &lines {
             watch(bench.time_s(), line);
         }
         gathered.gather(bench.machine_mut(), trace.mode());
         stream.extend(bench.take_frames());
-        trace.look(before, &passed, &lines, bench.plant().truth(), rows);
+        trace.look(&passed, &lines, bench.plant().truth(), asked.rows);
         if trace.is_over() {
             after -= 1;
         }
@@ -109,8 +152,10 @@ pub fn run(
     let mut recording = trace.finish(scenario, bench.plant(), started.elapsed().as_secs_f64());
     log::complete(&mut recording, &log::Run::of_stream(&stream));
     recording.stream = stream;
-    let machine = bench.into_machine();
-    let load = gathered.close(&machine, &footprint, stack_used(&machine)?);
+    let mut machine = bench.into_machine();
+    let stack = stack_used(&machine)?;
+    let mut load = gathered.close(&machine, &footprint, stack);
+    load.name_functions(&mut machine, elf).map_err(BenchError::from)?;
     Ok(Ran { recording, load, machine })
 }
 

@@ -30,6 +30,13 @@ pub(super) struct Args {
     #[arg(long, value_name = "TARGET", default_value = "sil")]
     target: String,
 
+    /// Fault of the emulated board's hardware and when it comes, may be repeated:
+    /// load-cell=0x8000@5.2, tread=<code>, angle-bits=<mask>, angle-lost, encoder-a,
+    /// encoder-b, dma-stalled, timer-flags, brown-out or flip=<address>.<bit>, each at its
+    /// seconds from power-up.
+    #[arg(long, value_name = "FAULT@S")]
+    board_fault: Vec<String>,
+
     /// Shows the controller's log on standard error.
     #[arg(long)]
     log: bool,
@@ -62,6 +69,9 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     if args.target == "board" {
         return board::run(args, &scenario, directory.as_deref());
     }
+    if let Some(fault) = args.board_fault.first() {
+        return Err(Failure::input(format!("--board-fault {fault}: takes --target board")));
+    }
     let recording = {
         let _progress = progress::spinner(scenario.run.direction.name());
         sil::run(&scenario, sil::Options { rows: directory.is_some(), speed: None })?
@@ -72,7 +82,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         }
     }
     let files = match &directory {
-        Some(directory) => write(&recording, directory)?,
+        Some(directory) => write(&recording, &[], directory)?,
         None => Vec::new(),
     };
     let summary = &recording.summary;
@@ -106,10 +116,14 @@ fn directory(args: &Args, scenario: &Scenario) -> Result<PathBuf, Failure> {
     Ok(directory)
 }
 
-fn write(recording: &Recording, directory: &Path) -> Result<Vec<PathBuf>, Failure> {
+fn write(
+    recording: &Recording,
+    more: &[report::Section],
+    directory: &Path,
+) -> Result<Vec<PathBuf>, Failure> {
     let mut files = export::write_all(recording, directory)?;
     let page = directory.join("report.html");
-    report::write_html(recording, &page)?;
+    report::write_html_with(recording, more, &page)?;
     files.insert(0, page);
     Ok(files)
 }

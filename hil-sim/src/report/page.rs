@@ -3,7 +3,7 @@
 use super::panels::{Across, View};
 use super::svg::{self, escape};
 use super::verdict::{Grade, gap_sentence, headline};
-use super::{band, crossings, tables};
+use super::{Section, band, crossings, tables};
 use crate::record::Recording;
 
 pub(super) const STYLE: &str = include_str!("style.css");
@@ -12,8 +12,8 @@ const SIZE: (u32, u32) = (1100, 240);
 /// Size of the bands, CSS pixels.
 const BAND_SIZE: (u32, u32) = (1100, 175);
 
-/// The page of `recording`.
-pub(super) fn html(recording: &Recording) -> String {
+/// The page of `recording` with these sections more.
+pub(super) fn html(recording: &Recording, more: &[Section]) -> String {
     let s = &recording.summary;
     let title = escape(&format!("{} on {}, seed {}", s.direction, s.rig, s.seed));
     let grade = match Grade::of(s) {
@@ -52,6 +52,9 @@ before the corner touched.</p>\n",
     page += &section("Faults and limits", &tables::reports(s));
     page += &section("The run", &plots(recording));
     page += &section("The crossings enlarged", &crossings::html(recording));
+    for Section { title, body } in more {
+        page += &section(title, body);
+    }
     page += &section("Log", &folded("Lines of the log", &tables::log(&recording.log)));
     let parameters = format!("<pre>{}</pre>\n", escape(&recording.parameters));
     page += &section("Parameters", &folded("Parameters used, as TOML", &parameters));

@@ -11,6 +11,8 @@ mod checks;
 mod handlers;
 #[cfg(target_os = "none")]
 mod program;
+#[cfg(target_os = "none")]
+mod storage;
 
 /// For the emulated core alone.
 #[cfg(not(target_os = "none"))]

@@ -6,7 +6,10 @@
 
 use std::collections::HashSet;
 
-use unicorn_engine::{Arch, ArmCpuModel, Mode, Prot, RegisterARM, Unicorn, uc_error};
+use unicorn_engine::{
+    Arch, ArmCpuModel, HookType, MemType, Mode, Prot, RegisterARM, TlbEntry, TlbType, Unicorn,
+    uc_error,
+};
 
 use super::{
     Access as Touch, Bus, Core, CoreError, Fault, Heat, Mark, Meter, NoBus, Register, Stop, passes,
@@ -56,6 +59,8 @@ const RETURN_BITS: u32 = 0xFFFF_FF01;
 /// `WFE`, `WFI` and `SEV`, as they stand in memory.
 const WFE: [u8; 2] = [0x20, 0xBF];
 const SEV: [u8; 2] = [0x40, 0xBF];
+/// The state of thumb code outside of a conditional block, among the flags.
+const THUMB: u64 = 1 << 24;
 /// Marks a halfword at which no block has begun yet.
 const UNSEEN: u32 = u32::MAX;
 
@@ -96,6 +101,7 @@ struct Count {
 struct Inside<B> {
     count: Count,
     bus: B,
+    marked: Vec<u32>,
     marks: Vec<Mark>,
 }
 
@@ -204,18 +210,20 @@ impl<B: Bus + 'static> UnicornCore<B> {
     /// As [`UnicornCore::new`].
     pub fn with_bus(memories: &[Memory], counted: &Counted<'_>, bus: B) -> Result<Self, CoreError> {
         let ranges = bus.ranges();
-        let inside = Inside { count: Count::new(counted), bus, marks: Vec::new() };
+        let inside =
+            Inside { count: Count::new(counted), bus, marked: Vec::new(), marks: Vec::new() };
         // The flag for the microcontroller profile would select another core.
         let new = Unicorn::new_with_data(Arch::ARM, Mode::THUMB, inside);
         let mut core = Self { engine: engine("start", new)? };
-        let uc = &mut core.engine;
-        engine("select the core", uc.ctl_set_cpu_model(ArmCpuModel::CORTEX_M4 as i32))?;
+        let model = core.engine.ctl_set_cpu_model(ArmCpuModel::CORTEX_M4 as i32);
+        engine("select the core", model)?;
+        core.translate_pages(memories)?;
         for memory in memories {
             let access = match memory.access {
                 Access::Code => Prot::READ | Prot::EXEC,
                 Access::Data => Prot::ALL,
             };
-            let mapped = uc.mem_map(memory.base.into(), memory.size.into(), access);
+            let mapped = core.engine.mem_map(memory.base.into(), memory.size.into(), access);
             engine("map a memory", mapped)?;
         }
         for (base, size) in ranges {
@@ -234,6 +242,32 @@ impl<B: Bus + 'static> UnicornCore<B> {
     /// The bus, to be changed between two runs.
     pub fn bus_mut(&mut self) -> &mut B {
         &mut self.engine.get_data_mut().bus
+    }
+
+    /// Tells the engine what a page may be used for. Left to itself it takes every page
+    /// for code, and then looks for translated blocks behind every write to RAM, which
+    /// is most of its time. Here RAM holds data until the program runs in it.
+    fn translate_pages(&mut self, memories: &[Memory]) -> Result<(), CoreError> {
+        engine("take over pages", self.engine.ctl_set_tlb_type(TlbType::VIRTUAL))?;
+        let data = memories.iter().filter(|m| m.access == Access::Data);
+        let data: Vec<_> = data.map(|m| m.base..m.base + m.size).collect();
+        let mut run = HashSet::new();
+        let filled = self.engine.add_tlb_hook(1, 0, move |uc, address, access| {
+            let page = address as u32;
+            if access == MemType::FETCH {
+                run.insert(page);
+            } else {
+                // The engine has put its record of a conditional block to where the
+                // access stands. In the middle of a translated block it has to be empty,
+                // or what follows is skipped.
+                uc.reg_write(RegisterARM::EPSR, THUMB).ok()?;
+            }
+            let is_data = data.iter().any(|range| range.contains(&page)) && !run.contains(&page);
+            // What a memory does not allow, the engine finds out by itself.
+            let perms = if is_data { Prot::READ | Prot::WRITE } else { Prot::ALL };
+            Some(TlbEntry { paddr: address, perms })
+        });
+        engine("hook pages", filled).map(|_| ())
     }
 
     fn map_bus(&mut self, base: u32, size: u32) -> Result<(), CoreError> {
@@ -271,7 +305,11 @@ impl<B: Bus + 'static> UnicornCore<B> {
                 halt(uc, Stop::Urgent(address as u32));
                 return;
             }
-            uc.get_data_mut().count.enter(address as u32, size);
+            let Inside { count, marked, .. } = uc.get_data_mut();
+            count.enter(address as u32, size);
+            if marked.binary_search(&(address as u32)).is_ok() {
+                note(uc, address as u32);
+            }
         });
         engine("hook blocks", blocks)?;
         let traps = uc.add_intr_hook(|uc, number| {
@@ -297,6 +335,19 @@ impl<B: Bus + 'static> UnicornCore<B> {
             false
         });
         engine("hook waiting", invalid)?;
+        let (first, last) = (counted.base, counted.base + (counted.bytes.len() as u32 - 1));
+        let (first, last) = (first.into(), last.into());
+        let kind = HookType::MEM_WRITE_PROT;
+        let protected = uc.add_mem_hook(kind, first, last, |uc, _, address, size, value| {
+            let access = Touch {
+                address: address as u32,
+                size: size as u32,
+                pc: uc.pc_read().unwrap_or_default() as u32 & !1,
+                now: uc.get_data().count.meter.cycles,
+            };
+            uc.get_data_mut().bus.write_code(access, value as u32)
+        });
+        engine("hook writes to code", protected)?;
         for range in counted.code {
             let bytes = (range.start.wrapping_sub(counted.base) as usize)
                 ..(range.end.wrapping_sub(counted.base) as usize);
@@ -355,6 +406,13 @@ impl<B: Bus + 'static> UnicornCore<B> {
             Err(error) => Stop::Fault { at, fault: fault(error) },
         })
     }
+}
+
+/// Notes that the program has come to a marked block.
+fn note<B>(uc: &mut Hooked<'_, B>, address: u32) {
+    let r0 = uc.reg_read(RegisterARM::R0).unwrap_or_default() as u32;
+    let inside = uc.get_data_mut();
+    inside.marks.push(Mark { cycles: inside.count.meter.cycles, address, r0 });
 }
 
 /// Whether the masks let an exception of this priority through.
@@ -448,14 +506,11 @@ impl<B: Bus + 'static> Core for UnicornCore<B> {
     }
 
     fn mark(&mut self, address: u32) -> Result<(), CoreError> {
-        let at = u64::from(address & !1);
-        let hooked = self.engine.add_code_hook(at, at, |uc, address, _| {
-            let r0 = uc.reg_read(RegisterARM::R0).unwrap_or_default() as u32;
-            let inside = uc.get_data_mut();
-            let cycles = inside.count.meter.cycles;
-            inside.marks.push(Mark { cycles, address: address as u32, r0 });
-        });
-        engine("hook an instruction", hooked).map(|_| ())
+        let marked = &mut self.engine.get_data_mut().marked;
+        if let Err(place) = marked.binary_search(&(address & !1)) {
+            marked.insert(place, address & !1);
+        }
+        Ok(())
     }
 
     fn take_marks(&mut self, marks: &mut Vec<Mark>) {

@@ -1,8 +1,8 @@
 //! The pair of analogue converters ADC1 and ADC2 with their common registers.
 //!
-//! Modelled: regulator, calibration, software start, single regular conversions with
-//! sampling time and oversampling, requests to DMA. The code is taken from the pin when
-//! the conversion is done.
+//! Modelled: regulator, calibration, software start, regular conversions of one channel,
+//! single or without end, with sampling time and oversampling, requests to DMA, overrun.
+//! The code is taken from the pin when the conversion is done.
 
 use super::registers::{Kept, Registers};
 use super::{Peripheral, Write};
@@ -13,11 +13,17 @@ const CFGR: u32 = 0x0C;
 const CFGR2: u32 = 0x10;
 const SMPR1: u32 = 0x14;
 const SQR1: u32 = 0x30;
-const DR: u32 = 0x40;
+/// Data register.
+pub(in crate::board) const DR: u32 = 0x40;
 const COMMON: u32 = 0x300;
 const CCR: u32 = 0x308;
 
 const ALL: u32 = u32::MAX;
+
+/// Of the configuration: DMA, keep the newest code, one conversion after the other.
+const DMA: u32 = 1;
+const OVERWRITE: u32 = 1 << 12;
+const CONTINUOUS: u32 = 1 << 13;
 
 const ENABLE: u32 = 1;
 const DISABLE: u32 = 1 << 1;
@@ -62,7 +68,6 @@ struct Converter {
     data: u32,
     /// Cycle at which the calibration or the conversion under way is done.
     done: u64,
-    wants_dma: bool,
 }
 
 impl Converter {
@@ -73,7 +78,6 @@ impl Converter {
             flags: 0,
             data: 0,
             done: u64::MAX,
-            wants_dma: false,
         }
     }
 
@@ -94,6 +98,11 @@ impl Converter {
         let channel = self.channel();
         let word = self.registers.get(SMPR1 + channel / 10 * 4);
         SAMPLING[(word >> (channel % 10 * 3) & 7) as usize] + 25
+    }
+
+    /// Cycles of the core that a code takes.
+    fn cycles(&self, clock: u64) -> u64 {
+        (self.ratio() * self.half_clocks() * clock).div_ceil(2)
     }
 
     /// The code of `sixteen`, the voltage at the pin in parts of 2^16 of the reference.
@@ -136,11 +145,11 @@ impl Converter {
         if ones & START != 0 && self.control & ENABLE != 0 && idle {
             // A sequence of several, or started by hardware, is not modelled.
             let (sequence, config) = (self.registers.get(SQR1), self.registers.get(CFGR));
-            if sequence & 0xF != 0 || config & (3 << 10 | 1 << 13 | 3 << 3) != 0 {
+            if sequence & 0xF != 0 || config & (3 << 10 | 3 << 3) != 0 {
                 return None;
             }
             self.control |= START;
-            self.done = now + (self.ratio() * self.half_clocks() * clock).div_ceil(2);
+            self.done = now + self.cycles(clock);
         }
         Some(())
     }
@@ -151,31 +160,40 @@ impl Converter {
             CR => Some(self.control),
             DR => {
                 self.flags &= !END;
-                self.wants_dma = false;
                 Some(self.data)
             }
             _ => self.registers.read(offset),
         }
     }
 
-    /// What was under way is done, with this at each channel.
-    fn finish(&mut self, voltage: u16) {
-        self.done = u64::MAX;
+    /// What was under way is done, with this at its channel.
+    fn finish(&mut self, voltage: u16, clock: u64) {
+        let done = std::mem::replace(&mut self.done, u64::MAX);
         if self.control & CALIBRATE != 0 {
             self.control &= !CALIBRATE;
             return;
         }
-        self.control &= !START;
+        let config = self.registers.get(CFGR);
+        if config & CONTINUOUS != 0 {
+            self.done = done + self.cycles(clock);
+        } else {
+            self.control &= !START;
+        }
         if self.flags & END != 0 {
             self.flags |= OVERRUN;
             // Without `OVRMOD` the old code is kept.
-            if self.registers.get(CFGR) >> 12 & 1 == 0 {
+            if config & OVERWRITE == 0 {
                 return;
             }
         }
         self.data = self.code(voltage);
         self.flags |= END | END_OF_SEQUENCE;
-        self.wants_dma = self.registers.get(CFGR) & 1 != 0;
+    }
+
+    /// Whether it asks DMA to take its code. After an overrun it does not until the flag
+    /// is cleared.
+    const fn wants_dma(&self, config: u32) -> bool {
+        config & DMA != 0 && self.flags & (END | OVERRUN) == END
     }
 }
 
@@ -202,8 +220,9 @@ impl Adc {
 
     /// Whether a converter asks DMA to take its code.
     #[must_use]
-    pub const fn wants_dma(&self, converter: usize) -> bool {
-        self.converters[converter].wants_dma
+    pub fn wants_dma(&self, converter: usize) -> bool {
+        let converter = &self.converters[converter];
+        converter.wants_dma(converter.registers.get(CFGR))
     }
 
     /// Cycles of the core in a clock of the converters.
@@ -247,10 +266,11 @@ impl Peripheral for Adc {
     }
 
     fn advance(&mut self, now: u64) {
+        let clock = self.clock();
         for (converter, inputs) in self.converters.iter_mut().zip(&self.inputs) {
-            if converter.done <= now {
+            while converter.done <= now {
                 let channel = converter.channel() as usize;
-                converter.finish(inputs.get(channel).copied().unwrap_or(0));
+                converter.finish(inputs.get(channel).copied().unwrap_or(0), clock);
             }
         }
     }
@@ -317,6 +337,36 @@ mod tests {
         }
         assert_eq!(adc.read(0x100 + ISR, 0).map(|flags| flags & OVERRUN), Some(OVERRUN));
         assert_eq!(adc.read(0x100 + DR, 0), Some(1600));
+    }
+
+    #[test]
+    fn without_end_one_code_follows_the_other() {
+        let mut adc = ready();
+        write(&mut adc, 0x100 + CFGR, DMA | CONTINUOUS, 0).expect("modelled");
+        write(&mut adc, 0x100 + CR, REGULATOR | START, 1000).expect("modelled");
+        for round in 1..4 {
+            let due = 1000 + round * 256 * 25 * 4;
+            assert_eq!(adc.deadline(), due);
+            adc.set_input(1, 9, 100 * round as u16);
+            // Looked after a little late: the next is none the later for it.
+            adc.advance(due + 17);
+            assert_eq!(adc.read(0x100 + DR, due), Some(100 * round as u32));
+        }
+        write(&mut adc, 0x100 + CR, REGULATOR | STOP, 90_000).expect("modelled");
+        assert_eq!(adc.deadline(), u64::MAX);
+    }
+
+    #[test]
+    fn after_an_overrun_it_asks_for_dma_only_when_the_flag_is_cleared() {
+        let mut adc = ready();
+        write(&mut adc, 0x100 + CFGR, DMA | CONTINUOUS, 0).expect("modelled");
+        write(&mut adc, 0x100 + CR, REGULATOR | START, 0).expect("modelled");
+        adc.advance(adc.deadline());
+        assert!(adc.wants_dma(1));
+        adc.advance(adc.deadline());
+        assert!(!adc.wants_dma(1));
+        write(&mut adc, 0x100 + ISR, OVERRUN, 0).expect("modelled");
+        assert!(adc.wants_dma(1));
     }
 
     #[test]

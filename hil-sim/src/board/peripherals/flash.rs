@@ -1,8 +1,21 @@
-//! The flash's interface: wait states and caches are kept (and cost nothing here), the
-//! locks are real.
+//! The flash's interface: locks, programming by double words, erasing by pages and banks,
+//! and what goes wrong if its rules are broken. Wait states and caches are kept and cost
+//! nothing here.
+//!
+//! A double word is 64 bits; it is written as two words, the one at the lower address
+//! first, into erased flash. The memory itself is the machine's: it says what stands where
+//! something is to be programmed, and takes over the [`Change`] when it is done.
+//!
+//! Source: RM0440, 5.3 (operations) and 5.7 (registers), dual bank as delivered.
+
+mod power;
+#[cfg(test)]
+mod tests;
 
 use super::registers::{Kept, Registers};
-use super::{Peripheral, Write};
+use super::{HZ, Peripheral, Write};
+
+pub use power::Cut;
 
 const KEYR: u32 = 0x08;
 const SR: u32 = 0x10;
@@ -11,92 +24,269 @@ const CR: u32 = 0x14;
 const LOCK: u32 = 1 << 31;
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 
-/// ACR, SR, CR, ECCR, OPTR (as delivered: two banks).
-const REGISTERS: [Kept; 5] = [
+/// Of the control register: program, erase a page (with number and bank) or a bank,
+/// start, interrupt at the end and on an error.
+const PROGRAM: u32 = 1;
+const PAGE: u32 = 1 << 1;
+const BANKS: [u32; 2] = [1 << 2, 1 << 15];
+const SECOND_BANK: u32 = 1 << 11;
+const START: u32 = 1 << 16;
+const END_INTERRUPT: u32 = 1 << 24;
+const ERROR_INTERRUPT: u32 = 1 << 25;
+/// Bits that can be written; option bytes, fast programming and the area that can be
+/// secured are not modelled.
+const CONTROL: u32 = PROGRAM
+    | PAGE
+    | BANKS[0]
+    | BANKS[1]
+    | 0x7F << 3
+    | SECOND_BANK
+    | START
+    | END_INTERRUPT
+    | ERROR_INTERRUPT
+    | 1 << 30
+    | LOCK;
+
+/// Of the status register.
+const END: u32 = 1;
+/// What stands there is not erased.
+const NOT_ERASED: u32 = 1 << 3;
+/// The second word does not belong to the first, or the first is not the lower one.
+const ALIGNMENT: u32 = 1 << 5;
+/// Written by bytes or halfwords.
+const SIZE: u32 = 1 << 6;
+/// Written without being told to program, or with an earlier error not cleared.
+const SEQUENCE: u32 = 1 << 7;
+const ERRORS: u32 = NOT_ERASED | 1 << 4 | ALIGNMENT | SIZE | SEQUENCE | 1 << 1 | 1 << 8 | 1 << 9;
+const BUSY: u32 = 1 << 16;
+
+/// Of the whole flash: first address, bytes of a bank and of a page.
+const BASE: u32 = 0x0800_0000;
+const BANK_BYTES: u32 = 256 * 1024;
+const PAGE_BYTES: u32 = 2 * 1024;
+/// Cycles that an operation takes, typical: 82 us a double word, 22 ms a page or bank.
+/// Source: DS12288, flash memory characteristics.
+const PROGRAM_CYCLES: u64 = 82 * (HZ / 1_000_000);
+const ERASE_CYCLES: u64 = 22 * (HZ / 1000);
+
+/// ACR, ECCR, OPTR (as delivered: two banks).
+const REGISTERS: [Kept; 3] = [
     Kept { offset: 0x00, reset: 0x0004_0600, mask: 0x0004_7F0F },
-    Kept { offset: SR, reset: 0, mask: 0 },
-    Kept { offset: CR, reset: 0xC000_0000, mask: 0 },
     Kept { offset: 0x18, reset: 0, mask: 0 },
     Kept { offset: 0x20, reset: 0xFFEF_F8AA, mask: 0 },
 ];
 
-/// The flash's interface. Programming and erasing are not modelled: setting their bits
-/// counts as unmodelled.
+/// What an operation makes of the memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Change {
+    /// A double word, or the part of it that was written before power went.
+    Programmed {
+        /// Where.
+        address: u32,
+        /// What stands there afterwards.
+        bytes: [u8; 8],
+    },
+    /// Every bit set.
+    Erased {
+        /// From where.
+        address: u32,
+        /// Bytes.
+        size: u32,
+    },
+}
+
+/// An operation under way.
+#[derive(Clone, Copy, Debug)]
+struct Operation {
+    change: Change,
+    /// What stands there before, of a double word.
+    before: [u8; 8],
+    due: u64,
+}
+
+/// The flash's interface.
 #[derive(Clone, Debug)]
 pub struct Flash {
     registers: Registers,
     /// Keys taken; none more is taken after a wrong one until reset.
     keys: Option<usize>,
+    control: u32,
+    flags: u32,
+    /// The lower word of a double word, and where.
+    first: Option<(u32, u32)>,
+    /// A double word whose place has not been looked at yet.
+    wanted: Option<(u32, [u8; 8])>,
+    operation: Option<Operation>,
+    finished: Option<Change>,
+    /// Operations begun so far, resets or not.
+    begun: u64,
+    cut: Option<Cut>,
+    power_lost: bool,
 }
 
 impl Default for Flash {
     fn default() -> Self {
-        Self { registers: Registers::new(&REGISTERS), keys: Some(0) }
+        Self {
+            registers: Registers::new(&REGISTERS),
+            keys: Some(0),
+            control: 0xC000_0000,
+            flags: 0,
+            first: None,
+            wanted: None,
+            operation: None,
+            finished: None,
+            begun: 0,
+            cut: None,
+            power_lost: false,
+        }
+    }
+}
+
+impl Flash {
+    /// The program writes to the flash's memory.
+    pub fn store(&mut self, address: u32, size: u32, value: u32) {
+        let broken = if self.control & PROGRAM == 0 || self.flags & ERRORS != 0 {
+            SEQUENCE
+        } else if size != 4 {
+            SIZE
+        } else {
+            match self.first.take() {
+                None if address.is_multiple_of(8) => {
+                    self.first = Some((address, value));
+                    return;
+                }
+                Some((lower, word)) if lower + 4 == address => {
+                    let double = u64::from(value) << 32 | u64::from(word);
+                    self.wanted = Some((lower, double.to_le_bytes()));
+                    return;
+                }
+                _ => ALIGNMENT,
+            }
+        };
+        self.flags |= broken;
+        self.first = None;
+    }
+
+    /// Place of which it has to be known what stands there.
+    #[must_use]
+    pub fn asks_for(&self) -> Option<u32> {
+        self.wanted.map(|(address, _)| address)
+    }
+
+    /// What stands at the place that was asked for.
+    pub fn found(&mut self, before: [u8; 8], now: u64) {
+        let Some((address, bytes)) = self.wanted.take() else { return };
+        // A double word of zeros may be written over anything.
+        if before != [0xFF; 8] && bytes != [0; 8] {
+            self.flags |= NOT_ERASED;
+            return;
+        }
+        self.begin(Change::Programmed { address, bytes }, before, now + PROGRAM_CYCLES, now);
+    }
+
+    fn erase(&mut self, now: u64) {
+        let banks = [0, 1].map(|bank| self.control & BANKS[bank] != 0);
+        let page = self.control & PAGE != 0;
+        let both = page && banks != [false; 2] || self.control & PROGRAM != 0;
+        if both || self.flags & ERRORS != 0 || !page && banks == [false; 2] {
+            self.flags |= SEQUENCE;
+            return;
+        }
+        let (address, size) = match (page, banks) {
+            (true, _) => {
+                let bank = if self.control & SECOND_BANK != 0 { BANK_BYTES } else { 0 };
+                (BASE + bank + PAGE_BYTES * (self.control >> 3 & 0x7F), PAGE_BYTES)
+            }
+            (_, [true, true]) => (BASE, 2 * BANK_BYTES),
+            (_, [true, _]) => (BASE, BANK_BYTES),
+            _ => (BASE + BANK_BYTES, BANK_BYTES),
+        };
+        self.begin(Change::Erased { address, size }, [0xFF; 8], now + ERASE_CYCLES, now);
+    }
+
+    fn begin(&mut self, change: Change, before: [u8; 8], due: u64, now: u64) {
+        self.begun += 1;
+        let due = self.cut_short(due, now);
+        self.operation = Some(Operation { change, before, due });
+    }
+
+    /// What the memory has to take over, once.
+    pub fn take_change(&mut self) -> Option<Change> {
+        self.finished.take()
+    }
+
+    /// Whether it asks for its interrupt.
+    #[must_use]
+    pub const fn asks(&self) -> bool {
+        self.control & END_INTERRUPT != 0 && self.flags & END != 0
+            || self.control & ERROR_INTERRUPT != 0 && self.flags & ERRORS != 0
+    }
+
+    const fn is_busy(&self) -> bool {
+        self.operation.is_some() || self.wanted.is_some()
+    }
+
+    fn write_control(&mut self, write: Write, now: u64) -> Option<()> {
+        // Locked or busy, it takes nothing.
+        if self.control & LOCK != 0 || self.is_busy() {
+            return Some(());
+        }
+        if write.ones() & !CONTROL != 0 {
+            return None;
+        }
+        let kept = self.control & (LOCK | 1 << 30);
+        self.control = write.onto(self.control) & !START | kept;
+        if self.control & PROGRAM == 0 {
+            self.first = None;
+        }
+        if write.ones() & START != 0 {
+            self.erase(now);
+        }
+        Some(())
     }
 }
 
 impl Peripheral for Flash {
     fn read(&mut self, offset: u32, _: u64) -> Option<u32> {
-        self.registers.read(offset)
+        match offset {
+            SR => Some(self.flags | if self.is_busy() { BUSY } else { 0 }),
+            CR => Some(self.control),
+            _ => self.registers.read(offset),
+        }
     }
 
-    fn write(&mut self, offset: u32, write: Write, _: u64) -> Option<()> {
+    fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
         match offset {
             KEYR => {
                 let next = self.keys.and_then(|taken| KEYS.get(taken).map(|key| (taken, *key)));
                 self.keys = next.filter(|(_, key)| *key == write.value).map(|(taken, _)| taken + 1);
                 if self.keys == Some(KEYS.len()) {
-                    self.registers.set(CR, self.registers.get(CR) & !LOCK);
+                    self.control &= !LOCK;
                     self.keys = Some(0);
                 }
-                Some(())
             }
-            CR if write.ones() & !LOCK == 0 => {
-                self.registers.set(CR, self.registers.get(CR) | write.ones());
-                Some(())
+            SR => self.flags &= !write.ones(),
+            CR => self.write_control(write, now)?,
+            _ => self.registers.write(offset, write)?,
+        }
+        Some(())
+    }
+
+    fn deadline(&self) -> u64 {
+        let due = self.operation.map_or(u64::MAX, |operation| operation.due);
+        if self.wanted.is_some() || self.finished.is_some() { 0 } else { due }
+    }
+
+    fn advance(&mut self, now: u64) {
+        if let Some(operation) = self.operation
+            && operation.due <= now
+            && !self.goes_dark()
+        {
+            self.operation = None;
+            self.finished = Some(operation.change);
+            if self.control & END_INTERRUPT != 0 {
+                self.flags |= END;
             }
-            CR => None,
-            _ => self.registers.write(offset, write),
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn write(flash: &mut Flash, offset: u32, value: u32) -> Option<()> {
-        flash.write(offset, Write { value, mask: u32::MAX }, 0)
-    }
-
-    fn locked(flash: &mut Flash) -> bool {
-        flash.read(CR, 0).is_some_and(|cr| cr & LOCK != 0)
-    }
-
-    #[test]
-    fn two_keys_in_their_order_open_it() {
-        let mut flash = Flash::default();
-        assert!(locked(&mut flash));
-        for key in KEYS {
-            assert_eq!(write(&mut flash, KEYR, key), Some(()));
-        }
-        assert!(!locked(&mut flash));
-        assert_eq!(write(&mut flash, CR, LOCK), Some(()));
-        assert!(locked(&mut flash));
-    }
-
-    #[test]
-    fn a_wrong_key_locks_it_until_reset() {
-        let mut flash = Flash::default();
-        let _ = write(&mut flash, KEYR, 1);
-        for key in KEYS {
-            let _ = write(&mut flash, KEYR, key);
-        }
-        assert!(locked(&mut flash));
-    }
-
-    #[test]
-    fn programming_is_not_modelled() {
-        assert_eq!(write(&mut Flash::default(), CR, 1), None);
     }
 }

@@ -18,17 +18,33 @@ pub struct Kept {
 pub struct Registers {
     kept: &'static [Kept],
     values: Vec<u32>,
+    /// Place among these by word of the block, for those in its beginning.
+    places: [u8; WORDS],
 }
+
+/// Words of a block whose registers are found without a search.
+const WORDS: usize = 64;
+/// No register at a word.
+const NONE: u8 = u8::MAX;
 
 impl Registers {
     /// After reset.
     #[must_use]
     pub fn new(kept: &'static [Kept]) -> Self {
-        Self { kept, values: kept.iter().map(|register| register.reset).collect() }
+        let mut places = [NONE; WORDS];
+        for (index, register) in kept.iter().enumerate() {
+            if let Some(place) = places.get_mut(register.offset as usize / 4) {
+                *place = index as u8;
+            }
+        }
+        Self { kept, values: kept.iter().map(|register| register.reset).collect(), places }
     }
 
     fn index(&self, offset: u32) -> Option<usize> {
-        self.kept.iter().position(|register| register.offset == offset)
+        match self.places.get(offset as usize / 4) {
+            Some(&place) => (place != NONE && offset.is_multiple_of(4)).then_some(place.into()),
+            None => self.kept.iter().position(|register| register.offset == offset),
+        }
     }
 
     /// What a register holds; `None` if it is not among these.

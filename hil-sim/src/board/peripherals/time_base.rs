@@ -50,11 +50,23 @@ pub struct TimeBase {
     seen: u64,
     /// Prescaler in use: a new one counts from the next start-over or update event.
     prescaler: u64,
+    /// Cycle at which a flag is raised next that is not up.
+    flag_due: u64,
+    /// The same of flags that ask for the interrupt.
+    due: u64,
 }
 
 impl Default for TimeBase {
     fn default() -> Self {
-        Self { registers: Registers::new(&REGISTERS), flags: 0, origin: 0, seen: 0, prescaler: 1 }
+        Self {
+            registers: Registers::new(&REGISTERS),
+            flags: 0,
+            origin: 0,
+            seen: 0,
+            prescaler: 1,
+            flag_due: u64::MAX,
+            due: u64::MAX,
+        }
     }
 }
 
@@ -90,12 +102,30 @@ impl TimeBase {
     /// Brings the flags up to date.
     fn look(&mut self, now: u64) {
         let counts = self.counts(now);
-        for bit in 0..5 {
-            if self.meets(self.seen, self.value_of(bit)).is_some_and(|at| at <= counts) {
-                self.flags |= 1 << bit;
+        if now >= self.flag_due {
+            for bit in 0..5 {
+                if self.meets(self.seen, self.value_of(bit)).is_some_and(|at| at <= counts) {
+                    self.flags |= 1 << bit;
+                }
             }
+            self.seen = counts;
+            self.look_ahead();
         }
         self.seen = counts;
+    }
+
+    /// Works out when flags are raised next.
+    fn look_ahead(&mut self) {
+        let next = |flags: u32| {
+            let bits = (0..5).filter(|bit| flags >> bit & 1 != 0);
+            let counts = bits.filter_map(|bit| self.meets(self.seen, self.value_of(bit))).min();
+            counts.map_or(u64::MAX, |count| self.origin.wrapping_add(count * self.prescaler))
+        };
+        (self.flag_due, self.due) = if self.runs() {
+            (next(!self.flags), next(self.registers.get(DIER) & !self.flags))
+        } else {
+            (u64::MAX, u64::MAX)
+        };
     }
 
     /// Puts the counter to `value` at `now`.
@@ -104,25 +134,8 @@ impl TimeBase {
         self.seen = value;
     }
 
-    /// Whether it asks for its interrupt.
-    #[must_use]
-    pub fn asks(&self) -> bool {
-        self.flags & self.registers.get(DIER) != 0
-    }
-}
-
-impl Peripheral for TimeBase {
-    fn read(&mut self, offset: u32, now: u64) -> Option<u32> {
-        self.look(now);
-        match offset {
-            CNT => Some((self.counts(now) % self.period()) as u32),
-            SR => Some(self.flags),
-            EGR => Some(0),
-            _ => self.registers.read(offset),
-        }
-    }
-
-    fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
+    /// Changes a register.
+    fn put(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
         self.look(now);
         match offset {
             SR => self.flags &= !(write.mask & !write.value),
@@ -149,16 +162,32 @@ impl Peripheral for TimeBase {
         Some(())
     }
 
-    fn deadline(&self) -> u64 {
-        if !self.runs() {
-            return u64::MAX;
+    /// Whether it asks for its interrupt.
+    #[must_use]
+    pub fn asks(&self) -> bool {
+        self.flags & self.registers.get(DIER) != 0
+    }
+}
+
+impl Peripheral for TimeBase {
+    fn read(&mut self, offset: u32, now: u64) -> Option<u32> {
+        self.look(now);
+        match offset {
+            CNT => Some((self.counts(now) % self.period()) as u32),
+            SR => Some(self.flags),
+            EGR => Some(0),
+            _ => self.registers.read(offset),
         }
-        let asked = self.registers.get(DIER) & !self.flags;
-        let next = (0..5)
-            .filter(|bit| asked >> bit & 1 != 0)
-            .filter_map(|bit| self.meets(self.seen, self.value_of(bit)))
-            .min();
-        next.map_or(u64::MAX, |counts| self.origin + counts * self.prescaler)
+    }
+
+    fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
+        let taken = self.put(offset, write, now);
+        self.look_ahead();
+        taken
+    }
+
+    fn deadline(&self) -> u64 {
+        self.due
     }
 
     fn advance(&mut self, now: u64) {

@@ -2,17 +2,15 @@
 //! what the firmware says of itself in its log.
 
 use interstage::model::Planner;
-use sha2::{Digest, Sha256};
+use sha2::Digest;
 
 use crate::board::bench::Passed;
 use crate::board::log::Line;
 use crate::plant::ledger::Crossing;
 use crate::plant::rig::{Truth, VirtualRig};
-use crate::record::{CrossingLine, LogLine, Recording, Report, Row, Summary};
-use crate::scenario::{Direction, Scenario};
-
-/// As in software: how far from the end of travel a run that arrived may stand, mm.
-const ARRIVED_WITHIN_MM: f64 = 1.0;
+use crate::record::tally::{Ended, Tally, true_line, true_row};
+use crate::record::{CrossingLine, LogLine, Recording, Report, Row};
+use crate::scenario::Scenario;
 
 /// What the log says of a mode, and its number in [`crate::record::MODE_NAMES`].
 const MODES: [(&str, u8); 11] = [
@@ -51,45 +49,22 @@ struct Reported {
 
 /// A run's record as it grows.
 pub(super) struct Trace {
-    digest: Sha256,
-    rows: Vec<Row>,
-    log: Vec<LogLine>,
-    faults: Vec<Report>,
-    limits: Vec<Report>,
+    tally: Tally,
     reported: Vec<Reported>,
-    gap_ref: f64,
-    start_mm: f64,
     mode: u8,
     stage: u8,
-    run_started: Option<f64>,
-    run_ended: f64,
-    preload_sum: f64,
-    moving: u32,
-    worst_separation: f64,
-    steps: u32,
 }
 
 impl Trace {
     pub(super) fn new(scenario: &Scenario, plant: &VirtualRig) -> Self {
         let planner = Planner::try_build(&scenario.rig).ok();
         let direction = scenario.run.direction.into();
+        let gap_ref = planner.map_or(f64::NAN, |planner| planner.gap_ref(direction).to_num());
         Self {
-            digest: Sha256::new(),
-            rows: Vec::new(),
-            log: Vec::new(),
-            faults: Vec::new(),
-            limits: Vec::new(),
+            tally: Tally::new(gap_ref, plant.truth().position_mm),
             reported: Vec::new(),
-            gap_ref: planner.map_or(f64::NAN, |planner| planner.gap_ref(direction).to_num()),
-            start_mm: plant.truth().position_mm,
             mode: 0,
             stage: 1,
-            run_started: None,
-            run_ended: 0.0,
-            preload_sum: 0.0,
-            moving: 0,
-            worst_separation: 0.0,
-            steps: 0,
         }
     }
 
@@ -108,50 +83,39 @@ impl Trace {
         matches!(self.mode, COMPLETE | FAULT_HOLD)
     }
 
-    /// Looks at a millisecond that began at `t_s` and ended with the plant in `truth`.
-    pub(super) fn look(
-        &mut self,
-        t_s: f64,
-        passed: &Passed,
-        lines: &[Line],
-        truth: &Truth,
-        keep_row: bool,
-    ) {
-        self.steps += 1;
+    /// Looks at a millisecond that ended with the plant in `truth`.
+    pub(super) fn look(&mut self, passed: &Passed, lines: &[Line], truth: &Truth, keep_row: bool) {
+        let t_s = self.tally.time_s();
         self.digest_pins(passed);
         for line in lines {
-            self.digest.update(line.text.as_bytes());
+            self.tally.digest.update(line.text.as_bytes());
             self.read(t_s, line);
         }
-        if MOVING.contains(&self.mode) {
-            self.run_started.get_or_insert(t_s);
-            self.run_ended = t_s;
-            self.preload_sum += truth.preload_n;
-            self.moving += 1;
-            self.worst_separation = self.worst_separation.max(truth.separation_mm);
-        }
         if keep_row {
-            self.rows.push(self.row(t_s, passed, truth));
+            let row = self.row(t_s, passed, truth);
+            self.tally.rows.push(row);
         }
+        self.tally.close_tick(MOVING.contains(&self.mode), truth);
     }
 
     /// Adds every bit that went into the board and came out of it.
     fn digest_pins(&mut self, passed: &Passed) {
         let Passed { codes, drives } = passed;
+        let digest = &mut self.tally.digest;
         for code in [codes.wheel.get(), codes.load_cell.get(), codes.tread.get(), codes.arm.get()] {
-            self.digest.update(code.to_le_bytes());
+            digest.update(code.to_le_bytes());
         }
         for duty in [drives.drive, drives.preload] {
-            self.digest.update(duty.to_le_bytes());
+            digest.update(duty.to_le_bytes());
         }
-        self.digest.update([u8::from(drives.drive_on), u8::from(drives.preload_on)]);
+        digest.update([u8::from(drives.drive_on), u8::from(drives.preload_on)]);
     }
 
     /// Takes from a line of the log what it says.
     fn read(&mut self, t_s: f64, line: &Line) {
         let level = if line.level.is_empty() { "" } else { " " };
         let text = format!("{}{level}{}", line.level, line.text);
-        self.log.push(LogLine { t_s, text });
+        self.tally.log.push(LogLine { t_s, text });
         if let Some(mode) = line.behind("mode: ") {
             self.mode = number_of(mode);
         } else if line.text.contains("] stage ") {
@@ -159,8 +123,8 @@ impl Trace {
         } else if line.text.contains("] step ") {
             self.reported.extend(crossing(line));
         } else {
-            for (kind, reports) in [("] fault ", &mut self.faults), ("] limit ", &mut self.limits)]
-            {
+            let Tally { faults, limits, .. } = &mut self.tally;
+            for (kind, reports) in [("] fault ", faults), ("] limit ", limits)] {
                 let said = line.behind(kind).and_then(|rest| rest.split_once(": "));
                 if let Some((code, text)) = said
                     && let Ok(code) = code.parse()
@@ -171,107 +135,37 @@ impl Trace {
         }
     }
 
+    /// A row of what the plant and the pins tell, and the log.
     fn row(&self, t_s: f64, passed: &Passed, truth: &Truth) -> Row {
-        // What the firmware believes is inside it; the pins do not tell.
-        let unknown = f64::NAN;
         Row {
-            t_s,
             mode: self.mode,
             stage: self.stage,
             level: self.reported.len() as u8,
-            position_true_mm: truth.position_mm,
-            position_est_mm: unknown,
-            speed_true_mm_s: truth.speed_mm_s,
-            speed_est_mm_s: unknown,
-            speed_ref_mm_s: unknown,
-            preload_true_n: truth.preload_n,
-            preload_meas_n: unknown,
-            preload_ref_n: unknown,
-            radius_true_mm: truth.radius_mm,
-            radius_est_mm: unknown,
-            compression_true_mm: truth.depth_mm,
-            compression_meas_mm: unknown,
-            root_clearance_mm: truth.root_clearance_mm.unwrap_or(f64::NAN),
-            gap_predicted_mm: unknown,
-            corner_force_n: truth.corner_n,
-            floor_force_n: truth.floor_n,
-            utilisation: truth.utilisation,
-            slip_margin_true: truth.friction - truth.utilisation.abs(),
-            slip_margin_est: unknown,
-            slip_mm: truth.slip_mm,
-            vibration_um: truth.vibration_mm * 1e3,
             drive_duty: passed.drives.drive,
             preload_duty: passed.drives.preload,
+            ..true_row(t_s, truth)
         }
     }
 
     /// The record of a run that took `wall_s` to compute.
     pub(super) fn finish(self, scenario: &Scenario, plant: &VirtualRig, wall_s: f64) -> Recording {
-        let truth = plant.truth();
-        let steps = plant.parameters().wall.steps().len();
-        let end_mm = match scenario.run.direction {
-            Direction::Deploy => scenario.rig.rig.travel_mm,
-            Direction::Retract => 0.0,
-        };
-        let there =
-            self.mode == COMPLETE && (truth.position_mm - end_mm).abs() <= ARRIVED_WITHIN_MM;
-        let crossings: Vec<CrossingLine> =
-            plant.ledger().crossings().iter().map(|crossing| self.line(crossing)).collect();
-        let worst = crossings.iter().map(|c| c.gap_mm).fold(self.worst_separation, f64::max);
-        let total_s = f64::from(self.steps) * 1e-3;
-        let summary = Summary {
-            completed: there && crossings.len() == steps && self.faults.is_empty(),
-            target: "board".into(),
-            controller: scenario.run.controller.name().into(),
-            direction: scenario.run.direction.name().into(),
-            rig: scenario.preset.clone(),
-            seed: scenario.run.seed,
-            duration_s: self.run_started.map_or(0.0, |from| self.run_ended - from),
-            total_s,
-            travel_mm: (truth.position_mm - self.start_mm).abs(),
-            gap_ref_mm: self.gap_ref,
-            max_gap_mm: worst,
-            slip_mm: truth.slip_mm,
-            mean_preload_n: self.preload_sum / f64::from(self.moving.max(1)),
-            energy_j: truth.work_mj * 1e-3,
-            wear_j: truth.wear_mj * 1e-3,
-            faults: self.faults,
-            limits: self.limits,
-            real_time_factor: total_s / wall_s.max(1e-9),
-            trace_digest: self.digest.finalize().iter().map(|b| format!("{b:02x}")).collect(),
-            crossings,
-        };
-        Recording {
-            summary,
-            rows: self.rows,
-            log: self.log,
-            parameters: scenario.to_toml(),
-            stream: Vec::new(),
-        }
+        let Self { tally, reported, mode, .. } = self;
+        let arrived = (mode == COMPLETE).then(|| scenario.run.direction.into());
+        let ended = Ended { target: "board", scenario, plant, arrived, wall_s };
+        tally.finish(&ended, |crossing| line(&reported, crossing))
     }
+}
 
-    /// Ledger line: the plant's truth with what the firmware logged of the same step.
-    fn line(&self, crossing: &Crossing) -> CrossingLine {
-        let index = crossing.index as u8;
-        let said = self.reported.iter().find(|reported| reported.index == index);
-        let told = |value: fn(&Reported) -> f64| said.map(value);
-        CrossingLine {
-            index,
-            speed_mm_s: crossing.speed_mm_s,
-            preload_n: crossing.preload_n,
-            gap_mm: crossing.gap_mm,
-            gap_predicted_mm: told(|r| r.predicted_mm),
-            gap_measured_mm: told(|r| r.measured_mm),
-            corner_force_n: crossing.corner_n,
-            lead_time_s: told(|r| r.lead_s),
-            slip_mm: crossing.slip_mm,
-            touch_s: crossing.touch_s,
-            lift_s: crossing.lift_s,
-            step_mm: crossing.step_mm,
-            step_found_mm: told(|r| r.found_mm),
-            peak_preload_n: crossing.peak_preload_n,
-            peak_utilisation: crossing.peak_utilisation,
-        }
+/// Ledger line: the plant's truth with what the firmware logged of the same step.
+fn line(reported: &[Reported], crossing: &Crossing) -> CrossingLine {
+    let said = reported.iter().find(|reported| u32::from(reported.index) == crossing.index as u32);
+    let told = |value: fn(&Reported) -> f64| said.map(value);
+    CrossingLine {
+        gap_predicted_mm: told(|r| r.predicted_mm),
+        gap_measured_mm: told(|r| r.measured_mm),
+        lead_time_s: told(|r| r.lead_s),
+        step_found_mm: told(|r| r.found_mm),
+        ..true_line(crossing)
     }
 }
 

@@ -22,6 +22,8 @@ struct Printed<'a> {
     #[serde(flatten)]
     summary: &'a crate::record::Summary,
     account: &'a crate::board::load::Load,
+    /// Budgets that the account misses.
+    missed: &'a [String],
     files: &'a [std::path::PathBuf],
 }
 
@@ -31,12 +33,18 @@ pub(super) fn run(
     scenario: &Scenario,
     directory: Option<&Path>,
 ) -> Result<Outcome, Failure> {
-    use crate::board::run;
+    use crate::bench::budget::Budget;
+    use crate::board::load::page;
+    use crate::board::run::{self, Asked};
     use crate::cli::output;
     use crate::firmware::{self, Profile};
+    use crate::report::Section;
     use crate::{progress, table};
 
     run::check(scenario).map_err(Failure::input)?;
+    let faults: Result<Vec<_>, _> = args.board_fault.iter().map(|text| text.parse()).collect();
+    let faults = faults.map_err(|error| Failure::input(format!("--board-fault {error}")))?;
+    let asked = Asked { rows: directory.is_some(), faults };
     let elf = firmware::build(Profile::Release)?;
     let image = std::fs::read(&elf)
         .map_err(|source| firmware::FirmwareError::Read { path: elf.clone(), source })?;
@@ -47,11 +55,13 @@ pub(super) fn run(
                 eprintln!("[{t_s:8.3}] {:<5} {}", line.level, line.text);
             }
         };
-        run::run(&image, scenario, directory.is_some(), show).map_err(Failure::run)?
+        run::run_with(&image, scenario, &asked, show).map_err(Failure::run)?
     };
+    let missed = ran.load.missed(&Budget::shipped().map_err(Failure::run)?.board);
     let mut files = Vec::new();
     if let Some(directory) = directory {
-        files = super::write(&ran.recording, directory)?;
+        let account = Section { title: page::TITLE, body: page::html(&ran.load, &missed) };
+        files = super::write(&ran.recording, &[account], directory)?;
         let log = directory.join("log.txt");
         let lines = ran.recording.log.iter();
         let text: String =
@@ -63,9 +73,9 @@ pub(super) fn run(
     for stray in &ran.load.unmodelled {
         eprintln!("warning: {stray}");
     }
-    let printed = Printed { summary, account: &ran.load, files: &files };
+    let printed = Printed { summary, account: &ran.load, missed: &missed, files: &files };
     output::result(args.json, &printed, || {
-        table::run(summary, &files) + &account::text(&ran.load)
+        table::run(summary, &files) + &account::text(&ran.load, &missed)
     })?;
     let clean = ran.load.unmodelled.is_empty();
     Ok(Outcome::of(summary.completed && summary.faults.is_empty() && clean))

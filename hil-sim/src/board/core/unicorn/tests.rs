@@ -117,3 +117,30 @@ fn an_access_to_nothing_names_its_place() {
     let stop = core.run(FLASH, 1_000).expect("stops");
     assert_eq!(stop, Stop::Fault { at: FLASH + 2, fault: Fault::Read });
 }
+
+#[test]
+fn a_page_first_met_in_a_conditional_block_leaves_no_condition_behind() {
+    // cmp r1, #0; ittt eq; ldreq r2, [r0]; streq r2, [r0, #4]; moveq r3, #7;
+    // b over a nop; movs r4, #5; adds r4, #1
+    let code = [0x2900, 0xBF02, 0x6802, 0x6042, 0x2307, 0xE000, 0xBF00, 0x2405, 0x3401];
+    let mut core = core(&code);
+    core.set_register(Register::R(1), 0).expect("set");
+    core.write(RAM, &9_u32.to_le_bytes()).expect("RAM");
+    cost(&mut core);
+    let registers = [2, 3, 4].map(|r| core.register(Register::R(r)).expect("told"));
+    assert_eq!(registers, [9, 7, 6]);
+}
+
+#[test]
+fn a_program_may_write_what_it_runs_in_ram() {
+    // str r2, [r0]; bx r3, with `movs r5, #1; bx lr` and then `movs r5, #2; bx lr` in r2
+    let mut core = core(&[0x6002, 0x4718]);
+    core.set_register(Register::R(3), RAM | 1).expect("set");
+    core.set_register(Register::Lr, (FLASH + 4) | 1).expect("set");
+    for value in [1, 2, 1, 3] {
+        core.set_register(Register::R(2), 0x4770_2500 | value).expect("set");
+        let stop = core.run(FLASH, 10_000).expect("runs");
+        assert_eq!(stop, Stop::Breakpoint(FLASH + 4));
+        assert_eq!(core.register(Register::R(5)), Ok(value));
+    }
+}

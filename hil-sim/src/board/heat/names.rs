@@ -6,8 +6,8 @@ use gimli::{Dwarf, EndianSlice, LittleEndian, SectionId};
 use object::read::elf::ElfFile32;
 use object::{Endianness, Object, ObjectSection};
 
-use super::ImageError;
 use crate::board::elf::form;
+use crate::board::image::ImageError;
 
 type Slice<'a> = EndianSlice<'a, LittleEndian>;
 

@@ -1,0 +1,233 @@
+//! What a run adds up to, whatever has run the controller: when it moved, with what
+//! preload, how far apart wheel and wall came, whether it arrived.
+
+use interstage::supervise::Direction;
+use sha2::{Digest, Sha256};
+
+use super::{CrossingLine, LogLine, Recording, Report, Row, Summary};
+use crate::plant::ledger::Crossing;
+use crate::plant::rig::{Truth, VirtualRig};
+use crate::scenario::Scenario;
+
+/// Period of a row, s.
+const TICK_S: f64 = 1e-3;
+/// How far from the end of travel a run that arrived may stand, mm: twice what creep and
+/// wheel radius leave on the drawn rigs.
+const ARRIVED_WITHIN_MM: f64 = 1.0;
+
+/// The sums of a run as it goes on.
+pub(crate) struct Tally {
+    /// Every bit that the run is to be known by.
+    pub(crate) digest: Sha256,
+    /// Rows kept.
+    pub(crate) rows: Vec<Row>,
+    /// Log lines.
+    pub(crate) log: Vec<LogLine>,
+    /// Latched faults.
+    pub(crate) faults: Vec<Report>,
+    /// Active limits.
+    pub(crate) limits: Vec<Report>,
+    gap_ref_mm: f64,
+    start_mm: f64,
+    run_started: Option<f64>,
+    run_ended: f64,
+    preload_sum: f64,
+    moving: u32,
+    worst_separation: f64,
+    ticks: u32,
+}
+
+/// How a run has ended.
+pub(crate) struct Ended<'a> {
+    /// What ran the controller.
+    pub(crate) target: &'static str,
+    /// What was asked for.
+    pub(crate) scenario: &'a Scenario,
+    /// The plant as it was left.
+    pub(crate) plant: &'a VirtualRig,
+    /// At the end of this way, by the controller's word.
+    pub(crate) arrived: Option<Direction>,
+    /// Wall-clock time that it took, s.
+    pub(crate) wall_s: f64,
+}
+
+impl Tally {
+    /// A run that begins at `start_mm` and is planned for gaps of `gap_ref_mm`.
+    pub(crate) fn new(gap_ref_mm: f64, start_mm: f64) -> Self {
+        Self {
+            digest: Sha256::new(),
+            rows: Vec::new(),
+            log: Vec::new(),
+            faults: Vec::new(),
+            limits: Vec::new(),
+            gap_ref_mm,
+            start_mm,
+            run_started: None,
+            run_ended: 0.0,
+            preload_sum: 0.0,
+            moving: 0,
+            worst_separation: 0.0,
+            ticks: 0,
+        }
+    }
+
+    /// Time at which the tick under way began, s.
+    pub(crate) fn time_s(&self) -> f64 {
+        f64::from(self.ticks) * TICK_S
+    }
+
+    /// Ends a tick, in which the drive moved or did not.
+    pub(crate) fn close_tick(&mut self, moves: bool, truth: &Truth) {
+        if moves {
+            let t_s = self.time_s();
+            self.run_started.get_or_insert(t_s);
+            self.run_ended = t_s;
+            self.preload_sum += truth.preload_n;
+            self.moving += 1;
+            self.worst_separation = self.worst_separation.max(truth.separation_mm);
+        }
+        self.ticks += 1;
+    }
+
+    /// The record of the run with its ledger, a line of which `line` makes.
+    pub(crate) fn finish(
+        self,
+        ended: &Ended<'_>,
+        line: impl Fn(&Crossing) -> CrossingLine,
+    ) -> Recording {
+        let Ended { target, scenario, plant, arrived, wall_s } = *ended;
+        let truth = plant.truth();
+        let steps = plant.parameters().wall.steps().len();
+        let there = arrived.is_some_and(|way| {
+            let end_mm = match way {
+                Direction::Deploy => scenario.rig.rig.travel_mm,
+                Direction::Retract => 0.0,
+            };
+            (truth.position_mm - end_mm).abs() <= ARRIVED_WITHIN_MM
+        });
+        let crossings: Vec<CrossingLine> = plant.ledger().crossings().iter().map(line).collect();
+        let worst = crossings.iter().map(|c| c.gap_mm).fold(self.worst_separation, f64::max);
+        let total_s = self.time_s();
+        let summary = Summary {
+            completed: there && crossings.len() == steps && self.faults.is_empty(),
+            target: target.into(),
+            controller: scenario.run.controller.name().into(),
+            direction: scenario.run.direction.name().into(),
+            rig: scenario.preset.clone(),
+            seed: scenario.run.seed,
+            duration_s: self.run_started.map_or(0.0, |from| self.run_ended - from),
+            total_s,
+            travel_mm: (truth.position_mm - self.start_mm).abs(),
+            gap_ref_mm: self.gap_ref_mm,
+            max_gap_mm: worst,
+            slip_mm: truth.slip_mm,
+            mean_preload_n: self.preload_sum / f64::from(self.moving.max(1)),
+            energy_j: truth.work_mj * 1e-3,
+            wear_j: truth.wear_mj * 1e-3,
+            faults: self.faults,
+            limits: self.limits,
+            real_time_factor: total_s / wall_s.max(1e-9),
+            trace_digest: self.digest.finalize().iter().map(|b| format!("{b:02x}")).collect(),
+            crossings,
+        };
+        Recording {
+            summary,
+            rows: self.rows,
+            log: self.log,
+            parameters: scenario.to_toml(),
+            stream: Vec::new(),
+        }
+    }
+}
+
+/// A row with what the plant knows; what the controller believes is `NaN`.
+pub(crate) fn true_row(t_s: f64, truth: &Truth) -> Row {
+    let unknown = f64::NAN;
+    Row {
+        t_s,
+        position_true_mm: truth.position_mm,
+        position_est_mm: unknown,
+        speed_true_mm_s: truth.speed_mm_s,
+        speed_est_mm_s: unknown,
+        speed_ref_mm_s: unknown,
+        preload_true_n: truth.preload_n,
+        preload_meas_n: unknown,
+        preload_ref_n: unknown,
+        radius_true_mm: truth.radius_mm,
+        radius_est_mm: unknown,
+        compression_true_mm: truth.depth_mm,
+        compression_meas_mm: unknown,
+        root_clearance_mm: truth.root_clearance_mm.unwrap_or(f64::NAN),
+        gap_predicted_mm: unknown,
+        corner_force_n: truth.corner_n,
+        floor_force_n: truth.floor_n,
+        utilisation: truth.utilisation,
+        slip_margin_true: truth.friction - truth.utilisation.abs(),
+        slip_margin_est: unknown,
+        slip_mm: truth.slip_mm,
+        vibration_um: truth.vibration_mm * 1e3,
+        ..Row::default()
+    }
+}
+
+/// A ledger line with what the plant knows.
+pub(crate) fn true_line(crossing: &Crossing) -> CrossingLine {
+    CrossingLine {
+        index: crossing.index as u8,
+        speed_mm_s: crossing.speed_mm_s,
+        preload_n: crossing.preload_n,
+        gap_mm: crossing.gap_mm,
+        gap_predicted_mm: None,
+        gap_measured_mm: None,
+        corner_force_n: crossing.corner_n,
+        lead_time_s: None,
+        slip_mm: crossing.slip_mm,
+        touch_s: crossing.touch_s,
+        lift_s: crossing.lift_s,
+        step_mm: crossing.step_mm,
+        step_found_mm: None,
+        peak_preload_n: crossing.peak_preload_n,
+        peak_utilisation: crossing.peak_utilisation,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plant::draw::PlantParameters;
+
+    fn truth(preload_n: f64, separation_mm: f64) -> Truth {
+        let scenario = Scenario::resolve(Some("prototype"), None, &[]).expect("a scenario");
+        let plant = VirtualRig::new(PlantParameters::draw(&scenario), 0.0, 0.0, TICK_S);
+        Truth { preload_n, separation_mm, ..*plant.truth() }
+    }
+
+    #[test]
+    fn only_ticks_under_way_count() {
+        let mut tally = Tally::new(2.5, 0.0);
+        for (moves, preload, separation) in
+            [(false, 90.0, 9.0), (true, 30.0, 0.1), (true, 40.0, 0.3), (false, 90.0, 9.0)]
+        {
+            tally.close_tick(moves, &truth(preload, separation));
+        }
+        assert_eq!((tally.run_started, tally.run_ended), (Some(1e-3), 2e-3));
+        assert_eq!((tally.preload_sum, tally.moving), (70.0, 2));
+        assert_eq!((tally.worst_separation, tally.time_s()), (0.3, 4e-3));
+    }
+
+    #[test]
+    fn arriving_takes_the_place_and_every_step() {
+        let scenario = Scenario::resolve(Some("prototype"), None, &[]).expect("a scenario");
+        let end = scenario.rig.rig.travel_mm;
+        let plant = VirtualRig::new(PlantParameters::draw(&scenario), end, 33.3, TICK_S);
+        let finish = |arrived| {
+            let ended =
+                Ended { target: "sil", scenario: &scenario, plant: &plant, arrived, wall_s: 1.0 };
+            Tally::new(2.5, 0.0).finish(&ended, true_line).summary
+        };
+        // It stands at the end of travel, but no step has been crossed.
+        assert!(!finish(Some(Direction::Deploy)).completed);
+        assert_eq!(finish(Some(Direction::Deploy)).travel_mm, end);
+        assert!(!finish(None).completed);
+    }
+}
