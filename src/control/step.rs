@@ -435,6 +435,7 @@ impl Controller {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "the rig is written in SI")]
 mod tests {
     use super::*;
     use crate::rig::Rig;
