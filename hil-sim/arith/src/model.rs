@@ -64,10 +64,10 @@ impl Given {
 /// Coefficients that both ways share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shared<N = f64> {
-    /// 128 N over the unit of force.
-    pub parts_per_128_n: N,
-    /// Unit of force over 128 N.
-    pub unit_128_n: N,
+    /// 256 N over the unit of force.
+    pub parts_per_256_n: N,
+    /// Unit of force over 256 N.
+    pub unit_256_n: N,
     /// Free run over R, shortest over longest.
     pub free: N,
     /// See `free`.
@@ -140,8 +140,8 @@ macro_rules! horner_with_slope {
 impl Shared {
     fn list(&self) -> impl Iterator<Item = f64> {
         let single = [
-            self.parts_per_128_n,
-            self.unit_128_n,
+            self.parts_per_256_n,
+            self.unit_256_n,
             self.free,
             self.least,
             self.inverse_longest_4,
@@ -178,8 +178,8 @@ impl<N: Number> Model<N> {
         let mut rest = flat.iter();
         let mut next = || N::of(*rest.next()?);
         let shared = Shared {
-            parts_per_128_n: next()?,
-            unit_128_n: next()?,
+            parts_per_256_n: next()?,
+            unit_256_n: next()?,
             free: next()?,
             least: next()?,
             inverse_longest_4: next()?,
@@ -211,7 +211,7 @@ impl<N: Number> Model<N> {
     pub fn crossing(&self, given: &Given) -> Answer {
         let (shared, way) = (&self.shared, self.way(given.direction));
         let speed = N::input(given.speed, 7);
-        let wanted = N::input(given.wanted, 7) * shared.parts_per_128_n;
+        let wanted = N::input(given.wanted, 8) * shared.parts_per_256_n;
         let fast = speed / (speed + way.half_speed);
         let load = shared.load * self.inverse_scale;
         let sought = wanted * self.inverse_scale;
@@ -227,7 +227,7 @@ impl<N: Number> Model<N> {
         let ramp = (speed * shared.ramp / run).at_most(N::ONE);
         Answer {
             gap: (horner!(t; g0, g1, g2, g3, g4, g5)).output(4),
-            corner_force: (radial * slope * shared.unit_128_n).output(7),
+            corner_force: (radial * slope * shared.unit_256_n).output(8),
             impact_stress_kpa: (speed * shared.stress).output(4),
             vibration_um: (radial * shared.deflection * ramp).output(12),
             utilisation: used.output(0),
@@ -249,7 +249,7 @@ impl<N: Number> Model<N> {
         let fast = speed / (speed + way.half_speed);
         let elastic = run * run * quartic(&shared.force, t) * way.stiffness(fast, t);
         let lifting = shared.load * quartic(&shared.slope, t);
-        ((elastic * self.scale + lifting) * shared.unit_128_n).output(7)
+        ((elastic * self.scale + lifting) * shared.unit_256_n).output(8)
     }
 
     #[inline(always)]

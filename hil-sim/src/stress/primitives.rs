@@ -22,6 +22,9 @@ const FRACTION_BOUND: f64 = 24.0;
 /// Bound of the inverse root, LSB: 1e-5 of its least value, 2^29.
 const INVERSE_BOUND: f64 = 5368.0;
 
+/// Bound of its guess, LSB: 0.22 % of the same.
+const GUESS_BOUND: f64 = 1_181_116.0;
+
 /// Inputs of a chunk.
 const CHUNK: u64 = 1 << 20;
 
@@ -181,6 +184,18 @@ fn sweeps() -> Vec<Sweep> {
                 let (shift, got) = numeric::inverse_sqrt_normalised(x as u32);
                 let m = (x << shift) as f64 / 4_294_967_296.0;
                 // Relative, as the bound is.
+                f64::from(got) * m.sqrt() - 536_870_912.0
+            }),
+        },
+        Sweep {
+            name: "inverse_sqrt_guess",
+            from: 1,
+            to: all,
+            bound: (-GUESS_BOUND, GUESS_BOUND),
+            whole: true,
+            error: Box::new(|x| {
+                let (shift, got) = numeric::inverse_sqrt_guess(x as u32);
+                let m = (x << shift) as f64 / 4_294_967_296.0;
                 f64::from(got) * m.sqrt() - 536_870_912.0
             }),
         },

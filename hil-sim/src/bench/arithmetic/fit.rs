@@ -56,8 +56,8 @@ impl Bench {
         let least = LEAST_RUN * f.radius_mm / self.longest_mm;
         let load = self.load_n / self.unit_n;
         Some(Shared {
-            parts_per_128_n: 128.0 / self.unit_n,
-            unit_128_n: self.unit_n / 128.0,
+            parts_per_256_n: 256.0 / self.unit_n,
+            unit_256_n: self.unit_n / 256.0,
             free: f.free_run_mm() / f.radius_mm,
             least,
             inverse_longest_4: 0.25 * f.radius_mm / self.longest_mm,
