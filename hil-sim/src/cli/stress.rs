@@ -272,12 +272,13 @@ fn the_plant(printed: &Printed) -> String {
     if printed.refined.is_empty() {
         return text;
     }
-    let orders = printed.refined.iter().filter_map(|line| line.order);
-    let least = orders.clone().fold(f64::INFINITY, f64::min);
+    let shown = printed.refined.iter().filter(|line| line.shows());
+    let least = shown.clone().filter_map(|line| Some(line.order? / line.stated));
     text += &format!(
-        "{} refined runs, {} of them within the grain; least order {least:.2}\n",
+        "{} refined runs, {} of them of the order stated (at least {:.2} of it), the rest without a difference left\n",
         printed.refined.len(),
-        printed.refined.len() - orders.count(),
+        shown.count(),
+        least.fold(f64::INFINITY, f64::min),
     );
     text
 }

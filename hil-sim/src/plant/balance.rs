@@ -75,9 +75,8 @@ impl Balance {
             Axial::Pushed => (c, dc, 0.0),
             Axial::Utilised(u) => (c + u * s, dc + u * ds, u),
             Axial::Carried(grip) => {
-                let traction = grip.at(c, s);
-                let u = traction.utilisation;
-                let du = traction.slope.0 * dc + traction.slope.1 * ds;
+                let (u, (by_c, by_s)) = grip.utilisation(c, s);
+                let du = by_c * dc + by_s * ds;
                 (c + u * s, dc + u * ds + du * s, u)
             }
             Axial::Driven(_) if c <= 0.0 => (0.0, 0.0, 0.0),
@@ -227,7 +226,7 @@ mod tests {
                     Axial::Driven(_) => assert!((thrust - load).abs() < 1e-6),
                     Axial::Carried(grip) => {
                         let speed = grip.speed + (thrust - load) / grip.inertia;
-                        assert!((grip.at(c, s).speed - speed).abs() < 1e-6);
+                        assert!((grip.ended(solved.utilisation, c, s).speed - speed).abs() < 1e-6);
                     }
                     _ => {}
                 }

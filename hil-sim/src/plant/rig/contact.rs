@@ -123,7 +123,7 @@ impl VirtualRig {
         let Stride { way_mm, turn_rad, dt_s, .. } = stride;
         // Foreseen: what the way has brought, and what the new load brings by the last
         // contact's stiffness.
-        let sunk = self.sinks(local, stride.axial());
+        let sunk = self.sinks(local, &stride);
         let balance = self.balance(local, stride.axial());
         let stands = self.truth.height_mm - local.base_mm;
         let pressed = balance.pressed(stands - self.parameters.ring.radius_mm).0 > 0.0;
@@ -163,10 +163,15 @@ impl VirtualRig {
     }
 
     /// Change of the height, mm, by which the last contact would carry the present load.
-    fn sinks(&self, local: &LocalWall, axial: Axial) -> f64 {
+    fn sinks(&self, local: &LocalWall, stride: &Stride) -> f64 {
         let Some(slopes) = self.stiffness else { return 0.0 };
         let (_, cosine, sine) = self.forces;
         let lift = self.truth.height_mm - local.base_mm - self.parameters.ring.radius_mm;
+        // A gripping wheel carries about the load.
+        let axial = match stride.axial() {
+            Axial::Carried(grip) if !self.sliding => Axial::Driven(grip.load_n),
+            axial => axial,
+        };
         let (residual, slope, _) =
             self.balance(local, axial).residual((cosine, sine), slopes, lift);
         let change = -residual / slope;
@@ -180,7 +185,7 @@ impl VirtualRig {
         stride: Stride,
         finer: bool,
     ) -> Result<bool, PlantError> {
-        let guess = self.truth.height_mm - self.base_mm + self.sinks(local, stride.axial());
+        let guess = self.truth.height_mm - self.base_mm + self.sinks(local, &stride);
         let speed = stride.tread_mm_s;
         let solved = self.roll_balanced(local, stride.axial(), speed, guess);
         let solved = solved.map_err(|source| self.unbalanced(source))?;

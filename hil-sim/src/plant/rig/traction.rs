@@ -92,16 +92,16 @@ impl VirtualRig {
             advance: self.advance(),
             normal: if cosine > 0.0 { normal / cosine } else { 1.0 },
         };
-        let ended = grip.at(cosine, sine);
+        let foreseen = self.foresee(&grip);
         let mut stride = Stride {
             dt_s,
             position_mm: self.truth.position_mm,
             way_mm: 0.0,
             turn_rad: 0.0,
-            tread_mm_s: ended.tread,
+            tread_mm_s: foreseen.1,
             moves: Moves::Parked,
             turn,
-            foreseen: (ended.speed, ended.tread),
+            foreseen,
             stopped: false,
         };
         if self.parked {
@@ -109,7 +109,7 @@ impl VirtualRig {
         }
         stride.moves = Moves::Driven(grip);
         self.thrust_n = p.load_n;
-        stride.way_mm = 0.5 * (self.truth.speed_mm_s + ended.speed) * dt_s + self.owed_mm.0;
+        stride.way_mm = 0.5 * (self.truth.speed_mm_s + foreseen.0) * dt_s + self.owed_mm.0;
         let (low, high) = p.stops_mm;
         let position = self.truth.position_mm + stride.way_mm;
         if position < low || position > high {
@@ -135,10 +135,25 @@ impl VirtualRig {
         stride
     }
 
+    /// Speeds of carriage and tread with which the stride will about end: with the slip of
+    /// the last, or, sliding, with its forces.
+    fn foresee(&self, grip: &Grip) -> (f64, f64) {
+        let (_, cosine, sine) = self.forces;
+        if self.sliding || cosine <= 0.0 {
+            let (utilisation, _) = grip.utilisation(cosine, sine);
+            let ended = grip.ended(utilisation, cosine, sine);
+            return (ended.speed, ended.tread);
+        }
+        let tread = grip.tread - grip.yields * self.resists_n;
+        let slip = self.truth.tread_mm_s * grip.advance - self.truth.speed_mm_s;
+        (tread * grip.advance - slip, tread)
+    }
+
     /// Whether the stride ends far from where it was foreseen.
     pub(super) fn astray(&self, stride: &Stride, solved: &Solved) -> bool {
         let (Moves::Driven(grip), false) = (stride.moves, stride.stopped) else { return false };
-        let ended = grip.at(solved.contact.cosine_n, solved.contact.sine_n);
+        let (cosine, sine) = (solved.contact.cosine_n, solved.contact.sine_n);
+        let ended = grip.ended(solved.utilisation, cosine, sine);
         (ended.speed - stride.foreseen.0).abs() * stride.dt_s > ASTRAY_MM
     }
 
@@ -157,7 +172,7 @@ impl VirtualRig {
                 sliding = stride.tread_mm_s.abs();
             }
             Moves::Driven(grip) => {
-                let ended = grip.at(cosine, sine);
+                let ended = grip.ended(truth.utilisation, cosine, sine);
                 truth.speed_mm_s = if stride.stopped { 0.0 } else { ended.speed };
                 truth.tread_mm_s = ended.tread;
                 resists_n = ended.resists_n;
