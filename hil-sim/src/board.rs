@@ -8,6 +8,7 @@ pub mod core;
 pub mod elf;
 pub mod exceptions;
 pub mod faults;
+pub mod gdb;
 pub mod heat;
 pub mod image;
 pub mod load;

@@ -97,8 +97,44 @@ impl<'a> Bench<'a> {
     /// # Errors
     /// [`BenchError`] if the engine or the plant fails.
     pub fn step(&mut self) -> Result<(Passed, Vec<Line>), BenchError> {
+        self.machine.run_on(self.end())?;
+        self.close()
+    }
+
+    /// Cycle at which the millisecond under way is over.
+    const fn end(&self) -> u64 {
+        (self.millisecond + 1) * STEP
+    }
+
+    /// Goes on up to the end of the millisecond or to a breakpoint, whose address is
+    /// returned.
+    ///
+    /// # Errors
+    /// As [`Bench::step`].
+    pub fn run_to_break(&mut self) -> Result<Option<u32>, BenchError> {
+        Ok(self.machine.run_until(self.end())?)
+    }
+
+    /// Goes on by one instruction.
+    ///
+    /// # Errors
+    /// As [`Bench::step`].
+    pub fn step_instruction(&mut self) -> Result<(), BenchError> {
+        Ok(self.machine.step(self.end())?)
+    }
+
+    /// Whether the millisecond is over and has to be closed.
+    #[must_use]
+    pub fn is_due(&self) -> bool {
+        self.machine.now() >= self.end()
+    }
+
+    /// Closes a millisecond that is over: the plant takes its step.
+    ///
+    /// # Errors
+    /// As [`Bench::step`].
+    pub fn close(&mut self) -> Result<(Passed, Vec<Line>), BenchError> {
         self.millisecond += 1;
-        self.machine.run_on(self.millisecond * STEP)?;
         let now = self.machine.now();
         let [drive, preload] = self.machine.chip_mut().take_motors(now);
         let on = |motor: Motor| motor.enabled > 0.5;

@@ -260,6 +260,15 @@ pub trait Core {
     /// As [`Core::run`].
     fn run_to(&mut self, address: u32, cycles: u64, until: u32) -> Result<Stop, CoreError>;
 
+    /// Carries out the one instruction at `address`, or the conditional block that begins
+    /// there.
+    ///
+    /// Slow: code is translated anew for it.
+    ///
+    /// # Errors
+    /// As [`Core::run`].
+    fn step(&mut self, address: u32) -> Result<Stop, CoreError>;
+
     /// Lets time pass in which no instruction is executed.
     fn pass(&mut self, cycles: u64);
 

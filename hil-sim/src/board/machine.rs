@@ -201,6 +201,23 @@ impl Machine {
         self.core.register(register)
     }
 
+    /// Where the program stands.
+    #[must_use]
+    pub const fn pc(&self) -> u32 {
+        self.pc
+    }
+
+    /// Sets a register of the core.
+    ///
+    /// # Errors
+    /// [`CoreError::Engine`] if the engine does not take it.
+    pub fn set_register(&mut self, register: Register, value: u32) -> Result<(), CoreError> {
+        if register == Register::Pc {
+            self.pc = value & !1;
+        }
+        self.core.set_register(register, value)
+    }
+
     /// Power lost and back, or another restart from outside.
     ///
     /// # Errors
@@ -254,39 +271,70 @@ impl Machine {
                 continue;
             }
             let stop = self.core.run(self.pc, cycle - self.now())?;
-            self.note_tasks();
-            match stop {
-                Stop::Spent(at) | Stop::Urgent(at) => self.pc = at,
-                Stop::Breakpoint(at) => {
-                    self.pc = at;
-                    return Ok(Some(at));
-                }
-                Stop::Call(at) => {
-                    self.pc = at;
-                    let now = self.now();
-                    self.chip_mut().system.exceptions.pend(SV_CALL, now);
-                    if self.takeable()? != Some(SV_CALL) {
-                        // Masked or no more urgent than what runs: not to be waited for.
-                        self.chip_mut().system.exceptions.clear(SV_CALL);
-                        self.fault(Cause::Program(super::core::Fault::Undefined), at)?;
-                    }
-                }
-                Stop::Return(value) => self.leave(value)?,
-                Stop::Event(at) => {
-                    self.pc = at;
-                    let exceptions = &mut self.chip_mut().system.exceptions;
-                    if !std::mem::take(&mut exceptions.event) {
-                        self.fall_asleep(Asleep::Event);
-                    }
-                }
-                Stop::Wait(at) => {
-                    self.pc = at;
-                    self.fall_asleep(Asleep::Interrupt);
-                }
-                Stop::Fault { at, fault } => self.fault(Cause::Program(fault), at)?,
+            if let Some(at) = self.follow(stop)? {
+                return Ok(Some(at));
             }
         }
         Ok(None)
+    }
+
+    /// Does what follows from a stop of the core; the address if it is a breakpoint.
+    fn follow(&mut self, stop: Stop) -> Result<Option<u32>, CoreError> {
+        self.note_tasks();
+        match stop {
+            Stop::Spent(at) | Stop::Urgent(at) => self.pc = at,
+            Stop::Breakpoint(at) => {
+                self.pc = at;
+                return Ok(Some(at));
+            }
+            Stop::Call(at) => {
+                self.pc = at;
+                let now = self.now();
+                self.chip_mut().system.exceptions.pend(SV_CALL, now);
+                if self.takeable()? != Some(SV_CALL) {
+                    // Masked or no more urgent than what runs: not to be waited for.
+                    self.chip_mut().system.exceptions.clear(SV_CALL);
+                    self.fault(Cause::Program(super::core::Fault::Undefined), at)?;
+                }
+            }
+            Stop::Return(value) => self.leave(value)?,
+            Stop::Event(at) => {
+                self.pc = at;
+                let exceptions = &mut self.chip_mut().system.exceptions;
+                if !std::mem::take(&mut exceptions.event) {
+                    self.fall_asleep(Asleep::Event);
+                }
+            }
+            Stop::Wait(at) => {
+                self.pc = at;
+                self.fall_asleep(Asleep::Interrupt);
+            }
+            Stop::Fault { at, fault } => self.fault(Cause::Program(fault), at)?,
+        }
+        Ok(None)
+    }
+
+    /// Carries out one instruction, or takes an exception; asleep it passes time, up to
+    /// this cycle at most.
+    ///
+    /// Slow: code is translated anew for it.
+    ///
+    /// # Errors
+    /// As [`Machine::run_until`].
+    pub fn step(&mut self, cycle: u64) -> Result<(), CoreError> {
+        while self.now() < cycle {
+            self.look_after()?;
+            if self.asleep.is_some() {
+                self.sleep(cycle);
+                continue;
+            }
+            if let Some(number) = self.takeable()? {
+                return self.enter(number, self.pc, false);
+            }
+            let stop = self.core.step(self.pc)?;
+            return self.follow(stop).map(|_| ());
+        }
+        Ok(())
     }
 
     /// Runs until this cycle whatever the program does at breakpoints.

@@ -37,6 +37,11 @@ pub(super) struct Args {
     #[arg(long, value_name = "FAULT@S")]
     board_fault: Vec<String>,
 
+    /// Waits for a debugger (GDB remote protocol) at this address and gives it the
+    /// emulated board, whose run is then its own: no files, no summary.
+    #[arg(long, value_name = "[HOST]:PORT", conflicts_with_all = ["out", "json"])]
+    gdb: Option<String>,
+
     /// Shows the controller's log on standard error.
     #[arg(long)]
     log: bool,
@@ -68,6 +73,9 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let directory = if args.no_files { None } else { Some(directory(args, &scenario)?) };
     if args.target == "board" {
         return board::run(args, &scenario, directory.as_deref());
+    }
+    if let Some(address) = &args.gdb {
+        return Err(Failure::input(format!("--gdb {address}: takes --target board")));
     }
     if let Some(fault) = args.board_fault.first() {
         return Err(Failure::input(format!("--board-fault {fault}: takes --target board")));

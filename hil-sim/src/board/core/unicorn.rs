@@ -58,6 +58,7 @@ const RETURN: u32 = 8;
 const RETURN_BITS: u32 = 0xFFFF_FF01;
 /// `WFE`, `WFI` and `SEV`, as they stand in memory.
 const WFE: [u8; 2] = [0x20, 0xBF];
+const WFI: [u8; 2] = [0x30, 0xBF];
 const SEV: [u8; 2] = [0x40, 0xBF];
 /// The state of thumb code outside of a conditional block, among the flags.
 const THUMB: u64 = 1 << 24;
@@ -120,6 +121,11 @@ impl Count {
             limit: u64::MAX,
             stop: None,
         }
+    }
+
+    /// The instruction at an address of the counted code.
+    fn at(&self, address: u32) -> Option<thumb::Instruction> {
+        thumb::decode(self.bytes.get((address & !1).wrapping_sub(self.base) as usize..)?)
     }
 
     /// Adds cycles to the total and to the block under way.
@@ -387,15 +393,28 @@ impl<B: Bus + 'static> UnicornCore<B> {
 }
 
 impl<B: Bus + 'static> UnicornCore<B> {
-    /// Runs from `address` until a hook stops it, or it comes to `until`.
-    fn go(&mut self, address: u32, cycles: u64, until: u64) -> Result<Stop, CoreError> {
+    /// Whether a wait for an interrupt stands there.
+    fn is_wait(&self, address: u32) -> Result<bool, CoreError> {
+        let mut code = [0; 2];
+        self.read(address & !1, &mut code)?;
+        Ok(code == WFI)
+    }
+
+    /// Runs from `address` until a hook stops it, or it comes to `until` or has carried
+    /// out so many instructions, if that is not 0.
+    fn go(
+        &mut self,
+        address: u32,
+        cycles: u64,
+        (until, instructions): (u64, usize),
+    ) -> Result<Stop, CoreError> {
         let count = &mut self.engine.get_data_mut().count;
         count.stop = None;
         count.limit = count.meter.cycles.saturating_add(cycles);
         count.current = UNSEEN;
         // Where the host starts the program, nothing has branched.
         count.next = address & !1;
-        let ended = self.engine.emu_start(u64::from(address | 1), until, 0, 0);
+        let ended = self.engine.emu_start(u64::from(address | 1), until, 0, instructions);
         if let Some(stop) = self.engine.get_data_mut().count.stop.take() {
             return Ok(stop);
         }
@@ -484,12 +503,28 @@ impl<B: Bus + 'static> Core for UnicornCore<B> {
     }
 
     fn run(&mut self, address: u32, cycles: u64) -> Result<Stop, CoreError> {
-        self.go(address, cycles, u64::MAX)
+        self.go(address, cycles, (u64::MAX, 0))
+    }
+
+    fn step(&mut self, address: u32) -> Result<Stop, CoreError> {
+        let before = self.meter();
+        engine("forget code", self.engine.ctl_flush_tb())?;
+        let stop = self.go(address, 1, (u64::MAX, 1))?;
+        engine("forget code", self.engine.ctl_flush_tb())?;
+        // The whole piece of code was counted of which one instruction was carried out.
+        let count = &mut self.engine.get_data_mut().count;
+        let instruction = count.at(address).map_or(0, |found| timing::extra(found.kind));
+        count.meter.cycles = before.cycles + 1 + instruction;
+        count.meter.instructions = before.instructions + 1;
+        Ok(match stop {
+            Stop::Wait(at) if !self.is_wait(address)? => Stop::Spent(at),
+            stop => stop,
+        })
     }
 
     fn run_to(&mut self, address: u32, cycles: u64, until: u32) -> Result<Stop, CoreError> {
         engine("forget code", self.engine.ctl_flush_tb())?;
-        let stop = self.go(address, cycles, u64::from(until & !1))?;
+        let stop = self.go(address, cycles, (u64::from(until & !1), 0))?;
         engine("forget code", self.engine.ctl_flush_tb())?;
         Ok(match stop {
             Stop::Wait(at) if at & !1 == until & !1 => Stop::Spent(at),

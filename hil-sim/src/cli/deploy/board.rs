@@ -34,6 +34,7 @@ pub(super) fn run(
     directory: Option<&Path>,
 ) -> Result<Outcome, Failure> {
     use crate::bench::budget::Budget;
+    use crate::board::gdb;
     use crate::board::load::page;
     use crate::board::run::{self, Asked};
     use crate::cli::output;
@@ -44,10 +45,20 @@ pub(super) fn run(
     run::check(scenario).map_err(Failure::input)?;
     let faults: Result<Vec<_>, _> = args.board_fault.iter().map(|text| text.parse()).collect();
     let faults = faults.map_err(|error| Failure::input(format!("--board-fault {error}")))?;
+    let listener = args.gdb.as_deref().map(gdb::listen).transpose().map_err(Failure::input)?;
     let asked = Asked { rows: directory.is_some(), faults };
     let elf = firmware::build(Profile::Release)?;
     let image = std::fs::read(&elf)
         .map_err(|source| firmware::FirmwareError::Read { path: elf.clone(), source })?;
+    if let Some(listener) = listener {
+        let address = listener.local_addr().map_err(Failure::run)?;
+        eprintln!("waiting for a debugger: gdb {} -ex 'target remote {address}'", elf.display());
+        let show = |t_s: f64, line: &crate::board::log::Line| {
+            eprintln!("[{t_s:8.3}] {:<5} {}", line.level, line.text);
+        };
+        gdb::serve(&listener, &image, scenario, show).map_err(Failure::run)?;
+        return Ok(Outcome::of(true));
+    }
     let ran = {
         let _progress = (!args.log).then(|| progress::spinner(scenario.run.direction.name()));
         let show = |t_s: f64, line: &crate::board::log::Line| {
