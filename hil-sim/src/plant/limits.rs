@@ -161,7 +161,12 @@ mod tests {
             height_mm: 20.5,
         }]);
         assert!(matches!(high.check(50.0), Err(Refusal::Towers { .. })));
-        high.load_n = 0.0;
+        (high.load_n, high.mu) = (0.0, 0.1);
+        assert_eq!(high.check(5.0), Ok(()));
+        // Braked, it would dig itself in, if it were heavy enough for that.
+        high.mu = 1.1;
+        assert!(matches!(high.check(5.0), Err(Refusal::Digs { .. })));
+        high.mass_kg = 0.1;
         assert_eq!(high.check(5.0), Ok(()));
         // The load presses too, through a trailing arm.
         let mut heavy = nominal();

@@ -85,6 +85,23 @@ pub struct Contact {
 }
 
 impl Contact {
+    /// The contact a little higher up, by its derivatives, its parts as the whole.
+    #[must_use]
+    pub fn moved(self, change_mm: f64) -> Self {
+        let cosine_n = self.cosine_n + self.slope.0 * change_mm;
+        let part = cosine_n / self.cosine_n;
+        Self {
+            normal_n: self.normal_n * part,
+            cosine_n,
+            sine_n: self.sine_n + self.slope.1 * change_mm,
+            floor_n: self.floor_n * part,
+            step_cosine_n: self.step_cosine_n * part,
+            step_sine_n: self.step_sine_n * part,
+            depth_mm: self.depth_mm - change_mm,
+            ..self
+        }
+    }
+
     /// Magnitude of the step's force on the wheel, N.
     #[must_use]
     pub fn step_force_n(&self) -> f64 {

@@ -130,7 +130,7 @@ impl VirtualRig {
         let foreseen = stands + self.drift * way_mm + self.creep * dt_s + sunk;
         let height_mm = if pressed { foreseen } else { stands };
         let motion = Motion { wall: *local, height_mm, turn_rad, dt_s };
-        let solved = balance.solve(&mut self.ring, motion);
+        let solved = balance.solve_near(&mut self.ring, motion);
         let solved = solved.map_err(|source| self.unbalanced(source))?;
         if finer && self.astray(&stride, &solved) {
             return Ok(false);
