@@ -60,9 +60,9 @@ fn cell(column: usize, text: String) -> Cell {
 
 fn details(s: &Summary) -> String {
     format!(
-        "{}; gross slip {:.3} mm; {} controller on {}, rig {}, seed {}; {:.0} times real time",
+        "{}; gross slip {} mm; {} controller on {}, rig {}, seed {}; {:.0} times real time",
         gap_sentence(s),
-        s.slip_mm,
+        number(s.slip_mm, 3),
         s.controller,
         s.target,
         s.rig,

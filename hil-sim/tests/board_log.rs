@@ -90,31 +90,35 @@ fn every_tick_of_a_run_is_logged_and_runs_again_on_this_host() {
         assert!(result.events as usize == run.events.len() && result.plans.1 == 0, "{result:?}");
         // What the report shows of the controller is its own word.
         let rows = &ran.recording.rows;
-        assert!(rows[2000..].iter().all(|row| row.position_est_mm.is_finite()));
+        // But for the last ticks, which had not left the board when the run ended.
+        let logged = &rows[2000..rows.len() - 24];
+        assert!(logged.iter().all(|row| row.position_est_mm.is_finite()));
         // Bytes a tick: what a probe has to keep up with.
         let mean = ran.recording.stream.len() as f64 / run.rows.len() as f64;
         assert!(mean < 50.0, "{mean}");
     }
 }
 
-/// A run until the drive has arrived, with the channel read or not; what passed at the
-/// pins, and what the tick cost.
-fn deployment(listen: bool) -> (Vec<String>, hil_sim::board::load::Load) {
+/// A run until the drive has arrived, with the channel read or not: how long it took, ms,
+/// what the text log says of the crossings, and what the tick cost.
+fn deployment(listen: bool) -> (u32, Vec<Vec<f64>>, hil_sim::board::load::Load) {
     let mut board = Board::off();
     board.bench.listen(listen);
     board.until("mode: idle", 3000);
-    let (mut gathered, mut pins) = (Gathered::default(), Vec::new());
+    let (mut gathered, mut crossings) = (Gathered::default(), Vec::new());
     gathered.begin(board.bench.machine_mut());
     board.send(b's');
-    for _ in 0..8000 {
-        let (passed, lines) = board.bench.step().expect("runs");
+    for millisecond in 0..8000 {
+        let (_, lines) = board.bench.step().expect("runs");
         board.bench.take_frames();
-        pins.push(format!("{passed:?}"));
+        let closed = lines.iter().filter(|line| line.text.contains("] step "));
+        // From the speed on: what stands before it is the time and the place.
+        crossings.extend(closed.map(|line| line.numbers()[4..].to_vec()));
         gathered.gather(board.bench.machine_mut(), 5);
         if lines.iter().any(|line| line.text.contains("mode: deployed")) {
             let footprint = Footprint::of_elf(elf()).expect("an image");
             let machine = board.bench.into_machine();
-            return (pins, gathered.close(&machine, &footprint, 0));
+            return (millisecond, crossings, gathered.close(&machine, &footprint, 0));
         }
     }
     panic!("it did not arrive");
@@ -122,9 +126,15 @@ fn deployment(listen: bool) -> (Vec<String>, hil_sim::board::load::Load) {
 
 #[test]
 fn a_reader_that_is_not_there_changes_nothing() {
-    let ((read, with), (unread, without)) = (deployment(true), deployment(false));
-    assert_eq!(read.len(), unread.len());
-    assert!(read == unread, "the pins differ");
+    let (read, unread) = (deployment(true), deployment(false));
+    // The journal's time differs by the copying of its frames, and with it the cycle in
+    // which an interrupt is taken; the loop amplifies that as it does any noise.
+    assert!(read.0.abs_diff(unread.0) <= 20, "{} ms, {} ms", read.0, unread.0);
+    assert_eq!((read.1.len(), unread.1.len()), (3, 3));
+    for (read, unread) in read.1.iter().flatten().zip(unread.1.iter().flatten()) {
+        assert!((read - unread).abs() <= 0.3 + 0.02 * unread.abs(), "{read} {unread}");
+    }
+    let (with, without) = (read.2, unread.2);
     let near = |a: f64, b: f64| (a / b - 1.0).abs() <= 0.02;
     assert!(near(with.tick.mean, without.tick.mean), "{:?} {:?}", with.tick, without.tick);
     assert!(near(with.tick.worst as f64, without.tick.worst as f64));
@@ -143,12 +153,22 @@ fn frames_that_found_no_room_are_marked_and_the_capture_waits_for_its_reader() {
     board.bench.listen(true);
     board.run(1500);
     let run = board.log();
-    let lost = run.marks.iter().find_map(|(_, mark)| match mark {
-        Mark::Lost { frames, dropped } => Some((*frames, *dropped)),
-        _ => None,
-    });
-    let (frames, dropped) = lost.expect("marked");
-    assert!(frames > 100 && frames == dropped, "{frames} {dropped}");
+    // A short frame may find room where a long one did not, so there are several marks.
+    let (mut frames, mut ticks) = (0, 0);
+    for (_, mark) in &run.marks {
+        match mark {
+            Mark::Lost { frames: lost, dropped } => {
+                assert_eq!(lost, dropped);
+                frames += lost;
+            }
+            other => panic!("{other}"),
+        }
+    }
+    for pair in run.rows.windows(2) {
+        ticks += u64::from(pair[1].tick - pair[0].tick - 1);
+    }
+    assert!(frames > 300 && ticks > 2400, "{frames} frames, {ticks} ticks");
+    assert_eq!((run.tally.lost_frames, run.tally.lost_ticks), (u64::from(frames), ticks));
     // The command came first, and its capture is kept whole until it has been read.
     let first = run.shots.first().expect("captured");
     assert_eq!(first.trigger, Trigger::Command);

@@ -67,6 +67,8 @@ fn put(svg: &mut String, (x, y, cells): (u16, u16, u16), look: &Look, text: &str
     }
     let weight = if *bold { " font-weight=\"bold\"" } else { "" };
     let text = text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
+    // Blanks that are not left out, or the text would be stretched over their place.
+    let text = text.replace(' ', "\u{a0}");
     let _ = writeln!(
         svg,
         "<text x=\"{left}\" y=\"{}\" fill=\"{fill}\" textLength=\"{width}\"{weight}>{text}</text>",
@@ -95,7 +97,7 @@ mod tests {
     #[test]
     fn the_picture_shows_what_the_screen_does() {
         let svg = svg(&drawn());
-        for part in ["speed, mm/s", "r retract", "#4fb3d9", "</svg>"] {
+        for part in ["speed,\u{a0}mm/s", "r\u{a0}retract", "#4fb3d9", "</svg>"] {
             assert!(svg.contains(part), "{part}");
         }
         assert_eq!(svg.matches("<svg").count(), 1);

@@ -27,11 +27,14 @@ const LINES: usize = 64;
 /// What stands at the bottom.
 const KEYS: &str = " s start   x stop   r retract   0 reset   q quit ";
 
-/// A plot: title, unit, least span, and its lines.
+/// A line of a plot: name, colour, value.
+type Curve = (&'static str, Color, fn(&Row) -> f64);
+
+/// A plot: title with unit, least span, and its lines, the later above the earlier.
 struct Plot {
     title: &'static str,
     least: f64,
-    lines: [Option<(&'static str, Color, fn(&Row) -> f64)>; 2],
+    lines: [Option<Curve>; 2],
 }
 
 const PLOTS: [Plot; 4] = [
@@ -39,16 +42,16 @@ const PLOTS: [Plot; 4] = [
         title: "speed, mm/s",
         least: 2.0,
         lines: [
-            Some(("estimated", Color::Cyan, |row| row.speed_mm_s)),
             Some(("wanted", Color::Gray, |row| row.speed_ref_mm_s)),
+            Some(("estimated", Color::Cyan, |row| row.speed_mm_s)),
         ],
     },
     Plot {
         title: "preload, N",
         least: 4.0,
         lines: [
-            Some(("measured", Color::Yellow, |row| row.preload_n)),
             Some(("wanted", Color::Gray, |row| row.preload_ref_n)),
+            Some(("measured", Color::Yellow, |row| row.preload_n)),
         ],
     },
     Plot {

@@ -123,7 +123,7 @@ fn summary(run: &Run) -> Summary {
         travel_mm: between(|row| row.position_mm).abs(),
         gap_ref_mm: unknown,
         max_gap_mm: unknown,
-        slip_mm: run.ledger.iter().map(|line| line.slip.to_num::<f64>().max(0.0)).sum(),
+        slip_mm: unknown,
         mean_preload_n: preload / moving.len() as f64,
         energy_j: unknown,
         wear_j: unknown,
@@ -152,7 +152,8 @@ fn crossing(run: &Run, line: &Line) -> CrossingLine {
         gap_measured_mm: Some(told.gap_measured_mm),
         corner_force_n: f64::NAN,
         lead_time_s: Some(told.lead_time_s),
-        slip_mm: told.slip_mm,
+        // The ledger's has creep and tolerances in it.
+        slip_mm: f64::NAN,
         touch_s: touch.map_or(told.t_s, |row| row.t_s),
         lift_s: lift.or(span.last()).map_or(told.t_s, |row| row.t_s),
         step_mm: told.step_found_mm - told.residual_mm,

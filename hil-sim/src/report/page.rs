@@ -28,14 +28,14 @@ pub(super) fn html(recording: &Recording, more: &[Section]) -> String {
     );
     page += &format!(
         "<header class=\"{grade}\">\n<p class=\"what\">interstage · {} controller · {} · rig {} · seed {}</p>\n\
-<h1>{}</h1>\n<p>{}; gross slip {:.3} mm; {}</p>\n</header>\n",
+<h1>{}</h1>\n<p>{}; gross slip {} mm; {}</p>\n</header>\n",
         escape(&s.controller),
         escape(&s.target),
         escape(&s.rig),
         s.seed,
         escape(&headline(s)),
         capital(&gap_sentence(s)),
-        s.slip_mm,
+        tables::number(s.slip_mm, 3),
         count(s.faults.len(), "fault") + ", " + &count(s.limits.len(), "limit") + " reported",
     );
     page += &section("Summary", &tables::summary(s));

@@ -117,7 +117,7 @@ fn a_view_without_terminal_ends_by_itself_and_leaves_its_picture() {
     let output = rig_in(directory.path(), &arguments);
     assert_eq!(code(&output), 0, "{}", String::from_utf8_lossy(&output.stderr));
     let picture = std::fs::read_to_string(directory.path().join("view.svg")).expect("a picture");
-    assert!(picture.contains("complete") && picture.contains("preload, N"));
+    assert!(picture.contains("complete") && picture.contains("preload,\u{a0}N"));
     refused(&["live"], "no terminal");
     refused(&["live", "--headless", "--listen", "nowhere"], "--listen nowhere");
 }
