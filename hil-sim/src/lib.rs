@@ -10,6 +10,7 @@ pub mod constants;
 pub mod docs;
 pub mod export;
 pub mod firmware;
+pub mod identify;
 pub mod montecarlo;
 pub mod paper;
 pub mod plant;
