@@ -13,6 +13,7 @@ mod crossing;
 mod deploy;
 mod docs;
 mod failure;
+mod identify;
 mod keys;
 mod modes;
 mod montecarlo;
@@ -48,6 +49,7 @@ enum Verb {
     Compare(compare::Args),
     Montecarlo(montecarlo::Args),
     Paper(paper::Args),
+    Identify(identify::Args),
     Keys(keys::Args),
     Stress(stress::Args),
     Size(size::Args),
@@ -67,6 +69,7 @@ impl Verb {
             Self::Compare(args) => compare::run(args),
             Self::Montecarlo(args) => montecarlo::run(args),
             Self::Paper(args) => paper::run(args),
+            Self::Identify(args) => identify::run(args),
             Self::Keys(args) => keys::run(args),
             Self::Stress(args) => stress::run(args),
             Self::Size(args) => size::run(args),
