@@ -7,9 +7,11 @@ mod bridge;
 mod button;
 pub(crate) mod config;
 mod console;
+mod flash;
 pub(crate) mod guard;
 mod journal;
 pub(crate) mod light;
+mod line;
 pub(crate) mod rtt;
 mod wheel;
 
@@ -18,13 +20,15 @@ pub(crate) use angle::Angle;
 pub(crate) use bridge::{Bridge, Bridges};
 pub(crate) use button::Button;
 pub(crate) use console::Console;
+pub(crate) use flash::Pages;
 pub(crate) use guard::Guard;
 pub(crate) use journal::Lines;
 pub(crate) use light::Lamp;
+pub(crate) use line::HostLine;
 pub(crate) use wheel::Wheel;
 
 use embassy_stm32::peripherals::{ADC1, ADC2, DMA1_CH1, DMA1_CH2, DMA1_CH3, DMA1_CH4};
-use embassy_stm32::{Config, bind_interrupts, dma, exti, interrupt, rcc};
+use embassy_stm32::{Config, bind_interrupts, dma, exti, flash as flash_driver, interrupt, rcc};
 use interstage::hal::Board;
 
 /// The board.
@@ -48,6 +52,7 @@ bind_interrupts!(pub(crate) struct Irqs {
     DMA1_CHANNEL2 => dma::InterruptHandler<DMA1_CH2>;
     DMA1_CHANNEL3 => dma::InterruptHandler<DMA1_CH3>;
     DMA1_CHANNEL4 => dma::InterruptHandler<DMA1_CH4>;
+    FLASH => flash_driver::InterruptHandler;
     EXTI15_10 => exti::InterruptHandler<interrupt::typelevel::EXTI15_10>;
 });
 

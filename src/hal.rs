@@ -99,6 +99,18 @@ pub trait CommandSource {
     async fn next(&mut self) -> Command;
 }
 
+/// The binary line to the host.
+pub trait Line {
+    /// Reads what has come, at most what fits; none if nothing has. Never waits.
+    fn read(&mut self, bytes: &mut [u8]) -> usize;
+
+    /// Writes all of it or nothing; whether it was taken. Never waits.
+    fn write(&mut self, bytes: &[u8]) -> bool;
+
+    /// Starts the board anew. The bridges are off from then on.
+    fn restart(&mut self);
+}
+
 /// Where log entries go.
 pub trait Journal {
     /// Writes one entry without blocking; what does not fit is dropped and

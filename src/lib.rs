@@ -15,9 +15,11 @@
 pub mod control;
 pub mod estimate;
 pub mod hal;
+pub mod link;
 pub mod log;
 pub mod model;
 pub mod numeric;
+pub mod params;
 pub mod rig;
 pub mod sense;
 pub mod supervise;

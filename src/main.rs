@@ -23,13 +23,17 @@ mod firmware {
     use interstage::control::Controller;
     use interstage::hal::{Board, Parts};
     use interstage::model::Planner;
+    use interstage::params::service::Service;
     use interstage::tasks::{self, Exchange};
     use panic_probe as _;
     use rtt_target::DownChannel;
 
     use crate::board::{self, config, guard, light, rtt};
-    use crate::board::{Analog, Angle, Bridge, Bridges, Button, Console, Guard, Lamp, Lines};
-    use crate::board::{Nucleo, Wheel};
+    use crate::board::{Analog, Angle, Bridge, Bridges, Button, Console, Guard, HostLine, Lamp};
+    use crate::board::{Lines, Nucleo, Pages, Wheel};
+
+    /// Any pin.
+    type Pin = Peri<'static, AnyPin>;
 
     static EXCHANGE: Exchange = Exchange::new();
 
@@ -58,16 +62,18 @@ mod firmware {
         defmt::info!("interstage {=str}", env!("CARGO_PKG_VERSION"));
         guard::report_restart();
         guard::arm();
-        let (parts, lamp) = split(p, channels.console);
+        let (parts, lamp, pages) = split(p, channels.console);
         threads.spawn(light::show(lamp).unwrap());
-        match config::build() {
+        let (constants, service) = config::build(pages);
+        threads.spawn(link(HostLine::new(channels.line), service).unwrap());
+        match constants {
             Ok((controller, planner)) => start(threads, parts, controller, planner),
             Err(error) => threads.spawn(config::hold(parts, error).unwrap()),
         }
     }
 
     /// Who gets which peripheral and pin; the bridges come up off.
-    fn split(p: Peripherals, console: DownChannel) -> (Parts<Nucleo>, Peri<'static, AnyPin>) {
+    fn split(p: Peripherals, console: DownChannel) -> (Parts<Nucleo>, Pin, Pages) {
         let parts = Parts {
             wheel: Wheel::new(p.TIM5, p.PA0, p.PA1),
             load_cell: Analog::new(p.ADC1, p.PC2, p.DMA1_CH1),
@@ -83,7 +89,7 @@ mod firmware {
             journal: Lines::default(),
             light: Lamp,
         };
-        (parts, p.PA5.into())
+        (parts, p.PA5.into(), Pages::new(p.FLASH))
     }
 
     /// Hands every part to its task.
@@ -145,6 +151,11 @@ mod firmware {
     #[embassy_executor::task]
     async fn typed(console: Console) -> ! {
         tasks::operator(console, &EXCHANGE).await
+    }
+
+    #[embassy_executor::task]
+    async fn link(line: HostLine, service: Service<Pages>) -> ! {
+        tasks::link(line, service, &EXCHANGE).await
     }
 
     #[embassy_executor::task]

@@ -22,9 +22,8 @@ pub const MAX_MODES: usize = 4;
 pub type List<const N: usize> = heapless::Vec<f64, N>;
 
 /// All parameters of one rig.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Rig {
     /// Sleeve, wheel and arm.
     pub rig: Geometry,
@@ -43,9 +42,8 @@ pub struct Rig {
 }
 
 /// Sleeve, wheel and arm.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Geometry {
     /// Undeformed wheel radius R, mm. Published: 25.
     pub wheel_radius_mm: f64,
@@ -72,9 +70,8 @@ pub struct Geometry {
 }
 
 /// Rubber of the wheel: three-parameter solid per area of ring.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Tread {
     /// Relaxed stiffness per area k_inf, Pa/m. Derived: fitted, with the next two,
     /// to the three published gaps.
@@ -86,9 +83,8 @@ pub struct Tread {
 }
 
 /// Loads and friction.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Loads {
     /// Coulomb friction of tread on wall. Chosen: no published value for rubber on
     /// 2A12; dry rubber on metal lies in 0.5 to 1.2 and the paper's own cases need
@@ -112,9 +108,8 @@ pub struct Loads {
 }
 
 /// Pre-tightener: motor, screw and spring.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Pretightener {
     /// Radial preload on the smooth wall, N. Published: 33 on the rig, 100 in the study.
     pub cruise_n: f64,
@@ -134,9 +129,8 @@ pub struct Pretightener {
 }
 
 /// Drive motor, gearbox and speed limits.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Drive {
     /// Speed of the tread at full duty without load, mm/s.
     pub no_load_speed_mm_s: f64,
@@ -164,9 +158,8 @@ pub struct Drive {
 }
 
 /// Sensors.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Sensors {
     /// Encoder counts per wheel turn, all edges.
     pub encoder_counts: f64,
@@ -181,9 +174,8 @@ pub struct Sensors {
 }
 
 /// What the controller is asked to hold.
-#[derive(Clone, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Goals {
     /// Gap to hold at a step, mm; 0 takes the gap at `safe_speed_mm_s` and cruise
     /// preload.

@@ -9,6 +9,7 @@
 //! | [`motors()`] | 1 kHz | the control tick: latest codes in, bridges out |
 //! | [`model()`] | on request | plans the next segment |
 //! | [`operator()`] | on command | hands commands to the tick; one task a source |
+//! | [`link()`] | on request | reads and replaces the stored parameters |
 //! | [`journal()`] | on entry | writes the log, shows the light |
 //!
 //! They share one [`Exchange`] and nothing else. Whatever the tick reads is there
@@ -19,6 +20,7 @@
 mod beat;
 mod exchange;
 mod journal;
+mod link;
 mod model;
 mod motors;
 mod operator;
@@ -26,6 +28,7 @@ mod sensors;
 
 pub use exchange::{CHECK_IN_TICKS, COMMANDS, ENTRIES, Exchange, Station};
 pub use journal::journal;
+pub use link::link;
 pub use model::model;
 pub use motors::motors;
 pub use operator::operator;

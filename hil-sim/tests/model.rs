@@ -128,6 +128,17 @@ fn the_ring_behind_it_is_converged() {
 }
 
 #[test]
+fn the_set_of_the_image_is_fresh() {
+    let mut room = [0; interstage::params::MAX_SET];
+    let length = interstage::params::compile("prototype", &Rig::prototype(), &mut room).unwrap();
+    assert!(
+        room[..length] == *include_bytes!("../../src/params/prototype.set"),
+        "stale: run `cargo rig constants --set`; if a type of a set has changed, raise \
+         interstage::params::SCHEMA"
+    );
+}
+
+#[test]
 fn the_constants_are_fresh() {
     let rows = stored().unwrap();
     verify(&rows, 61, &|| {}).unwrap();

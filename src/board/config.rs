@@ -1,48 +1,67 @@
-//! From the rig's parameters to what the tasks run on.
+//! From the set of parameters to what the tasks run on.
 
 use embassy_time::Timer;
 use interstage::control::Controller;
 use interstage::hal::{Indicator, Light, MotorCommand, Motors, Parts};
 use interstage::model::Planner;
-use interstage::rig::{Rig, RigError};
+use interstage::params::service::{Service, in_force};
+use interstage::params::{Header, ParameterSet, SetError};
 use static_cell::StaticCell;
 
-use super::{Nucleo, journal};
+use super::{Nucleo, Pages};
+
+/// The set that the image carries: the prototype, written by `cargo rig constants`.
+static PROTOTYPE: &[u8] = include_bytes!("../params/prototype.set");
 
 static CONTROLLER: StaticCell<Controller> = StaticCell::new();
 static PLANNER: StaticCell<Planner> = StaticCell::new();
 
-/// Controller and planner for the prototype, in place for good. Call once.
-pub(crate) fn build() -> Result<(&'static Controller, &'static Planner), RigError> {
-    let rig = Rig::prototype();
-    let controller = place(&CONTROLLER, Controller::try_build, &rig)?;
-    let planner = place(&PLANNER, Planner::try_build, &rig)?;
+/// What the tasks run on.
+pub(crate) type Constants = (&'static Controller, &'static Planner);
+
+/// Controller and planner of the set in force, in place for good, and the service that
+/// can replace it. Call once.
+///
+/// A stored set that the firmware cannot run is not passed over for another one: the
+/// drive would move by parameters that nobody chose.
+pub(crate) fn build(pages: Pages) -> (Result<Constants, SetError>, Service<Pages>) {
+    let (_, set) = in_force(&pages, PROTOTYPE);
+    let running = ParameterSet::open_any(set).map_or(0, |set| set.header().parameters);
+    (constants(set), Service::new(pages, PROTOTYPE, running))
+}
+
+fn constants(set: &[u8]) -> Result<Constants, SetError> {
+    let set = ParameterSet::open(set)?;
+    let (controller, rest) = set.controller()?;
+    let controller = CONTROLLER.init(controller);
+    let planner = PLANNER.init(rest.planner()?);
+    announce(set.header());
     Ok((controller, planner))
 }
 
-/// Builds one of them in a frame of its own and moves it once: these frames are
-/// the deepest the stack ever sees. Inlined into the caller they would add up, and
-/// `init` with `?` keeps two more copies of the value.
-#[inline(never)]
-fn place<T>(
-    cell: &'static StaticCell<T>,
-    try_build: fn(&Rig) -> Result<T, RigError>,
-    rig: &Rig,
-) -> Result<&'static T, RigError> {
-    let place = cell.uninit();
-    match try_build(rig) {
-        Ok(value) => Ok(place.write(value)),
-        Err(error) => Err(error),
-    }
+/// Which parameters these are, for whoever reads the log.
+fn announce(header: &Header) {
+    defmt::info!(
+        "rig {=str}, schema {=u16}, parameters {=u32:08x}, calibration {=u32:08x}",
+        header.name.as_str(),
+        header.schema,
+        header.parameters,
+        header.calibration
+    );
 }
 
-/// No controller can be built from the parameters: stays off and says so.
+/// No controller can be read from the parameters: stays off and says so.
 #[embassy_executor::task]
-pub(crate) async fn hold(mut parts: Parts<Nucleo>, error: RigError) -> ! {
+pub(crate) async fn hold(mut parts: Parts<Nucleo>, error: SetError) -> ! {
     parts.motors.apply(MotorCommand::OFF, MotorCommand::OFF);
     parts.light.show(Light::Alarm);
     loop {
-        journal::rig_error(&error);
+        match error {
+            SetError::Schema { found } => {
+                defmt::error!("parameters: {=str}, {=u16}", error.sentence(), found);
+            }
+            _ => defmt::error!("parameters: {=str}", error.sentence()),
+        }
         Timer::after_secs(1).await;
     }
 }

@@ -4,7 +4,6 @@ use defmt::{error, info, warn};
 use interstage::estimate::ContactStage;
 use interstage::hal::Journal;
 use interstage::log::{CrossingRecord, Entry, Event};
-use interstage::rig::RigError;
 use interstage::supervise::{Command, Direction, Leg, Mode};
 use interstage::units::Q16;
 
@@ -70,33 +69,6 @@ fn crossing(at: u32, record: &CrossingRecord) {
         value(record.slip_margin),
         value(record.stiffness_scale),
     );
-}
-
-/// Says what is wrong with the parameters.
-///
-/// Spelled out per kind: the error's own text would bring in the formatting of
-/// floating-point numbers, 20 KiB of it.
-pub(crate) fn rig_error(error: &RigError) {
-    match *error {
-        RigError::OutOfRange { key, value, min, max } => {
-            error!("{=str} = {=f64}: expected a value from {=f64} to {=f64}", key, value, min, max);
-        }
-        RigError::StepOrder { step, position_mm, least_mm } => {
-            error!("step {=usize} at {=f64} mm: expected >= {=f64}", step, position_mm, least_mm);
-        }
-        RigError::LimitBelowCruise { limit_n, cruise_n, least_n } => {
-            error!(
-                "preload limit {=f64} N: expected >= {=f64} for a cruise preload of {=f64} N",
-                limit_n, least_n, cruise_n
-            );
-        }
-        RigError::OutOfReach { radius_mm, min_mm, max_mm } => {
-            error!(
-                "the arm does not reach {=f64} mm, only {=f64} to {=f64}",
-                radius_mm, min_mm, max_mm
-            );
-        }
-    }
 }
 
 fn of_direction(direction: Direction) -> &'static str {

@@ -25,6 +25,8 @@ pub(crate) struct Channels {
     pub(crate) telemetry: UpChannel,
     /// Down 0: operator's letters.
     pub(crate) console: DownChannel,
+    /// Up 2 and down 1: the binary line.
+    pub(crate) line: (UpChannel, DownChannel),
 }
 
 /// Sets up the channels; the log works from here on. Call once, first of all.
@@ -33,14 +35,20 @@ pub(crate) fn init() -> Channels {
         up: {
             0: { size: 2048, mode: ChannelMode::NoBlockSkip, name: "defmt" }
             1: { size: 4096, mode: ChannelMode::NoBlockSkip, name: "telemetry" }
+            2: { size: 128, mode: ChannelMode::NoBlockSkip, name: "line" }
         }
         down: {
             0: { size: 16, name: "console" }
+            1: { size: 128, name: "line" }
         }
     };
     // SAFETY: in the critical section no frame is open, so nobody else holds the state.
     critical_section::with(|_| unsafe { (*STATE.0.get()).channel = Some(channels.up.0) });
-    Channels { telemetry: channels.up.1, console: channels.down.0 }
+    Channels {
+        telemetry: channels.up.1,
+        console: channels.down.0,
+        line: (channels.up.2, channels.down.1),
+    }
 }
 
 /// Log frames lost since boot; wraps.

@@ -79,7 +79,7 @@ pub struct Output {
 }
 
 /// The controller's configuration in machine units; its state is apart.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Controller {
     senses: Senses,
     monitor: Monitor,

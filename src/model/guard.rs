@@ -7,7 +7,7 @@ use crate::rig::{MAX_MODES, Rig, RigError};
 use crate::units::MillimetresPerSecond;
 
 /// Bands of speed to keep out of, ascending and apart.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Guard {
     bands: heapless::Vec<(MillimetresPerSecond, MillimetresPerSecond), MAX_MODES>,
 }

@@ -5,7 +5,7 @@ use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Ratio, Seconds};
 
 /// How preload and speed are chosen. The product is [`Strategy::Scheduled`]; the
 /// others are what it is compared with.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Strategy {
     /// Preload raised ahead of each step as far as the speed needs.
     #[default]

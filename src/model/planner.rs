@@ -23,7 +23,7 @@ const OUTLIER: Ratio = q16(350_000);
 const SLIP_TRIES: usize = 8;
 
 /// The model side of the schedule; runs outside the tick.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Planner {
     model: ReducedModel,
     guard: Guard,

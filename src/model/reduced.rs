@@ -62,7 +62,7 @@ impl Scale {
 /// beyond the fit give its nearer end. Error against [`Formula`](super::formula::Formula)
 /// beyond one LSB of the result, relative: force of a gap 5e-6; gap of a force 2e-5 for
 /// steps of 3 mm and more, 5e-3 for 2 mm, where 150 N all but close it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ReducedModel {
     shape: Shape,
     ways: [Way; 2],

@@ -19,7 +19,7 @@ use crate::units::Q16;
 ///
 /// Source: Catmull and Rom 1974; the error constant is that of the central slope
 /// `h^2 f'''/6` times `max t(1-t)(1-2t) = 0.096`.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Table<const N: usize> {
     /// Least argument, bits of Q16.
     lo: i32,
@@ -30,6 +30,7 @@ pub struct Table<const N: usize> {
     /// 32 to 62.
     shift: u32,
     /// Values at the points, bits of Q16.
+    #[serde(with = "serde_big_array::BigArray")]
     samples: [i32; N],
 }
 

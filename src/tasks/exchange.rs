@@ -1,6 +1,6 @@
 //! What the tasks hand to one another.
 
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use crate::control::{Input, Output};
 use crate::hal::Light;
@@ -79,6 +79,8 @@ pub struct Exchange {
     pub(super) entries: Channel<CriticalSectionRawMutex, Entry, ENTRIES>,
     telemetry: Slot<Telemetry>,
     light: Slot<Light>,
+    /// Nothing is driven.
+    at_rest: AtomicBool,
     lost_entries: AtomicU32,
     bus_faults: [AtomicU32; 4],
     check_ins: [AtomicU32; Station::FIXED + OPERATORS],
@@ -100,6 +102,7 @@ impl Exchange {
             entries: Channel::new(),
             telemetry: Slot::new(),
             light: Slot::new(),
+            at_rest: AtomicBool::new(true),
             lost_entries: AtomicU32::new(0),
             bus_faults: [const { AtomicU32::new(0) }; 4],
             check_ins: [const { AtomicU32::new(0) }; Station::FIXED + OPERATORS],
@@ -128,7 +131,9 @@ impl Exchange {
             self.log(entry);
         }
         self.telemetry.sender().send(output.telemetry);
-        self.show(light_of(output.telemetry.mode));
+        let mode = output.telemetry.mode;
+        self.at_rest.store(mode.is_at_rest(), Ordering::Relaxed);
+        self.show(light_of(mode));
     }
 
     /// Asks the model task for a plan; replaces a request not yet begun.
@@ -169,6 +174,12 @@ impl Exchange {
     #[must_use]
     pub fn light(&self) -> Light {
         self.light.anon_receiver().try_get().unwrap_or_default()
+    }
+
+    /// Whether nothing is driven, as of the latest tick.
+    #[must_use]
+    pub fn at_rest(&self) -> bool {
+        self.at_rest.load(Ordering::Relaxed)
     }
 
     /// Log entries dropped since boot because the journal did not keep up.

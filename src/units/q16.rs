@@ -12,9 +12,23 @@ use fixed::types::{I16F16, I32F32};
 /// infinity, then saturate. Cost on a Cortex-M4: one instruction a sum, about eight
 /// a product, a third of what the same costs through [`fixed`], whose
 /// conversions from and to other formats are used.
-#[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
 #[repr(transparent)]
+#[serde(transparent)]
 pub struct Q16(i32);
+
+impl<'de> serde::Deserialize<'de> for Q16 {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        bits(deserializer).map(Self)
+    }
+}
+
+/// Not inlined: a set of parameters holds a hundred of them, and each place would get a
+/// decoder of its own.
+#[inline(never)]
+fn bits<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<i32, D::Error> {
+    serde::Deserialize::deserialize(deserializer)
+}
 
 impl Q16 {
     /// 0.

@@ -1,9 +1,11 @@
-//! `rig constants`: the generated constants of the reduced model.
+//! `rig constants`: the generated constants of the reduced model, and the sets of
+//! parameters made with them.
 
 use std::path::{Path, PathBuf};
 
 use interstage::model::felt::Kind;
 use interstage::model::formula::Formula;
+use interstage::params::{MAX_SET, compile};
 use interstage::rig::Rig;
 use serde::Serialize;
 
@@ -23,6 +25,8 @@ const CHECKED_ONE_IN: usize = 50;
 ///
 /// Runs all crossings, which takes some minutes, writes them to
 /// `hil-sim/data/crossings.csv`, fits the model and writes `src/model/constants.rs`.
+/// What the image carries is made with the constants in this program, so `cargo rig
+/// constants --set` follows.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// Fits the stored crossings again without running them.
@@ -33,6 +37,11 @@ pub(super) struct Args {
     /// stale.
     #[arg(long, conflicts_with = "refit")]
     check: bool,
+
+    /// Writes `src/params/prototype.set`, the parameters that the image carries, with the
+    /// constants that this program was built with, and nothing else.
+    #[arg(long, conflicts_with_all = ["refit", "check"])]
+    set: bool,
 
     /// Prints the result as one JSON object.
     #[arg(long)]
@@ -63,7 +72,18 @@ struct Quality {
     gap_rms: f64,
 }
 
+/// What `--json` prints with `--set`.
+#[derive(Serialize)]
+struct PrintedSet {
+    path: PathBuf,
+    bytes: usize,
+    written: bool,
+}
+
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
+    if args.set {
+        return write_set(args.json);
+    }
     let failed = |error: anyhow::Error| Failure::run(format!("{error:#}"));
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).with_file_name("src/model/constants.rs");
     let old = std::fs::read_to_string(&path)
@@ -97,6 +117,26 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     output::result(args.json, &printed, || human(&printed))?;
     fresh.map_err(failed)?;
     Ok(Outcome::of(current || written))
+}
+
+/// Writes the set of the prototype if it is not what the image carries already.
+fn write_set(json: bool) -> Result<Outcome, Failure> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).with_file_name("src/params/prototype.set");
+    let mut room = [0; MAX_SET];
+    let length = compile("prototype", &Rig::prototype(), &mut room)
+        .map_err(|error| Failure::run(error.to_string()))?;
+    let set = &room[..length];
+    let written = std::fs::read(&path).ok().as_deref() != Some(set);
+    if written {
+        std::fs::write(&path, set)
+            .map_err(|error| Failure::run(format!("{}: {error}", path.display())))?;
+    }
+    let printed = PrintedSet { path, bytes: length, written };
+    output::result(json, &printed, || {
+        let state = if written { "rewritten" } else { "is current" };
+        format!("{} {state}, {length} bytes\n", printed.path.display())
+    })?;
+    Ok(Outcome::of(true))
 }
 
 /// Errors of the constants built into this program.
@@ -142,7 +182,7 @@ fn human(printed: &Printed) -> String {
     let state = match (printed.current, printed.written) {
         (true, _) => "is current",
         (false, true) => "rewritten: the errors above are those of the constants before",
-        (false, false) => "is stale: run `cargo rig constants`",
+        (false, false) => "is stale: run `cargo rig constants`, then `cargo rig constants --set`",
     };
     let columns = ["", "fitted", "stiffness max %", "RMS %", "held out", "gap max", "RMS"];
     format!(

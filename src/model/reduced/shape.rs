@@ -11,7 +11,7 @@ pub(super) type Quartic = [i32; 5];
 const MOST_SPEED: i32 = 2048 << 16;
 
 /// Geometry, units and load of one rig. The run r is a part of the longest one.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Shape {
     /// Free run over R, Q32.
     pub(super) free: u32,

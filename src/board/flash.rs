@@ -1,0 +1,73 @@
+//! Two places for a set of parameters at the end of the chip's flash.
+//!
+//! They lie in the second bank: while a page of it is erased or a double word
+//! programmed, the first, with the code, can be read on, so that the control tick goes
+//! on as ever.
+
+use cortex_m_rt::exception;
+use embassy_stm32::Peri;
+use embassy_stm32::flash::{Async, Flash};
+use embassy_stm32::pac;
+use embassy_stm32::peripherals::FLASH;
+use interstage::params::slots::{FlashFault, PAGE_BYTES, SLOT_BYTES, SetMemory, Slot, WORD_BYTES};
+
+use super::Irqs;
+
+/// Where flash begins in memory.
+const BASE: usize = 0x0800_0000;
+
+/// The last 8 KiB of 512.
+const PLACES: usize = 512 * 1024 - 2 * SLOT_BYTES;
+
+/// The chip's flash controller.
+pub(crate) struct Pages(Flash<'static, Async>);
+
+impl Pages {
+    /// Takes the controller.
+    pub(crate) fn new(flash: Peri<'static, FLASH>) -> Self {
+        Self(Flash::new(flash, Irqs))
+    }
+}
+
+/// Offset of a place from the start of flash, bytes.
+const fn offset_of(slot: Slot) -> usize {
+    match slot {
+        Slot::A => PLACES,
+        Slot::B => PLACES + SLOT_BYTES,
+    }
+}
+
+impl SetMemory for Pages {
+    fn bytes(&self, slot: Slot) -> &[u8] {
+        let start = (BASE + offset_of(slot)) as *const u8;
+        // SAFETY: inside flash, which is always mapped and holds plain bytes; it changes
+        // through `&mut self` alone, so not while this borrow lives.
+        unsafe { core::slice::from_raw_parts(start, SLOT_BYTES) }
+    }
+
+    async fn erase(&mut self, slot: Slot, page: usize) -> Result<(), FlashFault> {
+        let from = (offset_of(slot) + page * PAGE_BYTES) as u32;
+        self.0.erase(from, from + PAGE_BYTES as u32).await.map_err(|_| FlashFault)
+    }
+
+    async fn program(
+        &mut self,
+        slot: Slot,
+        offset: usize,
+        word: [u8; WORD_BYTES],
+    ) -> Result<(), FlashFault> {
+        let at = (offset_of(slot) + offset) as u32;
+        self.0.write(at, &word).await.map_err(|_| FlashFault)
+    }
+}
+
+/// A double word that lost its power half way reads with an error that no code can
+/// correct, and the chip says so here. What was read is not a set: its check tells. To
+/// go on is right; to stop would be a board that never starts again.
+#[exception]
+unsafe fn NonMaskableInt() {
+    let status = pac::FLASH.eccr().read();
+    if status.eccd() {
+        pac::FLASH.eccr().modify(|w| w.set_eccd(true));
+    }
+}

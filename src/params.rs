@@ -1,0 +1,20 @@
+//! Parameters as the firmware runs on them.
+//!
+//! A rig is written in SI numbers ([`Rig`](crate::rig::Rig)); the control path runs on
+//! fixed-point constants derived from them. The derivation needs the mathematics of a
+//! host, so the host does it, once, and what the board carries is the result: a *set*,
+//! with the rig it was made from behind it. The image holds no floating-point
+//! arithmetic in software, starts at once, and its constants are those of the virtual
+//! rig to the bit.
+
+mod compile;
+pub mod service;
+mod set;
+pub mod slots;
+
+pub use compile::{CompileError, compile};
+pub(crate) use set::checksum;
+pub use set::{Header, MAX_NAME, ParameterSet, SCHEMA, SetError};
+
+/// Longest set, bytes: two pages of flash less what its slot keeps beside it.
+pub const MAX_SET: usize = 4096 - 16;

@@ -1,0 +1,89 @@
+//! From a rig to the set that the board carries; runs on the host.
+
+use core::fmt;
+
+use serde::Serialize;
+
+use super::set::{Header, MAX_NAME, SCHEMA, checksum};
+use crate::control::Controller;
+use crate::model::Planner;
+use crate::rig::{Rig, RigError};
+
+/// Why no set could be made.
+#[derive(Clone, Debug, PartialEq)]
+pub enum CompileError {
+    /// The rig is not sound.
+    Rig(RigError),
+    /// The name is longer than [`MAX_NAME`] bytes.
+    Name,
+    /// The set is longer than the room for it.
+    Room,
+}
+
+impl fmt::Display for CompileError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Rig(error) => error.fmt(f),
+            Self::Name => write!(f, "the name of the rig: expected at most {MAX_NAME} bytes"),
+            Self::Room => f.write_str("the set does not fit its slot"),
+        }
+    }
+}
+
+impl core::error::Error for CompileError {}
+
+impl From<RigError> for CompileError {
+    fn from(error: RigError) -> Self {
+        Self::Rig(error)
+    }
+}
+
+/// Writes the set of this rig to the start of `room`; gives its length, bytes.
+///
+/// # Errors
+/// [`CompileError`] if the rig is not sound, its name too long or `room` too small.
+pub fn compile(name: &str, rig: &Rig, room: &mut [u8]) -> Result<usize, CompileError> {
+    let controller = Controller::try_build(rig)?;
+    let planner = Planner::try_build(rig)?;
+    let name = heapless::String::try_from(name).map_err(|_| CompileError::Name)?;
+    let parameters = hash(rig, room)?;
+    let calibration = hash(&rig.sense, room)?;
+    let header = Header { schema: SCHEMA, name, parameters, calibration };
+    let length = put(&(header, controller, planner, rig), room)?;
+    let sum = checksum(&room[..length]).to_le_bytes();
+    let check = room.get_mut(length..length + sum.len()).ok_or(CompileError::Room)?;
+    check.copy_from_slice(&sum);
+    Ok(length + sum.len())
+}
+
+/// CRC-32 of a part of the rig as postcard, written to `room` on the way.
+fn hash(part: &impl Serialize, room: &mut [u8]) -> Result<u32, CompileError> {
+    let length = put(part, room)?;
+    Ok(checksum(&room[..length]))
+}
+
+fn put(value: &impl Serialize, room: &mut [u8]) -> Result<usize, CompileError> {
+    postcard::to_slice(value, room).map(|written| written.len()).map_err(|_| CompileError::Room)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::MAX_SET;
+    use super::*;
+
+    #[test]
+    fn what_cannot_be_is_named() {
+        let mut room = [0; MAX_SET];
+        let rig = Rig::prototype();
+        let long = "a name that is longer than any";
+        assert_eq!(compile(long, &rig, &mut room), Err(CompileError::Name));
+        assert_eq!(compile("a", &rig, &mut room[..1000]), Err(CompileError::Room));
+        let length = compile("a", &rig, &mut room).unwrap();
+        assert!(length <= MAX_SET);
+        assert_eq!(compile("a", &rig, &mut room[..length - 1]), Err(CompileError::Room));
+        let mut broken = rig;
+        broken.tread.tau_s = -1.0;
+        let error = compile("a", &broken, &mut room).unwrap_err();
+        assert!(error.to_string().contains("tread.tau_s"), "{error}");
+    }
+}

@@ -1,0 +1,327 @@
+//! Reading and replacing the stored parameters, request by request.
+//!
+//! The host reads the set in force piece by piece, makes the new one and sends it back;
+//! here it is checked as a whole before it takes force. Nothing of it touches the
+//! controller that runs: a new set counts from the next start on.
+
+use serde::{Deserialize, Serialize};
+
+use super::slots::{Draft, DraftError, SetMemory, stored};
+use super::{MAX_NAME, ParameterSet, SCHEMA};
+
+/// Most bytes of a set in one request or answer; whole double words.
+pub const PIECE: usize = 48;
+
+/// Bytes of a set.
+pub type Piece = heapless::Vec<u8, PIECE>;
+
+/// What the host may ask.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Request {
+    /// What is in force.
+    Describe,
+    /// A piece of the set in force.
+    Read {
+        /// From this byte on.
+        offset: u16,
+    },
+    /// Make room for a new set.
+    Begin {
+        /// Its bytes.
+        length: u16,
+    },
+    /// The next piece of it.
+    Append(Piece),
+    /// Check it and put it in force.
+    Seal,
+    /// Put the set that the image carries in force.
+    Restore,
+    /// Start anew, with what is in force then.
+    Restart,
+}
+
+/// What the board answers.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Response {
+    /// To [`Request::Describe`].
+    Description(Description),
+    /// To [`Request::Read`]; empty beyond the end.
+    Piece(Piece),
+    /// Done.
+    Done,
+    /// Not done, and nothing that was in force has changed.
+    Refused(Refusal),
+}
+
+/// What is in force.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Description {
+    /// Where it lies.
+    pub origin: Origin,
+    /// Its bytes.
+    pub length: u16,
+    /// Its schema.
+    pub schema: u16,
+    /// The firmware's schema: of another one, the set is kept and not run.
+    pub expected: u16,
+    /// Name of the rig.
+    pub name: heapless::String<MAX_NAME>,
+    /// Hash of its parameters.
+    pub parameters: u32,
+    /// Hash of the parameters that the controller has run on since the start.
+    pub running: u32,
+}
+
+/// Where a set lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Origin {
+    /// In the image: nothing is stored.
+    Image,
+    /// In flash.
+    Stored {
+        /// How many sets have been stored before it, and one.
+        sequence: u32,
+    },
+}
+
+/// Why a request is refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Refusal {
+    /// The drive is moving, or about to.
+    Moving,
+    /// There is no draft: [`Request::Begin`] comes first.
+    NoDraft,
+    /// The set is too long, or not all there.
+    Length,
+    /// A piece is no multiple of eight bytes.
+    Piece,
+    /// The flash failed.
+    Flash,
+    /// The set is damaged or not readable.
+    Damaged,
+    /// The set is of another schema.
+    Schema,
+}
+
+impl Refusal {
+    /// Why, in words.
+    #[must_use]
+    pub const fn sentence(self) -> &'static str {
+        match self {
+            Self::Moving => "the drive is not at rest",
+            Self::NoDraft => "no new set has been begun",
+            Self::Length => "the new set is too long or not all there",
+            Self::Piece => "a piece of the new set is no multiple of eight bytes",
+            Self::Flash => "the flash failed",
+            Self::Damaged => "the new set arrived damaged",
+            Self::Schema => "the new set is of another schema than the firmware",
+        }
+    }
+}
+
+impl From<DraftError> for Refusal {
+    fn from(error: DraftError) -> Self {
+        use super::SetError;
+        match error {
+            DraftError::Length => Self::Length,
+            DraftError::Piece => Self::Piece,
+            DraftError::Flash => Self::Flash,
+            DraftError::Set(SetError::Schema { .. }) => Self::Schema,
+            DraftError::Set(_) => Self::Damaged,
+        }
+    }
+}
+
+/// Answers requests.
+#[derive(Debug)]
+pub struct Service<M> {
+    memory: M,
+    /// The set of the image.
+    image: &'static [u8],
+    /// Hash of the parameters that run.
+    running: u32,
+    draft: Option<Draft>,
+}
+
+impl<M: SetMemory> Service<M> {
+    /// Over this flash, with the set of the image and the hash of what runs.
+    pub const fn new(memory: M, image: &'static [u8], running: u32) -> Self {
+        Self { memory, image, running, draft: None }
+    }
+
+    /// Answers one request. With the drive not `at_rest`, what is stored cannot be
+    /// changed. [`Request::Restart`] is [`Response::Done`] here: whoever sent the answer
+    /// restarts.
+    pub async fn answer(&mut self, request: Request, at_rest: bool) -> Response {
+        match request {
+            Request::Describe => self.describe(),
+            Request::Read { offset } => self.read(offset),
+            _ if !at_rest => Response::Refused(Refusal::Moving),
+            request => match self.change(request).await {
+                Ok(()) => Response::Done,
+                Err(refusal) => Response::Refused(refusal),
+            },
+        }
+    }
+
+    async fn change(&mut self, request: Request) -> Result<(), Refusal> {
+        match request {
+            Request::Begin { length } => {
+                self.draft = None;
+                self.draft = Some(Draft::begin(&mut self.memory, length.into()).await?);
+            }
+            Request::Append(piece) => {
+                let draft = self.draft.as_mut().ok_or(Refusal::NoDraft)?;
+                draft.append(&mut self.memory, &piece).await?;
+            }
+            Request::Seal => {
+                let draft = self.draft.take().ok_or(Refusal::NoDraft)?;
+                draft.seal(&mut self.memory).await?;
+            }
+            Request::Restore => {
+                self.draft = None;
+                if in_force(&self.memory, self.image).1 != self.image {
+                    let mut draft = Draft::begin(&mut self.memory, self.image.len()).await?;
+                    draft.append(&mut self.memory, self.image).await?;
+                    draft.seal(&mut self.memory).await?;
+                }
+            }
+            Request::Restart | Request::Describe | Request::Read { .. } => {}
+        }
+        Ok(())
+    }
+
+    fn describe(&self) -> Response {
+        let (origin, set) = in_force(&self.memory, self.image);
+        let Ok(opened) = ParameterSet::open_any(set) else {
+            return Response::Refused(Refusal::Damaged);
+        };
+        let header = opened.header();
+        Response::Description(Description {
+            origin,
+            length: set.len() as u16,
+            schema: header.schema,
+            expected: SCHEMA,
+            name: header.name.clone(),
+            parameters: header.parameters,
+            running: self.running,
+        })
+    }
+
+    fn read(&self, offset: u16) -> Response {
+        let (_, set) = in_force(&self.memory, self.image);
+        let rest = set.get(usize::from(offset)..).unwrap_or_default();
+        let part = rest.get(..rest.len().min(PIECE)).unwrap_or_default();
+        Piece::from_slice(part).map_or(Response::Refused(Refusal::Length), Response::Piece)
+    }
+}
+
+/// The set in force: the stored one, or that of the image if none is stored.
+pub fn in_force<'m>(memory: &'m impl SetMemory, image: &'static [u8]) -> (Origin, &'m [u8]) {
+    match stored(memory) {
+        Some(stored) => (Origin::Stored { sequence: stored.sequence }, stored.set),
+        None => (Origin::Image, image),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::slots::tests::Flash;
+    use super::super::{MAX_SET, compile};
+    use super::*;
+    use crate::rig::Rig;
+    use embassy_futures::block_on;
+
+    fn set(name: &str) -> Vec<u8> {
+        let mut room = [0; MAX_SET];
+        let length = compile(name, &Rig::prototype(), &mut room).unwrap();
+        room[..length].to_vec()
+    }
+
+    fn service() -> Service<Flash> {
+        Service::new(Flash::blank(), set("image").leak(), 7)
+    }
+
+    fn ask(service: &mut Service<Flash>, request: Request) -> Response {
+        block_on(service.answer(request, true))
+    }
+
+    fn send(service: &mut Service<Flash>, set: &[u8]) -> Response {
+        let begun = ask(service, Request::Begin { length: set.len() as u16 });
+        assert_eq!(begun, Response::Done);
+        for piece in set.chunks(PIECE) {
+            let piece = Piece::from_slice(piece).unwrap();
+            assert_eq!(ask(service, Request::Append(piece)), Response::Done);
+        }
+        ask(service, Request::Seal)
+    }
+
+    fn read(service: &mut Service<Flash>) -> Vec<u8> {
+        let mut all = Vec::new();
+        loop {
+            match ask(service, Request::Read { offset: all.len() as u16 }) {
+                Response::Piece(piece) if piece.is_empty() => return all,
+                Response::Piece(piece) => all.extend(piece),
+                other => panic!("{other:?}"),
+            }
+        }
+    }
+
+    fn origin(service: &mut Service<Flash>) -> (Origin, String) {
+        match ask(service, Request::Describe) {
+            Response::Description(description) => {
+                assert_eq!(description.running, 7);
+                assert_eq!(description.schema, SCHEMA);
+                (description.origin, description.name.as_str().to_owned())
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_set_is_read_replaced_and_restored() {
+        let mut service = service();
+        assert_eq!(origin(&mut service), (Origin::Image, "image".into()));
+        assert_eq!(read(&mut service), set("image"));
+        assert_eq!(send(&mut service, &set("mine")), Response::Done);
+        assert_eq!(origin(&mut service), (Origin::Stored { sequence: 1 }, "mine".into()));
+        assert_eq!(read(&mut service), set("mine"));
+        for _ in 0..2 {
+            assert_eq!(ask(&mut service, Request::Restore), Response::Done);
+            assert_eq!(origin(&mut service), (Origin::Stored { sequence: 2 }, "image".into()));
+        }
+    }
+
+    #[test]
+    fn a_rejected_set_leaves_the_old_one() {
+        let mut service = service();
+        send(&mut service, &set("mine"));
+        let mut damaged = set("damaged");
+        damaged[50] ^= 4;
+        assert_eq!(send(&mut service, &damaged), Response::Refused(Refusal::Damaged));
+        assert_eq!(read(&mut service), set("mine"));
+        assert_eq!(ask(&mut service, Request::Seal), Response::Refused(Refusal::NoDraft));
+        let long = Request::Begin { length: MAX_SET as u16 + 1 };
+        assert_eq!(ask(&mut service, long), Response::Refused(Refusal::Length));
+        assert_eq!(read(&mut service), set("mine"));
+    }
+
+    #[test]
+    fn nothing_is_changed_while_the_drive_moves() {
+        let mut service = service();
+        for request in [
+            Request::Begin { length: 8 },
+            Request::Append(Piece::new()),
+            Request::Seal,
+            Request::Restore,
+            Request::Restart,
+        ] {
+            let refused = block_on(service.answer(request, false));
+            assert_eq!(refused, Response::Refused(Refusal::Moving));
+        }
+        assert!(matches!(
+            block_on(service.answer(Request::Describe, false)),
+            Response::Description(_)
+        ));
+    }
+}

@@ -1,0 +1,243 @@
+//! A set of parameters as bytes: what it is, the constants, the rig behind them, a check.
+//!
+//! ```text
+//! header | controller | planner | rig | CRC-32 of all before it, little end first
+//! ```
+//! All but the last four bytes is postcard.
+
+use core::fmt;
+
+use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
+use serde::{Deserialize, Serialize};
+
+use crate::control::Controller;
+use crate::model::Planner;
+use crate::rig::Rig;
+
+/// Layout of the constants. Raised with every change of a type that a set holds; a set
+/// of another number is not read but refused, and the host makes it anew from its rig.
+pub const SCHEMA: u16 = 1;
+
+/// Longest name of a set, bytes.
+pub const MAX_NAME: usize = 24;
+
+/// Bytes of the check.
+const CHECK: usize = 4;
+
+/// Without a table: it runs once at start.
+const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
+
+/// What a set says of itself.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Header {
+    /// Layout of what follows, [`SCHEMA`].
+    pub schema: u16,
+    /// Name of the rig.
+    pub name: heapless::String<MAX_NAME>,
+    /// CRC-32 of the rig's parameters, postcard.
+    pub parameters: u32,
+    /// CRC-32 of its sensors' parameters alone: ranges, offsets, scales.
+    pub calibration: u32,
+}
+
+/// Why bytes are not a set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SetError {
+    /// Fewer bytes than the least set.
+    Short,
+    /// The check does not fit the bytes.
+    Damaged,
+    /// Sound, but of another layout.
+    Schema {
+        /// That of the set.
+        found: u16,
+    },
+    /// The check fits and the content does not: not written by this program.
+    Content,
+}
+
+impl SetError {
+    /// What is wrong, in words.
+    #[must_use]
+    pub const fn sentence(self) -> &'static str {
+        match self {
+            Self::Short => "the set is cut off",
+            Self::Damaged => "the set is damaged: its check does not fit",
+            Self::Schema { .. } => "the set is of another schema",
+            Self::Content => "the set is sound but not readable",
+        }
+    }
+}
+
+impl fmt::Display for SetError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.sentence())?;
+        match self {
+            Self::Schema { found } => write!(f, " ({found}, expected {SCHEMA})"),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl core::error::Error for SetError {}
+
+/// A set whose check has been found right.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ParameterSet<'a> {
+    header: Header,
+    /// Behind the header, without the check.
+    body: &'a [u8],
+}
+
+impl<'a> ParameterSet<'a> {
+    /// Checks the bytes of a set; bytes behind it are not allowed.
+    ///
+    /// # Errors
+    /// [`SetError`] for anything but a whole set of this layout.
+    pub fn open(bytes: &'a [u8]) -> Result<Self, SetError> {
+        let set = Self::open_any(bytes)?;
+        match set.header.schema {
+            SCHEMA => Ok(set),
+            found => Err(SetError::Schema { found }),
+        }
+    }
+
+    /// The same for any layout: of another one, only [`header`](Self::header) is known.
+    ///
+    /// # Errors
+    /// [`SetError`] if the bytes are not a whole set.
+    pub fn open_any(bytes: &'a [u8]) -> Result<Self, SetError> {
+        let (content, sum) = bytes.split_last_chunk::<CHECK>().ok_or(SetError::Short)?;
+        if checksum(content) != u32::from_le_bytes(*sum) {
+            return Err(SetError::Damaged);
+        }
+        let (header, body) = take(content)?;
+        Ok(Self { header, body })
+    }
+
+    /// What the set says of itself.
+    #[must_use]
+    pub const fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// The controller, and what is left of the body.
+    ///
+    /// # Errors
+    /// [`SetError::Content`] if the bytes are not one.
+    pub fn controller(&self) -> Result<(Controller, Rest<'a>), SetError> {
+        take(self.body).map(|(controller, rest)| (controller, Rest(rest)))
+    }
+
+    /// The rig that the constants were made from, SI.
+    ///
+    /// # Errors
+    /// [`SetError::Content`] if the bytes are not one.
+    pub fn rig(&self) -> Result<Rig, SetError> {
+        let (_, Rest(rest)) = self.controller()?;
+        let (_, rest) = take::<Planner>(rest)?;
+        match take(rest)? {
+            (rig, []) => Ok(rig),
+            _ => Err(SetError::Content),
+        }
+    }
+}
+
+/// The body of a set behind its controller.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rest<'a>(&'a [u8]);
+
+impl Rest<'_> {
+    /// The planner.
+    ///
+    /// # Errors
+    /// [`SetError::Content`] if the bytes are not one.
+    pub fn planner(self) -> Result<Planner, SetError> {
+        take(self.0).map(|(planner, _)| planner)
+    }
+}
+
+/// CRC-32 (ISO-HDLC).
+#[must_use]
+pub(crate) fn checksum(bytes: &[u8]) -> u32 {
+    CRC.checksum(bytes)
+}
+
+fn take<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<(T, &'a [u8]), SetError> {
+    postcard::take_from_bytes(bytes).map_err(|_| SetError::Content)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{MAX_SET, compile};
+    use super::*;
+    use proptest::prelude::*;
+
+    fn set(name: &str, rig: &Rig) -> Vec<u8> {
+        let mut room = [0; MAX_SET];
+        let length = compile(name, rig, &mut room).expect("a sound rig");
+        room[..length].to_vec()
+    }
+
+    #[test]
+    fn what_was_compiled_is_read_back_to_the_bit() {
+        for (name, rig) in [("prototype", Rig::prototype()), ("fe", Rig::fe())] {
+            let bytes = set(name, &rig);
+            let set = ParameterSet::open(&bytes).expect("a set");
+            assert_eq!(set.header().name.as_str(), name);
+            let (controller, rest) = set.controller().expect("a controller");
+            assert_eq!(controller, Controller::try_build(&rig).unwrap());
+            assert_eq!(rest.planner().unwrap(), Planner::try_build(&rig).unwrap());
+            assert_eq!(set.rig().unwrap(), rig);
+        }
+    }
+
+    #[test]
+    fn hashes_tell_parameters_from_calibration() {
+        let header = |rig: &Rig| ParameterSet::open(&set("a", rig)).unwrap().header().clone();
+        let (mut other, plain) = (Rig::prototype(), header(&Rig::prototype()));
+        other.drive.cruise_speed_mm_s += 0.5;
+        let faster = header(&other);
+        assert_ne!(faster.parameters, plain.parameters);
+        assert_eq!(faster.calibration, plain.calibration);
+        other.sense.angle_zero_code += 1.0;
+        assert_ne!(header(&other).calibration, plain.calibration);
+    }
+
+    #[test]
+    fn a_set_of_another_layout_is_refused_by_number() {
+        let mut bytes = set("a", &Rig::prototype());
+        bytes[0] = SCHEMA as u8 + 1;
+        let end = bytes.len() - CHECK;
+        let sum = checksum(&bytes[..end]).to_le_bytes();
+        bytes[end..].copy_from_slice(&sum);
+        assert_eq!(ParameterSet::open(&bytes), Err(SetError::Schema { found: SCHEMA + 1 }));
+        assert_eq!(ParameterSet::open_any(&bytes).unwrap().header().name.as_str(), "a");
+    }
+
+    #[test]
+    fn every_flipped_bit_is_found() {
+        let mut bytes = set("prototype", &Rig::prototype());
+        for at in 0..bytes.len() {
+            bytes[at] ^= 1 << (at % 8);
+            assert!(ParameterSet::open(&bytes).is_err(), "byte {at}");
+            bytes[at] ^= 1 << (at % 8);
+        }
+        assert!(ParameterSet::open(&bytes).is_ok());
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_are_answered(bytes in prop::collection::vec(any::<u8>(), 0..600)) {
+            prop_assert!(ParameterSet::open(&bytes).is_err());
+            // As if their check were right.
+            let mut bytes = bytes;
+            let sum = checksum(&bytes).to_le_bytes();
+            bytes.extend(sum);
+            if let Ok(set) = ParameterSet::open_any(&bytes) {
+                let _ = set.controller();
+                let _ = set.rig();
+            }
+        }
+    }
+}

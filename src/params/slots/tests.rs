@@ -1,0 +1,220 @@
+//! Power lost at every operation, and everything else that can be wrong.
+
+use embassy_futures::block_on;
+use proptest::prelude::*;
+
+use super::super::{Header, MAX_SET, SCHEMA, compile};
+use super::*;
+use crate::rig::Rig;
+
+/// Flash by its rules, whose power can fail.
+#[derive(Clone)]
+pub(in crate::params) struct Flash {
+    slots: [Vec<u8>; 2],
+    /// Operations left until the power fails.
+    left: Option<usize>,
+    /// Random bits of what an operation cut short leaves.
+    noise: u64,
+    operations: usize,
+}
+
+impl Flash {
+    pub(in crate::params) fn blank() -> Self {
+        let slots = [vec![0xFF; SLOT_BYTES], vec![0xFF; SLOT_BYTES]];
+        Self { slots, left: None, noise: 0x9E37_79B9_7F4A_7C15, operations: 0 }
+    }
+
+    fn random(&mut self) -> u64 {
+        self.noise ^= self.noise << 13;
+        self.noise ^= self.noise >> 7;
+        self.noise ^= self.noise << 17;
+        self.noise
+    }
+
+    /// How the operation goes: done, cut short, or never begun.
+    fn operate(&mut self) -> Result<bool, FlashFault> {
+        self.operations += 1;
+        match &mut self.left {
+            None => Ok(true),
+            Some(0) => Err(FlashFault),
+            Some(left) => {
+                *left -= 1;
+                Ok(*left > 0)
+            }
+        }
+    }
+
+    fn restart(&self) -> Self {
+        Self { left: None, ..self.clone() }
+    }
+}
+
+impl SetMemory for Flash {
+    fn bytes(&self, slot: Slot) -> &[u8] {
+        &self.slots[slot as usize]
+    }
+
+    async fn erase(&mut self, slot: Slot, page: usize) -> Result<(), FlashFault> {
+        let whole = self.operate()?;
+        let range = page * PAGE_BYTES..(page + 1) * PAGE_BYTES;
+        for at in range {
+            let bits = if whole { u64::MAX } else { self.random() };
+            self.slots[slot as usize][at] |= bits as u8;
+        }
+        if whole { Ok(()) } else { Err(FlashFault) }
+    }
+
+    async fn program(
+        &mut self,
+        slot: Slot,
+        offset: usize,
+        word: [u8; WORD_BYTES],
+    ) -> Result<(), FlashFault> {
+        assert!(offset.is_multiple_of(WORD_BYTES), "{offset}");
+        let whole = self.operate()?;
+        let kept = if whole { 0 } else { self.random() };
+        let place = &mut self.slots[slot as usize][offset..offset + WORD_BYTES];
+        assert!(place.iter().all(|byte| *byte == 0xFF), "programmed twice");
+        for (index, (to, from)) in place.iter_mut().zip(word).enumerate() {
+            *to = from | (kept >> (8 * index)) as u8;
+        }
+        if whole { Ok(()) } else { Err(FlashFault) }
+    }
+}
+
+fn set(name: &str) -> Vec<u8> {
+    let mut room = [0; MAX_SET];
+    let length = compile(name, &Rig::prototype(), &mut room).unwrap();
+    room[..length].to_vec()
+}
+
+async fn save(flash: &mut Flash, set: &[u8]) -> Result<(), DraftError> {
+    let mut draft = Draft::begin(flash, set.len()).await?;
+    for piece in set.chunks(48) {
+        draft.append(flash, piece).await?;
+    }
+    draft.seal(flash).await
+}
+
+fn name(flash: &Flash) -> Option<String> {
+    let set = stored(flash)?.set;
+    let Header { name, .. } = ParameterSet::open(set).unwrap().header().clone();
+    Some(name.as_str().to_owned())
+}
+
+#[test]
+fn sets_take_turns() {
+    let mut flash = Flash::blank();
+    assert_eq!(stored(&flash), None);
+    for round in 0..7 {
+        let set = set(&format!("rig {round}"));
+        block_on(save(&mut flash, &set)).unwrap();
+        let now = stored(&flash).unwrap();
+        assert_eq!(now.set, set);
+        assert_eq!(now.sequence, round + 1);
+        assert_eq!(now.slot, if round % 2 == 0 { Slot::A } else { Slot::B });
+    }
+}
+
+#[test]
+fn the_sequence_may_wrap() {
+    let mut flash = Flash::blank();
+    block_on(save(&mut flash, &set("old"))).unwrap();
+    flash.slots[0][4..8].copy_from_slice(&u32::MAX.to_le_bytes());
+    block_on(save(&mut flash, &set("new"))).unwrap();
+    assert_eq!(name(&flash).as_deref(), Some("new"));
+    assert_eq!(stored(&flash).unwrap().sequence, 0);
+}
+
+#[test]
+fn power_lost_at_any_operation_leaves_the_old_set_or_the_new() {
+    let (old, new) = (set("old"), set("new"));
+    for before in 1..=2 {
+        let mut flash = Flash::blank();
+        for _ in 0..before {
+            block_on(save(&mut flash, &old)).unwrap();
+        }
+        let mut whole = flash.clone();
+        whole.operations = 0;
+        block_on(save(&mut whole, &new)).unwrap();
+        assert_eq!(name(&whole).as_deref(), Some("new"));
+        let (mut kept, mut torn_seals) = (0, 0);
+        for cut in 0..whole.operations {
+            for seed in 1..=3 {
+                let mut flash = flash.clone();
+                flash.left = Some(cut);
+                flash.noise = flash.noise.wrapping_mul(2 * seed + 1);
+                assert_eq!(block_on(save(&mut flash, &new)), Err(DraftError::Flash), "{cut}");
+                let mut after = flash.restart();
+                match name(&after).as_deref() {
+                    Some("old") => kept += 1,
+                    // The last operation may have been as good as whole.
+                    Some("new") if cut + 1 >= whole.operations => torn_seals += 1,
+                    other => panic!("cut at {cut}: {other:?}"),
+                }
+                // And the next save does it.
+                block_on(save(&mut after, &new)).unwrap();
+                assert_eq!(name(&after).as_deref(), Some("new"), "cut at {cut}");
+            }
+        }
+        assert!(kept > 3 * (whole.operations - 2), "{kept}, {torn_seals}");
+    }
+}
+
+#[test]
+fn what_is_not_a_set_never_takes_force() {
+    let mut flash = Flash::blank();
+    block_on(save(&mut flash, &set("old"))).unwrap();
+    let mut wrong = set("wrong");
+    wrong[100] ^= 1;
+    let damaged = Err(DraftError::Set(SetError::Damaged));
+    assert_eq!(block_on(save(&mut flash, &wrong)), damaged);
+    assert_eq!(name(&flash).as_deref(), Some("old"));
+
+    let mut foreign = set("foreign");
+    foreign[0] = SCHEMA as u8 + 1;
+    let end = foreign.len() - 4;
+    let sum = super::super::set::checksum(&foreign[..end]).to_le_bytes();
+    foreign[end..].copy_from_slice(&sum);
+    let refused = Err(DraftError::Set(SetError::Schema { found: SCHEMA + 1 }));
+    assert_eq!(block_on(save(&mut flash, &foreign)), refused);
+    assert_eq!(name(&flash).as_deref(), Some("old"));
+}
+
+#[test]
+fn pieces_have_to_fit() {
+    let mut flash = Flash::blank();
+    assert_eq!(block_on(Draft::begin(&mut flash, MAX_SET + 1)), Err(DraftError::Length));
+    let mut draft = block_on(Draft::begin(&mut flash, 20)).unwrap();
+    let mut append = |piece: &[u8]| block_on(draft.append(&mut flash, piece));
+    assert_eq!(append(&[0; 7]), Err(DraftError::Piece));
+    assert_eq!(append(&[0; 24]), Err(DraftError::Length));
+    assert_eq!(append(&[0; 16]), Ok(()));
+    assert_eq!(append(&[0; 4]), Ok(()));
+    assert_eq!(append(&[0; 1]), Err(DraftError::Length));
+    let short = block_on(Draft::begin(&mut flash, 20)).unwrap();
+    assert_eq!(block_on(short.seal(&mut flash)), Err(DraftError::Length));
+}
+
+proptest! {
+    #[test]
+    fn any_flash_is_read_without_panic(bytes in prop::collection::vec(any::<u8>(), 0..64)) {
+        let mut flash = Flash::blank();
+        flash.slots[0][..bytes.len()].copy_from_slice(&bytes);
+        flash.slots[1][..4].copy_from_slice(&MAGIC.to_le_bytes());
+        flash.slots[1][8..8 + bytes.len()].copy_from_slice(&bytes);
+        prop_assert_eq!(stored(&flash), None);
+    }
+
+    #[test]
+    fn a_flipped_bit_falls_back_to_the_set_before(at in 0_usize..2000, bit in 0_u8..8) {
+        let mut flash = Flash::blank();
+        block_on(save(&mut flash, &set("old"))).unwrap();
+        block_on(save(&mut flash, &set("new"))).unwrap();
+        flash.slots[1][at] ^= 1 << bit;
+        // But for the sequence number, where either is whole.
+        let now = name(&flash);
+        let seal = (4..8).contains(&at);
+        prop_assert!(now.as_deref() == Some("old") || (seal && now.as_deref() == Some("new")));
+    }
+}
