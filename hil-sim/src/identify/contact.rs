@@ -10,9 +10,9 @@ use std::ops::Range;
 use nalgebra_lm::DMatrix;
 
 use super::IdentifyError;
-use super::coordinates::{Coordinates, FRICTION, Prior};
+use super::coordinates::{CREEP, Coordinates, FRICTION, Prior};
 use super::forward::{Channels, Course, Fineness, Run, courses, derivatives};
-use super::least_squares::{Model, minimise, robust};
+use super::least_squares::{Model, consider, minimise, robust};
 use super::noise::Noise;
 
 /// Deviations that the first fit assumes: compression, mm, angle, mrad, effort, N; ten
@@ -30,6 +30,8 @@ const BLOCKS: [usize; 3] = [16, 16, 4];
 const WIDENED: f64 = 1.18 * 1.9;
 /// How far friction may stray while nothing tells of it, logarithm.
 const HELD_LN: f64 = 0.02;
+/// How closely the creep law is held, logarithm.
+const HELD_CREEP_LN: f64 = 1e-5;
 
 /// The result.
 #[derive(Clone, Debug)]
@@ -158,18 +160,25 @@ pub fn fit(
     fineness: Fineness,
 ) -> Result<Contact, IdentifyError> {
     let start: Vec<f64> = coordinates.priors().iter().map(|prior| prior.mean).collect();
+    // The creep law is held: what the model errs in it at every climb would go into it.
+    let creep = coordinates.priors()[CREEP];
+    let law = coordinates.known(CREEP, creep.mean, HELD_CREEP_LN);
     // Friction tells by its creep, and only once the rest is in place.
-    let held = coordinates.known(FRICTION, start[FRICTION], HELD_LN);
+    let held = law.known(FRICTION, start[FRICTION], HELD_LN);
     let first = minimise(&Weighted::new(runs, &held, fineness), &start)?;
-    let mut model = Weighted::new(runs, coordinates, fineness);
+    let mut model = Weighted::new(runs, &law, fineness);
     model.reweigh(&first.x, &first.at);
     let second = minimise(&model, &first.x)?;
     model.reweigh(&second.x, &second.at);
     let fitted = minimise(&model, &second.x)?;
     let residuals = model.remaining(&fitted.x, &fitted.at);
     let values = residuals.iter().map(|channels| channels.values().count()).sum();
+    let blocks = model.blocks();
+    let data = blocks.last().map_or(0, |block| block.end);
+    let mut covariance = robust(&fitted.jacobian, &fitted.residuals, &blocks, WIDENED)?;
+    consider(&mut covariance, &fitted.jacobian, data, CREEP, creep.deviation)?;
     Ok(Contact {
-        covariance: robust(&fitted.jacobian, &fitted.residuals, &model.blocks(), WIDENED)?,
+        covariance,
         noise: model.noise(&fitted.x, &fitted.at),
         courses: fitted.at,
         x: fitted.x,

@@ -1,27 +1,21 @@
 //! The fit to what the study publishes: three gaps, three parameters of the tread.
 //!
-//! Three points fit three parameters exactly: nothing is left to tell how well, so there
-//! is neither a validation nor an interval.
+//! Three points fit three parameters: nothing is left to tell how well, so there is neither
+//! a validation nor an interval. Nor do they fit exactly: at one speed the ratio of two
+//! gaps hardly depends on the tread, so that what is left over is the model's and no noise.
 
-use nalgebra_lm::Matrix3;
-use nalgebra_lm::Vector3;
 use rayon::prelude::*;
 
 use super::IdentifyError;
+use super::least_squares::{Model, minimise};
 use crate::paper::published::{AMPLITUDE_MM, CASES};
 use crate::plant::balance::Axial;
 use crate::plant::crossing::{CrossingCase, cross};
 use crate::plant::ring::RingParameters;
 use crate::scenario::Scenario;
 
-/// Largest deviation from a published gap at which the fit has arrived, mm.
-const ARRIVED_MM: f64 = 1e-5;
-/// Most Newton steps.
-const MOST_STEPS: usize = 30;
 /// Change of a logarithm for the differences.
-const MOVED: f64 = 0.01;
-/// Longest Newton step of a logarithm.
-const LONGEST: f64 = 0.3;
+const MOVED: f64 = 0.02;
 
 /// How finely the ring is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,79 +46,76 @@ pub struct Tread {
     pub residuals_mm: [f64; 3],
 }
 
-/// Gaps of the published cases for these logarithms, mm; pushed without friction.
-fn gaps(
-    scenario: &Scenario,
-    x: &Vector3<f64>,
+/// The three crossings, pushed without friction.
+struct Gaps<'a> {
+    scenario: &'a Scenario,
     fineness: Fineness,
-) -> Result<Vector3<f64>, IdentifyError> {
-    let k_inf = x[0].exp();
-    let ring = RingParameters {
-        k_inf,
-        k_0: k_inf * x[1].exp(),
-        tau_s: x[2].exp(),
-        ..RingParameters::of(&scenario.rig, fineness.elements)
-    };
-    let gap = |case: usize| {
-        let (speed_mm_s, preload_n) = CASES[case];
-        let case = CrossingCase {
-            ring,
-            step_height_mm: scenario.rig.rig.step_height_mm,
-            speed_mm_s,
-            preload_n,
-            axial: Axial::Pushed,
-            stride_mm: fineness.stride_mm,
-        };
-        cross(&case).map(|result| result.gap_mm)
-    };
-    let gaps: Result<Vec<f64>, _> = (0..3).into_par_iter().map(gap).collect();
-    let gaps = gaps.map_err(|error| IdentifyError::NoFit { why: error.to_string() })?;
-    Ok(Vector3::from_vec(gaps))
 }
 
-/// Solves for the tread whose three gaps are the published ones, by Newton's method on
-/// the logarithms.
+impl Gaps<'_> {
+    /// Gaps over the published ones, less 1, for these logarithms.
+    fn deviations(&self, x: &[f64]) -> Option<Vec<f64>> {
+        let k_inf = x[0].exp();
+        let ring = RingParameters {
+            k_inf,
+            k_0: k_inf * x[1].exp(),
+            tau_s: x[2].exp(),
+            ..RingParameters::of(&self.scenario.rig, self.fineness.elements)
+        };
+        let deviation = |case: usize| {
+            let (speed_mm_s, preload_n) = CASES[case];
+            let crossing = CrossingCase {
+                ring,
+                step_height_mm: self.scenario.rig.rig.step_height_mm,
+                speed_mm_s,
+                preload_n,
+                axial: Axial::Pushed,
+                stride_mm: self.fineness.stride_mm,
+            };
+            cross(&crossing).ok().map(|result| result.gap_mm / AMPLITUDE_MM[case] - 1.0)
+        };
+        (0..3).into_par_iter().map(deviation).collect()
+    }
+}
+
+impl Model for Gaps<'_> {
+    type At = Vec<f64>;
+
+    fn at(&self, x: &[f64]) -> Option<Vec<f64>> {
+        self.deviations(x)
+    }
+
+    fn residuals(&self, _: &[f64], at: &Vec<f64>) -> Vec<f64> {
+        at.clone()
+    }
+
+    fn jacobian(&self, x: &[f64], _: &Vec<f64>) -> Option<Vec<Vec<f64>>> {
+        let column = |index: usize| {
+            let at = |by: f64| {
+                let mut x = x.to_vec();
+                x[index] += by;
+                self.deviations(&x)
+            };
+            let (up, down) = (at(MOVED)?, at(-MOVED)?);
+            Some(up.iter().zip(&down).map(|(u, d)| (u - d) / (2.0 * MOVED)).collect())
+        };
+        (0..3).map(column).collect()
+    }
+}
+
+/// Fits the tread to the three published gaps by least squares of their relative
+/// deviations, from the scenario's tread on.
 ///
 /// # Errors
-/// [`IdentifyError::NoFit`] if it does not arrive.
+/// [`IdentifyError::NoFit`] if it does not settle.
 pub fn fit(scenario: &Scenario, fineness: Fineness) -> Result<Tread, IdentifyError> {
-    let wanted = Vector3::from(AMPLITUDE_MM);
     let tread = &scenario.rig.tread;
-    let start = [tread.k_inf_pa_per_m * 1e-9, tread.stiffening, tread.tau_s];
-    let mut x = Vector3::from(start.map(f64::ln));
-    let mut residuals = gaps(scenario, &x, fineness)? - wanted;
-    for _ in 0..MOST_STEPS {
-        if residuals.amax() < ARRIVED_MM {
-            let [k, stiffening, tau_s] = [x[0], x[1], x[2]].map(f64::exp);
-            let residuals_mm = residuals.into();
-            return Ok(Tread { k_inf_pa_per_m: 1e9 * k, stiffening, tau_s, residuals_mm });
-        }
-        let mut slopes = Matrix3::zeros();
-        for index in 0..3 {
-            let mut moved = x;
-            moved[index] += MOVED;
-            let change = gaps(scenario, &moved, fineness)? - wanted - residuals;
-            slopes.set_column(index, &(change / MOVED));
-        }
-        let step = slopes.lu().solve(&residuals).ok_or_else(|| IdentifyError::NoFit {
-            why: "the gaps do not determine the tread".into(),
-        })?;
-        // Shortened while it overshoots.
-        let mut part = (LONGEST / step.amax()).min(1.0);
-        loop {
-            let tried = x - part * step;
-            let after = gaps(scenario, &tried, fineness)? - wanted;
-            if after.norm() < residuals.norm() {
-                (x, residuals) = (tried, after);
-                break;
-            }
-            part *= 0.5;
-            if part < 1e-3 {
-                return Err(IdentifyError::NoFit {
-                    why: format!("stuck {:.1e} mm off the published gaps", residuals.amax()),
-                });
-            }
-        }
-    }
-    Err(IdentifyError::NoFit { why: format!("{:.1e} mm off after all steps", residuals.amax()) })
+    let start = [tread.k_inf_pa_per_m * 1e-9, tread.stiffening, tread.tau_s].map(f64::ln);
+    let fitted = minimise(&Gaps { scenario, fineness }, &start)?;
+    Ok(Tread {
+        k_inf_pa_per_m: 1e9 * fitted.x[0].exp(),
+        stiffening: fitted.x[1].exp(),
+        tau_s: fitted.x[2].exp(),
+        residuals_mm: std::array::from_fn(|case| AMPLITUDE_MM[case] * fitted.at[case]),
+    })
 }
