@@ -170,34 +170,25 @@ fn human(found: &Identification, files: &[PathBuf]) -> String {
 }
 
 fn by_published(args: &Args, scenario: &Scenario) -> Result<Outcome, Failure> {
-    let [stated, converged] = {
+    let (coarse, converged, stated) = {
         let _progress = progress::spinner("fit to the published gaps");
-        [published::Fineness::STATED, published::Fineness::CONVERGED]
-            .map(|fineness| published::fit(scenario, fineness))
+        (
+            published::fit(scenario, published::Fineness::STATED)?,
+            published::fit(scenario, published::Fineness::CONVERGED)?,
+            published::stated(scenario, published::Fineness::CONVERGED)?,
+        )
     };
-    let (stated, converged) = (stated?, converged?);
     let parameters = published_parameters(&converged);
     let notes = vec![
         "three points fit three parameters: no degree of freedom is left, so there is neither a \
          validation nor an interval"
             .to_owned(),
-        format!(
-            "left over: {:+.3}, {:+.3} and {:+.3} mm of {} mm",
-            converged.residuals_mm[0],
-            converged.residuals_mm[1],
-            converged.residuals_mm[2],
-            crate::paper::published::AMPLITUDE_MM.map(|gap| gap.to_string()).join(", ")
-        ),
-        format!(
-            "the same fit by a coarse ring: {:.4e} Pa/m, {:.4}, \
-             {:.4} s; the presets have {:.4e} Pa/m, {:.4}, {:.4} s",
-            stated.k_inf_pa_per_m,
-            stated.stiffening,
-            stated.tau_s,
-            scenario.rig.tread.k_inf_pa_per_m,
-            scenario.rig.tread.stiffening,
-            scenario.rig.tread.tau_s
-        ),
+        of_tread("this fit", &converged),
+        "one combination of the three is all but free: it is held to the scenario's tread \
+         within a factor of two"
+            .to_owned(),
+        of_tread("the same fit by a coarse ring", &coarse),
+        of_tread("the scenario's tread by the converged ring", &stated),
     ];
     let residuals = published_residuals(&converged);
     let printed = Printed {
@@ -220,6 +211,15 @@ fn by_published(args: &Args, scenario: &Scenario) -> Result<Outcome, Failure> {
         text
     })?;
     Ok(Outcome::Good)
+}
+
+fn of_tread(what: &str, tread: &Tread) -> String {
+    let [first, second, third] = tread.residuals_mm;
+    format!(
+        "{what}: {:.4e} Pa/m, {:.3}, {:.4} s leave {first:+.3}, {second:+.3} and {third:+.3} mm to \
+         the gaps",
+        tread.k_inf_pa_per_m, tread.stiffening, tread.tau_s
+    )
 }
 
 fn published_parameters(tread: &Tread) -> Vec<Parameter> {

@@ -2,7 +2,9 @@
 //!
 //! Three points fit three parameters: nothing is left to tell how well, so there is neither
 //! a validation nor an interval. Nor do they fit exactly: at one speed the ratio of two
-//! gaps hardly depends on the tread, so that what is left over is the model's and no noise.
+//! gaps hardly depends on the tread, so that what is left over is the model's and no noise,
+//! and one combination of the three parameters is all but free. It is held to the
+//! scenario's tread within a factor of two.
 
 use rayon::prelude::*;
 
@@ -16,6 +18,10 @@ use crate::scenario::Scenario;
 
 /// Change of a logarithm for the differences.
 const MOVED: f64 = 0.02;
+/// What the ring errs by in a gap, relative: the unit of the deviations.
+const GAP_REL: f64 = 1e-3;
+/// How far a parameter may lie from where it starts, logarithm: a factor of two.
+const FREE_LN: f64 = 0.7;
 
 /// How finely the ring is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,7 +36,7 @@ impl Fineness {
     /// The coarse ring that the presets' tread was fitted with.
     pub const STATED: Self = Self { elements: 720, stride_mm: 0.05 };
     /// Gaps within 0.1 % of the converged ones.
-    pub const CONVERGED: Self = Self { elements: 5760, stride_mm: 0.005 };
+    pub const CONVERGED: Self = Self { elements: 2880, stride_mm: 0.01 };
 }
 
 /// The tread that shows the published gaps.
@@ -50,9 +56,16 @@ pub struct Tread {
 struct Gaps<'a> {
     scenario: &'a Scenario,
     fineness: Fineness,
+    start: [f64; 3],
 }
 
-impl Gaps<'_> {
+impl<'a> Gaps<'a> {
+    fn of(scenario: &'a Scenario, fineness: Fineness) -> Self {
+        let tread = &scenario.rig.tread;
+        let start = [tread.k_inf_pa_per_m * 1e-9, tread.stiffening, tread.tau_s].map(f64::ln);
+        Self { scenario, fineness, start }
+    }
+
     /// Gaps over the published ones, less 1, for these logarithms.
     fn deviations(&self, x: &[f64]) -> Option<Vec<f64>> {
         let k_inf = x[0].exp();
@@ -85,8 +98,10 @@ impl Model for Gaps<'_> {
         self.deviations(x)
     }
 
-    fn residuals(&self, _: &[f64], at: &Vec<f64>) -> Vec<f64> {
-        at.clone()
+    fn residuals(&self, x: &[f64], at: &Vec<f64>) -> Vec<f64> {
+        let gaps = at.iter().map(|deviation| deviation / GAP_REL);
+        let held = x.iter().zip(&self.start).map(|(x, start)| (x - start) / FREE_LN);
+        gaps.chain(held).collect()
     }
 
     fn jacobian(&self, x: &[f64], _: &Vec<f64>) -> Option<Vec<Vec<f64>>> {
@@ -97,7 +112,9 @@ impl Model for Gaps<'_> {
                 self.deviations(&x)
             };
             let (up, down) = (at(MOVED)?, at(-MOVED)?);
-            Some(up.iter().zip(&down).map(|(u, d)| (u - d) / (2.0 * MOVED)).collect())
+            let slope = |(u, d): (&f64, &f64)| (u - d) / (2.0 * MOVED * GAP_REL);
+            let held = (0..3).map(|other| if other == index { 1.0 / FREE_LN } else { 0.0 });
+            Some(up.iter().zip(&down).map(slope).chain(held).collect())
         };
         (0..3).map(column).collect()
     }
@@ -109,13 +126,27 @@ impl Model for Gaps<'_> {
 /// # Errors
 /// [`IdentifyError::NoFit`] if it does not settle.
 pub fn fit(scenario: &Scenario, fineness: Fineness) -> Result<Tread, IdentifyError> {
-    let tread = &scenario.rig.tread;
-    let start = [tread.k_inf_pa_per_m * 1e-9, tread.stiffening, tread.tau_s].map(f64::ln);
-    let fitted = minimise(&Gaps { scenario, fineness }, &start)?;
-    Ok(Tread {
-        k_inf_pa_per_m: 1e9 * fitted.x[0].exp(),
-        stiffening: fitted.x[1].exp(),
-        tau_s: fitted.x[2].exp(),
-        residuals_mm: std::array::from_fn(|case| AMPLITUDE_MM[case] * fitted.at[case]),
-    })
+    let gaps = Gaps::of(scenario, fineness);
+    let fitted = minimise(&gaps, &gaps.start)?;
+    Ok(tread(&fitted.x, &fitted.at))
+}
+
+/// The scenario's own tread with what its gaps leave to the published ones.
+///
+/// # Errors
+/// [`IdentifyError::NoFit`] if a crossing has no balance.
+pub fn stated(scenario: &Scenario, fineness: Fineness) -> Result<Tread, IdentifyError> {
+    let gaps = Gaps::of(scenario, fineness);
+    let at = gaps.deviations(&gaps.start);
+    let at = at.ok_or_else(|| IdentifyError::NoFit { why: "a crossing has no balance".into() })?;
+    Ok(tread(&gaps.start, &at))
+}
+
+fn tread(x: &[f64], deviations: &[f64]) -> Tread {
+    Tread {
+        k_inf_pa_per_m: 1e9 * x[0].exp(),
+        stiffening: x[1].exp(),
+        tau_s: x[2].exp(),
+        residuals_mm: std::array::from_fn(|case| AMPLITUDE_MM[case] * deviations[case]),
+    }
 }
