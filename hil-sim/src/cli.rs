@@ -14,6 +14,7 @@ mod crossing;
 mod deploy;
 mod docs;
 mod failure;
+mod identify;
 mod keys;
 mod live;
 mod modes;
@@ -57,6 +58,7 @@ enum Verb {
     Compare(compare::Args),
     Montecarlo(montecarlo::Args),
     Paper(paper::Args),
+    Identify(identify::Args),
     Keys(keys::Args),
     Params(params::Args),
     Stress(stress::Args),
@@ -81,6 +83,7 @@ impl Verb {
             Self::Compare(args) => compare::run(args),
             Self::Montecarlo(args) => montecarlo::run(args),
             Self::Paper(args) => paper::run(args),
+            Self::Identify(args) => identify::run(args),
             Self::Keys(args) => keys::run(args),
             Self::Params(args) => params::run(args),
             Self::Stress(args) => stress::run(args),

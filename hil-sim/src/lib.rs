@@ -11,6 +11,7 @@ pub mod constants;
 pub mod docs;
 pub mod export;
 pub mod firmware;
+pub mod identify;
 pub mod live;
 pub mod log;
 pub mod montecarlo;

@@ -169,6 +169,11 @@ impl Pretightener {
         }
     }
 
+    /// Holds the screw where it gives this force, N.
+    pub(super) fn hold(&mut self, seat_n: f64) {
+        (self.seat, self.rate) = (seat_n, 0.0);
+    }
+
     /// Force of the screw's position at the undeformed wheel on level 0, N; the
     /// spring adds its rate times what the wheel has moved inwards.
     #[must_use]

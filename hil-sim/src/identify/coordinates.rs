@@ -1,0 +1,234 @@
+//! What is fitted, as the numbers that the solver moves: logarithms where only the ratio
+//! matters, the rest in units of about their tolerance; and what is known of each before
+//! any log is read.
+
+use nalgebra_lm::DMatrix;
+
+use crate::plant::draw::PlantParameters;
+use crate::plant::ring::RingParameters;
+use crate::plant::wall::{Step, Wall};
+use crate::scenario::{Scenario, Spread};
+
+/// Relaxed stiffness, logarithm.
+pub const STIFFNESS: usize = 0;
+/// Stiffening, logarithm.
+pub const STIFFENING: usize = 1;
+/// Relaxation time, logarithm.
+pub const TAU: usize = 2;
+/// Friction, logarithm.
+pub const FRICTION: usize = 3;
+/// Axial load on the wheel, logarithm.
+pub const LOAD: usize = 4;
+/// Friction of the gearbox, N at the tread.
+pub const GEARBOX: usize = 5;
+/// Wheel radius, mm.
+pub const RADIUS: usize = 6;
+/// Gain of the load cell over nominal, logarithm.
+pub const LOAD_GAIN: usize = 7;
+/// Gain of the displacement sensor over nominal, logarithm.
+pub const TREAD_GAIN: usize = 8;
+/// Zero of the arm angle, mrad.
+pub const ARM_ZERO: usize = 9;
+/// Elastic creep, logarithm.
+pub const CREEP: usize = 10;
+/// Force of the drive over nominal, logarithm.
+pub const DRIVE: usize = 11;
+/// First of the steps: all positions as the wheel's turn has them at its nominal radius,
+/// mm, so that a wheel of another radius meets them at the same turn; then all heights, mm.
+pub const STEPS: usize = 12;
+
+/// How little is known of what only the logs can tell: a factor of two (one standard
+/// deviation), and lengths, forces and angles beyond any tolerance.
+const UNKNOWN_LN: f64 = 0.7;
+const UNKNOWN_GEARBOX_N: f64 = 10.0;
+const UNKNOWN_ARM_MRAD: f64 = 10.0;
+const UNKNOWN_POSITION_MM: f64 = 3.0;
+const UNKNOWN_HEIGHT_MM: f64 = 0.5;
+/// What a data sheet leaves open of the drive's force, and what is left open of the creep
+/// law, relative: no scenario states them.
+const DRIVE_REL: f64 = 0.01;
+const CREEP_REL: f64 = 0.05;
+/// What is stated to have no tolerance is held to this.
+const EXACT: f64 = 1e-6;
+
+/// Mean and standard deviation of a coordinate before any log is read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Prior {
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation.
+    pub deviation: f64,
+    /// Whether it states a tolerance of the rig; else it only keeps the solver from
+    /// wandering where the logs say nothing.
+    pub tolerance: bool,
+}
+
+/// Meaning of the coordinates for one rig.
+#[derive(Clone, Debug)]
+pub struct Coordinates {
+    nominal: PlantParameters,
+    steps: usize,
+    priors: Vec<Prior>,
+}
+
+impl Coordinates {
+    /// The coordinates of a rig of which only what the scenario states is known; the
+    /// tolerances of sensors and wheel are those of its `spread`.
+    #[must_use]
+    pub fn of(scenario: &Scenario) -> Self {
+        let mut exact = scenario.clone();
+        exact.spread = Spread::none();
+        exact.run.seed = 0;
+        let nominal = PlantParameters::draw(&exact);
+        let steps = nominal.wall.steps().len();
+        let spread = &scenario.spread;
+        let free = |mean: f64, deviation| Prior { mean, deviation, tolerance: false };
+        let known =
+            |mean, deviation: f64| Prior { mean, deviation: deviation.max(EXACT), tolerance: true };
+        // Wear is drawn evenly from none to the most, what is made evenly about nominal.
+        let (made, worn) = (spread.wheel_radius_mm, spread.wear_mm);
+        let radius = known(
+            nominal.ring.radius_mm - 0.5 * worn,
+            (made * made / 3.0 + worn * worn / 12.0).sqrt(),
+        );
+        let mut priors = vec![
+            free(nominal.ring.k_inf.ln(), UNKNOWN_LN),
+            free((nominal.ring.k_0 / nominal.ring.k_inf).ln(), UNKNOWN_LN),
+            free(nominal.ring.tau_s.ln(), UNKNOWN_LN),
+            free(nominal.mu.ln(), UNKNOWN_LN),
+            free(nominal.load_n.ln(), UNKNOWN_LN),
+            free(nominal.drive.friction_n, UNKNOWN_GEARBOX_N),
+            radius,
+            known(0.0, spread.load_cell_gain_rel),
+            known(0.0, spread.tread_gain_rel),
+            free(0.0, UNKNOWN_ARM_MRAD),
+            known(nominal.elastic_creep.ln(), CREEP_REL),
+            known(0.0, DRIVE_REL),
+        ];
+        let all = nominal.wall.steps().iter();
+        priors.extend(all.clone().map(|step| free(step.position_mm, UNKNOWN_POSITION_MM)));
+        priors.extend(all.map(|step| free(step.height_mm, UNKNOWN_HEIGHT_MM)));
+        Self { nominal, steps, priors }
+    }
+
+    /// What is known of each coordinate; their means are where the fit starts.
+    #[must_use]
+    pub fn priors(&self) -> &[Prior] {
+        &self.priors
+    }
+
+    /// The same with one coordinate known otherwise, to this deviation.
+    #[must_use]
+    pub fn known(&self, index: usize, mean: f64, deviation: f64) -> Self {
+        let mut known = self.clone();
+        known.priors[index] = Prior { mean, deviation, tolerance: false };
+        known
+    }
+
+    /// Number of steps.
+    #[must_use]
+    pub const fn steps(&self) -> usize {
+        self.steps
+    }
+
+    /// Coordinate of a step's position.
+    #[must_use]
+    pub const fn position(&self, step: usize) -> usize {
+        STEPS + step
+    }
+
+    /// Coordinate of a step's height.
+    #[must_use]
+    pub const fn height(&self, step: usize) -> usize {
+        STEPS + self.steps + step
+    }
+
+    /// The plant that these numbers describe, for the forward model: its preload comes
+    /// from the log, so that it has no spring; its modes are averaged out of the log.
+    #[must_use]
+    pub fn plant(&self, x: &[f64]) -> PlantParameters {
+        let k_inf = x[STIFFNESS].exp();
+        let scale = self.scale(x);
+        let steps = (0..self.steps).map(|step| Step {
+            position_mm: scale * x[self.position(step)],
+            height_mm: x[self.height(step)],
+        });
+        PlantParameters {
+            ring: RingParameters {
+                radius_mm: x[RADIUS],
+                k_inf,
+                // Rubber that softens at once does not exist.
+                k_0: k_inf * x[STIFFENING].exp().max(1.0),
+                tau_s: x[TAU].exp(),
+                ..self.nominal.ring
+            },
+            wall: Wall::new(steps.collect()),
+            mu: x[FRICTION].exp(),
+            elastic_creep: x[CREEP].exp(),
+            load_n: x[LOAD].exp(),
+            spring_n_per_mm: 0.0,
+            modes_hz: Vec::new(),
+            ..self.nominal.clone()
+        }
+    }
+
+    /// Way over way at the nominal radius.
+    #[must_use]
+    pub fn scale(&self, x: &[f64]) -> f64 {
+        x[RADIUS] / self.nominal.ring.radius_mm
+    }
+
+    /// Position of a step, mm, and its variance by this covariance.
+    #[must_use]
+    pub fn place(&self, step: usize, x: &[f64], covariance: &DMatrix<f64>) -> (f64, f64) {
+        let (index, scale) = (self.position(step), self.scale(x));
+        let by_radius = x[index] / self.nominal.ring.radius_mm;
+        let variance = scale * scale * covariance[(index, index)]
+            + 2.0 * scale * by_radius * covariance[(index, RADIUS)]
+            + by_radius * by_radius * covariance[(RADIUS, RADIUS)];
+        (scale * x[index], variance)
+    }
+
+    /// The rig as stated, without mismatch.
+    #[must_use]
+    pub const fn nominal(&self) -> &PlantParameters {
+        &self.nominal
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_means_describe_the_nominal_rig_but_for_half_the_wear() {
+        let scenario = Scenario::default();
+        let coordinates = Coordinates::of(&scenario);
+        let means: Vec<f64> = coordinates.priors().iter().map(|prior| prior.mean).collect();
+        let (plant, nominal) = (coordinates.plant(&means), coordinates.nominal());
+        assert!((plant.ring.k_inf / nominal.ring.k_inf - 1.0).abs() < 1e-12);
+        assert!((plant.ring.k_0 / nominal.ring.k_0 - 1.0).abs() < 1e-12);
+        assert!((plant.mu - nominal.mu).abs() < 1e-12);
+        let scale = coordinates.scale(&means);
+        for (ours, stated) in plant.wall.steps().iter().zip(nominal.wall.steps()) {
+            assert_eq!(ours.height_mm, stated.height_mm);
+            assert!((ours.position_mm - scale * stated.position_mm).abs() < 1e-12);
+        }
+        let worn = nominal.ring.radius_mm - plant.ring.radius_mm;
+        assert!((worn - 0.5 * scenario.spread.wear_mm).abs() < 1e-12);
+        assert_eq!(means.len(), STEPS + 6);
+        assert_eq!((coordinates.position(2), coordinates.height(2)), (14, 17));
+    }
+
+    #[test]
+    fn tolerances_follow_the_spread_and_an_exact_rig_is_held() {
+        let mut scenario = Scenario::default();
+        scenario.spread.load_cell_gain_rel = 0.02;
+        let coordinates = Coordinates::of(&scenario);
+        assert_eq!(coordinates.priors()[LOAD_GAIN].deviation, 0.02);
+        assert!(coordinates.priors()[LOAD_GAIN].tolerance);
+        assert!(!coordinates.priors()[STIFFNESS].tolerance);
+        scenario.spread = Spread::none();
+        assert_eq!(Coordinates::of(&scenario).priors()[RADIUS].deviation, EXACT);
+    }
+}

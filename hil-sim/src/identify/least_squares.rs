@@ -1,0 +1,242 @@
+//! Nonlinear least squares by Levenberg and Marquardt (MINPACK's form, by the crate of
+//! that name), for models that are dear to evaluate.
+
+use std::ops::Range;
+
+use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt, TerminationReason};
+use nalgebra_lm::storage::Owned;
+use nalgebra_lm::{DMatrix, DVector, Dyn};
+
+use super::IdentifyError;
+
+/// Relative change of the sum of squares, and of the coordinates, at which it has settled.
+const SETTLED: f64 = 1e-6;
+/// Most evaluations, in units of the number of coordinates.
+const PATIENCE: usize = 4;
+
+/// What is fitted.
+pub trait Model {
+    /// What is computed at a point before its residuals and derivatives.
+    type At;
+    /// Evaluates the model; none where it has no answer.
+    fn at(&self, x: &[f64]) -> Option<Self::At>;
+    /// Residuals, each over its standard deviation.
+    fn residuals(&self, x: &[f64], at: &Self::At) -> Vec<f64>;
+    /// Their derivatives, coordinate after coordinate.
+    fn jacobian(&self, x: &[f64], at: &Self::At) -> Option<Vec<Vec<f64>>>;
+}
+
+/// Where it ended.
+#[derive(Clone, Debug)]
+pub struct Fitted<A> {
+    /// Coordinates.
+    pub x: Vec<f64>,
+    /// The model there.
+    pub at: A,
+    /// Residuals there.
+    pub residuals: DVector<f64>,
+    /// Derivatives there.
+    pub jacobian: DMatrix<f64>,
+}
+
+struct Problem<'a, M: Model> {
+    model: &'a M,
+    x: DVector<f64>,
+    at: Option<M::At>,
+}
+
+impl<M: Model> LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_, M> {
+    type ResidualStorage = Owned<f64, Dyn>;
+    type JacobianStorage = Owned<f64, Dyn, Dyn>;
+    type ParameterStorage = Owned<f64, Dyn>;
+
+    fn set_params(&mut self, x: &DVector<f64>) {
+        self.x.copy_from(x);
+        self.at = self.model.at(x.as_slice());
+    }
+
+    fn params(&self) -> DVector<f64> {
+        self.x.clone()
+    }
+
+    fn residuals(&self) -> Option<DVector<f64>> {
+        let at = self.at.as_ref()?;
+        Some(DVector::from_vec(self.model.residuals(self.x.as_slice(), at)))
+    }
+
+    fn jacobian(&self) -> Option<DMatrix<f64>> {
+        let columns = self.model.jacobian(self.x.as_slice(), self.at.as_ref()?)?;
+        let rows = columns.first()?.len();
+        Some(DMatrix::from_vec(rows, columns.len(), columns.concat()))
+    }
+}
+
+/// Minimises the sum of squares from `start` on.
+///
+/// # Errors
+/// [`IdentifyError::NoFit`] if it does not settle or the model has no answer on the way.
+pub fn minimise<M: Model>(model: &M, start: &[f64]) -> Result<Fitted<M::At>, IdentifyError> {
+    let no_fit = |why: String| IdentifyError::NoFit { why };
+    let problem = Problem { model, x: DVector::from_column_slice(start), at: model.at(start) };
+    let solver = LevenbergMarquardt::new()
+        .with_ftol(SETTLED)
+        .with_xtol(SETTLED)
+        .with_gtol(SETTLED)
+        .with_patience(PATIENCE);
+    let (problem, report) = solver.minimize(problem);
+    let settled = report.termination.was_successful()
+        || matches!(report.termination, TerminationReason::NoImprovementPossible(_));
+    if !settled {
+        return Err(no_fit(format!("{:?}", report.termination)));
+    }
+    let jacobian = problem.jacobian();
+    let residuals = problem.residuals();
+    match (jacobian, residuals, problem.at) {
+        (Some(jacobian), Some(residuals), Some(at)) => {
+            Ok(Fitted { x: problem.x.as_slice().to_vec(), at, residuals, jacobian })
+        }
+        _ => Err(no_fit("the model has no answer at its end".into())),
+    }
+}
+
+/// Covariance of the coordinates, (J'J)^-1, of residuals in standard deviations.
+///
+/// # Errors
+/// [`IdentifyError::NoFit`] if the residuals do not determine them.
+pub fn covariance(jacobian: &DMatrix<f64>) -> Result<DMatrix<f64>, IdentifyError> {
+    let normal = jacobian.transpose() * jacobian;
+    let inverse = normal.cholesky().map(|root| root.inverse());
+    inverse.ok_or_else(|| IdentifyError::NoFit {
+        why: "the logs do not determine the parameters".into(),
+    })
+}
+
+/// The covariance, each variance no less than what blocks of residuals that err alike
+/// make of it: `H^-1 (w^2 sum g g' + P) H^-1` with a block's gradient g, the normal matrix
+/// H and the part P of it that is no data (White 1980, Liang and Zeger 1986). Covers noise
+/// that lasts and noise that differs from place to place; `blocks` are rows, what is in
+/// none is no data. `widened` is w, for what no scatter shows.
+///
+/// # Errors
+/// [`IdentifyError::NoFit`] if the residuals do not determine the coordinates.
+pub fn robust(
+    jacobian: &DMatrix<f64>,
+    residuals: &DVector<f64>,
+    blocks: &[Range<usize>],
+    widened: f64,
+) -> Result<DMatrix<f64>, IdentifyError> {
+    let plain = covariance(jacobian)?;
+    let data = blocks.iter().map(|block| block.end).max().unwrap_or(0);
+    let rest = jacobian.rows(data, jacobian.nrows() - data);
+    let mut middle = rest.transpose() * rest;
+    for block in blocks {
+        let rows = jacobian.rows(block.start, block.len());
+        let gradient = rows.transpose() * residuals.rows(block.start, block.len());
+        middle += widened * widened * &gradient * gradient.transpose();
+    }
+    let sandwich = &plain * middle * &plain;
+    let grown = |i: usize| (sandwich[(i, i)] / plain[(i, i)]).max(1.0).sqrt();
+    let n = plain.nrows();
+    Ok(DMatrix::from_fn(n, n, |i, j| grown(i) * grown(j) * plain[(i, j)]))
+}
+
+/// Adds to a covariance what the coordinate `index` brings that is held in the fit but
+/// known only to `deviation`: `(dx/dc)(dx/dc)' s^2` with `dx/dc = -H^-1 J' j_c` over the
+/// rows of the data (a consider parameter, Schmidt 1966).
+///
+/// # Errors
+/// [`IdentifyError::NoFit`] if the residuals do not determine the coordinates.
+pub fn consider(
+    covariance: &mut DMatrix<f64>,
+    jacobian: &DMatrix<f64>,
+    data: usize,
+    index: usize,
+    deviation: f64,
+) -> Result<(), IdentifyError> {
+    let plain = self::covariance(jacobian)?;
+    let rows = jacobian.rows(0, data);
+    let mut follows = -(plain * rows.transpose() * rows.column(index));
+    follows[index] = 1.0;
+    covariance.row_mut(index).fill(0.0);
+    covariance.column_mut(index).fill(0.0);
+    *covariance += &follows * follows.transpose() * (deviation * deviation);
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// y = a exp(-t / b) at t = 0, 1, ... 9.
+    struct Decay(Vec<f64>);
+
+    impl Model for Decay {
+        type At = Vec<f64>;
+
+        fn at(&self, x: &[f64]) -> Option<Vec<f64>> {
+            (x[0] != 0.0).then(|| (0..10).map(|t| x[0] * (-f64::from(t) / x[1]).exp()).collect())
+        }
+
+        fn residuals(&self, _: &[f64], at: &Vec<f64>) -> Vec<f64> {
+            at.iter().zip(&self.0).map(|(a, b)| a - b).collect()
+        }
+
+        fn jacobian(&self, x: &[f64], at: &Vec<f64>) -> Option<Vec<Vec<f64>>> {
+            let by_a = at.iter().map(|y| y / x[0]).collect();
+            let by_b = at.iter().enumerate().map(|(t, y)| y * t as f64 / (x[1] * x[1])).collect();
+            Some(vec![by_a, by_b])
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn the_parameters_of_exact_data_come_back(a in 0.5f64..5.0, b in 1.0f64..8.0) {
+            let data = Decay(Vec::new()).at(&[a, b]).unwrap();
+            let fitted = minimise(&Decay(data), &[1.0, 2.0]).unwrap();
+            prop_assert!((fitted.x[0] / a - 1.0).abs() < 1e-4, "{:?}", fitted.x);
+            prop_assert!((fitted.x[1] / b - 1.0).abs() < 1e-4, "{:?}", fitted.x);
+            prop_assert!(fitted.residuals.norm() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn the_covariance_of_a_mean_is_the_variance_over_the_count() {
+        let jacobian = DMatrix::from_element(25, 1, 1.0 / 0.3);
+        assert!((covariance(&jacobian).unwrap()[(0, 0)] - 0.09 / 25.0).abs() < 1e-12);
+        let twice = DMatrix::from_element(25, 2, 1.0);
+        assert!(covariance(&twice).is_err());
+    }
+
+    #[test]
+    fn residuals_that_err_alike_widen_and_those_that_do_not_leave_it() {
+        // A mean of 40: by tens alike, or each for itself.
+        let jacobian = DMatrix::from_element(40, 1, 1.0);
+        let blocks: Vec<Range<usize>> = (0..4).map(|b| 10 * b..10 * b + 10).collect();
+        let alike = DVector::from_fn(40, |i, _| if i / 10 % 2 == 0 { 1.0 } else { -1.0 });
+        let each = DVector::from_fn(40, |i, _| if i % 2 == 0 { 1.0 } else { -1.0 });
+        let of = |residuals| robust(&jacobian, residuals, &blocks, 1.0).unwrap()[(0, 0)];
+        assert!((of(&alike) - 0.25).abs() < 1e-12, "{}", of(&alike));
+        assert!((of(&each) - 1.0 / 40.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_is_held_brings_its_own_uncertainty() {
+        // Readings of a + c, 25 of deviation 1, c held by a last row.
+        let held = 1e6;
+        let jacobian = DMatrix::from_fn(26, 2, |row, column| match (row, column) {
+            (25, 0) => 0.0,
+            (25, _) => held,
+            _ => 1.0,
+        });
+        let mut both = covariance(&jacobian).unwrap();
+        consider(&mut both, &jacobian, 25, 1, 0.3).unwrap();
+        assert!((both[(0, 0)] - (0.04 + 0.09)).abs() < 1e-6, "{both}");
+        assert!((both[(1, 1)] - 0.09).abs() < 1e-9 && (both[(0, 1)] + 0.09).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_model_without_an_answer_is_an_error() {
+        assert!(minimise(&Decay(vec![1.0; 10]), &[0.0, 2.0]).is_err());
+    }
+}

@@ -1,0 +1,152 @@
+//! The fit to what the study publishes: three gaps, three parameters of the tread.
+//!
+//! Three points fit three parameters: nothing is left to tell how well, so there is neither
+//! a validation nor an interval. Nor do they fit exactly: at one speed the ratio of two
+//! gaps hardly depends on the tread, so that what is left over is the model's and no noise,
+//! and one combination of the three parameters is all but free. It is held to the
+//! scenario's tread within a factor of two.
+
+use rayon::prelude::*;
+
+use super::IdentifyError;
+use super::least_squares::{Model, minimise};
+use crate::paper::published::{AMPLITUDE_MM, CASES};
+use crate::plant::balance::Axial;
+use crate::plant::crossing::{CrossingCase, cross};
+use crate::plant::ring::RingParameters;
+use crate::scenario::Scenario;
+
+/// Change of a logarithm for the differences.
+const MOVED: f64 = 0.02;
+/// What the ring errs by in a gap, relative: the unit of the deviations.
+const GAP_REL: f64 = 1e-3;
+/// How far a parameter may lie from where it starts, logarithm: a factor of two.
+const FREE_LN: f64 = 0.7;
+
+/// How finely the ring is computed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fineness {
+    /// Elements around the ring.
+    pub elements: usize,
+    /// Axial way per step, mm.
+    pub stride_mm: f64,
+}
+
+impl Fineness {
+    /// The coarse ring that the presets' tread was fitted with.
+    pub const STATED: Self = Self { elements: 720, stride_mm: 0.05 };
+    /// Gaps within 0.1 % of the converged ones.
+    pub const CONVERGED: Self = Self { elements: 2880, stride_mm: 0.01 };
+}
+
+/// The tread that shows the published gaps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tread {
+    /// Relaxed stiffness, Pa/m.
+    pub k_inf_pa_per_m: f64,
+    /// Stiffening.
+    pub stiffening: f64,
+    /// Relaxation time, s.
+    pub tau_s: f64,
+    /// Its gaps less the published ones, mm.
+    pub residuals_mm: [f64; 3],
+}
+
+/// The three crossings, pushed without friction.
+struct Gaps<'a> {
+    scenario: &'a Scenario,
+    fineness: Fineness,
+    start: [f64; 3],
+}
+
+impl<'a> Gaps<'a> {
+    fn of(scenario: &'a Scenario, fineness: Fineness) -> Self {
+        let tread = &scenario.rig.tread;
+        let start = [tread.k_inf_pa_per_m * 1e-9, tread.stiffening, tread.tau_s].map(f64::ln);
+        Self { scenario, fineness, start }
+    }
+
+    /// Gaps over the published ones, less 1, for these logarithms.
+    fn deviations(&self, x: &[f64]) -> Option<Vec<f64>> {
+        let k_inf = x[0].exp();
+        let ring = RingParameters {
+            k_inf,
+            k_0: k_inf * x[1].exp(),
+            tau_s: x[2].exp(),
+            ..RingParameters::of(&self.scenario.rig, self.fineness.elements)
+        };
+        let deviation = |case: usize| {
+            let (speed_mm_s, preload_n) = CASES[case];
+            let crossing = CrossingCase {
+                ring,
+                step_height_mm: self.scenario.rig.rig.step_height_mm,
+                speed_mm_s,
+                preload_n,
+                axial: Axial::Pushed,
+                stride_mm: self.fineness.stride_mm,
+            };
+            cross(&crossing).ok().map(|result| result.gap_mm / AMPLITUDE_MM[case] - 1.0)
+        };
+        (0..3).into_par_iter().map(deviation).collect()
+    }
+}
+
+impl Model for Gaps<'_> {
+    type At = Vec<f64>;
+
+    fn at(&self, x: &[f64]) -> Option<Vec<f64>> {
+        self.deviations(x)
+    }
+
+    fn residuals(&self, x: &[f64], at: &Vec<f64>) -> Vec<f64> {
+        let gaps = at.iter().map(|deviation| deviation / GAP_REL);
+        let held = x.iter().zip(&self.start).map(|(x, start)| (x - start) / FREE_LN);
+        gaps.chain(held).collect()
+    }
+
+    fn jacobian(&self, x: &[f64], _: &Vec<f64>) -> Option<Vec<Vec<f64>>> {
+        let column = |index: usize| {
+            let at = |by: f64| {
+                let mut x = x.to_vec();
+                x[index] += by;
+                self.deviations(&x)
+            };
+            let (up, down) = (at(MOVED)?, at(-MOVED)?);
+            let slope = |(u, d): (&f64, &f64)| (u - d) / (2.0 * MOVED * GAP_REL);
+            let held = (0..3).map(|other| if other == index { 1.0 / FREE_LN } else { 0.0 });
+            Some(up.iter().zip(&down).map(slope).chain(held).collect())
+        };
+        (0..3).map(column).collect()
+    }
+}
+
+/// Fits the tread to the three published gaps by least squares of their relative
+/// deviations, from the scenario's tread on.
+///
+/// # Errors
+/// [`IdentifyError::NoFit`] if it does not settle.
+pub fn fit(scenario: &Scenario, fineness: Fineness) -> Result<Tread, IdentifyError> {
+    let gaps = Gaps::of(scenario, fineness);
+    let fitted = minimise(&gaps, &gaps.start)?;
+    Ok(tread(&fitted.x, &fitted.at))
+}
+
+/// The scenario's own tread with what its gaps leave to the published ones.
+///
+/// # Errors
+/// [`IdentifyError::NoFit`] if a crossing has no balance.
+pub fn stated(scenario: &Scenario, fineness: Fineness) -> Result<Tread, IdentifyError> {
+    let gaps = Gaps::of(scenario, fineness);
+    let at = gaps.deviations(&gaps.start);
+    let at = at.ok_or_else(|| IdentifyError::NoFit { why: "a crossing has no balance".into() })?;
+    Ok(tread(&gaps.start, &at))
+}
+
+fn tread(x: &[f64], deviations: &[f64]) -> Tread {
+    Tread {
+        k_inf_pa_per_m: 1e9 * x[0].exp(),
+        stiffening: x[1].exp(),
+        tau_s: x[2].exp(),
+        residuals_mm: std::array::from_fn(|case| AMPLITUDE_MM[case] * deviations[case]),
+    }
+}

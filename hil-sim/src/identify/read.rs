@@ -1,0 +1,189 @@
+//! Records out of the files that `rig deploy` leaves: `log.mcap`, which has the rig's
+//! parameters with it, or `log.csv`, which has not.
+//!
+//! These files hold what the controller made of its sensors. Counts of the encoder are the
+//! differences of its odometry, from which its corrections at the steps are taken out:
+//! a count is a fixed length, a correction hardly ever a whole number of them.
+
+use std::path::Path;
+
+use serde::Deserialize;
+
+use super::IdentifyError;
+use super::record::{Record, Sample, TICK_S};
+use crate::scenario::Scenario;
+
+/// First bytes of an MCAP file.
+const MCAP: &[u8] = b"\x89MCAP";
+/// Lag of the arm's filter in the controller, s.
+const ARM_FILTER_S: f64 = 0.005;
+/// Deviation from whole counts beyond which the odometry was corrected, counts.
+const CORRECTED: f64 = 0.05;
+/// Modes in which a bridge is on: the pre-tightener's, and the drive's.
+const PRELOAD_MODES: std::ops::RangeInclusive<u8> = 4..=9;
+const DRIVE_MODES: std::ops::RangeInclusive<u8> = 5..=9;
+
+/// What is needed of a row.
+#[derive(Clone, Copy, Debug, Deserialize)]
+struct Line {
+    t_s: f64,
+    mode: u8,
+    position_est_mm: f64,
+    speed_est_mm_s: f64,
+    preload_meas_n: f64,
+    radius_est_mm: f64,
+    compression_meas_mm: f64,
+    drive_duty: f64,
+    preload_duty: f64,
+}
+
+impl Record {
+    /// Reads a log; `scenario` is the rig's where the log does not say.
+    ///
+    /// # Errors
+    /// [`IdentifyError::Log`] if it cannot be read or is no log of a run.
+    pub fn read(path: &Path, scenario: &Scenario) -> Result<Self, IdentifyError> {
+        let name = path.display().to_string();
+        let bad = |why: String| IdentifyError::Log { name: name.clone(), why };
+        let bytes = std::fs::read(path).map_err(|error| bad(error.to_string()))?;
+        let (lines, told) = if bytes.starts_with(MCAP) {
+            of_mcap(&bytes).map_err(bad)?
+        } else {
+            (of_csv(&bytes).map_err(bad)?, None)
+        };
+        if lines.is_empty() {
+            return Err(bad("it holds no row".into()));
+        }
+        let scenario = match told {
+            Some(text) => Scenario::parse(&name, &text, &[]).map_err(|e| bad(e.to_string()))?,
+            None => scenario.clone(),
+        };
+        let ticked = samples(&lines, &scenario);
+        let mut record = Self::new(&name, scenario, ticked)?;
+        record.arm_delay_s += ARM_FILTER_S;
+        Ok(record)
+    }
+}
+
+fn of_csv(bytes: &[u8]) -> Result<Vec<Line>, String> {
+    let rows = csv::Reader::from_reader(bytes).into_deserialize();
+    rows.collect::<Result<_, _>>().map_err(|error| format!("no log of a run: {error}"))
+}
+
+/// Rows, and the parameters as TOML if the file has them.
+fn of_mcap(bytes: &[u8]) -> Result<(Vec<Line>, Option<String>), String> {
+    let why = |error: mcap::McapError| error.to_string();
+    let mut lines = Vec::new();
+    for message in mcap::MessageStream::new(bytes).map_err(why)? {
+        let message = message.map_err(why)?;
+        if message.channel.topic == "/telemetry" {
+            let line = serde_json::from_slice(&message.data);
+            lines.push(line.map_err(|error| format!("/telemetry: {error}"))?);
+        }
+    }
+    let summary = mcap::Summary::read(bytes).map_err(why)?;
+    let indexes = summary.iter().flat_map(|summary| &summary.metadata_indexes);
+    let mut told = None;
+    for index in indexes.filter(|index| index.name == "parameters") {
+        told = mcap::read::metadata(bytes, index).map_err(why)?.metadata.get("toml").cloned();
+    }
+    Ok((lines, told))
+}
+
+fn samples(lines: &[Line], scenario: &Scenario) -> Vec<(u32, Sample)> {
+    let rig = &scenario.rig;
+    let count_mm = std::f64::consts::TAU * rig.rig.wheel_radius_mm / rig.sense.encoder_counts;
+    let mut counts = 0.0;
+    let mut before: Option<&Line> = None;
+    lines
+        .iter()
+        .map(|line| {
+            if let Some(before) = before {
+                let moved = (line.position_est_mm - before.position_est_mm) / count_mm;
+                let whole = moved.round();
+                // Corrected: what the wheel did meanwhile, its speed tells.
+                let corrected = (moved - whole).abs() > CORRECTED;
+                let turned = if corrected {
+                    (line.speed_est_mm_s * TICK_S / count_mm).round()
+                } else {
+                    whole
+                };
+                counts += turned;
+            }
+            before = Some(line);
+            let sine = (line.radius_est_mm - rig.rig.arm_pivot_radius_mm) / rig.rig.arm_length_mm;
+            let sample = Sample {
+                counts,
+                preload_n: line.preload_meas_n,
+                compression_mm: line.compression_meas_mm,
+                arm_rad: Some(sine.clamp(-1.0, 1.0).asin()),
+                drive: line.drive_duty,
+                drive_on: DRIVE_MODES.contains(&line.mode),
+                pretightener: line.preload_duty,
+                pretightener_on: PRELOAD_MODES.contains(&line.mode),
+            };
+            ((line.t_s / TICK_S).round() as u32, sample)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::record::Reader;
+    use crate::record::MODE_NAMES;
+    use crate::{export, sil};
+
+    #[test]
+    fn the_modes_are_those_of_the_rows() {
+        assert_eq!(MODE_NAMES[usize::from(*PRELOAD_MODES.start())], "preload");
+        assert_eq!(MODE_NAMES[usize::from(*DRIVE_MODES.start())], "cruise");
+        assert_eq!(MODE_NAMES[usize::from(*DRIVE_MODES.end())], "stopping");
+    }
+
+    #[test]
+    fn both_files_of_a_run_give_what_the_sensors_said() {
+        let mut scenario = Scenario::default();
+        scenario.run.seed = 3;
+        let directory = tempfile::tempdir().unwrap();
+        let recording =
+            sil::run(&scenario, sil::Options { rows: true, ..sil::Options::default() }).unwrap();
+        let (csv, mcap) = (directory.path().join("log.csv"), directory.path().join("log.mcap"));
+        export::write_csv(&recording, &csv).unwrap();
+        export::write_mcap(&recording, &mcap).unwrap();
+        let [csv, mcap] = [csv, mcap].map(|path| Record::read(&path, &scenario).unwrap());
+        assert_eq!(csv.samples, mcap.samples);
+        assert_eq!(mcap.scenario, scenario);
+
+        let mut session = sil::Session::new(&scenario, sil::Options::default()).unwrap();
+        let mut reader = Reader::new(&scenario);
+        let mut start = Some(interstage::supervise::Command::Start);
+        for read in &csv.samples {
+            let idle = session.mode() == interstage::supervise::Mode::Idle;
+            let command = if idle { start.take() } else { None };
+            let frame = session.sense();
+            let output = session.advance(&frame, command).unwrap();
+            let sample = reader.sample(&frame, &sil::drives(output.drive, output.preload));
+            assert!((sample.counts - read.counts).abs() <= 2.0, "{sample:?} {read:?}");
+            // The controller has taken its zeros.
+            assert!((sample.preload_n - read.preload_n).abs() < 0.5);
+            assert_eq!(sample.drive_on, read.drive_on);
+            assert_eq!(sample.pretightener_on, read.pretightener_on);
+            assert!((sample.pretightener - read.pretightener).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn what_is_no_log_is_told_in_a_line_with_its_name() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("notes.csv");
+        let refused = || Record::read(&path, &Scenario::default()).unwrap_err().to_string();
+        assert!(refused().contains("notes.csv: No such file"), "{}", refused());
+        std::fs::write(&path, "a,b\n1,2\n").unwrap();
+        assert!(refused().contains("notes.csv: no log of a run: "), "{}", refused());
+        std::fs::write(&path, "").unwrap();
+        assert!(refused().contains("it holds no row"), "{}", refused());
+        std::fs::write(&path, b"\x89MCAP and no more").unwrap();
+        assert!(refused().contains("notes.csv: "), "{}", refused());
+    }
+}

@@ -1,0 +1,213 @@
+//! What identification takes from a log: the sensors' readings and the bridges' duties of
+//! every tick, in the units of the rig that the log names, and nothing that the plant
+//! alone knows.
+
+use std::f64::consts::TAU;
+
+use interstage::sense::angle;
+use interstage::sense::raw::{EncoderCount, SensorFrame};
+
+use super::IdentifyError;
+use crate::plant::rig::Drives;
+use crate::scenario::{Direction, Scenario};
+
+/// Length of a tick, s.
+pub const TICK_S: f64 = 1e-3;
+
+/// Longest gap in a log that is bridged by the last reading, ticks.
+const LONGEST_GAP: u32 = 20;
+
+/// Part of the converter at which a bridge reads zero, and from there to full scale.
+const BRIDGE: (f64, f64) = (0.05, 0.85);
+const CONVERTER: f64 = 65_535.0;
+
+/// One tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sample {
+    /// Wheel encoder since boot, counts, unwrapped.
+    pub counts: f64,
+    /// Load cell, N.
+    pub preload_n: f64,
+    /// Tread displacement, mm.
+    pub compression_mm: f64,
+    /// Arm angle from the pillar, rad, where a new frame came.
+    pub arm_rad: Option<f64>,
+    /// Duty of the drive, -1 to 1.
+    pub drive: f64,
+    /// Whether its bridge is on.
+    pub drive_on: bool,
+    /// Duty of the pre-tightener, -1 to 1.
+    pub pretightener: f64,
+    /// Whether its bridge is on.
+    pub pretightener_on: bool,
+}
+
+/// A log as identification sees it.
+#[derive(Clone, Debug)]
+pub struct Record {
+    /// Its name in messages and plots.
+    pub name: String,
+    /// The rig as the controller believed it to be, and how the log was made.
+    pub scenario: Scenario,
+    /// Age of an arm angle when it is logged, s: conversion, and the filter if the log has
+    /// the filtered one.
+    pub arm_delay_s: f64,
+    /// One a tick, without gaps.
+    pub samples: Vec<Sample>,
+}
+
+impl Record {
+    /// A record of samples with their ticks.
+    ///
+    /// # Errors
+    /// [`IdentifyError::Log`] if ticks run backwards or too many are missing.
+    pub fn new(
+        name: &str,
+        scenario: Scenario,
+        ticked: impl IntoIterator<Item = (u32, Sample)>,
+    ) -> Result<Self, IdentifyError> {
+        let bad = |why: String| IdentifyError::Log { name: name.to_owned(), why };
+        let mut samples: Vec<Sample> = Vec::new();
+        let mut last: Option<u32> = None;
+        for (tick, sample) in ticked {
+            if let Some(before) = last {
+                let gap = tick.checked_sub(before).filter(|gap| *gap > 0);
+                let gap = gap.ok_or_else(|| bad(format!("tick {tick} follows tick {before}")))?;
+                if gap > LONGEST_GAP {
+                    return Err(bad(format!("{gap} ticks are missing before tick {tick}")));
+                }
+                let held = samples.last().copied().unwrap_or_default();
+                let held = Sample { arm_rad: None, ..held };
+                samples.extend(std::iter::repeat_n(held, gap as usize - 1));
+            }
+            let numbers = [
+                sample.counts,
+                sample.preload_n,
+                sample.compression_mm,
+                sample.arm_rad.unwrap_or(0.0),
+                sample.drive,
+                sample.pretightener,
+            ];
+            if numbers.iter().any(|number| !number.is_finite()) {
+                return Err(bad(format!("tick {tick} holds what is no number")));
+            }
+            samples.push(sample);
+            last = Some(tick);
+        }
+        let arm_delay_s = scenario.noise.angle_delay_s;
+        Ok(Self { name: name.to_owned(), scenario, arm_delay_s, samples })
+    }
+
+    /// Whether the wheel goes out, onto the smaller radius.
+    #[must_use]
+    pub fn deploys(&self) -> bool {
+        self.scenario.run.direction == Direction::Deploy
+    }
+
+    /// Where the run begins, mm.
+    #[must_use]
+    pub fn start_mm(&self) -> f64 {
+        if self.deploys() { 0.0 } else { self.scenario.rig.rig.travel_mm }
+    }
+}
+
+/// Makes samples of raw codes, tick after tick.
+#[derive(Clone, Debug)]
+pub struct Reader {
+    load_cell_n: f64,
+    tread_mm: f64,
+    angle_zero_code: f64,
+    wheel: Option<EncoderCount>,
+    counts: i64,
+    angle_at: Option<u32>,
+}
+
+impl Reader {
+    /// For the sensors of this scenario's rig.
+    #[must_use]
+    pub fn new(scenario: &Scenario) -> Self {
+        let sense = &scenario.rig.sense;
+        Self {
+            load_cell_n: sense.load_cell_full_scale_n,
+            tread_mm: sense.tread_full_scale_mm,
+            angle_zero_code: sense.angle_zero_code,
+            wheel: None,
+            counts: 0,
+            angle_at: None,
+        }
+    }
+
+    /// The sample of a tick: what the sensors said before it, and its duties.
+    pub fn sample(&mut self, frame: &SensorFrame, driven: &Drives) -> Sample {
+        if let Some(wheel) = frame.wheel {
+            let since = self.wheel.map_or_else(|| wheel.code.get() as i16, |b| wheel.code.since(b));
+            self.counts += i64::from(since);
+            self.wheel = Some(wheel.code);
+        }
+        let bridge = |code: u16| (f64::from(code) / CONVERTER - BRIDGE.0) / BRIDGE.1;
+        let new = frame.arm.filter(|arm| self.angle_at != Some(arm.at));
+        self.angle_at = frame.arm.map(|arm| arm.at);
+        // A frame that fails its parity is no reading.
+        let arm_rad = new.and_then(|arm| angle::decode(arm.code).ok()).map(|code| {
+            let turned = (f64::from(code) - self.angle_zero_code) / 16_384.0;
+            TAU * (turned - turned.round())
+        });
+        Sample {
+            counts: self.counts as f64,
+            preload_n: self.load_cell_n * frame.load_cell.map_or(0.0, |c| bridge(c.code.get())),
+            compression_mm: self.tread_mm * frame.tread.map_or(0.0, |c| bridge(c.code.get())),
+            arm_rad,
+            drive: driven.drive,
+            drive_on: driven.drive_on,
+            pretightener: driven.preload,
+            pretightener_on: driven.preload_on,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(ticks: &[u32]) -> Result<Record, IdentifyError> {
+        let sample = |tick: u32| Sample { counts: f64::from(tick), ..Sample::default() };
+        Record::new("a", Scenario::default(), ticks.iter().map(|&tick| (tick, sample(tick))))
+    }
+
+    #[test]
+    fn short_gaps_are_bridged_by_the_last_reading() {
+        let record = record(&[5, 6, 9]).unwrap();
+        let counts: Vec<f64> = record.samples.iter().map(|s| s.counts).collect();
+        assert_eq!(counts, [5.0, 6.0, 6.0, 6.0, 9.0]);
+    }
+
+    #[test]
+    fn long_gaps_and_time_that_runs_backwards_are_refused() {
+        assert!(record(&[5, 60]).unwrap_err().to_string().contains("55 ticks are missing"));
+        assert!(record(&[5, 5]).unwrap_err().to_string().contains("tick 5 follows tick 5"));
+        let nothing = Sample { preload_n: f64::NAN, ..Sample::default() };
+        let error = Record::new("a", Scenario::default(), [(3, nothing)]).unwrap_err();
+        assert!(error.to_string().contains("tick 3"), "{error}");
+    }
+
+    #[test]
+    fn codes_become_what_the_sensors_measure() {
+        use interstage::sense::raw::{AdcCode, AngleFrame, Sample as At};
+        let mut reader = Reader::new(&Scenario::default());
+        let mut frame = SensorFrame {
+            wheel: Some(At { code: EncoderCount::new(65_530), at: 0 }),
+            load_cell: Some(At { code: AdcCode::new((0.475f64 * CONVERTER) as u16), at: 0 }),
+            tread: Some(At { code: AdcCode::new((0.05f64 * CONVERTER) as u16), at: 0 }),
+            // 2000 + 2048 has seven bits: the parity bit is set.
+            arm: Some(At { code: AngleFrame::new(0x8000 | 4048), at: 0 }),
+        };
+        let first = reader.sample(&frame, &Drives::default());
+        assert_eq!(first.counts, -6.0);
+        assert!((first.preload_n - 100.0).abs() < 0.005, "{}", first.preload_n);
+        assert!(first.compression_mm.abs() < 1e-4);
+        assert!((first.arm_rad.unwrap() - TAU / 8.0).abs() < 1e-12);
+        frame.wheel = Some(At { code: EncoderCount::new(4), at: 1 });
+        let second = reader.sample(&frame, &Drives::default());
+        assert_eq!((second.counts, second.arm_rad), (4.0, None));
+    }
+}

@@ -1,0 +1,382 @@
+//! A record made ready for the fit: the wheel's turn and the preload as smooth inputs,
+//! compression, arm angle and drive effort as means over bins.
+//!
+//! An encoder count is 19 um of tread, so the turn is taken at the edges between counts,
+//! where it is known to half a tick of travel, and smoothed over 16 ms. The bins of
+//! 10 ms hold two periods and more of the arm's modes and of the torque ripple; speeds
+//! at which the one excites the other are left out.
+
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+use super::IdentifyError;
+use super::record::{Record, Sample, TICK_S};
+
+/// Length of a bin, ticks.
+pub const BIN: usize = 10;
+/// Length of a bin of the drive's effort, ticks: its speed is a difference of counts.
+pub const EFFORT_BIN: usize = 40;
+/// Half-width of the smoothing windows of turn and preload, ticks. What is left of the
+/// counts' steps in the acceleration is inertia to the model, and near the limit of
+/// friction creep grows faster than its mean.
+const SMOOTH_TURN: usize = 16;
+const SMOOTH_PRELOAD: usize = 6;
+/// Least number of readings of the unloaded rig for a zero.
+const LEAST_UNLOADED: usize = 50;
+/// Least preload at which a reading tells of the tread, N.
+const LEAST_PRELOAD_N: f64 = 2.0;
+/// Relative distance from a mode's speed within which nothing is compared.
+const NEAR_MODE: f64 = 0.12;
+/// Turn at a step with the arm at rest that is slip, mm.
+const SLIPS_MM: f64 = 4.0;
+/// How far before a face the wheel is clear of its corner, mm.
+const BEFORE_SLIP_MM: f64 = 16.0;
+/// Change of the arm's mean over so many ticks below which it stands, rad: a tenth of a
+/// millimetre, as a slipping wheel bounces.
+const STANDS_RAD: f64 = 1e-3;
+const STEADY: usize = 40;
+/// Time after the drive's start in which nothing is compared, ticks: the first counts
+/// do not tell when the wheel began to turn.
+const STARTING: usize = 40;
+/// Acceleration beyond which the drive's effort is its inertia, mm/s^2.
+const MOST_ACCELERATION: f64 = 60.0;
+/// Duty beyond which the current limit may bind.
+const MOST_PART_OF_LIMIT: f64 = 0.95;
+
+/// A zero of a sensor: mean over the unloaded rig, and its standard error.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Zero {
+    /// Reading of the unloaded sensor.
+    pub value: f64,
+    /// Standard error of it.
+    pub error: f64,
+    /// Readings behind it; 0 if the log has no unloaded rig.
+    pub count: usize,
+}
+
+/// Mean of a channel over a bin.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bin {
+    /// Ticks.
+    pub ticks: Range<usize>,
+    /// Compression without its zero, mm.
+    pub compression_mm: f64,
+    /// Arm angle, rad; none if no frame came.
+    pub arm_rad: Option<f64>,
+    /// Preload as read without the load cell's zero, N.
+    pub preload_n: f64,
+    /// Whether the preload is compared.
+    pub pressed: bool,
+    /// Whether it is compared.
+    pub used: bool,
+}
+
+/// What the drive did over a bin.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Effort {
+    /// Ticks.
+    pub ticks: Range<usize>,
+    /// Mean duty.
+    pub duty: f64,
+    /// Mean rate of turn, rad/s.
+    pub turn_rad_s: f64,
+    /// Mean acceleration of the turn, rad/s^2.
+    pub gain_rad_s2: f64,
+    /// Whether it is compared.
+    pub used: bool,
+}
+
+/// A record made ready.
+#[derive(Clone, Debug)]
+pub struct Traces {
+    /// Ticks that are compared: from the first preload to the last drive.
+    pub span: Range<usize>,
+    /// Turn since the start, rad, every tick.
+    pub turn_rad: Vec<f64>,
+    /// Preload without the load cell's zero, N, every tick.
+    pub preload_n: Vec<f64>,
+    /// Zero of the load cell, N.
+    pub load_cell: Zero,
+    /// Zero of the displacement sensor, mm.
+    pub tread: Zero,
+    /// Bins of compression and arm angle.
+    pub bins: Vec<Bin>,
+    /// Bins of the drive's effort.
+    pub efforts: Vec<Effort>,
+    /// Ticks of steady slip, if at the end the wheel turns at a step without getting up.
+    pub slip: Option<Range<usize>>,
+}
+
+impl Traces {
+    /// Makes a record ready.
+    ///
+    /// # Errors
+    /// [`IdentifyError::Log`] if the wheel was never pressed or never driven.
+    pub fn of(record: &Record) -> Result<Self, IdentifyError> {
+        let bad = |why: &str| IdentifyError::Log { name: record.name.clone(), why: why.into() };
+        let samples = &record.samples;
+        let pressed = samples.iter().position(|s| s.pretightener_on);
+        let start = pressed.ok_or_else(|| bad("the pre-tightener was never on"))?;
+        let driven = samples.iter().position(|s| s.drive_on);
+        let moving = driven.ok_or_else(|| bad("the drive was never on"))?;
+        let last = samples.iter().rposition(|s| s.drive_on).unwrap_or(moving);
+        let end = last + 1;
+        if end < start + 4 * EFFORT_BIN {
+            return Err(bad("the run is too short"));
+        }
+        // Unloaded: only before the first preload, and only on the way out.
+        let idle = if record.deploys() { &samples[..start] } else { &samples[..0] };
+        let load_cell = zero(idle, |s| s.preload_n);
+        let tread = zero(idle, |s| s.compression_mm);
+        let per_count = TAU / record.scenario.rig.sense.encoder_counts;
+        let turn_rad: Vec<f64> =
+            turn(samples, moving).into_iter().map(|counts| counts * per_count).collect();
+        let raw: Vec<f64> = samples.iter().map(|s| s.preload_n - load_cell.value).collect();
+        let delay = record.scenario.noise.load_cell_delay_s / TICK_S;
+        let smooth = smoothed(&raw, SMOOTH_PRELOAD);
+        let preload_n = (0..raw.len()).map(|n| at(&smooth, n as f64 + delay).max(0.0)).collect();
+        let mut traces = Self {
+            span: start..end,
+            turn_rad,
+            preload_n,
+            load_cell,
+            tread,
+            bins: Vec::new(),
+            efforts: Vec::new(),
+            slip: None,
+        };
+        traces.bin(record, moving);
+        Ok(traces)
+    }
+
+    /// Tick before the corner touches, and from when on the slip is steady, if at the end
+    /// the wheel turns at a step without rising.
+    fn onset_of_slip(&self, record: &Record) -> Option<(usize, usize)> {
+        let rig = &record.scenario.rig.rig;
+        if !record.deploys() {
+            return None;
+        }
+        let samples = &record.samples[..self.span.end];
+        let mean = |ticks: Range<usize>| {
+            let arms = samples[ticks].iter().filter_map(|s| s.arm_rad);
+            let (sum, count) = arms.fold((0.0, 0), |(sum, count), arm| (sum + arm, count + 1));
+            (count > 0).then(|| sum / f64::from(count))
+        };
+        let end = self.span.end;
+        let (first, last) = (mean(0..STEADY)?, mean(end - STEADY..end)?);
+        let risen = rig.arm_length_mm * (first.sin() - last.sin()) / rig.step_height_mm;
+        let face = rig.step_positions_mm.get(risen.round().max(0.0) as usize)?;
+        // Back from the end for as long as the arm stands.
+        let mut steady = end - STEADY;
+        while steady >= self.span.start + STEADY
+            && mean(steady - STEADY..steady).is_some_and(|arm| (arm - last).abs() < STANDS_RAD)
+        {
+            steady -= STEADY;
+        }
+        let steady = steady + STEADY;
+        let way = |tick: usize| self.turn_rad[tick] * rig.wheel_radius_mm;
+        let onset = (self.span.start..end).find(|&tick| way(tick) > face - BEFORE_SLIP_MM)?;
+        let slips = steady > onset && way(end - 1) - way(steady.min(end - 1)) > SLIPS_MM;
+        slips.then_some((onset, steady))
+    }
+
+    fn bin(&mut self, record: &Record, moving: usize) {
+        let (samples, rig) = (&record.samples, &record.scenario.rig);
+        let speed = |ticks: &Range<usize>| {
+            let way = self.turn_rad[ticks.end - 1] - self.turn_rad[ticks.start];
+            way / ((ticks.len() - 1) as f64 * TICK_S)
+        };
+        let radius = rig.rig.wheel_radius_mm;
+        let starting = moving..moving + STARTING;
+        let within =
+            |ticks: &Range<usize>| ticks.start < starting.end && ticks.end > starting.start;
+        // Where a wheel goes over from grip to slip hangs on a hair, and from there on it
+        // grips and slips by turns: nothing that can be followed tick by tick.
+        let slip = self.onset_of_slip(record);
+        let onset = slip.as_ref().map_or(usize::MAX, |(onset, _)| *onset);
+        self.slip = slip.map(|(_, steady)| steady..self.span.end);
+        let between = |ticks: &Range<usize>| ticks.end > onset;
+        let rings = |turn_rad_s: f64| {
+            let hz = (turn_rad_s * radius).abs() / rig.drive.ripple_pitch_mm;
+            rig.drive.modes_hz.iter().any(|mode| (hz / mode - 1.0).abs() < NEAR_MODE)
+        };
+        self.bins = ranges(&self.span, BIN)
+            .map(|ticks| {
+                let of = &samples[ticks.clone()];
+                let mean = of.iter().map(|s| s.compression_mm).sum::<f64>() / of.len() as f64;
+                let arms: Vec<f64> = of.iter().filter_map(|s| s.arm_rad).collect();
+                let pressed = self.preload_n[ticks.start] > LEAST_PRELOAD_N;
+                let preload = of.iter().map(|s| s.preload_n).sum::<f64>() / of.len() as f64;
+                Bin {
+                    preload_n: preload - self.load_cell.value,
+                    pressed,
+                    compression_mm: mean - self.tread.value,
+                    arm_rad: (!arms.is_empty())
+                        .then(|| arms.iter().sum::<f64>() / arms.len() as f64),
+                    used: pressed && !rings(speed(&ticks)) && !within(&ticks) && !between(&ticks),
+                    ticks,
+                }
+            })
+            .collect();
+        let limit = MOST_PART_OF_LIMIT * rig.drive.force_limit_n;
+        self.efforts = ranges(&(moving..self.span.end), EFFORT_BIN)
+            .map(|ticks| {
+                let of = &samples[ticks.clone()];
+                let duty = of.iter().map(|s| s.drive).sum::<f64>() / of.len() as f64;
+                let turn_rad_s = speed(&ticks);
+                let mid = (ticks.start + ticks.end) / 2;
+                let (first, second) = (speed(&(ticks.start..mid)), speed(&(mid..ticks.end)));
+                let gain_rad_s2 = (second - first) / (0.5 * ticks.len() as f64 * TICK_S);
+                let force = |s: &Sample| {
+                    let loss = turn_rad_s * radius / rig.drive.no_load_speed_mm_s;
+                    rig.drive.stall_force_n * (s.drive - loss)
+                };
+                let free = of.iter().all(|s| s.drive_on && force(s).abs() < limit);
+                let turning = turn_rad_s.abs() * radius > 0.5;
+                let steady = (gain_rad_s2 * radius).abs() < MOST_ACCELERATION;
+                let used = free && turning && steady && !within(&ticks) && !between(&ticks);
+                Effort { ticks, duty, turn_rad_s, gain_rad_s2, used }
+            })
+            .collect();
+    }
+}
+
+/// Whole bins of a span.
+fn ranges(span: &Range<usize>, length: usize) -> impl Iterator<Item = Range<usize>> + use<> {
+    let (start, count) = (span.start, span.len() / length);
+    (0..count).map(move |i| start + i * length..start + (i + 1) * length)
+}
+
+fn zero(idle: &[Sample], of: impl Fn(&Sample) -> f64) -> Zero {
+    let count = idle.len();
+    if count < LEAST_UNLOADED {
+        return Zero::default();
+    }
+    let n = count as f64;
+    let value = idle.iter().map(&of).sum::<f64>() / n;
+    let square = idle.iter().map(|s| (of(s) - value).powi(2)).sum::<f64>();
+    Zero { value, error: (square / (n - 1.0) / n).sqrt(), count }
+}
+
+/// Turn at every tick, counts: linear between the instants at which the count changed,
+/// smoothed, at rest until the drive is switched on.
+fn turn(samples: &[Sample], moving: usize) -> Vec<f64> {
+    let first = samples.first().map_or(0.0, |s| s.counts);
+    let mut knots = vec![(moving as f64, first)];
+    for n in moving.max(1)..samples.len() {
+        let (before, now) = (samples[n - 1].counts, samples[n].counts);
+        if before != now {
+            // Mean of the edges passed, half a tick ago.
+            knots.push((n as f64 - 0.5, 0.5 * (before + now + 1.0)));
+        }
+    }
+    let mut next = 0;
+    let linear: Vec<f64> = (0..samples.len())
+        .map(|n| {
+            let t = n as f64;
+            while next < knots.len() && knots[next].0 <= t {
+                next += 1;
+            }
+            match (next.checked_sub(1).map(|i| knots[i]), knots.get(next)) {
+                (None, _) => first,
+                (Some(a), None) => a.1,
+                (Some(a), Some(b)) => a.1 + (b.1 - a.1) * (t - a.0) / (b.0 - a.0),
+            }
+        })
+        .collect();
+    let mut smooth = smoothed(&linear, SMOOTH_TURN);
+    smooth[..=moving.min(samples.len() - 1)].fill(first);
+    smooth.iter_mut().for_each(|counts| *counts -= first);
+    smooth
+}
+
+/// Triangular mean over so many ticks to both sides, less at the ends.
+fn smoothed(values: &[f64], most: usize) -> Vec<f64> {
+    let last = values.len().saturating_sub(1);
+    (0..values.len())
+        .map(|n| {
+            let reach = most.min(n).min(last - n);
+            let weight = |k: usize| (reach + 1 - k.abs_diff(reach)) as f64;
+            let sum: f64 = (0..=2 * reach).map(|k| weight(k) * values[n - reach + k]).sum();
+            sum / ((reach + 1) * (reach + 1)) as f64
+        })
+        .collect()
+}
+
+/// `values` at a place between two of them; the ends beyond.
+pub(super) fn at(values: &[f64], place: f64) -> f64 {
+    let last = values.len() - 1;
+    let place = place.clamp(0.0, last as f64);
+    let (index, part) = (place as usize, place.fract());
+    values[index] + part * (values[(index + 1).min(last)] - values[index])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::Scenario;
+    use proptest::prelude::*;
+
+    /// Ticks of a wheel that turns as `counts` has it, from tick 100 on.
+    fn turning(length: usize, counts: impl Fn(f64) -> f64) -> Vec<Sample> {
+        (0..length)
+            .map(|n| {
+                let t = (n as f64 - 100.0).max(0.0) * TICK_S;
+                Sample { counts: counts(t).floor(), drive_on: n >= 100, ..Sample::default() }
+            })
+            .collect()
+    }
+
+    proptest! {
+        /// Known to a third of a count at any speed of the drive, either way.
+        #[test]
+        fn the_turn_is_known_finer_than_a_count(per_s in 100.0f64..1600.0, back in any::<bool>()) {
+            let sign = if back { -1.0 } else { 1.0 };
+            let way = |t: f64| sign * per_s * (t - 0.05 * (1.0 - (-t / 0.05).exp()));
+            let samples = turning(1500, way);
+            let turn = turn(&samples, 100);
+            let square: f64 = (400..1400)
+                .map(|n| (turn[n] - way((n as f64 - 100.0) * TICK_S)).powi(2))
+                .sum();
+            prop_assert!((square / 1000.0).sqrt() < 0.35, "{}", (square / 1000.0).sqrt());
+            prop_assert!(turn[..=100].iter().all(|turn| *turn == 0.0));
+        }
+
+        #[test]
+        fn smoothing_keeps_a_straight_line(from in -9.0f64..9.0, rate in -9.0f64..9.0) {
+            let line: Vec<f64> = (0..40).map(|n| from + rate * f64::from(n)).collect();
+            for (smooth, straight) in smoothed(&line, 6).iter().zip(&line) {
+                prop_assert!((smooth - straight).abs() < 1e-9);
+            }
+            prop_assert!((at(&line, 12.25) - (from + 12.25 * rate)).abs() < 1e-9);
+            prop_assert_eq!((at(&line, -3.0), at(&line, 99.0)), (line[0], line[39]));
+        }
+    }
+
+    #[test]
+    fn the_zero_is_the_mean_of_the_unloaded_rig() {
+        let idle: Vec<Sample> = (0..400)
+            .map(|n| Sample {
+                preload_n: 0.2 + 0.05 * f64::from(n % 2 * 2 - 1),
+                ..Sample::default()
+            })
+            .collect();
+        let found = zero(&idle, |s| s.preload_n);
+        assert!((found.value - 0.2).abs() < 1e-12 && (found.error - 0.0025).abs() < 1e-5);
+        assert_eq!(zero(&idle[..10], |s| s.preload_n), Zero::default());
+    }
+
+    #[test]
+    fn a_log_that_tells_nothing_is_refused() {
+        let refused = |samples: Vec<Sample>| {
+            let ticked = samples.into_iter().enumerate().map(|(n, s)| (n as u32, s));
+            let record = Record::new("b", Scenario::default(), ticked).unwrap();
+            Traces::of(&record).unwrap_err().to_string()
+        };
+        assert!(refused(vec![Sample::default(); 500]).contains("b: the pre-tightener was never"));
+        let pressed = Sample { pretightener_on: true, ..Sample::default() };
+        assert!(refused(vec![pressed; 500]).contains("the drive was never on"));
+        let driven = Sample { drive_on: true, ..pressed };
+        assert!(refused(vec![driven; 100]).contains("too short"));
+    }
+}

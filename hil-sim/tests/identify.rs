@@ -1,0 +1,149 @@
+//! Identification from logs: hidden parameters are found within their intervals, the
+//! command reads what a deployment leaves, and what it writes can be run.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use hil_sim::identify::forward::Fineness;
+use hil_sim::identify::published;
+use hil_sim::identify::study::study;
+use hil_sim::scenario::Scenario;
+use serde_json::Value;
+
+/// Rigs of the test. All hundred are run by `cargo rig identify --hidden 100`.
+const CASES: u64 = 10;
+/// Parameters that three deployments tell, of which none may be missing.
+const TOLD: [&str; 17] = [
+    "tread.k_inf_pa_per_m",
+    "tread.stiffening",
+    "tread.tau_s",
+    "plant.mu",
+    "plant.top_load_n",
+    "sense.angle_zero_code",
+    "rig.step_positions_mm[1]",
+    "rig.step_positions_mm[2]",
+    "rig.step_positions_mm[3]",
+    "rig.step_height_mm[1]",
+    "rig.step_height_mm[2]",
+    "rig.step_height_mm[3]",
+    "preload.delay_s",
+    "preload.lag_s",
+    "preload.slew_n_per_s",
+    "preload.spring_n_per_mm",
+    "load cell zero",
+];
+
+#[test]
+fn hidden_parameters_lie_within_their_intervals() {
+    let seeds: Vec<u64> = (1..=CASES).collect();
+    let found = study(&Scenario::default(), &seeds, Fineness::default(), &|| ());
+    assert!(found.failed.is_empty(), "{:?}", found.failed);
+    let (mut within, mut all) = (0, 0);
+    for name in TOLD {
+        let line = found.line(name).unwrap_or_else(|| panic!("{name} is missing"));
+        assert_eq!(line.identified, CASES as usize, "{line:?}");
+        // Of ten at 95 %, fewer than seven is one in a thousand.
+        assert!(line.within >= 7, "{line:?}");
+        within += line.within;
+        all += line.identified;
+    }
+    assert!(10 * within >= 9 * all, "{within} of {all}: {found:#?}");
+    for name in ["tread.k_inf_pa_per_m", "tread.stiffening", "tread.tau_s"] {
+        let line = found.line(name).unwrap();
+        assert!(line.worst_rel.unwrap() < 0.05, "{line:?}");
+        // An interval that holds everything says nothing.
+        assert!(line.half_width < 0.06 * typical(name), "{line:?}");
+    }
+}
+
+fn typical(name: &str) -> f64 {
+    let tread = Scenario::default().rig.tread;
+    match name {
+        "tread.k_inf_pa_per_m" => tread.k_inf_pa_per_m,
+        "tread.stiffening" => tread.stiffening,
+        _ => tread.tau_s,
+    }
+}
+
+/// Least squares of three gaps: better than the presets' tread by the same ring, and the
+/// gaps within 2.5 %.
+#[test]
+fn three_published_gaps_are_met_as_far_as_the_ring_can() {
+    let scenario = Scenario::default();
+    let published = hil_sim::paper::published::AMPLITUDE_MM;
+    let square = |tread: &published::Tread| {
+        tread.residuals_mm.iter().zip(published).map(|(r, gap)| (r / gap).powi(2)).sum::<f64>()
+    };
+    let fineness = published::Fineness::STATED;
+    let fitted = published::fit(&scenario, fineness).unwrap();
+    let stated = published::stated(&scenario, fineness).unwrap();
+    for (residual, gap) in fitted.residuals_mm.iter().zip(published) {
+        assert!((residual / gap).abs() < 0.025, "{fitted:?}");
+    }
+    assert!(square(&fitted) < square(&stated), "{fitted:?} {stated:?}");
+}
+
+fn rig(directory: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_rig"))
+        .current_dir(directory)
+        .args(arguments)
+        .output()
+        .expect("the command starts")
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn the_command_reads_what_deployments_leave_and_writes_what_one_can_run() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    let runs: [(&str, &[&str]); 2] = [
+        ("fast", &["--seed", "4"]),
+        ("light", &["--seed", "4", "--controller", "constant", "--set", "preload.cruise_n=25"]),
+    ];
+    for (name, arguments) in runs {
+        let arguments = [&["deploy", "--out", name], arguments].concat();
+        let output = rig(at, &arguments);
+        assert!(output.status.success(), "{}", said(&output));
+    }
+    let output =
+        rig(at, &["identify", "fast/log.mcap", "light/log.mcap", "--out", "found", "--json"]);
+    assert!(output.status.success(), "{}", said(&output));
+    let found: Value = serde_json::from_slice(&output.stdout).expect("one object");
+    assert!(found["degrees_of_freedom"].as_u64().unwrap() > 1000);
+    assert!(found["residuals"].as_array().unwrap().len() == 8, "{found}");
+    let parameters = found["parameters"].as_array().unwrap();
+    let parameter = |name: &str| {
+        parameters.iter().find(|p| p["name"] == name).unwrap_or_else(|| panic!("{name}"))
+    };
+    let k = parameter("tread.k_inf_pa_per_m");
+    assert!(k["identified"].as_bool().unwrap(), "{k}");
+    let [low, value, high] = ["low", "value", "high"].map(|key| k[key].as_f64().unwrap());
+    assert!(low < value && value < high, "{k}");
+    for file in found["files"].as_array().unwrap() {
+        assert!(at.join(file.as_str().unwrap()).is_file(), "{file}");
+    }
+    let output = rig(at, &["deploy", "found/identified.toml", "--no-files", "--json"]);
+    assert!(output.status.success(), "{}", said(&output));
+}
+
+#[test]
+fn what_is_no_log_is_one_clear_line_and_exit_code_2() {
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::write(directory.path().join("notes.csv"), "a,b\n1,2\n").unwrap();
+    for (arguments, expected) in [
+        (&["identify", "missing.mcap"][..], "missing.mcap: No such file"),
+        (&["identify", "notes.csv"][..], "notes.csv: no log of a run"),
+        (&["identify"][..], "<LOG>"),
+        (&["identify", "--published", "notes.csv"][..], "cannot be used with"),
+    ] {
+        let output = rig(directory.path(), arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        let said = said(&output);
+        assert_eq!(said.trim_end().lines().count(), 1, "{said}");
+        assert!(said.contains(expected), "{said}");
+        assert!(output.stdout.is_empty());
+    }
+}
