@@ -47,7 +47,7 @@ impl Scale {
         // 2^44 over the bits, in two digits of 31 and 13 places.
         let divisor = bits as u32;
         let (digit, rest) = ((1 << 31) / divisor, (1 << 31) % divisor);
-        let inverse = ((digit << 13) | ((rest << 13) / divisor)) as i32;
+        let inverse = ((digit << 13) + (rest << 13) / divisor) as i32;
         Self { ratio: Ratio::from_bits(bits), inverse }
     }
 

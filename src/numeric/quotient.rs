@@ -45,7 +45,8 @@ pub const fn fraction(a: u32, b: u32) -> u32 {
 /// Part `2^32 a / (a + b)` that one number is of a sum.
 ///
 /// Range: `b` from 1, `a + b` below 2^32; outside it a number without meaning. Error: 0 to
-/// 24 LSB too small, so 5.6e-9 absolute. Cost: as [`fraction`], without its branch.
+/// 25 LSB too small, one more than [`fraction`] as the last bit is none, so 5.9e-9 absolute.
+/// Cost: as that, without its branch.
 #[inline(always)]
 #[must_use]
 pub const fn part_of_sum(a: u32, b: u32) -> u32 {
@@ -106,7 +107,7 @@ mod tests {
             let (a, b) = (a >> a_shift, (b >> b_shift).max(1));
             let exact = f64::from(a) / (f64::from(a) + f64::from(b)) * 2f64.powi(32);
             let error = f64::from(part_of_sum(a, b)) - exact;
-            prop_assert!((-24.0..=0.0).contains(&error), "{error}");
+            prop_assert!((-25.0..=0.0).contains(&error), "{error}");
         }
 
         #[test]
