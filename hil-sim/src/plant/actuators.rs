@@ -35,6 +35,13 @@ pub struct Turn {
     pub force_rises: f64,
 }
 
+impl Turn {
+    /// The wheel turns at this speed, mm/s, whatever resists.
+    pub(super) fn led(free_mm_s: f64) -> Self {
+        Self { free_mm_s, ..Self::default() }
+    }
+}
+
 impl DriveMotor {
     /// The drive over `dt_s` at `duty` (-1 to 1) from tread speed `speed`. Exact for a
     /// constant load; across the current limit for the load `expected_n`, signed as the

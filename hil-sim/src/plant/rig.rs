@@ -169,6 +169,8 @@ pub struct VirtualRig {
     resists_n: f64,
     /// Static thrust on the arm, N: the load, or at an end stop what the wheel pushes with.
     thrust_n: f64,
+    /// Speed of the tread in place of what the motor makes of it, mm/s.
+    led_mm_s: Option<f64>,
     /// Rise of the centre per axial way in the last stride that no change of load explains.
     drift: f64,
     /// Rise per axial way beyond that along the step's force, for what the tread takes in.
@@ -229,6 +231,7 @@ impl VirtualRig {
             owed_mm: (0.0, 0.0),
             resists_n: 0.0,
             thrust_n: parameters.load_n,
+            led_mm_s: None,
             drift: 0.0,
             swells: 0.0,
             creep: 0.0,

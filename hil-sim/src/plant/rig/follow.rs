@@ -1,6 +1,6 @@
 //! The rig led through what was recorded: spin and preload given, the rest computed.
 
-use super::{PlantError, VirtualRig};
+use super::{Drives, PlantError, VirtualRig};
 
 impl VirtualRig {
     /// Advances by `dt_s` with the wheel turning at this tread speed, mm/s, under this
@@ -11,16 +11,13 @@ impl VirtualRig {
     /// [`PlantError`] when the state stops meaning anything.
     pub fn follow(&mut self, tread_mm_s: f64, preload_n: f64, dt_s: f64) -> Result<(), PlantError> {
         self.preload.hold(preload_n);
-        self.acceleration = (tread_mm_s - self.truth.tread_mm_s) / dt_s;
-        self.truth.tread_mm_s = tread_mm_s;
-        if tread_mm_s != 0.0 {
-            self.parked = false;
-        }
+        self.led_mm_s = Some(tread_mm_s);
         let parts = (tread_mm_s.abs() * dt_s / self.resolution.stride_mm).ceil();
         let parts = parts.clamp(1.0, super::MOST_STRIDES);
         for _ in 0..parts as usize {
-            self.roll(dt_s / parts)?;
+            self.roll(&Drives::default(), dt_s / parts)?;
         }
+        self.led_mm_s = None;
         self.truth.time_s += dt_s;
         self.derive();
         self.check()

@@ -75,7 +75,10 @@ impl VirtualRig {
     pub(super) fn set_out(&mut self, drives: &Drives, dt_s: f64) -> Stride {
         let p = &self.parameters;
         let tread = self.truth.tread_mm_s;
-        let turn = p.drive.turn(tread, drives.drive, drives.drive_on, self.resists_n, dt_s);
+        let turn = match self.led_mm_s {
+            Some(led_mm_s) => Turn::led(led_mm_s),
+            None => p.drive.turn(tread, drives.drive, drives.drive_on, self.resists_n, dt_s),
+        };
         if turn.free_mm_s != 0.0 {
             self.parked = false;
         }
