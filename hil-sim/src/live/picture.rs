@@ -19,7 +19,7 @@ pub fn svg(buffer: &Buffer) -> String {
     let (width, height) = (u32::from(area.width) * CELL.0, u32::from(area.height) * CELL.1);
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \
-font-family=\"DejaVu Sans Mono, monospace\" font-size=\"13\" xml:space=\"preserve\">\n\
+font-family=\"DejaVu Sans Mono, monospace\" font-size=\"13.29\" xml:space=\"preserve\">\n\
 <rect width=\"100%\" height=\"100%\" fill=\"{GROUND}\"/>\n"
     );
     for y in 0..area.height {
