@@ -12,7 +12,7 @@ use super::IdentifyError;
 /// Relative change of the sum of squares, and of the coordinates, at which it has settled.
 const SETTLED: f64 = 1e-6;
 /// Most evaluations, in units of the number of coordinates.
-const PATIENCE: usize = 4;
+const PATIENCE: usize = 30;
 
 /// What is fitted.
 pub trait Model {
