@@ -330,7 +330,9 @@ mod tests {
         }
         // In the wall's way it is lifted out, to where it just touches.
         let solved = balance.solve(&mut ring, Motion { height_mm: 24.0, ..motion }).unwrap();
-        assert!(solved.contact.normal_n < 1e-6 && solved.contact.depth_mm.abs() < 1e-3);
+        assert!(solved.contact.normal_n < 1e-6, "{solved:?}");
+        // The corner may lie between two elements.
+        assert!((0.0..0.055).contains(&solved.contact.depth_mm), "{solved:?}");
     }
 
     #[test]

@@ -87,11 +87,11 @@ impl Grip {
         let traction = utilisation * cosine;
         let resists_n = if traction * self.tread > 0.0 { traction * self.normal } else { 0.0 };
         let tread = self.tread - self.yields * resists_n;
-        Ended {
-            tread: if tread * self.tread > 0.0 { tread } else { 0.0 },
-            speed: self.speed + (traction - sine - self.load_n) / self.inertia,
-            resists_n,
-        }
+        let tread = if tread * self.tread > 0.0 { tread } else { 0.0 };
+        let speed = self.speed + (traction - sine - self.load_n) / self.inertia;
+        // What is held stands.
+        let stands = tread == 0.0 && speed.abs() < STANDS_BELOW;
+        Ended { tread, speed: if stands { 0.0 } else { speed }, resists_n }
     }
 
     /// Traction that takes the carriage to where a tread of this speed would without

@@ -182,11 +182,14 @@ impl VirtualRig {
                 sliding = grip.slides(&ended);
             }
         }
-        let dt_s = stride.dt_s;
+        // A wheel that has come to rest does not move on.
+        let moves = truth.speed_mm_s != 0.0 || truth.tread_mm_s != 0.0;
+        let dt_s = if moves { stride.dt_s } else { 0.0 };
         self.owed_mm = (
             0.5 * (truth.speed_mm_s - stride.foreseen.0) * dt_s,
             0.5 * (truth.tread_mm_s - stride.foreseen.1) * dt_s,
         );
+        let dt_s = stride.dt_s;
         self.sliding = sliding > 0.0;
         self.resists_n = resists_n;
         truth.slip_mm += sliding * dt_s;
