@@ -115,7 +115,7 @@ impl Balance {
     }
 
     /// The same where the height in `motion` is foreseen so well that one step of Newton's
-    /// method does: if less than [`NEAR`] of the preload is left there, the contact is moved
+    /// method does: if less than a small part of the preload is left there, the contact is moved
     /// by its derivatives and not computed anew. Its force errs by a part of 1e-7.
     ///
     /// # Errors
