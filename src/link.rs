@@ -26,38 +26,6 @@ pub enum ToHost {
     Parameters(u16, Response),
 }
 
-/// Codes of the sensors for a board whose plant is on the host: what its pins would say.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct PlantCodes {
-    /// Counts them; wraps.
-    pub number: u32,
-    /// The wheel's counter.
-    pub wheel: u16,
-    /// The load cell's code.
-    pub load_cell: u16,
-    /// The tread sensor's code.
-    pub tread: u16,
-    /// The arm sensor's frame.
-    pub arm: u16,
-    /// The emergency stop's contact is open.
-    pub stopped: bool,
-}
-
-/// What a board commands that has its plant on the host; its own bridges stay off.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct PlantCommands {
-    /// Number of the codes that it had.
-    pub number: u32,
-    /// Duty of the drive bridge, Q15.
-    pub drive: i16,
-    /// Whether the drive bridge is on.
-    pub drive_on: bool,
-    /// Duty of the pre-tightener's bridge, Q15.
-    pub preload: i16,
-    /// Whether the pre-tightener's bridge is on.
-    pub preload_on: bool,
-}
-
 /// Bytes of a frame.
 pub type Frame = heapless::Vec<u8, LONGEST>;
 
