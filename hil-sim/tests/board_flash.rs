@@ -107,11 +107,9 @@ impl Board {
     /// Stores a set; false if power went meanwhile.
     fn store(&mut self, set: &[u8]) -> bool {
         let begin = Request::Begin { length: set.len() as u16 };
-        let pieces = set.chunks(PIECE).map(|piece| {
-            let mut piece = Piece::from_slice(piece).expect("fits");
-            piece.resize(piece.len().next_multiple_of(8), 0).expect("fits");
-            Request::Append(piece)
-        });
+        let pieces = set
+            .chunks(PIECE)
+            .map(|piece| Request::Append(Piece::from_slice(piece).expect("fits")));
         for request in std::iter::once(begin).chain(pieces).chain([Request::Seal]) {
             match self.ask(request) {
                 Some(response) => assert_eq!(response, Response::Done),
