@@ -107,9 +107,8 @@ impl Board {
     /// Stores a set; false if power went meanwhile.
     fn store(&mut self, set: &[u8]) -> bool {
         let begin = Request::Begin { length: set.len() as u16 };
-        let pieces = set
-            .chunks(PIECE)
-            .map(|piece| Request::Append(Piece::from_slice(piece).expect("fits")));
+        let pieces =
+            set.chunks(PIECE).map(|piece| Request::Append(Piece::from_slice(piece).expect("fits")));
         for request in std::iter::once(begin).chain(pieces).chain([Request::Seal]) {
             match self.ask(request) {
                 Some(response) => assert_eq!(response, Response::Done),
