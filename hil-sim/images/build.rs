@@ -1,9 +1,23 @@
-//! A deeper stack for the measurement image: it makes its constants itself, in f64, which
-//! the firmware leaves to the host.
+//! What the measurement image is linked with: the sets of parameters of the presets, made
+//! here as for the firmware; and a deeper stack, because the model's image makes its models
+//! itself, for many rigs, in f64.
 
-fn main() {
+use std::{env, error::Error, fs, path::PathBuf};
+
+use interstage::params::{MAX_SET, compile};
+use interstage::rig::Rig;
+
+fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed=build.rs");
-    if std::env::var("CARGO_CFG_TARGET_OS").as_deref() == Ok("none") {
-        println!("cargo::rustc-link-arg-bin=measure=--defsym=_stack_size=40K");
+    if env::var("CARGO_CFG_TARGET_OS")? != "none" {
+        return Ok(());
     }
+    println!("cargo::rustc-link-arg-bin=measure=--defsym=_stack_size=40K");
+    let out = PathBuf::from(env::var("OUT_DIR")?);
+    for (name, rig) in [("prototype", Rig::prototype()), ("fe", Rig::fe())] {
+        let mut room = [0; MAX_SET];
+        let length = compile(name, &rig, &mut room)?;
+        fs::write(out.join(name).with_extension("set"), &room[..length])?;
+    }
+    Ok(())
 }

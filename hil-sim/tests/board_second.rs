@@ -106,7 +106,6 @@ impl Second {
 }
 
 #[test]
-#[ignore = "open: with the present model the other core does not come to the end"]
 fn another_core_takes_the_same_instructions_to_the_same_bits() {
     let path = build_binary(IMAGE.0, IMAGE.1, Profile::Release, &[]).expect("the image builds");
     let elf = std::fs::read(path).expect("readable");

@@ -3,7 +3,8 @@
 //!
 //! These files hold what the controller made of its sensors. Counts of the encoder are the
 //! differences of its odometry, from which its corrections at the steps are taken out:
-//! a count is a fixed length, a correction hardly ever a whole number of them.
+//! they are known by being no whole number of counts, or no way that the wheel can have
+//! gone at its speed.
 
 use std::path::Path;
 
@@ -19,6 +20,9 @@ const MCAP: &[u8] = b"\x89MCAP";
 const ARM_FILTER_S: f64 = 0.005;
 /// Deviation from whole counts beyond which the odometry was corrected, counts.
 const CORRECTED: f64 = 0.05;
+/// Deviation from the way at the estimated speed beyond which it was corrected, counts:
+/// a count may come or not, and the estimate swings when the load does.
+const LEAPT: f64 = 2.5;
 /// Modes in which a bridge is on: the pre-tightener's, and the drive's.
 const PRELOAD_MODES: std::ops::RangeInclusive<u8> = 4..=9;
 const DRIVE_MODES: std::ops::RangeInclusive<u8> = 5..=9;
@@ -102,12 +106,10 @@ fn samples(lines: &[Line], scenario: &Scenario) -> Vec<(u32, Sample)> {
                 let moved = (line.position_est_mm - before.position_est_mm) / count_mm;
                 let whole = moved.round();
                 // Corrected: what the wheel did meanwhile, its speed tells.
-                let corrected = (moved - whole).abs() > CORRECTED;
-                let turned = if corrected {
-                    (line.speed_est_mm_s * TICK_S / count_mm).round()
-                } else {
-                    whole
-                };
+                let likely = line.speed_est_mm_s * TICK_S / count_mm;
+                let corrected =
+                    (moved - whole).abs() > CORRECTED || (moved - likely).abs() > LEAPT;
+                let turned = if corrected { likely.round() } else { whole };
                 counts += turned;
             }
             before = Some(line);
@@ -142,7 +144,6 @@ mod tests {
     }
 
     #[test]
-    #[ignore = "open: the counts of both ways part by 0.25 mm on a corner since friction is solved within the step"]
     fn both_files_of_a_run_give_what_the_sensors_said() {
         let mut scenario = Scenario::default();
         scenario.run.seed = 3;

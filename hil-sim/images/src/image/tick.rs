@@ -2,7 +2,7 @@
 
 use interstage::control::{Controller, Input, Output, State};
 use interstage::model::{Plan, Planner};
-use interstage::rig::Rig;
+use interstage::params::ParameterSet;
 use interstage_images::tick::{Given, Preset, Taken};
 
 use super::slot::Slot;
@@ -14,28 +14,28 @@ static INPUT: Slot<Input> = Slot::new();
 static OUTPUT: Slot<Output> = Slot::new();
 static PLAN: Slot<Plan> = Slot::new();
 
+/// The set of a preset, as the firmware has it.
+const fn set(preset: Preset) -> &'static [u8] {
+    match preset {
+        Preset::Prototype => include_bytes!(concat!(env!("OUT_DIR"), "/prototype.set")),
+        Preset::Fe => include_bytes!(concat!(env!("OUT_DIR"), "/fe.set")),
+    }
+}
+
 /// Controller and planner of a preset, and a state as after power-up. Returns 1 if
-/// they can be built.
+/// they can be read from its set.
 #[unsafe(no_mangle)]
 pub(super) extern "C" fn tick_build(preset: u32) -> u32 {
     let Some(preset) = Preset::ALL.into_iter().find(|p| *p as u32 == preset) else { return 0 };
-    let Some(rig) = Rig::named(preset.name()) else { return 0 };
+    let Ok(set) = ParameterSet::open(set(preset)) else { return 0 };
     STATE.put(State::default);
     OUTPUT.put(Output::default);
     PLAN.take();
-    (controller(&rig) && planner(&rig)).into()
-}
-
-/// In a frame of its own: together they would be deeper than the stack.
-#[inline(never)]
-fn controller(rig: &Rig) -> bool {
-    let built = Controller::try_build(rig);
-    built.map(|controller| CONTROLLER.put(|| controller)).is_ok()
-}
-
-#[inline(never)]
-fn planner(rig: &Rig) -> bool {
-    Planner::try_build(rig).map(|planner| PLANNER.put(|| planner)).is_ok()
+    let Ok((controller, rest)) = set.controller() else { return 0 };
+    CONTROLLER.put(|| controller);
+    let Ok(planner) = rest.planner() else { return 0 };
+    PLANNER.put(|| planner);
+    1
 }
 
 /// Has the controller run every stage in every tick.
