@@ -1,5 +1,6 @@
 //! Modes, commands, faults and limits, and the one table of transitions.
 
+mod crosscheck;
 mod fault;
 mod mode;
 mod monitor;

@@ -83,8 +83,8 @@ fn clean(args: &Args, scenario: &crate::scenario::Scenario, count: u64) -> Resul
 /// The matrix as a table, with what failed below it.
 pub(super) fn human(outcome: &Result_) -> String {
     let head = [
-        "fault", "code", "found", "limited", "borne", "missed", "unsafe", "median\nms",
-        "worst\nms", "preload\nN", "motion\nmm",
+        "fault", "code", "found", "borne", "missed", "unsafe", "median\nms", "worst\nms",
+        "preload\nN", "motion\nmm",
     ];
     let mut text = format!(
         "{} faults at {} instants each: {} undetected, {} unsafe\n{}\n",
@@ -97,11 +97,10 @@ pub(super) fn human(outcome: &Result_) -> String {
     for line in &outcome.matrix {
         for failure in &line.failures {
             text += &format!(
-                "  {} at {:.3} s of seed {} ({}, {}): {:?}, {}{}\n",
+                "  {} at {:.3} s of seed {} ({}): {:?}, {}{}\n",
                 line.fault,
                 failure.at_s.unwrap_or(0.0),
                 failure.seed,
-                failure.direction,
                 failure.during,
                 failure.finding,
                 failure.end,
@@ -117,8 +116,7 @@ fn row(line: &Line) -> Vec<String> {
     vec![
         line.fault.clone(),
         line.code.map_or_else(|| "-".to_owned(), |code| code.to_string()),
-        count(line.found),
-        count(line.limited),
+        count(line.found + line.limited),
         count(line.tolerated),
         count(line.undetected),
         count(line.unheld),

@@ -1,26 +1,30 @@
 //! Every fault at random instants of random rigs, each beside the same run without it.
 
 mod matrix;
+mod operator;
 mod twin;
 
-use interstage::supervise::{Command, Leg, Mode};
+use interstage::supervise::{Leg, Mode};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::judge::{Finding, Judge};
-use super::{CATALOGUE, Entry, Injection, Kind};
-use crate::scenario::{Direction, Scenario, StepAnomaly};
+use super::{CATALOGUE, Entry, Injection, Kind, Target};
+use crate::scenario::{Scenario, StepAnomaly};
 use crate::sil::{Options, RunError, Session};
 
 pub use matrix::{Line, Outcome, Spread};
+use operator::Operator;
 use twin::Twin;
 
 /// Longest run, s.
 const LONGEST_S: f64 = 60.0;
 /// How long a run is watched after its end, s.
 const AFTER_S: f64 = 1.0;
+/// How long commands come at random, s.
+const COMMANDS_S: f64 = 1.0;
 
 /// A fault of the matrix.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -109,8 +113,10 @@ impl Case {
             Self::Struck(entry) => {
                 let at_s = twin.instant(instant, &mut random);
                 let magnitude = Self::magnitude(entry, instant);
-                scenario.run.faults =
-                    vec![Injection::at(entry.target, entry.kind, at_s, magnitude)];
+                let mut fault = Injection::at(entry.target, entry.kind, at_s, magnitude);
+                // Who presses buttons at random stops doing so some time.
+                fault.duration_s = (entry.target == Target::Commands).then_some(COMMANDS_S);
+                scenario.run.faults = vec![fault];
             }
             Self::Step(fault) => {
                 let steps = &base.rig.rig.step_positions_mm;
@@ -139,8 +145,6 @@ impl Case {
 pub struct Instant {
     /// Seed of the rig.
     pub seed: u64,
-    /// `deploy` or `retract`.
-    pub direction: &'static str,
     /// When the fault came, s since boot; none if it was there from the start.
     pub at_s: Option<f64>,
     /// Measure of the fault, in the unit of the catalogue.
@@ -214,12 +218,10 @@ impl Campaign {
         Ok(Outcome::of(lines.collect(), self.instants))
     }
 
-    /// Rig and direction of an instant: every other one is the way back.
+    /// Rig of an instant.
     fn base(&self, instant: usize) -> Scenario {
         let mut scenario = self.scenario.clone();
         scenario.run.seed += 1 + instant as u64;
-        scenario.run.direction =
-            if instant.is_multiple_of(2) { Direction::Deploy } else { Direction::Retract };
         scenario
     }
 }
@@ -243,7 +245,6 @@ fn one(scenario: &Scenario, twin: &Twin) -> Instant {
         Ok(instant) => instant,
         Err(error) => Instant {
             seed: scenario.run.seed,
-            direction: scenario.run.direction.name(),
             at_s: None,
             magnitude: None,
             during: "at rest",
@@ -264,17 +265,14 @@ fn one(scenario: &Scenario, twin: &Twin) -> Instant {
 fn watched(scenario: &Scenario, twin: &Twin) -> Result<Instant, RunError> {
     let mut session = Session::new(scenario, Options::default())?;
     let mut judge = Judge::new(scenario, session.plant().truth());
-    let mut start = Some(match scenario.run.direction {
-        Direction::Deploy => Command::Start,
-        Direction::Retract => Command::Retract,
-    });
+    let mut operator = Operator::default();
     let early = scenario.run.faults.is_empty();
     let (mut during, mut sign_s, mut tick, mut after_s) = ("at rest", None, 0, 0.0);
     let mut worst_mm = 0.0f64;
     while session.time_s() < LONGEST_S && after_s < AFTER_S {
         let t_s = session.time_s();
         let before = session.mode();
-        let command = if before == Mode::Idle { start.take() } else { None };
+        let command = operator.command(before);
         let output = session.step(command)?;
         let struck = early || session.struck_s().is_some();
         if session.struck_s() == Some(t_s) {
@@ -288,20 +286,16 @@ fn watched(scenario: &Scenario, twin: &Twin) -> Result<Instant, RunError> {
         if struck && sign_s.is_none() && twin.differs(tick, truth) {
             sign_s = Some(t_s);
         }
-        let ended = match session.mode() {
-            Mode::Complete(_) | Mode::FaultHold(_) => true,
-            // Stopped by a command.
-            Mode::Idle => start.is_none() && t_s > twin.started_s,
-            _ => false,
-        };
-        after_s = if ended { after_s + 1e-3 } else { 0.0 };
+        after_s = if operator.over(session.mode()) { after_s + 1e-3 } else { 0.0 };
         tick += 1;
     }
     let crossings = session.plant().ledger().crossings();
     let steps = session.plant().parameters().wall.steps().len();
-    let worst_mm = crossings.iter().map(|crossing| crossing.gap_mm).fold(worst_mm, f64::max);
-    let gap_part = worst_mm / twin.gap_ref_mm;
-    let finding = judge.finding(&twin.limits, gap_part, crossings.len() == steps);
+    let [out, back] = twin.gap_ref_mm;
+    let parts = crossings.iter().map(|c| c.gap_mm / if c.climbing { out } else { back });
+    let gap_part = parts.fold(worst_mm / out, f64::max);
+    let crossed = crossings.len() == 2 * steps;
+    let finding = judge.finding(&twin.limits, gap_part, crossed);
     let report = judge.fault.or_else(|| judge.new_limit(&twin.limits));
     let at_s = session.struck_s();
     let since = |from_s: Option<f64>| {
@@ -312,7 +306,6 @@ fn watched(scenario: &Scenario, twin: &Twin) -> Result<Instant, RunError> {
     let moving = injection.is_some_and(|fault| fault.target.moves());
     Ok(Instant {
         seed: scenario.run.seed,
-        direction: scenario.run.direction.name(),
         at_s,
         magnitude: injection.map(Injection::magnitude),
         during,

@@ -44,7 +44,7 @@ pub const CATALOGUE: &[Entry] = {
         one(Encoder, Off, 0.0, (0.0, 0.0), "", "no new reading comes"),
         one(Encoder, Stuck, 0.0, (0.0, 0.0), "", "the code stands still, fresh in time"),
         one(Encoder, Garbage, 0.0, (0.0, 0.0), "", "random codes"),
-        one(Encoder, Gain, 1.2, (0.0, 10.0), "x", "reads so many times what is true, from its zero"),
+        one(Encoder, Gain, 1.5, (0.0, 10.0), "x", "reads so many times what is true, from its zero"),
         one(Encoder, Offset, 2.0, (-100.0, 100.0), "mm", "jumps by so much once"),
         one(Encoder, Slow, 0.1, (0.001, 10.0), "s", "follows with this time constant"),
         one(Encoder, Delayed, 0.05, (0.001, 2.0), "s", "follows this much later"),

@@ -11,9 +11,9 @@ use crate::scenario::Scenario;
 
 /// Control period, s.
 const TICK_S: f64 = 1e-3;
-/// Preload that a run may reach, parts of its limit: what overpressure is found at, and what
-/// the screw still does until it is.
-pub const PRELOAD_PART: f64 = 1.15;
+/// Preload that a run may reach, parts of its limit: where the screw has its own stop, and
+/// what the parts are made for.
+pub const PRELOAD_PART: f64 = 1.25;
 /// Way that the wheel may go uncommanded, mm: all ways added, until it rests.
 pub const MOTION_MM: f64 = 1.0;
 /// Part of its reference beyond which motion is uncommanded, and a constant, mm/s: what
@@ -45,6 +45,8 @@ pub enum Finding {
 pub struct Judge {
     limit_n: f64,
     ends_mm: (f64, f64),
+    /// How far from the end it stood whenever it said that it had arrived, mm, at most.
+    off_mm: f64,
     position_mm: f64,
     asked_mm_s: f64,
     /// Largest preload since the fault came, N.
@@ -67,6 +69,7 @@ impl Judge {
         Self {
             limit_n: scenario.rig.preload.limit_n,
             ends_mm: (0.0, scenario.rig.rig.travel_mm),
+            off_mm: 0.0,
             position_mm: truth.position_mm,
             asked_mm_s: 0.0,
             peak_preload_n: 0.0,
@@ -92,6 +95,13 @@ impl Judge {
         }
         self.peak_preload_n = self.peak_preload_n.max(truth.preload_n);
         self.motion_mm += self.uncommanded(way_mm);
+        if let Mode::Complete(way) = self.mode {
+            let end_mm = match way {
+                Direction::Deploy => self.ends_mm.1,
+                Direction::Retract => self.ends_mm.0,
+            };
+            self.off_mm = self.off_mm.max((self.position_mm - end_mm).abs());
+        }
         for entry in &output.events {
             match entry.event {
                 Event::Fault(fault) if self.fault.is_none() => {
@@ -132,15 +142,8 @@ impl Judge {
         if self.motion_mm > MOTION_MM {
             harms.push(format!("{:.2} mm uncommanded, at most {MOTION_MM}", self.motion_mm));
         }
-        if let Mode::Complete(way) = self.mode {
-            let end_mm = match way {
-                Direction::Deploy => self.ends_mm.1,
-                Direction::Retract => self.ends_mm.0,
-            };
-            let off = (self.position_mm - end_mm).abs();
-            if off > POSITION_MM {
-                harms.push(format!("{off:.1} mm from the end it says it reached"));
-            }
+        if self.off_mm > POSITION_MM {
+            harms.push(format!("{:.1} mm from the end it says it reached", self.off_mm));
         }
         if self.rest_s.is_none() {
             harms.push("not at rest at its end".to_owned());
@@ -155,8 +158,7 @@ impl Judge {
     pub fn finding(&self, known: &[u16], gap_part: f64, crossed: bool) -> Finding {
         let ended = match self.mode {
             Mode::Complete(_) => crossed,
-            Mode::Idle => true,
-            _ => false,
+            _ => self.mode.is_at_rest(),
         };
         if self.fault.is_some() {
             Finding::Found
@@ -232,8 +234,8 @@ mod tests {
     #[test]
     fn a_harm_is_named() {
         let hold = Mode::FaultHold(Fault::Overpressure);
-        assert!(judged(hold, 0.0, 0.0, 57.0, 10).harms().is_empty());
-        assert!(judged(hold, 0.0, 0.0, 58.0, 10).harms()[0].starts_with("preload 58.0 N"));
+        assert!(judged(hold, 0.0, 0.0, 62.0, 10).harms().is_empty());
+        assert!(judged(hold, 0.0, 0.0, 63.0, 10).harms()[0].starts_with("preload 63.0 N"));
         assert!(judged(RUN, 8.0, 8.0, 40.0, 10).harms()[0].starts_with("not at rest"));
         let there = Mode::Complete(Direction::Deploy);
         assert!(judged(there, 0.0, 0.0, 40.0, 10).harms()[0].starts_with("80.0 mm from the end"));

@@ -3,12 +3,13 @@
 
 use interstage::log::Event;
 use interstage::model::Planner;
-use interstage::supervise::{Command, Leg, Mode};
+use interstage::supervise::{Direction, Leg, Mode};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
 use crate::plant::rig::Truth;
-use crate::scenario::{Direction, Scenario};
+use super::operator::Operator;
+use crate::scenario::Scenario;
 use crate::sil::{Options, RunError, Session};
 
 /// Differences from the twin that count as a sign of the fault: preload, N; position, mm;
@@ -27,8 +28,8 @@ pub(super) struct Twin {
     crossings: Vec<(f64, f64)>,
     /// Codes of the limits that it reports.
     pub(super) limits: Vec<u16>,
-    /// Reference gap, mm.
-    pub(super) gap_ref_mm: f64,
+    /// Reference gap of the way out and of the way back, mm.
+    pub(super) gap_ref_mm: [f64; 2],
     /// Preload, position, speed by tick.
     states: Vec<[f32; 3]>,
 }
@@ -38,23 +39,20 @@ impl Twin {
     pub(super) fn run(scenario: &Scenario) -> Result<Self, RunError> {
         let mut session = Session::new(scenario, Options::default())?;
         let planner = Planner::try_build(&scenario.rig)?;
-        let mut start = Some(match scenario.run.direction {
-            Direction::Deploy => Command::Start,
-            Direction::Retract => Command::Retract,
-        });
+        let mut operator = Operator::default();
         let mut twin = Self {
             started_s: 0.0,
             ended_s: 0.0,
             crossings: Vec::new(),
             limits: Vec::new(),
-            gap_ref_mm: planner.gap_ref(scenario.run.direction.into()).to_num(),
+            gap_ref_mm: Direction::ALL.map(|way| planner.gap_ref(way).to_num()),
             states: Vec::new(),
         };
         let mut crossing = None;
         while session.time_s() < LONGEST_S {
             let t_s = session.time_s();
-            let command = if session.mode() == Mode::Idle { start.take() } else { None };
-            if command.is_some() {
+            let command = operator.command(session.mode());
+            if !operator.started() {
                 twin.started_s = t_s;
             }
             let output = session.step(command)?;
@@ -73,7 +71,7 @@ impl Twin {
                 }
             }
             twin.ended_s = t_s;
-            if matches!(session.mode(), Mode::Complete(_) | Mode::FaultHold(_)) {
+            if operator.over(session.mode()) && command.is_none() {
                 break;
             }
         }

@@ -1,0 +1,1 @@
+//! Each check at its threshold, with the noise that it must bear.
