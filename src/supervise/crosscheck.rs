@@ -10,7 +10,9 @@
 use super::Fault;
 use crate::numeric::checked;
 use crate::rig::{Rig, RigError};
-use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Tick, Travel, per_tick, q16};
+use crate::units::{
+    Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Tick, Travel, per_tick, q16,
+};
 
 /// Ticks between the three positions that make an acceleration.
 const SPAN: usize = 6;
@@ -21,6 +23,8 @@ const KEPT: usize = 16;
 /// `1 / (6 ms)^2`, 530 mm/s^2 beyond the reference: twice what the profile asks for. The
 /// worst of the random rigs is 2.1.
 const BENT_COUNTS: f64 = 2.5;
+/// Way off the reference within two spans, mm: the dips behind a step make 0.11.
+const OFF: Millimetres = q16(150_000);
 /// Way that counts as progress of the wheel, mm: two counts and a half.
 const PROGRESS: Millimetres = q16(50_000);
 /// Way that the reference may go while the wheel makes no progress, mm; a start from rest
@@ -34,11 +38,11 @@ const ARM_BEYOND: Millimetres = q16(250_000);
 /// Least speed at which duty tells speed, mm/s.
 const TELLING: MillimetresPerSecond = q16(10_000_000);
 /// Duty beyond the feed-forward that cruising takes, least and most: gearbox friction and
-/// rolling resistance make 0.02 to 0.05, twice the top load 0.05 more, a motor that is off
+/// rolling resistance make 0.02 to 0.07, twice the top load 0.05 more, a motor that is off
 /// by 5 % 0.03 either way at cruise speed.
 const EFFORT: (Ratio, Ratio) = (q16(-50_000), q16(130_000));
 /// Ticks that it must be outside.
-const EFFORT_TICKS: u8 = 100;
+const EFFORT_TICKS: u8 = 30;
 /// Preload off its model, part of the cruise preload: 0.18 at the ramps of an actuator whose
 /// dead time, lag and slew are all three off.
 const STRAYED_PART: f64 = 0.25;
@@ -135,7 +139,12 @@ impl CrossCheck {
     }
 
     /// The pre-tightener alone, while the drive is off.
-    pub(super) fn preload(&self, state: &mut CrossState, preload: Newtons, due: Newtons) -> Option<Fault> {
+    pub(super) fn preload(
+        &self,
+        state: &mut CrossState,
+        preload: Newtons,
+        due: Newtons,
+    ) -> Option<Fault> {
         let off = (preload - due).abs() > self.strayed;
         lasts(&mut state.strayed, off, STRAYED_TICKS).then_some(Fault::PretightenerRunaway)
     }
@@ -143,10 +152,12 @@ impl CrossCheck {
     /// Every check of a tick in which the drive is on.
     pub(super) fn step(&self, state: &mut CrossState, seen: &Compared) -> Option<Fault> {
         let bent = self.bends(state, seen);
-        let lags = lags(state, seen);
+        // A wheel of which nothing new is known may have gone anywhere.
+        let fresh = seen.read_at == seen.now;
+        let lags = fresh && lags(state, seen);
         let erratic = judge(&mut state.preload, seen.preload, JUMP_N);
         let unsound = judge(&mut state.compression, seen.compression, JUMP_MM);
-        let arm = arm_runs_ahead(state, seen);
+        let arm = fresh && arm_runs_ahead(state, seen);
         let effort = seen.effort.is_some_and(|effort| {
             let along = if seen.speed_ref < Q16::ZERO { -effort } else { effort };
             seen.speed_ref.abs() > TELLING && !(EFFORT.0..=EFFORT.1).contains(&along)
@@ -169,8 +180,8 @@ impl CrossCheck {
         }
     }
 
-    /// Whether the wheel's way bends away from the reference: the second difference of
-    /// encoder less reference over 2 x 6 ms.
+    /// Whether the wheel leaves its reference: first or second difference of encoder less
+    /// reference over 12 ms.
     fn bends(&self, state: &mut CrossState, seen: &Compared) -> bool {
         state.reference = state.reference.wrapping_add(per_tick(seen.speed_ref));
         // A tick without a new reading, or one lost: the times would not be equal.
@@ -192,7 +203,7 @@ impl CrossCheck {
             state.held += 1;
             return false;
         }
-        ((now - middle) - (middle - old)).abs() > self.bent
+        ((now - middle) - (middle - old)).abs() > self.bent || (now - old).abs() > OFF
     }
 }
 

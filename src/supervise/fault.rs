@@ -108,7 +108,9 @@ impl Fault {
             Self::DisplacementRange => "the tread displacement sensor reads outside its range",
             Self::AngleRange => "the arm angle lies outside the arm's reach",
             Self::PressureImplausible => "the load cell reads what no force can be",
-            Self::DisplacementImplausible => "the tread displacement sensor reads what no tread does",
+            Self::DisplacementImplausible => {
+                "the tread displacement sensor reads what no tread does"
+            }
             Self::Overpressure => "the preload exceeded its limit",
             Self::PreloadNotReached => "the preload did not reach its reference in time",
             Self::DriveStalled => "the wheel stands still although driven",

@@ -60,7 +60,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
 }
 
 /// Random deployments without a fault.
-fn clean(args: &Args, scenario: &crate::scenario::Scenario, count: u64) -> Result<Outcome, Failure> {
+fn clean(
+    args: &Args,
+    scenario: &crate::scenario::Scenario,
+    count: u64,
+) -> Result<Outcome, Failure> {
     let first = scenario.run.seed + 1;
     let seeds: Vec<u64> = (first..first + count).collect();
     let lines = {
@@ -83,8 +87,16 @@ fn clean(args: &Args, scenario: &crate::scenario::Scenario, count: u64) -> Resul
 /// The matrix as a table, with what failed below it.
 pub(super) fn human(outcome: &Result_) -> String {
     let head = [
-        "fault", "code", "found", "borne", "missed", "unsafe", "median\nms", "worst\nms",
-        "preload\nN", "motion\nmm",
+        "fault",
+        "code",
+        "found",
+        "borne",
+        "missed",
+        "unsafe",
+        "median\nms",
+        "worst\nms",
+        "preload\nN",
+        "motion\nmm",
     ];
     let mut text = format!(
         "{} faults at {} instants each: {} undetected, {} unsafe\n{}\n",

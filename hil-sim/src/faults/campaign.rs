@@ -51,13 +51,8 @@ pub enum StepFault {
 }
 
 /// All of them.
-const STEP_FAULTS: [StepFault; 5] = [
-    StepFault::Early,
-    StepFault::Late,
-    StepFault::Missing,
-    StepFault::Doubled,
-    StepFault::Higher,
-];
+const STEP_FAULTS: [StepFault; 5] =
+    [StepFault::Early, StepFault::Late, StepFault::Missing, StepFault::Doubled, StepFault::Higher];
 
 impl Case {
     /// Every fault of the matrix.
@@ -155,7 +150,7 @@ pub struct Instant {
     pub finding: Finding,
     /// Code of the fault, or of the limit.
     pub code: Option<u16>,
-    /// From the fault to its report, ms.
+    /// From when the fault first did something to its report, ms.
     pub latency_ms: Option<f64>,
     /// The same from when the plant first ran otherwise than without the fault, ms.
     pub after_sign_ms: Option<f64>,
@@ -311,7 +306,7 @@ fn watched(scenario: &Scenario, twin: &Twin) -> Result<Instant, RunError> {
         during,
         finding,
         code: report.map(|(_, code)| code),
-        latency_ms: since(at_s),
+        latency_ms: since(session.acts_s()),
         after_sign_ms: if moving { since(sign_s.or(report.map(|r| r.0))) } else { None },
         rest_ms: judge.fault.and_then(|(at_s, _)| Some(1e3 * (judge.rest_s? - at_s).max(0.0))),
         end: judge.end(),

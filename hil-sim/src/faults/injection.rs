@@ -146,7 +146,12 @@ impl Target {
     pub const fn moves(self) -> bool {
         matches!(
             self,
-            Self::Drive | Self::Pretightener | Self::Wheel | Self::Tread | Self::Spring | Self::Load
+            Self::Drive
+                | Self::Pretightener
+                | Self::Wheel
+                | Self::Tread
+                | Self::Spring
+                | Self::Load
         )
     }
 }

@@ -6,6 +6,7 @@ use interstage::log::Event;
 use interstage::supervise::{Direction, Mode};
 use serde::Serialize;
 
+use super::Target;
 use crate::plant::rig::Truth;
 use crate::scenario::Scenario;
 
@@ -16,9 +17,12 @@ const TICK_S: f64 = 1e-3;
 pub const PRELOAD_PART: f64 = 1.25;
 /// Way that the wheel may go uncommanded, mm: all ways added, until it rests.
 pub const MOTION_MM: f64 = 1.0;
-/// Part of its reference beyond which motion is uncommanded, and a constant, mm/s: what
-/// tolerances, creep and the speed loop need.
-const BEYOND: (f64, f64) = (1.25, 3.0);
+/// Way that a wheel may slide that has lost half its grip, mm: the run over a corner, which no
+/// bridge can hold it on.
+pub const SLIDE_MM: f64 = 14.0;
+/// Part of its reference beyond which motion is uncommanded, and a constant, mm/s: half as
+/// fast again as asked is a wrong speed, but the one commanded.
+const BEYOND: (f64, f64) = (1.6, 3.0);
 /// How far from the end of travel a run that says it arrived may stand, mm.
 pub const POSITION_MM: f64 = 1.0;
 /// Gap that a run may have which reports nothing, parts of the reference gap.
@@ -60,12 +64,19 @@ pub struct Judge {
     /// When both bridges were off and nothing moved, for good so far, s.
     pub rest_s: Option<f64>,
     mode: Mode,
+    /// Way that it may go uncommanded, mm.
+    most_mm: f64,
+    /// Commands came that nobody foresaw: any rest is a right end.
+    commanded: bool,
 }
 
 impl Judge {
     /// Before the first tick of a run.
     #[must_use]
     pub fn new(scenario: &Scenario, truth: &Truth) -> Self {
+        let target = scenario.run.faults.first().map(|fault| fault.target);
+        let slips = target == Some(Target::Wheel);
+        let commanded = target == Some(Target::Commands);
         Self {
             limit_n: scenario.rig.preload.limit_n,
             ends_mm: (0.0, scenario.rig.rig.travel_mm),
@@ -78,6 +89,8 @@ impl Judge {
             limits: Vec::new(),
             rest_s: None,
             mode: Mode::Boot,
+            most_mm: if slips { SLIDE_MM } else { MOTION_MM },
+            commanded,
         }
     }
 
@@ -139,8 +152,9 @@ impl Judge {
         if self.peak_preload_n > most {
             harms.push(format!("preload {:.1} N, at most {most:.1}", self.peak_preload_n));
         }
-        if self.motion_mm > MOTION_MM {
-            harms.push(format!("{:.2} mm uncommanded, at most {MOTION_MM}", self.motion_mm));
+        if self.motion_mm > self.most_mm {
+            let (way, most) = (self.motion_mm, self.most_mm);
+            harms.push(format!("{way:.2} mm uncommanded, at most {most}"));
         }
         if self.off_mm > POSITION_MM {
             harms.push(format!("{:.1} mm from the end it says it reached", self.off_mm));
@@ -157,7 +171,7 @@ impl Judge {
     #[must_use]
     pub fn finding(&self, known: &[u16], gap_part: f64, crossed: bool) -> Finding {
         let ended = match self.mode {
-            Mode::Complete(_) => crossed,
+            Mode::Complete(_) => crossed || self.commanded,
             _ => self.mode.is_at_rest(),
         };
         if self.fault.is_some() {
@@ -224,8 +238,8 @@ mod tests {
 
     #[test]
     fn motion_is_uncommanded_beyond_its_reference_against_it_and_at_rest() {
-        assert!(judged(RUN, 8.0, 12.9, 40.0, 1000).motion_mm < 1e-9);
-        assert!((judged(RUN, 8.0, 23.0, 40.0, 100).motion_mm - 1.0).abs() < 0.01);
+        assert!(judged(RUN, 8.0, 15.7, 40.0, 1000).motion_mm < 1e-9);
+        assert!((judged(RUN, 8.0, 25.8, 40.0, 100).motion_mm - 1.0).abs() < 0.01);
         assert!((judged(RUN, 8.0, -8.0, 40.0, 100).motion_mm - 0.5).abs() < 0.01);
         let hold = Mode::FaultHold(Fault::DriveStalled);
         assert!((judged(hold, 0.0, 1.0, 40.0, 100).motion_mm - 0.1).abs() < 1e-9);

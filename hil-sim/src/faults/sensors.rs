@@ -91,9 +91,7 @@ impl Lie {
         let Some(truth) = truth else { return };
         let silent = match self.kind {
             Kind::Off => true,
-            Kind::Intermittent => {
-                since_s % PERIOD_S < self.magnitude * PERIOD_S
-            }
+            Kind::Intermittent => since_s % PERIOD_S < self.magnitude * PERIOD_S,
             _ => false,
         };
         if silent {
@@ -109,7 +107,9 @@ impl Lie {
         let told = match self.kind {
             Kind::Stuck => first,
             // The counter has no zero of its own: it goes wrong from where it stood.
-            Kind::Gain if self.target == Target::Encoder => first + (truth - first) * self.magnitude,
+            Kind::Gain if self.target == Target::Encoder => {
+                first + (truth - first) * self.magnitude
+            }
             Kind::Gain => self.zero + (truth - self.zero) * self.magnitude,
             Kind::Offset => truth + self.magnitude,
             Kind::Slow => {

@@ -15,6 +15,8 @@ use crate::scenario::{Direction, Scenario};
 
 /// Control period, s.
 const TICK_S: f64 = 1e-3;
+/// Difference of duty that is one.
+const ACTS: f64 = 0.02;
 /// Half of the torn sector, rad.
 const TORN_RAD: f64 = 0.35;
 /// Way within which a corner that carries again is the same one, mm.
@@ -39,6 +41,8 @@ struct Active {
     /// When it came, s.
     since_s: Option<f64>,
     over: bool,
+    /// When it first did something, s.
+    acts_s: Option<f64>,
     lie: Option<Lie>,
     /// Duty of an actuator when the fault came.
     kept: Option<f64>,
@@ -58,6 +62,7 @@ impl Tamper {
             injection: *injection,
             since_s: None,
             over: false,
+            acts_s: None,
             lie: injection.target.is_sensor().then(|| {
                 let (target, kind) = (injection.target, injection.kind);
                 Lie::new(target, kind, injection.magnitude(), &scenario.rig.sense, turn_mm)
@@ -80,6 +85,17 @@ impl Tamper {
     #[must_use]
     pub fn struck_s(&self) -> Option<f64> {
         self.faults.iter().filter_map(|fault| fault.since_s).min_by(f64::total_cmp)
+    }
+
+    /// When it first made an actuator take another duty than it was asked for, s since boot;
+    /// for all other faults, when it came.
+    #[must_use]
+    pub fn acts_s(&self) -> Option<f64> {
+        let acts = |fault: &Active| match fault.injection.target {
+            Target::Drive | Target::Pretightener => fault.acts_s,
+            _ => fault.since_s,
+        };
+        self.faults.iter().filter_map(acts).min_by(f64::total_cmp)
     }
 
     /// A tick begins: faults come and go.
@@ -154,13 +170,18 @@ impl Tamper {
     /// The bridges as the plant gets them.
     #[must_use]
     pub fn drives(&mut self, asked: Drives) -> Drives {
-        let mut drives = asked;
+        let (mut drives, t_s) = (asked, self.t_s);
         for fault in &mut self.faults {
             let active = fault.since_s.is_some() && !fault.over;
             match fault.injection.target {
                 Target::Drive => fault.turn(active, &mut drives.drive, drives.drive_on),
                 Target::Pretightener => fault.turn(active, &mut drives.preload, drives.preload_on),
                 _ => {}
+            }
+            let other =
+                (drives.drive - asked.drive).abs().max((drives.preload - asked.preload).abs());
+            if other > ACTS {
+                fault.acts_s.get_or_insert(t_s);
             }
         }
         drives

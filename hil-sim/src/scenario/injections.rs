@@ -34,7 +34,8 @@ pub(super) fn checked(origin: &Origin, at: &str, value: &Value) -> Result<Value,
             None => return Err(wrong(name, "nothing".to_owned(), expected())),
         }
     }
-    for (name, value) in given.iter().filter(|(name, _)| !["target", "kind"].contains(&name.as_str()))
+    for (name, value) in
+        given.iter().filter(|(name, _)| !["target", "kind"].contains(&name.as_str()))
     {
         if !MAY.contains(&name.as_str()) {
             return Err(ScenarioError::UnknownKey {
@@ -47,7 +48,8 @@ pub(super) fn checked(origin: &Origin, at: &str, value: &Value) -> Result<Value,
         let value = checked_value(origin, &format!("{at}.{name}"), kind, value)?;
         found.insert(name.clone(), value);
     }
-    let whens: Vec<&str> = MAY.into_iter().take(3).filter(|name| given.contains_key(*name)).collect();
+    let whens: Vec<&str> =
+        MAY.into_iter().take(3).filter(|name| given.contains_key(*name)).collect();
     match whens.as_slice() {
         [_] => Ok(Value::Table(found)),
         [] => Err(wrong("at_s", "nothing".to_owned(), WHEN.to_owned())),

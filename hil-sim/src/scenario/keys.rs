@@ -69,7 +69,8 @@ impl Kind {
                 "a list such as [{ kind = \"late\", step = 2, offset_mm = 1.0 }]".to_owned()
             }
             Self::Faults => {
-                "a list such as [{ target = \"load-cell\", kind = \"stuck\", at_s = 2.0 }]".to_owned()
+                "a list such as [{ target = \"load-cell\", kind = \"stuck\", at_s = 2.0 }]"
+                    .to_owned()
             }
         }
     }

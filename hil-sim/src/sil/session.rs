@@ -11,9 +11,9 @@ use interstage::units::Tick;
 use super::stream::Stream;
 use super::trace::Trace;
 use super::{Options, RunError, TICK_S};
+use crate::faults::Tamper;
 use crate::plant::draw::PlantParameters;
 use crate::plant::rig::{Drives, VirtualRig};
-use crate::faults::Tamper;
 use crate::plant::sensors::{Codes, Sensed, Sensors};
 use crate::record::Recording;
 use crate::scenario::Scenario;
@@ -186,6 +186,12 @@ impl Session {
         if let Some(stream) = &mut self.stream {
             stream.keep(&input, output, read);
         }
+    }
+
+    /// When it first did something, see [`Tamper::acts_s`], s since boot.
+    #[must_use]
+    pub fn acts_s(&self) -> Option<f64> {
+        self.tamper.as_ref().and_then(Tamper::acts_s)
     }
 
     /// When the first of the scenario's faults came, s since boot.

@@ -37,6 +37,8 @@ impl Operator {
 
     /// Whether it is over: at rest, and nobody wants it otherwise.
     pub(super) fn over(&self, mode: Mode) -> bool {
-        self.started && mode.is_at_rest() && (mode != Mode::Complete(Direction::Deploy) || self.turned)
+        self.started
+            && mode.is_at_rest()
+            && (mode != Mode::Complete(Direction::Deploy) || self.turned)
     }
 }

@@ -7,8 +7,8 @@ use interstage::supervise::{Direction, Leg, Mode};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-use crate::plant::rig::Truth;
 use super::operator::Operator;
+use crate::plant::rig::Truth;
 use crate::scenario::Scenario;
 use crate::sil::{Options, RunError, Session};
 
