@@ -35,8 +35,8 @@ const ARM_TICKS: u8 = 32;
 /// Way that the arm may move beyond the wheel's within them, mm; noise and the slope of a
 /// corner, at most 1, make 0.08.
 const ARM_BEYOND: Millimetres = q16(250_000);
-/// Least speed at which duty tells speed, mm/s.
-const TELLING: MillimetresPerSecond = q16(10_000_000);
+/// Least speed at which duty is compared with speed, mm/s: slower than any crossing.
+const TELLING: MillimetresPerSecond = q16(1_000_000);
 /// Duty beyond the feed-forward that cruising takes, least and most: gearbox friction and
 /// rolling resistance make 0.02 to 0.07, twice the top load 0.05 more, a motor that is off
 /// by 5 % 0.03 either way at cruise speed.
@@ -250,14 +250,18 @@ fn lasts(count: &mut u8, condition: bool, enough: u8) -> bool {
 }
 
 impl CrossState {
-    /// The drive is switched on: from here on.
+    /// The drive is switched on: from here on. The wheel has stood until now.
     pub(super) fn begin(&mut self, seen: &Compared) {
-        let strayed = self.strayed;
-        *self = Self { strayed, progress: (seen.travel, Travel::ZERO), ..Self::default() };
+        *self = Self {
+            past: [Q16::narrow(seen.travel); KEPT],
+            held: 2 * SPAN as u8,
+            at: seen.now.wrapping_sub(1),
+            progress: (seen.travel, Travel::ZERO),
+            strayed: self.strayed,
+            ..Self::default()
+        };
         self.preload.value = seen.preload;
         self.compression.value = seen.compression;
-        // The way so far is no lag of the encoder.
-        self.reference = Travel::ZERO;
     }
 }
 
