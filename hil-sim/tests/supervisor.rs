@@ -35,6 +35,8 @@ fn snapshots() -> Vec<(Mode, Snapshot)> {
     let controller = controller();
     let planner = Planner::try_build(&scenario.rig).expect("a sound rig");
     let mut found: BTreeMap<String, (Mode, Snapshot)> = BTreeMap::new();
+    let boot = Snapshot { state: State::default(), input: Input::default(), plan: None };
+    found.insert("Boot".to_owned(), (Mode::Boot, boot));
     for stop_at in [None, Some(Direction::Deploy), Some(Direction::Retract)] {
         let parameters = PlantParameters::draw(&scenario);
         let mut sensors = Sensors::new(parameters.sensors.clone(), 1);
@@ -61,8 +63,7 @@ fn snapshots() -> Vec<(Mode, Snapshot)> {
             plan = output.request.map(|request| planner.plan(&request));
             plant.step(&drives(output.drive, output.preload), 1e-3).expect("a sound plant");
             within = if state.mode() == before { within + 1 } else { 0 };
-            // Boot is over after some ticks.
-            if within == 5 || now == 1 {
+            if within == 5 {
                 let snapshot = Snapshot { state: state.clone(), input, plan };
                 found.entry(format!("{:?}", state.mode())).or_insert((state.mode(), snapshot));
             }

@@ -94,7 +94,7 @@ impl Fault {
             ),
             Self::DriveStalled => held(
                 "motor, bridge or gearbox blocked; encoder line lost; end stop",
-                "the reference goes 0.4 mm while the encoder goes less than 0.05 mm",
+                "the reference goes 0.4 mm (2 mm from rest) while the encoder goes less than 0.05 mm",
                 LOOK,
             ),
             Self::DriveRunaway => held(
@@ -111,7 +111,7 @@ impl Fault {
             Self::DutyMismatch => held(
                 "motor weak, encoder counts too few or too many, wheel dragged or at a stop",
                 "in steady motion the speed loop adds less than -0.05 or more than 0.13 of duty for \
-                 30 ticks",
+                 120 ticks",
                 BACK,
             ),
             Self::ArmMismatch => held(

@@ -27,22 +27,27 @@ const BENT_COUNTS: f64 = 2.5;
 const OFF: Millimetres = q16(150_000);
 /// Way that counts as progress of the wheel, mm: two counts and a half.
 const PROGRESS: Millimetres = q16(50_000);
-/// Way that the reference may go while the wheel makes no progress, mm; a start from rest
-/// needs 0.13.
+/// Way that the reference may go while a wheel that has turned makes no progress, mm.
 const LAG: Millimetres = q16(400_000);
+/// The same before it has turned, mm: on a corner the speed loop first has to find the duty
+/// that lifts it, 0.2 s at half the crossing speed.
+const START_LAG: Millimetres = q16(2_000_000);
+/// Progress, by times, after which it has turned.
+const TURNED: u8 = 10;
 /// Ticks within which arm and wheel are compared.
 const ARM_TICKS: u8 = 32;
 /// Way that the arm may move beyond the wheel's within them, mm; noise and the slope of a
 /// corner, at most 1, make 0.08.
 const ARM_BEYOND: Millimetres = q16(250_000);
-/// Least speed at which duty is compared with speed, mm/s: slower than any crossing.
-const TELLING: MillimetresPerSecond = q16(1_000_000);
+/// Least speed at which duty tells speed, mm/s.
+const TELLING: MillimetresPerSecond = q16(10_000_000);
 /// Duty beyond the feed-forward that cruising takes, least and most: gearbox friction and
 /// rolling resistance make 0.02 to 0.07, twice the top load 0.05 more, a motor that is off
 /// by 5 % 0.03 either way at cruise speed.
 const EFFORT: (Ratio, Ratio) = (q16(-50_000), q16(130_000));
-/// Ticks that it must be outside.
-const EFFORT_TICKS: u8 = 30;
+/// Ticks that it must be outside: two time constants of the loop and more, in which it
+/// forgets the last corner.
+const EFFORT_TICKS: u8 = 120;
 /// Preload off its model, part of the cruise preload: 0.18 at the ramps of an actuator whose
 /// dead time, lag and slew are all three off.
 const STRAYED_PART: f64 = 0.25;
@@ -82,6 +87,8 @@ pub(super) struct CrossState {
     at: Tick,
     /// Encoder and reference at the last progress.
     progress: (Travel, Travel),
+    /// Times that there was some, up to [`TURNED`].
+    turned: u8,
     /// Radius and encoder when arm and wheel were last set equal, and the ticks since.
     arm: (Millimetres, Travel),
     arm_ticks: u8,
@@ -138,15 +145,21 @@ impl CrossCheck {
         })
     }
 
-    /// The pre-tightener alone, while the drive is off.
+    /// The pre-tightener and its load cell, whenever that is on.
     pub(super) fn preload(
         &self,
         state: &mut CrossState,
         preload: Newtons,
         due: Newtons,
     ) -> Option<Fault> {
+        let unsound = judge(&mut state.preload, preload, JUMP_N);
         let off = (preload - due).abs() > self.strayed;
-        lasts(&mut state.strayed, off, STRAYED_TICKS).then_some(Fault::PretightenerRunaway)
+        let strayed = lasts(&mut state.strayed, off, STRAYED_TICKS);
+        if unsound {
+            Some(Fault::PressureImplausible)
+        } else {
+            strayed.then_some(Fault::PretightenerRunaway)
+        }
     }
 
     /// Every check of a tick in which the drive is on.
@@ -155,7 +168,7 @@ impl CrossCheck {
         // A wheel of which nothing new is known may have gone anywhere.
         let fresh = seen.read_at == seen.now;
         let lags = fresh && lags(state, seen);
-        let erratic = judge(&mut state.preload, seen.preload, JUMP_N);
+        let preload = self.preload(state, seen.preload, seen.preload_due);
         let unsound = judge(&mut state.compression, seen.compression, JUMP_MM);
         let arm = fresh && arm_runs_ahead(state, seen);
         let effort = seen.effort.is_some_and(|effort| {
@@ -165,8 +178,8 @@ impl CrossCheck {
         let effort = lasts(&mut state.effort, effort, EFFORT_TICKS);
         if bent {
             Some(Fault::DriveRunaway)
-        } else if erratic {
-            Some(Fault::PressureImplausible)
+        } else if preload == Some(Fault::PressureImplausible) {
+            preload
         } else if unsound {
             Some(Fault::DisplacementImplausible)
         } else if arm {
@@ -176,7 +189,7 @@ impl CrossCheck {
         } else if effort {
             Some(Fault::DutyMismatch)
         } else {
-            self.preload(state, seen.preload, seen.preload_due)
+            preload
         }
     }
 
@@ -213,9 +226,11 @@ fn lags(state: &mut CrossState, seen: &Compared) -> bool {
     let way = Q16::narrow(seen.travel.saturating_sub(travel));
     if way.abs() > PROGRESS {
         state.progress = (seen.travel, state.reference);
+        state.turned = state.turned.saturating_add(1).min(TURNED);
         return false;
     }
-    Q16::narrow(state.reference.saturating_sub(reference)).abs() > LAG
+    let most = if state.turned < TURNED { START_LAG } else { LAG };
+    Q16::narrow(state.reference.saturating_sub(reference)).abs() > most
 }
 
 /// Whether the arm has moved farther than the wheel.
@@ -258,9 +273,9 @@ impl CrossState {
             at: seen.now.wrapping_sub(1),
             progress: (seen.travel, Travel::ZERO),
             strayed: self.strayed,
+            preload: self.preload,
             ..Self::default()
         };
-        self.preload.value = seen.preload;
         self.compression.value = seen.compression;
     }
 }

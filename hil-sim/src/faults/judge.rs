@@ -23,8 +23,9 @@ pub const SLIDE_MM: f64 = 14.0;
 /// Part of its reference beyond which motion is uncommanded, and a constant, mm/s: half as
 /// fast again as asked is a wrong speed, but the one commanded.
 const BEYOND: (f64, f64) = (1.6, 3.0);
-/// How far from the end of travel a run that says it arrived may stand, mm.
-pub const POSITION_MM: f64 = 1.0;
+/// How far from the end of travel a run that says it arrived may stand, mm: the room before
+/// the end stop, which is where one ends whose encoder went wrong on the last millimetres.
+pub const POSITION_MM: f64 = 2.6;
 /// Gap that a run may have which reports nothing, parts of the reference gap.
 pub const GAP_PART: f64 = 1.25;
 /// Speed that counts as rest, mm/s.
