@@ -22,11 +22,13 @@ mod firmware {
     use embassy_stm32::{Peri, Peripherals, pac};
     use interstage::control::Controller;
     use interstage::hal::{Board, Parts};
+    use interstage::log::{Identity, Scribe};
     use interstage::model::Planner;
     use interstage::params::service::Service;
     use interstage::tasks::{self, Exchange};
     use panic_probe as _;
     use rtt_target::DownChannel;
+    use static_cell::ConstStaticCell;
 
     use crate::board::rtt::Frames;
     use crate::board::{self, config, guard, light, rtt};
@@ -39,6 +41,7 @@ mod firmware {
     static EXCHANGE: Exchange = Exchange::new();
     static LOAD_CELL: Ring = Ring::new();
     static TREAD: Ring = Ring::new();
+    static SCRIBE: ConstStaticCell<Scribe> = ConstStaticCell::new(Scribe::new(Identity::NOBODY));
 
     /// Runs the control tick and the sensors, above everything that may take long.
     ///
@@ -167,6 +170,6 @@ mod firmware {
 
     #[embassy_executor::task]
     async fn journal(journal: Lines, light: Lamp) -> ! {
-        tasks::journal(journal, light, &EXCHANGE).await
+        tasks::journal(journal, light, SCRIBE.take(), &EXCHANGE).await
     }
 }
