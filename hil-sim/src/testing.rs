@@ -199,7 +199,7 @@ fn documentation(root: &Path) -> Result<Ended> {
 pub fn budget(profile: Profile) -> Budget {
     match profile {
         Profile::Release => Budget::default(),
-        Profile::Debug => Budget { flash: 512 * 1024, ram: 128 * 1024 },
+        Profile::Debug | Profile::Loop => Budget { flash: 512 * 1024, ram: 128 * 1024 },
     }
 }
 

@@ -187,7 +187,7 @@ impl Session {
             Mode::Complete(way) => Some(way),
             _ => None,
         };
-        let mut recording = self.trace.finish(&self.scenario, &self.plant, arrived, wall_s);
+        let mut recording = self.trace.finish("sil", &self.scenario, &self.plant, arrived, wall_s);
         recording.stream = self.stream.map(Stream::finish).unwrap_or_default();
         recording
     }
