@@ -4,6 +4,7 @@
 //! The loop is closed in lockstep, so that nothing depends on how fast the port is: a run
 //! gives the same trace as in software, bit for bit, and takes as long as it takes.
 
+mod image;
 mod line;
 mod run;
 
@@ -13,6 +14,7 @@ use crate::plant::limits::Refusal;
 use crate::plant::rig::PlantError;
 use crate::probe::PortError;
 
+pub use image::Image;
 pub use line::HostLine;
 pub use run::{Asked, run};
 

@@ -6,16 +6,18 @@
 use std::sync::OnceLock;
 use std::time::Duration;
 
-use hil_sim::board::log::Strings;
 use hil_sim::firmware::{self, Profile};
-use hil_sim::hil::{self, Asked, HilError, HostLine};
+use hil_sim::hil::{self, Asked, HilError, HostLine, Image};
 use hil_sim::log::{Row, Run};
+use hil_sim::plant::draw::PlantParameters;
+use hil_sim::plant::rig::VirtualRig;
+use hil_sim::plant::sensors::Sensors;
 use hil_sim::probe::{EmulatedPort, Port, PortError};
 use hil_sim::record::Recording;
 use hil_sim::replay::replay;
 use hil_sim::scenario::Scenario;
 use hil_sim::sil;
-use interstage::hil::{FIRST, Given};
+use interstage::hil::{FIRST, Given, Taken};
 use interstage::rig::Rig;
 use interstage::supervise::{Command, Fault, Mode};
 
@@ -113,61 +115,101 @@ impl Port for Slow {
 
 #[test]
 fn a_slow_port_stretches_time_and_changes_nothing() {
-    let scenario = scenario(&["run.seed=5"]);
     let (mut slow, mut fast) = (Slow { port: board(), milliseconds: 3 }, board());
+    let (mut slow_rig, mut fast_rig) = (Rigged::new(5), Rigged::new(5));
     let (mut slow_line, mut fast_line) =
         (HostLine::begin(&mut slow).expect("ready"), HostLine::begin(&mut fast).expect("ready"));
-    let plant = hil_sim::plant::rig::VirtualRig::new(
-        hil_sim::plant::draw::PlantParameters::draw(&scenario),
-        0.0,
-        0.0,
-        1e-3,
-    );
-    let parameters = plant.parameters().sensors.clone();
-    let mut sensors = hil_sim::plant::sensors::Sensors::new(parameters, 5);
-    for tick in FIRST..FIRST + 600 {
-        let codes = sil::read(&mut sensors, &plant);
-        let given = Given::codes(codes.wheel, codes.load_cell, codes.tread, codes.arm);
-        let given = given.with((tick == FIRST + 400).then_some(Command::Start));
-        let (slow, fast) = (
-            slow_line.tick(tick, given).expect("goes"),
-            fast_line.tick(tick, given).expect("goes"),
-        );
+    let (mut slow_log, mut fast_log) = (Vec::new(), Vec::new());
+    for tick in FIRST..FIRST + 800 {
+        let command = (tick == FIRST + 400).then_some(Command::Start);
+        let slow = slow_rig.tick(&mut slow_line, tick, command);
+        let fast = fast_rig.tick(&mut fast_line, tick, command);
         assert_eq!(slow, fast, "tick {tick}");
+        slow_log.extend(slow_line.port().up(1).expect("reads"));
+        fast_log.extend(fast_line.port().up(1).expect("reads"));
     }
-    let (slow, fast) =
-        (slow_line.port().up(1).expect("reads"), fast_line.port().up(1).expect("reads"));
-    assert!(!fast.is_empty() && slow == fast, "{} and {} bytes", slow.len(), fast.len());
+    assert!(fast_log.len() > 10_000 && slow_log == fast_log, "{} bytes", fast_log.len());
+}
+
+/// What the bridges were told in every tick of a deployment, with the log's channel read
+/// in the ticks that `reads` names, and what was read.
+fn told(reads: impl Fn(u32) -> bool) -> (Vec<Taken>, Vec<u8>) {
+    let (mut port, mut rig) = (board(), Rigged::new(3));
+    let mut line = HostLine::begin(&mut port).expect("ready");
+    let (mut start, mut mode) = (Some(Command::Start), Mode::Boot);
+    let (mut all, mut log) = (Vec::new(), Vec::new());
+    for tick in FIRST..FIRST + 12_000 {
+        let command = if mode == Mode::Idle { start.take() } else { None };
+        let taken = rig.tick(&mut line, tick, command);
+        mode = taken.mode().expect("a mode");
+        all.push(taken);
+        if reads(tick) {
+            log.extend(line.port().up(1).expect("reads"));
+        }
+        if matches!(mode, Mode::Complete(_)) {
+            return (all, log);
+        }
+    }
+    panic!("it does not arrive: {mode:?}");
+}
+
+#[test]
+fn a_reader_that_stalls_or_is_not_there_changes_no_bit_of_the_control_trace() {
+    let (read, log) = told(|_| true);
+    let run = Run::of_stream(&log);
+    assert!(run.is_whole() && run.rows.len() > 6000, "{:?}", run.marks);
+    let (absent, nothing) = told(|_| false);
+    assert!(nothing.is_empty() && absent == read, "absent");
+    let (stalled, part) = told(|tick| tick % 1000 < 300);
+    assert!(stalled == read, "stalled");
+    let part = Run::of_stream(&part);
+    assert!(part.tally.lost_frames > 100, "{:?}", part.tally);
+    // What was lost is marked, and what was read is true.
+    assert!(replay(&part, &Rig::prototype()).expect("a sound rig").difference.is_none());
+    let lost = part.tally.lost_ticks as usize + part.rows.len();
+    assert!(lost.abs_diff(run.rows.len()) < 110, "{lost} of {}", run.rows.len());
+}
+
+/// A plant with its sensors.
+struct Rigged {
+    plant: VirtualRig,
+    sensors: Sensors,
+    given: Given,
+}
+
+impl Rigged {
+    fn new(seed: u64) -> Self {
+        let parameters = PlantParameters::draw(&scenario(&[&format!("run.seed={seed}")]));
+        let sensors = Sensors::new(parameters.sensors.clone(), seed);
+        let plant = VirtualRig::new(parameters, 0.0, 0.0, 1e-3);
+        Self { plant, sensors, given: Given::default() }
+    }
+
+    /// A millisecond of both.
+    fn tick(&mut self, line: &mut HostLine<'_>, tick: u32, command: Option<Command>) -> Taken {
+        let codes = sil::read(&mut self.sensors, &self.plant);
+        self.given = Given::codes(codes.wheel, codes.load_cell, codes.tread, codes.arm);
+        let taken = line.tick(tick, self.given.with(command)).expect("goes");
+        let (drive, preload) = taken.commands();
+        self.plant.step(&sil::drives(drive, preload), 1e-3).expect("moves");
+        taken
+    }
 }
 
 /// Runs a deployment up to this tick, and gives the board and its codes there.
 fn under_way(port: &mut EmulatedPort, ticks: u32) -> Given {
-    let scenario = scenario(&["run.seed=3"]);
-    let mut plant = hil_sim::plant::rig::VirtualRig::new(
-        hil_sim::plant::draw::PlantParameters::draw(&scenario),
-        0.0,
-        0.0,
-        1e-3,
-    );
-    let parameters = plant.parameters().sensors.clone();
-    let mut sensors = hil_sim::plant::sensors::Sensors::new(parameters, 3);
+    let mut rig = Rigged::new(3);
     let mut line = HostLine::begin(port).expect("ready");
     let (mut start, mut mode) = (Some(Command::Start), Mode::Boot);
-    let mut given = Given::default();
     for tick in FIRST..FIRST + ticks {
-        let codes = sil::read(&mut sensors, &plant);
-        given = Given::codes(codes.wheel, codes.load_cell, codes.tread, codes.arm);
         let command = if mode == Mode::Idle { start.take() } else { None };
-        let taken = line.tick(tick, given.with(command)).expect("goes");
-        mode = taken.mode().expect("a mode");
-        let (drive, preload) = taken.commands();
-        plant.step(&sil::drives(drive, preload), 1e-3).expect("moves");
+        mode = rig.tick(&mut line, tick, command).mode().expect("a mode");
         if tick.is_multiple_of(32) {
             line.port().up(1).expect("reads");
         }
     }
     assert!(matches!(mode, Mode::Run(..)), "{mode:?}");
-    given
+    rig.given
 }
 
 #[test]
@@ -216,15 +258,15 @@ fn a_host_that_falls_silent_leaves_the_bridges_off() {
 #[test]
 fn a_question_asked_twice_is_answered_twice_and_done_once() {
     let mut port = board();
-    let given = under_way(&mut port, 2500);
+    let given = under_way(&mut port, 3000);
     let mut line = HostLine::begin_at(&mut port);
-    let last = FIRST + 2499;
+    let last = FIRST + 2999;
     let (first, again) =
         (line.tick(last, given).expect("told again"), line.tick(last, given).expect("and again"));
     assert_eq!(first, again);
-    assert_eq!(line.stands().expect("stands"), (FIRST + 2500, false));
-    let error = line.tick(FIRST + 2700, given).unwrap_err();
-    assert!(matches!(error, HilError::Apart { board, .. } if board == FIRST + 2500), "{error}");
+    assert_eq!(line.stands().expect("stands"), (FIRST + 3000, false));
+    let error = line.tick(FIRST + 3200, given).unwrap_err();
+    assert!(matches!(error, HilError::Apart { board, .. } if board == FIRST + 3000), "{error}");
 }
 
 #[test]
@@ -238,5 +280,14 @@ fn other_firmware_and_other_parameters_are_told_from_a_board_in_the_loop() {
     let mut port = EmulatedPort::new(&ordinary).expect("an image");
     let error = looped(&mut port, &scenario(&[])).unwrap_err();
     assert!(error.to_string().contains("feature `hil`"), "{error}");
-    assert!(Strings::of(elf()).is_ok());
+}
+
+#[test]
+fn an_image_is_known_by_its_hash() {
+    let ordinary = firmware::build(Profile::Release).expect("the firmware builds");
+    let ordinary = Image::of(&std::fs::read(ordinary).expect("readable")).expect("an image");
+    let looped = Image::of(elf()).expect("an image");
+    let mut port = board();
+    assert_eq!(looped.is_on(&mut port), Ok(true));
+    assert_eq!(ordinary.is_on(&mut port), Ok(false));
 }
