@@ -24,12 +24,14 @@ mod firmware {
     use embassy_stm32::{Peri, Peripherals, pac};
     use interstage::control::Controller;
     use interstage::hal::{Board, Parts};
+    use interstage::log::{Identity, Scribe};
     use interstage::model::Planner;
     use interstage::params::service::Service;
     use interstage::tasks::{self, Exchange};
     use panic_probe as _;
     #[cfg(not(feature = "hil"))]
     use rtt_target::DownChannel;
+    use static_cell::ConstStaticCell;
 
     #[cfg(feature = "hil")]
     use crate::board::hil::{self, split};
@@ -51,6 +53,7 @@ mod firmware {
     static LOAD_CELL: Ring = Ring::new();
     #[cfg(not(feature = "hil"))]
     static TREAD: Ring = Ring::new();
+    static SCRIBE: ConstStaticCell<Scribe> = ConstStaticCell::new(Scribe::new(Identity::NOBODY));
 
     /// Runs the control tick and the sensors, above everything that may take long.
     ///
@@ -215,6 +218,6 @@ mod firmware {
 
     #[embassy_executor::task]
     async fn journal(journal: Lines, light: Lamp) -> ! {
-        tasks::journal(journal, light, &EXCHANGE).await
+        tasks::journal(journal, light, SCRIBE.take(), &EXCHANGE).await
     }
 }
