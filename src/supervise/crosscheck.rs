@@ -66,7 +66,7 @@ const JUMP_COUNTS: u8 = 8;
 const ERRATIC: u8 = 60;
 
 /// Thresholds of a rig.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct CrossCheck {
     /// See [`BENT_COUNTS`], mm.
     bent: Millimetres,

@@ -23,7 +23,7 @@ const RUNAWAY_TICKS: u16 = 12;
 const PRELOAD_TICKS: u16 = 400;
 
 /// Bounds of a rig.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Monitor {
     overpressure: Newtons,
     /// Preload error that counts as short, N.
