@@ -67,7 +67,7 @@ fn snapshots() -> Vec<(Mode, Snapshot)> {
                 let snapshot = Snapshot { state: state.clone(), input, plan };
                 found.entry(format!("{:?}", state.mode())).or_insert((state.mode(), snapshot));
             }
-            let over = matches!(state.mode(), Mode::Complete(Direction::Retract))
+            let over = matches!(state.mode(), Mode::Complete(Direction::Retract)) && within > 5
                 || stop_at.is_some() && matches!(before, Mode::Stopping(_)) && within > 5;
             if over {
                 break;

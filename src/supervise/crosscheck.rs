@@ -198,9 +198,7 @@ impl CrossCheck {
     fn bends(&self, state: &mut CrossState, seen: &Compared) -> bool {
         state.reference = state.reference.wrapping_add(per_tick(seen.speed_ref));
         // A tick without a new reading, or one lost: the times would not be equal.
-        if seen.read_at != seen.now || seen.now.wrapping_sub(state.at) != 1 {
-            state.held = 0;
-        }
+        let missed = seen.read_at != seen.now || seen.now.wrapping_sub(state.at) != 1;
         state.at = seen.now;
         let now = Q16::narrow(seen.travel.wrapping_sub(state.reference));
         let back = |ticks: usize| {
@@ -212,8 +210,8 @@ impl CrossCheck {
             *place = now;
         }
         state.head = (state.head + 1) % KEPT as u8;
-        if usize::from(state.held) < 2 * SPAN {
-            state.held += 1;
+        if missed || usize::from(state.held) < 2 * SPAN {
+            state.held = if missed { 0 } else { state.held + 1 };
             return false;
         }
         ((now - middle) - (middle - old)).abs() > self.bent || (now - old).abs() > OFF
