@@ -280,4 +280,5 @@ impl CrossState {
 
 #[cfg(test)]
 #[path = "crosscheck_tests.rs"]
+#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests;

@@ -226,7 +226,7 @@ mod tests {
                 let load_cell = Some(Sample { code, at: tick });
                 let mut frame = SensorFrame { load_cell, ..SensorFrame::default() };
                 let t_s = f64::from(tick) * 1e-3;
-                let since_s = (tick >= 20).then(|| t_s - 0.020);
+                let since_s = (tick >= 20).then_some(t_s - 0.020);
                 lie.tell(&mut frame, t_s, since_s, &mut random);
                 let sample = frame.load_cell.expect("a sample");
                 if sample.at < tick {

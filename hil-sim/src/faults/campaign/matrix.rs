@@ -42,6 +42,8 @@ pub struct Line {
     pub latency_ms: Option<f64>,
     /// Median of the same, ms.
     pub latency_median_ms: Option<f64>,
+    /// The same of the instants outside of crossings, ms.
+    pub latency_off_corner_ms: Option<Spread>,
     /// The same from when the plant first ran otherwise than without the fault, ms.
     pub after_sign_ms: Option<Spread>,
     /// From the report to rest with both bridges off, ms.
@@ -97,6 +99,9 @@ impl Line {
             detected: count(Finding::Undetected) == 0,
             latency_ms: latency.map(|l| l.worst),
             latency_median_ms: latency.map(|l| l.median),
+            latency_off_corner_ms: Spread::of(
+                instants.iter().filter(|i| !crossing(i)).filter_map(|i| i.latency_ms),
+            ),
             after_sign_ms: Spread::of(instants.iter().filter_map(|i| i.after_sign_ms)),
             rest_ms: Spread::of(instants.iter().filter_map(|i| i.rest_ms)),
             rest_in_crossing_ms: Spread::of(
