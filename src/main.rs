@@ -5,6 +5,8 @@
 
 #[cfg(target_os = "none")]
 mod board;
+#[cfg(target_os = "none")]
+use firmware::EXCHANGE;
 
 /// The image is for the board alone; on a host this says where to go.
 #[cfg(not(target_os = "none"))]
@@ -22,21 +24,21 @@ mod firmware {
     use embassy_stm32::{Peri, Peripherals, pac};
     use interstage::control::Controller;
     use interstage::hal::{Board, Parts};
+    use interstage::log::{Entry, Event};
     use interstage::model::Planner;
     use interstage::params::service::Service;
     use interstage::tasks::{self, Exchange};
-    use panic_probe as _;
     use rtt_target::DownChannel;
 
     use crate::board::rtt::Frames;
-    use crate::board::{self, config, guard, light, rtt};
+    use crate::board::{self, blackbox, config, guard, light, rtt};
     use crate::board::{Analog, Angle, Bridge, Bridges, Button, Console, Guard, HostLine, Lamp};
     use crate::board::{Lines, Nucleo, Pages, Ring, Wheel};
 
     /// Any pin.
     type Pin = Peri<'static, AnyPin>;
 
-    static EXCHANGE: Exchange = Exchange::new();
+    pub(crate) static EXCHANGE: Exchange = Exchange::new();
     static LOAD_CELL: Ring = Ring::new();
     static TREAD: Ring = Ring::new();
 
@@ -63,7 +65,8 @@ mod firmware {
         let channels = rtt::init();
         let p = embassy_stm32::init(board::clocks());
         defmt::info!("interstage {=str}", env!("CARGO_PKG_VERSION"));
-        guard::report_restart();
+        let restart = blackbox::report();
+        EXCHANGE.log(Entry { at: 0, event: Event::Restart(restart) });
         guard::arm();
         let (console, line) = (channels.console, channels.line);
         let (mut parts, lamp, pages) = split(p, console, channels.telemetry);

@@ -15,6 +15,8 @@ pub mod identify;
 pub mod live;
 pub mod log;
 pub mod montecarlo;
+#[cfg(feature = "board")]
+pub mod panics;
 pub mod paper;
 pub mod params;
 pub mod plant;
@@ -24,6 +26,8 @@ pub mod record;
 pub mod reference;
 pub mod replay;
 pub mod report;
+#[cfg(feature = "board")]
+pub mod resets;
 pub mod scenario;
 pub mod sil;
 pub mod stress;

@@ -107,8 +107,7 @@ fn samples(lines: &[Line], scenario: &Scenario) -> Vec<(u32, Sample)> {
                 let whole = moved.round();
                 // Corrected: what the wheel did meanwhile, its speed tells.
                 let likely = line.speed_est_mm_s * TICK_S / count_mm;
-                let corrected =
-                    (moved - whole).abs() > CORRECTED || (moved - likely).abs() > LEAPT;
+                let corrected = (moved - whole).abs() > CORRECTED || (moved - likely).abs() > LEAPT;
                 let turned = if corrected { likely.round() } else { whole };
                 counts += turned;
             }
