@@ -54,6 +54,12 @@ impl Late {
         self.0 == 0
     }
 
+    /// The last alone, if there is one.
+    #[must_use]
+    pub(crate) fn last(self) -> Option<Self> {
+        Some(Self(1 << self.0.checked_ilog2()?))
+    }
+
     /// The bits.
     #[must_use]
     pub const fn bits(self) -> u16 {
@@ -448,7 +454,9 @@ mod tests {
         let names: std::collections::BTreeSet<_> =
             (0..16).map(|bit| Late::from_bits(1 << bit).name()).collect();
         assert_eq!(names.len(), 9, "{names:?}");
-        assert_eq!(Late::TICK.and(Late::station(1)).name(), "pressure");
+        let both = Late::TICK.and(Late::station(1));
+        assert_eq!((both.name(), both.last()), ("pressure", Some(Late::TICK)));
+        assert_eq!(Late::NOBODY.last(), None);
         assert_eq!(Late::STARVED.name(), "the control tick, kept from the processor");
     }
 }

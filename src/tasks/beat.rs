@@ -73,6 +73,11 @@ impl Pulse {
         self.turn.store(number, Ordering::Relaxed);
     }
 
+    /// A turn ends.
+    pub(super) fn end(&self) {
+        self.turn.store(0, Ordering::Relaxed);
+    }
+
     /// Whose turn it is.
     pub(super) fn turn(&self) -> Turn {
         match self.turn.load(Ordering::Relaxed) {

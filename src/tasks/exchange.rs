@@ -243,7 +243,9 @@ impl Exchange {
         }
         let ticked = self.pulse.ticked();
         let behind = self.older(ticked, PERIODS.into_iter().map(|period| period - 1));
-        if behind.is_nobody() { Late::STARVED } else { behind }
+        // The executor serves a line from its end: those before the one that keeps the
+        // others from their turns have had theirs.
+        behind.last().unwrap_or(Late::STARVED)
     }
 
     /// The stations, from the first on, that were last seen longer ago than they may.
@@ -262,8 +264,10 @@ impl Exchange {
         if let Some(seen) = self.check_ins.get(station.index()) {
             seen.store(now, Ordering::Relaxed);
         }
-        // Whose turn it is among the sensors, the pulse keeps.
-        if station.index() >= PERIODS.len() {
+        // Whose turn it is among the sensors, the pulse keeps; theirs end with this.
+        if station.index() < PERIODS.len() {
+            self.pulse.end();
+        } else {
             self.wake(station);
         }
     }
