@@ -24,11 +24,16 @@ mod firmware {
     use embassy_stm32::{Peri, Peripherals, pac};
     use interstage::control::Controller;
     use interstage::hal::{Board, Parts};
+<<<<<<< HEAD
     use interstage::log::{Entry, Event};
+=======
+    use interstage::log::{Identity, Scribe};
+>>>>>>> main
     use interstage::model::Planner;
     use interstage::params::service::Service;
     use interstage::tasks::{self, Exchange};
     use rtt_target::DownChannel;
+    use static_cell::ConstStaticCell;
 
     use crate::board::rtt::Frames;
     use crate::board::{self, blackbox, config, guard, light, rtt};
@@ -41,6 +46,7 @@ mod firmware {
     pub(crate) static EXCHANGE: Exchange = Exchange::new();
     static LOAD_CELL: Ring = Ring::new();
     static TREAD: Ring = Ring::new();
+    static SCRIBE: ConstStaticCell<Scribe> = ConstStaticCell::new(Scribe::new(Identity::NOBODY));
 
     /// Runs the control tick and the sensors, above everything that may take long.
     ///
@@ -170,6 +176,6 @@ mod firmware {
 
     #[embassy_executor::task]
     async fn journal(journal: Lines, light: Lamp) -> ! {
-        tasks::journal(journal, light, &EXCHANGE).await
+        tasks::journal(journal, light, SCRIBE.take(), &EXCHANGE).await
     }
 }

@@ -9,7 +9,7 @@ use common::{
 use interstage::blackbox::Late;
 use interstage::control::Controller;
 use interstage::hal::{Light, MotorCommand};
-use interstage::log::{Entry, Event};
+use interstage::log::{Entry, Event, Identity, Scribe};
 use interstage::model::Planner;
 use interstage::rig::Rig;
 use interstage::supervise::{Command, Direction, Fault, Mode};
@@ -86,7 +86,10 @@ impl Board {
         }
         if runs(Station::Journal) {
             let (journal, light) = (board.journal.clone(), board.light.clone());
-            bench.spawn(async { tasks::journal(journal, light, exchange).await });
+            bench.spawn(async {
+                let mut scribe = Scribe::new(Identity::NOBODY);
+                tasks::journal(journal, light, &mut scribe, exchange).await
+            });
         }
         board
     }

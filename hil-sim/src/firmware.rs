@@ -230,11 +230,10 @@ pub struct Budget {
 }
 
 impl Default for Budget {
-    /// Of flash a quarter: room for a second image and for what is still to come. Of RAM
-    /// 48 KiB, half of them a stack that only the decoding of the parameters at start uses;
-    /// 32 are aimed at.
+    /// Of flash a quarter: room for a second image and for what is still to come. Of RAM a
+    /// third.
     fn default() -> Self {
-        Self { flash: 128 * 1024, ram: 48 * 1024 }
+        Self { flash: 128 * 1024, ram: 32 * 1024 }
     }
 }
 

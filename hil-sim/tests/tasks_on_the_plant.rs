@@ -28,7 +28,7 @@ use interstage::hal::{
     AnalogInput, AngleBus, CommandSource, Indicator, Journal, Light, MotorCommand, Motors,
     Watchdog, WheelEncoder,
 };
-use interstage::log::{CrossingRecord, Entry, Event, Telemetry};
+use interstage::log::{CrossingRecord, Entry, Event, Identity, Scribe, Telemetry};
 use interstage::model::Planner;
 use interstage::sense::raw::{AdcCode, AngleFrame, BusFault, EncoderCount};
 use interstage::supervise::{Command, Fault, Mode};
@@ -211,7 +211,10 @@ impl Board {
             Box::pin(async { tasks::operator(button, exchange).await }),
             Box::pin(async { tasks::motors(motors, watchdog, controller, exchange).await }),
             Box::pin(async { tasks::model(planner, exchange).await }),
-            Box::pin(async { tasks::journal(journal, light, exchange).await }),
+            Box::pin(async {
+                let mut scribe = Scribe::new(Identity::NOBODY);
+                tasks::journal(journal, light, &mut scribe, exchange).await
+            }),
         ];
         if order == Order::TickFirst {
             self.tasks[..6].rotate_right(1);

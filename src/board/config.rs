@@ -31,11 +31,13 @@ pub(crate) fn build(pages: Pages) -> (Result<Constants, SetError>, Service<Pages
     (constants(set), Service::new(pages, PROTOTYPE, running))
 }
 
+#[inline(never)]
 fn constants(set: &[u8]) -> Result<Constants, SetError> {
     let set = ParameterSet::open(set)?;
-    let (controller, rest) = set.controller()?;
-    let controller = CONTROLLER.init(controller);
-    let planner = PLANNER.init(rest.planner()?);
+    let controller = CONTROLLER.init_with(Controller::default);
+    let rest = set.controller_into(controller)?;
+    let planner = PLANNER.init_with(Planner::default);
+    rest.planner_into(planner)?;
     announce(set.header());
     Ok((controller, planner, identity(set.header(), controller)))
 }

@@ -28,7 +28,7 @@ const FASTEST_CORRECTION: f64 = 3.0;
 const CORRECTION_PART: f64 = 0.3;
 
 /// The actuator as known.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct PreloadLoop {
     /// Change of the reference in a tick, N.
     step: Newtons,

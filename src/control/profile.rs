@@ -7,7 +7,7 @@ use crate::rig::{Rig, RigError};
 use crate::units::{MillimetresPerSecond, MillimetresPerSecond2, Q16, Travel, per_tick};
 
 /// Limits of the profile.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Profile {
     acceleration: MillimetresPerSecond2,
     /// Change of acceleration in a tick, mm/s^2.

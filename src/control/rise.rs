@@ -28,7 +28,7 @@ const BACK_PART: f64 = 0.3;
 /// `dy/dx = d / sqrt((R-c)^2 - d^2)`, while the tread recovers from its depth at
 /// the corner to that on the wall, as a triangle that ends half a patch behind the
 /// edge; from the first touch it runs in with the square of the way.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Rise {
     slope: Table<97>,
     /// Tangent of the contact's mean inclination: what the climb costs the motor, per

@@ -27,7 +27,7 @@ const ARRIVED_WITHIN: Millimetres = q16(50_000);
 const SEARCH: Millimetres = q16(6_000_000);
 
 /// Limits of a rig.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Schedule {
     tolerance: Millimetres,
     /// Distance to the face by which a step must have been felt, out and back, mm.

@@ -21,7 +21,7 @@ const FULL: Ratio = q16(1_000_000);
 const INTEGRAL_LIMIT: Ratio = q16(500_000);
 
 /// Gains.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct SpeedLoop {
     /// Duty per speed, s/mm: the motor's inverse gain.
     per_speed: Q16,

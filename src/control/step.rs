@@ -78,8 +78,9 @@ pub struct Output {
     pub telemetry: Telemetry,
 }
 
-/// The controller's configuration in machine units; its state is apart.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+/// The controller's configuration in machine units; its state is apart. The default is room
+/// to read one into, and controls nothing.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Controller {
     senses: Senses,
     monitor: Monitor,

@@ -38,7 +38,7 @@ const HEIGHT_TOLERANCE: Millimetres = q16(120_000);
 const SETTLE_TICKS: u8 = 50;
 
 /// Geometry of the measurement.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CrossingWatch {
     radius: Millimetres,
     step: Millimetres,

@@ -50,7 +50,7 @@ const SIXTEENTH: (i32, i32) = (12_539, 30_273);
 /// division, no loop; about 60 cycles.
 ///
 /// Source: Luenberger 1971; coupled form and cutting: Barnes and Fam 1977.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct VibrationObserver {
     /// `p cos w` and `p sin w`, Q30.
     turn: (i32, i32),

@@ -34,6 +34,19 @@ pub struct Identity {
     pub corner: Millimetres,
 }
 
+impl Identity {
+    /// Nobody yet.
+    pub const NOBODY: Self = Self {
+        schema: 0,
+        version: Text::new(),
+        build: [0; 8],
+        rig: Text::new(),
+        parameters: 0,
+        calibration: 0,
+        corner: Millimetres::ZERO,
+    };
+}
+
 /// As much of a text as fits.
 #[must_use]
 pub fn text(from: &str) -> Text {

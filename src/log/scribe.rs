@@ -38,6 +38,11 @@ impl Scribe {
         }
     }
 
+    /// Says from now on that this one speaks.
+    pub fn speak_for(&mut self, identity: Identity) {
+        self.identity = identity;
+    }
+
     /// Writes what is on the tape. `send` takes a frame whole, or says that it did not.
     pub fn read(&mut self, tape: &Tape, send: &mut dyn FnMut(&[u8]) -> bool) {
         if let Some((at, request)) = tape.take_request() {

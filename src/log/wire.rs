@@ -91,7 +91,7 @@ impl Wire {
 
     /// Writes it; so many bytes.
     pub(super) fn put(&self, room: &mut [u8]) -> usize {
-        postcard::to_slice(self, room).map_or(0, |used| used.len())
+        postcard::serialize_with_flavor(self, Room { bytes: room, used: 0 }).unwrap_or(0)
     }
 
     /// The difference to what came before.
@@ -110,6 +110,29 @@ impl Wire {
             *number = number.wrapping_add(before);
         }
         sum
+    }
+}
+
+/// Bytes one by one: most numbers take a single one, for which a call that copies costs
+/// several times the rest.
+struct Room<'a> {
+    bytes: &'a mut [u8],
+    used: usize,
+}
+
+impl postcard::ser_flavors::Flavor for Room<'_> {
+    type Output = usize;
+
+    #[inline(always)]
+    fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
+        let room = self.bytes.get_mut(self.used).ok_or(postcard::Error::SerializeBufferFull)?;
+        *room = byte;
+        self.used += 1;
+        Ok(())
+    }
+
+    fn finalize(self) -> postcard::Result<usize> {
+        Ok(self.used)
     }
 }
 

@@ -22,8 +22,9 @@ const OUTLIER: Ratio = q16(350_000);
 /// Sixteenths of the gap taken off until the slip margin holds, at most.
 const SLIP_TRIES: usize = 8;
 
-/// The model side of the schedule; runs outside the tick.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+/// The model side of the schedule; runs outside the tick. The default is room to read one
+/// into, and plans nothing.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Planner {
     model: ReducedModel,
     guard: Guard,

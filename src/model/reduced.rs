@@ -67,7 +67,7 @@ impl Scale {
 /// corner force 5e-5, vibration 1e-4; utilisation 1e-4 absolute. The force that a speed of
 /// the inverse needs is that given within 0.2 %. A wheel pushed over 2 mm, which 150 N all
 /// but sink, has a gap within 1e-3 and a speed within 0.4 %.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ReducedModel {
     shape: Shape,
     ways: [Way; 2],

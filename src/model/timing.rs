@@ -13,7 +13,7 @@ use crate::units::{
 pub const SLEW_PART: Q16 = q16(850_000);
 
 /// Limits of the speed profile and of the pre-tightener.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Timing {
     acceleration: MillimetresPerSecond2,
     /// Division by the acceleration, by the knee and by the rate.

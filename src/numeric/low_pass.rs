@@ -13,7 +13,7 @@ use crate::units::Q16;
 /// Error: 1 LSB against the same filter in f64, plus 2^-17 / a relative of a jump
 /// from the rounding of `a` (tau = 5 ms: 5e-5).
 /// Cost: two multiplies and about 15 other instructions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct LowPass {
     /// `a` in Q16, 1 to 65536.
     pub(super) gain: u32,

@@ -34,6 +34,13 @@ pub struct Table<const N: usize> {
     samples: [i32; N],
 }
 
+/// Nought everywhere: room for a table to be read into.
+impl<const N: usize> Default for Table<N> {
+    fn default() -> Self {
+        Self { lo: 0, hi: 0, factor: 0, shift: 32, samples: [0; N] }
+    }
+}
+
 /// Bits of the position inside an interval.
 const FRACTION: u32 = 30;
 

@@ -132,9 +132,21 @@ impl<'a> ParameterSet<'a> {
     ///
     /// # Errors
     /// [`SetError::Content`] if the bytes are not one.
-    #[inline(never)]
     pub fn controller(&self) -> Result<(Controller, Rest<'a>), SetError> {
-        take(self.constants).map(|(controller, rest)| (controller, Rest(rest)))
+        let mut controller = Controller::default();
+        let rest = self.controller_into(&mut controller)?;
+        Ok((controller, rest))
+    }
+
+    /// The controller, read where it is to stay, and what is left of the constants. Returned
+    /// by value it would be copied at every level of what it is made of, and the copies would
+    /// be most of the stack; so it is with the planner.
+    ///
+    /// # Errors
+    /// [`SetError::Content`] if the bytes are not one; in `place` is then anything.
+    #[inline(never)]
+    pub fn controller_into(&self, place: &mut Controller) -> Result<Rest<'a>, SetError> {
+        into(self.constants, place).map(Rest)
     }
 
     /// The rig that the constants were made from, SI.
@@ -155,10 +167,30 @@ impl Rest<'_> {
     ///
     /// # Errors
     /// [`SetError::Content`] if the bytes are not one.
-    #[inline(never)]
     pub fn planner(self) -> Result<Planner, SetError> {
-        whole(self.0)
+        let mut planner = Planner::default();
+        self.planner_into(&mut planner)?;
+        Ok(planner)
     }
+
+    /// The planner, read where it is to stay.
+    ///
+    /// # Errors
+    /// [`SetError::Content`] if the bytes are not one; in `place` is then anything.
+    #[inline(never)]
+    pub fn planner_into(self, place: &mut Planner) -> Result<(), SetError> {
+        match into(self.0, place)? {
+            [] => Ok(()),
+            _ => Err(SetError::Content),
+        }
+    }
+}
+
+/// Reads a value where it is to stay; what is left of the bytes.
+fn into<'a, T: Deserialize<'a>>(bytes: &'a [u8], place: &mut T) -> Result<&'a [u8], SetError> {
+    let mut bytes = postcard::Deserializer::from_bytes(bytes);
+    T::deserialize_in_place(&mut bytes, place).map_err(|_| SetError::Content)?;
+    bytes.finalize().map_err(|_| SetError::Content)
 }
 
 /// CRC-32 (ISO-HDLC).

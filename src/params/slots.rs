@@ -11,7 +11,7 @@
 //! 16  the set, filled up with 0xFF to a double word
 //! ```
 
-use super::{MAX_SET, ParameterSet, SetError};
+use super::{MAX_SET, ParameterSet, Rest, SetError};
 
 /// Bytes of one place: two pages of the chip's flash.
 pub const SLOT_BYTES: usize = 4096;
@@ -201,7 +201,8 @@ impl Draft {
         }
         let bytes = memory.bytes(self.slot).get(PREFIX..PREFIX + self.length);
         let set = ParameterSet::open(bytes.ok_or(DraftError::Length)?).map_err(DraftError::Set)?;
-        set.controller().and_then(|(_, rest)| rest.planner()).map_err(DraftError::Set)?;
+        let rest = behind_controller(&set).map_err(DraftError::Set)?;
+        read_planner(rest).map_err(DraftError::Set)?;
         Ok(set)
     }
 
@@ -216,6 +217,18 @@ impl Draft {
         memory.program(self.slot, 0, pair(MAGIC, self.sequence)).await?;
         Ok(())
     }
+}
+
+/// What stands behind a readable controller; like the planner in a frame of its own, so that
+/// the stack never holds both.
+#[inline(never)]
+fn behind_controller<'a>(set: &ParameterSet<'a>) -> Result<Rest<'a>, SetError> {
+    set.controller().map(|(_, rest)| rest)
+}
+
+#[inline(never)]
+fn read_planner(rest: Rest<'_>) -> Result<(), SetError> {
+    rest.planner().map(drop)
 }
 
 /// A place as it stands with this set in force under this sequence number, for flash

@@ -33,7 +33,7 @@ const CODE_SPAN: f64 = 65_535.0;
 /// Range: -3.5 % to 109 % of full scale; beyond, the code is
 /// [`Reason::OutOfRange`] and the last value is held. Error: 0.5 LSB, 0.002 codes,
 /// and `1.3e-5 x 0.5 / full scale` relative. Cost: one multiply and one filter.
-#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct AnalogChannel {
     /// Code of the zero, times 2^8.
     zero: i32,

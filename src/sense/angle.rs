@@ -32,7 +32,7 @@ pub const fn decode(frame: AngleFrame) -> Result<u16, Reason> {
 ///
 /// `angle = code - zero`, wrapping at half a turn. Error: half a code (192 urad)
 /// of quantisation, 2 LSB of rounding. Cost: one filter.
-#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct AngleSensor {
     /// Code of the zero; 2^32 is a turn.
     zero: u32,

@@ -21,7 +21,7 @@ const LEVEL_SWITCH: Ratio = q16(600_000);
 /// axis, mm, growing outwards. Error against the formula over the whole reach of the
 /// prototype: 2e-5 mm in the radius, 2e-5 in the tangent; the sensor's half code is 0.019
 /// to 0.022 mm. Cost: a sine, a cosine and a reciprocal, about 80 cycles.
-#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Arm {
     /// Least and largest angle that is not taken for a sensor fault.
     reach: (Codes, Codes),

@@ -40,7 +40,7 @@ impl Default for Tuning {
 }
 
 /// The four sensors in machine units.
-#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Senses {
     wheel: Speedometer,
     load_cell: AnalogChannel,

@@ -38,7 +38,7 @@ const LONGEST_GAP: u32 = 1000;
 /// no division.
 ///
 /// Source: the critically damped g-h filter (Benedict and Bordner 1962).
-#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Speedometer {
     /// Travel of one count, mm, Q32.
     count: i64,

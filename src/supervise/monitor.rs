@@ -25,7 +25,7 @@ const PRELOAD_TICKS: u16 = 400;
 const HALF: Ratio = q16(500_000);
 
 /// Bounds of a rig.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Monitor {
     overpressure: Newtons,
     /// Speed below which the wheel counts as standing, mm/s.

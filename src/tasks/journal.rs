@@ -11,15 +11,17 @@ use embassy_time::with_timeout;
 /// the light when it changes.
 ///
 /// All encoding is done here, below the control rate. It waits for the tick, which wakes
-/// it once a frame's worth of records is there.
+/// it once a frame's worth of records is there. The scribe comes from outside, so that its
+/// three kilobytes are never on the stack.
 pub async fn journal(
     mut journal: impl Journal,
     mut light: impl Indicator,
+    scribe: &mut Scribe,
     exchange: &Exchange,
 ) -> ! {
     let mut shown = Light::default();
     let mut reported = 0;
-    let mut scribe = Scribe::new(journal.identity());
+    scribe.speak_for(journal.identity());
     light.show(shown);
     loop {
         exchange.check_in(Station::Journal, uptime());
@@ -31,17 +33,17 @@ pub async fn journal(
         let news = with_timeout(ROUND, news).await;
         exchange.wake(Station::Journal);
         if let Ok(Either::First(entry)) = news {
-            write(&mut journal, &mut scribe, &entry);
+            write(&mut journal, scribe, &entry);
             // At most a queue full before the next check-in.
             for _ in 1..ENTRIES {
                 let Ok(entry) = exchange.entries.try_receive() else { break };
-                write(&mut journal, &mut scribe, &entry);
+                write(&mut journal, scribe, &entry);
             }
             let lost = exchange.lost_entries();
             if lost != reported {
                 // The newest are the ones dropped, so their count stands behind the rest.
                 let event = Event::Lost(lost.wrapping_sub(reported));
-                write(&mut journal, &mut scribe, &Entry { at: uptime(), event });
+                write(&mut journal, scribe, &Entry { at: uptime(), event });
                 reported = lost;
             }
         }

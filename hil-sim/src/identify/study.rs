@@ -22,6 +22,8 @@ pub struct Line {
     pub within: usize,
     /// Root mean square of the error, in the parameter's unit.
     pub rms_error: f64,
+    /// Mean of the error: what all the rigs have in common.
+    pub mean_error: f64,
     /// Largest error over the hidden value, absolute; none where that may be nought.
     pub worst_rel: Option<f64>,
     /// Median half-width of the interval.
@@ -116,6 +118,7 @@ fn line(all: &[&Found]) -> Line {
         identified: told.len(),
         within: told.iter().filter(|found| found.within).count(),
         rms_error: (square / n).sqrt(),
+        mean_error: told.iter().map(|found| found.error).sum::<f64>() / n,
         worst_rel: (!nought && !told.is_empty()).then(|| relative.fold(0.0, f64::max)),
         half_width: widths.get(widths.len() / 2).copied().unwrap_or(0.0),
     }

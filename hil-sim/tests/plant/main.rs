@@ -3,6 +3,7 @@
 mod bench;
 mod crossing;
 mod deployment;
+mod follow;
 mod grip;
 mod precision;
 mod sensors;

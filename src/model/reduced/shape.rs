@@ -12,7 +12,7 @@ pub(super) type Quartic = [i32; 5];
 const LEAST_EXCESS: i32 = 1 << (31 - LOWEST_OCTAVE);
 
 /// Geometry, units and load of one rig. The run r is a part of the longest one.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Shape {
     /// Free run over R, Q32.
     pub(super) free: u32,

@@ -55,7 +55,7 @@ const NO_SPEED: i32 = (1 << 24) / 256;
 const LEAST_SLOPE: i32 = 1 << 21;
 
 /// One way of one rig.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Way {
     /// Speed at which half the crossing is fast, mm/s, Q16; its normalised bits, and by
     /// how many places they were shifted.

@@ -11,9 +11,7 @@ impl VirtualRig {
     /// [`PlantError`] when the state stops meaning anything.
     pub fn follow(&mut self, tread_mm_s: f64, preload_n: f64, dt_s: f64) -> Result<(), PlantError> {
         self.preload.hold(preload_n);
-        // From the start of the step on, not by way of the speed before.
         self.led_mm_s = Some(tread_mm_s);
-        self.truth.tread_mm_s = tread_mm_s;
         let parts = (tread_mm_s.abs() * dt_s / self.resolution.stride_mm).ceil();
         let parts = parts.clamp(1.0, super::MOST_STRIDES);
         for _ in 0..parts as usize {

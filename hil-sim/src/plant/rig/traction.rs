@@ -86,7 +86,7 @@ impl VirtualRig {
         let grip = Grip {
             mu: p.mu,
             creep: p.elastic_creep,
-            rolling: tread.abs(),
+            rolling: self.led_mm_s.unwrap_or(tread).abs(),
             load_n: p.load_n,
             inertia: 1e-3 * p.mass_kg / dt_s,
             speed: self.truth.speed_mm_s,
@@ -112,7 +112,7 @@ impl VirtualRig {
         }
         stride.moves = Moves::Driven(grip);
         self.thrust_n = p.load_n;
-        stride.way_mm = 0.5 * (self.truth.speed_mm_s + foreseen.0) * dt_s + self.owed_mm.0;
+        stride.way_mm = self.mean(self.truth.speed_mm_s, foreseen.0) * dt_s + self.owed_mm.0;
         let (low, high) = p.stops_mm;
         let position = self.truth.position_mm + stride.way_mm;
         if position < low || position > high {
@@ -133,9 +133,14 @@ impl VirtualRig {
             self.thrust_n = if spins { friction * cosine - sine } else { p.load_n };
         }
         stride.position_mm = self.truth.position_mm + stride.way_mm;
-        let rolled = 0.5 * (tread + stride.tread_mm_s) * dt_s + self.owed_mm.1;
+        let rolled = self.mean(tread, stride.tread_mm_s) * dt_s + self.owed_mm.1;
         stride.turn_rad = rolled / p.ring.radius_mm;
         stride
+    }
+
+    /// Mean speed over a stride, mm/s: a tread that is led has its speed from the start on.
+    fn mean(&self, before: f64, end: f64) -> f64 {
+        if self.led_mm_s.is_some() { end } else { 0.5 * (before + end) }
     }
 
     /// Speeds of carriage and tread with which the stride will about end: with the slip of
@@ -185,18 +190,20 @@ impl VirtualRig {
         // A wheel that has come to rest does not move on.
         let moves = truth.speed_mm_s != 0.0 || truth.tread_mm_s != 0.0;
         let dt_s = if moves { stride.dt_s } else { 0.0 };
+        let (speed, tread) = (truth.speed_mm_s, truth.tread_mm_s);
         self.owed_mm = (
-            0.5 * (truth.speed_mm_s - stride.foreseen.0) * dt_s,
-            0.5 * (truth.tread_mm_s - stride.foreseen.1) * dt_s,
+            self.mean(0.0, speed - stride.foreseen.0) * dt_s,
+            self.mean(0.0, tread - stride.foreseen.1) * dt_s,
         );
+        let rolled = self.mean(before, tread) * stride.dt_s;
         let dt_s = stride.dt_s;
         self.sliding = sliding > 0.0;
         self.resists_n = resists_n;
+        let truth = &mut self.truth;
         truth.slip_mm += sliding * dt_s;
         let creep = (truth.tread_mm_s - truth.speed_mm_s).abs() * dt_s;
         truth.wear_mj += truth.utilisation.abs() * normal * creep;
         let force = stride.turn.force_n + stride.turn.force_rises * resists_n;
-        let rolled = 0.5 * (before + truth.tread_mm_s) * dt_s;
         truth.work_mj += (force * rolled).max(0.0);
     }
 
