@@ -24,11 +24,7 @@ mod firmware {
     use embassy_stm32::{Peri, Peripherals, pac};
     use interstage::control::Controller;
     use interstage::hal::{Board, Parts};
-<<<<<<< HEAD
-    use interstage::log::{Entry, Event};
-=======
-    use interstage::log::{Identity, Scribe};
->>>>>>> main
+    use interstage::log::{Entry, Event, Identity, Scribe};
     use interstage::model::Planner;
     use interstage::params::service::Service;
     use interstage::tasks::{self, Exchange};
