@@ -131,6 +131,13 @@ impl Machine {
         self.tasks.names().collect()
     }
 
+    /// Name of the task that the executor is about to run, if it stands at that.
+    #[must_use]
+    pub fn task(&self) -> Option<&str> {
+        let pointer = self.core.register(Register::R(0)).ok()?;
+        self.tasks.names().nth(self.tasks.begins(self.pc, pointer)?)
+    }
+
     /// Restarts so far: when, and why.
     #[must_use]
     pub fn restarts(&self) -> &[(u64, Restart)] {
@@ -216,6 +223,27 @@ impl Machine {
             self.pc = value & !1;
         }
         self.core.set_register(register, value)
+    }
+
+    /// Catches what runs in a loop without end: it goes on at an instruction that branches
+    /// to itself.
+    ///
+    /// # Errors
+    /// [`CoreError::Engine`] if the image has no such instruction, or the engine fails.
+    pub fn catch(&mut self) -> Result<(), CoreError> {
+        const TO_ITSELF: [u8; 2] = [0xFE, 0xE7];
+        let flash = &self.loaded.flash;
+        let place = self.loaded.code.iter().find_map(|code| {
+            code.clone().step_by(2).find(|at| {
+                let at = (at - FLASH.base) as usize;
+                flash.get(at..at + 2) == Some(&TO_ITSELF)
+            })
+        });
+        let place = place.ok_or_else(|| CoreError::Engine {
+            what: "catch the program",
+            why: "the image has no loop".to_owned(),
+        })?;
+        self.set_register(Register::Pc, place)
     }
 
     /// Power lost and back, or another restart from outside.
@@ -368,19 +396,19 @@ impl Machine {
     pub fn run_to(&mut self, address: u32, cycle: u64) -> Result<bool, CoreError> {
         while self.now() < cycle {
             self.look_after()?;
+            if self.asleep.is_some() {
+                self.sleep(cycle);
+                continue;
+            }
             if let Some(number) = self.takeable()? {
                 self.enter(number, self.pc, false)?;
                 continue;
             }
-            match self.core.run_to(self.pc, cycle - self.now(), address)? {
-                Stop::Spent(at) | Stop::Urgent(at) => self.pc = at & !1,
-                Stop::Return(value) => self.leave(value)?,
-                Stop::Breakpoint(at) => {
-                    self.pc = at;
-                    return Ok(false);
-                }
-                _ => return Ok(false),
+            let stop = self.core.run_to(self.pc, cycle - self.now(), address)?;
+            if self.follow(stop)?.is_some() {
+                return Ok(false);
             }
+            self.pc &= !1;
             if self.pc == address {
                 return Ok(true);
             }
