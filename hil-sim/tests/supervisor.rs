@@ -219,10 +219,8 @@ proptest! {
         let Snapshot { mut state, input, plan } =
             FROM.with(|all| all[from % all.len()].1.clone());
         let controller = controller();
-        let mut now = input.now;
         let mut count = input.sensors.wheel.map_or(0, |wheel| wheel.code.get());
-        for tick in ticks {
-            now += 1;
+        for (now, tick) in (input.now + 1..).zip(ticks) {
             let before = state.mode();
             count = count.wrapping_add_signed(tick.wheel.map_or(0, |(by, _)| by));
             let at = |age: u32| now.saturating_sub(age);

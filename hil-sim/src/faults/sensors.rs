@@ -18,6 +18,8 @@ use super::{Kind, Target};
 const SPAN: f64 = 65_535.0;
 /// Codes of a turn of the angle sensor.
 const TURN: f64 = 16_384.0;
+/// What sums of milliseconds may be off, s.
+const TIME_S: f64 = 1e-6;
 /// Period of an intermittent contact, s.
 const PERIOD_S: f64 = 0.1;
 
@@ -136,7 +138,7 @@ impl Lie {
         self.last = Some((t_s, truth));
         if self.kind == Kind::Delayed {
             self.past.push_back((t_s, truth));
-            while self.past.get(1).is_some_and(|(at_s, _)| *at_s <= t_s - self.magnitude) {
+            while self.past.get(1).is_some_and(|(at_s, _)| *at_s <= t_s - self.magnitude + TIME_S) {
                 self.past.pop_front();
             }
         }
@@ -144,7 +146,7 @@ impl Lie {
 
     /// What was true so long ago.
     fn late(&self, t_s: f64) -> f64 {
-        let due = |(at_s, _): &&(f64, f64)| *at_s <= t_s - self.magnitude;
+        let due = |(at_s, _): &&(f64, f64)| *at_s <= t_s - self.magnitude + TIME_S;
         let then = self.past.iter().rev().find(due).or(self.past.front());
         then.map_or(0.0, |(_, code)| *code)
     }
