@@ -14,6 +14,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         if env::var("PROFILE")? == "debug" {
             // Without link-time optimisation the frames are about twice as deep.
             println!("cargo::rustc-link-arg-bins=--defsym=_stack_size=20K");
+        } else if env::var_os("CARGO_FEATURE_HIL").is_some() {
+            // One more level than otherwise: the host's line below all tasks.
+            println!("cargo::rustc-link-arg-bins=--defsym=_stack_size=10K");
         }
     }
     Ok(())

@@ -1,35 +1,51 @@
 //! The NUCLEO-G474RE behind [`interstage::hal::Board`]: one driver a file. Pins
 //! are chosen in `main.rs` and listed in `docs/HARDWARE.md`.
 
+#[cfg(not(feature = "hil"))]
 mod analog;
+#[cfg(not(feature = "hil"))]
 mod angle;
 pub(crate) mod blackbox;
+#[cfg(not(feature = "hil"))]
 mod bridge;
+#[cfg(not(feature = "hil"))]
 mod button;
 pub(crate) mod config;
 mod console;
 mod flash;
 pub(crate) mod guard;
+#[cfg(feature = "hil")]
+pub(crate) mod hil;
 mod image;
 mod journal;
 pub(crate) mod light;
 mod line;
 pub(crate) mod rtt;
+#[cfg(not(feature = "hil"))]
 mod wheel;
 
+#[cfg(not(feature = "hil"))]
 pub(crate) use analog::{Analog, Ring};
+#[cfg(not(feature = "hil"))]
 pub(crate) use angle::Angle;
+#[cfg(not(feature = "hil"))]
 pub(crate) use bridge::{Bridge, Bridges};
+#[cfg(not(feature = "hil"))]
 pub(crate) use button::Button;
 pub(crate) use console::Console;
 pub(crate) use flash::Pages;
 pub(crate) use guard::Guard;
+#[cfg(feature = "hil")]
+pub(crate) use hil::{Analog, Angle, Bridges, Button, Wheel};
 pub(crate) use journal::Lines;
 pub(crate) use light::Lamp;
 pub(crate) use line::HostLine;
+#[cfg(not(feature = "hil"))]
 pub(crate) use wheel::Wheel;
 
-use embassy_stm32::peripherals::{ADC1, ADC2, DMA1_CH1, DMA1_CH2};
+#[cfg(not(feature = "hil"))]
+use embassy_stm32::peripherals::{ADC1, ADC2};
+use embassy_stm32::peripherals::{DMA1_CH1, DMA1_CH2};
 use embassy_stm32::{Config, bind_interrupts, dma, exti, flash as flash_driver, interrupt, rcc};
 use interstage::hal::Board;
 
@@ -38,8 +54,14 @@ pub(crate) struct Nucleo;
 
 impl Board for Nucleo {
     type Wheel = Wheel;
+    #[cfg(not(feature = "hil"))]
     type LoadCell = Analog<ADC1>;
+    #[cfg(feature = "hil")]
+    type LoadCell = Analog;
+    #[cfg(not(feature = "hil"))]
     type Tread = Analog<ADC2>;
+    #[cfg(feature = "hil")]
+    type Tread = Analog;
     type Arm = Angle;
     type Motors = Bridges;
     type Watchdog = Guard;

@@ -16,6 +16,7 @@ pub mod blackbox;
 pub mod control;
 pub mod estimate;
 pub mod hal;
+pub mod hil;
 pub mod link;
 pub mod log;
 pub mod model;

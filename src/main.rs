@@ -19,8 +19,10 @@ fn main() -> std::process::ExitCode {
 #[cfg(target_os = "none")]
 mod firmware {
     use embassy_executor::{InterruptExecutor, Spawner};
+    #[cfg(not(feature = "hil"))]
     use embassy_stm32::gpio::AnyPin;
     use embassy_stm32::interrupt::{self, InterruptExt, Priority};
+    #[cfg(not(feature = "hil"))]
     use embassy_stm32::{Peri, Peripherals, pac};
     use interstage::control::Controller;
     use interstage::hal::{Board, Parts};
@@ -28,19 +30,29 @@ mod firmware {
     use interstage::model::Planner;
     use interstage::params::service::Service;
     use interstage::tasks::{self, Exchange};
+    #[cfg(not(feature = "hil"))]
     use rtt_target::DownChannel;
     use static_cell::ConstStaticCell;
 
+    #[cfg(feature = "hil")]
+    use crate::board::hil::{self, split};
+    use crate::board::rtt::Channels;
+    #[cfg(not(feature = "hil"))]
     use crate::board::rtt::Frames;
     use crate::board::{self, blackbox, config, guard, light, rtt};
-    use crate::board::{Analog, Angle, Bridge, Bridges, Button, Console, Guard, HostLine, Lamp};
-    use crate::board::{Lines, Nucleo, Pages, Ring, Wheel};
+    #[cfg(not(feature = "hil"))]
+    use crate::board::{Analog, Bridge, Ring};
+    use crate::board::{Angle, Bridges, Button, Console, Guard, HostLine, Lamp, Lines};
+    use crate::board::{Nucleo, Pages, Wheel};
 
     /// Any pin.
+    #[cfg(not(feature = "hil"))]
     type Pin = Peri<'static, AnyPin>;
 
     pub(crate) static EXCHANGE: Exchange = Exchange::new();
+    #[cfg(not(feature = "hil"))]
     static LOAD_CELL: Ring = Ring::new();
+    #[cfg(not(feature = "hil"))]
     static TREAD: Ring = Ring::new();
     static SCRIBE: ConstStaticCell<Scribe> = ConstStaticCell::new(Scribe::new(Identity::NOBODY));
 
@@ -62,9 +74,44 @@ mod firmware {
         unsafe { CONTROL.on_interrupt() }
     }
 
+    #[cfg(not(feature = "hil"))]
     #[embassy_executor::main]
     async fn main(threads: Spawner) {
-        let channels = rtt::init();
+        begin(threads, rtt::init());
+    }
+
+    /// With the host in the loop, thread mode is the host's line: it moves time on when
+    /// every task waits. What runs there otherwise has an executor of its own.
+    #[cfg(feature = "hil")]
+    #[cortex_m_rt::entry]
+    fn main() -> ! {
+        let (channels, host) = rtt::init();
+        hil::serve(host, &EXCHANGE, || {
+            interrupt::UART4.set_priority(Priority::P15);
+            THREADS.start(interrupt::UART4).spawn(boot(channels).unwrap());
+        })
+    }
+
+    /// In the place of the thread executor.
+    #[cfg(feature = "hil")]
+    static THREADS: InterruptExecutor = InterruptExecutor::new();
+
+    #[cfg(feature = "hil")]
+    #[embassy_stm32::interrupt]
+    unsafe fn UART4() {
+        // SAFETY: as for UART5.
+        unsafe { THREADS.on_interrupt() }
+    }
+
+    #[cfg(feature = "hil")]
+    #[embassy_executor::task]
+    async fn boot(channels: Channels) {
+        // SAFETY: a task's context is always the executor's.
+        begin(unsafe { Spawner::for_current_executor().await }, channels);
+    }
+
+    /// Starts everything.
+    fn begin(threads: Spawner, channels: Channels) {
         let p = embassy_stm32::init(board::clocks());
         defmt::info!("interstage {=str}", env!("CARGO_PKG_VERSION"));
         let restart = blackbox::report();
@@ -85,6 +132,7 @@ mod firmware {
     }
 
     /// Who gets which peripheral and pin; the bridges come up off.
+    #[cfg(not(feature = "hil"))]
     fn split(p: Peripherals, console: DownChannel, frames: Frames) -> (Parts<Nucleo>, Pin, Pages) {
         let parts = Parts {
             wheel: Wheel::new(p.TIM5, p.PA0, p.PA1),

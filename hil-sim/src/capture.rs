@@ -2,12 +2,14 @@
 //! shown while it grows.
 
 mod message;
+mod probed;
 pub(crate) mod schemas;
 mod source;
 mod view;
 mod writer;
 
 pub(crate) use message::messages;
+pub use probed::Probed;
 #[cfg(feature = "board")]
 pub use source::Emulated;
 pub use source::{Bytes, Source, SourceError, Virtual, letter};

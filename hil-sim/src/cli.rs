@@ -24,6 +24,8 @@ mod panics;
 mod paper;
 mod params;
 mod parse;
+#[cfg(feature = "probe")]
+mod probe;
 mod replay;
 mod report;
 mod resets;

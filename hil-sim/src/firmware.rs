@@ -87,6 +87,8 @@ pub enum Profile {
     /// As flashed.
     #[default]
     Release,
+    /// As flashed, with the host in the loop.
+    Loop,
 }
 
 impl Profile {
@@ -95,6 +97,16 @@ impl Profile {
         match self {
             Self::Debug => "debug",
             Self::Release => "release",
+            Self::Loop => "hil",
+        }
+    }
+
+    /// What cargo is told.
+    fn arguments(self) -> &'static [&'static str] {
+        match self {
+            Self::Debug => &[],
+            Self::Release => &["--release"],
+            Self::Loop => &["--profile", "hil", "--no-default-features", "--features", "hil"],
         }
     }
 }
@@ -188,9 +200,7 @@ pub fn build_binary(
         .env_remove("RUSTFLAGS")
         .env_remove("CARGO_ENCODED_RUSTFLAGS")
         .stderr(Stdio::inherit());
-    if profile == Profile::Release {
-        cargo.arg("--release");
-    }
+    cargo.args(profile.arguments());
     let built = output(&mut cargo)?;
     if !built.status.success() {
         return Err(FirmwareError::Build(built.status));

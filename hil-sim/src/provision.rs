@@ -1,11 +1,12 @@
-//! The emulated board on a machine that has never built it: the tools that its core
-//! needs, and the `rig` binary with the core in it.
+//! What `rig` is built with only where it is asked for: the emulated board, with the
+//! tools that its core needs, and probe-rs.
 //!
 //! The core is C behind generated bindings, so that cmake, ninja and libclang are
 //! needed. They come as wheels from PyPI into a virtual environment in the target
 //! directory; nothing is installed elsewhere, and nothing but the builds started here
 //! sees them. Whoever never asks for the emulated board needs none of it.
 
+mod printer;
 mod tools;
 
 use std::env;
@@ -14,18 +15,49 @@ use std::process::{Command, Stdio};
 
 use crate::firmware;
 
+pub use printer::defmt_print;
 pub use tools::Tools;
 
-/// Package and feature that carry the emulated board.
-const FEATURE: &str = "board";
-/// The binary with the feature.
-const BINARY: &str = "rig-board";
+/// What `rig` can have in it beside what it always has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extra {
+    /// The emulated board.
+    Board,
+    /// A real debug probe.
+    Probe,
+}
 
-/// Why the emulated board cannot be had. Each is one line.
+impl Extra {
+    /// The feature that carries it.
+    const fn feature(self) -> &'static str {
+        match self {
+            Self::Board => "board",
+            Self::Probe => "probe",
+        }
+    }
+
+    /// The binary with the feature.
+    const fn binary(self) -> &'static str {
+        match self {
+            Self::Board => "rig-board",
+            Self::Probe => "rig-probe",
+        }
+    }
+
+    /// In words.
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Board => "the emulated board",
+            Self::Probe => "probe-rs",
+        }
+    }
+}
+
+/// Why it cannot be had. Each is one line.
 #[derive(Debug, thiserror::Error)]
 pub enum ProvisionError {
     /// A program that has to be there is not.
-    #[error("the emulated board needs {program}, which could not be started: {source}")]
+    #[error("this needs {program}, which could not be started: {source}")]
     Program {
         /// The program.
         program: String,
@@ -55,35 +87,39 @@ pub enum ProvisionError {
         source: std::io::Error,
     },
     /// The build failed; cargo's own messages have gone to standard error.
-    #[error("building `rig` with the emulated board failed ({0})")]
-    Build(std::process::ExitStatus),
+    #[error("building `rig` with {0} failed ({1})")]
+    Build(&'static str, std::process::ExitStatus),
     /// cargo built something, but not that binary.
-    #[error("cargo reported no executable for {BINARY}")]
-    NoExecutable,
+    #[error("cargo reported no executable for {0}")]
+    NoExecutable(&'static str),
+    /// A tool of the tests could not be built; cargo's messages have gone to standard
+    /// error.
+    #[error("building {0} failed ({1})")]
+    Tool(&'static str, std::process::ExitStatus),
 }
 
-/// Builds `rig` with the emulated board, setting up what it needs, and returns the
-/// binary. A second call finds everything there. cargo's messages go to standard
-/// error.
+/// Builds `rig` with this in it, setting up what it needs, and returns the binary. A
+/// second call finds everything there. cargo's messages go to standard error.
 ///
 /// # Errors
 /// [`ProvisionError`] if tools cannot be had or the build fails.
-pub fn featured() -> Result<PathBuf, ProvisionError> {
-    let tools = Tools::ready()?;
+pub fn featured(extra: Extra) -> Result<PathBuf, ProvisionError> {
     let mut cargo = Command::new(firmware::tool("CARGO", "cargo"));
     cargo
         .current_dir(firmware::workspace())
         .args(["build", "--profile", "host", "--package", env!("CARGO_PKG_NAME")])
-        .args(["--bin", BINARY, "--features", FEATURE])
+        .args(["--bin", extra.binary(), "--features", extra.feature()])
         .args(["--message-format", "json-render-diagnostics"])
         .stderr(Stdio::inherit());
-    tools.apply(&mut cargo);
+    if extra == Extra::Board {
+        Tools::ready()?.apply(&mut cargo);
+    }
     let built = cargo.output().map_err(|source| started("cargo", source))?;
     if !built.status.success() {
-        return Err(ProvisionError::Build(built.status));
+        return Err(ProvisionError::Build(extra.name(), built.status));
     }
-    firmware::executable(&String::from_utf8_lossy(&built.stdout), BINARY)
-        .ok_or(ProvisionError::NoExecutable)
+    firmware::executable(&String::from_utf8_lossy(&built.stdout), extra.binary())
+        .ok_or(ProvisionError::NoExecutable(extra.binary()))
 }
 
 /// Goes on with the arguments of this process in `rig` with the emulated board, which
@@ -92,8 +128,17 @@ pub fn featured() -> Result<PathBuf, ProvisionError> {
 /// # Errors
 /// As [`featured`].
 pub fn go_on() -> Result<u8, ProvisionError> {
-    eprintln!("this needs the emulated board; the first time it takes some minutes to build");
-    let binary = featured()?;
+    go_on_with(Extra::Board)
+}
+
+/// The same in `rig` with any of them.
+///
+/// # Errors
+/// As [`featured`].
+pub fn go_on_with(extra: Extra) -> Result<u8, ProvisionError> {
+    let name = extra.name();
+    eprintln!("this needs {name}; the first time it takes some minutes to build");
+    let binary = featured(extra)?;
     let mut command = Command::new(&binary);
     command.args(env::args_os().skip(1));
     let program = || binary.display().to_string();

@@ -22,12 +22,13 @@ use crate::scenario::{ControllerKind, Direction, Scenario};
 pub use account::{PhaseAccount, PlantAccount, account, account_of};
 pub use session::{Session, drives, read};
 pub use stream::Stream;
+pub(crate) use trace::Trace;
 pub use trace::text;
 
 /// Control period, s.
-const TICK_S: f64 = 1e-3;
+pub(crate) const TICK_S: f64 = 1e-3;
 /// Longest run, s: the whole travel at the least useful speed, three times over.
-const LONGEST_S: f64 = 120.0;
+pub(crate) const LONGEST_S: f64 = 120.0;
 
 /// What is asked of a run beside its scenario.
 #[derive(Clone, Copy, Debug, Default)]
@@ -86,7 +87,7 @@ pub fn run_session(mut session: Session, scenario: &Scenario) -> Result<Recordin
 }
 
 /// The command that sets a run going.
-fn start_of(scenario: &Scenario) -> Command {
+pub(crate) fn start_of(scenario: &Scenario) -> Command {
     match scenario.run.direction {
         Direction::Deploy => Command::Start,
         Direction::Retract => Command::Retract,

@@ -12,7 +12,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, ensure};
 
 use crate::firmware::{self, Budget, Footprint, Profile, TARGET};
-use crate::provision::Tools;
+use crate::provision::{Tools, defmt_print};
 
 /// How a step ended.
 enum Ended {
@@ -30,13 +30,15 @@ struct Step {
 }
 
 /// In order of time taken, so that the cheap ones fail first.
-const STEPS: [Step; 9] = [
+const STEPS: [Step; 11] = [
     Step { name: "Toolchain", run: toolchain },
     Step { name: "Format", run: format },
     Step { name: "Tools of the emulator", run: tools },
     Step { name: "Lints", run: lints },
     Step { name: "Lints without emulator", run: plain_lints },
+    Step { name: "Lints with a probe", run: probe_lints },
     Step { name: "Lints of the firmware", run: firmware_lints },
+    Step { name: "Lints of the loop", run: loop_lints },
     Step { name: "Documentation", run: documentation },
     Step { name: "Firmware, debug", run: |root| image(root, Profile::Debug) },
     Step { name: "Firmware, release", run: |root| image(root, Profile::Release) },
@@ -137,10 +139,10 @@ fn format(root: &Path) -> Result<Ended> {
     step(cargo(root).args(["fmt", "--all", "--check"]))
 }
 
-/// Fetches what the emulator is built with. Where that cannot be had, this fails: a
+/// Fetches what the emulator is built with, and what its log is compared with. Where that cannot be had, this fails: a
 /// suite that left the board out would say more than it has seen.
 fn tools(_root: &Path) -> Result<Ended> {
-    match Tools::ready() {
+    match Tools::ready().and_then(|_| defmt_print()) {
         Ok(_) => Ok(Ended::Passed),
         Err(error) => {
             eprintln!("{}", error.to_string().replace('\n', " "));
@@ -174,6 +176,16 @@ fn plain_lints(root: &Path) -> Result<Ended> {
     step(clippy.args(["clippy", "--package", "hil-sim", "--lib", "--bins", "--", "-D", "warnings"]))
 }
 
+/// The package as those have it who have a board at a probe.
+fn probe_lints(root: &Path) -> Result<Ended> {
+    if !has(root, "clippy") {
+        return Ok(Ended::Skipped("clippy is not installed"));
+    }
+    let mut clippy = cargo(root);
+    clippy.args(["clippy", "--package", "hil-sim", "--features", "probe", "--lib", "--bins"]);
+    step(clippy.args(["--", "-D", "warnings"]))
+}
+
 fn firmware_lints(root: &Path) -> Result<Ended> {
     if !has(root, "clippy") {
         return Ok(Ended::Skipped("clippy is not installed"));
@@ -182,6 +194,19 @@ fn firmware_lints(root: &Path) -> Result<Ended> {
         cargo(root)
             .args(["clippy", "--package", "interstage", "--lib", "--bin", "interstage"])
             .args(["--package", "interstage-images", "--bin", "measure"])
+            .args(["--target", TARGET, "--", "-D", "warnings"]),
+    )
+}
+
+/// The firmware with the host in the loop.
+fn loop_lints(root: &Path) -> Result<Ended> {
+    if !has(root, "clippy") {
+        return Ok(Ended::Skipped("clippy is not installed"));
+    }
+    step(
+        cargo(root)
+            .args(["clippy", "--package", "interstage", "--bin", "interstage"])
+            .args(["--no-default-features", "--features", "hil"])
             .args(["--target", TARGET, "--", "-D", "warnings"]),
     )
 }
@@ -199,7 +224,7 @@ fn documentation(root: &Path) -> Result<Ended> {
 pub fn budget(profile: Profile) -> Budget {
     match profile {
         Profile::Release => Budget::default(),
-        Profile::Debug => Budget { flash: 512 * 1024, ram: 128 * 1024 },
+        Profile::Debug | Profile::Loop => Budget { flash: 512 * 1024, ram: 128 * 1024 },
     }
 }
 

@@ -29,6 +29,7 @@ pub(crate) struct Channels {
 }
 
 /// Sets up the channels; the log works from here on. Call once, first of all.
+#[cfg(not(feature = "hil"))]
 pub(crate) fn init() -> Channels {
     let channels = rtt_init! {
         up: {
@@ -41,13 +42,42 @@ pub(crate) fn init() -> Channels {
             1: { size: 128, name: "line" }
         }
     };
-    // SAFETY: in the critical section no frame is open, so nobody else holds the state.
-    critical_section::with(|_| unsafe { (*STATE.0.get()).channel = Some(channels.up.0) });
+    log_to(channels.up.0);
     Channels {
         telemetry: Frames(channels.up.1),
         console: channels.down.0,
         line: (channels.up.2, channels.down.1),
     }
+}
+
+/// The same with up 3 and down 2, over which the host closes the loop.
+#[cfg(feature = "hil")]
+pub(crate) fn init() -> (Channels, (UpChannel, DownChannel)) {
+    let channels = rtt_init! {
+        up: {
+            0: { size: 2048, mode: ChannelMode::NoBlockSkip, name: "defmt" }
+            1: { size: 4096, mode: ChannelMode::NoBlockSkip, name: "telemetry" }
+            2: { size: 128, mode: ChannelMode::NoBlockSkip, name: "line" }
+            3: { size: 64, mode: ChannelMode::NoBlockSkip, name: "hil" }
+        }
+        down: {
+            0: { size: 16, name: "console" }
+            1: { size: 128, name: "line" }
+            2: { size: 64, name: "hil" }
+        }
+    };
+    log_to(channels.up.0);
+    let rest = Channels {
+        telemetry: Frames(channels.up.1),
+        console: channels.down.0,
+        line: (channels.up.2, channels.down.1),
+    };
+    (rest, (channels.up.3, channels.down.2))
+}
+
+fn log_to(channel: UpChannel) {
+    // SAFETY: in the critical section no frame is open, so nobody else holds the state.
+    critical_section::with(|_| unsafe { (*STATE.0.get()).channel = Some(channel) });
 }
 
 /// The binary log's channel.

@@ -25,7 +25,11 @@ const SPEEDS: [Q16; 2] = [q16(1_000_000), q16(100_000_000)];
 
 /// A function of the model that can be measured: its symbol in the image, and what it
 /// computes.
-pub type Function = (&'static str, fn(&ReducedModel, &Given) -> i32);
+pub type Function = (&'static str, fn(&ReducedModel, Scale, &Given) -> i32);
+
+/// Symbol of what makes the scale of a call's tread beforehand: it changes once a crossing
+/// and is used many times.
+pub const PREPARE: &str = "model_scale";
 
 /// Every function.
 pub const FUNCTIONS: [Function; 3] = [
@@ -35,11 +39,17 @@ pub const FUNCTIONS: [Function; 3] = [
 ];
 
 impl Given {
-    fn point(&self) -> Point {
+    /// Scale of the tread's stiffness.
+    #[must_use]
+    pub fn scale(&self) -> Scale {
+        Scale::new(Q16::from_bits(self.scale))
+    }
+
+    fn point(&self, scale: Scale) -> Point {
         Point {
             direction: if self.direction == 1 { Direction::Retract } else { Direction::Deploy },
             speed: Q16::from_bits(self.speed),
-            scale: Scale::new(Q16::from_bits(self.scale)),
+            scale,
         }
     }
 
@@ -53,22 +63,22 @@ impl Given {
 
 /// Gap under a force, mm.
 #[must_use]
-pub fn forward(model: &ReducedModel, given: &Given) -> i32 {
-    model.gap(&given.point(), Q16::from_bits(given.force)).to_bits()
+pub fn forward(model: &ReducedModel, scale: Scale, given: &Given) -> i32 {
+    model.gap(&given.point(scale), Q16::from_bits(given.force)).to_bits()
 }
 
 /// Force for a gap, N.
 #[must_use]
-pub fn inverse_preload(model: &ReducedModel, given: &Given) -> i32 {
-    model.force(&given.point(), Q16::from_bits(given.gap)).to_bits()
+pub fn inverse_preload(model: &ReducedModel, scale: Scale, given: &Given) -> i32 {
+    model.force(&given.point(scale), Q16::from_bits(given.gap)).to_bits()
 }
 
 /// Speed at which a force holds a gap, mm/s.
 #[must_use]
-pub fn inverse_speed(model: &ReducedModel, given: &Given) -> i32 {
+pub fn inverse_speed(model: &ReducedModel, scale: Scale, given: &Given) -> i32 {
     let (gap, force) = (Q16::from_bits(given.gap), Q16::from_bits(given.force));
     let [floor, ceiling] = SPEEDS;
-    model.speed(&given.point(), gap, force, floor, ceiling).to_bits()
+    model.speed(&given.point(scale), gap, force, floor, ceiling).to_bits()
 }
 
 #[cfg(test)]
@@ -87,10 +97,10 @@ mod tests {
         let model = ReducedModel::try_build(&rig).unwrap();
         let one = 1 << 16;
         let given = Given { speed: 8 * one, scale: one, force: 40 * one, ..Given::default() };
-        let gap = forward(&model, &given);
-        let force = inverse_preload(&model, &Given { gap, ..given });
+        let gap = forward(&model, Scale::NOMINAL, &given);
+        let force = inverse_preload(&model, Scale::NOMINAL, &Given { gap, ..given });
         assert!((force - given.force).abs() < one / 20, "{force}");
-        let speed = inverse_speed(&model, &Given { gap, ..given });
+        let speed = inverse_speed(&model, Scale::NOMINAL, &Given { gap, ..given });
         assert!((speed - given.speed).abs() < one / 20, "{speed}");
     }
 }

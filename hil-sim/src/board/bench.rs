@@ -59,6 +59,8 @@ pub struct Bench<'a> {
     millisecond: u64,
     /// What has come on the binary log's channel; none if nobody listens.
     frames: Option<Vec<u8>>,
+    /// The text log as it came, if it is kept.
+    text: Option<Vec<u8>>,
 }
 
 impl<'a> Bench<'a> {
@@ -87,6 +89,7 @@ impl<'a> Bench<'a> {
             wheel: 0,
             millisecond: 0,
             frames: Some(Vec::new()),
+            text: None,
         };
         bench.speak(codes);
         Ok(bench)
@@ -152,6 +155,9 @@ impl<'a> Bench<'a> {
             frames.extend(self.probe.up(&mut self.machine, 1)?);
         }
         let bytes = self.probe.up(&mut self.machine, 0)?;
+        if let Some(text) = &mut self.text {
+            text.extend(&bytes);
+        }
         Ok((passed, self.reader.read(&bytes)))
     }
 
@@ -203,6 +209,16 @@ impl<'a> Bench<'a> {
     /// Whether the binary log's channel is read from now on; it is until told otherwise.
     pub fn listen(&mut self, listen: bool) {
         self.frames = listen.then(|| self.take_frames());
+    }
+
+    /// Keeps the text log as it comes from now on, for another reader.
+    pub fn keep_text(&mut self) {
+        self.text.get_or_insert_default();
+    }
+
+    /// The bytes of the text log since the last call, if they are kept.
+    pub fn take_text(&mut self) -> Vec<u8> {
+        self.text.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
     /// The board.

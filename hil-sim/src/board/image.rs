@@ -187,11 +187,28 @@ impl Image {
         function: &str,
         inputs: &[[u32; N]],
     ) -> Result<(Vec<u32>, Spread), ImageError> {
+        self.measure_prepared(None, function, inputs)
+    }
+
+    /// The same, `prepare` being called with each input before, which does not count.
+    ///
+    /// # Errors
+    /// As [`Image::measure`].
+    pub fn measure_prepared<const N: usize>(
+        &mut self,
+        prepare: Option<&str>,
+        function: &str,
+        inputs: &[[u32; N]],
+    ) -> Result<(Vec<u32>, Spread), ImageError> {
+        let prepare = prepare.map(|name| self.function(name)).transpose()?;
         let function = self.function(function)?;
         let mut values = Vec::with_capacity(inputs.len());
         let mut spread = Spread::default();
         for (index, words) in inputs.iter().enumerate() {
             self.put(ARGUMENTS, words)?;
+            if let Some(prepare) = prepare {
+                self.call(prepare, &[ARGUMENTS])?;
+            }
             let call = self.call(function, &[ARGUMENTS])?;
             values.push(call.value);
             spread.note(call.meter, index);

@@ -281,6 +281,21 @@ impl Machine {
         Ok(())
     }
 
+    /// Sees to what is due, to sleep and to an interrupt that can be taken; whether nothing
+    /// of that was to be done, so that the next instruction is the program's.
+    fn executes(&mut self, cycle: u64) -> Result<bool, CoreError> {
+        self.look_after()?;
+        if self.asleep.is_some() {
+            self.sleep(cycle);
+            return Ok(false);
+        }
+        if let Some(number) = self.takeable()? {
+            self.enter(number, self.pc, false)?;
+            return Ok(false);
+        }
+        Ok(true)
+    }
+
     /// Runs until this cycle, or the first block behind it. Returns early at a
     /// breakpoint instruction, with its address.
     ///
@@ -289,13 +304,7 @@ impl Machine {
     /// to handle.
     pub fn run_until(&mut self, cycle: u64) -> Result<Option<u32>, CoreError> {
         while self.now() < cycle {
-            self.look_after()?;
-            if self.asleep.is_some() {
-                self.sleep(cycle);
-                continue;
-            }
-            if let Some(number) = self.takeable()? {
-                self.enter(number, self.pc, false)?;
+            if !self.executes(cycle)? {
                 continue;
             }
             let stop = self.core.run(self.pc, cycle - self.now())?;
@@ -395,13 +404,7 @@ impl Machine {
     /// As [`Machine::run_until`].
     pub fn run_to(&mut self, address: u32, cycle: u64) -> Result<bool, CoreError> {
         while self.now() < cycle {
-            self.look_after()?;
-            if self.asleep.is_some() {
-                self.sleep(cycle);
-                continue;
-            }
-            if let Some(number) = self.takeable()? {
-                self.enter(number, self.pc, false)?;
+            if !self.executes(cycle)? {
                 continue;
             }
             let stop = self.core.run_to(self.pc, cycle - self.now(), address)?;

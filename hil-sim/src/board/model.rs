@@ -3,7 +3,7 @@
 
 use interstage::model::reduced::ReducedModel;
 use interstage::rig::{Rig, RigError};
-use interstage_images::model::{FUNCTIONS, Given};
+use interstage_images::model::{FUNCTIONS, Given, PREPARE};
 use interstage_images::tick::Preset;
 use serde::Serialize;
 
@@ -69,7 +69,7 @@ pub fn points(model: &ReducedModel) -> Vec<Given> {
                     gap: 0,
                     force: bits(between(15.0, 150.0, force)),
                 };
-                given.gap = interstage_images::model::forward(model, &given);
+                given.gap = interstage_images::model::forward(model, given.scale(), &given);
                 points.push(given);
             }
         }
@@ -90,9 +90,9 @@ pub fn measure(image: &mut Image, preset: Preset) -> Result<Vec<Measured>, Model
     let words: Vec<_> = points.iter().map(Given::words).collect();
     let mut measured = Vec::new();
     for (function, host) in FUNCTIONS {
-        let (values, cost) = image.measure(function, &words)?;
+        let (values, cost) = image.measure_prepared(Some(PREPARE), function, &words)?;
         for (index, (value, given)) in values.iter().zip(&points).enumerate() {
-            let (core, host) = (*value as i32, host(&model, given));
+            let (core, host) = (*value as i32, host(&model, given.scale(), given));
             if core != host {
                 return Err(ModelError::Differs { function, index, core, host });
             }

@@ -58,6 +58,14 @@ impl Probe {
         Ok(sound.then_some(ring))
     }
 
+    /// Makes the channels unknown until the program has set them up anew.
+    ///
+    /// # Errors
+    /// [`CoreError`] if the control block does not lie in memory.
+    pub fn forget(self, machine: &mut Machine) -> Result<(), CoreError> {
+        machine.poke(self.block, &[0; MARK.len()])
+    }
+
     /// Takes what channel `index` has sent.
     ///
     /// # Errors

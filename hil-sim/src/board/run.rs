@@ -68,7 +68,7 @@ pub fn check(scenario: &Scenario) -> Result<(), RunError> {
 
 /// Puts the parameters of a rig that is not the image's own into the board's flash, as
 /// `rig params` would have.
-fn store(machine: &mut Machine, scenario: &Scenario) -> Result<(), RunError> {
+pub(crate) fn store(machine: &mut Machine, scenario: &Scenario) -> Result<(), RunError> {
     if scenario.rig == Rig::prototype() {
         return Ok(());
     }

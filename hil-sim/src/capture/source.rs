@@ -26,6 +26,9 @@ pub enum SourceError {
     #[cfg(feature = "board")]
     #[error(transparent)]
     Board(#[from] crate::board::bench::BenchError),
+    /// The board at a probe.
+    #[error(transparent)]
+    Port(#[from] crate::probe::PortError),
 }
 
 /// Something that speaks the binary log.
@@ -41,6 +44,11 @@ pub trait Source {
     /// # Errors
     /// [`SourceError`] if it broke off.
     fn send(&mut self, letter: u8) -> Result<(), SourceError>;
+
+    /// What has happened to the way there since the last call, a line each.
+    fn news(&mut self) -> Vec<String> {
+        Vec::new()
+    }
 }
 
 /// Letter of a command on the console.

@@ -17,12 +17,12 @@ use crate::progress;
 use crate::scenario::Scenario;
 
 /// Sources beside a recorded stream.
-const TARGETS: [&str; 2] = ["sil", "board"];
+const TARGETS: [&str; 3] = ["sil", "board", "probe"];
 
 /// Writes the controller's log into an MCAP and a CSV file as it comes.
 ///
-/// From a recorded stream of the binary channel, from the emulated board, or from the
-/// controller on this host. What is missing is marked; a file that is cut off is read up
+/// From a recorded stream of the binary channel, from a board at a debug probe, from the
+/// emulated board, or from the controller on this host. What is missing is marked; a file that is cut off is read up
 /// to its last second. The exit code is 1 if anything is missing.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
@@ -34,7 +34,8 @@ pub(super) struct Args {
     stream: Option<PathBuf>,
 
     /// Runs a deployment and captures it: sil, the controller on this host; or board, the
-    /// firmware on an emulated board.
+    /// firmware on an emulated board. Or probe: captures what a real board does, until
+    /// Ctrl-C or --seconds; the probe may be unplugged for up to two minutes meanwhile.
     #[arg(long, value_name = "TARGET", default_value = "sil")]
     target: String,
 
@@ -75,6 +76,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     match args.target.as_str() {
         "sil" => write(args, &mut Virtual::new(&scenario, false)?, Some(&scenario)),
         "board" => board(args, &scenario),
+        "probe" => probe(args),
         other => {
             let targets = TARGETS.join(", ");
             Err(Failure::input(format!(
@@ -91,6 +93,16 @@ fn opened(file: &Path) -> Result<Bytes, Failure> {
     }
     let input = File::open(file).map_err(|error| Failure::input(format!("{name}: {error}")))?;
     Ok(Bytes::new(name, Box::new(input)))
+}
+
+#[cfg(not(feature = "probe"))]
+fn probe(_: &Args) -> Result<Outcome, Failure> {
+    Ok(Outcome::Code(crate::provision::go_on_with(crate::provision::Extra::Probe)?))
+}
+
+#[cfg(feature = "probe")]
+fn probe(args: &Args) -> Result<Outcome, Failure> {
+    write(args, &mut crate::capture::Probed::new(super::probe::patient()?), None)
 }
 
 #[cfg(not(feature = "board"))]
@@ -138,6 +150,9 @@ fn write(
     let mut view = View::default();
     while let Some(bytes) = source.read().map_err(Failure::run)? {
         writer.take(&bytes, &mut |item| view.see(item)).map_err(failed)?;
+        for line in source.news() {
+            progress.line(&line);
+        }
         if view.count(writer.tally()) {
             progress.say(&view.text(writer.tally()));
         }

@@ -1,6 +1,7 @@
 //! `rig deploy`: a whole deployment, or the way back.
 
 mod board;
+mod looped;
 
 use std::path::{Path, PathBuf};
 
@@ -9,12 +10,14 @@ use serde::Serialize;
 use super::failure::{Failure, Outcome};
 use super::output;
 use super::scenario::RunArgs;
+#[cfg(any(feature = "board", feature = "probe"))]
+use crate::firmware::FirmwareError;
 use crate::record::{Recording, Summary};
 use crate::scenario::Scenario;
 use crate::{export, progress, report, sil, table};
 
-/// Targets that this build can drive.
-const TARGETS: [&str; 2] = ["sil", "board"];
+/// What can run the controller.
+const TARGETS: [&str; 3] = ["sil", "board", "probe"];
 
 /// A whole deployment in closed loop, or the way back.
 ///
@@ -25,10 +28,16 @@ pub(super) struct Args {
     #[command(flatten)]
     run: RunArgs,
 
-    /// What runs the controller: sil, the shipping control tick on this host; or board,
-    /// the firmware itself on an emulated board.
+    /// What runs the controller: sil, the shipping control tick on this host; board, the
+    /// firmware itself on an emulated board; or probe, the firmware on a real board, the
+    /// plant on this host in the loop over its debug probe.
     #[arg(long, value_name = "TARGET", default_value = "sil")]
     target: String,
+
+    /// With --target board: the plant not at the board's pins, but in the loop as with
+    /// --target probe.
+    #[arg(long, conflicts_with_all = ["board_fault", "gdb"])]
+    hil: bool,
 
     /// Fault of the emulated board's hardware and when it comes, may be repeated:
     /// load-cell=0x8000@5.2, tread=<code>, angle-bits=<mask>, angle-lost, encoder-a,
@@ -71,32 +80,59 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     check_target(&args.target)?;
     let scenario = args.run.resolve()?;
     let directory = if args.no_files { None } else { Some(directory(args, &scenario)?) };
-    if args.target == "board" {
-        return board::run(args, &scenario, directory.as_deref());
-    }
-    if let Some(address) = &args.gdb {
-        return Err(Failure::input(format!("--gdb {address}: takes --target board")));
-    }
-    if let Some(fault) = args.board_fault.first() {
-        return Err(Failure::input(format!("--board-fault {fault}: takes --target board")));
+    match (args.target.as_str(), args.hil) {
+        ("board", false) => return board::run(args, &scenario, directory.as_deref()),
+        ("board", true) => return looped::on_board(args, &scenario, directory.as_deref()),
+        ("probe", _) => {
+            takes_board(args)?;
+            return looped::on_probe(args, &scenario, directory.as_deref());
+        }
+        _ => takes_board(args)?,
     }
     let recording = {
         let _progress = progress::spinner(scenario.run.direction.name());
         sil::run(&scenario, sil::Options { rows: directory.is_some(), speed: None })?
     };
+    conclude(args, &recording, directory.as_deref())
+}
+
+/// Writes and prints a run.
+fn conclude(
+    args: &Args,
+    recording: &Recording,
+    directory: Option<&Path>,
+) -> Result<Outcome, Failure> {
     if args.log {
         for line in &recording.log {
             eprintln!("[{:8.3}] {}", line.t_s, line.text);
         }
     }
-    let files = match &directory {
-        Some(directory) => write(&recording, &[], directory)?,
+    let files = match directory {
+        Some(directory) => write(recording, &[], directory)?,
         None => Vec::new(),
     };
     let summary = &recording.summary;
     let printed = Printed { summary, files: &files };
     output::result(args.json, &printed, || table::run(summary, &files))?;
     Ok(Outcome::of(summary.completed && summary.faults.is_empty()))
+}
+
+/// An image that has been built.
+#[cfg(any(feature = "board", feature = "probe"))]
+fn read(path: &Path) -> Result<Vec<u8>, Failure> {
+    let read = std::fs::read(path);
+    Ok(read.map_err(|source| FirmwareError::Read { path: path.to_owned(), source })?)
+}
+
+/// Refuses what the emulated board alone can do.
+fn takes_board(args: &Args) -> Result<(), Failure> {
+    let fault = args.board_fault.first().map(|fault| format!("--board-fault {fault}"));
+    let debugger = args.gdb.as_ref().map(|address| format!("--gdb {address}"));
+    let hil = (args.hil && args.target == "sil").then(|| "--hil".to_owned());
+    match debugger.or(fault).or(hil) {
+        Some(option) => Err(Failure::input(format!("{option}: takes --target board"))),
+        None => Ok(()),
+    }
 }
 
 fn check_target(target: &str) -> Result<(), Failure> {
@@ -113,7 +149,11 @@ fn directory(args: &Args, scenario: &Scenario) -> Result<PathBuf, Failure> {
         let file = args.run.scenario.file().and_then(Path::file_stem);
         let rig = file.map_or(scenario.preset.as_str().into(), |stem| stem.to_string_lossy());
         let (way, controller) = (scenario.run.direction.name(), scenario.run.controller.name());
-        let board = if args.target == "sil" { String::new() } else { format!("-{}", args.target) };
+        let board = match args.target.as_str() {
+            "sil" => String::new(),
+            "board" if args.hil => "-board-hil".to_owned(),
+            other => format!("-{other}"),
+        };
         Path::new("out").join(format!("{way}-{rig}-{controller}-{}{board}", scenario.run.seed))
     });
     // Told before the run rather than after it.
@@ -173,16 +213,32 @@ mod tests {
             default_directory(&["--target", "board"]),
             Path::new("out/deploy-prototype-scheduled-0-board")
         );
+        assert_eq!(
+            default_directory(&["--target", "board", "--hil"]),
+            Path::new("out/deploy-prototype-scheduled-0-board-hil")
+        );
         assert_eq!(default_directory(&["--out", "here"]), Path::new("here"));
     }
 
     #[test]
     fn a_target_that_is_not_there_is_refused_with_those_that_are() {
-        assert!(check_target("sil").is_ok() && check_target("board").is_ok());
-        for target in ["probe", "moon"] {
-            let error = check_target(target).unwrap_err().to_string();
-            let there = error.ends_with("available targets: sil, board");
-            assert!(error.contains(target) && there, "{error}");
+        assert!(TARGETS.into_iter().all(|target| check_target(target).is_ok()));
+        let error = check_target("moon").unwrap_err().to_string();
+        let there = error.ends_with("available targets: sil, board, probe");
+        assert!(error.contains("moon") && there, "{error}");
+    }
+
+    #[test]
+    fn what_the_emulated_board_alone_can_do_is_refused_elsewhere() {
+        for (arguments, named) in [
+            (&["--hil"][..], "--hil"),
+            (&["--target", "probe", "--board-fault", "encoder-a@1"], "--board-fault encoder-a@1"),
+            (&["--gdb", ":3333"], "--gdb :3333"),
+        ] {
+            let all = std::iter::once("rig").chain(arguments.iter().copied());
+            let args = Only::try_parse_from(all).unwrap().args;
+            let error = takes_board(&args).unwrap_err().to_string();
+            assert_eq!(error, format!("{named}: takes --target board"));
         }
     }
 }

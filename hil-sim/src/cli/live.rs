@@ -36,7 +36,8 @@ pub(super) struct Args {
     #[arg(long, value_name = "FILE", conflicts_with = "target")]
     stream: Option<PathBuf>,
 
-    /// What runs the controller: sil, this host; or board, an emulated board.
+    /// What runs the controller: sil, this host; board, an emulated board; or probe, a
+    /// real one.
     #[arg(long, value_name = "TARGET", default_value = "sil")]
     target: String,
 
@@ -71,10 +72,21 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     match args.target.as_str() {
         "sil" => watch(args, &mut Virtual::new(&scenario, !args.headless)?),
         "board" => board(args, &scenario),
+        "probe" => probe(args),
         other => Err(Failure::input(format!(
-            "--target {other}: not available; available targets: sil, board"
+            "--target {other}: not available; available targets: sil, board, probe"
         ))),
     }
+}
+
+#[cfg(not(feature = "probe"))]
+fn probe(_: &Args) -> Result<Outcome, Failure> {
+    Ok(Outcome::Code(crate::provision::go_on_with(crate::provision::Extra::Probe)?))
+}
+
+#[cfg(feature = "probe")]
+fn probe(args: &Args) -> Result<Outcome, Failure> {
+    watch(args, &mut crate::capture::Probed::new(super::probe::patient()?))
 }
 
 #[cfg(not(feature = "board"))]
@@ -131,6 +143,9 @@ fn watch(args: &Args, source: &mut dyn Source) -> Result<Outcome, Failure> {
                 server.publish(topic, clock.now_ns(), body);
             }
         });
+        for line in source.news() {
+            screen.note(line);
+        }
         screen.count(decoder.tally());
         clock.wait();
         if drawn.elapsed() < REDRAW {

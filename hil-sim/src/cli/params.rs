@@ -31,8 +31,9 @@ pub(super) struct Args {
     #[arg(long, global = true, value_name = "FILE", conflicts_with_all = ["target", "flash"])]
     file: Option<PathBuf>,
 
-    /// The place: board, the firmware on the emulated board, over its binary line.
-    #[arg(long, global = true, value_name = "TARGET", value_parser = ["board"])]
+    /// The place: board, the firmware on the emulated board, over its binary line; or
+    /// probe, a real board.
+    #[arg(long, global = true, value_name = "TARGET", value_parser = ["board", "probe"])]
     target: Option<String>,
 
     /// File that keeps the emulated board's flash from one time to the next.
@@ -70,6 +71,9 @@ enum Action {
         /// The file.
         from: Option<PathBuf>,
     },
+    /// Makes the constants anew from the rig that is there, for a board whose firmware is
+    /// of another schema than its parameters.
+    Migrate,
     /// Shows what differs from the defaults, or from a scenario file.
     Diff {
         /// The file.
@@ -94,9 +98,23 @@ struct Printed {
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     match (&args.file, args.target.as_deref()) {
         (Some(file), _) => act(args, &mut SetFile::new(file)),
+        (None, Some("probe")) => on_probe(args),
         (None, Some(_)) => on_board(args),
-        (None, None) => Err(Failure::input("where? expected --file FILE or --target board")),
+        (None, None) => {
+            Err(Failure::input("where? expected --file FILE, --target board or --target probe"))
+        }
     }
+}
+
+#[cfg(not(feature = "probe"))]
+fn on_probe(_: &Args) -> Result<Outcome, Failure> {
+    Ok(Outcome::Code(crate::provision::go_on_with(crate::provision::Extra::Probe)?))
+}
+
+#[cfg(feature = "probe")]
+fn on_probe(args: &Args) -> Result<Outcome, Failure> {
+    let mut port = super::probe::attach(None)?;
+    act(args, &mut crate::params::Client::new(&mut port as &mut dyn crate::probe::Port))
 }
 
 #[cfg(not(feature = "board"))]
@@ -110,7 +128,14 @@ fn on_board(args: &Args) -> Result<Outcome, Failure> {
 }
 
 fn act(args: &Args, store: &mut impl Store) -> Result<Outcome, Failure> {
-    let held = store.held()?;
+    let held = match store.held() {
+        // What cannot be read can be replaced all the same.
+        Err(StoreError::Set { .. }) if matches!(args.action, Action::Restore { .. }) => {
+            store.restore()?;
+            store.held()?
+        }
+        held => held?,
+    };
     let scenario = scenario_of(&held);
     match &args.action {
         Action::Get { keys } => {
@@ -143,6 +168,7 @@ fn act(args: &Args, store: &mut impl Store) -> Result<Outcome, Failure> {
             let (before, after) = differing(&scenario, &scenario_of(&now));
             show(args, &now, true, after, Some(before))
         }
+        Action::Migrate => replace(args, store, &scenario, &scenario, &held.name),
         Action::Diff { from } => {
             let other = match from {
                 Some(path) => Scenario::resolve(None, Some(path), &[])?,
@@ -245,7 +271,7 @@ fn values(rows: &[KeyInfo]) -> Map<String, Value> {
 fn human(held: &Held, rows: &[KeyInfo], before: Option<&[KeyInfo]>) -> String {
     let mut text = format!("{}, {:08x}, from {}\n", held.name, held.hash, held.origin);
     if !held.is_current() {
-        text += "its constants are of another schema: `set` or `restore` makes them anew\n";
+        text += "its constants are of another schema: `migrate` makes them anew from its rig\n";
     }
     match before {
         Some([]) => text += "no difference\n",

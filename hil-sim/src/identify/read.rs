@@ -1,17 +1,19 @@
-//! Records out of the files that `rig deploy` leaves: `log.mcap`, which has the rig's
-//! parameters with it, or `log.csv`, which has not.
+//! Records out of logs: those of `rig capture` and `log.mcap` of `rig deploy` have the
+//! sensors' own codes of every tick, and the rig's parameters if they are known.
 //!
-//! These files hold what the controller made of its sensors. Counts of the encoder are the
-//! differences of its odometry, from which its corrections at the steps are taken out:
-//! they are known by being no whole number of counts, or no way that the wheel can have
-//! gone at its speed.
+//! A `log.csv` of `rig deploy` holds what the controller made of its sensors. Counts of
+//! the encoder are then the differences of its odometry, from which its corrections at the
+//! steps are taken out: they are known by being no whole number of counts, or no way that
+//! the wheel can have gone at its speed.
 
 use std::path::Path;
 
 use serde::Deserialize;
 
 use super::IdentifyError;
-use super::record::{Record, Sample, TICK_S};
+use super::record::{Reader, Record, Sample, TICK_S};
+use crate::log::Run;
+use crate::plant::rig::Drives;
 use crate::scenario::Scenario;
 
 /// First bytes of an MCAP file.
@@ -50,6 +52,9 @@ impl Record {
         let name = path.display().to_string();
         let bad = |why: String| IdentifyError::Log { name: name.clone(), why };
         let bytes = std::fs::read(path).map_err(|error| bad(error.to_string()))?;
+        if let Ok(run) = Run::read(path) {
+            return of_codes(&name, run, scenario);
+        }
         let (lines, told) = if bytes.starts_with(MCAP) {
             of_mcap(&bytes).map_err(bad)?
         } else {
@@ -67,6 +72,29 @@ impl Record {
         record.arm_delay_s += ARM_FILTER_S;
         Ok(record)
     }
+}
+
+/// The record of a log with the sensors' codes.
+fn of_codes(name: &str, run: Run, scenario: &Scenario) -> Result<Record, IdentifyError> {
+    let scenario = match run.parameters {
+        Some(text) => Scenario::parse(name, &text, &[]).map_err(|error| IdentifyError::Log {
+            name: name.to_owned(),
+            why: error.to_string(),
+        })?,
+        None => scenario.clone(),
+    };
+    let mut reader = Reader::new(&scenario);
+    let ticked = run.rows.iter().map(|row| {
+        let driven = Drives {
+            drive: row.drive_duty,
+            drive_on: row.drive_on,
+            preload: row.preload_duty,
+            preload_on: row.preload_on,
+        };
+        (row.tick, reader.sample(&row.sensors(), &driven))
+    });
+    let ticked: Vec<_> = ticked.collect();
+    Record::new(name, scenario, ticked)
 }
 
 fn of_csv(bytes: &[u8]) -> Result<Vec<Line>, String> {
@@ -132,7 +160,6 @@ fn samples(lines: &[Line], scenario: &Scenario) -> Vec<(u32, Sample)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::record::Reader;
     use crate::record::MODE_NAMES;
     use crate::{export, sil};
 
@@ -154,18 +181,21 @@ mod tests {
         export::write_csv(&recording, &csv).unwrap();
         export::write_mcap(&recording, &mcap).unwrap();
         let [csv, mcap] = [csv, mcap].map(|path| Record::read(&path, &scenario).unwrap());
-        assert_eq!(csv.samples, mcap.samples);
+        assert_eq!(csv.samples.len(), mcap.samples.len());
         assert_eq!(mcap.scenario, scenario);
+        // The filter is the controller's.
+        assert!(csv.arm_delay_s > mcap.arm_delay_s);
 
         let mut session = sil::Session::new(&scenario, sil::Options::default()).unwrap();
         let mut reader = Reader::new(&scenario);
         let mut start = Some(interstage::supervise::Command::Start);
-        for read in &csv.samples {
+        for (read, coded) in csv.samples.iter().zip(&mcap.samples) {
             let idle = session.mode() == interstage::supervise::Mode::Idle;
             let command = if idle { start.take() } else { None };
             let frame = session.sense();
             let output = session.advance(&frame, command).unwrap();
             let sample = reader.sample(&frame, &sil::drives(output.drive, output.preload));
+            assert_eq!(&sample, coded, "the codes are the sensors' own");
             assert!((sample.counts - read.counts).abs() <= 2.0, "{sample:?} {read:?}");
             // The controller has taken its zeros.
             assert!((sample.preload_n - read.preload_n).abs() < 0.5);

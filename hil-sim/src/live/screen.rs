@@ -98,6 +98,11 @@ impl Screen {
         }
     }
 
+    /// Shows a line about the way to the board.
+    pub fn note(&mut self, text: String) {
+        self.say(Color::LightRed, text);
+    }
+
     fn keep(&mut self, row: Row) {
         self.rows.push_back(row);
         while self.rows.front().is_some_and(|first| first.t_s < row.t_s - SPAN_S) {

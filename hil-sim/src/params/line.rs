@@ -1,9 +1,12 @@
 //! A board's parameters over its binary line.
 
+use std::time::Duration;
+
 use interstage::link::{Gatherer, ToBoard, ToHost, frame};
 use interstage::params::service::{Description, Origin, PIECE, Piece, Request, Response};
 
 use super::{Held, Store, StoreError};
+use crate::probe::Port;
 
 /// How long an answer is waited for, ms of the board's time: erasing takes 50.
 const PATIENCE_MS: u32 = 1000;
@@ -24,6 +27,24 @@ pub trait Wire {
     /// # Errors
     /// Why the line is broken.
     fn receive(&mut self, milliseconds: u32) -> Result<Vec<u8>, String>;
+}
+
+/// RTT channels of the line, down and up.
+const DOWN: u32 = 1;
+const UP: u32 = 2;
+
+impl Wire for &mut dyn Port {
+    fn send(&mut self, bytes: &[u8]) -> Result<usize, String> {
+        self.down(DOWN, bytes).map_err(|error| error.to_string())
+    }
+
+    fn receive(&mut self, milliseconds: u32) -> Result<Vec<u8>, String> {
+        let (mut passed, wanted) = (Duration::ZERO, Duration::from_millis(milliseconds.into()));
+        while passed < wanted {
+            passed += self.pass().map_err(|error| error.to_string())?;
+        }
+        self.up(UP).map_err(|error| error.to_string())
+    }
 }
 
 /// Asks a board about its parameters.

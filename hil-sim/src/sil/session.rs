@@ -87,6 +87,13 @@ impl Session {
         self
     }
 
+    /// The same session with the binary log kept, whether rows are or not.
+    #[must_use]
+    pub fn logging(mut self) -> Self {
+        self.stream.get_or_insert_with(|| Stream::new(&self.scenario, &self.controller));
+        self
+    }
+
     /// The same with every ring element visited, see [`VirtualRig::visiting_all`].
     #[must_use]
     pub fn visiting_all(mut self) -> Self {
@@ -187,7 +194,7 @@ impl Session {
             Mode::Complete(way) => Some(way),
             _ => None,
         };
-        let mut recording = self.trace.finish(&self.scenario, &self.plant, arrived, wall_s);
+        let mut recording = self.trace.finish("sil", &self.scenario, &self.plant, arrived, wall_s);
         recording.stream = self.stream.map(Stream::finish).unwrap_or_default();
         recording
     }

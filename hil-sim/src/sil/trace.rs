@@ -18,7 +18,7 @@ use crate::scenario::Scenario;
 const STANDS_PART: f64 = 0.035;
 
 /// A run's record as it grows.
-pub(super) struct Trace {
+pub(crate) struct Trace {
     tally: Tally,
     told: Told,
 }
@@ -34,12 +34,12 @@ struct Told {
 }
 
 impl Trace {
-    pub(super) fn new(gap_ref: f64, start_mm: f64) -> Self {
+    pub(crate) fn new(gap_ref: f64, start_mm: f64) -> Self {
         Self { tally: Tally::new(gap_ref, start_mm), told: Told::default() }
     }
 
     /// Looks at one tick: the controller's output on the plant's state before it.
-    pub(super) fn look(&mut self, output: &Output, truth: &Truth, keep_row: bool) {
+    pub(crate) fn look(&mut self, output: &Output, truth: &Truth, keep_row: bool) {
         let Self { tally, told } = self;
         let t_s = tally.time_s();
         let seen = &output.telemetry;
@@ -64,17 +64,18 @@ impl Trace {
         tally.close_tick(seen.mode.moves(), truth);
     }
 
-    /// The record of a run that `arrived` at the end of this way by the controller's
-    /// word, if it did, and took `wall_s` to compute.
-    pub(super) fn finish(
+    /// The record of a run on `target` that `arrived` at the end of this way by the
+    /// controller's word, if it did, and took `wall_s` to compute.
+    pub(crate) fn finish(
         self,
+        target: &'static str,
         scenario: &Scenario,
         plant: &VirtualRig,
         arrived: Option<Direction>,
         wall_s: f64,
     ) -> Recording {
         let Self { tally, told } = self;
-        let ended = Ended { target: "sil", scenario, plant, arrived, wall_s };
+        let ended = Ended { target, scenario, plant, arrived, wall_s };
         tally.finish(&ended, |crossing| told.line(crossing))
     }
 }

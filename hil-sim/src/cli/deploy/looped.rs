@@ -1,0 +1,87 @@
+//! `rig deploy` with hardware in the loop: the controller on a board, the plant here.
+
+use std::path::Path;
+
+use super::Args;
+use crate::cli::failure::{Failure, Outcome};
+use crate::scenario::Scenario;
+
+/// Without the emulated board: go on with a binary that has it.
+#[cfg(not(feature = "board"))]
+pub(super) fn on_board(_: &Args, _: &Scenario, _: Option<&Path>) -> Result<Outcome, Failure> {
+    Ok(Outcome::Code(crate::provision::go_on()?))
+}
+
+#[cfg(feature = "board")]
+pub(super) fn on_board(
+    args: &Args,
+    scenario: &Scenario,
+    directory: Option<&Path>,
+) -> Result<Outcome, Failure> {
+    use crate::firmware::{self, Profile};
+    use crate::probe::EmulatedPort;
+
+    let path = firmware::build(Profile::Loop)?;
+    let elf = super::read(&path)?;
+    let mut port = EmulatedPort::new(&elf).map_err(Failure::run)?;
+    crate::board::run::store(port.machine_mut(), scenario).map_err(Failure::run)?;
+    close(args, &mut port, scenario, directory, "board")
+}
+
+/// Without probe-rs: go on with a binary that has it.
+#[cfg(not(feature = "probe"))]
+pub(super) fn on_probe(_: &Args, _: &Scenario, _: Option<&Path>) -> Result<Outcome, Failure> {
+    Ok(Outcome::Code(crate::provision::go_on_with(crate::provision::Extra::Probe)?))
+}
+
+#[cfg(feature = "probe")]
+pub(super) fn on_probe(
+    args: &Args,
+    scenario: &Scenario,
+    directory: Option<&Path>,
+) -> Result<Outcome, Failure> {
+    use crate::cli::probe::attach;
+    use crate::firmware::{self, Profile};
+    use crate::hil::Image;
+    use crate::progress;
+
+    // Told before minutes of building.
+    attach(None)?;
+    let path = firmware::build(Profile::Loop)?;
+    let image = Image::of(&super::read(&path)?)?;
+    let mut port = attach(Some(image.block))?;
+    if !image.is_on(&mut port).map_err(Failure::run)? {
+        let _progress = progress::spinner("flashing the firmware for the loop");
+        port.flash(&path).map_err(Failure::run)?;
+        eprintln!("the board now has the firmware for the loop; `cargo flash` puts the other back");
+    }
+    close(args, &mut port, scenario, directory, "probe")
+}
+
+/// Runs the scenario over this port.
+#[cfg(any(feature = "board", feature = "probe"))]
+fn close(
+    args: &Args,
+    port: &mut dyn crate::probe::Port,
+    scenario: &Scenario,
+    directory: Option<&Path>,
+    target: &'static str,
+) -> Result<Outcome, Failure> {
+    use crate::hil::{self, Asked, HilError};
+    use crate::progress;
+
+    let asked = Asked { rows: directory.is_some(), target };
+    let way = scenario.run.direction.name();
+    let recording = {
+        let progress = progress::spinner(way);
+        hil::run(port, scenario, asked, |t_s| progress.say(&format!("{way}, {t_s:.1} s")))
+    };
+    let recording = recording.map_err(|error| match error {
+        HilError::Controller(_)
+        | HilError::Rig(_)
+        | HilError::Refused(_)
+        | HilError::Parameters { .. } => Failure::input(error),
+        _ => Failure::run(error),
+    })?;
+    super::conclude(args, &recording, directory)
+}

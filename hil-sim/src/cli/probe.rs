@@ -1,0 +1,26 @@
+//! The board at a real debug probe.
+
+use std::time::Duration;
+
+use super::failure::Failure;
+use crate::probe::{Patient, PortError, RealPort};
+
+/// Time between two attempts to find a probe again.
+const PAUSE: Duration = Duration::from_millis(500);
+/// Longest time without it.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// Attaches to the board, whose channels' control block lies at `block` if that is known.
+pub(super) fn attach(block: Option<u32>) -> Result<RealPort, Failure> {
+    RealPort::attach(block).map_err(missing)
+}
+
+/// The same so that it outlives its cable.
+pub(super) fn patient() -> Result<Patient<'static>, Failure> {
+    Patient::open(|| Ok(Box::new(RealPort::attach(None)?)), PAUSE, PATIENCE).map_err(missing)
+}
+
+/// What is missing to begin with is the caller's to mend.
+fn missing(error: PortError) -> Failure {
+    Failure::input(format!("--target probe: {error}"))
+}

@@ -1,0 +1,77 @@
+//! Hardware in the loop: the plant on this host, the controller on a board, a port in
+//! between ([`interstage::hil`]).
+//!
+//! The loop is closed in lockstep, so that nothing depends on how fast the port is: a run
+//! gives the same trace as in software, bit for bit, and takes as long as it takes.
+
+mod image;
+mod line;
+mod run;
+
+use interstage::rig::RigError;
+
+use crate::plant::limits::Refusal;
+use crate::plant::rig::PlantError;
+use crate::probe::PortError;
+
+pub use image::Image;
+pub use line::HostLine;
+pub use run::{Asked, run};
+
+/// Why a run could not be made. Each is one line.
+#[derive(Debug, thiserror::Error)]
+pub enum HilError {
+    /// The port.
+    #[error(transparent)]
+    Port(#[from] PortError),
+    /// The firmware has one controller.
+    #[error("the firmware schedules: --controller {0} runs in software alone")]
+    Controller(&'static str),
+    /// The parameters do not make a planner.
+    #[error(transparent)]
+    Rig(#[from] RigError),
+    /// The plant of this seed cannot be computed.
+    #[error("plant: {0}")]
+    Refused(#[from] Refusal),
+    /// The plant left the set of meaningful states.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
+    /// Nobody answers who knows this protocol.
+    #[error("the board does not answer: it takes firmware with the feature `hil` of this version")]
+    NoAnswer,
+    /// The board fell silent.
+    #[error("the board fell silent at tick {0}")]
+    Silent(u32),
+    /// The board is not where this host is.
+    #[error("the board is at tick {board}, this host at {host}: it was started anew meanwhile")]
+    Apart {
+        /// The board's next tick.
+        board: u32,
+        /// This host's.
+        host: u32,
+    },
+    /// The board has heard nothing for too long.
+    #[error(
+        "this host was too slow: the board has turned its bridges off and gone on alone at \
+         tick {0}"
+    )]
+    Alone(u32),
+    /// The board's parameters are others than the scenario's.
+    #[error(
+        "the board runs on {board} ({board_hash}), the scenario is {scenario} \
+         ({scenario_hash}): `rig params restore FILE` puts a scenario's rig into the board"
+    )]
+    Parameters {
+        /// Name of the board's rig.
+        board: String,
+        /// Hash of its parameters.
+        board_hash: String,
+        /// Name of the scenario's.
+        scenario: String,
+        /// Hash of its parameters.
+        scenario_hash: String,
+    },
+    /// Not every tick has come back in the log.
+    #[error("the log lacks tick {0}, so that the run cannot be told")]
+    Incomplete(u32),
+}

@@ -1,0 +1,105 @@
+//! Tick by tick over a port.
+
+use std::time::Duration;
+
+use interstage::hil::{DOWN, FIRST, Given, PROTOCOL, Taken, ToBoard, ToHost, UP};
+use interstage::link::{Gatherer, frame};
+use interstage::units::Tick;
+
+use super::HilError;
+use crate::probe::Port;
+
+/// How long an answer is waited for before the question is asked again: well inside the
+/// board's own patience of 50 ms.
+const AGAIN: Duration = Duration::from_millis(10);
+/// How long it is asked in all: a board that starts takes a fifth of a second.
+const PATIENCE: Duration = Duration::from_secs(2);
+
+/// This host's end of the loop.
+pub struct HostLine<'a> {
+    port: &'a mut dyn Port,
+    gatherer: Gatherer,
+}
+
+impl<'a> HostLine<'a> {
+    /// Starts the board anew and waits until it is ready for its first tick.
+    ///
+    /// # Errors
+    /// [`HilError`] if the port fails or no board of this protocol answers.
+    pub fn begin(port: &'a mut dyn Port) -> Result<Self, HilError> {
+        port.reset()?;
+        let mut line = Self { port, gatherer: Gatherer::new() };
+        match line.ask(&ToBoard::Hello { protocol: PROTOCOL }, |_| true)? {
+            Some(ToHost::Next { tick: FIRST, alone: false }) => Ok(line),
+            Some(ToHost::Next { tick, .. }) => Err(HilError::Apart { board: tick, host: FIRST }),
+            Some(ToHost::Done(..)) | None => Err(HilError::NoAnswer),
+        }
+    }
+
+    /// Goes on with a board that runs already.
+    #[must_use]
+    pub const fn begin_at(port: &'a mut dyn Port) -> Self {
+        Self { port, gatherer: Gatherer::new() }
+    }
+
+    /// One tick of the board.
+    ///
+    /// # Errors
+    /// [`HilError`] if the port fails, the board is silent or has gone on alone.
+    pub fn tick(&mut self, tick: Tick, given: Given) -> Result<Taken, HilError> {
+        let answers = |answer: &ToHost| !matches!(answer, ToHost::Done(done, _) if *done != tick);
+        match self.ask(&ToBoard::Tick(tick, given), answers)? {
+            Some(ToHost::Done(_, taken)) => Ok(taken),
+            Some(ToHost::Next { tick, alone: true }) => Err(HilError::Alone(tick)),
+            Some(ToHost::Next { tick: board, .. }) => Err(HilError::Apart { board, host: tick }),
+            None => Err(HilError::Silent(tick)),
+        }
+    }
+
+    /// Asks how the board stands: its next tick, and whether it has gone on alone.
+    ///
+    /// # Errors
+    /// As [`HostLine::tick`].
+    pub fn stands(&mut self) -> Result<(Tick, bool), HilError> {
+        let hello = ToBoard::Hello { protocol: PROTOCOL };
+        match self.ask(&hello, |answer| matches!(answer, ToHost::Next { .. }))? {
+            Some(ToHost::Next { tick, alone }) => Ok((tick, alone)),
+            _ => Err(HilError::NoAnswer),
+        }
+    }
+
+    /// The port, for what else goes over it.
+    pub fn port(&mut self) -> &mut dyn Port {
+        self.port
+    }
+
+    /// Asks, and again, until an answer comes that answers this; none if patience ends.
+    fn ask(
+        &mut self,
+        message: &ToBoard,
+        answers: impl Fn(&ToHost) -> bool,
+    ) -> Result<Option<ToHost>, HilError> {
+        // Every message fits.
+        let Some(bytes) = frame(message) else { return Ok(None) };
+        let (mut waited, mut sent) = (Duration::ZERO, Duration::ZERO);
+        let mut left = bytes.as_slice();
+        while waited < PATIENCE {
+            if left.is_empty() && waited >= sent + AGAIN {
+                left = bytes.as_slice();
+            }
+            if !left.is_empty() {
+                left = &left[self.port.down(DOWN, left)?..];
+                sent = waited;
+            }
+            waited += self.port.pass()?;
+            for byte in self.port.up(UP)? {
+                if let Some(answer) = self.gatherer.take(byte)
+                    && answers(&answer)
+                {
+                    return Ok(Some(answer));
+                }
+            }
+        }
+        Ok(None)
+    }
+}

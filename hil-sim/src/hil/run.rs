@@ -1,0 +1,219 @@
+//! A whole run in the loop: reset, one command, arrival.
+
+use std::collections::VecDeque;
+use std::time::Instant;
+
+use interstage::control::Output;
+use interstage::hil::{FIRST, Given};
+use interstage::log::{Entry, Identity, Record, identity};
+use interstage::model::Planner;
+use interstage::supervise::Mode;
+use interstage::units::Tick;
+
+use super::{HilError, HostLine};
+use crate::log::{Decoder, Item};
+use crate::plant::draw::PlantParameters;
+use crate::plant::rig::{Truth, VirtualRig};
+use crate::plant::sensors::{Codes, Sensors};
+use crate::probe::Port;
+use crate::record::Recording;
+use crate::scenario::{ControllerKind, Direction, Scenario};
+use crate::sil::{LONGEST_S, TICK_S, Trace, drives, read, start_of};
+
+/// RTT channel of the binary log.
+const LOG: u32 = 1;
+/// RTT channel of the text log, which is read so that it does not fill.
+const TEXT: u32 = 0;
+/// Ticks between two looks at the log, of which the channel holds a hundred.
+const LOOK: Tick = 16;
+/// Ticks after the end within which the log has come: two frames and a look.
+const AFTER: Tick = 64;
+
+/// What is asked of a run beside its scenario.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Asked {
+    /// Keep one row a tick, and the log's bytes.
+    pub rows: bool,
+    /// Name of the target in the summary.
+    pub target: &'static str,
+}
+
+/// Runs a scenario with the controller on the board behind `port`; `watch` is given the
+/// time of each tick, s.
+///
+/// # Errors
+/// [`HilError`] if the run cannot be made. One that ends in a fault is a result.
+pub fn run(
+    port: &mut dyn Port,
+    scenario: &Scenario,
+    asked: Asked,
+    mut watch: impl FnMut(f64),
+) -> Result<Recording, HilError> {
+    let kind = scenario.run.controller;
+    if kind != ControllerKind::Scheduled {
+        return Err(HilError::Controller(kind.name()));
+    }
+    let mut rig = Rig::new(scenario)?;
+    let mut told = Told::new(scenario, &rig, asked.rows)?;
+    let mut line = HostLine::begin(port)?;
+    let mut start = Some(start_of(scenario));
+    let started = Instant::now();
+    let (mut tick, mut mode) = (FIRST, Mode::Boot);
+    let over = |mode: Mode| matches!(mode, Mode::Complete(_) | Mode::FaultHold(_));
+    let mut given = Given::default();
+    while !over(mode) && f64::from(tick - FIRST) * TICK_S < LONGEST_S {
+        let codes = read(&mut rig.sensors, &rig.plant);
+        let command = if mode == Mode::Idle { start.take() } else { None };
+        given = given_by(codes).with(command);
+        let taken = line.tick(tick, given)?;
+        mode = taken.mode().unwrap_or(mode);
+        told.truths.push_back(*rig.plant.truth());
+        let (drive, preload) = taken.commands();
+        rig.plant.step(&drives(drive, preload), TICK_S)?;
+        tick += 1;
+        if tick.is_multiple_of(LOOK) {
+            told.hear(line.port())?;
+            watch(f64::from(tick - FIRST) * TICK_S);
+        }
+    }
+    let wall_s = started.elapsed().as_secs_f64();
+    // The plant stands still while the rest of the log comes.
+    for tick in tick..tick + AFTER {
+        line.tick(tick, given.with(None))?;
+        if tick.is_multiple_of(LOOK) {
+            told.hear(line.port())?;
+        }
+    }
+    told.hear(line.port())?;
+    told.finish(scenario, &rig.plant, asked.target, mode, wall_s)
+}
+
+const fn given_by(codes: Codes) -> Given {
+    Given::codes(codes.wheel, codes.load_cell, codes.tread, codes.arm)
+}
+
+/// The plant and its sensors.
+struct Rig {
+    plant: VirtualRig,
+    sensors: Sensors,
+}
+
+impl Rig {
+    fn new(scenario: &Scenario) -> Result<Self, HilError> {
+        let parameters = PlantParameters::draw(scenario);
+        parameters.check(scenario.rig.preload.limit_n)?;
+        let (position, preload) = match scenario.run.direction {
+            Direction::Deploy => (0.0, 0.0),
+            Direction::Retract => (scenario.rig.rig.travel_mm, scenario.rig.preload.cruise_n),
+        };
+        let sensors = Sensors::new(parameters.sensors.clone(), scenario.run.seed);
+        Ok(Self { plant: VirtualRig::new(parameters, position, preload, TICK_S), sensors })
+    }
+}
+
+/// What the board tells of itself in its log, put to the plant's truth of the same tick.
+struct Told {
+    trace: Trace,
+    decoder: Decoder,
+    stream: Vec<u8>,
+    rows: bool,
+    /// The plant's states that no tick of the log has come for yet.
+    truths: VecDeque<Truth>,
+    /// Entries of ticks that have not come yet.
+    events: VecDeque<Entry>,
+    /// The tick that is due.
+    due: Tick,
+    name: String,
+    parameters: u32,
+}
+
+impl Told {
+    fn new(scenario: &Scenario, rig: &Rig, rows: bool) -> Result<Self, HilError> {
+        let planner = Planner::try_build(&scenario.rig)?;
+        let gap_ref = planner.gap_ref(scenario.run.direction.into()).to_num();
+        Ok(Self {
+            trace: Trace::new(gap_ref, rig.plant.truth().position_mm),
+            decoder: Decoder::new(),
+            stream: Vec::new(),
+            rows,
+            truths: VecDeque::new(),
+            events: VecDeque::new(),
+            due: FIRST,
+            name: scenario.preset.clone(),
+            parameters: identity::fingerprint(&scenario.rig),
+        })
+    }
+
+    /// Takes what the log has brought.
+    fn hear(&mut self, port: &mut dyn Port) -> Result<(), HilError> {
+        port.up(TEXT)?;
+        let bytes = port.up(LOG)?;
+        let mut items = Vec::new();
+        self.decoder.read(&bytes, &mut |item| items.push(item));
+        for item in items {
+            match item {
+                Item::Identity(identity) => self.is_scenarios(&identity)?,
+                Item::Event(entry) => self.events.push_back(entry),
+                Item::Tick(record, _) => self.tick(&record)?,
+                _ => {}
+            }
+        }
+        if self.rows {
+            self.stream.extend(bytes);
+        }
+        Ok(())
+    }
+
+    /// Whether the board runs on the scenario's parameters.
+    fn is_scenarios(&self, identity: &Identity) -> Result<(), HilError> {
+        if identity.parameters == self.parameters {
+            return Ok(());
+        }
+        Err(HilError::Parameters {
+            board: identity.rig.as_str().to_owned(),
+            board_hash: format!("{:08x}", identity.parameters),
+            scenario: self.name.clone(),
+            scenario_hash: format!("{:08x}", self.parameters),
+        })
+    }
+
+    /// A tick of the log; those behind the end have no truth and are passed over.
+    fn tick(&mut self, record: &Record) -> Result<(), HilError> {
+        let at = record.at();
+        if at != self.due {
+            return Err(HilError::Incomplete(self.due));
+        }
+        self.due += 1;
+        let mut output = Output { telemetry: record.telemetry, ..Output::default() };
+        // This host counts from zero.
+        output.telemetry.at = at - FIRST;
+        while let Some(entry) = self.events.pop_front_if(|entry| entry.at <= at) {
+            let _ = output.events.push(Entry { at: entry.at.wrapping_sub(FIRST), ..entry });
+        }
+        if let Some(truth) = self.truths.pop_front() {
+            self.trace.look(&output, &truth, self.rows);
+        }
+        Ok(())
+    }
+
+    /// The recording of a run that ended in this mode.
+    fn finish(
+        self,
+        scenario: &Scenario,
+        plant: &VirtualRig,
+        target: &'static str,
+        mode: Mode,
+        wall_s: f64,
+    ) -> Result<Recording, HilError> {
+        if !self.truths.is_empty() {
+            return Err(HilError::Incomplete(self.due));
+        }
+        let arrived = match mode {
+            Mode::Complete(way) => Some(way),
+            _ => None,
+        };
+        let mut recording = self.trace.finish(target, scenario, plant, arrived, wall_s);
+        recording.stream = self.stream;
+        Ok(recording)
+    }
+}
