@@ -5,6 +5,7 @@
 mod analog;
 #[cfg(not(feature = "hil"))]
 mod angle;
+pub(crate) mod blackbox;
 #[cfg(not(feature = "hil"))]
 mod bridge;
 #[cfg(not(feature = "hil"))]
@@ -77,7 +78,10 @@ bind_interrupts!(pub(crate) struct Irqs {
     EXTI15_10 => exti::InterruptHandler<interrupt::typelevel::EXTI15_10>;
 });
 
-/// 170 MHz from the internal oscillator: 16 MHz / 4 x 85 / 2. Its 1 % is ample,
+/// The core's clock, Hz.
+const SYSCLK_HZ: u32 = 170_000_000;
+
+/// [`SYSCLK_HZ`] from the internal oscillator: 16 MHz / 4 x 85 / 2. Its 1 % is ample,
 /// because positions come from the encoder and the plan is redone at every step;
 /// a crystal would be one more part that can stop.
 pub(crate) fn clocks() -> Config {

@@ -2,6 +2,7 @@
 //! and failure. `src/board` implements it on the STM32G474, the tests with
 //! mocks, the virtual rig with its plant.
 
+use crate::blackbox::Flight;
 use crate::log::{Entry, Identity};
 use crate::sense::raw::{AdcCode, AngleFrame, BusFault, EncoderCount};
 use crate::supervise::Command;
@@ -91,6 +92,12 @@ pub trait Motors {
 pub trait Watchdog {
     /// Restarts the time-out (100 ms on the board).
     fn feed(&mut self);
+
+    /// Keeps what the drive does in this tick where a restart finds it. A board without
+    /// such a place keeps nothing.
+    fn keep(&mut self, flight: &Flight) {
+        let _ = flight;
+    }
 }
 
 /// A source of operator commands: the board button or the log channel.

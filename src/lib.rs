@@ -12,6 +12,7 @@
 // The board's futures run on executors of one core; none has to be `Send`.
 #![allow(async_fn_in_trait)]
 
+pub mod blackbox;
 pub mod control;
 pub mod estimate;
 pub mod hal;

@@ -5,6 +5,8 @@
 
 #[cfg(target_os = "none")]
 mod board;
+#[cfg(target_os = "none")]
+use firmware::EXCHANGE;
 
 /// The image is for the board alone; on a host this says where to go.
 #[cfg(not(target_os = "none"))]
@@ -24,11 +26,10 @@ mod firmware {
     use embassy_stm32::{Peri, Peripherals, pac};
     use interstage::control::Controller;
     use interstage::hal::{Board, Parts};
-    use interstage::log::{Identity, Scribe};
+    use interstage::log::{Entry, Event, Identity, Scribe};
     use interstage::model::Planner;
     use interstage::params::service::Service;
     use interstage::tasks::{self, Exchange};
-    use panic_probe as _;
     #[cfg(not(feature = "hil"))]
     use rtt_target::DownChannel;
     use static_cell::ConstStaticCell;
@@ -38,7 +39,7 @@ mod firmware {
     use crate::board::rtt::Channels;
     #[cfg(not(feature = "hil"))]
     use crate::board::rtt::Frames;
-    use crate::board::{self, config, guard, light, rtt};
+    use crate::board::{self, blackbox, config, guard, light, rtt};
     #[cfg(not(feature = "hil"))]
     use crate::board::{Analog, Bridge, Ring};
     use crate::board::{Angle, Bridges, Button, Console, Guard, HostLine, Lamp, Lines};
@@ -48,7 +49,7 @@ mod firmware {
     #[cfg(not(feature = "hil"))]
     type Pin = Peri<'static, AnyPin>;
 
-    static EXCHANGE: Exchange = Exchange::new();
+    pub(crate) static EXCHANGE: Exchange = Exchange::new();
     #[cfg(not(feature = "hil"))]
     static LOAD_CELL: Ring = Ring::new();
     #[cfg(not(feature = "hil"))]
@@ -113,7 +114,8 @@ mod firmware {
     fn begin(threads: Spawner, channels: Channels) {
         let p = embassy_stm32::init(board::clocks());
         defmt::info!("interstage {=str}", env!("CARGO_PKG_VERSION"));
-        guard::report_restart();
+        let restart = blackbox::report();
+        EXCHANGE.log(Entry { at: 0, event: Event::Restart(restart) });
         guard::arm();
         let (console, line) = (channels.console, channels.line);
         let (mut parts, lamp, pages) = split(p, console, channels.telemetry);

@@ -29,3 +29,22 @@ pub use quotient::{fraction, part_of_sum, reciprocal_of_normalised};
 pub use root::sqrt;
 pub use sine::sin_cos;
 pub use table::Table;
+
+/// `value`, but no less than `low` and no more than `high`; `high` where the two are the
+/// wrong way round, which [`Ord::clamp`] panics on. For bounds out of the parameters.
+#[inline]
+#[must_use]
+pub fn between<T: Ord>(value: T, low: T, high: T) -> T {
+    value.max(low).min(high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::between;
+
+    #[test]
+    fn a_value_stays_between_its_bounds_and_wrong_bounds_end_at_the_upper() {
+        assert_eq!([-3, 1, 9].map(|value| between(value, 0, 5)), [0, 1, 5]);
+        assert_eq!([-3, 1, 9].map(|value| between(value, 5, 0)), [0, 0, 0]);
+    }
+}

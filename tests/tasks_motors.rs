@@ -3,9 +3,10 @@
 mod common;
 
 use common::{
-    Answer, Bench, Bridges, Operator, Record, Sensor, UNLOADED, arm_frame, forever, load_cell_code,
-    now_ms,
+    Answer, Bench, Bridges, Dog, Operator, Record, Sensor, UNLOADED, arm_frame, forever,
+    load_cell_code, now_ms,
 };
+use interstage::blackbox::Late;
 use interstage::control::Controller;
 use interstage::hal::{Light, MotorCommand};
 use interstage::log::{Entry, Event, Identity, Scribe};
@@ -25,7 +26,7 @@ struct Board {
     operator: Operator,
     motors: Record<(MotorCommand, MotorCommand)>,
     bridges: Bridges,
-    watchdog: Record<()>,
+    watchdog: Dog,
     journal: Record<Entry>,
     light: Record<Light>,
 }
@@ -51,7 +52,7 @@ impl Board {
             operator: Operator::default(),
             motors: bridges.applied.clone(),
             bridges,
-            watchdog: Record::default(),
+            watchdog: Dog::default(),
             journal: Record::default(),
             light: Record::default(),
         };
@@ -164,24 +165,53 @@ fn start_raises_the_preload_before_the_drive_moves() {
 fn the_watchdog_is_fed_every_tick_while_all_tasks_live() {
     let mut board = Board::new();
     board.bench.run_ms(1000);
-    assert_eq!(board.watchdog.times(), (1..=1000).collect::<Vec<_>>());
+    assert_eq!(board.watchdog.fed.times(), (1..=1000).collect::<Vec<_>>());
 }
 
 #[test]
-fn the_watchdog_starves_when_any_task_is_dead() {
-    for station in [
-        Station::Speed,
-        Station::Pressure,
-        Station::Displacement,
-        Station::Angle,
-        Station::Model,
-        Station::Journal,
+fn the_watchdog_starves_when_any_task_is_dead_and_the_record_names_it() {
+    for (station, name) in [
+        (Station::Speed, "speed"),
+        (Station::Pressure, "pressure"),
+        (Station::Displacement, "displacement"),
+        (Station::Angle, "angle"),
+        (Station::Model, "model"),
+        (Station::Journal, "journal"),
     ] {
         let mut board = Board::without(&[station]);
         board.bench.run_ms(500);
-        let last = board.watchdog.times().last().copied();
+        let last = board.watchdog.fed.times().last().copied();
         assert_eq!(last, Some(CHECK_IN_TICKS), "{station:?}");
+        let kept = board.watchdog.kept.items();
+        let named: Vec<&str> = kept.iter().map(|flight| flight.late.name()).collect();
+        assert!(named[..CHECK_IN_TICKS as usize].iter().all(|name| *name == "nobody"));
+        assert!(named[CHECK_IN_TICKS as usize..].iter().all(|late| *late == name), "{named:?}");
+        assert_eq!(board.exchange.unfed(500).name(), name);
     }
+}
+
+#[test]
+fn a_tick_that_comes_no_more_is_told_from_one_that_hangs() {
+    let mut board = Board::idle();
+    let now = now_ms();
+    assert_eq!(board.exchange.unfed(now), Late::NOBODY);
+    // Nobody gets the processor, and all had ended their turns.
+    board.bench.freeze_ms(100);
+    assert_eq!(board.exchange.unfed(now_ms()), Late::STARVED);
+}
+
+#[test]
+fn what_the_drive_does_is_kept_every_tick() {
+    let mut board = Board::idle();
+    board.watchdog.kept.clear();
+    board.operator.gives(&[Command::Start]);
+    board.bench.run_ms(50);
+    let kept = board.watchdog.kept.all();
+    assert_eq!(kept.len(), 50);
+    assert!(kept.iter().all(|(at, flight)| flight.tick == *at));
+    let last = kept.last().map(|(_, flight)| *flight).expect("fifty");
+    assert_eq!(last.mode(), Some(Mode::Preload(Direction::Deploy)));
+    assert_eq!((last.level, last.fault), (0, 0));
 }
 
 #[test]
@@ -202,7 +232,7 @@ fn a_hanging_sensor_is_a_fault_and_stops_neither_tick_nor_watchdog() {
         assert_eq!(board.exchange.light(), Light::Alarm);
         let ticks: Vec<u32> = board.motors.times().into_iter().filter(|&at| at > hung).collect();
         assert_eq!(ticks, (hung + 1..=now_ms()).collect::<Vec<_>>(), "{fault:?}");
-        assert_eq!(board.watchdog.times().last(), Some(&now_ms()), "{fault:?}");
+        assert_eq!(board.watchdog.fed.times().last(), Some(&now_ms()), "{fault:?}");
         let told = board.journal.items().iter().any(|entry| entry.event == Event::Fault(fault));
         assert!(told, "{fault:?} is in the log");
     }

@@ -20,6 +20,7 @@ mod live;
 mod modes;
 mod montecarlo;
 mod output;
+mod panics;
 mod paper;
 mod params;
 mod parse;
@@ -27,6 +28,7 @@ mod parse;
 mod probe;
 mod replay;
 mod report;
+mod resets;
 mod scenario;
 mod size;
 mod stress;
@@ -64,7 +66,9 @@ enum Verb {
     Keys(keys::Args),
     Params(params::Args),
     Stress(stress::Args),
+    Resets(resets::Args),
     Size(size::Args),
+    Panics(panics::Args),
     Account(account::Args),
     Constants(constants::Args),
     Docs(docs::Args),
@@ -89,7 +93,9 @@ impl Verb {
             Self::Keys(args) => keys::run(args),
             Self::Params(args) => params::run(args),
             Self::Stress(args) => stress::run(args),
+            Self::Resets(args) => resets::run(args),
             Self::Size(args) => size::run(args),
+            Self::Panics(args) => panics::run(args),
             Self::Account(args) => account::run(args),
             Self::Constants(args) => constants::run(args),
             Self::Docs(args) => docs::run(args),

@@ -16,6 +16,8 @@ pub mod identify;
 pub mod live;
 pub mod log;
 pub mod montecarlo;
+#[cfg(feature = "board")]
+pub mod panics;
 pub mod paper;
 pub mod params;
 pub mod plant;
@@ -26,6 +28,8 @@ pub mod record;
 pub mod reference;
 pub mod replay;
 pub mod report;
+#[cfg(feature = "board")]
+pub mod resets;
 pub mod scenario;
 pub mod sil;
 pub mod stress;

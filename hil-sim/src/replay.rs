@@ -203,8 +203,10 @@ impl Replay<'_> {
     /// not in the log.
     fn events(&mut self, tick: u32, output: &Output) -> (Vec<Entry>, Vec<Entry>) {
         let from = self.run.events.iter().filter(|entry| entry.at == tick);
-        let logged: Vec<Entry> =
-            from.filter(|entry| !matches!(entry.event, Event::Lost(_))).copied().collect();
+        let logged: Vec<Entry> = from
+            .filter(|entry| !matches!(entry.event, Event::Lost(_) | Event::Restart(_)))
+            .copied()
+            .collect();
         if logged.len() != output.events.len() {
             return (Vec::new(), Vec::new());
         }

@@ -1,11 +1,13 @@
 //! What makes the bridges safe when the software no longer does.
 
-use cortex_m_rt::{ExceptionFrame, exception};
 use embassy_stm32::Peri;
 use embassy_stm32::pac;
 use embassy_stm32::peripherals::IWDG;
 use embassy_stm32::wdg::IndependentWatchdog;
+use interstage::blackbox::{Flight, Reset};
 use interstage::hal::Watchdog;
+
+use super::blackbox;
 
 /// Time-out of the watchdog, us, by the nominal 32 kHz of its oscillator.
 const TIMEOUT_US: u32 = 100_000;
@@ -22,12 +24,18 @@ impl Guard {
     /// Starts it; from here on nothing but a reset stops it.
     pub(crate) fn start(&mut self) {
         self.0.unleash();
+        blackbox::look();
     }
 }
 
 impl Watchdog for Guard {
     fn feed(&mut self) {
         self.0.pet();
+        blackbox::fed();
+    }
+
+    fn keep(&mut self, flight: &Flight) {
+        blackbox::keep(flight);
     }
 }
 
@@ -45,23 +53,27 @@ pub(crate) fn arm() {
     });
 }
 
-/// Says why the board restarted, if it was not the operator, and forgets it.
-pub(crate) fn report_restart() {
-    let cause = pac::RCC.csr().read();
-    if cause.iwdgrstf() {
-        defmt::error!("restarted by the watchdog");
-    } else if cause.sftrstf() {
-        defmt::info!("restarted by software or debugger");
-    }
+/// Why the chip started, by its flags, which gather until they are taken.
+pub(super) fn take_reset() -> Reset {
+    let flags = pac::RCC.csr().read();
     pac::RCC.csr().modify(|w| w.set_rmvf(true));
+    // Every reset of the chip's own pulls the pin too; a supply that comes up raises the
+    // flag of one that was too low.
+    if flags.iwdgrstf() {
+        Reset::Watchdog
+    } else if flags.borrstf() {
+        Reset::Power
+    } else if flags.sftrstf() {
+        Reset::Software
+    } else if flags.pinrstf() {
+        Reset::Pin
+    } else {
+        Reset::Other
+    }
 }
 
-/// Panics and faults end here: bridges off, then wait for the watchdog.
-#[exception]
-unsafe fn HardFault(_frame: &ExceptionFrame) -> ! {
+/// Takes the power from both bridges, for good.
+pub(super) fn cut() {
     pac::TIM1.bdtr().modify(|w| w.set_moe(false));
     pac::TIM8.bdtr().modify(|w| w.set_moe(false));
-    loop {
-        cortex_m::asm::nop();
-    }
 }

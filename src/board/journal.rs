@@ -66,6 +66,8 @@ impl Journal for Lines {
                 warn!("[{=u32} ms] {=u32} log entries lost", at, entries);
             }
             Event::Crossing(record) => crossing(at, &record),
+            // Said when it was found, before there was a journal.
+            Event::Restart(_) => {}
         }
     }
 }

@@ -12,7 +12,7 @@
 use super::saturate::duty;
 use crate::hal::Duty;
 use crate::model::timing::SLEW_PART;
-use crate::numeric::{LowPass, LowPassState, checked};
+use crate::numeric::{LowPass, LowPassState, between, checked};
 use crate::rig::{Rig, RigError};
 use crate::units::{Newtons, NewtonsPerSecond, Q16, TICK_HZ};
 
@@ -101,13 +101,16 @@ impl PreloadLoop {
         if !state.running {
             state.start(measured);
         }
-        let change = (target - state.reference).clamp(-self.step, self.step);
+        let change = between(target - state.reference, -self.step, self.step);
         state.reference += change;
         let delayed = state.exchange(self.delay);
         let expected = self.lag.step(&mut state.model, delayed);
         let rate = change * Q16::from_num(TICK_HZ as i16) - drift;
-        let correction = ((expected - measured) * self.correction)
-            .clamp(-self.most_correction, self.most_correction);
+        let correction = between(
+            (expected - measured) * self.correction,
+            -self.most_correction,
+            self.most_correction,
+        );
         duty((rate + correction) * self.per_rate)
     }
 }

@@ -2,7 +2,7 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use crate::numeric::{checked, sqrt};
+use crate::numeric::{between, checked, sqrt};
 use crate::rig::{Rig, RigError};
 use crate::units::{MillimetresPerSecond, MillimetresPerSecond2, Q16, Travel, per_tick};
 
@@ -61,9 +61,9 @@ impl Profile {
             return;
         }
         let start = sqrt(missing.abs() + self.quantum);
-        let size = (self.root_jerk * start - self.half_jerk).clamp(Q16::ZERO, self.acceleration);
+        let size = between(self.root_jerk * start - self.half_jerk, Q16::ZERO, self.acceleration);
         let wanted = if missing < Q16::ZERO { -size } else { size };
-        let change = (wanted - state.acceleration).clamp(-self.jerk_per_tick, self.jerk_per_tick);
+        let change = between(wanted - state.acceleration, -self.jerk_per_tick, self.jerk_per_tick);
         state.acceleration += change;
         state.speed = state.speed.saturating_add(per_tick(state.acceleration)).max(Travel::ZERO);
     }

@@ -1,5 +1,6 @@
 //! Log entries: what happened, when.
 
+use crate::blackbox::Restart;
 use crate::estimate::ContactStage;
 use crate::supervise::{Command, Direction, Fault, Limit, Mode};
 use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Ratio, Seconds, Tick};
@@ -32,6 +33,8 @@ pub enum Event {
     Crossing(CrossingRecord),
     /// So many log entries were dropped here because the journal did not keep up.
     Lost(u32),
+    /// The board has started; what is known of the time before.
+    Restart(Restart),
 }
 
 /// Ledger line of one crossing as the controller saw it.

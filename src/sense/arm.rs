@@ -3,7 +3,7 @@
 #![deny(clippy::float_arithmetic)]
 
 use super::angle::Codes;
-use crate::numeric::{checked, reciprocal_of_normalised, sin_cos};
+use crate::numeric::{between, checked, reciprocal_of_normalised, sin_cos};
 use crate::rig::{MAX_STEPS, Rig, RigError};
 use crate::units::{Millimetres, Q16, Ratio, q16};
 
@@ -64,7 +64,7 @@ impl Arm {
     #[inline]
     #[must_use]
     pub fn stance(&self, angle: Codes) -> (Millimetres, Ratio) {
-        let angle = angle.clamp(self.reach.0, self.reach.1);
+        let angle = between(angle, self.reach.0, self.reach.1);
         // A turn is 2^14 codes of Q16, so 2^30: to 2^32.
         let (sine, cosine) = sin_cos((angle.to_bits() as u32) << 2);
         let lever = (i64::from(self.length.to_bits()) * i64::from(sine) + (1 << 29)) >> 30;

@@ -7,6 +7,7 @@
 use super::exchange::Station;
 use crate::units::{TICK_HZ, Tick};
 use core::future::poll_fn;
+use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 use core::task::Poll;
 use embassy_sync::waitqueue::AtomicWaker;
 use embassy_time::{Duration, Instant, TICK_HZ as CLOCK_HZ, Timer};
@@ -14,8 +15,11 @@ use embassy_time::{Duration, Instant, TICK_HZ as CLOCK_HZ, Timer};
 /// Clock ticks of the time driver in a control tick.
 const CLOCKS: u32 = (CLOCK_HZ / TICK_HZ as u64) as u32;
 
+/// Tasks of sensors, the first stations.
+const SENSORS: usize = 4;
+
 /// Ticks between two readings of the sensors, by [`Station`].
-const PERIODS: [u32; 4] = [1, 1, 1, ANGLE_PERIOD];
+pub(super) const PERIODS: [u32; SENSORS] = [1, 1, 1, ANGLE_PERIOD];
 
 /// The same of the arm's angle.
 pub(super) const ANGLE_PERIOD: u32 = 2;
@@ -24,17 +28,73 @@ pub(super) const ANGLE_PERIOD: u32 = 2;
 ///
 /// They and the control tick's task run on one executor, so that none is woken between
 /// looking at the clock and going to sleep.
-pub(super) struct Pulse([AtomicWaker; PERIODS.len()]);
+///
+/// It keeps whose turn it is as well, for whoever finds that no tick comes any more.
+pub(super) struct Pulse {
+    wakers: [AtomicWaker; SENSORS],
+    /// Number of the sensor from 1, [`TICK`], or 0.
+    turn: AtomicU8,
+    /// The tick of the latest turn.
+    ticked: AtomicU32,
+}
+
+/// The control tick among the turns.
+const TICK: u8 = u8::MAX;
+
+/// Whose turn it is in the control tick's executor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Turn {
+    /// All have ended theirs.
+    Nobody,
+    /// The control tick's.
+    Tick,
+    /// That of a sensor's task, by its station.
+    Sensor(u8),
+}
 
 impl Pulse {
     /// Nobody to wake yet.
     pub(super) const fn new() -> Self {
-        Self([const { AtomicWaker::new() }; PERIODS.len()])
+        Self {
+            wakers: [const { AtomicWaker::new() }; SENSORS],
+            turn: AtomicU8::new(0),
+            ticked: AtomicU32::new(0),
+        }
+    }
+
+    /// A turn begins.
+    pub(super) fn begin(&self, tick: Tick, turn: Turn) {
+        let number = match turn {
+            Turn::Nobody => 0,
+            Turn::Tick => TICK,
+            Turn::Sensor(station) => station + 1,
+        };
+        self.ticked.store(tick, Ordering::Relaxed);
+        self.turn.store(number, Ordering::Relaxed);
+    }
+
+    /// A turn ends.
+    pub(super) fn end(&self) {
+        self.turn.store(0, Ordering::Relaxed);
+    }
+
+    /// Whose turn it is.
+    pub(super) fn turn(&self) -> Turn {
+        match self.turn.load(Ordering::Relaxed) {
+            0 => Turn::Nobody,
+            TICK => Turn::Tick,
+            number => Turn::Sensor(number - 1),
+        }
+    }
+
+    /// The tick of the latest turn.
+    pub(super) fn ticked(&self) -> Tick {
+        self.ticked.load(Ordering::Relaxed)
     }
 
     /// Wakes the sensor tasks that are due in this tick.
     fn beat(&self, tick: Tick) {
-        for (waker, period) in self.0.iter().zip(PERIODS) {
+        for (waker, period) in self.wakers.iter().zip(PERIODS) {
             if tick.is_multiple_of(period) {
                 waker.wake();
             }
@@ -43,7 +103,7 @@ impl Pulse {
 
     /// The waker of a sensor's task; that of the last for stations that are none.
     fn of(&self, station: Station) -> &AtomicWaker {
-        &self.0[station.index().min(PERIODS.len() - 1)]
+        &self.wakers[station.index().min(SENSORS - 1)]
     }
 }
 
@@ -81,6 +141,7 @@ impl<const N: u32> Beat<N> {
     /// They do because this task is put in line before them, and the executor serves a
     /// line from its end. Would it not, the tick would find codes one tick older.
     pub(super) async fn lead(&mut self, pulse: &Pulse) -> Due {
+        pulse.begin(self.tick.wrapping_sub(N), Turn::Nobody);
         Timer::at(self.due).await;
         let mut beaten = false;
         let now = poll_fn(|context| {
@@ -89,11 +150,14 @@ impl<const N: u32> Beat<N> {
             }
             beaten = true;
             context.waker().wake_by_ref();
+            pulse.begin(self.tick, Turn::Nobody);
             pulse.beat(self.tick);
             Poll::Pending
         });
         let now = now.await;
-        self.advance(now)
+        let due = self.advance(now);
+        pulse.begin(due.tick, Turn::Tick);
+        due
     }
 
     /// Waits for the next wake-up by the pulse.
@@ -109,7 +173,9 @@ impl<const N: u32> Beat<N> {
             Poll::Pending
         });
         let now = now.await;
-        self.advance(now)
+        let due = self.advance(now);
+        pulse.begin(due.tick, Turn::Sensor(station.index() as u8));
+        due
     }
 
     /// The wake-up that has come, and on to the next.

@@ -2,7 +2,8 @@
 
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
-use super::beat::Pulse;
+use super::beat::{PERIODS, Pulse, Turn};
+use crate::blackbox::Late;
 use crate::control::{Input, Output};
 use crate::hal::Light;
 use crate::log::{Entry, Tape, Telemetry};
@@ -87,6 +88,8 @@ pub struct Exchange {
     bus_faults: [AtomicU32; 4],
     check_ins: [AtomicU32; Station::FIXED + OPERATORS],
     operators: AtomicU32,
+    /// Station whose turn it last was of those that wait for other things than time.
+    awake: AtomicU8,
 }
 
 impl Exchange {
@@ -110,6 +113,7 @@ impl Exchange {
             bus_faults: [const { AtomicU32::new(0) }; 4],
             check_ins: [const { AtomicU32::new(0) }; Station::FIXED + OPERATORS],
             operators: AtomicU32::new(0),
+            awake: AtomicU8::new(0),
         }
     }
 
@@ -202,21 +206,69 @@ impl Exchange {
         self.bus_faults.get(sensor.index()).map_or(0, |count| count.load(Ordering::Relaxed))
     }
 
-    /// Whether every task has checked in within [`CHECK_IN_TICKS`]. One that never
-    /// started counts as last seen at boot.
+    /// Who has not checked in within [`CHECK_IN_TICKS`]. One that never started counts as
+    /// last seen at boot.
     #[must_use]
-    pub fn all_checked_in(&self, now: Tick) -> bool {
+    pub fn late(&self, now: Tick) -> Late {
         let manned = Station::FIXED + self.operators.load(Ordering::Relaxed) as usize;
-        self.check_ins
-            .iter()
-            .take(manned)
-            .all(|seen| age(now, seen.load(Ordering::Relaxed)) <= CHECK_IN_TICKS)
+        self.older(now, [CHECK_IN_TICKS; Station::FIXED + OPERATORS].into_iter().take(manned))
+    }
+
+    /// Why the watchdog is not fed: who is late, or who keeps the control tick from coming.
+    #[must_use]
+    pub fn unfed(&self, now: Tick) -> Late {
+        if age(now, self.pulse.ticked()) > CHECK_IN_TICKS {
+            return self.culprit();
+        }
+        let late = self.late(now);
+        // One that does not let go keeps all others of its executor waiting as well.
+        let manned = Station::FIXED + self.operators.load(Ordering::Relaxed) as usize;
+        let all = (PERIODS.len()..manned).map(Late::station).fold(Late::NOBODY, Late::and);
+        if late == all { Late::station(self.awake.load(Ordering::Relaxed).into()) } else { late }
+    }
+
+    /// A task that waits for other things than time has got its turn.
+    pub(super) fn wake(&self, station: Station) {
+        self.awake.store(station.index() as u8, Ordering::Relaxed);
+    }
+
+    /// Who keeps the control tick from coming, as far as the check-ins tell: the task that
+    /// has begun a turn in the tick's executor and not ended it, or else the sensors'
+    /// tasks that have fallen behind the others, or something outside of it.
+    fn culprit(&self) -> Late {
+        match self.pulse.turn() {
+            Turn::Nobody => {}
+            Turn::Tick => return Late::TICK,
+            Turn::Sensor(station) => return Late::station(station.into()),
+        }
+        let ticked = self.pulse.ticked();
+        let behind = self.older(ticked, PERIODS.into_iter().map(|period| period - 1));
+        // The executor serves a line from its end: those before the one that keeps the
+        // others from their turns have had theirs.
+        behind.last().unwrap_or(Late::STARVED)
+    }
+
+    /// The stations, from the first on, that were last seen longer ago than they may.
+    fn older(&self, now: Tick, allowed: impl Iterator<Item = u32>) -> Late {
+        let mut late = Late::NOBODY;
+        for (index, (seen, ticks)) in self.check_ins.iter().zip(allowed).enumerate() {
+            if age(now, seen.load(Ordering::Relaxed)) > ticks {
+                late = late.and(Late::station(index));
+            }
+        }
+        late
     }
 
     /// A task says that it is alive.
     pub(super) fn check_in(&self, station: Station, now: Tick) {
         if let Some(seen) = self.check_ins.get(station.index()) {
             seen.store(now, Ordering::Relaxed);
+        }
+        // Whose turn it is among the sensors, the pulse keeps; theirs end with this.
+        if station.index() < PERIODS.len() {
+            self.pulse.end();
+        } else {
+            self.wake(station);
         }
     }
 
@@ -276,16 +328,16 @@ mod tests {
     #[test]
     fn one_silent_task_is_enough() {
         let exchange = Exchange::new();
-        assert!(exchange.all_checked_in(CHECK_IN_TICKS), "since boot");
-        assert!(!exchange.all_checked_in(CHECK_IN_TICKS + 1));
+        assert!(exchange.late(CHECK_IN_TICKS).is_nobody(), "since boot");
+        assert_eq!(exchange.late(CHECK_IN_TICKS + 1).bits(), 0x3F);
         let operators = [exchange.enrol_operator(), exchange.enrol_operator()];
         let all: Vec<_> = ALWAYS.into_iter().chain(operators).collect();
         for silent in &all {
             for station in &all {
                 exchange.check_in(*station, if station == silent { 1000 } else { 1030 });
             }
-            assert!(exchange.all_checked_in(1050), "{silent:?}");
-            assert!(!exchange.all_checked_in(1051), "{silent:?}");
+            assert!(exchange.late(1050).is_nobody(), "{silent:?}");
+            assert_eq!(exchange.late(1051), Late::station(silent.index()), "{silent:?}");
         }
     }
 
@@ -298,7 +350,7 @@ mod tests {
         for station in ALWAYS.into_iter().chain(seats) {
             exchange.check_in(station, 500);
         }
-        assert!(exchange.all_checked_in(500));
+        assert!(exchange.late(500).is_nobody());
     }
 
     #[test]
@@ -309,6 +361,47 @@ mod tests {
         }
         assert_eq!(exchange.lost_entries(), 7);
         assert_eq!(exchange.entries.try_receive().map(|entry| entry.at), Ok(0));
+    }
+
+    #[test]
+    fn of_tasks_that_wait_for_one_another_the_one_that_has_its_turn_is_named() {
+        let exchange = Exchange::new();
+        let operator = exchange.enrol_operator();
+        exchange.pulse.begin(1000, Turn::Nobody);
+        for station in ALWAYS.into_iter().take(4) {
+            exchange.check_in(station, 1000);
+        }
+        exchange.wake(Station::Journal);
+        assert_eq!(exchange.unfed(1000), Late::station(Station::Journal.index()));
+        exchange.check_in(operator, 0);
+        assert_eq!(exchange.unfed(1000), Late::station(operator.index()));
+        // Where the others go on, the one that does not is it.
+        exchange.check_in(Station::Journal, 990);
+        exchange.check_in(operator, 990);
+        assert_eq!(exchange.unfed(1000).name(), "model");
+    }
+
+    #[test]
+    fn who_keeps_the_tick_from_coming_is_named() {
+        let exchange = Exchange::new();
+        exchange.pulse.begin(700, Turn::Tick);
+        assert_eq!(exchange.culprit(), Late::TICK);
+        exchange.pulse.begin(701, Turn::Sensor(Station::Pressure.index() as u8));
+        assert_eq!(exchange.culprit().name(), "pressure");
+        // All turns ended, one task is behind: it was waiting in the middle of a reading.
+        exchange.pulse.begin(702, Turn::Nobody);
+        for station in ALWAYS {
+            exchange.check_in(station, if station == Station::Angle { 700 } else { 702 });
+        }
+        assert_eq!(exchange.culprit().name(), "angle");
+        // It is due every other tick alone.
+        exchange.check_in(Station::Angle, 702);
+        assert_eq!(exchange.culprit(), Late::STARVED);
+        exchange.pulse.begin(703, Turn::Nobody);
+        for station in [Station::Speed, Station::Pressure, Station::Displacement] {
+            exchange.check_in(station, 703);
+        }
+        assert_eq!(exchange.culprit(), Late::STARVED);
     }
 
     #[test]

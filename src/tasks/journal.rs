@@ -30,7 +30,9 @@ pub async fn journal(
             light.show(shown);
         }
         let news = select(exchange.entries.receive(), exchange.tape.ready());
-        if let Ok(Either::First(entry)) = with_timeout(ROUND, news).await {
+        let news = with_timeout(ROUND, news).await;
+        exchange.wake(Station::Journal);
+        if let Ok(Either::First(entry)) = news {
             write(&mut journal, scribe, &entry);
             // At most a queue full before the next check-in.
             for _ in 1..ENTRIES {

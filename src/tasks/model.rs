@@ -11,6 +11,7 @@ pub async fn model(planner: &Planner, exchange: &Exchange) -> ! {
     loop {
         exchange.check_in(Station::Model, uptime());
         if let Ok(request) = with_timeout(ROUND, exchange.request.receive()).await {
+            exchange.wake(Station::Model);
             latest(&exchange.answer, planner.plan(&request));
         }
     }

@@ -2,12 +2,13 @@
 
 use super::beat::Beat;
 use super::exchange::Exchange;
+use crate::blackbox::Recorder;
 use crate::control::{Controller, Input, Output, State};
 use crate::hal::{MotorCommand, Motors, Watchdog};
 
 /// Runs the control tick at 1 kHz: latest codes, command and plan in; bridges,
 /// request, log entries and telemetry out. Feeds the watchdog while every task is
-/// alive.
+/// alive, and keeps for a restart what the drive does and who is missing.
 ///
 /// It waits for nothing but time, and wakes the sensor tasks when it has come. A tick that starts more than a period late is
 /// marked as an overrun and the ticks missed are left out; the tick number is
@@ -21,6 +22,7 @@ pub async fn motors(
     motors.apply(MotorCommand::OFF, MotorCommand::OFF);
     let mut state = State::default();
     let mut output = Output::default();
+    let mut recorder = Recorder::default();
     let mut beat = Beat::<1>::new();
     loop {
         let due = beat.lead(&exchange.pulse).await;
@@ -32,7 +34,9 @@ pub async fn motors(
             motors.rearm();
         }
         exchange.publish(&input, &output);
-        if exchange.all_checked_in(due.tick) {
+        let late = exchange.late(due.tick);
+        watchdog.keep(&recorder.flight(&output.telemetry, late));
+        if late.is_nobody() {
             watchdog.feed();
         }
     }

@@ -12,6 +12,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Wake, Waker};
 
 use embassy_time::{Duration, Instant, MockDriver, Timer};
+use interstage::blackbox::Flight;
 use interstage::hal::{
     AnalogInput, AngleBus, CommandSource, Indicator, Journal, Light, MotorCommand, Motors,
     Watchdog, WheelEncoder,
@@ -238,9 +239,20 @@ impl Motors for Bridges {
     }
 }
 
-impl Watchdog for Record<()> {
+/// A mocked watchdog with the place that a restart finds; clones share both.
+#[derive(Clone, Default)]
+pub(crate) struct Dog {
+    pub(crate) fed: Record<()>,
+    pub(crate) kept: Record<Flight>,
+}
+
+impl Watchdog for Dog {
     fn feed(&mut self) {
-        self.push(());
+        self.fed.push(());
+    }
+
+    fn keep(&mut self, flight: &Flight) {
+        self.kept.push(*flight);
     }
 }
 

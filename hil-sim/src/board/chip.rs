@@ -42,6 +42,8 @@ pub struct Defects {
     pub dma_stalled: bool,
     /// Clearing the flags of the time driver's timer has no effect.
     pub timer_flags_stick: bool,
+    /// The line of the external interrupts 10 to 15, the button's, asks without end.
+    pub button_storm: bool,
 }
 
 /// The chip.
@@ -158,6 +160,11 @@ impl Chip {
         &self.strays
     }
 
+    /// Has every line looked at anew after a change from outside.
+    pub fn look_again(&mut self, now: u64) {
+        self.settle(now);
+    }
+
     /// Does what is due at `now`.
     pub fn advance(&mut self, now: u64) {
         self.system.advance(now);
@@ -260,7 +267,7 @@ impl Chip {
             (4, self.flash.asks()),
             (23, self.exti.asks(0x03E0)),
             (28, self.time.asks()),
-            (40, self.exti.asks(0xFC00)),
+            (40, self.exti.asks(0xFC00) || self.defects.button_storm),
         ];
         let exceptions = &mut self.system.exceptions;
         for (interrupt, high) in lines {

@@ -23,8 +23,14 @@ pub enum Fault {
     DmaStalled,
     /// Clearing the flags of the time driver's timer has no effect.
     TimerFlags,
+    /// The button's interrupt line asks without end, whatever the handler does.
+    ButtonStorm,
     /// The supply falls too low for a moment.
     BrownOut,
+    /// The reset pin is pulled for a moment.
+    ResetPin,
+    /// What runs is caught in a loop without end: the task, or the interrupt.
+    Caught,
     /// A bit of flash or RAM is turned over, past what the memory would correct: byte and
     /// bit in it.
     BitFlip(u32, u8),
@@ -46,7 +52,14 @@ impl Fault {
             Self::EncoderLine(line) => chip.defects.encoder_lines[line & 1] = true,
             Self::DmaStalled => chip.defects.dma_stalled = true,
             Self::TimerFlags => chip.defects.timer_flags_stick = true,
+            Self::ButtonStorm => {
+                chip.defects.button_storm = true;
+                let now = machine.now();
+                machine.chip_mut().look_again(now);
+            }
             Self::BrownOut => return machine.restart(Cause::Power),
+            Self::ResetPin => return machine.restart(Cause::Pin),
+            Self::Caught => return machine.catch(),
             Self::BitFlip(address, bit) => {
                 let mut byte = [0];
                 machine.peek(address, &mut byte)?;
@@ -66,7 +79,12 @@ impl Fault {
             Self::EncoderLine(line) => chip.defects.encoder_lines[line & 1] = false,
             Self::DmaStalled => chip.defects.dma_stalled = false,
             Self::TimerFlags => chip.defects.timer_flags_stick = false,
-            Self::BrownOut | Self::BitFlip(..) => {}
+            Self::ButtonStorm => {
+                chip.defects.button_storm = false;
+                let now = machine.now();
+                machine.chip_mut().look_again(now);
+            }
+            Self::BrownOut | Self::ResetPin | Self::Caught | Self::BitFlip(..) => {}
         }
     }
 }
@@ -84,8 +102,8 @@ pub struct Timed {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{0}`: expected <fault>@<seconds> with load-cell=<code>, tread=<code>, angle-bits=<mask>, \
-     angle-lost, encoder-a, encoder-b, dma-stalled, timer-flags, brown-out or \
-     flip=<address>.<bit>"
+     angle-lost, encoder-a, encoder-b, dma-stalled, timer-flags, button-storm, brown-out, \
+     reset-pin, caught or flip=<address>.<bit>"
 )]
 pub struct Misspelt(String);
 
@@ -112,7 +130,10 @@ impl FromStr for Fault {
             ("encoder-b", None) => Some(Self::EncoderLine(1)),
             ("dma-stalled", None) => Some(Self::DmaStalled),
             ("timer-flags", None) => Some(Self::TimerFlags),
+            ("button-storm", None) => Some(Self::ButtonStorm),
             ("brown-out", None) => Some(Self::BrownOut),
+            ("reset-pin", None) => Some(Self::ResetPin),
+            ("caught", None) => Some(Self::Caught),
             ("flip", Some(place)) => place.split_once('.').and_then(|(address, bit)| {
                 let bit = bit.parse().ok().filter(|bit| *bit < 8)?;
                 Some(Self::BitFlip(number(address)?, bit))
@@ -146,7 +167,10 @@ impl fmt::Display for Fault {
             Self::EncoderLine(_) => write!(f, "encoder-b"),
             Self::DmaStalled => write!(f, "dma-stalled"),
             Self::TimerFlags => write!(f, "timer-flags"),
+            Self::ButtonStorm => write!(f, "button-storm"),
             Self::BrownOut => write!(f, "brown-out"),
+            Self::ResetPin => write!(f, "reset-pin"),
+            Self::Caught => write!(f, "caught"),
             Self::BitFlip(address, bit) => write!(f, "flip={address:#x}.{bit}"),
         }
     }
@@ -167,7 +191,10 @@ mod tests {
             Fault::EncoderLine(1),
             Fault::DmaStalled,
             Fault::TimerFlags,
+            Fault::ButtonStorm,
             Fault::BrownOut,
+            Fault::ResetPin,
+            Fault::Caught,
             Fault::BitFlip(0x0800_1234, 7),
         ] {
             let timed = format!("{fault}@5.25").parse();

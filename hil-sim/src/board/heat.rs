@@ -1,7 +1,7 @@
 //! Where cycles go: those of blocks of code by the function of the source, also of what
 //! was inlined.
 
-mod names;
+pub(crate) mod names;
 
 use std::collections::BTreeMap;
 

@@ -131,6 +131,13 @@ impl Machine {
         self.tasks.names().collect()
     }
 
+    /// Name of the task that the executor is about to run, if it stands at that.
+    #[must_use]
+    pub fn task(&self) -> Option<&str> {
+        let pointer = self.core.register(Register::R(0)).ok()?;
+        self.tasks.names().nth(self.tasks.begins(self.pc, pointer)?)
+    }
+
     /// Restarts so far: when, and why.
     #[must_use]
     pub fn restarts(&self) -> &[(u64, Restart)] {
@@ -218,6 +225,27 @@ impl Machine {
         self.core.set_register(register, value)
     }
 
+    /// Catches what runs in a loop without end: it goes on at an instruction that branches
+    /// to itself.
+    ///
+    /// # Errors
+    /// [`CoreError::Engine`] if the image has no such instruction, or the engine fails.
+    pub fn catch(&mut self) -> Result<(), CoreError> {
+        const TO_ITSELF: [u8; 2] = [0xFE, 0xE7];
+        let flash = &self.loaded.flash;
+        let place = self.loaded.code.iter().find_map(|code| {
+            code.clone().step_by(2).find(|at| {
+                let at = (at - FLASH.base) as usize;
+                flash.get(at..at + 2) == Some(&TO_ITSELF)
+            })
+        });
+        let place = place.ok_or_else(|| CoreError::Engine {
+            what: "catch the program",
+            why: "the image has no loop".to_owned(),
+        })?;
+        self.set_register(Register::Pc, place)
+    }
+
     /// Power lost and back, or another restart from outside.
     ///
     /// # Errors
@@ -253,6 +281,21 @@ impl Machine {
         Ok(())
     }
 
+    /// Sees to what is due, to sleep and to an interrupt that can be taken; whether nothing
+    /// of that was to be done, so that the next instruction is the program's.
+    fn executes(&mut self, cycle: u64) -> Result<bool, CoreError> {
+        self.look_after()?;
+        if self.asleep.is_some() {
+            self.sleep(cycle);
+            return Ok(false);
+        }
+        if let Some(number) = self.takeable()? {
+            self.enter(number, self.pc, false)?;
+            return Ok(false);
+        }
+        Ok(true)
+    }
+
     /// Runs until this cycle, or the first block behind it. Returns early at a
     /// breakpoint instruction, with its address.
     ///
@@ -261,13 +304,7 @@ impl Machine {
     /// to handle.
     pub fn run_until(&mut self, cycle: u64) -> Result<Option<u32>, CoreError> {
         while self.now() < cycle {
-            self.look_after()?;
-            if self.asleep.is_some() {
-                self.sleep(cycle);
-                continue;
-            }
-            if let Some(number) = self.takeable()? {
-                self.enter(number, self.pc, false)?;
+            if !self.executes(cycle)? {
                 continue;
             }
             let stop = self.core.run(self.pc, cycle - self.now())?;
@@ -367,20 +404,14 @@ impl Machine {
     /// As [`Machine::run_until`].
     pub fn run_to(&mut self, address: u32, cycle: u64) -> Result<bool, CoreError> {
         while self.now() < cycle {
-            self.look_after()?;
-            if let Some(number) = self.takeable()? {
-                self.enter(number, self.pc, false)?;
+            if !self.executes(cycle)? {
                 continue;
             }
-            match self.core.run_to(self.pc, cycle - self.now(), address)? {
-                Stop::Spent(at) | Stop::Urgent(at) => self.pc = at & !1,
-                Stop::Return(value) => self.leave(value)?,
-                Stop::Breakpoint(at) => {
-                    self.pc = at;
-                    return Ok(false);
-                }
-                _ => return Ok(false),
+            let stop = self.core.run_to(self.pc, cycle - self.now(), address)?;
+            if self.follow(stop)?.is_some() {
+                return Ok(false);
             }
+            self.pc &= !1;
             if self.pc == address {
                 return Ok(true);
             }

@@ -1,6 +1,7 @@
 //! What a log says, as messages for other programs: the same in a file and on the
 //! network.
 
+use interstage::blackbox::Reset;
 use interstage::log::{Entry, Event};
 use serde::Serialize;
 
@@ -37,9 +38,10 @@ fn body(topic: Topic, message: &impl Serialize) -> Option<(Topic, Vec<u8>)> {
     json::bytes(message).ok().map(|bytes| (topic, bytes))
 }
 
-const fn level(entry: &Entry) -> u8 {
+fn level(entry: &Entry) -> u8 {
     match entry.event {
         Event::Fault(_) => ERROR,
+        Event::Restart(restart) if restart.reset != Reset::Power => ERROR,
         Event::Limit(_) | Event::Lost(_) | Event::Refused(_) => WARNING,
         _ => INFO,
     }

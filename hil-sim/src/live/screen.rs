@@ -9,6 +9,7 @@ use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph};
 
+use interstage::blackbox::Reset;
 use interstage::log::{Entry, Event};
 use interstage::supervise::Mode;
 
@@ -247,6 +248,7 @@ fn line(entry: &Entry) -> String {
 fn colour(entry: &Entry) -> Color {
     match entry.event {
         Event::Fault(_) => Color::Red,
+        Event::Restart(restart) if restart.reset != Reset::Power => Color::Red,
         Event::Limit(_) | Event::Lost(_) | Event::Refused(_) => Color::Yellow,
         Event::Crossing(_) => Color::Cyan,
         _ => Color::Reset,

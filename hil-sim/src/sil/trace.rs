@@ -173,6 +173,7 @@ pub fn text(event: &Event) -> String {
         Event::Fault(fault) => format!("fault {}: {}", fault.code(), fault.sentence()),
         Event::Limit(limit) => format!("limit {}: {}", limit.code(), limit.sentence()),
         Event::Lost(entries) => format!("{entries} log entries lost"),
+        Event::Restart(restart) => restart.to_string(),
         Event::Crossing(c) => format!(
             "crossing {} at {:.2} mm ({:+.2}): {:.2} mm/s, {:.1} N, gap {:.3} mm measured, \
              {:.3} mm predicted, lead {:.2} s, stiffness x{:.3}",

@@ -64,6 +64,8 @@ pub enum Cause {
     Watchdog,
     /// The program or a debugger asked for it.
     Software,
+    /// The reset pin was pulled from outside.
+    Pin,
 }
 
 impl Cause {
@@ -73,6 +75,7 @@ impl Cause {
             Self::Power => 1 << 27 | 1 << 26,
             Self::Watchdog => 1 << 29 | 1 << 26,
             Self::Software => 1 << 28 | 1 << 26,
+            Self::Pin => 1 << 26,
         }
     }
 }
