@@ -140,8 +140,8 @@ mod firmware {
             tread: Analog::new((p.ADC2, pac::ADC2), p.PC3, p.DMA1_CH2, &TREAD),
             arm: Angle::new(p.SPI1, (p.PB3, p.PA7, p.PA6), p.PB10.into()),
             motors: Bridges {
-                drive: Bridge::new(p.TIM1, p.PA8, p.PA9.into(), p.PA10.into(), p.PB12),
-                preload: Bridge::new(p.TIM8, p.PC6, p.PC8.into(), p.PC9.into(), p.PB7),
+                drive: Bridge::new((p.TIM1, pac::TIM1), p.PA8, p.PA9.into(), p.PA10.into(), p.PB12),
+                preload: Bridge::new((p.TIM8, pac::TIM8), p.PC6, p.PC8.into(), p.PC9.into(), p.PB7),
             },
             watchdog: Guard::new(p.IWDG),
             button: Button::new(p.PC13, p.EXTI13),

@@ -14,6 +14,7 @@ mod run;
 
 pub use complete::complete;
 pub use decoder::{Decoder, Item, Mark, Tally};
+pub(crate) use file::sound;
 pub use file::{FRAMES, ReadError, timed};
 pub use ledger::LedgerLine;
 pub use recording::recording;

@@ -32,7 +32,7 @@ const ROOTS: [&str; 5] = [
 ];
 
 /// Where every panic ends, and what comes before it in the libraries.
-const MACHINERY: [&str; 7] = [
+const MACHINERY: [&str; 9] = [
     "core::panicking::",
     "core::cell::panic_",
     "core::option::unwrap_failed",
@@ -40,17 +40,17 @@ const MACHINERY: [&str; 7] = [
     "core::result::unwrap_failed",
     "core::slice::index::",
     "rust_begin_unwind",
+    // The logger's own.
+    "_defmt_panic",
+    "__defmt_default_panic",
 ];
-
-/// The same of the logger's own panics.
-const LOGGER: &str = "_defmt_panic";
 
 /// Part of the names of the functions through which the executor runs tasks.
 const POLL: &str = "TaskStorage<F>::poll";
 
 /// Whether a function belongs to the machinery of panics.
 fn is_machinery(name: &str) -> bool {
-    name.ends_with(LOGGER) || MACHINERY.iter().any(|part| name.contains(part))
+    MACHINERY.iter().any(|part| name.contains(part))
 }
 
 /// A place that can panic, or that calls through a register.

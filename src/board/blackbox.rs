@@ -178,7 +178,7 @@ unsafe extern "C" {
 /// Program counter and link register of a frame, 0 if it does not lie in the stack.
 fn returns(frame: u32) -> (u32, u32) {
     let (from, to) = (&raw const _stack_end as u32, &raw const _stack_start as u32);
-    if frame % 4 != 0 || frame < from || frame > to - 32 {
+    if !frame.is_multiple_of(4) || frame < from || frame > to - 32 {
         return (0, 0);
     }
     let word = |index: u32| {

@@ -3,6 +3,7 @@
 
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AfType, AnyPin, Flex, Level, Output, OutputType, Pull, Speed};
+use embassy_stm32::pac::timer::TimAdv;
 use embassy_stm32::peripherals::{TIM1, TIM8};
 use embassy_stm32::time::khz;
 use embassy_stm32::timer::complementary_pwm::{
@@ -19,6 +20,11 @@ use interstage::hal::{MotorCommand, Motors};
 /// sense, the enable line wakes the bridge.
 pub(crate) struct Bridge<T: AdvancedInstance4Channel> {
     pwm: ComplementaryPwm<'static, T>,
+    /// The timer's registers: the driver's way to them asks in every tick what could only
+    /// have been wrong from the start on, and panics.
+    registers: TimAdv,
+    /// Counts of a period.
+    period: u32,
     forward: Output<'static>,
     enable: Output<'static>,
     _stop: Flex<'static>,
@@ -30,7 +36,7 @@ impl<T: AdvancedInstance4Channel> Bridge<T> {
     /// `stop` is the emergency stop: a contact to ground that opens. High, and so
     /// a broken wire too, takes the PWM away in hardware, whatever the software does.
     pub(crate) fn new<S: BreakInputPin<T, BkIn1>>(
-        timer: Peri<'static, T>,
+        (timer, registers): (Peri<'static, T>, TimAdv),
         pwm: Peri<'static, impl TimerPin<T, Ch1>>,
         forward: Peri<'static, AnyPin>,
         enable: Peri<'static, AnyPin>,
@@ -67,7 +73,8 @@ impl<T: AdvancedInstance4Channel> Bridge<T> {
         pwm.set_duty(Channel::Ch1, 0);
         pwm.enable(Channel::Ch1);
         pwm.set_break_enable(true);
-        Self { pwm, forward, enable, _stop: stop }
+        let period = pwm.get_max_duty();
+        Self { pwm, registers, period, forward, enable, _stop: stop }
     }
 
     /// Whether the break input has taken the outputs away.
@@ -84,15 +91,20 @@ impl<T: AdvancedInstance4Channel> Bridge<T> {
     fn set(&mut self, command: MotorCommand) {
         if !command.enable {
             self.enable.set_low();
-            self.pwm.set_duty(Channel::Ch1, 0);
+            self.chop(0);
             return;
         }
         let duty = command.duty.to_bits();
         // |duty| <= 2^15 and a period of 8500 counts: the product stays below 2^29.
-        let counts = (u32::from(duty.unsigned_abs()) * self.pwm.get_max_duty()) >> 15;
+        let counts = (u32::from(duty.unsigned_abs()) * self.period) >> 15;
         self.forward.set_level(if duty < 0 { Level::Low } else { Level::High });
-        self.pwm.set_duty(Channel::Ch1, counts);
+        self.chop(counts);
         self.enable.set_high();
+    }
+
+    /// Sets the duty, counts of the period, from the next period on.
+    fn chop(&self, counts: u32) {
+        self.registers.ccr(0).write(|w| w.set_ccr(counts as u16));
     }
 }
 

@@ -123,7 +123,8 @@ impl State {
     fn send(&mut self) {
         let Some(channel) = &mut self.channel else { return };
         channel.set_mode(ChannelMode::NoBlockSkip);
-        if self.cut || channel.write(&self.bytes[..self.length]) < self.length {
+        let frame = self.bytes.get(..self.length).unwrap_or_default();
+        if self.cut || channel.write(frame) < self.length {
             LOST.store(lost().wrapping_add(1), Ordering::Relaxed);
         }
     }

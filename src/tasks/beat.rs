@@ -10,7 +10,7 @@ use core::future::poll_fn;
 use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 use core::task::Poll;
 use embassy_sync::waitqueue::AtomicWaker;
-use embassy_time::{Duration, Instant, TICK_HZ as CLOCK_HZ, Timer};
+use embassy_time::{Instant, TICK_HZ as CLOCK_HZ, Timer};
 
 /// Clock ticks of the time driver in a control tick.
 const CLOCKS: u32 = (CLOCK_HZ / TICK_HZ as u64) as u32;
@@ -185,7 +185,9 @@ impl<const N: u32> Beat<N> {
         let missed = u32::try_from(late).unwrap_or(u32::MAX) / Self::PERIOD;
         let tick = self.tick.wrapping_add(missed.wrapping_mul(N));
         self.tick = tick.wrapping_add(N);
-        self.due += Duration::from_ticks(u64::from(Self::PERIOD) * (u64::from(missed) + 1));
+        // Half a million years until it saturates.
+        let on = u64::from(Self::PERIOD) * (u64::from(missed) + 1);
+        self.due = Instant::from_ticks(self.due.as_ticks().saturating_add(on));
         Due { tick, missed }
     }
 }

@@ -78,12 +78,13 @@ fn human(outcome: &crate::resets::Outcome) -> String {
     let mut text = format!("{}\n", plain(&head, rows));
     text += &format!(
         "{} resets: {} without a record, {} with other parameters, {} not held, {} that did not \
-         arrive; preload changed by {} N at most\n",
+         arrive; a run that hung went on for {} mm at most, preload changed by {} N at most\n",
         outcome.resets,
         outcome.unrecorded,
         outcome.parameters_changed,
         outcome.not_held,
         outcome.incomplete,
+        number(outcome.worst_hung_mm, 2),
         number(outcome.worst_preload_n, 1)
     );
     for after in &outcome.wrong {

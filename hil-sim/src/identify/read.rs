@@ -105,6 +105,7 @@ fn of_csv(bytes: &[u8]) -> Result<Vec<Line>, String> {
 /// Rows, and the parameters as TOML if the file has them.
 fn of_mcap(bytes: &[u8]) -> Result<(Vec<Line>, Option<String>), String> {
     let why = |error: mcap::McapError| error.to_string();
+    let bytes = crate::log::sound(bytes);
     let mut lines = Vec::new();
     for message in mcap::MessageStream::new(bytes).map_err(why)? {
         let message = message.map_err(why)?;

@@ -76,8 +76,31 @@ impl Run {
     }
 }
 
+/// Most that a chunk's content may be longer than it lies in the file: what LZ4 can reach.
+const EXPANSION: u64 = 256;
+
+/// The file up to the first record that says it is longer than what is left, or a chunk that
+/// says it holds more than it can: the reader takes such a length for the memory it needs.
+pub(crate) fn sound(bytes: &[u8]) -> &[u8] {
+    const CHUNK: u8 = 6;
+    // An opcode and a length; in a chunk two times come before the length of its content.
+    const HEAD: usize = 9;
+    let number = |at: usize| Some(u64::from_le_bytes(*bytes.get(at..)?.first_chunk()?));
+    let mut at = MCAP.len() + 3;
+    while let Some(length) = number(at + 1) {
+        let rest = (bytes.len() - at - HEAD) as u64;
+        let holds = if bytes[at] == CHUNK { number(at + HEAD + 16).unwrap_or(0) } else { 0 };
+        if length > rest || holds > length.saturating_mul(EXPANSION) {
+            return &bytes[..at];
+        }
+        at += HEAD + length as usize;
+    }
+    bytes
+}
+
 /// Reads messages up to the end, or to where the file was cut off.
 fn of_mcap(bytes: &[u8]) -> mcap::McapResult<Run> {
+    let bytes = sound(bytes);
     let (mut decoder, mut run) = (Decoder::new(), Run::default());
     for message in mcap::MessageStream::new_with_options(bytes, Options::IgnoreEndMagic.into())? {
         // A file without its end is read as far as it goes.
@@ -94,6 +117,7 @@ fn of_mcap(bytes: &[u8]) -> mcap::McapResult<Run> {
 
 /// The parameters that stand beside the messages.
 pub(super) fn parameters(bytes: &[u8]) -> Option<String> {
+    let bytes = sound(bytes);
     let records =
         mcap::read::LinearReader::new_with_options(bytes, Options::IgnoreEndMagic.into()).ok()?;
     records.map_while(Result::ok).find_map(|record| match record {
@@ -131,6 +155,26 @@ mod tests {
         let path = directory.path().join("log");
         std::fs::write(&path, bytes).unwrap();
         (directory, path)
+    }
+
+    #[test]
+    fn a_length_that_cannot_be_ends_the_file_there() {
+        let record = |opcode: u8, length: u64, body: &[u8]| {
+            [&[opcode][..], &length.to_le_bytes(), body].concat()
+        };
+        let head = [MCAP, b"0\r\n"].concat();
+        let good = [head, record(1, 3, b"abc"), record(6, 40, &[0; 40])].concat();
+        assert_eq!(sound(&good), good);
+        let long = [good.clone(), record(5, 1 << 62, b"xyz")].concat();
+        assert_eq!(sound(&long), good);
+        // A chunk of 24 bytes that says it holds more than 6 KiB.
+        let mut body = [0; 24];
+        body[16..].copy_from_slice(&10_000_u64.to_le_bytes());
+        let swollen = [good.clone(), record(6, 24, &body)].concat();
+        assert_eq!(sound(&swollen), good);
+        for cut in 0..good.len() {
+            assert!(sound(&good[..cut]).len() <= cut);
+        }
     }
 
     #[test]

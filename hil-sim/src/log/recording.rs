@@ -38,6 +38,7 @@ fn with_truth(bytes: &[u8]) -> Option<Recording> {
     fn read<T: DeserializeOwned>(data: &[u8]) -> Option<T> {
         serde_json::from_slice(data).ok()
     }
+    let bytes = super::sound(bytes);
     let (mut recording, mut summary) = (Recording::default(), None);
     for message in
         mcap::MessageStream::new_with_options(bytes, mcap::read::Options::IgnoreEndMagic.into())

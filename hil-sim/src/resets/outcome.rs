@@ -11,6 +11,9 @@ pub struct Outcome {
     pub resets: usize,
     /// Without a record, or with a wrong one.
     pub unrecorded: usize,
+    /// By the watchdog, of which the record does not name who hung: caught with interrupts
+    /// masked.
+    pub unnamed: usize,
     /// Whose stored parameters changed.
     pub parameters_changed: usize,
     /// That moved, drove or let go before the command.
@@ -23,6 +26,8 @@ pub struct Outcome {
     pub incomplete: usize,
     /// Most motion from reset to command, mm.
     pub worst_motion_mm: f64,
+    /// Most motion from being caught to the watchdog's reset, mm.
+    pub worst_hung_mm: f64,
     /// Most change of preload meanwhile, N.
     pub worst_preload_n: f64,
     /// The same by what reset the board.
@@ -76,12 +81,14 @@ impl Outcome {
         Self {
             resets: all.len(),
             unrecorded: count(&|a| !a.record),
+            unnamed: count(&|a| a.case.kind == Kind::Watchdog && a.late.is_empty()),
             parameters_changed: count(&|a| !a.parameters),
             not_held: count(&|a| !a.held),
             completed: count(&|a| a.completed),
             other_way: count(&|a| a.other_way),
             incomplete: count(&|a| !a.completed && !a.other_way),
             worst_motion_mm: most(all.iter().map(|a| a.motion_mm)),
+            worst_hung_mm: most(all.iter().map(|a| a.hung_mm)),
             worst_preload_n: most(all.iter().map(|a| a.preload_n)),
             kinds: kinds.collect(),
             wrong: all.iter().filter(|a| !a.wrong.is_empty()).cloned().collect(),
@@ -109,6 +116,8 @@ mod tests {
             record: true,
             parameters: true,
             held: true,
+            late: String::new(),
+            hung_mm: 0.0,
             motion_mm: 0.25 * index as f64,
             preload_n: 0.5,
             completed: true,
@@ -121,7 +130,7 @@ mod tests {
     fn one_bad_reset_is_counted_and_shown() {
         let good: Vec<After> = (0..8).map(after).collect();
         let outcome = Outcome::of(&good);
-        assert!(outcome.is_good());
+        assert!(outcome.is_good() && outcome.unnamed == 2);
         assert_eq!((outcome.resets, outcome.completed, outcome.worst_motion_mm), (8, 8, 1.75));
         assert!(outcome.kinds.iter().all(|kind| (kind.resets, kind.held) == (2, 2)));
         let spoil: [fn(&mut After); 5] = [

@@ -1,0 +1,185 @@
+//! What comes to the firmware from outside, damaged in every way: its readers refuse it
+//! and never panic. `FUZZ_SECONDS` gives each target that long instead.
+
+#[path = "common/mutate.rs"]
+mod mutate;
+
+use crc::{CRC_32_ISO_HDLC, Crc};
+use interstage::blackbox::{Crash, Flight};
+use interstage::link::{Gatherer, ToBoard, ToHost, frame};
+use interstage::log::frame::{Body, Frame, Head, Kind, LONGEST, write};
+use interstage::log::{Entry, Event, Identity};
+use interstage::params::service::{Piece, Request, Response};
+use interstage::params::slots::{
+    FlashFault, SLOT_BYTES, SetMemory, Slot, WORD_BYTES, place, stored,
+};
+use interstage::params::{MAX_SET, ParameterSet, compile};
+use interstage::rig::Rig;
+use interstage::supervise::{Command, Mode};
+
+use mutate::fuzz;
+
+const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
+fn set(rig: &Rig) -> Vec<u8> {
+    let mut room = [0; MAX_SET];
+    let length = compile("fuzz", rig, &mut room).expect("a sound rig");
+    room[..length].to_vec()
+}
+
+fn postcard<T: serde::Serialize>(value: &T) -> Vec<u8> {
+    let mut room = [0; 512];
+    postcard::to_slice(value, &mut room).expect("fits").to_vec()
+}
+
+/// With the check that fits, so that what is behind it is reached.
+fn signed(bytes: &[u8]) -> Vec<u8> {
+    [bytes, &CRC.checksum(bytes).to_le_bytes()].concat()
+}
+
+fn open_set(bytes: &[u8]) {
+    if let Ok(set) = ParameterSet::open_any(bytes) {
+        let _ = set.rig();
+        let _ = set.header().name.as_str();
+    }
+    if let Ok(set) = ParameterSet::open(bytes)
+        && let Ok((controller, rest)) = set.controller()
+    {
+        let _ = controller.corner_reach();
+        let _ = rest.planner();
+    }
+}
+
+#[test]
+fn parameter_sets() {
+    let corpus = [set(&Rig::prototype()), set(&Rig::fe())];
+    fuzz("parameter sets", &corpus, 4000, 2.0, open_set);
+    let contents = corpus.map(|set| set[..set.len() - 4].to_vec());
+    fuzz("parameter sets with their check", &contents, 4000, 2.0, |bytes| open_set(&signed(bytes)));
+}
+
+/// Flash that holds whatever it is given.
+struct Flash([Vec<u8>; 2]);
+
+impl SetMemory for Flash {
+    fn bytes(&self, slot: Slot) -> &[u8] {
+        match slot {
+            Slot::A => &self.0[0],
+            Slot::B => &self.0[1],
+        }
+    }
+
+    async fn erase(&mut self, _: Slot, _: usize) -> Result<(), FlashFault> {
+        Err(FlashFault)
+    }
+
+    async fn program(&mut self, _: Slot, _: usize, _: [u8; WORD_BYTES]) -> Result<(), FlashFault> {
+        Err(FlashFault)
+    }
+}
+
+#[test]
+fn places_of_parameter_sets() {
+    let slot = |sequence| place(&set(&Rig::prototype()), sequence).expect("fits").to_vec();
+    let corpus = [slot(1), slot(u32::MAX), vec![0xFF; SLOT_BYTES]];
+    fuzz("places", &corpus, 4000, 2.0, |bytes| {
+        let (a, b) = bytes.split_at(bytes.len().min(SLOT_BYTES));
+        let flash = Flash([a.to_vec(), b.to_vec()]);
+        if let Some(stored) = stored(&flash) {
+            open_set(stored.set);
+        }
+    });
+}
+
+#[test]
+fn frames_of_the_host_line() {
+    let piece = Piece::from_slice(&[7; 48]).expect("fits");
+    let down = [
+        Request::Describe,
+        Request::Read { offset: 99 },
+        Request::Begin { length: 3000 },
+        Request::Append(piece.clone()),
+        Request::Seal,
+        Request::Restart,
+    ];
+    let mut corpus: Vec<Vec<u8>> = down
+        .into_iter()
+        .map(|request| frame(&ToBoard::Parameters(5, request)).expect("fits").to_vec())
+        .collect();
+    let up = ToHost::Parameters(5, Response::Piece(piece));
+    corpus.push(frame(&up).expect("fits").to_vec());
+    fuzz("host line", &corpus, 20_000, 1.5, |bytes| {
+        let (mut board, mut host) = (Gatherer::new(), Gatherer::new());
+        for byte in bytes {
+            let _ = board.take::<ToBoard>(*byte);
+            let _ = host.take::<ToHost>(*byte);
+        }
+    });
+    let plain: Vec<Vec<u8>> = [Request::Begin { length: 1 }, Request::Append(Piece::new())]
+        .into_iter()
+        .map(|request| postcard(&ToBoard::Parameters(5, request)))
+        .collect();
+    fuzz("host line with its check", &plain, 20_000, 1.5, |bytes| {
+        let mut coded = vec![0; cobs::max_encoding_length(bytes.len() + 4)];
+        let length = cobs::encode(&signed(bytes), &mut coded);
+        coded.truncate(length);
+        coded.push(0);
+        let (mut board, mut host) = (Gatherer::new(), Gatherer::new());
+        for byte in &coded {
+            let _ = board.take::<ToBoard>(*byte);
+            let _ = host.take::<ToHost>(*byte);
+        }
+    });
+}
+
+fn read_frame(bytes: &mut [u8]) {
+    let Ok(frame) = Frame::open(bytes) else { return };
+    if let Ok(Body::Ticks(ticks)) = frame.body() {
+        assert!(ticks.count() <= LONGEST);
+    }
+}
+
+#[test]
+fn frames_of_the_log() {
+    let head = |kind: Kind| Head { kind: kind as u8, sequence: 77, dropped: 3 };
+    let bodies = [
+        (Kind::Identity, postcard(&Identity::default())),
+        (Kind::Event, postcard(&Entry { at: 9, event: Event::Command(Command::Stop) })),
+        (Kind::Event, postcard(&Entry { at: 10, event: Event::Mode(Mode::Idle) })),
+        (Kind::Request, vec![1; 60]),
+        (Kind::Plan, vec![1; 60]),
+        (Kind::Ticks, vec![3; 90]),
+    ];
+    let whole: Vec<Vec<u8>> = bodies
+        .iter()
+        .map(|(kind, body)| {
+            let mut room = [0; LONGEST];
+            let framed = write(&mut room, head(*kind), body);
+            framed[..framed.len() - 1].to_vec()
+        })
+        .collect();
+    fuzz("log frames", &whole, 20_000, 1.5, |bytes| read_frame(&mut bytes.to_vec()));
+    let plain: Vec<Vec<u8>> = bodies.iter().map(|(_, body)| body.clone()).collect();
+    fuzz("log frames with their check", &plain, 10_000, 2.0, |bytes| {
+        for kind in Kind::ALL {
+            let mut room = [0; LONGEST];
+            let framed = write(&mut room, head(kind), bytes);
+            let mut framed = framed[..framed.len() - 1].to_vec();
+            read_frame(&mut framed);
+        }
+    });
+}
+
+#[test]
+fn records_of_a_restart() {
+    let corpus = [vec![0xA5; 28], vec![0; 28]];
+    fuzz("records", &corpus, 20_000, 1.0, |bytes| {
+        let word = |index: usize| {
+            let bytes = bytes.get(4 * index..4 * index + 4).and_then(|b| b.try_into().ok());
+            bytes.map_or(0, u32::from_le_bytes)
+        };
+        let flight = Flight::open(&std::array::from_fn(word));
+        let crash = Crash::open(&std::array::from_fn(word));
+        assert!(flight.is_none() && crash.is_none(), "made up out of noise");
+    });
+}
