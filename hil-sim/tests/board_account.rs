@@ -3,20 +3,19 @@
 
 #![cfg(feature = "board")]
 
+#[path = "common/board.rs"]
+mod common;
+
 use hil_sim::board::account::{Account, AccountError, IMAGE, both_ways, record};
 use hil_sim::board::image::{ARGUMENTS, Image, ImageError};
 use hil_sim::board::model::measure;
 use hil_sim::firmware::{Profile, build_binary};
-use hil_sim::scenario::Scenario;
 use interstage_images::tick::Preset;
+
+use common::scenario;
 
 fn image() -> std::path::PathBuf {
     build_binary(IMAGE.0, IMAGE.1, Profile::Release, &[]).expect("the image builds")
-}
-
-fn scenario(sets: &[&str]) -> Scenario {
-    let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
-    Scenario::resolve(Some("prototype"), None, &sets).expect("a scenario")
 }
 
 #[test]

@@ -2,38 +2,22 @@
 
 #![cfg(feature = "board")]
 
-use std::sync::OnceLock;
+#[path = "common/board.rs"]
+mod common;
 
 use hil_sim::bench::budget::Budget;
 use hil_sim::board::bench::Bench;
 use hil_sim::board::chip::Pin;
 use hil_sim::board::faults::Fault;
-use hil_sim::board::log::{Line, Strings};
+use hil_sim::board::log::Line;
 use hil_sim::board::peripherals::rcc::Cause;
 use hil_sim::board::run::{self, Ran};
-use hil_sim::firmware::{self, Profile};
 use hil_sim::record::{CrossingLine, Summary};
-use hil_sim::scenario::{Direction, Scenario};
+use hil_sim::scenario::Direction;
 use hil_sim::sil::{Options, Session};
 use interstage::supervise::{Command, Mode};
 
-fn elf() -> &'static [u8] {
-    static ELF: OnceLock<Vec<u8>> = OnceLock::new();
-    ELF.get_or_init(|| {
-        let path = firmware::build(Profile::Release).expect("the firmware builds");
-        std::fs::read(path).expect("readable")
-    })
-}
-
-fn strings() -> &'static Strings {
-    static STRINGS: OnceLock<Strings> = OnceLock::new();
-    STRINGS.get_or_init(|| Strings::of(elf()).expect("it logs"))
-}
-
-fn scenario(sets: &[&str]) -> Scenario {
-    let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
-    Scenario::resolve(Some("prototype"), None, &sets).expect("a scenario")
-}
+use common::{elf, scenario, strings};
 
 /// A board under way, with what it has logged.
 struct Board {

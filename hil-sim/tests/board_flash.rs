@@ -3,36 +3,24 @@
 
 #![cfg(feature = "board")]
 
-use std::sync::OnceLock;
+#[path = "common/board.rs"]
+mod common;
 
 use hil_sim::board::bench::Bench;
-use hil_sim::board::log::Strings;
 use hil_sim::board::peripherals::flash::Cut;
 use hil_sim::board::peripherals::rcc::Cause;
 use hil_sim::board::rtt::Probe;
-use hil_sim::firmware::{self, Profile};
 use hil_sim::scenario::Scenario;
 use interstage::link::{Gatherer, ToBoard, ToHost, frame};
 use interstage::params::service::{Origin, PIECE, Piece, Request, Response};
 use interstage::params::{MAX_SET, compile};
 use interstage::rig::Rig;
 
+use common::{elf, strings};
+
 /// Channels of the binary line.
 const UP: u32 = 2;
 const DOWN: u32 = 1;
-
-fn elf() -> &'static [u8] {
-    static ELF: OnceLock<Vec<u8>> = OnceLock::new();
-    ELF.get_or_init(|| {
-        let path = firmware::build(Profile::Release).expect("the firmware builds");
-        std::fs::read(path).expect("readable")
-    })
-}
-
-fn strings() -> &'static Strings {
-    static STRINGS: OnceLock<Strings> = OnceLock::new();
-    STRINGS.get_or_init(|| Strings::of(elf()).expect("it logs"))
-}
 
 /// A set that the image does not carry.
 fn set() -> Vec<u8> {

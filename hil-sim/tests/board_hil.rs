@@ -3,6 +3,9 @@
 
 #![cfg(feature = "board")]
 
+#[path = "common/board.rs"]
+mod common;
+
 use std::sync::OnceLock;
 use std::time::Duration;
 
@@ -21,17 +24,14 @@ use interstage::hil::{FIRST, Given, Taken};
 use interstage::rig::Rig;
 use interstage::supervise::{Command, Fault, Mode};
 
+use common::scenario;
+
 fn elf() -> &'static [u8] {
     static ELF: OnceLock<Vec<u8>> = OnceLock::new();
     ELF.get_or_init(|| {
         let path = firmware::build(Profile::Loop).expect("the firmware builds");
         std::fs::read(path).expect("readable")
     })
-}
-
-fn scenario(sets: &[&str]) -> Scenario {
-    let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
-    Scenario::resolve(Some("prototype"), None, &sets).expect("a scenario")
 }
 
 fn board() -> EmulatedPort {

@@ -2,42 +2,26 @@
 
 #![cfg(feature = "board")]
 
+#[path = "common/board.rs"]
+mod common;
+
 use std::collections::VecDeque;
 use std::io::Write;
 use std::process::{Command, Stdio};
-use std::sync::OnceLock;
 
 use hil_sim::board::bench::{Bench, STEP};
-use hil_sim::board::log::{Line, Strings};
+use hil_sim::board::log::Line;
 use hil_sim::board::machine::Poll;
 use hil_sim::board::peripherals::rcc::Cause;
 use hil_sim::board::run;
-use hil_sim::firmware::{self, Profile};
 use hil_sim::log::{Decoder, Item, Mark, Row, Run};
 use hil_sim::replay::replay;
-use hil_sim::scenario::Scenario;
 use interstage::log::capture::Trigger;
 use interstage::rig::Rig;
 use interstage::supervise::Mode;
 use interstage::units::Q16;
 
-fn elf() -> &'static [u8] {
-    static ELF: OnceLock<Vec<u8>> = OnceLock::new();
-    ELF.get_or_init(|| {
-        let path = firmware::build(Profile::Release).expect("the firmware builds");
-        std::fs::read(path).expect("readable")
-    })
-}
-
-fn strings() -> &'static Strings {
-    static STRINGS: OnceLock<Strings> = OnceLock::new();
-    STRINGS.get_or_init(|| Strings::of(elf()).expect("it logs"))
-}
-
-fn scenario(sets: &[&str]) -> Scenario {
-    let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
-    Scenario::resolve(Some("prototype"), None, &sets).expect("a scenario")
-}
+use common::{elf, scenario, strings};
 
 /// How far the log may be from the truth under way. Position: the tolerance of the steps'
 /// places, which the controller knows from its table and corrects itself by. Preload: two

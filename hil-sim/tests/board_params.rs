@@ -2,19 +2,22 @@
 
 #![cfg(feature = "board")]
 
+#[path = "common/board.rs"]
+mod common;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use std::sync::OnceLock;
 
 use hil_sim::board::bench::Bench;
 use hil_sim::board::log::Strings;
-use hil_sim::firmware::{self, Profile};
 use hil_sim::params::board::PLACES;
 use hil_sim::params::set_of;
 use hil_sim::scenario::Scenario;
 use interstage::params::{ParameterSet, SCHEMA, SetError, slots};
 use interstage::rig::Rig;
 use serde_json::Value;
+
+use common::elf;
 
 /// A place for the board's flash, and for files.
 struct Place(tempfile::TempDir);
@@ -108,14 +111,6 @@ fn parameters_are_read_changed_saved_and_restored() {
     let again = place.good(&["restore", "mine.toml"]);
     assert_eq!(again["parameters"][KEY], 0.12);
     assert_eq!((&again["name"], &again["hash"]), (&"mine".into(), &set["hash"]));
-}
-
-fn elf() -> &'static [u8] {
-    static ELF: OnceLock<Vec<u8>> = OnceLock::new();
-    ELF.get_or_init(|| {
-        let path = firmware::build(Profile::Release).expect("the firmware builds");
-        std::fs::read(path).expect("readable")
-    })
 }
 
 /// What a board with this flash says in so many milliseconds, and whether a bridge was

@@ -3,14 +3,13 @@
 
 #![cfg(feature = "board")]
 
-use std::sync::OnceLock;
+#[path = "common/board.rs"]
+mod common;
 
 use hil_sim::board::bench::{Bench, Passed, STEP};
 use hil_sim::board::core::Register;
 use hil_sim::board::faults::Fault;
-use hil_sim::board::log::Strings;
 use hil_sim::board::peripherals::rcc::Cause;
-use hil_sim::firmware::{self, Profile};
 use hil_sim::log::Run;
 use hil_sim::resets;
 use hil_sim::scenario::Scenario;
@@ -18,18 +17,7 @@ use interstage::blackbox::{Late, Reset, Restart, Stopped};
 use interstage::log::Event;
 use interstage::supervise::{Direction, Mode};
 
-fn elf() -> &'static [u8] {
-    static ELF: OnceLock<Vec<u8>> = OnceLock::new();
-    ELF.get_or_init(|| {
-        let path = firmware::build(Profile::Release).expect("the firmware builds");
-        std::fs::read(path).expect("readable")
-    })
-}
-
-fn strings() -> &'static Strings {
-    static STRINGS: OnceLock<Strings> = OnceLock::new();
-    STRINGS.get_or_init(|| Strings::of(elf()).expect("it logs"))
-}
+use common::{elf, strings};
 
 /// A board under way.
 struct Board {
