@@ -1,10 +1,15 @@
 //! Modes, commands, faults and limits, and the one table of transitions.
 
+#[cfg(not(target_os = "none"))]
+mod account;
+mod crosscheck;
 mod fault;
 mod mode;
 mod monitor;
 mod transition;
 
+#[cfg(not(target_os = "none"))]
+pub use account::Account;
 pub use fault::{Fault, Limit};
 pub use mode::{Command, Direction, Leg, Mode};
 pub use monitor::{Monitor, MonitorState, Observed};

@@ -46,8 +46,8 @@ impl Board {
             bench: Bench::new(),
             exchange: forever(Exchange::new()),
             wheel: Sensor::new(0),
-            load_cell: Sensor::new(UNLOADED),
-            tread: Sensor::new(UNLOADED),
+            load_cell: Sensor::alive(UNLOADED),
+            tread: Sensor::alive(UNLOADED),
             arm: Sensor::new(arm_frame(0)),
             operator: Operator::default(),
             motors: bridges.applied.clone(),
@@ -244,8 +244,8 @@ fn a_dead_model_task_does_not_hold_up_the_tick() {
     board.reach(Mode::Idle, 3000);
     board.operator.gives(&[Command::Start]);
     board.reach(Mode::Preload(Direction::Deploy), 20);
-    // The preload comes up, but no plan: the drive has nothing to follow.
-    board.load_cell.answers(Answer::Code(load_cell_code(33.3)));
+    // Some preload comes up, but no plan: the drive has nothing to follow.
+    board.load_cell.answers(Answer::Code(load_cell_code(5.0)));
     let before = now_ms();
     board.bench.run_ms(300);
     let ticks: Vec<u32> = board.motors.times().into_iter().filter(|&at| at > before).collect();

@@ -14,6 +14,7 @@ mod crossing;
 mod deploy;
 mod docs;
 mod failure;
+mod faults;
 mod identify;
 mod keys;
 mod live;
@@ -61,6 +62,7 @@ enum Verb {
     Bench(bench::Args),
     Compare(compare::Args),
     Montecarlo(montecarlo::Args),
+    Faults(faults::Args),
     Paper(paper::Args),
     Identify(identify::Args),
     Keys(keys::Args),
@@ -88,6 +90,7 @@ impl Verb {
             Self::Bench(args) => bench::run(args),
             Self::Compare(args) => compare::run(args),
             Self::Montecarlo(args) => montecarlo::run(args),
+            Self::Faults(args) => faults::run(args),
             Self::Paper(args) => paper::run(args),
             Self::Identify(args) => identify::run(args),
             Self::Keys(args) => keys::run(args),

@@ -3,9 +3,11 @@
 pub mod blocks;
 pub mod model;
 mod modes;
+mod safety;
 
 pub use model::{fill_model, model_svg};
 pub use modes::modes;
+pub use safety::fill_safety;
 
 /// Head of a generated page.
 #[must_use]

@@ -10,6 +10,7 @@ pub mod compare;
 pub mod constants;
 pub mod docs;
 pub mod export;
+pub mod faults;
 pub mod firmware;
 pub mod hil;
 pub mod identify;

@@ -236,6 +236,9 @@ pub struct Summary {
     pub faults: Vec<Report>,
     /// Active limits reported.
     pub limits: Vec<Report>,
+    /// Faults that the scenario brought about.
+    #[serde(default)]
+    pub injected: Vec<String>,
     /// Simulated over wall-clock time.
     pub real_time_factor: f64,
     /// SHA-256 over the controller's trace.

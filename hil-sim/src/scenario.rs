@@ -4,6 +4,7 @@
 
 mod docs;
 mod error;
+mod injections;
 mod keys;
 mod merge;
 mod run;
@@ -178,6 +179,12 @@ impl Scenario {
     /// anomalies of the run applied.
     #[must_use]
     pub fn true_steps_mm(&self) -> Vec<f64> {
+        self.true_steps().into_iter().map(|(position, _)| position).collect()
+    }
+
+    /// The same, each with how much higher than the table says it is, mm.
+    #[must_use]
+    pub fn true_steps(&self) -> Vec<(f64, f64)> {
         run::apply(&self.rig.rig.step_positions_mm, &self.run.anomalies)
     }
 

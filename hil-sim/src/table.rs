@@ -21,6 +21,9 @@ pub fn run(summary: &Summary, files: &[PathBuf]) -> String {
     if !summary.crossings.is_empty() {
         text += &format!("{}\n", ledger(&summary.crossings));
     }
+    for fault in &summary.injected {
+        text += &wrapped(&format!("brought about: {fault}"), "  ");
+    }
     for (kind, reports) in [("fault", &summary.faults), ("limit", &summary.limits)] {
         for report in reports {
             text += &wrapped(&report_line(kind, report), "  ");

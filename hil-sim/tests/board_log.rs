@@ -7,12 +7,12 @@ use std::io::Write;
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
 
-use hil_sim::board::bench::Bench;
-use hil_sim::board::load::Gathered;
+use hil_sim::board::bench::{Bench, STEP};
 use hil_sim::board::log::{Line, Strings};
+use hil_sim::board::machine::Poll;
 use hil_sim::board::peripherals::rcc::Cause;
 use hil_sim::board::run;
-use hil_sim::firmware::{self, Footprint, Profile};
+use hil_sim::firmware::{self, Profile};
 use hil_sim::log::{Decoder, Item, Mark, Row, Run};
 use hil_sim::replay::replay;
 use hil_sim::scenario::Scenario;
@@ -39,11 +39,11 @@ fn scenario(sets: &[&str]) -> Scenario {
     Scenario::resolve(Some("prototype"), None, &sets).expect("a scenario")
 }
 
-/// How far the log may be from the truth under way: position by half a step's tolerance
-/// from the recognition of the last step to the next; preload by four deviations of the
-/// load cell and what it lags behind at the steepest rise.
-const POSITION_MM: f64 = 0.5;
-const PRELOAD_N: f64 = 2.0;
+/// How far the log may be from the truth under way. Position: the tolerance of the steps'
+/// places, which the controller knows from its table and corrects itself by. Preload: two
+/// deviations of the load cell's gain at 50 N, six of its noise, and its age.
+const POSITION_MM: f64 = 0.8;
+const PRELOAD_N: f64 = 1.0;
 
 /// A board under way, with what it has said on both channels.
 struct Board {
@@ -124,14 +124,67 @@ enum Reader {
 /// is the time and the place.
 type Crossings = Vec<Vec<f64>>;
 
+/// What the control tick cost, tick by tick, and when it began.
+#[derive(Default)]
+struct Ticks {
+    /// The turn of the tick's task that wakes the sensors, before the one that ticks.
+    lead: Option<Poll>,
+    cycles: Vec<u64>,
+    starts: Vec<u64>,
+}
+
+impl Ticks {
+    fn gather(&mut self, board: &mut Board) {
+        let machine = board.bench.machine_mut();
+        let tick = machine.tasks().iter().position(|name| *name == "motors").expect("the tick");
+        for turn in machine.profile_mut().take_polls() {
+            if turn.task != tick {
+                continue;
+            }
+            match self.lead.take() {
+                Some(lead) if turn.began - lead.began < STEP / 2 => {
+                    self.cycles.push(lead.cycles + turn.cycles);
+                    self.starts.push(turn.began);
+                }
+                _ => self.lead = Some(turn),
+            }
+        }
+    }
+
+    /// Mean and most cycles.
+    fn cost(&self) -> [f64; 2] {
+        let sum: u64 = self.cycles.iter().sum();
+        [
+            sum as f64 / self.cycles.len() as f64,
+            self.cycles.iter().copied().max().unwrap_or_default() as f64,
+        ]
+    }
+
+    /// Deviation of the beginnings from an even beat, cycles, and from the earliest to the
+    /// latest.
+    fn jitter(&self) -> [f64; 2] {
+        let first = self.starts[0];
+        let phases = self.starts.iter().map(|at| {
+            let beats = (at - first + STEP / 2) / STEP;
+            (at - first) as f64 - (beats * STEP) as f64
+        });
+        let phases: Vec<f64> = phases.collect();
+        let mean = phases.iter().sum::<f64>() / phases.len() as f64;
+        let square = phases.iter().map(|phase| (phase - mean).powi(2)).sum::<f64>();
+        let most = phases.iter().copied().fold(f64::MIN, f64::max);
+        let least = phases.iter().copied().fold(f64::MAX, f64::min);
+        [(square / phases.len() as f64).sqrt(), most - least]
+    }
+}
+
 /// A run until the drive has arrived: how long it took, ms, what the text log says of the
 /// crossings, and what the tick cost.
-fn deployment(reader: Reader) -> (u32, Crossings, hil_sim::board::load::Load) {
+fn deployment(reader: Reader) -> (u32, Crossings, Ticks) {
     let mut board = Board::off();
     board.bench.listen(reader == Reader::There);
     board.until("mode: idle", 3000);
-    let (mut gathered, mut crossings) = (Gathered::default(), Vec::new());
-    gathered.begin(board.bench.machine_mut());
+    let (mut ticks, mut crossings) = (Ticks::default(), Vec::new());
+    board.bench.machine_mut().profile_mut().take_polls();
     board.send(b's');
     for millisecond in 0..8000 {
         if reader == Reader::Stalled {
@@ -141,11 +194,9 @@ fn deployment(reader: Reader) -> (u32, Crossings, hil_sim::board::load::Load) {
         board.bench.take_frames();
         let closed = lines.iter().filter(|line| line.text.contains("] step "));
         crossings.extend(closed.map(|line| line.numbers()[4..].to_vec()));
-        gathered.gather(board.bench.machine_mut(), 5);
+        ticks.gather(&mut board);
         if lines.iter().any(|line| line.text.contains("mode: deployed")) {
-            let footprint = Footprint::of_elf(elf()).expect("an image");
-            let machine = board.bench.into_machine();
-            return (millisecond, crossings, gathered.close(&machine, &footprint, 0));
+            return (millisecond, crossings, ticks);
         }
     }
     panic!("it did not arrive");
@@ -154,7 +205,7 @@ fn deployment(reader: Reader) -> (u32, Crossings, hil_sim::board::load::Load) {
 #[test]
 fn a_reader_that_stalls_or_is_not_there_changes_neither_tick_nor_jitter() {
     let read = deployment(Reader::There);
-    for reader in [Reader::Absent, Reader::Stalled] {
+    for (name, reader) in [("absent", Reader::Absent), ("stalled", Reader::Stalled)] {
         let unread = deployment(reader);
         // The journal's time differs by the copying of its frames, and with it the cycle
         // in which an interrupt is taken; the loop amplifies that as it does any noise.
@@ -165,16 +216,17 @@ fn a_reader_that_stalls_or_is_not_there_changes_neither_tick_nor_jitter() {
         for (read, unread) in read.1.iter().flatten().zip(unread.1.iter().flatten()) {
             assert!((read - unread).abs() <= 0.3 + 0.02 * unread.abs(), "{read} {unread}");
         }
-        let (with, without) = (&read.2, &unread.2);
-        let (tick, start) = ((with.tick, without.tick), (with.start, without.start));
+        let (cost, jitter) =
+            ([read.2.cost(), unread.2.cost()], [read.2.jitter(), unread.2.jitter()]);
         println!(
-            "tick {:.1} against {:.1} cycles, at worst {} and {}; jitter {} and {}",
-            tick.0.mean, tick.1.mean, tick.0.worst, tick.1.worst, start.0.jitter, start.1.jitter
+            "{name}: cycles, mean and most, {cost:.1?}; jitter, deviation and all, {jitter:.1?}"
         );
-        let near = |a: f64, b: f64| (a / b - 1.0).abs() <= 0.02;
-        assert!(near(tick.0.mean, tick.1.mean), "{tick:?}");
-        assert!(near(tick.0.worst as f64, tick.1.worst as f64), "{tick:?}");
-        assert!(near(start.0.jitter as f64, start.1.jitter as f64), "{start:?}");
+        let off = |pair: [[f64; 2]; 2], at: usize| (pair[0][at] / pair[1][at] - 1.0).abs();
+        assert!(off(cost, 0) <= 0.02 && off(cost, 1) <= 0.02, "{name}: {cost:?}");
+        assert!(off(jitter, 0) <= 0.02, "{name}: {jitter:?}");
+        // The extreme of seven thousand beginnings is which interrupt happened to meet
+        // which block of code, of which the longest take a hundred cycles.
+        assert!((jitter[0][1] - jitter[1][1]).abs() <= 100.0, "{name}: {jitter:?}");
     }
 }
 
@@ -212,7 +264,7 @@ fn the_text_log_reads_as_defmt_print_reads_it() {
         .collect();
     let ours: Vec<(String, String)> =
         board.lines.iter().map(|line| (line.level.clone(), line.text.clone())).collect();
-    assert!(ours.len() > 40, "{} lines", ours.len());
+    assert!(ours.len() > 30, "{} lines", ours.len());
     assert_eq!(ours, printed);
 }
 
@@ -281,13 +333,18 @@ fn resident() -> Option<u64> {
 /// round, and nothing on the board or about it grows.
 #[test]
 fn minutes_of_deploying_and_retracting_are_logged_without_a_gap_or_drift() {
-    const ROUNDS: usize = 12;
+    const ROUNDS: usize = 24;
     let mut board = Board::off();
     board.until("mode: idle", 3000);
     let (mut decoder, mut truths) = (Decoder::new(), VecDeque::new());
     let mut due: Option<u32> = None;
     let mut worst = [(0.0, 0.0); ROUNDS];
-    let (mut log, mut settled) = (Vec::new(), None);
+    let (mut log, mut settled) = (std::mem::take(&mut board.frames), None);
+    decoder.read(&log, &mut |item| {
+        if let Item::Tick(record, _) = item {
+            due = Some(record.at() + 1);
+        }
+    });
     for (round, worst) in worst.iter_mut().enumerate() {
         let (letter, arrived) =
             if round % 2 == 0 { (b's', "mode: deployed") } else { (b'r', "mode: retracted") };
@@ -296,6 +353,8 @@ fn minutes_of_deploying_and_retracting_are_logged_without_a_gap_or_drift() {
         for millisecond in 0.. {
             assert!(millisecond < 20_000, "round {round} does not arrive");
             let (_, lines) = board.bench.step().expect("runs");
+            // What the emulator books of the tasks is not the board's.
+            board.bench.machine_mut().profile_mut().take_polls();
             let truth = board.bench.plant().truth();
             let now = (board.bench.time_s() * 1e3).round() as u32;
             truths.push_back((now, truth.position_mm, truth.preload_n));
@@ -331,23 +390,23 @@ fn minutes_of_deploying_and_retracting_are_logged_without_a_gap_or_drift() {
         }
         // What waits for the log is what the log has not brought yet: two frames.
         assert!(truths.len() < 64, "{} ticks wait", truths.len());
-        if round == 3 {
+        if round == 7 {
             settled = resident();
         }
     }
     println!("off by, mm and N, round by round: {worst:.3?}");
     let tally = *decoder.tally();
-    assert!(tally.ticks > 80_000, "{tally:?}");
+    assert!(tally.ticks > 120_000, "{tally:?}");
     assert_eq!((tally.lost_frames, tally.lost_ticks, tally.garbage_bytes), (0, 0, 0));
     for (round, (position, preload)) in worst.iter().enumerate() {
         assert!(*position < POSITION_MM, "round {round}: {position} mm");
         assert!(*preload < PRELOAD_N, "round {round}: {preload} N");
     }
-    // The engine's caches are full after four rounds; the log in memory is 40 bytes a tick.
+    // The engine's caches are full after eight rounds; the log in memory is 40 bytes a tick.
     if let (Some(before), Some(after)) = (settled, resident()) {
         let grown = after.saturating_sub(before);
-        println!("{} kB more than after four rounds", grown / 1024);
-        assert!(grown < (32 << 20), "{grown} bytes");
+        println!("{} kB more than after eight rounds", grown / 1024);
+        assert!(grown < (16 << 20), "{grown} bytes");
     }
     let run = Run::of_stream(&log);
     assert_eq!(run.ledger.len(), 3 * ROUNDS);

@@ -410,7 +410,7 @@ fn a_sensor_silent_for_less_than_its_limit_is_ridden_out() {
             let mut bench = run_to(case);
             silence(&mut bench, &sensor, 15);
             bench.finish();
-            assert!(bench.faults().is_empty(), "{name}");
+            assert_eq!(bench.faults(), [], "{name}");
             assert_arrived(&bench, &case.scenario, case.scenario.run.direction, &name);
             assert_three_crossings(&bench, &case.scenario, &name);
         }

@@ -85,7 +85,9 @@ impl SpeedLoopState {
         self.integral = Travel::ZERO;
     }
 
-    fn value(&self) -> Ratio {
+    /// Duty that it adds to the feed-forward.
+    #[must_use]
+    pub fn value(&self) -> Ratio {
         Q16::narrow(self.integral)
     }
 }

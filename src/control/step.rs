@@ -178,11 +178,14 @@ impl Controller {
     }
 
     fn look_for_faults(&self, state: &mut State, pass: &mut Pass<'_>, input: &Input) {
+        let steady = state.profile.acceleration() == Q16::ZERO && !state.on_corner();
         let observed = Observed {
+            now: pass.now,
             mode: state.mode,
             sensed: pass.sensed,
             speed_ref: state.signed_speed(),
             preload_due: state.preload_loop.due(),
+            effort: steady.then(|| state.speed_loop.value()),
             overrun: input.overrun,
             emergency_stop: input.emergency_stop,
         };

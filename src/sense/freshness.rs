@@ -105,6 +105,12 @@ impl Freshness {
         }
     }
 
+    /// Time of the last code, good or bad.
+    #[must_use]
+    pub const fn newest(&self) -> Option<Tick> {
+        self.newest
+    }
+
     /// Time of the last good code.
     #[must_use]
     pub const fn good(&self) -> Option<Tick> {

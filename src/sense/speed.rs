@@ -110,17 +110,26 @@ impl Speedometer {
         limit: u32,
     ) -> Motion {
         predict(state, acceleration);
+        let before = state.freshness.newest();
         if let Some(sample) = state.freshness.take(sample) {
-            self.correct(state, now, sample, limit);
+            self.correct(state, now, sample, before, limit);
         }
         let speed = state.freshness.reading(speed_mm_s(state.speed), now, limit);
         Motion { travel: state.travel, position: millimetres(state.travel), speed }
     }
 
     /// Takes a new sample into odometry and observer, unless the counter changed
-    /// faster than the wheel can turn.
-    fn correct(&self, state: &mut SpeedState, now: Tick, sample: Sample<EncoderCount>, limit: u32) {
-        let Some(before) = state.freshness.good() else {
+    /// faster than the wheel can turn. One that has jumped once is not believed again: the
+    /// way between would be lost.
+    fn correct(
+        &self,
+        state: &mut SpeedState,
+        now: Tick,
+        sample: Sample<EncoderCount>,
+        newest: Option<Tick>,
+        limit: u32,
+    ) {
+        let Some((before, newest)) = state.freshness.good().zip(newest) else {
             state.count = sample.code;
             state.error = 0;
             state.speed = 0;
@@ -129,7 +138,8 @@ impl Speedometer {
         };
         let counts = i32::from(sample.code.since(state.count));
         let gap = age(sample.at, before).clamp(1, LONGEST_GAP);
-        if counts.unsigned_abs() > ((self.plausible * gap) >> 8) + 1 {
+        let since = age(sample.at, newest).clamp(1, LONGEST_GAP);
+        if counts.unsigned_abs() > ((self.plausible * since) >> 8) + 1 {
             state.freshness.judge(Err(Reason::Implausible));
             return;
         }

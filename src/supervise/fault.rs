@@ -22,6 +22,10 @@ pub enum Fault {
     DisplacementRange = 113,
     /// The arm angle lies outside the arm's reach.
     AngleRange = 114,
+    /// The load cell's code stands still, or jumps as no force does.
+    PressureImplausible = 116,
+    /// The displacement sensor's code stands still, or jumps as no tread does.
+    DisplacementImplausible = 117,
     /// The preload exceeded its limit by more than the regulation band.
     Overpressure = 120,
     /// The preload did not reach its reference in time.
@@ -30,6 +34,14 @@ pub enum Fault {
     DriveStalled = 122,
     /// The wheel turns against the command or far faster than asked.
     DriveRunaway = 123,
+    /// Two steps in a row stand off the table by different ways.
+    StepsDisagree = 124,
+    /// The drive takes another duty than its speed needs.
+    DutyMismatch = 125,
+    /// The arm moves farther than the wheel turns.
+    ArmMismatch = 126,
+    /// The preload strays from what the pre-tightener is asked for.
+    PretightenerRunaway = 127,
     /// Odometry and arm disagree on the sleeve level at the end of travel.
     LevelMismatch = 131,
     /// Two steps of the table in a row were not found.
@@ -50,7 +62,7 @@ pub enum Fault {
 
 impl Fault {
     /// Every fault, in the order of codes.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 25] = [
         Self::SpeedStale,
         Self::PressureStale,
         Self::DisplacementStale,
@@ -58,10 +70,16 @@ impl Fault {
         Self::PressureRange,
         Self::DisplacementRange,
         Self::AngleRange,
+        Self::PressureImplausible,
+        Self::DisplacementImplausible,
         Self::Overpressure,
         Self::PreloadNotReached,
         Self::DriveStalled,
         Self::DriveRunaway,
+        Self::StepsDisagree,
+        Self::DutyMismatch,
+        Self::ArmMismatch,
+        Self::PretightenerRunaway,
         Self::LevelMismatch,
         Self::StepsLost,
         Self::WheelSlips,
@@ -89,10 +107,18 @@ impl Fault {
             Self::PressureRange => "the load cell reads outside its range",
             Self::DisplacementRange => "the tread displacement sensor reads outside its range",
             Self::AngleRange => "the arm angle lies outside the arm's reach",
+            Self::PressureImplausible => "the load cell reads what no force can be",
+            Self::DisplacementImplausible => {
+                "the tread displacement sensor reads what no tread does"
+            }
             Self::Overpressure => "the preload exceeded its limit",
             Self::PreloadNotReached => "the preload did not reach its reference in time",
             Self::DriveStalled => "the wheel stands still although driven",
             Self::DriveRunaway => "the wheel turns otherwise than commanded",
+            Self::StepsDisagree => "two steps in a row are off the table by different ways",
+            Self::DutyMismatch => "duty and speed of the drive do not belong together",
+            Self::ArmMismatch => "the arm moves farther than the wheel turns",
+            Self::PretightenerRunaway => "the preload strays from its reference",
             Self::LevelMismatch => "the arm does not confirm the sleeve level at the end of travel",
             Self::StepsLost => "two steps of the table in a row were not found",
             Self::WheelSlips => "the wheel turns at a corner without getting over it",

@@ -7,6 +7,7 @@ use super::{compare as compare_verb, montecarlo as montecarlo_verb, output};
 use crate::compare;
 use crate::docs;
 use crate::export::write_text;
+use crate::faults::campaign::{self as faults, Campaign};
 use crate::montecarlo;
 use crate::plant::balance::Axial;
 use crate::plant::crossing::{CrossingCase, cross};
@@ -18,8 +19,8 @@ use crate::sil;
 use crate::table;
 
 /// Writes the generated parts of `docs/`: modes and codes, the picture of a
-/// deployment, the results that the other pages refer to, and figures and plot of the
-/// page on the model.
+/// deployment, the results that the other pages refer to, figures and plot of the page on
+/// the model, and the campaign of faults.
 ///
 /// Takes several minutes; the lengths are for trying it out.
 #[derive(Debug, clap::Args)]
@@ -31,6 +32,10 @@ pub(super) struct Args {
     /// Random rigs of the campaign, each way.
     #[arg(long, value_name = "N", default_value_t = 1000)]
     runs: u64,
+
+    /// Instants at which each fault comes.
+    #[arg(long, value_name = "N", default_value_t = 100)]
+    instants: usize,
 
     /// Random rigs of the comparison of strategies.
     #[arg(long, value_name = "N", default_value_t = 200)]
@@ -46,6 +51,8 @@ enum Part {
     Results,
     /// The generated blocks of the page on the model, and its plot.
     Model,
+    /// The generated blocks of the page on faults.
+    Safety,
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
@@ -66,6 +73,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         write("MODEL.md", &docs::fill_model(&page).map_err(Failure::run)?)?;
         write("model.svg", &docs::model_svg().map_err(Failure::run)?)?;
     }
+    if wanted(Part::Safety) {
+        let page = std::fs::read_to_string(folder.join("SAFETY.md")).map_err(Failure::run)?;
+        let outcome = campaign(args.instants)?;
+        write("SAFETY.md", &docs::fill_safety(&page, &outcome).map_err(Failure::run)?)?;
+    }
     if wanted(Part::Results) {
         let recording = deploy(&[])?;
         write("deployment.svg", &report::overview_svg(&recording))?;
@@ -77,6 +89,13 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
 
 fn shown(path: &Path) -> String {
     format!("{}\n", path.display())
+}
+
+/// Every fault at so many instants.
+fn campaign(instants: usize) -> Result<faults::Outcome, Failure> {
+    let campaign = Campaign { scenario: Scenario::default(), instants, cases: faults::Case::all() };
+    let bar = progress::bar("faults", campaign.runs());
+    Ok(campaign.run(&|| bar.advance(1))?)
 }
 
 fn deploy(sets: &[String]) -> Result<crate::record::Recording, Failure> {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use interstage::supervise::{Command, Direction, Fault, Leg, Limit, Mode, Trigger, next};
+use interstage::supervise::{Account, Command, Direction, Fault, Leg, Limit, Mode, Trigger, next};
 
 use super::head;
 
@@ -20,16 +20,36 @@ pub fn modes() -> String {
     page += "```\n\nA fault leads from every mode to the fault hold: both bridges off, the \
              self-locking gears hold wheel and screw where they are, the preload stays in its \
              spring. Only a reset leads out. A command that a mode does not take is refused, \
-             logged and changes nothing.\n\n## Faults, latched\n\n| code | fault |\n|---|---|\n";
+             logged and changes nothing.\n\n## Faults, latched\n\nWhat happens when each is provoked, and how soon \
+             it is found: [SAFETY.md](SAFETY.md).\n\n| code | fault | cause | detection | reset \
+             |\n|---|---|---|---|---|\n";
     for fault in Fault::ALL {
-        let _ = writeln!(page, "| {} | {} |", fault.code(), fault.sentence());
+        let Account { cause, detection, reset, .. } = fault.account();
+        let (code, sentence) = (fault.code(), fault.sentence());
+        let _ = writeln!(page, "| {code} | {sentence} | {cause} | {detection} | {reset} |");
+    }
+    page += "\nReaction to each:\n\n";
+    for reaction in reactions() {
+        let of = Fault::ALL.into_iter().filter(|fault| fault.account().reaction == reaction);
+        let codes: Vec<String> = of.map(|fault| fault.code().to_string()).collect();
+        let _ = writeln!(page, "- {}: {reaction}.", codes.join(", "));
     }
     page += "\n## Limits, active\n\nReported and acted on; gone when their cause is gone.\n\n\
-             | code | limit |\n|---|---|\n";
+             | code | limit | reaction | until |\n|---|---|---|---|\n";
     for limit in Limit::ALL {
-        let _ = writeln!(page, "| {} | {} |", limit.code(), limit.sentence());
+        let (reaction, until) = limit.account();
+        let (code, sentence) = (limit.code(), limit.sentence());
+        let _ = writeln!(page, "| {code} | {sentence} | {reaction} | {until} |");
     }
     page
+}
+
+/// Every reaction once.
+fn reactions() -> Vec<&'static str> {
+    let mut all: Vec<&str> = Fault::ALL.map(|fault| fault.account().reaction).to_vec();
+    all.sort_unstable();
+    all.dedup();
+    all
 }
 
 /// Transitions by the pair of their ends, without the faults; both ways of a run and

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use interstage::control::Output;
 use interstage::hil::{FIRST, Given};
-use interstage::log::{Entry, Identity, Record, identity};
+use interstage::log::{Entry, Event, Identity, Record, identity};
 use interstage::model::Planner;
 use interstage::supervise::Mode;
 use interstage::units::Tick;
@@ -153,6 +153,8 @@ impl Told {
         for item in items {
             match item {
                 Item::Identity(identity) => self.is_scenarios(&identity)?,
+                // Why the board has started is known: this host made it.
+                Item::Event(Entry { event: Event::Restart(_), .. }) => {}
                 Item::Event(entry) => self.events.push_back(entry),
                 Item::Tick(record, _) => self.tick(&record)?,
                 _ => {}

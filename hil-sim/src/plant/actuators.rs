@@ -176,6 +176,13 @@ impl Pretightener {
         }
     }
 
+    /// Force and rate become this part: the spring yields where the screw stands.
+    pub(super) fn weaken(&mut self, part: f64) {
+        self.slew *= part;
+        self.seat *= part;
+        self.rate *= part;
+    }
+
     /// Holds the screw where it gives this force, N.
     pub(super) fn hold(&mut self, seat_n: f64) {
         (self.seat, self.rate) = (seat_n, 0.0);

@@ -135,11 +135,11 @@ impl PlantParameters {
         let tread_gain = draw.factor(spread.tread_gain_rel);
         let angle_zero_rad = draw.offset(spread.arm_zero_deg).to_radians();
         let steps = scenario
-            .true_steps_mm()
+            .true_steps()
             .into_iter()
-            .map(|position| Step {
+            .map(|(position, higher)| Step {
                 position_mm: position + draw.offset(spread.step_position_mm),
-                height_mm: rig.rig.step_height_mm + draw.offset(spread.step_height_mm),
+                height_mm: rig.rig.step_height_mm + higher + draw.offset(spread.step_height_mm),
             })
             .collect();
         Self {

@@ -1,6 +1,7 @@
 //! The whole rig, a millisecond at a time.
 
 mod contact;
+mod damage;
 mod follow;
 mod phases;
 mod traction;

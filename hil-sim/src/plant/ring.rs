@@ -236,6 +236,13 @@ impl Ring {
         self
     }
 
+    /// Stiffness becomes this from now on, N/mm^3, relaxed and instant.
+    pub(super) fn set_stiffness(&mut self, k_inf: f64, k_0: f64) {
+        (self.parameters.k_inf, self.parameters.k_0) = (k_inf, k_0);
+        self.law = Law::new(&self.parameters, 0.0);
+        self.ready = Ready::default();
+    }
+
     /// Wheel and rubber.
     #[must_use]
     pub fn parameters(&self) -> &RingParameters {

@@ -126,6 +126,7 @@ impl Tally {
             wear_j: truth.wear_mj * 1e-3,
             faults: self.faults,
             limits: self.limits,
+            injected: scenario.run.faults.iter().map(ToString::to_string).collect(),
             real_time_factor: total_s / wall_s.max(1e-9),
             trace_digest: self.digest.finalize().iter().map(|b| format!("{b:02x}")).collect(),
             crossings,

@@ -92,8 +92,11 @@ pub(super) fn reports(s: &Summary) -> String {
     let mut all: Vec<(&str, &Report)> = s.faults.iter().map(|r| ("fault", r)).collect();
     all.extend(s.limits.iter().map(|r| ("limit", r)));
     all.sort_by(|a, b| a.1.t_s.total_cmp(&b.1.t_s));
+    let injected =
+        s.injected.iter().map(|fault| format!("<p>Brought about: {}.</p>\n", escape(fault)));
+    let injected: String = injected.collect();
     if all.is_empty() {
-        return "<p>No fault, no limit.</p>\n".to_owned();
+        return injected + "<p>No fault, no limit.</p>\n";
     }
     let rows: String = all
         .iter()
@@ -106,7 +109,7 @@ pub(super) fn reports(s: &Summary) -> String {
             )
         })
         .collect();
-    format!("<table class=\"lines\">\n{rows}</table>\n")
+    format!("{injected}<table class=\"lines\">\n{rows}</table>\n")
 }
 
 /// The log.
@@ -137,6 +140,15 @@ mod tests {
     fn log_text_cannot_become_markup() {
         let line = LogLine { t_s: 1.0, text: "<script>".into() };
         assert!(log(&[line]).contains("&lt;script&gt;"));
+    }
+
+    #[test]
+    fn what_was_brought_about_is_named_before_what_was_found() {
+        let mut summary = example::faulted().summary;
+        summary.injected = vec!["load-cell stuck from 2 s".to_owned()];
+        let text = reports(&summary);
+        assert!(text.starts_with("<p>Brought about: load-cell stuck from 2 s.</p>"), "{text}");
+        assert!(text.contains("fault 121"));
     }
 
     #[test]

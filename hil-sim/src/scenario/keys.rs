@@ -32,6 +32,8 @@ pub(super) enum Kind {
     Word(&'static [&'static str]),
     /// A list of step anomalies.
     Anomalies,
+    /// A list of faults.
+    Faults,
 }
 
 impl Kind {
@@ -42,6 +44,7 @@ impl Kind {
             ("run.direction", _) => Self::Word(&Direction::NAMES),
             ("run.controller", _) => Self::Word(&ControllerKind::NAMES),
             ("run.anomalies", _) => Self::Anomalies,
+            ("run.faults", _) => Self::Faults,
             ("drive.modes_hz", _) => Self::Numbers(interstage::rig::MAX_MODES),
             (_, Value::Array(_)) => Self::Numbers(interstage::rig::MAX_STEPS),
             (_, Value::Integer(_)) => Self::Whole,
@@ -64,6 +67,10 @@ impl Kind {
             }
             Self::Anomalies => {
                 "a list such as [{ kind = \"late\", step = 2, offset_mm = 1.0 }]".to_owned()
+            }
+            Self::Faults => {
+                "a list such as [{ target = \"load-cell\", kind = \"stuck\", at_s = 2.0 }]"
+                    .to_owned()
             }
         }
     }

@@ -6,7 +6,7 @@ use std::path::Path;
 use toml::{Table, Value};
 
 use super::keys::{self, Kind};
-use super::{Origin, Scenario, ScenarioError, StepAnomaly, set, suggest};
+use super::{Origin, Scenario, ScenarioError, StepAnomaly, injections, set, suggest};
 
 /// Where each overridden key was written.
 #[derive(Clone, Debug)]
@@ -134,7 +134,12 @@ impl Merged {
 }
 
 /// `value` in the form that `kind` has in a scenario, or why it cannot be.
-fn checked(origin: &Origin, key: &str, kind: Kind, value: &Value) -> Result<Value, ScenarioError> {
+pub(super) fn checked(
+    origin: &Origin,
+    key: &str,
+    kind: Kind,
+    value: &Value,
+) -> Result<Value, ScenarioError> {
     let wrong = || wrong_type(origin, key, kind, value);
     match (kind, value) {
         (Kind::Number, Value::Float(x)) if x.is_finite() => Ok(value.clone()),
@@ -152,6 +157,12 @@ fn checked(origin: &Origin, key: &str, kind: Kind, value: &Value) -> Result<Valu
             .iter()
             .enumerate()
             .map(|(i, one)| anomaly(origin, &format!("{key}[{}]", i + 1), one))
+            .collect::<Result<_, _>>()
+            .map(Value::Array),
+        (Kind::Faults, Value::Array(list)) => list
+            .iter()
+            .enumerate()
+            .map(|(i, one)| injections::checked(origin, &format!("{key}[{}]", i + 1), one))
             .collect::<Result<_, _>>()
             .map(Value::Array),
         (Kind::Number | Kind::Whole, Value::String(text)) if set::has_unit(text) => {
@@ -220,7 +231,7 @@ fn anomaly(origin: &Origin, at: &str, value: &Value) -> Result<Value, ScenarioEr
     Ok(Value::Table(found))
 }
 
-fn wrong_type(origin: &Origin, key: &str, kind: Kind, value: &Value) -> ScenarioError {
+pub(super) fn wrong_type(origin: &Origin, key: &str, kind: Kind, value: &Value) -> ScenarioError {
     ScenarioError::WrongType {
         origin: origin.clone(),
         key: key.to_owned(),

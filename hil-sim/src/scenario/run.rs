@@ -3,6 +3,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::faults::Injection;
+
 /// Options of one run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -15,6 +17,9 @@ pub struct RunOptions {
     pub seed: u64,
     /// Steps that do not stand where the step table says.
     pub anomalies: Vec<StepAnomaly>,
+    /// Faults that come while it runs.
+    #[serde(default)]
+    pub faults: Vec<Injection>,
 }
 
 /// Sense of motion of a run.
@@ -106,6 +111,13 @@ pub enum StepAnomaly {
         /// Which step.
         step: u8,
     },
+    /// The step is higher than the table says.
+    Higher {
+        /// Which step.
+        step: u8,
+        /// By how much, mm, positive.
+        offset_mm: f64,
+    },
     /// A step that the table does not know.
     Extra {
         /// Where it stands, mm.
@@ -115,7 +127,7 @@ pub enum StepAnomaly {
 
 impl StepAnomaly {
     /// Names as written in scenarios.
-    pub(super) const NAMES: [&'static str; 4] = ["early", "late", "missing", "extra"];
+    pub(super) const NAMES: [&'static str; 5] = ["early", "late", "missing", "higher", "extra"];
 
     /// Keys beside `kind` of the anomaly of this name.
     pub(super) fn fields(kind: &str) -> &'static [&'static str] {
@@ -127,26 +139,28 @@ impl StepAnomaly {
     }
 }
 
-/// The step table `steps`, mm, with the anomalies applied, ascending.
-pub(super) fn apply(steps: &[f64], anomalies: &[StepAnomaly]) -> Vec<f64> {
-    let mut found: Vec<Option<f64>> = steps.iter().copied().map(Some).collect();
+/// The step table `steps`, mm, with the anomalies applied, ascending: position of each, and
+/// by how much it is higher than the table says, mm.
+pub(super) fn apply(steps: &[f64], anomalies: &[StepAnomaly]) -> Vec<(f64, f64)> {
+    let mut found: Vec<Option<(f64, f64)>> = steps.iter().map(|&at| Some((at, 0.0))).collect();
     let mut extra = Vec::new();
     for anomaly in anomalies {
         let (step, change) = match *anomaly {
-            StepAnomaly::Early { step, offset_mm } => (step, Some(-offset_mm)),
-            StepAnomaly::Late { step, offset_mm } => (step, Some(offset_mm)),
+            StepAnomaly::Early { step, offset_mm } => (step, Some((-offset_mm, 0.0))),
+            StepAnomaly::Late { step, offset_mm } => (step, Some((offset_mm, 0.0))),
+            StepAnomaly::Higher { step, offset_mm } => (step, Some((0.0, offset_mm))),
             StepAnomaly::Missing { step } => (step, None),
             StepAnomaly::Extra { position_mm } => {
-                extra.push(position_mm);
+                extra.push((position_mm, 0.0));
                 continue;
             }
         };
         if let Some(place) = usize::from(step).checked_sub(1).and_then(|i| found.get_mut(i)) {
-            *place = place.zip(change).map(|(position, by)| position + by);
+            *place = place.zip(change).map(|((at, high), (by, more))| (at + by, high + more));
         }
     }
-    let mut all: Vec<f64> = found.into_iter().flatten().chain(extra).collect();
-    all.sort_by(f64::total_cmp);
+    let mut all: Vec<(f64, f64)> = found.into_iter().flatten().chain(extra).collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
     all
 }
 
@@ -159,17 +173,19 @@ mod tests {
         let anomalies = [
             StepAnomaly::Early { step: 1, offset_mm: 1.0 },
             StepAnomaly::Late { step: 3, offset_mm: 2.0 },
+            StepAnomaly::Higher { step: 3, offset_mm: 0.5 },
             StepAnomaly::Missing { step: 2 },
             StepAnomaly::Extra { position_mm: 45.0 },
         ];
-        assert_eq!(apply(&[18.0, 40.0, 62.0], &anomalies), [17.0, 45.0, 64.0]);
+        let found = apply(&[18.0, 40.0, 62.0], &anomalies);
+        assert_eq!(found, [(17.0, 0.0), (45.0, 0.0), (64.0, 0.5)]);
     }
 
     #[test]
     fn a_missing_step_stays_missing_whatever_else_is_said_of_it() {
         let anomalies =
             [StepAnomaly::Missing { step: 1 }, StepAnomaly::Late { step: 1, offset_mm: 2.0 }];
-        assert_eq!(apply(&[18.0, 40.0], &anomalies), [40.0]);
+        assert_eq!(apply(&[18.0, 40.0], &anomalies), [(40.0, 0.0)]);
     }
 
     #[test]

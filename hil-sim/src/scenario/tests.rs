@@ -201,7 +201,7 @@ fn anomalies_are_checked_key_by_key() {
     let of = |inside: &str| error(&format!("[[run.anomalies]]\n{inside}\n"));
     assert_eq!(
         of("step = 1"),
-        "bench.toml: run.anomalies[1].kind = nothing: expected \"early\" or \"late\" or \"missing\" or \"extra\""
+        "bench.toml: run.anomalies[1].kind = nothing: expected \"early\" or \"late\" or \"missing\" or \"higher\" or \"extra\""
     );
     assert_eq!(
         of("kind = \"late\"\nstep = 1\noffset = 2"),

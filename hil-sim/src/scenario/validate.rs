@@ -1,11 +1,14 @@
 //! The checks of a whole scenario, after the rig's own.
 
 use super::merge::Provenance;
-use super::{Scenario, ScenarioError, StepAnomaly};
+use super::{Scenario, ScenarioError, StepAnomaly, injections};
 use crate::plant::draw::PlantParameters;
 
 /// Largest offset of an early or late step, mm.
 const MAX_OFFSET_MM: f64 = 20.0;
+
+/// Most that a step may be higher than the table says, mm.
+const MAX_HIGHER_MM: f64 = 4.0;
 
 /// Checks every value against its range and the values against one another.
 pub(super) fn check(scenario: &Scenario, from: &Provenance) -> Result<(), ScenarioError> {
@@ -22,6 +25,7 @@ pub(super) fn check(scenario: &Scenario, from: &Provenance) -> Result<(), Scenar
     }
     anomalies(scenario, from)?;
     spacing(scenario, from)?;
+    injections::check(scenario, from)?;
     PlantParameters::draw(scenario).check(scenario.rig.preload.limit_n).map_err(|refusal| {
         ScenarioError::Refused { origin: from.of_message(&refusal.to_string()), refusal }
     })
@@ -64,6 +68,9 @@ fn anomalies(scenario: &Scenario, from: &Provenance) -> Result<(), ScenarioError
         let (step, length) = match *anomaly {
             StepAnomaly::Early { step, offset_mm } | StepAnomaly::Late { step, offset_mm } => {
                 (Some(step), Some(("offset_mm", offset_mm, MAX_OFFSET_MM)))
+            }
+            StepAnomaly::Higher { step, offset_mm } => {
+                (Some(step), Some(("offset_mm", offset_mm, MAX_HIGHER_MM)))
             }
             StepAnomaly::Missing { step } => (Some(step), None),
             StepAnomaly::Extra { position_mm } => {

@@ -11,6 +11,7 @@ use interstage::units::Tick;
 use super::stream::Stream;
 use super::trace::Trace;
 use super::{Options, RunError, TICK_S};
+use crate::faults::Tamper;
 use crate::plant::draw::PlantParameters;
 use crate::plant::rig::{Drives, VirtualRig};
 use crate::plant::sensors::{Codes, Sensed, Sensors};
@@ -37,6 +38,12 @@ pub struct Session {
     plan: Option<Plan>,
     trace: Trace,
     stream: Option<Stream>,
+    tamper: Option<Tamper>,
+    /// What the bridges and the record hold on to while ticks are lost.
+    held: Output,
+    /// Ticks were lost before this one, and with them this command.
+    overrun: bool,
+    missed: Option<Command>,
 }
 
 impl Session {
@@ -64,6 +71,10 @@ impl Session {
         let plant = VirtualRig::new(parameters, position, preload, TICK_S);
         let controller = Controller::try_build(&scenario.rig)?;
         Ok(Self {
+            tamper: Tamper::of(scenario),
+            held: Output::default(),
+            overrun: false,
+            missed: None,
             stream: options.rows.then(|| Stream::new(scenario, &controller)),
             controller,
             trace: Trace::new(planner.gap_ref(direction).to_num(), position),
@@ -111,7 +122,7 @@ impl Session {
     }
 
     /// Reads the sensors: the latest code of each at the present tick. Once a tick,
-    /// before [`Session::advance`].
+    /// before [`Session::advance`]. Here the scenario's faults come and go.
     pub fn sense(&mut self) -> SensorFrame {
         let codes = read(&mut self.sensors, &self.plant);
         let at = self.tick;
@@ -121,7 +132,13 @@ impl Session {
         if at.is_multiple_of(ANGLE_EVERY) {
             self.frame.arm = Some(Sample { code: codes.arm, at });
         }
-        self.frame
+        let mut frame = self.frame;
+        if let Some(tamper) = &mut self.tamper {
+            tamper.begin(f64::from(at) * TICK_S, self.plant.truth());
+            tamper.plant(&mut self.plant);
+            tamper.sensors(&mut frame);
+        }
+        frame
     }
 
     /// The control tick on what `sensors` holds, then the plant's millisecond under
@@ -134,25 +151,60 @@ impl Session {
         sensors: &SensorFrame,
         command: Option<Command>,
     ) -> Result<Output, RunError> {
+        let command = self.missed.take().or(command);
+        if self.tamper.as_ref().is_some_and(Tamper::lost) {
+            (self.overrun, self.missed) = (true, command);
+        } else {
+            self.control(sensors, command);
+        }
+        let output = self.held.clone();
+        self.held.events.clear();
+        self.held.request = None;
+        self.trace.look(&output, self.plant.truth(), self.options.rows);
+        let mut drives = drives(output.drive, output.preload);
+        if let Some(tamper) = &mut self.tamper {
+            drives = tamper.drives(drives);
+        }
+        self.plant.step(&drives, TICK_S)?;
+        self.tick += 1;
+        Ok(output)
+    }
+
+    /// The control tick and the model task behind it.
+    fn control(&mut self, sensors: &SensorFrame, command: Option<Command>) {
+        let tamper = self.tamper.as_mut();
+        let (command, hangs, read) = tamper.map_or((command, false, true), |tamper| {
+            (tamper.command(command), tamper.model_hangs(), !tamper.log_gone())
+        });
         let input = Input {
             now: self.tick,
             sensors: *sensors,
             command,
             plan: self.plan.take(),
+            overrun: std::mem::take(&mut self.overrun),
             ..Input::default()
         };
-        let output = self.controller.step(&mut self.state, &input);
-        if let Some(request) = output.request {
+        self.controller.step_into(&mut self.state, &input, &mut self.held);
+        let output = &self.held;
+        if let Some(request) = output.request.filter(|_| !hangs) {
             // The model task runs between the ticks.
             self.plan = Some(self.planner.plan(&request));
         }
         if let Some(stream) = &mut self.stream {
-            stream.keep(&input, &output);
+            stream.keep(&input, output, read);
         }
-        self.trace.look(&output, self.plant.truth(), self.options.rows);
-        self.plant.step(&drives(output.drive, output.preload), TICK_S)?;
-        self.tick += 1;
-        Ok(output)
+    }
+
+    /// When it first did something, see [`Tamper::acts_s`], s since boot.
+    #[must_use]
+    pub fn acts_s(&self) -> Option<f64> {
+        self.tamper.as_ref().and_then(Tamper::acts_s)
+    }
+
+    /// When the first of the scenario's faults came, s since boot.
+    #[must_use]
+    pub fn struck_s(&self) -> Option<f64> {
+        self.tamper.as_ref().and_then(Tamper::struck_s)
     }
 
     /// Power lost and back: the controller forgets everything, the rig stays where it is.

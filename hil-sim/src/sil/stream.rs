@@ -21,11 +21,14 @@ impl Stream {
         Self { tape: Tape::new(), scribe, bytes: Vec::new() }
     }
 
-    /// Keeps a tick and what happened in it, as the journal does on the board.
-    pub fn keep(&mut self, input: &Input, output: &Output) {
+    /// Keeps a tick and what happened in it, as the journal does on the board, if there is
+    /// somebody who reads.
+    pub fn keep(&mut self, input: &Input, output: &Output, read: bool) {
         let mut send = |frame: &[u8]| {
-            self.bytes.extend_from_slice(frame);
-            true
+            if read {
+                self.bytes.extend_from_slice(frame);
+            }
+            read
         };
         self.tape.keep(input, output);
         for entry in &output.events {

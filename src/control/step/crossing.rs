@@ -129,6 +129,10 @@ impl Controller {
             // Two in a row off by the same: it is the odometry.
             state.odometry.set(pass.sensed.travel, pass.position - residual);
             state.displaced = None;
+        } else if state.displaced.is_some() {
+            // By another way than the one before: the odometry has lost its measure, or the
+            // table is wrong throughout.
+            self.give_up(state, pass, Fault::StepsDisagree);
         } else {
             // One alone: it is the step that is displaced.
             state.displaced = Some(residual);

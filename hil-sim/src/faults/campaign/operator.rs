@@ -1,0 +1,44 @@
+//! Who presses the buttons of a run: out, and, once it has arrived, back.
+
+use interstage::supervise::{Command, Direction, Mode};
+
+/// Ticks that the drive rests at the far end.
+const DWELL_TICKS: u32 = 100;
+
+/// The operator.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Operator {
+    started: bool,
+    turned: bool,
+    rested: u32,
+}
+
+impl Operator {
+    /// The command of a tick in which the drive is in this mode.
+    pub(super) fn command(&mut self, mode: Mode) -> Option<Command> {
+        if mode == Mode::Idle && !self.started {
+            self.started = true;
+            return Some(Command::Start);
+        }
+        if mode == Mode::Complete(Direction::Deploy) && !self.turned {
+            self.rested += 1;
+            if self.rested > DWELL_TICKS {
+                self.turned = true;
+                return Some(Command::Retract);
+            }
+        }
+        None
+    }
+
+    /// Whether the run has been set going.
+    pub(super) const fn started(&self) -> bool {
+        self.started
+    }
+
+    /// Whether it is over: at rest, and nobody wants it otherwise.
+    pub(super) fn over(&self, mode: Mode) -> bool {
+        self.started
+            && mode.is_at_rest()
+            && (mode != Mode::Complete(Direction::Deploy) || self.turned)
+    }
+}

@@ -1,0 +1,218 @@
+//! One fault of a scenario: what breaks, how, from when, for how long, how badly.
+
+use serde::{Deserialize, Serialize};
+
+/// What breaks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Target {
+    /// Wheel encoder.
+    Encoder,
+    /// Load cell.
+    LoadCell,
+    /// Tread displacement sensor.
+    TreadSensor,
+    /// Arm angle sensor.
+    Angle,
+    /// Drive motor or its bridge.
+    Drive,
+    /// Pre-tightener's motor or its bridge.
+    Pretightener,
+    /// Grip of the wheel.
+    Wheel,
+    /// Rubber of the wheel.
+    Tread,
+    /// Spring of the pre-tightener.
+    Spring,
+    /// Top load.
+    Load,
+    /// Control tick.
+    Tick,
+    /// Model task.
+    Model,
+    /// Reader of the log.
+    Log,
+    /// Source of the commands.
+    Commands,
+}
+
+/// How it breaks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// Gives nothing any more.
+    Off,
+    /// Gives what it gave last.
+    Stuck,
+    /// Gives random codes.
+    Garbage,
+    /// Gives too much or too little.
+    Gain,
+    /// Gives a constant more.
+    Offset,
+    /// Follows slowly.
+    Slow,
+    /// Follows late.
+    Delayed,
+    /// Comes and goes.
+    Intermittent,
+    /// Does not move.
+    Stalled,
+    /// Gives a part of its force.
+    Weak,
+    /// Moves the wrong way.
+    Reversed,
+    /// Moves at full duty whenever its bridge is on.
+    Runaway,
+    /// Loses friction.
+    Slip,
+    /// Is torn: a sector of it is soft.
+    Torn,
+    /// Is broken.
+    Broken,
+    /// Is doubled.
+    Doubled,
+    /// Comes late, ticks being lost.
+    Overrun,
+    /// Does not answer.
+    Hung,
+    /// Reads no more.
+    Gone,
+    /// Comes in every tick.
+    Flooding,
+    /// Comes at random.
+    Random,
+}
+
+/// From when a fault is there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum From {
+    /// Time since boot, s.
+    Time(f64),
+    /// True axial position that the wheel comes to, mm.
+    Position(f64),
+    /// The touch of this crossing's corner, counted from 1 over the run.
+    Crossing(u8),
+}
+
+/// A fault of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Injection {
+    /// What breaks.
+    pub target: Target,
+    /// How.
+    pub kind: Kind,
+    /// From this time since boot, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at_s: Option<f64>,
+    /// From this true position on, mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at_mm: Option<f64>,
+    /// From the touch of this crossing on, counted from 1 over the run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at_crossing: Option<u8>,
+    /// For so long, s; for good if it is not said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub duration_s: Option<f64>,
+    /// How badly, in the unit of the catalogue; the catalogue's own if it is not said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub magnitude: Option<f64>,
+}
+
+/// The name of a word of the scenario.
+fn word(value: impl Serialize) -> String {
+    match serde_json::to_value(value) {
+        Ok(serde_json::Value::String(name)) => name,
+        _ => String::new(),
+    }
+}
+
+impl Target {
+    /// Its name in scenarios.
+    #[must_use]
+    pub fn name(self) -> String {
+        word(self)
+    }
+
+    /// Whether it is one of the four sensors.
+    #[must_use]
+    pub const fn is_sensor(self) -> bool {
+        matches!(self, Self::Encoder | Self::LoadCell | Self::TreadSensor | Self::Angle)
+    }
+
+    /// Whether a fault of it moves something before the controller does.
+    #[must_use]
+    pub const fn moves(self) -> bool {
+        matches!(
+            self,
+            Self::Drive
+                | Self::Pretightener
+                | Self::Wheel
+                | Self::Tread
+                | Self::Spring
+                | Self::Load
+        )
+    }
+}
+
+impl Kind {
+    /// Its name in scenarios.
+    #[must_use]
+    pub fn name(self) -> String {
+        word(self)
+    }
+}
+
+impl Injection {
+    /// A fault for good from `at_s` on.
+    #[must_use]
+    pub const fn at(target: Target, kind: Kind, at_s: f64, magnitude: f64) -> Self {
+        Self {
+            target,
+            kind,
+            at_s: Some(at_s),
+            at_mm: None,
+            at_crossing: None,
+            duration_s: None,
+            magnitude: Some(magnitude),
+        }
+    }
+
+    /// From when; time 0 if nothing is said.
+    #[must_use]
+    pub fn from(&self) -> From {
+        match (self.at_s, self.at_mm, self.at_crossing) {
+            (_, Some(mm), _) => From::Position(mm),
+            (_, _, Some(crossing)) => From::Crossing(crossing),
+            (at_s, ..) => From::Time(at_s.unwrap_or(0.0)),
+        }
+    }
+
+    /// How badly: as said, or as the catalogue has it.
+    #[must_use]
+    pub fn magnitude(&self) -> f64 {
+        let usual = super::entry(self.target, self.kind).map_or(0.0, |entry| entry.magnitude);
+        self.magnitude.unwrap_or(usual)
+    }
+}
+
+impl std::fmt::Display for Injection {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} {}", self.target.name(), self.kind.name())?;
+        if let Some(entry) = super::entry(self.target, self.kind)
+            && !entry.unit.is_empty()
+        {
+            write!(f, " ({} {})", self.magnitude(), entry.unit)?;
+        }
+        match self.from() {
+            From::Time(s) => write!(f, " from {s} s")?,
+            From::Position(mm) => write!(f, " from {mm} mm")?,
+            From::Crossing(n) => write!(f, " from crossing {n}")?,
+        }
+        match self.duration_s {
+            Some(s) => write!(f, " for {s} s"),
+            None => Ok(()),
+        }
+    }
+}

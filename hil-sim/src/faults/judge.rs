@@ -1,0 +1,293 @@
+//! Judges a run that was tampered with, by what is true and not by what the controller
+//! believes: was the mechanism held, did it move uncommanded, was the fault reported.
+
+use interstage::control::Output;
+use interstage::log::Event;
+use interstage::supervise::{Direction, Mode};
+use serde::Serialize;
+
+use super::Target;
+use crate::plant::rig::Truth;
+use crate::scenario::Scenario;
+
+/// Control period, s.
+const TICK_S: f64 = 1e-3;
+/// Preload that a run may reach, parts of its limit: where the screw has its own stop, and
+/// what the parts are made for.
+pub const PRELOAD_PART: f64 = 1.25;
+/// Way that the wheel may go uncommanded, mm: all ways added, until it rests.
+pub const MOTION_MM: f64 = 1.0;
+/// Way that a wheel may slide that has lost half its grip, mm: the run over a corner, which no
+/// bridge can hold it on.
+pub const SLIDE_MM: f64 = 14.0;
+/// Part of its reference beyond which motion is uncommanded, and a constant, mm/s: half as
+/// fast again as asked is a wrong speed, but the one commanded.
+const BEYOND: (f64, f64) = (1.6, 3.0);
+/// How far from the end of travel a run that says it arrived may stand, mm: the room before
+/// the end stop, which is where one ends whose encoder went wrong on the last millimetres.
+pub const POSITION_MM: f64 = 2.6;
+/// Gap that a run may have which reports nothing, parts of the reference gap.
+pub const GAP_PART: f64 = 1.25;
+/// Speed that counts as rest, mm/s.
+const REST_MM_S: f64 = 0.01;
+
+/// What became of a fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Finding {
+    /// A fault was latched.
+    Found,
+    /// A limit was reported that the same run without the fault does not report.
+    Limited,
+    /// Nothing was reported, and the run ended as it should, within all bounds.
+    Tolerated,
+    /// Nothing was reported, and the run left a bound or ended otherwise than it says.
+    Undetected,
+}
+
+/// The record of a run under judgement.
+#[derive(Clone, Debug)]
+pub struct Judge {
+    limit_n: f64,
+    ends_mm: (f64, f64),
+    /// How far from the end it stood whenever it said that it had arrived, mm, at most.
+    off_mm: f64,
+    position_mm: f64,
+    asked_mm_s: f64,
+    /// Largest preload since the fault came, N.
+    pub peak_preload_n: f64,
+    /// Way gone uncommanded since the fault came, mm.
+    pub motion_mm: f64,
+    /// First fault latched since the fault came: when, s, and its code.
+    pub fault: Option<(f64, u16)>,
+    /// Limits since the fault came: when, s, and code.
+    pub limits: Vec<(f64, u16)>,
+    /// When both bridges were off and nothing moved, for good so far, s.
+    pub rest_s: Option<f64>,
+    mode: Mode,
+    /// Way that it may go uncommanded, mm.
+    most_mm: f64,
+    /// Commands came that nobody foresaw: any rest is a right end.
+    commanded: bool,
+}
+
+impl Judge {
+    /// Before the first tick of a run.
+    #[must_use]
+    pub fn new(scenario: &Scenario, truth: &Truth) -> Self {
+        let target = scenario.run.faults.first().map(|fault| fault.target);
+        let slips = target == Some(Target::Wheel);
+        let commanded = target == Some(Target::Commands);
+        Self {
+            limit_n: scenario.rig.preload.limit_n,
+            ends_mm: (0.0, scenario.rig.rig.travel_mm),
+            off_mm: 0.0,
+            position_mm: truth.position_mm,
+            asked_mm_s: 0.0,
+            peak_preload_n: 0.0,
+            motion_mm: 0.0,
+            fault: None,
+            limits: Vec::new(),
+            rest_s: None,
+            mode: Mode::Boot,
+            most_mm: if slips { SLIDE_MM } else { MOTION_MM },
+            commanded,
+        }
+    }
+
+    /// Looks at a tick: what the controller put out, and what is true after it. `struck`
+    /// tells whether the fault has come.
+    pub fn look(&mut self, t_s: f64, output: &Output, truth: &Truth, struck: bool) {
+        let way_mm = truth.position_mm - self.position_mm;
+        self.position_mm = truth.position_mm;
+        self.mode = output.telemetry.mode;
+        // What was asked lately: the wheel follows with a lag.
+        let asked = f64::from(output.telemetry.speed_ref.to_bits()) / 65_536.0;
+        self.asked_mm_s = asked.abs().max(self.asked_mm_s - 250.0 * TICK_S);
+        if !struck {
+            return;
+        }
+        self.peak_preload_n = self.peak_preload_n.max(truth.preload_n);
+        self.motion_mm += self.uncommanded(way_mm);
+        if let Mode::Complete(way) = self.mode {
+            let end_mm = match way {
+                Direction::Deploy => self.ends_mm.1,
+                Direction::Retract => self.ends_mm.0,
+            };
+            self.off_mm = self.off_mm.max((self.position_mm - end_mm).abs());
+        }
+        for entry in &output.events {
+            match entry.event {
+                Event::Fault(fault) if self.fault.is_none() => {
+                    self.fault = Some((t_s, fault.code()));
+                }
+                Event::Limit(limit) => self.limits.push((t_s, limit.code())),
+                _ => {}
+            }
+        }
+        let off = !output.drive.enable && !output.preload.enable;
+        let still = truth.speed_mm_s.abs() < REST_MM_S && truth.tread_mm_s.abs() < REST_MM_S;
+        self.rest_s = (off && still).then(|| self.rest_s.unwrap_or(t_s));
+    }
+
+    /// Way of a tick that nobody asked for, mm.
+    fn uncommanded(&self, way_mm: f64) -> f64 {
+        let direction = match self.mode {
+            Mode::Run(way, _) | Mode::Stopping(way) => way,
+            _ => return way_mm.abs(),
+        };
+        let along = match direction {
+            Direction::Deploy => way_mm,
+            Direction::Retract => -way_mm,
+        };
+        let most = (BEYOND.0 * self.asked_mm_s + BEYOND.1) * TICK_S;
+        let back = BEYOND.1 * TICK_S;
+        (along - most).max(-along - back).max(0.0)
+    }
+
+    /// What the mechanism was not spared, in words; empty if it was safe.
+    #[must_use]
+    pub fn harms(&self) -> Vec<String> {
+        let mut harms = Vec::new();
+        let most = PRELOAD_PART * self.limit_n;
+        if self.peak_preload_n > most {
+            harms.push(format!("preload {:.1} N, at most {most:.1}", self.peak_preload_n));
+        }
+        if self.motion_mm > self.most_mm {
+            let (way, most) = (self.motion_mm, self.most_mm);
+            harms.push(format!("{way:.2} mm uncommanded, at most {most}"));
+        }
+        if self.off_mm > POSITION_MM {
+            harms.push(format!("{:.1} mm from the end it says it reached", self.off_mm));
+        }
+        if self.rest_s.is_none() {
+            harms.push("not at rest at its end".to_owned());
+        }
+        harms
+    }
+
+    /// What became of the fault. `known` are the limits of the same run without it,
+    /// `gap_part` the largest gap over the reference, `crossed` whether every step was
+    /// crossed; a stop on command is as good an end as arrival.
+    #[must_use]
+    pub fn finding(&self, known: &[u16], gap_part: f64, crossed: bool) -> Finding {
+        let ended = match self.mode {
+            Mode::Complete(_) => crossed || self.commanded,
+            _ => self.mode.is_at_rest(),
+        };
+        if self.fault.is_some() {
+            Finding::Found
+        } else if self.new_limit(known).is_some() {
+            Finding::Limited
+        } else if ended && self.harms().is_empty() && gap_part <= GAP_PART {
+            Finding::Tolerated
+        } else {
+            Finding::Undetected
+        }
+    }
+
+    /// The first limit that the run without the fault does not report: when, s, and code.
+    #[must_use]
+    pub fn new_limit(&self, known: &[u16]) -> Option<(f64, u16)> {
+        self.limits.iter().find(|(_, code)| !known.contains(code)).copied()
+    }
+
+    /// How the run ended, in a word.
+    #[must_use]
+    pub fn end(&self) -> &'static str {
+        match self.mode {
+            Mode::FaultHold(_) => "fault hold",
+            Mode::Complete(_) => "arrived",
+            Mode::Idle => "idle",
+            Mode::Boot | Mode::SelfTest | Mode::Zero => "start",
+            Mode::Preload(_) | Mode::Run(..) | Mode::Stopping(_) => "under way",
+        }
+    }
+
+    /// Mode in the last tick.
+    #[must_use]
+    pub const fn mode(&self) -> Mode {
+        self.mode
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use interstage::hal::MotorCommand;
+    use interstage::log::Entry;
+    use interstage::supervise::{Fault, Leg, Limit};
+    use interstage::units::Q16;
+
+    use super::*;
+
+    const RUN: Mode = Mode::Run(Direction::Deploy, Leg::Cruise);
+
+    /// A judge that has seen `ticks` of this mode at this reference and true speed, mm/s,
+    /// under this preload, N.
+    fn judged(mode: Mode, asked: f64, speed: f64, preload_n: f64, ticks: u32) -> Judge {
+        let mut truth = Truth { preload_n, speed_mm_s: speed, ..Truth::default() };
+        let mut judge = Judge::new(&Scenario::default(), &truth);
+        let mut output = Output::default();
+        output.telemetry.mode = mode;
+        output.telemetry.speed_ref = Q16::from_num(asked);
+        for tick in 0..ticks {
+            truth.position_mm += speed * TICK_S;
+            judge.look(f64::from(tick) * TICK_S, &output, &truth, true);
+        }
+        judge
+    }
+
+    #[test]
+    fn motion_is_uncommanded_beyond_its_reference_against_it_and_at_rest() {
+        assert!(judged(RUN, 8.0, 15.7, 40.0, 1000).motion_mm < 1e-9);
+        assert!((judged(RUN, 8.0, 25.8, 40.0, 100).motion_mm - 1.0).abs() < 0.01);
+        assert!((judged(RUN, 8.0, -8.0, 40.0, 100).motion_mm - 0.5).abs() < 0.01);
+        let hold = Mode::FaultHold(Fault::DriveStalled);
+        assert!((judged(hold, 0.0, 1.0, 40.0, 100).motion_mm - 0.1).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_harm_is_named() {
+        let hold = Mode::FaultHold(Fault::Overpressure);
+        assert!(judged(hold, 0.0, 0.0, 62.0, 10).harms().is_empty());
+        assert!(judged(hold, 0.0, 0.0, 63.0, 10).harms()[0].starts_with("preload 63.0 N"));
+        assert!(judged(RUN, 8.0, 8.0, 40.0, 10).harms()[0].starts_with("not at rest"));
+        let there = Mode::Complete(Direction::Deploy);
+        assert!(judged(there, 0.0, 0.0, 40.0, 10).harms()[0].starts_with("80.0 mm from the end"));
+        assert!(judged(Mode::Complete(Direction::Retract), 0.0, 0.0, 40.0, 10).harms().is_empty());
+    }
+
+    #[test]
+    fn what_is_not_reported_must_have_ended_well() {
+        let back = Mode::Complete(Direction::Retract);
+        let good = judged(back, 0.0, 0.0, 40.0, 10);
+        assert_eq!(good.finding(&[], 1.0, true), Finding::Tolerated);
+        assert_eq!(good.finding(&[], 1.0, false), Finding::Undetected);
+        assert_eq!(good.finding(&[], 1.3, true), Finding::Undetected);
+        assert_eq!(judged(RUN, 8.0, 8.0, 40.0, 10).finding(&[], 1.0, true), Finding::Undetected);
+        let mut told = good.clone();
+        told.limits.push((0.1, Limit::StepLate.code()));
+        assert_eq!(told.finding(&[], 1.3, true), Finding::Limited);
+        assert_eq!(told.finding(&[Limit::StepLate.code()], 1.3, true), Finding::Undetected);
+    }
+
+    #[test]
+    fn the_first_fault_after_the_strike_counts() {
+        let mut judge = Judge::new(&Scenario::default(), &Truth::default());
+        let mut output = Output::default();
+        let mut say = |at: u32, fault, struck| {
+            output.events.clear();
+            let event = Event::Fault(fault);
+            output.events.push(Entry { at, event }).expect("room");
+            judge.look(f64::from(at) * TICK_S, &output, &Truth::default(), struck);
+        };
+        say(1, Fault::SelfTest, false);
+        say(2, Fault::AngleStale, true);
+        say(3, Fault::SelfTest, true);
+        assert_eq!(judge.fault, Some((0.002, Fault::AngleStale.code())));
+        assert_eq!(judge.rest_s, Some(0.002));
+        output.drive = MotorCommand { enable: true, ..MotorCommand::OFF };
+        judge.look(0.004, &output, &Truth::default(), true);
+        assert_eq!(judge.rest_s, None);
+    }
+}

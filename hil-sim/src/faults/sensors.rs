@@ -1,0 +1,267 @@
+//! A sensor that lies: between what it gives and what the controller gets.
+//!
+//! Every sensor is a number in codes, the wheel encoder's counter without its wrap; what a
+//! fault does to that number is the same for all.
+
+use std::collections::VecDeque;
+
+use interstage::rig::Sensors;
+use interstage::sense::analog::{FULL_AT, ZERO_AT};
+use interstage::sense::angle::decode;
+use interstage::sense::raw::{AdcCode, AngleFrame, EncoderCount, Sample, SensorFrame};
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+
+use super::{Kind, Target};
+
+/// Largest code of a converter.
+const SPAN: f64 = 65_535.0;
+/// Codes of a turn of the angle sensor.
+const TURN: f64 = 16_384.0;
+/// What sums of milliseconds may be off, s.
+const TIME_S: f64 = 1e-6;
+/// Period of an intermittent contact, s.
+const PERIOD_S: f64 = 0.1;
+
+/// A lying sensor.
+#[derive(Clone, Debug)]
+pub(super) struct Lie {
+    target: Target,
+    kind: Kind,
+    /// In codes where the kind has it in the sensor's unit.
+    magnitude: f64,
+    /// Code at which the sensor reads zero.
+    zero: f64,
+    /// Counter of the encoder before, and without its wrap.
+    counter: Option<(EncoderCount, i64)>,
+    /// What the sensor truly read last, s and codes.
+    last: Option<(f64, f64)>,
+    /// What it gave when the fault came.
+    first: Option<f64>,
+    filtered: f64,
+    past: VecDeque<(f64, f64)>,
+    /// The sample that stands while none comes.
+    stands: SensorFrame,
+}
+
+impl Lie {
+    /// A sensor of `rig` whose wheel has this circumference, mm.
+    pub(super) fn new(
+        target: Target,
+        kind: Kind,
+        magnitude: f64,
+        rig: &Sensors,
+        turn_mm: f64,
+    ) -> Self {
+        let bridge = |full_scale: f64| (FULL_AT - ZERO_AT) * SPAN / full_scale;
+        let (per_unit, zero) = match target {
+            Target::LoadCell => (bridge(rig.load_cell_full_scale_n), ZERO_AT * SPAN),
+            Target::TreadSensor => (bridge(rig.tread_full_scale_mm), ZERO_AT * SPAN),
+            Target::Angle => (TURN / 360.0, rig.angle_zero_code),
+            _ => (rig.encoder_counts / turn_mm, 0.0),
+        };
+        let magnitude = if kind == Kind::Offset { magnitude * per_unit } else { magnitude };
+        Self {
+            target,
+            kind,
+            magnitude,
+            zero,
+            counter: None,
+            last: None,
+            first: None,
+            filtered: 0.0,
+            past: VecDeque::new(),
+            stands: SensorFrame::default(),
+        }
+    }
+
+    /// Puts into `frame` what the controller gets, `since_s` after the fault came; before
+    /// that nothing is changed.
+    pub(super) fn tell(
+        &mut self,
+        frame: &mut SensorFrame,
+        t_s: f64,
+        since_s: Option<f64>,
+        random: &mut ChaCha8Rng,
+    ) {
+        let truth = self.read(frame);
+        let Some(since_s) = since_s else {
+            (self.stands, self.first) = (*frame, None);
+            self.keep(t_s, truth);
+            return;
+        };
+        let Some(truth) = truth else { return };
+        let silent = match self.kind {
+            Kind::Off => true,
+            Kind::Intermittent => since_s % PERIOD_S < self.magnitude * PERIOD_S,
+            _ => false,
+        };
+        if silent {
+            self.silence(frame);
+            return;
+        }
+        self.stands = *frame;
+        if self.kind == Kind::Garbage {
+            self.garble(frame, random);
+            return;
+        }
+        let first = *self.first.get_or_insert(self.last.map_or(truth, |(_, code)| code));
+        let told = match self.kind {
+            Kind::Stuck => first,
+            // The counter has no zero of its own: it goes wrong from where it stood.
+            Kind::Gain if self.target == Target::Encoder => {
+                first + (truth - first) * self.magnitude
+            }
+            Kind::Gain => self.zero + (truth - self.zero) * self.magnitude,
+            Kind::Offset => truth + self.magnitude,
+            Kind::Slow => {
+                let dt_s = self.last.map_or(0.0, |(before_s, _)| t_s - before_s);
+                self.filtered += (truth - self.filtered) * -(-dt_s / self.magnitude).exp_m1();
+                self.filtered
+            }
+            Kind::Delayed => self.late(t_s),
+            _ => truth,
+        };
+        self.remember(t_s, truth);
+        self.write(frame, told);
+    }
+
+    /// Keeps what is true while the sensor is whole.
+    fn keep(&mut self, t_s: f64, truth: Option<f64>) {
+        if let Some(truth) = truth {
+            self.filtered = truth;
+            self.remember(t_s, truth);
+        }
+    }
+
+    fn remember(&mut self, t_s: f64, truth: f64) {
+        self.last = Some((t_s, truth));
+        if self.kind == Kind::Delayed {
+            self.past.push_back((t_s, truth));
+            while self.past.get(1).is_some_and(|(at_s, _)| *at_s <= t_s - self.magnitude + TIME_S) {
+                self.past.pop_front();
+            }
+        }
+    }
+
+    /// What was true so long ago.
+    fn late(&self, t_s: f64) -> f64 {
+        let due = |(at_s, _): &&(f64, f64)| *at_s <= t_s - self.magnitude + TIME_S;
+        let then = self.past.iter().rev().find(due).or(self.past.front());
+        then.map_or(0.0, |(_, code)| *code)
+    }
+
+    /// The sensor's number in this frame; none before the first, or if it is not good.
+    fn read(&mut self, frame: &SensorFrame) -> Option<f64> {
+        match self.target {
+            Target::LoadCell => frame.load_cell.map(|s| f64::from(s.code.get())),
+            Target::TreadSensor => frame.tread.map(|s| f64::from(s.code.get())),
+            Target::Angle => decode(frame.arm?.code).ok().map(f64::from),
+            _ => {
+                let code = frame.wheel?.code;
+                let (before, sum) = self.counter.unwrap_or((code, i64::from(code.get())));
+                let sum = sum + i64::from(code.since(before));
+                self.counter = Some((code, sum));
+                Some(sum as f64)
+            }
+        }
+    }
+
+    fn write(&self, frame: &mut SensorFrame, code: f64) {
+        let bridge = AdcCode::new(code.round().clamp(0.0, SPAN) as u16);
+        match self.target {
+            Target::LoadCell => put(&mut frame.load_cell, bridge),
+            Target::TreadSensor => put(&mut frame.tread, bridge),
+            Target::Angle => {
+                let bits = (code.round() as i64 & 0x3fff) as u16;
+                let parity = (bits.count_ones() as u16 & 1) << 15;
+                put(&mut frame.arm, AngleFrame::new(bits | parity));
+            }
+            _ => put(&mut frame.wheel, EncoderCount::new(code.floor() as i64 as u16)),
+        }
+    }
+
+    fn garble(&self, frame: &mut SensorFrame, random: &mut ChaCha8Rng) {
+        let code: u16 = random.random();
+        match self.target {
+            Target::LoadCell => put(&mut frame.load_cell, AdcCode::new(code)),
+            Target::TreadSensor => put(&mut frame.tread, AdcCode::new(code)),
+            Target::Angle => put(&mut frame.arm, AngleFrame::new(code)),
+            _ => put(&mut frame.wheel, EncoderCount::new(code)),
+        }
+    }
+
+    /// The sample before stands.
+    fn silence(&self, frame: &mut SensorFrame) {
+        match self.target {
+            Target::LoadCell => frame.load_cell = self.stands.load_cell,
+            Target::TreadSensor => frame.tread = self.stands.tread,
+            Target::Angle => frame.arm = self.stands.arm,
+            _ => frame.wheel = self.stands.wheel,
+        }
+    }
+}
+
+fn put<T>(sample: &mut Option<Sample<T>>, code: T) {
+    if let Some(sample) = sample {
+        sample.code = code;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use interstage::rig::Rig;
+    use rand::SeedableRng;
+
+    use super::*;
+
+    /// What the controller gets of a load cell that reads 10, 11, 12 ... N a millisecond.
+    fn told(kind: Kind, magnitude: f64) -> Vec<f64> {
+        let rig = Rig::prototype().sense;
+        let mut lie = Lie::new(Target::LoadCell, kind, magnitude, &rig, 157.0);
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let per_n = (FULL_AT - ZERO_AT) * SPAN / rig.load_cell_full_scale_n;
+        (0..40u32)
+            .map(|tick| {
+                let force = 10.0 + f64::from(tick);
+                let code = AdcCode::new((ZERO_AT * SPAN + force * per_n).round() as u16);
+                let load_cell = Some(Sample { code, at: tick });
+                let mut frame = SensorFrame { load_cell, ..SensorFrame::default() };
+                let t_s = f64::from(tick) * 1e-3;
+                let since_s = (tick >= 20).then_some(t_s - 0.020);
+                lie.tell(&mut frame, t_s, since_s, &mut random);
+                let sample = frame.load_cell.expect("a sample");
+                if sample.at < tick {
+                    return f64::NAN;
+                }
+                (f64::from(sample.code.get()) - ZERO_AT * SPAN) / per_n
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_sensor_is_whole_until_its_fault_comes() {
+        for kind in [Kind::Off, Kind::Stuck, Kind::Garbage, Kind::Gain, Kind::Slow, Kind::Delayed] {
+            for (tick, force) in told(kind, 0.01).iter().take(20).enumerate() {
+                assert!((force - 10.0 - tick as f64).abs() < 0.01, "{kind:?} {tick} {force}");
+            }
+        }
+    }
+
+    #[test]
+    fn each_kind_tells_its_own_lie() {
+        let near = |a: f64, b: f64| assert!((a - b).abs() < 0.02, "{a} {b}");
+        assert!(told(Kind::Off, 0.0)[20..].iter().all(|force| force.is_nan()));
+        told(Kind::Stuck, 0.0)[20..].iter().for_each(|force| near(*force, 29.0));
+        near(told(Kind::Gain, 1.2)[30], 48.0);
+        near(told(Kind::Offset, -5.0)[30], 35.0);
+        near(told(Kind::Delayed, 0.005)[30], 35.0);
+        // A ramp through a low-pass lags by its time constant.
+        let slow = told(Kind::Slow, 0.002)[39];
+        assert!((46.5..48.5).contains(&slow), "{slow}");
+        let part = told(Kind::Intermittent, 0.1);
+        assert!(part[25].is_nan() && part[35] > 44.0, "{part:?}");
+        let garbage = told(Kind::Garbage, 0.0);
+        assert!(garbage[20..].iter().filter(|f| (**f - 40.0).abs() > 20.0).count() > 10);
+    }
+}

@@ -1,0 +1,350 @@
+//! Tampering with a run under way: between sensors and controller, between controller and
+//! actuators, in the plant, with the tick itself and with who talks to it.
+
+use std::collections::VecDeque;
+
+use interstage::sense::raw::SensorFrame;
+use interstage::supervise::Command;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::sensors::Lie;
+use super::{From, Injection, Kind, Target};
+use crate::plant::rig::{Drives, Truth, VirtualRig};
+use crate::scenario::{Direction, Scenario};
+
+/// Control period, s.
+const TICK_S: f64 = 1e-3;
+/// Difference of duty that is one.
+const ACTS: f64 = 0.02;
+/// Half of the torn sector, rad.
+const TORN_RAD: f64 = 0.35;
+/// Way within which a corner that carries again is the same one, mm.
+const SAME_CORNER_MM: f64 = 5.0;
+
+/// The faults of a run, and how far they have come.
+pub struct Tamper {
+    faults: Vec<Active>,
+    random: ChaCha8Rng,
+    t_s: f64,
+    /// Corners touched so far, and where the last one carried.
+    corners: (u8, Option<f64>),
+    /// The run goes outwards.
+    outwards: bool,
+    /// Undamaged plant: friction, load, stiffness.
+    whole: Option<(f64, f64, f64, f64)>,
+}
+
+/// One fault.
+struct Active {
+    injection: Injection,
+    /// When it came, s.
+    since_s: Option<f64>,
+    over: bool,
+    /// When it first did something, s.
+    acts_s: Option<f64>,
+    lie: Option<Lie>,
+    /// Duty of an actuator when the fault came.
+    kept: Option<f64>,
+    /// Duties on their way.
+    pipeline: VecDeque<f64>,
+    /// Angle of the wheel at the middle of the torn sector, rad.
+    torn_rad: f64,
+}
+
+impl Tamper {
+    /// The faults of a scenario; none if it has none.
+    #[must_use]
+    pub fn of(scenario: &Scenario) -> Option<Self> {
+        let injections = &scenario.run.faults;
+        let turn_mm = std::f64::consts::TAU * scenario.rig.rig.wheel_radius_mm;
+        let active = |injection: &Injection| Active {
+            injection: *injection,
+            since_s: None,
+            over: false,
+            acts_s: None,
+            lie: injection.target.is_sensor().then(|| {
+                let (target, kind) = (injection.target, injection.kind);
+                Lie::new(target, kind, injection.magnitude(), &scenario.rig.sense, turn_mm)
+            }),
+            kept: None,
+            pipeline: VecDeque::new(),
+            torn_rad: 0.0,
+        };
+        (!injections.is_empty()).then(|| Self {
+            faults: injections.iter().map(active).collect(),
+            random: ChaCha8Rng::seed_from_u64(scenario.run.seed ^ 0x00fa_0175),
+            t_s: 0.0,
+            corners: (0, None),
+            outwards: scenario.run.direction == Direction::Deploy,
+            whole: None,
+        })
+    }
+
+    /// When the first fault came, s since boot.
+    #[must_use]
+    pub fn struck_s(&self) -> Option<f64> {
+        self.faults.iter().filter_map(|fault| fault.since_s).min_by(f64::total_cmp)
+    }
+
+    /// When it first made an actuator take another duty than it was asked for, s since boot;
+    /// for all other faults, when it came.
+    #[must_use]
+    pub fn acts_s(&self) -> Option<f64> {
+        let acts = |fault: &Active| match fault.injection.target {
+            Target::Drive | Target::Pretightener => fault.acts_s,
+            _ => fault.since_s,
+        };
+        self.faults.iter().filter_map(acts).min_by(f64::total_cmp)
+    }
+
+    /// A tick begins: faults come and go.
+    pub fn begin(&mut self, t_s: f64, truth: &Truth) {
+        self.t_s = t_s;
+        if truth.corner_n > 0.0 {
+            let (count, last_mm) = &mut self.corners;
+            if last_mm.is_none_or(|mm| (mm - truth.position_mm).abs() > SAME_CORNER_MM) {
+                *count = count.saturating_add(1);
+            }
+            *last_mm = Some(truth.position_mm);
+        }
+        for fault in &mut self.faults {
+            let due = match fault.injection.from() {
+                From::Time(at_s) => t_s >= at_s,
+                From::Position(mm) if self.outwards => truth.position_mm >= mm,
+                From::Position(mm) => truth.position_mm <= mm,
+                From::Crossing(crossing) => self.corners.0 >= crossing,
+            };
+            if due && fault.since_s.is_none() {
+                fault.since_s = Some(t_s);
+                fault.torn_rad = truth.rotation_rad;
+            }
+            let ends = |since_s: f64| fault.injection.duration_s.map(|s| since_s + s);
+            fault.over = fault.since_s.and_then(ends).is_some_and(|end_s| t_s >= end_s);
+        }
+    }
+
+    /// The sensors as the controller gets them.
+    pub fn sensors(&mut self, frame: &mut SensorFrame) {
+        let t_s = self.t_s;
+        for fault in &mut self.faults {
+            let since_s = fault.since_s.filter(|_| !fault.over).map(|since_s| t_s - since_s);
+            if let Some(lie) = &mut fault.lie {
+                lie.tell(frame, t_s, since_s, &mut self.random);
+            }
+        }
+    }
+
+    /// The command as the controller gets it.
+    pub fn command(&mut self, given: Option<Command>) -> Option<Command> {
+        let flooding = self.is(Target::Commands, Kind::Flooding).is_some();
+        let rate = self.is(Target::Commands, Kind::Random);
+        let random = &mut self.random;
+        let dice = rate.filter(|rate| random.random::<f64>() < rate * TICK_S);
+        let any = dice.map(|_| Command::ALL[random.random_range(0..Command::ALL.len())]);
+        given.or(any).or(flooding.then_some(Command::Reset))
+    }
+
+    /// Whether this control tick is lost.
+    #[must_use]
+    pub fn lost(&self) -> bool {
+        self.faults.iter().any(|fault| {
+            let overrun = fault.injection.kind == Kind::Overrun;
+            let since = fault.since_s.map_or(f64::INFINITY, |since_s| self.t_s - since_s);
+            overrun && since < fault.injection.magnitude() - 0.5 * TICK_S
+        })
+    }
+
+    /// Whether the model task hangs.
+    #[must_use]
+    pub fn model_hangs(&self) -> bool {
+        self.is(Target::Model, Kind::Hung).is_some()
+    }
+
+    /// Whether nobody reads the log.
+    #[must_use]
+    pub fn log_gone(&self) -> bool {
+        self.is(Target::Log, Kind::Gone).is_some()
+    }
+
+    /// The bridges as the plant gets them.
+    #[must_use]
+    pub fn drives(&mut self, asked: Drives) -> Drives {
+        let (mut drives, t_s) = (asked, self.t_s);
+        for fault in &mut self.faults {
+            let active = fault.since_s.is_some() && !fault.over;
+            match fault.injection.target {
+                Target::Drive => fault.turn(active, &mut drives.drive, drives.drive_on),
+                Target::Pretightener => fault.turn(active, &mut drives.preload, drives.preload_on),
+                _ => {}
+            }
+            let other =
+                (drives.drive - asked.drive).abs().max((drives.preload - asked.preload).abs());
+            if other > ACTS {
+                fault.acts_s.get_or_insert(t_s);
+            }
+        }
+        drives
+    }
+
+    /// The plant as it is left.
+    pub fn plant(&mut self, plant: &mut VirtualRig) {
+        if !self.faults.iter().any(|fault| fault.damages()) {
+            return;
+        }
+        let p = plant.parameters();
+        let whole = (p.mu, p.load_n, p.ring.k_inf, p.ring.k_0);
+        let (mu, load_n, k_inf, k_0) = *self.whole.get_or_insert(whole);
+        let turned = plant.truth().rotation_rad;
+        for fault in &mut self.faults {
+            let active = fault.since_s.is_some() && !fault.over;
+            let part = if active { fault.injection.magnitude() } else { 1.0 };
+            match (fault.injection.target, fault.injection.kind) {
+                (Target::Wheel, Kind::Slip) => plant.set_friction(mu * part),
+                (Target::Load, Kind::Doubled) => plant.set_load(load_n * part),
+                (Target::Tread, Kind::Torn) => {
+                    let near = (turned - fault.torn_rad).abs() < TORN_RAD;
+                    let part = if near { part } else { 1.0 };
+                    plant.set_stiffness(k_inf * part, k_0 * part);
+                }
+                // A broken spring does not heal.
+                (Target::Spring, Kind::Broken) if active && fault.kept.is_none() => {
+                    fault.kept = Some(part);
+                    plant.break_spring(part);
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// Magnitude of such a fault, if it is there now.
+    fn is(&self, target: Target, kind: Kind) -> Option<f64> {
+        let fault = self.faults.iter().find(|fault| {
+            let injection = &fault.injection;
+            (injection.target, injection.kind) == (target, kind)
+                && fault.since_s.is_some()
+                && !fault.over
+        });
+        fault.map(|fault| fault.injection.magnitude())
+    }
+}
+
+impl Active {
+    fn damages(&self) -> bool {
+        use Target::{Load, Spring, Tread, Wheel};
+        matches!(self.injection.target, Wheel | Tread | Spring | Load)
+    }
+
+    /// What a faulty actuator makes of its duty.
+    fn turn(&mut self, active: bool, duty: &mut f64, on: bool) {
+        let kind = self.injection.kind;
+        if kind == Kind::Delayed {
+            let depth = (self.injection.magnitude() / TICK_S).round() as usize;
+            self.pipeline.push_back(if on { *duty } else { 0.0 });
+            while self.pipeline.len() > depth + 1 {
+                self.pipeline.pop_front();
+            }
+        }
+        if !active || !on {
+            self.kept = None;
+            return;
+        }
+        let kept = *self.kept.get_or_insert(*duty);
+        *duty = match kind {
+            Kind::Stalled => 0.0,
+            Kind::Stuck => kept,
+            Kind::Weak => *duty * self.injection.magnitude(),
+            Kind::Reversed => -*duty,
+            Kind::Delayed => self.pipeline.front().copied().unwrap_or(*duty),
+            Kind::Runaway => self.injection.magnitude(),
+            _ => *duty,
+        };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tamper(target: Target, kind: Kind, magnitude: f64) -> Tamper {
+        let mut scenario = Scenario::default();
+        scenario.run.faults = vec![Injection::at(target, kind, 0.010, magnitude)];
+        Tamper::of(&scenario).expect("a fault")
+    }
+
+    /// Duties that reach the drive when 0.001, 0.002 ... are asked for.
+    fn duties(kind: Kind, magnitude: f64) -> Vec<f64> {
+        let mut tamper = tamper(Target::Drive, kind, magnitude);
+        (1..=30)
+            .map(|tick| {
+                tamper.begin(f64::from(tick) * TICK_S, &Truth::default());
+                let drive = f64::from(tick) * 0.001;
+                let on = tick != 25;
+                tamper.drives(Drives { drive, drive_on: on, ..Drives::default() }).drive
+            })
+            .collect()
+    }
+
+    #[test]
+    fn an_actuator_turns_as_its_fault_has_it() {
+        let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} {b}");
+        for kind in [Kind::Stalled, Kind::Stuck, Kind::Weak, Kind::Reversed, Kind::Delayed] {
+            near(duties(kind, 0.005)[8], 0.009);
+        }
+        near(duties(Kind::Stalled, 0.0)[19], 0.0);
+        near(duties(Kind::Stuck, 0.0)[19], 0.010);
+        near(duties(Kind::Weak, 0.5)[19], 0.010);
+        near(duties(Kind::Reversed, 0.0)[19], -0.020);
+        near(duties(Kind::Delayed, 0.005)[19], 0.015);
+        near(duties(Kind::Runaway, -1.0)[19], -1.0);
+    }
+
+    #[test]
+    fn a_bridge_that_is_off_stays_off() {
+        assert_eq!(duties(Kind::Runaway, 1.0)[24], 0.025);
+        assert_eq!(duties(Kind::Runaway, 1.0)[25], 1.0);
+    }
+
+    #[test]
+    fn ticks_are_lost_once_and_for_as_long_as_said() {
+        let mut tamper = tamper(Target::Tick, Kind::Overrun, 0.003);
+        let lost: Vec<i32> = (0..100)
+            .filter(|tick| {
+                tamper.begin(f64::from(*tick) * TICK_S, &Truth::default());
+                tamper.lost()
+            })
+            .collect();
+        assert_eq!(lost, [10, 11, 12]);
+    }
+
+    #[test]
+    fn a_fault_ends_when_its_time_is_over() {
+        let mut scenario = Scenario::default();
+        let mut hung = Injection::at(Target::Model, Kind::Hung, 0.010, 0.0);
+        hung.duration_s = Some(0.005);
+        scenario.run.faults = vec![hung];
+        let mut tamper = Tamper::of(&scenario).expect("a fault");
+        let hangs: Vec<i32> = (0..100)
+            .filter(|tick| {
+                tamper.begin(f64::from(*tick) * TICK_S, &Truth::default());
+                tamper.model_hangs()
+            })
+            .collect();
+        assert_eq!((hangs.first(), hangs.len()), (Some(&10), 5));
+    }
+
+    #[test]
+    fn a_crossing_counts_once_however_its_corner_chatters() {
+        let mut scenario = Scenario::default();
+        let mut fault = Injection::at(Target::Log, Kind::Gone, 0.0, 0.0);
+        (fault.at_s, fault.at_crossing) = (None, Some(2));
+        scenario.run.faults = vec![fault];
+        let mut tamper = Tamper::of(&scenario).expect("a fault");
+        let mut at = |position_mm: f64, corner_n: f64| {
+            tamper.begin(0.0, &Truth { position_mm, corner_n, ..Truth::default() });
+            tamper.log_gone()
+        };
+        assert!(!at(0.0, 0.0) && !at(8.0, 3.0) && !at(9.0, 0.0) && !at(9.5, 3.0));
+        assert!(at(30.0, 4.0));
+    }
+}

@@ -1,0 +1,79 @@
+//! The campaign of faults, at a few instants each: nothing undetected, nothing unsafe, and
+//! what must be found at once is found at once. `cargo rig faults` is the whole of it.
+
+use hil_sim::faults::campaign::{Campaign, Case, Line, Outcome};
+use hil_sim::faults::{Injection, Kind, Target};
+use hil_sim::scenario::Scenario;
+use hil_sim::sil::{Options, run};
+
+fn campaign(instants: usize, wanted: impl Fn(&str) -> bool) -> Outcome {
+    let cases = Case::all().into_iter().filter(|case| wanted(&case.name())).collect();
+    let campaign = Campaign { scenario: Scenario::default(), instants, cases };
+    campaign.run(&|| {}).expect("a campaign")
+}
+
+fn line<'a>(outcome: &'a Outcome, fault: &str) -> &'a Line {
+    outcome.matrix.iter().find(|line| line.fault == fault).expect(fault)
+}
+
+#[test]
+fn every_fault_is_found_or_borne_and_the_mechanism_held() {
+    let outcome = campaign(4, |_| true);
+    assert!(outcome.matrix.len() > 50);
+    let failures: Vec<_> = outcome.matrix.iter().flat_map(|line| &line.failures).collect();
+    assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{failures:#?}");
+}
+
+#[test]
+fn what_must_be_found_at_once_is() {
+    let outcome = campaign(16, |name| ["drive runaway", "tick overrun"].contains(&name));
+    for (fault, code, most_ms) in [("drive runaway", 123, 30.0), ("tick overrun", 160, 10.0)] {
+        let line = line(&outcome, fault);
+        assert_eq!((line.found, line.code), (16, Some(code)), "{line:?}");
+        assert!(line.latency_ms.is_some_and(|ms| ms <= most_ms), "{line:?}");
+        assert!(line.latency_median_ms.is_some_and(|ms| ms <= 10.0), "{line:?}");
+    }
+}
+
+#[test]
+fn a_silent_sensor_is_named_within_its_age() {
+    let sensors = ["encoder off", "load-cell off", "tread-sensor off", "angle off"];
+    let outcome = campaign(4, |name| sensors.contains(&name));
+    for (fault, code) in sensors.into_iter().zip(101..) {
+        let line = line(&outcome, fault);
+        assert_eq!((line.found, line.code), (4, Some(code)), "{line:?}");
+        assert!(line.latency_ms.is_some_and(|ms| ms <= 25.0), "{line:?}");
+    }
+}
+
+#[test]
+fn the_same_campaign_comes_out_the_same_on_any_number_of_processors() {
+    let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
+    let some = |name: &str| name == "angle stuck" || name == "commands random";
+    let text = |outcome: &Outcome| serde_json::to_string(outcome).expect("JSON");
+    assert_eq!(text(&alone.install(|| campaign(3, some))), text(&campaign(3, some)));
+}
+
+#[test]
+fn a_run_with_a_fault_of_its_scenario_ends_in_it_and_says_so() {
+    let mut scenario = Scenario::default();
+    let stuck = Injection::at(Target::LoadCell, Kind::Stuck, 0.0, 0.0);
+    scenario.run.faults = vec![Injection { at_s: None, at_mm: Some(10.0), ..stuck }];
+    let recording = run(&scenario, Options { rows: true, speed: None }).expect("a run");
+    let summary = recording.summary;
+    assert_eq!(summary.faults.iter().map(|fault| fault.code).collect::<Vec<_>>(), [116]);
+    assert!(!summary.completed && (10.0..14.0).contains(&summary.travel_mm), "{summary:?}");
+    assert_eq!(summary.injected, ["load-cell stuck from 10 mm"]);
+}
+
+#[test]
+fn a_log_that_nobody_reads_does_not_change_the_run() {
+    let clean = Scenario::default();
+    let mut gone = clean.clone();
+    gone.run.faults = vec![Injection::at(Target::Log, Kind::Gone, 1.0, 0.0)];
+    let run =
+        |scenario: &Scenario| run(scenario, Options { rows: true, speed: None }).expect("a run");
+    let (clean, gone) = (run(&clean), run(&gone));
+    assert_eq!(clean.summary.trace_digest, gone.summary.trace_digest);
+    assert!(gone.stream.len() < clean.stream.len() / 2);
+}

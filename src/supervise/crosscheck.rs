@@ -1,0 +1,284 @@
+//! Checks of the sensors against one another and against what the bridges are asked for.
+//!
+//! Each compares two things that no single fault spoils alike. They run while the drive is
+//! on and start afresh whenever it has been off. What a fault-free rig shows was measured on
+//! random rigs of both presets, out and back; every threshold stands above the worst of it by
+//! the part that its constant says, and a campaign of 10,000 rigs holds it to that.
+
+#![deny(clippy::float_arithmetic)]
+
+use super::Fault;
+use crate::numeric::checked;
+use crate::rig::{Rig, RigError};
+use crate::units::{
+    Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Tick, Travel, per_tick, q16,
+};
+
+/// Ticks between the three positions that make an acceleration.
+const SPAN: usize = 6;
+/// Room for the positions of two spans.
+const KEPT: usize = 16;
+/// Way reference and encoder may bend apart within two spans, counts. Three readings of a
+/// counter are off by less than 2 counts together, and a third whole count takes
+/// `1 / (6 ms)^2`, 530 mm/s^2 beyond the reference: twice what the profile asks for. The
+/// worst of the random rigs is 2.1.
+const BENT_COUNTS: f64 = 2.5;
+/// Way off the reference within two spans, mm: the dips behind a step make 0.11.
+const OFF: Millimetres = q16(150_000);
+/// Way that counts as progress of the wheel, mm: two counts and a half.
+const PROGRESS: Millimetres = q16(50_000);
+/// Way that the reference may go while a wheel that has turned makes no progress, mm.
+const LAG: Millimetres = q16(400_000);
+/// The same before it has turned, mm: on a corner the speed loop first has to find the duty
+/// that lifts it, 0.2 s at half the crossing speed.
+const START_LAG: Millimetres = q16(2_000_000);
+/// Progress, by times, after which it has turned.
+const TURNED: u8 = 10;
+/// Ticks within which arm and wheel are compared.
+const ARM_TICKS: u8 = 32;
+/// Way that the arm may move beyond the wheel's within them, mm; noise and the slope of a
+/// corner, at most 1, make 0.08.
+const ARM_BEYOND: Millimetres = q16(250_000);
+/// Least speed at which duty tells speed, mm/s.
+const TELLING: MillimetresPerSecond = q16(10_000_000);
+/// Duty beyond the feed-forward that cruising takes, least and most: gearbox friction and
+/// rolling resistance make 0.02 to 0.07, twice the top load 0.05 more, a motor that is off
+/// by 5 % 0.03 either way at cruise speed.
+const EFFORT: (Ratio, Ratio) = (q16(-50_000), q16(130_000));
+/// Ticks that it must be outside: two time constants of the loop and more, in which it
+/// forgets the last corner.
+const EFFORT_TICKS: u8 = 120;
+/// Preload off its model, part of the cruise preload: 0.18 at the ramps of an actuator whose
+/// dead time, lag and slew are all three off.
+const STRAYED_PART: f64 = 0.25;
+/// Ticks that it must be.
+const STRAYED_TICKS: u8 = 10;
+/// Equal codes in a row of a converter that no signal moves: with noise of half a code it
+/// gives the same code again with a chance of 0.6, and 64 times with 1e-14.
+const STUCK: u8 = 64;
+/// Change within a tick that no force makes, N: the spring yields 36 N/s at cruise speed.
+const JUMP_N: Newtons = q16(4_000_000);
+/// The same of the tread's compression, mm: it runs in at 20 mm/s.
+const JUMP_MM: Millimetres = q16(100_000);
+/// What a jump adds to the count of them, of which each good tick takes one off.
+const JUMP_COUNTS: u8 = 8;
+/// Count at which a sensor is given up: eight jumps close together.
+const ERRATIC: u8 = 60;
+
+/// Thresholds of a rig.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub(super) struct CrossCheck {
+    /// See [`BENT_COUNTS`], mm.
+    bent: Millimetres,
+    /// See [`STRAYED_PART`], N.
+    strayed: Newtons,
+}
+
+/// What is remembered of the ticks before.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct CrossState {
+    /// Way of the reference since the drive was switched on.
+    reference: Travel,
+    /// Encoder less reference, mm, of the last ticks.
+    past: [Millimetres; KEPT],
+    /// Ticks that they hold, up to [`KEPT`], and where the next one goes.
+    held: u8,
+    head: u8,
+    at: Tick,
+    /// Encoder and reference at the last progress.
+    progress: (Travel, Travel),
+    /// Times that there was some, up to [`TURNED`].
+    turned: u8,
+    /// Radius and encoder when arm and wheel were last set equal, and the ticks since.
+    arm: (Millimetres, Travel),
+    arm_ticks: u8,
+    effort: u8,
+    strayed: u8,
+    preload: CodeState,
+    compression: CodeState,
+}
+
+/// What is remembered of a converter.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct CodeState {
+    value: Q16,
+    same: u8,
+    erratic: u8,
+}
+
+/// What is compared in a tick.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Compared {
+    /// Tick.
+    pub(super) now: Tick,
+    /// When the encoder was read.
+    pub(super) read_at: Tick,
+    /// Way by the encoder.
+    pub(super) travel: Travel,
+    /// Wheel centre's distance from the pillar axis, mm.
+    pub(super) radius: Millimetres,
+    /// Preload, N.
+    pub(super) preload: Newtons,
+    /// Preload that the actuator should have reached by now, N.
+    pub(super) preload_due: Newtons,
+    /// Compression of the tread, mm.
+    pub(super) compression: Millimetres,
+    /// Speed reference, signed outwards, mm/s.
+    pub(super) speed_ref: MillimetresPerSecond,
+    /// Duty that the speed loop adds to its feed-forward, if the reference is steady and the
+    /// wheel on the continuous wall.
+    pub(super) effort: Option<Ratio>,
+}
+
+impl CrossCheck {
+    /// Thresholds of a rig.
+    ///
+    /// # Errors
+    /// [`RigError`] if a parameter is out of range.
+    #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
+    pub(super) fn try_build(rig: &Rig) -> Result<Self, RigError> {
+        let turn_mm = 2.0 * core::f64::consts::PI * rig.rig.wheel_radius_mm;
+        let count_mm = turn_mm / rig.sense.encoder_counts;
+        Ok(Self {
+            bent: checked("sense.encoder_counts", BENT_COUNTS * count_mm)?,
+            strayed: checked("preload.cruise_n", STRAYED_PART * rig.preload.cruise_n)?,
+        })
+    }
+
+    /// The pre-tightener and its load cell, whenever that is on.
+    pub(super) fn preload(
+        &self,
+        state: &mut CrossState,
+        preload: Newtons,
+        due: Newtons,
+    ) -> Option<Fault> {
+        let unsound = judge(&mut state.preload, preload, JUMP_N);
+        let off = (preload - due).abs() > self.strayed;
+        let strayed = lasts(&mut state.strayed, off, STRAYED_TICKS);
+        if unsound {
+            Some(Fault::PressureImplausible)
+        } else {
+            strayed.then_some(Fault::PretightenerRunaway)
+        }
+    }
+
+    /// Every check of a tick in which the drive is on.
+    pub(super) fn step(&self, state: &mut CrossState, seen: &Compared) -> Option<Fault> {
+        let bent = self.bends(state, seen);
+        // A wheel of which nothing new is known may have gone anywhere.
+        let fresh = seen.read_at == seen.now;
+        let lags = fresh && lags(state, seen);
+        let preload = self.preload(state, seen.preload, seen.preload_due);
+        let unsound = judge(&mut state.compression, seen.compression, JUMP_MM);
+        let arm = fresh && arm_runs_ahead(state, seen);
+        let effort = seen.effort.is_some_and(|effort| {
+            let along = if seen.speed_ref < Q16::ZERO { -effort } else { effort };
+            seen.speed_ref.abs() > TELLING && !(EFFORT.0..=EFFORT.1).contains(&along)
+        });
+        let effort = lasts(&mut state.effort, effort, EFFORT_TICKS);
+        if bent {
+            Some(Fault::DriveRunaway)
+        } else if preload == Some(Fault::PressureImplausible) {
+            preload
+        } else if unsound {
+            Some(Fault::DisplacementImplausible)
+        } else if arm {
+            Some(Fault::ArmMismatch)
+        } else if lags {
+            Some(Fault::DriveStalled)
+        } else if effort {
+            Some(Fault::DutyMismatch)
+        } else {
+            preload
+        }
+    }
+
+    /// Whether the wheel leaves its reference: first or second difference of encoder less
+    /// reference over 12 ms.
+    fn bends(&self, state: &mut CrossState, seen: &Compared) -> bool {
+        state.reference = state.reference.wrapping_add(per_tick(seen.speed_ref));
+        // A tick without a new reading, or one lost: the times would not be equal.
+        let missed = seen.read_at != seen.now || seen.now.wrapping_sub(state.at) != 1;
+        state.at = seen.now;
+        let now = Q16::narrow(seen.travel.wrapping_sub(state.reference));
+        let back = |ticks: usize| {
+            let place = usize::from(state.head).wrapping_sub(ticks) % KEPT;
+            state.past.get(place).copied().unwrap_or(now)
+        };
+        let (middle, old) = (back(SPAN), back(2 * SPAN));
+        if let Some(place) = state.past.get_mut(usize::from(state.head)) {
+            *place = now;
+        }
+        state.head = (state.head + 1) % KEPT as u8;
+        if missed || usize::from(state.held) < 2 * SPAN {
+            state.held = if missed { 0 } else { state.held + 1 };
+            return false;
+        }
+        ((now - middle) - (middle - old)).abs() > self.bent || (now - old).abs() > OFF
+    }
+}
+
+/// Whether the reference goes on while the wheel does not.
+fn lags(state: &mut CrossState, seen: &Compared) -> bool {
+    let (travel, reference) = state.progress;
+    let way = Q16::narrow(seen.travel.saturating_sub(travel));
+    if way.abs() > PROGRESS {
+        state.progress = (seen.travel, state.reference);
+        state.turned = state.turned.saturating_add(1).min(TURNED);
+        return false;
+    }
+    let most = if state.turned < TURNED { START_LAG } else { LAG };
+    Q16::narrow(state.reference.saturating_sub(reference)).abs() > most
+}
+
+/// Whether the arm has moved farther than the wheel.
+fn arm_runs_ahead(state: &mut CrossState, seen: &Compared) -> bool {
+    if state.arm_ticks == 0 {
+        state.arm = (seen.radius, seen.travel);
+        state.arm_ticks = ARM_TICKS;
+    }
+    state.arm_ticks -= 1;
+    let (radius, travel) = state.arm;
+    let rolled = Q16::narrow(seen.travel.saturating_sub(travel)).abs();
+    (seen.radius - radius).abs() > rolled + ARM_BEYOND
+}
+
+/// Whether a converter gives the same code over and over, or jumps about.
+fn judge(state: &mut CodeState, value: Q16, jump: Q16) -> bool {
+    let change = (value - state.value).abs();
+    state.value = value;
+    state.same = if change == Q16::ZERO { state.same.saturating_add(1) } else { 0 };
+    state.erratic = if change > jump {
+        state.erratic.saturating_add(JUMP_COUNTS)
+    } else {
+        state.erratic.saturating_sub(1)
+    };
+    state.same >= STUCK || state.erratic >= ERRATIC
+}
+
+/// Counts ticks while a condition lasts, and tells when they are `enough`.
+fn lasts(count: &mut u8, condition: bool, enough: u8) -> bool {
+    *count = if condition { count.saturating_add(1) } else { 0 };
+    *count >= enough
+}
+
+impl CrossState {
+    /// The drive is switched on: from here on. The wheel has stood until now.
+    pub(super) fn begin(&mut self, seen: &Compared) {
+        *self = Self {
+            past: [Q16::narrow(seen.travel); KEPT],
+            held: 2 * SPAN as u8,
+            at: seen.now.wrapping_sub(1),
+            progress: (seen.travel, Travel::ZERO),
+            strayed: self.strayed,
+            preload: self.preload,
+            ..Self::default()
+        };
+        self.compression.value = seen.compression;
+    }
+}
+
+#[cfg(test)]
+#[path = "crosscheck_tests.rs"]
+#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
+mod tests;

@@ -1,0 +1,266 @@
+//! Each check at its threshold, and within the noise that it must bear.
+
+use super::*;
+use proptest::prelude::*;
+
+/// One count of the prototype's encoder, mm.
+const COUNT_MM: f64 = 2.0 * core::f64::consts::PI * 25.0 / 8192.0;
+
+/// What is true of a drive that the checks look at.
+#[derive(Clone, Copy, Debug)]
+struct Rolls {
+    /// Way of wheel and reference, mm.
+    way: f64,
+    reference: f64,
+    radius: f64,
+    preload: f64,
+    due: f64,
+    compression: f64,
+    effort: Option<f64>,
+    /// Codes stand still.
+    stuck: bool,
+}
+
+const ROLLS: Rolls = Rolls {
+    way: 0.0,
+    reference: 0.0,
+    radius: 125.0,
+    preload: 40.0,
+    due: 40.0,
+    compression: 0.4,
+    effort: None,
+    stuck: false,
+};
+
+/// Ticks until a fault when `at` tells what is true at each, after 100 ticks of settling;
+/// the encoder counts, and load cell and displacement sensor make noise.
+fn found(mut at: impl FnMut(f64) -> Rolls) -> Option<(Fault, i32)> {
+    let check = CrossCheck::try_build(&Rig::prototype()).expect("a sound rig");
+    let mut state = CrossState::default();
+    let mut before = 0.0;
+    (0..3000).find_map(|tick| {
+        let now = at(f64::from(tick - 100) * 1e-3);
+        // Any noise that keeps the last bits moving.
+        let noise = if now.stuck { 0.0 } else { f64::from((tick * 7919) % 101) / 101.0 - 0.5 };
+        let counts = (now.way / COUNT_MM).floor();
+        let speed_ref = (now.reference - before) * 1e3;
+        before = now.reference;
+        let seen = Compared {
+            now: tick as Tick,
+            read_at: tick as Tick,
+            travel: Travel::from_num(counts * COUNT_MM),
+            radius: Q16::from_num(now.radius),
+            preload: Q16::from_num(now.preload + 0.3 * noise),
+            preload_due: Q16::from_num(now.due),
+            compression: Q16::from_num(now.compression + 0.012 * noise),
+            speed_ref: Q16::from_num(speed_ref),
+            effort: now.effort.map(Q16::from_num),
+        };
+        if tick == 0 {
+            state.preload.value = seen.preload;
+            state.begin(&seen);
+        }
+        check.step(&mut state, &seen).map(|fault| (fault, tick - 100))
+    })
+}
+
+/// A wheel at constant speed, mm/s, that leaves it with this acceleration, mm/s^2.
+fn leaves(speed: f64, acceleration: f64) -> Option<(Fault, i32)> {
+    found(|t| {
+        let reference = speed * (t + 0.1);
+        let late = t.max(0.0);
+        Rolls { way: reference + 0.5 * acceleration * late * late, reference, ..ROLLS }
+    })
+}
+
+#[test]
+fn a_wheel_that_runs_away_is_found_within_ten_ticks() {
+    for speed in [3.0, 5.3, 8.0, 17.0, 30.0, -8.0, -30.0] {
+        for sign in [1.0, -1.0] {
+            // Full duty on the level, against the load of the rig.
+            let (fault, after) = leaves(speed, sign * 1700.0).expect("found");
+            assert_eq!(fault, Fault::DriveRunaway, "{speed}");
+            assert!((2..=10).contains(&after), "{speed} {after}");
+        }
+    }
+}
+
+#[test]
+fn a_bridge_at_full_duty_from_the_first_tick_is_found_as_soon() {
+    let check = CrossCheck::try_build(&Rig::prototype()).expect("a sound rig");
+    let mut state = CrossState::default();
+    let found = (0..100).find(|&tick| {
+        let t = f64::from(tick) * 1e-3;
+        let seen = Compared {
+            now: tick,
+            read_at: tick,
+            travel: Travel::from_num((0.5 * 1700.0 * t * t / COUNT_MM).floor() * COUNT_MM),
+            radius: Q16::from_num(125),
+            preload: Q16::from_num(40),
+            preload_due: Q16::from_num(40),
+            compression: Q16::from_num(0.4),
+            speed_ref: Q16::ZERO,
+            effort: None,
+        };
+        if tick == 0 {
+            state.begin(&seen);
+        }
+        check.step(&mut state, &seen) == Some(Fault::DriveRunaway)
+    });
+    assert!(found.is_some_and(|tick| tick <= 10), "{found:?}");
+}
+
+#[test]
+fn what_bends_less_than_the_threshold_is_borne() {
+    // A whole count more than quantisation needs 530 mm/s^2 over the spans; but what lasts
+    // adds up to a way off the reference.
+    for acceleration in [0.0, 250.0, -250.0] {
+        let found = found(|t| {
+            let reference = 8.0 * (t + 0.1);
+            let late = t.clamp(0.0, 0.012);
+            Rolls { way: reference + 0.5 * acceleration * late * late, reference, ..ROLLS }
+        });
+        assert_eq!(found, None, "{acceleration}");
+    }
+}
+
+#[test]
+fn a_way_off_the_reference_is_found_however_slowly_it_is_left() {
+    let (fault, after) = leaves(8.0, 300.0).expect("found");
+    // 0.15 mm in 12 ms is 12.5 mm/s, and 300 mm/s^2 take 42 ms to that.
+    assert!(fault == Fault::DriveRunaway && (40..60).contains(&after), "{fault:?} {after}");
+}
+
+#[test]
+fn a_wheel_that_stands_is_found_by_the_way_of_its_reference() {
+    for (speed, least, most) in [(3.0, 230, 255), (8.0, 5, 60), (30.0, 1, 20)] {
+        let stands = found(|t| {
+            let reference = speed * (t + 0.1);
+            // It has turned before.
+            Rolls { way: reference.min(0.6f64.max(speed * 0.1)), reference, ..ROLLS }
+        });
+        let (fault, after) = stands.expect("found");
+        assert!(matches!(fault, Fault::DriveStalled | Fault::DriveRunaway), "{speed}");
+        assert!((least..=most).contains(&after), "{speed}: {after}");
+    }
+}
+
+#[test]
+fn an_arm_that_outruns_the_wheel_is_found() {
+    let moved =
+        |by: f64| found(|t| Rolls { radius: 125.0 - if t > 0.0 { by } else { 0.0 }, ..ROLLS });
+    assert_eq!(moved(0.24), None);
+    assert_eq!(moved(0.26).map(|(fault, _)| fault), Some(Fault::ArmMismatch));
+    // On the steepest corner the arm moves as far as the wheel.
+    let climbs = found(|t| {
+        let way = 8.0 * (t + 0.1);
+        Rolls { way, reference: way, radius: 125.0 - way, ..ROLLS }
+    });
+    assert_eq!(climbs, None);
+}
+
+#[test]
+fn effort_outside_its_band_is_found_at_speed_and_after_its_time() {
+    let cruising = |speed: f64, effort: f64| {
+        found(|t| {
+            let way = speed * (t + 0.1);
+            let effort = (t >= 0.0).then_some(effort * speed.signum());
+            Rolls { way, reference: way, effort, ..ROLLS }
+        })
+    };
+    for speed in [30.0, -30.0] {
+        for (effort, bad) in [(-0.06, true), (-0.04, false), (0.12, false), (0.14, true)] {
+            let expected = bad.then_some((Fault::DutyMismatch, i32::from(EFFORT_TICKS) - 1));
+            assert_eq!(cruising(speed, effort), expected, "{speed} {effort}");
+        }
+    }
+    assert_eq!(cruising(8.0, 0.5), None, "too slow to tell");
+}
+
+#[test]
+fn a_preload_that_strays_is_found_after_its_time() {
+    let strays =
+        |by: f64| found(|t| Rolls { due: if t >= 0.0 { 40.0 + by } else { 40.0 }, ..ROLLS });
+    // A quarter of 33.3 N, with half of 0.3 N of noise.
+    for sign in [1.0, -1.0] {
+        assert_eq!(strays(sign * 8.1), None);
+        let (fault, after) = strays(sign * 8.6).expect("found");
+        assert_eq!((fault, after), (Fault::PretightenerRunaway, i32::from(STRAYED_TICKS) - 1));
+    }
+}
+
+#[test]
+fn a_code_that_stands_still_is_found_and_one_bit_of_noise_is_none() {
+    let stands = found(|t| Rolls { stuck: t >= 0.0, ..ROLLS });
+    let (fault, after) = stands.expect("found");
+    assert_eq!(fault, Fault::PressureImplausible);
+    assert!((64..=66).contains(&after), "{after}");
+    let mut state = CodeState::default();
+    for tick in 0..10_000 {
+        let value = Q16::from_bits(1000 + i32::from(tick % 60 == 0));
+        assert!(!judge(&mut state, value, JUMP_N), "{tick}");
+    }
+}
+
+#[test]
+fn a_jump_is_borne_and_jumping_about_is_not() {
+    let jumps = |every: i32| {
+        let mut state = CodeState::default();
+        (0..5000).find(|tick| {
+            let up = tick / every % 2 == 0;
+            judge(
+                &mut state,
+                Q16::from_num(if up { 20 } else { 30 }) + Q16::from_bits(*tick),
+                JUMP_N,
+            )
+        })
+    };
+    assert_eq!(jumps(2000), None);
+    assert_eq!(jumps(10), None, "a jump every ten ticks is forgotten between");
+    assert!(jumps(1).is_some_and(|tick| tick <= 9));
+}
+
+proptest! {
+    /// A wheel that follows a smooth reference as well as the random rigs do.
+    #[test]
+    fn no_alarm_within_the_tolerances(
+        speed in -30.0..30.0f64,
+        phase in 0.0..1.0f64,
+        off in -0.02..0.02f64,
+        strayed in -7.5..7.5f64,
+        effort in -0.04..0.12f64,
+    ) {
+        let found = found(|t| {
+            let reference = speed * (t + 0.1);
+            Rolls {
+                way: reference + off * (20.0 * (t + phase)).sin(),
+                reference,
+                due: 40.0 + strayed,
+                effort: Some(effort * speed.signum()),
+                ..ROLLS
+            }
+        });
+        prop_assert_eq!(found, None);
+    }
+
+    #[test]
+    fn nothing_overflows(inputs in prop::collection::vec(any::<(u32, i64, [i32; 6])>(), 1..60)) {
+        let check = CrossCheck::try_build(&Rig::prototype()).expect("a sound rig");
+        let mut state = CrossState::default();
+        for (now, travel, [radius, preload, due, compression, speed_ref, effort]) in inputs {
+            let seen = Compared {
+                now,
+                read_at: now,
+                travel: Travel::from_bits(travel),
+                radius: Q16::from_bits(radius),
+                preload: Q16::from_bits(preload),
+                preload_due: Q16::from_bits(due),
+                compression: Q16::from_bits(compression),
+                speed_ref: Q16::from_bits(speed_ref),
+                effort: Some(Q16::from_bits(effort)),
+            };
+            check.step(&mut state, &seen);
+            check.preload(&mut state, seen.preload, seen.preload_due);
+        }
+    }
+}
