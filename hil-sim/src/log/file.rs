@@ -6,6 +6,8 @@ use super::decoder::{Decoder, Item};
 use super::row::Row;
 use super::run::Run;
 use mcap::read::Options;
+use mcap::records::Record;
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 /// Topic of the MCAP file that carries the frames as they lay on the channel.
 pub const FRAMES: &str = "/frames";
@@ -76,6 +78,9 @@ impl Run {
     }
 }
 
+/// Longest record, bytes: a few hundred times what this program writes.
+const LONGEST_RECORD: usize = 1 << 26;
+
 /// Most that a chunk's content may be longer than it lies in the file: what LZ4 can reach.
 const EXPANSION: u64 = 256;
 
@@ -102,11 +107,30 @@ pub(crate) fn sound(bytes: &[u8]) -> &[u8] {
 fn of_mcap(bytes: &[u8]) -> mcap::McapResult<Run> {
     let bytes = sound(bytes);
     let (mut decoder, mut run) = (Decoder::new(), Run::default());
-    for message in mcap::MessageStream::new_with_options(bytes, Options::IgnoreEndMagic.into())? {
-        // A file without its end is read as far as it goes.
-        let Ok(message) = message else { break };
-        if message.channel.topic == FRAMES {
-            decoder.read(&message.data, &mut |item| run.add(&item));
+    let options = LinearReaderOptions::default()
+        .with_skip_end_magic(true)
+        .with_record_length_limit(LONGEST_RECORD);
+    let mut reader = LinearReader::new_with_options(options);
+    let (mut rest, mut frames) = (bytes, None);
+    // A file without its end, or damaged, is read as far as it goes.
+    while let Some(Ok(event)) = reader.next_event() {
+        match event {
+            LinearReadEvent::ReadRequest(wanted) => {
+                let (now, later) = rest.split_at(wanted.min(rest.len()));
+                reader.insert(now.len()).copy_from_slice(now);
+                reader.notify_read(now.len());
+                rest = later;
+            }
+            LinearReadEvent::Record { data, opcode } => match mcap::parse_record(opcode, data) {
+                Ok(Record::Channel(channel)) if channel.topic == FRAMES => {
+                    frames = Some(channel.id)
+                }
+                Ok(Record::Message { header, data }) if Some(header.channel_id) == frames => {
+                    decoder.read(&data, &mut |item| run.add(&item));
+                }
+                Ok(_) => {}
+                Err(_) => break,
+            },
         }
     }
     decoder.finish(&mut |item| run.add(&item));
