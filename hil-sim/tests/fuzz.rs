@@ -91,7 +91,7 @@ fn logs() {
     let row = Run::of_stream(&streams[0]).rows.first().cloned().expect("a row");
     let mut csv = csv::Writer::from_writer(Vec::new());
     for _ in 0..20 {
-        csv.serialize(&row).expect("a row");
+        csv.serialize(row).expect("a row");
     }
     fuzz("CSV files", &[csv.into_inner().expect("flushed")], 2000, 2.0, &mut read);
 }
@@ -162,8 +162,8 @@ fn clients_of_the_live_view() {
         let _ = client.write_all(first).and_then(|()| client.write_all(then));
         let _ = client.read(&mut [0; 2048]);
     };
-    fuzz("live view, handshake", &[request.clone()], 60, 2.0, |bytes| talk(bytes, &[]));
-    fuzz("live view, messages", &[subscribe.clone()], 60, 3.0, |bytes| {
+    fuzz("live view, handshake", std::slice::from_ref(&request), 60, 2.0, |bytes| talk(bytes, &[]));
+    fuzz("live view, messages", std::slice::from_ref(&subscribe), 60, 3.0, |bytes| {
         talk(&request, &framed(bytes));
         talk(&request, &mutant(&[framed(bytes)], &mut chance));
     });
