@@ -38,7 +38,7 @@ impl Tools {
     pub fn ready() -> Result<Self, ProvisionError> {
         let headers = headers()?;
         let place = firmware::target_directory().join(FOLDER);
-        if !is_complete(&place) {
+        if !is_complete(&place) || !starts(&place) {
             eprintln!("fetching cmake, ninja and libclang into {}", place.display());
             fetch(&place)?;
         }
@@ -72,6 +72,15 @@ impl Tools {
 /// Whether these very wheels have been put there.
 fn is_complete(place: &Path) -> bool {
     fs::read_to_string(place.join(COMPLETE)).is_ok_and(|text| text == WHEELS.join("\n"))
+}
+
+/// Whether the programs can be started at all: they name their interpreter by its place, so
+/// that a folder that has been moved or copied does not do.
+fn starts(place: &Path) -> bool {
+    ["cmake", "ninja"].iter().all(|program| {
+        let mut command = Command::new(place.join("bin").join(program));
+        command.arg("--version").output().is_ok()
+    })
 }
 
 /// Puts the wheels there: into a virtual environment or, where Python has come without
@@ -176,6 +185,27 @@ mod tests {
         assert!(!is_complete(place.path()));
         fs::write(place.path().join(COMPLETE), WHEELS.join("\n")).unwrap();
         assert!(is_complete(place.path()));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn tools_that_have_lost_their_interpreter_do_not_start() {
+        use std::os::unix::fs::PermissionsExt;
+        let place = tempfile::tempdir().unwrap();
+        let bin = place.path().join("bin");
+        fs::create_dir(&bin).unwrap();
+        let put = |interpreter: &str| {
+            for program in ["cmake", "ninja"] {
+                let path = bin.join(program);
+                fs::write(&path, format!("#!{interpreter}\n")).unwrap();
+                fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
+            }
+        };
+        assert!(!starts(place.path()));
+        put("/bin/sh");
+        assert!(starts(place.path()));
+        put("/no/such/place/python3");
+        assert!(!starts(place.path()));
     }
 
     #[test]
