@@ -16,6 +16,7 @@ use hil_sim::board::peripherals::rcc::Cause;
 use hil_sim::board::run;
 use hil_sim::log::{Decoder, Item, Mark, Row, Run};
 use hil_sim::replay::replay;
+use interstage::log::Event;
 use interstage::log::capture::Trigger;
 use interstage::rig::Rig;
 use interstage::supervise::Mode;
@@ -81,7 +82,9 @@ fn every_tick_of_a_run_is_logged_and_runs_again_on_this_host() {
         assert_ne!(header.build, "0".repeat(16));
         let result = replay(&run, &Rig::prototype()).expect("a sound rig");
         assert!(result.is_equal(), "{result:?}");
-        assert!(result.events as usize == run.events.len() && result.plans.1 == 0, "{result:?}");
+        // Why the board started is not the controller's to say.
+        let own = run.events.iter().filter(|entry| !matches!(entry.event, Event::Restart(_)));
+        assert!(result.events as usize == own.count() && result.plans.1 == 0, "{result:?}");
         // What the report shows of the controller is its own word.
         let rows = &ran.recording.rows;
         // But for the last ticks, which had not left the board when the run ended.
@@ -208,9 +211,9 @@ fn a_reader_that_stalls_or_is_not_there_changes_neither_tick_nor_jitter() {
         let off = |pair: [[f64; 2]; 2], at: usize| (pair[0][at] / pair[1][at] - 1.0).abs();
         assert!(off(cost, 0) <= 0.02 && off(cost, 1) <= 0.02, "{name}: {cost:?}");
         assert!(off(jitter, 0) <= 0.02, "{name}: {jitter:?}");
-        // The extreme of seven thousand beginnings is which interrupt happened to meet
-        // which block of code, of which the longest take a hundred cycles.
-        assert!((jitter[0][1] - jitter[1][1]).abs() <= 100.0, "{name}: {jitter:?}");
+        // The extreme of seven thousand beginnings is which interrupts happened to meet
+        // which block of code: a few of a hundred cycles each, 2 us at most.
+        assert!((jitter[0][1] - jitter[1][1]).abs() <= 340.0, "{name}: {jitter:?}");
     }
 }
 

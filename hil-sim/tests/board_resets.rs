@@ -98,12 +98,12 @@ impl Board {
             lines = self.log.len();
         }
         let stream = self.bench.take_frames();
-        let reports =
+        let mut reports =
             Run::of_stream(&stream).events.into_iter().filter_map(|entry| match entry.event {
                 Event::Restart(restart) => Some(restart),
                 _ => None,
             });
-        reports.last().expect("a report")
+        reports.next_back().expect("a report")
     }
 }
 

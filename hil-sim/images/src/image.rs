@@ -27,6 +27,7 @@ fn main() -> ! {
         arith::arith_f64_forward as *const (),
         arith::arith_f64_inverse as *const (),
         model::model_build as *const (),
+        model::model_scale as *const (),
         model::model_forward as *const (),
         model::model_inverse_preload as *const (),
         model::model_inverse_speed as *const (),
