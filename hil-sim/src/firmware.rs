@@ -230,6 +230,15 @@ pub(crate) fn executable(messages: &str, binary: &str) -> Option<PathBuf> {
         .find_map(|artifact| artifact.executable)
 }
 
+/// Builds the firmware and returns the image.
+///
+/// # Errors
+/// [`FirmwareError`] if it does not build or cannot be read.
+pub fn image(profile: Profile) -> Result<Vec<u8>, FirmwareError> {
+    let path = build(profile)?;
+    std::fs::read(&path).map_err(|source| FirmwareError::Read { path, source })
+}
+
 /// Largest image allowed, bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Budget {

@@ -1,6 +1,7 @@
 //! The board under way: core and chip in lockstep, exceptions taken and returned from,
 //! sleep passed over to the next event.
 
+mod access;
 mod frame;
 mod profile;
 mod tasks;
@@ -160,69 +161,6 @@ impl Machine {
     #[must_use]
     pub fn is_locked_up(&self) -> bool {
         self.asleep == Some(Asleep::Locked)
-    }
-
-    /// Reads memory, as a debug probe does.
-    ///
-    /// # Errors
-    /// [`CoreError::Engine`] if nothing lies there.
-    pub fn peek(&self, address: u32, into: &mut [u8]) -> Result<(), CoreError> {
-        self.core.read(address, into)
-    }
-
-    /// A word of memory.
-    ///
-    /// # Errors
-    /// [`CoreError::Engine`] if nothing lies there.
-    pub fn word(&self, address: u32) -> Result<u32, CoreError> {
-        let mut bytes = [0; 4];
-        self.core.read(address, &mut bytes)?;
-        Ok(u32::from_le_bytes(bytes))
-    }
-
-    /// Writes memory, as a debug probe does.
-    ///
-    /// # Errors
-    /// [`CoreError::Engine`] if nothing lies there.
-    pub fn poke(&mut self, address: u32, bytes: &[u8]) -> Result<(), CoreError> {
-        self.core.write(address, bytes)
-    }
-
-    /// Writes a word to a peripheral's register, as a debug probe does.
-    pub fn poke_register(&mut self, address: u32, value: u32) {
-        let access = Access { address, size: 4, pc: self.pc, now: self.now() };
-        self.chip_mut().write(access, value);
-    }
-
-    /// Reads a word from a peripheral's register, with what reading it does.
-    pub fn peek_register(&mut self, address: u32) -> u32 {
-        let access = Access { address, size: 4, pc: self.pc, now: self.now() };
-        self.chip_mut().read(access)
-    }
-
-    /// A register of the core.
-    ///
-    /// # Errors
-    /// [`CoreError::Engine`] if the engine does not tell.
-    pub fn register(&self, register: Register) -> Result<u32, CoreError> {
-        self.core.register(register)
-    }
-
-    /// Where the program stands.
-    #[must_use]
-    pub const fn pc(&self) -> u32 {
-        self.pc
-    }
-
-    /// Sets a register of the core.
-    ///
-    /// # Errors
-    /// [`CoreError::Engine`] if the engine does not take it.
-    pub fn set_register(&mut self, register: Register, value: u32) -> Result<(), CoreError> {
-        if register == Register::Pc {
-            self.pc = value & !1;
-        }
-        self.core.set_register(register, value)
     }
 
     /// Catches what runs in a loop without end: it goes on at an instruction that branches

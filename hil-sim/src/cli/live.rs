@@ -98,11 +98,10 @@ fn board(_: &Args, _: &Scenario) -> Result<Outcome, Failure> {
 fn board(args: &Args, scenario: &Scenario) -> Result<Outcome, Failure> {
     use crate::board::log::Strings;
     use crate::capture::Emulated;
-    use crate::firmware::{self, FirmwareError, Profile};
+    use crate::firmware::{self, Profile};
 
     crate::board::run::check(scenario).map_err(Failure::input)?;
-    let path = firmware::build(Profile::Release)?;
-    let elf = std::fs::read(&path).map_err(|source| FirmwareError::Read { path, source })?;
+    let elf = firmware::image(Profile::Release)?;
     let strings = Strings::of(&elf).map_err(Failure::run)?;
     let mut source =
         Emulated::new(&elf, &strings, scenario, !args.headless).map_err(Failure::run)?;

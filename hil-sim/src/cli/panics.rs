@@ -27,11 +27,10 @@ pub(super) fn run(_: &Args) -> Result<Outcome, Failure> {
 #[cfg(feature = "board")]
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     use super::output;
-    use crate::firmware::{FirmwareError, Profile, build};
+    use crate::firmware::{self, Profile};
     use crate::panics::walk;
 
-    let path = build(Profile::Release)?;
-    let elf = std::fs::read(&path).map_err(|source| FirmwareError::Read { path, source })?;
+    let elf = firmware::image(Profile::Release)?;
     let found = walk(&elf).map_err(Failure::run)?;
     output::result(args.json, &found, || human(&found, args.paths))?;
     Ok(Outcome::of(found.unexplained().next().is_none()))

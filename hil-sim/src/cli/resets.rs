@@ -38,13 +38,12 @@ pub(super) fn run(_: &Args) -> Result<Outcome, Failure> {
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     use super::output;
     use crate::board::log::Strings;
-    use crate::firmware::{FirmwareError, Profile, build};
+    use crate::firmware::{self, Profile};
     use crate::{progress, resets};
 
     let scenario = args.scenario.resolve()?;
     crate::board::run::check(&scenario).map_err(Failure::input)?;
-    let path = build(Profile::Release)?;
-    let elf = std::fs::read(&path).map_err(|source| FirmwareError::Read { path, source })?;
+    let elf = firmware::image(Profile::Release)?;
     let strings = Strings::of(&elf).map_err(Failure::run)?;
     let cases: Vec<resets::Case> =
         (0..args.count).map(|index| resets::case(args.seed, index)).collect();

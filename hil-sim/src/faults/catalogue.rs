@@ -30,124 +30,97 @@ const fn one(
     Entry { target, kind, magnitude, range, unit, text }
 }
 
+/// One that has no measure.
+const fn plain(target: Target, kind: Kind, text: &'static str) -> Entry {
+    one(target, kind, 0.0, (0.0, 0.0), "", text)
+}
+
+const SILENT: &str = "no new reading comes";
+const FROZEN: &str = "the code stands still, fresh in time";
+const RANDOM: &str = "random codes";
+
+const fn gain(target: Target, times: f64) -> Entry {
+    let text = "reads so many times what is true, from its zero";
+    one(target, Kind::Gain, times, (0.0, 10.0), "x", text)
+}
+
+const fn slow(target: Target, seconds: f64) -> Entry {
+    one(target, Kind::Slow, seconds, (0.001, 10.0), "s", "follows with this time constant")
+}
+
+const fn delayed(target: Target, seconds: f64, text: &'static str) -> Entry {
+    one(target, Kind::Delayed, seconds, (0.001, 2.0), "s", text)
+}
+
+const fn intermittent(target: Target) -> Entry {
+    let text = "gives nothing for this part of every 100 ms";
+    one(target, Kind::Intermittent, 0.5, (0.0, 1.0), "of 100 ms", text)
+}
+
+const fn weak(target: Target, part: f64) -> Entry {
+    one(target, Kind::Weak, part, (0.0, 1.0), "x", "gives this part of its duty")
+}
+
+const fn runaway(target: Target) -> Entry {
+    let text = "takes this duty whatever is asked while its bridge is on";
+    one(target, Kind::Runaway, 1.0, (-1.0, 1.0), "duty", text)
+}
+
 /// All of them, in the order of the matrix.
 pub const CATALOGUE: &[Entry] = {
     use Kind::{
-        Broken, Delayed, Doubled, Flooding, Gain, Garbage, Gone, Hung, Intermittent, Off, Offset,
-        Overrun, Random, Reversed, Runaway, Slip, Slow, Stalled, Stuck, Torn, Weak,
+        Broken, Doubled, Flooding, Garbage, Gone, Hung, Off, Offset, Overrun, Random, Reversed,
+        Slip, Stalled, Stuck, Torn,
     };
     use Target::{
         Angle, Commands, Drive, Encoder, Load, LoadCell, Log, Model, Pretightener, Spring, Tick,
         Tread, TreadSensor, Wheel,
     };
     &[
-        one(Encoder, Off, 0.0, (0.0, 0.0), "", "no new reading comes"),
-        one(Encoder, Stuck, 0.0, (0.0, 0.0), "", "the code stands still, fresh in time"),
-        one(Encoder, Garbage, 0.0, (0.0, 0.0), "", "random codes"),
-        one(
-            Encoder,
-            Gain,
-            1.5,
-            (0.0, 10.0),
-            "x",
-            "reads so many times what is true, from its zero",
-        ),
+        plain(Encoder, Off, SILENT),
+        plain(Encoder, Stuck, FROZEN),
+        plain(Encoder, Garbage, RANDOM),
+        gain(Encoder, 1.5),
         one(Encoder, Offset, 2.0, (-100.0, 100.0), "mm", "jumps by so much once"),
-        one(Encoder, Slow, 0.1, (0.001, 10.0), "s", "follows with this time constant"),
-        one(Encoder, Delayed, 0.05, (0.001, 2.0), "s", "follows this much later"),
-        one(
-            Encoder,
-            Intermittent,
-            0.5,
-            (0.0, 1.0),
-            "of 100 ms",
-            "gives nothing for this part of every 100 ms",
-        ),
-        one(LoadCell, Off, 0.0, (0.0, 0.0), "", "no new reading comes"),
-        one(LoadCell, Stuck, 0.0, (0.0, 0.0), "", "the code stands still, fresh in time"),
-        one(LoadCell, Garbage, 0.0, (0.0, 0.0), "", "random codes"),
-        one(
-            LoadCell,
-            Gain,
-            1.2,
-            (0.0, 10.0),
-            "x",
-            "reads so many times what is true, from its zero",
-        ),
+        slow(Encoder, 0.1),
+        delayed(Encoder, 0.05, "follows this much later"),
+        intermittent(Encoder),
+        plain(LoadCell, Off, SILENT),
+        plain(LoadCell, Stuck, FROZEN),
+        plain(LoadCell, Garbage, RANDOM),
+        gain(LoadCell, 1.2),
         one(LoadCell, Offset, 6.0, (-200.0, 200.0), "N", "reads so much more than is true"),
-        one(LoadCell, Slow, 0.1, (0.001, 10.0), "s", "follows with this time constant"),
-        one(LoadCell, Delayed, 0.05, (0.001, 2.0), "s", "follows this much later"),
-        one(
-            LoadCell,
-            Intermittent,
-            0.5,
-            (0.0, 1.0),
-            "of 100 ms",
-            "gives nothing for this part of every 100 ms",
-        ),
-        one(TreadSensor, Off, 0.0, (0.0, 0.0), "", "no new reading comes"),
-        one(TreadSensor, Stuck, 0.0, (0.0, 0.0), "", "the code stands still, fresh in time"),
-        one(TreadSensor, Garbage, 0.0, (0.0, 0.0), "", "random codes"),
-        one(
-            TreadSensor,
-            Gain,
-            1.2,
-            (0.0, 10.0),
-            "x",
-            "reads so many times what is true, from its zero",
-        ),
+        slow(LoadCell, 0.1),
+        delayed(LoadCell, 0.05, "follows this much later"),
+        intermittent(LoadCell),
+        plain(TreadSensor, Off, SILENT),
+        plain(TreadSensor, Stuck, FROZEN),
+        plain(TreadSensor, Garbage, RANDOM),
+        gain(TreadSensor, 1.2),
         one(TreadSensor, Offset, 0.3, (-5.0, 5.0), "mm", "reads so much more than is true"),
-        one(TreadSensor, Slow, 0.1, (0.001, 10.0), "s", "follows with this time constant"),
-        one(TreadSensor, Delayed, 0.05, (0.001, 2.0), "s", "follows this much later"),
-        one(
-            TreadSensor,
-            Intermittent,
-            0.5,
-            (0.0, 1.0),
-            "of 100 ms",
-            "gives nothing for this part of every 100 ms",
-        ),
-        one(Angle, Off, 0.0, (0.0, 0.0), "", "no new reading comes"),
-        one(Angle, Stuck, 0.0, (0.0, 0.0), "", "the code stands still, fresh in time"),
-        one(Angle, Garbage, 0.0, (0.0, 0.0), "", "random codes"),
-        one(Angle, Gain, 1.2, (0.0, 10.0), "x", "reads so many times what is true, from its zero"),
+        slow(TreadSensor, 0.1),
+        delayed(TreadSensor, 0.05, "follows this much later"),
+        intermittent(TreadSensor),
+        plain(Angle, Off, SILENT),
+        plain(Angle, Stuck, FROZEN),
+        plain(Angle, Garbage, RANDOM),
+        gain(Angle, 1.2),
         one(Angle, Offset, 1.0, (-90.0, 90.0), "deg", "reads so much more than is true"),
-        one(Angle, Slow, 0.1, (0.001, 10.0), "s", "follows with this time constant"),
-        one(Angle, Delayed, 0.05, (0.001, 2.0), "s", "follows this much later"),
-        one(
-            Angle,
-            Intermittent,
-            0.5,
-            (0.0, 1.0),
-            "of 100 ms",
-            "gives nothing for this part of every 100 ms",
-        ),
-        one(Drive, Stalled, 0.0, (0.0, 0.0), "", "gives no force"),
-        one(Drive, Stuck, 0.0, (0.0, 0.0), "", "keeps its last duty"),
-        one(Drive, Weak, 0.4, (0.0, 1.0), "x", "gives this part of its duty"),
-        one(Drive, Reversed, 0.0, (0.0, 0.0), "", "turns the other way"),
-        one(Drive, Delayed, 0.1, (0.001, 2.0), "s", "acts this much later"),
-        one(
-            Drive,
-            Runaway,
-            1.0,
-            (-1.0, 1.0),
-            "duty",
-            "takes this duty whatever is asked while its bridge is on",
-        ),
-        one(Pretightener, Stalled, 0.0, (0.0, 0.0), "", "gives no force"),
-        one(Pretightener, Stuck, 0.0, (0.0, 0.0), "", "keeps its last duty"),
-        one(Pretightener, Weak, 0.4, (0.0, 1.0), "x", "gives this part of its duty"),
-        one(Pretightener, Reversed, 0.0, (0.0, 0.0), "", "turns the other way"),
-        one(Pretightener, Delayed, 0.1, (0.001, 2.0), "s", "acts this much later"),
-        one(
-            Pretightener,
-            Runaway,
-            1.0,
-            (-1.0, 1.0),
-            "duty",
-            "takes this duty whatever is asked while its bridge is on",
-        ),
+        slow(Angle, 0.1),
+        delayed(Angle, 0.05, "follows this much later"),
+        intermittent(Angle),
+        plain(Drive, Stalled, "gives no force"),
+        plain(Drive, Stuck, "keeps its last duty"),
+        weak(Drive, 0.4),
+        plain(Drive, Reversed, "turns the other way"),
+        delayed(Drive, 0.1, "acts this much later"),
+        runaway(Drive),
+        plain(Pretightener, Stalled, "gives no force"),
+        plain(Pretightener, Stuck, "keeps its last duty"),
+        weak(Pretightener, 0.4),
+        plain(Pretightener, Reversed, "turns the other way"),
+        delayed(Pretightener, 0.1, "acts this much later"),
+        runaway(Pretightener),
         one(Wheel, Slip, 0.5, (0.01, 1.0), "x", "friction of tread on wall drops to this part"),
         one(
             Tread,
@@ -167,16 +140,9 @@ pub const CATALOGUE: &[Entry] = {
         ),
         one(Load, Doubled, 2.0, (0.0, 5.0), "x", "the top load is so many times as large"),
         one(Tick, Overrun, 0.005, (0.001, 0.1), "s", "control ticks are lost for so long, once"),
-        one(Model, Hung, 0.0, (0.0, 0.0), "", "the model task answers no request"),
-        one(Log, Gone, 0.0, (0.0, 0.0), "", "nobody reads the log"),
-        one(
-            Commands,
-            Flooding,
-            0.0,
-            (0.0, 0.0),
-            "",
-            "a command in every tick that no moving mode takes",
-        ),
+        plain(Model, Hung, "the model task answers no request"),
+        plain(Log, Gone, "nobody reads the log"),
+        plain(Commands, Flooding, "a command in every tick that no moving mode takes"),
         one(Commands, Random, 50.0, (0.0, 1000.0), "1/s", "so many random commands a second"),
     ]
 };

@@ -11,10 +11,7 @@ use hil_sim::scenario::Scenario;
 /// The image as it would be flashed.
 pub(crate) fn elf() -> &'static [u8] {
     static ELF: OnceLock<Vec<u8>> = OnceLock::new();
-    ELF.get_or_init(|| {
-        let path = firmware::build(Profile::Release).expect("the firmware builds");
-        std::fs::read(path).expect("readable")
-    })
+    ELF.get_or_init(|| firmware::image(Profile::Release).expect("the firmware builds"))
 }
 
 /// What its log is decoded with.
