@@ -207,6 +207,19 @@ mod tests {
     }
 
     #[test]
+    fn it_speaks_for_whom_it_was_told_to() {
+        let mut scribe = Scribe::new(Identity::NOBODY);
+        let somebody =
+            Identity { parameters: 0xABCD, rig: identity::text("fe"), ..Identity::NOBODY };
+        scribe.speak_for(somebody.clone());
+        let (tape, mut channel) = (Tape::new(), Channel::default());
+        run(&mut scribe, &tape, &mut channel, 0..super::super::BATCH);
+        let mut first = channel.frames[0][..channel.frames[0].len() - 1].to_vec();
+        let said = Frame::open(&mut first).unwrap().body().unwrap();
+        assert_eq!(said, Body::Identity(somebody));
+    }
+
+    #[test]
     fn what_finds_no_room_is_counted_and_takes_nothing_else_with_it() {
         let (mut scribe, tape, mut channel) = (scribe(), Tape::new(), Channel::default());
         run(&mut scribe, &tape, &mut channel, 0..80);

@@ -261,6 +261,17 @@ mod tests {
     }
 
     #[test]
+    fn constants_with_more_behind_them_are_not_a_set() {
+        let mut bytes = set("a", &Rig::prototype());
+        bytes.truncate(bytes.len() - CHECK);
+        bytes.push(0);
+        let sum = checksum(&bytes).to_le_bytes();
+        bytes.extend(sum);
+        let (_, rest) = ParameterSet::open(&bytes).unwrap().controller().unwrap();
+        assert_eq!(rest.planner(), Err(SetError::Content));
+    }
+
+    #[test]
     fn every_flipped_bit_is_found() {
         let mut bytes = set("prototype", &Rig::prototype());
         for at in 0..bytes.len() {

@@ -162,6 +162,19 @@ fn an_arm_that_outruns_the_wheel_is_found() {
 }
 
 #[test]
+fn an_arm_that_moves_twice_as_far_as_the_rolling_wheel_is_found() {
+    // In 32 ticks the wheel rolls 0.26 mm, and the arm may move 0.51 mm.
+    let moved = |times: f64| {
+        found(|t| {
+            let way = 8.0 * (t + 0.1);
+            Rolls { way, reference: way, radius: 125.0 - times * 8.0 * t.max(0.0), ..ROLLS }
+        })
+    };
+    assert_eq!(moved(1.8), None);
+    assert_eq!(moved(2.2).map(|(fault, _)| fault), Some(Fault::ArmMismatch));
+}
+
+#[test]
 fn effort_outside_its_band_is_found_at_speed_and_after_its_time() {
     let cruising = |speed: f64, effort: f64| {
         found(|t| {
