@@ -175,6 +175,8 @@ impl Controller {
         pass.output.drive = drive;
         pass.output.preload = preload;
         pass.output.telemetry = self.telemetry(state, &pass, &targets);
+        let given = &pass.output.telemetry;
+        state.monitor.give(given.drive, given.pretightener);
     }
 
     fn look_for_faults(&self, state: &mut State, pass: &mut Pass<'_>, input: &Input) {
@@ -183,6 +185,7 @@ impl Controller {
             now: pass.now,
             mode: state.mode,
             sensed: pass.sensed,
+            bridges: input.sensors.bridges,
             speed_ref: state.signed_speed(),
             preload_due: state.preload_loop.due(),
             effort: steady.then(|| state.speed_loop.value()),

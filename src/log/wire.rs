@@ -9,7 +9,7 @@ use crate::hal::Duty;
 use crate::units::Q16;
 
 /// Numbers of a record.
-const NUMBERS: usize = 21;
+const NUMBERS: usize = 23;
 
 /// A record as whole numbers, or the difference of two. postcard writes each in as many
 /// bytes as it needs, 1 to 5.
@@ -25,7 +25,8 @@ impl Wire {
     /// The record as numbers.
     #[inline(never)]
     pub(super) fn of(record: &Record) -> Self {
-        let Record { telemetry: t, codes: [wheel, load_cell, tread, arm], ages, flags } = record;
+        let Record { telemetry: t, codes, ages, bridges: [drive, pretightener], flags } = record;
+        let [wheel, load_cell, tread, arm] = codes;
         let [wheel_age, load_cell_age, tread_age, arm_age] = *ages;
         Self([
             t.at as i32,
@@ -51,13 +52,15 @@ impl Wire {
             t.distance.to_bits(),
             i32::from(t.drive.to_bits()),
             i32::from(t.pretightener.to_bits()),
+            i32::from(*drive),
+            i32::from(*pretightener),
         ])
     }
 
     /// The record of the numbers; none if one of them has no meaning.
     pub(super) fn record(&self) -> Option<Record> {
-        let [at, wheel, load_cell, tread, arm, ages, state, flags, q @ .., drive, pretightener] =
-            self.0;
+        let [at, wheel, load_cell, tread, arm, ages, state, flags, rest @ ..] = self.0;
+        let [q @ .., drive, pretightener, drive_code, pretightener_code] = rest;
         let q: [Q16; 11] = q.map(Q16::from_bits);
         let [arm_age, wheel_age, load_cell_age, tread_age] = ages.to_le_bytes();
         let [level, stage, mode, _] = state.to_le_bytes();
@@ -85,6 +88,7 @@ impl Wire {
             },
             codes: [code(wheel)?, code(load_cell)?, code(tread)?, code(arm)?.rotate_right(1)],
             ages: [wheel_age, load_cell_age, tread_age, arm_age],
+            bridges: [code(drive_code)?, code(pretightener_code)?],
             flags: Flags::from_bits(code(flags)?),
         })
     }
@@ -171,7 +175,7 @@ mod tests {
         after.ages[3] += 1;
         let difference = Wire::of(&after).since(&Wire::of(&before));
         let mut bytes = [0; LONGEST];
-        assert_eq!(postcard::to_slice(&difference, &mut bytes).unwrap().len(), 21);
+        assert_eq!(postcard::to_slice(&difference, &mut bytes).unwrap().len(), NUMBERS);
     }
 
     #[test]

@@ -56,6 +56,11 @@ impl Fault {
                 "no good frame for sense.stale_after_s",
                 LOOK,
             ),
+            Self::ReadbackStale => held(
+                "converter of the readback, or its clock",
+                "no conversion of the bridges' outputs for 20 ticks",
+                LOOK,
+            ),
             Self::PressureRange => held(
                 "broken bridge of the load cell, short, overload",
                 "code outside 2 to 98 % for sense.stale_after_s",
@@ -122,6 +127,20 @@ impl Fault {
             Self::PretightenerRunaway => held(
                 "pre-tightener at full duty, reversed or weak; spring broken; load cell jumps",
                 "preload off the actuator's model by a quarter of cruise for 10 ticks",
+                LOOK,
+            ),
+            Self::DriveBridge => held(
+                "bridge stuck, at full duty, reversed or acting late; motor supply off; divider \
+                 or converter of the readback",
+                "output off the given duty, through the same lag, by 0.02 and a 32nd of it for 4 \
+                 ticks",
+                LOOK,
+            ),
+            Self::PretightenerBridge => held(
+                "bridge stuck, at full duty, reversed or acting late; motor supply off; divider \
+                 or converter of the readback",
+                "output off the given duty, through the same lag, by 0.02 and a 32nd of it for 4 \
+                 ticks",
                 LOOK,
             ),
             Self::LevelMismatch => held(

@@ -161,7 +161,8 @@ impl Exchange {
         self.light.store(light as u8, Ordering::Relaxed);
     }
 
-    /// The latest code of each sensor.
+    /// The latest code of each sensor. Those of the bridges are not among them: who drives
+    /// the bridges has them.
     #[must_use]
     pub fn sensors(&self) -> SensorFrame {
         SensorFrame {
@@ -169,6 +170,7 @@ impl Exchange {
             load_cell: self.load_cell.anon_receiver().try_get(),
             tread: self.tread.anon_receiver().try_get(),
             arm: self.arm.anon_receiver().try_get(),
+            bridges: None,
         }
     }
 

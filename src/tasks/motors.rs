@@ -26,8 +26,9 @@ pub async fn motors(
     let mut beat = Beat::<1>::new();
     loop {
         let due = beat.lead(&exchange.pulse).await;
-        let input =
+        let mut input =
             Input { emergency_stop: motors.stopped(), ..exchange.input(due.tick, due.missed > 0) };
+        input.sensors.bridges = motors.readback();
         controller.step_into(&mut state, &input, &mut output);
         motors.apply(output.drive, output.preload);
         if output.rearm {

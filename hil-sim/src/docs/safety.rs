@@ -36,8 +36,9 @@ fn bounds() -> String {
 fn matrix(outcome: &Outcome) -> String {
     let mut text = format!(
         "`cargo rig faults -n {}`: {} faults at {} instants each, {} undetected, {} unsafe.\n\n\
-         | fault | measure | codes (times) | borne | detection, ms: median | worst | ends | \
-         preload, N | uncommanded, mm |\n|---|---|---|---|---|---|---|---|---|\n",
+         | fault | measure | codes (times) | borne | detection, ms: median | worst | from any \
+         difference: worst | ends | preload, N | uncommanded, mm |\n\
+         |---|---|---|---|---|---|---|---|---|---|\n",
         outcome.instants,
         outcome.matrix.len(),
         outcome.instants,
@@ -59,12 +60,13 @@ fn row(line: &Line) -> String {
         missed => format!("{} and {missed} missed", line.tolerated),
     };
     format!(
-        "| {} | {} | {} | {borne} | {} | {} | {} | {:.1} | {:.2} |",
+        "| {} | {} | {} | {borne} | {} | {} | {} | {} | {:.1} | {:.2} |",
         line.fault,
         line.text,
         list(codes),
         number(line.latency_median_ms, 0),
         number(line.latency_ms, 0),
+        number(line.latency_any_ms.map(|spread| spread.worst), 0),
         list(ends),
         line.worst_preload_n,
         line.worst_motion_mm
