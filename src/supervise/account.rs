@@ -130,17 +130,17 @@ impl Fault {
                 LOOK,
             ),
             Self::DriveBridge => held(
-                "bridge stuck, at full duty, reversed or acting late; motor supply off; divider \
-                 or converter of the readback",
-                "output off the given duty, through the same lag, by 0.02 and a 32nd of it for 4 \
-                 ticks",
+                "drive's bridge stuck, at full duty, reversed or late; motor supply off; its \
+                 divider or the readback's converter",
+                "drive's output off the given duty, through the same lag, by 0.02 and a 32nd of \
+                 it for 4 ticks",
                 LOOK,
             ),
             Self::PretightenerBridge => held(
-                "bridge stuck, at full duty, reversed or acting late; motor supply off; divider \
-                 or converter of the readback",
-                "output off the given duty, through the same lag, by 0.02 and a 32nd of it for 4 \
-                 ticks",
+                "pre-tightener's bridge stuck, at full duty, reversed or late; motor supply off; \
+                 its divider or the readback's converter",
+                "pre-tightener's output off the given duty, through the same lag, by 0.02 and a \
+                 32nd of it for 4 ticks",
                 LOOK,
             ),
             Self::LevelMismatch => held(
