@@ -17,6 +17,7 @@ use super::schedule::{Course, Schedule, Targets};
 use super::speed_loop::SpeedLoop;
 use crate::estimate::ContactStage;
 use crate::estimate::crossing::{Contact, CrossingWatch};
+use crate::estimate::tread::TreadLaw;
 use crate::estimate::vibration::VibrationObserver;
 use crate::hal::{Duty, MotorCommand};
 use crate::log::{Entry, Event, Telemetry};
@@ -85,6 +86,7 @@ pub struct Controller {
     senses: Senses,
     monitor: Monitor,
     watch: CrossingWatch,
+    tread: TreadLaw,
     vibration: VibrationObserver,
     /// Stages that the phase does not need are left out.
     skipping: bool,

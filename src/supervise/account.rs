@@ -214,6 +214,14 @@ impl Limit {
             Self::PreloadWait => {
                 ("slows down and, if need be, stands before the window", "the preload stands")
             }
+            Self::GapStrange => (
+                "goes on; the estimate follows by its step at most, or not at all",
+                "a crossing whose gap is as predicted",
+            ),
+            Self::TreadStrange => (
+                "goes on; load cell or displacement sensor is wrong, or the tread another one",
+                "the next preload phase",
+            ),
             Self::SlipMarginLow => ("goes on", "the next plan"),
         }
     }

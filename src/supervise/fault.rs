@@ -174,11 +174,15 @@ pub enum Limit {
     PreloadWait = 209,
     /// The friction utilisation leaves less than the wanted margin.
     SlipMarginLow = 210,
+    /// The measured gap of a crossing is not the predicted one.
+    GapStrange = 211,
+    /// Compression and preload of a wheel that stands do not belong together.
+    TreadStrange = 212,
 }
 
 impl Limit {
     /// Every limit, in the order of codes.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 12] = [
         Self::StepEarly,
         Self::StepLate,
         Self::StepMissing,
@@ -189,6 +193,8 @@ impl Limit {
         Self::AdaptationBounded,
         Self::PreloadWait,
         Self::SlipMarginLow,
+        Self::GapStrange,
+        Self::TreadStrange,
     ];
 
     /// The stable code.
@@ -215,6 +221,8 @@ impl Limit {
             Self::AdaptationBounded => "the stiffness estimate reached the end of its range",
             Self::PreloadWait => "waiting before a corner for the preload to stand",
             Self::SlipMarginLow => "the friction utilisation leaves less than the wanted margin",
+            Self::GapStrange => "the measured gap is not the predicted one",
+            Self::TreadStrange => "compression of the tread and preload do not belong together",
         }
     }
 }
