@@ -19,9 +19,10 @@ const LARGEST_CORRECTION: Ratio = q16(100_000);
 /// Relative difference of an observed stiffness beyond which it is not believed.
 const OUTLIER: Ratio = q16(350_000);
 /// Stiffness that a measured gap may ask for beyond the estimated one, part of that: what is
-/// more is reported. Rubber of three deviations is 0.12 off at the first crossing, the
-/// measurement 0.03; the worst of the random rigs is STRANGE_WORST.
-const STRANGE: Ratio = q16(200_000);
+/// more is reported. Rubber that is off by three deviations makes 0.12 at the first crossing;
+/// the rest is the measurement, of which a stiff guess is the dearest. Of 1,500 random rigs two
+/// come beyond 0.20.
+const STRANGE: Ratio = q16(270_000);
 
 /// Sixteenths of the gap taken off until the slip margin holds, at most.
 const SLIP_TRIES: usize = 8;
