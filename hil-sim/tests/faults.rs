@@ -68,6 +68,20 @@ fn a_run_with_a_fault_of_its_scenario_ends_in_it_and_says_so() {
 }
 
 #[test]
+fn a_displacement_sensor_that_is_a_fifth_off_from_before_boot_is_told() {
+    let told = |preset: &str, gain: f64| {
+        let mut scenario = Scenario::named(preset).expect("a preset");
+        scenario.run.faults = vec![Injection::at(Target::TreadSensor, Kind::Gain, 0.0, gain)];
+        let summary = run(&scenario, Options::default()).expect("a run").summary;
+        summary.limits.iter().any(|limit| limit.code == 212)
+    };
+    for preset in ["prototype", "fe"] {
+        assert!(told(preset, 1.2) && told(preset, 1.0 / 1.2), "{preset}");
+        assert!(!told(preset, 1.03) && !told(preset, 0.97), "{preset}");
+    }
+}
+
+#[test]
 fn a_log_that_nobody_reads_does_not_change_the_run() {
     let clean = Scenario::default();
     let mut gone = clean.clone();

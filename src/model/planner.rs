@@ -236,3 +236,43 @@ const fn way(direction: Direction) -> usize {
         Direction::Retract => 1,
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "the gaps are written in mm")]
+mod tests {
+    use super::*;
+    use crate::rig::Rig;
+    use crate::units::q16;
+
+    /// What the planner makes of a crossing whose gap is this much wider than it predicts, mm.
+    fn reviewed(wider: f64, trusted: bool) -> Outcome {
+        let planner = Planner::try_build(&Rig::prototype()).expect("a sound rig");
+        let scale = q16(1_000_000);
+        let mut review = Review {
+            direction: Direction::Deploy,
+            speed: q16(8_000_000),
+            preload: q16(47_000_000),
+            tan_arm: q16(1_000_000),
+            gap: Millimetres::from_num(2.5),
+            trusted: false,
+        };
+        let predicted = planner.review(&review, scale).gap_predicted;
+        review.gap = predicted + Millimetres::from_num(wider);
+        review.trusted = trusted;
+        planner.review(&review, scale)
+    }
+
+    #[test]
+    fn a_gap_that_no_tread_of_the_rig_makes_is_strange_and_moves_little() {
+        for wider in [0.0, 0.05, -0.05] {
+            assert!(!reviewed(wider, true).strange, "{wider}");
+        }
+        for wider in [0.5, -0.4] {
+            let outcome = reviewed(wider, true);
+            let moved = (outcome.scale - q16(1_000_000)).abs();
+            assert!(outcome.strange && moved <= LARGEST_CORRECTION, "{wider}: {outcome:?}");
+            // Of a crossing that is not trusted nothing is concluded.
+            assert!(!reviewed(wider, false).strange);
+        }
+    }
+}
