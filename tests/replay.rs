@@ -14,7 +14,7 @@ use interstage::log::{Entry, Record};
 use interstage::model::{Plan, PlanRequest, Planner};
 use interstage::rig::Rig;
 use interstage::sense::raw::SensorFrame;
-use interstage::supervise::Mode;
+use interstage::supervise::{Fault, Mode};
 
 /// A run as the frames of its log tell it.
 #[derive(Default)]
@@ -73,6 +73,34 @@ fn again(name: &str, mut judge: impl FnMut(&Recorded, &Record, &Input, &Output))
     run
 }
 
+#[test]
+fn a_sensor_that_never_answers_is_named() {
+    let run = Recorded::read("deploy.mcap");
+    let controller = Controller::try_build(&Rig::prototype()).expect("sound");
+    type Silence = fn(&mut SensorFrame);
+    let all: [(Silence, Fault); 4] = [
+        (|sensors| sensors.wheel = None, Fault::SpeedStale),
+        (|sensors| sensors.load_cell = None, Fault::PressureStale),
+        (|sensors| sensors.tread = None, Fault::DisplacementStale),
+        (|sensors| sensors.arm = None, Fault::AngleStale),
+    ];
+    for (silence, fault) in all {
+        let (mut state, mut sensors) = (State::default(), SensorFrame::default());
+        let mut said = None;
+        for record in &run.ticks {
+            let mut input = record.input(&sensors);
+            sensors = input.sensors.clone();
+            silence(&mut input.sensors);
+            let output = controller.step(&mut state, &input);
+            assert!(!output.drive.enable && !output.preload.enable, "{fault:?}");
+            if let Mode::FaultHold(fault) = output.telemetry.mode {
+                said.get_or_insert(fault);
+            }
+        }
+        assert_eq!(said, Some(fault));
+    }
+}
+
 /// Runs it again; the mode of its last tick.
 fn replayed(name: &str, crossings: usize) -> Mode {
     let mut events = Vec::new();
@@ -100,6 +128,25 @@ fn plans_again(run: &Recorded, name: &str) {
         let request = requests.find(|request| request.sequence == plan.sequence);
         let request = request.expect("a plan is asked for");
         assert_eq!(planner.plan(request), *plan, "{name}, tick {at}");
+    }
+}
+
+#[test]
+fn what_is_skipped_changes_no_bit() {
+    let whole = Controller::try_build(&Rig::prototype()).expect("sound").without_skipping();
+    let mut state = State::default();
+    for name in ["deploy.mcap", "slip.mcap"] {
+        let mut skipped = 0;
+        again(name, |_, record, input, output| {
+            if skipped == 0 {
+                state = State::default();
+            }
+            skipped += 1;
+            let again = whole.step(&mut state, input);
+            assert_eq!(again.telemetry, output.telemetry, "{name}, tick {}", record.at());
+            assert_eq!(state.mode(), output.telemetry.mode);
+            assert!((0.5..2.0).contains(&state.stiffness_scale().to_num::<f64>()));
+        });
     }
 }
 
