@@ -3,8 +3,10 @@
 //!
 //! The recordings in `hil-sim/tests/data` are the frames that the image would send, in an
 //! MCAP file: a deployment and a retraction, steps that stand elsewhere or are missing, lost
-//! friction, a sensor that stands still. After a change of the controller that is wanted,
-//! `cargo rig capture --bare` makes them anew; see `hil-sim/tests/logs.rs`.
+//! friction, a sensor that stands still, commands at random on a corner. After a change of
+//! the controller that is wanted they are made anew: those of the scenarios beside them by
+//! `cargo rig capture --bare NAME.toml --out hil-sim/tests/data --name NAME`, the first two
+//! as `hil-sim/tests/logs.rs` says.
 
 use std::path::Path;
 
@@ -14,7 +16,7 @@ use interstage::log::{Entry, Record};
 use interstage::model::{Plan, PlanRequest, Planner};
 use interstage::rig::Rig;
 use interstage::sense::raw::SensorFrame;
-use interstage::supervise::{Fault, Mode};
+use interstage::supervise::{Direction, Fault, Mode};
 
 /// A run as the frames of its log tell it.
 #[derive(Default)]
@@ -163,6 +165,16 @@ fn a_retraction() {
 #[test]
 fn steps_that_stand_elsewhere() {
     assert!(matches!(replayed("astray.mcap", 3), Mode::Complete(_)));
+}
+
+#[test]
+fn commands_on_a_corner_that_end_at_the_start() {
+    assert_eq!(replayed("back-again.mcap", 2), Mode::Complete(Direction::Retract));
+}
+
+#[test]
+fn commands_on_a_corner_that_end_at_the_end() {
+    assert_eq!(replayed("on-again.mcap", 3), Mode::Complete(Direction::Deploy));
 }
 
 #[test]
