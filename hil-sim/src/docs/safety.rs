@@ -24,7 +24,7 @@ fn bounds() -> String {
     let gap = 100.0 * GAP_PART;
     format!(
         "| bound | value |\n|---|---|\n\
-         | largest preload | {preload:.0} % of its limit, where the screw has its stop |\n\
+         | largest preload | {preload:.0} % of its limit; the screw has its stop at 125 % |\n\
          | way gone uncommanded, all together | {MOTION_MM} mm; {SLIDE_MM} mm where the wheel \
          has lost its grip |\n\
          | distance from the end that an arrival reports | {POSITION_MM} mm |\n\
