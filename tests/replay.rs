@@ -68,7 +68,7 @@ fn again(name: &str, mut judge: impl FnMut(&Recorded, &Record, &Input, &Output))
             plan: record.flags.plan().then(|| Recorded::of(&run.plans, record.at())).flatten(),
             ..record.input(&sensors)
         };
-        sensors = input.sensors.clone();
+        sensors = input.sensors;
         let output = controller.step(&mut state, &input);
         judge(&run, record, &input, &output);
     }
@@ -91,7 +91,7 @@ fn a_sensor_that_never_answers_is_named() {
         let mut said = None;
         for record in &run.ticks {
             let mut input = record.input(&sensors);
-            sensors = input.sensors.clone();
+            sensors = input.sensors;
             silence(&mut input.sensors);
             let output = controller.step(&mut state, &input);
             assert!(!output.drive.enable && !output.preload.enable, "{fault:?}");

@@ -29,8 +29,8 @@ impl Readback {
         drive: impl AdcChannel<ADC3> + 'static,
         preload: impl AdcChannel<ADC3> + 'static,
     ) -> Self {
-        // The driver has nothing to give back.
-        core::mem::forget(Adc::new(adc, AdcConfig::default()));
+        // Dropped, the driver leaves the converter as it is: on and calibrated.
+        let _ = Adc::new(adc, AdcConfig::default());
         let pins = [drive.degrade_adc(), preload.degrade_adc()];
         let channels = [pins[0].get_hw_channel(), pins[1].get_hw_channel()];
         registers.cfgr2().modify(|w| {
