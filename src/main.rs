@@ -41,7 +41,7 @@ mod firmware {
     use crate::board::rtt::Frames;
     use crate::board::{self, blackbox, config, guard, light, rtt};
     #[cfg(not(feature = "hil"))]
-    use crate::board::{Analog, Bridge, Ring};
+    use crate::board::{Analog, Bridge, Checksum, Ring};
     use crate::board::{Angle, Bridges, Button, Console, Guard, HostLine, Lamp, Lines};
     use crate::board::{Nucleo, Pages, Wheel};
 
@@ -146,7 +146,7 @@ mod firmware {
             watchdog: Guard::new(p.IWDG),
             button: Button::new(p.PC13, p.EXTI13),
             console: Console::new(console),
-            journal: Lines::new(frames),
+            journal: Lines::new(frames, Checksum::new(p.CRC)),
             light: Lamp,
         };
         (parts, p.PA5.into(), Pages::new(p.FLASH))

@@ -6,6 +6,7 @@
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AnyPin, Level, Output, Pull, Speed};
 use embassy_stm32::mode::Blocking;
+use embassy_stm32::pac;
 use embassy_stm32::peripherals::{PA6, PA7, PB3, SPI1};
 use embassy_stm32::spi::mode::Master;
 use embassy_stm32::spi::{Config, MODE_1, Spi};
@@ -23,9 +24,12 @@ const CLOCK: Hertz = Hertz(5_312_500);
 /// delay goes round once more than this, and a round takes the core three at least.
 const SELECT_ROUNDS: u32 = 20;
 
+/// Looks at the bus in which a frame of 512 cycles has come: a look takes four at least.
+const FRAME_ROUNDS: u32 = 500;
+
 /// The sensor on its bus.
 pub(crate) struct Angle {
-    bus: Spi<'static, Blocking, Master>,
+    _bus: Spi<'static, Blocking, Master>,
     select: Output<'static>,
 }
 
@@ -43,21 +47,24 @@ impl Angle {
         // An absent sensor then reads 0xFFFF, which carries the error flag;
         // 0x0000 would pass for an angle of zero with right parity.
         config.miso_pull = Pull::Up;
-        Self {
-            bus: Spi::new_blocking(spi, clock, out, input, config),
-            select: Output::new(select, Level::High, Speed::Medium),
-        }
+        let select = Output::new(select, Level::High, Speed::Medium);
+        let mut bus = Spi::new_blocking(spi, clock, out, input, config);
+        // Nobody is selected; from here on the bus stands at frames of 16 bits. The driver
+        // would set it up for each of them, which takes as long as half a frame.
+        let _ = bus.blocking_transfer_in_place(&mut [READ_ANGLE]);
+        Self { _bus: bus, select }
     }
 
     /// Sends the read command and returns what comes back meanwhile: the answer
     /// to the command before.
     fn exchange(&mut self) -> Result<u16, BusFault> {
-        let mut word = [READ_ANGLE];
         self.select.set_low();
         cortex_m::asm::delay(SELECT_ROUNDS);
-        let done = self.bus.blocking_transfer_in_place(&mut word);
+        pac::SPI1.dr16().write_value(READ_ANGLE);
+        let come = (0..FRAME_ROUNDS).any(|_| pac::SPI1.sr().read().rxne());
+        let word = pac::SPI1.dr16().read();
         self.select.set_high();
-        done.map(|()| word[0]).map_err(|_| BusFault::Transfer)
+        if come { Ok(word) } else { Err(BusFault::Transfer) }
     }
 }
 

@@ -1,5 +1,6 @@
 //! What the tasks hand to one another.
 
+use core::cell::Cell;
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
 use super::beat::{PERIODS, Pulse, Turn};
@@ -12,9 +13,9 @@ use crate::sense::freshness::age;
 use crate::sense::raw::{AdcCode, AngleFrame, EncoderCount, Sample, SensorFrame};
 use crate::supervise::{Command, Mode};
 use crate::units::Tick;
+use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
-use embassy_sync::watch::Watch;
 
 /// Log entries that wait for the journal at most; beyond, new ones are dropped and
 /// counted.
@@ -29,8 +30,24 @@ pub const CHECK_IN_TICKS: u32 = 50;
 /// Most operator tasks.
 const OPERATORS: usize = 4;
 
-/// The latest value of something: written by one task, polled by the tick.
-type Slot<T> = Watch<CriticalSectionRawMutex, T, 0>;
+/// The latest value of something: written by one task, polled by the tick. Nobody waits
+/// for it, so that it is a `Watch` without the wakers.
+pub(super) struct Slot<T>(Mutex<CriticalSectionRawMutex, Cell<Option<T>>>);
+
+impl<T: Copy> Slot<T> {
+    const fn new() -> Self {
+        Self(Mutex::new(Cell::new(None)))
+    }
+
+    /// Puts a value in the place of the one before.
+    pub(super) fn put(&self, value: T) {
+        self.0.lock(|place| place.set(Some(value)));
+    }
+
+    fn get(&self) -> Option<T> {
+        self.0.lock(Cell::get)
+    }
+}
 
 /// A task that checks in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -117,6 +134,19 @@ impl Exchange {
         }
     }
 
+    /// An interrupt calls [`Exchange::beat`] from now on. For before the control tick's task
+    /// begins.
+    pub fn expect_beat(&self) {
+        self.pulse.expect();
+    }
+
+    /// A whole millisecond has come. For an interrupt that preempts the executor of control
+    /// tick and sensors, after [`Exchange::expect_beat`].
+    #[inline]
+    pub fn beat(&self) {
+        self.pulse.strike();
+    }
+
     /// What a tick at `now` is given; takes the oldest command and the plan out.
     pub fn input(&self, now: Tick, overrun: bool) -> Input {
         Input {
@@ -165,10 +195,10 @@ impl Exchange {
     #[must_use]
     pub fn sensors(&self) -> SensorFrame {
         SensorFrame {
-            wheel: self.wheel.anon_receiver().try_get(),
-            load_cell: self.load_cell.anon_receiver().try_get(),
-            tread: self.tread.anon_receiver().try_get(),
-            arm: self.arm.anon_receiver().try_get(),
+            wheel: self.wheel.get(),
+            load_cell: self.load_cell.get(),
+            tread: self.tread.get(),
+            arm: self.arm.get(),
         }
     }
 

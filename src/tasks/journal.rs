@@ -22,6 +22,7 @@ pub async fn journal(
     let mut shown = Light::default();
     let mut reported = 0;
     scribe.speak_for(journal.identity());
+    scribe.check_by(journal.checker());
     light.show(shown);
     loop {
         exchange.check_in(Station::Journal, uptime());

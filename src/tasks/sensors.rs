@@ -17,20 +17,20 @@ pub async fn speed(mut wheel: impl WheelEncoder, exchange: &Exchange) -> ! {
     let mut beat = Beat::<1>::new();
     loop {
         let at = beat.follow(&exchange.pulse, Station::Speed).await.tick;
-        exchange.wheel.sender().send(Sample { code: wheel.count(), at });
+        exchange.wheel.put(Sample { code: wheel.count(), at });
         exchange.check_in(Station::Speed, at);
     }
 }
 
 /// Publishes the load cell's code at 1 kHz.
 pub async fn pressure(input: impl AnalogInput, exchange: &Exchange) -> ! {
-    let publish = |sample| exchange.load_cell.sender().send(sample);
+    let publish = |sample| exchange.load_cell.put(sample);
     analog(input, Station::Pressure, publish, exchange).await
 }
 
 /// Publishes the tread displacement sensor's code at 1 kHz.
 pub async fn displacement(input: impl AnalogInput, exchange: &Exchange) -> ! {
-    let publish = |sample| exchange.tread.sender().send(sample);
+    let publish = |sample| exchange.tread.put(sample);
     analog(input, Station::Displacement, publish, exchange).await
 }
 
@@ -39,7 +39,7 @@ pub async fn angle(mut bus: impl AngleBus, exchange: &Exchange) -> ! {
     let mut beat = Beat::<ANGLE_PERIOD>::new();
     loop {
         let at = beat.follow(&exchange.pulse, Station::Angle).await.tick;
-        let publish = |sample| exchange.arm.sender().send(sample);
+        let publish = |sample| exchange.arm.put(sample);
         settle(bounded(bus.frame()).await, at, Station::Angle, publish, exchange);
     }
 }
