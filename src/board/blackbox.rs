@@ -160,7 +160,9 @@ unsafe extern "C" fn sys_tick() {
 unsafe extern "C" fn look_at(frame: u32) {
     // With the host in the loop it is the host's time that beats.
     #[cfg(not(feature = "hil"))]
-    crate::EXCHANGE.beat();
+    if crate::EXCHANGE.beat() {
+        super::angle::begin();
+    }
     let unfed = UNFED.load(Ordering::Relaxed);
     UNFED.store(unfed + 1, Ordering::Relaxed);
     if unfed < PATIENCE {

@@ -292,15 +292,14 @@ impl Iterator for Ticks<'_> {
     }
 }
 
-/// Makes a body of ticks until it is full or there are none; its length.
+/// Makes a body of ticks until it is full or `next` has none; its length.
 #[inline]
-pub(super) fn put_ticks(body: &mut [u8; BODY], mut next: impl FnMut() -> Option<Record>) -> usize {
-    let (mut before, mut length) = (Wire::default(), 0);
-    while let Some(room) = body.get_mut(length..).and_then(|rest| rest.first_chunk_mut()) {
-        let Some(record) = next() else { break };
-        let wire = Wire::of(&record);
-        length += wire.put(&before, room);
-        before = wire;
+pub(super) fn put_ticks(body: &mut [u8; BODY], mut next: impl FnMut(&mut Record) -> bool) -> usize {
+    let (mut record, mut before, mut length) = (Record::EMPTY, Wire::default(), 0);
+    while let Some(room) = body.get_mut(length..).and_then(|rest| rest.first_chunk_mut())
+        && next(&mut record)
+    {
+        length += Wire::of(&record).put(&mut before, room);
     }
     length
 }
@@ -320,10 +319,11 @@ mod tests {
         let (mut left, mut put) = (records.iter().copied(), 0);
         let mut page = Page::new();
         let frame = page.write(head(Kind::Ticks, sequence), check, |body| {
-            put_ticks(body, || {
+            put_ticks(body, |record| {
                 let next = left.next();
                 put += usize::from(next.is_some());
-                next
+                *record = next.unwrap_or(*record);
+                next.is_some()
             })
         });
         (frame.to_vec(), put)

@@ -95,11 +95,13 @@ impl Scribe {
         let head = self.head(Kind::Ticks);
         let Self { capture, ledger, identity, page, check, .. } = self;
         let frame = page.write(head, *check, |body| {
-            put_ticks(body, || {
-                let record = tape.take()?;
-                capture.look(&record, identity.corner);
-                ledger.look(&record);
-                Some(record)
+            put_ticks(body, |record| {
+                let there = tape.take_into(record);
+                if there {
+                    capture.look(record, identity.corner);
+                    ledger.look(record);
+                }
+                there
             })
         });
         let room = send(frame);

@@ -105,14 +105,20 @@ impl Tape {
 
     /// The oldest tick not yet taken.
     pub fn take(&self) -> Option<Record> {
+        let mut record = Record::EMPTY;
+        self.take_into(&mut record).then_some(record)
+    }
+
+    /// The same into a place; false if there is none.
+    pub(super) fn take_into(&self, place: &mut Record) -> bool {
         self.inner.lock(|inner| {
             let inner = &mut *inner.borrow_mut();
             if inner.read == inner.written {
-                return None;
+                return false;
             }
-            let place = inner.read as usize % TAPE;
+            let row = inner.rows.get(inner.read as usize % TAPE);
             inner.read = inner.read.wrapping_add(1);
-            inner.rows.get(place).copied()
+            row.map(|row| *place = *row).is_some()
         })
     }
 

@@ -14,25 +14,29 @@ use super::telemetry::Telemetry;
 use crate::hal::Duty;
 use crate::units::Q16;
 
-/// Numbers of a record that are written as differences, the tick first.
-const NUMBERS: usize = 13;
+/// Numbers of a record that are written as differences, behind the tick.
+const NUMBERS: usize = 12;
 
 /// Words of a record that are written as they are.
 const WORDS: usize = 5;
 
-const _: () = assert!(2 * NUMBERS + WORDS <= 32, "one bit is left for two more codes");
+/// Bits of the map before those of the words.
+const DIFFERENCES: usize = 2 * (1 + NUMBERS);
+
+const _: () = assert!(DIFFERENCES + WORDS < 32, "one bit is left for two more codes");
 
 /// A record as whole numbers.
 ///
 /// Differences wrap, so that any two records have one and no bit is lost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Wire {
+    at: u32,
     numbers: [u32; NUMBERS],
     words: [u32; WORDS],
 }
 
 /// Most bytes that a [`Wire`] takes.
-pub(super) const LONGEST: usize = 4 * (1 + NUMBERS + WORDS);
+pub(super) const LONGEST: usize = 4 * (2 + NUMBERS + WORDS);
 
 /// Two halves of a word.
 const fn word(low: u16, high: u16) -> u32 {
@@ -52,8 +56,8 @@ impl Wire {
         let [wheel_age, load_cell_age, tread_age, arm_age] = *ages;
         let q = |value: Q16| value.to_bits() as u32;
         Self {
+            at: t.at,
             numbers: [
-                t.at,
                 // The arm's age lowest: read every second tick, it is the one that changes.
                 u32::from_le_bytes([arm_age, wheel_age, load_cell_age, tread_age]),
                 q(t.position),
@@ -80,7 +84,7 @@ impl Wire {
 
     /// The record of the numbers; none if one of them has no meaning.
     pub(super) fn record(&self) -> Option<Record> {
-        let [at, ages, q @ ..] = self.numbers;
+        let [ages, q @ ..] = self.numbers;
         let q: [Q16; 11] = q.map(|bits| Q16::from_bits(bits as i32));
         let [wheel_and_cell, tread_and_arm, duties, state, flags] = self.words;
         let [arm_age, wheel_age, load_cell_age, tread_age] = ages.to_le_bytes();
@@ -91,7 +95,7 @@ impl Wire {
         (rest == 0).then_some(())?;
         Some(Record {
             telemetry: Telemetry {
-                at,
+                at: self.at,
                 mode: number::mode(mode)?,
                 stage: number::stage(stage)?,
                 position: q[0],
@@ -115,47 +119,36 @@ impl Wire {
         })
     }
 
-    /// The numbers that are expected behind these.
-    fn next(&self) -> [u32; NUMBERS] {
-        let mut numbers = self.numbers;
-        numbers[0] = numbers[0].wrapping_add(1);
-        numbers
-    }
-
-    /// Writes what it is after `before`; so many bytes.
+    /// Writes what it is after `before`, and takes that one's place; so many bytes.
     #[inline]
-    pub(super) fn put(&self, before: &Self, room: &mut [u8; LONGEST]) -> usize {
-        let (mut map, mut used) = (0_u32, 4);
-        for (place, (number, before)) in self.numbers.iter().zip(before.next()).enumerate() {
-            let difference = number.wrapping_sub(before) as i32;
-            if difference == 0 {
-                continue;
-            }
-            if let Ok(half) = i16::try_from(difference) {
-                map |= 1 << (2 * place);
-                used += put(room, used, half.to_le_bytes());
-            } else {
-                map |= 2 << (2 * place);
-                used += put(room, used, difference.to_le_bytes());
+    pub(super) fn put(&self, before: &mut Self, room: &mut [u8; LONGEST]) -> usize {
+        let mut list = List { map: 0, used: 4, room };
+        list.number(0, self.at, before.at.wrapping_add(1));
+        before.at = self.at;
+        for (place, (number, before)) in self.numbers.iter().zip(&mut before.numbers).enumerate() {
+            list.number(1 + place, *number, *before);
+            *before = *number;
+        }
+        for (place, (word, before)) in self.words.iter().zip(&mut before.words).enumerate() {
+            if word != before {
+                list.map |= 1 << (DIFFERENCES + place);
+                list.put(word.to_le_bytes());
+                *before = *word;
             }
         }
-        for (place, (word, before)) in self.words.iter().zip(before.words).enumerate() {
-            if *word != before {
-                map |= 1 << (2 * NUMBERS + place);
-                used += put(room, used, word.to_le_bytes());
-            }
-        }
-        put(room, 0, map.to_le_bytes());
-        used
+        list.room[..4].copy_from_slice(&list.map.to_le_bytes());
+        list.used
     }
 
     /// Reads what comes after `before`, and what is left behind it; none if it is not whole.
     pub(super) fn take<'a>(before: &Self, bytes: &'a [u8]) -> Option<(Self, &'a [u8])> {
         let (map, mut rest) = bytes.split_first_chunk::<4>()?;
         let map = u32::from_le_bytes(*map);
-        (map >> (2 * NUMBERS + WORDS) == 0).then_some(())?;
-        let mut wire = Self { numbers: before.next(), words: before.words };
-        for (place, number) in wire.numbers.iter_mut().enumerate() {
+        (map >> (DIFFERENCES + WORDS) == 0).then_some(())?;
+        let mut wire = *before;
+        wire.at = wire.at.wrapping_add(1);
+        let numbers = core::iter::once(&mut wire.at).chain(&mut wire.numbers);
+        for (place, number) in numbers.enumerate() {
             let difference = match map >> (2 * place) & 3 {
                 0 => 0,
                 1 => i32::from(i16::from_le_bytes(*take(&mut rest)?)),
@@ -165,7 +158,7 @@ impl Wire {
             *number = number.wrapping_add_signed(difference);
         }
         for (place, word) in wire.words.iter_mut().enumerate() {
-            if map >> (2 * NUMBERS + place) & 1 != 0 {
+            if map >> (DIFFERENCES + place) & 1 != 0 {
                 *word = u32::from_le_bytes(*take(&mut rest)?);
             }
         }
@@ -173,13 +166,39 @@ impl Wire {
     }
 }
 
-/// Writes bytes at a place that has room for them; how many they are.
-#[inline(always)]
-fn put<const N: usize>(room: &mut [u8; LONGEST], at: usize, bytes: [u8; N]) -> usize {
-    if let Some(place) = room.get_mut(at..).and_then(|rest| rest.first_chunk_mut::<N>()) {
-        *place = bytes;
+/// What is written of a record, with the map of it.
+struct List<'a> {
+    map: u32,
+    used: usize,
+    room: &'a mut [u8; LONGEST],
+}
+
+impl List<'_> {
+    /// The number at this place of the map, by its difference to what was to be expected.
+    #[inline(always)]
+    fn number(&mut self, place: usize, number: u32, expected: u32) {
+        let difference = number.wrapping_sub(expected) as i32;
+        if difference == 0 {
+            return;
+        }
+        if let Ok(half) = i16::try_from(difference) {
+            self.map |= 1 << (2 * place);
+            self.put(half.to_le_bytes());
+        } else {
+            self.map |= 2 << (2 * place);
+            self.put(difference.to_le_bytes());
+        }
     }
-    N
+
+    /// Bytes for which there is room.
+    #[inline(always)]
+    fn put<const N: usize>(&mut self, bytes: [u8; N]) {
+        let rest = self.room.get_mut(self.used..);
+        if let Some(place) = rest.and_then(|rest| rest.first_chunk_mut::<N>()) {
+            *place = bytes;
+        }
+        self.used += N;
+    }
 }
 
 fn take<'a, const N: usize>(rest: &mut &'a [u8]) -> Option<&'a [u8; N]> {
@@ -197,7 +216,9 @@ mod tests {
     /// The record behind another, as it is written.
     fn written(one: &Record, other: &Record) -> Vec<u8> {
         let mut room = [0xA5; LONGEST];
-        let used = Wire::of(other).put(&Wire::of(one), &mut room);
+        let mut before = Wire::of(one);
+        let used = Wire::of(other).put(&mut before, &mut room);
+        assert_eq!(before, Wire::of(other));
         room[..used].to_vec()
     }
 

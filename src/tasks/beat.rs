@@ -15,7 +15,7 @@ use embassy_sync::waitqueue::AtomicWaker;
 use embassy_time::{Instant, TICK_HZ as CLOCK_HZ, Timer};
 
 /// Clock ticks of the time driver in a control tick.
-const CLOCKS: u32 = (CLOCK_HZ / TICK_HZ as u64) as u32;
+pub(super) const CLOCKS: u32 = (CLOCK_HZ / TICK_HZ as u64) as u32;
 
 /// Tasks of sensors, the first stations.
 const SENSORS: usize = 4;
@@ -42,6 +42,8 @@ pub(super) struct Pulse {
     turn: AtomicU8,
     /// The tick of the latest turn.
     ticked: AtomicU32,
+    /// When the latest control tick was due, low half of the clock.
+    due: AtomicU32,
 }
 
 /// The control tick among the turns.
@@ -67,6 +69,7 @@ impl Pulse {
             beaten: AtomicBool::new(false),
             turn: AtomicU8::new(0),
             ticked: AtomicU32::new(0),
+            due: AtomicU32::new(0),
         }
     }
 
@@ -108,20 +111,30 @@ impl Pulse {
     /// Wakes all whose turn comes with this millisecond: first the control tick's task, so
     /// that it runs last. For an interrupt at each whole millisecond that preempts their
     /// executor.
-    pub(super) fn strike(&self) {
+    /// Tells whether the arm's angle is among them.
+    pub(super) fn strike(&self) -> bool {
         self.lead.wake();
         // The one behind the latest turn. After ticks that were missed it may be another:
         // those that are woken look at the clock themselves.
-        self.beat(self.ticked().wrapping_add(1));
+        let tick = self.ticked().wrapping_add(1);
+        self.beat(tick);
+        tick.is_multiple_of(ANGLE_PERIOD)
     }
 
-    /// Wakes the sensor tasks that are due in this tick.
+    /// Wakes the sensor tasks that are due in this tick, the last first: it runs last.
     fn beat(&self, tick: Tick) {
-        for (waker, period) in self.wakers.iter().zip(PERIODS) {
-            if tick.is_multiple_of(period) {
-                waker.wake();
-            }
+        let [speed, pressure, displacement, angle] = &self.wakers;
+        if tick.is_multiple_of(ANGLE_PERIOD) {
+            angle.wake();
         }
+        for waker in [displacement, pressure, speed] {
+            waker.wake();
+        }
+    }
+
+    /// When the latest control tick was due, low half of the clock.
+    pub(super) fn due(&self) -> u32 {
+        self.due.load(Ordering::Relaxed)
     }
 
     /// The waker of a sensor's task; that of the last for stations that are none.
@@ -176,8 +189,13 @@ impl<const N: u32> Beat<N> {
     /// line from its end. Would it not, the tick would find codes one tick older.
     pub(super) async fn lead(&mut self, pulse: &Pulse) -> Due {
         pulse.begin(self.tick.wrapping_sub(N), Turn::Nobody);
+        pulse.due.store(self.due, Ordering::Relaxed);
         if pulse.beaten.load(Ordering::Relaxed) {
-            return poll_fn(|context| self.poll(context, pulse, &pulse.lead, Turn::Tick)).await;
+            let mut waits = false;
+            return poll_fn(|context| {
+                self.poll(context, &mut waits, pulse, (&pulse.lead, Turn::Tick))
+            })
+            .await;
         }
         self.beat(pulse).await;
         let due = self.advance(clock().wrapping_sub(self.due));
@@ -204,12 +222,19 @@ impl<const N: u32> Beat<N> {
         .await;
     }
 
-    /// Waits for the next wake-up by the pulse. A future of its own, without those of an
-    /// `async fn` inside of it: two of its turns come in every tick and task.
-    #[inline]
-    pub(super) fn follow(&mut self, pulse: &Pulse, station: Station) -> impl Future<Output = Due> {
+    /// The next wake-up by the pulse, for a `poll_fn` of the task's own: an `async fn`, or
+    /// one future for all tasks, costs as much again, two times every tick and task. `waits`
+    /// begins as false.
+    #[inline(always)]
+    pub(super) fn follow(
+        &mut self,
+        context: &Context<'_>,
+        waits: &mut bool,
+        pulse: &Pulse,
+        station: Station,
+    ) -> Poll<Due> {
         let turn = Turn::Sensor(station.index() as u8);
-        poll_fn(move |context| self.poll(context, pulse, pulse.of(station), turn))
+        self.poll(context, waits, pulse, (pulse.of(station), turn))
     }
 
     /// A wake-up, if it is due; a turn begins with it.
@@ -217,18 +242,26 @@ impl<const N: u32> Beat<N> {
     fn poll(
         &mut self,
         context: &Context<'_>,
+        waits: &mut bool,
         pulse: &Pulse,
-        wakes: &AtomicWaker,
-        turn: Turn,
+        (wakes, turn): (&AtomicWaker, Turn),
     ) -> Poll<Due> {
+        // The same task again: its waker stands there.
+        let known = self.waker.as_ref().is_some_and(|waker| waker.will_wake(context.waker()));
+        if known && !*waits {
+            // It has just had its turn. Whoever wakes it from now on finds its waker, and has
+            // done so since.
+            *waits = true;
+            return Poll::Pending;
+        }
         let late = clock().wrapping_sub(self.due);
         if late <= i32::MAX as u32 {
             let due = self.advance(late);
             pulse.begin(due.tick, turn);
             return Poll::Ready(due);
         }
-        // The same task again: its waker stands there.
-        if !self.waker.as_ref().is_some_and(|waker| waker.will_wake(context.waker())) {
+        *waits = true;
+        if !known {
             wakes.register(context.waker());
             self.waker = Some(context.waker().clone());
         }

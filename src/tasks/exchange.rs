@@ -3,7 +3,7 @@
 use core::cell::Cell;
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
-use super::beat::{PERIODS, Pulse, Turn};
+use super::beat::{CLOCKS, PERIODS, Pulse, Turn};
 use crate::blackbox::Late;
 use crate::control::{Input, Output};
 use crate::hal::Light;
@@ -16,6 +16,7 @@ use crate::units::Tick;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
+use embassy_time::{Duration, Instant};
 
 /// Log entries that wait for the journal at most; beyond, new ones are dropped and
 /// counted.
@@ -141,10 +142,22 @@ impl Exchange {
     }
 
     /// A whole millisecond has come. For an interrupt that preempts the executor of control
-    /// tick and sensors, after [`Exchange::expect_beat`].
+    /// tick and sensors, after [`Exchange::expect_beat`]. Tells whether the arm's angle is
+    /// read with it, after the other sensors.
     #[inline]
-    pub fn beat(&self) {
-        self.pulse.strike();
+    pub fn beat(&self) -> bool {
+        self.pulse.strike()
+    }
+
+    /// When a task below the control rate that waits for nothing but time goes on: in so
+    /// long, by half a millisecond more or less, in the middle between two ticks. So neither
+    /// its timer nor what it does with interrupts shut out delays the beginning of one.
+    #[must_use]
+    pub fn aside(&self, wait: Duration) -> Instant {
+        let now = Instant::now();
+        let phase = (now.as_ticks() as u32).wrapping_sub(self.pulse.due()) % CLOCKS;
+        let at = now + wait + Duration::from_ticks((CLOCKS / 2).into());
+        Instant::from_ticks(at.as_ticks().saturating_sub(phase.into()))
     }
 
     /// What a tick at `now` is given; takes the oldest command and the plan out.

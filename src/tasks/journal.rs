@@ -5,7 +5,7 @@ use super::{ROUND, uptime};
 use crate::hal::{Indicator, Journal, Light};
 use crate::log::{Entry, Event, Scribe};
 use embassy_futures::select::{Either, select};
-use embassy_time::with_timeout;
+use embassy_time::with_deadline;
 
 /// Writes log entries in their order and every tick as a record of the binary log; shows
 /// the light when it changes.
@@ -31,7 +31,7 @@ pub async fn journal(
             light.show(shown);
         }
         let news = select(exchange.entries.receive(), exchange.tape.ready());
-        let news = with_timeout(ROUND, news).await;
+        let news = with_deadline(exchange.aside(ROUND), news).await;
         exchange.wake(Station::Journal);
         if let Ok(Either::First(entry)) = news {
             write(&mut journal, scribe, &entry);

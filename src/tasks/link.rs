@@ -9,7 +9,7 @@ use crate::params::slots::SetMemory;
 use embassy_time::{Duration, Timer};
 
 /// How often the line is looked at: nobody tells when the host has written.
-const POLL: Duration = Duration::from_millis(5);
+const POLL: Duration = Duration::from_millis(10);
 
 /// Answers the host's requests about the parameters, one after the other.
 ///
@@ -26,7 +26,7 @@ pub async fn link<M: SetMemory>(
         exchange.check_in(station, uptime());
         let mut byte = [0];
         if line.read(&mut byte) == 0 {
-            Timer::after(POLL).await;
+            Timer::at(exchange.aside(POLL)).await;
             continue;
         }
         let Some(ToBoard::Parameters(number, request)) = gatherer.take(byte[0]) else { continue };
@@ -39,7 +39,7 @@ pub async fn link<M: SetMemory>(
         }
         if restarts && done {
             // For the answer to be fetched.
-            Timer::after(POLL * 4).await;
+            Timer::after(POLL * 2).await;
             line.restart();
         }
     }

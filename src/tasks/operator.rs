@@ -19,7 +19,7 @@ pub async fn operator(mut source: impl CommandSource, exchange: &Exchange) -> ! 
             let mut next = pin!(source.next());
             loop {
                 exchange.check_in(station, uptime());
-                match select(next.as_mut(), Timer::after(ROUND)).await {
+                match select(next.as_mut(), Timer::at(exchange.aside(ROUND))).await {
                     Either::First(command) => break command,
                     Either::Second(()) => {}
                 }

@@ -10,8 +10,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::chip::Stray;
-use super::exceptions::number::SYS_TICK;
 use super::core::Masked;
+use super::exceptions::number::SYS_TICK;
 use super::heat::by_function;
 use super::heat::names::Names;
 use super::image::ImageError;
@@ -272,7 +272,8 @@ const PLACES: usize = 12;
 /// A place at which interrupts are shut out, by the function that asks for it: the first
 /// that is not about just that.
 fn shut((pc, exception): (u32, u32), by: &Masked, names: &Names<'_>) -> Shut {
-    let about = ["core::", "cortex_m::", "critical_section::", "_critical_section", "blocking_mutex"];
+    let about =
+        ["core::", "cortex_m::", "critical_section::", "_critical_section", "blocking_mutex"];
     let frames = names.frames(pc).into_iter().map(|frame| frame.function);
     let mut others = frames.filter(|name| !about.iter().any(|about| name.contains(about)));
     Shut {

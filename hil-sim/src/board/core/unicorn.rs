@@ -60,10 +60,10 @@ const RETURN_BITS: u32 = 0xFFFF_FF01;
 /// `WFE`, `WFI` and `SEV`, as they stand in memory.
 const WFE: [u8; 2] = [0x20, 0xBF];
 const WFI: [u8; 2] = [0x30, 0xBF];
-const SEV: [u8; 2] = [0x40, 0xBF];
+const SEV: &[u8] = &[0x40, 0xBF];
 /// `CPSID i` and `CPSIE i`.
-const CLOSE: [u8; 2] = [0x72, 0xB6];
-const OPEN: [u8; 2] = [0x62, 0xB6];
+const CLOSE: &[u8] = &[0x72, 0xB6];
+const OPEN: &[u8] = &[0x62, 0xB6];
 /// The exception's number among the flags.
 const EXCEPTION: u64 = 0x1FF;
 /// The state of thumb code outside of a conditional block, among the flags.
@@ -217,6 +217,14 @@ type Hooked<'a, B> = Unicorn<'a, Inside<B>>;
 /// Gives an engine's error its place.
 fn engine<T>(what: &'static str, result: Result<T, impl std::fmt::Debug>) -> Result<T, CoreError> {
     result.map_err(|error| CoreError::Engine { what, why: format!("{error:?}") })
+}
+
+/// The program shuts interrupts out at this place.
+fn shut<B>(uc: &mut Hooked<'_, B>, address: u32) {
+    let flags = uc.reg_read(RegisterARM::XPSR).unwrap_or_default();
+    let inside = uc.get_data_mut();
+    let now = inside.count.meter.cycles;
+    inside.shut.get_or_insert((now, (address, (flags & EXCEPTION) as u32)));
 }
 
 /// Stops the engine from inside a hook.
@@ -390,10 +398,8 @@ impl<B: Bus + 'static> UnicornCore<B> {
                     self.hook_late(address, instruction.kind)?;
                 }
                 let at = (address - range.start) as usize;
-                if instruction.size == 2
-                    && let Some(code) = code.get(at..).and_then(|code| code.first_chunk())
-                {
-                    self.hook_narrow(address, *code)?;
+                if let Some(code) = code.get(at..at + instruction.size as usize) {
+                    self.hook_mask(address, code)?;
                 }
             }
         }
@@ -404,17 +410,22 @@ impl<B: Bus + 'static> UnicornCore<B> {
     ///
     /// The engine ends a block behind each of the latter two, so that the cycles counted
     /// when it comes to them are those up to them.
-    fn hook_narrow(&mut self, address: u32, code: [u8; 2]) -> Result<(), CoreError> {
+    fn hook_mask(&mut self, address: u32, code: &[u8]) -> Result<(), CoreError> {
         let (at, uc) = (u64::from(address), &mut self.engine);
         let hooked = match code {
             SEV => uc.add_code_hook(at, at, |uc, _, _| uc.get_data_mut().bus.event()),
-            CLOSE => uc.add_code_hook(at, at, move |uc, _, _| {
-                let flags = uc.reg_read(RegisterARM::XPSR).unwrap_or_default();
-                let inside = uc.get_data_mut();
-                let now = inside.count.meter.cycles;
-                inside.shut.get_or_insert((now, (address, (flags & EXCEPTION) as u32)));
-            }),
+            CLOSE => uc.add_code_hook(at, at, move |uc, _, _| shut(uc, address)),
             OPEN => uc.add_code_hook(at, at, |uc, _, _| uc.get_data_mut().open()),
+            // MSR PRIMASK, Rn.
+            [first, 0xF3, 0x10, 0x88] if first >> 4 == 8 => {
+                let register = general(first & 0xF);
+                uc.add_code_hook(at, at, move |uc, _, _| {
+                    match uc.reg_read(register).unwrap_or_default() & 1 {
+                        0 => uc.get_data_mut().open(),
+                        _ => shut(uc, address),
+                    }
+                })
+            }
             _ => return Ok(()),
         };
         engine("hook an instruction", hooked).map(|_| ())
