@@ -42,8 +42,8 @@ pub(super) struct Pulse {
     turn: AtomicU8,
     /// The tick of the latest turn.
     ticked: AtomicU32,
-    /// When the latest control tick was due, low half of the clock.
-    due: AtomicU32,
+    /// The latest control tick.
+    led: AtomicU32,
 }
 
 /// The control tick among the turns.
@@ -69,7 +69,7 @@ impl Pulse {
             beaten: AtomicBool::new(false),
             turn: AtomicU8::new(0),
             ticked: AtomicU32::new(0),
-            due: AtomicU32::new(0),
+            led: AtomicU32::new(0),
         }
     }
 
@@ -132,9 +132,9 @@ impl Pulse {
         }
     }
 
-    /// When the latest control tick was due, low half of the clock.
-    pub(super) fn due(&self) -> u32 {
-        self.due.load(Ordering::Relaxed)
+    /// The latest control tick.
+    pub(super) fn led(&self) -> Tick {
+        self.led.load(Ordering::Relaxed)
     }
 
     /// The waker of a sensor's task; that of the last for stations that are none.
@@ -189,7 +189,7 @@ impl<const N: u32> Beat<N> {
     /// line from its end. Would it not, the tick would find codes one tick older.
     pub(super) async fn lead(&mut self, pulse: &Pulse) -> Due {
         pulse.begin(self.tick.wrapping_sub(N), Turn::Nobody);
-        pulse.due.store(self.due, Ordering::Relaxed);
+        pulse.led.store(self.tick.wrapping_sub(N), Ordering::Relaxed);
         if pulse.beaten.load(Ordering::Relaxed) {
             let mut waits = false;
             return poll_fn(|context| {

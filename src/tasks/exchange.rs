@@ -149,13 +149,22 @@ impl Exchange {
         self.pulse.strike()
     }
 
+    /// The present tick, for tasks outside the control rate: that of the clock, without a
+    /// long division.
+    #[must_use]
+    pub fn uptime(&self) -> Tick {
+        let led = self.pulse.led();
+        led.wrapping_add(since(led, Instant::now()) / CLOCKS)
+    }
+
     /// When a task below the control rate that waits for nothing but time goes on: in so
     /// long, by half a millisecond more or less, in the middle between two ticks. So neither
     /// its timer nor what it does with interrupts shut out delays the beginning of one.
     #[must_use]
     pub fn aside(&self, wait: Duration) -> Instant {
+        let led = self.pulse.led();
         let now = Instant::now();
-        let phase = (now.as_ticks() as u32).wrapping_sub(self.pulse.due()) % CLOCKS;
+        let phase = since(led, now) % CLOCKS;
         let at = now + wait + Duration::from_ticks((CLOCKS / 2).into());
         Instant::from_ticks(at.as_ticks().saturating_sub(phase.into()))
     }
@@ -337,6 +346,11 @@ impl Default for Exchange {
     }
 }
 
+/// Clock ticks since a control tick was due, which stands on its whole millisecond.
+fn since(tick: Tick, now: Instant) -> u32 {
+    (now.as_ticks() as u32).wrapping_sub(tick.wrapping_mul(CLOCKS))
+}
+
 /// Puts a value in a place for one, instead of the one that may be there. For one writer.
 pub(super) fn latest<T>(place: &Channel<CriticalSectionRawMutex, T, 1>, value: T) {
     place.clear();
@@ -367,6 +381,17 @@ mod tests {
         Station::Model,
         Station::Journal,
     ];
+
+    #[test]
+    fn the_time_since_a_tick_is_right_across_the_clock_s_low_half() {
+        for millisecond in [1_u64, 4_294_966, 4_294_968, 1 << 32, (1 << 32) + 7] {
+            let due = Instant::from_millis(millisecond);
+            for later in [0, 999, 1500] {
+                let now = due + Duration::from_ticks(later);
+                assert_eq!(u64::from(since(millisecond as Tick, now)), later, "{millisecond}");
+            }
+        }
+    }
 
     #[test]
     fn one_silent_task_is_enough() {

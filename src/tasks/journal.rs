@@ -1,7 +1,7 @@
 //! The logging task.
 
+use super::ROUND;
 use super::exchange::{ENTRIES, Exchange, Station};
-use super::{ROUND, uptime};
 use crate::hal::{Indicator, Journal, Light};
 use crate::log::{Entry, Event, Scribe};
 use embassy_futures::select::{Either, select};
@@ -25,7 +25,7 @@ pub async fn journal(
     scribe.check_by(journal.checker());
     light.show(shown);
     loop {
-        exchange.check_in(Station::Journal, uptime());
+        exchange.check_in(Station::Journal, exchange.uptime());
         if exchange.light() != shown {
             shown = exchange.light();
             light.show(shown);
@@ -44,7 +44,7 @@ pub async fn journal(
             if lost != reported {
                 // The newest are the ones dropped, so their count stands behind the rest.
                 let event = Event::Lost(lost.wrapping_sub(reported));
-                write(&mut journal, scribe, &Entry { at: uptime(), event });
+                write(&mut journal, scribe, &Entry { at: exchange.uptime(), event });
                 reported = lost;
             }
         }

@@ -1,7 +1,6 @@
 //! The task at the host's binary line.
 
 use super::exchange::Exchange;
-use super::uptime;
 use crate::hal::Line;
 use crate::link::{Gatherer, ToBoard, ToHost, frame};
 use crate::params::service::{Request, Response, Service};
@@ -23,7 +22,7 @@ pub async fn link<M: SetMemory>(
     let station = exchange.enrol_operator();
     let mut gatherer = Gatherer::new();
     loop {
-        exchange.check_in(station, uptime());
+        exchange.check_in(station, exchange.uptime());
         let mut byte = [0];
         if line.read(&mut byte) == 0 {
             Timer::at(exchange.aside(POLL)).await;
