@@ -96,9 +96,7 @@ pub trait Watchdog {
 
     /// Keeps what the drive does in this tick where a restart finds it. A board without
     /// such a place keeps nothing.
-    fn keep(&mut self, flight: &Flight) {
-        let _ = flight;
-    }
+    fn keep(&mut self, flight: &Flight);
 }
 
 /// A source of operator commands: the board button or the log channel.
