@@ -52,7 +52,7 @@ impl CrcUnit {
         self.sum ^= word << (32 - bits);
         for _ in 0..bits {
             let out = self.sum >> 31;
-            self.sum = self.sum << 1 ^ out * polynomial;
+            self.sum = (self.sum << 1) ^ (out * polynomial);
         }
     }
 }
