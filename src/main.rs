@@ -58,12 +58,14 @@ mod firmware {
 
     /// Runs the control tick and the sensors, above everything that may take long.
     ///
-    /// The deadline is the next tick, 1 ms on. What can delay this executor: the
-    /// interrupts above it, which only wake tasks (time driver, two DMA channels,
-    /// button), and critical sections, of which the longest encodes one log frame,
-    /// bounded by its buffer. What can delay the tick on it: the four sensor tasks,
-    /// of which the longest exchanges two frames of 3 us. Model, log and
-    /// operator run in thread mode and are preempted, however long they take. The
+    /// The deadline is the next tick, 1 ms on. The system timer's interrupt beats it and
+    /// wakes all tasks here. What can delay this executor: that and the other interrupts
+    /// above it, which only wake tasks (time driver, two DMA channels, button), and
+    /// critical sections, of which the longest wakes a task in the queue of timers or
+    /// copies a log entry, 3 us. Those of thread mode come in the middle between two ticks
+    /// or right behind one, see [`Exchange::aside`]. What can delay the tick on it: the
+    /// four sensor tasks, of which the longest exchanges two frames of 3 us. Model, log
+    /// and operator run in thread mode and are preempted, however long they take. The
     /// tick measures its own lateness, and a whole period of it is a fault.
     static CONTROL: InterruptExecutor = InterruptExecutor::new();
 
