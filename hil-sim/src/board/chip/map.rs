@@ -23,6 +23,7 @@ pub(super) enum Block {
     Counter,
     System,
     Debug,
+    Crc,
 }
 
 /// Everything on the buses. Outside of it an access is a bus fault, as on the chip.
@@ -50,6 +51,7 @@ const BLOCKS: [(u32, u32, Block); 18] = [
     (0x4002_0800, 0x400, Block::Mux),
     (0x4002_1000, 0x400, Block::Rcc),
     (0x4002_2000, 0x400, Block::Flash),
+    (0x4002_3000, 0x400, Block::Crc),
     (0x5000_0000, 0x400, Block::Adc),
     (0x5000_0400, 0x400, Block::Readback),
     (0xE000_1000, 0x1000, Block::Counter),
@@ -96,6 +98,7 @@ pub(super) fn name(block: Block) -> &'static str {
         Block::Counter => "DWT",
         Block::System => "SCS",
         Block::Debug => "DBGMCU",
+        Block::Crc => "CRC",
     }
 }
 
@@ -120,6 +123,7 @@ pub(super) fn is_clocked(block: Block, rcc: &Rcc) -> bool {
         Block::Spi => (APB2, 12),
         Block::Dma => (AHB1, 0),
         Block::Mux => (AHB1, 2),
+        Block::Crc => (AHB1, 12),
         Block::Port(port) => (AHB2, port as u32),
         Block::Adc => (AHB2, 13),
         Block::Readback => (AHB2, 14),
