@@ -146,6 +146,7 @@ impl<'a> Bench<'a> {
             drive_on: on(drive),
             preload: preload.duty,
             preload_on: on(preload),
+            ..Drives::default()
         };
         let passed = Passed { codes: self.codes, drives };
         self.plant.step(&drives, STEP_S)?;
@@ -167,7 +168,9 @@ impl<'a> Bench<'a> {
         self.wheel += i64::from(turned);
         self.codes = codes;
         let chip = self.machine.chip_mut();
-        chip.set_analog([codes.load_cell.get(), codes.tread.get()]);
+        // Twelve bits and no more is what the readback takes of the sixteen.
+        let bridges = [codes.bridges.drive, codes.bridges.pretightener].map(|code| code.get() << 4);
+        chip.set_analog([codes.load_cell.get(), codes.tread.get(), bridges[0], bridges[1]]);
         chip.angle.angle = codes.arm.get();
         chip.turn_wheel(self.wheel, STEP);
     }
@@ -259,5 +262,6 @@ fn sensed(plant: &VirtualRig) -> Sensed {
         preload_n: truth.preload_n,
         depth_mm: truth.depth_mm,
         arm_rad: truth.arm_rad,
+        bridges: truth.bridges,
     }
 }

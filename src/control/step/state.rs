@@ -6,6 +6,7 @@ use crate::control::speed_loop::SpeedLoopState;
 use crate::estimate::ContactStage;
 use crate::estimate::crossing::{Contact, WatchState};
 use crate::estimate::odometry::Odometry;
+use crate::estimate::tread::TreadState;
 use crate::estimate::vibration::VibrationState;
 use crate::model::{Plan, Review};
 use crate::sense::SensesState;
@@ -35,6 +36,7 @@ pub struct State {
     /// then the drive goes as if the step came at once.
     pub(super) searching: bool,
     pub(super) watch: WatchState,
+    pub(super) tread: TreadState,
     pub(super) stage: ContactStage,
     pub(super) vibration: Shaking,
     /// Level by steps recognised.
@@ -163,6 +165,7 @@ impl Default for State {
             located: false,
             searching: false,
             watch: WatchState::default(),
+            tread: TreadState::default(),
             stage: ContactStage::Initial,
             vibration: Shaking::default(),
             level: 0,
