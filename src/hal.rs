@@ -2,7 +2,7 @@
 //! and failure. `src/board` implements it on the STM32G474, the tests with
 //! mocks, the virtual rig with its plant.
 
-use crate::blackbox::Flight;
+use crate::blackbox::{Flight, Place};
 use crate::log::{Entry, Identity};
 use crate::sense::raw::{AdcCode, AngleFrame, BusFault, EncoderCount};
 use crate::supervise::Command;
@@ -97,6 +97,11 @@ pub trait Watchdog {
     /// such a place keeps nothing.
     fn keep(&mut self, flight: &Flight) {
         let _ = flight;
+    }
+
+    /// Where the wheel stands by what was kept before this start, if that tells.
+    fn place(&self) -> Option<Place> {
+        None
     }
 }
 

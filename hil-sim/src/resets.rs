@@ -16,12 +16,14 @@ use crate::board::log::Strings;
 use crate::params::set_of;
 use crate::scenario::{Direction, Scenario};
 
-pub use case::{After, Case, Kind};
-pub use outcome::{KindOutcome, Outcome};
+pub use case::{After, Aim, Case, Kind};
+pub use outcome::{KindOutcome, ModeOutcome, Outcome};
 
-/// Time from the command within which the reset comes, s: that of a run on the board, and a
-/// little more for the moment after the arrival.
-const WITHIN_S: f64 = 12.5;
+/// Time from the command within which the reset comes, s: that of a run on the board, either
+/// way, and a little more for the moment after the arrival.
+const WITHIN_S: f64 = 4.0;
+/// Of so many resets one is aimed at a mode, in turn; the others come at any time.
+const AIMED: u64 = 4;
 
 /// Why a campaign cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -39,11 +41,16 @@ pub enum ResetError {
 pub fn case(seed: u64, index: u64) -> Case {
     let mut chance = ChaCha8Rng::seed_from_u64(seed);
     chance.set_stream(index);
+    let kinds = Kind::ALL.len() as u64;
+    // Of every mode every kind comes, out and back.
+    let (round, turn) = (index / (2 * kinds), index / (2 * kinds) / AIMED);
+    let aimed = round.is_multiple_of(AIMED);
     Case {
         index,
         seed: seed + index,
         way: if index.is_multiple_of(2) { Direction::Deploy } else { Direction::Retract },
-        kind: Kind::ALL[(index / 2 % Kind::ALL.len() as u64) as usize],
+        kind: Kind::ALL[(index / 2 % kinds) as usize],
+        aim: aimed.then(|| Aim::ALL[(turn % Aim::ALL.len() as u64) as usize]),
         after_s: chance.random_range(0.0..WITHIN_S),
         // The rest of a millisecond, so that it comes between any two instructions.
         part: chance.random_range(0.0..1.0),

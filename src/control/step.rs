@@ -7,6 +7,7 @@ mod build;
 mod crossing;
 mod modes;
 mod plans;
+mod resume;
 mod runs;
 mod state;
 
@@ -128,6 +129,11 @@ struct Pass<'a> {
 }
 
 impl Pass<'_> {
+    /// Compression of the tread, smoothed, mm.
+    fn compressed(&self) -> Millimetres {
+        self.sensed.compression_filtered
+    }
+
     fn log(&mut self, event: Event) {
         // A tick that has more to say than fits says the first eight.
         let _ = self.output.events.push(Entry { at: self.now, event });
@@ -318,7 +324,7 @@ impl Controller {
         state.direction = direction;
         // Corners that are not felt are not fed forward: the table may be wrong. One that
         // is felt is blended in, or the drive would jump.
-        let felt = state.feel_corner();
+        let felt = if state.knows_corner() { state.feel_corner() } else { Q16::ZERO };
         let wanted = state.signed_speed();
         let (climb, drift) = if felt == Q16::ZERO {
             (Q16::ZERO, Q16::ZERO)

@@ -10,6 +10,8 @@ use super::log::{Line, Reader, Strings};
 use super::machine::Machine;
 use super::peripherals::HZ;
 use super::rtt::Probe;
+use super::tampered::{Tampered, letter};
+use crate::faults::Tamper;
 use crate::plant::draw::PlantParameters;
 use crate::plant::rig::{Drives, PlantError, VirtualRig};
 use crate::plant::sensors::{Codes, Sensed, Sensors};
@@ -17,6 +19,8 @@ use crate::scenario::{Direction, Scenario};
 
 /// Step of the plant, s and cycles.
 const STEP_S: f64 = 1e-3;
+/// Most counts that the encoder's lines go through in a millisecond.
+const MOST_COUNTS: i16 = 512;
 /// Cycles of a millisecond.
 pub const STEP: u64 = HZ / 1000;
 
@@ -61,6 +65,8 @@ pub struct Bench<'a> {
     frames: Option<Vec<u8>>,
     /// The text log as it came, if it is kept.
     text: Option<Vec<u8>>,
+    /// The faults of the scenario, if it has some.
+    tampered: Option<Tampered>,
 }
 
 impl<'a> Bench<'a> {
@@ -90,6 +96,7 @@ impl<'a> Bench<'a> {
             millisecond: 0,
             frames: Some(Vec::new()),
             text: None,
+            tampered: Tamper::of(scenario).map(Tampered::new),
         };
         bench.speak(codes);
         Ok(bench)
@@ -100,7 +107,18 @@ impl<'a> Bench<'a> {
     /// # Errors
     /// [`BenchError`] if the engine or the plant fails.
     pub fn step(&mut self) -> Result<(Passed, Vec<Line>), BenchError> {
-        self.machine.run_on(self.end())?;
+        let end = self.end();
+        if let Some(tampered) = &mut self.tampered {
+            let (command, noise) = (tampered.command(), tampered.noise());
+            tampered.hunt(&mut self.machine, end)?;
+            if let Some(command) = command {
+                self.send(letter(command))?;
+            }
+            if let Some(noise) = noise {
+                self.line_send(&noise)?;
+            }
+        }
+        self.machine.run_on(end)?;
         self.close()
     }
 
@@ -148,9 +166,18 @@ impl<'a> Bench<'a> {
             preload_on: on(preload),
         };
         let passed = Passed { codes: self.codes, drives };
-        self.plant.step(&drives, STEP_S)?;
-        let codes = self.sensors.read(sensed(&self.plant), STEP_S);
+        let taken = self.tampered.as_mut().map_or(drives, |tampered| tampered.drives(drives));
+        self.plant.step(&taken, STEP_S)?;
+        let mut codes = self.sensors.read(sensed(&self.plant), STEP_S);
+        if let Some(tampered) = &mut self.tampered {
+            let t_s = self.millisecond as f64 * STEP_S;
+            tampered.begin(&mut self.machine, &mut self.plant, t_s)?;
+            codes = tampered.tell(&mut self.machine, codes, self.millisecond as u32);
+        }
         self.speak(codes);
+        if self.tampered.as_ref().is_some_and(Tampered::log_gone) {
+            return Ok((passed, Vec::new()));
+        }
         if let Some(frames) = &mut self.frames {
             frames.extend(self.probe.up(&mut self.machine, 1)?);
         }
@@ -163,7 +190,8 @@ impl<'a> Bench<'a> {
 
     /// The sensors' lines take on these codes.
     fn speak(&mut self, codes: Codes) {
-        let turned = codes.wheel.since(self.codes.wheel);
+        // More than a wheel can do is what can be made of noise on its lines.
+        let turned = codes.wheel.since(self.codes.wheel).clamp(-MOST_COUNTS, MOST_COUNTS);
         self.wheel += i64::from(turned);
         self.codes = codes;
         let chip = self.machine.chip_mut();
@@ -236,6 +264,18 @@ impl<'a> Bench<'a> {
     #[must_use]
     pub fn into_machine(self) -> Machine {
         self.machine
+    }
+
+    /// When the first of the scenario's faults came, s since power-up.
+    #[must_use]
+    pub fn struck_s(&self) -> Option<f64> {
+        self.tampered.as_ref().and_then(Tampered::struck_s)
+    }
+
+    /// When it first did something, s since power-up.
+    #[must_use]
+    pub fn acts_s(&self) -> Option<f64> {
+        self.tampered.as_ref().and_then(Tampered::acts_s)
     }
 
     /// The plant.

@@ -19,6 +19,10 @@ pub(super) struct Args {
           value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     count: u64,
 
+    /// Number of the first.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    first: u64,
+
     /// Seed of the campaign; each reset has a plant of its own.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
@@ -46,7 +50,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let elf = firmware::image(Profile::Release)?;
     let strings = Strings::of(&elf).map_err(Failure::run)?;
     let cases: Vec<resets::Case> =
-        (0..args.count).map(|index| resets::case(args.seed, index)).collect();
+        (args.first..args.first + args.count).map(|index| resets::case(args.seed, index)).collect();
     let all = {
         let bar = progress::bar("resets", args.count);
         let done = |after: &resets::After| {
@@ -75,6 +79,14 @@ fn human(outcome: &crate::resets::Outcome) -> String {
     });
     let head = ["reset", "made", "recorded", "held", "arrived", "other way", "motion, mm"];
     let mut text = format!("{}\n", plain(&head, rows));
+    let rows = outcome.modes.iter().map(|mode| {
+        let counts = [mode.resets, mode.watchdog, mode.completed, mode.other_way];
+        let mut row = vec![mode.mode.to_owned()];
+        row.extend(counts.iter().map(usize::to_string));
+        row
+    });
+    let head = ["in mode", "made", "by watchdog", "arrived", "other way"];
+    text += &format!("{}\n", plain(&head, rows));
     text += &format!(
         "{} resets: {} without a record, {} with other parameters, {} not held, {} that did not \
          arrive; a run that hung went on for {} mm at most, preload changed by {} N at most\n",

@@ -64,6 +64,9 @@ impl Controller {
         } else if expectation == Expectation::Ahead {
             pass.log(Event::Limit(Limit::StepEarly));
         }
+        if searching {
+            self.touched_somewhere(state, pass, direction);
+        }
         let step = if belongs { state.next_step } else { 0 };
         let expected = belongs && !searching && expectation != Expectation::Ahead;
         state.crossing = Some(OpenCrossing {
@@ -87,8 +90,11 @@ impl Controller {
 
     fn lifted(&self, state: &mut State, pass: &mut Pass<'_>, direction: Direction, lift: Lift) {
         let Some(mut open) = state.crossing else { return };
-        let face = pass.position + lift.distance;
-        let residual = self.step_position(open.step).map_or(Q16::ZERO, |table| face - table);
+        let table = self.step_position(open.step);
+        // Seen from its middle on, a crossing tells nothing of where its face is.
+        let seen = pass.position + lift.distance;
+        let face = if open.turned { table.unwrap_or(seen) } else { seen };
+        let residual = table.map_or(Q16::ZERO, |table| face - table);
         open.lift = Some(LiftPoint {
             at: pass.now,
             gap: lift.gap,

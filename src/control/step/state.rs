@@ -1,5 +1,6 @@
 //! What the controller remembers between ticks.
 
+use crate::blackbox::Place;
 use crate::control::preload_loop::PreloadLoopState;
 use crate::control::profile::ProfileState;
 use crate::control::speed_loop::SpeedLoopState;
@@ -34,6 +35,11 @@ pub struct State {
     /// That origin is a guess: the next step found tells where the wheel is, and until
     /// then the drive goes as if the step came at once.
     pub(super) searching: bool,
+    /// Where a record has the wheel, until the odometry has an origin.
+    pub(super) kept: Option<Place>,
+    /// Located without having rolled there: before the next run it is to be found out
+    /// whether the wheel stands on a corner.
+    pub(super) resumed: bool,
     pub(super) watch: WatchState,
     pub(super) stage: ContactStage,
     pub(super) vibration: Shaking,
@@ -162,6 +168,8 @@ impl Default for State {
             odometry: Odometry::default(),
             located: false,
             searching: false,
+            kept: None,
+            resumed: false,
             watch: WatchState::default(),
             stage: ContactStage::Initial,
             vibration: Shaking::default(),
@@ -195,6 +203,27 @@ impl Default for State {
 }
 
 impl State {
+    /// A start with the wheel where a record has it, if there is one.
+    #[must_use]
+    pub fn standing(kept: Option<Place>) -> Self {
+        let mut state = Self { kept, ..Self::default() };
+        if let Some(place) = kept {
+            // The wheel's travel begins with the start.
+            state.odometry.set(Travel::ZERO, place.position);
+        }
+        state
+    }
+
+    /// Whether the position is more than a guess, so that a start could go on from it.
+    #[must_use]
+    pub fn is_placed(&self) -> bool {
+        if self.located {
+            !self.searching && self.given_up == 0 && self.extra == 0
+        } else {
+            self.kept.is_some_and(|place| place.sure)
+        }
+    }
+
     /// What the drive is doing.
     #[must_use]
     pub const fn mode(&self) -> Mode {
@@ -227,6 +256,12 @@ impl State {
     pub(super) fn critical(&self) -> bool {
         let on_corner = matches!(self.watch.contact, Contact::Both | Contact::Corner);
         on_corner && self.crossing.as_ref().is_some_and(|crossing| crossing.lift.is_none())
+    }
+
+    /// Whether the place of a corner that is felt is known: a wheel that searches has none
+    /// until it has touched one.
+    pub(super) fn knows_corner(&self) -> bool {
+        !self.searching || self.crossing.is_some()
     }
 
     /// How far a felt corner is blended in, 0 to 1: a tick towards it or away from it.
