@@ -24,9 +24,10 @@ const RUN_MS: u32 = 60_000;
 /// Most motion from the reset to the command, mm: what the wheel runs on when its motor
 /// loses its power.
 const MOTION_MM: f64 = 0.5;
-/// Most motion from being caught to the watchdog's reset, mm: as long as the tick is not
-/// what hangs, the run goes on under control until the bridges are cut.
-const HUNG_MM: f64 = 4.0;
+/// Longest time from being caught to the cut of the bridges, s: as long as the tick is not
+/// what hangs, the run goes on under control until a task has been missed for 50 ms, and 80 ms
+/// more until the system timer finds the watchdog unfed.
+const HUNG_S: f64 = 0.131;
 /// Most change of the preload meanwhile, of what it was: the rubber relaxes, the gears hold.
 const PRELOAD_PART: f64 = 0.25;
 /// And whatever it was, N.
@@ -371,7 +372,8 @@ impl Case {
         };
         holds(!board.driven, &|| "driven without a command".to_owned());
         holds(motion_mm <= MOTION_MM, &|| format!("moved by {motion_mm:.2} mm"));
-        holds(hung_mm <= HUNG_MM, &|| format!("ran on for {hung_mm:.2} mm"));
+        let most_mm = HUNG_S * scenario.rig.drive.cruise_speed_mm_s + MOTION_MM;
+        holds(hung_mm <= most_mm, &|| format!("ran on for {hung_mm:.2} mm"));
         let allowed = PRELOAD_N.max(PRELOAD_PART * before.preload_n.abs());
         holds(preload_n <= allowed, &|| {
             format!("preload {:.1} N before, {:.1} N after", before.preload_n, truth.preload_n)

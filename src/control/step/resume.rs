@@ -18,6 +18,8 @@ const ON_CORNER: Millimetres = q16(500_000);
 const SURE_WITHIN: Millimetres = q16(500_000);
 /// The same after a drive went on that nobody watched, mm: half of what it may have gone.
 const UNSURE_WITHIN: Millimetres = q16(2_000_000);
+/// Nearer to the edge than this, the wheel stands on top of it, mm.
+const AT_EDGE: Millimetres = q16(300_000);
 /// Short of the first contact by so much, a corner is felt on the way out, mm.
 const RUN_IN: Millimetres = q16(2_000_000);
 /// Inside the edge by so much, it is felt on the way back, mm.
@@ -66,8 +68,12 @@ impl Controller {
     pub(super) fn resume(&self, state: &mut State, pass: &mut Pass<'_>, direction: Direction) {
         let steps = self.steps.len() as u8;
         let seen = self.seen(state, pass);
-        match self.ground(pass, ON_WALL) {
+        let known = if state.searching { None } else { self.corner_at(pass.position) };
+        match known.unwrap_or_else(|| self.ground(pass, ON_WALL)) {
             Ground::Corner(step) => {
+                // The drive has been off: nothing jumps if the corner's force is there at once,
+                // and without it the wheel would roll off before the speed loop has found it.
+                state.feel_at_once();
                 let from = match direction {
                     Direction::Deploy => step - 1,
                     Direction::Retract => step,
@@ -128,6 +134,14 @@ impl Controller {
         let (least, most) = (behind(position - within), behind(position + within + touch));
         let up = pass.sensed.steps_up;
         up >= least - HEIGHT_WITHIN && up <= most + HEIGHT_WITHIN
+    }
+
+    /// The corner on which a wheel at this position stands.
+    fn corner_at(&self, position: Millimetres) -> Option<Ground> {
+        let felt = self.rise.first_contact(Direction::Deploy) - RUN_IN;
+        let on = |face: &Millimetres| *face - position > AT_EDGE && *face - position < felt;
+        let step = self.steps.iter().position(on)?;
+        Some(Ground::Corner(step as u8 + 1))
     }
 
     /// What is under the wheel by its height: a wall within so much of its own, or a corner.

@@ -275,6 +275,11 @@ impl State {
         Q16::from_bits(i32::from(self.felt) << 11)
     }
 
+    /// A corner is felt from now on, without a way towards it.
+    pub(super) fn feel_at_once(&mut self) {
+        self.felt = BLEND_TICKS;
+    }
+
     /// A corner is felt.
     pub(super) fn on_corner(&self) -> bool {
         self.watch.contact != Contact::Wall
