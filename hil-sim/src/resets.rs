@@ -12,7 +12,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use crate::board::bench::BenchError;
-use crate::board::log::Strings;
+use crate::board::log::{Line, Strings};
 use crate::params::set_of;
 use crate::scenario::{Direction, Scenario};
 
@@ -58,8 +58,21 @@ pub fn case(seed: u64, index: u64) -> Case {
     }
 }
 
-/// Makes the cases with the image in `elf` and the rig of `scenario`. `done` is told of
-/// each.
+/// Who is told how a campaign goes.
+#[derive(Clone, Copy)]
+pub struct Told<'a> {
+    /// A reset has been made.
+    pub done: &'a (dyn Fn(&After) + Sync),
+    /// The board of this number has logged something, at this time since power-up, s.
+    pub line: &'a (dyn Fn(u64, f64, &Line) + Sync),
+}
+
+impl Told<'_> {
+    /// Nobody.
+    pub const NOBODY: Told<'static> = Told { done: &|_| {}, line: &|_, _, _| {} };
+}
+
+/// Makes the cases with the image in `elf` and the rig of `scenario`.
 ///
 /// The board's flash holds a stored set of the rig's parameters.
 ///
@@ -70,7 +83,7 @@ pub fn run(
     strings: &Strings,
     scenario: &Scenario,
     cases: &[Case],
-    done: &(dyn Fn(&After) + Sync),
+    told: &Told<'_>,
 ) -> Result<Vec<After>, ResetError> {
     let set = set_of("stored", &scenario.rig)?;
     let place = slots::place(&set, 7).ok_or(CompileError::Room)?;
@@ -82,9 +95,9 @@ pub fn run(
             if broken.load(Ordering::Relaxed) > 0 {
                 return Ok(None);
             }
-            let after = case.make(elf, strings, scenario, &place);
+            let after = case.make(elf, strings, scenario, &place, told.line);
             match &after {
-                Ok(after) => done(after),
+                Ok(after) => (told.done)(after),
                 Err(_) => broken.store(1, Ordering::Relaxed),
             }
             Ok(Some(after?))

@@ -61,6 +61,10 @@ pub struct Bench<'a> {
     /// The wheel's position in counts, beyond the 16 bits of a code.
     wheel: i64,
     millisecond: u64,
+    /// Cycle at which the millisecond under way is over.
+    end: u64,
+    /// Restarts after which it was set.
+    restarts: usize,
     /// What has come on the binary log's channel; none if nobody listens.
     frames: Option<Vec<u8>>,
     /// The text log as it came, if it is kept.
@@ -94,6 +98,8 @@ impl<'a> Bench<'a> {
             codes,
             wheel: 0,
             millisecond: 0,
+            end: STEP,
+            restarts: 0,
             frames: Some(Vec::new()),
             text: None,
             tampered: Tamper::of(scenario).map(Tampered::new),
@@ -123,8 +129,21 @@ impl<'a> Bench<'a> {
     }
 
     /// Cycle at which the millisecond under way is over.
-    const fn end(&self) -> u64 {
-        (self.millisecond + 1) * STEP
+    ///
+    /// The board counts its milliseconds from its start, and so does the plant: a tick always
+    /// comes a little into one. Where a restart shifted the two against one another, a tick
+    /// could meet the step of the plant, and find the wheel a whole millisecond farther or
+    /// not by a few microseconds of its own.
+    fn end(&mut self) -> u64 {
+        let restarts = self.machine.restarts();
+        if let Some((at, _)) = restarts.last()
+            && restarts.len() != self.restarts
+        {
+            self.restarts = restarts.len();
+            let since = self.machine.now().saturating_sub(*at);
+            self.end = at + (since / STEP + 1) * STEP;
+        }
+        self.end
     }
 
     /// Goes on up to the end of the millisecond or to a breakpoint, whose address is
@@ -133,7 +152,8 @@ impl<'a> Bench<'a> {
     /// # Errors
     /// As [`Bench::step`].
     pub fn run_to_break(&mut self) -> Result<Option<u32>, BenchError> {
-        Ok(self.machine.run_until(self.end())?)
+        let end = self.end();
+        Ok(self.machine.run_until(end)?)
     }
 
     /// Goes on by one instruction.
@@ -141,12 +161,13 @@ impl<'a> Bench<'a> {
     /// # Errors
     /// As [`Bench::step`].
     pub fn step_instruction(&mut self) -> Result<(), BenchError> {
-        Ok(self.machine.step(self.end())?)
+        let end = self.end();
+        Ok(self.machine.step(end)?)
     }
 
     /// Whether the millisecond is over and has to be closed.
     #[must_use]
-    pub fn is_due(&self) -> bool {
+    pub fn is_due(&mut self) -> bool {
         self.machine.now() >= self.end()
     }
 
@@ -156,6 +177,7 @@ impl<'a> Bench<'a> {
     /// As [`Bench::step`].
     pub fn close(&mut self) -> Result<(Passed, Vec<Line>), BenchError> {
         self.millisecond += 1;
+        self.end = self.end() + STEP;
         let now = self.machine.now();
         let [drive, preload] = self.machine.chip_mut().take_motors(now);
         let on = |motor: Motor| motor.enabled > 0.5;

@@ -27,6 +27,10 @@ pub(super) struct Args {
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 
+    /// Shows the log of each board on stderr.
+    #[arg(long)]
+    log: bool,
+
     /// Prints the outcome as one JSON object.
     #[arg(long)]
     json: bool,
@@ -59,7 +63,13 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
             }
             bar.advance(1);
         };
-        resets::run(&elf, &strings, &scenario, &cases, &done).map_err(Failure::run)?
+        let show = |index: u64, t_s: f64, line: &crate::board::log::Line| {
+            if args.log {
+                bar.line(&format!("{index} [{t_s:8.3}] {:<5} {}", line.level, line.text));
+            }
+        };
+        let told = resets::Told { done: &done, line: &show };
+        resets::run(&elf, &strings, &scenario, &cases, &told).map_err(Failure::run)?
     };
     let outcome = resets::Outcome::of(&all);
     output::result(args.json, &outcome, || human(&outcome))?;

@@ -27,6 +27,9 @@ use twin::Twin;
 const LONGEST_S: f64 = 60.0;
 /// How long a run is watched after its end, s.
 const AFTER_S: f64 = 1.0;
+/// How long an interrupt asks without end, s: longer than the watchdog waits, and not for
+/// ever, or the board would not come up again to tell.
+const STORM_S: f64 = 0.25;
 /// How long commands come at random, s.
 const COMMANDS_S: f64 = 1.0;
 
@@ -134,7 +137,11 @@ impl Case {
                 let magnitude = Self::magnitude(entry, instant);
                 let mut fault = Injection::at(entry.target, entry.kind, at_s, magnitude);
                 // Who presses buttons at random stops doing so some time.
-                fault.duration_s = (entry.target == Target::Commands).then_some(COMMANDS_S);
+                fault.duration_s = match entry.target {
+                    Target::Commands => Some(COMMANDS_S),
+                    Target::Interrupt => Some(STORM_S),
+                    _ => None,
+                };
                 scenario.run.faults = vec![fault];
             }
             Self::Step(fault) => {

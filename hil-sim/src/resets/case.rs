@@ -224,6 +224,8 @@ struct Under<'a> {
     fault: Option<u16>,
     /// Something was driven.
     driven: bool,
+    /// Who sees the log.
+    show: &'a dyn Fn(f64, &Line),
 }
 
 impl Under<'_> {
@@ -239,6 +241,7 @@ impl Under<'_> {
         self.driven |= drives.drive_on && drives.drive != 0.0;
         self.driven |= drives.preload_on && drives.preload != 0.0;
         for line in lines {
+            (self.show)(self.bench.time_s(), line);
             if let Some(mode) = line.behind("mode: ") {
                 mode.clone_into(&mut self.mode);
             }
@@ -320,7 +323,7 @@ const fn other(way: Direction) -> Direction {
 const POSITION_UNKNOWN: u16 = interstage::supervise::Fault::PositionUnknown.code();
 
 impl Case {
-    /// Makes it; `place` is what the flash holds of parameters.
+    /// Makes it; `place` is what the flash holds of parameters, `watch` sees the log.
     ///
     /// # Errors
     /// [`ResetError`] if the engine or the plant fails.
@@ -330,6 +333,7 @@ impl Case {
         strings: &Strings,
         scenario: &Scenario,
         place: &[u8],
+        watch: &(dyn Fn(u64, f64, &Line) + Sync),
     ) -> Result<After, ResetError> {
         let mut scenario = scenario.clone();
         scenario.run.seed = self.seed;
@@ -338,7 +342,9 @@ impl Case {
         let mut bench =
             Bench::new(elf, strings, &scenario).map_err(crate::board::bench::BenchError::from)?;
         bench.machine_mut().poke(PLACES, place).map_err(crate::board::bench::BenchError::from)?;
-        let mut board = Under { bench, mode: String::new(), fault: None, driven: false };
+        let show = |t_s: f64, line: &Line| watch(self.index, t_s, line);
+        let mut board =
+            Under { bench, mode: String::new(), fault: None, driven: false, show: &show };
         let mut wrong = Vec::new();
         self.lead_up(&mut board, &mut wrong)?;
         let mode = board.mode.clone();
