@@ -95,9 +95,7 @@ pub trait Watchdog {
 
     /// Keeps what the drive does in this tick where a restart finds it. A board without
     /// such a place keeps nothing.
-    fn keep(&mut self, flight: &Flight) {
-        let _ = flight;
-    }
+    fn keep(&mut self, flight: &Flight);
 
     /// Where the wheel stands by what was kept before this start, if that tells.
     fn place(&self) -> Option<Place> {

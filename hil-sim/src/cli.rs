@@ -10,6 +10,7 @@ mod bench;
 mod capture;
 mod compare;
 mod constants;
+mod coverage;
 mod crossing;
 mod deploy;
 mod docs;
@@ -71,6 +72,7 @@ enum Verb {
     Resets(resets::Args),
     Size(size::Args),
     Panics(panics::Args),
+    Coverage(coverage::Args),
     Account(account::Args),
     Constants(constants::Args),
     Docs(docs::Args),
@@ -99,6 +101,7 @@ impl Verb {
             Self::Resets(args) => resets::run(args),
             Self::Size(args) => size::run(args),
             Self::Panics(args) => panics::run(args),
+            Self::Coverage(args) => coverage::run(args),
             Self::Account(args) => account::run(args),
             Self::Constants(args) => constants::run(args),
             Self::Docs(args) => docs::run(args),

@@ -8,6 +8,7 @@ pub mod capture;
 pub mod cli;
 pub mod compare;
 pub mod constants;
+pub mod coverage;
 pub mod docs;
 pub mod export;
 pub mod faults;

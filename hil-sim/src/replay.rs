@@ -157,6 +157,17 @@ impl Replay<'_> {
         self.request.map(|request| self.planner.plan(&request))
     }
 
+    /// The plan that the log has for this tick, and the planner's own answer to the
+    /// request that it answers; none if one of them is not in the log, or there are two of
+    /// this number, as after a restart.
+    fn planned(&self, tick: u32) -> Option<(Plan, Plan)> {
+        let (_, recorded) = self.run.plans.iter().find(|(at, _)| *at == tick)?;
+        let all = self.run.requests.iter().map(|(_, request)| request);
+        let mut asked = all.filter(|request| request.sequence == recorded.sequence);
+        let request = asked.next().filter(|_| asked.next().is_none())?;
+        Some((*recorded, self.planner.plan(request)))
+    }
+
     fn compare(&mut self, row: &Row, input: &Input, output: &Output) -> Option<Difference> {
         let differs = |stage, quantity, recorded: String, replayed: String| Difference {
             tick: row.tick,
@@ -173,6 +184,12 @@ impl Replay<'_> {
             let numbers = format!("mode {}, stage {}", row.mode, row.stage);
             return Some(differs("log", "mode and stage", numbers, "a meaning".to_owned()));
         };
+        if let Some((recorded, replayed)) = self.planned(row.tick)
+            && recorded != replayed
+        {
+            let (recorded, replayed) = (format!("{recorded:?}"), format!("{replayed:?}"));
+            return Some(differs("planner", "plan", recorded, replayed));
+        }
         for Quantity { stage, name, of } in QUANTITIES {
             let (recorded, replayed) = (of(&seen), of(&output.telemetry));
             if recorded != replayed {
@@ -303,6 +320,16 @@ mod tests {
         let result = replay(&rows, &Rig::prototype()).unwrap();
         assert!(result.is_equal(), "{result:?}");
         assert_eq!(result.plans, (0, replay(&run, &Rig::prototype()).unwrap().plans.0));
+    }
+
+    #[test]
+    fn a_plan_that_the_planner_does_not_make_is_found() {
+        let mut run = Run::of_stream(stream());
+        let (tick, plan) = &mut run.plans[1];
+        plan.gap += interstage::units::Q16::from_bits(1);
+        let tick = *tick;
+        let difference = replay(&run, &Rig::prototype()).unwrap().difference.expect("different");
+        assert_eq!((difference.tick, difference.stage), (tick, "planner"));
     }
 
     #[test]

@@ -23,6 +23,7 @@ use hil_sim::plant::rig::{Drives, VirtualRig};
 use hil_sim::plant::sensors::{Codes, Sensors};
 use hil_sim::scenario::{Direction, Scenario};
 use hil_sim::sil;
+use interstage::blackbox::Flight;
 use interstage::control::Controller;
 use interstage::hal::{
     AnalogInput, AngleBus, CommandSource, Indicator, Journal, Light, MotorCommand, Motors,
@@ -115,6 +116,8 @@ impl Watchdog for Peripheral {
     fn feed(&mut self) {
         self.0.fed.borrow_mut().push(Instant::now().as_millis());
     }
+
+    fn keep(&mut self, _: &Flight) {}
 }
 
 impl Journal for Peripheral {

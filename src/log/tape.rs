@@ -170,7 +170,7 @@ mod tests {
         fn what_is_not_lost_comes_out_in_its_order(
             steps in prop::collection::vec((0..30_u32, 0..30_usize), 1..20),
         ) {
-            let tape = Tape::new();
+            let tape = Tape::default();
             let (mut written, mut expected, mut lost) = (0, 0, 0);
             for (keeps, takes) in steps {
                 for _ in 0..keeps {

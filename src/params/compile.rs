@@ -69,6 +69,14 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_set_in_the_image_is_the_prototypes() {
+        let mut room = [0; MAX_SET];
+        let length = compile("prototype", &Rig::prototype(), &mut room).unwrap();
+        let carried = &include_bytes!("prototype.set")[..];
+        assert!(room[..length] == *carried, "stale: `cargo rig constants --set` writes it anew");
+    }
+
+    #[test]
     fn what_cannot_be_is_named() {
         let mut room = [0; MAX_SET];
         let rig = Rig::prototype();

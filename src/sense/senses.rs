@@ -157,12 +157,6 @@ impl Senses {
             level: state.level.unwrap_or(0),
         }
     }
-
-    /// Geometry of the arm.
-    #[must_use]
-    pub const fn arm(&self) -> &Arm {
-        &self.arm
-    }
 }
 
 impl SensesState {

@@ -91,9 +91,8 @@ impl Controller {
     fn lifted(&self, state: &mut State, pass: &mut Pass<'_>, direction: Direction, lift: Lift) {
         let Some(mut open) = state.crossing else { return };
         let table = self.step_position(open.step);
-        // Seen from its middle on, a crossing tells nothing of where its face is.
         let seen = pass.position + lift.distance;
-        let face = if open.turned { table.unwrap_or(seen) } else { seen };
+        let face = if open.resumed { table.unwrap_or(seen) } else { seen };
         let residual = table.map_or(Q16::ZERO, |table| face - table);
         open.lift = Some(LiftPoint {
             at: pass.now,

@@ -82,6 +82,7 @@ impl Controller {
                 state.next_step = step;
                 state.crossing = Some(OpenCrossing {
                     turned: true,
+                    resumed: true,
                     ..OpenCrossing::begin(step, direction, false, pass.now)
                 });
                 self.watch.begin_between(&mut state.watch, direction, from, &seen);

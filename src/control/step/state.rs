@@ -109,6 +109,8 @@ pub(super) struct OpenCrossing {
     pub expected: bool,
     /// The wheel turned back on this very corner: its first half is not seen.
     pub turned: bool,
+    /// The wheel stood on it when the board started: where its face is, was not seen.
+    pub resumed: bool,
     /// That it was not where the table has it has been reported.
     pub told: bool,
     pub touched_at: Tick,
@@ -130,6 +132,7 @@ impl OpenCrossing {
             direction,
             expected,
             turned: false,
+            resumed: false,
             told: false,
             touched_at: now,
             from: None,

@@ -1,0 +1,64 @@
+//! What the controller says of itself in words: each thing a sentence, no two the same.
+
+use std::collections::HashSet;
+use std::fmt::Debug;
+
+use interstage::params::service::Refusal;
+use interstage::params::{SCHEMA, SetError};
+use interstage::supervise::{Fault, Limit};
+use interstage::units::Q16;
+
+fn differ<T: Copy + Debug>(all: &[T], say: impl Fn(T) -> &'static str) {
+    let mut said = HashSet::new();
+    for one in all {
+        let text = say(*one);
+        assert!(text.len() > 6 && text.starts_with(char::is_lowercase), "{one:?}: {text}");
+        assert!(!text.ends_with('.') && said.insert(text), "{one:?}: {text}");
+    }
+}
+
+#[test]
+fn faults_and_limits() {
+    differ(&Fault::ALL, Fault::sentence);
+    differ(&Limit::ALL, Limit::sentence);
+    for (done, ends) in Limit::ALL.map(Limit::account) {
+        assert!(done.len() > 6 && ends.len() > 6 && done != ends, "{done}, {ends}");
+    }
+    let everything =
+        Fault::ALL.map(Fault::sentence).into_iter().chain(Limit::ALL.map(Limit::sentence));
+    assert_eq!(everything.collect::<HashSet<_>>().len(), Fault::ALL.len() + Limit::ALL.len());
+}
+
+#[test]
+fn refusals() {
+    use Refusal::{Damaged, Flash, Length, Moving, NoDraft, Piece, Schema};
+    differ(&[Moving, NoDraft, Length, Piece, Flash, Damaged, Schema], Refusal::sentence);
+}
+
+#[test]
+fn sets_that_cannot_be_read() {
+    let errors =
+        [SetError::Short, SetError::Damaged, SetError::Schema { found: 77 }, SetError::Content];
+    differ(&errors, SetError::sentence);
+    for error in errors {
+        assert!(error.to_string().starts_with(error.sentence()), "{error}");
+    }
+    let schema = errors[2].to_string();
+    assert!(schema.contains("77") && schema.contains(&SCHEMA.to_string()), "{schema}");
+}
+
+#[test]
+fn numbers_read_as_they_are() {
+    let value = Q16::from_num(-3.25);
+    assert_eq!(
+        (format!("{value}"), format!("{value:?}")),
+        ("-3.25".to_owned(), "-3.25".to_owned())
+    );
+    let mut changed = value;
+    changed += Q16::from_num(10);
+    assert_eq!(changed, Q16::from_num(6.75));
+    changed -= Q16::from_num(0.5);
+    assert_eq!(changed, Q16::from_num(6.25));
+    changed *= Q16::from_num(4);
+    assert_eq!(changed, Q16::from_num(25));
+}
