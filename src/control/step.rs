@@ -324,7 +324,7 @@ impl Controller {
         state.direction = direction;
         // Corners that are not felt are not fed forward: the table may be wrong. One that
         // is felt is blended in, or the drive would jump.
-        let felt = if state.knows_corner() { state.feel_corner() } else { Q16::ZERO };
+        let felt = state.feel_corner();
         let wanted = state.signed_speed();
         let (climb, drift) = if felt == Q16::ZERO {
             (Q16::ZERO, Q16::ZERO)

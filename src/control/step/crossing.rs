@@ -64,9 +64,6 @@ impl Controller {
         } else if expectation == Expectation::Ahead {
             pass.log(Event::Limit(Limit::StepEarly));
         }
-        if searching {
-            self.touched_somewhere(state, pass, direction);
-        }
         let step = if belongs { state.next_step } else { 0 };
         let expected = belongs && !searching && expectation != Expectation::Ahead;
         state.crossing = Some(OpenCrossing {

@@ -22,11 +22,6 @@ const UNSURE_WITHIN: Millimetres = q16(2_000_000);
 const AT_EDGE: Millimetres = q16(300_000);
 /// Short of the first contact by so much, a corner is felt on the way out, mm.
 const RUN_IN: Millimetres = q16(2_000_000);
-/// Inside the edge by so much, it is felt on the way back, mm.
-const DIP: Millimetres = q16(2_800_000);
-/// Difference from where a corner was felt beyond which a guess gives way to it, mm.
-const GUESS: Millimetres = q16(3_000_000);
-
 /// What is under the wheel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Ground {
@@ -103,25 +98,6 @@ impl Controller {
                 self.watch.begin(&mut state.watch, &seen);
                 state.searching &= state.next_step > 0;
             }
-        }
-    }
-
-    /// A wheel that searches has felt a corner: it stands about there, whatever was taken
-    /// for its place before. Where exactly, the lift-off tells.
-    pub(super) fn touched_somewhere(
-        &self,
-        state: &mut State,
-        pass: &mut Pass<'_>,
-        direction: Direction,
-    ) {
-        let Some(face) = self.step_position(state.next_step) else { return };
-        let about = match direction {
-            Direction::Deploy => face - self.rise.first_contact(direction) + RUN_IN,
-            Direction::Retract => face - DIP,
-        };
-        if (pass.position - about).abs() > GUESS {
-            state.odometry.set(pass.sensed.travel, about);
-            pass.position = about;
         }
     }
 

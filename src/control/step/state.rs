@@ -261,12 +261,6 @@ impl State {
         on_corner && self.crossing.as_ref().is_some_and(|crossing| crossing.lift.is_none())
     }
 
-    /// Whether the place of a corner that is felt is known: a wheel that searches has none
-    /// until it has touched one.
-    pub(super) fn knows_corner(&self) -> bool {
-        !self.searching || self.crossing.is_some()
-    }
-
     /// How far a felt corner is blended in, 0 to 1: a tick towards it or away from it.
     pub(super) fn feel_corner(&mut self) -> Ratio {
         self.felt = if self.on_corner() {

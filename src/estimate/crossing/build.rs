@@ -126,7 +126,7 @@ mod tests {
 
     #[test]
     fn begun_on_a_corner_a_step_gives_what_is_left_of_its_signs() {
-        for from in [-12.0, -9.0, -5.0, -2.0, -1.0] {
+        for from in [-12.0, -9.0, -5.0, -2.0] {
             for direction in [Direction::Deploy, Direction::Retract] {
                 let signs = roll_from(0.7, 4.0, direction, Some(from));
                 let rest = matches!(signs[..], [Sign::Lifted(_), Sign::Over, Sign::Closed { .. }]);
