@@ -119,7 +119,7 @@ impl Case {
             Kind::Gain if other => 1.0 / entry.magnitude,
             Kind::Offset | Kind::Runaway if other => -entry.magnitude,
             // Along the word, one bit, which the parity tells, or two, which it does not.
-            Kind::BitErrors => f64::from(((1 + 2 * u16::from(other)) << (instant % 14)) as u16),
+            Kind::BitErrors => f64::from((1 + 2 * u16::from(other)) << (instant % 14)),
             Kind::Stuck if entry.target.is_hardware() && !entry.unit.is_empty() => {
                 [entry.magnitude, 0.0, 12_000.0, 65_535.0][instant % 4]
             }
