@@ -10,6 +10,7 @@ pub(crate) mod blackbox;
 mod bridge;
 #[cfg(not(feature = "hil"))]
 mod button;
+mod checksum;
 pub(crate) mod config;
 mod console;
 mod flash;
@@ -32,6 +33,7 @@ pub(crate) use angle::Angle;
 pub(crate) use bridge::{Bridge, Bridges};
 #[cfg(not(feature = "hil"))]
 pub(crate) use button::Button;
+pub(crate) use checksum::Checksum;
 pub(crate) use console::Console;
 pub(crate) use flash::Pages;
 pub(crate) use guard::Guard;

@@ -41,7 +41,7 @@ mod firmware {
     use crate::board::rtt::Frames;
     use crate::board::{self, blackbox, config, guard, light, rtt};
     #[cfg(not(feature = "hil"))]
-    use crate::board::{Analog, Bridge, Ring};
+    use crate::board::{Analog, Bridge, Checksum, Ring};
     use crate::board::{Angle, Bridges, Button, Console, Guard, HostLine, Lamp, Lines};
     use crate::board::{Nucleo, Pages, Wheel};
 
@@ -58,12 +58,14 @@ mod firmware {
 
     /// Runs the control tick and the sensors, above everything that may take long.
     ///
-    /// The deadline is the next tick, 1 ms on. What can delay this executor: the
-    /// interrupts above it, which only wake tasks (time driver, two DMA channels,
-    /// button), and critical sections, of which the longest encodes one log frame,
-    /// bounded by its buffer. What can delay the tick on it: the four sensor tasks,
-    /// of which the longest exchanges two frames of 3 us. Model, log and
-    /// operator run in thread mode and are preempted, however long they take. The
+    /// The deadline is the next tick, 1 ms on. The system timer's interrupt beats it and
+    /// wakes all tasks here. What can delay this executor: that and the other interrupts
+    /// above it, which only wake tasks (time driver, two DMA channels, button), and
+    /// critical sections, of which the longest wakes a task in the queue of timers or
+    /// copies a log entry, 3 us. Those of thread mode come in the middle between two ticks
+    /// or right behind one, see [`Exchange::aside`]. What can delay the tick on it: the
+    /// four sensor tasks, of which the longest exchanges two frames of 3 us. Model, log
+    /// and operator run in thread mode and are preempted, however long they take. The
     /// tick measures its own lateness, and a whole period of it is a fault.
     static CONTROL: InterruptExecutor = InterruptExecutor::new();
 
@@ -139,7 +141,7 @@ mod firmware {
             wheel: Wheel::new(p.TIM5, p.PA0, p.PA1),
             load_cell: Analog::new((p.ADC1, pac::ADC1), p.PC2, p.DMA1_CH1, &LOAD_CELL),
             tread: Analog::new((p.ADC2, pac::ADC2), p.PC3, p.DMA1_CH2, &TREAD),
-            arm: Angle::new(p.SPI1, (p.PB3, p.PA7, p.PA6), p.PB10.into()),
+            arm: Angle::new(p.SPI1, (p.PB3, p.PA7, p.PA6), p.PB10),
             motors: Bridges {
                 drive: Bridge::new((p.TIM1, pac::TIM1), p.PA8, p.PA9.into(), p.PA10.into(), p.PB12),
                 preload: Bridge::new((p.TIM8, pac::TIM8), p.PC6, p.PC8.into(), p.PC9.into(), p.PB7),
@@ -147,7 +149,7 @@ mod firmware {
             watchdog: Guard::new(p.IWDG),
             button: Button::new(p.PC13, p.EXTI13),
             console: Console::new(console),
-            journal: Lines::new(frames),
+            journal: Lines::new(frames, Checksum::new(p.CRC)),
             light: Lamp,
         };
         (parts, p.PA5.into(), Pages::new(p.FLASH))

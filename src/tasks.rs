@@ -34,14 +34,8 @@ pub use motors::motors;
 pub use operator::operator;
 pub use sensors::{SENSOR_TIMEOUT, angle, displacement, pressure, speed};
 
-use crate::units::Tick;
-use embassy_time::{Duration, Instant};
+use embassy_time::Duration;
 
 /// How often a task that waits for something else checks in: well inside
 /// [`CHECK_IN_TICKS`], with room for a plan being worked out.
 const ROUND: Duration = Duration::from_millis(20);
-
-/// The present tick, for tasks outside the control rate.
-fn uptime() -> Tick {
-    Instant::now().as_millis() as Tick
-}

@@ -35,15 +35,14 @@ impl Recorded {
         for message in mcap::MessageStream::new(&bytes).expect(name) {
             let message = message.expect(name);
             if message.channel.topic == "/frames" {
-                run.add(message.data.into_owned());
+                run.add(&message.data);
             }
         }
         run
     }
 
-    fn add(&mut self, mut frame: Vec<u8>) {
-        assert_eq!(frame.pop(), Some(0), "a frame has its end");
-        match Frame::open(&mut frame).unwrap().body().unwrap() {
+    fn add(&mut self, frame: &[u8]) {
+        match Frame::open(frame).unwrap().body().unwrap() {
             Body::Ticks(ticks) => self.ticks.extend(ticks.map(Result::unwrap)),
             Body::Plan(at, plan) => self.plans.push((at, plan)),
             Body::Request(at, request) => self.requests.push((at, request)),
@@ -68,7 +67,7 @@ fn again(name: &str, mut judge: impl FnMut(&Recorded, &Record, &Input, &Output))
             plan: record.flags.plan().then(|| Recorded::of(&run.plans, record.at())).flatten(),
             ..record.input(&sensors)
         };
-        sensors = input.sensors.clone();
+        sensors = input.sensors;
         let output = controller.step(&mut state, &input);
         judge(&run, record, &input, &output);
     }
@@ -91,7 +90,7 @@ fn a_sensor_that_never_answers_is_named() {
         let mut said = None;
         for record in &run.ticks {
             let mut input = record.input(&sensors);
-            sensors = input.sensors.clone();
+            sensors = input.sensors;
             silence(&mut input.sensors);
             let output = controller.step(&mut state, &input);
             assert!(!output.drive.enable && !output.preload.enable, "{fault:?}");

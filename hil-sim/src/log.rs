@@ -15,7 +15,7 @@ mod run;
 pub use complete::complete;
 pub use decoder::{Decoder, Item, Mark, Tally};
 pub(crate) use file::sound;
-pub use file::{FRAMES, ReadError, timed};
+pub use file::{FRAMES, ReadError, pieces, timed};
 pub use ledger::LedgerLine;
 pub use recording::recording;
 pub use row::Row;

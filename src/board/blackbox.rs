@@ -120,14 +120,11 @@ fn say(restart: &Restart) {
     }
 }
 
-/// Time between two looks at the feeding, ms.
-const LOOK_MS: u32 = 10;
+/// Milliseconds without feeding after which nothing good is to be expected: before the
+/// watchdog bites, also with its oscillator at the fast end.
+const PATIENCE: u32 = 75;
 
-/// Looks without feeding after which nothing good is to be expected: before the watchdog
-/// bites, also with its oscillator at the fast end.
-const LOOKS: u32 = 7;
-
-/// Looks since the watchdog was fed.
+/// Milliseconds since the watchdog was fed.
 static UNFED: AtomicU32 = AtomicU32::new(0);
 
 /// The watchdog has been fed.
@@ -135,19 +132,26 @@ pub(super) fn fed() {
     UNFED.store(0, Ordering::Relaxed);
 }
 
-/// Starts looking whether the watchdog is fed.
+/// Starts looking whether the watchdog is fed, and beating: at each whole millisecond of
+/// the clock, whose timer has the same source, some tenths of a microsecond behind it.
 pub(super) fn look() {
     // SAFETY: nobody else has the system timer: the time driver runs on another one.
     let mut timer = unsafe { cortex_m::Peripherals::steal() }.SYST;
     timer.set_clock_source(SystClkSource::Core);
-    timer.set_reload(SYSCLK_HZ / 1000 * LOOK_MS - 1);
+    timer.set_reload(SYSCLK_HZ / 1000 - 1);
+    #[cfg(not(feature = "hil"))]
+    {
+        crate::EXCHANGE.expect_beat();
+        let begun = embassy_time::Instant::now().as_millis();
+        while embassy_time::Instant::now().as_millis() == begun {}
+    }
     timer.clear_current();
     timer.enable_interrupt();
     timer.enable_counter();
 }
 
 /// The system timer, of the highest priority as every interrupt that is given none, and
-/// before the others among these: passes on where the processor was.
+/// before the others among these: it beats, and passes on where the processor was.
 #[unsafe(naked)]
 #[unsafe(export_name = "SysTick")]
 unsafe extern "C" fn sys_tick() {
@@ -156,9 +160,14 @@ unsafe extern "C" fn sys_tick() {
 
 /// `frame` is where the core put its registers when the interrupt came.
 unsafe extern "C" fn look_at(frame: u32) {
-    let looks = UNFED.load(Ordering::Relaxed);
-    UNFED.store(looks + 1, Ordering::Relaxed);
-    if looks < LOOKS {
+    // With the host in the loop it is the host's time that beats.
+    #[cfg(not(feature = "hil"))]
+    if crate::EXCHANGE.beat() {
+        super::angle::begin();
+    }
+    let unfed = UNFED.load(Ordering::Relaxed);
+    UNFED.store(unfed + 1, Ordering::Relaxed);
+    if unfed < PATIENCE {
         return;
     }
     guard::cut();

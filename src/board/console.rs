@@ -5,6 +5,8 @@ use interstage::hal::CommandSource;
 use interstage::supervise::Command;
 use rtt_target::DownChannel;
 
+use crate::EXCHANGE;
+
 /// The probe writes into memory without telling the core: look this often.
 const POLL: Duration = Duration::from_millis(20);
 
@@ -23,7 +25,7 @@ impl CommandSource for Console {
         loop {
             let mut letter = [0];
             if self.0.read(&mut letter) == 0 {
-                Timer::after(POLL).await;
+                Timer::at(EXCHANGE.aside(POLL)).await;
             } else if let Some(command) = decode(letter[0]) {
                 return command;
             }

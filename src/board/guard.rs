@@ -53,8 +53,12 @@ pub(crate) fn arm() {
     // A locked-up core (a fault inside the fault handler, as after a stack
     // overflow) executes nothing any more: the timers cut the bridges themselves.
     pac::SYSCFG.cfgr2().modify(|w| w.set_cll(true));
-    // Halted at a breakpoint, TIM1 and TIM8 stop with their outputs off.
-    pac::DBGMCU.apb1lfzr().modify(|w| w.set_iwdg(true));
+    // Halted at a breakpoint, TIM1 and TIM8 stop with their outputs off; and the clock
+    // stops with the system timer, which beats its milliseconds.
+    pac::DBGMCU.apb1lfzr().modify(|w| {
+        w.set_iwdg(true);
+        w.set_tim2(true);
+    });
     pac::DBGMCU.apb2fzr().modify(|w| {
         w.set_tim1(true);
         w.set_tim8(true);

@@ -5,11 +5,14 @@
 //! So the log has a logger of its own here: it gathers a frame, puts the channel
 //! back to skipping, and writes the frame whole or not at all. What is lost is
 //! counted.
+//!
+//! It shuts out no interrupt meanwhile: a line of many numbers takes as long as half a
+//! control tick, which would begin that much later. All lines come from thread mode; one
+//! of an interrupt that finds another under way is lost, and counted.
 
 use core::cell::UnsafeCell;
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
-use critical_section::RestoreState;
 use defmt::Encoder;
 use rtt_target::{ChannelMode, DownChannel, UpChannel, rtt_init};
 
@@ -29,12 +32,15 @@ pub(crate) struct Channels {
 }
 
 /// Sets up the channels; the log works from here on. Call once, first of all.
+///
+/// The binary log's buffer lies where all else is whole words, and so on a whole word, like
+/// the frames: copied word by word they cost a third.
 #[cfg(not(feature = "hil"))]
 pub(crate) fn init() -> Channels {
     let channels = rtt_init! {
         up: {
             0: { size: 2048, mode: ChannelMode::NoBlockSkip, name: "defmt" }
-            1: { size: 4096, mode: ChannelMode::NoBlockSkip, name: "telemetry" }
+            1: { size: 4096, mode: ChannelMode::NoBlockSkip, name: "telemetry", section: ".uninit.telemetry" }
             2: { size: 128, mode: ChannelMode::NoBlockSkip, name: "line" }
         }
         down: {
@@ -56,7 +62,7 @@ pub(crate) fn init() -> (Channels, (UpChannel, DownChannel)) {
     let channels = rtt_init! {
         up: {
             0: { size: 2048, mode: ChannelMode::NoBlockSkip, name: "defmt" }
-            1: { size: 4096, mode: ChannelMode::NoBlockSkip, name: "telemetry" }
+            1: { size: 4096, mode: ChannelMode::NoBlockSkip, name: "telemetry", section: ".uninit.telemetry" }
             2: { size: 128, mode: ChannelMode::NoBlockSkip, name: "line" }
             3: { size: 64, mode: ChannelMode::NoBlockSkip, name: "hil" }
         }
@@ -76,8 +82,8 @@ pub(crate) fn init() -> (Channels, (UpChannel, DownChannel)) {
 }
 
 fn log_to(channel: UpChannel) {
-    // SAFETY: in the critical section no frame is open, so nobody else holds the state.
-    critical_section::with(|_| unsafe { (*STATE.0.get()).channel = Some(channel) });
+    // SAFETY: nothing has been logged yet, so nobody else holds the state.
+    unsafe { (*STATE.0.get()).channel = Some(channel) };
 }
 
 /// The binary log's channel.
@@ -104,7 +110,6 @@ struct State {
     bytes: [u8; FRAME],
     length: usize,
     cut: bool,
-    restore: RestoreState,
 }
 
 impl State {
@@ -125,15 +130,15 @@ impl State {
         channel.set_mode(ChannelMode::NoBlockSkip);
         let frame = self.bytes.get(..self.length).unwrap_or_default();
         if self.cut || channel.write(frame) < self.length {
-            LOST.store(lost().wrapping_add(1), Ordering::Relaxed);
+            LOST.fetch_add(1, Ordering::Relaxed);
         }
     }
 }
 
 struct Shared(UnsafeCell<State>);
 
-// SAFETY: touched only between `acquire` and `release` of the logger and in
-// `init`, always inside a critical section; this chip has one core.
+// SAFETY: touched only in `init`, before anything is logged, and by who has found `OPEN`
+// false and made it true, until that makes it false again; this chip has one core.
 unsafe impl Sync for Shared {}
 
 static STATE: Shared = Shared(UnsafeCell::new(State {
@@ -142,24 +147,29 @@ static STATE: Shared = Shared(UnsafeCell::new(State {
     bytes: [0; FRAME],
     length: 0,
     cut: false,
-    restore: RestoreState::invalid(),
 }));
+
+/// A frame is under way.
+static OPEN: AtomicBool = AtomicBool::new(false);
+
+/// Frames that have begun meanwhile, in interrupts, and have not ended.
+static NESTED: AtomicU32 = AtomicU32::new(0);
 
 #[defmt::global_logger]
 struct Logger;
 
-// SAFETY: `acquire` opens a critical section that `release` closes, so the
-// methods in between have the state to themselves.
+// SAFETY: `acquire` either has the state to itself until `release`, or gives the frame up
+// and what it writes is left out. An interrupt that logs has ended its frame when the one
+// that it interrupted goes on.
 unsafe impl defmt::Logger for Logger {
     fn acquire() {
-        // SAFETY: paired with `release`. A frame that is open already was broken
-        // off by a panic and is never released: it is given up.
-        let state = unsafe {
-            let restore = critical_section::acquire();
-            let state = &mut *STATE.0.get();
-            state.restore = restore;
-            state
-        };
+        if OPEN.swap(true, Ordering::Acquire) {
+            NESTED.fetch_add(1, Ordering::Relaxed);
+            LOST.fetch_add(1, Ordering::Relaxed);
+            return;
+        }
+        // SAFETY: nobody else has found it free.
+        let state = unsafe { &mut *STATE.0.get() };
         state.length = 0;
         state.cut = false;
         state.encode(|encoder, out| encoder.start_frame(out));
@@ -170,19 +180,24 @@ unsafe impl defmt::Logger for Logger {
     }
 
     unsafe fn write(bytes: &[u8]) {
-        // SAFETY: between `acquire` and `release`.
+        if NESTED.load(Ordering::Relaxed) > 0 {
+            return;
+        }
+        // SAFETY: between `acquire` and `release` of the frame that has it.
         let state = unsafe { &mut *STATE.0.get() };
         state.encode(|encoder, out| encoder.write(bytes, out));
     }
 
     unsafe fn release() {
-        // SAFETY: paired with `acquire`; the state is let go before the section ends.
-        unsafe {
-            let state = &mut *STATE.0.get();
-            state.encode(|encoder, out| encoder.end_frame(out));
-            state.send();
-            let restore = state.restore;
-            critical_section::release(restore);
+        let nested = NESTED.load(Ordering::Relaxed);
+        if nested > 0 {
+            NESTED.store(nested - 1, Ordering::Relaxed);
+            return;
         }
+        // SAFETY: as in `write`; let go before the next can have it.
+        let state = unsafe { &mut *STATE.0.get() };
+        state.encode(|encoder, out| encoder.end_frame(out));
+        state.send();
+        OPEN.store(false, Ordering::Release);
     }
 }

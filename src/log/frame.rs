@@ -1,14 +1,17 @@
 //! A frame of the binary log: how it lies on the channel.
 //!
 //! ```text
-//! COBS( kind | sequence | dropped | body | CRC-32, little end first ) 00
+//! sync | length | kind | 0 | sequence | dropped | body, zeros to a whole word | CRC-32
+//!    4 |      2 |    1 | 1 |        4 |       4 |                   length .. |      4
 //! ```
-//! Numbers and body are postcard. A zero ends a frame and occurs nowhere else, so that a
-//! reader that comes late or meets garbage is in step again at the next zero. Every frame
-//! stands for itself: the loss of one takes nothing from the others. The sequence counts
-//! frames since boot, those that found no room too; `dropped` counts these.
+//! Numbers have their little end first; the check is over all between sync and itself.
+//! Everything stands on whole words, so that the core copies words and its CRC unit takes
+//! them; stuffing bytes would cost several times all the rest. A reader that comes late or
+//! meets garbage looks for the next sync with a sound frame behind it: a sync in the middle
+//! of other content is told by the check. Every frame stands for itself: the loss of one
+//! takes nothing from the others. The sequence counts frames since boot, those that found
+//! no room too; `dropped` counts these.
 
-use cobs::CobsEncoder;
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use serde::Deserialize;
 
@@ -17,17 +20,38 @@ use super::entry::Entry;
 use super::identity::Identity;
 use super::ledger::Line;
 use super::record::Record;
-use super::wire::{self, Wire};
+use super::wire::Wire;
 use crate::model::{Plan, PlanRequest};
 use crate::units::Tick;
 
-/// Longest frame on the channel with its end, bytes.
+/// Longest frame on the channel, bytes.
 pub const LONGEST: usize = 512;
+
+/// Longest body, bytes.
+pub const BODY: usize = LONGEST - HEAD - CHECK;
+
+/// First bytes of a frame.
+const SYNC: [u8; 4] = [0xE7, 0x1C, 0xB2, 0x5D];
+
+/// Bytes up to the body.
+const HEAD: usize = 16;
 
 /// Bytes of the check.
 const CHECK: usize = 4;
 
+const _: () = assert!(BODY.is_multiple_of(4) && HEAD.is_multiple_of(4));
+
 static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
+
+/// What sums up a frame: [`check`], or hardware that gives the same. It is given whole words
+/// from whole words on.
+pub type Checker = fn(&[u8]) -> u32;
+
+/// The check of these bytes.
+#[must_use]
+pub fn check(bytes: &[u8]) -> u32 {
+    CRC.checksum(bytes)
+}
 
 /// What a frame holds, as a number that stays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,44 +97,57 @@ pub struct Head {
     pub dropped: u32,
 }
 
-/// Longest body, bytes. With head, check, stuffing and end it just fits into a frame.
-pub const BODY: usize = LONGEST - HEAD - CHECK - STUFFING - 1;
+/// Room for a frame.
+#[derive(Debug)]
+#[repr(align(4))]
+pub struct Page([u8; LONGEST]);
 
-/// Longest head: kind, sequence, dropped.
-const HEAD: usize = 1 + 5 + 5;
-
-/// What COBS adds at most: a byte, and one for every 254.
-const STUFFING: usize = 1 + LONGEST / 254;
-
-/// Writes a frame into `bytes` and returns it with the zero that ends it; of a body longer
-/// than [`BODY`], only so much.
-pub fn write<'a>(bytes: &'a mut [u8; LONGEST], head: Head, body: &[u8]) -> &'a [u8] {
-    let body = &body[..body.len().min(BODY)];
-    let mut start = [0; HEAD];
-    let start = match postcard::to_slice(&(head.kind, head.sequence, head.dropped), &mut start) {
-        Ok(start) => &*start,
-        // It has room for the largest.
-        Err(_) => &[],
-    };
-    let mut digest = CRC.digest();
-    let mut cobs = CobsEncoder::new(&mut bytes[..LONGEST - 1]);
-    for part in [start, body] {
-        digest.update(part);
-        // There is room, see [`BODY`].
-        let _ = cobs.push(part);
+impl Page {
+    /// An empty page.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self([0; LONGEST])
     }
-    let _ = cobs.push(&digest.finalize().to_le_bytes());
-    let length = cobs.finalize();
-    bytes[length] = 0;
-    &bytes[..=length]
+
+    /// Makes it the frame whose body `fill` writes, so many bytes of it, and returns that.
+    #[inline]
+    pub fn write(
+        &mut self,
+        head: Head,
+        check: Checker,
+        fill: impl FnOnce(&mut [u8; BODY]) -> usize,
+    ) -> &[u8] {
+        let Some((start, rest)) = self.0.split_first_chunk_mut::<HEAD>() else { return &[] };
+        let Some(body) = rest.first_chunk_mut::<BODY>() else { return &[] };
+        let length = fill(body).min(BODY);
+        let whole = length.next_multiple_of(4);
+        body[length..whole].fill(0);
+        let [a, b] = (length as u16).to_le_bytes();
+        start[..4].copy_from_slice(&SYNC);
+        start[4..8].copy_from_slice(&[a, b, head.kind, 0]);
+        start[8..12].copy_from_slice(&head.sequence.to_le_bytes());
+        start[12..].copy_from_slice(&head.dropped.to_le_bytes());
+        let end = HEAD + whole;
+        let sum = check(&self.0[SYNC.len()..end]);
+        if let Some(place) = self.0[end..].first_chunk_mut() {
+            *place = sum.to_le_bytes();
+        }
+        &self.0[..end + CHECK]
+    }
+}
+
+impl Default for Page {
+    fn default() -> Self {
+        Self::new()
+    }
 }
 
 /// Why bytes are not a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameError {
-    /// Not what COBS makes of anything.
-    Stuffing,
-    /// The check does not fit, or the bytes are too few for one.
+    /// It does not begin as one, or has another length.
+    Form,
+    /// The check does not fit.
     Check,
     /// The check fits and the content does not: not written by this program.
     Content,
@@ -145,20 +182,57 @@ pub enum Body<'a> {
     Unknown,
 }
 
+/// What stands at the beginning of bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Seen<'a> {
+    /// A frame, and its length with all that belongs to it.
+    Frame(Frame<'a>, usize),
+    /// The beginning of a frame, or of what looks like one: more has to come.
+    Part,
+    /// So many bytes that are no frame, one at least.
+    Garbage(usize),
+}
+
+/// Looks at the beginning of bytes.
+#[must_use]
+pub fn look(bytes: &[u8]) -> Seen<'_> {
+    let begins = |at: &usize| {
+        let seen = &bytes[*at..bytes.len().min(at + SYNC.len())];
+        SYNC.starts_with(seen)
+    };
+    match (0..bytes.len()).find(begins) {
+        Some(0) => {}
+        Some(garbage) => return Seen::Garbage(garbage),
+        None if bytes.is_empty() => return Seen::Part,
+        None => return Seen::Garbage(bytes.len()),
+    }
+    let Some((start, rest)) = bytes.split_first_chunk::<HEAD>() else { return Seen::Part };
+    let &[_, _, _, _, a, b, kind, zero, ..] = start;
+    let length = usize::from(u16::from_le_bytes([a, b]));
+    if length > BODY || zero != 0 {
+        return Seen::Garbage(1);
+    }
+    let word = |at: usize| start[at..].first_chunk().map_or(0, |word| u32::from_le_bytes(*word));
+    let end = HEAD + length.next_multiple_of(4);
+    let Some(sum) = bytes.get(end..end + CHECK) else { return Seen::Part };
+    if check(&bytes[SYNC.len()..end]).to_le_bytes() != sum {
+        return Seen::Garbage(1);
+    }
+    let head = Head { kind, sequence: word(8), dropped: word(12) };
+    Seen::Frame(Frame { head, body: &rest[..length] }, end + CHECK)
+}
+
 impl<'a> Frame<'a> {
-    /// Opens what stands between two zeros, in place.
+    /// Opens bytes that are one frame.
     ///
     /// # Errors
     /// [`FrameError`] for anything but a whole frame.
-    pub fn open(bytes: &'a mut [u8]) -> Result<Self, FrameError> {
-        let length = cobs::decode_in_place(bytes).map_err(|_| FrameError::Stuffing)?;
-        let whole = bytes.get(..length).ok_or(FrameError::Stuffing)?;
-        let (content, sum) = whole.split_last_chunk::<CHECK>().ok_or(FrameError::Check)?;
-        if CRC.checksum(content) != u32::from_le_bytes(*sum) {
-            return Err(FrameError::Check);
+    pub fn open(bytes: &'a [u8]) -> Result<Self, FrameError> {
+        match look(bytes) {
+            Seen::Frame(frame, length) if length == bytes.len() => Ok(frame),
+            Seen::Garbage(1) => Err(FrameError::Check),
+            _ => Err(FrameError::Form),
         }
-        let ((kind, sequence, dropped), body) = take(content)?;
-        Ok(Self { head: Head { kind, sequence, dropped }, body })
     }
 
     /// Reads the body.
@@ -206,27 +280,26 @@ impl Iterator for Ticks<'_> {
         if self.rest.is_empty() {
             return None;
         }
-        let read = take::<Wire>(self.rest).and_then(|(difference, rest)| {
-            let wire = difference.after(&self.before);
-            let record = wire.record().ok_or(FrameError::Content)?;
+        let read = Wire::take(&self.before, self.rest).and_then(|(wire, rest)| {
+            let record = wire.record()?;
             (self.before, self.rest) = (wire, rest);
-            Ok(record)
+            Some(record)
         });
-        if read.is_err() {
+        if read.is_none() {
             self.rest = &[];
         }
-        Some(read)
+        Some(read.ok_or(FrameError::Content))
     }
 }
 
-/// Makes a body of ticks until it is full or there are none; its length.
-pub(super) fn put_ticks(body: &mut [u8; BODY], mut next: impl FnMut() -> Option<Record>) -> usize {
-    let (mut before, mut length) = (Wire::default(), 0);
-    while let Some(room) = body.get_mut(length..length + wire::LONGEST) {
-        let Some(record) = next() else { break };
-        let wire = Wire::of(&record);
-        length += wire.since(&before).put(room);
-        before = wire;
+/// Makes a body of ticks until it is full or `next` has none; its length.
+#[inline]
+pub(super) fn put_ticks(body: &mut [u8; BODY], mut next: impl FnMut(&mut Record) -> bool) -> usize {
+    let (mut record, mut before, mut length) = (Record::EMPTY, Wire::default(), 0);
+    while let Some(room) = body.get_mut(length..).and_then(|rest| rest.first_chunk_mut())
+        && next(&mut record)
+    {
+        length += Wire::of(&record).put(&mut before, room);
     }
     length
 }
@@ -241,27 +314,54 @@ mod tests {
         Head { kind: kind as u8, sequence, dropped: sequence / 3 }
     }
 
+    /// A frame of these records, as many as fit, and how many that were.
+    fn frame(records: &[Record], sequence: u32) -> (Vec<u8>, usize) {
+        let (mut left, mut put) = (records.iter().copied(), 0);
+        let mut page = Page::new();
+        let frame = page.write(head(Kind::Ticks, sequence), check, |body| {
+            put_ticks(body, |record| {
+                let next = left.next();
+                put += usize::from(next.is_some());
+                *record = next.unwrap_or(*record);
+                next.is_some()
+            })
+        });
+        (frame.to_vec(), put)
+    }
+
+    /// Frames found one after the other in bytes, and how many bytes are none.
+    fn read(mut bytes: &[u8]) -> (Vec<Head>, usize) {
+        let (mut heads, mut garbage) = (Vec::new(), 0);
+        loop {
+            let used = match look(bytes) {
+                Seen::Frame(frame, length) => {
+                    heads.push(frame.head);
+                    length
+                }
+                Seen::Part if bytes.is_empty() => return (heads, garbage),
+                // Nothing more comes.
+                Seen::Part => {
+                    garbage += 1;
+                    1
+                }
+                Seen::Garbage(used) => {
+                    garbage += used;
+                    used
+                }
+            };
+            bytes = &bytes[used..];
+        }
+    }
+
     proptest! {
         #[test]
         fn ticks_come_back(
             records in prop::collection::vec(any_record(), 0..12),
             sequence in any::<u32>(),
         ) {
-            let mut bytes = [0xA5; LONGEST];
-            let mut left = records.iter().copied();
-            let mut put = 0;
-            let next = || {
-                let next = left.next();
-                put += usize::from(next.is_some());
-                next
-            };
-            let mut body = [0; BODY];
-            let used = put_ticks(&mut body, next);
-            let length = write(&mut bytes, head(Kind::Ticks, sequence), &body[..used]).len();
-            let (end, frame) = bytes[..length].split_last_mut().unwrap();
-            prop_assert_eq!(*end, 0);
-            prop_assert!(!frame.contains(&0), "a zero inside");
-            let frame = Frame::open(frame).unwrap();
+            let (bytes, put) = frame(&records, sequence);
+            prop_assert_eq!(bytes.len() % 4, 0);
+            let frame = Frame::open(&bytes).unwrap();
             prop_assert_eq!(frame.head, head(Kind::Ticks, sequence));
             let Body::Ticks(ticks) = frame.body().unwrap() else { panic!("ticks") };
             let back: Vec<Record> = ticks.map(Result::unwrap).collect();
@@ -271,21 +371,48 @@ mod tests {
 
         #[test]
         fn a_flipped_bit_is_found(record in any_record(), at in any::<prop::sample::Index>(), bit in 0..8) {
-            let mut bytes = [0; LONGEST];
-            let mut once = Some(record);
-            let mut body = [0; BODY];
-            let used = put_ticks(&mut body, || once.take());
-            let length = write(&mut bytes, head(Kind::Ticks, 9), &body[..used]).len() - 1;
-            let frame = &mut bytes[..length];
-            frame[at.index(length)] ^= 1_u8 << bit;
-            prop_assert!(Frame::open(frame).is_err());
+            let mut bytes = frame(&[record], 9).0;
+            let at = at.index(bytes.len());
+            bytes[at] ^= 1_u8 << bit;
+            prop_assert!(Frame::open(&bytes).is_err());
+        }
+
+        #[test]
+        fn frames_behind_garbage_are_found_whatever_it_is(
+            record in any_record(),
+            garbage in prop::collection::vec(prop_oneof![any::<u8>(), prop::sample::select(SYNC.to_vec())], 0..600),
+            cut in any::<prop::sample::Index>(),
+        ) {
+            let whole = [frame(&[record], 1).0, frame(&[record, record], 2).0].concat();
+            // A part of a frame too is garbage, as for a reader that comes late.
+            let part = &whole[cut.index(whole.len() / 2)..];
+            let bytes = [&garbage[..], part, &whole].concat();
+            let heads = read(&bytes).0;
+            let sequences: Vec<u32> = heads.iter().map(|head| head.sequence).collect();
+            prop_assert!(sequences.ends_with(&[1, 2]), "{sequences:?}");
+        }
+
+        #[test]
+        fn a_sync_inside_a_frame_is_content(kind in any::<u8>(), at in 0..BODY - 4, length in any::<u16>()) {
+            let mut page = Page::new();
+            let bytes = page.write(Head { kind, sequence: 5, dropped: 0 }, check, |body| {
+                body.fill(0);
+                body[at..at + 4].copy_from_slice(&SYNC);
+                if let Some(place) = body[at + 4..].first_chunk_mut() {
+                    *place = length.to_le_bytes();
+                }
+                BODY
+            });
+            prop_assert_eq!(read(bytes).0.len(), 1);
+            // Of a frame that lost its beginning nothing is made up.
+            prop_assert_eq!(read(&bytes[1..]), (vec![], bytes.len() - 1));
         }
 
         #[test]
         fn random_bytes_are_no_frame_and_no_panic(
-            mut bytes in prop::collection::vec(any::<u8>(), 0..600),
+            bytes in prop::collection::vec(any::<u8>(), 0..600),
         ) {
-            if let Ok(frame) = Frame::open(&mut bytes) {
+            if let Seen::Frame(frame, _) = look(&bytes) {
                 // A check that fits by chance.
                 let _ = frame.body();
             }
@@ -304,16 +431,20 @@ mod tests {
     }
 
     #[test]
-    fn the_longest_body_fits_whatever_it_is() {
+    fn the_longest_body_fits() {
         let most = Head { kind: u8::MAX, sequence: u32::MAX, dropped: u32::MAX };
-        for byte in [0, 1, 255] {
-            let (mut bytes, body) = ([0xA5; LONGEST], [byte; BODY + 7]);
-            let whole = write(&mut bytes, most, &body);
-            let (end, frame) = whole.split_last().unwrap();
-            assert!(*end == 0 && !frame.contains(&0));
-            let mut frame = frame.to_vec();
-            let frame = Frame::open(&mut frame).unwrap();
-            assert_eq!((frame.head, frame.body), (most, &body[..BODY]));
-        }
+        let mut page = Page::new();
+        let bytes = page.write(most, check, |body| {
+            body.fill(0xA5);
+            BODY + 7
+        });
+        assert_eq!(bytes.len(), LONGEST);
+        let frame = Frame::open(bytes).unwrap();
+        assert_eq!((frame.head, frame.body), (most, &[0xA5; BODY][..]));
+    }
+
+    #[test]
+    fn the_check_is_the_one_of_ethernet() {
+        assert_eq!(check(b"123456789"), 0xCBF4_3926);
     }
 }

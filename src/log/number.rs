@@ -2,15 +2,28 @@
 //! given a second meaning.
 
 use crate::estimate::ContactStage;
-use crate::supervise::{Command, Fault, Mode};
+use crate::supervise::{Command, Direction, Fault, Mode};
 
 /// Number of a mode: its place in [`Mode::WITHOUT_FAULT`], or the code of the fault that
-/// is held, 101 to 160.
+/// is held, 101 to 160. Called every tick, so that it does not look for that place.
 #[must_use]
-pub fn of_mode(mode: Mode) -> u8 {
-    match mode {
-        Mode::FaultHold(fault) => fault.code() as u8,
-        other => Mode::WITHOUT_FAULT.iter().position(|known| *known == other).unwrap_or(0) as u8,
+pub const fn of_mode(mode: Mode) -> u8 {
+    /// Modes that have a way.
+    const WAY: u8 = 7;
+    let (first, direction) = match mode {
+        Mode::Boot => return 0,
+        Mode::SelfTest => return 1,
+        Mode::Zero => return 2,
+        Mode::Idle => return 3,
+        Mode::Preload(direction) => (4, direction),
+        Mode::Run(direction, leg) => (5 + leg as u8, direction),
+        Mode::Stopping(direction) => (9, direction),
+        Mode::Complete(direction) => (10, direction),
+        Mode::FaultHold(fault) => return fault.code() as u8,
+    };
+    match direction {
+        Direction::Deploy => first,
+        Direction::Retract => first + WAY,
     }
 }
 
@@ -56,6 +69,8 @@ mod tests {
         for known in &all {
             assert_eq!(mode(of_mode(*known)), Some(*known));
         }
+        let places = Mode::WITHOUT_FAULT.into_iter().map(of_mode);
+        assert!(places.eq(0..Mode::WITHOUT_FAULT.len() as u8));
         let known = (0..=u8::MAX).filter(|number| mode(*number).is_some()).count();
         assert_eq!(known, all.len());
     }

@@ -2,7 +2,7 @@
 
 use super::capture::Capture;
 use super::entry::{Entry, Event};
-use super::frame::{self, BODY, Head, Kind, LONGEST, put_ticks};
+use super::frame::{Checker, Head, Kind, Page, check, put_ticks};
 use super::identity::Identity;
 use super::ledger::Ledger;
 use super::tape::Tape;
@@ -20,7 +20,8 @@ pub struct Scribe {
     dropped: u32,
     capture: Capture,
     ledger: Ledger,
-    bytes: [u8; LONGEST],
+    page: Page,
+    check: Checker,
 }
 
 impl Scribe {
@@ -34,13 +35,19 @@ impl Scribe {
             dropped: 0,
             capture: Capture::new(),
             ledger: Ledger::new(),
-            bytes: [0; LONGEST],
+            page: Page::new(),
+            check,
         }
     }
 
     /// Says from now on that this one speaks.
     pub fn speak_for(&mut self, identity: Identity) {
         self.identity = identity;
+    }
+
+    /// Has its frames summed up by this from now on.
+    pub fn check_by(&mut self, check: Checker) {
+        self.check = check;
     }
 
     /// Writes what is on the tape. `send` takes a frame whole, or says that it did not.
@@ -74,7 +81,7 @@ impl Scribe {
 
     /// Says who speaks, if it is time.
     fn introduce(&mut self, tape: &Tape, send: &mut dyn FnMut(&[u8]) -> bool) {
-        let Some(now) = tape.latest().map(|latest| latest.at) else { return };
+        let now = tape.now();
         let due = |last: Tick| now.wrapping_sub(last) >= IDENTITY_EVERY;
         if self.introduced.is_none_or(due) {
             self.introduced = Some(now);
@@ -85,18 +92,23 @@ impl Scribe {
 
     /// One frame of ticks.
     fn ticks(&mut self, tape: &Tape, send: &mut dyn FnMut(&[u8]) -> bool) {
-        let mut body = [0; BODY];
-        let (capture, ledger, corner) = (&mut self.capture, &mut self.ledger, self.identity.corner);
-        let length = put_ticks(&mut body, || {
-            let record = tape.take()?;
-            capture.look(&record, corner);
-            ledger.look(&record);
-            Some(record)
+        let head = self.head(Kind::Ticks);
+        let Self { capture, ledger, identity, page, check, .. } = self;
+        let frame = page.write(head, *check, |body| {
+            put_ticks(body, |record| {
+                let there = tape.take_into(record);
+                if there {
+                    capture.look(record, identity.corner);
+                    ledger.look(record);
+                }
+                there
+            })
         });
-        self.send(Kind::Ticks, &body[..length], send);
+        let room = send(frame);
+        self.count(room);
     }
 
-    /// A frame of one value.
+    /// A frame of one value; whether there was room for it.
     #[inline(never)]
     fn one(
         &mut self,
@@ -104,20 +116,24 @@ impl Scribe {
         value: &impl Serialize,
         send: &mut dyn FnMut(&[u8]) -> bool,
     ) -> bool {
-        let mut body = [0; BODY];
+        let head = self.head(kind);
         // All of them fit, see the test.
-        let length = postcard::to_slice(value, &mut body).map_or(0, |used| used.len());
-        self.send(kind, &body[..length], send)
+        let frame = self.page.write(head, self.check, |body| {
+            postcard::to_slice(value, body).map_or(0, |used| used.len())
+        });
+        let room = send(frame);
+        self.count(room);
+        room
     }
 
-    /// Writes a frame; whether there was room for it.
-    #[inline(never)]
-    fn send(&mut self, kind: Kind, body: &[u8], send: &mut dyn FnMut(&[u8]) -> bool) -> bool {
-        let head = Head { kind: kind as u8, sequence: self.sequence, dropped: self.dropped };
-        let room = send(frame::write(&mut self.bytes, head, body));
+    const fn head(&self, kind: Kind) -> Head {
+        Head { kind: kind as u8, sequence: self.sequence, dropped: self.dropped }
+    }
+
+    /// A frame has been made, and has found room or not.
+    fn count(&mut self, room: bool) {
         self.sequence = self.sequence.wrapping_add(1);
         self.dropped = self.dropped.wrapping_add(u32::from(!room));
-        room
     }
 }
 
@@ -157,8 +173,7 @@ mod tests {
         fn read(&self) -> (Vec<Head>, Vec<Record>) {
             let (mut heads, mut records) = (Vec::new(), Vec::new());
             for frame in &self.frames {
-                let mut frame = frame[..frame.len() - 1].to_vec();
-                let frame = Frame::open(&mut frame).unwrap();
+                let frame = Frame::open(frame).unwrap();
                 heads.push(frame.head);
                 if let Body::Ticks(ticks) = frame.body().unwrap() {
                     records.extend(ticks.map(Result::unwrap));
@@ -214,9 +229,16 @@ mod tests {
         scribe.speak_for(somebody.clone());
         let (tape, mut channel) = (Tape::new(), Channel::default());
         run(&mut scribe, &tape, &mut channel, 0..super::super::BATCH);
-        let mut first = channel.frames[0][..channel.frames[0].len() - 1].to_vec();
-        let said = Frame::open(&mut first).unwrap().body().unwrap();
+        let said = Frame::open(&channel.frames[0]).unwrap().body().unwrap();
         assert_eq!(said, Body::Identity(somebody));
+    }
+
+    #[test]
+    fn who_is_told_to_sum_up_does() {
+        let (mut scribe, tape, mut channel) = (scribe(), Tape::new(), Channel::default());
+        scribe.check_by(|bytes| !super::check(bytes));
+        run(&mut scribe, &tape, &mut channel, 0..super::super::BATCH);
+        assert!(channel.frames.iter().all(|frame| Frame::open(frame).is_err()));
     }
 
     #[test]
@@ -326,7 +348,7 @@ mod tests {
         scribe.dropped = u32::MAX;
         let mut bodies = Vec::new();
         let mut send = |frame: &[u8]| {
-            bodies.push(frame[..frame.len() - 1].to_vec());
+            bodies.push(frame.to_vec());
             true
         };
         let entry = Entry { at: u32::MAX, event: Event::Crossing(crossing) };
@@ -335,7 +357,7 @@ mod tests {
         scribe.one(Kind::Request, &(u32::MAX, request), &mut send);
         scribe.one(Kind::Shots, &piece, &mut send);
         scribe.one(Kind::Identity, &identity, &mut send);
-        let mut read = bodies.iter_mut().map(|bytes| Frame::open(bytes).unwrap().body().unwrap());
+        let mut read = bodies.iter().map(|bytes| Frame::open(bytes).unwrap().body().unwrap());
         assert_eq!(read.next(), Some(Body::Event(entry)));
         assert!(matches!(read.next(), Some(Body::Ledger(line)) if line.crossing == crossing));
         assert_eq!(read.next(), Some(Body::Plan(u32::MAX, plan)));

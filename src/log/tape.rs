@@ -35,6 +35,7 @@ struct Inner {
     written: u32,
     read: u32,
     lost: u32,
+    now: Tick,
     /// The latest that the tick was given; at most one between two batches.
     plan: Vec<(Tick, Plan), 1>,
     /// The latest that the tick gave.
@@ -52,6 +53,7 @@ impl Tape {
             written: 0,
             read: 0,
             lost: 0,
+            now: 0,
             plan: Vec::new(),
             request: Vec::new(),
         };
@@ -60,6 +62,7 @@ impl Tape {
 
     /// Keeps a tick. Cost: the copying of [`Record`], and of plan and request in the few
     /// ticks that have them.
+    #[inline(never)]
     pub fn keep(&self, input: &Input, output: &Output) {
         let unread = self.inner.lock(|inner| {
             // Nobody else has it: this is the lock. A panic in the tick would be worse
@@ -74,6 +77,7 @@ impl Tape {
                 row.set(input, output);
             }
             inner.written = inner.written.wrapping_add(1);
+            inner.now = input.now;
             if let Some(plan) = input.plan {
                 inner.plan.clear();
                 let _ = inner.plan.push((input.now, plan));
@@ -101,14 +105,20 @@ impl Tape {
 
     /// The oldest tick not yet taken.
     pub fn take(&self) -> Option<Record> {
+        let mut record = Record::EMPTY;
+        self.take_into(&mut record).then_some(record)
+    }
+
+    /// The same into a place; false if there is none.
+    pub(super) fn take_into(&self, place: &mut Record) -> bool {
         self.inner.lock(|inner| {
             let inner = &mut *inner.borrow_mut();
             if inner.read == inner.written {
-                return None;
+                return false;
             }
-            let place = inner.read as usize % TAPE;
+            let row = inner.rows.get(inner.read as usize % TAPE);
             inner.read = inner.read.wrapping_add(1);
-            inner.rows.get(place).copied()
+            row.map(|row| *place = *row).is_some()
         })
     }
 
@@ -120,6 +130,12 @@ impl Tape {
     /// The plan that a tick asked for, if there is one not yet taken.
     pub fn take_request(&self) -> Option<(Tick, PlanRequest)> {
         self.inner.lock(|inner| inner.borrow_mut().request.pop())
+    }
+
+    /// The latest tick; 0 before the first.
+    #[must_use]
+    pub fn now(&self) -> Tick {
+        self.inner.lock(|inner| inner.borrow().now)
     }
 
     /// Ticks not yet taken.

@@ -1,6 +1,12 @@
-//! Records as differences: what changes little from tick to tick takes one byte.
-
-use serde::{Deserialize, Serialize};
+//! Records as words with a map of those that changed: what stays the same takes a bit,
+//! what changes little half a word.
+//!
+//! ```text
+//! map, a word | differences, half a word or a whole one each | words that changed
+//! ```
+//! Two bits of the map for a number of which the difference is written: 0 none, 1 half a
+//! word, 2 a whole one; one for a word that is written as it is. The tick of a record is one
+//! more than that before, unless its difference to that is there. All is little end first.
 
 use super::number;
 use super::record::{Flags, Record};
@@ -8,64 +14,88 @@ use super::telemetry::Telemetry;
 use crate::hal::Duty;
 use crate::units::Q16;
 
-/// Numbers of a record.
-const NUMBERS: usize = 21;
+/// Numbers of a record that are written as differences, behind the tick.
+const NUMBERS: usize = 12;
 
-/// A record as whole numbers, or the difference of two. postcard writes each in as many
-/// bytes as it needs, 1 to 5.
+/// Words of a record that are written as they are.
+const WORDS: usize = 5;
+
+/// Bits of the map before those of the words.
+const DIFFERENCES: usize = 2 * (1 + NUMBERS);
+
+const _: () = assert!(DIFFERENCES + WORDS < 32, "one bit is left for two more codes");
+
+/// A record as whole numbers.
 ///
 /// Differences wrap, so that any two records have one and no bit is lost.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct Wire([i32; NUMBERS]);
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Wire {
+    at: u32,
+    numbers: [u32; NUMBERS],
+    words: [u32; WORDS],
+}
 
 /// Most bytes that a [`Wire`] takes.
-pub(super) const LONGEST: usize = 5 * NUMBERS;
+pub(super) const LONGEST: usize = 4 * (2 + NUMBERS + WORDS);
+
+/// Two halves of a word.
+const fn word(low: u16, high: u16) -> u32 {
+    low as u32 | (high as u32) << 16
+}
+
+/// The halves of a word.
+const fn halves(word: u32) -> [u16; 2] {
+    [word as u16, (word >> 16) as u16]
+}
 
 impl Wire {
     /// The record as numbers.
-    #[inline(never)]
+    #[inline]
     pub(super) fn of(record: &Record) -> Self {
         let Record { telemetry: t, codes: [wheel, load_cell, tread, arm], ages, flags } = record;
         let [wheel_age, load_cell_age, tread_age, arm_age] = *ages;
-        Self([
-            t.at as i32,
-            i32::from(*wheel),
-            i32::from(*load_cell),
-            i32::from(*tread),
-            // The frame's parity, its highest bit, jumps: as the lowest it weighs little.
-            i32::from(arm.rotate_left(1)),
-            // The arm's age lowest: read every second tick, it is the one that changes.
-            i32::from_le_bytes([arm_age, wheel_age, load_cell_age, tread_age]),
-            i32::from_le_bytes([t.level, t.stage as u8, number::of_mode(t.mode), 0]),
-            i32::from(flags.to_bits()),
-            t.position.to_bits(),
-            t.speed.to_bits(),
-            t.speed_ref.to_bits(),
-            t.preload.to_bits(),
-            t.preload_ref.to_bits(),
-            t.compression.to_bits(),
-            t.radius.to_bits(),
-            t.gap_predicted.to_bits(),
-            t.slip_margin.to_bits(),
-            t.vibration.to_bits(),
-            t.distance.to_bits(),
-            i32::from(t.drive.to_bits()),
-            i32::from(t.pretightener.to_bits()),
-        ])
+        let q = |value: Q16| value.to_bits() as u32;
+        Self {
+            at: t.at,
+            numbers: [
+                // The arm's age lowest: read every second tick, it is the one that changes.
+                u32::from_le_bytes([arm_age, wheel_age, load_cell_age, tread_age]),
+                q(t.position),
+                q(t.speed),
+                q(t.speed_ref),
+                q(t.preload),
+                q(t.preload_ref),
+                q(t.compression),
+                q(t.radius),
+                q(t.gap_predicted),
+                q(t.slip_margin),
+                q(t.vibration),
+                q(t.distance),
+            ],
+            words: [
+                word(*wheel, *load_cell),
+                word(*tread, *arm),
+                word(t.drive.to_bits() as u16, t.pretightener.to_bits() as u16),
+                u32::from_le_bytes([t.level, t.stage as u8, number::of_mode(t.mode), 0]),
+                flags.to_bits().into(),
+            ],
+        }
     }
 
     /// The record of the numbers; none if one of them has no meaning.
     pub(super) fn record(&self) -> Option<Record> {
-        let [at, wheel, load_cell, tread, arm, ages, state, flags, q @ .., drive, pretightener] =
-            self.0;
-        let q: [Q16; 11] = q.map(Q16::from_bits);
+        let [ages, q @ ..] = self.numbers;
+        let q: [Q16; 11] = q.map(|bits| Q16::from_bits(bits as i32));
+        let [wheel_and_cell, tread_and_arm, duties, state, flags] = self.words;
         let [arm_age, wheel_age, load_cell_age, tread_age] = ages.to_le_bytes();
-        let [level, stage, mode, _] = state.to_le_bytes();
-        let code = |number: i32| u16::try_from(number).ok();
-        let duty = |number: i32| i16::try_from(number).ok().map(Duty::from_bits);
+        let [level, stage, mode, rest] = state.to_le_bytes();
+        let [wheel, load_cell] = halves(wheel_and_cell);
+        let [tread, arm] = halves(tread_and_arm);
+        let [drive, pretightener] = halves(duties).map(|half| Duty::from_bits(half as i16));
+        (rest == 0).then_some(())?;
         Some(Record {
             telemetry: Telemetry {
-                at: at as u32,
+                at: self.at,
                 mode: number::mode(mode)?,
                 stage: number::stage(stage)?,
                 position: q[0],
@@ -80,60 +110,101 @@ impl Wire {
                 slip_margin: q[8],
                 vibration: q[9],
                 distance: q[10],
-                drive: duty(drive)?,
-                pretightener: duty(pretightener)?,
+                drive,
+                pretightener,
             },
-            codes: [code(wheel)?, code(load_cell)?, code(tread)?, code(arm)?.rotate_right(1)],
+            codes: [wheel, load_cell, tread, arm],
             ages: [wheel_age, load_cell_age, tread_age, arm_age],
-            flags: Flags::from_bits(code(flags)?),
+            flags: Flags::from_bits(u16::try_from(flags).ok()?),
         })
     }
 
-    /// Writes it; so many bytes.
-    pub(super) fn put(&self, room: &mut [u8]) -> usize {
-        postcard::serialize_with_flavor(self, Room { bytes: room, used: 0 }).unwrap_or(0)
+    /// Writes what it is after `before`, and takes that one's place; so many bytes.
+    #[inline]
+    pub(super) fn put(&self, before: &mut Self, room: &mut [u8; LONGEST]) -> usize {
+        let mut list = List { map: 0, used: 4, room };
+        list.number(0, self.at, before.at.wrapping_add(1));
+        before.at = self.at;
+        for (place, (number, before)) in self.numbers.iter().zip(&mut before.numbers).enumerate() {
+            list.number(1 + place, *number, *before);
+            *before = *number;
+        }
+        for (place, (word, before)) in self.words.iter().zip(&mut before.words).enumerate() {
+            if word != before {
+                list.map |= 1 << (DIFFERENCES + place);
+                list.put(word.to_le_bytes());
+                *before = *word;
+            }
+        }
+        list.room[..4].copy_from_slice(&list.map.to_le_bytes());
+        list.used
     }
 
-    /// The difference to what came before.
-    pub(super) fn since(&self, before: &Self) -> Self {
-        let mut difference = *self;
-        for (number, before) in difference.0.iter_mut().zip(before.0) {
-            *number = number.wrapping_sub(before);
+    /// Reads what comes after `before`, and what is left behind it; none if it is not whole.
+    pub(super) fn take<'a>(before: &Self, bytes: &'a [u8]) -> Option<(Self, &'a [u8])> {
+        let (map, mut rest) = bytes.split_first_chunk::<4>()?;
+        let map = u32::from_le_bytes(*map);
+        (map >> (DIFFERENCES + WORDS) == 0).then_some(())?;
+        let mut wire = *before;
+        wire.at = wire.at.wrapping_add(1);
+        let numbers = core::iter::once(&mut wire.at).chain(&mut wire.numbers);
+        for (place, number) in numbers.enumerate() {
+            let difference = match map >> (2 * place) & 3 {
+                0 => 0,
+                1 => i32::from(i16::from_le_bytes(*take(&mut rest)?)),
+                2 => i32::from_le_bytes(*take(&mut rest)?),
+                _ => return None,
+            };
+            *number = number.wrapping_add_signed(difference);
         }
-        difference
-    }
-
-    /// What has this difference to what came before.
-    pub(super) fn after(&self, before: &Self) -> Self {
-        let mut sum = *self;
-        for (number, before) in sum.0.iter_mut().zip(before.0) {
-            *number = number.wrapping_add(before);
+        for (place, word) in wire.words.iter_mut().enumerate() {
+            if map >> (DIFFERENCES + place) & 1 != 0 {
+                *word = u32::from_le_bytes(*take(&mut rest)?);
+            }
         }
-        sum
+        Some((wire, rest))
     }
 }
 
-/// Bytes one by one: most numbers take a single one, for which a call that copies costs
-/// several times the rest.
-struct Room<'a> {
-    bytes: &'a mut [u8],
+/// What is written of a record, with the map of it.
+struct List<'a> {
+    map: u32,
     used: usize,
+    room: &'a mut [u8; LONGEST],
 }
 
-impl postcard::ser_flavors::Flavor for Room<'_> {
-    type Output = usize;
-
+impl List<'_> {
+    /// The number at this place of the map, by its difference to what was to be expected.
     #[inline(always)]
-    fn try_push(&mut self, byte: u8) -> postcard::Result<()> {
-        let room = self.bytes.get_mut(self.used).ok_or(postcard::Error::SerializeBufferFull)?;
-        *room = byte;
-        self.used += 1;
-        Ok(())
+    fn number(&mut self, place: usize, number: u32, expected: u32) {
+        let difference = number.wrapping_sub(expected) as i32;
+        if difference == 0 {
+            return;
+        }
+        if let Ok(half) = i16::try_from(difference) {
+            self.map |= 1 << (2 * place);
+            self.put(half.to_le_bytes());
+        } else {
+            self.map |= 2 << (2 * place);
+            self.put(difference.to_le_bytes());
+        }
     }
 
-    fn finalize(self) -> postcard::Result<usize> {
-        Ok(self.used)
+    /// Bytes for which there is room.
+    #[inline(always)]
+    fn put<const N: usize>(&mut self, bytes: [u8; N]) {
+        let rest = self.room.get_mut(self.used..);
+        if let Some(place) = rest.and_then(|rest| rest.first_chunk_mut::<N>()) {
+            *place = bytes;
+        }
+        self.used += N;
     }
+}
+
+fn take<'a, const N: usize>(rest: &mut &'a [u8]) -> Option<&'a [u8; N]> {
+    let (bytes, behind) = rest.split_first_chunk()?;
+    *rest = behind;
+    Some(bytes)
 }
 
 #[cfg(test)]
@@ -142,48 +213,74 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    /// The record behind another, as it is written.
+    fn written(one: &Record, other: &Record) -> Vec<u8> {
+        let mut room = [0xA5; LONGEST];
+        let mut before = Wire::of(one);
+        let used = Wire::of(other).put(&mut before, &mut room);
+        assert_eq!(before, Wire::of(other));
+        room[..used].to_vec()
+    }
+
     proptest! {
         #[test]
-        fn a_record_comes_back_from_its_difference(one in any_record(), other in any_record()) {
-            let (a, b) = (Wire::of(&one), Wire::of(&other));
-            prop_assert_eq!(a.record(), Some(one));
-            prop_assert_eq!(b.since(&a).after(&a).record(), Some(other));
+        fn a_record_comes_back_from_its_difference(
+            one in any_record(),
+            other in any_record(),
+            behind in prop::collection::vec(any::<u8>(), 0..5),
+        ) {
+            prop_assert_eq!(Wire::of(&one).record(), Some(one));
+            let bytes = [written(&one, &other), behind.clone()].concat();
+            let (back, rest) = Wire::take(&Wire::of(&one), &bytes).unwrap();
+            prop_assert_eq!(back.record(), Some(other));
+            prop_assert_eq!(rest, &behind);
         }
 
         #[test]
-        fn no_difference_is_longer_than_said(one in any_record(), other in any_record()) {
-            let mut bytes = [0; LONGEST];
-            let difference = Wire::of(&other).since(&Wire::of(&one));
-            let used = postcard::to_slice(&difference, &mut bytes).unwrap().len();
-            let (back, rest) = postcard::take_from_bytes::<Wire>(&bytes[..used]).unwrap();
-            prop_assert_eq!(back, difference);
-            prop_assert!(rest.is_empty());
+        fn what_is_cut_off_is_no_record(one in any_record(), other in any_record(), cut in 1..9_usize) {
+            let bytes = written(&one, &other);
+            prop_assert_eq!(Wire::take(&Wire::of(&one), &bytes[..bytes.len().saturating_sub(cut)]), None);
+        }
+
+        #[test]
+        fn differences_within_half_a_word_take_that(step in any::<i16>()) {
+            let one = Record::EMPTY;
+            let mut other = one;
+            other.telemetry.at = one.telemetry.at.wrapping_add(1);
+            other.telemetry.speed = Q16::from_bits(step.into());
+            prop_assert_eq!(written(&one, &other).len(), 4 + 2 * usize::from(step != 0));
         }
     }
 
     #[test]
-    fn a_tick_without_news_takes_a_byte_a_number() {
+    fn a_tick_without_news_takes_its_codes_and_ages_at_most() {
         let before = Record::EMPTY;
         let mut after = before;
         after.telemetry.at += 1;
+        assert_eq!(written(&before, &after).len(), 4);
         // Parity and age of the arm's frame alternate.
         after.codes[3] ^= 0x8000;
         after.ages[3] += 1;
-        let difference = Wire::of(&after).since(&Wire::of(&before));
-        let mut bytes = [0; LONGEST];
-        assert_eq!(postcard::to_slice(&difference, &mut bytes).unwrap().len(), 21);
+        assert_eq!(written(&before, &after).len(), 4 + 4 + 2);
     }
 
     #[test]
     fn numbers_without_meaning_are_no_record() {
         let sound = Wire::of(&Record::EMPTY);
         assert!(sound.record().is_some());
-        // Stage 0, mode 99, a code and a duty beyond 16 bits.
-        let state = |mode, stage| i32::from_le_bytes([0, stage, mode, 0]);
-        for (place, number) in [(6, state(0, 0)), (6, state(99, 1)), (1, 65_536), (20, 32_768)] {
+        // Stage 0, mode 99, a byte that says nothing, flags beyond 16 bits.
+        let state = |stage, mode, rest| u32::from_le_bytes([0, stage, mode, rest]);
+        for (place, number) in
+            [(3, state(0, 0, 0)), (3, state(1, 99, 0)), (3, state(1, 0, 1)), (4, 65_536)]
+        {
             let mut meaningless = sound;
-            meaningless.0[place] = number;
+            meaningless.words[place] = number;
             assert_eq!(meaningless.record(), None, "{place}");
+        }
+        // A map with a difference of no length, and with a word that there is not.
+        for map in [3_u32, 1 << 31] {
+            let bytes = [&map.to_le_bytes()[..], &[0; LONGEST]].concat();
+            assert_eq!(Wire::take(&sound, &bytes), None);
         }
     }
 }

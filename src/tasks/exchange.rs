@@ -1,8 +1,9 @@
 //! What the tasks hand to one another.
 
+use core::cell::Cell;
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
-use super::beat::{PERIODS, Pulse, Turn};
+use super::beat::{CLOCKS, PERIODS, Pulse, Turn};
 use crate::blackbox::Late;
 use crate::control::{Input, Output};
 use crate::hal::Light;
@@ -12,9 +13,10 @@ use crate::sense::freshness::age;
 use crate::sense::raw::{AdcCode, AngleFrame, EncoderCount, Sample, SensorFrame};
 use crate::supervise::{Command, Mode};
 use crate::units::Tick;
+use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
-use embassy_sync::watch::Watch;
+use embassy_time::{Duration, Instant};
 
 /// Log entries that wait for the journal at most; beyond, new ones are dropped and
 /// counted.
@@ -29,8 +31,24 @@ pub const CHECK_IN_TICKS: u32 = 50;
 /// Most operator tasks.
 const OPERATORS: usize = 4;
 
-/// The latest value of something: written by one task, polled by the tick.
-type Slot<T> = Watch<CriticalSectionRawMutex, T, 0>;
+/// The latest value of something: written by one task, polled by the tick. Nobody waits
+/// for it, so that it is a `Watch` without the wakers.
+pub(super) struct Slot<T>(Mutex<CriticalSectionRawMutex, Cell<Option<T>>>);
+
+impl<T: Copy> Slot<T> {
+    const fn new() -> Self {
+        Self(Mutex::new(Cell::new(None)))
+    }
+
+    /// Puts a value in the place of the one before.
+    pub(super) fn put(&self, value: T) {
+        self.0.lock(|place| place.set(Some(value)));
+    }
+
+    fn get(&self) -> Option<T> {
+        self.0.lock(Cell::get)
+    }
+}
 
 /// A task that checks in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -117,6 +135,40 @@ impl Exchange {
         }
     }
 
+    /// An interrupt calls [`Exchange::beat`] from now on. For before the control tick's task
+    /// begins.
+    pub fn expect_beat(&self) {
+        self.pulse.expect();
+    }
+
+    /// A whole millisecond has come. For an interrupt that preempts the executor of control
+    /// tick and sensors, after [`Exchange::expect_beat`]. Tells whether the arm's angle is
+    /// read with it, after the other sensors.
+    #[inline]
+    pub fn beat(&self) -> bool {
+        self.pulse.strike()
+    }
+
+    /// The present tick, for tasks outside the control rate: that of the clock, without a
+    /// long division.
+    #[must_use]
+    pub fn uptime(&self) -> Tick {
+        let led = self.pulse.led();
+        led.wrapping_add(since(led, Instant::now()) / CLOCKS)
+    }
+
+    /// When a task below the control rate that waits for nothing but time goes on: in so
+    /// long, by half a millisecond more or less, in the middle between two ticks. So neither
+    /// its timer nor what it does with interrupts shut out delays the beginning of one.
+    #[must_use]
+    pub fn aside(&self, wait: Duration) -> Instant {
+        let led = self.pulse.led();
+        let now = Instant::now();
+        let phase = since(led, now) % CLOCKS;
+        let at = now + wait + Duration::from_ticks((CLOCKS / 2).into());
+        Instant::from_ticks(at.as_ticks().saturating_sub(phase.into()))
+    }
+
     /// What a tick at `now` is given; takes the oldest command and the plan out.
     pub fn input(&self, now: Tick, overrun: bool) -> Input {
         Input {
@@ -165,10 +217,10 @@ impl Exchange {
     #[must_use]
     pub fn sensors(&self) -> SensorFrame {
         SensorFrame {
-            wheel: self.wheel.anon_receiver().try_get(),
-            load_cell: self.load_cell.anon_receiver().try_get(),
-            tread: self.tread.anon_receiver().try_get(),
-            arm: self.arm.anon_receiver().try_get(),
+            wheel: self.wheel.get(),
+            load_cell: self.load_cell.get(),
+            tread: self.tread.get(),
+            arm: self.arm.get(),
         }
     }
 
@@ -294,6 +346,11 @@ impl Default for Exchange {
     }
 }
 
+/// Clock ticks since a control tick was due, which stands on its whole millisecond.
+fn since(tick: Tick, now: Instant) -> u32 {
+    (now.as_ticks() as u32).wrapping_sub(tick.wrapping_mul(CLOCKS))
+}
+
 /// Puts a value in a place for one, instead of the one that may be there. For one writer.
 pub(super) fn latest<T>(place: &Channel<CriticalSectionRawMutex, T, 1>, value: T) {
     place.clear();
@@ -324,6 +381,17 @@ mod tests {
         Station::Model,
         Station::Journal,
     ];
+
+    #[test]
+    fn the_time_since_a_tick_is_right_across_the_clock_s_low_half() {
+        for millisecond in [1_u64, 4_294_966, 4_294_968, 1 << 32, (1 << 32) + 7] {
+            let due = Instant::from_millis(millisecond);
+            for later in [0, 999, 1500] {
+                let now = due + Duration::from_ticks(later);
+                assert_eq!(u64::from(since(millisecond as Tick, now)), later, "{millisecond}");
+            }
+        }
+    }
 
     #[test]
     fn one_silent_task_is_enough() {

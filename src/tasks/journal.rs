@@ -1,11 +1,11 @@
 //! The logging task.
 
+use super::ROUND;
 use super::exchange::{ENTRIES, Exchange, Station};
-use super::{ROUND, uptime};
 use crate::hal::{Indicator, Journal, Light};
 use crate::log::{Entry, Event, Scribe};
 use embassy_futures::select::{Either, select};
-use embassy_time::with_timeout;
+use embassy_time::with_deadline;
 
 /// Writes log entries in their order and every tick as a record of the binary log; shows
 /// the light when it changes.
@@ -22,15 +22,16 @@ pub async fn journal(
     let mut shown = Light::default();
     let mut reported = 0;
     scribe.speak_for(journal.identity());
+    scribe.check_by(journal.checker());
     light.show(shown);
     loop {
-        exchange.check_in(Station::Journal, uptime());
+        exchange.check_in(Station::Journal, exchange.uptime());
         if exchange.light() != shown {
             shown = exchange.light();
             light.show(shown);
         }
         let news = select(exchange.entries.receive(), exchange.tape.ready());
-        let news = with_timeout(ROUND, news).await;
+        let news = with_deadline(exchange.aside(ROUND), news).await;
         exchange.wake(Station::Journal);
         if let Ok(Either::First(entry)) = news {
             write(&mut journal, scribe, &entry);
@@ -43,7 +44,7 @@ pub async fn journal(
             if lost != reported {
                 // The newest are the ones dropped, so their count stands behind the rest.
                 let event = Event::Lost(lost.wrapping_sub(reported));
-                write(&mut journal, scribe, &Entry { at: uptime(), event });
+                write(&mut journal, scribe, &Entry { at: exchange.uptime(), event });
                 reported = lost;
             }
         }

@@ -1,7 +1,6 @@
 //! The task at the host's binary line.
 
 use super::exchange::Exchange;
-use super::uptime;
 use crate::hal::Line;
 use crate::link::{Gatherer, ToBoard, ToHost, frame};
 use crate::params::service::{Request, Response, Service};
@@ -9,7 +8,7 @@ use crate::params::slots::SetMemory;
 use embassy_time::{Duration, Timer};
 
 /// How often the line is looked at: nobody tells when the host has written.
-const POLL: Duration = Duration::from_millis(5);
+const POLL: Duration = Duration::from_millis(10);
 
 /// Answers the host's requests about the parameters, one after the other.
 ///
@@ -23,10 +22,10 @@ pub async fn link<M: SetMemory>(
     let station = exchange.enrol_operator();
     let mut gatherer = Gatherer::new();
     loop {
-        exchange.check_in(station, uptime());
+        exchange.check_in(station, exchange.uptime());
         let mut byte = [0];
         if line.read(&mut byte) == 0 {
-            Timer::after(POLL).await;
+            Timer::at(exchange.aside(POLL)).await;
             continue;
         }
         let Some(ToBoard::Parameters(number, request)) = gatherer.take(byte[0]) else { continue };
@@ -39,7 +38,7 @@ pub async fn link<M: SetMemory>(
         }
         if restarts && done {
             // For the answer to be fetched.
-            Timer::after(POLL * 4).await;
+            Timer::after(POLL * 2).await;
             line.restart();
         }
     }

@@ -3,14 +3,14 @@
 use super::beat::Beat;
 use super::exchange::Exchange;
 use crate::blackbox::Recorder;
-use crate::control::{Controller, Input, Output, State};
+use crate::control::{Controller, Output, State};
 use crate::hal::{MotorCommand, Motors, Watchdog};
 
 /// Runs the control tick at 1 kHz: latest codes, command and plan in; bridges,
 /// request, log entries and telemetry out. Feeds the watchdog while every task is
 /// alive, and keeps for a restart what the drive does and who is missing.
 ///
-/// It waits for nothing but time, and wakes the sensor tasks when it has come. A tick that starts more than a period late is
+/// It waits for nothing but time. A tick that starts more than a period late is
 /// marked as an overrun and the ticks missed are left out; the tick number is
 /// always that of the clock.
 pub async fn motors(
@@ -26,8 +26,8 @@ pub async fn motors(
     let mut beat = Beat::<1>::new();
     loop {
         let due = beat.lead(&exchange.pulse).await;
-        let input =
-            Input { emergency_stop: motors.stopped(), ..exchange.input(due.tick, due.missed > 0) };
+        let mut input = exchange.input(due.tick, due.missed > 0);
+        input.emergency_stop = motors.stopped();
         controller.step_into(&mut state, &input, &mut output);
         motors.apply(output.drive, output.preload);
         if output.rearm {

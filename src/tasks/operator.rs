@@ -2,8 +2,8 @@
 
 use core::pin::pin;
 
+use super::ROUND;
 use super::exchange::Exchange;
-use super::{ROUND, uptime};
 use crate::hal::CommandSource;
 use embassy_futures::select::{Either, select};
 use embassy_time::Timer;
@@ -18,8 +18,8 @@ pub async fn operator(mut source: impl CommandSource, exchange: &Exchange) -> ! 
             // each check-in.
             let mut next = pin!(source.next());
             loop {
-                exchange.check_in(station, uptime());
-                match select(next.as_mut(), Timer::after(ROUND)).await {
+                exchange.check_in(station, exchange.uptime());
+                match select(next.as_mut(), Timer::at(exchange.aside(ROUND))).await {
                     Either::First(command) => break command,
                     Either::Second(()) => {}
                 }

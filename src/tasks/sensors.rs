@@ -1,5 +1,7 @@
 //! One task a sensor: read, stamp, publish, check in.
 
+use core::future::poll_fn;
+
 use super::beat::{ANGLE_PERIOD, Beat};
 use super::exchange::{Exchange, Station};
 use crate::hal::{AnalogInput, AngleBus, WheelEncoder};
@@ -12,25 +14,33 @@ use embassy_time::{Duration, Timer};
 /// takes. The task lives on and checks in; the reading ages.
 pub const SENSOR_TIMEOUT: Duration = Duration::from_millis(2);
 
+/// Waits for a sensor's next turn; its tick.
+macro_rules! turn {
+    ($beat:expr, $exchange:expr, $station:expr) => {{
+        let mut waits = false;
+        poll_fn(|context| $beat.follow(context, &mut waits, &$exchange.pulse, $station)).await.tick
+    }};
+}
+
 /// Publishes the wheel counter at 1 kHz.
 pub async fn speed(mut wheel: impl WheelEncoder, exchange: &Exchange) -> ! {
     let mut beat = Beat::<1>::new();
     loop {
-        let at = beat.follow(&exchange.pulse, Station::Speed).await.tick;
-        exchange.wheel.sender().send(Sample { code: wheel.count(), at });
+        let at = turn!(beat, exchange, Station::Speed);
+        exchange.wheel.put(Sample { code: wheel.count(), at });
         exchange.check_in(Station::Speed, at);
     }
 }
 
 /// Publishes the load cell's code at 1 kHz.
 pub async fn pressure(input: impl AnalogInput, exchange: &Exchange) -> ! {
-    let publish = |sample| exchange.load_cell.sender().send(sample);
+    let publish = |sample| exchange.load_cell.put(sample);
     analog(input, Station::Pressure, publish, exchange).await
 }
 
 /// Publishes the tread displacement sensor's code at 1 kHz.
 pub async fn displacement(input: impl AnalogInput, exchange: &Exchange) -> ! {
-    let publish = |sample| exchange.tread.sender().send(sample);
+    let publish = |sample| exchange.tread.put(sample);
     analog(input, Station::Displacement, publish, exchange).await
 }
 
@@ -38,8 +48,8 @@ pub async fn displacement(input: impl AnalogInput, exchange: &Exchange) -> ! {
 pub async fn angle(mut bus: impl AngleBus, exchange: &Exchange) -> ! {
     let mut beat = Beat::<ANGLE_PERIOD>::new();
     loop {
-        let at = beat.follow(&exchange.pulse, Station::Angle).await.tick;
-        let publish = |sample| exchange.arm.sender().send(sample);
+        let at = turn!(beat, exchange, Station::Angle);
+        let publish = |sample| exchange.arm.put(sample);
         settle(bounded(bus.frame()).await, at, Station::Angle, publish, exchange);
     }
 }
@@ -52,7 +62,7 @@ async fn analog(
 ) -> ! {
     let mut beat = Beat::<1>::new();
     loop {
-        let at = beat.follow(&exchange.pulse, station).await.tick;
+        let at = turn!(beat, exchange, station);
         settle(bounded(input.sample()).await, at, station, &publish, exchange);
     }
 }

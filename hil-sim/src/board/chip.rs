@@ -7,6 +7,7 @@ mod stray;
 
 use super::core::{Access, Bus};
 use super::peripherals::adc::{self, Adc};
+use super::peripherals::crc::CrcUnit;
 use super::peripherals::dbgmcu::Dbgmcu;
 use super::peripherals::dma::{CHANNELS, Dma, Dmamux, Move};
 use super::peripherals::encoder::Encoder;
@@ -70,6 +71,7 @@ pub struct Chip {
     /// Independent watchdog.
     pub watchdog: Iwdg,
     debug: Dbgmcu,
+    crc: CrcUnit,
     /// The angle sensor.
     pub angle: AngleSensor,
     /// The select line was high during the frame under way.
@@ -112,6 +114,7 @@ impl Chip {
             spi: Spi::default(),
             watchdog: Iwdg::default(),
             debug: Dbgmcu::default(),
+            crc: CrcUnit::default(),
             angle: AngleSensor::default(),
             deselected: false,
             wheel: 0,
@@ -317,6 +320,7 @@ impl Chip {
             Block::Counter => &mut self.counter,
             Block::System => &mut self.system,
             Block::Debug => &mut self.debug,
+            Block::Crc => &mut self.crc,
         }
     }
 

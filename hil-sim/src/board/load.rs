@@ -10,7 +10,10 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::chip::Stray;
+use super::core::Masked;
+use super::exceptions::number::SYS_TICK;
 use super::heat::by_function;
+use super::heat::names::Names;
 use super::image::ImageError;
 use super::machine::{Machine, Poll, Share, THREAD};
 use super::peripherals::HZ;
@@ -76,6 +79,32 @@ pub struct Interrupt {
     pub latency_worst: u64,
 }
 
+/// Interrupts shut out, which delays them all by so much at most.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Shut {
+    /// By this function.
+    pub function: String,
+    /// In the exception of this name, or in thread mode.
+    pub level: String,
+    /// How often.
+    pub times: u64,
+    /// Mean cycles.
+    pub mean: f64,
+    /// Most cycles.
+    pub worst: u64,
+    /// Where it begins.
+    pub pc: u32,
+}
+
+impl Shut {
+    /// What it cost, as a row among the others.
+    #[must_use]
+    pub fn cost(&self, whole: u64) -> Cost {
+        let share = self.mean * self.times as f64 / whole.max(1) as f64;
+        Cost { runs: self.times, mean: self.mean, worst: self.worst, share, sum: 0 }
+    }
+}
+
 /// A function of the source.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Spent {
@@ -105,7 +134,7 @@ pub struct Load {
     pub load: f64,
     /// Part of the time in which it slept.
     pub idle: f64,
-    /// The control tick with its task, the waking of the sensors' tasks included.
+    /// The control tick with its task.
     pub tick: Cost,
     /// When it begins.
     pub start: Start,
@@ -118,6 +147,9 @@ pub struct Load {
     /// Cycles by function of the source, what was inlined by itself; the most expensive
     /// first, as many as make up nearly all.
     pub functions: Vec<Spent>,
+    /// Where interrupts were shut out, the longest first: each place, down to those that
+    /// hardly delay anything.
+    pub masked: Vec<Shut>,
     /// Bytes of the stack that were used, and those set apart for it.
     pub stack_used: u32,
     /// See [`Load::stack_used`].
@@ -138,8 +170,6 @@ pub struct Gathered {
     phases: BTreeMap<u8, Cost>,
     tick: Cost,
     starts: Vec<u64>,
-    /// The turn of the tick's task that wakes the sensors, before the one that ticks.
-    lead: Option<Poll>,
 }
 
 impl Gathered {
@@ -148,6 +178,7 @@ impl Gathered {
         let now = machine.now();
         machine.profile_mut().clear(now);
         machine.take_heat();
+        machine.take_masked();
         *self = Self { from: Some((now, machine.profile().slept())), ..Self::default() };
     }
 
@@ -160,24 +191,10 @@ impl Gathered {
         let tick = machine.tasks().iter().position(|name| *name == TICK);
         for Poll { task, began, cycles } in polls {
             self.tasks.entry(task).or_default().note(cycles);
-            if Some(task) == tick
-                && let Some(cycles) = self.ticked(Poll { task, began, cycles })
-            {
+            if Some(task) == tick {
                 self.tick.note(cycles);
                 self.phases.entry(phase).or_default().note(cycles);
                 self.starts.push(began);
-            }
-        }
-    }
-
-    /// Cycles of the tick if this turn of its task makes one: the second of the two that
-    /// it gets in a period.
-    fn ticked(&mut self, turn: Poll) -> Option<u64> {
-        match self.lead.take() {
-            Some(lead) if turn.began - lead.began < PERIOD / 2 => Some(lead.cycles + turn.cycles),
-            _ => {
-                self.lead = Some(turn);
-                None
             }
         }
     }
@@ -223,6 +240,7 @@ impl Gathered {
                 .map(interrupt)
                 .collect(),
             functions: Vec::new(),
+            masked: Vec::new(),
             stack_used,
             stack: footprint.stack(),
             flash: footprint.flash(),
@@ -248,6 +266,26 @@ fn spent(functions: Vec<(String, u64)>, cycles: u64) -> Vec<Spent> {
     found.map(|(function, spent)| Spent { function, cycles_per_ms: spent as f64 / ms }).collect()
 }
 
+/// Places at which interrupts are shut out, as many as are kept.
+const PLACES: usize = 12;
+
+/// A place at which interrupts are shut out, by the function that asks for it: the first
+/// that is not about just that.
+fn shut((pc, exception): (u32, u32), by: &Masked, names: &Names<'_>) -> Shut {
+    let about =
+        ["core::", "cortex_m::", "critical_section::", "_critical_section", "blocking_mutex"];
+    let frames = names.frames(pc).into_iter().map(|frame| frame.function);
+    let mut others = frames.filter(|name| !about.iter().any(|about| name.contains(about)));
+    Shut {
+        function: others.next().unwrap_or_else(|| "unknown".to_owned()),
+        level: if exception == 0 { "thread mode".to_owned() } else { vector(exception as u8) },
+        times: by.times,
+        mean: by.cycles as f64 / by.times.max(1) as f64,
+        worst: by.worst,
+        pc,
+    }
+}
+
 /// Beginnings of the tick against a beat of one period.
 fn start(starts: &[u64]) -> Start {
     let Some(first) = starts.first() else { return Start::default() };
@@ -266,6 +304,7 @@ fn start(starts: &[u64]) -> Start {
 /// Name of a vector that the firmware uses.
 fn vector(number: u8) -> String {
     match number.checked_sub(16) {
+        None if number == SYS_TICK => "SysTick".into(),
         None => format!("exception {number}"),
         Some(channel @ 11..=17) => format!("DMA1_CHANNEL{}", channel - 10),
         Some(28) => "TIM2".into(),
@@ -284,6 +323,11 @@ impl Load {
     pub fn name_functions(&mut self, machine: &mut Machine, elf: &[u8]) -> Result<(), ImageError> {
         let heat = machine.take_heat();
         self.functions = spent(by_function(elf, machine.image(), &heat)?, self.cycles);
+        let masked = machine.take_masked();
+        let names = Names::read(elf)?;
+        self.masked = masked.iter().map(|(place, by)| shut(*place, by, &names)).collect();
+        self.masked.sort_by_key(|shut| std::cmp::Reverse(shut.worst));
+        self.masked.truncate(PLACES);
         Ok(())
     }
 
@@ -315,18 +359,6 @@ mod tests {
         let start = start(&starts);
         assert_eq!(start.jitter, 50);
         assert_eq!(start.late_mean, (10.0 + 50.0 + 0.0 + 10.0) / 4.0);
-    }
-
-    #[test]
-    fn a_tick_is_the_second_turn_of_its_task_with_the_first_added() {
-        let mut gathered = Gathered::default();
-        let turn = |began, cycles| Poll { task: 0, began, cycles };
-        // One is cut off by the beginning of the account.
-        assert_eq!(gathered.ticked(turn(2000, 70)), None);
-        for beat in 1..4 {
-            assert_eq!(gathered.ticked(turn(beat * PERIOD, 300)), None);
-            assert_eq!(gathered.ticked(turn(beat * PERIOD + 2500, 4000)), Some(4300));
-        }
     }
 
     #[test]

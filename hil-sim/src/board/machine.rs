@@ -10,7 +10,7 @@ use std::path::Path;
 
 use super::chip::Chip;
 use super::core::unicorn::{Counted, UnicornCore};
-use super::core::{Access, Bus, Core, CoreError, Heat, Mark, Register, Stop, passes};
+use super::core::{Access, Bus, Core, CoreError, Heat, Mark, MaskedBy, Register, Stop, passes};
 use super::elf::{FLASH, Function, Loaded, RAM, named};
 use super::exceptions::number::{HARD_FAULT, SV_CALL};
 use super::image::ImageError;
@@ -124,6 +124,11 @@ impl Machine {
     /// Takes the cycles by block of code since the last call, or since the start.
     pub fn take_heat(&mut self) -> Heat {
         self.core.take_heat()
+    }
+
+    /// Takes where interrupts were shut out since the last call, or since the start.
+    pub fn take_masked(&mut self) -> MaskedBy {
+        self.core.take_masked()
     }
 
     /// Names of the tasks, by their numbers in the profile.

@@ -6,6 +6,7 @@
 //! is [`super::chip`]'s.
 
 pub mod adc;
+pub mod crc;
 pub mod dbgmcu;
 pub mod dma;
 pub mod encoder;

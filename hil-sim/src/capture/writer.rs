@@ -12,7 +12,8 @@ use mcap::records::{MessageHeader, Metadata};
 
 use super::message::messages;
 use crate::live::Topic;
-use crate::log::{Decoder, FRAMES, Header, Item, Mark, Row, Tally};
+use crate::log::{Decoder, FRAMES, Header, Item, Mark, Row, Tally, pieces};
+use interstage::log::frame::LONGEST;
 
 /// Nanoseconds of a tick.
 const TICK_NS: u64 = 1_000_000;
@@ -84,13 +85,22 @@ impl<M: Write + Seek, C: Write> Writer<M, C> {
     /// # Errors
     /// [`WriteError`] if a file cannot grow any more.
     pub fn take(&mut self, bytes: &[u8], see: &mut impl FnMut(&Item)) -> Result<(), WriteError> {
-        for part in bytes.split_inclusive(|byte| *byte == 0) {
-            self.partial.extend_from_slice(part);
-            if part.ends_with(&[0]) {
-                let frame = std::mem::take(&mut self.partial);
-                self.frame(&frame, see).map_err(|source| self.failed(source))?;
-            }
+        let mut held = std::mem::take(&mut self.partial);
+        held.extend_from_slice(bytes);
+        let mut used = 0;
+        for frame in pieces(&held) {
+            used += frame.len();
+            self.frame(frame, see).map_err(|source| self.failed(source))?;
         }
+        // Of what is no frame, only the end may become one.
+        let strange = (held.len() - used).saturating_sub(LONGEST);
+        if strange > LONGEST {
+            let strange = &held[used..used + strange];
+            used += strange.len();
+            self.frame(strange, see).map_err(|source| self.failed(source))?;
+        }
+        held.drain(..used);
+        self.partial = held;
         if self.decoder.tally().ticks >= self.kept + FLUSH_TICKS {
             self.flush().map_err(|source| self.failed(source))?;
         }

@@ -1,11 +1,11 @@
 //! Bytes of the binary channel to what they say.
 //!
 //! Nothing is lost unnoticed: what is missing between two frames is an item of its own.
-//! Garbage ends at the next zero; a target that starts anew is recognised by its
+//! Garbage ends at the next sound frame; a target that starts anew is recognised by its
 //! sequence or its clock going back.
 
 use interstage::log::capture::Shots;
-use interstage::log::frame::{Body, Frame, LONGEST};
+use interstage::log::frame::{Body, Frame, Seen, look};
 use interstage::log::identity::SCHEMA;
 use interstage::log::ledger::Line;
 use interstage::log::{Entry, Identity, Record};
@@ -121,10 +121,10 @@ pub struct Tally {
 /// A decoder under way. It takes bytes as they come.
 #[derive(Clone, Debug, Default)]
 pub struct Decoder {
-    /// Of the frame that has not ended yet.
+    /// What has come of a frame that is not whole yet.
     partial: Vec<u8>,
-    /// The frame under way is longer than any: skipped to its end.
-    overlong: u64,
+    /// Bytes before it that are no frame.
+    strange: u64,
     /// Sequence and dropped frames that the next head should have.
     due: Option<(u32, u32)>,
     /// Time of the last tick, and its codes.
@@ -150,50 +150,52 @@ impl Decoder {
     /// Reads on, and hands each item to `take` in its order.
     pub fn read(&mut self, bytes: &[u8], take: &mut impl FnMut(Item)) {
         self.tally.bytes += bytes.len() as u64;
-        let mut parts = bytes.split(|byte| *byte == 0);
-        // What stands behind the last zero is the beginning of a frame.
-        let rest = parts.next_back().unwrap_or_default();
-        for part in parts {
-            self.gather(part);
-            self.end(take);
-        }
-        self.gather(rest);
+        let mut held = std::mem::take(&mut self.partial);
+        held.extend_from_slice(bytes);
+        let used = self.look(&held, false, take);
+        held.drain(..used);
+        self.partial = held;
     }
 
     /// The log ends here: what has begun will not be completed.
     pub fn finish(&mut self, take: &mut impl FnMut(Item)) {
-        let bytes = self.overlong + self.partial.len() as u64;
-        (self.overlong, self.partial) = (0, Vec::new());
+        let held = std::mem::take(&mut self.partial);
+        self.look(&held, true, take);
+        self.strange(take);
+    }
+
+    /// Takes what is whole from the beginning of `bytes`, all of it if they are the last;
+    /// so many are used.
+    fn look(&mut self, bytes: &[u8], last: bool, take: &mut impl FnMut(Item)) -> usize {
+        let mut used = 0;
+        while let Some(rest) = bytes.get(used..).filter(|rest| !rest.is_empty()) {
+            used += match look(rest) {
+                Seen::Frame(frame, length) => {
+                    self.strange(take);
+                    self.frame(&frame, length as u64, take);
+                    length
+                }
+                Seen::Garbage(length) => {
+                    self.strange += length as u64;
+                    length
+                }
+                // What looks like a frame that goes on may be none, with one behind it.
+                Seen::Part if last => {
+                    self.strange += 1;
+                    1
+                }
+                Seen::Part => break,
+            };
+        }
+        used
+    }
+
+    /// Says what was no frame.
+    fn strange(&mut self, take: &mut impl FnMut(Item)) {
+        let bytes = std::mem::take(&mut self.strange);
         if bytes > 0 {
             self.garbage(bytes, take);
         }
-    }
-
-    fn gather(&mut self, part: &[u8]) {
-        if self.overlong > 0 || self.partial.len() + part.len() > LONGEST {
-            self.overlong += (self.partial.len() + part.len()) as u64;
-            self.partial.clear();
-        } else {
-            self.partial.extend_from_slice(part);
-        }
-    }
-
-    /// A zero has come.
-    fn end(&mut self, take: &mut impl FnMut(Item)) {
-        let mut bytes = std::mem::take(&mut self.partial);
-        let overlong = std::mem::take(&mut self.overlong);
-        if overlong > 0 {
-            self.garbage(overlong, take);
-        } else if !bytes.is_empty() {
-            let length = bytes.len() as u64;
-            match Frame::open(&mut bytes) {
-                Ok(frame) => self.frame(&frame, length, take),
-                Err(_) => self.garbage(length, take),
-            }
-        }
-        // The room is used again.
-        bytes.clear();
-        self.partial = bytes;
     }
 
     fn garbage(&mut self, bytes: u64, take: &mut impl FnMut(Item)) {
@@ -396,19 +398,17 @@ pub(crate) mod tests {
         }
 
         #[test]
-        fn garbage_ends_at_the_next_zero(
+        fn garbage_ends_at_the_next_frame(
             garbage in prop::collection::vec(any::<u8>(), 1..1500),
             at in 1..50_usize,
         ) {
             let all = frames(0, 400);
             let mut bytes = all[..at].concat();
             bytes.extend(&garbage);
-            bytes.push(0);
             bytes.extend(all[at..].concat());
             let (items, tally) = decode(&bytes, 333);
             prop_assert!(ticks(&items).into_iter().eq(0..400));
-            let zeros = garbage.iter().filter(|byte| **byte == 0).count();
-            prop_assert_eq!(tally.garbage_bytes as usize, garbage.len() - zeros);
+            prop_assert_eq!(tally.garbage_bytes as usize, garbage.len());
             prop_assert_eq!(tally.lost_frames, 0);
         }
 
@@ -416,8 +416,7 @@ pub(crate) mod tests {
         fn random_bytes_are_marked_and_no_panic(bytes in prop::collection::vec(any::<u8>(), 0..5000)) {
             let (items, tally) = decode(&bytes, 512);
             prop_assert_eq!(ticks(&items).len(), 0);
-            let zeros = bytes.iter().filter(|byte| **byte == 0).count();
-            prop_assert_eq!(tally.garbage_bytes as usize, bytes.len() - zeros);
+            prop_assert_eq!(tally.garbage_bytes as usize, bytes.len());
         }
 
         #[test]
@@ -433,8 +432,7 @@ pub(crate) mod tests {
             let (items, _) = decode(&bytes, 100);
             let seen = ticks(&items);
             prop_assert!(seen.windows(2).all(|pair| pair[0] < pair[1]));
-            // A zero that is hit joins two frames: two frames of eight for each.
-            prop_assert!(seen.len() + 16 * damages.len() >= 400, "{} left", seen.len());
+            prop_assert!(seen.len() + 8 * damages.len() >= 400, "{} left", seen.len());
         }
 
         #[test]
@@ -442,7 +440,6 @@ pub(crate) mod tests {
             let mut bytes = frames(5, before).concat();
             bytes.truncate(bytes.len() - 3);
             let second = frames(2, after);
-            bytes.push(0);
             bytes.extend(second[gone..].concat());
             let (items, tally) = decode(&bytes, 50);
             prop_assert_eq!(tally.restarts, 1);

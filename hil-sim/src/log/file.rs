@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use super::decoder::{Decoder, Item};
 use super::row::Row;
 use super::run::Run;
+use interstage::log::frame::{Seen, check, look};
+use interstage::log::identity::SCHEMA;
 use mcap::read::Options;
 use mcap::records::Record;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -38,11 +40,11 @@ pub enum ReadError {
     },
 }
 
-/// The frames of a stream, each with its zero and the time at which it was written, s:
-/// that of the newest tick up to it. What follows the last zero is no frame.
+/// The frames of a stream, each with what is none before it and the time at which it was
+/// written, s: that of the newest tick up to it. What follows the last is no frame.
 pub fn timed(stream: &[u8]) -> impl DoubleEndedIterator<Item = (f64, &[u8])> {
     let (mut decoder, mut now, mut frames) = (Decoder::new(), 0.0, Vec::new());
-    for frame in stream.split_inclusive(|byte| *byte == 0).filter(|frame| frame.ends_with(&[0])) {
+    for frame in pieces(stream) {
         decoder.read(frame, &mut |item| {
             if let Item::Tick(record, _) = item {
                 now = f64::from(record.at()) * 1e-3;
@@ -51,6 +53,39 @@ pub fn timed(stream: &[u8]) -> impl DoubleEndedIterator<Item = (f64, &[u8])> {
         frames.push((now, frame));
     }
     frames.into_iter()
+}
+
+/// A stream cut behind every frame; what follows the last one is left out.
+pub fn pieces(stream: &[u8]) -> impl Iterator<Item = &[u8]> {
+    let mut rest = stream;
+    std::iter::from_fn(move || {
+        let mut used = 0;
+        loop {
+            used += match look(rest.get(used..).filter(|rest| !rest.is_empty())?) {
+                Seen::Garbage(length) => length,
+                Seen::Part => 1,
+                Seen::Frame(_, length) => {
+                    let (piece, behind) = rest.split_at(used + length);
+                    rest = behind;
+                    return Some(piece);
+                }
+            };
+        }
+    })
+}
+
+/// Whether bytes are frames of the first layout, which stood between zeros.
+fn is_first_layout(bytes: &[u8]) -> bool {
+    let sound = |part: &&[u8]| {
+        let mut part = part.to_vec();
+        let whole = cobs::decode_in_place(&mut part).ok().and_then(|length| part.get(..length));
+        let parts = whole.and_then(|whole| whole.split_last_chunk());
+        parts.is_some_and(|(content, sum)| check(content).to_le_bytes() == *sum)
+    };
+    /// Frames that are looked at: the first may have lost its beginning.
+    const FRAMES: usize = 8;
+    let parts = bytes.split(|byte| *byte == 0).filter(|part| part.len() > 4 && part.len() < 512);
+    parts.take(FRAMES).any(|part| sound(&part))
 }
 
 impl Run {
@@ -64,15 +99,22 @@ impl Run {
         let bytes = std::fs::read(path)
             .map_err(|source| ReadError::File { path: path.to_owned(), source })?;
         let content = |why: String| ReadError::Content { path: path.to_owned(), why };
+        let mut old = is_first_layout(&bytes);
         let run = if bytes.starts_with(MCAP) {
-            of_mcap(&bytes).map_err(|error| content(error.to_string()))?
+            let (run, first) = of_mcap(&bytes).map_err(|error| content(error.to_string()))?;
+            old = is_first_layout(&first);
+            run
         } else if bytes.starts_with(CSV) {
             of_csv(&bytes).map_err(|error| content(error.to_string()))?
         } else {
             Self::of_stream(&bytes)
         };
         if run.rows.is_empty() {
-            return Err(content("it holds no tick".to_owned()));
+            return Err(content(if old {
+                format!("frames of schema 1, this reader knows {SCHEMA}")
+            } else {
+                "it holds no tick".to_owned()
+            }));
         }
         Ok(run)
     }
@@ -103,15 +145,16 @@ pub(crate) fn sound(bytes: &[u8]) -> &[u8] {
     bytes
 }
 
-/// Reads messages up to the end, or to where the file was cut off.
-fn of_mcap(bytes: &[u8]) -> mcap::McapResult<Run> {
+/// Reads messages up to the end, or to where the file was cut off; with the first message's
+/// bytes.
+fn of_mcap(bytes: &[u8]) -> mcap::McapResult<(Run, Vec<u8>)> {
     let bytes = sound(bytes);
     let (mut decoder, mut run) = (Decoder::new(), Run::default());
     let options = LinearReaderOptions::default()
         .with_skip_end_magic(true)
         .with_record_length_limit(LONGEST_RECORD);
     let mut reader = LinearReader::new_with_options(options);
-    let (mut rest, mut frames) = (bytes, None);
+    let (mut rest, mut frames, mut first) = (bytes, None, Vec::new());
     // A file without its end, or damaged, is read as far as it goes.
     while let Some(Ok(event)) = reader.next_event() {
         match event {
@@ -126,6 +169,9 @@ fn of_mcap(bytes: &[u8]) -> mcap::McapResult<Run> {
                     frames = Some(channel.id)
                 }
                 Ok(Record::Message { header, data }) if Some(header.channel_id) == frames => {
+                    if first.is_empty() {
+                        first = data.to_vec();
+                    }
                     decoder.read(&data, &mut |item| run.add(&item));
                 }
                 Ok(_) => {}
@@ -136,7 +182,7 @@ fn of_mcap(bytes: &[u8]) -> mcap::McapResult<Run> {
     decoder.finish(&mut |item| run.add(&item));
     run.tally = *decoder.tally();
     run.parameters = parameters(bytes);
-    Ok(run)
+    Ok((run, first))
 }
 
 /// The parameters that stand beside the messages.
@@ -208,6 +254,32 @@ mod tests {
         assert_eq!(run.rows.len(), 80);
         assert!(run.is_whole());
         assert_eq!(run.header.unwrap().rig, "test");
+    }
+
+    #[test]
+    fn a_log_of_the_first_layout_is_told_by_its_number() {
+        let content = b"\x01\x00\x00a version";
+        let frame = [&content[..], &check(content).to_le_bytes()].concat();
+        let mut bytes = vec![0; frame.len() + 8];
+        let length = cobs::encode(&frame, &mut bytes);
+        bytes.truncate(length + 1);
+        // In the middle of one frame, then whole ones.
+        let stream = [b"tail\0", &bytes[..], &bytes].concat();
+        let (_directory, path) = file(&stream);
+        let error = Run::read(&path).unwrap_err().to_string();
+        assert!(error.ends_with("frames of schema 1, this reader knows 2"), "{error}");
+        let (_directory, path) = file(&[7; 600]);
+        assert!(Run::read(&path).unwrap_err().to_string().ends_with("it holds no tick"));
+    }
+
+    #[test]
+    fn a_stream_is_cut_behind_its_frames() {
+        let all = frames(0, 80);
+        let stream = [b"strange", &all.concat()[..], &all[3][..9]].concat();
+        let cut: Vec<&[u8]> = pieces(&stream).collect();
+        assert_eq!(cut.len(), all.len());
+        assert_eq!(cut[0], [b"strange", &all[0][..]].concat());
+        assert!(cut[1..].iter().zip(&all[1..]).all(|(piece, frame)| piece == frame));
     }
 
     #[test]

@@ -12,7 +12,7 @@ use crate::{code, good, number, object, rig, rig_in, said};
 fn frames() -> Vec<Vec<u8>> {
     let options = sil::Options { rows: true, ..sil::Options::default() };
     let stream = sil::run(&Scenario::default(), options).expect("a run").stream;
-    stream.split_inclusive(|byte| *byte == 0).map(<[u8]>::to_vec).collect()
+    hil_sim::log::pieces(&stream).map(<[u8]>::to_vec).collect()
 }
 
 /// A directory with a file in it.

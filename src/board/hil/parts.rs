@@ -12,7 +12,7 @@ use rtt_target::DownChannel;
 
 use super::desk::DESK;
 use crate::board::rtt::Frames;
-use crate::board::{Console, Guard, Lamp, Lines, Nucleo, Pages};
+use crate::board::{Checksum, Console, Guard, Lamp, Lines, Nucleo, Pages};
 
 /// The wheel's counter.
 pub(crate) struct Wheel;
@@ -87,7 +87,7 @@ pub(crate) fn split(
         watchdog: Guard::new(p.IWDG),
         button: Button,
         console: Console::new(console),
-        journal: Lines::new(frames),
+        journal: Lines::new(frames, Checksum::new(p.CRC)),
         light: Lamp,
     };
     (parts, p.PA5.into(), Pages::new(p.FLASH))

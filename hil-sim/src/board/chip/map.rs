@@ -22,6 +22,7 @@ pub(super) enum Block {
     Counter,
     System,
     Debug,
+    Crc,
 }
 
 /// Everything on the buses. Outside of it an access is a bus fault, as on the chip.
@@ -35,7 +36,7 @@ pub(super) const RANGES: [(u32, u32); 6] = [
 ];
 
 /// First address, bytes, block. Source: RM0440, table 3.
-const BLOCKS: [(u32, u32, Block); 17] = [
+const BLOCKS: [(u32, u32, Block); 18] = [
     (0x4000_0000, 0x400, Block::Time),
     (0x4000_0C00, 0x400, Block::Encoder),
     (0x4000_3000, 0x400, Block::Watchdog),
@@ -49,6 +50,7 @@ const BLOCKS: [(u32, u32, Block); 17] = [
     (0x4002_0800, 0x400, Block::Mux),
     (0x4002_1000, 0x400, Block::Rcc),
     (0x4002_2000, 0x400, Block::Flash),
+    (0x4002_3000, 0x400, Block::Crc),
     (0x5000_0000, 0x400, Block::Adc),
     (0xE000_1000, 0x1000, Block::Counter),
     (0xE000_E000, 0x1000, Block::System),
@@ -93,6 +95,7 @@ pub(super) fn name(block: Block) -> &'static str {
         Block::Counter => "DWT",
         Block::System => "SCS",
         Block::Debug => "DBGMCU",
+        Block::Crc => "CRC",
     }
 }
 
@@ -117,6 +120,7 @@ pub(super) fn is_clocked(block: Block, rcc: &Rcc) -> bool {
         Block::Spi => (APB2, 12),
         Block::Dma => (AHB1, 0),
         Block::Mux => (AHB1, 2),
+        Block::Crc => (AHB1, 12),
         Block::Port(port) => (AHB2, port as u32),
         Block::Adc => (AHB2, 13),
         Block::Flash

@@ -12,7 +12,8 @@ use unicorn_engine::{
 };
 
 use super::{
-    Access as Touch, Bus, Core, CoreError, Fault, Heat, Mark, Meter, NoBus, Register, Stop, passes,
+    Access as Touch, Bus, Core, CoreError, Fault, Heat, Mark, MaskedBy, Meter, NoBus, Register,
+    Stop, passes,
 };
 use crate::board::thumb::{self, Kind};
 use crate::board::timing::{self, REFILL};
@@ -59,7 +60,12 @@ const RETURN_BITS: u32 = 0xFFFF_FF01;
 /// `WFE`, `WFI` and `SEV`, as they stand in memory.
 const WFE: [u8; 2] = [0x20, 0xBF];
 const WFI: [u8; 2] = [0x30, 0xBF];
-const SEV: [u8; 2] = [0x40, 0xBF];
+const SEV: &[u8] = &[0x40, 0xBF];
+/// `CPSID i` and `CPSIE i`.
+const CLOSE: &[u8] = &[0x72, 0xB6];
+const OPEN: &[u8] = &[0x62, 0xB6];
+/// The exception's number among the flags.
+const EXCEPTION: u64 = 0x1FF;
 /// The state of thumb code outside of a conditional block, among the flags.
 const THUMB: u64 = 1 << 24;
 /// Marks a halfword at which no block has begun yet.
@@ -104,6 +110,27 @@ struct Inside<B> {
     bus: B,
     marked: Vec<u32>,
     marks: Vec<Mark>,
+    /// Interrupts are shut out since this cycle, by this place in this exception.
+    shut: Option<(u64, (u32, u32))>,
+    masked: MaskedBy,
+}
+
+impl<B> Inside<B> {
+    fn new(count: Count, bus: B) -> Self {
+        let (marked, marks, masked) = (Vec::new(), Vec::new(), MaskedBy::new());
+        Self { count, bus, marked, marks, shut: None, masked }
+    }
+
+    /// Interrupts are let in again.
+    fn open(&mut self) {
+        if let Some((since, place)) = self.shut.take() {
+            let cycles = self.count.meter.cycles.saturating_sub(since);
+            let masked = self.masked.entry(place).or_default();
+            masked.times += 1;
+            masked.cycles += cycles;
+            masked.worst = masked.worst.max(cycles);
+        }
+    }
 }
 
 impl Count {
@@ -192,6 +219,14 @@ fn engine<T>(what: &'static str, result: Result<T, impl std::fmt::Debug>) -> Res
     result.map_err(|error| CoreError::Engine { what, why: format!("{error:?}") })
 }
 
+/// The program shuts interrupts out at this place.
+fn shut<B>(uc: &mut Hooked<'_, B>, address: u32) {
+    let flags = uc.reg_read(RegisterARM::XPSR).unwrap_or_default();
+    let inside = uc.get_data_mut();
+    let now = inside.count.meter.cycles;
+    inside.shut.get_or_insert((now, (address, (flags & EXCEPTION) as u32)));
+}
+
 /// Stops the engine from inside a hook.
 fn halt<B>(uc: &mut Hooked<'_, B>, stop: Stop) {
     uc.get_data_mut().count.stop = Some(stop);
@@ -216,8 +251,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
     /// As [`UnicornCore::new`].
     pub fn with_bus(memories: &[Memory], counted: &Counted<'_>, bus: B) -> Result<Self, CoreError> {
         let ranges = bus.ranges();
-        let inside =
-            Inside { count: Count::new(counted), bus, marked: Vec::new(), marks: Vec::new() };
+        let inside = Inside::new(Count::new(counted), bus);
         // The flag for the microcontroller profile would select another core.
         let new = Unicorn::new_with_data(Arch::ARM, Mode::THUMB, inside);
         let mut core = Self { engine: engine("start", new)? };
@@ -364,15 +398,37 @@ impl<B: Bus + 'static> UnicornCore<B> {
                     self.hook_late(address, instruction.kind)?;
                 }
                 let at = (address - range.start) as usize;
-                if instruction.size == 2 && code.get(at..at + 2) == Some(&SEV[..]) {
-                    let at = u64::from(address);
-                    let sent =
-                        self.engine.add_code_hook(at, at, |uc, _, _| uc.get_data_mut().bus.event());
-                    engine("hook an instruction", sent)?;
+                if let Some(code) = code.get(at..at + instruction.size as usize) {
+                    self.hook_mask(address, code)?;
                 }
             }
         }
         Ok(())
+    }
+
+    /// Follows an instruction that sends an event, or shuts interrupts out or lets them in.
+    ///
+    /// The engine ends a block behind each of the latter two, so that the cycles counted
+    /// when it comes to them are those up to them.
+    fn hook_mask(&mut self, address: u32, code: &[u8]) -> Result<(), CoreError> {
+        let (at, uc) = (u64::from(address), &mut self.engine);
+        let hooked = match code {
+            SEV => uc.add_code_hook(at, at, |uc, _, _| uc.get_data_mut().bus.event()),
+            CLOSE => uc.add_code_hook(at, at, move |uc, _, _| shut(uc, address)),
+            OPEN => uc.add_code_hook(at, at, |uc, _, _| uc.get_data_mut().open()),
+            // MSR PRIMASK, Rn.
+            [first, 0xF3, 0x10, 0x88] if first >> 4 == 8 => {
+                let register = general(first & 0xF);
+                uc.add_code_hook(at, at, move |uc, _, _| {
+                    match uc.reg_read(register).unwrap_or_default() & 1 {
+                        0 => uc.get_data_mut().open(),
+                        _ => shut(uc, address),
+                    }
+                })
+            }
+            _ => return Ok(()),
+        };
+        engine("hook an instruction", hooked).map(|_| ())
     }
 
     /// Adds what an instruction costs beyond its first cycle whenever it is carried out.
@@ -491,6 +547,10 @@ impl<B: Bus + 'static> Core for UnicornCore<B> {
     }
 
     fn set_register(&mut self, register: Register, value: u32) -> Result<(), CoreError> {
+        if register == Register::Primask && value & 1 == 0 {
+            // Set from outside: what was shut by the program is open.
+            self.engine.get_data_mut().shut = None;
+        }
         let uc = &mut self.engine;
         if register == Register::Xpsr {
             // This name takes every field; the plain one leaves some out. Only the
@@ -550,6 +610,10 @@ impl<B: Bus + 'static> Core for UnicornCore<B> {
 
     fn take_marks(&mut self, marks: &mut Vec<Mark>) {
         marks.append(&mut self.engine.get_data_mut().marks);
+    }
+
+    fn take_masked(&mut self) -> MaskedBy {
+        std::mem::take(&mut self.engine.get_data_mut().masked)
     }
 
     fn take_heat(&mut self) -> Heat {

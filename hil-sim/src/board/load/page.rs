@@ -70,7 +70,11 @@ fn table(load: &Load) -> String {
         .interrupts
         .iter()
         .map(|i| row("interrupt", &i.name, &i.cost, Some((i.latency_mean, i.latency_worst))));
-    let rows: String = phases.chain(tasks).chain(interrupts).collect();
+    let shut = load.masked.iter().map(|shut| {
+        let name = format!("{} ({})", shut.function, shut.level);
+        row("interrupts shut out by", &name, &shut.cost(load.cycles), None)
+    });
+    let rows: String = phases.chain(tasks).chain(interrupts).chain(shut).collect();
     format!("{HEAD}{rows}</tbody>\n</table>\n")
 }
 

@@ -5,7 +5,10 @@ use std::fmt::Write;
 use crate::board::load::{Cost, Load};
 use crate::table::plain;
 
-/// Load, tick by phase, tasks and interrupts.
+/// Places shown that shut interrupts out, the longest first.
+const SHUT: usize = 3;
+
+/// Load, tick by phase, tasks and interrupts, and who shuts interrupts out.
 pub(super) fn text(load: &Load, missed: &[String]) -> String {
     let us = |cycles: f64| cycles * 1e6 / load.clock_hz as f64;
     let mut text = String::new();
@@ -45,8 +48,12 @@ pub(super) fn text(load: &Load, missed: &[String]) -> String {
         .interrupts
         .iter()
         .map(|i| row("interrupt", &i.name, &i.cost, Some((i.latency_mean, i.latency_worst))));
+    let shut = load.masked.iter().take(SHUT).map(|shut| {
+        let name = format!("{} ({})", shut.function, shut.level);
+        row("shut out by", &name, &shut.cost(load.cycles), None)
+    });
     let head = ["cycles of", "runs", "mean", "worst", "time", "latency", "worst"];
-    let _ = writeln!(text, "{}", plain(&head, phases.chain(tasks).chain(interrupts)));
+    let _ = writeln!(text, "{}", plain(&head, phases.chain(tasks).chain(interrupts).chain(shut)));
     for missed in missed {
         let _ = writeln!(text, "  over budget: {missed}");
     }
