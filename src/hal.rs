@@ -2,7 +2,7 @@
 //! and failure. `src/board` implements it on the STM32G474, the tests with
 //! mocks, the virtual rig with its plant.
 
-use crate::blackbox::Flight;
+use crate::blackbox::{Flight, Place};
 use crate::log::frame::{Checker, check};
 use crate::log::{Entry, Identity};
 use crate::sense::raw::{AdcCode, AngleFrame, BridgeCodes, BusFault, EncoderCount};
@@ -102,6 +102,11 @@ pub trait Watchdog {
     /// Keeps what the drive does in this tick where a restart finds it. A board without
     /// such a place keeps nothing.
     fn keep(&mut self, flight: &Flight);
+
+    /// Where the wheel stands by what was kept before this start, if that tells.
+    fn place(&self) -> Option<Place> {
+        None
+    }
 }
 
 /// A source of operator commands: the board button or the log channel.

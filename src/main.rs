@@ -121,6 +121,7 @@ mod firmware {
         guard::arm();
         let (console, line) = (channels.console, channels.line);
         let (mut parts, lamp, pages) = split(p, console, channels.telemetry);
+        parts.watchdog.place = restart.place();
         threads.spawn(light::show(lamp).unwrap());
         let (constants, service) = config::build(pages);
         threads.spawn(link(HostLine::new(line), service).unwrap());

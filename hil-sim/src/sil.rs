@@ -54,6 +54,9 @@ pub enum RunError {
     /// The plant left the set of meaningful states.
     #[error("{0}")]
     Plant(#[from] PlantError),
+    /// There is no board that could break.
+    #[error("run.faults: {0} is a fault of the board's hardware: --target board")]
+    Hardware(String),
 }
 
 impl From<ControllerKind> for Strategy {

@@ -7,6 +7,7 @@ mod build;
 mod crossing;
 mod modes;
 mod plans;
+mod resume;
 mod runs;
 mod state;
 
@@ -130,6 +131,11 @@ struct Pass<'a> {
 }
 
 impl Pass<'_> {
+    /// Compression of the tread, smoothed, mm.
+    fn compressed(&self) -> Millimetres {
+        self.sensed.compression_filtered
+    }
+
     fn log(&mut self, event: Event) {
         // A tick that has more to say than fits says the first eight.
         let _ = self.output.events.push(Entry { at: self.now, event });

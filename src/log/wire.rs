@@ -23,7 +23,7 @@ const WORDS: usize = 6;
 /// Bits of the map before those of the words.
 const DIFFERENCES: usize = 2 * (1 + NUMBERS);
 
-const _: () = assert!(DIFFERENCES + WORDS == 32, "every bit of the map has its meaning");
+const _: () = assert!(DIFFERENCES + WORDS == 32, "the map is full");
 
 /// A record as whole numbers.
 ///
@@ -76,10 +76,10 @@ impl Wire {
             words: [
                 word(*wheel, *load_cell),
                 word(*tread, *arm),
+                word(*drive, *pretightener),
                 word(t.drive.to_bits() as u16, t.pretightener.to_bits() as u16),
                 u32::from_le_bytes([t.level, t.stage as u8, number::of_mode(t.mode), 0]),
                 flags.to_bits().into(),
-                word(*drive, *pretightener),
             ],
         }
     }
@@ -88,7 +88,7 @@ impl Wire {
     pub(super) fn record(&self) -> Option<Record> {
         let [ages, q @ ..] = self.numbers;
         let q: [Q16; 11] = q.map(|bits| Q16::from_bits(bits as i32));
-        let [wheel_and_cell, tread_and_arm, duties, state, flags, bridges] = self.words;
+        let [wheel_and_cell, tread_and_arm, bridges, duties, state, flags] = self.words;
         let [arm_age, wheel_age, load_cell_age, tread_age] = ages.to_le_bytes();
         let [level, stage, mode, rest] = state.to_le_bytes();
         let [wheel, load_cell] = halves(wheel_and_cell);
@@ -273,14 +273,16 @@ mod tests {
         // Stage 0, mode 99, a byte that says nothing, flags beyond 16 bits.
         let state = |stage, mode, rest| u32::from_le_bytes([0, stage, mode, rest]);
         for (place, number) in
-            [(3, state(0, 0, 0)), (3, state(1, 99, 0)), (3, state(1, 0, 1)), (4, 65_536)]
+            [(4, state(0, 0, 0)), (4, state(1, 99, 0)), (4, state(1, 0, 1)), (5, 65_536)]
         {
             let mut meaningless = sound;
             meaningless.words[place] = number;
             assert_eq!(meaningless.record(), None, "{place}");
         }
-        // A map with a difference of no length.
-        let bytes = [&3_u32.to_le_bytes()[..], &[0; LONGEST]].concat();
-        assert_eq!(Wire::take(&sound, &bytes), None);
+        // A map with a difference of no length, and one with a word that is missing.
+        for (map, behind) in [(3_u32, LONGEST), (1 << 31, 3)] {
+            let bytes = [&map.to_le_bytes()[..], &vec![0; behind]].concat();
+            assert_eq!(Wire::take(&sound, &bytes), None);
+        }
     }
 }

@@ -19,6 +19,14 @@ pub fn fill_safety(page: &str, outcome: &Outcome) -> Result<String> {
     fill(&page, "rest", &rest(outcome))
 }
 
+/// `page` with the matrix of the emulated board as this campaign came out.
+///
+/// # Errors
+/// If the block is missing.
+pub fn fill_board(page: &str, outcome: &Outcome) -> Result<String> {
+    fill(page, "board-matrix", &matrix(outcome))
+}
+
 fn bounds() -> String {
     let preload = 100.0 * PRELOAD_PART;
     let gap = 100.0 * GAP_PART;
@@ -35,10 +43,11 @@ fn bounds() -> String {
 
 fn matrix(outcome: &Outcome) -> String {
     let mut text = format!(
-        "`cargo rig faults -n {}`: {} faults at {} instants each, {} undetected, {} unsafe.\n\n\
+        "`cargo rig faults{} -n {}`: {} faults at {} instants each, {} undetected, {} unsafe.\n\n\
          | fault | measure | codes (times) | borne | detection, ms: median | worst | from any \
          difference: worst | ends | preload, N | uncommanded, mm |\n\
          |---|---|---|---|---|---|---|---|---|---|\n",
+        if outcome.target == "sil" { "" } else { " --target board" },
         outcome.instants,
         outcome.matrix.len(),
         outcome.instants,
@@ -53,7 +62,9 @@ fn matrix(outcome: &Outcome) -> String {
 
 fn row(line: &Line) -> String {
     let list = |all: Vec<String>| if all.is_empty() { "-".to_owned() } else { all.join(", ") };
-    let codes = line.codes.iter().map(|(code, times)| format!("{code} ({times})")).collect();
+    let codes = line.codes.iter().map(|(code, times)| format!("{code} ({times})"));
+    let restarts = line.restarts.iter().map(|(cause, times)| format!("{cause} ({times})"));
+    let codes = codes.chain(restarts).collect();
     let ends = line.ends.iter().map(|(end, times)| format!("{end} {times}")).collect();
     let borne = match line.undetected {
         0 => line.tolerated.to_string(),

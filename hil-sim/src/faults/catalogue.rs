@@ -19,7 +19,7 @@ pub struct Entry {
     pub text: &'static str,
 }
 
-const fn one(
+pub(super) const fn one(
     target: Target,
     kind: Kind,
     magnitude: f64,
@@ -31,7 +31,7 @@ const fn one(
 }
 
 /// One that has no measure.
-const fn plain(target: Target, kind: Kind, text: &'static str) -> Entry {
+pub(super) const fn plain(target: Target, kind: Kind, text: &'static str) -> Entry {
     one(target, kind, 0.0, (0.0, 0.0), "", text)
 }
 
@@ -178,7 +178,8 @@ pub const CATALOGUE: &[Entry] = {
 /// The fault of this kind at this target, if there is one.
 #[must_use]
 pub fn entry(target: Target, kind: Kind) -> Option<&'static Entry> {
-    CATALOGUE.iter().find(|entry| entry.target == target && entry.kind == kind)
+    let mut all = CATALOGUE.iter().chain(super::HARDWARE);
+    all.find(|entry| entry.target == target && entry.kind == kind)
 }
 
 #[cfg(test)]

@@ -40,6 +40,48 @@ pub enum Target {
     Log,
     /// Source of the commands.
     Commands,
+    /// Converter of the load cell.
+    LoadCellConverter,
+    /// Converter of the tread sensor.
+    TreadConverter,
+    /// Bus of the angle sensor.
+    AngleBus,
+    /// Line A of the wheel encoder.
+    EncoderLineA,
+    /// Line B of the wheel encoder.
+    EncoderLineB,
+    /// Direct memory access.
+    Dma,
+    /// Timer that wakes the tasks.
+    Timer,
+    /// The button's interrupt line.
+    Interrupt,
+    /// Whatever the processor executes.
+    Processor,
+    /// Task of the wheel encoder.
+    SpeedTask,
+    /// Task of the load cell.
+    PressureTask,
+    /// Task of the tread sensor.
+    DisplacementTask,
+    /// Task of the angle sensor.
+    AngleTask,
+    /// Task of the control tick.
+    TickTask,
+    /// Task of the model.
+    ModelTask,
+    /// Task of the log.
+    JournalTask,
+    /// Task of the host's line.
+    LineTask,
+    /// The board's supply.
+    Supply,
+    /// The reset pin.
+    ResetPin,
+    /// A debugger.
+    Debugger,
+    /// The host's line.
+    HostLine,
 }
 
 /// How it breaks.
@@ -88,6 +130,10 @@ pub enum Kind {
     Flooding,
     /// Comes at random.
     Random,
+    /// Turns bits over.
+    BitErrors,
+    /// Resets the board.
+    Reset,
 }
 
 /// From when a fault is there.
@@ -154,6 +200,12 @@ impl Target {
                 | Self::DriveReadback
                 | Self::PretightenerReadback
         )
+    }
+
+    /// Whether it is of the board's hardware, which a run in software has not.
+    #[must_use]
+    pub fn is_hardware(self) -> bool {
+        super::HARDWARE.iter().any(|entry| entry.target == self)
     }
 
     /// Whether a fault of it moves something before the controller does.

@@ -44,6 +44,8 @@ struct Active {
     /// When it came, s.
     since_s: Option<f64>,
     over: bool,
+    /// Whether it was there when it was last asked for.
+    known: bool,
     /// When it first did something, s.
     acts_s: Option<f64>,
     /// When it first did what the readback must tell, s.
@@ -67,6 +69,7 @@ impl Tamper {
             injection: *injection,
             since_s: None,
             over: false,
+            known: false,
             acts_s: None,
             tells_s: None,
             lie: injection.target.is_sensor().then(|| {
@@ -142,6 +145,18 @@ impl Tamper {
             let ends = |since_s: f64| fault.injection.duration_s.map(|s| since_s + s);
             fault.over = fault.since_s.and_then(ends).is_some_and(|end_s| t_s >= end_s);
         }
+    }
+
+    /// The faults that have come, and those that have gone, since the last call.
+    pub fn changes(&mut self) -> Vec<(Injection, bool)> {
+        let mut changes = Vec::new();
+        for fault in &mut self.faults {
+            let there = fault.since_s.is_some() && !fault.over;
+            if there != std::mem::replace(&mut fault.known, there) {
+                changes.push((fault.injection, there));
+            }
+        }
+        changes
     }
 
     /// The sensors as the controller gets them.

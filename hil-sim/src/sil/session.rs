@@ -1,6 +1,7 @@
 //! A run under way: controller and plant, a tick at a time, with commands and sensor
 //! failures given from outside.
 
+use interstage::blackbox::{Late, Recorder, Reset, Restart};
 use interstage::control::{Controller, Input, Output, State};
 use interstage::hal::MotorCommand;
 use interstage::model::{Plan, Planner};
@@ -52,8 +53,12 @@ impl Session {
     ///
     /// # Errors
     /// [`RunError::Rig`] if the parameters do not make a controller, [`RunError::Refused`] if
-    /// they do not make a plant.
+    /// they do not make a plant, [`RunError::Hardware`] if a fault takes a board.
     pub fn new(scenario: &Scenario, options: Options) -> Result<Self, RunError> {
+        if let Some(fault) = scenario.run.faults.iter().find(|f| f.target.is_hardware()) {
+            let (target, kind) = (fault.target.name(), fault.kind.name());
+            return Err(RunError::Hardware(format!("{target} {kind}")));
+        }
         let strategy = scenario.run.controller.into();
         let mut planner = Planner::try_build_as(&scenario.rig, strategy)?;
         if let Some((speed, uniform)) = options.speed {
@@ -221,6 +226,16 @@ impl Session {
         if let Some(stream) = &mut self.stream {
             stream.restart(&self.scenario, &self.controller);
         }
+    }
+
+    /// A reset that leaves memory and takes the power from the bridges at once: the
+    /// controller starts with what its record of the last tick tells of the place.
+    pub fn restart(&mut self) {
+        let flight =
+            Recorder::default().flight(&self.held.telemetry, self.state.is_placed(), Late::NOBODY);
+        let restart = Restart { reset: Reset::Pin, flight: Some(flight), crash: None };
+        self.reboot();
+        self.state = State::standing(restart.place());
     }
 
     /// What the drive is doing.

@@ -37,7 +37,7 @@ pub(super) const RANGES: [(u32, u32); 6] = [
 ];
 
 /// First address, bytes, block. Source: RM0440, table 3.
-const BLOCKS: [(u32, u32, Block); 18] = [
+const BLOCKS: [(u32, u32, Block); 19] = [
     (0x4000_0000, 0x400, Block::Time),
     (0x4000_0C00, 0x400, Block::Encoder),
     (0x4000_3000, 0x400, Block::Watchdog),
