@@ -5,7 +5,7 @@
 use crate::blackbox::{Flight, Place};
 use crate::log::frame::{Checker, check};
 use crate::log::{Entry, Identity};
-use crate::sense::raw::{AdcCode, AngleFrame, BusFault, EncoderCount};
+use crate::sense::raw::{AdcCode, AngleFrame, BridgeCodes, BusFault, EncoderCount};
 use crate::supervise::Command;
 
 /// The wheel encoder's counter.
@@ -79,6 +79,11 @@ pub trait Motors {
     /// Sets both bridges; takes effect at the next PWM period (at most 50 us).
     /// Never blocks and cannot fail.
     fn apply(&mut self, drive: MotorCommand, preload: MotorCommand);
+
+    /// What the bridges have put out since this was last asked, each through a low-pass of
+    /// [`LAG_TICKS`](crate::supervise::LAG_TICKS), taken at some moment since the last
+    /// tick; none if nothing has been converted. Never waits.
+    fn readback(&mut self) -> Option<BridgeCodes>;
 
     /// Whether the emergency stop has cut a bridge since the last [`Motors::rearm`].
     /// While it has, bridges stay without power whatever is applied.

@@ -2,6 +2,7 @@
 //! millisecond at a time, as fast as the host goes.
 
 mod account;
+mod echo;
 mod session;
 mod stream;
 mod trace;
@@ -20,6 +21,7 @@ use crate::record::{LogLine, Recording, Report};
 use crate::scenario::{ControllerKind, Direction, Scenario};
 
 pub use account::{PhaseAccount, PlantAccount, account, account_of};
+pub use echo::Echo;
 pub use session::{Session, drives, read};
 pub use stream::Stream;
 pub(crate) use trace::Trace;

@@ -28,6 +28,7 @@ pub async fn motors(
         let due = beat.lead(&exchange.pulse).await;
         let mut input = exchange.input(due.tick, due.missed > 0);
         input.emergency_stop = motors.stopped();
+        input.sensors.bridges = motors.readback();
         controller.step_into(&mut state, &input, &mut output);
         motors.apply(output.drive, output.preload);
         if output.rearm {

@@ -186,6 +186,7 @@ impl<'a> Bench<'a> {
             drive_on: on(drive),
             preload: preload.duty,
             preload_on: on(preload),
+            ..Drives::default()
         };
         let passed = Passed { codes: self.codes, drives };
         let taken = self.tampered.as_mut().map_or(drives, |tampered| tampered.drives(drives));
@@ -217,7 +218,9 @@ impl<'a> Bench<'a> {
         self.wheel += i64::from(turned);
         self.codes = codes;
         let chip = self.machine.chip_mut();
-        chip.set_analog([codes.load_cell.get(), codes.tread.get()]);
+        // Twelve bits and no more is what the readback takes of the sixteen.
+        let bridges = [codes.bridges.drive, codes.bridges.pretightener].map(|code| code.get() << 4);
+        chip.set_analog([codes.load_cell.get(), codes.tread.get(), bridges[0], bridges[1]]);
         chip.angle.angle = codes.arm.get();
         chip.turn_wheel(self.wheel, STEP);
     }
@@ -300,6 +303,12 @@ impl<'a> Bench<'a> {
         self.tampered.as_ref().and_then(Tampered::acts_s)
     }
 
+    /// When the readback had to tell it, s since power-up.
+    #[must_use]
+    pub fn tells_s(&self) -> Option<f64> {
+        self.tampered.as_ref().and_then(Tampered::tells_s)
+    }
+
     /// The plant.
     #[must_use]
     pub const fn plant(&self) -> &VirtualRig {
@@ -321,5 +330,6 @@ fn sensed(plant: &VirtualRig) -> Sensed {
         preload_n: truth.preload_n,
         depth_mm: truth.depth_mm,
         arm_rad: truth.arm_rad,
+        bridges: truth.bridges,
     }
 }

@@ -109,6 +109,7 @@ impl Tampered {
             load_cell: Some(Sample { code: codes.load_cell, at: now }),
             tread: Some(Sample { code: codes.tread, at: now }),
             arm: Some(Sample { code: codes.arm, at: now }),
+            bridges: Some(codes.bridges),
         };
         self.tamper.sensors(&mut frame);
         let bridge = |sample: Option<Sample<AdcCode>>| match sample {
@@ -127,6 +128,7 @@ impl Tampered {
             load_cell: bridge(frame.load_cell),
             tread: bridge(frame.tread),
             arm: frame.arm.filter(|_| !silent[1]).map_or(codes.arm, |s| s.code),
+            bridges: frame.bridges.unwrap_or_default(),
         }
     }
 
@@ -163,6 +165,11 @@ impl Tampered {
     /// When it first did something, see [`Tamper::acts_s`].
     pub(super) fn acts_s(&self) -> Option<f64> {
         if self.hangs { self.caught_s } else { self.tamper.acts_s() }
+    }
+
+    /// When the readback had to tell it, see [`Tamper::tells_s`].
+    pub(super) fn tells_s(&self) -> Option<f64> {
+        if self.hangs { self.caught_s } else { self.tamper.tells_s() }
     }
 }
 

@@ -32,7 +32,7 @@ fn bounds() -> String {
     let gap = 100.0 * GAP_PART;
     format!(
         "| bound | value |\n|---|---|\n\
-         | largest preload | {preload:.0} % of its limit, where the screw has its stop |\n\
+         | largest preload | {preload:.0} % of its limit; the screw has its stop at 125 % |\n\
          | way gone uncommanded, all together | {MOTION_MM} mm; {SLIDE_MM} mm where the wheel \
          has lost its grip |\n\
          | distance from the end that an arrival reports | {POSITION_MM} mm |\n\
@@ -44,8 +44,9 @@ fn bounds() -> String {
 fn matrix(outcome: &Outcome) -> String {
     let mut text = format!(
         "`cargo rig faults{} -n {}`: {} faults at {} instants each, {} undetected, {} unsafe.\n\n\
-         | fault | measure | codes (times) | borne | detection, ms: median | worst | ends | \
-         preload, N | uncommanded, mm |\n|---|---|---|---|---|---|---|---|---|\n",
+         | fault | measure | codes (times) | borne | detection, ms: median | worst | from any \
+         difference: worst | ends | preload, N | uncommanded, mm |\n\
+         |---|---|---|---|---|---|---|---|---|---|\n",
         if outcome.target == "sil" { "" } else { " --target board" },
         outcome.instants,
         outcome.matrix.len(),
@@ -70,12 +71,13 @@ fn row(line: &Line) -> String {
         missed => format!("{} and {missed} missed", line.tolerated),
     };
     format!(
-        "| {} | {} | {} | {borne} | {} | {} | {} | {:.1} | {:.2} |",
+        "| {} | {} | {} | {borne} | {} | {} | {} | {} | {:.1} | {:.2} |",
         line.fault,
         line.text,
         list(codes),
         number(line.latency_median_ms, 0),
         number(line.latency_ms, 0),
+        number(line.latency_any_ms.map(|spread| spread.worst), 0),
         list(ends),
         line.worst_preload_n,
         line.worst_motion_mm

@@ -184,8 +184,11 @@ pub struct Instant {
     /// What restarted the board, if something did and it was reported.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub restart: Option<&'static str>,
-    /// From when the fault first did something to its report, ms.
+    /// From when the fault first did something to its report, ms. Where it lies in a bridge:
+    /// from when the duty was off by more than the readback's band.
     pub latency_ms: Option<f64>,
+    /// The same from when the duty was off by two parts in a hundred, ms.
+    pub latency_any_ms: Option<f64>,
     /// The same from when the plant first ran otherwise than without the fault, ms.
     pub after_sign_ms: Option<f64>,
     /// From the report to rest with both bridges off, ms.
@@ -284,6 +287,7 @@ fn failed(scenario: &Scenario, error: &impl std::fmt::Display) -> Instant {
         code: None,
         restart: None,
         latency_ms: None,
+        latency_any_ms: None,
         after_sign_ms: None,
         rest_ms: None,
         end: "plant failed",
@@ -344,7 +348,9 @@ fn watched(scenario: &Scenario, twin: &Twin) -> Result<Instant, RunError> {
         finding,
         code: report.map(|(_, code)| code),
         restart: None,
-        latency_ms: since(session.acts_s()),
+        // Found before it had to be is found at once.
+        latency_ms: since(session.tells_s()).or(since(session.acts_s()).map(|_| 0.0)),
+        latency_any_ms: since(session.acts_s()),
         after_sign_ms: if moving { since(sign_s.or(report.map(|r| r.0))) } else { None },
         rest_ms: judge.fault.and_then(|(at_s, _)| Some(1e3 * (judge.rest_s? - at_s).max(0.0))),
         end: judge.end(),

@@ -14,6 +14,12 @@ pub enum Target {
     TreadSensor,
     /// Arm angle sensor.
     Angle,
+    /// Converter that reads the outputs of both bridges.
+    Readback,
+    /// Readback of the drive's bridge.
+    DriveReadback,
+    /// Readback of the pre-tightener's bridge.
+    PretightenerReadback,
     /// Drive motor or its bridge.
     Drive,
     /// Pre-tightener's motor or its bridge.
@@ -181,10 +187,19 @@ impl Target {
         word(self)
     }
 
-    /// Whether it is one of the four sensors.
+    /// Whether it is one of the four sensors or the readback of a bridge.
     #[must_use]
     pub const fn is_sensor(self) -> bool {
-        matches!(self, Self::Encoder | Self::LoadCell | Self::TreadSensor | Self::Angle)
+        matches!(
+            self,
+            Self::Encoder
+                | Self::LoadCell
+                | Self::TreadSensor
+                | Self::Angle
+                | Self::Readback
+                | Self::DriveReadback
+                | Self::PretightenerReadback
+        )
     }
 
     /// Whether it is of the board's hardware, which a run in software has not.
@@ -209,6 +224,13 @@ impl Target {
 }
 
 impl Kind {
+    /// Whether a fault of an actuator lies in its bridge or before it, so that the bridge
+    /// puts out another duty than it was given. The others lie behind: in motor and gear.
+    #[must_use]
+    pub const fn is_in_bridge(self) -> bool {
+        matches!(self, Self::Stuck | Self::Reversed | Self::Delayed | Self::Runaway)
+    }
+
     /// Its name in scenarios.
     #[must_use]
     pub fn name(self) -> String {

@@ -134,6 +134,7 @@ impl Session {
         self.frame.wheel = Some(Sample { code: codes.wheel, at });
         self.frame.load_cell = Some(Sample { code: codes.load_cell, at });
         self.frame.tread = Some(Sample { code: codes.tread, at });
+        self.frame.bridges = Some(codes.bridges);
         if at.is_multiple_of(ANGLE_EVERY) {
             self.frame.arm = Some(Sample { code: codes.arm, at });
         }
@@ -206,6 +207,12 @@ impl Session {
         self.tamper.as_ref().and_then(Tamper::acts_s)
     }
 
+    /// When it first did what the readback must tell, see [`Tamper::tells_s`], s since boot.
+    #[must_use]
+    pub fn tells_s(&self) -> Option<f64> {
+        self.tamper.as_ref().and_then(Tamper::tells_s)
+    }
+
     /// When the first of the scenario's faults came, s since boot.
     #[must_use]
     pub fn struck_s(&self) -> Option<f64> {
@@ -275,6 +282,7 @@ pub fn read(sensors: &mut Sensors, plant: &VirtualRig) -> Codes {
         preload_n: truth.preload_n,
         depth_mm: truth.depth_mm,
         arm_rad: truth.arm_rad,
+        bridges: truth.bridges,
     };
     sensors.read(sensed, TICK_S)
 }
@@ -288,5 +296,6 @@ pub fn drives(drive: MotorCommand, preload: MotorCommand) -> Drives {
         drive_on: drive.enable,
         preload: duty(preload),
         preload_on: preload.enable,
+        ..Drives::default()
     }
 }

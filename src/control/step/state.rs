@@ -7,6 +7,7 @@ use crate::control::speed_loop::SpeedLoopState;
 use crate::estimate::ContactStage;
 use crate::estimate::crossing::{Contact, WatchState};
 use crate::estimate::odometry::Odometry;
+use crate::estimate::tread::TreadState;
 use crate::estimate::vibration::VibrationState;
 use crate::model::{Plan, Review};
 use crate::sense::SensesState;
@@ -41,6 +42,7 @@ pub struct State {
     /// whether the wheel stands on a corner.
     pub(super) resumed: bool,
     pub(super) watch: WatchState,
+    pub(super) tread: TreadState,
     pub(super) stage: ContactStage,
     pub(super) vibration: Shaking,
     /// Level by steps recognised.
@@ -174,6 +176,7 @@ impl Default for State {
             kept: None,
             resumed: false,
             watch: WatchState::default(),
+            tread: TreadState::default(),
             stage: ContactStage::Initial,
             vibration: Shaking::default(),
             level: 0,

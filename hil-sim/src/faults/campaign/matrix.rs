@@ -45,6 +45,8 @@ pub struct Line {
     pub latency_ms: Option<f64>,
     /// Median of the same, ms.
     pub latency_median_ms: Option<f64>,
+    /// The same from when the duty was off by two parts in a hundred, ms.
+    pub latency_any_ms: Option<Spread>,
     /// The same of the instants outside of crossings, ms.
     pub latency_off_corner_ms: Option<Spread>,
     /// The same from when the plant first ran otherwise than without the fault, ms.
@@ -113,6 +115,7 @@ impl Line {
             detected: count(Finding::Undetected) == 0,
             latency_ms: latency.map(|l| l.worst),
             latency_median_ms: latency.map(|l| l.median),
+            latency_any_ms: Spread::of(instants.iter().filter_map(|i| i.latency_any_ms)),
             latency_off_corner_ms: Spread::of(
                 instants.iter().filter(|i| !crossing(i)).filter_map(|i| i.latency_ms),
             ),
