@@ -129,5 +129,7 @@ mod tests {
         let page = fill_safety(&page(), &outcome).expect("every block");
         assert!(page.contains("| tick overrun | control ticks are lost"), "{page}");
         assert!(page.contains("| 160 (2) | 0 |"), "{page}");
+        let page = fill_board(&page, &Outcome { target: "board", ..outcome }).expect("its block");
+        assert!(page.contains("`cargo rig faults --target board -n 2`: 1 faults"), "{page}");
     }
 }
