@@ -10,8 +10,8 @@ use core::fmt;
 use serde::{Deserialize, Serialize};
 
 use crate::log::{Telemetry, number};
-use crate::supervise::Mode;
-use crate::units::{Millimetres, Q16, Tick};
+use crate::supervise::{Fault, Mode};
+use crate::units::{Millimetres, MillimetresPerSecond, Q16, Tick, ticks_to_seconds};
 
 /// Words of a [`Flight`].
 pub const FLIGHT_WORDS: usize = 5;
@@ -84,6 +84,36 @@ impl Late {
     }
 }
 
+/// Reference of the speed in a tick, signed outwards, in 1/32 mm/s, and in the last bit
+/// whether the position was more than a guess.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Pace(i16);
+
+impl Pace {
+    /// Bits of a speed that it leaves out.
+    const COARSER: u32 = 11;
+
+    /// Of this speed, mm/s; half a metre a second counts for more.
+    #[must_use]
+    pub fn of(speed: MillimetresPerSecond, placed: bool) -> Self {
+        let most = i32::from(i16::MAX >> 1);
+        let speed = (speed.to_bits() >> Self::COARSER).clamp(-most, most);
+        Self((speed << 1) as i16 | i16::from(placed))
+    }
+
+    /// The speed, mm/s.
+    #[must_use]
+    pub fn speed(self) -> MillimetresPerSecond {
+        Q16::from_bits((i32::from(self.0) >> 1) << Self::COARSER)
+    }
+
+    /// Whether the position was more than a guess.
+    #[must_use]
+    pub const fn placed(self) -> bool {
+        self.0 & 1 != 0
+    }
+}
+
 /// What the drive was doing in a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Flight {
@@ -99,6 +129,8 @@ pub struct Flight {
     pub fault: u16,
     /// Who had not come.
     pub late: Late,
+    /// How fast it was going, and whether the position was more than a guess.
+    pub pace: Pace,
 }
 
 impl Flight {
@@ -109,7 +141,7 @@ impl Flight {
     #[must_use]
     pub fn seal(&self) -> [u32; FLIGHT_WORDS] {
         let state = u32::from(self.mode) | u32::from(self.level) << 8 | u32::from(self.fault) << 16;
-        let late = u32::from(self.late.bits());
+        let late = u32::from(self.late.bits()) | u32::from(self.pace.0 as u16) << 16;
         let [a, b, c, d] = [self.tick, self.position.to_bits() as u32, state, late];
         [a, b, c, d, check(Self::SEED, &[a, b, c, d])]
     }
@@ -125,6 +157,7 @@ impl Flight {
             level: (state >> 8) as u8,
             fault: (state >> 16) as u16,
             late: Late::from_bits(late as u16),
+            pace: Pace((late >> 16) as i16),
         })
     }
 
@@ -155,8 +188,8 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// What is to be kept of a tick.
-    pub fn flight(&mut self, row: &Telemetry, late: Late) -> Flight {
+    /// What is to be kept of a tick; `placed` says that the position is more than a guess.
+    pub fn flight(&mut self, row: &Telemetry, placed: bool, late: Late) -> Flight {
         if row.mode != self.mode {
             self.mode = row.mode;
             self.number = number::of_mode(row.mode);
@@ -171,6 +204,7 @@ impl Recorder {
             level: row.level,
             fault: self.fault,
             late,
+            pace: Pace::of(row.speed_ref, placed),
         }
     }
 }
@@ -204,6 +238,8 @@ pub enum Stopped {
         lr: u32,
         /// Who had not come.
         late: Late,
+        /// When the bridges were cut.
+        at: Tick,
     },
 }
 
@@ -226,7 +262,7 @@ impl Crash {
         let (kind, [a, b, c, d]) = match self.stopped {
             Stopped::Panic { place, line } => (1, [place, line, 0, 0]),
             Stopped::Fault { pc, lr, cfsr, hfsr } => (2, [pc, lr, cfsr, hfsr]),
-            Stopped::Hang { pc, lr, late } => (3, [pc, lr, u32::from(late.bits()), 0]),
+            Stopped::Hang { pc, lr, late, at } => (3, [pc, lr, u32::from(late.bits()), at]),
         };
         let build = self.build;
         [kind, build, a, b, c, d, check(Self::SEED, &[kind, build, a, b, c, d])]
@@ -239,7 +275,7 @@ impl Crash {
         let stopped = match kind {
             1 => Stopped::Panic { place: a, line: b },
             2 => Stopped::Fault { pc: a, lr: b, cfsr: c, hfsr: d },
-            3 => Stopped::Hang { pc: a, lr: b, late: Late::from_bits(c as u16) },
+            3 => Stopped::Hang { pc: a, lr: b, late: Late::from_bits(c as u16), at: d },
             _ => return None,
         };
         let whole = check(Self::SEED, &[kind, build, a, b, c, d]) == sum;
@@ -287,6 +323,66 @@ pub struct Restart {
     pub crash: Option<Crash>,
 }
 
+/// Where a wheel stands by the record of the run before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// Axial position, mm.
+    pub position: Millimetres,
+    /// The bridges were off as soon as the record ends: what is added is the coasting. If
+    /// not, a drive went on that nobody watched.
+    pub sure: bool,
+}
+
+/// Ticks for which the wheel goes on at its speed after the record: what is left of the
+/// tick, and the coasting, in which the gears take half of the speed each ms.
+const COASTS: Tick = 2;
+
+/// Ticks from the watchdog's last feeding to its reset.
+const UNFED: Tick = 100;
+
+/// Longest time without a record within which it still tells all, ticks.
+const FRESH: Tick = 5;
+
+impl Restart {
+    /// Where the wheel stands, if the record tells.
+    ///
+    /// A reset takes the power from the bridges at once, a panic or a hard fault before it
+    /// is recorded; then the wheel coasts by a tenth of a millimetre. If the tick hung, the
+    /// drive went on at its last duty until the bridges were cut, or until the watchdog
+    /// bit: at about the reference of the last tick, for a time that is known. After a fault
+    /// that may have been one of the position it tells nothing.
+    #[must_use]
+    pub fn place(&self) -> Option<Place> {
+        let flight = self.flight.filter(|flight| flight.pace.placed() && spared(flight.fault))?;
+        let unwatched = match (self.reset, self.crash.map(|crash| crash.stopped)) {
+            (_, Some(Stopped::Hang { at, .. })) => at.wrapping_sub(flight.tick).min(UNFED),
+            (Reset::Watchdog, None) => UNFED,
+            _ => 0,
+        };
+        let way = flight.pace.speed() * ticks_to_seconds(unwatched + COASTS);
+        Some(Place { position: flight.position + way, sure: unwatched <= FRESH })
+    }
+}
+
+/// Whether the position was to be believed although this fault was reported: none, or one
+/// that has nothing to do with how the wheel's way is found.
+fn spared(code: u16) -> bool {
+    const OTHERS: [Fault; 11] = [
+        Fault::PressureStale,
+        Fault::DisplacementStale,
+        Fault::PressureRange,
+        Fault::DisplacementRange,
+        Fault::PressureImplausible,
+        Fault::DisplacementImplausible,
+        Fault::Overpressure,
+        Fault::PreloadNotReached,
+        Fault::PretightenerRunaway,
+        Fault::EmergencyStop,
+        Fault::TickOverrun,
+    ];
+    code == 0 || OTHERS.iter().any(|fault| fault.code() == code)
+}
+
 impl fmt::Display for Stopped {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
@@ -294,7 +390,7 @@ impl fmt::Display for Stopped {
             Self::Fault { pc, lr, cfsr, hfsr } => {
                 write!(f, "a hard fault at {pc:#x} from {lr:#x}, CFSR {cfsr:#x}, HFSR {hfsr:#x}")
             }
-            Self::Hang { pc, lr, late } => {
+            Self::Hang { pc, lr, late, .. } => {
                 write!(f, "{} did not come, at {pc:#x} from {lr:#x}", late.name())
             }
         }
@@ -336,18 +432,20 @@ fn check(seed: u32, words: &[u32]) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::supervise::{Direction, Fault, Leg};
+    use crate::supervise::{Direction, Leg};
     use proptest::prelude::*;
 
     fn flight() -> impl Strategy<Value = Flight> {
-        (any::<u32>(), any::<i32>(), any::<u8>(), any::<u8>(), any::<u16>(), any::<u16>()).prop_map(
-            |(tick, position, mode, level, fault, late)| Flight {
+        let bits = (any::<u8>(), any::<u8>(), any::<u16>(), any::<u16>(), any::<i16>());
+        (any::<u32>(), any::<i32>(), bits).prop_map(
+            |(tick, position, (mode, level, fault, late, pace))| Flight {
                 tick,
                 position: Q16::from_bits(position),
                 mode,
                 level,
                 fault,
                 late: Late::from_bits(late),
+                pace: Pace(pace),
             },
         )
     }
@@ -358,7 +456,7 @@ mod tests {
             stopped: match kind {
                 0 => Stopped::Panic { place: a, line: b },
                 1 => Stopped::Fault { pc: a, lr: b, cfsr: c, hfsr: d },
-                _ => Stopped::Hang { pc: a, lr: b, late: Late::from_bits(c as u16) },
+                _ => Stopped::Hang { pc: a, lr: b, late: Late::from_bits(c as u16), at: d },
             },
         })
     }
@@ -410,24 +508,71 @@ mod tests {
         assert_eq!(later(None, None), None);
     }
 
-    const EMPTY: Flight =
-        Flight { tick: 0, position: Q16::ZERO, mode: 0, level: 0, fault: 0, late: Late::NOBODY };
+    const EMPTY: Flight = Flight {
+        tick: 0,
+        position: Q16::ZERO,
+        mode: 0,
+        level: 0,
+        fault: 0,
+        late: Late::NOBODY,
+        pace: Pace(0),
+    };
+
+    #[test]
+    fn a_pace_is_the_speed_to_a_32nd() {
+        for (speed, placed) in [(0.0, true), (47.3, false), (-47.3, true), (-511.9, false)] {
+            let pace = Pace::of(Q16::from_num(speed), placed);
+            let read = pace.speed().to_num::<f64>();
+            assert!((read - speed).abs() <= 1.0 / 32.0, "{read} for {speed}");
+            assert_eq!(pace.placed(), placed);
+        }
+        assert!(Pace::of(Q16::MIN, true).speed() < Q16::from_num(-511));
+    }
+
+    #[test]
+    fn the_place_is_the_record_s_and_the_way_gone_after_it() {
+        let pace = Pace::of(Q16::from_num(-40), true);
+        let flight = Flight { tick: 900, position: Q16::from_num(30), pace, ..EMPTY };
+        let restart = |reset, crash| Restart { reset, flight: Some(flight), crash };
+        let at = |restart: Restart| {
+            restart.place().map(|place| (place.position.to_num::<f64>(), place.sure))
+        };
+        let near = |restart, mm: f64, sure| {
+            let (position, told) = at(restart).expect("a place");
+            assert!((position - mm).abs() < 1e-3 && told == sure, "{restart}: {position}");
+        };
+        near(restart(Reset::Pin, None), 29.92, true);
+        near(restart(Reset::Watchdog, None), 30.0 - 40.0 * 0.102, false);
+        let crash = |stopped| Some(Crash { build: 1, stopped });
+        let hang = |at| crash(Stopped::Hang { pc: 0, lr: 0, late: Late::TICK, at });
+        near(restart(Reset::Watchdog, hang(900)), 29.92, true);
+        near(restart(Reset::Watchdog, hang(975)), 30.0 - 40.0 * 0.077, false);
+        near(restart(Reset::Software, crash(Stopped::Panic { place: 1, line: 2 })), 29.92, true);
+        let lost = Flight { pace: Pace::of(Q16::from_num(-40), false), ..flight };
+        assert_eq!(Restart { flight: Some(lost), ..restart(Reset::Pin, None) }.place(), None);
+        let held = Flight { fault: 123, ..flight };
+        assert_eq!(Restart { flight: Some(held), ..restart(Reset::Pin, None) }.place(), None);
+        let stopped = Flight { fault: Fault::EmergencyStop.code(), ..flight };
+        near(Restart { flight: Some(stopped), ..restart(Reset::Pin, None) }, 29.92, true);
+        assert_eq!(Restart { flight: None, ..restart(Reset::Power, None) }.place(), None);
+    }
 
     #[test]
     fn the_last_fault_is_kept_beyond_its_hold() {
         let mut recorder = Recorder::default();
         let mut row =
             Telemetry { at: 5, level: 2, position: Q16::from_num(41), ..Telemetry::EMPTY };
-        assert_eq!(recorder.flight(&row, Late::NOBODY).mode(), Some(Mode::Boot));
+        assert_eq!(recorder.flight(&row, true, Late::NOBODY).mode(), Some(Mode::Boot));
         row.mode = Mode::Run(Direction::Deploy, Leg::Crossing);
-        let flight = recorder.flight(&row, Late::TICK);
+        let flight = recorder.flight(&row, true, Late::TICK);
         assert_eq!((flight.mode(), flight.fault), (Some(row.mode), 0));
         assert_eq!((flight.tick, flight.level, flight.position), (5, 2, row.position));
         assert_eq!(flight.late, Late::TICK);
         row.mode = Mode::FaultHold(Fault::DriveStalled);
-        assert_eq!(recorder.flight(&row, Late::NOBODY).mode(), Some(row.mode));
+        assert_eq!(recorder.flight(&row, false, Late::NOBODY).mode(), Some(row.mode));
         row.mode = Mode::Idle;
-        let flight = recorder.flight(&row, Late::NOBODY);
+        let flight = recorder.flight(&row, false, Late::NOBODY);
+        assert!(!flight.pace.placed());
         assert_eq!((flight.mode(), flight.fault), (Some(Mode::Idle), 122));
     }
 
@@ -436,7 +581,7 @@ mod tests {
         let restart = Restart { reset: Reset::Power, flight: None, crash: None };
         assert_eq!(restart.to_string(), "started: power came up");
         let flight = Flight { tick: 9, mode: 6, level: 1, fault: 122, late: Late::TICK, ..EMPTY };
-        let stopped = Stopped::Hang { pc: 16, lr: 32, late: Late::STARVED };
+        let stopped = Stopped::Hang { pc: 16, lr: 32, late: Late::STARVED, at: 80 };
         let crash = Some(Crash { build: 1, stopped });
         let text = Restart { reset: Reset::Watchdog, flight: Some(flight), crash }.to_string();
         assert_eq!(

@@ -21,6 +21,8 @@ mod image;
 mod journal;
 pub(crate) mod light;
 mod line;
+#[cfg(not(feature = "hil"))]
+mod readback;
 pub(crate) mod rtt;
 #[cfg(not(feature = "hil"))]
 mod wheel;
@@ -42,6 +44,8 @@ pub(crate) use hil::{Analog, Angle, Bridges, Button, Wheel};
 pub(crate) use journal::Lines;
 pub(crate) use light::Lamp;
 pub(crate) use line::HostLine;
+#[cfg(not(feature = "hil"))]
+pub(crate) use readback::Readback;
 #[cfg(not(feature = "hil"))]
 pub(crate) use wheel::Wheel;
 
@@ -99,7 +103,8 @@ pub(crate) fn clocks() -> Config {
     config.rcc.sys = rcc::Sysclk::PLL1_R;
     // Above 150 MHz the core needs its higher voltage.
     config.rcc.boost = true;
-    // Both converters from the system clock; the driver divides it by four.
+    // All converters from the system clock; the driver divides it by four.
     config.rcc.mux.adc12sel = rcc::mux::Adcsel::SYS;
+    config.rcc.mux.adc345sel = rcc::mux::Adcsel::SYS;
     config
 }

@@ -3,6 +3,7 @@
 pub mod crossing;
 pub mod odometry;
 mod stage;
+pub mod tread;
 pub mod vibration;
 
 pub use stage::ContactStage;

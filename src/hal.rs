@@ -2,10 +2,10 @@
 //! and failure. `src/board` implements it on the STM32G474, the tests with
 //! mocks, the virtual rig with its plant.
 
-use crate::blackbox::Flight;
+use crate::blackbox::{Flight, Place};
 use crate::log::frame::{Checker, check};
 use crate::log::{Entry, Identity};
-use crate::sense::raw::{AdcCode, AngleFrame, BusFault, EncoderCount};
+use crate::sense::raw::{AdcCode, AngleFrame, BridgeCodes, BusFault, EncoderCount};
 use crate::supervise::Command;
 
 /// The wheel encoder's counter.
@@ -80,6 +80,11 @@ pub trait Motors {
     /// Never blocks and cannot fail.
     fn apply(&mut self, drive: MotorCommand, preload: MotorCommand);
 
+    /// What the bridges have put out since this was last asked, each through a low-pass of
+    /// [`LAG_TICKS`](crate::supervise::LAG_TICKS), taken at some moment since the last
+    /// tick; none if nothing has been converted. Never waits.
+    fn readback(&mut self) -> Option<BridgeCodes>;
+
     /// Whether the emergency stop has cut a bridge since the last [`Motors::rearm`].
     /// While it has, bridges stay without power whatever is applied.
     fn stopped(&mut self) -> bool;
@@ -97,6 +102,11 @@ pub trait Watchdog {
     /// Keeps what the drive does in this tick where a restart finds it. A board without
     /// such a place keeps nothing.
     fn keep(&mut self, flight: &Flight);
+
+    /// Where the wheel stands by what was kept before this start, if that tells.
+    fn place(&self) -> Option<Place> {
+        None
+    }
 }
 
 /// A source of operator commands: the board button or the log channel.

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::hal::{Duty, MotorCommand};
 use crate::log::number;
-use crate::sense::raw::{AdcCode, AngleFrame, EncoderCount};
+use crate::sense::raw::{AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount};
 use crate::supervise::{Command, Mode};
 use crate::units::Tick;
 
@@ -25,7 +25,7 @@ pub const UP: u32 = 3;
 pub const DOWN: u32 = 2;
 
 /// Number of this protocol; another one is not answered.
-pub const PROTOCOL: u8 = 1;
+pub const PROTOCOL: u8 = 2;
 
 /// The board's first tick: its clock begins one before. Even, so that the angle sensor's
 /// turn comes in the first tick, as in software.
@@ -54,6 +54,8 @@ pub struct Given {
     pub tread: Option<u16>,
     /// Frame of the arm's angle sensor; none as above.
     pub arm: Option<u16>,
+    /// Outputs of the bridges of drive and pre-tightener; none as above.
+    pub bridges: Option<[u16; 2]>,
     /// The emergency stop's contact is open.
     pub stop: bool,
     /// Number of the operator's command, 0 for none ([`number::of_command`]).
@@ -68,12 +70,14 @@ impl Given {
         load_cell: AdcCode,
         tread: AdcCode,
         arm: AngleFrame,
+        bridges: BridgeCodes,
     ) -> Self {
         Self {
             wheel: wheel.get(),
             load_cell: Some(load_cell.get()),
             tread: Some(tread.get()),
             arm: Some(arm.get()),
+            bridges: Some([bridges.drive.get(), bridges.pretightener.get()]),
             stop: false,
             command: 0,
         }
@@ -89,7 +93,16 @@ impl Given {
     /// silent.
     #[must_use]
     pub const fn silent(self) -> Self {
-        Self { load_cell: None, tread: None, arm: None, command: 0, ..self }
+        Self { load_cell: None, tread: None, arm: None, bridges: None, command: 0, ..self }
+    }
+
+    /// What the bridges put out, if they were looked at.
+    #[must_use]
+    pub fn readback(&self) -> Option<BridgeCodes> {
+        self.bridges.map(|codes| BridgeCodes {
+            drive: BridgeCode::new(codes[0]),
+            pretightener: BridgeCode::new(codes[1]),
+        })
     }
 }
 
@@ -164,6 +177,7 @@ mod tests {
             load_cell: code,
             tread: code,
             arm: code,
+            bridges: Some([u16::MAX; 2]),
             stop: true,
             command: 4,
         };
@@ -181,6 +195,7 @@ mod tests {
             tick in any::<u32>(),
             codes in any::<[u16; 4]>(),
             answers in any::<[bool; 3]>(),
+            bridges in any::<Option<[u16; 2]>>(),
             stop in any::<bool>(),
             command in 0..5_u8,
             duties in any::<[Option<i16>; 2]>(),
@@ -191,6 +206,7 @@ mod tests {
                 load_cell: code(0),
                 tread: code(1),
                 arm: code(2),
+                bridges,
                 stop,
                 command,
             };

@@ -41,7 +41,7 @@ mod firmware {
     use crate::board::rtt::Frames;
     use crate::board::{self, blackbox, config, guard, light, rtt};
     #[cfg(not(feature = "hil"))]
-    use crate::board::{Analog, Bridge, Checksum, Ring};
+    use crate::board::{Analog, Bridge, Checksum, Readback, Ring};
     use crate::board::{Angle, Bridges, Button, Console, Guard, HostLine, Lamp, Lines};
     use crate::board::{Nucleo, Pages, Wheel};
 
@@ -121,6 +121,7 @@ mod firmware {
         guard::arm();
         let (console, line) = (channels.console, channels.line);
         let (mut parts, lamp, pages) = split(p, console, channels.telemetry);
+        parts.watchdog.place = restart.place();
         threads.spawn(light::show(lamp).unwrap());
         let (constants, service) = config::build(pages);
         threads.spawn(link(HostLine::new(line), service).unwrap());
@@ -144,6 +145,7 @@ mod firmware {
             motors: Bridges {
                 drive: Bridge::new((p.TIM1, pac::TIM1), p.PA8, p.PA9.into(), p.PA10.into(), p.PB12),
                 preload: Bridge::new((p.TIM8, pac::TIM8), p.PC6, p.PC8.into(), p.PC9.into(), p.PB7),
+                readback: Readback::new((p.ADC3, pac::ADC3), p.PB0, p.PB1),
             },
             watchdog: Guard::new(p.IWDG),
             button: Button::new(p.PC13, p.EXTI13),

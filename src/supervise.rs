@@ -6,6 +6,7 @@ mod crosscheck;
 mod fault;
 mod mode;
 mod monitor;
+mod readback;
 mod transition;
 
 #[cfg(not(target_os = "none"))]
@@ -13,4 +14,5 @@ pub use account::Account;
 pub use fault::{Fault, Limit};
 pub use mode::{Command, Direction, Leg, Mode};
 pub use monitor::{Monitor, MonitorState, Observed};
+pub use readback::{BAND, BAND_SHIFT, LAG_TICKS, Lag, OFF_TICKS, Readback};
 pub use transition::{Trigger, next};

@@ -6,7 +6,7 @@ use interstage::model::formula::Formula;
 use interstage::model::reduced::ReducedModel;
 use interstage::model::{PlanRequest, Planner};
 use interstage::rig::{Rig, RigError};
-use interstage::sense::raw::{AdcCode, AngleFrame, EncoderCount};
+use interstage::sense::raw::{AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount};
 use interstage::supervise::{Command, Direction};
 use interstage::units::{Q16, Ratio};
 
@@ -123,7 +123,10 @@ fn codes_given_in_the_loop_are_the_sensors() {
         AdcCode::new(1_234),
         AdcCode::new(777),
         AngleFrame::new(0x8421),
+        BridgeCodes { drive: BridgeCode::new(3000), pretightener: BridgeCode::new(17) },
     );
+    let readback = given.readback().map(|codes| (codes.drive.get(), codes.pretightener.get()));
+    assert_eq!(readback, Some((3000, 17)));
     assert_eq!((given.wheel, given.load_cell), (40_000, Some(1_234)));
     assert_eq!(
         (given.tread, given.arm, given.stop, given.command),
@@ -135,4 +138,5 @@ fn codes_given_in_the_loop_are_the_sensors() {
     let silent = commanded.silent();
     assert_eq!((silent.wheel, silent.command), (40_000, 0));
     assert_eq!((silent.load_cell, silent.tread, silent.arm), (None, None, None));
+    assert_eq!(silent.readback(), None);
 }

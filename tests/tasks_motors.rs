@@ -239,6 +239,30 @@ fn a_hanging_sensor_is_a_fault_and_stops_neither_tick_nor_watchdog() {
 }
 
 #[test]
+fn a_converter_of_the_bridges_that_falls_silent_is_a_fault() {
+    let mut board = Board::idle();
+    board.bridges.mute.set(true);
+    board.reach(Mode::FaultHold(Fault::ReadbackStale), 30);
+    assert!(board.bridges_are_off());
+    // Back again, a reset leads on.
+    board.bridges.mute.set(false);
+    board.bench.run_ms(150);
+    board.operator.gives(&[Command::Reset]);
+    board.reach(Mode::Idle, 3000);
+}
+
+#[test]
+fn a_bridge_that_takes_another_duty_is_off_within_ten_ticks() {
+    let mut board = Board::idle();
+    board.operator.gives(&[Command::Start]);
+    board.reach(Mode::Preload(Direction::Deploy), 20);
+    board.bench.run_ms(50);
+    board.bridges.runaway_preload.set(Some(-20_000));
+    board.reach(Mode::FaultHold(Fault::PretightenerBridge), 10);
+    assert!(board.bridges_are_off());
+}
+
+#[test]
 fn a_dead_model_task_does_not_hold_up_the_tick() {
     let mut board = Board::without(&[Station::Model]);
     board.reach(Mode::Idle, 3000);

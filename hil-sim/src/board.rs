@@ -18,5 +18,6 @@ pub mod model;
 pub mod peripherals;
 pub mod rtt;
 pub mod run;
+pub(crate) mod tampered;
 pub mod thumb;
 pub mod timing;

@@ -7,7 +7,7 @@ mod safety;
 
 pub use model::{fill_model, model_svg};
 pub use modes::modes;
-pub use safety::fill_safety;
+pub use safety::{fill_board, fill_safety};
 
 /// Head of a generated page.
 #[must_use]

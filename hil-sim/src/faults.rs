@@ -6,11 +6,13 @@
 
 pub mod campaign;
 mod catalogue;
+mod hardware;
 mod injection;
 pub mod judge;
 mod sensors;
 mod tamper;
 
 pub use catalogue::{CATALOGUE, Entry, entry};
+pub use hardware::HARDWARE;
 pub use injection::{From, Injection, Kind, Target};
 pub use tamper::Tamper;

@@ -12,16 +12,18 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
 use crate::board::bench::BenchError;
-use crate::board::log::Strings;
+use crate::board::log::{Line, Strings};
 use crate::params::set_of;
 use crate::scenario::{Direction, Scenario};
 
-pub use case::{After, Case, Kind};
-pub use outcome::{KindOutcome, Outcome};
+pub use case::{After, Aim, Case, Kind};
+pub use outcome::{KindOutcome, ModeOutcome, Outcome};
 
-/// Time from the command within which the reset comes, s: that of a run on the board, and a
-/// little more for the moment after the arrival.
-const WITHIN_S: f64 = 12.5;
+/// Time from the command within which the reset comes, s: that of a run on the board, either
+/// way, and a little more for the moment after the arrival.
+const WITHIN_S: f64 = 4.0;
+/// Of so many resets one is aimed at a mode, in turn; the others come at any time.
+const AIMED: u64 = 4;
 
 /// Why a campaign cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -39,11 +41,16 @@ pub enum ResetError {
 pub fn case(seed: u64, index: u64) -> Case {
     let mut chance = ChaCha8Rng::seed_from_u64(seed);
     chance.set_stream(index);
+    let kinds = Kind::ALL.len() as u64;
+    // Of every mode every kind comes, out and back.
+    let (round, turn) = (index / (2 * kinds), index / (2 * kinds) / AIMED);
+    let aimed = round.is_multiple_of(AIMED);
     Case {
         index,
         seed: seed + index,
         way: if index.is_multiple_of(2) { Direction::Deploy } else { Direction::Retract },
-        kind: Kind::ALL[(index / 2 % Kind::ALL.len() as u64) as usize],
+        kind: Kind::ALL[(index / 2 % kinds) as usize],
+        aim: aimed.then(|| Aim::ALL[(turn % Aim::ALL.len() as u64) as usize]),
         after_s: chance.random_range(0.0..WITHIN_S),
         // The rest of a millisecond, so that it comes between any two instructions.
         part: chance.random_range(0.0..1.0),
@@ -51,8 +58,21 @@ pub fn case(seed: u64, index: u64) -> Case {
     }
 }
 
-/// Makes the cases with the image in `elf` and the rig of `scenario`. `done` is told of
-/// each.
+/// Who is told how a campaign goes.
+#[derive(Clone, Copy)]
+pub struct Told<'a> {
+    /// A reset has been made.
+    pub done: &'a (dyn Fn(&After) + Sync),
+    /// The board of this number has logged something, at this time since power-up, s.
+    pub line: &'a (dyn Fn(u64, f64, &Line) + Sync),
+}
+
+impl Told<'_> {
+    /// Nobody.
+    pub const NOBODY: Told<'static> = Told { done: &|_| {}, line: &|_, _, _| {} };
+}
+
+/// Makes the cases with the image in `elf` and the rig of `scenario`.
 ///
 /// The board's flash holds a stored set of the rig's parameters.
 ///
@@ -63,7 +83,7 @@ pub fn run(
     strings: &Strings,
     scenario: &Scenario,
     cases: &[Case],
-    done: &(dyn Fn(&After) + Sync),
+    told: &Told<'_>,
 ) -> Result<Vec<After>, ResetError> {
     let set = set_of("stored", &scenario.rig)?;
     let place = slots::place(&set, 7).ok_or(CompileError::Room)?;
@@ -75,9 +95,9 @@ pub fn run(
             if broken.load(Ordering::Relaxed) > 0 {
                 return Ok(None);
             }
-            let after = case.make(elf, strings, scenario, &place);
+            let after = case.make(elf, strings, scenario, &place, told.line);
             match &after {
-                Ok(after) => done(after),
+                Ok(after) => (told.done)(after),
                 Err(_) => broken.store(1, Ordering::Relaxed),
             }
             Ok(Some(after?))

@@ -2,6 +2,7 @@
 //! millisecond at a time, as fast as the host goes.
 
 mod account;
+mod echo;
 mod session;
 mod stream;
 mod trace;
@@ -20,6 +21,7 @@ use crate::record::{LogLine, Recording, Report};
 use crate::scenario::{ControllerKind, Direction, Scenario};
 
 pub use account::{PhaseAccount, PlantAccount, account, account_of};
+pub use echo::Echo;
 pub use session::{Session, drives, read};
 pub use stream::Stream;
 pub(crate) use trace::Trace;
@@ -52,6 +54,9 @@ pub enum RunError {
     /// The plant left the set of meaningful states.
     #[error("{0}")]
     Plant(#[from] PlantError),
+    /// There is no board that could break.
+    #[error("run.faults: {0} is a fault of the board's hardware: --target board")]
+    Hardware(String),
 }
 
 impl From<ControllerKind> for Strategy {

@@ -188,7 +188,8 @@ impl Rigged {
     /// A millisecond of both.
     fn tick(&mut self, line: &mut HostLine<'_>, tick: u32, command: Option<Command>) -> Taken {
         let codes = sil::read(&mut self.sensors, &self.plant);
-        self.given = Given::codes(codes.wheel, codes.load_cell, codes.tread, codes.arm);
+        self.given =
+            Given::codes(codes.wheel, codes.load_cell, codes.tread, codes.arm, codes.bridges);
         let taken = line.tick(tick, self.given.with(command)).expect("goes");
         let (drive, preload) = taken.commands();
         self.plant.step(&sil::drives(drive, preload), 1e-3).expect("moves");

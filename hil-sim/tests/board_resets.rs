@@ -299,7 +299,8 @@ fn a_report_is_made_once() {
 fn resets_at_random_instants_are_recorded_held_and_gone_on_from() {
     let scenario = Scenario::default();
     let cases: Vec<resets::Case> = (0..16).map(|index| resets::case(1, index)).collect();
-    let all = resets::run(elf(), strings(), &scenario, &cases, &|_| {}).expect("runs");
+    let all =
+        resets::run(elf(), strings(), &scenario, &cases, &resets::Told::NOBODY).expect("runs");
     let outcome = resets::Outcome::of(&all);
     assert!(outcome.is_good(), "{:#?}", outcome.wrong);
     assert_eq!(outcome.resets, 16);

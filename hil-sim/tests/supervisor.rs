@@ -7,12 +7,14 @@ use hil_sim::plant::draw::PlantParameters;
 use hil_sim::plant::rig::VirtualRig;
 use hil_sim::plant::sensors::Sensors;
 use hil_sim::scenario::Scenario;
-use hil_sim::sil::{drives, read};
+use hil_sim::sil::{Echo, drives, read};
 use interstage::control::{Controller, Input, Output, State};
 use interstage::hal::MotorCommand;
 use interstage::log::Event;
 use interstage::model::{Plan, Planner};
-use interstage::sense::raw::{AdcCode, AngleFrame, EncoderCount, Sample, SensorFrame};
+use interstage::sense::raw::{
+    AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
+};
 use interstage::supervise::{Command, Direction, Fault, Mode};
 use proptest::prelude::*;
 
@@ -48,6 +50,7 @@ fn snapshots() -> Vec<(Mode, Snapshot)> {
             frame.wheel = Some(Sample { code: codes.wheel, at: now });
             frame.load_cell = Some(Sample { code: codes.load_cell, at: now });
             frame.tread = Some(Sample { code: codes.tread, at: now });
+            frame.bridges = Some(codes.bridges);
             if now % 2 == 0 {
                 frame.arm = Some(Sample { code: codes.arm, at: now });
             }
@@ -105,17 +108,26 @@ fn every_mode_of_a_run_is_among_the_snapshots() {
 /// What brings about a fault within a sensor's age, from every mode.
 type Spoil = (Fault, fn(&mut Input));
 
-const SPOILS: [Spoil; 9] = [
+const SPOILS: [Spoil; 12] = [
     (Fault::EmergencyStop, |input| input.emergency_stop = true),
     (Fault::TickOverrun, |input| input.overrun = true),
     (Fault::SpeedStale, |_| {}),
     (Fault::PressureStale, |_| {}),
     (Fault::DisplacementStale, |_| {}),
     (Fault::AngleStale, |_| {}),
+    (Fault::ReadbackStale, |input| input.sensors.bridges = None),
+    (Fault::DriveBridge, |input| spoil(input, |codes| codes.drive = BridgeCode::of(29_000))),
+    (Fault::PretightenerBridge, |input| {
+        spoil(input, |codes| codes.pretightener = BridgeCode::of(-29_000));
+    }),
     (Fault::PressureRange, |input| set(&mut input.sensors.load_cell, AdcCode::new(0))),
     (Fault::DisplacementRange, |input| set(&mut input.sensors.tread, AdcCode::new(0xffff))),
     (Fault::AngleRange, |input| set(&mut input.sensors.arm, AngleFrame::new(2000))),
 ];
+
+fn spoil(input: &mut Input, of: fn(&mut BridgeCodes)) {
+    input.sensors.bridges.iter_mut().for_each(of);
+}
 
 fn set<T>(sample: &mut Option<Sample<T>>, code: T) {
     if let Some(sample) = sample {
@@ -184,6 +196,8 @@ struct Tick {
     load_cell: Option<(u16, u32)>,
     tread: Option<(u16, u32)>,
     arm: Option<(u16, u32)>,
+    /// What the drive's bridge reads if it does not read what it should; none for silence.
+    bridges: Option<Option<BridgeCode>>,
     command: Option<Command>,
     overrun: bool,
     emergency_stop: bool,
@@ -197,13 +211,27 @@ fn tick() -> impl Strategy<Value = Tick> {
         sample(prop_oneof![3 => 3000u16..20_000, 1 => any::<u16>()]),
         sample(prop_oneof![3 => 3000u16..12_000, 1 => any::<u16>()]),
         sample(prop_oneof![3 => 3700u16..4600, 1 => any::<u16>()]),
+        prop::option::weighted(
+            0.98,
+            prop::option::weighted(0.1, any::<u16>().prop_map(BridgeCode::new)),
+        ),
         prop::option::weighted(0.1, command),
         prop::bool::weighted(0.02),
         prop::bool::weighted(0.02),
         any::<bool>(),
     )
-        .prop_map(|(wheel, load_cell, tread, arm, command, overrun, emergency_stop, plan)| {
-            Tick { wheel, load_cell, tread, arm, command, overrun, emergency_stop, plan }
+        .prop_map(|(wheel, load_cell, tread, arm, bridges, command, overrun, stop, plan)| {
+            Tick {
+                wheel,
+                load_cell,
+                tread,
+                arm,
+                bridges,
+                command,
+                overrun,
+                emergency_stop: stop,
+                plan,
+            }
         })
 }
 
@@ -220,6 +248,7 @@ proptest! {
             FROM.with(|all| all[from % all.len()].1.clone());
         let controller = controller();
         let mut count = input.sensors.wheel.map_or(0, |wheel| wheel.code.get());
+        let (mut echo, mut sound) = (Echo::default(), input.sensors.bridges.unwrap_or_default());
         for (now, tick) in (input.now + 1..).zip(ticks) {
             let before = state.mode();
             count = count.wrapping_add_signed(tick.wheel.map_or(0, |(by, _)| by));
@@ -239,6 +268,10 @@ proptest! {
                 arm: tick
                     .arm
                     .map(|(code, age)| Sample { code: AngleFrame::new(parity(code)), at: at(age) }),
+                bridges: tick.bridges.map(|drive| BridgeCodes {
+                    drive: drive.unwrap_or(sound.drive),
+                    ..sound
+                }),
             };
             let input = Input {
                 now,
@@ -249,6 +282,7 @@ proptest! {
                 emergency_stop: tick.emergency_stop,
             };
             let output = controller.step(&mut state, &input);
+            sound = echo.read(&output);
             prop_assert_eq!(output.telemetry.mode, state.mode());
             if let Err(error) = check(before, &output) {
                 return Err(TestCaseError::fail(error));

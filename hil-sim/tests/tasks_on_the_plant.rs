@@ -31,7 +31,7 @@ use interstage::hal::{
 };
 use interstage::log::{CrossingRecord, Entry, Event, Identity, Scribe, Telemetry};
 use interstage::model::Planner;
-use interstage::sense::raw::{AdcCode, AngleFrame, BusFault, EncoderCount};
+use interstage::sense::raw::{AdcCode, AngleFrame, BridgeCodes, BusFault, EncoderCount};
 use interstage::supervise::{Command, Fault, Mode};
 use interstage::tasks::{self, Exchange, Station};
 
@@ -103,6 +103,10 @@ impl AngleBus for Peripheral {
 impl Motors for Peripheral {
     fn apply(&mut self, drive: MotorCommand, preload: MotorCommand) {
         self.0.drives.set(sil::drives(drive, preload));
+    }
+
+    fn readback(&mut self) -> Option<BridgeCodes> {
+        Some(self.0.codes().bridges)
     }
 
     fn stopped(&mut self) -> bool {

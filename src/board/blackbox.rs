@@ -34,7 +34,9 @@ struct Shared(UnsafeCell<MaybeUninit<Kept>>);
 // and told from a record by its check.
 unsafe impl Sync for Shared {}
 
+/// By this name a probe finds it.
 #[unsafe(link_section = ".uninit.blackbox")]
+#[unsafe(export_name = "INTERSTAGE_BLACKBOX")]
 static KEPT: Shared = Shared(UnsafeCell::new(MaybeUninit::uninit()));
 
 fn kept() -> *mut Kept {
@@ -97,7 +99,7 @@ fn say(restart: &Restart) {
                 cfsr,
                 hfsr
             ),
-            Stopped::Hang { pc, lr, late } => defmt::error!(
+            Stopped::Hang { pc, lr, late, .. } => defmt::error!(
                 "{=str} did not come, at {=u32:#x} from {=u32:#x}",
                 late.name(),
                 pc,
@@ -105,7 +107,7 @@ fn say(restart: &Restart) {
             ),
         }
     }
-    if let Some(Flight { tick, position, mode, level, fault, late }) = restart.flight {
+    if let Some(Flight { tick, position, mode, level, fault, late, .. }) = restart.flight {
         defmt::warn!(
             "before: tick {=u32}, mode {=u8}, {=f32} mm, level {=u8}, last fault {=u16}, late: {=str}",
             tick,
@@ -172,7 +174,7 @@ unsafe extern "C" fn look_at(frame: u32) {
     let (pc, lr) = returns(frame);
     let now = embassy_time::Instant::now().as_millis() as u32;
     let late = crate::EXCHANGE.unfed(now);
-    stop(Stopped::Hang { pc, lr, late });
+    stop(Stopped::Hang { pc, lr, late, at: now });
     // The watchdog ends it: it would also had this not been reached.
     loop {
         cortex_m::asm::nop();

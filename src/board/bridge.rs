@@ -15,6 +15,9 @@ use embassy_stm32::timer::{
     AdvancedInstance4Channel, BkIn1, BreakInputPin, Ch1, Channel, TimerPin,
 };
 use interstage::hal::{MotorCommand, Motors};
+use interstage::sense::raw::BridgeCodes;
+
+use super::Readback;
 
 /// One bridge in phase/enable control: PWM chops, the direction line chooses the
 /// sense, the enable line wakes the bridge.
@@ -114,12 +117,18 @@ pub(crate) struct Bridges {
     pub(crate) drive: Bridge<TIM1>,
     /// The pre-tightener's motor.
     pub(crate) preload: Bridge<TIM8>,
+    /// What both put out.
+    pub(crate) readback: Readback,
 }
 
 impl Motors for Bridges {
     fn apply(&mut self, drive: MotorCommand, preload: MotorCommand) {
         self.drive.set(drive);
         self.preload.set(preload);
+    }
+
+    fn readback(&mut self) -> Option<BridgeCodes> {
+        self.readback.take()
     }
 
     fn stopped(&mut self) -> bool {

@@ -4,7 +4,7 @@ use embassy_stm32::Peri;
 use embassy_stm32::pac;
 use embassy_stm32::peripherals::IWDG;
 use embassy_stm32::wdg::IndependentWatchdog;
-use interstage::blackbox::{Flight, Reset};
+use interstage::blackbox::{Flight, Place, Reset};
 use interstage::hal::Watchdog;
 
 use super::blackbox;
@@ -13,29 +13,37 @@ use super::blackbox;
 const TIMEOUT_US: u32 = 100_000;
 
 /// The independent watchdog.
-pub(crate) struct Guard(IndependentWatchdog<'static, IWDG>);
+pub(crate) struct Guard {
+    dog: IndependentWatchdog<'static, IWDG>,
+    /// Where the wheel stands by the record of the run before.
+    pub(crate) place: Option<Place>,
+}
 
 impl Guard {
     /// The watchdog, not yet running.
     pub(crate) fn new(watchdog: Peri<'static, IWDG>) -> Self {
-        Self(IndependentWatchdog::new(watchdog, TIMEOUT_US))
+        Self { dog: IndependentWatchdog::new(watchdog, TIMEOUT_US), place: None }
     }
 
     /// Starts it; from here on nothing but a reset stops it.
     pub(crate) fn start(&mut self) {
-        self.0.unleash();
+        self.dog.unleash();
         blackbox::look();
     }
 }
 
 impl Watchdog for Guard {
     fn feed(&mut self) {
-        self.0.pet();
+        self.dog.pet();
         blackbox::fed();
     }
 
     fn keep(&mut self, flight: &Flight) {
         blackbox::keep(flight);
+    }
+
+    fn place(&self) -> Option<Place> {
+        self.place
     }
 }
 

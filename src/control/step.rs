@@ -7,6 +7,7 @@ mod build;
 mod crossing;
 mod modes;
 mod plans;
+mod resume;
 mod runs;
 mod state;
 
@@ -17,6 +18,7 @@ use super::schedule::{Course, Schedule, Targets};
 use super::speed_loop::SpeedLoop;
 use crate::estimate::ContactStage;
 use crate::estimate::crossing::{Contact, CrossingWatch};
+use crate::estimate::tread::TreadLaw;
 use crate::estimate::vibration::VibrationObserver;
 use crate::hal::{Duty, MotorCommand};
 use crate::log::{Entry, Event, Telemetry};
@@ -85,6 +87,7 @@ pub struct Controller {
     senses: Senses,
     monitor: Monitor,
     watch: CrossingWatch,
+    tread: TreadLaw,
     vibration: VibrationObserver,
     /// Stages that the phase does not need are left out.
     skipping: bool,
@@ -128,6 +131,11 @@ struct Pass<'a> {
 }
 
 impl Pass<'_> {
+    /// Compression of the tread, smoothed, mm.
+    fn compressed(&self) -> Millimetres {
+        self.sensed.compression_filtered
+    }
+
     fn log(&mut self, event: Event) {
         // A tick that has more to say than fits says the first eight.
         let _ = self.output.events.push(Entry { at: self.now, event });
@@ -175,6 +183,8 @@ impl Controller {
         pass.output.drive = drive;
         pass.output.preload = preload;
         pass.output.telemetry = self.telemetry(state, &pass, &targets);
+        let given = &pass.output.telemetry;
+        state.monitor.give(given.drive, given.pretightener);
     }
 
     fn look_for_faults(&self, state: &mut State, pass: &mut Pass<'_>, input: &Input) {
@@ -183,6 +193,7 @@ impl Controller {
             now: pass.now,
             mode: state.mode,
             sensed: pass.sensed,
+            bridges: input.sensors.bridges,
             speed_ref: state.signed_speed(),
             preload_due: state.preload_loop.due(),
             effort: steady.then(|| state.speed_loop.value()),

@@ -158,8 +158,7 @@ impl CrossingWatch {
     /// Starts on a corner, on the way to the wall of `level`: nothing is measured until
     /// the wheel stands on that wall.
     pub fn begin_on_corner(&self, state: &mut WatchState, direction: Direction, level: u8) {
-        let below = Millimetres::from_num(level) * self.step;
-        let wall = self.outermost - below;
+        let wall = self.wall(level);
         let from = match direction {
             Direction::Deploy => wall + self.step,
             Direction::Retract => wall - self.step,
@@ -169,6 +168,45 @@ impl CrossingWatch {
             baseline: LowPassState::at(from),
             ..WatchState::default()
         };
+    }
+
+    /// Starts in the middle of a corner, on the way over it from the wall of `level`: with
+    /// that wall's baseline by the table.
+    pub fn begin_between(
+        &self,
+        state: &mut WatchState,
+        direction: Direction,
+        level: u8,
+        seen: &Seen,
+    ) {
+        *state =
+            WatchState { baseline: LowPassState::at(self.wall(level)), ..WatchState::default() };
+        self.touch(state, direction, seen);
+    }
+
+    /// Baseline of a level by the table, mm.
+    fn wall(&self, level: u8) -> Millimetres {
+        self.outermost - Millimetres::from_num(level) * self.step
+    }
+
+    /// How far inwards of the wall of `level` the wheel stands, by the table, mm.
+    #[must_use]
+    pub fn height_over(
+        &self,
+        level: u8,
+        radius: Millimetres,
+        compression: Millimetres,
+    ) -> Millimetres {
+        self.wall(level) - (radius - compression)
+    }
+
+    /// Axial distance from the centre of a wheel that stands on an edge to its face, mm: the
+    /// edge lies `R - c` from the centre, and `y - h` below it. `level` is that of the lower
+    /// wall.
+    #[must_use]
+    pub fn to_edge(&self, level: u8, radius: Millimetres, compression: Millimetres) -> Millimetres {
+        let height = self.wall(level) + self.radius - radius;
+        self.measure(compression, height).distance
     }
 
     /// Turns back, from now on in `direction`: what was climbed is dropped off again,

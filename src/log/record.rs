@@ -5,7 +5,9 @@ use super::number;
 use super::telemetry::Telemetry;
 use crate::control::{Input, Output};
 use crate::hal::MotorCommand;
-use crate::sense::raw::{AdcCode, AngleFrame, EncoderCount, Sample, SensorFrame};
+use crate::sense::raw::{
+    AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
+};
 use crate::supervise::Command;
 use crate::units::Tick;
 
@@ -16,7 +18,7 @@ const OLD: u8 = 254;
 /// Age of a code that never came.
 const NEVER: u8 = 255;
 
-/// A tick's input and output in 84 bytes. Plan, request and log entries, of which a run
+/// A tick's input and output in 88 bytes. Plan, request and log entries, of which a run
 /// has few, go beside it; flags tell that they were there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Record {
@@ -26,6 +28,8 @@ pub struct Record {
     pub codes: [u16; 4],
     /// Ages of the codes as they travel, see [`Record::sensors`].
     pub ages: [u8; 4],
+    /// Codes of the bridges of drive and pre-tightener; 0 if there were none.
+    pub bridges: [u16; 2],
     /// What else there was.
     pub flags: Flags,
 }
@@ -44,6 +48,8 @@ impl Flags {
     const DRIVE: u16 = 1 << 8;
     const PRELOAD: u16 = 1 << 9;
     const EVENTS: u32 = 10;
+    const MOST_EVENTS: u16 = 0b1111;
+    const READBACK: u16 = 1 << 14;
 
     fn of(input: &Input, output: &Output) -> Self {
         let bit = |set: bool, bit: u16| if set { bit } else { 0 };
@@ -56,6 +62,7 @@ impl Flags {
                 | bit(output.rearm, Self::REARM)
                 | bit(output.drive.enable, Self::DRIVE)
                 | bit(output.preload.enable, Self::PRELOAD)
+                | bit(input.sensors.bridges.is_some(), Self::READBACK)
                 | (output.events.len() as u16) << Self::EVENTS,
         )
     }
@@ -124,10 +131,16 @@ impl Flags {
         self.has(Self::PRELOAD)
     }
 
+    /// It was given what the bridges put out.
+    #[must_use]
+    pub const fn readback(self) -> bool {
+        self.has(Self::READBACK)
+    }
+
     /// Log entries that it gave.
     #[must_use]
     pub const fn events(self) -> u16 {
-        self.0 >> Self::EVENTS
+        self.0 >> Self::EVENTS & Self::MOST_EVENTS
     }
 }
 
@@ -144,11 +157,13 @@ impl Record {
     #[inline]
     pub(super) fn set(&mut self, input: &Input, output: &Output) {
         self.telemetry = output.telemetry;
-        let SensorFrame { wheel, load_cell, tread, arm } = &input.sensors;
+        let SensorFrame { wheel, load_cell, tread, arm, bridges } = &input.sensors;
         (self.codes[0], self.ages[0]) = pack(input.now, wheel.as_ref(), EncoderCount::get);
         (self.codes[1], self.ages[1]) = pack(input.now, load_cell.as_ref(), AdcCode::get);
         (self.codes[2], self.ages[2]) = pack(input.now, tread.as_ref(), AdcCode::get);
         (self.codes[3], self.ages[3]) = pack(input.now, arm.as_ref(), AngleFrame::get);
+        let codes = bridges.unwrap_or_default();
+        self.bridges = [codes.drive.get(), codes.pretightener.get()];
         self.flags = Flags::of(input, output);
     }
 
@@ -176,6 +191,10 @@ impl Record {
             load_cell: unpack(load_cell, before.load_cell, AdcCode::new, oldest),
             tread: unpack(tread, before.tread, AdcCode::new, oldest),
             arm: unpack(arm, before.arm, AngleFrame::new, oldest),
+            bridges: self.flags.readback().then(|| {
+                let [drive, pretightener] = self.bridges.map(BridgeCode::new);
+                BridgeCodes { drive, pretightener }
+            }),
         }
     }
 
@@ -206,8 +225,13 @@ impl Record {
     }
 
     /// A record of nothing.
-    pub const EMPTY: Self =
-        Self { telemetry: Telemetry::EMPTY, codes: [0; 4], ages: [0; 4], flags: Flags(0) };
+    pub const EMPTY: Self = Self {
+        telemetry: Telemetry::EMPTY,
+        codes: [0; 4],
+        ages: [0; 4],
+        bridges: [0; 2],
+        flags: Flags(0),
+    };
 }
 
 /// Code and age of a sample as they travel.
@@ -241,10 +265,10 @@ pub(super) mod tests {
         let quantities = prop::array::uniform11(any::<i32>());
         (
             (any::<u32>(), 0..18_usize, 1..=6_u8, any::<u8>(), quantities, any::<[i16; 2]>()),
-            (any::<[u16; 4]>(), any::<[u8; 4]>(), 0..1_u16 << 14),
+            (any::<[u16; 4]>(), any::<[u8; 4]>(), any::<[u16; 2]>(), 0..1_u16 << 15),
         )
-            .prop_map(|((at, mode, stage, level, q, duties), (codes, ages, flags))| {
-                Record {
+            .prop_map(
+                |((at, mode, stage, level, q, duties), (codes, ages, bridges, flags))| Record {
                     telemetry: Telemetry {
                         at,
                         mode: Mode::WITHOUT_FAULT[mode],
@@ -266,9 +290,10 @@ pub(super) mod tests {
                     },
                     codes,
                     ages,
+                    bridges,
                     flags: Flags::from_bits(flags),
-                }
-            })
+                },
+            )
     }
 
     fn sample<T>(code: T, at: Tick) -> Option<Sample<T>> {
@@ -282,6 +307,7 @@ pub(super) mod tests {
             codes in any::<[u16; 4]>(),
             ages in prop::array::uniform4(prop::option::of(-8..=245_i32)),
             command in prop::option::of(0..4_usize),
+            bridges in prop::option::of(any::<[u16; 2]>()),
             overrun in any::<bool>(),
             emergency_stop in any::<bool>(),
         ) {
@@ -291,6 +317,10 @@ pub(super) mod tests {
                 load_cell: at(1).and_then(|at| sample(AdcCode::new(codes[1]), at)),
                 tread: at(2).and_then(|at| sample(AdcCode::new(codes[2]), at)),
                 arm: at(3).and_then(|at| sample(AngleFrame::new(codes[3]), at)),
+                bridges: bridges.map(|codes| BridgeCodes {
+                    drive: BridgeCode::new(codes[0]),
+                    pretightener: BridgeCode::new(codes[1]),
+                }),
             };
             let command = command.map(|index| Command::ALL[index]);
             let input =

@@ -300,8 +300,13 @@ mod tests {
             scale: most,
             review: Some(review),
         };
-        let outcome =
-            Outcome { gap_predicted: most, slip_margin: most, scale: most, bounded: true };
+        let outcome = Outcome {
+            gap_predicted: most,
+            slip_margin: most,
+            scale: most,
+            bounded: true,
+            strange: true,
+        };
         let plan = Plan {
             sequence: u32::MAX,
             step: 255,

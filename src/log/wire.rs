@@ -18,12 +18,12 @@ use crate::units::Q16;
 const NUMBERS: usize = 12;
 
 /// Words of a record that are written as they are.
-const WORDS: usize = 5;
+const WORDS: usize = 6;
 
 /// Bits of the map before those of the words.
 const DIFFERENCES: usize = 2 * (1 + NUMBERS);
 
-const _: () = assert!(DIFFERENCES + WORDS < 32, "one bit is left for two more codes");
+const _: () = assert!(DIFFERENCES + WORDS == 32, "the map is full");
 
 /// A record as whole numbers.
 ///
@@ -52,7 +52,8 @@ impl Wire {
     /// The record as numbers.
     #[inline]
     pub(super) fn of(record: &Record) -> Self {
-        let Record { telemetry: t, codes: [wheel, load_cell, tread, arm], ages, flags } = record;
+        let Record { telemetry: t, codes, ages, bridges: [drive, pretightener], flags } = record;
+        let [wheel, load_cell, tread, arm] = codes;
         let [wheel_age, load_cell_age, tread_age, arm_age] = *ages;
         let q = |value: Q16| value.to_bits() as u32;
         Self {
@@ -75,6 +76,7 @@ impl Wire {
             words: [
                 word(*wheel, *load_cell),
                 word(*tread, *arm),
+                word(*drive, *pretightener),
                 word(t.drive.to_bits() as u16, t.pretightener.to_bits() as u16),
                 u32::from_le_bytes([t.level, t.stage as u8, number::of_mode(t.mode), 0]),
                 flags.to_bits().into(),
@@ -86,7 +88,7 @@ impl Wire {
     pub(super) fn record(&self) -> Option<Record> {
         let [ages, q @ ..] = self.numbers;
         let q: [Q16; 11] = q.map(|bits| Q16::from_bits(bits as i32));
-        let [wheel_and_cell, tread_and_arm, duties, state, flags] = self.words;
+        let [wheel_and_cell, tread_and_arm, bridges, duties, state, flags] = self.words;
         let [arm_age, wheel_age, load_cell_age, tread_age] = ages.to_le_bytes();
         let [level, stage, mode, rest] = state.to_le_bytes();
         let [wheel, load_cell] = halves(wheel_and_cell);
@@ -115,6 +117,7 @@ impl Wire {
             },
             codes: [wheel, load_cell, tread, arm],
             ages: [wheel_age, load_cell_age, tread_age, arm_age],
+            bridges: halves(bridges),
             flags: Flags::from_bits(u16::try_from(flags).ok()?),
         })
     }
@@ -144,7 +147,6 @@ impl Wire {
     pub(super) fn take<'a>(before: &Self, bytes: &'a [u8]) -> Option<(Self, &'a [u8])> {
         let (map, mut rest) = bytes.split_first_chunk::<4>()?;
         let map = u32::from_le_bytes(*map);
-        (map >> (DIFFERENCES + WORDS) == 0).then_some(())?;
         let mut wire = *before;
         wire.at = wire.at.wrapping_add(1);
         let numbers = core::iter::once(&mut wire.at).chain(&mut wire.numbers);
@@ -271,15 +273,15 @@ mod tests {
         // Stage 0, mode 99, a byte that says nothing, flags beyond 16 bits.
         let state = |stage, mode, rest| u32::from_le_bytes([0, stage, mode, rest]);
         for (place, number) in
-            [(3, state(0, 0, 0)), (3, state(1, 99, 0)), (3, state(1, 0, 1)), (4, 65_536)]
+            [(4, state(0, 0, 0)), (4, state(1, 99, 0)), (4, state(1, 0, 1)), (5, 65_536)]
         {
             let mut meaningless = sound;
             meaningless.words[place] = number;
             assert_eq!(meaningless.record(), None, "{place}");
         }
-        // A map with a difference of no length, and with a word that there is not.
-        for map in [3_u32, 1 << 31] {
-            let bytes = [&map.to_le_bytes()[..], &[0; LONGEST]].concat();
+        // A map with a difference of no length, and one with a word that is missing.
+        for (map, behind) in [(3_u32, LONGEST), (1 << 31, 3)] {
+            let bytes = [&map.to_le_bytes()[..], &vec![0; behind]].concat();
             assert_eq!(Wire::take(&sound, &bytes), None);
         }
     }

@@ -62,6 +62,8 @@ pub struct Outcome {
     pub scale: Ratio,
     /// Whether the correction met the end of its range.
     pub bounded: bool,
+    /// Whether the measured gap asks for a stiffness far from the estimated one.
+    pub strange: bool,
 }
 
 /// Speed and preload for the way to the next step and over it.

@@ -17,7 +17,7 @@ use crate::rig::Rig;
 
 /// Layout of the constants. Raised with every change of a type that a set holds; a set
 /// of another number is not read but refused, and the host makes it anew from its rig.
-pub const SCHEMA: u16 = 3;
+pub const SCHEMA: u16 = 4;
 
 /// Longest name of a set, bytes.
 pub const MAX_NAME: usize = 24;

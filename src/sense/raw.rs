@@ -69,6 +69,57 @@ impl AngleFrame {
     }
 }
 
+/// Mean output of a motor's bridge, the difference of its two legs, behind divider and
+/// low-pass: 12 bits, of which [`BridgeCode::CENTRE`] is no voltage. A code is 20 parts of
+/// 2^15 of the supply, so that the range ends at a duty of 1.25 either way, and its noise
+/// takes one byte a tick in the log.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub struct BridgeCode(u16);
+
+impl BridgeCode {
+    /// Code without voltage.
+    pub const CENTRE: u16 = 2048;
+    /// Duty of a code, LSB of Q15.
+    pub const DUTY: i32 = 20;
+
+    /// A code as read from the converter.
+    #[must_use]
+    pub const fn new(code: u16) -> Self {
+        Self(code)
+    }
+
+    /// The code of a duty, Q15, at the nominal supply; the nearest end if it is beyond.
+    #[must_use]
+    pub const fn of(duty: i32) -> Self {
+        let code = (duty + Self::DUTY * Self::CENTRE as i32 + Self::DUTY / 2) / Self::DUTY;
+        let end = 2 * Self::CENTRE as i32 - 1;
+        Self(if code < 0 { 0 } else { (if code > end { end } else { code }) as u16 })
+    }
+
+    /// The bare code.
+    #[must_use]
+    pub const fn get(self) -> u16 {
+        self.0
+    }
+
+    /// The duty that gives it at the nominal supply, Q15.
+    #[must_use]
+    pub const fn duty(self) -> i32 {
+        (self.0 as i32 - Self::CENTRE as i32) * Self::DUTY
+    }
+}
+
+/// What both bridges were found to put out. One converter reads them, one after the other.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+pub struct BridgeCodes {
+    /// Drive.
+    pub drive: BridgeCode,
+    /// Pre-tightener.
+    pub pretightener: BridgeCode,
+}
+
 /// Why a sensor gave no code this time. The last good one stays in force and ages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
@@ -100,4 +151,26 @@ pub struct SensorFrame {
     pub tread: Option<Sample<AdcCode>>,
     /// Arm angle at the pillar.
     pub arm: Option<Sample<AngleFrame>>,
+    /// Output of the bridges, converted since the tick before; none if nothing has been.
+    pub bridges: Option<BridgeCodes>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_code_of_a_bridge_is_the_nearest_to_its_duty() {
+        for code in 0..2 * BridgeCode::CENTRE {
+            let duty = BridgeCode::new(code).duty();
+            for off in [-BridgeCode::DUTY / 2, 0, BridgeCode::DUTY / 2 - 1] {
+                assert_eq!(BridgeCode::of(duty + off).get(), code, "{off}");
+            }
+        }
+        assert_eq!(BridgeCode::of(0).get(), BridgeCode::CENTRE);
+        assert_eq!(
+            (BridgeCode::of(i32::MIN / 2).get(), BridgeCode::of(i32::MAX / 2).get()),
+            (0, 4095)
+        );
+    }
 }

@@ -214,6 +214,7 @@ mod tests {
             load_cell: Some(Sample { code: analog(truth.preload_n / 200.0), at }),
             tread: Some(Sample { code: analog(truth.compression_mm / 5.0), at }),
             arm: Some(Sample { code: AngleFrame::new(code | parity << 15), at }),
+            bridges: None,
         }
     }
 
@@ -274,6 +275,7 @@ mod tests {
                     load_cell: if silent == 1 { old.load_cell } else { new.load_cell },
                     tread: if silent == 2 { old.tread } else { new.tread },
                     arm: if silent == 3 { old.arm } else { new.arm },
+                    bridges: None,
                 };
                 sensed = senses.step(&mut state, now, &mixed, Default::default());
             }

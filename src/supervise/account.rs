@@ -56,6 +56,11 @@ impl Fault {
                 "no good frame for sense.stale_after_s",
                 LOOK,
             ),
+            Self::ReadbackStale => held(
+                "converter of the readback, or its clock",
+                "no conversion of the bridges' outputs for 20 ticks",
+                LOOK,
+            ),
             Self::PressureRange => held(
                 "broken bridge of the load cell, short, overload",
                 "code outside 2 to 98 % for sense.stale_after_s",
@@ -122,6 +127,20 @@ impl Fault {
             Self::PretightenerRunaway => held(
                 "pre-tightener at full duty, reversed or weak; spring broken; load cell jumps",
                 "preload off the actuator's model by a quarter of cruise for 10 ticks",
+                LOOK,
+            ),
+            Self::DriveBridge => held(
+                "drive's bridge stuck, at full duty, reversed or late; motor supply off; its \
+                 divider or the readback's converter",
+                "drive's output off the given duty, through the same lag, by 0.02 and a 32nd of \
+                 it for 4 ticks",
+                LOOK,
+            ),
+            Self::PretightenerBridge => held(
+                "pre-tightener's bridge stuck, at full duty, reversed or late; motor supply off; \
+                 its divider or the readback's converter",
+                "pre-tightener's output off the given duty, through the same lag, by 0.02 and a \
+                 32nd of it for 4 ticks",
                 LOOK,
             ),
             Self::LevelMismatch => held(
@@ -195,6 +214,14 @@ impl Limit {
             Self::PreloadWait => {
                 ("slows down and, if need be, stands before the window", "the preload stands")
             }
+            Self::GapStrange => (
+                "goes on; the estimate follows by its step at most, or not at all",
+                "a crossing whose gap is as predicted",
+            ),
+            Self::TreadStrange => (
+                "goes on; load cell or displacement sensor is wrong, or the tread another one",
+                "the next preload phase",
+            ),
             Self::SlipMarginLow => ("goes on", "the next plan"),
         }
     }

@@ -16,6 +16,8 @@ pub enum Fault {
     DisplacementStale = 103,
     /// The arm angle sensor stopped answering or answers with errors.
     AngleStale = 104,
+    /// The readback of the bridges stopped answering.
+    ReadbackStale = 105,
     /// The load cell reads outside its range.
     PressureRange = 112,
     /// The tread displacement sensor reads outside its range.
@@ -42,6 +44,10 @@ pub enum Fault {
     ArmMismatch = 126,
     /// The preload strays from what the pre-tightener is asked for.
     PretightenerRunaway = 127,
+    /// The drive's bridge puts out another duty than it was given.
+    DriveBridge = 128,
+    /// The pre-tightener's bridge puts out another duty than it was given.
+    PretightenerBridge = 129,
     /// Odometry and arm disagree on the sleeve level at the end of travel.
     LevelMismatch = 131,
     /// Two steps of the table in a row were not found.
@@ -62,11 +68,12 @@ pub enum Fault {
 
 impl Fault {
     /// Every fault, in the order of codes.
-    pub const ALL: [Self; 25] = [
+    pub const ALL: [Self; 28] = [
         Self::SpeedStale,
         Self::PressureStale,
         Self::DisplacementStale,
         Self::AngleStale,
+        Self::ReadbackStale,
         Self::PressureRange,
         Self::DisplacementRange,
         Self::AngleRange,
@@ -80,6 +87,8 @@ impl Fault {
         Self::DutyMismatch,
         Self::ArmMismatch,
         Self::PretightenerRunaway,
+        Self::DriveBridge,
+        Self::PretightenerBridge,
         Self::LevelMismatch,
         Self::StepsLost,
         Self::WheelSlips,
@@ -104,6 +113,7 @@ impl Fault {
             Self::PressureStale => "the load cell stopped answering",
             Self::DisplacementStale => "the tread displacement sensor stopped answering",
             Self::AngleStale => "the arm angle sensor stopped answering or answers with errors",
+            Self::ReadbackStale => "the readback of the bridges stopped answering",
             Self::PressureRange => "the load cell reads outside its range",
             Self::DisplacementRange => "the tread displacement sensor reads outside its range",
             Self::AngleRange => "the arm angle lies outside the arm's reach",
@@ -119,6 +129,10 @@ impl Fault {
             Self::DutyMismatch => "duty and speed of the drive do not belong together",
             Self::ArmMismatch => "the arm moves farther than the wheel turns",
             Self::PretightenerRunaway => "the preload strays from its reference",
+            Self::DriveBridge => "the drive's bridge puts out another duty than it was given",
+            Self::PretightenerBridge => {
+                "the pre-tightener's bridge puts out another duty than it was given"
+            }
             Self::LevelMismatch => "the arm does not confirm the sleeve level at the end of travel",
             Self::StepsLost => "two steps of the table in a row were not found",
             Self::WheelSlips => "the wheel turns at a corner without getting over it",
@@ -160,11 +174,15 @@ pub enum Limit {
     PreloadWait = 209,
     /// The friction utilisation leaves less than the wanted margin.
     SlipMarginLow = 210,
+    /// The measured gap of a crossing is not the predicted one.
+    GapStrange = 211,
+    /// Compression and preload of a wheel that stands do not belong together.
+    TreadStrange = 212,
 }
 
 impl Limit {
     /// Every limit, in the order of codes.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 12] = [
         Self::StepEarly,
         Self::StepLate,
         Self::StepMissing,
@@ -175,6 +193,8 @@ impl Limit {
         Self::AdaptationBounded,
         Self::PreloadWait,
         Self::SlipMarginLow,
+        Self::GapStrange,
+        Self::TreadStrange,
     ];
 
     /// The stable code.
@@ -201,6 +221,8 @@ impl Limit {
             Self::AdaptationBounded => "the stiffness estimate reached the end of its range",
             Self::PreloadWait => "waiting before a corner for the preload to stand",
             Self::SlipMarginLow => "the friction utilisation leaves less than the wanted margin",
+            Self::GapStrange => "the measured gap is not the predicted one",
+            Self::TreadStrange => "compression of the tread and preload do not belong together",
         }
     }
 }

@@ -3,9 +3,12 @@
 #![deny(clippy::float_arithmetic)]
 
 use super::crosscheck::{Compared, CrossCheck, CrossState};
+use super::readback::Readback;
 use super::{Fault, Mode};
+use crate::hal::Duty;
 use crate::numeric::checked;
 use crate::rig::{Rig, RigError};
+use crate::sense::raw::BridgeCodes;
 use crate::sense::{Reason, SensedState, Validity};
 use crate::units::{MillimetresPerSecond, Newtons, Ratio, Tick, q16};
 
@@ -40,6 +43,7 @@ pub struct MonitorState {
     /// The drive was on in the last tick.
     driving: bool,
     cross: CrossState,
+    readback: Readback,
 }
 
 /// What is looked at beside the sensors.
@@ -51,6 +55,8 @@ pub struct Observed<'a> {
     pub mode: Mode,
     /// Sensors.
     pub sensed: &'a SensedState,
+    /// What the bridges were found to put out since the last tick.
+    pub bridges: Option<BridgeCodes>,
     /// Speed reference, signed, mm/s.
     pub speed_ref: MillimetresPerSecond,
     /// Preload that the actuator should have reached by now, N.
@@ -99,6 +105,7 @@ impl Monitor {
         let turns = !driven(seen.mode) && speed.abs() > BEYOND;
         lasting(&mut state.runaway, turns);
         let lost = sensor_fault(seen.sensed);
+        let bridge = state.readback.step(seen.bridges);
         let crossed = self.cross_check(state, seen);
         if seen.emergency_stop {
             Some(Fault::EmergencyStop)
@@ -108,6 +115,8 @@ impl Monitor {
             Some(Fault::Overpressure)
         } else if lost.is_some() {
             lost
+        } else if bridge.is_some() {
+            bridge
         } else if state.runaway >= RUNAWAY_TICKS {
             Some(Fault::DriveRunaway)
         } else if crossed.is_some() {
@@ -117,6 +126,14 @@ impl Monitor {
         } else {
             None
         }
+    }
+}
+
+impl MonitorState {
+    /// What the bridges are given until the next tick; off is none.
+    #[inline]
+    pub fn give(&mut self, drive: Duty, pretightener: Duty) {
+        self.readback.give(drive, pretightener);
     }
 }
 
@@ -192,11 +209,15 @@ fn judge(sensed: &SensedState) -> Option<Fault> {
 mod tests {
     use super::*;
     use crate::sense::Reading;
+    use crate::sense::raw::BridgeCode;
     use crate::supervise::{Direction, Leg};
     use crate::units::{Millimetres, Q16, Travel};
     use proptest::prelude::*;
 
     const RUN: Mode = Mode::Run(Direction::Deploy, Leg::Cruise);
+    /// Of bridges that were given nothing.
+    const IDLE: BridgeCodes =
+        BridgeCodes { drive: BridgeCode::of(0), pretightener: BridgeCode::of(0) };
 
     fn sensed(speed: f64, preload: f64) -> SensedState {
         let reading =
@@ -237,6 +258,7 @@ mod tests {
                 now: tick as Tick,
                 mode,
                 sensed: &sensed,
+                bridges: Some(IDLE),
                 speed_ref: Q16::from_num(wanted),
                 preload_due: Q16::from_num(due),
                 effort: None,
@@ -281,6 +303,7 @@ mod tests {
             now: 0,
             mode: Mode::Idle,
             sensed: &sensed,
+            bridges: Some(IDLE),
             speed_ref: Q16::ZERO,
             preload_due: Q16::ZERO,
             effort: None,

@@ -213,7 +213,8 @@ impl Exchange {
         self.light.store(light as u8, Ordering::Relaxed);
     }
 
-    /// The latest code of each sensor.
+    /// The latest code of each sensor. Those of the bridges are not among them: who drives
+    /// the bridges has them.
     #[must_use]
     pub fn sensors(&self) -> SensorFrame {
         SensorFrame {
@@ -221,6 +222,7 @@ impl Exchange {
             load_cell: self.load_cell.get(),
             tread: self.tread.get(),
             arm: self.arm.get(),
+            bridges: None,
         }
     }
 

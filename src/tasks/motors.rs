@@ -20,7 +20,7 @@ pub async fn motors(
     exchange: &Exchange,
 ) -> ! {
     motors.apply(MotorCommand::OFF, MotorCommand::OFF);
-    let mut state = State::default();
+    let mut state = State::standing(watchdog.place());
     let mut output = Output::default();
     let mut recorder = Recorder::default();
     let mut beat = Beat::<1>::new();
@@ -28,6 +28,7 @@ pub async fn motors(
         let due = beat.lead(&exchange.pulse).await;
         let mut input = exchange.input(due.tick, due.missed > 0);
         input.emergency_stop = motors.stopped();
+        input.sensors.bridges = motors.readback();
         controller.step_into(&mut state, &input, &mut output);
         motors.apply(output.drive, output.preload);
         if output.rearm {
@@ -35,7 +36,7 @@ pub async fn motors(
         }
         exchange.publish(&input, &output);
         let late = exchange.late(due.tick);
-        watchdog.keep(&recorder.flight(&output.telemetry, late));
+        watchdog.keep(&recorder.flight(&output.telemetry, state.is_placed(), late));
         if late.is_nobody() {
             watchdog.feed();
         }

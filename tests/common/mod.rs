@@ -19,8 +19,10 @@ use interstage::hal::{
 };
 use interstage::log::Entry;
 use interstage::rig::Rig;
-use interstage::sense::raw::{AdcCode, AngleFrame, BusFault, EncoderCount};
-use interstage::supervise::Command;
+use interstage::sense::raw::{
+    AdcCode, AngleFrame, BridgeCode, BridgeCodes, BusFault, EncoderCount,
+};
+use interstage::supervise::{Command, Lag};
 
 /// The clock is one for the whole process: one bench at a time.
 static CLOCK: Mutex<()> = Mutex::new(());
@@ -235,11 +237,33 @@ pub(crate) struct Bridges {
     pub(crate) open: Rc<Cell<bool>>,
     /// It has cut the bridges.
     pub(crate) cut: Rc<Cell<bool>>,
+    /// Duties that both take, and their outputs behind the low-pass.
+    outputs: Rc<Cell<[(i16, Lag); 2]>>,
+    /// Nothing is converted any more.
+    pub(crate) mute: Rc<Cell<bool>>,
+    /// The pre-tightener takes this duty whatever it is given, while it is on.
+    pub(crate) runaway_preload: Rc<Cell<Option<i16>>>,
 }
 
 impl Motors for Bridges {
     fn apply(&mut self, drive: MotorCommand, preload: MotorCommand) {
         self.applied.push((drive, preload));
+        let taken = |command: MotorCommand| {
+            if command.enable { command.duty.to_bits() } else { 0 }
+        };
+        let [(_, one), (_, other)] = self.outputs.get();
+        let runaway = self.runaway_preload.get().filter(|_| preload.enable);
+        self.outputs.set([(taken(drive), one), (runaway.unwrap_or(taken(preload)), other)]);
+    }
+
+    fn readback(&mut self) -> Option<BridgeCodes> {
+        let [(drive, mut one), (preload, mut other)] = self.outputs.get();
+        let codes = BridgeCodes {
+            drive: BridgeCode::of(one.step(drive.into())),
+            pretightener: BridgeCode::of(other.step(preload.into())),
+        };
+        self.outputs.set([(drive, one), (preload, other)]);
+        (!self.mute.get()).then_some(codes)
     }
 
     fn stopped(&mut self) -> bool {

@@ -2,7 +2,9 @@
 
 use interstage::control::{Input, Output};
 use interstage::model::Plan;
-use interstage::sense::raw::{AdcCode, AngleFrame, EncoderCount, Sample, SensorFrame};
+use interstage::sense::raw::{
+    AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
+};
 use interstage::supervise::Command;
 
 use crate::digest::Digest;
@@ -27,6 +29,9 @@ pub struct Given {
     pub now: u32,
     /// Wheel, load cell, tread, arm.
     pub codes: [Code; 4],
+    /// Codes of the bridges of drive and pre-tightener in low and high half, or
+    /// [`NO_BRIDGES`].
+    pub bridges: u32,
     /// Index into [`Command::ALL`], from 1; 0 for none.
     pub command: u32,
     /// 1 if the tick is late.
@@ -34,6 +39,9 @@ pub struct Given {
     /// 1 if the emergency stop has cut the bridges.
     pub emergency_stop: u32,
 }
+
+/// No conversion of the bridges' outputs.
+pub const NO_BRIDGES: u32 = u32::MAX;
 
 /// What is looked at of a tick's output.
 #[repr(C)]
@@ -100,6 +108,9 @@ impl Given {
                 code(frame.tread, AdcCode::get),
                 code(frame.arm, AngleFrame::get),
             ],
+            bridges: frame.bridges.map_or(NO_BRIDGES, |codes| {
+                u32::from(codes.drive.get()) | u32::from(codes.pretightener.get()) << 16
+            }),
             command: input.command.map_or(0, position),
             overrun: input.overrun.into(),
             emergency_stop: input.emergency_stop.into(),
@@ -117,6 +128,10 @@ impl Given {
                 load_cell: sample(load_cell, AdcCode::new),
                 tread: sample(tread, AdcCode::new),
                 arm: sample(arm, AngleFrame::new),
+                bridges: (self.bridges != NO_BRIDGES).then_some(BridgeCodes {
+                    drive: BridgeCode::new(self.bridges as u16),
+                    pretightener: BridgeCode::new((self.bridges >> 16) as u16),
+                }),
             },
             command: Command::ALL.get((self.command as usize).wrapping_sub(1)).copied(),
             plan,
@@ -127,7 +142,7 @@ impl Given {
 
     /// The words as the image's memory holds them.
     #[must_use]
-    pub fn words(&self) -> [u32; 16] {
+    pub fn words(&self) -> [u32; 17] {
         let [w, l, t, a] = self.codes;
         let [head, tail] = [self.now, self.command];
         [
@@ -144,6 +159,7 @@ impl Given {
             a.valid,
             a.code,
             a.at,
+            self.bridges,
             tail,
             self.overrun,
             self.emergency_stop,
@@ -188,6 +204,10 @@ mod tests {
                 load_cell: None,
                 tread: Some(Sample { code: AdcCode::new(1), at }),
                 arm: Some(Sample { code: AngleFrame::new(0x8001), at: 6 }),
+                bridges: Some(BridgeCodes {
+                    drive: BridgeCode::new(4095),
+                    pretightener: BridgeCode::new(7),
+                }),
             },
             command: Some(Command::Retract),
             plan: None,
@@ -202,6 +222,6 @@ mod tests {
     #[test]
     fn the_words_lie_as_the_structure_does() {
         assert_eq!(size_of::<Given>(), size_of_val(&Given::default().words()));
-        assert_eq!(core::mem::offset_of!(Given, command), 13 * 4);
+        assert_eq!(core::mem::offset_of!(Given, command), 14 * 4);
     }
 }

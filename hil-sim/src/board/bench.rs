@@ -10,6 +10,8 @@ use super::log::{Line, Reader, Strings};
 use super::machine::Machine;
 use super::peripherals::HZ;
 use super::rtt::Probe;
+use super::tampered::{Tampered, letter};
+use crate::faults::Tamper;
 use crate::plant::draw::PlantParameters;
 use crate::plant::rig::{Drives, PlantError, VirtualRig};
 use crate::plant::sensors::{Codes, Sensed, Sensors};
@@ -17,6 +19,8 @@ use crate::scenario::{Direction, Scenario};
 
 /// Step of the plant, s and cycles.
 const STEP_S: f64 = 1e-3;
+/// Most counts that the encoder's lines go through in a millisecond.
+const MOST_COUNTS: i16 = 512;
 /// Cycles of a millisecond.
 pub const STEP: u64 = HZ / 1000;
 
@@ -57,10 +61,16 @@ pub struct Bench<'a> {
     /// The wheel's position in counts, beyond the 16 bits of a code.
     wheel: i64,
     millisecond: u64,
+    /// Cycle at which the millisecond under way is over.
+    end: u64,
+    /// Restarts after which it was set.
+    restarts: usize,
     /// What has come on the binary log's channel; none if nobody listens.
     frames: Option<Vec<u8>>,
     /// The text log as it came, if it is kept.
     text: Option<Vec<u8>>,
+    /// The faults of the scenario, if it has some.
+    tampered: Option<Tampered>,
 }
 
 impl<'a> Bench<'a> {
@@ -88,8 +98,11 @@ impl<'a> Bench<'a> {
             codes,
             wheel: 0,
             millisecond: 0,
+            end: STEP,
+            restarts: 0,
             frames: Some(Vec::new()),
             text: None,
+            tampered: Tamper::of(scenario).map(Tampered::new),
         };
         bench.speak(codes);
         Ok(bench)
@@ -100,13 +113,37 @@ impl<'a> Bench<'a> {
     /// # Errors
     /// [`BenchError`] if the engine or the plant fails.
     pub fn step(&mut self) -> Result<(Passed, Vec<Line>), BenchError> {
-        self.machine.run_on(self.end())?;
+        let end = self.end();
+        if let Some(tampered) = &mut self.tampered {
+            let (command, noise) = (tampered.command(), tampered.noise());
+            tampered.hunt(&mut self.machine, end)?;
+            if let Some(command) = command {
+                self.send(letter(command))?;
+            }
+            if let Some(noise) = noise {
+                self.line_send(&noise)?;
+            }
+        }
+        self.machine.run_on(end)?;
         self.close()
     }
 
     /// Cycle at which the millisecond under way is over.
-    const fn end(&self) -> u64 {
-        (self.millisecond + 1) * STEP
+    ///
+    /// The board counts its milliseconds from its start, and so does the plant: a tick always
+    /// comes a little into one. Where a restart shifted the two against one another, a tick
+    /// could meet the step of the plant, and find the wheel a whole millisecond farther or
+    /// not by a few microseconds of its own.
+    fn end(&mut self) -> u64 {
+        let restarts = self.machine.restarts();
+        if let Some((at, _)) = restarts.last()
+            && restarts.len() != self.restarts
+        {
+            self.restarts = restarts.len();
+            let since = self.machine.now().saturating_sub(*at);
+            self.end = at + (since / STEP + 1) * STEP;
+        }
+        self.end
     }
 
     /// Goes on up to the end of the millisecond or to a breakpoint, whose address is
@@ -115,7 +152,8 @@ impl<'a> Bench<'a> {
     /// # Errors
     /// As [`Bench::step`].
     pub fn run_to_break(&mut self) -> Result<Option<u32>, BenchError> {
-        Ok(self.machine.run_until(self.end())?)
+        let end = self.end();
+        Ok(self.machine.run_until(end)?)
     }
 
     /// Goes on by one instruction.
@@ -123,12 +161,13 @@ impl<'a> Bench<'a> {
     /// # Errors
     /// As [`Bench::step`].
     pub fn step_instruction(&mut self) -> Result<(), BenchError> {
-        Ok(self.machine.step(self.end())?)
+        let end = self.end();
+        Ok(self.machine.step(end)?)
     }
 
     /// Whether the millisecond is over and has to be closed.
     #[must_use]
-    pub fn is_due(&self) -> bool {
+    pub fn is_due(&mut self) -> bool {
         self.machine.now() >= self.end()
     }
 
@@ -138,6 +177,7 @@ impl<'a> Bench<'a> {
     /// As [`Bench::step`].
     pub fn close(&mut self) -> Result<(Passed, Vec<Line>), BenchError> {
         self.millisecond += 1;
+        self.end = self.end() + STEP;
         let now = self.machine.now();
         let [drive, preload] = self.machine.chip_mut().take_motors(now);
         let on = |motor: Motor| motor.enabled > 0.5;
@@ -146,11 +186,21 @@ impl<'a> Bench<'a> {
             drive_on: on(drive),
             preload: preload.duty,
             preload_on: on(preload),
+            ..Drives::default()
         };
         let passed = Passed { codes: self.codes, drives };
-        self.plant.step(&drives, STEP_S)?;
-        let codes = self.sensors.read(sensed(&self.plant), STEP_S);
+        let taken = self.tampered.as_mut().map_or(drives, |tampered| tampered.drives(drives));
+        self.plant.step(&taken, STEP_S)?;
+        let mut codes = self.sensors.read(sensed(&self.plant), STEP_S);
+        if let Some(tampered) = &mut self.tampered {
+            let t_s = self.millisecond as f64 * STEP_S;
+            tampered.begin(&mut self.machine, &mut self.plant, t_s)?;
+            codes = tampered.tell(&mut self.machine, codes, self.millisecond as u32);
+        }
         self.speak(codes);
+        if self.tampered.as_ref().is_some_and(Tampered::log_gone) {
+            return Ok((passed, Vec::new()));
+        }
         if let Some(frames) = &mut self.frames {
             frames.extend(self.probe.up(&mut self.machine, 1)?);
         }
@@ -163,11 +213,14 @@ impl<'a> Bench<'a> {
 
     /// The sensors' lines take on these codes.
     fn speak(&mut self, codes: Codes) {
-        let turned = codes.wheel.since(self.codes.wheel);
+        // More than a wheel can do is what can be made of noise on its lines.
+        let turned = codes.wheel.since(self.codes.wheel).clamp(-MOST_COUNTS, MOST_COUNTS);
         self.wheel += i64::from(turned);
         self.codes = codes;
         let chip = self.machine.chip_mut();
-        chip.set_analog([codes.load_cell.get(), codes.tread.get()]);
+        // Twelve bits and no more is what the readback takes of the sixteen.
+        let bridges = [codes.bridges.drive, codes.bridges.pretightener].map(|code| code.get() << 4);
+        chip.set_analog([codes.load_cell.get(), codes.tread.get(), bridges[0], bridges[1]]);
         chip.angle.angle = codes.arm.get();
         chip.turn_wheel(self.wheel, STEP);
     }
@@ -238,6 +291,24 @@ impl<'a> Bench<'a> {
         self.machine
     }
 
+    /// When the first of the scenario's faults came, s since power-up.
+    #[must_use]
+    pub fn struck_s(&self) -> Option<f64> {
+        self.tampered.as_ref().and_then(Tampered::struck_s)
+    }
+
+    /// When it first did something, s since power-up.
+    #[must_use]
+    pub fn acts_s(&self) -> Option<f64> {
+        self.tampered.as_ref().and_then(Tampered::acts_s)
+    }
+
+    /// When the readback had to tell it, s since power-up.
+    #[must_use]
+    pub fn tells_s(&self) -> Option<f64> {
+        self.tampered.as_ref().and_then(Tampered::tells_s)
+    }
+
     /// The plant.
     #[must_use]
     pub const fn plant(&self) -> &VirtualRig {
@@ -259,5 +330,6 @@ fn sensed(plant: &VirtualRig) -> Sensed {
         preload_n: truth.preload_n,
         depth_mm: truth.depth_mm,
         arm_rad: truth.arm_rad,
+        bridges: truth.bridges,
     }
 }

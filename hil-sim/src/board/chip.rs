@@ -37,8 +37,9 @@ const REQUESTS: [u32; 4] = [5, 36, 10, 11];
 pub struct Defects {
     /// Lines of the wheel encoder that are broken: the pull-up holds them high.
     pub encoder_lines: [bool; 2],
-    /// The converter of this index gives this code whatever the voltage.
-    pub stuck_codes: [Option<u16>; 2],
+    /// The input of load cell, tread sensor, drive's or pre-tightener's bridge reads this,
+    /// in parts of 2^16, whatever the voltage.
+    pub stuck_codes: [Option<u16>; 4],
     /// DMA moves nothing.
     pub dma_stalled: bool,
     /// Clearing the flags of the time driver's timer has no effect.
@@ -65,6 +66,8 @@ pub struct Chip {
     /// The timers of drive and pre-tightener.
     motors: [Pwm; 2],
     adc: Adc,
+    /// The converters of which the first reads the bridges.
+    readback: Adc,
     dma: Dma,
     mux: Dmamux,
     spi: Spi,
@@ -78,7 +81,7 @@ pub struct Chip {
     deselected: bool,
     /// The wheel encoder's position, in quarters of a line pair.
     wheel: i64,
-    inputs: [u16; 2],
+    inputs: [u16; 4],
     bridges: [Bridge; 2],
     /// Faults of the hardware.
     pub defects: Defects,
@@ -109,6 +112,7 @@ impl Chip {
             encoder: Encoder::new(pins::lines_at(0)),
             motors: [Pwm::new(false), Pwm::new(false)],
             adc: Adc::default(),
+            readback: Adc::default(),
             dma: Dma::default(),
             mux: Dmamux::default(),
             spi: Spi::default(),
@@ -118,7 +122,7 @@ impl Chip {
             angle: AngleSensor::default(),
             deselected: false,
             wheel: 0,
-            inputs: [0; 2],
+            inputs: [0; 4],
             bridges: [Bridge::default(); 2],
             defects: Defects::default(),
             strays: Strays::default(),
@@ -173,6 +177,7 @@ impl Chip {
         self.system.advance(now);
         self.time.advance(now);
         self.adc.advance(now);
+        self.readback.advance(now);
         if let Some(frame) = self.spi.over(now) {
             let answer = self.exchange(frame);
             self.spi.answer(answer, now);
@@ -248,7 +253,7 @@ impl Chip {
             Block::Port(_) | Block::Syscfg | Block::Motor(_) | Block::Exti if write => {
                 self.settle(now);
             }
-            Block::Adc | Block::Spi if write => self.settle_lines(now),
+            Block::Adc | Block::Readback | Block::Spi if write => self.settle_lines(now),
             // Their data registers are changed by being read.
             Block::Adc if offset & 0xFF == adc::DR => self.settle_lines(now),
             Block::Spi if offset == spi::DR => self.settle_lines(now),
@@ -290,6 +295,7 @@ impl Chip {
             self.motors[0].deadline(),
             self.motors[1].deadline(),
             self.adc.deadline(),
+            self.readback.deadline(),
             self.spi.deadline(),
             self.watchdog.deadline(),
             self.flash.deadline(),
@@ -317,6 +323,7 @@ impl Chip {
             Block::Flash => &mut self.flash,
             Block::Port(index) => &mut self.ports[index],
             Block::Adc => &mut self.adc,
+            Block::Readback => &mut self.readback,
             Block::Counter => &mut self.counter,
             Block::System => &mut self.system,
             Block::Debug => &mut self.debug,

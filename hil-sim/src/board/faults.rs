@@ -11,7 +11,8 @@ use super::peripherals::rcc::Cause;
 /// A fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// The converter of the load cell (0) or of the tread sensor (1) gives this code.
+    /// The input of load cell (0), tread sensor (1), drive's (2) or pre-tightener's bridge (3)
+    /// reads this, in parts of 2^16.
     StuckCode(usize, u16),
     /// These bits of the angle sensor's answers are turned over.
     BitErrors(u16),
@@ -45,7 +46,7 @@ impl Fault {
         let chip = machine.chip_mut();
         match self {
             Self::StuckCode(converter, code) => {
-                chip.defects.stuck_codes[converter & 1] = Some(code);
+                chip.defects.stuck_codes[converter & 3] = Some(code);
             }
             Self::BitErrors(bits) => chip.angle.bit_errors = bits,
             Self::AngleLost => chip.angle.lost = true,
@@ -73,7 +74,7 @@ impl Fault {
     pub fn heal(self, machine: &mut Machine) {
         let chip = machine.chip_mut();
         match self {
-            Self::StuckCode(converter, _) => chip.defects.stuck_codes[converter & 1] = None,
+            Self::StuckCode(converter, _) => chip.defects.stuck_codes[converter & 3] = None,
             Self::BitErrors(_) => chip.angle.bit_errors = 0,
             Self::AngleLost => chip.angle.lost = false,
             Self::EncoderLine(line) => chip.defects.encoder_lines[line & 1] = false,
@@ -101,8 +102,8 @@ pub struct Timed {
 /// A fault that is spelt wrong.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{0}`: expected <fault>@<seconds> with load-cell=<code>, tread=<code>, angle-bits=<mask>, \
-     angle-lost, encoder-a, encoder-b, dma-stalled, timer-flags, button-storm, brown-out, \
+    "`{0}`: expected <fault>@<seconds> with load-cell=<code>, tread=<code>, \
+     drive-readback=<code>, pretightener-readback=<code>, angle-bits=<mask>, angle-lost, encoder-a, encoder-b, dma-stalled, timer-flags, button-storm, brown-out, \
      reset-pin, caught or flip=<address>.<bit>"
 )]
 pub struct Misspelt(String);
@@ -124,6 +125,10 @@ impl FromStr for Fault {
         let fault = match (name, value) {
             ("load-cell", Some(code)) => half(code).map(|code| Self::StuckCode(0, code)),
             ("tread", Some(code)) => half(code).map(|code| Self::StuckCode(1, code)),
+            ("drive-readback", Some(code)) => half(code).map(|code| Self::StuckCode(2, code)),
+            ("pretightener-readback", Some(code)) => {
+                half(code).map(|code| Self::StuckCode(3, code))
+            }
             ("angle-bits", Some(mask)) => half(mask).map(Self::BitErrors),
             ("angle-lost", None) => Some(Self::AngleLost),
             ("encoder-a", None) => Some(Self::EncoderLine(0)),
@@ -160,7 +165,9 @@ impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self::StuckCode(0, code) => write!(f, "load-cell={code:#x}"),
-            Self::StuckCode(_, code) => write!(f, "tread={code:#x}"),
+            Self::StuckCode(1, code) => write!(f, "tread={code:#x}"),
+            Self::StuckCode(2, code) => write!(f, "drive-readback={code:#x}"),
+            Self::StuckCode(_, code) => write!(f, "pretightener-readback={code:#x}"),
             Self::BitErrors(mask) => write!(f, "angle-bits={mask:#x}"),
             Self::AngleLost => write!(f, "angle-lost"),
             Self::EncoderLine(0) => write!(f, "encoder-a"),
@@ -185,6 +192,8 @@ mod tests {
         for fault in [
             Fault::StuckCode(0, 0x1234),
             Fault::StuckCode(1, 0),
+            Fault::StuckCode(2, 0x8000),
+            Fault::StuckCode(3, 7),
             Fault::BitErrors(0x8000),
             Fault::AngleLost,
             Fault::EncoderLine(0),

@@ -39,12 +39,9 @@ pub enum RunError {
     /// The firmware has one controller.
     #[error("the firmware schedules: --controller {0} runs in software alone")]
     Controller(String),
-    /// The scenario's faults are of the run in software.
-    #[error(
-        "run.faults: of runs in software alone; the emulated board's hardware breaks by \
-         --board-fault"
-    )]
-    Faults,
+    /// The scenario's parameters.
+    #[error("{0}")]
+    Scenario(String),
     /// The rig cannot be put into the board's flash.
     #[error(transparent)]
     Parameters(#[from] CompileError),
@@ -63,14 +60,10 @@ pub struct Ran {
 /// What the firmware can be asked to do.
 ///
 /// # Errors
-/// [`RunError::Controller`] if the scenario wants another controller than the firmware's,
-/// [`RunError::Faults`] if it brings about faults.
+/// [`RunError::Controller`] if the scenario wants another controller than the firmware's.
 pub fn check(scenario: &Scenario) -> Result<(), RunError> {
     if scenario.run.controller != ControllerKind::Scheduled {
         return Err(RunError::Controller(scenario.run.controller.name().to_owned()));
-    }
-    if !scenario.run.faults.is_empty() {
-        return Err(RunError::Faults);
     }
     Ok(())
 }

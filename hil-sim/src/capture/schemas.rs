@@ -16,6 +16,8 @@ pub(crate) fn rows() -> Value {
         tread_at: Some(0),
         arm_code: Some(0),
         arm_at: Some(0),
+        drive_code: Some(0),
+        pretightener_code: Some(0),
         ..Row::default()
     });
     json::schema("interstage.Controller", &example, &["tick", "t_s", "mode"])

@@ -103,7 +103,7 @@ impl From<RunError> for Failure {
     fn from(error: RunError) -> Self {
         match error {
             RunError::Rig(error) => error.into(),
-            RunError::Refused(_) => Self::input(error),
+            RunError::Refused(_) | RunError::Hardware(_) => Self::input(error),
             RunError::Plant(_) => Self::run(error),
         }
     }

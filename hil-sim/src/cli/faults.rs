@@ -14,6 +14,11 @@ use crate::table::{number, plain};
 /// The exit code is 1 if a fault goes undetected or the mechanism is not held.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
+    /// What runs the controller: the host, or the firmware on the emulated board, which
+    /// breaks in its registers and lines as well.
+    #[arg(long, default_value = "sil", value_parser = ["sil", "board"])]
+    target: String,
+
     /// Instants a fault.
     #[arg(short = 'n', value_name = "N", default_value_t = 20,
           value_parser = clap::value_parser!(u64).range(1..=100_000))]
@@ -24,9 +29,13 @@ pub(super) struct Args {
     only: Vec<String>,
 
     /// No faults: this many random deployments, in which none may be reported.
-    #[arg(long, value_name = "N", conflicts_with_all = ["only", "count"],
+    #[arg(long, value_name = "N", conflicts_with_all = ["only", "count", "target"],
           value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     clean: Option<u64>,
+
+    /// Writes the table of the emulated board into `docs/SAFETY.md`.
+    #[arg(long, requires_if("sil", "target"))]
+    write_docs: bool,
 
     #[command(flatten)]
     scenario: ScenarioArgs,
@@ -41,20 +50,52 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     if let Some(count) = args.clean {
         return clean(args, &scenario, count);
     }
-    let wanted = |case: &Case| {
-        args.only.is_empty() || args.only.iter().any(|text| case.name().contains(text))
-    };
-    let cases: Vec<Case> = Case::all().into_iter().filter(wanted).collect();
+    let board = args.target == "board";
+    let all = if board { Case::all_on_board() } else { Case::all() };
+    let cases: Vec<Case> = all.iter().filter(|case| case.is_one_of(&args.only)).copied().collect();
     if cases.is_empty() {
-        let names: Vec<String> = Case::all().iter().map(Case::name).collect();
+        let names: Vec<String> = all.iter().map(Case::name).collect();
         let (text, names) = (args.only.join(", "), names.join(", "));
         return Err(Failure::input(format!("--only {text}: no such fault; faults: {names}")));
     }
     let campaign = Campaign { scenario, instants: args.count as usize, cases };
+    if board {
+        return on_board(args, &campaign);
+    }
     let outcome = {
         let bar = progress::bar("runs", campaign.runs());
         campaign.run(&|| bar.advance(1))?
     };
+    output::result(args.json, &outcome, || human(&outcome))?;
+    Ok(Outcome::of(outcome.is_good()))
+}
+
+/// Without the emulated board: go on with a binary that has it.
+#[cfg(not(feature = "board"))]
+fn on_board(_: &Args, _: &Campaign) -> Result<Outcome, Failure> {
+    Ok(Outcome::Code(crate::provision::go_on()?))
+}
+
+#[cfg(feature = "board")]
+fn on_board(args: &Args, campaign: &Campaign) -> Result<Outcome, Failure> {
+    use crate::board::log::Strings;
+    use crate::faults::campaign::Firmware;
+    use crate::firmware::{self, Profile};
+
+    crate::board::run::check(&campaign.scenario).map_err(Failure::input)?;
+    let elf = firmware::image(Profile::Release)?;
+    let strings = Strings::of(&elf).map_err(Failure::run)?;
+    let firmware = Firmware { elf: &elf, strings: &strings };
+    let outcome = {
+        let bar = progress::bar("runs", campaign.runs());
+        campaign.run_on_board(firmware, &|| bar.advance(1)).map_err(Failure::run)?
+    };
+    if args.write_docs {
+        let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/SAFETY.md");
+        let text = std::fs::read_to_string(page).map_err(Failure::run)?;
+        let text = crate::docs::fill_board(&text, &outcome).map_err(Failure::run)?;
+        crate::export::write_text(std::path::Path::new(page), &text)?;
+    }
     output::result(args.json, &outcome, || human(&outcome))?;
     Ok(Outcome::of(outcome.is_good()))
 }
@@ -127,7 +168,7 @@ fn row(line: &Line) -> Vec<String> {
     let count = |n: usize| if n == 0 { "-".to_owned() } else { n.to_string() };
     vec![
         line.fault.clone(),
-        line.code.map_or_else(|| "-".to_owned(), |code| code.to_string()),
+        line.code.map_or_else(|| line.restarted().unwrap_or("-").to_owned(), |c| c.to_string()),
         count(line.found + line.limited),
         count(line.tolerated),
         count(line.undetected),

@@ -19,9 +19,17 @@ pub(super) struct Args {
           value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     count: u64,
 
+    /// Number of the first.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    first: u64,
+
     /// Seed of the campaign; each reset has a plant of its own.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+
+    /// Shows the log of each board on stderr.
+    #[arg(long)]
+    log: bool,
 
     /// Prints the outcome as one JSON object.
     #[arg(long)]
@@ -46,7 +54,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let elf = firmware::image(Profile::Release)?;
     let strings = Strings::of(&elf).map_err(Failure::run)?;
     let cases: Vec<resets::Case> =
-        (0..args.count).map(|index| resets::case(args.seed, index)).collect();
+        (args.first..args.first + args.count).map(|index| resets::case(args.seed, index)).collect();
     let all = {
         let bar = progress::bar("resets", args.count);
         let done = |after: &resets::After| {
@@ -55,7 +63,13 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
             }
             bar.advance(1);
         };
-        resets::run(&elf, &strings, &scenario, &cases, &done).map_err(Failure::run)?
+        let show = |index: u64, t_s: f64, line: &crate::board::log::Line| {
+            if args.log {
+                bar.line(&format!("{index} [{t_s:8.3}] {:<5} {}", line.level, line.text));
+            }
+        };
+        let told = resets::Told { done: &done, line: &show };
+        resets::run(&elf, &strings, &scenario, &cases, &told).map_err(Failure::run)?
     };
     let outcome = resets::Outcome::of(&all);
     output::result(args.json, &outcome, || human(&outcome))?;
@@ -75,6 +89,14 @@ fn human(outcome: &crate::resets::Outcome) -> String {
     });
     let head = ["reset", "made", "recorded", "held", "arrived", "other way", "motion, mm"];
     let mut text = format!("{}\n", plain(&head, rows));
+    let rows = outcome.modes.iter().map(|mode| {
+        let counts = [mode.resets, mode.watchdog, mode.completed, mode.other_way];
+        let mut row = vec![mode.mode.to_owned()];
+        row.extend(counts.iter().map(usize::to_string));
+        row
+    });
+    let head = ["in mode", "made", "by watchdog", "arrived", "other way"];
+    text += &format!("{}\n", plain(&head, rows));
     text += &format!(
         "{} resets: {} without a record, {} with other parameters, {} not held, {} that did not \
          arrive; a run that hung went on for {} mm at most, preload changed by {} N at most\n",

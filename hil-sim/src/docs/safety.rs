@@ -19,12 +19,20 @@ pub fn fill_safety(page: &str, outcome: &Outcome) -> Result<String> {
     fill(&page, "rest", &rest(outcome))
 }
 
+/// `page` with the matrix of the emulated board as this campaign came out.
+///
+/// # Errors
+/// If the block is missing.
+pub fn fill_board(page: &str, outcome: &Outcome) -> Result<String> {
+    fill(page, "board-matrix", &matrix(outcome))
+}
+
 fn bounds() -> String {
     let preload = 100.0 * PRELOAD_PART;
     let gap = 100.0 * GAP_PART;
     format!(
         "| bound | value |\n|---|---|\n\
-         | largest preload | {preload:.0} % of its limit, where the screw has its stop |\n\
+         | largest preload | {preload:.0} % of its limit; the screw has its stop at 125 % |\n\
          | way gone uncommanded, all together | {MOTION_MM} mm; {SLIDE_MM} mm where the wheel \
          has lost its grip |\n\
          | distance from the end that an arrival reports | {POSITION_MM} mm |\n\
@@ -35,9 +43,11 @@ fn bounds() -> String {
 
 fn matrix(outcome: &Outcome) -> String {
     let mut text = format!(
-        "`cargo rig faults -n {}`: {} faults at {} instants each, {} undetected, {} unsafe.\n\n\
-         | fault | measure | codes (times) | borne | detection, ms: median | worst | ends | \
-         preload, N | uncommanded, mm |\n|---|---|---|---|---|---|---|---|---|\n",
+        "`cargo rig faults{} -n {}`: {} faults at {} instants each, {} undetected, {} unsafe.\n\n\
+         | fault | measure | codes (times) | borne | detection, ms: median | worst | from any \
+         difference: worst | ends | preload, N | uncommanded, mm |\n\
+         |---|---|---|---|---|---|---|---|---|---|\n",
+        if outcome.target == "sil" { "" } else { " --target board" },
         outcome.instants,
         outcome.matrix.len(),
         outcome.instants,
@@ -52,19 +62,22 @@ fn matrix(outcome: &Outcome) -> String {
 
 fn row(line: &Line) -> String {
     let list = |all: Vec<String>| if all.is_empty() { "-".to_owned() } else { all.join(", ") };
-    let codes = line.codes.iter().map(|(code, times)| format!("{code} ({times})")).collect();
+    let codes = line.codes.iter().map(|(code, times)| format!("{code} ({times})"));
+    let restarts = line.restarts.iter().map(|(cause, times)| format!("{cause} ({times})"));
+    let codes = codes.chain(restarts).collect();
     let ends = line.ends.iter().map(|(end, times)| format!("{end} {times}")).collect();
     let borne = match line.undetected {
         0 => line.tolerated.to_string(),
         missed => format!("{} and {missed} missed", line.tolerated),
     };
     format!(
-        "| {} | {} | {} | {borne} | {} | {} | {} | {:.1} | {:.2} |",
+        "| {} | {} | {} | {borne} | {} | {} | {} | {} | {:.1} | {:.2} |",
         line.fault,
         line.text,
         list(codes),
         number(line.latency_median_ms, 0),
         number(line.latency_ms, 0),
+        number(line.latency_any_ms.map(|spread| spread.worst), 0),
         list(ends),
         line.worst_preload_n,
         line.worst_motion_mm

@@ -1,5 +1,7 @@
 //! Every fault at random instants of random rigs, each beside the same run without it.
 
+#[cfg(feature = "board")]
+mod board;
 mod matrix;
 mod operator;
 mod twin;
@@ -11,10 +13,12 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::judge::{Finding, Judge};
-use super::{CATALOGUE, Entry, Injection, Kind, Target};
+use super::{CATALOGUE, Entry, HARDWARE, Injection, Kind, Target};
 use crate::scenario::{Scenario, StepAnomaly};
 use crate::sil::{Options, RunError, Session};
 
+#[cfg(feature = "board")]
+pub use board::Firmware;
 pub use matrix::{Line, Outcome, Spread};
 use operator::Operator;
 use twin::Twin;
@@ -23,6 +27,9 @@ use twin::Twin;
 const LONGEST_S: f64 = 60.0;
 /// How long a run is watched after its end, s.
 const AFTER_S: f64 = 1.0;
+/// How long an interrupt asks without end, s: longer than the watchdog waits, and not for
+/// ever, or the board would not come up again to tell.
+const STORM_S: f64 = 0.25;
 /// How long commands come at random, s.
 const COMMANDS_S: f64 = 1.0;
 
@@ -62,6 +69,15 @@ impl Case {
         struck.chain(STEP_FAULTS.into_iter().map(Self::Step)).collect()
     }
 
+    /// Every fault of the matrix on the emulated board: those of software and of hardware. A
+    /// model that does not answer is a task that hangs there.
+    #[must_use]
+    pub fn all_on_board() -> Vec<Self> {
+        let software = CATALOGUE.iter().filter(|entry| entry.target != Target::Model);
+        let struck = software.chain(HARDWARE).map(Self::Struck);
+        struck.chain(STEP_FAULTS.into_iter().map(Self::Step)).collect()
+    }
+
     /// Its name in the matrix.
     #[must_use]
     pub fn name(&self) -> String {
@@ -69,6 +85,12 @@ impl Case {
             Self::Struck(entry) => format!("{} {}", entry.target.name(), entry.kind.name()),
             Self::Step(fault) => format!("step {fault:?}").to_lowercase(),
         }
+    }
+
+    /// Whether the name of the fault contains one of these, or there are none.
+    #[must_use]
+    pub fn is_one_of(&self, wanted: &[String]) -> bool {
+        wanted.is_empty() || wanted.iter().any(|text| self.name().contains(text))
     }
 
     /// What happens, in words.
@@ -96,6 +118,11 @@ impl Case {
         match entry.kind {
             Kind::Gain if other => 1.0 / entry.magnitude,
             Kind::Offset | Kind::Runaway if other => -entry.magnitude,
+            // Along the word, one bit, which the parity tells, or two, which it does not.
+            Kind::BitErrors => f64::from((1 + 2 * u16::from(other)) << (instant % 14)),
+            Kind::Stuck if entry.target.is_hardware() && !entry.unit.is_empty() => {
+                [entry.magnitude, 0.0, 12_000.0, 65_535.0][instant % 4]
+            }
             _ => entry.magnitude,
         }
     }
@@ -110,7 +137,11 @@ impl Case {
                 let magnitude = Self::magnitude(entry, instant);
                 let mut fault = Injection::at(entry.target, entry.kind, at_s, magnitude);
                 // Who presses buttons at random stops doing so some time.
-                fault.duration_s = (entry.target == Target::Commands).then_some(COMMANDS_S);
+                fault.duration_s = match entry.target {
+                    Target::Commands => Some(COMMANDS_S),
+                    Target::Interrupt => Some(STORM_S),
+                    _ => None,
+                };
                 scenario.run.faults = vec![fault];
             }
             Self::Step(fault) => {
@@ -150,8 +181,14 @@ pub struct Instant {
     pub finding: Finding,
     /// Code of the fault, or of the limit.
     pub code: Option<u16>,
-    /// From when the fault first did something to its report, ms.
+    /// What restarted the board, if something did and it was reported.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub restart: Option<&'static str>,
+    /// From when the fault first did something to its report, ms. Where it lies in a bridge:
+    /// from when the duty was off by more than the readback's band.
     pub latency_ms: Option<f64>,
+    /// The same from when the duty was off by two parts in a hundred, ms.
+    pub latency_any_ms: Option<f64>,
     /// The same from when the plant first ran otherwise than without the fault, ms.
     pub after_sign_ms: Option<f64>,
     /// From the report to rest with both bridges off, ms.
@@ -210,7 +247,7 @@ impl Campaign {
             let instants: Vec<Instant> = (0..self.instants).into_par_iter().map(one).collect();
             Line::of(case, &instants)
         });
-        Ok(Outcome::of(lines.collect(), self.instants))
+        Ok(Outcome::of("sil", lines.collect(), self.instants))
     }
 
     /// Rig of an instant.
@@ -236,24 +273,28 @@ fn doing(mode: Mode) -> &'static str {
 
 /// Runs a scenario with its fault beside its twin.
 fn one(scenario: &Scenario, twin: &Twin) -> Instant {
-    match watched(scenario, twin) {
-        Ok(instant) => instant,
-        Err(error) => Instant {
-            seed: scenario.run.seed,
-            at_s: None,
-            magnitude: None,
-            during: "at rest",
-            finding: Finding::Undetected,
-            code: None,
-            latency_ms: None,
-            after_sign_ms: None,
-            rest_ms: None,
-            end: "plant failed",
-            peak_preload_n: 0.0,
-            motion_mm: 0.0,
-            gap_part: 0.0,
-            harms: vec![error.to_string()],
-        },
+    watched(scenario, twin).unwrap_or_else(|error| failed(scenario, &error))
+}
+
+/// A run that could not be made.
+fn failed(scenario: &Scenario, error: &impl std::fmt::Display) -> Instant {
+    Instant {
+        seed: scenario.run.seed,
+        at_s: None,
+        magnitude: None,
+        during: "at rest",
+        finding: Finding::Undetected,
+        code: None,
+        restart: None,
+        latency_ms: None,
+        latency_any_ms: None,
+        after_sign_ms: None,
+        rest_ms: None,
+        end: "plant failed",
+        peak_preload_n: 0.0,
+        motion_mm: 0.0,
+        gap_part: 0.0,
+        harms: vec![error.to_string()],
     }
 }
 
@@ -306,7 +347,10 @@ fn watched(scenario: &Scenario, twin: &Twin) -> Result<Instant, RunError> {
         during,
         finding,
         code: report.map(|(_, code)| code),
-        latency_ms: since(session.acts_s()),
+        restart: None,
+        // Found before it had to be is found at once.
+        latency_ms: since(session.tells_s()).or(since(session.acts_s()).map(|_| 0.0)),
+        latency_any_ms: since(session.acts_s()),
         after_sign_ms: if moving { since(sign_s.or(report.map(|r| r.0))) } else { None },
         rest_ms: judge.fault.and_then(|(at_s, _)| Some(1e3 * (judge.rest_s? - at_s).max(0.0))),
         end: judge.end(),

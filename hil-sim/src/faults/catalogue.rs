@@ -19,7 +19,7 @@ pub struct Entry {
     pub text: &'static str,
 }
 
-const fn one(
+pub(super) const fn one(
     target: Target,
     kind: Kind,
     magnitude: f64,
@@ -31,7 +31,7 @@ const fn one(
 }
 
 /// One that has no measure.
-const fn plain(target: Target, kind: Kind, text: &'static str) -> Entry {
+pub(super) const fn plain(target: Target, kind: Kind, text: &'static str) -> Entry {
     one(target, kind, 0.0, (0.0, 0.0), "", text)
 }
 
@@ -58,11 +58,18 @@ const fn intermittent(target: Target) -> Entry {
 }
 
 const fn weak(target: Target, part: f64) -> Entry {
-    one(target, Kind::Weak, part, (0.0, 1.0), "x", "gives this part of its duty")
+    one(
+        target,
+        Kind::Weak,
+        part,
+        (0.0, 1.0),
+        "x",
+        "gives this part of its duty, its bridge being sound",
+    )
 }
 
 const fn runaway(target: Target) -> Entry {
-    let text = "takes this duty whatever is asked while its bridge is on";
+    let text = "takes this duty whatever is asked while its bridge is on, in the bridge";
     one(target, Kind::Runaway, 1.0, (-1.0, 1.0), "duty", text)
 }
 
@@ -73,8 +80,8 @@ pub const CATALOGUE: &[Entry] = {
         Slip, Stalled, Stuck, Torn,
     };
     use Target::{
-        Angle, Commands, Drive, Encoder, Load, LoadCell, Log, Model, Pretightener, Spring, Tick,
-        Tread, TreadSensor, Wheel,
+        Angle, Commands, Drive, DriveReadback, Encoder, Load, LoadCell, Log, Model, Pretightener,
+        PretightenerReadback, Readback, Spring, Tick, Tread, TreadSensor, Wheel,
     };
     &[
         plain(Encoder, Off, SILENT),
@@ -109,17 +116,38 @@ pub const CATALOGUE: &[Entry] = {
         slow(Angle, 0.1),
         delayed(Angle, 0.05, "follows this much later"),
         intermittent(Angle),
-        plain(Drive, Stalled, "gives no force"),
-        plain(Drive, Stuck, "keeps its last duty"),
+        plain(Readback, Off, SILENT),
+        intermittent(Readback),
+        plain(DriveReadback, Stuck, FROZEN),
+        plain(DriveReadback, Garbage, RANDOM),
+        gain(DriveReadback, 1.2),
+        one(DriveReadback, Offset, 0.1, (-2.5, 2.5), "duty", "reads so much more than is true"),
+        slow(DriveReadback, 0.1),
+        delayed(DriveReadback, 0.05, "follows this much later"),
+        plain(PretightenerReadback, Stuck, FROZEN),
+        plain(PretightenerReadback, Garbage, RANDOM),
+        gain(PretightenerReadback, 1.2),
+        one(
+            PretightenerReadback,
+            Offset,
+            0.1,
+            (-2.5, 2.5),
+            "duty",
+            "reads so much more than is true",
+        ),
+        slow(PretightenerReadback, 0.1),
+        delayed(PretightenerReadback, 0.05, "follows this much later"),
+        plain(Drive, Stalled, "gives no force, its bridge being sound"),
+        plain(Drive, Stuck, "keeps its last duty, in the bridge"),
         weak(Drive, 0.4),
-        plain(Drive, Reversed, "turns the other way"),
-        delayed(Drive, 0.1, "acts this much later"),
+        plain(Drive, Reversed, "turns the other way, in the bridge"),
+        delayed(Drive, 0.1, "acts this much later, in the bridge"),
         runaway(Drive),
-        plain(Pretightener, Stalled, "gives no force"),
-        plain(Pretightener, Stuck, "keeps its last duty"),
+        plain(Pretightener, Stalled, "gives no force, its bridge being sound"),
+        plain(Pretightener, Stuck, "keeps its last duty, in the bridge"),
         weak(Pretightener, 0.4),
-        plain(Pretightener, Reversed, "turns the other way"),
-        delayed(Pretightener, 0.1, "acts this much later"),
+        plain(Pretightener, Reversed, "turns the other way, in the bridge"),
+        delayed(Pretightener, 0.1, "acts this much later, in the bridge"),
         runaway(Pretightener),
         one(Wheel, Slip, 0.5, (0.01, 1.0), "x", "friction of tread on wall drops to this part"),
         one(
@@ -150,7 +178,8 @@ pub const CATALOGUE: &[Entry] = {
 /// The fault of this kind at this target, if there is one.
 #[must_use]
 pub fn entry(target: Target, kind: Kind) -> Option<&'static Entry> {
-    CATALOGUE.iter().find(|entry| entry.target == target && entry.kind == kind)
+    let mut all = CATALOGUE.iter().chain(super::HARDWARE);
+    all.find(|entry| entry.target == target && entry.kind == kind)
 }
 
 #[cfg(test)]

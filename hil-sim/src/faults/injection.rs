@@ -14,6 +14,12 @@ pub enum Target {
     TreadSensor,
     /// Arm angle sensor.
     Angle,
+    /// Converter that reads the outputs of both bridges.
+    Readback,
+    /// Readback of the drive's bridge.
+    DriveReadback,
+    /// Readback of the pre-tightener's bridge.
+    PretightenerReadback,
     /// Drive motor or its bridge.
     Drive,
     /// Pre-tightener's motor or its bridge.
@@ -34,6 +40,48 @@ pub enum Target {
     Log,
     /// Source of the commands.
     Commands,
+    /// Converter of the load cell.
+    LoadCellConverter,
+    /// Converter of the tread sensor.
+    TreadConverter,
+    /// Bus of the angle sensor.
+    AngleBus,
+    /// Line A of the wheel encoder.
+    EncoderLineA,
+    /// Line B of the wheel encoder.
+    EncoderLineB,
+    /// Direct memory access.
+    Dma,
+    /// Timer that wakes the tasks.
+    Timer,
+    /// The button's interrupt line.
+    Interrupt,
+    /// Whatever the processor executes.
+    Processor,
+    /// Task of the wheel encoder.
+    SpeedTask,
+    /// Task of the load cell.
+    PressureTask,
+    /// Task of the tread sensor.
+    DisplacementTask,
+    /// Task of the angle sensor.
+    AngleTask,
+    /// Task of the control tick.
+    TickTask,
+    /// Task of the model.
+    ModelTask,
+    /// Task of the log.
+    JournalTask,
+    /// Task of the host's line.
+    LineTask,
+    /// The board's supply.
+    Supply,
+    /// The reset pin.
+    ResetPin,
+    /// A debugger.
+    Debugger,
+    /// The host's line.
+    HostLine,
 }
 
 /// How it breaks.
@@ -82,6 +130,10 @@ pub enum Kind {
     Flooding,
     /// Comes at random.
     Random,
+    /// Turns bits over.
+    BitErrors,
+    /// Resets the board.
+    Reset,
 }
 
 /// From when a fault is there.
@@ -135,10 +187,25 @@ impl Target {
         word(self)
     }
 
-    /// Whether it is one of the four sensors.
+    /// Whether it is one of the four sensors or the readback of a bridge.
     #[must_use]
     pub const fn is_sensor(self) -> bool {
-        matches!(self, Self::Encoder | Self::LoadCell | Self::TreadSensor | Self::Angle)
+        matches!(
+            self,
+            Self::Encoder
+                | Self::LoadCell
+                | Self::TreadSensor
+                | Self::Angle
+                | Self::Readback
+                | Self::DriveReadback
+                | Self::PretightenerReadback
+        )
+    }
+
+    /// Whether it is of the board's hardware, which a run in software has not.
+    #[must_use]
+    pub fn is_hardware(self) -> bool {
+        super::HARDWARE.iter().any(|entry| entry.target == self)
     }
 
     /// Whether a fault of it moves something before the controller does.
@@ -157,6 +224,13 @@ impl Target {
 }
 
 impl Kind {
+    /// Whether a fault of an actuator lies in its bridge or before it, so that the bridge
+    /// puts out another duty than it was given. The others lie behind: in motor and gear.
+    #[must_use]
+    pub const fn is_in_bridge(self) -> bool {
+        matches!(self, Self::Stuck | Self::Reversed | Self::Delayed | Self::Runaway)
+    }
+
     /// Its name in scenarios.
     #[must_use]
     pub fn name(self) -> String {

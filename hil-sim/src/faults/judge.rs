@@ -12,11 +12,11 @@ use crate::scenario::Scenario;
 
 /// Control period, s.
 const TICK_S: f64 = 1e-3;
-/// Preload that a run may reach, parts of its limit: where the screw has its own stop, and
-/// what the parts are made for.
-pub const PRELOAD_PART: f64 = 1.25;
+/// Preload that a run may reach, parts of its limit: what a load cell that reads a sixth too
+/// little makes of it. The screw has its own stop at 1.25, what the parts are made for.
+pub const PRELOAD_PART: f64 = 1.20;
 /// Way that the wheel may go uncommanded, mm: all ways added, until it rests.
-pub const MOTION_MM: f64 = 1.0;
+pub const MOTION_MM: f64 = 0.75;
 /// Way that a wheel may slide that has lost half its grip, mm: the run over a corner, which no
 /// bridge can hold it on.
 pub const SLIDE_MM: f64 = 14.0;
@@ -249,8 +249,8 @@ mod tests {
     #[test]
     fn a_harm_is_named() {
         let hold = Mode::FaultHold(Fault::Overpressure);
-        assert!(judged(hold, 0.0, 0.0, 62.0, 10).harms().is_empty());
-        assert!(judged(hold, 0.0, 0.0, 63.0, 10).harms()[0].starts_with("preload 63.0 N"));
+        assert!(judged(hold, 0.0, 0.0, 59.5, 10).harms().is_empty());
+        assert!(judged(hold, 0.0, 0.0, 60.5, 10).harms()[0].starts_with("preload 60.5 N"));
         assert!(judged(RUN, 8.0, 8.0, 40.0, 10).harms()[0].starts_with("not at rest"));
         let there = Mode::Complete(Direction::Deploy);
         assert!(judged(there, 0.0, 0.0, 40.0, 10).harms()[0].starts_with("80.0 mm from the end"));

@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 use interstage::rig::Sensors;
 use interstage::sense::analog::{FULL_AT, ZERO_AT};
 use interstage::sense::angle::decode;
-use interstage::sense::raw::{AdcCode, AngleFrame, EncoderCount, Sample, SensorFrame};
+use interstage::sense::raw::{AdcCode, AngleFrame, BridgeCode, EncoderCount, Sample, SensorFrame};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
@@ -18,6 +18,8 @@ use super::{Kind, Target};
 const SPAN: f64 = 65_535.0;
 /// Codes of a turn of the angle sensor.
 const TURN: f64 = 16_384.0;
+/// Largest code of a bridge, and the codes of a duty of one.
+const BRIDGE: (f64, f64) = (4095.0, 32_768.0 / BridgeCode::DUTY as f64);
 /// What sums of milliseconds may be off, s.
 const TIME_S: f64 = 1e-6;
 /// Period of an intermittent contact, s.
@@ -58,6 +60,9 @@ impl Lie {
             Target::LoadCell => (bridge(rig.load_cell_full_scale_n), ZERO_AT * SPAN),
             Target::TreadSensor => (bridge(rig.tread_full_scale_mm), ZERO_AT * SPAN),
             Target::Angle => (TURN / 360.0, rig.angle_zero_code),
+            Target::DriveReadback | Target::PretightenerReadback => {
+                (BRIDGE.1, f64::from(BridgeCode::CENTRE))
+            }
             _ => (rig.encoder_counts / turn_mm, 0.0),
         };
         let magnitude = if kind == Kind::Offset { magnitude * per_unit } else { magnitude };
@@ -157,6 +162,11 @@ impl Lie {
             Target::LoadCell => frame.load_cell.map(|s| f64::from(s.code.get())),
             Target::TreadSensor => frame.tread.map(|s| f64::from(s.code.get())),
             Target::Angle => decode(frame.arm?.code).ok().map(f64::from),
+            Target::Readback => frame.bridges.map(|_| 0.0),
+            Target::DriveReadback => frame.bridges.map(|codes| codes.drive.get().into()),
+            Target::PretightenerReadback => {
+                frame.bridges.map(|codes| codes.pretightener.get().into())
+            }
             _ => {
                 let code = frame.wheel?.code;
                 let (before, sum) = self.counter.unwrap_or((code, i64::from(code.get())));
@@ -169,6 +179,7 @@ impl Lie {
 
     fn write(&self, frame: &mut SensorFrame, code: f64) {
         let bridge = AdcCode::new(code.round().clamp(0.0, SPAN) as u16);
+        let output = BridgeCode::new(code.round().clamp(0.0, BRIDGE.0) as u16);
         match self.target {
             Target::LoadCell => put(&mut frame.load_cell, bridge),
             Target::TreadSensor => put(&mut frame.tread, bridge),
@@ -177,7 +188,21 @@ impl Lie {
                 let parity = (bits.count_ones() as u16 & 1) << 15;
                 put(&mut frame.arm, AngleFrame::new(bits | parity));
             }
+            Target::Readback | Target::DriveReadback | Target::PretightenerReadback => {
+                self.put_output(frame, output);
+            }
             _ => put(&mut frame.wheel, EncoderCount::new(code.floor() as i64 as u16)),
+        }
+    }
+
+    /// Puts the code of the bridge that is lied about.
+    fn put_output(&self, frame: &mut SensorFrame, code: BridgeCode) {
+        if let Some(codes) = &mut frame.bridges {
+            match self.target {
+                Target::DriveReadback => codes.drive = code,
+                Target::PretightenerReadback => codes.pretightener = code,
+                _ => {}
+            }
         }
     }
 
@@ -187,6 +212,9 @@ impl Lie {
             Target::LoadCell => put(&mut frame.load_cell, AdcCode::new(code)),
             Target::TreadSensor => put(&mut frame.tread, AdcCode::new(code)),
             Target::Angle => put(&mut frame.arm, AngleFrame::new(code)),
+            Target::Readback | Target::DriveReadback | Target::PretightenerReadback => {
+                self.put_output(frame, BridgeCode::new(code & 0xFFF));
+            }
             _ => put(&mut frame.wheel, EncoderCount::new(code)),
         }
     }
@@ -197,6 +225,9 @@ impl Lie {
             Target::LoadCell => frame.load_cell = self.stands.load_cell,
             Target::TreadSensor => frame.tread = self.stands.tread,
             Target::Angle => frame.arm = self.stands.arm,
+            Target::Readback | Target::DriveReadback | Target::PretightenerReadback => {
+                frame.bridges = None;
+            }
             _ => frame.wheel = self.stands.wheel,
         }
     }
@@ -211,6 +242,7 @@ fn put<T>(sample: &mut Option<Sample<T>>, code: T) {
 #[cfg(test)]
 mod tests {
     use interstage::rig::Rig;
+    use interstage::sense::raw::BridgeCodes;
     use rand::SeedableRng;
 
     use super::*;
@@ -246,6 +278,26 @@ mod tests {
                 assert!((force - 10.0 - tick as f64).abs() < 0.01, "{kind:?} {tick} {force}");
             }
         }
+    }
+
+    #[test]
+    fn a_readback_lies_about_its_bridge_alone_and_falls_silent_with_both() {
+        let rig = Rig::prototype().sense;
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let codes = BridgeCodes { drive: BridgeCode::of(3277), pretightener: BridgeCode::of(0) };
+        let mut told = |target, kind, magnitude| {
+            let mut lie = Lie::new(target, kind, magnitude, &rig, 157.0);
+            let mut frame = SensorFrame { bridges: Some(codes), ..SensorFrame::default() };
+            lie.tell(&mut frame, 0.0, None, &mut random);
+            lie.tell(&mut frame, 1e-3, Some(0.0), &mut random);
+            frame.bridges
+        };
+        assert_eq!(told(Target::Readback, Kind::Off, 0.0), None);
+        let off = told(Target::DriveReadback, Kind::Offset, 0.1).expect("a code");
+        assert!((off.drive.duty() - 6554).abs() <= BridgeCode::DUTY, "{off:?}");
+        assert_eq!(off.pretightener, codes.pretightener);
+        let gain = told(Target::PretightenerReadback, Kind::Gain, 5.0).expect("a code");
+        assert_eq!(gain, codes, "nothing is nothing at any gain");
     }
 
     #[test]

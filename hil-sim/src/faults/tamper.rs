@@ -17,6 +17,9 @@ use crate::scenario::{Direction, Scenario};
 const TICK_S: f64 = 1e-3;
 /// Difference of duty that is one.
 const ACTS: f64 = 0.02;
+/// Difference of duty from which on the readback must tell: its band, and as much for what
+/// the supply may be off. A constant, and a part of the duty.
+const TELLS: (f64, f64) = (0.04, 0.0625);
 /// Half of the torn sector, rad.
 const TORN_RAD: f64 = 0.35;
 /// Way within which a corner that carries again is the same one, mm.
@@ -41,8 +44,12 @@ struct Active {
     /// When it came, s.
     since_s: Option<f64>,
     over: bool,
+    /// Whether it was there when it was last asked for.
+    known: bool,
     /// When it first did something, s.
     acts_s: Option<f64>,
+    /// When it first did what the readback must tell, s.
+    tells_s: Option<f64>,
     lie: Option<Lie>,
     /// Duty of an actuator when the fault came.
     kept: Option<f64>,
@@ -62,7 +69,9 @@ impl Tamper {
             injection: *injection,
             since_s: None,
             over: false,
+            known: false,
             acts_s: None,
+            tells_s: None,
             lie: injection.target.is_sensor().then(|| {
                 let (target, kind) = (injection.target, injection.kind);
                 Lie::new(target, kind, injection.magnitude(), &scenario.rig.sense, turn_mm)
@@ -98,6 +107,20 @@ impl Tamper {
         self.faults.iter().filter_map(acts).min_by(f64::total_cmp)
     }
 
+    /// The same with the difference of duty being one that the readback must tell, where the
+    /// fault lies in the bridge.
+    #[must_use]
+    pub fn tells_s(&self) -> Option<f64> {
+        let tells = |fault: &Active| match fault.injection.target {
+            Target::Drive | Target::Pretightener if fault.injection.kind.is_in_bridge() => {
+                fault.tells_s
+            }
+            Target::Drive | Target::Pretightener => fault.acts_s,
+            _ => fault.since_s,
+        };
+        self.faults.iter().filter_map(tells).min_by(f64::total_cmp)
+    }
+
     /// A tick begins: faults come and go.
     pub fn begin(&mut self, t_s: f64, truth: &Truth) {
         self.t_s = t_s;
@@ -122,6 +145,18 @@ impl Tamper {
             let ends = |since_s: f64| fault.injection.duration_s.map(|s| since_s + s);
             fault.over = fault.since_s.and_then(ends).is_some_and(|end_s| t_s >= end_s);
         }
+    }
+
+    /// The faults that have come, and those that have gone, since the last call.
+    pub fn changes(&mut self) -> Vec<(Injection, bool)> {
+        let mut changes = Vec::new();
+        for fault in &mut self.faults {
+            let there = fault.since_s.is_some() && !fault.over;
+            if there != std::mem::replace(&mut fault.known, there) {
+                changes.push((fault.injection, there));
+            }
+        }
+        changes
     }
 
     /// The sensors as the controller gets them.
@@ -174,14 +209,23 @@ impl Tamper {
         for fault in &mut self.faults {
             let active = fault.since_s.is_some() && !fault.over;
             match fault.injection.target {
-                Target::Drive => fault.turn(active, &mut drives.drive, drives.drive_on),
-                Target::Pretightener => fault.turn(active, &mut drives.preload, drives.preload_on),
-                _ => {}
+                Target::Drive => {
+                    drives.lost[0] = fault.turn(active, &mut drives.drive, drives.drive_on);
+                }
+                Target::Pretightener => {
+                    drives.lost[1] = fault.turn(active, &mut drives.preload, drives.preload_on);
+                }
+                _ => continue,
             }
-            let other =
-                (drives.drive - asked.drive).abs().max((drives.preload - asked.preload).abs());
-            if other > ACTS {
-                fault.acts_s.get_or_insert(t_s);
+            let worked = drives.worked();
+            for (works, asked) in worked.into_iter().zip([asked.drive, asked.preload]) {
+                let other = (works - asked).abs();
+                if other > ACTS {
+                    fault.acts_s.get_or_insert(t_s);
+                }
+                if other > TELLS.0 + TELLS.1 * asked.abs() {
+                    fault.tells_s.get_or_insert(t_s);
+                }
             }
         }
         drives
@@ -235,8 +279,8 @@ impl Active {
         matches!(self.injection.target, Wheel | Tread | Spring | Load)
     }
 
-    /// What a faulty actuator makes of its duty.
-    fn turn(&mut self, active: bool, duty: &mut f64, on: bool) {
+    /// What a faulty bridge makes of its duty. Gives the part that is lost behind it.
+    fn turn(&mut self, active: bool, duty: &mut f64, on: bool) -> f64 {
         let kind = self.injection.kind;
         if kind == Kind::Delayed {
             let depth = (self.injection.magnitude() / TICK_S).round() as usize;
@@ -247,18 +291,21 @@ impl Active {
         }
         if !active || !on {
             self.kept = None;
-            return;
+            return 0.0;
         }
         let kept = *self.kept.get_or_insert(*duty);
         *duty = match kind {
-            Kind::Stalled => 0.0,
             Kind::Stuck => kept,
-            Kind::Weak => *duty * self.injection.magnitude(),
             Kind::Reversed => -*duty,
             Kind::Delayed => self.pipeline.front().copied().unwrap_or(*duty),
             Kind::Runaway => self.injection.magnitude(),
             _ => *duty,
         };
+        match kind {
+            Kind::Stalled => 1.0,
+            Kind::Weak => 1.0 - self.injection.magnitude(),
+            _ => 0.0,
+        }
     }
 }
 
@@ -280,7 +327,7 @@ mod tests {
                 tamper.begin(f64::from(tick) * TICK_S, &Truth::default());
                 let drive = f64::from(tick) * 0.001;
                 let on = tick != 25;
-                tamper.drives(Drives { drive, drive_on: on, ..Drives::default() }).drive
+                tamper.drives(Drives { drive, drive_on: on, ..Drives::default() }).worked()[0]
             })
             .collect()
     }
@@ -297,6 +344,32 @@ mod tests {
         near(duties(Kind::Reversed, 0.0)[19], -0.020);
         near(duties(Kind::Delayed, 0.005)[19], 0.015);
         near(duties(Kind::Runaway, -1.0)[19], -1.0);
+    }
+
+    #[test]
+    fn a_fault_behind_the_bridge_does_not_show_at_its_output() {
+        for (kind, seen) in [(Kind::Stalled, false), (Kind::Weak, false), (Kind::Reversed, true)] {
+            let mut tamper = tamper(Target::Pretightener, kind, 0.4);
+            tamper.begin(0.020, &Truth::default());
+            let asked = Drives { preload: 0.5, preload_on: true, ..Drives::default() };
+            let drives = tamper.drives(asked);
+            assert_eq!(drives.preload != asked.preload, seen, "{kind:?}");
+            assert!((drives.worked()[1] - 0.5).abs() > 0.1, "{kind:?}");
+            assert_eq!((tamper.acts_s(), tamper.tells_s()), (Some(0.020), Some(0.020)));
+        }
+    }
+
+    #[test]
+    fn what_the_readback_need_not_tell_acts_all_the_same() {
+        let mut tamper = tamper(Target::Drive, Kind::Runaway, 0.5);
+        let mut drive = |t_s: f64, drive: f64| {
+            tamper.begin(t_s, &Truth::default());
+            let _ = tamper.drives(Drives { drive, drive_on: true, ..Drives::default() });
+            (tamper.acts_s(), tamper.tells_s())
+        };
+        assert_eq!(drive(0.010, 0.49), (None, None));
+        assert_eq!(drive(0.011, 0.45), (Some(0.011), None));
+        assert_eq!(drive(0.012, 0.40), (Some(0.011), Some(0.012)));
     }
 
     #[test]

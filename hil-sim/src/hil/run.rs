@@ -89,7 +89,7 @@ pub fn run(
 }
 
 const fn given_by(codes: Codes) -> Given {
-    Given::codes(codes.wheel, codes.load_cell, codes.tread, codes.arm)
+    Given::codes(codes.wheel, codes.load_cell, codes.tread, codes.arm, codes.bridges)
 }
 
 /// The plant and its sensors.

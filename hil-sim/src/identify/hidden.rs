@@ -168,6 +168,7 @@ fn frame(codes: &Codes, at: u32, arm: &mut Option<Sample<AngleFrame>>) -> Sensor
         load_cell: Some(Sample { code: codes.load_cell, at }),
         tread: Some(Sample { code: codes.tread, at }),
         arm: *arm,
+        bridges: Some(codes.bridges),
     }
 }
 

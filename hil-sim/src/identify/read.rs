@@ -90,6 +90,7 @@ fn of_codes(name: &str, run: Run, scenario: &Scenario) -> Result<Record, Identif
             drive_on: row.drive_on,
             preload: row.preload_duty,
             preload_on: row.preload_on,
+            ..Drives::default()
         };
         (row.tick, reader.sample(&row.sensors(), &driven))
     });

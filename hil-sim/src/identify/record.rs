@@ -200,6 +200,7 @@ mod tests {
             tread: Some(At { code: AdcCode::new((0.05f64 * CONVERTER) as u16), at: 0 }),
             // 2000 + 2048 has seven bits: the parity bit is set.
             arm: Some(At { code: AngleFrame::new(0x8000 | 4048), at: 0 }),
+            bridges: None,
         };
         let first = reader.sample(&frame, &Drives::default());
         assert_eq!(first.counts, -6.0);

@@ -2,7 +2,9 @@
 
 use interstage::hal::Duty;
 use interstage::log::{Flags, Record, Telemetry, number};
-use interstage::sense::raw::{AdcCode, AngleFrame, EncoderCount, Sample, SensorFrame};
+use interstage::sense::raw::{
+    AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
+};
 use interstage::units::Q16;
 use serde::{Deserialize, Serialize};
 
@@ -38,6 +40,10 @@ pub struct Row {
     pub arm_code: Option<u16>,
     /// When it was taken, ticks.
     pub arm_at: Option<u32>,
+    /// Code of the drive's bridge, 12 bits, 2048 without voltage; none if none was taken.
+    pub drive_code: Option<u16>,
+    /// Code of the pre-tightener's bridge.
+    pub pretightener_code: Option<u16>,
     /// Number of the command that was given, from 1; 0 for none.
     pub command: u8,
     /// Everything else that the tick was given and gave, as bits, see [`Flags`].
@@ -82,7 +88,7 @@ impl Row {
     #[must_use]
     pub fn of(record: &Record, sensors: &SensorFrame) -> Self {
         let Record { telemetry: seen, flags, .. } = record;
-        let SensorFrame { wheel, load_cell, tread, arm } = sensors;
+        let SensorFrame { wheel, load_cell, tread, arm, bridges } = sensors;
         Self {
             tick: seen.at,
             t_s: f64::from(seen.at) * 1e-3,
@@ -97,6 +103,8 @@ impl Row {
             tread_at: tread.map(|sample| sample.at),
             arm_code: arm.map(|sample| sample.code.get()),
             arm_at: arm.map(|sample| sample.at),
+            drive_code: bridges.map(|codes| codes.drive.get()),
+            pretightener_code: bridges.map(|codes| codes.pretightener.get()),
             command: number::of_command(flags.command()),
             flags: flags.to_bits(),
             position_mm: seen.position.to_num(),
@@ -127,11 +135,16 @@ impl Row {
         ) -> Option<Sample<T>> {
             Some(Sample { code: make(code?), at: at? })
         }
+        let bridges = self.drive_code.zip(self.pretightener_code);
         SensorFrame {
             wheel: sample(self.wheel_code, self.wheel_at, EncoderCount::new),
             load_cell: sample(self.load_cell_code, self.load_cell_at, AdcCode::new),
             tread: sample(self.tread_code, self.tread_at, AdcCode::new),
             arm: sample(self.arm_code, self.arm_at, AngleFrame::new),
+            bridges: bridges.map(|(drive, pretightener)| BridgeCodes {
+                drive: BridgeCode::new(drive),
+                pretightener: BridgeCode::new(pretightener),
+            }),
         }
     }
 

@@ -83,6 +83,12 @@ pub struct SensorParameters {
     pub angle_zero_code: f64,
     /// Zero error, rad.
     pub angle_zero_rad: f64,
+    /// Gain error factors of the bridges' readback: supply, divider and reference.
+    pub readback_gain: [f64; 2],
+    /// Its zero errors, parts of the supply.
+    pub readback_zero: [f64; 2],
+    /// Factor of its time constant.
+    pub readback_lag: f64,
     /// Noise and delays.
     pub noise: Noise,
 }
@@ -142,6 +148,13 @@ impl PlantParameters {
                 height_mm: rig.rig.step_height_mm + higher + draw.offset(spread.step_height_mm),
             })
             .collect();
+        // The supply is one for both bridges, the dividers are not.
+        let supply = draw.factor(spread.supply_rel);
+        let mut divided = || supply * draw.factor(spread.readback_gain_rel);
+        let readback_gain = [divided(), divided()];
+        let mut zero = || draw.factor(spread.readback_zero_duty) - 1.0;
+        let readback_zero = [zero(), zero()];
+        let readback_lag = draw.factor(spread.readback_lag_rel);
         Self {
             ring: RingParameters {
                 radius_mm,
@@ -186,6 +199,9 @@ impl PlantParameters {
                 tread_gain,
                 angle_zero_code: rig.sense.angle_zero_code,
                 angle_zero_rad,
+                readback_gain,
+                readback_zero,
+                readback_lag,
                 noise: scenario.noise.clone(),
             },
         }

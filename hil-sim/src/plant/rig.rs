@@ -56,6 +56,17 @@ pub struct Drives {
     pub preload: f64,
     /// Pre-tightener bridge enabled.
     pub preload_on: bool,
+    /// Parts of drive and pre-tightener that are lost behind their bridges, in motor and
+    /// gear: nought where all is sound.
+    pub lost: [f64; 2],
+}
+
+impl Drives {
+    /// Duty that drive and pre-tightener work with.
+    #[must_use]
+    pub fn worked(&self) -> [f64; 2] {
+        [self.drive * (1.0 - self.lost[0]), self.preload * (1.0 - self.lost[1])]
+    }
 }
 
 /// What is true after a step.
@@ -63,6 +74,9 @@ pub struct Drives {
 pub struct Truth {
     /// Time, s.
     pub time_s: f64,
+    /// Mean outputs of the bridges of drive and pre-tightener, parts of the supply. One that
+    /// is off shows what its motor generates.
+    pub bridges: [f64; 2],
     /// Axial position of the wheel centre, mm.
     pub position_mm: f64,
     /// Axial speed, mm/s.
@@ -291,7 +305,9 @@ impl VirtualRig {
     /// # Errors
     /// [`PlantError`] when the state stops meaning anything.
     pub fn step(&mut self, drives: &Drives, dt_s: f64) -> Result<(), PlantError> {
-        self.preload.step(drives.preload, drives.preload_on, dt_s);
+        let [drive, preload] = drives.worked();
+        let worked = &Drives { drive, preload, ..*drives };
+        self.preload.step(preload, drives.preload_on, dt_s);
         let before = self.work();
         let mut left_s = dt_s;
         while left_s > 0.0 {
@@ -301,7 +317,7 @@ impl VirtualRig {
             let parts = way / exchanges / self.resolution.stride_mm;
             let parts = parts.ceil().clamp(1.0, MOST_STRIDES);
             for _ in 0..parts as usize {
-                self.roll(drives, part_s / parts)?;
+                self.roll(worked, part_s / parts)?;
             }
             self.check()?;
             left_s -= part_s;
@@ -309,6 +325,12 @@ impl VirtualRig {
         self.count(&before, dt_s);
         self.vibrate(dt_s);
         self.truth.time_s += dt_s;
+        // The self-locking screw stands at once; the wheel turns on for some milliseconds.
+        let generated = self.truth.tread_mm_s / self.parameters.drive.no_load_mm_s;
+        self.truth.bridges = [
+            if drives.drive_on { drives.drive } else { generated },
+            if drives.preload_on { drives.preload } else { 0.0 },
+        ];
         self.derive();
         self.check()
     }

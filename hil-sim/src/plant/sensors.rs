@@ -1,8 +1,9 @@
-//! The four sensors: from what is true to the codes that the converters give.
+//! The four sensors and the readback of the bridges: from what is true to the codes that the
+//! converters give.
 
 use std::collections::VecDeque;
 
-use interstage::sense::raw::{AdcCode, AngleFrame, EncoderCount};
+use interstage::sense::raw::{AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -20,6 +21,9 @@ pub struct Sensed {
     pub depth_mm: f64,
     /// Arm angle from the pillar, rad.
     pub arm_rad: f64,
+    /// Outputs of the bridges of drive and pre-tightener since the last call, parts of the
+    /// nominal supply.
+    pub bridges: [f64; 2],
 }
 
 /// The codes of one millisecond.
@@ -33,6 +37,8 @@ pub struct Codes {
     pub tread: AdcCode,
     /// Arm angle.
     pub arm: AngleFrame,
+    /// Outputs of the bridges.
+    pub bridges: BridgeCodes,
 }
 
 /// Sensors with their noise.
@@ -42,6 +48,37 @@ pub struct Sensors {
     noise: ChaCha8Rng,
     /// What was true at the last calls, newest first.
     past: VecDeque<Sensed>,
+    readback: Readback,
+}
+
+/// The readback of the bridges, with noise of its own: what the other sensors make of a seed
+/// does not depend on it.
+#[derive(Clone, Debug)]
+struct Readback {
+    noise: ChaCha8Rng,
+    /// Outputs behind the low-pass.
+    lagged: [f64; 2],
+}
+
+/// Time constant of the low-pass, s, as the parts on the board have it.
+const READBACK_S: f64 = 1e-3;
+/// Part of the half range of the converter at which a bridge gives the nominal supply.
+const SUPPLY: f64 = 0.8;
+
+impl Readback {
+    /// Codes of these outputs, each held for `dt_s` until now.
+    fn read(&mut self, outputs: [f64; 2], p: &SensorParameters, dt_s: f64) -> BridgeCodes {
+        let takes = -(-dt_s / (READBACK_S * p.readback_lag)).exp_m1();
+        let [drive, pretightener] = [0, 1].map(|i| {
+            self.lagged[i] += (outputs[i] - self.lagged[i]) * takes;
+            let normal: f64 = StandardNormal.sample(&mut self.noise);
+            let part = self.lagged[i] * p.readback_gain[i] + p.readback_zero[i];
+            let part = part + p.noise.readback_duty * normal;
+            let code = 2048.0 * (1.0 + SUPPLY * part);
+            BridgeCode::new(code.round().clamp(0.0, 4095.0) as u16)
+        });
+        BridgeCodes { drive, pretightener }
+    }
 }
 
 /// Oldest reading that may be handed over, in calls.
@@ -58,7 +95,11 @@ impl Sensors {
     pub fn new(parameters: SensorParameters, seed: u64) -> Self {
         // Another stream than the plant's draw, which has the seed itself.
         let noise = ChaCha8Rng::seed_from_u64(seed ^ 0x005e_4504_0153_0000);
-        Self { parameters, noise, past: VecDeque::new() }
+        let readback = Readback {
+            noise: ChaCha8Rng::seed_from_u64(seed ^ 0x000b_41d6_e000_0000),
+            lagged: [0.0; 2],
+        };
+        Self { parameters, noise, past: VecDeque::new(), readback }
     }
 
     /// Codes of what is true now, `dt_s` after the last call; a reading handed over late
@@ -97,6 +138,7 @@ impl Sensors {
             load_cell: bridge(preload / p.load_cell_full_scale_n),
             tread: bridge(depth / p.tread_full_scale_mm),
             arm: frame(code),
+            bridges: self.readback.read(now.bridges, &self.parameters, dt_s),
         }
     }
 }

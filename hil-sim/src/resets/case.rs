@@ -24,9 +24,10 @@ const RUN_MS: u32 = 60_000;
 /// Most motion from the reset to the command, mm: what the wheel runs on when its motor
 /// loses its power.
 const MOTION_MM: f64 = 0.5;
-/// Most motion from being caught to the watchdog's reset, mm: as long as the tick is not
-/// what hangs, the run goes on under control until the bridges are cut.
-const HUNG_MM: f64 = 4.0;
+/// Longest time from being caught to the cut of the bridges, s: as long as the tick is not
+/// what hangs, the run goes on under control until a task has been missed for 50 ms, and 80 ms
+/// more until the system timer finds the watchdog unfed.
+const HUNG_S: f64 = 0.131;
 /// Most change of the preload meanwhile, of what it was: the rubber relaxes, the gears hold.
 const PRELOAD_PART: f64 = 0.25;
 /// And whatever it was, N.
@@ -79,6 +80,87 @@ impl Kind {
     }
 }
 
+/// What the drive is doing when an aimed reset comes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Aim {
+    /// In the self-test after a start.
+    SelfTest,
+    /// Taking its zeros.
+    Zeroing,
+    /// Waiting for a command.
+    Idle,
+    /// Raising the preload before a run.
+    Preloading,
+    /// Between the steps.
+    Cruise,
+    /// Before a step.
+    Approach,
+    /// On a corner.
+    Crossing,
+    /// Behind a step.
+    Settle,
+    /// Coming to rest on command.
+    Stopping,
+    /// Arrived.
+    Complete,
+    /// Held by a fault.
+    FaultHold,
+}
+
+impl Aim {
+    /// All of them.
+    pub const ALL: [Self; 11] = [
+        Self::SelfTest,
+        Self::Zeroing,
+        Self::Idle,
+        Self::Preloading,
+        Self::Cruise,
+        Self::Approach,
+        Self::Crossing,
+        Self::Settle,
+        Self::Stopping,
+        Self::Complete,
+        Self::FaultHold,
+    ];
+
+    /// Part of what the log says of it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::SelfTest => "self-test",
+            Self::Zeroing => "zeroing",
+            Self::Idle => "idle",
+            Self::Preloading => "preloading",
+            Self::Cruise => "cruise",
+            Self::Approach => "approach",
+            Self::Crossing => "crossing",
+            Self::Settle => "settle",
+            Self::Stopping => "stopping",
+            Self::Complete => "ed",
+            Self::FaultHold => "fault hold",
+        }
+    }
+
+    /// Whether it is over once the drive has got its command.
+    const fn comes_before_the_command(self) -> bool {
+        matches!(self, Self::SelfTest | Self::Zeroing | Self::Idle)
+    }
+}
+
+/// Which of the modes a mode of the log is, in the words of the log; the ways out and back
+/// alike.
+#[must_use]
+pub(super) fn aim_of(mode: &str) -> &'static str {
+    if mode.is_empty() {
+        return "boot";
+    }
+    if matches!(mode, "deployed" | "retracted") {
+        return "complete";
+    }
+    Aim::ALL.into_iter().map(Aim::name).find(|name| mode.contains(name)).unwrap_or("other")
+}
+
 /// A reset to be made.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Case {
@@ -90,7 +172,9 @@ pub struct Case {
     pub way: Direction,
     /// What breaks it off.
     pub kind: Kind,
-    /// Time from the command, s.
+    /// The mode that it is aimed at, if it is.
+    pub aim: Option<Aim>,
+    /// Time from the command, s; of an aimed one it tells the place in the mode.
     pub after_s: f64,
     /// Part of a millisecond on top.
     pub part: f64,
@@ -140,6 +224,8 @@ struct Under<'a> {
     fault: Option<u16>,
     /// Something was driven.
     driven: bool,
+    /// Who sees the log.
+    show: &'a dyn Fn(f64, &Line),
 }
 
 impl Under<'_> {
@@ -155,6 +241,7 @@ impl Under<'_> {
         self.driven |= drives.drive_on && drives.drive != 0.0;
         self.driven |= drives.preload_on && drives.preload != 0.0;
         for line in lines {
+            (self.show)(self.bench.time_s(), line);
             if let Some(mode) = line.behind("mode: ") {
                 mode.clone_into(&mut self.mode);
             }
@@ -173,6 +260,38 @@ impl Under<'_> {
             self.step()?;
         }
         Ok(false)
+    }
+
+    /// Goes on for so many milliseconds.
+    fn pass(&mut self, milliseconds: u32) -> Result<(), ResetError> {
+        (0..milliseconds).try_for_each(|_| self.step())
+    }
+
+    /// Goes on until the mode contains this, or the drive rests.
+    fn until_within(&mut self, part: &str, milliseconds: u32) -> Result<(), ResetError> {
+        for _ in 0..milliseconds {
+            if self.mode.contains(part) || self.rests() {
+                break;
+            }
+            self.step()?;
+        }
+        Ok(())
+    }
+
+    /// Goes on as long as the mode contains this.
+    fn while_within(&mut self, part: &str, milliseconds: u32) -> Result<(), ResetError> {
+        for _ in 0..milliseconds {
+            if !self.mode.contains(part) {
+                break;
+            }
+            self.step()?;
+        }
+        Ok(())
+    }
+
+    /// Arrived or held.
+    fn rests(&self) -> bool {
+        ["deployed", "retracted", "fault hold"].contains(&self.mode.as_str())
     }
 
     fn send(&mut self, way: Direction) -> Result<bool, ResetError> {
@@ -204,7 +323,7 @@ const fn other(way: Direction) -> Direction {
 const POSITION_UNKNOWN: u16 = interstage::supervise::Fault::PositionUnknown.code();
 
 impl Case {
-    /// Makes it; `place` is what the flash holds of parameters.
+    /// Makes it; `place` is what the flash holds of parameters, `watch` sees the log.
     ///
     /// # Errors
     /// [`ResetError`] if the engine or the plant fails.
@@ -214,24 +333,20 @@ impl Case {
         strings: &Strings,
         scenario: &Scenario,
         place: &[u8],
+        watch: &(dyn Fn(u64, f64, &Line) + Sync),
     ) -> Result<After, ResetError> {
         let mut scenario = scenario.clone();
         scenario.run.seed = self.seed;
-        scenario.run.direction = self.way;
+        // The way back begins where the way out has ended.
+        scenario.run.direction = Direction::Deploy;
         let mut bench =
             Bench::new(elf, strings, &scenario).map_err(crate::board::bench::BenchError::from)?;
         bench.machine_mut().poke(PLACES, place).map_err(crate::board::bench::BenchError::from)?;
-        let mut board = Under { bench, mode: String::new(), fault: None, driven: false };
+        let show = |t_s: f64, line: &Line| watch(self.index, t_s, line);
+        let mut board =
+            Under { bench, mode: String::new(), fault: None, driven: false, show: &show };
         let mut wrong = Vec::new();
-        if !board.until(&["idle"], START_MS)? {
-            wrong.push(format!("not idle after power-up but {}", board.mode));
-        }
-        if !board.send(self.way)? {
-            wrong.push("the console does not listen".to_owned());
-        }
-        for _ in 0..(self.after_s * 1e3) as u32 {
-            board.step()?;
-        }
+        self.lead_up(&mut board, &mut wrong)?;
         let mode = board.mode.clone();
         let before = *board.bench.plant().truth();
         let position_mm = before.position_mm;
@@ -263,7 +378,8 @@ impl Case {
         };
         holds(!board.driven, &|| "driven without a command".to_owned());
         holds(motion_mm <= MOTION_MM, &|| format!("moved by {motion_mm:.2} mm"));
-        holds(hung_mm <= HUNG_MM, &|| format!("ran on for {hung_mm:.2} mm"));
+        let most_mm = HUNG_S * scenario.rig.drive.cruise_speed_mm_s + MOTION_MM;
+        holds(hung_mm <= most_mm, &|| format!("ran on for {hung_mm:.2} mm"));
         let allowed = PRELOAD_N.max(PRELOAD_PART * before.preload_n.abs());
         holds(preload_n <= allowed, &|| {
             format!("preload {:.1} N before, {:.1} N after", before.preload_n, truth.preload_n)
@@ -310,6 +426,63 @@ impl Case {
             other_way,
             wrong,
         })
+    }
+
+    /// The run up to the reset.
+    fn lead_up(&self, board: &mut Under<'_>, wrong: &mut Vec<String>) -> Result<(), ResetError> {
+        let part = self.after_s / super::WITHIN_S;
+        if let Some(aim) = self.aim.filter(|aim| aim.comes_before_the_command()) {
+            board.until(&[aim.name()], START_MS)?;
+            // The shortest of them takes a tenth of a second.
+            return board.pass((part * 95.0) as u32);
+        }
+        let mut missed = !board.until(&["idle"], START_MS)?;
+        if self.way == Direction::Retract {
+            missed |= !board.send(Direction::Deploy)?;
+            missed |= !board.until(&["deployed"], RUN_MS)?;
+        }
+        missed |= !board.send(self.way)?;
+        if missed {
+            wrong.push(format!("not set going but {:?}", board.mode));
+        }
+        let Some(aim) = self.aim else { return board.pass((self.after_s * 1e3) as u32) };
+        // Legs come once a step: of which, the part says.
+        let (step, part) = ((part * 3.0) as u32, (part * 3.0).fract());
+        match aim {
+            Aim::Cruise | Aim::Approach | Aim::Crossing | Aim::Settle => {
+                for _ in 0..step {
+                    board.until_within(aim.name(), RUN_MS)?;
+                    board.while_within(aim.name(), RUN_MS)?;
+                }
+                board.until_within(aim.name(), RUN_MS)?;
+                board.pass((part * 60.0) as u32)
+            }
+            Aim::Complete => {
+                board.until(&[arrived(self.way)], RUN_MS)?;
+                board.pass((part * 500.0) as u32)
+            }
+            Aim::Stopping | Aim::FaultHold => {
+                board.until_within("ing: ", RUN_MS)?;
+                board.pass((f64::from(step) * 600.0) as u32 + 100)?;
+                if aim == Aim::Stopping {
+                    board.bench.send(b'x')?;
+                    board.until_within(aim.name(), BITE_MS)?;
+                    return board.pass((part * 30.0) as u32);
+                }
+                // Ticks are lost, which is a fault.
+                let engine = crate::board::bench::BenchError::from;
+                Fault::ButtonStorm.strike(board.bench.machine_mut()).map_err(engine)?;
+                board.pass(5)?;
+                Fault::ButtonStorm.heal(board.bench.machine_mut());
+                board.until_within(aim.name(), BITE_MS)?;
+                board.pass((part * 300.0) as u32)
+            }
+            Aim::Preloading => {
+                board.until_within(aim.name(), BITE_MS)?;
+                board.pass((part * 60.0) as u32)
+            }
+            Aim::SelfTest | Aim::Zeroing | Aim::Idle => Ok(()),
+        }
     }
 
     /// The reset, at its part of a millisecond. Gives where the wheel was in the

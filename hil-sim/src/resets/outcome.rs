@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::case::aim_of;
 use super::{After, Kind};
 
 /// The figures of a campaign.
@@ -32,6 +33,8 @@ pub struct Outcome {
     pub worst_preload_n: f64,
     /// The same by what reset the board.
     pub kinds: Vec<KindOutcome>,
+    /// The same by what the drive was doing.
+    pub modes: Vec<ModeOutcome>,
     /// Those with which something is wrong.
     pub wrong: Vec<After>,
 }
@@ -53,6 +56,41 @@ pub struct KindOutcome {
     pub other_way: usize,
     /// Most motion from reset to command, mm.
     pub worst_motion_mm: f64,
+}
+
+/// The figures of the resets in one mode.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ModeOutcome {
+    /// The mode, out and back alike.
+    pub mode: &'static str,
+    /// Resets made.
+    pub resets: usize,
+    /// Of them by the watchdog.
+    pub watchdog: usize,
+    /// That arrived where they were sent.
+    pub completed: usize,
+    /// That arrived the other way.
+    pub other_way: usize,
+}
+
+/// By mode, in the order of their names.
+fn modes(all: &[After]) -> Vec<ModeOutcome> {
+    let mut modes = std::collections::BTreeMap::new();
+    for after in all {
+        let mode = aim_of(&after.mode);
+        let of = modes.entry(mode).or_insert(ModeOutcome {
+            mode,
+            resets: 0,
+            watchdog: 0,
+            completed: 0,
+            other_way: 0,
+        });
+        of.resets += 1;
+        of.watchdog += usize::from(after.case.kind == Kind::Watchdog);
+        of.completed += usize::from(after.completed);
+        of.other_way += usize::from(after.other_way);
+    }
+    modes.into_values().collect()
 }
 
 fn most(of: impl Iterator<Item = f64>) -> f64 {
@@ -91,6 +129,7 @@ impl Outcome {
             worst_hung_mm: most(all.iter().map(|a| a.hung_mm)),
             worst_preload_n: most(all.iter().map(|a| a.preload_n)),
             kinds: kinds.collect(),
+            modes: modes(all),
             wrong: all.iter().filter(|a| !a.wrong.is_empty()).cloned().collect(),
         }
     }

@@ -5,7 +5,7 @@ use toml::{Table, Value};
 use super::keys::Kind as KeyKind;
 use super::merge::{Provenance, checked as checked_value, wrong_type};
 use super::{Origin, Scenario, ScenarioError};
-use crate::faults::{CATALOGUE, entry};
+use crate::faults::{CATALOGUE, Entry, HARDWARE, entry};
 
 /// What an entry may say beside target and kind.
 const MAY: [&str; 5] = ["at_s", "at_mm", "at_crossing", "duration_s", "magnitude"];
@@ -57,9 +57,14 @@ pub(super) fn checked(origin: &Origin, at: &str, value: &Value) -> Result<Value,
     }
 }
 
+/// Everything that can break, in software and on the board.
+fn all() -> impl Iterator<Item = &'static Entry> {
+    CATALOGUE.iter().chain(HARDWARE)
+}
+
 /// Names of everything that can break.
 fn targets() -> Vec<String> {
-    let mut names: Vec<String> = CATALOGUE.iter().map(|entry| entry.target.name()).collect();
+    let mut names: Vec<String> = all().map(|entry| entry.target.name()).collect();
     names.dedup();
     names
 }
@@ -67,7 +72,7 @@ fn targets() -> Vec<String> {
 /// How the target of this entry can break.
 fn kinds(given: &Table) -> Vec<String> {
     let target = given.get("target").and_then(Value::as_str).unwrap_or_default();
-    let of = CATALOGUE.iter().filter(|entry| entry.target.name() == target);
+    let of = all().filter(|entry| entry.target.name() == target);
     of.map(|entry| entry.kind.name()).collect()
 }
 

@@ -40,6 +40,14 @@ pub struct Spread {
     pub tread_gain_rel: f64,
     /// Zero of the arm angle sensor, degrees.
     pub arm_zero_deg: f64,
+    /// Supply of the bridges, relative.
+    pub supply_rel: f64,
+    /// Dividers of their readback, relative.
+    pub readback_gain_rel: f64,
+    /// Zero of their readback, parts of the supply: standard deviation.
+    pub readback_zero_duty: f64,
+    /// Time constant of their readback, relative.
+    pub readback_lag_rel: f64,
 }
 
 impl Default for Spread {
@@ -61,6 +69,10 @@ impl Default for Spread {
             load_cell_gain_rel: 0.005,
             tread_gain_rel: 0.005,
             arm_zero_deg: 0.05,
+            supply_rel: 0.006,
+            readback_gain_rel: 0.002,
+            readback_zero_duty: 0.002,
+            readback_lag_rel: 0.05,
         }
     }
 }
@@ -86,6 +98,10 @@ impl Spread {
             load_cell_gain_rel: 0.0,
             tread_gain_rel: 0.0,
             arm_zero_deg: 0.0,
+            supply_rel: 0.0,
+            readback_gain_rel: 0.0,
+            readback_zero_duty: 0.0,
+            readback_lag_rel: 0.0,
         }
     }
 }
@@ -108,6 +124,8 @@ pub struct Noise {
     pub tread_delay_s: f64,
     /// Age of an angle reading when it is handed over, s.
     pub angle_delay_s: f64,
+    /// Readback of the bridges, parts of the supply.
+    pub readback_duty: f64,
 }
 
 impl Default for Noise {
@@ -120,6 +138,7 @@ impl Default for Noise {
             load_cell_delay_s: 0.000_5,
             tread_delay_s: 0.000_5,
             angle_delay_s: 0.000_1,
+            readback_duty: 0.002,
         }
     }
 }
@@ -136,6 +155,7 @@ impl Noise {
             load_cell_delay_s: 0.0,
             tread_delay_s: 0.0,
             angle_delay_s: 0.0,
+            readback_duty: 0.0,
         }
     }
 }

@@ -31,7 +31,7 @@ pub(super) fn check(scenario: &Scenario, from: &Provenance) -> Result<(), Scenar
     })
 }
 
-fn ranges(scenario: &Scenario) -> [(&'static str, f64, f64, f64); 24] {
+fn ranges(scenario: &Scenario) -> [(&'static str, f64, f64, f64); 29] {
     let (s, n) = (&scenario.spread, &scenario.noise);
     [
         ("spread.k_inf_rel", s.k_inf_rel, 0.0, 0.3),
@@ -50,6 +50,10 @@ fn ranges(scenario: &Scenario) -> [(&'static str, f64, f64, f64); 24] {
         ("spread.load_cell_gain_rel", s.load_cell_gain_rel, 0.0, 0.1),
         ("spread.tread_gain_rel", s.tread_gain_rel, 0.0, 0.1),
         ("spread.arm_zero_deg", s.arm_zero_deg, 0.0, 2.0),
+        ("spread.supply_rel", s.supply_rel, 0.0, 0.1),
+        ("spread.readback_gain_rel", s.readback_gain_rel, 0.0, 0.1),
+        ("spread.readback_zero_duty", s.readback_zero_duty, 0.0, 0.1),
+        ("spread.readback_lag_rel", s.readback_lag_rel, 0.0, 0.3),
         ("noise.load_cell_n", n.load_cell_n, 0.0, 10.0),
         ("noise.tread_mm", n.tread_mm, 0.0, 0.5),
         ("noise.angle_lsb", n.angle_lsb, 0.0, 50.0),
@@ -57,6 +61,7 @@ fn ranges(scenario: &Scenario) -> [(&'static str, f64, f64, f64); 24] {
         ("noise.load_cell_delay_s", n.load_cell_delay_s, 0.0, 0.02),
         ("noise.tread_delay_s", n.tread_delay_s, 0.0, 0.02),
         ("noise.angle_delay_s", n.angle_delay_s, 0.0, 0.02),
+        ("noise.readback_duty", n.readback_duty, 0.0, 0.1),
         // TOML has no larger integer.
         ("run.seed", scenario.run.seed as f64, 0.0, i64::MAX as f64),
     ]

@@ -1,6 +1,7 @@
 //! A run under way: controller and plant, a tick at a time, with commands and sensor
 //! failures given from outside.
 
+use interstage::blackbox::{Late, Recorder, Reset, Restart};
 use interstage::control::{Controller, Input, Output, State};
 use interstage::hal::MotorCommand;
 use interstage::model::{Plan, Planner};
@@ -52,8 +53,12 @@ impl Session {
     ///
     /// # Errors
     /// [`RunError::Rig`] if the parameters do not make a controller, [`RunError::Refused`] if
-    /// they do not make a plant.
+    /// they do not make a plant, [`RunError::Hardware`] if a fault takes a board.
     pub fn new(scenario: &Scenario, options: Options) -> Result<Self, RunError> {
+        if let Some(fault) = scenario.run.faults.iter().find(|f| f.target.is_hardware()) {
+            let (target, kind) = (fault.target.name(), fault.kind.name());
+            return Err(RunError::Hardware(format!("{target} {kind}")));
+        }
         let strategy = scenario.run.controller.into();
         let mut planner = Planner::try_build_as(&scenario.rig, strategy)?;
         if let Some((speed, uniform)) = options.speed {
@@ -129,6 +134,7 @@ impl Session {
         self.frame.wheel = Some(Sample { code: codes.wheel, at });
         self.frame.load_cell = Some(Sample { code: codes.load_cell, at });
         self.frame.tread = Some(Sample { code: codes.tread, at });
+        self.frame.bridges = Some(codes.bridges);
         if at.is_multiple_of(ANGLE_EVERY) {
             self.frame.arm = Some(Sample { code: codes.arm, at });
         }
@@ -201,6 +207,12 @@ impl Session {
         self.tamper.as_ref().and_then(Tamper::acts_s)
     }
 
+    /// When it first did what the readback must tell, see [`Tamper::tells_s`], s since boot.
+    #[must_use]
+    pub fn tells_s(&self) -> Option<f64> {
+        self.tamper.as_ref().and_then(Tamper::tells_s)
+    }
+
     /// When the first of the scenario's faults came, s since boot.
     #[must_use]
     pub fn struck_s(&self) -> Option<f64> {
@@ -214,6 +226,16 @@ impl Session {
         if let Some(stream) = &mut self.stream {
             stream.restart(&self.scenario, &self.controller);
         }
+    }
+
+    /// A reset that leaves memory and takes the power from the bridges at once: the
+    /// controller starts with what its record of the last tick tells of the place.
+    pub fn restart(&mut self) {
+        let flight =
+            Recorder::default().flight(&self.held.telemetry, self.state.is_placed(), Late::NOBODY);
+        let restart = Restart { reset: Reset::Pin, flight: Some(flight), crash: None };
+        self.reboot();
+        self.state = State::standing(restart.place());
     }
 
     /// What the drive is doing.
@@ -260,6 +282,7 @@ pub fn read(sensors: &mut Sensors, plant: &VirtualRig) -> Codes {
         preload_n: truth.preload_n,
         depth_mm: truth.depth_mm,
         arm_rad: truth.arm_rad,
+        bridges: truth.bridges,
     };
     sensors.read(sensed, TICK_S)
 }
@@ -273,5 +296,6 @@ pub fn drives(drive: MotorCommand, preload: MotorCommand) -> Drives {
         drive_on: drive.enable,
         preload: duty(preload),
         preload_on: preload.enable,
+        ..Drives::default()
     }
 }

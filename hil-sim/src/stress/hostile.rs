@@ -5,13 +5,16 @@
 //! Whether a sum wraps that was not meant to shows where overflow is checked: in the
 //! tests; the command runs the same without.
 
+use crate::sil::Echo;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use interstage::control::{Controller, Input, Output, State};
 use interstage::model::reduced::{Point, ReducedModel, Scale};
 use interstage::model::{Plan, PlanRequest, Planner, Review};
 use interstage::rig::Rig;
-use interstage::sense::raw::{AdcCode, AngleFrame, EncoderCount, Sample, SensorFrame};
+use interstage::sense::raw::{
+    AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
+};
 use interstage::supervise::{Command, Direction, Mode};
 use interstage::units::{Q16, Tick};
 use rand::{Rng, SeedableRng};
@@ -120,13 +123,15 @@ fn fed(
     let mut random = ChaCha8Rng::seed_from_u64(seed ^ feed as u64);
     let mut state = State::default();
     let mut answer: Option<Plan> = None;
+    let mut echo = Echo::default();
+    let mut bridges = Some(BridgeCodes::default());
     // Across the wrap of the clock.
     let start = u32::MAX - ticks / 3;
     for tick in 0..ticks {
         let now = start.wrapping_add(tick);
         let input = Input {
             now,
-            sensors: frame(feed, tick, now, &mut random),
+            sensors: frame(feed, tick, now, bridges, &mut random),
             command: tick.is_multiple_of(97).then(|| {
                 let all = [Command::Start, Command::Reset, Command::Retract, Command::Stop];
                 all[random.random_range(0..4)]
@@ -136,6 +141,16 @@ fn fed(
             emergency_stop: feed == Feed::Garbage && random.random_range(0..400) == 0,
         };
         let output = controller.step(&mut state, &input);
+        // Sound bridges, or the controller would hold before it has met the rest.
+        let sound = echo.read(&output);
+        bridges = match feed {
+            Feed::Garbage if random.random_range(0..50) == 0 => None,
+            Feed::Garbage if random.random_range(0..20) == 0 => {
+                let any = BridgeCode::new(random.random());
+                Some(BridgeCodes { drive: any, ..sound })
+            }
+            _ => Some(sound),
+        };
         answer = output.request.as_ref().map(|request| match feed {
             Feed::Plans => wild(request, planner, &mut random),
             _ => planner.plan(request),
@@ -166,12 +181,19 @@ fn unsafe_output(output: &Output) -> Option<String> {
     (output.telemetry.vibration < Q16::ZERO).then(|| "a negative amplitude".to_owned())
 }
 
-fn frame(feed: Feed, tick: u32, now: Tick, random: &mut ChaCha8Rng) -> SensorFrame {
+fn frame(
+    feed: Feed,
+    tick: u32,
+    now: Tick,
+    bridges: Option<BridgeCodes>,
+    random: &mut ChaCha8Rng,
+) -> SensorFrame {
     let made = |wheel: u16, load: u16, tread: u16, arm: u16| SensorFrame {
         wheel: Some(Sample { code: EncoderCount::new(wheel), at: now }),
         load_cell: Some(Sample { code: AdcCode::new(load), at: now }),
         tread: Some(Sample { code: AdcCode::new(tread), at: now }),
         arm: Some(Sample { code: AngleFrame::new(arm), at: now }),
+        bridges,
     };
     let even = |angle: u16| {
         let angle = angle & 0x3FFF;

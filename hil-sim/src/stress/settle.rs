@@ -8,7 +8,9 @@ use interstage::control::{Controller, Input, State};
 use interstage::estimate::vibration::{VibrationObserver, VibrationState};
 use interstage::numeric::{LowPass, LowPassState};
 use interstage::rig::Rig;
-use interstage::sense::raw::{AdcCode, AngleFrame, EncoderCount, Sample, SensorFrame};
+use interstage::sense::raw::{
+    AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
+};
 use interstage::sense::{Senses, SensesState};
 use interstage::units::Q16;
 use serde::Serialize;
@@ -122,6 +124,7 @@ fn sensed(lines: &mut Vec<Line>, preset: &str, rig: &Rig) {
         load_cell: Some(Sample { code: AdcCode::new(code.1), at }),
         tread: Some(Sample { code: AdcCode::new(code.2), at }),
         arm: Some(Sample { code: AngleFrame::new(code.3 | parity(code.3)), at }),
+        bridges: Some(BridgeCodes { drive: BridgeCode::of(0), pretightener: BridgeCode::of(0) }),
     };
     let senses = Senses::try_build(rig).expect("a preset");
     // Rolling and loaded, then everything stands.

@@ -1,8 +1,8 @@
 //! The emulated sensors through the firmware's own conversion.
 
-use hil_sim::plant::draw::SensorParameters;
+use hil_sim::plant::draw::{PlantParameters, SensorParameters};
 use hil_sim::plant::sensors::{Codes, Sensed, Sensors};
-use hil_sim::scenario::Noise;
+use hil_sim::scenario::{Noise, Scenario};
 use interstage::rig::Rig;
 use interstage::sense::raw::{Sample, SensorFrame};
 use interstage::sense::{SensedState, Senses, SensesState, Tuning, Validity};
@@ -43,6 +43,7 @@ impl Chain {
             load_cell: Some(Sample { code: codes.load_cell, at }),
             tread: Some(Sample { code: codes.tread, at }),
             arm: Some(Sample { code: codes.arm, at }),
+            bridges: Some(codes.bridges),
         };
         self.now += 1;
         let rest = MillimetresPerSecond2::from_num(0);
@@ -69,6 +70,7 @@ fn every_quantity_comes_back_within_its_quantisation() {
             preload_n: preload,
             depth_mm: depth,
             arm_rad: arm_rad(radius),
+            ..Sensed::default()
         });
         assert_eq!(seen.preload.validity, Validity::Valid);
         assert_eq!(seen.compression.validity, Validity::Valid);
@@ -109,6 +111,7 @@ fn a_reading_is_as_old_as_its_delay() {
                 preload_n: 0.5 * at,
                 depth_mm: 0.01 * at,
                 arm_rad: arm_rad(125.0 - 0.05 * at),
+                ..Sensed::default()
             });
             // Before there was anything older, the oldest.
             let then = (at - ticks).max(0.0);
@@ -132,6 +135,7 @@ fn noise_has_its_deviation_and_no_bias() {
             preload_n: 40.0,
             depth_mm: 0.8,
             arm_rad: arm_rad(radius),
+            ..Sensed::default()
         });
         let off = [
             seen.preload.value.to_num::<f64>() - 40.0,
@@ -171,4 +175,27 @@ fn the_same_seed_makes_the_same_noise() {
     };
     assert_eq!(read(3), read(3));
     assert_ne!(read(3), read(4));
+}
+
+#[test]
+fn a_bridge_reads_its_output_behind_a_low_pass_within_what_the_controller_allows() {
+    use interstage::supervise::{BAND, BAND_SHIFT, Lag};
+    for seed in 0..50 {
+        let mut scenario = Scenario::named("prototype").expect("a preset");
+        scenario.run.seed = seed;
+        let parameters = PlantParameters::draw(&scenario).sensors;
+        let mut sensors = Sensors::new(parameters, seed);
+        let mut lags = [Lag::default(); 2];
+        for tick in 0..400 {
+            let output = [[0.0, 1.0], [0.9, -0.3], [-1.0, 0.0]][tick / 40 % 3];
+            let codes = sensors.read(Sensed { bridges: output, ..Sensed::default() }, 1e-3).bridges;
+            for (i, code) in [codes.drive, codes.pretightener].into_iter().enumerate() {
+                let expected = lags[i].step((output[i] * 32_768.0) as i32);
+                let settled = tick % 40 > 4;
+                let off = (code.duty() - expected).abs();
+                let band = BAND + (expected.abs() >> BAND_SHIFT);
+                assert!(!settled || off <= band, "{seed} {tick}: {off} of {band}");
+            }
+        }
+    }
 }

@@ -26,6 +26,7 @@ pub(super) static DESK: Desk = Desk {
         load_cell: None,
         tread: None,
         arm: None,
+        bridges: None,
         stop: false,
         command: 0,
     })),

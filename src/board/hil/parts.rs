@@ -6,7 +6,7 @@ use interstage::hal::{
     AnalogInput, AngleBus, CommandSource, MotorCommand, Motors, Parts, WheelEncoder,
 };
 use interstage::hil::Given;
-use interstage::sense::raw::{AdcCode, AngleFrame, BusFault, EncoderCount};
+use interstage::sense::raw::{AdcCode, AngleFrame, BridgeCodes, BusFault, EncoderCount};
 use interstage::supervise::Command;
 use rtt_target::DownChannel;
 
@@ -49,6 +49,10 @@ pub(crate) struct Bridges {
 impl Motors for Bridges {
     fn apply(&mut self, drive: MotorCommand, preload: MotorCommand) {
         DESK.apply(drive, preload);
+    }
+
+    fn readback(&mut self) -> Option<BridgeCodes> {
+        DESK.given().readback()
     }
 
     fn stopped(&mut self) -> bool {

@@ -7,6 +7,7 @@ use crate::control::rise::Rise;
 use crate::control::schedule::Schedule;
 use crate::control::speed_loop::SpeedLoop;
 use crate::estimate::crossing::CrossingWatch;
+use crate::estimate::tread::TreadLaw;
 use crate::estimate::vibration::VibrationObserver;
 use crate::model::formula::Formula;
 use crate::numeric::checked;
@@ -43,6 +44,7 @@ impl Controller {
             senses: Senses::try_build_tuned(rig, &tuning)?,
             monitor: Monitor::try_build(rig)?,
             watch: CrossingWatch::try_build(rig)?,
+            tread: TreadLaw::try_build(rig)?,
             vibration: VibrationObserver::try_build(rig)?,
             skipping: true,
             rise: Rise::try_build(rig)?,

@@ -87,8 +87,10 @@ impl Controller {
 
     fn lifted(&self, state: &mut State, pass: &mut Pass<'_>, direction: Direction, lift: Lift) {
         let Some(mut open) = state.crossing else { return };
-        let face = pass.position + lift.distance;
-        let residual = self.step_position(open.step).map_or(Q16::ZERO, |table| face - table);
+        let table = self.step_position(open.step);
+        let seen = pass.position + lift.distance;
+        let face = if open.resumed { table.unwrap_or(seen) } else { seen };
+        let residual = table.map_or(Q16::ZERO, |table| face - table);
         open.lift = Some(LiftPoint {
             at: pass.now,
             gap: lift.gap,

@@ -3,7 +3,7 @@
 use super::{Controller, Pass, State};
 use crate::control::start::{TEST_TICKS, all_answer, at_rest, silent, stowed};
 use crate::log::Event;
-use crate::supervise::{Direction, Fault, Mode, Trigger, next};
+use crate::supervise::{Direction, Fault, Limit, Mode, Trigger, next};
 use crate::units::Q16;
 
 /// Ticks that a preload must stand before the drive starts.
@@ -95,9 +95,21 @@ impl Controller {
         }
     }
 
+    /// Compression against preload, on a wheel that surely stands on a wall.
+    fn compare_tread(&self, state: &mut State, pass: &mut Pass<'_>) {
+        let (preload, wedge) = (pass.sensed.preload_filtered, pass.wedge);
+        let compression = pass.sensed.compression_filtered;
+        if state.in_mode <= 1 || state.on_corner() || state.searching {
+            self.tread.begin(&mut state.tread, preload);
+        } else if self.tread.step(&mut state.tread, preload, wedge, compression) {
+            pass.log(Event::Limit(Limit::TreadStrange));
+        }
+    }
+
     fn await_preload(&self, state: &mut State, pass: &mut Pass<'_>, direction: Direction) {
         let seen = self.seen(state, pass);
         self.watch.rest(&mut state.watch, &seen);
+        self.compare_tread(state, pass);
         let stands = state.plan.as_ref().is_some_and(|plan| {
             let course = self.course(state, pass, direction);
             let wanted = self.schedule.targets(&self.rise, plan, &course).preload;

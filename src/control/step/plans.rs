@@ -45,6 +45,9 @@ impl Controller {
             if outcome.bounded {
                 pass.log(Event::Limit(Limit::AdaptationBounded));
             }
+            if outcome.strange {
+                pass.log(Event::Limit(Limit::GapStrange));
+            }
             self.close_line(state, pass, outcome);
         }
         state.plan = Some(*plan);

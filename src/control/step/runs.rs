@@ -20,13 +20,14 @@ impl Controller {
             state.odometry.set(pass.sensed.travel, Millimetres::ZERO);
             state.located = true;
             state.searching = false;
+            (state.kept, state.resumed) = (None, false);
             state.crossing = None;
             state.level = 0;
             (state.given_up, state.extra) = (0, 0);
             pass.position = Millimetres::ZERO;
             return;
         }
-        if state.located {
+        if state.located || self.go_on_from(state, pass) {
             return;
         }
         state.level = pass.sensed.level;
@@ -49,7 +50,9 @@ impl Controller {
         let turned = state.direction != direction;
         state.direction = direction;
         state.leaving = None;
-        if state.searching {
+        if core::mem::take(&mut state.resumed) {
+            self.resume(state, pass, direction);
+        } else if state.searching {
             self.start_searching(state, pass, direction);
         } else if turned {
             self.turn(state, pass, direction);

@@ -1,11 +1,13 @@
 //! What the controller remembers between ticks.
 
+use crate::blackbox::Place;
 use crate::control::preload_loop::PreloadLoopState;
 use crate::control::profile::ProfileState;
 use crate::control::speed_loop::SpeedLoopState;
 use crate::estimate::ContactStage;
 use crate::estimate::crossing::{Contact, WatchState};
 use crate::estimate::odometry::Odometry;
+use crate::estimate::tread::TreadState;
 use crate::estimate::vibration::VibrationState;
 use crate::model::{Plan, Review};
 use crate::sense::SensesState;
@@ -34,7 +36,13 @@ pub struct State {
     /// That origin is a guess: the next step found tells where the wheel is, and until
     /// then the drive goes as if the step came at once.
     pub(super) searching: bool,
+    /// Where a record has the wheel, until the odometry has an origin.
+    pub(super) kept: Option<Place>,
+    /// Located without having rolled there: before the next run it is to be found out
+    /// whether the wheel stands on a corner.
+    pub(super) resumed: bool,
     pub(super) watch: WatchState,
+    pub(super) tread: TreadState,
     pub(super) stage: ContactStage,
     pub(super) vibration: Shaking,
     /// Level by steps recognised.
@@ -103,6 +111,8 @@ pub(super) struct OpenCrossing {
     pub expected: bool,
     /// The wheel turned back on this very corner: its first half is not seen.
     pub turned: bool,
+    /// The wheel stood on it when the board started: where its face is, was not seen.
+    pub resumed: bool,
     /// That it was not where the table has it has been reported.
     pub told: bool,
     pub touched_at: Tick,
@@ -124,6 +134,7 @@ impl OpenCrossing {
             direction,
             expected,
             turned: false,
+            resumed: false,
             told: false,
             touched_at: now,
             from: None,
@@ -162,7 +173,10 @@ impl Default for State {
             odometry: Odometry::default(),
             located: false,
             searching: false,
+            kept: None,
+            resumed: false,
             watch: WatchState::default(),
+            tread: TreadState::default(),
             stage: ContactStage::Initial,
             vibration: Shaking::default(),
             level: 0,
@@ -195,6 +209,27 @@ impl Default for State {
 }
 
 impl State {
+    /// A start with the wheel where a record has it, if there is one.
+    #[must_use]
+    pub fn standing(kept: Option<Place>) -> Self {
+        let mut state = Self { kept, ..Self::default() };
+        if let Some(place) = kept {
+            // The wheel's travel begins with the start.
+            state.odometry.set(Travel::ZERO, place.position);
+        }
+        state
+    }
+
+    /// Whether the position is more than a guess, so that a start could go on from it.
+    #[must_use]
+    pub fn is_placed(&self) -> bool {
+        if self.located {
+            !self.searching && self.given_up == 0 && self.extra == 0
+        } else {
+            self.kept.is_some_and(|place| place.sure)
+        }
+    }
+
     /// What the drive is doing.
     #[must_use]
     pub const fn mode(&self) -> Mode {
@@ -238,6 +273,11 @@ impl State {
         };
         // BLEND_TICKS is 2^5: bits of Q16 shifted.
         Q16::from_bits(i32::from(self.felt) << 11)
+    }
+
+    /// A corner is felt from now on, without a way towards it.
+    pub(super) fn feel_at_once(&mut self) {
+        self.felt = BLEND_TICKS;
     }
 
     /// A corner is felt.

@@ -57,6 +57,11 @@ mod tests {
 
     /// Rolls a wheel with constant corner depth over a step and returns the signs.
     fn roll(depth: f64, height: f64, direction: Direction) -> Vec<Sign> {
+        roll_from(depth, height, direction, None)
+    }
+
+    /// The same from this place on the corner, known by the table alone.
+    fn roll_from(depth: f64, height: f64, direction: Direction, from: Option<f64>) -> Vec<Sign> {
         let watch = CrossingWatch::try_build(&Rig::prototype()).unwrap();
         let mut state = WatchState::default();
         let flat = 0.3;
@@ -67,7 +72,12 @@ mod tests {
             Direction::Deploy => track,
             Direction::Retract => track.into_iter().rev().collect(),
         };
-        for (index, x) in walk.into_iter().enumerate() {
+        let ahead = |x: &f64| match (from, direction) {
+            (None, _) => true,
+            (Some(from), Direction::Deploy) => *x >= from,
+            (Some(from), Direction::Retract) => *x <= from,
+        };
+        for (index, x) in walk.into_iter().filter(ahead).enumerate() {
             // Height above the lower wall: resting on it, on the corner, on the upper.
             let over_corner =
                 if x < 0.0 && x > -reach { height + (reach * reach - x * x).sqrt() } else { 0.0 };
@@ -82,7 +92,11 @@ mod tests {
             let near = x.abs() < 16.0;
             let now = Seen { near, clear, ..seen(150.0 - y, compression) };
             if index == 0 {
-                watch.begin(&mut state, &now);
+                let level = u8::from(direction == Direction::Retract);
+                match from {
+                    None => watch.begin(&mut state, &now),
+                    Some(_) => watch.begin_between(&mut state, direction, level, &now),
+                }
             }
             if let Some(sign) = watch.step(&mut state, direction, &now) {
                 signs.push(sign);
@@ -110,7 +124,34 @@ mod tests {
         }
     }
 
+    #[test]
+    fn begun_on_a_corner_a_step_gives_what_is_left_of_its_signs() {
+        for from in [-12.0, -9.0, -5.0, -2.0] {
+            for direction in [Direction::Deploy, Direction::Retract] {
+                let signs = roll_from(0.7, 4.0, direction, Some(from));
+                let rest = matches!(signs[..], [Sign::Lifted(_), Sign::Over, Sign::Closed { .. }]);
+                assert!(rest, "{direction:?} from {from}: {signs:?}");
+            }
+        }
+    }
+
     proptest! {
+        #[test]
+        fn a_wheel_on_an_edge_tells_how_far_its_face_is(
+            depth in 0.4..1.6f64,
+            distance in 1.0..12.0f64,
+            level in 0..3_u8,
+        ) {
+            let watch = CrossingWatch::try_build(&Rig::prototype()).unwrap();
+            let height = 4.0 + ((25.0 - depth).powi(2) - distance.powi(2)).sqrt();
+            let radius = 150.0 - 4.0 * f64::from(level) - height;
+            let (radius_mm, depth_mm) = (Q16::from_num(radius), Q16::from_num(depth));
+            let got = watch.to_edge(level, radius_mm, depth_mm).to_num::<f64>();
+            prop_assert!((got - distance).abs() < 2e-3, "{got} for {distance}");
+            let over = watch.height_over(level, radius_mm, depth_mm).to_num::<f64>();
+            prop_assert!((over - (height - 25.0 + depth)).abs() < 1e-4);
+        }
+
         #[test]
         fn gap_and_height_are_measured_by_geometry(
             depth in 0.4..1.6f64,

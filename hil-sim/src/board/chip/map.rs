@@ -19,6 +19,7 @@ pub(super) enum Block {
     Flash,
     Port(usize),
     Adc,
+    Readback,
     Counter,
     System,
     Debug,
@@ -36,7 +37,7 @@ pub(super) const RANGES: [(u32, u32); 6] = [
 ];
 
 /// First address, bytes, block. Source: RM0440, table 3.
-const BLOCKS: [(u32, u32, Block); 18] = [
+const BLOCKS: [(u32, u32, Block); 19] = [
     (0x4000_0000, 0x400, Block::Time),
     (0x4000_0C00, 0x400, Block::Encoder),
     (0x4000_3000, 0x400, Block::Watchdog),
@@ -52,6 +53,7 @@ const BLOCKS: [(u32, u32, Block); 18] = [
     (0x4002_2000, 0x400, Block::Flash),
     (0x4002_3000, 0x400, Block::Crc),
     (0x5000_0000, 0x400, Block::Adc),
+    (0x5000_0400, 0x400, Block::Readback),
     (0xE000_1000, 0x1000, Block::Counter),
     (0xE000_E000, 0x1000, Block::System),
     (0xE004_2000, 0x400, Block::Debug),
@@ -92,6 +94,7 @@ pub(super) fn name(block: Block) -> &'static str {
             ["GPIOA", "GPIOB", "GPIOC", "GPIOD", "GPIOE", "GPIOF", "GPIOG"][port.min(6)]
         }
         Block::Adc => "ADC12",
+        Block::Readback => "ADC345",
         Block::Counter => "DWT",
         Block::System => "SCS",
         Block::Debug => "DBGMCU",
@@ -123,6 +126,7 @@ pub(super) fn is_clocked(block: Block, rcc: &Rcc) -> bool {
         Block::Crc => (AHB1, 12),
         Block::Port(port) => (AHB2, port as u32),
         Block::Adc => (AHB2, 13),
+        Block::Readback => (AHB2, 14),
         Block::Flash
         | Block::Rcc
         | Block::Exti

@@ -33,8 +33,8 @@ const WHEEL_FUNCTION: u32 = 2;
 /// Lines of the angle sensor: clock, to the board, from the board; SPI1 is function 5.
 const ANGLE: [Pin; 3] = [Pin(1, 3), Pin(0, 6), Pin(0, 7)];
 const ANGLE_FUNCTION: u32 = 5;
-/// Analogue inputs: pin and channel of ADC1 and of ADC2.
-const ANALOG: [(Pin, usize); 2] = [(Pin(2, 2), 8), (Pin(2, 3), 9)];
+/// Analogue inputs: pin and channel of ADC1 and of ADC2, then two of ADC3.
+const ANALOG: [(Pin, usize); 4] = [(Pin(2, 2), 8), (Pin(2, 3), 9), (Pin(1, 0), 12), (Pin(1, 1), 1)];
 
 /// What a motor's bridge is wired to.
 struct Wired {
@@ -156,19 +156,22 @@ impl Chip {
         }
     }
 
-    /// Voltages at the analogue inputs of load cell and tread sensor, in parts of 2^16
-    /// of the reference.
-    pub fn set_analog(&mut self, inputs: [u16; 2]) {
+    /// Voltages at the analogue inputs of load cell, tread sensor and the bridges of drive
+    /// and pre-tightener, in parts of 2^16 of the reference.
+    pub fn set_analog(&mut self, inputs: [u16; 4]) {
         self.inputs = inputs;
         self.apply_analog();
     }
 
     fn apply_analog(&mut self) {
-        for (converter, (pin, channel)) in ANALOG.into_iter().enumerate() {
+        for (input, (pin, channel)) in ANALOG.into_iter().enumerate() {
             let wired = self.role(pin) == Role::Analog;
-            let voltage = if wired { self.inputs[converter] } else { 0 };
-            let voltage = self.defects.stuck_codes[converter].unwrap_or(voltage);
-            self.adc.set_input(converter, channel, voltage);
+            let voltage = if wired { self.inputs[input] } else { 0 };
+            let voltage = self.defects.stuck_codes[input].unwrap_or(voltage);
+            match input {
+                0 | 1 => self.adc.set_input(input, channel, voltage),
+                _ => self.readback.set_input(0, channel, voltage),
+            }
         }
     }
 

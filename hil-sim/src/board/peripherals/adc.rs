@@ -1,7 +1,9 @@
-//! The pair of analogue converters ADC1 and ADC2 with their common registers.
+//! A pair of analogue converters, ADC1 and ADC2 or ADC3 and ADC4, with their common
+//! registers.
 //!
 //! Modelled: regulator, calibration, software start, regular conversions of one channel,
-//! single or without end, with sampling time and oversampling, requests to DMA, overrun.
+//! single or without end, with sampling time and oversampling, requests to DMA, overrun; on a
+//! converter without regular ones, injected conversions of up to four channels.
 //! The code is taken from the pin when the conversion is done.
 
 use super::registers::{Kept, Registers};
@@ -13,6 +15,9 @@ const CFGR: u32 = 0x0C;
 const CFGR2: u32 = 0x10;
 const SMPR1: u32 = 0x14;
 const SQR1: u32 = 0x30;
+const JSQR: u32 = 0x4C;
+/// First of the four data registers of the injected conversions.
+const JDR: u32 = 0x80;
 /// Data register.
 pub(in crate::board) const DR: u32 = 0x40;
 const COMMON: u32 = 0x300;
@@ -28,6 +33,7 @@ const CONTINUOUS: u32 = 1 << 13;
 const ENABLE: u32 = 1;
 const DISABLE: u32 = 1 << 1;
 const START: u32 = 1 << 2;
+const INJECT: u32 = 1 << 3;
 const STOP: u32 = 1 << 4;
 const REGULATOR: u32 = 1 << 28;
 const DEEP: u32 = 1 << 29;
@@ -36,11 +42,16 @@ const READY: u32 = 1;
 const END: u32 = 1 << 2;
 const END_OF_SEQUENCE: u32 = 1 << 3;
 const OVERRUN: u32 = 1 << 4;
+const INJECTED: u32 = 1 << 5;
+const INJECTED_SEQUENCE: u32 = 1 << 6;
+/// Oversampling of regular and of injected conversions.
+const OVERSAMPLED: u32 = 1;
+const INJECTED_OVERSAMPLED: u32 = 1 << 1;
 /// Converter clocks that a calibration takes.
 const CALIBRATION: u64 = 116;
 
-/// IER, CFGR, CFGR2, sampling times, watchdogs, sequence, DIFSEL, CALFACT.
-const REGISTERS: [Kept; 16] = [
+/// IER, CFGR, CFGR2, sampling times, watchdogs, sequences, DIFSEL, CALFACT.
+const REGISTERS: [Kept; 17] = [
     Kept { offset: 0x04, reset: 0, mask: 0x7FF },
     Kept { offset: CFGR, reset: 0x8000_0000, mask: ALL },
     Kept { offset: CFGR2, reset: 0, mask: 0x0E0F_07FF },
@@ -53,6 +64,7 @@ const REGISTERS: [Kept; 16] = [
     Kept { offset: SQR1 + 4, reset: 0, mask: 0x1F7D_F7DF },
     Kept { offset: SQR1 + 8, reset: 0, mask: 0x1F7D_F7DF },
     Kept { offset: SQR1 + 12, reset: 0, mask: 0x7DF },
+    Kept { offset: JSQR, reset: 0, mask: ALL },
     Kept { offset: 0xB0, reset: 0, mask: 0x0007_FFFF },
     Kept { offset: 0xB4, reset: 0, mask: 0x007F_007F },
     Kept { offset: 0xA0, reset: 0, mask: 0 },
@@ -68,6 +80,9 @@ struct Converter {
     data: u32,
     /// Cycle at which the calibration or the conversion under way is done.
     done: u64,
+    /// The injected conversion under way: its rank, and the cycle at which it is done.
+    injected: Option<(usize, u64)>,
+    injected_data: [u32; 4],
 }
 
 impl Converter {
@@ -78,31 +93,42 @@ impl Converter {
             flags: 0,
             data: 0,
             done: u64::MAX,
+            injected: None,
+            injected_data: [0; 4],
         }
     }
 
-    fn channel(&self) -> u32 {
-        self.registers.get(SQR1) >> 6 & 0x1F
+    /// Channel of the regular conversion, or of the injected one of this rank.
+    fn channel(&self, rank: Option<usize>) -> u32 {
+        match rank {
+            None => self.registers.get(SQR1) >> 6 & 0x1F,
+            Some(rank) => self.registers.get(JSQR) >> (9 + 6 * rank) & 0x1F,
+        }
+    }
+
+    /// Whether a code is made of several conversions.
+    fn is_oversampled(&self, rank: Option<usize>) -> bool {
+        let bit = if rank.is_some() { INJECTED_OVERSAMPLED } else { OVERSAMPLED };
+        self.registers.get(CFGR2) & bit != 0
     }
 
     /// Conversions that make one code.
-    fn ratio(&self) -> u64 {
-        let setting = self.registers.get(CFGR2);
-        if setting & 1 == 0 { 1 } else { 2 << (setting >> 2 & 7) }
+    fn ratio(&self, rank: Option<usize>) -> u64 {
+        if self.is_oversampled(rank) { 2 << (self.registers.get(CFGR2) >> 2 & 7) } else { 1 }
     }
 
     /// Half clocks of the converter that one conversion into 12 bits takes: sampling and
     /// 12.5 clocks.
-    fn half_clocks(&self) -> u64 {
+    fn half_clocks(&self, rank: Option<usize>) -> u64 {
         const SAMPLING: [u64; 8] = [5, 13, 25, 49, 95, 185, 495, 1281];
-        let channel = self.channel();
+        let channel = self.channel(rank);
         let word = self.registers.get(SMPR1 + channel / 10 * 4);
         SAMPLING[(word >> (channel % 10 * 3) & 7) as usize] + 25
     }
 
     /// Cycles of the core that a code takes.
-    fn cycles(&self, clock: u64) -> u64 {
-        (self.ratio() * self.half_clocks() * clock).div_ceil(2)
+    fn cycles(&self, rank: Option<usize>, clock: u64) -> u64 {
+        (self.ratio(rank) * self.half_clocks(rank) * clock).div_ceil(2)
     }
 
     /// The code of `sixteen`, the voltage at the pin in parts of 2^16 of the reference.
@@ -110,22 +136,23 @@ impl Converter {
     /// The noise at a real pin is worth more than a step of 12 bits, so that the mean of
     /// many conversions has more than 12; here one conversion after the other reads
     /// evenly through the step, and the sum is exact to one part of 2^16.
-    fn code(&self, sixteen: u16) -> u32 {
+    fn code(&self, rank: Option<usize>, sixteen: u16) -> u32 {
         let setting = self.registers.get(CFGR2);
-        let sum = u64::from(sixteen) * self.ratio() / 16;
-        let shift = if setting & 1 == 0 { 0 } else { setting >> 5 & 0xF };
+        let sum = u64::from(sixteen) * self.ratio(rank) / 16;
+        let shift = if self.is_oversampled(rank) { setting >> 5 & 0xF } else { 0 };
         (sum >> shift) as u32 & 0xFFFF
     }
 
     fn write_control(&mut self, write: Write, clock: u64, now: u64) -> Option<()> {
         let ones = write.ones();
-        if ones & !(ENABLE | DISABLE | START | STOP | REGULATOR | DEEP | 1 << 30 | CALIBRATE) != 0 {
+        let known = ENABLE | DISABLE | START | INJECT | STOP | REGULATOR | DEEP | 1 << 30;
+        if ones & !(known | CALIBRATE) != 0 {
             return None;
         }
         let level = REGULATOR | DEEP | 1 << 30;
         self.control = self.control & !level | write.onto(self.control) & level;
         let ready = self.control & REGULATOR != 0 && self.control & DEEP == 0;
-        let idle = self.control & (START | CALIBRATE) == 0;
+        let idle = self.control & (START | INJECT | CALIBRATE) == 0;
         if ones & CALIBRATE != 0 && ready && self.control & ENABLE == 0 {
             self.control |= CALIBRATE;
             self.done = now + CALIBRATION * clock;
@@ -149,7 +176,15 @@ impl Converter {
                 return None;
             }
             self.control |= START;
-            self.done = now + self.cycles(clock);
+            self.done = now + self.cycles(None, clock);
+        }
+        if ones & INJECT != 0 && self.control & (ENABLE | INJECT) == ENABLE {
+            // Between regular ones, or started by hardware, is not modelled.
+            if !idle || self.registers.get(JSQR) & (3 << 7) != 0 {
+                return None;
+            }
+            self.control |= INJECT;
+            self.injected = Some((0, now + self.cycles(Some(0), clock)));
         }
         Some(())
     }
@@ -162,7 +197,22 @@ impl Converter {
                 self.flags &= !END;
                 Some(self.data)
             }
+            JDR..=0x8C => self.injected_data.get((offset - JDR) as usize / 4).copied(),
             _ => self.registers.read(offset),
+        }
+    }
+
+    /// The injected conversion of this rank is done, with this at its channel.
+    fn finish_injected(&mut self, rank: usize, done: u64, voltage: u16, clock: u64) {
+        self.injected_data[rank] = self.code(Some(rank), voltage);
+        self.flags |= INJECTED;
+        let last = self.registers.get(JSQR) as usize & 3;
+        if rank < last {
+            self.injected = Some((rank + 1, done + self.cycles(Some(rank + 1), clock)));
+        } else {
+            self.injected = None;
+            self.control &= !INJECT;
+            self.flags |= INJECTED_SEQUENCE;
         }
     }
 
@@ -175,7 +225,7 @@ impl Converter {
         }
         let config = self.registers.get(CFGR);
         if config & CONTINUOUS != 0 {
-            self.done = done + self.cycles(clock);
+            self.done = done + self.cycles(None, clock);
         } else {
             self.control &= !START;
         }
@@ -186,7 +236,7 @@ impl Converter {
                 return;
             }
         }
-        self.data = self.code(voltage);
+        self.data = self.code(None, voltage);
         self.flags |= END | END_OF_SEQUENCE;
     }
 
@@ -262,15 +312,23 @@ impl Peripheral for Adc {
     }
 
     fn deadline(&self) -> u64 {
-        self.converters[0].done.min(self.converters[1].done)
+        let due = |converter: &Converter| {
+            converter.injected.map_or(converter.done, |(_, done)| done.min(converter.done))
+        };
+        due(&self.converters[0]).min(due(&self.converters[1]))
     }
 
     fn advance(&mut self, now: u64) {
         let clock = self.clock();
         for (converter, inputs) in self.converters.iter_mut().zip(&self.inputs) {
             while converter.done <= now {
-                let channel = converter.channel() as usize;
+                let channel = converter.channel(None) as usize;
                 converter.finish(inputs.get(channel).copied().unwrap_or(0), clock);
+            }
+            while let Some((rank, done)) = converter.injected.filter(|(_, done)| *done <= now) {
+                let channel = converter.channel(Some(rank)) as usize;
+                let voltage = inputs.get(channel).copied().unwrap_or(0);
+                converter.finish_injected(rank, done, voltage, clock);
             }
         }
     }
@@ -379,6 +437,41 @@ mod tests {
         assert_eq!(adc.deadline(), 10 + CALIBRATION);
         adc.advance(10 + CALIBRATION);
         assert_eq!(adc.read(CR, 0), Some(REGULATOR));
+    }
+
+    #[test]
+    fn injected_conversions_follow_one_another_into_registers_of_their_own() {
+        let mut adc = Adc::default();
+        for (offset, value) in [
+            (CCR, 2 << 18),
+            (CR, REGULATOR),
+            (CR, REGULATOR | ENABLE),
+            (CFGR2, 8 << 5 | 7 << 2 | INJECTED_OVERSAMPLED),
+            (SMPR1, 2 << 3),
+            (SMPR1 + 4, 2 << 6),
+            (JSQR, 12 << 9 | 1 << 15 | 1),
+        ] {
+            write(&mut adc, offset, value, 0).expect("modelled");
+        }
+        adc.set_input(0, 12, 4095 << 4);
+        adc.set_input(0, 1, 1234 << 4);
+        write(&mut adc, CR, REGULATOR | INJECT, 1000).expect("modelled");
+        let each = 256 * 25 * 4;
+        assert_eq!(adc.deadline(), 1000 + each);
+        adc.advance(1000 + each);
+        let flags = |adc: &mut Adc| adc.read(ISR, 0).map(|f| f & (INJECTED | INJECTED_SEQUENCE));
+        assert_eq!(flags(&mut adc), Some(INJECTED));
+        adc.advance(adc.deadline());
+        assert_eq!(flags(&mut adc), Some(INJECTED | INJECTED_SEQUENCE));
+        assert_eq!((adc.read(JDR, 0), adc.read(JDR + 4, 0)), (Some(4095), Some(1234)));
+        assert_eq!(adc.read(CR, 0).map(|control| control & INJECT), Some(0));
+        assert_eq!(adc.deadline(), u64::MAX);
+        write(&mut adc, ISR, INJECTED_SEQUENCE, 0).expect("modelled");
+        assert_eq!(flags(&mut adc), Some(INJECTED));
+        // Beside regular ones they are not modelled.
+        write(&mut adc, CFGR, CONTINUOUS, 0).expect("modelled");
+        write(&mut adc, CR, REGULATOR | START, 0).expect("modelled");
+        assert_eq!(write(&mut adc, CR, REGULATOR | INJECT, 0), None);
     }
 
     #[test]

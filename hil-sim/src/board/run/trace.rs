@@ -102,7 +102,14 @@ impl Trace {
     fn digest_pins(&mut self, passed: &Passed) {
         let Passed { codes, drives } = passed;
         let digest = &mut self.tally.digest;
-        for code in [codes.wheel.get(), codes.load_cell.get(), codes.tread.get(), codes.arm.get()] {
+        for code in [
+            codes.wheel.get(),
+            codes.load_cell.get(),
+            codes.tread.get(),
+            codes.arm.get(),
+            codes.bridges.drive.get(),
+            codes.bridges.pretightener.get(),
+        ] {
             digest.update(code.to_le_bytes());
         }
         for duty in [drives.drive, drives.preload] {

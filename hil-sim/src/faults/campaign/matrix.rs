@@ -36,12 +36,17 @@ pub struct Line {
     pub code: Option<u16>,
     /// Every code that it was reported by, with how often.
     pub codes: BTreeMap<u16, usize>,
+    /// Restarts that it was reported by, with how often; none in software.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub restarts: BTreeMap<&'static str, usize>,
     /// Whether at every instant it was reported or tolerated.
     pub detected: bool,
     /// Worst time from fault to report, ms; none if nothing was reported.
     pub latency_ms: Option<f64>,
     /// Median of the same, ms.
     pub latency_median_ms: Option<f64>,
+    /// The same from when the duty was off by two parts in a hundred, ms.
+    pub latency_any_ms: Option<Spread>,
     /// The same of the instants outside of crossings, ms.
     pub latency_off_corner_ms: Option<Spread>,
     /// The same from when the plant first ran otherwise than without the fault, ms.
@@ -74,16 +79,26 @@ pub struct Line {
 }
 
 impl Line {
+    /// What it restarted the board by most often.
+    #[must_use]
+    pub fn restarted(&self) -> Option<&'static str> {
+        self.restarts.iter().max_by_key(|(_, times)| **times).map(|(cause, _)| *cause)
+    }
+
     /// The line of a fault.
     #[must_use]
     pub fn of(case: &Case, instants: &[Instant]) -> Self {
         let count = |finding| instants.iter().filter(|i| i.finding == finding).count();
         let mut codes = BTreeMap::new();
+        let mut restarts = BTreeMap::new();
         let mut ends = BTreeMap::new();
         for instant in instants {
             *ends.entry(instant.end).or_default() += 1;
             if let Some(code) = instant.code {
                 *codes.entry(code).or_default() += 1;
+            }
+            if let Some(cause) = instant.restart {
+                *restarts.entry(cause).or_default() += 1;
             }
         }
         let failed = |i: &&Instant| i.finding == Finding::Undetected || !i.harms.is_empty();
@@ -96,9 +111,11 @@ impl Line {
             text: case.text(),
             code: codes.iter().max_by_key(|(_, n)| **n).map(|(code, _)| *code),
             codes,
+            restarts,
             detected: count(Finding::Undetected) == 0,
             latency_ms: latency.map(|l| l.worst),
             latency_median_ms: latency.map(|l| l.median),
+            latency_any_ms: Spread::of(instants.iter().filter_map(|i| i.latency_any_ms)),
             latency_off_corner_ms: Spread::of(
                 instants.iter().filter(|i| !crossing(i)).filter_map(|i| i.latency_ms),
             ),
@@ -140,10 +157,10 @@ pub struct Outcome {
 impl Outcome {
     /// The outcome of these lines.
     #[must_use]
-    pub fn of(matrix: Vec<Line>, instants: usize) -> Self {
+    pub fn of(target: &'static str, matrix: Vec<Line>, instants: usize) -> Self {
         let undetected = matrix.iter().map(|line| line.undetected).sum();
         let unheld = matrix.iter().map(|line| line.unheld).sum();
-        Self { target: "sil", instants, matrix, undetected, unheld }
+        Self { target, instants, matrix, undetected, unheld }
     }
 
     /// Whether every fault was found or borne, and nothing was left unheld.

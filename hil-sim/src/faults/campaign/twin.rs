@@ -1,8 +1,10 @@
 //! The same run without the fault: when it moves and crosses, what it reports by itself, and
 //! where the rig is in every tick.
 
+use interstage::control::Output;
 use interstage::log::Event;
 use interstage::model::Planner;
+use interstage::rig::RigError;
 use interstage::supervise::{Direction, Leg, Mode};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -24,6 +26,8 @@ pub(super) struct Twin {
     /// From the command to the end, s since boot.
     pub(super) started_s: f64,
     ended_s: f64,
+    /// When the crossing under way began, s.
+    crossing_s: Option<f64>,
     /// Stretches of time in which it crosses a step, s.
     crossings: Vec<(f64, f64)>,
     /// Codes of the limits that it reports.
@@ -38,17 +42,8 @@ impl Twin {
     /// Runs it.
     pub(super) fn run(scenario: &Scenario) -> Result<Self, RunError> {
         let mut session = Session::new(scenario, Options::default())?;
-        let planner = Planner::try_build(&scenario.rig)?;
         let mut operator = Operator::default();
-        let mut twin = Self {
-            started_s: 0.0,
-            ended_s: 0.0,
-            crossings: Vec::new(),
-            limits: Vec::new(),
-            gap_ref_mm: Direction::ALL.map(|way| planner.gap_ref(way).to_num()),
-            states: Vec::new(),
-        };
-        let mut crossing = None;
+        let mut twin = Self::new(scenario)?;
         while session.time_s() < LONGEST_S {
             let t_s = session.time_s();
             let command = operator.command(session.mode());
@@ -56,26 +51,54 @@ impl Twin {
                 twin.started_s = t_s;
             }
             let output = session.step(command)?;
-            twin.states.push(state(session.plant().truth()));
-            for entry in &output.events {
-                if let Event::Limit(limit) = entry.event {
-                    twin.limits.push(limit.code());
-                }
-            }
-            match (session.mode(), crossing) {
-                (Mode::Run(_, Leg::Crossing), None) => crossing = Some(t_s),
-                (Mode::Run(_, Leg::Crossing), Some(_)) | (_, None) => {}
-                (_, Some(from_s)) => {
-                    twin.crossings.push((from_s, t_s));
-                    crossing = None;
-                }
-            }
-            twin.ended_s = t_s;
+            twin.note(t_s, session.mode(), &output, session.plant().truth(), false);
             if operator.over(session.mode()) && command.is_none() {
                 break;
             }
         }
         Ok(twin)
+    }
+
+    /// Before the first tick.
+    pub(super) fn new(scenario: &Scenario) -> Result<Self, RigError> {
+        let planner = Planner::try_build(&scenario.rig)?;
+        Ok(Self {
+            started_s: 0.0,
+            ended_s: 0.0,
+            crossing_s: None,
+            crossings: Vec::new(),
+            limits: Vec::new(),
+            gap_ref_mm: Direction::ALL.map(|way| planner.gap_ref(way).to_num()),
+            states: Vec::new(),
+        })
+    }
+
+    /// A tick, after which the drive is in this mode; `over` says that it counts no more.
+    pub(super) fn note(
+        &mut self,
+        t_s: f64,
+        mode: Mode,
+        output: &Output,
+        truth: &Truth,
+        over: bool,
+    ) {
+        self.states.push(state(truth));
+        for entry in &output.events {
+            if let Event::Limit(limit) = entry.event {
+                self.limits.push(limit.code());
+            }
+        }
+        match (mode, self.crossing_s) {
+            (Mode::Run(_, Leg::Crossing), None) => self.crossing_s = Some(t_s),
+            (Mode::Run(_, Leg::Crossing), Some(_)) | (_, None) => {}
+            (_, Some(from_s)) => {
+                self.crossings.push((from_s, t_s));
+                self.crossing_s = None;
+            }
+        }
+        if !over {
+            self.ended_s = t_s;
+        }
     }
 
     /// A random instant: of every three, one in a crossing and two anywhere under way.

@@ -1,0 +1,263 @@
+//! The faults of a scenario on the board: at its pins and registers, or in its plant.
+//!
+//! What software breaks between sensor and controller breaks here before the pin. A sensor
+//! that gives nothing is a broken line: a bridge reads the low end, the encoder's lines stay
+//! high, the angle sensor does not answer. Lost ticks are an interrupt that asks without end
+//! for as long; a task that hangs is caught in a loop in its next turn.
+
+use interstage::sense::raw::{AdcCode, Sample, SensorFrame};
+use interstage::supervise::Command;
+
+use super::core::CoreError;
+use super::faults::Fault;
+use super::machine::Machine;
+use super::peripherals::rcc::Cause;
+use crate::faults::{Injection, Kind, Tamper, Target};
+use crate::plant::rig::{Drives, VirtualRig};
+use crate::plant::sensors::Codes;
+
+/// Cycles into its turn at which a task is caught.
+const INTO_TURN: u64 = 100;
+/// Milliseconds for which a function that runs tasks is waited for, before the next is.
+const PATIENCE: u32 = 20;
+
+/// The faults of a run, and how far they have come.
+pub(super) struct Tampered {
+    tamper: Tamper,
+    hunt: Option<Hunt>,
+    /// When the task that was to hang was caught, s.
+    caught_s: Option<f64>,
+    /// A task is to hang.
+    hangs: bool,
+    /// Ticks are being lost.
+    losing: bool,
+    /// Encoder and angle sensor give nothing.
+    silent: [bool; 2],
+    /// The host's line is flooded, and with what next.
+    flood: Option<u32>,
+}
+
+impl Tampered {
+    pub(super) fn new(tamper: Tamper) -> Self {
+        Self {
+            tamper,
+            hunt: None,
+            caught_s: None,
+            hangs: false,
+            losing: false,
+            silent: [false; 2],
+            flood: None,
+        }
+    }
+
+    /// A millisecond begins: faults come and go.
+    pub(super) fn begin(
+        &mut self,
+        machine: &mut Machine,
+        plant: &mut VirtualRig,
+        t_s: f64,
+    ) -> Result<(), CoreError> {
+        self.tamper.begin(t_s, plant.truth());
+        self.tamper.plant(plant);
+        for (injection, comes) in self.tamper.changes() {
+            self.change(machine, &injection, comes)?;
+        }
+        let losing = self.tamper.lost();
+        if losing != std::mem::replace(&mut self.losing, losing) {
+            switch(Fault::ButtonStorm, machine, losing)?;
+        }
+        Ok(())
+    }
+
+    fn change(
+        &mut self,
+        machine: &mut Machine,
+        injection: &Injection,
+        comes: bool,
+    ) -> Result<(), CoreError> {
+        if injection.target == Target::HostLine {
+            self.flood = comes.then_some(1);
+        }
+        if let Some(task) = task(injection) {
+            self.hangs = true;
+            self.hunt = comes.then(|| Hunt::new(machine, task));
+        }
+        if injection.target == Target::Debugger && comes {
+            machine.restart(Cause::Software)?;
+        }
+        match register(injection) {
+            Some(fault) => switch(fault, machine, comes),
+            None => Ok(()),
+        }
+    }
+
+    /// Runs the board towards the turn of a task that is to hang, up to this cycle.
+    pub(super) fn hunt(&mut self, machine: &mut Machine, until: u64) -> Result<(), CoreError> {
+        if let Some(hunt) = &mut self.hunt
+            && hunt.go(machine, until)?
+        {
+            self.hunt = None;
+            self.caught_s = Some(machine.now() as f64 / super::peripherals::HZ as f64);
+        }
+        Ok(())
+    }
+
+    /// What the sensors say at the pins, of what they would.
+    pub(super) fn tell(&mut self, machine: &mut Machine, codes: Codes, now: u32) -> Codes {
+        let mut frame = SensorFrame {
+            wheel: Some(Sample { code: codes.wheel, at: now }),
+            load_cell: Some(Sample { code: codes.load_cell, at: now }),
+            tread: Some(Sample { code: codes.tread, at: now }),
+            arm: Some(Sample { code: codes.arm, at: now }),
+            bridges: Some(codes.bridges),
+        };
+        self.tamper.sensors(&mut frame);
+        let bridge = |sample: Option<Sample<AdcCode>>| match sample {
+            Some(sample) if sample.at == now => sample.code,
+            _ => AdcCode::new(0),
+        };
+        let fresh = [frame.wheel.map(|s| s.at), frame.arm.map(|s| s.at)];
+        let silent = fresh.map(|at| at != Some(now));
+        if silent != std::mem::replace(&mut self.silent, silent) {
+            let chip = machine.chip_mut();
+            chip.defects.encoder_lines = [silent[0]; 2];
+            chip.angle.lost = silent[1];
+        }
+        Codes {
+            wheel: frame.wheel.filter(|_| !silent[0]).map_or(codes.wheel, |s| s.code),
+            load_cell: bridge(frame.load_cell),
+            tread: bridge(frame.tread),
+            arm: frame.arm.filter(|_| !silent[1]).map_or(codes.arm, |s| s.code),
+            bridges: frame.bridges.unwrap_or_default(),
+        }
+    }
+
+    /// The bridges as the plant gets them.
+    pub(super) fn drives(&mut self, asked: Drives) -> Drives {
+        self.tamper.drives(asked)
+    }
+
+    /// A command that nobody gave.
+    pub(super) fn command(&mut self) -> Option<Command> {
+        self.tamper.command(None)
+    }
+
+    /// Bytes that nobody meant for the host's line.
+    pub(super) fn noise(&mut self) -> Option<[u8; 4]> {
+        let state = self.flood.as_mut()?;
+        // Marsaglia's xorshift.
+        *state ^= *state << 13;
+        *state ^= *state >> 17;
+        *state ^= *state << 5;
+        Some(state.to_le_bytes())
+    }
+
+    /// Whether nobody reads the log.
+    pub(super) fn log_gone(&self) -> bool {
+        self.tamper.log_gone()
+    }
+
+    /// When the first fault came, s since power-up; of a task that hangs, when it was caught.
+    pub(super) fn struck_s(&self) -> Option<f64> {
+        if self.hangs { self.caught_s } else { self.tamper.struck_s() }
+    }
+
+    /// When it first did something, see [`Tamper::acts_s`].
+    pub(super) fn acts_s(&self) -> Option<f64> {
+        if self.hangs { self.caught_s } else { self.tamper.acts_s() }
+    }
+
+    /// When the readback had to tell it, see [`Tamper::tells_s`].
+    pub(super) fn tells_s(&self) -> Option<f64> {
+        if self.hangs { self.caught_s } else { self.tamper.tells_s() }
+    }
+}
+
+/// The letter of a command on the console.
+pub(crate) const fn letter(command: Command) -> u8 {
+    match command {
+        Command::Start => b's',
+        Command::Stop => b'x',
+        Command::Retract => b'r',
+        Command::Reset => b'0',
+    }
+}
+
+fn switch(fault: Fault, machine: &mut Machine, on: bool) -> Result<(), CoreError> {
+    if on {
+        return fault.strike(machine);
+    }
+    fault.heal(machine);
+    Ok(())
+}
+
+/// Name of the task that is to hang.
+fn task(injection: &Injection) -> Option<&'static str> {
+    Some(match injection.target {
+        Target::Model | Target::ModelTask => "model",
+        Target::SpeedTask => "speed",
+        Target::PressureTask => "pressure",
+        Target::DisplacementTask => "displacement",
+        Target::AngleTask => "angle",
+        Target::TickTask => "motors",
+        Target::JournalTask => "journal",
+        Target::LineTask => "link",
+        _ => return None,
+    })
+}
+
+/// What it is in registers and lines.
+fn register(injection: &Injection) -> Option<Fault> {
+    let word = injection.magnitude() as u16;
+    Some(match (injection.target, injection.kind) {
+        (Target::LoadCellConverter, _) => Fault::StuckCode(0, word),
+        (Target::TreadConverter, _) => Fault::StuckCode(1, word),
+        (Target::AngleBus, Kind::BitErrors) => Fault::BitErrors(word),
+        (Target::AngleBus, _) => Fault::AngleLost,
+        (Target::EncoderLineA, _) => Fault::EncoderLine(0),
+        (Target::EncoderLineB, _) => Fault::EncoderLine(1),
+        (Target::Dma, _) => Fault::DmaStalled,
+        (Target::Timer, _) => Fault::TimerFlags,
+        (Target::Interrupt, _) => Fault::ButtonStorm,
+        (Target::Processor, _) => Fault::Caught,
+        (Target::Supply, _) => Fault::BrownOut,
+        (Target::ResetPin, _) => Fault::ResetPin,
+        _ => return None,
+    })
+}
+
+/// The search for a task's next turn.
+struct Hunt {
+    task: &'static str,
+    /// Functions that run tasks, of which each runs one, and may run this one.
+    places: Vec<u32>,
+    tried: u32,
+}
+
+impl Hunt {
+    fn new(machine: &Machine, task: &'static str) -> Self {
+        let functions = &machine.image().functions;
+        let polls = functions.iter().filter(|f| f.name.contains("TaskStorage<F>::poll"));
+        Self { task, places: polls.map(|f| f.range.start).collect(), tried: 0 }
+    }
+
+    /// Goes on up to this cycle; whether the task was caught.
+    fn go(&mut self, machine: &mut Machine, until: u64) -> Result<bool, CoreError> {
+        while let Some(&place) = self.places.first() {
+            if !machine.run_to(place, until)? {
+                self.tried += 1;
+                if self.tried.is_multiple_of(PATIENCE) {
+                    self.places.rotate_left(1);
+                }
+                return Ok(false);
+            }
+            if machine.task() == Some(self.task) {
+                machine.run_on(machine.now() + INTO_TURN)?;
+                machine.catch()?;
+                return Ok(true);
+            }
+            self.places.remove(0);
+        }
+        Ok(false)
+    }
+}

@@ -1,0 +1,68 @@
+//! What can break of the board itself, in registers and on lines: on the emulated board
+//! alone.
+
+use super::catalogue::{one, plain};
+use super::{Entry, Kind, Target};
+
+const GIVES: &str = "gives this code whatever the voltage";
+const CAUGHT: &str = "is caught in a loop in one of its turns";
+
+const fn stuck(target: Target) -> Entry {
+    one(target, Kind::Stuck, 30_000.0, (0.0, 65_535.0), "of 65535", GIVES)
+}
+
+const fn hung(target: Target) -> Entry {
+    plain(target, Kind::Hung, CAUGHT)
+}
+
+/// All of them, in the order of the matrix.
+pub const HARDWARE: &[Entry] = {
+    use Kind::{BitErrors, Flooding, Hung, Off, Reset, Stalled, Stuck};
+    use Target::{
+        AngleBus, AngleTask, Debugger, DisplacementTask, Dma, EncoderLineA, EncoderLineB, HostLine,
+        Interrupt, JournalTask, LineTask, LoadCellConverter, ModelTask, PressureTask, Processor,
+        ResetPin, SpeedTask, Supply, TickTask, Timer, TreadConverter,
+    };
+    &[
+        stuck(LoadCellConverter),
+        stuck(TreadConverter),
+        one(AngleBus, BitErrors, 1.0, (1.0, 65_535.0), "mask", "these bits come turned over"),
+        plain(AngleBus, Off, "the line is broken"),
+        plain(EncoderLineA, Off, "the line is broken"),
+        plain(EncoderLineB, Off, "the line is broken"),
+        plain(Dma, Stalled, "moves nothing"),
+        plain(Timer, Stuck, "its flags cannot be cleared"),
+        plain(Interrupt, Flooding, "asks without end"),
+        plain(Processor, Hung, "what it executes is caught in a loop"),
+        hung(SpeedTask),
+        hung(PressureTask),
+        hung(DisplacementTask),
+        hung(AngleTask),
+        hung(TickTask),
+        hung(ModelTask),
+        hung(JournalTask),
+        hung(LineTask),
+        plain(Supply, Off, "falls too low for a moment: brown-out"),
+        plain(ResetPin, Reset, "is pulled for a moment"),
+        plain(Debugger, Reset, "asks for a reset"),
+        plain(HostLine, Flooding, "random bytes in every millisecond"),
+    ]
+};
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::faults::CATALOGUE;
+
+    #[test]
+    fn none_is_of_software_too() {
+        for entry in HARDWARE {
+            assert!(CATALOGUE.iter().all(|other| other.target != entry.target), "{entry:?}");
+            assert!(entry.target.is_hardware());
+            let (low, high) = entry.range;
+            assert!(low <= entry.magnitude && entry.magnitude <= high, "{entry:?}");
+            assert_eq!(low == high, entry.unit.is_empty(), "{entry:?}");
+        }
+        assert!(!Target::Encoder.is_hardware());
+    }
+}

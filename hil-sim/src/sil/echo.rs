@@ -1,0 +1,25 @@
+//! What sound bridges read, for a controller that is fed without a plant.
+
+use interstage::control::Output;
+use interstage::hal::MotorCommand;
+use interstage::sense::raw::{BridgeCode, BridgeCodes};
+use interstage::supervise::Lag;
+
+/// Two bridges that take what they are given, without noise.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Echo([Lag; 2]);
+
+impl Echo {
+    /// What they read a tick after this output.
+    pub fn read(&mut self, output: &Output) -> BridgeCodes {
+        let [drive, pretightener] = &mut self.0;
+        let code = |lag: &mut Lag, command: MotorCommand| {
+            let duty = if command.enable { command.duty.to_bits() } else { 0 };
+            BridgeCode::of(lag.step(duty.into()))
+        };
+        BridgeCodes {
+            drive: code(drive, output.drive),
+            pretightener: code(pretightener, output.preload),
+        }
+    }
+}

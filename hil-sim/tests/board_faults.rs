@@ -1,0 +1,74 @@
+//! The campaign of faults on the emulated board, a few of them at one instant each, and a
+//! scenario's faults in a run on the board. `cargo rig faults --target board` is the whole.
+
+#![cfg(feature = "board")]
+
+#[path = "common/board.rs"]
+mod common;
+
+use hil_sim::board::run::run;
+use hil_sim::faults::campaign::{Campaign, Case, Firmware, Outcome};
+use hil_sim::faults::{Injection, Kind, Target};
+use hil_sim::scenario::Scenario;
+
+use common::{elf, strings};
+
+fn campaign(wanted: &[&str]) -> Outcome {
+    let named = |case: &Case| wanted.contains(&case.name().as_str());
+    let cases: Vec<Case> = Case::all_on_board().into_iter().filter(named).collect();
+    assert_eq!(cases.len(), wanted.len());
+    let campaign = Campaign { scenario: Scenario::default(), instants: 1, cases };
+    let firmware = Firmware { elf: elf(), strings: strings() };
+    campaign.run_on_board(firmware, &|| {}).expect("a campaign")
+}
+
+#[test]
+fn what_breaks_on_the_board_is_found_or_borne_and_the_mechanism_held() {
+    let faults = [
+        ("load-cell off", Some(102)),
+        ("encoder-line-a off", Some(123)),
+        ("angle-bus off", Some(104)),
+        ("dma stalled", Some(102)),
+        ("drive runaway", Some(123)),
+        ("tick overrun", Some(160)),
+        ("log gone", None),
+        ("host-line flooding", None),
+        ("supply off", None),
+        ("journal-task hung", None),
+    ];
+    let outcome = campaign(&faults.map(|(name, _)| name));
+    let failures: Vec<_> = outcome.matrix.iter().flat_map(|line| &line.failures).collect();
+    assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{failures:#?}");
+    for (name, code) in faults {
+        let line = outcome.matrix.iter().find(|line| line.fault == name).expect(name);
+        // A sensor that reads the low end is out of its range before it is missed.
+        let alike = line.code == code || (line.code, code) == (Some(112), Some(102));
+        assert!(alike, "{line:?}");
+        let restarted = match name {
+            "supply off" => Some("reset by supply"),
+            "journal-task hung" => Some("reset by watchdog"),
+            _ => None,
+        };
+        assert_eq!(line.restarted(), restarted, "{line:?}");
+    }
+}
+
+#[test]
+fn a_scenario_s_faults_come_on_the_board_too() {
+    let mut scenario = Scenario::default();
+    let off = Injection::at(Target::EncoderLineB, Kind::Off, 0.0, 0.0);
+    scenario.run.faults = vec![Injection { at_s: None, at_mm: Some(10.0), ..off }];
+    let summary = run(elf(), &scenario, false, |_, _| {}).expect("a run").recording.summary;
+    assert_eq!(summary.faults.iter().map(|fault| fault.code).collect::<Vec<_>>(), [123]);
+    assert!(!summary.completed && (10.0..14.0).contains(&summary.travel_mm), "{summary:?}");
+    assert_eq!(summary.injected, ["encoder-line-b off from 10 mm"]);
+}
+
+#[test]
+fn in_software_there_is_no_board_that_could_break() {
+    let mut scenario = Scenario::default();
+    scenario.run.faults = vec![Injection::at(Target::Dma, Kind::Stalled, 1.0, 0.0)];
+    let error = hil_sim::sil::run(&scenario, hil_sim::sil::Options::default());
+    let error = error.err().expect("refused").to_string();
+    assert!(error.contains("dma stalled") && error.contains("--target board"), "{error}");
+}

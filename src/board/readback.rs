@@ -1,0 +1,79 @@
+//! What the bridges put out: one converter for both, in injected conversions.
+//!
+//! They are started anew whenever their results are taken, once a tick, and are done long
+//! before the next. Each has its own result register, so that neither DMA nor an interrupt
+//! is needed.
+
+use embassy_stm32::Peri;
+use embassy_stm32::adc::{Adc, AdcChannel, AdcConfig, AnyAdcChannel, SampleTime};
+use embassy_stm32::pac::adc::Adc as Registers;
+use embassy_stm32::peripherals::ADC3;
+use interstage::sense::raw::{BridgeCode, BridgeCodes};
+
+/// `OVSR` for 256 conversions a code: 151 us, three periods of the bridges' PWM.
+const RATIO_256: u8 = 7;
+
+/// Their sum becomes a mean of 12 bits.
+const SHIFT: u8 = 8;
+
+/// The converter of both bridges' outputs.
+pub(crate) struct Readback {
+    registers: Registers,
+    _pins: [AnyAdcChannel<'static, ADC3>; 2],
+}
+
+impl Readback {
+    /// Calibrates the converter with these registers and starts the first conversions.
+    pub(crate) fn new(
+        (adc, registers): (Peri<'static, ADC3>, Registers),
+        drive: impl AdcChannel<ADC3> + 'static,
+        preload: impl AdcChannel<ADC3> + 'static,
+    ) -> Self {
+        // Dropped, the driver leaves the converter as it is: on and calibrated.
+        let _ = Adc::new(adc, AdcConfig::default());
+        let pins = [drive.degrade_adc(), preload.degrade_adc()];
+        let channels = [pins[0].get_hw_channel(), pins[1].get_hw_channel()];
+        registers.cfgr2().modify(|w| {
+            w.set_ovsr(RATIO_256);
+            w.set_ovss(SHIFT);
+            w.set_jovse(true);
+        });
+        for channel in channels {
+            // The difference amplifiers drive the pins: as for the other analogue inputs.
+            let time = SampleTime::CYCLES12_5;
+            if channel < 10 {
+                registers.smpr().modify(|w| w.set_smp(channel.into(), time));
+            } else {
+                registers.smpr2().modify(|w| w.set_smp((channel - 10).into(), time));
+            }
+        }
+        registers.jsqr().write(|w| {
+            w.set_jl(1);
+            w.set_jsq(0, channels[0]);
+            w.set_jsq(1, channels[1]);
+        });
+        let readback = Self { registers, _pins: pins };
+        readback.start();
+        readback
+    }
+
+    fn start(&self) {
+        // The other bits of this register do something only where a one is written, but for
+        // the regulator's, which stay as they are.
+        self.registers.cr().modify(|w| w.set_jadstart(true));
+    }
+
+    /// The codes converted since this was last asked, if all of them are there. Starts the
+    /// next ones.
+    pub(crate) fn take(&mut self) -> Option<BridgeCodes> {
+        if !self.registers.isr().read().jeos() {
+            return None;
+        }
+        // Written with a one, the flag is cleared, and no other.
+        self.registers.isr().write(|w| w.set_jeos(true));
+        let code = |rank: usize| BridgeCode::new(self.registers.jdr(rank).read().jdata());
+        let codes = BridgeCodes { drive: code(0), pretightener: code(1) };
+        self.start();
+        Some(codes)
+    }
+}

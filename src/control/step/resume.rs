@@ -1,0 +1,149 @@
+//! Going on after a restart: from the record of the run before, or from what the arm tells
+//! of a corner under the wheel.
+
+use super::state::OpenCrossing;
+use super::{Controller, Pass, State};
+use crate::supervise::Direction;
+use crate::units::{Millimetres, Q16, Ratio, q16};
+
+/// Most deviation of the wheel's height from what a record has it at, steps: what a sleeve
+/// and the arm's zero are off, with a tread that is pressed more than it was.
+const HEIGHT_WITHIN: Ratio = q16(200_000);
+/// Off a wall's height by less than this, the wheel stands on it, mm: the tolerances of
+/// sleeve and arm.
+const ON_WALL: Millimetres = q16(250_000);
+/// Off a wall's height by more than this, without a record, it stands on a corner, mm.
+const ON_CORNER: Millimetres = q16(500_000);
+/// How far off a record may be, mm: the coasting and what the odometry had gathered.
+const SURE_WITHIN: Millimetres = q16(500_000);
+/// The same after a drive went on that nobody watched, mm: half of what it may have gone.
+const UNSURE_WITHIN: Millimetres = q16(2_000_000);
+/// Nearer to the edge than this, the wheel stands on top of it, mm.
+const AT_EDGE: Millimetres = q16(300_000);
+/// Short of the first contact by so much, a corner is felt on the way out, mm.
+const RUN_IN: Millimetres = q16(2_000_000);
+/// What is under the wheel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Ground {
+    /// The wall of this level.
+    Wall(u8),
+    /// The corner of this step, from 1.
+    Corner(u8),
+}
+
+impl Controller {
+    /// Takes the place that a record has, if the arm does not contradict it, or the one that
+    /// a corner under the wheel tells; whether there was one.
+    pub(super) fn go_on_from(&self, state: &mut State, pass: &mut Pass<'_>) -> bool {
+        let kept = state.kept.take();
+        let position = match kept {
+            Some(place) if self.may_stand_at(pass, place.position, within(place.sure)) => {
+                // A wheel that may have gone on looks for the next step as one without a
+                // record does, and can do without it.
+                state.searching = !place.sure;
+                place.position
+            }
+            _ => {
+                let Ground::Corner(step) = self.ground(pass, ON_CORNER) else { return false };
+                let Some(face) = self.step_position(step) else { return false };
+                state.searching = false;
+                face - self.to_face(pass, step)
+            }
+        };
+        state.odometry.set(pass.sensed.travel, position);
+        pass.position = position;
+        state.level = pass.sensed.level;
+        state.located = true;
+        state.resumed = true;
+        true
+    }
+
+    /// Before the first run after that: on a corner the crossing goes on, or is taken back;
+    /// else everything starts on the wall.
+    pub(super) fn resume(&self, state: &mut State, pass: &mut Pass<'_>, direction: Direction) {
+        let steps = self.steps.len() as u8;
+        let seen = self.seen(state, pass);
+        let known = if state.searching { None } else { self.corner_at(pass.position) };
+        match known.unwrap_or_else(|| self.ground(pass, ON_WALL)) {
+            Ground::Corner(step) => {
+                // The drive has been off: nothing jumps if the corner's force is there at once,
+                // and without it the wheel would roll off before the speed loop has found it.
+                state.feel_at_once();
+                let from = match direction {
+                    Direction::Deploy => step - 1,
+                    Direction::Retract => step,
+                };
+                state.level = from;
+                state.next_step = step;
+                state.crossing = Some(OpenCrossing {
+                    turned: true,
+                    resumed: true,
+                    ..OpenCrossing::begin(step, direction, false, pass.now)
+                });
+                self.watch.begin_between(&mut state.watch, direction, from, &seen);
+                let further = match direction {
+                    Direction::Deploy => step < steps,
+                    Direction::Retract => step > 1,
+                };
+                state.searching &= further;
+            }
+            Ground::Wall(level) => {
+                state.level = level;
+                state.next_step = match direction {
+                    Direction::Deploy if level < steps => level + 1,
+                    Direction::Deploy => 0,
+                    Direction::Retract => level,
+                };
+                state.crossing = None;
+                self.watch.begin(&mut state.watch, &seen);
+                state.searching &= state.next_step > 0;
+            }
+        }
+    }
+
+    /// Whether a wheel within so much of this position can stand as high as it does.
+    fn may_stand_at(&self, pass: &Pass<'_>, position: Millimetres, within: Millimetres) -> bool {
+        let within = within + self.schedule.tolerance();
+        let touch = self.rise.first_contact(Direction::Deploy);
+        let behind = |at: Millimetres| {
+            Ratio::from_num(self.steps.iter().filter(|face| **face <= at).count() as u8)
+        };
+        let (least, most) = (behind(position - within), behind(position + within + touch));
+        let up = pass.sensed.steps_up;
+        up >= least - HEIGHT_WITHIN && up <= most + HEIGHT_WITHIN
+    }
+
+    /// The corner on which a wheel at this position stands.
+    fn corner_at(&self, position: Millimetres) -> Option<Ground> {
+        let felt = self.rise.first_contact(Direction::Deploy) - RUN_IN;
+        let on = |face: &Millimetres| *face - position > AT_EDGE && *face - position < felt;
+        let step = self.steps.iter().position(on)?;
+        Some(Ground::Corner(step as u8 + 1))
+    }
+
+    /// What is under the wheel by its height: a wall within so much of its own, or a corner.
+    fn ground(&self, pass: &Pass<'_>, within: Millimetres) -> Ground {
+        let steps = self.steps.len() as u8;
+        let level = pass.sensed.level.min(steps);
+        let height = self.watch.height_over(level, pass.sensed.radius.value, pass.compressed());
+        if height.abs() <= within {
+            Ground::Wall(level)
+        } else if height > Q16::ZERO && level < steps {
+            Ground::Corner(level + 1)
+        } else if height < Q16::ZERO && level > 0 {
+            Ground::Corner(level)
+        } else {
+            Ground::Wall(level)
+        }
+    }
+
+    /// Axial distance from the wheel's centre to the face of the step that it stands on, mm.
+    fn to_face(&self, pass: &Pass<'_>, step: u8) -> Millimetres {
+        self.watch.to_edge(step - 1, pass.sensed.radius.value, pass.compressed())
+    }
+}
+
+/// How far off a record may be, mm.
+const fn within(sure: bool) -> Millimetres {
+    if sure { SURE_WITHIN } else { UNSURE_WITHIN }
+}

@@ -1,0 +1,247 @@
+//! The bridges against what they are given.
+//!
+//! A bridge that takes another duty than its own shows at its output in the same
+//! millisecond; at the wheel it shows when the mass has moved, at the load cell when the
+//! screw has. So each bridge's output, the difference of its two legs, goes through a
+//! low-pass to a converter, and the tick compares it with the duty that it gave, through the
+//! same low-pass.
+//!
+//! What lies behind the output is not seen here: a motor without force, a slipping gear, a
+//! screw that jams. Those are left to the comparison of the sensors with one another
+//! ([`crosscheck`](super::crosscheck)).
+
+#![deny(clippy::float_arithmetic)]
+
+use super::Fault;
+use crate::hal::Duty;
+use crate::sense::raw::{BridgeCode, BridgeCodes};
+
+/// Time constant of the low-pass before the converter, ticks. A period of the PWM, 50 us,
+/// leaves 1 % of ripple behind it, the mean of 0.15 ms nothing to speak of.
+pub const LAG_TICKS: f64 = 1.0;
+/// What the low-pass takes of a step within a tick, Q15: `1 - exp(-1 / LAG_TICKS)`.
+const TAKES: i32 = 20_713;
+/// Output may be off by so much, Q15 duty: five deviations of its noise, 0.002 each, and
+/// three of its zero, as much again; what the transistors of the bridge drop is less.
+pub const BAND: i32 = 655;
+/// And by this part of what is expected, as a shift: three deviations of supply, divider and
+/// reference together, 0.7 % each.
+pub const BAND_SHIFT: u32 = 5;
+/// Ticks that it must be: a low-pass that is off by 15 % leaves of the largest step 0.05
+/// after one tick, 0.04 after two, 0.02 after three.
+pub const OFF_TICKS: u8 = 4;
+/// Ticks without a conversion after which the readback is given up, as for the sensors.
+const SILENT_TICKS: u8 = 20;
+
+/// What is remembered of both bridges.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Readback {
+    drive: Bridge,
+    pretightener: Bridge,
+    /// Ticks without a conversion.
+    silent: u8,
+}
+
+/// The same of one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Bridge {
+    /// Duty given until now, Q15.
+    given: i16,
+    lag: Lag,
+    /// Ticks for which it has been off.
+    off: u8,
+}
+
+/// The low-pass before the converter: `y' = (u - y) / LAG_TICKS`, exact for a duty that is
+/// held through the tick, but for the rounding, 1 LSB of Q15 at most.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Lag(i32);
+
+impl Lag {
+    /// Output after a tick under this duty, Q15.
+    #[inline]
+    pub const fn step(&mut self, duty: i32) -> i32 {
+        // |duty - output| <= 2^16: the product stays below 2^31.
+        self.0 += ((duty - self.0) * TAKES + (1 << 14)) >> 15;
+        self.0
+    }
+}
+
+impl Readback {
+    /// What the bridges are given until the next tick; off is none.
+    #[inline]
+    pub const fn give(&mut self, drive: Duty, pretightener: Duty) {
+        self.drive.given = drive.to_bits();
+        self.pretightener.given = pretightener.to_bits();
+    }
+
+    /// The tick after it, with what was found.
+    #[inline]
+    pub fn step(&mut self, found: Option<BridgeCodes>) -> Option<Fault> {
+        let Some(found) = found else {
+            self.drive.lag.step(self.drive.given.into());
+            self.pretightener.lag.step(self.pretightener.given.into());
+            self.silent = self.silent.saturating_add(1);
+            return (self.silent >= SILENT_TICKS).then_some(Fault::ReadbackStale);
+        };
+        self.silent = 0;
+        let drive = self.drive.is_off(found.drive);
+        let pretightener = self.pretightener.is_off(found.pretightener);
+        if drive {
+            Some(Fault::DriveBridge)
+        } else {
+            pretightener.then_some(Fault::PretightenerBridge)
+        }
+    }
+}
+
+impl Bridge {
+    /// Whether it has been off for too long. The code was taken at some moment since the
+    /// last tick, so that it may lie anywhere between the outputs of the two ticks.
+    #[inline]
+    fn is_off(&mut self, code: BridgeCode) -> bool {
+        let before = self.lag.0;
+        let now = self.lag.step(self.given.into());
+        let (low, high) = if before < now { (before, now) } else { (now, before) };
+        let band = BAND + (now.abs() >> BAND_SHIFT);
+        let found = code.duty();
+        let off = found < low - band || found > high + band;
+        self.off = if off { self.off.saturating_add(1) } else { 0 };
+        self.off >= OFF_TICKS
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// A bridge as built: its output through a low-pass of this time constant, read at this
+    /// part of the tick, times a gain, plus an offset.
+    #[derive(Clone, Copy)]
+    struct Built {
+        tau: f64,
+        at: f64,
+        gain: f64,
+        offset: f64,
+    }
+
+    const NOMINAL: Built = Built { tau: LAG_TICKS, at: 1.0, gain: 1.0, offset: 0.0 };
+
+    impl Built {
+        /// Codes tick by tick of a bridge that takes these duties.
+        fn codes(self, duties: &[f64]) -> Vec<BridgeCode> {
+            let mut output = 0.0;
+            let code = |duty: &f64| {
+                let after = |time: f64| duty + (output - duty) * (-time / self.tau).exp();
+                let (read, end) = (after(self.at), after(1.0));
+                output = end;
+                BridgeCode::of(((self.gain * read + self.offset) * 32_768.0).round() as i32)
+            };
+            duties.iter().map(code).collect()
+        }
+    }
+
+    fn q15(duty: f64) -> Duty {
+        Duty::from_bits((duty * 32_767.0).round() as i16)
+    }
+
+    /// First fault of a drive that is given these duties, and in which tick. The other
+    /// bridge is given nothing and puts nothing out.
+    fn found(given: &[f64], codes: &[BridgeCode]) -> Option<(Fault, usize)> {
+        let mut readback = Readback::default();
+        given.iter().zip(codes).enumerate().find_map(|(tick, (given, code))| {
+            readback.give(q15(*given), Duty::ZERO);
+            let pretightener = BridgeCode::of(0);
+            let fault = readback.step(Some(BridgeCodes { drive: *code, pretightener }));
+            fault.map(|fault| (fault, tick))
+        })
+    }
+
+    #[test]
+    fn the_low_pass_is_the_exact_one() {
+        for (from, to) in [(0, 32_767), (32_767, -32_768), (-5, 5), (1000, 0)] {
+            let mut lag = Lag(from);
+            for tick in 1..20 {
+                let exact =
+                    f64::from(to) + f64::from(from - to) * (-f64::from(tick) / LAG_TICKS).exp();
+                let got = f64::from(lag.step(to));
+                assert!((got - exact).abs() <= 2.0, "{got} {exact}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_bridge_that_runs_away_is_found_in_five_ticks() {
+        for asked in [-0.9, 0.0, 0.2, 0.85] {
+            let given = [asked; 40];
+            let taken: Vec<f64> = (0..40).map(|tick| if tick < 20 { asked } else { 1.0 }).collect();
+            for at in [0.0, 0.2, 1.0] {
+                let codes = Built { at, ..NOMINAL }.codes(&taken);
+                let (fault, tick) = found(&given, &codes).expect("found");
+                assert_eq!(fault, Fault::DriveBridge);
+                assert!((23..=25).contains(&tick), "{asked} {at}: {tick}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_bridge_that_drives_although_it_is_off_is_found() {
+        let codes = NOMINAL.codes(&[0.3; 20]);
+        assert_eq!(found(&[0.0; 20], &codes), Some((Fault::DriveBridge, 3)));
+    }
+
+    #[test]
+    fn each_bridge_has_its_own_fault_and_silence_has_one() {
+        let mut readback = Readback::default();
+        let codes = BridgeCodes { drive: BridgeCode::of(0), pretightener: BridgeCode::of(9000) };
+        let faults: Vec<_> = (0..4).map(|_| readback.step(Some(codes))).collect();
+        assert_eq!(faults, [None, None, None, Some(Fault::PretightenerBridge)]);
+        let silent: Vec<_> = (0..20).map(|_| readback.step(None)).collect();
+        assert!(silent[..19].iter().all(Option::is_none));
+        assert_eq!(silent[19], Some(Fault::ReadbackStale));
+    }
+
+    proptest! {
+        /// Supply, divider, zero, low-pass and moment all at the ends of what is foreseen.
+        #[test]
+        fn a_sound_bridge_raises_no_alarm(
+            steps in prop::collection::vec((-1.0..1.0f64, 4usize..30), 1..20),
+            tau in 0.85..1.15f64,
+            at in 0.05..1.0f64,
+            gain in 0.979..1.021f64,
+            offset in -0.006..0.006f64,
+            noise in prop::collection::vec(-0.008..0.008f64, 600),
+        ) {
+            let given: Vec<f64> =
+                steps.iter().flat_map(|(duty, ticks)| vec![*duty; *ticks]).collect();
+            let built = Built { tau: tau * LAG_TICKS, at, gain, offset };
+            let codes: Vec<BridgeCode> = built
+                .codes(&given)
+                .into_iter()
+                .zip(&noise)
+                .map(|(code, noise)| BridgeCode::of(code.duty() + (noise * 32_768.0) as i32))
+                .collect();
+            prop_assert_eq!(found(&given, &codes), None);
+        }
+
+        /// Whatever is off by twice the band and stays so.
+        #[test]
+        fn what_is_off_by_twice_the_band_is_found(
+            asked in -0.9..0.9f64,
+            beyond in 0.005..1.0f64,
+            up in any::<bool>(),
+            at in 0.05..1.0f64,
+            gain in 0.979..1.021f64,
+        ) {
+            let off = 0.04 + asked.abs() / 16.0 + beyond;
+            let taken = if up { asked + off } else { asked - off };
+            let duties: Vec<f64> =
+                (0..60).map(|tick| if tick < 30 { asked } else { taken }).collect();
+            let codes = Built { at, gain, ..NOMINAL }.codes(&duties);
+            let (_, tick) = found(&[asked; 60], &codes).expect("found");
+            prop_assert!((33..=39).contains(&tick), "{}", tick);
+        }
+    }
+}
