@@ -139,8 +139,13 @@ mod firmware {
     fn split(p: Peripherals, console: DownChannel, frames: Frames) -> (Parts<Nucleo>, Pin, Pages) {
         let parts = Parts {
             wheel: Wheel::new(p.TIM5, p.PA0, p.PA1),
-            load_cell: Analog::new((p.ADC1, pac::ADC1), p.PC2, p.DMA1_CH1, &LOAD_CELL),
-            tread: Analog::new((p.ADC2, pac::ADC2), p.PC3, p.DMA1_CH2, &TREAD),
+            load_cell: Analog::new(
+                (p.ADC1, pac::ADC1),
+                p.PC2,
+                (p.DMA1_CH1, pac::DMA1.ch(0)),
+                &LOAD_CELL,
+            ),
+            tread: Analog::new((p.ADC2, pac::ADC2), p.PC3, (p.DMA1_CH2, pac::DMA1.ch(1)), &TREAD),
             arm: Angle::new(p.SPI1, (p.PB3, p.PA7, p.PA6), p.PB10),
             motors: Bridges {
                 drive: Bridge::new((p.TIM1, pac::TIM1), p.PA8, p.PA9.into(), p.PA10.into(), p.PB12),

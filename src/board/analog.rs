@@ -2,8 +2,8 @@
 //! neither waits for the other.
 //!
 //! Each converts without end and DMA puts its codes into a ring; who samples takes the
-//! latest and goes on. Nothing is started and nothing waited for, so that a sample costs
-//! no interrupt and no second turn of its task.
+//! latest, by the channel's own count, and goes on. Nothing is started and nothing waited
+//! for, so that a sample costs no interrupt and no second turn of its task.
 
 use embassy_stm32::adc::{
     Adc, AdcChannel, AdcConfig, CONTINUOUS, DefaultInstance, Resolution, RingBufferedAdc, Rovsm,
@@ -12,6 +12,7 @@ use embassy_stm32::adc::{
 use embassy_stm32::interrupt::typelevel::Binding;
 use embassy_stm32::pac::adc::Adc as Registers;
 use embassy_stm32::pac::adc::vals::Exten;
+use embassy_stm32::pac::bdma::Ch as Channel;
 use embassy_stm32::{Peri, dma};
 use embassy_time::{Duration, Timer};
 use interstage::hal::AnalogInput;
@@ -30,7 +31,8 @@ const SHIFT: u8 = 4;
 /// three times that will not come.
 const LIMIT: Duration = Duration::from_micros(500);
 
-/// Codes in a ring: 9.6 ms of them. DMA interrupts twice in that time.
+/// Codes in a ring: 9.6 ms of them, so that a count which stands still between two samples
+/// has not gone round.
 const RING: usize = 64;
 
 /// Where DMA puts the codes of a sensor.
@@ -43,19 +45,30 @@ impl Ring {
     }
 }
 
+/// What DMA writes, to be read from one task.
+struct Written(*const u16);
+
+// SAFETY: it points to a static that nobody but DMA writes, and is only read.
+unsafe impl Send for Written {}
+
 /// One sensor on its converter.
 pub(crate) struct Analog<T: DefaultInstance> {
     registers: Registers,
-    codes: RingBufferedAdc<'static, T>,
+    channel: Channel,
+    written: Written,
+    /// The channel's count when the latest code was taken.
+    left: u16,
+    /// Dropped, it would stop.
+    _converter: RingBufferedAdc<'static, T>,
 }
 
 impl<T: DefaultInstance> Analog<T> {
     /// Calibrates the converter with these registers and has it convert `pin` from now
-    /// on. Each ring serves once.
+    /// on, by the DMA channel of these. Each ring serves once.
     pub(crate) fn new<D: RxDma<T>>(
         (adc, registers): (Peri<'static, T>, Registers),
         pin: impl AdcChannel<T> + 'static,
-        dma: Peri<'static, D>,
+        (dma, channel): (Peri<'static, D>, Channel),
         ring: &'static Ring,
     ) -> Self
     where
@@ -72,7 +85,8 @@ impl<T: DefaultInstance> Analog<T> {
         // channels allow suffices, and the average counts for more.
         let sequence = [(pin.degrade_adc(), SampleTime::CYCLES12_5)];
         let ring = ring.0.init([0; RING]);
-        let mut codes = Adc::new(adc, config).into_ring_buffered(
+        let written = Written(ring.as_ptr());
+        let mut converter = Adc::new(adc, config).into_ring_buffered(
             dma,
             ring,
             Irqs,
@@ -80,14 +94,27 @@ impl<T: DefaultInstance> Analog<T> {
             CONTINUOUS,
             Exten::DISABLED,
         );
-        codes.start();
-        Self { registers, codes }
+        converter.start();
+        // Nobody waits for the ring's half or its end.
+        channel.cr().modify(|w| {
+            w.set_htie(false);
+            w.set_tcie(false);
+        });
+        Self { registers, channel, written, left: RING as u16, _converter: converter }
     }
 
     /// The latest code, if one has come since this was last asked.
     fn latest(&mut self) -> Option<AdcCode> {
-        let mut code = [0];
-        (self.codes.read_latest(&mut code) == 1).then(|| AdcCode::new(code[0]))
+        let left = self.channel.ndtr().read().ndt();
+        if left == self.left {
+            return None;
+        }
+        self.left = left;
+        // The count is that of the codes up to the ring's end, and full again behind it.
+        let latest = (2 * RING - 1 - usize::from(left)) % RING;
+        // SAFETY: within the ring, which is static; DMA has written this code and comes
+        // back to it after 63 others.
+        Some(AdcCode::new(unsafe { self.written.0.add(latest).read_volatile() }))
     }
 }
 
