@@ -47,3 +47,61 @@ pub(super) fn stowed(sensed: &SensedState) -> bool {
         && sensed.preload_filtered.abs() < UNLOADED
         && sensed.compression_filtered.abs() < UNPRESSED
 }
+
+#[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "quantities of a test")]
+mod tests {
+    use super::*;
+    use crate::rig::Rig;
+    use crate::sense::raw::SensorFrame;
+    use crate::sense::{Senses, SensesState};
+    use crate::units::Q16;
+
+    /// What the senses say on this wall, at this speed, preload and compression.
+    fn sensed(level: u8, speed: f64, preload: f64, compression: f64) -> SensedState {
+        let senses = Senses::try_build(&Rig::prototype()).expect("sound");
+        let nothing = SensorFrame::default();
+        let mut sensed = senses.step(&mut SensesState::default(), 0, &nothing, Q16::ZERO);
+        sensed.level = level;
+        sensed.speed.value = Q16::from_num(speed);
+        sensed.preload_filtered = Q16::from_num(preload);
+        sensed.compression_filtered = Q16::from_num(compression);
+        sensed
+    }
+
+    #[test]
+    fn stowed_is_unloaded_and_on_the_outermost_wall() {
+        for (level, preload, compression, expected) in [
+            (0, 0.0, 0.0, true),
+            (0, 2.9, 0.09, true),
+            (0, -2.9, -0.09, true),
+            (1, 0.0, 0.0, false),
+            (0, 3.0, 0.0, false),
+            (0, -3.1, 0.0, false),
+            (0, 0.0, 0.11, false),
+            (0, 0.0, -0.11, false),
+        ] {
+            let seen = sensed(level, 0.0, preload, compression);
+            assert_eq!(stowed(&seen), expected, "{level} {preload} {compression}");
+        }
+        let mut edge = sensed(0, 0.0, 0.0, 0.0);
+        edge.compression_filtered = UNPRESSED;
+        assert!(!stowed(&edge));
+    }
+
+    #[test]
+    fn rest_is_less_than_half_a_millimetre_a_second() {
+        for (speed, expected) in
+            [(0.0, true), (0.49, true), (-0.49, true), (0.5, false), (-0.5, false)]
+        {
+            assert_eq!(at_rest(&sensed(0, speed, 0.0, 0.0)), expected, "{speed}");
+        }
+    }
+
+    #[test]
+    fn the_first_that_is_silent_is_named() {
+        let seen = sensed(0, 0.0, 0.0, 0.0);
+        assert!(!all_answer(&seen));
+        assert_eq!(silent(&seen), Fault::SpeedStale);
+    }
+}

@@ -190,6 +190,33 @@ mod tests {
     }
 
     #[test]
+    fn a_mode_that_the_format_does_not_hold_is_refused() {
+        for hz in 1..500 {
+            let of_mode = VibrationObserver::of_mode(f64::from(hz));
+            let Ok(observer) = of_mode else {
+                // Too slow to be told from the climb, or too close to half the rate.
+                assert!(!(SEEN_HZ.0..=SEEN_HZ.1).contains(&f64::from(hz)), "{hz}");
+                continue;
+            };
+            let held = |bits: i32| bits.unsigned_abs() < 2 << GAIN_BITS;
+            let (gain, second) = (observer.gain, observer.second);
+            assert!(held(gain.0) && held(gain.1) && held(second.0) && held(second.1), "{hz}");
+            // The largest input, over and over in the worst order, stays in the state.
+            let mut largest: f64 = 0.0;
+            let gains = [gain.0, gain.1].map(|bits| f64::from(bits) / f64::from(1 << GAIN_BITS));
+            for tick in 0..4000 {
+                let (x, y) = (f64::from(tick), 2.0 * core::f64::consts::PI * f64::from(hz) * 1e-3);
+                largest += (gains[0] * (x * y).cos() - gains[1] * (x * y).sin()).abs()
+                    * RADIUS.powi(tick)
+                    * f64::from(LARGEST)
+                    / 65_536.0;
+            }
+            assert!(largest < 4.0, "{hz}: {largest}");
+        }
+        assert!(VibrationObserver::of_mode(1.0).is_err());
+    }
+
+    #[test]
     fn the_highest_mode_that_shows_is_taken() {
         let mut rig = Rig::prototype();
         assert_eq!(observer(), VibrationObserver::of_mode(276.0).unwrap());
