@@ -29,7 +29,7 @@ fn what_breaks_on_the_board_is_found_or_borne_and_the_mechanism_held() {
         ("encoder-line-a off", Some(123)),
         ("angle-bus off", Some(104)),
         ("dma stalled", Some(102)),
-        ("drive runaway", Some(123)),
+        ("drive runaway", Some(128)),
         ("tick overrun", Some(160)),
         ("log gone", None),
         ("host-line flooding", None),
@@ -69,6 +69,7 @@ fn in_software_there_is_no_board_that_could_break() {
     let mut scenario = Scenario::default();
     scenario.run.faults = vec![Injection::at(Target::Dma, Kind::Stalled, 1.0, 0.0)];
     let error = hil_sim::sil::run(&scenario, hil_sim::sil::Options::default());
-    let error = error.err().expect("refused").to_string();
+    let Err(error) = error else { panic!("it was taken") };
+    let error = error.to_string();
     assert!(error.contains("dma stalled") && error.contains("--target board"), "{error}");
 }

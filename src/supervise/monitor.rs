@@ -105,7 +105,8 @@ impl Monitor {
         let turns = !driven(seen.mode) && speed.abs() > BEYOND;
         lasting(&mut state.runaway, turns);
         let lost = sensor_fault(seen.sensed);
-        let bridge = state.readback.step(seen.bridges);
+        // The self-test ends once the wheel rests.
+        let bridge = state.readback.step(seen.bridges, seen.mode == Mode::SelfTest);
         let crossed = self.cross_check(state, seen);
         if seen.emergency_stop {
             Some(Fault::EmergencyStop)

@@ -33,6 +33,10 @@ pub const OFF_TICKS: u8 = 4;
 /// Ticks without a conversion after which the readback is given up, as for the sensors.
 const SILENT_TICKS: u8 = 20;
 
+/// Ticks after the start in which nothing is judged: of what was given before a restart the
+/// low-pass keeps a thousandth then.
+const SETTLES: u8 = 7;
+
 /// What is remembered of both bridges.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Readback {
@@ -40,6 +44,8 @@ pub struct Readback {
     pretightener: Bridge,
     /// Ticks without a conversion.
     silent: u8,
+    /// Ticks since the start, as far as they matter.
+    begun: u8,
 }
 
 /// The same of one.
@@ -48,6 +54,8 @@ struct Bridge {
     /// Duty given until now, Q15.
     given: i16,
     lag: Lag,
+    /// Output a tick ago, Q15.
+    before: i32,
     /// Ticks for which it has been off.
     off: u8,
 }
@@ -75,9 +83,11 @@ impl Readback {
         self.pretightener.given = pretightener.to_bits();
     }
 
-    /// The tick after it, with what was found.
+    /// The tick after it, with what was found. A wheel that may still coast, as after a
+    /// restart in motion, has its motor generate what the drive's bridge then shows: that
+    /// is not judged.
     #[inline]
-    pub fn step(&mut self, found: Option<BridgeCodes>) -> Option<Fault> {
+    pub fn step(&mut self, found: Option<BridgeCodes>, coasts: bool) -> Option<Fault> {
         let Some(found) = found else {
             self.drive.lag.step(self.drive.given.into());
             self.pretightener.lag.step(self.pretightener.given.into());
@@ -87,22 +97,30 @@ impl Readback {
         self.silent = 0;
         let drive = self.drive.is_off(found.drive);
         let pretightener = self.pretightener.is_off(found.pretightener);
-        if drive {
+        if self.begun < SETTLES {
+            self.begun += 1;
+            (self.drive.off, self.pretightener.off) = (0, 0);
+        } else if coasts {
+            self.drive.off = 0;
+        }
+        if drive && self.drive.off != 0 {
             Some(Fault::DriveBridge)
         } else {
-            pretightener.then_some(Fault::PretightenerBridge)
+            (pretightener && self.pretightener.off != 0).then_some(Fault::PretightenerBridge)
         }
     }
 }
 
 impl Bridge {
-    /// Whether it has been off for too long. The code was taken at some moment since the
-    /// last tick, so that it may lie anywhere between the outputs of the two ticks.
+    /// Whether it has been off for too long. The code was taken at some moment of the last
+    /// two ticks, so that it may lie anywhere between the outputs of three.
     #[inline]
     fn is_off(&mut self, code: BridgeCode) -> bool {
-        let before = self.lag.0;
+        let (older, before) = (self.before, self.lag.0);
         let now = self.lag.step(self.given.into());
+        self.before = before;
         let (low, high) = if before < now { (before, now) } else { (now, before) };
+        let (low, high) = (low.min(older), high.max(older));
         let band = BAND + (now.abs() >> BAND_SHIFT);
         let found = code.duty();
         let off = found < low - band || found > high + band;
@@ -150,11 +168,11 @@ mod tests {
     /// First fault of a drive that is given these duties, and in which tick. The other
     /// bridge is given nothing and puts nothing out.
     fn found(given: &[f64], codes: &[BridgeCode]) -> Option<(Fault, usize)> {
-        let mut readback = Readback::default();
+        let mut readback = Readback { begun: SETTLES, ..Readback::default() };
         given.iter().zip(codes).enumerate().find_map(|(tick, (given, code))| {
             readback.give(q15(*given), Duty::ZERO);
             let pretightener = BridgeCode::of(0);
-            let fault = readback.step(Some(BridgeCodes { drive: *code, pretightener }));
+            let fault = readback.step(Some(BridgeCodes { drive: *code, pretightener }), false);
             fault.map(|fault| (fault, tick))
         })
     }
@@ -193,12 +211,48 @@ mod tests {
     }
 
     #[test]
-    fn each_bridge_has_its_own_fault_and_silence_has_one() {
+    fn what_a_coasting_wheel_generates_is_no_fault_until_it_rests() {
+        let mut readback = Readback { begun: SETTLES, ..Readback::default() };
+        let step = |readback: &mut Readback, drive, pretightener, coasts| {
+            let [drive, pretightener] = [drive, pretightener].map(BridgeCode::of);
+            readback.step(Some(BridgeCodes { drive, pretightener }), coasts)
+        };
+        for _ in 0..100 {
+            assert_eq!(step(&mut readback, 16_000, 0, true), None);
+        }
+        let rested: Vec<_> = (0..4).map(|_| step(&mut readback, 16_000, 0, false)).collect();
+        assert_eq!(rested, [None, None, None, Some(Fault::DriveBridge)]);
+        // The screw does not coast.
+        let screw: Vec<_> = (0..4).map(|_| step(&mut readback, 0, 9000, true)).collect();
+        assert_eq!(screw, [None, None, None, Some(Fault::PretightenerBridge)]);
+    }
+
+    #[test]
+    fn what_the_low_pass_keeps_of_a_run_before_the_start_is_no_fault() {
+        for duty in [-1.0_f64, 0.3, 1.0] {
+            let mut readback = Readback::default();
+            for tick in 0..40 {
+                let left = duty * (-f64::from(tick) / LAG_TICKS).exp() + 0.006;
+                let code = BridgeCode::of((left * 32_768.0) as i32);
+                let codes = BridgeCodes { drive: code, pretightener: code };
+                assert_eq!(readback.step(Some(codes), false), None, "{duty} {tick}");
+            }
+        }
+        // One that goes on driving is.
         let mut readback = Readback::default();
+        let code = BridgeCode::of(20_000);
+        let codes = BridgeCodes { drive: BridgeCode::of(0), pretightener: code };
+        let found = (1..40).find(|_| readback.step(Some(codes), false).is_some());
+        assert_eq!(found, Some(i32::from(SETTLES + OFF_TICKS)));
+    }
+
+    #[test]
+    fn each_bridge_has_its_own_fault_and_silence_has_one() {
+        let mut readback = Readback { begun: SETTLES, ..Readback::default() };
         let codes = BridgeCodes { drive: BridgeCode::of(0), pretightener: BridgeCode::of(9000) };
-        let faults: Vec<_> = (0..4).map(|_| readback.step(Some(codes))).collect();
+        let faults: Vec<_> = (0..4).map(|_| readback.step(Some(codes), false)).collect();
         assert_eq!(faults, [None, None, None, Some(Fault::PretightenerBridge)]);
-        let silent: Vec<_> = (0..20).map(|_| readback.step(None)).collect();
+        let silent: Vec<_> = (0..20).map(|_| readback.step(None, false)).collect();
         assert!(silent[..19].iter().all(Option::is_none));
         assert_eq!(silent[19], Some(Fault::ReadbackStale));
     }
@@ -210,6 +264,7 @@ mod tests {
             steps in prop::collection::vec((-1.0..1.0f64, 4usize..30), 1..20),
             tau in 0.85..1.15f64,
             at in 0.05..1.0f64,
+            late in any::<bool>(),
             gain in 0.979..1.021f64,
             offset in -0.006..0.006f64,
             noise in prop::collection::vec(-0.008..0.008f64, 600),
@@ -217,9 +272,11 @@ mod tests {
             let given: Vec<f64> =
                 steps.iter().flat_map(|(duty, ticks)| vec![*duty; *ticks]).collect();
             let built = Built { tau: tau * LAG_TICKS, at, gain, offset };
-            let codes: Vec<BridgeCode> = built
-                .codes(&given)
+            // Late, it is of the tick before.
+            let late = late.then_some(BridgeCode::of((offset * 32_768.0) as i32));
+            let codes: Vec<BridgeCode> = late
                 .into_iter()
+                .chain(built.codes(&given))
                 .zip(&noise)
                 .map(|(code, noise)| BridgeCode::of(code.duty() + (noise * 32_768.0) as i32))
                 .collect();
