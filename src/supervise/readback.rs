@@ -29,13 +29,13 @@ pub const BAND: i32 = 655;
 pub const BAND_SHIFT: u32 = 5;
 /// Ticks that it must be: a low-pass that is off by 15 % leaves of the largest step 0.05
 /// after one tick, 0.04 after two, 0.02 after three.
-pub const OFF_TICKS: u8 = 4;
+pub const OFF_TICKS: i8 = 4;
 /// Ticks without a conversion after which the readback is given up, as for the sensors.
 const SILENT_TICKS: u8 = 20;
 
 /// Ticks after the start in which nothing is judged: of what was given before a restart the
 /// low-pass keeps a thousandth then.
-const SETTLES: u8 = 7;
+const SETTLES: i8 = 7;
 
 /// What is remembered of both bridges.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -44,20 +44,24 @@ pub struct Readback {
     pretightener: Bridge,
     /// Ticks without a conversion.
     silent: u8,
-    /// Ticks since the start, as far as they matter.
-    begun: u8,
 }
 
 /// The same of one.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Bridge {
     /// Duty given until now, Q15.
     given: i16,
     lag: Lag,
     /// Output a tick ago, Q15.
     before: i32,
-    /// Ticks for which it has been off.
-    off: u8,
+    /// Ticks for which it has been off; below 0, those until it is judged.
+    off: i8,
+}
+
+impl Default for Bridge {
+    fn default() -> Self {
+        Self { given: 0, lag: Lag(0), before: 0, off: -SETTLES }
+    }
 }
 
 /// The low-pass before the converter: `y' = (u - y) / LAG_TICKS`, exact for a duty that is
@@ -97,17 +101,13 @@ impl Readback {
         self.silent = 0;
         let drive = self.drive.is_off(found.drive);
         let pretightener = self.pretightener.is_off(found.pretightener);
-        if self.begun < SETTLES {
-            self.begun += 1;
-            (self.drive.off, self.pretightener.off) = (0, 0);
-        } else if coasts {
-            self.drive.off = 0;
+        if drive && !coasts {
+            return Some(Fault::DriveBridge);
         }
-        if drive && self.drive.off != 0 {
-            Some(Fault::DriveBridge)
-        } else {
-            (pretightener && self.pretightener.off != 0).then_some(Fault::PretightenerBridge)
+        if coasts {
+            self.drive.off = self.drive.off.min(0);
         }
+        pretightener.then_some(Fault::PretightenerBridge)
     }
 }
 
@@ -124,7 +124,7 @@ impl Bridge {
         let band = BAND + (now.abs() >> BAND_SHIFT);
         let found = code.duty();
         let off = found < low - band || found > high + band;
-        self.off = if off { self.off.saturating_add(1) } else { 0 };
+        self.off = if off || self.off < 0 { self.off.saturating_add(1) } else { 0 };
         self.off >= OFF_TICKS
     }
 }
@@ -165,10 +165,17 @@ mod tests {
         Duty::from_bits((duty * 32_767.0).round() as i16)
     }
 
+    /// Begun long ago.
+    fn settled() -> Readback {
+        let mut readback = Readback::default();
+        (readback.drive.off, readback.pretightener.off) = (0, 0);
+        readback
+    }
+
     /// First fault of a drive that is given these duties, and in which tick. The other
     /// bridge is given nothing and puts nothing out.
     fn found(given: &[f64], codes: &[BridgeCode]) -> Option<(Fault, usize)> {
-        let mut readback = Readback { begun: SETTLES, ..Readback::default() };
+        let mut readback = settled();
         given.iter().zip(codes).enumerate().find_map(|(tick, (given, code))| {
             readback.give(q15(*given), Duty::ZERO);
             let pretightener = BridgeCode::of(0);
@@ -212,7 +219,7 @@ mod tests {
 
     #[test]
     fn what_a_coasting_wheel_generates_is_no_fault_until_it_rests() {
-        let mut readback = Readback { begun: SETTLES, ..Readback::default() };
+        let mut readback = settled();
         let step = |readback: &mut Readback, drive, pretightener, coasts| {
             let [drive, pretightener] = [drive, pretightener].map(BridgeCode::of);
             readback.step(Some(BridgeCodes { drive, pretightener }), coasts)
@@ -248,7 +255,7 @@ mod tests {
 
     #[test]
     fn each_bridge_has_its_own_fault_and_silence_has_one() {
-        let mut readback = Readback { begun: SETTLES, ..Readback::default() };
+        let mut readback = settled();
         let codes = BridgeCodes { drive: BridgeCode::of(0), pretightener: BridgeCode::of(9000) };
         let faults: Vec<_> = (0..4).map(|_| readback.step(Some(codes), false)).collect();
         assert_eq!(faults, [None, None, None, Some(Fault::PretightenerBridge)]);
