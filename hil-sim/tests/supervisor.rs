@@ -161,6 +161,11 @@ fn every_fault_holds_from_every_mode_with_both_bridges_off_in_the_same_tick() {
                 // Nothing is watched before every sensor has answered.
                 continue;
             }
+            if (mode, fault) == (Mode::SelfTest, Fault::DriveBridge) {
+                // Until the wheel is known to rest, it may be what a coasting one generates;
+                // a bridge that drives then is found by the wheel that turns.
+                continue;
+            }
             let Snapshot { mut state, mut input, .. } = snapshot.clone();
             let mut held = None;
             for tick in 0..40 {
