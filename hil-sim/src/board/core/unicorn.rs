@@ -4,19 +4,21 @@
 //! on operands or on a condition is added by a hook on just those instructions, which
 //! the engine calls only if the instruction is carried out.
 
+mod count;
+mod hooks;
+
 use std::collections::HashSet;
 
 use unicorn_engine::{
-    Arch, ArmCpuModel, HookType, MemType, Mode, Prot, RegisterARM, TlbEntry, TlbType, Unicorn,
-    uc_error,
+    Arch, ArmCpuModel, MemType, Mode, Prot, RegisterARM, TlbEntry, TlbType, Unicorn, uc_error,
 };
 
+use self::count::{Count, UNSEEN};
 use super::{
     Access as Touch, Bus, Core, CoreError, Fault, Heat, Mark, MaskedBy, Meter, NoBus, Register,
     Stop, passes,
 };
-use crate::board::thumb::{self, Kind};
-use crate::board::timing::{self, REFILL};
+use crate::board::timing;
 
 /// Memory of the board, or a stand-in for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,50 +62,11 @@ const RETURN_BITS: u32 = 0xFFFF_FF01;
 /// `WFE`, `WFI` and `SEV`, as they stand in memory.
 const WFE: [u8; 2] = [0x20, 0xBF];
 const WFI: [u8; 2] = [0x30, 0xBF];
-const SEV: &[u8] = &[0x40, 0xBF];
-/// `CPSID i` and `CPSIE i`.
-const CLOSE: &[u8] = &[0x72, 0xB6];
-const OPEN: &[u8] = &[0x62, 0xB6];
+const SEV: [u8; 2] = [0x40, 0xBF];
 /// The exception's number among the flags.
 const EXCEPTION: u64 = 0x1FF;
 /// The state of thumb code outside of a conditional block, among the flags.
 const THUMB: u64 = 1 << 24;
-/// Marks a halfword at which no block has begun yet.
-const UNSEEN: u32 = u32::MAX;
-
-/// A straight piece of code.
-#[derive(Clone, Copy, Debug)]
-struct Block {
-    address: u32,
-    size: u32,
-    instructions: u64,
-    cycles: u64,
-    /// Cycles spent here since last asked.
-    heat: u64,
-}
-
-/// What the hooks keep.
-struct Count {
-    base: u32,
-    bytes: Vec<u8>,
-    /// Block by the halfword it begins at.
-    begins: Vec<u32>,
-    blocks: Vec<Block>,
-    /// Instructions with a hook of their own.
-    late: HashSet<u32>,
-    /// Blocks that have heat.
-    warm: Vec<u32>,
-    /// The block under way.
-    current: u32,
-    /// Where the program is if it does not branch.
-    next: u32,
-    meter: Meter,
-    /// Cycles at which to stop.
-    limit: u64,
-    /// Why a hook stopped the engine.
-    stop: Option<Stop>,
-}
-
 /// What the engine carries.
 struct Inside<B> {
     count: Count,
@@ -133,79 +96,6 @@ impl<B> Inside<B> {
     }
 }
 
-impl Count {
-    fn new(counted: &Counted<'_>) -> Self {
-        Self {
-            base: counted.base,
-            bytes: counted.bytes.to_vec(),
-            begins: vec![UNSEEN; counted.bytes.len() / 2],
-            blocks: Vec::new(),
-            late: HashSet::new(),
-            warm: Vec::new(),
-            current: UNSEEN,
-            next: 0,
-            meter: Meter::default(),
-            limit: u64::MAX,
-            stop: None,
-        }
-    }
-
-    /// The instruction at an address of the counted code.
-    fn at(&self, address: u32) -> Option<thumb::Instruction> {
-        thumb::decode(self.bytes.get((address & !1).wrapping_sub(self.base) as usize..)?)
-    }
-
-    /// Adds cycles to the total and to the block under way.
-    fn spend(&mut self, cycles: u64) {
-        self.meter.cycles += cycles;
-        if let Some(block) = self.blocks.get_mut(self.current as usize) {
-            if block.heat == 0 {
-                self.warm.push(self.current);
-            }
-            block.heat += cycles;
-        }
-    }
-
-    /// Counts the block that begins here.
-    fn enter(&mut self, address: u32, size: u32) {
-        if self.next != address {
-            // The branch belongs to the block that ends with it.
-            self.spend(REFILL);
-        }
-        self.next = address.wrapping_add(size);
-        let Some(index) = self.block(address, size) else {
-            self.current = UNSEEN;
-            return;
-        };
-        let Block { instructions, cycles, .. } = self.blocks[index as usize];
-        self.current = index;
-        self.meter.instructions += instructions;
-        self.spend(cycles);
-    }
-
-    /// The block of this place, decoded when first seen.
-    fn block(&mut self, address: u32, size: u32) -> Option<u32> {
-        let offset = address.wrapping_sub(self.base) as usize;
-        let index = *self.begins.get(offset / 2)?;
-        if self.blocks.get(index as usize).is_some_and(|block| block.size == size) {
-            return Some(index);
-        }
-        let code = self.bytes.get(offset..offset + size as usize)?;
-        let (mut instructions, mut cycles) = (0, 0);
-        // A block may begin under a condition, so the sweep of the whole code decides
-        // what is late, not this one.
-        for (at, instruction, _) in thumb::sweep(code, address) {
-            let late = self.late.contains(&at);
-            instructions += 1;
-            cycles += 1 + if late { 0 } else { timing::extra(instruction.kind) };
-        }
-        let index = u32::try_from(self.blocks.len()).ok()?;
-        self.blocks.push(Block { address, size, instructions, cycles, heat: 0 });
-        self.begins[offset / 2] = index;
-        Some(index)
-    }
-}
-
 /// A Cortex-M4 on Unicorn.
 pub struct UnicornCore<B: Bus + 'static = NoBus> {
     engine: Unicorn<'static, Inside<B>>,
@@ -217,21 +107,6 @@ type Hooked<'a, B> = Unicorn<'a, Inside<B>>;
 /// Gives an engine's error its place.
 fn engine<T>(what: &'static str, result: Result<T, impl std::fmt::Debug>) -> Result<T, CoreError> {
     result.map_err(|error| CoreError::Engine { what, why: format!("{error:?}") })
-}
-
-/// The program shuts interrupts out at this place.
-fn shut<B>(uc: &mut Hooked<'_, B>, address: u32) {
-    let flags = uc.reg_read(RegisterARM::XPSR).unwrap_or_default();
-    let inside = uc.get_data_mut();
-    let now = inside.count.meter.cycles;
-    inside.shut.get_or_insert((now, (address, (flags & EXCEPTION) as u32)));
-}
-
-/// Stops the engine from inside a hook.
-fn halt<B>(uc: &mut Hooked<'_, B>, stop: Stop) {
-    uc.get_data_mut().count.stop = Some(stop);
-    // Stopping can only fail if nothing runs.
-    let _ = uc.emu_stop();
 }
 
 impl UnicornCore {
@@ -329,126 +204,6 @@ impl<B: Bus + 'static> UnicornCore<B> {
         engine("map the bus", mapped)
     }
 
-    fn hook(&mut self, counted: &Counted<'_>) -> Result<(), CoreError> {
-        let uc = &mut self.engine;
-        let blocks = uc.add_block_hook(1, 0, |uc, address, size| {
-            let Inside { count, bus, .. } = uc.get_data_mut();
-            let now = count.meter.cycles;
-            // What stops here is not executed and so not counted.
-            if now >= count.limit || now >= bus.deadline() {
-                halt(uc, Stop::Spent(address as u32));
-                return;
-            }
-            if let Some(priority) = bus.urgent()
-                && unmasked(uc, priority)
-            {
-                halt(uc, Stop::Urgent(address as u32));
-                return;
-            }
-            let Inside { count, marked, .. } = uc.get_data_mut();
-            count.enter(address as u32, size);
-            if marked.binary_search(&(address as u32)).is_ok() {
-                note(uc, address as u32);
-            }
-        });
-        engine("hook blocks", blocks)?;
-        let traps = uc.add_intr_hook(|uc, number| {
-            let at = uc.pc_read().unwrap_or_default() as u32;
-            let stop = match number {
-                CALL => Stop::Call(at),
-                BREAKPOINT => Stop::Breakpoint(at),
-                RETURN => Stop::Return(at | RETURN_BITS),
-                _ => Stop::Fault { at, fault: Fault::Other },
-            };
-            halt(uc, stop);
-        });
-        engine("hook interrupts", traps)?;
-        // Waiting for an event arrives here, with the program counter behind it.
-        let invalid = uc.add_insn_invalid_hook(|uc| {
-            let at = uc.pc_read().unwrap_or_default() as u32 & !1;
-            let mut before = [0; 2];
-            let read = uc.mem_read(u64::from(at.wrapping_sub(2)), &mut before);
-            if read.is_ok() && before == WFE {
-                halt(uc, Stop::Event(at));
-                return true;
-            }
-            false
-        });
-        engine("hook waiting", invalid)?;
-        let (first, last) = (counted.base, counted.base + (counted.bytes.len() as u32 - 1));
-        let (first, last) = (first.into(), last.into());
-        let kind = HookType::MEM_WRITE_PROT;
-        let protected = uc.add_mem_hook(kind, first, last, |uc, _, address, size, value| {
-            let access = Touch {
-                address: address as u32,
-                size: size as u32,
-                pc: uc.pc_read().unwrap_or_default() as u32 & !1,
-                now: uc.get_data().count.meter.cycles,
-            };
-            uc.get_data_mut().bus.write_code(access, value as u32)
-        });
-        engine("hook writes to code", protected)?;
-        for range in counted.code {
-            let bytes = (range.start.wrapping_sub(counted.base) as usize)
-                ..(range.end.wrapping_sub(counted.base) as usize);
-            let code = counted.bytes.get(bytes).unwrap_or_default();
-            for (address, instruction, conditional) in thumb::sweep(code, range.start) {
-                if timing::is_late(&instruction, conditional) {
-                    self.engine.get_data_mut().count.late.insert(address);
-                    self.hook_late(address, instruction.kind)?;
-                }
-                let at = (address - range.start) as usize;
-                if let Some(code) = code.get(at..at + instruction.size as usize) {
-                    self.hook_mask(address, code)?;
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Follows an instruction that sends an event, or shuts interrupts out or lets them in.
-    ///
-    /// The engine ends a block behind each of the latter two, so that the cycles counted
-    /// when it comes to them are those up to them.
-    fn hook_mask(&mut self, address: u32, code: &[u8]) -> Result<(), CoreError> {
-        let (at, uc) = (u64::from(address), &mut self.engine);
-        let hooked = match code {
-            SEV => uc.add_code_hook(at, at, |uc, _, _| uc.get_data_mut().bus.event()),
-            CLOSE => uc.add_code_hook(at, at, move |uc, _, _| shut(uc, address)),
-            OPEN => uc.add_code_hook(at, at, |uc, _, _| uc.get_data_mut().open()),
-            // MSR PRIMASK, Rn.
-            [first, 0xF3, 0x10, 0x88] if first >> 4 == 8 => {
-                let register = general(first & 0xF);
-                uc.add_code_hook(at, at, move |uc, _, _| {
-                    match uc.reg_read(register).unwrap_or_default() & 1 {
-                        0 => uc.get_data_mut().open(),
-                        _ => shut(uc, address),
-                    }
-                })
-            }
-            _ => return Ok(()),
-        };
-        engine("hook an instruction", hooked).map(|_| ())
-    }
-
-    /// Adds what an instruction costs beyond its first cycle whenever it is carried out.
-    fn hook_late(&mut self, address: u32, kind: Kind) -> Result<(), CoreError> {
-        let at = u64::from(address);
-        let hooked = if let Kind::Divide { signed, n, m } = kind {
-            self.engine.add_code_hook(at, at, move |uc, _, _| {
-                let value = |number| uc.reg_read(general(number)).unwrap_or_default() as u32;
-                let cycles = timing::division(signed, value(n), value(m)) - 1;
-                uc.get_data_mut().count.spend(cycles);
-            })
-        } else {
-            let extra = timing::extra(kind);
-            self.engine.add_code_hook(at, at, move |uc, _, _| uc.get_data_mut().count.spend(extra))
-        };
-        engine("hook an instruction", hooked).map(|_| ())
-    }
-}
-
-impl<B: Bus + 'static> UnicornCore<B> {
     /// Whether a wait for an interrupt stands there.
     fn is_wait(&self, address: u32) -> Result<bool, CoreError> {
         let mut code = [0; 2];
@@ -470,7 +225,17 @@ impl<B: Bus + 'static> UnicornCore<B> {
         count.current = UNSEEN;
         // Where the host starts the program, nothing has branched.
         count.next = address & !1;
-        let ended = self.engine.emu_start(u64::from(address | 1), until, 0, instructions);
+        let mut address = address;
+        let ended = loop {
+            let ended = self.engine.emu_start(u64::from(address | 1), until, 0, instructions);
+            let count = &self.engine.get_data().count;
+            match count.stop {
+                Some(Stop::Spent(at)) if !count.wanted.is_empty() => address = at,
+                _ => break ended,
+            }
+            self.hook_wanted()?;
+            self.engine.get_data_mut().count.stop = None;
+        };
         if let Some(stop) = self.engine.get_data_mut().count.stop.take() {
             return Ok(stop);
         }
@@ -481,24 +246,6 @@ impl<B: Bus + 'static> UnicornCore<B> {
             Err(error) => Stop::Fault { at, fault: fault(error) },
         })
     }
-}
-
-/// Notes that the program has come to a marked block.
-fn note<B>(uc: &mut Hooked<'_, B>, address: u32) {
-    let r0 = uc.reg_read(RegisterARM::R0).unwrap_or_default() as u32;
-    let inside = uc.get_data_mut();
-    inside.marks.push(Mark { cycles: inside.count.meter.cycles, address, r0 });
-}
-
-/// Whether the masks let an exception of this priority through.
-fn unmasked<B>(uc: &Hooked<'_, B>, priority: i16) -> bool {
-    let read = |register: RegisterARM| uc.reg_read(register).unwrap_or_default() as u32;
-    passes(
-        priority,
-        read(RegisterARM::PRIMASK),
-        read(RegisterARM::BASEPRI),
-        read(RegisterARM::FAULTMASK),
-    )
 }
 
 /// The engine's name of R0 to R12.
