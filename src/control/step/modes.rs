@@ -101,7 +101,9 @@ impl Controller {
         let compression = pass.sensed.compression_filtered;
         if state.in_mode <= 1 || state.on_corner() || state.searching {
             self.tread.begin(&mut state.tread, preload);
-        } else if self.tread.step(&mut state.tread, preload, wedge, compression) {
+        } else if self.tread.step(&mut state.tread, preload, wedge, compression)
+            && !self.may_feel_corner(pass.position)
+        {
             pass.log(Event::Limit(Limit::TreadStrange));
         }
     }

@@ -20,8 +20,10 @@ const SURE_WITHIN: Millimetres = q16(500_000);
 const UNSURE_WITHIN: Millimetres = q16(2_000_000);
 /// Nearer to the edge than this, the wheel stands on top of it, mm.
 const AT_EDGE: Millimetres = q16(300_000);
-/// Short of the first contact by so much, a corner is felt on the way out, mm.
+/// Way from the first contact over which a corner carries so little that a wheel on its way
+/// back is off it at once, mm.
 const RUN_IN: Millimetres = q16(2_000_000);
+
 /// What is under the wheel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Ground {
@@ -63,7 +65,7 @@ impl Controller {
     pub(super) fn resume(&self, state: &mut State, pass: &mut Pass<'_>, direction: Direction) {
         let steps = self.steps.len() as u8;
         let seen = self.seen(state, pass);
-        let known = if state.searching { None } else { self.corner_at(pass.position) };
+        let known = if state.searching { None } else { self.corner_at(pass.position, direction) };
         match known.unwrap_or_else(|| self.ground(pass, ON_WALL)) {
             Ground::Corner(step) => {
                 // The drive has been off: nothing jumps if the corner's force is there at once,
@@ -95,7 +97,7 @@ impl Controller {
                     Direction::Retract => level,
                 };
                 state.crossing = None;
-                self.watch.begin(&mut state.watch, &seen);
+                self.begin_on_wall(state, pass, direction);
                 state.searching &= state.next_step > 0;
             }
         }
@@ -113,12 +115,53 @@ impl Controller {
         up >= least - HEIGHT_WITHIN && up <= most + HEIGHT_WITHIN
     }
 
-    /// The corner on which a wheel at this position stands.
-    fn corner_at(&self, position: Millimetres) -> Option<Ground> {
-        let felt = self.rise.first_contact(Direction::Deploy) - RUN_IN;
+    /// The corner on which a wheel at this position stands. One that is on its way out stands
+    /// on it as soon as it may feel it: the wall can no longer be measured.
+    fn corner_at(&self, position: Millimetres, direction: Direction) -> Option<Ground> {
+        let felt = match direction {
+            Direction::Deploy => self.felt_within(),
+            Direction::Retract => self.rise.first_contact(Direction::Deploy) - RUN_IN,
+        };
         let on = |face: &Millimetres| *face - position > AT_EDGE && *face - position < felt;
         let step = self.steps.iter().position(on)?;
         Some(Ground::Corner(step as u8 + 1))
+    }
+
+    /// Starts on the wall of the present level. A wheel that may feel the corner which it
+    /// leaves on its way back has that wall measured when it is clear of it: what the corner
+    /// adds to the depth of its tread would else be taken for the wall's height, and the wall
+    /// behind for the next corner.
+    pub(super) fn begin_on_wall(&self, state: &mut State, pass: &Pass<'_>, direction: Direction) {
+        let left = match direction {
+            Direction::Deploy => None,
+            Direction::Retract => self.step_position(state.next_step.saturating_add(1)),
+        };
+        match left.filter(|face| *face - pass.position < self.felt_within()) {
+            Some(face) => {
+                state.leaving = Some(face - self.schedule.tolerance());
+                self.watch.begin_on_corner(&mut state.watch, direction, state.level);
+            }
+            None => {
+                let seen = self.seen(state, pass);
+                self.watch.begin(&mut state.watch, &seen);
+            }
+        }
+    }
+
+    /// Whether a wheel at this position may feel a corner: that of a step ahead of it, or of
+    /// one behind it.
+    pub(super) fn may_feel_corner(&self, position: Millimetres) -> bool {
+        let behind = self.rise.first_contact(Direction::Retract) + self.schedule.tolerance();
+        let ahead = self.felt_within();
+        self.steps.iter().any(|face| {
+            let distance = *face - position;
+            distance < ahead && distance > -behind
+        })
+    }
+
+    /// Nearer to a face than this, a wheel before it may feel its corner, mm.
+    fn felt_within(&self) -> Millimetres {
+        self.rise.first_contact(Direction::Deploy) + self.schedule.tolerance()
     }
 
     /// What is under the wheel by its height: a wall within so much of its own, or a corner.

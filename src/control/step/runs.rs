@@ -50,7 +50,9 @@ impl Controller {
         let turned = state.direction != direction;
         state.direction = direction;
         state.leaving = None;
-        if core::mem::take(&mut state.resumed) {
+        // A crossing that was begun in its middle has no wall measured to turn back to.
+        let between = state.crossing.as_ref().is_some_and(|open| open.resumed);
+        if core::mem::take(&mut state.resumed) || turned && between {
             self.resume(state, pass, direction);
         } else if state.searching {
             self.start_searching(state, pass, direction);
@@ -73,8 +75,7 @@ impl Controller {
 
     fn start_afresh(&self, state: &mut State, pass: &Pass<'_>, direction: Direction) {
         state.next_step = self.step_ahead(state, pass, direction);
-        let seen = self.seen(state, pass);
-        self.watch.begin(&mut state.watch, &seen);
+        self.begin_on_wall(state, pass, direction);
     }
 
     /// After a restart away from the stow end the wheel may stand on a corner: off it
