@@ -190,3 +190,8 @@ impl Controller {
 const fn within(sure: bool) -> Millimetres {
     if sure { SURE_WITHIN } else { UNSURE_WITHIN }
 }
+
+#[cfg(test)]
+#[path = "resume_tests.rs"]
+#[allow(clippy::float_arithmetic, reason = "quantities of a test")]
+mod tests;
