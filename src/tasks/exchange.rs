@@ -170,7 +170,15 @@ impl Exchange {
     }
 
     /// What a tick at `now` is given; takes the oldest command and the plan out.
-    pub fn input(&self, now: Tick, overrun: bool, input: &mut Input) {
+    #[must_use]
+    pub fn input(&self, now: Tick, overrun: bool) -> Input {
+        let mut input = Input::default();
+        self.input_into(now, overrun, &mut input);
+        input
+    }
+
+    /// The same into a place.
+    pub fn input_into(&self, now: Tick, overrun: bool, input: &mut Input) {
         *input = Input {
             now,
             sensors: self.sensors(),

@@ -34,7 +34,7 @@ pub async fn motors(
             continue;
         };
         let Turn { input, output, fresh } = &mut *turn;
-        exchange.input(due.tick, due.missed > 0, input);
+        exchange.input_into(due.tick, due.missed > 0, input);
         input.emergency_stop = motors.stopped();
         input.sensors.bridges = motors.readback();
         controller.step_into(&mut state, input, output);
