@@ -319,11 +319,22 @@ fn a_restart_in_the_middle_is_marked_and_both_parts_run_again() {
     board.until("mode: idle", 3000);
     board.send(b's');
     board.until("deploying: crossing", 8000);
+    // This one leaves the record of the run before, from which it goes on.
+    board.bench.machine_mut().restart(Cause::Pin).expect("restarts");
+    board.until("mode: idle", 3000);
+    board.send(b's');
+    board.until("mode: deployed", 12_000);
+    board.send(b'r');
+    board.until("mode: retracted", 12_000);
+    board.send(b's');
+    board.until("deploying: crossing", 8000);
     board.bench.machine_mut().restart(Cause::Power).expect("restarts");
     board.until("mode: idle", 3000);
     board.run(200);
     let run = board.log();
-    assert_eq!(run.tally.restarts, 1, "{:?}", run.marks);
+    assert_eq!(run.tally.restarts, 2, "{:?}", run.marks);
+    let placed = |boot| run.since_boot(boot).restart().and_then(|restart| restart.place());
+    assert_eq!([0, 1, 2].map(|boot| placed(boot).is_some()), [false, true, false]);
     let result = replay(&run, &Rig::prototype()).expect("a sound rig");
     assert!(result.difference.is_none(), "{result:?}");
     let idle = run.rows.last().and_then(Row::telemetry).expect("a row");
