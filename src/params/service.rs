@@ -318,6 +318,26 @@ mod tests {
     }
 
     #[test]
+    fn a_damaged_set_is_told_and_can_be_replaced() {
+        let mut service = service();
+        for restore in [true, false] {
+            send(&mut service, &set("mine"));
+            service.memory.flip(500);
+            for request in [Request::Describe, Request::Read { offset: 0 }] {
+                assert_eq!(ask(&mut service, request), Response::Refused(Refusal::Lost));
+            }
+            let done = if restore {
+                ask(&mut service, Request::Restore)
+            } else {
+                send(&mut service, &set("again"))
+            };
+            assert_eq!(done, Response::Done);
+            let name = if restore { "image" } else { "again" };
+            assert_eq!(origin(&mut service).1, name);
+        }
+    }
+
+    #[test]
     fn nothing_is_changed_while_the_drive_moves() {
         let mut service = service();
         for request in [

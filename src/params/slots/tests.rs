@@ -24,6 +24,12 @@ impl Flash {
         Self { slots, left: None, noise: 0x9E37_79B9_7F4A_7C15, operations: 0 }
     }
 
+    /// Turns a bit of this byte over in the place in force.
+    pub(in crate::params) fn flip(&mut self, at: usize) {
+        let slot = stored(self).expect("no damage").expect("a set").slot;
+        self.slots[slot as usize][at] ^= 1;
+    }
+
     fn random(&mut self) -> u64 {
         self.noise ^= self.noise << 13;
         self.noise ^= self.noise >> 7;

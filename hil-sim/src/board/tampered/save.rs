@@ -11,7 +11,7 @@ const AGAIN: u32 = 10;
 
 /// How far a save has come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Saving {
+pub(crate) enum Saving {
     /// Asked for; so far the board refuses, or has not answered.
     Asked,
     /// The board writes.
