@@ -29,10 +29,10 @@ mod firmware {
     use interstage::log::{Entry, Event, Identity, Scribe};
     use interstage::model::Planner;
     use interstage::params::service::Service;
-    use interstage::tasks::{self, Exchange};
+    use interstage::tasks::{self, Exchange, Latest};
     #[cfg(not(feature = "hil"))]
     use rtt_target::DownChannel;
-    use static_cell::ConstStaticCell;
+    use static_cell::{ConstStaticCell, StaticCell};
 
     #[cfg(feature = "hil")]
     use crate::board::hil::{self, split};
@@ -54,6 +54,7 @@ mod firmware {
     static LOAD_CELL: Ring = Ring::new();
     #[cfg(not(feature = "hil"))]
     static TREAD: Ring = Ring::new();
+    static LATEST: StaticCell<Latest> = StaticCell::new();
     static SCRIBE: ConstStaticCell<Scribe> = ConstStaticCell::new(Scribe::new(Identity::NOBODY));
 
     /// Runs the control tick and the sensors, above everything that may take long.
@@ -175,7 +176,9 @@ mod firmware {
         control.spawn(pressure(parts.load_cell).unwrap());
         control.spawn(displacement(parts.tread).unwrap());
         control.spawn(angle(parts.arm).unwrap());
-        control.spawn(motors(parts.motors, parts.watchdog, controller).unwrap());
+        let latest = LATEST.init(Latest::default());
+        control.spawn(motors(parts.motors, parts.watchdog, controller, latest).unwrap());
+        control.spawn(tape(latest).unwrap());
         threads.spawn(model(planner).unwrap());
         threads.spawn(pressed(parts.button).unwrap());
         threads.spawn(typed(parts.console).unwrap());
@@ -203,8 +206,18 @@ mod firmware {
     }
 
     #[embassy_executor::task]
-    async fn motors(motors: Bridges, watchdog: Guard, controller: &'static Controller) -> ! {
-        tasks::motors(motors, watchdog, controller, &EXCHANGE).await
+    async fn motors(
+        motors: Bridges,
+        watchdog: Guard,
+        controller: &'static Controller,
+        latest: &'static Latest,
+    ) -> ! {
+        tasks::motors(motors, watchdog, controller, latest, &EXCHANGE).await
+    }
+
+    #[embassy_executor::task]
+    async fn tape(latest: &'static Latest) -> ! {
+        tasks::tape(latest, &EXCHANGE).await
     }
 
     #[embassy_executor::task]

@@ -7,6 +7,7 @@
 //! | [`displacement()`] | 1 kHz | publishes the tread sensor's code |
 //! | [`angle()`] | 500 Hz | publishes the arm sensor's frame |
 //! | [`motors()`] | 1 kHz | the control tick: latest codes in, bridges out |
+//! | [`tape()`] | 1 kHz | takes the tick down for the log, behind it |
 //! | [`model()`] | on request | plans the next segment |
 //! | [`operator()`] | on command | hands commands to the tick; one task a source |
 //! | [`link()`] | on request | reads and replaces the stored parameters |
@@ -25,6 +26,7 @@ mod model;
 mod motors;
 mod operator;
 mod sensors;
+mod tape;
 
 pub use exchange::{CHECK_IN_TICKS, COMMANDS, ENTRIES, Exchange, Station};
 pub use journal::journal;
@@ -33,6 +35,7 @@ pub use model::model;
 pub use motors::motors;
 pub use operator::operator;
 pub use sensors::{SENSOR_TIMEOUT, angle, displacement, pressure, speed};
+pub use tape::{Latest, tape};
 
 use embassy_time::Duration;
 

@@ -13,7 +13,7 @@ use interstage::log::{Entry, Event, Identity, Scribe};
 use interstage::model::Planner;
 use interstage::rig::Rig;
 use interstage::supervise::{Command, Direction, Fault, Mode};
-use interstage::tasks::{self, CHECK_IN_TICKS, Exchange, Station};
+use interstage::tasks::{self, CHECK_IN_TICKS, Exchange, Latest, Station};
 
 /// All tasks of the firmware on a mocked board: at rest, unloaded, stowed.
 struct Board {
@@ -76,7 +76,9 @@ impl Board {
             bench.spawn(async { tasks::angle(arm, exchange).await });
         }
         let (motors, watchdog) = (board.bridges.clone(), board.watchdog.clone());
-        bench.spawn(async { tasks::motors(motors, watchdog, controller, exchange).await });
+        let latest = forever(Latest::default());
+        bench.spawn(async { tasks::motors(motors, watchdog, controller, latest, exchange).await });
+        bench.spawn(async { tasks::tape(latest, exchange).await });
         if runs(Station::Model) {
             bench.spawn(async { tasks::model(planner, exchange).await });
         }

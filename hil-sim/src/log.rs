@@ -19,4 +19,4 @@ pub use file::{FRAMES, ReadError, pieces, timed};
 pub use ledger::LedgerLine;
 pub use recording::recording;
 pub use row::Row;
-pub use run::{Header, Run};
+pub use run::{Boot, Header, Run, Since};

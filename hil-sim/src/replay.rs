@@ -8,7 +8,7 @@ use interstage::rig::{Rig, RigError};
 use interstage::supervise::Mode;
 use serde::Serialize;
 
-use crate::log::{Mark, Row, Run};
+use crate::log::{Mark, Row, Run, Since};
 use crate::record::STAGE_NAMES;
 
 /// What came of a replay.
@@ -74,17 +74,21 @@ pub fn replay(run: &Run, rig: &Rig) -> Result<Replayed, RigError> {
     let controller = Controller::try_build(rig)?;
     let mut replay = Replay {
         planner: Planner::try_build(rig)?,
-        run,
+        since: run.since_boot(0),
         state: State::default(),
         request: None,
         result: Replayed::default(),
     };
     let (mut marks, mut blind) = (run.marks.iter().peekable(), starts_late(run));
+    let mut boot = 0;
+    replay.begin();
     for (place, row) in run.rows.iter().enumerate() {
         while let Some((_, mark)) = marks.next_if(|(at, _)| *at <= place) {
             match mark {
                 Mark::Restart => {
-                    (replay.state, replay.request, blind) = (State::default(), None, false);
+                    (boot, blind) = (boot + 1, false);
+                    replay.since = run.since_boot(boot);
+                    replay.begin();
                 }
                 // What is no frame was none before either; ticks that never ran are
                 // told by the flag of the one that did.
@@ -120,7 +124,8 @@ fn starts_late(run: &Run) -> bool {
 /// A replay under way.
 struct Replay<'a> {
     planner: Planner,
-    run: &'a Run,
+    /// What the log has of the present start.
+    since: Since<'a>,
     state: State,
     /// The latest request, for a plan that is not in the log.
     request: Option<PlanRequest>,
@@ -128,6 +133,12 @@ struct Replay<'a> {
 }
 
 impl Replay<'_> {
+    /// The target starts, with the wheel where its record of the run before has it.
+    fn begin(&mut self) {
+        let place = self.since.restart().and_then(|restart| restart.place());
+        (self.state, self.request) = (State::standing(place), None);
+    }
+
     /// Runs a tick again; the first thing that differs.
     fn tick(&mut self, controller: &Controller, row: &Row) -> Option<Difference> {
         let flags = row.flags();
@@ -148,7 +159,7 @@ impl Replay<'_> {
 
     /// The plan that the tick was given: that of the log, or the planner's own.
     fn plan(&mut self, tick: u32) -> Option<Plan> {
-        let logged = self.run.plans.iter().find(|(at, _)| *at == tick);
+        let logged = self.since.plans.iter().find(|(at, _)| *at == tick);
         if let Some((_, plan)) = logged {
             self.result.plans.0 += 1;
             return Some(*plan);
@@ -159,10 +170,10 @@ impl Replay<'_> {
 
     /// The plan that the log has for this tick, and the planner's own answer to the
     /// request that it answers; none if one of them is not in the log, or there are two of
-    /// this number, as after a restart.
+    /// this number.
     fn planned(&self, tick: u32) -> Option<(Plan, Plan)> {
-        let (_, recorded) = self.run.plans.iter().find(|(at, _)| *at == tick)?;
-        let all = self.run.requests.iter().map(|(_, request)| request);
+        let (_, recorded) = self.since.plans.iter().find(|(at, _)| *at == tick)?;
+        let all = self.since.requests.iter().map(|(_, request)| request);
         let mut asked = all.filter(|request| request.sequence == recorded.sequence);
         let request = asked.next().filter(|_| asked.next().is_none())?;
         Some((*recorded, self.planner.plan(request)))
@@ -202,7 +213,7 @@ impl Replay<'_> {
             let (recorded, replayed) = (bits(row.flags), bits(again.to_bits()));
             return Some(differs("bridges, requests and entries", "flags", recorded, replayed));
         }
-        let asked = self.run.requests.iter().find(|(at, _)| *at == row.tick);
+        let asked = self.since.requests.iter().find(|(at, _)| *at == row.tick);
         if let (Some((_, recorded)), Some(replayed)) = (asked, output.request)
             && *recorded != replayed
         {
@@ -219,7 +230,7 @@ impl Replay<'_> {
     /// Entries of a tick in the log, and those of the replay; none of either if they are
     /// not in the log.
     fn events(&mut self, tick: u32, output: &Output) -> (Vec<Entry>, Vec<Entry>) {
-        let from = self.run.events.iter().filter(|entry| entry.at == tick);
+        let from = self.since.events.iter().filter(|entry| entry.at == tick);
         let logged: Vec<Entry> = from
             .filter(|entry| !matches!(entry.event, Event::Lost(_) | Event::Restart(_)))
             .copied()
@@ -342,6 +353,42 @@ mod tests {
         assert_eq!((difference.tick, difference.stage), (run.rows[place].tick, "sensing"));
         assert_eq!(difference.quantity, "compression, mm");
         assert_eq!(result.ticks as usize, place + 1);
+    }
+
+    #[test]
+    fn a_start_from_the_record_of_the_run_before_is_run_again_from_there() {
+        let scenario = Scenario::resolve(Some("prototype"), None, &[]).unwrap();
+        let options = sil::Options { rows: true, ..sil::Options::default() };
+        let mut session = sil::Session::new(&scenario, options).unwrap();
+        let mut bytes = Vec::new();
+        for _ in 0..2 {
+            let mut left = Some(interstage::supervise::Command::Start);
+            for _ in 0..4000 {
+                let given = if session.mode() == Mode::Idle { left.take() } else { None };
+                session.step(given).unwrap();
+            }
+            bytes.extend(session.take_stream());
+            session.restart();
+        }
+        let run = Run::of_stream(&bytes);
+        assert_eq!(run.tally.restarts, 1);
+        let place = run.since_boot(1).restart().and_then(|restart| restart.place());
+        assert!(
+            place
+                .is_some_and(|place| place.position > interstage::units::Millimetres::from_num(10)),
+            "{place:?}"
+        );
+        let result = replay(&run, &Rig::prototype()).unwrap();
+        assert!(result.difference.is_none() && result.blind == 0, "{result:?}");
+        // Ticks of both starts have the same numbers, and their plans other answers.
+        assert!(result.plans.0 >= 3 && result.plans.1 == 0, "{:?}", result.plans);
+        let mut forgotten = run.clone();
+        forgotten.events.retain(|entry| !matches!(entry.event, Event::Restart(_)));
+        for boot in &mut forgotten.boots {
+            boot.events = 0;
+        }
+        let result = replay(&forgotten, &Rig::prototype()).unwrap();
+        assert!(result.difference.is_some());
     }
 
     #[test]

@@ -185,6 +185,22 @@ fn a_retraction_is_that_of_the_software_three_times_alike() {
     assert_way(&["run.seed=1", "run.direction=retract"]);
 }
 
+/// Ten times the rig's speed is asked of a release build on a machine that does nothing else,
+/// and `deploy` prints it. Here tests share the cores, and half of that tells a fall; by this
+/// thread's processor time.
+#[test]
+fn a_deployment_is_far_ahead_of_the_rig() {
+    const LEAST: f64 = 5.0;
+    let factor = |_| {
+        let begun = cpu_time::ThreadTime::now();
+        let summary = ran(&["run.seed=1"]).recording.summary;
+        summary.duration_s / begun.elapsed().as_secs_f64()
+    };
+    let factors = [0; 3].map(factor);
+    println!("{factors:.1?} times real time");
+    assert!(factors.iter().any(|factor| *factor >= LEAST), "{factors:.1?}");
+}
+
 #[test]
 fn power_comes_up_to_idle_with_the_bridges_off() {
     let mut board = Board::off(&[]);

@@ -206,6 +206,7 @@ impl Board {
         let exchange = self.exchange;
         let controller = forever(Controller::try_build(&scenario.rig).expect("a sound rig"));
         let planner = forever(Planner::try_build(&scenario.rig).expect("a sound rig"));
+        let latest = forever(tasks::Latest::default());
         let part = || Peripheral(Rc::clone(&self.shared));
         let load_cell = LoadCell(Rc::clone(&self.shared));
         let (wheel, tread, arm, button) = (part(), part(), part(), part());
@@ -216,7 +217,8 @@ impl Board {
             Box::pin(async { tasks::displacement(tread, exchange).await }),
             Box::pin(async { tasks::angle(arm, exchange).await }),
             Box::pin(async { tasks::operator(button, exchange).await }),
-            Box::pin(async { tasks::motors(motors, watchdog, controller, exchange).await }),
+            Box::pin(async { tasks::motors(motors, watchdog, controller, latest, exchange).await }),
+            Box::pin(async { tasks::tape(latest, exchange).await }),
             Box::pin(async { tasks::model(planner, exchange).await }),
             Box::pin(async {
                 let mut scribe = Scribe::new(Identity::NOBODY);

@@ -36,6 +36,8 @@ pub(super) struct Pulse {
     wakers: [AtomicWaker; SENSORS],
     /// The control tick's task, where an interrupt beats.
     lead: AtomicWaker,
+    /// The task that runs behind the control tick.
+    tail: AtomicWaker,
     /// An interrupt beats.
     beaten: AtomicBool,
     /// Number of the sensor from 1, [`TICK`], or 0.
@@ -66,6 +68,7 @@ impl Pulse {
         Self {
             wakers: [const { AtomicWaker::new() }; SENSORS],
             lead: AtomicWaker::new(),
+            tail: AtomicWaker::new(),
             beaten: AtomicBool::new(false),
             turn: AtomicU8::new(0),
             ticked: AtomicU32::new(0),
@@ -108,17 +111,23 @@ impl Pulse {
         self.beaten.store(true, Ordering::Relaxed);
     }
 
-    /// Wakes all whose turn comes with this millisecond: first the control tick's task, so
-    /// that it runs last. For an interrupt at each whole millisecond that preempts their
+    /// Wakes all whose turn comes with this millisecond: first the one behind the control
+    /// tick and then the control tick's task, so that these run last. For an interrupt at each whole millisecond that preempts their
     /// executor.
     /// Tells whether the arm's angle is among them.
     pub(super) fn strike(&self) -> bool {
+        self.tail.wake();
         self.lead.wake();
         // The one behind the latest turn. After ticks that were missed it may be another:
         // those that are woken look at the clock themselves.
         let tick = self.ticked().wrapping_add(1);
         self.beat(tick);
         tick.is_multiple_of(ANGLE_PERIOD)
+    }
+
+    /// This task is to run behind each control tick.
+    pub(super) fn follow_tick(&self, waker: &Waker) {
+        self.tail.register(waker);
     }
 
     /// Wakes the sensor tasks that are due in this tick, the last first: it runs last.
@@ -214,6 +223,7 @@ impl<const N: u32> Beat<N> {
                 return Poll::Ready(());
             }
             beaten = true;
+            pulse.tail.wake();
             context.waker().wake_by_ref();
             pulse.begin(self.tick, Turn::Nobody);
             pulse.beat(self.tick);

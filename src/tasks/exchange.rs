@@ -170,27 +170,33 @@ impl Exchange {
     }
 
     /// What a tick at `now` is given; takes the oldest command and the plan out.
+    #[must_use]
     pub fn input(&self, now: Tick, overrun: bool) -> Input {
-        Input {
+        let mut input = Input::default();
+        self.input_into(now, overrun, &mut input);
+        input
+    }
+
+    /// The same into a place.
+    pub fn input_into(&self, now: Tick, overrun: bool, input: &mut Input) {
+        *input = Input {
             now,
             sensors: self.sensors(),
             command: self.commands.try_receive().ok(),
             plan: self.answer.try_receive().ok(),
             overrun,
             emergency_stop: false,
-        }
+        };
     }
 
-    /// Passes on what a tick gave, except the motors' part, and keeps the tick for the
-    /// log.
-    pub fn publish(&self, input: &Input, output: &Output) {
+    /// Passes on what a tick gave, except the motors' part.
+    pub fn publish(&self, output: &Output) {
         if let Some(request) = output.request {
             self.request_plan(request);
         }
         for &entry in &output.events {
             self.log(entry);
         }
-        self.tape.keep(input, output);
         let mode = output.telemetry.mode;
         self.driven.store(!mode.is_at_rest(), Ordering::Relaxed);
         self.show(light_of(mode));

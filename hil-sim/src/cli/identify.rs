@@ -170,11 +170,12 @@ fn human(found: &Identification, files: &[PathBuf]) -> String {
 }
 
 fn by_published(args: &Args, scenario: &Scenario) -> Result<Outcome, Failure> {
-    let (coarse, converged, stated) = {
+    let (coarse, converged, held, stated) = {
         let _progress = progress::spinner("fit to the published gaps");
         (
             published::fit(scenario, published::Fineness::STATED)?,
             published::fit(scenario, published::Fineness::CONVERGED)?,
+            published::fit_held(scenario, published::Fineness::CONVERGED)?,
             published::stated(scenario, published::Fineness::CONVERGED)?,
         )
     };
@@ -188,6 +189,7 @@ fn by_published(args: &Args, scenario: &Scenario) -> Result<Outcome, Failure> {
          within a factor of two"
             .to_owned(),
         of_tread("the same fit by a coarse ring", &coarse),
+        of_tread("with the scenario's stiffening held", &held),
         of_tread("the scenario's tread by the converged ring", &stated),
     ];
     let residuals = published_residuals(&converged);

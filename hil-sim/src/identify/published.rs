@@ -22,6 +22,8 @@ const MOVED: f64 = 0.02;
 const GAP_REL: f64 = 1e-3;
 /// How far a parameter may lie from where it starts, logarithm: a factor of two.
 const FREE_LN: f64 = 0.7;
+/// The same of one that is held.
+const HELD_LN: f64 = 1e-6;
 
 /// How finely the ring is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,13 +59,15 @@ struct Gaps<'a> {
     scenario: &'a Scenario,
     fineness: Fineness,
     start: [f64; 3],
+    /// How far each may lie from there, logarithm.
+    free: [f64; 3],
 }
 
 impl<'a> Gaps<'a> {
     fn of(scenario: &'a Scenario, fineness: Fineness) -> Self {
         let tread = &scenario.rig.tread;
         let start = [tread.k_inf_pa_per_m * 1e-9, tread.stiffening, tread.tau_s].map(f64::ln);
-        Self { scenario, fineness, start }
+        Self { scenario, fineness, start, free: [FREE_LN; 3] }
     }
 
     /// Gaps over the published ones, less 1, for these logarithms.
@@ -100,7 +104,8 @@ impl Model for Gaps<'_> {
 
     fn residuals(&self, x: &[f64], at: &Vec<f64>) -> Vec<f64> {
         let gaps = at.iter().map(|deviation| deviation / GAP_REL);
-        let held = x.iter().zip(&self.start).map(|(x, start)| (x - start) / FREE_LN);
+        let from = x.iter().zip(&self.start).map(|(x, start)| x - start);
+        let held = from.zip(&self.free).map(|(from, free)| from / free);
         gaps.chain(held).collect()
     }
 
@@ -113,7 +118,8 @@ impl Model for Gaps<'_> {
             };
             let (up, down) = (at(MOVED)?, at(-MOVED)?);
             let slope = |(u, d): (&f64, &f64)| (u - d) / (2.0 * MOVED * GAP_REL);
-            let held = (0..3).map(|other| if other == index { 1.0 / FREE_LN } else { 0.0 });
+            let held =
+                (0..3).map(|other| if other == index { 1.0 / self.free[index] } else { 0.0 });
             Some(up.iter().zip(&down).map(slope).chain(held).collect())
         };
         (0..3).map(column).collect()
@@ -127,6 +133,16 @@ impl Model for Gaps<'_> {
 /// [`IdentifyError::NoFit`] if it does not settle.
 pub fn fit(scenario: &Scenario, fineness: Fineness) -> Result<Tread, IdentifyError> {
     let gaps = Gaps::of(scenario, fineness);
+    let fitted = minimise(&gaps, &gaps.start)?;
+    Ok(tread(&fitted.x, &fitted.at))
+}
+
+/// The same with the stiffening that the scenario has: two parameters, which the gaps tell.
+///
+/// # Errors
+/// [`IdentifyError::NoFit`] if it does not settle.
+pub fn fit_held(scenario: &Scenario, fineness: Fineness) -> Result<Tread, IdentifyError> {
+    let gaps = Gaps { free: [FREE_LN, HELD_LN, FREE_LN], ..Gaps::of(scenario, fineness) };
     let fitted = minimise(&gaps, &gaps.start)?;
     Ok(tread(&fitted.x, &fitted.at))
 }

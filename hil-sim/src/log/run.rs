@@ -1,8 +1,9 @@
 //! A whole log in memory.
 
+use interstage::blackbox::Restart;
 use interstage::log::capture::Shots;
 use interstage::log::ledger::Line;
-use interstage::log::{Entry, Identity};
+use interstage::log::{Entry, Event, Identity};
 use interstage::model::{Plan, PlanRequest};
 use serde::{Deserialize, Serialize};
 
@@ -42,6 +43,39 @@ impl From<&Identity> for Header {
     }
 }
 
+/// What came before a start of the target.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Boot {
+    /// Events.
+    pub events: usize,
+    /// Plans.
+    pub plans: usize,
+    /// Requests.
+    pub requests: usize,
+}
+
+/// What came from one start of the target to the next.
+#[derive(Clone, Copy, Debug)]
+pub struct Since<'a> {
+    /// What happened.
+    pub events: &'a [Entry],
+    /// Plans with the ticks that were given them.
+    pub plans: &'a [(u32, Plan)],
+    /// Requests with the ticks that made them.
+    pub requests: &'a [(u32, PlanRequest)],
+}
+
+impl Since<'_> {
+    /// Why the target started, if it came to say so.
+    #[must_use]
+    pub fn restart(&self) -> Option<Restart> {
+        self.events.iter().find_map(|entry| match entry.event {
+            Event::Restart(restart) => Some(restart),
+            _ => None,
+        })
+    }
+}
+
 /// A whole log.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Run {
@@ -59,6 +93,8 @@ pub struct Run {
     pub ledger: Vec<Line>,
     /// Pieces of captures.
     pub shots: Vec<Shots>,
+    /// Where each start after the first begins.
+    pub boots: Vec<Boot>,
     /// What is missing, and before which row.
     pub marks: Vec<(usize, Mark)>,
     /// Counts of what came and what is missing.
@@ -88,7 +124,34 @@ impl Run {
             Item::Event(entry) => self.events.push(*entry),
             Item::Shots(shots) => self.shots.push(shots.clone()),
             Item::Ledger(line) => self.ledger.push(*line),
-            Item::Mark(mark) => self.marks.push((self.rows.len(), *mark)),
+            Item::Mark(mark) => {
+                if *mark == Mark::Restart {
+                    self.boots.push(Boot {
+                        events: self.events.len(),
+                        plans: self.plans.len(),
+                        requests: self.requests.len(),
+                    });
+                }
+                self.marks.push((self.rows.len(), *mark));
+            }
+        }
+    }
+
+    /// What a start of the target left in the log, counted from 0; ticks begin anew with
+    /// each.
+    #[must_use]
+    pub fn since_boot(&self, boot: usize) -> Since<'_> {
+        let from = boot.checked_sub(1).and_then(|before| self.boots.get(before));
+        let (from, to) = (from.copied().unwrap_or_default(), self.boots.get(boot).copied());
+        let to = to.unwrap_or(Boot {
+            events: self.events.len(),
+            plans: self.plans.len(),
+            requests: self.requests.len(),
+        });
+        Since {
+            events: self.events.get(from.events..to.events).unwrap_or_default(),
+            plans: self.plans.get(from.plans..to.plans).unwrap_or_default(),
+            requests: self.requests.get(from.requests..to.requests).unwrap_or_default(),
         }
     }
 

@@ -236,6 +236,9 @@ impl Session {
         let restart = Restart { reset: Reset::Pin, flight: Some(flight), crash: None };
         self.reboot();
         self.state = State::standing(restart.place());
+        if let Some(stream) = &mut self.stream {
+            stream.tell(restart);
+        }
     }
 
     /// What the drive is doing.

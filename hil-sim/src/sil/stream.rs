@@ -1,8 +1,9 @@
 //! The binary log of a run in software: the firmware's own tape and scribe, so that one
 //! decoder serves both.
 
+use interstage::blackbox::Restart;
 use interstage::control::{Controller, Input, Output};
-use interstage::log::{BATCH, Identity, Scribe, Tape, identity};
+use interstage::log::{BATCH, Entry, Event, Identity, Scribe, Tape, identity};
 
 use crate::scenario::Scenario;
 
@@ -48,6 +49,15 @@ impl Stream {
     pub(super) fn restart(&mut self, scenario: &Scenario, controller: &Controller) {
         let bytes = self.take();
         *self = Self { bytes, ..Self::new(scenario, controller) };
+    }
+
+    /// The controller says why it has started, as the board does first of all.
+    pub(super) fn tell(&mut self, restart: Restart) {
+        let entry = Entry { at: 0, event: Event::Restart(restart) };
+        self.scribe.entry(&entry, &mut |frame: &[u8]| {
+            self.bytes.extend_from_slice(frame);
+            true
+        });
     }
 
     /// The whole log.

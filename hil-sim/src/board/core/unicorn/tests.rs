@@ -1,6 +1,7 @@
 //! Small pieces of machine code, with cycles counted by hand.
 
 use super::*;
+use crate::board::timing::REFILL;
 
 const FLASH: u32 = 0x0800_0000;
 const RAM: u32 = 0x2000_0000;
