@@ -41,3 +41,36 @@ pub async fn tape(latest: &Latest, exchange: &Exchange) -> ! {
     })
     .await
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::pin::pin;
+    use core::task::Context;
+
+    #[test]
+    fn every_tick_is_taken_down_once() {
+        let (latest, exchange) = (Latest::default(), Exchange::new());
+        let mut task = pin!(tape(&latest, &exchange));
+        let mut context = Context::from_waker(Waker::noop());
+        let mut kept = || {
+            assert!(task.as_mut().poll(&mut context).is_pending());
+            exchange.tape.unread()
+        };
+        assert_eq!(kept(), 0, "before the first tick");
+        for tick in 1..4 {
+            {
+                let mut turn = latest.0.borrow_mut();
+                turn.input.now = tick;
+                turn.output.telemetry.at = tick;
+                turn.fresh = true;
+            }
+            assert_eq!((kept(), kept()), (tick, tick));
+        }
+        let held = latest.0.borrow_mut();
+        assert_eq!(kept(), 3, "in use: left alone");
+        drop(held);
+        let rows: Vec<_> = core::iter::from_fn(|| exchange.tape.take()).collect();
+        assert_eq!(rows.iter().map(|row| row.at()).collect::<Vec<_>>(), [1, 2, 3]);
+    }
+}

@@ -356,8 +356,10 @@ impl Case {
 
         // The hold, up to the command; in the millisecond of the reset there was drive.
         board.step()?;
-        let reset_mm = board.bench.plant().truth().position_mm;
+        let reset = *board.bench.plant().truth();
+        let reset_mm = reset.position_mm;
         let hung_mm = (reset_mm - position_mm).abs();
+        let hung_n = (reset.preload_n - before.preload_n).abs();
         board.driven = false;
         board.mode.clear();
         if !board.until(&["idle", "fault hold"], START_MS)? || board.mode != "idle" {
@@ -368,7 +370,7 @@ impl Case {
         }
         let truth = *board.bench.plant().truth();
         let motion_mm = (truth.position_mm - reset_mm).abs();
-        let preload_n = (truth.preload_n - before.preload_n).abs();
+        let preload_n = (truth.preload_n - reset.preload_n).abs();
         let mut held = true;
         let mut holds = |good: bool, why: &dyn Fn() -> String| {
             if !good {
@@ -380,9 +382,11 @@ impl Case {
         holds(motion_mm <= MOTION_MM, &|| format!("moved by {motion_mm:.2} mm"));
         let most_mm = HUNG_S * scenario.rig.drive.cruise_speed_mm_s + MOTION_MM;
         holds(hung_mm <= most_mm, &|| format!("ran on for {hung_mm:.2} mm"));
-        let allowed = PRELOAD_N.max(PRELOAD_PART * before.preload_n.abs());
+        let most_n = HUNG_S * scenario.rig.preload.slew_n_per_s + PRELOAD_N;
+        holds(hung_n <= most_n, &|| format!("preload went on by {hung_n:.1} N"));
+        let allowed = PRELOAD_N.max(PRELOAD_PART * reset.preload_n.abs());
         holds(preload_n <= allowed, &|| {
-            format!("preload {:.1} N before, {:.1} N after", before.preload_n, truth.preload_n)
+            format!("preload {:.1} N at the reset, {:.1} N after", reset.preload_n, truth.preload_n)
         });
 
         let stream = board.bench.take_frames();

@@ -1,0 +1,133 @@
+//! What a start knows of the run before.
+
+use core::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use super::{Crash, Flight, Stopped};
+use crate::supervise::Fault;
+use crate::units::{Millimetres, Tick, ticks_to_seconds};
+
+/// What the chip says about why it started.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Reset {
+    /// Power came up, or fell too low and came back.
+    Power,
+    /// The reset pin.
+    Pin,
+    /// The program or a debugger asked for it.
+    Software,
+    /// The watchdog.
+    Watchdog,
+    /// Something else.
+    Other,
+}
+
+impl Reset {
+    /// In words.
+    #[must_use]
+    pub const fn sentence(self) -> &'static str {
+        match self {
+            Self::Power => "power came up",
+            Self::Pin => "by the reset pin",
+            Self::Software => "by software or debugger",
+            Self::Watchdog => "by the watchdog",
+            Self::Other => "for a reason that the chip does not tell",
+        }
+    }
+}
+
+/// What a start reports of the time before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Restart {
+    /// Why the chip started.
+    pub reset: Reset,
+    /// What the drive last did, if memory kept it.
+    pub flight: Option<Flight>,
+    /// What stopped the program, if something did.
+    pub crash: Option<Crash>,
+}
+
+/// Where a wheel stands by the record of the run before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// Axial position, mm.
+    pub position: Millimetres,
+    /// The bridges were off as soon as the record ends: what is added is the coasting. If
+    /// not, a drive went on that nobody watched.
+    pub sure: bool,
+}
+
+/// Ticks for which the wheel goes on at its speed after the record: what is left of the
+/// tick, and the coasting, in which the gears take half of the speed each ms.
+const COASTS: Tick = 2;
+
+/// Ticks from the watchdog's last feeding to its reset.
+const UNFED: Tick = 100;
+
+/// Longest time without a record within which it still tells all, ticks.
+const FRESH: Tick = 5;
+
+impl Restart {
+    /// Where the wheel stands, if the record tells.
+    ///
+    /// A reset takes the power from the bridges at once, a panic or a hard fault before it
+    /// is recorded; then the wheel coasts by a tenth of a millimetre. If the tick hung, the
+    /// drive went on at its last duty until the bridges were cut, or until the watchdog
+    /// bit: at about the reference of the last tick, for a time that is known. After a fault
+    /// that may have been one of the position it tells nothing.
+    #[must_use]
+    pub fn place(&self) -> Option<Place> {
+        let flight = self.flight.filter(|flight| flight.pace.placed() && spared(flight.fault))?;
+        let unwatched = match (self.reset, self.crash.map(|crash| crash.stopped)) {
+            (_, Some(Stopped::Hang { at, .. })) => at.wrapping_sub(flight.tick).min(UNFED),
+            (Reset::Watchdog, None) => UNFED,
+            _ => 0,
+        };
+        let way = flight.pace.speed() * ticks_to_seconds(unwatched + COASTS);
+        Some(Place { position: flight.position + way, sure: unwatched <= FRESH })
+    }
+}
+
+/// Whether the position was to be believed although this fault was reported: none, or one
+/// that has nothing to do with how the wheel's way is found.
+fn spared(code: u16) -> bool {
+    const OTHERS: [Fault; 11] = [
+        Fault::PressureStale,
+        Fault::DisplacementStale,
+        Fault::PressureRange,
+        Fault::DisplacementRange,
+        Fault::PressureImplausible,
+        Fault::DisplacementImplausible,
+        Fault::Overpressure,
+        Fault::PreloadNotReached,
+        Fault::PretightenerRunaway,
+        Fault::EmergencyStop,
+        Fault::TickOverrun,
+    ];
+    code == 0 || OTHERS.iter().any(|fault| fault.code() == code)
+}
+
+impl fmt::Display for Restart {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "started: {}", self.reset.sentence())?;
+        if let Some(crash) = &self.crash {
+            write!(f, "; {}", crash.stopped)?;
+        }
+        if let Some(flight) = &self.flight {
+            let Flight { tick, position, level, fault, late, .. } = *flight;
+            match flight.mode() {
+                Some(mode) => write!(f, "; before: {mode:?}")?,
+                None => write!(f, "; before: mode {}", flight.mode)?,
+            }
+            write!(f, " at tick {tick}, {position:.2} mm, level {level}")?;
+            if fault != 0 {
+                write!(f, ", last fault {fault}")?;
+            }
+            if !late.is_nobody() {
+                write!(f, ", {} was late", late.name())?;
+            }
+        }
+        Ok(())
+    }
+}
