@@ -85,7 +85,7 @@ fn places_of_parameter_sets() {
     fuzz("places", &corpus, 4000, 2.0, |bytes| {
         let (a, b) = bytes.split_at(bytes.len().min(SLOT_BYTES));
         let flash = Flash([a.to_vec(), b.to_vec()]);
-        if let Some(stored) = stored(&flash) {
+        if let Ok(Some(stored)) = stored(&flash) {
             open_set(stored.set);
         }
     });

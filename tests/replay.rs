@@ -57,27 +57,37 @@ impl Recorded {
     }
 }
 
-/// Gives each tick its recorded input; what came out is compared in `judge`.
-fn again(name: &str, mut judge: impl FnMut(&Recorded, &Record, &Input, &Output)) -> Recorded {
-    let run = Recorded::read(name);
+/// Gives each tick of a fresh controller its recorded input as `alter` leaves it; what came
+/// out is compared in `judge`.
+fn step_through(
+    run: &Recorded,
+    mut alter: impl FnMut(&mut Input),
+    mut judge: impl FnMut(&Record, &Input, &Output),
+) {
     let controller = Controller::try_build(&Rig::prototype()).expect("the prototype is sound");
     let (mut state, mut sensors) = (State::default(), SensorFrame::default());
     for record in &run.ticks {
-        let input = Input {
+        let mut input = Input {
             plan: record.flags.plan().then(|| Recorded::of(&run.plans, record.at())).flatten(),
             ..record.input(&sensors)
         };
         sensors = input.sensors;
+        alter(&mut input);
         let output = controller.step(&mut state, &input);
-        judge(&run, record, &input, &output);
+        judge(record, &input, &output);
     }
+}
+
+/// Gives each tick its recorded input; what came out is compared in `judge`.
+fn again(name: &str, mut judge: impl FnMut(&Recorded, &Record, &Input, &Output)) -> Recorded {
+    let run = Recorded::read(name);
+    step_through(&run, |_| {}, |record, input, output| judge(&run, record, input, output));
     run
 }
 
 #[test]
 fn a_sensor_that_never_answers_is_named() {
     let run = Recorded::read("deploy.mcap");
-    let controller = Controller::try_build(&Rig::prototype()).expect("sound");
     type Silence = fn(&mut SensorFrame);
     let all: [(Silence, Fault); 4] = [
         (|sensors| sensors.wheel = None, Fault::SpeedStale),
@@ -86,18 +96,14 @@ fn a_sensor_that_never_answers_is_named() {
         (|sensors| sensors.arm = None, Fault::AngleStale),
     ];
     for (silence, fault) in all {
-        let (mut state, mut sensors) = (State::default(), SensorFrame::default());
         let mut said = None;
-        for record in &run.ticks {
-            let mut input = record.input(&sensors);
-            sensors = input.sensors;
-            silence(&mut input.sensors);
-            let output = controller.step(&mut state, &input);
+        let silence = |input: &mut Input| silence(&mut input.sensors);
+        step_through(&run, silence, |_, _, output| {
             assert!(!output.drive.enable && !output.preload.enable, "{fault:?}");
             if let Mode::FaultHold(fault) = output.telemetry.mode {
                 said.get_or_insert(fault);
             }
-        }
+        });
         assert_eq!(said, Some(fault));
     }
 }

@@ -10,6 +10,7 @@ mod hardware;
 mod injection;
 pub mod judge;
 mod sensors;
+pub mod sets;
 mod tamper;
 
 pub use catalogue::{CATALOGUE, Entry, entry};

@@ -6,9 +6,11 @@
 #[path = "common/board.rs"]
 mod common;
 
+use hil_sim::board::bench::Bench;
 use hil_sim::board::run::run;
 use hil_sim::faults::campaign::{Campaign, Case, Firmware, Outcome};
-use hil_sim::faults::{Injection, Kind, Target};
+use hil_sim::faults::{Injection, Kind, Target, sets};
+use hil_sim::params::board::PLACES;
 use hil_sim::scenario::Scenario;
 
 use common::{elf, strings};
@@ -51,6 +53,45 @@ fn what_breaks_on_the_board_is_found_or_borne_and_the_mechanism_held() {
         };
         assert_eq!(line.restarted(), restarted, "{line:?}");
     }
+}
+
+#[test]
+fn parameters_in_flash_are_the_old_ones_the_new_ones_or_named_as_damaged() {
+    let faults = [
+        ("stored-set bit-errors", Some("parameters damaged")),
+        ("spare-set bit-errors", None),
+        ("image-set bit-errors", Some("parameters damaged")),
+        ("parameter-save torn", Some("reset by supply")),
+        ("parameter-save reset", Some("reset by pin")),
+    ];
+    let outcome = campaign(&faults.map(|(name, _)| name));
+    let failures: Vec<_> = outcome.matrix.iter().flat_map(|line| &line.failures).collect();
+    assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{failures:#?}");
+    for (name, told) in faults {
+        let line = outcome.matrix.iter().find(|line| line.fault == name).expect(name);
+        assert_eq!((line.restarted(), line.code), (told, None), "{line:?}");
+    }
+}
+
+#[test]
+fn a_scenario_can_have_a_set_damaged_in_flash_and_the_board_started_anew() {
+    let text = "[[run.faults]]\ntarget = \"stored-set\"\nkind = \"bit-errors\"\nat_s = 0.5\n\
+                magnitude = 4321\n[[run.faults]]\ntarget = \"supply\"\nkind = \"off\"\nat_s = 0.6\n";
+    let scenario = Scenario::parse("bench.toml", text, &[]).expect("a scenario");
+    let mut bench = Bench::new(elf(), strings(), &scenario).expect("a bench");
+    let places = sets::places(&scenario).expect("sets");
+    bench.machine_mut().poke(PLACES, &places).expect("flash");
+    let mut said = Vec::new();
+    for _ in 0..1500 {
+        let (passed, lines) = bench.step().expect("runs");
+        assert!(!passed.drives.drive_on && !passed.drives.preload_on);
+        said.extend(lines.into_iter().map(|line| line.text));
+    }
+    let at = |text: &str| said.iter().position(|line| line.starts_with(text));
+    // A supply that was lost is a start like the first.
+    let (runs, holds) = (at("rig kept, "), at("parameters: the set is damaged"));
+    assert!(runs.is_some() && holds > runs, "{said:#?}");
+    assert_eq!(said.iter().filter(|line| line.starts_with("interstage ")).count(), 2);
 }
 
 #[test]

@@ -196,6 +196,24 @@ fn a_board_with_parameters_of_an_older_schema_holds_and_is_migrated_without_loss
 }
 
 #[test]
+fn a_damaged_set_is_named_drives_nothing_and_can_be_restored() {
+    let place = Place::new();
+    let set = set_of("mine", &Rig::prototype()).expect("a sound rig");
+    let mut flash = flash_with(&set, &place.at("flash"));
+    flash[1000] ^= 4;
+    std::fs::write(place.at("flash"), &flash).expect("written");
+    let (said, driven) = powered(&flash, 1500);
+    let complaints = said.iter().filter(|line| line.contains("the set is damaged")).count();
+    assert!(complaints >= 2 && !driven, "{said:?}");
+    let asked = place.run(&["get"]);
+    let line = String::from_utf8_lossy(&asked.stderr).into_owned();
+    assert!(line.contains("the set in force is damaged"), "{line}");
+    assert_eq!(place.good(&["restore"])["name"], "prototype");
+    let (said, _) = powered(&place.flash(), 1500);
+    assert!(said.iter().any(|line| line.contains("mode: idle")), "{said:?}");
+}
+
+#[test]
 fn parameters_that_nobody_can_read_are_named_and_can_be_restored() {
     // A rig of another layout: what stands in its place is no rig.
     let mut set = set_of("odd", &Rig::prototype()).expect("a sound rig");

@@ -23,10 +23,12 @@ pub(crate) type Constants = (&'static Controller, &'static Planner, Identity);
 /// Controller and planner of the set in force, in place for good, and the service that
 /// can replace it. Call once.
 ///
-/// A stored set that the firmware cannot run is not passed over for another one: the
-/// drive would move by parameters that nobody chose.
+/// A stored set that the firmware cannot run, or that is damaged, is not passed over for
+/// another one: the drive would move by parameters that nobody chose.
 pub(crate) fn build(pages: Pages) -> (Result<Constants, SetError>, Service<Pages>) {
-    let (_, set) = in_force(&pages, PROTOTYPE);
+    let Ok((_, set)) = in_force(&pages, PROTOTYPE) else {
+        return (Err(SetError::Damaged), Service::new(pages, PROTOTYPE, 0));
+    };
     let running = ParameterSet::open_any(set).map_or(0, |set| set.header().parameters);
     (constants(set), Service::new(pages, PROTOTYPE, running))
 }

@@ -6,7 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::slots::{Draft, DraftError, SetMemory, stored};
+use super::slots::{Damaged, Draft, DraftError, SetMemory, stored};
 use super::{MAX_NAME, ParameterSet, SCHEMA};
 
 /// Most bytes of a set in one request or answer; whole double words.
@@ -101,6 +101,8 @@ pub enum Refusal {
     Damaged,
     /// The set is of another schema.
     Schema,
+    /// The set in force is damaged.
+    Lost,
 }
 
 impl Refusal {
@@ -115,7 +117,14 @@ impl Refusal {
             Self::Flash => "the flash failed",
             Self::Damaged => "the new set arrived damaged",
             Self::Schema => "the new set is of another schema than the firmware",
+            Self::Lost => "the set in force is damaged: restore the image's, or one from a file",
         }
+    }
+}
+
+impl From<Damaged> for Refusal {
+    fn from(_: Damaged) -> Self {
+        Self::Lost
     }
 }
 
@@ -153,15 +162,13 @@ impl<M: SetMemory> Service<M> {
     /// changed. [`Request::Restart`] is [`Response::Done`] here: whoever sent the answer
     /// restarts.
     pub async fn answer(&mut self, request: Request, at_rest: bool) -> Response {
-        match request {
+        let answer = match request {
             Request::Describe => self.describe(),
             Request::Read { offset } => self.read(offset),
-            _ if !at_rest => Response::Refused(Refusal::Moving),
-            request => match self.change(request).await {
-                Ok(()) => Response::Done,
-                Err(refusal) => Response::Refused(refusal),
-            },
-        }
+            _ if !at_rest => Err(Refusal::Moving),
+            request => self.change(request).await.map(|()| Response::Done),
+        };
+        answer.unwrap_or_else(Response::Refused)
     }
 
     async fn change(&mut self, request: Request) -> Result<(), Refusal> {
@@ -180,7 +187,7 @@ impl<M: SetMemory> Service<M> {
             }
             Request::Restore => {
                 self.draft = None;
-                if in_force(&self.memory, self.image).1 != self.image {
+                if in_force(&self.memory, self.image).map(|(_, set)| set) != Ok(self.image) {
                     let mut draft = Draft::begin(&mut self.memory, self.image.len()).await?;
                     draft.append(&mut self.memory, self.image).await?;
                     draft.seal(&mut self.memory).await?;
@@ -191,13 +198,11 @@ impl<M: SetMemory> Service<M> {
         Ok(())
     }
 
-    fn describe(&self) -> Response {
-        let (origin, set) = in_force(&self.memory, self.image);
-        let Ok(opened) = ParameterSet::open_any(set) else {
-            return Response::Refused(Refusal::Damaged);
-        };
+    fn describe(&self) -> Result<Response, Refusal> {
+        let (origin, set) = in_force(&self.memory, self.image)?;
+        let opened = ParameterSet::open_any(set).map_err(|_| Refusal::Lost)?;
         let header = opened.header();
-        Response::Description(Description {
+        Ok(Response::Description(Description {
             origin,
             length: set.len() as u16,
             schema: header.schema,
@@ -205,23 +210,29 @@ impl<M: SetMemory> Service<M> {
             name: header.name.clone(),
             parameters: header.parameters,
             running: self.running,
-        })
+        }))
     }
 
-    fn read(&self, offset: u16) -> Response {
-        let (_, set) = in_force(&self.memory, self.image);
+    fn read(&self, offset: u16) -> Result<Response, Refusal> {
+        let (_, set) = in_force(&self.memory, self.image)?;
         let rest = set.get(usize::from(offset)..).unwrap_or_default();
         let part = rest.get(..rest.len().min(PIECE)).unwrap_or_default();
-        Piece::from_slice(part).map_or(Response::Refused(Refusal::Length), Response::Piece)
+        Piece::from_slice(part).map(Response::Piece).map_err(|_| Refusal::Length)
     }
 }
 
 /// The set in force: the stored one, or that of the image if none is stored.
-pub fn in_force<'m>(memory: &'m impl SetMemory, image: &'static [u8]) -> (Origin, &'m [u8]) {
-    match stored(memory) {
+///
+/// # Errors
+/// [`Damaged`] if one was stored and is damaged: no other one is in force for it.
+pub fn in_force<'m>(
+    memory: &'m impl SetMemory,
+    image: &'static [u8],
+) -> Result<(Origin, &'m [u8]), Damaged> {
+    Ok(match stored(memory)? {
         Some(stored) => (Origin::Stored { sequence: stored.sequence }, stored.set),
         None => (Origin::Image, image),
-    }
+    })
 }
 
 #[cfg(test)]
@@ -304,6 +315,26 @@ mod tests {
         let long = Request::Begin { length: MAX_SET as u16 + 1 };
         assert_eq!(ask(&mut service, long), Response::Refused(Refusal::Length));
         assert_eq!(read(&mut service), set("mine"));
+    }
+
+    #[test]
+    fn a_damaged_set_is_told_and_can_be_replaced() {
+        let mut service = service();
+        for restore in [true, false] {
+            send(&mut service, &set("mine"));
+            service.memory.flip(500);
+            for request in [Request::Describe, Request::Read { offset: 0 }] {
+                assert_eq!(ask(&mut service, request), Response::Refused(Refusal::Lost));
+            }
+            let done = if restore {
+                ask(&mut service, Request::Restore)
+            } else {
+                send(&mut service, &set("again"))
+            };
+            assert_eq!(done, Response::Done);
+            let name = if restore { "image" } else { "again" };
+            assert_eq!(origin(&mut service).1, name);
+        }
     }
 
     #[test]

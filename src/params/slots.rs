@@ -7,9 +7,15 @@
 //!
 //! ```text
 //! 0   seal: magic, sequence number       (written last)
-//! 8   length of the set, its complement
+//! 8   length of the set, fold of the sequence number, their complement
 //! 16  the set, filled up with 0xFF to a double word
 //! ```
+//!
+//! A bit that turns over later is another matter: the set in force is then lost, and neither
+//! the one before it nor the image's takes its place in silence, which nobody chose. What was
+//! never sealed is passed over; what was sealed and is not whole any more is told, unless the
+//! other place shows that it was out of force. The fold holds the sequence number to that: by
+//! itself, a number with a bit turned over would make a spare set the younger.
 
 use super::{MAX_SET, ParameterSet, Rest, SetError};
 
@@ -89,28 +95,89 @@ pub struct Stored<'a> {
     pub set: &'a [u8],
 }
 
-/// The set in force: the younger of those that are whole; none if none is.
-pub fn stored(memory: &impl SetMemory) -> Option<Stored<'_>> {
-    let whole = |slot| read(memory.bytes(slot), slot);
-    match (whole(Slot::A), whole(Slot::B)) {
-        (Some(a), Some(b)) => {
+/// The set in force is damaged: stored in this place, and not whole any more.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Damaged(pub Slot);
+
+/// The set in force: the younger of those that are whole; none if none was ever stored.
+///
+/// # Errors
+/// [`Damaged`] if a place is sealed, not whole, and not known to have been out of force.
+pub fn stored(memory: &impl SetMemory) -> Result<Option<Stored<'_>>, Damaged> {
+    use Found::{Broken, Open, Whole};
+    let found = |slot| look(memory.bytes(slot), slot).unwrap_or(Open);
+    match (found(Slot::A), found(Slot::B)) {
+        (Whole(a), Whole(b)) => {
             let b_is_younger = b.sequence.wrapping_sub(a.sequence) as i32 > 0;
-            Some(if b_is_younger { b } else { a })
+            Ok(Some(if b_is_younger { b } else { a }))
         }
-        (a, b) => a.or(b),
+        (Whole(whole), other) | (other, Whole(whole)) => {
+            let lost = other.may_follow(whole.sequence);
+            if lost { Err(Damaged(whole.slot.other())) } else { Ok(Some(whole)) }
+        }
+        (Broken { .. }, _) => Err(Damaged(Slot::A)),
+        (_, Broken { .. }) => Err(Damaged(Slot::B)),
+        (Open, Open) => Ok(None),
     }
 }
 
-fn read(bytes: &[u8], slot: Slot) -> Option<Stored<'_>> {
-    let number = |at: usize| Some(u32::from_le_bytes(*bytes.get(at..)?.first_chunk()?));
-    let length = number(8)?;
-    if number(0)? != MAGIC || number(12)? != !length {
-        return None;
+/// What stands in a place.
+enum Found<'a> {
+    /// Nothing that was sealed.
+    Open,
+    /// A whole set.
+    Whole(Stored<'a>),
+    /// What was sealed once.
+    Broken {
+        sequence: u32,
+        /// Fold of the sequence number, if it has one that can be read.
+        fold: Option<u16>,
+    },
+}
+
+impl Found<'_> {
+    /// Whether this place is broken, and its set may have been stored after that of this
+    /// number. One thing is broken: the fold, or else the sequence number itself, is right.
+    const fn may_follow(&self, before: u32) -> bool {
+        match *self {
+            Self::Broken { fold: Some(found), .. } => found != fold(before.wrapping_sub(1)),
+            Self::Broken { sequence, fold: None } => before.wrapping_sub(sequence) as i32 <= 0,
+            Self::Open | Self::Whole(_) => false,
+        }
     }
-    let set = bytes.get(PREFIX..)?.get(..length as usize)?;
-    // Of another schema it is still the user's, and told apart by whoever opens it.
-    ParameterSet::open_any(set).ok()?;
-    Some(Stored { slot, sequence: number(4)?, set })
+}
+
+/// Of a sequence number, so that no bit of it turns over unseen.
+const fn fold(sequence: u32) -> u16 {
+    (sequence ^ sequence >> 16) as u16
+}
+
+/// Length and fold of a sequence number in a word.
+const fn length_word(length: u32, sequence: u32) -> u32 {
+    length | (fold(sequence) as u32) << 16
+}
+
+fn look(bytes: &[u8], slot: Slot) -> Option<Found<'_>> {
+    let number = |at: usize| Some(u32::from_le_bytes(*bytes.get(at..)?.first_chunk()?));
+    let (magic, sequence, word) = (number(0)?, number(4)?, number(8)?);
+    // A seal half written or half erased is farther off than one bit.
+    if (magic ^ MAGIC).count_ones() > 1 {
+        return Some(Found::Open);
+    }
+    let sound = number(12)? == !word;
+    // Sets of earlier firmware have none.
+    let known = Some((word >> 16) as u16).filter(|found| sound && *found != 0);
+    // Of a seal half written the sequence number may be blank.
+    let named = sequence == u32::MAX || known.is_none_or(|found| found == fold(sequence));
+    let set = bytes.get(PREFIX..)?.get(..(word & 0xFFFF) as usize);
+    let whole = set.filter(|set| {
+        // Of another schema it is still the user's, and told apart by whoever opens it.
+        magic == MAGIC && sound && named && ParameterSet::open_any(set).is_ok()
+    });
+    Some(match whole {
+        Some(set) => Found::Whole(Stored { slot, sequence, set }),
+        None => Found::Broken { sequence, fold: known },
+    })
 }
 
 /// A set on its way into the place that is not in force.
@@ -143,9 +210,9 @@ impl From<FlashFault> for DraftError {
 }
 
 impl Draft {
-    /// Clears the place that is not in force for a set of `length` bytes. Of the pages
-    /// the one with the seal goes first, so that no old set is left half erased under
-    /// its seal.
+    /// Clears the place that is not in force, or is damaged, for a set of `length` bytes. Of
+    /// the pages the one with the seal goes first, so that no old set is left half erased
+    /// under its seal.
     ///
     /// # Errors
     /// [`DraftError`]; the set in force stays.
@@ -153,8 +220,14 @@ impl Draft {
         if length > MAX_SET {
             return Err(DraftError::Length);
         }
-        let (slot, sequence) = stored(memory)
-            .map_or((Slot::A, 1), |old| (old.slot.other(), old.sequence.wrapping_add(1)));
+        let (slot, sequence) = match stored(memory) {
+            Ok(Some(old)) => (old.slot.other(), old.sequence.wrapping_add(1)),
+            Ok(None) => (Slot::A, 1),
+            Err(Damaged(slot)) => match look(memory.bytes(slot.other()), slot.other()) {
+                Some(Found::Whole(old)) => (slot, old.sequence.wrapping_add(1)),
+                _ => (slot, 1),
+            },
+        };
         for page in 0..SLOT_BYTES / PAGE_BYTES {
             memory.erase(slot, page).await?;
         }
@@ -212,8 +285,8 @@ impl Draft {
     /// [`DraftError`]; the set that was in force stays.
     pub async fn seal(self, memory: &mut impl SetMemory) -> Result<(), DraftError> {
         self.check(memory)?;
-        let length = self.length as u32;
-        memory.program(self.slot, 8, pair(length, !length)).await?;
+        let word = length_word(self.length as u32, self.sequence);
+        memory.program(self.slot, 8, pair(word, !word)).await?;
         memory.program(self.slot, 0, pair(MAGIC, self.sequence)).await?;
         Ok(())
     }
@@ -235,10 +308,10 @@ fn read_planner(rest: Rest<'_>) -> Result<(), SetError> {
 /// that is written from outside; none if the set is too long.
 #[must_use]
 pub fn place(set: &[u8], sequence: u32) -> Option<[u8; SLOT_BYTES]> {
-    let length = u32::try_from(set.len()).ok()?;
+    let word = length_word(u16::try_from(set.len()).ok()?.into(), sequence);
     let mut bytes = [0xFF; SLOT_BYTES];
     bytes.get_mut(..WORD_BYTES)?.copy_from_slice(&pair(MAGIC, sequence));
-    bytes.get_mut(WORD_BYTES..PREFIX)?.copy_from_slice(&pair(length, !length));
+    bytes.get_mut(WORD_BYTES..PREFIX)?.copy_from_slice(&pair(word, !word));
     bytes.get_mut(PREFIX..PREFIX + set.len())?.copy_from_slice(set);
     Some(bytes)
 }

@@ -10,7 +10,7 @@ use super::log::{Line, Reader, Strings};
 use super::machine::Machine;
 use super::peripherals::HZ;
 use super::rtt::Probe;
-use super::tampered::{Tampered, letter};
+use super::tampered::{Saving, Tampered, letter};
 use crate::faults::Tamper;
 use crate::plant::draw::PlantParameters;
 use crate::plant::rig::{Drives, PlantError, VirtualRig};
@@ -102,7 +102,7 @@ impl<'a> Bench<'a> {
             restarts: 0,
             frames: Some(Vec::new()),
             text: None,
-            tampered: Tamper::of(scenario).map(Tampered::new),
+            tampered: Tamper::of(scenario).map(|tamper| Tampered::new(tamper, scenario)),
         };
         bench.speak(codes);
         Ok(bench)
@@ -114,7 +114,12 @@ impl<'a> Bench<'a> {
     /// [`BenchError`] if the engine or the plant fails.
     pub fn step(&mut self) -> Result<(Passed, Vec<Line>), BenchError> {
         let end = self.end();
+        self.save()?;
         if let Some(tampered) = &mut self.tampered {
+            // What is broken from the first is so before the first instruction.
+            if self.millisecond == 0 {
+                tampered.begin(&mut self.machine, &mut self.plant, 0.0)?;
+            }
             let (command, noise) = (tampered.command(), tampered.noise());
             tampered.hunt(&mut self.machine, end)?;
             if let Some(command) = command {
@@ -126,6 +131,23 @@ impl<'a> Bench<'a> {
         }
         self.machine.run_on(end)?;
         self.close()
+    }
+
+    /// A host that saves parameters, if a fault has it so, has its turn at the line.
+    fn save(&mut self) -> Result<(), BenchError> {
+        let Some(says) = self.tampered.as_ref().and_then(Tampered::says) else { return Ok(()) };
+        let went = self.line_send(&says)?;
+        let came = self.line_take()?;
+        if let Some(tampered) = &mut self.tampered {
+            tampered.hears(&mut self.machine, &came, went);
+        }
+        Ok(())
+    }
+
+    /// How far a save of parameters has come that a fault is to break off.
+    #[must_use]
+    pub(crate) fn saving(&self) -> Option<Saving> {
+        self.tampered.as_ref().and_then(Tampered::saving)
     }
 
     /// Cycle at which the millisecond under way is over.

@@ -183,8 +183,8 @@ impl Chip {
             self.spi.answer(answer, now);
         }
         self.flash.advance(now);
-        if self.flash.takes_power() {
-            self.reset = Some(Cause::Power);
+        if let Some(cause) = self.flash.ends_by() {
+            self.reset = Some(cause);
         }
         if self.watchdog.has_bitten(now) {
             self.reset = Some(Cause::Watchdog);

@@ -13,6 +13,7 @@ use super::machine::Machine;
 use interstage::params::{CompileError, slots};
 use interstage::rig::Rig;
 
+use crate::faults::{Injection, Target, sets};
 use crate::firmware::{FirmwareError, Footprint};
 use crate::log;
 use crate::params::board::PLACES;
@@ -69,8 +70,15 @@ pub fn check(scenario: &Scenario) -> Result<(), RunError> {
 }
 
 /// Puts the parameters of a rig that is not the image's own into the board's flash, as
-/// `rig params` would have.
+/// `rig params` would have. For a fault of stored parameters it is put there as well, with
+/// another one in the spare place.
 pub(crate) fn store(machine: &mut Machine, scenario: &Scenario) -> Result<(), RunError> {
+    let of_sets = |fault: &Injection| fault.target.is_of_sets();
+    let mut faults = scenario.run.faults.iter().filter(|fault| of_sets(fault));
+    if faults.any(|fault| fault.target != Target::ImageSet) {
+        machine.poke(PLACES, &sets::places(scenario)?).map_err(BenchError::from)?;
+        return Ok(());
+    }
     if scenario.rig == Rig::prototype() {
         return Ok(());
     }

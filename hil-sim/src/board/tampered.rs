@@ -3,7 +3,11 @@
 //! What software breaks between sensor and controller breaks here before the pin. A sensor
 //! that gives nothing is a broken line: a bridge reads the low end, the encoder's lines stay
 //! high, the angle sensor does not answer. Lost ticks are an interrupt that asks without end
-//! for as long; a task that hangs is caught in a loop in its next turn.
+//! for as long; a task that hangs is caught in a loop in its next turn. Of parameters in flash a
+//! bit is turned over, or a host saves new ones, as soon as the drive rests, and power goes or
+//! the reset pin is pulled while the flash is at work.
+
+mod save;
 
 use interstage::sense::raw::{AdcCode, Sample, SensorFrame};
 use interstage::supervise::Command;
@@ -11,10 +15,19 @@ use interstage::supervise::Command;
 use super::core::CoreError;
 use super::faults::Fault;
 use super::machine::Machine;
+use super::peripherals::HZ;
+use super::peripherals::flash::Cut;
 use super::peripherals::rcc::Cause;
-use crate::faults::{Injection, Kind, Tamper, Target};
+use crate::faults::{Injection, Kind, Tamper, Target, sets};
+use crate::params::{board::PLACES, set_of};
 use crate::plant::rig::{Drives, VirtualRig};
 use crate::plant::sensors::Codes;
+use crate::scenario::Scenario;
+use interstage::params::slots::SLOT_BYTES;
+use interstage::rig::Rig;
+
+use save::Save;
+pub(crate) use save::Saving;
 
 /// Cycles into its turn at which a task is caught.
 const INTO_TURN: u64 = 100;
@@ -25,28 +38,34 @@ const PATIENCE: u32 = 20;
 pub(super) struct Tampered {
     tamper: Tamper,
     hunt: Option<Hunt>,
-    /// When the task that was to hang was caught, s.
+    /// When the task that was to hang was caught, or the save broken off, s.
     caught_s: Option<f64>,
-    /// A task is to hang.
-    hangs: bool,
+    /// A task is to hang, or a save to be broken off: it strikes later than it comes.
+    waits: bool,
     /// Ticks are being lost.
     losing: bool,
     /// Encoder and angle sensor give nothing.
     silent: [bool; 2],
     /// The host's line is flooded, and with what next.
     flood: Option<u32>,
+    /// A host that saves parameters.
+    save: Option<Save>,
+    /// The rig of the parameters.
+    rig: Rig,
 }
 
 impl Tampered {
-    pub(super) fn new(tamper: Tamper) -> Self {
+    pub(super) fn new(tamper: Tamper, scenario: &Scenario) -> Self {
         Self {
             tamper,
             hunt: None,
             caught_s: None,
-            hangs: false,
+            waits: false,
             losing: false,
             silent: [false; 2],
             flood: None,
+            save: None,
+            rig: scenario.rig.clone(),
         }
     }
 
@@ -79,11 +98,20 @@ impl Tampered {
             self.flood = comes.then_some(1);
         }
         if let Some(task) = task(injection) {
-            self.hangs = true;
+            self.waits = true;
             self.hunt = comes.then(|| Hunt::new(machine, task));
         }
         if injection.target == Target::Debugger && comes {
             machine.restart(Cause::Software)?;
+        }
+        if injection.target == Target::ParameterSave {
+            self.waits = true;
+            // An unsound rig has been refused where the sets were put into flash.
+            let set = sets::set(sets::SAVED, &self.rig).ok().filter(|_| comes);
+            self.save = set.map(|set| Save::new(machine, set, cut(injection)));
+        }
+        if let Some(bit) = flipped(machine, injection)?.filter(|_| comes) {
+            return bit.strike(machine);
         }
         match register(injection) {
             Some(fault) => switch(fault, machine, comes),
@@ -97,9 +125,28 @@ impl Tampered {
             && hunt.go(machine, until)?
         {
             self.hunt = None;
-            self.caught_s = Some(machine.now() as f64 / super::peripherals::HZ as f64);
+            self.caught_s = Some(machine.now() as f64 / HZ as f64);
         }
         Ok(())
+    }
+
+    /// What a host that saves parameters has to send, if there is one.
+    pub(super) fn says(&self) -> Option<Vec<u8>> {
+        self.save.as_ref().map(Save::says)
+    }
+
+    /// So much of it went, and this came back.
+    pub(super) fn hears(&mut self, machine: &mut Machine, came: &[u8], went: usize) {
+        let Some(save) = &mut self.save else { return };
+        save.turn(machine, came, went);
+        if self.caught_s.is_none() {
+            self.caught_s = save.cut_at(machine).map(|at| at as f64 / HZ as f64);
+        }
+    }
+
+    /// How far a save of parameters has come, if there is one.
+    pub(super) fn saving(&self) -> Option<Saving> {
+        self.save.as_ref().map(Save::state)
     }
 
     /// What the sensors say at the pins, of what they would.
@@ -157,19 +204,20 @@ impl Tampered {
         self.tamper.log_gone()
     }
 
-    /// When the first fault came, s since power-up; of a task that hangs, when it was caught.
+    /// When the first fault came, s since power-up; of a task that hangs, when it was
+    /// caught; of a save, when it was broken off.
     pub(super) fn struck_s(&self) -> Option<f64> {
-        if self.hangs { self.caught_s } else { self.tamper.struck_s() }
+        if self.waits { self.caught_s } else { self.tamper.struck_s() }
     }
 
     /// When it first did something, see [`Tamper::acts_s`].
     pub(super) fn acts_s(&self) -> Option<f64> {
-        if self.hangs { self.caught_s } else { self.tamper.acts_s() }
+        if self.waits { self.caught_s } else { self.tamper.acts_s() }
     }
 
     /// When the readback had to tell it, see [`Tamper::tells_s`].
     pub(super) fn tells_s(&self) -> Option<f64> {
-        if self.hangs { self.caught_s } else { self.tamper.tells_s() }
+        if self.waits { self.caught_s } else { self.tamper.tells_s() }
     }
 }
 
@@ -204,6 +252,31 @@ fn task(injection: &Injection) -> Option<&'static str> {
         Target::LineTask => "link",
         _ => return None,
     })
+}
+
+/// When a save is broken off.
+fn cut(injection: &Injection) -> Cut {
+    let operation = injection.magnitude() as u64;
+    match injection.kind {
+        Kind::Reset => Cut::Pulled(operation),
+        _ => Cut::Within(operation),
+    }
+}
+
+/// The bit of a set of parameters that is turned over; none if it is another fault, or the
+/// image has no such set.
+fn flipped(machine: &Machine, injection: &Injection) -> Result<Option<Fault>, CoreError> {
+    let bit = injection.magnitude() as u32;
+    let (place, bit) = match injection.target {
+        Target::StoredSet => (Some(PLACES), bit),
+        Target::SpareSet => (Some(PLACES + SLOT_BYTES as u32), bit),
+        Target::ImageSet => {
+            let set = set_of("prototype", &Rig::prototype()).unwrap_or_default();
+            (machine.find(&set)?, bit % (8 * set.len() as u32).max(1))
+        }
+        _ => return Ok(None),
+    };
+    Ok(place.map(|place| Fault::BitFlip(place + bit / 8, (bit % 8) as u8)))
 }
 
 /// What it is in registers and lines.

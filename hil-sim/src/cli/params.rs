@@ -129,8 +129,10 @@ fn on_board(args: &Args) -> Result<Outcome, Failure> {
 
 fn act(args: &Args, store: &mut impl Store) -> Result<Outcome, Failure> {
     let held = match store.held() {
-        // What cannot be read can be replaced all the same.
-        Err(StoreError::Set { .. }) if matches!(args.action, Action::Restore { .. }) => {
+        // What cannot be read, or is damaged, can be replaced all the same.
+        Err(StoreError::Set { .. } | StoreError::Refused(_))
+            if matches!(args.action, Action::Restore { .. }) =>
+        {
             store.restore()?;
             store.held()?
         }

@@ -13,7 +13,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::judge::{Finding, Judge};
-use super::{CATALOGUE, Entry, HARDWARE, Injection, Kind, Target};
+use super::{CATALOGUE, Entry, HARDWARE, Injection, Kind, Target, sets};
+use crate::params::set_of;
+use crate::plant::rig::VirtualRig;
 use crate::scenario::{Scenario, StepAnomaly};
 use crate::sil::{Options, RunError, Session};
 
@@ -127,14 +129,39 @@ impl Case {
         }
     }
 
+    /// The measure of a fault of stored parameters: a random bit, every fourth time of the
+    /// seal and length, or a random operation of the flash.
+    fn measure(
+        entry: &Entry,
+        base: &Scenario,
+        instant: usize,
+        random: &mut ChaCha8Rng,
+    ) -> Option<f64> {
+        let stored = entry.target != Target::ImageSet;
+        let set = set_of(if stored { sets::KEPT } else { "prototype" }, &base.rig).ok()?;
+        let number = match entry.kind {
+            Kind::BitErrors if stored && instant % 4 == 1 => {
+                random.random_range(0..sets::seal_bits())
+            }
+            Kind::BitErrors => random.random_range(0..sets::bits(set.len(), stored)),
+            _ => random.random_range(1..=sets::operations(set.len())),
+        };
+        Some(f64::from(number))
+    }
+
     /// The scenario of an instant.
     fn scenario(&self, base: &Scenario, twin: &Twin, instant: usize) -> Scenario {
         let mut scenario = base.clone();
         let mut random = ChaCha8Rng::seed_from_u64(base.run.seed ^ 0x00fa_017e);
         match self {
             Self::Struck(entry) => {
-                let at_s = twin.instant(instant, &mut random);
-                let magnitude = Self::magnitude(entry, instant);
+                let mut at_s = twin.instant(instant, &mut random);
+                let mut magnitude = Self::magnitude(entry, instant);
+                if entry.target.is_of_sets() {
+                    magnitude = Self::measure(entry, base, instant, &mut random).unwrap_or(1.0);
+                    // One of three before the board starts.
+                    at_s = if instant.is_multiple_of(3) { 0.0 } else { at_s };
+                }
                 let mut fault = Injection::at(entry.target, entry.kind, at_s, magnitude);
                 // Who presses buttons at random stops doing so some time.
                 fault.duration_s = match entry.target {
@@ -229,9 +256,21 @@ impl Campaign {
     /// # Errors
     /// [`RunError`] if a run without a fault cannot be made.
     pub fn run(&self, done: &(dyn Fn() + Sync)) -> Result<Outcome, RunError> {
+        self.run_on("sil", Twin::run, watched, done)
+    }
+
+    /// Makes all of them on a target: each rig without a fault first, then every fault on
+    /// each. One that cannot be made counts as undetected.
+    fn run_on<E: std::fmt::Display + Send>(
+        &self,
+        target: &'static str,
+        twin: impl Fn(&Scenario) -> Result<Twin, E> + Sync,
+        watched: impl Fn(&Scenario, &Twin) -> Result<Instant, E> + Sync,
+        done: &(dyn Fn() + Sync),
+    ) -> Result<Outcome, E> {
         let scenarios: Vec<Scenario> = (0..self.instants).map(|i| self.base(i)).collect();
         let twin = |scenario: &Scenario| {
-            let twin = Twin::run(scenario);
+            let twin = twin(scenario);
             done();
             twin
         };
@@ -240,14 +279,14 @@ impl Campaign {
             let one = |instant: usize| {
                 let twin = &twins[instant];
                 let scenario = case.scenario(&scenarios[instant], twin, instant);
-                let found = one(&scenario, twin);
+                let found = watched(&scenario, twin);
                 done();
-                found
+                found.unwrap_or_else(|error| failed(&scenario, &error))
             };
             let instants: Vec<Instant> = (0..self.instants).into_par_iter().map(one).collect();
             Line::of(case, &instants)
         });
-        Ok(Outcome::of("sil", lines.collect(), self.instants))
+        Ok(Outcome::of(target, lines.collect(), self.instants))
     }
 
     /// Rig of an instant.
@@ -269,11 +308,6 @@ fn doing(mode: Mode) -> &'static str {
         Mode::Stopping(_) => "stopping",
         _ => "at rest",
     }
-}
-
-/// Runs a scenario with its fault beside its twin.
-fn one(scenario: &Scenario, twin: &Twin) -> Instant {
-    watched(scenario, twin).unwrap_or_else(|error| failed(scenario, &error))
 }
 
 /// A run that could not be made.
@@ -298,6 +332,17 @@ fn failed(scenario: &Scenario, error: &impl std::fmt::Display) -> Instant {
     }
 }
 
+/// Largest gap over the reference gap, of crossings and elsewhere (`worst_mm`), and whether
+/// every step was crossed both ways.
+fn crossed(plant: &VirtualRig, twin: &Twin, worst_mm: f64) -> (f64, bool) {
+    let crossings = plant.ledger().crossings();
+    let steps = plant.parameters().wall.steps().len();
+    let [out, back] = twin.gap_ref_mm;
+    let parts = crossings.iter().map(|c| c.gap_mm / if c.climbing { out } else { back });
+    (parts.fold(worst_mm / out, f64::max), crossings.len() == 2 * steps)
+}
+
+/// Runs a scenario with its fault beside its twin.
 fn watched(scenario: &Scenario, twin: &Twin) -> Result<Instant, RunError> {
     let mut session = Session::new(scenario, Options::default())?;
     let mut judge = Judge::new(scenario, session.plant().truth());
@@ -325,12 +370,7 @@ fn watched(scenario: &Scenario, twin: &Twin) -> Result<Instant, RunError> {
         after_s = if operator.over(session.mode()) { after_s + 1e-3 } else { 0.0 };
         tick += 1;
     }
-    let crossings = session.plant().ledger().crossings();
-    let steps = session.plant().parameters().wall.steps().len();
-    let [out, back] = twin.gap_ref_mm;
-    let parts = crossings.iter().map(|c| c.gap_mm / if c.climbing { out } else { back });
-    let gap_part = parts.fold(worst_mm / out, f64::max);
-    let crossed = crossings.len() == 2 * steps;
+    let (gap_part, crossed) = crossed(session.plant(), twin, worst_mm);
     let finding = judge.finding(&twin.limits, gap_part, crossed);
     let report = judge.fault.or_else(|| judge.new_limit(&twin.limits));
     let at_s = session.struck_s();

@@ -5,6 +5,9 @@ use super::catalogue::{one, plain};
 use super::{Entry, Kind, Target};
 
 const GIVES: &str = "gives this code whatever the voltage";
+const TURNED: &str = "a bit of its bytes in flash is turned over";
+const CUT: &str = "power goes in the middle of an operation of the flash";
+const PULLED: &str = "the reset pin is pulled in the middle of an operation of the flash";
 const CAUGHT: &str = "is caught in a loop in one of its turns";
 
 const fn stuck(target: Target) -> Entry {
@@ -15,13 +18,23 @@ const fn hung(target: Target) -> Entry {
     plain(target, Kind::Hung, CAUGHT)
 }
 
+/// By its number from the beginning; of the image's, from behind its last bit on again.
+const fn turned(target: Target) -> Entry {
+    one(target, Kind::BitErrors, 1000.0, (0.0, 32_767.0), "from its first", TURNED)
+}
+
+const fn broken_off(kind: Kind, text: &'static str) -> Entry {
+    one(Target::ParameterSave, kind, 100.0, (1.0, 10_000.0), "from its first", text)
+}
+
 /// All of them, in the order of the matrix.
 pub const HARDWARE: &[Entry] = {
-    use Kind::{BitErrors, Flooding, Hung, Off, Reset, Stalled, Stuck};
+    use Kind::{BitErrors, Flooding, Hung, Off, Reset, Stalled, Stuck, Torn};
     use Target::{
         AngleBus, AngleTask, Debugger, DisplacementTask, Dma, EncoderLineA, EncoderLineB, HostLine,
-        Interrupt, JournalTask, LineTask, LoadCellConverter, ModelTask, PressureTask, Processor,
-        ResetPin, SpeedTask, Supply, TickTask, Timer, TreadConverter,
+        ImageSet, Interrupt, JournalTask, LineTask, LoadCellConverter, ModelTask, PressureTask,
+        Processor, ResetPin, SpareSet, SpeedTask, StoredSet, Supply, TickTask, Timer,
+        TreadConverter,
     };
     &[
         stuck(LoadCellConverter),
@@ -46,6 +59,11 @@ pub const HARDWARE: &[Entry] = {
         plain(ResetPin, Reset, "is pulled for a moment"),
         plain(Debugger, Reset, "asks for a reset"),
         plain(HostLine, Flooding, "random bytes in every millisecond"),
+        turned(StoredSet),
+        turned(SpareSet),
+        turned(ImageSet),
+        broken_off(Torn, CUT),
+        broken_off(Reset, PULLED),
     ]
 };
 

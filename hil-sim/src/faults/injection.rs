@@ -82,6 +82,14 @@ pub enum Target {
     Debugger,
     /// The host's line.
     HostLine,
+    /// The set of parameters in force, in flash.
+    StoredSet,
+    /// The one before it, in the other place in flash.
+    SpareSet,
+    /// The set that the image carries, with nothing stored.
+    ImageSet,
+    /// A new set on its way into flash.
+    ParameterSave,
 }
 
 /// How it breaks.
@@ -114,7 +122,7 @@ pub enum Kind {
     Runaway,
     /// Loses friction.
     Slip,
-    /// Is torn: a sector of it is soft.
+    /// Is torn: a sector of it is soft; of a save, power goes in its middle.
     Torn,
     /// Is broken.
     Broken,
@@ -206,6 +214,12 @@ impl Target {
     #[must_use]
     pub fn is_hardware(self) -> bool {
         super::HARDWARE.iter().any(|entry| entry.target == self)
+    }
+
+    /// Whether it is a set of parameters that is read at a start.
+    #[must_use]
+    pub const fn is_of_sets(self) -> bool {
+        matches!(self, Self::StoredSet | Self::SpareSet | Self::ImageSet | Self::ParameterSave)
     }
 
     /// Whether a fault of it moves something before the controller does.

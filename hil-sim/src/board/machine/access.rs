@@ -2,6 +2,7 @@
 
 use super::Machine;
 use crate::board::core::{Access, Bus, Core, CoreError, Register};
+use crate::board::elf::FLASH;
 
 impl Machine {
     /// Reads memory, as a debug probe does.
@@ -10,6 +11,17 @@ impl Machine {
     /// [`CoreError::Engine`] if nothing lies there.
     pub fn peek(&self, address: u32, into: &mut [u8]) -> Result<(), CoreError> {
         self.core.read(address, into)
+    }
+
+    /// Where these bytes stand in flash, at their first place if there are several.
+    ///
+    /// # Errors
+    /// [`CoreError::Engine`] if flash cannot be read.
+    pub fn find(&self, bytes: &[u8]) -> Result<Option<u32>, CoreError> {
+        let mut flash = vec![0; FLASH.size as usize];
+        self.core.read(FLASH.base, &mut flash)?;
+        let mut places = flash.windows(bytes.len().max(1));
+        Ok(places.position(|place| place == bytes).map(|at| FLASH.base + at as u32))
     }
 
     /// A word of memory.

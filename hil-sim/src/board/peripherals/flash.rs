@@ -121,7 +121,7 @@ pub struct Flash {
     /// Operations begun so far, resets or not.
     begun: u64,
     cut: Option<Cut>,
-    power_lost: bool,
+    ends: bool,
 }
 
 impl Default for Flash {
@@ -137,7 +137,7 @@ impl Default for Flash {
             finished: None,
             begun: 0,
             cut: None,
-            power_lost: false,
+            ends: false,
         }
     }
 }

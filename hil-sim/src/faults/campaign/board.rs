@@ -4,24 +4,26 @@
 //! What the drive does in each tick is read where a restart would find it, in the record in
 //! the board's memory; nothing is asked of the firmware for it.
 
+mod parameters;
+
 use interstage::blackbox::{CRASH_WORDS, FLIGHT_WORDS, Flight, later};
 use interstage::control::Output;
 use interstage::log::{Entry, Event};
 use interstage::supervise::{Command, Limit, Mode};
 use interstage::units::Q16;
-use rayon::prelude::*;
 
 use super::super::judge::{Finding, Judge};
 use super::operator::Operator;
 use super::twin::Twin;
-use super::{AFTER_S, Campaign, Injection, Instant, Line, Outcome, doing, failed};
+use super::{AFTER_S, Campaign, Injection, Instant, Outcome, crossed, doing};
 use crate::board::bench::Bench;
 use crate::board::log::Strings;
 use crate::board::peripherals::rcc::Cause;
 use crate::board::run::{RunError, store};
-use crate::board::tampered::letter;
+use crate::board::tampered::{Saving, letter};
 use crate::log::Run;
 use crate::scenario::Scenario;
+use parameters::Parameters;
 
 /// Symbol of the record in the board's memory.
 const RECORD: &str = "INTERSTAGE_BLACKBOX";
@@ -49,26 +51,9 @@ impl Campaign {
         firmware: Firmware<'_>,
         done: &(dyn Fn() + Sync),
     ) -> Result<Outcome, RunError> {
-        let scenarios: Vec<Scenario> = (0..self.instants).map(|i| self.base(i)).collect();
-        let twin = |scenario: &Scenario| {
-            let twin = twin(firmware, scenario);
-            done();
-            twin
-        };
-        let twins: Vec<Twin> = scenarios.par_iter().map(twin).collect::<Result<_, _>>()?;
-        let lines = self.cases.iter().map(|case| {
-            let one = |instant: usize| {
-                let twin = &twins[instant];
-                let scenario = case.scenario(&scenarios[instant], twin, instant);
-                let found = watched(firmware, &scenario, twin)
-                    .unwrap_or_else(|error| failed(&scenario, &error));
-                done();
-                found
-            };
-            let instants: Vec<Instant> = (0..self.instants).into_par_iter().map(one).collect();
-            Line::of(case, &instants)
-        });
-        Ok(Outcome::of("board", lines.collect(), self.instants))
+        let twin = |scenario: &Scenario| twin(firmware, scenario);
+        let watched = |scenario: &Scenario, twin: &Twin| watched(firmware, scenario, twin);
+        self.run_on("board", twin, watched, done)
     }
 }
 
@@ -87,6 +72,8 @@ struct Board<'a> {
     frames: Vec<u8>,
     /// What it said of why it restarted.
     said: usize,
+    /// What it said of its parameters since it last started.
+    parameters: Parameters,
 }
 
 impl<'a> Board<'a> {
@@ -106,6 +93,7 @@ impl<'a> Board<'a> {
             owed: None,
             frames: Vec::new(),
             said: 0,
+            parameters: Parameters::default(),
         })
     }
 
@@ -124,6 +112,7 @@ impl<'a> Board<'a> {
         let restarts = self.bench.machine().restarts().len();
         if restarts > std::mem::replace(&mut self.restarts, restarts) {
             (self.mode, self.speed, self.up) = (Mode::Boot, Q16::ZERO, 0);
+            self.parameters = Parameters::default();
         }
         let mut output = Output::default();
         output.drive.enable = passed.drives.drive_on;
@@ -148,6 +137,7 @@ impl<'a> Board<'a> {
             let known = Limit::ALL.into_iter().find(|limit| Some(limit.code()) == code);
             known.into_iter().for_each(|limit| say(Event::Limit(limit)));
             self.said += usize::from(line.text.starts_with("restarted "));
+            self.parameters.look(&line.text, self.up);
         }
         output.telemetry.mode = self.mode;
         output.telemetry.speed_ref = self.speed;
@@ -216,7 +206,9 @@ fn watched(firmware: Firmware<'_>, scenario: &Scenario, twin: &Twin) -> Result<I
     while board.bench.time_s() < LONGEST_S && after_s < AFTER_S {
         let t_s = board.bench.time_s();
         let before = board.mode;
-        let command = operator.command(before);
+        // Who saves parameters does not press buttons meanwhile.
+        let free = board.bench.saving() != Some(Saving::Writing);
+        let command = if free { operator.command(before) } else { None };
         let output = board.step(command)?;
         let struck = early || board.bench.struck_s().is_some();
         if struck && !early && during.is_none() {
@@ -234,16 +226,15 @@ fn watched(firmware: Firmware<'_>, scenario: &Scenario, twin: &Twin) -> Result<I
             back_s = Some(t_s);
         }
         // A fault that is still to come is waited for only where something goes on.
-        after_s = if operator.over(board.mode) { after_s + 1e-3 } else { 0.0 };
+        let saves = matches!(board.bench.saving(), Some(Saving::Asked | Saving::Writing));
+        let over = !saves && (operator.over(board.mode) || board.parameters.holds());
+        after_s = if over { after_s + 1e-3 } else { 0.0 };
         tick += 1;
     }
-    let plant = board.bench.plant();
-    let crossings = plant.ledger().crossings();
-    let steps = plant.parameters().wall.steps().len();
-    let [out, back] = twin.gap_ref_mm;
-    let parts = crossings.iter().map(|c| c.gap_mm / if c.climbing { out } else { back });
-    let gap_part = parts.fold(worst_mm / out, f64::max);
-    let crossed = crossings.len() == 2 * steps;
+    let (gap_part, crossed) = crossed(board.bench.plant(), twin, worst_mm);
+    if scenario.run.faults.first().is_some_and(|fault| fault.target.is_of_sets()) {
+        return parameters::judged(board, judge, scenario, twin, (gap_part, crossed));
+    }
     let restart = board.restart();
     let finding = match (judge.finding(&twin.limits, gap_part, crossed), board.restarts) {
         (finding, 0) => finding,

@@ -1,6 +1,7 @@
-//! Power that goes while the flash is at work.
+//! Power that goes, or a reset that comes, while the flash is at work.
 
 use super::{Change, Flash};
+use crate::board::peripherals::rcc::Cause;
 
 /// When power is to go, counted in operations from the moment at which this is set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -9,6 +10,8 @@ pub enum Cut {
     Within(u64),
     /// As soon as the n-th is over.
     After(u64),
+    /// Power stays, but the reset pin is pulled in the middle of the n-th.
+    Pulled(u64),
 }
 
 impl Flash {
@@ -17,6 +20,7 @@ impl Flash {
         self.cut = Some(match cut {
             Cut::Within(count) => Cut::Within(self.begun + count),
             Cut::After(count) => Cut::After(self.begun + count),
+            Cut::Pulled(count) => Cut::Pulled(self.begun + count),
         });
     }
 
@@ -28,20 +32,26 @@ impl Flash {
 
     /// When an operation that begins at `now` and would be over at `due` ends or is cut.
     pub(super) fn cut_short(&self, due: u64, now: u64) -> u64 {
-        if self.cut == Some(Cut::Within(self.begun)) { now + (due - now) / 2 } else { due }
+        if self.is_torn() { now + (due - now) / 2 } else { due }
+    }
+
+    /// Whether the operation under way is not to come to its end.
+    fn is_torn(&self) -> bool {
+        [Some(Cut::Within(self.begun)), Some(Cut::Pulled(self.begun))].contains(&self.cut)
     }
 
     /// Whether power goes with the operation whose time has come; it is then not over.
     pub(super) fn goes_dark(&mut self) -> bool {
-        let within = self.cut == Some(Cut::Within(self.begun));
-        self.power_lost |= within || self.cut == Some(Cut::After(self.begun));
+        let within = self.is_torn();
+        self.ends |= within || self.cut == Some(Cut::After(self.begun));
         within
     }
 
-    /// Whether power has to go now.
+    /// What ends it all now.
     #[must_use]
-    pub const fn takes_power(&self) -> bool {
-        self.power_lost
+    pub fn ends_by(&self) -> Option<Cause> {
+        let pulled = matches!(self.cut, Some(Cut::Pulled(_)));
+        self.ends.then_some(if pulled { Cause::Pin } else { Cause::Power })
     }
 
     /// A reset. What was under way stays half done: of a double word the lower word is
@@ -55,7 +65,7 @@ impl Flash {
             }
             Change::Erased { address, size } => Change::Erased { address, size: size / 2 },
         });
-        let cut = self.cut.filter(|_| !self.power_lost);
+        let cut = self.cut.filter(|_| !self.ends);
         *self = Self { begun: self.begun, cut, ..Self::default() };
         over.or(torn)
     }

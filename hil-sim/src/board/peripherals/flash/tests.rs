@@ -1,6 +1,7 @@
 //! The rules of the reference manual, one a test.
 
 use super::*;
+use crate::board::peripherals::rcc::Cause;
 
 const ALL: u32 = u32::MAX;
 const ERASED: [u8; 8] = [0xFF; 8];
@@ -157,12 +158,22 @@ fn the_end_and_errors_interrupt_where_that_is_wanted() {
 fn power_that_goes_in_the_middle_leaves_half() {
     let mut flash = programming();
     flash.cut_power(Cut::Within(2));
-    assert!(program(&mut flash, PLACE, 1, ERASED).is_some() && !flash.takes_power());
+    assert!(program(&mut flash, PLACE, 1, ERASED).is_some() && flash.ends_by().is_none());
     assert_eq!(program(&mut flash, PLACE + 8, 0x1111_2222_3333_4444, ERASED), None);
-    assert!(flash.takes_power());
+    assert_eq!(flash.ends_by(), Some(Cause::Power));
     let bytes = [0x44, 0x44, 0x33, 0x33, 0xFF, 0xFF, 0xFF, 0xFF];
     assert_eq!(flash.reset(), Some(Change::Programmed { address: PLACE + 8, bytes }));
-    assert!(!flash.takes_power(), "it comes back and stays");
+    assert_eq!(flash.ends_by(), None, "it comes back and stays");
+}
+
+#[test]
+fn a_reset_in_the_middle_leaves_half_too() {
+    let mut flash = unlocked();
+    flash.cut_power(Cut::Pulled(1));
+    write(&mut flash, CR, PAGE | START, 0);
+    flash.advance(ERASE_CYCLES);
+    assert_eq!(flash.ends_by(), Some(Cause::Pin));
+    assert_eq!(flash.reset(), Some(Change::Erased { address: BASE, size: PAGE_BYTES / 2 }));
 }
 
 #[test]
@@ -171,7 +182,7 @@ fn power_that_goes_behind_an_operation_finds_it_done() {
     flash.cut_power(Cut::After(1));
     write(&mut flash, CR, PAGE | START, 0);
     flash.advance(ERASE_CYCLES);
-    assert!(flash.takes_power());
+    assert_eq!(flash.ends_by(), Some(Cause::Power));
     assert_eq!(flash.reset(), Some(Change::Erased { address: BASE, size: PAGE_BYTES }));
 }
 
