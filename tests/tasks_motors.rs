@@ -38,13 +38,17 @@ impl Board {
 
     /// A board on which some tasks never get the processor.
     fn without(missing: &[Station]) -> Self {
+        Self::with(forever(Exchange::new()), missing)
+    }
+
+    fn with(exchange: &'static Exchange, missing: &[Station]) -> Self {
         let rig = Rig::prototype();
         let controller = forever(Controller::try_build(&rig).expect("the prototype is valid"));
         let planner = forever(Planner::try_build(&rig).expect("the prototype is valid"));
         let bridges = Bridges::default();
         let mut board = Self {
             bench: Bench::new(),
-            exchange: forever(Exchange::new()),
+            exchange,
             wheel: Sensor::new(0),
             load_cell: Sensor::alive(UNLOADED),
             tread: Sensor::alive(UNLOADED),
@@ -56,7 +60,6 @@ impl Board {
             journal: Record::default(),
             light: Record::default(),
         };
-        let exchange = board.exchange;
         let runs = |station| !missing.contains(&station);
         let bench = &mut board.bench;
         if runs(Station::Speed) {
@@ -121,6 +124,28 @@ impl Board {
     fn bridges_are_off(&self) -> bool {
         self.motors.items().last() == Some(&(MotorCommand::OFF, MotorCommand::OFF))
     }
+}
+
+#[test]
+fn an_interrupt_that_beats_leads_every_tick() {
+    let exchange = forever(Exchange::new());
+    exchange.expect_beat();
+    let mut board = Board::with(exchange, &[]);
+    board.bench.poll();
+    assert!(exchange.telemetry().is_none());
+    for _ in 0..3000 {
+        board.bench.freeze_ms(1);
+        // The arm's angle is read with every second tick.
+        assert_eq!(exchange.beat(), now_ms().is_multiple_of(2));
+        board.bench.poll();
+        assert_eq!(exchange.telemetry().expect("a tick").at, now_ms());
+        board.bench.poll();
+    }
+    assert_eq!(board.mode(), Mode::Idle);
+    let reads = board.arm.reads();
+    assert!(reads.windows(2).all(|pair| pair[1] - pair[0] == 2), "{:?}", &reads[..8]);
+    let reads = board.wheel.reads();
+    assert!(reads.windows(2).all(|pair| pair[1] - pair[0] == 1), "{:?}", &reads[..8]);
 }
 
 #[test]

@@ -310,6 +310,11 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    #[test]
+    fn a_page_begins_blank() {
+        assert_eq!(Page::default().0, Page::new().0);
+    }
+
     fn head(kind: Kind, sequence: u32) -> Head {
         Head { kind: kind as u8, sequence, dropped: sequence / 3 }
     }

@@ -238,6 +238,36 @@ mod tests {
         }
     }
 
+    #[test]
+    fn each_sensor_s_state_has_its_fault() {
+        let states = [
+            (Validity::Valid, None),
+            (Validity::Held(Reason::OutOfRange), None),
+            (Validity::Absent, Some(0)),
+            (Validity::Stale, Some(0)),
+            (Validity::Invalid(Reason::OutOfRange), Some(1)),
+        ];
+        let faults = [
+            [Fault::SpeedStale, Fault::SpeedStale],
+            [Fault::PressureStale, Fault::PressureRange],
+            [Fault::DisplacementStale, Fault::DisplacementRange],
+            [Fault::AngleStale, Fault::AngleRange],
+        ];
+        for (validity, expected) in states {
+            for (sensor, faults) in faults.iter().enumerate() {
+                let mut sensed = sensed(0.0, 40.0);
+                let place = [
+                    &mut sensed.speed.validity,
+                    &mut sensed.preload.validity,
+                    &mut sensed.compression.validity,
+                    &mut sensed.radius.validity,
+                ];
+                *place.into_iter().nth(sensor).unwrap() = validity;
+                assert_eq!(judge(&sensed), expected.map(|which: usize| faults[which]));
+            }
+        }
+    }
+
     /// Ticks until a fault under a condition that lasts; `None` within five seconds.
     fn found(
         mode: Mode,

@@ -209,6 +209,11 @@ mod tests {
             prop_assert_eq!((x - y).0, (p - q).0.to_bits());
             prop_assert_eq!((x * y).0, (p * q).0.to_bits());
             prop_assert_eq!((-x).0, (-p).0.to_bits());
+            let (mut sum, mut difference, mut product) = (x, x, x);
+            sum += y;
+            difference -= y;
+            product *= y;
+            prop_assert_eq!((sum, difference, product), (x + y, x - y, x * y));
             prop_assert_eq!(x.abs().0, p.abs().0.to_bits());
             prop_assert_eq!(x.round(), p.0.to_num::<f64>().round() as i32);
             prop_assert_eq!(x.floor(), p.0.to_num::<f64>().floor() as i32);

@@ -2,6 +2,7 @@
 
 use super::super::Output;
 use super::*;
+use crate::blackbox::Place;
 use crate::estimate::crossing::{Contact, Sign};
 use crate::rig::Rig;
 use crate::sense::raw::SensorFrame;
@@ -119,4 +120,44 @@ proptest! {
         let felt = steps.iter().any(|face| (0.31..14.8).contains(&(face - position)));
         prop_assert!(!felt || state.watch.contact != Contact::Wall, "{:?}", state.watch);
     }
+}
+
+/// A start with this record; where it says that it stands, if it does, and whether it looks
+/// for the next step.
+fn started(sensed: &SensedState, kept: Option<(f64, bool)>) -> Option<(f64, bool)> {
+    let place = |(position, sure)| Place { position: Q16::from_num(position), sure };
+    let mut state = State::standing(kept.map(place));
+    let (placed, position) = at(sensed, 0.0, |controller, pass| {
+        (controller.go_on_from(&mut state, pass), pass.position.to_num::<f64>())
+    });
+    assert_eq!((state.located, state.resumed), (placed, placed));
+    placed.then_some((position, state.searching))
+}
+
+#[test]
+fn a_record_is_believed_as_far_as_the_arm_agrees() {
+    let on = |level: u8| SensedState { steps_up: Q16::from_num(level), ..sensed(level, 0.0, 0.3) };
+    let same = |got: Option<(f64, bool)>, position: f64, searching| {
+        got.is_some_and(|(at, searches)| (at - position).abs() < 1e-3 && searches == searching)
+    };
+    // On the first wall short of the step at 18 mm, and past it.
+    assert!(same(started(&on(0), Some((2.0, true))), 2.0, false));
+    assert!(same(started(&on(1), Some((30.0, true))), 30.0, false));
+    // Whoever may have gone on looks for the next step.
+    assert!(same(started(&on(1), Some((30.0, false))), 30.0, true));
+    // The arm stands too low or too high for the place.
+    assert_eq!(started(&on(0), Some((30.0, true))), None);
+    assert_eq!(started(&on(2), Some((2.0, true))), None);
+    assert_eq!(started(&on(0), None), None);
+}
+
+#[test]
+fn without_a_record_a_corner_under_the_wheel_tells_the_place() {
+    let on_corner = SensedState { steps_up: Q16::from_num(0.5), ..sensed(0, -2.0, 0.3) };
+    let (position, searching) = started(&on_corner, None).expect("a corner");
+    // Half-way up the first step, before its face and within its run.
+    assert!((5.0..18.0).contains(&position) && !searching, "{position}");
+    let from_above = SensedState { steps_up: Q16::from_num(0.5), ..sensed(1, 2.0, 0.3) };
+    let (other, _) = started(&from_above, None).expect("a corner");
+    assert!((other - position).abs() < 0.01, "{other} {position}");
 }

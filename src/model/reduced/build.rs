@@ -270,6 +270,24 @@ mod tests {
     use crate::units::Q16;
     use proptest::prelude::*;
 
+    #[test]
+    fn what_the_formats_do_not_hold_is_refused_by_name() {
+        let refuses = |change: fn(&mut Rig), key: &str| {
+            let mut rig = Rig::prototype();
+            change(&mut rig);
+            let formula = Formula::new(&rig);
+            let start = Start::new(&formula, None);
+            let shape = start.shape(&rig).err();
+            let error = shape.or_else(|| start.way(&rig, Direction::Deploy).err());
+            let named =
+                matches!(error, Some(RigError::OutOfRange { key: named, .. }) if named == key);
+            assert!(named, "{key}: {error:?}");
+        };
+        refuses(|rig| rig.tread.k_inf_pa_per_m = 1e11, "tread.k_inf_pa_per_m");
+        refuses(|rig| rig.tread.stiffening = 30.0, "tread.stiffening");
+        refuses(|rig| rig.tread.stiffening = 0.1, "tread.stiffening");
+    }
+
     const WAYS: [Direction; 2] = [Direction::Deploy, Direction::Retract];
 
     /// Largest relative errors against the formulas over a grid of the domain: gap,
