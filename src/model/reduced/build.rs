@@ -107,8 +107,8 @@ impl<'a> Start<'a> {
         let longest_bits = (longest * two_to(32)) as u32;
         let longest_shift = longest_bits.leading_zeros();
         let normalised = longest_bits << longest_shift;
-        let places = 14 - libm::log2(self.unit_n) as i32;
-        let force_places = u32::try_from(places).map_err(|_| stiff())?;
+        // 4 or more, as the unit is bounded.
+        let force_places = (14 - libm::log2(self.unit_n) as i32).unsigned_abs();
         let deflection_um = 1e3 * self.unit_n / f.impact.arm_n_per_mm;
         let at = |w: f64| self.longest_mm * (w + 0.5);
         let part = |force_n: f64| (force_n / self.unit_n * two_to(30)) as i32;
