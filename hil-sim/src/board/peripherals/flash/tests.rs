@@ -168,22 +168,25 @@ fn power_that_goes_in_the_middle_leaves_half() {
 
 #[test]
 fn a_reset_in_the_middle_leaves_half_too() {
-    let mut flash = unlocked();
-    flash.cut_power(Cut::Pulled(1));
-    write(&mut flash, CR, PAGE | START, 0);
-    flash.advance(ERASE_CYCLES);
-    assert_eq!(flash.ends_by(), Some(Cause::Pin));
-    assert_eq!(flash.reset(), Some(Change::Erased { address: BASE, size: PAGE_BYTES / 2 }));
+    assert_eq!(erased_until(Cut::Pulled(1)), (Some(Cause::Pin), PAGE_BYTES / 2));
 }
 
 #[test]
 fn power_that_goes_behind_an_operation_finds_it_done() {
+    assert_eq!(erased_until(Cut::After(1)), (Some(Cause::Power), PAGE_BYTES));
+}
+
+/// Erases the first page until this ends it: what ended it, and how much is erased.
+fn erased_until(cut: Cut) -> (Option<Cause>, u32) {
     let mut flash = unlocked();
-    flash.cut_power(Cut::After(1));
+    flash.cut_power(cut);
     write(&mut flash, CR, PAGE | START, 0);
     flash.advance(ERASE_CYCLES);
-    assert_eq!(flash.ends_by(), Some(Cause::Power));
-    assert_eq!(flash.reset(), Some(Change::Erased { address: BASE, size: PAGE_BYTES }));
+    let cause = flash.ends_by();
+    let Some(Change::Erased { address: BASE, size }) = flash.reset() else {
+        panic!("nothing erased at the beginning");
+    };
+    (cause, size)
 }
 
 #[test]
