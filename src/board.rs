@@ -17,15 +17,17 @@ mod flash;
 pub(crate) mod guard;
 #[cfg(feature = "hil")]
 pub(crate) mod hil;
-mod image;
+pub(crate) mod image;
 mod journal;
 pub(crate) mod light;
 mod line;
 #[cfg(not(feature = "hil"))]
 mod readback;
 pub(crate) mod rtt;
+pub(crate) mod supply;
 #[cfg(not(feature = "hil"))]
 mod wheel;
+mod words;
 
 #[cfg(not(feature = "hil"))]
 pub(crate) use analog::{Analog, Ring};

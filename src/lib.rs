@@ -21,6 +21,7 @@ pub mod link;
 pub mod log;
 pub mod model;
 pub mod numeric;
+pub mod pages;
 pub mod params;
 pub mod rig;
 pub mod sense;

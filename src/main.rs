@@ -25,7 +25,7 @@ mod firmware {
     #[cfg(not(feature = "hil"))]
     use embassy_stm32::{Peri, Peripherals, pac};
     use interstage::control::Controller;
-    use interstage::hal::{Board, Parts};
+    use interstage::hal::{Board, Journal, Parts};
     use interstage::log::{Entry, Event, Identity, Scribe};
     use interstage::model::Planner;
     use interstage::params::service::Service;
@@ -34,12 +34,13 @@ mod firmware {
     use rtt_target::DownChannel;
     use static_cell::{ConstStaticCell, StaticCell};
 
+    use crate::board::config::Held;
     #[cfg(feature = "hil")]
     use crate::board::hil::{self, split};
     use crate::board::rtt::Channels;
     #[cfg(not(feature = "hil"))]
     use crate::board::rtt::Frames;
-    use crate::board::{self, blackbox, config, guard, light, rtt};
+    use crate::board::{self, blackbox, config, guard, image, light, rtt, supply};
     #[cfg(not(feature = "hil"))]
     use crate::board::{Analog, Bridge, Checksum, Readback, Ring};
     use crate::board::{Angle, Bridges, Button, Console, Guard, HostLine, Lamp, Lines};
@@ -116,6 +117,7 @@ mod firmware {
     /// Starts everything.
     fn begin(threads: Spawner, channels: Channels) {
         let p = embassy_stm32::init(board::clocks());
+        supply::watch();
         defmt::info!("interstage {=str}", env!("CARGO_PKG_VERSION"));
         let restart = blackbox::report();
         EXCHANGE.log(Entry { at: 0, event: Event::Restart(restart) });
@@ -124,6 +126,11 @@ mod firmware {
         let (mut parts, lamp, pages) = split(p, console, channels.telemetry);
         parts.watchdog.place = restart.place();
         threads.spawn(light::show(lamp).unwrap());
+        let check = parts.journal.checker();
+        match image::verify(check) {
+            Some(sealed) => threads.spawn(image::watch(check, sealed).unwrap()),
+            None => return config::hold(threads, parts, Held::Image),
+        }
         let (constants, service) = config::build(pages);
         threads.spawn(link(HostLine::new(line), service).unwrap());
         match constants {
@@ -131,7 +138,7 @@ mod firmware {
                 parts.journal.introduce(identity);
                 start(threads, parts, controller, planner);
             }
-            Err(error) => threads.spawn(config::hold(parts, error).unwrap()),
+            Err(error) => config::hold(threads, parts, Held::Parameters(error)),
         }
     }
 

@@ -39,6 +39,10 @@ pub enum Stopped {
         /// When the bridges were cut.
         at: Tick,
     },
+    /// The supply fell below what it has to be.
+    Supply,
+    /// A bit of the image had turned over.
+    Image,
 }
 
 /// The last words of a program that was stopped.
@@ -61,6 +65,8 @@ impl Crash {
             Stopped::Panic { place, line } => (1, [place, line, 0, 0]),
             Stopped::Fault { pc, lr, cfsr, hfsr } => (2, [pc, lr, cfsr, hfsr]),
             Stopped::Hang { pc, lr, late, at } => (3, [pc, lr, u32::from(late.bits()), at]),
+            Stopped::Supply => (4, [0; 4]),
+            Stopped::Image => (5, [0; 4]),
         };
         let build = self.build;
         [kind, build, a, b, c, d, check(Self::SEED, &[kind, build, a, b, c, d])]
@@ -74,6 +80,8 @@ impl Crash {
             1 => Stopped::Panic { place: a, line: b },
             2 => Stopped::Fault { pc: a, lr: b, cfsr: c, hfsr: d },
             3 => Stopped::Hang { pc: a, lr: b, late: Late::from_bits(c as u16), at: d },
+            4 => Stopped::Supply,
+            5 => Stopped::Image,
             _ => return None,
         };
         let whole = check(Self::SEED, &[kind, build, a, b, c, d]) == sum;
@@ -91,6 +99,8 @@ impl fmt::Display for Stopped {
             Self::Hang { pc, lr, late, .. } => {
                 write!(f, "{} did not come, at {pc:#x} from {lr:#x}", late.name())
             }
+            Self::Supply => f.write_str("the supply fell too low"),
+            Self::Image => f.write_str("a bit of the image had turned over"),
         }
     }
 }

@@ -53,8 +53,9 @@ pub struct Restart {
 pub struct Place {
     /// Axial position, mm.
     pub position: Millimetres,
-    /// The bridges were off as soon as the record ends: what is added is the coasting. If
-    /// not, a drive went on that nobody watched.
+    /// The bridges were off as soon as the record ends, and the start came right behind it:
+    /// what is added is the coasting. If not, a drive went on that nobody watched, or the
+    /// supply was away for nobody knows how long.
     pub sure: bool,
 }
 
@@ -69,13 +70,21 @@ const UNFED: Tick = 100;
 const FRESH: Tick = 5;
 
 impl Restart {
+    /// Whether the program hung with interrupts shut out: nothing got through that could have
+    /// told who it was.
+    #[must_use]
+    pub const fn shut_out(&self) -> bool {
+        matches!(self.reset, Reset::Watchdog) && self.crash.is_none()
+    }
+
     /// Where the wheel stands, if the record tells.
     ///
     /// A reset takes the power from the bridges at once, a panic or a hard fault before it
     /// is recorded; then the wheel coasts by a tenth of a millimetre. If the tick hung, the
     /// drive went on at its last duty until the bridges were cut, or until the watchdog
-    /// bit: at about the reference of the last tick, for a time that is known. After a fault
-    /// that may have been one of the position it tells nothing.
+    /// bit: at about the reference of the last tick, for a time that is known. Without a
+    /// supply the gears hold the wheel, but not against a hand. After a fault that may have
+    /// been one of the position it tells nothing.
     #[must_use]
     pub fn place(&self) -> Option<Place> {
         let flight = self.flight.filter(|flight| flight.pace.placed() && spared(flight.fault))?;
@@ -85,7 +94,10 @@ impl Restart {
             _ => 0,
         };
         let way = flight.pace.speed() * ticks_to_seconds(unwatched + COASTS);
-        Some(Place { position: flight.position + way, sure: unwatched <= FRESH })
+        Some(Place {
+            position: flight.position + way,
+            sure: unwatched <= FRESH && self.reset != Reset::Power,
+        })
     }
 }
 
@@ -113,6 +125,9 @@ impl fmt::Display for Restart {
         write!(f, "started: {}", self.reset.sentence())?;
         if let Some(crash) = &self.crash {
             write!(f, "; {}", crash.stopped)?;
+        }
+        if self.shut_out() {
+            f.write_str("; a hang with interrupts shut out")?;
         }
         if let Some(flight) = &self.flight {
             let Flight { tick, position, level, fault, late, .. } = *flight;

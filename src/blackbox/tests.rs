@@ -22,12 +22,14 @@ fn flight() -> impl Strategy<Value = Flight> {
 }
 
 fn crash() -> impl Strategy<Value = Crash> {
-    (any::<u32>(), 0..3, any::<[u32; 4]>()).prop_map(|(build, kind, [a, b, c, d])| Crash {
+    (any::<u32>(), 0..5, any::<[u32; 4]>()).prop_map(|(build, kind, [a, b, c, d])| Crash {
         build,
         stopped: match kind {
             0 => Stopped::Panic { place: a, line: b },
             1 => Stopped::Fault { pc: a, lr: b, cfsr: c, hfsr: d },
-            _ => Stopped::Hang { pc: a, lr: b, late: Late::from_bits(c as u16), at: d },
+            2 => Stopped::Hang { pc: a, lr: b, late: Late::from_bits(c as u16), at: d },
+            3 => Stopped::Supply,
+            _ => Stopped::Image,
         },
     })
 }
@@ -119,6 +121,10 @@ fn the_place_is_the_record_s_and_the_way_gone_after_it() {
     near(restart(Reset::Watchdog, hang(900)), 29.92, true);
     near(restart(Reset::Watchdog, hang(975)), 30.0 - 40.0 * 0.077, false);
     near(restart(Reset::Software, crash(Stopped::Panic { place: 1, line: 2 })), 29.92, true);
+    // A dip, one that lasts until the watchdog bites, and a supply that was away.
+    near(restart(Reset::Software, crash(Stopped::Supply)), 29.92, true);
+    near(restart(Reset::Watchdog, crash(Stopped::Supply)), 29.92, true);
+    near(restart(Reset::Power, crash(Stopped::Supply)), 29.92, false);
     let lost = Flight { pace: Pace::of(Q16::from_num(-40), false), ..flight };
     assert_eq!(Restart { flight: Some(lost), ..restart(Reset::Pin, None) }.place(), None);
     let held = Flight { fault: 123, ..flight };
@@ -150,6 +156,14 @@ fn the_last_fault_is_kept_beyond_its_hold() {
 fn a_report_names_what_is_known() {
     let restart = Restart { reset: Reset::Power, flight: None, crash: None };
     assert_eq!(restart.to_string(), "started: power came up");
+    let hung = Restart { reset: Reset::Watchdog, ..restart };
+    assert_eq!(hung.to_string(), "started: by the watchdog; a hang with interrupts shut out");
+    let crash = |stopped| Some(Crash { build: 1, stopped });
+    let fell = Restart { crash: crash(Stopped::Supply), ..restart };
+    assert_eq!(fell.to_string(), "started: power came up; the supply fell too low");
+    let turned = Restart { reset: Reset::Software, crash: crash(Stopped::Image), ..restart };
+    let text = "started: by software or debugger; a bit of the image had turned over";
+    assert_eq!(turned.to_string(), text);
     let flight = Flight { tick: 9, mode: 6, level: 1, fault: 122, late: Late::TICK, ..EMPTY };
     let stopped = Stopped::Hang { pc: 16, lr: 32, late: Late::STARVED, at: 80 };
     let crash = Some(Crash { build: 1, stopped });

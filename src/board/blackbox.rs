@@ -17,7 +17,7 @@ use interstage::blackbox::{
     CRASH_WORDS, Crash, FLIGHT_WORDS, Flight, Reset, Restart, Stopped, later,
 };
 
-use super::{SYSCLK_HZ, guard, image};
+use super::{SYSCLK_HZ, guard, image, supply};
 
 /// What is kept.
 #[repr(C)]
@@ -50,8 +50,16 @@ pub(super) fn keep(flight: &Flight) {
     unsafe { (&raw mut (*kept()).flights[place]).write_volatile(flight.seal()) }
 }
 
+/// What is kept of the last whole tick.
+#[inline(never)]
+pub(super) fn flight() -> Option<Flight> {
+    // SAFETY: see `Shared`; read by a start, and by handlers that never return.
+    let [even, odd] = unsafe { (&raw const (*kept()).flights).read_volatile() };
+    later(Flight::open(&even), Flight::open(&odd))
+}
+
 /// Keeps why the program ends.
-fn stop(stopped: Stopped) {
+pub(super) fn stop(stopped: Stopped) {
     let crash = Crash { build: build(), stopped };
     // SAFETY: see `Shared`.
     unsafe { (&raw mut (*kept()).crash).write_volatile(crash.seal()) }
@@ -63,21 +71,26 @@ fn build() -> u32 {
     u32::from_le_bytes([a, b, c, d])
 }
 
-/// What there is to report of the time before this start; forgotten by that. Call once,
-/// before the control tick begins.
+/// What there is to report of the time before this start. Call once, before the control tick
+/// begins.
+///
+/// What the drive was doing stays kept until the tick writes over it, so that a second reset
+/// right behind the first, as of a pin that bounces or a supply that flickers, finds it too.
 pub(crate) fn report() -> Restart {
-    // SAFETY: nobody else is there yet. The words may never have been written, so they
-    // are read as volatile memory that holds anything.
-    let Kept { crash, flights: [even, odd] } = unsafe {
-        let found = kept().read_volatile();
-        kept().write_volatile(Kept { crash: [0; CRASH_WORDS], flights: [[0; FLIGHT_WORDS]; 2] });
-        found
-    };
-    let restart = Restart {
-        reset: guard::take_reset(),
-        flight: later(Flight::open(&even), Flight::open(&odd)),
-        crash: Crash::open(&crash),
-    };
+    let in_memory = flight();
+    // SAFETY: nobody else is there yet. The words may never have been written, so they are
+    // read as volatile memory that holds anything.
+    let crash = unsafe { (&raw const (*kept()).crash).read_volatile() };
+    let in_flash = supply::take();
+    let flight = in_memory.or(in_flash);
+    let first = flight.map_or([0; FLIGHT_WORDS], |flight| flight.seal());
+    let flights = [first, [0; FLIGHT_WORDS]];
+    // SAFETY: as before.
+    unsafe { kept().write_volatile(Kept { crash: [0; CRASH_WORDS], flights }) }
+    let supply = || Crash { build: build(), stopped: Stopped::Supply };
+    let crash =
+        Crash::open(&crash).or(if in_memory.is_none() { in_flash.map(|_| supply()) } else { None });
+    let restart = Restart { reset: guard::take_reset(), flight, crash };
     say(&restart);
     restart
 }
@@ -86,6 +99,9 @@ pub(crate) fn report() -> Restart {
 fn say(restart: &Restart) {
     if restart.reset != Reset::Power {
         defmt::error!("restarted {=str}", restart.reset.sentence());
+    }
+    if restart.shut_out() {
+        defmt::error!("a hang with interrupts shut out");
     }
     if let Some(crash) = &restart.crash {
         match crash.stopped {
@@ -105,6 +121,8 @@ fn say(restart: &Restart) {
                 pc,
                 lr
             ),
+            Stopped::Supply => defmt::error!("the supply fell too low"),
+            Stopped::Image => defmt::error!("a bit of the image had turned over"),
         }
     }
     if let Some(Flight { tick, position, mode, level, fault, late, .. }) = restart.flight {
@@ -234,7 +252,14 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     let (place, line) = info
         .location()
         .map_or((0, 0), |place| (core::ptr::from_ref::<Location<'_>>(place) as u32, place.line()));
-    stop(Stopped::Panic { place, line });
+    end(Stopped::Panic { place, line })
+}
+
+/// Ends the program for this: bridges off, the reason kept, a start anew.
+pub(super) fn end(stopped: Stopped) -> ! {
+    cortex_m::interrupt::disable();
+    guard::cut();
+    stop(stopped);
     restart()
 }
 

@@ -1,5 +1,6 @@
 //! From the set of parameters to what the tasks run on.
 
+use embassy_executor::Spawner;
 use embassy_time::Timer;
 use interstage::control::Controller;
 use interstage::hal::{Indicator, Light, MotorCommand, Motors, Parts};
@@ -9,7 +10,7 @@ use interstage::params::service::{Service, in_force};
 use interstage::params::{Header, ParameterSet, SetError};
 use static_cell::StaticCell;
 
-use super::{Nucleo, Pages, image};
+use super::{Bridges, Lamp, Nucleo, Pages, image};
 
 /// The set that the image carries: the prototype, written by `cargo rig constants`.
 static PROTOTYPE: &[u8] = include_bytes!("../params/prototype.set");
@@ -67,17 +68,35 @@ fn announce(header: &Header) {
     );
 }
 
-/// No controller can be read from the parameters: stays off and says so.
+/// Why the drive stays off.
+#[derive(Clone, Copy)]
+pub(crate) enum Held {
+    /// A bit of the image has turned over: what would run is not what was tested.
+    Image,
+    /// No controller can be read from the parameters.
+    Parameters(SetError),
+}
+
+/// Has the drive stay off, and says why.
+pub(crate) fn hold(threads: Spawner, parts: Parts<Nucleo>, why: Held) {
+    let Parts { motors, light, wheel, load_cell, tread, arm, watchdog, button, console, journal } =
+        parts;
+    // As they are until the next start: to switch them off would be code for nothing.
+    core::mem::forget((wheel, load_cell, tread, arm, watchdog, button, console, journal));
+    threads.spawn(stay_off(motors, light, why).unwrap());
+}
+
 #[embassy_executor::task]
-pub(crate) async fn hold(mut parts: Parts<Nucleo>, error: SetError) -> ! {
-    parts.motors.apply(MotorCommand::OFF, MotorCommand::OFF);
-    parts.light.show(Light::Alarm);
+async fn stay_off(mut motors: Bridges, mut light: Lamp, why: Held) -> ! {
+    motors.apply(MotorCommand::OFF, MotorCommand::OFF);
+    light.show(Light::Alarm);
     loop {
-        match error {
-            SetError::Schema { found } => {
+        match why {
+            Held::Image => image::say_damaged(),
+            Held::Parameters(error @ SetError::Schema { found }) => {
                 defmt::error!("parameters: {=str}, {=u16}", error.sentence(), found);
             }
-            _ => defmt::error!("parameters: {=str}", error.sentence()),
+            Held::Parameters(error) => defmt::error!("parameters: {=str}", error.sentence()),
         }
         Timer::after_secs(1).await;
     }

@@ -1,9 +1,24 @@
-//! Which image this is.
+//! Which image this is, and whether it is still what was flashed.
+
+use core::slice;
+
+use embassy_time::{Duration, Timer};
+use interstage::blackbox::Stopped;
+use interstage::log::frame::Checker;
+use interstage::pages::seals;
+
+use super::blackbox;
+use super::words::SEALS;
 
 unsafe extern "C" {
     /// The note that the linker writes, see `memory.x`: three words of head, the name
     /// `GNU` with its zero, then the hash of the image.
     static __build_id: [u8; 24];
+    static __vector_table: u8;
+    /// Initial values of the statics, with which the image ends.
+    static __sidata: u8;
+    static __sdata: u8;
+    static __edata: u8;
 }
 
 /// First eight bytes of the image's hash. `readelf -n` shows the whole of it.
@@ -14,4 +29,63 @@ pub(super) fn id() -> [u8; 8] {
     let note = unsafe { &__build_id };
     id.copy_from_slice(&note[16..]);
     id
+}
+
+/// All of it, as it stands in flash.
+fn bytes() -> &'static [u8] {
+    let first = &raw const __vector_table;
+    let values = &raw const __edata as usize - &raw const __sdata as usize;
+    let length = &raw const __sidata as usize + values - first as usize;
+    // SAFETY: flash from the vectors to the end of the image, which nothing writes to.
+    unsafe { slice::from_raw_parts(first, length) }
+}
+
+/// The image's sum, if it is the one of its first start, or this is its first; none if a bit
+/// has turned over since.
+pub(crate) fn verify(check: Checker) -> Option<u32> {
+    let sum = bytes().chunks(seals::CHUNK).fold(0, |sum, part| seals::fold(sum, check(part)));
+    let sealed = seals::sum_of(SEALS.bytes(), id()).unwrap_or_else(|| {
+        seal(sum);
+        sum
+    });
+    (sealed == sum).then_some(sum)
+}
+
+/// Keeps the sum for the starts to come.
+fn seal(sum: u32) {
+    defmt::info!("first start of this image, sum {=u32:08x}", sum);
+    let first = seals::free(SEALS.bytes()).unwrap_or_else(|| {
+        SEALS.erase();
+        0
+    });
+    for (index, word) in seals::entry(id(), sum).into_iter().enumerate() {
+        SEALS.program(first + index, word);
+    }
+}
+
+/// Says that it is no longer what it was.
+#[inline(never)]
+pub(super) fn say_damaged() {
+    defmt::error!("image: a bit has turned over since its first start; flash it again");
+}
+
+/// From one part to the next: a round takes six seconds, and no more than a thousandth of
+/// the core.
+const PACE: Duration = Duration::from_millis(50);
+
+/// Sums up the image over and over, and ends the program if it is no longer what it was.
+#[embassy_executor::task]
+pub(crate) async fn watch(check: Checker, sealed: u32) -> ! {
+    loop {
+        let mut sum = 0;
+        for part in bytes().chunks(seals::CHUNK) {
+            Timer::at(crate::EXCHANGE.aside(PACE)).await;
+            sum = seals::fold(sum, check(part));
+        }
+        if sum != sealed {
+            // Also for the case that what starts anew cannot say it any more.
+            say_damaged();
+            blackbox::end(Stopped::Image);
+        }
+    }
 }

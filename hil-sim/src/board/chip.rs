@@ -16,7 +16,7 @@ use super::peripherals::flash::{Change, Flash};
 use super::peripherals::gpio::Gpio;
 use super::peripherals::iwdg::Iwdg;
 use super::peripherals::pwm::Pwm;
-use super::peripherals::pwr::Pwr;
+use super::peripherals::pwr::{Pwr, Then};
 use super::peripherals::rcc::{Cause, Rcc};
 use super::peripherals::spi::{self, AngleSensor, Spi};
 use super::peripherals::syscfg::Syscfg;
@@ -28,6 +28,9 @@ pub use pins::{Bridge, Motor, Pin};
 pub use stray::{Stray, Strays, Why};
 
 use map::Block;
+
+/// Line of the supply's detector among the external interrupts.
+const SUPPLY_LINE: u32 = 16;
 
 /// Requests of the multiplexer: ADC1, ADC2, SPI1 in and out.
 const REQUESTS: [u32; 4] = [5, 36, 10, 11];
@@ -55,7 +58,8 @@ pub struct Chip {
     counter: Counter,
     /// Reset and clock control.
     pub rcc: Rcc,
-    pwr: Pwr,
+    /// Power control, with the supply.
+    pub power: Pwr,
     /// The flash's interface.
     pub flash: Flash,
     syscfg: Syscfg,
@@ -103,7 +107,7 @@ impl Chip {
             system: System::new(vectors),
             counter: Counter::default(),
             rcc: Rcc::new(Cause::Power, 0),
-            pwr: Pwr::default(),
+            power: Pwr::default(),
             flash: Flash::default(),
             syscfg: Syscfg::default(),
             exti: Exti::new(0),
@@ -152,8 +156,15 @@ impl Chip {
         self.strays = old.strays;
         self.inputs = old.inputs;
         self.flash = old.flash;
+        self.power = old.power.after_reset(now);
         self.settle(now);
         torn
+    }
+
+    /// The supply falls below the detector's threshold, up to this cycle.
+    pub fn supply_falls(&mut self, until: u64, then: Then, now: u64) {
+        self.power.fall(until, then);
+        self.settle(now);
     }
 
     /// A reset that the chip wants, once.
@@ -183,13 +194,18 @@ impl Chip {
             self.spi.answer(answer, now);
         }
         self.flash.advance(now);
+        let low = self.power.tells();
+        self.power.advance(now);
         if let Some(cause) = self.flash.ends_by() {
             self.reset = Some(cause);
         }
         if self.watchdog.has_bitten(now) {
             self.reset = Some(Cause::Watchdog);
         }
-        let mut turned = false;
+        if self.power.is_gone(now) {
+            self.reset = Some(Cause::Power);
+        }
+        let mut turned = self.power.tells() != low;
         for motor in &mut self.motors {
             if motor.deadline() <= now {
                 motor.advance(now);
@@ -250,7 +266,9 @@ impl Chip {
     /// The same after an access to one block: what cannot have changed is left alone.
     fn settle_after(&mut self, block: Block, offset: u32, write: bool, now: u64) {
         match block {
-            Block::Port(_) | Block::Syscfg | Block::Motor(_) | Block::Exti if write => {
+            Block::Port(_) | Block::Syscfg | Block::Motor(_) | Block::Exti | Block::Pwr
+                if write =>
+            {
                 self.settle(now);
             }
             Block::Adc | Block::Readback | Block::Spi if write => self.settle_lines(now),
@@ -272,6 +290,7 @@ impl Chip {
             self.reset = Some(Cause::Software);
         }
         let lines = [
+            (1, self.exti.asks(1 << SUPPLY_LINE)),
             (4, self.flash.asks()),
             (23, self.exti.asks(0x03E0)),
             (28, self.time.asks()),
@@ -299,6 +318,7 @@ impl Chip {
             self.spi.deadline(),
             self.watchdog.deadline(),
             self.flash.deadline(),
+            self.power.deadline(),
         ];
         self.deadline = due.into_iter().min().unwrap_or(u64::MAX);
         if self.reset.is_some() || self.next_move().is_some() {
@@ -313,7 +333,7 @@ impl Chip {
             Block::Encoder => &mut self.encoder,
             Block::Motor(index) => &mut self.motors[index],
             Block::Watchdog => &mut self.watchdog,
-            Block::Pwr => &mut self.pwr,
+            Block::Pwr => &mut self.power,
             Block::Syscfg => &mut self.syscfg,
             Block::Exti => &mut self.exti,
             Block::Spi => &mut self.spi,

@@ -6,6 +6,7 @@ use std::str::FromStr;
 
 use super::core::CoreError;
 use super::machine::Machine;
+use super::peripherals::pwr::{HOLDS, Then};
 use super::peripherals::rcc::Cause;
 
 /// A fault.
@@ -26,8 +27,13 @@ pub enum Fault {
     TimerFlags,
     /// The button's interrupt line asks without end, whatever the handler does.
     ButtonStorm,
-    /// The supply falls too low for a moment.
+    /// The supply falls too low for a moment: the detector tells of it, and a millisecond later
+    /// power is gone.
     BrownOut,
+    /// The supply is gone for a moment, without a warning.
+    SupplyCut,
+    /// The supply falls below the detector's threshold for half a millisecond, and comes back.
+    SupplyDip,
     /// The reset pin is pulled for a moment.
     ResetPin,
     /// What runs is caught in a loop without end: the task, or the interrupt.
@@ -58,7 +64,15 @@ impl Fault {
                 let now = machine.now();
                 machine.chip_mut().look_again(now);
             }
-            Self::BrownOut => return machine.restart(Cause::Power),
+            Self::BrownOut => {
+                let now = machine.now();
+                machine.chip_mut().supply_falls(now + HOLDS, Then::Gone, now);
+            }
+            Self::SupplyCut => return machine.restart(Cause::Power),
+            Self::SupplyDip => {
+                let now = machine.now();
+                machine.chip_mut().supply_falls(now + HOLDS / 2, Then::Back, now);
+            }
             Self::ResetPin => return machine.restart(Cause::Pin),
             Self::Caught => return machine.catch(),
             Self::BitFlip(address, bit) => {
@@ -85,7 +99,12 @@ impl Fault {
                 let now = machine.now();
                 machine.chip_mut().look_again(now);
             }
-            Self::BrownOut | Self::ResetPin | Self::Caught | Self::BitFlip(..) => {}
+            Self::BrownOut
+            | Self::SupplyCut
+            | Self::SupplyDip
+            | Self::ResetPin
+            | Self::Caught
+            | Self::BitFlip(..) => {}
         }
     }
 }
@@ -103,8 +122,8 @@ pub struct Timed {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{0}`: expected <fault>@<seconds> with load-cell=<code>, tread=<code>, \
-     drive-readback=<code>, pretightener-readback=<code>, angle-bits=<mask>, angle-lost, encoder-a, encoder-b, dma-stalled, timer-flags, button-storm, brown-out, \
-     reset-pin, caught or flip=<address>.<bit>"
+     drive-readback=<code>, pretightener-readback=<code>, angle-bits=<mask>, angle-lost, encoder-a, encoder-b, dma-stalled, timer-flags, button-storm, \
+     brown-out, supply-cut, supply-dip, reset-pin, caught or flip=<address>.<bit>"
 )]
 pub struct Misspelt(String);
 
@@ -137,6 +156,8 @@ impl FromStr for Fault {
             ("timer-flags", None) => Some(Self::TimerFlags),
             ("button-storm", None) => Some(Self::ButtonStorm),
             ("brown-out", None) => Some(Self::BrownOut),
+            ("supply-cut", None) => Some(Self::SupplyCut),
+            ("supply-dip", None) => Some(Self::SupplyDip),
             ("reset-pin", None) => Some(Self::ResetPin),
             ("caught", None) => Some(Self::Caught),
             ("flip", Some(place)) => place.split_once('.').and_then(|(address, bit)| {
@@ -176,6 +197,8 @@ impl fmt::Display for Fault {
             Self::TimerFlags => write!(f, "timer-flags"),
             Self::ButtonStorm => write!(f, "button-storm"),
             Self::BrownOut => write!(f, "brown-out"),
+            Self::SupplyCut => write!(f, "supply-cut"),
+            Self::SupplyDip => write!(f, "supply-dip"),
             Self::ResetPin => write!(f, "reset-pin"),
             Self::Caught => write!(f, "caught"),
             Self::BitFlip(address, bit) => write!(f, "flip={address:#x}.{bit}"),
@@ -202,6 +225,8 @@ mod tests {
             Fault::TimerFlags,
             Fault::ButtonStorm,
             Fault::BrownOut,
+            Fault::SupplyCut,
+            Fault::SupplyDip,
             Fault::ResetPin,
             Fault::Caught,
             Fault::BitFlip(0x0800_1234, 7),

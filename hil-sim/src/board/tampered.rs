@@ -13,6 +13,7 @@ use interstage::sense::raw::{AdcCode, Sample, SensorFrame};
 use interstage::supervise::Command;
 
 use super::core::CoreError;
+use super::elf::FLASH;
 use super::faults::Fault;
 use super::machine::Machine;
 use super::peripherals::HZ;
@@ -263,8 +264,8 @@ fn cut(injection: &Injection) -> Cut {
     }
 }
 
-/// The bit of a set of parameters that is turned over; none if it is another fault, or the
-/// image has no such set.
+/// The bit of the image or of a set of parameters that is turned over; none if it is another
+/// fault, or the image has no such set.
 fn flipped(machine: &Machine, injection: &Injection) -> Result<Option<Fault>, CoreError> {
     let bit = injection.magnitude() as u32;
     let (place, bit) = match injection.target {
@@ -273,6 +274,10 @@ fn flipped(machine: &Machine, injection: &Injection) -> Result<Option<Fault>, Co
         Target::ImageSet => {
             let set = set_of("prototype", &Rig::prototype()).unwrap_or_default();
             (machine.find(&set)?, bit % (8 * set.len() as u32).max(1))
+        }
+        Target::Image => {
+            let used = machine.image().flash.iter().rposition(|byte| *byte != 0xFF);
+            (Some(FLASH.base), bit % (8 * used.map_or(1, |last| last as u32 + 1)))
         }
         _ => return Ok(None),
     };
@@ -293,7 +298,9 @@ fn register(injection: &Injection) -> Option<Fault> {
         (Target::Timer, _) => Fault::TimerFlags,
         (Target::Interrupt, _) => Fault::ButtonStorm,
         (Target::Processor, _) => Fault::Caught,
-        (Target::Supply, _) => Fault::BrownOut,
+        (Target::Supply, Kind::Off) => Fault::BrownOut,
+        (Target::Supply, Kind::Weak) => Fault::SupplyDip,
+        (Target::Supply, _) => Fault::SupplyCut,
         (Target::ResetPin, _) => Fault::ResetPin,
         _ => return None,
     })

@@ -41,8 +41,8 @@ pub(super) struct Args {
 
     /// Fault of the emulated board's hardware and when it comes, may be repeated:
     /// load-cell=0x8000@5.2, tread=<code>, angle-bits=<mask>, angle-lost, encoder-a,
-    /// encoder-b, dma-stalled, timer-flags, brown-out or flip=<address>.<bit>, each at its
-    /// seconds from power-up.
+    /// encoder-b, dma-stalled, timer-flags, brown-out, supply-cut, supply-dip or
+    /// flip=<address>.<bit>, each at its seconds from power-up.
     #[arg(long, value_name = "FAULT@S")]
     board_fault: Vec<String>,
 

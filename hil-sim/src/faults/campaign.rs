@@ -162,6 +162,9 @@ impl Case {
                     // One of three before the board starts.
                     at_s = if instant.is_multiple_of(3) { 0.0 } else { at_s };
                 }
+                if entry.target == Target::Image {
+                    magnitude = random.random_range(entry.range.0..=entry.range.1).floor();
+                }
                 let mut fault = Injection::at(entry.target, entry.kind, at_s, magnitude);
                 // Who presses buttons at random stops doing so some time.
                 fault.duration_s = match entry.target {

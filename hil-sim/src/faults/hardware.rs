@@ -29,11 +29,11 @@ const fn broken_off(kind: Kind, text: &'static str) -> Entry {
 
 /// All of them, in the order of the matrix.
 pub const HARDWARE: &[Entry] = {
-    use Kind::{BitErrors, Flooding, Hung, Off, Reset, Stalled, Stuck, Torn};
+    use Kind::{BitErrors, Flooding, Gone, Hung, Off, Reset, Stalled, Stuck, Torn, Weak};
     use Target::{
         AngleBus, AngleTask, Debugger, DisplacementTask, Dma, EncoderLineA, EncoderLineB, HostLine,
-        ImageSet, Interrupt, JournalTask, LineTask, LoadCellConverter, ModelTask, PressureTask,
-        Processor, ResetPin, SpareSet, SpeedTask, StoredSet, Supply, TickTask, Timer,
+        Image, ImageSet, Interrupt, JournalTask, LineTask, LoadCellConverter, ModelTask,
+        PressureTask, Processor, ResetPin, SpareSet, SpeedTask, StoredSet, Supply, TickTask, Timer,
         TreadConverter,
     };
     &[
@@ -56,12 +56,15 @@ pub const HARDWARE: &[Entry] = {
         hung(JournalTask),
         hung(LineTask),
         plain(Supply, Off, "falls too low for a moment: brown-out"),
+        plain(Supply, Gone, "is gone for a moment, without a warning"),
+        plain(Supply, Weak, "dips below its threshold for half a millisecond"),
         plain(ResetPin, Reset, "is pulled for a moment"),
         plain(Debugger, Reset, "asks for a reset"),
         plain(HostLine, Flooding, "random bytes in every millisecond"),
         turned(StoredSet),
         turned(SpareSet),
         turned(ImageSet),
+        one(Image, BitErrors, 100_000.0, (0.0, 1_048_575.0), "from its first", TURNED),
         broken_off(Torn, CUT),
         broken_off(Reset, PULLED),
     ]

@@ -90,6 +90,8 @@ pub enum Target {
     ImageSet,
     /// A new set on its way into flash.
     ParameterSave,
+    /// The image in flash, after its first start.
+    Image,
 }
 
 /// How it breaks.

@@ -17,6 +17,8 @@ use crate::scenario::{Direction, Scenario};
 const START_MS: u32 = 6000;
 /// Longest time from being caught to the watchdog's reset, ms.
 const BITE_MS: u32 = 250;
+/// Longest time from the supply's warning to its reset, ms.
+const FALLS_MS: u32 = 2;
 /// How long the idle drive is watched before the command, ms.
 const WATCHED_MS: u32 = 200;
 /// Longest way to either end, ms.
@@ -44,7 +46,7 @@ const ARRIVED_MM: f64 = 1.0;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
-    /// The supply falls too low: memory is lost.
+    /// The supply falls too low: memory is lost, a millisecond after the warning.
     BrownOut,
     /// What runs is caught in a loop, and the watchdog ends it.
     Watchdog,
@@ -192,8 +194,7 @@ pub struct After {
     pub mode: String,
     /// Where the wheel was, mm.
     pub position_mm: f64,
-    /// The record said why the board restarted and what the drive was doing; without
-    /// memory, why alone.
+    /// The record said why the board restarted and what the drive was doing.
     pub record: bool,
     /// The stored parameters are as they were, to the byte.
     pub parameters: bool,
@@ -501,7 +502,17 @@ impl Case {
         let engine = crate::board::bench::BenchError::from;
         machine.run_on(machine.now() + (self.part * STEP as f64) as u64).map_err(engine)?;
         match self.kind {
-            Kind::BrownOut => machine.restart(Cause::Power).map_err(engine)?,
+            Kind::BrownOut => {
+                Fault::BrownOut.strike(machine).map_err(engine)?;
+                for _ in 0..FALLS_MS {
+                    board.step()?;
+                    way.push(board.bench.plant().truth().position_mm);
+                    if !board.bench.machine().restarts().is_empty() {
+                        return Ok(way);
+                    }
+                }
+                wrong.push("not reset by a supply that is gone".to_owned());
+            }
             Kind::Pin => Fault::ResetPin.strike(machine).map_err(engine)?,
             Kind::Software => machine.restart(Cause::Software).map_err(engine)?,
             Kind::Watchdog => {
@@ -526,15 +537,14 @@ impl Case {
         if restart.reset != self.kind.reset() {
             return fail("another reset");
         }
-        if self.kind == Kind::BrownOut {
-            // Memory is gone; something that looks like a record would be made up.
-            let none = restart.flight.is_none() && restart.crash.is_none();
-            return if none { None } else { fail("out of lost memory") };
-        }
         let Some(flight) = &restart.flight else { return fail("nothing of the run") };
         let since_ms = struck_ms - f64::from(flight.tick);
-        let bites_ms = if self.kind == Kind::Watchdog { f64::from(BITE_MS) } else { 0.0 };
-        if !(-1.0..=RECORD_MS + bites_ms).contains(&since_ms) {
+        let later_ms = f64::from(match self.kind {
+            Kind::Watchdog => BITE_MS,
+            Kind::BrownOut => FALLS_MS,
+            Kind::Pin | Kind::Software => 0,
+        });
+        if !(-1.0..=RECORD_MS + later_ms).contains(&since_ms) {
             return fail("of another time");
         }
         let back = (since_ms.max(0.0) as usize).min(way.len() - 1);
@@ -544,6 +554,8 @@ impl Case {
         }
         match (self.kind, restart.crash.map(|crash| crash.stopped)) {
             (Kind::Watchdog, Some(Stopped::Hang { late, .. })) if !late.is_nobody() => None,
+            (Kind::BrownOut, Some(Stopped::Supply)) => None,
+            (Kind::BrownOut, None) => fail("nothing of the supply"),
             // Caught in a critical section nothing gets through that could tell who.
             (_, None) => None,
             (_, Some(_)) => fail("a crash that was none"),

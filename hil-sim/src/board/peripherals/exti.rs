@@ -1,4 +1,5 @@
-//! External interrupts: edges at the pins that the system configuration selects.
+//! External interrupts: edges at the pins that the system configuration selects, and of the
+//! supply's detector.
 
 use super::registers::{Kept, Registers};
 use super::{Peripheral, Write};
@@ -40,7 +41,7 @@ impl Exti {
         Self { registers: Registers::new(&REGISTERS), pending: 0, levels }
     }
 
-    /// Levels of lines 0 to 15 as they stand now.
+    /// Levels of the lines as they stand now: 0 to 15 of pins, 16 of the supply's detector.
     pub fn look(&mut self, levels: u32) {
         let rising = levels & !self.levels & self.registers.get(RTSR);
         let falling = !levels & self.levels & self.registers.get(FTSR);

@@ -15,7 +15,7 @@ use interstage::units::Q16;
 use super::super::judge::{Finding, Judge};
 use super::operator::Operator;
 use super::twin::Twin;
-use super::{AFTER_S, Campaign, Injection, Instant, Outcome, crossed, doing};
+use super::{AFTER_S, Campaign, Injection, Instant, Outcome, Target, crossed, doing};
 use crate::board::bench::Bench;
 use crate::board::log::Strings;
 use crate::board::peripherals::rcc::Cause;
@@ -27,6 +27,10 @@ use parameters::Parameters;
 
 /// Symbol of the record in the board's memory.
 const RECORD: &str = "INTERSTAGE_BLACKBOX";
+/// What it says of an image of which a bit has turned over.
+const IMAGE: &str = "image: ";
+/// How that is reported, in the matrix.
+const IMAGE_DAMAGED: &str = "image damaged";
 /// Longest run, s since power-up.
 const LONGEST_S: f64 = 60.0;
 /// Ticks that a record may be ahead of the clock since a restart.
@@ -74,6 +78,8 @@ struct Board<'a> {
     said: usize,
     /// What it said of its parameters since it last started.
     parameters: Parameters,
+    /// When it first said that its image is damaged, s.
+    image_s: Option<f64>,
 }
 
 impl<'a> Board<'a> {
@@ -94,6 +100,7 @@ impl<'a> Board<'a> {
             frames: Vec::new(),
             said: 0,
             parameters: Parameters::default(),
+            image_s: None,
         })
     }
 
@@ -138,6 +145,9 @@ impl<'a> Board<'a> {
             known.into_iter().for_each(|limit| say(Event::Limit(limit)));
             self.said += usize::from(line.text.starts_with("restarted "));
             self.parameters.look(&line.text, self.up);
+            if line.text.starts_with(IMAGE) {
+                self.image_s.get_or_insert(self.bench.time_s());
+            }
         }
         output.telemetry.mode = self.mode;
         output.telemetry.speed_ref = self.speed;
@@ -201,6 +211,7 @@ fn watched(firmware: Firmware<'_>, scenario: &Scenario, twin: &Twin) -> Result<I
     let mut judge = Judge::new(scenario, board.bench.plant().truth());
     let mut operator = Operator::default();
     let early = scenario.run.faults.is_empty();
+    let of_image = scenario.run.faults.iter().any(|fault| fault.target == Target::Image);
     let (mut during, mut sign_s, mut tick, mut after_s) = (None, None, 0, 0.0);
     let (mut worst_mm, mut back_s) = (0.0f64, None);
     while board.bench.time_s() < LONGEST_S && after_s < AFTER_S {
@@ -227,7 +238,12 @@ fn watched(firmware: Firmware<'_>, scenario: &Scenario, twin: &Twin) -> Result<I
         }
         // A fault that is still to come is waited for only where something goes on.
         let saves = matches!(board.bench.saving(), Some(Saving::Asked | Saving::Writing));
-        let over = !saves && (operator.over(board.mode) || board.parameters.holds());
+        let over = match board.image_s {
+            Some(_) => true,
+            // The whole of it is looked at in some seconds.
+            None if of_image => false,
+            None => !saves && (operator.over(board.mode) || board.parameters.holds()),
+        };
         after_s = if over { after_s + 1e-3 } else { 0.0 };
         tick += 1;
     }
@@ -235,15 +251,21 @@ fn watched(firmware: Firmware<'_>, scenario: &Scenario, twin: &Twin) -> Result<I
     if scenario.run.faults.first().is_some_and(|fault| fault.target.is_of_sets()) {
         return parameters::judged(board, judge, scenario, twin, (gap_part, crossed));
     }
-    let restart = board.restart();
+    let restart = match board.image_s {
+        Some(_) => Some(IMAGE_DAMAGED),
+        None => board.restart().filter(|_| !of_image),
+    };
     let finding = match (judge.finding(&twin.limits, gap_part, crossed), board.restarts) {
-        (finding, 0) => finding,
+        (finding, 0) if !of_image => finding,
         _ if restart.is_some() => Finding::Found,
         _ => Finding::Undetected,
     };
     let report = judge.fault.or_else(|| judge.new_limit(&twin.limits));
     let at_s = board.bench.struck_s();
-    let told_s = report.map(|(at_s, _)| at_s).or(back_s.filter(|_| restart.is_some()));
+    let told_s = match report {
+        Some((at_s, _)) => Some(at_s),
+        None => board.image_s.or(back_s).filter(|_| restart.is_some()),
+    };
     let since = |from_s: Option<f64>| Some(1e3 * (told_s? - from_s?).max(0.0));
     let injection = scenario.run.faults.first();
     let moving = injection.is_some_and(|fault| fault.target.moves());
@@ -259,7 +281,7 @@ fn watched(firmware: Firmware<'_>, scenario: &Scenario, twin: &Twin) -> Result<I
         latency_any_ms: since(board.bench.acts_s()),
         after_sign_ms: if moving { since(sign_s.or(told_s)) } else { None },
         rest_ms: judge.fault.and_then(|(at_s, _)| Some(1e3 * (judge.rest_s? - at_s).max(0.0))),
-        end: judge.end(),
+        end: if board.image_s.is_some() { "hold" } else { judge.end() },
         peak_preload_n: judge.peak_preload_n,
         motion_mm: judge.motion_mm,
         gap_part,

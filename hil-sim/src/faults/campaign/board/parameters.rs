@@ -4,11 +4,12 @@
 //! them. So the run is judged as any other, then the board is started anew, and judged is
 //! what it says then: it has to run on the set in force, or, after a save, on the old one or
 //! the new one, whole to the byte; or hold and name the damage. A set that nobody put in
-//! force is a harm, and so is a drive that holds although its set is whole.
+//! force is a harm, and so is a drive that holds although its set is whole. A bit of the
+//! image's own set is one of the image too, and is told as such after its first start.
 
 use interstage::params::slots::SLOT_BYTES;
 
-use super::{AFTER_S, Board, Saving, Twin};
+use super::{AFTER_S, Board, IMAGE, IMAGE_DAMAGED, Saving, Twin};
 use crate::board::bench::BenchError;
 use crate::board::peripherals::rcc::Cause;
 use crate::board::run::RunError;
@@ -37,7 +38,7 @@ pub(super) struct Parameters {
 impl Parameters {
     /// Looks at a line that comes so many milliseconds after the start.
     pub(super) fn look(&mut self, text: &str, up: u64) {
-        if text.starts_with(DAMAGED) {
+        if text.starts_with(DAMAGED) || text.starts_with(IMAGE) {
             self.damaged.get_or_insert(up);
         }
         if let Some((name, _)) = text.strip_prefix(RUNS).and_then(|rest| rest.split_once(", ")) {
@@ -77,7 +78,8 @@ pub(super) fn judged(
     if saving.is_some() && before && !crossed {
         harms.push("does not complete after the save".to_owned());
     }
-    let told = if held { Some(HELD) } else { board.restart().filter(|_| saving.is_some()) };
+    let why = if board.image_s.is_some() { IMAGE_DAMAGED } else { HELD };
+    let told = if held { Some(why) } else { board.restart().filter(|_| saving.is_some()) };
     if held {
         (finding, end) = (Finding::Found, "hold");
     } else if lost || saving.is_some() && told.is_none() {

@@ -1,0 +1,211 @@
+//! What the board's flash keeps beside parameters: what the drive was doing when the supply
+//! went, and the sum of the image at its first start.
+
+#![cfg(feature = "board")]
+
+#[path = "common/board.rs"]
+mod common;
+#[path = "common/reset_board.rs"]
+mod reset_board;
+
+use hil_sim::board::bench::STEP;
+use hil_sim::board::faults::Fault;
+use hil_sim::board::peripherals::flash::Cut;
+use hil_sim::board::peripherals::rcc::Cause;
+use interstage::blackbox::{Flight, Reset, Stopped};
+use interstage::pages::PAGE_BYTES;
+use interstage::params::slots::SLOT_BYTES;
+use interstage::supervise::Mode;
+
+use reset_board::Board;
+
+/// Where the pages stand, by `docs/PARAMETERS.md`.
+const RECORDS: u32 = 0x0808_0000 - 2 * SLOT_BYTES as u32 - PAGE_BYTES as u32;
+const SEALS: u32 = RECORDS - PAGE_BYTES as u32;
+
+/// What every image says that finds itself damaged.
+const DAMAGED: &str = "image: a bit has turned over";
+
+/// Longest time in which the whole image is looked at twice, ms.
+const LOOKED_AT_MS: u32 = 14_000;
+
+fn page(board: &Board, address: u32) -> Vec<u8> {
+    let mut bytes = vec![0; PAGE_BYTES];
+    board.bench.machine().peek(address, &mut bytes).expect("flash");
+    bytes
+}
+
+fn strike(board: &mut Board, fault: Fault) {
+    fault.strike(board.bench.machine_mut()).expect("strikes");
+}
+
+/// Falls in the middle of a run, and is judged by what the next start reports.
+fn falls(board: &mut Board) -> Option<Flight> {
+    strike(board, Fault::BrownOut);
+    let (cause, after, driven) = board.reset(5);
+    assert_eq!(cause, Cause::Power);
+    assert!(after <= 1, "{after} ms");
+    assert!(!driven[1..].contains(&true), "{driven:?}");
+    let restart = board.report();
+    assert_eq!(restart.reset, Reset::Power);
+    assert_eq!(restart.flight.is_some(), restart.crash.is_some());
+    if let Some(crash) = restart.crash {
+        assert_eq!(crash.stopped, Stopped::Supply);
+    }
+    restart.flight
+}
+
+#[test]
+fn a_supply_that_falls_leaves_what_the_drive_did() {
+    let mut board = Board::moving();
+    let at = board.bench.plant().truth().position_mm;
+    let flight = falls(&mut board).expect("a record");
+    assert!(matches!(flight.mode(), Some(Mode::Run(..))), "{flight:?}");
+    assert!((flight.position.to_num::<f64>() - at).abs() < 0.3, "{flight:?} at {at}");
+    for said in ["the supply fell too low", "before: tick"] {
+        assert!(board.log.iter().any(|line| line.contains(said)), "{said}: {:#?}", board.log);
+    }
+}
+
+#[test]
+fn a_record_of_the_supply_is_reported_once() {
+    let mut board = Board::moving();
+    falls(&mut board).expect("a record");
+    // The memory is lost, and this time without a warning.
+    strike(&mut board, Fault::SupplyCut);
+    let second = board.report();
+    assert_eq!((second.reset, second.flight, second.crash), (Reset::Power, None, None));
+}
+
+#[test]
+fn a_supply_that_flickers_leaves_its_first_record() {
+    let mut board = Board::moving();
+    strike(&mut board, Fault::BrownOut);
+    board.reset(5);
+    // Back for some milliseconds: the record has been taken, the tick has not begun.
+    for _ in 0..5 {
+        board.step();
+    }
+    let flight = falls(&mut board).expect("the same record");
+    assert!(matches!(flight.mode(), Some(Mode::Run(..))), "{flight:?}");
+}
+
+#[test]
+fn a_record_is_whole_or_none_wherever_power_goes() {
+    for (operations, whole) in [(1, false), (2, false), (3, false), (4, true)] {
+        let mut board = Board::moving();
+        // One from before, which must not pass for this one.
+        let earlier = falls(&mut board).expect("a record");
+        assert!(board.bench.send(b's').expect("runs"));
+        board.until("deploying: cruise", 6000);
+        board.bench.take_frames();
+        board.bench.machine_mut().chip_mut().flash.cut_power(Cut::Within(operations));
+        strike(&mut board, Fault::BrownOut);
+        board.reset(5);
+        let restart = board.report();
+        assert_eq!(restart.flight.is_some(), whole, "{operations}: {restart}");
+        assert!(restart.flight.is_none_or(|flight| flight.tick != earlier.tick), "{operations}");
+        if !whole {
+            // What was torn is in nobody's way.
+            assert!(board.bench.send(b'r').expect("runs"));
+            board.until("retracting", 6000);
+            falls(&mut board).expect("the next record");
+        }
+    }
+}
+
+#[test]
+fn a_full_page_of_records_makes_room() {
+    let mut board = Board::idle();
+    let full = [0; PAGE_BYTES];
+    board.bench.machine_mut().poke(RECORDS, &full).expect("flash");
+    strike(&mut board, Fault::ResetPin);
+    board.until("mode: idle", 3000);
+    assert_eq!(page(&board, RECORDS), [0xFF; PAGE_BYTES]);
+    board.bench.take_frames();
+    let flight = falls(&mut board).expect("a record");
+    assert_eq!(flight.mode(), Some(Mode::Idle));
+}
+
+#[test]
+fn a_dip_of_the_supply_cuts_the_bridges_and_starts_anew() {
+    let mut board = Board::moving();
+    let at = board.bench.plant().truth().position_mm;
+    strike(&mut board, Fault::SupplyDip);
+    let (cause, after, driven) = board.reset(20);
+    assert_eq!(cause, Cause::Software);
+    assert!(after <= 8, "{after} ms");
+    assert!(!driven[1..].contains(&true), "{driven:?}");
+    let restart = board.report();
+    assert_eq!(restart.crash.expect("a crash").stopped, Stopped::Supply);
+    let flight = restart.flight.expect("what it did");
+    assert!((flight.position.to_num::<f64>() - at).abs() < 0.3, "{flight:?} at {at}");
+}
+
+#[test]
+fn a_start_waits_for_its_supply() {
+    let mut board = Board::idle();
+    board.bench.take_frames();
+    // Comes back too low, for a tenth of a second.
+    let machine = board.bench.machine_mut();
+    machine.restart(Cause::Power).expect("restarts");
+    let (now, back) = (machine.now(), machine.now() + 100 * STEP);
+    let then = hil_sim::board::peripherals::pwr::Then::Back;
+    machine.chip_mut().supply_falls(back, then, now);
+    let lines = board.log.len();
+    for _ in 0..99 {
+        board.step();
+    }
+    assert_eq!(board.log.len(), lines, "{:#?}", &board.log[lines..]);
+    board.until("mode: idle", 3000);
+}
+
+#[test]
+fn the_first_start_of_an_image_keeps_its_sum() {
+    let first = |board: &Board| {
+        board.log.iter().filter(|line| line.contains("first start of this image")).count()
+    };
+    let mut board = Board::idle();
+    assert_eq!(first(&board), 1, "{:#?}", board.log);
+    let seals = page(&board, SEALS);
+    assert_ne!(seals[..16], [0xFF; 16]);
+    assert_eq!(seals[16..], [0xFF; PAGE_BYTES - 16]);
+    strike(&mut board, Fault::ResetPin);
+    board.until("mode: idle", 3000);
+    assert_eq!(first(&board), 1, "known by now");
+    assert_eq!(page(&board, SEALS), seals);
+}
+
+/// Bytes of the image: of its vectors, its code, its constants, its hash.
+fn places(board: &Board) -> Vec<u32> {
+    let image = board.bench.machine().image();
+    let last = image.flash.iter().rposition(|byte| *byte != 0xFF).expect("an image") as u32;
+    let hash = image.symbol("__build_id").expect("a symbol");
+    vec![0x0800_0000 + 0x1D0, board.function("panic_bounds_check"), 0x0800_0000 + last, hash + 16]
+}
+
+#[test]
+fn a_bit_of_the_image_that_turns_over_is_told_and_held() {
+    for place in places(&Board::idle()) {
+        let mut board = Board::moving();
+        let flip = Fault::BitFlip(place, 4);
+        strike(&mut board, flip);
+        board.until(DAMAGED, LOOKED_AT_MS);
+        let (cause, _, driven) = board.reset(20);
+        assert_eq!(cause, Cause::Software, "{place:#x}");
+        assert!(!driven[1..].contains(&true), "{driven:?}");
+        // It stays off, and says so every second; commands are nothing to it.
+        for _ in 0..2 {
+            board.until(DAMAGED, 1100);
+            board.bench.send(b's').expect("runs");
+        }
+        for _ in 0..500 {
+            let drives = board.step().drives;
+            assert!(!drives.drive_on && !drives.preload_on);
+        }
+        // Flashed again, it goes on.
+        strike(&mut board, flip);
+        strike(&mut board, Fault::ResetPin);
+        board.until("mode: idle", 3000);
+    }
+}

@@ -1,0 +1,62 @@
+//! The supply, watched: before it is too low for the chip, the bridges go off and what the
+//! drive was doing goes to flash, where the next start finds it.
+//!
+//! The chip compares its supply with 2.9 V. From there on down to where it resets itself,
+//! 1.7 V, what the board's capacitors hold has to last for a millisecond (see
+//! `docs/HARDWARE.md`); a record takes a third of that.
+
+use embassy_stm32::interrupt::{self, InterruptExt};
+use embassy_stm32::pac::{EXTI, PWR};
+use interstage::blackbox::{Flight, Stopped};
+use interstage::pages::records;
+
+use super::words::RECORDS;
+use super::{blackbox, guard};
+
+/// Threshold of the chip's detector: 2.9 V falling, 3.0 V rising.
+const LEVEL: u8 = 6;
+
+/// Line of the detector among the external interrupts; high means low.
+const LINE: usize = 16;
+
+/// Begins to watch; waits for as long as the supply is too low to go on with.
+pub(crate) fn watch() {
+    PWR.cr2().modify(|w| {
+        w.set_pls(LEVEL);
+        w.set_pvde(true);
+    });
+    EXTI.rtsr(0).modify(|w| w.set_line(LINE, true));
+    while PWR.sr2().read().pvdo() {}
+    EXTI.imr(0).modify(|w| w.set_line(LINE, true));
+    // SAFETY: the handler shares nothing with anyone who goes on behind it.
+    unsafe { interrupt::PVD_PVM.enable() };
+}
+
+/// The record that the supply left when it went, once; makes room for the next.
+pub(super) fn take() -> Option<Flight> {
+    let found = records::latest(RECORDS.bytes());
+    if let Some(latest) = found {
+        RECORDS.program(latest.mark, records::TAKEN);
+    }
+    if records::free(RECORDS.bytes()).is_none() {
+        RECORDS.erase();
+    }
+    found.and_then(|latest| latest.flight)
+}
+
+/// The supply falls. Nothing runs behind this but a start.
+#[embassy_stm32::interrupt]
+unsafe fn PVD_PVM() {
+    cortex_m::interrupt::disable();
+    guard::cut();
+    if let (Some(flight), Some(first)) = (blackbox::flight(), records::free(RECORDS.bytes())) {
+        let mut index = first;
+        for word in records::words(&flight) {
+            RECORDS.program(index, word);
+            index += 1;
+        }
+    }
+    // It may come back before the chip is reset.
+    while PWR.sr2().read().pvdo() {}
+    blackbox::end(Stopped::Supply)
+}

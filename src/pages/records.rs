@@ -1,0 +1,58 @@
+//! What the drive was doing when the supply went, one place behind the other.
+//!
+//! ```text
+//! 0   record of the drive, five words and a blank one   (written as the supply goes)
+//! 24  blank, or 0 once a start has reported it
+//! ```
+//!
+//! The supply gives its warning about a millisecond before the memory is lost; a record is
+//! three double words, a quarter of that.
+
+use super::{PAGE_WORDS, Page, Word, used, word};
+use crate::blackbox::{FLIGHT_WORDS, Flight};
+
+/// Double words of a place.
+const PLACE_WORDS: usize = 4;
+
+/// Places of a page.
+const PLACES: usize = PAGE_WORDS / PLACE_WORDS;
+
+/// What is programmed over the last double word of a place that has been reported.
+pub const TAKEN: Word = [0; 2];
+
+/// The first double word of the place for the next record; none if the page is full.
+#[must_use]
+pub fn free(page: &Page) -> Option<usize> {
+    let next = used(page, PLACE_WORDS);
+    (next < PLACES).then_some(next * PLACE_WORDS)
+}
+
+/// The double words of a record.
+#[must_use]
+pub fn words(flight: &Flight) -> [Word; 3] {
+    let [a, b, c, d, e] = flight.seal();
+    [[a, b], [c, d], [e, u32::MAX]]
+}
+
+/// A record that no start has reported yet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Latest {
+    /// Number of the double word that has to be [`TAKEN`].
+    pub mark: usize,
+    /// The record, if it is whole.
+    pub flight: Option<Flight>,
+}
+
+/// The last record, unless it has been reported.
+#[must_use]
+pub fn latest(page: &Page) -> Option<Latest> {
+    let first = used(page, PLACE_WORDS).checked_sub(1)? * PLACE_WORDS;
+    let mark = first + PLACE_WORDS - 1;
+    if word(page, mark) != [u32::MAX; 2] {
+        return None;
+    }
+    let mut words = [0; FLIGHT_WORDS];
+    let found = (first..mark).flat_map(|index| word(page, index));
+    words.iter_mut().zip(found).for_each(|(to, from)| *to = from);
+    Some(Latest { mark, flight: Flight::open(&words) })
+}

@@ -1,0 +1,146 @@
+use proptest::prelude::*;
+
+use super::*;
+use crate::blackbox::{Flight, Late, Pace};
+use crate::units::{Q16, q16};
+
+const BLANK: Page = [0xFF; PAGE_BYTES];
+
+fn put(page: &mut Page, index: usize, [low, high]: Word) {
+    let at = index * WORD_BYTES;
+    assert_eq!(page[at..at + WORD_BYTES], [0xFF; WORD_BYTES], "only what is blank is written");
+    page[at..at + 4].copy_from_slice(&low.to_le_bytes());
+    page[at + 4..at + 8].copy_from_slice(&high.to_le_bytes());
+}
+
+fn flight(tick: u32) -> Flight {
+    let pace = Pace::of(q16(8 << 16), true);
+    let position = Q16::from_num(f64::from(tick) * 0.008);
+    Flight { tick, position, mode: 7, level: 1, fault: 0, late: Late::NOBODY, pace }
+}
+
+/// Writes a record, of which only so many double words come through.
+fn write(page: &mut Page, flight: &Flight, words: usize) {
+    let first = records::free(page).expect("room");
+    for (index, word) in records::words(flight).into_iter().take(words).enumerate() {
+        put(page, first + index, word);
+    }
+}
+
+#[test]
+fn a_record_is_found_until_it_is_taken() {
+    let mut page = BLANK;
+    assert_eq!(records::latest(&page), None);
+    for tick in [1000, 2000] {
+        write(&mut page, &flight(tick), 3);
+        let latest = records::latest(&page).expect("a record");
+        assert_eq!(latest.flight, Some(flight(tick)));
+        put(&mut page, latest.mark, records::TAKEN);
+        assert_eq!(records::latest(&page), None);
+    }
+}
+
+#[test]
+fn a_record_that_was_broken_off_is_none_and_is_not_written_over() {
+    for words in 1..3 {
+        let mut page = BLANK;
+        write(&mut page, &flight(5), words);
+        let latest = records::latest(&page).expect("something");
+        assert_eq!(latest.flight, None);
+        write(&mut page, &flight(6), 3);
+        assert_eq!(records::latest(&page).and_then(|l| l.flight), Some(flight(6)));
+    }
+}
+
+#[test]
+fn a_page_holds_64_records() {
+    let mut page = BLANK;
+    for tick in 0..64 {
+        write(&mut page, &flight(tick), 3);
+    }
+    assert_eq!(records::latest(&page).and_then(|l| l.flight), Some(flight(63)));
+    assert_eq!(records::free(&page), None);
+}
+
+#[test]
+fn an_image_is_known_by_its_first_start() {
+    let mut page = BLANK;
+    let images = [([1, 2, 3, 4, 5, 6, 7, 8], 77), ([9; 8], 78)];
+    assert_eq!(seals::sum_of(&page, images[0].0), None);
+    for (id, sum) in images {
+        let first = seals::free(&page).expect("room");
+        for (index, word) in seals::entry(id, sum).into_iter().enumerate() {
+            put(&mut page, first + index, word);
+        }
+    }
+    for (id, sum) in images {
+        assert_eq!(seals::sum_of(&page, id), Some(sum));
+    }
+    assert_eq!(seals::sum_of(&page, [0; 8]), None);
+}
+
+#[test]
+fn an_entry_that_was_broken_off_is_none_and_is_not_written_over() {
+    let mut page = BLANK;
+    put(&mut page, 0, seals::entry([3; 8], 5)[0]);
+    assert_eq!(seals::sum_of(&page, [3; 8]), None);
+    assert_eq!(seals::free(&page), Some(2));
+}
+
+#[test]
+fn a_page_of_seals_fills_up() {
+    let mut page = BLANK;
+    for image in 0..128_u8 {
+        let first = seals::free(&page).expect("room");
+        for (index, word) in seals::entry([image; 8], 1).into_iter().enumerate() {
+            put(&mut page, first + index, word);
+        }
+    }
+    assert_eq!(seals::free(&page), None);
+}
+
+proptest! {
+    #[test]
+    fn a_bit_of_the_hash_makes_no_new_image(id: [u8; 8], sum: u32, bit in 0_usize..64) {
+        let mut page = BLANK;
+        for (index, word) in seals::entry(id, sum).into_iter().enumerate() {
+            put(&mut page, index, word);
+        }
+        let mut turned = id;
+        turned[bit / 8] ^= 1 << (bit % 8);
+        prop_assert_eq!(seals::sum_of(&page, turned), Some(sum));
+        page[bit / 8] ^= 1 << (bit % 8);
+        prop_assert_eq!(seals::sum_of(&page, id), Some(sum));
+    }
+
+    #[test]
+    fn a_bit_of_a_sum_is_no_other_sum(id: [u8; 8], sum: u32, bit in 0_usize..64) {
+        let mut page = BLANK;
+        for (index, word) in seals::entry(id, sum).into_iter().enumerate() {
+            put(&mut page, index, word);
+        }
+        page[8 + bit / 8] ^= 1 << (bit % 8);
+        prop_assert_eq!(seals::sum_of(&page, id), None);
+    }
+
+    #[test]
+    fn a_change_of_one_chunk_changes_the_sum(
+        checks in prop::collection::vec(any::<u32>(), 1..200),
+        place: prop::sample::Index,
+        change in 1_u32..,
+    ) {
+        let sum = |checks: &[u32]| checks.iter().fold(0, |sum, check| seals::fold(sum, *check));
+        let mut changed = checks.clone();
+        changed[place.index(checks.len())] ^= change;
+        prop_assert_ne!(sum(&checks), sum(&changed));
+    }
+
+    #[test]
+    fn a_damaged_page_is_read_without_harm(bytes in prop::collection::vec(any::<u8>(), PAGE_BYTES)) {
+        let page: Page = bytes.try_into().expect("a page");
+        // Random words hardly ever pass for a record.
+        prop_assert_eq!(records::latest(&page).and_then(|latest| latest.flight), None);
+        prop_assert_eq!(records::free(&page), None);
+        prop_assert_eq!(seals::free(&page), None);
+    }
+}
