@@ -3,72 +3,98 @@
 //!
 //! The recordings in `hil-sim/tests/data` are the frames that the image would send, in an
 //! MCAP file: a deployment and a retraction, steps that stand elsewhere or are missing, lost
-//! friction, a sensor that stands still, commands at random on a corner. After a change of
-//! the controller that is wanted they are made anew: those of the scenarios beside them by
-//! `cargo rig capture --bare NAME.toml --out hil-sim/tests/data --name NAME`, the first two
-//! as `hil-sim/tests/logs.rs` says.
+//! friction, sensors that stand still or read wrong, commands at random, resets near corners.
+//! After a change of the controller that is wanted they are made anew: those of the scenarios
+//! beside them by `cargo rig capture --bare NAME.toml --out hil-sim/tests/data --name NAME`,
+//! the first two as `hil-sim/tests/logs.rs` says, those with resets as
+//! `hil-sim/examples/resets.rs` does, from the seeds 1 to 3.
 
 use std::path::Path;
 
+use interstage::blackbox::Restart;
 use interstage::control::{Controller, Input, Output, State};
 use interstage::log::frame::{Body, Frame};
-use interstage::log::{Entry, Record};
+use interstage::log::{Entry, Event, Record};
 use interstage::model::{Plan, PlanRequest, Planner};
 use interstage::rig::Rig;
 use interstage::sense::raw::SensorFrame;
 use interstage::supervise::{Direction, Fault, Mode};
 
-/// A run as the frames of its log tell it.
+/// What the frames of a log tell of the time from one start to the next.
 #[derive(Default)]
-struct Recorded {
+struct Boot {
+    /// What was left of the run before.
+    restart: Option<Restart>,
     ticks: Vec<Record>,
     plans: Vec<(u32, Plan)>,
     requests: Vec<(u32, PlanRequest)>,
     events: Vec<Entry>,
 }
 
-impl Recorded {
-    fn read(name: &str) -> Self {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("hil-sim/tests/data").join(name);
-        let bytes = std::fs::read(&path).expect(name);
-        let mut run = Self::default();
-        for message in mcap::MessageStream::new(&bytes).expect(name) {
-            let message = message.expect(name);
-            if message.channel.topic == "/frames" {
-                run.add(&message.data);
-            }
-        }
-        run
-    }
-
-    fn add(&mut self, frame: &[u8]) {
-        match Frame::open(frame).unwrap().body().unwrap() {
-            Body::Ticks(ticks) => self.ticks.extend(ticks.map(Result::unwrap)),
-            Body::Plan(at, plan) => self.plans.push((at, plan)),
-            Body::Request(at, request) => self.requests.push((at, request)),
-            Body::Event(entry) => self.events.push(entry),
-            _ => {}
-        }
-    }
-
+impl Boot {
     /// What the log has of this tick, in its order.
     fn of<T: Clone>(all: &[(u32, T)], tick: u32) -> Option<T> {
         all.iter().find(|(at, _)| *at == tick).map(|(_, what)| what.clone())
     }
+
+    /// Up to its last tick: of what came behind that a reset has kept nothing but events.
+    fn events(&self) -> Vec<Entry> {
+        let last = self.ticks.last().map_or(0, Record::at);
+        self.events.iter().filter(|entry| entry.at <= last).cloned().collect()
+    }
 }
 
-/// Gives each tick of a fresh controller its recorded input as `alter` leaves it; what came
-/// out is compared in `judge`.
+/// A run as its log tells it: its starts.
+struct Recorded(Vec<Boot>);
+
+impl Recorded {
+    fn read(name: &str) -> Self {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("hil-sim/tests/data").join(name);
+        let bytes = std::fs::read(&path).expect(name);
+        let mut boots: Vec<Boot> = Vec::new();
+        for message in mcap::MessageStream::new(&bytes).expect(name) {
+            let message = message.expect(name);
+            if message.channel.topic == "/frames" {
+                let frame = Frame::open(&message.data).unwrap();
+                // Frames are counted from each start on.
+                if frame.head.sequence == 0 {
+                    boots.push(Boot::default());
+                }
+                add(boots.last_mut().expect("a start"), frame.body().unwrap());
+            }
+        }
+        Self(boots)
+    }
+
+    fn ticks(&self) -> usize {
+        self.0.iter().map(|boot| boot.ticks.len()).sum()
+    }
+}
+
+fn add(boot: &mut Boot, body: Body<'_>) {
+    match body {
+        Body::Ticks(ticks) => boot.ticks.extend(ticks.map(Result::unwrap)),
+        Body::Plan(at, plan) => boot.plans.push((at, plan)),
+        Body::Request(at, request) => boot.requests.push((at, request)),
+        Body::Event(Entry { event: Event::Restart(restart), .. }) => boot.restart = Some(restart),
+        Body::Event(entry) => boot.events.push(entry),
+        _ => {}
+    }
+}
+
+/// Gives each tick of a controller that starts as it did then its recorded input as `alter`
+/// leaves it; what came out is compared in `judge`.
 fn step_through(
-    run: &Recorded,
+    boot: &Boot,
     mut alter: impl FnMut(&mut Input),
     mut judge: impl FnMut(&Record, &Input, &Output),
 ) {
     let controller = Controller::try_build(&Rig::prototype()).expect("the prototype is sound");
-    let (mut state, mut sensors) = (State::default(), SensorFrame::default());
-    for record in &run.ticks {
+    let place = boot.restart.as_ref().and_then(Restart::place);
+    let (mut state, mut sensors) = (State::standing(place), SensorFrame::default());
+    for record in &boot.ticks {
         let mut input = Input {
-            plan: record.flags.plan().then(|| Recorded::of(&run.plans, record.at())).flatten(),
+            plan: record.flags.plan().then(|| Boot::of(&boot.plans, record.at())).flatten(),
             ..record.input(&sensors)
         };
         sensors = input.sensors;
@@ -78,16 +104,9 @@ fn step_through(
     }
 }
 
-/// Gives each tick its recorded input; what came out is compared in `judge`.
-fn again(name: &str, mut judge: impl FnMut(&Recorded, &Record, &Input, &Output)) -> Recorded {
-    let run = Recorded::read(name);
-    step_through(&run, |_| {}, |record, input, output| judge(&run, record, input, output));
-    run
-}
-
 #[test]
 fn a_sensor_that_never_answers_is_named() {
-    let run = Recorded::read("deploy.mcap");
+    let Recorded(boots) = Recorded::read("deploy.mcap");
     type Silence = fn(&mut SensorFrame);
     let all: [(Silence, Fault); 4] = [
         (|sensors| sensors.wheel = None, Fault::SpeedStale),
@@ -98,7 +117,7 @@ fn a_sensor_that_never_answers_is_named() {
     for (silence, fault) in all {
         let mut said = None;
         let silence = |input: &mut Input| silence(&mut input.sensors);
-        step_through(&run, silence, |_, _, output| {
+        step_through(&boots[0], silence, |_, _, output| {
             assert!(!output.drive.enable && !output.preload.enable, "{fault:?}");
             if let Mode::FaultHold(fault) = output.telemetry.mode {
                 said.get_or_insert(fault);
@@ -110,28 +129,34 @@ fn a_sensor_that_never_answers_is_named() {
 
 /// Runs it again; the mode of its last tick.
 fn replayed(name: &str, crossings: usize) -> Mode {
-    let mut events = Vec::new();
+    let run = Recorded::read(name);
+    assert!(run.ticks() > 2000, "{name}: {} ticks", run.ticks());
     let mut last = None;
-    let run = again(name, |run, record, input, output| {
-        assert_eq!(Record::of(input, output), *record, "{name}, tick {}", record.at());
-        let request = Recorded::of(&run.requests, record.at());
-        assert_eq!(output.request, request, "{name}, tick {}", record.at());
-        events.extend(output.events.iter().cloned());
-        last = Some(output.telemetry.mode);
-    });
-    assert_eq!(events, run.events, "{name}");
-    plans_again(&run, name);
-    assert!(run.ticks.len() > 3000, "{name}: {} ticks", run.ticks.len());
-    let closed = |entry: &&Entry| matches!(entry.event, interstage::log::Event::Crossing(_));
-    assert_eq!(run.events.iter().filter(closed).count(), crossings, "{name}");
+    let mut closed = 0;
+    for (start, boot) in run.0.iter().enumerate() {
+        let mut events = Vec::new();
+        step_through(boot, |_| {}, |record, input, output| {
+            let at = record.at();
+            assert_eq!(Record::of(input, output), *record, "{name}, start {start}, tick {at}");
+            let request = Boot::of(&boot.requests, at);
+            assert_eq!(output.request, request, "{name}, start {start}, tick {at}");
+            events.extend(output.events.iter().cloned());
+            last = Some(output.telemetry.mode);
+        });
+        assert_eq!(events, boot.events(), "{name}, start {start}");
+        let is_crossing = |entry: &&Entry| matches!(entry.event, Event::Crossing(_));
+        closed += events.iter().filter(is_crossing).count();
+        plans_again(boot, name);
+    }
+    assert_eq!(closed, crossings, "{name}");
     last.expect("ticks")
 }
 
 /// Each plan is what the planner makes of the request that it answers.
-fn plans_again(run: &Recorded, name: &str) {
+fn plans_again(boot: &Boot, name: &str) {
     let planner = Planner::try_build(&Rig::prototype()).expect("the prototype is sound");
-    for (at, plan) in &run.plans {
-        let mut requests = run.requests.iter().map(|(_, request)| request);
+    for (at, plan) in &boot.plans {
+        let mut requests = boot.requests.iter().map(|(_, request)| request);
         let request = requests.find(|request| request.sequence == plan.sequence);
         let request = request.expect("a plan is asked for");
         assert_eq!(planner.plan(request), *plan, "{name}, tick {at}");
@@ -141,14 +166,9 @@ fn plans_again(run: &Recorded, name: &str) {
 #[test]
 fn what_is_skipped_changes_no_bit() {
     let whole = Controller::try_build(&Rig::prototype()).expect("sound").without_skipping();
-    let mut state = State::default();
     for name in ["deploy.mcap", "slip.mcap"] {
-        let mut skipped = 0;
-        again(name, |_, record, input, output| {
-            if skipped == 0 {
-                state = State::default();
-            }
-            skipped += 1;
+        let mut state = State::default();
+        step_through(&Recorded::read(name).0[0], |_| {}, |record, input, output| {
             let again = whole.step(&mut state, input);
             assert_eq!(again.telemetry, output.telemetry, "{name}, tick {}", record.at());
             assert_eq!(state.mode(), output.telemetry.mode);
@@ -195,4 +215,52 @@ fn a_wheel_that_slips_on_a_corner() {
 #[test]
 fn a_load_cell_that_stands_still() {
     assert!(matches!(replayed("stuck.mcap", 0), Mode::FaultHold(_)));
+}
+
+#[test]
+fn a_tread_sensor_that_reads_too_much() {
+    assert!(matches!(replayed("tread-gain.mcap", 2), Mode::FaultHold(_)));
+}
+
+#[test]
+fn an_encoder_that_loses_counts() {
+    assert!(matches!(replayed("encoder-gain.mcap", 0), Mode::FaultHold(_)));
+}
+
+#[test]
+fn an_arm_angle_that_jumps() {
+    assert!(matches!(replayed("arm-offset.mcap", 1), Mode::FaultHold(_)));
+}
+
+#[test]
+fn a_step_that_is_higher_than_the_table_says() {
+    assert!(matches!(replayed("higher.mcap", 3), Mode::FaultHold(_)));
+}
+
+#[test]
+fn buttons_pressed_at_random() {
+    assert!(matches!(replayed("presses.mcap", 0), Mode::Complete(_)));
+}
+
+#[test]
+fn a_preload_that_comes_late_and_weak() {
+    assert!(matches!(replayed("soft.mcap", 2), Mode::FaultHold(_)));
+}
+
+#[test]
+fn ticks_that_come_late() {
+    assert!(matches!(replayed("late.mcap", 0), Mode::FaultHold(_)));
+}
+
+#[test]
+fn twice_the_load() {
+    assert!(matches!(replayed("load.mcap", 3), Mode::Complete(_)));
+}
+
+#[test]
+fn resets_near_corners() {
+    for (name, crossings) in [("resets-1.mcap", 5), ("resets-2.mcap", 7), ("resets-3.mcap", 6)] {
+        replayed(name, crossings);
+        assert_eq!(Recorded::read(name).0.len(), 10, "{name}");
+    }
 }
