@@ -135,14 +135,18 @@ fn replayed(name: &str, crossings: usize) -> Mode {
     let mut closed = 0;
     for (start, boot) in run.0.iter().enumerate() {
         let mut events = Vec::new();
-        step_through(boot, |_| {}, |record, input, output| {
-            let at = record.at();
-            assert_eq!(Record::of(input, output), *record, "{name}, start {start}, tick {at}");
-            let request = Boot::of(&boot.requests, at);
-            assert_eq!(output.request, request, "{name}, start {start}, tick {at}");
-            events.extend(output.events.iter().cloned());
-            last = Some(output.telemetry.mode);
-        });
+        step_through(
+            boot,
+            |_| {},
+            |record, input, output| {
+                let at = record.at();
+                assert_eq!(Record::of(input, output), *record, "{name}, start {start}, tick {at}");
+                let request = Boot::of(&boot.requests, at);
+                assert_eq!(output.request, request, "{name}, start {start}, tick {at}");
+                events.extend(output.events.iter().cloned());
+                last = Some(output.telemetry.mode);
+            },
+        );
         assert_eq!(events, boot.events(), "{name}, start {start}");
         let is_crossing = |entry: &&Entry| matches!(entry.event, Event::Crossing(_));
         closed += events.iter().filter(is_crossing).count();
@@ -168,12 +172,16 @@ fn what_is_skipped_changes_no_bit() {
     let whole = Controller::try_build(&Rig::prototype()).expect("sound").without_skipping();
     for name in ["deploy.mcap", "slip.mcap"] {
         let mut state = State::default();
-        step_through(&Recorded::read(name).0[0], |_| {}, |record, input, output| {
-            let again = whole.step(&mut state, input);
-            assert_eq!(again.telemetry, output.telemetry, "{name}, tick {}", record.at());
-            assert_eq!(state.mode(), output.telemetry.mode);
-            assert!((0.5..2.0).contains(&state.stiffness_scale().to_num::<f64>()));
-        });
+        step_through(
+            &Recorded::read(name).0[0],
+            |_| {},
+            |record, input, output| {
+                let again = whole.step(&mut state, input);
+                assert_eq!(again.telemetry, output.telemetry, "{name}, tick {}", record.at());
+                assert_eq!(state.mode(), output.telemetry.mode);
+                assert!((0.5..2.0).contains(&state.stiffness_scale().to_num::<f64>()));
+            },
+        );
     }
 }
 

@@ -81,18 +81,21 @@ fn a_record_of_the_supply_is_reported_once() {
 fn a_supply_that_flickers_leaves_its_first_record() {
     let mut board = Board::moving();
     strike(&mut board, Fault::BrownOut);
-    board.reset(5);
-    // Back for some milliseconds: the record has been taken, the tick has not begun.
-    for _ in 0..5 {
-        board.step();
-    }
+    // Back until the record has been taken, 24 bytes on: the tick has not begun.
+    let taken = (0..200).any(|_| {
+        let machine = board.bench.machine_mut();
+        machine.run_on(machine.now() + STEP / 20).expect("runs");
+        page(&board, RECORDS)[24..32] == [0; 8]
+    });
+    assert!(taken, "{:#?}", board.log);
     let flight = falls(&mut board).expect("the same record");
     assert!(matches!(flight.mode(), Some(Mode::Run(..))), "{flight:?}");
 }
 
 #[test]
 fn a_record_is_whole_or_none_wherever_power_goes() {
-    for (operations, whole) in [(1, false), (2, false), (3, false), (4, true)] {
+    // Of the third double word the lower half is the record's last.
+    for (operations, whole) in [(1, false), (2, false), (3, true), (4, true)] {
         let mut board = Board::moving();
         // One from before, which must not pass for this one.
         let earlier = falls(&mut board).expect("a record");
@@ -107,9 +110,8 @@ fn a_record_is_whole_or_none_wherever_power_goes() {
         assert!(restart.flight.is_none_or(|flight| flight.tick != earlier.tick), "{operations}");
         if !whole {
             // What was torn is in nobody's way.
-            assert!(board.bench.send(b'r').expect("runs"));
-            board.until("retracting", 6000);
-            falls(&mut board).expect("the next record");
+            let next = falls(&mut board).expect("the next record");
+            assert_eq!(next.mode(), Some(Mode::Idle));
         }
     }
 }
@@ -132,9 +134,9 @@ fn a_dip_of_the_supply_cuts_the_bridges_and_starts_anew() {
     let mut board = Board::moving();
     let at = board.bench.plant().truth().position_mm;
     strike(&mut board, Fault::SupplyDip);
-    let (cause, after, driven) = board.reset(20);
+    let (cause, after, driven) = board.reset(60);
     assert_eq!(cause, Cause::Software);
-    assert!(after <= 8, "{after} ms");
+    assert!(after < 40, "{after} ms");
     assert!(!driven[1..].contains(&true), "{driven:?}");
     let restart = board.report();
     assert_eq!(restart.crash.expect("a crash").stopped, Stopped::Supply);

@@ -81,12 +81,15 @@ pub(crate) fn report() -> Restart {
     // SAFETY: nobody else is there yet. The words may never have been written, so they are
     // read as volatile memory that holds anything.
     let crash = unsafe { (&raw const (*kept()).crash).read_volatile() };
-    let in_flash = supply::take();
+    let found = supply::found();
+    let in_flash = found.and_then(|latest| latest.flight);
     let flight = in_memory.or(in_flash);
     let first = flight.map_or([0; FLIGHT_WORDS], |flight| flight.seal());
     let flights = [first, [0; FLIGHT_WORDS]];
     // SAFETY: as before.
     unsafe { kept().write_volatile(Kept { crash: [0; CRASH_WORDS], flights }) }
+    // In this order: a supply that goes again here finds it in one place or the other.
+    supply::take(found);
     let supply = || Crash { build: build(), stopped: Stopped::Supply };
     let crash =
         Crash::open(&crash).or(if in_memory.is_none() { in_flash.map(|_| supply()) } else { None });

@@ -7,8 +7,8 @@
 
 use embassy_stm32::interrupt::{self, InterruptExt};
 use embassy_stm32::pac::{EXTI, PWR};
-use interstage::blackbox::{Flight, Stopped};
-use interstage::pages::records;
+use interstage::blackbox::Stopped;
+use interstage::pages::records::{self, Latest};
 
 use super::words::RECORDS;
 use super::{blackbox, guard};
@@ -32,16 +32,19 @@ pub(crate) fn watch() {
     unsafe { interrupt::PVD_PVM.enable() };
 }
 
-/// The record that the supply left when it went, once; makes room for the next.
-pub(super) fn take() -> Option<Flight> {
-    let found = records::latest(RECORDS.bytes());
+/// What the supply left when it went, if no start has taken it yet.
+pub(super) fn found() -> Option<Latest> {
+    records::latest(RECORDS.bytes())
+}
+
+/// Takes it, once it is kept elsewhere, and makes room for the next.
+pub(super) fn take(found: Option<Latest>) {
     if let Some(latest) = found {
         RECORDS.program(latest.mark, records::TAKEN);
     }
     if records::free(RECORDS.bytes()).is_none() {
         RECORDS.erase();
     }
-    found.and_then(|latest| latest.flight)
 }
 
 /// The supply falls. Nothing runs behind this but a start.

@@ -48,7 +48,8 @@ pub struct Latest {
 pub fn latest(page: &Page) -> Option<Latest> {
     let first = used(page, PLACE_WORDS).checked_sub(1)? * PLACE_WORDS;
     let mark = first + PLACE_WORDS - 1;
-    if word(page, mark) != [u32::MAX; 2] {
+    // A mark that was broken off is none: better twice than not at all.
+    if word(page, mark) == TAKEN {
         return None;
     }
     let mut words = [0; FLIGHT_WORDS];

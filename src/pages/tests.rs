@@ -41,6 +41,16 @@ fn a_record_is_found_until_it_is_taken() {
 }
 
 #[test]
+fn a_mark_that_was_broken_off_takes_nothing() {
+    let mut page = BLANK;
+    write(&mut page, &flight(3), 3);
+    let mark = records::latest(&page).expect("a record").mark;
+    put(&mut page, mark, [0, u32::MAX]);
+    let again = records::Latest { mark, flight: Some(flight(3)) };
+    assert_eq!(records::latest(&page), Some(again));
+}
+
+#[test]
 fn a_record_that_was_broken_off_is_none_and_is_not_written_over() {
     for words in 1..3 {
         let mut page = BLANK;

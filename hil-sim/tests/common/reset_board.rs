@@ -12,13 +12,13 @@ use interstage::log::Event;
 use super::common::{elf, strings};
 
 /// A board under way.
-pub struct Board {
-    pub bench: Bench<'static>,
-    pub log: Vec<String>,
+pub(crate) struct Board {
+    pub(crate) bench: Bench<'static>,
+    pub(crate) log: Vec<String>,
 }
 
 impl Board {
-    pub fn idle() -> Self {
+    pub(crate) fn idle() -> Self {
         let bench = Bench::new(elf(), strings(), &Scenario::default()).expect("a bench");
         let mut board = Self { bench, log: Vec::new() };
         board.until("mode: idle", 3000);
@@ -26,7 +26,7 @@ impl Board {
     }
 
     /// Deploying.
-    pub fn moving() -> Self {
+    pub(crate) fn moving() -> Self {
         let mut board = Self::idle();
         assert!(board.bench.send(b's').expect("runs"));
         board.until("deploying: cruise", 4000);
@@ -35,13 +35,13 @@ impl Board {
         board
     }
 
-    pub fn step(&mut self) -> Passed {
+    pub(crate) fn step(&mut self) -> Passed {
         let (passed, lines) = self.bench.step().expect("runs");
         self.log.extend(lines.into_iter().map(|line| line.text));
         passed
     }
 
-    pub fn until(&mut self, text: &str, milliseconds: u32) {
+    pub(crate) fn until(&mut self, text: &str, milliseconds: u32) {
         let from = self.log.len();
         for _ in 0..milliseconds {
             self.step();
@@ -53,19 +53,19 @@ impl Board {
     }
 
     /// Address of the first function whose name contains this.
-    pub fn function(&self, name: &str) -> u32 {
+    pub(crate) fn function(&self, name: &str) -> u32 {
         let functions = &self.bench.machine().image().functions;
         let found = functions.iter().find(|function| function.name.contains(name));
         found.unwrap_or_else(|| panic!("no function {name}")).range.start
     }
 
-    pub fn set(&mut self, register: Register, value: u32) {
+    pub(crate) fn set(&mut self, register: Register, value: u32) {
         self.bench.machine_mut().set_register(register, value).expect("a register");
     }
 
     /// The reset that comes within so many milliseconds, and after how many; what was
     /// driven meanwhile.
-    pub fn reset(&mut self, milliseconds: u32) -> (Cause, u32, Vec<bool>) {
+    pub(crate) fn reset(&mut self, milliseconds: u32) -> (Cause, u32, Vec<bool>) {
         let before = self.bench.machine().restarts().len();
         let mut driven = Vec::new();
         for after in 0..milliseconds {
@@ -79,7 +79,7 @@ impl Board {
     }
 
     /// What the start reports; nothing moves until it is idle, and then.
-    pub fn report(&mut self) -> Restart {
+    pub(crate) fn report(&mut self) -> Restart {
         let mut lines = self.log.len();
         for _ in 0..3000 {
             let drives = self.step().drives;
