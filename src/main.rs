@@ -25,7 +25,7 @@ mod firmware {
     #[cfg(not(feature = "hil"))]
     use embassy_stm32::{Peri, Peripherals, pac};
     use interstage::control::Controller;
-    use interstage::hal::{Board, Journal, Parts};
+    use interstage::hal::{Board, Parts};
     use interstage::log::{Entry, Event, Identity, Scribe};
     use interstage::model::Planner;
     use interstage::params::service::Service;
@@ -126,9 +126,8 @@ mod firmware {
         let (mut parts, lamp, pages) = split(p, console, channels.telemetry);
         parts.watchdog.place = restart.place();
         threads.spawn(light::show(lamp).unwrap());
-        let check = parts.journal.checker();
-        match image::verify(check) {
-            Some(sealed) => threads.spawn(image::watch(check, sealed).unwrap()),
+        match image::verify() {
+            Some(sealed) => threads.spawn(image::watch(sealed).unwrap()),
             None => return config::hold(threads, parts, Held::Image),
         }
         let (constants, service) = config::build(pages);

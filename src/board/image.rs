@@ -4,7 +4,6 @@ use core::slice;
 
 use embassy_time::{Duration, Timer};
 use interstage::blackbox::Stopped;
-use interstage::log::frame::Checker;
 use interstage::pages::seals;
 
 use super::blackbox;
@@ -14,7 +13,7 @@ unsafe extern "C" {
     /// The note that the linker writes, see `memory.x`: three words of head, the name
     /// `GNU` with its zero, then the hash of the image.
     static __build_id: [u8; 24];
-    static __vector_table: u8;
+    static __vector_table: u32;
     /// Initial values of the statics, with which the image ends.
     static __sidata: u8;
     static __sdata: u8;
@@ -31,19 +30,20 @@ pub(super) fn id() -> [u8; 8] {
     id
 }
 
-/// All of it, as it stands in flash.
-fn bytes() -> &'static [u8] {
+/// Its words, as they stand in flash; what is left of a last one is no part of any image.
+fn words() -> &'static [u32] {
     let first = &raw const __vector_table;
     let values = &raw const __edata as usize - &raw const __sdata as usize;
     let length = &raw const __sidata as usize + values - first as usize;
-    // SAFETY: flash from the vectors to the end of the image, which nothing writes to.
-    unsafe { slice::from_raw_parts(first, length) }
+    // SAFETY: flash from the vectors, which are aligned, to the end of the image, which nothing
+    // writes to.
+    unsafe { slice::from_raw_parts(first, length / 4) }
 }
 
 /// The image's sum, if it is the one of its first start, or this is its first; none if a bit
 /// has turned over since.
-pub(crate) fn verify(check: Checker) -> Option<u32> {
-    let sum = bytes().chunks(seals::CHUNK).fold(0, |sum, part| seals::fold(sum, check(part)));
+pub(crate) fn verify() -> Option<u32> {
+    let sum = seals::sum_on(0, words());
     let sealed = seals::sum_of(SEALS.bytes(), id()).unwrap_or_else(|| {
         seal(sum);
         sum
@@ -69,18 +69,21 @@ pub(super) fn say_damaged() {
     defmt::error!("image: a bit has turned over since its first start; flash it again");
 }
 
+/// Words that are summed up in one go.
+const PART: usize = 256;
+
 /// From one part to the next: a round takes six seconds, and no more than a thousandth of
 /// the core.
 const PACE: Duration = Duration::from_millis(50);
 
 /// Sums up the image over and over, and ends the program if it is no longer what it was.
 #[embassy_executor::task]
-pub(crate) async fn watch(check: Checker, sealed: u32) -> ! {
+pub(crate) async fn watch(sealed: u32) -> ! {
     loop {
         let mut sum = 0;
-        for part in bytes().chunks(seals::CHUNK) {
+        for part in words().chunks(PART) {
             Timer::at(crate::EXCHANGE.aside(PACE)).await;
-            sum = seals::fold(sum, check(part));
+            sum = seals::sum_on(sum, part);
         }
         if sum != sealed {
             // Also for the case that what starts anew cannot say it any more.

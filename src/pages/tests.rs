@@ -134,15 +134,23 @@ proptest! {
     }
 
     #[test]
-    fn a_change_of_one_chunk_changes_the_sum(
-        checks in prop::collection::vec(any::<u32>(), 1..200),
+    fn a_change_of_one_word_changes_the_sum(
+        words in prop::collection::vec(any::<u32>(), 1..200),
         place: prop::sample::Index,
         change in 1_u32..,
     ) {
-        let sum = |checks: &[u32]| checks.iter().fold(0, |sum, check| seals::fold(sum, *check));
-        let mut changed = checks.clone();
-        changed[place.index(checks.len())] ^= change;
-        prop_assert_ne!(sum(&checks), sum(&changed));
+        let mut changed = words.clone();
+        changed[place.index(words.len())] ^= change;
+        prop_assert_ne!(seals::sum_on(0, &words), seals::sum_on(0, &changed));
+    }
+
+    #[test]
+    fn a_sum_is_the_same_in_one_go_and_in_parts(
+        words in prop::collection::vec(any::<u32>(), 0..200),
+        part in 1_usize..50,
+    ) {
+        let sum = words.chunks(part).fold(0, seals::sum_on);
+        prop_assert_eq!(sum, seals::sum_on(0, &words));
     }
 
     #[test]
