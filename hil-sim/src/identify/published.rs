@@ -35,7 +35,8 @@ pub struct Fineness {
 }
 
 impl Fineness {
-    /// The coarse ring that the presets' tread was fitted with.
+    /// A coarse ring, about as coarse as that which the presets' tread may have been fitted
+    /// with.
     pub const STATED: Self = Self { elements: 720, stride_mm: 0.05 };
     /// Gaps within 0.1 % of the converged ones.
     pub const CONVERGED: Self = Self { elements: 2880, stride_mm: 0.01 };
