@@ -361,4 +361,32 @@ mod tests {
             prop_assert_eq!(found(RUN, speed, wanted, preload, preload + lag), None);
         }
     }
+
+    #[test]
+    fn what_a_wheel_generates_is_excused_in_the_self_test_alone() {
+        let found = |mode: Mode| {
+            let monitor = Monitor::try_build(&Rig::prototype()).unwrap();
+            let mut state = MonitorState::default();
+            let sensed = sensed(0.0, 0.0);
+            let generates = BridgeCodes { drive: BridgeCode::of(3000), ..IDLE };
+            (0..40).find_map(|now| {
+                let seen = Observed {
+                    now,
+                    mode,
+                    sensed: &sensed,
+                    bridges: Some(generates),
+                    speed_ref: Q16::ZERO,
+                    preload_due: Q16::ZERO,
+                    effort: None,
+                    overrun: false,
+                    emergency_stop: false,
+                };
+                monitor.step(&mut state, &seen)
+            })
+        };
+        assert_eq!(found(Mode::SelfTest), None);
+        for mode in [Mode::Zero, Mode::Idle, Mode::Complete(Direction::Deploy)] {
+            assert_eq!(found(mode), Some(Fault::DriveBridge), "{mode:?}");
+        }
+    }
 }

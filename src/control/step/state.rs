@@ -322,3 +322,29 @@ impl State {
         self.preload_loop.halt();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_is_known_only_with_every_step_found_where_the_table_has_it() {
+        for (searching, given_up, extra, placed) in [
+            (false, 0, 0, true),
+            (true, 0, 0, false),
+            (false, 1, 0, false),
+            (false, 0, 1, false),
+            (true, 1, 0, false),
+            (true, 0, 1, false),
+            (false, 1, 1, false),
+        ] {
+            let state = State { located: true, searching, given_up, extra, ..State::default() };
+            assert_eq!(state.is_placed(), placed, "{searching} {given_up} {extra}");
+        }
+        assert!(!State::default().is_placed());
+        for sure in [true, false] {
+            let kept = Some(Place { position: Q16::ZERO, sure });
+            assert_eq!(State::standing(kept).is_placed(), sure);
+        }
+    }
+}
