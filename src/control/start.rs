@@ -113,12 +113,8 @@ mod tests {
         all.compression.validity = Validity::Held(Reason::OutOfRange);
         all.radius.validity = Validity::Valid;
         assert!(all_answer(&all));
-        let missing = [
-            Fault::SpeedStale,
-            Fault::PressureStale,
-            Fault::DisplacementStale,
-            Fault::AngleStale,
-        ];
+        let missing =
+            [Fault::SpeedStale, Fault::PressureStale, Fault::DisplacementStale, Fault::AngleStale];
         for (sensor, fault) in missing.into_iter().enumerate() {
             let mut seen = all;
             let places = [

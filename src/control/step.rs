@@ -518,7 +518,10 @@ mod tests {
         let controller = Controller::try_build(&Rig::prototype()).expect("sound");
         let mut output = Output::default();
         let position = Q16::from_num(position);
-        act(&controller, &mut Pass { now: 0, sensed, position, wedge: Q16::ZERO, output: &mut output })
+        act(
+            &controller,
+            &mut Pass { now: 0, sensed, position, wedge: Q16::ZERO, output: &mut output },
+        )
     }
 
     #[test]
@@ -589,5 +592,30 @@ mod tests {
             assert_eq!(state.stage, stage, "{preload}");
             assert_eq!(told, usize::from(stage != ContactStage::Rolling));
         }
+    }
+
+    #[test]
+    fn only_on_a_corner_the_climb_limits_the_speed() {
+        let fast = q16(60_000_000);
+        let limited = |contact: Contact| {
+            let mut state = State::default();
+            state.watch.contact = contact;
+            // Eight millimetres before the face at 18 mm.
+            at(&sensed(0, -2.0, 0.3), 10.0, |_, pass| {
+                let mut targets = Targets {
+                    speed: fast,
+                    preload: Q16::ZERO,
+                    ramping: false,
+                    braking: false,
+                    approaching: false,
+                    waiting: false,
+                };
+                stiff().limit_climb(&state, pass, &mut targets);
+                targets.speed
+            })
+        };
+        assert_eq!(limited(Contact::Wall), fast);
+        assert!(limited(Contact::Both) < q16(30_000_000));
+        assert!(limited(Contact::Corner) < q16(30_000_000));
     }
 }

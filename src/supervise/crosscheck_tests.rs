@@ -337,8 +337,12 @@ fn off_by_exactly_the_threshold_is_borne() {
     let drifts = |way: Q16| {
         let mut past = [Q16::ZERO; KEPT];
         past[SPAN] = way.half();
-        let mut state =
-            CrossState { past, held: 2 * SPAN as u8, head: 2 * SPAN as u8, ..CrossState::default() };
+        let mut state = CrossState {
+            past,
+            held: 2 * SPAN as u8,
+            head: 2 * SPAN as u8,
+            ..CrossState::default()
+        };
         check.bends(&mut state, &off_by(1, way))
     };
     assert!(!drifts(OFF) && !drifts(-OFF));
@@ -351,7 +355,9 @@ fn off_by_exactly_the_threshold_is_borne() {
     assert_eq!(strays(check.strayed), None);
     assert_eq!(strays(-check.strayed), None);
     assert_eq!(strays(check.strayed + Q16::DELTA), Some(Fault::PretightenerRunaway));
-    assert!((check.strayed.to_num::<f64>() / Rig::prototype().preload.cruise_n - 0.25).abs() < 1e-4);
+    assert!(
+        (check.strayed.to_num::<f64>() / Rig::prototype().preload.cruise_n - 0.25).abs() < 1e-4
+    );
 }
 
 #[test]

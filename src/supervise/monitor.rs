@@ -389,4 +389,22 @@ mod tests {
             assert_eq!(found(mode), Some(Fault::DriveBridge), "{mode:?}");
         }
     }
+
+    #[test]
+    fn sensors_that_are_all_lost_are_a_fault_and_one_too() {
+        let mut lost = sensed(0.0, 40.0);
+        assert_eq!(sensor_fault(&lost), None);
+        lost.radius.validity = Validity::Stale;
+        assert_eq!(sensor_fault(&lost), Some(Fault::AngleStale));
+        lost.speed.validity = Validity::Stale;
+        lost.preload.validity = Validity::Stale;
+        lost.compression.validity = Validity::Stale;
+        assert_eq!(sensor_fault(&lost), Some(Fault::SpeedStale));
+    }
+
+    #[test]
+    fn under_way_a_preload_beyond_its_limit_is_one_even_if_it_was_asked_for() {
+        let press = usize::from(OVERPRESSURE_TICKS);
+        assert_eq!(found(RUN, 8.0, 8.0, 56.0, 56.0), Some((Fault::Overpressure, press)));
+    }
 }

@@ -204,3 +204,42 @@ fn outside_the_outermost_wall_there_is_no_corner() {
     let ground = at(&inmost, 75.0, |controller, pass| controller.ground(pass, ON_WALL));
     assert_eq!(ground, Ground::Wall(3));
 }
+
+#[test]
+fn a_place_is_contradicted_by_a_height_a_fifth_of_a_step_off() {
+    let stands = |position: Millimetres, up: f64, sure: bool| {
+        let here = SensedState { steps_up: Q16::from_num(up), ..sensed(0, 0.0, 0.3) };
+        at(&here, 0.0, |controller, pass| controller.may_stand_at(pass, position, within(sure)))
+    };
+    // Walls at 2 and 22.7 mm; at 10 mm the wheel may stand on the first corner, or before it.
+    for (position, least, most) in [(2.0, 0.0, 0.0), (10.0, 0.0, 1.0), (22.7, 1.0, 1.0)] {
+        let stands = |up: f64| stands(Q16::from_num(position), up, true);
+        assert!(stands(least - 0.19) && stands(most + 0.19), "{position}");
+        assert!(!stands(least - 0.21) && !stands(most + 0.21), "{position}");
+    }
+    // Behind the face at 18 mm by its tolerance and by what the record may be off.
+    let tolerance = at(&sensed(0, 0.0, 0.3), 0.0, |controller, _| controller.schedule.tolerance());
+    let behind = |way: Millimetres| q16(18_000_000) + tolerance + way;
+    assert!(stands(behind(q16(400_000)), 0.0, true));
+    assert!(!stands(behind(q16(600_000)), 0.0, true));
+    assert!(stands(behind(q16(1_900_000)), 0.0, false));
+    assert!(!stands(behind(q16(2_100_000)), 0.0, false));
+}
+
+#[test]
+fn on_a_wall_the_step_ahead_is_the_next_one_and_without_one_nothing_is_searched() {
+    for (level, position, out, back) in [(0, 2.0, 1, 0), (1, 24.8, 2, 1), (3, 75.0, 0, 3)] {
+        for (direction, next) in [(Direction::Deploy, out), (Direction::Retract, back)] {
+            for searching in [false, true] {
+                let mut state = State::default();
+                (state.direction, state.searching) = (direction, searching);
+                at(&sensed(level, 0.0, 0.34), position, |controller, pass| {
+                    controller.resume(&mut state, pass, direction);
+                });
+                assert_eq!((state.level, state.next_step), (level, next), "{position}");
+                assert_eq!(state.searching, searching && next > 0, "{position} {direction:?}");
+                assert!(state.crossing.is_none());
+            }
+        }
+    }
+}

@@ -256,4 +256,36 @@ mod tests {
         assert_eq!(ahead(0, Contact::Corner, out, 30.0, 2), 2);
         assert_eq!(ahead(0, Contact::Both, back, 30.0, 1), 1);
     }
+
+    #[test]
+    fn a_search_begins_towards_the_wall_that_the_arm_shows() {
+        for (up, out, back) in [
+            (0.0, (0, 1), (0, 0)),
+            (0.1, (0, 1), (0, 0)),
+            (0.14, (1, 2), (0, 0)),
+            (0.5, (1, 2), (0, 0)),
+            (0.86, (1, 2), (0, 0)),
+            (0.9, (1, 2), (1, 1)),
+            (2.5, (3, 0), (2, 2)),
+            (3.0, (3, 0), (3, 3)),
+            (-0.05, (0, 1), (0, 0)),
+        ] {
+            let mut seen = sensed(0, 0.0, 0.3);
+            seen.steps_up = Q16::from_num(up);
+            for (direction, (level, next)) in [(Direction::Deploy, out), (Direction::Retract, back)]
+            {
+                let mut state = State::default();
+                let clear = at(&seen, 30.0, |controller, pass| {
+                    controller.start_searching(&mut state, pass, direction);
+                    match direction {
+                        Direction::Deploy => pass.position + controller.corner_reach(),
+                        Direction::Retract => pass.position,
+                    }
+                });
+                assert_eq!((state.level, state.next_step), (level, next), "{up} {direction:?}");
+                assert_eq!(state.leaving, Some(clear), "{up} {direction:?}");
+                assert_eq!(state.watch.contact, Contact::Leaving);
+            }
+        }
+    }
 }
