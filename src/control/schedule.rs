@@ -357,4 +357,38 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn a_step_is_due_from_its_window_on_and_its_corner_belongs_from_six_millimetres_before() {
+        for back in [false, true] {
+            let (_, schedule, rise, plan) = setting(back);
+            let window = rise.first_contact(plan.direction) + schedule.tolerance();
+            let at = |ahead: Q16| Course {
+                distance: Some(window + ahead),
+                ..course(&plan, 0.0, 5.0, 40.0)
+            };
+            assert_eq!(schedule.expectation(&rise, &at(Q16::DELTA)), Expectation::Ahead);
+            assert_eq!(schedule.expectation(&rise, &at(Q16::ZERO)), Expectation::Due);
+            assert!(schedule.belongs(&rise, &at(Q16::ZERO)));
+            assert!(schedule.belongs(&rise, &at(q16(6_000_000))));
+            assert!(!schedule.belongs(&rise, &at(q16(6_000_000) + Q16::DELTA)));
+            let none = Course { distance: None, ..at(Q16::ZERO) };
+            assert!(!schedule.belongs(&rise, &none));
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn out_of_sight_no_braking_is_due(
+            back in any::<bool>(),
+            speed in 0.0..90.0f64,
+            rising in 0.0..1.0f64,
+        ) {
+            let (rig, schedule, _, plan) = setting(back);
+            let acceleration = Q16::from_num(rising * rig.drive.acceleration_mm_s2);
+            let at = Course { acceleration, ..course(&plan, 0.0, speed, 40.0) };
+            let needs = schedule.brake_way(&at, plan.cross_speed) + BRAKE_RESERVE;
+            prop_assert!(needs <= schedule.sight(&plan, &at), "{needs}");
+        }
+    }
 }

@@ -54,7 +54,7 @@ mod tests {
     use super::*;
     use crate::rig::Rig;
     use crate::sense::raw::SensorFrame;
-    use crate::sense::{Senses, SensesState};
+    use crate::sense::{Reason, Senses, SensesState, Validity};
     use crate::units::Q16;
 
     /// What the senses say on this wall, at this speed, preload and compression.
@@ -103,5 +103,29 @@ mod tests {
         let seen = sensed(0, 0.0, 0.0, 0.0);
         assert!(!all_answer(&seen));
         assert_eq!(silent(&seen), Fault::SpeedStale);
+    }
+
+    #[test]
+    fn each_sensor_that_has_not_answered_is_missed_and_named() {
+        let mut all = sensed(0, 0.0, 0.0, 0.0);
+        all.speed.validity = Validity::Valid;
+        all.preload.validity = Validity::Valid;
+        all.compression.validity = Validity::Held(Reason::OutOfRange);
+        all.radius.validity = Validity::Valid;
+        assert!(all_answer(&all));
+        let missing =
+            [Fault::SpeedStale, Fault::PressureStale, Fault::DisplacementStale, Fault::AngleStale];
+        for (sensor, fault) in missing.into_iter().enumerate() {
+            let mut seen = all;
+            let places = [
+                &mut seen.speed.validity,
+                &mut seen.preload.validity,
+                &mut seen.compression.validity,
+                &mut seen.radius.validity,
+            ];
+            *places.into_iter().nth(sensor).expect("one of four") = Validity::Absent;
+            assert!(!all_answer(&seen), "{fault:?}");
+            assert_eq!(silent(&seen), fault);
+        }
     }
 }

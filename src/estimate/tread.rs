@@ -166,4 +166,22 @@ mod tests {
             prop_assert_eq!(pressed("prototype", stiff, load_gain, tread_gain), None);
         }
     }
+
+    #[test]
+    fn it_is_told_from_half_the_cruise_preload_on_and_after_its_ticks() {
+        let rig = Rig::prototype();
+        let law = TreadLaw::try_build(&rig).expect("in range");
+        let told = |preload: Newtons| {
+            let mut state = TreadState::default();
+            law.begin(&mut state, preload);
+            (1..2000).find(|_| law.step(&mut state, preload, Q16::ZERO, Q16::ZERO))
+        };
+        let least = Q16::from_num(0.5 * rig.preload.cruise_n);
+        assert_eq!(told(least - q16(10_000)), None);
+        assert_eq!(told(q16(1_000_000)), None);
+        // The first of the ticks that it must be off is that at which enough is forgotten.
+        let ticks = u32::from(FORGETS + OFF_TICKS) - 1;
+        assert_eq!(told(law.least), Some(ticks));
+        assert_eq!(told(least + q16(10_000)), Some(ticks));
+    }
 }

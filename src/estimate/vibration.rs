@@ -372,4 +372,15 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn what_is_cut_is_cut_towards_zero_and_whole_numbers_are_not() {
+        for whole in [0_i64, 1, 2, 1000, 1 << 20] {
+            let product = whole << GAIN_BITS;
+            assert_eq!(i64::from(cut(product)), whole);
+            assert_eq!(i64::from(cut(-product)), -whole);
+            assert_eq!(i64::from(cut(product + 1)), whole);
+            assert_eq!(i64::from(cut(-product - 1)), -whole);
+        }
+    }
 }

@@ -109,4 +109,12 @@ mod tests {
         let sudden = impact.vibration_mm(1e6, 40.0, 3.0);
         assert!((sudden - 40.0 / impact.arm_n_per_mm).abs() < 1e-12);
     }
+
+    #[test]
+    fn a_rig_without_modes_does_not_swing() {
+        let mut rig = Rig::prototype();
+        rig.drive.modes_hz.clear();
+        let swing = Impact::new(&rig).vibration_mm(60.0, 40.0, 3.0);
+        assert!(swing.abs() < 1e-12, "{swing}");
+    }
 }

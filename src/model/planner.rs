@@ -275,4 +275,66 @@ mod tests {
             assert!(!reviewed(wider, false).strange);
         }
     }
+
+    #[test]
+    fn a_gap_beyond_every_tread_corrects_nothing() {
+        for wider in [1.0, 1.5, -1.0] {
+            let outcome = reviewed(wider, true);
+            assert_eq!(outcome.scale, q16(1_000_000), "{wider}: {outcome:?}");
+            assert!(outcome.strange && !outcome.bounded);
+        }
+    }
+
+    #[test]
+    fn a_gap_that_the_friction_cannot_hold_is_made_smaller_until_it_can() {
+        let mut smaller = 0;
+        for mu in [0.5, 0.6, 0.7, 0.8, 0.9, 1.1] {
+            let mut rig = Rig::prototype();
+            rig.plant.mu = mu;
+            let Ok(planner) = Planner::try_build(&rig) else { continue };
+            for direction in Direction::ALL {
+                let scale = Scale::NOMINAL;
+                let at = Point { direction, speed: planner.least_speed, scale };
+                let (target, gap) =
+                    (planner.target_of(direction), planner.gripping_gap(&at, direction));
+                let grips = |gap| planner.model.utilisation(&at, gap) <= planner.usable;
+                if grips(target) {
+                    assert_eq!(gap, target, "{mu}");
+                    continue;
+                }
+                smaller += 1;
+                // By sixteenths, eight times at most.
+                let part = gap.to_num::<f64>() / target.to_num::<f64>();
+                assert!((0.59..0.94).contains(&part), "{mu} {part}");
+                assert!(grips(gap) || part < 0.6, "{mu} {gap}");
+            }
+        }
+        assert!(smaller > 0);
+    }
+
+    #[test]
+    fn a_crossing_that_the_preload_slows_is_told() {
+        let (mut limited, mut free) = (0, 0);
+        for gap_mm in [0.0, 1.5, 1.75, 2.0, 2.25, 2.5] {
+            let mut rig = Rig::prototype();
+            rig.control.gap_ref_mm = gap_mm;
+            let planner = Planner::try_build(&rig).expect("a sound rig");
+            for (scale, direction) in [0.8, 1.0, 1.25]
+                .into_iter()
+                .flat_map(|scale| Direction::ALL.map(|way| (scale, way)))
+            {
+                let scale = Ratio::from_num(scale);
+                let request = PlanRequest { sequence: 1, direction, step: 2, scale, review: None };
+                let plan = planner.plan(&request);
+                let told = plan.limits.contains(&Some(Limit::PreloadLimited));
+                let floored = plan.limits.contains(&Some(Limit::SpeedFloor));
+                let at_limit = plan.cross_preload >= planner.most_preload * q16(980_000);
+                let slow = plan.cross_speed < planner.safe_speed;
+                assert_eq!(told, at_limit && slow && !floored, "{gap_mm} {plan:?}");
+                limited += u32::from(told);
+                free += u32::from(!told && !floored);
+            }
+        }
+        assert!(limited > 0 && free > 0, "{limited} {free}");
+    }
 }

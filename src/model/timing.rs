@@ -152,4 +152,18 @@ mod tests {
             prop_assert!((way - exact * 0.5 * (from + to)).abs() < 0.02 + 1e-3 * way, "{way}");
         }
     }
+
+    #[test]
+    fn a_preload_falls_in_the_time_in_which_it_rises() {
+        let rig = Rig::prototype();
+        let timing = Timing::try_build(&rig).unwrap();
+        for change in [0.5, 5.0, 14.7] {
+            let up = timing.preload_change(Q16::from_num(change));
+            assert_eq!(up, timing.preload_change(-Q16::from_num(change)));
+            // As fast as the reference is let run, a part of the slew.
+            let rate = rig.preload.slew_n_per_s * SLEW_PART.to_num::<f64>();
+            let exact = timing.preload_change(Q16::ZERO).to_num::<f64>() + change / rate;
+            assert!((up.to_num::<f64>() - exact).abs() < 2e-3 * exact, "{up} {exact}");
+        }
+    }
 }

@@ -363,4 +363,17 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn a_full_scale_out_of_range_is_refused() {
+        for sound in [0.1, 1.0, 20_000.0] {
+            assert!(AnalogChannel::try_build("k", sound, 0.005).is_ok(), "{sound}");
+        }
+        for (value, named) in [(0.0, 0.0), (-5.0, -5.0), (0.099, 0.099), (20_001.0, 20_001.0)] {
+            let refused = AnalogChannel::try_build("k", value, 0.005);
+            let error = RigError::OutOfRange { key: "k", value: named, min: 0.1, max: 20_000.0 };
+            assert_eq!(refused.err(), Some(error));
+        }
+        assert!(AnalogChannel::try_build("k", f64::NAN, 0.005).is_err());
+    }
 }

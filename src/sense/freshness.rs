@@ -218,4 +218,11 @@ mod tests {
         assert_eq!(age(0, 1000), 0);
         assert_eq!(age(8, 7), 1);
     }
+
+    #[test]
+    fn a_second_ahead_counts_as_now_and_no_more() {
+        assert_eq!(age(5, 1005), 0);
+        assert_eq!(age(5, 1006), u32::MAX - 1000);
+        assert_eq!(age(u32::MAX, 999), 0);
+    }
 }

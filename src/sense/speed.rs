@@ -483,4 +483,45 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn a_gap_within_the_limit_is_bridged_and_a_longer_one_starts_anew() {
+        let after = |gap: u32| {
+            let meter = build();
+            let mut state = SpeedState::default();
+            let step = |state: &mut SpeedState, now: Tick, at: Tick| {
+                let position = 10.0e-3 * f64::from(at);
+                meter.step(state, now, sample(position, at), Default::default(), LIMIT)
+            };
+            for now in 0..2000 {
+                step(&mut state, now, now);
+            }
+            for now in 2000..1999 + gap {
+                step(&mut state, now, 1999);
+            }
+            step(&mut state, 1999 + gap, 1999 + gap).speed.value.to_num::<f64>()
+        };
+        for gap in [1, 2, LIMIT - 1, LIMIT] {
+            assert!((after(gap) - 10.0).abs() < 1.0, "{gap}: {}", after(gap));
+        }
+        assert!(after(LIMIT + 1).abs() < 1e-9);
+    }
+
+    #[test]
+    fn twice_what_the_motor_can_is_still_believed() {
+        let mut rig = Rig::prototype();
+        rig.drive.no_load_speed_mm_s = 2.0 * IMPLAUSIBLE_MM_S;
+        let meter = Speedometer::try_build(&rig, BANDWIDTH_RAD_S).expect("in range");
+        let believed = |part: f64| {
+            let mut state = SpeedState::default();
+            let step_mm = part * rig.drive.no_load_speed_mm_s * 1e-3;
+            (0..50).all(|now| {
+                let at = sample(step_mm * f64::from(now), now);
+                let motion = meter.step(&mut state, now, at, Default::default(), LIMIT);
+                motion.speed.validity == Validity::Valid
+            })
+        };
+        assert!(believed(1.0) && believed(1.9) && believed(-1.9));
+        assert!(!believed(3.0) && !believed(-3.0));
+    }
 }

@@ -250,4 +250,35 @@ mod tests {
         assert!(faults.is_sorted_by(|a, b| a < b) && faults.iter().all(|c| (100..200).contains(c)));
         assert!(limits.is_sorted_by(|a, b| a < b) && limits.iter().all(|c| (200..300).contains(c)));
     }
+
+    /// The page that an operator reads.
+    const PAGE: &str = include_str!("../../docs/MODES.md");
+
+    #[test]
+    fn the_page_says_of_each_fault_what_its_account_says() {
+        for fault in Fault::ALL {
+            let (code, sentence) = (fault.code(), fault.sentence());
+            let Account { cause, detection, reaction, reset } = fault.account();
+            let row = format!("| {code} | {sentence} | {cause} | {detection} | {reset} |");
+            assert_eq!(PAGE.matches(&row).count(), 1, "{row}");
+            let code = code.to_string();
+            let reactions = |line: &&str| line.starts_with("- ") && line.contains(&code);
+            let line = PAGE.lines().find(reactions).expect("a reaction");
+            assert!(line.ends_with(&format!(": {reaction}.")), "{line}");
+            let alike = |other: &&Fault| other.sentence() == sentence;
+            assert_eq!(Fault::ALL.iter().filter(alike).count(), 1, "{sentence}");
+        }
+    }
+
+    #[test]
+    fn the_page_says_of_each_limit_what_its_account_says() {
+        for limit in Limit::ALL {
+            let (code, sentence) = (limit.code(), limit.sentence());
+            let (reaction, until) = limit.account();
+            let row = format!("| {code} | {sentence} | {reaction} | {until} |");
+            assert_eq!(PAGE.matches(&row).count(), 1, "{row}");
+            let alike = |other: &&Limit| other.sentence() == sentence;
+            assert_eq!(Limit::ALL.iter().filter(alike).count(), 1, "{sentence}");
+        }
+    }
 }

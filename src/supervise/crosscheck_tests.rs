@@ -279,3 +279,112 @@ proptest! {
         }
     }
 }
+
+/// A tick of a wheel that is so far off a reference that stands, mm.
+fn off_by(now: Tick, off: Millimetres) -> Compared {
+    Compared {
+        now,
+        read_at: now,
+        travel: off.widen(),
+        radius: q16(125_000_000),
+        preload: q16(40_000_000),
+        preload_due: q16(40_000_000),
+        compression: q16(400_000),
+        speed_ref: Q16::ZERO,
+        effort: None,
+    }
+}
+
+/// A drive switched on at tick 0, and 100 ticks of rest after it.
+fn rested() -> (CrossCheck, CrossState) {
+    let check = CrossCheck::try_build(&Rig::prototype()).expect("a sound rig");
+    let mut state = CrossState::default();
+    state.begin(&off_by(0, Q16::ZERO));
+    assert!((0..=100).all(|tick| !check.bends(&mut state, &off_by(tick, Q16::ZERO))));
+    (check, state)
+}
+
+#[test]
+fn a_wheel_that_jumps_off_its_reference_is_found_in_the_same_tick() {
+    let far = q16(200_000);
+    let (check, mut state) = rested();
+    assert!(check.bends(&mut state, &off_by(101, far)));
+    // In the very first tick too: until then the wheel has stood.
+    state.begin(&off_by(500, Q16::ZERO));
+    assert!(check.bends(&mut state, &off_by(500, far)));
+}
+
+#[test]
+fn across_a_reading_that_is_missing_no_way_is_judged() {
+    let far = q16(200_000);
+    // The tick's own reading is old, or the tick before was lost.
+    let old = Compared { read_at: 100, ..off_by(101, far) };
+    for gap in [old, off_by(102, far)] {
+        let (check, mut state) = rested();
+        assert!(!check.bends(&mut state, &gap));
+        for tick in 1..100 {
+            assert!(!check.bends(&mut state, &off_by(gap.now + tick, far)), "{tick}");
+        }
+        // From then on it is again.
+        assert!(check.bends(&mut state, &off_by(gap.now + 100, Q16::ZERO)));
+    }
+}
+
+#[test]
+fn off_by_exactly_the_threshold_is_borne() {
+    let check = CrossCheck::try_build(&Rig::prototype()).expect("a sound rig");
+    // Steadily away from the reference: half of the way in each span.
+    let drifts = |way: Q16| {
+        let mut past = [Q16::ZERO; KEPT];
+        past[SPAN] = way.half();
+        let mut state = CrossState {
+            past,
+            held: 2 * SPAN as u8,
+            head: 2 * SPAN as u8,
+            ..CrossState::default()
+        };
+        check.bends(&mut state, &off_by(1, way))
+    };
+    assert!(!drifts(OFF) && !drifts(-OFF));
+    assert!(drifts(OFF + Q16::DELTA) && drifts(-OFF - Q16::DELTA));
+    let strays = |off: Newtons| {
+        let mut state = CrossState::default();
+        let due = q16(40_000_000);
+        (0..50).find_map(|_| check.preload(&mut state, due + off, due))
+    };
+    assert_eq!(strays(check.strayed), None);
+    assert_eq!(strays(-check.strayed), None);
+    assert_eq!(strays(check.strayed + Q16::DELTA), Some(Fault::PretightenerRunaway));
+    assert!(
+        (check.strayed.to_num::<f64>() / Rig::prototype().preload.cruise_n - 0.25).abs() < 1e-4
+    );
+}
+
+#[test]
+fn duty_tells_speed_only_above_ten_millimetres_a_second() {
+    let found = |speed: MillimetresPerSecond| {
+        let check = CrossCheck::try_build(&Rig::prototype()).expect("a sound rig");
+        let mut state = CrossState::default();
+        let mut reference = Travel::ZERO;
+        (0..400).find_map(|tick| {
+            reference += per_tick(speed);
+            // Codes that are alive.
+            let alive = Q16::from_bits(tick % 7);
+            let seen = Compared {
+                travel: reference,
+                speed_ref: speed,
+                effort: Some(q16(300_000)),
+                preload: q16(40_000_000) + alive,
+                compression: q16(400_000) + alive,
+                ..off_by(tick as Tick, Q16::ZERO)
+            };
+            if tick == 0 {
+                state.begin(&seen);
+            }
+            check.step(&mut state, &seen)
+        })
+    };
+    assert_eq!(found(TELLING), None);
+    assert_eq!(found(TELLING + q16(100_000)), Some(Fault::DutyMismatch));
+    assert_eq!(found(-TELLING - q16(100_000)), Some(Fault::DutyMismatch));
+}

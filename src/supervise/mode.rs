@@ -130,3 +130,22 @@ impl Mode {
         matches!(self, Self::Run(..) | Self::Stopping(_))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn at_rest_is_what_drives_neither_wheel_nor_pretightener() {
+        let run = Mode::Run(Direction::Deploy, Leg::Settle);
+        let stopping = Mode::Stopping(Direction::Retract);
+        let preload = Mode::Preload(Direction::Deploy);
+        assert!([run, stopping, preload].iter().all(|mode| !mode.is_at_rest()));
+        assert!(run.moves() && stopping.moves() && !preload.moves());
+        let held = Mode::FaultHold(Fault::TickOverrun);
+        let complete = Mode::Complete(Direction::Deploy);
+        for mode in [Mode::Boot, Mode::SelfTest, Mode::Zero, Mode::Idle, complete, held] {
+            assert!(mode.is_at_rest() && !mode.moves(), "{mode:?}");
+        }
+    }
+}

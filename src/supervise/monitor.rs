@@ -361,4 +361,50 @@ mod tests {
             prop_assert_eq!(found(RUN, speed, wanted, preload, preload + lag), None);
         }
     }
+
+    #[test]
+    fn what_a_wheel_generates_is_excused_in_the_self_test_alone() {
+        let found = |mode: Mode| {
+            let monitor = Monitor::try_build(&Rig::prototype()).unwrap();
+            let mut state = MonitorState::default();
+            let sensed = sensed(0.0, 0.0);
+            let generates = BridgeCodes { drive: BridgeCode::of(3000), ..IDLE };
+            (0..40).find_map(|now| {
+                let seen = Observed {
+                    now,
+                    mode,
+                    sensed: &sensed,
+                    bridges: Some(generates),
+                    speed_ref: Q16::ZERO,
+                    preload_due: Q16::ZERO,
+                    effort: None,
+                    overrun: false,
+                    emergency_stop: false,
+                };
+                monitor.step(&mut state, &seen)
+            })
+        };
+        assert_eq!(found(Mode::SelfTest), None);
+        for mode in [Mode::Zero, Mode::Idle, Mode::Complete(Direction::Deploy)] {
+            assert_eq!(found(mode), Some(Fault::DriveBridge), "{mode:?}");
+        }
+    }
+
+    #[test]
+    fn sensors_that_are_all_lost_are_a_fault_and_one_too() {
+        let mut lost = sensed(0.0, 40.0);
+        assert_eq!(sensor_fault(&lost), None);
+        lost.radius.validity = Validity::Stale;
+        assert_eq!(sensor_fault(&lost), Some(Fault::AngleStale));
+        lost.speed.validity = Validity::Stale;
+        lost.preload.validity = Validity::Stale;
+        lost.compression.validity = Validity::Stale;
+        assert_eq!(sensor_fault(&lost), Some(Fault::SpeedStale));
+    }
+
+    #[test]
+    fn under_way_a_preload_beyond_its_limit_is_one_even_if_it_was_asked_for() {
+        let press = usize::from(OVERPRESSURE_TICKS);
+        assert_eq!(found(RUN, 8.0, 8.0, 56.0, 56.0), Some((Fault::Overpressure, press)));
+    }
 }

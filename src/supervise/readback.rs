@@ -308,4 +308,58 @@ mod tests {
             prop_assert!((33..=39).contains(&tick), "{}", tick);
         }
     }
+
+    #[test]
+    fn the_low_pass_comes_to_the_duty_itself() {
+        for (from, to) in [(0, 1), (0, -1), (0, 7), (500, 0), (-500, 0), (-32_768, 32_767)] {
+            let mut lag = Lag(from);
+            for _ in 0..60 {
+                lag.step(to);
+            }
+            assert_eq!(lag.step(to), to, "{from}");
+        }
+    }
+
+    #[test]
+    fn off_by_the_band_is_borne_and_by_more_is_not() {
+        let step = |given: i16, found: i32| {
+            let lag = Lag(given.into());
+            let mut bridge = Bridge { given, lag, before: given.into(), off: 0 };
+            // The code's own steps are coarser than what is asked here.
+            let code = BridgeCode::of(found);
+            assert_eq!(code.duty(), found);
+            (0..20).any(|_| bridge.is_off(code))
+        };
+        // Duties and bands of whole steps of the code: 655 and 5 of 160.
+        for given in [160_i16, -160] {
+            let wide = 660;
+            assert!(!step(given, i32::from(given) + wide));
+            assert!(!step(given, i32::from(given) - wide));
+            assert!(step(given, i32::from(given) + wide + 20));
+            assert!(step(given, i32::from(given) - wide - 20));
+        }
+    }
+
+    #[test]
+    fn three_ticks_off_are_borne_however_many_were_good_before() {
+        for good in 0..6 {
+            let mut readback = settled();
+            let step = |readback: &mut Readback, drive| {
+                let codes =
+                    BridgeCodes { drive: BridgeCode::of(drive), pretightener: BridgeCode::of(0) };
+                readback.step(Some(codes), false)
+            };
+            for _ in 0..good {
+                assert_eq!(step(&mut readback, 0), None);
+            }
+            for _ in 1..OFF_TICKS {
+                assert_eq!(step(&mut readback, 9000), None, "{good}");
+            }
+            assert_eq!(step(&mut readback, 0), None);
+            for _ in 1..OFF_TICKS {
+                assert_eq!(step(&mut readback, 9000), None, "{good}");
+            }
+            assert_eq!(step(&mut readback, 9000), Some(Fault::DriveBridge));
+        }
+    }
 }

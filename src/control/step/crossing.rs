@@ -296,3 +296,20 @@ fn lead_time(open: &OpenCrossing, lifted_at: Tick) -> Seconds {
         None => -ticks_to_seconds(lifted_at.wrapping_sub(open.touched_at)),
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "quantities of a test")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_preload_that_came_too_late_has_a_negative_lead() {
+        let touched = OpenCrossing::begin(1, Direction::Deploy, true, 5000);
+        let lead = |standing_since: Option<Tick>| {
+            lead_time(&OpenCrossing { standing_since, ..touched }, 5400).to_num::<f64>()
+        };
+        // It stood 0.25 s before the touch; or not yet when the wheel lifted, 0.4 s after it.
+        assert!((lead(Some(4750)) - 0.25).abs() < 1e-4, "{}", lead(Some(4750)));
+        assert!((lead(None) + 0.4).abs() < 1e-4, "{}", lead(None));
+    }
+}

@@ -126,3 +126,81 @@ impl Controller {
         }
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "quantities of a test")]
+mod tests {
+    use super::super::tests::{at, sensed};
+    use super::*;
+    use crate::estimate::crossing::Contact;
+    use crate::sense::{SensedState, Validity};
+    use crate::units::q16;
+
+    /// Every sensor answers, and the wheel stands.
+    fn answering() -> SensedState {
+        let mut all = sensed(0, 0.0, 0.0);
+        all.speed.validity = Validity::Valid;
+        all.preload.validity = Validity::Valid;
+        all.compression.validity = Validity::Valid;
+        all.radius.validity = Validity::Valid;
+        all
+    }
+
+    #[test]
+    fn boot_waits_two_seconds_for_every_sensor() {
+        let mut state = State::default();
+        let mut deaf = answering();
+        deaf.radius.validity = Validity::Absent;
+        at(&deaf, 0.0, |controller, pass| {
+            for tick in 1..2000 {
+                controller.advance_mode(&mut state, pass);
+                assert_eq!(state.mode, Mode::Boot, "{tick}");
+            }
+            controller.advance_mode(&mut state, pass);
+        });
+        assert_eq!(state.mode, Mode::FaultHold(Fault::AngleStale));
+        let mut state = State::default();
+        at(&answering(), 0.0, |controller, pass| controller.advance_mode(&mut state, pass));
+        assert_eq!(state.mode, Mode::SelfTest);
+    }
+
+    #[test]
+    fn a_zero_that_does_not_come_in_is_given_up_after_two_seconds() {
+        let mut state = State::default();
+        state.mode = Mode::Zero;
+        state.senses.begin_zero();
+        at(&answering(), 0.0, |controller, pass| {
+            for tick in 1..2000 {
+                controller.advance_mode(&mut state, pass);
+                assert_eq!(state.mode, Mode::Zero, "{tick}");
+            }
+            controller.advance_mode(&mut state, pass);
+        });
+        assert_eq!(state.mode, Mode::FaultHold(Fault::SelfTest));
+    }
+
+    #[test]
+    fn a_tread_is_compared_on_a_wall_alone() {
+        // Pressed with 40 N, and the displacement sensor shows nothing.
+        let strange = SensedState { preload_filtered: q16(40_000_000), ..sensed(0, 0.0, 0.0) };
+        let told = |contact: Contact, searching: bool, position: f64| {
+            let mut state = State::default();
+            state.watch.contact = contact;
+            state.searching = searching;
+            at(&strange, position, |controller, pass| {
+                for tick in 1..500 {
+                    state.in_mode = tick;
+                    controller.compare_tread(&mut state, pass);
+                }
+                let strange = Event::Limit(Limit::TreadStrange);
+                pass.output.events.iter().filter(|entry| entry.event == strange).count()
+            })
+        };
+        assert_eq!(told(Contact::Wall, false, 0.0), 1);
+        assert_eq!(told(Contact::Both, false, 0.0), 0);
+        assert_eq!(told(Contact::Leaving, false, 0.0), 0);
+        assert_eq!(told(Contact::Wall, true, 0.0), 0);
+        // The corner at 18 mm may carry a part.
+        assert_eq!(told(Contact::Wall, false, 12.0), 0);
+    }
+}

@@ -89,3 +89,66 @@ impl Controller {
         }
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "quantities of a test")]
+mod tests {
+    use super::super::tests::{at, sensed};
+    use super::*;
+    use crate::supervise::{Direction, Leg};
+    use crate::units::q16;
+
+    /// Under way on the first wall.
+    fn running() -> State {
+        let mut state = State::default();
+        state.mode = Mode::Run(Direction::Deploy, Leg::Cruise);
+        state
+    }
+
+    #[test]
+    fn a_model_that_does_not_answer_is_given_up_after_half_a_second() {
+        let mut state = running();
+        at(&sensed(0, 0.0, 0.3), 2.0, |controller, pass| {
+            controller.ask(&mut state, pass);
+            for tick in 1..500 {
+                controller.take_plan(&mut state, pass, None);
+                assert_eq!(state.mode, running().mode, "{tick}");
+            }
+            controller.take_plan(&mut state, pass, None);
+        });
+        assert_eq!(state.mode, Mode::FaultHold(Fault::ModelSilent));
+        // Nothing is missed that was not asked for.
+        let mut state = running();
+        at(&sensed(0, 0.0, 0.3), 2.0, |controller, pass| {
+            for _ in 0..2000 {
+                controller.take_plan(&mut state, pass, None);
+            }
+        });
+        assert_eq!(state.mode, running().mode);
+    }
+
+    #[test]
+    fn a_preload_that_never_stands_is_given_up_when_the_patience_is_over() {
+        let mut state = running();
+        let waiting = Targets {
+            speed: q16(1_000_000),
+            preload: q16(48_000_000),
+            ramping: true,
+            braking: true,
+            approaching: true,
+            waiting: true,
+        };
+        at(&sensed(0, 0.0, 0.3), 2.0, |controller, pass| {
+            let cross = waiting.preload;
+            for tick in 0..controller.patience {
+                controller.note_preload(&mut state, pass, cross, &waiting);
+                assert_eq!(state.mode, running().mode, "{tick}");
+            }
+            // Told once.
+            let told = Event::Limit(Limit::PreloadWait);
+            assert_eq!(pass.output.events.iter().filter(|e| e.event == told).count(), 1);
+            controller.note_preload(&mut state, pass, cross, &waiting);
+        });
+        assert_eq!(state.mode, Mode::FaultHold(Fault::PreloadNotReached));
+    }
+}

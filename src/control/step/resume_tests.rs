@@ -1,39 +1,12 @@
 //! Tests of the start after a restart: where a wall is measured and where it is not.
 
-use super::super::Output;
+use super::super::tests::{at, sensed};
 use super::*;
 use crate::blackbox::Place;
 use crate::estimate::crossing::{Contact, Sign};
 use crate::rig::Rig;
-use crate::sense::raw::SensorFrame;
-use crate::sense::{SensedState, Senses, SensesState};
+use crate::sense::SensedState;
 use proptest::prelude::*;
-
-/// What the senses say of a wheel on this level, so much off its wall by the table and so
-/// deep in its tread, mm.
-fn sensed(level: u8, off: f64, compression: f64) -> SensedState {
-    let rig = Rig::prototype();
-    let senses = Senses::try_build(&rig).expect("sound");
-    let nothing = SensorFrame::default();
-    let mut sensed = senses.step(&mut SensesState::default(), 0, &nothing, Q16::ZERO);
-    sensed.level = level;
-    let wall = rig.centre_radius_mm(usize::from(level));
-    sensed.radius.value = Q16::from_num(wall + off + compression);
-    sensed.compression_filtered = Q16::from_num(compression);
-    sensed
-}
-
-/// Does something at this position.
-fn at<T>(
-    sensed: &SensedState,
-    position: f64,
-    act: impl FnOnce(&Controller, &mut Pass<'_>) -> T,
-) -> T {
-    let controller = Controller::try_build(&Rig::prototype()).expect("sound");
-    let mut output = Output::default();
-    let position = Q16::from_num(position);
-    act(&controller, &mut Pass { now: 0, sensed, position, wedge: Q16::ZERO, output: &mut output })
-}
 
 /// A run that is resumed there.
 fn resumed(sensed: &SensedState, position: f64, direction: Direction) -> State {
@@ -160,4 +133,113 @@ fn without_a_record_a_corner_under_the_wheel_tells_the_place() {
     let from_above = SensedState { steps_up: Q16::from_num(0.5), ..sensed(1, 2.0, 0.3) };
     let (other, _) = started(&from_above, None).expect("a corner");
     assert!((other - position).abs() < 0.01, "{other} {position}");
+}
+
+#[test]
+fn a_corner_is_felt_exactly_between_its_edges() {
+    at(&sensed(0, 0.0, 0.3), 0.0, |controller, _| {
+        let face = q16(18_000_000);
+        let tolerance = controller.schedule.tolerance();
+        let ahead = face - controller.rise.first_contact(Direction::Deploy) - tolerance;
+        let behind = face + controller.rise.first_contact(Direction::Retract) + tolerance;
+        assert!(!controller.may_feel_corner(ahead));
+        assert!(controller.may_feel_corner(ahead + Q16::DELTA));
+        assert!(controller.may_feel_corner(behind - Q16::DELTA));
+        assert!(!controller.may_feel_corner(behind));
+        // Within 0.3 mm of its edge the wheel stands on top.
+        for direction in Direction::ALL {
+            let corner = |position| controller.corner_at(position, direction);
+            assert_eq!(corner(face - AT_EDGE - Q16::DELTA), Some(Ground::Corner(1)));
+            assert_eq!(corner(face - AT_EDGE), None);
+            assert_eq!(corner(face), None);
+        }
+    });
+}
+
+#[test]
+fn at_the_first_touch_itself_the_wall_is_still_measured() {
+    let contact = |nearer: Millimetres| {
+        let mut state = State::default();
+        at(&sensed(0, 0.0, 0.3), 0.0, |controller, pass| {
+            pass.position = q16(18_000_000) - controller.felt_within() + nearer;
+            controller.begin_on_wall(&mut state, pass, Direction::Retract);
+        });
+        (state.watch.contact, state.leaving.is_some())
+    };
+    assert_eq!(contact(Q16::ZERO), (Contact::Wall, false));
+    assert_eq!(contact(Q16::DELTA), (Contact::Leaving, true));
+}
+
+#[test]
+fn the_search_ends_on_the_last_corner_of_each_way() {
+    // Half-way up the corner above the wall of this level: 2 mm inwards of it.
+    let searches = |level: u8, direction: Direction| {
+        let mut state = State::default();
+        (state.direction, state.searching) = (direction, true);
+        at(&sensed(level, -2.0, 0.3), 0.0, |controller, pass| {
+            controller.resume(&mut state, pass, direction);
+        });
+        let open = state.crossing.expect("on a corner");
+        assert_eq!((open.step, state.next_step), (level + 1, level + 1));
+        state.searching
+    };
+    let out = [0, 1, 2].map(|level| searches(level, Direction::Deploy));
+    assert_eq!(out, [true, true, false]);
+    let back = [0, 1, 2].map(|level| searches(level, Direction::Retract));
+    assert_eq!(back, [false, true, true]);
+}
+
+#[test]
+fn outside_the_outermost_wall_there_is_no_corner() {
+    for direction in Direction::ALL {
+        let mut state = State::default();
+        (state.direction, state.searching) = (direction, true);
+        at(&sensed(0, 1.5, 0.3), 0.0, |controller, pass| {
+            controller.resume(&mut state, pass, direction);
+        });
+        assert!(state.crossing.is_none() && state.level == 0);
+    }
+    // And inwards of the innermost there is none either.
+    let inmost = sensed(3, -1.5, 0.3);
+    let ground = at(&inmost, 75.0, |controller, pass| controller.ground(pass, ON_WALL));
+    assert_eq!(ground, Ground::Wall(3));
+}
+
+#[test]
+fn a_place_is_contradicted_by_a_height_a_fifth_of_a_step_off() {
+    let stands = |position: Millimetres, up: f64, sure: bool| {
+        let here = SensedState { steps_up: Q16::from_num(up), ..sensed(0, 0.0, 0.3) };
+        at(&here, 0.0, |controller, pass| controller.may_stand_at(pass, position, within(sure)))
+    };
+    // Walls at 2 and 22.7 mm; at 10 mm the wheel may stand on the first corner, or before it.
+    for (position, least, most) in [(2.0, 0.0, 0.0), (10.0, 0.0, 1.0), (22.7, 1.0, 1.0)] {
+        let stands = |up: f64| stands(Q16::from_num(position), up, true);
+        assert!(stands(least - 0.19) && stands(most + 0.19), "{position}");
+        assert!(!stands(least - 0.21) && !stands(most + 0.21), "{position}");
+    }
+    // Behind the face at 18 mm by its tolerance and by what the record may be off.
+    let tolerance = at(&sensed(0, 0.0, 0.3), 0.0, |controller, _| controller.schedule.tolerance());
+    let behind = |way: Millimetres| q16(18_000_000) + tolerance + way;
+    assert!(stands(behind(q16(400_000)), 0.0, true));
+    assert!(!stands(behind(q16(600_000)), 0.0, true));
+    assert!(stands(behind(q16(1_900_000)), 0.0, false));
+    assert!(!stands(behind(q16(2_100_000)), 0.0, false));
+}
+
+#[test]
+fn on_a_wall_the_step_ahead_is_the_next_one_and_without_one_nothing_is_searched() {
+    for (level, position, out, back) in [(0, 2.0, 1, 0), (1, 24.8, 2, 1), (3, 75.0, 0, 3)] {
+        for (direction, next) in [(Direction::Deploy, out), (Direction::Retract, back)] {
+            for searching in [false, true] {
+                let mut state = State::default();
+                (state.direction, state.searching) = (direction, searching);
+                at(&sensed(level, 0.0, 0.34), position, |controller, pass| {
+                    controller.resume(&mut state, pass, direction);
+                });
+                assert_eq!((state.level, state.next_step), (level, next), "{position}");
+                assert_eq!(state.searching, searching && next > 0, "{position} {direction:?}");
+                assert!(state.crossing.is_none());
+            }
+        }
+    }
 }

@@ -193,3 +193,99 @@ impl Controller {
         }
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "quantities of a test")]
+mod tests {
+    use super::super::tests::{at, sensed};
+    use super::*;
+
+    #[test]
+    fn close_to_a_face_the_level_tells_which_step_is_ahead() {
+        // The steps of the prototype stand at 18, 40 and 62 mm.
+        for (position, level, out, back) in [
+            (2.0, 0, 1, 0),
+            (17.9, 0, 1, 0),
+            // Up before the table has the face.
+            (17.9, 1, 2, 1),
+            (18.0, 1, 2, 1),
+            // The face is passed: behind, even if the level has not been counted yet.
+            (18.1, 0, 2, 1),
+            (30.0, 1, 2, 1),
+            (61.9, 3, 0, 3),
+            (75.0, 3, 0, 3),
+            (75.0, 2, 0, 3),
+        ] {
+            let mut state = State::default();
+            state.level = level;
+            at(&sensed(level, 0.0, 0.3), position, |controller, pass| {
+                let ahead = |direction| controller.step_ahead(&state, pass, direction);
+                assert_eq!(ahead(Direction::Deploy), out, "{position} {level}");
+                assert_eq!(ahead(Direction::Retract), back, "{position} {level}");
+            });
+        }
+    }
+
+    /// Step ahead after turning to `direction` in the middle of this step's corner.
+    fn ahead(step: u8, contact: Contact, direction: Direction, position: f64, level: u8) -> u8 {
+        let before = match direction {
+            Direction::Deploy => Direction::Retract,
+            Direction::Retract => Direction::Deploy,
+        };
+        let mut state = State::default();
+        (state.level, state.extra) = (level, u8::from(step == 0));
+        state.watch.contact = contact;
+        state.crossing = Some(OpenCrossing::begin(step, before, true, 0));
+        at(&sensed(level, 0.0, 0.3), position, |controller, pass| {
+            controller.turn(&mut state, pass, direction);
+        });
+        state.next_step
+    }
+
+    #[test]
+    fn turned_on_a_corner_the_step_ahead_is_the_one_beyond_it() {
+        let (out, back) = (Direction::Deploy, Direction::Retract);
+        // On the way back, and up again.
+        assert_eq!(ahead(1, Contact::Corner, out, 17.0, 1), 2);
+        assert_eq!(ahead(2, Contact::Corner, out, 39.0, 2), 3);
+        assert_eq!(ahead(3, Contact::Corner, out, 61.0, 3), 0);
+        // On the way out, and off again; or over it the other way.
+        assert_eq!(ahead(2, Contact::Both, back, 30.0, 1), 1);
+        assert_eq!(ahead(2, Contact::Corner, back, 39.0, 1), 2);
+        // At a step that the table lacks, between the first and the second.
+        assert_eq!(ahead(0, Contact::Corner, out, 30.0, 2), 2);
+        assert_eq!(ahead(0, Contact::Both, back, 30.0, 1), 1);
+    }
+
+    #[test]
+    fn a_search_begins_towards_the_wall_that_the_arm_shows() {
+        for (up, out, back) in [
+            (0.0, (0, 1), (0, 0)),
+            (0.1, (0, 1), (0, 0)),
+            (0.14, (1, 2), (0, 0)),
+            (0.5, (1, 2), (0, 0)),
+            (0.86, (1, 2), (0, 0)),
+            (0.9, (1, 2), (1, 1)),
+            (2.5, (3, 0), (2, 2)),
+            (3.0, (3, 0), (3, 3)),
+            (-0.05, (0, 1), (0, 0)),
+        ] {
+            let mut seen = sensed(0, 0.0, 0.3);
+            seen.steps_up = Q16::from_num(up);
+            for (direction, (level, next)) in [(Direction::Deploy, out), (Direction::Retract, back)]
+            {
+                let mut state = State::default();
+                let clear = at(&seen, 30.0, |controller, pass| {
+                    controller.start_searching(&mut state, pass, direction);
+                    match direction {
+                        Direction::Deploy => pass.position + controller.corner_reach(),
+                        Direction::Retract => pass.position,
+                    }
+                });
+                assert_eq!((state.level, state.next_step), (level, next), "{up} {direction:?}");
+                assert_eq!(state.leaving, Some(clear), "{up} {direction:?}");
+                assert_eq!(state.watch.contact, Contact::Leaving);
+            }
+        }
+    }
+}

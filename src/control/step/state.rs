@@ -322,3 +322,69 @@ impl State {
         self.preload_loop.halt();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_is_known_only_with_every_step_found_where_the_table_has_it() {
+        for (searching, given_up, extra, placed) in [
+            (false, 0, 0, true),
+            (true, 0, 0, false),
+            (false, 1, 0, false),
+            (false, 0, 1, false),
+            (true, 1, 0, false),
+            (true, 0, 1, false),
+            (false, 1, 1, false),
+        ] {
+            let state = State { located: true, searching, given_up, extra, ..State::default() };
+            assert_eq!(state.is_placed(), placed, "{searching} {given_up} {extra}");
+        }
+        assert!(!State::default().is_placed());
+        for sure in [true, false] {
+            let kept = Some(Place { position: Q16::ZERO, sure });
+            assert_eq!(State::standing(kept).is_placed(), sure);
+        }
+    }
+
+    #[test]
+    fn a_step_that_the_table_lacks_is_ahead_until_its_face() {
+        let lifted = |step: u8| {
+            let zero = Q16::ZERO;
+            let lift = LiftPoint {
+                at: 0,
+                gap: zero,
+                speed: zero,
+                preload: zero,
+                tan_arm: zero,
+                face: q16(30_000_000),
+                residual: zero,
+            };
+            let open = OpenCrossing::begin(step, Direction::Deploy, false, 0);
+            let crossing = Some(OpenCrossing { lift: Some(lift), ..open });
+            State { crossing, ..State::default() }
+        };
+        let unknown = lifted(0);
+        assert_eq!(unknown.extra_face(q16(25_000_000)), Some(q16(5_000_000)));
+        assert_eq!(unknown.extra_face(q16(30_000_000)), None);
+        assert_eq!(unknown.extra_face(q16(35_000_000)), None);
+        assert_eq!(lifted(1).extra_face(q16(25_000_000)), None);
+        assert_eq!(State::default().extra_face(q16(25_000_000)), None);
+    }
+
+    #[test]
+    fn a_corner_is_blended_in_over_its_ticks_or_at_once() {
+        let mut state = State::default();
+        state.watch.contact = Contact::Both;
+        let felt: Vec<Ratio> = (0..40).map(|_| state.feel_corner()).collect();
+        assert_eq!((felt[0], felt[15], felt[31]), (q16(31_250), q16(500_000), q16(1_000_000)));
+        assert_eq!(felt[39], q16(1_000_000));
+        let mut state = State::default();
+        state.watch.contact = Contact::Corner;
+        state.feel_at_once();
+        assert_eq!(state.feel_corner(), q16(1_000_000));
+        state.watch.contact = Contact::Wall;
+        assert_eq!(state.feel_corner(), q16(968_750));
+    }
+}

@@ -43,7 +43,7 @@ mod tests {
     use super::super::{Contact, Seen, Sign, WatchState};
     use super::*;
     use crate::supervise::Direction;
-    use crate::units::Q16;
+    use crate::units::{Q16, q16};
     use proptest::prelude::*;
 
     fn seen(radius: f64, compression: f64) -> Seen {
@@ -192,6 +192,133 @@ mod tests {
                 let sign = watch.step(&mut state, Direction::Deploy, &seen(125.3 + noise, 0.3));
                 prop_assert_eq!(sign, None);
             }
+        }
+    }
+
+    fn watch() -> CrossingWatch {
+        CrossingWatch::try_build(&Rig::prototype()).expect("a sound rig")
+    }
+
+    #[test]
+    fn at_rest_the_baseline_follows_a_wall_that_it_nearly_is_and_nothing_else() {
+        let rested = |contact: Contact, off: f64| {
+            let watch = watch();
+            let mut state = WatchState::default();
+            watch.begin(&mut state, &seen(125.0, 0.0));
+            state.contact = contact;
+            for _ in 0..1000 {
+                watch.rest(&mut state, &seen(125.0 + off, 0.0));
+            }
+            state.baseline.output().to_num::<f64>() - 125.0
+        };
+        for off in [0.05, -0.05] {
+            assert!((rested(Contact::Wall, off) - off).abs() < 1e-3, "{off}");
+            for contact in [Contact::Both, Contact::Corner, Contact::Leaving] {
+                assert!(rested(contact, off).abs() < 1e-9, "{contact:?}");
+            }
+        }
+        for off in [0.2, -0.2] {
+            assert!(rested(Contact::Wall, off).abs() < 1e-9, "{off}");
+        }
+    }
+
+    #[test]
+    fn a_corner_is_felt_from_its_rise_on_and_held_down_to_another() {
+        // So high over a wall of 125 mm with the tread 0.5 mm deep.
+        let high = |rise: Q16| {
+            let wall = seen(125.5, 0.5);
+            Seen { radius: wall.radius - rise, near: true, ..wall }
+        };
+        let out = Direction::Deploy;
+        let signs = |rise: Q16| {
+            let watch = watch();
+            let mut state = WatchState::default();
+            watch.begin(&mut state, &high(Q16::ZERO));
+            (1..100)
+                .find_map(|tick| watch.step(&mut state, out, &high(rise)).map(|sign| (sign, tick)))
+        };
+        let (touch, release) = (super::super::TOUCH, super::super::RELEASE);
+        assert_eq!(signs(touch), Some((Sign::Touched, 3)));
+        assert_eq!(signs(touch - Q16::DELTA), None);
+        let after = |rise: Q16| {
+            let watch = watch();
+            let mut state = WatchState::default();
+            watch.begin(&mut state, &high(Q16::ZERO));
+            for _ in 0..3 {
+                watch.step(&mut state, out, &high(touch));
+            }
+            assert_eq!(state.contact, Contact::Both);
+            (1..200)
+                .find_map(|tick| watch.step(&mut state, out, &high(rise)).map(|sign| (sign, tick)))
+        };
+        assert_eq!(after(release), None);
+        assert_eq!(after(release - Q16::DELTA), Some((Sign::Released, 60)));
+    }
+
+    #[test]
+    fn turned_back_on_a_corner_the_tread_still_keeps_what_the_wall_pressed() {
+        let watch = watch();
+        let mut state = WatchState::default();
+        // Back over the edge between walls at 121 and 125 mm, 0.3 mm deep in the tread.
+        watch.begin(&mut state, &seen(121.3, 0.3));
+        let back = [(121.3, 0.3), (121.9, 0.6), (121.9, 0.6), (121.9, 0.6), (125.3, 0.7)];
+        let signs: Vec<Sign> = back
+            .iter()
+            .filter_map(|at| watch.step(&mut state, Direction::Retract, &seen(at.0, at.1)))
+            .collect();
+        assert!(matches!(signs[..], [Sign::Touched, Sign::Lifted(_)]), "{signs:?}");
+        // And up again: the lower wall stops to carry that much before the undeformed wheel.
+        watch.reverse(&mut state, Direction::Deploy);
+        let kept = 0.3 * watch.memory.to_num::<f64>();
+        assert!(kept > 0.1, "{kept}");
+        let up = |radius: f64| seen(radius, 0.7);
+        assert_eq!(watch.step(&mut state, Direction::Deploy, &up(125.0 + kept + 0.01)), None);
+        let sign = watch.step(&mut state, Direction::Deploy, &up(125.0 + kept - 0.01));
+        let Some(Sign::Lifted(lift)) = sign else { panic!("{sign:?}") };
+        assert!((lift.height.to_num::<f64>() - (25.0 - kept)).abs() < 1e-3, "{lift:?}");
+    }
+
+    #[test]
+    fn the_next_corner_is_felt_before_the_wall_between_was_measured() {
+        let again = super::super::AGAIN;
+        let signs = |direction: Direction, beyond: Q16| {
+            let watch = watch();
+            let (mut state, level) =
+                (WatchState::default(), u8::from(direction == Direction::Deploy));
+            watch.begin_on_corner(&mut state, direction, level);
+            // So far off the wall that this level has by the table, in the way of the run.
+            let wall = watch.wall(level);
+            let off = if direction == Direction::Deploy { -beyond } else { beyond };
+            let at = Seen { radius: wall + off, clear: false, ..seen(0.0, 0.0) };
+            let sign = (1..50)
+                .find_map(|tick| watch.step(&mut state, direction, &at).map(|sign| (sign, tick)));
+            (sign, watch.rise(&state, direction, &at), state.contact)
+        };
+        for (direction, contact) in
+            [(Direction::Deploy, Contact::Both), (Direction::Retract, Contact::Corner)]
+        {
+            let (sign, _, _) = signs(direction, again);
+            assert_eq!(sign, None, "{direction:?}");
+            let beyond = again + q16(10_000);
+            let (sign, rise, now) = signs(direction, beyond);
+            assert_eq!(sign, Some((Sign::Again { gap: Q16::ZERO }, 3)), "{direction:?}");
+            // From now on off that wall.
+            assert_eq!((rise, now), (beyond, contact));
+        }
+    }
+
+    #[test]
+    fn turned_back_the_deepest_compression_is_kept() {
+        let watch = watch();
+        for (contact, direction) in [
+            (Contact::Both, Direction::Deploy),
+            (Contact::Corner, Direction::Retract),
+            (Contact::Leaving, Direction::Deploy),
+        ] {
+            let deepest = q16(900_000);
+            let mut state = WatchState { contact, deepest, ..WatchState::default() };
+            watch.reverse(&mut state, direction);
+            assert_eq!(state.deepest, deepest, "{contact:?}");
         }
     }
 }

@@ -205,4 +205,34 @@ mod tests {
             prop_assert!((after - scale).abs() <= 0.1 + 1e-3, "{after} {scale}");
         }
     }
+
+    #[test]
+    fn between_the_steps_only_the_limit_strategy_keeps_the_limit() {
+        let rig = Rig::prototype();
+        for strategy in ALL {
+            let planner = Planner::try_build_as(&rig, strategy).unwrap();
+            for step in 0..4 {
+                let preload = planner.plan(&request(false, step, 1.0)).cruise_preload;
+                let expected = match strategy {
+                    Strategy::Limit => rig.preload.limit_n * (1.0 - REGULATION_PART),
+                    _ => rig.preload.cruise_n,
+                };
+                assert!((preload.to_num::<f64>() - expected).abs() < 1e-3, "{strategy:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_gap_that_is_written_down_is_held_and_else_that_of_the_cruise_preload() {
+        let mut rig = Rig::prototype();
+        rig.control.gap_ref_mm = 2.0;
+        let planner = Planner::try_build(&rig).unwrap();
+        rig.control.gap_ref_mm = 0.0;
+        let own = Planner::try_build(&rig).unwrap();
+        for direction in Direction::ALL {
+            assert!((planner.gap_ref(direction).to_num::<f64>() - 2.0).abs() < 1e-4);
+            let gap = own.gap_ref(direction).to_num::<f64>();
+            assert!((1.0..4.0).contains(&gap) && (gap - 2.0).abs() > 0.01, "{gap}");
+        }
+    }
 }

@@ -432,4 +432,60 @@ mod tests {
             prop_assert!(speed >= q(1 << 16) && speed <= q(60 << 16));
         }
     }
+
+    #[test]
+    fn the_gap_alone_is_that_of_the_whole_crossing() {
+        let model = ReducedModel::try_build(&Rig::prototype()).unwrap();
+        for direction in WAYS {
+            for force in [20.0, 40.0, 80.0] {
+                let speed = Q16::from_num(8.0);
+                let at = Point { direction, speed, scale: Scale::NOMINAL };
+                let force = Q16::from_num(force);
+                let gap = model.gap(&at, force);
+                assert_eq!(gap, model.crossing(&at, force).gap);
+                assert!(gap > Q16::ZERO);
+            }
+        }
+    }
+
+    #[test]
+    fn a_stiffening_beyond_its_format_is_refused() {
+        let mut felt = Folded::default();
+        assert!(holds(&felt));
+        felt[0][0] = 15.9;
+        assert!(holds(&felt));
+        felt[0][0] = 20.0;
+        assert!(!holds(&felt));
+        // Not at the middle of speed and run, but at an end.
+        felt[0][0] = 15.0;
+        felt[1][0] = 1.5;
+        assert!(holds(&felt));
+        felt[0][1] = 1.5;
+        assert!(!holds(&felt));
+    }
+
+    #[test]
+    fn a_scale_is_kept_within_a_quarter_and_four() {
+        for (ratio, kept) in [(0.1, 0.25), (0.25, 0.25), (1.25, 1.25), (4.0, 4.0), (9.0, 4.0)] {
+            assert_eq!(Scale::new(Q16::from_num(ratio)).ratio(), Q16::from_num(kept));
+        }
+        assert_eq!(Scale::NOMINAL.ratio(), Q16::ONE);
+    }
+
+    #[test]
+    fn the_first_touch_presses_as_the_formula_has_it() {
+        let rig = Rig::prototype();
+        let model = ReducedModel::try_build(&rig).unwrap();
+        let formula = Formula::new(&rig);
+        for speed in [2.0, 8.0, 30.0, 100.0] {
+            let at = Point {
+                direction: Direction::Deploy,
+                speed: Q16::from_num(speed),
+                scale: Scale::NOMINAL,
+            };
+            let got = model.crossing(&at, Q16::from_num(60)).impact_stress_kpa.to_num::<f64>();
+            let exact = 1e-3 * formula.impact.stress_pa(speed);
+            assert!((got - exact).abs() < 5e-5 + 1e-4 * exact, "{got} {exact}");
+        }
+    }
 }

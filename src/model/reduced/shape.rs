@@ -286,3 +286,145 @@ impl Shape {
 pub(super) fn speed(speed: MillimetresPerSecond) -> u32 {
     speed.to_bits().clamp(0, (1 << 23) - 1) as u32
 }
+
+#[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
+mod tests {
+    use super::super::ReducedModel;
+    use super::*;
+    use crate::model::formula::Formula;
+    use crate::rig::Rig;
+
+    fn shape_of(rig: &Rig) -> Shape {
+        ReducedModel::try_build(rig).expect("a sound rig").shape
+    }
+
+    #[test]
+    fn each_end_of_the_model_is_told_alone_and_together() {
+        let shape = shape_of(&Rig::prototype());
+        let force = |beyond: i32| Q16::from_bits(shape.most_force + beyond);
+        let sought = |beyond: i32| shape.most_lifting + LEAST_EXCESS + beyond;
+        let run = |half: i32| (half as u32) << 1;
+        let (short, long) = (shape.least + 1, i32::MAX - 1);
+        for half in [short, 1 << 30, long] {
+            assert!(!shape.is_at_end(force(0), sought(0), run(half)), "{half}");
+            assert!(!shape.is_at_end(Q16::ZERO, sought(1 << 20), run(half)), "{half}");
+            // The force, what is sought, or both.
+            assert!(shape.is_at_end(force(1), sought(0), run(half)));
+            assert!(shape.is_at_end(force(0), sought(-1), run(half)));
+            assert!(shape.is_at_end(force(1), sought(-1), run(half)));
+        }
+        for half in [short - 1, long + 1] {
+            assert!(shape.is_at_end(force(0), sought(0), run(half)), "{half}");
+            assert!(shape.is_at_end(force(1), sought(0), run(half)), "{half}");
+        }
+    }
+
+    #[test]
+    fn a_stiffness_and_a_force_beyond_their_formats_count_as_the_largest() {
+        let shape = shape_of(&Rig::prototype());
+        let run = 1 << 31;
+        let most = shape.elastic(run, (1 << 27) - 1);
+        // Twice the instant stiffness carries twice its force.
+        let half = shape.elastic(run, 1 << 26);
+        assert!(half > 0 && (most - 2 * half).abs() < 16, "{most} {half}");
+        assert_eq!(shape.elastic(run, 1 << 27), most);
+        assert_eq!(shape.elastic(run, i32::MAX), most);
+        // A quarter of the unit has three zeros before it, what is below one more.
+        for beyond in [(1 << 28) - 1, 1 << 28, 1 << 29] {
+            let excess = shape.beyond_lift(shape.most_lifting + beyond);
+            assert_eq!((excess.octave, excess.normalised), (4, 0xffff_fff0), "{beyond}");
+        }
+        let excess = shape.beyond_lift(i32::MIN / 2);
+        assert_eq!((excess.octave, excess.normalised), (LOWEST_OCTAVE, 1 << 31));
+    }
+
+    #[test]
+    fn no_run_is_refined_to_less_than_the_shortest() {
+        let model = ReducedModel::try_build(&Rig::prototype()).expect("a sound rig");
+        let (shape, way) = (&model.shape, &model.ways[0]);
+        let excess = shape.beyond_lift(0);
+        for run in [shape.least_run(), 2 * shape.least_run()] {
+            let guess = Guess { run, by_force: 1 << 29 };
+            // Less than even the shortest run carries.
+            let sought = shape.most_lifting - (1 << 20);
+            let refined = shape.refine(way, 1 << 31, &guess, sought, &excess);
+            assert_eq!(refined.run, shape.least_run(), "{run}");
+        }
+    }
+
+    /// The vibration after a run that is this part of the longest, by the model and by the
+    /// formulas, um.
+    fn vibrations(rig: &Rig, speed_bits: u32, part: f64) -> (f64, f64) {
+        let shape = shape_of(rig);
+        let run = (part * 4_294_967_296.0) as u32;
+        let radial = 1 << 26;
+        let got = shape.vibration(speed_bits, radial, run).to_num::<f64>();
+        let radial_n = f64::from(radial) / f64::from(1 << shape.force_places) / 65_536.0;
+        let longest_mm = f64::from(shape.longest) / 4_294_967_296.0 * rig.rig.wheel_radius_mm;
+        let run_mm = f64::from(run) / 4_294_967_296.0 * longest_mm;
+        let speed = f64::from(speed_bits) / 65_536.0;
+        (got, 1e3 * Formula::new(rig).impact.vibration_mm(speed, radial_n, run_mm))
+    }
+
+    #[test]
+    fn no_crossing_swings_more_than_a_sudden_force() {
+        let mut slow = Rig::prototype();
+        // An arm that swings slowly: at the fastest speed the corner is a blow to it.
+        slow.drive.modes_hz = [60.0].into_iter().collect();
+        let mut most = Vec::new();
+        for speed in [5 << 16, 20 << 16, 60 << 16, 90 << 16, 127 << 16] {
+            let (got, exact) = vibrations(&slow, speed, 0.0625);
+            assert!((got / exact - 1.0).abs() < 1e-3, "{got} {exact}");
+            most.push(exact);
+        }
+        assert!(most[3] < most[4] * 1.01 && most[0] < 0.1 * most[4], "{most:?}");
+        let (blow, _) = vibrations(&slow, 127 << 16, 0.0625);
+        let (same, _) = vibrations(&slow, 120 << 16, 0.0625);
+        assert!((blow - same).abs() < 1e-9, "{blow} {same}");
+    }
+
+    #[test]
+    fn the_slowest_wheel_leaves_no_vibration_and_odd_speeds_are_told_as_even_ones() {
+        let rig = Rig::prototype();
+        let (least, exact) = vibrations(&rig, 1, 0.5);
+        assert!(least >= 0.0 && (least - exact).abs() < 1e-3, "{least} {exact}");
+        for speed in [3, 5, 4095] {
+            let (got, exact) = vibrations(&rig, speed, 0.5);
+            assert!((got - exact).abs() < 1e-3 + 1e-3 * exact, "{speed} {got} {exact}");
+        }
+    }
+
+    #[test]
+    fn the_division_of_speed_by_run_is_rounded_to_neither_side() {
+        let rig = Rig::prototype();
+        let errors: Vec<f64> = (0..400)
+            .map(|i| vibrations(&rig, (40 << 16) + 7919 * i, 0.95))
+            .map(|(got, exact)| got / exact - 1.0)
+            .collect();
+        let mean = errors.iter().sum::<f64>() / errors.len() as f64;
+        assert!(mean.abs() < 1e-5, "{mean}");
+    }
+
+    #[test]
+    fn gaps_beyond_the_model_have_the_runs_at_its_ends() {
+        let shape = shape_of(&Rig::prototype());
+        for wide in [20, 31, 32, 1000, 32_767] {
+            assert_eq!(shape.run(Q16::from_num(wide)), shape.least_run(), "{wide}");
+        }
+        assert_eq!(shape.run(Q16::MAX), shape.least_run());
+        assert_eq!(shape.run(Q16::MIN), shape.run(Q16::ZERO));
+        assert!(shape.run(Q16::ZERO) > shape.run(Q16::ONE));
+    }
+
+    #[test]
+    fn a_lift_of_more_than_twice_the_reaction_counts_as_twice() {
+        let shape = shape_of(&Rig::prototype());
+        for radial in [0, 1, shape.load / 4, shape.load / 2] {
+            let used = shape.utilisation(radial, 0).to_num::<f64>();
+            assert!((used - 2.0).abs() < 1e-3, "{radial} {used}");
+        }
+        let used = shape.utilisation(shape.load, 0).to_num::<f64>();
+        assert!((used - 1.0).abs() < 1e-3, "{used}");
+    }
+}

@@ -205,3 +205,56 @@ fn step(slope: i32, bend: i32, lacking: i32) -> Option<i32> {
     let mean = ((slope >> 2) + (root >> (shift / 2)) as i32).max(LEAST_SLOPE) as u32 >> 13;
     Some((lacking / mean as i32).clamp(-(1 << 16), (1 << 16) - 1) << 13)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::ReducedModel;
+    use super::*;
+    use crate::rig::Rig;
+
+    #[test]
+    fn a_steeper_stiffness_takes_a_smaller_step() {
+        // Of x, Q31, to make up for 1/64 of the instant stiffness.
+        let lacking = 1 << 20;
+        let steps: Vec<i32> = [1 << 22, 1 << 24, 1 << 26, (1 << 27) - 1, 1 << 27, i32::MAX]
+            .map(|slope| step(slope, 0, lacking).expect("a step"))
+            .into();
+        assert!(
+            steps.iter().all(|step| *step > 0) && steps.is_sorted_by(|a, b| a >= b),
+            "{steps:?}"
+        );
+        // A line: what lacks over its slope, 2^20 / 2^26 over 2^26 / 2^24, Q31.
+        let exact = 1 << 23;
+        assert!((steps[2] - exact).abs() < exact / 100, "{steps:?}");
+    }
+
+    #[test]
+    fn no_step_is_longer_than_a_quarter() {
+        for lacking in [i32::MAX, 1 << 24, -(1 << 24), i32::MIN] {
+            let taken = step(1 << 10, 0, lacking).expect("a step");
+            assert_eq!(taken > 0, lacking > 0);
+            assert!(taken.unsigned_abs() <= 1 << 29, "{taken}");
+            assert!(taken.unsigned_abs() > (1 << 29) - (1 << 14), "{taken}");
+        }
+    }
+
+    #[test]
+    fn a_stiffness_that_the_parabola_does_not_reach_takes_none() {
+        assert_eq!(step(0, -(1 << 24), 1 << 22), None);
+        assert_eq!(step(1 << 20, -(1 << 26), 1 << 23), None);
+        assert!(step(0, 1 << 24, 1 << 22).is_some());
+    }
+
+    #[test]
+    fn stiffnesses_beyond_the_instant_one_are_as_fast_as_that() {
+        let model = ReducedModel::try_build(&Rig::prototype()).expect("a sound rig");
+        for way in &model.ways {
+            let guess = |stiffness: i32| way.guess_fast_part(stiffness, 0);
+            let most = guess((1 << 26) - 1);
+            assert_eq!(guess(1 << 26), most);
+            assert_eq!(guess(i32::MAX), most);
+            assert_eq!(guess(-1), guess(0));
+            assert!(most > guess(1 << 25));
+        }
+    }
+}
