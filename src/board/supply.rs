@@ -53,10 +53,8 @@ unsafe fn PVD_PVM() {
     cortex_m::interrupt::disable();
     guard::cut();
     if let (Some(flight), Some(first)) = (blackbox::flight(), records::free(RECORDS.bytes())) {
-        let mut index = first;
-        for word in records::words(&flight) {
+        for (index, word) in (first..).zip(records::words(&flight)) {
             RECORDS.program(index, word);
-            index += 1;
         }
     }
     // It may come back before the chip is reset.

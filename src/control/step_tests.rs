@@ -1,0 +1,165 @@
+//! Tests of the control tick.
+
+use super::*;
+use crate::rig::Rig;
+use crate::sense::SensesState;
+use crate::supervise::Fault;
+use proptest::prelude::*;
+
+/// With a stiff spring, whose pre-tightener follows at 6 mm/s of rise.
+fn stiff() -> Controller {
+    let mut rig = Rig::prototype();
+    rig.preload.spring_n_per_mm = 0.9 * rig.preload.slew_n_per_s / 6.0;
+    Controller::try_build(&rig).expect("a sound rig")
+}
+
+#[test]
+fn on_a_steep_corner_the_spring_limits_the_speed() {
+    let controller = stiff();
+    let limited = controller.followed(q16(20_000_000), q16(600_000));
+    assert!((limited - q16(10_000_000)).abs() < q16(1_000), "{limited}");
+    assert_eq!(controller.followed(q16(8_000_000), q16(600_000)), q16(8_000_000));
+    // Level wall, and down behind the edge.
+    assert_eq!(controller.followed(q16(20_000_000), Q16::ZERO), q16(20_000_000));
+    assert_eq!(controller.followed(q16(20_000_000), q16(-600_000)), q16(20_000_000));
+}
+
+proptest! {
+    #[test]
+    fn the_rise_stays_within_what_the_pretightener_follows(
+        speed in 0..100 << 16_i32,
+        slope in -(1 << 16)..1 << 16_i32,
+    ) {
+        let controller = stiff();
+        let (speed, slope) = (Q16::from_bits(speed), Q16::from_bits(slope));
+        let followed = controller.followed(speed, slope);
+        prop_assert!(followed >= Q16::ZERO && followed <= speed);
+        if slope > LEVEL_SLOPE {
+            prop_assert!(followed * slope <= controller.rise_speed + Q16::DELTA);
+        }
+        if speed * slope <= controller.rise_speed {
+            prop_assert_eq!(followed, speed);
+        }
+    }
+}
+
+/// What the senses say of a wheel on this level, so much off its wall by the table and so
+/// deep in its tread, mm.
+pub(super) fn sensed(level: u8, off: f64, compression: f64) -> SensedState {
+    let rig = Rig::prototype();
+    let senses = Senses::try_build(&rig).expect("sound");
+    let nothing = SensorFrame::default();
+    let mut sensed = senses.step(&mut SensesState::default(), 0, &nothing, Q16::ZERO);
+    sensed.level = level;
+    let wall = rig.centre_radius_mm(usize::from(level));
+    sensed.radius.value = Q16::from_num(wall + off + compression);
+    sensed.compression_filtered = Q16::from_num(compression);
+    sensed
+}
+
+/// Does something at this position.
+pub(super) fn at<T>(
+    sensed: &SensedState,
+    position: f64,
+    act: impl FnOnce(&Controller, &mut Pass<'_>) -> T,
+) -> T {
+    let controller = Controller::try_build(&Rig::prototype()).expect("sound");
+    let mut output = Output::default();
+    let position = Q16::from_num(position);
+    act(&controller, &mut Pass { now: 0, sensed, position, wedge: Q16::ZERO, output: &mut output })
+}
+
+#[test]
+fn a_crossing_runs_over_a_quarter_of_a_turn_s_chord() {
+    // Of a rigid wheel of 25 mm that touches the edge of a step of 4 mm.
+    let reach = stiff().corner_reach().to_num::<f64>();
+    assert!((reach - (25.0f64 * 25.0 - 21.0 * 21.0).sqrt()).abs() < 1e-3, "{reach}");
+}
+
+#[test]
+fn a_slope_beyond_any_limits_alike_and_the_least_one_does_not() {
+    let controller = stiff();
+    // Down to 6 mm/s of rise, also where speed and slope together are less than that.
+    let limited = controller.followed(q16(2_500_000), q16(3_000_000));
+    assert!((limited - q16(2_000_000)).abs() < q16(1_000), "{limited}");
+    let fast = q16(128_000_000);
+    assert_eq!(controller.followed(fast, LEVEL_SLOPE), fast);
+    assert!(controller.followed(fast, LEVEL_SLOPE + Q16::DELTA) < fast);
+}
+
+#[test]
+fn a_reset_right_after_a_fault_is_refused() {
+    let idle = sensed(0, 0.0, 0.0);
+    for (ticks, taken) in [(0, false), (50, false), (99, false), (100, true), (5000, true)] {
+        let mut state = State::default();
+        state.mode = Mode::FaultHold(Fault::TickOverrun);
+        state.in_mode = ticks;
+        let events = at(&idle, 0.0, |controller, pass| {
+            controller.take_command(&mut state, pass, Some(Command::Reset));
+            pass.output.events.clone()
+        });
+        let expected = if taken { Mode::SelfTest } else { Mode::FaultHold(Fault::TickOverrun) };
+        assert_eq!(state.mode, expected, "{ticks}");
+        let refused = events.iter().any(|e| e.event == Event::Refused(Command::Reset));
+        assert_eq!(refused, !taken, "{ticks}");
+    }
+}
+
+#[test]
+fn a_face_is_ahead_until_the_patch_is_clear_of_it() {
+    at(&sensed(1, 0.0, 0.3), 0.0, |controller, pass| {
+        let state = State::default();
+        let (patch, face, next) = (controller.rise.patch(), q16(18_000_000), q16(40_000_000));
+        pass.position = face + patch - Q16::DELTA;
+        assert_eq!(controller.ahead(&state, pass, Q16::ZERO), Q16::DELTA - patch);
+        pass.position = face + patch;
+        assert_eq!(controller.ahead(&state, pass, Q16::ZERO), next - pass.position);
+        pass.position = q16(75_000_000);
+        assert_eq!(controller.ahead(&state, pass, Q16::ZERO), Q16::MAX);
+    });
+}
+
+#[test]
+fn off_a_run_the_stage_stays_while_there_is_preload() {
+    for (preload, stage) in [
+        (q16(40_000_000), ContactStage::Rolling),
+        (q16(1_000_000) + Q16::DELTA, ContactStage::Rolling),
+        (q16(1_000_000), ContactStage::Initial),
+        (Q16::ZERO, ContactStage::Initial),
+    ] {
+        let seen = SensedState { preload_filtered: preload, ..sensed(0, 0.0, 0.3) };
+        let mut state = State::default();
+        (state.mode, state.stage) = (Mode::Idle, ContactStage::Rolling);
+        let told = at(&seen, 0.0, |controller, pass| {
+            controller.note_stage(&mut state, pass);
+            pass.output.events.len()
+        });
+        assert_eq!(state.stage, stage, "{preload}");
+        assert_eq!(told, usize::from(stage != ContactStage::Rolling));
+    }
+}
+
+#[test]
+fn only_on_a_corner_the_climb_limits_the_speed() {
+    let fast = q16(60_000_000);
+    let limited = |contact: Contact| {
+        let mut state = State::default();
+        state.watch.contact = contact;
+        // Eight millimetres before the face at 18 mm.
+        at(&sensed(0, -2.0, 0.3), 10.0, |_, pass| {
+            let mut targets = Targets {
+                speed: fast,
+                preload: Q16::ZERO,
+                ramping: false,
+                braking: false,
+                approaching: false,
+                waiting: false,
+            };
+            stiff().limit_climb(&state, pass, &mut targets);
+            targets.speed
+        })
+    };
+    assert_eq!(limited(Contact::Wall), fast);
+    assert!(limited(Contact::Both) < q16(30_000_000));
+    assert!(limited(Contact::Corner) < q16(30_000_000));
+}
