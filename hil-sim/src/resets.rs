@@ -1,6 +1,7 @@
 //! Resets at random instants of random runs on the emulated board: is the record there,
 //! are the parameters whole, does the drive hold, and does it go on when it is told to?
 
+mod aim;
 mod case;
 mod outcome;
 
@@ -16,7 +17,8 @@ use crate::board::log::{Line, Strings};
 use crate::params::set_of;
 use crate::scenario::{Direction, Scenario};
 
-pub use case::{After, Aim, Case, Kind};
+pub use aim::Aim;
+pub use case::{After, Case, Kind};
 pub use outcome::{KindOutcome, ModeOutcome, Outcome};
 
 /// Time from the command within which the reset comes, s: that of a run on the board, either

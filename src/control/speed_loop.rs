@@ -141,6 +141,24 @@ mod tests {
         }
     }
 
+    #[test]
+    fn the_integral_stops_where_the_duty_does_either_way() {
+        let control = SpeedLoop::try_build(&Rig::prototype()).unwrap();
+        let wound = |wanted: i32| {
+            let mut state = SpeedLoopState::default();
+            for _ in 0..20_000 {
+                control.step(&mut state, Q16::from_num(wanted), Q16::ZERO, Q16::ZERO);
+            }
+            state.value()
+        };
+        for wanted in [20, 30, 40, 50, 60] {
+            let (out, back) = (wound(wanted), wound(-wanted));
+            assert!((out + back).abs() <= Q16::from_bits(2), "{wanted}: {out} {back}");
+        }
+        // The duty is what stops it, not the integral's own limit.
+        assert!(wound(60) < INTEGRAL_LIMIT && wound(-60) > -INTEGRAL_LIMIT);
+    }
+
     proptest! {
         #[test]
         fn no_input_overflows(wanted in any::<i32>(), measured in any::<i32>(), load in any::<i32>()) {

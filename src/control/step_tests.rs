@@ -2,8 +2,10 @@
 
 use super::*;
 use crate::rig::Rig;
-use crate::sense::SensesState;
-use crate::supervise::Fault;
+use crate::sense::raw::{BridgeCode, BridgeCodes};
+use crate::sense::{SensesState, Validity};
+use crate::supervise::{Fault, Leg};
+use crate::units::per_tick;
 use proptest::prelude::*;
 
 /// With a stiff spring, whose pre-tightener follows at 6 mm/s of rise.
@@ -162,4 +164,58 @@ fn only_on_a_corner_the_climb_limits_the_speed() {
     assert_eq!(limited(Contact::Wall), fast);
     assert!(limited(Contact::Both) < q16(30_000_000));
     assert!(limited(Contact::Corner) < q16(30_000_000));
+}
+
+#[test]
+fn the_duty_tells_the_load_only_at_a_steady_speed() {
+    let controller = Controller::try_build(&Rig::prototype()).expect("sound");
+    let idle = BridgeCode::of(0);
+    let input = Input {
+        sensors: SensorFrame {
+            bridges: Some(BridgeCodes { drive: idle, pretightener: idle }),
+            ..SensorFrame::default()
+        },
+        ..Input::default()
+    };
+    // At 20 mm/s, reached or on the way to 30, with an effort far beyond its band.
+    let found = |target: i32| {
+        let mut state = State::default();
+        state.mode = Mode::Run(Direction::Deploy, Leg::Cruise);
+        let wanted = Q16::from_num(target);
+        while state.profile.speed() < Q16::from_num(20) {
+            controller.profile.step(&mut state.profile, wanted);
+        }
+        if target == 20 {
+            (0..1000).for_each(|_| controller.profile.step(&mut state.profile, wanted));
+        }
+        assert_eq!(state.profile.acceleration() == Q16::ZERO, target == 20);
+        while state.speed_loop.value() < q16(200_000) {
+            controller.speed_loop.step(
+                &mut state.speed_loop,
+                Q16::from_num(20),
+                Q16::ZERO,
+                Q16::ZERO,
+            );
+        }
+        let speed = state.signed_speed();
+        let mut sensed = sensed(0, 0.0, 0.0);
+        let alive = [&mut sensed.speed, &mut sensed.preload, &mut sensed.compression];
+        alive.into_iter().for_each(|reading| reading.validity = Validity::Valid);
+        sensed.radius.validity = Validity::Valid;
+        sensed.speed.value = speed;
+        (0..300).find_map(|now| {
+            let mut output = Output::default();
+            sensed.travel += per_tick(speed);
+            sensed.speed.at = now;
+            // Codes that are alive.
+            sensed.preload.value = Q16::from_bits((now % 7) as i32);
+            sensed.compression.value = sensed.preload.value;
+            let (position, wedge) = (Q16::ZERO, Q16::ZERO);
+            let mut pass = Pass { now, sensed: &sensed, position, wedge, output: &mut output };
+            controller.look_for_faults(&mut state, &mut pass, &input);
+            if let Mode::FaultHold(fault) = state.mode { Some(fault) } else { None }
+        })
+    };
+    assert_eq!(found(20), Some(Fault::DutyMismatch));
+    assert_eq!(found(30), None);
 }

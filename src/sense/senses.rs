@@ -315,6 +315,29 @@ mod tests {
     }
 
     #[test]
+    fn one_of_angle_and_displacement_alone_changes_no_level() {
+        let senses = build();
+        let level = |truth: Truth, spoil: fn(&mut SensorFrame)| {
+            let mut state = SensesState::default();
+            still(&senses, &mut state, 0, &STOWED);
+            let mut sensed = still(&senses, &mut state, 1, &STOWED);
+            for now in 2..=200 {
+                // What is lost is lost before anything moves.
+                let mut frame = frame(if now < 100 { &STOWED } else { &truth }, now);
+                spoil(&mut frame);
+                sensed = senses.step(&mut state, now, &frame, Default::default());
+            }
+            sensed.level
+        };
+        let (pressed, up) =
+            (Truth { compression_mm: 3.6, ..STOWED }, Truth { radius_mm: 121.0, ..STOWED });
+        // Each of them tells of a step while the other is sound.
+        assert_eq!((level(pressed, |_| ()), level(up, |_| ())), (1, 1));
+        assert_eq!(level(pressed, |frame| frame.arm = None), 0);
+        assert_eq!(level(up, |frame| frame.tread = None), 0);
+    }
+
+    #[test]
     fn a_bad_angle_changes_neither_radius_nor_level() {
         let senses = build();
         let mut state = SensesState::default();

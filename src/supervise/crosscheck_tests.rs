@@ -388,3 +388,22 @@ fn duty_tells_speed_only_above_ten_millimetres_a_second() {
     assert_eq!(found(TELLING + q16(100_000)), Some(Fault::DutyMismatch));
     assert_eq!(found(-TELLING - q16(100_000)), Some(Fault::DutyMismatch));
 }
+
+#[test]
+fn a_preload_astray_before_the_drive_starts_is_counted_on() {
+    let check = CrossCheck::try_build(&Rig::prototype()).expect("a sound rig");
+    let astray = |tick: Tick| Compared {
+        preload: q16(55_000_000) + Q16::from_bits(i32::from(tick.is_multiple_of(7))),
+        ..off_by(tick, Q16::ZERO)
+    };
+    let before = STRAYED_TICKS - 3;
+    let mut state = CrossState::default();
+    for tick in 0..Tick::from(before) {
+        let seen = astray(tick);
+        assert_eq!(check.preload(&mut state, seen.preload, seen.preload_due), None);
+    }
+    state.begin(&astray(Tick::from(before)));
+    let start = Tick::from(before);
+    let told: Vec<_> = (start..start + 3).map(|t| check.step(&mut state, &astray(t))).collect();
+    assert_eq!(told, [None, None, Some(Fault::PretightenerRunaway)]);
+}

@@ -324,6 +324,11 @@ mod tests {
         let preload = Mode::Preload(Direction::Deploy);
         assert_eq!(found(preload, 0.0, 0.0, 60.0, 60.0), None);
         assert!(found(preload, 0.0, 0.0, 60.0, 40.0).is_some());
+        // A tenth of the 33.3 N above what is due there, and still less than the quarter that
+        // tells a pre-tightener gone astray.
+        assert_eq!(found(preload, 0.0, 0.0, 60.0, 57.0), None);
+        let press = usize::from(OVERPRESSURE_TICKS);
+        assert_eq!(found(preload, 0.0, 0.0, 60.0, 56.0), Some((Fault::Overpressure, press)));
     }
 
     #[test]

@@ -5,6 +5,7 @@ use interstage::log::Event;
 use serde::Serialize;
 
 use super::ResetError;
+use super::aim::Aim;
 use crate::board::bench::{Bench, Passed, STEP};
 use crate::board::faults::Fault;
 use crate::board::log::{Line, Strings};
@@ -80,87 +81,6 @@ impl Kind {
             Self::Software => Reset::Software,
         }
     }
-}
-
-/// What the drive is doing when an aimed reset comes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Aim {
-    /// In the self-test after a start.
-    SelfTest,
-    /// Taking its zeros.
-    Zeroing,
-    /// Waiting for a command.
-    Idle,
-    /// Raising the preload before a run.
-    Preloading,
-    /// Between the steps.
-    Cruise,
-    /// Before a step.
-    Approach,
-    /// On a corner.
-    Crossing,
-    /// Behind a step.
-    Settle,
-    /// Coming to rest on command.
-    Stopping,
-    /// Arrived.
-    Complete,
-    /// Held by a fault.
-    FaultHold,
-}
-
-impl Aim {
-    /// All of them.
-    pub const ALL: [Self; 11] = [
-        Self::SelfTest,
-        Self::Zeroing,
-        Self::Idle,
-        Self::Preloading,
-        Self::Cruise,
-        Self::Approach,
-        Self::Crossing,
-        Self::Settle,
-        Self::Stopping,
-        Self::Complete,
-        Self::FaultHold,
-    ];
-
-    /// Part of what the log says of it.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::SelfTest => "self-test",
-            Self::Zeroing => "zeroing",
-            Self::Idle => "idle",
-            Self::Preloading => "preloading",
-            Self::Cruise => "cruise",
-            Self::Approach => "approach",
-            Self::Crossing => "crossing",
-            Self::Settle => "settle",
-            Self::Stopping => "stopping",
-            Self::Complete => "ed",
-            Self::FaultHold => "fault hold",
-        }
-    }
-
-    /// Whether it is over once the drive has got its command.
-    const fn comes_before_the_command(self) -> bool {
-        matches!(self, Self::SelfTest | Self::Zeroing | Self::Idle)
-    }
-}
-
-/// Which of the modes a mode of the log is, in the words of the log; the ways out and back
-/// alike.
-#[must_use]
-pub(super) fn aim_of(mode: &str) -> &'static str {
-    if mode.is_empty() {
-        return "boot";
-    }
-    if matches!(mode, "deployed" | "retracted") {
-        return "complete";
-    }
-    Aim::ALL.into_iter().map(Aim::name).find(|name| mode.contains(name)).unwrap_or("other")
 }
 
 /// A reset to be made.
@@ -288,6 +208,19 @@ impl Under<'_> {
             self.step()?;
         }
         Ok(())
+    }
+
+    /// Goes on until the board is reset, and adds where the wheel is in each millisecond;
+    /// whether it was in time.
+    fn until_reset(&mut self, milliseconds: u32, way: &mut Vec<f64>) -> Result<bool, ResetError> {
+        for _ in 0..milliseconds {
+            self.step()?;
+            way.push(self.bench.plant().truth().position_mm);
+            if !self.bench.machine().restarts().is_empty() {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     /// Arrived or held.
@@ -504,27 +437,17 @@ impl Case {
         match self.kind {
             Kind::BrownOut => {
                 Fault::BrownOut.strike(machine).map_err(engine)?;
-                for _ in 0..FALLS_MS {
-                    board.step()?;
-                    way.push(board.bench.plant().truth().position_mm);
-                    if !board.bench.machine().restarts().is_empty() {
-                        return Ok(way);
-                    }
+                if !board.until_reset(FALLS_MS, &mut way)? {
+                    wrong.push("not reset by a supply that is gone".to_owned());
                 }
-                wrong.push("not reset by a supply that is gone".to_owned());
             }
             Kind::Pin => Fault::ResetPin.strike(machine).map_err(engine)?,
             Kind::Software => machine.restart(Cause::Software).map_err(engine)?,
             Kind::Watchdog => {
                 Fault::Caught.strike(machine).map_err(engine)?;
-                for _ in 0..BITE_MS {
-                    board.step()?;
-                    way.push(board.bench.plant().truth().position_mm);
-                    if !board.bench.machine().restarts().is_empty() {
-                        return Ok(way);
-                    }
+                if !board.until_reset(BITE_MS, &mut way)? {
+                    wrong.push(format!("not reset {BITE_MS} ms after it was caught"));
                 }
-                wrong.push(format!("not reset {BITE_MS} ms after it was caught"));
             }
         }
         Ok(way)

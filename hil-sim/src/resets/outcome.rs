@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::case::aim_of;
+use super::aim::aim_of;
 use super::{After, Kind};
 
 /// The figures of a campaign.
