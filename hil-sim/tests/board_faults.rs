@@ -8,7 +8,7 @@ mod common;
 
 use hil_sim::board::bench::Bench;
 use hil_sim::board::run::run;
-use hil_sim::faults::campaign::{Campaign, Case, Firmware, Outcome};
+use hil_sim::faults::campaign::{Campaign, Case, Firmware, Kept, Outcome};
 use hil_sim::faults::{Injection, Kind, Target, sets};
 use hil_sim::params::board::PLACES;
 use hil_sim::scenario::Scenario;
@@ -21,7 +21,7 @@ fn campaign(wanted: &[&str]) -> Outcome {
     assert_eq!(cases.len(), wanted.len());
     let campaign = Campaign { scenario: Scenario::default(), instants: 1, cases };
     let firmware = Firmware { elf: elf(), strings: strings() };
-    campaign.run_on_board(firmware, &|| {}).expect("a campaign")
+    campaign.run_on_board(firmware, &mut Kept::default(), &|| {}).expect("a campaign")
 }
 
 #[test]

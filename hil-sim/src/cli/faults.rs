@@ -1,9 +1,12 @@
 //! `rig faults`: every fault at random instants, and what became of it.
 
+use std::path::PathBuf;
+
 use super::failure::{Failure, Outcome};
 use super::output;
 use super::scenario::ScenarioArgs;
-use crate::faults::campaign::{Campaign, Case, Line, Outcome as Result_};
+use crate::docs;
+use crate::faults::campaign::{Campaign, Case, Kept, Line, Outcome as Result_};
 use crate::montecarlo;
 use crate::progress;
 use crate::table::{number, plain};
@@ -33,8 +36,12 @@ pub(super) struct Args {
           value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     clean: Option<u64>,
 
-    /// Writes the table of the emulated board into `docs/SAFETY.md`.
-    #[arg(long, requires_if("sil", "target"))]
+    /// Keeps each fault that is done in this file, and goes on from what stands there.
+    #[arg(long, value_name = "FILE", conflicts_with = "clean")]
+    keep: Option<PathBuf>,
+
+    /// Writes the target's table into `docs/SAFETY.md`, of the whole campaign.
+    #[arg(long, conflicts_with_all = ["only", "clean"])]
     write_docs: bool,
 
     #[command(flatten)]
@@ -62,12 +69,35 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     if board {
         return on_board(args, &campaign);
     }
+    let mut kept = kept(args, &campaign, &[])?;
     let outcome = {
         let bar = progress::bar("runs", campaign.runs());
-        campaign.run(&|| bar.advance(1))?
+        campaign.run_keeping(&mut kept, &|| bar.advance(1))?
     };
-    output::result(args.json, &outcome, || human(&outcome))?;
+    ended(args, &outcome, docs::fill_safety)
+}
+
+/// Puts the table on its page, if it is wanted there, and prints the outcome.
+fn ended(
+    args: &Args,
+    outcome: &Result_,
+    fill: impl Fn(&str, &Result_) -> anyhow::Result<String>,
+) -> Result<Outcome, Failure> {
+    if args.write_docs {
+        let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/SAFETY.md");
+        let text = std::fs::read_to_string(page).map_err(Failure::run)?;
+        let text = fill(&text, outcome).map_err(Failure::run)?;
+        crate::export::write_text(std::path::Path::new(page), &text)?;
+    }
+    output::result(args.json, outcome, || human(outcome))?;
     Ok(Outcome::of(outcome.is_good()))
+}
+
+/// What is done of the campaign on this image, if it is kept.
+fn kept(args: &Args, campaign: &Campaign, elf: &[u8]) -> Result<Kept, Failure> {
+    let Some(path) = &args.keep else { return Ok(Kept::default()) };
+    let judge = std::env::current_exe().and_then(std::fs::read).map_err(Failure::run)?;
+    Kept::at(path, &args.target, campaign, &[&judge, elf]).map_err(Failure::input)
 }
 
 /// Without the emulated board: go on with a binary that has it.
@@ -86,18 +116,12 @@ fn on_board(args: &Args, campaign: &Campaign) -> Result<Outcome, Failure> {
     let elf = firmware::image(Profile::Release)?;
     let strings = Strings::of(&elf).map_err(Failure::run)?;
     let firmware = Firmware { elf: &elf, strings: &strings };
+    let mut kept = kept(args, campaign, &elf)?;
     let outcome = {
         let bar = progress::bar("runs", campaign.runs());
-        campaign.run_on_board(firmware, &|| bar.advance(1)).map_err(Failure::run)?
+        campaign.run_on_board(firmware, &mut kept, &|| bar.advance(1)).map_err(Failure::run)?
     };
-    if args.write_docs {
-        let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/SAFETY.md");
-        let text = std::fs::read_to_string(page).map_err(Failure::run)?;
-        let text = crate::docs::fill_board(&text, &outcome).map_err(Failure::run)?;
-        crate::export::write_text(std::path::Path::new(page), &text)?;
-    }
-    output::result(args.json, &outcome, || human(&outcome))?;
-    Ok(Outcome::of(outcome.is_good()))
+    ended(args, &outcome, docs::fill_board)
 }
 
 /// Random deployments without a fault.

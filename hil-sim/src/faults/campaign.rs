@@ -2,15 +2,18 @@
 
 #[cfg(feature = "board")]
 mod board;
+mod kept;
 mod matrix;
 mod operator;
 mod twin;
+
+use std::borrow::Cow;
 
 use interstage::supervise::{Leg, Mode};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::judge::{Finding, Judge};
 use super::{CATALOGUE, Entry, HARDWARE, Injection, Kind, Target, sets};
@@ -21,6 +24,7 @@ use crate::sil::{Options, RunError, Session};
 
 #[cfg(feature = "board")]
 pub use board::Firmware;
+pub use kept::{Kept, KeptError};
 pub use matrix::{Line, Outcome, Spread};
 use operator::Operator;
 use twin::Twin;
@@ -197,7 +201,7 @@ impl Case {
 }
 
 /// What became of one fault at one instant.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Instant {
     /// Seed of the rig.
     pub seed: u64,
@@ -206,14 +210,14 @@ pub struct Instant {
     /// Measure of the fault, in the unit of the catalogue.
     pub magnitude: Option<f64>,
     /// What the drive was doing.
-    pub during: &'static str,
+    pub during: Cow<'static, str>,
     /// What became of it.
     pub finding: Finding,
     /// Code of the fault, or of the limit.
     pub code: Option<u16>,
     /// What restarted the board, if something did and it was reported.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub restart: Option<&'static str>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub restart: Option<Cow<'static, str>>,
     /// From when the fault first did something to its report, ms. Where it lies in a bridge:
     /// from when the duty was off by more than the readback's band.
     pub latency_ms: Option<f64>,
@@ -224,7 +228,7 @@ pub struct Instant {
     /// From the report to rest with both bridges off, ms.
     pub rest_ms: Option<f64>,
     /// How the run ended.
-    pub end: &'static str,
+    pub end: Cow<'static, str>,
     /// Largest preload, N.
     pub peak_preload_n: f64,
     /// Way gone uncommanded, mm.
@@ -257,9 +261,21 @@ impl Campaign {
     /// not depend on the number of processors.
     ///
     /// # Errors
-    /// [`RunError`] if a run without a fault cannot be made.
-    pub fn run(&self, done: &(dyn Fn() + Sync)) -> Result<Outcome, RunError> {
-        self.run_on("sil", Twin::run, watched, done)
+    /// [`CampaignError`] if a run without a fault cannot be made.
+    pub fn run(&self, done: &(dyn Fn() + Sync)) -> Result<Outcome, CampaignError<RunError>> {
+        self.run_keeping(&mut Kept::default(), done)
+    }
+
+    /// The same, with what is done kept, and what is kept not done again.
+    ///
+    /// # Errors
+    /// [`CampaignError`], also if what is done cannot be kept.
+    pub fn run_keeping(
+        &self,
+        kept: &mut Kept,
+        done: &(dyn Fn() + Sync),
+    ) -> Result<Outcome, CampaignError<RunError>> {
+        self.run_on("sil", Twin::run, watched, kept, done)
     }
 
     /// Makes all of them on a target: each rig without a fault first, then every fault on
@@ -269,16 +285,26 @@ impl Campaign {
         target: &'static str,
         twin: impl Fn(&Scenario) -> Result<Twin, E> + Sync,
         watched: impl Fn(&Scenario, &Twin) -> Result<Instant, E> + Sync,
+        kept: &mut Kept,
         done: &(dyn Fn() + Sync),
-    ) -> Result<Outcome, E> {
+    ) -> Result<Outcome, CampaignError<E>> {
         let scenarios: Vec<Scenario> = (0..self.instants).map(|i| self.base(i)).collect();
         let twin = |scenario: &Scenario| {
             let twin = twin(scenario);
             done();
             twin
         };
-        let twins: Vec<Twin> = scenarios.par_iter().map(twin).collect::<Result<_, _>>()?;
-        let lines = self.cases.iter().map(|case| {
+        let missing = self.cases.iter().any(|case| kept.line(&case.name()).is_none());
+        let needed = if missing { &scenarios[..] } else { &[] };
+        let twins: Vec<Twin> =
+            needed.par_iter().map(twin).collect::<Result<_, _>>().map_err(CampaignError::Run)?;
+        let mut lines = Vec::new();
+        for case in &self.cases {
+            if let Some(line) = kept.line(&case.name()) {
+                lines.push(line.clone());
+                (0..self.instants).for_each(|_| done());
+                continue;
+            }
             let one = |instant: usize| {
                 let twin = &twins[instant];
                 let scenario = case.scenario(&scenarios[instant], twin, instant);
@@ -287,9 +313,11 @@ impl Campaign {
                 found.unwrap_or_else(|error| failed(&scenario, &error))
             };
             let instants: Vec<Instant> = (0..self.instants).into_par_iter().map(one).collect();
-            Line::of(case, &instants)
-        });
-        Ok(Outcome::of(target, lines.collect(), self.instants))
+            let line = Line::of(case, &instants);
+            kept.keep(&line)?;
+            lines.push(line);
+        }
+        Ok(Outcome::of(target, lines, self.instants))
     }
 
     /// Rig of an instant.
@@ -298,6 +326,17 @@ impl Campaign {
         scenario.run.seed += 1 + instant as u64;
         scenario
     }
+}
+
+/// Why there is no outcome of a campaign; displays as one line.
+#[derive(Debug, thiserror::Error)]
+pub enum CampaignError<E> {
+    /// A run without a fault cannot be made.
+    #[error("{0}")]
+    Run(E),
+    /// What is done cannot be kept.
+    #[error(transparent)]
+    Kept(#[from] KeptError),
 }
 
 /// A name for what the drive is doing.
@@ -319,7 +358,7 @@ fn failed(scenario: &Scenario, error: &impl std::fmt::Display) -> Instant {
         seed: scenario.run.seed,
         at_s: None,
         magnitude: None,
-        during: "at rest",
+        during: "at rest".into(),
         finding: Finding::Undetected,
         code: None,
         restart: None,
@@ -327,7 +366,7 @@ fn failed(scenario: &Scenario, error: &impl std::fmt::Display) -> Instant {
         latency_any_ms: None,
         after_sign_ms: None,
         rest_ms: None,
-        end: "plant failed",
+        end: "plant failed".into(),
         peak_preload_n: 0.0,
         motion_mm: 0.0,
         gap_part: 0.0,
@@ -387,7 +426,7 @@ fn watched(scenario: &Scenario, twin: &Twin) -> Result<Instant, RunError> {
         seed: scenario.run.seed,
         at_s,
         magnitude: injection.map(Injection::magnitude),
-        during,
+        during: during.into(),
         finding,
         code: report.map(|(_, code)| code),
         restart: None,
@@ -396,7 +435,7 @@ fn watched(scenario: &Scenario, twin: &Twin) -> Result<Instant, RunError> {
         latency_any_ms: since(session.acts_s()),
         after_sign_ms: if moving { since(sign_s.or(report.map(|r| r.0))) } else { None },
         rest_ms: judge.fault.and_then(|(at_s, _)| Some(1e3 * (judge.rest_s? - at_s).max(0.0))),
-        end: judge.end(),
+        end: judge.end().into(),
         peak_preload_n: judge.peak_preload_n,
         motion_mm: judge.motion_mm,
         gap_part,

@@ -4,7 +4,7 @@
 use interstage::control::Output;
 use interstage::log::Event;
 use interstage::supervise::{Direction, Mode};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::Target;
 use crate::plant::rig::Truth;
@@ -32,7 +32,7 @@ pub const GAP_PART: f64 = 1.25;
 const REST_MM_S: f64 = 0.01;
 
 /// What became of a fault.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Finding {
     /// A fault was latched.

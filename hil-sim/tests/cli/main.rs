@@ -2,6 +2,7 @@
 
 mod crossing;
 mod deploy;
+mod faults;
 mod input;
 mod logs;
 mod montecarlo;

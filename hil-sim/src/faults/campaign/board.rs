@@ -15,7 +15,9 @@ use interstage::units::Q16;
 use super::super::judge::{Finding, Judge};
 use super::operator::Operator;
 use super::twin::Twin;
-use super::{AFTER_S, Campaign, Injection, Instant, Outcome, Target, crossed, doing};
+use super::{
+    AFTER_S, Campaign, CampaignError, Injection, Instant, Kept, Outcome, Target, crossed, doing,
+};
 use crate::board::bench::Bench;
 use crate::board::log::Strings;
 use crate::board::peripherals::rcc::Cause;
@@ -46,18 +48,19 @@ pub struct Firmware<'a> {
 }
 
 impl Campaign {
-    /// Makes all runs on the emulated board, as [`Campaign::run`] does in software.
+    /// Makes all runs on the emulated board, as [`Campaign::run_keeping`] does in software.
     ///
     /// # Errors
-    /// [`RunError`] if a run without a fault cannot be made.
+    /// [`CampaignError`] if what is done cannot be kept, or a run without a fault cannot be made.
     pub fn run_on_board(
         &self,
         firmware: Firmware<'_>,
+        kept: &mut Kept,
         done: &(dyn Fn() + Sync),
-    ) -> Result<Outcome, RunError> {
+    ) -> Result<Outcome, CampaignError<RunError>> {
         let twin = |scenario: &Scenario| twin(firmware, scenario);
         let watched = |scenario: &Scenario, twin: &Twin| watched(firmware, scenario, twin);
-        self.run_on("board", twin, watched, done)
+        self.run_on("board", twin, watched, kept, done)
     }
 }
 
@@ -273,15 +276,15 @@ fn watched(firmware: Firmware<'_>, scenario: &Scenario, twin: &Twin) -> Result<I
         seed: scenario.run.seed,
         at_s,
         magnitude: injection.map(Injection::magnitude),
-        during: during.unwrap_or("at rest"),
+        during: during.unwrap_or("at rest").into(),
         finding,
         code: report.map(|(_, code)| code),
-        restart,
+        restart: restart.map(Into::into),
         latency_ms: since(board.bench.tells_s()).or(since(board.bench.acts_s()).map(|_| 0.0)),
         latency_any_ms: since(board.bench.acts_s()),
         after_sign_ms: if moving { since(sign_s.or(told_s)) } else { None },
         rest_ms: judge.fault.and_then(|(at_s, _)| Some(1e3 * (judge.rest_s? - at_s).max(0.0))),
-        end: if board.image_s.is_some() { "hold" } else { judge.end() },
+        end: if board.image_s.is_some() { "hold" } else { judge.end() }.into(),
         peak_preload_n: judge.peak_preload_n,
         motion_mm: judge.motion_mm,
         gap_part,

@@ -1,13 +1,14 @@
 //! What a campaign comes to: a line a fault.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{Case, Finding, Instant};
 
 /// Median and worst of what varies between instants.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
     /// Median.
     pub median: f64,
@@ -26,7 +27,7 @@ impl Spread {
 }
 
 /// A fault at all its instants.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Line {
     /// The fault.
     pub fault: String,
@@ -37,8 +38,8 @@ pub struct Line {
     /// Every code that it was reported by, with how often.
     pub codes: BTreeMap<u16, usize>,
     /// Restarts that it was reported by, with how often; none in software.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub restarts: BTreeMap<&'static str, usize>,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub restarts: BTreeMap<Cow<'static, str>, usize>,
     /// Whether at every instant it was reported or tolerated.
     pub detected: bool,
     /// Worst time from fault to report, ms; none if nothing was reported.
@@ -69,7 +70,7 @@ pub struct Line {
     #[serde(rename = "unsafe")]
     pub unheld: usize,
     /// How the runs ended, with how many did.
-    pub ends: BTreeMap<&'static str, usize>,
+    pub ends: BTreeMap<Cow<'static, str>, usize>,
     /// Largest preload, N.
     pub worst_preload_n: f64,
     /// Longest way gone uncommanded, mm.
@@ -81,8 +82,8 @@ pub struct Line {
 impl Line {
     /// What it restarted the board by most often.
     #[must_use]
-    pub fn restarted(&self) -> Option<&'static str> {
-        self.restarts.iter().max_by_key(|(_, times)| **times).map(|(cause, _)| *cause)
+    pub fn restarted(&self) -> Option<&str> {
+        self.restarts.iter().max_by_key(|(_, times)| **times).map(|(cause, _)| cause.as_ref())
     }
 
     /// The line of a fault.
@@ -93,12 +94,12 @@ impl Line {
         let mut restarts = BTreeMap::new();
         let mut ends = BTreeMap::new();
         for instant in instants {
-            *ends.entry(instant.end).or_default() += 1;
+            *ends.entry(instant.end.clone()).or_default() += 1;
             if let Some(code) = instant.code {
                 *codes.entry(code).or_default() += 1;
             }
-            if let Some(cause) = instant.restart {
-                *restarts.entry(cause).or_default() += 1;
+            if let Some(cause) = &instant.restart {
+                *restarts.entry(cause.clone()).or_default() += 1;
             }
         }
         let failed = |i: &&Instant| i.finding == Finding::Undetected || !i.harms.is_empty();
