@@ -16,6 +16,7 @@ mod deploy;
 mod docs;
 mod failure;
 mod faults;
+mod flash;
 mod identify;
 mod keys;
 mod live;
@@ -64,6 +65,7 @@ enum Verb {
     Compare(compare::Args),
     Montecarlo(montecarlo::Args),
     Faults(faults::Args),
+    Flash(flash::Args),
     Paper(paper::Args),
     Identify(identify::Args),
     Keys(keys::Args),
@@ -93,6 +95,7 @@ impl Verb {
             Self::Compare(args) => compare::run(args),
             Self::Montecarlo(args) => montecarlo::run(args),
             Self::Faults(args) => faults::run(args),
+            Self::Flash(args) => flash::run(args),
             Self::Paper(args) => paper::run(args),
             Self::Identify(args) => identify::run(args),
             Self::Keys(args) => keys::run(args),

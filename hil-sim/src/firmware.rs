@@ -129,6 +129,21 @@ pub fn elf_path(profile: Profile) -> PathBuf {
     target_directory().join(TARGET).join(profile.folder()).join(PACKAGE)
 }
 
+/// Settings of cargo by which an image has no folder of this machine in it: the places of
+/// panics name the sources of libraries, and would make an image as long as the way to them.
+pub(crate) fn nameless() -> Vec<String> {
+    let home = env::var_os("CARGO_HOME").map(PathBuf::from);
+    let home = home.or_else(|| Some(env::home_dir()?.join(".cargo"))).unwrap_or_default();
+    let Ok(folders) = std::fs::read_dir(home.join("registry/src")) else { return Vec::new() };
+    let mut folders: Vec<PathBuf> = folders.flatten().map(|folder| folder.path()).collect();
+    folders.sort();
+    let flags = folders.iter().filter_map(|folder| {
+        let separator = std::path::MAIN_SEPARATOR;
+        Some(format!("--remap-path-prefix={}{separator}=", folder.to_str()?))
+    });
+    vec![format!("target.{TARGET}.rustflags={:?}", flags.collect::<Vec<_>>())]
+}
+
 /// A tool of the toolchain that runs this program, if it is known.
 pub(crate) fn tool(variable: &str, name: &str) -> OsString {
     env::var_os(variable).unwrap_or_else(|| name.into())
@@ -194,7 +209,7 @@ pub fn build_binary(
         .current_dir(workspace())
         .args(["build", "--package", package, "--bin", binary, "--target", TARGET])
         .args(["--message-format", "json-render-diagnostics"])
-        .args(settings.iter().flat_map(|setting| ["--config", setting]))
+        .args(settings.iter().chain(&nameless()).flat_map(|setting| ["--config", setting]))
         // Flags from the environment would displace the linker arguments of
         // `.cargo/config.toml`.
         .env_remove("RUSTFLAGS")

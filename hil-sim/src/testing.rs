@@ -236,6 +236,7 @@ fn image(root: &Path, profile: Profile) -> Result<Ended> {
         // Flags of the compiler would displace those of the linker, so warnings are
         // counted instead of denied; cargo repeats those of an earlier build.
         .args(["--message-format", "json-diagnostic-rendered-ansi"])
+        .args(firmware::nameless().iter().flat_map(|setting| ["--config", setting]))
         .env_remove("RUSTFLAGS")
         .env_remove("CARGO_ENCODED_RUSTFLAGS")
         .stderr(Stdio::inherit());

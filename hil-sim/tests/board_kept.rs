@@ -11,6 +11,7 @@ mod reset_board;
 use hil_sim::board::bench::STEP;
 use hil_sim::board::faults::Fault;
 use hil_sim::board::peripherals::flash::Cut;
+use hil_sim::board::peripherals::pwr::Then;
 use hil_sim::board::peripherals::rcc::Cause;
 use interstage::blackbox::{Flight, Reset, Stopped};
 use interstage::pages::PAGE_BYTES;
@@ -144,16 +145,55 @@ fn a_dip_of_the_supply_cuts_the_bridges_and_starts_anew() {
     assert!((flight.position.to_num::<f64>() - at).abs() < 0.3, "{flight:?} at {at}");
 }
 
+/// Too low for a while, without being gone.
+fn sags(board: &mut Board, milliseconds: u64) {
+    let machine = board.bench.machine_mut();
+    let now = machine.now();
+    machine.chip_mut().supply_falls(now + milliseconds * STEP, Then::Back, now);
+}
+
+#[test]
+fn a_supply_that_sags_until_the_watchdog_bites_is_no_hang() {
+    let mut board = Board::moving();
+    let at = board.bench.plant().truth().position_mm;
+    sags(&mut board, 400);
+    let (cause, after, driven) = board.reset(150);
+    assert_eq!(cause, Cause::Watchdog);
+    assert!((80..130).contains(&after), "{after} ms");
+    assert!(!driven[1..].contains(&true), "{driven:?}");
+    let restart = board.report();
+    assert_eq!(restart.crash.expect("a crash").stopped, Stopped::Supply);
+    // What it was doing when the bridges went off, and no way gone since; but it may have
+    // been moved meanwhile.
+    let place = restart.place().expect("a place");
+    assert!((place.position.to_num::<f64>() - at).abs() < 0.3 && !place.sure, "{restart} at {at}");
+}
+
+#[test]
+fn a_reset_behind_a_lost_supply_makes_its_place_no_surer() {
+    let mut board = Board::moving();
+    strike(&mut board, Fault::BrownOut);
+    board.reset(5);
+    // The start has taken the record; the tick has not begun.
+    let taken = (0..200).any(|_| {
+        let machine = board.bench.machine_mut();
+        machine.run_on(machine.now() + STEP / 20).expect("runs");
+        page(&board, RECORDS)[24..32] == [0; 8]
+    });
+    assert!(taken, "{:#?}", board.log);
+    strike(&mut board, Fault::ResetPin);
+    let restart = board.report();
+    assert_eq!((restart.reset, restart.crash), (Reset::Pin, None));
+    assert!(restart.place().is_some_and(|place| !place.sure), "{restart}");
+}
+
 #[test]
 fn a_start_waits_for_its_supply() {
     let mut board = Board::idle();
     board.bench.take_frames();
     // Comes back too low, for a tenth of a second.
-    let machine = board.bench.machine_mut();
-    machine.restart(Cause::Power).expect("restarts");
-    let (now, back) = (machine.now(), machine.now() + 100 * STEP);
-    let then = hil_sim::board::peripherals::pwr::Then::Back;
-    machine.chip_mut().supply_falls(back, then, now);
+    board.bench.machine_mut().restart(Cause::Power).expect("restarts");
+    sags(&mut board, 100);
     let lines = board.log.len();
     for _ in 0..99 {
         board.step();

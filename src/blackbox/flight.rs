@@ -46,7 +46,7 @@ pub struct Flight {
     pub position: Millimetres,
     /// Mode, by [`number::mode`].
     pub mode: u8,
-    /// Sleeve level.
+    /// Sleeve level, and [`AWAY`](Self::AWAY).
     pub level: u8,
     /// Code of the last fault since the start, 0 for none.
     pub fault: u16,
@@ -59,6 +59,9 @@ pub struct Flight {
 impl Flight {
     /// What it is known by.
     const SEED: u32 = 0xF11E_0001;
+    /// Added to the level by a start that found the supply back: it had been away since the
+    /// drive last did something, for nobody knows how long.
+    pub const AWAY: u8 = 0x80;
 
     /// As words.
     #[must_use]

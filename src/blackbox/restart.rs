@@ -96,8 +96,21 @@ impl Restart {
         let way = flight.pace.speed() * ticks_to_seconds(unwatched + COASTS);
         Some(Place {
             position: flight.position + way,
-            sure: unwatched <= FRESH && self.reset != Reset::Power,
+            sure: unwatched <= FRESH && !self.was_away(),
         })
+    }
+
+    /// Whether the supply was away, for nobody knows how long, since the drive last did
+    /// something: at this start, or at one before it from which the drive did nothing.
+    ///
+    /// A dip from which the program itself started anew was short: the watchdog would have
+    /// ended it in a tenth of a second.
+    #[must_use]
+    pub fn was_away(&self) -> bool {
+        let fell = self.crash.is_some_and(|crash| crash.stopped == Stopped::Supply);
+        self.reset == Reset::Power
+            || fell && self.reset != Reset::Software
+            || self.flight.is_some_and(|flight| flight.level >= Flight::AWAY)
     }
 }
 
@@ -135,12 +148,16 @@ impl fmt::Display for Restart {
                 Some(mode) => write!(f, "; before: {mode:?}")?,
                 None => write!(f, "; before: mode {}", flight.mode)?,
             }
+            let level = level & !Flight::AWAY;
             write!(f, " at tick {tick}, {position:.2} mm, level {level}")?;
             if fault != 0 {
                 write!(f, ", last fault {fault}")?;
             }
             if !late.is_nobody() {
                 write!(f, ", {} was late", late.name())?;
+            }
+            if self.was_away() {
+                f.write_str(", then without a supply")?;
             }
         }
         Ok(())

@@ -123,8 +123,12 @@ fn the_place_is_the_record_s_and_the_way_gone_after_it() {
     near(restart(Reset::Software, crash(Stopped::Panic { place: 1, line: 2 })), 29.92, true);
     // A dip, one that lasts until the watchdog bites, and a supply that was away.
     near(restart(Reset::Software, crash(Stopped::Supply)), 29.92, true);
-    near(restart(Reset::Watchdog, crash(Stopped::Supply)), 29.92, true);
+    near(restart(Reset::Watchdog, crash(Stopped::Supply)), 29.92, false);
+    near(restart(Reset::Pin, crash(Stopped::Supply)), 29.92, false);
     near(restart(Reset::Power, crash(Stopped::Supply)), 29.92, false);
+    // Nothing happened since a start that found the supply back.
+    let since = Flight { level: Flight::AWAY | 2, ..flight };
+    near(Restart { flight: Some(since), ..restart(Reset::Pin, None) }, 29.92, false);
     let lost = Flight { pace: Pace::of(Q16::from_num(-40), false), ..flight };
     assert_eq!(Restart { flight: Some(lost), ..restart(Reset::Pin, None) }.place(), None);
     let held = Flight { fault: 123, ..flight };
@@ -164,6 +168,13 @@ fn a_report_names_what_is_known() {
     let turned = Restart { reset: Reset::Software, crash: crash(Stopped::Image), ..restart };
     let text = "started: by software or debugger; a bit of the image had turned over";
     assert_eq!(turned.to_string(), text);
+    let away = Flight { tick: 9, mode: 6, level: Flight::AWAY | 1, ..EMPTY };
+    let again = Restart { reset: Reset::Pin, flight: Some(away), crash: None };
+    assert_eq!(
+        again.to_string(),
+        "started: by the reset pin; before: Run(Deploy, Approach) at tick 9, 0.00 mm, level 1, \
+         then without a supply"
+    );
     let flight = Flight { tick: 9, mode: 6, level: 1, fault: 122, late: Late::TICK, ..EMPTY };
     let stopped = Stopped::Hang { pc: 16, lr: 32, late: Late::STARVED, at: 80 };
     let crash = Some(Crash { build: 1, stopped });

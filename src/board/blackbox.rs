@@ -83,17 +83,19 @@ pub(crate) fn report() -> Restart {
     let crash = unsafe { (&raw const (*kept()).crash).read_volatile() };
     let found = supply::found();
     let in_flash = found.and_then(|latest| latest.flight);
-    let flight = in_memory.or(in_flash);
-    let first = flight.map_or([0; FLIGHT_WORDS], |flight| flight.seal());
+    let supply = || Crash { build: build(), stopped: Stopped::Supply };
+    let crash = Crash::open(&crash).or(in_flash.map(|_| supply()));
+    let mut restart = Restart { reset: guard::take_reset(), flight: in_memory.or(in_flash), crash };
+    let away = if restart.was_away() { Flight::AWAY } else { 0 };
+    let first = restart.flight.as_mut().map_or([0; FLIGHT_WORDS], |flight| {
+        flight.level |= away;
+        flight.seal()
+    });
     let flights = [first, [0; FLIGHT_WORDS]];
     // SAFETY: as before.
     unsafe { kept().write_volatile(Kept { crash: [0; CRASH_WORDS], flights }) }
     // In this order: a supply that goes again here finds it in one place or the other.
     supply::take(found);
-    let supply = || Crash { build: build(), stopped: Stopped::Supply };
-    let crash =
-        Crash::open(&crash).or(if in_memory.is_none() { in_flash.map(|_| supply()) } else { None });
-    let restart = Restart { reset: guard::take_reset(), flight, crash };
     say(&restart);
     restart
 }
@@ -134,7 +136,7 @@ fn say(restart: &Restart) {
             tick,
             mode,
             position.to_num::<f32>(),
-            level,
+            level & !Flight::AWAY,
             fault,
             late.name()
         );

@@ -27,6 +27,8 @@ pub(crate) fn watch() {
     });
     EXTI.rtsr(0).modify(|w| w.set_line(LINE, true));
     while PWR.sr2().read().pvdo() {}
+    // It rose before anyone looked.
+    EXTI.pr(0).write(|w| w.set_line(LINE, true));
     EXTI.imr(0).modify(|w| w.set_line(LINE, true));
     // SAFETY: the handler shares nothing with anyone who goes on behind it.
     unsafe { interrupt::PVD_PVM.enable() };
@@ -57,7 +59,7 @@ unsafe fn PVD_PVM() {
             RECORDS.program(index, word);
         }
     }
-    // It may come back before the chip is reset.
+    // It may come back before the chip is reset, or the watchdog bite before it does.
     while PWR.sr2().read().pvdo() {}
     blackbox::end(Stopped::Supply)
 }

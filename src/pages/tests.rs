@@ -111,7 +111,12 @@ fn a_page_of_seals_fills_up() {
 
 proptest! {
     #[test]
-    fn a_bit_of_the_hash_makes_no_new_image(id: [u8; 8], sum: u32, bit in 0_usize..64) {
+    fn a_bit_or_two_of_the_hash_make_no_new_image(
+        id: [u8; 8],
+        sum: u32,
+        bit in 0_usize..64,
+        other in 0_usize..64,
+    ) {
         let mut page = BLANK;
         for (index, word) in seals::entry(id, sum).into_iter().enumerate() {
             put(&mut page, index, word);
@@ -119,7 +124,10 @@ proptest! {
         let mut turned = id;
         turned[bit / 8] ^= 1 << (bit % 8);
         prop_assert_eq!(seals::sum_of(&page, turned), Some(sum));
+        turned[other / 8] ^= 1 << (other % 8);
+        prop_assert_eq!(seals::sum_of(&page, turned), Some(sum));
         page[bit / 8] ^= 1 << (bit % 8);
+        page[other / 8] ^= 1 << (other % 8);
         prop_assert_eq!(seals::sum_of(&page, id), Some(sum));
     }
 
@@ -142,6 +150,23 @@ proptest! {
         let mut changed = words.clone();
         changed[place.index(words.len())] ^= change;
         prop_assert_ne!(seals::sum_on(0, &words), seals::sum_on(0, &changed));
+    }
+
+    #[test]
+    fn two_bits_of_a_double_word_change_the_sum(
+        words in prop::collection::vec(any::<[u32; 2]>(), 1..20),
+        place: prop::sample::Index,
+    ) {
+        let sum = |words: &[[u32; 2]]| seals::sum_on(0, words.as_flattened());
+        let place = place.index(words.len());
+        let whole = sum(&words);
+        for (one, other) in (0..64).flat_map(|one| (0..one).map(move |other| (one, other))) {
+            let mut changed = words.clone();
+            for bit in [one, other] {
+                changed[place][bit / 32] ^= 1 << (bit % 32);
+            }
+            prop_assert_ne!(sum(&changed), whole, "{} and {}", one, other);
+        }
     }
 
     #[test]

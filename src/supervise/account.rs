@@ -222,6 +222,10 @@ impl Limit {
                 "goes on; load cell or displacement sensor is wrong, or the tread another one",
                 "the next preload phase",
             ),
+            Self::PositionUnconfirmed => (
+                "goes on from the record of a run that hung or lost its supply",
+                "the next step that is found",
+            ),
             Self::SlipMarginLow => ("goes on", "the next plan"),
         }
     }

@@ -178,11 +178,13 @@ pub enum Limit {
     GapStrange = 211,
     /// Compression and preload of a wheel that stands do not belong together.
     TreadStrange = 212,
+    /// The position is that of a record which no step ahead can confirm.
+    PositionUnconfirmed = 213,
 }
 
 impl Limit {
     /// Every limit, in the order of codes.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::StepEarly,
         Self::StepLate,
         Self::StepMissing,
@@ -195,6 +197,7 @@ impl Limit {
         Self::SlipMarginLow,
         Self::GapStrange,
         Self::TreadStrange,
+        Self::PositionUnconfirmed,
     ];
 
     /// The stable code.
@@ -223,6 +226,7 @@ impl Limit {
             Self::SlipMarginLow => "the friction utilisation leaves less than the wanted margin",
             Self::GapStrange => "the measured gap is not the predicted one",
             Self::TreadStrange => "compression of the tread and preload do not belong together",
+            Self::PositionUnconfirmed => "the position is of a record that no step ahead confirms",
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::Duration;
 
-use probe_rs::flashing::{ElfLoader, ElfOptions, download_file};
+use probe_rs::flashing::{DownloadOptions, ElfLoader, ElfOptions, download_file_with_options};
 use probe_rs::probe::list::Lister;
 use probe_rs::probe::{DebugProbeInfo, DebugProbeSelector};
 use probe_rs::rtt::{Error as RttError, Rtt, ScanRegion};
@@ -57,13 +57,16 @@ impl RealPort {
         Ok(Self { session, rtt: None, block })
     }
 
-    /// Puts an image into the board's flash. Parameters stored there stay.
+    /// Puts an image into the board's flash and reads it back. Parameters stored there stay.
     ///
     /// # Errors
     /// [`PortError::Board`] with what probe-rs says.
     pub fn flash(&mut self, elf: &Path) -> Result<(), PortError> {
         self.rtt = None;
-        download_file(&mut self.session, elf, ElfLoader(ElfOptions::default()))
+        let mut options = DownloadOptions::default();
+        options.verify = true;
+        let loader = ElfLoader(ElfOptions::default());
+        download_file_with_options(&mut self.session, elf, loader, options)
             .map_err(|error| PortError::Board(format!("flashing failed: {}", said(&error))))
     }
 

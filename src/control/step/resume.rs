@@ -3,7 +3,8 @@
 
 use super::state::OpenCrossing;
 use super::{Controller, Pass, State};
-use crate::supervise::Direction;
+use crate::log::Event;
+use crate::supervise::{Direction, Limit};
 use crate::units::{Millimetres, Q16, Ratio, q16};
 
 /// Most deviation of the wheel's height from what a record has it at, steps: what a sleeve
@@ -66,6 +67,7 @@ impl Controller {
         let steps = self.steps.len() as u8;
         let seen = self.seen(state, pass);
         let known = if state.searching { None } else { self.corner_at(pass.position, direction) };
+        let confirmed;
         match known.unwrap_or_else(|| self.ground(pass, ON_WALL)) {
             Ground::Corner(step) => {
                 // The drive has been off: nothing jumps if the corner's force is there at once,
@@ -87,7 +89,7 @@ impl Controller {
                     Direction::Deploy => step < steps,
                     Direction::Retract => step > 1,
                 };
-                state.searching &= further;
+                confirmed = further;
             }
             Ground::Wall(level) => {
                 state.level = level;
@@ -98,8 +100,12 @@ impl Controller {
                 };
                 state.crossing = None;
                 self.begin_on_wall(state, pass, direction);
-                state.searching &= state.next_step > 0;
+                confirmed = state.next_step > 0;
             }
+        }
+        if state.searching && !confirmed {
+            state.searching = false;
+            pass.log(Event::Limit(Limit::PositionUnconfirmed));
         }
     }
 

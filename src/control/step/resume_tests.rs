@@ -170,17 +170,48 @@ fn at_the_first_touch_itself_the_wall_is_still_measured() {
     assert_eq!(contact(Q16::DELTA), (Contact::Leaving, true));
 }
 
+/// A run that is resumed from a record that may be off; how often it says that nothing ahead
+/// can confirm it.
+fn unsure(sensed: &SensedState, direction: Direction) -> (State, usize) {
+    let mut state = State::default();
+    (state.direction, state.searching) = (direction, true);
+    let told = at(sensed, 0.0, |controller, pass| {
+        controller.resume(&mut state, pass, direction);
+        let unconfirmed = Event::Limit(Limit::PositionUnconfirmed);
+        pass.output.events.iter().filter(|entry| entry.event == unconfirmed).count()
+    });
+    (state, told)
+}
+
+#[test]
+fn a_record_that_no_step_ahead_can_confirm_is_told() {
+    let searches = |level: u8, direction: Direction| {
+        let (state, told) = unsure(&sensed(level, 0.0, 0.3), direction);
+        assert!(state.crossing.is_none());
+        assert_eq!(told, usize::from(!state.searching));
+        state.searching
+    };
+    let out = [0, 1, 2, 3].map(|level| searches(level, Direction::Deploy));
+    assert_eq!(out, [true, true, true, false]);
+    let back = [0, 1, 2, 3].map(|level| searches(level, Direction::Retract));
+    assert_eq!(back, [false, true, true, true]);
+    // Sure of its place, it has nothing to say.
+    let mut sure = State::default();
+    let said = at(&sensed(3, 0.0, 0.3), 70.0, |controller, pass| {
+        controller.resume(&mut sure, pass, Direction::Deploy);
+        pass.output.events.len()
+    });
+    assert_eq!((said, sure.searching), (0, false));
+}
+
 #[test]
 fn the_search_ends_on_the_last_corner_of_each_way() {
     // Half-way up the corner above the wall of this level: 2 mm inwards of it.
     let searches = |level: u8, direction: Direction| {
-        let mut state = State::default();
-        (state.direction, state.searching) = (direction, true);
-        at(&sensed(level, -2.0, 0.3), 0.0, |controller, pass| {
-            controller.resume(&mut state, pass, direction);
-        });
+        let (state, told) = unsure(&sensed(level, -2.0, 0.3), direction);
         let open = state.crossing.expect("on a corner");
         assert_eq!((open.step, state.next_step), (level + 1, level + 1));
+        assert_eq!(told, usize::from(!state.searching));
         state.searching
     };
     let out = [0, 1, 2].map(|level| searches(level, Direction::Deploy));
