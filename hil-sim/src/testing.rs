@@ -139,8 +139,9 @@ fn format(root: &Path) -> Result<Ended> {
     step(cargo(root).args(["fmt", "--all", "--check"]))
 }
 
-/// Fetches what the emulator is built with, and what its log is compared with. Where that cannot be had, this fails: a
-/// suite that left the board out would say more than it has seen.
+/// Fetches what the emulator is built with, and what its log is compared with. Where that
+/// cannot be had, this fails: a suite that left the board out would say more than it has
+/// seen.
 fn tools(_root: &Path) -> Result<Ended> {
     match Tools::ready().and_then(|_| defmt_print()) {
         Ok(_) => Ok(Ended::Passed),

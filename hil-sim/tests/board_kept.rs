@@ -11,7 +11,7 @@ mod reset_board;
 use hil_sim::board::bench::STEP;
 use hil_sim::board::faults::Fault;
 use hil_sim::board::peripherals::flash::Cut;
-use hil_sim::board::peripherals::pwr::Then;
+use hil_sim::board::peripherals::pwr::{HOLDS, Then};
 use hil_sim::board::peripherals::rcc::Cause;
 use interstage::blackbox::{Flight, Reset, Stopped};
 use interstage::pages::PAGE_BYTES;
@@ -65,6 +65,28 @@ fn a_supply_that_falls_leaves_what_the_drive_did() {
     assert!((flight.position.to_num::<f64>() - at).abs() < 0.3, "{flight:?} at {at}");
     for said in ["the supply fell too low", "before: tick"] {
         assert!(board.log.iter().any(|line| line.contains(said)), "{said}: {:#?}", board.log);
+    }
+}
+
+/// Of the millisecond that the wiring has to give it, it takes the half at most.
+#[test]
+fn a_record_of_the_supply_is_written_in_half_of_its_time() {
+    // An empty page, which is looked through from its end, and one with room for one more.
+    for filled in [0, PAGE_BYTES - 32] {
+        let mut board = Board::moving();
+        board.bench.machine_mut().poke(RECORDS, &vec![0; filled]).expect("flash");
+        strike(&mut board, Fault::BrownOut);
+        let fell = board.bench.machine().now();
+        // The record's last word is the lower one of its third double word.
+        let written = |board: &Board| page(board, RECORDS)[filled + 16..filled + 20] != [0xFF; 4];
+        while !written(&board) {
+            let machine = board.bench.machine_mut();
+            let now = machine.now();
+            assert!(now - fell < HOLDS / 2, "{filled}: not yet");
+            machine.run_on(now + STEP / 100).expect("runs");
+        }
+        let took_ms = (board.bench.machine().now() - fell) as f64 / STEP as f64;
+        assert!((0.2..0.4).contains(&took_ms), "{filled}: {took_ms} ms");
     }
 }
 
@@ -249,5 +271,17 @@ fn a_bit_of_the_image_that_turns_over_is_told_and_held() {
         strike(&mut board, flip);
         strike(&mut board, Fault::ResetPin);
         board.until("mode: idle", 3000);
+    }
+}
+
+#[test]
+fn an_image_names_no_folder_of_the_machine_that_built_it() {
+    let board = Board::idle();
+    let image = &board.bench.machine().image().flash;
+    let holds = |text: &str| image.windows(text.len()).any(|bytes| bytes == text.as_bytes());
+    assert!(holds("src/main.rs"), "places of panics are in it");
+    let home = std::env::home_dir().expect("a home");
+    for folder in ["registry", ".cargo", home.to_str().expect("a path")] {
+        assert!(!holds(folder), "{folder}");
     }
 }

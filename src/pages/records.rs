@@ -6,7 +6,7 @@
 //! ```
 //!
 //! The supply gives its warning about a millisecond before the memory is lost; a record is
-//! three double words, a quarter of that.
+//! three double words, which take a quarter of that, and the search for its place a tenth.
 
 use super::{PAGE_WORDS, Page, Word, used, word};
 use crate::blackbox::{FLIGHT_WORDS, Flight};

@@ -3,6 +3,7 @@
 mod crossing;
 mod deploy;
 mod faults;
+mod flash;
 mod input;
 mod logs;
 mod montecarlo;
