@@ -118,6 +118,8 @@ mod firmware {
     fn begin(threads: Spawner, channels: Channels) {
         let p = embassy_stm32::init(board::clocks());
         supply::watch();
+        // Before anything that it may have damaged.
+        let image = image::verify();
         defmt::info!("interstage {=str}", env!("CARGO_PKG_VERSION"));
         let restart = blackbox::report();
         EXCHANGE.log(Entry { at: 0, event: Event::Restart(restart) });
@@ -126,7 +128,7 @@ mod firmware {
         let (mut parts, lamp, pages) = split(p, console, channels.telemetry);
         parts.watchdog.place = restart.place();
         threads.spawn(light::show(lamp).unwrap());
-        match image::verify() {
+        match image {
             Some(sealed) => threads.spawn(image::watch(sealed).unwrap()),
             None => return config::hold(threads, parts, Held::Image),
         }

@@ -138,8 +138,8 @@ pub(crate) fn nameless() -> Vec<String> {
     let mut folders: Vec<PathBuf> = folders.flatten().map(|folder| folder.path()).collect();
     folders.sort();
     let flags = folders.iter().filter_map(|folder| {
-        let separator = std::path::MAIN_SEPARATOR;
-        Some(format!("--remap-path-prefix={}{separator}=", folder.to_str()?))
+        // To the root, so that nobody takes what is left for a path from somewhere else.
+        Some(format!("--remap-path-prefix={}=/", folder.to_str()?))
     });
     vec![format!("target.{TARGET}.rustflags={:?}", flags.collect::<Vec<_>>())]
 }

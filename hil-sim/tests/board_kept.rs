@@ -285,3 +285,19 @@ fn an_image_names_no_folder_of_the_machine_that_built_it() {
         assert!(!holds(folder), "{folder}");
     }
 }
+
+/// A start that no longer gets to its tasks, because what copies its parts about is broken,
+/// has said so before.
+#[test]
+fn a_damaged_image_that_no_longer_starts_says_so_too() {
+    let mut board = Board::moving();
+    let copies = board.function("compiler_builtins::mem::memcpy");
+    strike(&mut board, Fault::BitFlip(copies + 0x22F, 4));
+    board.until(DAMAGED, LOOKED_AT_MS);
+    // Off from here on, how often ever it starts.
+    board.step();
+    for _ in 0..500 {
+        let drives = board.step().drives;
+        assert!(!drives.drive_on && !drives.preload_on);
+    }
+}

@@ -41,14 +41,18 @@ fn words() -> &'static [u32] {
 }
 
 /// The image's sum, if it is the one of its first start, or this is its first; none if a bit
-/// has turned over since.
+/// has turned over since, which is said at once: what comes behind may no longer work.
 pub(crate) fn verify() -> Option<u32> {
     let sum = seals::sum_on(0, words());
     let sealed = seals::sum_of(SEALS.bytes(), id()).unwrap_or_else(|| {
         seal(sum);
         sum
     });
-    (sealed == sum).then_some(sum)
+    if sealed != sum {
+        say_damaged();
+        return None;
+    }
+    Some(sum)
 }
 
 /// Keeps the sum for the starts to come.

@@ -76,7 +76,8 @@ fn shortened(path: &str) -> String {
     }
     match path.split_once("/library/") {
         Some((_, rest)) => rest.to_owned(),
-        None => path.to_owned(),
+        // A library's, as `firmware::build` leaves it.
+        None => path.strip_prefix('/').unwrap_or(path).to_owned(),
     }
 }
 
