@@ -103,7 +103,7 @@ fn a_stack_that_overflows_is_reported_too() {
 /// Tasks by their functions in `main.rs`, how the record calls them, and cycles that lead
 /// into the middle of a turn.
 const TASKS: [(&str, &str, u64); 8] = [
-    ("speed", "speed", 40),
+    ("speed", "speed", 90),
     ("pressure", "pressure", 130),
     ("displacement", "displacement", 130),
     ("angle", "angle", 60),
