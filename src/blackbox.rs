@@ -10,7 +10,7 @@ mod late;
 mod restart;
 
 pub use crash::{Crash, Stopped};
-pub use flight::{Flight, Pace, Recorder, later};
+pub use flight::{Flight, Pace, Recorder, Trust, later};
 pub use late::Late;
 pub use restart::{Place, Reset, Restart};
 

@@ -117,11 +117,11 @@ mod firmware {
     /// Starts everything.
     fn begin(threads: Spawner, channels: Channels) {
         let p = embassy_stm32::init(board::clocks());
-        supply::watch();
+        let waited = supply::watch();
         // Before anything that it may have damaged.
         let image = image::verify();
         defmt::info!("interstage {=str}", env!("CARGO_PKG_VERSION"));
-        let restart = blackbox::report();
+        let restart = blackbox::report(waited);
         EXCHANGE.log(Entry { at: 0, event: Event::Restart(restart) });
         guard::arm();
         let (console, line) = (channels.console, channels.line);

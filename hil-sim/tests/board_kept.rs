@@ -163,8 +163,8 @@ fn a_dip_of_the_supply_cuts_the_bridges_and_starts_anew() {
     assert!(!driven[1..].contains(&true), "{driven:?}");
     let restart = board.report();
     assert_eq!(restart.crash.expect("a crash").stopped, Stopped::Supply);
-    let flight = restart.flight.expect("what it did");
-    assert!((flight.position.to_num::<f64>() - at).abs() < 0.3, "{flight:?} at {at}");
+    let place = restart.place().expect("a place");
+    assert!((place.position.to_num::<f64>() - at).abs() < 0.3 && !place.sure, "{restart} at {at}");
 }
 
 /// Too low for a while, without being gone.
@@ -206,6 +206,46 @@ fn a_reset_behind_a_lost_supply_makes_its_place_no_surer() {
     strike(&mut board, Fault::ResetPin);
     let restart = board.report();
     assert_eq!((restart.reset, restart.crash), (Reset::Pin, None));
+    assert!(restart.place().is_some_and(|place| !place.sure), "{restart}");
+}
+
+#[test]
+fn a_place_without_a_step_found_stays_unsure_however_long_it_idles() {
+    let mut board = Board::moving();
+    let at = board.bench.plant().truth().position_mm;
+    let lost = falls(&mut board).expect("a record");
+    for _ in 0..2 {
+        for _ in 0..50 {
+            board.step();
+        }
+        strike(&mut board, Fault::ResetPin);
+        let restart = board.report();
+        assert!(restart.flight.is_some_and(|flight| flight.tick != lost.tick), "{restart}");
+        let place = restart.place().expect("a place");
+        let off = (place.position.to_num::<f64>() - at).abs();
+        assert!(off < 0.3 && !place.sure, "{restart} at {at}");
+    }
+}
+
+#[test]
+fn a_reset_into_a_low_supply_leaves_its_place_unsure() {
+    let mut board = Board::moving();
+    strike(&mut board, Fault::ResetPin);
+    sags(&mut board, 300);
+    let restart = board.report();
+    assert_eq!((restart.reset, restart.crash), (Reset::Power, None));
+    assert!(restart.place().is_some_and(|place| !place.sure), "{restart}");
+}
+
+#[test]
+fn a_supply_that_sags_is_named_without_its_record_too() {
+    let mut board = Board::moving();
+    // No room for one.
+    board.bench.machine_mut().poke(RECORDS, &[0; PAGE_BYTES]).expect("flash");
+    sags(&mut board, 400);
+    assert_eq!(board.reset(150).0, Cause::Watchdog);
+    let restart = board.report();
+    assert_eq!(restart.crash.expect("a crash").stopped, Stopped::Supply);
     assert!(restart.place().is_some_and(|place| !place.sure), "{restart}");
 }
 

@@ -3,8 +3,10 @@
 
 use hil_sim::scenario::{Direction, Scenario};
 use hil_sim::sil::{Options, Session};
+use interstage::blackbox::{Reset, Restart};
 use interstage::log::Event;
 use interstage::supervise::{Command, Fault, Limit, Mode};
+use interstage::units::Millimetres;
 use rayon::prelude::*;
 
 /// Rigs each way.
@@ -111,6 +113,11 @@ fn draws(direction: Direction, count: u64) -> impl ParallelIterator<Item = (u64,
     })
 }
 
+/// Whether a rig without a fault never reports it.
+fn untrue(limit: &Limit) -> bool {
+    matches!(limit, Limit::StepExtra | Limit::StepMissing | Limit::TreadStrange)
+}
+
 #[test]
 fn a_reset_anywhere_is_followed_by_no_false_alarm() {
     for direction in [Direction::Deploy, Direction::Retract] {
@@ -173,9 +180,6 @@ fn from_anywhere_at_a_corner_it_arrives_and_reports_nothing_that_is_not_so() {
                 (seed, step, before, session.mode(), limits)
             })
             .collect();
-        let untrue = |limit: &Limit| {
-            matches!(limit, Limit::StepExtra | Limit::StepMissing | Limit::TreadStrange)
-        };
         let left: Vec<_> = ends
             .iter()
             .filter(|(.., mode, limits)| {
@@ -212,4 +216,90 @@ fn sent_to_and_fro_at_a_corner_it_still_arrives() {
             ends.iter().filter(|(.., mode)| *mode != Mode::Complete(then.into())).collect();
         assert!(left.is_empty(), "{direction:?}, then {then:?}: {left:?}");
     }
+}
+
+/// How far off its record is when the supply is back, mm: moved by hand meanwhile, along the
+/// wall, which goes on for 2.7 mm behind the end of travel.
+const MOVED: [f64; 5] = [-6.5, -2.6, -0.4, 0.4, 1.9];
+
+/// The supply goes with the wheel at about 71 mm, on the last wall, and comes back with it
+/// moved by so much. Then sent out, to the end or not at all.
+fn moved_on_the_last_wall(seed: u64, moved: f64, out: u32) -> (Session, Vec<Limit>) {
+    let mut session = session(seed, Direction::Deploy);
+    drive(&mut session, Direction::Deploy, 40_000, |session| {
+        session.plant().truth().position_mm > 71.0
+    });
+    let mut flight = session.record();
+    flight.position -= Millimetres::from_num(moved);
+    session.restart_from(Restart { reset: Reset::Power, flight: Some(flight), crash: None });
+    let limits = drive(&mut session, Direction::Deploy, out, |_| false);
+    (session, limits)
+}
+
+/// What the way back says, where it ends, and how.
+fn back(session: &mut Session) -> (Vec<Limit>, f64, Mode) {
+    if !matches!(session.mode(), Mode::Idle | Mode::Complete(_)) {
+        session.step(Some(Command::Stop)).expect("runs");
+    }
+    let limits = drive(session, Direction::Retract, 40_000, |_| false);
+    (limits, session.plant().truth().position_mm, session.mode())
+}
+
+#[test]
+fn moved_on_the_last_wall_it_says_so_and_finds_its_place_on_the_way_back() {
+    for (seed, moved) in (1..=20).flat_map(|seed| MOVED.map(|moved| (seed, moved))) {
+        for out in [0, 1500, 40_000] {
+            let (mut session, limits) = moved_on_the_last_wall(seed, moved, out);
+            let told = limits.iter().filter(|limit| **limit == Limit::PositionUnconfirmed);
+            assert_eq!(told.count(), usize::from(out > 0), "{seed} {moved} {out}: {limits:?}");
+            if out == 40_000 {
+                assert_eq!(session.mode(), Mode::Complete(Direction::Deploy.into()));
+            }
+            let (limits, at, mode) = back(&mut session);
+            let place = format!("{seed} {moved} {out}: {limits:?}, {at}, {mode:?}");
+            assert_eq!(mode, Mode::Complete(Direction::Retract.into()), "{place}");
+            assert!(at.abs() < 2.6, "{place}");
+            assert!(!limits.iter().any(untrue), "{place}");
+        }
+    }
+}
+
+#[test]
+fn no_reset_makes_a_place_sure_that_no_step_has_confirmed() {
+    for moved in MOVED {
+        let (mut session, _) = moved_on_the_last_wall(3, moved, 40_000);
+        for reset in [Reset::Pin, Reset::Software] {
+            let flight = Some(session.record());
+            let restart = Restart { reset, flight, crash: None };
+            assert!(restart.place().is_some_and(|place| !place.sure), "{moved}: {restart}");
+            session.restart_from(restart);
+            // Idle for a second: nothing moves, and nothing is found out.
+            for _ in 0..1000 {
+                session.step(None).expect("runs");
+            }
+        }
+        let limits = drive(&mut session, Direction::Deploy, 40_000, |_| false);
+        assert_eq!(limits, [Limit::PositionUnconfirmed], "{moved}");
+        let (_, at, mode) = back(&mut session);
+        assert_eq!(mode, Mode::Complete(Direction::Retract.into()), "{moved}");
+        assert!(at.abs() < 2.6, "{moved}: {at}");
+        // A step has been found: from here on it is sure again.
+        let restart = Restart { reset: Reset::Pin, flight: Some(session.record()), crash: None };
+        assert!(restart.place().is_some_and(|place| place.sure), "{moved}: {restart}");
+    }
+}
+
+/// Nothing but the sleeve's end tells it that it is further out than it believes.
+#[test]
+fn moved_outwards_it_holds_at_the_sleeve_s_end() {
+    let (mut session, limits) = moved_on_the_last_wall(3, 6.5, 40_000);
+    assert!(limits.contains(&Limit::PositionUnconfirmed), "{limits:?}");
+    assert!(matches!(session.mode(), Mode::FaultHold(_)), "{:?}", session.mode());
+    let stood = session.plant().truth().clone();
+    for _ in 0..1000 {
+        session.step(None).expect("runs");
+    }
+    let truth = session.plant().truth();
+    assert!((truth.position_mm - stood.position_mm).abs() < 0.1, "{truth:?} after {stood:?}");
+    assert!((truth.preload_n - stood.preload_n).abs() < 3.0, "{truth:?} after {stood:?}");
 }

@@ -37,6 +37,17 @@ impl Pace {
     }
 }
 
+/// How far a position is to be trusted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Trust {
+    /// Not at all: where on its wall the wheel stands is a guess.
+    Guess,
+    /// It is that of a record which may be off, and no step found since confirms it.
+    Unsure,
+    /// It counts from the stow end, or from a step.
+    Sure,
+}
+
 /// What the drive was doing in a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Flight {
@@ -46,7 +57,7 @@ pub struct Flight {
     pub position: Millimetres,
     /// Mode, by [`number::mode`].
     pub mode: u8,
-    /// Sleeve level, and [`AWAY`](Self::AWAY).
+    /// Sleeve level, and [`UNSURE`](Self::UNSURE).
     pub level: u8,
     /// Code of the last fault since the start, 0 for none.
     pub fault: u16,
@@ -59,9 +70,10 @@ pub struct Flight {
 impl Flight {
     /// What it is known by.
     const SEED: u32 = 0xF11E_0001;
-    /// Added to the level by a start that found the supply back: it had been away since the
-    /// drive last did something, for nobody knows how long.
-    pub const AWAY: u8 = 0x80;
+    /// Added to the level if the position may be off, and no step has confirmed it; and by
+    /// every start until its first tick, as nobody knows for how long the drive then stands
+    /// unwatched.
+    pub const UNSURE: u8 = 0x80;
 
     /// As words.
     #[must_use]
@@ -114,8 +126,8 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// What is to be kept of a tick; `placed` says that the position is more than a guess.
-    pub fn flight(&mut self, row: &Telemetry, placed: bool, late: Late) -> Flight {
+    /// What is to be kept of a tick, in which the position was to be trusted so far.
+    pub fn flight(&mut self, row: &Telemetry, trust: Trust, late: Late) -> Flight {
         if row.mode != self.mode {
             self.mode = row.mode;
             self.number = number::of_mode(row.mode);
@@ -127,10 +139,10 @@ impl Recorder {
             tick: row.at,
             position: row.position,
             mode: self.number,
-            level: row.level,
+            level: row.level | if trust == Trust::Unsure { Flight::UNSURE } else { 0 },
             fault: self.fault,
             late,
-            pace: Pace::of(row.speed_ref, placed),
+            pace: Pace::of(row.speed_ref, trust != Trust::Guess),
         }
     }
 }

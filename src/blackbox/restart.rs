@@ -4,7 +4,7 @@ use core::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Crash, Flight, Stopped};
+use super::{Crash, Flight, Pace, Stopped};
 use crate::supervise::Fault;
 use crate::units::{Millimetres, Tick, ticks_to_seconds};
 
@@ -85,6 +85,7 @@ impl Restart {
     /// bit: at about the reference of the last tick, for a time that is known. Without a
     /// supply the gears hold the wheel, but not against a hand. After a fault that may have
     /// been one of the position it tells nothing.
+    #[inline(never)]
     #[must_use]
     pub fn place(&self) -> Option<Place> {
         let flight = self.flight.filter(|flight| flight.pace.placed() && spared(flight.fault))?;
@@ -96,21 +97,28 @@ impl Restart {
         let way = flight.pace.speed() * ticks_to_seconds(unwatched + COASTS);
         Some(Place {
             position: flight.position + way,
-            sure: unwatched <= FRESH && !self.was_away(),
+            sure: unwatched <= FRESH && !self.was_away() && flight.level < Flight::UNSURE,
         })
     }
 
     /// Whether the supply was away, for nobody knows how long, since the drive last did
-    /// something: at this start, or at one before it from which the drive did nothing.
-    ///
-    /// A dip from which the program itself started anew was short: the watchdog would have
-    /// ended it in a tenth of a second.
-    #[must_use]
-    pub fn was_away(&self) -> bool {
+    /// something.
+    fn was_away(&self) -> bool {
         let fell = self.crash.is_some_and(|crash| crash.stopped == Stopped::Supply);
-        self.reset == Reset::Power
-            || fell && self.reset != Reset::Software
-            || self.flight.is_some_and(|flight| flight.level >= Flight::AWAY)
+        fell || self.reset == Reset::Power
+    }
+
+    /// What is to be kept of it until the first tick, for a reset that comes before: the
+    /// wheel stands where it came to rest, unless it is moved.
+    #[must_use]
+    pub fn standing(&self) -> Option<Flight> {
+        let mut flight = self.flight?;
+        if let Some(place) = self.place() {
+            flight.position = place.position;
+            flight.pace = Pace::of(Millimetres::ZERO, true);
+        }
+        flight.level |= Flight::UNSURE;
+        Some(flight)
     }
 }
 
@@ -148,7 +156,7 @@ impl fmt::Display for Restart {
                 Some(mode) => write!(f, "; before: {mode:?}")?,
                 None => write!(f, "; before: mode {}", flight.mode)?,
             }
-            let level = level & !Flight::AWAY;
+            let level = level & !Flight::UNSURE;
             write!(f, " at tick {tick}, {position:.2} mm, level {level}")?;
             if fault != 0 {
                 write!(f, ", last fault {fault}")?;
@@ -156,8 +164,8 @@ impl fmt::Display for Restart {
             if !late.is_nobody() {
                 write!(f, ", {} was late", late.name())?;
             }
-            if self.was_away() {
-                f.write_str(", then without a supply")?;
+            if flight.level >= Flight::UNSURE {
+                f.write_str(", its place unsure")?;
             }
         }
         Ok(())

@@ -121,13 +121,14 @@ fn the_place_is_the_record_s_and_the_way_gone_after_it() {
     near(restart(Reset::Watchdog, hang(900)), 29.92, true);
     near(restart(Reset::Watchdog, hang(975)), 30.0 - 40.0 * 0.077, false);
     near(restart(Reset::Software, crash(Stopped::Panic { place: 1, line: 2 })), 29.92, true);
-    // A dip, one that lasts until the watchdog bites, and a supply that was away.
-    near(restart(Reset::Software, crash(Stopped::Supply)), 29.92, true);
+    // A dip, one that lasts until the watchdog bites, and a supply that was away: nobody
+    // knows for how long.
+    near(restart(Reset::Software, crash(Stopped::Supply)), 29.92, false);
     near(restart(Reset::Watchdog, crash(Stopped::Supply)), 29.92, false);
     near(restart(Reset::Pin, crash(Stopped::Supply)), 29.92, false);
     near(restart(Reset::Power, crash(Stopped::Supply)), 29.92, false);
-    // Nothing happened since a start that found the supply back.
-    let since = Flight { level: Flight::AWAY | 2, ..flight };
+    // Not confirmed by any step.
+    let since = Flight { level: Flight::UNSURE | 2, ..flight };
     near(Restart { flight: Some(since), ..restart(Reset::Pin, None) }, 29.92, false);
     let lost = Flight { pace: Pace::of(Q16::from_num(-40), false), ..flight };
     assert_eq!(Restart { flight: Some(lost), ..restart(Reset::Pin, None) }.place(), None);
@@ -138,20 +139,53 @@ fn the_place_is_the_record_s_and_the_way_gone_after_it() {
     assert_eq!(Restart { flight: None, ..restart(Reset::Power, None) }.place(), None);
 }
 
+/// A reset before the first tick finds what the start before it made of the record.
+#[test]
+fn what_a_start_keeps_is_where_the_wheel_came_to_rest_and_unsure() {
+    let pace = Pace::of(Q16::from_num(40), true);
+    let flight = Flight { tick: 900, position: Q16::from_num(30), level: 1, pace, ..EMPTY };
+    let hang = Stopped::Hang { pc: 0, lr: 0, late: Late::TICK, at: 975 };
+    let crash = Some(Crash { build: 1, stopped: hang });
+    let hung = Restart { reset: Reset::Watchdog, flight: Some(flight), crash };
+    let sure = Restart { reset: Reset::Pin, crash: None, ..hung };
+    for (first, way) in [(hung, 40.0 * 0.077), (sure, 40.0 * 0.002)] {
+        let kept = first.standing().expect("a record");
+        assert_eq!((kept.tick, kept.level), (900, Flight::UNSURE | 1));
+        let again = Restart { reset: Reset::Pin, flight: Some(kept), crash: None };
+        let place = again.place().expect("a place");
+        assert!((place.position.to_num::<f64>() - 30.0 - way).abs() < 1e-3 && !place.sure);
+        // And a third changes nothing more.
+        assert_eq!(again.standing(), Some(kept));
+    }
+    // What was a guess stays one; what was a fault too.
+    let guess = Flight { pace: Pace::of(Q16::from_num(40), false), ..flight };
+    let held = Flight { fault: 123, ..flight };
+    for flight in [guess, held] {
+        let kept = Restart { flight: Some(flight), ..hung }.standing().expect("a record");
+        assert_eq!(kept, Flight { level: Flight::UNSURE | 1, ..flight });
+        let again = Restart { reset: Reset::Pin, flight: Some(kept), crash: None };
+        assert_eq!(again.place(), None);
+    }
+    assert_eq!(Restart { flight: None, ..hung }.standing(), None);
+}
+
 #[test]
 fn the_last_fault_is_kept_beyond_its_hold() {
     let mut recorder = Recorder::default();
     let mut row = Telemetry { at: 5, level: 2, position: Q16::from_num(41), ..Telemetry::EMPTY };
-    assert_eq!(recorder.flight(&row, true, Late::NOBODY).mode(), Some(Mode::Boot));
+    assert_eq!(recorder.flight(&row, Trust::Sure, Late::NOBODY).mode(), Some(Mode::Boot));
     row.mode = Mode::Run(Direction::Deploy, Leg::Crossing);
-    let flight = recorder.flight(&row, true, Late::TICK);
+    let flight = recorder.flight(&row, Trust::Sure, Late::TICK);
     assert_eq!((flight.mode(), flight.fault), (Some(row.mode), 0));
     assert_eq!((flight.tick, flight.level, flight.position), (5, 2, row.position));
     assert_eq!(flight.late, Late::TICK);
+    assert!(flight.pace.placed());
+    let unsure = recorder.flight(&row, Trust::Unsure, Late::TICK);
+    assert_eq!(unsure, Flight { level: Flight::UNSURE | 2, ..flight });
     row.mode = Mode::FaultHold(Fault::DriveStalled);
-    assert_eq!(recorder.flight(&row, false, Late::NOBODY).mode(), Some(row.mode));
+    assert_eq!(recorder.flight(&row, Trust::Guess, Late::NOBODY).mode(), Some(row.mode));
     row.mode = Mode::Idle;
-    let flight = recorder.flight(&row, false, Late::NOBODY);
+    let flight = recorder.flight(&row, Trust::Guess, Late::NOBODY);
     assert!(!flight.pace.placed());
     assert_eq!((flight.mode(), flight.fault), (Some(Mode::Idle), 122));
 }
@@ -168,12 +202,12 @@ fn a_report_names_what_is_known() {
     let turned = Restart { reset: Reset::Software, crash: crash(Stopped::Image), ..restart };
     let text = "started: by software or debugger; a bit of the image had turned over";
     assert_eq!(turned.to_string(), text);
-    let away = Flight { tick: 9, mode: 6, level: Flight::AWAY | 1, ..EMPTY };
+    let away = Flight { tick: 9, mode: 6, level: Flight::UNSURE | 1, ..EMPTY };
     let again = Restart { reset: Reset::Pin, flight: Some(away), crash: None };
     assert_eq!(
         again.to_string(),
         "started: by the reset pin; before: Run(Deploy, Approach) at tick 9, 0.00 mm, level 1, \
-         then without a supply"
+         its place unsure"
     );
     let flight = Flight { tick: 9, mode: 6, level: 1, fault: 122, late: Late::TICK, ..EMPTY };
     let stopped = Stopped::Hang { pc: 16, lr: 32, late: Late::STARVED, at: 80 };

@@ -59,6 +59,7 @@ pub(super) fn flight() -> Option<Flight> {
 }
 
 /// Keeps why the program ends.
+#[inline(never)]
 pub(super) fn stop(stopped: Stopped) {
     let crash = Crash { build: build(), stopped };
     // SAFETY: see `Shared`.
@@ -71,12 +72,12 @@ fn build() -> u32 {
     u32::from_le_bytes([a, b, c, d])
 }
 
-/// What there is to report of the time before this start. Call once, before the control tick
-/// begins.
+/// What there is to report of the time before this start, which may have `waited` for its
+/// supply. Call once, before the control tick begins.
 ///
 /// What the drive was doing stays kept until the tick writes over it, so that a second reset
 /// right behind the first, as of a pin that bounces or a supply that flickers, finds it too.
-pub(crate) fn report() -> Restart {
+pub(crate) fn report(waited: bool) -> Restart {
     let in_memory = flight();
     // SAFETY: nobody else is there yet. The words may never have been written, so they are
     // read as volatile memory that holds anything.
@@ -86,11 +87,10 @@ pub(crate) fn report() -> Restart {
     let supply = || Crash { build: build(), stopped: Stopped::Supply };
     let crash = Crash::open(&crash).or(in_flash.map(|_| supply()));
     let mut restart = Restart { reset: guard::take_reset(), flight: in_memory.or(in_flash), crash };
-    let away = if restart.was_away() { Flight::AWAY } else { 0 };
-    let first = restart.flight.as_mut().map_or([0; FLIGHT_WORDS], |flight| {
-        flight.level |= away;
-        flight.seal()
-    });
+    if waited {
+        restart.reset = Reset::Power;
+    }
+    let first = restart.standing().map_or([0; FLIGHT_WORDS], |flight| flight.seal());
     let flights = [first, [0; FLIGHT_WORDS]];
     // SAFETY: as before.
     unsafe { kept().write_volatile(Kept { crash: [0; CRASH_WORDS], flights }) }
@@ -136,7 +136,7 @@ fn say(restart: &Restart) {
             tick,
             mode,
             position.to_num::<f32>(),
-            level & !Flight::AWAY,
+            level & !Flight::UNSURE,
             fault,
             late.name()
         );
@@ -269,7 +269,7 @@ pub(super) fn end(stopped: Stopped) -> ! {
 }
 
 /// Starts anew, with the bridges off until then and after it.
-fn restart() -> ! {
+pub(super) fn restart() -> ! {
     // For the probe to fetch the end of the log: 5 ms at least, some times that at most.
     cortex_m::asm::delay(SYSCLK_HZ / 200);
     SCB::sys_reset()

@@ -1,6 +1,8 @@
 //! The two motor bridges, each driven by PWM, direction and enable, and the
 //! emergency stop on the timers' break inputs.
 
+use core::mem::ManuallyDrop;
+
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AfType, AnyPin, Flex, Level, Output, OutputType, Pull, Speed};
 use embassy_stm32::pac::timer::TimAdv;
@@ -21,16 +23,18 @@ use super::Readback;
 
 /// One bridge in phase/enable control: PWM chops, the direction line chooses the
 /// sense, the enable line wakes the bridge.
+///
+/// It is never given back: that would let go of the lines that hold the bridge off.
 pub(crate) struct Bridge<T: AdvancedInstance4Channel> {
-    pwm: ComplementaryPwm<'static, T>,
+    pwm: ManuallyDrop<ComplementaryPwm<'static, T>>,
     /// The timer's registers: the driver's way to them asks in every tick what could only
     /// have been wrong from the start on, and panics.
     registers: TimAdv,
     /// Counts of a period.
     period: u32,
-    forward: Output<'static>,
-    enable: Output<'static>,
-    _stop: Flex<'static>,
+    forward: ManuallyDrop<Output<'static>>,
+    enable: ManuallyDrop<Output<'static>>,
+    _stop: ManuallyDrop<Flex<'static>>,
 }
 
 impl<T: AdvancedInstance4Channel> Bridge<T> {
@@ -77,7 +81,14 @@ impl<T: AdvancedInstance4Channel> Bridge<T> {
         pwm.enable(Channel::Ch1);
         pwm.set_break_enable(true);
         let period = pwm.get_max_duty();
-        Self { pwm, registers, period, forward, enable, _stop: stop }
+        Self {
+            pwm: ManuallyDrop::new(pwm),
+            registers,
+            period,
+            forward: ManuallyDrop::new(forward),
+            enable: ManuallyDrop::new(enable),
+            _stop: ManuallyDrop::new(stop),
+        }
     }
 
     /// Whether the break input has taken the outputs away.

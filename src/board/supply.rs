@@ -19,19 +19,27 @@ const LEVEL: u8 = 6;
 /// Line of the detector among the external interrupts; high means low.
 const LINE: usize = 16;
 
-/// Begins to watch; waits for as long as the supply is too low to go on with.
-pub(crate) fn watch() {
+/// Begins to watch; waits for as long as the supply is too low to go on with, and says
+/// whether it was.
+pub(crate) fn watch() -> bool {
     PWR.cr2().modify(|w| {
         w.set_pls(LEVEL);
         w.set_pvde(true);
     });
     EXTI.rtsr(0).modify(|w| w.set_line(LINE, true));
-    while PWR.sr2().read().pvdo() {}
-    // It rose before anyone looked.
-    EXTI.pr(0).write(|w| w.set_line(LINE, true));
     EXTI.imr(0).modify(|w| w.set_line(LINE, true));
+    let is_low = || PWR.sr2().read().pvdo();
+    let waited = is_low();
+    // What fell before anyone looked has been waited for; what falls behind the last look
+    // here is told.
+    while is_low() || {
+        EXTI.pr(0).write(|w| w.set_line(LINE, true));
+        interrupt::PVD_PVM.unpend();
+        is_low()
+    } {}
     // SAFETY: the handler shares nothing with anyone who goes on behind it.
     unsafe { interrupt::PVD_PVM.enable() };
+    waited
 }
 
 /// What the supply left when it went, if no start has taken it yet.
@@ -54,12 +62,16 @@ pub(super) fn take(found: Option<Latest>) {
 unsafe fn PVD_PVM() {
     cortex_m::interrupt::disable();
     guard::cut();
+    // Whatever ends it from here on, this is why.
+    blackbox::stop(Stopped::Supply);
     if let (Some(flight), Some(first)) = (blackbox::flight(), records::free(RECORDS.bytes())) {
         for (index, word) in (first..).zip(records::words(&flight)) {
-            RECORDS.program(index, word);
+            // Refused if someone else was in the middle of a double word, which is dropped
+            // then.
+            let _ = RECORDS.program(index, word) || RECORDS.program(index, word);
         }
     }
     // It may come back before the chip is reset, or the watchdog bite before it does.
     while PWR.sr2().read().pvdo() {}
-    blackbox::end(Stopped::Supply)
+    blackbox::restart()
 }

@@ -43,17 +43,23 @@ pub struct Latest {
     pub flight: Option<Flight>,
 }
 
-/// The last record, unless it has been reported.
+/// The last record, unless it has been reported; of one that was broken off the one before
+/// it, of which the start before may not have come to report it either.
 #[must_use]
 pub fn latest(page: &Page) -> Option<Latest> {
-    let first = used(page, PLACE_WORDS).checked_sub(1)? * PLACE_WORDS;
-    let mark = first + PLACE_WORDS - 1;
+    let last = used(page, PLACE_WORDS).checked_sub(1)?;
+    let mark = |place: usize| (place + 1) * PLACE_WORDS - 1;
     // A mark that was broken off is none: better twice than not at all.
-    if word(page, mark) == TAKEN {
-        return None;
-    }
-    let mut words = [0; FLIGHT_WORDS];
-    let found = (first..mark).flat_map(|index| word(page, index));
-    words.iter_mut().zip(found).for_each(|(to, from)| *to = from);
-    Some(Latest { mark, flight: Flight::open(&words) })
+    let untaken = |place: &usize| word(page, mark(*place)) != TAKEN;
+    let places = last.saturating_sub(1)..=last;
+    let flight = |place: usize| {
+        let mut words = [0; FLIGHT_WORDS];
+        let found = (place * PLACE_WORDS..mark(place)).flat_map(|index| word(page, index));
+        words.iter_mut().zip(found).for_each(|(to, from)| *to = from);
+        Flight::open(&words)
+    };
+    untaken(&last).then(|| Latest {
+        mark: mark(last),
+        flight: places.rev().take_while(untaken).find_map(flight),
+    })
 }

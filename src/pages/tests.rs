@@ -62,6 +62,27 @@ fn a_record_that_was_broken_off_is_none_and_is_not_written_over() {
     }
 }
 
+/// A supply that goes again while a start takes what it had left, and this time too fast.
+#[test]
+fn behind_a_record_that_was_not_taken_one_that_was_broken_off_hides_nothing() {
+    for words in 0..3 {
+        let mut page = BLANK;
+        write(&mut page, &flight(4), 3);
+        let first = records::latest(&page).expect("a record").mark;
+        write(&mut page, &flight(5), words);
+        let latest = records::latest(&page).expect("a record");
+        assert_eq!(latest.flight, Some(flight(4)));
+        put(&mut page, latest.mark, records::TAKEN);
+        assert_eq!(records::latest(&page), None);
+        // Once it was taken there is nothing to find.
+        let mut page = BLANK;
+        write(&mut page, &flight(4), 3);
+        put(&mut page, first, records::TAKEN);
+        write(&mut page, &flight(5), words);
+        assert_eq!(records::latest(&page).and_then(|latest| latest.flight), None);
+    }
+}
+
 #[test]
 fn a_page_holds_64_records() {
     let mut page = BLANK;

@@ -45,7 +45,7 @@ pub async fn motors(
         }
         exchange.publish(output);
         let late = exchange.late(due.tick);
-        watchdog.keep(&recorder.flight(&output.telemetry, state.is_placed(), late));
+        watchdog.keep(&recorder.flight(&output.telemetry, state.trust(), late));
         if late.is_nobody() {
             watchdog.feed();
         }

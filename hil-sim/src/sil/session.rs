@@ -1,7 +1,7 @@
 //! A run under way: controller and plant, a tick at a time, with commands and sensor
 //! failures given from outside.
 
-use interstage::blackbox::{Late, Recorder, Reset, Restart};
+use interstage::blackbox::{Flight, Late, Recorder, Reset, Restart};
 use interstage::control::{Controller, Input, Output, State};
 use interstage::hal::MotorCommand;
 use interstage::model::{Plan, Planner};
@@ -228,12 +228,21 @@ impl Session {
         }
     }
 
+    /// The record of the last tick, as memory keeps it.
+    #[must_use]
+    pub fn record(&self) -> Flight {
+        Recorder::default().flight(&self.held.telemetry, self.state.trust(), Late::NOBODY)
+    }
+
     /// A reset that leaves memory and takes the power from the bridges at once: the
     /// controller starts with what its record of the last tick tells of the place.
     pub fn restart(&mut self) {
-        let flight =
-            Recorder::default().flight(&self.held.telemetry, self.state.is_placed(), Late::NOBODY);
-        let restart = Restart { reset: Reset::Pin, flight: Some(flight), crash: None };
+        let flight = Some(self.record());
+        self.restart_from(Restart { reset: Reset::Pin, flight, crash: None });
+    }
+
+    /// A start that finds this of the time before it.
+    pub fn restart_from(&mut self, restart: Restart) {
         self.reboot();
         self.state = State::standing(restart.place());
         if let Some(stream) = &mut self.stream {

@@ -123,7 +123,7 @@ impl Controller {
         let alike = |other: Millimetres| (residual - other).abs() <= tolerance;
         if state.searching {
             state.odometry.set(pass.sensed.travel, pass.position - residual);
-            state.searching = false;
+            (state.searching, state.unsure) = (false, false);
         } else if residual.abs() <= tolerance {
             state.odometry.correct(residual);
             state.displaced = None;

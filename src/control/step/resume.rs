@@ -43,13 +43,13 @@ impl Controller {
             Some(place) if self.may_stand_at(pass, place.position, within(place.sure)) => {
                 // A wheel that may have gone on looks for the next step as one without a
                 // record does, and can do without it.
-                state.searching = !place.sure;
+                (state.searching, state.unsure) = (!place.sure, !place.sure);
                 place.position
             }
             _ => {
                 let Ground::Corner(step) = self.ground(pass, ON_CORNER) else { return false };
                 let Some(face) = self.step_position(step) else { return false };
-                state.searching = false;
+                (state.searching, state.unsure) = (false, false);
                 face - self.to_face(pass, step)
             }
         };
@@ -61,8 +61,9 @@ impl Controller {
         true
     }
 
-    /// Before the first run after that: on a corner the crossing goes on, or is taken back;
-    /// else everything starts on the wall.
+    /// Before the first run after that, and before each until a step has confirmed an unsure
+    /// place: on a corner the crossing goes on, or is taken back; else everything starts on
+    /// the wall. A run without a step ahead goes by the record, and says so.
     pub(super) fn resume(&self, state: &mut State, pass: &mut Pass<'_>, direction: Direction) {
         let steps = self.steps.len() as u8;
         let seen = self.seen(state, pass);

@@ -19,7 +19,7 @@ impl Controller {
         if stowed {
             state.odometry.set(pass.sensed.travel, Millimetres::ZERO);
             state.located = true;
-            state.searching = false;
+            (state.searching, state.unsure) = (false, false);
             (state.kept, state.resumed) = (None, false);
             state.crossing = None;
             state.level = 0;
@@ -41,7 +41,7 @@ impl Controller {
         };
         state.odometry.set(pass.sensed.travel, position);
         state.located = true;
-        state.searching = true;
+        (state.searching, state.unsure) = (true, false);
         pass.position = position;
     }
 
@@ -52,7 +52,8 @@ impl Controller {
         state.leaving = None;
         // A crossing that was begun in its middle has no wall measured to turn back to.
         let between = state.crossing.as_ref().is_some_and(|open| open.resumed);
-        if core::mem::take(&mut state.resumed) || turned && between {
+        if core::mem::take(&mut state.resumed) || state.unsure || turned && between {
+            state.searching |= state.unsure;
             self.resume(state, pass, direction);
         } else if state.searching {
             self.start_searching(state, pass, direction);

@@ -1,6 +1,6 @@
 //! What the controller remembers between ticks.
 
-use crate::blackbox::Place;
+use crate::blackbox::{Place, Trust};
 use crate::control::preload_loop::PreloadLoopState;
 use crate::control::profile::ProfileState;
 use crate::control::speed_loop::SpeedLoopState;
@@ -36,6 +36,9 @@ pub struct State {
     /// That origin is a guess: the next step found tells where the wheel is, and until
     /// then the drive goes as if the step came at once.
     pub(super) searching: bool,
+    /// The position is that of a record which may be off, and no step found since then
+    /// confirms it.
+    pub(super) unsure: bool,
     /// Where a record has the wheel, until the odometry has an origin.
     pub(super) kept: Option<Place>,
     /// Located without having rolled there: before the next run it is to be found out
@@ -173,6 +176,7 @@ impl Default for State {
             odometry: Odometry::default(),
             located: false,
             searching: false,
+            unsure: false,
             kept: None,
             resumed: false,
             watch: WatchState::default(),
@@ -214,19 +218,22 @@ impl State {
     pub fn standing(kept: Option<Place>) -> Self {
         let mut state = Self { kept, ..Self::default() };
         if let Some(place) = kept {
+            state.unsure = !place.sure;
             // The wheel's travel begins with the start.
             state.odometry.set(Travel::ZERO, place.position);
         }
         state
     }
 
-    /// Whether the position is more than a guess, so that a start could go on from it.
+    /// Whether a start could go on from the position.
     #[must_use]
-    pub fn is_placed(&self) -> bool {
-        if self.located {
-            !self.searching && self.given_up == 0 && self.extra == 0
-        } else {
-            self.kept.is_some_and(|place| place.sure)
+    pub const fn trust(&self) -> Trust {
+        let steps_found = self.given_up == 0 && self.extra == 0;
+        let known = self.kept.is_some() || self.located && steps_found;
+        match (known, self.unsure, self.searching) {
+            (true, true, _) => Trust::Unsure,
+            (true, false, false) => Trust::Sure,
+            _ => Trust::Guess,
         }
     }
 
@@ -339,12 +346,17 @@ mod tests {
             (false, 1, 1, false),
         ] {
             let state = State { located: true, searching, given_up, extra, ..State::default() };
-            assert_eq!(state.is_placed(), placed, "{searching} {given_up} {extra}");
+            let trust = if placed { Trust::Sure } else { Trust::Guess };
+            assert_eq!(state.trust(), trust, "{searching} {given_up} {extra}");
+            // That of a record which may be off stays so, whether it searches or not.
+            let steps_found = given_up == 0 && extra == 0;
+            let trust = if steps_found { Trust::Unsure } else { Trust::Guess };
+            assert_eq!(State { unsure: true, ..state }.trust(), trust, "{given_up} {extra}");
         }
-        assert!(!State::default().is_placed());
-        for sure in [true, false] {
+        assert_eq!(State::default().trust(), Trust::Guess);
+        for (sure, trust) in [(true, Trust::Sure), (false, Trust::Unsure)] {
             let kept = Some(Place { position: Q16::ZERO, sure });
-            assert_eq!(State::standing(kept).is_placed(), sure);
+            assert_eq!(State::standing(kept).trust(), trust);
         }
     }
 
