@@ -86,15 +86,20 @@ pub(crate) fn report(waited: bool) -> Restart {
     let in_flash = found.and_then(|latest| latest.flight);
     let supply = || Crash { build: build(), stopped: Stopped::Supply };
     let crash = Crash::open(&crash).or(in_flash.map(|_| supply()));
-    let mut restart = Restart { reset: guard::take_reset(), flight: in_memory.or(in_flash), crash };
-    if waited {
+    let mut restart = Restart { reset: guard::reset(), flight: in_memory.or(in_flash), crash };
+    // The watchdog has reasons of its own for doubt.
+    if waited && restart.reset != Reset::Watchdog {
         restart.reset = Reset::Power;
     }
     let first = restart.standing().map_or([0; FLIGHT_WORDS], |flight| flight.seal());
-    let flights = [first, [0; FLIGHT_WORDS]];
+    // In this order: a reset or a supply that goes again finds here what it was, in one place
+    // or the other.
     // SAFETY: as before.
-    unsafe { kept().write_volatile(Kept { crash: [0; CRASH_WORDS], flights }) }
-    // In this order: a supply that goes again here finds it in one place or the other.
+    unsafe {
+        (&raw mut (*kept()).flights).write_volatile([first, [0; FLIGHT_WORDS]]);
+        (&raw mut (*kept()).crash).write_volatile([0; CRASH_WORDS]);
+    }
+    guard::forget_reset();
     supply::take(found);
     say(&restart);
     restart

@@ -65,10 +65,14 @@ pub(crate) fn arm() {
     });
 }
 
-/// Why the chip started, by its flags, which gather until they are taken.
-pub(super) fn take_reset() -> Reset {
-    let flags = pac::RCC.csr().read();
+/// Forgets why the chip started.
+pub(super) fn forget_reset() {
     pac::RCC.csr().modify(|w| w.set_rmvf(true));
+}
+
+/// Why the chip started, by its flags, which gather until they are forgotten.
+pub(super) fn reset() -> Reset {
+    let flags = pac::RCC.csr().read();
     // Every reset of the chip's own pulls the pin too; a supply that comes up raises the
     // flag of one that was too low.
     if flags.iwdgrstf() {

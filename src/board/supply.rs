@@ -29,14 +29,16 @@ pub(crate) fn watch() -> bool {
     EXTI.rtsr(0).modify(|w| w.set_line(LINE, true));
     EXTI.imr(0).modify(|w| w.set_line(LINE, true));
     let is_low = || PWR.sr2().read().pvdo();
-    let waited = is_low();
+    let mut waited = false;
     // What fell before anyone looked has been waited for; what falls behind the last look
     // here is told.
     while is_low() || {
         EXTI.pr(0).write(|w| w.set_line(LINE, true));
         interrupt::PVD_PVM.unpend();
         is_low()
-    } {}
+    } {
+        waited = true;
+    }
     // SAFETY: the handler shares nothing with anyone who goes on behind it.
     unsafe { interrupt::PVD_PVM.enable() };
     waited

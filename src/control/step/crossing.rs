@@ -1,5 +1,6 @@
 //! Following a crossing: what the watch notices becomes odometry, ledger, review.
 
+use super::resume::UNSURE_WITHIN;
 use super::state::{LiftPoint, OpenCrossing};
 use super::{Controller, Pass, State};
 use crate::control::schedule::{Course, Expectation};
@@ -269,7 +270,9 @@ impl Controller {
             Direction::Deploy => Direction::Retract,
             Direction::Retract => Direction::Deploy,
         };
-        past > self.rise.first_contact(other)
+        // By the table, that face is where a record in doubt has it.
+        let doubt = if state.unsure && followed.is_some() { UNSURE_WITHIN } else { Q16::ZERO };
+        past > self.rise.first_contact(other) + doubt
     }
 
     /// On to the next step.

@@ -18,9 +18,12 @@ const ON_CORNER: Millimetres = q16(500_000);
 /// How far off a record may be, mm: the coasting and what the odometry had gathered.
 const SURE_WITHIN: Millimetres = q16(500_000);
 /// The same after a drive went on that nobody watched, mm: half of what it may have gone.
-const UNSURE_WITHIN: Millimetres = q16(2_000_000);
+pub(super) const UNSURE_WITHIN: Millimetres = q16(2_000_000);
 /// Nearer to the edge than this, the wheel stands on top of it, mm.
 const AT_EDGE: Millimetres = q16(300_000);
+/// From here on to its edge a wheel on a corner stands within [`ON_WALL`] of the next wall,
+/// mm: `sqrt(2 R h)` with R of 25 mm is 3.5 mm.
+const ON_TOP: Millimetres = q16(4_000_000);
 /// Way from the first contact over which a corner carries so little that a wheel on its way
 /// back is off it at once, mm.
 const RUN_IN: Millimetres = q16(2_000_000);
@@ -38,13 +41,14 @@ impl Controller {
     /// Takes the place that a record has, if the arm does not contradict it, or the one that
     /// a corner under the wheel tells; whether there was one.
     pub(super) fn go_on_from(&self, state: &mut State, pass: &mut Pass<'_>) -> bool {
-        let kept = state.kept.take();
-        let position = match kept {
-            Some(place) if self.may_stand_at(pass, place.position, within(place.sure)) => {
+        // With what the wheel has been moved since the start.
+        let stands = state.odometry.position(pass.sensed.travel);
+        let position = match state.kept.take() {
+            Some(place) if self.may_stand_at(pass, stands, within(place.sure)) => {
                 // A wheel that may have gone on looks for the next step as one without a
                 // record does, and can do without it.
                 (state.searching, state.unsure) = (!place.sure, !place.sure);
-                place.position
+                stands
             }
             _ => {
                 let Ground::Corner(step) = self.ground(pass, ON_CORNER) else { return false };
@@ -61,9 +65,9 @@ impl Controller {
         true
     }
 
-    /// Before the first run after that, and before each until a step has confirmed an unsure
-    /// place: on a corner the crossing goes on, or is taken back; else everything starts on
-    /// the wall. A run without a step ahead goes by the record, and says so.
+    /// Before the first run after that: on a corner the crossing goes on, or is taken back;
+    /// else everything starts on the wall. A run that no step ahead can confirm goes by the
+    /// record, and says so.
     pub(super) fn resume(&self, state: &mut State, pass: &mut Pass<'_>, direction: Direction) {
         let steps = self.steps.len() as u8;
         let seen = self.seen(state, pass);
@@ -137,8 +141,12 @@ impl Controller {
     /// Starts on the wall of the present level. A wheel that may feel the corner which it
     /// leaves on its way back has that wall measured when it is clear of it: what the corner
     /// adds to the depth of its tread would else be taken for the wall's height, and the wall
-    /// behind for the next corner.
+    /// behind for the next corner. As long as the place is in doubt it may be on a corner's
+    /// end: within what the arm is off, that cannot be told from the wall.
     pub(super) fn begin_on_wall(&self, state: &mut State, pass: &Pass<'_>, direction: Direction) {
+        if state.unsure {
+            return self.begin_off(state, pass, direction, ON_TOP);
+        }
         let left = match direction {
             Direction::Deploy => None,
             Direction::Retract => self.step_position(state.next_step.saturating_add(1)),

@@ -6,6 +6,7 @@ use crate::blackbox::Place;
 use crate::estimate::crossing::{Contact, Sign};
 use crate::rig::Rig;
 use crate::sense::SensedState;
+use crate::units::Travel;
 use proptest::prelude::*;
 
 /// A run that is resumed there.
@@ -122,6 +123,22 @@ fn a_record_is_believed_as_far_as_the_arm_agrees() {
     assert_eq!(started(&on(0), Some((30.0, true))), None);
     assert_eq!(started(&on(2), Some((2.0, true))), None);
     assert_eq!(started(&on(0), None), None);
+}
+
+/// As by a hand, while the board held after its start.
+#[test]
+fn what_the_wheel_is_moved_since_the_start_counts() {
+    let moved = |mm: f64| SensedState {
+        travel: Travel::from_num(mm),
+        steps_up: Q16::ONE,
+        ..sensed(1, 0.0, 0.3)
+    };
+    for mm in [-4.0, 0.0, 4.0] {
+        let (position, _) = started(&moved(mm), Some((30.0, true))).expect("a place");
+        assert!((position - 30.0 - mm).abs() < 1e-3, "{position} with {mm}");
+    }
+    // Off its wall by then, by the arm as well.
+    assert_eq!(started(&moved(-28.0), Some((30.0, true))), None);
 }
 
 #[test]
@@ -271,6 +288,21 @@ fn on_a_wall_the_step_ahead_is_the_next_one_and_without_one_nothing_is_searched(
                 assert_eq!(state.searching, searching && next > 0, "{position} {direction:?}");
                 assert!(state.crossing.is_none());
             }
+        }
+    }
+}
+
+#[test]
+fn in_doubt_no_wall_is_measured_before_a_corner_is_surely_behind() {
+    for direction in Direction::ALL {
+        for unsure in [false, true] {
+            let mut state = State::default();
+            (state.direction, state.unsure, state.next_step) = (direction, unsure, 1);
+            at(&sensed(1, 0.0, 0.3), 22.0, |controller, pass| {
+                controller.begin_on_wall(&mut state, pass, direction);
+            });
+            let leaves = state.watch.contact == Contact::Leaving && state.leaving.is_some();
+            assert_eq!(leaves, unsure, "{direction:?}");
         }
     }
 }

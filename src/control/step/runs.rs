@@ -3,6 +3,7 @@
 
 use super::state::OpenCrossing;
 use super::{Controller, Pass, State};
+use crate::blackbox::Trust;
 use crate::estimate::crossing::Contact;
 use crate::supervise::{Direction, Fault, Trigger};
 use crate::units::{Millimetres, Q16, Ratio, q16};
@@ -52,8 +53,9 @@ impl Controller {
         state.leaving = None;
         // A crossing that was begun in its middle has no wall measured to turn back to.
         let between = state.crossing.as_ref().is_some_and(|open| open.resumed);
-        if core::mem::take(&mut state.resumed) || state.unsure || turned && between {
-            state.searching |= state.unsure;
+        // Away from the end that it went to in doubt, steps lie ahead that tell the place.
+        state.searching |= turned && state.trust() == Trust::Unsure;
+        if core::mem::take(&mut state.resumed) || turned && between {
             self.resume(state, pass, direction);
         } else if state.searching {
             self.start_searching(state, pass, direction);
@@ -98,11 +100,23 @@ impl Controller {
             Direction::Retract => level.min(steps),
         };
         // As if the wheel had just come onto a corner: clear of that it surely is then.
+        self.begin_off(state, pass, direction, self.corner_reach);
+    }
+
+    /// Starts towards the wall of the present level, off a corner whose face may still be so
+    /// far ahead.
+    pub(super) fn begin_off(
+        &self,
+        state: &mut State,
+        pass: &Pass<'_>,
+        direction: Direction,
+        ahead: Millimetres,
+    ) {
         state.leaving = Some(match direction {
-            Direction::Deploy => pass.position + self.corner_reach,
+            Direction::Deploy => pass.position + ahead,
             Direction::Retract => pass.position,
         });
-        self.watch.begin_on_corner(&mut state.watch, direction, level);
+        self.watch.begin_on_corner(&mut state.watch, direction, state.level);
     }
 
     /// Turning back, perhaps on a corner.
