@@ -328,7 +328,8 @@ mod tests {
     }
 
     proptest! {
-        /// Known to a third of a count at any speed of the drive, either way.
+        /// Known to a third of a count at any speed of the drive, either way. At a count a tick
+        /// the edges keep their place within the tick, and nothing tells it: half a count.
         #[test]
         fn the_turn_is_known_finer_than_a_count(per_s in 100.0f64..1600.0, back in any::<bool>()) {
             let sign = if back { -1.0 } else { 1.0 };
@@ -338,7 +339,9 @@ mod tests {
             let square: f64 = (400..1400)
                 .map(|n| (turn[n] - way((n as f64 - 100.0) * TICK_S)).powi(2))
                 .sum();
-            prop_assert!((square / 1000.0).sqrt() < 0.35, "{}", (square / 1000.0).sqrt());
+            let off = (square / 1000.0).sqrt();
+            let drifts = (per_s * TICK_S - 1.0).abs() * 1000.0;
+            prop_assert!(off < if drifts < 0.5 { 0.5 } else { 0.35 }, "{off}");
             prop_assert!(turn[..=100].iter().all(|turn| *turn == 0.0));
         }
 
