@@ -73,16 +73,7 @@ impl Controller {
         let seen = self.seen(state, pass);
         let known = if state.searching { None } else { self.corner_at(pass.position, direction) };
         let confirmed;
-        let ground = match known.unwrap_or_else(|| self.ground(pass, ON_WALL)) {
-            // On its way back it is off it at once, as it would be by a record that is sure.
-            Ground::Corner(step)
-                if direction == Direction::Retract && self.to_face(pass, step) > self.run_in() =>
-            {
-                Ground::Wall(step - 1)
-            }
-            ground => ground,
-        };
-        match ground {
+        match known.unwrap_or_else(|| self.ground(pass, ON_WALL)) {
             Ground::Corner(step) => {
                 // The drive has been off: nothing jumps if the corner's force is there at once,
                 // and without it the wheel would roll off before the speed loop has found it.
@@ -140,7 +131,7 @@ impl Controller {
     fn corner_at(&self, position: Millimetres, direction: Direction) -> Option<Ground> {
         let felt = match direction {
             Direction::Deploy => self.felt_within(),
-            Direction::Retract => self.run_in(),
+            Direction::Retract => self.rise.first_contact(Direction::Deploy) - RUN_IN,
         };
         let on = |face: &Millimetres| *face - position > AT_EDGE && *face - position < felt;
         let step = self.steps.iter().position(on)?;
@@ -181,11 +172,6 @@ impl Controller {
             let distance = *face - position;
             distance < ahead && distance > -behind
         })
-    }
-
-    /// Nearer to a face than this, a corner carries a wheel on its way back, mm.
-    fn run_in(&self) -> Millimetres {
-        self.rise.first_contact(Direction::Deploy) - RUN_IN
     }
 
     /// Nearer to a face than this, a wheel before it may feel its corner, mm.

@@ -306,19 +306,3 @@ fn in_doubt_no_wall_is_measured_before_a_corner_is_surely_behind() {
         }
     }
 }
-
-#[test]
-fn in_doubt_the_foot_of_a_corner_is_the_wall_on_the_way_back() {
-    for (height, direction, corner) in [
-        (-0.4, Direction::Retract, false),
-        (-2.0, Direction::Retract, true),
-        (-0.4, Direction::Deploy, true),
-        (-2.0, Direction::Deploy, true),
-    ] {
-        let (state, _) = unsure(&sensed(1, height, 0.3), direction);
-        assert_eq!(state.crossing.map(|open| open.step), corner.then_some(2), "{height}");
-        if !corner {
-            assert_eq!((state.level, state.next_step), (1, 1));
-        }
-    }
-}
