@@ -113,7 +113,7 @@ impl Chip {
             exti: Exti::new(0),
             ports,
             time: TimeBase::default(),
-            encoder: Encoder::new(pins::lines_at(0)),
+            encoder: Encoder::new([false; 2]),
             motors: [Pwm::new(false), Pwm::new(false)],
             adc: Adc::default(),
             readback: Adc::default(),
@@ -150,7 +150,6 @@ impl Chip {
         }
         self.angle = old.angle;
         self.wheel = old.wheel;
-        self.encoder = Encoder::new(pins::lines_at(old.wheel));
         self.bridges = old.bridges;
         self.defects = old.defects;
         self.strays = old.strays;
@@ -269,6 +268,9 @@ impl Chip {
             Block::Port(_) | Block::Syscfg | Block::Motor(_) | Block::Exti | Block::Pwr
                 if write =>
             {
+                if matches!(block, Block::Port(_)) {
+                    self.look_at_wheel();
+                }
                 self.settle(now);
             }
             Block::Adc | Block::Readback | Block::Spi if write => self.settle_lines(now),

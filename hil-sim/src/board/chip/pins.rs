@@ -118,7 +118,7 @@ impl Bridge {
 }
 
 /// Levels of the wheel encoder's lines at a position in quarters of a line pair.
-pub(super) const fn lines_at(position: i64) -> [bool; 2] {
+const fn lines_at(position: i64) -> [bool; 2] {
     let phase = position.rem_euclid(4);
     [matches!(phase, 1 | 2), matches!(phase, 2 | 3)]
 }
@@ -144,16 +144,23 @@ impl Chip {
     /// pair, evenly over the last `cycles`.
     pub fn turn_wheel(&mut self, position: i64, cycles: u64) {
         let edges = self.wheel.abs_diff(position);
-        let wired = WHEEL.iter().all(|pin| self.role(*pin) == Role::Alternate(WHEEL_FUNCTION));
         for _ in 0..edges {
             self.wheel += (position - self.wheel).signum();
-            let lines = lines_at(self.wheel);
-            let broken = self.defects.encoder_lines;
-            let seen = [lines[0] || broken[0], lines[1] || broken[1]];
-            if wired {
-                self.encoder.look(seen, cycles / edges);
-            }
+            self.encoder.look(self.wheel_lines(), cycles / edges);
         }
+    }
+
+    /// The encoder's counter sees the levels that its lines have now.
+    pub(super) fn look_at_wheel(&mut self) {
+        self.encoder.look(self.wheel_lines(), u64::MAX);
+    }
+
+    /// What the encoder's counter has at its inputs: nothing before its pins are its own.
+    fn wheel_lines(&self) -> [bool; 2] {
+        let wired = WHEEL.iter().all(|pin| self.role(*pin) == Role::Alternate(WHEEL_FUNCTION));
+        let lines = lines_at(self.wheel);
+        let broken = self.defects.encoder_lines;
+        [wired && (lines[0] || broken[0]), wired && (lines[1] || broken[1])]
     }
 
     /// Voltages at the analogue inputs of load cell, tread sensor and the bridges of drive
@@ -213,6 +220,41 @@ impl Chip {
             let sense = if out(wired.forward) { 1.0 } else { -1.0 };
             let on = out(wired.enable);
             self.bridges[index].set(sense * duty, on, now);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::board::core::{Access, Bus};
+
+    const COUNT: u32 = 0x4000_0C24;
+
+    fn at(address: u32) -> Access {
+        Access { address, size: 4, pc: 0, now: 0 }
+    }
+
+    fn write(chip: &mut Chip, writes: &[(u32, u32)]) {
+        for (address, value) in writes {
+            chip.write(at(*address), *value);
+        }
+    }
+
+    #[test]
+    fn a_wheel_that_turns_before_its_pins_are_wired_is_not_counted_and_none_is_afterwards_lost() {
+        for early in -6..=6 {
+            let mut chip = Chip::new(0);
+            chip.turn_wheel(early, 1_000_000);
+            // Clocks of the port and of the timer; pins to the timer, which counts then.
+            write(&mut chip, &[(0x4002_104C, 1), (0x4002_1058, 1 << 3)]);
+            write(&mut chip, &[(0x4800_0020, 0x22), (0x4800_0000, 0xABFF_FFFA)]);
+            write(&mut chip, &[(0x4000_0C2C, 0xFFFF), (0x4000_0C18, 0xF1F1)]);
+            write(&mut chip, &[(0x4000_0C08, 3), (0x4000_0C00, 1)]);
+            for turned in [1, 2, 3, 4, 5, 4, 3, 2, 1, 0, -1, -2, -3, -4, -5] {
+                chip.turn_wheel(early + turned, 1_000_000);
+                assert_eq!(chip.read(at(COUNT)) as u16 as i16, turned as i16, "{early} {turned}");
+            }
         }
     }
 }
