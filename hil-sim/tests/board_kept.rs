@@ -9,10 +9,12 @@ mod common;
 mod reset_board;
 
 use hil_sim::board::bench::STEP;
+use hil_sim::board::chip::Pin;
 use hil_sim::board::faults::Fault;
 use hil_sim::board::peripherals::flash::Cut;
 use hil_sim::board::peripherals::pwr::{HOLDS, Then};
 use hil_sim::board::peripherals::rcc::Cause;
+use hil_sim::board::thumb::sweep;
 use interstage::blackbox::{Flight, Reset, Stopped};
 use interstage::pages::PAGE_BYTES;
 use interstage::params::slots::SLOT_BYTES;
@@ -340,4 +342,58 @@ fn a_damaged_image_that_no_longer_starts_says_so_too() {
         let drives = board.step().drives;
         assert!(!drives.drive_on && !drives.preload_on);
     }
+}
+
+/// One that comes to nothing at all shows so by the light, over and over; on a sound board it
+/// stays dark until the first word.
+#[test]
+fn a_damaged_image_that_says_nothing_any_more_blinks() {
+    let lit = |board: &Board| board.bench.machine().chip().level(Pin::LIGHT);
+    let mut board = Board::moving();
+    strike(&mut board, Fault::ResetPin);
+    let from = board.log.len();
+    while board.log.len() == from {
+        board.step();
+        assert!(board.log.len() > from || !lit(&board));
+    }
+    let mut board = Board::moving();
+    let copies = board.function("compiler_builtins::mem::memcpy");
+    strike(&mut board, Fault::BitFlip(copies + 0x115, 4));
+    strike(&mut board, Fault::ResetPin);
+    board.step();
+    let from = board.log.len();
+    let mut seen = Vec::new();
+    for _ in 0..1000 {
+        let drives = board.step().drives;
+        assert!(!drives.drive_on && !drives.preload_on);
+        seen.push(lit(&board));
+    }
+    assert_eq!(board.log.len(), from, "{:#?}", &board.log[from..]);
+    let blinks = seen.windows(2).filter(|pair| !pair[0] && pair[1]).count();
+    let share = seen.iter().filter(|on| **on).count();
+    assert!(blinks >= 3 && (200..800).contains(&share), "{blinks} times, {share} ms");
+}
+
+/// The floating-point unit is off until a start has turned it on: what comes before must do
+/// without, whatever the compiler would like for its copies.
+#[test]
+fn what_a_start_does_first_needs_no_floating_point_unit() {
+    let board = Board::idle();
+    let image = board.bench.machine().image();
+    let mut looked_at = 0;
+    for name in ["__pre_init", "board::image::sums", "interstage::pages::word", "Reset"] {
+        for function in image.functions.iter().filter(|function| function.name.contains(name)) {
+            let range = function.range.start - 0x0800_0000..function.range.end - 0x0800_0000;
+            let code = &image.flash[range.start as usize..range.end as usize];
+            for (place, instruction, _) in sweep(code, function.range.start) {
+                let at = (place - function.range.start) as usize;
+                let half = |at: usize| u16::from_le_bytes([code[at], code[at + 1]]);
+                let wide = instruction.size == 4 && (0xEC..=0xEF).contains(&(half(at) >> 8));
+                let float = wide && matches!(half(at + 2) >> 8 & 0xF, 10 | 11);
+                assert!(!float, "{} at {place:#x}", function.name);
+            }
+            looked_at += 1;
+        }
+    }
+    assert!(looked_at >= 3, "{looked_at}");
 }

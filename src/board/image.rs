@@ -6,8 +6,8 @@ use embassy_time::{Duration, Timer};
 use interstage::blackbox::Stopped;
 use interstage::pages::seals;
 
-use super::blackbox;
 use super::words::SEALS;
+use super::{blackbox, light};
 
 unsafe extern "C" {
     /// The note that the linker writes, see `memory.x`: three words of head, the name
@@ -40,17 +40,42 @@ fn words() -> &'static [u32] {
     unsafe { slice::from_raw_parts(first, length / 4) }
 }
 
+/// Time for which the light is dark, and then tells of a damaged image, before the clocks run:
+/// in cycles of the oscillator that the chip starts on.
+const SHOWN: u32 = 16_000_000 / 4;
+
+/// The very first of a start, before statics have their values: looks at the image, and shows
+/// by the light for a while if a bit has turned over. What comes behind says so too, if it
+/// still works; if it does not and starts over and over, the light blinks.
+///
+/// Needs nothing of the image but itself, [`seals`] and some registers.
+#[unsafe(export_name = "__pre_init")]
+extern "C" fn look() {
+    let (sum, sealed) = sums();
+    if sealed.is_some_and(|sealed| sealed != sum) {
+        cortex_m::asm::delay(SHOWN);
+        light::glow();
+        cortex_m::asm::delay(SHOWN);
+    }
+}
+
+/// The image's sum, and that of its first start, if this is not the first.
+#[inline(never)]
+fn sums() -> (u32, Option<u32>) {
+    (seals::sum_on(0, words()), seals::sum_of(SEALS.bytes(), id()))
+}
+
 /// The image's sum, if it is the one of its first start, or this is its first; none if a bit
 /// has turned over since, which is said at once: what comes behind may no longer work.
 pub(crate) fn verify() -> Option<u32> {
-    let sum = seals::sum_on(0, words());
-    let sealed = seals::sum_of(SEALS.bytes(), id()).unwrap_or_else(|| {
-        seal(sum);
-        sum
-    });
-    if sealed != sum {
-        say_damaged();
-        return None;
+    let (sum, sealed) = sums();
+    match sealed {
+        None => seal(sum),
+        Some(sealed) if sealed != sum => {
+            say_damaged();
+            return None;
+        }
+        Some(_) => {}
     }
     Some(sum)
 }

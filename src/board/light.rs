@@ -4,6 +4,8 @@
 use embassy_futures::select::{Either, select};
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AnyPin, Level, Output, Speed};
+use embassy_stm32::pac;
+use embassy_stm32::pac::gpio::vals::Moder;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Timer};
@@ -13,6 +15,13 @@ use interstage::hal::{Indicator, Light};
 const HALF_PERIOD: Duration = Duration::from_millis(125);
 
 static WANTED: Signal<CriticalSectionRawMutex, Light> = Signal::new();
+
+/// Lights it by registers alone, where nothing else runs yet.
+pub(super) fn glow() {
+    pac::RCC.ahb2enr().modify(|w| w.set_gpioaen(true));
+    pac::GPIOA.bsrr().write(|w| w.set_bs(5, true));
+    pac::GPIOA.moder().modify(|w| w.set_moder(5, Moder::OUTPUT));
+}
 
 /// Leaves word for [`show`].
 pub(crate) struct Lamp;

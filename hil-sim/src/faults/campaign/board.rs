@@ -19,6 +19,7 @@ use super::{
     AFTER_S, Campaign, CampaignError, Injection, Instant, Kept, Outcome, Target, crossed, doing,
 };
 use crate::board::bench::Bench;
+use crate::board::chip::Pin;
 use crate::board::log::Strings;
 use crate::board::peripherals::rcc::Cause;
 use crate::board::run::{RunError, store};
@@ -33,6 +34,10 @@ const RECORD: &str = "INTERSTAGE_BLACKBOX";
 const IMAGE: &str = "image: ";
 /// How that is reported, in the matrix.
 const IMAGE_DAMAGED: &str = "image damaged";
+/// The same where it can no longer say so.
+const IMAGE_LIGHT: &str = "image damaged, by the light alone";
+/// How long it may take to say what the light tells, s.
+const SAYS_S: f64 = 1.0;
 /// Longest run, s since power-up.
 const LONGEST_S: f64 = 60.0;
 /// Ticks that a record may be ahead of the clock since a restart.
@@ -83,6 +88,10 @@ struct Board<'a> {
     parameters: Parameters,
     /// When it first said that its image is damaged, s.
     image_s: Option<f64>,
+    /// It has said something since it last started.
+    heard: bool,
+    /// When the light first told of a damaged image, s.
+    light_s: Option<f64>,
 }
 
 impl<'a> Board<'a> {
@@ -104,6 +113,8 @@ impl<'a> Board<'a> {
             said: 0,
             parameters: Parameters::default(),
             image_s: None,
+            heard: false,
+            light_s: None,
         })
     }
 
@@ -123,6 +134,12 @@ impl<'a> Board<'a> {
         if restarts > std::mem::replace(&mut self.restarts, restarts) {
             (self.mode, self.speed, self.up) = (Mode::Boot, Q16::ZERO, 0);
             self.parameters = Parameters::default();
+            self.heard = false;
+        }
+        self.heard |= !lines.is_empty();
+        // Nothing else lights it before the first word of a start.
+        if self.restarts > 0 && !self.heard && self.bench.machine().chip().level(Pin::LIGHT) {
+            self.light_s.get_or_insert(self.bench.time_s());
         }
         let mut output = Output::default();
         output.drive.enable = passed.drives.drive_on;
@@ -241,11 +258,13 @@ fn watched(firmware: Firmware<'_>, scenario: &Scenario, twin: &Twin) -> Result<I
         }
         // A fault that is still to come is waited for only where something goes on.
         let saves = matches!(board.bench.saving(), Some(Saving::Asked | Saving::Writing));
-        let over = match board.image_s {
-            Some(_) => true,
+        let over = match (board.image_s, board.light_s) {
+            (Some(_), _) => true,
+            // It may still say so.
+            (None, Some(light_s)) => t_s > light_s + SAYS_S,
             // The whole of it is looked at in some seconds.
-            None if of_image => false,
-            None => !saves && (operator.over(board.mode) || board.parameters.holds()),
+            (None, None) if of_image => false,
+            (None, None) => !saves && (operator.over(board.mode) || board.parameters.holds()),
         };
         after_s = if over { after_s + 1e-3 } else { 0.0 };
         tick += 1;
@@ -254,9 +273,10 @@ fn watched(firmware: Firmware<'_>, scenario: &Scenario, twin: &Twin) -> Result<I
     if scenario.run.faults.first().is_some_and(|fault| fault.target.is_of_sets()) {
         return parameters::judged(board, judge, scenario, twin, (gap_part, crossed));
     }
-    let restart = match board.image_s {
-        Some(_) => Some(IMAGE_DAMAGED),
-        None => board.restart().filter(|_| !of_image),
+    let restart = match (board.image_s, board.light_s) {
+        (Some(_), _) => Some(IMAGE_DAMAGED),
+        (None, Some(_)) => Some(IMAGE_LIGHT),
+        (None, None) => board.restart().filter(|_| !of_image),
     };
     let finding = match (judge.finding(&twin.limits, gap_part, crossed), board.restarts) {
         (finding, 0) if !of_image => finding,
@@ -267,7 +287,7 @@ fn watched(firmware: Firmware<'_>, scenario: &Scenario, twin: &Twin) -> Result<I
     let at_s = board.bench.struck_s();
     let told_s = match report {
         Some((at_s, _)) => Some(at_s),
-        None => board.image_s.or(back_s).filter(|_| restart.is_some()),
+        None => board.image_s.or(board.light_s).or(back_s).filter(|_| restart.is_some()),
     };
     let since = |from_s: Option<f64>| Some(1e3 * (told_s? - from_s?).max(0.0));
     let injection = scenario.run.faults.first();
