@@ -9,7 +9,7 @@ mod common;
 use hil_sim::board::bench::Bench;
 use hil_sim::board::run::run;
 use hil_sim::faults::campaign::{Campaign, Case, Firmware, Kept, Outcome};
-use hil_sim::faults::{Injection, Kind, Target, sets};
+use hil_sim::faults::{Entry, HARDWARE, Injection, Kind, Target, sets};
 use hil_sim::params::board::PLACES;
 use hil_sim::scenario::Scenario;
 
@@ -19,6 +19,10 @@ fn campaign(wanted: &[&str]) -> Outcome {
     let named = |case: &Case| wanted.contains(&case.name().as_str());
     let cases: Vec<Case> = Case::all_on_board().into_iter().filter(named).collect();
     assert_eq!(cases.len(), wanted.len());
+    tried(cases)
+}
+
+fn tried(cases: Vec<Case>) -> Outcome {
     let campaign = Campaign { scenario: Scenario::default(), instants: 1, cases };
     let firmware = Firmware { elf: elf(), strings: strings() };
     campaign.run_on_board(firmware, &mut Kept::default(), &|| {}).expect("a campaign")
@@ -53,6 +57,22 @@ fn what_breaks_on_the_board_is_found_or_borne_and_the_mechanism_held() {
         };
         assert_eq!(line.restarted(), restarted, "{line:?}");
     }
+}
+
+/// The very bit of `memcpy` after which no start comes to its first word.
+#[test]
+fn a_board_that_can_only_tell_by_its_light_is_found_by_that() {
+    let bench = Bench::new(elf(), strings(), &Scenario::default()).expect("a bench");
+    let functions = &bench.machine().image().functions;
+    let copies = functions.iter().find(|f| f.name == "compiler_builtins::mem::memcpy");
+    let bit = f64::from(8 * (copies.expect("it copies").range.start + 0x115 - 0x0800_0000) + 4);
+    let image = HARDWARE.iter().find(|entry| entry.target == Target::Image).expect("an image");
+    let entry = Box::leak(Box::new(Entry { range: (bit, bit), ..*image }));
+    let outcome = tried(vec![Case::Struck(entry)]);
+    let line = &outcome.matrix[0];
+    assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{line:#?}");
+    assert_eq!(line.restarted(), Some("image damaged, by the light alone"), "{line:#?}");
+    assert!(line.worst_motion_mm < 0.75, "{line:#?}");
 }
 
 #[test]
