@@ -391,4 +391,32 @@ mod tests {
             prop_assert!(needs <= schedule.sight(&plan, &at), "{needs}");
         }
     }
+
+    #[test]
+    fn a_step_is_in_sight_from_the_longest_braking_way_and_a_reserve() {
+        for back in [false, true] {
+            let (_, schedule, _, plan) = setting(back);
+            let sight = |speed: Q16| {
+                schedule.sight(&plan, &Course { speed, ..course(&plan, 0.0, 0.0, 40.0) })
+            };
+            let most = plan.cruise_speed.max(plan.cross_speed);
+            assert_eq!(sight(most), plan.brake_horizon + BRAKE_RESERVE);
+            assert_eq!(sight(Q16::ZERO), plan.brake_horizon + BRAKE_RESERVE);
+            assert_eq!(sight(most + Q16::DELTA), Q16::MAX);
+        }
+    }
+
+    #[test]
+    fn who_does_not_look_ahead_raises_nothing_ahead() {
+        for back in [false, true] {
+            let (_, schedule, _, plan) = setting(back);
+            let way = |plan: &Plan| schedule.ramp_way(plan, plan.cruise_preload);
+            let blind = Plan { look_ahead: false, ..plan.clone() };
+            let level = Plan { cross_preload: plan.cruise_preload, ..plan.clone() };
+            let neither = Plan { look_ahead: false, ..level.clone() };
+            assert!(plan.cross_preload > plan.cruise_preload && way(&plan) >= plan.brake_way);
+            assert_eq!(way(&level), plan.brake_way);
+            assert_eq!([way(&blind), way(&neither)], [Q16::MIN; 2]);
+        }
+    }
 }

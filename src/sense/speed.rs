@@ -524,4 +524,23 @@ mod tests {
         assert!(believed(1.0) && believed(1.9) && believed(-1.9));
         assert!(!believed(3.0) && !believed(-3.0));
     }
+
+    #[test]
+    fn a_reading_that_comes_late_may_have_gone_so_much_farther() {
+        let meter = build();
+        let most = Rig::prototype().drive.no_load_speed_mm_s.max(IMPLAUSIBLE_MM_S / 2.0);
+        let believed = |part: f64, every: Tick| {
+            let mut state = SpeedState::default();
+            let step_mm = part * most * 1e-3;
+            (0..60).all(|now| {
+                let at = now - now % every;
+                let read = sample(step_mm * f64::from(at), at);
+                let motion = meter.step(&mut state, now, read, Default::default(), LIMIT);
+                motion.speed.validity == Validity::Valid
+            })
+        };
+        for every in [1, 2, 4] {
+            assert!(believed(1.9, every) && !believed(3.0, every), "{every}");
+        }
+    }
 }

@@ -407,3 +407,33 @@ fn a_preload_astray_before_the_drive_starts_is_counted_on() {
     let told: Vec<_> = (start..start + 3).map(|t| check.step(&mut state, &astray(t))).collect();
     assert_eq!(told, [None, None, Some(Fault::PretightenerRunaway)]);
 }
+
+/// What was counted of a stuck load cell before the drive came on counts on; a wheel that
+/// has rolled 50 mm some time before has not rolled since.
+#[test]
+fn switched_on_it_goes_on_from_where_wheel_and_load_cell_are() {
+    let mut state = CrossState::default();
+    (state.strayed, state.preload.same, state.preload.erratic) = (3, 4, 5);
+    state.preload.value = Q16::from_num(40);
+    state.progress = (Travel::from_num(7), Travel::from_num(9));
+    let (before, travel) = (state, Travel::from_num(50));
+    let seen = Compared {
+        now: 10,
+        read_at: 10,
+        travel,
+        radius: Q16::from_num(125),
+        preload: Q16::from_num(40),
+        preload_due: Q16::from_num(40),
+        compression: Q16::from_num(0.4),
+        speed_ref: Q16::ZERO,
+        effort: None,
+    };
+    state.begin(&seen);
+    let kept = |state: &CrossState| {
+        let code = &state.preload;
+        (state.strayed, code.value, code.same, code.erratic)
+    };
+    assert_eq!(kept(&state), kept(&before));
+    assert_eq!(state.progress, (travel, Travel::ZERO));
+    assert!(!lags(&mut state, &seen) && state.turned == 0);
+}

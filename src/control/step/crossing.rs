@@ -315,4 +315,86 @@ mod tests {
         assert!((lead(Some(4750)) - 0.25).abs() < 1e-4, "{}", lead(Some(4750)));
         assert!((lead(None) + 0.4).abs() < 1e-4, "{}", lead(None));
     }
+
+    use super::super::state::LiftPoint;
+    use super::super::tests::{at, sensed};
+    use crate::supervise::{Leg, Mode};
+    use crate::units::q16;
+
+    #[test]
+    fn the_second_step_missed_in_a_row_is_one_too_many() {
+        for (direction, from) in [(Direction::Deploy, 1), (Direction::Retract, 3)] {
+            let mut state = State::default();
+            state.mode = Mode::Run(direction, Leg::Approach);
+            (state.direction, state.next_step, state.given_up) = (direction, from, 0);
+            // Past every step of the prototype, which stand at 18, 40 and 62 mm.
+            let position = if direction == Direction::Deploy { 79.0 } else { 1.0 };
+            at(&sensed(0, 0.0, 0.3), position, |controller, pass| {
+                for missed in 1..=2 {
+                    assert_eq!(state.mode, Mode::Run(direction, Leg::Approach));
+                    let course = controller.course(&state, pass, direction);
+                    controller.watch_expectation(&mut state, pass, &course);
+                    assert_eq!(state.lost_in_a_row, missed);
+                    let missing = Event::Limit(Limit::StepMissing);
+                    let told = pass.output.events.iter().filter(|e| e.event == missing).count();
+                    assert_eq!(told, usize::from(missed));
+                }
+            });
+            assert_eq!(state.mode, Mode::FaultHold(Fault::StepsLost));
+            assert_eq!(state.next_step, 3 - u8::from(direction == Direction::Retract) * 2);
+        }
+    }
+
+    #[test]
+    fn in_doubt_a_corner_is_left_behind_so_much_later() {
+        let face = q16(18_000_000);
+        for direction in Direction::ALL {
+            for unsure in [false, true] {
+                let mut state = State::default();
+                (state.direction, state.unsure) = (direction, unsure);
+                let (zero, now) = (Q16::ZERO, 0);
+                let lift = Some(LiftPoint {
+                    at: now,
+                    gap: zero,
+                    speed: zero,
+                    preload: zero,
+                    tan_arm: zero,
+                    face,
+                    residual: zero,
+                });
+                let open = OpenCrossing::begin(1, direction, true, now);
+                state.crossing = Some(OpenCrossing { lift, ..open });
+                at(&sensed(1, 0.0, 0.3), 0.0, |controller, pass| {
+                    let (sign, other) = match direction {
+                        Direction::Deploy => (1, Direction::Retract),
+                        Direction::Retract => (-1, Direction::Deploy),
+                    };
+                    let doubt = if unsure { UNSURE_WITHIN } else { zero };
+                    let way = controller.rise.first_contact(other) + doubt;
+                    let mut clear = |past: Millimetres| {
+                        pass.position = face + past * Q16::from_num(sign);
+                        controller.clear_of(&state, pass)
+                    };
+                    assert!(!clear(way) && clear(way + Q16::DELTA), "{direction:?} {unsure}");
+                });
+            }
+        }
+    }
+
+    #[test]
+    fn a_displaced_step_is_early_where_it_comes_before_its_place_on_the_way() {
+        let told = |direction: Direction, residual: i32| {
+            let state = State::default();
+            at(&sensed(0, 0.0, 0.3), 18.0, |controller, pass| {
+                let residual = Q16::from_num(residual);
+                controller.report_displaced(&state, pass, direction, residual);
+                pass.output.events.iter().map(|entry| entry.event).collect::<Vec<_>>()
+            })
+        };
+        let (early, late) = (Event::Limit(Limit::StepEarly), Event::Limit(Limit::StepLate));
+        assert_eq!(told(Direction::Deploy, -2), [early]);
+        assert_eq!(told(Direction::Deploy, 2), [late]);
+        assert_eq!(told(Direction::Retract, 2), [early]);
+        assert_eq!(told(Direction::Retract, -2), [late]);
+    }
 }

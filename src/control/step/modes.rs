@@ -134,6 +134,7 @@ mod tests {
     use super::*;
     use crate::estimate::crossing::Contact;
     use crate::sense::{SensedState, Validity};
+    use crate::supervise::Command;
     use crate::units::q16;
 
     /// Every sensor answers, and the wheel stands.
@@ -202,5 +203,63 @@ mod tests {
         assert_eq!(told(Contact::Wall, true, 0.0), 0);
         // The corner at 18 mm may carry a part.
         assert_eq!(told(Contact::Wall, false, 12.0), 0);
+    }
+
+    #[test]
+    fn a_wheel_that_does_not_stop_is_given_up_after_a_second_and_a_half() {
+        let stopping = |speed: Q16| {
+            let mut state = State::default();
+            state.mode = Mode::Stopping(Direction::Deploy);
+            let mut turning = answering();
+            turning.speed.value = speed;
+            let ticks = at(&turning, 10.0, |controller, pass| {
+                (1..5000).find(|_| {
+                    controller.advance_mode(&mut state, pass);
+                    state.mode != Mode::Stopping(Direction::Deploy)
+                })
+            });
+            (ticks, state.mode)
+        };
+        let runs = (Some(1500), Mode::FaultHold(Fault::DriveRunaway));
+        assert_eq!(stopping(q16(20_000_000)), runs);
+        assert_eq!(stopping(q16(-20_000_000)), runs);
+        assert_eq!(stopping(Q16::ZERO), (Some(1), Mode::Idle));
+    }
+
+    #[test]
+    fn a_preload_that_never_stands_is_given_up_after_twice_its_longest_rise_and_a_second() {
+        let mut rig = crate::rig::Rig::prototype();
+        for limit_n in [50.0, 60.0] {
+            rig.preload.limit_n = limit_n;
+            let controller = Controller::try_build(&rig).expect("sound");
+            let mut state = State::default();
+            state.mode = Mode::Preload(Direction::Deploy);
+            let ticks = at(&answering(), 0.0, |_, pass| {
+                (1..20_000).find(|_| {
+                    controller.advance_mode(&mut state, pass);
+                    state.mode != Mode::Preload(Direction::Deploy)
+                })
+            });
+            assert_eq!(state.mode, Mode::FaultHold(Fault::PreloadNotReached));
+            let patience_s = 2.0 * limit_n / rig.preload.slew_n_per_s + 1.0;
+            assert_eq!(ticks, Some((1000.0 * patience_s) as u32));
+        }
+    }
+
+    #[test]
+    fn bridges_are_armed_anew_by_a_reset_from_a_fault_alone() {
+        let idle = answering();
+        let armed = |from: Mode, trigger: Trigger| {
+            let mut state = State::default();
+            state.mode = from;
+            at(&idle, 0.0, |controller, pass| {
+                assert!(controller.trigger(&mut state, pass, trigger));
+                (state.mode, pass.output.rearm)
+            })
+        };
+        let reset = Trigger::Command(Command::Reset);
+        let fault = Mode::FaultHold(Fault::TickOverrun);
+        assert_eq!(armed(fault, reset), (Mode::SelfTest, true));
+        assert_eq!(armed(Mode::Boot, Trigger::SensorsAnswer), (Mode::SelfTest, false));
     }
 }

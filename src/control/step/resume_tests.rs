@@ -272,6 +272,15 @@ fn a_place_is_contradicted_by_a_height_a_fifth_of_a_step_off() {
     assert!(!stands(behind(q16(600_000)), 0.0, true));
     assert!(stands(behind(q16(1_900_000)), 0.0, false));
     assert!(!stands(behind(q16(2_100_000)), 0.0, false));
+    // Up already from the corner's first touch on, by the same.
+    let touch = at(&sensed(0, 0.0, 0.3), 0.0, |controller, _| {
+        controller.rise.first_contact(Direction::Deploy)
+    });
+    let before = |way: Millimetres| q16(18_000_000) - touch - tolerance - way;
+    assert!(stands(before(q16(400_000)), 1.0, true));
+    assert!(!stands(before(q16(600_000)), 1.0, true));
+    assert!(stands(before(q16(1_900_000)), 1.0, false));
+    assert!(!stands(before(q16(2_100_000)), 1.0, false));
 }
 
 #[test]

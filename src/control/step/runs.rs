@@ -214,6 +214,7 @@ impl Controller {
 mod tests {
     use super::super::tests::{at, sensed};
     use super::*;
+    use crate::supervise::{Leg, Mode};
 
     #[test]
     fn close_to_a_face_the_level_tells_which_step_is_ahead() {
@@ -300,6 +301,59 @@ mod tests {
                 assert_eq!((state.level, state.next_step), (level, next), "{up} {direction:?}");
                 assert_eq!(state.leaving, Some(clear), "{up} {direction:?}");
                 assert_eq!(state.watch.contact, Contact::Leaving);
+            }
+        }
+    }
+
+    #[test]
+    fn a_step_given_up_counts_to_the_level_that_is_up() {
+        // Close before the face at 40 mm: the first step was given up, the second climbed.
+        let mut state = State::default();
+        (state.level, state.given_up) = (1, 1);
+        at(&sensed(1, 0.0, 0.3), 39.9, |controller, pass| {
+            assert_eq!(controller.step_ahead(&state, pass, Direction::Deploy), 3);
+            assert_eq!(controller.step_ahead(&state, pass, Direction::Retract), 2);
+            state.given_up = 0;
+            assert_eq!(controller.step_ahead(&state, pass, Direction::Deploy), 2);
+        });
+    }
+
+    #[test]
+    fn turned_on_a_wall_it_is_measured_anew_and_turned_past_a_corner_it_is_the_one_behind() {
+        let wall = sensed(1, 0.4, 0.3);
+        let turned = |contact: Contact| {
+            let mut state = State::default();
+            state.level = 1;
+            state.watch.contact = contact;
+            at(&wall, 25.0, |controller, pass| {
+                let mut anew = state.watch;
+                let seen = controller.seen(&state, pass);
+                controller.watch.begin(&mut anew, &seen);
+                controller.turn(&mut state, pass, Direction::Retract);
+                (state.watch == anew, state.watch.contact, state.next_step)
+            })
+        };
+        assert_eq!(turned(Contact::Wall), (true, Contact::Wall, 1));
+        assert_eq!(turned(Contact::Leaving), (false, Contact::Wall, 1));
+    }
+
+    #[test]
+    fn at_the_end_the_arm_must_show_the_steps_climbed_and_no_others() {
+        let (out, back) = (Direction::Deploy, Direction::Retract);
+        for (direction, given_up, extra, level) in
+            [(out, 0, 0, 3), (out, 1, 0, 2), (out, 0, 1, 4), (out, 1, 1, 3), (back, 0, 1, 0)]
+        {
+            for shown in 0..=4 {
+                let mut state = State::default();
+                state.mode = Mode::Run(direction, Leg::Cruise);
+                (state.given_up, state.extra) = (given_up, extra);
+                at(&sensed(shown, 0.0, 0.3), 0.0, |controller, pass| {
+                    pass.position = if direction == out { controller.travel } else { Q16::ZERO };
+                    controller.await_arrival(&mut state, pass, direction);
+                });
+                let mismatch = Mode::FaultHold(Fault::LevelMismatch);
+                let expected = if shown == level { Mode::Complete(direction) } else { mismatch };
+                assert_eq!(state.mode, expected, "{given_up} {extra} {shown}");
             }
         }
     }

@@ -321,4 +321,24 @@ mod tests {
             assert_eq!(state.deepest, deepest, "{contact:?}");
         }
     }
+
+    #[test]
+    fn back_over_a_step_lower_than_its_table_the_wall_carries_before_the_arm_says_so() {
+        let watch = watch();
+        let wall = seen(121.1, 0.1);
+        let high = |rise: Q16| Seen { radius: wall.radius + rise, near: true, ..wall };
+        let lifts = |rise: Q16| {
+            let mut state = WatchState::default();
+            watch.begin(&mut state, &wall);
+            for _ in 0..3 {
+                watch.step(&mut state, Direction::Retract, &high(super::super::TOUCH));
+            }
+            assert_eq!(state.contact, Contact::Corner);
+            let sign = watch.step(&mut state, Direction::Retract, &high(rise));
+            matches!(sign, Some(Sign::Lifted(_)))
+        };
+        let over = watch.step - super::super::OVER;
+        assert!(over + wall.compression < watch.step);
+        assert!(lifts(over) && !lifts(over - Q16::DELTA));
+    }
 }

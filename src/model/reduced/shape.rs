@@ -317,6 +317,8 @@ mod tests {
         for half in [short - 1, long + 1] {
             assert!(shape.is_at_end(force(0), sought(0), run(half)), "{half}");
             assert!(shape.is_at_end(force(1), sought(0), run(half)), "{half}");
+            assert!(shape.is_at_end(force(0), sought(-1), run(half)), "{half}");
+            assert!(shape.is_at_end(force(1), sought(-1), run(half)), "{half}");
         }
     }
 
