@@ -411,9 +411,9 @@ mod tests {
         for back in [false, true] {
             let (_, schedule, _, plan) = setting(back);
             let way = |plan: &Plan| schedule.ramp_way(plan, plan.cruise_preload);
-            let blind = Plan { look_ahead: false, ..plan.clone() };
-            let level = Plan { cross_preload: plan.cruise_preload, ..plan.clone() };
-            let neither = Plan { look_ahead: false, ..level.clone() };
+            let blind = Plan { look_ahead: false, ..plan };
+            let level = Plan { cross_preload: plan.cruise_preload, ..plan };
+            let neither = Plan { look_ahead: false, ..level };
             assert!(plan.cross_preload > plan.cruise_preload && way(&plan) >= plan.brake_way);
             assert_eq!(way(&level), plan.brake_way);
             assert_eq!([way(&blind), way(&neither)], [Q16::MIN; 2]);
