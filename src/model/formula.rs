@@ -472,4 +472,14 @@ mod tests {
             prop_assert!((radial + used * axial - force).abs() < 1e-9);
         }
     }
+
+    #[test]
+    fn where_the_ring_is_free_it_presses_nowhere_and_has_no_slope() {
+        let f = formula();
+        let free = f.contact(f.gap_after_mm(0.0) + 1.0);
+        assert_eq!(free, Contact { radial: 0.0, axial: 0.0 });
+        assert!(free.slope().abs() < f64::EPSILON);
+        let kind = Kind { direction: Direction::Deploy, driven: true };
+        assert!(f.relaxed_force_n(kind, f.gap_after_mm(0.0) + 1.0).abs() < f64::EPSILON);
+    }
 }

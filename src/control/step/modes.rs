@@ -261,5 +261,8 @@ mod tests {
         let fault = Mode::FaultHold(Fault::TickOverrun);
         assert_eq!(armed(fault, reset), (Mode::SelfTest, true));
         assert_eq!(armed(Mode::Boot, Trigger::SensorsAnswer), (Mode::SelfTest, false));
+        for from in [Mode::Idle, Mode::Complete(Direction::Retract)] {
+            assert_eq!(armed(from, reset), (Mode::SelfTest, false), "{from:?}");
+        }
     }
 }

@@ -488,4 +488,11 @@ mod tests {
             assert!((got - exact).abs() < 5e-5 + 1e-4 * exact, "{got} {exact}");
         }
     }
+
+    /// Short runs do not even lift such a load.
+    #[test]
+    fn a_heavy_load_has_its_guesses_too() {
+        let errors = errors(&Rig::prototype(), Some(60.0));
+        assert!(errors.gap < 1e-5 && errors.force < 5e-6, "{errors:?}");
+    }
 }

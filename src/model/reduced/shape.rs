@@ -429,4 +429,14 @@ mod tests {
         let used = shape.utilisation(shape.load, 0).to_num::<f64>();
         assert!((used - 1.0).abs() < 1e-3, "{used}");
     }
+
+    #[test]
+    fn without_load_nothing_is_used_to_lift_it() {
+        let mut rig = Rig::prototype();
+        rig.plant.top_load_n = 0.0;
+        let shape = shape_of(&rig);
+        for radial in [0, 1, 2, 1 << 20, 1 << 28] {
+            assert_eq!(shape.utilisation(radial, 0), Q16::ZERO, "{radial}");
+        }
+    }
 }

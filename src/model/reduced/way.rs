@@ -207,6 +207,7 @@ fn step(slope: i32, bend: i32, lacking: i32) -> Option<i32> {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::super::ReducedModel;
     use super::*;
@@ -255,6 +256,19 @@ mod tests {
             assert_eq!(guess(i32::MAX), most);
             assert_eq!(guess(-1), guess(0));
             assert!(most > guess(1 << 25));
+        }
+    }
+
+    #[test]
+    fn where_the_stiffness_falls_with_speed_the_parabola_s_other_side_is_taken() {
+        // Slope S', half the second derivative S''/2, and what lacks; the step by its equation.
+        for (slope, bend, lacking) in [(-0.25, 2.0, 0.03125), (-0.5, 4.0, 0.03125)] {
+            let bits = |value: f64, places: i32| (value * f64::powi(2.0, places)) as i32;
+            let taken = step(bits(slope, 24), bits(bend, 23), bits(lacking, 26));
+            let taken = f64::from(taken.expect("a step")) / f64::powi(2.0, 31);
+            let root = f64::sqrt(slope * slope + 4.0 * bend * lacking);
+            let exact = 2.0 * lacking / (slope + root);
+            assert!((taken / exact - 1.0).abs() < 0.02, "{taken} {exact}");
         }
     }
 }
