@@ -85,23 +85,29 @@ fn a_wheel_that_runs_away_is_found_within_ten_ticks() {
     }
 }
 
+/// Everything as it should be, with a reference that does not move.
+fn commanded_to_rest(now: Tick, travel: Travel) -> Compared {
+    Compared {
+        now,
+        read_at: now,
+        travel,
+        radius: Q16::from_num(125),
+        preload: Q16::from_num(40),
+        preload_due: Q16::from_num(40),
+        compression: Q16::from_num(0.4),
+        speed_ref: Q16::ZERO,
+        effort: None,
+    }
+}
+
 #[test]
 fn a_bridge_at_full_duty_from_the_first_tick_is_found_as_soon() {
     let check = CrossCheck::try_build(&Rig::prototype()).expect("a sound rig");
     let mut state = CrossState::default();
     let found = (0..100).find(|&tick| {
         let t = f64::from(tick) * 1e-3;
-        let seen = Compared {
-            now: tick,
-            read_at: tick,
-            travel: Travel::from_num((0.5 * 1700.0 * t * t / COUNT_MM).floor() * COUNT_MM),
-            radius: Q16::from_num(125),
-            preload: Q16::from_num(40),
-            preload_due: Q16::from_num(40),
-            compression: Q16::from_num(0.4),
-            speed_ref: Q16::ZERO,
-            effort: None,
-        };
+        let travel = (0.5 * 1700.0 * t * t / COUNT_MM).floor() * COUNT_MM;
+        let seen = commanded_to_rest(tick, Travel::from_num(travel));
         if tick == 0 {
             state.begin(&seen);
         }
@@ -417,17 +423,7 @@ fn switched_on_it_goes_on_from_where_wheel_and_load_cell_are() {
     state.preload.value = Q16::from_num(40);
     state.progress = (Travel::from_num(7), Travel::from_num(9));
     let (before, travel) = (state, Travel::from_num(50));
-    let seen = Compared {
-        now: 10,
-        read_at: 10,
-        travel,
-        radius: Q16::from_num(125),
-        preload: Q16::from_num(40),
-        preload_due: Q16::from_num(40),
-        compression: Q16::from_num(0.4),
-        speed_ref: Q16::ZERO,
-        effort: None,
-    };
+    let seen = commanded_to_rest(10, travel);
     state.begin(&seen);
     let kept = |state: &CrossState| {
         let code = &state.preload;
