@@ -72,6 +72,8 @@ fn a_board_that_can_only_tell_by_its_light_is_found_by_that() {
     let line = &outcome.matrix[0];
     assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{line:#?}");
     assert_eq!(line.restarted(), Some("image damaged, by the light alone"), "{line:#?}");
+    let told_ms = line.latency_ms.expect("a time at which it was told");
+    assert!((1.0..13_000.0).contains(&told_ms), "{line:#?}");
     assert!(line.worst_motion_mm < 0.75, "{line:#?}");
 }
 
