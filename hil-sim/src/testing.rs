@@ -48,6 +48,10 @@ const STEPS: [Step; 11] = [
 /// minutes, is built once for all of them.
 const WITH_BOARD: [&str; 2] = ["--features", "hil-sim/board"];
 
+/// What else a step looks at, so that cargo gives the dependencies those features that they
+/// have in the tests, and what is built is built once for both.
+const AS_IN_TESTS: [&str; 2] = ["--lib", "--examples"];
+
 /// Runs every step and then `cargo test` with `arguments`, and returns the exit code
 /// of the first that failed, or 0. Headings, times and cargo's messages go to
 /// standard error; the last lines of standard output are those of the tests.
@@ -174,7 +178,8 @@ fn plain_lints(root: &Path) -> Result<Ended> {
         return Ok(Ended::Skipped("clippy is not installed"));
     }
     let mut clippy = cargo(root);
-    step(clippy.args(["clippy", "--package", "hil-sim", "--lib", "--bins", "--", "-D", "warnings"]))
+    clippy.args(["clippy", "--package", "hil-sim", "--bins"]).args(AS_IN_TESTS);
+    step(clippy.args(["--", "-D", "warnings"]))
 }
 
 /// The package as those have it who have a board at a probe.
@@ -183,8 +188,8 @@ fn probe_lints(root: &Path) -> Result<Ended> {
         return Ok(Ended::Skipped("clippy is not installed"));
     }
     let mut clippy = cargo(root);
-    clippy.args(["clippy", "--package", "hil-sim", "--features", "probe", "--lib", "--bins"]);
-    step(clippy.args(["--", "-D", "warnings"]))
+    clippy.args(["clippy", "--package", "hil-sim", "--features", "probe", "--bins"]);
+    step(clippy.args(AS_IN_TESTS).args(["--", "-D", "warnings"]))
 }
 
 fn firmware_lints(root: &Path) -> Result<Ended> {
@@ -216,7 +221,7 @@ fn documentation(root: &Path) -> Result<Ended> {
     let mut doc = cargo(root);
     doc.env("RUSTDOCFLAGS", "-D warnings").args(["doc", "--workspace", "--no-deps"]);
     provided(&mut doc)?;
-    step(doc.args(WITH_BOARD))
+    step(doc.args(AS_IN_TESTS).args(WITH_BOARD))
 }
 
 /// What the image of this profile may take: the one that is flashed its budget, the
