@@ -9,6 +9,7 @@ mod decimate;
 #[cfg(test)]
 pub(crate) mod example;
 mod gaps;
+pub(crate) mod mesh;
 mod overview;
 mod page;
 pub(crate) mod palette;

@@ -6,8 +6,8 @@ use plotters::style::text_anchor::{HPos, VPos};
 
 use super::result::{Left, NORMAL_95};
 use crate::report::axis::{Scale, extent, label, padded, ticks};
-use crate::report::palette;
-use crate::report::svg::{Area, Drawn, SCALE, fixed, font, size};
+use crate::report::svg::{Area, Drawn, SCALE, fixed, font};
+use crate::report::{mesh, palette};
 
 const S: i32 = SCALE as i32;
 /// Width of a picture and height of a row, CSS pixels.
@@ -15,7 +15,6 @@ const WIDTH: u32 = 1040;
 const ROW: u32 = 190;
 /// Height of a row's title.
 const TITLE: u32 = 24;
-const TEXT_PX: f64 = 12.0;
 const TITLE_PX: f64 = 13.0;
 const LEFT: i32 = 78 * S;
 
@@ -62,14 +61,7 @@ fn draw(row: &Left, x: (f64, f64), last: bool, cell: &Area) -> Drawn {
         .y_label_area_size(LEFT)
         .build_cartesian_2d(Scale::new(x, x_ticks), Scale::new(y, y_ticks))?;
     chart.draw_series([Rectangle::new([(x.0, -band), (x.1, band)], palette::SHADE.filled())])?;
-    chart
-        .configure_mesh()
-        .light_line_style(TRANSPARENT)
-        .bold_line_style(palette::GRID.stroke_width(2))
-        .axis_style(palette::AXIS.stroke_width(2))
-        .x_label_style(("sans-serif", size(TEXT_PX), &palette::TEXT))
-        .y_label_style(("sans-serif", size(TEXT_PX), &palette::TEXT))
-        .axis_desc_style(("sans-serif", size(TEXT_PX), &palette::TEXT))
+    mesh::plain(&mut chart.configure_mesh())
         .x_label_formatter(&|x| if last { label(*x, x_decimals) } else { String::new() })
         .y_label_formatter(&|y| label(*y, y_decimals))
         .x_desc(if last { "time, s" } else { "" })

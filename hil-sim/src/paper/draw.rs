@@ -6,8 +6,9 @@ use plotters::style::text_anchor::{HPos, VPos};
 
 use super::figure::{Figure, Panel, Series, Source};
 use crate::report::axis::{Scale, extent, label, padded, ticks};
+use crate::report::mesh::{self, TEXT_PX};
 use crate::report::palette;
-use crate::report::svg::{Area, Drawn, SCALE, fixed, font, size, text_width};
+use crate::report::svg::{Area, Drawn, SCALE, fixed, font, text_width};
 
 const S: i32 = SCALE as i32;
 /// Width of a figure, CSS pixels.
@@ -18,7 +19,6 @@ const ROW: u32 = 270;
 const HEAD: u32 = 34;
 /// Height of a plot's title.
 const TITLE: u32 = 26;
-const TEXT_PX: f64 = 12.0;
 const TITLE_PX: f64 = 13.0;
 
 /// Colour of the band over all runs.
@@ -124,14 +124,7 @@ fn draw(panel: &Panel, cell: &Area) -> Drawn {
         .x_label_area_size(38 * S)
         .y_label_area_size(widest.unwrap_or(0) + 26 * S)
         .build_cartesian_2d(Scale::new(x, x_ticks), Scale::new(y, y_ticks))?;
-    chart
-        .configure_mesh()
-        .light_line_style(TRANSPARENT)
-        .bold_line_style(palette::GRID.stroke_width(2))
-        .axis_style(palette::AXIS.stroke_width(2))
-        .x_label_style(("sans-serif", size(TEXT_PX), &palette::TEXT))
-        .y_label_style(("sans-serif", size(TEXT_PX), &palette::TEXT))
-        .axis_desc_style(("sans-serif", size(TEXT_PX), &palette::TEXT))
+    mesh::plain(&mut chart.configure_mesh())
         .x_label_formatter(&|x| match panel.categories.get(x.round() as usize) {
             Some(name) => name.clone(),
             None if panel.categories.is_empty() => label(*x, x_decimals),

@@ -6,8 +6,9 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
 use super::axis;
+use super::mesh::TEXT_PX;
 use super::palette;
-use super::panel::{HEAD, LEFT, RIGHT, TEXT_PX};
+use super::panel::{HEAD, LEFT, RIGHT};
 use super::panels::View;
 use super::svg::{Area, Drawn, SCALE, escape, font, text_width};
 use crate::record::{MODE_NAMES, Row, STAGE_NAMES};

@@ -6,8 +6,9 @@ use plotters::style::text_anchor::{HPos, VPos};
 
 use super::axis::{self, Scale};
 use super::decimate::{Pieces, decimate};
+use super::mesh::{self, TEXT_PX};
 use super::palette;
-use super::svg::{Area, Drawn, SCALE, font, size, text_width};
+use super::svg::{Area, Drawn, SCALE, font, text_width};
 
 const S: i32 = SCALE as i32;
 /// Height of the row with title and legend.
@@ -21,7 +22,6 @@ pub(super) const RIGHT: i32 = 18 * S;
 /// Height of the row of a legend that stands below the title.
 const LEGEND: i32 = 20 * S;
 const TITLE_PX: f64 = 14.0;
-pub(super) const TEXT_PX: f64 = 12.0;
 
 /// What a line stands for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -137,14 +137,7 @@ impl Panel {
                 chart.draw_series([span])?;
             }
         }
-        chart
-            .configure_mesh()
-            .light_line_style(TRANSPARENT)
-            .bold_line_style(palette::GRID.stroke_width(2))
-            .axis_style(palette::AXIS.stroke_width(2))
-            .x_label_style(("sans-serif", size(TEXT_PX), &palette::TEXT))
-            .y_label_style(("sans-serif", size(TEXT_PX), &palette::TEXT))
-            .axis_desc_style(("sans-serif", size(TEXT_PX), &palette::TEXT))
+        mesh::plain(&mut chart.configure_mesh())
             .x_label_formatter(&|x| match self.x_name {
                 Some(_) => axis::label(*x, x_decimals),
                 None => String::new(),
