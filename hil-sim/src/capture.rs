@@ -10,8 +10,6 @@ mod writer;
 
 pub(crate) use message::messages;
 pub use probed::Probed;
-#[cfg(feature = "board")]
-pub use source::Emulated;
 pub use source::{Bytes, Source, SourceError, Virtual, letter};
 pub use view::View;
 pub(crate) use view::mode_name;

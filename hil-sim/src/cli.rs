@@ -5,42 +5,34 @@
 //! code is 0 if all is well, 1 if what was run did not end well, 2 if it could not
 //! be run as asked; an error is one line.
 
-mod account;
-mod bench;
-mod capture;
+pub mod capture;
 mod compare;
-mod constants;
-mod coverage;
 mod crossing;
-mod deploy;
-mod docs;
-mod failure;
-mod faults;
+pub mod deploy;
+pub mod failure;
+pub mod faults;
 mod flash;
 mod identify;
 mod keys;
-mod live;
-mod modes;
+pub mod live;
 mod montecarlo;
-mod output;
-mod panics;
-mod paper;
-mod params;
+pub mod output;
+pub mod params;
 mod parse;
 #[cfg(feature = "probe")]
 mod probe;
-mod replay;
+pub mod replay;
 mod report;
-mod resets;
-mod scenario;
-mod size;
+pub mod scenario;
 mod stress;
 mod test;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+use crate::provision::{self, Extra};
 use failure::{Failure, Outcome};
 
 /// Virtual rig for a rubber-wheeled drive that climbs the steps of a telescoping
@@ -60,25 +52,30 @@ enum Verb {
     Replay(replay::Args),
     Report(report::Args),
     Crossing(crossing::Args),
-    Modes(modes::Args),
-    Bench(bench::Args),
     Compare(compare::Args),
     Montecarlo(montecarlo::Args),
     Faults(faults::Args),
     Flash(flash::Args),
-    Paper(paper::Args),
     Identify(identify::Args),
     Keys(keys::Args),
     Params(params::Args),
     Stress(stress::Args),
-    Resets(resets::Args),
-    Size(size::Args),
-    Panics(panics::Args),
-    Coverage(coverage::Args),
-    Account(account::Args),
-    Constants(constants::Args),
-    Docs(docs::Args),
     Test(test::Args),
+    /// Natural frequencies of the drive arm by the wave-vector method.
+    Modes(Passed),
+    /// Run time against error.
+    Bench(Passed),
+    /// The study's figures and which of its claims hold.
+    Paper(Passed),
+}
+
+/// Arguments of a verb that another part of `rig` has, see [`Extra`].
+#[derive(Debug, clap::Args)]
+#[command(disable_help_flag = true)]
+struct Passed {
+    /// What that part takes; `--help` shows it.
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "ARGS")]
+    _all: Vec<OsString>,
 }
 
 impl Verb {
@@ -90,25 +87,18 @@ impl Verb {
             Self::Replay(args) => replay::run(args),
             Self::Report(args) => report::run(args),
             Self::Crossing(args) => crossing::run(args),
-            Self::Modes(args) => modes::run(args),
-            Self::Bench(args) => bench::run(args),
             Self::Compare(args) => compare::run(args),
             Self::Montecarlo(args) => montecarlo::run(args),
             Self::Faults(args) => faults::run(args),
             Self::Flash(args) => flash::run(args),
-            Self::Paper(args) => paper::run(args),
             Self::Identify(args) => identify::run(args),
             Self::Keys(args) => keys::run(args),
             Self::Params(args) => params::run(args),
             Self::Stress(args) => stress::run(args),
-            Self::Resets(args) => resets::run(args),
-            Self::Size(args) => size::run(args),
-            Self::Panics(args) => panics::run(args),
-            Self::Coverage(args) => coverage::run(args),
-            Self::Account(args) => account::run(args),
-            Self::Constants(args) => constants::run(args),
-            Self::Docs(args) => docs::run(args),
             Self::Test(args) => test::run(args),
+            Self::Modes(_) | Self::Bench(_) | Self::Paper(_) => {
+                Ok(Outcome::Code(provision::go_on(Extra::Study)?))
+            }
         }
     }
 }
@@ -116,11 +106,16 @@ impl Verb {
 /// Runs the command with the arguments of this process.
 #[must_use]
 pub fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    run(|cli: &Cli| cli.verb.run())
+}
+
+/// Parses the arguments of this process and runs what they ask for. Errors are one line.
+pub fn run<C: Parser>(run: impl FnOnce(&C) -> Result<Outcome, Failure>) -> ExitCode {
+    let cli = match C::try_parse() {
         Ok(cli) => cli,
         Err(error) => return parse::report(&error),
     };
-    match cli.verb.run() {
+    match run(&cli) {
         Ok(outcome) => outcome.code(),
         Err(failure) => {
             eprintln!("error: {failure}");

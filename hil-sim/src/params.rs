@@ -4,8 +4,6 @@
 //! ([`interstage::params`]). A file may hold one as well, so that everything that can be
 //! done to a board can be tried without one.
 
-#[cfg(feature = "board")]
-pub mod board;
 mod file;
 mod line;
 

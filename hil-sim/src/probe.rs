@@ -1,16 +1,12 @@
 //! A debug probe as everything here needs it: rings in the board's memory, a reset, and
 //! memory itself. One interface, a real probe or the emulated board behind it.
 
-#[cfg(feature = "board")]
-mod emulated;
 mod patient;
 #[cfg(feature = "probe")]
 mod real;
 
 use std::time::Duration;
 
-#[cfg(feature = "board")]
-pub use emulated::EmulatedPort;
 pub use patient::Patient;
 #[cfg(feature = "probe")]
 pub use real::RealPort;

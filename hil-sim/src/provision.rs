@@ -18,28 +18,34 @@ use crate::firmware;
 pub use printer::defmt_print;
 pub use tools::Tools;
 
-/// What `rig` can have in it beside what it always has.
+/// A part of `rig` that is a binary of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extra {
     /// The emulated board.
     Board,
+    /// The published study, and run time against error.
+    Study,
     /// A real debug probe.
     Probe,
 }
 
 impl Extra {
-    /// The feature that carries it.
-    const fn feature(self) -> &'static str {
+    /// What cargo builds of which package.
+    const fn package(self) -> &'static [&'static str] {
         match self {
-            Self::Board => "board",
-            Self::Probe => "probe",
+            Self::Board => &["--package", "rig-board", "--bin", "rig-board"],
+            Self::Study => &["--package", "rig-study", "--bin", "rig-study"],
+            Self::Probe => {
+                &["--package", "hil-sim", "--bin", "rig-probe", "--features", "hil-sim/probe"]
+            }
         }
     }
 
-    /// The binary with the feature.
+    /// The binary.
     const fn binary(self) -> &'static str {
         match self {
             Self::Board => "rig-board",
+            Self::Study => "rig-study",
             Self::Probe => "rig-probe",
         }
     }
@@ -48,6 +54,7 @@ impl Extra {
     const fn name(self) -> &'static str {
         match self {
             Self::Board => "the emulated board",
+            Self::Study => "the study",
             Self::Probe => "probe-rs",
         }
     }
@@ -107,8 +114,8 @@ pub fn featured(extra: Extra) -> Result<PathBuf, ProvisionError> {
     let mut cargo = Command::new(firmware::tool("CARGO", "cargo"));
     cargo
         .current_dir(firmware::workspace())
-        .args(["build", "--profile", "host", "--package", env!("CARGO_PKG_NAME")])
-        .args(["--bin", extra.binary(), "--features", extra.feature()])
+        .arg("build")
+        .args(extra.package())
         .args(["--message-format", "json-render-diagnostics"])
         .stderr(Stdio::inherit());
     if extra == Extra::Board {
@@ -122,20 +129,12 @@ pub fn featured(extra: Extra) -> Result<PathBuf, ProvisionError> {
         .ok_or(ProvisionError::NoExecutable(extra.binary()))
 }
 
-/// Goes on with the arguments of this process in `rig` with the emulated board, which
-/// is built first if need be, and returns its exit code. Standard output is its own.
+/// Goes on with the arguments of this process in that part of `rig`, which is built first
+/// if need be, and returns its exit code. Standard output is its own.
 ///
 /// # Errors
 /// As [`featured`].
-pub fn go_on() -> Result<u8, ProvisionError> {
-    go_on_with(Extra::Board)
-}
-
-/// The same in `rig` with any of them.
-///
-/// # Errors
-/// As [`featured`].
-pub fn go_on_with(extra: Extra) -> Result<u8, ProvisionError> {
+pub fn go_on(extra: Extra) -> Result<u8, ProvisionError> {
     let name = extra.name();
     eprintln!("this needs {name}; the first time it takes some minutes to build");
     let binary = featured(extra)?;

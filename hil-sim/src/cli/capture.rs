@@ -25,7 +25,7 @@ const TARGETS: [&str; 3] = ["sil", "board", "probe"];
 /// emulated board, or from the controller on this host. What is missing is marked; a file that is cut off is read up
 /// to its last second. The exit code is 1 if anything is missing.
 #[derive(Debug, clap::Args)]
-pub(super) struct Args {
+pub struct Args {
     #[command(flatten)]
     run: RunArgs,
 
@@ -68,7 +68,7 @@ struct Printed {
     files: Vec<PathBuf>,
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
+pub fn run(args: &Args) -> Result<Outcome, Failure> {
     if let Some(file) = &args.stream {
         return write(args, &mut opened(file)?, None);
     }
@@ -97,7 +97,7 @@ fn opened(file: &Path) -> Result<Bytes, Failure> {
 
 #[cfg(not(feature = "probe"))]
 fn probe(_: &Args) -> Result<Outcome, Failure> {
-    Ok(Outcome::Code(crate::provision::go_on_with(crate::provision::Extra::Probe)?))
+    Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Probe)?))
 }
 
 #[cfg(feature = "probe")]
@@ -105,22 +105,8 @@ fn probe(args: &Args) -> Result<Outcome, Failure> {
     write(args, &mut crate::capture::Probed::new(super::probe::patient()?), None)
 }
 
-#[cfg(not(feature = "board"))]
 fn board(_: &Args, _: &Scenario) -> Result<Outcome, Failure> {
-    Ok(Outcome::Code(crate::provision::go_on()?))
-}
-
-#[cfg(feature = "board")]
-fn board(args: &Args, scenario: &Scenario) -> Result<Outcome, Failure> {
-    use crate::board::log::Strings;
-    use crate::capture::Emulated;
-    use crate::firmware::{self, Profile};
-
-    crate::board::run::check(scenario).map_err(Failure::input)?;
-    let elf = firmware::image(Profile::Release)?;
-    let strings = Strings::of(&elf).map_err(Failure::run)?;
-    let mut source = Emulated::new(&elf, &strings, scenario, false).map_err(Failure::run)?;
-    write(args, &mut source, Some(scenario))
+    Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Board)?))
 }
 
 /// Writes what `source` gives until it ends.

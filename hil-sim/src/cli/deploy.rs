@@ -1,6 +1,5 @@
 //! `rig deploy`: a whole deployment, or the way back.
 
-mod board;
 mod looped;
 
 use std::path::{Path, PathBuf};
@@ -10,8 +9,8 @@ use serde::Serialize;
 use super::failure::{Failure, Outcome};
 use super::output;
 use super::scenario::RunArgs;
-#[cfg(any(feature = "board", feature = "probe"))]
 use crate::firmware::FirmwareError;
+use crate::provision::{self, Extra};
 use crate::record::{Recording, Summary};
 use crate::scenario::Scenario;
 use crate::{export, progress, report, sil, table};
@@ -24,7 +23,7 @@ const TARGETS: [&str; 3] = ["sil", "board", "probe"];
 /// Writes report, logs and summary. The exit code is 1 if the run ends in a fault or
 /// does not complete.
 #[derive(Debug, clap::Args)]
-pub(super) struct Args {
+pub struct Args {
     #[command(flatten)]
     run: RunArgs,
 
@@ -76,14 +75,13 @@ struct Printed<'a> {
     files: &'a [PathBuf],
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
+pub fn run(args: &Args) -> Result<Outcome, Failure> {
     check_target(&args.target)?;
     let scenario = args.run.resolve()?;
     let directory = if args.no_files { None } else { Some(directory(args, &scenario)?) };
-    match (args.target.as_str(), args.hil) {
-        ("board", false) => return board::run(args, &scenario, directory.as_deref()),
-        ("board", true) => return looped::on_board(args, &scenario, directory.as_deref()),
-        ("probe", _) => {
+    match args.target.as_str() {
+        "board" => return Ok(Outcome::Code(provision::go_on(Extra::Board)?)),
+        "probe" => {
             takes_board(args)?;
             return looped::on_probe(args, &scenario, directory.as_deref());
         }
@@ -118,7 +116,6 @@ fn conclude(
 }
 
 /// An image that has been built.
-#[cfg(any(feature = "board", feature = "probe"))]
 fn read(path: &Path) -> Result<Vec<u8>, Failure> {
     let read = std::fs::read(path);
     Ok(read.map_err(|source| FirmwareError::Read { path: path.to_owned(), source })?)

@@ -15,7 +15,7 @@ use crate::sil::RunError;
 
 /// How a verb ended that did its work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Outcome {
+pub enum Outcome {
     /// All is well.
     Good,
     /// What was run did not end well: a fault, a stale file, a size above budget.
@@ -26,12 +26,12 @@ pub(super) enum Outcome {
 
 impl Outcome {
     /// Good or bad.
-    pub(super) fn of(good: bool) -> Self {
+    pub fn of(good: bool) -> Self {
         if good { Self::Good } else { Self::Bad }
     }
 
     /// The exit code.
-    pub(super) fn code(self) -> ExitCode {
+    pub fn code(self) -> ExitCode {
         match self {
             Self::Good => ExitCode::SUCCESS,
             Self::Bad => ExitCode::from(1),
@@ -42,7 +42,7 @@ impl Outcome {
 
 /// Why a verb did not do its work. Displays as one line.
 #[derive(Debug)]
-pub(super) enum Failure {
+pub enum Failure {
     /// It was asked for something that cannot be: exit code 2.
     Input(String),
     /// It broke off under way: exit code 1.
@@ -51,17 +51,17 @@ pub(super) enum Failure {
 
 impl Failure {
     /// A failure of the input.
-    pub(super) fn input(error: impl fmt::Display) -> Self {
+    pub fn input(error: impl fmt::Display) -> Self {
         Self::Input(error.to_string())
     }
 
     /// A failure under way.
-    pub(super) fn run(error: impl fmt::Display) -> Self {
+    pub fn run(error: impl fmt::Display) -> Self {
         Self::Run(error.to_string())
     }
 
     /// The exit code.
-    pub(super) fn code(&self) -> ExitCode {
+    pub fn code(&self) -> ExitCode {
         match self {
             Self::Input(_) => ExitCode::from(2),
             Self::Run(_) => ExitCode::from(1),
@@ -77,7 +77,7 @@ impl fmt::Display for Failure {
 }
 
 /// `text` with every run of white space that breaks a line as one blank.
-pub(super) fn one_line(text: &str) -> String {
+pub fn one_line(text: &str) -> String {
     let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
     lines.collect::<Vec<_>>().join(" ")
 }

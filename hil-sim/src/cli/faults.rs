@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use super::failure::{Failure, Outcome};
 use super::output;
 use super::scenario::ScenarioArgs;
-use crate::docs;
 use crate::faults::campaign::{Campaign, Case, Kept, Line, Outcome as Result_};
 use crate::montecarlo;
 use crate::progress;
@@ -16,7 +15,7 @@ use crate::table::{number, plain};
 ///
 /// The exit code is 1 if a fault goes undetected or the mechanism is not held.
 #[derive(Debug, clap::Args)]
-pub(super) struct Args {
+pub struct Args {
     /// What runs the controller: the host, or the firmware on the emulated board, which
     /// breaks in its registers and lines as well.
     #[arg(long, default_value = "sil", value_parser = ["sil", "board"])]
@@ -40,10 +39,6 @@ pub(super) struct Args {
     #[arg(long, value_name = "FILE", conflicts_with = "clean")]
     keep: Option<PathBuf>,
 
-    /// Writes the target's table into `docs/SAFETY.md`, of the whole campaign.
-    #[arg(long, conflicts_with_all = ["only", "clean"])]
-    write_docs: bool,
-
     #[command(flatten)]
     scenario: ScenarioArgs,
 
@@ -52,7 +47,7 @@ pub(super) struct Args {
     json: bool,
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
+pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let scenario = args.scenario.resolve()?;
     if let Some(count) = args.clean {
         return clean(args, &scenario, count);
@@ -74,21 +69,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         let bar = progress::bar("runs", campaign.runs());
         campaign.run_keeping(&mut kept, &|| bar.advance(1))?
     };
-    ended(args, &outcome, docs::fill_safety)
+    ended(args, &outcome)
 }
 
-/// Puts the table on its page, if it is wanted there, and prints the outcome.
-fn ended(
-    args: &Args,
-    outcome: &Result_,
-    fill: impl Fn(&str, &Result_) -> anyhow::Result<String>,
-) -> Result<Outcome, Failure> {
-    if args.write_docs {
-        let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/SAFETY.md");
-        let text = std::fs::read_to_string(page).map_err(Failure::run)?;
-        let text = fill(&text, outcome).map_err(Failure::run)?;
-        crate::export::write_text(std::path::Path::new(page), &text)?;
-    }
+/// Prints the outcome.
+pub fn ended(args: &Args, outcome: &Result_) -> Result<Outcome, Failure> {
     output::result(args.json, outcome, || human(outcome))?;
     Ok(Outcome::of(outcome.is_good()))
 }
@@ -101,27 +86,8 @@ fn kept(args: &Args, campaign: &Campaign, elf: &[u8]) -> Result<Kept, Failure> {
 }
 
 /// Without the emulated board: go on with a binary that has it.
-#[cfg(not(feature = "board"))]
 fn on_board(_: &Args, _: &Campaign) -> Result<Outcome, Failure> {
-    Ok(Outcome::Code(crate::provision::go_on()?))
-}
-
-#[cfg(feature = "board")]
-fn on_board(args: &Args, campaign: &Campaign) -> Result<Outcome, Failure> {
-    use crate::board::log::Strings;
-    use crate::faults::campaign::Firmware;
-    use crate::firmware::{self, Profile};
-
-    crate::board::run::check(&campaign.scenario).map_err(Failure::input)?;
-    let elf = firmware::image(Profile::Release)?;
-    let strings = Strings::of(&elf).map_err(Failure::run)?;
-    let firmware = Firmware { elf: &elf, strings: &strings };
-    let mut kept = kept(args, campaign, &elf)?;
-    let outcome = {
-        let bar = progress::bar("runs", campaign.runs());
-        campaign.run_on_board(firmware, &mut kept, &|| bar.advance(1)).map_err(Failure::run)?
-    };
-    ended(args, &outcome, docs::fill_board)
+    Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Board)?))
 }
 
 /// Random deployments without a fault.
@@ -150,7 +116,7 @@ fn clean(
 }
 
 /// The matrix as a table, with what failed below it.
-pub(super) fn human(outcome: &Result_) -> String {
+pub fn human(outcome: &Result_) -> String {
     let head = [
         "fault",
         "code",

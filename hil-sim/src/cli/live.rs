@@ -28,7 +28,7 @@ const PICTURE: (u16, u16) = (110, 36);
 /// The same goes out over a WebSocket in the Foxglove protocol, for Foxglove, Lichtblick
 /// and PlotJuggler.
 #[derive(Debug, clap::Args)]
-pub(super) struct Args {
+pub struct Args {
     #[command(flatten)]
     run: RunArgs,
 
@@ -59,7 +59,7 @@ pub(super) struct Args {
     picture: Option<PathBuf>,
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
+pub fn run(args: &Args) -> Result<Outcome, Failure> {
     if !args.headless && !std::io::stdout().is_terminal() {
         return Err(Failure::input("standard output is no terminal: use --headless"));
     }
@@ -81,7 +81,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
 
 #[cfg(not(feature = "probe"))]
 fn probe(_: &Args) -> Result<Outcome, Failure> {
-    Ok(Outcome::Code(crate::provision::go_on_with(crate::provision::Extra::Probe)?))
+    Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Probe)?))
 }
 
 #[cfg(feature = "probe")]
@@ -89,23 +89,8 @@ fn probe(args: &Args) -> Result<Outcome, Failure> {
     watch(args, &mut crate::capture::Probed::new(super::probe::patient()?))
 }
 
-#[cfg(not(feature = "board"))]
 fn board(_: &Args, _: &Scenario) -> Result<Outcome, Failure> {
-    Ok(Outcome::Code(crate::provision::go_on()?))
-}
-
-#[cfg(feature = "board")]
-fn board(args: &Args, scenario: &Scenario) -> Result<Outcome, Failure> {
-    use crate::board::log::Strings;
-    use crate::capture::Emulated;
-    use crate::firmware::{self, Profile};
-
-    crate::board::run::check(scenario).map_err(Failure::input)?;
-    let elf = firmware::image(Profile::Release)?;
-    let strings = Strings::of(&elf).map_err(Failure::run)?;
-    let mut source =
-        Emulated::new(&elf, &strings, scenario, !args.headless).map_err(Failure::run)?;
-    watch(args, &mut source)
+    Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Board)?))
 }
 
 /// A terminal that is given back however the view ends.

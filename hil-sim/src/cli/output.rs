@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::failure::Failure;
 
 /// Prints `value` as one line of JSON, or what `human` makes of it.
-pub(super) fn result(
+pub fn result(
     json: bool,
     value: &impl Serialize,
     human: impl FnOnce() -> String,
@@ -21,7 +21,7 @@ pub(super) fn result(
 }
 
 /// Prints `text`. A reader that has seen enough is no error.
-pub(super) fn print(text: &str) -> Result<(), Failure> {
+pub fn print(text: &str) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {

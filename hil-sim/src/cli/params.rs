@@ -1,8 +1,5 @@
 //! `rig params`: the parameters that a board, or a file, holds.
 
-#[cfg(feature = "board")]
-mod board;
-
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -23,7 +20,7 @@ const ELSEWHERE: [&str; 4] = ["preset", "spread", "noise", "run"];
 /// A change is checked as a whole before it is sent, sent beside what is in force, and
 /// takes force at once or not at all; a board runs on it from its next start.
 #[derive(Debug, clap::Args)]
-pub(super) struct Args {
+pub struct Args {
     #[command(subcommand)]
     action: Action,
 
@@ -95,7 +92,7 @@ struct Printed {
     before: Option<Map<String, Value>>,
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
+pub fn run(args: &Args) -> Result<Outcome, Failure> {
     match (&args.file, args.target.as_deref()) {
         (Some(file), _) => act(args, &mut SetFile::new(file)),
         (None, Some("probe")) => on_probe(args),
@@ -108,7 +105,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
 
 #[cfg(not(feature = "probe"))]
 fn on_probe(_: &Args) -> Result<Outcome, Failure> {
-    Ok(Outcome::Code(crate::provision::go_on_with(crate::provision::Extra::Probe)?))
+    Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Probe)?))
 }
 
 #[cfg(feature = "probe")]
@@ -117,14 +114,8 @@ fn on_probe(args: &Args) -> Result<Outcome, Failure> {
     act(args, &mut crate::params::Client::new(&mut port as &mut dyn crate::probe::Port))
 }
 
-#[cfg(not(feature = "board"))]
 fn on_board(_: &Args) -> Result<Outcome, Failure> {
-    Ok(Outcome::Code(crate::provision::go_on()?))
-}
-
-#[cfg(feature = "board")]
-fn on_board(args: &Args) -> Result<Outcome, Failure> {
-    board::with(&args.flash, |store| act(args, store))
+    Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Board)?))
 }
 
 fn act(args: &Args, store: &mut impl Store) -> Result<Outcome, Failure> {

@@ -18,7 +18,7 @@ use crate::scenario::Scenario;
 /// exit code is 1 at the first difference, which is shown, or if a part of a log could
 /// not be run again because something before it is missing.
 #[derive(Debug, clap::Args)]
-pub(super) struct Args {
+pub struct Args {
     /// Logs: MCAP, CSV of rows, or bytes of the channel.
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
@@ -48,7 +48,7 @@ struct Log {
     result: Replayed,
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
+pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let mut logs = Vec::new();
     for file in &args.logs {
         let run = Run::read(file).map_err(Failure::input)?;

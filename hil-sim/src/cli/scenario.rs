@@ -9,7 +9,7 @@ use crate::scenario::{ControllerKind, PRESETS, Scenario};
 
 /// Which rig.
 #[derive(Clone, Debug, Default, clap::Args)]
-pub(super) struct ScenarioArgs {
+pub struct ScenarioArgs {
     /// Rig preset; by default that of the file.
     #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(PRESETS))]
     rig: Option<String>,
@@ -29,12 +29,12 @@ pub(super) struct ScenarioArgs {
 
 impl ScenarioArgs {
     /// The file, however it was given.
-    pub(super) fn file(&self) -> Option<&Path> {
+    pub fn file(&self) -> Option<&Path> {
         self.scenario.as_deref().or(self.file.as_deref())
     }
 
     /// The scenario: preset, then file, then overrides.
-    pub(super) fn resolve(&self) -> Result<Scenario, Failure> {
+    pub fn resolve(&self) -> Result<Scenario, Failure> {
         self.resolve_with(&[])
     }
 
@@ -46,9 +46,9 @@ impl ScenarioArgs {
 
 /// Which rig, and how it is run.
 #[derive(Clone, Debug, Default, clap::Args)]
-pub(super) struct RunArgs {
+pub struct RunArgs {
     #[command(flatten)]
-    pub(super) scenario: ScenarioArgs,
+    pub scenario: ScenarioArgs,
 
     /// The way back: from the end of travel, dropping off the steps.
     #[arg(long)]
@@ -65,7 +65,7 @@ pub(super) struct RunArgs {
 
 impl RunArgs {
     /// The scenario; the options come after every `--set`.
-    pub(super) fn resolve(&self) -> Result<Scenario, Failure> {
+    pub fn resolve(&self) -> Result<Scenario, Failure> {
         let mut sets = Vec::new();
         if self.retract {
             sets.push("run.direction=retract".to_owned());

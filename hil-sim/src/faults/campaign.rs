@@ -1,7 +1,5 @@
 //! Every fault at random instants of random rigs, each beside the same run without it.
 
-#[cfg(feature = "board")]
-mod board;
 mod kept;
 mod matrix;
 mod operator;
@@ -22,8 +20,6 @@ use crate::plant::rig::VirtualRig;
 use crate::scenario::{Scenario, StepAnomaly};
 use crate::sil::{Options, RunError, Session};
 
-#[cfg(feature = "board")]
-pub use board::Firmware;
 pub use kept::{Kept, KeptError};
 pub use matrix::{Line, Outcome, Spread};
 use operator::Operator;

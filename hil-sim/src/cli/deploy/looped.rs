@@ -6,32 +6,10 @@ use super::Args;
 use crate::cli::failure::{Failure, Outcome};
 use crate::scenario::Scenario;
 
-/// Without the emulated board: go on with a binary that has it.
-#[cfg(not(feature = "board"))]
-pub(super) fn on_board(_: &Args, _: &Scenario, _: Option<&Path>) -> Result<Outcome, Failure> {
-    Ok(Outcome::Code(crate::provision::go_on()?))
-}
-
-#[cfg(feature = "board")]
-pub(super) fn on_board(
-    args: &Args,
-    scenario: &Scenario,
-    directory: Option<&Path>,
-) -> Result<Outcome, Failure> {
-    use crate::firmware::{self, Profile};
-    use crate::probe::EmulatedPort;
-
-    let path = firmware::build(Profile::Loop)?;
-    let elf = super::read(&path)?;
-    let mut port = EmulatedPort::new(&elf).map_err(Failure::run)?;
-    crate::board::run::store(port.machine_mut(), scenario).map_err(Failure::run)?;
-    close(args, &mut port, scenario, directory, "board")
-}
-
 /// Without probe-rs: go on with a binary that has it.
 #[cfg(not(feature = "probe"))]
 pub(super) fn on_probe(_: &Args, _: &Scenario, _: Option<&Path>) -> Result<Outcome, Failure> {
-    Ok(Outcome::Code(crate::provision::go_on_with(crate::provision::Extra::Probe)?))
+    Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Probe)?))
 }
 
 #[cfg(feature = "probe")]
@@ -59,7 +37,6 @@ pub(super) fn on_probe(
 }
 
 /// Runs the scenario over this port.
-#[cfg(any(feature = "board", feature = "probe"))]
 fn close(
     args: &Args,
     port: &mut dyn crate::probe::Port,

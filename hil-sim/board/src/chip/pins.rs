@@ -1,0 +1,260 @@
+//! The chip's pins as the board has them wired (docs/HARDWARE.md): what goes in, what
+//! comes out.
+
+use super::Chip;
+use crate::peripherals::gpio::Role;
+use crate::peripherals::spi::Frame;
+
+/// A pin: port (0 is A) and number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pin(usize, u32);
+
+impl Pin {
+    /// Emergency stop of the drive's timer: high is open.
+    pub const STOP_DRIVE: Self = Self(1, 12);
+    /// Emergency stop of the pre-tightener's timer: high is open.
+    pub const STOP_PRELOAD: Self = Self(1, 7);
+    /// Button: high is pressed.
+    pub const BUTTON: Self = Self(2, 13);
+    /// Light.
+    pub const LIGHT: Self = Self(0, 5);
+    /// Select line of the angle sensor: low selects.
+    const SELECT: Self = Self(1, 10);
+}
+
+/// Pins that the world outside drives from the start, port by port, with their levels:
+/// emergency stop closed, button released.
+pub(super) const OUTSIDE: [(u32, u32); 7] =
+    [(0, 0), (1 << 12 | 1 << 7, 0), (1 << 13, 0), (0, 0), (0, 0), (0, 0), (0, 0)];
+
+/// Lines of the wheel encoder: TIM5 is their alternate function 2.
+const WHEEL: [Pin; 2] = [Pin(0, 0), Pin(0, 1)];
+const WHEEL_FUNCTION: u32 = 2;
+/// Lines of the angle sensor: clock, to the board, from the board; SPI1 is function 5.
+const ANGLE: [Pin; 3] = [Pin(1, 3), Pin(0, 6), Pin(0, 7)];
+const ANGLE_FUNCTION: u32 = 5;
+/// Analogue inputs: pin and channel of ADC1 and of ADC2, then two of ADC3.
+const ANALOG: [(Pin, usize); 4] = [(Pin(2, 2), 8), (Pin(2, 3), 9), (Pin(1, 0), 12), (Pin(1, 1), 1)];
+
+/// What a motor's bridge is wired to.
+struct Wired {
+    pwm: Pin,
+    pwm_function: u32,
+    forward: Pin,
+    enable: Pin,
+    stop: Pin,
+    stop_function: u32,
+}
+
+/// Drive and pre-tightener.
+const BRIDGES: [Wired; 2] = [
+    Wired {
+        pwm: Pin(0, 8),
+        pwm_function: 6,
+        forward: Pin(0, 9),
+        enable: Pin(0, 10),
+        stop: Pin::STOP_DRIVE,
+        stop_function: 6,
+    },
+    Wired {
+        pwm: Pin(2, 6),
+        pwm_function: 4,
+        forward: Pin(2, 8),
+        enable: Pin(2, 9),
+        stop: Pin::STOP_PRELOAD,
+        stop_function: 5,
+    },
+];
+
+/// What a bridge's three lines have said over a stretch of time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Motor {
+    /// Mean signed duty, -1 to 1, over the time in which the bridge was enabled.
+    pub duty: f64,
+    /// Part of the time in which the bridge was enabled.
+    pub enabled: f64,
+}
+
+/// A bridge's lines, summed up.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bridge {
+    /// Signed duty and enable now.
+    duty: f64,
+    on: bool,
+    since: u64,
+    /// Sums since they were last taken: duty times cycles, cycles enabled, from when.
+    turned: f64,
+    enabled: u64,
+    from: u64,
+}
+
+impl Bridge {
+    fn gather(&mut self, now: u64) {
+        let cycles = now.saturating_sub(self.since);
+        self.since = now;
+        if self.on {
+            self.turned += self.duty * cycles as f64;
+            self.enabled += cycles;
+        }
+    }
+
+    fn set(&mut self, duty: f64, on: bool, now: u64) {
+        if (duty, on) != (self.duty, self.on) {
+            self.gather(now);
+            (self.duty, self.on) = (duty, on);
+        }
+    }
+
+    fn take(&mut self, now: u64) -> Motor {
+        self.gather(now);
+        let whole = now.saturating_sub(self.from).max(1);
+        let motor = Motor {
+            duty: if self.enabled == 0 { 0.0 } else { self.turned / self.enabled as f64 },
+            enabled: self.enabled as f64 / whole as f64,
+        };
+        (self.turned, self.enabled, self.from) = (0.0, 0, now);
+        motor
+    }
+}
+
+/// Levels of the wheel encoder's lines at a position in quarters of a line pair.
+const fn lines_at(position: i64) -> [bool; 2] {
+    let phase = position.rem_euclid(4);
+    [matches!(phase, 1 | 2), matches!(phase, 2 | 3)]
+}
+
+impl Chip {
+    fn role(&self, pin: Pin) -> Role {
+        self.ports[pin.0].role(pin.1)
+    }
+
+    /// Level at a pin.
+    #[must_use]
+    pub fn level(&self, pin: Pin) -> bool {
+        self.ports[pin.0].level(pin.1)
+    }
+
+    /// The world outside puts a pin to this level.
+    pub fn drive(&mut self, pin: Pin, level: bool, now: u64) {
+        self.ports[pin.0].drive(pin.1, Some(level));
+        self.settle(now);
+    }
+
+    /// The wheel encoder's lines have turned on to this position, in quarters of a line
+    /// pair, evenly over the last `cycles`.
+    pub fn turn_wheel(&mut self, position: i64, cycles: u64) {
+        let edges = self.wheel.abs_diff(position);
+        for _ in 0..edges {
+            self.wheel += (position - self.wheel).signum();
+            self.encoder.look(self.wheel_lines(), cycles / edges);
+        }
+    }
+
+    /// The encoder's counter sees the levels that its lines have now.
+    pub(super) fn look_at_wheel(&mut self) {
+        self.encoder.look(self.wheel_lines(), u64::MAX);
+    }
+
+    /// What the encoder's counter has at its inputs: nothing before its pins are its own.
+    fn wheel_lines(&self) -> [bool; 2] {
+        let wired = WHEEL.iter().all(|pin| self.role(*pin) == Role::Alternate(WHEEL_FUNCTION));
+        let lines = lines_at(self.wheel);
+        let broken = self.defects.encoder_lines;
+        [wired && (lines[0] || broken[0]), wired && (lines[1] || broken[1])]
+    }
+
+    /// Voltages at the analogue inputs of load cell, tread sensor and the bridges of drive
+    /// and pre-tightener, in parts of 2^16 of the reference.
+    pub fn set_analog(&mut self, inputs: [u16; 4]) {
+        self.inputs = inputs;
+        self.apply_analog();
+    }
+
+    fn apply_analog(&mut self) {
+        for (input, (pin, channel)) in ANALOG.into_iter().enumerate() {
+            let wired = self.role(pin) == Role::Analog;
+            let voltage = if wired { self.inputs[input] } else { 0 };
+            let voltage = self.defects.stuck_codes[input].unwrap_or(voltage);
+            match input {
+                0 | 1 => self.adc.set_input(input, channel, voltage),
+                _ => self.readback.set_input(0, channel, voltage),
+            }
+        }
+    }
+
+    /// What drive and pre-tightener were driven with since this was last asked.
+    pub fn take_motors(&mut self, now: u64) -> [Motor; 2] {
+        [self.bridges[0].take(now), self.bridges[1].take(now)]
+    }
+
+    /// A frame on the angle sensor's bus.
+    pub(super) fn exchange(&mut self, frame: Frame) -> u16 {
+        let wired = ANGLE.iter().all(|pin| self.role(*pin) == Role::Alternate(ANGLE_FUNCTION));
+        let low = self.role(Pin::SELECT) == Role::Output && !self.level(Pin::SELECT);
+        let selected = wired && low && !self.deselected;
+        self.deselected = !low;
+        self.angle.exchange(frame, selected)
+    }
+
+    /// What follows at the pins from a change inside.
+    pub(super) fn settle_pins(&mut self, now: u64) {
+        if self.level(Pin::SELECT) {
+            self.deselected = true;
+        } else if !self.spi.is_busy() {
+            self.deselected = false;
+        }
+        self.apply_analog();
+        let levels = (0..16).filter(|line| {
+            let port = self.syscfg.port(*line) as usize;
+            self.ports.get(port).is_some_and(|port| port.level(*line))
+        });
+        let supply = u32::from(self.power.tells()) << super::SUPPLY_LINE;
+        self.exti.look(levels.fold(supply, |word, line| word | 1 << line));
+        for (index, wired) in BRIDGES.iter().enumerate() {
+            let reaches = self.role(wired.stop) == Role::Alternate(wired.stop_function);
+            let open = reaches && self.level(wired.stop);
+            self.motors[index].look(open, now);
+            let comes_out = self.role(wired.pwm) == Role::Alternate(wired.pwm_function);
+            let duty = if comes_out { self.motors[index].duty(0) } else { 0.0 };
+            let out = |pin: Pin| self.ports[pin.0].puts_out(pin.1);
+            let sense = if out(wired.forward) { 1.0 } else { -1.0 };
+            let on = out(wired.enable);
+            self.bridges[index].set(sense * duty, on, now);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::core::{Access, Bus};
+
+    const COUNT: u32 = 0x4000_0C24;
+
+    fn at(address: u32) -> Access {
+        Access { address, size: 4, pc: 0, now: 0 }
+    }
+
+    fn write(chip: &mut Chip, writes: &[(u32, u32)]) {
+        for (address, value) in writes {
+            chip.write(at(*address), *value);
+        }
+    }
+
+    #[test]
+    fn a_wheel_that_turns_before_its_pins_are_wired_is_not_counted_and_none_is_afterwards_lost() {
+        for early in -6..=6 {
+            let mut chip = Chip::new(0);
+            chip.turn_wheel(early, 1_000_000);
+            // Clocks of the port and of the timer; pins to the timer, which counts then.
+            write(&mut chip, &[(0x4002_104C, 1), (0x4002_1058, 1 << 3)]);
+            write(&mut chip, &[(0x4800_0020, 0x22), (0x4800_0000, 0xABFF_FFFA)]);
+            write(&mut chip, &[(0x4000_0C2C, 0xFFFF), (0x4000_0C18, 0xF1F1)]);
+            write(&mut chip, &[(0x4000_0C08, 3), (0x4000_0C00, 1)]);
+            for turned in [1, 2, 3, 4, 5, 4, 3, 2, 1, 0, -1, -2, -3, -4, -5] {
+                chip.turn_wheel(early + turned, 1_000_000);
+                assert_eq!(chip.read(at(COUNT)) as u16 as i16, turned as i16, "{early} {turned}");
+            }
+        }
+    }
+}

@@ -1,0 +1,390 @@
+//! The core on Unicorn, with a counter of cycles in its block hook.
+//!
+//! Most of an instruction's cost is known when its block is first seen; what depends
+//! on operands or on a condition is added by a hook on just those instructions, which
+//! the engine calls only if the instruction is carried out.
+
+mod count;
+mod hooks;
+
+use std::collections::HashSet;
+
+use unicorn_engine::{
+    Arch, ArmCpuModel, MemType, Mode, Prot, RegisterARM, TlbEntry, TlbType, Unicorn, uc_error,
+};
+
+use self::count::{Count, UNSEEN};
+use super::{
+    Access as Touch, Bus, Core, CoreError, Fault, Heat, Mark, MaskedBy, Meter, NoBus, Register,
+    Stop, passes,
+};
+use crate::timing;
+
+/// Memory of the board, or a stand-in for it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Memory {
+    /// First address.
+    pub base: u32,
+    /// Bytes, a multiple of 4096.
+    pub size: u32,
+    /// What the program may do there.
+    pub access: Access,
+}
+
+/// What a program may do in a memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    /// Read and run: flash.
+    Code,
+    /// Read, write and run: RAM.
+    Data,
+}
+
+/// Code whose cycles are counted: where it lies, and its bytes.
+#[derive(Clone, Copy, Debug)]
+pub struct Counted<'a> {
+    /// Address of the first byte.
+    pub base: u32,
+    /// Everything from there on, data between the code included.
+    pub bytes: &'a [u8],
+    /// Where in it instructions stand.
+    pub code: &'a [std::ops::Range<u32>],
+}
+
+/// Interrupt number by which the engine reports a supervisor call.
+const CALL: u32 = 2;
+/// The same of a breakpoint instruction.
+const BREAKPOINT: u32 = 7;
+/// The same of a return from an exception.
+const RETURN: u32 = 8;
+/// Bits of a return value that the program counter does not keep.
+const RETURN_BITS: u32 = 0xFFFF_FF01;
+/// `WFE`, `WFI` and `SEV`, as they stand in memory.
+const WFE: [u8; 2] = [0x20, 0xBF];
+const WFI: [u8; 2] = [0x30, 0xBF];
+const SEV: [u8; 2] = [0x40, 0xBF];
+/// The exception's number among the flags.
+const EXCEPTION: u64 = 0x1FF;
+/// The state of thumb code outside of a conditional block, among the flags.
+const THUMB: u64 = 1 << 24;
+/// What the engine carries.
+struct Inside<B> {
+    count: Count,
+    bus: B,
+    marked: Vec<u32>,
+    marks: Vec<Mark>,
+    /// Interrupts are shut out since this cycle, by this place in this exception.
+    shut: Option<(u64, (u32, u32))>,
+    masked: MaskedBy,
+}
+
+impl<B> Inside<B> {
+    fn new(count: Count, bus: B) -> Self {
+        let (marked, marks, masked) = (Vec::new(), Vec::new(), MaskedBy::new());
+        Self { count, bus, marked, marks, shut: None, masked }
+    }
+
+    /// Interrupts are let in again.
+    fn open(&mut self) {
+        if let Some((since, place)) = self.shut.take() {
+            let cycles = self.count.meter.cycles.saturating_sub(since);
+            let masked = self.masked.entry(place).or_default();
+            masked.times += 1;
+            masked.cycles += cycles;
+            masked.worst = masked.worst.max(cycles);
+        }
+    }
+}
+
+/// A Cortex-M4 on Unicorn.
+pub struct UnicornCore<B: Bus + 'static = NoBus> {
+    engine: Unicorn<'static, Inside<B>>,
+}
+
+/// The engine as a hook sees it.
+type Hooked<'a, B> = Unicorn<'a, Inside<B>>;
+
+/// Gives an engine's error its place.
+fn engine<T>(what: &'static str, result: Result<T, impl std::fmt::Debug>) -> Result<T, CoreError> {
+    result.map_err(|error| CoreError::Engine { what, why: format!("{error:?}") })
+}
+
+impl UnicornCore {
+    /// A core with these memories and nothing else, counting the cycles of `counted`.
+    ///
+    /// # Errors
+    /// [`CoreError::Engine`] if the engine cannot be had or a memory overlaps.
+    pub fn new(memories: &[Memory], counted: &Counted<'_>) -> Result<Self, CoreError> {
+        Self::with_bus(memories, counted, NoBus)
+    }
+}
+
+impl<B: Bus + 'static> UnicornCore<B> {
+    /// A core with these memories and a bus, counting the cycles of `counted`.
+    ///
+    /// # Errors
+    /// As [`UnicornCore::new`].
+    pub fn with_bus(memories: &[Memory], counted: &Counted<'_>, bus: B) -> Result<Self, CoreError> {
+        let ranges = bus.ranges();
+        let inside = Inside::new(Count::new(counted), bus);
+        // The flag for the microcontroller profile would select another core.
+        let new = Unicorn::new_with_data(Arch::ARM, Mode::THUMB, inside);
+        let mut core = Self { engine: engine("start", new)? };
+        let model = core.engine.ctl_set_cpu_model(ArmCpuModel::CORTEX_M4 as i32);
+        engine("select the core", model)?;
+        core.translate_pages(memories)?;
+        for memory in memories {
+            let access = match memory.access {
+                Access::Code => Prot::READ | Prot::EXEC,
+                Access::Data => Prot::ALL,
+            };
+            let mapped = core.engine.mem_map(memory.base.into(), memory.size.into(), access);
+            engine("map a memory", mapped)?;
+        }
+        for (base, size) in ranges {
+            core.map_bus(base, size)?;
+        }
+        core.write(counted.base, counted.bytes)?;
+        core.hook(counted)?;
+        Ok(core)
+    }
+
+    /// The bus.
+    pub fn bus(&self) -> &B {
+        &self.engine.get_data().bus
+    }
+
+    /// The bus, to be changed between two runs.
+    pub fn bus_mut(&mut self) -> &mut B {
+        &mut self.engine.get_data_mut().bus
+    }
+
+    /// Tells the engine what a page may be used for. Left to itself it takes every page
+    /// for code, and then looks for translated blocks behind every write to RAM, which
+    /// is most of its time. Here RAM holds data until the program runs in it.
+    fn translate_pages(&mut self, memories: &[Memory]) -> Result<(), CoreError> {
+        engine("take over pages", self.engine.ctl_set_tlb_type(TlbType::VIRTUAL))?;
+        let data = memories.iter().filter(|m| m.access == Access::Data);
+        let data: Vec<_> = data.map(|m| m.base..m.base + m.size).collect();
+        let mut run = HashSet::new();
+        let filled = self.engine.add_tlb_hook(1, 0, move |uc, address, access| {
+            let page = address as u32;
+            if access == MemType::FETCH {
+                run.insert(page);
+            } else {
+                // The engine has put its record of a conditional block to where the
+                // access stands. In the middle of a translated block it has to be empty,
+                // or what follows is skipped.
+                uc.reg_write(RegisterARM::EPSR, THUMB).ok()?;
+            }
+            let is_data = data.iter().any(|range| range.contains(&page)) && !run.contains(&page);
+            // What a memory does not allow, the engine finds out by itself.
+            let perms = if is_data { Prot::READ | Prot::WRITE } else { Prot::ALL };
+            Some(TlbEntry { paddr: address, perms })
+        });
+        engine("hook pages", filled).map(|_| ())
+    }
+
+    fn map_bus(&mut self, base: u32, size: u32) -> Result<(), CoreError> {
+        let touch = move |uc: &Hooked<'_, B>, offset: u64, size: usize| Touch {
+            address: base + offset as u32,
+            size: size as u32,
+            pc: uc.pc_read().unwrap_or_default() as u32 & !1,
+            now: uc.get_data().count.meter.cycles,
+        };
+        let read = move |uc: &mut Hooked<'_, B>, offset: u64, size: usize| {
+            let access = touch(uc, offset, size);
+            u64::from(uc.get_data_mut().bus.read(access))
+        };
+        let write = move |uc: &mut Hooked<'_, B>, offset: u64, size: usize, value: u64| {
+            let access = touch(uc, offset, size);
+            uc.get_data_mut().bus.write(access, value as u32);
+        };
+        let mapped = self.engine.mmio_map(base.into(), size.into(), Some(read), Some(write));
+        engine("map the bus", mapped)
+    }
+
+    /// Whether a wait for an interrupt stands there.
+    fn is_wait(&self, address: u32) -> Result<bool, CoreError> {
+        let mut code = [0; 2];
+        self.read(address & !1, &mut code)?;
+        Ok(code == WFI)
+    }
+
+    /// Runs from `address` until a hook stops it, or it comes to `until` or has carried
+    /// out so many instructions, if that is not 0.
+    fn go(
+        &mut self,
+        address: u32,
+        cycles: u64,
+        (until, instructions): (u64, usize),
+    ) -> Result<Stop, CoreError> {
+        let count = &mut self.engine.get_data_mut().count;
+        count.stop = None;
+        count.limit = count.meter.cycles.saturating_add(cycles);
+        count.current = UNSEEN;
+        // Where the host starts the program, nothing has branched.
+        count.next = address & !1;
+        let mut address = address;
+        let ended = loop {
+            let ended = self.engine.emu_start(u64::from(address | 1), until, 0, instructions);
+            let count = &self.engine.get_data().count;
+            match count.stop {
+                Some(Stop::Spent(at)) if !count.wanted.is_empty() => address = at,
+                _ => break ended,
+            }
+            self.hook_wanted()?;
+            self.engine.get_data_mut().count.stop = None;
+        };
+        if let Some(stop) = self.engine.get_data_mut().count.stop.take() {
+            return Ok(stop);
+        }
+        let at = self.register(Register::Pc)?;
+        Ok(match ended {
+            // Only waiting for an interrupt ends it without a hook.
+            Ok(()) => Stop::Wait(at),
+            Err(error) => Stop::Fault { at, fault: fault(error) },
+        })
+    }
+}
+
+/// The engine's name of R0 to R12.
+fn general(number: u8) -> i32 {
+    // The engine numbers R0 to R12 in sequence.
+    RegisterARM::R0 as i32 + i32::from(number)
+}
+
+fn name(register: Register) -> i32 {
+    match register {
+        Register::R(number) => general(number),
+        Register::Sp => RegisterARM::SP as i32,
+        Register::Lr => RegisterARM::LR as i32,
+        Register::Pc => RegisterARM::PC as i32,
+        Register::Psp => RegisterARM::PSP as i32,
+        Register::Xpsr => RegisterARM::XPSR as i32,
+        Register::Control => RegisterARM::CONTROL as i32,
+        Register::Primask => RegisterARM::PRIMASK as i32,
+        Register::Basepri => RegisterARM::BASEPRI as i32,
+        Register::Faultmask => RegisterARM::FAULTMASK as i32,
+        // S0 to S31 too.
+        Register::Float(number) => RegisterARM::S0 as i32 + i32::from(number),
+        Register::Fpscr => RegisterARM::FPSCR as i32,
+    }
+}
+
+impl<B: Bus + 'static> Core for UnicornCore<B> {
+    fn read(&self, address: u32, into: &mut [u8]) -> Result<(), CoreError> {
+        engine("read memory", self.engine.mem_read(address.into(), into))
+    }
+
+    fn write(&mut self, address: u32, bytes: &[u8]) -> Result<(), CoreError> {
+        engine("write memory", self.engine.mem_write(address.into(), bytes))?;
+        let count = &self.engine.get_data().count;
+        if (address.wrapping_sub(count.base) as usize) < count.bytes.len() {
+            // Code that was translated already must not go on as it was.
+            let (from, to) = (u64::from(address & !0xFFF), u64::from(address) + bytes.len() as u64);
+            return engine("forget code", self.engine.ctl_remove_cache(from, to));
+        }
+        Ok(())
+    }
+
+    fn register(&self, register: Register) -> Result<u32, CoreError> {
+        let value = engine("read a register", self.engine.reg_read(name(register)))?;
+        Ok(value as u32)
+    }
+
+    fn set_register(&mut self, register: Register, value: u32) -> Result<(), CoreError> {
+        if register == Register::Primask && value & 1 == 0 {
+            // Set from outside: what was shut by the program is open.
+            self.engine.get_data_mut().shut = None;
+        }
+        let uc = &mut self.engine;
+        if register == Register::Xpsr {
+            // This name takes every field; the plain one leaves some out. Only the
+            // other makes the engine look at the new mode and state.
+            let whole = uc.reg_write(RegisterARM::XPSR_NZCVQG, value.into());
+            engine("set a register", whole)?;
+            return engine("set flags", uc.reg_write(RegisterARM::APSR_NZCV, value.into()));
+        }
+        engine("set a register", uc.reg_write(name(register), value.into()))
+    }
+
+    fn run(&mut self, address: u32, cycles: u64) -> Result<Stop, CoreError> {
+        self.go(address, cycles, (u64::MAX, 0))
+    }
+
+    fn step(&mut self, address: u32) -> Result<Stop, CoreError> {
+        let before = self.meter();
+        engine("forget code", self.engine.ctl_flush_tb())?;
+        let stop = self.go(address, 1, (u64::MAX, 1))?;
+        engine("forget code", self.engine.ctl_flush_tb())?;
+        // The whole piece of code was counted of which one instruction was carried out.
+        let count = &mut self.engine.get_data_mut().count;
+        let instruction = count.at(address).map_or(0, |found| timing::extra(found.kind));
+        count.meter.cycles = before.cycles + 1 + instruction;
+        count.meter.instructions = before.instructions + 1;
+        Ok(match stop {
+            Stop::Wait(at) if !self.is_wait(address)? => Stop::Spent(at),
+            stop => stop,
+        })
+    }
+
+    fn run_to(&mut self, address: u32, cycles: u64, until: u32) -> Result<Stop, CoreError> {
+        engine("forget code", self.engine.ctl_flush_tb())?;
+        let stop = self.go(address, cycles, (u64::from(until & !1), 0))?;
+        engine("forget code", self.engine.ctl_flush_tb())?;
+        Ok(match stop {
+            Stop::Wait(at) if at & !1 == until & !1 => Stop::Spent(at),
+            stop => stop,
+        })
+    }
+
+    fn pass(&mut self, cycles: u64) {
+        self.engine.get_data_mut().count.meter.cycles += cycles;
+    }
+
+    fn meter(&self) -> Meter {
+        self.engine.get_data().count.meter
+    }
+
+    fn mark(&mut self, address: u32) -> Result<(), CoreError> {
+        let marked = &mut self.engine.get_data_mut().marked;
+        if let Err(place) = marked.binary_search(&(address & !1)) {
+            marked.insert(place, address & !1);
+        }
+        Ok(())
+    }
+
+    fn take_marks(&mut self, marks: &mut Vec<Mark>) {
+        marks.append(&mut self.engine.get_data_mut().marks);
+    }
+
+    fn take_masked(&mut self) -> MaskedBy {
+        std::mem::take(&mut self.engine.get_data_mut().masked)
+    }
+
+    fn take_heat(&mut self) -> Heat {
+        let count = &mut self.engine.get_data_mut().count;
+        let mut heat = Heat::new();
+        for index in std::mem::take(&mut count.warm) {
+            let block = &mut count.blocks[index as usize];
+            *heat.entry((block.address, block.size)).or_default() +=
+                std::mem::take(&mut block.heat);
+        }
+        heat
+    }
+}
+
+/// What a processor makes of an engine's error.
+fn fault(error: uc_error) -> Fault {
+    match error {
+        uc_error::INSN_INVALID => Fault::Undefined,
+        uc_error::FETCH_UNMAPPED | uc_error::FETCH_PROT | uc_error::FETCH_UNALIGNED => Fault::Fetch,
+        uc_error::READ_UNMAPPED | uc_error::READ_PROT | uc_error::READ_UNALIGNED => Fault::Read,
+        uc_error::WRITE_UNMAPPED | uc_error::WRITE_PROT | uc_error::WRITE_UNALIGNED => Fault::Write,
+        _ => Fault::Other,
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,162 @@
+//! Small pieces of machine code, with cycles counted by hand.
+
+use super::*;
+use crate::timing::REFILL;
+
+const FLASH: u32 = 0x0800_0000;
+const RAM: u32 = 0x2000_0000;
+
+/// A core with this code at the beginning of flash and a breakpoint after it.
+fn core(code: &[u16]) -> UnicornCore {
+    let mut bytes: Vec<u8> = code.iter().flat_map(|half| half.to_le_bytes()).collect();
+    bytes.extend([0x00, 0xBE]);
+    let range = FLASH..FLASH + bytes.len() as u32;
+    bytes.resize(0x1000, 0);
+    let memories = [
+        Memory { base: FLASH, size: 0x1000, access: Access::Code },
+        Memory { base: RAM, size: 0x1000, access: Access::Data },
+    ];
+    let counted = Counted { base: FLASH, bytes: &bytes, code: std::slice::from_ref(&range) };
+    let mut core = UnicornCore::new(&memories, &counted).expect("a core");
+    core.set_register(Register::R(0), RAM).expect("set");
+    core.set_register(Register::Sp, RAM + 0x1000).expect("set");
+    core
+}
+
+/// Cycles and instructions of the code, the breakpoint's own taken off.
+fn cost(core: &mut UnicornCore) -> (u64, u64) {
+    let before = core.meter();
+    let stop = core.run(FLASH, 10_000).expect("runs");
+    assert!(matches!(stop, Stop::Breakpoint(_)), "{stop:?}");
+    let spent = core.meter().since(before);
+    (spent.cycles - 1, spent.instructions - 1)
+}
+
+#[test]
+fn straight_code_costs_its_instructions_and_words() {
+    // adds r1, r1, #1; ldr r2, [r0]; push {r1, r2, r3}; ldrd r4, r5, [r0]
+    let mut core = core(&[0x3101, 0x6802, 0xB40E, 0xE9D0, 0x4500]);
+    assert_eq!(cost(&mut core), (1 + 2 + 4 + 3, 4));
+}
+
+#[test]
+fn a_branch_taken_refills_the_pipeline_and_one_not_taken_does_not() {
+    // cmp r1, #0; beq to the breakpoint; nop
+    let code = [0x2900, 0xD000, 0xBF00];
+    let mut taken = core(&code);
+    taken.set_register(Register::R(1), 0).expect("set");
+    assert_eq!(cost(&mut taken), (2 + REFILL, 2));
+    let mut passed = core(&code);
+    passed.set_register(Register::R(1), 1).expect("set");
+    assert_eq!(cost(&mut passed), (3, 3));
+}
+
+#[test]
+fn what_a_condition_skips_costs_one_cycle() {
+    // cmp r1, #0; itt eq; ldmeq r0, {r2, r3, r4}; udiveq r5, r6, r7
+    let code = [0x2900, 0xBF04, 0xE890, 0x001C, 0xFBB6, 0xF5F7];
+    let mut skipped = core(&code);
+    skipped.set_register(Register::R(1), 1).expect("set");
+    assert_eq!(cost(&mut skipped), (4, 4));
+    let mut done = core(&code);
+    done.set_register(Register::R(1), 0).expect("set");
+    done.set_register(Register::R(6), u32::MAX).expect("set");
+    done.set_register(Register::R(7), 1).expect("set");
+    assert_eq!(cost(&mut done), (2 + 4 + 12, 4));
+    assert_eq!(done.register(Register::R(5)), Ok(u32::MAX));
+}
+
+#[test]
+fn a_division_costs_by_its_operands() {
+    // sdiv r1, r2, r3
+    let mut core = core(&[0xFB92, 0xF1F3]);
+    core.set_register(Register::R(2), -5_i32 as u32).expect("set");
+    core.set_register(Register::R(3), 7).expect("set");
+    assert_eq!(cost(&mut core), (2, 1));
+    core.set_register(Register::R(2), i32::MIN as u32).expect("set");
+    core.set_register(Register::R(3), 1).expect("set");
+    assert_eq!(cost(&mut core), (12, 1));
+}
+
+#[test]
+fn a_loop_costs_every_round() {
+    // movs r1, #3; subs r1, #1; bne to the subtraction
+    let mut core = core(&[0x2103, 0x3901, 0xD1FD]);
+    assert_eq!(cost(&mut core), (1 + 3 * 2 + 2 * REFILL, 7));
+}
+
+#[test]
+fn floating_point_has_its_own_prices() {
+    // vdiv.f32 s0, s1, s2; vadd.f32 s0, s0, s1; vfma.f32 s0, s1, s2
+    let mut core = core(&[0xEE80, 0x0A81, 0xEE30, 0x0A20, 0xEEA0, 0x0A81]);
+    assert_eq!(cost(&mut core), (14 + 1 + 3, 3));
+}
+
+#[test]
+fn the_heat_is_the_total_and_is_given_once() {
+    let mut core = core(&[0x2103, 0x3901, 0xD1FD]);
+    let before = core.meter();
+    core.run(FLASH, 10_000).expect("runs");
+    let total = core.meter().since(before).cycles;
+    assert_eq!(core.take_heat().values().sum::<u64>(), total);
+    assert!(core.take_heat().is_empty());
+}
+
+#[test]
+fn a_loop_without_end_is_stopped_when_its_cycles_are_spent() {
+    // b to itself
+    let mut core = core(&[0xE7FE]);
+    assert_eq!(core.run(FLASH, 1_000), Ok(Stop::Spent(FLASH)));
+    assert!((1_000..1_004).contains(&core.meter().cycles));
+}
+
+#[test]
+fn an_access_to_nothing_names_its_place() {
+    // nop; ldr r1, [r2]
+    let mut core = core(&[0xBF00, 0x6811]);
+    core.set_register(Register::R(2), 0x4000_0000).expect("set");
+    let stop = core.run(FLASH, 1_000).expect("stops");
+    assert_eq!(stop, Stop::Fault { at: FLASH + 2, fault: Fault::Read });
+}
+
+#[test]
+fn a_page_first_met_in_a_conditional_block_leaves_no_condition_behind() {
+    // cmp r1, #0; ittt eq; ldreq r2, [r0]; streq r2, [r0, #4]; moveq r3, #7;
+    // b over a nop; movs r4, #5; adds r4, #1
+    let code = [0x2900, 0xBF02, 0x6802, 0x6042, 0x2307, 0xE000, 0xBF00, 0x2405, 0x3401];
+    let mut core = core(&code);
+    core.set_register(Register::R(1), 0).expect("set");
+    core.write(RAM, &9_u32.to_le_bytes()).expect("RAM");
+    cost(&mut core);
+    let registers = [2, 3, 4].map(|r| core.register(Register::R(r)).expect("told"));
+    assert_eq!(registers, [9, 7, 6]);
+}
+
+#[test]
+fn a_program_may_write_what_it_runs_in_ram() {
+    // str r2, [r0]; bx r3, with `movs r5, #1; bx lr` and then `movs r5, #2; bx lr` in r2
+    let mut core = core(&[0x6002, 0x4718]);
+    core.set_register(Register::R(3), RAM | 1).expect("set");
+    core.set_register(Register::Lr, (FLASH + 4) | 1).expect("set");
+    for value in [1, 2, 1, 3] {
+        core.set_register(Register::R(2), 0x4770_2500 | value).expect("set");
+        let stop = core.run(FLASH, 10_000).expect("runs");
+        assert_eq!(stop, Stop::Breakpoint(FLASH + 4));
+        assert_eq!(core.register(Register::R(5)), Ok(value));
+    }
+}
+
+#[test]
+fn stretches_without_interrupts_are_timed_from_where_they_begin() {
+    // nop; cpsid i; nop; ldr r2, [r0]; cpsid i; nop; cpsie i; nop; cpsid i; msr primask, r1
+    let code =
+        [0xBF00, 0xB672, 0xBF00, 0x6802, 0xB672, 0xBF00, 0xB662, 0xBF00, 0xB672, 0xF381, 0x8810];
+    let mut core = core(&code);
+    core.set_register(Register::R(1), 0).expect("set");
+    core.run(FLASH, 10_000).expect("runs");
+    let masked = core.take_masked();
+    let worst: Vec<_> = masked.iter().map(|(place, by)| (*place, by.times, by.worst)).collect();
+    // The first goes on through the second place up to where they are let in.
+    assert_eq!(worst, [((FLASH + 2, 0), 1, 1 + 2 + 1 + 1 + 1), ((FLASH + 16, 0), 1, 1)]);
+    assert!(core.take_masked().is_empty());
+}

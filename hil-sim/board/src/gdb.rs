@@ -1,0 +1,216 @@
+//! A debugger on the emulated board, over GDB's remote protocol: registers, memory,
+//! breakpoints, single steps, while the plant goes on with the board's own clock.
+//!
+//! A breakpoint is the processor's own instruction for it in the place of another, which
+//! is put back before it is carried out. Whatever is looked at, no time passes.
+
+mod arch;
+mod target;
+
+use std::collections::BTreeMap;
+use std::io;
+use std::net::{TcpListener, TcpStream};
+
+use gdbstub::common::Signal;
+use gdbstub::conn::ConnectionExt;
+use gdbstub::stub::run_blocking::{BlockingEventLoop, Event, WaitForStopReasonError};
+use gdbstub::stub::{DisconnectReason, GdbStub, SingleThreadStopReason};
+
+use super::bench::{Bench, BenchError};
+use super::log::{Line, Strings};
+use hil_sim::scenario::{Direction, Scenario};
+
+use target::Fatal;
+
+/// `BKPT 0`.
+const BREAK: [u8; 2] = [0x00, 0xBE];
+/// Port if none is given.
+const PORT: u16 = 3333;
+
+/// Why there is no debugging.
+#[derive(Debug, thiserror::Error)]
+pub enum GdbError {
+    /// The address cannot be listened at.
+    #[error("{address}: {source}")]
+    Listen {
+        /// The address.
+        address: String,
+        /// Why.
+        source: io::Error,
+    },
+    /// The connection.
+    #[error("the debugger's connection failed: {0}")]
+    Connection(String),
+    /// The board or its plant.
+    #[error(transparent)]
+    Bench(#[from] BenchError),
+}
+
+/// Listens at `[host]:[port]`; without a host on this machine alone.
+///
+/// # Errors
+/// [`GdbError::Listen`] if that cannot be done.
+pub fn listen(address: &str) -> Result<TcpListener, GdbError> {
+    let (host, port) = address.rsplit_once(':').unwrap_or((address, ""));
+    let host = if host.is_empty() { "127.0.0.1" } else { host };
+    let port = if port.is_empty() { Ok(PORT) } else { port.parse() };
+    let failed = |source| GdbError::Listen { address: address.to_owned(), source };
+    let port = port.map_err(|error| failed(io::Error::new(io::ErrorKind::InvalidInput, error)))?;
+    TcpListener::bind((host, port)).map_err(failed)
+}
+
+/// Waits for a debugger and lets it have the board with the image in `elf`, before its
+/// first instruction. The command to set off is given once the drive is idle. Returns when
+/// the debugger goes.
+///
+/// # Errors
+/// [`GdbError`] if the board or the connection fails.
+pub fn serve(
+    listener: &TcpListener,
+    elf: &[u8],
+    scenario: &Scenario,
+    watch: impl FnMut(f64, &Line),
+) -> Result<(), GdbError> {
+    let (stream, _) = listener.accept().map_err(|error| GdbError::Connection(error.to_string()))?;
+    let strings = Strings::of(elf).map_err(BenchError::from)?;
+    let bench = Bench::new(elf, &strings, scenario).map_err(BenchError::from)?;
+    let start = match scenario.run.direction {
+        Direction::Deploy => b's',
+        Direction::Retract => b'r',
+    };
+    let mut board = Debugged {
+        bench,
+        breaks: BTreeMap::new(),
+        steps: false,
+        start: Some(start),
+        idle: false,
+        watch: Box::new(watch),
+    };
+    match GdbStub::new(stream).run_blocking::<Loop>(&mut board) {
+        Ok(DisconnectReason::Disconnect | DisconnectReason::Kill) => Ok(()),
+        Ok(reason) => Err(GdbError::Connection(format!("{reason:?}"))),
+        Err(error) if error.is_target_error() => Err(error
+            .into_target_error()
+            .map_or(GdbError::Connection(String::new()), |e| GdbError::Bench(e.0))),
+        Err(error) => Err(GdbError::Connection(error.to_string())),
+    }
+}
+
+/// Is shown each line of the log as it comes.
+type Watch<'a> = Box<dyn FnMut(f64, &Line) + 'a>;
+
+/// A board in the hands of a debugger.
+struct Debugged<'a> {
+    bench: Bench<'a>,
+    /// Breakpoints with what stands in their places.
+    breaks: BTreeMap<u32, [u8; 2]>,
+    /// Asked to go on by one instruction.
+    steps: bool,
+    /// The letter that sets off, until it is sent.
+    start: Option<u8>,
+    /// The drive has said that it is idle.
+    idle: bool,
+    watch: Watch<'a>,
+}
+
+impl Debugged<'_> {
+    /// Ends the millisecond if its time is over.
+    fn close(&mut self) -> Result<(), BenchError> {
+        if self.bench.is_due() {
+            let (_, lines) = self.bench.close()?;
+            for line in &lines {
+                self.idle |= line.text.contains("mode: idle");
+                (self.watch)(self.bench.time_s(), line);
+            }
+        }
+        if self.idle
+            && let Some(letter) = self.start
+            && self.bench.send(letter)?
+        {
+            self.start = None;
+        }
+        Ok(())
+    }
+
+    /// Carries out what stands at the program counter, a breakpoint or not.
+    fn step(&mut self) -> Result<(), BenchError> {
+        let machine = self.bench.machine_mut();
+        let place = machine.pc();
+        if let Some(kept) = self.breaks.get(&place) {
+            machine.poke(place, kept)?;
+        }
+        self.bench.step_instruction()?;
+        if self.breaks.contains_key(&place) {
+            self.bench.machine_mut().poke(place, &BREAK)?;
+        }
+        self.close()
+    }
+
+    /// Goes on up to a breakpoint, or a millisecond at most.
+    fn run(&mut self) -> Result<Option<SingleThreadStopReason<u32>>, BenchError> {
+        if self.breaks.contains_key(&self.bench.machine().pc()) {
+            self.step()?;
+        }
+        let stop = self.bench.run_to_break()?;
+        self.close()?;
+        Ok(stop.map(|place| match self.breaks.contains_key(&place) {
+            true => SingleThreadStopReason::SwBreak(()),
+            false => SingleThreadStopReason::Signal(Signal::SIGTRAP),
+        }))
+    }
+}
+
+/// What the debugger and the board wait for.
+struct Loop<'a>(std::marker::PhantomData<&'a ()>);
+
+type Waited<'a> = Result<
+    Event<SingleThreadStopReason<u32>>,
+    WaitForStopReasonError<Fatal, <TcpStream as gdbstub::conn::Connection>::Error>,
+>;
+
+impl<'a> BlockingEventLoop for Loop<'a> {
+    type Target = Debugged<'a>;
+    type Connection = TcpStream;
+    type StopReason = SingleThreadStopReason<u32>;
+
+    fn wait_for_stop_reason(board: &mut Debugged<'a>, stream: &mut TcpStream) -> Waited<'a> {
+        let failed = |error: BenchError| WaitForStopReasonError::Target(Fatal(error));
+        loop {
+            if stream.peek().map_err(WaitForStopReasonError::Connection)?.is_some() {
+                let byte =
+                    ConnectionExt::read(stream).map_err(WaitForStopReasonError::Connection)?;
+                return Ok(Event::IncomingData(byte));
+            }
+            if board.steps {
+                board.step().map_err(failed)?;
+                return Ok(Event::TargetStopped(SingleThreadStopReason::DoneStep));
+            }
+            if let Some(stop) = board.run().map_err(failed)? {
+                return Ok(Event::TargetStopped(stop));
+            }
+        }
+    }
+
+    fn on_interrupt(_: &mut Debugged<'a>) -> Result<Option<Self::StopReason>, Fatal> {
+        Ok(Some(SingleThreadStopReason::Signal(Signal::SIGINT)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_a_host_it_is_this_machine_alone() {
+        let listener = listen(":0").expect("a port");
+        assert!(listener.local_addr().expect("bound").ip().is_loopback());
+    }
+
+    #[test]
+    fn an_address_that_is_none_is_named() {
+        for address in [":x", ":99999", "no such host:1"] {
+            let error = listen(address).expect_err("none").to_string();
+            assert!(error.starts_with(address), "{error}");
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! Names of functions by address, from the image's debug information, so that what was
+//! inlined is still told apart.
+
+use addr2line::Context;
+use gimli::{Dwarf, EndianSlice, LittleEndian, SectionId};
+use object::read::elf::ElfFile32;
+use object::{Endianness, Object, ObjectSection};
+
+use crate::elf::form;
+use crate::image::ImageError;
+
+type Slice<'a> = EndianSlice<'a, LittleEndian>;
+
+/// Names of functions by address.
+pub(crate) struct Names<'a>(Context<Slice<'a>>);
+
+impl<'a> Names<'a> {
+    /// Reads the debug information of `elf`.
+    pub(crate) fn read(elf: &'a [u8]) -> Result<Self, ImageError> {
+        let file = ElfFile32::<Endianness>::parse(elf).map_err(form)?;
+        let section = |id: SectionId| -> Result<Slice<'a>, gimli::Error> {
+            let data = file.section_by_name(id.name()).and_then(|s| s.data().ok());
+            Ok(EndianSlice::new(data.unwrap_or_default(), LittleEndian))
+        };
+        let dwarf = Dwarf::load(section).map_err(form)?;
+        Ok(Self(Context::from_dwarf(dwarf).map_err(form)?))
+    }
+
+    /// The functions of the source at this address, innermost first, none without debug
+    /// information.
+    pub(crate) fn frames(&self, address: u32) -> Vec<Frame> {
+        let Ok(mut frames) = self.0.find_frames(address.into()).skip_all_loads() else {
+            return Vec::new();
+        };
+        let mut found = Vec::new();
+        while let Ok(Some(frame)) = frames.next() {
+            let named = frame.function.and_then(|name| name.demangle().ok().map(|n| short(&n)));
+            let place = frame.location;
+            found.push(Frame {
+                function: named.unwrap_or_default(),
+                file: place.as_ref().and_then(|p| p.file).map(shortened).unwrap_or_default(),
+                line: place.and_then(|p| p.line).unwrap_or_default(),
+            });
+        }
+        found
+    }
+
+    /// The innermost function at this address, without type parameters.
+    pub(super) fn at(&self, address: u32) -> Option<String> {
+        let mut frames = self.0.find_frames(address.into()).skip_all_loads().ok()?;
+        let name = frames.next().ok()??.function?;
+        Some(short(&name.demangle().ok()?))
+    }
+}
+
+/// A function of the source, and a place in it.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct Frame {
+    /// Name, with the crate's.
+    pub function: String,
+    /// File: of this project from its folder on, of others from that of their crate on.
+    pub file: String,
+    /// Line, 0 where the compiler gives none.
+    pub line: u32,
+}
+
+/// A path of the debug information from where it says something.
+fn shortened(path: &str) -> String {
+    let own = concat!(env!("CARGO_MANIFEST_DIR"), "/");
+    let own = own.strip_suffix("hil-sim/").unwrap_or(own);
+    if let Some(rest) = path.strip_prefix(own) {
+        return rest.to_owned();
+    }
+    if let Some((_, rest)) = path.split_once("/registry/src/") {
+        return rest.split_once('/').map_or(rest, |(_, rest)| rest).to_owned();
+    }
+    match path.split_once("/library/") {
+        Some((_, rest)) => rest.to_owned(),
+        // A library's, as `firmware::build` leaves it.
+        None => path.strip_prefix('/').unwrap_or(path).to_owned(),
+    }
+}
+
+/// A demangled name without its hash.
+fn short(name: &str) -> String {
+    match name.rsplit_once("::h") {
+        Some((path, hash)) if hash.len() == 16 && hash.bytes().all(|b| b.is_ascii_hexdigit()) => {
+            path.to_owned()
+        }
+        _ => name.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hash_is_cut_and_nothing_else() {
+        assert_eq!(short("a::b::h0123456789abcdef"), "a::b");
+        assert_eq!(short("a::halve"), "a::halve");
+    }
+}

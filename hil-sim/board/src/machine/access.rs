@@ -1,0 +1,81 @@
+//! What a debug probe may do to a board: memory, peripherals' registers, the core's.
+
+use super::Machine;
+use crate::core::{Access, Bus, Core, CoreError, Register};
+use crate::elf::FLASH;
+
+impl Machine {
+    /// Reads memory, as a debug probe does.
+    ///
+    /// # Errors
+    /// [`CoreError::Engine`] if nothing lies there.
+    pub fn peek(&self, address: u32, into: &mut [u8]) -> Result<(), CoreError> {
+        self.core.read(address, into)
+    }
+
+    /// Where these bytes stand in flash, at their first place if there are several.
+    ///
+    /// # Errors
+    /// [`CoreError::Engine`] if flash cannot be read.
+    pub fn find(&self, bytes: &[u8]) -> Result<Option<u32>, CoreError> {
+        let mut flash = vec![0; FLASH.size as usize];
+        self.core.read(FLASH.base, &mut flash)?;
+        let mut places = flash.windows(bytes.len().max(1));
+        Ok(places.position(|place| place == bytes).map(|at| FLASH.base + at as u32))
+    }
+
+    /// A word of memory.
+    ///
+    /// # Errors
+    /// [`CoreError::Engine`] if nothing lies there.
+    pub fn word(&self, address: u32) -> Result<u32, CoreError> {
+        let mut bytes = [0; 4];
+        self.core.read(address, &mut bytes)?;
+        Ok(u32::from_le_bytes(bytes))
+    }
+
+    /// Writes memory, as a debug probe does.
+    ///
+    /// # Errors
+    /// [`CoreError::Engine`] if nothing lies there.
+    pub fn poke(&mut self, address: u32, bytes: &[u8]) -> Result<(), CoreError> {
+        self.core.write(address, bytes)
+    }
+
+    /// Writes a word to a peripheral's register, as a debug probe does.
+    pub fn poke_register(&mut self, address: u32, value: u32) {
+        let access = Access { address, size: 4, pc: self.pc, now: self.now() };
+        self.chip_mut().write(access, value);
+    }
+
+    /// Reads a word from a peripheral's register, with what reading it does.
+    pub fn peek_register(&mut self, address: u32) -> u32 {
+        let access = Access { address, size: 4, pc: self.pc, now: self.now() };
+        self.chip_mut().read(access)
+    }
+
+    /// A register of the core.
+    ///
+    /// # Errors
+    /// [`CoreError::Engine`] if the engine does not tell.
+    pub fn register(&self, register: Register) -> Result<u32, CoreError> {
+        self.core.register(register)
+    }
+
+    /// Where the program stands.
+    #[must_use]
+    pub const fn pc(&self) -> u32 {
+        self.pc
+    }
+
+    /// Sets a register of the core.
+    ///
+    /// # Errors
+    /// [`CoreError::Engine`] if the engine does not take it.
+    pub fn set_register(&mut self, register: Register, value: u32) -> Result<(), CoreError> {
+        if register == Register::Pc {
+            self.pc = value & !1;
+        }
+        self.core.set_register(register, value)
+    }
+}

@@ -1,0 +1,83 @@
+//! Which task runs: the executor calls each through the same kind of function, with a
+//! pointer into the task's own memory.
+
+use crate::elf::Loaded;
+use crate::thumb;
+
+/// Part of the name of the functions through which tasks are run.
+const POLL: &str = "TaskStorage<F>::poll";
+/// Name of the memory of a task inside the function that spawns it.
+const POOL: &str = "POOL";
+
+/// The tasks of an image.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Tasks {
+    /// Address of a task's memory, and its name, in the order of the addresses.
+    pools: Vec<(u32, String)>,
+    /// Where a task begins to run.
+    begins: Vec<u32>,
+    /// Where it is back in the executor.
+    ends: Vec<u32>,
+}
+
+impl Tasks {
+    /// Finds the tasks by the symbols of an image.
+    pub(super) fn of(image: &Loaded) -> Self {
+        let mut pools: Vec<(u32, String)> = image
+            .symbols()
+            .filter_map(|(symbol, at)| {
+                let name = format!("{:#}", rustc_demangle::demangle(symbol));
+                let task = name.strip_suffix(POOL)?.trim_end_matches(':').rsplit("::").next()?;
+                Some((at, task.trim_start_matches('_').to_owned()))
+            })
+            .collect();
+        pools.sort();
+        let polls = image.functions.iter().filter(|f| f.name.contains(POLL));
+        let begins = polls.map(|f| f.range.start).collect();
+        Self { pools, begins, ends: ends(image) }
+    }
+
+    /// Every address to be marked.
+    pub(super) fn marks(&self) -> impl Iterator<Item = u32> {
+        self.begins.iter().chain(&self.ends).copied()
+    }
+
+    /// The task that begins at `address` with this pointer; none where one ends.
+    pub(super) fn begins(&self, address: u32, pointer: u32) -> Option<usize> {
+        if !self.begins.contains(&address) {
+            return None;
+        }
+        self.pools.partition_point(|(at, _)| *at <= pointer).checked_sub(1)
+    }
+
+    /// Names, by the numbers that [`Tasks::begins`] gives.
+    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
+        self.pools.iter().map(|(_, name)| name.as_str())
+    }
+}
+
+/// Addresses behind calls through a register in the executor's functions.
+fn ends(image: &Loaded) -> Vec<u32> {
+    let executor = |name: &str| {
+        name.contains("Executor::poll")
+            || name.contains("Executor::on_interrupt")
+            || name.contains("Executor::run")
+            || name.contains("UART5")
+            || name.contains("main")
+    };
+    let mut found = Vec::new();
+    for function in image.functions.iter().filter(|f| executor(&f.name)) {
+        let base = crate::elf::FLASH.base;
+        let bytes = (function.range.start - base) as usize..(function.range.end - base) as usize;
+        let code = image.flash.get(bytes).unwrap_or_default();
+        for (address, instruction, _) in thumb::sweep(code, function.range.start) {
+            let at = (address - function.range.start) as usize;
+            let half = u16::from_le_bytes([code[at], code[at + 1]]);
+            // BLX Rm.
+            if instruction.size == 2 && half & 0xFF87 == 0x4780 {
+                found.push(address + 2);
+            }
+        }
+    }
+    found
+}

@@ -1,0 +1,196 @@
+//! The rules of the reference manual, one a test.
+
+use super::*;
+use crate::peripherals::rcc::Cause;
+
+const ALL: u32 = u32::MAX;
+const ERASED: [u8; 8] = [0xFF; 8];
+/// The first page of the second bank.
+const PLACE: u32 = BASE + BANK_BYTES;
+
+fn write(flash: &mut Flash, offset: u32, value: u32, now: u64) {
+    flash.write(offset, Write { value, mask: ALL }, now).expect("modelled");
+}
+
+fn unlocked() -> Flash {
+    let mut flash = Flash::default();
+    for key in KEYS {
+        write(&mut flash, KEYR, key, 0);
+    }
+    flash
+}
+
+fn programming() -> Flash {
+    let mut flash = unlocked();
+    write(&mut flash, CR, PROGRAM, 0);
+    flash
+}
+
+fn status(flash: &mut Flash) -> u32 {
+    flash.read(SR, 0).expect("modelled")
+}
+
+/// Writes a double word where `before` stands and waits for its end.
+fn program(flash: &mut Flash, address: u32, value: u64, before: [u8; 8]) -> Option<Change> {
+    flash.store(address, 4, value as u32);
+    flash.store(address + 4, 4, (value >> 32) as u32);
+    if flash.asks_for() == Some(address) {
+        flash.found(before, 0);
+    }
+    flash.advance(PROGRAM_CYCLES);
+    flash.take_change()
+}
+
+#[test]
+fn two_keys_in_their_order_open_it() {
+    let mut flash = unlocked();
+    assert_eq!(flash.read(CR, 0), Some(1 << 30));
+    write(&mut flash, CR, LOCK, 0);
+    write(&mut flash, CR, PROGRAM, 0);
+    assert_eq!(flash.read(CR, 0), Some(LOCK | 1 << 30), "locked, it takes nothing");
+}
+
+#[test]
+fn a_wrong_key_locks_it_until_reset() {
+    let mut flash = Flash::default();
+    for key in [1, KEYS[0], KEYS[1]] {
+        write(&mut flash, KEYR, key, 0);
+    }
+    assert_eq!(flash.read(CR, 0).map(|cr| cr & LOCK), Some(LOCK));
+    assert_eq!(flash.reset(), None);
+    for key in KEYS {
+        write(&mut flash, KEYR, key, 0);
+    }
+    assert_eq!(flash.read(CR, 0).map(|cr| cr & LOCK), Some(0));
+}
+
+#[test]
+fn a_double_word_takes_its_time_and_its_two_words() {
+    let mut flash = programming();
+    flash.store(PLACE, 4, 0x0403_0201);
+    assert_eq!((status(&mut flash), flash.asks_for()), (0, None));
+    flash.store(PLACE + 4, 4, 0x0807_0605);
+    assert_eq!(flash.asks_for(), Some(PLACE));
+    flash.found(ERASED, 1000);
+    assert_eq!((status(&mut flash), flash.deadline()), (BUSY, 1000 + PROGRAM_CYCLES));
+    flash.advance(999 + PROGRAM_CYCLES);
+    assert_eq!(flash.take_change(), None);
+    flash.advance(1000 + PROGRAM_CYCLES);
+    let bytes = [1, 2, 3, 4, 5, 6, 7, 8];
+    assert_eq!(flash.take_change(), Some(Change::Programmed { address: PLACE, bytes }));
+    assert_eq!(status(&mut flash), 0, "its end shows only where it is to interrupt");
+}
+
+#[test]
+fn only_erased_flash_takes_anything_but_zeros() {
+    let mut flash = programming();
+    let used = 7_u64.to_le_bytes();
+    assert_eq!(program(&mut flash, PLACE, 6, used), None);
+    assert_eq!(status(&mut flash), NOT_ERASED);
+    write(&mut flash, SR, NOT_ERASED, 0);
+    assert!(program(&mut flash, PLACE, 0, used).is_some());
+    assert_eq!(status(&mut flash), 0);
+}
+
+#[test]
+fn breaking_a_rule_raises_its_flag_and_programs_nothing() {
+    type Breaks = fn(&mut Flash);
+    let cases: [(Breaks, u32); 5] = [
+        (|flash| flash.store(PLACE, 2, 0), SIZE),
+        (|flash| flash.store(PLACE + 4, 4, 0), ALIGNMENT),
+        (
+            |flash| {
+                flash.store(PLACE, 4, 0);
+                flash.store(PLACE + 12, 4, 0);
+            },
+            ALIGNMENT,
+        ),
+        (
+            |flash| {
+                write(flash, CR, 0, 0);
+                flash.store(PLACE, 4, 0);
+            },
+            SEQUENCE,
+        ),
+        (|flash| write(flash, CR, PROGRAM | PAGE | START, 0), SEQUENCE),
+    ];
+    for (breaks, flag) in cases {
+        let mut flash = programming();
+        breaks(&mut flash);
+        assert_eq!(status(&mut flash), flag);
+        // An error that is not cleared makes the next one.
+        write(&mut flash, CR, PROGRAM, 0);
+        assert_eq!(program(&mut flash, PLACE, 1, ERASED), None);
+        assert_eq!(status(&mut flash), flag | SEQUENCE);
+        write(&mut flash, SR, ALL, 0);
+        assert!(program(&mut flash, PLACE, 1, ERASED).is_some());
+    }
+}
+
+#[test]
+fn a_page_of_either_bank_is_erased_in_its_time() {
+    for (control, address, size) in [
+        (PAGE | 5 << 3, BASE + 5 * PAGE_BYTES, PAGE_BYTES),
+        (PAGE | SECOND_BANK | 127 << 3, BASE + 2 * BANK_BYTES - PAGE_BYTES, PAGE_BYTES),
+        (BANKS[1], BASE + BANK_BYTES, BANK_BYTES),
+    ] {
+        let mut flash = unlocked();
+        write(&mut flash, CR, control | START, 50);
+        assert_eq!((status(&mut flash), flash.deadline()), (BUSY, 50 + ERASE_CYCLES));
+        flash.advance(50 + ERASE_CYCLES);
+        assert_eq!(flash.take_change(), Some(Change::Erased { address, size }));
+    }
+}
+
+#[test]
+fn the_end_and_errors_interrupt_where_that_is_wanted() {
+    let mut flash = unlocked();
+    write(&mut flash, CR, PROGRAM | END_INTERRUPT | ERROR_INTERRUPT, 0);
+    assert!(program(&mut flash, PLACE, 1, ERASED).is_some());
+    assert!(flash.asks());
+    write(&mut flash, SR, END, 0);
+    assert!(!flash.asks());
+    flash.store(PLACE, 1, 0);
+    assert!(flash.asks());
+}
+
+#[test]
+fn power_that_goes_in_the_middle_leaves_half() {
+    let mut flash = programming();
+    flash.cut_power(Cut::Within(2));
+    assert!(program(&mut flash, PLACE, 1, ERASED).is_some() && flash.ends_by().is_none());
+    assert_eq!(program(&mut flash, PLACE + 8, 0x1111_2222_3333_4444, ERASED), None);
+    assert_eq!(flash.ends_by(), Some(Cause::Power));
+    let bytes = [0x44, 0x44, 0x33, 0x33, 0xFF, 0xFF, 0xFF, 0xFF];
+    assert_eq!(flash.reset(), Some(Change::Programmed { address: PLACE + 8, bytes }));
+    assert_eq!(flash.ends_by(), None, "it comes back and stays");
+}
+
+#[test]
+fn a_reset_in_the_middle_leaves_half_too() {
+    assert_eq!(erased_until(Cut::Pulled(1)), (Some(Cause::Pin), PAGE_BYTES / 2));
+}
+
+#[test]
+fn power_that_goes_behind_an_operation_finds_it_done() {
+    assert_eq!(erased_until(Cut::After(1)), (Some(Cause::Power), PAGE_BYTES));
+}
+
+/// Erases the first page until this ends it: what ended it, and how much is erased.
+fn erased_until(cut: Cut) -> (Option<Cause>, u32) {
+    let mut flash = unlocked();
+    flash.cut_power(cut);
+    write(&mut flash, CR, PAGE | START, 0);
+    flash.advance(ERASE_CYCLES);
+    let cause = flash.ends_by();
+    let Some(Change::Erased { address: BASE, size }) = flash.reset() else {
+        panic!("nothing erased at the beginning");
+    };
+    (cause, size)
+}
+
+#[test]
+fn option_bytes_are_not_modelled() {
+    let mut flash = unlocked();
+    assert_eq!(flash.write(CR, Write { value: 1 << 17, mask: ALL }, 0), None);
+}

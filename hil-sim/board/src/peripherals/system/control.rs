@@ -1,0 +1,244 @@
+//! The system control block: vectors, faults and their status, reset by software.
+
+use super::Write;
+use crate::core::Fault;
+use crate::exceptions::Exceptions;
+use crate::exceptions::number::{BUS_FAULT, HARD_FAULT, PEND_SV, SYS_TICK, USAGE_FAULT};
+
+const CPUID: u32 = 0xD00;
+const ICSR: u32 = 0xD04;
+const VTOR: u32 = 0xD08;
+const AIRCR: u32 = 0xD0C;
+const SCR: u32 = 0xD10;
+const CCR: u32 = 0xD14;
+const SHCSR: u32 = 0xD24;
+const CFSR: u32 = 0xD28;
+const HFSR: u32 = 0xD2C;
+const DFSR: u32 = 0xD30;
+const MMFAR: u32 = 0xD34;
+const BFAR: u32 = 0xD38;
+const AFSR: u32 = 0xD3C;
+const CPACR: u32 = 0xD88;
+const DEMCR: u32 = 0xDFC;
+const FPCCR: u32 = 0xF34;
+const FPDSCR: u32 = 0xF3C;
+
+/// A fault with the bit of the status register that names it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cause {
+    /// What the core met in the program.
+    Program(Fault),
+    /// Stacking at the entry of an exception.
+    Stacking,
+    /// Unstacking at its return.
+    Unstacking,
+}
+
+impl Cause {
+    const fn status(self) -> u32 {
+        match self {
+            // UNDEFINSTR, IBUSERR, PRECISERR.
+            Self::Program(Fault::Undefined) => 1 << 16,
+            Self::Program(Fault::Fetch) => 1 << 8,
+            Self::Program(Fault::Read | Fault::Write | Fault::Other) => 1 << 9,
+            // STKERR, UNSTKERR.
+            Self::Stacking => 1 << 12,
+            Self::Unstacking => 1 << 11,
+        }
+    }
+}
+
+/// The system control block.
+#[derive(Clone, Debug)]
+pub struct Control {
+    vectors: u32,
+    sleep: u32,
+    config: u32,
+    enables: u32,
+    faults: u32,
+    hard: u32,
+    coprocessors: u32,
+    monitor: u32,
+    float_context: u32,
+    float_default: u32,
+    /// The program asks for a reset.
+    pub wants_reset: bool,
+}
+
+impl Control {
+    pub(super) fn new(vectors: u32) -> Self {
+        Self {
+            vectors,
+            sleep: 0,
+            config: 0x200,
+            enables: 0,
+            faults: 0,
+            hard: 0,
+            coprocessors: 0,
+            monitor: 0,
+            float_context: 0xC000_0000,
+            float_default: 0,
+            wants_reset: false,
+        }
+    }
+
+    /// Address of an exception's vector.
+    #[must_use]
+    pub fn vector(&self, number: u8) -> u32 {
+        self.vectors + 4 * u32::from(number)
+    }
+
+    /// `SLEEPONEXIT`: back in thread mode the core sleeps.
+    #[must_use]
+    pub const fn sleeps_on_exit(&self) -> bool {
+        self.sleep & 2 != 0
+    }
+
+    /// `SEVONPEND`: an interrupt that becomes pending is an event.
+    #[must_use]
+    pub const fn pending_is_event(&self) -> bool {
+        self.sleep & 1 << 4 != 0
+    }
+
+    /// Status of configurable faults and of the hard fault.
+    #[must_use]
+    pub const fn status(&self) -> (u32, u32) {
+        (self.faults, self.hard)
+    }
+
+    /// Notes a fault and returns the exception to take for it: its own if that is
+    /// enabled and may preempt what runs, or else the hard fault. `None` if that runs
+    /// already: the core locks up.
+    pub fn fault(&mut self, cause: Cause, exceptions: &Exceptions, masked: bool) -> Option<u8> {
+        self.faults |= cause.status();
+        let (own, enable) = match cause {
+            Cause::Program(Fault::Undefined) => (USAGE_FAULT, 1 << 18),
+            _ => (BUS_FAULT, 1 << 17),
+        };
+        let priority = i16::from(exceptions.priority_set(own));
+        if self.enables & enable != 0 && !masked && priority < exceptions.level() {
+            return Some(own);
+        }
+        if exceptions.level() <= -1 {
+            return None;
+        }
+        // FORCED.
+        self.hard |= 1 << 30;
+        Some(HARD_FAULT)
+    }
+
+    pub(super) fn read(&self, offset: u32, exceptions: &Exceptions) -> Option<u32> {
+        Some(match offset {
+            CPUID => 0x410F_C241,
+            ICSR => {
+                let next = exceptions.urgent().map_or(0, |(number, _)| u32::from(number));
+                let pending = (0..4).any(|word| exceptions.pending(word) != 0);
+                u32::from(exceptions.running())
+                    | u32::from(exceptions.depth() <= 1) << 11
+                    | next << 12
+                    | u32::from(pending) << 22
+                    | u32::from(exceptions.is_pending(SYS_TICK)) << 26
+                    | u32::from(exceptions.is_pending(PEND_SV)) << 28
+            }
+            VTOR => self.vectors,
+            AIRCR => 0xFA05_0000 | u32::from(exceptions.group()) << 8,
+            SCR => self.sleep,
+            CCR => self.config,
+            SHCSR => self.enables,
+            CFSR => self.faults,
+            HFSR => self.hard,
+            // The engine does not tell the address of a fault.
+            DFSR | MMFAR | BFAR | AFSR => 0,
+            CPACR => self.coprocessors,
+            DEMCR => self.monitor,
+            FPCCR => self.float_context,
+            FPDSCR => self.float_default,
+            _ => return None,
+        })
+    }
+
+    pub(super) fn write(
+        &mut self,
+        offset: u32,
+        write: Write,
+        exceptions: &mut Exceptions,
+        now: u64,
+    ) -> Option<()> {
+        match offset {
+            ICSR => {
+                for (bit, number) in [(28, PEND_SV), (26, SYS_TICK)] {
+                    if write.ones() >> bit & 1 != 0 {
+                        exceptions.pend(number, now);
+                    } else if write.ones() >> (bit - 1) & 1 != 0 {
+                        exceptions.clear(number);
+                    }
+                }
+            }
+            VTOR => self.vectors = write.onto(self.vectors) & !0x7F,
+            AIRCR => {
+                if write.value >> 16 == 0x05FA {
+                    exceptions.set_group((write.value >> 8 & 7) as u8);
+                    self.wants_reset |= write.value & 4 != 0;
+                }
+            }
+            SCR => self.sleep = write.onto(self.sleep) & 0x16,
+            CCR => self.config = write.onto(self.config),
+            SHCSR => self.enables = write.onto(self.enables) & 0x7 << 16,
+            CFSR => self.faults &= !write.ones(),
+            HFSR => self.hard &= !write.ones(),
+            DFSR => {}
+            CPACR => self.coprocessors = write.onto(self.coprocessors),
+            DEMCR => self.monitor = write.onto(self.monitor),
+            FPCCR => self.float_context = write.onto(self.float_context),
+            FPDSCR => self.float_default = write.onto(self.float_default),
+            _ => return None,
+        }
+        Some(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::exceptions::number::INTERRUPT;
+
+    const UNDEFINED: Cause = Cause::Program(Fault::Undefined);
+
+    fn write(control: &mut Control, exceptions: &mut Exceptions, offset: u32, value: u32) {
+        let all = Write { value, mask: u32::MAX };
+        control.write(offset, all, exceptions, 0).expect("modelled");
+    }
+
+    #[test]
+    fn a_fault_without_a_handler_becomes_a_hard_fault() {
+        let (mut control, exceptions) = (Control::new(0), Exceptions::default());
+        assert_eq!(control.fault(UNDEFINED, &exceptions, false), Some(HARD_FAULT));
+        assert_eq!(control.status(), (1 << 16, 1 << 30));
+    }
+
+    #[test]
+    fn with_one_it_is_taken_unless_something_as_urgent_runs() {
+        let (mut control, mut exceptions) = (Control::new(0), Exceptions::default());
+        write(&mut control, &mut exceptions, SHCSR, 7 << 16);
+        assert_eq!(control.fault(UNDEFINED, &exceptions, false), Some(USAGE_FAULT));
+        assert_eq!(control.fault(UNDEFINED, &exceptions, true), Some(HARD_FAULT));
+        exceptions.enter(INTERRUPT);
+        assert_eq!(control.fault(UNDEFINED, &exceptions, false), Some(HARD_FAULT));
+    }
+
+    #[test]
+    fn a_fault_inside_the_hard_fault_locks_up() {
+        let (mut control, mut exceptions) = (Control::new(0), Exceptions::default());
+        exceptions.enter(HARD_FAULT);
+        assert_eq!(control.fault(UNDEFINED, &exceptions, false), None);
+    }
+
+    #[test]
+    fn a_reset_takes_the_key() {
+        let (mut control, mut exceptions) = (Control::new(0), Exceptions::default());
+        write(&mut control, &mut exceptions, AIRCR, 4);
+        assert!(!control.wants_reset);
+        write(&mut control, &mut exceptions, AIRCR, 0x05FA_0004);
+        assert!(control.wants_reset);
+    }
+}

@@ -1,0 +1,209 @@
+//! What is kept of a run on the board: the plant's truth, what passed at the pins, and
+//! what the firmware says of itself in its log.
+
+use interstage::model::Planner;
+use sha2::Digest;
+
+use crate::bench::Passed;
+use crate::log::Line;
+use hil_sim::plant::ledger::Crossing;
+use hil_sim::plant::rig::{Truth, VirtualRig};
+use hil_sim::record::tally::{Ended, Tally, true_line, true_row};
+use hil_sim::record::{CrossingLine, LogLine, Recording, Report, Row};
+use hil_sim::scenario::Scenario;
+
+/// What the log says of a mode, and its number in [`hil_sim::record::MODE_NAMES`].
+const MODES: [(&str, u8); 11] = [
+    ("boot", 0),
+    ("self-test", 1),
+    ("zeroing", 2),
+    ("idle", 3),
+    ("preloading", 4),
+    ("cruise", 5),
+    ("approach", 6),
+    ("crossing", 7),
+    ("settle", 8),
+    ("stopping", 9),
+    ("fault hold", 11),
+];
+const COMPLETE: u8 = 10;
+const FAULT_HOLD: u8 = 11;
+const IDLE: u8 = 3;
+/// Under way or coming to rest.
+const MOVING: std::ops::Range<u8> = 5..10;
+
+/// Values of the log's line about a crossing, in their order: milliseconds, step,
+/// position, residual, speed, preload, peak, lead, tread, gap measured, predicted, slip
+/// margin, stiffness.
+const VALUES: usize = 13;
+
+/// What the firmware reported of a crossing.
+#[derive(Clone, Copy, Debug)]
+struct Reported {
+    index: u8,
+    found_mm: f64,
+    lead_s: f64,
+    measured_mm: f64,
+    predicted_mm: f64,
+}
+
+/// A run's record as it grows.
+pub(super) struct Trace {
+    tally: Tally,
+    reported: Vec<Reported>,
+    mode: u8,
+    stage: u8,
+}
+
+impl Trace {
+    pub(super) fn new(scenario: &Scenario, plant: &VirtualRig) -> Self {
+        let planner = Planner::try_build(&scenario.rig).ok();
+        let direction = scenario.run.direction.into();
+        let gap_ref = planner.map_or(f64::NAN, |planner| planner.gap_ref(direction).to_num());
+        Self {
+            tally: Tally::new(gap_ref, plant.truth().position_mm),
+            reported: Vec::new(),
+            mode: 0,
+            stage: 1,
+        }
+    }
+
+    /// What it does, as a number in [`hil_sim::record::MODE_NAMES`].
+    pub(super) const fn mode(&self) -> u8 {
+        self.mode
+    }
+
+    /// Waiting for a command, by its own word.
+    pub(super) const fn is_idle(&self) -> bool {
+        self.mode == IDLE
+    }
+
+    /// Arrived, or held by a fault.
+    pub(super) const fn is_over(&self) -> bool {
+        matches!(self.mode, COMPLETE | FAULT_HOLD)
+    }
+
+    /// Looks at a millisecond that ended with the plant in `truth`.
+    pub(super) fn look(&mut self, passed: &Passed, lines: &[Line], truth: &Truth, keep_row: bool) {
+        let t_s = self.tally.time_s();
+        self.digest_pins(passed);
+        for line in lines {
+            self.tally.digest.update(line.text.as_bytes());
+            self.read(t_s, line);
+        }
+        if keep_row {
+            let row = self.row(t_s, passed, truth);
+            self.tally.rows.push(row);
+        }
+        self.tally.close_tick(MOVING.contains(&self.mode), truth);
+    }
+
+    /// Adds every bit that went into the board and came out of it.
+    fn digest_pins(&mut self, passed: &Passed) {
+        let Passed { codes, drives } = passed;
+        let digest = &mut self.tally.digest;
+        for code in [
+            codes.wheel.get(),
+            codes.load_cell.get(),
+            codes.tread.get(),
+            codes.arm.get(),
+            codes.bridges.drive.get(),
+            codes.bridges.pretightener.get(),
+        ] {
+            digest.update(code.to_le_bytes());
+        }
+        for duty in [drives.drive, drives.preload] {
+            digest.update(duty.to_le_bytes());
+        }
+        digest.update([u8::from(drives.drive_on), u8::from(drives.preload_on)]);
+    }
+
+    /// Takes from a line of the log what it says.
+    fn read(&mut self, t_s: f64, line: &Line) {
+        let level = if line.level.is_empty() { "" } else { " " };
+        let text = format!("{}{level}{}", line.level, line.text);
+        self.tally.log.push(LogLine { t_s, text });
+        if let Some(mode) = line.behind("mode: ") {
+            self.mode = number_of(mode);
+        } else if line.text.contains("] stage ") {
+            self.stage = line.numbers().get(1).map_or(self.stage, |number| *number as u8);
+        } else if line.text.contains("] step ") {
+            self.reported.extend(crossing(line));
+        } else {
+            let Tally { faults, limits, .. } = &mut self.tally;
+            for (kind, reports) in [("] fault ", faults), ("] limit ", limits)] {
+                let said = line.behind(kind).and_then(|rest| rest.split_once(": "));
+                if let Some((code, text)) = said
+                    && let Ok(code) = code.parse()
+                {
+                    reports.push(Report { t_s, code, text: text.to_owned() });
+                }
+            }
+        }
+    }
+
+    /// A row of what the plant and the pins tell, and the log.
+    fn row(&self, t_s: f64, passed: &Passed, truth: &Truth) -> Row {
+        Row {
+            mode: self.mode,
+            stage: self.stage,
+            level: self.reported.len() as u8,
+            drive_duty: passed.drives.drive,
+            preload_duty: passed.drives.preload,
+            ..true_row(t_s, truth)
+        }
+    }
+
+    /// The record of a run that took `wall_s` to compute.
+    pub(super) fn finish(self, scenario: &Scenario, plant: &VirtualRig, wall_s: f64) -> Recording {
+        let Self { tally, reported, mode, .. } = self;
+        let arrived = (mode == COMPLETE).then(|| scenario.run.direction.into());
+        let ended = Ended { target: "board", scenario, plant, arrived, wall_s };
+        tally.finish(&ended, |crossing| line(&reported, crossing))
+    }
+}
+
+/// Ledger line: the plant's truth with what the firmware logged of the same step.
+fn line(reported: &[Reported], crossing: &Crossing) -> CrossingLine {
+    let said = reported.iter().find(|reported| u32::from(reported.index) == crossing.index as u32);
+    let told = |value: fn(&Reported) -> f64| said.map(value);
+    CrossingLine {
+        gap_predicted_mm: told(|r| r.predicted_mm),
+        gap_measured_mm: told(|r| r.measured_mm),
+        lead_time_s: told(|r| r.lead_s),
+        step_found_mm: told(|r| r.found_mm),
+        ..true_line(crossing)
+    }
+}
+
+/// Number of the mode that the log names so.
+fn number_of(text: &str) -> u8 {
+    if matches!(text, "deployed" | "retracted") {
+        return COMPLETE;
+    }
+    let found = MODES.iter().find(|(name, _)| text.contains(name));
+    found.map_or(FAULT_HOLD, |(_, number)| *number)
+}
+
+/// What a line about a crossing says.
+fn crossing(line: &Line) -> Option<Reported> {
+    let values = line.numbers();
+    let [_, index, found_mm, _, _, _, _, lead_s, _, measured_mm, predicted_mm, _, _] =
+        <[f64; VALUES]>::try_from(values).ok()?;
+    Some(Reported { index: index as u8, found_mm, lead_s, measured_mm, predicted_mm })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn modes_are_known_by_what_the_log_calls_them() {
+        assert_eq!(number_of("zeroing"), 2);
+        assert_eq!(number_of("preloading to deploy"), 4);
+        assert_eq!(number_of("retracting: settle"), 8);
+        assert_eq!(number_of("deployed"), COMPLETE);
+        assert_eq!(number_of("stopping while deploying"), 9);
+        assert_eq!(number_of("fault hold, 104"), FAULT_HOLD);
+    }
+}

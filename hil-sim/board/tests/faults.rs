@@ -1,0 +1,138 @@
+//! The campaign of faults on the emulated board, a few of them at one instant each, and a
+//! scenario's faults in a run on the board. `cargo rig faults --target board` is the whole.
+
+#[path = "common/board.rs"]
+mod common;
+
+use hil_sim::faults::campaign::{Campaign, Case, Firmware, Kept, Outcome};
+use hil_sim::faults::{Entry, HARDWARE, Injection, Kind, Target, sets};
+use hil_sim::scenario::Scenario;
+use rig_board::bench::Bench;
+use rig_board::params::PLACES;
+use rig_board::run::run;
+
+use common::{elf, strings};
+
+fn campaign(wanted: &[&str]) -> Outcome {
+    let named = |case: &Case| wanted.contains(&case.name().as_str());
+    let cases: Vec<Case> = Case::all_on_board().into_iter().filter(named).collect();
+    assert_eq!(cases.len(), wanted.len());
+    tried(cases)
+}
+
+fn tried(cases: Vec<Case>) -> Outcome {
+    let campaign = Campaign { scenario: Scenario::default(), instants: 1, cases };
+    let firmware = Firmware { elf: elf(), strings: strings() };
+    campaign.run_on_board(firmware, &mut Kept::default(), &|| {}).expect("a campaign")
+}
+
+#[test]
+fn what_breaks_on_the_board_is_found_or_borne_and_the_mechanism_held() {
+    let faults = [
+        ("load-cell off", Some(102)),
+        ("encoder-line-a off", Some(123)),
+        ("angle-bus off", Some(104)),
+        ("dma stalled", Some(102)),
+        ("drive runaway", Some(128)),
+        ("tick overrun", Some(160)),
+        ("log gone", None),
+        ("host-line flooding", None),
+        ("supply off", None),
+        ("journal-task hung", None),
+    ];
+    let outcome = campaign(&faults.map(|(name, _)| name));
+    let failures: Vec<_> = outcome.matrix.iter().flat_map(|line| &line.failures).collect();
+    assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{failures:#?}");
+    for (name, code) in faults {
+        let line = outcome.matrix.iter().find(|line| line.fault == name).expect(name);
+        // A sensor that reads the low end is out of its range before it is missed.
+        let alike = line.code == code || (line.code, code) == (Some(112), Some(102));
+        assert!(alike, "{line:?}");
+        let restarted = match name {
+            "supply off" => Some("reset by supply"),
+            "journal-task hung" => Some("reset by watchdog"),
+            _ => None,
+        };
+        assert_eq!(line.restarted(), restarted, "{line:?}");
+    }
+}
+
+/// The very bit of `memcpy` after which no start comes to its first word.
+#[test]
+fn a_board_that_can_only_tell_by_its_light_is_found_by_that() {
+    let bench = Bench::new(elf(), strings(), &Scenario::default()).expect("a bench");
+    let functions = &bench.machine().image().functions;
+    let copies = functions.iter().find(|f| f.name == "compiler_builtins::mem::memcpy");
+    let bit = f64::from(8 * (copies.expect("it copies").range.start + 0x115 - 0x0800_0000) + 4);
+    let image = HARDWARE.iter().find(|entry| entry.target == Target::Image).expect("an image");
+    let entry = Box::leak(Box::new(Entry { range: (bit, bit), ..*image }));
+    let outcome = tried(vec![Case::Struck(entry)]);
+    let line = &outcome.matrix[0];
+    assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{line:#?}");
+    assert_eq!(line.restarted(), Some("image damaged, by the light alone"), "{line:#?}");
+    let told_ms = line.latency_ms.expect("a time at which it was told");
+    assert!((1.0..13_000.0).contains(&told_ms), "{line:#?}");
+    assert!(line.worst_motion_mm < 0.75, "{line:#?}");
+}
+
+#[test]
+fn parameters_in_flash_are_the_old_ones_the_new_ones_or_named_as_damaged() {
+    let faults = [
+        ("stored-set bit-errors", Some("parameters damaged")),
+        ("spare-set bit-errors", None),
+        ("image-set bit-errors", Some("parameters damaged")),
+        ("parameter-save torn", Some("reset by supply")),
+        ("parameter-save reset", Some("reset by pin")),
+    ];
+    let outcome = campaign(&faults.map(|(name, _)| name));
+    let failures: Vec<_> = outcome.matrix.iter().flat_map(|line| &line.failures).collect();
+    assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{failures:#?}");
+    for (name, told) in faults {
+        let line = outcome.matrix.iter().find(|line| line.fault == name).expect(name);
+        // A limit that comes now and then without a fault too, as 209, is none of it.
+        let no_fault = line.codes.keys().all(|code| *code >= 200);
+        assert!(line.restarted() == told && no_fault, "{line:?}");
+    }
+}
+
+#[test]
+fn a_scenario_can_have_a_set_damaged_in_flash_and_the_board_started_anew() {
+    let text = "[[run.faults]]\ntarget = \"stored-set\"\nkind = \"bit-errors\"\nat_s = 0.5\n\
+                magnitude = 4321\n[[run.faults]]\ntarget = \"supply\"\nkind = \"off\"\nat_s = 0.6\n";
+    let scenario = Scenario::parse("bench.toml", text, &[]).expect("a scenario");
+    let mut bench = Bench::new(elf(), strings(), &scenario).expect("a bench");
+    let places = sets::places(&scenario).expect("sets");
+    bench.machine_mut().poke(PLACES, &places).expect("flash");
+    let mut said = Vec::new();
+    for _ in 0..1500 {
+        let (passed, lines) = bench.step().expect("runs");
+        assert!(!passed.drives.drive_on && !passed.drives.preload_on);
+        said.extend(lines.into_iter().map(|line| line.text));
+    }
+    let at = |text: &str| said.iter().position(|line| line.starts_with(text));
+    // A supply that was lost is a start like the first.
+    let (runs, holds) = (at("rig kept, "), at("parameters: the set is damaged"));
+    assert!(runs.is_some() && holds > runs, "{said:#?}");
+    assert_eq!(said.iter().filter(|line| line.starts_with("interstage ")).count(), 2);
+}
+
+#[test]
+fn a_scenario_s_faults_come_on_the_board_too() {
+    let mut scenario = Scenario::default();
+    let off = Injection::at(Target::EncoderLineB, Kind::Off, 0.0, 0.0);
+    scenario.run.faults = vec![Injection { at_s: None, at_mm: Some(10.0), ..off }];
+    let summary = run(elf(), &scenario, false, |_, _| {}).expect("a run").recording.summary;
+    assert_eq!(summary.faults.iter().map(|fault| fault.code).collect::<Vec<_>>(), [123]);
+    assert!(!summary.completed && (10.0..14.0).contains(&summary.travel_mm), "{summary:?}");
+    assert_eq!(summary.injected, ["encoder-line-b off from 10 mm"]);
+}
+
+#[test]
+fn in_software_there_is_no_board_that_could_break() {
+    let mut scenario = Scenario::default();
+    scenario.run.faults = vec![Injection::at(Target::Dma, Kind::Stalled, 1.0, 0.0)];
+    let error = hil_sim::sil::run(&scenario, hil_sim::sil::Options::default());
+    let Err(error) = error else { panic!("it was taken") };
+    let error = error.to_string();
+    assert!(error.contains("dma stalled") && error.contains("--target board"), "{error}");
+}

@@ -1,0 +1,394 @@
+//! The firmware itself on the emulated board, the plant at its pins.
+
+#[path = "common/board.rs"]
+mod common;
+
+use hil_sim::bench::budget::Budget;
+use hil_sim::record::{CrossingLine, Summary};
+use hil_sim::scenario::Direction;
+use hil_sim::sil::{self, Options, Session};
+use interstage::supervise::{Command, Mode};
+use rig_board::bench::Bench;
+use rig_board::chip::Pin;
+use rig_board::faults::Fault;
+use rig_board::log::Line;
+use rig_board::peripherals::rcc::Cause;
+use rig_board::run::{self, Ran};
+
+use common::{elf, scenario, strings};
+
+/// A board under way, with what it has logged.
+struct Board {
+    bench: Bench<'static>,
+    log: Vec<Line>,
+}
+
+impl Board {
+    fn off(sets: &[&str]) -> Self {
+        let bench = Bench::new(elf(), strings(), &scenario(sets)).expect("a bench");
+        Self { bench, log: Vec::new() }
+    }
+
+    /// Powered up and idle.
+    fn idle(sets: &[&str]) -> Self {
+        let mut board = Self::off(sets);
+        board.until("mode: idle", 3000);
+        board
+    }
+
+    /// Goes on for so many milliseconds.
+    fn run(&mut self, milliseconds: u32) {
+        for _ in 0..milliseconds {
+            self.log.extend(self.bench.step().expect("runs").1);
+        }
+    }
+
+    fn said(&self, text: &str) -> bool {
+        self.log.iter().any(|line| line.text.contains(text))
+    }
+
+    /// Goes on until this is logged.
+    fn until(&mut self, text: &str, milliseconds: u32) {
+        let from = self.log.len();
+        for _ in 0..milliseconds {
+            self.run(1);
+            if self.log[from..].iter().any(|line| line.text.contains(text)) {
+                return;
+            }
+        }
+        let last: Vec<&str> = self.log[from..].iter().map(|line| line.text.as_str()).collect();
+        panic!("no `{text}` within {milliseconds} ms: {last:#?}");
+    }
+
+    fn send(&mut self, letter: u8) {
+        assert!(self.bench.send(letter).expect("runs"), "the console listens");
+    }
+
+    fn press(&mut self, pressed: bool) {
+        let now = self.bench.machine().now();
+        self.bench.machine_mut().chip_mut().drive(Pin::BUTTON, pressed, now);
+    }
+
+    fn position_mm(&self) -> f64 {
+        self.bench.plant().truth().position_mm
+    }
+
+    fn assert_no_strays(&self) {
+        let strays: Vec<String> =
+            self.bench.machine().chip().strays().iter().map(ToString::to_string).collect();
+        assert!(strays.is_empty(), "{strays:#?}");
+    }
+
+    /// Whether a motor is driven within the next milliseconds.
+    fn drives(&mut self, milliseconds: u32) -> bool {
+        (0..milliseconds).any(|_| {
+            let (passed, lines) = self.bench.step().expect("runs");
+            self.log.extend(lines);
+            let drives = passed.drives;
+            drives.drive_on && drives.drive != 0.0 || drives.preload_on && drives.preload != 0.0
+        })
+    }
+}
+
+fn ran(sets: &[&str]) -> Ran {
+    run::run(elf(), &scenario(sets), false, |_, _| {}).expect("a run")
+}
+
+/// The software on the same rig, started at several moments: sensor noise differs, and
+/// with it what the controller believes of the rubber and the speeds that it plans.
+fn software(sets: &[&str]) -> Vec<Summary> {
+    let scenario = scenario(sets);
+    let start = match scenario.run.direction {
+        Direction::Deploy => Command::Start,
+        Direction::Retract => Command::Retract,
+    };
+    (0..8)
+        .map(|moment| {
+            let mut session = Session::new(&scenario, Options::default()).expect("a session");
+            let (mut wait, mut sent) = (10 * moment, false);
+            while !matches!(session.mode(), Mode::Complete(_) | Mode::FaultHold(_)) {
+                let idle = session.mode() == Mode::Idle && !sent;
+                sent |= idle && wait == 0;
+                session.step((idle && wait == 0).then_some(start)).expect("runs");
+                wait -= u32::from(idle && wait > 0);
+            }
+            session.finish(1.0).summary
+        })
+        .collect()
+}
+
+/// A quantity of the ledger, and what of it drivers and one tick's delay may change.
+type Quantity = (&'static str, fn(&CrossingLine) -> f64, f64);
+
+const QUANTITIES: [Quantity; 4] = [
+    ("gap, mm", |c| c.gap_mm, 0.005),
+    ("preload, N", |c| c.preload_n, 0.05),
+    ("speed, mm/s", |c| c.speed_mm_s, 0.05),
+    ("corner force, N", |c| c.corner_force_n, 0.2),
+];
+
+/// The board's ledger lies where the software's does, within four deviations of what
+/// the noise of another moment makes.
+fn assert_alike(board: &Summary, software: &[Summary]) {
+    assert!(board.completed, "{:?}", board.faults);
+    assert!(software.iter().all(|run| run.completed && run.crossings.len() == 3));
+    assert_eq!(board.crossings.len(), 3);
+    let count = software.len() as f64;
+    for (step, on_board) in board.crossings.iter().enumerate() {
+        for (what, of, own) in QUANTITIES {
+            let values: Vec<f64> = software.iter().map(|run| of(&run.crossings[step])).collect();
+            let mean = values.iter().sum::<f64>() / count;
+            let spread = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (count - 1.0);
+            let (value, within) = (of(on_board), 4.0 * spread.sqrt() + own);
+            let index = on_board.index;
+            assert!(
+                (value - mean).abs() <= within,
+                "step {index}: {what} {value} on the board, {mean} +- {within} in software"
+            );
+        }
+        let found = on_board.step_found_mm.expect("the firmware logged the crossing");
+        assert!((found - on_board.step_mm).abs() < 0.5, "found at {found}");
+    }
+}
+
+fn assert_way(sets: &[&str]) {
+    let first = ran(sets);
+    assert_alike(&first.recording.summary, &software(sets));
+    assert!(first.load.unmodelled.is_empty(), "{:#?}", first.load.unmodelled);
+    assert!(first.machine.restarts().is_empty());
+    let budget = Budget::shipped().expect("a budget").board;
+    assert_eq!(first.load.missed(&budget), Vec::<String>::new());
+    // A sensor's frame more or less before it is all that moves the tick.
+    assert!(first.load.start.jitter < 4_000, "{:?}", first.load.start);
+    assert!(u64::from(first.load.stack_used) < first.load.stack, "{}", first.load.stack_used);
+    let ticks = first.load.cycles / first.load.clock_hz.div_euclid(1000);
+    assert!(first.load.tick.runs.abs_diff(ticks) <= 1, "{} of {ticks}", first.load.tick.runs);
+    // Three runs, the same bytes.
+    for _ in 0..2 {
+        let again = ran(sets);
+        let (a, b) = (&again.recording, &first.recording);
+        assert_eq!(a.summary.trace_digest, b.summary.trace_digest);
+        assert_eq!(a.log, b.log);
+        assert_eq!(again.load, first.load);
+    }
+}
+
+#[test]
+fn a_deployment_is_that_of_the_software_three_times_alike() {
+    assert_way(&["run.seed=1"]);
+}
+
+#[test]
+fn a_retraction_is_that_of_the_software_three_times_alike() {
+    assert_way(&["run.seed=1", "run.direction=retract"]);
+}
+
+/// Ten times the rig's speed is asked of a release build on a machine that does nothing else,
+/// and `deploy` prints it. Machines differ by more than that, and tests share their cores, so
+/// here it is held against the same deployment in software, which takes a seventieth of it; a board
+/// that stops at every hook takes three times as much. By this thread's processor time, the best
+/// of turns about.
+#[test]
+fn a_deployment_is_far_ahead_of_the_rig() {
+    const MOST: f64 = 150.0;
+    let timed = |run: &dyn Fn()| {
+        let begun = cpu_time::ThreadTime::now();
+        run();
+        begun.elapsed().as_secs_f64()
+    };
+    let sets = ["run.seed=1"];
+    let (mut board, mut software) = (f64::INFINITY, f64::INFINITY);
+    for _ in 0..4 {
+        board = board.min(timed(&|| drop(ran(&sets))));
+        let run = || drop(sil::run(&scenario(&sets), Options::default()).expect("a run"));
+        software = software.min(timed(&run));
+    }
+    println!("{:.1} times the time of the software", board / software);
+    assert!(board <= MOST * software, "{board:.3} s on the board, {software:.4} s in software");
+}
+
+#[test]
+fn power_comes_up_to_idle_with_the_bridges_off() {
+    let mut board = Board::off(&[]);
+    assert!(!board.drives(3000), "nothing may move before a command");
+    for text in ["interstage", "mode: self-test", "mode: zeroing", "mode: idle"] {
+        assert!(board.said(text), "{text}: {:#?}", board.log);
+    }
+    assert!(!board.said("restarted"));
+    board.assert_no_strays();
+}
+
+#[test]
+fn a_short_press_starts_and_holding_stops() {
+    let mut board = Board::idle(&[]);
+    board.press(true);
+    board.run(100);
+    board.press(false);
+    board.until("preloading to deploy", 500);
+    board.press(true);
+    board.until("stop", 1100);
+    board.assert_no_strays();
+}
+
+#[test]
+fn an_open_emergency_stop_takes_the_drive_away_until_it_is_reset() {
+    let mut board = Board::idle(&[]);
+    board.send(b's');
+    board.until("deploying: cruise", 4000);
+    board.run(100);
+    let open = |board: &mut Board, open| {
+        let now = board.bench.machine().now();
+        for pin in [Pin::STOP_DRIVE, Pin::STOP_PRELOAD] {
+            board.bench.machine_mut().chip_mut().drive(pin, open, now);
+        }
+    };
+    open(&mut board, true);
+    board.until("fault 151", 20);
+    assert!(!board.drives(200));
+    open(&mut board, false);
+    assert!(!board.drives(200), "closing the contact starts nothing");
+    board.send(b'0');
+    board.until("mode: idle", 1500);
+    board.send(b's');
+    assert!(board.drives(500));
+}
+
+#[test]
+fn a_tick_that_hangs_is_ended_by_the_watchdog() {
+    let mut board = Board::idle(&[]);
+    board.send(b's');
+    board.until("deploying: crossing", 8000);
+    let at = board.position_mm();
+    // What every tick calls for the load cell never returns.
+    let functions = &board.bench.machine().image().functions;
+    let found = functions.iter().find(|f| f.name.ends_with("AnalogChannel::step"));
+    let stage = found.expect("a function").range.start;
+    let mut whole = [0; 2];
+    board.bench.machine().peek(stage, &mut whole).expect("flash");
+    board.bench.machine_mut().poke(stage, &[0xFE, 0xE7]).expect("flash");
+    board.run(110);
+    let [(_, cause)] = board.bench.machine().restarts() else {
+        panic!("one restart: {:?}", board.bench.machine().restarts());
+    };
+    assert_eq!(*cause, Cause::Watchdog);
+    board.bench.machine_mut().poke(stage, &whole).expect("flash");
+    // The start has found its image damaged, and shows that first.
+    board.run(300);
+    assert!(board.said("restarted by the watchdog"), "{:#?}", board.log);
+    assert!(!board.drives(900), "nothing moves after a restart");
+    assert!(board.position_mm() - at < 1.2, "it went on for {}", board.position_mm() - at);
+    assert_eq!(board.bench.machine().restarts().len(), 1);
+}
+
+#[test]
+fn power_lost_in_the_middle_of_a_crossing_is_survived() {
+    let mut board = Board::idle(&[]);
+    board.send(b's');
+    board.until("sliding on the corner", 8000);
+    board.bench.machine_mut().restart(Cause::Power).expect("restarts");
+    assert!(!board.drives(3000), "nothing moves before a command");
+    assert!(board.said("mode: idle") && !board.said("restarted by the watchdog"));
+    board.send(b's');
+    board.until("mode: deployed", 40_000);
+    assert!((board.position_mm() - 80.0).abs() < 1.0, "{}", board.position_mm());
+    board.assert_no_strays();
+}
+
+#[test]
+fn a_driver_on_the_wrong_timer_channel_is_caught() {
+    const TIM1_CCER: u32 = 0x4001_2C20;
+    let mut board = Board::idle(&[]);
+    let enables = board.bench.machine_mut().peek_register(TIM1_CCER);
+    assert_eq!(enables & 0xF0, 0, "only channel 1 and its complement: {enables:#x}");
+    // Channel 2 instead of channel 1.
+    board.bench.machine_mut().poke_register(TIM1_CCER, enables << 4);
+    board.send(b's');
+    board.until("] fault ", 10_000);
+    assert!(board.position_mm().abs() < 0.1, "{}", board.position_mm());
+}
+
+#[test]
+fn an_interrupt_flag_that_is_not_cleared_is_caught() {
+    let mut board = Board::off(&[]);
+    // In the time driver's handler, the write that clears the flags: `mvns` of what was
+    // read, then its `str`, which becomes a `nop`.
+    let machine = board.bench.machine_mut();
+    let handler = machine.image().functions.iter().find(|f| f.name == "TIM2").expect("a handler");
+    let range = handler.range.clone();
+    let mut code = vec![0; (range.end - range.start) as usize];
+    machine.peek(range.start, &mut code).expect("flash");
+    let half = |at: usize| u16::from_le_bytes([code[at], code[at + 1]]);
+    let inverts = |half: u16| half & 0xFFC0 == 0x43C0;
+    // The long or the short form of a store.
+    let stores = |half: u16| half & 0xFFF0 == 0xF8C0 || half & 0xF800 == 0x6000;
+    let place = (0..code.len() - 2)
+        .step_by(2)
+        .find(|at| inverts(half(*at)) && stores(half(*at + 2)))
+        .expect("the write");
+    let nop: &[u8] =
+        if half(place + 2) & 0xFFF0 == 0xF8C0 { &[0xAF, 0xF3, 0x00, 0x80] } else { &[0x00, 0xBF] };
+    machine.poke(range.start + place as u32 + 2, nop).expect("flash");
+    board.run(2000);
+    assert!(!board.said("mode: idle"), "it came up as if nothing were: {:#?}", board.log);
+}
+
+#[test]
+fn a_lost_angle_sensor_is_a_fault_of_its_own() {
+    let mut board = Board::idle(&[]);
+    Fault::AngleLost.strike(board.bench.machine_mut()).expect("strikes");
+    board.until("fault 104", 200);
+}
+
+#[test]
+fn a_dma_that_stands_still_is_a_fault_and_no_hang() {
+    let mut board = Board::idle(&[]);
+    Fault::DmaStalled.strike(board.bench.machine_mut()).expect("strikes");
+    board.until("] fault ", 200);
+    board.run(300);
+    assert!(board.bench.machine().restarts().is_empty(), "the tasks go on");
+}
+
+/// A run with a fault that comes when this is logged; what is logged after that.
+fn struck(text: &str, fault: Fault, milliseconds: u32) -> (Board, Vec<String>) {
+    let mut board = Board::idle(&[]);
+    board.send(b's');
+    board.until(text, 8000);
+    let from = board.log.len();
+    fault.strike(board.bench.machine_mut()).expect("strikes");
+    board.run(milliseconds);
+    let lines = board.log[from..].iter().map(|line| line.text.clone()).collect();
+    (board, lines)
+}
+
+#[test]
+fn a_broken_sensor_under_way_stops_the_drive_with_a_fault() {
+    for fault in [
+        Fault::StuckCode(0, 0xFFFF),
+        Fault::StuckCode(1, 0),
+        Fault::BitErrors(1 << 9),
+        Fault::AngleLost,
+        Fault::EncoderLine(1),
+        Fault::DmaStalled,
+    ] {
+        let (mut board, lines) = struck("deploying: approach", fault, 1500);
+        assert!(lines.iter().any(|line| line.contains("] fault ")), "{fault}: {lines:#?}");
+        assert!(!board.drives(300), "{fault}");
+        assert!(board.bench.machine().restarts().is_empty(), "{fault}: the tasks live on");
+    }
+}
+
+#[test]
+fn bit_errors_that_pass_are_ridden_out() {
+    let mut board = Board::idle(&[]);
+    board.send(b's');
+    board.until("deploying: approach", 8000);
+    for _ in 0..5 {
+        let fault = Fault::BitErrors(1 << 5);
+        fault.strike(board.bench.machine_mut()).expect("strikes");
+        board.run(3);
+        fault.heal(board.bench.machine_mut());
+        board.run(40);
+    }
+    assert!(!board.said("] fault "), "{:#?}", board.log);
+    board.until("mode: deployed", 20_000);
+}

@@ -1,0 +1,164 @@
+//! Parameters stored by the firmware in the emulated board's flash, and power that goes
+//! while it writes.
+
+#[path = "common/board.rs"]
+mod common;
+
+use hil_sim::scenario::Scenario;
+use interstage::link::{Gatherer, ToBoard, ToHost, frame};
+use interstage::params::service::{Origin, PIECE, Piece, Request, Response};
+use interstage::params::{MAX_SET, compile};
+use interstage::rig::Rig;
+use rig_board::bench::Bench;
+use rig_board::peripherals::flash::Cut;
+use rig_board::peripherals::rcc::Cause;
+use rig_board::rtt::Probe;
+
+use common::{elf, strings};
+
+/// Channels of the binary line.
+const UP: u32 = 2;
+const DOWN: u32 = 1;
+
+/// A set that the image does not carry.
+fn set() -> Vec<u8> {
+    let mut rig = Rig::prototype();
+    rig.preload.cruise_n += 1.0;
+    let mut room = vec![0; MAX_SET];
+    let length = compile("changed", &rig, &mut room).expect("a sound rig");
+    room.truncate(length);
+    room
+}
+
+/// A board and the host at its binary line.
+struct Board {
+    bench: Bench<'static>,
+    probe: Probe,
+    gatherer: Gatherer,
+    number: u16,
+}
+
+impl Board {
+    /// Powered up and idle.
+    fn idle() -> Self {
+        let scenario = Scenario::resolve(Some("prototype"), None, &[]).expect("a scenario");
+        let bench = Bench::new(elf(), strings(), &scenario).expect("a bench");
+        let probe = Probe::of(bench.machine()).expect("a control block");
+        let mut board = Self { bench, probe, gatherer: Gatherer::new(), number: 0 };
+        board.until_idle();
+        board
+    }
+
+    fn until_idle(&mut self) {
+        for _ in 0..3000 {
+            let (_, lines) = self.bench.step().expect("runs");
+            if lines.iter().any(|line| line.text.contains("mode: idle")) {
+                return;
+            }
+        }
+        panic!("it does not come up");
+    }
+
+    fn restarts(&self) -> usize {
+        self.bench.machine().restarts().len()
+    }
+
+    /// Asks; none if the board restarts before it answers.
+    fn ask(&mut self, request: Request) -> Option<Response> {
+        let before = self.restarts();
+        self.number += 1;
+        let frame = frame(&ToBoard::Parameters(self.number, request)).expect("fits");
+        for byte in frame {
+            while !self.probe.down(self.bench.machine_mut(), DOWN, byte).expect("runs") {
+                self.bench.step().expect("runs");
+            }
+        }
+        for _ in 0..500 {
+            self.bench.step().expect("runs");
+            if self.restarts() > before {
+                self.gatherer = Gatherer::new();
+                return None;
+            }
+            for byte in self.probe.up(self.bench.machine_mut(), UP).expect("runs") {
+                if let Some(ToHost::Parameters(number, response)) = self.gatherer.take(byte)
+                    && number == self.number
+                {
+                    return Some(response);
+                }
+            }
+        }
+        panic!("no answer");
+    }
+
+    /// Stores a set; false if power went meanwhile.
+    fn store(&mut self, set: &[u8]) -> bool {
+        let begin = Request::Begin { length: set.len() as u16 };
+        let pieces =
+            set.chunks(PIECE).map(|piece| Request::Append(Piece::from_slice(piece).expect("fits")));
+        for request in std::iter::once(begin).chain(pieces).chain([Request::Seal]) {
+            match self.ask(request) {
+                Some(response) => assert_eq!(response, Response::Done),
+                None => return false,
+            }
+        }
+        true
+    }
+
+    /// Where what is in force lies, and its rig's name.
+    fn in_force(&mut self) -> (Origin, String) {
+        match self.ask(Request::Describe) {
+            Some(Response::Description(d)) => (d.origin, d.name.as_str().to_owned()),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn operations(&self) -> u64 {
+        self.bench.machine().chip().flash.begun()
+    }
+}
+
+#[test]
+fn a_stored_set_is_in_force_after_power_was_lost() {
+    let mut board = Board::idle();
+    assert_eq!(board.in_force().0, Origin::Image);
+    assert!(board.store(&set()));
+    let stored = (Origin::Stored { sequence: 1 }, "changed".to_owned());
+    assert_eq!(board.in_force(), stored);
+    board.bench.machine_mut().restart(Cause::Power).expect("restarts");
+    board.until_idle();
+    assert_eq!(board.in_force(), stored);
+    let strays = board.bench.machine().chip().strays().count();
+    assert_eq!(strays, 0);
+}
+
+#[test]
+fn power_that_goes_in_any_write_leaves_the_old_set_or_the_new() {
+    let set = set();
+    let mut board = Board::idle();
+    let before = board.operations();
+    assert!(board.store(&set));
+    let all = board.operations() - before;
+    assert!(all > set.len() as u64 / 8, "{all}");
+    // The erasing, the first and some later words, the last and what seals.
+    for cut in [1, 2, 3, 4, all / 2, all - 2, all - 1, all] {
+        for cut in [Cut::Within(cut), Cut::After(cut)] {
+            let mut board = Board::idle();
+            board.bench.machine_mut().chip_mut().flash.cut_power(cut);
+            // If the last write was over, the answer may yet have been sent.
+            let done = board.store(&set) && board.restarts() == 0;
+            if board.restarts() == 0 {
+                board.bench.step().expect("runs");
+            }
+            board.until_idle();
+            assert_eq!(board.restarts(), 1, "{cut:?}");
+            let (origin, name) = board.in_force();
+            // Whole, whatever its number: of a seal half written that reads all ones.
+            let new = origin != Origin::Image && name == "changed";
+            assert!(new || origin == Origin::Image, "{cut:?}: {origin:?} {name}");
+            assert!(new || !done, "{cut:?}: it had said that it is stored");
+            // And what is half written is no obstacle to the next.
+            assert!(board.store(&set), "{cut:?}");
+            assert_eq!(board.in_force().1, "changed", "{cut:?}");
+        }
+    }
+}

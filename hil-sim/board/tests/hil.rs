@@ -1,0 +1,299 @@
+//! Hardware in the loop over the emulated board: the plant on this host, the controller
+//! in the firmware with the feature `hil`.
+
+#[path = "common/board.rs"]
+mod common;
+
+use std::sync::OnceLock;
+use std::time::Duration;
+
+use hil_sim::firmware::{self, Profile};
+use hil_sim::hil::{self, Asked, HilError, HostLine, Image};
+use hil_sim::log::{Row, Run};
+use hil_sim::plant::draw::PlantParameters;
+use hil_sim::plant::rig::VirtualRig;
+use hil_sim::plant::sensors::Sensors;
+use hil_sim::probe::{EmulatedPort, Port, PortError};
+use hil_sim::record::Recording;
+use hil_sim::replay::replay;
+use hil_sim::scenario::Scenario;
+use hil_sim::sil;
+use interstage::hil::{FIRST, Given, Taken};
+use interstage::rig::Rig;
+use interstage::supervise::{Command, Fault, Mode};
+
+use common::scenario;
+
+fn elf() -> &'static [u8] {
+    static ELF: OnceLock<Vec<u8>> = OnceLock::new();
+    ELF.get_or_init(|| {
+        let path = firmware::build(Profile::Loop).expect("the firmware builds");
+        std::fs::read(path).expect("readable")
+    })
+}
+
+fn board() -> EmulatedPort {
+    EmulatedPort::new(elf()).expect("an image")
+}
+
+/// A run over this port, with its rows.
+fn looped(port: &mut dyn Port, scenario: &Scenario) -> Result<Recording, HilError> {
+    hil::run(port, scenario, Asked { rows: true, target: "board" }, |_| {})
+}
+
+#[test]
+fn a_run_in_the_loop_is_the_run_in_software_bit_for_bit() {
+    for sets in [&["run.seed=3"][..], &["run.seed=4", "run.direction=retract"]] {
+        let scenario = scenario(sets);
+        let mut port = board();
+        let board = looped(&mut port, &scenario).expect("a run");
+        let options = sil::Options { rows: true, ..sil::Options::default() };
+        let software = sil::run(&scenario, options).expect("a run");
+        let (seen, wanted) = (&board.summary, &software.summary);
+        assert!(seen.completed && seen.faults.is_empty(), "{:?}", seen.faults);
+        assert_eq!((seen.target.as_str(), wanted.target.as_str()), ("board", "sil"));
+        assert_eq!(seen.trace_digest, wanted.trace_digest);
+        assert_eq!(seen.crossings, wanted.crossings);
+        assert_eq!(seen.crossings.len(), 3);
+        let all = |recording: &Recording| format!("{:?}", recording.rows);
+        assert!(all(&board) == all(&software), "rows differ");
+        let lines = |recording: &Recording| {
+            recording.log.iter().map(|line| (line.t_s, line.text.clone())).collect::<Vec<_>>()
+        };
+        assert_eq!(lines(&board), lines(&software));
+        // The log is the board's own, and replays.
+        let run = Run::of_stream(&board.stream);
+        assert!(run.is_whole(), "{:?}", run.marks);
+        assert!(replay(&run, &Rig::prototype()).expect("a sound rig").is_equal());
+        // Nothing but the host's side was driven, and the watchdog never bit.
+        bridges_have_no_power(&mut port);
+        assert_eq!(port.machine().restarts().len(), 1, "the reset before the run");
+    }
+}
+
+/// Neither PWM nor enable lines were ever driven.
+fn bridges_have_no_power(port: &mut EmulatedPort) {
+    let now = port.machine().now();
+    for motor in port.machine_mut().chip_mut().take_motors(now) {
+        assert_eq!((motor.duty, motor.enabled), (0.0, 0.0));
+    }
+}
+
+/// A port over which every exchange takes this long on the board.
+struct Slow {
+    port: EmulatedPort,
+    milliseconds: u64,
+}
+
+impl Port for Slow {
+    fn up(&mut self, channel: u32) -> Result<Vec<u8>, PortError> {
+        self.port.up(channel)
+    }
+
+    fn down(&mut self, channel: u32, bytes: &[u8]) -> Result<usize, PortError> {
+        // In pieces, as a probe may.
+        self.port.down(channel, &bytes[..bytes.len().min(5)])
+    }
+
+    fn reset(&mut self) -> Result<(), PortError> {
+        self.port.reset()
+    }
+
+    fn memory(&mut self, address: u32, into: &mut [u8]) -> Result<(), PortError> {
+        self.port.memory(address, into)
+    }
+
+    fn pass(&mut self) -> Result<Duration, PortError> {
+        let machine = self.port.machine_mut();
+        let until = machine.now() + self.milliseconds * 170_000;
+        machine.run_on(until).map_err(|error| PortError::Gone(error.to_string()))?;
+        Ok(Duration::from_millis(self.milliseconds))
+    }
+}
+
+#[test]
+fn a_slow_port_stretches_time_and_changes_nothing() {
+    let (mut slow, mut fast) = (Slow { port: board(), milliseconds: 3 }, board());
+    let (mut slow_rig, mut fast_rig) = (Rigged::new(5), Rigged::new(5));
+    let (mut slow_line, mut fast_line) =
+        (HostLine::begin(&mut slow).expect("ready"), HostLine::begin(&mut fast).expect("ready"));
+    let (mut slow_log, mut fast_log) = (Vec::new(), Vec::new());
+    for tick in FIRST..FIRST + 800 {
+        let command = (tick == FIRST + 400).then_some(Command::Start);
+        let slow = slow_rig.tick(&mut slow_line, tick, command);
+        let fast = fast_rig.tick(&mut fast_line, tick, command);
+        assert_eq!(slow, fast, "tick {tick}");
+        slow_log.extend(slow_line.port().up(1).expect("reads"));
+        fast_log.extend(fast_line.port().up(1).expect("reads"));
+    }
+    assert!(fast_log.len() > 10_000 && slow_log == fast_log, "{} bytes", fast_log.len());
+}
+
+/// What the bridges were told in every tick of a deployment, with the log's channel read
+/// in the ticks that `reads` names, and what was read.
+fn told(reads: impl Fn(u32) -> bool) -> (Vec<Taken>, Vec<u8>) {
+    let (mut port, mut rig) = (board(), Rigged::new(3));
+    let mut line = HostLine::begin(&mut port).expect("ready");
+    let (mut start, mut mode) = (Some(Command::Start), Mode::Boot);
+    let (mut all, mut log) = (Vec::new(), Vec::new());
+    for tick in FIRST..FIRST + 12_000 {
+        let command = if mode == Mode::Idle { start.take() } else { None };
+        let taken = rig.tick(&mut line, tick, command);
+        mode = taken.mode().expect("a mode");
+        all.push(taken);
+        if reads(tick) {
+            log.extend(line.port().up(1).expect("reads"));
+        }
+        if matches!(mode, Mode::Complete(_)) {
+            return (all, log);
+        }
+    }
+    panic!("it does not arrive: {mode:?}");
+}
+
+#[test]
+fn a_reader_that_stalls_or_is_not_there_changes_no_bit_of_the_control_trace() {
+    let (read, log) = told(|_| true);
+    let run = Run::of_stream(&log);
+    assert!(run.is_whole() && run.rows.len() > 6000, "{:?}", run.marks);
+    let (absent, nothing) = told(|_| false);
+    assert!(nothing.is_empty() && absent == read, "absent");
+    let (stalled, part) = told(|tick| tick % 1000 < 300);
+    assert!(stalled == read, "stalled");
+    let part = Run::of_stream(&part);
+    assert!(part.tally.lost_frames > 100, "{:?}", part.tally);
+    // What was lost is marked, and what was read is true.
+    assert!(replay(&part, &Rig::prototype()).expect("a sound rig").difference.is_none());
+    let lost = part.tally.lost_ticks as usize + part.rows.len();
+    assert!(lost.abs_diff(run.rows.len()) < 110, "{lost} of {}", run.rows.len());
+}
+
+/// A plant with its sensors.
+struct Rigged {
+    plant: VirtualRig,
+    sensors: Sensors,
+    given: Given,
+}
+
+impl Rigged {
+    fn new(seed: u64) -> Self {
+        let parameters = PlantParameters::draw(&scenario(&[&format!("run.seed={seed}")]));
+        let sensors = Sensors::new(parameters.sensors.clone(), seed);
+        let plant = VirtualRig::new(parameters, 0.0, 0.0, 1e-3);
+        Self { plant, sensors, given: Given::default() }
+    }
+
+    /// A millisecond of both.
+    fn tick(&mut self, line: &mut HostLine<'_>, tick: u32, command: Option<Command>) -> Taken {
+        let codes = sil::read(&mut self.sensors, &self.plant);
+        self.given =
+            Given::codes(codes.wheel, codes.load_cell, codes.tread, codes.arm, codes.bridges);
+        let taken = line.tick(tick, self.given.with(command)).expect("goes");
+        let (drive, preload) = taken.commands();
+        self.plant.step(&sil::drives(drive, preload), 1e-3).expect("moves");
+        taken
+    }
+}
+
+/// Runs a deployment up to this tick, and gives the board and its codes there.
+fn under_way(port: &mut EmulatedPort, ticks: u32) -> Given {
+    let mut rig = Rigged::new(3);
+    let mut line = HostLine::begin(port).expect("ready");
+    let (mut start, mut mode) = (Some(Command::Start), Mode::Boot);
+    for tick in FIRST..FIRST + ticks {
+        let command = if mode == Mode::Idle { start.take() } else { None };
+        mode = rig.tick(&mut line, tick, command).mode().expect("a mode");
+        if tick.is_multiple_of(32) {
+            line.port().up(1).expect("reads");
+        }
+    }
+    assert!(matches!(mode, Mode::Run(..)), "{mode:?}");
+    rig.given
+}
+
+#[test]
+fn a_host_that_falls_silent_leaves_the_bridges_off() {
+    let mut port = board();
+    let given = under_way(&mut port, 3000);
+    port.up(1).expect("reads");
+    // A second of nothing.
+    let mut stream = Vec::new();
+    for _ in 0..1000 {
+        let machine = port.machine_mut();
+        let until = machine.now() + 170_000;
+        machine.run_on(until).expect("runs");
+        stream.extend(port.up(1).expect("reads"));
+    }
+    let run = Run::of_stream(&stream);
+    let alone = run.rows.iter().position(|row| row.tick >= FIRST + 3000).expect("it goes on");
+    let rows = &run.rows[alone..];
+    let seen: Vec<_> = rows.iter().filter_map(Row::telemetry).collect();
+    // It went on alone: after 50 ms a tick a millisecond, of which the last few are not
+    // in the log yet.
+    assert!((935..=950).contains(&seen.len()), "{} ticks", seen.len());
+    let held = seen.iter().position(|seen| matches!(seen.mode, Mode::FaultHold(_)));
+    let held = held.expect("a fault hold");
+    let stale = (Rig::prototype().sense.stale_after_s * 1e3) as usize;
+    assert!(held <= stale + 3, "{held} ticks alone");
+    // The counter cannot fall silent: it stands, and the reference goes on.
+    let found = [
+        Fault::PressureStale,
+        Fault::DisplacementStale,
+        Fault::AngleStale,
+        Fault::DriveRunaway,
+        Fault::DriveStalled,
+    ];
+    assert!(
+        matches!(seen[held].mode, Mode::FaultHold(fault) if found.contains(&fault)),
+        "{:?}",
+        seen[held].mode
+    );
+    assert!(rows[held..].iter().all(|row| !row.drive_on && !row.preload_on));
+    // What is still driven are ticks that ran: the watchdog has not bitten.
+    assert_eq!(port.machine().restarts().len(), 1);
+    bridges_have_no_power(&mut port);
+    // A host that comes back is told, and has to start anew.
+    let next = FIRST + 3000;
+    let mut line = HostLine::begin_at(&mut port);
+    assert!(matches!(line.tick(next, given), Err(HilError::Alone(_))));
+    assert!(matches!(line.stands(), Ok((_, true))));
+    let ran = looped(&mut port, &scenario(&["run.seed=3"])).expect("a run");
+    assert!(ran.summary.completed);
+}
+
+#[test]
+fn a_question_asked_twice_is_answered_twice_and_done_once() {
+    let mut port = board();
+    let given = under_way(&mut port, 3000);
+    let mut line = HostLine::begin_at(&mut port);
+    let last = FIRST + 2999;
+    let (first, again) =
+        (line.tick(last, given).expect("told again"), line.tick(last, given).expect("and again"));
+    assert_eq!(first, again);
+    assert_eq!(line.stands().expect("stands"), (FIRST + 3000, false));
+    let error = line.tick(FIRST + 3200, given).unwrap_err();
+    assert!(matches!(error, HilError::Apart { board, .. } if board == FIRST + 3000), "{error}");
+}
+
+#[test]
+fn other_firmware_and_other_parameters_are_told_from_a_board_in_the_loop() {
+    let fe = Scenario::named("fe").expect("a preset");
+    let error = looped(&mut board(), &fe).unwrap_err();
+    assert!(matches!(&error, HilError::Parameters { board, .. } if board == "prototype"));
+    assert!(error.to_string().contains("rig params restore"), "{error}");
+    let ordinary = firmware::build(Profile::Release).expect("the firmware builds");
+    let ordinary = std::fs::read(ordinary).expect("readable");
+    let mut port = EmulatedPort::new(&ordinary).expect("an image");
+    let error = looped(&mut port, &scenario(&[])).unwrap_err();
+    assert!(error.to_string().contains("feature `hil`"), "{error}");
+}
+
+#[test]
+fn an_image_is_known_by_its_hash() {
+    let ordinary = firmware::build(Profile::Release).expect("the firmware builds");
+    let ordinary = Image::of(&std::fs::read(ordinary).expect("readable")).expect("an image");
+    let looped = Image::of(elf()).expect("an image");
+    let mut port = board();
+    assert_eq!(looped.is_on(&mut port), Ok(true));
+    assert_eq!(ordinary.is_on(&mut port), Ok(false));
+}

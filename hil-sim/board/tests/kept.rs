@@ -1,0 +1,397 @@
+//! What the board's flash keeps beside parameters: what the drive was doing when the supply
+//! went, and the sum of the image at its first start.
+
+#[path = "common/board.rs"]
+mod common;
+#[path = "common/reset_board.rs"]
+mod reset_board;
+
+use interstage::blackbox::{Flight, Reset, Stopped};
+use interstage::pages::PAGE_BYTES;
+use interstage::params::slots::SLOT_BYTES;
+use interstage::supervise::Mode;
+use rig_board::bench::STEP;
+use rig_board::chip::Pin;
+use rig_board::faults::Fault;
+use rig_board::peripherals::flash::Cut;
+use rig_board::peripherals::pwr::{HOLDS, Then};
+use rig_board::peripherals::rcc::Cause;
+use rig_board::thumb::sweep;
+
+use reset_board::Board;
+
+/// Where the pages stand, by `docs/PARAMETERS.md`.
+const RECORDS: u32 = 0x0808_0000 - 2 * SLOT_BYTES as u32 - PAGE_BYTES as u32;
+const SEALS: u32 = RECORDS - PAGE_BYTES as u32;
+
+/// What every image says that finds itself damaged.
+const DAMAGED: &str = "image: a bit has turned over";
+
+/// Longest time in which the whole image is looked at twice, ms.
+const LOOKED_AT_MS: u32 = 14_000;
+
+fn page(board: &Board, address: u32) -> Vec<u8> {
+    let mut bytes = vec![0; PAGE_BYTES];
+    board.bench.machine().peek(address, &mut bytes).expect("flash");
+    bytes
+}
+
+fn strike(board: &mut Board, fault: Fault) {
+    fault.strike(board.bench.machine_mut()).expect("strikes");
+}
+
+/// Falls in the middle of a run, and is judged by what the next start reports.
+fn falls(board: &mut Board) -> Option<Flight> {
+    strike(board, Fault::BrownOut);
+    let (cause, after, driven) = board.reset(5);
+    assert_eq!(cause, Cause::Power);
+    assert!(after <= 1, "{after} ms");
+    assert!(!driven[1..].contains(&true), "{driven:?}");
+    let restart = board.report();
+    assert_eq!(restart.reset, Reset::Power);
+    assert_eq!(restart.flight.is_some(), restart.crash.is_some());
+    if let Some(crash) = restart.crash {
+        assert_eq!(crash.stopped, Stopped::Supply);
+    }
+    restart.flight
+}
+
+#[test]
+fn a_supply_that_falls_leaves_what_the_drive_did() {
+    let mut board = Board::moving();
+    let at = board.bench.plant().truth().position_mm;
+    let flight = falls(&mut board).expect("a record");
+    assert!(matches!(flight.mode(), Some(Mode::Run(..))), "{flight:?}");
+    assert!((flight.position.to_num::<f64>() - at).abs() < 0.3, "{flight:?} at {at}");
+    for said in ["the supply fell too low", "before: tick"] {
+        assert!(board.log.iter().any(|line| line.contains(said)), "{said}: {:#?}", board.log);
+    }
+}
+
+/// Of the millisecond that the wiring has to give it, it takes the half at most.
+#[test]
+fn a_record_of_the_supply_is_written_in_half_of_its_time() {
+    // An empty page, which is looked through from its end, and one with room for one more.
+    for filled in [0, PAGE_BYTES - 32] {
+        let mut board = Board::moving();
+        board.bench.machine_mut().poke(RECORDS, &vec![0; filled]).expect("flash");
+        strike(&mut board, Fault::BrownOut);
+        let fell = board.bench.machine().now();
+        // The record's last word is the lower one of its third double word.
+        let written = |board: &Board| page(board, RECORDS)[filled + 16..filled + 20] != [0xFF; 4];
+        while !written(&board) {
+            let machine = board.bench.machine_mut();
+            let now = machine.now();
+            assert!(now - fell < HOLDS / 2, "{filled}: not yet");
+            machine.run_on(now + STEP / 100).expect("runs");
+        }
+        let took_ms = (board.bench.machine().now() - fell) as f64 / STEP as f64;
+        assert!((0.2..0.4).contains(&took_ms), "{filled}: {took_ms} ms");
+    }
+}
+
+#[test]
+fn a_record_of_the_supply_is_reported_once() {
+    let mut board = Board::moving();
+    falls(&mut board).expect("a record");
+    // The memory is lost, and this time without a warning.
+    strike(&mut board, Fault::SupplyCut);
+    let second = board.report();
+    assert_eq!((second.reset, second.flight, second.crash), (Reset::Power, None, None));
+}
+
+#[test]
+fn a_supply_that_flickers_leaves_its_first_record() {
+    let mut board = Board::moving();
+    strike(&mut board, Fault::BrownOut);
+    // Back until the record has been taken, 24 bytes on: the tick has not begun.
+    let taken = (0..200).any(|_| {
+        let machine = board.bench.machine_mut();
+        machine.run_on(machine.now() + STEP / 20).expect("runs");
+        page(&board, RECORDS)[24..32] == [0; 8]
+    });
+    assert!(taken, "{:#?}", board.log);
+    let flight = falls(&mut board).expect("the same record");
+    assert!(matches!(flight.mode(), Some(Mode::Run(..))), "{flight:?}");
+}
+
+#[test]
+fn a_record_is_whole_or_none_wherever_power_goes() {
+    // Of the third double word the lower half is the record's last.
+    for (operations, whole) in [(1, false), (2, false), (3, true), (4, true)] {
+        let mut board = Board::moving();
+        // One from before, which must not pass for this one.
+        let earlier = falls(&mut board).expect("a record");
+        assert!(board.bench.send(b's').expect("runs"));
+        board.until("deploying: cruise", 6000);
+        board.bench.take_frames();
+        board.bench.machine_mut().chip_mut().flash.cut_power(Cut::Within(operations));
+        strike(&mut board, Fault::BrownOut);
+        board.reset(5);
+        let restart = board.report();
+        assert_eq!(restart.flight.is_some(), whole, "{operations}: {restart}");
+        assert!(restart.flight.is_none_or(|flight| flight.tick != earlier.tick), "{operations}");
+        if !whole {
+            // What was torn is in nobody's way.
+            let next = falls(&mut board).expect("the next record");
+            assert_eq!(next.mode(), Some(Mode::Idle));
+        }
+    }
+}
+
+#[test]
+fn a_full_page_of_records_makes_room() {
+    let mut board = Board::idle();
+    let full = [0; PAGE_BYTES];
+    board.bench.machine_mut().poke(RECORDS, &full).expect("flash");
+    strike(&mut board, Fault::ResetPin);
+    board.until("mode: idle", 3000);
+    assert_eq!(page(&board, RECORDS), [0xFF; PAGE_BYTES]);
+    board.bench.take_frames();
+    let flight = falls(&mut board).expect("a record");
+    assert_eq!(flight.mode(), Some(Mode::Idle));
+}
+
+#[test]
+fn a_dip_of_the_supply_cuts_the_bridges_and_starts_anew() {
+    let mut board = Board::moving();
+    let at = board.bench.plant().truth().position_mm;
+    strike(&mut board, Fault::SupplyDip);
+    let (cause, after, driven) = board.reset(60);
+    assert_eq!(cause, Cause::Software);
+    assert!(after < 40, "{after} ms");
+    assert!(!driven[1..].contains(&true), "{driven:?}");
+    let restart = board.report();
+    assert_eq!(restart.crash.expect("a crash").stopped, Stopped::Supply);
+    let place = restart.place().expect("a place");
+    assert!((place.position.to_num::<f64>() - at).abs() < 0.3 && !place.sure, "{restart} at {at}");
+}
+
+/// Too low for a while, without being gone.
+fn sags(board: &mut Board, milliseconds: u64) {
+    let machine = board.bench.machine_mut();
+    let now = machine.now();
+    machine.chip_mut().supply_falls(now + milliseconds * STEP, Then::Back, now);
+}
+
+#[test]
+fn a_supply_that_sags_until_the_watchdog_bites_is_no_hang() {
+    let mut board = Board::moving();
+    let at = board.bench.plant().truth().position_mm;
+    sags(&mut board, 400);
+    let (cause, after, driven) = board.reset(150);
+    assert_eq!(cause, Cause::Watchdog);
+    assert!((80..130).contains(&after), "{after} ms");
+    assert!(!driven[1..].contains(&true), "{driven:?}");
+    let restart = board.report();
+    assert_eq!(restart.crash.expect("a crash").stopped, Stopped::Supply);
+    // What it was doing when the bridges went off, and no way gone since; but it may have
+    // been moved meanwhile.
+    let place = restart.place().expect("a place");
+    assert!((place.position.to_num::<f64>() - at).abs() < 0.3 && !place.sure, "{restart} at {at}");
+}
+
+#[test]
+fn a_reset_behind_a_lost_supply_makes_its_place_no_surer() {
+    let mut board = Board::moving();
+    strike(&mut board, Fault::BrownOut);
+    board.reset(5);
+    // The start has taken the record; the tick has not begun.
+    let taken = (0..200).any(|_| {
+        let machine = board.bench.machine_mut();
+        machine.run_on(machine.now() + STEP / 20).expect("runs");
+        page(&board, RECORDS)[24..32] == [0; 8]
+    });
+    assert!(taken, "{:#?}", board.log);
+    strike(&mut board, Fault::ResetPin);
+    let restart = board.report();
+    assert_eq!((restart.reset, restart.crash), (Reset::Pin, None));
+    assert!(restart.place().is_some_and(|place| !place.sure), "{restart}");
+}
+
+#[test]
+fn a_place_without_a_step_found_stays_unsure_however_long_it_idles() {
+    let mut board = Board::moving();
+    let at = board.bench.plant().truth().position_mm;
+    let lost = falls(&mut board).expect("a record");
+    for _ in 0..2 {
+        for _ in 0..50 {
+            board.step();
+        }
+        strike(&mut board, Fault::ResetPin);
+        let restart = board.report();
+        assert!(restart.flight.is_some_and(|flight| flight.tick != lost.tick), "{restart}");
+        let place = restart.place().expect("a place");
+        let off = (place.position.to_num::<f64>() - at).abs();
+        assert!(off < 0.3 && !place.sure, "{restart} at {at}");
+    }
+}
+
+#[test]
+fn a_reset_into_a_low_supply_leaves_its_place_unsure() {
+    let mut board = Board::moving();
+    strike(&mut board, Fault::ResetPin);
+    sags(&mut board, 300);
+    let restart = board.report();
+    assert_eq!((restart.reset, restart.crash), (Reset::Power, None));
+    assert!(restart.place().is_some_and(|place| !place.sure), "{restart}");
+}
+
+#[test]
+fn a_supply_that_sags_is_named_without_its_record_too() {
+    let mut board = Board::moving();
+    // No room for one.
+    board.bench.machine_mut().poke(RECORDS, &[0; PAGE_BYTES]).expect("flash");
+    sags(&mut board, 400);
+    assert_eq!(board.reset(150).0, Cause::Watchdog);
+    let restart = board.report();
+    assert_eq!(restart.crash.expect("a crash").stopped, Stopped::Supply);
+    assert!(restart.place().is_some_and(|place| !place.sure), "{restart}");
+}
+
+#[test]
+fn a_start_waits_for_its_supply() {
+    let mut board = Board::idle();
+    board.bench.take_frames();
+    // Comes back too low, for a tenth of a second.
+    board.bench.machine_mut().restart(Cause::Power).expect("restarts");
+    sags(&mut board, 100);
+    let lines = board.log.len();
+    for _ in 0..99 {
+        board.step();
+    }
+    assert_eq!(board.log.len(), lines, "{:#?}", &board.log[lines..]);
+    board.until("mode: idle", 3000);
+}
+
+#[test]
+fn the_first_start_of_an_image_keeps_its_sum() {
+    let first = |board: &Board| {
+        board.log.iter().filter(|line| line.contains("first start of this image")).count()
+    };
+    let mut board = Board::idle();
+    assert_eq!(first(&board), 1, "{:#?}", board.log);
+    let seals = page(&board, SEALS);
+    assert_ne!(seals[..16], [0xFF; 16]);
+    assert_eq!(seals[16..], [0xFF; PAGE_BYTES - 16]);
+    strike(&mut board, Fault::ResetPin);
+    board.until("mode: idle", 3000);
+    assert_eq!(first(&board), 1, "known by now");
+    assert_eq!(page(&board, SEALS), seals);
+}
+
+/// Bytes of the image: of its vectors, its code, its constants, its hash.
+fn places(board: &Board) -> Vec<u32> {
+    let image = board.bench.machine().image();
+    let last = image.flash.iter().rposition(|byte| *byte != 0xFF).expect("an image") as u32;
+    let hash = image.symbol("__build_id").expect("a symbol");
+    vec![0x0800_0000 + 0x1D0, board.function("panic_bounds_check"), 0x0800_0000 + last, hash + 16]
+}
+
+#[test]
+fn a_bit_of_the_image_that_turns_over_is_told_and_held() {
+    for place in places(&Board::idle()) {
+        let mut board = Board::moving();
+        let flip = Fault::BitFlip(place, 4);
+        strike(&mut board, flip);
+        board.until(DAMAGED, LOOKED_AT_MS);
+        let (cause, _, driven) = board.reset(20);
+        assert_eq!(cause, Cause::Software, "{place:#x}");
+        assert!(!driven[1..].contains(&true), "{driven:?}");
+        // It stays off, and says so every second; commands are nothing to it.
+        for _ in 0..2 {
+            board.until(DAMAGED, 1100);
+            board.bench.send(b's').expect("runs");
+        }
+        for _ in 0..500 {
+            let drives = board.step().drives;
+            assert!(!drives.drive_on && !drives.preload_on);
+        }
+        // Flashed again, it goes on.
+        strike(&mut board, flip);
+        strike(&mut board, Fault::ResetPin);
+        board.until("mode: idle", 3000);
+    }
+}
+
+#[test]
+fn an_image_names_no_folder_of_the_machine_that_built_it() {
+    let board = Board::idle();
+    let image = &board.bench.machine().image().flash;
+    let holds = |text: &str| image.windows(text.len()).any(|bytes| bytes == text.as_bytes());
+    assert!(holds("src/main.rs"), "places of panics are in it");
+    let home = std::env::home_dir().expect("a home");
+    for folder in ["registry", ".cargo", home.to_str().expect("a path")] {
+        assert!(!holds(folder), "{folder}");
+    }
+}
+
+/// A start that no longer gets to its tasks, because what copies its parts about is broken,
+/// has said so before.
+#[test]
+fn a_damaged_image_that_no_longer_starts_says_so_too() {
+    let mut board = Board::moving();
+    let copies = board.function("compiler_builtins::mem::memcpy");
+    strike(&mut board, Fault::BitFlip(copies + 0x22F, 4));
+    board.until(DAMAGED, LOOKED_AT_MS);
+    // Off from here on, how often ever it starts.
+    board.step();
+    for _ in 0..500 {
+        let drives = board.step().drives;
+        assert!(!drives.drive_on && !drives.preload_on);
+    }
+}
+
+/// One that comes to nothing at all shows so by the light, over and over; on a sound board it
+/// stays dark until the first word.
+#[test]
+fn a_damaged_image_that_says_nothing_any_more_blinks() {
+    let lit = |board: &Board| board.bench.machine().chip().level(Pin::LIGHT);
+    let mut board = Board::moving();
+    strike(&mut board, Fault::ResetPin);
+    let from = board.log.len();
+    while board.log.len() == from {
+        board.step();
+        assert!(board.log.len() > from || !lit(&board));
+    }
+    let mut board = Board::moving();
+    let copies = board.function("compiler_builtins::mem::memcpy");
+    strike(&mut board, Fault::BitFlip(copies + 0x115, 4));
+    strike(&mut board, Fault::ResetPin);
+    board.step();
+    let from = board.log.len();
+    let mut seen = Vec::new();
+    for _ in 0..1000 {
+        let drives = board.step().drives;
+        assert!(!drives.drive_on && !drives.preload_on);
+        seen.push(lit(&board));
+    }
+    assert_eq!(board.log.len(), from, "{:#?}", &board.log[from..]);
+    let blinks = seen.windows(2).filter(|pair| !pair[0] && pair[1]).count();
+    let share = seen.iter().filter(|on| **on).count();
+    assert!(blinks >= 3 && (200..800).contains(&share), "{blinks} times, {share} ms");
+}
+
+/// The floating-point unit is off until a start has turned it on: what comes before must do
+/// without, whatever the compiler would like for its copies.
+#[test]
+fn what_a_start_does_first_needs_no_floating_point_unit() {
+    let board = Board::idle();
+    let image = board.bench.machine().image();
+    let mut looked_at = 0;
+    for name in ["__pre_init", "board::image::sums", "interstage::pages::word", "Reset"] {
+        for function in image.functions.iter().filter(|function| function.name.contains(name)) {
+            let range = function.range.start - 0x0800_0000..function.range.end - 0x0800_0000;
+            let code = &image.flash[range.start as usize..range.end as usize];
+            for (place, instruction, _) in sweep(code, function.range.start) {
+                let at = (place - function.range.start) as usize;
+                let half = |at: usize| u16::from_le_bytes([code[at], code[at + 1]]);
+                let wide = instruction.size == 4 && (0xEC..=0xEF).contains(&(half(at) >> 8));
+                let float = wide && matches!(half(at + 2) >> 8 & 0xF, 10 | 11);
+                assert!(!float, "{} at {place:#x}", function.name);
+            }
+            looked_at += 1;
+        }
+    }
+    assert!(looked_at >= 3, "{looked_at}");
+}

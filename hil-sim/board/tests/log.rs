@@ -1,0 +1,431 @@
+//! The binary log of the firmware itself, on the emulated board.
+
+#[path = "common/board.rs"]
+mod common;
+
+use std::collections::VecDeque;
+use std::io::Write;
+use std::process::{Command, Stdio};
+
+use hil_sim::log::{Decoder, Item, Mark, Row, Run};
+use hil_sim::replay::replay;
+use interstage::log::Event;
+use interstage::log::capture::Trigger;
+use interstage::rig::Rig;
+use interstage::supervise::Mode;
+use interstage::units::Q16;
+use rig_board::bench::{Bench, STEP};
+use rig_board::log::Line;
+use rig_board::peripherals::rcc::Cause;
+use rig_board::run;
+
+use common::{elf, scenario, strings};
+
+/// How far the log may be from the truth under way. Position: the tolerance of the steps'
+/// places, which the controller knows from its table and corrects itself by. Preload: two
+/// deviations of the load cell's gain at 50 N, six of its noise, and its age.
+const POSITION_MM: f64 = 0.8;
+const PRELOAD_N: f64 = 1.0;
+
+/// A board under way, with what it has said on both channels.
+struct Board {
+    bench: Bench<'static>,
+    lines: Vec<Line>,
+    frames: Vec<u8>,
+}
+
+impl Board {
+    fn off() -> Self {
+        let bench = Bench::new(elf(), strings(), &scenario(&["run.seed=1"])).expect("a bench");
+        Self { bench, lines: Vec::new(), frames: Vec::new() }
+    }
+
+    fn run(&mut self, milliseconds: u32) {
+        for _ in 0..milliseconds {
+            self.lines.extend(self.bench.step().expect("runs").1);
+            self.frames.extend(self.bench.take_frames());
+        }
+    }
+
+    fn until(&mut self, text: &str, milliseconds: u32) {
+        let from = self.lines.len();
+        for _ in 0..milliseconds {
+            self.run(1);
+            if self.lines[from..].iter().any(|line| line.text.contains(text)) {
+                return;
+            }
+        }
+        panic!("no `{text}` within {milliseconds} ms");
+    }
+
+    fn send(&mut self, letter: u8) {
+        assert!(self.bench.send(letter).expect("runs"), "the console listens");
+    }
+
+    fn log(&self) -> Run {
+        Run::of_stream(&self.frames)
+    }
+}
+
+#[test]
+fn every_tick_of_a_run_is_logged_and_runs_again_on_this_host() {
+    for sets in [&["run.seed=1"][..], &["run.seed=1", "run.direction=retract"]] {
+        let ran = run::run(elf(), &scenario(sets), true, |_, _| {}).expect("a run");
+        let run = Run::of_stream(&ran.recording.stream);
+        assert!(run.is_whole(), "{:?}", run.marks);
+        assert_eq!(run.ledger.len(), 3);
+        let header = run.header.clone().expect("it says who it is");
+        assert_eq!((header.rig.as_str(), header.build.len()), ("prototype", 16));
+        assert_ne!(header.build, "0".repeat(16));
+        let result = replay(&run, &Rig::prototype()).expect("a sound rig");
+        assert!(result.is_equal(), "{result:?}");
+        // Why the board started is not the controller's to say.
+        let own = run.events.iter().filter(|entry| !matches!(entry.event, Event::Restart(_)));
+        assert!(result.events as usize == own.count() && result.plans.1 == 0, "{result:?}");
+        // What the report shows of the controller is its own word.
+        let rows = &ran.recording.rows;
+        // But for the last ticks, which had not left the board when the run ended.
+        let logged = &rows[2000..rows.len() - 24];
+        assert!(logged.iter().all(|row| row.position_est_mm.is_finite()));
+        // Bytes a tick: what a probe has to keep up with.
+        let mean = ran.recording.stream.len() as f64 / run.rows.len() as f64;
+        assert!(mean < 50.0, "{mean}");
+    }
+}
+
+/// Who reads the binary log's channel.
+#[derive(Clone, Copy, PartialEq)]
+enum Reader {
+    /// One who keeps up.
+    There,
+    /// Nobody.
+    Absent,
+    /// One who stands still for 700 of every 1000 ms.
+    Stalled,
+    /// Nobody, and nothing to read: the image keeps no tick.
+    Mute,
+}
+
+/// What the text log says of a crossing's ledger from the speed on: what stands before it
+/// is the time and the place.
+type Crossings = Vec<Vec<f64>>;
+
+/// What the control tick cost, tick by tick, and when it began.
+#[derive(Default)]
+struct Ticks {
+    cycles: Vec<u64>,
+    starts: Vec<u64>,
+}
+
+impl Ticks {
+    fn gather(&mut self, board: &mut Board) {
+        let machine = board.bench.machine_mut();
+        let tick = machine.tasks().iter().position(|name| *name == "motors").expect("the tick");
+        for turn in machine.profile_mut().take_polls().iter().filter(|turn| turn.task == tick) {
+            self.cycles.push(turn.cycles);
+            self.starts.push(turn.began);
+        }
+    }
+
+    /// Mean and most cycles.
+    fn cost(&self) -> [f64; 2] {
+        let sum: u64 = self.cycles.iter().sum();
+        [
+            sum as f64 / self.cycles.len() as f64,
+            self.cycles.iter().copied().max().unwrap_or_default() as f64,
+        ]
+    }
+
+    /// Deviation of the beginnings from an even beat, cycles, and from the earliest to the
+    /// latest.
+    fn jitter(&self) -> [f64; 2] {
+        let first = self.starts[0] / STEP;
+        let phase = |(tick, at): (u64, &u64)| *at as f64 - ((first + tick) * STEP) as f64;
+        let phases: Vec<f64> = (0..).zip(&self.starts).map(phase).collect();
+        let mean = phases.iter().sum::<f64>() / phases.len() as f64;
+        let square = phases.iter().map(|phase| (phase - mean).powi(2)).sum::<f64>();
+        let most = phases.iter().copied().fold(f64::MIN, f64::max);
+        let least = phases.iter().copied().fold(f64::MAX, f64::min);
+        [(square / phases.len() as f64).sqrt(), most - least]
+    }
+}
+
+/// Has the image keep no tick for the log: the function that does returns at once.
+fn mute(board: &mut Board) {
+    const BX_LR: [u8; 2] = [0x70, 0x47];
+    let machine = board.bench.machine_mut();
+    let keeps = |name: &str| name.ends_with("log::tape::Tape::keep");
+    let found: Vec<u32> = machine
+        .image()
+        .functions
+        .iter()
+        .filter(|function| keeps(&function.name))
+        .map(|function| function.range.start)
+        .collect();
+    assert_eq!(found.len(), 1, "the function that keeps a tick");
+    machine.poke(found[0], &BX_LR).expect("flash");
+}
+
+/// A run until the drive has arrived: how long it took, ms, what the text log says of the
+/// crossings, and what the tick cost.
+fn deployment(reader: Reader) -> (u32, Crossings, Ticks) {
+    let mut board = Board::off();
+    board.bench.listen(reader == Reader::There);
+    if reader == Reader::Mute {
+        mute(&mut board);
+    }
+    board.until("mode: idle", 3000);
+    let (mut ticks, mut crossings) = (Ticks::default(), Vec::new());
+    board.bench.machine_mut().profile_mut().take_polls();
+    board.send(b's');
+    for millisecond in 0..8000 {
+        if reader == Reader::Stalled {
+            board.bench.listen(millisecond % 1000 < 300);
+        }
+        let (_, lines) = board.bench.step().expect("runs");
+        board.bench.take_frames();
+        let closed = lines.iter().filter(|line| line.text.contains("] step "));
+        crossings.extend(closed.map(|line| line.numbers()[4..].to_vec()));
+        ticks.gather(&mut board);
+        if lines.iter().any(|line| line.text.contains("mode: deployed")) {
+            return (millisecond, crossings, ticks);
+        }
+    }
+    panic!("it did not arrive");
+}
+
+/// Ledgers that differ by no more than noise: the journal's time differs, and with it the
+/// cycle in which an interrupt is taken, which the loop amplifies as it does any noise. That
+/// the controller itself gives the same bits is seen in lockstep, where there is no such
+/// thing: `board_hil.rs`.
+fn alike(name: &str, read: &(u32, Crossings, Ticks), other: &(u32, Crossings, Ticks)) {
+    assert!(read.0.abs_diff(other.0) <= 20, "{name}: {} ms, {} ms", read.0, other.0);
+    assert_eq!((read.1.len(), other.1.len()), (3, 3), "{name}");
+    for (read, other) in read.1.iter().flatten().zip(other.1.iter().flatten()) {
+        assert!((read - other).abs() <= 0.3 + 0.02 * other.abs(), "{name}: {read} {other}");
+    }
+}
+
+/// Telemetry at full rate changes nothing of the control tick's beginning, whoever reads it
+/// or does not, and whether there is any.
+#[test]
+fn neither_telemetry_nor_its_reader_changes_when_the_tick_begins_or_what_it_takes() {
+    /// What two runs may differ by, relative.
+    const SAME: f64 = 0.02;
+    let read = deployment(Reader::There);
+    let off = |one: f64, other: f64| (one / other - 1.0).abs();
+    println!("there: cycles {:.1?}; beginning {:.1?}", read.2.cost(), read.2.jitter());
+    for (name, reader) in
+        [("absent", Reader::Absent), ("stalled", Reader::Stalled), ("mute", Reader::Mute)]
+    {
+        let other = deployment(reader);
+        alike(name, &read, &other);
+        let (cost, jitter) = (other.2.cost(), other.2.jitter());
+        println!("{name}: cycles {cost:.1?}; beginning {jitter:.1?}");
+        for (what, one, other) in [
+            ("deviation of its beginning", read.2.jitter()[0], jitter[0]),
+            ("earliest to latest beginning", read.2.jitter()[1], jitter[1]),
+        ] {
+            assert!(off(one, other) <= SAME, "{name}: {what}: {one:.1}, {other:.1}");
+        }
+        for (what, one, other) in
+            [("mean", read.2.cost()[0], cost[0]), ("most", read.2.cost()[1], cost[1])]
+        {
+            assert!(off(one, other) <= SAME, "{name}: {what} cycles: {one:.1}, {other:.1}");
+        }
+    }
+}
+
+#[test]
+fn the_text_log_reads_as_defmt_print_reads_it() {
+    let mut board = Board::off();
+    board.bench.keep_text();
+    board.until("mode: idle", 3000);
+    board.send(b's');
+    board.until("mode: deployed", 12_000);
+    board.run(100);
+    let text = board.bench.take_text();
+    let image = tempfile::NamedTempFile::new().expect("a file");
+    std::fs::write(image.path(), elf()).expect("written");
+    let mut reader = Command::new(hil_sim::provision::defmt_print().expect("it builds"))
+        .arg("-e")
+        .arg(image.path())
+        .args(["--log-format", "{L}|{s}"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("starts");
+    let mut input = reader.stdin.take().expect("piped");
+    input.write_all(&text).expect("it reads");
+    drop(input);
+    let output = reader.wait_with_output().expect("it ends");
+    let printed = String::from_utf8(output.stdout).expect("text");
+    let printed: Vec<(String, String)> = printed
+        .lines()
+        .map(|line| {
+            let (level, text) = line.split_once('|').unwrap_or_else(|| panic!("{line}"));
+            (level.trim().to_lowercase(), text.to_owned())
+        })
+        .collect();
+    let ours: Vec<(String, String)> =
+        board.lines.iter().map(|line| (line.level.clone(), line.text.clone())).collect();
+    assert!(ours.len() > 30, "{} lines", ours.len());
+    assert_eq!(ours, printed);
+}
+
+#[test]
+fn frames_that_found_no_room_are_marked_and_the_capture_waits_for_its_reader() {
+    let mut board = Board::off();
+    board.until("mode: idle", 3000);
+    // Nobody listens while the drive is started and goes over the first step.
+    board.bench.listen(false);
+    board.send(b's');
+    board.until("deploying: settle", 9000);
+    board.run(1500);
+    board.bench.listen(true);
+    board.run(1500);
+    let run = board.log();
+    // A short frame may find room where a long one did not, so there are several marks.
+    let (mut frames, mut ticks) = (0, 0);
+    for (_, mark) in &run.marks {
+        match mark {
+            Mark::Lost { frames: lost, dropped } => {
+                assert_eq!(lost, dropped);
+                frames += lost;
+            }
+            other => panic!("{other}"),
+        }
+    }
+    for pair in run.rows.windows(2) {
+        ticks += u64::from(pair[1].tick - pair[0].tick - 1);
+    }
+    assert!(frames > 300 && ticks > 2400, "{frames} frames, {ticks} ticks");
+    assert_eq!((run.tally.lost_frames, run.tally.lost_ticks), (u64::from(frames), ticks));
+    // The command came first, and its capture is kept whole until it has been read.
+    let first = run.shots.first().expect("captured");
+    assert_eq!(first.trigger, Trigger::Command);
+    let pieces: Vec<_> = run.shots.iter().take_while(|piece| piece.at == first.at).collect();
+    let shots: usize = pieces.iter().map(|piece| piece.shots.len()).sum();
+    assert_eq!(shots, usize::from(first.of));
+    assert_eq!(pieces.len(), usize::from(first.of).div_ceil(16));
+}
+
+#[test]
+fn a_restart_in_the_middle_is_marked_and_both_parts_run_again() {
+    let mut board = Board::off();
+    board.until("mode: idle", 3000);
+    board.send(b's');
+    board.until("deploying: crossing", 8000);
+    // This one leaves the record of the run before, from which it goes on.
+    board.bench.machine_mut().restart(Cause::Pin).expect("restarts");
+    board.until("mode: idle", 3000);
+    board.send(b's');
+    board.until("mode: deployed", 12_000);
+    board.send(b'r');
+    board.until("mode: retracted", 12_000);
+    board.send(b's');
+    board.until("deploying: crossing", 8000);
+    board.bench.machine_mut().restart(Cause::Power).expect("restarts");
+    board.until("mode: idle", 3000);
+    board.run(200);
+    let run = board.log();
+    assert_eq!(run.tally.restarts, 2, "{:?}", run.marks);
+    let placed = |boot| run.since_boot(boot).restart().and_then(|restart| restart.place());
+    assert_eq!([0, 1, 2].map(|boot| placed(boot).is_some()), [false, true, false]);
+    let result = replay(&run, &Rig::prototype()).expect("a sound rig");
+    assert!(result.difference.is_none(), "{result:?}");
+    let idle = run.rows.last().and_then(Row::telemetry).expect("a row");
+    assert_eq!(idle.mode, Mode::Idle);
+    assert!(result.ticks as usize > run.rows.len() / 2, "{result:?}");
+}
+
+/// Resident memory of this process, bytes; none where the system does not tell.
+fn resident() -> Option<u64> {
+    let text = std::fs::read_to_string("/proc/self/statm").ok()?;
+    text.split_whitespace().nth(1)?.parse::<u64>().ok().map(|pages| pages * 4096)
+}
+
+/// Two minutes on the board. What it logs stays as close to the truth as in the first
+/// round, and nothing on the board or about it grows.
+#[test]
+fn minutes_of_deploying_and_retracting_are_logged_without_a_gap_or_drift() {
+    const ROUNDS: usize = 24;
+    let mut board = Board::off();
+    board.until("mode: idle", 3000);
+    let (mut decoder, mut truths) = (Decoder::new(), VecDeque::new());
+    let mut due: Option<u32> = None;
+    let mut worst = [(0.0, 0.0); ROUNDS];
+    let (mut log, mut settled) = (std::mem::take(&mut board.frames), None);
+    decoder.read(&log, &mut |item| {
+        if let Item::Tick(record, _) = item {
+            due = Some(record.at() + 1);
+        }
+    });
+    for (round, worst) in worst.iter_mut().enumerate() {
+        let (letter, arrived) =
+            if round % 2 == 0 { (b's', "mode: deployed") } else { (b'r', "mode: retracted") };
+        board.send(letter);
+        let mut left = None;
+        for millisecond in 0.. {
+            assert!(millisecond < 20_000, "round {round} does not arrive");
+            let (_, lines) = board.bench.step().expect("runs");
+            // What the emulator books of the tasks is not the board's.
+            board.bench.machine_mut().profile_mut().take_polls();
+            let truth = board.bench.plant().truth();
+            let now = (board.bench.time_s() * 1e3).round() as u32;
+            truths.push_back((now, truth.position_mm, truth.preload_n));
+            let frames = board.bench.take_frames();
+            log.extend_from_slice(&frames);
+            decoder.read(&frames, &mut |item| match item {
+                Item::Tick(record, _) => {
+                    let at = record.at();
+                    assert!(due.is_none_or(|due| due == at), "{due:?} {at}");
+                    due = Some(at + 1);
+                    while truths.front().is_some_and(|(ms, ..)| *ms < at) {
+                        truths.pop_front();
+                    }
+                    if let Some((ms, position, preload)) = truths.front()
+                        && *ms == at
+                        && matches!(record.telemetry.mode, Mode::Run(..))
+                    {
+                        let off = |seen: Q16, truth: f64| (seen.to_num::<f64>() - truth).abs();
+                        worst.0 = off(record.telemetry.position, *position).max(worst.0);
+                        worst.1 = off(record.telemetry.preload, *preload).max(worst.1);
+                    }
+                }
+                Item::Mark(mark) => panic!("{mark}"),
+                _ => {}
+            });
+            if lines.iter().any(|line| line.text.contains(arrived)) {
+                left = Some(100);
+            }
+            left = left.map(|left: u32| left - 1);
+            if left == Some(0) {
+                break;
+            }
+        }
+        // What waits for the log is what the log has not brought yet: two frames.
+        assert!(truths.len() < 64, "{} ticks wait", truths.len());
+        if round == 7 {
+            settled = resident();
+        }
+    }
+    println!("off by, mm and N, round by round: {worst:.3?}");
+    let tally = *decoder.tally();
+    assert!(tally.ticks > 120_000, "{tally:?}");
+    assert_eq!((tally.lost_frames, tally.lost_ticks, tally.garbage_bytes), (0, 0, 0));
+    for (round, (position, preload)) in worst.iter().enumerate() {
+        assert!(*position < POSITION_MM, "round {round}: {position} mm");
+        assert!(*preload < PRELOAD_N, "round {round}: {preload} N");
+    }
+    // The engine's caches are full after eight rounds; the log in memory is 40 bytes a tick.
+    if let (Some(before), Some(after)) = (settled, resident()) {
+        let grown = after.saturating_sub(before);
+        println!("{} kB more than after eight rounds", grown / 1024);
+        assert!(grown < (16 << 20), "{grown} bytes");
+    }
+    let run = Run::of_stream(&log);
+    assert_eq!(run.ledger.len(), 3 * ROUNDS);
+    assert!(replay(&run, &Rig::prototype()).expect("a sound rig").is_equal());
+}

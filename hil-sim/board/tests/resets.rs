@@ -1,0 +1,222 @@
+//! What ends the firmware, on the emulated board: each time the bridges go off, and the
+//! next start says what it was.
+
+#[path = "common/board.rs"]
+mod common;
+#[path = "common/reset_board.rs"]
+mod reset_board;
+
+use hil_sim::scenario::Scenario;
+use interstage::blackbox::{Late, Reset, Restart, Stopped};
+use interstage::supervise::{Direction, Mode};
+use rig_board::bench::STEP;
+use rig_board::core::Register;
+use rig_board::faults::Fault;
+use rig_board::peripherals::rcc::Cause;
+use rig_board::resets;
+
+use common::{elf, strings};
+use reset_board::Board;
+
+fn hang(restart: &Restart) -> (u32, Late) {
+    match restart.crash.map(|crash| crash.stopped) {
+        Some(Stopped::Hang { pc, late, .. }) => (pc, late),
+        _ => panic!("{restart}"),
+    }
+}
+
+/// The bridges go off within the first of these times, and not again on, ms.
+fn assert_cut(driven: &[bool], within: usize) {
+    assert!(!driven[within..].contains(&true), "{driven:?}");
+}
+
+#[test]
+fn a_first_start_reports_nothing_but_power() {
+    let mut board = Board::idle();
+    let nothing = Restart { reset: Reset::Power, flight: None, crash: None };
+    assert_eq!(board.report(), nothing);
+    assert!(!board.log.iter().any(|line| line.contains("restarted") || line.contains("before:")));
+}
+
+#[test]
+fn a_panic_is_reported_with_its_line_and_what_the_drive_did() {
+    let mut board = Board::moving();
+    let at = board.bench.plant().truth().position_mm;
+    let panics = board.function("panic_bounds_check");
+    // Index and length, and a place that has some line.
+    let place = 0x0800_1000;
+    let line = board.bench.machine().word(place + 8).expect("flash");
+    for (register, value) in [(Register::R(0), 7), (Register::R(1), 3), (Register::R(2), place)] {
+        board.set(register, value);
+    }
+    board.set(Register::Pc, panics);
+    let (cause, after, driven) = board.reset(60);
+    assert_eq!(cause, Cause::Software);
+    assert!(after < 40, "{after} ms");
+    assert_cut(&driven, 2);
+    let restart = board.report();
+    assert_eq!(restart.reset, Reset::Software);
+    assert_eq!(restart.crash.expect("a crash").stopped, Stopped::Panic { place, line });
+    let flight = restart.flight.expect("what it did");
+    assert!(matches!(flight.mode(), Some(Mode::Run(Direction::Deploy, _))), "{flight:?}");
+    assert!((flight.position.to_num::<f64>() - at).abs() < 0.3, "{flight:?} at {at}");
+    for said in ["restarted by software", "panicked in line", "before: tick"] {
+        assert!(board.log.iter().any(|line| line.contains(said)), "{said}: {:#?}", board.log);
+    }
+}
+
+#[test]
+fn a_hard_fault_is_reported_with_where_and_why() {
+    let mut board = Board::moving();
+    // Nothing lies there.
+    board.set(Register::Pc, 0x0900_0000);
+    let (cause, _, driven) = board.reset(60);
+    assert_eq!(cause, Cause::Software);
+    assert_cut(&driven, 2);
+    let restart = board.report();
+    match restart.crash.expect("a crash").stopped {
+        Stopped::Fault { pc, cfsr, hfsr, .. } => {
+            assert_eq!(pc, 0x0900_0000);
+            assert_ne!(cfsr, 0);
+            assert_eq!(hfsr, 1 << 30, "escalated");
+        }
+        other => panic!("{other:?}"),
+    }
+    assert!(restart.flight.is_some());
+}
+
+#[test]
+fn a_stack_that_overflows_is_reported_too() {
+    let mut board = Board::moving();
+    let end = board.bench.machine().image().symbol("_stack_end").expect("a symbol");
+    board.set(Register::Sp, end + 16);
+    let (_, after, driven) = board.reset(150);
+    assert_cut(&driven, 2);
+    assert!(after < 60, "the record ends it, not the watchdog: {after} ms");
+    let restart = board.report();
+    assert!(matches!(restart.crash.expect("a crash").stopped, Stopped::Fault { .. }));
+    assert!(restart.flight.is_some());
+}
+
+/// Tasks by their functions in `main.rs`, how the record calls them, and cycles that lead
+/// into the middle of a turn.
+const TASKS: [(&str, &str, u64); 8] = [
+    ("speed", "speed", 90),
+    ("pressure", "pressure", 130),
+    ("displacement", "displacement", 130),
+    ("angle", "angle", 60),
+    ("motors", "the control tick", 100),
+    ("model", "model", 250),
+    ("journal", "journal", 1500),
+    ("link", "an operator's task or the host's line", 300),
+];
+
+/// Runs the board up to the next turn of a task, and so many cycles into it.
+fn into_turn(board: &mut Board, task: &str, cycles: u64) {
+    let functions = &board.bench.machine().image().functions;
+    let polls: Vec<u32> = functions
+        .iter()
+        .filter(|function| function.name.contains("TaskStorage<F>::poll"))
+        .map(|function| function.range.start)
+        .collect();
+    for poll in polls {
+        for _ in 0..60 {
+            let machine = board.bench.machine_mut();
+            let until = (machine.now() / STEP + 1) * STEP;
+            if machine.run_to(poll, until).expect("runs") {
+                if machine.task() != Some(task) {
+                    break;
+                }
+                machine.run_on(machine.now() + cycles).expect("runs");
+                // A turn in which it only sets its timer anew is over by now.
+                if machine.place().contains("Executor::run") {
+                    continue;
+                }
+                // Caught in a critical section, nothing but the watchdog gets through.
+                while machine.register(Register::Primask).expect("a register") & 1 != 0 {
+                    machine.run_on(machine.now() + 5).expect("runs");
+                }
+                return;
+            }
+            if board.bench.is_due() {
+                let (_, lines) = board.bench.close().expect("runs");
+                board.log.extend(lines.into_iter().map(|line| line.text));
+            }
+        }
+    }
+    panic!("{task} has no turn");
+}
+
+#[test]
+fn the_task_that_hangs_is_named_whichever_it_is() {
+    for (task, name, cycles) in TASKS {
+        let mut board = Board::moving();
+        into_turn(&mut board, task, cycles);
+        Fault::Caught.strike(board.bench.machine_mut()).expect("strikes");
+        let (cause, after, driven) = board.reset(250);
+        assert_eq!(cause, Cause::Watchdog, "{task}");
+        // The time to be missed, and that of the watchdog.
+        assert!(after <= 160, "{task}: {after} ms");
+        assert_cut(&driven, driven.len().min(135));
+        let restart = board.report();
+        assert_eq!(restart.reset, Reset::Watchdog, "{task}");
+        let (pc, late) = hang(&restart);
+        assert_eq!(late.name(), name, "{task}: {restart}");
+        assert_ne!(pc, 0, "{task}");
+    }
+}
+
+#[test]
+fn an_interrupt_that_never_ceases_ends_in_a_reset_that_names_the_starved_tick() {
+    let mut board = Board::moving();
+    let at = board.bench.plant().truth().position_mm;
+    Fault::ButtonStorm.strike(board.bench.machine_mut()).expect("strikes");
+    let (cause, after, driven) = board.reset(150);
+    assert_eq!(cause, Cause::Watchdog);
+    assert!(after <= 115, "{after} ms");
+    // The system timer's interrupt gets through and cuts before the watchdog bites.
+    assert_cut(&driven, 85);
+    Fault::ButtonStorm.heal(board.bench.machine_mut());
+    let restart = board.report();
+    let (pc, late) = hang(&restart);
+    assert_eq!(late, Late::STARVED);
+    assert_ne!(pc, 0);
+    let on = board.bench.plant().truth().position_mm - at;
+    assert!(on < 1.0, "it went on for {on} mm");
+}
+
+#[test]
+fn interrupts_masked_for_good_end_in_a_reset_with_what_the_drive_did() {
+    let mut board = Board::moving();
+    board.set(Register::Primask, 1);
+    Fault::Caught.strike(board.bench.machine_mut()).expect("strikes");
+    let (cause, _, _) = board.reset(150);
+    assert_eq!(cause, Cause::Watchdog);
+    let restart = board.report();
+    assert_eq!((restart.reset, restart.crash), (Reset::Watchdog, None));
+    assert!(matches!(restart.flight.and_then(|f| f.mode()), Some(Mode::Run(..))));
+}
+
+#[test]
+fn a_report_is_made_once() {
+    let mut board = Board::moving();
+    Fault::ResetPin.strike(board.bench.machine_mut()).expect("strikes");
+    let first = board.report();
+    assert_eq!(first.reset, Reset::Pin);
+    assert!(matches!(first.flight.and_then(|f| f.mode()), Some(Mode::Run(..))));
+    board.bench.machine_mut().restart(Cause::Software).expect("restarts");
+    let second = board.report();
+    assert_eq!(second.reset, Reset::Software);
+    assert_eq!(second.flight.and_then(|f| f.mode()), Some(Mode::Idle));
+}
+
+#[test]
+fn resets_at_random_instants_are_recorded_held_and_gone_on_from() {
+    let scenario = Scenario::default();
+    let cases: Vec<resets::Case> = (0..16).map(|index| resets::case(1, index)).collect();
+    let all =
+        resets::run(elf(), strings(), &scenario, &cases, &resets::Told::NOBODY).expect("runs");
+    let outcome = resets::Outcome::of(&all);
+    assert!(outcome.is_good(), "{:#?}", outcome.wrong);
+    assert_eq!(outcome.resets, 16);
+}

@@ -1,0 +1,171 @@
+//! The study's results, regenerated: every figure that its text describes, as theory
+//! (the reduced model), simulation (the reference models) and experiment (the virtual
+//! rig, forty runs and four means of ten), with the numbers that it prints as marks, and
+//! every claim of it judged by these data.
+//!
+//! A claim is judged by code from the data of the figure below which it stands; nothing
+//! is fitted but the three numbers of the tread, and nothing is tuned so that a claim
+//! would hold. Everything is deterministic: the same build writes the same bytes.
+
+pub mod amplitudes;
+pub mod case;
+pub mod cases;
+pub mod course;
+pub mod draw;
+pub mod experiment;
+pub mod figure;
+pub mod history;
+pub mod hold;
+pub mod means;
+pub mod measure;
+pub mod modes;
+pub mod page;
+pub mod published;
+pub mod simulation;
+pub mod sweeps;
+pub mod theory;
+pub mod transitions;
+
+use interstage::rig::Rig;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use amplitudes::Amplitudes;
+use case::Case;
+use experiment::Experiment;
+use figure::{Claim, Figure};
+use history::Histories;
+use hold::Hold;
+use modes::Modes;
+use sweeps::{Sweep, Variable};
+
+use crate::reference::ReferenceError;
+use crate::reference::beam::BeamError;
+use hil_sim::plant::balance::BalanceError;
+use hil_sim::sil::RunError;
+
+/// Everything that is regenerated.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Study {
+    /// The figures, in the study's order.
+    pub figures: Vec<Figure>,
+    /// The claims, by figure.
+    pub claims: Vec<Claim>,
+}
+
+/// Why it could not be regenerated.
+#[derive(Debug, thiserror::Error)]
+pub enum StudyError {
+    /// A deployment failed.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// A crossing of the ring could not be balanced.
+    #[error(transparent)]
+    Balance(#[from] BalanceError),
+    /// A reference model refused.
+    #[error(transparent)]
+    Reference(#[from] ReferenceError),
+    /// The arm refused.
+    #[error(transparent)]
+    Beam(#[from] BeamError),
+}
+
+/// Deployments that [`regenerate`] runs.
+#[must_use]
+pub fn runs() -> usize {
+    cases().len() * published::RUNS
+}
+
+/// Cases of all experiments, each once.
+fn cases() -> Vec<Case> {
+    let all = [
+        cases::cases(),
+        Variable::Preload.cases(),
+        Variable::Speed.cases(),
+        transitions::cases(),
+        Hold::cases(),
+    ];
+    let mut unique: Vec<Case> = Vec::new();
+    for case in all.concat() {
+        if !unique.contains(&case) {
+            unique.push(case);
+        }
+    }
+    unique
+}
+
+/// Runs the experiments, computes theory and simulation, and judges the claims. `done`
+/// is called after each deployment.
+///
+/// # Errors
+/// [`StudyError`] if a deployment or a reference fails.
+pub fn regenerate(done: &(dyn Fn() + Sync)) -> Result<Study, StudyError> {
+    let experiments = experiment::run_all(&cases(), done)?;
+    let find = |wanted: &[Case]| -> Vec<&Experiment> {
+        let of = |case: &Case| experiments.iter().find(|e| e.case == *case);
+        wanted.iter().filter_map(of).collect()
+    };
+    let histories = |wanted: &[Case]| {
+        find(wanted).into_par_iter().map(Histories::new).collect::<Result<Vec<_>, _>>()
+    };
+    let four = histories(&cases::cases())?;
+    let three = histories(&transitions::cases())?;
+    let amplitudes = Amplitudes::new(&find(&cases::cases()))?;
+    let modes = Modes::new()?;
+    let preload = Sweep::new(Variable::Preload, &find(&Variable::Preload.cases()))?;
+    let speed = Sweep::new(Variable::Speed, &find(&Variable::Speed.cases()))?;
+    let hold = Hold::new(&find(&Hold::cases()))?;
+    let at_rig: Vec<&Experiment> =
+        experiments.iter().filter(|e| e.case.loads == case::Loads::Prototype).collect();
+    let pitch = Rig::prototype().drive.ripple_pitch_mm;
+    let figures = vec![
+        cases::figure(&four),
+        amplitudes.loads_figure(),
+        amplitudes.gap_figure(&four),
+        modes.figure(),
+        preload.gap_figure(),
+        speed.gap_figure(),
+        preload.depth_figure(),
+        speed.depth_figure(),
+        transitions::figure(&three),
+        hold.figure(),
+    ];
+    let claims = [
+        cases::claims(&four),
+        amplitudes.claims(&four),
+        modes.claims((3.0 / pitch, 8.0 / pitch)),
+        sweeps::preload_claims(&preload),
+        sweeps::speed_claims(&speed, &preload),
+        transitions::claims(&three),
+        hold.claims(&at_rig, &speed),
+    ]
+    .concat();
+    Ok(Study { figures, claims })
+}
+
+/// The study's figures and claims as JSON, values to four figures: what a comparison
+/// across builds can rely on.
+///
+/// # Errors
+/// Never for a study; what the serialiser says otherwise.
+pub fn json(study: &Study) -> serde_json::Result<String> {
+    let mut value = serde_json::to_value(study)?;
+    round(&mut value);
+    serde_json::to_string(&value)
+}
+
+/// Rounds every number to four figures.
+fn round(value: &mut serde_json::Value) {
+    use serde_json::Value;
+    match value {
+        Value::Number(number) => {
+            let rounded = number.as_f64().and_then(|x| format!("{x:.3e}").parse::<f64>().ok());
+            if let Some(shorter) = rounded.and_then(serde_json::Number::from_f64) {
+                *number = shorter;
+            }
+        }
+        Value::Array(all) => all.iter_mut().for_each(round),
+        Value::Object(all) => all.values_mut().for_each(round),
+        _ => {}
+    }
+}

@@ -1,0 +1,138 @@
+//! Speed, preload and loads of a crossing, and the rig that is run with them.
+
+use interstage::rig::Rig;
+use serde::Serialize;
+
+use hil_sim::plant::arm::Arm;
+use hil_sim::scenario::{ControllerKind, Scenario};
+
+/// Loads of the study.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Loads {
+    /// Of its theory and finite elements: 60 N on top, 100 N and more of preload.
+    Fe,
+    /// Of its rig: a third of that.
+    Prototype,
+}
+
+impl Loads {
+    /// Name of the rig's preset.
+    #[must_use]
+    pub const fn preset(self) -> &'static str {
+        match self {
+            Self::Fe => "fe",
+            Self::Prototype => "prototype",
+        }
+    }
+
+    /// The rig with these loads.
+    #[must_use]
+    pub fn rig(self) -> Rig {
+        match self {
+            Self::Fe => Rig::fe(),
+            Self::Prototype => Rig::prototype(),
+        }
+    }
+}
+
+/// A deployment at constant speed and preload.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Case {
+    /// Loads.
+    pub loads: Loads,
+    /// Axial speed, mm/s.
+    pub speed_mm_s: f64,
+    /// Radial preload, N.
+    pub preload_n: f64,
+}
+
+impl Case {
+    /// A case.
+    #[must_use]
+    pub const fn new(loads: Loads, speed_mm_s: f64, preload_n: f64) -> Self {
+        Self { loads, speed_mm_s, preload_n }
+    }
+
+    /// Speed and preload as text.
+    #[must_use]
+    pub fn name(&self) -> String {
+        format!("{} mm/s, {} N", self.speed_mm_s, self.preload_n)
+    }
+
+    /// Axial load that this wheel lifts, N.
+    #[must_use]
+    pub fn load_n(&self) -> f64 {
+        let plant = self.loads.rig().plant;
+        plant.top_load_n * plant.top_load_share
+    }
+
+    /// Arm, and the radius of a wheel that stands on sleeve `level`, mm.
+    fn arm(&self, level: usize) -> (Arm, f64) {
+        let rig = self.loads.rig();
+        let step = rig.rig.step_height_mm;
+        let centre = rig.rig.wall_radius_mm - rig.rig.wheel_radius_mm - step * level as f64;
+        let arm = Arm {
+            length_mm: rig.rig.arm_length_mm,
+            pivot_mm: rig.rig.arm_pivot_radius_mm,
+            coupling: rig.plant.arm_coupling,
+        };
+        (arm, centre)
+    }
+
+    /// Angle of the arm from the pillar with the wheel on sleeve `level`, rad.
+    #[must_use]
+    pub fn arm_rad(&self, level: usize) -> f64 {
+        let (arm, centre) = self.arm(level);
+        arm.angle(centre)
+    }
+
+    /// Radial force on a wheel that lifts its load from sleeve `level`, N: the preload,
+    /// and what the inclined arm makes of the thrust.
+    #[must_use]
+    pub fn pressing_n(&self, level: usize) -> f64 {
+        let (arm, centre) = self.arm(level);
+        self.preload_n + arm.wedge(centre) * self.load_n()
+    }
+
+    /// The deployment of the rig that `seed` draws: this preload and speed
+    /// throughout, with room above the preload for its loop.
+    #[must_use]
+    pub fn scenario(&self, seed: u64) -> Scenario {
+        let mut scenario = Scenario { rig: self.loads.rig(), ..Scenario::default() };
+        scenario.preset = self.loads.preset().to_owned();
+        let preload = &mut scenario.rig.preload;
+        preload.cruise_n = self.preload_n;
+        preload.limit_n = preload.limit_n.max(1.25 * self.preload_n);
+        scenario.rig.drive.cruise_speed_mm_s = self.speed_mm_s;
+        // The safe speed may not lie above it; nothing here asks for a reference gap.
+        let safe = &mut scenario.rig.control.safe_speed_mm_s;
+        *safe = safe.min(self.speed_mm_s);
+        scenario.run.controller = ControllerKind::Constant;
+        scenario.run.seed = seed;
+        scenario
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_arm_presses_less_from_sleeve_to_sleeve() {
+        let case = Case::new(Loads::Prototype, 5.0, 40.0);
+        let pressing: Vec<f64> = (0..3).map(|level| case.pressing_n(level)).collect();
+        assert!(pressing.windows(2).all(|pair| pair[1] < pair[0]), "{pressing:?}");
+        assert!((pressing[0] - 40.0 - 1.05 * 20.0 / 3.0).abs() < 0.01, "{pressing:?}");
+    }
+
+    #[test]
+    fn scenarios_are_valid() {
+        for case in [Case::new(Loads::Fe, 3.0, 120.0), Case::new(Loads::Prototype, 8.0, 50.0)] {
+            let scenario = case.scenario(7);
+            scenario.validate().unwrap();
+            interstage::model::Planner::try_build(&scenario.rig).unwrap();
+            assert_eq!(scenario.rig.preload.cruise_n, case.preload_n);
+        }
+    }
+}

@@ -1,0 +1,257 @@
+//! The study's experiment on the virtual rig: forty rigs within their tolerances, each
+//! deployed once a case with the shipping controller and noisy sensors, and four means
+//! of ten.
+//!
+//! Gap, embedding depth and contact area are what the sensors say; forces and arm
+//! vibration, for which the rig has no sensor, are what the plant did.
+
+use interstage::log::Event;
+use interstage::supervise::{Command, Mode};
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
+
+use super::StudyError;
+use super::case::Case;
+use super::course::Arms;
+use super::figure::Series;
+use super::measure::{CollisionGauge, impact_kpa};
+use super::published::{LOG_S, RUNS, RUNS_OF_A_MEAN};
+use super::theory::area_of_depth_mm2;
+use crate::reference::ReferenceError;
+use crate::reference::vibration::modal::Modal;
+use hil_sim::plant::rig::VirtualRig;
+use hil_sim::sil::{Options, Session};
+
+/// Crossings of a deployment.
+pub const STAGES: usize = 3;
+
+/// Means of an experiment.
+pub const MEANS: usize = RUNS / RUNS_OF_A_MEAN;
+
+/// Longest run, s: the whole travel at the slowest case, with room.
+const LONGEST_S: f64 = 60.0;
+
+/// A tick of the session, s.
+const TICK_S: f64 = 1e-3;
+
+/// Seed of the choice of runs for the means.
+const CHOICE: u64 = 40;
+
+/// One crossing as the rig saw it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Reading {
+    /// Gap measured by the controller, mm.
+    pub gap_mm: f64,
+    /// True gap, mm.
+    pub true_gap_mm: f64,
+    /// Tread compression that its sensor shows when the lower wall stops carrying, mm.
+    pub depth_mm: f64,
+    /// Contact area that geometry makes of that compression, mm^2.
+    pub area_mm2: f64,
+    /// Largest less least true preload in the crossing, N.
+    pub preload_swing_n: f64,
+}
+
+/// One line of the log: what is true at its time; of the arm's deflection, the largest
+/// since the last line.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Line {
+    /// Time since the motion began, s.
+    pub time_s: f64,
+    /// Axial force of the contact against the motion, N.
+    pub collision_n: f64,
+    /// Stress that the collision adds to the tread, kPa.
+    pub impact_kpa: f64,
+    /// Deflection of the arm, um.
+    pub vibration_um: f64,
+    /// Separation of wheel and wall away from the steps, mm.
+    pub separation_mm: f64,
+    /// Clearance of the undeformed wheel from the root of the step ahead, mm; none
+    /// farther than a radius from it.
+    pub clearance_mm: Option<f64>,
+}
+
+/// One deployment.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Run {
+    /// Readings of the three crossings; none of one that was not completed.
+    pub crossings: Vec<Reading>,
+    /// The log.
+    pub log: Vec<Line>,
+    /// Contact stages that the controller went through, 1 to 6.
+    pub stages: [bool; 6],
+    /// From the start of motion to the end of travel, s.
+    pub duration_s: f64,
+    /// Gross slip, mm.
+    pub slip_mm: f64,
+}
+
+impl Run {
+    /// Mean over the crossings of a figure; none if none was completed.
+    #[must_use]
+    pub fn mean(&self, figure: impl Fn(&Reading) -> f64) -> Option<f64> {
+        let count = self.crossings.len();
+        (count > 0).then(|| self.crossings.iter().map(figure).sum::<f64>() / count as f64)
+    }
+}
+
+/// Forty runs of a case.
+#[derive(Clone, Debug)]
+pub struct Experiment {
+    /// The case.
+    pub case: Case,
+    /// Its runs, by seed from 1.
+    pub runs: Vec<Run>,
+}
+
+/// The runs of each of four means, drawn once for all cases.
+#[must_use]
+pub fn groups() -> Vec<Vec<usize>> {
+    let mut all: Vec<usize> = (0..RUNS).collect();
+    all.shuffle(&mut ChaCha8Rng::seed_from_u64(CHOICE));
+    all.chunks(RUNS_OF_A_MEAN).map(<[usize]>::to_vec).collect()
+}
+
+/// Adds the four means of `all`, by run, and their range to the marks at `x`.
+pub fn marks(x: f64, all: &[f64], series: &mut Series) {
+    for group in groups() {
+        let of: Vec<f64> = group.iter().filter_map(|&run| all.get(run).copied()).collect();
+        series.points.push((x, of.iter().sum::<f64>() / of.len() as f64));
+    }
+    let (low, high) = all
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| (low.min(*y), high.max(*y)));
+    series.range.push((x, low, high));
+}
+
+/// Runs every case on forty rigs; `done` is called after each run.
+///
+/// # Errors
+/// [`StudyError`] if a case makes no controller or a plant fails.
+pub fn run_all(cases: &[Case], done: &(dyn Fn() + Sync)) -> Result<Vec<Experiment>, StudyError> {
+    let pairs: Vec<(Case, u64)> =
+        cases.iter().flat_map(|case| (1..=RUNS as u64).map(move |seed| (*case, seed))).collect();
+    let runs: Vec<Run> = pairs
+        .par_iter()
+        .map(|&(case, seed)| {
+            let run = run(&case, seed);
+            done();
+            run
+        })
+        .collect::<Result<_, StudyError>>()?;
+    let by_case = cases.iter().zip(runs.chunks(RUNS));
+    Ok(by_case.map(|(case, runs)| Experiment { case: *case, runs: runs.to_vec() }).collect())
+}
+
+/// One deployment of the rig that `seed` draws.
+///
+/// # Errors
+/// [`StudyError`] if the case makes no controller or the plant fails.
+pub fn run(case: &Case, seed: u64) -> Result<Run, StudyError> {
+    let scenario = case.scenario(seed);
+    let options = Options { speed: Some((case.speed_mm_s, true)), ..Options::default() };
+    let mut session = Session::new(&scenario, options)?;
+    let mut watch = Watch::new(case, session.plant())?;
+    let mut start = Some(Command::Start);
+    while session.time_s() < LONGEST_S {
+        let command = if session.mode() == Mode::Idle { start.take() } else { None };
+        let output = session.step(command)?;
+        let telemetry = &output.telemetry;
+        watch.run.stages[(telemetry.stage as usize).clamp(1, 6) - 1] = true;
+        for entry in &output.events {
+            if let Event::Crossing(record) = entry.event {
+                watch.measured.push((usize::from(record.index), record.gap_measured.to_num()));
+            }
+        }
+        watch.look(telemetry.mode.moves(), telemetry.compression.to_num(), session.plant());
+        if matches!(session.mode(), Mode::Complete(_) | Mode::FaultHold(_)) {
+            break;
+        }
+    }
+    Ok(watch.finish(case, session.plant()))
+}
+
+/// What is kept of a run while it goes on.
+struct Watch {
+    run: Run,
+    /// Step and gap as the controller reports them.
+    measured: Vec<(usize, f64)>,
+    /// Measured compression and true preload of every tick.
+    ticks: Vec<(f32, f32)>,
+    gauge: CollisionGauge,
+    arms: Arms,
+    arm: Modal,
+    moving_since: Option<f64>,
+    largest_um: f64,
+}
+
+impl Watch {
+    fn new(case: &Case, plant: &VirtualRig) -> Result<Self, ReferenceError> {
+        let arms = Arms::of(case)?;
+        Ok(Self {
+            run: Run::default(),
+            measured: Vec::new(),
+            ticks: Vec::new(),
+            gauge: CollisionGauge::new(plant, case.speed_mm_s, case.pressing_n(1)),
+            arm: arms.modal()?,
+            arms,
+            moving_since: None,
+            largest_um: 0.0,
+        })
+    }
+
+    /// Looks at one millisecond.
+    fn look(&mut self, moves: bool, compression_mm: f64, plant: &VirtualRig) {
+        let truth = plant.truth();
+        self.ticks.push((compression_mm as f32, truth.preload_n as f32));
+        let axial = self.gauge.read_n(plant);
+        let level = plant.parameters().wall.local(truth.position_mm).level;
+        self.arm.step(self.arms.across_n(level, axial), TICK_S);
+        // The plant's own vibration is that of the torque ripple.
+        let deflection_um = 1e6 * self.arm.deflection_m() + 1e3 * truth.vibration_mm;
+        self.largest_um = self.largest_um.max(deflection_um.abs());
+        if moves {
+            self.run.duration_s = truth.time_s - *self.moving_since.get_or_insert(truth.time_s);
+        }
+        let Some(since) = self.moving_since else { return };
+        let due = self.run.log.len() as f64 * LOG_S;
+        if truth.time_s - since >= due - 1e-9 {
+            self.run.log.push(Line {
+                time_s: due,
+                collision_n: axial,
+                impact_kpa: impact_kpa(plant, axial),
+                vibration_um: self.largest_um,
+                separation_mm: truth.separation_mm,
+                clearance_mm: truth.root_clearance_mm,
+            });
+            self.largest_um = 0.0;
+        }
+    }
+
+    fn finish(mut self, case: &Case, plant: &VirtualRig) -> Run {
+        self.run.slip_mm = plant.truth().slip_mm;
+        for crossing in plant.ledger().crossings() {
+            let tick = (crossing.lift_s / TICK_S) as usize;
+            let gap = self.measured.iter().find(|(index, _)| *index == crossing.index);
+            let (Some(&(_, gap_mm)), Some(&(depth, _))) = (gap, self.ticks.get(tick)) else {
+                continue;
+            };
+            let since = ((crossing.touch_s / TICK_S) as usize).min(tick);
+            let preloads = self.ticks[since..=tick].iter().map(|tick| f64::from(tick.1));
+            let (low, high) =
+                preloads.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), n| (a.min(n), b.max(n)));
+            // The experimenter knows the drawing, not the rig as built.
+            let depth_mm = f64::from(depth);
+            self.run.crossings.push(Reading {
+                gap_mm,
+                true_gap_mm: crossing.gap_mm,
+                depth_mm,
+                area_mm2: area_of_depth_mm2(case, depth_mm),
+                preload_swing_n: high - low,
+            });
+        }
+        self.run
+    }
+}

@@ -1,0 +1,139 @@
+//! Collision force and impact stress from the state of the virtual rig.
+//!
+//! The collision force is the axial force of the contact against the motion beyond rolling
+//! resistance. The plant does not keep it, but it follows from what it keeps: a gripping
+//! wheel carries `C + u S = N` radially and `u C - S = T` axially, with the friction
+//! utilisation u, the pressing force N and the thrust T; from S goes what the continuous
+//! wall resists.
+
+use hil_sim::plant::rig::VirtualRig;
+use hil_sim::plant::rolling;
+
+/// Way behind an edge, mm, over which the patch leaves it: the next corner is farther.
+const LEAVES_MM: f64 = 8.0;
+
+/// Watches a plant for the force of its corners.
+#[derive(Clone, Copy, Debug)]
+pub struct CollisionGauge {
+    /// Rolling resistance over radial force on the continuous wall.
+    resistance: f64,
+}
+
+impl CollisionGauge {
+    /// A gauge for this plant at this speed, mm/s, and pressing force, N, whose rolling
+    /// resistance it takes off.
+    #[must_use]
+    pub fn new(plant: &VirtualRig, speed_mm_s: f64, pressing_n: f64) -> Self {
+        let ring = &plant.parameters().ring;
+        let guess = ring.radius_mm - 0.3;
+        let steady = rolling::solve(ring, speed_mm_s, guess, |c| c.cosine_n - pressing_n);
+        Self { resistance: steady.sine_n / steady.cosine_n.max(f64::MIN_POSITIVE) }
+    }
+
+    /// Collision force, N, within the inertia of the carriage, 0.3 N, as long as the wheel
+    /// grips; 0 where the wheel has not yet touched the step ahead.
+    #[must_use]
+    pub fn read_n(&self, plant: &VirtualRig) -> f64 {
+        let (truth, parameters) = (plant.truth(), plant.parameters());
+        let used = truth.utilisation;
+        let thrust = if used == 0.0 { 0.0 } else { parameters.load_n };
+        let pressing = truth.preload_n + parameters.arm.wedge(truth.radius_mm) * thrust;
+        let radial = (pressing + used * thrust) / (1.0 + used * used);
+        let axial = used * radial - thrust;
+        let beyond = (axial - self.resistance * truth.floor_n).max(0.0);
+        let local = parameters.wall.local(truth.position_mm);
+        let (radius, height) = (parameters.ring.radius_mm, truth.height_mm - local.base_mm);
+        if local.behind_mm < LEAVES_MM {
+            return beyond;
+        }
+        // No part of the corner's force is steeper than the end of its arc.
+        let end = ((height - local.rise_mm) / radius).clamp(-1.0, 1.0).acos();
+        beyond.min(truth.corner_n * end.sin())
+    }
+}
+
+/// Mean stress that this collision force puts on the wheel, kPa (1e-3 N/mm^2): the force
+/// over the part of the wheel's undeformed surface that the step cuts off.
+#[must_use]
+pub fn impact_kpa(plant: &VirtualRig, collision_n: f64) -> f64 {
+    let (truth, parameters) = (plant.truth(), plant.parameters());
+    let local = parameters.wall.local(truth.position_mm);
+    let ring = &parameters.ring;
+    let height = truth.height_mm - local.base_mm;
+    let size = (ring.radius_mm, ring.width_mm);
+    let ahead = corner_area_mm2(size, local.ahead_mm, height - local.rise_mm);
+    let area = if ahead > 0.0 { ahead } else { corner_area_mm2(size, -local.behind_mm, height) };
+    // Elements of the plant's ring touch whole.
+    let element = std::f64::consts::TAU * size.0 * size.1 / ring.elements as f64;
+    stress_kpa(collision_n, area.max(element))
+}
+
+/// Force over area, kPa; 0 where nothing touches.
+#[must_use]
+pub fn stress_kpa(force_n: f64, area_mm2: f64) -> f64 {
+    if area_mm2 > 0.0 { 1e3 * force_n / area_mm2 } else { 0.0 }
+}
+
+/// Part of the undeformed surface of a wheel of this radius and width that face and top
+/// of a step cut off, mm^2.
+///
+/// Equation: `A = R L (acos(u/R) - asin(d/R))`, d the way to the face, negative once the
+/// centre has passed it, and u the height of the centre above the top, both mm. Range: 0
+/// where the corner stands ahead of the wheel; the whole patch where it lies behind.
+/// Memory lets the trailing part of the patch go earlier: the true area is smaller.
+#[must_use]
+pub fn corner_area_mm2((radius, width): (f64, f64), ahead_mm: f64, above_mm: f64) -> f64 {
+    let half = (above_mm / radius).clamp(-1.0, 1.0).acos();
+    let start = (ahead_mm / radius).clamp(-1.0, 1.0).asin().max(-half);
+    if ahead_mm > 0.0 && ahead_mm.hypot(above_mm) >= radius {
+        return 0.0;
+    }
+    radius * width * (half - start).max(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::paper::case::{Case, Loads};
+    use crate::paper::experiment;
+    use crate::paper::figure::Source;
+    use crate::paper::history::{Histories, Quantity};
+
+    #[test]
+    fn the_area_is_that_of_a_fine_sum() {
+        let (radius, width, above) = (25.0, 28.0, 21.0);
+        for ahead in [10.0_f64, 2.0, -2.0, -9.0] {
+            let n = 200_000;
+            let pitch = 2.4 / f64::from(n);
+            let inside = (0..n)
+                .map(|i| (f64::from(i) + 0.5) * pitch - 1.2)
+                .filter(|psi: &f64| {
+                    // Beyond the face, and below the top.
+                    radius * psi.sin() > ahead && radius * psi.cos() > above
+                })
+                .count();
+            let sum = inside as f64 * pitch * radius * width;
+            let area = corner_area_mm2((radius, width), ahead, above);
+            assert!((area / sum - 1.0).abs() < 1e-3, "{area} {sum}");
+        }
+        assert_eq!(corner_area_mm2((radius, width), 14.0, above), 0.0);
+        assert_eq!(stress_kpa(5.0, 0.0), 0.0);
+    }
+
+    #[test]
+    fn the_gauge_reads_what_the_reference_gives() {
+        let case = Case::new(Loads::Prototype, 8.0, 40.0);
+        let run = experiment::run(&case, 0).unwrap();
+        let nominal = experiment::Experiment { case, runs: vec![run; 40] };
+        let histories = Histories::new(&nominal).unwrap();
+        for quantity in [Quantity::Collision, Quantity::Impact] {
+            let read = histories.peaks(quantity, Source::Experiment);
+            let wanted = histories.peaks(quantity, Source::Simulation);
+            for (read, wanted) in read.iter().zip(&wanted) {
+                // The log misses the tip of a peak by up to 0.05 s.
+                assert!((read.1 / wanted.1 - 1.0).abs() < 0.06, "{quantity:?} {read:?} {wanted:?}");
+                assert!((read.0 - wanted.0).abs() < 0.2, "{quantity:?} {read:?} {wanted:?}");
+            }
+        }
+    }
+}

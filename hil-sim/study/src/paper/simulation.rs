@@ -1,0 +1,130 @@
+//! What the reference models say: gap, depth and area of the converged ring with memory,
+//! and a whole deployment as ring with inertia, waves in the tread and bending of the arm.
+
+use super::case::Case;
+use super::course::{Arms, Course, Instant};
+use super::measure::{corner_area_mm2, stress_kpa};
+use super::theory::{Drive, Lift};
+use crate::reference::collision::dynamic;
+use crate::reference::impact::rod::{Face, Rod};
+use crate::reference::impact::rubber::THICKNESS_MM;
+use crate::reference::impact::{Rubber, hub_reflection};
+use crate::reference::{Case as Reference, ReferenceError};
+use hil_sim::plant::balance::{Axial, BalanceError};
+use hil_sim::plant::crossing::{CrossingCase, cross};
+use hil_sim::plant::ring::RingParameters;
+
+/// Elements of the ring and axial way of a step, mm, of single crossings: the gap is
+/// within 0.2 % of the converged one.
+const ELEMENTS: usize = 2880;
+const STRIDE_MM: f64 = 0.01;
+
+/// Way before a step at which its crossing begins, mm: touch, and a tenth of a radius.
+const BEGINS_MM: f64 = 16.1;
+
+/// Longest time that waves and arm are followed over where nothing happens, s.
+const QUIET_S: f64 = 1e-3;
+
+/// Axial forces of a wheel that crosses from sleeve `level`, and the force that presses
+/// it, N.
+fn loading(case: &Case, drive: Drive, level: usize) -> (Axial, f64) {
+    match drive {
+        Drive::Pushed => (Axial::Pushed, case.preload_n),
+        Drive::Driven => (Axial::Driven(case.load_n()), case.pressing_n(level)),
+    }
+}
+
+/// The ring's crossing from sleeve `level`, at the instant at which the lower wall stops
+/// carrying; the collision is the largest of the crossing.
+///
+/// The area is the part of the wheel that the step cuts off, as a compression sensor
+/// would have it: elements of the ring enter and leave whole.
+///
+/// # Errors
+/// [`BalanceError`] if no height of the centre balances the preload.
+pub fn lift(case: &Case, drive: Drive, level: usize) -> Result<Lift, BalanceError> {
+    let rig = case.loads.rig();
+    let (axial, preload_n) = loading(case, drive, level);
+    let ring = RingParameters::of(&rig, ELEMENTS);
+    let step = rig.rig.step_height_mm;
+    let result = cross(&CrossingCase {
+        ring,
+        step_height_mm: step,
+        speed_mm_s: case.speed_mm_s,
+        preload_n,
+        axial,
+        stride_mm: STRIDE_MM,
+    })?;
+    let (x, y) = result.lift;
+    let area = corner_area_mm2((ring.radius_mm, ring.width_mm), -x, y - step);
+    Ok(Lift {
+        gap_mm: result.gap_mm,
+        depth_mm: result.lift_depth_mm,
+        area_mm2: area,
+        collision_n: result.corner_force_n,
+        impact_kpa: stress_kpa(result.corner_force_n, area),
+    })
+}
+
+/// Cells of the tread in which waves run to the hub.
+const CELLS: usize = 4;
+
+/// A whole deployment of the driven wheel by the reference models, a crossing a step: the
+/// ring with memory and inertia, the waves that its stress sends through the tread, and the
+/// arm that it bends.
+///
+/// # Errors
+/// [`ReferenceError`] if an argument is out of range or the preload cannot be carried.
+pub fn deployment(case: &Case, arms: &Arms) -> Result<Course, ReferenceError> {
+    let rig = case.loads.rig();
+    let size = (rig.rig.wheel_radius_mm, rig.rig.wheel_width_mm);
+    let steps = rig.rig.step_positions_mm.clone();
+    let mut course = Course::default();
+    let mut modal = arms.modal()?;
+    let mut last_s = 0.0;
+    for (level, &step) in steps.iter().enumerate() {
+        let reference =
+            Reference::new(rig.clone(), case.speed_mm_s, case.pressing_n(level)).driven();
+        let crossing = dynamic(&reference)?;
+        let rubber = Rubber::of(&reference)?;
+        let mut rod = Rod::new(rubber, THICKNESS_MM * 1e-3, CELLS, hub_reflection(&rubber))?;
+        let before = crossing.samples.iter().filter(|sample| sample.t_s < 0.0);
+        let (axial, floor) =
+            before.fold((0.0, 0.0), |(a, b), sample| (a + sample.axial_n, b + sample.floor_n));
+        let resistance = if floor > 0.0 { axial / floor } else { 0.0 };
+        // Until the next crossing begins.
+        let next = steps.get(level + 1).map_or(rig.rig.travel_mm, |next| next - BEGINS_MM);
+        for sample in crossing.samples.iter().filter(|sample| step + sample.x_mm < next) {
+            let time_s = (step + sample.x_mm) / case.speed_mm_s;
+            let dt_s = time_s - last_s;
+            if dt_s <= 0.0 {
+                continue;
+            }
+            last_s = time_s;
+            let collision_n = (sample.axial_n - resistance * sample.floor_n).max(0.0);
+            let top = sample.y_mm - rig.rig.step_height_mm;
+            let stress = stress_kpa(collision_n, corner_area_mm2(size, -sample.x_mm, top));
+            let waves = (dt_s.min(QUIET_S) / rod.step_s()).ceil();
+            for _ in 0..waves as usize {
+                rod.step(Face::Pressure(1e3 * stress));
+            }
+            modal.step(arms.across_n(level, collision_n), dt_s);
+            course.push(&Instant {
+                time_s,
+                collision_n,
+                impact_kpa: 1e-3 * rod.hub_pa(),
+                arm_um: 1e6 * modal.deflection_m(),
+                clearance_mm: (level == 0 && sample.x_mm < 0.0).then_some(sample.clearance_mm),
+            });
+        }
+    }
+    // The rest of the way, on the last sleeve.
+    let end_s = rig.rig.travel_mm / case.speed_mm_s;
+    while last_s < end_s {
+        last_s += QUIET_S;
+        modal.step(0.0, QUIET_S);
+        let arm_um = 1e6 * modal.deflection_m();
+        course.push(&Instant { time_s: last_s, arm_um, ..Instant::default() });
+    }
+    Ok(course)
+}

@@ -1,0 +1,89 @@
+//! The committed page of the study's figures is what this build makes of them: every
+//! verdict on a claim, and the data behind it.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use rig_study::paper;
+use serde_json::Value;
+
+/// Largest difference of a value from the recorded one over the range of its series:
+/// other processors' sines and exponentials move a history by about a ten thousandth.
+const SAME_WITHIN: f64 = 0.01;
+
+fn recorded(name: &str) -> String {
+    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
+    let path = root.with_file_name("docs").join("paper").join(name);
+    std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+/// Verdict of each claim by its name.
+fn verdicts(study: &Value) -> BTreeMap<String, bool> {
+    let claims = study["claims"].as_array().expect("claims");
+    let of = |claim: &Value| {
+        (claim["id"].as_str().expect("id").to_owned(), claim["holds"].as_bool().expect("holds"))
+    };
+    claims.iter().map(of).collect()
+}
+
+/// Points of each series by figure, panel, source and name.
+fn series(study: &Value) -> BTreeMap<String, Vec<(f64, f64)>> {
+    let mut all = BTreeMap::new();
+    for figure in study["figures"].as_array().expect("figures") {
+        for (panel, plot) in figure["panels"].as_array().expect("panels").iter().enumerate() {
+            for one in plot["series"].as_array().expect("series") {
+                let key = format!("{} {panel} {} {}", figure["id"], one["source"], one["name"]);
+                let point = |p: &Value| (p[0].as_f64().expect("x"), p[1].as_f64().expect("y"));
+                let points = one["points"].as_array().expect("points").iter().map(point);
+                assert!(all.insert(key.clone(), points.collect()).is_none(), "{key} twice");
+            }
+        }
+    }
+    all
+}
+
+/// Largest distance between two series over the range of the first.
+fn apart(a: &[(f64, f64)], b: &[(f64, f64)]) -> f64 {
+    let values = a.iter().map(|p| p.1);
+    let (low, high) = values.fold((0.0_f64, 0.0_f64), |(low, high), y| (low.min(y), high.max(y)));
+    let off = |(a, b): (&(f64, f64), &(f64, f64))| (a.0 - b.0).abs().max((a.1 - b.1).abs());
+    a.iter().zip(b).map(off).fold(0.0, f64::max) / (high - low).max(f64::MIN_POSITIVE)
+}
+
+#[test]
+fn the_committed_page_is_what_this_build_makes() {
+    let study = paper::regenerate(&|| {}).expect("the study can be regenerated");
+    let made: Value = serde_json::from_str(&paper::json(&study).unwrap()).unwrap();
+    let kept: Value = serde_json::from_str(&recorded("paper.json")).unwrap();
+
+    let (now, then) = (verdicts(&made), verdicts(&kept));
+    let changed: Vec<&String> = now
+        .iter()
+        .filter(|(id, holds)| then.get(*id) != Some(holds))
+        .map(|(id, _)| id)
+        .chain(then.keys().filter(|id| !now.contains_key(*id)))
+        .collect();
+    assert!(changed.is_empty(), "verdicts that changed; see `cargo rig paper`: {changed:?}");
+
+    let (now, then) = (series(&made), series(&kept));
+    assert!(now.keys().eq(then.keys()), "other series than recorded");
+    for (key, points) in &now {
+        let kept = &then[key];
+        assert_eq!(points.len(), kept.len(), "{key}");
+        let off = apart(kept, points);
+        assert!(off < SAME_WITHIN, "{key} is off by {off}; see `cargo rig paper`");
+    }
+
+    // The page says what the data say, and shows every figure.
+    let text = recorded("README.md");
+    for claim in &study.claims {
+        let row = format!("| {} | {} | {} |", claim.claim, claim.section, claim.verdict());
+        assert!(text.contains(&row), "{row}");
+    }
+    for figure in &study.figures {
+        assert!(text.contains(&format!("]({})", figure.file)), "{}", figure.file);
+        assert!(recorded(&figure.file).starts_with("<svg "));
+        assert!(study.claims.iter().any(|claim| claim.figure == figure.id), "{}", figure.id);
+    }
+    assert!(study.claims.iter().all(|c| study.figures.iter().any(|f| f.id == c.figure)));
+}
