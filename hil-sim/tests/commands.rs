@@ -1,9 +1,9 @@
 //! An operator and failing sensors in the middle of a run: stop, go on, turn back,
 //! reset, and commands that the mode does not take.
 
-mod common;
-
-use common::{Bench, Moment, NO_SLIP_MM, RIGS, WAYS, back, check_each, end_mm, scenario, starter};
+use crate::common::{
+    Bench, Moment, NO_SLIP_MM, RIGS, WAYS, back, check_each, end_mm, scenario, starter,
+};
 use hil_sim::scenario::{Direction, Scenario};
 use interstage::estimate::ContactStage as Stage;
 use interstage::log::Event;

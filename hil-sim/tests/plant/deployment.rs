@@ -4,7 +4,7 @@ use hil_sim::plant::balance::Axial;
 use hil_sim::plant::rig::{Resolution, Truth};
 use hil_sim::plant::wall::{Step, Wall};
 
-use crate::bench::{TICK_S, close, crossed, deploy, elastic, fine, ideal, nominal, off, pairs};
+use super::bench::{TICK_S, close, crossed, deploy, elastic, fine, ideal, nominal, off, pairs};
 
 /// As runs are computed.
 const USUAL: Resolution = Resolution { stride_mm: 0.02, always_awake: false };

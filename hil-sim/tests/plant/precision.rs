@@ -3,7 +3,7 @@
 use hil_sim::plant::precision::{FINER, Setting, crossings, work_precision};
 use interstage::rig::Rig;
 
-use crate::bench::{TICK_S, nominal, off};
+use super::bench::{TICK_S, nominal, off};
 
 #[test]
 fn an_isolated_crossing_is_within_its_error() {
