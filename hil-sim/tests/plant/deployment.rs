@@ -37,23 +37,6 @@ fn every_crossing_of_a_deployment_is_the_isolated_one() {
 }
 
 #[test]
-fn elements_and_stride_converge() {
-    for (preset, preload) in PRESETS {
-        for speed in [6.0, 20.0, 30.0, -6.0, -30.0] {
-            let usual = deploy(nominal(preset), USUAL, speed, preload, |_| {});
-            let mut plant = nominal(preset);
-            plant.ring.elements *= 4;
-            let fine = deploy(plant, FINE, speed, preload, |_| {});
-            for (usual, fine) in pairs(&usual, &fine) {
-                close(usual.gap_mm, fine.gap_mm, 0.004);
-                close(usual.corner_n, fine.corner_n, 0.004);
-                close(usual.speed_mm_s, fine.speed_mm_s, 0.004);
-            }
-        }
-    }
-}
-
-#[test]
 fn the_sleeping_ring_changes_nothing() {
     for (preset, preload) in PRESETS {
         for speed in [6.0, 30.0, -6.0, -30.0] {
