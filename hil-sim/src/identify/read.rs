@@ -52,23 +52,22 @@ impl Record {
         let name = path.display().to_string();
         let bad = |why: String| IdentifyError::Log { name: name.clone(), why };
         let bytes = std::fs::read(path).map_err(|error| bad(error.to_string()))?;
-        if let Ok(run) = Run::read(path) {
-            return of_codes(&name, run, scenario);
+        match Run::read(path) {
+            Ok(run) => return of_codes(&name, run, scenario),
+            Err(error) if bytes.starts_with(MCAP) => {
+                let why = error.to_string();
+                return Err(bad(why.trim_start_matches(&format!("{name}: ")).to_owned()));
+            }
+            Err(_) => {}
         }
-        let (lines, told) = if bytes.starts_with(MCAP) {
-            of_mcap(&bytes).map_err(bad)?
-        } else {
-            (of_csv(&bytes).map_err(bad)?, None)
-        };
+        let rows = csv::Reader::from_reader(&bytes[..]).into_deserialize();
+        let lines: Vec<Line> = rows
+            .collect::<Result<_, _>>()
+            .map_err(|error: csv::Error| bad(format!("no log of a run: {error}")))?;
         if lines.is_empty() {
             return Err(bad("it holds no row".into()));
         }
-        let scenario = match told {
-            Some(text) => Scenario::parse(&name, &text, &[]).map_err(|e| bad(e.to_string()))?,
-            None => scenario.clone(),
-        };
-        let ticked = samples(&lines, &scenario);
-        let mut record = Self::new(&name, scenario, ticked)?;
+        let mut record = Self::new(&name, scenario.clone(), samples(&lines, scenario))?;
         record.arm_delay_s += ARM_FILTER_S;
         Ok(record)
     }
@@ -84,44 +83,21 @@ fn of_codes(name: &str, run: Run, scenario: &Scenario) -> Result<Record, Identif
         None => scenario.clone(),
     };
     let mut reader = Reader::new(&scenario);
-    let ticked = run.rows.iter().map(|row| {
-        let driven = Drives {
-            drive: row.drive_duty,
-            drive_on: row.drive_on,
-            preload: row.preload_duty,
-            preload_on: row.preload_on,
-            ..Drives::default()
-        };
-        (row.tick, reader.sample(&row.sensors(), &driven))
-    });
-    let ticked: Vec<_> = ticked.collect();
+    let ticked: Vec<_> = run
+        .rows
+        .iter()
+        .map(|row| {
+            let driven = Drives {
+                drive: row.drive_duty,
+                drive_on: row.drive_on,
+                preload: row.preload_duty,
+                preload_on: row.preload_on,
+                ..Drives::default()
+            };
+            (row.tick, reader.sample(&row.sensors(), &driven))
+        })
+        .collect();
     Record::new(name, scenario, ticked)
-}
-
-fn of_csv(bytes: &[u8]) -> Result<Vec<Line>, String> {
-    let rows = csv::Reader::from_reader(bytes).into_deserialize();
-    rows.collect::<Result<_, _>>().map_err(|error| format!("no log of a run: {error}"))
-}
-
-/// Rows, and the parameters as TOML if the file has them.
-fn of_mcap(bytes: &[u8]) -> Result<(Vec<Line>, Option<String>), String> {
-    let why = |error: mcap::McapError| error.to_string();
-    let bytes = crate::log::sound(bytes);
-    let mut lines = Vec::new();
-    for message in mcap::MessageStream::new(bytes).map_err(why)? {
-        let message = message.map_err(why)?;
-        if message.channel.topic == "/telemetry" {
-            let line = serde_json::from_slice(&message.data);
-            lines.push(line.map_err(|error| format!("/telemetry: {error}"))?);
-        }
-    }
-    let summary = mcap::Summary::read(bytes).map_err(why)?;
-    let indexes = summary.iter().flat_map(|summary| &summary.metadata_indexes);
-    let mut told = None;
-    for index in indexes.filter(|index| index.name == "parameters") {
-        told = mcap::read::metadata(bytes, index).map_err(why)?.metadata.get("toml").cloned();
-    }
-    Ok((lines, told))
 }
 
 fn samples(lines: &[Line], scenario: &Scenario) -> Vec<(u32, Sample)> {
@@ -136,9 +112,10 @@ fn samples(lines: &[Line], scenario: &Scenario) -> Vec<(u32, Sample)> {
                 let moved = (line.position_est_mm - before.position_est_mm) / count_mm;
                 let whole = moved.round();
                 // Corrected: what the wheel did meanwhile, its speed tells.
-                let likely = line.speed_est_mm_s * TICK_S / count_mm;
-                let corrected = (moved - whole).abs() > CORRECTED || (moved - likely).abs() > LEAPT;
-                let turned = if corrected { likely.round() } else { whole };
+                let expected = line.speed_est_mm_s * TICK_S / count_mm;
+                let corrected =
+                    (moved - whole).abs() > CORRECTED || (moved - expected).abs() > LEAPT;
+                let turned = if corrected { expected.round() } else { whole };
                 counts += turned;
             }
             before = Some(line);

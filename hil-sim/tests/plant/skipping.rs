@@ -5,7 +5,7 @@ use hil_sim::plant::wall::{Step, Wall};
 use hil_sim::scenario::Scenario;
 use hil_sim::sil::{Options, Session, account, run_session};
 
-use crate::bench::{TICK_S, nominal, roll};
+use super::bench::{TICK_S, nominal, roll};
 
 /// All states of a way out or back, and the crossings.
 fn states(all: bool, speed: f64) -> (Vec<Truth>, VirtualRig) {

@@ -1,0 +1,9 @@
+//! All tests of this crate that need more than one of its modules: one program.
+
+mod commands;
+mod common;
+mod identify;
+mod modes_page;
+mod plant;
+#[cfg(feature = "probe")]
+mod probe;
