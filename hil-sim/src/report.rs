@@ -1,7 +1,7 @@
 //! A run as one self-contained HTML page: verdict, ledger of the crossings, plots
 //! over time and over position, each crossing enlarged, log, faults, parameters.
 
-pub(crate) mod axis;
+pub mod axis;
 mod band;
 mod compare;
 mod crossings;
@@ -9,13 +9,13 @@ mod decimate;
 #[cfg(test)]
 pub(crate) mod example;
 mod gaps;
-pub(crate) mod mesh;
+pub mod mesh;
 mod overview;
 mod page;
-pub(crate) mod palette;
+pub mod palette;
 mod panel;
 mod panels;
-pub(crate) mod svg;
+pub mod svg;
 mod tables;
 pub(crate) mod verdict;
 

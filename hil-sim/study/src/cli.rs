@@ -1,6 +1,5 @@
 //! The verbs of `rig` that show the study.
 
-mod bench;
 mod modes;
 mod paper;
 
@@ -19,7 +18,6 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Verb {
-    Bench(bench::Args),
     Modes(modes::Args),
     Paper(paper::Args),
 }
@@ -27,7 +25,6 @@ enum Verb {
 impl Verb {
     fn run(&self) -> Result<Outcome, Failure> {
         match self {
-            Self::Bench(args) => bench::run(args),
             Self::Modes(args) => modes::run(args),
             Self::Paper(args) => paper::run(args),
         }
