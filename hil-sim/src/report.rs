@@ -8,7 +8,6 @@ mod crossings;
 mod decimate;
 #[cfg(test)]
 pub(crate) mod example;
-mod gaps;
 pub mod mesh;
 mod overview;
 mod page;
@@ -25,7 +24,6 @@ use crate::export::{ExportError, write_text};
 use crate::record::Recording;
 
 pub use compare::{Difference, compare_html, differences};
-pub use gaps::{Published, published_svg};
 pub use overview::overview_svg;
 
 /// The page of `recording`. It needs no other file and no script.

@@ -205,10 +205,24 @@ impl<N: Number> FloatModel<N> {
         }
     }
 
-    /// Gap at this speed and force, bits of Q15.16, mm; at the ends of the model the gap there.
+    /// Gap at this speed and force, bits of Q15.16, mm.
     #[inline(always)]
     #[must_use]
     pub fn forward(&self, given: &Given) -> i32 {
+        self.gap_mm(given).output()
+    }
+
+    /// Radial force that gives this gap at this speed, bits of Q15.16, N.
+    #[inline(always)]
+    #[must_use]
+    pub fn inverse(&self, given: &Given) -> i32 {
+        self.radial_n(given).output()
+    }
+
+    /// Gap at this speed and force, mm; at the ends of the model the gap there.
+    #[inline(always)]
+    #[must_use]
+    pub fn gap_mm(&self, given: &Given) -> N {
         let (series, fast) = self.stiffening_at(given);
         let wanted = N::input(given.wanted);
         let mut run = N::of(0.5) * self.longest_mm;
@@ -223,18 +237,18 @@ impl<N: Number> FloatModel<N> {
         let distance = self.free_run_mm - run;
         let square = distance * distance;
         let reach = (square + self.radius_mm * self.radius_mm).sqrt();
-        (square / (reach + self.radius_mm)).output()
+        square / (reach + self.radius_mm)
     }
 
-    /// Radial force that gives this gap at this speed, bits of Q15.16, N.
+    /// Radial force that gives this gap at this speed, N.
     #[inline(always)]
     #[must_use]
-    pub fn inverse(&self, given: &Given) -> i32 {
+    pub fn radial_n(&self, given: &Given) -> N {
         let (series, fast) = self.stiffening_at(given);
         let gap = N::input(given.wanted);
         let distance = (gap * (gap + self.radius_mm + self.radius_mm)).sqrt();
         let run = limited(self.free_run_mm - distance, self.least_mm, self.longest_mm);
-        self.force_n(&series, fast, run).0.output()
+        self.force_n(&series, fast, run).0
     }
 
     /// E as a series in the run at this speed, and x times the stiffening less one.

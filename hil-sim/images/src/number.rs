@@ -18,6 +18,9 @@ pub trait Number:
     /// Square root; not a number below 0.
     fn sqrt(self) -> Self;
 
+    /// As f64.
+    fn value(self) -> f64;
+
     /// From the bits of a Q15.16.
     fn input(bits: i32) -> Self;
 
@@ -36,6 +39,11 @@ macro_rules! number {
             #[inline(always)]
             fn sqrt(self) -> Self {
                 libm::$sqrt(self)
+            }
+
+            #[inline(always)]
+            fn value(self) -> f64 {
+                self.into()
             }
 
             #[inline(always)]

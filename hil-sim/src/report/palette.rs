@@ -3,26 +3,38 @@
 
 use plotters::style::RGBColor;
 
+/// What is true.
 pub const TRUTH: RGBColor = RGBColor(0x1f, 0x29, 0x37);
-/// Drawn dashed, see [`DASHES`].
+/// What is asked for; drawn dashed, see [`DASHES`].
 pub const WANTED: RGBColor = RGBColor(0x6b, 0x72, 0x80);
-/// Drawn dashed, see [`DASHES`].
+/// Limits; drawn dashed, see [`DASHES`].
 pub const LIMIT: RGBColor = RGBColor(0xb9, 0x1c, 0x1c);
 
-/// Drawn dashed, see [`DASHES`].
+/// Simulated by the reference models; drawn dashed, see [`DASHES`].
 pub const SIMULATED: RGBColor = RGBColor(0x1c, 0x6f, 0xd6);
 
+/// Speed.
 pub const SPEED: RGBColor = RGBColor(0x1d, 0x7f, 0xe0);
+/// Preload.
 pub const PRELOAD: RGBColor = RGBColor(0xe0, 0x7b, 0x12);
+/// Gap.
 pub const GAP: RGBColor = RGBColor(0xd0, 0x2f, 0x6b);
+/// Radius.
 pub const RADIUS: RGBColor = RGBColor(0x0f, 0x97, 0x97);
+/// Slip.
 pub const SLIP: RGBColor = RGBColor(0x35, 0xa1, 0x4a);
+/// Compression of the tread.
 pub const COMPRESSION: RGBColor = RGBColor(0x80, 0x5a, 0xd5);
+/// Force on the lower wall.
 pub const FLOOR: RGBColor = RGBColor(0x3d, 0x8e, 0xb9);
 
+/// Text.
 pub const TEXT: RGBColor = RGBColor(0x37, 0x41, 0x51);
+/// Axes.
 pub const AXIS: RGBColor = RGBColor(0x9c, 0xa3, 0xaf);
+/// Lines of the grid.
 pub const GRID: RGBColor = RGBColor(0xe9, 0xeb, 0xef);
+/// Shaded stretches.
 pub const SHADE: RGBColor = RGBColor(0xfa, 0xf1, 0xdf);
 
 /// Stroke colours that are drawn dashed, as SVG writes them, with their dashes.
