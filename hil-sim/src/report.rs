@@ -1,21 +1,20 @@
 //! A run as one self-contained HTML page: verdict, ledger of the crossings, plots
 //! over time and over position, each crossing enlarged, log, faults, parameters.
 
-pub(crate) mod axis;
+pub mod axis;
 mod band;
 mod compare;
 mod crossings;
 mod decimate;
 #[cfg(test)]
 pub(crate) mod example;
-mod gaps;
-pub(crate) mod mesh;
+pub mod mesh;
 mod overview;
 mod page;
-pub(crate) mod palette;
+pub mod palette;
 mod panel;
 mod panels;
-pub(crate) mod svg;
+pub mod svg;
 mod tables;
 pub(crate) mod verdict;
 
@@ -25,7 +24,6 @@ use crate::export::{ExportError, write_text};
 use crate::record::Recording;
 
 pub use compare::{Difference, compare_html, differences};
-pub use gaps::{Published, published_svg};
 pub use overview::overview_svg;
 
 /// The page of `recording`. It needs no other file and no script.

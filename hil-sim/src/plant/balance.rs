@@ -70,7 +70,7 @@ const NEAR: f64 = 1e-4;
 impl Balance {
     /// Residual of the radial balance, N, its slope, N/mm, and the utilisation, from
     /// the contact's cosine and sine sums, N, and their derivatives by height, N/mm.
-    pub(crate) fn residual(
+    pub fn residual(
         &self,
         (c, s): (f64, f64),
         (dc, ds): (f64, f64),

@@ -1,5 +1,5 @@
-//! A figure as data: what is drawn, what is printed as JSON, and what the claims are
-//! judged by.
+//! A figure as data: what is drawn, what is printed as JSON, and what the study's claims
+//! are judged by.
 
 use serde::Serialize;
 
@@ -17,6 +17,8 @@ pub enum Source {
     Published,
     /// Printed in the study, and what the tread's parameters are fitted to.
     Fitted,
+    /// One of several methods, by the number of its colour; the series has its name.
+    Method(usize),
 }
 
 impl Source {
@@ -29,6 +31,7 @@ impl Source {
             Self::Experiment => "experiment, four means of ten",
             Self::Published => "published",
             Self::Fitted => "published (fitted)",
+            Self::Method(_) => "",
         }
     }
 }
@@ -52,6 +55,19 @@ impl Series {
     pub fn new(source: Source, points: Vec<(f64, f64)>) -> Self {
         Self { source, name: String::new(), points, range: Vec::new() }
     }
+
+    /// A method of this number.
+    #[must_use]
+    pub fn method(number: usize, name: &str, points: Vec<(f64, f64)>) -> Self {
+        Self { name: name.to_owned(), ..Self::new(Source::Method(number), points) }
+    }
+
+    /// Its entry in the legend.
+    #[must_use]
+    pub fn legend(&self) -> (Source, &str) {
+        let method = matches!(self.source, Source::Method(_));
+        (self.source, if method { &self.name } else { self.source.name() })
+    }
 }
 
 /// One plot.
@@ -65,6 +81,9 @@ pub struct Panel {
     pub y: String,
     /// Names of x = 0, 1, ... where x is no quantity; the series are marks then.
     pub categories: Vec<String>,
+    /// Whether both axes are logarithmic.
+    #[serde(skip)]
+    pub logarithmic: bool,
     /// Smallest vertical axis.
     pub least_y: Option<(f64, f64)>,
     /// What is drawn.
@@ -80,6 +99,7 @@ impl Panel {
             x: x.into(),
             y: y.into(),
             categories: Vec::new(),
+            logarithmic: false,
             least_y: None,
             series: Vec::new(),
         }

@@ -4,7 +4,7 @@
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
-use super::figure::{Figure, Panel, Series, Source};
+use crate::figure::{Figure, Panel, Series, Source};
 use hil_sim::report::axis::{Scale, extent, label, padded, ticks};
 use hil_sim::report::mesh::{self, TEXT_PX};
 use hil_sim::report::palette;
@@ -25,6 +25,16 @@ const TITLE_PX: f64 = 13.0;
 const BAND: RGBColor = RGBColor(0xfb, 0xe9, 0xd2);
 const EXPERIMENT: RGBColor = palette::PRELOAD;
 const PUBLISHED: RGBColor = palette::GAP;
+/// Colours of methods by number.
+const METHODS: [RGBColor; 7] = [
+    palette::TRUTH,
+    palette::SPEED,
+    palette::PRELOAD,
+    palette::RADIUS,
+    palette::GAP,
+    palette::COMPRESSION,
+    palette::SLIP,
+];
 
 /// The figure as SVG.
 #[must_use]
@@ -32,7 +42,7 @@ pub fn svg(figure: &Figure) -> String {
     let rows = figure.panels.len().div_ceil(figure.columns.max(1)) as u32;
     fixed((WIDTH, HEAD + rows * ROW), |area| {
         let (head, body) = area.split_vertically(HEAD * SCALE);
-        legend(&sources(figure), banded(figure), &head)?;
+        legend(&entries(figure), banded(figure), &head)?;
         let cells = body.split_evenly((rows as usize, figure.columns));
         for (panel, cell) in figure.panels.iter().zip(&cells) {
             draw(panel, cell)?;
@@ -41,10 +51,10 @@ pub fn svg(figure: &Figure) -> String {
     })
 }
 
-/// Sources that the figure shows, in the order of the legend.
-fn sources(figure: &Figure) -> Vec<Source> {
+/// Entries of the legend in its order.
+fn entries(figure: &Figure) -> Vec<(Source, &str)> {
     let series = figure.panels.iter().flat_map(|panel| &panel.series);
-    let mut found: Vec<Source> = series.map(|series| series.source).collect();
+    let mut found: Vec<(Source, &str)> = series.map(Series::legend).collect();
     found.sort_unstable();
     found.dedup();
     found
@@ -55,7 +65,7 @@ fn banded(figure: &Figure) -> bool {
     figure.panels.iter().flat_map(|panel| &panel.series).any(|series| !series.range.is_empty())
 }
 
-fn legend(sources: &[Source], band: bool, head: &Area) -> Drawn {
+fn legend(entries: &[(Source, &str)], band: bool, head: &Area) -> Drawn {
     let middle = (HEAD * SCALE) as i32 / 2;
     let mut left = 16 * S;
     let name = |text: &str, left: &mut i32| {
@@ -64,11 +74,15 @@ fn legend(sources: &[Source], band: bool, head: &Area) -> Drawn {
         *left = at + text_width(text, TEXT_PX) + 14 * S;
         head.draw(&Text::new(text.to_owned(), (at, middle), style))
     };
-    for &source in sources {
+    for &(source, text) in entries {
         let ends = [(left, middle), (left + 28 * S, middle)];
         match source {
             Source::Theory | Source::Simulation | Source::Experiment => {
                 head.draw(&PathElement::new(ends, stroke(source)))?;
+            }
+            Source::Method(_) => {
+                head.draw(&PathElement::new(ends, stroke(source)))?;
+                head.draw(&Circle::new((left + 14 * S, middle), 4 * S, stroke(source).filled()))?;
             }
             Source::Published | Source::Fitted => {
                 for part in diamond((left + 14 * S, middle), source) {
@@ -76,7 +90,7 @@ fn legend(sources: &[Source], band: bool, head: &Area) -> Drawn {
                 }
             }
         }
-        name(source.name(), &mut left)?;
+        name(text, &mut left)?;
     }
     if band {
         let corners = [(left, middle - 7 * S), (left + 28 * S, middle + 7 * S)];
@@ -92,6 +106,7 @@ fn stroke(source: Source) -> ShapeStyle {
         Source::Simulation => palette::SIMULATED.stroke_width(4),
         Source::Experiment => EXPERIMENT.stroke_width(3),
         Source::Published | Source::Fitted => PUBLISHED.stroke_width(3),
+        Source::Method(number) => METHODS[number % METHODS.len()].stroke_width(3),
     }
 }
 
@@ -101,11 +116,46 @@ fn layer(source: Source) -> u8 {
         Source::Experiment => 0,
         Source::Theory => 1,
         Source::Simulation => 2,
-        Source::Published | Source::Fitted => 3,
+        Source::Published | Source::Fitted | Source::Method(_) => 3,
     }
 }
 
 fn draw(panel: &Panel, cell: &Area) -> Drawn {
+    if panel.logarithmic {
+        return draw_scaled(&decimal_logarithms(panel), cell);
+    }
+    draw_scaled(panel, cell)
+}
+
+/// The panel with the decimal logarithms of its points; what is not above 0 is left out.
+fn decimal_logarithms(panel: &Panel) -> Panel {
+    let mut scaled = panel.clone();
+    for series in &mut scaled.series {
+        series.points.retain(|&(x, y)| x > 0.0 && y > 0.0 && (x * y).is_finite());
+        series.points.iter_mut().for_each(|p| *p = (p.0.log10(), p.1.log10()));
+    }
+    scaled
+}
+
+/// Ticks of a logarithmic axis: decades, or 1, 2 and 5 where these are few.
+fn decades((low, high): (f64, f64)) -> Vec<f64> {
+    let within: &[f64] = if high - low < 2.5 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+    let all = (low.floor() as i32..=high.ceil() as i32)
+        .flat_map(|decade| within.iter().map(move |part| part.log10() + f64::from(decade)));
+    all.filter(|tick| (low..=high).contains(tick)).collect()
+}
+
+/// A power of ten with as many digits as it takes.
+fn power(exponent: f64) -> String {
+    let value = 10_f64.powf(exponent);
+    if (1e-3..1e5).contains(&value) {
+        format!("{value:.3}").trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        format!("{value:.0e}")
+    }
+}
+
+fn draw_scaled(panel: &Panel, cell: &Area) -> Drawn {
     let (head, body) = cell.split_vertically(TITLE * SCALE);
     let style = font(TITLE_PX, palette::TRUTH, HPos::Left, VPos::Center);
     head.draw(&Text::new(panel.title.clone(), (16 * S, (TITLE * SCALE) as i32 / 2), style))?;
@@ -115,8 +165,14 @@ fn draw(panel: &Panel, cell: &Area) -> Drawn {
     if !panel.categories.is_empty() {
         x_ticks = (0..panel.categories.len()).map(|i| i as f64).collect();
     }
-    let (y_ticks, y_decimals) = ticks(y, (high as i32 / (30 * S)).clamp(2, 7) as usize);
-    let widest = y_ticks.iter().map(|&y| text_width(&label(y, y_decimals), TEXT_PX)).max();
+    let (mut y_ticks, y_decimals) = ticks(y, (high as i32 / (30 * S)).clamp(2, 7) as usize);
+    if panel.logarithmic {
+        (x_ticks, y_ticks) = (decades(x), decades(y));
+    }
+    let shown = |value: f64, decimals| {
+        if panel.logarithmic { power(value) } else { label(value, decimals) }
+    };
+    let widest = y_ticks.iter().map(|&y| text_width(&shown(y, y_decimals), TEXT_PX)).max();
     let mut chart = ChartBuilder::on(&body)
         .margin_left(6 * S)
         .margin_right(16 * S)
@@ -127,10 +183,10 @@ fn draw(panel: &Panel, cell: &Area) -> Drawn {
     mesh::plain(&mut chart.configure_mesh())
         .x_label_formatter(&|x| match panel.categories.get(x.round() as usize) {
             Some(name) => name.clone(),
-            None if panel.categories.is_empty() => label(*x, x_decimals),
+            None if panel.categories.is_empty() => shown(*x, x_decimals),
             None => String::new(),
         })
-        .y_label_formatter(&|y| label(*y, y_decimals))
+        .y_label_formatter(&|y| shown(*y, y_decimals))
         .x_desc(panel.x.as_str())
         .y_desc(panel.y.as_str())
         .draw()?;
@@ -146,6 +202,10 @@ fn draw(panel: &Panel, cell: &Area) -> Drawn {
         let published = matches!(one.source, Source::Published | Source::Fitted);
         if !published && panel.categories.is_empty() {
             chart.draw_series([PathElement::new(one.points.clone(), stroke(one.source))])?;
+            if matches!(one.source, Source::Method(_)) {
+                let dot = |&point| Circle::new(point, 4 * S, stroke(one.source).filled());
+                chart.draw_series(one.points.iter().map(dot))?;
+            }
             continue;
         }
         let shift = if panel.categories.is_empty() { 0 } else { beside(one.source) };
@@ -178,6 +238,7 @@ fn beside(source: Source) -> i32 {
         Source::Simulation => -9 * S,
         Source::Experiment => 9 * S,
         Source::Published | Source::Fitted => 27 * S,
+        Source::Method(_) => 0,
     }
 }
 
@@ -189,7 +250,8 @@ fn ranges(panel: &Panel) -> ((f64, f64), (f64, f64)) {
         let all = points().map(|p| p.0).chain(bands().map(|b| b.0));
         let (low, high) = extent(all).unwrap_or((0.0, 1.0));
         let room = 0.03 * (high - low);
-        (if low == 0.0 { 0.0 } else { low - room }, high + room)
+        let keeps_zero = low == 0.0 && !panel.logarithmic;
+        (if keeps_zero { 0.0 } else { low - room }, high + room)
     } else {
         (-0.5, panel.categories.len() as f64 - 0.5)
     };
@@ -198,7 +260,7 @@ fn ranges(panel: &Panel) -> ((f64, f64), (f64, f64)) {
     let y = extent(values.chain(least)).unwrap_or((0.0, 1.0));
     let wide = padded(y, 0.07);
     // What begins at zero keeps its zero line.
-    (x, if y.0 == 0.0 { (0.0, wide.1) } else { wide })
+    (x, if y.0 == 0.0 && !panel.logarithmic { (0.0, wide.1) } else { wide })
 }
 
 type Drawable<'a> = DynElement<'static, SVGBackend<'a>, (i32, i32)>;
@@ -219,9 +281,9 @@ fn mark<'a>(at: (i32, i32), source: Source) -> [Drawable<'a>; 2] {
             // Undashed: a mark is too small for dashes.
             Circle::new(at, R, palette::SPEED.stroke_width(4)).into_dyn(),
         ],
-        Source::Experiment => [
+        Source::Experiment | Source::Method(_) => [
             Circle::new(at, R - 1, WHITE.filled()).into_dyn(),
-            Circle::new(at, R - 3, EXPERIMENT.filled()).into_dyn(),
+            Circle::new(at, R - 3, stroke(source).filled()).into_dyn(),
         ],
         Source::Published | Source::Fitted => diamond(at, source),
     }

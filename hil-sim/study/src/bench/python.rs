@@ -6,48 +6,38 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 /// A Python that has what the scripts import.
 pub(super) struct Python {
     program: PathBuf,
-    folder: String,
+    /// A folder for what the scripts build.
+    pub(super) folder: String,
 }
 
-/// Where the scripts are.
+/// The folder of the scripts.
 fn scripts() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("peers")
 }
 
-/// Makes the environment, unless it stands with these packages already.
+/// Makes the environment, unless it has these packages already.
 pub(super) fn provide(say: &dyn Fn(&str)) -> Result<Python> {
-    let target = env::var_os("CARGO_TARGET_DIR").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).with_file_name("target"),
-        PathBuf::from,
-    );
+    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let target = env::var_os("CARGO_TARGET_DIR").map_or(workspace.join("target"), PathBuf::from);
     let folder = target.join("peers");
     let wanted = fs::read_to_string(scripts().join("requirements.txt"))?;
     let stamp = folder.join("requirements.txt");
     let program = folder.join("bin/python");
-    if fs::read_to_string(&stamp).is_ok_and(|stands| stands == wanted) && program.is_file() {
-        return python(program, &folder);
+    if fs::read_to_string(&stamp).ok().as_ref() != Some(&wanted) || !program.is_file() {
+        say("setting up Python");
+        fs::create_dir_all(&folder)?;
+        quiet(Command::new("python3").args(["-m", "venv"]).arg(&folder))?;
+        let install = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r"];
+        quiet(Command::new(&program).args(install).arg(scripts().join("requirements.txt")))?;
+        fs::write(&stamp, &wanted)?;
     }
-    say("setting up Python");
-    fs::create_dir_all(&folder)?;
-    quiet(Command::new("python3").args(["-m", "venv"]).arg(&folder))?;
-    say("installing the peers");
-    quiet(
-        Command::new(&program)
-            .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r"])
-            .arg(scripts().join("requirements.txt")),
-    )?;
-    fs::write(&stamp, &wanted)?;
-    python(program, &folder)
-}
-
-fn python(program: PathBuf, folder: &Path) -> Result<Python> {
     let folder = folder.to_str().context("the target directory's name is not text")?.to_owned();
     Ok(Python { program, folder })
 }
@@ -56,9 +46,7 @@ fn python(program: PathBuf, folder: &Path) -> Result<Python> {
 fn quiet(command: &mut Command) -> Result<()> {
     let name = command.get_program().to_string_lossy().into_owned();
     let output = command.output().with_context(|| format!("could not start `{name}`"))?;
-    if !output.status.success() {
-        bail!("`{name}` failed: {}", last_line(&output.stderr));
-    }
+    ensure!(output.status.success(), "`{name}` failed: {}", last_line(&output.stderr));
     Ok(())
 }
 
@@ -68,13 +56,8 @@ fn last_line(text: &[u8]) -> String {
 }
 
 impl Python {
-    /// A folder of its own, for what the scripts build.
-    pub(super) fn folder(&self) -> &str {
-        &self.folder
-    }
-
-    /// Runs a script with `given` on its standard input; its standard output is the
-    /// result, both JSON.
+    /// Runs a script with `given` on its standard input; its standard output is the result,
+    /// both JSON.
     pub(super) fn run<T: DeserializeOwned>(
         &self,
         script: &str,
@@ -82,7 +65,7 @@ impl Python {
     ) -> Result<T> {
         let mut child = Command::new(&self.program)
             .arg(scripts().join(script))
-            // Compared are single threads.
+            // Single threads are compared.
             .envs([("OMP_NUM_THREADS", "1"), ("OPENBLAS_NUM_THREADS", "1")])
             .env("PYTHONDONTWRITEBYTECODE", "1")
             .stdin(Stdio::piped())
@@ -105,16 +88,13 @@ mod tests {
     #[test]
     fn the_packages_are_pinned() {
         let wanted = fs::read_to_string(scripts().join("requirements.txt")).unwrap();
-        assert!(wanted.lines().count() >= 2);
-        assert!(wanted.lines().all(|line| line.contains("==")), "{wanted}");
+        assert!(wanted.lines().count() >= 2 && wanted.lines().all(|line| line.contains("==")));
     }
 
     #[test]
     fn a_script_that_fails_says_why_in_one_line() {
         let python = Python { program: "python3".into(), folder: "/nowhere".into() };
-        let Err(error) = python.run::<serde_json::Value>("no_such_script.py", &1) else {
-            panic!("there is no such script")
-        };
+        let error = python.run::<serde_json::Value>("no_such_script.py", &1).unwrap_err();
         let text = error.to_string();
         assert!(text.contains("no_such_script.py") && !text.contains('\n'), "{text}");
     }
