@@ -6,10 +6,12 @@
 //! and resolution are stated per alias; what needs more is an accumulator of its
 //! own (see [`Travel`]).
 
+mod motion;
 mod q16;
 
 use fixed::types::I32F32;
 
+pub use motion::{Direction, Duty, MotorCommand};
 pub use q16::Q16;
 
 /// Length or position, mm. LSB 15 nm; the rig spans 0.4 m, headroom 80-fold.

@@ -9,12 +9,10 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use super::saturate::duty;
-use crate::hal::Duty;
 use crate::model::timing::SLEW_PART;
 use crate::numeric::{LowPass, LowPassState, between, checked};
 use crate::rig::{Rig, RigError};
-use crate::units::{Newtons, NewtonsPerSecond, Q16, TICK_HZ};
+use crate::units::{Duty, Newtons, NewtonsPerSecond, Q16, TICK_HZ};
 
 /// Longest dead time modelled, ticks; the rig's parameters end there.
 pub const LONGEST_DELAY: usize = 256;
@@ -111,7 +109,7 @@ impl PreloadLoop {
             -self.most_correction,
             self.most_correction,
         );
-        duty((rate + correction) * self.per_rate)
+        Duty::saturating((rate + correction) * self.per_rate)
     }
 }
 

@@ -2,11 +2,9 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use super::saturate::duty;
-use crate::hal::Duty;
 use crate::numeric::checked;
 use crate::rig::{Rig, RigError};
-use crate::units::{MillimetresPerSecond, Newtons, Q16, Ratio, Travel, per_tick, q16};
+use crate::units::{Duty, MillimetresPerSecond, Newtons, Q16, Ratio, Travel, per_tick, q16};
 
 /// Crossover of the integral part, rad/s: a third of the speed observer's bandwidth.
 const CROSSOVER_RAD_S: f64 = 20.0;
@@ -75,7 +73,7 @@ impl SpeedLoop {
                 .saturating_add(per_tick(self.integral * error.clamp(-MOST_ERROR, MOST_ERROR)))
                 .clamp(-limit, limit);
         }
-        duty(whole)
+        Duty::saturating(whole)
     }
 }
 

@@ -9,7 +9,7 @@
 //! 1 exactly, whatever was fitted.
 
 use super::constants::{DEPLOY, DEPLOY_PUSHED, RETRACT, RETRACT_PUSHED};
-use crate::supervise::Direction;
+use crate::units::Direction;
 
 /// Highest degree in x.
 pub const FAST_DEGREE: usize = 5;

@@ -9,7 +9,7 @@
 use super::felt::{self, FORCE_END, Folded, Kind, RUN_END};
 use super::impact::Impact;
 use crate::rig::Rig;
-use crate::supervise::Direction;
+use crate::units::Direction;
 
 /// Shortest run of the model over R: 0.1 mm on the published wheel.
 pub const LEAST_RUN: f64 = 0.004;

@@ -9,9 +9,9 @@ use super::guard::Guard;
 use super::plan::{Outcome, Plan, PlanRequest, Review, Strategy};
 use super::reduced::{Point, ReducedModel, Scale};
 use super::timing::Timing;
+use crate::fault::Limit;
 use crate::rig::MAX_STEPS;
-use crate::supervise::{Direction, Limit};
-use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Ratio, Seconds, q16};
+use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Ratio, Seconds, q16};
 
 /// Largest correction of the stiffness scale by one crossing.
 const LARGEST_CORRECTION: Ratio = q16(100_000);

@@ -18,8 +18,7 @@ mod shape;
 mod way;
 
 use crate::numeric::{fraction, high};
-use crate::supervise::Direction;
-use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio};
+use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio};
 
 use shape::{Refined, Shape};
 use way::Way;

@@ -7,7 +7,7 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use super::Fault;
+use crate::fault::Fault;
 use crate::numeric::checked;
 use crate::rig::{Rig, RigError};
 use crate::units::{

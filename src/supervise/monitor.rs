@@ -2,15 +2,15 @@
 
 #![deny(clippy::float_arithmetic)]
 
+use super::Mode;
 use super::crosscheck::{Compared, CrossCheck, CrossState};
 use super::readback::Readback;
-use super::{Fault, Mode};
-use crate::hal::Duty;
+use crate::fault::Fault;
 use crate::numeric::checked;
 use crate::rig::{Rig, RigError};
 use crate::sense::raw::BridgeCodes;
 use crate::sense::{Reason, SensedState, Validity};
-use crate::units::{MillimetresPerSecond, Newtons, Ratio, Tick, q16};
+use crate::units::{Duty, MillimetresPerSecond, Newtons, Ratio, Tick, q16};
 
 /// Preload above the limit that counts as overpressure, relative: regulation and
 /// the spring that a climb compresses stay below it.
@@ -211,8 +211,8 @@ mod tests {
     use super::*;
     use crate::sense::Reading;
     use crate::sense::raw::BridgeCode;
-    use crate::supervise::{Direction, Leg};
-    use crate::units::{Millimetres, Q16, Travel};
+    use crate::supervise::Leg;
+    use crate::units::{Direction, Millimetres, Q16, Travel};
     use proptest::prelude::*;
 
     const RUN: Mode = Mode::Run(Direction::Deploy, Leg::Cruise);

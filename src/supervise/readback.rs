@@ -12,9 +12,9 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use super::Fault;
-use crate::hal::Duty;
+use crate::fault::Fault;
 use crate::sense::raw::{BridgeCode, BridgeCodes};
+use crate::units::Duty;
 
 /// Time constant of the low-pass before the converter, ticks. A period of the PWM, 50 us,
 /// leaves 1 % of ripple behind it, the mean of 0.15 ms nothing to speak of.

@@ -1,6 +1,8 @@
 //! The one table of transitions.
 
-use super::{Command, Direction, Fault, Leg, Mode};
+use super::{Command, Leg, Mode};
+use crate::fault::Fault;
+use crate::units::Direction;
 
 /// What can move the drive from one mode to another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -8,7 +8,7 @@ use crate::model::reduced::ReducedModel;
 use crate::model::timing::Timing;
 use crate::numeric::checked;
 use crate::rig::{REGULATION_PART, Rig, RigError};
-use crate::supervise::Direction;
+use crate::units::Direction;
 
 /// Part of the pre-tightener's slew that the spring may use up while the wheel climbs.
 const CLIMB_PART: f64 = 0.9;

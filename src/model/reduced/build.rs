@@ -11,7 +11,7 @@ use crate::model::felt::{FAST_DEGREE, FORCE_END, Folded, Kind, RUN_DEGREE, RUN_E
 use crate::model::formula::{Formula, LEAST_RUN};
 use crate::numeric::{checked, fits, fits_with_slope};
 use crate::rig::{Rig, RigError};
-use crate::supervise::Direction;
+use crate::units::Direction;
 use polynomial::{interpolate, rows, value};
 
 /// Largest unit of force, N: forces from 8 to 256 N are told, of which no rig needs more.

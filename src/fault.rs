@@ -1,6 +1,12 @@
 //! Latched faults (codes 100 to 199) and active limits (200 to 299). Codes are
 //! stable: a number is never given a second meaning.
 
+#[cfg(not(target_os = "none"))]
+mod description;
+
+#[cfg(not(target_os = "none"))]
+pub use description::FaultDescription;
+
 /// A latched fault: the drive holds until it is reset.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
