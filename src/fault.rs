@@ -106,13 +106,11 @@ impl Fault {
     ];
 
     /// The stable code.
-    #[must_use]
     pub const fn code(self) -> u16 {
         self as u16
     }
 
     /// One sentence for the operator.
-    #[must_use]
     pub const fn sentence(self) -> &'static str {
         match self {
             Self::SpeedStale => "the wheel encoder stopped answering",
@@ -207,13 +205,11 @@ impl Limit {
     ];
 
     /// The stable code.
-    #[must_use]
     pub const fn code(self) -> u16 {
         self as u16
     }
 
     /// One sentence for the operator.
-    #[must_use]
     pub const fn sentence(self) -> &'static str {
         match self {
             Self::StepEarly => "a corner was met before its window",

@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use interstage::supervise::{Account, Command, Direction, Fault, Leg, Limit, Mode, Trigger, next};
+use interstage::fault::{Fault, FaultDescription, Limit};
+use interstage::supervise::{Command, Leg, Mode, Trigger, next};
+use interstage::units::Direction;
 
 use super::head;
 
@@ -24,20 +26,20 @@ pub fn modes() -> String {
              it is found: [SAFETY.md](SAFETY.md).\n\n| code | fault | cause | detection | reset \
              |\n|---|---|---|---|---|\n";
     for fault in Fault::ALL {
-        let Account { cause, detection, reset, .. } = fault.account();
+        let FaultDescription { cause, detection, reset, .. } = fault.description();
         let (code, sentence) = (fault.code(), fault.sentence());
         let _ = writeln!(page, "| {code} | {sentence} | {cause} | {detection} | {reset} |");
     }
     page += "\nReaction to each:\n\n";
     for reaction in reactions() {
-        let of = Fault::ALL.into_iter().filter(|fault| fault.account().reaction == reaction);
+        let of = Fault::ALL.into_iter().filter(|fault| fault.description().reaction == reaction);
         let codes: Vec<String> = of.map(|fault| fault.code().to_string()).collect();
         let _ = writeln!(page, "- {}: {reaction}.", codes.join(", "));
     }
     page += "\n## Limits, active\n\nReported and acted on; gone when their cause is gone.\n\n\
              | code | limit | reaction | until |\n|---|---|---|---|\n";
     for limit in Limit::ALL {
-        let (reaction, until) = limit.account();
+        let (reaction, until) = limit.description();
         let (code, sentence) = (limit.code(), limit.sentence());
         let _ = writeln!(page, "| {code} | {sentence} | {reaction} | {until} |");
     }
@@ -46,7 +48,7 @@ pub fn modes() -> String {
 
 /// Every reaction once.
 fn reactions() -> Vec<&'static str> {
-    let mut all: Vec<&str> = Fault::ALL.map(|fault| fault.account().reaction).to_vec();
+    let mut all: Vec<&str> = Fault::ALL.map(|fault| fault.description().reaction).to_vec();
     all.sort_unstable();
     all.dedup();
     all

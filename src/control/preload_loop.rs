@@ -66,9 +66,6 @@ impl Default for PreloadLoopState {
 
 impl PreloadLoop {
     /// The actuator of a rig.
-    ///
-    /// # Errors
-    /// [`RigError`] if a parameter is out of range.
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         let slew = rig.preload.slew_n_per_s;
@@ -120,13 +117,11 @@ impl PreloadLoopState {
     }
 
     /// Reference after the slew limit, N.
-    #[must_use]
     pub const fn reference(&self) -> Newtons {
         self.reference
     }
 
     /// Preload that the actuator should have reached by now, N.
-    #[must_use]
     pub fn due(&self) -> Newtons {
         if self.running { self.model.output() } else { Q16::ZERO }
     }

@@ -81,13 +81,11 @@ impl Schedule {
     }
 
     /// Short of the wanted preload by no more than this, it stands, N.
-    #[must_use]
     pub const fn reached_within(&self) -> Newtons {
         self.reached_within
     }
 
     /// What to ask for.
-    #[must_use]
     pub fn targets(&self, steps: &Steps, plan: &Plan, course: &Course) -> Targets {
         let to_window = steps.to_window(course.direction, course.distance);
         let within = |way: Millimetres| to_window.is_some_and(|ahead| ahead <= way);

@@ -38,9 +38,6 @@ pub struct SpeedLoopState {
 
 impl SpeedLoop {
     /// Gains of a rig.
-    ///
-    /// # Errors
-    /// [`RigError`] if a gain is out of range.
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         let inverse = 1.0 / rig.drive.no_load_speed_mm_s;
@@ -84,7 +81,6 @@ impl SpeedLoopState {
     }
 
     /// Duty that it adds to the feed-forward.
-    #[must_use]
     pub fn value(&self) -> Ratio {
         Q16::narrow(self.integral)
     }

@@ -190,7 +190,6 @@ impl CrossingWatch {
     }
 
     /// How far inwards of the wall of `level` the wheel stands, by the table, mm.
-    #[must_use]
     pub fn height_over(
         &self,
         level: u8,
@@ -203,7 +202,6 @@ impl CrossingWatch {
     /// Axial distance from the centre of a wheel that stands on an edge to its face, mm: the
     /// edge lies `R - c` from the centre, and `y - h` below it. `level` is that of the lower
     /// wall.
-    #[must_use]
     pub fn to_edge(&self, level: u8, radius: Millimetres, compression: Millimetres) -> Millimetres {
         let height = self.wall(level) + self.radius - radius;
         self.measure(compression, height).distance
@@ -240,7 +238,6 @@ impl CrossingWatch {
     }
 
     /// How far the wheel stands off its baseline in the direction of the step, mm.
-    #[must_use]
     pub fn rise(&self, state: &WatchState, direction: Direction, seen: &WatchInput) -> Millimetres {
         let rise = state.baseline.output() - (seen.radius - seen.compression);
         match direction {

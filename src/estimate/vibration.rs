@@ -109,9 +109,6 @@ impl VibrationObserver {
 
     /// An observer of the rig's highest mode that a millisecond shows; one that sees
     /// nothing if there is none.
-    ///
-    /// # Errors
-    /// [`RigError::OutOfRange`] if the mode cannot be observed in these formats.
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         let seen = |hz: &&f64| **hz >= SEEN_HZ.0 && **hz <= SEEN_HZ.1;
         let highest = rig.drive.modes_hz.iter().filter(seen).copied().reduce(f64::max);

@@ -37,7 +37,6 @@ const fn held(
 
 impl Fault {
     /// Its account.
-    #[must_use]
     pub const fn description(self) -> FaultDescription {
         match self {
             Self::SpeedStale => held(
@@ -193,7 +192,6 @@ impl Fault {
 
 impl Limit {
     /// What is done while it lasts, and what ends it.
-    #[must_use]
     pub const fn description(self) -> (&'static str, &'static str) {
         match self {
             Self::StepEarly => {

@@ -43,9 +43,6 @@ pub struct CornerProfile {
 
 impl CornerProfile {
     /// Profile of a rig.
-    ///
-    /// # Errors
-    /// [`RigError`] if a length is out of range.
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         let (r, h) = (rig.rig.wheel_radius_mm, rig.rig.step_height_mm);
@@ -103,7 +100,6 @@ impl CornerProfile {
     }
 
     /// Distance to the face at which the corner may first be felt on this way, mm.
-    #[must_use]
     pub const fn first_contact(&self, direction: Direction) -> Millimetres {
         match direction {
             Direction::Deploy => self.touch,
@@ -112,14 +108,12 @@ impl CornerProfile {
     }
 
     /// Way behind an edge after which the patch is clear of it, mm.
-    #[must_use]
     pub const fn patch(&self) -> Millimetres {
         self.patch
     }
 
     /// Motor force per radial force that a corner `ahead` mm outwards of the centre
     /// costs; zero away from it.
-    #[must_use]
     pub fn drive_slope(&self, direction: Direction, ahead: Millimetres) -> Ratio {
         let [out, back] = &self.drive_slope;
         if ahead <= Q16::ZERO || ahead >= self.touch {
@@ -133,7 +127,6 @@ impl CornerProfile {
 
     /// Rise per axial way outwards with the face `ahead` mm outwards of the centre,
     /// negative behind the edge; zero away from a corner.
-    #[must_use]
     pub fn slope(&self, ahead: Millimetres) -> Ratio {
         if ahead <= -self.patch || ahead >= self.touch { Q16::ZERO } else { self.slope.eval(ahead) }
     }

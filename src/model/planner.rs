@@ -65,7 +65,6 @@ pub struct Planner {
 
 impl Planner {
     /// Answers a request.
-    #[must_use]
     pub fn plan(&self, request: &PlanRequest) -> Plan {
         let outcome = request.review.map(|review| self.review(&review, request.scale));
         let scale = outcome.map_or(request.scale, |o| o.scale);
@@ -104,7 +103,6 @@ impl Planner {
     }
 
     /// Gap that the schedule holds on this way, mm.
-    #[must_use]
     pub fn gap_ref(&self, direction: Direction) -> Millimetres {
         self.gap_ref[way(direction)]
     }

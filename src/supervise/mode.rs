@@ -94,13 +94,11 @@ impl Mode {
     };
 
     /// Whether nothing is driven in this mode, neither wheel nor pre-tightener.
-    #[must_use]
     pub const fn is_at_rest(self) -> bool {
         !matches!(self, Self::Preload(_) | Self::Run(..) | Self::Stopping(_))
     }
 
     /// Whether the drive may turn in this mode.
-    #[must_use]
     pub const fn moves(self) -> bool {
         matches!(self, Self::Run(..) | Self::Stopping(_))
     }

@@ -60,7 +60,6 @@ impl Controller {
 
     /// The same controller with every stage run in every tick, needed or not: its outputs are
     /// the same to the bit.
-    #[must_use]
     pub fn without_skipping(mut self) -> Self {
         self.skipping = false;
         self

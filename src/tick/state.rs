@@ -75,7 +75,6 @@ impl Default for Planning {
 
 impl State {
     /// A start with the wheel where a record has it, if there is one.
-    #[must_use]
     pub fn restored(record: Option<Place>) -> Self {
         Self { estimate: EstimateState::restored(record), ..Self::default() }
     }

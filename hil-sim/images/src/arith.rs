@@ -2,8 +2,7 @@
 
 use interstage::model::reduced::{Point, ReducedModel, Scale};
 use interstage::rig::Rig;
-use interstage::supervise::Direction;
-use interstage::units::Q16;
+use interstage::units::{Direction, Q16};
 use interstage_arith::{Answer, Given};
 
 /// What can be called: name of the arithmetic, functions forwards and back.

@@ -1,8 +1,7 @@
 //! One call of the reduced model as words.
 
 use interstage::model::reduced::{Point, ReducedModel, Scale};
-use interstage::supervise::Direction;
-use interstage::units::{Q16, q16};
+use interstage::units::{Direction, Q16, q16};
 
 /// What a call of the model is given: Q15.16 bits, in the units of [`Point`].
 #[repr(C)]

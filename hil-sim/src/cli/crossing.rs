@@ -3,7 +3,7 @@
 mod methods;
 
 use clap::ValueEnum;
-use interstage::supervise::Direction;
+use interstage::units::Direction;
 use serde::Serialize;
 
 use super::failure::{Failure, Outcome};

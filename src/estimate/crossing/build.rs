@@ -19,9 +19,6 @@ const MEMORY_STIFFENING: f64 = 4.2235;
 
 impl CrossingWatch {
     /// The watch of a rig.
-    ///
-    /// # Errors
-    /// [`RigError`] if a length is out of range.
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         let (r, h) = (rig.rig.wheel_radius_mm, rig.rig.step_height_mm);
         Ok(Self {

@@ -16,7 +16,7 @@ use std::time::Duration;
 
 use anyhow::{Context, Result};
 use interstage::model::reduced::Scale;
-use interstage::supervise::Direction;
+use interstage::units::Direction;
 use interstage_arith::{Double, Fixed, Given, Libm, Micro, Model, Number};
 use interstage_images::arith::{FUNCTIONS, crossing, force};
 use serde::Serialize;

@@ -4,7 +4,7 @@
 use interstage::model::felt::{self, FORCE_END, Kind};
 use interstage::model::formula::{Formula, LEAST_RUN};
 use interstage::rig::Rig;
-use interstage::supervise::Direction;
+use interstage::units::Direction;
 use interstage_arith::{CELL, FAST_CELLS, FORCE_CELLS, Shared, Way};
 use nalgebra::{DMatrix, DVector};
 
