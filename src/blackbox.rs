@@ -10,9 +10,9 @@ mod late;
 mod restart;
 
 pub use crash::{Crash, Stopped};
-pub use flight::{Flight, Pace, Recorder, Trust, later};
+pub use flight::{Flight, Pace, Recorder, later};
 pub use late::Late;
-pub use restart::{Place, Reset, Restart};
+pub use restart::{Reset, Restart};
 
 /// Words of a [`Flight`].
 pub const FLIGHT_WORDS: usize = 5;

@@ -12,11 +12,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::hal::{Duty, MotorCommand};
 use crate::log::number;
 use crate::sense::raw::{AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount};
 use crate::supervise::{Command, Mode};
-use crate::units::Tick;
+use crate::units::{Duty, MotorCommand, Tick};
 
 /// RTT channel up.
 pub const UP: u32 = 3;

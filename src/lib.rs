@@ -3,7 +3,7 @@
 //! proportion to the speed, so that the gap between wheel and wall stays as on
 //! the smooth wall.
 //!
-//! The control tick ([`control`]) is fixed point, without allocation and without
+//! The control tick ([`tick`]) is fixed point, without allocation and without
 //! waiting; the async [`tasks`] around it are generic over one board trait
 //! ([`hal`]). All of it builds on the host, where the virtual rig runs it.
 
@@ -15,6 +15,7 @@
 pub mod blackbox;
 pub mod control;
 pub mod estimate;
+pub mod fault;
 pub mod hal;
 pub mod hil;
 pub mod link;
@@ -27,4 +28,5 @@ pub mod rig;
 pub mod sense;
 pub mod supervise;
 pub mod tasks;
+pub mod tick;
 pub mod units;

@@ -12,7 +12,6 @@
 //! | [`ledger`] | a line a crossing |
 
 pub mod capture;
-mod entry;
 pub mod frame;
 pub mod identity;
 pub mod ledger;
@@ -20,12 +19,9 @@ pub mod number;
 mod record;
 mod scribe;
 mod tape;
-mod telemetry;
 mod wire;
 
-pub use entry::{CrossingRecord, Entry, Event};
 pub use identity::Identity;
 pub use record::{Flags, Record};
 pub use scribe::Scribe;
 pub use tape::{BATCH, TAPE, Tape};
-pub use telemetry::Telemetry;

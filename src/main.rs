@@ -24,12 +24,12 @@ mod firmware {
     use embassy_stm32::interrupt::{self, InterruptExt, Priority};
     #[cfg(not(feature = "hil"))]
     use embassy_stm32::{Peri, Peripherals, pac};
-    use interstage::control::Controller;
     use interstage::hal::{Board, Parts};
-    use interstage::log::{Entry, Event, Identity, Scribe};
+    use interstage::log::{Identity, Scribe};
     use interstage::model::Planner;
     use interstage::params::service::Service;
     use interstage::tasks::{self, Exchange, Latest};
+    use interstage::tick::{Controller, Entry, Event};
     #[cfg(not(feature = "hil"))]
     use rtt_target::DownChannel;
     use static_cell::{ConstStaticCell, StaticCell};

@@ -7,8 +7,8 @@ mod mutate;
 use crc::{CRC_32_ISO_HDLC, Crc};
 use interstage::blackbox::{Crash, Flight};
 use interstage::link::{Gatherer, ToBoard, ToHost, frame};
+use interstage::log::Identity;
 use interstage::log::frame::{Body, Frame, Head, Kind, LONGEST, Page, check};
-use interstage::log::{Entry, Event, Identity};
 use interstage::params::service::{Piece, Request, Response};
 use interstage::params::slots::{
     FlashFault, SLOT_BYTES, SetMemory, Slot, WORD_BYTES, place, stored,
@@ -16,6 +16,7 @@ use interstage::params::slots::{
 use interstage::params::{MAX_SET, ParameterSet, compile};
 use interstage::rig::Rig;
 use interstage::supervise::{Command, Mode};
+use interstage::tick::{Entry, Event};
 
 use mutate::fuzz;
 

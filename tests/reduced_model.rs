@@ -7,8 +7,8 @@ use interstage::model::reduced::ReducedModel;
 use interstage::model::{PlanRequest, Planner};
 use interstage::rig::{Rig, RigError};
 use interstage::sense::raw::{AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount};
-use interstage::supervise::{Command, Direction};
-use interstage::units::{Q16, Ratio};
+use interstage::supervise::Command;
+use interstage::units::{Direction, Q16, Ratio};
 
 const WAYS: [Direction; 2] = [Direction::Deploy, Direction::Retract];
 

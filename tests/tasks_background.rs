@@ -5,12 +5,13 @@ mod common;
 use common::{Bench, Operator, Record, forever};
 use embassy_time::Duration;
 use interstage::hal::Light;
-use interstage::log::{Entry, Event, Identity, Scribe};
+use interstage::log::{Identity, Scribe};
 use interstage::model::{PlanRequest, Planner};
 use interstage::rig::Rig;
-use interstage::supervise::{Command, Direction};
+use interstage::supervise::Command;
 use interstage::tasks::{self, COMMANDS, ENTRIES, Exchange};
-use interstage::units::Ratio;
+use interstage::tick::{Entry, Event};
+use interstage::units::{Direction, Ratio};
 
 fn planner() -> &'static Planner {
     forever(Planner::try_build(&Rig::prototype()).expect("the prototype is valid"))

@@ -7,13 +7,15 @@ use common::{
     load_cell_code, now_ms,
 };
 use interstage::blackbox::Late;
-use interstage::control::Controller;
-use interstage::hal::{Light, MotorCommand};
-use interstage::log::{Entry, Event, Identity, Scribe};
+use interstage::fault::Fault;
+use interstage::hal::Light;
+use interstage::log::{Identity, Scribe};
 use interstage::model::Planner;
 use interstage::rig::Rig;
-use interstage::supervise::{Command, Direction, Fault, Mode};
+use interstage::supervise::{Command, Mode};
 use interstage::tasks::{self, CHECK_IN_TICKS, Exchange, Latest, Station};
+use interstage::tick::{Controller, Entry, Event};
+use interstage::units::{Direction, MotorCommand};
 
 /// All tasks of the firmware on a mocked board: at rest, unloaded, stowed.
 struct Board {

@@ -9,11 +9,10 @@ mod trace;
 
 use std::time::Instant;
 
-use interstage::control::Output;
-use interstage::log::{CrossingRecord, Event};
 use interstage::model::Strategy;
 use interstage::rig::RigError;
 use interstage::supervise::{Command, Mode};
+use interstage::tick::{CrossingRecord, Event, Output};
 
 use crate::plant::limits::Refusal;
 use crate::plant::rig::PlantError;

@@ -8,7 +8,8 @@ use common::{Bench, NO_SLIP_MM, WAYS, back, check_each, end_mm, scenario, starte
 use hil_sim::record::Row;
 use hil_sim::scenario::{Direction, Scenario, StepAnomaly};
 use hil_sim::sil::{Options, run};
-use interstage::supervise::{Fault, Mode};
+use interstage::fault::Fault;
+use interstage::supervise::Mode;
 
 /// What comes of a run.
 #[derive(Debug)]

@@ -7,9 +7,10 @@ use crate::common::{
 use hil_sim::scenario::{Direction, Scenario};
 use hil_sim::testing::long;
 use interstage::estimate::ContactStage as Stage;
-use interstage::log::Event;
+use interstage::fault::Fault;
 use interstage::sense::raw::SensorFrame;
-use interstage::supervise::{Command, Fault, Leg, Mode, Trigger, next};
+use interstage::supervise::{Command, Leg, Mode, Trigger, next};
+use interstage::tick::Event;
 
 /// Where in a run something happens.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -222,8 +223,8 @@ fn assert_sound_records(bench: &Bench, scenario: &Scenario, name: &str) {
         assert!(residual.abs() < 0.5, "{name}: {record:?}");
         let mut way = scenario.clone();
         way.run.direction = match record.direction {
-            interstage::supervise::Direction::Deploy => Direction::Deploy,
-            interstage::supervise::Direction::Retract => Direction::Retract,
+            interstage::units::Direction::Deploy => Direction::Deploy,
+            interstage::units::Direction::Retract => Direction::Retract,
         };
         let part = record.gap_measured.to_num::<f64>() / gap_ref(&way);
         assert!((0.65..1.05).contains(&part), "{name}: {part} {record:?}");

@@ -4,7 +4,9 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use interstage::supervise::{Direction, Fault, Limit, Mode, Trigger, next};
+use interstage::fault::{Fault, Limit};
+use interstage::supervise::{Mode, Trigger, next};
+use interstage::units::Direction;
 
 const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/MODES.md");
 
@@ -40,7 +42,7 @@ fn page() -> String {
              | code | fault | cause | detection | reset |\n|---|---|---|---|---|\n";
     let mut reactions = BTreeMap::<&str, Vec<String>>::new();
     for fault in Fault::ALL {
-        let (code, sentence, account) = (fault.code(), fault.sentence(), fault.account());
+        let (code, sentence, account) = (fault.code(), fault.sentence(), fault.description());
         let (cause, detection, reset) = (account.cause, account.detection, account.reset);
         let _ = writeln!(page, "| {code} | {sentence} | {cause} | {detection} | {reset} |");
         reactions.entry(account.reaction).or_default().push(code.to_string());
@@ -52,7 +54,7 @@ fn page() -> String {
     page += "\n## Limits, active\n\nReported and acted on; gone when their cause is gone.\n\n\
              | code | limit | reaction | until |\n|---|---|---|---|\n";
     for limit in Limit::ALL {
-        let (reaction, until) = limit.account();
+        let (reaction, until) = limit.description();
         let (code, sentence) = (limit.code(), limit.sentence());
         let _ = writeln!(page, "| {code} | {sentence} | {reaction} | {until} |");
     }

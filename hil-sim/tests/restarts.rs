@@ -4,8 +4,9 @@
 use hil_sim::scenario::{Direction, Scenario};
 use hil_sim::sil::{Options, Session};
 use interstage::blackbox::{Reset, Restart};
-use interstage::log::Event;
-use interstage::supervise::{Command, Fault, Limit, Mode};
+use interstage::fault::{Fault, Limit};
+use interstage::supervise::{Command, Mode};
+use interstage::tick::Event;
 use interstage::units::Millimetres;
 use rayon::prelude::*;
 

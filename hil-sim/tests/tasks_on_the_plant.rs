@@ -24,16 +24,17 @@ use hil_sim::plant::sensors::{Codes, Sensors};
 use hil_sim::scenario::{Direction, Scenario};
 use hil_sim::sil;
 use interstage::blackbox::Flight;
-use interstage::control::Controller;
+use interstage::fault::Fault;
 use interstage::hal::{
-    AnalogInput, AngleBus, CommandSource, Indicator, Journal, Light, MotorCommand, Motors,
-    Watchdog, WheelEncoder,
+    AnalogInput, AngleBus, CommandSource, Indicator, Journal, Light, Motors, Watchdog, WheelEncoder,
 };
-use interstage::log::{CrossingRecord, Entry, Event, Identity, Scribe, Telemetry};
+use interstage::log::{Identity, Scribe};
 use interstage::model::Planner;
 use interstage::sense::raw::{AdcCode, AngleFrame, BridgeCodes, BusFault, EncoderCount};
-use interstage::supervise::{Command, Fault, Mode};
+use interstage::supervise::{Command, Mode};
 use interstage::tasks::{self, Exchange, Station};
+use interstage::tick::{Controller, CrossingRecord, Entry, Event, Telemetry};
+use interstage::units::MotorCommand;
 
 /// The clock is one for the whole process: one board at a time.
 static CLOCK: Mutex<()> = Mutex::new(());

@@ -3,8 +3,10 @@
 use serde::{Deserialize, Serialize};
 
 use super::{FLIGHT_WORDS, Late, check};
-use crate::log::{Telemetry, number};
+use crate::estimate::PositionConfidence;
+use crate::log::number;
 use crate::supervise::Mode;
+use crate::tick::Telemetry;
 use crate::units::{Millimetres, MillimetresPerSecond, Q16, Tick};
 
 /// Reference of the speed in a tick, signed outwards, in 1/32 mm/s, and in the last bit
@@ -35,17 +37,6 @@ impl Pace {
     pub const fn placed(self) -> bool {
         self.0 & 1 != 0
     }
-}
-
-/// How far a position is to be trusted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Trust {
-    /// Not at all: where on its wall the wheel stands is a guess.
-    Guess,
-    /// It is that of a record which may be off, and no step found since confirms it.
-    Unsure,
-    /// It counts from the stow end, or from a step.
-    Sure,
 }
 
 /// What the drive was doing in a tick.
@@ -127,7 +118,7 @@ pub struct Recorder {
 
 impl Recorder {
     /// What is to be kept of a tick, in which the position was to be trusted so far.
-    pub fn flight(&mut self, row: &Telemetry, trust: Trust, late: Late) -> Flight {
+    pub fn flight(&mut self, row: &Telemetry, trust: PositionConfidence, late: Late) -> Flight {
         if row.mode != self.mode {
             self.mode = row.mode;
             self.number = number::of_mode(row.mode);
@@ -139,10 +130,10 @@ impl Recorder {
             tick: row.at,
             position: row.position,
             mode: self.number,
-            level: row.level | if trust == Trust::Unsure { Flight::UNSURE } else { 0 },
+            level: row.level | if trust == PositionConfidence::Unsure { Flight::UNSURE } else { 0 },
             fault: self.fault,
             late,
-            pace: Pace::of(row.speed_ref, trust != Trust::Guess),
+            pace: Pace::of(row.speed_ref, trust != PositionConfidence::Guess),
         }
     }
 }

@@ -5,7 +5,8 @@ use core::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::{Crash, Flight, Pace, Stopped};
-use crate::supervise::Fault;
+use crate::estimate::Place;
+use crate::fault::Fault;
 use crate::units::{Millimetres, Tick, ticks_to_seconds};
 
 /// What the chip says about why it started.
@@ -46,17 +47,6 @@ pub struct Restart {
     pub flight: Option<Flight>,
     /// What stopped the program, if something did.
     pub crash: Option<Crash>,
-}
-
-/// Where a wheel stands by the record of the run before.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Place {
-    /// Axial position, mm.
-    pub position: Millimetres,
-    /// The bridges were off as soon as the record ends, and the start came right behind it:
-    /// what is added is the coasting. If not, a drive went on that nobody watched, or the
-    /// supply was away for nobody knows how long.
-    pub sure: bool,
 }
 
 /// Ticks for which the wheel goes on at its speed after the record: what is left of the

@@ -1,9 +1,11 @@
 //! Records as words, and what a start makes of them.
 
 use super::*;
-use crate::log::Telemetry;
-use crate::supervise::{Direction, Fault, Leg, Mode};
-use crate::units::Q16;
+use crate::estimate::PositionConfidence;
+use crate::fault::Fault;
+use crate::supervise::{Leg, Mode};
+use crate::tick::Telemetry;
+use crate::units::{Direction, Q16};
 use proptest::prelude::*;
 
 fn flight() -> impl Strategy<Value = Flight> {
@@ -173,19 +175,25 @@ fn what_a_start_keeps_is_where_the_wheel_came_to_rest_and_unsure() {
 fn the_last_fault_is_kept_beyond_its_hold() {
     let mut recorder = Recorder::default();
     let mut row = Telemetry { at: 5, level: 2, position: Q16::from_num(41), ..Telemetry::EMPTY };
-    assert_eq!(recorder.flight(&row, Trust::Sure, Late::NOBODY).mode(), Some(Mode::Boot));
+    assert_eq!(
+        recorder.flight(&row, PositionConfidence::Sure, Late::NOBODY).mode(),
+        Some(Mode::Boot)
+    );
     row.mode = Mode::Run(Direction::Deploy, Leg::Crossing);
-    let flight = recorder.flight(&row, Trust::Sure, Late::TICK);
+    let flight = recorder.flight(&row, PositionConfidence::Sure, Late::TICK);
     assert_eq!((flight.mode(), flight.fault), (Some(row.mode), 0));
     assert_eq!((flight.tick, flight.level, flight.position), (5, 2, row.position));
     assert_eq!(flight.late, Late::TICK);
     assert!(flight.pace.placed());
-    let unsure = recorder.flight(&row, Trust::Unsure, Late::TICK);
+    let unsure = recorder.flight(&row, PositionConfidence::Unsure, Late::TICK);
     assert_eq!(unsure, Flight { level: Flight::UNSURE | 2, ..flight });
     row.mode = Mode::FaultHold(Fault::DriveStalled);
-    assert_eq!(recorder.flight(&row, Trust::Guess, Late::NOBODY).mode(), Some(row.mode));
+    assert_eq!(
+        recorder.flight(&row, PositionConfidence::Guess, Late::NOBODY).mode(),
+        Some(row.mode)
+    );
     row.mode = Mode::Idle;
-    let flight = recorder.flight(&row, Trust::Guess, Late::NOBODY);
+    let flight = recorder.flight(&row, PositionConfidence::Guess, Late::NOBODY);
     assert!(!flight.pace.placed());
     assert_eq!((flight.mode(), flight.fault), (Some(Mode::Idle), 122));
 }

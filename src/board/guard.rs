@@ -4,7 +4,8 @@ use embassy_stm32::Peri;
 use embassy_stm32::pac;
 use embassy_stm32::peripherals::IWDG;
 use embassy_stm32::wdg::IndependentWatchdog;
-use interstage::blackbox::{Flight, Place, Reset};
+use interstage::blackbox::{Flight, Reset};
+use interstage::estimate::Place;
 use interstage::hal::Watchdog;
 
 use super::blackbox;

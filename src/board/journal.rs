@@ -3,10 +3,11 @@
 use defmt::{error, info, warn};
 use interstage::estimate::ContactStage;
 use interstage::hal::Journal;
+use interstage::log::Identity;
 use interstage::log::frame::Checker;
-use interstage::log::{CrossingRecord, Entry, Event, Identity};
-use interstage::supervise::{Command, Direction, Leg, Mode};
-use interstage::units::Q16;
+use interstage::supervise::{Command, Leg, Mode};
+use interstage::tick::{CrossingRecord, Entry, Event};
+use interstage::units::{Direction, Q16};
 
 use super::Checksum;
 use super::rtt::{self, Frames};

@@ -13,8 +13,8 @@ use serde::{Deserialize, Serialize};
 
 use super::number;
 use super::record::Record;
-use crate::supervise::{Direction, Leg, Mode};
-use crate::units::{Millimetres, Q16, Tick, q16};
+use crate::supervise::{Leg, Mode};
+use crate::units::{Direction, Millimetres, Q16, Tick, q16};
 
 /// Ticks from one shot to the next.
 pub const EVERY: u32 = 10;
@@ -203,7 +203,7 @@ const _: () = assert!(CLOSE.to_bits() < Q16::ONE.to_bits());
 #[allow(clippy::float_arithmetic, reason = "positions of the test")]
 mod tests {
     use super::*;
-    use crate::supervise::Fault;
+    use crate::fault::Fault;
 
     const CORNER: Millimetres = q16(13_500_000);
 

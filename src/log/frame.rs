@@ -16,12 +16,12 @@ use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use serde::Deserialize;
 
 use super::capture::Shots;
-use super::entry::Entry;
 use super::identity::Identity;
 use super::ledger::Line;
 use super::record::Record;
 use super::wire::Wire;
 use crate::model::{Plan, PlanRequest};
+use crate::tick::Entry;
 use crate::units::Tick;
 
 /// Longest frame on the channel, bytes.

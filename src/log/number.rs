@@ -2,7 +2,9 @@
 //! given a second meaning.
 
 use crate::estimate::ContactStage;
-use crate::supervise::{Command, Direction, Fault, Mode};
+use crate::fault::Fault;
+use crate::supervise::{Command, Mode};
+use crate::units::Direction;
 
 /// Number of a mode: its place in [`Mode::WITHOUT_FAULT`], or the code of the fault that
 /// is held, 101 to 160. Called every tick, so that it does not look for that place.

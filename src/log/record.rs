@@ -2,14 +2,13 @@
 //! that a host can run it again and compare bits.
 
 use super::number;
-use super::telemetry::Telemetry;
-use crate::control::{Input, Output};
-use crate::hal::MotorCommand;
 use crate::sense::raw::{
     AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
 };
 use crate::supervise::Command;
-use crate::units::Tick;
+use crate::tick::Telemetry;
+use crate::tick::{Input, Output};
+use crate::units::{MotorCommand, Tick};
 
 /// Age of a code that was taken at its tick, and so the farthest ahead that one may be.
 const NOW: u32 = 8;
@@ -255,9 +254,8 @@ fn unpack<T>(
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::hal::Duty;
     use crate::supervise::Mode;
-    use crate::units::Q16;
+    use crate::units::{Duty, Q16};
     use proptest::prelude::*;
 
     /// Any record that a tick can leave.

@@ -1,11 +1,11 @@
 //! From the tape to frames: the journal's part of the binary log.
 
 use super::capture::Capture;
-use super::entry::{Entry, Event};
 use super::frame::{self, Checker, Head, Kind, Page, put_ticks};
 use super::identity::Identity;
 use super::ledger::Ledger;
 use super::tape::Tape;
+use crate::tick::{Entry, Event};
 use crate::units::Tick;
 use serde::Serialize;
 
@@ -144,14 +144,16 @@ impl Scribe {
 mod tests {
     use super::super::capture::{IN_FRAME, Shot, Shots, Trigger};
     use super::super::frame::{Body, Frame};
+    use super::super::identity;
     use super::super::ledger::tests::crossing;
     use super::super::record::Record;
-    use super::super::{CrossingRecord, identity};
     use super::*;
-    use crate::control::{Input, Output};
+    use crate::fault::Limit;
     use crate::model::{Outcome, Plan, PlanRequest, Review};
-    use crate::supervise::{Direction, Limit, Mode};
-    use crate::units::Q16;
+    use crate::supervise::Mode;
+    use crate::tick::CrossingRecord;
+    use crate::tick::{Input, Output};
+    use crate::units::{Direction, Q16};
 
     /// A channel that keeps what it is sent, as long as it has room.
     #[derive(Default)]

@@ -8,9 +8,9 @@ use embassy_sync::signal::Signal;
 use heapless::Vec;
 
 use super::record::Record;
-use super::telemetry::Telemetry;
-use crate::control::{Input, Output};
 use crate::model::{Plan, PlanRequest};
+use crate::tick::Telemetry;
+use crate::tick::{Input, Output};
 use crate::units::Tick;
 
 /// Ticks that the tape holds: 16 ms, in which the journal must get the processor. What

@@ -10,9 +10,8 @@
 
 use super::number;
 use super::record::{Flags, Record};
-use super::telemetry::Telemetry;
-use crate::hal::Duty;
-use crate::units::Q16;
+use crate::tick::Telemetry;
+use crate::units::{Duty, Q16};
 
 /// Numbers of a record that are written as differences, behind the tick.
 const NUMBERS: usize = 12;

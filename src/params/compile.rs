@@ -5,9 +5,9 @@ use core::fmt;
 use serde::Serialize;
 
 use super::set::{Header, MAX_NAME, SCHEMA, checksum};
-use crate::control::Controller;
 use crate::model::Planner;
 use crate::rig::{Rig, RigError};
+use crate::tick::Controller;
 
 /// Why no set could be made.
 #[derive(Clone, Debug, PartialEq)]

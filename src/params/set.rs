@@ -11,13 +11,13 @@ use core::fmt;
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use serde::{Deserialize, Serialize};
 
-use crate::control::Controller;
 use crate::model::Planner;
 use crate::rig::Rig;
+use crate::tick::Controller;
 
 /// Layout of the constants. Raised with every change of a type that a set holds; a set
 /// of another number is not read but refused, and the host makes it anew from its rig.
-pub const SCHEMA: u16 = 4;
+pub const SCHEMA: u16 = 5;
 
 /// Longest name of a set, bytes.
 pub const MAX_NAME: usize = 24;

@@ -5,13 +5,13 @@ use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
 use super::beat::{CLOCKS, PERIODS, Pulse, Turn};
 use crate::blackbox::Late;
-use crate::control::{Input, Output};
 use crate::hal::Light;
-use crate::log::{Entry, Tape, Telemetry};
+use crate::log::Tape;
 use crate::model::{Plan, PlanRequest};
 use crate::sense::freshness::age;
 use crate::sense::raw::{AdcCode, AngleFrame, EncoderCount, Sample, SensorFrame};
 use crate::supervise::{Command, Mode};
+use crate::tick::{Entry, Input, Output, Telemetry};
 use crate::units::Tick;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -378,8 +378,9 @@ const fn light_of(mode: Mode) -> Light {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::log::Event;
-    use crate::supervise::{Direction, Fault};
+    use crate::fault::Fault;
+    use crate::tick::Event;
+    use crate::units::Direction;
 
     const ALWAYS: [Station; 6] = [
         Station::Speed,

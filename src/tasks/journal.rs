@@ -3,7 +3,8 @@
 use super::ROUND;
 use super::exchange::{ENTRIES, Exchange, Station};
 use crate::hal::{Indicator, Journal, Light};
-use crate::log::{Entry, Event, Scribe};
+use crate::log::Scribe;
+use crate::tick::{Entry, Event};
 use embassy_futures::select::{Either, select};
 use embassy_time::with_deadline;
 

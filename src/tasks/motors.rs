@@ -4,8 +4,9 @@ use super::beat::Beat;
 use super::exchange::Exchange;
 use super::tape::{Latest, Turn};
 use crate::blackbox::Recorder;
-use crate::control::{Controller, State};
-use crate::hal::{MotorCommand, Motors, Watchdog};
+use crate::hal::{Motors, Watchdog};
+use crate::tick::{Controller, State};
+use crate::units::MotorCommand;
 
 /// Runs the control tick at 1 kHz: latest codes, command and plan in; bridges,
 /// request and log entries out. Feeds the watchdog while every task is alive, and keeps
@@ -23,7 +24,7 @@ pub async fn motors(
     exchange: &Exchange,
 ) -> ! {
     motors.apply(MotorCommand::OFF, MotorCommand::OFF);
-    let mut state = State::standing(watchdog.place());
+    let mut state = State::restored(watchdog.place());
     let mut recorder = Recorder::default();
     let mut beat = Beat::<1>::new();
     loop {
@@ -45,7 +46,7 @@ pub async fn motors(
         }
         exchange.publish(output);
         let late = exchange.late(due.tick);
-        watchdog.keep(&recorder.flight(&output.telemetry, state.trust(), late));
+        watchdog.keep(&recorder.flight(&output.telemetry, state.confidence(), late));
         if late.is_nobody() {
             watchdog.feed();
         }

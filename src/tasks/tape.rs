@@ -5,7 +5,7 @@ use core::future::poll_fn;
 use core::task::{Poll, Waker};
 
 use super::exchange::Exchange;
-use crate::control::{Input, Output};
+use crate::tick::{Input, Output};
 
 /// What the latest tick was given and gave: the tick fills it, and [`tape()`] takes it down
 /// before the next one. Both run on one executor, so that neither finds it in use.

@@ -14,15 +14,15 @@ use std::task::{Context, Poll, Wake, Waker};
 use embassy_time::{Duration, Instant, MockDriver, Timer};
 use interstage::blackbox::Flight;
 use interstage::hal::{
-    AnalogInput, AngleBus, CommandSource, Indicator, Journal, Light, MotorCommand, Motors,
-    Watchdog, WheelEncoder,
+    AnalogInput, AngleBus, CommandSource, Indicator, Journal, Light, Motors, Watchdog, WheelEncoder,
 };
-use interstage::log::Entry;
 use interstage::rig::Rig;
 use interstage::sense::raw::{
     AdcCode, AngleFrame, BridgeCode, BridgeCodes, BusFault, EncoderCount,
 };
 use interstage::supervise::{Command, Lag};
+use interstage::tick::Entry;
+use interstage::units::MotorCommand;
 
 /// The clock is one for the whole process: one bench at a time.
 static CLOCK: Mutex<()> = Mutex::new(());

@@ -7,9 +7,9 @@
 mod parameters;
 
 use interstage::blackbox::{CRASH_WORDS, FLIGHT_WORDS, Flight, later};
-use interstage::control::Output;
-use interstage::log::{Entry, Event};
-use interstage::supervise::{Command, Limit, Mode};
+use interstage::fault::Limit;
+use interstage::supervise::{Command, Mode};
+use interstage::tick::{Entry, Event, Output};
 use interstage::units::Q16;
 
 use super::super::judge::{Finding, Judge};

@@ -8,7 +8,8 @@ mod reset_board;
 
 use hil_sim::scenario::Scenario;
 use interstage::blackbox::{Late, Reset, Restart, Stopped};
-use interstage::supervise::{Direction, Mode};
+use interstage::supervise::Mode;
+use interstage::units::Direction;
 use rig_board::bench::STEP;
 use rig_board::core::Register;
 use rig_board::faults::Fault;

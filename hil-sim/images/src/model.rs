@@ -9,7 +9,7 @@ use interstage::model::felt::{self, FAST_DEGREE, Kind, RUN_DEGREE, RUN_END};
 use interstage::model::formula::{Formula, LEAST_RUN};
 use interstage::model::reduced::{self, ReducedModel, Scale};
 use interstage::rig::Rig;
-use interstage::supervise::Direction;
+use interstage::units::Direction;
 use interstage::units::Q16;
 
 use crate::number::Number;

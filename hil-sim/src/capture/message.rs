@@ -2,7 +2,7 @@
 //! network.
 
 use interstage::blackbox::Reset;
-use interstage::log::{Entry, Event};
+use interstage::tick::{Entry, Event};
 use serde::Serialize;
 
 use crate::export::json;

@@ -5,7 +5,7 @@ use interstage::model::felt::Kind;
 use interstage::model::formula::{Formula, LEAST_RUN};
 use interstage::model::reduced::{Point, ReducedModel, Scale};
 use interstage::rig::Rig;
-use interstage::supervise::Direction;
+use interstage::units::Direction;
 use interstage::units::Q16;
 use serde::Serialize;
 

@@ -3,11 +3,11 @@
 use std::collections::VecDeque;
 use std::time::Instant;
 
-use interstage::control::Output;
 use interstage::hil::{FIRST, Given};
-use interstage::log::{Entry, Event, Identity, Record, identity};
+use interstage::log::{Identity, Record, identity};
 use interstage::model::Planner;
 use interstage::supervise::Mode;
+use interstage::tick::{Entry, Event, Output};
 use interstage::units::Tick;
 
 use super::{HilError, HostLine};

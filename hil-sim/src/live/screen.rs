@@ -10,8 +10,8 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph};
 
 use interstage::blackbox::Reset;
-use interstage::log::{Entry, Event};
 use interstage::supervise::Mode;
+use interstage::tick::{Entry, Event};
 
 use crate::capture::{View, mode_name};
 use crate::log::{Item, Row, Tally};

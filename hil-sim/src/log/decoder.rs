@@ -8,9 +8,10 @@ use interstage::log::capture::Shots;
 use interstage::log::frame::{Body, Frame, Seen, look};
 use interstage::log::identity::SCHEMA;
 use interstage::log::ledger::Line;
-use interstage::log::{Entry, Identity, Record};
+use interstage::log::{Identity, Record};
 use interstage::model::{Plan, PlanRequest};
 use interstage::sense::raw::SensorFrame;
+use interstage::tick::Entry;
 use serde::{Deserialize, Serialize};
 
 /// What a log says, in its order.
@@ -298,8 +299,8 @@ impl Decoder {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use interstage::control::{Input, Output};
     use interstage::log::{BATCH, Scribe, Tape, identity};
+    use interstage::tick::{Input, Output};
     use proptest::prelude::*;
 
     /// The frames of a target that runs for so many ticks from `from`.

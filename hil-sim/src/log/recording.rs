@@ -5,8 +5,10 @@
 
 use std::path::Path;
 
-use interstage::log::{Event, ledger::Line};
-use interstage::supervise::{Direction, Mode};
+use interstage::log::ledger::Line;
+use interstage::supervise::Mode;
+use interstage::tick::Event;
+use interstage::units::Direction;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 

@@ -1,11 +1,11 @@
 //! A tick with names and units.
 
-use interstage::hal::Duty;
-use interstage::log::{Flags, Record, Telemetry, number};
+use interstage::log::{Flags, Record, number};
 use interstage::sense::raw::{
     AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
 };
-use interstage::units::Q16;
+use interstage::tick::Telemetry;
+use interstage::units::{Duty, Q16};
 use serde::{Deserialize, Serialize};
 
 /// A tick of the controller: what its sensors said, what it made of it, what it did.

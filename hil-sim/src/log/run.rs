@@ -1,10 +1,11 @@
 //! A whole log in memory.
 
 use interstage::blackbox::Restart;
+use interstage::log::Identity;
 use interstage::log::capture::Shots;
 use interstage::log::ledger::Line;
-use interstage::log::{Entry, Event, Identity};
 use interstage::model::{Plan, PlanRequest};
+use interstage::tick::{Entry, Event};
 use serde::{Deserialize, Serialize};
 
 use super::decoder::{Decoder, Item, Mark, Tally};

@@ -1,7 +1,7 @@
 //! What a run adds up to, whatever has run the controller: when it moved, with what
 //! preload, how far apart wheel and wall came, whether it arrived.
 
-use interstage::supervise::Direction;
+use interstage::units::Direction;
 use sha2::{Digest, Sha256};
 
 use super::{CrossingLine, LogLine, Recording, Report, Row, Summary};

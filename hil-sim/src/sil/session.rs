@@ -2,12 +2,11 @@
 //! failures given from outside.
 
 use interstage::blackbox::{Flight, Late, Recorder, Reset, Restart};
-use interstage::control::{Controller, Input, Output, State};
-use interstage::hal::MotorCommand;
 use interstage::model::{Plan, Planner};
 use interstage::sense::raw::{Sample, SensorFrame};
-use interstage::supervise::{Command, Direction, Mode};
-use interstage::units::Tick;
+use interstage::supervise::{Command, Mode};
+use interstage::tick::{Controller, Input, Output, State};
+use interstage::units::{Direction, MotorCommand, Tick};
 
 use super::stream::Stream;
 use super::trace::Trace;
@@ -231,7 +230,7 @@ impl Session {
     /// The record of the last tick, as memory keeps it.
     #[must_use]
     pub fn record(&self) -> Flight {
-        Recorder::default().flight(&self.held.telemetry, self.state.trust(), Late::NOBODY)
+        Recorder::default().flight(&self.held.telemetry, self.state.confidence(), Late::NOBODY)
     }
 
     /// A reset that leaves memory and takes the power from the bridges at once: the
@@ -244,7 +243,7 @@ impl Session {
     /// A start that finds this of the time before it.
     pub fn restart_from(&mut self, restart: Restart) {
         self.reboot();
-        self.state = State::standing(restart.place());
+        self.state = State::restored(restart.place());
         if let Some(stream) = &mut self.stream {
             stream.tell(restart);
         }

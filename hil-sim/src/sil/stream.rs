@@ -2,8 +2,8 @@
 //! decoder serves both.
 
 use interstage::blackbox::Restart;
-use interstage::control::{Controller, Input, Output};
-use interstage::log::{BATCH, Entry, Event, Identity, Scribe, Tape, identity};
+use interstage::log::{BATCH, Identity, Scribe, Tape, identity};
+use interstage::tick::{Controller, Entry, Event, Input, Output};
 
 use crate::scenario::Scenario;
 

@@ -1,9 +1,7 @@
 //! What is kept of a run while it goes on.
 
-use interstage::control::Output;
-use interstage::log::{CrossingRecord, Event, Telemetry};
-use interstage::supervise::Direction;
-use interstage::units::Q16;
+use interstage::tick::{CrossingRecord, Event, Output, Telemetry};
+use interstage::units::{Direction, Q16};
 use sha2::{Digest, Sha256};
 
 use super::{Reported, TICK_S, report};

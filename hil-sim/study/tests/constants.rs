@@ -11,7 +11,7 @@ use hil_sim::plant::ring::RingParameters;
 use interstage::model::felt::Kind;
 use interstage::model::formula::Formula;
 use interstage::rig::Rig;
-use interstage::supervise::Direction;
+use interstage::units::Direction;
 use rayon::prelude::*;
 use rig_study::constants::data::{self, Row};
 use rig_study::constants::design::Use;

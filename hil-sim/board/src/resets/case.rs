@@ -1,7 +1,7 @@
 //! One reset: the run up to it, the hold behind it, the command and what came of it.
 
 use interstage::blackbox::{Reset, Restart, Stopped};
-use interstage::log::Event;
+use interstage::tick::Event;
 use serde::Serialize;
 
 use super::ResetError;
@@ -253,8 +253,8 @@ const fn other(way: Direction) -> Direction {
     }
 }
 
-/// Code of [`interstage::supervise::Fault::PositionUnknown`].
-const POSITION_UNKNOWN: u16 = interstage::supervise::Fault::PositionUnknown.code();
+/// Code of [`interstage::fault::Fault::PositionUnknown`].
+const POSITION_UNKNOWN: u16 = interstage::fault::Fault::PositionUnknown.code();
 
 impl Case {
     /// Makes it; `place` is what the flash holds of parameters, `watch` sees the log.

@@ -5,8 +5,8 @@
 //! Gap, embedding depth and contact area are what the sensors say; forces and arm
 //! vibration, for which the rig has no sensor, are what the plant did.
 
-use interstage::log::Event;
 use interstage::supervise::{Command, Mode};
+use interstage::tick::Event;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;

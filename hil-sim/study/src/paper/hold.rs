@@ -3,7 +3,7 @@
 
 use interstage::model::formula::Formula;
 use interstage::rig::Rig;
-use interstage::supervise::Direction;
+use interstage::units::Direction;
 
 use super::case::{Case, Loads};
 use super::course::Points;

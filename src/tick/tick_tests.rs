@@ -1,11 +1,16 @@
 //! Tests of the control tick.
 
+use super::drive::LEVEL_SLOPE;
 use super::*;
+use crate::control::schedule::Targets;
+use crate::estimate::ContactStage;
+use crate::estimate::crossing::Contact;
+pub(super) use crate::estimate::sensed;
 use crate::rig::Rig;
+use crate::sense::Validity;
 use crate::sense::raw::{BridgeCode, BridgeCodes};
-use crate::sense::{SensesState, Validity};
-use crate::supervise::{Fault, Leg};
-use crate::units::per_tick;
+use crate::supervise::Leg;
+use crate::units::{Direction, per_tick, q16};
 use proptest::prelude::*;
 
 /// With a stiff spring, whose pre-tightener follows at 6 mm/s of rise.
@@ -45,37 +50,15 @@ proptest! {
     }
 }
 
-/// What the senses say of a wheel on this level, so much off its wall by the table and so
-/// deep in its tread, mm.
-pub(super) fn sensed(level: u8, off: f64, compression: f64) -> SensedState {
-    let rig = Rig::prototype();
-    let senses = Senses::try_build(&rig).expect("sound");
-    let nothing = SensorFrame::default();
-    let mut sensed = senses.step(&mut SensesState::default(), 0, &nothing, Q16::ZERO);
-    sensed.level = level;
-    let wall = rig.centre_radius_mm(usize::from(level));
-    sensed.radius.value = Q16::from_num(wall + off + compression);
-    sensed.compression_filtered = Q16::from_num(compression);
-    sensed
-}
-
-/// Does something at this position.
-pub(super) fn at<T>(
+/// Does something in a tick with these readings.
+pub(super) fn within<T>(
     sensed: &SensedState,
-    position: f64,
-    act: impl FnOnce(&Controller, &mut Pass<'_>) -> T,
+    act: impl FnOnce(&Controller, &mut TickContext<'_>) -> T,
 ) -> T {
     let controller = Controller::try_build(&Rig::prototype()).expect("sound");
     let mut output = Output::default();
-    let position = Q16::from_num(position);
-    act(&controller, &mut Pass { now: 0, sensed, position, wedge: Q16::ZERO, output: &mut output })
-}
-
-#[test]
-fn a_crossing_runs_over_a_quarter_of_a_turn_s_chord() {
-    // Of a rigid wheel of 25 mm that touches the edge of a step of 4 mm.
-    let reach = stiff().corner_reach().to_num::<f64>();
-    assert!((reach - (25.0f64 * 25.0 - 21.0 * 21.0).sqrt()).abs() < 1e-3, "{reach}");
+    let (arm_thrust, output) = (Q16::ZERO, &mut output);
+    act(&controller, &mut TickContext { now: 0, sensed, arm_thrust, trigger: None, output })
 }
 
 #[test]
@@ -96,7 +79,7 @@ fn a_reset_right_after_a_fault_is_refused() {
         let mut state = State::default();
         state.mode = Mode::FaultHold(Fault::TickOverrun);
         state.in_mode = ticks;
-        let events = at(&idle, 0.0, |controller, pass| {
+        let events = within(&idle, |controller, pass| {
             controller.take_command(&mut state, pass, Some(Command::Reset));
             pass.output.events.clone()
         });
@@ -105,20 +88,6 @@ fn a_reset_right_after_a_fault_is_refused() {
         let refused = events.iter().any(|e| e.event == Event::Refused(Command::Reset));
         assert_eq!(refused, !taken, "{ticks}");
     }
-}
-
-#[test]
-fn a_face_is_ahead_until_the_patch_is_clear_of_it() {
-    at(&sensed(1, 0.0, 0.3), 0.0, |controller, pass| {
-        let state = State::default();
-        let (patch, face, next) = (controller.rise.patch(), q16(18_000_000), q16(40_000_000));
-        pass.position = face + patch - Q16::DELTA;
-        assert_eq!(controller.ahead(&state, pass, Q16::ZERO), Q16::DELTA - patch);
-        pass.position = face + patch;
-        assert_eq!(controller.ahead(&state, pass, Q16::ZERO), next - pass.position);
-        pass.position = q16(75_000_000);
-        assert_eq!(controller.ahead(&state, pass, Q16::ZERO), Q16::MAX);
-    });
 }
 
 #[test]
@@ -132,7 +101,7 @@ fn off_a_run_the_stage_stays_while_there_is_preload() {
         let seen = SensedState { preload_filtered: preload, ..sensed(0, 0.0, 0.3) };
         let mut state = State::default();
         (state.mode, state.stage) = (Mode::Idle, ContactStage::Rolling);
-        let told = at(&seen, 0.0, |controller, pass| {
+        let told = within(&seen, |controller, pass| {
             controller.note_stage(&mut state, pass);
             pass.output.events.len()
         });
@@ -146,9 +115,10 @@ fn only_on_a_corner_the_climb_limits_the_speed() {
     let fast = q16(60_000_000);
     let limited = |contact: Contact| {
         let mut state = State::default();
-        state.watch.contact = contact;
+        state.estimate.watch.contact = contact;
         // Eight millimetres before the face at 18 mm.
-        at(&sensed(0, -2.0, 0.3), 10.0, |_, pass| {
+        state.estimate.position = Q16::from_num(10);
+        {
             let mut targets = Targets {
                 speed: fast,
                 preload: Q16::ZERO,
@@ -157,9 +127,9 @@ fn only_on_a_corner_the_climb_limits_the_speed() {
                 approaching: false,
                 waiting: false,
             };
-            stiff().limit_climb(&state, pass, &mut targets);
+            stiff().limit_climb(&state, &mut targets);
             targets.speed
-        })
+        }
     };
     assert_eq!(limited(Contact::Wall), fast);
     assert!(limited(Contact::Both) < q16(30_000_000));
@@ -210,9 +180,10 @@ fn the_duty_tells_the_load_only_at_a_steady_speed() {
             // Codes that are alive.
             sensed.preload.value = Q16::from_bits((now % 7) as i32);
             sensed.compression.value = sensed.preload.value;
-            let (position, wedge) = (Q16::ZERO, Q16::ZERO);
-            let mut pass = Pass { now, sensed: &sensed, position, wedge, output: &mut output };
-            controller.look_for_faults(&mut state, &mut pass, &input);
+            let (arm_thrust, output) = (Q16::ZERO, &mut output);
+            let mut tick = TickContext { now, sensed: &sensed, arm_thrust, trigger: None, output };
+            controller.look_for_faults(&mut state, &mut tick, &input);
+            controller.transit(&mut state, &mut tick);
             if let Mode::FaultHold(fault) = state.mode { Some(fault) } else { None }
         })
     };

@@ -3,10 +3,10 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use crate::model::formula::Formula;
+use super::formula::Formula;
 use crate::numeric::{Table, checked};
 use crate::rig::{Rig, RigError};
-use crate::supervise::Direction;
+use crate::units::Direction;
 use crate::units::{Millimetres, Q16, Ratio};
 
 /// Tread depth at the corner, as a part of the step height; it varies little over
@@ -18,7 +18,7 @@ const WALL_PART: f64 = 0.08;
 /// Motor force over radial force times the corner's inclination: part of the radial
 /// force comes from traction itself, `1/(cos + u sin)` against `1/cos` at the
 /// utilisation of a crossing.
-const LEAN_PART: f64 = 0.85;
+const DRIVE_SLOPE_PART: f64 = 0.85;
 
 /// Way from touch-down until the corner is free, over that from touch to lift-off.
 const BACK_PART: f64 = 0.3;
@@ -29,11 +29,11 @@ const BACK_PART: f64 = 0.3;
 /// the corner to that on the wall, as a triangle that ends half a patch behind the
 /// edge; from the first touch it runs in with the square of the way.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Rise {
+pub struct CornerProfile {
     slope: Table<97>,
     /// Tangent of the contact's mean inclination: what the climb costs the motor, per
     /// radial force. It runs ahead of the rise by the energy that the tread stores.
-    lean: [Table<65>; 2],
+    drive_slope: [Table<65>; 2],
     /// Distance of first touch, mm.
     touch: Millimetres,
     /// Half the patch on the continuous wall: distance behind the edge at which it is
@@ -41,11 +41,8 @@ pub struct Rise {
     patch: Millimetres,
 }
 
-impl Rise {
+impl CornerProfile {
     /// Profile of a rig.
-    ///
-    /// # Errors
-    /// [`RigError`] if a length is out of range.
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         let (r, h) = (rig.rig.wheel_radius_mm, rig.rig.step_height_mm);
@@ -80,9 +77,9 @@ impl Rise {
         })?;
         // The load passes from wall to corner between first touch and lift-off, and back
         // within a few tenths of that way: the relaxed tread is still deep at the corner.
-        let lean = |ends: f64| {
+        let drive_slope = |ends: f64| {
             Table::build(0.0, touch, |d| {
-                let whole = LEAN_PART * on_corner(d.min(lift));
+                let whole = DRIVE_SLOPE_PART * on_corner(d.min(lift));
                 let part = ((ends - d) / (ends - lift)).clamp(0.0, 1.0);
                 whole * part
             })
@@ -96,14 +93,13 @@ impl Rise {
         let back = lift + BACK_PART * (touch - lift);
         Ok(Self {
             slope,
-            lean: [lean(touch)?, lean(back)?],
+            drive_slope: [drive_slope(touch)?, drive_slope(back)?],
             touch: checked("rig.step_height_mm", touch)?,
             patch: checked("rig.wheel_radius_mm", patch)?,
         })
     }
 
     /// Distance to the face at which the corner may first be felt on this way, mm.
-    #[must_use]
     pub const fn first_contact(&self, direction: Direction) -> Millimetres {
         match direction {
             Direction::Deploy => self.touch,
@@ -112,16 +108,14 @@ impl Rise {
     }
 
     /// Way behind an edge after which the patch is clear of it, mm.
-    #[must_use]
     pub const fn patch(&self) -> Millimetres {
         self.patch
     }
 
     /// Motor force per radial force that a corner `ahead` mm outwards of the centre
     /// costs; zero away from it.
-    #[must_use]
-    pub fn lean(&self, direction: Direction, ahead: Millimetres) -> Ratio {
-        let [out, back] = &self.lean;
+    pub fn drive_slope(&self, direction: Direction, ahead: Millimetres) -> Ratio {
+        let [out, back] = &self.drive_slope;
         if ahead <= Q16::ZERO || ahead >= self.touch {
             return Q16::ZERO;
         }
@@ -133,7 +127,6 @@ impl Rise {
 
     /// Rise per axial way outwards with the face `ahead` mm outwards of the centre,
     /// negative behind the edge; zero away from a corner.
-    #[must_use]
     pub fn slope(&self, ahead: Millimetres) -> Ratio {
         if ahead <= -self.patch || ahead >= self.touch { Q16::ZERO } else { self.slope.eval(ahead) }
     }
@@ -146,10 +139,10 @@ mod tests {
 
     #[test]
     fn the_slope_integrates_to_the_step_height() {
-        let rise = Rise::try_build(&Rig::prototype()).unwrap();
+        let corner = CornerProfile::try_build(&Rig::prototype()).unwrap();
         let mut height = 0.0;
         for i in -8_000..16_000 {
-            height += rise.slope(Q16::from_num(f64::from(i) * 1e-3)).to_num::<f64>() * 1e-3;
+            height += corner.slope(Q16::from_num(f64::from(i) * 1e-3)).to_num::<f64>() * 1e-3;
         }
         assert!((height - 4.0).abs() < 0.2, "{height}");
     }
@@ -157,12 +150,12 @@ mod tests {
     proptest::proptest! {
         #[test]
         fn slopes_are_those_of_a_wheel_whatever_the_distance(bits in proptest::prelude::any::<i32>()) {
-            let rise = Rise::try_build(&Rig::prototype()).unwrap();
+            let corner = CornerProfile::try_build(&Rig::prototype()).unwrap();
             let ahead = Q16::from_bits(bits);
             let within = |x: Ratio| (-0.01..1.0).contains(&x.to_num::<f64>());
-            proptest::prop_assert!(within(rise.slope(ahead)));
+            proptest::prop_assert!(within(corner.slope(ahead)));
             for way in Direction::ALL {
-                proptest::prop_assert!(within(rise.lean(way, ahead)));
+                proptest::prop_assert!(within(corner.drive_slope(way, ahead)));
             }
         }
     }

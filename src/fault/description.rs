@@ -6,7 +6,7 @@ use super::{Fault, Limit};
 
 /// A fault in full.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Account {
+pub struct FaultDescription {
     /// What may have brought it about.
     pub cause: &'static str,
     /// How it is found, and after how long.
@@ -27,14 +27,17 @@ const LOOK: &str = "reset, once the cause is mended; the self-test must pass";
 /// Reset where the position may be wrong.
 const BACK: &str = "reset; then a retraction to the stow end, which sets the position anew";
 
-const fn held(cause: &'static str, detection: &'static str, reset: &'static str) -> Account {
-    Account { cause, detection, reaction: HOLD, reset }
+const fn held(
+    cause: &'static str,
+    detection: &'static str,
+    reset: &'static str,
+) -> FaultDescription {
+    FaultDescription { cause, detection, reaction: HOLD, reset }
 }
 
 impl Fault {
     /// Its account.
-    #[must_use]
-    pub const fn account(self) -> Account {
+    pub const fn description(self) -> FaultDescription {
         match self {
             Self::SpeedStale => held(
                 "encoder cable, counter, or its task; a count that jumps",
@@ -158,7 +161,7 @@ impl Fault {
                 "on a corner the encoder goes farther than any crossing takes",
                 "reset; then the other way",
             ),
-            Self::PositionUnknown => Account {
+            Self::PositionUnknown => FaultDescription {
                 cause: "started between the last step and the end of travel after a reset",
                 detection: "before the start",
                 reaction: STAY,
@@ -167,7 +170,7 @@ impl Fault {
             Self::ModelSilent => {
                 held("model task hung or starved", "no answer within 500 ticks of a request", LOOK)
             }
-            Self::SelfTest => Account {
+            Self::SelfTest => FaultDescription {
                 cause: "wheel turns, or zero of load cell or displacement sensor is off",
                 detection: "within 2 s of boot or reset",
                 reaction: STAY,
@@ -189,8 +192,7 @@ impl Fault {
 
 impl Limit {
     /// What is done while it lasts, and what ends it.
-    #[must_use]
-    pub const fn account(self) -> (&'static str, &'static str) {
+    pub const fn description(self) -> (&'static str, &'static str) {
         match self {
             Self::StepEarly => {
                 ("crosses at crossing speed; the odometry is not moved", "the step is behind")
@@ -238,11 +240,11 @@ mod tests {
     #[test]
     fn every_account_says_something_of_its_own() {
         for fault in Fault::ALL {
-            let Account { cause, detection, reaction, reset } = fault.account();
+            let FaultDescription { cause, detection, reaction, reset } = fault.description();
             for text in [cause, detection, reaction, reset] {
                 assert!(text.len() > 10 && !text.contains('|'), "{fault:?}");
             }
-            let alike = |other: &&Fault| other.account().cause == cause;
+            let alike = |other: &&Fault| other.description().cause == cause;
             assert_eq!(Fault::ALL.iter().filter(alike).count(), 1, "{fault:?}");
         }
     }
@@ -262,7 +264,7 @@ mod tests {
     fn the_page_says_of_each_fault_what_its_account_says() {
         for fault in Fault::ALL {
             let (code, sentence) = (fault.code(), fault.sentence());
-            let Account { cause, detection, reaction, reset } = fault.account();
+            let FaultDescription { cause, detection, reaction, reset } = fault.description();
             let row = format!("| {code} | {sentence} | {cause} | {detection} | {reset} |");
             assert_eq!(PAGE.matches(&row).count(), 1, "{row}");
             let code = code.to_string();
@@ -278,7 +280,7 @@ mod tests {
     fn the_page_says_of_each_limit_what_its_account_says() {
         for limit in Limit::ALL {
             let (code, sentence) = (limit.code(), limit.sentence());
-            let (reaction, until) = limit.account();
+            let (reaction, until) = limit.description();
             let row = format!("| {code} | {sentence} | {reaction} | {until} |");
             assert_eq!(PAGE.matches(&row).count(), 1, "{row}");
             let alike = |other: &&Limit| other.sentence() == sentence;

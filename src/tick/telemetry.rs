@@ -1,9 +1,8 @@
 //! The controller's state as one row a tick.
 
 use crate::estimate::ContactStage;
-use crate::hal::Duty;
 use crate::supervise::Mode;
-use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Tick};
+use crate::units::{Duty, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Tick};
 
 /// All control-rate quantities of one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -1,6 +1,12 @@
 //! Latched faults (codes 100 to 199) and active limits (200 to 299). Codes are
 //! stable: a number is never given a second meaning.
 
+#[cfg(not(target_os = "none"))]
+mod description;
+
+#[cfg(not(target_os = "none"))]
+pub use description::FaultDescription;
+
 /// A latched fault: the drive holds until it is reset.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
@@ -100,13 +106,11 @@ impl Fault {
     ];
 
     /// The stable code.
-    #[must_use]
     pub const fn code(self) -> u16 {
         self as u16
     }
 
     /// One sentence for the operator.
-    #[must_use]
     pub const fn sentence(self) -> &'static str {
         match self {
             Self::SpeedStale => "the wheel encoder stopped answering",
@@ -201,13 +205,11 @@ impl Limit {
     ];
 
     /// The stable code.
-    #[must_use]
     pub const fn code(self) -> u16 {
         self as u16
     }
 
     /// One sentence for the operator.
-    #[must_use]
     pub const fn sentence(self) -> &'static str {
         match self {
             Self::StepEarly => "a corner was met before its window",

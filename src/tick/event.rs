@@ -2,8 +2,9 @@
 
 use crate::blackbox::Restart;
 use crate::estimate::ContactStage;
-use crate::supervise::{Command, Direction, Fault, Limit, Mode};
-use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Ratio, Seconds, Tick};
+use crate::fault::{Fault, Limit};
+use crate::supervise::{Command, Mode};
+use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Ratio, Seconds, Tick};
 
 /// One line of the log.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
