@@ -2,9 +2,11 @@
 //! and failure. `src/board` implements it on the STM32G474, the tests with
 //! mocks, the virtual rig with its plant.
 
-use crate::blackbox::{Flight, Place};
+pub mod hil;
+
 use crate::log::frame::{Checker, check};
 use crate::log::{Entry, Identity};
+use crate::restart::{DriveSnapshot, Place};
 use crate::sense::raw::{AdcCode, AngleFrame, BridgeCodes, BusFault, EncoderCount};
 use crate::supervise::Command;
 
@@ -101,7 +103,7 @@ pub trait Watchdog {
 
     /// Keeps what the drive does in this tick where a restart finds it. A board without
     /// such a place keeps nothing.
-    fn keep(&mut self, flight: &Flight);
+    fn keep(&mut self, snapshot: &DriveSnapshot);
 
     /// Where the wheel stands by what was kept before this start, if that tells.
     fn place(&self) -> Option<Place> {

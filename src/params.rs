@@ -8,6 +8,7 @@
 //! rig to the bit.
 
 mod compile;
+pub mod link;
 pub mod service;
 mod set;
 pub mod slots;

@@ -2,6 +2,7 @@
 
 #[cfg(not(target_os = "none"))]
 mod account;
+pub mod codes;
 mod crosscheck;
 mod fault;
 mod mode;

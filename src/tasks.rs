@@ -28,7 +28,7 @@ mod operator;
 mod sensors;
 mod tape;
 
-pub use exchange::{CHECK_IN_TICKS, COMMANDS, ENTRIES, Exchange, Station};
+pub use exchange::{CHECK_IN_TICKS, COMMANDS, ENTRIES, Exchange, TaskId};
 pub use journal::journal;
 pub use link::link;
 pub use model::model;

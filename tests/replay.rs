@@ -11,11 +11,11 @@
 
 use std::path::Path;
 
-use interstage::blackbox::Restart;
 use interstage::control::{Controller, Input, Output, State};
 use interstage::log::frame::{Body, Frame};
 use interstage::log::{Entry, Event, Record};
 use interstage::model::{Plan, PlanRequest, Planner};
+use interstage::restart::Restart;
 use interstage::rig::Rig;
 use interstage::sense::raw::SensorFrame;
 use interstage::supervise::{Direction, Fault, Mode};

@@ -5,7 +5,7 @@ mod common;
 use common::{Bench, Operator, Record, forever};
 use embassy_time::Duration;
 use interstage::hal::Light;
-use interstage::log::{Entry, Event, Identity, Scribe};
+use interstage::log::{Entry, Event, Identity, LogEncoder};
 use interstage::model::{PlanRequest, Planner};
 use interstage::rig::Rig;
 use interstage::supervise::{Command, Direction};
@@ -129,7 +129,7 @@ fn entries_are_written_in_their_order() {
     let (exchange, written) = (forever(Exchange::new()), Record::<Entry>::default());
     let (journal, light) = (written.clone(), Record::<Light>::default());
     bench.spawn(async {
-        let mut scribe = Scribe::new(Identity::NOBODY);
+        let mut scribe = LogEncoder::new(Identity::NOBODY);
         tasks::journal(journal, light, &mut scribe, exchange).await
     });
     for at in 0..ENTRIES as u32 {
@@ -149,7 +149,7 @@ fn entries_that_do_not_fit_are_counted_and_the_others_kept() {
     let (exchange, written) = (forever(Exchange::new()), Record::<Entry>::default());
     let (journal, light) = (written.clone(), Record::<Light>::default());
     bench.spawn(async {
-        let mut scribe = Scribe::new(Identity::NOBODY);
+        let mut scribe = LogEncoder::new(Identity::NOBODY);
         tasks::journal(journal, light, &mut scribe, exchange).await
     });
     bench.poll();
@@ -175,7 +175,7 @@ fn the_light_is_set_when_it_changes_and_only_then() {
     let (exchange, shown) = (forever(Exchange::new()), Record::<Light>::default());
     let (journal, light) = (Record::<Entry>::default(), shown.clone());
     bench.spawn(async {
-        let mut scribe = Scribe::new(Identity::NOBODY);
+        let mut scribe = LogEncoder::new(Identity::NOBODY);
         tasks::journal(journal, light, &mut scribe, exchange).await
     });
     bench.run_ms(100);

@@ -5,39 +5,39 @@ mod common;
 use common::{Answer, Bench, Sensor, forever};
 use embassy_time::Duration;
 use interstage::sense::raw::{AdcCode, AngleFrame, BusFault, EncoderCount, Sample};
-use interstage::tasks::{self, Exchange, SENSOR_TIMEOUT, Station};
+use interstage::tasks::{self, Exchange, SENSOR_TIMEOUT, TaskId};
 
 /// Spawns one sensor's task on its part of the exchange.
-fn spawn(bench: &mut Bench, sensor: &Sensor, station: Station, exchange: &'static Exchange) {
+fn spawn(bench: &mut Bench, sensor: &Sensor, station: TaskId, exchange: &'static Exchange) {
     let sensor = sensor.clone();
     match station {
-        Station::Speed => bench.spawn(async { tasks::speed(sensor, exchange).await }),
-        Station::Pressure => bench.spawn(async { tasks::pressure(sensor, exchange).await }),
-        Station::Displacement => {
+        TaskId::Speed => bench.spawn(async { tasks::speed(sensor, exchange).await }),
+        TaskId::Pressure => bench.spawn(async { tasks::pressure(sensor, exchange).await }),
+        TaskId::Displacement => {
             bench.spawn(async { tasks::displacement(sensor, exchange).await });
         }
-        Station::Angle => bench.spawn(async { tasks::angle(sensor, exchange).await }),
+        TaskId::Angle => bench.spawn(async { tasks::angle(sensor, exchange).await }),
         other => panic!("{other:?} is not a sensor"),
     }
 }
 
 /// Time of the latest sample of a sensor.
-fn latest(exchange: &Exchange, station: Station) -> Option<u32> {
+fn latest(exchange: &Exchange, station: TaskId) -> Option<u32> {
     let frame = exchange.sensors();
     match station {
-        Station::Speed => frame.wheel.map(|sample| sample.at),
-        Station::Pressure => frame.load_cell.map(|sample| sample.at),
-        Station::Displacement => frame.tread.map(|sample| sample.at),
-        Station::Angle => frame.arm.map(|sample| sample.at),
+        TaskId::Speed => frame.wheel.map(|sample| sample.at),
+        TaskId::Pressure => frame.load_cell.map(|sample| sample.at),
+        TaskId::Displacement => frame.tread.map(|sample| sample.at),
+        TaskId::Angle => frame.arm.map(|sample| sample.at),
         other => panic!("{other:?} is not a sensor"),
     }
 }
 
-const SENSORS: [(Station, u32); 4] =
-    [(Station::Speed, 1), (Station::Pressure, 1), (Station::Displacement, 1), (Station::Angle, 2)];
+const SENSORS: [(TaskId, u32); 4] =
+    [(TaskId::Speed, 1), (TaskId::Pressure, 1), (TaskId::Displacement, 1), (TaskId::Angle, 2)];
 
 /// Those that can fail: a counter cannot.
-const BUSES: [(Station, u32); 3] = [SENSORS[1], SENSORS[2], SENSORS[3]];
+const BUSES: [(TaskId, u32); 3] = [SENSORS[1], SENSORS[2], SENSORS[3]];
 
 #[test]
 fn each_sensor_is_read_at_its_own_rate() {
@@ -124,8 +124,8 @@ fn a_hang_of_one_sensor_leaves_the_others_alone() {
     bench.run_ms(10);
     sensors[3].answers(Answer::Hang);
     bench.run_ms(50);
-    assert_eq!(latest(exchange, Station::Angle), Some(10));
-    for station in [Station::Speed, Station::Pressure, Station::Displacement] {
+    assert_eq!(latest(exchange, TaskId::Angle), Some(10));
+    for station in [TaskId::Speed, TaskId::Pressure, TaskId::Displacement] {
         assert_eq!(latest(exchange, station), Some(60), "{station:?}");
     }
 }
@@ -156,7 +156,7 @@ fn time_stamps_do_not_depend_on_when_a_task_was_started() {
     bench.run_ms(3);
     embassy_time::MockDriver::get().advance(Duration::from_micros(750));
     let sensor = Sensor::new(7);
-    spawn(&mut bench, &sensor, Station::Angle, exchange);
+    spawn(&mut bench, &sensor, TaskId::Angle, exchange);
     bench.run_ms(10);
     assert_eq!(sensor.reads(), [4, 6, 8, 10, 12]);
 }

@@ -11,7 +11,7 @@ use hil_sim::board::peripherals::flash::Cut;
 use hil_sim::board::peripherals::rcc::Cause;
 use hil_sim::board::rtt::Probe;
 use hil_sim::scenario::Scenario;
-use interstage::link::{Gatherer, ToBoard, ToHost, frame};
+use interstage::params::link::{FrameReader, ToBoard, ToHost, frame};
 use interstage::params::service::{Origin, PIECE, Piece, Request, Response};
 use interstage::params::{MAX_SET, compile};
 use interstage::rig::Rig;
@@ -36,7 +36,7 @@ fn set() -> Vec<u8> {
 struct Board {
     bench: Bench<'static>,
     probe: Probe,
-    gatherer: Gatherer,
+    gatherer: FrameReader,
     number: u16,
 }
 
@@ -46,7 +46,7 @@ impl Board {
         let scenario = Scenario::resolve(Some("prototype"), None, &[]).expect("a scenario");
         let bench = Bench::new(elf(), strings(), &scenario).expect("a bench");
         let probe = Probe::of(bench.machine()).expect("a control block");
-        let mut board = Self { bench, probe, gatherer: Gatherer::new(), number: 0 };
+        let mut board = Self { bench, probe, gatherer: FrameReader::new(), number: 0 };
         board.until_idle();
         board
     }
@@ -78,7 +78,7 @@ impl Board {
         for _ in 0..500 {
             self.bench.step().expect("runs");
             if self.restarts() > before {
-                self.gatherer = Gatherer::new();
+                self.gatherer = FrameReader::new();
                 return None;
             }
             for byte in self.probe.up(self.bench.machine_mut(), UP).expect("runs") {

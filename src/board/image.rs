@@ -3,11 +3,11 @@
 use core::slice;
 
 use embassy_time::{Duration, Timer};
-use interstage::blackbox::Stopped;
-use interstage::pages::seals;
+use interstage::restart::Stopped;
+use interstage::restart::image_checksum;
 
-use super::words::SEALS;
-use super::{blackbox, light};
+use super::flash_page::SEALS;
+use super::{light, retained};
 
 unsafe extern "C" {
     /// The note that the linker writes, see `memory.x`: three words of head, the name
@@ -117,7 +117,7 @@ pub(crate) async fn watch(sealed: u32) -> ! {
         if sum != sealed {
             // Also for the case that what starts anew cannot say it any more.
             say_damaged();
-            blackbox::end(Stopped::Image);
+            retained::end(Stopped::Image);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Log entries: what happened, when.
 
-use crate::blackbox::Restart;
 use crate::estimate::ContactStage;
+use crate::restart::Restart;
 use crate::supervise::{Command, Direction, Fault, Limit, Mode};
 use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Ratio, Seconds, Tick};
 

@@ -15,12 +15,12 @@
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use serde::Deserialize;
 
-use super::capture::Shots;
+use super::capture::CaptureChunk;
+use super::delta::DeltaRecord;
 use super::entry::Entry;
 use super::identity::Identity;
 use super::ledger::Line;
 use super::record::Record;
-use super::wire::Wire;
 use crate::model::{Plan, PlanRequest};
 use crate::units::Tick;
 
@@ -67,8 +67,8 @@ pub enum Kind {
     Request = 4,
     /// A log [`Entry`].
     Event = 5,
-    /// A piece of a capture: [`Shots`].
-    Shots = 6,
+    /// A piece of a capture: [`CaptureChunk`].
+    CaptureChunk = 6,
     /// A [`Line`] of the crossings' ledger.
     Ledger = 7,
 }
@@ -81,7 +81,7 @@ impl Kind {
         Self::Plan,
         Self::Request,
         Self::Event,
-        Self::Shots,
+        Self::CaptureChunk,
         Self::Ledger,
     ];
 }
@@ -100,9 +100,9 @@ pub struct Head {
 /// Room for a frame.
 #[derive(Debug)]
 #[repr(align(4))]
-pub struct Page([u8; LONGEST]);
+pub struct FrameBuffer([u8; LONGEST]);
 
-impl Page {
+impl FrameBuffer {
     /// An empty page.
     #[must_use]
     pub const fn new() -> Self {
@@ -136,7 +136,7 @@ impl Page {
     }
 }
 
-impl Default for Page {
+impl Default for FrameBuffer {
     fn default() -> Self {
         Self::new()
     }
@@ -175,7 +175,7 @@ pub enum Body<'a> {
     /// Something happened.
     Event(Entry),
     /// A piece of a capture.
-    Shots(Shots),
+    CaptureChunk(CaptureChunk),
     /// A crossing was closed.
     Ledger(Line),
     /// Something that this reader does not know.
@@ -245,11 +245,11 @@ impl<'a> Frame<'a> {
         };
         Ok(match kind {
             Kind::Identity => Body::Identity(whole(self.body)?),
-            Kind::Ticks => Body::Ticks(Ticks { before: Wire::default(), rest: self.body }),
+            Kind::Ticks => Body::Ticks(Ticks { before: DeltaRecord::default(), rest: self.body }),
             Kind::Plan => whole(self.body).map(|(at, plan)| Body::Plan(at, plan))?,
             Kind::Request => whole(self.body).map(|(at, request)| Body::Request(at, request))?,
             Kind::Event => Body::Event(whole(self.body)?),
-            Kind::Shots => Body::Shots(whole(self.body)?),
+            Kind::CaptureChunk => Body::CaptureChunk(whole(self.body)?),
             Kind::Ledger => Body::Ledger(whole(self.body)?),
         })
     }
@@ -269,7 +269,7 @@ fn whole<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, FrameError> {
 /// The records of a frame, in their order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ticks<'a> {
-    before: Wire,
+    before: DeltaRecord,
     rest: &'a [u8],
 }
 
@@ -280,7 +280,7 @@ impl Iterator for Ticks<'_> {
         if self.rest.is_empty() {
             return None;
         }
-        let read = Wire::take(&self.before, self.rest).and_then(|(wire, rest)| {
+        let read = DeltaRecord::take(&self.before, self.rest).and_then(|(wire, rest)| {
             let record = wire.record()?;
             (self.before, self.rest) = (wire, rest);
             Some(record)
@@ -295,11 +295,11 @@ impl Iterator for Ticks<'_> {
 /// Makes a body of ticks until it is full or `next` has none; its length.
 #[inline]
 pub(super) fn put_ticks(body: &mut [u8; BODY], mut next: impl FnMut(&mut Record) -> bool) -> usize {
-    let (mut record, mut before, mut length) = (Record::EMPTY, Wire::default(), 0);
+    let (mut record, mut before, mut length) = (Record::EMPTY, DeltaRecord::default(), 0);
     while let Some(room) = body.get_mut(length..).and_then(|rest| rest.first_chunk_mut())
         && next(&mut record)
     {
-        length += Wire::of(&record).put(&mut before, room);
+        length += DeltaRecord::of(&record).put(&mut before, room);
     }
     length
 }
@@ -312,7 +312,7 @@ mod tests {
 
     #[test]
     fn a_page_begins_blank() {
-        assert_eq!(Page::default().0, Page::new().0);
+        assert_eq!(FrameBuffer::default().0, FrameBuffer::new().0);
     }
 
     fn head(kind: Kind, sequence: u32) -> Head {
@@ -322,7 +322,7 @@ mod tests {
     /// A frame of these records, as many as fit, and how many that were.
     fn frame(records: &[Record], sequence: u32) -> (Vec<u8>, usize) {
         let (mut left, mut put) = (records.iter().copied(), 0);
-        let mut page = Page::new();
+        let mut page = FrameBuffer::new();
         let frame = page.write(head(Kind::Ticks, sequence), check, |body| {
             put_ticks(body, |record| {
                 let next = left.next();
@@ -399,7 +399,7 @@ mod tests {
 
         #[test]
         fn a_sync_inside_a_frame_is_content(kind in any::<u8>(), at in 0..BODY - 4, length in any::<u16>()) {
-            let mut page = Page::new();
+            let mut page = FrameBuffer::new();
             let bytes = page.write(Head { kind, sequence: 5, dropped: 0 }, check, |body| {
                 body.fill(0);
                 body[at..at + 4].copy_from_slice(&SYNC);
@@ -438,7 +438,7 @@ mod tests {
     #[test]
     fn the_longest_body_fits() {
         let most = Head { kind: u8::MAX, sequence: u32::MAX, dropped: u32::MAX };
-        let mut page = Page::new();
+        let mut page = FrameBuffer::new();
         let bytes = page.write(most, check, |body| {
             body.fill(0xA5);
             BODY + 7

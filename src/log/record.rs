@@ -1,7 +1,6 @@
 //! One tick as the log keeps it: all that the tick was given and all that it gave, so
 //! that a host can run it again and compare bits.
 
-use super::number;
 use super::telemetry::Telemetry;
 use crate::control::{Input, Output};
 use crate::hal::MotorCommand;
@@ -9,6 +8,7 @@ use crate::sense::raw::{
     AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
 };
 use crate::supervise::Command;
+use crate::supervise::codes;
 use crate::units::Tick;
 
 /// Age of a code that was taken at its tick, and so the farthest ahead that one may be.
@@ -54,7 +54,7 @@ impl Flags {
     fn of(input: &Input, output: &Output) -> Self {
         let bit = |set: bool, bit: u16| if set { bit } else { 0 };
         Self(
-            u16::from(number::of_command(input.command))
+            u16::from(codes::of_command(input.command))
                 | bit(input.plan.is_some(), Self::PLAN)
                 | bit(input.overrun, Self::OVERRUN)
                 | bit(input.emergency_stop, Self::EMERGENCY)
@@ -86,7 +86,7 @@ impl Flags {
     /// The command that the tick was given.
     #[must_use]
     pub fn command(self) -> Option<Command> {
-        number::command((self.0 & Self::COMMAND) as u8)
+        codes::command((self.0 & Self::COMMAND) as u8)
     }
 
     /// The tick was given a plan.
@@ -272,7 +272,7 @@ pub(super) mod tests {
                     telemetry: Telemetry {
                         at,
                         mode: Mode::WITHOUT_FAULT[mode],
-                        stage: number::stage(stage).unwrap(),
+                        stage: codes::stage(stage).unwrap(),
                         position: Q16::from_bits(q[0]),
                         speed: Q16::from_bits(q[1]),
                         speed_ref: Q16::from_bits(q[2]),

@@ -6,7 +6,7 @@
 //! and whose timer else is due would be woken in between. Without such an interrupt the
 //! control tick's task waits for the clock and wakes the others.
 
-use super::exchange::Station;
+use super::exchange::TaskId;
 use crate::units::{TICK_HZ, Tick};
 use core::future::poll_fn;
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
@@ -20,7 +20,7 @@ pub(super) const CLOCKS: u32 = (CLOCK_HZ / TICK_HZ as u64) as u32;
 /// Tasks of sensors, the first stations.
 const SENSORS: usize = 4;
 
-/// Ticks between two readings of the sensors, by [`Station`].
+/// Ticks between two readings of the sensors, by [`TaskId`].
 pub(super) const PERIODS: [u32; SENSORS] = [1, 1, 1, ANGLE_PERIOD];
 
 /// The same of the arm's angle.
@@ -147,7 +147,7 @@ impl Pulse {
     }
 
     /// The waker of a sensor's task; that of the last for stations that are none.
-    fn of(&self, station: Station) -> &AtomicWaker {
+    fn of(&self, station: TaskId) -> &AtomicWaker {
         &self.wakers[station.index().min(SENSORS - 1)]
     }
 }
@@ -241,7 +241,7 @@ impl<const N: u32> Beat<N> {
         context: &Context<'_>,
         waits: &mut bool,
         pulse: &Pulse,
-        station: Station,
+        station: TaskId,
     ) -> Poll<Due> {
         let turn = Turn::Sensor(station.index() as u8);
         self.poll(context, waits, pulse, (pulse.of(station), turn))

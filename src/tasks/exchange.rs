@@ -4,11 +4,11 @@ use core::cell::Cell;
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
 use super::beat::{CLOCKS, PERIODS, Pulse, Turn};
-use crate::blackbox::Late;
 use crate::control::{Input, Output};
 use crate::hal::Light;
 use crate::log::{Entry, Tape, Telemetry};
 use crate::model::{Plan, PlanRequest};
+use crate::restart::MissedCheckIns;
 use crate::sense::freshness::age;
 use crate::sense::raw::{AdcCode, AngleFrame, EncoderCount, Sample, SensorFrame};
 use crate::supervise::{Command, Mode};
@@ -52,7 +52,7 @@ impl<T: Copy> Slot<T> {
 
 /// A task that checks in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Station {
+pub enum TaskId {
     /// [`speed`](super::speed()).
     Speed,
     /// [`pressure`](super::pressure()).
@@ -69,7 +69,7 @@ pub enum Station {
     Operator(u8),
 }
 
-impl Station {
+impl TaskId {
     /// Stations that must always be manned.
     const FIXED: usize = 6;
 
@@ -104,9 +104,9 @@ pub struct Exchange {
     driven: AtomicBool,
     lost_entries: AtomicU32,
     bus_faults: [AtomicU32; 4],
-    check_ins: [AtomicU32; Station::FIXED + OPERATORS],
+    check_ins: [AtomicU32; TaskId::FIXED + OPERATORS],
     operators: AtomicU32,
-    /// Station whose turn it last was of those that wait for other things than time.
+    /// TaskId whose turn it last was of those that wait for other things than time.
     awake: AtomicU8,
 }
 
@@ -129,7 +129,7 @@ impl Exchange {
             driven: AtomicBool::new(false),
             lost_entries: AtomicU32::new(0),
             bus_faults: [const { AtomicU32::new(0) }; 4],
-            check_ins: [const { AtomicU32::new(0) }; Station::FIXED + OPERATORS],
+            check_ins: [const { AtomicU32::new(0) }; TaskId::FIXED + OPERATORS],
             operators: AtomicU32::new(0),
             awake: AtomicU8::new(0),
         }
@@ -262,65 +262,71 @@ impl Exchange {
 
     /// Readings that a sensor failed to give since boot; 0 for other stations.
     #[must_use]
-    pub fn bus_faults(&self, sensor: Station) -> u32 {
+    pub fn bus_faults(&self, sensor: TaskId) -> u32 {
         self.bus_faults.get(sensor.index()).map_or(0, |count| count.load(Ordering::Relaxed))
     }
 
     /// Who has not checked in within [`CHECK_IN_TICKS`]. One that never started counts as
     /// last seen at boot.
     #[must_use]
-    pub fn late(&self, now: Tick) -> Late {
-        let manned = Station::FIXED + self.operators.load(Ordering::Relaxed) as usize;
-        self.older(now, [CHECK_IN_TICKS; Station::FIXED + OPERATORS].into_iter().take(manned))
+    pub fn late(&self, now: Tick) -> MissedCheckIns {
+        let manned = TaskId::FIXED + self.operators.load(Ordering::Relaxed) as usize;
+        self.older(now, [CHECK_IN_TICKS; TaskId::FIXED + OPERATORS].into_iter().take(manned))
     }
 
     /// Why the watchdog is not fed: who is late, or who keeps the control tick from coming.
     #[must_use]
-    pub fn unfed(&self, now: Tick) -> Late {
+    pub fn unfed(&self, now: Tick) -> MissedCheckIns {
         if age(now, self.pulse.ticked()) > CHECK_IN_TICKS {
             return self.culprit();
         }
         let late = self.late(now);
         // One that does not let go keeps all others of its executor waiting as well.
-        let manned = Station::FIXED + self.operators.load(Ordering::Relaxed) as usize;
-        let all = (PERIODS.len()..manned).map(Late::station).fold(Late::NOBODY, Late::and);
-        if late == all { Late::station(self.awake.load(Ordering::Relaxed).into()) } else { late }
+        let manned = TaskId::FIXED + self.operators.load(Ordering::Relaxed) as usize;
+        let all = (PERIODS.len()..manned)
+            .map(MissedCheckIns::station)
+            .fold(MissedCheckIns::NOBODY, MissedCheckIns::and);
+        if late == all {
+            MissedCheckIns::station(self.awake.load(Ordering::Relaxed).into())
+        } else {
+            late
+        }
     }
 
     /// A task that waits for other things than time has got its turn.
-    pub(super) fn wake(&self, station: Station) {
+    pub(super) fn wake(&self, station: TaskId) {
         self.awake.store(station.index() as u8, Ordering::Relaxed);
     }
 
     /// Who keeps the control tick from coming, as far as the check-ins tell: the task that
     /// has begun a turn in the tick's executor and not ended it, or else the sensors'
     /// tasks that have fallen behind the others, or something outside of it.
-    fn culprit(&self) -> Late {
+    fn culprit(&self) -> MissedCheckIns {
         match self.pulse.turn() {
             Turn::Nobody => {}
-            Turn::Tick => return Late::TICK,
-            Turn::Sensor(station) => return Late::station(station.into()),
+            Turn::Tick => return MissedCheckIns::TICK,
+            Turn::Sensor(station) => return MissedCheckIns::station(station.into()),
         }
         let ticked = self.pulse.ticked();
         let behind = self.older(ticked, PERIODS.into_iter().map(|period| period - 1));
         // The executor serves a line from its end: those before the one that keeps the
         // others from their turns have had theirs.
-        behind.last().unwrap_or(Late::STARVED)
+        behind.last().unwrap_or(MissedCheckIns::STARVED)
     }
 
     /// The stations, from the first on, that were last seen longer ago than they may.
-    fn older(&self, now: Tick, allowed: impl Iterator<Item = u32>) -> Late {
-        let mut late = Late::NOBODY;
+    fn older(&self, now: Tick, allowed: impl Iterator<Item = u32>) -> MissedCheckIns {
+        let mut late = MissedCheckIns::NOBODY;
         for (index, (seen, ticks)) in self.check_ins.iter().zip(allowed).enumerate() {
             if age(now, seen.load(Ordering::Relaxed)) > ticks {
-                late = late.and(Late::station(index));
+                late = late.and(MissedCheckIns::station(index));
             }
         }
         late
     }
 
     /// A task says that it is alive.
-    pub(super) fn check_in(&self, station: Station, now: Tick) {
+    pub(super) fn check_in(&self, station: TaskId, now: Tick) {
         if let Some(seen) = self.check_ins.get(station.index()) {
             seen.store(now, Ordering::Relaxed);
         }
@@ -334,14 +340,14 @@ impl Exchange {
 
     /// The station of a further operator task; the last one is shared if there are
     /// more than four.
-    pub(super) fn enrol_operator(&self) -> Station {
+    pub(super) fn enrol_operator(&self) -> TaskId {
         let number = (self.operators.load(Ordering::Relaxed) as usize).min(OPERATORS - 1);
         self.operators.store(number as u32 + 1, Ordering::Relaxed);
-        Station::Operator(number as u8)
+        TaskId::Operator(number as u8)
     }
 
     /// A sensor gave no reading.
-    pub(super) fn count_bus_fault(&self, sensor: Station) {
+    pub(super) fn count_bus_fault(&self, sensor: TaskId) {
         if let Some(count) = self.bus_faults.get(sensor.index()) {
             count.fetch_add(1, Ordering::Relaxed);
         }
@@ -381,13 +387,13 @@ mod tests {
     use crate::log::Event;
     use crate::supervise::{Direction, Fault};
 
-    const ALWAYS: [Station; 6] = [
-        Station::Speed,
-        Station::Pressure,
-        Station::Displacement,
-        Station::Angle,
-        Station::Model,
-        Station::Journal,
+    const ALWAYS: [TaskId; 6] = [
+        TaskId::Speed,
+        TaskId::Pressure,
+        TaskId::Displacement,
+        TaskId::Angle,
+        TaskId::Model,
+        TaskId::Journal,
     ];
 
     #[test]
@@ -413,7 +419,7 @@ mod tests {
                 exchange.check_in(*station, if station == silent { 1000 } else { 1030 });
             }
             assert!(exchange.late(1050).is_nobody(), "{silent:?}");
-            assert_eq!(exchange.late(1051), Late::station(silent.index()), "{silent:?}");
+            assert_eq!(exchange.late(1051), MissedCheckIns::station(silent.index()), "{silent:?}");
         }
     }
 
@@ -421,8 +427,8 @@ mod tests {
     fn operators_beyond_the_last_seat_share_it() {
         let exchange = Exchange::new();
         let seats: Vec<_> = (0..6).map(|_| exchange.enrol_operator()).collect();
-        assert_eq!(seats[3], Station::Operator(3));
-        assert_eq!(seats[5], Station::Operator(3));
+        assert_eq!(seats[3], TaskId::Operator(3));
+        assert_eq!(seats[5], TaskId::Operator(3));
         for station in ALWAYS.into_iter().chain(seats) {
             exchange.check_in(station, 500);
         }
@@ -447,12 +453,12 @@ mod tests {
         for station in ALWAYS.into_iter().take(4) {
             exchange.check_in(station, 1000);
         }
-        exchange.wake(Station::Journal);
-        assert_eq!(exchange.unfed(1000), Late::station(Station::Journal.index()));
+        exchange.wake(TaskId::Journal);
+        assert_eq!(exchange.unfed(1000), MissedCheckIns::station(TaskId::Journal.index()));
         exchange.check_in(operator, 0);
-        assert_eq!(exchange.unfed(1000), Late::station(operator.index()));
+        assert_eq!(exchange.unfed(1000), MissedCheckIns::station(operator.index()));
         // Where the others go on, the one that does not is it.
-        exchange.check_in(Station::Journal, 990);
+        exchange.check_in(TaskId::Journal, 990);
         exchange.check_in(operator, 990);
         assert_eq!(exchange.unfed(1000).name(), "model");
     }
@@ -461,23 +467,23 @@ mod tests {
     fn who_keeps_the_tick_from_coming_is_named() {
         let exchange = Exchange::new();
         exchange.pulse.begin(700, Turn::Tick);
-        assert_eq!(exchange.culprit(), Late::TICK);
-        exchange.pulse.begin(701, Turn::Sensor(Station::Pressure.index() as u8));
+        assert_eq!(exchange.culprit(), MissedCheckIns::TICK);
+        exchange.pulse.begin(701, Turn::Sensor(TaskId::Pressure.index() as u8));
         assert_eq!(exchange.culprit().name(), "pressure");
         // All turns ended, one task is behind: it was waiting in the middle of a reading.
         exchange.pulse.begin(702, Turn::Nobody);
         for station in ALWAYS {
-            exchange.check_in(station, if station == Station::Angle { 700 } else { 702 });
+            exchange.check_in(station, if station == TaskId::Angle { 700 } else { 702 });
         }
         assert_eq!(exchange.culprit().name(), "angle");
         // It is due every other tick alone.
-        exchange.check_in(Station::Angle, 702);
-        assert_eq!(exchange.culprit(), Late::STARVED);
+        exchange.check_in(TaskId::Angle, 702);
+        assert_eq!(exchange.culprit(), MissedCheckIns::STARVED);
         exchange.pulse.begin(703, Turn::Nobody);
-        for station in [Station::Speed, Station::Pressure, Station::Displacement] {
+        for station in [TaskId::Speed, TaskId::Pressure, TaskId::Displacement] {
             exchange.check_in(station, 703);
         }
-        assert_eq!(exchange.culprit(), Late::STARVED);
+        assert_eq!(exchange.culprit(), MissedCheckIns::STARVED);
     }
 
     #[test]

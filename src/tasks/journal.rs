@@ -1,9 +1,9 @@
 //! The logging task.
 
 use super::ROUND;
-use super::exchange::{ENTRIES, Exchange, Station};
+use super::exchange::{ENTRIES, Exchange, TaskId};
 use crate::hal::{Indicator, Journal, Light};
-use crate::log::{Entry, Event, Scribe};
+use crate::log::{Entry, Event, LogEncoder};
 use embassy_futures::select::{Either, select};
 use embassy_time::with_deadline;
 
@@ -16,23 +16,23 @@ use embassy_time::with_deadline;
 pub async fn journal(
     mut journal: impl Journal,
     mut light: impl Indicator,
-    scribe: &mut Scribe,
+    scribe: &mut LogEncoder,
     exchange: &Exchange,
 ) -> ! {
     let mut shown = Light::default();
     let mut reported = 0;
-    scribe.speak_for(journal.identity());
+    scribe.set_identity(journal.identity());
     scribe.check_by(journal.checker());
     light.show(shown);
     loop {
-        exchange.check_in(Station::Journal, exchange.uptime());
+        exchange.check_in(TaskId::Journal, exchange.uptime());
         if exchange.light() != shown {
             shown = exchange.light();
             light.show(shown);
         }
         let news = select(exchange.entries.receive(), exchange.tape.ready());
         let news = with_deadline(exchange.aside(ROUND), news).await;
-        exchange.wake(Station::Journal);
+        exchange.wake(TaskId::Journal);
         if let Ok(Either::First(entry)) = news {
             write(&mut journal, scribe, &entry);
             // At most a queue full before the next check-in.
@@ -54,7 +54,7 @@ pub async fn journal(
 
 /// An entry as a line and as a frame; once in the image, however often it is called.
 #[inline(never)]
-fn write(journal: &mut impl Journal, scribe: &mut Scribe, entry: &Entry) {
+fn write(journal: &mut impl Journal, scribe: &mut LogEncoder, entry: &Entry) {
     journal.write(entry);
     scribe.entry(entry, &mut |frame| journal.send(frame));
 }

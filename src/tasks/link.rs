@@ -2,7 +2,7 @@
 
 use super::exchange::Exchange;
 use crate::hal::Line;
-use crate::link::{Gatherer, ToBoard, ToHost, frame};
+use crate::params::link::{FrameReader, ToBoard, ToHost, frame};
 use crate::params::service::{Request, Response, Service};
 use crate::params::slots::SetMemory;
 use embassy_time::{Duration, Timer};
@@ -20,7 +20,7 @@ pub async fn link<M: SetMemory>(
     exchange: &Exchange,
 ) -> ! {
     let station = exchange.enrol_operator();
-    let mut gatherer = Gatherer::new();
+    let mut gatherer = FrameReader::new();
     loop {
         exchange.check_in(station, exchange.uptime());
         let mut byte = [0];

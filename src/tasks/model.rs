@@ -1,7 +1,7 @@
 //! The planning task.
 
 use super::ROUND;
-use super::exchange::{Exchange, Station, latest};
+use super::exchange::{Exchange, TaskId, latest};
 use crate::model::Planner;
 use embassy_time::with_deadline;
 
@@ -9,10 +9,10 @@ use embassy_time::with_deadline;
 /// as it takes; of several requests meanwhile, the latest counts.
 pub async fn model(planner: &Planner, exchange: &Exchange) -> ! {
     loop {
-        exchange.check_in(Station::Model, exchange.uptime());
+        exchange.check_in(TaskId::Model, exchange.uptime());
         let round = exchange.aside(ROUND);
         if let Ok(request) = with_deadline(round, exchange.request.receive()).await {
-            exchange.wake(Station::Model);
+            exchange.wake(TaskId::Model);
             latest(&exchange.answer, planner.plan(&request));
         }
     }

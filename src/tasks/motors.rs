@@ -3,9 +3,9 @@
 use super::beat::Beat;
 use super::exchange::Exchange;
 use super::tape::{Latest, Turn};
-use crate::blackbox::Recorder;
 use crate::control::{Controller, State};
 use crate::hal::{MotorCommand, Motors, Watchdog};
+use crate::log::SnapshotRecorder;
 
 /// Runs the control tick at 1 kHz: latest codes, command and plan in; bridges,
 /// request and log entries out. Feeds the watchdog while every task is alive, and keeps
@@ -24,7 +24,7 @@ pub async fn motors(
 ) -> ! {
     motors.apply(MotorCommand::OFF, MotorCommand::OFF);
     let mut state = State::standing(watchdog.place());
-    let mut recorder = Recorder::default();
+    let mut recorder = SnapshotRecorder::default();
     let mut beat = Beat::<1>::new();
     loop {
         let due = beat.lead(&exchange.pulse).await;
@@ -45,7 +45,7 @@ pub async fn motors(
         }
         exchange.publish(output);
         let late = exchange.late(due.tick);
-        watchdog.keep(&recorder.flight(&output.telemetry, state.trust(), late));
+        watchdog.keep(&recorder.snapshot(&output.telemetry, state.trust(), late));
         if late.is_nobody() {
             watchdog.feed();
         }

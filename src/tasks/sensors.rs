@@ -3,7 +3,7 @@
 use core::future::poll_fn;
 
 use super::beat::{ANGLE_PERIOD, Beat};
-use super::exchange::{Exchange, Station};
+use super::exchange::{Exchange, TaskId};
 use crate::hal::{AnalogInput, AngleBus, WheelEncoder};
 use crate::sense::raw::{AdcCode, BusFault, Sample};
 use crate::units::Tick;
@@ -26,37 +26,37 @@ macro_rules! turn {
 pub async fn speed(mut wheel: impl WheelEncoder, exchange: &Exchange) -> ! {
     let mut beat = Beat::<1>::new();
     loop {
-        let at = turn!(beat, exchange, Station::Speed);
+        let at = turn!(beat, exchange, TaskId::Speed);
         exchange.wheel.put(Sample { code: wheel.count(), at });
-        exchange.check_in(Station::Speed, at);
+        exchange.check_in(TaskId::Speed, at);
     }
 }
 
 /// Publishes the load cell's code at 1 kHz.
 pub async fn pressure(input: impl AnalogInput, exchange: &Exchange) -> ! {
     let publish = |sample| exchange.load_cell.put(sample);
-    analog(input, Station::Pressure, publish, exchange).await
+    analog(input, TaskId::Pressure, publish, exchange).await
 }
 
 /// Publishes the tread displacement sensor's code at 1 kHz.
 pub async fn displacement(input: impl AnalogInput, exchange: &Exchange) -> ! {
     let publish = |sample| exchange.tread.put(sample);
-    analog(input, Station::Displacement, publish, exchange).await
+    analog(input, TaskId::Displacement, publish, exchange).await
 }
 
 /// Publishes the arm angle sensor's frame at 500 Hz, good or bad: the tick judges.
 pub async fn angle(mut bus: impl AngleBus, exchange: &Exchange) -> ! {
     let mut beat = Beat::<ANGLE_PERIOD>::new();
     loop {
-        let at = turn!(beat, exchange, Station::Angle);
+        let at = turn!(beat, exchange, TaskId::Angle);
         let publish = |sample| exchange.arm.put(sample);
-        settle(bounded(bus.frame()).await, at, Station::Angle, publish, exchange);
+        settle(bounded(bus.frame()).await, at, TaskId::Angle, publish, exchange);
     }
 }
 
 async fn analog(
     mut input: impl AnalogInput,
-    station: Station,
+    station: TaskId,
     publish: impl Fn(Sample<AdcCode>),
     exchange: &Exchange,
 ) -> ! {
@@ -80,7 +80,7 @@ async fn bounded<T>(reading: impl Future<Output = Result<T, BusFault>>) -> Resul
 fn settle<T>(
     reading: Result<T, BusFault>,
     at: Tick,
-    station: Station,
+    station: TaskId,
     publish: impl Fn(Sample<T>),
     exchange: &Exchange,
 ) {

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::time::Instant;
 
 use interstage::control::Output;
-use interstage::hil::{FIRST, Given};
+use interstage::hal::hil::{FIRST, Given};
 use interstage::log::{Entry, Event, Identity, Record, identity};
 use interstage::model::Planner;
 use interstage::supervise::Mode;

@@ -9,8 +9,8 @@ use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph};
 
-use interstage::blackbox::Reset;
 use interstage::log::{Entry, Event};
+use interstage::restart::Reset;
 use interstage::supervise::Mode;
 
 use crate::capture::{View, mode_name};

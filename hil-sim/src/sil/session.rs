@@ -1,10 +1,11 @@
 //! A run under way: controller and plant, a tick at a time, with commands and sensor
 //! failures given from outside.
 
-use interstage::blackbox::{Flight, Late, Recorder, Reset, Restart};
 use interstage::control::{Controller, Input, Output, State};
 use interstage::hal::MotorCommand;
+use interstage::log::SnapshotRecorder;
 use interstage::model::{Plan, Planner};
+use interstage::restart::{DriveSnapshot, MissedCheckIns, Reset, Restart};
 use interstage::sense::raw::{Sample, SensorFrame};
 use interstage::supervise::{Command, Direction, Mode};
 use interstage::units::Tick;
@@ -230,15 +231,19 @@ impl Session {
 
     /// The record of the last tick, as memory keeps it.
     #[must_use]
-    pub fn record(&self) -> Flight {
-        Recorder::default().flight(&self.held.telemetry, self.state.trust(), Late::NOBODY)
+    pub fn record(&self) -> DriveSnapshot {
+        SnapshotRecorder::default().snapshot(
+            &self.held.telemetry,
+            self.state.trust(),
+            MissedCheckIns::NOBODY,
+        )
     }
 
     /// A reset that leaves memory and takes the power from the bridges at once: the
     /// controller starts with what its record of the last tick tells of the place.
     pub fn restart(&mut self) {
-        let flight = Some(self.record());
-        self.restart_from(Restart { reset: Reset::Pin, flight, crash: None });
+        let snapshot = Some(self.record());
+        self.restart_from(Restart { reset: Reset::Pin, snapshot, crash: None });
     }
 
     /// A start that finds this of the time before it.

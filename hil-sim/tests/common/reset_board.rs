@@ -6,8 +6,8 @@ use hil_sim::board::core::Register;
 use hil_sim::board::peripherals::rcc::Cause;
 use hil_sim::log::Run;
 use hil_sim::scenario::Scenario;
-use interstage::blackbox::Restart;
 use interstage::log::Event;
+use interstage::restart::Restart;
 
 use super::common::{elf, strings};
 

@@ -6,7 +6,7 @@ use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use interstage::hal::MotorCommand;
-use interstage::hil::Given;
+use interstage::hal::hil::Given;
 use interstage::supervise::Command;
 
 /// Between the host's line and the parts of the board that it stands in for.

@@ -2,10 +2,10 @@
 
 use embassy_stm32::gpio::{AnyPin, Level, Output, Speed};
 use embassy_stm32::{Peri, Peripherals};
+use interstage::hal::hil::Given;
 use interstage::hal::{
     AnalogInput, AngleBus, CommandSource, MotorCommand, Motors, Parts, WheelEncoder,
 };
-use interstage::hil::Given;
 use interstage::sense::raw::{AdcCode, AngleFrame, BridgeCodes, BusFault, EncoderCount};
 use interstage::supervise::Command;
 use rtt_target::DownChannel;

@@ -2,8 +2,8 @@
 
 use super::super::tests::{at, sensed};
 use super::*;
-use crate::blackbox::Place;
 use crate::estimate::crossing::{Contact, Sign};
+use crate::restart::Place;
 use crate::rig::Rig;
 use crate::sense::SensedState;
 use crate::units::Travel;

@@ -3,8 +3,8 @@
 
 use super::state::OpenCrossing;
 use super::{Controller, Pass, State};
-use crate::blackbox::Trust;
 use crate::estimate::crossing::Contact;
+use crate::restart::PositionConfidence;
 use crate::supervise::{Direction, Fault, Trigger};
 use crate::units::{Millimetres, Q16, Ratio, q16};
 
@@ -54,7 +54,7 @@ impl Controller {
         // A crossing that was begun in its middle has no wall measured to turn back to.
         let between = state.crossing.as_ref().is_some_and(|open| open.resumed);
         // Away from the end that it went to in doubt, steps lie ahead that tell the place.
-        state.searching |= turned && state.trust() == Trust::Unsure;
+        state.searching |= turned && state.trust() == PositionConfidence::Unsure;
         if core::mem::take(&mut state.resumed) || turned && between {
             self.resume(state, pass, direction);
         } else if state.searching {

@@ -1,6 +1,5 @@
 //! What the controller remembers between ticks.
 
-use crate::blackbox::{Place, Trust};
 use crate::control::preload_loop::PreloadLoopState;
 use crate::control::profile::ProfileState;
 use crate::control::speed_loop::SpeedLoopState;
@@ -10,6 +9,7 @@ use crate::estimate::odometry::Odometry;
 use crate::estimate::tread::TreadState;
 use crate::estimate::vibration::VibrationState;
 use crate::model::{Plan, Review};
+use crate::restart::{Place, PositionConfidence};
 use crate::sense::SensesState;
 use crate::supervise::{Direction, Leg, Mode, MonitorState};
 use crate::units::{
@@ -227,13 +227,13 @@ impl State {
 
     /// Whether a start could go on from the position.
     #[must_use]
-    pub const fn trust(&self) -> Trust {
+    pub const fn trust(&self) -> PositionConfidence {
         let steps_found = self.given_up == 0 && self.extra == 0;
         let known = self.kept.is_some() || self.located && steps_found;
         match (known, self.unsure, self.searching) {
-            (true, true, _) => Trust::Unsure,
-            (true, false, false) => Trust::Sure,
-            _ => Trust::Guess,
+            (true, true, _) => PositionConfidence::Unsure,
+            (true, false, false) => PositionConfidence::Sure,
+            _ => PositionConfidence::Guess,
         }
     }
 
@@ -346,15 +346,17 @@ mod tests {
             (false, 1, 1, false),
         ] {
             let state = State { located: true, searching, given_up, extra, ..State::default() };
-            let trust = if placed { Trust::Sure } else { Trust::Guess };
+            let trust = if placed { PositionConfidence::Sure } else { PositionConfidence::Guess };
             assert_eq!(state.trust(), trust, "{searching} {given_up} {extra}");
             // That of a record which may be off stays so, whether it searches or not.
             let steps_found = given_up == 0 && extra == 0;
-            let trust = if steps_found { Trust::Unsure } else { Trust::Guess };
+            let trust =
+                if steps_found { PositionConfidence::Unsure } else { PositionConfidence::Guess };
             assert_eq!(State { unsure: true, ..state }.trust(), trust, "{given_up} {extra}");
         }
-        assert_eq!(State::default().trust(), Trust::Guess);
-        for (sure, trust) in [(true, Trust::Sure), (false, Trust::Unsure)] {
+        assert_eq!(State::default().trust(), PositionConfidence::Guess);
+        for (sure, trust) in [(true, PositionConfidence::Sure), (false, PositionConfidence::Unsure)]
+        {
             let kept = Some(Place { position: Q16::ZERO, sure });
             assert_eq!(State::standing(kept).trust(), trust);
         }

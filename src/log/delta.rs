@@ -8,10 +8,10 @@
 //! word, 2 a whole one; one for a word that is written as it is. The tick of a record is one
 //! more than that before, unless its difference to that is there. All is little end first.
 
-use super::number;
 use super::record::{Flags, Record};
 use super::telemetry::Telemetry;
 use crate::hal::Duty;
+use crate::supervise::codes;
 use crate::units::Q16;
 
 /// Numbers of a record that are written as differences, behind the tick.
@@ -29,13 +29,13 @@ const _: () = assert!(DIFFERENCES + WORDS == 32, "the map is full");
 ///
 /// Differences wrap, so that any two records have one and no bit is lost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Wire {
+pub(super) struct DeltaRecord {
     at: u32,
     numbers: [u32; NUMBERS],
     words: [u32; WORDS],
 }
 
-/// Most bytes that a [`Wire`] takes.
+/// Most bytes that a [`DeltaRecord`] takes.
 pub(super) const LONGEST: usize = 4 * (2 + NUMBERS + WORDS);
 
 /// Two halves of a word.
@@ -48,7 +48,7 @@ const fn halves(word: u32) -> [u16; 2] {
     [word as u16, (word >> 16) as u16]
 }
 
-impl Wire {
+impl DeltaRecord {
     /// The record as numbers.
     #[inline]
     pub(super) fn of(record: &Record) -> Self {
@@ -78,7 +78,7 @@ impl Wire {
                 word(*tread, *arm),
                 word(*drive, *pretightener),
                 word(t.drive.to_bits() as u16, t.pretightener.to_bits() as u16),
-                u32::from_le_bytes([t.level, t.stage as u8, number::of_mode(t.mode), 0]),
+                u32::from_le_bytes([t.level, t.stage as u8, codes::of_mode(t.mode), 0]),
                 flags.to_bits().into(),
             ],
         }
@@ -98,8 +98,8 @@ impl Wire {
         Some(Record {
             telemetry: Telemetry {
                 at: self.at,
-                mode: number::mode(mode)?,
-                stage: number::stage(stage)?,
+                mode: codes::mode(mode)?,
+                stage: codes::stage(stage)?,
                 position: q[0],
                 speed: q[1],
                 speed_ref: q[2],
@@ -218,9 +218,9 @@ mod tests {
     /// The record behind another, as it is written.
     fn written(one: &Record, other: &Record) -> Vec<u8> {
         let mut room = [0xA5; LONGEST];
-        let mut before = Wire::of(one);
-        let used = Wire::of(other).put(&mut before, &mut room);
-        assert_eq!(before, Wire::of(other));
+        let mut before = DeltaRecord::of(one);
+        let used = DeltaRecord::of(other).put(&mut before, &mut room);
+        assert_eq!(before, DeltaRecord::of(other));
         room[..used].to_vec()
     }
 
@@ -231,9 +231,9 @@ mod tests {
             other in any_record(),
             behind in prop::collection::vec(any::<u8>(), 0..5),
         ) {
-            prop_assert_eq!(Wire::of(&one).record(), Some(one));
+            prop_assert_eq!(DeltaRecord::of(&one).record(), Some(one));
             let bytes = [written(&one, &other), behind.clone()].concat();
-            let (back, rest) = Wire::take(&Wire::of(&one), &bytes).unwrap();
+            let (back, rest) = DeltaRecord::take(&DeltaRecord::of(&one), &bytes).unwrap();
             prop_assert_eq!(back.record(), Some(other));
             prop_assert_eq!(rest, &behind);
         }
@@ -241,7 +241,7 @@ mod tests {
         #[test]
         fn what_is_cut_off_is_no_record(one in any_record(), other in any_record(), cut in 1..9_usize) {
             let bytes = written(&one, &other);
-            prop_assert_eq!(Wire::take(&Wire::of(&one), &bytes[..bytes.len().saturating_sub(cut)]), None);
+            prop_assert_eq!(DeltaRecord::take(&DeltaRecord::of(&one), &bytes[..bytes.len().saturating_sub(cut)]), None);
         }
 
         #[test]
@@ -268,7 +268,7 @@ mod tests {
 
     #[test]
     fn numbers_without_meaning_are_no_record() {
-        let sound = Wire::of(&Record::EMPTY);
+        let sound = DeltaRecord::of(&Record::EMPTY);
         assert!(sound.record().is_some());
         // Stage 0, mode 99, a byte that says nothing, flags beyond 16 bits.
         let state = |stage, mode, rest| u32::from_le_bytes([0, stage, mode, rest]);
@@ -282,7 +282,7 @@ mod tests {
         // A map with a difference of no length, and one with a word that is missing.
         for (map, behind) in [(3_u32, LONGEST), (1 << 31, 3)] {
             let bytes = [&map.to_le_bytes()[..], &vec![0; behind]].concat();
-            assert_eq!(Wire::take(&sound, &bytes), None);
+            assert_eq!(DeltaRecord::take(&sound, &bytes), None);
         }
     }
 }

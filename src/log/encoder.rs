@@ -2,7 +2,7 @@
 
 use super::capture::Capture;
 use super::entry::{Entry, Event};
-use super::frame::{self, Checker, Head, Kind, Page, put_ticks};
+use super::frame::{self, Checker, FrameBuffer, Head, Kind, put_ticks};
 use super::identity::Identity;
 use super::ledger::Ledger;
 use super::tape::Tape;
@@ -13,20 +13,20 @@ use serde::Serialize;
 const IDENTITY_EVERY: u32 = 1000;
 
 /// Writes frames. It never waits: what finds no room is dropped whole and counted.
-pub struct Scribe {
+pub struct LogEncoder {
     identity: Identity,
     introduced: Option<Tick>,
     sequence: u32,
     dropped: u32,
     capture: Capture,
     ledger: Ledger,
-    page: Page,
+    page: FrameBuffer,
     /// What sums up its frames if not the library's own code. None to begin with, so that a
     /// new scribe is all zeros and takes no room in flash.
     check: Option<Checker>,
 }
 
-impl Scribe {
+impl LogEncoder {
     /// A scribe that has written nothing yet.
     #[must_use]
     pub const fn new(identity: Identity) -> Self {
@@ -37,13 +37,13 @@ impl Scribe {
             dropped: 0,
             capture: Capture::new(),
             ledger: Ledger::new(),
-            page: Page::new(),
+            page: FrameBuffer::new(),
             check: None,
         }
     }
 
     /// Says from now on that this one speaks.
-    pub fn speak_for(&mut self, identity: Identity) {
+    pub fn set_identity(&mut self, identity: Identity) {
         self.identity = identity;
     }
 
@@ -66,7 +66,7 @@ impl Scribe {
         }
         // A capture waits for the room that the ticks leave.
         if let Some(piece) = self.capture.piece()
-            && self.one(Kind::Shots, &piece, send)
+            && self.one(Kind::CaptureChunk, &piece, send)
         {
             self.capture.sent(&piece);
         }
@@ -142,7 +142,7 @@ impl Scribe {
 #[cfg(test)]
 #[allow(clippy::float_arithmetic, reason = "positions of the test")]
 mod tests {
-    use super::super::capture::{IN_FRAME, Shot, Shots, Trigger};
+    use super::super::capture::{CaptureChunk, CaptureSample, IN_FRAME, Trigger};
     use super::super::frame::{Body, Frame};
     use super::super::ledger::tests::crossing;
     use super::super::record::Record;
@@ -185,8 +185,8 @@ mod tests {
         }
     }
 
-    fn scribe() -> Scribe {
-        Scribe::new(Identity {
+    fn scribe() -> LogEncoder {
+        LogEncoder::new(Identity {
             schema: identity::SCHEMA,
             version: identity::text("1.2.3"),
             rig: identity::text("prototype"),
@@ -202,7 +202,12 @@ mod tests {
         tape.keep(&Input { now: at, ..Input::default() }, &output);
     }
 
-    fn run(scribe: &mut Scribe, tape: &Tape, channel: &mut Channel, ticks: core::ops::Range<Tick>) {
+    fn run(
+        scribe: &mut LogEncoder,
+        tape: &Tape,
+        channel: &mut Channel,
+        ticks: core::ops::Range<Tick>,
+    ) {
         for at in ticks {
             tick(tape, at);
             if tape.unread() == super::super::BATCH {
@@ -225,10 +230,10 @@ mod tests {
 
     #[test]
     fn it_speaks_for_whom_it_was_told_to() {
-        let mut scribe = Scribe::new(Identity::NOBODY);
+        let mut scribe = LogEncoder::new(Identity::NOBODY);
         let somebody =
             Identity { parameters: 0xABCD, rig: identity::text("fe"), ..Identity::NOBODY };
-        scribe.speak_for(somebody.clone());
+        scribe.set_identity(somebody.clone());
         let (tape, mut channel) = (Tape::new(), Channel::default());
         run(&mut scribe, &tape, &mut channel, 0..super::super::BATCH);
         let said = Frame::open(&channel.frames[0]).unwrap().body().unwrap();
@@ -326,14 +331,14 @@ mod tests {
             limits: [Some(Limit::SlipMarginLow); 3],
             outcome: Some(outcome),
         };
-        let shot = Shot {
+        let shot = CaptureSample {
             at: u16::MAX,
             codes: [u16::MAX; 4],
             duties: [i16::MIN; 2],
             mode: 255,
             stage: 255,
         };
-        let piece = Shots {
+        let piece = CaptureChunk {
             trigger: Trigger::Command,
             at: u32::MAX,
             first: 255,
@@ -362,14 +367,14 @@ mod tests {
         scribe.entry(&entry, &mut send);
         scribe.one(Kind::Plan, &(u32::MAX, plan), &mut send);
         scribe.one(Kind::Request, &(u32::MAX, request), &mut send);
-        scribe.one(Kind::Shots, &piece, &mut send);
+        scribe.one(Kind::CaptureChunk, &piece, &mut send);
         scribe.one(Kind::Identity, &identity, &mut send);
         let mut read = bodies.iter().map(|bytes| Frame::open(bytes).unwrap().body().unwrap());
         assert_eq!(read.next(), Some(Body::Event(entry)));
         assert!(matches!(read.next(), Some(Body::Ledger(line)) if line.crossing == crossing));
         assert_eq!(read.next(), Some(Body::Plan(u32::MAX, plan)));
         assert_eq!(read.next(), Some(Body::Request(u32::MAX, request)));
-        assert_eq!(read.next(), Some(Body::Shots(piece)));
+        assert_eq!(read.next(), Some(Body::CaptureChunk(piece)));
         assert_eq!(read.next(), Some(Body::Identity(identity)));
     }
 }

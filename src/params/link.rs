@@ -50,14 +50,14 @@ pub fn frame(message: &impl Serialize) -> Option<Frame> {
 
 /// Puts bytes together to frames.
 #[derive(Clone, Debug, Default)]
-pub struct Gatherer {
+pub struct FrameReader {
     bytes: Frame,
     /// More came than fits: all is dropped up to the next end.
     too_long: bool,
     dropped: u32,
 }
 
-impl Gatherer {
+impl FrameReader {
     /// Nothing gathered.
     #[must_use]
     pub const fn new() -> Self {
@@ -107,7 +107,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn gathered<T: for<'de> Deserialize<'de>>(bytes: &[u8]) -> (Vec<T>, u32) {
-        let mut gatherer = Gatherer::new();
+        let mut gatherer = FrameReader::new();
         let messages = bytes.iter().filter_map(|byte| gatherer.take(*byte)).collect();
         (messages, gatherer.dropped())
     }
