@@ -4,7 +4,6 @@
 
 pub mod hil;
 
-use crate::log::frame::{Checker, check};
 use crate::log::{Entry, Identity};
 use crate::restart::{DriveSnapshot, Place};
 use crate::sense::raw::{AdcCode, AngleFrame, BridgeCodes, BusFault, EncoderCount};
@@ -140,11 +139,6 @@ pub trait Journal {
     fn send(&mut self, frame: &[u8]) -> bool {
         let _ = frame;
         false
-    }
-
-    /// What sums up the frames: the library's own code, or hardware that gives the same.
-    fn checker(&self) -> Checker {
-        check
     }
 
     /// Who speaks, for the head of the binary log.

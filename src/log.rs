@@ -5,13 +5,13 @@
 //! |---|---|
 //! | [`Entry`], [`Telemetry`] | what happened; the state after a tick |
 //! | [`Record`] | a tick's whole input and output, for the stream |
-//! | [`Tape`] | hands records from the tick to the journal |
 //! | [`LogEncoder`] | makes frames of them, below the control rate |
 //! | [`frame`] | how a frame lies on the channel |
 //! | [`capture`] | moments that matter, kept until they have been read |
 //! | [`ledger`] | a line a crossing |
 
 pub mod capture;
+mod crc;
 mod delta;
 mod encoder;
 mod entry;
@@ -20,14 +20,13 @@ pub mod identity;
 pub mod ledger;
 mod record;
 mod recorder;
-mod tape;
 mod telemetry;
 
 pub use crate::supervise::codes;
-pub use encoder::LogEncoder;
+pub use crc::crc32;
+pub use encoder::{FrameSink, LogEncoder, TICKS_PER_FRAME};
 pub use entry::{CrossingRecord, Entry, Event};
 pub use identity::Identity;
 pub use record::{Flags, Record};
 pub use recorder::SnapshotRecorder;
-pub use tape::{BATCH, TAPE, Tape};
 pub use telemetry::Telemetry;

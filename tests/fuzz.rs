@@ -1,12 +1,8 @@
 //! What comes to the firmware from outside, damaged in every way: its readers refuse it
 //! and never panic. `FUZZ_SECONDS` gives each target that long instead.
 
-#[path = "common/mutate.rs"]
-mod mutate;
-
-use crc::{CRC_32_ISO_HDLC, Crc};
-use interstage::log::frame::{Body, Frame, FrameBuffer, Head, Kind, LONGEST, check};
-use interstage::log::{Entry, Event, Identity};
+use interstage::log::frame::{Body, Frame, FrameBuffer, Head, Kind, LONGEST};
+use interstage::log::{Entry, Event, Identity, crc32};
 use interstage::params::link::{FrameReader, ToBoard, ToHost, frame};
 use interstage::params::service::{Piece, Request, Response};
 use interstage::params::slots::{
@@ -17,9 +13,7 @@ use interstage::restart::{Crash, DriveSnapshot};
 use interstage::rig::Rig;
 use interstage::supervise::{Command, Mode};
 
-use mutate::fuzz;
-
-const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+use crate::common::mutate::fuzz;
 
 fn set(rig: &Rig) -> Vec<u8> {
     let mut room = [0; MAX_SET];
@@ -34,7 +28,7 @@ fn postcard<T: serde::Serialize>(value: &T) -> Vec<u8> {
 
 /// With the check that fits, so that what is behind it is reached.
 fn signed(bytes: &[u8]) -> Vec<u8> {
-    [bytes, &CRC.checksum(bytes).to_le_bytes()].concat()
+    [bytes, &crc32(bytes).to_le_bytes()].concat()
 }
 
 fn open_set(bytes: &[u8]) {
@@ -142,7 +136,7 @@ fn read_frame(bytes: &[u8]) {
 /// A frame with as much of a body as has room.
 fn framed(head: Head, body: &[u8]) -> Vec<u8> {
     let mut page = FrameBuffer::new();
-    let frame = page.write(head, check, |room| {
+    let frame = page.write(head, |room| {
         let length = body.len().min(room.len());
         room[..length].copy_from_slice(&body[..length]);
         length

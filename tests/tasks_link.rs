@@ -1,13 +1,11 @@
 //! The task at the host's binary line, on a mocked line and flash.
 
-mod common;
-
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
 use std::sync::OnceLock;
 
-use common::{Bench, forever};
+use crate::common::{Bench, forever};
 use interstage::hal::Line;
 use interstage::params::link::{FrameReader, ToBoard, ToHost, frame};
 use interstage::params::service::{Origin, Refusal, Request, Response, Service};

@@ -1,8 +1,6 @@
 //! The motor task with the shipped controller and all other tasks around it.
 
-mod common;
-
-use common::{
+use crate::common::{
     Answer, Bench, Bridges, Dog, Operator, Record, Sensor, UNLOADED, arm_frame, forever,
     load_cell_code, now_ms,
 };
@@ -13,7 +11,7 @@ use interstage::model::Planner;
 use interstage::restart::MissedCheckIns;
 use interstage::rig::Rig;
 use interstage::supervise::{Command, Direction, Fault, Mode};
-use interstage::tasks::{self, CHECK_IN_TICKS, Exchange, Latest, TaskId};
+use interstage::tasks::{self, CHECK_IN_TICKS, Exchange, TaskId, TickIo, TickIoCell};
 
 /// All tasks of the firmware on a mocked board: at rest, unloaded, stowed.
 struct Board {
@@ -38,10 +36,7 @@ impl Board {
 
     /// A board on which some tasks never get the processor.
     fn without(missing: &[TaskId]) -> Self {
-        Self::with(forever(Exchange::new()), missing)
-    }
-
-    fn with(exchange: &'static Exchange, missing: &[TaskId]) -> Self {
+        let exchange = forever(Exchange::new());
         let rig = Rig::prototype();
         let controller = forever(Controller::try_build(&rig).expect("the prototype is valid"));
         let planner = forever(Planner::try_build(&rig).expect("the prototype is valid"));
@@ -62,6 +57,7 @@ impl Board {
         };
         let runs = |station| !missing.contains(&station);
         let bench = &mut board.bench;
+        bench.spawn(async { tasks::clock(exchange).await });
         if runs(TaskId::Speed) {
             let wheel = board.wheel.clone();
             bench.spawn(async { tasks::speed(wheel, exchange).await });
@@ -79,9 +75,9 @@ impl Board {
             bench.spawn(async { tasks::angle(arm, exchange).await });
         }
         let (motors, watchdog) = (board.bridges.clone(), board.watchdog.clone());
-        let latest = forever(Latest::default());
+        let latest = forever(TickIoCell::new(TickIo::default()));
         bench.spawn(async { tasks::motors(motors, watchdog, controller, latest, exchange).await });
-        bench.spawn(async { tasks::tape(latest, exchange).await });
+        bench.spawn(async { tasks::record(latest, exchange).await });
         if runs(TaskId::Model) {
             bench.spawn(async { tasks::model(planner, exchange).await });
         }
@@ -92,8 +88,8 @@ impl Board {
         if runs(TaskId::Journal) {
             let (journal, light) = (board.journal.clone(), board.light.clone());
             bench.spawn(async {
-                let mut scribe = LogEncoder::new(Identity::NOBODY);
-                tasks::journal(journal, light, &mut scribe, exchange).await
+                let mut encoder = LogEncoder::new(Identity::NOBODY);
+                tasks::journal(journal, light, &mut encoder, exchange).await
             });
         }
         board
@@ -124,28 +120,6 @@ impl Board {
     fn bridges_are_off(&self) -> bool {
         self.motors.items().last() == Some(&(MotorCommand::OFF, MotorCommand::OFF))
     }
-}
-
-#[test]
-fn an_interrupt_that_beats_leads_every_tick() {
-    let exchange = forever(Exchange::new());
-    exchange.expect_beat();
-    let mut board = Board::with(exchange, &[]);
-    board.bench.poll();
-    assert!(exchange.telemetry().is_none());
-    for _ in 0..3000 {
-        board.bench.freeze_ms(1);
-        // The arm's angle is read with every second tick.
-        assert_eq!(exchange.beat(), now_ms().is_multiple_of(2));
-        board.bench.poll();
-        assert_eq!(exchange.telemetry().expect("a tick").at, now_ms());
-        board.bench.poll();
-    }
-    assert_eq!(board.mode(), Mode::Idle);
-    let reads = board.arm.reads();
-    assert!(reads.windows(2).all(|pair| pair[1] - pair[0] == 2), "{:?}", &reads[..8]);
-    let reads = board.wheel.reads();
-    assert!(reads.windows(2).all(|pair| pair[1] - pair[0] == 1), "{:?}", &reads[..8]);
 }
 
 #[test]

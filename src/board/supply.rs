@@ -46,15 +46,15 @@ pub(crate) fn watch() -> bool {
 
 /// What the supply left when it went, if no start has taken it yet.
 pub(super) fn found() -> Option<Latest> {
-    records::latest(RECORDS.bytes())
+    flash_log::latest(RECORDS.bytes())
 }
 
 /// Takes it, once it is kept elsewhere, and makes room for the next.
 pub(super) fn take(found: Option<Latest>) {
     if let Some(latest) = found {
-        RECORDS.program(latest.mark, records::TAKEN);
+        RECORDS.program(latest.mark, flash_log::TAKEN);
     }
-    if records::free(RECORDS.bytes()).is_none() {
+    if flash_log::free(RECORDS.bytes()).is_none() {
         RECORDS.erase();
     }
 }
@@ -66,8 +66,9 @@ unsafe fn PVD_PVM() {
     guard::cut();
     // Whatever ends it from here on, this is why.
     retained::stop(Stopped::Supply);
-    if let (Some(snapshot), Some(first)) = (retained::snapshot(), records::free(RECORDS.bytes())) {
-        for (index, word) in (first..).zip(records::words(&snapshot)) {
+    if let (Some(snapshot), Some(first)) = (retained::snapshot(), flash_log::free(RECORDS.bytes()))
+    {
+        for (index, word) in (first..).zip(flash_log::words(&snapshot)) {
             // Refused if someone else was in the middle of a double word, which is dropped
             // then.
             let _ = RECORDS.program(index, word) || RECORDS.program(index, word);

@@ -19,9 +19,9 @@ impl MissedCheckIns {
     const NAMES: [&'static str; 6] =
         ["speed", "pressure", "displacement", "angle", "model", "journal"];
 
-    /// The task of this station, by [`TaskId`](crate::tasks::TaskId).
+    /// The task of this number, by [`TaskId`](crate::tasks::TaskId).
     #[must_use]
-    pub(crate) const fn station(index: usize) -> Self {
+    pub const fn task(index: usize) -> Self {
         Self(1 << (index & 0xF))
     }
 
@@ -35,12 +35,6 @@ impl MissedCheckIns {
     #[must_use]
     pub const fn is_nobody(self) -> bool {
         self.0 == 0
-    }
-
-    /// The last alone, if there is one.
-    #[must_use]
-    pub(crate) fn last(self) -> Option<Self> {
-        Some(Self(1 << self.0.checked_ilog2()?))
     }
 
     /// The bits.

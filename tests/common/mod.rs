@@ -1,6 +1,6 @@
 //! Virtual time, mocked board and task runner for the tests of the async tasks.
 
-#![allow(dead_code, reason = "each test file uses its part of this")]
+pub(crate) mod mutate;
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
