@@ -2,10 +2,12 @@
 //! and failure. `src/board` implements it on the STM32G474, the tests with
 //! mocks, the virtual rig with its plant.
 
-use crate::blackbox::Flight;
+pub mod hil;
+
 use crate::estimate::Place;
 use crate::log::Identity;
-use crate::log::frame::{Checker, check};
+use crate::restart::DriveSnapshot;
+use crate::tick::Entry;
 use crate::sense::raw::{AdcCode, AngleFrame, BridgeCodes, BusFault, EncoderCount};
 use crate::supervise::Command;
 use crate::tick::Entry;
@@ -65,7 +67,7 @@ pub trait Watchdog {
 
     /// Keeps what the drive does in this tick where a restart finds it. A board without
     /// such a place keeps nothing.
-    fn keep(&mut self, flight: &Flight);
+    fn keep(&mut self, snapshot: &DriveSnapshot);
 
     /// Where the wheel stands by what was kept before this start, if that tells.
     fn place(&self) -> Option<Place> {
@@ -102,11 +104,6 @@ pub trait Journal {
     fn send(&mut self, frame: &[u8]) -> bool {
         let _ = frame;
         false
-    }
-
-    /// What sums up the frames: the library's own code, or hardware that gives the same.
-    fn checker(&self) -> Checker {
-        check
     }
 
     /// Who speaks, for the head of the binary log.

@@ -12,18 +12,15 @@
 // The board's futures run on executors of one core; none has to be `Send`.
 #![allow(async_fn_in_trait)]
 
-pub mod blackbox;
 pub mod control;
 pub mod estimate;
 pub mod fault;
 pub mod hal;
-pub mod hil;
-pub mod link;
 pub mod log;
 pub mod model;
 pub mod numeric;
-pub mod pages;
 pub mod params;
+pub mod restart;
 pub mod rig;
 pub mod sense;
 pub mod supervise;

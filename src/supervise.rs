@@ -1,5 +1,6 @@
 //! Modes and their one table of transitions, self-test, and the monitors that find faults.
 
+pub mod codes;
 mod crosscheck;
 mod mode;
 mod monitor;

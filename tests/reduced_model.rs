@@ -1,7 +1,7 @@
 //! What the model offers beside the quantities of a crossing, against the formulas or
 //! against itself the other way round.
 
-use interstage::hil::Given;
+use interstage::hal::hil::Given;
 use interstage::model::formula::Formula;
 use interstage::model::reduced::ReducedModel;
 use interstage::model::{PlanRequest, Planner};

@@ -11,11 +11,11 @@
 
 use std::path::Path;
 
-use interstage::blackbox::Restart;
 use interstage::fault::Fault;
 use interstage::log::Record;
 use interstage::log::frame::{Body, Frame};
 use interstage::model::{Plan, PlanRequest, Planner};
+use interstage::restart::Restart;
 use interstage::rig::Rig;
 use interstage::sense::raw::SensorFrame;
 use interstage::supervise::Mode;

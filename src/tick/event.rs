@@ -1,8 +1,8 @@
 //! Log entries: what happened, when.
 
-use crate::blackbox::Restart;
 use crate::estimate::ContactStage;
 use crate::fault::{Fault, Limit};
+use crate::restart::Restart;
 use crate::supervise::{Command, Mode};
 use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Ratio, Seconds, Tick};
 

@@ -19,7 +19,7 @@ use hil_sim::replay::replay;
 use hil_sim::scenario::Scenario;
 use hil_sim::sil;
 use interstage::fault::Fault;
-use interstage::hil::{FIRST, Given, Taken};
+use interstage::hal::hil::{FIRST, Given, Taken};
 use interstage::rig::Rig;
 use interstage::supervise::{Command, Mode};
 

@@ -1,7 +1,7 @@
 //! What a log says, as messages for other programs: the same in a file and on the
 //! network.
 
-use interstage::blackbox::Reset;
+use interstage::restart::Reset;
 use interstage::tick::{Entry, Event};
 use serde::Serialize;
 
@@ -29,7 +29,7 @@ pub(crate) fn messages(item: &Item) -> Option<(Topic, Vec<u8>)> {
             body(Topic::Log, &json::log_message(ns, level(entry), &text))
         }
         Item::Mark(mark) => body(Topic::Log, &json::log_message(0, WARNING, &mark.to_string())),
-        Item::Identity(_) | Item::Plan(..) | Item::Request(..) | Item::Shots(_) => None,
+        Item::Identity(_) | Item::Plan(..) | Item::Request(..) | Item::CaptureChunk(_) => None,
     }
 }
 

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::time::Instant;
 
-use interstage::hil::{FIRST, Given};
+use interstage::hal::hil::{FIRST, Given};
 use interstage::log::{Identity, Record, identity};
 use interstage::model::Planner;
 use interstage::supervise::Mode;

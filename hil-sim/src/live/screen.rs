@@ -9,7 +9,7 @@ use ratatui::symbols::Marker;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph};
 
-use interstage::blackbox::Reset;
+use interstage::restart::Reset;
 use interstage::supervise::Mode;
 use interstage::tick::{Entry, Event};
 

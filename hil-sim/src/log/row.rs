@@ -1,6 +1,6 @@
 //! A tick with names and units.
 
-use interstage::log::{Flags, Record, number};
+use interstage::log::{Flags, Record, codes};
 use interstage::sense::raw::{
     AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
 };
@@ -18,7 +18,7 @@ pub struct Row {
     pub tick: u32,
     /// The same, s.
     pub t_s: f64,
-    /// Number of the mode, see [`number::mode`].
+    /// Number of the mode, see [`codes::mode`].
     pub mode: u8,
     /// Contact stage, 1 to 6.
     pub stage: u8,
@@ -92,7 +92,7 @@ impl Row {
         Self {
             tick: seen.at,
             t_s: f64::from(seen.at) * 1e-3,
-            mode: number::of_mode(seen.mode),
+            mode: codes::of_mode(seen.mode),
             stage: seen.stage as u8,
             level: seen.level,
             wheel_code: wheel.map(|sample| sample.code.get()),
@@ -105,7 +105,7 @@ impl Row {
             arm_at: arm.map(|sample| sample.at),
             drive_code: bridges.map(|codes| codes.drive.get()),
             pretightener_code: bridges.map(|codes| codes.pretightener.get()),
-            command: number::of_command(flags.command()),
+            command: codes::of_command(flags.command()),
             flags: flags.to_bits(),
             position_mm: seen.position.to_num(),
             speed_mm_s: seen.speed.to_num(),
@@ -161,8 +161,8 @@ impl Row {
         let duty = |value: f64| Duty::from_bits((value * DUTY).round() as i16);
         Some(Telemetry {
             at: self.tick,
-            mode: number::mode(self.mode)?,
-            stage: number::stage(self.stage)?,
+            mode: codes::mode(self.mode)?,
+            stage: codes::stage(self.stage)?,
             position: q(self.position_mm),
             speed: q(self.speed_mm_s),
             speed_ref: q(self.speed_ref_mm_s),

@@ -1,8 +1,9 @@
 //! A run under way: controller and plant, a tick at a time, with commands and sensor
 //! failures given from outside.
 
-use interstage::blackbox::{Flight, Late, Recorder, Reset, Restart};
+use interstage::log::SnapshotRecorder;
 use interstage::model::{Plan, Planner};
+use interstage::restart::{DriveSnapshot, MissedCheckIns, Reset, Restart};
 use interstage::sense::raw::{Sample, SensorFrame};
 use interstage::supervise::{Command, Mode};
 use interstage::tick::{Controller, Input, Output, State};
@@ -229,15 +230,19 @@ impl Session {
 
     /// The record of the last tick, as memory keeps it.
     #[must_use]
-    pub fn record(&self) -> Flight {
-        Recorder::default().flight(&self.held.telemetry, self.state.confidence(), Late::NOBODY)
+    pub fn record(&self) -> DriveSnapshot {
+        SnapshotRecorder::default().snapshot(
+            &self.held.telemetry,
+            self.state.confidence(),
+            MissedCheckIns::NOBODY,
+        )
     }
 
     /// A reset that leaves memory and takes the power from the bridges at once: the
     /// controller starts with what its record of the last tick tells of the place.
     pub fn restart(&mut self) {
-        let flight = Some(self.record());
-        self.restart_from(Restart { reset: Reset::Pin, flight, crash: None });
+        let snapshot = Some(self.record());
+        self.restart_from(Restart { reset: Reset::Pin, snapshot, crash: None });
     }
 
     /// A start that finds this of the time before it.

@@ -5,7 +5,7 @@ use core::cell::Cell;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
-use interstage::hil::Given;
+use interstage::hal::hil::Given;
 use interstage::supervise::Command;
 use interstage::units::MotorCommand;
 

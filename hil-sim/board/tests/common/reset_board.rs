@@ -3,7 +3,7 @@
 
 use hil_sim::log::Run;
 use hil_sim::scenario::Scenario;
-use interstage::blackbox::Restart;
+use interstage::restart::Restart;
 use interstage::tick::Event;
 use rig_board::bench::{Bench, Passed};
 use rig_board::core::Register;

@@ -1,33 +1,38 @@
-//! From the tape to frames: the journal's part of the binary log.
+//! From ticks and entries to frames: the journal's part of the binary log.
 
 use super::capture::Capture;
-use super::frame::{self, Checker, Head, Kind, Page, put_ticks};
+use super::frame::{FrameBuffer, Head, Kind, TicksFrame};
 use super::identity::Identity;
 use super::ledger::Ledger;
-use super::tape::Tape;
+use crate::model::{Plan, PlanRequest};
 use crate::tick::{Entry, Event};
+use super::record::Record;
 use crate::units::Tick;
 use serde::Serialize;
 
 /// Ticks from one identity to the next.
 const IDENTITY_EVERY: u32 = 1000;
 
-/// Writes frames. It never waits: what finds no room is dropped whole and counted.
-pub struct Scribe {
+/// Ticks in a frame, as far as they fit.
+pub const TICKS_PER_FRAME: usize = 8;
+
+/// Takes a frame complete, or says that it did not.
+pub type FrameSink<'a> = &'a mut dyn FnMut(&[u8]) -> bool;
+
+/// Writes frames. It never waits: what finds no room is dropped as a whole and counted.
+pub struct LogEncoder {
     identity: Identity,
     introduced: Option<Tick>,
     sequence: u32,
     dropped: u32,
     capture: Capture,
     ledger: Ledger,
-    page: Page,
-    /// What sums up its frames if not the library's own code. None to begin with, so that a
-    /// new scribe is all zeros and takes no room in flash.
-    check: Option<Checker>,
+    ticks: TicksFrame,
+    buffer: FrameBuffer,
 }
 
-impl Scribe {
-    /// A scribe that has written nothing yet.
+impl LogEncoder {
+    /// An encoder that has written nothing yet.
     #[must_use]
     pub const fn new(identity: Identity) -> Self {
         Self {
@@ -37,43 +42,41 @@ impl Scribe {
             dropped: 0,
             capture: Capture::new(),
             ledger: Ledger::new(),
-            page: Page::new(),
-            check: None,
+            ticks: TicksFrame::new(),
+            buffer: FrameBuffer::new(),
         }
     }
 
-    /// Says from now on that this one speaks.
-    pub fn speak_for(&mut self, identity: Identity) {
+    /// Sets the identity that the log reports from now on.
+    pub fn set_identity(&mut self, identity: Identity) {
         self.identity = identity;
     }
 
-    /// Has its frames summed up by this from now on.
-    pub fn check_by(&mut self, check: Checker) {
-        self.check = Some(check);
+    /// Adds a tick; its frame is sent with the last of [`TICKS_PER_FRAME`].
+    pub fn tick(&mut self, record: &Record, send: FrameSink<'_>) {
+        self.capture.look(record, self.identity.corner);
+        self.ledger.look(record);
+        if !self.ticks.push(record) {
+            self.flush(record.at(), send);
+            self.ticks.push(record);
+        }
+        if self.ticks.ticks() >= TICKS_PER_FRAME {
+            self.flush(record.at(), send);
+        }
     }
 
-    /// Writes what is on the tape. `send` takes a frame whole, or says that it did not.
-    pub fn read(&mut self, tape: &Tape, send: &mut dyn FnMut(&[u8]) -> bool) {
-        if let Some((at, request)) = tape.take_request() {
-            self.one(Kind::Request, &(at, request), send);
-        }
-        if let Some((at, plan)) = tape.take_plan() {
-            self.one(Kind::Plan, &(at, plan), send);
-        }
-        while tape.unread() > 0 {
-            self.introduce(tape, send);
-            self.ticks(tape, send);
-        }
-        // A capture waits for the room that the ticks leave.
-        if let Some(piece) = self.capture.piece()
-            && self.one(Kind::Shots, &piece, send)
-        {
-            self.capture.sent(&piece);
-        }
+    /// Writes the plan that the tick of this number was given.
+    pub fn plan(&mut self, at: Tick, plan: &Plan, send: FrameSink<'_>) {
+        self.one(Kind::Plan, &(at, plan), send);
+    }
+
+    /// Writes the request that the tick of this number made.
+    pub fn request(&mut self, at: Tick, request: &PlanRequest, send: FrameSink<'_>) {
+        self.one(Kind::Request, &(at, request), send);
     }
 
     /// Writes a log entry; of a crossing, its line of the ledger as well.
-    pub fn entry(&mut self, entry: &Entry, send: &mut dyn FnMut(&[u8]) -> bool) {
+    pub fn entry(&mut self, entry: &Entry, send: FrameSink<'_>) {
         self.one(Kind::Event, entry, send);
         if let Event::Crossing(crossing) = &entry.event {
             let line = self.ledger.close(entry.at, crossing);
@@ -81,55 +84,39 @@ impl Scribe {
         }
     }
 
-    /// Says who speaks, if it is time.
-    fn introduce(&mut self, tape: &Tape, send: &mut dyn FnMut(&[u8]) -> bool) {
-        let now = tape.now();
+    /// Sends the ticks that wait for their frame to fill, the identity before them once a
+    /// second, and a piece of a capture behind them.
+    pub fn flush(&mut self, now: Tick, send: FrameSink<'_>) {
+        if self.ticks.ticks() == 0 {
+            return;
+        }
         let due = |last: Tick| now.wrapping_sub(last) >= IDENTITY_EVERY;
         if self.introduced.is_none_or(due) {
             self.introduced = Some(now);
             let identity = self.identity.clone();
             self.one(Kind::Identity, &identity, send);
         }
-    }
-
-    /// One frame of ticks.
-    fn ticks(&mut self, tape: &Tape, send: &mut dyn FnMut(&[u8]) -> bool) {
-        let head = self.head(Kind::Ticks);
-        let Self { capture, ledger, identity, page, check, .. } = self;
-        let frame = page.write(head, check.unwrap_or(frame::check), |body| {
-            put_ticks(body, |record| {
-                let there = tape.take_into(record);
-                if there {
-                    capture.look(record, identity.corner);
-                    ledger.look(record);
-                }
-                there
-            })
-        });
-        let room = send(frame);
+        let room = send(self.ticks.close(self.sequence, self.dropped));
         self.count(room);
+        // A capture waits for the room that the ticks leave.
+        if let Some(piece) = self.capture.piece()
+            && self.one(Kind::CaptureChunk, &piece, send)
+        {
+            self.capture.sent(&piece);
+        }
     }
 
     /// A frame of one value; whether there was room for it.
     #[inline(never)]
-    fn one(
-        &mut self,
-        kind: Kind,
-        value: &impl Serialize,
-        send: &mut dyn FnMut(&[u8]) -> bool,
-    ) -> bool {
-        let head = self.head(kind);
+    fn one(&mut self, kind: Kind, value: &impl Serialize, send: FrameSink<'_>) -> bool {
+        let head = Head { kind: kind as u8, sequence: self.sequence, dropped: self.dropped };
         // All of them fit, see the test.
-        let frame = self.page.write(head, self.check.unwrap_or(frame::check), |body| {
-            postcard::to_slice(value, body).map_or(0, |used| used.len())
-        });
+        let frame = self
+            .buffer
+            .write(head, |body| postcard::to_slice(value, body).map_or(0, |used| used.len()));
         let room = send(frame);
         self.count(room);
         room
-    }
-
-    const fn head(&self, kind: Kind) -> Head {
-        Head { kind: kind as u8, sequence: self.sequence, dropped: self.dropped }
     }
 
     /// A frame has been made, and has found room or not.
@@ -142,13 +129,12 @@ impl Scribe {
 #[cfg(test)]
 #[allow(clippy::float_arithmetic, reason = "positions of the test")]
 mod tests {
-    use super::super::capture::{IN_FRAME, Shot, Shots, Trigger};
+    use super::super::capture::{CaptureChunk, CaptureSample, IN_FRAME, Trigger};
     use super::super::frame::{Body, Frame};
     use super::super::identity;
     use super::super::ledger::tests::crossing;
-    use super::super::record::Record;
     use super::*;
-    use crate::fault::Limit;
+use crate::fault::Limit;
     use crate::model::{Outcome, Plan, PlanRequest, Review};
     use crate::supervise::Mode;
     use crate::tick::CrossingRecord;
@@ -187,8 +173,8 @@ mod tests {
         }
     }
 
-    fn scribe() -> Scribe {
-        Scribe::new(Identity {
+    fn encoder() -> LogEncoder {
+        LogEncoder::new(Identity {
             schema: identity::SCHEMA,
             version: identity::text("1.2.3"),
             rig: identity::text("prototype"),
@@ -196,27 +182,20 @@ mod tests {
         })
     }
 
-    fn tick(tape: &Tape, at: Tick) {
-        let mut output = Output::default();
-        output.telemetry.at = at;
-        output.telemetry.mode = Mode::Idle;
-        output.telemetry.position = Q16::from_num(f64::from(at) * 0.008);
-        tape.keep(&Input { now: at, ..Input::default() }, &output);
-    }
-
-    fn run(scribe: &mut Scribe, tape: &Tape, channel: &mut Channel, ticks: core::ops::Range<Tick>) {
+    fn run(encoder: &mut LogEncoder, channel: &mut Channel, ticks: core::ops::Range<Tick>) {
         for at in ticks {
-            tick(tape, at);
-            if tape.unread() == super::super::BATCH {
-                scribe.read(tape, &mut |frame| channel.send(frame));
-            }
+            let mut record = Record::EMPTY;
+            record.telemetry.at = at;
+            record.telemetry.mode = Mode::Idle;
+            record.telemetry.position = Q16::from_num(f64::from(at) * 0.008);
+            encoder.tick(&record, &mut |frame| channel.send(frame));
         }
     }
 
     #[test]
     fn every_tick_arrives_and_the_identity_every_second() {
-        let (mut scribe, tape, mut channel) = (scribe(), Tape::new(), Channel::default());
-        run(&mut scribe, &tape, &mut channel, 0..4000);
+        let (mut encoder, mut channel) = (encoder(), Channel::default());
+        run(&mut encoder, &mut channel, 0..4000);
         let (heads, records) = channel.read();
         assert!(records.iter().map(Record::at).eq(0..4000));
         assert!(heads.iter().map(|head| head.sequence).eq(0..heads.len() as u32));
@@ -227,32 +206,24 @@ mod tests {
 
     #[test]
     fn it_speaks_for_whom_it_was_told_to() {
-        let mut scribe = Scribe::new(Identity::NOBODY);
+        let mut encoder = LogEncoder::new(Identity::NOBODY);
         let somebody =
             Identity { parameters: 0xABCD, rig: identity::text("fe"), ..Identity::NOBODY };
-        scribe.speak_for(somebody.clone());
-        let (tape, mut channel) = (Tape::new(), Channel::default());
-        run(&mut scribe, &tape, &mut channel, 0..super::super::BATCH);
+        encoder.set_identity(somebody.clone());
+        let mut channel = Channel::default();
+        run(&mut encoder, &mut channel, 0..TICKS_PER_FRAME as u32);
         let said = Frame::open(&channel.frames[0]).unwrap().body().unwrap();
         assert_eq!(said, Body::Identity(somebody));
     }
 
     #[test]
-    fn who_is_told_to_sum_up_does() {
-        let (mut scribe, tape, mut channel) = (scribe(), Tape::new(), Channel::default());
-        scribe.check_by(|bytes| !frame::check(bytes));
-        run(&mut scribe, &tape, &mut channel, 0..super::super::BATCH);
-        assert!(channel.frames.iter().all(|frame| Frame::open(frame).is_err()));
-    }
-
-    #[test]
     fn what_finds_no_room_is_counted_and_takes_nothing_else_with_it() {
-        let (mut scribe, tape, mut channel) = (scribe(), Tape::new(), Channel::default());
-        run(&mut scribe, &tape, &mut channel, 0..80);
+        let (mut encoder, mut channel) = (encoder(), Channel::default());
+        run(&mut encoder, &mut channel, 0..80);
         channel.room = Some(0);
-        run(&mut scribe, &tape, &mut channel, 80..160);
+        run(&mut encoder, &mut channel, 80..160);
         channel.room = None;
-        run(&mut scribe, &tape, &mut channel, 160..240);
+        run(&mut encoder, &mut channel, 160..240);
         let (heads, records) = channel.read();
         assert!(records.iter().map(Record::at).eq((0..80).chain(160..240)));
         let jump = heads.windows(2).find(|pair| pair[1].sequence != pair[0].sequence + 1).unwrap();
@@ -262,9 +233,9 @@ mod tests {
 
     #[test]
     fn a_crossing_is_an_event_and_a_line_of_the_ledger() {
-        let (mut scribe, mut channel) = (scribe(), Channel::default());
+        let (mut encoder, mut channel) = (encoder(), Channel::default());
         let event = Event::Crossing(crossing(Direction::Deploy, 1.0));
-        scribe.entry(&Entry { at: 7, event }, &mut |frame| channel.send(frame));
+        encoder.entry(&Entry { at: 7, event }, &mut |frame| channel.send(frame));
         let kinds: Vec<u8> = channel.read().0.iter().map(|head| head.kind).collect();
         assert_eq!(kinds, [Kind::Event as u8, Kind::Ledger as u8]);
     }
@@ -328,14 +299,14 @@ mod tests {
             limits: [Some(Limit::SlipMarginLow); 3],
             outcome: Some(outcome),
         };
-        let shot = Shot {
+        let shot = CaptureSample {
             at: u16::MAX,
             codes: [u16::MAX; 4],
             duties: [i16::MIN; 2],
             mode: 255,
             stage: 255,
         };
-        let piece = Shots {
+        let piece = CaptureChunk {
             trigger: Trigger::Command,
             at: u32::MAX,
             first: 255,
@@ -352,26 +323,26 @@ mod tests {
             calibration: u32::MAX,
             corner: most,
         };
-        let mut scribe = scribe();
-        scribe.sequence = u32::MAX;
-        scribe.dropped = u32::MAX;
+        let mut encoder = encoder();
+        encoder.sequence = u32::MAX;
+        encoder.dropped = u32::MAX;
         let mut bodies = Vec::new();
         let mut send = |frame: &[u8]| {
             bodies.push(frame.to_vec());
             true
         };
         let entry = Entry { at: u32::MAX, event: Event::Crossing(crossing) };
-        scribe.entry(&entry, &mut send);
-        scribe.one(Kind::Plan, &(u32::MAX, plan), &mut send);
-        scribe.one(Kind::Request, &(u32::MAX, request), &mut send);
-        scribe.one(Kind::Shots, &piece, &mut send);
-        scribe.one(Kind::Identity, &identity, &mut send);
+        encoder.entry(&entry, &mut send);
+        encoder.one(Kind::Plan, &(u32::MAX, plan), &mut send);
+        encoder.one(Kind::Request, &(u32::MAX, request), &mut send);
+        encoder.one(Kind::CaptureChunk, &piece, &mut send);
+        encoder.one(Kind::Identity, &identity, &mut send);
         let mut read = bodies.iter().map(|bytes| Frame::open(bytes).unwrap().body().unwrap());
         assert_eq!(read.next(), Some(Body::Event(entry)));
         assert!(matches!(read.next(), Some(Body::Ledger(line)) if line.crossing == crossing));
         assert_eq!(read.next(), Some(Body::Plan(u32::MAX, plan)));
         assert_eq!(read.next(), Some(Body::Request(u32::MAX, request)));
-        assert_eq!(read.next(), Some(Body::Shots(piece)));
+        assert_eq!(read.next(), Some(Body::CaptureChunk(piece)));
         assert_eq!(read.next(), Some(Body::Identity(identity)));
     }
 }

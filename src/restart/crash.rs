@@ -4,7 +4,7 @@ use core::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use super::{CRASH_WORDS, Late, check};
+use super::{CRASH_WORDS, MissedCheckIns, check};
 use crate::units::Tick;
 
 /// What stopped the program.
@@ -35,7 +35,7 @@ pub enum Stopped {
         /// Where that would have returned to.
         lr: u32,
         /// Who had not come.
-        late: Late,
+        missed: MissedCheckIns,
         /// When the bridges were cut.
         at: Tick,
     },
@@ -64,7 +64,7 @@ impl Crash {
         let (kind, [a, b, c, d]) = match self.stopped {
             Stopped::Panic { place, line } => (1, [place, line, 0, 0]),
             Stopped::Fault { pc, lr, cfsr, hfsr } => (2, [pc, lr, cfsr, hfsr]),
-            Stopped::Hang { pc, lr, late, at } => (3, [pc, lr, u32::from(late.bits()), at]),
+            Stopped::Hang { pc, lr, missed, at } => (3, [pc, lr, u32::from(missed.bits()), at]),
             Stopped::Supply => (4, [0; 4]),
             Stopped::Image => (5, [0; 4]),
         };
@@ -79,7 +79,7 @@ impl Crash {
         let stopped = match kind {
             1 => Stopped::Panic { place: a, line: b },
             2 => Stopped::Fault { pc: a, lr: b, cfsr: c, hfsr: d },
-            3 => Stopped::Hang { pc: a, lr: b, late: Late::from_bits(c as u16), at: d },
+            3 => Stopped::Hang { pc: a, lr: b, missed: MissedCheckIns::from_bits(c as u16), at: d },
             4 => Stopped::Supply,
             5 => Stopped::Image,
             _ => return None,
@@ -96,8 +96,8 @@ impl fmt::Display for Stopped {
             Self::Fault { pc, lr, cfsr, hfsr } => {
                 write!(f, "a hard fault at {pc:#x} from {lr:#x}, CFSR {cfsr:#x}, HFSR {hfsr:#x}")
             }
-            Self::Hang { pc, lr, late, .. } => {
-                write!(f, "{} did not come, at {pc:#x} from {lr:#x}", late.name())
+            Self::Hang { pc, lr, missed, .. } => {
+                write!(f, "{} did not come, at {pc:#x} from {lr:#x}", missed.name())
             }
             Self::Supply => f.write_str("the supply fell too low"),
             Self::Image => f.write_str("a bit of the image had turned over"),

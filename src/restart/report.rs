@@ -4,9 +4,9 @@ use core::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Crash, Flight, Pace, Stopped};
 use crate::estimate::Place;
 use crate::fault::Fault;
+use super::{Crash, DriveSnapshot, PackedSpeed, Stopped};
 use crate::units::{Millimetres, Tick, ticks_to_seconds};
 
 /// What the chip says about why it started.
@@ -44,7 +44,7 @@ pub struct Restart {
     /// Why the chip started.
     pub reset: Reset,
     /// What the drive last did, if memory kept it.
-    pub flight: Option<Flight>,
+    pub snapshot: Option<DriveSnapshot>,
     /// What stopped the program, if something did.
     pub crash: Option<Crash>,
 }
@@ -78,16 +78,18 @@ impl Restart {
     #[inline(never)]
     #[must_use]
     pub fn place(&self) -> Option<Place> {
-        let flight = self.flight.filter(|flight| flight.pace.placed() && spared(flight.fault))?;
+        let snapshot = self
+            .snapshot
+            .filter(|snapshot| snapshot.packed_speed.placed() && spared(snapshot.fault))?;
         let unwatched = match (self.reset, self.crash.map(|crash| crash.stopped)) {
-            (_, Some(Stopped::Hang { at, .. })) => at.wrapping_sub(flight.tick).min(UNFED),
+            (_, Some(Stopped::Hang { at, .. })) => at.wrapping_sub(snapshot.tick).min(UNFED),
             (Reset::Watchdog, None) => UNFED,
             _ => 0,
         };
-        let way = flight.pace.speed() * ticks_to_seconds(unwatched + COASTS);
+        let way = snapshot.packed_speed.speed() * ticks_to_seconds(unwatched + COASTS);
         Some(Place {
-            position: flight.position + way,
-            sure: unwatched <= FRESH && !self.was_away() && flight.level < Flight::UNSURE,
+            position: snapshot.position + way,
+            sure: unwatched <= FRESH && !self.was_away() && snapshot.level < DriveSnapshot::UNSURE,
         })
     }
 
@@ -101,14 +103,14 @@ impl Restart {
     /// What is to be kept of it until the first tick, for a reset that comes before: the
     /// wheel stands where it came to rest, unless it is moved.
     #[must_use]
-    pub fn standing(&self) -> Option<Flight> {
-        let mut flight = self.flight?;
+    pub fn standing(&self) -> Option<DriveSnapshot> {
+        let mut snapshot = self.snapshot?;
         if let Some(place) = self.place() {
-            flight.position = place.position;
-            flight.pace = Pace::of(Millimetres::ZERO, true);
+            snapshot.position = place.position;
+            snapshot.packed_speed = PackedSpeed::of(Millimetres::ZERO, true);
         }
-        flight.level |= Flight::UNSURE;
-        Some(flight)
+        snapshot.level |= DriveSnapshot::UNSURE;
+        Some(snapshot)
     }
 }
 
@@ -140,21 +142,21 @@ impl fmt::Display for Restart {
         if self.shut_out() {
             f.write_str("; a hang with interrupts shut out")?;
         }
-        if let Some(flight) = &self.flight {
-            let Flight { tick, position, level, fault, late, .. } = *flight;
-            match flight.mode() {
+        if let Some(snapshot) = &self.snapshot {
+            let DriveSnapshot { tick, position, level, fault, missed, .. } = *snapshot;
+            match snapshot.mode() {
                 Some(mode) => write!(f, "; before: {mode:?}")?,
-                None => write!(f, "; before: mode {}", flight.mode)?,
+                None => write!(f, "; before: mode {}", snapshot.mode)?,
             }
-            let level = level & !Flight::UNSURE;
+            let level = level & !DriveSnapshot::UNSURE;
             write!(f, " at tick {tick}, {position:.2} mm, level {level}")?;
             if fault != 0 {
                 write!(f, ", last fault {fault}")?;
             }
-            if !late.is_nobody() {
-                write!(f, ", {} was late", late.name())?;
+            if !missed.is_nobody() {
+                write!(f, ", {} was late", missed.name())?;
             }
-            if flight.level >= Flight::UNSURE {
+            if snapshot.level >= DriveSnapshot::UNSURE {
                 f.write_str(", its place unsure")?;
             }
         }

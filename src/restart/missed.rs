@@ -4,9 +4,9 @@ use serde::{Deserialize, Serialize};
 
 /// Who had not come when the watchdog was no longer fed, one bit a task.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Late(u16);
+pub struct MissedCheckIns(u16);
 
-impl Late {
+impl MissedCheckIns {
     /// Everyone is there.
     pub const NOBODY: Self = Self(0);
     /// The control tick began and did not end.
@@ -19,9 +19,9 @@ impl Late {
     const NAMES: [&'static str; 6] =
         ["speed", "pressure", "displacement", "angle", "model", "journal"];
 
-    /// The task of this station, by [`Station`](crate::tasks::Station).
+    /// The task of this number, by [`TaskId`](crate::tasks::TaskId).
     #[must_use]
-    pub(crate) const fn station(index: usize) -> Self {
+    pub const fn task(index: usize) -> Self {
         Self(1 << (index & 0xF))
     }
 
@@ -35,12 +35,6 @@ impl Late {
     #[must_use]
     pub const fn is_nobody(self) -> bool {
         self.0 == 0
-    }
-
-    /// The last alone, if there is one.
-    #[must_use]
-    pub(crate) fn last(self) -> Option<Self> {
-        Some(Self(1 << self.0.checked_ilog2()?))
     }
 
     /// The bits.

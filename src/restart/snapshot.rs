@@ -2,19 +2,19 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{FLIGHT_WORDS, Late, check};
 use crate::estimate::PositionConfidence;
-use crate::log::number;
+use super::{MissedCheckIns, SNAPSHOT_WORDS, check};
 use crate::supervise::Mode;
+use crate::supervise::codes;
 use crate::tick::Telemetry;
 use crate::units::{Millimetres, MillimetresPerSecond, Q16, Tick};
 
 /// Reference of the speed in a tick, signed outwards, in 1/32 mm/s, and in the last bit
 /// whether the position was more than a guess.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Pace(pub(super) i16);
+pub struct PackedSpeed(pub(super) i16);
 
-impl Pace {
+impl PackedSpeed {
     /// Bits of a speed that it leaves out.
     const COARSER: u32 = 11;
 
@@ -41,24 +41,24 @@ impl Pace {
 
 /// What the drive was doing in a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Flight {
+pub struct DriveSnapshot {
     /// The tick.
     pub tick: Tick,
     /// Estimated axial position, mm.
     pub position: Millimetres,
-    /// Mode, by [`number::mode`].
+    /// Mode, by [`codes::mode`].
     pub mode: u8,
     /// Sleeve level, and [`UNSURE`](Self::UNSURE).
     pub level: u8,
     /// Code of the last fault since the start, 0 for none.
     pub fault: u16,
     /// Who had not come.
-    pub late: Late,
+    pub missed: MissedCheckIns,
     /// How fast it was going, and whether the position was more than a guess.
-    pub pace: Pace,
+    pub packed_speed: PackedSpeed,
 }
 
-impl Flight {
+impl DriveSnapshot {
     /// What it is known by.
     const SEED: u32 = 0xF11E_0001;
     /// Added to the level if the position may be off, and no step has confirmed it; and by
@@ -68,72 +68,41 @@ impl Flight {
 
     /// As words.
     #[must_use]
-    pub fn seal(&self) -> [u32; FLIGHT_WORDS] {
+    pub fn seal(&self) -> [u32; SNAPSHOT_WORDS] {
         let state = u32::from(self.mode) | u32::from(self.level) << 8 | u32::from(self.fault) << 16;
-        let late = u32::from(self.late.bits()) | u32::from(self.pace.0 as u16) << 16;
-        let [a, b, c, d] = [self.tick, self.position.to_bits() as u32, state, late];
+        let missed = u32::from(self.missed.bits()) | u32::from(self.packed_speed.0 as u16) << 16;
+        let [a, b, c, d] = [self.tick, self.position.to_bits() as u32, state, missed];
         [a, b, c, d, check(Self::SEED, &[a, b, c, d])]
     }
 
     /// From words, if they are whole.
     #[must_use]
-    pub fn open(words: &[u32; FLIGHT_WORDS]) -> Option<Self> {
-        let [tick, position, state, late, sum] = *words;
-        (check(Self::SEED, &[tick, position, state, late]) == sum).then_some(Self {
+    pub fn open(words: &[u32; SNAPSHOT_WORDS]) -> Option<Self> {
+        let [tick, position, state, missed, sum] = *words;
+        (check(Self::SEED, &[tick, position, state, missed]) == sum).then_some(Self {
             tick,
             position: Q16::from_bits(position as i32),
             mode: state as u8,
             level: (state >> 8) as u8,
             fault: (state >> 16) as u16,
-            late: Late::from_bits(late as u16),
-            pace: Pace((late >> 16) as i16),
+            missed: MissedCheckIns::from_bits(missed as u16),
+            packed_speed: PackedSpeed((missed >> 16) as i16),
         })
     }
 
     /// The mode; none if the number has no meaning.
     #[must_use]
     pub fn mode(&self) -> Option<Mode> {
-        number::mode(self.mode)
+        codes::mode(self.mode)
     }
 }
 
 /// The later of two.
 #[must_use]
-pub fn later(one: Option<Flight>, other: Option<Flight>) -> Option<Flight> {
+pub fn later(one: Option<DriveSnapshot>, other: Option<DriveSnapshot>) -> Option<DriveSnapshot> {
     match (one, other) {
         (Some(a), Some(b)) if b.tick.wrapping_sub(a.tick) as i32 > 0 => Some(b),
         (Some(a), _) => Some(a),
         (None, b) => b,
-    }
-}
-
-/// Gathers from tick to tick what a [`Flight`] says.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Recorder {
-    /// Mode of the latest row, and its number.
-    mode: Mode,
-    number: u8,
-    fault: u16,
-}
-
-impl Recorder {
-    /// What is to be kept of a tick, in which the position was to be trusted so far.
-    pub fn flight(&mut self, row: &Telemetry, trust: PositionConfidence, late: Late) -> Flight {
-        if row.mode != self.mode {
-            self.mode = row.mode;
-            self.number = number::of_mode(row.mode);
-            if let Mode::FaultHold(fault) = row.mode {
-                self.fault = fault.code();
-            }
-        }
-        Flight {
-            tick: row.at,
-            position: row.position,
-            mode: self.number,
-            level: row.level | if trust == PositionConfidence::Unsure { Flight::UNSURE } else { 0 },
-            fault: self.fault,
-            late,
-            pace: Pace::of(row.speed_ref, trust != PositionConfidence::Guess),
-        }
     }
 }

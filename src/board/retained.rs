@@ -13,8 +13,8 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 use cortex_m::peripheral::SCB;
 use cortex_m::peripheral::syst::SystClkSource;
-use interstage::blackbox::{
-    CRASH_WORDS, Crash, FLIGHT_WORDS, Flight, Reset, Restart, Stopped, later,
+use interstage::restart::{
+    CRASH_WORDS, Crash, DriveSnapshot, Reset, Restart, SNAPSHOT_WORDS, Stopped, later,
 };
 
 use super::{SYSCLK_HZ, guard, image, supply};
@@ -24,7 +24,7 @@ use super::{SYSCLK_HZ, guard, image, supply};
 struct Kept {
     crash: [u32; CRASH_WORDS],
     /// Even and odd ticks.
-    flights: [[u32; FLIGHT_WORDS]; 2],
+    snapshots: [[u32; SNAPSHOT_WORDS]; 2],
 }
 
 struct Shared(UnsafeCell<MaybeUninit<Kept>>);
@@ -35,7 +35,7 @@ struct Shared(UnsafeCell<MaybeUninit<Kept>>);
 unsafe impl Sync for Shared {}
 
 /// By this name a probe finds it.
-#[unsafe(link_section = ".uninit.blackbox")]
+#[unsafe(link_section = ".uninit.retained")]
 #[unsafe(export_name = "INTERSTAGE_BLACKBOX")]
 static KEPT: Shared = Shared(UnsafeCell::new(MaybeUninit::uninit()));
 
@@ -44,18 +44,18 @@ fn kept() -> *mut Kept {
 }
 
 /// Keeps what the drive does in a tick.
-pub(super) fn keep(flight: &Flight) {
-    let place = (flight.tick & 1) as usize;
+pub(super) fn keep(snapshot: &DriveSnapshot) {
+    let place = (snapshot.tick & 1) as usize;
     // SAFETY: see `Shared`; the index is 0 or 1.
-    unsafe { (&raw mut (*kept()).flights[place]).write_volatile(flight.seal()) }
+    unsafe { (&raw mut (*kept()).snapshots[place]).write_volatile(snapshot.seal()) }
 }
 
 /// What is kept of the last whole tick.
 #[inline(never)]
-pub(super) fn flight() -> Option<Flight> {
+pub(super) fn snapshot() -> Option<DriveSnapshot> {
     // SAFETY: see `Shared`; read by a start, and by handlers that never return.
-    let [even, odd] = unsafe { (&raw const (*kept()).flights).read_volatile() };
-    later(Flight::open(&even), Flight::open(&odd))
+    let [even, odd] = unsafe { (&raw const (*kept()).snapshots).read_volatile() };
+    later(DriveSnapshot::open(&even), DriveSnapshot::open(&odd))
 }
 
 /// Keeps why the program ends.
@@ -78,25 +78,25 @@ fn build() -> u32 {
 /// What the drive was doing stays kept until the tick writes over it, so that a second reset
 /// right behind the first, as of a pin that bounces or a supply that flickers, finds it too.
 pub(crate) fn report(waited: bool) -> Restart {
-    let in_memory = flight();
+    let in_memory = snapshot();
     // SAFETY: nobody else is there yet. The words may never have been written, so they are
     // read as volatile memory that holds anything.
     let crash = unsafe { (&raw const (*kept()).crash).read_volatile() };
     let found = supply::found();
-    let in_flash = found.and_then(|latest| latest.flight);
+    let in_flash = found.and_then(|latest| latest.snapshot);
     let supply = || Crash { build: build(), stopped: Stopped::Supply };
     let crash = Crash::open(&crash).or(in_flash.map(|_| supply()));
-    let mut restart = Restart { reset: guard::reset(), flight: in_memory.or(in_flash), crash };
+    let mut restart = Restart { reset: guard::reset(), snapshot: in_memory.or(in_flash), crash };
     // The watchdog has reasons of its own for doubt.
     if waited && restart.reset != Reset::Watchdog {
         restart.reset = Reset::Power;
     }
-    let first = restart.standing().map_or([0; FLIGHT_WORDS], |flight| flight.seal());
+    let first = restart.standing().map_or([0; SNAPSHOT_WORDS], |snapshot| snapshot.seal());
     // In this order: a reset or a supply that goes again finds here what it was, in one place
     // or the other.
     // SAFETY: as before.
     unsafe {
-        (&raw mut (*kept()).flights).write_volatile([first, [0; FLIGHT_WORDS]]);
+        (&raw mut (*kept()).snapshots).write_volatile([first, [0; SNAPSHOT_WORDS]]);
         (&raw mut (*kept()).crash).write_volatile([0; CRASH_WORDS]);
     }
     guard::forget_reset();
@@ -125,9 +125,9 @@ fn say(restart: &Restart) {
                 cfsr,
                 hfsr
             ),
-            Stopped::Hang { pc, lr, late, .. } => defmt::error!(
+            Stopped::Hang { pc, lr, missed, .. } => defmt::error!(
                 "{=str} did not come, at {=u32:#x} from {=u32:#x}",
-                late.name(),
+                missed.name(),
                 pc,
                 lr
             ),
@@ -135,15 +135,16 @@ fn say(restart: &Restart) {
             Stopped::Image => defmt::error!("a bit of the image had turned over"),
         }
     }
-    if let Some(Flight { tick, position, mode, level, fault, late, .. }) = restart.flight {
+    if let Some(DriveSnapshot { tick, position, mode, level, fault, missed, .. }) = restart.snapshot
+    {
         defmt::warn!(
             "before: tick {=u32}, mode {=u8}, {=f32} mm, level {=u8}, last fault {=u16}, late: {=str}",
             tick,
             mode,
             position.to_num::<f32>(),
-            level & !Flight::UNSURE,
+            level & !DriveSnapshot::UNSURE,
             fault,
-            late.name()
+            missed.name()
         );
     }
 }
@@ -201,8 +202,8 @@ unsafe extern "C" fn look_at(frame: u32) {
     guard::cut();
     let (pc, lr) = returns(frame);
     let now = embassy_time::Instant::now().as_millis() as u32;
-    let late = crate::EXCHANGE.unfed(now);
-    stop(Stopped::Hang { pc, lr, late, at: now });
+    let missed = crate::EXCHANGE.unfed(now);
+    stop(Stopped::Hang { pc, lr, missed, at: now });
     // The watchdog ends it: it would also had this not been reached.
     loop {
         cortex_m::asm::nop();

@@ -5,8 +5,8 @@
 //! a lost supply, and behind them the two places of a set of parameters.
 
 use embassy_stm32::pac::FLASH;
-use interstage::pages::{self, PAGE_BYTES, WORD_BYTES, Word};
 use interstage::params::slots::SLOT_BYTES;
+use interstage::restart::page::{self, PAGE_BYTES, WORD_BYTES, Word};
 
 /// Where flash ends in memory.
 const END: u32 = 0x0808_0000;
@@ -26,11 +26,11 @@ pub(super) const SEALS: Page = Page(RECORDS.0 - PAGE_BYTES as u32);
 
 impl Page {
     /// What stands there.
-    pub(super) fn bytes(self) -> &'static pages::Page {
+    pub(super) fn bytes(self) -> &'static page::Page {
         // SAFETY: inside flash, which is always mapped and holds plain bytes. It changes at
         // a start, before the tasks, and in a handler that does not return: whoever reads it
         // then does so again behind each change.
-        unsafe { &*(self.0 as *const pages::Page) }
+        unsafe { &*(self.0 as *const page::Page) }
     }
 
     /// Programs the double word of this number, which has to be blank; takes 0.1 ms, and up

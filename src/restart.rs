@@ -5,17 +5,20 @@
 //! whole is none. What the drive does is kept every tick, in two places by turns, so that
 //! a reset in the middle of writing leaves the tick before.
 mod crash;
-mod flight;
-mod late;
-mod restart;
+pub mod flash_log;
+pub mod image_checksum;
+mod missed;
+pub mod page;
+mod report;
+mod snapshot;
 
 pub use crash::{Crash, Stopped};
-pub use flight::{Flight, Pace, Recorder, later};
-pub use late::Late;
-pub use restart::{Reset, Restart};
+pub use missed::MissedCheckIns;
+pub use report::{Place, Reset, Restart};
+pub use snapshot::{DriveSnapshot, PackedSpeed, PositionConfidence, later};
 
-/// Words of a [`Flight`].
-pub const FLIGHT_WORDS: usize = 5;
+/// Words of a [`DriveSnapshot`].
+pub const SNAPSHOT_WORDS: usize = 5;
 
 /// Words of a [`Crash`].
 pub const CRASH_WORDS: usize = 7;

@@ -8,8 +8,8 @@
 //! The supply gives its warning about a millisecond before the memory is lost; a record is
 //! three double words, which take a quarter of that, and the search for its place a tenth.
 
-use super::{PAGE_WORDS, Page, Word, used, word};
-use crate::blackbox::{FLIGHT_WORDS, Flight};
+use super::page::{PAGE_WORDS, Page, Word, used, word};
+use crate::restart::{DriveSnapshot, SNAPSHOT_WORDS};
 
 /// Double words of a place.
 const PLACE_WORDS: usize = 4;
@@ -29,8 +29,8 @@ pub fn free(page: &Page) -> Option<usize> {
 
 /// The double words of a record.
 #[must_use]
-pub fn words(flight: &Flight) -> [Word; 3] {
-    let [a, b, c, d, e] = flight.seal();
+pub fn words(snapshot: &DriveSnapshot) -> [Word; 3] {
+    let [a, b, c, d, e] = snapshot.seal();
     [[a, b], [c, d], [e, u32::MAX]]
 }
 
@@ -40,7 +40,7 @@ pub struct Latest {
     /// Number of the double word that has to be [`TAKEN`].
     pub mark: usize,
     /// The record, if it is whole.
-    pub flight: Option<Flight>,
+    pub snapshot: Option<DriveSnapshot>,
 }
 
 /// The last record, unless it has been reported; of one that was broken off the one before
@@ -52,14 +52,14 @@ pub fn latest(page: &Page) -> Option<Latest> {
     // A mark that was broken off is none: better twice than not at all.
     let untaken = |place: &usize| word(page, mark(*place)) != TAKEN;
     let places = last.saturating_sub(1)..=last;
-    let flight = |place: usize| {
-        let mut words = [0; FLIGHT_WORDS];
+    let snapshot = |place: usize| {
+        let mut words = [0; SNAPSHOT_WORDS];
         let found = (place * PLACE_WORDS..mark(place)).flat_map(|index| word(page, index));
         words.iter_mut().zip(found).for_each(|(to, from)| *to = from);
-        Flight::open(&words)
+        DriveSnapshot::open(&words)
     };
     untaken(&last).then(|| Latest {
         mark: mark(last),
-        flight: places.rev().take_while(untaken).find_map(flight),
+        snapshot: places.rev().take_while(untaken).find_map(snapshot),
     })
 }

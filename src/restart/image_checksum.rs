@@ -10,7 +10,7 @@
 //! flashed it, and a sum made on the host would have to be put into every image after it is
 //! linked.
 
-use super::{PAGE_WORDS, Page, Word, used, word};
+use super::page::{PAGE_WORDS, Page, Word, used, word};
 
 /// Double words of an entry.
 const ENTRY_WORDS: usize = 2;

@@ -7,13 +7,13 @@
 //! to come; nothing is made up and nothing left out, so that a run gives the same bits
 //! through a slow probe as in software.
 //!
-//! Frames are those of the [binary line](crate::link), on RTT channels [`UP`] and
+//! Frames are those of the [binary line](crate::params::link), on RTT channels [`UP`] and
 //! [`DOWN`].
 
 use serde::{Deserialize, Serialize};
 
-use crate::log::number;
 use crate::sense::raw::{AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount};
+use crate::supervise::codes;
 use crate::supervise::{Command, Mode};
 use crate::units::{Duty, MotorCommand, Tick};
 
@@ -57,7 +57,7 @@ pub struct Given {
     pub bridges: Option<[u16; 2]>,
     /// The emergency stop's contact is open.
     pub stop: bool,
-    /// Number of the operator's command, 0 for none ([`number::of_command`]).
+    /// Number of the operator's command, 0 for none ([`codes::of_command`]).
     pub command: u8,
 }
 
@@ -85,7 +85,7 @@ impl Given {
     /// The same with an operator's command, or none.
     #[must_use]
     pub const fn with(self, command: Option<Command>) -> Self {
-        Self { command: number::of_command(command), ..self }
+        Self { command: codes::of_command(command), ..self }
     }
 
     /// The same with no sensor answering but the wheel's counter, which cannot fall
@@ -128,7 +128,7 @@ pub struct Taken {
     pub drive: Option<i16>,
     /// Duty of the pre-tightener, Q15; none with the bridge off.
     pub preload: Option<i16>,
-    /// Number of the mode after the tick ([`number::of_mode`]).
+    /// Number of the mode after the tick ([`codes::of_mode`]).
     pub mode: u8,
 }
 
@@ -155,14 +155,14 @@ impl Taken {
     /// Mode after the tick; none if the number has no meaning.
     #[must_use]
     pub fn mode(&self) -> Option<Mode> {
-        number::mode(self.mode)
+        codes::mode(self.mode)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::link::{Gatherer, frame};
+    use crate::params::link::{FrameReader, frame};
     use proptest::prelude::*;
 
     /// Room in the board's ring for a tick and a hello behind it.
@@ -210,7 +210,7 @@ mod tests {
                 command,
             };
             let sent = ToBoard::Tick(tick, given);
-            let mut gatherer = Gatherer::new();
+            let mut gatherer = FrameReader::new();
             let come = frame(&sent).unwrap().iter().find_map(|byte| gatherer.take(*byte));
             prop_assert_eq!(come, Some(sent));
             let taken = Taken { drive: duties[0], preload: duties[1], mode: 3 };
@@ -225,7 +225,7 @@ mod tests {
     #[test]
     fn a_bridge_that_is_off_has_no_duty() {
         let off = MotorCommand { duty: Duty::from_bits(77), enable: false };
-        let taken = Taken::new(off, MotorCommand::OFF, number::of_mode(Mode::Idle));
+        let taken = Taken::new(off, MotorCommand::OFF, codes::of_mode(Mode::Idle));
         assert_eq!(taken.commands(), (MotorCommand::OFF, MotorCommand::OFF));
         assert_eq!(taken.mode(), Some(Mode::Idle));
     }

@@ -6,7 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::params::checksum;
+use crate::log::crc32;
 use crate::params::service::{Request, Response};
 
 /// Longest frame, bytes, its end included.
@@ -37,7 +37,7 @@ const CHECK: usize = 4;
 pub fn frame(message: &impl Serialize) -> Option<Frame> {
     let mut plain = [0; LONGEST];
     let length = postcard::to_slice(message, plain.get_mut(..LONGEST - CHECK)?).ok()?.len();
-    let sum = checksum(plain.get(..length)?).to_le_bytes();
+    let sum = crc32(plain.get(..length)?).to_le_bytes();
     plain.get_mut(length..length + CHECK)?.copy_from_slice(&sum);
     let plain = plain.get(..length + CHECK)?;
     let mut coded = Frame::new();
@@ -50,14 +50,14 @@ pub fn frame(message: &impl Serialize) -> Option<Frame> {
 
 /// Puts bytes together to frames.
 #[derive(Clone, Debug, Default)]
-pub struct Gatherer {
+pub struct FrameReader {
     bytes: Frame,
     /// More came than fits: all is dropped up to the next end.
     too_long: bool,
     dropped: u32,
 }
 
-impl Gatherer {
+impl FrameReader {
     /// Nothing gathered.
     #[must_use]
     pub const fn new() -> Self {
@@ -90,7 +90,7 @@ impl Gatherer {
 fn open<T: for<'de> Deserialize<'de>>(coded: &mut [u8]) -> Option<T> {
     let length = cobs::decode_in_place(coded).ok()?;
     let (content, sum) = coded.get(..length)?.split_last_chunk::<CHECK>()?;
-    if checksum(content) != u32::from_le_bytes(*sum) {
+    if crc32(content) != u32::from_le_bytes(*sum) {
         return None;
     }
     match postcard::take_from_bytes(content) {
@@ -107,7 +107,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn gathered<T: for<'de> Deserialize<'de>>(bytes: &[u8]) -> (Vec<T>, u32) {
-        let mut gatherer = Gatherer::new();
+        let mut gatherer = FrameReader::new();
         let messages = bytes.iter().filter_map(|byte| gatherer.take(*byte)).collect();
         (messages, gatherer.dropped())
     }
