@@ -7,7 +7,6 @@ pub mod hil;
 use crate::estimate::Place;
 use crate::log::Identity;
 use crate::restart::DriveSnapshot;
-use crate::tick::Entry;
 use crate::sense::raw::{AdcCode, AngleFrame, BridgeCodes, BusFault, EncoderCount};
 use crate::supervise::Command;
 use crate::tick::Entry;

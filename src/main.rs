@@ -25,7 +25,7 @@ mod firmware {
     #[cfg(not(feature = "hil"))]
     use embassy_stm32::{Peri, Peripherals, pac};
     use interstage::hal::{Board, Parts};
-use interstage::log::{Identity, LogEncoder};
+    use interstage::log::{Identity, LogEncoder};
     use interstage::model::Planner;
     use interstage::params::service::Service;
     use interstage::tasks::{self, Exchange, Latest};

@@ -4,7 +4,6 @@
 use interstage::log::frame::{Body, Frame, FrameBuffer, Head, Kind, LONGEST};
 use interstage::log::{Identity, crc32};
 use interstage::params::link::{FrameReader, ToBoard, ToHost, frame};
-use interstage::tick::{Entry, Event};
 use interstage::params::service::{Piece, Request, Response};
 use interstage::params::slots::{
     FlashFault, SLOT_BYTES, SetMemory, Slot, WORD_BYTES, place, stored,

@@ -11,7 +11,7 @@ use interstage::model::Planner;
 use interstage::restart::MissedCheckIns;
 use interstage::rig::Rig;
 use interstage::supervise::{Command, Mode};
-use interstage::tasks::{CHECK_IN_TICKS, Exchange, TaskId, TickIo, TickIoCell, self};
+use interstage::tasks::{self, CHECK_IN_TICKS, Exchange, TaskId, TickIo, TickIoCell};
 use interstage::tick::{Controller, Entry, Event};
 use interstage::units::{Direction, MotorCommand};
 

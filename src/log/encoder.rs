@@ -4,9 +4,9 @@ use super::capture::Capture;
 use super::frame::{FrameBuffer, Head, Kind, TicksFrame};
 use super::identity::Identity;
 use super::ledger::Ledger;
+use super::record::Record;
 use crate::model::{Plan, PlanRequest};
 use crate::tick::{Entry, Event};
-use super::record::Record;
 use crate::units::Tick;
 use serde::Serialize;
 
@@ -134,11 +134,11 @@ mod tests {
     use super::super::identity;
     use super::super::ledger::tests::crossing;
     use super::*;
-use crate::fault::Limit;
+    use crate::fault::Limit;
     use crate::model::{Outcome, Plan, PlanRequest, Review};
     use crate::supervise::Mode;
     use crate::tick::CrossingRecord;
-    use crate::tick::{Input, Output};
+
     use crate::units::{Direction, Q16};
 
     /// A channel that keeps what it is sent, as long as it has room.

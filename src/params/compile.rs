@@ -4,8 +4,8 @@ use core::fmt;
 
 use serde::Serialize;
 
-use crate::log::crc32;
 use super::set::{Header, MAX_NAME, SCHEMA};
+use crate::log::crc32;
 use crate::model::Planner;
 use crate::rig::{Rig, RigError};
 use crate::tick::Controller;

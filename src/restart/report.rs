@@ -4,9 +4,9 @@ use core::fmt;
 
 use serde::{Deserialize, Serialize};
 
+use super::{Crash, DriveSnapshot, PackedSpeed, Stopped};
 use crate::estimate::Place;
 use crate::fault::Fault;
-use super::{Crash, DriveSnapshot, PackedSpeed, Stopped};
 use crate::units::{Millimetres, Tick, ticks_to_seconds};
 
 /// What the chip says about why it started.

@@ -10,11 +10,11 @@ use hil_sim::scenario::Scenario;
 use interstage::restart::{MissedCheckIns, Reset, Restart, Stopped};
 use interstage::supervise::Mode;
 use interstage::units::Direction;
-use rig_board::resets;
 use rig_board::bench::STEP;
 use rig_board::core::Register;
 use rig_board::faults::Fault;
 use rig_board::peripherals::rcc::Cause;
+use rig_board::resets;
 
 use common::{elf, strings};
 use reset_board::Board;

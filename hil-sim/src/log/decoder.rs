@@ -299,8 +299,8 @@ impl Decoder {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-use interstage::log::{BATCH, LogEncoder, Tape, identity};
-use interstage::tick::{Input, Output};
+    use interstage::log::{BATCH, LogEncoder, Tape, identity};
+    use interstage::tick::{Input, Output};
     use proptest::prelude::*;
 
     /// The frames of a target that runs for so many ticks from `from`.

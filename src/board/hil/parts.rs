@@ -2,8 +2,8 @@
 
 use embassy_stm32::gpio::{AnyPin, Level, Output, Speed};
 use embassy_stm32::{Peri, Peripherals};
-use interstage::hal::{AnalogInput, AngleBus, CommandSource, Motors, Parts, WheelEncoder};
 use interstage::hal::hil::Given;
+use interstage::hal::{AnalogInput, AngleBus, CommandSource, Motors, Parts, WheelEncoder};
 use interstage::sense::raw::{AdcCode, AngleFrame, BridgeCodes, BusFault, EncoderCount};
 use interstage::supervise::Command;
 use interstage::units::MotorCommand;
