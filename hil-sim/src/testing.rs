@@ -84,16 +84,18 @@ fn passes(long: bool) -> Vec<(&'static str, &'static str, Command)> {
         clippy.args(arguments).args(DENY);
         clippy
     };
-    let firmware = ["--package", "interstage", "--bin", "interstage", "--target", TARGET];
-    let looped = ["--no-default-features", "--features", "hil"];
+    let images = ["--package", "interstage", "--package", "interstage-images"];
+    let images = [&images[..], &["--lib", "--bins", "--target", TARGET]].concat();
+    let looped = ["--package", "interstage", "--bin", "interstage", "--target", TARGET];
+    let looped = [&looped[..], &["--no-default-features", "--features", "hil"]].concat();
     // `--examples` gives the dependencies the features that they have in the tests.
     let mut documentation = cargo(&["doc", "--workspace", "--no-deps", "--lib", "--examples"]);
     documentation.env("RUSTDOCFLAGS", "-D warnings");
     let mut passes = vec![
         ("Format", "fmt", cargo(&["fmt", "--all", "--check"])),
         ("Lints", "clippy", lint(&["--workspace", "--all-targets"])),
-        ("Lints of the firmware", "clippy", lint(&[&firmware[..], &["--lib"]].concat())),
-        ("Lints of the loop's firmware", "clippy", lint(&[&firmware[..], &looped].concat())),
+        ("Lints of the images", "clippy", lint(&images)),
+        ("Lints of the loop's image", "clippy", lint(&looped)),
         ("Documentation", "doc", documentation),
     ];
     if long {
@@ -124,7 +126,7 @@ fn code(status: ExitStatus) -> u8 {
 
 /// Whether cargo has this component.
 fn has(component: &str) -> bool {
-    let mut command = cargo(&[component, "--help"]);
+    let mut command = cargo(&[component, "-h"]);
     command.stdout(Stdio::null()).stderr(Stdio::null());
     command.status().is_ok_and(|status| status.success())
 }

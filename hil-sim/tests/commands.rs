@@ -85,9 +85,9 @@ fn everywhere() -> Vec<Case> {
     between_steps().into_iter().chain(on_a_step()).collect()
 }
 
-/// A fifth of the cases, of every rig, direction and place, unless the long samples run.
+/// A quarter of the cases, of every rig, direction and place, unless the long samples run.
 fn sample(cases: Vec<Case>) -> Vec<Case> {
-    cases.into_iter().step_by(if long() { 1 } else { 5 }).collect()
+    cases.into_iter().step_by(if long() { 1 } else { 4 }).collect()
 }
 
 /// The run up to that place and time.

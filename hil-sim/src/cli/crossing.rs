@@ -82,12 +82,14 @@ enum Method {
 }
 
 /// A crossing to compute.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize)]
 struct Case {
     speed_mm_s: f64,
     preload_n: f64,
+    #[serde(skip)]
     direction: Direction,
     /// Axial load lifted by friction, N; none pushes a frictionless wheel.
+    #[serde(skip_serializing_if = "Option::is_none")]
     load_n: Option<f64>,
 }
 
@@ -117,10 +119,8 @@ struct Printed<'a> {
     method: Method,
     rig: &'a str,
     direction: &'static str,
-    speed_mm_s: f64,
-    preload_n: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    load_n: Option<f64>,
+    #[serde(flatten)]
+    case: Case,
     #[serde(flatten)]
     figures: Figures,
 }
@@ -157,9 +157,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         method: args.method,
         rig: &scenario.preset,
         direction: if args.retract { "retract" } else { "deploy" },
-        speed_mm_s: case.speed_mm_s,
-        preload_n: case.preload_n,
-        load_n: case.load_n,
+        case,
         figures,
     };
     output::result(args.json, &printed, || human(&printed))?;
@@ -172,10 +170,9 @@ fn human(printed: &Printed<'_>) -> String {
         Method::Reduced => "reduced model",
         Method::Fixed => "reduced model in fixed point",
     };
-    let driven = printed
-        .load_n
-        .map_or("frictionless".to_owned(), |load| format!("driven against {load:.2} N"));
-    let figures = &printed.figures;
+    let (case, figures) = (&printed.case, &printed.figures);
+    let driven =
+        case.load_n.map_or("frictionless".to_owned(), |load| format!("driven against {load:.2} N"));
     // Hardly pressed, it slides at any friction.
     let mu = |mu| if mu < 100.0 { number(mu, 3) } else { "> 100".to_owned() };
     let rows = [
@@ -192,9 +189,9 @@ fn human(printed: &Printed<'_>) -> String {
         .filter_map(|(name, value, unit)| Some(vec![name.into(), value?, unit.into()]));
     let mut text = format!(
         "{} at {} mm/s under {} N, {driven}, rig {}, by the {method}\n{}\n",
-        if printed.direction == "retract" { "Drop" } else { "Climb" },
-        printed.speed_mm_s,
-        printed.preload_n,
+        if case.direction == Direction::Retract { "Drop" } else { "Climb" },
+        case.speed_mm_s,
+        case.preload_n,
         printed.rig,
         plain(&["", "value", "unit"], rows)
     );

@@ -70,7 +70,7 @@ pub(super) fn quotient(a: &Channels, b: &Channels, over: f64) -> Channels {
 }
 
 impl Run {
-    /// Makes a record ready.
+    /// Prepares a record.
     ///
     /// # Errors
     /// As of [`Traces::of`].

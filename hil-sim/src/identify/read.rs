@@ -1,10 +1,9 @@
 //! Records out of logs: those of `rig capture` and `log.mcap` of `rig deploy` have the
 //! sensors' own codes of every tick, and the rig's parameters if they are known.
 //!
-//! A `log.csv` of `rig deploy` holds what the controller made of its sensors. Counts of
-//! the encoder are then the differences of its odometry, from which its corrections at the
-//! steps are taken out: they are known by being no whole number of counts, or no way that
-//! the wheel can have gone at its speed.
+//! A `log.csv` of `rig deploy` holds the controller's estimates. Encoder counts are then
+//! the differences of its odometry without its corrections at the steps: those are no
+//! whole number of counts, or no travel that the wheel can have made at its speed.
 
 use std::path::Path;
 
@@ -22,7 +21,7 @@ const MCAP: &[u8] = b"\x89MCAP";
 const ARM_FILTER_S: f64 = 0.005;
 /// Deviation from whole counts beyond which the odometry was corrected, counts.
 const CORRECTED: f64 = 0.05;
-/// Deviation from the way at the estimated speed beyond which it was corrected, counts:
+/// Deviation from the travel at the estimated speed beyond which it was corrected, counts:
 /// a count may come or not, and the estimate swings when the load does.
 const LEAPT: f64 = 2.5;
 /// Modes in which a bridge is on: the pre-tightener's, and the drive's.
@@ -111,7 +110,7 @@ fn samples(lines: &[Line], scenario: &Scenario) -> Vec<(u32, Sample)> {
             if let Some(before) = before {
                 let moved = (line.position_est_mm - before.position_est_mm) / count_mm;
                 let whole = moved.round();
-                // Corrected: what the wheel did meanwhile, its speed tells.
+                // Corrected: the speed gives what the wheel did meanwhile.
                 let expected = line.speed_est_mm_s * TICK_S / count_mm;
                 let corrected =
                     (moved - whole).abs() > CORRECTED || (moved - expected).abs() > LEAPT;

@@ -1,6 +1,6 @@
-//! What identification takes from a log: the sensors' readings and the bridges' duties of
-//! every tick, in the units of the rig that the log names, and nothing that the plant
-//! alone knows.
+//! The input of identification: the sensors' readings and the bridges' duties of every
+//! tick, in the units of the rig that the log names, and nothing that the plant alone
+//! knows.
 
 use std::f64::consts::TAU;
 

@@ -1,10 +1,10 @@
-//! A record made ready for the fit: the wheel's turn and the preload as smooth inputs,
+//! A record prepared for the fit: the wheel's rotation and the preload as smooth inputs,
 //! compression, arm angle and drive effort as means over bins.
 //!
-//! An encoder count is 19 um of tread, so the turn is taken at the edges between counts,
-//! where it is known to half a tick of travel, and smoothed over 16 ms. The bins of
-//! 10 ms hold two periods and more of the arm's modes and of the torque ripple; speeds
-//! at which the one excites the other are left out.
+//! An encoder count is 19 um of tread. The rotation is taken at the edges between counts,
+//! where it is known to half a tick of travel, and smoothed over 16 ms. The bins of 10 ms
+//! hold at least two periods of the arm's modes and of the torque ripple; speeds at which
+//! the one excites the other are left out.
 
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -16,27 +16,27 @@ use super::record::{Record, Sample, TICK_S};
 pub const BIN: usize = 10;
 /// Length of a bin of the drive's effort, ticks: its speed is a difference of counts.
 pub const EFFORT_BIN: usize = 40;
-/// Half-width of the smoothing windows of turn and preload, ticks. What is left of the
-/// counts' steps in the acceleration is inertia to the model, and near the limit of
-/// friction creep grows faster than its mean.
+/// Half-width of the smoothing windows of rotation and preload, ticks. The model takes the
+/// residual steps of the counts for acceleration, and near the limit of friction creep
+/// grows faster than its mean.
 const SMOOTH_TURN: usize = 16;
 const SMOOTH_PRELOAD: usize = 6;
 /// Least number of readings of the unloaded rig for a zero.
 const LEAST_UNLOADED: usize = 50;
-/// Least preload at which a reading tells of the tread, N.
+/// Least preload at which a reading is compared, N.
 const LEAST_PRELOAD_N: f64 = 2.0;
 /// Relative distance from a mode's speed within which nothing is compared.
 const NEAR_MODE: f64 = 0.12;
-/// Turn at a step with the arm at rest that is slip, mm.
+/// Rotation at a step with the arm at rest that is slip, mm of tread.
 const SLIPS_MM: f64 = 4.0;
 /// How far before a face the wheel is clear of its corner, mm.
 const BEFORE_SLIP_MM: f64 = 16.0;
-/// Change of the arm's mean over so many ticks below which it stands, rad: a tenth of a
-/// millimetre, as a slipping wheel bounces.
-const STANDS_RAD: f64 = 1e-3;
+/// Change of the arm's mean over so many ticks below which it is at rest, rad: a tenth of
+/// a millimetre, as a slipping wheel bounces.
+const AT_REST_RAD: f64 = 1e-3;
 const STEADY: usize = 40;
-/// Time after the drive's start in which nothing is compared, ticks: the first counts
-/// do not tell when the wheel began to turn.
+/// Time after the drive's start in which nothing is compared, ticks: the first counts do
+/// not show when the wheel began to turn.
 const STARTING: usize = 40;
 /// Acceleration beyond which the drive's effort is its inertia, mm/s^2.
 const MOST_ACCELERATION: f64 = 60.0;
@@ -86,12 +86,12 @@ pub struct Effort {
     pub used: bool,
 }
 
-/// A record made ready.
+/// A prepared record.
 #[derive(Clone, Debug)]
 pub struct Traces {
     /// Ticks that are compared: from the first preload to the last drive.
     pub span: Range<usize>,
-    /// Turn since the start, rad, every tick.
+    /// Rotation since the start, rad, every tick.
     pub turn_rad: Vec<f64>,
     /// Preload without the load cell's zero, N, every tick.
     pub preload_n: Vec<f64>,
@@ -108,7 +108,7 @@ pub struct Traces {
 }
 
 impl Traces {
-    /// Makes a record ready.
+    /// Prepares a record.
     ///
     /// # Errors
     /// [`IdentifyError::Log`] if the wheel was never pressed or never driven.
@@ -166,17 +166,17 @@ impl Traces {
         let (first, last) = (mean(0..STEADY)?, mean(end - STEADY..end)?);
         let risen = rig.arm_length_mm * (first.sin() - last.sin()) / rig.step_height_mm;
         let face = rig.step_positions_mm.get(risen.round().max(0.0) as usize)?;
-        // Back from the end for as long as the arm stands.
+        // Back from the end for as long as the arm is at rest.
         let mut steady = end - STEADY;
         while steady >= self.span.start + STEADY
-            && mean(steady - STEADY..steady).is_some_and(|arm| (arm - last).abs() < STANDS_RAD)
+            && mean(steady - STEADY..steady).is_some_and(|arm| (arm - last).abs() < AT_REST_RAD)
         {
             steady -= STEADY;
         }
         let steady = steady + STEADY;
-        let way = |tick: usize| self.turn_rad[tick] * rig.wheel_radius_mm;
-        let onset = (self.span.start..end).find(|&tick| way(tick) > face - BEFORE_SLIP_MM)?;
-        let slips = steady > onset && way(end - 1) - way(steady.min(end - 1)) > SLIPS_MM;
+        let rolled = |tick: usize| self.turn_rad[tick] * rig.wheel_radius_mm;
+        let onset = (self.span.start..end).find(|&tick| rolled(tick) > face - BEFORE_SLIP_MM)?;
+        let slips = steady > onset && rolled(end - 1) - rolled(steady.min(end - 1)) > SLIPS_MM;
         slips.then_some(onset)
     }
 

@@ -17,7 +17,7 @@ pub struct CrossingCase {
     pub preload_n: f64,
     /// Frictionless, or driven by torque against an axial load.
     pub axial: Axial,
-    /// Axial way per step of time, mm.
+    /// Axial travel per step of time, mm.
     pub stride_mm: f64,
 }
 

@@ -38,7 +38,7 @@ pub struct Grip {
     pub tread: f64,
     /// What a resisting newton takes off it, mm/s. Nothing drives the worm.
     pub yields: f64,
-    /// Carriage's way per tread's way of a wheel without creep.
+    /// Carriage's travel per tread's travel of a wheel without creep.
     pub advance: f64,
     /// Normal force over cosine sum.
     pub normal: f64,
@@ -100,7 +100,7 @@ impl Grip {
         sine + self.load_n + self.inertia * (self.advance * tread - self.speed)
     }
 
-    /// Way of the tread over the wall beyond its creep, mm/s.
+    /// Speed of the tread over the wall beyond its creep, mm/s.
     #[must_use]
     pub fn slides(&self, ended: &Ended) -> f64 {
         let slip = (self.advance * ended.tread - ended.speed).abs();

@@ -63,8 +63,7 @@ pub struct Point {
 
 /// The crossings that the error is measured on: both loads and directions, pushed and
 /// driven.
-#[must_use]
-pub fn cases() -> Vec<(f64, f64, Axial)> {
+fn cases() -> Vec<(f64, f64, Axial)> {
     let mut all = Vec::new();
     for (speed, preload) in [(5.0, 100.0), (8.0, 40.0), (25.0, 60.0)] {
         for axial in [Axial::Pushed, Axial::Driven(6.7)] {

@@ -1,4 +1,4 @@
-//! The whole rig, a millisecond at a time.
+//! The complete rig, a millisecond at a time.
 
 mod contact;
 mod intervention;
@@ -19,11 +19,10 @@ use traction::Stride;
 
 pub use phases::{PHASES, Phase, PhaseWork};
 
-/// Most ring steps in a call: 10 mm of way at the usual stride.
+/// Most ring steps in a call: 10 mm of travel at the usual stride.
 const MOST_STRIDES: f64 = 256.0;
 
-/// Way after which the stride is fitted again to the speed, if the step of time is longer
-/// than that, mm.
+/// Travel after which the stride is fitted to the speed again, mm.
 const EXCHANGE_MM: f64 = 1.0;
 
 /// Most parts that a stride is halved into.
@@ -32,7 +31,7 @@ const MOST_HALVINGS: f64 = 4096.0;
 /// How finely the rig is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Resolution {
-    /// Longest axial way of one ring step, mm.
+    /// Longest axial travel of one ring step, mm.
     pub stride_mm: f64,
     /// Resolves the ring on the smooth wall too, instead of steady rolling there.
     pub always_awake: bool,
@@ -165,7 +164,7 @@ pub struct VirtualRig {
     ledger: Ledger,
     /// Sliding bodily over the wall.
     sliding: bool,
-    /// Resting on the stop or latch that carries the load until the drive first turns.
+    /// Held by the stop or latch that carries the load until the drive first turns.
     latched: bool,
     /// Tread speed of the last steady rolling, mm/s.
     rolled_mm_s: f64,
@@ -176,20 +175,20 @@ pub struct VirtualRig {
     phase: Phase,
     /// Contact forces of the last stride: normal, cosine and sine sums, N.
     forces: (f64, f64, f64),
-    /// Way that the speeds of the last stride gave beyond the one predicted: of the carriage
-    /// and of the tread, mm.
+    /// Travel by the speeds of the last stride beyond the predicted one: of the carriage and
+    /// of the tread, mm.
     way_residual_mm: (f64, f64),
     /// Force that resisted the tread in the last stride, N, signed as its speed.
     tread_load_n: f64,
     /// Static thrust on the arm, N: the load, or at an end stop what the wheel pushes with.
     thrust_n: f64,
-    /// Speed of the tread in place of what the motor makes of it, mm/s.
+    /// Imposed speed of the tread in place of the motor's, mm/s.
     imposed_speed_mm_s: Option<f64>,
-    /// Rise of the centre per axial way in the last stride that no change of load explains.
+    /// Rise of the centre per axial travel in the last stride that no change of load explains.
     drift: f64,
-    /// Rise per axial way beyond that along the step's force, for what the tread takes in.
+    /// Rise per axial travel beyond that along the step's force: the tread's own compression.
     tread_intake: f64,
-    /// Rise that no change of load explains while the wheel stands, mm/s.
+    /// Rise that no change of load explains while the wheel is at rest, mm/s.
     creep: f64,
     /// Derivatives of the resolved contact's cosine and sine sums by the height, N/mm.
     stiffness: Option<(f64, f64)>,
@@ -278,7 +277,7 @@ impl VirtualRig {
     }
 
     /// The same rig with every ring element visited that faces the wall, in reach or not.
-    /// No bit of any result depends on it: it proves that what is skipped is not needed.
+    /// No bit of any result depends on it: it proves that skipping is exact.
     #[must_use]
     pub fn visiting_all(mut self) -> Self {
         self.ring = self.ring.visiting_all();
@@ -327,7 +326,7 @@ impl VirtualRig {
         self.count(dt_s);
         self.vibrate(dt_s);
         self.truth.time_s += dt_s;
-        // The self-locking screw stands at once; the wheel turns on for some milliseconds.
+        // The self-locking screw stops at once; the wheel turns on for some milliseconds.
         let generated = self.truth.tread_mm_s / self.parameters.drive.no_load_mm_s;
         self.truth.bridges = [
             if drives.drive_on { drives.drive } else { generated },

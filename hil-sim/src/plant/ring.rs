@@ -5,9 +5,8 @@
 //! p >= 0: the three-parameter solid per area. Elements turn with the wheel.
 //! Within a step delta runs linearly, and q is integrated exactly for it.
 //!
-//! Only elements that can touch are visited (`window`), four side by side
-//! (`sweep`); the memory of the others decays unvisited, and is brought up to date in
-//! closed form when they come back.
+//! Only elements that can touch are visited (`window`), four at a time (`sweep`). The
+//! memory of the others is brought up to date in closed form when they come back.
 
 mod law;
 mod sweep;

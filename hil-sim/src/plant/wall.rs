@@ -149,15 +149,6 @@ impl LocalWall {
         let over = y - self.rise_mm;
         y.min((self.ahead_mm * self.ahead_mm + over * over).sqrt())
     }
-
-    /// Derivative of a ray's distance by `y`.
-    #[inline]
-    #[must_use]
-    pub fn slope(&self, y: f64, sin: f64, cos: f64) -> f64 {
-        let on_face =
-            y * sin > self.ahead_mm * cos && (y - self.rise_mm) * sin <= self.ahead_mm * cos;
-        if on_face { 0.0 } else { 1.0 / cos }
-    }
 }
 
 #[cfg(test)]

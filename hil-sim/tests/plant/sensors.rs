@@ -167,17 +167,6 @@ fn codes_stop_at_the_converters_ends() {
 }
 
 #[test]
-fn the_same_seed_makes_the_same_noise() {
-    let parameters = nominal("prototype").sensors;
-    let read = |seed| {
-        let mut sensors = Sensors::new(parameters.clone(), seed);
-        (0..50).map(|_| sensors.read(Sensed::default(), TICK_S)).collect::<Vec<_>>()
-    };
-    assert_eq!(read(3), read(3));
-    assert_ne!(read(3), read(4));
-}
-
-#[test]
 fn a_bridge_reads_its_output_behind_a_low_pass_within_what_the_controller_allows() {
     use interstage::supervise::{BAND, BAND_SHIFT, Lag};
     for seed in 0..50 {

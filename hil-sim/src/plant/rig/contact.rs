@@ -1,5 +1,5 @@
-//! How wheel and wall bear on each other: the ring near a step, steady rolling
-//! elsewhere, and the radial balance of both.
+//! Contact of wheel and wall: the ring near a step, steady rolling elsewhere, and the
+//! radial balance of both.
 
 use super::{PlantError, Stride, VirtualRig};
 use crate::plant::balance::{Axial, Balance, BalanceError, Solved};
@@ -28,7 +28,7 @@ const OFF_MM: f64 = 1e-6;
 /// nothing from before it came into the patch.
 const FORGETS: f64 = 6.0;
 
-/// What the wheel has been rolling at, and for how long.
+/// Speed and radial force of the wheel, and for how long they have been steady.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SettleTimer {
     pub(super) tread_mm_s: f64,
@@ -37,8 +37,8 @@ pub(super) struct SettleTimer {
 }
 
 impl VirtualRig {
-    /// Whether speed and radial force have stood long enough, and away from any step, for
-    /// steady rolling.
+    /// Whether speed and radial force have been steady for long enough, away from any step,
+    /// for steady rolling.
     pub(super) fn settled(&mut self, local: &LocalWall, dt_s: f64) -> bool {
         let tread = self.truth.tread_mm_s;
         let (seat, added) = self.pressing(local);
@@ -122,14 +122,14 @@ impl VirtualRig {
         finer: bool,
     ) -> Result<bool, PlantError> {
         let Stride { travel_mm, turn_rad, dt_s, .. } = stride;
-        // Foreseen: what the way has brought, and what the new load brings by the last
-        // contact's stiffness.
-        let sunk = self.load_response(local, &stride);
+        // Predicted: the rise by the travel, and by the new load with the last contact's
+        // stiffness.
+        let settled_mm = self.load_response(local, &stride);
         let balance = self.balance(local, stride.axial());
-        let stands = self.truth.height_mm - local.base_mm;
-        let pressed = balance.pressed(stands - self.parameters.ring.radius_mm).0 > 0.0;
-        let predicted = stands + self.drift * travel_mm + self.creep * dt_s + sunk;
-        let height_mm = if pressed { predicted } else { stands };
+        let current = self.truth.height_mm - local.base_mm;
+        let pressed = balance.pressed(current - self.parameters.ring.radius_mm).0 > 0.0;
+        let predicted = current + self.drift * travel_mm + self.creep * dt_s + settled_mm;
+        let height_mm = if pressed { predicted } else { current };
         let motion = Motion { wall: *local, height_mm, turn_rad, dt_s };
         let solved = balance.solve_near(&mut self.ring, motion);
         let solved = solved.map_err(|source| self.unbalanced(source))?;
@@ -140,9 +140,9 @@ impl VirtualRig {
         let rise = solved.height_mm + local.base_mm - self.truth.height_mm;
         self.learn_rise(&solved.contact, travel_mm, rise);
         if travel_mm.abs() > 1e-6 {
-            (self.drift, self.creep) = ((rise - sunk) / travel_mm, 0.0);
+            (self.drift, self.creep) = ((rise - settled_mm) / travel_mm, 0.0);
         } else {
-            (self.drift, self.creep) = (0.0, (rise - sunk) / dt_s);
+            (self.drift, self.creep) = (0.0, (rise - settled_mm) / dt_s);
         }
         self.stiffness = Some(solved.contact.slope);
         self.adopt(local, &solved, &stride);

@@ -11,10 +11,10 @@ use crate::plant::ring::Contact;
 /// end stop is as good as jammed by the arm: it stands.
 const JAMMED_BELOW: f64 = 0.25;
 
-/// Way over which the wheel's rise is learnt, mm.
-const LEARNT_MM: f64 = 1.0;
+/// Travel over which the wheel's rise is learned, mm.
+const LEARNING_MM: f64 = 1.0;
 
-/// Farthest that a stride may end from where it was predicted, mm.
+/// Largest distance of a stride's end from its prediction, mm.
 const OFF_PREDICTION_MM: f64 = 0.01;
 
 /// What holds or moves the wheel in a stride.
@@ -28,11 +28,11 @@ pub(super) enum Moves {
     Driven(Grip),
 }
 
-/// A stride as predicted by the forces of the last.
+/// A stride as predicted from the forces of the last.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stride {
     pub(super) dt_s: f64,
-    /// Where the carriage comes to, and by what way, mm.
+    /// Position of the carriage at its end, and its travel, mm.
     pub(super) position_mm: f64,
     pub(super) travel_mm: f64,
     /// Angle that the wheel turns, rad, and the speed of its tread, mm/s.
@@ -139,7 +139,7 @@ impl VirtualRig {
         stride
     }
 
-    /// Mean speed over a stride, mm/s: a tread that is led has its speed from the start on.
+    /// Mean speed over a stride, mm/s: an imposed speed holds from the start on.
     fn mean(&self, before: f64, end: f64) -> f64 {
         if self.imposed_speed_mm_s.is_some() { end } else { 0.5 * (before + end) }
     }
@@ -158,7 +158,7 @@ impl VirtualRig {
         (tread * grip.advance - slip, tread)
     }
 
-    /// Whether the stride ends far from where it was predicted.
+    /// Whether the stride ends far from its prediction.
     pub(super) fn off_prediction(&self, stride: &Stride, solved: &Solved) -> bool {
         let (Moves::Driven(grip), false) = (stride.moves, stride.stopped) else { return false };
         let (cosine, sine) = (solved.contact.cosine_n, solved.contact.sine_n);
@@ -166,7 +166,7 @@ impl VirtualRig {
         (ended.speed - stride.predicted.0).abs() * stride.dt_s > OFF_PREDICTION_MM
     }
 
-    /// Books what the stride came to in the contact that was found for it.
+    /// Books the stride with the contact that was found for it.
     pub(super) fn complete(&mut self, stride: &Stride) {
         let (normal, cosine, sine) = self.forces;
         let truth = &mut self.truth;
@@ -208,11 +208,11 @@ impl VirtualRig {
         truth.work_mj += (force * rolled).max(0.0);
     }
 
-    /// Axial way of a gripping wheel per way of its tread. With equal utilisation all
+    /// Axial travel of a gripping wheel per travel of its tread. With equal utilisation all
     /// over the contact, traction does the motor's work on the axle if
     /// `c v_x + s v_y = N omega R`, c and s being the cosine and sine sums. A step whose axial
-    /// force is t lifts the wheel by t/c of its way where it does no work on the tread;
-    /// what it does is known from the way just behind.
+    /// force is t lifts the wheel by t/c of its travel where it does no work on the tread;
+    /// that work is known from the last strides.
     fn advance(&self) -> f64 {
         let (normal, cosine, sine) = self.forces;
         if !self.parameters.climb_slows || cosine <= 0.0 {
@@ -228,7 +228,7 @@ impl VirtualRig {
         if self.parameters.climb_slows && contact.cosine_n > 0.0 {
             let leans = contact.step_sine_n / contact.cosine_n;
             let more = rise_mm - (leans + self.tread_intake) * travel_mm;
-            self.tread_intake += more * travel_mm.signum() / travel_mm.abs().max(LEARNT_MM);
+            self.tread_intake += more * travel_mm.signum() / travel_mm.abs().max(LEARNING_MM);
         }
     }
 
