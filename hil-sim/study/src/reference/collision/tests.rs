@@ -1,8 +1,5 @@
 //! The ring against its closed form without memory, its limits, and what inertia adds.
 
-mod hereditary;
-mod hunt_crossley;
-
 use interstage::rig::Rig;
 use proptest::prelude::*;
 
