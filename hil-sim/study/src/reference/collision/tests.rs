@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use super::dynamic::Mass;
 use super::elastic::{Elastic, rigid_climb_n};
 use super::*;
-use crate::reference::Resolution;
+use crate::reference::{Case, Resolution};
 use hil_sim::plant::balance::{Axial, Balance};
 use hil_sim::plant::ring::{Motion, Ring};
 use hil_sim::plant::wall::Wall;
