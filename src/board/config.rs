@@ -13,7 +13,7 @@ use static_cell::StaticCell;
 
 use super::{Bridges, Lamp, Nucleo, Pages, image};
 
-/// The set that the image carries: the prototype, written by `cargo rig constants`.
+/// The set that the image carries: the prototype, written by `rig-study constants`.
 static PROTOTYPE: &[u8] = include_bytes!("../params/prototype.set");
 
 static CONTROLLER: StaticCell<Controller> = StaticCell::new();

@@ -74,7 +74,7 @@ mod tests {
         let mut room = [0; MAX_SET];
         let length = compile("prototype", &Rig::prototype(), &mut room).unwrap();
         let carried = &include_bytes!("prototype.set")[..];
-        assert!(room[..length] == *carried, "stale: `cargo rig constants --set` writes it anew");
+        assert!(room[..length] == *carried, "stale: `rig-study constants --set` writes it");
     }
 
     #[test]

@@ -5,32 +5,20 @@
 //!
 //! 1. The host calls `model_build(preset)` of the image, with a [`tick::Preset`] as `u32`;
 //!    it returns 1 if the models of all arithmetics are ready.
-//! 2. For each of [`model::VARIANTS`] and each of [`model::points`], the host writes
-//!    [`model::Given::words`] of the point's `forward` (`inverse`) to memory and calls the
-//!    variant's function `forward` (`inverse`) with their address in r0. The function
-//!    returns the answer as bits of Q15.16.
-//! 3. `rig-board cycles --json` does this for [`model::PRESET`] and prints
+//! 2. For each of [`model::VARIANTS`] the host calls the functions `forward` and `inverse`
+//!    once for each of [`model::points`], with [`model::Given::words`] given by reference. A
+//!    function returns its answer as bits of Q15.16.
 //!
-//! ```json
-//! {
-//!   "variants": [{
-//!     "name": "fixed",
-//!     "forward_cycles": 466,
-//!     "inverse_cycles": 319,
-//!     "outputs": [123456, -1]
-//!   }],
-//!   "tick": { "mean": 3708.0, "worst": 5090 }
-//! }
-//! ```
-//!
-//! Cycles are those of the costliest call, textbook Cortex-M4. `outputs` holds the answer
-//! of every point forwards, then of every point back. `tick` is the control tick over a
-//! deployment.
+//! The host has `rig-board cycles --script FILE` do this: a JSON array of steps
+//! `{"call": {"function": .., "arguments": [..]}}` and
+//! `{"measure": {"function": .., "inputs": [[..], ..]}}`. It prints an array of
+//! `{"values": [..], "cost": {"max": ..}}`, a step each; cycles are textbook Cortex-M4.
 //!
 //! # Control tick
 //!
 //! See [`tick`]: `tick_build(preset)`, then `tick_load`, `tick_step`, `tick_plan` and
-//! `tick_save` for each tick.
+//! `tick_save` for each tick. `rig-board cycles` does this over a deployment and a
+//! retraction, and prints `{"tick": {"max": .., "calls": .., "cycles": ..}}`.
 
 #![no_std]
 

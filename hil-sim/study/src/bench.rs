@@ -83,7 +83,10 @@ pub fn measure(options: Options, say: &dyn Fn(&str)) -> Result<Report> {
     let (tick, cycles_left_out) = if options.cycles {
         say("cycles");
         match cycles::run() {
-            Ok(measured) => (cycles::fill(&measured, &mut variants)?, None),
+            Ok(measured) => {
+                cycles::fill(&measured, &mut variants)?;
+                (Some(measured.tick), None)
+            }
             Err(error) => (None, Some(one_line(&error))),
         }
     } else {

@@ -85,7 +85,7 @@ pub fn source(rows: &[Row]) -> Result<String> {
     let formula = Formula::new(&Rig::fe());
     let mut source = String::from(
         "//! Coefficients of the felt stiffening in 1e-8, in the order of\n\
-         //! [`Kind::terms`](super::felt::Kind::terms). Written by `cargo rig constants` from\n\
+         //! [`Kind::terms`](super::felt::Kind::terms). Written by `rig-study constants` from\n\
          //! crossings of the converged ring; do not edit.\n",
     );
     for kind in Kind::ALL {

@@ -125,7 +125,7 @@ fn of_case(index: usize) -> Result<(CaseFigures, f64), ReferenceError> {
     let stiffness = case.tread()?.instant() * patch_mm2 * 1e-6;
     let closing_mm_s = case.closing_speed_mm_s();
     let bending = vibration::bending(&case, &moving)?;
-    let stress = impact::history_of(&case, &moving)?;
+    let stresses = impact::stress(&case, &moving)?;
     let shaken = bending.iter().filter(|now| now.t_s < climbing_s);
     let figures = CaseFigures {
         speed_mm_s: case.speed_mm_s,
@@ -135,7 +135,7 @@ fn of_case(index: usize) -> Result<(CaseFigures, f64), ReferenceError> {
         published_force_n: COLLISION_N[index],
         force_n: still.peak_n(),
         published_stress: STRESS[index],
-        stress_pa: largest(stress.into_iter().map(|point| point.1)),
+        stress_pa: largest(stresses.into_iter().map(|point| point.1)),
         closing_mm_s,
         inertia_n: largest(climbing.map(|sample| (sample.radial_n - case.preload_n).abs())),
         inertia_bound_n: 1e-3 * closing_mm_s * (stiffness * case.rig.plant.moved_mass_kg).sqrt(),

@@ -4,15 +4,16 @@
 //! One file a stage, in the study's own order, each stage driven by the one before:
 //! [`solid`] is the rubber, [`collision`] the force of a crossing, [`impact`] the stress
 //! waves that it sends through the tread, [`vibration`] the motion of the arm on
-//! [`beam`]. A crossing is described once, by a [`Case`]; `history(&case)` of a stage is
-//! its course over time. Nothing here is fitted beyond the three numbers of the tread
+//! [`beam`]. A crossing is described once, by a [`Case`]. Nothing here is fitted beyond the three numbers of the tread
 //! that `interstage::rig` names as fitted.
 
 pub mod beam;
 mod case;
 pub mod collision;
+mod error;
 pub mod impact;
 pub mod solid;
 pub mod vibration;
 
-pub use case::{Case, ReferenceError, Resolution};
+pub use case::{Case, Resolution};
+pub use error::ReferenceError;

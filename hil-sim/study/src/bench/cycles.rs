@@ -1,15 +1,18 @@
-//! Cycles on the emulated core, which is a program of its own: `rig-board cycles --json`.
+//! Cycles on the emulated core, which is a program of its own: `rig-board cycles`.
 //! `interstage_images` says what is exchanged.
 
+use std::path::Path;
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, ensure};
 use interstage::model::reduced::ReducedModel;
 use interstage::rig::Rig;
 use interstage_images::model::{
-    FloatModel, PRESET, VARIANTS, fixed_forward, fixed_inverse, points,
+    FloatModel, Given, PRESET, VARIANTS, fixed_forward, fixed_inverse, points,
 };
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use hil_sim::provision::{Extra, featured};
 
@@ -20,29 +23,36 @@ use super::model::Variant;
 const FLOAT_LSB: u32 = 64;
 
 /// What the core measured.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Measured {
-    /// By number format.
-    pub variants: Vec<MeasuredVariant>,
+    /// Forward and inverse calls of each of [`VARIANTS`], in turn.
+    pub calls: Vec<Calls>,
     /// The control tick.
-    pub tick: Option<Tick>,
+    pub tick: Tick,
 }
 
-/// Cycles and answers of one number format.
+/// Calls of one function.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-pub struct MeasuredVariant {
-    /// The number format.
-    pub name: String,
-    /// Cycles of the costliest call forwards.
-    pub forward_cycles: u64,
-    /// Cycles of the costliest call back.
-    pub inverse_cycles: u64,
-    /// Answers of all points forwards, then of all points back, bits of Q15.16.
-    pub outputs: Vec<i32>,
+pub struct Calls {
+    /// What each returned.
+    pub values: Vec<u32>,
+    /// What they took.
+    pub cost: Cost,
 }
 
-/// Textbook cycles of the control tick over a deployment.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+/// Textbook Cortex-M4 cycles of calls.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+pub struct Cost {
+    /// Calls.
+    pub calls: u64,
+    /// Cycles of all calls.
+    pub cycles: u64,
+    /// Cycles of the costliest call.
+    pub max: u64,
+}
+
+/// Textbook cycles of the control tick over a deployment and a retraction.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Tick {
     /// Mean of all ticks.
     pub mean: f64,
@@ -55,9 +65,30 @@ pub struct Tick {
 /// # Errors
 /// If it cannot be built or does not run.
 pub fn run() -> Result<Measured> {
+    #[derive(Deserialize)]
+    struct TickCost {
+        tick: Cost,
+    }
     let binary = featured(Extra::Board)?;
-    let output = Command::new(&binary)
+    let name = format!("rig-study-{}.json", std::process::id());
+    let script = std::env::temp_dir().join(name);
+    std::fs::write(&script, serde_json::to_vec(&steps()?)?)?;
+    let done = start(&binary, &["--script".as_ref(), script.as_os_str()]);
+    std::fs::remove_file(&script)?;
+    // The first step builds the models.
+    let mut calls: Vec<Calls> = done?;
+    let built = calls.remove(0);
+    ensure!(built.values == [1], "the core cannot build the models");
+    let TickCost { tick } = start(&binary, &[])?;
+    let mean = tick.cycles as f64 / tick.calls.max(1) as f64;
+    Ok(Measured { calls, tick: Tick { mean, worst: tick.max } })
+}
+
+/// Runs `rig-board cycles` with these arguments.
+fn start<T: DeserializeOwned>(binary: &Path, arguments: &[&std::ffi::OsStr]) -> Result<T> {
+    let output = Command::new(binary)
         .args(["cycles", "--json"])
+        .args(arguments)
         .stderr(Stdio::inherit())
         .output()
         .with_context(|| format!("could not start {}", binary.display()))?;
@@ -65,44 +96,66 @@ pub fn run() -> Result<Measured> {
     serde_json::from_slice(&output.stdout).context("output of rig-board")
 }
 
+/// The script: build the models, then every function at every point.
+fn steps() -> Result<Vec<serde_json::Value>> {
+    let build = json!({ "call": { "function": "model_build", "arguments": [PRESET as u32] } });
+    let [forward, inverse] = inputs()?;
+    let measure = |function: &str, given: &[Given]| {
+        let inputs: Vec<[u32; 3]> = given.iter().map(Given::words).collect();
+        json!({ "measure": { "function": function, "inputs": inputs } })
+    };
+    let all = VARIANTS.iter().flat_map(|variant| {
+        [measure(variant.forward, &forward), measure(variant.inverse, &inverse)]
+    });
+    Ok([build].into_iter().chain(all).collect())
+}
+
+fn rig() -> Result<Rig> {
+    Rig::named(PRESET.name()).context("a preset is a rig")
+}
+
+/// Inputs forwards and back.
+fn inputs() -> Result<[Vec<Given>; 2]> {
+    let rig = rig()?;
+    Ok([points(&rig).map(|p| p.forward).collect(), points(&rig).map(|p| p.inverse).collect()])
+}
+
 /// Puts the cycles into the variants, once the core's answers agree with the host's.
 ///
 /// # Errors
 /// If an answer differs.
-pub fn fill(measured: &Measured, variants: &mut [Variant]) -> Result<Option<Tick>> {
-    for variant in variants {
-        let found = measured.variants.iter().find(|found| found.name == variant.name);
-        let found = found.with_context(|| format!("the core has no {}", variant.name))?;
-        let host = on_host(variant.name)?;
-        ensure!(host.len() == found.outputs.len(), "{}: other points on the core", variant.name);
-        let most = if variant.name == VARIANTS[0].name { 0 } else { FLOAT_LSB };
-        for (index, (&host, &core)) in host.iter().zip(&found.outputs).enumerate() {
+pub fn fill(measured: &Measured, variants: &mut [Variant]) -> Result<()> {
+    let host = on_host()?;
+    ensure!(measured.calls.len() == host.len(), "other functions on the core");
+    for (index, (calls, host)) in measured.calls.iter().zip(&host).enumerate() {
+        let (variant, back) = (&mut variants[index / 2], index % 2 == 1);
+        ensure!(calls.values.len() == host.len(), "{}: other points on the core", variant.name);
+        let most = if index < 2 { 0 } else { FLOAT_LSB };
+        for (point, (&core, &host)) in calls.values.iter().zip(host).enumerate() {
+            let (name, core) = (variant.name, core as i32);
             let same = host.abs_diff(core) <= most;
-            ensure!(same, "{} {index}: {core} on the core, {host} on the host", variant.name);
+            ensure!(same, "{name}, point {point}: {core} on the core, {host} on the host");
         }
-        variant.forward.cycles = Some(found.forward_cycles);
-        variant.inverse.cycles = Some(found.inverse_cycles);
+        let course = if back { &mut variant.inverse } else { &mut variant.forward };
+        course.cycles = Some(calls.cost.max);
     }
-    Ok(measured.tick)
+    Ok(())
 }
 
-/// The answers of one number format on this host.
-fn on_host(name: &str) -> Result<Vec<i32>> {
-    let rig = Rig::named(PRESET.name()).context("a preset is a rig")?;
+/// Answers of this host, in the order of [`Measured::calls`].
+fn on_host() -> Result<[Vec<i32>; 6]> {
+    let rig = rig()?;
     let fixed = ReducedModel::try_build(&rig)?;
     let (single, double) = (FloatModel::<f32>::of(&rig), FloatModel::<f64>::of(&rig));
-    let both = |inverse: bool| {
-        points(&rig).map(move |p| (inverse, if inverse { p.inverse } else { p.forward }))
-    };
-    let answer = |(inverse, given)| match (name, inverse) {
-        ("fixed", false) => fixed_forward(&fixed, &given),
-        ("fixed", true) => fixed_inverse(&fixed, &given),
-        ("f32", false) => single.forward(&given),
-        ("f32", true) => single.inverse(&given),
-        (_, false) => double.forward(&given),
-        (_, true) => double.inverse(&given),
-    };
-    Ok(both(false).chain(both(true)).map(answer).collect())
+    let [forward, inverse] = inputs()?;
+    Ok([
+        forward.iter().map(|given| fixed_forward(&fixed, given)).collect(),
+        inverse.iter().map(|given| fixed_inverse(&fixed, given)).collect(),
+        forward.iter().map(|given| single.forward(given)).collect(),
+        inverse.iter().map(|given| single.inverse(given)).collect(),
+        forward.iter().map(|given| double.forward(given)).collect(),
+        inverse.iter().map(|given| double.inverse(given)).collect(),
+    ])
 }
 
 #[cfg(test)]
@@ -110,28 +163,28 @@ mod tests {
     use super::*;
     use crate::bench::model;
 
-    fn measured() -> Measured {
-        let of = |name: &str| MeasuredVariant {
-            name: name.to_owned(),
-            forward_cycles: 500,
-            inverse_cycles: 300,
-            outputs: on_host(name).unwrap(),
-        };
-        let tick = Some(Tick { mean: 4e3, worst: 5000 });
-        Measured { variants: VARIANTS.map(|variant| of(variant.name)).to_vec(), tick }
-    }
-
     #[test]
     fn cycles_count_only_with_the_same_answers() {
         let mut variants = model::measure().unwrap();
-        let mut measured = measured();
-        assert_eq!(fill(&measured, &mut variants).unwrap().unwrap().worst, 5000);
-        assert!(variants.iter().all(|v| v.forward.cycles == Some(500)));
+        let answers = on_host().unwrap();
+        assert_eq!(steps().unwrap().len(), 1 + answers.len());
+        let calls = answers.iter().zip([500, 300, 1500, 600, 60_000, 20_000]);
+        let mut measured = Measured {
+            calls: calls
+                .map(|(values, max)| Calls {
+                    values: values.iter().map(|&value| value as u32).collect(),
+                    cost: Cost { calls: 1, cycles: max, max },
+                })
+                .collect(),
+            tick: Tick { mean: 4e3, worst: 5000 },
+        };
+        fill(&measured, &mut variants).unwrap();
+        assert_eq!(variants[1].inverse.cycles, Some(600));
         // Fixed point is the same to the bit, floating point nearly.
-        measured.variants[1].outputs[3] += 1;
-        assert!(fill(&measured, &mut variants).is_ok());
-        measured.variants[0].outputs[3] += 1;
+        measured.calls[2].values[3] += 1;
+        fill(&measured, &mut variants).unwrap();
+        measured.calls[0].values[3] += 1;
         let error = fill(&measured, &mut variants).unwrap_err().to_string();
-        assert!(error.starts_with("fixed 3:"), "{error}");
+        assert!(error.starts_with("fixed, point 3:"), "{error}");
     }
 }

@@ -85,7 +85,7 @@ pub fn run_all(cases: &[(Case, Use)], progress: &(dyn Fn() + Sync)) -> Result<Ve
 pub fn write(rows: &[Row]) -> String {
     let mut text = format!(
         "# Crossings of the ring, {ELEMENTS} elements, {STRIDE_MM} mm a step. Written by \
-         `cargo rig constants`; do not edit.\n\
+         `rig-study constants`; do not edit.\n\
          kind,use,step_mm,speed_mm_s,preload_n,load_n,gap_mm,utilisation,corner_force_n\n"
     );
     for Row { case, of, gap_mm, utilisation, corner_force_n } in rows {

@@ -35,15 +35,15 @@ pub fn markdown(study: &Study) -> String {
     let fitted = study.claims.iter().filter(|claim| claim.holds && claim.fitted).count();
     let mut page = format!(
         "# The study's figures, regenerated\n\nWritten by `cargo rig paper`; do not edit.\n\n\
-         Every result that the text of the study describes, three times: **theory**, the reduced model \
-         that the controller uses; **simulation**, the reference models; **experiment**, the virtual \
-         rig with the shipping controller, sensor noise and tolerances, forty rigs a case and four means \
-         of ten, as the study made them. Filled diamonds are numbers that the study prints, hollow ones those \
-         among them to which a parameter is fitted: three gaps, to which stiffness, stiffening and relaxation time of \
-         the tread are, and one frequency, to which a tip mass is. Nothing else is fitted, and nothing is \
-         tuned so that a claim would hold.\n\n\
-         Of {} claims {held} hold, {fitted} of these because something is fitted to them, and {} do not. Each is judged by code from the data of its figure; \
-         a test fails if a verdict changes. The data are in [paper.json](paper.json).\n",
+         Every result that the study's text describes, three times. **Theory** is the reduced model that the \
+         controller uses. **Simulation** is the reference models. **Experiment** is the virtual rig with the \
+         shipping controller, sensor noise and tolerances: forty rigs a case, four means of ten, as in the study. \
+         Filled diamonds are numbers that the study prints. To hollow ones a parameter is fitted: stiffness, \
+         stiffening and relaxation time of the tread to three gaps, a tip mass to one frequency. Nothing else is \
+         fitted.\n\n\
+         Of {} claims {held} hold, {fitted} of these because something is fitted to them, and {} do not. Code \
+         judges each claim from the data of its figure. [paper.json](paper.json) has the data, the section of each \
+         claim and what was found.\n",
         study.claims.len(),
         study.claims.len() - held,
     );
@@ -73,11 +73,10 @@ fn section(page: &mut String, figure: &Figure, claims: &[Claim]) {
             *page += &mark_row(mark);
         }
     }
-    *page += "\n| the study says | in its section | | in ours |\n|---|---|---|---|\n";
+    *page += "\n| the study says | here | why not |\n|---|---|---|\n";
     for claim in claims.iter().filter(|claim| claim.figure == figure.id) {
-        let verdict = claim.verdict();
-        let _ =
-            writeln!(page, "| {} | {} | {verdict} | {} |", claim.claim, claim.section, claim.why);
+        let why = if claim.holds { "" } else { &claim.why };
+        let _ = writeln!(page, "| {} | {} | {why} |", claim.claim, claim.verdict());
     }
 }
 

@@ -1,5 +1,5 @@
 //! The drive arm by the wave-vector method: natural frequencies here, their [`Shape`]s
-//! (55), the forced response ([`Forcing`], 56), discontinuities ([`junction`], 46-51).
+//! (55), the forced response ([`Forcing`], 56).
 //!
 //! An Euler-Bernoulli beam with end A at the pillar and end B at the wheel; end B may
 //! carry a mass and press on a spring to ground (the contact). A wave that runs from A
@@ -10,7 +10,6 @@
 //! the higher the mode.
 
 mod forced;
-pub mod junction;
 mod roots;
 mod shapes;
 pub mod waves;

@@ -11,5 +11,5 @@ mod history;
 pub mod rod;
 pub mod rubber;
 
-pub use history::{history, history_of, hub_reflection, touch};
+pub use history::{hub_reflection, stress};
 pub use rubber::Rubber;

@@ -13,7 +13,7 @@ mod tests;
 
 use nalgebra::Complex;
 
-use super::case::{ReferenceError, positive, require};
+use super::error::{ReferenceError, positive, require};
 
 pub use memory::Memory;
 

@@ -12,8 +12,9 @@
 mod arm;
 pub mod modal;
 
-use super::case::{Case, ReferenceError};
-use super::collision::{Crossing, dynamic};
+use super::case::Case;
+use super::collision::Crossing;
+use super::error::ReferenceError;
 
 pub use arm::{Arm, CONSTRAINED_HZ, FREE_HZ};
 
@@ -34,18 +35,8 @@ pub struct Bending {
     pub vibration_mm: f64,
 }
 
-/// Time, s, from the touch of the corner on, and deflection at the wheel across the arm,
-/// mm, under what the crossing adds to the force of steady rolling.
-///
-/// # Errors
-/// [`ReferenceError`] if an argument is out of range or the preload cannot be carried.
-pub fn history(case: &Case) -> Result<Vec<(f64, f64)>, ReferenceError> {
-    let course = bending(case, &dynamic(case)?)?;
-    Ok(course.iter().map(|now| (now.t_s, now.deflection_mm)).collect())
-}
-
-/// [`history()`] of a crossing of `case` that has been computed already, with its
-/// vibration apart.
+/// Deflection at the wheel across the arm under what the crossing adds to the force of
+/// steady rolling.
 ///
 /// # Errors
 /// [`ReferenceError`] if the rig's arm is out of range.
@@ -86,6 +77,7 @@ fn across(case: &Case, arm: &Arm, crossing: &Crossing) -> Vec<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::reference::collision::dynamic;
 
     fn course(speed_mm_s: f64) -> (Vec<Bending>, f64) {
         let case = Case { speed_mm_s, ..Case::study()[0].clone() };

@@ -7,7 +7,8 @@
 
 use super::crossing::{Crossing, Recorder, Way};
 use super::quasi_static::Rolling;
-use crate::reference::case::{Case, ReferenceError};
+use crate::reference::case::Case;
+use crate::reference::error::ReferenceError;
 use hil_sim::plant::balance::Balance;
 use hil_sim::plant::ring::{Contact, Motion, Ring};
 

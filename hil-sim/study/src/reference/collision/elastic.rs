@@ -5,7 +5,7 @@
 //! `(R - distance) cos psi` and `(R - distance) sin psi`, distance being `y/cos psi`,
 //! `d/sin psi` and `(y - h)/cos psi`, over the angles at which they are positive.
 
-use crate::reference::case::{ReferenceError, positive, require};
+use crate::reference::error::{ReferenceError, positive, require};
 
 /// An elastic wheel and a step.
 #[derive(Clone, Copy, Debug, PartialEq)]

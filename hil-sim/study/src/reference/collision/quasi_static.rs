@@ -1,7 +1,8 @@
 //! The crossing without inertia: at every place the contact carries the preload.
 
 use super::crossing::{Crossing, Recorder, Way, ring};
-use crate::reference::case::{Case, ReferenceError};
+use crate::reference::case::Case;
+use crate::reference::error::ReferenceError;
 use hil_sim::plant::balance::Balance;
 use hil_sim::plant::ring::{Contact, Motion, Ring};
 

@@ -1,15 +1,12 @@
 //! The ring against its closed form without memory, its limits, and what inertia adds.
 
-mod hereditary;
-mod hunt_crossley;
-
 use interstage::rig::Rig;
 use proptest::prelude::*;
 
 use super::dynamic::Mass;
 use super::elastic::{Elastic, rigid_climb_n};
 use super::*;
-use crate::reference::Resolution;
+use crate::reference::{Case, Resolution};
 use hil_sim::plant::balance::{Axial, Balance};
 use hil_sim::plant::ring::{Motion, Ring};
 use hil_sim::plant::wall::Wall;

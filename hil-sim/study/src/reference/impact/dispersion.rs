@@ -56,15 +56,6 @@ pub fn front_attenuation_np_m(rubber: &Rubber) -> f64 {
     relaxing / (2.0 * solid.relaxation_time_s() * rubber.front_speed_m_s())
 }
 
-/// (40) as printed: Kelvin-Voigt's attenuation, Np/m, for modulus E, density, and delay
-/// time. It grows with frequency without bound.
-#[must_use]
-pub fn attenuation_as_printed(e_pa: f64, density_kg_m3: f64, delay_s: f64, omega: f64) -> f64 {
-    let lag = (omega * delay_s).powi(2);
-    let slow = omega * omega * density_kg_m3 / (2.0 * e_pa * (1.0 + lag));
-    (slow * ((1.0 + lag).sqrt() - 1.0)).sqrt()
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
@@ -139,21 +130,6 @@ mod tests {
         assert!(rubber.solid.loss_tangent(0.9 * peak) < 0.25);
         assert!(rubber.solid.loss_tangent(1.1 * peak) < 0.25);
         assert!(Rubber::of_sheets(0.0, 1.0).is_err());
-    }
-
-    #[test]
-    fn what_is_printed_holds_for_kelvin_voigt_alone() {
-        let (e, rho, delay) = (4.8e6, 1140.0, 1e-3);
-        for omega in [1.0, 30.0, 1e3, 1e4, 1e6] {
-            let modulus = Complex::new(e, e * omega * delay);
-            let kappa = (Complex::from(rho * omega * omega) / modulus).sqrt();
-            let printed = attenuation_as_printed(e, rho, delay, omega);
-            assert!((printed / -kappa.im - 1.0).abs() < 1e-6, "{omega}");
-        }
-        // The instant modulus that Kelvin-Voigt lacks is what bounds the solid's.
-        let rubber = Rubber::of_sheets(0.25, 100.0).unwrap();
-        let printed = attenuation_as_printed(e, rho, rubber.solid.retardation_time_s(), 1e7);
-        assert!(printed > 10.0 * Wave::at(&rubber, 1e7).attenuation_np_m);
     }
 
     proptest! {

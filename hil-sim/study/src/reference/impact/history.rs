@@ -4,8 +4,9 @@ use super::Rubber;
 use super::rod::{Face, Rod};
 use super::rubber::THICKNESS_MM;
 use crate::reference::beam::Beam;
-use crate::reference::case::{Case, ReferenceError, positive};
-use crate::reference::collision::{Crossing, dynamic};
+use crate::reference::case::Case;
+use crate::reference::collision::Crossing;
+use crate::reference::error::ReferenceError;
 
 /// Cells across the tread.
 const CELLS: usize = 16;
@@ -23,31 +24,22 @@ pub fn hub_reflection(rubber: &Rubber) -> f64 {
 }
 
 /// The tread of a case as a rod.
-fn tread(case: &Case, cells: usize) -> Result<Rod, ReferenceError> {
+fn tread(case: &Case) -> Result<Rod, ReferenceError> {
     let rubber = Rubber::of(case)?;
-    Rod::new(rubber, THICKNESS_MM * 1e-3, cells, hub_reflection(&rubber))
+    Rod::new(rubber, THICKNESS_MM * 1e-3, CELLS, hub_reflection(&rubber))
 }
 
 /// Time, s, from the touch of the corner on, and the stress increment at the hub, Pa:
 /// the mean pressure of the contact above that of steady rolling (the study: what the
 /// collision adds to the preload), sent through the tread as positive and negative waves.
 ///
-/// A crossing lasts seconds and a transit a tenth of a millisecond, so that the stress at
-/// the hub is that on the face a transit before, to some thousandths of its peak; what the waves themselves do at the touch is
-/// [`touch`].
-///
-/// # Errors
-/// [`ReferenceError`] if an argument is out of range or the preload cannot be carried.
-pub fn history(case: &Case) -> Result<Vec<(f64, f64)>, ReferenceError> {
-    history_of(case, &dynamic(case)?)
-}
-
-/// [`history()`] of a crossing of `case` that has been computed already.
+/// The stress at the hub is that on the face a transit before, to some thousandths of its
+/// peak.
 ///
 /// # Errors
 /// [`ReferenceError`] if the tread is none of a passive solid.
-pub fn history_of(case: &Case, crossing: &Crossing) -> Result<Vec<(f64, f64)>, ReferenceError> {
-    let mut rod = tread(case, CELLS)?;
+pub fn stress(case: &Case, crossing: &Crossing) -> Result<Vec<(f64, f64)>, ReferenceError> {
+    let mut rod = tread(case)?;
     let Some(first) = crossing.samples.first() else { return Ok(Vec::new()) };
     let (mut t, mut next) = (first.t_s, first.t_s);
     let mut course = Vec::new();
@@ -66,48 +58,16 @@ pub fn history_of(case: &Case, crossing: &Crossing) -> Result<Vec<(f64, f64)>, R
     Ok(course)
 }
 
-/// The first `duration_s` after the touch: time, s, and the stress, Pa, on face and hub
-/// if corner and tread closed at `v sin(phi)` at once over the whole face. An upper
-/// bound: the ring's patch at the corner grows from nothing.
-///
-/// # Errors
-/// [`ReferenceError`] if an argument is out of range.
-pub fn touch(case: &Case, duration_s: f64) -> Result<Vec<(f64, f64, f64)>, ReferenceError> {
-    case.check()?;
-    positive("duration_s", duration_s)?;
-    let mut rod = tread(case, 4 * CELLS)?;
-    let speed = case.closing_speed_mm_s() * 1e-3;
-    let steps = (duration_s / rod.step_s()).ceil() as usize;
-    let instants = (1..=steps).map(|step| {
-        rod.step(Face::Speed(speed));
-        (rod.step_s() * step as f64, rod.face_pa(), rod.hub_pa())
-    });
-    Ok(instants.collect())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_touch_begins_with_the_jump_of_the_closing_speed() {
-        let case = Case::study()[0].clone();
-        let waves = touch(&case, 2e-4).unwrap();
-        let rubber = Rubber::of(&case).unwrap();
-        let jump = rubber.impedance() * case.closing_speed_mm_s() * 1e-3;
-        // Hundreds of pascals: a thousandth of the contact pressure.
-        assert!((waves[0].1 / jump - 1.0).abs() < 1e-6 && (200.0..600.0).contains(&jump));
-        let transit = THICKNESS_MM * 1e-3 / rubber.front_speed_m_s();
-        let arrival = waves.iter().find(|wave| wave.2 > 0.0).unwrap();
-        assert!((arrival.0 - transit).abs() < 2.0 * transit / 64.0, "{} {transit}", arrival.0);
-        assert!((arrival.2 / (jump * (1.0 + hub_reflection(&rubber))) - 1.0).abs() < 1e-3);
-    }
+    use crate::reference::collision::dynamic;
 
     #[test]
     fn the_hub_bears_what_the_face_does_a_transit_later() {
         let case = Case::study()[2].clone();
         let crossing = dynamic(&case).unwrap();
-        let course = history_of(&case, &crossing).unwrap();
+        let course = stress(&case, &crossing).unwrap();
         let peak = course.iter().map(|point| point.1).fold(0.0, f64::max);
         let transit = THICKNESS_MM * 1e-3 / Rubber::of(&case).unwrap().front_speed_m_s();
         let mut worst = 0.0_f64;

@@ -5,7 +5,7 @@
 //! d'Alembert's to rounding, with it the error is of second order in the step.
 
 use super::Rubber;
-use crate::reference::case::{ReferenceError, positive, require};
+use crate::reference::error::{ReferenceError, positive, require};
 
 /// What is held on the face.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,6 +1,7 @@
 //! The tread as a material that carries waves.
 
-use crate::reference::case::{Case, ReferenceError, positive};
+use crate::reference::case::Case;
+use crate::reference::error::{ReferenceError, positive};
 use crate::reference::solid::Solid;
 
 /// Thickness of the tread, mm. Not published; chosen: with it the fitted relaxed

@@ -2,7 +2,8 @@
 
 use super::modal::Modal;
 use crate::reference::beam::{Beam, Ends, Mode, Tip};
-use crate::reference::case::{Case, ReferenceError};
+use crate::reference::case::Case;
+use crate::reference::error::ReferenceError;
 
 /// First constrained mode of the rig, Hz. Published.
 pub const CONSTRAINED_HZ: f64 = 276.0;
