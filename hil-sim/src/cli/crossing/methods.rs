@@ -1,6 +1,6 @@
 //! The three ways to compute a crossing.
 
-use interstage::model::felt::Kind;
+use interstage::model::effective_stiffness::Kind;
 use interstage::model::formula::{Formula, LEAST_RUN};
 use interstage::model::reduced::{Point, ReducedModel, Scale};
 use interstage::rig::Rig;

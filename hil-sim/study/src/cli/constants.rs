@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use interstage::model::felt::Kind;
+use interstage::model::effective_stiffness::Kind;
 use interstage::model::formula::Formula;
 use interstage::params::{MAX_SET, compile};
 use interstage::rig::Rig;

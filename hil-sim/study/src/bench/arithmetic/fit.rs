@@ -1,7 +1,7 @@
 //! Coefficients for `interstage-arith`: the polynomials of the shipping model, fitted
 //! from the formulas in f64.
 
-use interstage::model::felt::{self, FORCE_END, Kind};
+use interstage::model::effective_stiffness::{self, FORCE_END, Kind};
 use interstage::model::formula::{Formula, LEAST_RUN};
 use interstage::rig::Rig;
 use interstage::units::Direction;
@@ -86,7 +86,8 @@ impl Bench {
         let folded = f.fold(kind, self.load_n);
         let part_of_excess = (f.stiffening - 1.0) / f.stiffening;
         let felt_at = |x: f64, part: f64| {
-            part_of_excess * felt::value(&folded, x, part * self.longest_mm / f.radius_mm)
+            part_of_excess
+                * effective_stiffness::value(&folded, x, part * self.longest_mm / f.radius_mm)
         };
         let grid: Vec<(f64, f64)> =
             nodes(GRID).flat_map(|x| nodes(GRID).map(move |part| (x, part))).collect();
@@ -94,7 +95,10 @@ impl Bench {
         Some(Way {
             half_speed: f.half_speed_mm_s(kind) / 128.0,
             relaxed: 1.0 / f.stiffening,
-            felt: surface(&powers(felt::FAST_DEGREE, felt::RUN_DEGREE), felt_points)?,
+            felt: surface(
+                &powers(effective_stiffness::FAST_DEGREE, effective_stiffness::RUN_DEGREE),
+                felt_points,
+            )?,
             guess: self.guess(kind, &felt_at)?,
         })
     }
@@ -218,7 +222,7 @@ mod tests {
 
     #[test]
     fn the_powers_are_those_of_the_model() {
-        let found = powers(felt::FAST_DEGREE, felt::RUN_DEGREE);
+        let found = powers(effective_stiffness::FAST_DEGREE, effective_stiffness::RUN_DEGREE);
         assert_eq!(found.len(), interstage_arith::FELT);
         assert!(found.contains(&(5, 0)) && found.contains(&(0, 6)) && !found.contains(&(1, 5)));
     }

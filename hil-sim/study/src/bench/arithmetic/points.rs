@@ -2,7 +2,7 @@
 //! and way, for both presets and five heights of the step.
 
 use anyhow::{Context, Result};
-use interstage::model::felt::Kind;
+use interstage::model::effective_stiffness::Kind;
 use interstage::model::formula::Formula;
 use interstage::model::reduced::ReducedModel;
 use interstage::rig::Rig;
