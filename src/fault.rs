@@ -1,11 +1,6 @@
 //! Latched faults (codes 100 to 199) and active limits (200 to 299). Codes are
-//! stable: a number is never given a second meaning.
-
-#[cfg(not(target_os = "none"))]
-mod description;
-
-#[cfg(not(target_os = "none"))]
-pub use description::FaultDescription;
+//! stable: a number is never given a second meaning. Cause, detection, reaction and reset of
+//! each: `docs/MODES.md`.
 
 /// A latched fault: the drive holds until it is reset.
 #[derive(
@@ -15,34 +10,34 @@ pub use description::FaultDescription;
 #[repr(u16)]
 pub enum Fault {
     /// The wheel encoder stopped answering.
-    SpeedStale = 101,
-    /// The load cell stopped answering.
-    PressureStale = 102,
-    /// The tread displacement sensor stopped answering.
-    DisplacementStale = 103,
+    WheelEncoderStale = 101,
+    /// The preload sensor stopped answering.
+    PreloadSensorStale = 102,
+    /// The compression sensor stopped answering.
+    CompressionSensorStale = 103,
     /// The arm angle sensor stopped answering or answers with errors.
-    AngleStale = 104,
+    ArmAngleStale = 104,
     /// The readback of the bridges stopped answering.
     ReadbackStale = 105,
-    /// The load cell reads outside its range.
-    PressureRange = 112,
-    /// The tread displacement sensor reads outside its range.
-    DisplacementRange = 113,
+    /// The preload sensor reads outside its range.
+    PreloadSensorRange = 112,
+    /// The compression sensor reads outside its range.
+    CompressionSensorRange = 113,
     /// The arm angle lies outside the arm's reach.
-    AngleRange = 114,
-    /// The load cell's code stands still, or jumps as no force does.
-    PressureImplausible = 116,
-    /// The displacement sensor's code stands still, or jumps as no tread does.
-    DisplacementImplausible = 117,
+    ArmAngleRange = 114,
+    /// The load cell's code does not change, or jumps as no force does.
+    PreloadSensorImplausible = 116,
+    /// The compression sensor's code does not change, or jumps as no tread does.
+    CompressionSensorImplausible = 117,
     /// The preload exceeded its limit by more than the regulation band.
     Overpressure = 120,
     /// The preload did not reach its reference in time.
     PreloadNotReached = 121,
-    /// The wheel stands still although driven.
+    /// The wheel does not turn although driven.
     DriveStalled = 122,
     /// The wheel turns against the command or far faster than asked.
     DriveRunaway = 123,
-    /// Two steps in a row stand off the table by different ways.
+    /// Two steps in a row are off the table by different distances.
     StepsDisagree = 124,
     /// The drive takes another duty than its speed needs.
     DutyMismatch = 125,
@@ -60,7 +55,7 @@ pub enum Fault {
     StepsLost = 132,
     /// The wheel turns at a corner without getting over it.
     WheelSlips = 133,
-    /// The position is not known and no step lies ahead that could tell it.
+    /// The position is not known and no step lies ahead that could set it.
     PositionUnknown = 134,
     /// The model task does not answer.
     ModelSilent = 141,
@@ -75,16 +70,16 @@ pub enum Fault {
 impl Fault {
     /// Every fault, in the order of codes.
     pub const ALL: [Self; 28] = [
-        Self::SpeedStale,
-        Self::PressureStale,
-        Self::DisplacementStale,
-        Self::AngleStale,
+        Self::WheelEncoderStale,
+        Self::PreloadSensorStale,
+        Self::CompressionSensorStale,
+        Self::ArmAngleStale,
         Self::ReadbackStale,
-        Self::PressureRange,
-        Self::DisplacementRange,
-        Self::AngleRange,
-        Self::PressureImplausible,
-        Self::DisplacementImplausible,
+        Self::PreloadSensorRange,
+        Self::CompressionSensorRange,
+        Self::ArmAngleRange,
+        Self::PreloadSensorImplausible,
+        Self::CompressionSensorImplausible,
         Self::Overpressure,
         Self::PreloadNotReached,
         Self::DriveStalled,
@@ -113,16 +108,16 @@ impl Fault {
     /// One sentence for the operator.
     pub const fn sentence(self) -> &'static str {
         match self {
-            Self::SpeedStale => "the wheel encoder stopped answering",
-            Self::PressureStale => "the load cell stopped answering",
-            Self::DisplacementStale => "the tread displacement sensor stopped answering",
-            Self::AngleStale => "the arm angle sensor stopped answering or answers with errors",
+            Self::WheelEncoderStale => "the wheel encoder stopped answering",
+            Self::PreloadSensorStale => "the load cell stopped answering",
+            Self::CompressionSensorStale => "the tread displacement sensor stopped answering",
+            Self::ArmAngleStale => "the arm angle sensor stopped answering or answers with errors",
             Self::ReadbackStale => "the readback of the bridges stopped answering",
-            Self::PressureRange => "the load cell reads outside its range",
-            Self::DisplacementRange => "the tread displacement sensor reads outside its range",
-            Self::AngleRange => "the arm angle lies outside the arm's reach",
-            Self::PressureImplausible => "the load cell reads what no force can be",
-            Self::DisplacementImplausible => {
+            Self::PreloadSensorRange => "the load cell reads outside its range",
+            Self::CompressionSensorRange => "the tread displacement sensor reads outside its range",
+            Self::ArmAngleRange => "the arm angle lies outside the arm's reach",
+            Self::PreloadSensorImplausible => "the load cell reads what no force can be",
+            Self::CompressionSensorImplausible => {
                 "the tread displacement sensor reads what no tread does"
             }
             Self::Overpressure => "the preload exceeded its limit",
@@ -174,13 +169,13 @@ pub enum Limit {
     ResonanceAvoided = 207,
     /// The stiffness estimate reached the end of its range.
     AdaptationBounded = 208,
-    /// The drive waits before a corner for the preload to stand.
+    /// The drive waits before a corner for the preload to be reached.
     PreloadWait = 209,
     /// The friction utilisation leaves less than the wanted margin.
     SlipMarginLow = 210,
     /// The measured gap of a crossing is not the predicted one.
     GapStrange = 211,
-    /// Compression and preload of a wheel that stands do not belong together.
+    /// Compression and preload of a wheel at rest contradict each other.
     TreadStrange = 212,
     /// The position is that of a record which no step ahead can confirm.
     PositionUnconfirmed = 213,
@@ -230,5 +225,18 @@ impl Limit {
             Self::TreadStrange => "compression of the tread and preload do not belong together",
             Self::PositionUnconfirmed => "the position is of a record that no step ahead confirms",
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn codes_ascend_in_their_own_ranges() {
+        let faults = Fault::ALL.map(Fault::code);
+        let limits = Limit::ALL.map(Limit::code);
+        assert!(faults.is_sorted_by(|a, b| a < b) && faults.iter().all(|c| (100..200).contains(c)));
+        assert!(limits.is_sorted_by(|a, b| a < b) && limits.iter().all(|c| (200..300).contains(c)));
     }
 }

@@ -2,7 +2,7 @@
 
 pub mod constants;
 pub mod corner_profile;
-pub mod felt;
+pub mod effective_stiffness;
 pub mod formula;
 pub mod guard;
 pub mod impact;

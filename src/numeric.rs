@@ -1,11 +1,6 @@
-//! Fixed-point primitives that [`fixed`] does not give cheaply on a 32-bit core:
-//! division, square root, tabulated functions and a low-pass, all exact to the
-//! bit on every machine.
-//!
-//! Nothing here divides 64-bit numbers, loops without a bound or panics. The
-//! conversion from SI numbers, which does use floats, is in one place
-//! ([`checked`], [`Divisor::build`], [`Table::build`], [`LowPass::build`]) and runs at
-//! start only.
+//! Fixed-point primitives that [`fixed`] lacks or makes slow on a 32-bit core, exact to the bit
+//! on every machine. Nothing here divides 64-bit numbers, loops without a bound or panics. The
+//! conversion from SI numbers uses floats; it runs at start, in `build` alone.
 
 mod build;
 mod divide;
@@ -19,7 +14,7 @@ mod sine;
 mod table;
 
 pub use build::{checked, cosine_of_turns};
-pub use divide::{divide, part, reciprocal};
+pub use divide::{divide, part};
 pub use divisor::Divisor;
 pub use fraction_root::{inverse_sqrt_guess, inverse_sqrt_normalised, sqrt_fraction};
 pub use high::{fits, fits_with_slope, high};

@@ -1,10 +1,9 @@
-//! The rig: geometry, material, actuators, sensors, limits. Every number stands
-//! here once, in SI or millimetres as its suffix says, with its source. The plant
-//! of the virtual rig reads the same struct; mismatch between the two is drawn
-//! there on purpose and never written down a second time.
+//! The rig: geometry, material, actuators, sensors, limits. Every number is here once, in SI or
+//! millimetres as its suffix says, with its source. The plant of the virtual rig reads the same
+//! struct; mismatch between the two is drawn there on purpose.
 //!
-//! Sources: *published* is the study of the deployable mechanism; *derived* is
-//! computed from published numbers; *chosen* is ours, with the reason beside it.
+//! Sources: *published* is the study of the deployable mechanism; *derived* is computed from
+//! published numbers; *chosen* is ours, with the reason beside it.
 
 mod presets;
 mod validate;
@@ -38,7 +37,7 @@ pub struct Rig {
     /// Sensors.
     pub sense: Sensors,
     /// What the controller is asked to hold.
-    pub control: Goals,
+    pub control: ControlSettings,
 }
 
 /// Sleeve, wheel and arm.
@@ -51,7 +50,7 @@ pub struct Geometry {
     pub wheel_width_mm: f64,
     /// Step height h between neighbouring sleeves, mm. Published: 4.
     pub step_height_mm: f64,
-    /// Axial positions of the step faces on the way out, mm, ascending. Chosen:
+    /// Axial positions of the step faces, mm, ascending. Chosen:
     /// three steps evenly over the travel.
     pub step_positions_mm: List<MAX_STEPS>,
     /// Half-width of the window in which a step is expected, mm. Chosen: machining
@@ -148,7 +147,7 @@ pub struct Drive {
     pub acceleration_mm_s2: f64,
     /// Largest jerk of the profile, mm/s^3.
     pub jerk_mm_s3: f64,
-    /// Way between two torque ripples of motor and gearbox, mm at the tread: the
+    /// Travel between two torque ripples of motor and gearbox, mm at the tread: the
     /// excitation frequency is speed over this.
     pub ripple_pitch_mm: f64,
     /// Structural modes to keep away from, Hz. Published: 163 and 276.
@@ -163,7 +162,7 @@ pub struct Drive {
 pub struct Sensors {
     /// Encoder counts per wheel turn, all edges.
     pub encoder_counts: f64,
-    /// Load cell full scale, N, at 90 % of the converter; zero stands at 5 %.
+    /// Load cell full scale, N, at 90 % of the converter; zero is at 5 %.
     pub load_cell_full_scale_n: f64,
     /// Tread displacement full scale, mm, at 90 % of the converter; zero at 5 %.
     pub tread_full_scale_mm: f64,
@@ -176,7 +175,7 @@ pub struct Sensors {
 /// What the controller is asked to hold.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Goals {
+pub struct ControlSettings {
     /// Gap to hold at a step, mm; 0 takes the gap at `safe_speed_mm_s` and cruise
     /// preload.
     pub gap_ref_mm: f64,

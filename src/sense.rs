@@ -1,16 +1,11 @@
-//! From raw codes to checked quantities.
-//!
-//! [`Senses`] is what the control tick calls: it takes the latest code of each
-//! sensor and gives every quantity with its time and [`Validity`]. A sensor that
-//! falls silent or answers with errors keeps its last good value, which ages; it
-//! never holds up the tick.
+//! From raw codes to checked quantities: [`Senses`] gives every quantity with its time and
+//! [`Validity`]. A sensor that falls silent or answers with errors keeps its last good value,
+//! which ages; it never holds up the tick.
 
 pub mod analog;
 pub mod angle;
 pub mod arm;
-pub mod displacement;
 pub mod freshness;
-pub mod pressure;
 pub mod raw;
 mod senses;
 pub mod speed;

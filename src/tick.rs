@@ -205,7 +205,7 @@ impl Controller {
         command: Option<Command>,
     ) {
         let Some(command) = command else { return };
-        // A reset that was already on its way must not clear a fault unseen.
+        // A reset that was already sent must not clear a fault unseen.
         let hasty = matches!(state.mode, Mode::FaultHold(_)) && state.in_mode < HOLD_TICKS;
         let trigger = Trigger::Command(command);
         if hasty || next(state.mode, trigger).is_none() {

@@ -1,10 +1,8 @@
-//! Fixed-point quantities, named by what they measure.
+//! Fixed-point quantities, named by what they measure, and what moves the drive.
 //!
-//! Every quantity of the control path is a [`Q16`]: 32 bits, 16 of them
-//! fraction, saturating in every operation. One format keeps the tick in single
-//! 32 x 32 -> 64 multiplies and makes the same bits on host and target. Range
-//! and resolution are stated per alias; what needs more is an accumulator of its
-//! own (see [`Travel`]).
+//! Every quantity of the control path is a [`Q16`]: 32 bits, 16 of them fraction, saturating.
+//! One format keeps the tick in 32 x 32 -> 64 multiplies, bit-identical on host and target.
+//! What needs more resolution is an accumulator of its own (see [`Travel`]).
 
 mod motion;
 mod q16;
@@ -35,9 +33,8 @@ pub type Seconds = Q16;
 /// Dimensionless ratio: friction, utilisation, stiffness scale, Deborah number.
 pub type Ratio = Q16;
 
-/// Accumulated position, mm, Q31.32: LSB 0.23 pm, so that a millisecond at
-/// 1 mm/s (4.3e6 LSB) is integrated without a rounding drift. Wraps never:
-/// 2^31 mm is 2000 km.
+/// Accumulated position, mm, Q31.32: LSB 0.23 pm, so that a millisecond at 1 mm/s is integrated
+/// without drift. Never wraps: 2^31 mm is 2000 km.
 pub type Travel = I32F32;
 
 /// Time in control ticks of one millisecond since boot; wraps after 49.7 days,
@@ -47,10 +44,8 @@ pub type Tick = u32;
 /// Control ticks in a second, the rate of the motor task.
 pub const TICK_HZ: u32 = 1000;
 
-/// A constant [`Q16`] from millionths, rounded towards zero: `q16(1_500_000)` is 1.5.
-///
-/// Range of the argument: +-32_767_000_000; outside it the build fails when used
-/// in a constant.
+/// A constant [`Q16`] from millionths, rounded towards zero: `q16(1_500_000)` is 1.5. Out of
+/// range the build fails.
 pub const fn q16(millionths: i64) -> Q16 {
     let bits = millionths * 65_536 / 1_000_000;
     assert!(bits >= i32::MIN as i64 && bits <= i32::MAX as i64);

@@ -17,31 +17,14 @@ fn load(rig: &Rig) -> f64 {
 }
 
 #[test]
-fn the_unloaded_wheel_has_the_largest_gap() {
-    for rig in [Rig::prototype(), Rig::fe()] {
-        let formula = Formula::new(&rig);
-        let largest = formula.largest_gap_mm();
-        // The circle through the edge that just touches the floor: its centre is one
-        // radius above, and `h (2 R - h)` of the edge is the square of its distance.
-        let run = (rig.rig.step_height_mm
-            * (2.0 * rig.rig.wheel_radius_mm - rig.rig.step_height_mm))
-            .sqrt();
-        let radius = rig.rig.wheel_radius_mm;
-        assert!((largest - ((run * run + radius * radius).sqrt() - radius)).abs() < 1e-12);
-        for force in [1.0, 40.0, 300.0] {
-            assert!(formula.gap_mm(Direction::Deploy, 5.0, force, None) < largest);
-        }
-    }
-}
-
-#[test]
 fn stiffness_times_the_relaxed_force_is_the_force() {
     let rig = Rig::fe();
     let formula = Formula::new(&rig);
     for way in WAYS {
         for speed in [0.5, 5.0, 8.0, 30.0] {
             for gap in [1.4, 1.8, 2.2] {
-                let kind = interstage::model::felt::Kind { direction: way, driven: false };
+                let kind =
+                    interstage::model::effective_stiffness::Kind { direction: way, driven: false };
                 let force = formula.force_n(way, speed, gap, None);
                 let product =
                     formula.stiffness(way, speed, gap, None) * formula.relaxed_force_n(kind, gap);

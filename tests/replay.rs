@@ -111,10 +111,10 @@ fn a_sensor_that_never_answers_is_named() {
     let Recorded(boots) = Recorded::read("deploy.mcap");
     type Silence = fn(&mut SensorFrame);
     let all: [(Silence, Fault); 4] = [
-        (|sensors| sensors.wheel = None, Fault::SpeedStale),
-        (|sensors| sensors.load_cell = None, Fault::PressureStale),
-        (|sensors| sensors.tread = None, Fault::DisplacementStale),
-        (|sensors| sensors.arm = None, Fault::AngleStale),
+        (|sensors| sensors.wheel = None, Fault::WheelEncoderStale),
+        (|sensors| sensors.load_cell = None, Fault::PreloadSensorStale),
+        (|sensors| sensors.tread = None, Fault::CompressionSensorStale),
+        (|sensors| sensors.arm = None, Fault::ArmAngleStale),
     ];
     for (silence, fault) in all {
         let mut said = None;

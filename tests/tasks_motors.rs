@@ -221,9 +221,9 @@ fn what_the_drive_does_is_kept_every_tick() {
 fn a_hanging_sensor_is_a_fault_and_stops_neither_tick_nor_watchdog() {
     type Pick = fn(&Board) -> &Sensor;
     let sensors: [(Pick, Fault); 3] = [
-        (|board| &board.load_cell, Fault::PressureStale),
-        (|board| &board.tread, Fault::DisplacementStale),
-        (|board| &board.arm, Fault::AngleStale),
+        (|board| &board.load_cell, Fault::PreloadSensorStale),
+        (|board| &board.tread, Fault::CompressionSensorStale),
+        (|board| &board.arm, Fault::ArmAngleStale),
     ];
     for (sensor, fault) in sensors {
         let mut board = Board::idle();

@@ -15,7 +15,7 @@ mod validate;
 
 use std::path::Path;
 
-use interstage::rig::{Drive, Geometry, Goals, Loads, Pretightener, Rig, Sensors, Tread};
+use interstage::rig::{ControlSettings, Drive, Geometry, Loads, Pretightener, Rig, Sensors, Tread};
 use serde::{Deserialize, Serialize};
 
 pub use error::{Origin, ScenarioError};
@@ -53,7 +53,7 @@ struct Document {
     preload: Pretightener,
     drive: Drive,
     sense: Sensors,
-    control: Goals,
+    control: ControlSettings,
     spread: Spread,
     noise: Noise,
     run: RunOptions,

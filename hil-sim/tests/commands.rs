@@ -350,10 +350,10 @@ fn commands_in_the_wrong_mode_are_refused_and_change_nothing() {
 type Silence = (&'static str, fn(&mut SensorFrame, &SensorFrame), Fault);
 
 const SENSORS: [Silence; 4] = [
-    ("wheel", |now, old| now.wheel = old.wheel, Fault::SpeedStale),
-    ("load cell", |now, old| now.load_cell = old.load_cell, Fault::PressureStale),
-    ("tread", |now, old| now.tread = old.tread, Fault::DisplacementStale),
-    ("arm", |now, old| now.arm = old.arm, Fault::AngleStale),
+    ("wheel", |now, old| now.wheel = old.wheel, Fault::WheelEncoderStale),
+    ("load cell", |now, old| now.load_cell = old.load_cell, Fault::PreloadSensorStale),
+    ("tread", |now, old| now.tread = old.tread, Fault::CompressionSensorStale),
+    ("arm", |now, old| now.arm = old.arm, Fault::ArmAngleStale),
 ];
 
 /// The sensor is silent for so long from now on.

@@ -1,67 +1,40 @@
-//! `docs/MODES.md` is what the firmware's table of modes, faults and limits gives; with the
-//! environment variable `UPDATE_DOCS` the page is written.
+//! The page `docs/MODES.md` against the table of transitions and the codes of the firmware.
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 
 use interstage::fault::{Fault, Limit};
-use interstage::supervise::{Mode, Trigger, next};
+use interstage::supervise::{Command, Leg, Mode, Trigger, next};
 use interstage::units::Direction;
 
-const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/MODES.md");
+/// The page that an operator reads.
+const PAGE: &str = include_str!("../../docs/MODES.md");
 
 #[test]
-fn the_page_of_modes_is_current() {
-    let page = page();
-    for mode in Mode::WITHOUT_FAULT {
-        assert!(page.contains(&name(mode)), "{mode:?}");
-    }
-    if std::env::var_os("UPDATE_DOCS").is_some() {
-        std::fs::write(PATH, &page).expect("the page can be written");
-    }
-    let current = std::fs::read_to_string(PATH).unwrap_or_default();
-    assert!(current == page, "docs/MODES.md: UPDATE_DOCS=1 cargo test -p hil-sim modes_page");
+fn the_diagram_is_the_table_of_transitions() {
+    let (_, diagram) = PAGE.split_once("stateDiagram-v2\n").expect("a diagram");
+    let (diagram, _) = diagram.split_once("```").expect("its end");
+    let edge = |((from, to), triggers): (_, Vec<String>)| -> String {
+        let (from, to): (String, String) = (from, to);
+        format!("    {from} --> {to}: {}\n", triggers.join(", "))
+    };
+    assert_eq!(diagram, edges().into_iter().map(edge).collect::<String>());
 }
 
-fn page() -> String {
-    let mut page = String::from(
-        "# Modes, faults and limits\n\n\
-         Written by `UPDATE_DOCS=1 cargo test -p hil-sim modes_page`; do not edit.\n\n\
-         The drive is always in one mode. [`src/supervise/transition.rs`]\
-         (../src/supervise/transition.rs) is the one table of transitions; this page is read \
-         out of it.\n\n```mermaid\nstateDiagram-v2\n",
-    );
-    for ((from, to), triggers) in edges() {
-        let _ = writeln!(page, "    {from} --> {to}: {}", triggers.join(", "));
+#[test]
+fn every_code_has_its_row_once_and_every_fault_its_reaction() {
+    let faults = Fault::ALL.map(|fault| (fault.code(), fault.sentence()));
+    let limits = Limit::ALL.map(|limit| (limit.code(), limit.sentence()));
+    for (code, sentence) in faults.into_iter().chain(limits) {
+        assert_eq!(PAGE.matches(&format!("| {code} | {sentence} | ")).count(), 1, "{code}");
     }
-    page += "```\n\nA fault leads from every mode to the fault hold: both bridges off, the \
-             self-locking gears hold wheel and screw where they are, the preload stays in its \
-             spring. Only a reset leads out. A command that a mode does not take is refused, \
-             logged and changes nothing.\n\n## Faults, latched\n\nWhat happens when each is \
-             provoked, and how soon it is found: [SAFETY.md](SAFETY.md).\n\n\
-             | code | fault | cause | detection | reset |\n|---|---|---|---|---|\n";
-    let mut reactions = BTreeMap::<&str, Vec<String>>::new();
-    for fault in Fault::ALL {
-        let (code, sentence, account) = (fault.code(), fault.sentence(), fault.description());
-        let (cause, detection, reset) = (account.cause, account.detection, account.reset);
-        let _ = writeln!(page, "| {code} | {sentence} | {cause} | {detection} | {reset} |");
-        reactions.entry(account.reaction).or_default().push(code.to_string());
+    for (code, _) in faults {
+        let code = code.to_string();
+        let reacts = |line: &&str| line.starts_with("- ") && line.contains(&code);
+        assert_eq!(PAGE.lines().filter(reacts).count(), 1, "{code}");
     }
-    page += "\nReaction to each:\n\n";
-    for (reaction, codes) in reactions {
-        let _ = writeln!(page, "- {}: {reaction}.", codes.join(", "));
-    }
-    page += "\n## Limits, active\n\nReported and acted on; gone when their cause is gone.\n\n\
-             | code | limit | reaction | until |\n|---|---|---|---|\n";
-    for limit in Limit::ALL {
-        let (reaction, until) = limit.description();
-        let (code, sentence) = (limit.code(), limit.sentence());
-        let _ = writeln!(page, "| {code} | {sentence} | {reaction} | {until} |");
-    }
-    page
 }
 
-/// Transitions by the pair of their ends, without the faults; both directions of a run and
+/// Transitions by the pair of their ends, without the faults; both ways of a run and
 /// its legs are drawn as one.
 fn edges() -> BTreeMap<(String, String), Vec<String>> {
     let mut edges: BTreeMap<(String, String), Vec<String>> = BTreeMap::new();
@@ -74,7 +47,8 @@ fn edges() -> BTreeMap<(String, String), Vec<String>> {
             if ends.0 == ends.1 && !matches!(mode, Mode::Run(..)) {
                 continue;
             }
-            let (label, labels) = (label(trigger), edges.entry(ends).or_default());
+            let label = label(trigger);
+            let labels = edges.entry(ends).or_default();
             if !labels.contains(&label) {
                 labels.push(label);
             }
@@ -85,14 +59,16 @@ fn edges() -> BTreeMap<(String, String), Vec<String>> {
 
 fn name(mode: Mode) -> String {
     match mode {
+        Mode::Boot => "Boot".into(),
+        Mode::SelfTest => "SelfTest".into(),
+        Mode::Zero => "Zero".into(),
+        Mode::Idle => "Idle".into(),
         Mode::Preload(_) => "Preload".into(),
         Mode::Run(..) => "Run".into(),
         Mode::Stopping(_) => "Stopping".into(),
         Mode::Complete(Direction::Deploy) => "Deployed".into(),
         Mode::Complete(Direction::Retract) => "Retracted".into(),
         Mode::FaultHold(_) => "FaultHold".into(),
-        // Boot, SelfTest, Zero, Idle.
-        plain => format!("{plain:?}"),
     }
 }
 
@@ -102,11 +78,17 @@ fn label(trigger: Trigger) -> String {
         Trigger::TestPassed { stowed: true } => "passed, stowed".into(),
         Trigger::TestPassed { stowed: false } => "passed, elsewhere".into(),
         Trigger::Zeroed => "zeros taken".into(),
+        Trigger::Command(Command::Start) => "start".into(),
+        Trigger::Command(Command::Stop) => "stop".into(),
+        Trigger::Command(Command::Retract) => "retract".into(),
+        Trigger::Command(Command::Reset) => "reset".into(),
         Trigger::PreloadStands => "preload stands".into(),
+        Trigger::Leg(Leg::Cruise) => "cruise".into(),
+        Trigger::Leg(Leg::Approach) => "approach".into(),
+        Trigger::Leg(Leg::Crossing) => "crossing".into(),
+        Trigger::Leg(Leg::Settle) => "settle".into(),
         Trigger::AtRest => "at rest".into(),
-        // Start, Stop, Retract, Reset; Cruise, Approach, Crossing, Settle; Arrived.
-        Trigger::Command(command) => format!("{command:?}").to_lowercase(),
-        Trigger::Leg(leg) => format!("{leg:?}").to_lowercase(),
-        plain => format!("{plain:?}").to_lowercase(),
+        Trigger::Arrived => "arrived".into(),
+        Trigger::Fault(fault) => format!("fault {}", fault.code()),
     }
 }

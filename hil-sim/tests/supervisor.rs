@@ -111,18 +111,18 @@ type Spoil = (Fault, fn(&mut Input));
 const SPOILS: [Spoil; 12] = [
     (Fault::EmergencyStop, |input| input.emergency_stop = true),
     (Fault::TickOverrun, |input| input.overrun = true),
-    (Fault::SpeedStale, |_| {}),
-    (Fault::PressureStale, |_| {}),
-    (Fault::DisplacementStale, |_| {}),
-    (Fault::AngleStale, |_| {}),
+    (Fault::WheelEncoderStale, |_| {}),
+    (Fault::PreloadSensorStale, |_| {}),
+    (Fault::CompressionSensorStale, |_| {}),
+    (Fault::ArmAngleStale, |_| {}),
     (Fault::ReadbackStale, |input| input.sensors.bridges = None),
     (Fault::DriveBridge, |input| spoil(input, |codes| codes.drive = BridgeCode::of(29_000))),
     (Fault::PretightenerBridge, |input| {
         spoil(input, |codes| codes.pretightener = BridgeCode::of(-29_000));
     }),
-    (Fault::PressureRange, |input| set(&mut input.sensors.load_cell, AdcCode::new(0))),
-    (Fault::DisplacementRange, |input| set(&mut input.sensors.tread, AdcCode::new(0xffff))),
-    (Fault::AngleRange, |input| set(&mut input.sensors.arm, AngleFrame::new(2000))),
+    (Fault::PreloadSensorRange, |input| set(&mut input.sensors.load_cell, AdcCode::new(0))),
+    (Fault::CompressionSensorRange, |input| set(&mut input.sensors.tread, AdcCode::new(0xffff))),
+    (Fault::ArmAngleRange, |input| set(&mut input.sensors.arm, AngleFrame::new(2000))),
 ];
 
 fn spoil(input: &mut Input, of: fn(&mut BridgeCodes)) {
@@ -145,10 +145,10 @@ fn next(input: &Input, silent: Fault) -> Input {
             *at = now;
         }
     };
-    frame.wheel.iter_mut().for_each(|s| fresh(Fault::SpeedStale, &mut s.at));
-    frame.load_cell.iter_mut().for_each(|s| fresh(Fault::PressureStale, &mut s.at));
-    frame.tread.iter_mut().for_each(|s| fresh(Fault::DisplacementStale, &mut s.at));
-    frame.arm.iter_mut().for_each(|s| fresh(Fault::AngleStale, &mut s.at));
+    frame.wheel.iter_mut().for_each(|s| fresh(Fault::WheelEncoderStale, &mut s.at));
+    frame.load_cell.iter_mut().for_each(|s| fresh(Fault::PreloadSensorStale, &mut s.at));
+    frame.tread.iter_mut().for_each(|s| fresh(Fault::CompressionSensorStale, &mut s.at));
+    frame.arm.iter_mut().for_each(|s| fresh(Fault::ArmAngleStale, &mut s.at));
     input
 }
 

@@ -406,7 +406,10 @@ fn a_hanging_converter_stops_the_drive_while_the_board_lives_on() {
     board.until(|row| matches!(row.mode, Mode::FaultHold(_)));
     let took = board.rows.len() - from;
     assert!((20..=24).contains(&took), "{took} ms");
-    assert_eq!(board.rows.last().map(|row| row.mode), Some(Mode::FaultHold(Fault::PressureStale)));
+    assert_eq!(
+        board.rows.last().map(|row| row.mode),
+        Some(Mode::FaultHold(Fault::PreloadSensorStale))
+    );
     let stopped = board.shared.drives.get();
     assert!(!stopped.drive_on && !stopped.preload_on);
     let (at, ticks) = (board.plant.truth().position_mm, board.rows.len());
@@ -414,7 +417,7 @@ fn a_hanging_converter_stops_the_drive_while_the_board_lives_on() {
     assert!((board.plant.truth().position_mm - at).abs() < 0.1);
     assert_eq!(board.plant.truth().speed_mm_s, 0.0);
     assert_eq!(board.shared.light.get(), Light::Alarm);
-    assert!(board.entries().iter().any(|e| e.event == Event::Fault(Fault::PressureStale)));
+    assert!(board.entries().iter().any(|e| e.event == Event::Fault(Fault::PreloadSensorStale)));
     // A sensor that hangs is a fault of the rig, not of the board.
     let fed = board.shared.fed.borrow();
     let late = fed.iter().filter(|at| **at > u64::from(FIRST_TICK) + ticks as u64).count();

@@ -1,11 +1,10 @@
-//! Preload loop: the reference runs at the actuator's slew, its rate is fed
-//! forward, and feedback acts only on what a model of the actuator did not expect.
+//! Preload loop: the reference runs at the actuator's slew, its rate is fed forward, and
+//! feedback acts only on what a model of the actuator did not expect.
 //!
-//! The pre-tightener integrates duty into force behind a dead time and a lag, so
-//! plain feedback would have to be slow. Here the reference goes through the same
-//! dead time and lag in a model, and the loop corrects the difference between that
-//! and the load cell (Smith 1957). An actuator whose dead time, lag and slew are all
-//! three standard deviations off overshoots by less than 2 N; the nominal one by 0.3 N.
+//! The pre-tightener integrates duty into force behind a dead time and a lag. The reference goes
+//! through the same dead time and lag in a model, and the loop corrects the difference between
+//! that and the sensor (Smith 1957). With dead time, lag and slew all three standard
+//! deviations off it overshoots by less than 2 N; the nominal actuator by 0.3 N.
 
 #![deny(clippy::float_arithmetic)]
 
@@ -21,8 +20,8 @@ pub const LONGEST_DELAY: usize = 256;
 const CORRECTION: f64 = 0.4;
 /// Fastest correction, 1/s.
 const FASTEST_CORRECTION: f64 = 3.0;
-/// Part of the slew that the correction may use: a load cell that lies cannot make the
-/// preload run away faster than it is noticed.
+/// Part of the slew that the correction may use: a preload sensor that reads wrong cannot make
+/// the preload run away faster than it is noticed.
 const CORRECTION_PART: f64 = 0.3;
 
 /// The actuator as known.
@@ -45,7 +44,7 @@ pub struct PreloadLoop {
 pub struct PreloadLoopState {
     /// Reference after the slew limit, N.
     reference: Newtons,
-    /// References on their way through the dead time.
+    /// References inside the dead time.
     pipeline: [Newtons; LONGEST_DELAY],
     head: usize,
     model: LowPassState,

@@ -16,11 +16,11 @@ pub struct Profile {
     root_jerk: Q16,
     /// Half the change of acceleration in a tick, mm/s^2.
     half_jerk: MillimetresPerSecond2,
-    /// Speed that half of it squared stands for, j T^2 / 8, mm/s.
+    /// Speed that half of it squared corresponds to, j T^2 / 8, mm/s.
     quantum: MillimetresPerSecond,
 }
 
-/// Where the profile stands: speed not negative, along the run's way.
+/// State of the profile: speed not negative, along the run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ProfileState {
     /// Speed, mm/s, Q31.32.
@@ -43,12 +43,10 @@ impl Profile {
         })
     }
 
-    /// One tick towards `target`, mm/s, not negative.
-    ///
-    /// The acceleration wanted is the one from which full jerk J in each tick T just
-    /// reaches the target at zero acceleration, `a (a + J) T / 2J = |dv|`, within the
-    /// limit; the acceleration follows it by the jerk. Source: time-optimal control
-    /// of a double integrator, in steps.
+    /// One tick towards `target`, mm/s, not negative: the acceleration wanted is the one from
+    /// which full jerk J in each tick T just reaches the target, `a (a + J) T / 2J = |dv|`,
+    /// within the limit; the acceleration follows it by the jerk. Source: time-optimal control
+    /// of a double integrator.
     pub fn step(&self, state: &mut ProfileState, target: MillimetresPerSecond) {
         let target = target.max(Q16::ZERO);
         let missing = target - state.speed();

@@ -1,11 +1,10 @@
-//! Recognises a step by what it does to arm and tread, and measures the gap.
+//! Detects a step by what it does to arm and tread, and measures the gap.
 //!
-//! On the continuous wall the wheel centre's radius less the tread's compression is
-//! constant: the baseline. A corner that carries lifts the wheel off it. The lower
-//! wall stops carrying when the centre stands y above it: the undeformed radius R on
-//! the way back, and on the way out less by what the tread's memory keeps of its
-//! compression before. Then the compression c, which is the corner's depth, gives the
-//! gap without odometry: `gap = sqrt((R-c)^2 + y^2 - (y-h)^2) - R`.
+//! On the continuous wall the wheel centre's radius less the tread's compression is constant:
+//! the baseline. A corner that carries lifts the wheel off it. The lower wall stops carrying
+//! when the centre is y above it: the undeformed radius R on retract, on deploy less by what
+//! the tread's memory keeps of its compression. Then the compression c, the corner's depth,
+//! gives the gap without odometry: `gap = sqrt((R-c)^2 + y^2 - (y-h)^2) - R`.
 
 #![deny(clippy::float_arithmetic)]
 
@@ -26,13 +25,13 @@ const TOUCH_TICKS: u8 = 3;
 const RELEASE: Millimetres = q16(60_000);
 /// Ticks that this must last.
 const RELEASE_TICKS: u8 = 60;
-/// Short of the whole step height, the wheel counts as over the corner, mm.
+/// Short of the full step height, the wheel counts as over the corner, mm.
 const OVER: Millimetres = q16(400_000);
 /// Rise above the wall expected behind a step that counts as the next corner, mm: a
 /// height tolerance more than a corner on a measured wall.
 const AGAIN: Millimetres = q16(320_000);
 /// Deviation of a measured step height from the table that a sleeve may have, with the
-/// error of the arm, mm; more tells that the wall was not yet reached.
+/// error of the arm, mm; more shows that the wall was not yet reached.
 const HEIGHT_TOLERANCE: Millimetres = q16(120_000);
 /// Ticks over which the new wall's baseline is averaged.
 const SETTLE_TICKS: u8 = 50;
@@ -51,7 +50,7 @@ pub struct CrossingWatch {
     settle: LowPass,
 }
 
-/// Who carries the wheel.
+/// What carries the wheel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Contact {
     /// The continuous wall.
@@ -68,14 +67,14 @@ pub enum Contact {
 /// State of the watch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WatchState {
-    /// Who carries.
+    /// What carries.
     pub contact: Contact,
     /// Radius less compression on the wall, mm.
     baseline: LowPassState,
     /// The same on the next wall.
     next: LowPassState,
     ticks: u8,
-    /// Ticks for which the next corner has been felt while leaving the last.
+    /// Ticks for which the next corner has touched while leaving the last.
     again: u8,
     /// Largest compression of the crossing, mm.
     pub deepest: Millimetres,
@@ -139,7 +138,7 @@ pub struct WatchInput {
 }
 
 impl CrossingWatch {
-    /// Takes the wall under the resting wheel as baseline, unless it stands on a corner.
+    /// Takes the wall under the resting wheel as baseline, unless it is on a corner.
     pub fn rest(&self, state: &mut WatchState, seen: &WatchInput) {
         let off = state.baseline.output() - (seen.radius - seen.compression);
         if state.contact == Contact::Wall && off.abs() < HOLD {
@@ -155,8 +154,8 @@ impl CrossingWatch {
         };
     }
 
-    /// Starts on a corner, on the way to the wall of `level`: nothing is measured until
-    /// the wheel stands on that wall.
+    /// Starts on a corner, towards the wall of `level`: nothing is measured until
+    /// the wheel is on that wall.
     pub fn begin_on_corner(&self, state: &mut WatchState, direction: Direction, level: u8) {
         let wall = self.wall(level);
         let from = match direction {
@@ -170,7 +169,7 @@ impl CrossingWatch {
         };
     }
 
-    /// Starts in the middle of a corner, on the way over it from the wall of `level`: with
+    /// Starts in the middle of a corner, moving over it from the wall of `level`: with
     /// that wall's baseline by the table.
     pub fn begin_between(
         &self,
@@ -189,7 +188,7 @@ impl CrossingWatch {
         self.outermost - Millimetres::from_num(level) * self.step
     }
 
-    /// How far inwards of the wall of `level` the wheel stands, by the table, mm.
+    /// How far inwards of the wall of `level` the wheel is, by the table, mm.
     pub fn height_over(
         &self,
         level: u8,
@@ -199,7 +198,7 @@ impl CrossingWatch {
         self.wall(level) - (radius - compression)
     }
 
-    /// Axial distance from the centre of a wheel that stands on an edge to its face, mm: the
+    /// Axial distance from the centre of a wheel on an edge to its face, mm: the
     /// edge lies `R - c` from the centre, and `y - h` below it. `level` is that of the lower
     /// wall.
     pub fn to_edge(&self, level: u8, radius: Millimetres, compression: Millimetres) -> Millimetres {
@@ -207,9 +206,8 @@ impl CrossingWatch {
         self.measure(compression, height).distance
     }
 
-    /// Turns back, from now on in `direction`: what was climbed is dropped off again,
-    /// or the other way round. The baseline is that of the wall which the wheel now
-    /// comes from.
+    /// Turns back, from now on in `direction`; the baseline is that of the wall which the
+    /// wheel now comes from.
     pub fn reverse(&self, state: &mut WatchState, direction: Direction) {
         let other_wall = state.baseline.output()
             + match direction {
@@ -237,7 +235,7 @@ impl CrossingWatch {
         };
     }
 
-    /// How far the wheel stands off its baseline in the direction of the step, mm.
+    /// How far the wheel is off its baseline in the direction of the step, mm.
     pub fn rise(&self, state: &WatchState, direction: Direction, seen: &WatchInput) -> Millimetres {
         let rise = state.baseline.output() - (seen.radius - seen.compression);
         match direction {
@@ -344,7 +342,7 @@ impl CrossingWatch {
         rise: Millimetres,
     ) -> Option<CrossingEvent> {
         let ground = seen.radius - seen.compression;
-        // Off the wall that the table promises: the next corner is already felt.
+        // Off the wall that the table promises: the next corner already touches.
         let beyond = rise - self.step;
         state.again = if beyond > AGAIN { state.again + 1 } else { 0 };
         if state.again >= TOUCH_TICKS {
@@ -386,7 +384,7 @@ impl CrossingWatch {
         state.again = 0;
         state.deepest = seen.compression;
         state.lift = None;
-        // On the way back the wheel stands on the edge alone as soon as it dips.
+        // On retract the wheel is on the edge alone as soon as it dips.
         state.contact = match direction {
             Direction::Deploy => Contact::Both,
             Direction::Retract => Contact::Corner,

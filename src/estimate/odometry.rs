@@ -25,7 +25,7 @@ impl Odometry {
         Q16::narrow(position)
     }
 
-    /// Declares that the wheel stands at `position`.
+    /// Declares that the wheel is at `position`.
     pub fn set(&mut self, travel: Travel, position: Millimetres) {
         self.offset = position.widen().saturating_sub(travel);
     }

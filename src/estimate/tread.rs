@@ -1,13 +1,10 @@
-//! Compression against preload, through the tread's stiffness, on a wheel that stands.
+//! Compression against preload, through the tread's stiffness, on a wheel at rest.
 //!
-//! The tread is a ring of radial elements of rubber with memory ([`crate::model::formula`]).
-//! Pressed on a wall it carries `E = K c^(3/2)` at rest, with `K = 4/3 k_inf L sqrt(2 R)`;
-//! while it is being pressed, more: `F = E + (s - 1)(E - q)`, where `q` follows `E` with the
-//! relaxation time. So of load cell and displacement sensor either tells what the other must
-//! read, as far as the rubber is known.
-//!
-//! Of a wheel that rolls it is not asked: there the memory hangs on speed and way, and
-//! leaves, by so simple a law, as much as a sensor that is a fifth off.
+//! Pressed on a wall a ring of rubber with memory carries `E = K c^(3/2)` when relaxed, with
+//! `K = 4/3 k_inf L sqrt(2 R)`; while it is being pressed, `F = E + (s - 1)(E - q)`, where `q`
+//! follows `E` with the relaxation time. So preload and compression sensor check each other,
+//! as far as the rubber is known. A rolling wheel is not checked: the law is too simple for
+//! it.
 
 #![deny(clippy::float_arithmetic)]
 
@@ -19,7 +16,7 @@ use crate::units::{Millimetres, Newtons, Q16, Ratio, q16};
 /// by three deviations of 4 % makes 0.13, gains of both sensors 0.03, the noise of what they
 /// zeroed 0.01; the worst of the random rigs is 0.17.
 const BAND: Ratio = q16(220_000);
-/// Least preload at which it tells, part of the cruise preload.
+/// Least preload at which it is checked, part of the cruise preload.
 const LEAST_PART: f64 = 0.5;
 /// Ticks after which what the tread remembers from before is forgotten far enough.
 const FORGETS: u16 = 300;
@@ -34,7 +31,7 @@ pub struct TreadLaw {
     /// `1 / s`.
     instant: Ratio,
     memory: LowPass,
-    /// Least preload at which it tells, N.
+    /// Least preload at which it is checked, N.
     least: Newtons,
 }
 
@@ -61,19 +58,19 @@ impl TreadLaw {
         })
     }
 
-    /// The wheel stands, pressed like this for long.
+    /// The wheel is at rest and has been pressed like this for long.
     pub const fn begin(&self, state: &mut TreadState, preload: Newtons) {
         *state = TreadState { memory: LowPassState::at(preload), ticks: 0, off: 0 };
     }
 
-    /// A tick of a wheel that stands on a wall; whether compression and preload do not belong
-    /// together, once. `wedge` is what the arm's inclination may add to the preload: while
-    /// the latch at the stow end carries the load, it adds nothing.
+    /// A tick of a wheel at rest on a wall; true once, if compression and preload contradict
+    /// each other. The arm's inclination may add `arm_thrust` to the preload, or nothing while
+    /// the latch at the stow end carries the load.
     pub fn step(
         &self,
         state: &mut TreadState,
         preload: Newtons,
-        wedge: Newtons,
+        arm_thrust: Newtons,
         compression: Millimetres,
     ) -> bool {
         let kept = state.memory.output();
@@ -84,7 +81,7 @@ impl TreadLaw {
             return false;
         }
         let shown = compression * sqrt(compression) * self.rate;
-        let most = felt + wedge;
+        let most = felt + arm_thrust;
         let off = shown > most + most * BAND || shown < felt - felt * BAND;
         state.off = if off { state.off.saturating_add(1) } else { 0 };
         state.off == OFF_TICKS
@@ -139,12 +136,12 @@ mod tests {
     #[test]
     fn what_the_arm_may_add_excuses_as_much() {
         let law = TreadLaw::try_build(&Rig::prototype()).expect("in range");
-        let relaxed = |wedge: f64, compression: f64| {
+        let relaxed = |arm_thrust: f64, compression: f64| {
             let mut state = TreadState::default();
             let preload = Q16::from_num(40.0);
             law.begin(&mut state, preload);
             (0..1000).any(|_| {
-                law.step(&mut state, preload, Q16::from_num(wedge), Q16::from_num(compression))
+                law.step(&mut state, preload, Q16::from_num(arm_thrust), Q16::from_num(compression))
             })
         };
         let at = |force: f64| (force / law.rate.to_num::<f64>()).powf(2.0 / 3.0);

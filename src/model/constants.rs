@@ -1,5 +1,5 @@
 //! Coefficients of the felt stiffening in 1e-8, in the order of
-//! [`Kind::terms`](super::felt::Kind::terms). Written by `rig-study constants` from
+//! [`Kind::terms`](super::effective_stiffness::Kind::terms). Written by `rig-study constants` from
 //! crossings of the converged ring; do not edit.
 
 /// Way out, driven by friction.

@@ -1,5 +1,5 @@
-//! How the wheel rises over a corner: for the spring that the climb compresses and
-//! the force that it costs.
+//! Rise of the wheel over a corner: for the spring that the climb compresses and the force
+//! that it costs.
 
 #![deny(clippy::float_arithmetic)]
 
@@ -20,14 +20,14 @@ const WALL_PART: f64 = 0.08;
 /// utilisation of a crossing.
 const DRIVE_SLOPE_PART: f64 = 0.85;
 
-/// Way from touch-down until the corner is free, over that from touch to lift-off.
+/// Travel from touch-down until the corner is free, over that from touch to lift-off.
 const BACK_PART: f64 = 0.3;
 
-/// Rise of the centre per axial way over the distance to the face, dimensionless:
-/// on the corner a circle of radius R - c rolls about a point,
-/// `dy/dx = d / sqrt((R-c)^2 - d^2)`, while the tread recovers from its depth at
-/// the corner to that on the wall, as a triangle that ends half a patch behind the
-/// edge; from the first touch it runs in with the square of the way.
+/// Rise of the centre per axial travel over the distance to the face, dimensionless: on the
+/// corner a circle of radius R - c rolls about a point, `dy/dx = d / sqrt((R-c)^2 - d^2)`; the
+/// tread recovers from its depth at the corner to that on the wall, as a triangle that ends
+/// half a patch behind the edge; from the first touch it runs in with the square of the
+/// distance.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CornerProfile {
     slope: Table<97>,
@@ -76,7 +76,7 @@ impl CornerProfile {
             max: 8.0,
         })?;
         // The load passes from wall to corner between first touch and lift-off, and back
-        // within a few tenths of that way: the relaxed tread is still deep at the corner.
+        // within a few tenths of that travel: the relaxed tread is still deep at the corner.
         let drive_slope = |ends: f64| {
             Table::build(0.0, touch, |d| {
                 let whole = DRIVE_SLOPE_PART * on_corner(d.min(lift));
@@ -99,7 +99,7 @@ impl CornerProfile {
         })
     }
 
-    /// Distance to the face at which the corner may first be felt on this way, mm.
+    /// Distance to the face at which the corner may first touch in this direction, mm.
     pub const fn first_contact(&self, direction: Direction) -> Millimetres {
         match direction {
             Direction::Deploy => self.touch,
@@ -107,7 +107,7 @@ impl CornerProfile {
         }
     }
 
-    /// Way behind an edge after which the patch is clear of it, mm.
+    /// Distance behind an edge after which the patch is clear of it, mm.
     pub const fn patch(&self) -> Millimetres {
         self.patch
     }
@@ -125,7 +125,7 @@ impl CornerProfile {
         }
     }
 
-    /// Rise per axial way outwards with the face `ahead` mm outwards of the centre,
+    /// Rise per axial travel outwards with the face `ahead` mm outwards of the centre,
     /// negative behind the edge; zero away from a corner.
     pub fn slope(&self, ahead: Millimetres) -> Ratio {
         if ahead <= -self.patch || ahead >= self.touch { Q16::ZERO } else { self.slope.eval(ahead) }

@@ -1,12 +1,11 @@
 //! The reduced model in f64: the definition that the fixed-point model follows.
 //!
-//! At the instant the lower wall stops carrying, the centre of an elastic ring
-//! stands at its undeformed height R above it, so the contact with face and corner
-//! is a closed form in the gap. Memory enters as an effective stiffness
-//! ([`super::felt`]), fitted to the ring. Friction that lifts the top load is
+//! When the lower wall stops carrying, the centre of an elastic ring is at its undeformed
+//! height R above it, so the contact with face and corner is a closed form in the gap. Memory
+//! enters as an effective stiffness fitted to the ring. Friction that lifts the top load is
 //! taken as equally used over the contact.
 
-use super::felt::{self, FORCE_END, Folded, Kind, RUN_END};
+use super::effective_stiffness::{self, FORCE_END, Folded, Kind, RUN_END};
 use super::impact::Impact;
 use crate::rig::Rig;
 use crate::units::Direction;
@@ -54,7 +53,7 @@ pub struct Formula {
 }
 
 /// What the model says of a crossing, at the instant at which the lower wall stops
-/// (on the way back: begins) to carry.
+/// (on retract: begins) to carry.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crossing {
     /// Clearance between the root of the step and the undeformed wheel, mm.
@@ -88,11 +87,6 @@ impl Formula {
         self.k_inf * self.radius_mm * self.radius_mm * self.width_mm
     }
 
-    /// Gap of the unloaded wheel, mm: the circle just touches floor and corner.
-    pub fn largest_gap_mm(&self) -> f64 {
-        self.gap_after_mm(0.0)
-    }
-
     /// Axial distance of the corner from the centre at which the undeformed wheel
     /// touches it, mm.
     pub fn free_run_mm(&self) -> f64 {
@@ -100,7 +94,7 @@ impl Formula {
         libm::sqrt(self.radius_mm * self.radius_mm - above * above)
     }
 
-    /// Axial distance from the face at which the wheel stands with this gap, mm.
+    /// Axial distance from the face of a wheel with this gap, mm.
     pub fn distance_mm(&self, gap_mm: f64) -> f64 {
         let reach = self.radius_mm + gap_mm;
         libm::sqrt((reach * reach - self.radius_mm * self.radius_mm).max(0.0))
@@ -164,7 +158,7 @@ impl Formula {
 
     /// Speed at which half the crossing is fast, mm/s.
     pub fn half_speed_mm_s(&self, kind: Kind) -> f64 {
-        kind.half_pace() * self.radius_mm / self.tau_s
+        kind.half_speed() * self.radius_mm / self.tau_s
     }
 
     /// Part of the crossing that is fast, `v / (v + v_half)`.
@@ -172,7 +166,7 @@ impl Formula {
         speed_mm_s / (speed_mm_s + self.half_speed_mm_s(kind))
     }
 
-    /// The felt stiffening at this rig's step and this load.
+    /// The effective stiffness at this rig's step and this load.
     pub fn fold(&self, kind: Kind, load_n: f64) -> Folded {
         kind.fold(self.step_mm / self.radius_mm, load_n / self.unit_force_n())
     }
@@ -194,7 +188,7 @@ impl Formula {
     fn folded_stiffness(&self, kind: Kind, folded: &Folded, speed_mm_s: f64, gap_mm: f64) -> f64 {
         let x = self.fast_part(kind, speed_mm_s);
         let run = self.run_mm(gap_mm) / self.radius_mm;
-        1.0 + (self.stiffening - 1.0) * x * felt::value(folded, x, run)
+        1.0 + (self.stiffening - 1.0) * x * effective_stiffness::value(folded, x, run)
     }
 
     /// Radial force on the wheel that gives this gap, N: `k (I_r + s I_a) + T s` with
@@ -450,15 +444,5 @@ mod tests {
             prop_assert!((used * radial - axial - load).abs() < 1e-9);
             prop_assert!((radial + used * axial - force).abs() < 1e-9);
         }
-    }
-
-    #[test]
-    fn where_the_ring_is_free_it_presses_nowhere_and_has_no_slope() {
-        let f = formula();
-        let free = f.contact(f.gap_after_mm(0.0) + 1.0);
-        assert_eq!(free, Contact { radial: 0.0, axial: 0.0 });
-        assert!(free.slope().abs() < f64::EPSILON);
-        let kind = Kind { direction: Direction::Deploy, driven: true };
-        assert!(f.relaxed_force_n(kind, f.gap_after_mm(0.0) + 1.0).abs() < f64::EPSILON);
     }
 }

@@ -14,14 +14,14 @@ pub enum Strategy {
     Constant,
     /// The preload limit throughout.
     Limit,
-    /// Preload raised when the step is felt.
+    /// Preload raised when the step is detected.
     Reactive,
 }
 
 /// A closed crossing, for the model to compare with its prediction.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Review {
-    /// Way of the crossing.
+    /// Direction of the crossing.
     pub direction: Direction,
     /// Speed at lift-off, mm/s.
     pub speed: MillimetresPerSecond,
@@ -39,9 +39,9 @@ pub struct Review {
 /// the step behind.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct PlanRequest {
-    /// Numbers the requests, so that a late answer is told from a current one.
+    /// Numbers the requests, so that a late answer is recognised.
     pub sequence: u32,
-    /// Way of the run.
+    /// Direction of the run.
     pub direction: Direction,
     /// Step ahead, from 1 at the outermost sleeve; 0 when none is left.
     pub step: u8,
@@ -66,14 +66,14 @@ pub struct Outcome {
     pub strange: bool,
 }
 
-/// Speed and preload for the way to the next step and over it.
+/// Speed and preload up to the next step and over it.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Plan {
     /// Sequence of the request answered.
     pub sequence: u32,
     /// Step that it is for; 0 when none is left.
     pub step: u8,
-    /// Way of the run.
+    /// Direction of the run.
     pub direction: Direction,
     /// Speed between the steps, mm/s.
     pub cruise_speed: MillimetresPerSecond,
@@ -87,11 +87,11 @@ pub struct Plan {
     pub gap: Millimetres,
     /// Friction left unused at the step.
     pub slip_margin: Ratio,
-    /// Way that braking from cruise to crossing speed takes, mm.
+    /// Distance that braking from cruise to crossing speed takes, mm.
     pub brake_way: Millimetres,
     /// Time that this braking takes, s.
     pub brake_time: Seconds,
-    /// Way before a step or the end within which braking can be due, mm.
+    /// Distance before a step or the end within which braking can be due, mm.
     pub brake_horizon: Millimetres,
     /// Whether the preload is raised ahead of the step.
     pub look_ahead: bool,

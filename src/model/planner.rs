@@ -20,7 +20,7 @@ const LARGEST_CORRECTION: Ratio = q16(100_000);
 const OUTLIER: Ratio = q16(350_000);
 /// Stiffness that a measured gap may ask for beyond the estimated one, part of that: what is
 /// more is reported. Rubber that is off by three deviations makes 0.12 at the first crossing;
-/// the rest is the measurement, of which a stiff guess is the dearest. Of 1,500 random rigs two
+/// the rest is the measurement, of which a stiff guess costs most. Of 1,500 random rigs two
 /// come beyond 0.20.
 const STRANGE: Ratio = q16(270_000);
 
@@ -35,11 +35,11 @@ pub struct Planner {
     guard: Guard,
     timing: Timing,
     strategy: Strategy,
-    /// Radial force per preload and wall level that the arm's wedge adds, N, by step.
-    wedge: heapless::Vec<Newtons, MAX_STEPS>,
-    /// Coupling times load: wedge per tangent of the arm angle, N.
+    /// Radial force that the arm's inclination adds at each step, N.
+    arm_thrust: heapless::Vec<Newtons, MAX_STEPS>,
+    /// Coupling times load: arm_thrust per tangent of the arm angle, N.
     coupling: Newtons,
-    /// Gap to hold, way out and way back, mm.
+    /// Gap to hold, deploy and retract, mm.
     gap_ref: [Millimetres; 2],
     /// Gap aimed at, a reserve below it, mm.
     target: [Millimetres; 2],
@@ -69,10 +69,7 @@ impl Planner {
         let outcome = request.review.map(|review| self.review(&review, request.scale));
         let scale = outcome.map_or(request.scale, |o| o.scale);
         let (cruise_speed, moved) = self.guard.below(self.cruise_speed);
-        let mut limits = Limits::default();
-        if moved {
-            limits.add(Limit::ResonanceAvoided);
-        }
+        let limits = [moved.then_some(Limit::ResonanceAvoided), None, None];
         let mut plan = Plan {
             sequence: request.sequence,
             step: request.step,
@@ -86,32 +83,31 @@ impl Planner {
             brake_way: Millimetres::ZERO,
             brake_time: Seconds::ZERO,
             brake_horizon: Millimetres::ZERO,
-            // Without look-ahead the preload rises when the step is felt, never before.
+            // Without look-ahead the preload rises when the step is detected, never before.
             look_ahead: self.strategy != Strategy::Reactive,
-            limits: [None; 3],
+            limits,
             outcome,
         };
         if request.step > 0 {
-            self.crossing(request, scale, &mut plan, &mut limits);
+            self.crossing(request, scale, &mut plan);
         }
         if self.uniform {
             plan.cruise_speed = plan.cross_speed;
         }
         self.ways(&mut plan);
-        plan.limits = limits.0;
         plan
     }
 
-    /// Gap that the schedule holds on this way, mm.
+    /// Gap that the schedule holds in this direction, mm.
     pub fn gap_ref(&self, direction: Direction) -> Millimetres {
-        self.gap_ref[way(direction)]
+        self.gap_ref[direction as usize]
     }
 
     /// Speed and preload at the step.
-    fn crossing(&self, request: &PlanRequest, scale: Ratio, plan: &mut Plan, limits: &mut Limits) {
+    fn crossing(&self, request: &PlanRequest, scale: Ratio, plan: &mut Plan) {
         let scale = Scale::new(scale);
         let at = Point { direction: request.direction, speed: self.least_speed, scale };
-        let wedge = self.wedge_at(request.step);
+        let arm_thrust = self.arm_thrust_at(request.step);
         let most = match self.strategy {
             Strategy::Scheduled | Strategy::Limit => self.most_preload,
             Strategy::Constant | Strategy::Reactive => self.cruise_preload,
@@ -121,21 +117,21 @@ impl Planner {
         let floor = self.least_speed.min(plan.cruise_speed);
         // No faster than the pre-tightener can follow the spring over the corner.
         let ceiling = ceiling.min(self.climb_speed.max(floor));
-        let found = self.model.speed(&at, gap, most + wedge, floor.min(ceiling), ceiling);
+        let found = self.model.speed(&at, gap, most + arm_thrust, floor.min(ceiling), ceiling);
         let speed = self.prescribed_speed.unwrap_or(found);
         let (speed, moved) = self.guard.below(speed.max(floor));
         if moved {
-            limits.add(Limit::ResonanceAvoided);
+            add(&mut plan.limits, Limit::ResonanceAvoided);
         }
         // A band that reaches below the floor is crossed in: too slow is worse.
         let speed = speed.max(floor);
         let at = Point { speed, ..at };
-        let wanted = self.model.force(&at, gap) - wedge;
+        let wanted = self.model.force(&at, gap) - arm_thrust;
         plan.cross_speed = speed;
         if wanted > most && speed <= floor {
-            limits.add(Limit::SpeedFloor);
+            add(&mut plan.limits, Limit::SpeedFloor);
         } else if wanted >= most * q16(980_000) && speed < self.safe_speed {
-            limits.add(Limit::PreloadLimited);
+            add(&mut plan.limits, Limit::PreloadLimited);
         }
         plan.cross_preload = match self.strategy {
             Strategy::Scheduled => wanted.clamp(self.cruise_preload, most),
@@ -143,13 +139,13 @@ impl Planner {
             Strategy::Limit => self.most_preload,
             Strategy::Reactive => wanted.clamp(self.cruise_preload, self.most_preload),
         };
-        let carried = plan.cross_preload.min(most) + wedge;
+        let carried = plan.cross_preload.min(most) + arm_thrust;
         let crossing = self.model.crossing(&at, carried);
         plan.gap = crossing.gap;
         let margin = crossing.slip_margin;
         plan.slip_margin = margin;
         if margin < self.friction - self.usable {
-            limits.add(Limit::SlipMarginLow);
+            add(&mut plan.limits, Limit::SlipMarginLow);
         }
     }
 
@@ -196,9 +192,9 @@ impl Planner {
         Outcome { gap_predicted, slip_margin, scale, bounded: scale != wanted, strange }
     }
 
-    fn wedge_at(&self, step: u8) -> Newtons {
+    fn arm_thrust_at(&self, step: u8) -> Newtons {
         let index = usize::from(step).saturating_sub(1);
-        self.wedge.get(index).copied().unwrap_or(Newtons::ZERO)
+        self.arm_thrust.get(index).copied().unwrap_or(Newtons::ZERO)
     }
 
     fn between_steps(&self) -> Newtons {
@@ -209,29 +205,16 @@ impl Planner {
     }
 
     fn target_of(&self, direction: Direction) -> Millimetres {
-        self.target[way(direction)]
+        self.target[direction as usize]
     }
 }
 
-/// Limits met, at most three.
-#[derive(Default)]
-struct Limits([Option<Limit>; 3]);
-
-impl Limits {
-    fn add(&mut self, limit: Limit) {
-        if self.0.contains(&Some(limit)) {
-            return;
-        }
-        if let Some(free) = self.0.iter_mut().find(|slot| slot.is_none()) {
-            *free = Some(limit);
-        }
-    }
-}
-
-const fn way(direction: Direction) -> usize {
-    match direction {
-        Direction::Deploy => 0,
-        Direction::Retract => 1,
+/// Adds a limit, once; a plan holds three.
+fn add(limits: &mut [Option<Limit>; 3], limit: Limit) {
+    if !limits.contains(&Some(limit))
+        && let Some(free) = limits.iter_mut().find(|slot| slot.is_none())
+    {
+        *free = Some(limit);
     }
 }
 

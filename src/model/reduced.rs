@@ -1,33 +1,25 @@
-//! The reduced model in fixed point: forward (speed and force to gap and what goes with
-//! it) and inverse (gap to force, gap and force to speed).
+//! The reduced model in fixed point: forward (speed and force to gap and what follows from it)
+//! and inverse (gap to force, gap and force to speed).
 //!
-//! For one rig the fitted polynomial depends on two things only: how fast the crossing is
-//! and how far the wheel runs over the corner. Both inverses are therefore the zero of one
-//! polynomial, found in one step from a guess: a low polynomial in its cell of speed and
-//! force, or of stiffness. No loop, at most four 32-bit divisions.
-//!
-//! Formats inside: lengths over R and parts of a whole in Q32 without sign, so that a
-//! difference from one half is a Q32 with sign as `horner` wants it; forces over the
-//! unit of `Shape` in Q30.
+//! For one rig the fitted polynomial depends on speed and run alone. Both inverses are the
+//! zero of one polynomial, found in one step from a guess: a low polynomial in its cell of
+//! speed and force, or of stiffness. Lengths over R and parts are Q32 without sign, forces
+//! over the unit of `Shape` Q30.
 
 #![deny(clippy::float_arithmetic)]
 
 #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
 mod build;
+mod direction_model;
 mod shape;
-mod way;
 
 use crate::numeric::{fraction, high};
 use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio};
 
+use direction_model::DirectionModel;
 use shape::{Refined, Shape};
-use way::Way;
 
-/// Estimated over nominal stiffness of the tread, with its reciprocal: it changes once a
-/// crossing and is used many times.
-///
-/// Range: 1/4 to 4, the nearer end outside. Error of the reciprocal: 1 LSB, 1.5e-8 relative
-/// at most.
+/// Estimated over nominal stiffness of the tread, 1/4 to 4, with its reciprocal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Scale {
     ratio: Ratio,
@@ -57,17 +49,16 @@ impl Scale {
 
 /// The reduced model of one rig under one load.
 ///
-/// Range: speeds from 0 to 128 mm/s; forces from 2^-7 to a quarter of the unit, 8 to 256 N,
-/// beyond what lifting the load takes; what is beyond gives the nearer end. Error against
-/// [`Formula`](super::formula::Formula) over 1 to 100 mm/s, 15 to 150 N and steps of 2 to
-/// 6 mm, beyond one LSB of the result, relative: force of a gap 5e-6, gap of a force 1e-5,
-/// corner force 5e-5, vibration 1e-4; utilisation 1e-4 absolute. The force that a speed of
-/// the inverse needs is that given within 0.2 %. A wheel pushed over 2 mm, which 150 N all
-/// but sink, has a gap within 1e-3 and a speed within 0.4 %.
+/// Range: 0 to 128 mm/s; forces from 2^-7 to a quarter of the unit, 8 to 256 N, beyond the
+/// lift of the load; the nearer end outside. Error against
+/// [`Formula`](super::formula::Formula) over 1 to
+/// 100 mm/s, 15 to 150 N and steps of 2 to 6 mm, beyond one LSB, relative: force of a gap 5e-6, gap
+/// of a force 1e-5, corner force 5e-5, vibration 1e-4; utilisation 1e-4 absolute; force at the
+/// speed of the inverse 0.2 %. Pushed over 2 mm: gap 1e-3, speed 0.4 %.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ReducedModel {
     shape: Shape,
-    ways: [Way; 2],
+    ways: [DirectionModel; 2],
     /// All bits if friction drives the wheel; none if it is pushed and needs none.
     driven: i32,
     /// Friction of tread on wall.
@@ -77,7 +68,7 @@ pub struct ReducedModel {
 /// A crossing's working point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
-    /// Way.
+    /// Direction.
     pub direction: Direction,
     /// Speed at lift-off, mm/s, not negative.
     pub speed: MillimetresPerSecond,
@@ -110,11 +101,9 @@ impl ReducedModel {
         (self.shape.gap(self.shape.most_run()), self.shape.gap(self.shape.least_run()))
     }
 
-    /// Everything about the crossing at this radial force, N.
-    ///
-    /// Equation: the run r with `F(x, r) + T s(r) = P` by one step from
-    /// a guess in cells of x and P; then [`Formula::crossing`](super::formula::Formula::crossing). A
-    /// scale multiplies what the force exceeds the lift of the load on the mean slope by.
+    /// Everything about the crossing at this radial force, N: the run r with `F(x, r) + T s(r)
+    /// = P` by one step from a guess; then
+    /// [`Formula::crossing`](super::formula::Formula::crossing).
     pub fn crossing(&self, point: &Point, force: Newtons) -> Crossing {
         let (shape, way) = (&self.shape, self.way(point.direction));
         let wanted = shape.part(force);
@@ -159,10 +148,8 @@ impl ReducedModel {
     }
 
     /// Largest speed from `floor` to `ceiling` at which `force` still holds the gap, mm/s;
-    /// `floor` if none does.
-    ///
-    /// Equation: the fast part x with `F(x, r) = P - T s`, by two steps of Newton's
-    /// method from a polynomial guess; then `v = v_half x / (1 - x)`.
+    /// `floor` if none does. Equation: the fast part x with `F(x, r) = P - T s` by one step
+    /// from a polynomial guess; then `v = v_half x / (1 - x)`.
     pub fn speed(
         &self,
         point: &Point,
@@ -212,25 +199,10 @@ impl ReducedModel {
         Ratio::from_bits(self.shape.utilisation(radial, slope).to_bits() & self.driven)
     }
 
-    /// One address, from which all coefficients are read; a choice of two references would
-    /// be made anew for each.
-    fn way(&self, direction: Direction) -> &Way {
+    /// Coefficients of a direction.
+    fn way(&self, direction: Direction) -> &DirectionModel {
         &self.ways[direction as usize % 2]
     }
-}
-
-/// `value`, where it is `beyond` what the model knows the `bound`.
-///
-/// A branch that is hardly ever taken is cheaper than a choice. And the coefficients behind
-/// it are not loaded before it, where they would not fit the registers.
-fn unless(beyond: bool, bound: i32, value: i32) -> i32 {
-    if beyond { end(bound) } else { value }
-}
-
-#[cold]
-fn end(bound: i32) -> i32 {
-    // Unseen, or it would be a choice after all.
-    core::hint::black_box(bound)
 }
 
 /// A part of a whole, Q32 without sign, as its difference from one half, Q32 with sign.

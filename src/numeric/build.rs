@@ -38,7 +38,7 @@ impl<const N: usize> Table<N> {
     /// overflow.
     pub fn build(lo: f64, hi: f64, f: impl Fn(f64) -> f64) -> Option<Self> {
         let (lo, hi) = (I16F16::checked_from_num(lo)?, I16F16::checked_from_num(hi)?);
-        // From the rounded ends, so that samples stand where they are looked up.
+        // From the rounded ends, so that samples are where they are looked up.
         let (start, end) = (lo.to_num::<f64>(), hi.to_num::<f64>());
         let last = N.checked_sub(1)? as f64;
         let mut samples = [0; N];
@@ -46,7 +46,7 @@ impl<const N: usize> Table<N> {
             let x = start + (end - start) * (index as f64 / last);
             *sample = I16F16::checked_from_num(f(x))?.to_bits();
         }
-        Self::checked_from_bits(lo.to_bits(), hi.to_bits(), samples)
+        Self::from_bits(lo.to_bits(), hi.to_bits(), samples)
     }
 }
 

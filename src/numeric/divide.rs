@@ -4,17 +4,12 @@
 
 use crate::units::Q16;
 
-/// One.
-const ONE: Q16 = Q16::ONE;
-
 /// Quotient `a / b`, rounded to nearest, halves away from zero.
 ///
-/// Sign as usual; any units. Range: all of [`Q16`]; what exceeds it saturates, so
-/// does division by zero, towards the sign of `a` (0 / 0 is 0). Error: 0.5 LSB,
-/// the exact quotient rounded once. Cost: two 32-bit divisions and about a hundred
-/// other instructions.
-///
-/// Source: schoolbook division in base 2^16, Knuth, TAOCP 2, 4.3.1, algorithm D.
+/// Range: all of [`Q16`]; what exceeds it saturates, so does division by zero, towards the sign
+/// of `a` (0 / 0 is 0). Error: 0.5 LSB. Source: schoolbook division in base 2^16, Knuth, TAOCP
+/// 2,
+/// 4.3.1, algorithm D.
 pub fn divide(a: Q16, b: Q16) -> Q16 {
     let (a, b) = (a.to_bits(), b.to_bits());
     if a == 0 {
@@ -34,12 +29,11 @@ pub fn divide(a: Q16, b: Q16) -> Q16 {
     Q16::from_bits(bits)
 }
 
-/// Quotient `a / b` of numbers that are not negative, with one 32-bit division where
-/// `a` is not above `b`, rounded down.
+/// Quotient `a / b` of numbers that are not negative, with one 32-bit division where `a` is not
+/// above `b`, rounded down; else as [`divide`].
 ///
-/// Range: as [`divide`], which does what is outside. Error: within `[-1, 0]` LSB and
-/// 2^-15 relative upwards, since `b` is cut to the bits that the quotient resolves.
-/// Cost: about 25 cycles; as [`divide`] for quotients above one.
+/// Error: within `[-1, 0]` LSB and 2^-15 relative upwards: `b` is cut to the bits that the
+/// quotient resolves.
 pub fn part(a: Q16, b: Q16) -> Q16 {
     let (Ok(a_bits), Ok(b_bits)) = (u32::try_from(a.to_bits()), u32::try_from(b.to_bits())) else {
         return divide(a, b);
@@ -55,15 +49,6 @@ pub fn part(a: Q16, b: Q16) -> Q16 {
     Q16::from_bits(bits as i32)
 }
 
-/// Reciprocal `1 / x`, rounded to nearest.
-///
-/// Range: |x| > 2^-15, below that the result saturates. Error: 0.5 LSB absolute,
-/// so |x| 2^-17 relative: at |x| = 100 the result has ten good bits. To divide by
-/// a large number use [`divide`]. Cost: as [`divide`].
-pub fn reciprocal(x: Q16) -> Q16 {
-    divide(ONE, x)
-}
-
 /// `numerator / divisor` rounded down. Needs `numerator < divisor * 2^32`, so that
 /// the quotient fits.
 fn quotient(numerator: u64, divisor: u32) -> u32 {
@@ -77,9 +62,8 @@ fn quotient(numerator: u64, divisor: u32) -> u32 {
     first << 16 | second
 }
 
-/// One base-2^16 digit of `(high 2^16 + next) / divisor`, `divisor` normalised
-/// (top bit set) and above `high`. The estimate from the leading halves is at
-/// most two too large.
+/// One base-2^16 digit of `(high 2^16 + next) / divisor`, `divisor` normalised and above `high`.
+/// The estimate from the leading halves is at most two too large.
 fn digit(high: u32, next: u32, divisor: u32) -> u32 {
     // The top bit is set already; said again, the division cannot be by zero.
     let (upper, lower) = (divisor >> 16 | 0x8000, divisor & 0xFFFF);
@@ -170,21 +154,6 @@ mod tests {
         ) {
             let (a, b) = (a >> a_shift, b >> b_shift);
             prop_assert_eq!(divide(q(a), q(b)).to_bits(), exact(a, b));
-        }
-
-        #[test]
-        fn quotients_agree_with_f64(a in -30_000.0_f64..30_000.0, b in 0.01_f64..30_000.0) {
-            let (a, b) = (Q16::from_num(a), Q16::from_num(b));
-            let reference = (a.to_num::<f64>() / b.to_num::<f64>()).clamp(-32_768.0, 32_767.999_99);
-            let got = divide(a, b).to_num::<f64>();
-            prop_assert!((got - reference).abs() <= 0.501 / 65_536.0);
-        }
-
-        #[test]
-        fn reciprocals_agree_with_f64(bits in 3_i32..i32::MAX, negative in any::<bool>()) {
-            let x = q(if negative { -bits } else { bits });
-            let got = reciprocal(x).to_num::<f64>();
-            prop_assert!((got - 1.0 / x.to_num::<f64>()).abs() <= 0.501 / 65_536.0);
         }
     }
 }

@@ -4,11 +4,10 @@
 
 use crate::units::Q16;
 
-/// A positive number to divide by, as its reciprocal with 31 significant bits.
+/// A positive number to divide by, as its reciprocal with 31 significant bits: `x m / 2^shift`.
 ///
-/// `x / d = x m / 2^shift`. Any units. Range: d from 2^-14 to 2^15, all of [`Q16`]
-/// for x; what exceeds it saturates. Error: 0.5 LSB of rounding and 2^-31 relative, so
-/// at most 1.5 LSB. Cost: one wide multiply and about ten other instructions.
+/// Range: d from 2^-14 to 2^15, all of [`Q16`] for x; what exceeds it saturates. Error: at most
+/// 1.5 LSB.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Divisor {
     /// m, from 2^30 to 2^31.

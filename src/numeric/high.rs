@@ -3,11 +3,8 @@
 
 #![deny(clippy::float_arithmetic)]
 
-/// Upper half of a product, `floor(a b / 2^32)`.
-///
-/// A factor `t` that stands for `t / 2^32`, so from -1/2 to 1/2, leaves the format of
-/// the other factor as it is. Range: all arguments. Error: below 1 LSB, downwards.
-/// Cost: one instruction (SMMUL; with an addition behind it SMMLA).
+/// Upper half of a product, `floor(a b / 2^32)`. A factor `t` that represents `t / 2^32` leaves
+/// the format of the other factor as it is.
 #[inline(always)]
 pub const fn high(a: i32, b: i32) -> i32 {
     ((a as i64 * b as i64) >> 32) as i32
@@ -15,10 +12,8 @@ pub const fn high(a: i32, b: i32) -> i32 {
 
 /// Polynomial `c0 + c1 t + c2 t^2 + ...` for `t / 2^32` from -1/2 to 1/2, by Horner's rule.
 ///
-/// Coefficients and value in one format of the caller's choice. Range: all `t`; every
-/// sum of `|c_i| 2^(k-i)` over i from k up must stay below 2^31, see [`fits`]. Error: below 2 LSB, as
-/// each step's truncation is at least halved by the next. Cost: one instruction a
-/// degree, and one or two more to load each coefficient.
+/// Coefficients and value in one format. Range: coefficients that pass [`fits`]. Error: below
+/// 2 LSB, as each step's truncation is at least halved by the next.
 macro_rules! horner {
     ($t:expr; $c:expr) => { $c };
     ($t:expr; $c:expr, $($rest:expr),+) => {
@@ -26,12 +21,8 @@ macro_rules! horner {
     };
 }
 
-/// The same polynomial and its derivative by `t`, as a pair.
-///
-/// Range: as [`horner`], and the derivative's sums must fit as well, see
-/// [`fits_with_slope`]. Error: below 2 LSB for the
-/// value, below 6 LSB for the derivative. Cost: two instructions a degree less one, and
-/// the loads.
+/// The same polynomial and its derivative by `t`. Range: coefficients that pass
+/// [`fits_with_slope`]. Error: below 2 and 6 LSB.
 macro_rules! horner_with_slope {
     ($t:expr; $c:expr, $last:expr) => {
         ($c + $crate::numeric::high($last, $t), $last)
@@ -42,11 +33,9 @@ macro_rules! horner_with_slope {
     }};
 }
 
-/// The same polynomial, its derivative and half its second derivative by `t`.
-///
-/// Range: as [`horner_with_slope`], and half the second derivative's sums must fit, which
-/// they do where those of the derivative stay below a quarter of the range. Error: below 2,
-/// 6 and 14 LSB. Cost: three instructions a degree less three, and the loads.
+/// The same polynomial, its derivative and half its second derivative by `t`. Range: as
+/// [`horner_with_slope`], with the derivative below a quarter of it. Error: below 2, 6 and 14
+/// LSB.
 macro_rules! horner_with_curvature {
     ($t:expr; $c0:expr, $c1:expr, $c2:expr) => {{
         let (value, slope) = $crate::numeric::horner_with_slope!($t; $c0, $c1, $c2);

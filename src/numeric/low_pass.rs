@@ -4,15 +4,11 @@
 
 use crate::units::Q16;
 
-/// First-order low-pass `y += a (x - y)`, one call a tick, `a = 1 - exp(-T / tau)`
-/// with the tick T = 1 ms, so that the step response is that of the continuous
-/// filter at the ticks.
+/// First-order low-pass `y += a (x - y)`, one call a tick T, `a = 1 - exp(-T / tau)`: the step
+/// response is that of the continuous filter at the ticks.
 ///
-/// Any unit; range all of [`Q16`]. The state carries 16 more bits than the
-/// output, hence no dead band: a constant input is reached to the last bit.
-/// Error: 1 LSB against the same filter in f64, plus 2^-17 / a relative of a jump
-/// from the rounding of `a` (tau = 5 ms: 5e-5).
-/// Cost: two multiplies and about 15 other instructions.
+/// Range: all of [`Q16`]. The state has 16 more bits than the output: no dead band. Error: 1 LSB
+/// against the same filter in f64, plus 2^-17 / a relative of a jump from the rounding of `a`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct LowPass {
     /// `a` in Q16, 1 to 65536.

@@ -5,13 +5,10 @@
 
 use super::high;
 
-/// Reciprocal `2^63 / n` of a number whose top bit is set.
+/// Reciprocal `2^63 / n` of a number whose top bit is set; without it, a number without meaning.
 ///
-/// Range: `n` from 2^31 to 2^32 - 1 gives 2^32 (less the error) down to 2^31; a smaller
-/// `n` gives a number without meaning, never a panic. Error: 0 to 16 LSB too small, at
-/// most 6e-9 relative. Cost: one division of at most 12 cycles and 10 other instructions.
-///
-/// Source: Newton's iteration `r (2 - n r)` from a quotient of 16 bits.
+/// Error: 0 to 16 LSB too small, at most 6e-9 relative. Source: Newton's iteration `r (2 - n r)`
+/// from a quotient of 16 bits.
 pub const fn reciprocal_of_normalised(n: u32) -> u32 {
     // Odd, so never zero; within 2^-15 of n 2^-16.
     let upper = n >> 16 | 1;
@@ -23,11 +20,8 @@ pub const fn reciprocal_of_normalised(n: u32) -> u32 {
     (guess << 16).wrapping_add_signed(step - 6)
 }
 
-/// Quotient `2^32 a / b` of a smaller by a larger number.
-///
-/// Range: `a < b`; what reaches 1 saturates at 2^32 - 1, so does division by zero.
-/// Error: 0 to 24 LSB too small, so 5.6e-9 absolute, and at most 6e-9 relative beyond
-/// 1 LSB. Cost: one division of at most 12 cycles and about 15 other instructions.
+/// Quotient `2^32 a / b` of a smaller by a larger number; what reaches 1 saturates, so does
+/// division by zero. Error: 0 to 24 LSB too small, at most 6e-9 relative beyond 1 LSB.
 pub const fn fraction(a: u32, b: u32) -> u32 {
     if a >= b {
         return u32::MAX;
@@ -38,11 +32,8 @@ pub const fn fraction(a: u32, b: u32) -> u32 {
     (((a << shift) as u64 * reciprocal as u64) >> 31) as u32
 }
 
-/// Part `2^32 a / (a + b)` that one number is of a sum.
-///
-/// Range: `b` from 1, `a + b` below 2^32; outside it a number without meaning. Error: 0 to
-/// 25 LSB too small, one more than [`fraction`] as the last bit is none, so 5.9e-9 absolute.
-/// Cost: as that, without its branch.
+/// Part `2^32 a / (a + b)` that one number is of a sum, for `b` from 1 and `a + b` below 2^32.
+/// Error: 0 to 25 LSB too small.
 pub const fn part_of_sum(a: u32, b: u32) -> u32 {
     let sum = a.wrapping_add(b);
     let shift = sum.leading_zeros() & 31;

@@ -5,12 +5,7 @@
 use super::sqrt_fraction;
 use crate::units::Q16;
 
-/// Square root.
-///
-/// Range: 0 to 32768 gives 0 to 181.02; negative arguments give 0. Error: 0.51 LSB, the
-/// root with eight more bits rounded once. Cost: about 40 cycles.
-///
-/// Source: as [`sqrt_fraction`].
+/// Square root; negative arguments give 0. Error: 0.51 LSB. Source: as [`sqrt_fraction`].
 pub fn sqrt(x: Q16) -> Q16 {
     let bits = u32::try_from(x.to_bits()).unwrap_or(0);
     // 2^16 sqrt(bits) is the root in Q24; at most 1.5 LSB of that too small.

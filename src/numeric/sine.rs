@@ -11,14 +11,10 @@ const SINE: [i32; 4] = [843_314_854, -346_799_001, 42_777_991, -2_470_760];
 /// `cos(pi x / 4)` likewise, within 5e-11.
 const COSINE: [i32; 5] = [1_073_741_824, -1_324_675_869, 272_375_233, -22_398_329, 970_263];
 
-/// Sine and cosine of an angle in turns / 2^32, both Q30.
-///
-/// Range: all angles, wrapping. Error: at most 7 LSB of Q30, 6.6e-9. Cost: about 35
-/// instructions, no division, no loop.
-///
-/// Source: Chebyshev interpolation on an eighth of a turn either way of each axis.
+/// Sine and cosine of an angle in turns / 2^32, both Q30, wrapping. Error: at most 7 LSB,
+/// 6.6e-9. Source: Chebyshev interpolation on an eighth of a turn on both sides of each axis.
 pub const fn sin_cos(angle: u32) -> (i32, i32) {
-    // The nearest axis, and the way from it in eighths of a turn, Q31.
+    // The nearest axis, and the angle from it in eighths of a turn, Q31.
     let quadrant = angle.wrapping_add(1 << 29) >> 30;
     let x = (angle.wrapping_sub(quadrant << 30) as i32) << 2;
     // x^2 / 4, Q32.

@@ -4,21 +4,17 @@
 
 use crate::units::Q16;
 
-/// A function sampled at N evenly spaced points and interpolated by Catmull-Rom
+/// A function sampled at N evenly spaced points, at least 4, and interpolated by Catmull-Rom
 /// splines: through every sample, continuous in slope, exact for parabolas.
 ///
 /// `y(k + t) = p1 + t/2 ((p2 - p0) + t ((2 p0 - 5 p1 + 4 p2 - p3) + t (3 p1 - 3 p2 + p3 - p0)))`
-/// over the four samples around the interval; beyond the ends the samples go on
-/// as the parabola through the last three.
+/// over the four samples around the interval; beyond the ends the samples continue as the
+/// parabola through the last three. The argument is clamped to the table's range.
 ///
-/// Any units. Range: the argument is clamped to the table's; N is at least 4.
-/// Error: `0.017 h^3 max|f'''|` inside, six times that in the first and last interval,
-/// h being the spacing, plus 1.5 LSB of arithmetic and `2^-32 (N - 1)` of the largest slope
-/// per interval, for the argument's place; [`Table::solve`] accordingly.
-/// Cost of a value: four wide multiplies and about a hundred other instructions.
-///
-/// Source: Catmull and Rom 1974; the error constant is that of the central slope
-/// `h^2 f'''/6` times `max t(1-t)(1-2t) = 0.096`.
+/// Error: `0.017 h^3 max|f'''|` inside, six times that in the first and last interval, h being
+/// the spacing, plus 1.5 LSB and `2^-32 (N - 1)` of the largest slope per interval. Source:
+/// Catmull and Rom 1974; the constant is the central slope's `h^2 f'''/6` times `max
+/// t(1-t)(1-2t) = 0.096`.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Table<const N: usize> {
     /// Least argument, bits of Q16.
@@ -34,7 +30,7 @@ pub struct Table<const N: usize> {
     samples: [i32; N],
 }
 
-/// Nought everywhere: room for a table to be read into.
+/// Zero everywhere: room for a table to be read into.
 impl<const N: usize> Default for Table<N> {
     fn default() -> Self {
         Self { lo: 0, hi: 0, factor: 0, shift: 32, samples: [0; N] }
@@ -49,20 +45,10 @@ const FRACTION: u32 = 30;
 const COEFFICIENT_LIMIT: i64 = 1 << 30;
 
 impl<const N: usize> Table<N> {
-    /// A table from bits of Q16: both ends of the argument and the N values.
-    /// For generated constants: fails the build where
-    /// [`checked_from_bits`](Self::checked_from_bits) gives `None`.
-    pub const fn from_bits(lo: i32, hi: i32, samples: [i32; N]) -> Self {
-        match Self::checked_from_bits(lo, hi, samples) {
-            Some(table) => table,
-            None => panic!("a table needs a range, four samples and no wild bends"),
-        }
-    }
-
     /// A table from bits of Q16; `None` if the range is narrower than its
     /// intervals, N is below 4, or neighbouring samples differ so much that the
     /// interpolation could overflow (second differences beyond 8000).
-    pub const fn checked_from_bits(lo: i32, hi: i32, samples: [i32; N]) -> Option<Self> {
+    pub(super) fn from_bits(lo: i32, hi: i32, samples: [i32; N]) -> Option<Self> {
         if N < 4 || hi <= lo {
             return None;
         }
@@ -95,57 +81,9 @@ impl<const N: usize> Table<N> {
         Some(table)
     }
 
-    /// Least argument.
-    pub const fn lo(&self) -> Q16 {
-        Q16::from_bits(self.lo)
-    }
-
-    /// Largest argument.
-    pub const fn hi(&self) -> Q16 {
-        Q16::from_bits(self.hi)
-    }
-
-    /// Whether `x` lies inside the table.
-    pub fn contains(&self, x: Q16) -> bool {
-        (self.lo..=self.hi).contains(&x.to_bits())
-    }
-
     /// Value at `x`; that of the nearer end outside.
     pub fn eval(&self, x: Q16) -> Q16 {
         Q16::from_bits(self.eval_bits(x.to_bits()))
-    }
-
-    /// Argument at which the table reaches `y`, for tables that rise or fall
-    /// throughout; the nearer end if none does.
-    ///
-    /// Error: the value at the result and the value one LSB before it enclose
-    /// `y`. Cost: at most 32 times [`eval`](Self::eval); not meant for the tick.
-    pub fn solve(&self, y: Q16) -> Q16 {
-        let y = y.to_bits();
-        let (first, last) = (self.eval_bits(self.lo), self.eval_bits(self.hi));
-        let rising = first <= last;
-        let reached = |value: i32| if rising { value >= y } else { value <= y };
-        if reached(first) {
-            return self.lo();
-        }
-        if !reached(last) {
-            return self.hi();
-        }
-        // before: not reached; at: reached.
-        let (mut before, mut at) = (self.lo, self.hi);
-        for _ in 0..32 {
-            let gap = at.wrapping_sub(before) as u32;
-            if gap <= 1 {
-                break;
-            }
-            let middle = before.wrapping_add((gap >> 1) as i32);
-            if reached(self.eval_bits(middle)) {
-                at = middle;
-            } else {
-                before = middle;
-            }
-        }
-        Q16::from_bits(at)
     }
 
     fn eval_bits(&self, x: i32) -> i32 {
@@ -167,7 +105,7 @@ impl<const N: usize> Table<N> {
     }
 
     /// Value, and twice the coefficients of t, t^2, t^3, of an interval.
-    const fn cubic(&self, index: usize) -> [i64; 4] {
+    fn cubic(&self, index: usize) -> [i64; 4] {
         let p1 = self.sample(index);
         let p2 = self.sample(index + 1);
         let p0 = match index.checked_sub(1) {
@@ -180,14 +118,14 @@ impl<const N: usize> Table<N> {
         [p1, p2 - p0, square, cube]
     }
 
-    const fn sample(&self, index: usize) -> i64 {
+    fn sample(&self, index: usize) -> i64 {
         // The index is below N by construction; the last sample stands in for
         // the bound that the compiler cannot see.
         if index < N { self.samples[index] as i64 } else { self.samples[N - 1] as i64 }
     }
 }
 
-const fn within(coefficient: i64) -> bool {
+fn within(coefficient: i64) -> bool {
     coefficient > -COEFFICIENT_LIMIT && coefficient < COEFFICIENT_LIMIT
 }
 
@@ -241,7 +179,7 @@ mod tests {
     #[test]
     fn samples_are_met_exactly() {
         let samples = [5, -70_000, 1_000_000, 3_000_000, -2, 7, 65_536, 0, 12];
-        let table = Table::from_bits(-8 * 65_536, 8 * 65_536, samples);
+        let table = Table::from_bits(-8 * 65_536, 8 * 65_536, samples).expect("tame");
         for (index, &sample) in samples.iter().enumerate() {
             let x = Q16::from_num(2 * index as i32 - 8);
             assert_eq!(table.eval(x), q(sample));
@@ -255,15 +193,6 @@ mod tests {
             let exact = q(bits).to_num::<f64>().min(32_767.0) / 4.0;
             assert!((table.eval(q(bits)).to_num::<f64>() - exact).abs() <= 2.5 * LSB);
         }
-    }
-
-    #[test]
-    fn constants_are_built_by_the_compiler() {
-        const LINE: Table<4> = Table::from_bits(0, 3 << 16, [0, 1 << 16, 2 << 16, 3 << 16]);
-        assert_eq!(LINE.eval(Q16::from_num(1.25)), Q16::from_num(1.25));
-        assert_eq!(LINE.lo(), Q16::ZERO);
-        assert_eq!(LINE.hi(), Q16::from_num(3));
-        assert!(LINE.contains(Q16::from_num(3)) && !LINE.contains(q(-1)));
     }
 
     proptest! {
@@ -286,39 +215,14 @@ mod tests {
         }
 
         #[test]
-        fn solving_encloses_the_value(
-            y in -1.0_f64..25.0,
-            rising in any::<bool>(),
-        ) {
-            let f = |x: f64| if rising { x.exp() } else { (3.0 - x).exp() };
-            let table = Table::<33>::build(0.0, 3.0, f).expect("an exponential");
-            let y = Q16::from_num(y);
-            let x = table.solve(y);
-            let (at, before) = (table.eval(x), table.eval(x - Q16::DELTA));
-            let reached = if rising { at >= y } else { at <= y };
-            let not_before = if rising { before < y } else { before > y };
-            prop_assert!(reached || x == table.hi());
-            prop_assert!(not_before || x == table.lo());
-        }
-
-        #[test]
-        fn solving_inverts_to_the_slope(x in 0.0_f64..3.0) {
-            let table = Table::<33>::build(0.0, 3.0, |x| 4.0 * x + x.sin()).expect("a rise");
-            let x = Q16::from_num(x);
-            let back = table.solve(table.eval(x));
-            prop_assert!((back - x).abs() <= Q16::DELTA);
-        }
-
-        #[test]
         fn any_bits_stay_without_panic(
             samples in prop::array::uniform8(-0x0400_0000..0x0400_0000_i32),
             lo in any::<i32>(),
             hi in any::<i32>(),
             x in any::<i32>(),
         ) {
-            if let Some(table) = Table::checked_from_bits(lo, hi, samples) {
+            if let Some(table) = Table::from_bits(lo, hi, samples) {
                 let _ = table.eval(q(x));
-                let _ = table.solve(q(x));
             }
         }
     }

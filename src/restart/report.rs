@@ -118,12 +118,12 @@ impl Restart {
 /// that has nothing to do with how the wheel's way is found.
 fn spared(code: u16) -> bool {
     const OTHERS: [Fault; 11] = [
-        Fault::PressureStale,
-        Fault::DisplacementStale,
-        Fault::PressureRange,
-        Fault::DisplacementRange,
-        Fault::PressureImplausible,
-        Fault::DisplacementImplausible,
+        Fault::PreloadSensorStale,
+        Fault::CompressionSensorStale,
+        Fault::PreloadSensorRange,
+        Fault::CompressionSensorRange,
+        Fault::PreloadSensorImplausible,
+        Fault::CompressionSensorImplausible,
         Fault::Overpressure,
         Fault::PreloadNotReached,
         Fault::PretightenerRunaway,

@@ -1,6 +1,6 @@
 //! The two rigs of the study.
 
-use super::{Drive, Geometry, Goals, List, Loads, Pretightener, Rig, Sensors, Tread};
+use super::{ControlSettings, Drive, Geometry, List, Loads, Pretightener, Rig, Sensors, Tread};
 
 /// A list from a slice; what does not fit is a mistake of this file.
 fn list<const N: usize>(values: &[f64]) -> List<N> {
@@ -59,7 +59,7 @@ impl Rig {
                 angle_zero_code: 2000.0,
                 stale_after_s: 0.020,
             },
-            control: Goals {
+            control: ControlSettings {
                 gap_ref_mm: 0.0,
                 safe_speed_mm_s: 5.0,
                 gap_reserve: 0.03,

@@ -7,12 +7,11 @@ use super::raw::{AngleFrame, Sample};
 use crate::numeric::{LowPass, LowPassState};
 use crate::units::{Q16, Tick};
 
-/// Angle from the pillar in codes of the sensor, 16384 a turn: range +-8192 codes,
-/// LSB 2^-16 code = 5.9 nrad. The arm lies along the pillar at 0 and leans
-/// outwards as the angle grows.
+/// Angle from the pillar in codes of the sensor, 16384 a turn, LSB 2^-16 code = 5.9 nrad. It
+/// grows as the arm leans outwards.
 pub type Codes = Q16;
 
-/// Checks a frame and gives its 14-bit code.
+/// The 14-bit code of a frame with even parity and without the error flag, bit 14.
 pub const fn decode(frame: AngleFrame) -> Result<u16, Reason> {
     let frame = frame.get();
     if !frame.count_ones().is_multiple_of(2) {
@@ -24,10 +23,8 @@ pub const fn decode(frame: AngleFrame) -> Result<u16, Reason> {
     Ok(frame & 0x3FFF)
 }
 
-/// The angle sensor: frame to angle, range check, low-pass.
-///
-/// `angle = code - zero`, wrapping at half a turn. Error: half a code (192 urad)
-/// of quantisation, 2 LSB of rounding. Cost: one filter.
+/// The angle sensor: frame to angle, range check, low-pass. `angle = code - zero`, wrapping at
+/// half a turn. Error: half a code (192 urad) of quantisation, 2 LSB of rounding.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct AngleSensor {
     /// Code of the zero; 2^32 is a turn.

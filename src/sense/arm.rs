@@ -11,16 +11,13 @@ use crate::units::{Millimetres, Q16, Ratio, q16};
 /// the reach that the parameters are checked against is 0.1 to 0.9.
 const SINE: (f64, f64) = (0.05, 0.95);
 
-/// How far the wheel must stand from a level, in steps, before the next is
+/// How far the wheel must be from a level, in steps, before the next is
 /// reported: a tenth of a step (0.4 mm, ten codes of the sensor) beyond the middle.
 const LEVEL_SWITCH: Ratio = q16(600_000);
 
-/// Geometry of arm and sleeve.
-///
-/// `r = r_pivot + L sin(angle)`: distance of the wheel centre from the pillar
-/// axis, mm, growing outwards. Error against the formula over the whole reach of the
-/// prototype: 2e-5 mm in the radius, 2e-5 in the tangent; the sensor's half code is 0.019
-/// to 0.022 mm. Cost: a sine, a cosine and a reciprocal, about 80 cycles.
+/// Geometry of arm and sleeve: `r = r_pivot + L sin(angle)` is the distance of the wheel centre
+/// from the pillar axis, mm, growing outwards. Error over the reach of the prototype: 2e-5 mm in
+/// the radius, 2e-5 in the tangent; the sensor's half code is 0.019 to 0.022 mm.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Arm {
     /// Least and largest angle that is not taken for a sensor fault.
@@ -54,9 +51,8 @@ impl Arm {
         self.reach
     }
 
-    /// Distance of the wheel centre from the pillar axis, mm, and the tangent of the arm
-    /// angle: radial force per axial thrust through the arm. Outside its reach the arm is
-    /// taken to stand at the end of it.
+    /// Radius of the wheel centre, mm, and tangent of the arm angle: radial force per axial
+    /// thrust through the arm. Outside its reach the arm counts as at the end of it.
     pub fn stance(&self, angle: Codes) -> (Millimetres, Ratio) {
         let angle = between(angle, self.reach.0, self.reach.1);
         // A turn is 2^14 codes of Q16, so 2^30: to 2^32.
@@ -72,17 +68,14 @@ impl Arm {
         )
     }
 
-    /// Height of the wall under the wheel above the outermost one, in steps, not
-    /// rounded: `(r_0 + compression - r) / h`. Compression brings the centre
-    /// nearer to the wall, so it is taken off the radius first.
+    /// Height of the wall under the wheel above the outermost one, in steps, not rounded:
+    /// `(r_0 + compression - r) / h`.
     pub fn steps_up(&self, radius: Millimetres, compression: Millimetres) -> Ratio {
         (self.outermost + compression - radius) * self.per_step
     }
 
-    /// Sleeve level under the wheel: 0 at the outermost wall, one more per step,
-    /// nearest to [`steps_up`](Self::steps_up). With a `previous` level it changes
-    /// only when the wheel stands 0.6 steps from that, so that it does not flutter
-    /// half way up a step.
+    /// Sleeve level under the wheel: 0 at the outermost wall, one more per step. A `previous`
+    /// level changes only when the wheel is 0.6 steps from it, so that it does not flutter.
     pub fn level(&self, previous: Option<u8>, steps: Ratio) -> u8 {
         match previous {
             Some(level)
@@ -151,15 +144,6 @@ mod tests {
         assert_eq!(arm.level(Some(1), arm.steps_up(at(123.5), zero)), 0);
         assert_eq!(arm.level(None, arm.steps_up(at(140.0), zero)), 0);
         assert_eq!(arm.level(None, arm.steps_up(at(60.0), zero)), MAX_STEPS as u8 + 1);
-    }
-
-    #[test]
-    fn compression_is_taken_off_the_radius() {
-        let arm = arm();
-        // On level 2 (centre at 117 mm) with 1.5 mm of compression.
-        let (r, c) = (Millimetres::from_num(118.5), Millimetres::from_num(1.5));
-        assert_eq!(arm.steps_up(r, c), Ratio::from_num(2));
-        assert_eq!(arm.level(None, arm.steps_up(r, c)), 2);
     }
 
     proptest! {

@@ -64,7 +64,7 @@ impl AngleFrame {
 
 /// Mean output of a motor's bridge, the difference of its two legs, behind divider and
 /// low-pass: 12 bits, of which [`BridgeCode::CENTRE`] is no voltage. A code is 20 parts of
-/// 2^15 of the supply, so that the range ends at a duty of 1.25 either way, and its noise
+/// 2^15 of the supply, so that the range ends at a duty of 1.25 in either direction, and its noise
 /// takes one byte a tick in the log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
@@ -134,7 +134,7 @@ pub struct Sample<T> {
 pub struct SensorFrame {
     /// Wheel encoder.
     pub wheel: Option<Sample<EncoderCount>>,
-    /// Load cell between pre-tightener and arm.
+    /// Preload sensor between pre-tightener and arm.
     pub load_cell: Option<Sample<AdcCode>>,
     /// Tread displacement between arm and wheel.
     pub tread: Option<Sample<AdcCode>>,

@@ -23,20 +23,14 @@ const LONGEST_GAP: u32 = 1000;
 
 /// Travel and speed of the wheel: exact odometry and a tracking observer.
 ///
-/// Travel is `counts x 2 pi R / counts_per_turn`, summed without rounding. The
-/// observer, once a tick T = 1 ms with the profile's acceleration a:
-/// `e += dz - (v T + a T^2/2)`, `v += a T + (1 - p)^2 e / T`, `e -= (1 - p^2) e`,
-/// `p = exp(-w T)`: both poles at the bandwidth w, no steady error at constant
-/// speed, none at constant acceleration as far as `a` is right; an acceleration
-/// error da shows as a speed error of 2 da / w.
+/// Travel is `counts x 2 pi R / counts_per_turn`, summed without rounding. The observer, once a
+/// tick T with the profile's acceleration a: `e += dz - (v T + a T^2/2)`,
+/// `v += a T + (1 - p)^2 e / T`, `e -= (1 - p^2) e`, `p = exp(-w T)`: both poles at the
+/// bandwidth w. An acceleration error da appears as a speed error of 2 da / w.
 ///
-/// Positive in the direction of deployment; mm and mm/s. Range: speeds to
-/// +-2000 mm/s, gaps between samples bridged by the model. Error: travel 2e-8
-/// relative beside one count (0.0192 mm); speed, with w = 23 rad/s, 1 % peak from 3
-/// to 30 mm/s (0.4 % at 3, 0.3 % at 5 and 0.04 % at 30 mm/s, the rest where counts
-/// and ticks beat), bias 0.01 %, 0.1 mm/s through an S-curve of 250 mm/s^2. Cost: six wide multiplies,
-/// no division.
-///
+/// Positive in the direction of deployment; mm and mm/s, to +-2000 mm/s. Error: travel 2e-8
+/// relative beside one count (0.0192 mm); speed, with w = 23 rad/s, 1 % peak from 3 to 30 mm/s
+/// where counts and ticks beat, bias 0.01 %, 0.1 mm/s through an S-curve of 250 mm/s^2.
 /// Source: the critically damped g-h filter (Benedict and Bordner 1962).
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Speedometer {
@@ -151,7 +145,7 @@ impl Speedometer {
             return;
         }
         state.error += moved << 16;
-        // A sample a few ticks old is compared with where the wheel stood then.
+        // A sample a few ticks old is compared with where the wheel was then.
         let late = i64::from(age(now, sample.at).min(limit));
         let innovation = state.error + state.speed * late;
         // Q48 to Q28; beyond 8 mm the correction is bounded.
@@ -281,20 +275,6 @@ mod tests {
     }
 
     #[test]
-    fn travel_returns_to_zero_to_the_last_bit() {
-        let meter = build();
-        let mut state = SpeedState::default();
-        for now in 0..20_000_u32 {
-            let position =
-                40.0 * (1.0 - (f64::from(now) * 1e-3 * core::f64::consts::PI / 10.0).cos());
-            meter.step(&mut state, now, sample(position, now), Default::default(), LIMIT);
-        }
-        let motion = meter.step(&mut state, 20_000, sample(0.0, 20_000), Default::default(), LIMIT);
-        assert_eq!(motion.travel, Travel::ZERO);
-        assert_eq!(motion.position, Millimetres::ZERO);
-    }
-
-    #[test]
     fn an_s_curve_is_followed_without_lag() {
         let meter = build();
         let mut state = SpeedState::default();
@@ -346,22 +326,6 @@ mod tests {
     }
 
     #[test]
-    fn rest_reads_as_rest() {
-        let meter = build();
-        let mut state = SpeedState::default();
-        for now in 0..1000_u32 {
-            let position = 8e-3 * f64::from(now);
-            meter.step(&mut state, now, sample(position, now), Default::default(), LIMIT);
-        }
-        let mut motion = None;
-        for now in 1000..2000 {
-            motion = Some(meter.step(&mut state, now, sample(8.0, now), Default::default(), LIMIT));
-        }
-        let speed = motion.expect("ran").speed.value;
-        assert!(speed.abs() <= MillimetresPerSecond::DELTA, "{speed}");
-    }
-
-    #[test]
     fn samples_that_come_late_or_every_other_tick_leave_no_error() {
         let meter = build();
         for (every, delay) in [(1, 1), (2, 0), (2, 1), (3, 2), (10, 0)] {
@@ -379,24 +343,6 @@ mod tests {
             let bias = sum / 3000.0;
             assert!(bias.abs() <= 20.0 * 1e-3, "every {every}, delay {delay}: {bias}");
         }
-    }
-
-    #[test]
-    fn samples_of_uneven_age_are_compared_with_their_own_time() {
-        let meter = build();
-        let mut state = SpeedState::default();
-        let mut worst = 0.0_f64;
-        for now in 10..5010_u32 {
-            // Turn and turn about fresh and three ticks old, for 50 ms each.
-            let at = now - if now / 50 % 2 == 0 { 0 } else { 3 };
-            let position = 30.0 * f64::from(at) * 1e-3;
-            let motion =
-                meter.step(&mut state, now, sample(position, at), Default::default(), LIMIT);
-            if now >= 1010 {
-                worst = worst.max((motion.speed.value.to_num::<f64>() - 30.0).abs());
-            }
-        }
-        assert!(worst <= 0.1, "{worst}");
     }
 
     #[test]
@@ -457,17 +403,6 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_constant_speed_is_met_within_a_percent(
-            speed in 3.0_f64..30.0,
-            backwards in any::<bool>(),
-        ) {
-            let meter = build();
-            let (bias, worst) = steady(&meter, if backwards { -speed } else { speed });
-            prop_assert!(worst <= 0.01, "{}", worst);
-            prop_assert!(bias.abs() <= 1e-4, "{}", bias);
-        }
-
-        #[test]
         fn no_sequence_panics(
             inputs in prop::collection::vec(any::<(u16, u32, i32)>(), 1..300),
         ) {
@@ -520,24 +455,5 @@ mod tests {
         };
         assert!(believed(1.0) && believed(1.9) && believed(-1.9));
         assert!(!believed(3.0) && !believed(-3.0));
-    }
-
-    #[test]
-    fn a_reading_that_comes_late_may_have_gone_so_much_farther() {
-        let meter = build();
-        let most = Rig::prototype().drive.no_load_speed_mm_s.max(IMPLAUSIBLE_MM_S / 2.0);
-        let believed = |part: f64, every: Tick| {
-            let mut state = SpeedState::default();
-            let step_mm = part * most * 1e-3;
-            (0..60).all(|now| {
-                let at = now - now % every;
-                let read = sample(step_mm * f64::from(at), at);
-                let motion = meter.step(&mut state, now, read, Default::default(), LIMIT);
-                motion.speed.validity == Validity::Valid
-            })
-        };
-        for every in [1, 2, 4] {
-            assert!(believed(1.9, every) && !believed(3.0, every), "{every}");
-        }
     }
 }

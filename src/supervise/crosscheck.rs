@@ -1,9 +1,8 @@
-//! Checks of the sensors against one another and against what the bridges are asked for.
-//!
-//! Each compares two things that no single fault spoils alike. They run while the drive is
-//! on and start afresh whenever it has been off. What a fault-free rig shows was measured on
-//! random rigs of both presets, out and back; every threshold stands above the worst of it by
-//! the part that its constant says, and a campaign of 10,000 rigs holds it to that.
+//! Checks of the sensors against one another and against what the bridges are asked for. Each
+//! compares two things that no single fault spoils alike. They run while the drive is on and
+//! start again when it has been off. Each threshold is above the worst of fault-free random
+//! rigs of both presets by the part that its constant gives; a campaign of 10,000 rigs
+//! confirms it.
 
 #![deny(clippy::float_arithmetic)]
 
@@ -18,16 +17,16 @@ use crate::units::{
 const SPAN: usize = 6;
 /// Room for the positions of two spans.
 const KEPT: usize = 16;
-/// Way reference and encoder may bend apart within two spans, counts. Three readings of a
-/// counter are off by less than 2 counts together, and a third whole count takes
-/// `1 / (6 ms)^2`, 530 mm/s^2 beyond the reference: twice what the profile asks for. The
-/// worst of the random rigs is 2.1.
+/// Distance by which reference and encoder may bend apart within two spans, counts. Three
+/// readings of a counter are off by less than 2 counts together, and a third whole count takes
+/// `1 / (6 ms)^2`, 530 mm/s^2 beyond the reference: twice what the profile asks for. The worst
+/// of the random rigs is 2.1.
 const BENT_COUNTS: f64 = 2.5;
-/// Way off the reference within two spans, mm: the dips behind a step make 0.11.
+/// Distance off the reference within two spans, mm: the dips behind a step make 0.11.
 const OFF: Millimetres = q16(150_000);
-/// Way that counts as progress of the wheel, mm: two counts and a half.
+/// Distance that counts as progress of the wheel, mm: two counts and a half.
 const PROGRESS: Millimetres = q16(50_000);
-/// Way that the reference may go while a wheel that has turned makes no progress, mm.
+/// Distance that the reference may go while a wheel that has turned makes no progress, mm.
 const LAG: Millimetres = q16(400_000);
 /// The same before it has turned, mm: on a corner the speed loop first has to find the duty
 /// that lifts it, 0.2 s at half the crossing speed.
@@ -36,10 +35,10 @@ const START_LAG: Millimetres = q16(2_000_000);
 const TURNED: u8 = 10;
 /// Ticks within which arm and wheel are compared.
 const ARM_TICKS: u8 = 32;
-/// Way that the arm may move beyond the wheel's within them, mm; noise and the slope of a
+/// Distance that the arm may move beyond the wheel's within them, mm; noise and the slope of a
 /// corner, at most 1, make 0.08.
 const ARM_BEYOND: Millimetres = q16(250_000);
-/// Least speed at which duty tells speed, mm/s.
+/// Least speed at which duty and speed are compared, mm/s.
 const TELLING: MillimetresPerSecond = q16(10_000_000);
 /// Duty beyond the feed-forward that cruising takes, least and most: gearbox friction and
 /// rolling resistance make 0.02 to 0.07, twice the top load 0.05 more, a motor that is off
@@ -77,7 +76,7 @@ pub(super) struct CrossCheck {
 /// What is remembered of the ticks before.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct CrossState {
-    /// Way of the reference since the drive was switched on.
+    /// Travel of the reference since the drive was switched on.
     reference: Travel,
     /// Encoder less reference, mm, of the last ticks.
     past: [Millimetres; KEPT],
@@ -113,7 +112,7 @@ pub(super) struct Compared {
     pub(super) now: Tick,
     /// When the encoder was read.
     pub(super) read_at: Tick,
-    /// Way by the encoder.
+    /// Travel by the encoder.
     pub(super) travel: Travel,
     /// Wheel centre's distance from the pillar axis, mm.
     pub(super) radius: Millimetres,
@@ -142,7 +141,7 @@ impl CrossCheck {
         })
     }
 
-    /// The pre-tightener and its load cell, whenever that is on.
+    /// The pre-tightener and its sensor, whenever that is on.
     pub(super) fn preload(
         &self,
         state: &mut CrossState,
@@ -153,7 +152,7 @@ impl CrossCheck {
         let off = (preload - due).abs() > self.strayed;
         let strayed = lasts(&mut state.strayed, off, STRAYED_TICKS);
         if unsound {
-            Some(Fault::PressureImplausible)
+            Some(Fault::PreloadSensorImplausible)
         } else {
             strayed.then_some(Fault::PretightenerRunaway)
         }
@@ -175,10 +174,10 @@ impl CrossCheck {
         let effort = lasts(&mut state.effort, effort, EFFORT_TICKS);
         if bent {
             Some(Fault::DriveRunaway)
-        } else if preload == Some(Fault::PressureImplausible) {
+        } else if preload == Some(Fault::PreloadSensorImplausible) {
             preload
         } else if unsound {
-            Some(Fault::DisplacementImplausible)
+            Some(Fault::CompressionSensorImplausible)
         } else if arm {
             Some(Fault::ArmMismatch)
         } else if lags {
@@ -253,14 +252,14 @@ fn judge(state: &mut CodeState, value: Q16, jump: Q16) -> bool {
     state.same >= STUCK || state.erratic >= ERRATIC
 }
 
-/// Counts ticks while a condition lasts, and tells when they are `enough`.
+/// Counts ticks while a condition lasts, and whether they are `enough`.
 fn lasts(count: &mut u8, condition: bool, enough: u8) -> bool {
     *count = if condition { count.saturating_add(1) } else { 0 };
     *count >= enough
 }
 
 impl CrossState {
-    /// The drive is switched on: from here on. The wheel has stood until now.
+    /// The drive is switched on: from here on. The wheel has been at rest until now.
     pub(super) fn begin(&mut self, seen: &Compared) {
         *self = Self {
             past: [Q16::narrow(seen.travel); KEPT],

@@ -7,13 +7,13 @@ use crate::units::Direction;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub enum Command {
-    /// Deploy from where the wheel stands.
+    /// Deploy from where the wheel is.
     Start,
     /// Come to rest and hold.
     Stop,
-    /// Retract from where the wheel stands.
+    /// Retract from where the wheel is.
     Retract,
-    /// Leave the fault hold, or zero the sensors anew when idle at the stow end.
+    /// Leave the fault hold, or zero the sensors again when idle at the stow end.
     Reset,
 }
 
@@ -46,7 +46,7 @@ pub enum Mode {
     Idle,
     /// Bringing the preload to cruise before moving.
     Preload(Direction),
-    /// Under way.
+    /// Running.
     Run(Direction, Leg),
     /// Braking to rest on command.
     Stopping(Direction),

@@ -92,14 +92,14 @@ impl Monitor {
         }
         let preload = seen.sensed.preload.value;
         let speed = seen.sensed.speed.value;
-        let acting = driven(seen.mode) || matches!(seen.mode, Mode::Preload(_));
+        let acting = seen.mode.moves() || matches!(seen.mode, Mode::Preload(_));
         // With the bridges off nothing here could relieve it; while it falls as it should,
         // it is being relieved.
         let pressed = preload > self.overpressure
-            && (driven(seen.mode) || acting && preload - seen.preload_due > self.short);
+            && (seen.mode.moves() || acting && preload - seen.preload_due > self.short);
         lasting(&mut state.overpressure, pressed);
         lasting(&mut state.short, acting && seen.preload_due - preload > self.short);
-        let turns = !driven(seen.mode) && speed.abs() > BEYOND;
+        let turns = !seen.mode.moves() && speed.abs() > BEYOND;
         lasting(&mut state.runaway, turns);
         let lost = sensor_fault(seen.sensed);
         // The self-test ends once the wheel rests.
@@ -125,16 +125,7 @@ impl Monitor {
             None
         }
     }
-}
 
-impl MonitorState {
-    /// What the bridges are given until the next tick; off is none.
-    pub fn give(&mut self, drive: Duty, pretightener: Duty) {
-        self.readback.give(drive, pretightener);
-    }
-}
-
-impl Monitor {
     /// The sensors against one another, while a bridge is on.
     fn cross_check(&self, state: &mut MonitorState, seen: &Observed<'_>) -> Option<Fault> {
         let sensed = seen.sensed;
@@ -149,7 +140,7 @@ impl Monitor {
             speed_ref: seen.speed_ref,
             effort: seen.effort,
         };
-        let before = core::mem::replace(&mut state.driving, driven(seen.mode));
+        let before = core::mem::replace(&mut state.driving, seen.mode.moves());
         if state.driving {
             if !before {
                 state.cross.begin(&compared);
@@ -164,9 +155,11 @@ impl Monitor {
     }
 }
 
-/// Whether the drive's bridge is on.
-fn driven(mode: Mode) -> bool {
-    mode.moves()
+impl MonitorState {
+    /// What the bridges are given until the next tick; off is none.
+    pub fn give(&mut self, drive: Duty, pretightener: Duty) {
+        self.readback.give(drive, pretightener);
+    }
 }
 
 /// Counts ticks while a condition lasts.
@@ -176,27 +169,20 @@ fn lasting(count: &mut u16, condition: bool) {
 
 /// The fault of a sensor that cannot be used any more.
 fn sensor_fault(sensed: &SensedState) -> Option<Fault> {
-    let all = [
-        sensed.speed.validity,
-        sensed.preload.validity,
-        sensed.compression.validity,
-        sensed.radius.validity,
-    ];
-    if all.iter().all(|validity| *validity == Validity::Valid) { None } else { judge(sensed) }
-}
-
-/// The same where not every sensor's newest code is good.
-fn judge(sensed: &SensedState) -> Option<Fault> {
     let judge = |validity: Validity, stale: Fault, range: Fault| match validity {
         Validity::Valid | Validity::Held(_) => None,
         Validity::Absent | Validity::Stale => Some(stale),
         Validity::Invalid(Reason::OutOfRange) => Some(range),
         Validity::Invalid(_) => Some(stale),
     };
-    judge(sensed.speed.validity, Fault::SpeedStale, Fault::SpeedStale)
-        .or(judge(sensed.preload.validity, Fault::PressureStale, Fault::PressureRange))
-        .or(judge(sensed.compression.validity, Fault::DisplacementStale, Fault::DisplacementRange))
-        .or(judge(sensed.radius.validity, Fault::AngleStale, Fault::AngleRange))
+    judge(sensed.speed.validity, Fault::WheelEncoderStale, Fault::WheelEncoderStale)
+        .or(judge(sensed.preload.validity, Fault::PreloadSensorStale, Fault::PreloadSensorRange))
+        .or(judge(
+            sensed.compression.validity,
+            Fault::CompressionSensorStale,
+            Fault::CompressionSensorRange,
+        ))
+        .or(judge(sensed.radius.validity, Fault::ArmAngleStale, Fault::ArmAngleRange))
 }
 
 #[cfg(test)]
@@ -242,10 +228,10 @@ mod tests {
             (Validity::Invalid(Reason::OutOfRange), Some(1)),
         ];
         let faults = [
-            [Fault::SpeedStale, Fault::SpeedStale],
-            [Fault::PressureStale, Fault::PressureRange],
-            [Fault::DisplacementStale, Fault::DisplacementRange],
-            [Fault::AngleStale, Fault::AngleRange],
+            [Fault::WheelEncoderStale, Fault::WheelEncoderStale],
+            [Fault::PreloadSensorStale, Fault::PreloadSensorRange],
+            [Fault::CompressionSensorStale, Fault::CompressionSensorRange],
+            [Fault::ArmAngleStale, Fault::ArmAngleRange],
         ];
         for (validity, expected) in states {
             for (sensor, faults) in faults.iter().enumerate() {
@@ -257,7 +243,7 @@ mod tests {
                     &mut sensed.radius.validity,
                 ];
                 *place.into_iter().nth(sensor).unwrap() = validity;
-                assert_eq!(judge(&sensed), expected.map(|which: usize| faults[which]));
+                assert_eq!(sensor_fault(&sensed), expected.map(|which: usize| faults[which]));
             }
         }
     }
@@ -387,18 +373,6 @@ mod tests {
         for mode in [Mode::Zero, Mode::Idle, Mode::Complete(Direction::Deploy)] {
             assert_eq!(found(mode), Some(Fault::DriveBridge), "{mode:?}");
         }
-    }
-
-    #[test]
-    fn sensors_that_are_all_lost_are_a_fault_and_one_too() {
-        let mut lost = sensed(0.0, 40.0);
-        assert_eq!(sensor_fault(&lost), None);
-        lost.radius.validity = Validity::Stale;
-        assert_eq!(sensor_fault(&lost), Some(Fault::AngleStale));
-        lost.speed.validity = Validity::Stale;
-        lost.preload.validity = Validity::Stale;
-        lost.compression.validity = Validity::Stale;
-        assert_eq!(sensor_fault(&lost), Some(Fault::SpeedStale));
     }
 
     #[test]

@@ -9,7 +9,7 @@ use crate::units::Direction;
 pub enum Trigger {
     /// Every sensor has answered.
     SensorsAnswer,
-    /// The self-test passed; `stowed` tells whether the wheel is at the stow end and
+    /// The self-test passed; `stowed`: whether the wheel is at the stow end and
     /// unloaded, so that the zeros can be taken.
     TestPassed {
         /// At the stow end and unloaded.
@@ -19,7 +19,7 @@ pub enum Trigger {
     Zeroed,
     /// An operator's command.
     Command(Command),
-    /// The preload stands.
+    /// The preload is reached.
     PreloadStands,
     /// The run enters this leg.
     Leg(Leg),
@@ -52,11 +52,9 @@ impl Trigger {
     ];
 }
 
-/// The mode after `trigger` in `mode`; `None` if the mode does not take it.
-///
-/// A fault leads to the fault hold from everywhere, and the first fault is kept. While
-/// something moves, start and retract mean stop: whoever presses the button then
-/// wants it to end.
+/// The mode after `trigger` in `mode`; `None` if the mode does not take it. A fault leads to the
+/// fault hold from everywhere, and the first fault is kept. While something moves, start and
+/// retract mean stop.
 pub const fn next(mode: Mode, trigger: Trigger) -> Option<Mode> {
     use Command::{Reset, Retract, Start, Stop};
     use Direction::{Deploy, Retract as Back};

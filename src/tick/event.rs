@@ -43,7 +43,7 @@ pub enum Event {
 pub struct CrossingRecord {
     /// Step number, 1 at the outermost sleeve; 0 for a step that the table lacks.
     pub index: u8,
-    /// Way of the crossing.
+    /// Direction of the crossing.
     pub direction: Direction,
     /// Where the step was found, mm of travel.
     pub position: Millimetres,
@@ -61,7 +61,7 @@ pub struct CrossingRecord {
     pub gap_predicted: Millimetres,
     /// Gap measured from compression and arm angle, mm.
     pub gap_measured: Millimetres,
-    /// Time that the wanted preload stood before the corner touched, s; negative
+    /// Time for which the wanted preload was reached before the corner touched, s; negative
     /// when it came after.
     pub lead_time: Seconds,
     /// Friction that the crossing leaves unused by the model, absolute.

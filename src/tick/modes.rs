@@ -168,7 +168,7 @@ mod tests {
             }
             advance(controller, &mut state, pass);
         });
-        assert_eq!(state.mode, Mode::FaultHold(Fault::AngleStale));
+        assert_eq!(state.mode, Mode::FaultHold(Fault::ArmAngleStale));
         let mut state = State::default();
         within(&answering(), |controller, pass| advance(controller, &mut state, pass));
         assert_eq!(state.mode, Mode::SelfTest);

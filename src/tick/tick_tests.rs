@@ -62,17 +62,6 @@ pub(super) fn within<T>(
 }
 
 #[test]
-fn a_slope_beyond_any_limits_alike_and_the_least_one_does_not() {
-    let controller = stiff();
-    // Down to 6 mm/s of rise, also where speed and slope together are less than that.
-    let limited = controller.followed(q16(2_500_000), q16(3_000_000));
-    assert!((limited - q16(2_000_000)).abs() < q16(1_000), "{limited}");
-    let fast = q16(128_000_000);
-    assert_eq!(controller.followed(fast, LEVEL_SLOPE), fast);
-    assert!(controller.followed(fast, LEVEL_SLOPE + Q16::DELTA) < fast);
-}
-
-#[test]
 fn a_reset_right_after_a_fault_is_refused() {
     let idle = sensed(0, 0.0, 0.0);
     for (ticks, taken) in [(0, false), (50, false), (99, false), (100, true), (5000, true)] {

@@ -6,12 +6,9 @@ use core::ops::{Add, AddAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 use fixed::traits::{FromFixed, ToFixed};
 use fixed::types::{I16F16, I32F32};
 
-/// Saturating Q15.16: range -32768 to 32767.99998, LSB 2^-16 = 15.3e-6.
-///
-/// Sums and differences are exact or saturate; products are rounded towards minus
-/// infinity, then saturate. Cost on a Cortex-M4: one instruction a sum, about eight
-/// a product, a third of what the same costs through [`fixed`], whose
-/// conversions from and to other formats are used.
+/// Saturating Q15.16: range -32768 to 32767.99998, LSB 2^-16 = 15.3e-6. Sums are exact or
+/// saturate; products are rounded towards minus infinity, then saturate. A third of the cost of
+/// the same through [`fixed`], whose conversions are used.
 #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
 #[repr(transparent)]
 #[serde(transparent)]

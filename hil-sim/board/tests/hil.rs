@@ -238,9 +238,9 @@ fn a_host_that_falls_silent_leaves_the_bridges_off() {
     assert!(held <= stale + 3, "{held} ticks alone");
     // The counter cannot fall silent: it stands, and the reference goes on.
     let found = [
-        Fault::PressureStale,
-        Fault::DisplacementStale,
-        Fault::AngleStale,
+        Fault::PreloadSensorStale,
+        Fault::CompressionSensorStale,
+        Fault::ArmAngleStale,
         Fault::DriveRunaway,
         Fault::DriveStalled,
     ];

@@ -282,9 +282,9 @@ mod tests {
             judge.look(f64::from(at) * TICK_S, &output, &Truth::default(), struck);
         };
         say(1, Fault::SelfTest, false);
-        say(2, Fault::AngleStale, true);
+        say(2, Fault::ArmAngleStale, true);
         say(3, Fault::SelfTest, true);
-        assert_eq!(judge.fault, Some((0.002, Fault::AngleStale.code())));
+        assert_eq!(judge.fault, Some((0.002, Fault::ArmAngleStale.code())));
         assert_eq!(judge.rest_s, Some(0.002));
         output.drive = MotorCommand { enable: true, ..MotorCommand::OFF };
         judge.look(0.004, &output, &Truth::default(), true);

@@ -9,7 +9,7 @@ const SECTIONS: [(&str, &str, &str); 10] = [
     ("preload", "Pretightener", RIG),
     ("drive", "Drive", RIG),
     ("sense", "Sensors", RIG),
-    ("control", "Goals", RIG),
+    ("control", "ControlSettings", RIG),
     ("spread", "Spread", SPREAD),
     ("noise", "Noise", SPREAD),
     ("run", "RunOptions", RUN),

@@ -151,7 +151,6 @@ fn sweeps() -> Vec<Sweep> {
         error,
     };
     vec![
-        whole("reciprocal", (-0.5, 0.5), Box::new(reciprocal)),
         whole("sqrt", (-0.51, 0.51), Box::new(sqrt)),
         Sweep {
             name: "reciprocal_of_normalised",
@@ -236,20 +235,6 @@ fn sweeps() -> Vec<Sweep> {
         },
         pairs("fraction", (-FRACTION_BOUND, 0.0), fraction),
     ]
-}
-
-fn reciprocal(input: u64) -> f64 {
-    let x = input as u32 as i32;
-    let got = i64::from(numeric::reciprocal(q(input)).to_bits());
-    if x == 0 {
-        return (got - i64::from(i32::MAX)) as f64;
-    }
-    // 2^32 / x in integers, the rest as a fraction: f64 alone would round.
-    let (exact, rest) = ((1i64 << 32) / i64::from(x), (1i64 << 32) % i64::from(x));
-    if exact >= i64::from(i32::MAX) || exact <= i64::from(i32::MIN) {
-        return got as f64 - saturated(exact as f64);
-    }
-    (got - exact) as f64 - rest as f64 / f64::from(x)
 }
 
 fn sqrt(input: u64) -> f64 {

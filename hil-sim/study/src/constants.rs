@@ -11,7 +11,7 @@ pub mod fit;
 use std::fmt::Write as _;
 
 use anyhow::{Context, Result, ensure};
-use interstage::model::felt::Kind;
+use interstage::model::effective_stiffness::Kind;
 use interstage::model::formula::Formula;
 use interstage::rig::Rig;
 use interstage::units::Direction;
@@ -85,7 +85,7 @@ pub fn source(rows: &[Row]) -> Result<String> {
     let formula = Formula::new(&Rig::fe());
     let mut source = String::from(
         "//! Coefficients of the felt stiffening in 1e-8, in the order of\n\
-         //! [`Kind::terms`](super::felt::Kind::terms). Written by `rig-study constants` from\n\
+         //! [`Kind::terms`](super::effective_stiffness::Kind::terms). Written by `rig-study constants` from\n\
          //! crossings of the converged ring; do not edit.\n",
     );
     for kind in Kind::ALL {

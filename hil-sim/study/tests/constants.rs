@@ -8,7 +8,7 @@
 use hil_sim::plant::balance::Axial;
 use hil_sim::plant::crossing::{CrossingCase, cross};
 use hil_sim::plant::ring::RingParameters;
-use interstage::model::felt::Kind;
+use interstage::model::effective_stiffness::Kind;
 use interstage::model::formula::Formula;
 use interstage::rig::Rig;
 use interstage::units::Direction;

@@ -329,21 +329,6 @@ mod tests {
     }
 
     #[test]
-    fn turned_back_the_deepest_compression_is_kept() {
-        let watch = watch();
-        for (contact, direction) in [
-            (Contact::Both, Direction::Deploy),
-            (Contact::Corner, Direction::Retract),
-            (Contact::Leaving, Direction::Deploy),
-        ] {
-            let deepest = q16(900_000);
-            let mut state = WatchState { contact, deepest, ..WatchState::default() };
-            watch.reverse(&mut state, direction);
-            assert_eq!(state.deepest, deepest, "{contact:?}");
-        }
-    }
-
-    #[test]
     fn back_over_a_step_lower_than_its_table_the_wall_carries_before_the_arm_says_so() {
         let watch = watch();
         let wall = seen(121.1, 0.1);

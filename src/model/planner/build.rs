@@ -35,12 +35,12 @@ impl Planner {
             sine / libm::sqrt(1.0 - sine * sine)
         });
         let coupling = rig.plant.arm_coupling * load;
-        let mut wedge = heapless::Vec::new();
+        let mut arm_thrust = heapless::Vec::new();
         for tangent in tangents {
             // Never full: as many as steps.
-            let _ = wedge.push(checked("plant.arm_coupling", coupling * tangent)?);
+            let _ = arm_thrust.push(checked("plant.arm_coupling", coupling * tangent)?);
         }
-        let first = wedge.first().map_or(0.0, |w| w.to_num::<f64>());
+        let first = arm_thrust.first().map_or(0.0, |w| w.to_num::<f64>());
         let formula = Formula::new(rig);
         let reference = |direction| {
             if rig.control.gap_ref_mm > 0.0 {
@@ -59,7 +59,7 @@ impl Planner {
             guard: Guard::try_build(rig)?,
             timing: Timing::try_build(rig)?,
             strategy,
-            wedge,
+            arm_thrust,
             coupling: checked("plant.arm_coupling", coupling)?,
             gap_ref: [gap(references[0])?, gap(references[1])?],
             target: [gap(references[0] * aim)?, gap(references[1] * aim)?],
@@ -210,20 +210,6 @@ mod tests {
                 };
                 assert!((preload.to_num::<f64>() - expected).abs() < 1e-3, "{strategy:?}");
             }
-        }
-    }
-
-    #[test]
-    fn a_gap_that_is_written_down_is_held_and_else_that_of_the_cruise_preload() {
-        let mut rig = Rig::prototype();
-        rig.control.gap_ref_mm = 2.0;
-        let planner = Planner::try_build(&rig).unwrap();
-        rig.control.gap_ref_mm = 0.0;
-        let own = Planner::try_build(&rig).unwrap();
-        for direction in Direction::ALL {
-            assert!((planner.gap_ref(direction).to_num::<f64>() - 2.0).abs() < 1e-4);
-            let gap = own.gap_ref(direction).to_num::<f64>();
-            assert!((1.0..4.0).contains(&gap) && (gap - 2.0).abs() > 0.01, "{gap}");
         }
     }
 }

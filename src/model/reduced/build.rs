@@ -5,16 +5,18 @@ mod least_squares;
 mod polynomial;
 
 use super::ReducedModel;
+use super::direction_model::{DirectionModel, TERMS};
 use super::shape::Shape;
-use super::way::{TERMS, Way};
-use crate::model::felt::{FAST_DEGREE, FORCE_END, Folded, Kind, RUN_DEGREE, RUN_END};
+use crate::model::effective_stiffness::{
+    FAST_DEGREE, FORCE_END, Folded, Kind, RUN_DEGREE, RUN_END,
+};
 use crate::model::formula::{Formula, LEAST_RUN};
 use crate::numeric::{checked, fits, fits_with_slope};
 use crate::rig::{Rig, RigError};
 use crate::units::Direction;
 use polynomial::{interpolate, rows, value};
 
-/// Largest unit of force, N: forces from 8 to 256 N are told, of which no rig needs more.
+/// Largest unit of force, N: forces from 8 to 256 N are resolved, of which no rig needs more.
 const MOST_UNIT_N: f64 = 1024.0;
 
 /// 2 to a power.
@@ -43,7 +45,7 @@ impl ReducedModel {
     }
 }
 
-/// What both ways are built from. The run is a part r of the longest, w = r - 1/2.
+/// What both directions are built from. The run is a part r of the longest, w = r - 1/2.
 struct Start<'a> {
     formula: &'a Formula,
     driven: bool,
@@ -146,7 +148,7 @@ impl<'a> Start<'a> {
         })
     }
 
-    fn way(&self, rig: &Rig, direction: Direction) -> Result<Way, RigError> {
+    fn way(&self, rig: &Rig, direction: Direction) -> Result<DirectionModel, RigError> {
         let f = self.formula;
         let kind = Kind { direction, driven: self.driven };
         let stiff = || refused("tread.stiffening", rig.tread.stiffening, 1.0, 20.0);
@@ -160,7 +162,7 @@ impl<'a> Start<'a> {
         }
         let half_speed = (f.half_speed_mm_s(kind) * two_to(16)).clamp(1.0, two_to(31) - 1.0) as u32;
         let half_speed_shift = half_speed.leading_zeros();
-        Ok(Way {
+        Ok(DirectionModel {
             half_speed,
             half_speed_normalised: half_speed << half_speed_shift,
             half_speed_shift,
@@ -209,7 +211,7 @@ impl<'a> Start<'a> {
     }
 }
 
-/// The terms in the order of [`Way::felt`].
+/// The terms in the order of [`DirectionModel::felt`].
 fn triangle(felt: &Folded) -> impl Iterator<Item = f64> {
     (0..=RUN_DEGREE).flat_map(move |j| {
         let most = (30 - 5 * j) / 6;
@@ -217,7 +219,7 @@ fn triangle(felt: &Folded) -> impl Iterator<Item = f64> {
     })
 }
 
-/// Whether the felt stiffening stays below 16, and its derivatives in their formats,
+/// Whether the effective stiffness stays below 16, and its derivatives in their formats,
 /// for every speed and run.
 fn holds(felt: &Folded) -> bool {
     let bound = |sum: f64, c: f64| 0.5 * sum + libm::fabs(c);
@@ -424,21 +426,6 @@ mod tests {
             let _ = model.observed_scale(&at, q(gap), q(force));
             let speed = model.speed(&at, q(gap), q(force), q(1 << 16), q(60 << 16));
             prop_assert!(speed >= q(1 << 16) && speed <= q(60 << 16));
-        }
-    }
-
-    #[test]
-    fn the_gap_alone_is_that_of_the_whole_crossing() {
-        let model = ReducedModel::try_build(&Rig::prototype()).unwrap();
-        for direction in WAYS {
-            for force in [20.0, 40.0, 80.0] {
-                let speed = Q16::from_num(8.0);
-                let at = Point { direction, speed, scale: Scale::NOMINAL };
-                let force = Q16::from_num(force);
-                let gap = model.gap(&at, force);
-                assert_eq!(gap, model.crossing(&at, force).gap);
-                assert!(gap > Q16::ZERO);
-            }
         }
     }
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::{Context, Result, ensure};
-use interstage::model::felt::Kind;
+use interstage::model::effective_stiffness::Kind;
 use interstage::rig::Rig;
 use interstage::units::Direction;
 use rayon::prelude::*;

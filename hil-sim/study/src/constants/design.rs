@@ -1,6 +1,6 @@
 //! Which crossings the reduced model is fitted to, and which it is checked on.
 
-use interstage::model::felt::{FORCE_END, Kind};
+use interstage::model::effective_stiffness::{FORCE_END, Kind};
 use interstage::model::formula::Formula;
 use interstage::units::Direction;
 

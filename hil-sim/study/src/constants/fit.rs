@@ -1,7 +1,9 @@
 //! Least squares of the felt stiffening.
 
 use anyhow::{Context, Result};
-use interstage::model::felt::{Kind, fast_values, load_values, run_values, step_values};
+use interstage::model::effective_stiffness::{
+    Kind, fast_values, load_values, run_values, step_values,
+};
 use interstage::model::formula::Formula;
 use nalgebra::{DMatrix, DVector};
 

@@ -4,8 +4,8 @@
 use super::least_squares::LeastSquares;
 use super::polynomial::{node, value};
 use super::{Start, bits};
-use crate::model::felt::Folded;
-use crate::model::reduced::way::{
+use crate::model::effective_stiffness::Folded;
+use crate::model::reduced::direction_model::{
     FAST_CELLS, FORCE_CELLS, LOWEST_OCTAVE, Pair, RunCell, STIFFNESS_CELLS, SpeedCell,
 };
 

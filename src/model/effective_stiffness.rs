@@ -1,12 +1,10 @@
-//! How much of the tread's stiffening a crossing feels: the polynomial that is fitted to
-//! the ring.
+//! Effective stiffness of the tread in a crossing: the polynomial fitted to the ring.
 //!
 //! In units of the wheel (lengths over R, forces over k_inf R^2 L) the crossing of a
-//! quasi-static ring depends on the pace v tau / R, the run over the corner r / R, the
-//! step h / R, the load T / (k_inf R^2 L) and the stiffening s alone. The effective
-//! stiffness is `k_eff / k_inf = 1 + (s - 1) x E`, with the part `x = pace / (pace + l)` of
-//! the crossing that is fast, and E a polynomial in x, run, step and load. At rest it is
-//! 1 exactly, whatever was fitted.
+//! quasi-static ring depends on the speed v tau / R, the run over the corner r / R, the step h
+//! / R, the load T / (k_inf R^2 L) and the stiffening s alone. `k_eff / k_inf = 1 + (s - 1) x
+//! E`, with the fast part `x = speed / (speed + l)` of the crossing, and E a polynomial in x,
+//! run, step and load. At rest it is 1 exactly.
 
 use super::constants::{DEPLOY, DEPLOY_PUSHED, RETRACT, RETRACT_PUSHED};
 use crate::units::Direction;
@@ -31,10 +29,10 @@ pub const FORCE_END: f64 = 0.0217;
 /// Unit of the constants.
 const UNIT: f64 = 1e-8;
 
-/// Which polynomial: way, and whether friction drives the wheel or it is pushed.
+/// Which polynomial: direction, and whether friction drives the wheel or it is pushed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Kind {
-    /// Way of the crossing.
+    /// Direction of the crossing.
     pub direction: Direction,
     /// Driven by friction, with a load or without; else pushed and frictionless.
     pub driven: bool,
@@ -50,7 +48,7 @@ impl Kind {
     ];
 
     /// Pace v tau / R at which half the crossing is fast. Chosen: least scatter of the fit.
-    pub const fn half_pace(self) -> f64 {
+    pub const fn half_speed(self) -> f64 {
         match self.direction {
             Direction::Deploy => 0.04,
             Direction::Retract => 0.12,
