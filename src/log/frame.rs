@@ -289,6 +289,11 @@ impl TicksFrame {
         self.ticks
     }
 
+    /// The latest of them.
+    pub(super) const fn latest(&self) -> Tick {
+        self.before.at
+    }
+
     /// Adds a record; false if there is no room for one of any kind.
     pub(super) fn push(&mut self, record: &Record) -> bool {
         let rest = self.buffer.0.get_mut(HEAD + self.length..LONGEST - CHECK);

@@ -19,7 +19,7 @@ use embassy_stm32::timer::{
 use interstage::hal::{MotorCommand, Motors};
 use interstage::sense::raw::BridgeCodes;
 
-use super::Readback;
+use super::readback::Readback;
 
 /// One bridge in phase/enable control: PWM chops, the direction line chooses the
 /// sense, the enable line wakes the bridge.
