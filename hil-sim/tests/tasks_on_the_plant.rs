@@ -8,7 +8,7 @@
 mod common;
 
 use std::cell::{Cell, RefCell};
-use std::future::{Future, pending, poll_fn};
+use std::future::{Future, poll_fn};
 use std::pin::Pin;
 use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -32,7 +32,7 @@ use interstage::log::{CrossingRecord, Entry, Event, Identity, LogEncoder, Teleme
 use interstage::model::Planner;
 use interstage::restart::DriveSnapshot;
 use interstage::sense::raw::{AdcCode, AngleFrame, BridgeCodes, BusFault, EncoderCount};
-use interstage::supervise::{Command, Fault, Mode};
+use interstage::supervise::{Command, Mode};
 use interstage::tasks::{self, Exchange, TickIo, TickIoCell};
 
 /// The clock is one for the whole process: one board at a time.
@@ -50,8 +50,6 @@ struct Shared {
     codes: Cell<Option<Codes>>,
     drives: Cell<Drives>,
     command: Cell<Option<Command>>,
-    /// The load cell's converter hangs.
-    hangs: Cell<bool>,
     /// Time of each feeding, ms.
     fed: RefCell<Vec<u64>>,
     /// Entries with the time of writing, ms.
@@ -81,9 +79,6 @@ impl WheelEncoder for Peripheral {
 
 impl AnalogInput for LoadCell {
     async fn sample(&mut self) -> Result<AdcCode, BusFault> {
-        if self.0.hangs.get() {
-            return pending().await;
-        }
         Ok(self.0.codes().load_cell)
     }
 }
@@ -388,35 +383,4 @@ fn the_watchdog_is_fed_and_the_log_is_written_all_along() {
         });
         assert_eq!(odd, None, "{}", way.name());
     }
-}
-
-#[test]
-fn a_hanging_converter_stops_the_drive_while_the_board_lives_on() {
-    let mut board = Board::new(&scenario("prototype", Direction::Deploy, 0), Order::TickFirst);
-    board.until(|row| row.mode == Mode::Idle);
-    assert_eq!(board.shared.light.get(), Light::Off);
-    board.shared.command.set(Some(Command::Start));
-    board.until(|row| matches!(row.mode, Mode::Run(..)));
-    while board.plant.truth().position_mm < 20.0 {
-        board.tick();
-    }
-    assert_eq!(board.shared.light.get(), Light::On);
-    board.shared.hangs.set(true);
-    let from = board.rows.len();
-    board.until(|row| matches!(row.mode, Mode::FaultHold(_)));
-    let took = board.rows.len() - from;
-    assert!((20..=24).contains(&took), "{took} ms");
-    assert_eq!(board.rows.last().map(|row| row.mode), Some(Mode::FaultHold(Fault::PressureStale)));
-    let stopped = board.shared.drives.get();
-    assert!(!stopped.drive_on && !stopped.preload_on);
-    let (at, ticks) = (board.plant.truth().position_mm, board.rows.len());
-    board.run_ms(300);
-    assert!((board.plant.truth().position_mm - at).abs() < 0.1);
-    assert_eq!(board.plant.truth().speed_mm_s, 0.0);
-    assert_eq!(board.shared.light.get(), Light::Alarm);
-    assert!(board.entries().iter().any(|e| e.event == Event::Fault(Fault::PressureStale)));
-    // A sensor that hangs is a fault of the rig, not of the board.
-    let fed = board.shared.fed.borrow();
-    let late = fed.iter().filter(|at| **at > u64::from(FIRST_TICK) + ticks as u64).count();
-    assert!(late >= 299, "{late}");
 }

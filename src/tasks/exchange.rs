@@ -42,10 +42,10 @@ pub struct Exchange {
     pub(super) sensor_ticks: [Signal<Raw, Tick>; PERIODS.len()],
     pub(super) tick_started: Signal<Raw, ()>,
     pub(super) tick_ended: Signal<Raw, ()>,
-    wheel: Latest<Sample<EncoderCount>>,
-    load_cell: Latest<Sample<AdcCode>>,
-    tread: Latest<Sample<AdcCode>>,
-    arm: Latest<Sample<AngleFrame>>,
+    pub(super) wheel: Latest<Sample<EncoderCount>>,
+    pub(super) load_cell: Latest<Sample<AdcCode>>,
+    pub(super) tread: Latest<Sample<AdcCode>>,
+    pub(super) arm: Latest<Sample<AngleFrame>>,
     pub(super) request: Slot<PlanRequest>,
     pub(super) answer: Slot<Plan>,
     pub(super) commands: Channel<Raw, Command, COMMANDS>,
@@ -96,26 +96,6 @@ impl Exchange {
                 sensor.signal(tick);
             }
         }
-    }
-
-    /// Publishes a reading of the wheel counter.
-    pub(super) fn put_wheel(&self, sample: Sample<EncoderCount>) {
-        self.wheel.sender().send(sample);
-    }
-
-    /// Publishes a reading of the load cell.
-    pub(super) fn put_load_cell(&self, sample: Sample<AdcCode>) {
-        self.load_cell.sender().send(sample);
-    }
-
-    /// Publishes a reading of the tread sensor.
-    pub(super) fn put_tread(&self, sample: Sample<AdcCode>) {
-        self.tread.sender().send(sample);
-    }
-
-    /// Publishes a frame of the arm sensor.
-    pub(super) fn put_arm(&self, sample: Sample<AngleFrame>) {
-        self.arm.sender().send(sample);
     }
 
     /// What a tick at `now` is given; takes the oldest command and the plan out. Bridge
