@@ -1,15 +1,6 @@
-//! The NUCLEO-G474RE behind [`interstage::hal::Board`]: one driver a file. Pins
-//! are chosen in `main.rs` and listed in `docs/HARDWARE.md`.
+//! The NUCLEO-G474RE behind [`interstage::hal::Board`]: one driver a file. Its pins are
+//! listed in `docs/HARDWARE.md`.
 
-#[cfg(not(feature = "hil"))]
-mod analog;
-#[cfg(not(feature = "hil"))]
-mod angle;
-#[cfg(not(feature = "hil"))]
-mod bridge;
-#[cfg(not(feature = "hil"))]
-mod button;
-mod checksum;
 pub(crate) mod config;
 mod console;
 mod flash;
@@ -21,55 +12,40 @@ pub(crate) mod image;
 pub(crate) mod light;
 mod line;
 #[cfg(not(feature = "hil"))]
-mod readback;
-pub(crate) mod retained;
+mod pins;
+mod retained;
 pub(crate) mod rtt;
+pub(crate) mod safety;
+pub(crate) mod start;
 pub(crate) mod supply;
 mod text_log;
-#[cfg(not(feature = "hil"))]
-mod wheel;
 
-#[cfg(not(feature = "hil"))]
-pub(crate) use analog::{Analog, Ring};
-#[cfg(not(feature = "hil"))]
-pub(crate) use angle::Angle;
-#[cfg(not(feature = "hil"))]
-pub(crate) use bridge::{Bridge, Bridges};
-#[cfg(not(feature = "hil"))]
-pub(crate) use button::Button;
-pub(crate) use checksum::Checksum;
 pub(crate) use console::Console;
 pub(crate) use flash::Pages;
 pub(crate) use guard::Guard;
 #[cfg(feature = "hil")]
-pub(crate) use hil::{Analog, Angle, Bridges, Button, Wheel};
+pub(crate) use hil::{Angle, Bridges, Button, LoadCell, Tread, Wheel, split};
 pub(crate) use light::Lamp;
 pub(crate) use line::HostLine;
 #[cfg(not(feature = "hil"))]
-pub(crate) use readback::Readback;
+pub(crate) use pins::{Angle, Bridges, Button, LoadCell, Tread, Wheel, split};
 pub(crate) use text_log::Lines;
-#[cfg(not(feature = "hil"))]
-pub(crate) use wheel::Wheel;
 
-#[cfg(not(feature = "hil"))]
-use embassy_stm32::peripherals::{ADC1, ADC2};
 use embassy_stm32::peripherals::{DMA1_CH1, DMA1_CH2};
 use embassy_stm32::{Config, bind_interrupts, dma, exti, flash as flash_driver, interrupt, rcc};
 use interstage::hal::Board;
+use interstage::tasks::Exchange;
+
+/// What all tasks share.
+pub(crate) static EXCHANGE: Exchange = Exchange::new();
 
 /// The board.
 pub(crate) struct Nucleo;
 
 impl Board for Nucleo {
     type Wheel = Wheel;
-    #[cfg(not(feature = "hil"))]
-    type LoadCell = Analog<ADC1>;
-    #[cfg(feature = "hil")]
-    type LoadCell = Analog;
-    #[cfg(not(feature = "hil"))]
-    type Tread = Analog<ADC2>;
-    #[cfg(feature = "hil")]
-    type Tread = Analog;
+    type LoadCell = LoadCell;
+    type Tread = Tread;
     type Arm = Angle;
     type Motors = Bridges;
     type Watchdog = Guard;

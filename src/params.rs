@@ -9,6 +9,7 @@
 
 mod compile;
 pub mod link;
+mod refusal;
 pub mod service;
 mod set;
 pub mod slots;

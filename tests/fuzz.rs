@@ -5,15 +5,13 @@ use interstage::log::frame::{Body, Frame, FrameBuffer, Head, Kind, LONGEST};
 use interstage::log::{Identity, crc32};
 use interstage::params::link::{FrameReader, ToBoard, ToHost, frame};
 use interstage::params::service::{Piece, Request, Response};
-use interstage::params::slots::{
-    FlashFault, SLOT_BYTES, SetMemory, Slot, WORD_BYTES, place, stored,
-};
+use interstage::params::slots::{SLOT_BYTES, place, stored};
 use interstage::params::{MAX_SET, ParameterSet, compile};
-use interstage::restart::{Crash, DriveSnapshot};
 use interstage::rig::Rig;
 use interstage::supervise::{Command, Mode};
 use interstage::tick::{Entry, Event};
 
+use crate::common::FixedFlash;
 use crate::common::mutate::fuzz;
 
 fn set(rig: &Rig) -> Vec<u8> {
@@ -53,33 +51,13 @@ fn parameter_sets() {
     fuzz("parameter sets with their check", &contents, 4000, 2.0, |bytes| open_set(&signed(bytes)));
 }
 
-/// Flash that holds whatever it is given.
-struct Flash([Vec<u8>; 2]);
-
-impl SetMemory for Flash {
-    fn bytes(&self, slot: Slot) -> &[u8] {
-        match slot {
-            Slot::A => &self.0[0],
-            Slot::B => &self.0[1],
-        }
-    }
-
-    async fn erase(&mut self, _: Slot, _: usize) -> Result<(), FlashFault> {
-        Err(FlashFault)
-    }
-
-    async fn program(&mut self, _: Slot, _: usize, _: [u8; WORD_BYTES]) -> Result<(), FlashFault> {
-        Err(FlashFault)
-    }
-}
-
 #[test]
 fn places_of_parameter_sets() {
     let slot = |sequence| place(&set(&Rig::prototype()), sequence).expect("fits").to_vec();
     let corpus = [slot(1), slot(u32::MAX), vec![0xFF; SLOT_BYTES]];
     fuzz("places", &corpus, 4000, 2.0, |bytes| {
         let (a, b) = bytes.split_at(bytes.len().min(SLOT_BYTES));
-        let flash = Flash([a.to_vec(), b.to_vec()]);
+        let flash = FixedFlash([a.to_vec(), b.to_vec()]);
         if let Ok(Some(stored)) = stored(&flash) {
             open_set(stored.set);
         }
@@ -163,19 +141,5 @@ fn frames_of_the_log() {
         for kind in Kind::ALL {
             read_frame(&framed(head(kind), bytes));
         }
-    });
-}
-
-#[test]
-fn records_of_a_restart() {
-    let corpus = [vec![0xA5; 28], vec![0; 28]];
-    fuzz("records", &corpus, 20_000, 1.0, |bytes| {
-        let word = |index: usize| {
-            let bytes = bytes.get(4 * index..4 * index + 4).and_then(|b| b.try_into().ok());
-            bytes.map_or(0, u32::from_le_bytes)
-        };
-        let snapshot = DriveSnapshot::open(&std::array::from_fn(word));
-        let crash = Crash::open(&std::array::from_fn(word));
-        assert!(snapshot.is_none() && crash.is_none(), "made up out of noise");
     });
 }

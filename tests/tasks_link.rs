@@ -5,11 +5,10 @@ use std::collections::VecDeque;
 use std::rc::Rc;
 use std::sync::OnceLock;
 
-use crate::common::{Bench, forever};
+use crate::common::{Bench, FixedFlash, forever};
 use interstage::hal::Line;
 use interstage::params::link::{FrameReader, ToBoard, ToHost, frame};
 use interstage::params::service::{Origin, Refusal, Request, Response, Service};
-use interstage::params::slots::{FlashFault, SLOT_BYTES, SetMemory, Slot};
 use interstage::params::{MAX_SET, compile};
 use interstage::rig::Rig;
 use interstage::tasks::{self, Exchange};
@@ -58,23 +57,6 @@ impl Wire {
     }
 }
 
-/// Flash with nothing in it, that nobody may change.
-struct Blank;
-
-impl SetMemory for Blank {
-    fn bytes(&self, _: Slot) -> &[u8] {
-        &[0xFF; SLOT_BYTES]
-    }
-
-    async fn erase(&mut self, _: Slot, _: usize) -> Result<(), FlashFault> {
-        Err(FlashFault)
-    }
-
-    async fn program(&mut self, _: Slot, _: usize, _: [u8; 8]) -> Result<(), FlashFault> {
-        Err(FlashFault)
-    }
-}
-
 fn image() -> &'static [u8] {
     static SET: OnceLock<Vec<u8>> = OnceLock::new();
     SET.get_or_init(|| {
@@ -87,7 +69,7 @@ fn image() -> &'static [u8] {
 
 fn bench() -> (Bench, Wire, &'static Exchange) {
     let (mut bench, wire, exchange) = (Bench::new(), Wire::default(), forever(Exchange::default()));
-    let (line, service) = (wire.clone(), Service::new(Blank, image(), 0xAFFE));
+    let (line, service) = (wire.clone(), Service::new(FixedFlash::blank(), image(), 0xAFFE));
     bench.spawn(async move { tasks::link(line, service, exchange).await });
     (bench, wire, exchange)
 }

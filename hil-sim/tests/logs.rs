@@ -14,7 +14,7 @@ use hil_sim::log::{Decoder, Item, Mark, Run};
 use hil_sim::replay::replay;
 use hil_sim::scenario::Scenario;
 use hil_sim::sil::{Options, Session};
-use interstage::log::BATCH;
+use interstage::log::TICKS_PER_FRAME;
 use interstage::rig::Rig;
 use interstage::supervise::{Command as Order, Mode};
 use interstage::units::Q16;
@@ -134,7 +134,7 @@ fn an_hour_of_deploying_and_retracting_is_logged_without_a_gap() {
     }
     // What is handed over at once, and what waits for it: a frame of ticks, events, a
     // piece of a capture.
-    assert!(largest < 2048 && waiting <= 2 * BATCH as usize, "{largest} bytes, {waiting} ticks");
+    assert!(largest < 2048 && waiting <= 2 * TICKS_PER_FRAME, "{largest} bytes, {waiting} ticks");
     // The plant's own ledger and what a run's trace keeps go with their session.
     if let (Some(first), Some(last)) = (memory.first(), memory.last()) {
         assert!(last.saturating_sub(*first) < (16 << 20), "{memory:?}");

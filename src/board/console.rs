@@ -3,9 +3,8 @@
 use embassy_time::{Duration, Timer};
 use interstage::hal::CommandSource;
 use interstage::supervise::Command;
+use interstage::tasks::mid_tick_deadline;
 use rtt_target::DownChannel;
-
-use crate::EXCHANGE;
 
 /// The probe writes into memory without telling the core: look this often.
 const POLL: Duration = Duration::from_millis(20);
@@ -25,7 +24,7 @@ impl CommandSource for Console {
         loop {
             let mut letter = [0];
             if self.0.read(&mut letter) == 0 {
-                Timer::at(EXCHANGE.aside(POLL)).await;
+                Timer::at(mid_tick_deadline(POLL)).await;
             } else if let Some(command) = decode(letter[0]) {
                 return command;
             }

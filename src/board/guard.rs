@@ -1,4 +1,4 @@
-//! What makes the bridges safe when the software no longer does.
+//! The watchdog, and what a debugger or a core that is locked up means to the bridges.
 
 use embassy_stm32::Peri;
 use embassy_stm32::pac;
@@ -6,9 +6,9 @@ use embassy_stm32::peripherals::IWDG;
 use embassy_stm32::wdg::IndependentWatchdog;
 use interstage::estimate::Place;
 use interstage::hal::Watchdog;
-use interstage::restart::{DriveSnapshot, Place, Reset};
+use interstage::restart::{DriveSnapshot, Place};
 
-use super::retained;
+use super::{retained, safety};
 
 /// Time-out of the watchdog, us, by the nominal 32 kHz of its oscillator.
 const TIMEOUT_US: u32 = 100_000;
@@ -29,14 +29,14 @@ impl Guard {
     /// Starts it; from here on nothing but a reset stops it.
     pub(crate) fn start(&mut self) {
         self.dog.unleash();
-        retained::look();
+        safety::watch_feeding();
     }
 }
 
 impl Watchdog for Guard {
     fn feed(&mut self) {
         self.dog.pet();
-        retained::fed();
+        safety::fed();
     }
 
     fn keep(&mut self, snapshot: &DriveSnapshot) {
@@ -54,8 +54,7 @@ pub(crate) fn arm() {
     // A locked-up core (a fault inside the fault handler, as after a stack
     // overflow) executes nothing any more: the timers cut the bridges themselves.
     pac::SYSCFG.cfgr2().modify(|w| w.set_cll(true));
-    // Halted at a breakpoint, TIM1 and TIM8 stop with their outputs off; and the clock
-    // stops with the system timer, which beats its milliseconds.
+    // Halted at a breakpoint, TIM1 and TIM8 stop with their outputs off, and the clock stops.
     pac::DBGMCU.apb1lfzr().modify(|w| {
         w.set_iwdg(true);
         w.set_tim2(true);
@@ -64,33 +63,4 @@ pub(crate) fn arm() {
         w.set_tim1(true);
         w.set_tim8(true);
     });
-}
-
-/// Forgets why the chip started.
-pub(super) fn forget_reset() {
-    pac::RCC.csr().modify(|w| w.set_rmvf(true));
-}
-
-/// Why the chip started, by its flags, which gather until they are forgotten.
-pub(super) fn reset() -> Reset {
-    let flags = pac::RCC.csr().read();
-    // Every reset of the chip's own pulls the pin too; a supply that comes up raises the
-    // flag of one that was too low.
-    if flags.iwdgrstf() {
-        Reset::Watchdog
-    } else if flags.borrstf() {
-        Reset::Power
-    } else if flags.sftrstf() {
-        Reset::Software
-    } else if flags.pinrstf() {
-        Reset::Pin
-    } else {
-        Reset::Other
-    }
-}
-
-/// Takes the power from both bridges, for good.
-pub(super) fn cut() {
-    pac::TIM1.bdtr().modify(|w| w.set_moe(false));
-    pac::TIM8.bdtr().modify(|w| w.set_moe(false));
 }

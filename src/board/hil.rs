@@ -1,7 +1,7 @@
 //! Hardware in the loop: sensors, bridges, button and time are the host's
 //! ([`interstage::hal::hil`]). Everything else is the firmware as it is flashed.
 //!
-//! The real bridges have no power: their pins are outputs that stand low, and no timer
+//! The real bridges have no power: their pins are outputs that are held low, and no timer
 //! drives them.
 
 mod clock;
@@ -9,5 +9,37 @@ mod desk;
 mod parts;
 mod serve;
 
-pub(crate) use parts::{Analog, Angle, Bridges, Button, Wheel, split};
-pub(crate) use serve::serve;
+pub(crate) use parts::{Angle, Bridges, Button, LoadCell, Tread, Wheel, split};
+
+use embassy_executor::{InterruptExecutor, Spawner};
+use embassy_stm32::interrupt::{self, InterruptExt, Priority};
+use rtt_target::{DownChannel, UpChannel};
+
+use super::rtt::Channels;
+
+/// In the place of the thread executor.
+static THREADS: InterruptExecutor = InterruptExecutor::new();
+
+#[embassy_stm32::interrupt]
+unsafe fn UART4() {
+    // SAFETY: this is the executor's handler, unmasked by `start` alone.
+    unsafe { THREADS.on_interrupt() }
+}
+
+/// What starts everything.
+type Begin = fn(Spawner, Channels);
+
+/// Runs the host's line in thread mode, where it moves time on when every task waits; what
+/// runs there otherwise has an executor of its own.
+pub(crate) fn run((channels, host): (Channels, (UpChannel, DownChannel)), begin: Begin) -> ! {
+    serve::serve(host, || {
+        interrupt::UART4.set_priority(Priority::P15);
+        THREADS.start(interrupt::UART4).spawn(boot(channels, begin).unwrap());
+    })
+}
+
+#[embassy_executor::task]
+async fn boot(channels: Channels, begin: Begin) {
+    // SAFETY: a task's context is always the executor's.
+    begin(unsafe { Spawner::for_current_executor().await }, channels);
+}

@@ -2,12 +2,10 @@
 
 use core::slice;
 
-use embassy_time::{Duration, Timer};
-use interstage::restart::Stopped;
 use interstage::restart::image_checksum;
 
 use super::flash_page::SEALS;
-use super::{light, retained};
+use super::light;
 
 unsafe extern "C" {
     /// The note that the linker writes, see `memory.x`: three words of head, the name
@@ -31,7 +29,7 @@ pub(super) fn id() -> [u8; 8] {
 }
 
 /// Its words, as they stand in flash; what is left of a last one is no part of any image.
-fn words() -> &'static [u32] {
+pub(super) fn words() -> &'static [u32] {
     let first = &raw const __vector_table;
     let values = &raw const __edata as usize - &raw const __sdata as usize;
     let length = &raw const __sidata as usize + values - first as usize;
@@ -96,28 +94,4 @@ fn seal(sum: u32) {
 #[inline(never)]
 pub(super) fn say_damaged() {
     defmt::error!("image: a bit has turned over since its first start; flash it again");
-}
-
-/// Words that are summed up in one go.
-const PART: usize = 256;
-
-/// From one part to the next: a round takes six seconds, and no more than a thousandth of
-/// the core.
-const PACE: Duration = Duration::from_millis(50);
-
-/// Sums up the image over and over, and ends the program if it is no longer what it was.
-#[embassy_executor::task]
-pub(crate) async fn watch(sealed: u32) -> ! {
-    loop {
-        let mut sum = 0;
-        for part in words().chunks(PART) {
-            Timer::at(crate::EXCHANGE.aside(PACE)).await;
-            sum = image_checksum::sum_on(sum, part);
-        }
-        if sum != sealed {
-            // Also for the case that what starts anew cannot say it any more.
-            say_damaged();
-            retained::end(Stopped::Image);
-        }
-    }
 }

@@ -11,7 +11,7 @@ use interstage::restart::Stopped;
 use interstage::restart::flash_log::{self, Latest};
 
 use super::flash_page::RECORDS;
-use super::{guard, retained};
+use super::{retained, safety};
 
 /// Threshold of the chip's detector: 2.9 V falling, 3.0 V rising.
 const LEVEL: u8 = 6;
@@ -63,7 +63,7 @@ pub(super) fn take(found: Option<Latest>) {
 #[embassy_stm32::interrupt]
 unsafe fn PVD_PVM() {
     cortex_m::interrupt::disable();
-    guard::cut();
+    safety::cut();
     // Whatever ends it from here on, this is why.
     retained::stop(Stopped::Supply);
     if let (Some(snapshot), Some(first)) = (retained::snapshot(), flash_log::free(RECORDS.bytes()))
@@ -76,5 +76,5 @@ unsafe fn PVD_PVM() {
     }
     // It may come back before the chip is reset, or the watchdog bite before it does.
     while PWR.sr2().read().pvdo() {}
-    retained::restart()
+    safety::restart()
 }

@@ -4,26 +4,23 @@ use defmt::{error, info, warn};
 use interstage::estimate::ContactStage;
 use interstage::hal::Journal;
 use interstage::log::Identity;
-use interstage::log::frame::Checker;
 use interstage::supervise::{Command, Leg, Mode};
 use interstage::tick::{CrossingRecord, Entry, Event};
 use interstage::units::{Direction, Q16};
 
-use super::Checksum;
 use super::rtt::{self, Frames};
 
 /// Writes entries, and owns up to what was lost; passes frames on.
 pub(crate) struct Lines {
     frames: Frames,
-    checksum: Checksum,
     identity: Identity,
     lost: u32,
 }
 
 impl Lines {
     /// Lines on the log's channel, frames on their own.
-    pub(crate) fn new(frames: Frames, checksum: Checksum) -> Self {
-        Self { frames, checksum, identity: Identity::default(), lost: 0 }
+    pub(crate) fn new(frames: Frames) -> Self {
+        Self { frames, identity: Identity::default(), lost: 0 }
     }
 
     /// Says what the frames are to begin with; before the journal starts.
@@ -35,10 +32,6 @@ impl Lines {
 impl Journal for Lines {
     fn send(&mut self, frame: &[u8]) -> bool {
         self.frames.send(frame)
-    }
-
-    fn checker(&self) -> Checker {
-        self.checksum.checker()
     }
 
     fn identity(&self) -> Identity {

@@ -33,7 +33,7 @@ const _: () = assert!(MAP <= 8, "the map is kept in a u64");
 /// Differences wrap, so that any two records have one and no bit is lost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct DeltaRecord {
-    at: u32,
+    pub(super) at: u32,
     numbers: [u32; NUMBERS],
     words: [u32; WORDS],
 }

@@ -57,11 +57,11 @@ impl LogEncoder {
         self.capture.look(record, self.identity.corner);
         self.ledger.look(record);
         if !self.ticks.push(record) {
-            self.flush(record.at(), send);
+            self.flush(send);
             self.ticks.push(record);
         }
         if self.ticks.ticks() >= TICKS_PER_FRAME {
-            self.flush(record.at(), send);
+            self.flush(send);
         }
     }
 
@@ -86,10 +86,11 @@ impl LogEncoder {
 
     /// Sends the ticks that wait for their frame to fill, the identity before them once a
     /// second, and a piece of a capture behind them.
-    pub fn flush(&mut self, now: Tick, send: FrameSink<'_>) {
+    pub fn flush(&mut self, send: FrameSink<'_>) {
         if self.ticks.ticks() == 0 {
             return;
         }
+        let now = self.ticks.latest();
         let due = |last: Tick| now.wrapping_sub(last) >= IDENTITY_EVERY;
         if self.introduced.is_none_or(due) {
             self.introduced = Some(now);

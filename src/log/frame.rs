@@ -289,6 +289,11 @@ impl TicksFrame {
         self.ticks
     }
 
+    /// The latest of them.
+    pub(super) const fn latest(&self) -> Tick {
+        self.before.at
+    }
+
     /// Adds a record; false if there is no room for one of any kind.
     pub(super) fn push(&mut self, record: &Record) -> bool {
         let rest = self.buffer.0.get_mut(HEAD + self.length..LONGEST - CHECK);
@@ -402,27 +407,6 @@ mod tests {
             prop_assert_eq!(read(bytes).0.len(), 1);
             // Of a frame that lost its beginning nothing is made up.
             prop_assert_eq!(read(&bytes[1..]), (vec![], bytes.len() - 1));
-        }
-
-        #[test]
-        fn random_bytes_are_no_frame_and_no_panic(
-            bytes in prop::collection::vec(any::<u8>(), 0..600),
-        ) {
-            if let Seen::Frame(frame, _) = look(&bytes) {
-                // A check that fits by chance.
-                let _ = frame.body();
-            }
-        }
-
-        #[test]
-        fn a_body_of_random_bytes_is_no_panic(
-            kind in 0..9_u8,
-            body in prop::collection::vec(any::<u8>(), 0..300),
-        ) {
-            let frame = Frame { head: Head { kind, sequence: 0, dropped: 0 }, body: &body };
-            if let Ok(Body::Ticks(ticks)) = frame.body() {
-                prop_assert!(ticks.count() <= body.len());
-            }
         }
     }
 

@@ -6,7 +6,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::slots::{Damaged, Draft, DraftError, SetMemory, stored};
+pub use super::refusal::Refusal;
+use super::slots::{Damaged, Draft, SetMemory, stored};
 use super::{MAX_NAME, ParameterSet, SCHEMA};
 
 /// Most bytes of a set in one request or answer; whole double words.
@@ -82,63 +83,6 @@ pub enum Origin {
         /// How many sets have been stored before it, and one.
         sequence: u32,
     },
-}
-
-/// Why a request is refused.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Refusal {
-    /// The drive is moving, or about to.
-    Moving,
-    /// There is no draft: [`Request::Begin`] comes first.
-    NoDraft,
-    /// The set is too long, or not all there.
-    Length,
-    /// A piece is no multiple of eight bytes.
-    Piece,
-    /// The flash failed.
-    Flash,
-    /// The set is damaged or not readable.
-    Damaged,
-    /// The set is of another schema.
-    Schema,
-    /// The set in force is damaged.
-    Lost,
-}
-
-impl Refusal {
-    /// Why, in words.
-    #[must_use]
-    pub const fn sentence(self) -> &'static str {
-        match self {
-            Self::Moving => "the drive is not at rest",
-            Self::NoDraft => "no new set has been begun",
-            Self::Length => "the new set is too long or not all there",
-            Self::Piece => "a piece of the new set is no multiple of eight bytes",
-            Self::Flash => "the flash failed",
-            Self::Damaged => "the new set arrived damaged",
-            Self::Schema => "the new set is of another schema than the firmware",
-            Self::Lost => "the set in force is damaged: restore the image's, or one from a file",
-        }
-    }
-}
-
-impl From<Damaged> for Refusal {
-    fn from(_: Damaged) -> Self {
-        Self::Lost
-    }
-}
-
-impl From<DraftError> for Refusal {
-    fn from(error: DraftError) -> Self {
-        use super::SetError;
-        match error {
-            DraftError::Length => Self::Length,
-            DraftError::Piece => Self::Piece,
-            DraftError::Flash => Self::Flash,
-            DraftError::Set(SetError::Schema { .. }) => Self::Schema,
-            DraftError::Set(_) => Self::Damaged,
-        }
-    }
 }
 
 /// Answers requests.

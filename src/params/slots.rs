@@ -17,6 +17,7 @@
 //! other place shows that it was out of force. The fold holds the sequence number to that: by
 //! itself, a number with a bit turned over would make a spare set the younger.
 
+use super::refusal::Refusal;
 use super::{MAX_SET, ParameterSet, Rest, SetError};
 pub use crate::restart::page::{PAGE_BYTES, WORD_BYTES};
 
@@ -54,6 +55,12 @@ impl Slot {
 /// The flash refused or failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FlashFault;
+
+impl From<FlashFault> for Refusal {
+    fn from(FlashFault: FlashFault) -> Self {
+        Self::Flash
+    }
+}
 
 /// Flash that holds both places, mapped into memory.
 pub trait SetMemory {
@@ -93,6 +100,12 @@ pub struct Stored<'a> {
 /// The set in force is damaged: stored in this place, and not whole any more.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Damaged(pub Slot);
+
+impl From<Damaged> for Refusal {
+    fn from(_: Damaged) -> Self {
+        Self::Lost
+    }
+}
 
 /// The set in force: the younger of those that are whole; none if none was ever stored.
 ///
@@ -185,35 +198,16 @@ pub struct Draft {
     written: usize,
 }
 
-/// Why a draft was not taken.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DraftError {
-    /// Longer than [`MAX_SET`], or more pieces than announced.
-    Length,
-    /// A piece other than the last is no multiple of eight bytes.
-    Piece,
-    /// The flash failed.
-    Flash,
-    /// What stands in the flash is not a sound set of this schema.
-    Set(SetError),
-}
-
-impl From<FlashFault> for DraftError {
-    fn from(FlashFault: FlashFault) -> Self {
-        Self::Flash
-    }
-}
-
 impl Draft {
     /// Clears the place that is not in force, or is damaged, for a set of `length` bytes. Of
     /// the pages the one with the seal goes first, so that no old set is left half erased
     /// under its seal.
     ///
     /// # Errors
-    /// [`DraftError`]; the set in force stays.
-    pub async fn begin(memory: &mut impl SetMemory, length: usize) -> Result<Self, DraftError> {
+    /// [`Refusal`]; the set in force stays.
+    pub async fn begin(memory: &mut impl SetMemory, length: usize) -> Result<Self, Refusal> {
         if length > MAX_SET {
-            return Err(DraftError::Length);
+            return Err(Refusal::Length);
         }
         let (slot, sequence) = match stored(memory) {
             Ok(Some(old)) => (old.slot.other(), old.sequence.wrapping_add(1)),
@@ -238,17 +232,17 @@ impl Draft {
     /// Programs the next piece: whole double words, but for the last.
     ///
     /// # Errors
-    /// [`DraftError`]; the set in force stays.
+    /// [`Refusal`]; the set in force stays.
     pub async fn append(
         &mut self,
         memory: &mut impl SetMemory,
         piece: &[u8],
-    ) -> Result<(), DraftError> {
+    ) -> Result<(), Refusal> {
         if piece.len() > self.missing() {
-            return Err(DraftError::Length);
+            return Err(Refusal::Length);
         }
         if !piece.len().is_multiple_of(WORD_BYTES) && piece.len() != self.missing() {
-            return Err(DraftError::Piece);
+            return Err(Refusal::Piece);
         }
         for part in piece.chunks(WORD_BYTES) {
             let mut word = [0xFF; WORD_BYTES];
@@ -262,23 +256,23 @@ impl Draft {
     /// What has been written, if it is a whole and sound set of this schema.
     ///
     /// # Errors
-    /// [`DraftError::Length`] if pieces are missing, [`DraftError::Set`] otherwise.
-    pub fn check<'m>(&self, memory: &'m impl SetMemory) -> Result<ParameterSet<'m>, DraftError> {
+    /// [`Refusal::Length`] if pieces are missing, another otherwise.
+    pub fn check<'m>(&self, memory: &'m impl SetMemory) -> Result<ParameterSet<'m>, Refusal> {
         if self.missing() > 0 {
-            return Err(DraftError::Length);
+            return Err(Refusal::Length);
         }
         let bytes = memory.bytes(self.slot).get(PREFIX..PREFIX + self.length);
-        let set = ParameterSet::open(bytes.ok_or(DraftError::Length)?).map_err(DraftError::Set)?;
-        let rest = behind_controller(&set).map_err(DraftError::Set)?;
-        read_planner(rest).map_err(DraftError::Set)?;
+        let set = ParameterSet::open(bytes.ok_or(Refusal::Length)?)?;
+        let rest = behind_controller(&set)?;
+        read_planner(rest)?;
         Ok(set)
     }
 
     /// Checks the set and puts it in force.
     ///
     /// # Errors
-    /// [`DraftError`]; the set that was in force stays.
-    pub async fn seal(self, memory: &mut impl SetMemory) -> Result<(), DraftError> {
+    /// [`Refusal`]; the set that was in force stays.
+    pub async fn seal(self, memory: &mut impl SetMemory) -> Result<(), Refusal> {
         self.check(memory)?;
         let word = length_word(self.length as u32, self.sequence);
         memory.program(self.slot, 8, pair(word, !word)).await?;

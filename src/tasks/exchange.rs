@@ -31,6 +31,10 @@ const RECORDS: usize = 8;
 /// The latest value of something, which nobody waits for.
 type Latest<T> = Watch<Raw, T, 0>;
 
+/// Room for one value, see [`replace`]. Unlike a `Signal`'s its empty state is all zeros
+/// whatever it holds, so that the exchange takes no room in flash.
+pub(super) type Slot<T> = Channel<Raw, T, 1>;
+
 /// Everything the tasks share: one in a `static`, or one per test.
 pub struct Exchange {
     pub(super) liveness: Liveness,
@@ -38,18 +42,18 @@ pub struct Exchange {
     pub(super) sensor_ticks: [Signal<Raw, Tick>; PERIODS.len()],
     pub(super) tick_started: Signal<Raw, ()>,
     pub(super) tick_ended: Signal<Raw, ()>,
-    wheel: Latest<Sample<EncoderCount>>,
-    load_cell: Latest<Sample<AdcCode>>,
-    tread: Latest<Sample<AdcCode>>,
-    arm: Latest<Sample<AngleFrame>>,
-    pub(super) request: Signal<Raw, PlanRequest>,
-    pub(super) answer: Signal<Raw, Plan>,
+    pub(super) wheel: Latest<Sample<EncoderCount>>,
+    pub(super) load_cell: Latest<Sample<AdcCode>>,
+    pub(super) tread: Latest<Sample<AdcCode>>,
+    pub(super) arm: Latest<Sample<AngleFrame>>,
+    pub(super) request: Slot<PlanRequest>,
+    pub(super) answer: Slot<Plan>,
     pub(super) commands: Channel<Raw, Command, COMMANDS>,
     pub(super) entries: Channel<Raw, Entry, ENTRIES>,
     pub(super) records: Channel<Raw, Record, RECORDS>,
     /// Plan and request for the log, with their ticks.
-    pub(super) logged_plan: Signal<Raw, (Tick, Plan)>,
-    pub(super) logged_request: Signal<Raw, (Tick, PlanRequest)>,
+    pub(super) logged_plan: Slot<(Tick, Plan)>,
+    pub(super) logged_request: Slot<(Tick, PlanRequest)>,
     telemetry: Latest<Telemetry>,
     lost_entries: AtomicU32,
 }
@@ -67,13 +71,13 @@ impl Exchange {
             load_cell: Watch::new(),
             tread: Watch::new(),
             arm: Watch::new(),
-            request: Signal::new(),
-            answer: Signal::new(),
+            request: Channel::new(),
+            answer: Channel::new(),
             commands: Channel::new(),
             entries: Channel::new(),
             records: Channel::new(),
-            logged_plan: Signal::new(),
-            logged_request: Signal::new(),
+            logged_plan: Channel::new(),
+            logged_request: Channel::new(),
             telemetry: Watch::new(),
             lost_entries: AtomicU32::new(0),
         }
@@ -94,26 +98,6 @@ impl Exchange {
         }
     }
 
-    /// Publishes a reading of the wheel counter.
-    pub(super) fn put_wheel(&self, sample: Sample<EncoderCount>) {
-        self.wheel.sender().send(sample);
-    }
-
-    /// Publishes a reading of the load cell.
-    pub(super) fn put_load_cell(&self, sample: Sample<AdcCode>) {
-        self.load_cell.sender().send(sample);
-    }
-
-    /// Publishes a reading of the tread sensor.
-    pub(super) fn put_tread(&self, sample: Sample<AdcCode>) {
-        self.tread.sender().send(sample);
-    }
-
-    /// Publishes a frame of the arm sensor.
-    pub(super) fn put_arm(&self, sample: Sample<AngleFrame>) {
-        self.arm.sender().send(sample);
-    }
-
     /// What a tick at `now` is given; takes the oldest command and the plan out. Bridge
     /// codes and emergency stop are added by the task that drives the bridges.
     #[must_use]
@@ -122,7 +106,7 @@ impl Exchange {
             now,
             sensors: self.sensors(),
             command: self.commands.try_receive().ok(),
-            plan: self.answer.try_take(),
+            plan: self.answer.try_receive().ok(),
             overrun,
             emergency_stop: false,
         }
@@ -143,10 +127,10 @@ impl Exchange {
     #[inline(never)]
     pub(super) fn record(&self, TickIo { input, output }: &TickIo) {
         if let Some(plan) = input.plan {
-            self.logged_plan.signal((input.now, plan));
+            replace(&self.logged_plan, (input.now, plan));
         }
         if let Some(request) = output.request {
-            self.logged_request.signal((input.now, request));
+            replace(&self.logged_request, (input.now, request));
         }
         // A reader sees by the tick's number that one is missing.
         let _ = self.records.try_send(Record::of(input, output));
@@ -154,7 +138,7 @@ impl Exchange {
 
     /// Asks the model task for a plan; replaces a request not yet begun.
     pub fn request_plan(&self, request: PlanRequest) {
-        self.request.signal(request);
+        replace(&self.request, request);
     }
 
     /// Puts an entry in the log's queue, or counts it as lost.
@@ -217,6 +201,13 @@ impl Default for Exchange {
     fn default() -> Self {
         Self::new()
     }
+}
+
+/// Puts a value in the place of the one that may be there. For one writer.
+pub(super) fn replace<T>(slot: &Slot<T>, value: T) {
+    slot.clear();
+    // Nobody else writes, so there is room.
+    let _ = slot.try_send(value);
 }
 
 /// What the light shows in a mode.

@@ -51,10 +51,10 @@ pub async fn journal(
             }
             Ok(Either::Second(record)) => {
                 let mut send = |frame: &[u8]| journal.send(frame);
-                if let Some((at, request)) = exchange.logged_request.try_take() {
+                if let Ok((at, request)) = exchange.logged_request.try_receive() {
                     encoder.request(at, &request, &mut send);
                 }
-                if let Some((at, plan)) = exchange.logged_plan.try_take() {
+                if let Ok((at, plan)) = exchange.logged_plan.try_receive() {
                     encoder.plan(at, &plan, &mut send);
                 }
                 encoder.tick(&record, &mut send);

@@ -1,7 +1,7 @@
 //! The planning task.
 
 use super::clock::{mid_tick_deadline, uptime};
-use super::exchange::Exchange;
+use super::exchange::{Exchange, replace};
 use super::{ROUND, TaskId};
 use crate::model::Planner;
 use embassy_time::with_deadline;
@@ -11,10 +11,10 @@ use embassy_time::with_deadline;
 pub async fn model(planner: &Planner, exchange: &Exchange) -> ! {
     loop {
         exchange.check_in(TaskId::Model, uptime());
-        let request = with_deadline(mid_tick_deadline(ROUND), exchange.request.wait()).await;
+        let request = with_deadline(mid_tick_deadline(ROUND), exchange.request.receive()).await;
         if let Ok(request) = request {
             exchange.liveness.running(TaskId::Model);
-            exchange.answer.signal(planner.plan(&request));
+            replace(&exchange.answer, planner.plan(&request));
         }
     }
 }

@@ -12,22 +12,24 @@ pub const SENSOR_TIMEOUT: Duration = Duration::from_millis(2);
 
 /// Publishes the wheel counter at 1 kHz.
 pub async fn speed(mut wheel: impl WheelEncoder, exchange: &Exchange) -> ! {
-    run(TaskId::Speed, exchange, async || Ok(wheel.count()), |s| exchange.put_wheel(s)).await
+    run(TaskId::Speed, exchange, async || Ok(wheel.count()), |s| exchange.wheel.sender().send(s))
+        .await
 }
 
 /// Publishes the load cell's code at 1 kHz.
 pub async fn pressure(input: impl AnalogInput, exchange: &Exchange) -> ! {
-    analog(TaskId::Pressure, exchange, input, |sample| exchange.put_load_cell(sample)).await
+    analog(TaskId::Pressure, exchange, input, |s| exchange.load_cell.sender().send(s)).await
 }
 
 /// Publishes the tread displacement sensor's code at 1 kHz.
 pub async fn displacement(input: impl AnalogInput, exchange: &Exchange) -> ! {
-    analog(TaskId::Displacement, exchange, input, |sample| exchange.put_tread(sample)).await
+    analog(TaskId::Displacement, exchange, input, |s| exchange.tread.sender().send(s)).await
 }
 
 /// Publishes the arm angle sensor's frame at 500 Hz, good or bad: the tick judges.
 pub async fn angle(mut bus: impl AngleBus, exchange: &Exchange) -> ! {
-    run(TaskId::Angle, exchange, async || bus.frame().await, |s| exchange.put_arm(s)).await
+    run(TaskId::Angle, exchange, async || bus.frame().await, |s| exchange.arm.sender().send(s))
+        .await
 }
 
 async fn analog(

@@ -15,6 +15,7 @@ use embassy_time::{Duration, Instant, MockDriver, Timer};
 use interstage::hal::{
     AnalogInput, AngleBus, CommandSource, Indicator, Journal, Light, Motors, Watchdog, WheelEncoder,
 };
+use interstage::params::slots::{FlashFault, SLOT_BYTES, SetMemory, Slot};
 use interstage::restart::DriveSnapshot;
 use interstage::rig::Rig;
 use interstage::sense::raw::{
@@ -340,6 +341,29 @@ impl CommandSource for Operator {
             Timer::after(self.gesture).await;
         }
         command
+    }
+}
+
+/// Flash that holds whatever it is given and cannot be changed.
+pub(crate) struct FixedFlash(pub(crate) [Vec<u8>; 2]);
+
+impl FixedFlash {
+    pub(crate) fn blank() -> Self {
+        Self([vec![0xFF; SLOT_BYTES], vec![0xFF; SLOT_BYTES]])
+    }
+}
+
+impl SetMemory for FixedFlash {
+    fn bytes(&self, slot: Slot) -> &[u8] {
+        &self.0[slot as usize]
+    }
+
+    async fn erase(&mut self, _: Slot, _: usize) -> Result<(), FlashFault> {
+        Err(FlashFault)
+    }
+
+    async fn program(&mut self, _: Slot, _: usize, _: [u8; 8]) -> Result<(), FlashFault> {
+        Err(FlashFault)
     }
 }
 

@@ -29,7 +29,7 @@ use hil_sim::scenario::Scenario;
 use parameters::Parameters;
 
 /// Symbol of the record in the board's memory.
-const RECORD: &str = "INTERSTAGE_BLACKBOX";
+const RECORD: &str = "INTERSTAGE_RETAINED";
 /// What it says of an image of which a bit has turned over.
 const IMAGE: &str = "image: ";
 /// How that is reported, in the matrix.

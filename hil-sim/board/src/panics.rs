@@ -23,8 +23,10 @@ pub use known::{Reason, judge, judge_indirect};
 
 /// Functions of the source whose tasks run on the control tick's executor: their names
 /// stand among what was inlined into the function that the executor calls.
-const ROOTS: [&str; 5] = [
+const ROOTS: [&str; 7] = [
+    "interstage::tasks::clock::clock",
     "interstage::tasks::motors::motors",
+    "interstage::tasks::motors::record",
     "interstage::tasks::sensors::speed",
     "interstage::tasks::sensors::pressure",
     "interstage::tasks::sensors::displacement",

@@ -154,7 +154,7 @@ impl Ticks {
 fn mute(board: &mut Board) {
     const BX_LR: [u8; 2] = [0x70, 0x47];
     let machine = board.bench.machine_mut();
-    let keeps = |name: &str| name.ends_with("log::tape::Tape::keep");
+    let keeps = |name: &str| name.ends_with("exchange::Exchange::record");
     let found: Vec<u32> = machine
         .image()
         .functions

@@ -299,28 +299,41 @@ impl Decoder {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use interstage::log::{BATCH, LogEncoder, Tape, identity};
-    use interstage::tick::{Input, Output};
+use interstage::log::{LogEncoder, identity};
+use interstage::tick::{Input, Output};
     use proptest::prelude::*;
 
     /// The frames of a target that runs for so many ticks from `from`.
     pub(crate) fn frames(from: u32, ticks: u32) -> Vec<Vec<u8>> {
         let identity =
             Identity { schema: SCHEMA, rig: identity::text("test"), ..Default::default() };
-        let (mut scribe, tape, mut frames) = (LogEncoder::new(identity), Tape::new(), Vec::new());
+        let (mut encoder, mut frames) = (LogEncoder::new(identity), Vec::new());
         for at in from..from + ticks {
-            let mut output = Output::default();
-            output.telemetry.at = at;
-            output.telemetry.level = (at / 7) as u8;
-            tape.keep(&Input { now: at, ..Input::default() }, &output);
-            if tape.unread() == BATCH {
-                scribe.read(&tape, &mut |frame: &[u8]| {
-                    frames.push(frame.to_vec());
-                    true
-                });
-            }
+            let mut record = Record::EMPTY;
+            record.telemetry.at = at;
+            record.telemetry.level = (at / 7) as u8;
+            encoder.tick(&record, &mut |frame: &[u8]| {
+                frames.push(frame.to_vec());
+                true
+            });
         }
         frames
+    }
+
+    /// What an encoder sends of these ticks.
+    fn stream(mut encoder: LogEncoder, inputs: &[Input]) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let mut send = |frame: &[u8]| {
+            bytes.extend_from_slice(frame);
+            true
+        };
+        for input in inputs {
+            let mut output = Output::default();
+            output.telemetry.at = input.now;
+            encoder.tick(&Record::of(input, &output), &mut send);
+        }
+        encoder.flush(&mut send);
+        bytes
     }
 
     fn decode(bytes: &[u8], cut: usize) -> (Vec<Item>, Tally) {
@@ -467,18 +480,9 @@ pub(crate) mod tests {
         for (overrun, expected) in
             [(true, Mark::Overrun { ticks: 3 }), (false, Mark::Skipped { ticks: 3 })]
         {
-            let (mut scribe, tape) = (LogEncoder::new(Identity::default()), Tape::new());
-            for at in [10, 11, 15] {
-                let mut output = Output::default();
-                output.telemetry.at = at;
-                let overrun = overrun && at == 15;
-                tape.keep(&Input { now: at, overrun, ..Input::default() }, &output);
-            }
-            let mut bytes = Vec::new();
-            scribe.read(&tape, &mut |frame: &[u8]| {
-                bytes.extend_from_slice(frame);
-                true
-            });
+            let input = |now| Input { now, overrun: overrun && now == 15, ..Input::default() };
+            let encoder = LogEncoder::new(Identity::default());
+            let bytes = stream(encoder, &[10, 11, 15].map(input));
             let (items, _) = decode(&bytes, 10);
             let known = |mark: &Mark| !matches!(mark, Mark::Schema { .. });
             assert_eq!(marks(&items).into_iter().filter(known).collect::<Vec<_>>(), [expected]);
@@ -487,14 +491,8 @@ pub(crate) mod tests {
 
     #[test]
     fn another_layout_is_told_by_its_number() {
-        let (mut scribe, tape) =
-            (LogEncoder::new(Identity { schema: 99, ..Identity::default() }), Tape::new());
-        tape.keep(&Input::default(), &Output::default());
-        let mut bytes = Vec::new();
-        scribe.read(&tape, &mut |frame: &[u8]| {
-            bytes.extend_from_slice(frame);
-            true
-        });
+        let identity = Identity { schema: 99, ..Identity::default() };
+        let bytes = stream(LogEncoder::new(identity), &[Input::default()]);
         let (items, _) = decode(&bytes, 10);
         assert_eq!(marks(&items)[0], Mark::Schema { found: 99 });
     }

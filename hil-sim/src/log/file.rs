@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use super::decoder::{Decoder, Item};
 use super::row::Row;
 use super::run::Run;
-use interstage::log::frame::{Seen, check, look};
+use interstage::log::crc32;
+use interstage::log::frame::{Seen, look};
 use interstage::log::identity::SCHEMA;
 use mcap::read::Options;
 use mcap::records::Record;
@@ -80,7 +81,7 @@ fn is_first_layout(bytes: &[u8]) -> bool {
         let mut part = part.to_vec();
         let whole = cobs::decode_in_place(&mut part).ok().and_then(|length| part.get(..length));
         let parts = whole.and_then(|whole| whole.split_last_chunk());
-        parts.is_some_and(|(content, sum)| check(content).to_le_bytes() == *sum)
+        parts.is_some_and(|(content, sum)| crc32(content).to_le_bytes() == *sum)
     };
     /// Frames that are looked at: the first may have lost its beginning.
     const FRAMES: usize = 8;
@@ -259,7 +260,7 @@ mod tests {
     #[test]
     fn a_log_of_the_first_layout_is_told_by_its_number() {
         let content = b"\x01\x00\x00a version";
-        let frame = [&content[..], &check(content).to_le_bytes()].concat();
+        let frame = [&content[..], &crc32(content).to_le_bytes()].concat();
         let mut bytes = vec![0; frame.len() + 8];
         let length = cobs::encode(&frame, &mut bytes);
         bytes.truncate(length + 1);

@@ -1,7 +1,7 @@
-//! The binary log of a run in software: the firmware's own tape and scribe, so that one
-//! decoder serves both.
+//! The binary log of a run in software: the firmware's own encoder, so that one decoder
+//! serves both.
 
-use interstage::log::{BATCH, Identity, LogEncoder, Tape, identity};
+use interstage::log::{Identity, LogEncoder, Record, identity};
 use interstage::restart::Restart;
 use interstage::tick::{Controller, Entry, Event, Input, Output};
 
@@ -9,8 +9,7 @@ use crate::scenario::Scenario;
 
 /// The binary log as it grows. Its channel has room for everything.
 pub struct Stream {
-    tape: Tape,
-    scribe: LogEncoder,
+    encoder: LogEncoder,
     bytes: Vec<u8>,
 }
 
@@ -18,8 +17,7 @@ impl Stream {
     /// A log of this controller from its first tick on.
     #[must_use]
     pub fn new(scenario: &Scenario, controller: &Controller) -> Self {
-        let scribe = LogEncoder::new(of(scenario, controller));
-        Self { tape: Tape::new(), scribe, bytes: Vec::new() }
+        Self { encoder: LogEncoder::new(of(scenario, controller)), bytes: Vec::new() }
     }
 
     /// Keeps a tick and what happened in it, as the journal does on the board, if there is
@@ -31,13 +29,16 @@ impl Stream {
             }
             read
         };
-        self.tape.keep(input, output);
         for entry in &output.events {
-            self.scribe.entry(entry, &mut send);
+            self.encoder.entry(entry, &mut send);
         }
-        if self.tape.unread() >= BATCH {
-            self.scribe.read(&self.tape, &mut send);
+        if let Some(request) = &output.request {
+            self.encoder.request(input.now, request, &mut send);
         }
+        if let Some(plan) = &input.plan {
+            self.encoder.plan(input.now, plan, &mut send);
+        }
+        self.encoder.tick(&Record::of(input, output), &mut send);
     }
 
     /// What has come since the last call.
@@ -54,7 +55,7 @@ impl Stream {
     /// The controller says why it has started, as the board does first of all.
     pub(super) fn tell(&mut self, restart: Restart) {
         let entry = Entry { at: 0, event: Event::Restart(restart) };
-        self.scribe.entry(&entry, &mut |frame: &[u8]| {
+        self.encoder.entry(&entry, &mut |frame: &[u8]| {
             self.bytes.extend_from_slice(frame);
             true
         });
@@ -63,7 +64,7 @@ impl Stream {
     /// The whole log.
     #[must_use]
     pub fn finish(mut self) -> Vec<u8> {
-        self.scribe.read(&self.tape, &mut |frame: &[u8]| {
+        self.encoder.flush(&mut |frame: &[u8]| {
             self.bytes.extend_from_slice(frame);
             true
         });

@@ -11,7 +11,7 @@ use rtt_target::DownChannel;
 
 use super::desk::DESK;
 use crate::board::rtt::Frames;
-use crate::board::{Checksum, Console, Guard, Lamp, Lines, Nucleo, Pages};
+use crate::board::{Console, Guard, Lamp, Lines, Nucleo, Pages};
 
 /// The wheel's counter.
 pub(crate) struct Wheel;
@@ -21,6 +21,12 @@ impl WheelEncoder for Wheel {
         EncoderCount::new(DESK.given().wheel)
     }
 }
+
+/// The load cell.
+pub(crate) type LoadCell = Analog;
+
+/// The tread sensor.
+pub(crate) type Tread = Analog;
 
 /// One of the two analogue sensors.
 pub(crate) struct Analog(fn(&Given) -> Option<u16>);
@@ -90,7 +96,7 @@ pub(crate) fn split(
         watchdog: Guard::new(p.IWDG),
         button: Button,
         console: Console::new(console),
-        journal: Lines::new(frames, Checksum::new(p.CRC)),
+        journal: Lines::new(frames),
         light: Lamp,
     };
     (parts, p.PA5.into(), Pages::new(p.FLASH))

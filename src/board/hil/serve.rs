@@ -5,18 +5,18 @@ use cortex_m::peripheral::DWT;
 use interstage::hal::hil::{FIRST, Given, PROTOCOL, Taken, ToBoard, ToHost};
 use interstage::log::codes;
 use interstage::params::link::{FrameReader, frame};
-use interstage::tasks::Exchange;
 use interstage::units::Tick;
 use rtt_target::{ChannelMode, DownChannel, UpChannel};
 
 use super::clock;
 use super::desk::DESK;
+use crate::board::EXCHANGE;
 
 /// Cycles of a millisecond.
 const MILLISECOND: u32 = 170_000;
 
 /// Without a tick for so long, the host is taken for gone: half of what the watchdog,
-/// which the ticks feed, has patience for.
+/// which the ticks feed, allows.
 const SILENCE: u32 = 50 * MILLISECOND;
 
 /// The channels up and down.
@@ -29,9 +29,9 @@ type Channels = (UpChannel, DownChannel);
 /// answer no more. The board goes on alone, a tick a millisecond, so that the controller
 /// finds the fault, turns the bridges off and holds, and the watchdog is fed by ticks
 /// that run. There is no way back but a restart.
-pub(crate) fn serve(channels: Channels, exchange: &Exchange, begin: impl FnOnce()) -> ! {
+pub(super) fn serve(channels: Channels, begin: impl FnOnce()) -> ! {
     count_cycles();
-    let mut line = Line { channels, gatherer: FrameReader::new() };
+    let mut line = Line { channels, reader: FrameReader::new() };
     while line.take() != Some(ToBoard::Hello { protocol: PROTOCOL }) {}
     begin();
     let mut course = Course { next: FIRST, last: None, alone: false };
@@ -39,7 +39,7 @@ pub(crate) fn serve(channels: Channels, exchange: &Exchange, begin: impl FnOnce(
     let mut heard = DWT::cycle_count();
     loop {
         if let Some(message) = line.take() {
-            if let Some(answer) = course.answer(message, exchange) {
+            if let Some(answer) = course.answer(message) {
                 line.send(&answer);
             }
             if !course.alone {
@@ -77,13 +77,13 @@ impl Course {
     }
 
     /// Does what the host wants; none for what is not of this protocol.
-    fn answer(&mut self, message: ToBoard, exchange: &Exchange) -> Option<ToHost> {
+    fn answer(&mut self, message: ToBoard) -> Option<ToHost> {
         match message {
             ToBoard::Hello { protocol } => (protocol == PROTOCOL).then(|| self.stands()),
             ToBoard::Tick(tick, given) if tick == self.next && !self.alone => {
                 self.tick(given);
                 let (drive, preload) = DESK.commands();
-                let mode = exchange.telemetry().map_or(0, |seen| codes::of_mode(seen.mode));
+                let mode = EXCHANGE.telemetry().map_or(0, |seen| codes::of_mode(seen.mode));
                 let taken = Taken::new(drive, preload, mode);
                 self.last = Some((tick, taken));
                 Some(ToHost::Done(tick, taken))
@@ -111,7 +111,7 @@ impl Course {
 /// Frames over the two channels.
 struct Line {
     channels: Channels,
-    gatherer: FrameReader,
+    reader: FrameReader,
 }
 
 impl Line {
@@ -119,7 +119,7 @@ impl Line {
     fn take(&mut self) -> Option<ToBoard> {
         let mut byte = [0];
         while self.channels.1.read(&mut byte) > 0 {
-            if let Some(message) = self.gatherer.take(byte[0]) {
+            if let Some(message) = self.reader.take(byte[0]) {
                 return Some(message);
             }
         }

@@ -125,7 +125,7 @@ mod tests {
         // A cell of our own, borrowed in a task.
         let cell = [
             ("core::cell::RefCell<T>::borrow_mut", "core/src/cell.rs"),
-            ("interstage::log::tape::Tape::keep", "src/log/tape.rs"),
+            ("interstage::tasks::exchange::Exchange::record", "src/tasks/exchange.rs"),
             task[0],
         ];
         assert_eq!(judge(&site("core::cell::panic_already_borrowed", &cell)), None);

@@ -19,7 +19,7 @@ use interstage::hal::AnalogInput;
 use interstage::sense::raw::{AdcCode, BusFault};
 use static_cell::StaticCell;
 
-use super::Irqs;
+use crate::board::Irqs;
 
 /// `OVSR` for 256 conversions a code.
 const RATIO_256: u8 = 7;

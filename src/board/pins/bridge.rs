@@ -20,7 +20,7 @@ use interstage::hal::Motors;
 use interstage::sense::raw::BridgeCodes;
 use interstage::units::MotorCommand;
 
-use super::Readback;
+use super::readback::Readback;
 
 /// One bridge in phase/enable control: PWM chops, the direction line chooses the
 /// sense, the enable line wakes the bridge.

@@ -16,7 +16,7 @@ use embassy_time::{Duration, Timer, with_timeout};
 use interstage::hal::CommandSource;
 use interstage::supervise::Command;
 
-use super::Irqs;
+use crate::board::Irqs;
 
 /// Contacts have come to rest after this.
 const BOUNCE: Duration = Duration::from_millis(20);

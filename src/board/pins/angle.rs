@@ -1,10 +1,7 @@
 //! The arm's angle sensor, an AS5048A: 16-bit frames on SPI1, mode 1.
 //!
-//! A frame takes 3 us, and a reading two of them. To wait for the second costs half of what
-//! it would to have DMA move it and wake the task; and the bus clocks by itself, so that the
-//! wait always ends. The first passes while other sensors are read, see [`begin`].
-
-use core::sync::atomic::{AtomicU8, Ordering};
+//! A frame takes 3 us, and a reading two of them. They are waited for: the bus clocks by
+//! itself, so that the wait always ends.
 
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{Level, Output, Pull, Speed};
@@ -29,36 +26,6 @@ const SELECT_ROUNDS: u32 = 20;
 
 /// Looks at the bus in which a frame of 512 cycles has come: a look takes four at least.
 const FRAME_ROUNDS: u32 = 500;
-
-/// Nothing is under way on the bus.
-const IDLE: u8 = 0;
-/// The beat has begun the first frame.
-const BEGUN: u8 = 1;
-/// The bus is its task's.
-const TAKEN: u8 = 2;
-
-/// Who has the bus: one of these.
-static HOLDER: AtomicU8 = AtomicU8::new(TAKEN);
-
-/// Begins the first of the two frames that the sensor's task exchanges in its turn, if
-/// nobody has the bus. For the interrupt that wakes it: the other sensors' tasks come
-/// before it, and while they run the frame passes.
-pub(crate) fn begin() {
-    if HOLDER.load(Ordering::Acquire) == IDLE {
-        pac::GPIOB.bsrr().write(|w| w.set_br(SELECT, true));
-        send();
-        HOLDER.store(BEGUN, Ordering::Release);
-    }
-}
-
-/// Sends the read command to the sensor, which is selected.
-fn send() {
-    cortex_m::asm::delay(SELECT_ROUNDS);
-    pac::SPI1.dr16().write_value(READ_ANGLE);
-}
-
-/// Pin of port B that selects the sensor.
-const SELECT: usize = 10;
 
 /// The sensor on its bus.
 pub(crate) struct Angle {
@@ -85,7 +52,6 @@ impl Angle {
         // Nobody is selected; from here on the bus stands at frames of 16 bits. The driver
         // would set it up for each of them, which takes as long as half a frame.
         let _ = bus.blocking_transfer_in_place(&mut [READ_ANGLE]);
-        HOLDER.store(IDLE, Ordering::Release);
         Self { _bus: bus, select }
     }
 
@@ -93,12 +59,8 @@ impl Angle {
     /// to the command before.
     fn exchange(&mut self) -> Result<u16, BusFault> {
         self.select.set_low();
-        send();
-        self.receive()
-    }
-
-    /// What comes back of a frame that has begun.
-    fn receive(&mut self) -> Result<u16, BusFault> {
+        cortex_m::asm::delay(SELECT_ROUNDS);
+        pac::SPI1.dr16().write_value(READ_ANGLE);
         let come = (0..FRAME_ROUNDS).any(|_| pac::SPI1.sr().read().rxne());
         let word = pac::SPI1.dr16().read();
         self.select.set_high();
@@ -110,11 +72,8 @@ impl AngleBus for Angle {
     async fn frame(&mut self) -> Result<AngleFrame, BusFault> {
         // Two frames, because the answer to the last call's command is a whole
         // sampling period old.
-        let begun = HOLDER.swap(TAKEN, Ordering::AcqRel) == BEGUN;
-        let first = if begun { self.receive() } else { self.exchange() };
+        self.exchange()?;
         cortex_m::asm::delay(SELECT_ROUNDS);
-        let second = self.exchange();
-        HOLDER.store(IDLE, Ordering::Release);
-        first.and(second).map(AngleFrame::new)
+        self.exchange().map(AngleFrame::new)
     }
 }

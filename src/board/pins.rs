@@ -1,0 +1,63 @@
+//! Sensors, bridges and button at the board's pins.
+
+mod analog;
+mod angle;
+mod bridge;
+mod button;
+mod readback;
+mod wheel;
+
+use embassy_stm32::gpio::AnyPin;
+use embassy_stm32::peripherals::{ADC1, ADC2};
+use embassy_stm32::{Peri, Peripherals, pac};
+use interstage::hal::Parts;
+use rtt_target::DownChannel;
+
+use super::rtt::Frames;
+use super::{Console, Guard, Lamp, Lines, Nucleo, Pages};
+use analog::{Analog, Ring};
+pub(crate) use angle::Angle;
+use bridge::Bridge;
+pub(crate) use bridge::Bridges;
+pub(crate) use button::Button;
+use readback::Readback;
+pub(crate) use wheel::Wheel;
+
+/// The load cell's converter.
+pub(crate) type LoadCell = Analog<ADC1>;
+
+/// The tread sensor's converter.
+pub(crate) type Tread = Analog<ADC2>;
+
+static LOAD_CELL: Ring = Ring::new();
+static TREAD: Ring = Ring::new();
+
+/// Assigns peripherals and pins; the bridges come up off.
+pub(crate) fn split(
+    p: Peripherals,
+    console: DownChannel,
+    frames: Frames,
+) -> (Parts<Nucleo>, Peri<'static, AnyPin>, Pages) {
+    let parts = Parts {
+        wheel: Wheel::new(p.TIM5, p.PA0, p.PA1),
+        load_cell: Analog::new(
+            (p.ADC1, pac::ADC1),
+            p.PC2,
+            (p.DMA1_CH1, pac::DMA1.ch(0)),
+            &LOAD_CELL,
+        ),
+        tread: Analog::new((p.ADC2, pac::ADC2), p.PC3, (p.DMA1_CH2, pac::DMA1.ch(1)), &TREAD),
+        arm: Angle::new(p.SPI1, (p.PB3, p.PA7, p.PA6), p.PB10),
+        motors: Bridges {
+            drive: Bridge::new((p.TIM1, pac::TIM1), p.PA8, p.PA9.into(), p.PA10.into(), p.PB12),
+            preload: Bridge::new((p.TIM8, pac::TIM8), p.PC6, p.PC8.into(), p.PC9.into(), p.PB7),
+            readback: Readback::new((p.ADC3, pac::ADC3), p.PB0, p.PB1),
+        },
+        watchdog: Guard::new(p.IWDG),
+        button: Button::new(p.PC13, p.EXTI13),
+        console: Console::new(console),
+        journal: Lines::new(frames),
+        light: Lamp,
+    };
+    (parts, p.PA5.into(), Pages::new(p.FLASH))
+}
