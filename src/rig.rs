@@ -43,6 +43,7 @@ pub struct Rig {
 
 /// Sleeve, wheel and arm.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(not(target_os = "none"), derive(documented::DocumentedFields))]
 #[serde(deny_unknown_fields)]
 pub struct Geometry {
     /// Undeformed wheel radius R, mm. Published: 25.
@@ -71,6 +72,7 @@ pub struct Geometry {
 
 /// Rubber of the wheel: three-parameter solid per area of ring.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(not(target_os = "none"), derive(documented::DocumentedFields))]
 #[serde(deny_unknown_fields)]
 pub struct Tread {
     /// Relaxed stiffness per area k_inf, Pa/m. Derived: fitted, with the next two,
@@ -84,6 +86,7 @@ pub struct Tread {
 
 /// Loads and friction.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(not(target_os = "none"), derive(documented::DocumentedFields))]
 #[serde(deny_unknown_fields)]
 pub struct Loads {
     /// Coulomb friction of tread on wall. Chosen: no published value for rubber on
@@ -109,6 +112,7 @@ pub struct Loads {
 
 /// Pre-tightener: motor, screw and spring.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(not(target_os = "none"), derive(documented::DocumentedFields))]
 #[serde(deny_unknown_fields)]
 pub struct Pretightener {
     /// Radial preload on the smooth wall, N. Published: 33 on the rig, 100 in the study.
@@ -130,6 +134,7 @@ pub struct Pretightener {
 
 /// Drive motor, gearbox and speed limits.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(not(target_os = "none"), derive(documented::DocumentedFields))]
 #[serde(deny_unknown_fields)]
 pub struct Drive {
     /// Speed of the tread at full duty without load, mm/s.
@@ -159,6 +164,7 @@ pub struct Drive {
 
 /// Sensors.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(not(target_os = "none"), derive(documented::DocumentedFields))]
 #[serde(deny_unknown_fields)]
 pub struct Sensors {
     /// Encoder counts per wheel turn, all edges.
@@ -175,6 +181,7 @@ pub struct Sensors {
 
 /// What the controller is asked to hold.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(not(target_os = "none"), derive(documented::DocumentedFields))]
 #[serde(deny_unknown_fields)]
 pub struct Goals {
     /// Gap to hold at a step, mm; 0 takes the gap at `safe_speed_mm_s` and cruise

@@ -144,7 +144,7 @@ pub fn hidden(scenario: &Scenario, seed: u64) -> Result<Hidden, HiddenError> {
         .iter()
         .map(|experiment| log(*experiment, &wide, zeros))
         .collect::<Result<_, _>>()?;
-    Ok(Hidden { truth: PlantParameters::draw(&wide), zeros, records })
+    Ok(Hidden { truth: wide.plant(), zeros, records })
 }
 
 /// What can go wrong while logs are made.

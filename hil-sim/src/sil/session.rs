@@ -13,7 +13,6 @@ use super::stream::Stream;
 use super::trace::Trace;
 use super::{Options, RunError, TICK_S};
 use crate::injector::{FaultInjector, RecordFound};
-use crate::plant::draw::PlantParameters;
 use crate::plant::rig::{Drives, VirtualRig};
 use crate::plant::sensors::{Codes, Sensed, Sensors};
 use crate::record::Recording;
@@ -65,7 +64,7 @@ impl Session {
             planner = planner.with_speed(speed, uniform)?;
         }
         let direction = scenario.run.direction.into();
-        let parameters = PlantParameters::draw(scenario);
+        let parameters = scenario.plant();
         parameters.check(scenario.rig.preload.limit_n)?;
         // The way back begins where the way out ended: at the end of travel, pressed.
         let (position, preload) = match direction {

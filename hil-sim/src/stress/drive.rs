@@ -37,7 +37,7 @@ pub(super) struct Drove {
 
 /// The rig of a case: the nominal one with the case's parameters.
 pub(super) fn plant(case: &StressCase) -> PlantParameters {
-    let mut plant = PlantParameters::draw(&Scenario::default());
+    let mut plant = Scenario::default().plant();
     // Strong enough to climb.
     let limit_n = 2.0 * (case.load_n + case.preload_n);
     plant.ring = case.ring();

@@ -9,7 +9,6 @@
 //! its friction being that of the step's end.
 
 use hil_sim::plant::balance::{Axial, Balance};
-use hil_sim::plant::draw::PlantParameters;
 use hil_sim::plant::rig::{Drives, Resolution, VirtualRig};
 use hil_sim::plant::ring::{Motion, Ring, RingParameters};
 use hil_sim::plant::wall::{Step, Wall};
@@ -119,7 +118,7 @@ fn climb(ring: RingParameters, speed: f64, preload_n: f64, stride: f64) -> Optio
 
 /// Where the rig stands 0.2 s after full duty for this speed, mm.
 fn distance(speed: f64, dt_s: f64) -> Option<f64> {
-    let mut plant = PlantParameters::draw(&Scenario::default());
+    let mut plant = Scenario::default().plant();
     plant.ripple.0 = 0.0;
     plant.drive.no_load_mm_s = 2.0 * speed;
     // The step of time alone: no stride cuts it.

@@ -1,6 +1,5 @@
 //! A rig led through the spin and the preload of a run goes the way of that run.
 
-use hil_sim::plant::draw::PlantParameters;
 use hil_sim::plant::rig::VirtualRig;
 use hil_sim::scenario::Scenario;
 use hil_sim::sil::{Options, Session};
@@ -15,7 +14,7 @@ fn a_run_led_by_its_own_spin_and_preload_is_the_run() {
     let mut scenario = Scenario::default();
     scenario.run.seed = 3;
     let mut session = Session::new(&scenario, Options::default()).unwrap();
-    let mut parameters = PlantParameters::draw(&scenario);
+    let mut parameters = scenario.plant();
     let mut truths = vec![*session.plant().truth()];
     for tick in 0..5000 {
         let command = (tick == 600).then_some(interstage::supervise::Command::Start);

@@ -36,12 +36,11 @@ impl VirtualRig {
 
 #[cfg(test)]
 mod tests {
-    use crate::plant::draw::PlantParameters;
     use crate::plant::rig::{Drives, VirtualRig};
     use crate::scenario::Scenario;
 
     fn pressed() -> VirtualRig {
-        let mut rig = VirtualRig::new(PlantParameters::draw(&Scenario::default()), 0.0, 30.0, 1e-3);
+        let mut rig = VirtualRig::new(Scenario::default().plant(), 0.0, 30.0, 1e-3);
         for _ in 0..500 {
             rig.step(&Drives::default(), 1e-3).expect("a sound plant");
         }

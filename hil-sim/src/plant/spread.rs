@@ -1,11 +1,12 @@
 //! How far the plant may differ from the rig that the controller believes in, and
 //! how its sensors err.
 
+use documented::DocumentedFields;
 use serde::{Deserialize, Serialize};
 
 /// Width of the per-seed draw of the plant. Keys in `_rel` are standard deviations
 /// relative to the nominal value; keys with a unit are half-widths about it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, DocumentedFields)]
 #[serde(deny_unknown_fields)]
 pub struct Spread {
     /// Relaxed stiffness of the tread, relative.
@@ -107,7 +108,7 @@ impl Spread {
 }
 
 /// Noise of the sensors, one standard deviation, and their conversion delays.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, DocumentedFields)]
 #[serde(deny_unknown_fields)]
 pub struct Noise {
     /// Load cell, N.
