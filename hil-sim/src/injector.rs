@@ -20,7 +20,7 @@ use crate::scenario::{Direction, Scenario};
 const TICK_S: f64 = 1e-3;
 /// Difference of duty that is one.
 const ACTS: f64 = 0.02;
-/// Difference of duty from which on the readback must tell: its band, and as much for what
+/// Difference of duty from which on the readback must show it: its band, and as much for what
 /// the supply may be off. A constant, and a part of the duty.
 const TELLS: (f64, f64) = (0.04, 0.0625);
 /// Half of the torn sector, rad.
@@ -64,12 +64,12 @@ struct Active {
     known: bool,
     /// When it first did something, s.
     acts_s: Option<f64>,
-    /// When it first did what the readback must tell, s.
+    /// When it first did what the readback must show, s.
     tells_s: Option<f64>,
     sensor: Option<FaultySensor>,
     /// Duty of an actuator when the fault came.
     kept: Option<f64>,
-    /// Duties on their way.
+    /// Delayed duties.
     pipeline: VecDeque<f64>,
     /// Angle of the wheel at the middle of the torn sector, rad.
     torn_rad: f64,
@@ -124,7 +124,7 @@ impl FaultInjector {
         self.faults.iter().filter_map(acts).min_by(f64::total_cmp)
     }
 
-    /// The same with the difference of duty being one that the readback must tell, where the
+    /// The same with the difference of duty being one that the readback must show, where the
     /// fault lies in the bridge.
     #[must_use]
     pub fn tells_s(&self) -> Option<f64> {
@@ -227,7 +227,7 @@ impl FaultInjector {
         self.is(Target::Model, Kind::Hung).is_some()
     }
 
-    /// Whether nobody reads the log.
+    /// Whether the log is not read.
     #[must_use]
     pub fn log_gone(&self) -> bool {
         self.is(Target::Log, Kind::Gone).is_some()

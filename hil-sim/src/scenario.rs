@@ -40,7 +40,7 @@ pub struct Scenario {
     pub run: RunOptions,
 }
 
-/// The scenario as it stands in a file: the rig's sections beside the others.
+/// The scenario as it is in a file: the rig's sections beside the others.
 #[derive(Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Document {
@@ -131,7 +131,7 @@ impl Scenario {
         Self::resolve_layers(preset, given, sets)
     }
 
-    /// As [`Scenario::resolve`], with the text of the file; `name` stands for its
+    /// As [`Scenario::resolve`], with the text of the file; `name` is its
     /// path in messages.
     ///
     /// # Errors
@@ -205,8 +205,8 @@ impl Scenario {
         Self {
             preset: preset.to_owned(),
             rig,
-            spread: Spread::default(),
-            noise: Noise::default(),
+            spread: Spread::usual(),
+            noise: Noise::usual(),
             run: RunOptions::default(),
         }
     }

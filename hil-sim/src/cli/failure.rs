@@ -44,7 +44,7 @@ impl Outcome {
 pub enum Failure {
     /// It was asked for something that cannot be: exit code 2.
     Input(String),
-    /// It broke off under way: exit code 1.
+    /// It failed while running: exit code 1.
     Run(String),
 }
 
@@ -54,7 +54,7 @@ impl Failure {
         Self::Input(error.to_string())
     }
 
-    /// A failure under way.
+    /// A failure while running.
     pub fn run(error: impl fmt::Display) -> Self {
         Self::Run(error.to_string())
     }

@@ -3,7 +3,7 @@
 use super::failure::{Failure, Outcome};
 use super::output;
 use super::scenario::ScenarioArgs;
-use crate::faults::campaign::{Campaign, Case, Line, Outcome as Matrix};
+use crate::faults::campaign::{Campaign, Case, MatrixRow, Outcome as Matrix};
 use crate::montecarlo::{self, Shard};
 use crate::progress;
 use crate::table::{number, plain};
@@ -156,7 +156,7 @@ fn human(outcome: &Matrix) -> String {
     text
 }
 
-fn row(line: &Line) -> Vec<String> {
+fn row(line: &MatrixRow) -> Vec<String> {
     let count = |n: usize| if n == 0 { "-".to_owned() } else { n.to_string() };
     vec![
         line.fault.clone(),

@@ -18,7 +18,7 @@ use crate::scenario::injection::{Injection, Kind, Target};
 use crate::sil::{Options, RunError, Session};
 
 pub use case::{Case, StepFault};
-pub use matrix::{Line, Outcome, Spread};
+pub use matrix::{MatrixRow, MedianAndWorst, Outcome};
 use operator::Operator;
 use twin::Twin;
 
@@ -121,7 +121,7 @@ impl Campaign {
                 found.unwrap_or_else(|error| failed(&scenario, &error))
             };
             let instants: Vec<Instant> = (0..self.instants).into_par_iter().map(one).collect();
-            Line::of(case, &instants)
+            MatrixRow::of(case, &instants)
         };
         Ok(Outcome::of(target, self.cases.iter().map(row).collect(), self.instants))
     }

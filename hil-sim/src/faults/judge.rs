@@ -99,8 +99,8 @@ impl Judge {
         }
     }
 
-    /// Looks at a tick: what the controller put out, and what is true after it. `struck`
-    /// tells whether the fault has come.
+    /// Looks at a tick: what the controller put out, and what is true after it. `struck`:
+    /// whether the fault has come.
     pub fn look(&mut self, t_s: f64, output: &Output, truth: &Truth, struck: bool) {
         let moved_mm = truth.position_mm - self.position_mm;
         self.position_mm = truth.position_mm;

@@ -42,8 +42,8 @@ pub(super) struct FaultySensor {
     first: Option<f64>,
     filtered: f64,
     past: VecDeque<(f64, f64)>,
-    /// The sample that stands while none comes.
-    stands: SensorFrame,
+    /// The last sample before the fault, given while none comes.
+    held: SensorFrame,
 }
 
 impl FaultySensor {
@@ -76,7 +76,7 @@ impl FaultySensor {
             first: None,
             filtered: 0.0,
             past: VecDeque::new(),
-            stands: SensorFrame::default(),
+            held: SensorFrame::default(),
         }
     }
 
@@ -91,7 +91,7 @@ impl FaultySensor {
     ) {
         let truth = self.code(frame);
         let Some(since_s) = since_s else {
-            (self.stands, self.first) = (*frame, None);
+            (self.held, self.first) = (*frame, None);
             self.keep(t_s, truth);
             return;
         };
@@ -105,7 +105,7 @@ impl FaultySensor {
             self.silence(frame);
             return;
         }
-        self.stands = *frame;
+        self.held = *frame;
         if self.kind == Kind::Garbage {
             self.garble(frame, random);
             return;
@@ -219,16 +219,16 @@ impl FaultySensor {
         }
     }
 
-    /// The sample before stands.
+    /// Gives the sample before again.
     fn silence(&self, frame: &mut SensorFrame) {
         match self.target {
-            Target::LoadCell => frame.load_cell = self.stands.load_cell,
-            Target::TreadSensor => frame.tread = self.stands.tread,
-            Target::Angle => frame.arm = self.stands.arm,
+            Target::LoadCell => frame.load_cell = self.held.load_cell,
+            Target::TreadSensor => frame.tread = self.held.tread,
+            Target::Angle => frame.arm = self.held.arm,
             Target::Readback | Target::DriveReadback | Target::PretightenerReadback => {
                 frame.bridges = None;
             }
-            _ => frame.wheel = self.stands.wheel,
+            _ => frame.wheel = self.held.wheel,
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use documented::DocumentedFields;
 use interstage::rig::{Drive, Geometry, Goals, Loads, Pretightener, Sensors, Tread};
+use serde::Serialize;
 use toml::{Table, Value};
 
 use super::run::{ControllerKind, Direction, RunOptions};
@@ -11,14 +12,15 @@ use crate::plant::spread::{Noise, Spread};
 pub const PRESETS: [&str; 2] = ["prototype", "fe"];
 
 /// One key of a scenario.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct KeyInfo {
     /// Dotted path, as in `--set`.
     pub key: String,
     /// Unit of its value; empty if it has none.
     pub unit: &'static str,
-    /// Its value, as in TOML.
-    pub value: String,
+    /// Its value.
+    #[serde(rename = "default")]
+    pub value: Value,
     /// What it takes.
     pub expected: String,
     /// What it is.
@@ -160,7 +162,7 @@ pub(super) fn list(table: &Table) -> Vec<KeyInfo> {
         let (_, value) = values.iter().find(|(name, _)| *name == key)?;
         Some(KeyInfo {
             unit: unit(&key),
-            value: value.to_string(),
+            value: (*value).clone(),
             expected: Kind::of(&key, value).expected(&key),
             description,
             key,

@@ -47,7 +47,7 @@ impl Merged {
         Self { table, provenance: Provenance::new(preset) }
     }
 
-    /// Lays a whole file over it.
+    /// Lays a file over it.
     pub(super) fn layer(&mut self, origin: &Origin, given: &Table) -> Result<(), ScenarioError> {
         self.section("", origin, given)
     }

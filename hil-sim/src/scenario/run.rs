@@ -89,7 +89,7 @@ impl ControllerKind {
 }
 
 /// One step that is not where the step table says. Steps count from 1 on
-/// the way out.
+/// deployment.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
 pub enum StepAnomaly {

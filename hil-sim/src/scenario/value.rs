@@ -16,7 +16,7 @@ pub(super) fn split(text: &str) -> Option<(&str, &str)> {
     (!key.is_empty() && !value.is_empty()).then_some((key, value))
 }
 
-/// The value that `text` stands for where a key takes `kind`: TOML, but words need
+/// The value that `text` means where a key takes `kind`: TOML, but words need
 /// no quotes and lists of numbers no brackets. What is neither stays text, which
 /// [`checked`] refuses.
 pub(super) fn from_text(kind: Kind, text: &str) -> Value {

@@ -69,7 +69,7 @@ pub enum Course {
     Forward,
     /// At constant speed back.
     Back,
-    /// Outwards, then back over the same way.
+    /// Outwards, then back over the same distance.
     Reversing,
     /// To and fro, four times.
     Rocking,
@@ -131,7 +131,7 @@ pub struct StressCase {
     pub course: Course,
     /// Rate of the preload spring, N/mm.
     pub spring_n_per_mm: f64,
-    /// Where the run begins, parts of the way over the step before the touch.
+    /// Where the run begins, parts of the distance over the step before the touch.
     pub phase: f64,
 }
 

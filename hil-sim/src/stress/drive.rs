@@ -17,7 +17,7 @@ const LEAST_TICKS: f64 = 20.0;
 /// Force that is known no better than to the tolerance of the balance, N.
 const LEAST_N: f64 = 1e-2;
 
-/// Longest stride, mm: the way of the fastest and longest step in as many as the plant takes.
+/// Longest stride, mm: the distance of the fastest and longest step, cut into as many as the plant takes.
 const LONGEST_MM: f64 = 0.16;
 
 /// What a run shows.
@@ -78,7 +78,7 @@ pub(super) fn run(case: &StressCase, plant: &PlantParameters) -> Result<Drove, P
         .with_speed(case.course.speed(0.0) * case.speed_mm_s);
     let mut out = Drove::default();
     let mut before = *rig.truth();
-    // The screw stands.
+    // The screw does not move.
     let seat_n = before.preload_n - plant.spring_n_per_mm * (before.height_mm - RADIUS_MM);
     let (mut first, rest_mm) = (0.0, before.depth_mm);
     let (mut wedged, mut misplaced, mut force) = (0.0, 0.0, 0.0f64);

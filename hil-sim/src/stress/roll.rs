@@ -38,7 +38,7 @@ pub(super) fn run(case: &StressCase) -> Result<Roll, BalanceError> {
     } else {
         BUDGET / 4
     };
-    // A run too short for the whole step begins somewhere on its way over it.
+    // A run too short for the whole step begins somewhere on the step.
     let way = stride * steps as f64;
     let lead = (way * 0.4).min(0.5 * RADIUS_MM);
     let sense = case.course.speed(0.0);

@@ -1,7 +1,7 @@
 //! The campaign of faults, at a few instants each: nothing undetected, nothing unsafe, and
-//! what must be found at once is found at once. `cargo rig faults` is the whole of it.
+//! what must be found at once is found at once. `cargo rig faults` is the complete campaign.
 
-use hil_sim::faults::campaign::{Campaign, Case, Line, Outcome};
+use hil_sim::faults::campaign::{Campaign, Case, MatrixRow, Outcome};
 use hil_sim::scenario::Scenario;
 use hil_sim::scenario::injection::{Injection, Kind, Target};
 use hil_sim::sil::{Options, run};
@@ -12,7 +12,7 @@ fn campaign(instants: usize, wanted: impl Fn(&str) -> bool) -> Outcome {
     campaign.run(&|| {}).expect("a campaign")
 }
 
-fn line<'a>(outcome: &'a Outcome, fault: &str) -> &'a Line {
+fn line<'a>(outcome: &'a Outcome, fault: &str) -> &'a MatrixRow {
     outcome.matrix.iter().find(|line| line.fault == fault).expect(fault)
 }
 

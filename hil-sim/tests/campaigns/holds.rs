@@ -4,7 +4,7 @@ use crate::common::{Bench, starter};
 use hil_sim::scenario::{Direction, Scenario};
 use interstage::supervise::{Command, Fault, Mode};
 
-/// The prototype with these overrides, run to its end this way.
+/// The prototype with these overrides, run to its end in this direction.
 fn run(sets: &[&str], way: Direction) -> Bench {
     let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
     let mut scenario = Scenario::resolve(None, None, &sets).expect("a sound scenario");

@@ -27,7 +27,7 @@ const ROUNDING: f64 = 1e-8;
 /// Strides, mm.
 const STRIDES_MM: [f64; 3] = [0.08, 0.04, 0.02];
 
-/// Half way up the step of 4 mm, before its face, and where the wheel sets out, mm.
+/// Half way up the step of 4 mm, before its face, and where the wheel starts, mm.
 const PLACE_MM: f64 = -6.72;
 const FROM_MM: (f64, f64) = (-20.16, 10.08);
 
@@ -116,7 +116,7 @@ fn climb(ring: RingParameters, speed: f64, preload_n: f64, stride: f64) -> Optio
     Some((height, work))
 }
 
-/// Where the rig stands 0.2 s after full duty for this speed, mm.
+/// Where the rig is 0.2 s after full duty for this speed, mm.
 fn distance(speed: f64, dt_s: f64) -> Option<f64> {
     let mut plant = Scenario::default().plant();
     plant.ripple.0 = 0.0;

@@ -119,7 +119,7 @@ fn sensed(rig: &Rig) {
         bridges: Some(BridgeCodes { drive: BridgeCode::of(0), pretightener: BridgeCode::of(0) }),
     };
     let senses = Senses::try_build(rig).expect("a preset");
-    // Rolling and loaded, then everything stands.
+    // Rolling and loaded, then everything rests.
     let mut state = SensesState::default();
     for tick in 0..2000_u32 {
         let codes = ((tick / 3) as u16, 20_000 + tick as u16, 9000, 4111 - (tick / 20) as u16);

@@ -49,7 +49,7 @@ fn a_seed_is_always_the_same_rig_and_none_is_like_another() {
 
 #[test]
 fn the_draws_mean_what_the_spread_documents() {
-    let spread = Spread::default();
+    let spread = Spread::usual();
     let nominal = nominal("prototype");
     let plants: Vec<PlantParameters> = (1..=SEEDS).map(drawn).collect();
     // Keys in `_rel`: relative standard deviation, cut at three of it.

@@ -18,7 +18,7 @@ const COMMANDS_S: f64 = 1.0;
 /// A fault of the matrix.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Case {
-    /// One that comes under way.
+    /// One that is injected into the run.
     Injected(&'static Entry),
     /// A step that is not where or as the table says.
     Step(StepFault),
@@ -33,7 +33,7 @@ pub enum StepFault {
     Late,
     /// Not there.
     Missing,
-    /// Followed by one that the table lacks, as close as the wheel can tell them apart.
+    /// Followed by one that the table lacks, as close as the wheel can distinguish.
     Doubled,
     /// A quarter higher.
     Higher,

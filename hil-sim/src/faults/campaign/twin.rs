@@ -25,13 +25,13 @@ pub struct Twin {
     /// From the command to the end, s since boot.
     pub started_s: f64,
     ended_s: f64,
-    /// When the crossing under way began, s.
+    /// When the present crossing began, s.
     crossing_s: Option<f64>,
     /// Stretches of time in which it crosses a step, s.
     crossings: Vec<(f64, f64)>,
     /// Codes of the limits that it reports.
     pub limits: Vec<u16>,
-    /// Reference gap of the way out and of the way back, mm.
+    /// Reference gap of deployment and retraction, mm.
     pub gap_ref_mm: [f64; 2],
     /// Preload, position, speed by tick.
     states: Vec<[f32; 3]>,
@@ -93,7 +93,7 @@ impl Twin {
         }
     }
 
-    /// A random instant: of every three, one in a crossing and two anywhere under way.
+    /// A random instant: of every three, one in a crossing and two anywhere in the run.
     pub fn instant(&self, number: usize, random: &mut ChaCha8Rng) -> f64 {
         let (from_s, to_s) = if number % 3 == 2 && !self.crossings.is_empty() {
             self.crossings[random.random_range(0..self.crossings.len())]
@@ -105,7 +105,7 @@ impl Twin {
         (at_s * 1e3).round() * 1e-3
     }
 
-    /// Whether the rig stands or moves otherwise in this tick.
+    /// Whether the state of the rig differs in this tick.
     pub fn differs(&self, tick: usize, truth: &Truth) -> bool {
         let Some(then) = self.states.get(tick).or(self.states.last()) else { return false };
         let now = state(truth);

@@ -90,7 +90,7 @@ pub enum Target {
     SpareSet,
     /// The set that the image carries, with nothing stored.
     ImageSet,
-    /// A new set on its way into flash.
+    /// A new set while it is written to flash.
     ParameterSave,
     /// The image in flash, after its first start.
     Image,
@@ -120,7 +120,7 @@ pub enum Kind {
     Stalled,
     /// Gives a part of its force.
     Weak,
-    /// Moves the wrong way.
+    /// Moves in the wrong direction.
     Reversed,
     /// Moves at full duty whenever its bridge is on.
     Runaway,
