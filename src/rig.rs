@@ -42,6 +42,7 @@ pub struct Rig {
 
 /// Sleeve, wheel and arm.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(not(target_os = "none"), derive(documented::DocumentedFields))]
 #[serde(deny_unknown_fields)]
 pub struct Geometry {
     /// Undeformed wheel radius R, mm. Published: 25.
@@ -70,6 +71,7 @@ pub struct Geometry {
 
 /// Rubber of the wheel: three-parameter solid per area of ring.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(not(target_os = "none"), derive(documented::DocumentedFields))]
 #[serde(deny_unknown_fields)]
 pub struct Tread {
     /// Relaxed stiffness per area k_inf, Pa/m. Derived: fitted, with the next two,
@@ -83,6 +85,7 @@ pub struct Tread {
 
 /// Loads and friction.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(not(target_os = "none"), derive(documented::DocumentedFields))]
 #[serde(deny_unknown_fields)]
 pub struct Loads {
     /// Coulomb friction of tread on wall. Chosen: no published value for rubber on
@@ -108,6 +111,7 @@ pub struct Loads {
 
 /// Pre-tightener: motor, screw and spring.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(not(target_os = "none"), derive(documented::DocumentedFields))]
 #[serde(deny_unknown_fields)]
 pub struct Pretightener {
     /// Radial preload on the smooth wall, N. Published: 33 on the rig, 100 in the study.
@@ -129,6 +133,7 @@ pub struct Pretightener {
 
 /// Drive motor, gearbox and speed limits.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(not(target_os = "none"), derive(documented::DocumentedFields))]
 #[serde(deny_unknown_fields)]
 pub struct Drive {
     /// Speed of the tread at full duty without load, mm/s.
@@ -158,6 +163,7 @@ pub struct Drive {
 
 /// Sensors.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(not(target_os = "none"), derive(documented::DocumentedFields))]
 #[serde(deny_unknown_fields)]
 pub struct Sensors {
     /// Encoder counts per wheel turn, all edges.
@@ -174,6 +180,7 @@ pub struct Sensors {
 
 /// What the controller is asked to hold.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(not(target_os = "none"), derive(documented::DocumentedFields))]
 #[serde(deny_unknown_fields)]
 pub struct ControlSettings {
     /// Gap to hold at a step, mm; 0 takes the gap at `safe_speed_mm_s` and cruise

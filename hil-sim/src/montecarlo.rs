@@ -7,7 +7,6 @@ use interstage::fault::Limit;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::plant::draw::PlantParameters;
 use crate::record::{Report, Summary};
 use crate::report::verdict::SLIP_SEEN_MM;
 use crate::scenario::Scenario;
@@ -105,7 +104,7 @@ fn one(scenario: &Scenario, seed: u64) -> Result<RunLine, RunError> {
     let mut scenario = scenario.clone();
     scenario.run.seed = seed;
     match sil::run(&scenario, Options::default()) {
-        Ok(recording) => Ok(RunLine::new(recording.summary, PlantParameters::draw(&scenario).mu)),
+        Ok(recording) => Ok(RunLine::new(recording.summary, scenario.plant().mu)),
         Err(error @ (RunError::Plant(_) | RunError::Refused(_))) => {
             Ok(RunLine { seed, error: Some(error.to_string()), ..RunLine::default() })
         }

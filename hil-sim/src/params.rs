@@ -24,7 +24,7 @@ pub enum StoreError {
         /// Why.
         source: std::io::Error,
     },
-    /// The set there is none.
+    /// What lies there is no set.
     #[error("{place}: {source}")]
     Set {
         /// Where.
@@ -47,7 +47,7 @@ pub enum StoreError {
     /// The board answered another question.
     #[error("the board answered something else than it was asked")]
     Answer,
-    /// The way to the board failed.
+    /// The connection to the board failed.
     #[error("{0}")]
     Wire(String),
 }
@@ -59,7 +59,7 @@ pub struct Held {
     pub name: String,
     /// The rig.
     pub rig: Rig,
-    /// Layout of its constants; if it is not [`SCHEMA`], they have to be made anew.
+    /// Layout of its constants; if it is not [`SCHEMA`], they have to be made again.
     pub schema: u16,
     /// Hash of the parameters.
     pub hash: u32,
@@ -96,10 +96,10 @@ pub trait Store {
     /// What is in force there.
     ///
     /// # Errors
-    /// [`StoreError`] if it cannot be told.
+    /// [`StoreError`] if it cannot be read.
     fn held(&mut self) -> Result<Held, StoreError>;
 
-    /// Puts a set in force: all of it or nothing.
+    /// Makes a set the active one: completely or not at all.
     ///
     /// # Errors
     /// [`StoreError`]; what was in force still is.

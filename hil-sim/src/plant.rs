@@ -14,4 +14,5 @@ pub mod rig;
 pub mod ring;
 pub mod rolling;
 pub mod sensors;
+pub mod spread;
 pub mod wall;

@@ -2,29 +2,27 @@
 //! of its sensors, and how it is run. A scenario starts from a preset, takes any
 //! subset of keys from a TOML file, and then what `--set key=value` overrides.
 
-mod docs;
 mod error;
-mod injections;
+pub mod injection;
 mod keys;
 mod merge;
 mod run;
-mod set;
-mod spread;
 mod suggest;
 mod validate;
+mod value;
 
 use std::path::Path;
 
 use interstage::rig::{ControlSettings, Drive, Geometry, Loads, Pretightener, Rig, Sensors, Tread};
 use serde::{Deserialize, Serialize};
+use toml::Table;
+
+use crate::plant::draw::PlantParameters;
+use crate::plant::spread::{Noise, Spread};
 
 pub use error::{Origin, ScenarioError};
-pub use keys::KeyInfo;
+pub use keys::{KeyInfo, PRESETS};
 pub use run::{ControllerKind, Direction, RunOptions, StepAnomaly};
-pub use spread::{Noise, Spread};
-
-/// Names of the presets.
-pub const PRESETS: [&str; 2] = ["prototype", "fe"];
 
 /// One rig, its mismatch, its noise and its run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -42,7 +40,7 @@ pub struct Scenario {
     pub run: RunOptions,
 }
 
-/// The scenario as it stands in a file: the rig's sections beside the others.
+/// The scenario as it is in a file: the rig's sections beside the others.
 #[derive(Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Document {
@@ -133,7 +131,7 @@ impl Scenario {
         Self::resolve_layers(preset, given, sets)
     }
 
-    /// As [`Scenario::resolve`], with the text of the file; `name` stands for its
+    /// As [`Scenario::resolve`], with the text of the file; `name` is its
     /// path in messages.
     ///
     /// # Errors
@@ -154,25 +152,26 @@ impl Scenario {
     /// # Errors
     /// The first thing found wrong.
     pub fn with(self, sets: &[String]) -> Result<Self, ScenarioError> {
-        let mut merged = merge::Merged::new(&self);
-        for text in sets {
-            merged.set(text)?;
-        }
-        let (scenario, provenance) = merged.finish();
-        validate::check(&scenario, &provenance)?;
-        Ok(scenario)
+        self.overlaid(&[], sets)
     }
 
     /// Every key with its unit, value, what it takes, and its description.
     #[must_use]
     pub fn keys(&self) -> Vec<KeyInfo> {
-        keys::list(self)
+        keys::list(&self.table())
     }
 
     /// The whole scenario as TOML; reading it back gives the same scenario.
     #[must_use]
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("numbers, words and lists are always TOML")
+    }
+
+    /// The plant of the scenario's seed.
+    #[must_use]
+    pub fn plant(&self) -> PlantParameters {
+        let seed = self.run.seed;
+        PlantParameters::draw(&self.rig, &self.true_steps(), &self.spread, &self.noise, seed)
     }
 
     /// Step positions of the nominal plant, mm, ascending: the step table with the
@@ -206,35 +205,46 @@ impl Scenario {
         Self {
             preset: preset.to_owned(),
             rig,
-            spread: Spread::default(),
-            noise: Noise::default(),
+            spread: Spread::usual(),
+            noise: Noise::usual(),
             run: RunOptions::default(),
         }
     }
 
     fn resolve_layers(
         preset: Option<&str>,
-        mut layers: Vec<(Origin, toml::Table)>,
+        mut layers: Vec<(Origin, Table)>,
         sets: &[String],
     ) -> Result<Self, ScenarioError> {
         let from_file = merge::take_preset(&mut layers)?;
-        let from_set = sets.iter().rev().filter_map(|text| set::split(text));
+        let from_set = sets.iter().rev().filter_map(|text| value::split(text));
         let from_set = from_set.filter(|(key, _)| *key == "preset").map(|(_, name)| name).next();
         let base = match (from_set.or(preset), from_file) {
             (Some(name), _) => Self::from_preset(name.trim_matches('"'), Origin::Set)?,
             (None, Some((name, origin))) => Self::from_preset(&name, origin)?,
             (None, None) => Self::default(),
         };
-        let mut merged = merge::Merged::new(&base);
-        for (origin, table) in &layers {
+        base.overlaid(&layers, sets)
+    }
+
+    /// This scenario as a table, with layers and then overrides laid over it.
+    fn overlaid(&self, layers: &[(Origin, Table)], sets: &[String]) -> Result<Self, ScenarioError> {
+        let mut merged = merge::Merged::new(&self.preset, self.table());
+        for (origin, table) in layers {
             merged.layer(origin, table)?;
         }
         for text in sets {
             merged.set(text)?;
         }
-        let (scenario, provenance) = merged.finish();
+        let (table, provenance) = merged.finish();
+        let scenario: Self =
+            table.try_into().expect("every value was checked for the kind of its key");
         validate::check(&scenario, &provenance)?;
         Ok(scenario)
+    }
+
+    fn table(&self) -> Table {
+        Table::try_from(self).expect("numbers, words and lists are always TOML")
     }
 }
 

@@ -1,5 +1,6 @@
 //! All tests of this crate that need more than one of its modules: one program.
 
+mod campaigns;
 mod commands;
 mod common;
 mod identify;

@@ -3,7 +3,6 @@
 
 use std::collections::BTreeMap;
 
-use hil_sim::plant::draw::PlantParameters;
 use hil_sim::plant::rig::VirtualRig;
 use hil_sim::plant::sensors::Sensors;
 use hil_sim::scenario::Scenario;
@@ -40,7 +39,7 @@ fn snapshots() -> Vec<(Mode, Snapshot)> {
     let boot = Snapshot { state: State::default(), input: Input::default(), plan: None };
     found.insert("Boot".to_owned(), (Mode::Boot, boot));
     for stop_at in [None, Some(Direction::Deploy), Some(Direction::Retract)] {
-        let parameters = PlantParameters::draw(&scenario);
+        let parameters = scenario.plant();
         let mut sensors = Sensors::new(parameters.sensors.clone(), 1);
         let mut plant = VirtualRig::new(parameters, 0.0, 0.0, 1e-3);
         let (mut state, mut frame) = (State::default(), SensorFrame::default());

@@ -17,7 +17,6 @@ use std::task::{Context, Poll, Wake, Waker};
 
 use common::{Bench, Moment, NO_SLIP_MM, RIGS, STEP_CODES, WAYS, back, end_mm, scenario, starter};
 use embassy_time::{Duration, Instant, MockDriver};
-use hil_sim::plant::draw::PlantParameters;
 use hil_sim::plant::ledger::Crossing;
 use hil_sim::plant::rig::{Drives, VirtualRig};
 use hil_sim::plant::sensors::{Codes, Sensors};
@@ -183,7 +182,7 @@ impl Board {
             Direction::Deploy => 0.0,
             Direction::Retract => scenario.rig.preload.cruise_n,
         };
-        let parameters = PlantParameters::draw(scenario);
+        let parameters = scenario.plant();
         let mut this = Self {
             shared: Rc::new(Shared::default()),
             tasks: Vec::new(),

@@ -12,7 +12,6 @@ use super::peripherals::HZ;
 use super::rtt::Probe;
 use super::tampered::{Saving, Tampered, letter};
 use hil_sim::faults::Tamper;
-use hil_sim::plant::draw::PlantParameters;
 use hil_sim::plant::rig::{Drives, PlantError, VirtualRig};
 use hil_sim::plant::sensors::{Codes, Sensed, Sensors};
 use hil_sim::scenario::{Direction, Scenario};
@@ -80,7 +79,7 @@ impl<'a> Bench<'a> {
     /// # Errors
     /// [`ImageError`] if the image is none, or lacks its log.
     pub fn new(elf: &[u8], strings: &'a Strings, scenario: &Scenario) -> Result<Self, ImageError> {
-        let parameters = PlantParameters::draw(scenario);
+        let parameters = scenario.plant();
         let (position, preload) = match scenario.run.direction {
             Direction::Deploy => (0.0, 0.0),
             Direction::Retract => (scenario.rig.rig.travel_mm, scenario.rig.preload.cruise_n),

@@ -10,7 +10,6 @@ use std::time::Duration;
 use hil_sim::firmware::{self, Profile};
 use hil_sim::hil::{self, Asked, HilError, HostLine, Image};
 use hil_sim::log::{Row, Run};
-use hil_sim::plant::draw::PlantParameters;
 use hil_sim::plant::rig::VirtualRig;
 use hil_sim::plant::sensors::Sensors;
 use hil_sim::probe::{EmulatedPort, Port, PortError};
@@ -178,7 +177,7 @@ struct Rigged {
 
 impl Rigged {
     fn new(seed: u64) -> Self {
-        let parameters = PlantParameters::draw(&scenario(&[&format!("run.seed={seed}")]));
+        let parameters = scenario(&[&format!("run.seed={seed}")]).plant();
         let sensors = Sensors::new(parameters.sensors.clone(), seed);
         let plant = VirtualRig::new(parameters, 0.0, 0.0, 1e-3);
         Self { plant, sensors, given: Given::default() }

@@ -6,7 +6,6 @@ use std::process::ExitCode;
 use interstage::rig::RigError;
 
 use crate::export::ExportError;
-use crate::faults::campaign::CampaignError;
 use crate::firmware::FirmwareError;
 use crate::plant::balance::BalanceError;
 use crate::provision::ProvisionError;
@@ -45,7 +44,7 @@ impl Outcome {
 pub enum Failure {
     /// It was asked for something that cannot be: exit code 2.
     Input(String),
-    /// It broke off under way: exit code 1.
+    /// It failed while running: exit code 1.
     Run(String),
 }
 
@@ -55,7 +54,7 @@ impl Failure {
         Self::Input(error.to_string())
     }
 
-    /// A failure under way.
+    /// A failure while running.
     pub fn run(error: impl fmt::Display) -> Self {
         Self::Run(error.to_string())
     }
@@ -106,15 +105,6 @@ impl From<RunError> for Failure {
             RunError::Rig(error) => error.into(),
             RunError::Refused(_) | RunError::Hardware(_) => Self::input(error),
             RunError::Plant(_) => Self::run(error),
-        }
-    }
-}
-
-impl From<CampaignError<RunError>> for Failure {
-    fn from(error: CampaignError<RunError>) -> Self {
-        match error {
-            CampaignError::Run(error) => error.into(),
-            CampaignError::Kept(error) => Self::run(error),
         }
     }
 }

@@ -3,7 +3,6 @@
 use clap::builder::PossibleValuesParser;
 use comfy_table::{Cell, Table};
 use serde::Serialize;
-use serde_json::Value;
 
 use super::failure::{Failure, Outcome};
 use super::output;
@@ -27,62 +26,23 @@ pub(super) struct Args {
 #[derive(Serialize)]
 struct Printed<'a> {
     rig: &'a str,
-    keys: Vec<Key<'a>>,
-}
-
-#[derive(Serialize)]
-struct Key<'a> {
-    key: &'a str,
-    unit: &'a str,
-    default: Value,
-    expected: &'a str,
-    description: &'a str,
+    keys: &'a [KeyInfo],
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let keys = Scenario::named(&args.rig)?.keys();
-    let printed = Printed { rig: &args.rig, keys: keys.iter().map(key).collect() };
+    let printed = Printed { rig: &args.rig, keys: &keys };
     output::result(args.json, &printed, || human(&keys))?;
     Ok(Outcome::Good)
 }
 
-fn key(info: &KeyInfo) -> Key<'_> {
-    Key {
-        key: &info.key,
-        unit: info.unit,
-        default: value(&info.value),
-        expected: &info.expected,
-        description: &info.description,
-    }
-}
-
-/// A TOML value as JSON.
-pub(super) fn value(text: &str) -> Value {
-    let table: Result<Value, _> = toml::from_str(&format!("value = {text}"));
-    match table {
-        Ok(Value::Object(mut fields)) => fields.remove("value").unwrap_or_default(),
-        _ => Value::String(text.to_owned()),
-    }
-}
-
 fn human(keys: &[KeyInfo]) -> String {
-    // Text throughout, so every column stands on the left.
+    // Text throughout: every column is aligned to the left.
     let mut table: Table = plain(&[], []);
     table.set_header(["key", "default", "unit", "what"].map(Cell::new));
     for info in keys {
-        table.add_row([&*info.key, &*info.value, info.unit, &*info.description].map(Cell::new));
+        let value = info.value.to_string();
+        table.add_row([&*info.key, &*value, info.unit, &*info.description].map(Cell::new));
     }
     format!("{table}\n")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn values_are_json_of_their_own_kind() {
-        assert_eq!(value("0.5"), 0.5);
-        assert_eq!(value("\"scheduled\""), "scheduled");
-        assert_eq!(value("[163.0, 276.0]"), serde_json::json!([163.0, 276.0]));
-    }
 }

@@ -1,9 +1,10 @@
 //! `rig params`: the parameters that a board, or a file, holds.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
-use serde_json::{Map, Value};
+use toml::Value;
 
 use super::failure::{Failure, Outcome};
 use super::output;
@@ -13,12 +14,12 @@ use crate::scenario::{KeyInfo, PRESETS, Scenario};
 use crate::table::plain;
 
 /// Sections of a scenario that a board does not hold.
-const ELSEWHERE: [&str; 4] = ["preset", "spread", "noise", "run"];
+const ELSEWHERE: [&str; 4] = ["preset", "spread.", "noise.", "run."];
 
 /// Reads and changes the parameters that a board, or a file, holds.
 ///
-/// A change is checked as a whole before it is sent, sent beside what is in force, and
-/// takes force at once or not at all; a board runs on it from its next start.
+/// A change is checked before it is sent, stored beside what is in force, and becomes
+/// active completely or not at all; a board runs on it from its next start.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(subcommand)]
@@ -68,7 +69,7 @@ enum Action {
         /// The file.
         from: Option<PathBuf>,
     },
-    /// Makes the constants anew from the rig that is there, for a board whose firmware is
+    /// Makes the constants again from the rig that is there, for a board whose firmware is
     /// of another schema than its parameters.
     Migrate,
     /// Shows what differs from the defaults, or from a scenario file.
@@ -80,23 +81,25 @@ enum Action {
 
 /// What `--json` prints.
 #[derive(Serialize)]
-struct Printed {
-    name: String,
-    origin: String,
+struct Printed<'a> {
+    name: &'a str,
+    origin: &'a str,
     schema: u16,
     hash: String,
     changed: bool,
-    parameters: Map<String, Value>,
+    parameters: BTreeMap<&'a str, &'a Value>,
     /// With `diff` and `set`: what it was compared with.
     #[serde(skip_serializing_if = "Option::is_none")]
-    before: Option<Map<String, Value>>,
+    before: Option<BTreeMap<&'a str, &'a Value>>,
 }
 
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     match (&args.file, args.target.as_deref()) {
         (Some(file), _) => act(args, &mut SetFile::new(file)),
         (None, Some("probe")) => on_probe(args),
-        (None, Some(_)) => on_board(args),
+        (None, Some(_)) => {
+            Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Board)?))
+        }
         (None, None) => {
             Err(Failure::input("where? expected --file FILE, --target board or --target probe"))
         }
@@ -112,10 +115,6 @@ fn on_probe(_: &Args) -> Result<Outcome, Failure> {
 fn on_probe(args: &Args) -> Result<Outcome, Failure> {
     let mut port = super::probe::attach(None)?;
     act(args, &mut crate::params::Client::new(&mut port as &mut dyn crate::probe::Port))
-}
-
-fn on_board(_: &Args) -> Result<Outcome, Failure> {
-    Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Board)?))
 }
 
 fn act(args: &Args, store: &mut impl Store) -> Result<Outcome, Failure> {
@@ -210,8 +209,7 @@ fn stem(path: &Path) -> String {
 
 /// The keys that a board holds.
 fn held_keys(scenario: &Scenario) -> Vec<KeyInfo> {
-    let section = |key: &str| key.split('.').next().unwrap_or_default().to_owned();
-    let here = |info: &KeyInfo| !ELSEWHERE.contains(&section(&info.key).as_str());
+    let here = |info: &KeyInfo| !ELSEWHERE.iter().any(|section| info.key.starts_with(section));
     scenario.keys().into_iter().filter(here).collect()
 }
 
@@ -221,14 +219,13 @@ fn chosen(scenario: &Scenario, keys: &[String]) -> Result<Vec<KeyInfo>, Failure>
     if keys.is_empty() {
         return Ok(all);
     }
-    keys.iter()
-        .map(|key| {
-            let found = all.iter().find(|info| info.key == *key).cloned();
-            found.ok_or_else(|| {
-                Failure::input(format!("{key}: no such parameter; `rig keys` lists them"))
-            })
+    let one = |key: &String| {
+        let found = all.iter().find(|info| info.key == *key).cloned();
+        found.ok_or_else(|| {
+            Failure::input(format!("{key}: no such parameter; `rig keys` lists them"))
         })
-        .collect()
+    };
+    keys.iter().map(one).collect()
 }
 
 /// The keys whose values differ, as they were and as they are.
@@ -245,8 +242,8 @@ fn show(
     before: Option<Vec<KeyInfo>>,
 ) -> Result<Outcome, Failure> {
     let printed = Printed {
-        name: held.name.clone(),
-        origin: held.origin.clone(),
+        name: &held.name,
+        origin: &held.origin,
         schema: held.schema,
         hash: format!("{:08x}", held.hash),
         changed,
@@ -257,20 +254,25 @@ fn show(
     Ok(Outcome::Good)
 }
 
-fn values(rows: &[KeyInfo]) -> Map<String, Value> {
-    rows.iter().map(|info| (info.key.clone(), super::keys::value(&info.value))).collect()
+fn values(rows: &[KeyInfo]) -> BTreeMap<&str, &Value> {
+    rows.iter().map(|info| (info.key.as_str(), &info.value)).collect()
 }
 
 fn human(held: &Held, rows: &[KeyInfo], before: Option<&[KeyInfo]>) -> String {
     let mut text = format!("{}, {:08x}, from {}\n", held.name, held.hash, held.origin);
     if !held.is_current() {
-        text += "its constants are of another schema: `migrate` makes them anew from its rig\n";
+        text += "its constants are of another schema: `migrate` makes them again from its rig\n";
     }
     match before {
         Some([]) => text += "no difference\n",
         Some(before) => {
             let rows = before.iter().zip(rows).map(|(old, new)| {
-                vec![new.key.clone(), old.value.clone(), new.value.clone(), new.unit.to_owned()]
+                vec![
+                    new.key.clone(),
+                    old.value.to_string(),
+                    new.value.to_string(),
+                    new.unit.to_owned(),
+                ]
             });
             text += &format!("{}\n", plain(&["key", "was", "is", "unit"], rows));
         }
@@ -278,7 +280,7 @@ fn human(held: &Held, rows: &[KeyInfo], before: Option<&[KeyInfo]>) -> String {
         None => {
             let rows = rows
                 .iter()
-                .map(|info| vec![info.key.clone(), info.value.clone(), info.unit.to_owned()]);
+                .map(|info| vec![info.key.clone(), info.value.to_string(), info.unit.to_owned()]);
             text += &format!("{}\n", plain(&["key", "value", "unit"], rows));
         }
     }

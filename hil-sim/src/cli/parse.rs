@@ -12,7 +12,7 @@ pub(super) fn report(error: &clap::Error) -> ExitCode {
         ErrorKind::DisplayHelp
         | ErrorKind::DisplayVersion
         | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
-            // Help that nobody reads to the end is no error.
+            // Help that is not read to the end is no error.
             let _ = error.print();
         }
         _ => eprintln!("{}", line(&error.to_string())),

@@ -50,7 +50,7 @@ pub struct RunArgs {
     #[command(flatten)]
     pub scenario: ScenarioArgs,
 
-    /// The way back: from the end of travel, dropping off the steps.
+    /// Retraction: from the end of travel, dropping off the steps.
     #[arg(long)]
     retract: bool,
 

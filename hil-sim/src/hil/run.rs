@@ -12,7 +12,6 @@ use interstage::units::Tick;
 
 use super::{HilError, HostLine};
 use crate::log::{Decoder, Item};
-use crate::plant::draw::PlantParameters;
 use crate::plant::rig::{Truth, VirtualRig};
 use crate::plant::sensors::{Codes, Sensors};
 use crate::probe::Port;
@@ -100,7 +99,7 @@ struct Rig {
 
 impl Rig {
     fn new(scenario: &Scenario) -> Result<Self, HilError> {
-        let parameters = PlantParameters::draw(scenario);
+        let parameters = scenario.plant();
         parameters.check(scenario.rig.preload.limit_n)?;
         let (position, preload) = match scenario.run.direction {
             Direction::Deploy => (0.0, 0.0),

@@ -6,8 +6,9 @@ use nalgebra::DMatrix;
 
 use crate::plant::draw::PlantParameters;
 use crate::plant::ring::RingParameters;
+use crate::plant::spread::Spread;
 use crate::plant::wall::{Step, Wall};
-use crate::scenario::{Scenario, Spread};
+use crate::scenario::Scenario;
 
 /// Relaxed stiffness, logarithm.
 pub const STIFFNESS: usize = 0;
@@ -79,7 +80,7 @@ impl Coordinates {
         let mut exact = scenario.clone();
         exact.spread = Spread::none();
         exact.run.seed = 0;
-        let nominal = PlantParameters::draw(&exact);
+        let nominal = exact.plant();
         let steps = nominal.wall.steps().len();
         let spread = &scenario.spread;
         let free = |mean: f64, deviation| Prior { mean, deviation, tolerance: false };

@@ -9,7 +9,7 @@ use super::{Held, Store, StoreError};
 use crate::probe::Port;
 
 /// How long an answer is waited for, ms of the board's time: erasing takes 50.
-const PATIENCE_MS: u32 = 1000;
+const TIMEOUT_MS: u32 = 1000;
 
 /// Steps of waiting, ms.
 const STEP_MS: u32 = 5;
@@ -75,7 +75,7 @@ impl<W: Wire> Client<W> {
         let message = ToBoard::Parameters(self.number, request);
         let bytes = frame(&message).ok_or(StoreError::Answer)?;
         let mut left = bytes.as_slice();
-        for _ in 0..PATIENCE_MS / STEP_MS {
+        for _ in 0..TIMEOUT_MS / STEP_MS {
             left = &left[self.wire.send(left).map_err(StoreError::Wire)?..];
             for byte in self.wire.receive(STEP_MS).map_err(StoreError::Wire)? {
                 match self.gatherer.take(byte) {
@@ -91,7 +91,7 @@ impl<W: Wire> Client<W> {
                 }
             }
         }
-        Err(StoreError::Silent { seconds: f64::from(PATIENCE_MS) / 1000.0 })
+        Err(StoreError::Silent { seconds: f64::from(TIMEOUT_MS) / 1000.0 })
     }
 
     fn done(&mut self, request: Request) -> Result<(), StoreError> {
@@ -112,7 +112,7 @@ impl<W: Wire> Client<W> {
         }
     }
 
-    /// Starts the board anew.
+    /// Restarts the board.
     ///
     /// # Errors
     /// As [`ask`](Self::ask).
@@ -254,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn a_refusal_is_told_in_words() {
+    fn a_refusal_is_reported_in_words() {
         let mut board = Board::new();
         board.at_rest = false;
         let mut client = Client::new(board);

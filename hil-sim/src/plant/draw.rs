@@ -8,8 +8,8 @@ use rand_distr::{Distribution, StandardNormal};
 use super::actuators::DriveMotor;
 use super::arm::Arm;
 use super::ring::RingParameters;
+use super::spread::{Noise, Spread};
 use super::wall::{Step, Wall};
-use crate::scenario::{Noise, Scenario};
 
 /// Elements of the ring in a deployment. With the usual stride the gap is within 0.25 %,
 /// the largest force within 0.3 % of a ring twenty times as fine. Two thirds of them keep
@@ -116,14 +116,20 @@ impl Draw {
 }
 
 impl PlantParameters {
-    /// The plant of the scenario's seed. Seed 0 is the nominal rig without mismatch;
-    /// its sensors still quantise and make noise.
+    /// The plant of a seed: `rig` with this spread, and with these steps, each its position
+    /// and how much higher than the table says it is, mm. Seed 0 is the nominal rig without
+    /// mismatch; its sensors still quantise and have their noise.
     #[must_use]
-    pub fn draw(scenario: &Scenario) -> Self {
-        let nominal = crate::scenario::Spread::none();
-        let spread = if scenario.run.seed == 0 { &nominal } else { &scenario.spread };
-        let rig: &Rig = &scenario.rig;
-        let mut draw = Draw(ChaCha8Rng::seed_from_u64(scenario.run.seed));
+    pub fn draw(
+        rig: &Rig,
+        steps: &[(f64, f64)],
+        spread: &Spread,
+        noise: &Noise,
+        seed: u64,
+    ) -> Self {
+        let nominal = Spread::none();
+        let spread = if seed == 0 { &nominal } else { spread };
+        let mut draw = Draw(ChaCha8Rng::seed_from_u64(seed));
         let k_inf = rig.tread.k_inf_pa_per_m * 1e-9 * draw.factor(spread.k_inf_rel);
         // Rubber that softens at once does not exist.
         let stiffening = (rig.tread.stiffening * draw.factor(spread.stiffening_rel)).max(1.0);
@@ -140,9 +146,8 @@ impl PlantParameters {
         let load_cell_gain = draw.factor(spread.load_cell_gain_rel);
         let tread_gain = draw.factor(spread.tread_gain_rel);
         let angle_zero_rad = draw.offset(spread.arm_zero_deg).to_radians();
-        let steps = scenario
-            .true_steps()
-            .into_iter()
+        let steps = steps
+            .iter()
             .map(|(position, higher)| Step {
                 position_mm: position + draw.offset(spread.step_position_mm),
                 height_mm: rig.rig.step_height_mm + higher + draw.offset(spread.step_height_mm),
@@ -202,7 +207,7 @@ impl PlantParameters {
                 readback_gain,
                 readback_zero,
                 readback_lag,
-                noise: scenario.noise.clone(),
+                noise: noise.clone(),
             },
         }
     }

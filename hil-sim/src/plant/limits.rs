@@ -133,16 +133,22 @@ pub fn takes(ring: &RingParameters, step_mm: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scenario::Scenario;
+    use crate::plant::spread::{Noise, Spread};
+    use interstage::rig::Rig;
+
+    fn of(rig: &Rig) -> PlantParameters {
+        let steps: Vec<_> = rig.rig.step_positions_mm.iter().map(|at| (*at, 0.0)).collect();
+        PlantParameters::draw(rig, &steps, &Spread::none(), &Noise::none(), 0)
+    }
 
     fn nominal() -> PlantParameters {
-        PlantParameters::draw(&Scenario::default())
+        of(&Rig::prototype())
     }
 
     #[test]
     fn the_presets_are_far_from_every_refusal() {
-        for (preset, preload) in [("prototype", 50.0), ("fe", 150.0)] {
-            let plant = PlantParameters::draw(&Scenario::named(preset).unwrap());
+        for (rig, preload) in [(Rig::prototype(), 50.0), (Rig::fe(), 150.0)] {
+            let plant = of(&rig);
             assert_eq!(plant.check(preload), Ok(()));
             assert_eq!(plant.check(5.0 * preload), Ok(()));
         }

@@ -195,11 +195,10 @@ pub(crate) fn true_line(crossing: &Crossing) -> CrossingLine {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plant::draw::PlantParameters;
 
     fn truth(preload_n: f64, separation_mm: f64) -> Truth {
         let scenario = Scenario::resolve(Some("prototype"), None, &[]).expect("a scenario");
-        let plant = VirtualRig::new(PlantParameters::draw(&scenario), 0.0, 0.0, TICK_S);
+        let plant = VirtualRig::new(scenario.plant(), 0.0, 0.0, TICK_S);
         Truth { preload_n, separation_mm, ..*plant.truth() }
     }
 
@@ -220,7 +219,7 @@ mod tests {
     fn arriving_takes_the_place_and_every_step() {
         let scenario = Scenario::resolve(Some("prototype"), None, &[]).expect("a scenario");
         let end = scenario.rig.rig.travel_mm;
-        let plant = VirtualRig::new(PlantParameters::draw(&scenario), end, 33.3, TICK_S);
+        let plant = VirtualRig::new(scenario.plant(), end, 33.3, TICK_S);
         let finish = |arrived| {
             let ended =
                 Ended { target: "sil", scenario: &scenario, plant: &plant, arrived, wall_s: 1.0 };

@@ -1,18 +1,26 @@
 //! The keys of a scenario: what each takes and in which unit.
 
-use toml::Value;
+use documented::DocumentedFields;
+use interstage::rig::{Drive, Geometry, Goals, Loads, Pretightener, Sensors, Tread};
+use serde::Serialize;
+use toml::{Table, Value};
 
-use super::{ControllerKind, Direction, PRESETS, Scenario, docs};
+use super::run::{ControllerKind, Direction, RunOptions};
+use crate::plant::spread::{Noise, Spread};
+
+/// Names of the presets.
+pub const PRESETS: [&str; 2] = ["prototype", "fe"];
 
 /// One key of a scenario.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct KeyInfo {
     /// Dotted path, as in `--set`.
     pub key: String,
     /// Unit of its value; empty if it has none.
     pub unit: &'static str,
-    /// Its value, as in TOML.
-    pub value: String,
+    /// Its value.
+    #[serde(rename = "default")]
+    pub value: Value,
     /// What it takes.
     pub expected: String,
     /// What it is.
@@ -109,7 +117,7 @@ pub(super) fn stem(name: &str) -> &str {
 }
 
 /// Every leaf of `table` with its dotted path.
-pub(super) fn leaves(table: &toml::Table) -> Vec<(String, &Value)> {
+pub(super) fn leaves(table: &Table) -> Vec<(String, &Value)> {
     let mut found = Vec::new();
     for (name, value) in table {
         match value {
@@ -122,23 +130,45 @@ pub(super) fn leaves(table: &toml::Table) -> Vec<(String, &Value)> {
     found
 }
 
-/// Every key of `scenario`, in the order of declaration.
-pub(super) fn list(scenario: &Scenario) -> Vec<KeyInfo> {
-    let table = super::merge::table_of(scenario);
-    let docs = docs::all();
-    let place = |key: &str| docs.iter().position(|(name, _)| name == key);
-    let mut keys: Vec<KeyInfo> = leaves(&table)
-        .into_iter()
-        .map(|(key, value)| KeyInfo {
+/// Every key with its description, the documentation of its field, in the order of
+/// declaration.
+fn descriptions() -> Vec<(String, String)> {
+    fn fields<T: DocumentedFields>(section: &str) -> Vec<(String, String)> {
+        let plain = |text: &str| text.replace(['`', '[', ']'], "").replace('\n', " ");
+        let fields = T::FIELD_NAMES.iter().zip(T::FIELD_DOCS);
+        fields.map(|(name, text)| (format!("{section}.{name}"), plain(text))).collect()
+    }
+    let preset = ("preset".to_owned(), "Rig that the scenario starts from.".to_owned());
+    [
+        vec![preset],
+        fields::<Geometry>("rig"),
+        fields::<Tread>("tread"),
+        fields::<Loads>("plant"),
+        fields::<Pretightener>("preload"),
+        fields::<Drive>("drive"),
+        fields::<Sensors>("sense"),
+        fields::<Goals>("control"),
+        fields::<Spread>("spread"),
+        fields::<Noise>("noise"),
+        fields::<RunOptions>("run"),
+    ]
+    .concat()
+}
+
+/// Every key of the scenario in `table`, in the order of declaration.
+pub(super) fn list(table: &Table) -> Vec<KeyInfo> {
+    let values = leaves(table);
+    let described = descriptions().into_iter().filter_map(|(key, description)| {
+        let (_, value) = values.iter().find(|(name, _)| *name == key)?;
+        Some(KeyInfo {
             unit: unit(&key),
-            value: value.to_string(),
+            value: (*value).clone(),
             expected: Kind::of(&key, value).expected(&key),
-            description: place(&key).map(|i| docs[i].1.clone()).unwrap_or_default(),
+            description,
             key,
         })
-        .collect();
-    keys.sort_by_key(|info| place(&info.key));
-    keys
+    });
+    described.collect()
 }
 
 #[cfg(test)]
@@ -146,18 +176,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_key_has_a_description() {
-        for key in Scenario::default().keys() {
-            assert!(key.description.len() > 4, "{} has no description", key.key);
-        }
-    }
-
-    #[test]
-    fn every_description_belongs_to_a_key() {
-        let keys: Vec<String> = Scenario::default().keys().into_iter().map(|k| k.key).collect();
-        for (key, _) in docs::all() {
-            assert!(keys.contains(&key), "{key} is described but is no key");
-        }
+    fn every_key_has_a_description_and_every_description_a_key() {
+        let table = Table::try_from(crate::scenario::Scenario::default()).expect("a table");
+        let listed = list(&table);
+        assert_eq!(listed.len(), leaves(&table).len());
+        assert_eq!(listed.len(), descriptions().len());
+        assert!(listed.iter().all(|key| key.description.len() > 4));
     }
 
     #[test]

@@ -5,8 +5,10 @@ use std::path::Path;
 
 use toml::{Table, Value};
 
-use super::keys::{self, Kind};
-use super::{Origin, Scenario, ScenarioError, StepAnomaly, injections, set, suggest};
+use super::error::{Origin, ScenarioError};
+use super::keys::{self, Kind, PRESETS};
+use super::suggest;
+use super::value::{checked, from_text, has_unit, split, wrong_type};
 
 /// Where each overridden key was written.
 #[derive(Clone, Debug)]
@@ -40,36 +42,33 @@ pub(super) struct Merged {
 }
 
 impl Merged {
-    /// Starts from `base`.
-    pub(super) fn new(base: &Scenario) -> Self {
-        Self { table: table_of(base), provenance: Provenance::new(&base.preset) }
+    /// Starts from the values in `table`, those of a preset.
+    pub(super) fn new(preset: &str, table: Table) -> Self {
+        Self { table, provenance: Provenance::new(preset) }
     }
 
-    /// Lays a whole file over it.
+    /// Lays a file over it.
     pub(super) fn layer(&mut self, origin: &Origin, given: &Table) -> Result<(), ScenarioError> {
         self.section("", origin, given)
     }
 
     /// Lays one `key=value` over it.
     pub(super) fn set(&mut self, text: &str) -> Result<(), ScenarioError> {
-        let (key, text) = set::split(text)
-            .ok_or_else(|| ScenarioError::NotAnAssignment { text: text.to_owned() })?;
+        let (key, text) =
+            split(text).ok_or_else(|| ScenarioError::NotAnAssignment { text: text.to_owned() })?;
         match self.find(key) {
             Some(Value::Table(_)) => Err(self.is_section(&Origin::Set, key, text)),
             Some(leaf) => {
-                let value = set::value(Kind::of(key, leaf), text);
+                let value = from_text(Kind::of(key, leaf), text);
                 self.put(&Origin::Set, key, &value)
             }
             None => Err(self.unknown(&Origin::Set, key)),
         }
     }
 
-    /// The scenario and where its values come from.
-    pub(super) fn finish(self) -> (Scenario, Provenance) {
-        let scenario = Value::Table(self.table)
-            .try_into()
-            .expect("every value was checked for the kind of its key");
-        (scenario, self.provenance)
+    /// The table, each value of the kind of its key, and where the values come from.
+    pub(super) fn finish(self) -> (Table, Provenance) {
+        (self.table, self.provenance)
     }
 
     fn section(&mut self, at: &str, origin: &Origin, given: &Table) -> Result<(), ScenarioError> {
@@ -133,118 +132,6 @@ impl Merged {
     }
 }
 
-/// `value` in the form that `kind` has in a scenario, or why it cannot be.
-pub(super) fn checked(
-    origin: &Origin,
-    key: &str,
-    kind: Kind,
-    value: &Value,
-) -> Result<Value, ScenarioError> {
-    let wrong = || wrong_type(origin, key, kind, value);
-    match (kind, value) {
-        (Kind::Number, Value::Float(x)) if x.is_finite() => Ok(value.clone()),
-        (Kind::Number, Value::Integer(n)) => Ok(Value::Float(*n as f64)),
-        (Kind::Whole, Value::Integer(0..)) => Ok(value.clone()),
-        (Kind::Word(words), Value::String(word)) if words.contains(&word.as_str()) => {
-            Ok(value.clone())
-        }
-        (Kind::Numbers(most), Value::Array(list)) if list.len() <= most => list
-            .iter()
-            .map(|one| checked(origin, key, Kind::Number, one).map_err(|_| wrong()))
-            .collect::<Result<_, _>>()
-            .map(Value::Array),
-        (Kind::Anomalies, Value::Array(list)) => list
-            .iter()
-            .enumerate()
-            .map(|(i, one)| anomaly(origin, &format!("{key}[{}]", i + 1), one))
-            .collect::<Result<_, _>>()
-            .map(Value::Array),
-        (Kind::Faults, Value::Array(list)) => list
-            .iter()
-            .enumerate()
-            .map(|(i, one)| injections::checked(origin, &format!("{key}[{}]", i + 1), one))
-            .collect::<Result<_, _>>()
-            .map(Value::Array),
-        (Kind::Number | Kind::Whole, Value::String(text)) if set::has_unit(text) => {
-            Err(ScenarioError::UnitInValue {
-                origin: origin.clone(),
-                key: key.to_owned(),
-                found: text.clone(),
-                unit: keys::unit(key),
-            })
-        }
-        _ => Err(wrong()),
-    }
-}
-
-/// One step anomaly: the kind decides which keys it has.
-fn anomaly(origin: &Origin, at: &str, value: &Value) -> Result<Value, ScenarioError> {
-    let Value::Table(given) = value else {
-        return Err(wrong_type(origin, at, Kind::Anomalies, value));
-    };
-    let kind_key = format!("{at}.kind");
-    let Some(kind) = given.get("kind") else {
-        return Err(ScenarioError::WrongType {
-            origin: origin.clone(),
-            key: kind_key.clone(),
-            found: "nothing".to_owned(),
-            expected: Kind::Word(&StepAnomaly::NAMES).expected(&kind_key),
-        });
-    };
-    let kind = checked(origin, &kind_key, Kind::Word(&StepAnomaly::NAMES), kind)?;
-    let fields = StepAnomaly::fields(kind.as_str().unwrap_or_default());
-    for name in given.keys().filter(|name| *name != "kind") {
-        if !fields.contains(&name.as_str()) {
-            return Err(ScenarioError::UnknownKey {
-                origin: origin.clone(),
-                key: format!("{at}.{name}"),
-                hint: format!("; kind = {kind} takes {}", fields.join(" and ")),
-            });
-        }
-    }
-    let mut found = Table::new();
-    for &name in fields {
-        let key = format!("{at}.{name}");
-        let field = if name == "step" { Kind::Whole } else { Kind::Number };
-        let Some(value) = given.get(name) else {
-            return Err(ScenarioError::WrongType {
-                origin: origin.clone(),
-                expected: field.expected(&key),
-                key,
-                found: "nothing".to_owned(),
-            });
-        };
-        let value = checked(origin, &key, field, value)?;
-        let most = interstage::rig::MAX_STEPS;
-        if let Some(step) = value.as_integer().filter(|&n| !(1..=most as i64).contains(&n)) {
-            return Err(ScenarioError::OutOfRange {
-                origin: origin.clone(),
-                key,
-                value: step as f64,
-                min: 1.0,
-                max: most as f64,
-            });
-        }
-        found.insert(name.to_owned(), value);
-    }
-    found.insert("kind".to_owned(), kind);
-    Ok(Value::Table(found))
-}
-
-pub(super) fn wrong_type(origin: &Origin, key: &str, kind: Kind, value: &Value) -> ScenarioError {
-    ScenarioError::WrongType {
-        origin: origin.clone(),
-        key: key.to_owned(),
-        found: value.to_string().replace('\n', " "),
-        expected: kind.expected(key),
-    }
-}
-
-/// The scenario as the table that its file would be.
-pub(super) fn table_of(scenario: &Scenario) -> Table {
-    Table::try_from(scenario).expect("numbers, words and lists are always TOML")
-}
-
 /// Takes the `preset` keys out of the layers; the last one counts.
 pub(super) fn take_preset(
     layers: &mut [(Origin, Table)],
@@ -254,7 +141,7 @@ pub(super) fn take_preset(
         match table.remove("preset") {
             Some(Value::String(name)) => found = Some((name, origin.clone())),
             Some(other) => {
-                return Err(wrong_type(origin, "preset", Kind::Word(&super::PRESETS), &other));
+                return Err(wrong_type(origin, "preset", Kind::Word(&PRESETS), &other));
             }
             None => {}
         }
@@ -286,7 +173,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Table, ScenarioError> {
 fn unit_at(path: &Path, text: &str, line: usize) -> Option<ScenarioError> {
     let (name, value) = text.lines().nth(line - 1)?.split_once('=')?;
     let value = value.split('#').next()?.trim();
-    if !set::has_unit(value) {
+    if !has_unit(value) {
         return None;
     }
     let section = text

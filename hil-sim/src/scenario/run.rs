@@ -1,12 +1,13 @@
-//! How a scenario is run: direction, controller, seed, and steps that do not stand
+//! How a scenario is run: direction, controller, seed, and steps that are not
 //! where the step table says.
 
+use documented::DocumentedFields;
 use serde::{Deserialize, Serialize};
 
-use crate::faults::Injection;
+use super::injection::Injection;
 
 /// Options of one run.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, DocumentedFields)]
 #[serde(deny_unknown_fields)]
 pub struct RunOptions {
     /// Sense of motion.
@@ -15,7 +16,7 @@ pub struct RunOptions {
     pub controller: ControllerKind,
     /// Seed of the plant's draw and of the noise; 0 draws the nominal plant.
     pub seed: u64,
-    /// Steps that do not stand where the step table says.
+    /// Steps that are not where the step table says.
     pub anomalies: Vec<StepAnomaly>,
     /// Faults that come while it runs.
     #[serde(default)]
@@ -87,19 +88,19 @@ impl ControllerKind {
     }
 }
 
-/// One step that does not stand where the step table says. Steps count from 1 on
-/// the way out.
+/// One step that is not where the step table says. Steps count from 1 on
+/// deployment.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
 pub enum StepAnomaly {
-    /// The step stands nearer to the stow end than the table says.
+    /// The step is nearer to the stow end than the table says.
     Early {
         /// Which step.
         step: u8,
         /// By how much, mm, positive.
         offset_mm: f64,
     },
-    /// The step stands farther out than the table says.
+    /// The step is farther out than the table says.
     Late {
         /// Which step.
         step: u8,
@@ -120,7 +121,7 @@ pub enum StepAnomaly {
     },
     /// A step that the table does not know.
     Extra {
-        /// Where it stands, mm.
+        /// Where it is, mm.
         position_mm: f64,
     },
 }

@@ -1,5 +1,6 @@
 use std::path::Path;
 
+use super::injection::{Injection, Kind, Target};
 use super::*;
 
 fn error(text: &str) -> String {
@@ -11,7 +12,7 @@ fn set_error(text: &str) -> String {
 }
 
 #[test]
-fn presets_are_whole_scenarios() {
+fn presets_are_complete_scenarios() {
     for preset in PRESETS {
         let scenario = Scenario::named(preset).unwrap();
         scenario.validate().unwrap();
@@ -233,19 +234,81 @@ fn every_message_is_one_line() {
 }
 
 #[test]
-fn keys_tell_unit_value_and_description() {
+fn keys_have_unit_value_and_description() {
     let keys = Scenario::default().keys();
     let tau = keys.iter().find(|k| k.key == "tread.tau_s").unwrap();
-    assert_eq!((tau.unit, tau.value.as_str()), ("s", "0.1059"));
+    assert_eq!((tau.unit, tau.value.as_float()), ("s", Some(0.1059)));
     assert_eq!(tau.description, "Relaxation time tau, s.");
     assert!(keys.iter().any(|k| k.key == "run.anomalies"));
     assert_eq!(keys[0].key, "preset");
 }
 
 #[test]
-fn values_that_make_no_plant_are_told_with_the_one_to_change() {
+fn values_that_make_no_plant_are_refused_with_the_one_to_change() {
     let text = set_error("tread.k_inf_pa_per_m=1e7");
     assert!(text.starts_with("command line: preload.limit_n, with the load"), "{text}");
     assert!(text.contains("tread.k_inf_pa_per_m = 1.000e7") && text.contains("at most"), "{text}");
     assert_eq!(text.lines().count(), 1);
+}
+
+#[test]
+fn faults_are_read_and_written_back() {
+    let text = "[[run.faults]]\ntarget = \"load-cell\"\nkind = \"gain\"\nat_mm = 20\n\
+                magnitude = 1.1\n[[run.faults]]\ntarget = \"drive\"\nkind = \"runaway\"\n\
+                at_crossing = 2\nduration_s = 0.5\n";
+    let parse = |text: &str| Scenario::parse("bench.toml", text, &[]).unwrap();
+    let scenario = parse(text);
+    let [first, second] = scenario.run.faults.as_slice() else { panic!("two") };
+    let gain = Injection::at(Target::LoadCell, Kind::Gain, 0.0, 1.1);
+    assert_eq!(*first, Injection { at_s: None, at_mm: Some(20.0), ..gain });
+    assert_eq!((second.at_crossing, second.duration_s), (Some(2), Some(0.5)));
+    assert_eq!(second.magnitude(), 1.0, "as the catalogue has it");
+    assert_eq!(parse(&scenario.to_toml()), scenario);
+}
+
+#[test]
+fn every_mistake_of_a_fault_is_named() {
+    let fault = |rest: &str| error(&format!("[[run.faults]]\n{rest}"));
+    for (rest, said) in [
+        ("kind = \"off\"\nat_s = 1", "run.faults[1].target = nothing: expected \"encoder\""),
+        (
+            "target = \"angel\"\nkind = \"off\"\nat_s = 1",
+            "run.faults[1].target = \"angel\": expected \"encoder\"",
+        ),
+        (
+            "target = \"model\"\nkind = \"off\"\nat_s = 1",
+            "run.faults[1].kind = \"off\": expected \"hung\"",
+        ),
+        (
+            "target = \"model\"\nkind = \"hung\"",
+            "run.faults[1].at_s = nothing: expected one of at_s, at_mm and at_crossing",
+        ),
+        (
+            "target = \"model\"\nkind = \"hung\"\nat_s = 1\nat_mm = 2",
+            "run.faults[1].at_s = at_s and at_mm: expected one of",
+        ),
+        (
+            "target = \"model\"\nkind = \"hung\"\nat = 1",
+            "run.faults[1].at: no such key; a fault takes target, kind, at_s",
+        ),
+        (
+            "target = \"model\"\nkind = \"hung\"\nat_s = \"1 s\"",
+            "run.faults[1].at_s = 1 s: expected a bare number in s",
+        ),
+        (
+            "target = \"model\"\nkind = \"hung\"\nat_s = 1\nmagnitude = 2",
+            "run.faults[1].magnitude = 2: expected a value from 0 to 0",
+        ),
+        (
+            "target = \"drive\"\nkind = \"weak\"\nat_s = -1",
+            "run.faults[1].at_s = -1: expected a value from 0 to 3600",
+        ),
+        (
+            "target = \"drive\"\nkind = \"weak\"\nat_crossing = 300",
+            "run.faults[1].at_crossing = 300: expected a value from 1 to 250",
+        ),
+    ] {
+        let found = fault(rest);
+        assert!(found.starts_with("bench.toml: ") && found.contains(said), "{found}");
+    }
 }

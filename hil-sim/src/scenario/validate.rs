@@ -1,8 +1,8 @@
 //! The checks of a whole scenario, after the rig's own.
 
+use super::injection::entry;
 use super::merge::Provenance;
-use super::{Scenario, ScenarioError, StepAnomaly, injections};
-use crate::plant::draw::PlantParameters;
+use super::{Scenario, ScenarioError, StepAnomaly};
 
 /// Largest offset of an early or late step, mm.
 const MAX_OFFSET_MM: f64 = 20.0;
@@ -25,9 +25,10 @@ pub(super) fn check(scenario: &Scenario, from: &Provenance) -> Result<(), Scenar
     }
     anomalies(scenario, from)?;
     spacing(scenario, from)?;
-    injections::check(scenario, from)?;
-    PlantParameters::draw(scenario).check(scenario.rig.preload.limit_n).map_err(|refusal| {
-        ScenarioError::Refused { origin: from.of_message(&refusal.to_string()), refusal }
+    faults(scenario, from)?;
+    scenario.plant().check(scenario.rig.preload.limit_n).map_err(|refusal| ScenarioError::Refused {
+        origin: from.of_message(&refusal.to_string()),
+        refusal,
     })
 }
 
@@ -93,6 +94,29 @@ fn anomalies(scenario: &Scenario, from: &Provenance) -> Result<(), ScenarioError
                     min,
                     max,
                 });
+            }
+        }
+    }
+    Ok(())
+}
+
+fn faults(scenario: &Scenario, from: &Provenance) -> Result<(), ScenarioError> {
+    for (index, fault) in scenario.run.faults.iter().enumerate() {
+        let measure = entry(fault.target, fault.kind).map_or((0.0, 0.0), |entry| entry.range);
+        let ranges = [
+            ("at_s", fault.at_s, (0.0, 3600.0)),
+            ("at_mm", fault.at_mm, (-10.0, 1e4)),
+            ("duration_s", fault.duration_s, (0.001, 3600.0)),
+            ("magnitude", fault.magnitude, measure),
+        ];
+        for (name, value, (min, max)) in ranges {
+            // Written so that a NaN fails.
+            if let Some(value) = value
+                && !(value >= min && value <= max)
+            {
+                let origin = from.of("run.faults");
+                let key = format!("run.faults[{}].{name}", index + 1);
+                return Err(ScenarioError::OutOfRange { origin, key, value, min, max });
             }
         }
     }

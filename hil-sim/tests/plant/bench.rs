@@ -16,7 +16,7 @@ const ACCELERATION_MM_S2: f64 = 250.0;
 
 /// The nominal plant of a preset.
 pub(crate) fn nominal(preset: &str) -> PlantParameters {
-    PlantParameters::draw(&Scenario::named(preset).unwrap())
+    Scenario::named(preset).unwrap().plant()
 }
 
 /// A plant whose preload and speed are what is asked for: no spring, no ripple, an arm

@@ -1,7 +1,6 @@
 //! A rig under the rotation and preload of a run moves as in that run, and parameters that
 //! change in a run act.
 
-use hil_sim::plant::draw::PlantParameters;
 use hil_sim::plant::rig::{Drives, VirtualRig};
 use hil_sim::scenario::Scenario;
 use hil_sim::sil::{Options, Session};
@@ -18,7 +17,7 @@ fn following_the_rotation_and_preload_of_a_run_gives_that_run() {
     let mut scenario = Scenario::default();
     scenario.run.seed = 3;
     let mut session = Session::new(&scenario, Options::default()).unwrap();
-    let mut parameters = PlantParameters::draw(&scenario);
+    let mut parameters = scenario.plant();
     let mut truths = vec![*session.plant().truth()];
     for tick in 0..5000 {
         let command = (tick == 600).then_some(interstage::supervise::Command::Start);

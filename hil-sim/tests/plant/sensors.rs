@@ -1,8 +1,9 @@
 //! The emulated sensors through the firmware's own conversion.
 
-use hil_sim::plant::draw::{PlantParameters, SensorParameters};
+use hil_sim::plant::draw::SensorParameters;
 use hil_sim::plant::sensors::{Codes, Sensed, Sensors};
-use hil_sim::scenario::{Noise, Scenario};
+use hil_sim::plant::spread::Noise;
+use hil_sim::scenario::Scenario;
 use interstage::rig::Rig;
 use interstage::sense::raw::{Sample, SensorFrame};
 use interstage::sense::{SensedState, Senses, SensesState, Tuning, Validity};
@@ -172,7 +173,7 @@ fn a_bridge_reads_its_output_behind_a_low_pass_within_what_the_controller_allows
     for seed in 0..50 {
         let mut scenario = Scenario::named("prototype").expect("a preset");
         scenario.run.seed = seed;
-        let parameters = PlantParameters::draw(&scenario).sensors;
+        let parameters = scenario.plant().sensors;
         let mut sensors = Sensors::new(parameters, seed);
         let mut lags = [Lag::default(); 2];
         for tick in 0..400 {

@@ -1,7 +1,8 @@
 //! What a seed draws, against the meaning that the scenario's keys document.
 
 use hil_sim::plant::draw::PlantParameters;
-use hil_sim::scenario::{Scenario, Spread};
+use hil_sim::plant::spread::Spread;
+use hil_sim::scenario::Scenario;
 
 use super::bench::nominal;
 
@@ -10,7 +11,7 @@ const SEEDS: u64 = 2000;
 fn drawn(seed: u64) -> PlantParameters {
     let mut scenario = Scenario::default();
     scenario.run.seed = seed;
-    PlantParameters::draw(&scenario)
+    scenario.plant()
 }
 
 #[test]
@@ -35,7 +36,7 @@ fn seed_0_is_the_nominal_rig() {
     // Without spread every seed is that rig.
     let mut narrow = Scenario { spread: Spread::none(), ..scenario };
     narrow.run.seed = 5;
-    assert_eq!(PlantParameters::draw(&narrow), plant);
+    assert_eq!(narrow.plant(), plant);
 }
 
 #[test]
@@ -48,7 +49,7 @@ fn a_seed_is_always_the_same_rig_and_none_is_like_another() {
 
 #[test]
 fn the_draws_mean_what_the_spread_documents() {
-    let spread = Spread::default();
+    let spread = Spread::usual();
     let nominal = nominal("prototype");
     let plants: Vec<PlantParameters> = (1..=SEEDS).map(drawn).collect();
     // Keys in `_rel`: relative standard deviation, cut at three of it.

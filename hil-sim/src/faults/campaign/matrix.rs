@@ -1,4 +1,4 @@
-//! What a campaign comes to: a line a fault.
+//! The outcome of a campaign: a row for each fault.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -9,14 +9,14 @@ use super::{Case, Finding, Instant};
 
 /// Median and worst of what varies between instants.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Spread {
+pub struct MedianAndWorst {
     /// Median.
     pub median: f64,
     /// Largest.
     pub worst: f64,
 }
 
-impl Spread {
+impl MedianAndWorst {
     /// Of these values; none of nothing.
     #[must_use]
     pub fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
@@ -28,7 +28,7 @@ impl Spread {
 
 /// A fault at all its instants.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Line {
+pub struct MatrixRow {
     /// The fault.
     pub fault: String,
     /// What happens, in words.
@@ -37,7 +37,7 @@ pub struct Line {
     pub code: Option<u16>,
     /// Every code that it was reported by, with how often.
     pub codes: BTreeMap<u16, usize>,
-    /// Restarts that it was reported by, with how often; none in software.
+    /// Restarts of the controller that it was reported by, with how often.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub restarts: BTreeMap<Cow<'static, str>, usize>,
     /// Whether at every instant it was reported or tolerated.
@@ -47,15 +47,15 @@ pub struct Line {
     /// Median of the same, ms.
     pub latency_median_ms: Option<f64>,
     /// The same from when the duty was off by two parts in a hundred, ms.
-    pub latency_any_ms: Option<Spread>,
+    pub latency_any_ms: Option<MedianAndWorst>,
     /// The same of the instants outside of crossings, ms.
-    pub latency_off_corner_ms: Option<Spread>,
+    pub latency_off_corner_ms: Option<MedianAndWorst>,
     /// The same from when the plant first ran otherwise than without the fault, ms.
-    pub after_sign_ms: Option<Spread>,
+    pub after_sign_ms: Option<MedianAndWorst>,
     /// From the report to rest with both bridges off, ms.
-    pub rest_ms: Option<Spread>,
+    pub rest_ms: Option<MedianAndWorst>,
     /// The same of the instants in a crossing.
-    pub rest_in_crossing_ms: Option<Spread>,
+    pub rest_in_crossing_ms: Option<MedianAndWorst>,
     /// Whether at every instant the mechanism was held.
     pub safe: bool,
     /// Instants by what became of them.
@@ -73,20 +73,20 @@ pub struct Line {
     pub ends: BTreeMap<Cow<'static, str>, usize>,
     /// Largest preload, N.
     pub worst_preload_n: f64,
-    /// Longest way gone uncommanded, mm.
+    /// Longest distance moved uncommanded, mm.
     pub worst_motion_mm: f64,
     /// Instants undetected or unsafe, in full.
     pub failures: Vec<Instant>,
 }
 
-impl Line {
-    /// What it restarted the board by most often.
+impl MatrixRow {
+    /// What it restarted the controller by most often.
     #[must_use]
     pub fn restarted(&self) -> Option<&str> {
         self.restarts.iter().max_by_key(|(_, times)| **times).map(|(cause, _)| cause.as_ref())
     }
 
-    /// The line of a fault.
+    /// The row of a fault.
     #[must_use]
     pub fn of(case: &Case, instants: &[Instant]) -> Self {
         let count = |finding| instants.iter().filter(|i| i.finding == finding).count();
@@ -104,7 +104,7 @@ impl Line {
         }
         let failed = |i: &&Instant| i.finding == Finding::Undetected || !i.harms.is_empty();
         let failures: Vec<Instant> = instants.iter().filter(failed).cloned().collect();
-        let latency = Spread::of(instants.iter().filter_map(|i| i.latency_ms));
+        let latency = MedianAndWorst::of(instants.iter().filter_map(|i| i.latency_ms));
         let crossing = |i: &&Instant| i.during == "crossing";
         let unheld = instants.iter().filter(|i| !i.harms.is_empty()).count();
         Self {
@@ -116,13 +116,13 @@ impl Line {
             detected: count(Finding::Undetected) == 0,
             latency_ms: latency.map(|l| l.worst),
             latency_median_ms: latency.map(|l| l.median),
-            latency_any_ms: Spread::of(instants.iter().filter_map(|i| i.latency_any_ms)),
-            latency_off_corner_ms: Spread::of(
+            latency_any_ms: MedianAndWorst::of(instants.iter().filter_map(|i| i.latency_any_ms)),
+            latency_off_corner_ms: MedianAndWorst::of(
                 instants.iter().filter(|i| !crossing(i)).filter_map(|i| i.latency_ms),
             ),
-            after_sign_ms: Spread::of(instants.iter().filter_map(|i| i.after_sign_ms)),
-            rest_ms: Spread::of(instants.iter().filter_map(|i| i.rest_ms)),
-            rest_in_crossing_ms: Spread::of(
+            after_sign_ms: MedianAndWorst::of(instants.iter().filter_map(|i| i.after_sign_ms)),
+            rest_ms: MedianAndWorst::of(instants.iter().filter_map(|i| i.rest_ms)),
+            rest_in_crossing_ms: MedianAndWorst::of(
                 instants.iter().filter(crossing).filter_map(|i| i.rest_ms),
             ),
             safe: unheld == 0,
@@ -146,8 +146,8 @@ pub struct Outcome {
     pub target: &'static str,
     /// Instants a fault.
     pub instants: usize,
-    /// A line a fault.
-    pub matrix: Vec<Line>,
+    /// A row for each fault.
+    pub matrix: Vec<MatrixRow>,
     /// Instants at which a fault was neither reported nor tolerated.
     pub undetected: usize,
     /// Instants at which the mechanism was not held.
@@ -156,15 +156,15 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// The outcome of these lines.
+    /// The outcome of these rows.
     #[must_use]
-    pub fn of(target: &'static str, matrix: Vec<Line>, instants: usize) -> Self {
+    pub fn of(target: &'static str, matrix: Vec<MatrixRow>, instants: usize) -> Self {
         let undetected = matrix.iter().map(|line| line.undetected).sum();
         let unheld = matrix.iter().map(|line| line.unheld).sum();
         Self { target, instants, matrix, undetected, unheld }
     }
 
-    /// Whether every fault was found or borne, and nothing was left unheld.
+    /// Whether every fault was found or tolerated, and nothing was left unheld.
     #[must_use]
     pub const fn is_good(&self) -> bool {
         self.undetected == 0 && self.unheld == 0

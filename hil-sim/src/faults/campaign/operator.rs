@@ -1,4 +1,4 @@
-//! Who presses the buttons of a run: out, and, once it has arrived, back.
+//! The operator of a run: sends it out and, once it has arrived, back.
 
 use interstage::supervise::{Command, Mode};
 use interstage::units::Direction;
@@ -8,7 +8,7 @@ const DWELL_TICKS: u32 = 100;
 
 /// The operator.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Operator {
+pub struct Operator {
     started: bool,
     turned: bool,
     rested: u32,
@@ -16,10 +16,10 @@ pub(super) struct Operator {
 
 impl Operator {
     /// The command of a tick in which the drive is in this mode.
-    pub(super) fn command(&mut self, mode: Mode) -> Option<Command> {
+    pub fn command(&mut self, mode: Mode) -> Option<Command> {
         if mode == Mode::Idle && !self.started {
             self.started = true;
-            return Some(Command::Start);
+            return Some(if self.turned { Command::Retract } else { Command::Start });
         }
         if mode == Mode::Complete(Direction::Deploy) && !self.turned {
             self.rested += 1;
@@ -31,13 +31,18 @@ impl Operator {
         None
     }
 
+    /// The controller has started again: the last command is given once more.
+    pub const fn press_again(&mut self) {
+        self.started = false;
+    }
+
     /// Whether the run has been set going.
-    pub(super) const fn started(&self) -> bool {
+    pub const fn started(&self) -> bool {
         self.started
     }
 
-    /// Whether it is over: at rest, and nobody wants it otherwise.
-    pub(super) fn over(&self, mode: Mode) -> bool {
+    /// Whether it is over: at rest, and no further command comes.
+    pub fn over(&self, mode: Mode) -> bool {
         self.started
             && mode.is_at_rest()
             && (mode != Mode::Complete(Direction::Deploy) || self.turned)

@@ -9,6 +9,7 @@ use interstage::units::Direction;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
+use super::LONGEST_S;
 use super::operator::Operator;
 use crate::plant::rig::Truth;
 use crate::scenario::Scenario;
@@ -18,29 +19,27 @@ use crate::sil::{Options, RunError, Session};
 /// speed, mm/s. Ten deviations of the load cell, five counts of the encoder, and what the
 /// speed observer swings by itself.
 const SIGNS: (f64, f64, f64) = (0.5, 0.1, 2.0);
-/// Longest run, s.
-const LONGEST_S: f64 = 60.0;
 
 /// A run without fault.
-pub(super) struct Twin {
+pub struct Twin {
     /// From the command to the end, s since boot.
-    pub(super) started_s: f64,
+    pub started_s: f64,
     ended_s: f64,
-    /// When the crossing under way began, s.
+    /// When the present crossing began, s.
     crossing_s: Option<f64>,
     /// Stretches of time in which it crosses a step, s.
     crossings: Vec<(f64, f64)>,
     /// Codes of the limits that it reports.
-    pub(super) limits: Vec<u16>,
-    /// Reference gap of the way out and of the way back, mm.
-    pub(super) gap_ref_mm: [f64; 2],
+    pub limits: Vec<u16>,
+    /// Reference gap of deployment and retraction, mm.
+    pub gap_ref_mm: [f64; 2],
     /// Preload, position, speed by tick.
     states: Vec<[f32; 3]>,
 }
 
 impl Twin {
     /// Runs it.
-    pub(super) fn run(scenario: &Scenario) -> Result<Self, RunError> {
+    pub fn run(scenario: &Scenario) -> Result<Self, RunError> {
         let mut session = Session::new(scenario, Options::default())?;
         let mut operator = Operator::default();
         let mut twin = Self::new(scenario)?;
@@ -60,7 +59,7 @@ impl Twin {
     }
 
     /// Before the first tick.
-    pub(super) fn new(scenario: &Scenario) -> Result<Self, RigError> {
+    pub fn new(scenario: &Scenario) -> Result<Self, RigError> {
         let planner = Planner::try_build(&scenario.rig)?;
         Ok(Self {
             started_s: 0.0,
@@ -74,14 +73,7 @@ impl Twin {
     }
 
     /// A tick, after which the drive is in this mode; `over` says that it counts no more.
-    pub(super) fn note(
-        &mut self,
-        t_s: f64,
-        mode: Mode,
-        output: &Output,
-        truth: &Truth,
-        over: bool,
-    ) {
+    pub fn note(&mut self, t_s: f64, mode: Mode, output: &Output, truth: &Truth, over: bool) {
         self.states.push(state(truth));
         for entry in &output.events {
             if let Event::Limit(limit) = entry.event {
@@ -101,8 +93,8 @@ impl Twin {
         }
     }
 
-    /// A random instant: of every three, one in a crossing and two anywhere under way.
-    pub(super) fn instant(&self, number: usize, random: &mut ChaCha8Rng) -> f64 {
+    /// A random instant: of every three, one in a crossing and two anywhere in the run.
+    pub fn instant(&self, number: usize, random: &mut ChaCha8Rng) -> f64 {
         let (from_s, to_s) = if number % 3 == 2 && !self.crossings.is_empty() {
             self.crossings[random.random_range(0..self.crossings.len())]
         } else {
@@ -113,8 +105,8 @@ impl Twin {
         (at_s * 1e3).round() * 1e-3
     }
 
-    /// Whether the rig stands or moves otherwise in this tick.
-    pub(super) fn differs(&self, tick: usize, truth: &Truth) -> bool {
+    /// Whether the state of the rig differs in this tick.
+    pub fn differs(&self, tick: usize, truth: &Truth) -> bool {
         let Some(then) = self.states.get(tick).or(self.states.last()) else { return false };
         let now = state(truth);
         let apart = |i: usize| f64::from(now[i] - then[i]).abs();

@@ -1,13 +1,11 @@
 //! Runs that cannot end well: each holds in the fault that says why, bridges off.
 
-mod common;
-
-use common::{Bench, starter};
+use crate::common::{Bench, starter};
 use hil_sim::scenario::{Direction, Scenario};
 use interstage::fault::Fault;
 use interstage::supervise::{Command, Mode};
 
-/// The prototype with these overrides, run to its end this way.
+/// The prototype with these overrides, run to its end in this direction.
 fn run(sets: &[&str], way: Direction) -> Bench {
     let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
     let mut scenario = Scenario::resolve(None, None, &sets).expect("a sound scenario");

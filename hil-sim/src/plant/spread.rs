@@ -1,11 +1,12 @@
-//! How far the plant may differ from the rig that the controller believes in, and
-//! how its sensors err.
+//! How far the plant may differ from the rig as the controller knows it, and how its
+//! sensors err.
 
+use documented::DocumentedFields;
 use serde::{Deserialize, Serialize};
 
 /// Width of the per-seed draw of the plant. Keys in `_rel` are standard deviations
 /// relative to the nominal value; keys with a unit are half-widths about it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, DocumentedFields)]
 #[serde(deny_unknown_fields)]
 pub struct Spread {
     /// Relaxed stiffness of the tread, relative.
@@ -50,8 +51,10 @@ pub struct Spread {
     pub readback_lag_rel: f64,
 }
 
-impl Default for Spread {
-    fn default() -> Self {
+impl Spread {
+    /// That of the usual rigs.
+    #[must_use]
+    pub const fn usual() -> Self {
         Self {
             k_inf_rel: 0.04,
             stiffening_rel: 0.03,
@@ -75,39 +78,16 @@ impl Default for Spread {
             readback_lag_rel: 0.05,
         }
     }
-}
 
-impl Spread {
     /// No spread: every seed draws the nominal plant.
     #[must_use]
-    pub const fn none() -> Self {
-        Self {
-            k_inf_rel: 0.0,
-            stiffening_rel: 0.0,
-            tau_rel: 0.0,
-            mu_rel: 0.0,
-            top_load_rel: 0.0,
-            step_position_mm: 0.0,
-            step_height_mm: 0.0,
-            wheel_radius_mm: 0.0,
-            wear_mm: 0.0,
-            spring_rel: 0.0,
-            delay_rel: 0.0,
-            lag_rel: 0.0,
-            slew_rel: 0.0,
-            load_cell_gain_rel: 0.0,
-            tread_gain_rel: 0.0,
-            arm_zero_deg: 0.0,
-            supply_rel: 0.0,
-            readback_gain_rel: 0.0,
-            readback_zero_duty: 0.0,
-            readback_lag_rel: 0.0,
-        }
+    pub fn none() -> Self {
+        Self::default()
     }
 }
 
 /// Noise of the sensors, one standard deviation, and their conversion delays.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, DocumentedFields)]
 #[serde(deny_unknown_fields)]
 pub struct Noise {
     /// Load cell, N.
@@ -128,8 +108,10 @@ pub struct Noise {
     pub readback_duty: f64,
 }
 
-impl Default for Noise {
-    fn default() -> Self {
+impl Noise {
+    /// That of the usual sensors.
+    #[must_use]
+    pub const fn usual() -> Self {
         Self {
             load_cell_n: 0.05,
             tread_mm: 0.002,
@@ -141,21 +123,10 @@ impl Default for Noise {
             readback_duty: 0.002,
         }
     }
-}
 
-impl Noise {
     /// Ideal sensors: quantised, but without noise and delay.
     #[must_use]
-    pub const fn none() -> Self {
-        Self {
-            load_cell_n: 0.0,
-            tread_mm: 0.0,
-            angle_lsb: 0.0,
-            encoder_jitter_counts: 0.0,
-            load_cell_delay_s: 0.0,
-            tread_delay_s: 0.0,
-            angle_delay_s: 0.0,
-            readback_duty: 0.0,
-        }
+    pub fn none() -> Self {
+        Self::default()
     }
 }

@@ -1,0 +1,252 @@
+//! Values of keys: from the text of an override, checked for what the key takes, and units
+//! written where none belong.
+
+use interstage::rig::MAX_STEPS;
+use toml::{Table, Value};
+
+use super::error::{Origin, ScenarioError};
+use super::injection::{self, CATALOGUE, HARDWARE};
+use super::keys::{self, Kind};
+use super::run::StepAnomaly;
+
+/// Key and text of `key=value`.
+pub(super) fn split(text: &str) -> Option<(&str, &str)> {
+    let (key, value) = text.split_once('=')?;
+    let (key, value) = (key.trim(), value.trim());
+    (!key.is_empty() && !value.is_empty()).then_some((key, value))
+}
+
+/// The value that `text` means where a key takes `kind`: TOML, but words need
+/// no quotes and lists of numbers no brackets. What is neither stays text, which
+/// [`checked`] refuses.
+pub(super) fn from_text(kind: Kind, text: &str) -> Value {
+    let as_text = || Value::String(text.trim_matches('"').to_owned());
+    match kind {
+        Kind::Word(_) => as_text(),
+        Kind::Numbers(_) if !text.starts_with('[') => {
+            toml_value(&format!("[{text}]")).unwrap_or_else(as_text)
+        }
+        Kind::Number => {
+            toml_value(text).or_else(|| text.parse().ok().map(Value::Float)).unwrap_or_else(as_text)
+        }
+        _ => toml_value(text).unwrap_or_else(as_text),
+    }
+}
+
+fn toml_value(text: &str) -> Option<Value> {
+    toml::from_str::<toml::Table>(&format!("v = {text}")).ok()?.remove("v")
+}
+
+/// Whether `text` is a number with a unit behind it.
+pub(super) fn has_unit(text: &str) -> bool {
+    let text = text.trim();
+    let number = (1..=text.len())
+        .rev()
+        .filter(|&end| text.is_char_boundary(end))
+        .find(|&end| text[..end].trim_end().parse::<f64>().is_ok());
+    number.is_some_and(|end| {
+        text[end..]
+            .trim_start()
+            .starts_with(|c: char| c.is_alphabetic() || matches!(c, '%' | '°' | '/'))
+    })
+}
+
+/// `value` in the form that `kind` has in a scenario.
+///
+/// # Errors
+/// What the key takes instead.
+pub(super) fn checked(
+    origin: &Origin,
+    key: &str,
+    kind: Kind,
+    value: &Value,
+) -> Result<Value, ScenarioError> {
+    let wrong = || wrong_type(origin, key, kind, value);
+    let entry = |(index, one): (usize, &Value)| {
+        let at = format!("{key}[{}]", index + 1);
+        let given = one.as_table().ok_or_else(|| wrong_type(origin, &at, kind, one))?;
+        let entry = Entry { origin, at, given, found: Table::new() };
+        let table = if kind == Kind::Faults { entry.fault() } else { entry.anomaly() };
+        table.map(Value::Table)
+    };
+    match (kind, value) {
+        (Kind::Number, Value::Float(x)) if x.is_finite() => Ok(value.clone()),
+        (Kind::Number, Value::Integer(n)) => Ok(Value::Float(*n as f64)),
+        (Kind::Whole, Value::Integer(0..)) => Ok(value.clone()),
+        (Kind::Word(words), Value::String(word)) if words.contains(&word.as_str()) => {
+            Ok(value.clone())
+        }
+        (Kind::Numbers(most), Value::Array(list)) if list.len() <= most => {
+            let one = |one| checked(origin, key, Kind::Number, one).map_err(|_| wrong());
+            list.iter().map(one).collect::<Result<_, _>>().map(Value::Array)
+        }
+        (Kind::Anomalies | Kind::Faults, Value::Array(list)) => {
+            list.iter().enumerate().map(entry).collect::<Result<_, _>>().map(Value::Array)
+        }
+        (Kind::Number | Kind::Whole, Value::String(text)) if has_unit(text) => {
+            Err(ScenarioError::UnitInValue {
+                origin: origin.clone(),
+                key: key.to_owned(),
+                found: text.clone(),
+                unit: keys::unit(key),
+            })
+        }
+        _ => Err(wrong()),
+    }
+}
+
+/// The error of a value that is not what the key takes.
+pub(super) fn wrong_type(origin: &Origin, key: &str, kind: Kind, value: &Value) -> ScenarioError {
+    ScenarioError::WrongType {
+        origin: origin.clone(),
+        key: key.to_owned(),
+        found: value.to_string().replace('\n', " "),
+        expected: kind.expected(key),
+    }
+}
+
+/// An entry of a list of anomalies or faults, under check.
+struct Entry<'a> {
+    origin: &'a Origin,
+    /// Its key, with its number from 1.
+    at: String,
+    given: &'a Table,
+    found: Table,
+}
+
+impl Entry<'_> {
+    /// A step anomaly: its kind decides which keys it has.
+    fn anomaly(mut self) -> Result<Table, ScenarioError> {
+        let kind = self.word("kind", StepAnomaly::NAMES.map(str::to_owned).to_vec())?;
+        let fields = StepAnomaly::fields(&kind);
+        let takes = fields.join(" and ");
+        self.known(&["kind"], fields, &format!("; kind = \"{kind}\" takes {takes}"))?;
+        for name in fields {
+            if !self.field(name, if *name == "step" { MAX_STEPS as f64 } else { f64::MAX })? {
+                let key = self.key(name);
+                let kind = if *name == "step" { Kind::Whole } else { Kind::Number };
+                return Err(self.wrong(name, "nothing", kind.expected(&key)));
+            }
+        }
+        Ok(self.found)
+    }
+
+    /// A fault: its target decides which kinds there are.
+    fn fault(mut self) -> Result<Table, ScenarioError> {
+        const WHEN: [&str; 3] = ["at_s", "at_mm", "at_crossing"];
+        const FIELDS: [&str; 5] = ["at_s", "at_mm", "at_crossing", "duration_s", "magnitude"];
+        let all = || -> Vec<&injection::Entry> { CATALOGUE.iter().chain(HARDWARE).collect() };
+        let mut targets: Vec<String> = all().iter().map(|entry| entry.target.name()).collect();
+        targets.dedup();
+        let target = self.word("target", targets)?;
+        let of = all().into_iter().filter(|entry| entry.target.name() == target);
+        self.word("kind", of.map(|entry| entry.kind.name()).collect())?;
+        let hint = format!("; a fault takes target, kind, {}", FIELDS.join(", "));
+        self.known(&["target", "kind"], &FIELDS, &hint)?;
+        for name in FIELDS {
+            self.field(name, if name == "at_crossing" { 250.0 } else { f64::MAX })?;
+        }
+        let when = WHEN.into_iter().filter(|name| self.given.contains_key(*name));
+        let found = match when.collect::<Vec<_>>().as_slice() {
+            [_] => return Ok(self.found),
+            [] => "nothing".to_owned(),
+            several => several.join(" and "),
+        };
+        Err(self.wrong("at_s", &found, "one of at_s, at_mm and at_crossing".to_owned()))
+    }
+
+    fn key(&self, name: &str) -> String {
+        format!("{}.{name}", self.at)
+    }
+
+    fn wrong(&self, name: &str, found: &str, expected: String) -> ScenarioError {
+        let (origin, key) = (self.origin.clone(), self.key(name));
+        ScenarioError::WrongType { origin, key, found: found.to_owned(), expected }
+    }
+
+    /// Takes one of these words, which has to be there.
+    fn word(&mut self, name: &str, known: Vec<String>) -> Result<String, ScenarioError> {
+        match self.given.get(name) {
+            Some(Value::String(word)) if known.contains(word) => {
+                self.found.insert(name.to_owned(), Value::String(word.clone()));
+                Ok(word.clone())
+            }
+            other => {
+                let found = other.map_or_else(|| "nothing".to_owned(), Value::to_string);
+                let known: Vec<String> = known.iter().map(|word| format!("\"{word}\"")).collect();
+                Err(self.wrong(name, &found, known.join(" or ")))
+            }
+        }
+    }
+
+    /// Refuses every other key than these.
+    fn known(&self, words: &[&str], fields: &[&str], hint: &str) -> Result<(), ScenarioError> {
+        let known = |name: &str| words.contains(&name) || fields.contains(&name);
+        match self.given.keys().find(|name| !known(name)) {
+            Some(name) => Err(ScenarioError::UnknownKey {
+                origin: self.origin.clone(),
+                key: self.key(name),
+                hint: hint.to_owned(),
+            }),
+            None => Ok(()),
+        }
+    }
+
+    /// Takes a number, or a whole number from 1 to `most` where it counts something. Gives
+    /// whether it is there.
+    fn field(&mut self, name: &str, most: f64) -> Result<bool, ScenarioError> {
+        let Some(value) = self.given.get(name) else { return Ok(false) };
+        let kind = if most < f64::MAX { Kind::Whole } else { Kind::Number };
+        let value = checked(self.origin, &self.key(name), kind, value)?;
+        if let Some(number) = value.as_integer().map(|n| n as f64)
+            && !(1.0..=most).contains(&number)
+        {
+            let (origin, key) = (self.origin.clone(), self.key(name));
+            return Err(ScenarioError::OutOfRange {
+                origin,
+                key,
+                value: number,
+                min: 1.0,
+                max: most,
+            });
+        }
+        self.found.insert(name.to_owned(), value);
+        Ok(true)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_are_told_from_other_text() {
+        for text in ["0.1s", "5mm/s", "5 mm/s", "3 %", "1e-3 s", "-2N", "0.5°", "12µm"] {
+            assert!(has_unit(text), "{text}");
+        }
+        for text in ["abc", "", "1,5", "1 2", "0.1", "s"] {
+            assert!(!has_unit(text), "{text}");
+        }
+    }
+
+    #[test]
+    fn words_need_no_quotes_and_lists_no_brackets() {
+        assert_eq!(from_text(Kind::Word(&[]), "retract"), Value::String("retract".into()));
+        assert_eq!(from_text(Kind::Word(&[]), "\"retract\""), Value::String("retract".into()));
+        assert_eq!(
+            from_text(Kind::Numbers(3), "18, 40.5"),
+            Value::Array(vec![Value::Integer(18), Value::Float(40.5)])
+        );
+        assert_eq!(from_text(Kind::Numbers(3), "[18]"), Value::Array(vec![Value::Integer(18)]));
+        assert_eq!(from_text(Kind::Number, ".5"), Value::Float(0.5));
+        assert_eq!(from_text(Kind::Number, "0.1s"), Value::String("0.1s".into()));
+    }
+
+    #[test]
+    fn an_assignment_has_a_key_and_a_value() {
+        assert_eq!(split(" a.b = 1 "), Some(("a.b", "1")));
+        for text in ["a.b", "=1", "a.b=", ""] {
+            assert_eq!(split(text), None, "{text}");
+        }
+    }
+}
