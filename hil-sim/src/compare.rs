@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::record::Summary;
 use crate::scenario::{ControllerKind, Scenario};
-use crate::sil::{Options, RunError, run};
+use crate::session::{Options, RunError, run};
 
 /// Slip of a run that counts as an event, mm.
 pub const SLIP_EVENT_MM: f64 = 0.05;

@@ -11,7 +11,7 @@ use crate::plant::draw::PlantParameters;
 use crate::record::{Report, Summary};
 use crate::report::verdict::SLIP_SEEN_MM;
 use crate::scenario::Scenario;
-use crate::sil::{self, Options, RunError};
+use crate::session::{self, Options, RunError};
 
 pub use outcome::{Least, LimitCount, Outcome, Quantiles, SeedReport};
 pub use shard::{Shard, ShardError};
@@ -104,7 +104,7 @@ pub fn run(
 fn one(scenario: &Scenario, seed: u64) -> Result<RunLine, RunError> {
     let mut scenario = scenario.clone();
     scenario.run.seed = seed;
-    match sil::run(&scenario, Options::default()) {
+    match session::run(&scenario, Options::default()) {
         Ok(recording) => Ok(RunLine::new(recording.summary, PlantParameters::draw(&scenario).mu)),
         Err(error @ (RunError::Plant(_) | RunError::Refused(_))) => {
             Ok(RunLine { seed, error: Some(error.to_string()), ..RunLine::default() })

@@ -1,13 +1,13 @@
 //! A debug probe as everything here needs it: rings in the board's memory, a reset, and
 //! memory itself. One interface, a real probe or the emulated board behind it.
 
-mod patient;
+mod reconnecting;
 #[cfg(feature = "probe")]
 mod real;
 
 use std::time::Duration;
 
-pub use patient::Patient;
+pub use reconnecting::ReconnectingPort;
 #[cfg(feature = "probe")]
 pub use real::RealPort;
 

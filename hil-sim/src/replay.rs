@@ -8,8 +8,7 @@ use interstage::rig::{Rig, RigError};
 use interstage::supervise::Mode;
 use serde::Serialize;
 
-use crate::log::{Mark, Row, Run, Since};
-use crate::record::STAGE_NAMES;
+use crate::record::{self, Controller as Columns, Mark, Run, Since};
 
 /// What came of a replay.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -117,7 +116,7 @@ pub fn replay(run: &Run, rig: &Rig) -> Result<Replayed, RigError> {
 
 /// A table of rows does not say where it begins; its first mode does.
 fn starts_late(run: &Run) -> bool {
-    let first = run.rows.first().and_then(Row::telemetry);
+    let first = run.rows.first().and_then(Columns::telemetry);
     first.is_some_and(|seen| !matches!(seen.mode, Mode::Boot | Mode::SelfTest))
 }
 
@@ -140,7 +139,7 @@ impl Replay<'_> {
     }
 
     /// Runs a tick again; the first thing that differs.
-    fn tick(&mut self, controller: &Controller, row: &Row) -> Option<Difference> {
+    fn tick(&mut self, controller: &Controller, row: &Columns) -> Option<Difference> {
         let flags = row.flags();
         let input = Input {
             now: row.tick,
@@ -179,13 +178,10 @@ impl Replay<'_> {
         Some((*recorded, self.planner.plan(request)))
     }
 
-    fn compare(&mut self, row: &Row, input: &Input, output: &Output) -> Option<Difference> {
+    fn compare(&mut self, row: &Columns, input: &Input, output: &Output) -> Option<Difference> {
         let differs = |stage, quantity, recorded: String, replayed: String| Difference {
             tick: row.tick,
-            contact: STAGE_NAMES
-                .get(usize::from(row.stage).wrapping_sub(1))
-                .copied()
-                .unwrap_or("unknown stage"),
+            contact: record::stage_name(row.stage),
             stage,
             quantity,
             recorded,
@@ -302,15 +298,15 @@ mod tests {
 
     use super::*;
     use crate::scenario::Scenario;
-    use crate::sil;
+    use crate::session;
 
     fn stream() -> &'static [u8] {
         static STREAM: OnceLock<Vec<u8>> = OnceLock::new();
         STREAM.get_or_init(|| {
             let sets = ["run.seed=4".to_owned()];
             let scenario = Scenario::resolve(Some("prototype"), None, &sets).unwrap();
-            let options = sil::Options { rows: true, ..sil::Options::default() };
-            sil::run(&scenario, options).unwrap().stream
+            let options = session::Options { rows: true, ..session::Options::default() };
+            session::run(&scenario, options).unwrap().stream
         })
     }
 
@@ -347,7 +343,7 @@ mod tests {
     fn a_changed_code_is_found_where_it_first_matters() {
         let mut run = Run::of_stream(stream());
         let place = run.rows.len() / 2;
-        run.rows[place].tread_code = run.rows[place].tread_code.map(|code| code ^ 0x20);
+        run.rows[place].compression_code = run.rows[place].compression_code.map(|code| code ^ 0x20);
         let result = replay(&run, &Rig::prototype()).unwrap();
         let difference = result.difference.expect("different");
         assert_eq!((difference.tick, difference.stage), (run.rows[place].tick, "sensing"));
@@ -358,8 +354,8 @@ mod tests {
     #[test]
     fn a_start_from_the_record_of_the_run_before_is_run_again_from_there() {
         let scenario = Scenario::resolve(Some("prototype"), None, &[]).unwrap();
-        let options = sil::Options { rows: true, ..sil::Options::default() };
-        let mut session = sil::Session::new(&scenario, options).unwrap();
+        let options = session::Options { rows: true, ..session::Options::default() };
+        let mut session = session::Session::new(&scenario, options).unwrap();
         let mut bytes = Vec::new();
         for _ in 0..2 {
             let mut left = Some(interstage::supervise::Command::Start);
@@ -371,7 +367,7 @@ mod tests {
             session.restart();
         }
         let run = Run::of_stream(&bytes);
-        assert_eq!(run.tally.restarts, 1);
+        assert_eq!(run.counts.restarts, 1);
         let place = run.since_boot(1).restart().and_then(|restart| restart.place());
         assert!(
             place
@@ -402,7 +398,7 @@ mod tests {
 
     #[test]
     fn ticks_behind_a_gap_are_not_taken_for_equal() {
-        let frames: Vec<&[u8]> = crate::log::pieces(stream()).collect();
+        let frames: Vec<&[u8]> = crate::record::pieces(stream()).collect();
         let torn = [&frames[..40], &frames[41..]].concat().concat();
         let run = Run::of_stream(&torn);
         let result = replay(&run, &Rig::prototype()).unwrap();

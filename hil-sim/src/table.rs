@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
 use comfy_table::{Cell, CellAlignment, ContentArrangement, Table, TableComponent};
 
+use crate::cli::output::wrote;
 use crate::record::{CrossingLine, Report, Summary};
 use crate::report::verdict::{gap_sentence, headline};
 
@@ -29,11 +30,7 @@ pub fn run(summary: &Summary, files: &[PathBuf]) -> String {
             text += &wrapped(&report_line(kind, report), "  ");
         }
     }
-    for file in files {
-        // Paths are not wrapped, so that they can be copied.
-        text += &format!("  wrote {}\n", file.display());
-    }
-    text
+    text + &wrote(files)
 }
 
 /// A table of `head` and `rows` in the style of the others, its first column on the

@@ -5,9 +5,9 @@
 mod common;
 
 use common::{Bench, NO_SLIP_MM, WAYS, back, check_each, end_mm, scenario, starter};
-use hil_sim::record::Row;
+use hil_sim::record::Tick;
 use hil_sim::scenario::{Direction, Scenario, StepAnomaly};
-use hil_sim::sil::{Options, run};
+use hil_sim::session::{Options, run};
 use interstage::supervise::{Fault, Mode};
 
 /// What comes of a run.
@@ -30,7 +30,7 @@ struct Outcome {
 fn outcome(scenario: &Scenario) -> Outcome {
     let recording = run(scenario, Options { rows: true, speed: None }).expect("a run");
     let (summary, rows) = (recording.summary, recording.rows);
-    let last: &Row = rows.last().expect("rows");
+    let last: &Tick = rows.last().expect("rows");
     let codes = summary.limits.iter().map(|limit| limit.code);
     Outcome {
         completed: summary.completed,
@@ -40,9 +40,9 @@ fn outcome(scenario: &Scenario) -> Outcome {
             .map(|line| (line.step_mm, line.gap_mm / summary.gap_ref_mm))
             .collect(),
         found: summary.crossings.iter().map(|line| line.step_found_mm).collect(),
-        peak_preload_n: rows.iter().map(|row| row.preload_true_n).fold(0.0, f64::max),
+        peak_preload_n: rows.iter().map(|row| row.of_truth(|t| t.preload_true_n)).fold(0.0, f64::max),
         slip_mm: summary.slip_mm,
-        short_mm: (last.position_true_mm - end_mm(scenario, scenario.run.direction)).abs(),
+        short_mm: (last.of_truth(|t| t.position_true_mm) - end_mm(scenario, scenario.run.direction)).abs(),
     }
 }
 

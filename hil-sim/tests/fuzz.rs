@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use hil_sim::live::Server;
-use hil_sim::log::Run;
+use hil_sim::record::Run;
 use hil_sim::params::{Held, set_of};
 use hil_sim::replay::replay;
 use hil_sim::scenario::Scenario;
@@ -61,7 +61,7 @@ fn stream(mcap: &[u8]) -> Vec<u8> {
     let messages = mcap::MessageStream::new(mcap).expect("an MCAP file");
     messages
         .filter_map(Result::ok)
-        .filter(|message| message.channel.topic == hil_sim::log::FRAMES)
+        .filter(|message| message.channel.topic == hil_sim::record::FRAMES)
         .flat_map(|message| message.data.to_vec())
         .collect()
 }

@@ -9,11 +9,11 @@ use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use hil_sim::export::write_mcap;
-use hil_sim::log::{Decoder, Item, Mark, Run};
+use hil_sim::record::write_mcap;
+use hil_sim::record::{Decoder, Item, Mark, Run};
 use hil_sim::replay::replay;
 use hil_sim::scenario::Scenario;
-use hil_sim::sil::{Options, Session};
+use hil_sim::session::{Options, Session};
 use interstage::log::BATCH;
 use interstage::rig::Rig;
 use interstage::supervise::{Command as Order, Mode};
@@ -179,7 +179,7 @@ fn python_reads_the_files_by_the_schemas_inside() {
     let directory = tempfile::tempdir().expect("a directory");
     let path = directory.path().join("log.mcap");
     let options = Options { rows: true, ..Options::default() };
-    let recording = hil_sim::sil::run(&Scenario::default(), options).expect("a run");
+    let recording = hil_sim::session::run(&Scenario::default(), options).expect("a run");
     write_mcap(&recording, &path).expect("written");
     let found = found(&path);
     let counts = &found["counts"];

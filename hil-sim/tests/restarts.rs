@@ -2,7 +2,7 @@
 //! record of the run before it arrives.
 
 use hil_sim::scenario::{Direction, Scenario};
-use hil_sim::sil::{Options, Session};
+use hil_sim::session::{Options, Session};
 use interstage::blackbox::{Reset, Restart};
 use interstage::log::Event;
 use interstage::supervise::{Command, Fault, Limit, Mode};

@@ -1,7 +1,7 @@
 //! Stress of plant and controller, and what may be left out of a tick without a trace.
 
 use hil_sim::scenario::{Direction, Scenario};
-use hil_sim::sil::{Options, Session};
+use hil_sim::session::{Options, Session};
 use hil_sim::stress::plant::{self, Figure};
 use interstage::control::Output;
 use interstage::supervise::{Command, Leg, Mode};

@@ -7,7 +7,7 @@ use hil_sim::plant::draw::PlantParameters;
 use hil_sim::plant::rig::VirtualRig;
 use hil_sim::plant::sensors::Sensors;
 use hil_sim::scenario::Scenario;
-use hil_sim::sil::{Echo, drives, read};
+use hil_sim::session::{Echo, drives, read};
 use interstage::control::{Controller, Input, Output, State};
 use interstage::hal::MotorCommand;
 use interstage::log::Event;

@@ -22,7 +22,7 @@ use hil_sim::plant::ledger::Crossing;
 use hil_sim::plant::rig::{Drives, VirtualRig};
 use hil_sim::plant::sensors::{Codes, Sensors};
 use hil_sim::scenario::{Direction, Scenario};
-use hil_sim::sil;
+use hil_sim::session;
 use interstage::blackbox::Flight;
 use interstage::control::Controller;
 use interstage::hal::{
@@ -102,7 +102,7 @@ impl AngleBus for Peripheral {
 
 impl Motors for Peripheral {
     fn apply(&mut self, drive: MotorCommand, preload: MotorCommand) {
-        self.0.drives.set(sil::drives(drive, preload));
+        self.0.drives.set(session::drives(drive, preload));
     }
 
     fn readback(&mut self) -> Option<BridgeCodes> {
@@ -245,7 +245,7 @@ impl Board {
 
     /// A millisecond: the sensors look at the plant, the tasks run, the plant moves.
     fn tick(&mut self) -> Telemetry {
-        self.shared.codes.set(Some(sil::read(&mut self.sensors, &self.plant)));
+        self.shared.codes.set(Some(session::read(&mut self.sensors, &self.plant)));
         MockDriver::get().advance(Duration::from_millis(1));
         self.poll();
         let row = self.exchange.telemetry().expect("a tick");

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::failure::{Failure, Outcome};
 use super::output;
-use crate::log::{Mark, Run};
+use crate::record::{Mark, Run};
 use crate::replay::{Replayed, replay};
 use crate::scenario::Scenario;
 

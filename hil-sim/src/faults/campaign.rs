@@ -18,7 +18,7 @@ use super::{CATALOGUE, Entry, HARDWARE, Injection, Kind, Target, sets};
 use crate::params::set_of;
 use crate::plant::rig::VirtualRig;
 use crate::scenario::{Scenario, StepAnomaly};
-use crate::sil::{Options, RunError, Session};
+use crate::session::{Options, RunError, Session};
 
 pub use kept::{Kept, KeptError};
 pub use matrix::{Line, Outcome, Spread};

@@ -15,7 +15,7 @@ use super::record::{Reader, Record};
 use crate::plant::draw::PlantParameters;
 use crate::plant::sensors::{Codes, Sensors};
 use crate::scenario::{ControllerKind, Scenario};
-use crate::sil::{Options, RunError, Session, drives, read};
+use crate::session::{Options, RunError, Session, drives, read};
 
 /// Longest log, ticks.
 const LONGEST: usize = 20_000;

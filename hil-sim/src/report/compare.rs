@@ -7,7 +7,7 @@ use super::panels::Across;
 use super::svg::{self, escape};
 use super::tables::number;
 use super::verdict::{gap_sentence, headline};
-use crate::record::{CrossingLine, Recording, Row};
+use crate::record::{CrossingLine, Recording, Tick};
 
 /// Size of a plot, CSS pixels.
 const SIZE: (u32, u32) = (1100, 240);
@@ -130,26 +130,24 @@ fn table(differences: &[Difference]) -> String {
 }
 
 /// A plot: title, name of the axis, what it shows.
-type Plot = (&'static str, &'static str, fn(&Row) -> f64);
+type Plot = (&'static str, &'static str, fn(&Tick) -> f64);
 
 fn plots(a: &Recording, b: &Recording) -> String {
-    let known = |truth: f64, belief: f64| if truth.is_finite() { truth } else { belief };
     let plots: [Plot; 4] = [
-        ("Speed", "speed, mm/s", |row| row.speed_est_mm_s),
-        ("Preload", "preload, N", |row| row.preload_meas_n),
-        ("Tread compression", "compression, mm", |row| row.compression_meas_mm),
-        ("Radial position", "radius, mm", |row| row.radius_est_mm),
+        ("Speed", "speed, mm/s", |row| row.controller.wheel_speed_mm_s),
+        ("Preload", "preload, N", |row| row.controller.preload_n),
+        ("Tread compression", "compression, mm", |row| row.controller.compression_mm),
+        ("Radial position", "radius, mm", |row| row.controller.radius_mm),
     ];
-    let place = |row: &Row| known(row.position_true_mm, row.position_est_mm);
     let mut html = String::new();
     for (title, y_name, of) in plots {
-        let line = |name, colour, rows: &[Row]| Line {
+        let line = |name, colour, rows: &[Tick]| Line {
             name,
             look: Look::Other(colour),
             points: rows
                 .iter()
-                .filter(|row| (5..=9).contains(&row.mode))
-                .map(|row| (place(row), of(row)))
+                .filter(|row| (5..=9).contains(&row.controller.mode))
+                .map(|row| (row.position_mm(), of(row)))
                 .collect(),
         };
         let rows = |run: &Recording| Across::Position.range(&run.rows);

@@ -43,8 +43,8 @@ fn view<'a>(recording: &'a Recording, line: &CrossingLine) -> View<'a> {
     let (first, last) = (line.touch_s.min(line.lift_s), line.touch_s.max(line.lift_s));
     let x = (-BEFORE_S, last - first + AFTER_S);
     let rows = &recording.rows;
-    let from = rows.partition_point(|row| row.t_s < first + x.0);
-    let to = rows.partition_point(|row| row.t_s <= first + x.1).max(from);
+    let from = rows.partition_point(|row| row.controller.t_s < first + x.0);
+    let to = rows.partition_point(|row| row.controller.t_s <= first + x.1).max(from);
     View { rows: &rows[from..to], x, ..View::new(recording, Across::Since(first)) }
 }
 
@@ -53,8 +53,8 @@ fn panels(view: &View) -> [Panel; 6] {
     clearance.title = "Clearance at the step root".to_owned();
     let mut forces = view.panel("Forces of corner and lower wall", "force, N");
     forces.lines = vec![
-        view.line("corner", Look::Truth, |row| row.corner_force_n),
-        view.line("lower wall", Look::Other(palette::FLOOR), |row| row.floor_force_n),
+        view.line("corner", Look::Truth, |row| row.of_truth(|t| t.corner_force_n)),
+        view.line("lower wall", Look::Other(palette::FLOOR), |row| row.of_truth(|t| t.floor_force_n)),
     ];
     let mut preload = view.preload();
     // The limit may lie far above; it is in the plot of the whole run.

@@ -5,7 +5,7 @@
 //! Whether a sum wraps that was not meant to shows where overflow is checked: in the
 //! tests; the command runs the same without.
 
-use crate::sil::Echo;
+use crate::session::Echo;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use interstage::control::{Controller, Input, Output, State};

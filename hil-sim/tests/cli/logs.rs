@@ -3,16 +3,16 @@
 use std::path::{Path, PathBuf};
 
 use hil_sim::scenario::Scenario;
-use hil_sim::sil;
+use hil_sim::session;
 use serde_json::Value;
 
 use crate::{code, good, number, object, rig, rig_in, said};
 
 /// The frames of a deployment.
 fn frames() -> Vec<Vec<u8>> {
-    let options = sil::Options { rows: true, ..sil::Options::default() };
-    let stream = sil::run(&Scenario::default(), options).expect("a run").stream;
-    hil_sim::log::pieces(&stream).map(<[u8]>::to_vec).collect()
+    let options = session::Options { rows: true, ..session::Options::default() };
+    let stream = session::run(&Scenario::default(), options).expect("a run").stream;
+    hil_sim::record::pieces(&stream).map(<[u8]>::to_vec).collect()
 }
 
 /// A directory with a file in it.
@@ -146,7 +146,7 @@ fn a_log_of_other_parameters_is_refused_until_they_are_given() {
     let frames: Vec<u8> = mcap::MessageStream::new(&bytes)
         .expect("a file")
         .map(|message| message.expect("whole"))
-        .filter(|message| message.channel.topic == hil_sim::log::FRAMES)
+        .filter(|message| message.channel.topic == hil_sim::record::FRAMES)
         .flat_map(|message| message.data.to_vec())
         .collect();
     std::fs::write(directory.path().join("line.bin"), frames).expect("written");

@@ -3,7 +3,7 @@
 use hil_sim::plant::draw::PlantParameters;
 use hil_sim::plant::rig::VirtualRig;
 use hil_sim::scenario::Scenario;
-use hil_sim::sil::{Options, Session};
+use hil_sim::session::{Options, Session};
 
 /// Bound on the way, mm: a twentieth of what a wheel does in a millisecond.
 const WAY_MM: f64 = 0.002;

@@ -3,7 +3,8 @@
 use hil_sim::plant::rig::{PHASES, Phase, Resolution, Truth, VirtualRig};
 use hil_sim::plant::wall::{Step, Wall};
 use hil_sim::scenario::Scenario;
-use hil_sim::sil::{Options, Session, account, run_session};
+use hil_sim::session::plant_profile::profile;
+use hil_sim::session::{Options, Session, run_session};
 
 use crate::bench::{TICK_S, nominal, roll};
 
@@ -81,7 +82,7 @@ fn memory_is_the_same_looked_at_late() {
 #[test]
 fn the_account_adds_up() {
     let scenario = Scenario::named("prototype").unwrap();
-    let account = account(&scenario, 1).unwrap();
+    let account = profile(&scenario, 1, |rig| rig).unwrap();
     let total: f64 = account.phases.iter().map(|phase| phase.simulated_s).sum();
     assert!((total - account.simulated_s).abs() < 1e-6, "{account:?}");
     let [smooth, awake, crossing] = PHASES.map(|phase| account.phases[phase as usize]);

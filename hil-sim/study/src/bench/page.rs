@@ -9,7 +9,7 @@ use super::run::Costs;
 use super::skipping::Firmware;
 use super::{Plant, Report};
 use hil_sim::plant::precision::Point;
-use hil_sim::sil::PlantAccount;
+use hil_sim::session::plant_profile::PlantProfile;
 use hil_sim::table::plain;
 
 /// The tables of a report, for the terminal.
@@ -476,7 +476,7 @@ fn plant_chart(plant: &Plant) -> Chart {
 }
 
 fn phases_bars(costs: &Costs) -> Bars {
-    let row = |name: &str, account: &PlantAccount| {
+    let row = |name: &str, account: &PlantProfile| {
         (name.to_owned(), account.phases.iter().map(|phase| 1e3 * phase.wall_s).collect())
     };
     Bars {

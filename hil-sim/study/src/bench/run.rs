@@ -6,7 +6,8 @@ use serde::Serialize;
 
 use hil_sim::plant::rig::Resolution;
 use hil_sim::scenario::Scenario;
-use hil_sim::sil::{self, Options, PlantAccount};
+use hil_sim::session::plant_profile::{PlantProfile, profile};
+use hil_sim::session::{self, Options};
 
 /// Cruise of the deployment that is timed: 80 mm of travel in the study's ten seconds.
 const CRUISE: &str = "drive.cruise_speed_mm_s=8";
@@ -18,11 +19,11 @@ const REPEATS: usize = 15;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Costs {
     /// As it is run.
-    pub account: PlantAccount,
+    pub account: PlantProfile,
     /// The plant alone with the ring resolved throughout.
-    pub always_awake: PlantAccount,
+    pub always_awake: PlantProfile,
     /// And with every element visited that faces the wall, in reach or not.
-    pub nothing_skipped: PlantAccount,
+    pub nothing_skipped: PlantProfile,
     /// Times faster than real time: controller, sensors and plant.
     pub run_real_time_factor: f64,
     /// The plant alone.
@@ -43,13 +44,13 @@ pub struct Costs {
 pub fn measure(quick: bool) -> Result<Costs> {
     let repeats = if quick { 1 } else { REPEATS };
     let scenario = Scenario::resolve(None, None, &[CRUISE.to_owned()])?;
-    let run = sil::run(&scenario, Options::default())?;
+    let run = session::run(&scenario, Options::default())?;
     ensure!(run.summary.completed, "a deployment with {CRUISE} does not complete");
-    let account = sil::account(&scenario, repeats)?;
+    let account = profile(&scenario, repeats, |rig| rig)?;
     let awake = Resolution { always_awake: true, ..Resolution::default() };
-    let always_awake = sil::account_of(&scenario, repeats, |rig| rig.with_resolution(awake))?;
+    let always_awake = profile(&scenario, repeats, |rig| rig.with_resolution(awake))?;
     let nothing_skipped =
-        sil::account_of(&scenario, repeats, |rig| rig.with_resolution(awake).visiting_all())?;
+        profile(&scenario, repeats, |rig| rig.with_resolution(awake).visiting_all())?;
     Ok(Costs {
         run_real_time_factor: account.sil_factor(),
         plant_real_time_factor: account.plant_factor(),
@@ -64,13 +65,13 @@ pub fn measure(quick: bool) -> Result<Costs> {
 
 /// Elements visited in all phases.
 #[must_use]
-pub fn elements(account: &PlantAccount) -> u64 {
+pub fn elements(account: &PlantProfile) -> u64 {
     account.phases.iter().map(|phase| phase.elements).sum()
 }
 
 /// Part of the simulated time in the phase of this name.
 #[must_use]
-pub fn part(account: &PlantAccount, phase: &str) -> f64 {
+pub fn part(account: &PlantProfile, phase: &str) -> f64 {
     let within = account.phases.iter().filter(|found| found.name == phase);
     within.map(|found| found.simulated_s).sum::<f64>() / account.simulated_s
 }

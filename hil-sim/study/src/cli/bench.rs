@@ -8,7 +8,7 @@ use crate::bench::history::{self, Change, Entry};
 use crate::bench::{self, Options, Report, page};
 use hil_sim::cli::failure::{Failure, Outcome};
 use hil_sim::cli::output;
-use hil_sim::export::write_text;
+use hil_sim::files::write_text;
 use hil_sim::progress;
 
 /// Measures run time against error: the reduced model in five arithmetics, the plant's

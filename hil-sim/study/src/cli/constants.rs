@@ -14,7 +14,7 @@ use hil_sim::cli::output;
 use crate::constants::data::{self, Row};
 use crate::constants::design::Use;
 use crate::constants::{fit, plan, source, stored, sweep, verify};
-use hil_sim::export::write_text;
+use hil_sim::files::write_text;
 use hil_sim::progress;
 use hil_sim::table::{number, plain};
 

@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::paper::{self, Study, StudyError, draw, page};
 use hil_sim::cli::failure::{Failure, Outcome};
 use hil_sim::cli::output;
-use hil_sim::export::{make_directory, write_text};
+use hil_sim::files::{make_directory, write_text};
 use hil_sim::progress;
 use hil_sim::table::plain;
 

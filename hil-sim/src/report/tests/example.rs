@@ -1,7 +1,7 @@
 //! A made-up run for the tests of what is shown of a run: three crossings in about
 //! six seconds, shaped like a real one but from no physics.
 
-use crate::record::{CrossingLine, LogLine, Recording, Row, Summary};
+use crate::record::{Controller, CrossingLine, LogLine, Recording, Summary, Tick, TrueState};
 use crate::scenario::Scenario;
 
 /// Corner touches this far before the step face, mm.
@@ -20,13 +20,13 @@ pub(crate) fn deploy() -> Recording {
     let rows = rows();
     let crossings: Vec<CrossingLine> =
         STEPS_MM.iter().enumerate().map(|(i, &step)| line(&rows, i, step)).collect();
-    let duration_s = rows.iter().filter(|row| row.speed_true_mm_s > 0.0).count() as f64 * 1e-3;
+    let duration_s = rows.iter().filter(|row| row.of_truth(|t| t.speed_true_mm_s) > 0.0).count() as f64 * 1e-3;
     let log = rows
         .windows(2)
-        .filter(|pair| pair[0].mode != pair[1].mode)
+        .filter(|pair| pair[0].controller.mode != pair[1].controller.mode)
         .map(|pair| LogLine {
-            t_s: pair[1].t_s,
-            text: format!("mode {} <{}>", pair[1].mode, pair[1].level),
+            t_s: pair[1].controller.t_s,
+            text: format!("mode {} <{}>", pair[1].controller.mode, pair[1].controller.level),
         })
         .collect();
     let summary = Summary {
@@ -37,7 +37,7 @@ pub(crate) fn deploy() -> Recording {
         rig: "prototype".into(),
         seed: 1,
         duration_s,
-        total_s: rows.last().map_or(0.0, |row| row.t_s),
+        total_s: rows.last().map_or(0.0, |row| row.controller.t_s),
         travel_mm: TRAVEL_MM,
         gap_ref_mm: 1.62,
         max_gap_mm: crossings.iter().map(|c| c.gap_mm).fold(0.0, f64::max),
@@ -63,12 +63,12 @@ pub(crate) fn deploy() -> Recording {
 pub(crate) fn faulted() -> Recording {
     let mut recording = deploy();
     let lift_s = recording.summary.crossings[0].lift_s;
-    recording.rows.retain(|row| row.t_s < lift_s + 0.9);
+    recording.rows.retain(|row| row.controller.t_s < lift_s + 0.9);
     recording.summary.completed = false;
     let last = recording.rows[recording.rows.len() - 1];
-    recording.summary.travel_mm = last.position_true_mm;
-    recording.summary.duration_s = last.t_s - 2.0;
-    recording.summary.total_s = last.t_s;
+    recording.summary.travel_mm = last.position_mm();
+    recording.summary.duration_s = last.controller.t_s - 2.0;
+    recording.summary.total_s = last.controller.t_s;
     recording.summary.crossings.truncate(1);
     recording.summary.crossings[0].gap_measured_mm = None;
     recording.summary.max_gap_mm = 1.9;
@@ -85,8 +85,8 @@ pub(crate) fn faulted() -> Recording {
     recording
 }
 
-fn rows() -> Vec<Row> {
-    let mut rows: Vec<Row> = Vec::new();
+fn rows() -> Vec<Tick> {
+    let mut rows: Vec<Tick> = Vec::new();
     let (mut position, mut speed, mut wanted, mut preload, mut noise) =
         (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64, 1_u32);
     for tick in 0_u32..9000 {
@@ -141,7 +141,8 @@ fn rows() -> Vec<Row> {
             _ if ahead => 6,
             _ => 5,
         };
-        rows.push(Row {
+        let controller = Controller {
+            tick,
             t_s,
             mode,
             stage: match (mode, touching, lifted) {
@@ -152,30 +153,34 @@ fn rows() -> Vec<Row> {
                 _ => 6,
             },
             level: passed as u8,
-            position_true_mm: position,
-            position_est_mm: position + 0.05,
-            speed_true_mm_s: speed,
-            speed_est_mm_s: speed + 0.15 * random(),
+            position_mm: position + 0.05,
+            wheel_speed_mm_s: speed + 0.15 * random(),
             speed_ref_mm_s: speed_ref,
-            preload_true_n: preload,
-            preload_meas_n: preload + 0.2 * random(),
+            preload_n: preload + 0.2 * random(),
             preload_ref_n: wanted,
-            radius_true_mm: 125.0 - 4.0 * passed as f64 - rise,
-            radius_est_mm: 125.05 - 4.0 * passed as f64 - rise + 0.05 * random(),
-            compression_true_mm: compression,
-            compression_meas_mm: compression + 0.006 * random(),
-            root_clearance_mm: clearance,
+            radius_mm: 125.05 - 4.0 * passed as f64 - rise + 0.05 * random(),
+            compression_mm: compression + 0.006 * random(),
             gap_predicted_mm: 1.57,
+            slip_margin: 1.06 - utilisation,
+            drive_duty: speed / 60.0,
+            pretightener_duty: (wanted - preload) / 10.0,
+            ..Controller::default()
+        };
+        let truth = TrueState {
+            position_true_mm: position,
+            speed_true_mm_s: speed,
+            preload_true_n: preload,
+            radius_true_mm: 125.0 - 4.0 * passed as f64 - rise,
+            compression_true_mm: compression,
+            root_clearance_mm: clearance,
             corner_force_n: if touching { 31.0 * load } else { 0.0 },
             floor_force_n: if lifted { 0.0 } else { preload * (1.0 - climb / 0.32).max(0.0) },
             utilisation,
             slip_margin_true: 1.1 - utilisation,
-            slip_margin_est: 1.06 - utilisation,
             slip_mm: 0.004,
-            vibration_um: 0.4 * random(),
-            drive_duty: speed / 60.0,
-            preload_duty: (wanted - preload) / 10.0,
-        });
+            vibration_true_um: 0.4 * random(),
+        };
+        rows.push(Tick { controller, truth: Some(truth) });
         if position >= TRAVEL_MM + 0.5 {
             break;
         }
@@ -183,22 +188,23 @@ fn rows() -> Vec<Row> {
     rows
 }
 
-fn line(rows: &[Row], index: usize, step_mm: f64) -> CrossingLine {
-    let at = |mm: f64| rows.iter().find(|row| row.position_true_mm >= mm).expect("in the run");
+fn line(rows: &[Tick], index: usize, step_mm: f64) -> CrossingLine {
+    let at = |mm: f64| rows.iter().find(|row| row.position_mm() >= mm).expect("in the run");
     let (touch, lift) = (at(step_mm - RUN_MM), at(step_mm - LIFT_MM));
-    let gap_mm = lift.root_clearance_mm;
+    let truth = lift.truth.expect("in every row");
+    let gap_mm = truth.root_clearance_mm;
     CrossingLine {
         index: index as u8 + 1,
-        speed_mm_s: lift.speed_true_mm_s,
-        preload_n: lift.preload_true_n,
+        speed_mm_s: truth.speed_true_mm_s,
+        preload_n: truth.preload_true_n,
         gap_mm,
         gap_predicted_mm: Some(gap_mm * (0.97 + 0.015 * index as f64)),
         gap_measured_mm: (index != 1).then_some(gap_mm + 0.021),
         corner_force_n: 31.0,
         lead_time_s: Some(0.112 - 0.05 * index as f64),
         slip_mm: 0.001,
-        touch_s: touch.t_s,
-        lift_s: lift.t_s,
+        touch_s: touch.controller.t_s,
+        lift_s: lift.controller.t_s,
         step_mm,
         step_found_mm: Some(step_mm - 0.12),
         peak_preload_n: RAISED_N,

@@ -1,4 +1,4 @@
-//! What a run costs and where: the plant's phases with their share of the time.
+//! What a run costs: the plant's phases with their share of the time.
 //!
 //! The run is made once, its bridge commands are kept, and the plant alone is then led
 //! through them again: the clock is read where the phase changes and nowhere else, so
@@ -8,14 +8,14 @@ use cpu_time::ThreadTime;
 
 use serde::Serialize;
 
-use super::session::{Session, drives};
-use super::{Options, RunError, TICK_S, run, start_of};
-use crate::plant::rig::{PHASES, PhaseWork, VirtualRig};
+use super::{Options, RunError, Session, TICK_S, drives, run};
+use crate::record::starter;
+use crate::plant::rig::{Drives, PHASES, PhaseWork, VirtualRig};
 use crate::scenario::Scenario;
 
 /// What one phase of the plant did and took.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct PhaseAccount {
+pub struct PhaseProfile {
     /// Name of the phase.
     pub name: &'static str,
     /// Simulated time, s.
@@ -34,7 +34,7 @@ pub struct PhaseAccount {
     pub steady_iterations: u64,
 }
 
-impl PhaseAccount {
+impl PhaseProfile {
     /// Time taken per simulated second; none if the phase did not come up.
     #[must_use]
     pub fn cost(&self) -> Option<f64> {
@@ -44,7 +44,7 @@ impl PhaseAccount {
 
 /// What a run costs: whole, the plant alone, and by phase.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct PlantAccount {
+pub struct PlantProfile {
     /// Simulated time, s.
     pub simulated_s: f64,
     /// Controller, sensors, plant and ledger, without rows or files, s.
@@ -52,10 +52,10 @@ pub struct PlantAccount {
     /// The plant alone under the same commands, s.
     pub plant_wall_s: f64,
     /// Its phases.
-    pub phases: Vec<PhaseAccount>,
+    pub phases: Vec<PhaseProfile>,
 }
 
-impl PlantAccount {
+impl PlantProfile {
     /// Simulated over real time of the whole loop.
     #[must_use]
     pub fn sil_factor(&self) -> f64 {
@@ -77,25 +77,16 @@ impl PlantAccount {
     }
 }
 
-/// The account of a scenario; of `repeats` runs the fastest counts, as the others were
-/// disturbed.
+/// The profile of a scenario, with the plant as `changed` makes it: computed more finely, or
+/// with less skipped. Of `repeats` runs the fastest counts, as the others were disturbed.
 ///
 /// # Errors
 /// [`RunError`] as of [`run`].
-pub fn account(scenario: &Scenario, repeats: usize) -> Result<PlantAccount, RunError> {
-    account_of(scenario, repeats, |plant| plant)
-}
-
-/// The same with the plant alone, not that of the run, as `changed` makes it: computed
-/// more finely, or with less skipped.
-///
-/// # Errors
-/// As [`account`].
-pub fn account_of(
+pub fn profile(
     scenario: &Scenario,
     repeats: usize,
     changed: impl FnOnce(VirtualRig) -> VirtualRig,
-) -> Result<PlantAccount, RunError> {
+) -> Result<PlantProfile, RunError> {
     let repeats = repeats.max(1);
     let (fresh, commands) = record(scenario)?;
     let fresh = changed(fresh);
@@ -114,7 +105,7 @@ pub fn account_of(
         work = same;
     }
     let phases =
-        PHASES.iter().zip(walls.iter().zip(&work)).map(|(phase, (&wall_s, work))| PhaseAccount {
+        PHASES.iter().zip(walls.iter().zip(&work)).map(|(phase, (&wall_s, work))| PhaseProfile {
             name: phase.name(),
             simulated_s: work.simulated_s,
             wall_s,
@@ -124,7 +115,7 @@ pub fn account_of(
             steady_computed: work.steady_computed,
             steady_iterations: work.steady_iterations,
         });
-    Ok(PlantAccount {
+    Ok(PlantProfile {
         simulated_s: commands.len() as f64 * TICK_S,
         sil_wall_s,
         plant_wall_s: walls.iter().sum(),
@@ -133,11 +124,11 @@ pub fn account_of(
 }
 
 /// The plant before the run, and what its bridges were driven with.
-fn record(scenario: &Scenario) -> Result<(VirtualRig, Vec<crate::plant::rig::Drives>), RunError> {
+fn record(scenario: &Scenario) -> Result<(VirtualRig, Vec<Drives>), RunError> {
     let mut session = Session::new(scenario, Options::default())?;
     let fresh = session.plant().clone();
     let mut commands = Vec::new();
-    let mut start = Some(start_of(scenario));
+    let mut start = Some(starter(scenario.run.direction));
     while let Some(output) = super::tick(&mut session, &mut start)? {
         commands.push(drives(output.drive, output.preload));
     }
@@ -147,7 +138,7 @@ fn record(scenario: &Scenario) -> Result<(VirtualRig, Vec<crate::plant::rig::Dri
 /// Leads a plant through the commands; time and work of each phase.
 fn replay(
     mut plant: VirtualRig,
-    commands: &[crate::plant::rig::Drives],
+    commands: &[Drives],
 ) -> Result<([f64; PHASES.len()], [PhaseWork; PHASES.len()]), RunError> {
     let mut walls = [0.0; PHASES.len()];
     let mut phase = plant.phase();

@@ -97,7 +97,7 @@ impl std::fmt::Display for Mark {
 
 /// What has come so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Tally {
+pub struct Counts {
     /// Bytes.
     pub bytes: u64,
     /// Sound frames.
@@ -118,6 +118,14 @@ pub struct Tally {
     pub restarts: u64,
 }
 
+impl Counts {
+    /// Whether ticks came, and none is known to be missing.
+    #[must_use]
+    pub const fn is_complete(&self) -> bool {
+        self.ticks > 0 && self.lost_frames == 0 && self.lost_ticks == 0
+    }
+}
+
 /// A decoder under way. It takes bytes as they come.
 #[derive(Clone, Debug, Default)]
 pub struct Decoder {
@@ -131,7 +139,7 @@ pub struct Decoder {
     last: Option<(u32, SensorFrame)>,
     /// Frames went missing since the last tick.
     torn: bool,
-    tally: Tally,
+    counts: Counts,
 }
 
 impl Decoder {
@@ -143,13 +151,13 @@ impl Decoder {
 
     /// What has come so far.
     #[must_use]
-    pub const fn tally(&self) -> &Tally {
-        &self.tally
+    pub const fn counts(&self) -> &Counts {
+        &self.counts
     }
 
     /// Reads on, and hands each item to `take` in its order.
     pub fn read(&mut self, bytes: &[u8], take: &mut impl FnMut(Item)) {
-        self.tally.bytes += bytes.len() as u64;
+        self.counts.bytes += bytes.len() as u64;
         let mut held = std::mem::take(&mut self.partial);
         held.extend_from_slice(bytes);
         let used = self.look(&held, false, take);
@@ -199,7 +207,7 @@ impl Decoder {
     }
 
     fn garbage(&mut self, bytes: u64, take: &mut impl FnMut(Item)) {
-        self.tally.garbage_bytes += bytes;
+        self.counts.garbage_bytes += bytes;
         take(Item::Mark(Mark::Garbage { bytes }));
     }
 
@@ -208,7 +216,7 @@ impl Decoder {
             // The check fits by chance: its head is not to be believed either.
             return self.garbage(length, take);
         };
-        self.tally.frames += 1;
+        self.counts.frames += 1;
         self.follow(frame, &body, take);
         match body {
             Body::Identity(identity) if identity.schema != SCHEMA => {
@@ -257,7 +265,7 @@ impl Decoder {
     }
 
     fn restart(&mut self, take: &mut impl FnMut(Item)) {
-        self.tally.restarts += 1;
+        self.counts.restarts += 1;
         self.last = None;
         self.torn = false;
         take(Item::Mark(Mark::Restart));
@@ -267,8 +275,8 @@ impl Decoder {
         if frames > 0 {
             let dropped = dropped.min(frames);
             self.torn = true;
-            self.tally.lost_frames += u64::from(frames);
-            self.tally.dropped_frames += u64::from(dropped);
+            self.counts.lost_frames += u64::from(frames);
+            self.counts.dropped_frames += u64::from(dropped);
             take(Item::Mark(Mark::Lost { frames, dropped }));
         }
     }
@@ -278,10 +286,10 @@ impl Decoder {
         if let Some((last, _)) = self.last {
             let ticks = record.at().wrapping_sub(last).wrapping_sub(1);
             if ticks > 0 && record.flags.overrun() && !self.torn {
-                self.tally.overrun_ticks += u64::from(ticks);
+                self.counts.overrun_ticks += u64::from(ticks);
                 take(Item::Mark(Mark::Overrun { ticks }));
             } else if ticks > 0 {
-                self.tally.lost_ticks += u64::from(ticks);
+                self.counts.lost_ticks += u64::from(ticks);
                 if !self.torn {
                     take(Item::Mark(Mark::Skipped { ticks }));
                 }
@@ -290,13 +298,13 @@ impl Decoder {
         self.torn = false;
         let sensors = record.sensors(&before);
         self.last = Some((record.at(), sensors));
-        self.tally.ticks += 1;
+        self.counts.ticks += 1;
         take(Item::Tick(*record, sensors));
     }
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
+pub(super) mod tests {
     use super::*;
     use interstage::control::{Input, Output};
     use interstage::log::{BATCH, Scribe, Tape, identity};
@@ -322,13 +330,13 @@ pub(crate) mod tests {
         frames
     }
 
-    fn decode(bytes: &[u8], cut: usize) -> (Vec<Item>, Tally) {
+    fn decode(bytes: &[u8], cut: usize) -> (Vec<Item>, Counts) {
         let (mut decoder, mut items) = (Decoder::new(), Vec::new());
         for part in bytes.chunks(cut.max(1)) {
             decoder.read(part, &mut |item| items.push(item));
         }
         decoder.finish(&mut |item| items.push(item));
-        (items, decoder.tally)
+        (items, decoder.counts)
     }
 
     fn ticks(items: &[Item]) -> Vec<u32> {
@@ -351,10 +359,10 @@ pub(crate) mod tests {
         #[test]
         fn bytes_come_in_any_pieces(cut in 1..700_usize) {
             let bytes = frames(0, 400).concat();
-            let (items, tally) = decode(&bytes, cut);
+            let (items, counts) = decode(&bytes, cut);
             prop_assert!(ticks(&items).into_iter().eq(0..400));
             prop_assert_eq!(marks(&items), []);
-            prop_assert_eq!((tally.ticks, tally.lost_frames, tally.lost_ticks), (400, 0, 0));
+            prop_assert_eq!((counts.ticks, counts.lost_frames, counts.lost_ticks), (400, 0, 0));
         }
 
         #[test]
@@ -368,8 +376,8 @@ pub(crate) mod tests {
                 .filter(|(place, _)| !gone.contains(place))
                 .flat_map(|(_, frame)| frame.clone())
                 .collect();
-            let (items, tally) = decode(&kept, 64);
-            prop_assert_eq!(tally.lost_frames, gone.len() as u64);
+            let (items, counts) = decode(&kept, 64);
+            prop_assert_eq!(counts.lost_frames, gone.len() as u64);
             let lost: u32 = marks(&items).iter().map(|mark| match mark {
                 Mark::Lost { frames, .. } => *frames,
                 other => panic!("{other:?}"),
@@ -378,7 +386,7 @@ pub(crate) mod tests {
             prop_assert_eq!(ticks(&items).len(), 400 - 8 * gone.len());
             // Those before the first tick that came cannot be known.
             let head = ticks(&items)[0];
-            prop_assert_eq!(tally.lost_ticks as usize + head as usize, 8 * gone.len());
+            prop_assert_eq!(counts.lost_ticks as usize + head as usize, 8 * gone.len());
         }
 
         #[test]
@@ -386,14 +394,14 @@ pub(crate) mod tests {
             let all = frames(0, 400);
             let bytes = all.concat();
             let at = at % bytes.len();
-            let (items, tally) = decode(&bytes[..at], 97);
+            let (items, counts) = decode(&bytes[..at], 97);
             let mut left = at;
             let whole = all.iter().take_while(|frame| {
                 let fits = frame.len() <= left;
                 left = left.saturating_sub(frame.len());
                 fits
             });
-            prop_assert_eq!(tally.frames, whole.count() as u64);
+            prop_assert_eq!(counts.frames, whole.count() as u64);
             prop_assert!(ticks(&items).into_iter().eq(0..ticks(&items).len() as u32));
         }
 
@@ -406,17 +414,17 @@ pub(crate) mod tests {
             let mut bytes = all[..at].concat();
             bytes.extend(&garbage);
             bytes.extend(all[at..].concat());
-            let (items, tally) = decode(&bytes, 333);
+            let (items, counts) = decode(&bytes, 333);
             prop_assert!(ticks(&items).into_iter().eq(0..400));
-            prop_assert_eq!(tally.garbage_bytes as usize, garbage.len());
-            prop_assert_eq!(tally.lost_frames, 0);
+            prop_assert_eq!(counts.garbage_bytes as usize, garbage.len());
+            prop_assert_eq!(counts.lost_frames, 0);
         }
 
         #[test]
         fn random_bytes_are_marked_and_no_panic(bytes in prop::collection::vec(any::<u8>(), 0..5000)) {
-            let (items, tally) = decode(&bytes, 512);
+            let (items, counts) = decode(&bytes, 512);
             prop_assert_eq!(ticks(&items).len(), 0);
-            prop_assert_eq!(tally.garbage_bytes as usize, bytes.len());
+            prop_assert_eq!(counts.garbage_bytes as usize, bytes.len());
         }
 
         #[test]
@@ -441,8 +449,8 @@ pub(crate) mod tests {
             bytes.truncate(bytes.len() - 3);
             let second = frames(2, after);
             bytes.extend(second[gone..].concat());
-            let (items, tally) = decode(&bytes, 50);
-            prop_assert_eq!(tally.restarts, 1);
+            let (items, counts) = decode(&bytes, 50);
+            prop_assert_eq!(counts.restarts, 1);
             let place = items.iter().position(|item| *item == Item::Mark(Mark::Restart)).unwrap();
             prop_assert!(ticks(&items[..place]).iter().all(|tick| *tick >= 5));
             let expected = after / 8 * 8 - 8 * (gone.max(1) as u32 - 1);
@@ -455,8 +463,8 @@ pub(crate) mod tests {
         let all = frames(0, 3000);
         // Half way into a frame.
         let bytes = all[60..].concat();
-        let (items, tally) = decode(&bytes[100..], 100);
-        assert_eq!(tally.lost_frames, 0, "what was before is not lost but past");
+        let (items, counts) = decode(&bytes[100..], 100);
+        assert_eq!(counts.lost_frames, 0, "what was before is not lost but past");
         let first = items.iter().position(|item| matches!(item, Item::Identity(_))).unwrap();
         assert!(ticks(&items[..first]).len() <= 1000);
     }

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use super::{Source, SourceError};
-use crate::probe::{Patient, Port};
+use crate::probe::{Port, ReconnectingPort};
 
 /// RTT channel of the binary log, up.
 const LOG: u32 = 1;
@@ -16,16 +16,16 @@ const LOOKS: u32 = 20;
 /// operator's.
 ///
 /// The probe may be unplugged and the board start anew: what was not read is missing, and
-/// marked where it is missing by the log's own numbers. It ends when patience does.
+/// marked where it is missing by the log's own numbers. It ends when the port gives up.
 pub struct Probed<'a> {
-    port: Patient<'a>,
+    port: ReconnectingPort<'a>,
     letters: VecDeque<u8>,
 }
 
 impl<'a> Probed<'a> {
     /// Over this port.
     #[must_use]
-    pub const fn new(port: Patient<'a>) -> Self {
+    pub const fn new(port: ReconnectingPort<'a>) -> Self {
         Self { port, letters: VecDeque::new() }
     }
 }
@@ -62,8 +62,7 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
-    use crate::capture::{Virtual, Writer};
-    use crate::log::{Mark, Run};
+    use crate::record::{Mark, Run, Virtual, Writer};
     use crate::probe::PortError;
     use crate::replay::replay;
     use crate::scenario::Scenario;
@@ -137,7 +136,7 @@ mod tests {
             }
             Ok(Box::new(Plug(Rc::clone(&inside))))
         };
-        let port = Patient::open(connect, Duration::ZERO, Duration::from_secs(60)).unwrap();
+        let port = ReconnectingPort::open(connect, Duration::ZERO, Duration::from_secs(60)).unwrap();
         let mut source = Probed::new(port);
         source.send(b's').unwrap();
         let folder = tempfile::tempdir().unwrap();
@@ -181,11 +180,11 @@ mod tests {
             Mark::Lost { frames, dropped: 0 } => Some(u64::from(*frames)),
             _ => None,
         });
-        assert_eq!(lost, Some(run.tally.lost_frames));
-        assert_eq!(run.tally.frames + run.tally.lost_frames, whole.tally.frames);
+        assert_eq!(lost, Some(run.counts.lost_frames));
+        assert_eq!(run.counts.frames + run.counts.lost_frames, whole.counts.frames);
         let missing = whole.rows.len() - run.rows.len();
         assert!(missing > 300, "{missing}");
-        assert_eq!(run.tally.lost_ticks, missing as u64);
+        assert_eq!(run.counts.lost_ticks, missing as u64);
         assert!(replay(&run, &Rig::prototype()).unwrap().difference.is_none());
     }
 
@@ -195,7 +194,7 @@ mod tests {
         let whole = Run::of_stream(&bytes);
         let looks = in_looks(&bytes[..bytes.len() / 2]).chain([Look::Error]);
         let (run, _, _) = captured(looks.chain(in_looks(&bytes)).chain(quiet()).collect());
-        assert_eq!(run.tally.restarts, 1, "{:?}", run.marks);
+        assert_eq!(run.counts.restarts, 1, "{:?}", run.marks);
         let again = run.rows.iter().rposition(|row| row.tick == 0).unwrap();
         assert_eq!(run.rows.len() - again, whole.rows.len());
         assert!(again > whole.rows.len() / 3);

@@ -1,31 +1,26 @@
 //! A run in software: the shipping control tick in closed loop with the plant, a
-//! millisecond at a time, as fast as the host goes.
+//! millisecond at a time, as fast as the host allows.
 
-mod account;
+mod closed_loop;
 mod echo;
-mod session;
+pub mod plant_profile;
 mod stream;
-mod trace;
 
 use std::time::Instant;
 
 use interstage::control::Output;
-use interstage::log::{CrossingRecord, Event};
 use interstage::model::Strategy;
 use interstage::rig::RigError;
 use interstage::supervise::{Command, Mode};
 
 use crate::plant::limits::Refusal;
 use crate::plant::rig::PlantError;
-use crate::record::{LogLine, Recording, Report};
-use crate::scenario::{ControllerKind, Direction, Scenario};
+use crate::record::{Recording, starter};
+use crate::scenario::{ControllerKind, Scenario};
 
-pub use account::{PhaseAccount, PlantAccount, account, account_of};
+pub use closed_loop::{Session, drives, initial_rig, read};
 pub use echo::Echo;
-pub use session::{Session, drives, read};
 pub use stream::Stream;
-pub(crate) use trace::Trace;
-pub use trace::text;
 
 /// Control period, s.
 pub(crate) const TICK_S: f64 = 1e-3;
@@ -85,18 +80,10 @@ pub fn run(scenario: &Scenario, options: Options) -> Result<Recording, RunError>
 /// # Errors
 /// [`RunError::Plant`] if the plant fails.
 pub fn run_session(mut session: Session, scenario: &Scenario) -> Result<Recording, RunError> {
-    let mut start = Some(start_of(scenario));
+    let mut start = Some(starter(scenario.run.direction));
     let started = Instant::now();
     while tick(&mut session, &mut start)?.is_some() {}
     Ok(session.finish(started.elapsed().as_secs_f64()))
-}
-
-/// The command that sets a run going.
-pub(crate) fn start_of(scenario: &Scenario) -> Command {
-    match scenario.run.direction {
-        Direction::Deploy => Command::Start,
-        Direction::Retract => Command::Retract,
-    }
 }
 
 /// A tick of a run that gets `start` as soon as the drive is idle; none at its end.
@@ -107,20 +94,4 @@ fn tick(session: &mut Session, start: &mut Option<Command>) -> Result<Option<Out
     }
     let command = if session.mode() == Mode::Idle { start.take() } else { None };
     session.step(command).map(Some)
-}
-
-/// Kept for the ledger: when, and what the controller reported of a crossing.
-type Reported = (f64, CrossingRecord);
-
-/// Log line, fault and limit reports of an event.
-fn report(t_s: f64, event: &Event) -> (LogLine, Option<(bool, Report)>) {
-    let line = LogLine { t_s, text: text(event) };
-    let found = match event {
-        Event::Fault(fault) => Some((true, fault.code(), fault.sentence())),
-        Event::Limit(limit) => Some((false, limit.code(), limit.sentence())),
-        _ => None,
-    };
-    let found =
-        found.map(|(latched, code, text)| (latched, Report { t_s, code, text: text.to_owned() }));
-    (line, found)
 }

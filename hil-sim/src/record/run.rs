@@ -1,4 +1,4 @@
-//! A whole log in memory.
+//! A log in memory.
 
 use interstage::blackbox::Restart;
 use interstage::log::capture::Shots;
@@ -7,8 +7,7 @@ use interstage::log::{Entry, Event, Identity};
 use interstage::model::{Plan, PlanRequest};
 use serde::{Deserialize, Serialize};
 
-use super::decoder::{Decoder, Item, Mark, Tally};
-use super::row::Row;
+use super::{Controller, Counts, Decoder, Item, Mark};
 
 /// Who made a log, with which parameters.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -25,7 +24,7 @@ pub struct Header {
     pub parameters: String,
     /// CRC-32 of its sensors' parameters, hexadecimal.
     pub calibration: String,
-    /// Way of the wheel over a corner, mm.
+    /// Travel of the wheel over a corner, mm.
     pub corner_mm: f64,
 }
 
@@ -76,13 +75,13 @@ impl Since<'_> {
     }
 }
 
-/// A whole log.
+/// A log in memory.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Run {
     /// Who made it; none if the log has not come to say so.
     pub header: Option<Header>,
     /// A row a tick, in the order of the log.
-    pub rows: Vec<Row>,
+    pub rows: Vec<Controller>,
     /// What happened.
     pub events: Vec<Entry>,
     /// Plans with the ticks that were given them.
@@ -98,7 +97,7 @@ pub struct Run {
     /// What is missing, and before which row.
     pub marks: Vec<(usize, Mark)>,
     /// Counts of what came and what is missing.
-    pub tally: Tally,
+    pub counts: Counts,
     /// The rig's parameters as TOML, if the file has them with it.
     pub parameters: Option<String>,
 }
@@ -110,7 +109,7 @@ impl Run {
         let (mut decoder, mut run) = (Decoder::new(), Self::default());
         decoder.read(bytes, &mut |item| run.add(&item));
         decoder.finish(&mut |item| run.add(&item));
-        run.tally = *decoder.tally();
+        run.counts = *decoder.counts();
         run
     }
 
@@ -118,7 +117,7 @@ impl Run {
     pub fn add(&mut self, item: &Item) {
         match item {
             Item::Identity(identity) => self.header = Some(identity.into()),
-            Item::Tick(record, sensors) => self.rows.push(Row::of(record, sensors)),
+            Item::Tick(record, sensors) => self.rows.push(Controller::of(record, sensors)),
             Item::Plan(at, plan) => self.plans.push((*at, *plan)),
             Item::Request(at, request) => self.requests.push((*at, *request)),
             Item::Event(entry) => self.events.push(*entry),
@@ -137,8 +136,8 @@ impl Run {
         }
     }
 
-    /// What a start of the target left in the log, counted from 0; ticks begin anew with
-    /// each.
+    /// What a start of the target left in the log, counted from 0; ticks count from 0
+    /// again after each.
     #[must_use]
     pub fn since_boot(&self, boot: usize) -> Since<'_> {
         let from = boot.checked_sub(1).and_then(|before| self.boots.get(before));

@@ -5,18 +5,14 @@
 
 use std::path::Path;
 
-use interstage::log::{Event, ledger::Line};
-use interstage::supervise::{Direction, Mode};
+use interstage::log::ledger::Line;
+use interstage::supervise::Mode;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use super::complete::believe;
-use super::file::{MCAP, ReadError};
-use super::ledger::LedgerLine;
-use super::row::Row;
-use super::run::Run;
-use crate::record::{self, CrossingLine, LogLine, Recording, Report, Summary};
-use crate::sil;
+use super::read::{MCAP, ReadError, parameters, sound};
+use super::recorder::{reported, text};
+use super::{Controller, CrossingLine, LedgerLine, LogLine, Recording, Run, Summary, Tick};
 
 /// Reads what a report shows from any log.
 ///
@@ -38,7 +34,7 @@ fn with_truth(bytes: &[u8]) -> Option<Recording> {
     fn read<T: DeserializeOwned>(data: &[u8]) -> Option<T> {
         serde_json::from_slice(data).ok()
     }
-    let bytes = super::sound(bytes);
+    let bytes = sound(bytes);
     let (mut recording, mut summary) = (Recording::default(), None);
     for message in
         mcap::MessageStream::new_with_options(bytes, mcap::read::Options::IgnoreEndMagic.into())
@@ -47,7 +43,7 @@ fn with_truth(bytes: &[u8]) -> Option<Recording> {
         let Ok(message) = message else { break };
         let data = &message.data[..];
         match message.channel.topic.as_str() {
-            "/telemetry" => recording.rows.extend(read::<record::Row>(data)),
+            "/tick" => recording.rows.extend(read::<Tick>(data)),
             "/summary" => summary = read::<Summary>(data),
             "/log" => {
                 let line = read::<Value>(data)?;
@@ -58,52 +54,49 @@ fn with_truth(bytes: &[u8]) -> Option<Recording> {
         }
     }
     recording.summary = summary?;
-    recording.parameters = super::file::parameters(bytes).unwrap_or_default();
+    recording.parameters = parameters(bytes).unwrap_or_default();
     Some(recording)
 }
 
 /// The recording of a log without truth.
 #[must_use]
 pub(crate) fn believed(run: &Run) -> Recording {
-    let rows: Vec<record::Row> = run.rows.iter().map(row).collect();
     let mut summary = summary(run);
-    for event in &run.events {
-        let t_s = f64::from(event.at) * 1e-3;
-        let report = |code, text: &str| Report { t_s, code, text: text.to_owned() };
-        match event.event {
-            Event::Fault(fault) => summary.faults.push(report(fault.code(), fault.sentence())),
-            Event::Limit(limit) => summary.limits.push(report(limit.code(), limit.sentence())),
-            _ => {}
+    let mut log = Vec::new();
+    for entry in &run.events {
+        let t_s = f64::from(entry.at) * 1e-3;
+        log.push(LogLine { t_s, text: text(&entry.event) });
+        match reported(t_s, &entry.event) {
+            Some((true, fault)) => summary.faults.push(fault),
+            Some((false, limit)) => summary.limits.push(limit),
+            None => {}
         }
     }
     summary.completed &= summary.faults.is_empty();
     summary.crossings = run.ledger.iter().map(|line| crossing(run, line)).collect();
-    let lines = run.events.iter();
-    let log = lines
-        .map(|entry| LogLine { t_s: f64::from(entry.at) * 1e-3, text: sil::text(&entry.event) })
-        .collect();
+    let rows = run.rows.iter().map(|row| Tick { controller: *row, truth: None }).collect();
     let parameters = run.parameters.clone().unwrap_or_default();
     Recording { summary, rows, log, parameters, ..Recording::default() }
 }
 
-fn row(row: &Row) -> record::Row {
-    let mut place = record::Row { t_s: row.t_s, ..record::Row::unknown() };
-    believe(&mut place, row);
-    place.vibration_um = row.vibration_mm * 1e3;
-    place
+/// Completes the rows of a recording, a millisecond each from boot, by those of the
+/// controller's log. A row whose tick is not in the log keeps what it has.
+pub fn complete(recording: &mut Recording, run: &Run) {
+    for row in &run.rows {
+        if let Some(place) = recording.rows.get_mut(row.tick as usize) {
+            place.controller = *row;
+        }
+    }
 }
 
-/// What the controller's own word tells of a run.
+/// A run as the controller reports it.
 fn summary(run: &Run) -> Summary {
-    let mode = |row: &Row| row.telemetry().map(|seen| seen.mode);
-    let moves = |row: &&Row| mode(row).is_some_and(Mode::moves);
+    let moves = |row: &&Controller| row.mode().is_some_and(Mode::moves);
     let (first, last) = (run.rows.iter().find(moves), run.rows.iter().rfind(moves));
-    let retracts = first.and_then(mode).is_some_and(|mode| {
-        matches!(mode, Mode::Run(Direction::Retract, _) | Mode::Stopping(Direction::Retract))
-    });
-    let moving: Vec<&Row> = run.rows.iter().filter(moves).collect();
+    let retracts = first.is_some_and(|row| row.retracts);
+    let moving: Vec<&Controller> = run.rows.iter().filter(moves).collect();
     let preload: f64 = moving.iter().map(|row| row.preload_n).sum();
-    let between = |of: fn(&Row) -> f64| match (first, last) {
+    let between = |of: fn(&Controller) -> f64| match (first, last) {
         (Some(first), Some(last)) => of(last) - of(first),
         _ => 0.0,
     };
@@ -113,7 +106,7 @@ fn summary(run: &Run) -> Summary {
         completed: run
             .rows
             .last()
-            .and_then(mode)
+            .and_then(Controller::mode)
             .is_some_and(|mode| matches!(mode, Mode::Complete(_))),
         target: format!("log of version {}, build {}", header.version, header.build),
         controller: "recorded".to_owned(),
@@ -135,9 +128,9 @@ fn summary(run: &Run) -> Summary {
 
 /// The line of a crossing as the controller saw it; its instants by the contact stage.
 fn crossing(run: &Run, line: &Line) -> CrossingLine {
-    let told = LedgerLine::from(line);
+    let seen = LedgerLine::from(line);
     let closed = run.rows.partition_point(|row| row.tick <= line.at);
-    let on_corner = |row: &Row| (3..=5).contains(&row.stage);
+    let on_corner = |row: &Controller| (3..=5).contains(&row.stage);
     let end = run.rows[..closed].iter().rposition(on_corner).map_or(closed, |place| place + 1);
     let begin =
         run.rows[..end].iter().rposition(|row| !on_corner(row)).map_or(0, |place| place + 1);
@@ -145,21 +138,21 @@ fn crossing(run: &Run, line: &Line) -> CrossingLine {
     let touch = span.first();
     let lift = span.iter().find(|row| Some(row.stage) != touch.map(|first| first.stage));
     CrossingLine {
-        index: told.index,
-        speed_mm_s: told.speed_mm_s,
-        preload_n: told.preload_n,
+        index: seen.index,
+        speed_mm_s: seen.speed_mm_s,
+        preload_n: seen.preload_n,
         gap_mm: f64::NAN,
-        gap_predicted_mm: Some(told.gap_predicted_mm),
-        gap_measured_mm: Some(told.gap_measured_mm),
+        gap_predicted_mm: Some(seen.gap_predicted_mm),
+        gap_measured_mm: Some(seen.gap_measured_mm),
         corner_force_n: f64::NAN,
-        lead_time_s: Some(told.lead_time_s),
+        lead_time_s: Some(seen.lead_time_s),
         // The ledger's has creep and tolerances in it.
         slip_mm: f64::NAN,
-        touch_s: touch.map_or(told.t_s, |row| row.t_s),
-        lift_s: lift.or(span.last()).map_or(told.t_s, |row| row.t_s),
-        step_mm: told.step_found_mm - told.residual_mm,
-        step_found_mm: Some(told.step_found_mm),
-        peak_preload_n: told.peak_preload_n,
+        touch_s: touch.map_or(seen.t_s, |row| row.t_s),
+        lift_s: lift.or(span.last()).map_or(seen.t_s, |row| row.t_s),
+        step_mm: seen.step_found_mm - seen.residual_mm,
+        step_found_mm: Some(seen.step_found_mm),
+        peak_preload_n: seen.peak_preload_n,
         peak_utilisation: f64::NAN,
     }
 }
@@ -167,12 +160,13 @@ fn crossing(run: &Run, line: &Line) -> CrossingLine {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::export::write_mcap;
+    use crate::record::write_mcap;
     use crate::scenario::Scenario;
+    use crate::session;
 
     fn run() -> Recording {
-        let options = sil::Options { rows: true, ..sil::Options::default() };
-        sil::run(&Scenario::default(), options).unwrap()
+        let options = session::Options { rows: true, ..session::Options::default() };
+        session::run(&Scenario::default(), options).unwrap()
     }
 
     #[test]
@@ -207,7 +201,16 @@ mod tests {
             assert!((seen.step_mm - real.step_mm).abs() < 0.5);
         }
         assert_eq!(believed.log, truth.log);
-        let page = crate::report::html(&believed);
+        // Every quantity of every tick in less than this.
+        let mean = truth.stream.len() as f64 / truth.rows.len() as f64;
+        assert!(mean < 50.0, "{mean} bytes a tick");
+        let mut bare = truth.clone();
+        for (tick, row) in (0..).zip(&mut bare.rows) {
+            row.controller = Controller::unknown(tick);
+        }
+        complete(&mut bare, &Run::of_stream(&truth.stream));
+        assert_eq!(format!("{:?}", bare.rows), format!("{:?}", truth.rows));
+        let page = crate::report::html(&believed, &[]);
         assert!(page.contains("Deployed") && !page.contains("NaN"), "{}", &page[..2000]);
     }
 }

@@ -1,71 +1,75 @@
 //! What is kept of a run while it goes on.
 
-use interstage::control::Output;
-use interstage::log::{CrossingRecord, Event, Telemetry};
+use interstage::log::{CrossingRecord, Entry, Event, Telemetry};
 use interstage::supervise::Direction;
 use interstage::units::Q16;
 use sha2::{Digest, Sha256};
 
-use super::{Reported, TICK_S, report};
+use super::tally::{Ended, TICK_S, Tally, true_line};
+use super::{Controller, CrossingLine, LogLine, Recording, Report, Tick, mode_number};
 use crate::plant::ledger::Crossing;
 use crate::plant::rig::{Truth, VirtualRig};
-use crate::record::tally::{Ended, Tally, true_line, true_row};
-use crate::record::{CrossingLine, Recording, Row, mode_number};
 use crate::scenario::Scenario;
 
-/// Short of the wanted preload by no more than this part of it, it stands: what the
-/// controller allows of measured preload, and three deviations of the load cell.
-const STANDS_PART: f64 = 0.035;
+/// The preload is reached when it lacks no more than this part of its reference: what the
+/// controller allows of measured preload, and three deviations of the sensor.
+const REACHED_PART: f64 = 0.035;
 
 /// A run's record as it grows.
-pub(crate) struct Trace {
+pub(crate) struct RunRecorder {
     tally: Tally,
-    told: Told,
+    seen: ControllerView,
 }
 
-/// What the controller said that its ledger is made of.
+/// What the controller reported that the ledger of the crossings needs.
 #[derive(Default)]
-struct Told {
-    reported: Vec<Reported>,
+struct ControllerView {
+    /// Crossings, and when they were reported, s.
+    crossings: Vec<(f64, CrossingRecord)>,
     /// True preload of every tick, N.
     preload: Vec<f32>,
-    /// Preload asked for in every tick, N.
-    wanted: Vec<f32>,
+    /// Preload reference of every tick, N.
+    reference: Vec<f32>,
 }
 
-impl Trace {
+impl RunRecorder {
     pub(crate) fn new(gap_ref: f64, start_mm: f64) -> Self {
-        Self { tally: Tally::new(gap_ref, start_mm), told: Told::default() }
+        Self { tally: Tally::new(gap_ref, start_mm), seen: ControllerView::default() }
     }
 
-    /// Looks at one tick: the controller's output on the plant's state before it.
-    pub(crate) fn look(&mut self, output: &Output, truth: &Truth, keep_row: bool) {
-        let Self { tally, told } = self;
+    /// Takes a tick: the controller's state and events on the plant's `truth` before it, and
+    /// the columns of the controller if ticks are kept.
+    pub(crate) fn take(
+        &mut self,
+        telemetry: &Telemetry,
+        events: &[Entry],
+        truth: &Truth,
+        columns: Option<Controller>,
+    ) {
+        let Self { tally, seen } = self;
         let t_s = tally.time_s();
-        let seen = &output.telemetry;
-        digest(&mut tally.digest, seen);
-        for entry in &output.events {
-            let (line, found) = report(t_s, &entry.event);
-            tally.log.push(line);
-            match found {
+        digest(&mut tally.digest, telemetry);
+        for Entry { event, .. } in events {
+            tally.log.push(LogLine { t_s, text: text(event) });
+            match reported(t_s, event) {
                 Some((true, fault)) => tally.faults.push(fault),
                 Some((false, limit)) => tally.limits.push(limit),
                 None => {}
             }
-            if let Event::Crossing(record) = entry.event {
-                told.reported.push((t_s, record));
+            if let Event::Crossing(record) = event {
+                seen.crossings.push((t_s, *record));
             }
         }
-        told.preload.push(truth.preload_n as f32);
-        told.wanted.push(seen.preload_ref.to_num());
-        if keep_row {
-            tally.rows.push(row(t_s, seen, truth));
+        seen.preload.push(truth.preload_n as f32);
+        seen.reference.push(telemetry.preload_ref.to_num());
+        if let Some(controller) = columns {
+            tally.rows.push(Tick { controller, truth: Some(truth.into()) });
         }
-        tally.close_tick(seen.mode.moves(), truth);
+        tally.close_tick(telemetry.mode.moves(), truth);
     }
 
-    /// The record of a run on `target` that `arrived` at the end of this way by the
-    /// controller's word, if it did, and took `wall_s` to compute.
+    /// The record of a run on `target` that took `wall_s` to compute, and the direction in
+    /// which it `arrived`, as the controller reports it.
     pub(crate) fn finish(
         self,
         target: &'static str,
@@ -74,24 +78,23 @@ impl Trace {
         arrived: Option<Direction>,
         wall_s: f64,
     ) -> Recording {
-        let Self { tally, told } = self;
+        let Self { tally, seen } = self;
         let ended = Ended { target, scenario, plant, arrived, wall_s };
-        tally.finish(&ended, |crossing| told.line(crossing))
+        tally.finish(&ended, |crossing| seen.line(crossing))
     }
 }
 
-impl Told {
+impl ControllerView {
     /// Ledger line: the plant's truth with what the controller reported of the same
     /// step beside it.
     fn line(&self, crossing: &Crossing) -> CrossingLine {
-        let climbed = |way: Direction| (way == Direction::Deploy) == crossing.climbing;
         // Reported when the crossing is closed: the first of this step after lift-off.
-        let same = |(t_s, r): &&Reported| {
+        let same = |(t_s, r): &&(f64, CrossingRecord)| {
             *t_s >= crossing.lift_s
-                && climbed(r.direction)
+                && (r.direction == Direction::Deploy) == crossing.climbing
                 && (r.position.to_num::<f64>() - crossing.step_mm).abs() < 5.0
         };
-        let reported = self.reported.iter().find(same);
+        let reported = self.crossings.iter().find(same);
         let num = |f: fn(&CrossingRecord) -> Q16| reported.map(|(_, r)| f(r).to_num::<f64>());
         CrossingLine {
             gap_predicted_mm: num(|r| r.gap_predicted),
@@ -102,17 +105,17 @@ impl Told {
         }
     }
 
-    /// How long the true preload had stood close to the one then wanted when
-    /// the corner touched, s; negative by how long it still took.
+    /// How long the true preload had been close to the reference when the corner touched, s;
+    /// negative by how long it still took.
     fn lead_time(&self, touch_s: f64) -> f64 {
         let touch = ((touch_s / TICK_S) as usize).min(self.preload.len().saturating_sub(1));
-        let wanted = self.wanted.get(touch).copied().map_or(0.0, f64::from);
-        let stands = |n: &f32| f64::from(*n) >= wanted * (1.0 - STANDS_PART);
-        if self.preload.get(touch).is_some_and(stands) {
-            let since = self.preload[..touch].iter().rposition(|n| !stands(n)).map_or(0, |i| i + 1);
-            (touch - since) as f64 * TICK_S
+        let wanted = self.reference.get(touch).copied().map_or(0.0, f64::from);
+        let reached = |n: &f32| f64::from(*n) >= wanted * (1.0 - REACHED_PART);
+        if self.preload.get(touch).is_some_and(reached) {
+            let since = self.preload[..touch].iter().rposition(|n| !reached(n));
+            (touch - since.map_or(0, |i| i + 1)) as f64 * TICK_S
         } else {
-            let late = self.preload[touch..].iter().position(stands);
+            let late = self.preload[touch..].iter().position(reached);
             -(late.unwrap_or(self.preload.len() - touch) as f64) * TICK_S
         }
     }
@@ -142,24 +145,14 @@ fn digest(digest: &mut Sha256, seen: &Telemetry) {
     digest.update(seen.pretightener.to_bits().to_le_bytes());
 }
 
-fn row(t_s: f64, seen: &Telemetry, truth: &Truth) -> Row {
-    Row {
-        mode: mode_number(seen.mode),
-        stage: seen.stage as u8,
-        level: seen.level,
-        position_est_mm: seen.position.to_num(),
-        speed_est_mm_s: seen.speed.to_num(),
-        speed_ref_mm_s: seen.speed_ref.to_num(),
-        preload_meas_n: seen.preload.to_num(),
-        preload_ref_n: seen.preload_ref.to_num(),
-        radius_est_mm: seen.radius.to_num(),
-        compression_meas_mm: seen.compression.to_num(),
-        gap_predicted_mm: seen.gap_predicted.to_num(),
-        slip_margin_est: seen.slip_margin.to_num(),
-        drive_duty: f64::from(seen.drive.to_bits()) / 32_768.0,
-        preload_duty: f64::from(seen.pretightener.to_bits()) / 32_768.0,
-        ..true_row(t_s, truth)
-    }
+/// Code and sentence of a fault or a limit, and whether it is a fault.
+pub(super) fn reported(t_s: f64, event: &Event) -> Option<(bool, Report)> {
+    let (latched, code, text) = match event {
+        Event::Fault(fault) => (true, fault.code(), fault.sentence()),
+        Event::Limit(limit) => (false, limit.code(), limit.sentence()),
+        _ => return None,
+    };
+    Some((latched, Report { t_s, code, text: text.to_owned() }))
 }
 
 /// An event as one line of text.

@@ -7,22 +7,22 @@ use super::{Port, PortError};
 /// How a port is opened.
 type Connect<'a> = Box<dyn FnMut() -> Result<Box<dyn Port + 'a>, PortError> + 'a>;
 
-/// A port that is opened again when it fails, for as long as its patience lasts. What the
+/// A port that is opened again when it fails, for as long as its timeout lasts. What the
 /// board sends meanwhile finds no reader: the log's own numbers tell how much that was.
-pub struct Patient<'a> {
+pub struct ReconnectingPort<'a> {
     connect: Connect<'a>,
     port: Option<Box<dyn Port + 'a>>,
     /// Time between two attempts.
     pause: Duration,
     /// Longest time without the board.
-    patience: Duration,
+    timeout: Duration,
     /// When it was last there, and when it was last tried.
     lost: Option<(Instant, Instant)>,
     interruptions: u32,
     news: Vec<String>,
 }
 
-impl<'a> Patient<'a> {
+impl<'a> ReconnectingPort<'a> {
     /// Opens the port by `connect`, and again at most every `pause` when it fails.
     ///
     /// # Errors
@@ -31,14 +31,14 @@ impl<'a> Patient<'a> {
     pub fn open(
         mut connect: impl FnMut() -> Result<Box<dyn Port + 'a>, PortError> + 'a,
         pause: Duration,
-        patience: Duration,
+        timeout: Duration,
     ) -> Result<Self, PortError> {
         let port = connect()?;
         Ok(Self {
             connect: Box::new(connect),
             port: Some(port),
             pause,
-            patience,
+            timeout,
             lost: None,
             interruptions: 0,
             news: Vec::new(),
@@ -92,9 +92,9 @@ impl<'a> Patient<'a> {
                 Ok(())
             }
             Err(PortError::Board(why)) => Err(PortError::Board(why)),
-            Err(error) if since.elapsed() >= self.patience => {
-                let patience = self.patience.as_secs_f64();
-                Err(PortError::Gone(format!("not back within {patience:.0} s: {error}")))
+            Err(error) if since.elapsed() >= self.timeout => {
+                let timeout = self.timeout.as_secs_f64();
+                Err(PortError::Gone(format!("not back within {timeout:.0} s: {error}")))
             }
             Err(_) => {
                 self.lost = Some((since, Instant::now()));
@@ -104,7 +104,7 @@ impl<'a> Patient<'a> {
     }
 }
 
-impl Port for Patient<'_> {
+impl Port for ReconnectingPort<'_> {
     fn up(&mut self, channel: u32) -> Result<Vec<u8>, PortError> {
         self.attempt(Vec::new(), |port| port.up(channel))
     }
@@ -192,7 +192,7 @@ mod tests {
         }
     }
 
-    fn open(script: &[Next], patience: Duration) -> (Patient<'static>, Script) {
+    fn open(script: &[Next], timeout: Duration) -> (ReconnectingPort<'static>, Script) {
         let script: Script = Rc::new(RefCell::new(script.iter().cloned().collect()));
         let inside = Rc::clone(&script);
         let connect = move || -> Result<Box<dyn Port>, PortError> {
@@ -202,7 +202,7 @@ mod tests {
                 _ => panic!("opened without need"),
             }
         };
-        (Patient::open(connect, Duration::ZERO, patience).unwrap(), script)
+        (ReconnectingPort::open(connect, Duration::ZERO, timeout).unwrap(), script)
     }
 
     #[test]
@@ -224,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn patience_ends() {
+    fn timeout_ends() {
         let (mut port, _) = open(&[Next::Opens, Next::Unplugged], Duration::ZERO);
         assert_eq!(port.up(1), Ok(Vec::new()));
         let error = port.up(1).unwrap_err().to_string();
@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn a_board_that_is_another_one_is_no_matter_of_patience() {
+    fn a_board_that_is_another_one_is_no_matter_of_timeout() {
         let (mut port, _) = open(&[Next::Opens, Next::Wrong], Duration::from_secs(60));
         assert_eq!(port.up(1), Err(PortError::Board("no channel".to_owned())));
     }
@@ -240,7 +240,7 @@ mod tests {
     #[test]
     fn nothing_to_begin_with_is_told_at_once() {
         let connect = || Err(PortError::Absent("no probe".to_owned()));
-        let opened = Patient::open(connect, Duration::ZERO, Duration::from_secs(60));
+        let opened = ReconnectingPort::open(connect, Duration::ZERO, Duration::from_secs(60));
         assert_eq!(opened.err(), Some(PortError::Absent("no probe".to_owned())));
     }
 }

@@ -6,7 +6,7 @@ use std::io::Read;
 use interstage::supervise::{Command, Mode};
 
 use crate::scenario::{Direction, Scenario};
-use crate::sil::{self, Session};
+use crate::session::{self, Session};
 
 /// A source that broke off.
 #[derive(Debug, thiserror::Error)]
@@ -21,7 +21,7 @@ pub enum SourceError {
     },
     /// The run in software cannot be made.
     #[error(transparent)]
-    Run(#[from] sil::RunError),
+    Run(#[from] session::RunError),
     /// A source of another crate.
     #[error(transparent)]
     Other(Box<dyn std::error::Error + Send + Sync>),
@@ -66,9 +66,9 @@ fn command(letter: u8) -> Option<Command> {
     Command::ALL.into_iter().find(|command| self::letter(*command) == letter)
 }
 
-/// The command that sets a run of this direction going.
+/// The command that begins a run in this direction.
 #[must_use]
-pub(super) const fn starter(direction: Direction) -> Command {
+pub const fn starter(direction: Direction) -> Command {
     match direction {
         Direction::Deploy => Command::Start,
         Direction::Retract => Command::Retract,
@@ -125,9 +125,9 @@ impl Virtual {
     /// itself and ends when the drive has arrived.
     ///
     /// # Errors
-    /// [`sil::RunError`] if the parameters do not make a controller.
-    pub fn new(scenario: &Scenario, attended: bool) -> Result<Self, sil::RunError> {
-        let options = sil::Options { rows: true, ..sil::Options::default() };
+    /// [`session::RunError`] if the parameters do not make a controller.
+    pub fn new(scenario: &Scenario, attended: bool) -> Result<Self, session::RunError> {
+        let options = session::Options { rows: true, ..session::Options::default() };
         Ok(Self {
             session: Some(Session::new(scenario, options)?),
             letters: VecDeque::new(),
@@ -174,7 +174,7 @@ impl Source for Virtual {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::log::Run;
+    use crate::record::{Controller, Run};
 
     #[test]
     fn a_run_without_an_operator_starts_and_ends_by_itself() {
@@ -185,8 +185,8 @@ mod tests {
         }
         let run = Run::of_stream(&bytes);
         assert!(run.is_whole());
-        let last = run.rows.last().and_then(crate::log::Row::telemetry).unwrap();
-        assert!(matches!(last.mode, Mode::Complete(_)), "{last:?}");
+        let last = run.rows.last().and_then(Controller::mode).unwrap();
+        assert!(matches!(last, Mode::Complete(_)), "{last:?}");
         assert_eq!(run.ledger.len(), 3);
     }
 

@@ -1,18 +1,13 @@
-//! Logs as files: MCAP, CSV, or the bare bytes of the channel.
+//! Logs out of files: MCAP, CSV, or the bare bytes of the channel.
 
 use std::path::{Path, PathBuf};
 
-use super::decoder::{Decoder, Item};
-use super::row::Row;
-use super::run::Run;
-use interstage::log::frame::{Seen, check, look};
-use interstage::log::identity::SCHEMA;
+use interstage::log::frame::{Seen, look};
 use mcap::read::Options;
 use mcap::records::Record;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
-
-/// Topic of the MCAP file that carries the frames as they lay on the channel.
-pub const FRAMES: &str = "/frames";
+use super::tick::OFF;
+use super::{Controller, Decoder, FRAMES, Item, Run};
 
 /// First bytes of an MCAP file.
 pub(super) const MCAP: &[u8] = b"\x89MCAP";
@@ -40,9 +35,20 @@ pub enum ReadError {
     },
 }
 
+impl ReadError {
+    /// What is wrong, without the path.
+    #[must_use]
+    pub fn reason(&self) -> String {
+        match self {
+            Self::File { source, .. } => source.to_string(),
+            Self::Content { why, .. } => why.clone(),
+        }
+    }
+}
+
 /// The frames of a stream, each with what is none before it and the time at which it was
 /// written, s: that of the newest tick up to it. What follows the last is no frame.
-pub fn timed(stream: &[u8]) -> impl DoubleEndedIterator<Item = (f64, &[u8])> {
+pub fn timed(stream: &[u8]) -> impl Iterator<Item = (f64, &[u8])> {
     let (mut decoder, mut now, mut frames) = (Decoder::new(), 0.0, Vec::new());
     for frame in pieces(stream) {
         decoder.read(frame, &mut |item| {
@@ -74,20 +80,6 @@ pub fn pieces(stream: &[u8]) -> impl Iterator<Item = &[u8]> {
     })
 }
 
-/// Whether bytes are frames of the first layout, which stood between zeros.
-fn is_first_layout(bytes: &[u8]) -> bool {
-    let sound = |part: &&[u8]| {
-        let mut part = part.to_vec();
-        let whole = cobs::decode_in_place(&mut part).ok().and_then(|length| part.get(..length));
-        let parts = whole.and_then(|whole| whole.split_last_chunk());
-        parts.is_some_and(|(content, sum)| check(content).to_le_bytes() == *sum)
-    };
-    /// Frames that are looked at: the first may have lost its beginning.
-    const FRAMES: usize = 8;
-    let parts = bytes.split(|byte| *byte == 0).filter(|part| part.len() > 4 && part.len() < 512);
-    parts.take(FRAMES).any(|part| sound(&part))
-}
-
 impl Run {
     /// Reads a log of any form: MCAP with the controller's frames, CSV of rows, or the
     /// bytes of the channel. What was cut off is missing and everything before it is
@@ -99,22 +91,15 @@ impl Run {
         let bytes = std::fs::read(path)
             .map_err(|source| ReadError::File { path: path.to_owned(), source })?;
         let content = |why: String| ReadError::Content { path: path.to_owned(), why };
-        let mut old = is_first_layout(&bytes);
         let run = if bytes.starts_with(MCAP) {
-            let (run, first) = of_mcap(&bytes).map_err(|error| content(error.to_string()))?;
-            old = is_first_layout(&first);
-            run
+            of_mcap(&bytes)
         } else if bytes.starts_with(CSV) {
-            of_csv(&bytes).map_err(|error| content(error.to_string()))?
+            of_csv(&bytes).map_err(content)?
         } else {
             Self::of_stream(&bytes)
         };
         if run.rows.is_empty() {
-            return Err(content(if old {
-                format!("frames of schema 1, this reader knows {SCHEMA}")
-            } else {
-                "it holds no tick".to_owned()
-            }));
+            return Err(content("it holds no tick".to_owned()));
         }
         Ok(run)
     }
@@ -128,7 +113,7 @@ const EXPANSION: u64 = 256;
 
 /// The file up to the first record that says it is longer than what is left, or a chunk that
 /// says it holds more than it can: the reader takes such a length for the memory it needs.
-pub(crate) fn sound(bytes: &[u8]) -> &[u8] {
+pub(super) fn sound(bytes: &[u8]) -> &[u8] {
     const CHUNK: u8 = 6;
     // An opcode and a length; in a chunk two times come before the length of its content.
     const HEAD: usize = 9;
@@ -145,17 +130,15 @@ pub(crate) fn sound(bytes: &[u8]) -> &[u8] {
     bytes
 }
 
-/// Reads messages up to the end, or to where the file was cut off; with the first message's
-/// bytes.
-fn of_mcap(bytes: &[u8]) -> mcap::McapResult<(Run, Vec<u8>)> {
+/// Reads frames up to the end, or to where the file was cut off or damaged.
+fn of_mcap(bytes: &[u8]) -> Run {
     let bytes = sound(bytes);
     let (mut decoder, mut run) = (Decoder::new(), Run::default());
     let options = LinearReaderOptions::default()
         .with_skip_end_magic(true)
         .with_record_length_limit(LONGEST_RECORD);
     let mut reader = LinearReader::new_with_options(options);
-    let (mut rest, mut frames, mut first) = (bytes, None, Vec::new());
-    // A file without its end, or damaged, is read as far as it goes.
+    let (mut rest, mut frames) = (bytes, None);
     while let Some(Ok(event)) = reader.next_event() {
         match event {
             LinearReadEvent::ReadRequest(wanted) => {
@@ -169,9 +152,6 @@ fn of_mcap(bytes: &[u8]) -> mcap::McapResult<(Run, Vec<u8>)> {
                     frames = Some(channel.id)
                 }
                 Ok(Record::Message { header, data }) if Some(header.channel_id) == frames => {
-                    if first.is_empty() {
-                        first = data.to_vec();
-                    }
                     decoder.read(&data, &mut |item| run.add(&item));
                 }
                 Ok(_) => {}
@@ -180,44 +160,53 @@ fn of_mcap(bytes: &[u8]) -> mcap::McapResult<(Run, Vec<u8>)> {
         }
     }
     decoder.finish(&mut |item| run.add(&item));
-    run.tally = *decoder.tally();
+    run.counts = *decoder.counts();
     run.parameters = parameters(bytes);
-    Ok((run, first))
+    run
 }
 
-/// The parameters that stand beside the messages.
+/// The parameters that the file has beside the messages.
 pub(super) fn parameters(bytes: &[u8]) -> Option<String> {
-    let bytes = sound(bytes);
     let records =
-        mcap::read::LinearReader::new_with_options(bytes, Options::IgnoreEndMagic.into()).ok()?;
+        mcap::read::LinearReader::new_with_options(sound(bytes), Options::IgnoreEndMagic.into())
+            .ok()?;
     records.map_while(Result::ok).find_map(|record| match record {
-        mcap::records::Record::Metadata(metadata) if metadata.name == "parameters" => {
+        Record::Metadata(metadata) if metadata.name == "parameters" => {
             metadata.metadata.get("toml").cloned()
         }
         _ => None,
     })
 }
 
-/// Reads rows; a last one that was cut off is left out.
-fn of_csv(bytes: &[u8]) -> Result<Run, csv::Error> {
+/// Reads the controller's columns; a last row that was cut off is left out, and so are ticks
+/// that did not run.
+fn of_csv(bytes: &[u8]) -> Result<Run, String> {
     let mut run = Run::default();
     let mut reader = csv::Reader::from_reader(bytes);
-    let mut rows = reader.deserialize::<Row>().peekable();
+    let head = reader.headers().map_err(|error| error.to_string())?.clone();
+    let columns = serde_json::to_value(Controller::default()).unwrap_or_default();
+    let lacks = |name: &&String| !head.iter().any(|found| found == name.as_str());
+    if let Some((name, _)) = columns.as_object().into_iter().flatten().find(|(name, _)| lacks(name))
+    {
+        return Err(format!("it lacks the column {name}"));
+    }
+    let mut rows = reader.records().peekable();
     while let Some(row) = rows.next() {
-        match row {
+        match row.and_then(|row| row.deserialize::<Controller>(Some(&head))) {
+            Ok(row) if row.mode == OFF => {}
             Ok(row) => run.rows.push(row),
             Err(_) if rows.peek().is_none() => break,
-            Err(error) => return Err(error),
+            Err(error) => return Err(error.to_string()),
         }
     }
-    run.tally.bytes = bytes.len() as u64;
-    run.tally.ticks = run.rows.len() as u64;
+    run.counts.bytes = bytes.len() as u64;
+    run.counts.ticks = run.rows.len() as u64;
     Ok(run)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::decoder::tests::frames;
+    use crate::record::decoder::tests::frames;
     use super::*;
 
     fn file(bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
@@ -257,22 +246,6 @@ mod tests {
     }
 
     #[test]
-    fn a_log_of_the_first_layout_is_told_by_its_number() {
-        let content = b"\x01\x00\x00a version";
-        let frame = [&content[..], &check(content).to_le_bytes()].concat();
-        let mut bytes = vec![0; frame.len() + 8];
-        let length = cobs::encode(&frame, &mut bytes);
-        bytes.truncate(length + 1);
-        // In the middle of one frame, then whole ones.
-        let stream = [b"tail\0", &bytes[..], &bytes].concat();
-        let (_directory, path) = file(&stream);
-        let error = Run::read(&path).unwrap_err().to_string();
-        assert!(error.ends_with("frames of schema 1, this reader knows 2"), "{error}");
-        let (_directory, path) = file(&[7; 600]);
-        assert!(Run::read(&path).unwrap_err().to_string().ends_with("it holds no tick"));
-    }
-
-    #[test]
     fn a_stream_is_cut_behind_its_frames() {
         let all = frames(0, 80);
         let stream = [b"strange", &all.concat()[..], &all[3][..9]].concat();
@@ -303,6 +276,9 @@ mod tests {
             let error = Run::read(&path).unwrap_err().to_string();
             assert!(error.contains("no log") && error.lines().count() == 1, "{error}");
         }
+        let (_directory, path) = file(b"tick,t_s,mode,load_cell_code\n1,0.001,0,7\n");
+        let error = Run::read(&path).unwrap_err().to_string();
+        assert!(error.contains("it lacks the column arm_angle_at"), "{error}");
         let missing = Run::read(Path::new("/nowhere/log.mcap")).unwrap_err();
         assert!(matches!(missing, ReadError::File { .. }));
     }

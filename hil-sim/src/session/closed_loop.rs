@@ -4,28 +4,29 @@
 use interstage::blackbox::{Flight, Late, Recorder, Reset, Restart};
 use interstage::control::{Controller, Input, Output, State};
 use interstage::hal::MotorCommand;
+use interstage::log::Record;
 use interstage::model::{Plan, Planner};
 use interstage::sense::raw::{Sample, SensorFrame};
-use interstage::supervise::{Command, Direction, Mode};
+use interstage::supervise::{Command, Mode};
 use interstage::units::Tick;
 
 use super::stream::Stream;
-use super::trace::Trace;
 use super::{Options, RunError, TICK_S};
 use crate::faults::Tamper;
 use crate::plant::draw::PlantParameters;
 use crate::plant::rig::{Drives, VirtualRig};
 use crate::plant::sensors::{Codes, Sensed, Sensors};
-use crate::record::Recording;
-use crate::scenario::Scenario;
+use crate::record::{Controller as Columns, Recording, RunRecorder};
+use crate::plant::limits::Refusal;
+use crate::scenario::{Direction, Scenario};
 
 /// The angle sensor is read every second tick.
 const ANGLE_EVERY: Tick = 2;
 
 /// A run under way.
 ///
-/// [`Session::step`] is one millisecond. Who wants to tamper with what the controller
-/// gets takes its two halves apart: [`Session::sense`] and [`Session::advance`].
+/// [`Session::step`] is one millisecond. Its two halves, [`Session::sense`] and
+/// [`Session::advance`], let a caller change what the controller is given.
 pub struct Session {
     scenario: Scenario,
     options: Options,
@@ -37,7 +38,7 @@ pub struct Session {
     frame: SensorFrame,
     tick: Tick,
     plan: Option<Plan>,
-    trace: Trace,
+    recorder: RunRecorder,
     stream: Option<Stream>,
     tamper: Option<Tamper>,
     /// What the bridges and the record hold on to while ticks are lost.
@@ -48,8 +49,7 @@ pub struct Session {
 }
 
 impl Session {
-    /// A session before its first tick: for deployment with the wheel unloaded at the
-    /// stow end, for retraction pressed at the end of travel.
+    /// A session before its first tick, see [`initial_rig`].
     ///
     /// # Errors
     /// [`RunError::Rig`] if the parameters do not make a controller, [`RunError::Refused`] if
@@ -65,15 +65,8 @@ impl Session {
             planner = planner.with_speed(speed, uniform)?;
         }
         let direction = scenario.run.direction.into();
-        let parameters = PlantParameters::draw(scenario);
-        parameters.check(scenario.rig.preload.limit_n)?;
-        // The way back begins where the way out ended: at the end of travel, pressed.
-        let (position, preload) = match direction {
-            Direction::Deploy => (0.0, 0.0),
-            Direction::Retract => (scenario.rig.rig.travel_mm, scenario.rig.preload.cruise_n),
-        };
-        let sensors = Sensors::new(parameters.sensors.clone(), scenario.run.seed);
-        let plant = VirtualRig::new(parameters, position, preload, TICK_S);
+        let (plant, sensors) = initial_rig(scenario)?;
+        let position = plant.truth().position_mm;
         let controller = Controller::try_build(&scenario.rig)?;
         Ok(Self {
             tamper: Tamper::of(scenario),
@@ -82,7 +75,7 @@ impl Session {
             missed: None,
             stream: options.rows.then(|| Stream::new(scenario, &controller)),
             controller,
-            trace: Trace::new(planner.gap_ref(direction).to_num(), position),
+            recorder: RunRecorder::new(planner.gap_ref(direction).to_num(), position),
             planner,
             state: State::default(),
             sensors,
@@ -158,15 +151,16 @@ impl Session {
         command: Option<Command>,
     ) -> Result<Output, RunError> {
         let command = self.missed.take().or(command);
-        if self.tamper.as_ref().is_some_and(Tamper::lost) {
+        let columns = if self.tamper.as_ref().is_some_and(Tamper::lost) {
             (self.overrun, self.missed) = (true, command);
+            self.options.rows.then(|| Columns::unknown(self.tick))
         } else {
-            self.control(sensors, command);
-        }
+            self.control(sensors, command)
+        };
         let output = self.held.clone();
         self.held.events.clear();
         self.held.request = None;
-        self.trace.look(&output, self.plant.truth(), self.options.rows);
+        self.recorder.take(&output.telemetry, &output.events, self.plant.truth(), columns);
         let mut drives = drives(output.drive, output.preload);
         if let Some(tamper) = &mut self.tamper {
             drives = tamper.drives(drives);
@@ -176,8 +170,8 @@ impl Session {
         Ok(output)
     }
 
-    /// The control tick and the model task behind it.
-    fn control(&mut self, sensors: &SensorFrame, command: Option<Command>) {
+    /// The control tick and the model task behind it; the tick's columns if they are kept.
+    fn control(&mut self, sensors: &SensorFrame, command: Option<Command>) -> Option<Columns> {
         let tamper = self.tamper.as_mut();
         let (command, hangs, read) = tamper.map_or((command, false, true), |tamper| {
             (tamper.command(command), tamper.model_hangs(), !tamper.log_gone())
@@ -199,6 +193,8 @@ impl Session {
         if let Some(stream) = &mut self.stream {
             stream.keep(&input, output, read);
         }
+        let rows = self.options.rows;
+        rows.then(|| Columns::of(&Record::of(&input, output), sensors))
     }
 
     /// When it first did something, see [`Tamper::acts_s`], s since boot.
@@ -277,13 +273,30 @@ impl Session {
     #[must_use]
     pub fn finish(self, wall_s: f64) -> Recording {
         let arrived = match self.state.mode() {
-            Mode::Complete(way) => Some(way),
+            Mode::Complete(direction) => Some(direction),
             _ => None,
         };
-        let mut recording = self.trace.finish("sil", &self.scenario, &self.plant, arrived, wall_s);
+        let mut recording = self.recorder.finish("sil", &self.scenario, &self.plant, arrived, wall_s);
         recording.stream = self.stream.map(Stream::finish).unwrap_or_default();
         recording
     }
+}
+
+/// The plant of a scenario and its sensors before the first tick: for deployment with the wheel
+/// unloaded at the stow end; for retraction where deployment ended, pressed at the end of
+/// travel.
+///
+/// # Errors
+/// [`Refusal`] if the plant of this seed cannot be computed.
+pub fn initial_rig(scenario: &Scenario) -> Result<(VirtualRig, Sensors), Refusal> {
+    let parameters = PlantParameters::draw(scenario);
+    parameters.check(scenario.rig.preload.limit_n)?;
+    let (position, preload) = match scenario.run.direction {
+        Direction::Deploy => (0.0, 0.0),
+        Direction::Retract => (scenario.rig.rig.travel_mm, scenario.rig.preload.cruise_n),
+    };
+    let sensors = Sensors::new(parameters.sensors.clone(), scenario.run.seed);
+    Ok((VirtualRig::new(parameters, position, preload, TICK_S), sensors))
 }
 
 /// What the sensors of this plant read now, a tick after the last call.
