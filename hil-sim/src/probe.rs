@@ -1,15 +1,15 @@
 //! A debug probe as everything here needs it: rings in the board's memory, a reset, and
 //! memory itself. One interface, a real probe or the emulated board behind it.
 
-mod reconnecting;
 #[cfg(feature = "probe")]
 mod real;
+mod reconnecting;
 
 use std::time::Duration;
 
-pub use reconnecting::ReconnectingPort;
 #[cfg(feature = "probe")]
 pub use real::RealPort;
+pub use reconnecting::ReconnectingPort;
 
 /// Why a port did not do it. Each is one line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

@@ -40,9 +40,14 @@ fn outcome(scenario: &Scenario) -> Outcome {
             .map(|line| (line.step_mm, line.gap_mm / summary.gap_ref_mm))
             .collect(),
         found: summary.crossings.iter().map(|line| line.step_found_mm).collect(),
-        peak_preload_n: rows.iter().map(|row| row.of_truth(|t| t.preload_true_n)).fold(0.0, f64::max),
+        peak_preload_n: rows
+            .iter()
+            .map(|row| row.of_truth(|t| t.preload_true_n))
+            .fold(0.0, f64::max),
         slip_mm: summary.slip_mm,
-        short_mm: (last.of_truth(|t| t.position_true_mm) - end_mm(scenario, scenario.run.direction)).abs(),
+        short_mm: (last.of_truth(|t| t.position_true_mm)
+            - end_mm(scenario, scenario.run.direction))
+        .abs(),
     }
 }
 

@@ -78,7 +78,12 @@ fn each_step_is_crossed_once_and_in_its_order() {
             Direction::Retract => ([3, 2, 1], 0),
         };
         assert_eq!(order, expected, "{}", run.name());
-        assert_eq!(run.recording.rows.last().map(|row| row.controller.level), Some(level), "{}", run.name());
+        assert_eq!(
+            run.recording.rows.last().map(|row| row.controller.level),
+            Some(level),
+            "{}",
+            run.name()
+        );
         for line in crossings {
             let found = line.step_found_mm.expect("reported") - line.step_mm;
             assert!(found.abs() < 0.5, "{} step {}: {found}", run.name(), line.index);
@@ -147,7 +152,12 @@ fn the_gap_is_measured_and_predicted() {
 fn the_preload_never_exceeds_its_limit() {
     for run in RUNS.iter() {
         let limit = run.scenario.rig.preload.limit_n;
-        let peak = run.recording.rows.iter().map(|row| row.of_truth(|t| t.preload_true_n)).fold(0.0, f64::max);
+        let peak = run
+            .recording
+            .rows
+            .iter()
+            .map(|row| row.of_truth(|t| t.preload_true_n))
+            .fold(0.0, f64::max);
         assert!(peak <= limit, "{}: {peak} N", run.name());
         // And it is made use of.
         assert!(peak > 0.94 * limit, "{}: {peak} N", run.name());
@@ -159,10 +169,12 @@ fn a_crossing_is_never_slower_than_the_least_speed() {
     for run in RUNS.iter() {
         let least = run.scenario.rig.drive.min_crossing_speed_mm_s;
         for line in &run.recording.summary.crossings {
-            let on_corner = |row: &&Tick| (line.touch_s..=line.lift_s).contains(&row.controller.t_s);
+            let on_corner =
+                |row: &&Tick| (line.touch_s..=line.lift_s).contains(&row.controller.t_s);
             let rows = run.recording.rows.iter().filter(on_corner);
-            let (slowest, ticks) =
-                rows.fold((f64::MAX, 0), |(s, n), row| (s.min(row.of_truth(|t| t.speed_true_mm_s).abs()), n + 1));
+            let (slowest, ticks) = rows.fold((f64::MAX, 0), |(s, n), row| {
+                (s.min(row.of_truth(|t| t.speed_true_mm_s).abs()), n + 1)
+            });
             assert!(ticks > 100, "{} step {}: {ticks} rows", run.name(), line.index);
             assert!(slowest >= least, "{} step {}: {slowest}", run.name(), line.index);
         }
@@ -199,8 +211,14 @@ fn contact_stages_and_legs_follow_one_another() {
         let rows = &run.recording.rows;
         let mut expected = vec![1, 2, 6];
         expected.extend(per_step(run.scenario.run.direction).repeat(3));
-        assert_eq!(changes(rows.iter().map(|row| row.controller.stage)), expected, "{}", run.name());
-        let legs = changes(rows.iter().map(|row| row.controller.mode).filter(|m| (5..=8).contains(m)));
+        assert_eq!(
+            changes(rows.iter().map(|row| row.controller.stage)),
+            expected,
+            "{}",
+            run.name()
+        );
+        let legs =
+            changes(rows.iter().map(|row| row.controller.mode).filter(|m| (5..=8).contains(m)));
         assert_eq!(legs.last(), Some(&cruise), "{}", run.name());
         // Cruise between two steps is for those that lie far enough apart.
         let busy: Vec<u8> = legs.into_iter().filter(|leg| *leg != cruise).collect();
@@ -267,9 +285,24 @@ fn reported_values_follow_the_true_ones() {
             run.recording.rows.iter().filter(|r| r.controller.mode >= mode("idle")).collect();
         for row in &rows {
             for (what, got, exact, bound) in [
-                ("position", row.controller.position_mm, row.of_truth(|t| t.position_true_mm), bounds.position_mm),
-                ("preload", row.controller.preload_n, row.of_truth(|t| t.preload_true_n), bounds.preload_n),
-                ("radius", row.controller.radius_mm, row.of_truth(|t| t.radius_true_mm), bounds.radius_mm),
+                (
+                    "position",
+                    row.controller.position_mm,
+                    row.of_truth(|t| t.position_true_mm),
+                    bounds.position_mm,
+                ),
+                (
+                    "preload",
+                    row.controller.preload_n,
+                    row.of_truth(|t| t.preload_true_n),
+                    bounds.preload_n,
+                ),
+                (
+                    "radius",
+                    row.controller.radius_mm,
+                    row.of_truth(|t| t.radius_true_mm),
+                    bounds.radius_mm,
+                ),
                 (
                     "compression",
                     row.controller.compression_mm,
@@ -278,11 +311,17 @@ fn reported_values_follow_the_true_ones() {
                 ),
             ] {
                 let off = got - exact;
-                assert!(off.abs() <= bound, "{} at {} s: {what} off by {off}", run.name(), row.controller.t_s);
+                assert!(
+                    off.abs() <= bound,
+                    "{} at {} s: {what} off by {off}",
+                    run.name(),
+                    row.controller.t_s
+                );
             }
             bias += row.controller.preload_n - row.of_truth(|t| t.preload_true_n);
             if (mode("cruise")..=mode("settle")).contains(&row.controller.mode) {
-                squares += (row.controller.wheel_speed_mm_s - row.of_truth(|t| t.speed_true_mm_s)).powi(2);
+                squares +=
+                    (row.controller.wheel_speed_mm_s - row.of_truth(|t| t.speed_true_mm_s)).powi(2);
                 moving += 1;
             }
         }

@@ -12,8 +12,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use hil_sim::live::Server;
-use hil_sim::record::Run;
 use hil_sim::params::{Held, set_of};
+use hil_sim::record::Run;
 use hil_sim::replay::replay;
 use hil_sim::scenario::Scenario;
 use interstage::rig::Rig;

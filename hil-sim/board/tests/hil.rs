@@ -9,12 +9,12 @@ use std::time::Duration;
 
 use hil_sim::firmware::{self, Profile};
 use hil_sim::hil::{self, Asked, HilError, HostLine, Image};
-use hil_sim::record::{Row, Run};
 use hil_sim::plant::draw::PlantParameters;
 use hil_sim::plant::rig::VirtualRig;
 use hil_sim::plant::sensors::Sensors;
 use hil_sim::probe::{EmulatedPort, Port, PortError};
 use hil_sim::record::Recording;
+use hil_sim::record::{Row, Run};
 use hil_sim::replay::replay;
 use hil_sim::scenario::Scenario;
 use hil_sim::session;

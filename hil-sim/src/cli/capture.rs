@@ -72,8 +72,7 @@ pub fn write(
     let mcap = created(&files[0])?;
     let csv = files.get(1).map(|path| created(path)).transpose()?;
     let parameters = scenario.map(Scenario::to_toml);
-    let failed =
-        |error: WriteError| Failure::run(format!("{}: {error}", args.out.display()));
+    let failed = |error: WriteError| Failure::run(format!("{}: {error}", args.out.display()));
     let mut writer =
         Writer::new(Some(mcap), csv, parameters.as_deref(), !args.bare).map_err(failed)?;
     let (progress, started) = (progress::spinner("waiting for the first frame"), Instant::now());

@@ -137,13 +137,15 @@ fn directory(args: &Args, scenario: &Scenario) -> Result<PathBuf, Failure> {
     let directory = args.out.clone().unwrap_or_else(|| {
         let file = args.run.scenario.file().and_then(Path::file_stem);
         let rig = file.map_or(scenario.preset.as_str().into(), |stem| stem.to_string_lossy());
-        let (direction, controller) = (scenario.run.direction.name(), scenario.run.controller.name());
+        let (direction, controller) =
+            (scenario.run.direction.name(), scenario.run.controller.name());
         let board = match args.target.as_str() {
             "sil" => String::new(),
             "board" if args.hil => "-board-hil".to_owned(),
             other => format!("-{other}"),
         };
-        Path::new("out").join(format!("{direction}-{rig}-{controller}-{}{board}", scenario.run.seed))
+        Path::new("out")
+            .join(format!("{direction}-{rig}-{controller}-{}{board}", scenario.run.seed))
     });
     // Told before the run rather than after it.
     if directory.exists() && !directory.is_dir() {

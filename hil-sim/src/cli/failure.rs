@@ -5,8 +5,8 @@ use std::process::ExitCode;
 
 use interstage::rig::RigError;
 
-use crate::files::FileError;
 use crate::faults::campaign::CampaignError;
+use crate::files::FileError;
 use crate::firmware::FirmwareError;
 use crate::plant::balance::BalanceError;
 use crate::provision::ProvisionError;

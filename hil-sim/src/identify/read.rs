@@ -5,8 +5,8 @@ use std::path::Path;
 
 use super::IdentifyError;
 use super::record::{Reader, Record};
-use crate::record::Run;
 use crate::plant::rig::Drives;
+use crate::record::Run;
 use crate::scenario::Scenario;
 
 impl Record {
@@ -16,10 +16,8 @@ impl Record {
     /// [`IdentifyError::Log`] if it cannot be read or is no log of a run.
     pub fn read(path: &Path, scenario: &Scenario) -> Result<Self, IdentifyError> {
         let name = path.display().to_string();
-        let run = Run::read(path).map_err(|error| IdentifyError::Log {
-            name: name.clone(),
-            why: error.reason(),
-        })?;
+        let run = Run::read(path)
+            .map_err(|error| IdentifyError::Log { name: name.clone(), why: error.reason() })?;
         of_codes(&name, run, scenario)
     }
 }
@@ -60,7 +58,8 @@ mod tests {
         scenario.run.seed = 3;
         let directory = tempfile::tempdir().unwrap();
         let recording =
-            session::run(&scenario, session::Options { rows: true, ..session::Options::default() }).unwrap();
+            session::run(&scenario, session::Options { rows: true, ..session::Options::default() })
+                .unwrap();
         let (csv, mcap) = (directory.path().join("log.csv"), directory.path().join("log.mcap"));
         write_csv(&recording, &csv).unwrap();
         write_mcap(&recording, &mcap).unwrap();

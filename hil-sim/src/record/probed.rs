@@ -62,8 +62,8 @@ mod tests {
     use std::time::Duration;
 
     use super::*;
-    use crate::record::{Mark, Run, Virtual, Writer};
     use crate::probe::PortError;
+    use crate::record::{Mark, Run, Virtual, Writer};
     use crate::replay::replay;
     use crate::scenario::Scenario;
     use interstage::rig::Rig;
@@ -136,7 +136,8 @@ mod tests {
             }
             Ok(Box::new(Plug(Rc::clone(&inside))))
         };
-        let port = ReconnectingPort::open(connect, Duration::ZERO, Duration::from_secs(60)).unwrap();
+        let port =
+            ReconnectingPort::open(connect, Duration::ZERO, Duration::from_secs(60)).unwrap();
         let mut source = Probed::new(port);
         source.send(b's').unwrap();
         let folder = tempfile::tempdir().unwrap();

@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use super::tick::OFF;
+use super::{Controller, Decoder, FRAMES, Item, Run};
 use interstage::log::frame::{Seen, look};
 use mcap::read::Options;
 use mcap::records::Record;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
-use super::tick::OFF;
-use super::{Controller, Decoder, FRAMES, Item, Run};
 
 /// First bytes of an MCAP file.
 pub(super) const MCAP: &[u8] = b"\x89MCAP";
@@ -206,8 +206,8 @@ fn of_csv(bytes: &[u8]) -> Result<Run, String> {
 
 #[cfg(test)]
 mod tests {
-    use crate::record::decoder::tests::frames;
     use super::*;
+    use crate::record::decoder::tests::frames;
 
     fn file(bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
         let directory = tempfile::tempdir().unwrap();

@@ -93,11 +93,7 @@ impl Tally {
 
     /// The record of the run with its ledger, a line of which `line` makes.
     #[must_use]
-    pub fn finish(
-        self,
-        ended: &Ended<'_>,
-        line: impl Fn(&Crossing) -> CrossingLine,
-    ) -> Recording {
+    pub fn finish(self, ended: &Ended<'_>, line: impl Fn(&Crossing) -> CrossingLine) -> Recording {
         let Ended { target, scenario, plant, arrived, wall_s } = *ended;
         let truth = plant.truth();
         let steps = plant.parameters().wall.steps().len();

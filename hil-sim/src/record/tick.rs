@@ -422,7 +422,9 @@ mod tests {
             let (number, retracts, fault) = split(mode);
             let tick = Controller { mode: number, retracts, fault, ..Controller::default() };
             assert_eq!(tick.mode(), Some(mode));
-            assert!(format!("{mode:?}").to_lowercase().contains(&mode_name(mode)[..4].replace('-', "")));
+            assert!(
+                format!("{mode:?}").to_lowercase().contains(&mode_name(mode)[..4].replace('-', ""))
+            );
         }
         for (mode, retracts) in [(OFF, false), (3, true), (FAULT_HOLD, false), (200, true)] {
             let tick = Controller { mode, retracts, ..Controller::default() };

@@ -141,7 +141,10 @@ mod tests {
         let rows = vec![row(0.0, 5), row(1.0, 5), row(2.0, 6), row(3.0, 7)];
         let recording = Recording { rows, ..Recording::default() };
         let view = View::new(&recording, Across::Time);
-        assert_eq!(spans(&view, |row| row.controller.mode), [(0.0, 2.0, 5), (2.0, 3.0, 6), (3.0, 3.0, 7)]);
+        assert_eq!(
+            spans(&view, |row| row.controller.mode),
+            [(0.0, 2.0, 5), (2.0, 3.0, 6), (3.0, 3.0, 7)]
+        );
         let legend = legend(&recording.rows);
         assert!(legend.contains("cruise") && !legend.contains("fault"), "{legend}");
     }

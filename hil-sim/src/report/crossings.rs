@@ -54,7 +54,9 @@ fn panels(view: &View) -> [Panel; 6] {
     let mut forces = view.panel("Forces of corner and lower wall", "force, N");
     forces.lines = vec![
         view.line("corner", Look::Truth, |row| row.of_truth(|t| t.corner_force_n)),
-        view.line("lower wall", Look::Other(palette::FLOOR), |row| row.of_truth(|t| t.floor_force_n)),
+        view.line("lower wall", Look::Other(palette::FLOOR), |row| {
+            row.of_truth(|t| t.floor_force_n)
+        }),
     ];
     let mut preload = view.preload();
     // The limit may lie far above; it is in the plot of the whole run.

@@ -42,7 +42,8 @@ impl Across {
 
     /// Where the time `t_s` stands on the axis.
     fn at(self, rows: &[Tick], t_s: f64) -> f64 {
-        let place = rows.partition_point(|row| row.controller.t_s < t_s).min(rows.len().saturating_sub(1));
+        let place =
+            rows.partition_point(|row| row.controller.t_s < t_s).min(rows.len().saturating_sub(1));
         match self {
             Self::Time => t_s,
             Self::Since(start_s) => t_s - start_s,
@@ -140,7 +141,9 @@ impl<'a> View<'a> {
         panel.least_span = 2.0;
         panel.lines = vec![
             self.line("wanted", Look::Wanted, |row| row.controller.speed_ref_mm_s),
-            self.line("estimated", Look::Estimate(palette::SPEED), |row| row.controller.wheel_speed_mm_s),
+            self.line("estimated", Look::Estimate(palette::SPEED), |row| {
+                row.controller.wheel_speed_mm_s
+            }),
             self.line("true", Look::Truth, |row| row.of_truth(|t| t.speed_true_mm_s)),
         ];
         panel
@@ -161,7 +164,8 @@ impl<'a> View<'a> {
     pub(super) fn gap(&self) -> Panel {
         let summary = &self.recording.summary;
         let mut panel = self.panel("Clearance at the step root, and the gap", "clearance, mm");
-        panel.lines = vec![self.line("clearance", Look::Truth, |row| row.of_truth(|t| t.root_clearance_mm))];
+        panel.lines =
+            vec![self.line("clearance", Look::Truth, |row| row.of_truth(|t| t.root_clearance_mm))];
         panel.marks = vec![
             self.marks("predicted", (Shape::Triangle, palette::FLOOR, -SIDE), |c| {
                 c.gap_predicted_mm
@@ -194,7 +198,9 @@ impl<'a> View<'a> {
         let mut panel = self.panel("Slip margin", "friction left unused");
         panel.least_span = 0.2;
         panel.lines = vec![
-            self.line("by the model", Look::Estimate(palette::SLIP), |row| row.controller.slip_margin),
+            self.line("by the model", Look::Estimate(palette::SLIP), |row| {
+                row.controller.slip_margin
+            }),
             self.line("true", Look::Truth, |row| row.of_truth(|t| t.slip_margin_true)),
         ];
         panel.levels = vec![("slip", Look::Limit, 0.0)];

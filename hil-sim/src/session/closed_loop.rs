@@ -14,10 +14,10 @@ use super::stream::Stream;
 use super::{Options, RunError, TICK_S};
 use crate::faults::Tamper;
 use crate::plant::draw::PlantParameters;
+use crate::plant::limits::Refusal;
 use crate::plant::rig::{Drives, VirtualRig};
 use crate::plant::sensors::{Codes, Sensed, Sensors};
 use crate::record::{Controller as Columns, Recording, RunRecorder};
-use crate::plant::limits::Refusal;
 use crate::scenario::{Direction, Scenario};
 
 /// The angle sensor is read every second tick.
@@ -276,7 +276,8 @@ impl Session {
             Mode::Complete(direction) => Some(direction),
             _ => None,
         };
-        let mut recording = self.recorder.finish("sil", &self.scenario, &self.plant, arrived, wall_s);
+        let mut recording =
+            self.recorder.finish("sil", &self.scenario, &self.plant, arrived, wall_s);
         recording.stream = self.stream.map(Stream::finish).unwrap_or_default();
         recording
     }

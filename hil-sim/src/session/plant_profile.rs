@@ -9,8 +9,8 @@ use cpu_time::ThreadTime;
 use serde::Serialize;
 
 use super::{Options, RunError, Session, TICK_S, drives, run};
-use crate::record::starter;
 use crate::plant::rig::{Drives, PHASES, PhaseWork, VirtualRig};
+use crate::record::starter;
 use crate::scenario::Scenario;
 
 /// What one phase of the plant did and took.

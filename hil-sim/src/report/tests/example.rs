@@ -20,7 +20,8 @@ pub(crate) fn deploy() -> Recording {
     let rows = rows();
     let crossings: Vec<CrossingLine> =
         STEPS_MM.iter().enumerate().map(|(i, &step)| line(&rows, i, step)).collect();
-    let duration_s = rows.iter().filter(|row| row.of_truth(|t| t.speed_true_mm_s) > 0.0).count() as f64 * 1e-3;
+    let duration_s =
+        rows.iter().filter(|row| row.of_truth(|t| t.speed_true_mm_s) > 0.0).count() as f64 * 1e-3;
     let log = rows
         .windows(2)
         .filter(|pair| pair[0].controller.mode != pair[1].controller.mode)
