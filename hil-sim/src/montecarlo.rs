@@ -31,7 +31,7 @@ pub struct RunLine {
     pub gap_over_ref: Option<f64>,
     /// Crossings with gross slip, or 1 if the run slipped but none of them did.
     pub slip_events: usize,
-    /// Least time for which the wanted preload stood before a corner touched, s.
+    /// Least time by which the preload was reached before a corner touched, s.
     pub least_lead_s: Option<f64>,
     /// Least of the plant's friction less the utilisation at its peak in a crossing.
     pub least_slip_margin: Option<f64>,
@@ -80,7 +80,7 @@ pub fn slip_events(summary: &Summary) -> usize {
 }
 
 /// Runs `scenario` once for each of `seeds`, on all processors, and calls `done`
-/// after each run. The lines stand in the order of the seeds and do not depend on
+/// after each run. The lines are in the order of the seeds and do not depend on
 /// the number of processors.
 ///
 /// # Errors
@@ -113,7 +113,7 @@ fn one(scenario: &Scenario, seed: u64) -> Result<RunLine, RunError> {
     }
 }
 
-/// What a limit's code stands for.
+/// The sentence of a limit's code.
 fn limit_text(code: u16) -> &'static str {
     let known = Limit::ALL.into_iter().find(|limit| limit.code() == code);
     known.map_or("unknown limit", Limit::sentence)

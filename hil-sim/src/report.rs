@@ -7,6 +7,7 @@ mod compare;
 mod crossings;
 mod decimate;
 mod gaps;
+pub(crate) mod ledger;
 pub(crate) mod mesh;
 mod page;
 pub(crate) mod palette;

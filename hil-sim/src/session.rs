@@ -24,7 +24,7 @@ pub use stream::Stream;
 
 /// Control period, s.
 pub(crate) const TICK_S: f64 = 1e-3;
-/// Longest run, s: the whole travel at the least useful speed, three times over.
+/// Longest run, s: three times the travel at the least useful speed.
 pub(crate) const LONGEST_S: f64 = 120.0;
 
 /// What is asked of a run beside its scenario.

@@ -14,6 +14,15 @@ use anyhow::{Context, Result, ensure};
 use crate::firmware::{self, Budget, Footprint, Profile, TARGET};
 use crate::provision::{Tools, defmt_print};
 
+/// Set while the long samples are wanted.
+const LONG: &str = "RIG_LONG";
+
+/// Whether tests run their long samples.
+#[must_use]
+pub fn long() -> bool {
+    env::var_os(LONG).is_some()
+}
+
 /// How a step ended.
 enum Ended {
     Passed,

@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::core::{Heat, Meter};
 use super::image::{ARGUMENTS, Image, ImageError};
 use hil_sim::scenario::Scenario;
-use hil_sim::session::RunError;
+use hil_sim::sil::RunError;
 
 pub use phases::{Phase, PhaseCost, Spread};
 pub use recorded::{Recorded, record};

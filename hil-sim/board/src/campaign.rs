@@ -24,7 +24,7 @@ use crate::log::Strings;
 use crate::peripherals::rcc::Cause;
 use crate::run::{RunError, store};
 use crate::tampered::{Saving, letter};
-use hil_sim::record::Run;
+use hil_sim::log::Run;
 use hil_sim::scenario::Scenario;
 use parameters::Parameters;
 

@@ -1,6 +1,6 @@
 //! The firmware on the emulated board as a source of its binary log.
 
-use hil_sim::record::{Source, SourceError, letter, starter};
+use hil_sim::capture::{Source, SourceError, letter, starter};
 use crate::bench::Bench;
 use crate::log::{Line, Strings};
 use hil_sim::scenario::Scenario;

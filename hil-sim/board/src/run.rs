@@ -16,8 +16,8 @@ use interstage::rig::Rig;
 use crate::params::PLACES;
 use hil_sim::faults::{Injection, Target, sets};
 use hil_sim::firmware::{FirmwareError, Footprint};
+use hil_sim::log;
 use hil_sim::params::set_of;
-use hil_sim::record;
 use hil_sim::record::Recording;
 use hil_sim::scenario::{ControllerKind, Direction, Scenario};
 

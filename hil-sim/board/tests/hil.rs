@@ -9,15 +9,15 @@ use std::time::Duration;
 
 use hil_sim::firmware::{self, Profile};
 use hil_sim::hil::{self, Asked, HilError, HostLine, Image};
+use hil_sim::log::{Row, Run};
 use hil_sim::plant::draw::PlantParameters;
 use hil_sim::plant::rig::VirtualRig;
 use hil_sim::plant::sensors::Sensors;
 use hil_sim::probe::{EmulatedPort, Port, PortError};
 use hil_sim::record::Recording;
-use hil_sim::record::{Row, Run};
 use hil_sim::replay::replay;
 use hil_sim::scenario::Scenario;
-use hil_sim::session;
+use hil_sim::sil;
 use interstage::hil::{FIRST, Given, Taken};
 use interstage::rig::Rig;
 use interstage::supervise::{Command, Fault, Mode};
@@ -47,8 +47,8 @@ fn a_run_in_the_loop_is_the_run_in_software_bit_for_bit() {
         let scenario = scenario(sets);
         let mut port = board();
         let board = looped(&mut port, &scenario).expect("a run");
-        let options = session::Options { rows: true, ..session::Options::default() };
-        let software = session::run(&scenario, options).expect("a run");
+        let options = sil::Options { rows: true, ..sil::Options::default() };
+        let software = sil::run(&scenario, options).expect("a run");
         let (seen, wanted) = (&board.summary, &software.summary);
         assert!(seen.completed && seen.faults.is_empty(), "{:?}", seen.faults);
         assert_eq!((seen.target.as_str(), wanted.target.as_str()), ("board", "sil"));
@@ -185,12 +185,12 @@ impl Rigged {
 
     /// A millisecond of both.
     fn tick(&mut self, line: &mut HostLine<'_>, tick: u32, command: Option<Command>) -> Taken {
-        let codes = session::read(&mut self.sensors, &self.plant);
+        let codes = sil::read(&mut self.sensors, &self.plant);
         self.given =
             Given::codes(codes.wheel, codes.load_cell, codes.tread, codes.arm, codes.bridges);
         let taken = line.tick(tick, self.given.with(command)).expect("goes");
         let (drive, preload) = taken.commands();
-        self.plant.step(&session::drives(drive, preload), 1e-3).expect("moves");
+        self.plant.step(&sil::drives(drive, preload), 1e-3).expect("moves");
         taken
     }
 }

@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 use std::io::Write;
 use std::process::{Command, Stdio};
 
-use hil_sim::record::{Decoder, Item, Mark, Row, Run};
+use hil_sim::log::{Decoder, Item, Mark, Row, Run};
 use hil_sim::replay::replay;
 use interstage::log::Event;
 use interstage::log::capture::Trigger;

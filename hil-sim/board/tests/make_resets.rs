@@ -6,9 +6,9 @@ use std::error::Error;
 use std::fs::File;
 use std::io::sink;
 
-use hil_sim::record::Writer;
+use hil_sim::capture::Writer;
 use hil_sim::scenario::Scenario;
-use hil_sim::session::{Options, Session};
+use hil_sim::sil::{Options, Session};
 use interstage::supervise::{Command, Mode};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

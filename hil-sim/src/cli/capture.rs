@@ -55,6 +55,7 @@ struct Printed {
     files: Vec<PathBuf>,
 }
 
+/// Runs the verb.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     args.source.open(false, |source, scenario| write(args, source, scenario))
 }

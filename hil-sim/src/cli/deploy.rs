@@ -1,6 +1,6 @@
 //! `rig deploy`: a deployment, or the retraction.
 
-mod looped;
+pub mod looped;
 
 use std::path::{Path, PathBuf};
 
@@ -31,7 +31,7 @@ pub struct Args {
     /// firmware itself on an emulated board; or probe, the firmware on a real board, the
     /// plant on this host in the loop over its debug probe.
     #[arg(long, value_name = "TARGET", default_value = "sil")]
-    target: String,
+    pub target: String,
 
     /// With --target board: the plant not at the board's pins, but in the loop as with
     /// --target probe.
@@ -75,10 +75,19 @@ struct Printed<'a> {
     files: &'a [PathBuf],
 }
 
+impl Args {
+    /// The scenario, and where the files go if there are to be any.
+    pub fn resolve(&self) -> Result<(Scenario, Option<PathBuf>), Failure> {
+        let scenario = self.run.resolve()?;
+        let directory = if self.no_files { None } else { Some(directory(self, &scenario)?) };
+        Ok((scenario, directory))
+    }
+}
+
+/// Runs the verb.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     check_target(&args.target)?;
-    let scenario = args.run.resolve()?;
-    let directory = if args.no_files { None } else { Some(directory(args, &scenario)?) };
+    let (scenario, directory) = args.resolve()?;
     match args.target.as_str() {
         "board" => return Ok(Outcome::Code(provision::go_on(Extra::Board)?)),
         "probe" => {
@@ -116,7 +125,7 @@ pub fn conclude(
 }
 
 /// An image that has been built.
-fn read(path: &Path) -> Result<Vec<u8>, Failure> {
+pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
     let read = std::fs::read(path);
     Ok(read.map_err(|source| FirmwareError::Read { path: path.to_owned(), source })?)
 }

@@ -45,7 +45,7 @@ impl Outcome {
 pub enum Failure {
     /// It was asked for something that cannot be: exit code 2.
     Input(String),
-    /// It broke off under way: exit code 1.
+    /// It failed while it ran: exit code 1.
     Run(String),
 }
 
@@ -55,7 +55,7 @@ impl Failure {
         Self::Input(error.to_string())
     }
 
-    /// A failure under way.
+    /// A failure of a run.
     pub fn run(error: impl fmt::Display) -> Self {
         Self::Run(error.to_string())
     }

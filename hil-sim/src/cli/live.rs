@@ -1,4 +1,4 @@
-//! `rig live`: a log under way, on the terminal and on the network.
+//! `rig live`: a log as it grows, on the terminal and on the network.
 
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
@@ -38,6 +38,7 @@ pub struct Args {
     fast: bool,
 }
 
+/// Runs the verb.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     if !args.headless && !std::io::stdout().is_terminal() {
         return Err(Failure::input("standard output is no terminal: use --headless"));
@@ -138,7 +139,7 @@ impl Clock {
         Self { fast, began: Instant::now(), first: None, tick: 0 }
     }
 
-    /// The log has come to this tick. A target that starts anew starts the clock anew.
+    /// The log has come to this tick. A restart of the target restarts the clock.
     fn tick(&mut self, tick: u32) {
         if self.first.is_none_or(|first| tick < first) {
             (self.first, self.began) = (Some(tick), Instant::now());

@@ -92,8 +92,8 @@ fn two(args: &Args, first: &Recording, path: &Path) -> Result<Outcome, Failure> 
 
 fn human(printed: &Two<'_>) -> String {
     let rows = printed.differences.iter().map(|difference| {
-        let Difference { index, quantity, unit, a, b, change } = difference;
-        let value = |value: &Option<f64>| table::number(*value, 3);
+        let Difference { index, quantity, unit, decimals, a, b, change } = difference;
+        let value = |value: &Option<f64>| table::number(*value, *decimals);
         vec![format!("{index}"), format!("{quantity}, {unit}"), value(a), value(b), value(change)]
     });
     let table = table::plain(&["step", "quantity", "A", "B", "B - A"], rows);

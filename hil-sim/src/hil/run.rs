@@ -1,4 +1,4 @@
-//! A whole run in the loop: reset, one command, arrival.
+//! A run in the loop: reset, one command, arrival.
 
 use std::collections::VecDeque;
 use std::time::Instant;
@@ -158,7 +158,7 @@ impl BoardLog {
         })
     }
 
-    /// A tick of the log; those behind the end have no truth and are passed over.
+    /// A tick of the log; those after the end have no truth and are skipped.
     fn tick(&mut self, record: &Record, mut sensors: SensorFrame) -> Result<(), HilError> {
         let at = record.at();
         if at != self.due {

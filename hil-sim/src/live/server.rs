@@ -92,7 +92,7 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 /// Serves a client until it goes.
 fn serve(stream: TcpStream, messages: &Receiver<Arc<Published>>) {
     let Ok(mut socket) = tungstenite::accept_hdr(stream, agree) else { return };
-    // A client that goes ends in an error of whatever was under way.
+    // A client that disconnects ends in an error.
     let _ = greet(&mut socket).and_then(|()| talk(&mut socket, messages));
 }
 
@@ -161,25 +161,21 @@ fn talk(
     }
 }
 
-/// Takes a client's wish in; what is none is passed over.
+/// Takes a client's request in; what is none is ignored.
 fn listen(text: &str, subscribed: &mut HashMap<u32, Vec<u32>>) {
-    let Ok(wish) = serde_json::from_str::<Value>(text) else { return };
+    let Ok(request) = serde_json::from_str::<Value>(text) else { return };
     let number = |value: &Value| value.as_u64().and_then(|number| u32::try_from(number).ok());
-    match wish["op"].as_str() {
+    let list = |key: &str| request[key].as_array().into_iter().flatten();
+    match request["op"].as_str() {
         Some("subscribe") => {
-            for one in wish["subscriptions"].as_array().into_iter().flatten() {
+            for one in list("subscriptions") {
                 if let (Some(id), Some(channel)) = (number(&one["id"]), number(&one["channelId"])) {
                     subscribed.entry(channel).or_default().push(id);
                 }
             }
         }
         Some("unsubscribe") => {
-            let gone: Vec<u32> = wish["subscriptionIds"]
-                .as_array()
-                .into_iter()
-                .flatten()
-                .filter_map(number)
-                .collect();
+            let gone: Vec<u32> = list("subscriptionIds").filter_map(number).collect();
             for ids in subscribed.values_mut() {
                 ids.retain(|id| !gone.contains(id));
             }

@@ -16,7 +16,7 @@ pub struct Shard {
 pub struct ShardError;
 
 impl Shard {
-    /// The whole campaign.
+    /// All of the campaign.
     pub const WHOLE: Self = Self { index: 1, of: 1 };
 
     /// Its part of the `count` seeds that follow `base`: every n-th of them, so that

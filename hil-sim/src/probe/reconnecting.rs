@@ -1,4 +1,4 @@
-//! A port that outlives its cable: what is unplugged is looked for again.
+//! A port that is opened again after its cable was unplugged.
 
 use std::time::{Duration, Instant};
 
@@ -7,8 +7,8 @@ use super::{Port, PortError};
 /// How a port is opened.
 type Connect<'a> = Box<dyn FnMut() -> Result<Box<dyn Port + 'a>, PortError> + 'a>;
 
-/// A port that is opened again when it fails, for as long as its timeout lasts. What the
-/// board sends meanwhile finds no reader: the log's own numbers tell how much that was.
+/// A port that is opened again when it fails, until its timeout has passed. What the
+/// board sends meanwhile finds no reader: the log's own numbers show how much that was.
 pub struct ReconnectingPort<'a> {
     connect: Connect<'a>,
     port: Option<Box<dyn Port + 'a>>,
@@ -165,7 +165,7 @@ mod tests {
                 Some(Next::Bytes(bytes)) => Ok(bytes),
                 Some(Next::Unplugged) => Err(PortError::Gone("USB error".to_owned())),
                 Some(Next::Wrong) => Err(PortError::Board("no channel".to_owned())),
-                _ => panic!("the port was not opened anew"),
+                _ => panic!("the port was not opened again"),
             }
         }
     }
@@ -224,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn timeout_ends() {
+    fn it_gives_up_after_the_timeout() {
         let (mut port, _) = open(&[Next::Opens, Next::Unplugged], Duration::ZERO);
         assert_eq!(port.up(1), Ok(Vec::new()));
         let error = port.up(1).unwrap_err().to_string();
@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn a_board_that_is_another_one_is_no_matter_of_timeout() {
+    fn a_board_that_is_another_one_is_an_error_at_once() {
         let (mut port, _) = open(&[Next::Opens, Next::Wrong], Duration::from_secs(60));
         assert_eq!(port.up(1), Err(PortError::Board("no channel".to_owned())));
     }

@@ -1,7 +1,7 @@
 //! Bytes of the binary channel to what they say.
 //!
 //! Nothing is lost unnoticed: what is missing between two frames is an item of its own.
-//! Garbage ends at the next sound frame; a target that starts anew is recognised by its
+//! Garbage ends at the next sound frame; a restart of the target is recognised by its
 //! sequence or its clock going back.
 
 use interstage::log::capture::Shots;
@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 /// What a log says, in its order.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Item {
-    /// Who speaks; once a second.
+    /// The target's identity; once a second.
     Identity(Identity),
     /// A tick, and the codes that it found with their times.
     Tick(Record, SensorFrame),
@@ -66,7 +66,7 @@ pub enum Mark {
         /// How many.
         frames: u32,
     },
-    /// The target started anew.
+    /// The target restarted.
     Restart,
     /// A frame of another layout than this reader knows.
     Schema {
@@ -87,7 +87,7 @@ impl std::fmt::Display for Mark {
             Self::Joined { frames } => {
                 write!(f, "the log begins {frames} frames after the target's first")
             }
-            Self::Restart => write!(f, "the target started anew"),
+            Self::Restart => write!(f, "the target restarted"),
             Self::Schema { found } => {
                 write!(f, "frames of schema {found}, this reader knows {SCHEMA}")
             }
@@ -114,7 +114,7 @@ pub struct Counts {
     pub lost_ticks: u64,
     /// Ticks that never ran.
     pub overrun_ticks: u64,
-    /// Times that the target started anew.
+    /// Times that the target restarted.
     pub restarts: u64,
 }
 
@@ -126,13 +126,13 @@ impl Counts {
     }
 }
 
-/// A decoder under way. It takes bytes as they come.
+/// A decoder. It takes bytes as they come.
 #[derive(Clone, Debug, Default)]
 pub struct Decoder {
-    /// What has come of a frame that is not whole yet.
+    /// The beginning of a frame that is not complete yet.
     partial: Vec<u8>,
     /// Bytes before it that are no frame.
-    strange: u64,
+    garbage: u64,
     /// Sequence and dropped frames that the next head should have.
     due: Option<(u32, u32)>,
     /// Time of the last tick, and its codes.
@@ -169,27 +169,27 @@ impl Decoder {
     pub fn finish(&mut self, take: &mut impl FnMut(Item)) {
         let held = std::mem::take(&mut self.partial);
         self.look(&held, true, take);
-        self.strange(take);
+        self.report_garbage(take);
     }
 
-    /// Takes what is whole from the beginning of `bytes`, all of it if they are the last;
-    /// so many are used.
+    /// Takes the complete frames at the beginning of `bytes`, everything if they are the last;
+    /// returns how many bytes it used.
     fn look(&mut self, bytes: &[u8], last: bool, take: &mut impl FnMut(Item)) -> usize {
         let mut used = 0;
         while let Some(rest) = bytes.get(used..).filter(|rest| !rest.is_empty()) {
             used += match look(rest) {
                 Seen::Frame(frame, length) => {
-                    self.strange(take);
+                    self.report_garbage(take);
                     self.frame(&frame, length as u64, take);
                     length
                 }
                 Seen::Garbage(length) => {
-                    self.strange += length as u64;
+                    self.garbage += length as u64;
                     length
                 }
-                // What looks like a frame that goes on may be none, with one behind it.
+                // What looks like the beginning of a frame may be garbage before another one.
                 Seen::Part if last => {
-                    self.strange += 1;
+                    self.garbage += 1;
                     1
                 }
                 Seen::Part => break,
@@ -198,23 +198,23 @@ impl Decoder {
         used
     }
 
-    /// Says what was no frame.
-    fn strange(&mut self, take: &mut impl FnMut(Item)) {
-        let bytes = std::mem::take(&mut self.strange);
+    /// Reports what was no frame.
+    fn report_garbage(&mut self, take: &mut impl FnMut(Item)) {
+        let bytes = std::mem::take(&mut self.garbage);
         if bytes > 0 {
-            self.garbage(bytes, take);
+            self.mark_garbage(bytes, take);
         }
     }
 
-    fn garbage(&mut self, bytes: u64, take: &mut impl FnMut(Item)) {
+    fn mark_garbage(&mut self, bytes: u64, take: &mut impl FnMut(Item)) {
         self.counts.garbage_bytes += bytes;
         take(Item::Mark(Mark::Garbage { bytes }));
     }
 
     fn frame(&mut self, frame: &Frame<'_>, length: u64, take: &mut impl FnMut(Item)) {
         let Ok(body) = frame.body() else {
-            // The check fits by chance: its head is not to be believed either.
-            return self.garbage(length, take);
+            // The checksum matches by chance: its head is invalid, too.
+            return self.mark_garbage(length, take);
         };
         self.counts.frames += 1;
         self.follow(frame, &body, take);
@@ -227,7 +227,7 @@ impl Decoder {
                 for record in ticks {
                     match record {
                         Ok(record) => self.tick(&record, take),
-                        Err(_) => self.garbage(length, take),
+                        Err(_) => self.mark_garbage(length, take),
                     }
                 }
             }
@@ -444,7 +444,7 @@ pub(super) mod tests {
         }
 
         #[test]
-        fn a_target_that_starts_anew_is_told(before in 20..300_u32, after in 20..300_u32, gone in 0..3_usize) {
+        fn a_restart_of_the_target_is_marked(before in 20..300_u32, after in 20..300_u32, gone in 0..3_usize) {
             let mut bytes = frames(5, before).concat();
             bytes.truncate(bytes.len() - 3);
             let second = frames(2, after);
@@ -470,7 +470,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn ticks_that_did_not_run_are_told_from_those_not_logged() {
+    fn ticks_that_did_not_run_are_distinguished_from_those_not_logged() {
         for (overrun, expected) in
             [(true, Mark::Overrun { ticks: 3 }), (false, Mark::Skipped { ticks: 3 })]
         {
@@ -493,7 +493,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn another_layout_is_told_by_its_number() {
+    fn another_layout_is_named_by_its_number() {
         let (mut scribe, tape) =
             (Scribe::new(Identity { schema: 99, ..Identity::default() }), Tape::new());
         tape.keep(&Input::default(), &Output::default());

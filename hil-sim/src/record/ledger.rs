@@ -22,7 +22,7 @@ pub struct LedgerLine {
     pub residual_mm: f64,
     /// Speed at lift-off (touch-down on retract), mm/s.
     pub speed_mm_s: f64,
-    /// Most that the wheel was slower than asked on the corner, mm/s.
+    /// Largest speed deficit on the corner, mm/s.
     pub speed_dip_mm_s: f64,
     /// Measured preload at that instant, N.
     pub preload_n: f64,
@@ -36,11 +36,11 @@ pub struct LedgerLine {
     pub gap_measured_mm: f64,
     /// Measured minus predicted, mm.
     pub gap_residual_mm: f64,
-    /// How long the wanted preload stood before the corner touched, s.
+    /// How long before the corner touched the preload was reached, s.
     pub lead_time_s: f64,
     /// Friction left unused, by the model.
     pub slip_margin: f64,
-    /// How much farther the wheel turned than it went since the last step found, mm.
+    /// Travel of the tread beyond the axial travel since the last step found, mm.
     pub slip_mm: f64,
     /// Stiffness scale after this crossing.
     pub stiffness_scale: f64,

@@ -236,7 +236,7 @@ fn about(summary: &Summary) -> [(String, String); 7] {
     .map(|(key, value)| (key.to_owned(), value))
 }
 
-/// Time since boot in ns; what lies before boot is boot.
+/// Time since boot in ns; what is before boot is boot.
 fn nanoseconds(t_s: f64) -> u64 {
     (t_s * 1e9).round() as u64
 }

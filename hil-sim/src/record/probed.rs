@@ -9,13 +9,13 @@ use crate::probe::{Port, ReconnectingPort};
 const LOG: u32 = 1;
 /// RTT channel of the console, down.
 const CONSOLE: u32 = 0;
-/// Looks at the channel at each reading, so that who shows the log gets its turn.
+/// Polls of the channel in each reading, so that the display gets its turn.
 const LOOKS: u32 = 20;
 
-/// The log of a board at a probe. It is not started anew and gets no command but the
+/// The log of a board at a probe. It is not reset and gets no command but the
 /// operator's.
 ///
-/// The probe may be unplugged and the board start anew: what was not read is missing, and
+/// The probe may be unplugged and the board may restart: what was not read is missing, and
 /// marked where it is missing by the log's own numbers. It ends when the port gives up.
 pub struct Probed<'a> {
     port: ReconnectingPort<'a>,
@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn a_board_that_starts_anew_in_the_middle_is_marked_and_both_parts_are_there() {
+    fn a_restart_in_the_middle_is_marked_and_both_parts_are_there() {
         let bytes = sent();
         let whole = Run::of_stream(&bytes);
         let looks = in_looks(&bytes[..bytes.len() / 2]).chain([Look::Error]);

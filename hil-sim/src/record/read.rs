@@ -61,7 +61,7 @@ pub fn timed(stream: &[u8]) -> impl Iterator<Item = (f64, &[u8])> {
     frames.into_iter()
 }
 
-/// A stream cut behind every frame; what follows the last one is left out.
+/// A stream cut after every frame; what follows the last one is left out.
 pub fn pieces(stream: &[u8]) -> impl Iterator<Item = &[u8]> {
     let mut rest = stream;
     std::iter::from_fn(move || {
@@ -108,7 +108,7 @@ impl Run {
 /// Longest record, bytes: a few hundred times what this program writes.
 const LONGEST_RECORD: usize = 1 << 26;
 
-/// Most that a chunk's content may be longer than it lies in the file: what LZ4 can reach.
+/// Most that a chunk's content may be longer than it is in the file: what LZ4 can reach.
 const EXPANSION: u64 = 256;
 
 /// The file up to the first record that says it is longer than what is left, or a chunk that

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Controller, Counts, Decoder, Item, Mark};
 
-/// Who made a log, with which parameters.
+/// What made a log, with which parameters.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Header {
     /// Layout of the frames.
@@ -65,7 +65,7 @@ pub struct Since<'a> {
 }
 
 impl Since<'_> {
-    /// Why the target started, if it came to say so.
+    /// Why the target started, if the log says so.
     #[must_use]
     pub fn restart(&self) -> Option<Restart> {
         self.events.iter().find_map(|entry| match entry.event {
@@ -78,7 +78,7 @@ impl Since<'_> {
 /// A log in memory.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Run {
-    /// Who made it; none if the log has not come to say so.
+    /// What made it; none if the log does not say.
     pub header: Option<Header>,
     /// A row a tick, in the order of the log.
     pub rows: Vec<Controller>,

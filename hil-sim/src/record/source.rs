@@ -8,7 +8,7 @@ use interstage::supervise::{Command, Mode};
 use crate::scenario::{Direction, Scenario};
 use crate::session::{self, Session};
 
-/// A source that broke off.
+/// A source that failed.
 #[derive(Debug, thiserror::Error)]
 pub enum SourceError {
     /// Its bytes cannot be read.
@@ -44,7 +44,7 @@ pub trait Source {
     /// [`SourceError`] if it broke off.
     fn send(&mut self, letter: u8) -> Result<(), SourceError>;
 
-    /// What has happened to the way there since the last call, a line each.
+    /// What has happened to the connection since the last call, a line each.
     fn news(&mut self) -> Vec<String> {
         Vec::new()
     }

@@ -21,7 +21,7 @@ pub struct CrossingLine {
     pub gap_measured_mm: Option<f64>,
     /// Largest force of corner and face on the wheel, N.
     pub corner_force_n: f64,
-    /// How long the wanted preload stood before the corner touched, s.
+    /// How long before the corner touched the preload was reached, s.
     pub lead_time_s: Option<f64>,
     /// Gross slip during the crossing, mm.
     pub slip_mm: f64,
@@ -96,7 +96,7 @@ pub struct Summary {
     pub faults: Vec<Report>,
     /// Active limits reported.
     pub limits: Vec<Report>,
-    /// Faults that the scenario brought about.
+    /// Faults that the scenario injected.
     #[serde(default)]
     pub injected: Vec<String>,
     /// Simulated over wall-clock time.

@@ -1,5 +1,5 @@
-//! What a run adds up to, whatever has run the controller: when it moved, with what
-//! preload, how far apart wheel and wall came, whether it arrived.
+//! The sums of a run, whatever ran the controller: when it moved, with what preload, how
+//! far wheel and wall separated, whether it arrived.
 
 use interstage::supervise::Direction;
 use sha2::{Digest, Sha256};
@@ -17,7 +17,7 @@ const ARRIVED_WITHIN_MM: f64 = 1.0;
 
 /// The sums of a run as it goes on.
 pub struct Tally {
-    /// Every bit that the run is to be known by.
+    /// Digest of every bit that identifies the run.
     pub digest: Sha256,
     /// One row a tick, if they are kept.
     pub rows: Vec<Tick>,
@@ -72,7 +72,7 @@ impl Tally {
         }
     }
 
-    /// Time at which the tick under way began, s.
+    /// Time at which this tick began, s.
     #[must_use]
     pub fn time_s(&self) -> f64 {
         f64::from(self.passed) * TICK_S
@@ -196,7 +196,7 @@ mod tests {
                 Ended { target: "sil", scenario: &scenario, plant: &plant, arrived, wall_s: 1.0 };
             Tally::new(2.5, 0.0).finish(&ended, true_line).summary
         };
-        // It stands at the end of travel, but no step has been crossed.
+        // It is at the end of travel, but no step has been crossed.
         assert!(!finish(Some(Direction::Deploy)).completed);
         assert_eq!(finish(Some(Direction::Deploy)).travel_mm, end);
         assert!(!finish(None).completed);

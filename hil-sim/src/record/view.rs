@@ -1,4 +1,4 @@
-//! The state of a log under way as a few lines of text.
+//! The state of a log that grows as a few lines of text.
 
 use std::time::Instant;
 

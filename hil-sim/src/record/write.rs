@@ -150,10 +150,10 @@ impl<M: Write + Seek, C: Write> Writer<M, C> {
             self.frame(frame, see)?;
         }
         // Of what is no frame, only the end may become one.
-        let strange = (held.len() - used).saturating_sub(LONGEST);
-        if strange > LONGEST {
-            self.frame(&held[used..used + strange], see)?;
-            used += strange;
+        let garbage = (held.len() - used).saturating_sub(LONGEST);
+        if garbage > LONGEST {
+            self.frame(&held[used..used + garbage], see)?;
+            used += garbage;
         }
         held.drain(..used);
         self.partial = held;
@@ -201,7 +201,7 @@ impl<M: Write + Seek, C: Write> Writer<M, C> {
         Ok(())
     }
 
-    /// Adds who speaks, if that is new.
+    /// Adds the target's identity if it is new.
     fn header(&mut self, header: Header) -> Result<(), Failure> {
         if let Some(mcap) = self.mcap.as_mut().filter(|_| self.header.as_ref() != Some(&header)) {
             let value = serde_json::to_value(&header)?;

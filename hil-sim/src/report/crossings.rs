@@ -59,7 +59,7 @@ fn panels(view: &View) -> [Panel; 6] {
         }),
     ];
     let mut preload = view.preload();
-    // The limit may lie far above; it is in the plot of the whole run.
+    // The limit may be far above; it is in the plot of the run.
     let shown = preload.lines.iter().flat_map(|line| &line.points).map(|point| point.1);
     let range = axis::padded(axis::extent(shown).unwrap_or((0.0, 1.0)), 0.08);
     preload.levels.retain(|level| level.2 <= range.1 + 0.5 * (range.1 - range.0));
@@ -84,8 +84,10 @@ mod tests {
         let recording = example::deploy();
         let line = &recording.summary.crossings[1];
         let view = view(&recording, line);
-        assert!((view.rows[0].t_s - (line.touch_s - BEFORE_S)).abs() < 2e-3);
-        assert!((view.rows[view.rows.len() - 1].t_s - (line.lift_s + AFTER_S)).abs() < 2e-3);
+        assert!((view.rows[0].controller.t_s - (line.touch_s - BEFORE_S)).abs() < 2e-3);
+        assert!(
+            (view.rows[view.rows.len() - 1].controller.t_s - (line.lift_s + AFTER_S)).abs() < 2e-3
+        );
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! The plots of a whole run, over time or over position.
+//! The plots of a run, over time or over position.
 
 use plotters::style::RGBColor;
 
@@ -31,7 +31,7 @@ impl Across {
         }
     }
 
-    /// Where `row` stands on the axis.
+    /// The place of `row` on the axis.
     pub(super) fn of(self, row: &Tick) -> f64 {
         match self {
             Self::Time => row.controller.t_s,
@@ -40,7 +40,7 @@ impl Across {
         }
     }
 
-    /// Where the time `t_s` stands on the axis.
+    /// The place of the time `t_s` on the axis.
     fn at(self, rows: &[Tick], t_s: f64) -> f64 {
         let place =
             rows.partition_point(|row| row.controller.t_s < t_s).min(rows.len().saturating_sub(1));
@@ -68,12 +68,12 @@ pub(super) struct View<'a> {
     pub(super) across: Across,
     pub(super) x: (f64, f64),
     pub(super) shades: Vec<(f64, f64)>,
-    /// Largest preload, N, if the parameters tell it.
+    /// Largest preload, N, if the parameters have it.
     pub(super) limit_n: Option<f64>,
 }
 
 impl<'a> View<'a> {
-    /// The whole of `recording`.
+    /// All of `recording`.
     pub(super) fn new(recording: &'a Recording, across: Across) -> Self {
         let rows = &recording.rows[..];
         let span = |c: &CrossingLine| {
@@ -140,7 +140,7 @@ impl<'a> View<'a> {
         let mut panel = self.panel("Speed", "speed, mm/s");
         panel.least_span = 2.0;
         panel.lines = vec![
-            self.line("wanted", Look::Wanted, |row| row.controller.speed_ref_mm_s),
+            self.line("reference", Look::Wanted, |row| row.controller.speed_ref_mm_s),
             self.line("estimated", Look::Estimate(palette::SPEED), |row| {
                 row.controller.wheel_speed_mm_s
             }),
@@ -153,7 +153,7 @@ impl<'a> View<'a> {
         let mut panel = self.panel("Preload", "preload, N");
         panel.least_span = 4.0;
         panel.lines = vec![
-            self.line("wanted", Look::Wanted, |row| row.controller.preload_ref_n),
+            self.line("reference", Look::Wanted, |row| row.controller.preload_ref_n),
             self.line("measured", Look::Measured(palette::PRELOAD), |row| row.controller.preload_n),
             self.line("true", Look::Truth, |row| row.of_truth(|t| t.preload_true_n)),
         ];
@@ -174,7 +174,7 @@ impl<'a> View<'a> {
             self.marks("measured", (Shape::Ring, palette::GAP, SIDE), |c| c.gap_measured_mm),
         ];
         if summary.gap_ref_mm > 0.0 {
-            panel.levels = vec![("reference", Look::Limit, summary.gap_ref_mm)];
+            panel.levels = vec![("reference gap", Look::Limit, summary.gap_ref_mm)];
         }
         // The clearance before touch and after the climb says nothing about the gap.
         let gaps = panel.marks.iter().flat_map(|marks| &marks.points).map(|point| point.1);

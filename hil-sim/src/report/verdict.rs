@@ -44,13 +44,15 @@ pub(crate) fn headline(summary: &Summary) -> String {
         1 => "1 crossing".to_owned(),
         n => format!("{n} crossings"),
     };
-    let way = format!("{:.1} mm in {:.2} s, {crossings}", summary.travel_mm, summary.duration_s);
+    let travel = format!("{:.1} mm in {:.2} s, {crossings}", summary.travel_mm, summary.duration_s);
     match (summary.completed, summary.faults.first()) {
-        (true, None) => format!("{verb} {way}"),
-        (true, Some(fault)) => format!("{verb} {way}, with fault {}: {}", fault.code, fault.text),
-        (false, None) => format!("Did not complete: {way}"),
+        (true, None) => format!("{verb} {travel}"),
+        (true, Some(fault)) => {
+            format!("{verb} {travel}, with fault {}: {}", fault.code, fault.text)
+        }
+        (false, None) => format!("Did not complete: {travel}"),
         (false, Some(fault)) => {
-            format!("Did not complete: fault {} after {way}: {}", fault.code, fault.text)
+            format!("Did not complete: fault {} after {travel}: {}", fault.code, fault.text)
         }
     }
 }

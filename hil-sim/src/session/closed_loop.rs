@@ -1,4 +1,4 @@
-//! A run under way: controller and plant, a tick at a time, with commands and sensor
+//! A run in progress: controller and plant, a tick at a time, with commands and sensor
 //! failures given from outside.
 
 use interstage::blackbox::{Flight, Late, Recorder, Reset, Restart};
@@ -23,7 +23,7 @@ use crate::scenario::{Direction, Scenario};
 /// The angle sensor is read every second tick.
 const ANGLE_EVERY: Tick = 2;
 
-/// A run under way.
+/// A run in progress.
 ///
 /// [`Session::step`] is one millisecond. Its two halves, [`Session::sense`] and
 /// [`Session::advance`], let a caller change what the controller is given.
@@ -203,7 +203,7 @@ impl Session {
         self.tamper.as_ref().and_then(Tamper::acts_s)
     }
 
-    /// When it first did what the readback must tell, see [`Tamper::tells_s`], s since boot.
+    /// When it first did what the readback must show, see [`Tamper::tells_s`], s since boot.
     #[must_use]
     pub fn tells_s(&self) -> Option<f64> {
         self.tamper.as_ref().and_then(Tamper::tells_s)
@@ -231,7 +231,7 @@ impl Session {
     }
 
     /// A reset that leaves memory and takes the power from the bridges at once: the
-    /// controller starts with what its record of the last tick tells of the place.
+    /// controller starts with the position that its record of the last tick has.
     pub fn restart(&mut self) {
         let flight = Some(self.record());
         self.restart_from(Restart { reset: Reset::Pin, flight, crash: None });
@@ -242,7 +242,7 @@ impl Session {
         self.reboot();
         self.state = State::standing(restart.place());
         if let Some(stream) = &mut self.stream {
-            stream.tell(restart);
+            stream.report(restart);
         }
     }
 
@@ -269,7 +269,7 @@ impl Session {
         self.stream.as_mut().map(Stream::take).unwrap_or_default()
     }
 
-    /// What is left behind if the session ends here; it took `wall_s` to compute.
+    /// The recording of a session that ends here; it took `wall_s` to compute.
     #[must_use]
     pub fn finish(self, wall_s: f64) -> Recording {
         let arrived = match self.state.mode() {

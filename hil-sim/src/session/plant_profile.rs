@@ -42,7 +42,7 @@ impl PhaseProfile {
     }
 }
 
-/// What a run costs: whole, the plant alone, and by phase.
+/// What a run costs: all of it, the plant alone, and by phase.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PlantProfile {
     /// Simulated time, s.
@@ -56,7 +56,7 @@ pub struct PlantProfile {
 }
 
 impl PlantProfile {
-    /// Simulated over real time of the whole loop.
+    /// Simulated over real time of the loop.
     #[must_use]
     pub fn sil_factor(&self) -> f64 {
         self.simulated_s / self.sil_wall_s

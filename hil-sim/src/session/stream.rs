@@ -22,8 +22,8 @@ impl Stream {
         Self { tape: Tape::new(), scribe, bytes: Vec::new() }
     }
 
-    /// Keeps a tick and what happened in it, as the journal does on the board, if there is
-    /// somebody who reads.
+    /// Keeps a tick and what happened in it, as the journal does on the board, if it is
+    /// read.
     pub fn keep(&mut self, input: &Input, output: &Output, read: bool) {
         let mut send = |frame: &[u8]| {
             if read {
@@ -45,14 +45,14 @@ impl Stream {
         std::mem::take(&mut self.bytes)
     }
 
-    /// The controller starts anew; what it had not yet passed on is lost with it.
+    /// The controller restarts; what it had not yet sent is lost.
     pub(super) fn restart(&mut self, scenario: &Scenario, controller: &Controller) {
         let bytes = self.take();
         *self = Self { bytes, ..Self::new(scenario, controller) };
     }
 
-    /// The controller says why it has started, as the board does first of all.
-    pub(super) fn tell(&mut self, restart: Restart) {
+    /// The controller reports why it has started, as the board does first of all.
+    pub(super) fn report(&mut self, restart: Restart) {
         let entry = Entry { at: 0, event: Event::Restart(restart) };
         self.scribe.entry(&entry, &mut |frame: &[u8]| {
             self.bytes.extend_from_slice(frame);
@@ -60,7 +60,7 @@ impl Stream {
         });
     }
 
-    /// The whole log.
+    /// The rest of the log.
     #[must_use]
     pub fn finish(mut self) -> Vec<u8> {
         self.scribe.read(&self.tape, &mut |frame: &[u8]| {
@@ -71,7 +71,7 @@ impl Stream {
     }
 }
 
-/// Who speaks when the controller runs on this host.
+/// The identity of the controller on this host.
 fn of(scenario: &Scenario, controller: &Controller) -> Identity {
     Identity {
         schema: identity::SCHEMA,

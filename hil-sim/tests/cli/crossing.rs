@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::{good, number, object, rig};
+use super::{good, number, object, rig};
 
 /// A crossing on the study's rig.
 fn crossing(speed: f64, preload: f64, more: &[&str]) -> Value {

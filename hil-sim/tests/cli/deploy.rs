@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::{code, good, is_empty, object, rig, rig_in, said};
+use super::{code, good, is_empty, object, rig, rig_in, said};
 
 /// Keys of the summary that others rely on.
 const KEYS: [&str; 12] = [

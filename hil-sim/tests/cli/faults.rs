@@ -1,6 +1,6 @@
 //! `rig faults`.
 
-use crate::{code, good, rig};
+use super::{code, good, rig};
 
 /// What it said of an error.
 fn complaint(arguments: &[&str]) -> String {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::{code, is_empty, rig_in};
+use super::{code, is_empty, rig_in};
 
 /// Runs the command and expects it to refuse, naming each of `names`.
 fn refused_in(directory: &Path, arguments: &[&str], names: &[&str]) {

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::{code, good, number, rig, said};
+use super::{code, good, number, rig, said};
 
 fn numbers(value: &Value, key: &str) -> Vec<f64> {
     value[key].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()

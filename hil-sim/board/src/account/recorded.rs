@@ -6,7 +6,7 @@ use interstage_images::tick::{Given, Taken};
 
 use super::Phase;
 use hil_sim::scenario::{Direction, Scenario};
-use hil_sim::session::{Options, RunError, Session};
+use hil_sim::sil::{Options, RunError, Session};
 
 /// Longest run recorded, ticks: as a run in software.
 const LONGEST: usize = 120_000;

@@ -74,7 +74,7 @@ pub(super) fn run(
         let lines = ran.recording.log.iter();
         let text: String =
             lines.map(|line| format!("[{:8.3}] {}\n", line.t_s, line.text)).collect();
-        hil_sim::files::write_text(&log, &text)?;
+        hil_sim::export::write_text(&log, &text)?;
         files.push(log);
     }
     let summary = &ran.recording.summary;

@@ -11,7 +11,7 @@ use crate::faults::Fault;
 use crate::log::{Line, Strings};
 use crate::params::PLACES;
 use crate::peripherals::rcc::Cause;
-use hil_sim::record::Run;
+use hil_sim::log::Run;
 use hil_sim::scenario::{Direction, Scenario};
 
 /// Longest start-up, ms: longer than the waiting for every sensor and the self-test.

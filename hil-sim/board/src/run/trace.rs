@@ -8,8 +8,8 @@ use crate::bench::Passed;
 use crate::log::Line;
 use hil_sim::plant::ledger::Crossing;
 use hil_sim::plant::rig::{Truth, VirtualRig};
+use hil_sim::record::tally::{Ended, Tally, true_line, true_row};
 use hil_sim::record::{CrossingLine, LogLine, Recording, Report, Row};
-use hil_sim::record::{Ended, Tally, true_line, true_row};
 use hil_sim::scenario::Scenario;
 
 /// What the log says of a mode, and its number in [`hil_sim::record::MODE_NAMES`].

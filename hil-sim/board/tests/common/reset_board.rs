@@ -1,7 +1,7 @@
 #![allow(dead_code, reason = "every test takes what it needs")]
 //! A board under way that is reset, and what it reports then.
 
-use hil_sim::record::Run;
+use hil_sim::log::Run;
 use hil_sim::scenario::Scenario;
 use interstage::blackbox::Restart;
 use interstage::log::Event;

@@ -1,7 +1,7 @@
 //! What users and boards give the host tools, damaged in every way: the tools refuse it
 //! and never panic. `FUZZ_SECONDS` gives each target that long instead.
 
-#[path = "../../tests/common/mutate.rs"]
+#[path = "../../../tests/common/mutate.rs"]
 mod mutate;
 
 use std::fs;
@@ -175,49 +175,4 @@ fn clients_of_the_live_view() {
     client.set_read_timeout(Some(Duration::from_secs(5))).expect("set");
     client.read_exact(&mut answer).expect("it answers");
     assert_eq!(&answer, b"HTTP/1.1 101");
-}
-
-#[cfg(feature = "board")]
-mod board {
-    use super::*;
-    use hil_sim::board::faults::Timed;
-    use hil_sim::board::log::Strings;
-    use hil_sim::firmware::{self, Profile};
-
-    #[test]
-    fn faults_of_the_board() {
-        let spelt = [
-            "load-cell=0x1234@5.2",
-            "angle-lost@1",
-            "flip=0x20000000.7@3",
-            "brown-out@0.5",
-            "button-storm@2",
-            "angle-bits=512@1e1",
-        ];
-        let corpus = spelt.map(|text| text.as_bytes().to_vec());
-        fuzz("--board-fault", &corpus, 20_000, 1.0, |bytes| {
-            if let Ok(timed) = text(bytes).parse::<Timed>() {
-                let again: Timed =
-                    format!("{}@{}", timed.fault, timed.at_s).parse().expect("spelt");
-                assert_eq!(again, timed);
-            }
-        });
-    }
-
-    #[test]
-    fn lines_of_the_board() {
-        let path = firmware::build(Profile::Release).expect("the firmware builds");
-        let elf = fs::read(path).expect("readable");
-        let strings = Strings::of(&elf).expect("it logs");
-        // Frames as the logger encodes them: an index into the strings, a time, values.
-        let corpus: Vec<Vec<u8>> =
-            (1..40_u8).map(|index| vec![0, 4, index, 0, 9, 9, 2, 1, 5, 1, 1, 1, 1, 1, 0]).collect();
-        fuzz("lines of the board", &corpus, 4000, 3.0, |bytes| {
-            drop(strings.reader().read(bytes));
-        });
-        fuzz("images", &[elf[..elf.len().min(200_000)].to_vec()], 60, 3.0, |bytes| {
-            drop(Strings::of(bytes));
-            drop(hil_sim::board::elf::Loaded::of(bytes));
-        });
-    }
 }

@@ -5,8 +5,6 @@
 //! the loop of `sil` does. Polled the other way round, as interrupts may have it, the
 //! tick finds samples that are a millisecond older, and the run differs by that.
 
-mod common;
-
 use std::cell::{Cell, RefCell};
 use std::future::{Future, pending, poll_fn};
 use std::pin::Pin;
@@ -15,7 +13,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Wake, Waker};
 
-use common::{Bench, Moment, NO_SLIP_MM, RIGS, STEP_CODES, WAYS, back, end_mm, scenario, starter};
+use crate::common::{
+    Bench, Moment, NO_SLIP_MM, RIGS, STEP_CODES, WAYS, back, end_mm, scenario, starter,
+};
 use embassy_time::{Duration, Instant, MockDriver};
 use hil_sim::plant::draw::PlantParameters;
 use hil_sim::plant::ledger::Crossing;
