@@ -10,6 +10,8 @@ use std::time::Duration;
 #[cfg(feature = "probe")]
 pub use real::RealPort;
 pub use reconnecting::ReconnectingPort;
+#[cfg(test)]
+pub(crate) use reconnecting::tests as script;
 
 /// Why a port did not do it. Each is one line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

@@ -138,21 +138,27 @@ impl Port for ReconnectingPort<'_> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use std::cell::RefCell;
     use std::collections::VecDeque;
     use std::rc::Rc;
 
     use super::*;
 
-    /// What the fake answers to the next calls, of the port or of opening it.
+    /// What comes of the next calls, of the port or of opening it.
     #[derive(Clone)]
-    enum Next {
-        Bytes(&'static [u8]),
+    pub(crate) enum Next {
+        Bytes(Vec<u8>),
         Unplugged,
         NotThere,
         Opens,
         Wrong,
+    }
+
+    impl Next {
+        pub(crate) fn bytes(bytes: &[u8]) -> Self {
+            Self::Bytes(bytes.to_vec())
+        }
     }
 
     type Script = Rc<RefCell<VecDeque<Next>>>;
@@ -160,7 +166,7 @@ mod tests {
     struct Fake(Script);
 
     impl Fake {
-        fn next(&self) -> Result<&'static [u8], PortError> {
+        fn next(&self) -> Result<Vec<u8>, PortError> {
             match self.0.borrow_mut().pop_front() {
                 Some(Next::Bytes(bytes)) => Ok(bytes),
                 Some(Next::Unplugged) => Err(PortError::Gone("USB error".to_owned())),
@@ -172,19 +178,19 @@ mod tests {
 
     impl Port for Fake {
         fn up(&mut self, _: u32) -> Result<Vec<u8>, PortError> {
-            self.next().map(<[u8]>::to_vec)
+            self.next()
         }
 
         fn down(&mut self, _: u32, _: &[u8]) -> Result<usize, PortError> {
-            self.next().map(<[u8]>::len)
+            self.next().map(|bytes| bytes.len())
         }
 
         fn reset(&mut self) -> Result<(), PortError> {
-            self.next().map(|_| ())
+            panic!("a board that runs is not reset");
         }
 
         fn memory(&mut self, _: u32, _: &mut [u8]) -> Result<(), PortError> {
-            self.next().map(|_| ())
+            panic!("memory is not read");
         }
 
         fn pass(&mut self) -> Result<Duration, PortError> {
@@ -192,8 +198,11 @@ mod tests {
         }
     }
 
-    fn open(script: &[Next], timeout: Duration) -> (ReconnectingPort<'static>, Script) {
-        let script: Script = Rc::new(RefCell::new(script.iter().cloned().collect()));
+    pub(crate) fn open(
+        script: impl IntoIterator<Item = Next>,
+        timeout: Duration,
+    ) -> (ReconnectingPort<'static>, Script) {
+        let script: Script = Rc::new(RefCell::new(script.into_iter().collect()));
         let inside = Rc::clone(&script);
         let connect = move || -> Result<Box<dyn Port>, PortError> {
             match inside.borrow_mut().pop_front() {
@@ -207,10 +216,10 @@ mod tests {
 
     #[test]
     fn what_is_unplugged_and_plugged_in_again_goes_on() {
-        use Next::{Bytes, NotThere, Opens, Unplugged};
-        let script =
-            [Opens, Bytes(b"ab"), Unplugged, NotThere, NotThere, Opens, Bytes(b"c"), Bytes(b"d")];
-        let (mut port, left) = open(&script, Duration::from_secs(60));
+        use Next::{NotThere, Opens, Unplugged};
+        let [ab, c, d] = [&b"ab"[..], b"c", b"d"].map(Next::bytes);
+        let script = [Opens, ab, Unplugged, NotThere, NotThere, Opens, c, d];
+        let (mut port, left) = open(script, Duration::from_secs(60));
         let mut come = Vec::new();
         for _ in 0..6 {
             come.extend(port.up(1).unwrap());
@@ -225,7 +234,7 @@ mod tests {
 
     #[test]
     fn it_gives_up_after_the_timeout() {
-        let (mut port, _) = open(&[Next::Opens, Next::Unplugged], Duration::ZERO);
+        let (mut port, _) = open([Next::Opens, Next::Unplugged], Duration::ZERO);
         assert_eq!(port.up(1), Ok(Vec::new()));
         let error = port.up(1).unwrap_err().to_string();
         assert!(error.contains("not back") && error.contains("no probe"), "{error}");
@@ -233,7 +242,7 @@ mod tests {
 
     #[test]
     fn a_board_that_is_another_one_is_an_error_at_once() {
-        let (mut port, _) = open(&[Next::Opens, Next::Wrong], Duration::from_secs(60));
+        let (mut port, _) = open([Next::Opens, Next::Wrong], Duration::from_secs(60));
         assert_eq!(port.up(1), Err(PortError::Board("no channel".to_owned())));
     }
 

@@ -57,60 +57,14 @@ impl Source for Probed<'_> {
 
 #[cfg(test)]
 mod tests {
-    use std::cell::RefCell;
-    use std::rc::Rc;
     use std::time::Duration;
 
     use super::*;
-    use crate::probe::PortError;
+    use crate::probe::script::{Next, open};
     use crate::record::{Mark, Run, Virtual, Writer};
     use crate::replay::replay;
     use crate::scenario::Scenario;
     use interstage::rig::Rig;
-
-    /// What a board has sent, look by look, and what happens to its cable.
-    enum Look {
-        Bytes(Vec<u8>),
-        Error,
-    }
-
-    struct Cable {
-        looks: VecDeque<Look>,
-        letters: Vec<u8>,
-        opened: u32,
-    }
-
-    struct Plug(Rc<RefCell<Cable>>);
-
-    impl Port for Plug {
-        fn up(&mut self, channel: u32) -> Result<Vec<u8>, PortError> {
-            assert_eq!(channel, LOG);
-            let mut cable = self.0.borrow_mut();
-            match cable.looks.pop_front() {
-                Some(Look::Bytes(bytes)) => Ok(bytes),
-                Some(Look::Error) => Err(PortError::Gone("USB error".to_owned())),
-                None => Err(PortError::Board("the script is over".to_owned())),
-            }
-        }
-
-        fn down(&mut self, channel: u32, bytes: &[u8]) -> Result<usize, PortError> {
-            assert_eq!(channel, CONSOLE);
-            self.0.borrow_mut().letters.extend(bytes);
-            Ok(bytes.len())
-        }
-
-        fn reset(&mut self) -> Result<(), PortError> {
-            panic!("a board that runs is left alone");
-        }
-
-        fn memory(&mut self, _: u32, _: &mut [u8]) -> Result<(), PortError> {
-            panic!("a board that runs is left alone");
-        }
-
-        fn pass(&mut self) -> Result<Duration, PortError> {
-            Ok(Duration::ZERO)
-        }
-    }
 
     /// The frames of a run in software, as a board would send them.
     fn sent() -> Vec<u8> {
@@ -122,22 +76,13 @@ mod tests {
         bytes
     }
 
-    /// Captures what comes over the cable until its script is over.
-    fn captured(looks: Vec<Look>) -> (Run, Vec<String>, u32) {
-        let cable = Cable { looks: looks.into(), letters: Vec::new(), opened: 0 };
-        let cable = Rc::new(RefCell::new(cable));
-        let inside = Rc::clone(&cable);
-        let connect = move || -> Result<Box<dyn Port>, PortError> {
-            let mut cable = inside.borrow_mut();
-            cable.opened += 1;
-            // The first attempt after it was lost finds nothing yet.
-            if cable.opened.is_multiple_of(2) {
-                return Err(PortError::Absent("no probe".to_owned()));
-            }
-            Ok(Box::new(Plug(Rc::clone(&inside))))
-        };
-        let port =
-            ReconnectingPort::open(connect, Duration::ZERO, Duration::from_secs(60)).unwrap();
+    /// Sends a letter, then captures what the polls of the channel bring, and after them
+    /// nothing for so long that all has been handed on.
+    fn captured(polls: impl Iterator<Item = Next>) -> (Run, Vec<String>) {
+        let letter = [Next::Opens, Next::bytes(b"s")].into_iter();
+        let quiet = (0..2 * LOOKS).map(|_| Next::bytes(b""));
+        let script = letter.chain(polls).chain(quiet).chain([Next::Wrong]);
+        let (port, left) = open(script, Duration::from_secs(60));
         let mut source = Probed::new(port);
         source.send(b's').unwrap();
         let folder = tempfile::tempdir().unwrap();
@@ -149,20 +94,18 @@ mod tests {
             writer.take(&bytes, &mut |_| {}).unwrap();
             news.extend(source.news());
         }
-        news.extend(source.news());
         writer.finish(&mut |_| {}).unwrap();
-        assert_eq!(cable.borrow().letters, b"s");
-        let opened = cable.borrow().opened;
-        (Run::read(&path).unwrap(), news, opened)
+        assert!(left.borrow().is_empty());
+        (Run::read(&path).unwrap(), news)
     }
 
-    fn in_looks(bytes: &[u8]) -> impl Iterator<Item = Look> {
-        bytes.chunks(997).map(|part| Look::Bytes(part.to_vec()))
+    fn in_polls(bytes: &[u8]) -> impl Iterator<Item = Next> {
+        bytes.chunks(997).map(Next::bytes)
     }
 
-    /// Nothing, for so long that what came before has been handed on.
-    fn quiet() -> impl Iterator<Item = Look> {
-        (0..2 * LOOKS).map(|_| Look::Bytes(Vec::new()))
+    /// The cable is pulled; the first attempt to open the port again finds nothing yet.
+    fn pulled() -> [Next; 3] {
+        [Next::Unplugged, Next::NotThere, Next::Opens]
     }
 
     #[test]
@@ -171,10 +114,8 @@ mod tests {
         let whole = Run::of_stream(&bytes);
         // A third of the way in, at no particular byte, 20 kB are lost.
         let (from, lost) = (bytes.len() / 3, 20_000);
-        let (before, after) = (in_looks(&bytes[..from]), in_looks(&bytes[from + lost..]));
-        let looks = before.chain([Look::Error]).chain(after).chain(quiet()).collect();
-        let (run, news, opened) = captured(looks);
-        assert_eq!(opened, 3, "opened, not there, opened again");
+        let (before, after) = (in_polls(&bytes[..from]), in_polls(&bytes[from + lost..]));
+        let (run, news) = captured(before.chain(pulled()).chain(after));
         assert_eq!(news.len(), 2, "{news:?}");
         // Two halves of frames meet where the cable was out, and the rest is counted.
         let lost = run.marks.iter().find_map(|(_, mark)| match mark {
@@ -193,8 +134,8 @@ mod tests {
     fn a_restart_in_the_middle_is_marked_and_both_parts_are_there() {
         let bytes = sent();
         let whole = Run::of_stream(&bytes);
-        let looks = in_looks(&bytes[..bytes.len() / 2]).chain([Look::Error]);
-        let (run, _, _) = captured(looks.chain(in_looks(&bytes)).chain(quiet()).collect());
+        let before = in_polls(&bytes[..bytes.len() / 2]);
+        let (run, _) = captured(before.chain(pulled()).chain(in_polls(&bytes)));
         assert_eq!(run.counts.restarts, 1, "{:?}", run.marks);
         let again = run.rows.iter().rposition(|row| row.tick == 0).unwrap();
         assert_eq!(run.rows.len() - again, whole.rows.len());
