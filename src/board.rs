@@ -5,7 +5,6 @@
 mod analog;
 #[cfg(not(feature = "hil"))]
 mod angle;
-pub(crate) mod blackbox;
 #[cfg(not(feature = "hil"))]
 mod bridge;
 #[cfg(not(feature = "hil"))]
@@ -14,20 +13,21 @@ mod checksum;
 pub(crate) mod config;
 mod console;
 mod flash;
+mod flash_page;
 pub(crate) mod guard;
 #[cfg(feature = "hil")]
 pub(crate) mod hil;
 pub(crate) mod image;
-mod journal;
 pub(crate) mod light;
 mod line;
 #[cfg(not(feature = "hil"))]
 mod readback;
+pub(crate) mod retained;
 pub(crate) mod rtt;
 pub(crate) mod supply;
+mod text_log;
 #[cfg(not(feature = "hil"))]
 mod wheel;
-mod words;
 
 #[cfg(not(feature = "hil"))]
 pub(crate) use analog::{Analog, Ring};
@@ -43,11 +43,11 @@ pub(crate) use flash::Pages;
 pub(crate) use guard::Guard;
 #[cfg(feature = "hil")]
 pub(crate) use hil::{Analog, Angle, Bridges, Button, Wheel};
-pub(crate) use journal::Lines;
 pub(crate) use light::Lamp;
 pub(crate) use line::HostLine;
 #[cfg(not(feature = "hil"))]
 pub(crate) use readback::Readback;
+pub(crate) use text_log::Lines;
 #[cfg(not(feature = "hil"))]
 pub(crate) use wheel::Wheel;
 

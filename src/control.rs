@@ -1,12 +1,6 @@
-//! The control tick: sensors, estimate, phase, schedule, loops, actuators.
+//! Control: the schedule of speed and preload, the speed profile, and the two loops.
 
 pub mod preload_loop;
 pub mod profile;
-pub mod rise;
-pub mod saturate;
 pub mod schedule;
 pub mod speed_loop;
-mod start;
-mod step;
-
-pub use step::{Controller, EVENTS_PER_TICK, Input, Output, State};

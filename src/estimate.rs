@@ -1,9 +1,73 @@
-//! From readings to the state of motion and contact.
+//! From readings to the state of motion and contact: where the wheel is on its travel, which
+//! steps are behind it, and what carries it.
+
+#![deny(clippy::float_arithmetic)]
 
 pub mod crossing;
+mod follow;
 pub mod odometry;
+mod position;
+mod restore;
+mod run;
 mod stage;
+mod state;
+mod steps;
 pub mod tread;
 pub mod vibration;
 
+use crate::model::corner_profile::CornerProfile;
+use crate::numeric::checked;
+use crate::rig::{Rig, RigError};
+use crossing::CrossingWatch;
+use tread::TreadLaw;
+
+pub use follow::Follow;
+pub use position::{Place, Position, PositionConfidence};
 pub use stage::ContactStage;
+pub use state::{EstimateState, Findings, LiftPoint, OpenCrossing};
+pub use steps::{Expectation, Steps};
+
+use crate::units::Millimetres;
+
+/// Wheel travel on a corner over the wheel radius beyond which the wheel slips: twice the
+/// travel of a crossing.
+const CORNER_TRAVEL_PART: f64 = 1.5;
+
+/// The estimator of a rig; its state is apart.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Estimator {
+    watch: CrossingWatch,
+    tread: TreadLaw,
+    steps: Steps,
+    /// Wheel travel on a corner beyond which the wheel slips, mm.
+    corner_travel: Millimetres,
+}
+
+impl Estimator {
+    /// The estimator of a rig; fails where a parameter is out of range.
+    #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
+    pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
+        Ok(Self {
+            watch: CrossingWatch::try_build(rig)?,
+            tread: TreadLaw::try_build(rig)?,
+            steps: Steps::try_build(rig)?,
+            corner_travel: checked(
+                "rig.wheel_radius_mm",
+                CORNER_TRAVEL_PART * rig.rig.wheel_radius_mm,
+            )?,
+        })
+    }
+
+    /// Step table and end of travel.
+    pub const fn steps(&self) -> &Steps {
+        &self.steps
+    }
+
+    /// Geometry of a corner.
+    pub const fn corner(&self) -> &CornerProfile {
+        self.steps.corner()
+    }
+}
+
+#[cfg(test)]
+pub(crate) use restore::tests::sensed;

@@ -2,11 +2,16 @@
 //! and failure. `src/board` implements it on the STM32G474, the tests with
 //! mocks, the virtual rig with its plant.
 
-use crate::blackbox::{Flight, Place};
-use crate::log::frame::{Checker, check};
-use crate::log::{Entry, Identity};
+pub mod hil;
+
+use crate::estimate::Place;
+use crate::log::Identity;
+use crate::restart::DriveSnapshot;
 use crate::sense::raw::{AdcCode, AngleFrame, BridgeCodes, BusFault, EncoderCount};
 use crate::supervise::Command;
+use crate::tick::Entry;
+use crate::tick::Entry;
+use crate::units::MotorCommand;
 
 /// The wheel encoder's counter.
 pub trait WheelEncoder {
@@ -33,45 +38,6 @@ pub trait AngleBus {
     /// [`BusFault`] if the transfer failed. Parity and the sensor's own error
     /// flag are judged by the caller.
     async fn frame(&mut self) -> Result<AngleFrame, BusFault>;
-}
-
-/// Signed duty of a bridge, Q15: -32768 is full reverse, 32767 full forward,
-/// LSB 3.1e-5. Forward deploys (drive) or raises the preload (pre-tightener).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
-pub struct Duty(i16);
-
-impl Duty {
-    /// No torque.
-    pub const ZERO: Self = Self(0);
-
-    /// A duty from its Q15 bits.
-    #[must_use]
-    pub const fn from_bits(bits: i16) -> Self {
-        Self(bits)
-    }
-
-    /// The Q15 bits.
-    #[must_use]
-    pub const fn to_bits(self) -> i16 {
-        self.0
-    }
-}
-
-/// What one motor's bridge is to do until the next call.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
-pub struct MotorCommand {
-    /// Signed duty.
-    pub duty: Duty,
-    /// Bridge enabled. Disabled, the bridge is off and the self-locking gears
-    /// hold the mechanism where it is; the duty is then ignored.
-    pub enable: bool,
-}
-
-impl MotorCommand {
-    /// Bridge off: the safe state of either motor.
-    pub const OFF: Self = Self { duty: Duty::ZERO, enable: false };
 }
 
 /// Both motors' bridges.
@@ -101,7 +67,7 @@ pub trait Watchdog {
 
     /// Keeps what the drive does in this tick where a restart finds it. A board without
     /// such a place keeps nothing.
-    fn keep(&mut self, flight: &Flight);
+    fn keep(&mut self, snapshot: &DriveSnapshot);
 
     /// Where the wheel stands by what was kept before this start, if that tells.
     fn place(&self) -> Option<Place> {
@@ -138,11 +104,6 @@ pub trait Journal {
     fn send(&mut self, frame: &[u8]) -> bool {
         let _ = frame;
         false
-    }
-
-    /// What sums up the frames: the library's own code, or hardware that gives the same.
-    fn checker(&self) -> Checker {
-        check
     }
 
     /// Who speaks, for the head of the binary log.

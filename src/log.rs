@@ -5,27 +5,24 @@
 //! |---|---|
 //! | [`Entry`], [`Telemetry`] | what happened; the state after a tick |
 //! | [`Record`] | a tick's whole input and output, for the stream |
-//! | [`Tape`] | hands records from the tick to the journal |
-//! | [`Scribe`] | makes frames of them, below the control rate |
+//! | [`LogEncoder`] | makes frames of them, below the control rate |
 //! | [`frame`] | how a frame lies on the channel |
 //! | [`capture`] | moments that matter, kept until they have been read |
 //! | [`ledger`] | a line a crossing |
 
 pub mod capture;
-mod entry;
+mod crc;
+mod delta;
+mod encoder;
 pub mod frame;
 pub mod identity;
 pub mod ledger;
-pub mod number;
 mod record;
-mod scribe;
-mod tape;
-mod telemetry;
-mod wire;
+mod recorder;
 
-pub use entry::{CrossingRecord, Entry, Event};
+pub use crate::supervise::codes;
+pub use crc::crc32;
+pub use encoder::{FrameSink, LogEncoder, TICKS_PER_FRAME};
 pub use identity::Identity;
 pub use record::{Flags, Record};
-pub use scribe::Scribe;
-pub use tape::{BATCH, TAPE, Tape};
-pub use telemetry::Telemetry;
+pub use recorder::SnapshotRecorder;

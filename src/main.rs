@@ -24,12 +24,12 @@ mod firmware {
     use embassy_stm32::interrupt::{self, InterruptExt, Priority};
     #[cfg(not(feature = "hil"))]
     use embassy_stm32::{Peri, Peripherals, pac};
-    use interstage::control::Controller;
     use interstage::hal::{Board, Parts};
-    use interstage::log::{Entry, Event, Identity, Scribe};
+    use interstage::log::{Identity, LogEncoder};
     use interstage::model::Planner;
     use interstage::params::service::Service;
     use interstage::tasks::{self, Exchange, Latest};
+    use interstage::tick::{Controller, Entry, Event};
     #[cfg(not(feature = "hil"))]
     use rtt_target::DownChannel;
     use static_cell::{ConstStaticCell, StaticCell};
@@ -40,7 +40,7 @@ mod firmware {
     use crate::board::rtt::Channels;
     #[cfg(not(feature = "hil"))]
     use crate::board::rtt::Frames;
-    use crate::board::{self, blackbox, config, guard, image, light, rtt, supply};
+    use crate::board::{self, config, guard, image, light, retained, rtt, supply};
     #[cfg(not(feature = "hil"))]
     use crate::board::{Analog, Bridge, Checksum, Readback, Ring};
     use crate::board::{Angle, Bridges, Button, Console, Guard, HostLine, Lamp, Lines};
@@ -56,7 +56,8 @@ mod firmware {
     #[cfg(not(feature = "hil"))]
     static TREAD: Ring = Ring::new();
     static LATEST: StaticCell<Latest> = StaticCell::new();
-    static SCRIBE: ConstStaticCell<Scribe> = ConstStaticCell::new(Scribe::new(Identity::NOBODY));
+    static SCRIBE: ConstStaticCell<LogEncoder> =
+        ConstStaticCell::new(LogEncoder::new(Identity::NOBODY));
 
     /// Runs the control tick and the sensors, above everything that may take long.
     ///
@@ -121,7 +122,7 @@ mod firmware {
         // Before anything that it may have damaged.
         let image = image::verify();
         defmt::info!("interstage {=str}", env!("CARGO_PKG_VERSION"));
-        let restart = blackbox::report(waited);
+        let restart = retained::report(waited);
         EXCHANGE.log(Entry { at: 0, event: Event::Restart(restart) });
         guard::arm();
         let (console, line) = (channels.console, channels.line);

@@ -1,6 +1,7 @@
 //! The reduced collision-vibration model and the schedule made from it.
 
 pub mod constants;
+pub mod corner_profile;
 pub mod felt;
 pub mod formula;
 pub mod guard;

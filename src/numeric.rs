@@ -32,8 +32,6 @@ pub use table::Table;
 
 /// `value`, but no less than `low` and no more than `high`; `high` where the two are the
 /// wrong way round, which [`Ord::clamp`] panics on. For bounds out of the parameters.
-#[inline]
-#[must_use]
 pub fn between<T: Ord>(value: T, low: T, high: T) -> T {
     value.max(low).min(high)
 }

@@ -8,12 +8,12 @@
 //! rig to the bit.
 
 mod compile;
+pub mod link;
 pub mod service;
 mod set;
 pub mod slots;
 
 pub use compile::{CompileError, compile};
-pub(crate) use set::checksum;
 pub use set::{Header, MAX_NAME, ParameterSet, Rest, SCHEMA, SetError};
 
 /// Longest set, bytes: two pages of flash less what its slot keeps beside it.

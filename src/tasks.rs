@@ -2,40 +2,42 @@
 //!
 //! | task | rate | does |
 //! |---|---|---|
+//! | [`clock()`] | 1 kHz | wakes sensors and control tick at each whole millisecond |
 //! | [`speed()`] | 1 kHz | publishes the wheel counter |
 //! | [`pressure()`] | 1 kHz | publishes the load cell's code |
 //! | [`displacement()`] | 1 kHz | publishes the tread sensor's code |
 //! | [`angle()`] | 500 Hz | publishes the arm sensor's frame |
 //! | [`motors()`] | 1 kHz | the control tick: latest codes in, bridges out |
-//! | [`tape()`] | 1 kHz | takes the tick down for the log, behind it |
+//! | [`record()`] | 1 kHz | copies the tick for the log, behind it |
 //! | [`model()`] | on request | plans the next segment |
 //! | [`operator()`] | on command | hands commands to the tick; one task a source |
 //! | [`link()`] | on request | reads and replaces the stored parameters |
 //! | [`journal()`] | on entry | writes the log, shows the light |
 //!
-//! They share one [`Exchange`] and nothing else. Whatever the tick reads is there
-//! already or is taken as absent: it waits for time only. A sensor that hangs makes
+//! They share one [`Exchange`] and nothing else. The tick waits for time only: what it
+//! reads is there already or is taken as absent. A sensor that hangs makes
 //! its reading age; a task that hangs starves the watchdog, which is fed only while
 //! every task has checked in within [`CHECK_IN_TICKS`].
 
-mod beat;
+mod clock;
 mod exchange;
 mod journal;
 mod link;
+mod liveness;
 mod model;
 mod motors;
 mod operator;
 mod sensors;
-mod tape;
 
-pub use exchange::{CHECK_IN_TICKS, COMMANDS, ENTRIES, Exchange, Station};
+pub use clock::{clock, mid_tick_deadline};
+pub use exchange::{COMMANDS, ENTRIES, Exchange};
 pub use journal::journal;
 pub use link::link;
+pub use liveness::{CHECK_IN_TICKS, TaskId};
 pub use model::model;
-pub use motors::motors;
+pub use motors::{TickIo, TickIoCell, motors, record};
 pub use operator::operator;
 pub use sensors::{SENSOR_TIMEOUT, angle, displacement, pressure, speed};
-pub use tape::{Latest, tape};
 
 use embassy_time::Duration;
 

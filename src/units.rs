@@ -6,10 +6,12 @@
 //! and resolution are stated per alias; what needs more is an accumulator of its
 //! own (see [`Travel`]).
 
+mod motion;
 mod q16;
 
 use fixed::types::I32F32;
 
+pub use motion::{Direction, Duty, MotorCommand};
 pub use q16::Q16;
 
 /// Length or position, mm. LSB 15 nm; the rig spans 0.4 m, headroom 80-fold.
@@ -49,7 +51,6 @@ pub const TICK_HZ: u32 = 1000;
 ///
 /// Range of the argument: +-32_767_000_000; outside it the build fails when used
 /// in a constant.
-#[must_use]
 pub const fn q16(millionths: i64) -> Q16 {
     let bits = millionths * 65_536 / 1_000_000;
     assert!(bits >= i32::MIN as i64 && bits <= i32::MAX as i64);
@@ -57,7 +58,6 @@ pub const fn q16(millionths: i64) -> Q16 {
 }
 
 /// Distance covered in one tick at `speed`, mm, exact to half an LSB of [`Travel`].
-#[must_use]
 pub fn per_tick(speed: MillimetresPerSecond) -> Travel {
     // 2^32 / 1000 rounded: Q16 x Q32 -> Q48, shifted to Q32.
     const TICK_Q32: i64 = 4_294_967;
@@ -65,7 +65,6 @@ pub fn per_tick(speed: MillimetresPerSecond) -> Travel {
 }
 
 /// A duration in whole ticks as seconds, saturating at 32767 s.
-#[must_use]
 pub fn ticks_to_seconds(ticks: u32) -> Seconds {
     // 2^16 / 1000 = 65.536 = 1_099_511_628 / 2^24 within 3e-10.
     let bits = (u64::from(ticks) * 1_099_511_628) >> 24;

@@ -1,25 +1,21 @@
 //! What comes to the firmware from outside, damaged in every way: its readers refuse it
 //! and never panic. `FUZZ_SECONDS` gives each target that long instead.
 
-#[path = "common/mutate.rs"]
-mod mutate;
-
-use crc::{CRC_32_ISO_HDLC, Crc};
-use interstage::blackbox::{Crash, Flight};
-use interstage::link::{Gatherer, ToBoard, ToHost, frame};
-use interstage::log::frame::{Body, Frame, Head, Kind, LONGEST, Page, check};
-use interstage::log::{Entry, Event, Identity};
+use interstage::log::frame::{Body, Frame, FrameBuffer, Head, Kind, LONGEST};
+use interstage::log::{Identity, crc32};
+use interstage::params::link::{FrameReader, ToBoard, ToHost, frame};
 use interstage::params::service::{Piece, Request, Response};
 use interstage::params::slots::{
     FlashFault, SLOT_BYTES, SetMemory, Slot, WORD_BYTES, place, stored,
 };
 use interstage::params::{MAX_SET, ParameterSet, compile};
+use interstage::restart::{Crash, DriveSnapshot};
 use interstage::rig::Rig;
 use interstage::supervise::{Command, Mode};
+use interstage::tick::{Entry, Event};
+use interstage::tick::{Entry, Event};
 
-use mutate::fuzz;
-
-const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+use crate::common::mutate::fuzz;
 
 fn set(rig: &Rig) -> Vec<u8> {
     let mut room = [0; MAX_SET];
@@ -34,7 +30,7 @@ fn postcard<T: serde::Serialize>(value: &T) -> Vec<u8> {
 
 /// With the check that fits, so that what is behind it is reached.
 fn signed(bytes: &[u8]) -> Vec<u8> {
-    [bytes, &CRC.checksum(bytes).to_le_bytes()].concat()
+    [bytes, &crc32(bytes).to_le_bytes()].concat()
 }
 
 fn open_set(bytes: &[u8]) {
@@ -109,7 +105,7 @@ fn frames_of_the_host_line() {
     let up = ToHost::Parameters(5, Response::Piece(piece));
     corpus.push(frame(&up).expect("fits").to_vec());
     fuzz("host line", &corpus, 20_000, 1.5, |bytes| {
-        let (mut board, mut host) = (Gatherer::new(), Gatherer::new());
+        let (mut board, mut host) = (FrameReader::new(), FrameReader::new());
         for byte in bytes {
             let _ = board.take::<ToBoard>(*byte);
             let _ = host.take::<ToHost>(*byte);
@@ -124,7 +120,7 @@ fn frames_of_the_host_line() {
         let length = cobs::encode(&signed(bytes), &mut coded);
         coded.truncate(length);
         coded.push(0);
-        let (mut board, mut host) = (Gatherer::new(), Gatherer::new());
+        let (mut board, mut host) = (FrameReader::new(), FrameReader::new());
         for byte in &coded {
             let _ = board.take::<ToBoard>(*byte);
             let _ = host.take::<ToHost>(*byte);
@@ -141,8 +137,8 @@ fn read_frame(bytes: &[u8]) {
 
 /// A frame with as much of a body as has room.
 fn framed(head: Head, body: &[u8]) -> Vec<u8> {
-    let mut page = Page::new();
-    let frame = page.write(head, check, |room| {
+    let mut page = FrameBuffer::new();
+    let frame = page.write(head, |room| {
         let length = body.len().min(room.len());
         room[..length].copy_from_slice(&body[..length]);
         length
@@ -179,8 +175,8 @@ fn records_of_a_restart() {
             let bytes = bytes.get(4 * index..4 * index + 4).and_then(|b| b.try_into().ok());
             bytes.map_or(0, u32::from_le_bytes)
         };
-        let flight = Flight::open(&std::array::from_fn(word));
+        let snapshot = DriveSnapshot::open(&std::array::from_fn(word));
         let crash = Crash::open(&std::array::from_fn(word));
-        assert!(flight.is_none() && crash.is_none(), "made up out of noise");
+        assert!(snapshot.is_none() && crash.is_none(), "made up out of noise");
     });
 }

@@ -1,14 +1,14 @@
 //! What the model offers beside the quantities of a crossing, against the formulas or
 //! against itself the other way round.
 
-use interstage::hil::Given;
+use interstage::hal::hil::Given;
 use interstage::model::formula::Formula;
 use interstage::model::reduced::ReducedModel;
 use interstage::model::{PlanRequest, Planner};
 use interstage::rig::{Rig, RigError};
 use interstage::sense::raw::{AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount};
-use interstage::supervise::{Command, Direction};
-use interstage::units::{Q16, Ratio};
+use interstage::supervise::Command;
+use interstage::units::{Direction, Q16, Ratio};
 
 const WAYS: [Direction; 2] = [Direction::Deploy, Direction::Retract];
 

@@ -11,14 +11,16 @@
 
 use std::path::Path;
 
-use interstage::blackbox::Restart;
-use interstage::control::{Controller, Input, Output, State};
+use interstage::fault::Fault;
+use interstage::log::Record;
 use interstage::log::frame::{Body, Frame};
-use interstage::log::{Entry, Event, Record};
 use interstage::model::{Plan, PlanRequest, Planner};
+use interstage::restart::Restart;
 use interstage::rig::Rig;
 use interstage::sense::raw::SensorFrame;
-use interstage::supervise::{Direction, Fault, Mode};
+use interstage::supervise::Mode;
+use interstage::tick::{Controller, Entry, Event, Input, Output, State};
+use interstage::units::Direction;
 
 /// What the frames of a log tell of the time from one start to the next.
 #[derive(Default)]
@@ -91,7 +93,7 @@ fn step_through(
 ) {
     let controller = Controller::try_build(&Rig::prototype()).expect("the prototype is sound");
     let place = boot.restart.as_ref().and_then(Restart::place);
-    let (mut state, mut sensors) = (State::standing(place), SensorFrame::default());
+    let (mut state, mut sensors) = (State::restored(place), SensorFrame::default());
     for record in &boot.ticks {
         let mut input = Input {
             plan: record.flags.plan().then(|| Boot::of(&boot.plans, record.at())).flatten(),

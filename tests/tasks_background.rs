@@ -1,16 +1,18 @@
 //! The tasks below the control rate: model, operator, journal.
 
-mod common;
-
-use common::{Bench, Operator, Record, forever};
+use crate::common::{Bench, Operator, Record, forever, now_ms};
 use embassy_time::Duration;
+use interstage::control::Output;
+use interstage::fault::Fault;
 use interstage::hal::Light;
-use interstage::log::{Entry, Event, Identity, Scribe};
+use interstage::log::{Identity, LogEncoder};
 use interstage::model::{PlanRequest, Planner};
 use interstage::rig::Rig;
-use interstage::supervise::{Command, Direction};
+use interstage::supervise::{Command, Mode};
 use interstage::tasks::{self, COMMANDS, ENTRIES, Exchange};
-use interstage::units::Ratio;
+use interstage::tick::Telemetry;
+use interstage::tick::{Entry, Event};
+use interstage::units::{Direction, Ratio};
 
 fn planner() -> &'static Planner {
     forever(Planner::try_build(&Rig::prototype()).expect("the prototype is valid"))
@@ -129,8 +131,8 @@ fn entries_are_written_in_their_order() {
     let (exchange, written) = (forever(Exchange::new()), Record::<Entry>::default());
     let (journal, light) = (written.clone(), Record::<Light>::default());
     bench.spawn(async {
-        let mut scribe = Scribe::new(Identity::NOBODY);
-        tasks::journal(journal, light, &mut scribe, exchange).await
+        let mut encoder = LogEncoder::new(Identity::NOBODY);
+        tasks::journal(journal, light, &mut encoder, exchange).await
     });
     for at in 0..ENTRIES as u32 {
         exchange.log(entry(at));
@@ -149,8 +151,8 @@ fn entries_that_do_not_fit_are_counted_and_the_others_kept() {
     let (exchange, written) = (forever(Exchange::new()), Record::<Entry>::default());
     let (journal, light) = (written.clone(), Record::<Light>::default());
     bench.spawn(async {
-        let mut scribe = Scribe::new(Identity::NOBODY);
-        tasks::journal(journal, light, &mut scribe, exchange).await
+        let mut encoder = LogEncoder::new(Identity::NOBODY);
+        tasks::journal(journal, light, &mut encoder, exchange).await
     });
     bench.poll();
     for at in 0..ENTRIES as u32 + 9 {
@@ -175,14 +177,16 @@ fn the_light_is_set_when_it_changes_and_only_then() {
     let (exchange, shown) = (forever(Exchange::new()), Record::<Light>::default());
     let (journal, light) = (Record::<Entry>::default(), shown.clone());
     bench.spawn(async {
-        let mut scribe = Scribe::new(Identity::NOBODY);
-        tasks::journal(journal, light, &mut scribe, exchange).await
+        let mut encoder = LogEncoder::new(Identity::NOBODY);
+        tasks::journal(journal, light, &mut encoder, exchange).await
     });
     bench.run_ms(100);
     assert_eq!(shown.items(), [Light::Off]);
-    for light in [Light::On, Light::Alarm, Light::Off] {
-        exchange.show(light);
-        let asked = common::now_ms();
+    let modes = [Mode::Preload(Direction::Deploy), Mode::FaultHold(Fault::SelfTest), Mode::Idle];
+    for (mode, light) in modes.into_iter().zip([Light::On, Light::Alarm, Light::Off]) {
+        let telemetry = Telemetry { mode, ..Telemetry::EMPTY };
+        exchange.publish(&Output { telemetry, ..Output::default() });
+        let asked = now_ms();
         bench.run_ms(200);
         let (at, last) = shown.all().last().copied().expect("shown");
         assert_eq!(last, light);

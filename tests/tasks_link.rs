@@ -1,15 +1,13 @@
 //! The task at the host's binary line, on a mocked line and flash.
 
-mod common;
-
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
 use std::sync::OnceLock;
 
-use common::{Bench, forever};
+use crate::common::{Bench, forever};
 use interstage::hal::Line;
-use interstage::link::{Gatherer, ToBoard, ToHost, frame};
+use interstage::params::link::{FrameReader, ToBoard, ToHost, frame};
 use interstage::params::service::{Origin, Refusal, Request, Response, Service};
 use interstage::params::slots::{FlashFault, SLOT_BYTES, SetMemory, Slot};
 use interstage::params::{MAX_SET, compile};
@@ -54,7 +52,7 @@ impl Wire {
     }
 
     fn answers(&self) -> Vec<ToHost> {
-        let mut gatherer = Gatherer::new();
+        let mut gatherer = FrameReader::new();
         let bytes = std::mem::take(&mut self.0.borrow_mut().to_host);
         bytes.into_iter().filter_map(|byte| gatherer.take(byte)).collect()
     }

@@ -1,19 +1,19 @@
 //! The motor task with the shipped controller and all other tasks around it.
 
-mod common;
-
-use common::{
+use crate::common::{
     Answer, Bench, Bridges, Dog, Operator, Record, Sensor, UNLOADED, arm_frame, forever,
     load_cell_code, now_ms,
 };
-use interstage::blackbox::Late;
-use interstage::control::Controller;
-use interstage::hal::{Light, MotorCommand};
-use interstage::log::{Entry, Event, Identity, Scribe};
+use interstage::fault::Fault;
+use interstage::hal::Light;
+use interstage::log::{Identity, LogEncoder};
 use interstage::model::Planner;
+use interstage::restart::MissedCheckIns;
 use interstage::rig::Rig;
-use interstage::supervise::{Command, Direction, Fault, Mode};
-use interstage::tasks::{self, CHECK_IN_TICKS, Exchange, Latest, Station};
+use interstage::supervise::{Command, Mode};
+use interstage::tasks::{self, CHECK_IN_TICKS, Exchange, TaskId, TickIo, TickIoCell};
+use interstage::tick::{Controller, Entry, Event};
+use interstage::units::{Direction, MotorCommand};
 
 /// All tasks of the firmware on a mocked board: at rest, unloaded, stowed.
 struct Board {
@@ -37,11 +37,8 @@ impl Board {
     }
 
     /// A board on which some tasks never get the processor.
-    fn without(missing: &[Station]) -> Self {
-        Self::with(forever(Exchange::new()), missing)
-    }
-
-    fn with(exchange: &'static Exchange, missing: &[Station]) -> Self {
+    fn without(missing: &[TaskId]) -> Self {
+        let exchange = forever(Exchange::new());
         let rig = Rig::prototype();
         let controller = forever(Controller::try_build(&rig).expect("the prototype is valid"));
         let planner = forever(Planner::try_build(&rig).expect("the prototype is valid"));
@@ -62,38 +59,39 @@ impl Board {
         };
         let runs = |station| !missing.contains(&station);
         let bench = &mut board.bench;
-        if runs(Station::Speed) {
+        bench.spawn(async { tasks::clock(exchange).await });
+        if runs(TaskId::Speed) {
             let wheel = board.wheel.clone();
             bench.spawn(async { tasks::speed(wheel, exchange).await });
         }
-        if runs(Station::Pressure) {
+        if runs(TaskId::Pressure) {
             let load_cell = board.load_cell.clone();
             bench.spawn(async { tasks::pressure(load_cell, exchange).await });
         }
-        if runs(Station::Displacement) {
+        if runs(TaskId::Displacement) {
             let tread = board.tread.clone();
             bench.spawn(async { tasks::displacement(tread, exchange).await });
         }
-        if runs(Station::Angle) {
+        if runs(TaskId::Angle) {
             let arm = board.arm.clone();
             bench.spawn(async { tasks::angle(arm, exchange).await });
         }
         let (motors, watchdog) = (board.bridges.clone(), board.watchdog.clone());
-        let latest = forever(Latest::default());
+        let latest = forever(TickIoCell::new(TickIo::default()));
         bench.spawn(async { tasks::motors(motors, watchdog, controller, latest, exchange).await });
-        bench.spawn(async { tasks::tape(latest, exchange).await });
-        if runs(Station::Model) {
+        bench.spawn(async { tasks::record(latest, exchange).await });
+        if runs(TaskId::Model) {
             bench.spawn(async { tasks::model(planner, exchange).await });
         }
-        if runs(Station::Operator(0)) {
+        if runs(TaskId::Operator(0)) {
             let operator = board.operator.clone();
             bench.spawn(async { tasks::operator(operator, exchange).await });
         }
-        if runs(Station::Journal) {
+        if runs(TaskId::Journal) {
             let (journal, light) = (board.journal.clone(), board.light.clone());
             bench.spawn(async {
-                let mut scribe = Scribe::new(Identity::NOBODY);
-                tasks::journal(journal, light, &mut scribe, exchange).await
+                let mut encoder = LogEncoder::new(Identity::NOBODY);
+                tasks::journal(journal, light, &mut encoder, exchange).await
             });
         }
         board
@@ -124,28 +122,6 @@ impl Board {
     fn bridges_are_off(&self) -> bool {
         self.motors.items().last() == Some(&(MotorCommand::OFF, MotorCommand::OFF))
     }
-}
-
-#[test]
-fn an_interrupt_that_beats_leads_every_tick() {
-    let exchange = forever(Exchange::new());
-    exchange.expect_beat();
-    let mut board = Board::with(exchange, &[]);
-    board.bench.poll();
-    assert!(exchange.telemetry().is_none());
-    for _ in 0..3000 {
-        board.bench.freeze_ms(1);
-        // The arm's angle is read with every second tick.
-        assert_eq!(exchange.beat(), now_ms().is_multiple_of(2));
-        board.bench.poll();
-        assert_eq!(exchange.telemetry().expect("a tick").at, now_ms());
-        board.bench.poll();
-    }
-    assert_eq!(board.mode(), Mode::Idle);
-    let reads = board.arm.reads();
-    assert!(reads.windows(2).all(|pair| pair[1] - pair[0] == 2), "{:?}", &reads[..8]);
-    let reads = board.wheel.reads();
-    assert!(reads.windows(2).all(|pair| pair[1] - pair[0] == 1), "{:?}", &reads[..8]);
 }
 
 #[test]
@@ -198,19 +174,19 @@ fn the_watchdog_is_fed_every_tick_while_all_tasks_live() {
 #[test]
 fn the_watchdog_starves_when_any_task_is_dead_and_the_record_names_it() {
     for (station, name) in [
-        (Station::Speed, "speed"),
-        (Station::Pressure, "pressure"),
-        (Station::Displacement, "displacement"),
-        (Station::Angle, "angle"),
-        (Station::Model, "model"),
-        (Station::Journal, "journal"),
+        (TaskId::Speed, "speed"),
+        (TaskId::Pressure, "pressure"),
+        (TaskId::Displacement, "displacement"),
+        (TaskId::Angle, "angle"),
+        (TaskId::Model, "model"),
+        (TaskId::Journal, "journal"),
     ] {
         let mut board = Board::without(&[station]);
         board.bench.run_ms(500);
         let last = board.watchdog.fed.times().last().copied();
         assert_eq!(last, Some(CHECK_IN_TICKS), "{station:?}");
         let kept = board.watchdog.kept.items();
-        let named: Vec<&str> = kept.iter().map(|flight| flight.late.name()).collect();
+        let named: Vec<&str> = kept.iter().map(|snapshot| snapshot.missed.name()).collect();
         assert!(named[..CHECK_IN_TICKS as usize].iter().all(|name| *name == "nobody"));
         assert!(named[CHECK_IN_TICKS as usize..].iter().all(|late| *late == name), "{named:?}");
         assert_eq!(board.exchange.unfed(500).name(), name);
@@ -221,10 +197,10 @@ fn the_watchdog_starves_when_any_task_is_dead_and_the_record_names_it() {
 fn a_tick_that_comes_no_more_is_told_from_one_that_hangs() {
     let mut board = Board::idle();
     let now = now_ms();
-    assert_eq!(board.exchange.unfed(now), Late::NOBODY);
+    assert_eq!(board.exchange.unfed(now), MissedCheckIns::NOBODY);
     // Nobody gets the processor, and all had ended their turns.
     board.bench.freeze_ms(100);
-    assert_eq!(board.exchange.unfed(now_ms()), Late::STARVED);
+    assert_eq!(board.exchange.unfed(now_ms()), MissedCheckIns::STARVED);
 }
 
 #[test]
@@ -235,8 +211,8 @@ fn what_the_drive_does_is_kept_every_tick() {
     board.bench.run_ms(50);
     let kept = board.watchdog.kept.all();
     assert_eq!(kept.len(), 50);
-    assert!(kept.iter().all(|(at, flight)| flight.tick == *at));
-    let last = kept.last().map(|(_, flight)| *flight).expect("fifty");
+    assert!(kept.iter().all(|(at, snapshot)| snapshot.tick == *at));
+    let last = kept.last().map(|(_, snapshot)| *snapshot).expect("fifty");
     assert_eq!(last.mode(), Some(Mode::Preload(Direction::Deploy)));
     assert_eq!((last.level, last.fault), (0, 0));
 }
@@ -291,7 +267,7 @@ fn a_bridge_that_takes_another_duty_is_off_within_ten_ticks() {
 
 #[test]
 fn a_dead_model_task_does_not_hold_up_the_tick() {
-    let mut board = Board::without(&[Station::Model]);
+    let mut board = Board::without(&[TaskId::Model]);
     board.reach(Mode::Idle, 3000);
     board.operator.gives(&[Command::Start]);
     board.reach(Mode::Preload(Direction::Deploy), 20);

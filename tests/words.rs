@@ -3,9 +3,9 @@
 use std::collections::HashSet;
 use std::fmt::Debug;
 
+use interstage::fault::{Fault, Limit};
 use interstage::params::service::Refusal;
 use interstage::params::{SCHEMA, SetError};
-use interstage::supervise::{Fault, Limit};
 use interstage::units::Q16;
 
 fn differ<T: Copy + Debug>(all: &[T], say: impl Fn(T) -> &'static str) {
@@ -21,7 +21,7 @@ fn differ<T: Copy + Debug>(all: &[T], say: impl Fn(T) -> &'static str) {
 fn faults_and_limits() {
     differ(&Fault::ALL, Fault::sentence);
     differ(&Limit::ALL, Limit::sentence);
-    for (done, ends) in Limit::ALL.map(Limit::account) {
+    for (done, ends) in Limit::ALL.map(Limit::description) {
         assert!(done.len() > 6 && ends.len() > 6 && done != ends, "{done}, {ends}");
     }
     let everything =

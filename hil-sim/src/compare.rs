@@ -3,7 +3,7 @@
 //! at the same speed.
 
 use interstage::model::Planner;
-use interstage::supervise::Direction;
+use interstage::units::Direction;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 

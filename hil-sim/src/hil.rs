@@ -1,5 +1,5 @@
 //! Hardware in the loop: the plant on this host, the controller on a board, a port in
-//! between ([`interstage::hil`]).
+//! between ([`interstage::hal::hil`]).
 //!
 //! The loop is closed in lockstep, so that nothing depends on how fast the port is: a run
 //! gives the same trace as in software, bit for bit, and takes as long as it takes.

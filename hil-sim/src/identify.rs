@@ -4,7 +4,6 @@ pub mod actuator;
 pub mod contact;
 pub mod coordinates;
 pub mod forward;
-pub mod hidden;
 pub mod least_squares;
 pub mod noise;
 pub mod plot;
@@ -12,7 +11,6 @@ pub mod published;
 pub mod read;
 pub mod record;
 pub mod result;
-pub mod study;
 pub mod traces;
 
 /// Why nothing was identified.

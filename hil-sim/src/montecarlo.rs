@@ -3,7 +3,7 @@
 mod outcome;
 mod shard;
 
-use interstage::supervise::Limit;
+use interstage::fault::Limit;
 use rayon::prelude::*;
 use serde::Serialize;
 

@@ -1,11 +1,11 @@
 //! A log run again: the recorded inputs through the controller on this host, whose
 //! outputs must be the recorded ones to the bit.
 
-use interstage::control::{Controller, Input, Output, State};
-use interstage::log::{Entry, Event, Record};
+use interstage::log::Record;
 use interstage::model::{Plan, PlanRequest, Planner};
 use interstage::rig::{Rig, RigError};
 use interstage::supervise::Mode;
+use interstage::tick::{Controller, Entry, Event, Input, Output, State};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -136,7 +136,7 @@ impl Replay<'_> {
     /// The target starts, with the wheel where its record of the run before has it.
     fn begin(&mut self) {
         let place = self.since.restart().and_then(|restart| restart.place());
-        (self.state, self.request) = (State::standing(place), None);
+        (self.state, self.request) = (State::restored(place), None);
     }
 
     /// Runs a tick again; the first thing that differs.

@@ -1,26 +1,26 @@
 //! A run as one self-contained HTML page: verdict, ledger of the crossings, plots
 //! over time and over position, each crossing enlarged, log, faults, parameters.
 
-pub(crate) mod axis;
+pub mod axis;
 mod band;
 mod compare;
 mod crossings;
 mod decimate;
-mod gaps;
 pub(crate) mod ledger;
-pub(crate) mod mesh;
+pub mod mesh;
+mod overview;
 mod page;
-pub(crate) mod palette;
+pub mod palette;
 mod panel;
 mod panels;
-pub(crate) mod svg;
+pub mod svg;
 mod tables;
 pub(crate) mod verdict;
 
 use crate::record::Recording;
 
 pub use compare::{Difference, compare_html, differences};
-pub use gaps::{Published, published_svg};
+pub use overview::overview_svg;
 
 /// A section of a page beside those that every run has.
 #[derive(Clone, Debug, PartialEq, Eq)]

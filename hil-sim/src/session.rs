@@ -3,15 +3,14 @@
 
 mod closed_loop;
 mod echo;
-pub mod plant_profile;
 mod stream;
 
 use std::time::Instant;
 
-use interstage::control::Output;
 use interstage::model::Strategy;
 use interstage::rig::RigError;
 use interstage::supervise::{Command, Mode};
+use interstage::tick::{CrossingRecord, Event, Output};
 
 use crate::plant::limits::Refusal;
 use crate::plant::rig::PlantError;

@@ -4,7 +4,8 @@ mod common;
 
 use common::{Bench, starter};
 use hil_sim::scenario::{Direction, Scenario};
-use interstage::supervise::{Command, Fault, Mode};
+use interstage::fault::Fault;
+use interstage::supervise::{Command, Mode};
 
 /// The prototype with these overrides, run to its end this way.
 fn run(sets: &[&str], way: Direction) -> Bench {

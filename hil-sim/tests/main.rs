@@ -1,6 +1,12 @@
 //! All tests of this crate that need more than one of its modules: one program.
 
 mod cli;
+mod commands;
 mod common;
+mod identify;
+mod modes_page;
+mod plant;
+#[cfg(feature = "probe")]
+mod probe;
 mod record;
 mod session;

@@ -1,58 +1,67 @@
-//! Modes, transitions, faults and limits, from the table that the firmware uses.
+//! `docs/MODES.md` is what the firmware's table of modes, faults and limits gives; with the
+//! environment variable `UPDATE_DOCS` the page is written.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use interstage::supervise::{Account, Command, Direction, Fault, Leg, Limit, Mode, Trigger, next};
+use interstage::fault::{Fault, Limit};
+use interstage::supervise::{Mode, Trigger, next};
+use interstage::units::Direction;
 
-use super::head;
+const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/MODES.md");
 
-/// The page `docs/MODES.md`.
-#[must_use]
-pub fn modes() -> String {
-    let mut page = head("Modes, faults and limits");
-    page += "\nThe drive is always in one mode. [`src/supervise/transition.rs`]\
-             (../src/supervise/transition.rs) is the one table of transitions; this page is \
-             read out of it.\n\n```mermaid\nstateDiagram-v2\n";
+#[test]
+fn the_page_of_modes_is_current() {
+    let page = page();
+    for mode in Mode::WITHOUT_FAULT {
+        assert!(page.contains(&name(mode)), "{mode:?}");
+    }
+    if std::env::var_os("UPDATE_DOCS").is_some() {
+        std::fs::write(PATH, &page).expect("the page can be written");
+    }
+    let current = std::fs::read_to_string(PATH).unwrap_or_default();
+    assert!(current == page, "docs/MODES.md: UPDATE_DOCS=1 cargo test -p hil-sim modes_page");
+}
+
+fn page() -> String {
+    let mut page = String::from(
+        "# Modes, faults and limits\n\n\
+         Written by `UPDATE_DOCS=1 cargo test -p hil-sim modes_page`; do not edit.\n\n\
+         The drive is always in one mode. [`src/supervise/transition.rs`]\
+         (../src/supervise/transition.rs) is the one table of transitions; this page is read \
+         out of it.\n\n```mermaid\nstateDiagram-v2\n",
+    );
     for ((from, to), triggers) in edges() {
         let _ = writeln!(page, "    {from} --> {to}: {}", triggers.join(", "));
     }
     page += "```\n\nA fault leads from every mode to the fault hold: both bridges off, the \
              self-locking gears hold wheel and screw where they are, the preload stays in its \
              spring. Only a reset leads out. A command that a mode does not take is refused, \
-             logged and changes nothing.\n\n## Faults, latched\n\nWhat happens when each is provoked, and how soon \
-             it is found: [SAFETY.md](SAFETY.md).\n\n| code | fault | cause | detection | reset \
-             |\n|---|---|---|---|---|\n";
+             logged and changes nothing.\n\n## Faults, latched\n\nWhat happens when each is \
+             provoked, and how soon it is found: [SAFETY.md](SAFETY.md).\n\n\
+             | code | fault | cause | detection | reset |\n|---|---|---|---|---|\n";
+    let mut reactions = BTreeMap::<&str, Vec<String>>::new();
     for fault in Fault::ALL {
-        let Account { cause, detection, reset, .. } = fault.account();
-        let (code, sentence) = (fault.code(), fault.sentence());
+        let (code, sentence, account) = (fault.code(), fault.sentence(), fault.description());
+        let (cause, detection, reset) = (account.cause, account.detection, account.reset);
         let _ = writeln!(page, "| {code} | {sentence} | {cause} | {detection} | {reset} |");
+        reactions.entry(account.reaction).or_default().push(code.to_string());
     }
     page += "\nReaction to each:\n\n";
-    for reaction in reactions() {
-        let of = Fault::ALL.into_iter().filter(|fault| fault.account().reaction == reaction);
-        let codes: Vec<String> = of.map(|fault| fault.code().to_string()).collect();
+    for (reaction, codes) in reactions {
         let _ = writeln!(page, "- {}: {reaction}.", codes.join(", "));
     }
     page += "\n## Limits, active\n\nReported and acted on; gone when their cause is gone.\n\n\
              | code | limit | reaction | until |\n|---|---|---|---|\n";
     for limit in Limit::ALL {
-        let (reaction, until) = limit.account();
+        let (reaction, until) = limit.description();
         let (code, sentence) = (limit.code(), limit.sentence());
         let _ = writeln!(page, "| {code} | {sentence} | {reaction} | {until} |");
     }
     page
 }
 
-/// Every reaction once.
-fn reactions() -> Vec<&'static str> {
-    let mut all: Vec<&str> = Fault::ALL.map(|fault| fault.account().reaction).to_vec();
-    all.sort_unstable();
-    all.dedup();
-    all
-}
-
-/// Transitions by the pair of their ends, without the faults; both ways of a run and
+/// Transitions by the pair of their ends, without the faults; both directions of a run and
 /// its legs are drawn as one.
 fn edges() -> BTreeMap<(String, String), Vec<String>> {
     let mut edges: BTreeMap<(String, String), Vec<String>> = BTreeMap::new();
@@ -65,8 +74,7 @@ fn edges() -> BTreeMap<(String, String), Vec<String>> {
             if ends.0 == ends.1 && !matches!(mode, Mode::Run(..)) {
                 continue;
             }
-            let label = label(trigger);
-            let labels = edges.entry(ends).or_default();
+            let (label, labels) = (label(trigger), edges.entry(ends).or_default());
             if !labels.contains(&label) {
                 labels.push(label);
             }
@@ -77,16 +85,14 @@ fn edges() -> BTreeMap<(String, String), Vec<String>> {
 
 fn name(mode: Mode) -> String {
     match mode {
-        Mode::Boot => "Boot".into(),
-        Mode::SelfTest => "SelfTest".into(),
-        Mode::Zero => "Zero".into(),
-        Mode::Idle => "Idle".into(),
         Mode::Preload(_) => "Preload".into(),
         Mode::Run(..) => "Run".into(),
         Mode::Stopping(_) => "Stopping".into(),
         Mode::Complete(Direction::Deploy) => "Deployed".into(),
         Mode::Complete(Direction::Retract) => "Retracted".into(),
         Mode::FaultHold(_) => "FaultHold".into(),
+        // Boot, SelfTest, Zero, Idle.
+        plain => format!("{plain:?}"),
     }
 }
 
@@ -96,43 +102,11 @@ fn label(trigger: Trigger) -> String {
         Trigger::TestPassed { stowed: true } => "passed, stowed".into(),
         Trigger::TestPassed { stowed: false } => "passed, elsewhere".into(),
         Trigger::Zeroed => "zeros taken".into(),
-        Trigger::Command(Command::Start) => "start".into(),
-        Trigger::Command(Command::Stop) => "stop".into(),
-        Trigger::Command(Command::Retract) => "retract".into(),
-        Trigger::Command(Command::Reset) => "reset".into(),
         Trigger::PreloadStands => "preload stands".into(),
-        Trigger::Leg(Leg::Cruise) => "cruise".into(),
-        Trigger::Leg(Leg::Approach) => "approach".into(),
-        Trigger::Leg(Leg::Crossing) => "crossing".into(),
-        Trigger::Leg(Leg::Settle) => "settle".into(),
         Trigger::AtRest => "at rest".into(),
-        Trigger::Arrived => "arrived".into(),
-        Trigger::Fault(fault) => format!("fault {}", fault.code()),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_mode_and_code_is_on_the_page() {
-        let page = modes();
-        for mode in Mode::WITHOUT_FAULT {
-            assert!(page.contains(&name(mode)), "{mode:?}");
-        }
-        for fault in Fault::ALL {
-            assert!(page.contains(&format!("| {} | {}", fault.code(), fault.sentence())));
-        }
-        for limit in Limit::ALL {
-            assert!(page.contains(&format!("| {} | {}", limit.code(), limit.sentence())));
-        }
-    }
-
-    #[test]
-    fn the_page_in_the_repository_is_current() {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/MODES.md");
-        let page = std::fs::read_to_string(path).unwrap_or_default();
-        assert_eq!(page, modes(), "run `cargo rig docs`");
+        // Start, Stop, Retract, Reset; Cruise, Approach, Crossing, Settle; Arrived.
+        Trigger::Command(command) => format!("{command:?}").to_lowercase(),
+        Trigger::Leg(leg) => format!("{leg:?}").to_lowercase(),
+        plain => format!("{plain:?}").to_lowercase(),
     }
 }

@@ -1,7 +1,5 @@
 //! `--target probe` where there is none. Run with `--features probe`.
 
-#![cfg(feature = "probe")]
-
 use std::process::Command;
 
 /// A probe that nobody has: a board that happens to be attached is left alone.

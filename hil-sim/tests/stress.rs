@@ -3,8 +3,8 @@
 use hil_sim::scenario::{Direction, Scenario};
 use hil_sim::session::{Options, Session};
 use hil_sim::stress::plant::{self, Figure};
-use interstage::control::Output;
 use interstage::supervise::{Command, Leg, Mode};
+use interstage::tick::Output;
 
 /// A whole run of `scenario`: `look` at every output.
 fn run(

@@ -16,8 +16,9 @@ use embassy_stm32::timer::simple_pwm::{PwmPin, PwmPinConfig};
 use embassy_stm32::timer::{
     AdvancedInstance4Channel, BkIn1, BreakInputPin, Ch1, Channel, TimerPin,
 };
-use interstage::hal::{MotorCommand, Motors};
+use interstage::hal::Motors;
 use interstage::sense::raw::BridgeCodes;
+use interstage::units::MotorCommand;
 
 use super::Readback;
 

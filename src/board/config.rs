@@ -2,12 +2,13 @@
 
 use embassy_executor::Spawner;
 use embassy_time::Timer;
-use interstage::control::Controller;
-use interstage::hal::{Indicator, Light, MotorCommand, Motors, Parts};
+use interstage::hal::{Indicator, Light, Motors, Parts};
 use interstage::log::{Identity, identity};
 use interstage::model::Planner;
 use interstage::params::service::{Service, in_force};
 use interstage::params::{Header, ParameterSet, SetError};
+use interstage::tick::Controller;
+use interstage::units::MotorCommand;
 use static_cell::StaticCell;
 
 use super::{Bridges, Lamp, Nucleo, Pages, image};

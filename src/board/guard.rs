@@ -4,10 +4,11 @@ use embassy_stm32::Peri;
 use embassy_stm32::pac;
 use embassy_stm32::peripherals::IWDG;
 use embassy_stm32::wdg::IndependentWatchdog;
-use interstage::blackbox::{Flight, Place, Reset};
+use interstage::estimate::Place;
 use interstage::hal::Watchdog;
+use interstage::restart::{DriveSnapshot, Place, Reset};
 
-use super::blackbox;
+use super::retained;
 
 /// Time-out of the watchdog, us, by the nominal 32 kHz of its oscillator.
 const TIMEOUT_US: u32 = 100_000;
@@ -28,18 +29,18 @@ impl Guard {
     /// Starts it; from here on nothing but a reset stops it.
     pub(crate) fn start(&mut self) {
         self.dog.unleash();
-        blackbox::look();
+        retained::look();
     }
 }
 
 impl Watchdog for Guard {
     fn feed(&mut self) {
         self.dog.pet();
-        blackbox::fed();
+        retained::fed();
     }
 
-    fn keep(&mut self, flight: &Flight) {
-        blackbox::keep(flight);
+    fn keep(&mut self, snapshot: &DriveSnapshot) {
+        retained::keep(snapshot);
     }
 
     fn place(&self) -> Option<Place> {

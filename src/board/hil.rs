@@ -1,5 +1,5 @@
 //! Hardware in the loop: sensors, bridges, button and time are the host's
-//! ([`interstage::hil`]). Everything else is the firmware as it is flashed.
+//! ([`interstage::hal::hil`]). Everything else is the firmware as it is flashed.
 //!
 //! The real bridges have no power: their pins are outputs that stand low, and no timer
 //! drives them.

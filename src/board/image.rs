@@ -3,11 +3,11 @@
 use core::slice;
 
 use embassy_time::{Duration, Timer};
-use interstage::blackbox::Stopped;
-use interstage::pages::seals;
+use interstage::restart::Stopped;
+use interstage::restart::image_checksum;
 
-use super::words::SEALS;
-use super::{blackbox, light};
+use super::flash_page::SEALS;
+use super::{light, retained};
 
 unsafe extern "C" {
     /// The note that the linker writes, see `memory.x`: three words of head, the name
@@ -62,7 +62,7 @@ extern "C" fn look() {
 /// The image's sum, and that of its first start, if this is not the first.
 #[inline(never)]
 fn sums() -> (u32, Option<u32>) {
-    (seals::sum_on(0, words()), seals::sum_of(SEALS.bytes(), id()))
+    (image_checksum::sum_on(0, words()), image_checksum::sum_of(SEALS.bytes(), id()))
 }
 
 /// The image's sum, if it is the one of its first start, or this is its first; none if a bit
@@ -83,11 +83,11 @@ pub(crate) fn verify() -> Option<u32> {
 /// Keeps the sum for the starts to come.
 fn seal(sum: u32) {
     defmt::info!("first start of this image, sum {=u32:08x}", sum);
-    let first = seals::free(SEALS.bytes()).unwrap_or_else(|| {
+    let first = image_checksum::free(SEALS.bytes()).unwrap_or_else(|| {
         SEALS.erase();
         0
     });
-    for (index, word) in seals::entry(id(), sum).into_iter().enumerate() {
+    for (index, word) in image_checksum::entry(id(), sum).into_iter().enumerate() {
         SEALS.program(first + index, word);
     }
 }
@@ -112,12 +112,12 @@ pub(crate) async fn watch(sealed: u32) -> ! {
         let mut sum = 0;
         for part in words().chunks(PART) {
             Timer::at(crate::EXCHANGE.aside(PACE)).await;
-            sum = seals::sum_on(sum, part);
+            sum = image_checksum::sum_on(sum, part);
         }
         if sum != sealed {
             // Also for the case that what starts anew cannot say it any more.
             say_damaged();
-            blackbox::end(Stopped::Image);
+            retained::end(Stopped::Image);
         }
     }
 }

@@ -7,11 +7,11 @@
 
 use embassy_stm32::interrupt::{self, InterruptExt};
 use embassy_stm32::pac::{EXTI, PWR};
-use interstage::blackbox::Stopped;
-use interstage::pages::records::{self, Latest};
+use interstage::restart::Stopped;
+use interstage::restart::flash_log::{self, Latest};
 
-use super::words::RECORDS;
-use super::{blackbox, guard};
+use super::flash_page::RECORDS;
+use super::{guard, retained};
 
 /// Threshold of the chip's detector: 2.9 V falling, 3.0 V rising.
 const LEVEL: u8 = 6;
@@ -46,15 +46,15 @@ pub(crate) fn watch() -> bool {
 
 /// What the supply left when it went, if no start has taken it yet.
 pub(super) fn found() -> Option<Latest> {
-    records::latest(RECORDS.bytes())
+    flash_log::latest(RECORDS.bytes())
 }
 
 /// Takes it, once it is kept elsewhere, and makes room for the next.
 pub(super) fn take(found: Option<Latest>) {
     if let Some(latest) = found {
-        RECORDS.program(latest.mark, records::TAKEN);
+        RECORDS.program(latest.mark, flash_log::TAKEN);
     }
-    if records::free(RECORDS.bytes()).is_none() {
+    if flash_log::free(RECORDS.bytes()).is_none() {
         RECORDS.erase();
     }
 }
@@ -65,9 +65,10 @@ unsafe fn PVD_PVM() {
     cortex_m::interrupt::disable();
     guard::cut();
     // Whatever ends it from here on, this is why.
-    blackbox::stop(Stopped::Supply);
-    if let (Some(flight), Some(first)) = (blackbox::flight(), records::free(RECORDS.bytes())) {
-        for (index, word) in (first..).zip(records::words(&flight)) {
+    retained::stop(Stopped::Supply);
+    if let (Some(snapshot), Some(first)) = (retained::snapshot(), flash_log::free(RECORDS.bytes()))
+    {
+        for (index, word) in (first..).zip(flash_log::words(&snapshot)) {
             // Refused if someone else was in the middle of a double word, which is dropped
             // then.
             let _ = RECORDS.program(index, word) || RECORDS.program(index, word);
@@ -75,5 +76,5 @@ unsafe fn PVD_PVM() {
     }
     // It may come back before the chip is reset, or the watchdog bite before it does.
     while PWR.sr2().read().pvdo() {}
-    blackbox::restart()
+    retained::restart()
 }

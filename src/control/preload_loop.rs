@@ -9,12 +9,10 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use super::saturate::duty;
-use crate::hal::Duty;
 use crate::model::timing::SLEW_PART;
 use crate::numeric::{LowPass, LowPassState, between, checked};
 use crate::rig::{Rig, RigError};
-use crate::units::{Newtons, NewtonsPerSecond, Q16, TICK_HZ};
+use crate::units::{Duty, Newtons, NewtonsPerSecond, Q16, TICK_HZ};
 
 /// Longest dead time modelled, ticks; the rig's parameters end there.
 pub const LONGEST_DELAY: usize = 256;
@@ -68,9 +66,6 @@ impl Default for PreloadLoopState {
 
 impl PreloadLoop {
     /// The actuator of a rig.
-    ///
-    /// # Errors
-    /// [`RigError`] if a parameter is out of range.
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         let slew = rig.preload.slew_n_per_s;
@@ -111,7 +106,7 @@ impl PreloadLoop {
             -self.most_correction,
             self.most_correction,
         );
-        duty((rate + correction) * self.per_rate)
+        Duty::saturating((rate + correction) * self.per_rate)
     }
 }
 
@@ -122,13 +117,11 @@ impl PreloadLoopState {
     }
 
     /// Reference after the slew limit, N.
-    #[must_use]
     pub const fn reference(&self) -> Newtons {
         self.reference
     }
 
     /// Preload that the actuator should have reached by now, N.
-    #[must_use]
     pub fn due(&self) -> Newtons {
         if self.running { self.model.output() } else { Q16::ZERO }
     }

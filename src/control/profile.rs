@@ -31,9 +31,6 @@ pub struct ProfileState {
 
 impl Profile {
     /// Limits of a rig.
-    ///
-    /// # Errors
-    /// [`RigError`] if a limit is out of range.
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         let jerk = rig.drive.jerk_mm_s3;
@@ -76,13 +73,11 @@ impl Profile {
 
 impl ProfileState {
     /// Speed, mm/s.
-    #[must_use]
     pub fn speed(&self) -> MillimetresPerSecond {
         Q16::narrow(self.speed)
     }
 
     /// Acceleration, mm/s^2.
-    #[must_use]
     pub const fn acceleration(&self) -> MillimetresPerSecond2 {
         self.acceleration
     }

@@ -2,40 +2,30 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use super::rise::Rise;
+use crate::estimate::Steps;
 use crate::model::Plan;
 use crate::model::timing::Timing;
 use crate::numeric::{checked, divide};
 use crate::rig::{Rig, RigError};
-use crate::supervise::Direction;
 use crate::units::{
-    Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, Q16, Seconds, q16,
+    Direction, Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, Q16, Seconds, q16,
 };
 
 /// Short of the wanted preload by no more than this part of the limit, it stands:
 /// worth 1.2 % of the gap, less than the schedule's reserve.
-const STANDS_PART: Q16 = q16(20_000);
+const REACHED_PART: Q16 = q16(20_000);
 /// Way by which braking starts early, for the tick and the loop's lag, mm.
 const BRAKE_RESERVE: Millimetres = q16(300_000);
 /// Time that a preload needs after its reference, kept before a window, s.
 const SETTLING: Seconds = q16(150_000);
 /// Speed at which the last tenths of a millimetre are covered, mm/s.
 const END_CREEP: MillimetresPerSecond = q16(1_500_000);
-/// Way to the end that counts as arrived, mm.
-const ARRIVED_WITHIN: Millimetres = q16(50_000);
-/// Way after a late step over which it is still searched, mm.
-const SEARCH: Millimetres = q16(6_000_000);
-
 /// Limits of a rig.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Schedule {
-    tolerance: Millimetres,
-    /// Distance to the face by which a step must have been felt, out and back, mm.
-    felt_by: [Millimetres; 2],
     timing: Timing,
     /// Short of the wanted preload by no more than this, it stands, N.
-    stands_within: Newtons,
-    travel: Millimetres,
+    reached_within: Newtons,
 }
 
 /// Where the wheel is on its way.
@@ -80,79 +70,24 @@ pub struct Targets {
     pub waiting: bool,
 }
 
-/// What has become of the step expected.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Expectation {
-    /// Its window lies ahead.
-    Ahead,
-    /// Inside its window.
-    Due,
-    /// Past its window, still searched.
-    Late,
-    /// Given up.
-    Missing,
-}
-
 impl Schedule {
-    /// Limits of a rig.
-    ///
-    /// # Errors
-    /// [`RigError`] if a limit is out of range.
+    /// Limits of a rig; fails where one is out of range.
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
-        let (r, h) = (rig.rig.wheel_radius_mm, rig.rig.step_height_mm);
-        // Way out: at lift-off with the tread as deep as a step's half. Way back: where
-        // the edge has let the wheel down by a tenth of the step.
-        let deep = r - 0.5 * h;
-        let out = libm::sqrt((deep * deep - (r - h) * (r - h)).max(0.0));
-        let back = libm::sqrt(r * r - (r - 0.1 * h) * (r - 0.1 * h));
         Ok(Self {
-            tolerance: checked("rig.step_tolerance_mm", rig.rig.step_tolerance_mm)?,
-            felt_by: [checked("rig.step_height_mm", out)?, -checked("rig.step_height_mm", back)?],
             timing: Timing::try_build(rig)?,
-            stands_within: checked("preload.limit_n", rig.preload.limit_n)? * STANDS_PART,
-            travel: checked("rig.travel_mm", rig.rig.travel_mm)?,
+            reached_within: checked("preload.limit_n", rig.preload.limit_n)? * REACHED_PART,
         })
     }
 
-    /// Half-width of the window in which a step is expected, mm.
-    #[must_use]
-    pub const fn tolerance(&self) -> Millimetres {
-        self.tolerance
-    }
-
     /// Short of the wanted preload by no more than this, it stands, N.
-    #[must_use]
-    pub const fn stands_within(&self) -> Newtons {
-        self.stands_within
-    }
-
-    /// Way to the end of travel from `position`, along the run, mm.
-    #[must_use]
-    pub fn remaining(&self, direction: Direction, position: Millimetres) -> Millimetres {
-        match direction {
-            Direction::Deploy => self.travel - position,
-            Direction::Retract => position,
-        }
-    }
-
-    /// Whether the way to the end is covered.
-    #[must_use]
-    pub fn arrived(&self, remaining: Millimetres) -> bool {
-        remaining <= ARRIVED_WITHIN
-    }
-
-    /// Way to where the corner may first be felt, tolerance included, mm.
-    #[must_use]
-    pub fn to_window(&self, rise: &Rise, course: &Course) -> Option<Millimetres> {
-        let first = rise.first_contact(course.direction) + self.tolerance;
-        course.distance.map(|distance| distance - first)
+    pub const fn reached_within(&self) -> Newtons {
+        self.reached_within
     }
 
     /// What to ask for.
-    #[must_use]
-    pub fn targets(&self, rise: &Rise, plan: &Plan, course: &Course) -> Targets {
-        let to_window = self.to_window(rise, course);
+    pub fn targets(&self, steps: &Steps, plan: &Plan, course: &Course) -> Targets {
+        let to_window = steps.to_window(course.direction, course.distance);
         let within = |way: Millimetres| to_window.is_some_and(|ahead| ahead <= way);
         // Out of sight of a step no braking can be due, whatever the speed is doing.
         let sight = self.sight(plan, course);
@@ -166,8 +101,8 @@ impl Schedule {
         let mut waiting = false;
         let short = plan.cross_preload - course.preload;
         if let (false, true, Some(ahead)) = (course.critical, ramping, to_window)
-            && short > self.stands_within
-            && ahead > -self.tolerance
+            && short > self.reached_within
+            && ahead > -steps.tolerance()
         {
             // Arrive no sooner than the preload: at the window, not at the corner.
             let needed = self.timing.ramp(short) + SETTLING;
@@ -178,7 +113,7 @@ impl Schedule {
             }
         }
         Targets {
-            speed: speed.min(self.end_speed(course, sight)),
+            speed: speed.min(self.end_speed(steps, course, sight)),
             preload,
             ramping,
             braking,
@@ -188,7 +123,7 @@ impl Schedule {
     }
 
     /// Way before the window at which a preload now referenced at `reference` must
-    /// start to rise, mm: what it takes longer than the braking is driven at cruise
+    /// start to steps, mm: what it takes longer than the braking is driven at cruise
     /// speed.
     fn ramp_way(&self, plan: &Plan, reference: Newtons) -> Millimetres {
         let missing = plan.cross_preload - reference;
@@ -197,32 +132,6 @@ impl Schedule {
         }
         let needed = self.timing.preload_change(missing.max(Q16::ZERO));
         plan.brake_way + (needed - plan.brake_time).max(Q16::ZERO) * plan.cruise_speed
-    }
-
-    /// Whether the step ahead is still to come.
-    #[must_use]
-    pub fn expectation(&self, rise: &Rise, course: &Course) -> Expectation {
-        let Some(distance) = course.distance else { return Expectation::Ahead };
-        let by = match course.direction {
-            Direction::Deploy => self.felt_by[0],
-            Direction::Retract => self.felt_by[1],
-        } - self.tolerance;
-        if self.to_window(rise, course).is_some_and(|ahead| ahead > Q16::ZERO) {
-            Expectation::Ahead
-        } else if distance > by {
-            Expectation::Due
-        } else if distance > by - SEARCH {
-            Expectation::Late
-        } else {
-            Expectation::Missing
-        }
-    }
-
-    /// Whether a corner felt at this distance is the step of the table rather than
-    /// one that the table lacks.
-    #[must_use]
-    pub fn belongs(&self, rise: &Rise, course: &Course) -> bool {
-        self.to_window(rise, course).is_some_and(|ahead| ahead <= SEARCH)
     }
 
     /// Way within which a step or the end can ask for another speed, mm.
@@ -245,10 +154,15 @@ impl Schedule {
 
     /// Speed towards the end of travel, mm/s: free until braking must begin, then a creep
     /// that is left within a few hundredths of a millimetre.
-    fn end_speed(&self, course: &Course, sight: Millimetres) -> MillimetresPerSecond {
+    fn end_speed(
+        &self,
+        steps: &Steps,
+        course: &Course,
+        sight: Millimetres,
+    ) -> MillimetresPerSecond {
         if course.remaining > sight {
             Q16::MAX
-        } else if self.arrived(course.remaining) {
+        } else if steps.arrived(course.remaining) {
             Q16::ZERO
         } else if course.remaining <= self.brake_way(course, END_CREEP) + BRAKE_RESERVE {
             END_CREEP
@@ -265,7 +179,7 @@ mod tests {
     use crate::model::{PlanRequest, Planner};
     use proptest::prelude::*;
 
-    fn setting(back: bool) -> (Rig, Schedule, Rise, Plan) {
+    fn setting(back: bool) -> (Rig, Schedule, Steps, Plan) {
         let rig = Rig::prototype();
         let direction = if back { Direction::Retract } else { Direction::Deploy };
         let plan = Planner::try_build(&rig).unwrap().plan(&PlanRequest {
@@ -275,7 +189,7 @@ mod tests {
             scale: q16(1_000_000),
             review: None,
         });
-        (rig.clone(), Schedule::try_build(&rig).unwrap(), Rise::try_build(&rig).unwrap(), plan)
+        (rig.clone(), Schedule::try_build(&rig).unwrap(), Steps::try_build(&rig).unwrap(), plan)
     }
 
     fn course(plan: &Plan, distance: f64, speed: f64, preload: f64) -> Course {
@@ -301,8 +215,8 @@ mod tests {
             speed in 0.0..40.0f64,
             preload in 0.0..60.0f64,
         ) {
-            let (_, schedule, rise, plan) = setting(back);
-            let got = schedule.targets(&rise, &plan, &course(&plan, distance, speed, preload));
+            let (_, schedule, steps, plan) = setting(back);
+            let got = schedule.targets(&steps, &plan, &course(&plan, distance, speed, preload));
             prop_assert!(got.speed >= Q16::ZERO && got.speed <= plan.cruise_speed);
             prop_assert!(got.preload == plan.cruise_preload || got.preload == plan.cross_preload);
         }
@@ -312,11 +226,11 @@ mod tests {
             back in any::<bool>(),
             into in 0.0..3.0f64,
         ) {
-            let (_, schedule, rise, plan) = setting(back);
-            let edge = rise.first_contact(plan.direction) + schedule.tolerance();
+            let (_, schedule, steps, plan) = setting(back);
+            let edge = steps.corner().first_contact(plan.direction) + steps.tolerance();
             let distance = edge.to_num::<f64>() - into;
             let standing = plan.cross_preload.to_num::<f64>();
-            let got = schedule.targets(&rise, &plan, &course(&plan, distance, 8.0, standing));
+            let got = schedule.targets(&steps, &plan, &course(&plan, distance, 8.0, standing));
             prop_assert_eq!(got.speed, plan.cross_speed);
             prop_assert_eq!(got.preload, plan.cross_preload);
             prop_assert!(got.approaching && !got.waiting);
@@ -327,10 +241,10 @@ mod tests {
             back in any::<bool>(),
             ahead in 0.0..2.0f64,
         ) {
-            let (rig, schedule, rise, plan) = setting(back);
-            let edge = rise.first_contact(plan.direction) + schedule.tolerance();
+            let (rig, schedule, steps, plan) = setting(back);
+            let edge = steps.corner().first_contact(plan.direction) + steps.tolerance();
             let distance = edge.to_num::<f64>() + ahead;
-            let got = schedule.targets(&rise, &plan, &course(&plan, distance, 8.0, 33.3));
+            let got = schedule.targets(&steps, &plan, &course(&plan, distance, 8.0, 33.3));
             // At most so fast that the missing preload is there first.
             let missing = plan.cross_preload.to_num::<f64>() - 33.3;
             let bound = ahead / (missing / rig.preload.slew_n_per_s);
@@ -342,38 +256,19 @@ mod tests {
             remaining in 0.06..40.0f64,
             speed in 0.0..30.0f64,
         ) {
-            let (_, schedule, rise, plan) = setting(false);
+            let (_, schedule, steps, plan) = setting(false);
             let at = Course {
                 remaining: Q16::from_num(remaining),
                 distance: None,
                 ..course(&plan, 0.0, speed, 33.3)
             };
-            let got = schedule.targets(&rise, &plan, &at).speed.to_num::<f64>();
+            let got = schedule.targets(&steps, &plan, &at).speed.to_num::<f64>();
             let way = schedule.timing.brake_way(Q16::from_num(speed), END_CREEP).to_num::<f64>();
             if remaining < way {
                 prop_assert_eq!(got, END_CREEP.to_num::<f64>());
             } else if remaining > way + 0.4 {
                 prop_assert_eq!(got, plan.cruise_speed.to_num::<f64>());
             }
-        }
-    }
-
-    #[test]
-    fn a_step_is_due_from_its_window_on_and_its_corner_belongs_from_six_millimetres_before() {
-        for back in [false, true] {
-            let (_, schedule, rise, plan) = setting(back);
-            let window = rise.first_contact(plan.direction) + schedule.tolerance();
-            let at = |ahead: Q16| Course {
-                distance: Some(window + ahead),
-                ..course(&plan, 0.0, 5.0, 40.0)
-            };
-            assert_eq!(schedule.expectation(&rise, &at(Q16::DELTA)), Expectation::Ahead);
-            assert_eq!(schedule.expectation(&rise, &at(Q16::ZERO)), Expectation::Due);
-            assert!(schedule.belongs(&rise, &at(Q16::ZERO)));
-            assert!(schedule.belongs(&rise, &at(q16(6_000_000))));
-            assert!(!schedule.belongs(&rise, &at(q16(6_000_000) + Q16::DELTA)));
-            let none = Course { distance: None, ..at(Q16::ZERO) };
-            assert!(!schedule.belongs(&rise, &none));
         }
     }
 

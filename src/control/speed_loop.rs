@@ -2,11 +2,9 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use super::saturate::duty;
-use crate::hal::Duty;
 use crate::numeric::checked;
 use crate::rig::{Rig, RigError};
-use crate::units::{MillimetresPerSecond, Newtons, Q16, Ratio, Travel, per_tick, q16};
+use crate::units::{Duty, MillimetresPerSecond, Newtons, Q16, Ratio, Travel, per_tick, q16};
 
 /// Crossover of the integral part, rad/s: a third of the speed observer's bandwidth.
 const CROSSOVER_RAD_S: f64 = 20.0;
@@ -40,9 +38,6 @@ pub struct SpeedLoopState {
 
 impl SpeedLoop {
     /// Gains of a rig.
-    ///
-    /// # Errors
-    /// [`RigError`] if a gain is out of range.
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         let inverse = 1.0 / rig.drive.no_load_speed_mm_s;
@@ -75,7 +70,7 @@ impl SpeedLoop {
                 .saturating_add(per_tick(self.integral * error.clamp(-MOST_ERROR, MOST_ERROR)))
                 .clamp(-limit, limit);
         }
-        duty(whole)
+        Duty::saturating(whole)
     }
 }
 
@@ -86,7 +81,6 @@ impl SpeedLoopState {
     }
 
     /// Duty that it adds to the feed-forward.
-    #[must_use]
     pub fn value(&self) -> Ratio {
         Q16::narrow(self.integral)
     }

@@ -13,7 +13,7 @@
 mod build;
 
 use crate::numeric::{LowPass, LowPassState, sqrt};
-use crate::supervise::Direction;
+use crate::units::Direction;
 use crate::units::{Millimetres, Q16, Ratio, q16};
 
 /// Rise above which the baseline is held, mm: two steps of the angle code.
@@ -99,7 +99,7 @@ pub struct Lift {
 
 /// What the watch noticed in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Sign {
+pub enum CrossingEvent {
     /// The corner carries.
     Touched,
     /// What looked like a corner is gone.
@@ -107,9 +107,9 @@ pub enum Sign {
     /// The lower wall stopped (retract: began) to carry.
     Lifted(Lift),
     /// The wheel has left the corner for the next wall.
-    Over,
+    Passed,
     /// The next wall's baseline is known: step height and the gap with it, mm.
-    Closed {
+    GapClosed {
         /// Measured step height.
         height: Millimetres,
         /// Gap with that height; with the nominal one if that is not plausible.
@@ -119,7 +119,7 @@ pub enum Sign {
     },
     /// The next corner carries before the wall between was measured; the gap of the
     /// last one with the nominal height, mm.
-    Again {
+    Retouched {
         /// Gap.
         gap: Millimetres,
     },
@@ -127,7 +127,7 @@ pub enum Sign {
 
 /// Sensor values of a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Seen {
+pub struct WatchInput {
     /// Wheel centre's distance from the pillar axis, mm.
     pub radius: Millimetres,
     /// Tread compression, mm.
@@ -140,7 +140,7 @@ pub struct Seen {
 
 impl CrossingWatch {
     /// Takes the wall under the resting wheel as baseline, unless it stands on a corner.
-    pub fn rest(&self, state: &mut WatchState, seen: &Seen) {
+    pub fn rest(&self, state: &mut WatchState, seen: &WatchInput) {
         let off = state.baseline.output() - (seen.radius - seen.compression);
         if state.contact == Contact::Wall && off.abs() < HOLD {
             self.baseline.step(&mut state.baseline, seen.radius - seen.compression);
@@ -148,7 +148,7 @@ impl CrossingWatch {
     }
 
     /// Starts afresh on the wall under the wheel.
-    pub fn begin(&self, state: &mut WatchState, seen: &Seen) {
+    pub fn begin(&self, state: &mut WatchState, seen: &WatchInput) {
         *state = WatchState {
             baseline: LowPassState::at(seen.radius - seen.compression),
             ..WatchState::default()
@@ -177,7 +177,7 @@ impl CrossingWatch {
         state: &mut WatchState,
         direction: Direction,
         level: u8,
-        seen: &Seen,
+        seen: &WatchInput,
     ) {
         *state =
             WatchState { baseline: LowPassState::at(self.wall(level)), ..WatchState::default() };
@@ -190,7 +190,6 @@ impl CrossingWatch {
     }
 
     /// How far inwards of the wall of `level` the wheel stands, by the table, mm.
-    #[must_use]
     pub fn height_over(
         &self,
         level: u8,
@@ -203,7 +202,6 @@ impl CrossingWatch {
     /// Axial distance from the centre of a wheel that stands on an edge to its face, mm: the
     /// edge lies `R - c` from the centre, and `y - h` below it. `level` is that of the lower
     /// wall.
-    #[must_use]
     pub fn to_edge(&self, level: u8, radius: Millimetres, compression: Millimetres) -> Millimetres {
         let height = self.wall(level) + self.radius - radius;
         self.measure(compression, height).distance
@@ -240,8 +238,7 @@ impl CrossingWatch {
     }
 
     /// How far the wheel stands off its baseline in the direction of the step, mm.
-    #[must_use]
-    pub fn rise(&self, state: &WatchState, direction: Direction, seen: &Seen) -> Millimetres {
+    pub fn rise(&self, state: &WatchState, direction: Direction, seen: &WatchInput) -> Millimetres {
         let rise = state.baseline.output() - (seen.radius - seen.compression);
         match direction {
             Direction::Deploy => rise,
@@ -250,7 +247,12 @@ impl CrossingWatch {
     }
 
     /// One tick.
-    pub fn step(&self, state: &mut WatchState, direction: Direction, seen: &Seen) -> Option<Sign> {
+    pub fn step(
+        &self,
+        state: &mut WatchState,
+        direction: Direction,
+        seen: &WatchInput,
+    ) -> Option<CrossingEvent> {
         let rise = self.rise(state, direction, seen);
         if state.contact != Contact::Wall {
             state.deepest = state.deepest.max(seen.compression);
@@ -266,9 +268,9 @@ impl CrossingWatch {
         &self,
         state: &mut WatchState,
         direction: Direction,
-        seen: &Seen,
+        seen: &WatchInput,
         rise: Millimetres,
-    ) -> Option<Sign> {
+    ) -> Option<CrossingEvent> {
         if rise < TOUCH {
             state.ticks = 0;
             let level = rise.abs() < HOLD;
@@ -287,16 +289,16 @@ impl CrossingWatch {
             return None;
         }
         self.touch(state, direction, seen);
-        Some(Sign::Touched)
+        Some(CrossingEvent::Touched)
     }
 
     fn on_corner(
         &self,
         state: &mut WatchState,
         direction: Direction,
-        seen: &Seen,
+        seen: &WatchInput,
         rise: Millimetres,
-    ) -> Option<Sign> {
+    ) -> Option<CrossingEvent> {
         // Height of the centre that the tread's memory still lacks at this instant.
         let short = match direction {
             Direction::Deploy => state.flat * self.memory,
@@ -314,19 +316,19 @@ impl CrossingWatch {
             };
             let lift = self.measure(seen.compression, self.radius - short);
             state.lift = Some(lift);
-            return Some(Sign::Lifted(lift));
+            return Some(CrossingEvent::Lifted(lift));
         }
         if state.lift.is_some() && rise >= self.step - OVER {
             state.contact = Contact::Leaving;
             state.ticks = 0;
-            return Some(Sign::Over);
+            return Some(CrossingEvent::Passed);
         }
         if rise < RELEASE {
             state.ticks = state.ticks.saturating_add(1);
             if state.ticks >= RELEASE_TICKS {
                 state.contact = Contact::Wall;
                 state.ticks = 0;
-                return Some(Sign::Released);
+                return Some(CrossingEvent::Released);
             }
         } else {
             state.ticks = 0;
@@ -338,9 +340,9 @@ impl CrossingWatch {
         &self,
         state: &mut WatchState,
         direction: Direction,
-        seen: &Seen,
+        seen: &WatchInput,
         rise: Millimetres,
-    ) -> Option<Sign> {
+    ) -> Option<CrossingEvent> {
         let ground = seen.radius - seen.compression;
         // Off the wall that the table promises: the next corner is already felt.
         let beyond = rise - self.step;
@@ -354,7 +356,7 @@ impl CrossingWatch {
             let gap = state.lift.map_or(Q16::ZERO, |lift| lift.gap);
             state.baseline = LowPassState::at(base);
             self.touch(state, direction, seen);
-            return Some(Sign::Again { gap });
+            return Some(CrossingEvent::Retouched { gap });
         }
         if !seen.clear {
             state.ticks = 0;
@@ -375,11 +377,11 @@ impl CrossingWatch {
         state.baseline = state.next;
         state.contact = Contact::Wall;
         state.ticks = 0;
-        Some(Sign::Closed { height, gap, plausible })
+        Some(CrossingEvent::GapClosed { height, gap, plausible })
     }
 
     /// A corner begins to carry.
-    fn touch(&self, state: &mut WatchState, direction: Direction, seen: &Seen) {
+    fn touch(&self, state: &mut WatchState, direction: Direction, seen: &WatchInput) {
         state.ticks = 0;
         state.again = 0;
         state.deepest = seen.compression;

@@ -20,7 +20,6 @@ pub struct Odometry {
 
 impl Odometry {
     /// Position by this travel, mm from the stow end.
-    #[must_use]
     pub fn position(&self, travel: Travel) -> Millimetres {
         let position = travel.saturating_add(self.offset);
         Q16::narrow(position)

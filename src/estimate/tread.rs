@@ -49,9 +49,6 @@ pub struct TreadState {
 
 impl TreadLaw {
     /// The tread of a rig.
-    ///
-    /// # Errors
-    /// [`RigError`] if a parameter is out of range.
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         let area = 1e-9 * rig.tread.k_inf_pa_per_m * rig.rig.wheel_width_mm;

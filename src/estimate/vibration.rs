@@ -69,12 +69,46 @@ pub struct VibrationState {
     last: Millimetres,
 }
 
+/// The observer's state and what it has shown.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct VibrationTracking {
+    observer: VibrationState,
+    awake: bool,
+    peak: Millimetres,
+}
+
+impl VibrationTracking {
+    /// Largest amplitude since tracking last began, mm.
+    pub const fn peak(&self) -> Millimetres {
+        self.peak
+    }
+}
+
 impl VibrationObserver {
+    /// One tick of tracking: from the first tick that is `awake` the observer starts again and
+    /// the peak counts. Asleep the observer runs only if nothing is skipped.
+    pub fn track(
+        &self,
+        tracking: &mut VibrationTracking,
+        compression: Millimetres,
+        awake: bool,
+        skipping: bool,
+    ) {
+        if awake && !tracking.awake {
+            self.reset(&mut tracking.observer, compression);
+            tracking.peak = Q16::ZERO;
+        }
+        tracking.awake = awake;
+        if awake || !skipping {
+            let amplitude = self.step(&mut tracking.observer, compression);
+            if awake {
+                tracking.peak = tracking.peak.max(amplitude);
+            }
+        }
+    }
+
     /// An observer of the rig's highest mode that a millisecond shows; one that sees
     /// nothing if there is none.
-    ///
-    /// # Errors
-    /// [`RigError::OutOfRange`] if the mode cannot be observed in these formats.
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         let seen = |hz: &&f64| **hz >= SEEN_HZ.0 && **hz <= SEEN_HZ.1;
         let highest = rig.drive.modes_hz.iter().filter(seen).copied().reduce(f64::max);

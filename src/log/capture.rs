@@ -11,21 +11,20 @@
 use heapless::{HistoryBuf, Vec};
 use serde::{Deserialize, Serialize};
 
-use super::number;
 use super::record::Record;
-use crate::supervise::{Direction, Leg, Mode};
-use crate::units::{Millimetres, Q16, Tick, q16};
+use crate::supervise::{Leg, Mode, codes};
+use crate::units::{Direction, Millimetres, Q16, Tick, q16};
 
 /// Ticks from one shot to the next.
 pub const EVERY: u32 = 10;
 
-/// Shots that a capture has.
+/// CaptureChunk that a capture has.
 pub const SHOTS: usize = 120;
 
-/// Shots after the trigger; the others are history.
+/// CaptureChunk after the trigger; the others are history.
 pub const AFTER: u8 = 90;
 
-/// Shots in a frame.
+/// CaptureChunk in a frame.
 pub const IN_FRAME: usize = 16;
 
 /// Way before the face at which a step counts as reached when it is dropped off, mm.
@@ -44,7 +43,7 @@ pub enum Trigger {
 
 /// A moment of a capture, 16 bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Shot {
+pub struct CaptureSample {
     /// Low half of its tick.
     pub at: u16,
     /// Codes of wheel, load cell, tread, arm.
@@ -57,14 +56,14 @@ pub struct Shot {
     pub stage: u8,
 }
 
-impl Shot {
+impl CaptureSample {
     fn of(record: &Record) -> Self {
         let seen = &record.telemetry;
         Self {
             at: seen.at as u16,
             codes: record.codes,
             duties: [seen.drive.to_bits(), seen.pretightener.to_bits()],
-            mode: number::of_mode(seen.mode),
+            mode: codes::of_mode(seen.mode),
             stage: seen.stage as u8,
         }
     }
@@ -72,17 +71,17 @@ impl Shot {
 
 /// A piece of a capture, as it is sent.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Shots {
+pub struct CaptureChunk {
     /// What set it off.
     pub trigger: Trigger,
     /// When.
     pub at: Tick,
     /// Place of the piece's first shot in the capture.
     pub first: u8,
-    /// Shots of the whole capture.
+    /// CaptureChunk of the whole capture.
     pub of: u8,
     /// The shots.
-    pub shots: Vec<Shot, IN_FRAME>,
+    pub shots: Vec<CaptureSample, IN_FRAME>,
 }
 
 /// What a capture is doing.
@@ -100,7 +99,7 @@ enum Doing {
 /// The ring of a capture, and what it waits for.
 #[derive(Debug, Default)]
 pub struct Capture {
-    shots: HistoryBuf<Shot, SHOTS>,
+    shots: HistoryBuf<CaptureSample, SHOTS>,
     doing: Doing,
     since: u32,
     /// This approach has set it off already.
@@ -141,7 +140,7 @@ impl Capture {
             return;
         }
         self.since = 0;
-        self.shots.write(Shot::of(record));
+        self.shots.write(CaptureSample::of(record));
         if let Doing::Filling(trigger, at, left) = self.doing {
             self.doing = match left {
                 0 | 1 => Doing::Draining(trigger, at, 0),
@@ -176,15 +175,15 @@ impl Capture {
 
     /// The next piece to be sent, if there is one; [`Capture::sent`] says that it was.
     #[must_use]
-    pub fn piece(&self) -> Option<Shots> {
+    pub fn piece(&self) -> Option<CaptureChunk> {
         let Doing::Draining(trigger, at, first) = self.doing else { return None };
         let rest = self.shots.oldest_ordered().skip(usize::from(first));
-        let shots: Vec<Shot, IN_FRAME> = rest.take(IN_FRAME).copied().collect();
-        Some(Shots { trigger, at, first, of: self.shots.len() as u8, shots })
+        let shots: Vec<CaptureSample, IN_FRAME> = rest.take(IN_FRAME).copied().collect();
+        Some(CaptureChunk { trigger, at, first, of: self.shots.len() as u8, shots })
     }
 
     /// A piece has found room on the channel. After the last, the capture watches again.
-    pub fn sent(&mut self, piece: &Shots) {
+    pub fn sent(&mut self, piece: &CaptureChunk) {
         let Doing::Draining(trigger, at, _) = self.doing else { return };
         let next = piece.first + piece.shots.len() as u8;
         if next < piece.of {
@@ -203,7 +202,7 @@ const _: () = assert!(CLOSE.to_bits() < Q16::ONE.to_bits());
 #[allow(clippy::float_arithmetic, reason = "positions of the test")]
 mod tests {
     use super::*;
-    use crate::supervise::Fault;
+    use crate::fault::Fault;
 
     const CORNER: Millimetres = q16(13_500_000);
 
@@ -223,7 +222,7 @@ mod tests {
         from + ticks
     }
 
-    fn whole(capture: &mut Capture) -> Option<(Trigger, Tick, std::vec::Vec<Shot>)> {
+    fn whole(capture: &mut Capture) -> Option<(Trigger, Tick, std::vec::Vec<CaptureSample>)> {
         let mut all = std::vec::Vec::new();
         let first = capture.piece()?;
         while let Some(piece) = capture.piece() {

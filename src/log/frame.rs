@@ -12,16 +12,16 @@
 //! takes nothing from the others. The sequence counts frames since boot, those that found
 //! no room too; `dropped` counts these.
 
-use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use serde::Deserialize;
 
-use super::capture::Shots;
-use super::entry::Entry;
+use super::capture::CaptureChunk;
+use super::crc::crc32;
+use super::delta::DeltaRecord;
 use super::identity::Identity;
 use super::ledger::Line;
 use super::record::Record;
-use super::wire::Wire;
 use crate::model::{Plan, PlanRequest};
+use crate::tick::Entry;
 use crate::units::Tick;
 
 /// Longest frame on the channel, bytes.
@@ -41,18 +41,6 @@ const CHECK: usize = 4;
 
 const _: () = assert!(BODY.is_multiple_of(4) && HEAD.is_multiple_of(4));
 
-static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
-
-/// What sums up a frame: [`check`], or hardware that gives the same. It is given whole words
-/// from whole words on.
-pub type Checker = fn(&[u8]) -> u32;
-
-/// The check of these bytes.
-#[must_use]
-pub fn check(bytes: &[u8]) -> u32 {
-    CRC.checksum(bytes)
-}
-
 /// What a frame holds, as a number that stays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
@@ -67,8 +55,8 @@ pub enum Kind {
     Request = 4,
     /// A log [`Entry`].
     Event = 5,
-    /// A piece of a capture: [`Shots`].
-    Shots = 6,
+    /// A piece of a capture: [`CaptureChunk`].
+    CaptureChunk = 6,
     /// A [`Line`] of the crossings' ledger.
     Ledger = 7,
 }
@@ -81,7 +69,7 @@ impl Kind {
         Self::Plan,
         Self::Request,
         Self::Event,
-        Self::Shots,
+        Self::CaptureChunk,
         Self::Ledger,
     ];
 }
@@ -100,10 +88,10 @@ pub struct Head {
 /// Room for a frame.
 #[derive(Debug)]
 #[repr(align(4))]
-pub struct Page([u8; LONGEST]);
+pub struct FrameBuffer([u8; LONGEST]);
 
-impl Page {
-    /// An empty page.
+impl FrameBuffer {
+    /// An empty one.
     #[must_use]
     pub const fn new() -> Self {
         Self([0; LONGEST])
@@ -111,12 +99,7 @@ impl Page {
 
     /// Makes it the frame whose body `fill` writes, so many bytes of it, and returns that.
     #[inline]
-    pub fn write(
-        &mut self,
-        head: Head,
-        check: Checker,
-        fill: impl FnOnce(&mut [u8; BODY]) -> usize,
-    ) -> &[u8] {
+    pub fn write(&mut self, head: Head, fill: impl FnOnce(&mut [u8; BODY]) -> usize) -> &[u8] {
         let Some((start, rest)) = self.0.split_first_chunk_mut::<HEAD>() else { return &[] };
         let Some(body) = rest.first_chunk_mut::<BODY>() else { return &[] };
         let length = fill(body).min(BODY);
@@ -128,17 +111,11 @@ impl Page {
         start[8..12].copy_from_slice(&head.sequence.to_le_bytes());
         start[12..].copy_from_slice(&head.dropped.to_le_bytes());
         let end = HEAD + whole;
-        let sum = check(&self.0[SYNC.len()..end]);
+        let sum = crc32(&self.0[SYNC.len()..end]);
         if let Some(place) = self.0[end..].first_chunk_mut() {
             *place = sum.to_le_bytes();
         }
         &self.0[..end + CHECK]
-    }
-}
-
-impl Default for Page {
-    fn default() -> Self {
-        Self::new()
     }
 }
 
@@ -175,7 +152,7 @@ pub enum Body<'a> {
     /// Something happened.
     Event(Entry),
     /// A piece of a capture.
-    Shots(Shots),
+    CaptureChunk(CaptureChunk),
     /// A crossing was closed.
     Ledger(Line),
     /// Something that this reader does not know.
@@ -215,7 +192,7 @@ pub fn look(bytes: &[u8]) -> Seen<'_> {
     let word = |at: usize| start[at..].first_chunk().map_or(0, |word| u32::from_le_bytes(*word));
     let end = HEAD + length.next_multiple_of(4);
     let Some(sum) = bytes.get(end..end + CHECK) else { return Seen::Part };
-    if check(&bytes[SYNC.len()..end]).to_le_bytes() != sum {
+    if crc32(&bytes[SYNC.len()..end]).to_le_bytes() != sum {
         return Seen::Garbage(1);
     }
     let head = Head { kind, sequence: word(8), dropped: word(12) };
@@ -245,11 +222,11 @@ impl<'a> Frame<'a> {
         };
         Ok(match kind {
             Kind::Identity => Body::Identity(whole(self.body)?),
-            Kind::Ticks => Body::Ticks(Ticks { before: Wire::default(), rest: self.body }),
+            Kind::Ticks => Body::Ticks(Ticks { before: DeltaRecord::default(), rest: self.body }),
             Kind::Plan => whole(self.body).map(|(at, plan)| Body::Plan(at, plan))?,
             Kind::Request => whole(self.body).map(|(at, request)| Body::Request(at, request))?,
             Kind::Event => Body::Event(whole(self.body)?),
-            Kind::Shots => Body::Shots(whole(self.body)?),
+            Kind::CaptureChunk => Body::CaptureChunk(whole(self.body)?),
             Kind::Ledger => Body::Ledger(whole(self.body)?),
         })
     }
@@ -269,7 +246,7 @@ fn whole<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, FrameError> {
 /// The records of a frame, in their order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ticks<'a> {
-    before: Wire,
+    before: DeltaRecord,
     rest: &'a [u8],
 }
 
@@ -280,7 +257,7 @@ impl Iterator for Ticks<'_> {
         if self.rest.is_empty() {
             return None;
         }
-        let read = Wire::take(&self.before, self.rest).and_then(|(wire, rest)| {
+        let read = DeltaRecord::take(&self.before, self.rest).and_then(|(wire, rest)| {
             let record = wire.record()?;
             (self.before, self.rest) = (wire, rest);
             Some(record)
@@ -292,16 +269,42 @@ impl Iterator for Ticks<'_> {
     }
 }
 
-/// Makes a body of ticks until it is full or `next` has none; its length.
-#[inline]
-pub(super) fn put_ticks(body: &mut [u8; BODY], mut next: impl FnMut(&mut Record) -> bool) -> usize {
-    let (mut record, mut before, mut length) = (Record::EMPTY, Wire::default(), 0);
-    while let Some(room) = body.get_mut(length..).and_then(|rest| rest.first_chunk_mut())
-        && next(&mut record)
-    {
-        length += Wire::of(&record).put(&mut before, room);
+/// A frame of ticks that fills up, one record behind the other.
+#[derive(Debug)]
+pub(super) struct TicksFrame {
+    buffer: FrameBuffer,
+    before: DeltaRecord,
+    length: usize,
+    ticks: usize,
+}
+
+impl TicksFrame {
+    /// Without a tick.
+    pub(super) const fn new() -> Self {
+        Self { buffer: FrameBuffer::new(), before: DeltaRecord::ZERO, length: 0, ticks: 0 }
     }
-    length
+
+    /// Ticks in it.
+    pub(super) const fn ticks(&self) -> usize {
+        self.ticks
+    }
+
+    /// Adds a record; false if there is no room for one of any kind.
+    pub(super) fn push(&mut self, record: &Record) -> bool {
+        let rest = self.buffer.0.get_mut(HEAD + self.length..LONGEST - CHECK);
+        let Some(room) = rest.and_then(|rest| rest.first_chunk_mut()) else { return false };
+        self.length += DeltaRecord::of(record).put(&mut self.before, room);
+        self.ticks += 1;
+        true
+    }
+
+    /// The frame; the next record begins another.
+    pub(super) fn close(&mut self, sequence: u32, dropped: u32) -> &[u8] {
+        let length = self.length;
+        (self.before, self.length, self.ticks) = (DeltaRecord::ZERO, 0, 0);
+        let head = Head { kind: Kind::Ticks as u8, sequence, dropped };
+        self.buffer.write(head, |_| length)
+    }
 }
 
 #[cfg(test)]
@@ -310,28 +313,16 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    #[test]
-    fn a_page_begins_blank() {
-        assert_eq!(Page::default().0, Page::new().0);
-    }
-
     fn head(kind: Kind, sequence: u32) -> Head {
         Head { kind: kind as u8, sequence, dropped: sequence / 3 }
     }
 
     /// A frame of these records, as many as fit, and how many that were.
     fn frame(records: &[Record], sequence: u32) -> (Vec<u8>, usize) {
-        let (mut left, mut put) = (records.iter().copied(), 0);
-        let mut page = Page::new();
-        let frame = page.write(head(Kind::Ticks, sequence), check, |body| {
-            put_ticks(body, |record| {
-                let next = left.next();
-                put += usize::from(next.is_some());
-                *record = next.unwrap_or(*record);
-                next.is_some()
-            })
-        });
-        (frame.to_vec(), put)
+        let mut frame = TicksFrame::new();
+        let put = records.iter().take_while(|record| frame.push(record)).count();
+        assert_eq!(frame.ticks(), put);
+        (frame.close(sequence, sequence / 3).to_vec(), put)
     }
 
     /// Frames found one after the other in bytes, and how many bytes are none.
@@ -399,8 +390,8 @@ mod tests {
 
         #[test]
         fn a_sync_inside_a_frame_is_content(kind in any::<u8>(), at in 0..BODY - 4, length in any::<u16>()) {
-            let mut page = Page::new();
-            let bytes = page.write(Head { kind, sequence: 5, dropped: 0 }, check, |body| {
+            let mut buffer = FrameBuffer::new();
+            let bytes = buffer.write(Head { kind, sequence: 5, dropped: 0 }, |body| {
                 body.fill(0);
                 body[at..at + 4].copy_from_slice(&SYNC);
                 if let Some(place) = body[at + 4..].first_chunk_mut() {
@@ -438,18 +429,13 @@ mod tests {
     #[test]
     fn the_longest_body_fits() {
         let most = Head { kind: u8::MAX, sequence: u32::MAX, dropped: u32::MAX };
-        let mut page = Page::new();
-        let bytes = page.write(most, check, |body| {
+        let mut buffer = FrameBuffer::new();
+        let bytes = buffer.write(most, |body| {
             body.fill(0xA5);
             BODY + 7
         });
         assert_eq!(bytes.len(), LONGEST);
         let frame = Frame::open(bytes).unwrap();
         assert_eq!((frame.head, frame.body), (most, &[0xA5; BODY][..]));
-    }
-
-    #[test]
-    fn the_check_is_the_one_of_ethernet() {
-        assert_eq!(check(b"123456789"), 0xCBF4_3926);
     }
 }

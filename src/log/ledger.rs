@@ -8,10 +8,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::entry::CrossingRecord;
 use super::record::Record;
 use crate::estimate::ContactStage;
 use crate::supervise::Mode;
+use crate::tick::CrossingRecord;
 use crate::units::{Millimetres, MillimetresPerSecond, Q16, Ratio, Tick, q16};
 
 /// Weight of the newest crossing in the trend.
@@ -107,7 +107,8 @@ impl Ledger {
 #[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 pub(super) mod tests {
     use super::*;
-    use crate::supervise::{Direction, Leg};
+    use crate::supervise::Leg;
+    use crate::units::Direction;
 
     /// A crossing of ordinary values.
     pub(in crate::log) fn crossing(direction: Direction, scale: f64) -> CrossingRecord {

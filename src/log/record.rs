@@ -1,15 +1,13 @@
 //! One tick as the log keeps it: all that the tick was given and all that it gave, so
 //! that a host can run it again and compare bits.
 
-use super::number;
-use super::telemetry::Telemetry;
-use crate::control::{Input, Output};
-use crate::hal::MotorCommand;
 use crate::sense::raw::{
     AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
 };
 use crate::supervise::Command;
-use crate::units::Tick;
+use crate::supervise::codes;
+use crate::tick::{Input, Output, Telemetry};
+use crate::units::{MotorCommand, Tick};
 
 /// Age of a code that was taken at its tick, and so the farthest ahead that one may be.
 const NOW: u32 = 8;
@@ -54,7 +52,7 @@ impl Flags {
     fn of(input: &Input, output: &Output) -> Self {
         let bit = |set: bool, bit: u16| if set { bit } else { 0 };
         Self(
-            u16::from(number::of_command(input.command))
+            u16::from(codes::of_command(input.command))
                 | bit(input.plan.is_some(), Self::PLAN)
                 | bit(input.overrun, Self::OVERRUN)
                 | bit(input.emergency_stop, Self::EMERGENCY)
@@ -86,7 +84,7 @@ impl Flags {
     /// The command that the tick was given.
     #[must_use]
     pub fn command(self) -> Option<Command> {
-        number::command((self.0 & Self::COMMAND) as u8)
+        codes::command((self.0 & Self::COMMAND) as u8)
     }
 
     /// The tick was given a plan.
@@ -148,23 +146,21 @@ impl Record {
     /// The record of a tick.
     #[must_use]
     pub fn of(input: &Input, output: &Output) -> Self {
-        let mut record = Self::EMPTY;
-        record.set(input, output);
-        record
-    }
-
-    /// Makes it the record of a tick, where it stands: it is copied once.
-    #[inline]
-    pub(super) fn set(&mut self, input: &Input, output: &Output) {
-        self.telemetry = output.telemetry;
         let SensorFrame { wheel, load_cell, tread, arm, bridges } = &input.sensors;
-        (self.codes[0], self.ages[0]) = pack(input.now, wheel.as_ref(), EncoderCount::get);
-        (self.codes[1], self.ages[1]) = pack(input.now, load_cell.as_ref(), AdcCode::get);
-        (self.codes[2], self.ages[2]) = pack(input.now, tread.as_ref(), AdcCode::get);
-        (self.codes[3], self.ages[3]) = pack(input.now, arm.as_ref(), AngleFrame::get);
-        let codes = bridges.unwrap_or_default();
-        self.bridges = [codes.drive.get(), codes.pretightener.get()];
-        self.flags = Flags::of(input, output);
+        let sensors = [
+            pack(input.now, wheel.as_ref(), EncoderCount::get),
+            pack(input.now, load_cell.as_ref(), AdcCode::get),
+            pack(input.now, tread.as_ref(), AdcCode::get),
+            pack(input.now, arm.as_ref(), AngleFrame::get),
+        ];
+        let bridges = bridges.unwrap_or_default();
+        Self {
+            telemetry: output.telemetry,
+            codes: sensors.map(|(code, _)| code),
+            ages: sensors.map(|(_, age)| age),
+            bridges: [bridges.drive.get(), bridges.pretightener.get()],
+            flags: Flags::of(input, output),
+        }
     }
 
     /// Time of the tick.
@@ -255,43 +251,33 @@ fn unpack<T>(
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::hal::Duty;
     use crate::supervise::Mode;
-    use crate::units::Q16;
+    use crate::units::{Duty, Q16};
     use proptest::prelude::*;
 
     /// Any record that a tick can leave.
     pub(in crate::log) fn any_record() -> impl Strategy<Value = Record> {
-        let quantities = prop::array::uniform11(any::<i32>());
+        let quantities = any::<[i32; Telemetry::COLUMNS.len()]>();
         (
             (any::<u32>(), 0..18_usize, 1..=6_u8, any::<u8>(), quantities, any::<[i16; 2]>()),
             (any::<[u16; 4]>(), any::<[u8; 4]>(), any::<[u16; 2]>(), 0..1_u16 << 15),
         )
             .prop_map(
-                |((at, mode, stage, level, q, duties), (codes, ages, bridges, flags))| Record {
-                    telemetry: Telemetry {
+                |((at, mode, stage, level, q, duties), (codes, ages, bridges, flags))| {
+                    let [drive, pretightener] = duties.map(Duty::from_bits);
+                    let mode = Mode::WITHOUT_FAULT[mode];
+                    let stage = codes::stage(stage).unwrap();
+                    let state = Telemetry {
                         at,
-                        mode: Mode::WITHOUT_FAULT[mode],
-                        stage: number::stage(stage).unwrap(),
-                        position: Q16::from_bits(q[0]),
-                        speed: Q16::from_bits(q[1]),
-                        speed_ref: Q16::from_bits(q[2]),
-                        preload: Q16::from_bits(q[3]),
-                        preload_ref: Q16::from_bits(q[4]),
-                        compression: Q16::from_bits(q[5]),
-                        radius: Q16::from_bits(q[6]),
+                        mode,
+                        stage,
                         level,
-                        gap_predicted: Q16::from_bits(q[7]),
-                        slip_margin: Q16::from_bits(q[8]),
-                        vibration: Q16::from_bits(q[9]),
-                        distance: Q16::from_bits(q[10]),
-                        drive: Duty::from_bits(duties[0]),
-                        pretightener: Duty::from_bits(duties[1]),
-                    },
-                    codes,
-                    ages,
-                    bridges,
-                    flags: Flags::from_bits(flags),
+                        drive,
+                        pretightener,
+                        ..Telemetry::EMPTY
+                    };
+                    let telemetry = state.with_quantities(q.map(Q16::from_bits));
+                    Record { telemetry, codes, ages, bridges, flags: Flags::from_bits(flags) }
                 },
             )
     }

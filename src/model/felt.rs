@@ -9,7 +9,7 @@
 //! 1 exactly, whatever was fitted.
 
 use super::constants::{DEPLOY, DEPLOY_PUSHED, RETRACT, RETRACT_PUSHED};
-use crate::supervise::Direction;
+use crate::units::Direction;
 
 /// Highest degree in x.
 pub const FAST_DEGREE: usize = 5;
@@ -50,7 +50,6 @@ impl Kind {
     ];
 
     /// Pace v tau / R at which half the crossing is fast. Chosen: least scatter of the fit.
-    #[must_use]
     pub const fn half_pace(self) -> f64 {
         match self.direction {
             Direction::Deploy => 0.04,
@@ -82,7 +81,6 @@ impl Kind {
 
     /// The polynomial for one step and load, both over the wheel's units and held at the
     /// ends of the fit.
-    #[must_use]
     pub fn fold(self, step: f64, load: f64) -> Folded {
         let mut folded = Folded::default();
         let (by_step, by_load) = (step_values(step), load_values(load));
@@ -96,7 +94,6 @@ impl Kind {
 }
 
 /// Chebyshev polynomials of the first kind at `t`, T_0 to T_(N-1).
-#[must_use]
 pub fn chebyshev<const N: usize>(t: f64) -> [f64; N] {
     let (mut now, mut next) = (1.0, t);
     [(); N].map(|()| {
@@ -107,32 +104,27 @@ pub fn chebyshev<const N: usize>(t: f64) -> [f64; N] {
 }
 
 /// Chebyshev values in x, 0 to 1.
-#[must_use]
 pub fn fast_values(x: f64) -> [f64; FAST_DEGREE + 1] {
     chebyshev(2.0 * x - 1.0)
 }
 
 /// Chebyshev values in the run over R.
-#[must_use]
 pub fn run_values(run: f64) -> [f64; RUN_DEGREE + 1] {
     chebyshev(2.0 * run / RUN_END - 1.0)
 }
 
 /// Chebyshev values in the step over R, held at the ends.
-#[must_use]
 pub fn step_values(step: f64) -> [f64; SLOW_DEGREE + 1] {
     let (low, high) = STEP_RANGE;
     chebyshev(2.0 * (step.max(low).min(high) - low) / (high - low) - 1.0)
 }
 
 /// Chebyshev values in the load over k_inf R^2 L, held at the ends.
-#[must_use]
 pub fn load_values(load: f64) -> [f64; SLOW_DEGREE + 1] {
     chebyshev(2.0 * load.clamp(0.0, LOAD_END) / LOAD_END - 1.0)
 }
 
 /// Value of a folded polynomial.
-#[must_use]
 pub fn value(folded: &Folded, x: f64, run: f64) -> f64 {
     let (by_x, by_run) = (fast_values(x), run_values(run));
     let row = |row: &[f64; RUN_DEGREE + 1]| row.iter().zip(by_run).map(|(c, t)| c * t).sum::<f64>();

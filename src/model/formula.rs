@@ -9,7 +9,7 @@
 use super::felt::{self, FORCE_END, Folded, Kind, RUN_END};
 use super::impact::Impact;
 use crate::rig::Rig;
-use crate::supervise::Direction;
+use crate::units::Direction;
 
 /// Shortest run of the model over R: 0.1 mm on the published wheel.
 pub const LEAST_RUN: f64 = 0.004;
@@ -29,7 +29,6 @@ pub struct Contact {
 
 impl Contact {
     /// Axial over radial part: tangent of the contact's mean inclination.
-    #[must_use]
     pub fn slope(&self) -> f64 {
         if self.radial > 0.0 { self.axial / self.radial } else { 0.0 }
     }
@@ -72,7 +71,6 @@ pub struct Crossing {
 
 impl Formula {
     /// The reduced model of a rig.
-    #[must_use]
     pub fn new(rig: &Rig) -> Self {
         Self {
             radius_mm: rig.rig.wheel_radius_mm,
@@ -86,47 +84,40 @@ impl Formula {
     }
 
     /// Unit of force of the fit, `k_inf R^2 L`, N.
-    #[must_use]
     pub fn unit_force_n(&self) -> f64 {
         self.k_inf * self.radius_mm * self.radius_mm * self.width_mm
     }
 
     /// Gap of the unloaded wheel, mm: the circle just touches floor and corner.
-    #[must_use]
     pub fn largest_gap_mm(&self) -> f64 {
         self.gap_after_mm(0.0)
     }
 
     /// Axial distance of the corner from the centre at which the undeformed wheel
     /// touches it, mm.
-    #[must_use]
     pub fn free_run_mm(&self) -> f64 {
         let above = self.radius_mm - self.step_mm;
         libm::sqrt(self.radius_mm * self.radius_mm - above * above)
     }
 
     /// Axial distance from the face at which the wheel stands with this gap, mm.
-    #[must_use]
     pub fn distance_mm(&self, gap_mm: f64) -> f64 {
         let reach = self.radius_mm + gap_mm;
         libm::sqrt((reach * reach - self.radius_mm * self.radius_mm).max(0.0))
     }
 
     /// Run of the wheel over the corner up to lift-off, mm.
-    #[must_use]
     pub fn run_mm(&self, gap_mm: f64) -> f64 {
         self.free_run_mm() - self.distance_mm(gap_mm)
     }
 
     /// Gap with which the wheel lifts off after this run, mm.
-    #[must_use]
     pub fn gap_after_mm(&self, run_mm: f64) -> f64 {
         let d = self.free_run_mm() - run_mm;
         libm::sqrt(d * d + self.radius_mm * self.radius_mm) - self.radius_mm
     }
 
     /// Tread depth at the corner at lift-off, mm.
-    #[must_use]
     pub fn depth_mm(&self, gap_mm: f64) -> f64 {
         let d = self.distance_mm(gap_mm);
         let above = self.radius_mm - self.step_mm;
@@ -135,7 +126,6 @@ impl Formula {
 
     /// Contact at lift-off with this gap: face from where the circle meets it up to
     /// the corner, then the top.
-    #[must_use]
     pub fn contact(&self, gap_mm: f64) -> Contact {
         let (r, above) = (self.radius_mm, self.radius_mm - self.step_mm);
         let d = self.distance_mm(gap_mm);
@@ -156,7 +146,6 @@ impl Formula {
     }
 
     /// Radial force of the relaxed ring that lifts off with this gap, without load, N.
-    #[must_use]
     pub fn relaxed_force_n(&self, kind: Kind, gap_mm: f64) -> f64 {
         let contact = self.contact(gap_mm);
         // Traction on the contact's slope carries the rest of a driven wheel's force.
@@ -166,7 +155,6 @@ impl Formula {
 
     /// Longest run of the model, mm: where the fit ends, be it by the run, by the
     /// relaxed force, or because the gap closes.
-    #[must_use]
     pub fn largest_run_mm(&self, kind: Kind) -> f64 {
         let most = (RUN_END * self.radius_mm).min(MOST_RUN_PART * self.free_run_mm());
         let limit = FORCE_END * self.unit_force_n();
@@ -175,26 +163,22 @@ impl Formula {
     }
 
     /// Speed at which half the crossing is fast, mm/s.
-    #[must_use]
     pub fn half_speed_mm_s(&self, kind: Kind) -> f64 {
         kind.half_pace() * self.radius_mm / self.tau_s
     }
 
     /// Part of the crossing that is fast, `v / (v + v_half)`.
-    #[must_use]
     pub fn fast_part(&self, kind: Kind, speed_mm_s: f64) -> f64 {
         speed_mm_s / (speed_mm_s + self.half_speed_mm_s(kind))
     }
 
     /// The felt stiffening at this rig's step and this load.
-    #[must_use]
     pub fn fold(&self, kind: Kind, load_n: f64) -> Folded {
         kind.fold(self.step_mm / self.radius_mm, load_n / self.unit_force_n())
     }
 
     /// Effective stiffness over k_inf, `1 + (s - 1) x E`, of a crossing with this gap;
     /// `load_n` as in [`force_n`](Self::force_n).
-    #[must_use]
     pub fn stiffness(
         &self,
         direction: Direction,
@@ -216,7 +200,6 @@ impl Formula {
     /// Radial force on the wheel that gives this gap, N: `k (I_r + s I_a) + T s` with
     /// `s = I_a / I_r`, pushed `k I_r`. `load_n` is the axial load lifted by friction;
     /// `None` pushes a frictionless wheel.
-    #[must_use]
     pub fn force_n(
         &self,
         direction: Direction,
@@ -244,7 +227,6 @@ impl Formula {
 
     /// Gap at this speed and radial force, mm, by 40 halvings of the run; at the ends of
     /// the model the gap there.
-    #[must_use]
     pub fn gap_mm(
         &self,
         direction: Direction,
@@ -265,7 +247,6 @@ impl Formula {
 
     /// Largest speed up to `ceiling_mm_s` at which this radial force still holds the gap,
     /// mm/s; 0 if none does.
-    #[must_use]
     pub fn speed_mm_s(
         &self,
         direction: Direction,
@@ -280,7 +261,6 @@ impl Formula {
 
     /// Friction that the lift of `load_n` uses at that instant: `T / C + s`, with the
     /// radial reaction `C = (P - T s) / (1 + s^2)`.
-    #[must_use]
     pub fn utilisation(
         &self,
         direction: Direction,
@@ -294,7 +274,6 @@ impl Formula {
     }
 
     /// Everything that the model says of a crossing.
-    #[must_use]
     pub fn crossing(
         &self,
         direction: Direction,

@@ -14,9 +14,6 @@ pub struct Guard {
 
 impl Guard {
     /// Bands of a rig: ripple frequency v / pitch within the guard of a mode.
-    ///
-    /// # Errors
-    /// [`RigError`] if a band's speed is out of range.
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         let mut guard = Self::default();
@@ -43,7 +40,6 @@ impl Guard {
     }
 
     /// The largest speed up to `speed` outside the bands, and whether it was moved.
-    #[must_use]
     pub fn below(&self, speed: MillimetresPerSecond) -> (MillimetresPerSecond, bool) {
         let inside = self.bands.iter().find(|(low, high)| speed > *low && speed < *high);
         inside.map_or((speed, false), |(low, _)| (*low, true))

@@ -31,7 +31,6 @@ impl Impact {
     /// Impact and vibration of a rig.
     ///
     /// The mode is the highest of `drive.modes_hz`: the first of the constrained rig.
-    #[must_use]
     pub fn new(rig: &Rig) -> Self {
         let (r, h) = (rig.rig.wheel_radius_mm, rig.rig.step_height_mm);
         let above = (r - h) / r;
@@ -50,7 +49,6 @@ impl Impact {
     /// the instant wave speed `c_0 = sqrt(E_0 / rho)`, `E_0 = s E_inf`, and the closing
     /// speed normal to the tread, `cos(phi) = (R - h) / R`. Proportional to the speed,
     /// mm/s. Source: a plane wave in a half-space (Graff 1975, 1.1).
-    #[must_use]
     pub fn stress_pa(&self, speed_mm_s: f64) -> f64 {
         self.stress_per_speed * speed_mm_s
     }
@@ -59,7 +57,6 @@ impl Impact {
     /// that rises evenly to `radial_n` while the wheel runs `run_mm` over the corner at
     /// `speed_mm_s` leaves `F/k 2 / (omega t)`, `t = run / v`; never more than a sudden
     /// force, `F/k`. Source: undamped oscillator under a ramp (Biggs 1964, 2.5).
-    #[must_use]
     pub fn vibration_mm(&self, speed_mm_s: f64, radial_n: f64, run_mm: f64) -> f64 {
         let ramp = 2.0 * speed_mm_s / (self.mode_rad_s * run_mm);
         // A rig without modes has nothing that could swing.

@@ -1,7 +1,7 @@
 //! What the tick asks the model task, and what it is answered.
 
-use crate::supervise::{Direction, Limit};
-use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Ratio, Seconds};
+use crate::fault::Limit;
+use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Ratio, Seconds};
 
 /// How preload and speed are chosen. The product is [`Strategy::Scheduled`]; the
 /// others are what it is compared with.

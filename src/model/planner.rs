@@ -9,9 +9,9 @@ use super::guard::Guard;
 use super::plan::{Outcome, Plan, PlanRequest, Review, Strategy};
 use super::reduced::{Point, ReducedModel, Scale};
 use super::timing::Timing;
+use crate::fault::Limit;
 use crate::rig::MAX_STEPS;
-use crate::supervise::{Direction, Limit};
-use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Ratio, Seconds, q16};
+use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Ratio, Seconds, q16};
 
 /// Largest correction of the stiffness scale by one crossing.
 const LARGEST_CORRECTION: Ratio = q16(100_000);
@@ -65,7 +65,6 @@ pub struct Planner {
 
 impl Planner {
     /// Answers a request.
-    #[must_use]
     pub fn plan(&self, request: &PlanRequest) -> Plan {
         let outcome = request.review.map(|review| self.review(&review, request.scale));
         let scale = outcome.map_or(request.scale, |o| o.scale);
@@ -104,7 +103,6 @@ impl Planner {
     }
 
     /// Gap that the schedule holds on this way, mm.
-    #[must_use]
     pub fn gap_ref(&self, direction: Direction) -> Millimetres {
         self.gap_ref[way(direction)]
     }

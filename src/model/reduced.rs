@@ -18,8 +18,7 @@ mod shape;
 mod way;
 
 use crate::numeric::{fraction, high};
-use crate::supervise::Direction;
-use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio};
+use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio};
 
 use shape::{Refined, Shape};
 use way::Way;
@@ -41,7 +40,6 @@ impl Scale {
     pub const NOMINAL: Self = Self { ratio: Ratio::ONE, inverse: 1 << 28 };
 
     /// From the ratio.
-    #[must_use]
     pub fn new(ratio: Ratio) -> Self {
         let bits = ratio.to_bits().clamp(1 << 14, 1 << 18);
         // 2^44 over the bits, in two digits of 31 and 13 places.
@@ -52,7 +50,6 @@ impl Scale {
     }
 
     /// The ratio.
-    #[must_use]
     pub const fn ratio(self) -> Ratio {
         self.ratio
     }
@@ -109,7 +106,6 @@ pub struct Crossing {
 
 impl ReducedModel {
     /// Least and largest gap of the model, mm.
-    #[must_use]
     pub fn gap_range(&self) -> (Millimetres, Millimetres) {
         (self.shape.gap(self.shape.most_run()), self.shape.gap(self.shape.least_run()))
     }
@@ -119,8 +115,6 @@ impl ReducedModel {
     /// Equation: the run r with `F(x, r) + T s(r) = P` by one step from
     /// a guess in cells of x and P; then [`Formula::crossing`](super::formula::Formula::crossing). A
     /// scale multiplies what the force exceeds the lift of the load on the mean slope by.
-    #[must_use]
-    #[inline]
     pub fn crossing(&self, point: &Point, force: Newtons) -> Crossing {
         let (shape, way) = (&self.shape, self.way(point.direction));
         let wanted = shape.part(force);
@@ -147,20 +141,16 @@ impl ReducedModel {
     }
 
     /// Gap under this radial force, mm.
-    #[must_use]
     pub fn gap(&self, point: &Point, force: Newtons) -> Millimetres {
         self.crossing(point, force).gap
     }
 
     /// Radial force that gives this gap, N: `F + T s`, scaled.
-    #[must_use]
-    #[inline]
     pub fn force(&self, point: &Point, gap: Millimetres) -> Newtons {
         self.shape.newtons(self.force_part(point, self.shape.run(gap)))
     }
 
     /// Friction that lifting the load uses at this gap: `T / C + s`; 0 if pushed.
-    #[must_use]
     pub fn utilisation(&self, point: &Point, gap: Millimetres) -> Ratio {
         let run = self.shape.run(gap);
         let force = self.force_part(point, run);
@@ -173,8 +163,6 @@ impl ReducedModel {
     ///
     /// Equation: the fast part x with `F(x, r) = P - T s`, by two steps of Newton's
     /// method from a polynomial guess; then `v = v_half x / (1 - x)`.
-    #[must_use]
-    #[inline]
     pub fn speed(
         &self,
         point: &Point,
@@ -195,7 +183,6 @@ impl ReducedModel {
     }
 
     /// Scale of the stiffness that explains this gap under this radial force.
-    #[must_use]
     pub fn observed_scale(&self, point: &Point, gap: Millimetres, force: Newtons) -> Ratio {
         let nominal = Point { scale: Scale::NOMINAL, ..*point };
         let shape = &self.shape;
@@ -207,13 +194,11 @@ impl ReducedModel {
     }
 
     /// Tread depth at the corner at lift-off, mm.
-    #[must_use]
     pub fn depth(&self, gap: Millimetres) -> Millimetres {
         self.shape.depth(self.shape.run(gap))
     }
 
     /// Radial force after this run, Q30.
-    #[inline(always)]
     fn force_part(&self, point: &Point, run: u32) -> i32 {
         let (shape, way) = (&self.shape, self.way(point.direction));
         let w = centred(run);
@@ -223,14 +208,12 @@ impl ReducedModel {
     }
 
     /// Friction used under a radial reaction on this slope, both Q30.
-    #[inline(always)]
     fn used(&self, radial: i32, slope: i32) -> Ratio {
         Ratio::from_bits(self.shape.utilisation(radial, slope).to_bits() & self.driven)
     }
 
     /// One address, from which all coefficients are read; a choice of two references would
     /// be made anew for each.
-    #[inline(always)]
     fn way(&self, direction: Direction) -> &Way {
         &self.ways[direction as usize % 2]
     }
@@ -240,20 +223,17 @@ impl ReducedModel {
 ///
 /// A branch that is hardly ever taken is cheaper than a choice. And the coefficients behind
 /// it are not loaded before it, where they would not fit the registers.
-#[inline(always)]
 fn unless(beyond: bool, bound: i32, value: i32) -> i32 {
     if beyond { end(bound) } else { value }
 }
 
 #[cold]
-#[inline(never)]
 fn end(bound: i32) -> i32 {
     // Unseen, or it would be a choice after all.
     core::hint::black_box(bound)
 }
 
 /// A part of a whole, Q32 without sign, as its difference from one half, Q32 with sign.
-#[inline(always)]
 const fn centred(part: u32) -> i32 {
     (part ^ 0x8000_0000) as i32
 }

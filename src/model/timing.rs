@@ -30,9 +30,6 @@ pub struct Timing {
 
 impl Timing {
     /// Limits of a rig.
-    ///
-    /// # Errors
-    /// [`RigError`] if a limit is out of range.
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         let (a, j) = (rig.drive.acceleration_mm_s2, rig.drive.jerk_mm_s3);
@@ -57,7 +54,6 @@ impl Timing {
 
     /// Duration of a jerk-limited change of speed, s: `D/a + a/j`, or
     /// `2 sqrt(D/j)` below the knee `a^2/j`. Source: S-curve kinematics.
-    #[must_use]
     pub fn speed_change(&self, change: MillimetresPerSecond) -> Seconds {
         let change = if change < Q16::ZERO { -change } else { change };
         if change >= self.knee {
@@ -71,27 +67,23 @@ impl Timing {
 
     /// Way of that change between two speeds, mm: the S-curve is symmetric, so its
     /// duration times the mean speed.
-    #[must_use]
     pub fn brake_way(&self, from: MillimetresPerSecond, to: MillimetresPerSecond) -> Millimetres {
         let mean = (from + to) * q16(500_000);
         self.speed_change(from - to) * mean
     }
 
     /// Time in which the jerk takes this acceleration back, s.
-    #[must_use]
     pub fn until_level(&self, acceleration: MillimetresPerSecond2) -> Seconds {
         self.by_acceleration.divide(acceleration) * self.build_up
     }
 
     /// Time from the command until a preload change stands, s.
-    #[must_use]
     pub fn preload_change(&self, change: Newtons) -> Seconds {
         let change = if change < Q16::ZERO { -change } else { change };
         self.latency + self.by_rate.divide(change)
     }
 
     /// Time in which the reference runs through a preload change, s.
-    #[must_use]
     pub fn ramp(&self, change: Newtons) -> Seconds {
         self.by_rate.divide(change)
     }
@@ -99,7 +91,6 @@ impl Timing {
     /// Way that no braking from up to `cruise` exceeds, whatever the acceleration still
     /// under way, mm: the speed that this leads to at most, for as long as it takes to
     /// lose all of it.
-    #[must_use]
     pub fn longest_brake_way(&self, cruise: MillimetresPerSecond) -> Millimetres {
         let peak = cruise + (self.acceleration * self.build_up).half();
         self.speed_change(peak) * peak + q16(100_000)

@@ -7,10 +7,6 @@ use crate::units::{Q16, TICK_HZ};
 use fixed::types::I16F16;
 
 /// `value` as a [`Q16`], rounded to nearest.
-///
-/// # Errors
-/// [`RigError::OutOfRange`] with `key` if the value is not finite or exceeds the
-/// range of the format.
 pub fn checked(key: &'static str, value: f64) -> Result<Q16, RigError> {
     let number = I16F16::checked_from_num(value);
     number.map(|n| Q16::from_bits(n.to_bits())).ok_or(RigError::OutOfRange {
@@ -56,9 +52,6 @@ impl<const N: usize> Table<N> {
 
 impl Divisor {
     /// A division by `value`.
-    ///
-    /// # Errors
-    /// [`RigError::OutOfRange`] with `key` if the value is not within 2^-14 to 2^15.
     pub fn build(key: &'static str, value: f64) -> Result<Self, RigError> {
         let (min, max) = (1.0 / 16_384.0, 32_768.0);
         if !(value >= min && value <= max) {
@@ -74,7 +67,6 @@ impl Divisor {
 impl LowPass {
     /// A low-pass of time constant `tau_s`, s; none at all if it is not positive.
     /// Longest useful: 20 s, where the gain is three LSB.
-    #[must_use]
     pub fn build(tau_s: f64) -> Self {
         let gain =
             if tau_s > 0.0 { -libm::expm1(-1.0 / (f64::from(TICK_HZ) * tau_s)) } else { 1.0 };

@@ -15,7 +15,6 @@ const ONE: Q16 = Q16::ONE;
 /// other instructions.
 ///
 /// Source: schoolbook division in base 2^16, Knuth, TAOCP 2, 4.3.1, algorithm D.
-#[must_use]
 pub fn divide(a: Q16, b: Q16) -> Q16 {
     let (a, b) = (a.to_bits(), b.to_bits());
     if a == 0 {
@@ -41,7 +40,6 @@ pub fn divide(a: Q16, b: Q16) -> Q16 {
 /// Range: as [`divide`], which does what is outside. Error: within `[-1, 0]` LSB and
 /// 2^-15 relative upwards, since `b` is cut to the bits that the quotient resolves.
 /// Cost: about 25 cycles; as [`divide`] for quotients above one.
-#[must_use]
 pub fn part(a: Q16, b: Q16) -> Q16 {
     let (Ok(a_bits), Ok(b_bits)) = (u32::try_from(a.to_bits()), u32::try_from(b.to_bits())) else {
         return divide(a, b);
@@ -62,7 +60,6 @@ pub fn part(a: Q16, b: Q16) -> Q16 {
 /// Range: |x| > 2^-15, below that the result saturates. Error: 0.5 LSB absolute,
 /// so |x| 2^-17 relative: at |x| = 100 the result has ten good bits. To divide by
 /// a large number use [`divide`]. Cost: as [`divide`].
-#[must_use]
 pub fn reciprocal(x: Q16) -> Q16 {
     divide(ONE, x)
 }

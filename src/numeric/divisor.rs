@@ -24,8 +24,6 @@ impl Divisor {
     }
 
     /// `x` over this number.
-    #[must_use]
-    #[inline]
     pub fn divide(&self, x: Q16) -> Q16 {
         let product = i64::from(x.to_bits()) * i64::from(self.factor);
         Q16::saturating_from_bits((product + (1 << (self.shift - 1))) >> self.shift)

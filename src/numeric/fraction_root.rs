@@ -18,8 +18,6 @@ const MIDDLE: u32 = 0xA000_0000;
 ///
 /// Source: Heron's step for the root with [`inverse_sqrt_normalised`] in place of the
 /// division.
-#[inline(always)]
-#[must_use]
 pub const fn sqrt_fraction(x: u32) -> u32 {
     let (shift, inverse) = inverse_sqrt_normalised(x);
     let m = x << shift;
@@ -37,8 +35,6 @@ pub const fn sqrt_fraction(x: u32) -> u32 {
 /// relative. Cost: about 20 instructions, no division, no branch.
 ///
 /// Source: one step of Newton's iteration from [`inverse_sqrt_guess`].
-#[inline(always)]
-#[must_use]
 pub const fn inverse_sqrt_normalised(x: u32) -> (u32, u32) {
     let (shift, guess) = inverse_sqrt_guess(x);
     // Q30, from 1 to 2, as is what follows from it.
@@ -51,8 +47,6 @@ pub const fn inverse_sqrt_normalised(x: u32) -> (u32, u32) {
 /// The same within 0.22 %, relative.
 ///
 /// Cost: about 12 instructions. Source: a quartic of least relative error.
-#[inline(always)]
-#[must_use]
 pub const fn inverse_sqrt_guess(x: u32) -> (u32, u32) {
     let shift = (x | 1).leading_zeros() & !1;
     let t = (x << shift).wrapping_sub(MIDDLE) as i32;
@@ -61,7 +55,6 @@ pub const fn inverse_sqrt_guess(x: u32) -> (u32, u32) {
 }
 
 /// Upper half of an unsigned product.
-#[inline(always)]
 const fn upper(a: u32, b: u32) -> u32 {
     ((a as u64 * b as u64) >> 32) as u32
 }

@@ -9,7 +9,6 @@
 /// the other factor as it is. Range: all arguments. Error: below 1 LSB, downwards.
 /// Cost: one instruction (SMMUL; with an addition behind it SMMLA).
 #[inline(always)]
-#[must_use]
 pub const fn high(a: i32, b: i32) -> i32 {
     ((a as i64 * b as i64) >> 32) as i32
 }
@@ -66,13 +65,11 @@ macro_rules! horner_with_curvature {
 pub(crate) use {horner, horner_with_curvature, horner_with_slope};
 
 /// Whether no `t` makes `horner` overflow with these coefficients, in any step.
-#[must_use]
 pub fn fits(coefficients: &[i32]) -> bool {
     bounds(coefficients).0
 }
 
 /// Whether no `t` makes `horner_with_slope` overflow with these coefficients.
-#[must_use]
 pub fn fits_with_slope(coefficients: &[i32]) -> bool {
     let (value, slope) = bounds(coefficients);
     value && slope

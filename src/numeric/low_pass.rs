@@ -30,14 +30,11 @@ pub struct LowPassState {
 
 impl LowPassState {
     /// A filter at rest at `value`.
-    #[must_use]
     pub const fn at(value: Q16) -> Self {
         Self { whole: value.to_bits(), rest: 0 }
     }
 
     /// The present output.
-    #[inline]
-    #[must_use]
     pub const fn output(&self) -> Q16 {
         Q16::from_bits(self.whole.saturating_add((self.rest >> 15) as i32))
     }
@@ -45,7 +42,6 @@ impl LowPassState {
 
 impl LowPass {
     /// One tick with input `x`.
-    #[inline]
     pub fn step(&self, state: &mut LowPassState, x: Q16) -> Q16 {
         // a (x - y) in two products: y's whole bits, then the 16 behind them.
         let error = i64::from(x.to_bits()) - i64::from(state.whole);

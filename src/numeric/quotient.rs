@@ -12,8 +12,6 @@ use super::high;
 /// most 6e-9 relative. Cost: one division of at most 12 cycles and 10 other instructions.
 ///
 /// Source: Newton's iteration `r (2 - n r)` from a quotient of 16 bits.
-#[inline(always)]
-#[must_use]
 pub const fn reciprocal_of_normalised(n: u32) -> u32 {
     // Odd, so never zero; within 2^-15 of n 2^-16.
     let upper = n >> 16 | 1;
@@ -30,8 +28,6 @@ pub const fn reciprocal_of_normalised(n: u32) -> u32 {
 /// Range: `a < b`; what reaches 1 saturates at 2^32 - 1, so does division by zero.
 /// Error: 0 to 24 LSB too small, so 5.6e-9 absolute, and at most 6e-9 relative beyond
 /// 1 LSB. Cost: one division of at most 12 cycles and about 15 other instructions.
-#[inline(always)]
-#[must_use]
 pub const fn fraction(a: u32, b: u32) -> u32 {
     if a >= b {
         return u32::MAX;
@@ -47,8 +43,6 @@ pub const fn fraction(a: u32, b: u32) -> u32 {
 /// Range: `b` from 1, `a + b` below 2^32; outside it a number without meaning. Error: 0 to
 /// 25 LSB too small, one more than [`fraction`] as the last bit is none, so 5.9e-9 absolute.
 /// Cost: as that, without its branch.
-#[inline(always)]
-#[must_use]
 pub const fn part_of_sum(a: u32, b: u32) -> u32 {
     let sum = a.wrapping_add(b);
     let shift = sum.leading_zeros() & 31;

@@ -11,8 +11,6 @@ use crate::units::Q16;
 /// root with eight more bits rounded once. Cost: about 40 cycles.
 ///
 /// Source: as [`sqrt_fraction`].
-#[inline]
-#[must_use]
 pub fn sqrt(x: Q16) -> Q16 {
     let bits = u32::try_from(x.to_bits()).unwrap_or(0);
     // 2^16 sqrt(bits) is the root in Q24; at most 1.5 LSB of that too small.

@@ -17,8 +17,6 @@ const COSINE: [i32; 5] = [1_073_741_824, -1_324_675_869, 272_375_233, -22_398_32
 /// instructions, no division, no loop.
 ///
 /// Source: Chebyshev interpolation on an eighth of a turn either way of each axis.
-#[inline]
-#[must_use]
 pub const fn sin_cos(angle: u32) -> (i32, i32) {
     // The nearest axis, and the way from it in eighths of a turn, Q31.
     let quadrant = angle.wrapping_add(1 << 29) >> 30;

@@ -52,10 +52,6 @@ impl<const N: usize> Table<N> {
     /// A table from bits of Q16: both ends of the argument and the N values.
     /// For generated constants: fails the build where
     /// [`checked_from_bits`](Self::checked_from_bits) gives `None`.
-    ///
-    /// # Panics
-    /// As said; meant for constants.
-    #[must_use]
     pub const fn from_bits(lo: i32, hi: i32, samples: [i32; N]) -> Self {
         match Self::checked_from_bits(lo, hi, samples) {
             Some(table) => table,
@@ -66,7 +62,6 @@ impl<const N: usize> Table<N> {
     /// A table from bits of Q16; `None` if the range is narrower than its
     /// intervals, N is below 4, or neighbouring samples differ so much that the
     /// interpolation could overflow (second differences beyond 8000).
-    #[must_use]
     pub const fn checked_from_bits(lo: i32, hi: i32, samples: [i32; N]) -> Option<Self> {
         if N < 4 || hi <= lo {
             return None;
@@ -101,25 +96,21 @@ impl<const N: usize> Table<N> {
     }
 
     /// Least argument.
-    #[must_use]
     pub const fn lo(&self) -> Q16 {
         Q16::from_bits(self.lo)
     }
 
     /// Largest argument.
-    #[must_use]
     pub const fn hi(&self) -> Q16 {
         Q16::from_bits(self.hi)
     }
 
     /// Whether `x` lies inside the table.
-    #[must_use]
     pub fn contains(&self, x: Q16) -> bool {
         (self.lo..=self.hi).contains(&x.to_bits())
     }
 
     /// Value at `x`; that of the nearer end outside.
-    #[must_use]
     pub fn eval(&self, x: Q16) -> Q16 {
         Q16::from_bits(self.eval_bits(x.to_bits()))
     }
@@ -129,7 +120,6 @@ impl<const N: usize> Table<N> {
     ///
     /// Error: the value at the result and the value one LSB before it enclose
     /// `y`. Cost: at most 32 times [`eval`](Self::eval); not meant for the tick.
-    #[must_use]
     pub fn solve(&self, y: Q16) -> Q16 {
         let y = y.to_bits();
         let (first, last) = (self.eval_bits(self.lo), self.eval_bits(self.hi));

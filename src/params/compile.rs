@@ -4,10 +4,11 @@ use core::fmt;
 
 use serde::Serialize;
 
-use super::set::{Header, MAX_NAME, SCHEMA, checksum};
-use crate::control::Controller;
+use super::set::{Header, MAX_NAME, SCHEMA};
+use crate::log::crc32;
 use crate::model::Planner;
 use crate::rig::{Rig, RigError};
+use crate::tick::Controller;
 
 /// Why no set could be made.
 #[derive(Clone, Debug, PartialEq)]
@@ -46,13 +47,13 @@ pub fn compile(name: &str, rig: &Rig, room: &mut [u8]) -> Result<usize, CompileE
     let controller = Controller::try_build(rig)?;
     let planner = Planner::try_build(rig)?;
     let name = heapless::String::try_from(name).map_err(|_| CompileError::Name)?;
-    let calibration = checksum(part(&rig.sense, room)?);
+    let calibration = crc32(part(&rig.sense, room)?);
     let parameters = part(rig, room)?;
     let rig_length = parameters.len() as u16;
-    let parameters = checksum(parameters);
+    let parameters = crc32(parameters);
     let header = Header { schema: SCHEMA, name, rig_length, parameters, calibration };
     let length = part(&(header, rig, controller, planner), room)?.len();
-    let sum = checksum(&room[..length]).to_le_bytes();
+    let sum = crc32(&room[..length]).to_le_bytes();
     let check = room.get_mut(length..length + sum.len()).ok_or(CompileError::Room)?;
     check.copy_from_slice(&sum);
     Ok(length + sum.len())

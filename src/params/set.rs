@@ -8,25 +8,22 @@
 
 use core::fmt;
 
-use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use serde::{Deserialize, Serialize};
 
-use crate::control::Controller;
+use crate::log::crc32;
 use crate::model::Planner;
 use crate::rig::Rig;
+use crate::tick::Controller;
 
 /// Layout of the constants. Raised with every change of a type that a set holds; a set
 /// of another number is not read but refused, and the host makes it anew from its rig.
-pub const SCHEMA: u16 = 4;
+pub const SCHEMA: u16 = 5;
 
 /// Longest name of a set, bytes.
 pub const MAX_NAME: usize = 24;
 
 /// Bytes of the check.
 const CHECK: usize = 4;
-
-/// Without a table: it runs once at start.
-const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
 /// What a set says of itself.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -113,7 +110,7 @@ impl<'a> ParameterSet<'a> {
     /// [`SetError`] if the bytes are not a whole set.
     pub fn open_any(bytes: &'a [u8]) -> Result<Self, SetError> {
         let (content, sum) = bytes.split_last_chunk::<CHECK>().ok_or(SetError::Short)?;
-        if checksum(content) != u32::from_le_bytes(*sum) {
+        if crc32(content) != u32::from_le_bytes(*sum) {
             return Err(SetError::Damaged);
         }
         let (header, body) = take::<Header>(content)?;
@@ -193,12 +190,6 @@ fn into<'a, T: Deserialize<'a>>(bytes: &'a [u8], place: &mut T) -> Result<&'a [u
     bytes.finalize().map_err(|_| SetError::Content)
 }
 
-/// CRC-32 (ISO-HDLC).
-#[must_use]
-pub(crate) fn checksum(bytes: &[u8]) -> u32 {
-    CRC.checksum(bytes)
-}
-
 fn take<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<(T, &'a [u8]), SetError> {
     postcard::take_from_bytes(bytes).map_err(|_| SetError::Content)
 }
@@ -252,7 +243,7 @@ mod tests {
         let mut bytes = set("a", &Rig::prototype());
         bytes[0] = SCHEMA as u8 + 1;
         let end = bytes.len() - CHECK;
-        let sum = checksum(&bytes[..end]).to_le_bytes();
+        let sum = crc32(&bytes[..end]).to_le_bytes();
         bytes[end..].copy_from_slice(&sum);
         assert_eq!(ParameterSet::open(&bytes), Err(SetError::Schema { found: SCHEMA + 1 }));
         let old = ParameterSet::open_any(&bytes).unwrap();
@@ -265,7 +256,7 @@ mod tests {
         let mut bytes = set("a", &Rig::prototype());
         bytes.truncate(bytes.len() - CHECK);
         bytes.push(0);
-        let sum = checksum(&bytes).to_le_bytes();
+        let sum = crc32(&bytes).to_le_bytes();
         bytes.extend(sum);
         let (_, rest) = ParameterSet::open(&bytes).unwrap().controller().unwrap();
         assert_eq!(rest.planner(), Err(SetError::Content));
@@ -288,7 +279,7 @@ mod tests {
             prop_assert!(ParameterSet::open(&bytes).is_err());
             // As if their check were right.
             let mut bytes = bytes;
-            let sum = checksum(&bytes).to_le_bytes();
+            let sum = crc32(&bytes).to_le_bytes();
             bytes.extend(sum);
             if let Ok(set) = ParameterSet::open_any(&bytes) {
                 let _ = set.controller();

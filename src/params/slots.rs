@@ -18,15 +18,10 @@
 //! itself, a number with a bit turned over would make a spare set the younger.
 
 use super::{MAX_SET, ParameterSet, Rest, SetError};
+pub use crate::restart::page::{PAGE_BYTES, WORD_BYTES};
 
 /// Bytes of one place: two pages of the chip's flash.
 pub const SLOT_BYTES: usize = 4096;
-
-/// Bytes that are erased at once.
-pub const PAGE_BYTES: usize = 2048;
-
-/// Bytes that are programmed at once.
-pub const WORD_BYTES: usize = 8;
 
 /// Bytes before the set.
 const PREFIX: usize = 2 * WORD_BYTES;

@@ -9,7 +9,6 @@ fn list<const N: usize>(values: &[f64]) -> List<N> {
 
 impl Rig {
     /// The 1:1 prototype: one drive unit at a third of the study's loads.
-    #[must_use]
     pub fn prototype() -> Self {
         Self {
             rig: Geometry {
@@ -73,7 +72,6 @@ impl Rig {
 
     /// The study's own loads: 60 N on top, 100 N of preload, 150 N at most, with a
     /// spring and a motor three times as strong.
-    #[must_use]
     pub fn fe() -> Self {
         let mut rig = Self::prototype();
         rig.plant.top_load_n = 60.0;
@@ -91,7 +89,6 @@ impl Rig {
     }
 
     /// The preset of that name: `prototype` or `fe`.
-    #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         match name {
             "prototype" => Some(Self::prototype()),

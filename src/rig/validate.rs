@@ -79,9 +79,6 @@ impl core::error::Error for RigError {}
 
 impl Rig {
     /// Checks every value against its range and the values against one another.
-    ///
-    /// # Errors
-    /// The first [`RigError`] found.
     pub fn validate(&self) -> Result<(), RigError> {
         self.ranges()?;
         self.step_table()?;
@@ -103,7 +100,6 @@ impl Rig {
     }
 
     /// Wheel-centre radius with an undeformed wheel on the wall of `level`, mm.
-    #[must_use]
     pub fn centre_radius_mm(&self, level: usize) -> f64 {
         self.rig.wall_radius_mm - self.rig.step_height_mm * level as f64 - self.rig.wheel_radius_mm
     }

@@ -102,9 +102,6 @@ pub enum Zeroing {
 impl AnalogChannel {
     /// A sensor of full scale `full_scale`, the value of the parameter `key`, with
     /// a low-pass of time constant `tau_s`.
-    ///
-    /// # Errors
-    /// [`RigError::OutOfRange`] if the full scale is not within 0.1 to 20000 units.
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub fn try_build(key: &'static str, full_scale: f64, tau_s: f64) -> Result<Self, RigError> {
         let (min, max) = (0.1, 20_000.0);
@@ -194,13 +191,11 @@ impl AnalogState {
     }
 
     /// How far taking the zero has come.
-    #[must_use]
     pub const fn zeroing(&self) -> Zeroing {
         self.zeroing
     }
 
     /// The offset in force.
-    #[must_use]
     pub const fn offset(&self) -> Q16 {
         self.offset
     }

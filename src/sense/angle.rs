@@ -13,10 +13,6 @@ use crate::units::{Q16, Tick};
 pub type Codes = Q16;
 
 /// Checks a frame and gives its 14-bit code.
-///
-/// # Errors
-/// [`Reason::Parity`] if the 16 bits do not have even parity, then
-/// [`Reason::SensorError`] if bit 14 is set.
 pub const fn decode(frame: AngleFrame) -> Result<u16, Reason> {
     let frame = frame.get();
     if !frame.count_ones().is_multiple_of(2) {
@@ -64,7 +60,6 @@ impl AngleSensor {
     /// A sensor reading `zero_code` with the arm along the pillar, for arms that
     /// move from `lo` to `hi`.
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
-    #[must_use]
     pub fn build(zero_code: f64, lo: Codes, hi: Codes, tau_s: f64) -> Self {
         // Reduced to a turn by the cast's wrap from 64 bits.
         let zero = libm::round(zero_code * f64::from(1_u32 << 18)) as i64 as u32;
@@ -109,7 +104,6 @@ impl AngleSensor {
 
 impl AngleState {
     /// Frames refused since boot: parity, error flag or out of reach.
-    #[must_use]
     pub const fn bad_frames(&self) -> u32 {
         self.bad_frames
     }

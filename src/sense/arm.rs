@@ -35,9 +35,6 @@ pub struct Arm {
 
 impl Arm {
     /// The arm of `rig`.
-    ///
-    /// # Errors
-    /// [`RigError`] if a dimension does not fit the format.
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         let geometry = &rig.rig;
@@ -53,7 +50,6 @@ impl Arm {
     }
 
     /// Least and largest angle that the arm can take.
-    #[must_use]
     pub const fn reach(&self) -> (Codes, Codes) {
         self.reach
     }
@@ -61,8 +57,6 @@ impl Arm {
     /// Distance of the wheel centre from the pillar axis, mm, and the tangent of the arm
     /// angle: radial force per axial thrust through the arm. Outside its reach the arm is
     /// taken to stand at the end of it.
-    #[inline]
-    #[must_use]
     pub fn stance(&self, angle: Codes) -> (Millimetres, Ratio) {
         let angle = between(angle, self.reach.0, self.reach.1);
         // A turn is 2^14 codes of Q16, so 2^30: to 2^32.
@@ -81,7 +75,6 @@ impl Arm {
     /// Height of the wall under the wheel above the outermost one, in steps, not
     /// rounded: `(r_0 + compression - r) / h`. Compression brings the centre
     /// nearer to the wall, so it is taken off the radius first.
-    #[must_use]
     pub fn steps_up(&self, radius: Millimetres, compression: Millimetres) -> Ratio {
         (self.outermost + compression - radius) * self.per_step
     }
@@ -90,7 +83,6 @@ impl Arm {
     /// nearest to [`steps_up`](Self::steps_up). With a `previous` level it changes
     /// only when the wheel stands 0.6 steps from that, so that it does not flutter
     /// half way up a step.
-    #[must_use]
     pub fn level(&self, previous: Option<u8>, steps: Ratio) -> u8 {
         match previous {
             Some(level)

@@ -12,9 +12,6 @@ pub const FILTER_S: f64 = 0.005;
 ///
 /// Range: -0.17 mm to 5.4 mm at a full scale of 5 mm, a code being 9e-5 mm. Error:
 /// 2e-5 mm and half a code, before the sensor's own.
-///
-/// # Errors
-/// [`RigError`] if the full scale is out of range.
 pub fn tread(rig: &Rig, tau_s: f64) -> Result<AnalogChannel, RigError> {
     AnalogChannel::try_build("sense.tread_full_scale_mm", rig.sense.tread_full_scale_mm, tau_s)
 }

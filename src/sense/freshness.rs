@@ -19,13 +19,11 @@ pub struct Reading<T> {
 
 impl<T> Reading<T> {
     /// Ticks since the value was taken.
-    #[must_use]
     pub fn age(&self, now: Tick) -> u32 {
         age(now, self.at)
     }
 
     /// Whether the value may be acted on: taken lately, by a sensor that answers.
-    #[must_use]
     pub fn is_usable(&self) -> bool {
         self.validity.is_usable()
     }
@@ -50,7 +48,6 @@ pub enum Validity {
 
 impl Validity {
     /// Whether the value may be acted on.
-    #[must_use]
     pub const fn is_usable(self) -> bool {
         matches!(self, Self::Valid | Self::Held(_))
     }
@@ -72,7 +69,6 @@ pub enum Reason {
 
 /// Ticks from `at` to `now`. A time stamp up to a second ahead counts as zero, so
 /// that a sensor task running between two ticks never looks ancient.
-#[must_use]
 pub const fn age(now: Tick, at: Tick) -> u32 {
     let age = now.wrapping_sub(at);
     if age > u32::MAX - 1000 { 0 } else { age }
@@ -106,19 +102,16 @@ impl Freshness {
     }
 
     /// Time of the last code, good or bad.
-    #[must_use]
     pub const fn newest(&self) -> Option<Tick> {
         self.newest
     }
 
     /// Time of the last good code.
-    #[must_use]
     pub const fn good(&self) -> Option<Tick> {
         self.good
     }
 
     /// `value` as a reading at `now`, with `limit` as the largest age, ticks.
-    #[must_use]
     pub fn reading<T>(&self, value: T, now: Tick, limit: u32) -> Reading<T> {
         // In nearly every tick: a good code, taken just now.
         if let (Some(newest), None) = (self.newest, self.fault)
@@ -130,7 +123,6 @@ impl Freshness {
     }
 
     /// The same where the newest code is old, bad or has not come yet.
-    #[inline(never)]
     fn doubtful<T>(&self, value: T, now: Tick, limit: u32) -> Reading<T> {
         let young = |at: Tick| age(now, at) <= limit;
         let validity = match (self.newest, self.fault) {

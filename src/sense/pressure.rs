@@ -13,9 +13,6 @@ pub const FILTER_S: f64 = 0.005;
 ///
 /// Range: -7 N to 218 N at a full scale of 200 N, a code being 0.0036 N. Error: 2e-5
 /// N and half a code, before the sensor's own.
-///
-/// # Errors
-/// [`RigError`] if the full scale is out of range.
 pub fn load_cell(rig: &Rig, tau_s: f64) -> Result<AnalogChannel, RigError> {
     AnalogChannel::try_build(
         "sense.load_cell_full_scale_n",

@@ -11,19 +11,16 @@ pub struct EncoderCount(u16);
 
 impl EncoderCount {
     /// A counter value as read from the timer.
-    #[must_use]
     pub const fn new(count: u16) -> Self {
         Self(count)
     }
 
     /// Counts from `earlier` to `self`, positive in the direction of deployment.
-    #[must_use]
     pub const fn since(self, earlier: Self) -> i16 {
         self.0.wrapping_sub(earlier.0) as i16
     }
 
     /// The bare counter value.
-    #[must_use]
     pub const fn get(self) -> u16 {
         self.0
     }
@@ -37,13 +34,11 @@ pub struct AdcCode(u16);
 
 impl AdcCode {
     /// A code as read from the converter.
-    #[must_use]
     pub const fn new(code: u16) -> Self {
         Self(code)
     }
 
     /// The bare code, 0 to 65535.
-    #[must_use]
     pub const fn get(self) -> u16 {
         self.0
     }
@@ -57,13 +52,11 @@ pub struct AngleFrame(u16);
 
 impl AngleFrame {
     /// A frame as shifted in from the bus.
-    #[must_use]
     pub const fn new(frame: u16) -> Self {
         Self(frame)
     }
 
     /// The bare frame.
-    #[must_use]
     pub const fn get(self) -> u16 {
         self.0
     }
@@ -84,13 +77,11 @@ impl BridgeCode {
     pub const DUTY: i32 = 20;
 
     /// A code as read from the converter.
-    #[must_use]
     pub const fn new(code: u16) -> Self {
         Self(code)
     }
 
     /// The code of a duty, Q15, at the nominal supply; the nearest end if it is beyond.
-    #[must_use]
     pub const fn of(duty: i32) -> Self {
         let code = (duty + Self::DUTY * Self::CENTRE as i32 + Self::DUTY / 2) / Self::DUTY;
         let end = 2 * Self::CENTRE as i32 - 1;
@@ -98,13 +89,11 @@ impl BridgeCode {
     }
 
     /// The bare code.
-    #[must_use]
     pub const fn get(self) -> u16 {
         self.0
     }
 
     /// The duty that gives it at the nominal supply, Q15.
-    #[must_use]
     pub const fn duty(self) -> i32 {
         (self.0 as i32 - Self::CENTRE as i32) * Self::DUTY
     }

@@ -95,17 +95,11 @@ pub struct SensedState {
 
 impl Senses {
     /// The sensors of `rig` with the default filters.
-    ///
-    /// # Errors
-    /// [`RigError`] if a parameter is out of range.
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         Self::try_build_tuned(rig, &Tuning::default())
     }
 
     /// The sensors of `rig` with chosen filters.
-    ///
-    /// # Errors
-    /// [`RigError`] if a parameter is out of range.
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub fn try_build_tuned(rig: &Rig, tuning: &Tuning) -> Result<Self, RigError> {
         let arm = Arm::try_build(rig)?;
@@ -168,7 +162,6 @@ impl SensesState {
 
     /// Whether the zeros of both are in: `None` while under way, then whether both
     /// were accepted.
-    #[must_use]
     pub const fn zeroed(&self) -> Option<bool> {
         match (self.load_cell.zeroing(), self.tread.zeroing()) {
             (Zeroing::Done { .. }, Zeroing::Done { .. }) => Some(true),

@@ -78,9 +78,6 @@ const SPEED_LIMIT: i64 = 2 << 48;
 
 impl Speedometer {
     /// The encoder of `rig` with an observer of `bandwidth_rad_s`.
-    ///
-    /// # Errors
-    /// [`RigError`] if a count is longer than the format holds.
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub fn try_build(rig: &Rig, bandwidth_rad_s: f64) -> Result<Self, RigError> {
         let turn_mm = 2.0 * core::f64::consts::PI * rig.rig.wheel_radius_mm;

@@ -7,7 +7,7 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use super::Fault;
+use crate::fault::Fault;
 use crate::numeric::checked;
 use crate::rig::{Rig, RigError};
 use crate::units::{
@@ -132,9 +132,6 @@ pub(super) struct Compared {
 
 impl CrossCheck {
     /// Thresholds of a rig.
-    ///
-    /// # Errors
-    /// [`RigError`] if a parameter is out of range.
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub(super) fn try_build(rig: &Rig) -> Result<Self, RigError> {
         let turn_mm = 2.0 * core::f64::consts::PI * rig.rig.wheel_radius_mm;

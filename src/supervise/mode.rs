@@ -1,6 +1,7 @@
 //! What the drive is doing, and what an operator may ask for.
 
-use super::Fault;
+use crate::fault::Fault;
+use crate::units::Direction;
 
 /// An operator's command, from the board button or the log channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -14,27 +15,6 @@ pub enum Command {
     Retract,
     /// Leave the fault hold, or zero the sensors anew when idle at the stow end.
     Reset,
-}
-
-/// Sense of axial motion.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
-pub enum Direction {
-    /// Outwards, onto the smaller radius: the wheel climbs the steps.
-    Deploy,
-    /// Back: the wheel drops off the steps.
-    Retract,
-}
-
-impl Direction {
-    /// +1 outwards, -1 back.
-    #[must_use]
-    pub const fn sign(self) -> i32 {
-        match self {
-            Self::Deploy => 1,
-            Self::Retract => -1,
-        }
-    }
 }
 
 /// Part of a run between two steps.
@@ -81,11 +61,6 @@ impl Command {
     pub const ALL: [Self; 4] = [Self::Start, Self::Stop, Self::Retract, Self::Reset];
 }
 
-impl Direction {
-    /// Both ways.
-    pub const ALL: [Self; 2] = [Self::Deploy, Self::Retract];
-}
-
 impl Leg {
     /// Every leg, in the order of a run.
     pub const ALL: [Self; 4] = [Self::Cruise, Self::Approach, Self::Crossing, Self::Settle];
@@ -119,13 +94,11 @@ impl Mode {
     };
 
     /// Whether nothing is driven in this mode, neither wheel nor pre-tightener.
-    #[must_use]
     pub const fn is_at_rest(self) -> bool {
         !matches!(self, Self::Preload(_) | Self::Run(..) | Self::Stopping(_))
     }
 
     /// Whether the drive may turn in this mode.
-    #[must_use]
     pub const fn moves(self) -> bool {
         matches!(self, Self::Run(..) | Self::Stopping(_))
     }

@@ -2,15 +2,15 @@
 
 #![deny(clippy::float_arithmetic)]
 
+use super::Mode;
 use super::crosscheck::{Compared, CrossCheck, CrossState};
 use super::readback::Readback;
-use super::{Fault, Mode};
-use crate::hal::Duty;
+use crate::fault::Fault;
 use crate::numeric::checked;
 use crate::rig::{Rig, RigError};
 use crate::sense::raw::BridgeCodes;
 use crate::sense::{Reason, SensedState, Validity};
-use crate::units::{MillimetresPerSecond, Newtons, Ratio, Tick, q16};
+use crate::units::{Duty, MillimetresPerSecond, Newtons, Ratio, Tick, q16};
 
 /// Preload above the limit that counts as overpressure, relative: regulation and
 /// the spring that a climb compresses stay below it.
@@ -72,9 +72,6 @@ pub struct Observed<'a> {
 
 impl Monitor {
     /// Bounds of a rig.
-    ///
-    /// # Errors
-    /// [`RigError`] if a parameter is out of range.
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         Ok(Self {
@@ -132,7 +129,6 @@ impl Monitor {
 
 impl MonitorState {
     /// What the bridges are given until the next tick; off is none.
-    #[inline]
     pub fn give(&mut self, drive: Duty, pretightener: Duty) {
         self.readback.give(drive, pretightener);
     }
@@ -179,7 +175,6 @@ fn lasting(count: &mut u16, condition: bool) {
 }
 
 /// The fault of a sensor that cannot be used any more.
-#[inline]
 fn sensor_fault(sensed: &SensedState) -> Option<Fault> {
     let all = [
         sensed.speed.validity,
@@ -191,7 +186,6 @@ fn sensor_fault(sensed: &SensedState) -> Option<Fault> {
 }
 
 /// The same where not every sensor's newest code is good.
-#[inline(never)]
 fn judge(sensed: &SensedState) -> Option<Fault> {
     let judge = |validity: Validity, stale: Fault, range: Fault| match validity {
         Validity::Valid | Validity::Held(_) => None,
@@ -211,8 +205,8 @@ mod tests {
     use super::*;
     use crate::sense::Reading;
     use crate::sense::raw::BridgeCode;
-    use crate::supervise::{Direction, Leg};
-    use crate::units::{Millimetres, Q16, Travel};
+    use crate::supervise::Leg;
+    use crate::units::{Direction, Millimetres, Q16, Travel};
     use proptest::prelude::*;
 
     const RUN: Mode = Mode::Run(Direction::Deploy, Leg::Cruise);

@@ -12,9 +12,9 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use super::Fault;
-use crate::hal::Duty;
+use crate::fault::Fault;
 use crate::sense::raw::{BridgeCode, BridgeCodes};
+use crate::units::Duty;
 
 /// Time constant of the low-pass before the converter, ticks. A period of the PWM, 50 us,
 /// leaves 1 % of ripple behind it, the mean of 0.15 ms nothing to speak of.
@@ -71,7 +71,6 @@ pub struct Lag(i32);
 
 impl Lag {
     /// Output after a tick under this duty, Q15.
-    #[inline]
     pub const fn step(&mut self, duty: i32) -> i32 {
         // |duty - output| <= 2^16: the product stays below 2^31.
         self.0 += ((duty - self.0) * TAKES + (1 << 14)) >> 15;
@@ -81,7 +80,6 @@ impl Lag {
 
 impl Readback {
     /// What the bridges are given until the next tick; off is none.
-    #[inline]
     pub const fn give(&mut self, drive: Duty, pretightener: Duty) {
         self.drive.given = drive.to_bits();
         self.pretightener.given = pretightener.to_bits();
@@ -90,7 +88,6 @@ impl Readback {
     /// The tick after it, with what was found. A wheel that may still coast, as after a
     /// restart in motion, has its motor generate what the drive's bridge then shows: that
     /// is not judged.
-    #[inline]
     pub fn step(&mut self, found: Option<BridgeCodes>, coasts: bool) -> Option<Fault> {
         let Some(found) = found else {
             self.drive.lag.step(self.drive.given.into());
@@ -114,7 +111,6 @@ impl Readback {
 impl Bridge {
     /// Whether it has been off for too long. The code was taken at some moment of the last
     /// two ticks, so that it may lie anywhere between the outputs of three.
-    #[inline]
     fn is_off(&mut self, code: BridgeCode) -> bool {
         let (older, before) = (self.before, self.lag.0);
         let now = self.lag.step(self.given.into());

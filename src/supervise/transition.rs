@@ -1,6 +1,8 @@
 //! The one table of transitions.
 
-use super::{Command, Direction, Fault, Leg, Mode};
+use super::{Command, Leg, Mode};
+use crate::fault::Fault;
+use crate::units::Direction;
 
 /// What can move the drive from one mode to another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,7 +57,6 @@ impl Trigger {
 /// A fault leads to the fault hold from everywhere, and the first fault is kept. While
 /// something moves, start and retract mean stop: whoever presses the button then
 /// wants it to end.
-#[must_use]
 pub const fn next(mode: Mode, trigger: Trigger) -> Option<Mode> {
     use Command::{Reset, Retract, Start, Stop};
     use Direction::{Deploy, Retract as Back};

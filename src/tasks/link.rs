@@ -1,13 +1,14 @@
 //! The task at the host's binary line.
 
+use super::clock::{mid_tick_deadline, uptime};
 use super::exchange::Exchange;
 use crate::hal::Line;
-use crate::link::{Gatherer, ToBoard, ToHost, frame};
+use crate::params::link::{FrameReader, ToBoard, ToHost, frame};
 use crate::params::service::{Request, Response, Service};
 use crate::params::slots::SetMemory;
 use embassy_time::{Duration, Timer};
 
-/// How often the line is looked at: nobody tells when the host has written.
+/// How often the line is polled: the host writes without an interrupt.
 const POLL: Duration = Duration::from_millis(10);
 
 /// Answers the host's requests about the parameters, one after the other.
@@ -19,16 +20,16 @@ pub async fn link<M: SetMemory>(
     mut service: Service<M>,
     exchange: &Exchange,
 ) -> ! {
-    let station = exchange.enrol_operator();
-    let mut gatherer = Gatherer::new();
+    let task = exchange.liveness.enrol_operator();
+    let mut reader = FrameReader::new();
     loop {
-        exchange.check_in(station, exchange.uptime());
+        exchange.check_in(task, uptime());
         let mut byte = [0];
         if line.read(&mut byte) == 0 {
-            Timer::at(exchange.aside(POLL)).await;
+            Timer::at(mid_tick_deadline(POLL)).await;
             continue;
         }
-        let Some(ToBoard::Parameters(number, request)) = gatherer.take(byte[0]) else { continue };
+        let Some(ToBoard::Parameters(number, request)) = reader.take(byte[0]) else { continue };
         let restarts = request == Request::Restart;
         let response = service.answer(request, exchange.at_rest()).await;
         let done = response == Response::Done;

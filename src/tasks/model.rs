@@ -1,7 +1,8 @@
 //! The planning task.
 
-use super::ROUND;
-use super::exchange::{Exchange, Station, latest};
+use super::clock::{mid_tick_deadline, uptime};
+use super::exchange::Exchange;
+use super::{ROUND, TaskId};
 use crate::model::Planner;
 use embassy_time::with_deadline;
 
@@ -9,11 +10,11 @@ use embassy_time::with_deadline;
 /// as it takes; of several requests meanwhile, the latest counts.
 pub async fn model(planner: &Planner, exchange: &Exchange) -> ! {
     loop {
-        exchange.check_in(Station::Model, exchange.uptime());
-        let round = exchange.aside(ROUND);
-        if let Ok(request) = with_deadline(round, exchange.request.receive()).await {
-            exchange.wake(Station::Model);
-            latest(&exchange.answer, planner.plan(&request));
+        exchange.check_in(TaskId::Model, uptime());
+        let request = with_deadline(mid_tick_deadline(ROUND), exchange.request.wait()).await;
+        if let Ok(request) = request {
+            exchange.liveness.running(TaskId::Model);
+            exchange.answer.signal(planner.plan(&request));
         }
     }
 }

@@ -1,16 +1,29 @@
-//! The control tick's task.
+//! The control tick's task, and the one that copies the tick for the log.
 
-use super::beat::Beat;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::mutex::Mutex;
+
+use super::clock::uptime;
 use super::exchange::Exchange;
-use super::tape::{Latest, Turn};
-use crate::blackbox::Recorder;
-use crate::control::{Controller, State};
-use crate::hal::{MotorCommand, Motors, Watchdog};
+use crate::hal::{Motors, Watchdog};
+use crate::log::SnapshotRecorder;
+use crate::tick::{Controller, Input, Output, State};
+use crate::units::MotorCommand;
+
+/// What a tick was given and gave.
+#[derive(Default)]
+pub struct TickIo {
+    pub(super) input: Input,
+    pub(super) output: Output,
+}
+
+/// The latest tick: [`motors()`] fills it, [`record()`] reads it before the next. Both run
+/// on one executor and hold it across no await, so that neither finds it in use.
+pub type TickIoCell = Mutex<CriticalSectionRawMutex, TickIo>;
 
 /// Runs the control tick at 1 kHz: latest codes, command and plan in; bridges,
 /// request and log entries out. Feeds the watchdog while every task is alive, and keeps
-/// for a restart what the drive does and who is missing. What it was given and gave stays
-/// in `latest` for [`tape()`](super::tape()).
+/// for a restart what the drive does and which tasks are missing.
 ///
 /// It waits for nothing but time. A tick that starts more than a period late is
 /// marked as an overrun and the ticks missed are left out; the tick number is
@@ -19,35 +32,50 @@ pub async fn motors(
     mut motors: impl Motors,
     mut watchdog: impl Watchdog,
     controller: &Controller,
-    latest: &Latest,
+    latest: &TickIoCell,
     exchange: &Exchange,
 ) -> ! {
     motors.apply(MotorCommand::OFF, MotorCommand::OFF);
-    let mut state = State::standing(watchdog.place());
-    let mut recorder = Recorder::default();
-    let mut beat = Beat::<1>::new();
+    let mut state = State::restored(watchdog.place());
+    let mut recorder = SnapshotRecorder::default();
+    let mut last = uptime();
     loop {
-        let due = beat.lead(&exchange.pulse).await;
-        let Ok(mut turn) = latest.0.try_borrow_mut() else {
-            // Nobody holds it over a turn of theirs; if so the watchdog ends it.
+        exchange.tick_started.wait().await;
+        exchange.liveness.in_tick(true);
+        let now = uptime();
+        let Ok(mut tick) = latest.try_lock() else {
+            // No task holds this borrow across an await; the watchdog catches one that does.
             motors.apply(MotorCommand::OFF, MotorCommand::OFF);
             continue;
         };
-        let Turn { input, output, fresh } = &mut *turn;
-        exchange.input_into(due.tick, due.missed > 0, input);
+        let TickIo { input, output } = &mut *tick;
+        *input = exchange.input(now, now.wrapping_sub(last) > 1);
         input.emergency_stop = motors.stopped();
         input.sensors.bridges = motors.readback();
         controller.step_into(&mut state, input, output);
-        *fresh = true;
         motors.apply(output.drive, output.preload);
         if output.rearm {
             motors.rearm();
         }
         exchange.publish(output);
-        let late = exchange.late(due.tick);
-        watchdog.keep(&recorder.flight(&output.telemetry, state.trust(), late));
-        if late.is_nobody() {
+        let missed = exchange.liveness.missed(now);
+        watchdog.keep(&recorder.snapshot(&output.telemetry, state.confidence(), missed));
+        if missed.is_nobody() {
             watchdog.feed();
+        }
+        last = now;
+        exchange.tick_ended.signal(());
+        exchange.liveness.in_tick(false);
+    }
+}
+
+/// Copies every tick for the log. It runs right behind the tick, so that the tick takes as
+/// long with a log as without, and its bridges and its watchdog do not wait for the copy.
+pub async fn record(latest: &TickIoCell, exchange: &Exchange) -> ! {
+    loop {
+        exchange.tick_ended.wait().await;
+        if let Ok(tick) = latest.try_lock() {
+            exchange.record(&tick);
         }
     }
 }

@@ -1,92 +1,58 @@
 //! One task a sensor: read, stamp, publish, check in.
 
-use core::future::poll_fn;
-
-use super::beat::{ANGLE_PERIOD, Beat};
-use super::exchange::{Exchange, Station};
+use super::exchange::Exchange;
+use super::liveness::{PERIODS, TaskId};
 use crate::hal::{AnalogInput, AngleBus, WheelEncoder};
 use crate::sense::raw::{AdcCode, BusFault, Sample};
-use crate::units::Tick;
-use embassy_futures::select::{Either, select};
-use embassy_time::{Duration, Timer};
+use embassy_time::{Duration, with_timeout};
 
-/// After this long a reading is given up and begun anew: ten times what the board
+/// After this long a reading is given up and begun again: ten times what the board
 /// takes. The task lives on and checks in; the reading ages.
 pub const SENSOR_TIMEOUT: Duration = Duration::from_millis(2);
 
-/// Waits for a sensor's next turn; its tick.
-macro_rules! turn {
-    ($beat:expr, $exchange:expr, $station:expr) => {{
-        let mut waits = false;
-        poll_fn(|context| $beat.follow(context, &mut waits, &$exchange.pulse, $station)).await.tick
-    }};
-}
-
 /// Publishes the wheel counter at 1 kHz.
 pub async fn speed(mut wheel: impl WheelEncoder, exchange: &Exchange) -> ! {
-    let mut beat = Beat::<1>::new();
-    loop {
-        let at = turn!(beat, exchange, Station::Speed);
-        exchange.wheel.put(Sample { code: wheel.count(), at });
-        exchange.check_in(Station::Speed, at);
-    }
+    run(TaskId::Speed, exchange, async || Ok(wheel.count()), |s| exchange.put_wheel(s)).await
 }
 
 /// Publishes the load cell's code at 1 kHz.
 pub async fn pressure(input: impl AnalogInput, exchange: &Exchange) -> ! {
-    let publish = |sample| exchange.load_cell.put(sample);
-    analog(input, Station::Pressure, publish, exchange).await
+    analog(TaskId::Pressure, exchange, input, |sample| exchange.put_load_cell(sample)).await
 }
 
 /// Publishes the tread displacement sensor's code at 1 kHz.
 pub async fn displacement(input: impl AnalogInput, exchange: &Exchange) -> ! {
-    let publish = |sample| exchange.tread.put(sample);
-    analog(input, Station::Displacement, publish, exchange).await
+    analog(TaskId::Displacement, exchange, input, |sample| exchange.put_tread(sample)).await
 }
 
 /// Publishes the arm angle sensor's frame at 500 Hz, good or bad: the tick judges.
 pub async fn angle(mut bus: impl AngleBus, exchange: &Exchange) -> ! {
-    let mut beat = Beat::<ANGLE_PERIOD>::new();
-    loop {
-        let at = turn!(beat, exchange, Station::Angle);
-        let publish = |sample| exchange.arm.put(sample);
-        settle(bounded(bus.frame()).await, at, Station::Angle, publish, exchange);
-    }
+    run(TaskId::Angle, exchange, async || bus.frame().await, |s| exchange.put_arm(s)).await
 }
 
 async fn analog(
+    task: TaskId,
+    exchange: &Exchange,
     mut input: impl AnalogInput,
-    station: Station,
     publish: impl Fn(Sample<AdcCode>),
-    exchange: &Exchange,
 ) -> ! {
-    let mut beat = Beat::<1>::new();
-    loop {
-        let at = turn!(beat, exchange, station);
-        settle(bounded(input.sample()).await, at, station, &publish, exchange);
-    }
+    run(task, exchange, async || input.sample().await, publish).await
 }
 
-/// A reading that ends one way or the other. One that is there at once costs no timer.
-async fn bounded<T>(reading: impl Future<Output = Result<T, BusFault>>) -> Result<T, BusFault> {
-    let limit = async { Timer::after(SENSOR_TIMEOUT).await };
-    match select(reading, limit).await {
-        Either::First(done) => done,
-        Either::Second(()) => Err(BusFault::Timeout),
-    }
-}
-
-/// Publishes a reading or counts its failure.
-fn settle<T>(
-    reading: Result<T, BusFault>,
-    at: Tick,
-    station: Station,
-    publish: impl Fn(Sample<T>),
+/// Reads whenever a tick asks for it, and publishes what comes within [`SENSOR_TIMEOUT`],
+/// stamped with that tick. A reading that fails only ages; one that is ready arms no timer.
+async fn run<T>(
+    task: TaskId,
     exchange: &Exchange,
-) {
-    match reading {
-        Ok(code) => publish(Sample { code, at }),
-        Err(BusFault::Timeout | BusFault::Transfer) => exchange.count_bus_fault(station),
+    mut read: impl AsyncFnMut() -> Result<T, BusFault>,
+    publish: impl Fn(Sample<T>),
+) -> ! {
+    let ticks = &exchange.sensor_ticks[task.index() % PERIODS.len()];
+    loop {
+        let at = ticks.wait().await;
+        if let Ok(Ok(code)) = with_timeout(SENSOR_TIMEOUT, read()).await {
+            publish(Sample { code, at });
+        }
+        exchange.check_in(task, at);
     }
-    exchange.check_in(station, at);
 }

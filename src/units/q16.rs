@@ -25,7 +25,6 @@ impl<'de> serde::Deserialize<'de> for Q16 {
 
 /// Not inlined: a set of parameters holds a hundred of them, and each place would get a
 /// decoder of its own.
-#[inline(never)]
 fn bits<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<i32, D::Error> {
     serde::Deserialize::deserialize(deserializer)
 }
@@ -43,19 +42,16 @@ impl Q16 {
     pub const MIN: Self = Self(i32::MIN);
 
     /// The number of these bits, in units of 2^-16.
-    #[must_use]
     pub const fn from_bits(bits: i32) -> Self {
         Self(bits)
     }
 
     /// In units of 2^-16.
-    #[must_use]
     pub const fn to_bits(self) -> i32 {
         self.0
     }
 
     /// From units of 2^-16, saturating.
-    #[must_use]
     pub const fn saturating_from_bits(bits: i64) -> Self {
         if bits as i32 as i64 == bits {
             Self(bits as i32)
@@ -65,50 +61,42 @@ impl Q16 {
     }
 
     /// From any number, saturating, rounded to nearest; not for the tick.
-    #[must_use]
     pub fn from_num<T: ToFixed>(number: T) -> Self {
         Self(I16F16::saturating_from_num(number).to_bits())
     }
 
     /// As any number, by the rules of [`fixed`].
-    #[must_use]
     pub fn to_num<T: FromFixed>(self) -> T {
         I16F16::from_bits(self.0).to_num()
     }
 
     /// From Q31.32, rounded towards minus infinity, saturating.
-    #[must_use]
     pub const fn narrow(wide: I32F32) -> Self {
         Self::saturating_from_bits(wide.to_bits() >> 16)
     }
 
     /// As Q31.32, exact.
-    #[must_use]
     pub const fn widen(self) -> I32F32 {
         I32F32::from_bits((self.0 as i64) << 16)
     }
 
     /// Magnitude, saturating.
-    #[must_use]
     pub const fn abs(self) -> Self {
         Self(self.0.saturating_abs())
     }
 
     /// Half, rounded towards minus infinity.
-    #[must_use]
     pub const fn half(self) -> Self {
         Self(self.0 >> 1)
     }
 
     /// The whole number nearest to it, halves away from zero.
-    #[must_use]
     pub const fn round(self) -> i32 {
         let magnitude = ((self.0.unsigned_abs() >> 15) + 1) >> 1;
         if self.0 < 0 { -(magnitude as i32) } else { magnitude as i32 }
     }
 
     /// The whole number at or below it.
-    #[must_use]
     pub const fn floor(self) -> i32 {
         self.0 >> 16
     }
@@ -117,7 +105,6 @@ impl Q16 {
 impl Add for Q16 {
     type Output = Self;
 
-    #[inline]
     fn add(self, other: Self) -> Self {
         Self(self.0.saturating_add(other.0))
     }
@@ -126,7 +113,6 @@ impl Add for Q16 {
 impl Sub for Q16 {
     type Output = Self;
 
-    #[inline]
     fn sub(self, other: Self) -> Self {
         Self(self.0.saturating_sub(other.0))
     }
@@ -135,7 +121,6 @@ impl Sub for Q16 {
 impl Neg for Q16 {
     type Output = Self;
 
-    #[inline]
     fn neg(self) -> Self {
         Self(self.0.saturating_neg())
     }
@@ -144,28 +129,24 @@ impl Neg for Q16 {
 impl Mul for Q16 {
     type Output = Self;
 
-    #[inline]
     fn mul(self, other: Self) -> Self {
         Self::saturating_from_bits((i64::from(self.0) * i64::from(other.0)) >> 16)
     }
 }
 
 impl AddAssign for Q16 {
-    #[inline]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
 }
 
 impl SubAssign for Q16 {
-    #[inline]
     fn sub_assign(&mut self, other: Self) {
         *self = *self - other;
     }
 }
 
 impl MulAssign for Q16 {
-    #[inline]
     fn mul_assign(&mut self, other: Self) {
         *self = *self * other;
     }

@@ -1,6 +1,6 @@
 //! Virtual time, mocked board and task runner for the tests of the async tasks.
 
-#![allow(dead_code, reason = "each test file uses its part of this")]
+pub(crate) mod mutate;
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
@@ -12,17 +12,17 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Wake, Waker};
 
 use embassy_time::{Duration, Instant, MockDriver, Timer};
-use interstage::blackbox::Flight;
 use interstage::hal::{
-    AnalogInput, AngleBus, CommandSource, Indicator, Journal, Light, MotorCommand, Motors,
-    Watchdog, WheelEncoder,
+    AnalogInput, AngleBus, CommandSource, Indicator, Journal, Light, Motors, Watchdog, WheelEncoder,
 };
-use interstage::log::Entry;
+use interstage::restart::DriveSnapshot;
 use interstage::rig::Rig;
 use interstage::sense::raw::{
     AdcCode, AngleFrame, BridgeCode, BridgeCodes, BusFault, EncoderCount,
 };
 use interstage::supervise::{Command, Lag};
+use interstage::tick::Entry;
+use interstage::units::MotorCommand;
 
 /// The clock is one for the whole process: one bench at a time.
 static CLOCK: Mutex<()> = Mutex::new(());
@@ -280,7 +280,7 @@ impl Motors for Bridges {
 #[derive(Clone, Default)]
 pub(crate) struct Dog {
     pub(crate) fed: Record<()>,
-    pub(crate) kept: Record<Flight>,
+    pub(crate) kept: Record<DriveSnapshot>,
 }
 
 impl Watchdog for Dog {
@@ -288,8 +288,8 @@ impl Watchdog for Dog {
         self.fed.push(());
     }
 
-    fn keep(&mut self, flight: &Flight) {
-        self.kept.push(*flight);
+    fn keep(&mut self, snapshot: &DriveSnapshot) {
+        self.kept.push(*snapshot);
     }
 }
 

@@ -6,10 +6,10 @@
 
 mod parameters;
 
-use interstage::blackbox::{CRASH_WORDS, FLIGHT_WORDS, Flight, later};
-use interstage::control::Output;
-use interstage::log::{Entry, Event};
-use interstage::supervise::{Command, Limit, Mode};
+use interstage::fault::Limit;
+use interstage::restart::{CRASH_WORDS, DriveSnapshot, SNAPSHOT_WORDS, later};
+use interstage::supervise::{Command, Mode};
+use interstage::tick::{Entry, Event, Output};
 use interstage::units::Q16;
 
 use super::super::judge::{Finding, Judge};
@@ -145,9 +145,11 @@ impl<'a> Board<'a> {
         output.drive.enable = passed.drives.drive_on;
         output.preload.enable = passed.drives.preload_on;
         let before = self.mode;
-        let flight = self.flight()?;
-        if let Some((flight, mode)) = flight.and_then(|flight| Some((flight, flight.mode()?))) {
-            (self.mode, self.speed) = (mode, flight.pace.speed());
+        let snapshot = self.snapshot()?;
+        if let Some((snapshot, mode)) =
+            snapshot.and_then(|snapshot| Some((snapshot, snapshot.mode()?)))
+        {
+            (self.mode, self.speed) = (mode, snapshot.packed_speed.speed());
         }
         let mut say = |event| {
             // More than there is room for comes in no millisecond.
@@ -175,19 +177,19 @@ impl<'a> Board<'a> {
     }
 
     /// The record of the latest tick since the board started.
-    fn flight(&self) -> Result<Option<Flight>, RunError> {
-        let read = |place: u32| -> Result<Option<Flight>, RunError> {
-            let mut words = [0; FLIGHT_WORDS];
+    fn snapshot(&self) -> Result<Option<DriveSnapshot>, RunError> {
+        let read = |place: u32| -> Result<Option<DriveSnapshot>, RunError> {
+            let mut words = [0; SNAPSHOT_WORDS];
             for (at, word) in (0..).zip(&mut words) {
-                let address = self.record + 4 * (place * FLIGHT_WORDS as u32 + at);
+                let address = self.record + 4 * (place * SNAPSHOT_WORDS as u32 + at);
                 let read = self.bench.machine().word(address);
                 *word = read.map_err(crate::bench::BenchError::from)?;
             }
-            Ok(Flight::open(&words))
+            Ok(DriveSnapshot::open(&words))
         };
-        let flight = later(read(0)?, read(1)?);
+        let snapshot = later(read(0)?, read(1)?);
         // That of before a restart is not of now.
-        Ok(flight.filter(|flight| u64::from(flight.tick) <= self.up + AHEAD))
+        Ok(snapshot.filter(|snapshot| u64::from(snapshot.tick) <= self.up + AHEAD))
     }
 
     /// What restarted it first, if it reported every restart.

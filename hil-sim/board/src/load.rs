@@ -242,9 +242,9 @@ impl Gathered {
             functions: Vec::new(),
             masked: Vec::new(),
             stack_used,
-            stack: footprint.stack(),
-            flash: footprint.flash(),
-            ram: footprint.ram(),
+            stack: footprint.stack,
+            flash: footprint.flash,
+            ram: footprint.ram,
             unmodelled: machine.chip().strays().iter().copied().collect(),
         }
     }

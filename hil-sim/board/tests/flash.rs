@@ -5,7 +5,7 @@
 mod common;
 
 use hil_sim::scenario::Scenario;
-use interstage::link::{Gatherer, ToBoard, ToHost, frame};
+use interstage::params::link::{FrameReader, ToBoard, ToHost, frame};
 use interstage::params::service::{Origin, PIECE, Piece, Request, Response};
 use interstage::params::{MAX_SET, compile};
 use interstage::rig::Rig;
@@ -34,7 +34,7 @@ fn set() -> Vec<u8> {
 struct Board {
     bench: Bench<'static>,
     probe: Probe,
-    gatherer: Gatherer,
+    gatherer: FrameReader,
     number: u16,
 }
 
@@ -44,7 +44,7 @@ impl Board {
         let scenario = Scenario::resolve(Some("prototype"), None, &[]).expect("a scenario");
         let bench = Bench::new(elf(), strings(), &scenario).expect("a bench");
         let probe = Probe::of(bench.machine()).expect("a control block");
-        let mut board = Self { bench, probe, gatherer: Gatherer::new(), number: 0 };
+        let mut board = Self { bench, probe, gatherer: FrameReader::new(), number: 0 };
         board.until_idle();
         board
     }
@@ -76,7 +76,7 @@ impl Board {
         for _ in 0..500 {
             self.bench.step().expect("runs");
             if self.restarts() > before {
-                self.gatherer = Gatherer::new();
+                self.gatherer = FrameReader::new();
                 return None;
             }
             for byte in self.probe.up(self.bench.machine_mut(), UP).expect("runs") {

@@ -18,9 +18,10 @@ use hil_sim::record::Recording;
 use hil_sim::replay::replay;
 use hil_sim::scenario::Scenario;
 use hil_sim::sil;
-use interstage::hil::{FIRST, Given, Taken};
+use interstage::fault::Fault;
+use interstage::hal::hil::{FIRST, Given, Taken};
 use interstage::rig::Rig;
-use interstage::supervise::{Command, Fault, Mode};
+use interstage::supervise::{Command, Mode};
 
 use common::scenario;
 

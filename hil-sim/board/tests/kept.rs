@@ -6,9 +6,9 @@ mod common;
 #[path = "common/reset_board.rs"]
 mod reset_board;
 
-use interstage::blackbox::{Flight, Reset, Stopped};
-use interstage::pages::PAGE_BYTES;
 use interstage::params::slots::SLOT_BYTES;
+use interstage::restart::page::PAGE_BYTES;
+use interstage::restart::{DriveSnapshot, Reset, Stopped};
 use interstage::supervise::Mode;
 use rig_board::bench::STEP;
 use rig_board::chip::Pin;
@@ -41,7 +41,7 @@ fn strike(board: &mut Board, fault: Fault) {
 }
 
 /// Falls in the middle of a run, and is judged by what the next start reports.
-fn falls(board: &mut Board) -> Option<Flight> {
+fn falls(board: &mut Board) -> Option<DriveSnapshot> {
     strike(board, Fault::BrownOut);
     let (cause, after, driven) = board.reset(5);
     assert_eq!(cause, Cause::Power);
@@ -49,20 +49,20 @@ fn falls(board: &mut Board) -> Option<Flight> {
     assert!(!driven[1..].contains(&true), "{driven:?}");
     let restart = board.report();
     assert_eq!(restart.reset, Reset::Power);
-    assert_eq!(restart.flight.is_some(), restart.crash.is_some());
+    assert_eq!(restart.snapshot.is_some(), restart.crash.is_some());
     if let Some(crash) = restart.crash {
         assert_eq!(crash.stopped, Stopped::Supply);
     }
-    restart.flight
+    restart.snapshot
 }
 
 #[test]
 fn a_supply_that_falls_leaves_what_the_drive_did() {
     let mut board = Board::moving();
     let at = board.bench.plant().truth().position_mm;
-    let flight = falls(&mut board).expect("a record");
-    assert!(matches!(flight.mode(), Some(Mode::Run(..))), "{flight:?}");
-    assert!((flight.position.to_num::<f64>() - at).abs() < 0.3, "{flight:?} at {at}");
+    let snapshot = falls(&mut board).expect("a record");
+    assert!(matches!(snapshot.mode(), Some(Mode::Run(..))), "{snapshot:?}");
+    assert!((snapshot.position.to_num::<f64>() - at).abs() < 0.3, "{snapshot:?} at {at}");
     for said in ["the supply fell too low", "before: tick"] {
         assert!(board.log.iter().any(|line| line.contains(said)), "{said}: {:#?}", board.log);
     }
@@ -97,7 +97,7 @@ fn a_record_of_the_supply_is_reported_once() {
     // The memory is lost, and this time without a warning.
     strike(&mut board, Fault::SupplyCut);
     let second = board.report();
-    assert_eq!((second.reset, second.flight, second.crash), (Reset::Power, None, None));
+    assert_eq!((second.reset, second.snapshot, second.crash), (Reset::Power, None, None));
 }
 
 #[test]
@@ -111,8 +111,8 @@ fn a_supply_that_flickers_leaves_its_first_record() {
         page(&board, RECORDS)[24..32] == [0; 8]
     });
     assert!(taken, "{:#?}", board.log);
-    let flight = falls(&mut board).expect("the same record");
-    assert!(matches!(flight.mode(), Some(Mode::Run(..))), "{flight:?}");
+    let snapshot = falls(&mut board).expect("the same record");
+    assert!(matches!(snapshot.mode(), Some(Mode::Run(..))), "{snapshot:?}");
 }
 
 #[test]
@@ -129,8 +129,11 @@ fn a_record_is_whole_or_none_wherever_power_goes() {
         strike(&mut board, Fault::BrownOut);
         board.reset(5);
         let restart = board.report();
-        assert_eq!(restart.flight.is_some(), whole, "{operations}: {restart}");
-        assert!(restart.flight.is_none_or(|flight| flight.tick != earlier.tick), "{operations}");
+        assert_eq!(restart.snapshot.is_some(), whole, "{operations}: {restart}");
+        assert!(
+            restart.snapshot.is_none_or(|snapshot| snapshot.tick != earlier.tick),
+            "{operations}"
+        );
         if !whole {
             // What was torn is in nobody's way.
             let next = falls(&mut board).expect("the next record");
@@ -148,8 +151,8 @@ fn a_full_page_of_records_makes_room() {
     board.until("mode: idle", 3000);
     assert_eq!(page(&board, RECORDS), [0xFF; PAGE_BYTES]);
     board.bench.take_frames();
-    let flight = falls(&mut board).expect("a record");
-    assert_eq!(flight.mode(), Some(Mode::Idle));
+    let snapshot = falls(&mut board).expect("a record");
+    assert_eq!(snapshot.mode(), Some(Mode::Idle));
 }
 
 #[test]
@@ -220,7 +223,7 @@ fn a_place_without_a_step_found_stays_unsure_however_long_it_idles() {
         }
         strike(&mut board, Fault::ResetPin);
         let restart = board.report();
-        assert!(restart.flight.is_some_and(|flight| flight.tick != lost.tick), "{restart}");
+        assert!(restart.snapshot.is_some_and(|snapshot| snapshot.tick != lost.tick), "{restart}");
         let place = restart.place().expect("a place");
         let off = (place.position.to_num::<f64>() - at).abs();
         assert!(off < 0.3 && !place.sure, "{restart} at {at}");
@@ -379,7 +382,7 @@ fn what_a_start_does_first_needs_no_floating_point_unit() {
     let board = Board::idle();
     let image = board.bench.machine().image();
     let mut looked_at = 0;
-    for name in ["__pre_init", "board::image::sums", "interstage::pages::word", "Reset"] {
+    for name in ["__pre_init", "board::image::sums", "interstage::restart::page::word", "Reset"] {
         for function in image.functions.iter().filter(|function| function.name.contains(name)) {
             let range = function.range.start - 0x0800_0000..function.range.end - 0x0800_0000;
             let code = &image.flash[range.start as usize..range.end as usize];

@@ -9,10 +9,10 @@ use std::process::{Command, Stdio};
 
 use hil_sim::log::{Decoder, Item, Mark, Row, Run};
 use hil_sim::replay::replay;
-use interstage::log::Event;
 use interstage::log::capture::Trigger;
 use interstage::rig::Rig;
 use interstage::supervise::Mode;
+use interstage::tick::Event;
 use interstage::units::Q16;
 use rig_board::bench::{Bench, STEP};
 use rig_board::log::Line;

@@ -7,8 +7,9 @@ mod common;
 mod reset_board;
 
 use hil_sim::scenario::Scenario;
-use interstage::blackbox::{Late, Reset, Restart, Stopped};
-use interstage::supervise::{Direction, Mode};
+use interstage::restart::{MissedCheckIns, Reset, Restart, Stopped};
+use interstage::supervise::Mode;
+use interstage::units::Direction;
 use rig_board::bench::STEP;
 use rig_board::core::Register;
 use rig_board::faults::Fault;
@@ -18,9 +19,9 @@ use rig_board::resets;
 use common::{elf, strings};
 use reset_board::Board;
 
-fn hang(restart: &Restart) -> (u32, Late) {
+fn hang(restart: &Restart) -> (u32, MissedCheckIns) {
     match restart.crash.map(|crash| crash.stopped) {
-        Some(Stopped::Hang { pc, late, .. }) => (pc, late),
+        Some(Stopped::Hang { pc, missed, .. }) => (pc, missed),
         _ => panic!("{restart}"),
     }
 }
@@ -33,7 +34,7 @@ fn assert_cut(driven: &[bool], within: usize) {
 #[test]
 fn a_first_start_reports_nothing_but_power() {
     let mut board = Board::idle();
-    let nothing = Restart { reset: Reset::Power, flight: None, crash: None };
+    let nothing = Restart { reset: Reset::Power, snapshot: None, crash: None };
     assert_eq!(board.report(), nothing);
     assert!(!board.log.iter().any(|line| line.contains("restarted") || line.contains("before:")));
 }
@@ -57,9 +58,9 @@ fn a_panic_is_reported_with_its_line_and_what_the_drive_did() {
     let restart = board.report();
     assert_eq!(restart.reset, Reset::Software);
     assert_eq!(restart.crash.expect("a crash").stopped, Stopped::Panic { place, line });
-    let flight = restart.flight.expect("what it did");
-    assert!(matches!(flight.mode(), Some(Mode::Run(Direction::Deploy, _))), "{flight:?}");
-    assert!((flight.position.to_num::<f64>() - at).abs() < 0.3, "{flight:?} at {at}");
+    let snapshot = restart.snapshot.expect("what it did");
+    assert!(matches!(snapshot.mode(), Some(Mode::Run(Direction::Deploy, _))), "{snapshot:?}");
+    assert!((snapshot.position.to_num::<f64>() - at).abs() < 0.3, "{snapshot:?} at {at}");
     for said in ["restarted by software", "panicked in line", "before: tick"] {
         assert!(board.log.iter().any(|line| line.contains(said)), "{said}: {:#?}", board.log);
     }
@@ -82,7 +83,7 @@ fn a_hard_fault_is_reported_with_where_and_why() {
         }
         other => panic!("{other:?}"),
     }
-    assert!(restart.flight.is_some());
+    assert!(restart.snapshot.is_some());
 }
 
 #[test]
@@ -95,7 +96,7 @@ fn a_stack_that_overflows_is_reported_too() {
     assert!(after < 60, "the record ends it, not the watchdog: {after} ms");
     let restart = board.report();
     assert!(matches!(restart.crash.expect("a crash").stopped, Stopped::Fault { .. }));
-    assert!(restart.flight.is_some());
+    assert!(restart.snapshot.is_some());
 }
 
 /// Tasks by their functions in `main.rs`, how the record calls them, and cycles that lead
@@ -160,8 +161,8 @@ fn the_task_that_hangs_is_named_whichever_it_is() {
         assert_cut(&driven, driven.len().min(135));
         let restart = board.report();
         assert_eq!(restart.reset, Reset::Watchdog, "{task}");
-        let (pc, late) = hang(&restart);
-        assert_eq!(late.name(), name, "{task}: {restart}");
+        let (pc, missed) = hang(&restart);
+        assert_eq!(missed.name(), name, "{task}: {restart}");
         assert_ne!(pc, 0, "{task}");
     }
 }
@@ -178,8 +179,8 @@ fn an_interrupt_that_never_ceases_ends_in_a_reset_that_names_the_starved_tick() 
     assert_cut(&driven, 85);
     Fault::ButtonStorm.heal(board.bench.machine_mut());
     let restart = board.report();
-    let (pc, late) = hang(&restart);
-    assert_eq!(late, Late::STARVED);
+    let (pc, missed) = hang(&restart);
+    assert_eq!(missed, MissedCheckIns::STARVED);
     assert_ne!(pc, 0);
     let on = board.bench.plant().truth().position_mm - at;
     assert!(on < 1.0, "it went on for {on} mm");
@@ -194,7 +195,7 @@ fn interrupts_masked_for_good_end_in_a_reset_with_what_the_drive_did() {
     assert_eq!(cause, Cause::Watchdog);
     let restart = board.report();
     assert_eq!((restart.reset, restart.crash), (Reset::Watchdog, None));
-    assert!(matches!(restart.flight.and_then(|f| f.mode()), Some(Mode::Run(..))));
+    assert!(matches!(restart.snapshot.and_then(|f| f.mode()), Some(Mode::Run(..))));
 }
 
 #[test]
@@ -203,11 +204,11 @@ fn a_report_is_made_once() {
     Fault::ResetPin.strike(board.bench.machine_mut()).expect("strikes");
     let first = board.report();
     assert_eq!(first.reset, Reset::Pin);
-    assert!(matches!(first.flight.and_then(|f| f.mode()), Some(Mode::Run(..))));
+    assert!(matches!(first.snapshot.and_then(|f| f.mode()), Some(Mode::Run(..))));
     board.bench.machine_mut().restart(Cause::Software).expect("restarts");
     let second = board.report();
     assert_eq!(second.reset, Reset::Software);
-    assert_eq!(second.flight.and_then(|f| f.mode()), Some(Mode::Idle));
+    assert_eq!(second.snapshot.and_then(|f| f.mode()), Some(Mode::Idle));
 }
 
 #[test]

@@ -1,6 +1,5 @@
 //! Start, panic and the list of what can be called.
 
-mod arith;
 mod model;
 mod slot;
 mod tick;
@@ -14,23 +13,13 @@ use embassy_stm32 as _;
 fn main() -> ! {
     // Keeps what only the host calls.
     core::hint::black_box([
-        arith::arith_load as *const (),
-        arith::arith_build_shipping as *const (),
-        arith::arith_shipping_forward as *const (),
-        arith::arith_shipping_inverse as *const (),
-        arith::arith_fixed_forward as *const (),
-        arith::arith_fixed_inverse as *const (),
-        arith::arith_micromath_forward as *const (),
-        arith::arith_micromath_inverse as *const (),
-        arith::arith_libm_forward as *const (),
-        arith::arith_libm_inverse as *const (),
-        arith::arith_f64_forward as *const (),
-        arith::arith_f64_inverse as *const (),
         model::model_build as *const (),
-        model::model_scale as *const (),
-        model::model_forward as *const (),
-        model::model_inverse_preload as *const (),
-        model::model_inverse_speed as *const (),
+        model::fixed_forward as *const (),
+        model::fixed_inverse as *const (),
+        model::f32_forward as *const (),
+        model::f32_inverse as *const (),
+        model::f64_forward as *const (),
+        model::f64_inverse as *const (),
         tick::tick_build as *const (),
         tick::tick_skip_nothing as *const (),
         tick::tick_load as *const (),

@@ -9,6 +9,6 @@ mod image;
 /// For the emulated core alone.
 #[cfg(not(target_os = "none"))]
 fn main() -> std::process::ExitCode {
-    eprintln!("This image runs on the emulated board; `cargo rig account` builds and runs it.");
+    eprintln!("This image runs on the emulated board; `cargo rig bench` builds and runs it.");
     std::process::ExitCode::from(2)
 }

@@ -1,11 +1,11 @@
 //! One control tick as words: what goes in, and what is looked at of what comes out.
 
-use interstage::control::{Input, Output};
 use interstage::model::Plan;
 use interstage::sense::raw::{
     AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
 };
 use interstage::supervise::Command;
+use interstage::tick::{Input, Output};
 
 use crate::digest::Digest;
 
@@ -172,7 +172,7 @@ impl Taken {
     #[must_use]
     pub fn of(output: &Output) -> Self {
         let digest = Digest::of(output);
-        let duty = |command: interstage::hal::MotorCommand| {
+        let duty = |command: interstage::units::MotorCommand| {
             if command.enable { u32::from(command.duty.to_bits() as u16) } else { 0x1_0000 }
         };
         Self {

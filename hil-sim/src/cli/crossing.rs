@@ -1,31 +1,41 @@
 //! `rig crossing`: one isolated crossing at constant speed and preload.
 
-mod methods;
-
 use clap::ValueEnum;
-use interstage::supervise::Direction;
+use interstage::model::felt::Kind;
+use interstage::model::formula::{Formula, LEAST_RUN};
+use interstage::model::reduced::{Point, ReducedModel, Scale};
+use interstage::rig::Rig;
+use interstage::units::Direction;
+use interstage::units::Q16;
 use serde::Serialize;
 
 use super::failure::{Failure, Outcome};
 use super::output;
 use super::scenario::ScenarioArgs;
+use crate::plant::balance::Axial;
+use crate::plant::crossing::{CrossingCase, cross};
+use crate::plant::ring::RingParameters;
 use crate::progress;
 use crate::table::{number, plain};
 
 /// Fastest crossing, mm/s.
 const MAX_SPEED_MM_S: f64 = 2000.0;
-
 /// Largest preload, N.
 const MAX_PRELOAD_N: f64 = 1000.0;
+/// Elements around the ring and axial travel per step, mm: the gap is within 0.1 % of
+/// that at half the stride and twice the elements.
+const FINENESS: (usize, f64) = (5760, 0.005);
+/// Gap from an end of the model within which it is at that end, mm.
+const NEAR_END_MM: f64 = 1e-7;
 
 /// One isolated crossing at constant speed and preload, without arm and controller.
 ///
 /// Figures of the ring are taken over the whole crossing: the largest axial force of
-/// the contact, its work, the largest tread depth, the largest friction utilisation.
+/// the contact, its work, the largest tread compression, the largest friction utilisation.
 /// The reduced model knows the instant at which the lower wall stops carrying (on
-/// the way back: begins to) and gives force, depth and utilisation there; its work
-/// is the elastic one, preload times step height, without what the rubber loses. On
-/// the way back the work is negative: the step gives it back.
+/// retract: begins to) and gives force, compression and utilisation there; its work is
+/// the elastic one, preload times step height, without the rubber's losses. On retract
+/// the work is negative: the step gives it back.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// Axial speed, mm/s.
@@ -47,7 +57,7 @@ pub(super) struct Args {
     #[arg(long)]
     driven: bool,
 
-    /// The way back: dropping off the step.
+    /// Retracts: drops off the step.
     #[arg(long)]
     retract: bool,
 
@@ -116,17 +126,17 @@ struct Printed<'a> {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
-    let within = |option, value, max, unit| {
-        // Written so that a NaN fails.
-        if value > 0.0 && value <= max {
-            return Ok(());
+    for (option, value, max, unit) in [
+        ("--speed-mm-s", args.speed_mm_s, MAX_SPEED_MM_S, "mm/s"),
+        ("--preload-n", args.preload_n, MAX_PRELOAD_N, "N"),
+    ] {
+        // A NaN fails too.
+        if !(value > 0.0 && value <= max) {
+            return Err(Failure::input(format!(
+                "{option} {value}: expected a value above 0, at most {max} {unit}"
+            )));
         }
-        Err(Failure::input(format!(
-            "{option} {value}: expected a value above 0, at most {max} {unit}"
-        )))
-    };
-    within("--speed-mm-s", args.speed_mm_s, MAX_SPEED_MM_S, "mm/s")?;
-    within("--preload-n", args.preload_n, MAX_PRELOAD_N, "N")?;
+    }
     let scenario = args.scenario.resolve()?;
     let loads = &scenario.rig.plant;
     let case = Case {
@@ -138,9 +148,9 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let figures = {
         let _progress = progress::spinner("crossing");
         match args.method {
-            Method::Ring => methods::ring(&scenario.rig, &case)?,
-            Method::Reduced => methods::reduced(&scenario.rig, &case)?,
-            Method::Fixed => methods::fixed(&scenario.rig, &case)?,
+            Method::Ring => ring(&scenario.rig, &case, FINENESS)?,
+            Method::Reduced => reduced(&scenario.rig, &case),
+            Method::Fixed => fixed(&scenario.rig, &case)?,
         }
     };
     let printed = Printed {
@@ -166,35 +176,156 @@ fn human(printed: &Printed<'_>) -> String {
         .load_n
         .map_or("frictionless".to_owned(), |load| format!("driven against {load:.2} N"));
     let figures = &printed.figures;
-    let mut rows = vec![
-        ("gap", number(figures.gap_mm, 3), "mm"),
-        ("corner force", number(figures.corner_force_n, 2), "N"),
-        ("work of the climb", number(figures.climb_work_mj, 1), "mJ"),
-        ("embedding", number(figures.embedding_mm, 3), "mm"),
+    // Hardly pressed, it slides at any friction.
+    let mu = |mu| if mu < 100.0 { number(mu, 3) } else { "> 100".to_owned() };
+    let rows = [
+        ("gap", Some(number(figures.gap_mm, 3)), "mm"),
+        ("corner force", Some(number(figures.corner_force_n, 2)), "N"),
+        ("work of the climb", Some(number(figures.climb_work_mj, 1)), "mJ"),
+        ("embedding", Some(number(figures.embedding_mm, 3)), "mm"),
+        ("friction needed", figures.mu_needed.map(mu), ""),
+        ("impact stress", figures.impact_stress_pa.map(|stress| number(stress, 0)), "Pa"),
+        ("vibration of the arm", figures.vibration_um.map(|um| number(um, 2)), "um"),
     ];
-    if let Some(mu) = figures.mu_needed {
-        // Hardly pressed, it slides whatever the friction.
-        let mu = if mu < 100.0 { number(mu, 3) } else { "> 100".to_owned() };
-        rows.push(("friction needed", mu, ""));
-    }
-    if let Some(stress) = figures.impact_stress_pa {
-        rows.push(("impact stress", number(stress, 0), "Pa"));
-    }
-    if let Some(vibration) = figures.vibration_um {
-        rows.push(("vibration of the arm", number(vibration, 2), "um"));
-    }
-    let note = if figures.at_model_end {
-        "the gap lies beyond the reduced model, which holds its end\n"
-    } else {
-        ""
-    };
-    let rows = rows.into_iter().map(|(name, value, unit)| vec![name.into(), value, unit.into()]);
-    format!(
-        "{} at {} mm/s under {} N, {driven}, rig {}, by the {method}\n{}\n{note}",
-        if printed.direction == "retract" { "Way back" } else { "Climb" },
+    let rows = rows
+        .into_iter()
+        .filter_map(|(name, value, unit)| Some(vec![name.into(), value?, unit.into()]));
+    let mut text = format!(
+        "{} at {} mm/s under {} N, {driven}, rig {}, by the {method}\n{}\n",
+        if printed.direction == "retract" { "Drop" } else { "Climb" },
         printed.speed_mm_s,
         printed.preload_n,
         printed.rig,
         plain(&["", "value", "unit"], rows)
-    )
+    );
+    if figures.at_model_end {
+        text += "the gap lies beyond the reduced model, which holds its end\n";
+    }
+    text
+}
+
+/// The ring with memory, as the plant has it.
+fn ring(rig: &Rig, case: &Case, (elements, stride_mm): (usize, f64)) -> Result<Figures, Failure> {
+    let result = cross(&CrossingCase {
+        ring: RingParameters::of(rig, elements),
+        step_height_mm: rig.rig.step_height_mm,
+        speed_mm_s: case.speed_mm_s * f64::from(case.direction.sign()),
+        preload_n: case.preload_n,
+        axial: case.load_n.map_or(Axial::Pushed, Axial::Driven),
+        stride_mm,
+    })?;
+    if result.lift == (0.0, 0.0) {
+        return Err(Failure::run(
+            "the wheel sinks in so far that the lower wall carries until the step lies under \
+             its centre: this crossing has no gap",
+        ));
+    }
+    Ok(Figures {
+        gap_mm: result.gap_mm,
+        corner_force_n: result.corner_force_n,
+        climb_work_mj: result.climb_work_mj,
+        embedding_mm: result.embedding_mm,
+        mu_needed: case.load_n.map(|_| result.mu_needed),
+        impact_stress_pa: None,
+        vibration_um: None,
+        at_model_end: false,
+    })
+}
+
+/// The reduced model in f64.
+fn reduced(rig: &Rig, case: &Case) -> Figures {
+    let formula = Formula::new(rig);
+    let Case { speed_mm_s, preload_n, direction, load_n } = *case;
+    let crossing = formula.crossing(direction, speed_mm_s, preload_n, load_n);
+    let kind = Kind { direction, driven: load_n.is_some() };
+    let longest = formula.gap_after_mm(formula.largest_run_mm(kind));
+    let shortest = formula.gap_after_mm(LEAST_RUN * formula.radius_mm);
+    let inside = longest + NEAR_END_MM..=shortest - NEAR_END_MM;
+    Figures {
+        gap_mm: crossing.gap_mm,
+        corner_force_n: crossing.corner_force_n,
+        climb_work_mj: elastic_work_mj(rig, case),
+        embedding_mm: formula.depth_mm(crossing.gap_mm),
+        mu_needed: load_n.map(|_| crossing.utilisation),
+        impact_stress_pa: Some(crossing.impact_stress_pa),
+        vibration_um: Some(1e3 * crossing.vibration_mm),
+        at_model_end: !inside.contains(&crossing.gap_mm),
+    }
+}
+
+/// The reduced model as the firmware runs it.
+fn fixed(rig: &Rig, case: &Case) -> Result<Figures, Failure> {
+    let model = ReducedModel::try_build_for(rig, case.load_n)?;
+    let speed = Q16::from_num(case.speed_mm_s);
+    let point = Point { direction: case.direction, speed, scale: Scale::NOMINAL };
+    let crossing = model.crossing(&point, Q16::from_num(case.preload_n));
+    Ok(Figures {
+        gap_mm: crossing.gap.to_num(),
+        corner_force_n: crossing.corner_force.to_num(),
+        climb_work_mj: elastic_work_mj(rig, case),
+        embedding_mm: model.depth(crossing.gap).to_num(),
+        mu_needed: case.load_n.map(|_| crossing.utilisation.to_num()),
+        impact_stress_pa: Some(1e3 * crossing.impact_stress_kpa.to_num::<f64>()),
+        vibration_um: Some(crossing.vibration_um.to_num()),
+        at_model_end: crossing.at_end,
+    })
+}
+
+/// Work of a frictionless elastic climb, mJ: the preload times the step's height.
+fn elastic_work_mj(rig: &Rig, case: &Case) -> f64 {
+    f64::from(case.direction.sign()) * case.preload_n * rig.rig.step_height_mm
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn case(speed_mm_s: f64, preload_n: f64, load_n: Option<f64>) -> Case {
+        Case { speed_mm_s, preload_n, direction: Direction::Deploy, load_n }
+    }
+
+    #[test]
+    fn fixed_point_follows_the_closed_form() {
+        let rig = Rig::prototype();
+        let close = |a: f64, b: f64, within: f64| assert!((a / b - 1.0).abs() < within);
+        for direction in [Direction::Deploy, Direction::Retract] {
+            for load_n in [None, Some(6.7)] {
+                let case = Case { direction, ..case(8.0, 40.0, load_n) };
+                let (exact, got) = (reduced(&rig, &case), fixed(&rig, &case).unwrap());
+                close(got.gap_mm, exact.gap_mm, 5e-4);
+                close(got.corner_force_n, exact.corner_force_n, 2e-3);
+                close(got.embedding_mm, exact.embedding_mm, 2e-3);
+                assert_eq!(got.climb_work_mj, exact.climb_work_mj);
+                assert_eq!(got.mu_needed.is_some(), load_n.is_some());
+                if let (Some(got), Some(exact)) = (got.mu_needed, exact.mu_needed) {
+                    close(got, exact, 2e-3);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_pushed_corner_force_is_the_preload_on_the_slope() {
+        let rig = Rig::fe();
+        let figures = reduced(&rig, &case(5.0, 100.0, None));
+        let contact = Formula::new(&rig).contact(figures.gap_mm);
+        let expected = 100.0 * contact.axial / contact.radial;
+        assert!((figures.corner_force_n / expected - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_gap_beyond_the_model_is_reported() {
+        let rig = Rig::prototype();
+        for (preload_n, beyond) in [(1000.0, true), (0.01, true), (33.3, false)] {
+            let case = case(5.0, preload_n, None);
+            assert_eq!(reduced(&rig, &case).at_model_end, beyond);
+            assert_eq!(fixed(&rig, &case).unwrap().at_model_end, beyond);
+        }
+    }
+
+    #[test]
+    fn a_wheel_that_sinks_in_has_no_gap() {
+        let sunk = ring(&Rig::prototype(), &case(5.0, 1000.0, None), FINENESS);
+        assert!(matches!(sunk, Err(Failure::Run(_))));
+    }
 }

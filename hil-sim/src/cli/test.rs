@@ -5,18 +5,21 @@ use crate::testing;
 
 /// Sets up what is missing and runs every check and test.
 ///
-/// In this order, up to the first that fails: format, lints, documentation, firmware
-/// and its size, the whole test suite. Its result lines come last.
+/// In this order, up to the first that fails: format, lints, documentation, the firmware's
+/// images, the test suite. Its result lines come last.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
+    /// Runs the long samples too.
+    #[arg(long)]
+    long: bool,
+
     /// Arguments for `cargo test`, after `--`.
     #[arg(last = true, value_name = "ARGS")]
     rest: Vec<String>,
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
-    Ok(match testing::run(&args.rest).map_err(Failure::run)? {
-        0 => Outcome::Good,
-        code => Outcome::Code(code),
-    })
+    let code =
+        testing::run(&args.rest, args.long).map_err(|error| Failure::run(format!("{error:#}")))?;
+    Ok(Outcome::Code(code))
 }

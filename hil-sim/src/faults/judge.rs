@@ -1,9 +1,9 @@
 //! Judges a run that was tampered with, by what is true and not by what the controller
 //! believes: was the mechanism held, did it move uncommanded, was the fault reported.
 
-use interstage::control::Output;
-use interstage::log::Event;
-use interstage::supervise::{Direction, Mode};
+use interstage::supervise::Mode;
+use interstage::tick::{Event, Output};
+use interstage::units::Direction;
 use serde::{Deserialize, Serialize};
 
 use super::Target;
@@ -213,10 +213,10 @@ impl Judge {
 
 #[cfg(test)]
 mod tests {
-    use interstage::hal::MotorCommand;
-    use interstage::log::Entry;
-    use interstage::supervise::{Fault, Leg, Limit};
-    use interstage::units::Q16;
+    use interstage::fault::{Fault, Limit};
+    use interstage::supervise::Leg;
+    use interstage::tick::Entry;
+    use interstage::units::{MotorCommand, Q16};
 
     use super::*;
 

@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use interstage::hil::{DOWN, FIRST, Given, PROTOCOL, Taken, ToBoard, ToHost, UP};
-use interstage::link::{Gatherer, frame};
+use interstage::hal::hil::{DOWN, FIRST, Given, PROTOCOL, Taken, ToBoard, ToHost, UP};
+use interstage::params::link::{FrameReader, frame};
 use interstage::units::Tick;
 
 use super::HilError;
@@ -18,7 +18,7 @@ const TIMEOUT: Duration = Duration::from_secs(2);
 /// This host's end of the loop.
 pub struct HostLine<'a> {
     port: &'a mut dyn Port,
-    gatherer: Gatherer,
+    gatherer: FrameReader,
 }
 
 impl<'a> HostLine<'a> {
@@ -28,7 +28,7 @@ impl<'a> HostLine<'a> {
     /// [`HilError`] if the port fails or no board of this protocol answers.
     pub fn begin(port: &'a mut dyn Port) -> Result<Self, HilError> {
         port.reset()?;
-        let mut line = Self { port, gatherer: Gatherer::new() };
+        let mut line = Self { port, gatherer: FrameReader::new() };
         match line.ask(&ToBoard::Hello { protocol: PROTOCOL }, |_| true)? {
             Some(ToHost::Next { tick: FIRST, alone: false }) => Ok(line),
             Some(ToHost::Next { tick, .. }) => Err(HilError::Apart { board: tick, host: FIRST }),
@@ -39,7 +39,7 @@ impl<'a> HostLine<'a> {
     /// Goes on with a board that runs already.
     #[must_use]
     pub const fn begin_at(port: &'a mut dyn Port) -> Self {
-        Self { port, gatherer: Gatherer::new() }
+        Self { port, gatherer: FrameReader::new() }
     }
 
     /// One tick of the board.

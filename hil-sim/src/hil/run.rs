@@ -3,11 +3,12 @@
 use std::collections::VecDeque;
 use std::time::Instant;
 
-use interstage::hil::{FIRST, Given};
-use interstage::log::{Entry, Event, Identity, Record, identity};
+use interstage::hal::hil::{FIRST, Given};
+use interstage::log::{Identity, Record, identity};
 use interstage::model::Planner;
 use interstage::sense::raw::SensorFrame;
 use interstage::supervise::Mode;
+use interstage::tick::{Entry, Event};
 use interstage::units::Tick;
 
 use super::{HilError, HostLine};

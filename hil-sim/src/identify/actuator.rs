@@ -1,14 +1,16 @@
 //! The fit of the pre-tightener: its duty through dead time, lag and slew, and the spring
-//! that the wheel's rise compresses, against the load cell.
+//! that the wheel's rise compresses, against the preload sensor.
 //!
 //! `P(t) = seat + slew int lag(duty(t - delay)) dt + spring (height(t) - R)`, as the screw
 //! locks itself while its bridge is off. The height of the centre comes from the fit of
 //! the contact.
 
-use nalgebra_lm::DMatrix;
+use std::ops::Range;
+
+use nalgebra::DMatrix;
 
 use super::IdentifyError;
-use super::forward::{Course, Run};
+use super::forward::{Run, Trajectory};
 use super::least_squares::{Model, covariance, minimise};
 use super::noise::Noise;
 use super::record::{Record, Sample, TICK_S};
@@ -17,9 +19,9 @@ use super::record::{Record, Sample, TICK_S};
 pub const DELAY: usize = 0;
 /// Logarithm of the lag, s.
 pub const LAG: usize = 1;
-/// Slew, N/s by the load cell.
+/// Slew, N/s by the preload sensor.
 pub const SLEW: usize = 2;
-/// Spring rate, N/mm by the load cell.
+/// Spring rate, N/mm by the preload sensor.
 pub const SPRING: usize = 3;
 /// First of the seats, N, one a log.
 const SEATS: usize = 4;
@@ -29,8 +31,9 @@ const LONGEST_MS: f64 = 250.0;
 /// Changes for the differences: ms, and relative.
 const MOVED_MS: f64 = 0.5;
 const MOVED_LAG: f64 = 0.01;
-/// Deviation that the first fit assumes, N.
+/// Deviation that the first fit assumes, N, and the least of the second.
 const FIRST_N: f64 = 0.1;
+const LEAST_N: f64 = 1e-4;
 
 /// The result.
 #[derive(Clone, Debug)]
@@ -39,28 +42,23 @@ pub struct Actuator {
     pub x: Vec<f64>,
     /// Their covariance.
     pub covariance: DMatrix<f64>,
-    /// What is left, N, by log.
+    /// Residuals, N, by log.
     pub residuals: Vec<Vec<f64>>,
-    /// Times of it, s.
+    /// Their times, s.
     pub times: Vec<Vec<f64>>,
-    /// Its noise, by log.
-    pub noise: Vec<Noise>,
 }
 
 /// One log.
 struct Log<'a> {
     samples: &'a [Sample],
-    /// Ticks of the bins and what the load cell said in them, N.
-    bins: Vec<(std::ops::Range<usize>, f64)>,
+    /// Ticks of the bins and the mean preload that the sensor showed in them, N.
+    bins: Vec<(Range<usize>, f64)>,
     /// Rise of the centre above the undeformed wheel on the outermost wall, mm, in them.
     rise_mm: Vec<f64>,
     /// Age of a reading, ticks.
     delay: f64,
-}
-
-struct Screw<'a> {
-    logs: Vec<Log<'a>>,
-    weights: Vec<f64>,
+    /// One over the deviation, 1/N.
+    weight: f64,
 }
 
 /// Force of the screw's position for a slew of 1 N/s, every tick and one more.
@@ -83,60 +81,79 @@ fn seat(samples: &[Sample], delay: usize, lag_s: f64) -> Vec<f64> {
     out
 }
 
-impl Log<'_> {
-    /// The seat for a slew of 1 N/s, in the bins; between two whole dead times it is mixed.
-    fn way(&self, delay_ms: f64, lag_s: f64) -> Vec<f64> {
+impl<'a> Log<'a> {
+    fn of(record: &'a Record, run: &Run, at: &Trajectory, radius_mm: f64) -> Self {
+        let delay = record.scenario.noise.load_cell_delay_s / TICK_S;
+        let used = run.traces.bins.iter().filter(|bin| bin.pressed);
+        let bins: Vec<_> = used.map(|bin| (bin.ticks.clone(), bin.preload_n)).collect();
+        let middle = |ticks: &Range<usize>| 0.5 * (ticks.start + ticks.end - 1) as f64 - delay;
+        let rise = |(ticks, _): &(Range<usize>, f64)| at.height_mm(middle(ticks)) - radius_mm;
+        let rise_mm = bins.iter().map(rise).collect();
+        Self { samples: &record.samples, bins, rise_mm, delay, weight: 1.0 / FIRST_N }
+    }
+
+    /// The seat for a slew of 1 N/s in the bins, interpolated between two whole dead times.
+    fn seats(&self, delay_ms: f64, lag_s: f64) -> Vec<f64> {
         let whole = delay_ms.floor();
         let [early, late] = [0, 1].map(|more| seat(self.samples, whole as usize + more, lag_s));
         let part = delay_ms - whole;
         let mixed: Vec<f64> = early.iter().zip(&late).map(|(a, b)| a + part * (b - a)).collect();
-        let mean = |ticks: &std::ops::Range<usize>| {
+        let mean = |(ticks, _): &(Range<usize>, f64)| {
             let of = |tick: usize| super::traces::at(&mixed, tick as f64 - self.delay);
             ticks.clone().map(of).sum::<f64>() / ticks.len() as f64
         };
-        self.bins.iter().map(|(ticks, _)| mean(ticks)).collect()
+        self.bins.iter().map(mean).collect()
+    }
+
+    /// Predicted less measured preload in the bins, N.
+    fn remaining(&self, x: &[f64], seat_n: f64, seats: &[f64]) -> Vec<f64> {
+        let predicted = seats.iter().zip(&self.rise_mm);
+        let predicted = predicted.map(|(seat, rise)| seat_n + x[SLEW] * seat + x[SPRING] * rise);
+        predicted.zip(&self.bins).map(|(predicted, (_, measured))| predicted - measured).collect()
+    }
+}
+
+struct Screw<'a>(Vec<Log<'a>>);
+
+impl Screw<'_> {
+    /// Predicted less measured preload, N, by log.
+    fn remaining(&self, x: &[f64], at: &[Vec<f64>]) -> Vec<Vec<f64>> {
+        let logs = self.0.iter().zip(at).zip(&x[SEATS..]);
+        logs.map(|((log, seats), seat_n)| log.remaining(x, *seat_n, seats)).collect()
     }
 }
 
 impl Model for Screw<'_> {
-    /// Ways of the screw, by log.
+    /// Seats for a slew of 1 N/s, by log.
     type At = Vec<Vec<f64>>;
 
     fn at(&self, x: &[f64]) -> Option<Self::At> {
         let within = (0.0..LONGEST_MS).contains(&x[DELAY]) && x[LAG].abs() < 9.0;
-        within.then(|| self.logs.iter().map(|log| log.way(x[DELAY], x[LAG].exp())).collect())
+        within.then(|| self.0.iter().map(|log| log.seats(x[DELAY], x[LAG].exp())).collect())
     }
 
     fn residuals(&self, x: &[f64], at: &Self::At) -> Vec<f64> {
-        let of = |index: usize| {
-            let (log, weight) = (&self.logs[index], self.weights[index]);
-            let force = move |(way, rise): (&f64, &f64)| {
-                x[SEATS + index] + x[SLEW] * way + x[SPRING] * rise
-            };
-            let said = at[index].iter().zip(&log.rise_mm).map(force);
-            said.zip(&log.bins).map(move |(said, (_, heard))| weight * (said - heard))
-        };
-        (0..self.logs.len()).flat_map(of).collect()
+        let logs = self.0.iter().zip(self.remaining(x, at));
+        logs.flat_map(|(log, left)| left.into_iter().map(|left| log.weight * left)).collect()
     }
 
     fn jacobian(&self, x: &[f64], at: &Self::At) -> Option<Vec<Vec<f64>>> {
         let mut columns = vec![Vec::new(); x.len()];
-        for (index, log) in self.logs.iter().enumerate() {
-            let weight = self.weights[index];
+        for (index, log) in self.0.iter().enumerate() {
             let between = |a: Vec<f64>, b: Vec<f64>, over: f64| -> Vec<f64> {
-                a.iter().zip(&b).map(|(a, b)| weight * x[SLEW] * (a - b) / over).collect()
+                a.iter().zip(&b).map(|(a, b)| log.weight * x[SLEW] * (a - b) / over).collect()
             };
             let (delay, lag) = (x[DELAY], x[LAG].exp());
             let least = (delay - MOVED_MS).max(0.0);
-            let (later, sooner) = (log.way(delay + MOVED_MS, lag), log.way(least, lag));
+            let (later, sooner) = (log.seats(delay + MOVED_MS, lag), log.seats(least, lag));
             columns[DELAY].extend(between(later, sooner, delay + MOVED_MS - least));
             let (up, down) = (lag * MOVED_LAG.exp(), lag * (-MOVED_LAG).exp());
-            let (slower, faster) = (log.way(delay, up), log.way(delay, down));
+            let (slower, faster) = (log.seats(delay, up), log.seats(delay, down));
             columns[LAG].extend(between(slower, faster, 2.0 * MOVED_LAG));
-            columns[SLEW].extend(at[index].iter().map(|way| weight * way));
-            columns[SPRING].extend(log.rise_mm.iter().map(|rise| weight * rise));
-            for other in 0..self.logs.len() {
-                let one = if other == index { weight } else { 0.0 };
+            columns[SLEW].extend(at[index].iter().map(|seat| log.weight * seat));
+            columns[SPRING].extend(log.rise_mm.iter().map(|rise| log.weight * rise));
+            for other in 0..self.0.len() {
+                let one = if other == index { log.weight } else { 0.0 };
                 columns[SEATS + other].extend(log.bins.iter().map(|_| one));
             }
         }
@@ -144,87 +161,42 @@ impl Model for Screw<'_> {
     }
 }
 
-/// Fits the pre-tightener to records whose contact is known.
+/// Fits the pre-tightener to records whose contact is known, then once more with the noise
+/// that this leaves.
 ///
 /// # Errors
 /// [`IdentifyError::NoFit`] if it does not settle.
 pub fn fit(
     records: &[Record],
     runs: &[Run],
-    courses: &[Course],
+    trajectories: &[Trajectory],
     radius_mm: f64,
 ) -> Result<Actuator, IdentifyError> {
-    let logs: Vec<Log<'_>> = records
-        .iter()
-        .zip(runs.iter().zip(courses))
-        .map(|(record, (run, course))| {
-            let used = run.traces.bins.iter().filter(|bin| bin.pressed);
-            let delay = record.scenario.noise.load_cell_delay_s / TICK_S;
-            let middle =
-                |ticks: &std::ops::Range<usize>| 0.5 * (ticks.start + ticks.end - 1) as f64 - delay;
-            Log {
-                samples: &record.samples,
-                rise_mm: used
-                    .clone()
-                    .map(|bin| course.height_mm(middle(&bin.ticks)) - radius_mm)
-                    .collect(),
-                bins: used.map(|bin| (bin.ticks.clone(), bin.preload_n)).collect(),
-                delay,
-            }
-        })
-        .collect();
-    let times = logs
-        .iter()
-        .map(|log| {
-            let mid = |ticks: &std::ops::Range<usize>| 0.5 * (ticks.start + ticks.end) as f64;
-            log.bins.iter().map(|(ticks, _)| TICK_S * mid(ticks)).collect()
-        })
-        .collect();
+    let no_logs = || IdentifyError::NoFit { why: "there are no logs".into() };
     let preload = &records.first().ok_or_else(no_logs)?.scenario.rig.preload;
+    let of = |((record, run), at): ((_, &Run), _)| Log::of(record, run, at, radius_mm);
+    let mut model = Screw(records.iter().zip(runs).zip(trajectories).map(of).collect());
     let mut start = vec![
         preload.delay_s / TICK_S,
         preload.lag_s.ln(),
         preload.slew_n_per_s,
         preload.spring_n_per_mm,
     ];
-    // Where the screw stands before it first moves.
+    // Where the screw is before it first moves.
     start.extend(runs.iter().map(|run| run.traces.preload_n[run.traces.span.start]));
-    let counts: Vec<usize> = logs.iter().map(|log| log.bins.len()).collect();
-    let mut model = Screw { weights: vec![1.0 / FIRST_N; logs.len()], logs };
     let first = minimise(&model, &start)?;
-    let noise = noise_of(first.residuals.as_slice(), &counts, &model.weights);
-    model.weights = noise.iter().map(|noise| 1.0 / noise.effective().max(1e-4)).collect();
+    let residuals = model.remaining(&first.x, &first.at);
+    for (log, residuals) in model.0.iter_mut().zip(&residuals) {
+        log.weight = 1.0 / Noise::of(residuals).effective().max(LEAST_N);
+    }
     let fitted = minimise(&model, &first.x)?;
-    let residuals = split(fitted.residuals.as_slice(), &counts, &model.weights);
+    let mid = |(ticks, _): &(Range<usize>, f64)| TICK_S * (0.5 * (ticks.start + ticks.end) as f64);
     Ok(Actuator {
         covariance: covariance(&fitted.jacobian)?,
-        noise: residuals.iter().map(|of| Noise::of(of)).collect(),
+        residuals: model.remaining(&fitted.x, &fitted.at),
+        times: model.0.iter().map(|log| log.bins.iter().map(mid).collect()).collect(),
         x: fitted.x,
-        residuals,
-        times,
     })
-}
-
-fn no_logs() -> IdentifyError {
-    IdentifyError::NoFit { why: "there are no logs".into() }
-}
-
-/// Residuals by log, their weights taken off.
-fn split(residuals: &[f64], counts: &[usize], weights: &[f64]) -> Vec<Vec<f64>> {
-    let mut rest = residuals;
-    counts
-        .iter()
-        .zip(weights)
-        .map(|(&count, weight)| {
-            let (these, others) = rest.split_at(count);
-            rest = others;
-            these.iter().map(|r| r / weight).collect()
-        })
-        .collect()
-}
-
-fn noise_of(residuals: &[f64], counts: &[usize], weights: &[f64]) -> Vec<Noise> {
-    split(residuals, counts, weights).iter().map(|of| Noise::of(of)).collect()
 }
 
 #[cfg(test)]
@@ -248,17 +220,11 @@ mod tests {
             let range = (-1e6, 1e6);
             let mut screw =
                 Pretightener::new(slew, lag, delay as f64 * TICK_S, TICK_S, 0.0, range);
-            let way = seat(&samples, delay, lag);
+            let seats = seat(&samples, delay, lag);
             for (n, sample) in samples.iter().enumerate() {
-                prop_assert!((slew * way[n] - screw.seat_n()).abs() < 1e-9, "{n}");
+                prop_assert!((slew * seats[n] - screw.seat_n()).abs() < 1e-9, "{n}");
                 screw.step(sample.pretightener, sample.pretightener_on, TICK_S);
             }
         }
-    }
-
-    #[test]
-    fn residuals_are_split_by_log_without_their_weights() {
-        let split = split(&[2.0, 4.0, 9.0], &[2, 1], &[2.0, 3.0]);
-        assert_eq!(split, [vec![1.0, 2.0], vec![3.0]]);
     }
 }

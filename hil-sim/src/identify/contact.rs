@@ -1,34 +1,34 @@
 //! The fit of the tread, the friction, the load, the steps and the sensors: least squares
 //! of compression, arm angle and drive effort over all logs at once.
 //!
-//! Each channel of each log is weighted by what its own residuals show of its noise,
-//! correlation included, so that a model error that lasts counts as such an error and not
-//! as many readings that agree.
+//! Each channel of each log is weighted by the noise of its own residuals, correlation
+//! included, so that a lasting model error counts as one error and not as many readings
+//! that agree.
 
 use std::ops::Range;
 
-use nalgebra_lm::DMatrix;
+use nalgebra::DMatrix;
 
 use super::IdentifyError;
-use super::coordinates::{CREEP, Coordinates, FRICTION, Prior};
-use super::forward::{Channels, Course, Fineness, Run, courses, derivatives};
+use super::coordinates::{CREEP, Coordinates, FRICTION};
+use super::forward::{Channels, Run, Trajectory, derivatives, quotient, simulate};
 use super::least_squares::{Model, consider, minimise, robust};
 use super::noise::Noise;
 
 /// Deviations that the first fit assumes: compression, mm, angle, mrad, effort, N; ten
 /// times those of the sensors, as the start may be far off.
 const FIRST: [f64; 3] = [5e-3, 0.3, 0.5];
-/// Least deviations: what the forward model itself errs by.
+/// Least deviations: the forward model's own errors.
 const LEAST: [f64; 3] = [2e-4, 2e-2, 2e-2];
-/// Values that may err alike, by channel: 0.16 s, what a crossing takes at the quickest.
+/// Values that may err alike, by channel: 0.16 s, the shortest crossing.
 const BLOCKS: [usize; 3] = [16, 16, 4];
-/// By how much the scatter of the blocks is widened. What tells of steps, friction and
-/// wheel are some nine crossings: Student's t with eight degrees of freedom in place of the
-/// normal quantile, 1.18. And at every crossing the model errs alike, as it does not see
-/// how the drive's load jitters between two counts, which raises the creep: 1.9, by
-/// the hidden rigs of seeds 1 to 10.
+/// By how much the scatter of the blocks is widened. Some nine crossings determine steps,
+/// friction and wheel: Student's t with eight degrees of freedom in place of the normal
+/// quantile, 1.18. And the model has an error common to all crossings, the jitter of the
+/// drive's load between two counts, which raises the creep: 1.9, by the hidden rigs of
+/// seeds 1 to 10.
 const WIDENED: f64 = 1.18 * 1.9;
-/// How far friction may stray while nothing tells of it, logarithm.
+/// How far friction may stray while nothing determines it, logarithm.
 const HELD_LN: f64 = 0.02;
 /// How closely the creep law is held, logarithm.
 const HELD_CREEP_LN: f64 = 1e-5;
@@ -40,106 +40,78 @@ pub struct Contact {
     pub x: Vec<f64>,
     /// Their covariance.
     pub covariance: DMatrix<f64>,
-    /// Courses of the logs there.
-    pub courses: Vec<Course>,
-    /// What is left, by log and channel.
+    /// Trajectories of the logs there.
+    pub trajectories: Vec<Trajectory>,
+    /// Residuals, by log and channel.
     pub residuals: Vec<Channels>,
-    /// Its noise, by log and channel.
-    pub noise: Vec<[Noise; 3]>,
-    /// Values compared.
-    pub values: usize,
 }
 
 struct Weighted<'a> {
     runs: &'a [Run],
-    heard: Vec<Channels>,
+    measured: Vec<Channels>,
     coordinates: &'a Coordinates,
     weights: Vec<[f64; 3]>,
-    fineness: Fineness,
 }
 
 impl<'a> Weighted<'a> {
-    fn new(runs: &'a [Run], coordinates: &'a Coordinates, fineness: Fineness) -> Self {
-        Self {
-            runs,
-            heard: runs.iter().map(Run::heard).collect(),
-            coordinates,
-            weights: vec![FIRST.map(|deviation| 1.0 / deviation); runs.len()],
-            fineness,
-        }
+    fn new(runs: &'a [Run], coordinates: &'a Coordinates) -> Self {
+        let measured = runs.iter().map(Run::measured).collect();
+        let weights = vec![FIRST.map(|deviation| 1.0 / deviation); runs.len()];
+        Self { runs, measured, coordinates, weights }
     }
 
-    /// What is left between the model and the logs.
-    fn remaining(&self, x: &[f64], at: &[Course]) -> Vec<Channels> {
-        let runs = self.runs.iter().zip(at).zip(&self.heard);
-        runs.map(|((run, course), heard)| run.said(course, x).minus(heard)).collect()
-    }
-
-    fn noise(&self, x: &[f64], at: &[Course]) -> Vec<[Noise; 3]> {
-        let remaining = self.remaining(x, at);
-        remaining.iter().map(|channels| channels.each().map(Noise::of)).collect()
+    /// Predicted less measured values, by log.
+    fn remaining(&self, x: &[f64], at: &[Trajectory]) -> Vec<Channels> {
+        let runs = self.runs.iter().zip(at).zip(&self.measured);
+        runs.map(|((run, at), measured)| quotient(&run.predicted(at, x), measured, 1.0)).collect()
     }
 
     /// Rows of the residuals that may err alike.
     fn blocks(&self) -> Vec<Range<usize>> {
         let (mut blocks, mut from) = (Vec::new(), 0);
-        for channels in &self.heard {
-            for (values, length) in channels.each().into_iter().zip(BLOCKS) {
-                let end = from + values.len();
-                while from < end {
-                    let to = (from + length).min(end);
-                    blocks.push(from..to);
-                    from = to;
-                }
-            }
+        for (values, length) in self.measured.iter().flat_map(|log| log.iter().zip(BLOCKS)) {
+            let end = from + values.len();
+            blocks.extend((from..end).step_by(length).map(|from| from..(from + length).min(end)));
+            from = end;
         }
         blocks
     }
 
-    /// Weighs each channel by the noise that it shows.
-    fn reweigh(&mut self, x: &[f64], at: &[Course]) {
-        let by = |of: &[Noise; 3]| std::array::from_fn(|i| 1.0 / of[i].effective().max(LEAST[i]));
-        self.weights = self.noise(x, at).iter().map(by).collect();
+    /// Weights each channel by the noise of its residuals.
+    fn reweigh(&mut self, x: &[f64], at: &[Trajectory]) {
+        let weight = |values: &Vec<f64>, least: f64| 1.0 / Noise::of(values).effective().max(least);
+        let of = |log: &Channels| std::array::from_fn(|i| weight(&log[i], LEAST[i]));
+        self.weights = self.remaining(x, at).iter().map(of).collect();
     }
 
-    fn weighted(&self, run: usize, channels: &Channels) -> impl Iterator<Item = f64> {
-        let weights = self.weights[run];
-        let each = channels.each().into_iter().zip(weights);
-        let values: Vec<f64> =
-            each.flat_map(|(values, weight)| values.iter().map(move |v| v * weight)).collect();
-        values.into_iter()
-    }
-
-    fn prior(&self, x: &[f64]) -> impl Iterator<Item = f64> {
-        let from = |(x, prior): (&f64, &Prior)| (x - prior.mean) / prior.deviation;
-        let values: Vec<f64> = x.iter().zip(self.coordinates.priors()).map(from).collect();
-        values.into_iter()
+    /// All values of a log over their deviations.
+    fn weighted<'b>(&self, log: usize, channels: &'b Channels) -> impl Iterator<Item = f64> + 'b {
+        let each = channels.iter().zip(self.weights[log]);
+        each.flat_map(|(values, weight)| values.iter().map(move |value| value * weight))
     }
 }
 
 impl Model for Weighted<'_> {
-    type At = Vec<Course>;
+    type At = Vec<Trajectory>;
 
-    fn at(&self, x: &[f64]) -> Option<Vec<Course>> {
+    fn at(&self, x: &[f64]) -> Option<Vec<Trajectory>> {
         x.iter().all(|x| x.is_finite()).then_some(())?;
-        courses(self.runs, self.coordinates, x, self.fineness).ok()
+        simulate(self.runs, self.coordinates, x).ok()
     }
 
-    fn residuals(&self, x: &[f64], at: &Vec<Course>) -> Vec<f64> {
-        let mut all = Vec::new();
-        for (index, (run, course)) in self.runs.iter().zip(at).enumerate() {
-            all.extend(self.weighted(index, &run.said(course, x).minus(&self.heard[index])));
-        }
-        all.extend(self.prior(x));
-        all
+    fn residuals(&self, x: &[f64], at: &Vec<Trajectory>) -> Vec<f64> {
+        let remaining = self.remaining(x, at);
+        let logs = remaining.iter().enumerate().flat_map(|(log, left)| self.weighted(log, left));
+        let priors = x.iter().zip(self.coordinates.priors());
+        logs.chain(priors.map(|(x, prior)| (x - prior.mean) / prior.deviation)).collect()
     }
 
-    fn jacobian(&self, x: &[f64], at: &Vec<Course>) -> Option<Vec<Vec<f64>>> {
+    fn jacobian(&self, x: &[f64], at: &Vec<Trajectory>) -> Option<Vec<Vec<f64>>> {
         let mut columns = vec![Vec::new(); x.len()];
-        for (index, (run, course)) in self.runs.iter().zip(at).enumerate() {
-            let by = derivatives(run, self.coordinates, x, course, self.fineness).ok()?;
+        for (log, (run, at)) in self.runs.iter().zip(at).enumerate() {
+            let by = derivatives(run, self.coordinates, x, at).ok()?;
             for (column, channels) in columns.iter_mut().zip(&by) {
-                column.extend(self.weighted(index, channels));
+                column.extend(self.weighted(log, channels));
             }
         }
         for (index, column) in columns.iter_mut().enumerate() {
@@ -150,39 +122,27 @@ impl Model for Weighted<'_> {
     }
 }
 
-/// Fits the coordinates to the runs, then once more with the noise that this leaves.
+/// Fits the coordinates to the runs, then twice more with the noise that this leaves.
 ///
 /// # Errors
 /// [`IdentifyError::NoFit`] if it does not settle.
-pub fn fit(
-    runs: &[Run],
-    coordinates: &Coordinates,
-    fineness: Fineness,
-) -> Result<Contact, IdentifyError> {
+pub fn fit(runs: &[Run], coordinates: &Coordinates) -> Result<Contact, IdentifyError> {
     let start: Vec<f64> = coordinates.priors().iter().map(|prior| prior.mean).collect();
-    // The creep law is held: what the model errs in it at every climb would go into it.
+    // The creep law is held: fitted, it would absorb the model's errors at every climb.
     let creep = coordinates.priors()[CREEP];
     let law = coordinates.known(CREEP, creep.mean, HELD_CREEP_LN);
-    // Friction tells by its creep, and only once the rest is in place.
+    // Friction shows in the creep, and only once the rest is in place.
     let held = law.known(FRICTION, start[FRICTION], HELD_LN);
-    let first = minimise(&Weighted::new(runs, &held, fineness), &start)?;
-    let mut model = Weighted::new(runs, &law, fineness);
+    let first = minimise(&Weighted::new(runs, &held), &start)?;
+    let mut model = Weighted::new(runs, &law);
     model.reweigh(&first.x, &first.at);
     let second = minimise(&model, &first.x)?;
     model.reweigh(&second.x, &second.at);
     let fitted = minimise(&model, &second.x)?;
-    let residuals = model.remaining(&fitted.x, &fitted.at);
-    let values = residuals.iter().map(|channels| channels.values().count()).sum();
     let blocks = model.blocks();
     let data = blocks.last().map_or(0, |block| block.end);
     let mut covariance = robust(&fitted.jacobian, &fitted.residuals, &blocks, WIDENED)?;
     consider(&mut covariance, &fitted.jacobian, data, CREEP, creep.deviation)?;
-    Ok(Contact {
-        covariance,
-        noise: model.noise(&fitted.x, &fitted.at),
-        courses: fitted.at,
-        x: fitted.x,
-        residuals,
-        values,
-    })
+    let residuals = model.remaining(&fitted.x, &fitted.at);
+    Ok(Contact { covariance, trajectories: fitted.at, x: fitted.x, residuals })
 }

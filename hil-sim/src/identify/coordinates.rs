@@ -2,7 +2,7 @@
 //! matters, the rest in units of about their tolerance; and what is known of each before
 //! any log is read.
 
-use nalgebra_lm::DMatrix;
+use nalgebra::DMatrix;
 
 use crate::plant::draw::PlantParameters;
 use crate::plant::ring::RingParameters;

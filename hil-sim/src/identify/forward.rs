@@ -1,10 +1,12 @@
-//! The forward model: the plant's ring led through a log by the recorded turn of the
-//! wheel and the recorded preload. It answers with the compression, the height of the
-//! centre and the traction that such a tread would have shown.
+//! The forward model: the plant's ring follows a log's wheel rotation and preload. It
+//! gives the compression, the height of the centre and the traction that such a tread
+//! would have shown.
 //!
-//! Motor and pre-tightener are thus no part of it: their errors do not add up along the
-//! way. Derivatives are differences of runs. Steps act only where they stand, so one run
-//! with all of them moved gives the derivatives by each.
+//! Motor and pre-tightener are no part of it, so their errors do not accumulate over the
+//! travel. Derivatives are central differences of simulations. A step acts only near
+//! itself, so one pair of simulations with all steps moved gives the derivatives by each.
+
+use std::ops::Range;
 
 use rayon::prelude::*;
 
@@ -14,36 +16,24 @@ use super::coordinates::{
 };
 use super::record::{Record, TICK_S};
 use super::traces::{Traces, at};
-use crate::plant::arm::Arm;
 use crate::plant::draw::PlantParameters;
-use crate::plant::rig::{PlantError, Resolution, VirtualRig};
+use crate::plant::rig::{PlantError, VirtualRig};
 
-/// How finely the forward model is computed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Fineness {
-    /// Elements of the ring.
-    pub elements: usize,
-    /// Longest way of a ring step, mm.
-    pub stride_mm: f64,
-    /// Step, ticks.
-    pub step: usize,
-}
+/// Step of the forward model, ticks.
+const STEP: usize = 2;
 
-impl Default for Fineness {
-    fn default() -> Self {
-        Self { elements: 1440, stride_mm: 0.04, step: 2 }
-    }
-}
+/// Series of a [`Trajectory`]: compression, mm, height of the centre, mm, traction, N,
+/// and position, mm.
+const COMPRESSION: usize = 0;
+const HEIGHT: usize = 1;
+const TRACTION: usize = 2;
+const POSITION: usize = 3;
 
-/// What the forward model says, every so many ticks.
+/// What the forward model gives, every [`STEP`] ticks, or a change of it.
 #[derive(Clone, Debug)]
-pub struct Course {
+pub struct Trajectory {
     first: usize,
-    step: usize,
-    compression_mm: Vec<f64>,
-    height_mm: Vec<f64>,
-    traction_n: Vec<f64>,
-    position_mm: Vec<f64>,
+    series: [Vec<f64>; 4],
     most_utilisation: f64,
 }
 
@@ -53,44 +43,30 @@ pub struct Run {
     /// Where it begins, mm.
     start_mm: f64,
     arm_delay: f64,
-    tread_delay: f64,
-    arm: Arm,
-    wall_radius_mm: f64,
-    stall_n: f64,
-    no_load_mm_s: f64,
-    reflected_kg: f64,
+    compression_delay: f64,
+    nominal: PlantParameters,
     /// The record's traces.
     pub traces: Traces,
     /// Its name.
     pub name: String,
 }
 
-/// What is compared: one value a used bin, by channel.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Channels {
-    /// Compression, mm.
-    pub compression: Vec<f64>,
-    /// Arm angle, mrad.
-    pub arm: Vec<f64>,
-    /// Drive effort, N.
-    pub effort: Vec<f64>,
+/// What is compared, one value a used bin: compression, mm, arm angle, mrad, and drive
+/// effort, N.
+pub type Channels = [Vec<f64>; 3];
+
+/// Names of the channels, with their units.
+pub const CHANNELS: [(&str, &str); 3] =
+    [("compression", "mm"), ("arm angle", "mrad"), ("drive effort", "N")];
+
+/// `of` of each pair of values.
+fn combined(a: &Channels, b: &Channels, of: impl Fn(f64, f64) -> f64) -> Channels {
+    std::array::from_fn(|i| a[i].iter().zip(&b[i]).map(|(a, b)| of(*a, *b)).collect())
 }
 
-impl Channels {
-    /// All values, channel after channel.
-    pub fn values(&self) -> impl Iterator<Item = f64> + '_ {
-        [&self.compression, &self.arm, &self.effort].into_iter().flatten().copied()
-    }
-
-    /// Names of the channels, with their units.
-    pub const NAMES: [(&'static str, &'static str); 3] =
-        [("compression", "mm"), ("arm angle", "mrad"), ("drive effort", "N")];
-
-    /// The channels in the order of their names.
-    #[must_use]
-    pub fn each(&self) -> [&[f64]; 3] {
-        [&self.compression, &self.arm, &self.effort]
-    }
+/// Difference of two channels' values, divided by `over`.
+pub(super) fn quotient(a: &Channels, b: &Channels, over: f64) -> Channels {
+    combined(a, b, |a, b| (a - b) * (1.0 / over))
 }
 
 impl Run {
@@ -99,134 +75,113 @@ impl Run {
     /// # Errors
     /// As of [`Traces::of`].
     pub fn of(record: &Record, coordinates: &Coordinates) -> Result<Self, super::IdentifyError> {
-        let nominal = coordinates.nominal();
         Ok(Self {
             start_mm: record.start_mm(),
             arm_delay: record.arm_delay_s / TICK_S,
-            tread_delay: record.scenario.noise.tread_delay_s / TICK_S,
-            arm: nominal.arm,
-            wall_radius_mm: nominal.wall_radius_mm,
-            stall_n: nominal.drive.stall_n,
-            no_load_mm_s: nominal.drive.no_load_mm_s,
-            reflected_kg: nominal.drive.mass_kg,
+            compression_delay: record.scenario.noise.tread_delay_s / TICK_S,
+            nominal: coordinates.nominal().clone(),
             traces: Traces::of(record)?,
             name: record.name.clone(),
         })
     }
 
-    /// Leads the plant of these parameters through the record.
+    /// Simulates the record with the plant of these coordinates.
     ///
     /// # Errors
     /// [`PlantError`] where it has no balance.
-    pub fn lead(
-        &self,
-        plant: &PlantParameters,
-        load_gain: f64,
-        fineness: Fineness,
-    ) -> Result<Course, PlantError> {
-        let traces = &self.traces;
+    pub fn simulate(&self, of: &Coordinates, x: &[f64]) -> Result<Trajectory, PlantError> {
+        let (traces, plant) = (&self.traces, of.plant(x));
         let (first, last) = (traces.span.start, traces.span.end - 1);
-        let step = fineness.step;
-        let dt = step as f64 * TICK_S;
-        let mut plant = plant.clone();
-        plant.ring.elements = fineness.elements;
+        let dt_s = STEP as f64 * TICK_S;
         let radius = plant.ring.radius_mm;
-        let preload = |tick: usize| traces.preload_n[tick] / load_gain;
-        let mut rig = VirtualRig::new(plant, self.start_mm, preload(first), dt)
-            .with_resolution(Resolution { stride_mm: fineness.stride_mm, always_awake: false });
-        let count = (last - first) / step + 1;
-        let mut course = Course {
-            first,
-            step,
-            compression_mm: Vec::with_capacity(count),
-            height_mm: Vec::with_capacity(count),
-            traction_n: Vec::with_capacity(count),
-            position_mm: Vec::with_capacity(count),
-            most_utilisation: 0.0,
-        };
-        course.note(&rig);
-        for k in 1..count {
-            let (from, to) = (first + (k - 1) * step, first + k * step);
-            let tread = radius * (traces.turn_rad[to] - traces.turn_rad[from]) / dt;
-            rig.follow(tread, preload(to), dt)?;
-            course.note(&rig);
+        let gain = x[LOAD_GAIN].exp();
+        let preload = |tick: usize| traces.preload_n[tick] / gain;
+        let mut rig = VirtualRig::new(plant, self.start_mm, preload(first), dt_s);
+        let count = (last - first) / STEP + 1;
+        let series = [(); 4].map(|()| Vec::with_capacity(count));
+        let mut trajectory = Trajectory { first, series, most_utilisation: 0.0 };
+        trajectory.note(&rig);
+        for to in (first..=last).step_by(STEP).skip(1) {
+            let turn = traces.turn_rad[to] - traces.turn_rad[to - STEP];
+            rig.follow(radius * turn / dt_s, preload(to), dt_s)?;
+            trajectory.note(&rig);
         }
-        Ok(course)
+        Ok(trajectory)
     }
 
-    /// What the sensors would have said in the used bins.
+    /// What the sensors would have shown in the used bins.
     #[must_use]
-    pub fn said(&self, course: &Course, x: &[f64]) -> Channels {
-        let traces = &self.traces;
-        let mut said = Channels::default();
-        for bin in traces.bins.iter().filter(|bin| bin.used) {
-            let depth = course.mean(&course.compression_mm, &bin.ticks, self.tread_delay);
-            said.compression.push(depth * x[TREAD_GAIN].exp());
+    pub fn predicted(&self, of: &Trajectory, x: &[f64]) -> Channels {
+        let [mut compression, mut arm, mut effort] = Channels::default();
+        let (plant, radius) = (&self.nominal, x[RADIUS]);
+        for bin in self.traces.bins.iter().filter(|bin| bin.used) {
+            let depth = of.mean(COMPRESSION, &bin.ticks, self.compression_delay);
+            compression.push(depth * x[TREAD_GAIN].exp());
             if bin.arm_rad.is_some() {
-                let height = course.mean(&course.height_mm, &bin.ticks, self.arm_delay);
-                said.arm.push(1e3 * self.arm.angle(self.wall_radius_mm - height) + x[ARM_ZERO]);
+                let height = of.mean(HEIGHT, &bin.ticks, self.arm_delay);
+                arm.push(1e3 * plant.arm.angle(plant.wall_radius_mm - height) + x[ARM_ZERO]);
             }
         }
-        let radius = x[RADIUS];
-        for effort in traces.efforts.iter().filter(|effort| effort.used) {
-            let sense = effort.turn_rad_s.signum();
-            // The worm gear holds what would help.
-            let traction = course.mean(&course.traction_n, &effort.ticks, 0.0) * sense;
-            let inertia = 1e-3 * self.reflected_kg * effort.gain_rad_s2 * radius;
-            let loss = self.stall_n * effort.turn_rad_s * radius / self.no_load_mm_s;
+        for bin in self.traces.efforts.iter().filter(|effort| effort.used) {
+            let sense = bin.turn_rad_s.signum();
+            // The worm gear holds a load along the motion.
+            let traction = of.mean(TRACTION, &bin.ticks, 0.0) * sense;
+            let inertia = 1e-3 * plant.drive.mass_kg * bin.gain_rad_s2 * radius;
+            let loss = plant.drive.stall_n * bin.turn_rad_s * radius / plant.drive.no_load_mm_s;
             let force = sense * (traction.max(0.0) + x[GEARBOX]) + inertia;
-            said.effort.push(force / x[DRIVE].exp() + loss);
+            effort.push(force / x[DRIVE].exp() + loss);
         }
-        said
+        [compression, arm, effort]
     }
 
-    /// What the sensors did say there.
+    /// What the sensors did show there.
     #[must_use]
-    pub fn heard(&self) -> Channels {
+    pub fn measured(&self) -> Channels {
         let used = self.traces.bins.iter().filter(|bin| bin.used);
         let efforts = self.traces.efforts.iter().filter(|effort| effort.used);
-        Channels {
-            compression: used.clone().map(|bin| bin.compression_mm).collect(),
-            arm: used.filter_map(|bin| bin.arm_rad).map(|arm| 1e3 * arm).collect(),
-            effort: efforts.map(|effort| self.stall_n * effort.duty).collect(),
-        }
+        [
+            used.clone().map(|bin| bin.compression_mm).collect(),
+            used.filter_map(|bin| bin.arm_rad).map(|arm| 1e3 * arm).collect(),
+            efforts.map(|effort| self.nominal.drive.stall_n * effort.duty).collect(),
+        ]
     }
 
     /// Times of the values of each channel, s.
     #[must_use]
     pub fn times(&self) -> Channels {
-        let mid = |ticks: &std::ops::Range<usize>| 0.5e-3 * (ticks.start + ticks.end) as f64;
+        let mid = |ticks: &Range<usize>| 0.5e-3 * (ticks.start + ticks.end) as f64;
         let used = self.traces.bins.iter().filter(|bin| bin.used);
         let efforts = self.traces.efforts.iter().filter(|effort| effort.used);
-        Channels {
-            compression: used.clone().map(|bin| mid(&bin.ticks)).collect(),
-            arm: used.filter(|bin| bin.arm_rad.is_some()).map(|bin| mid(&bin.ticks)).collect(),
-            effort: efforts.map(|effort| mid(&effort.ticks)).collect(),
-        }
+        [
+            used.clone().map(|bin| mid(&bin.ticks)).collect(),
+            used.filter(|bin| bin.arm_rad.is_some()).map(|bin| mid(&bin.ticks)).collect(),
+            efforts.map(|effort| mid(&effort.ticks)).collect(),
+        ]
     }
 }
 
-impl Course {
+impl Trajectory {
     fn note(&mut self, rig: &VirtualRig) {
         let truth = rig.truth();
-        self.compression_mm.push(truth.depth_mm);
-        self.height_mm.push(truth.height_mm);
-        self.traction_n.push(rig.traction_n());
-        self.position_mm.push(truth.position_mm);
+        let now = [truth.depth_mm, truth.height_mm, rig.traction_n(), truth.position_mm];
+        self.series.iter_mut().zip(now).for_each(|(series, value)| series.push(value));
         self.most_utilisation = self.most_utilisation.max(truth.utilisation.abs());
     }
 
-    /// Mean over the readings of a bin, each `delay` ticks old.
-    fn mean(&self, values: &[f64], ticks: &std::ops::Range<usize>, delay: f64) -> f64 {
-        let place = |tick: usize| (tick as f64 - delay - self.first as f64) / self.step as f64;
-        let sum: f64 = ticks.clone().map(|tick| at(values, place(tick))).sum();
+    /// Mean of a series over the readings of a bin, each `delay` ticks old.
+    fn mean(&self, series: usize, ticks: &Range<usize>, delay: f64) -> f64 {
+        let sum: f64 = ticks.clone().map(|tick| self.at(series, tick as f64 - delay)).sum();
         sum / ticks.len() as f64
+    }
+
+    fn at(&self, series: usize, tick: f64) -> f64 {
+        at(&self.series[series], (tick - self.first as f64) / STEP as f64)
     }
 
     /// Height of the centre above the outermost wall at a tick, mm.
     #[must_use]
     pub fn height_mm(&self, tick: f64) -> f64 {
-        at(&self.height_mm, (tick - self.first as f64) / self.step as f64)
+        self.at(HEIGHT, tick)
     }
 
     /// Largest friction utilisation.
@@ -235,54 +190,21 @@ impl Course {
         self.most_utilisation
     }
 
-    /// This course with `change` per unit of a coordinate added.
+    /// Each value replaced by what `of` gives for its series, its index and itself.
+    fn map(&self, of: impl Fn(usize, usize, f64) -> f64) -> Self {
+        let each =
+            |i: usize| self.series[i].iter().enumerate().map(|(k, v)| of(i, k, *v)).collect();
+        Self { series: std::array::from_fn(each), ..*self }
+    }
+
+    /// This with a part of a change added.
     fn plus(&self, change: &Self, part: f64) -> Self {
-        let add = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a + part * b).collect();
-        Self {
-            compression_mm: add(&self.compression_mm, &change.compression_mm),
-            height_mm: add(&self.height_mm, &change.height_mm),
-            traction_n: add(&self.traction_n, &change.traction_n),
-            position_mm: add(&self.position_mm, &change.position_mm),
-            ..self.clone()
-        }
-    }
-
-    /// Difference quotient of two courses.
-    fn per(&self, base: &Self, change: f64) -> Self {
-        self.plus(base, -1.0).scaled(1.0 / change)
-    }
-
-    fn scaled(&self, factor: f64) -> Self {
-        let zero = Self {
-            compression_mm: vec![0.0; self.compression_mm.len()],
-            height_mm: vec![0.0; self.height_mm.len()],
-            traction_n: vec![0.0; self.traction_n.len()],
-            position_mm: vec![0.0; self.position_mm.len()],
-            ..self.clone()
-        };
-        zero.plus(self, factor)
-    }
-
-    /// The part of a change that belongs to step `index` of those that stand at `stand`.
-    fn near(&self, positions: &[f64], stand: &[f64], index: usize) -> Self {
-        let after = |x: f64| index == 0 || is_behind(stand, x, index - 1);
-        let here: Vec<bool> =
-            positions.iter().map(|&x| after(x) && !is_behind(stand, x, index)).collect();
-        let cut = |values: &[f64]| {
-            values.iter().zip(&here).map(|(v, here)| if *here { *v } else { 0.0 }).collect()
-        };
-        Self {
-            compression_mm: cut(&self.compression_mm),
-            height_mm: cut(&self.height_mm),
-            traction_n: cut(&self.traction_n),
-            position_mm: cut(&self.position_mm),
-            ..self.clone()
-        }
+        self.map(|i, k, value| value + part * change.series[i][k])
     }
 }
 
-/// Coordinates by which runs are differenced, and by how much to either side: so far that
-/// the ring's elements, which meet a corner one by one, do not show.
+/// Coordinates by which simulations are differenced, and by how much to either side: so
+/// far that the ring's elements, which meet a corner one by one, do not show.
 const MOVED: [(usize, f64); 7] = [
     (STIFFNESS, 0.01),
     (STIFFENING, 0.01),
@@ -292,30 +214,27 @@ const MOVED: [(usize, f64); 7] = [
     (RADIUS, 0.04),
     (CREEP, 0.05),
 ];
-/// By how much the steps are, mm.
-const MOVED_POSITION_MM: f64 = 0.03;
-const MOVED_HEIGHT_MM: f64 = 0.03;
+/// By how much the steps are moved, mm, in position and height.
+const MOVED_STEPS_MM: f64 = 0.03;
 
-/// How far before its face a corner is felt, mm, and the part of what is left between two
-/// steps that belongs to the first, whose edge the patch has to leave.
+/// How far before its face a corner acts, mm, and the part of the rest between two steps
+/// that belongs to the first, whose edge the patch has to leave.
 const CORNER_MM: f64 = 14.5;
 const PART_OF_CLEAR: f64 = 0.8;
 
-/// Courses of all runs at these coordinates.
+/// Trajectories of all runs at these coordinates.
 ///
 /// # Errors
 /// [`PlantError`] where one has no balance.
-pub fn courses(
+pub fn simulate(
     runs: &[Run],
     coordinates: &Coordinates,
     x: &[f64],
-    fineness: Fineness,
-) -> Result<Vec<Course>, PlantError> {
-    let plant = coordinates.plant(x);
-    runs.par_iter().map(|run| run.lead(&plant, x[LOAD_GAIN].exp(), fineness)).collect()
+) -> Result<Vec<Trajectory>, PlantError> {
+    runs.par_iter().map(|run| run.simulate(coordinates, x)).collect()
 }
 
-/// Derivatives of what a run would have said by each coordinate.
+/// Derivatives of what a run's sensors would have shown by each coordinate.
 ///
 /// # Errors
 /// [`PlantError`] where a changed plant has no balance.
@@ -323,119 +242,88 @@ pub fn derivatives(
     run: &Run,
     coordinates: &Coordinates,
     x: &[f64],
-    base: &Course,
-    fineness: Fineness,
+    base: &Trajectory,
 ) -> Result<Vec<Channels>, PlantError> {
-    let steps = coordinates.steps();
-    let moved = |indices: &[usize], by: f64| {
-        let mut x = x.to_vec();
-        for &index in indices {
-            x[index] += by;
-        }
-        run.lead(&coordinates.plant(&x), x[LOAD_GAIN].exp(), fineness)
-    };
-    let mut changes: Vec<(Vec<usize>, f64)> =
+    let steps = 0..coordinates.steps();
+    let mut moves: Vec<(Vec<usize>, f64)> =
         MOVED.iter().map(|&(index, by)| (vec![index], by)).collect();
-    changes.push(((0..steps).map(|step| coordinates.position(step)).collect(), MOVED_POSITION_MM));
-    changes.push(((0..steps).map(|step| coordinates.height(step)).collect(), MOVED_HEIGHT_MM));
-    let quotient = |(indices, by): &(Vec<usize>, f64)| {
-        let (up, down) = (moved(indices, *by)?, moved(indices, -by)?);
-        Ok(up.per(&down, 2.0 * by))
+    moves.push((steps.clone().map(|s| coordinates.position(s)).collect(), MOVED_STEPS_MM));
+    moves.push((steps.map(|step| coordinates.height(step)).collect(), MOVED_STEPS_MM));
+    let difference = |(indices, by): &(Vec<usize>, f64)| {
+        let moved = |by: f64| {
+            let mut x = x.to_vec();
+            indices.iter().for_each(|&index| x[index] += by);
+            run.simulate(coordinates, &x)
+        };
+        let (up, down) = (moved(*by)?, moved(-by)?);
+        let factor = 1.0 / (2.0 * by);
+        Ok(up.map(|i, k, value| (value - down.series[i][k]) * factor))
     };
-    let changes: Vec<Course> =
-        changes.par_iter().map(quotient).collect::<Result<_, PlantError>>()?;
-    let said = run.said(base, x);
-    // By a small part of a course's change: the geometry of the arm is not linear.
-    let by_course = |change: &Course| {
+    let changes: Vec<Trajectory> =
+        moves.par_iter().map(difference).collect::<Result<_, PlantError>>()?;
+    let predicted = run.predicted(base, x);
+    // By a small part of the change: the geometry of the arm is not linear.
+    let by_change = |change: &Trajectory| {
         const PART: f64 = 1e-3;
-        run.said(&base.plus(change, PART), x).minus(&said).scaled(1.0 / PART)
+        quotient(&run.predicted(&base.plus(change, PART), x), &predicted, PART)
     };
-    let mut columns = vec![said.scaled(0.0); x.len()];
+    // Of what the sensors make of the same trajectory.
+    let by_sensors = |index: usize, by: f64| {
+        let mut moved = x.to_vec();
+        moved[index] += by;
+        quotient(&run.predicted(base, &moved), &predicted, by)
+    };
+    let mut columns = vec![Channels::default(); x.len()];
     for (&(index, _), change) in MOVED.iter().zip(&changes) {
-        columns[index] = by_course(change);
+        columns[index] = by_change(change);
     }
-    // The radius is in the turn's way of the drive, too.
-    columns[RADIUS] = columns[RADIUS].plus(&by_coordinate(run, base, x, RADIUS, 1e-3));
+    // The drive's effort depends on the radius, too.
+    columns[RADIUS] = combined(&columns[RADIUS], &by_sensors(RADIUS, 1e-3), |a, b| a + b);
     for index in [GEARBOX, TREAD_GAIN, ARM_ZERO, DRIVE] {
-        columns[index] = by_coordinate(run, base, x, index, 1e-4);
+        columns[index] = by_sensors(index, 1e-4);
     }
     // All forces scaled alike change no geometry: a load cell that reads high is a
     // stiffer tread under a larger load, its forces taken too large.
     let (stiffer, loaded) = (&changes[0], &changes[4]);
     let mut scaled = stiffer.plus(loaded, 1.0);
-    for (change, traction) in scaled.traction_n.iter_mut().zip(&base.traction_n) {
+    for (change, traction) in scaled.series[TRACTION].iter_mut().zip(&base.series[TRACTION]) {
         *change -= traction;
     }
-    columns[LOAD_GAIN] = by_course(&scaled);
-    step_columns(coordinates, x, base, &changes[MOVED.len()..], &mut columns, by_course);
+    columns[LOAD_GAIN] = by_change(&scaled);
+    step_columns(coordinates, x, base, &changes[MOVED.len()..], &mut columns, by_change);
     Ok(columns)
-}
-
-/// Whether a wheel at `x` has nothing to do with step `index` any more: past its face by
-/// most of the way that is left to the corner of the next.
-fn is_behind(stand: &[f64], x: f64, index: usize) -> bool {
-    let clear = |next: &f64| PART_OF_CLEAR * (next - stand[index] - CORNER_MM).max(0.0);
-    stand.get(index + 1).is_some_and(|next| x > stand[index] + clear(next))
 }
 
 fn step_columns(
     coordinates: &Coordinates,
     x: &[f64],
-    base: &Course,
-    changes: &[Course],
+    base: &Trajectory,
+    changes: &[Trajectory],
     columns: &mut [Channels],
-    by_course: impl Fn(&Course) -> Channels,
+    by_change: impl Fn(&Trajectory) -> Channels,
 ) {
-    let steps = coordinates.steps();
-    let scale = coordinates.scale(x);
-    let stand: Vec<f64> = (0..steps).map(|step| scale * x[coordinates.position(step)]).collect();
-    let (by_position, mut by_height) = (&changes[0], changes[1].clone());
-    // Heights add up along the way: each step alone, above the wall before it.
-    let before = |x: f64, index: usize| is_behind(&stand, x, index);
-    let positions = &base.position_mm;
-    for (height, &x) in by_height.height_mm.iter_mut().zip(positions) {
-        *height -= (0..steps).filter(|&index| before(x, index)).count() as f64;
-    }
-    for index in 0..steps {
-        columns[coordinates.position(index)] =
-            by_course(&by_position.near(positions, &stand, index));
-        let mut change = by_height.near(positions, &stand, index);
-        for (height, &x) in change.height_mm.iter_mut().zip(positions) {
-            if before(x, index) {
-                *height += 1.0;
-            }
-        }
-        columns[coordinates.height(index)] = by_course(&change);
-    }
-}
-
-fn by_coordinate(run: &Run, base: &Course, x: &[f64], index: usize, by: f64) -> Channels {
-    let mut moved = x.to_vec();
-    moved[index] += by;
-    run.said(base, &moved).minus(&run.said(base, x)).scaled(1.0 / by)
-}
-
-impl Channels {
-    fn with(&self, other: &Self, of: impl Fn(f64, f64) -> f64) -> Self {
-        let each = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| of(*a, *b)).collect();
-        Self {
-            compression: each(&self.compression, &other.compression),
-            arm: each(&self.arm, &other.arm),
-            effort: each(&self.effort, &other.effort),
-        }
-    }
-
-    /// Difference.
-    #[must_use]
-    pub fn minus(&self, other: &Self) -> Self {
-        self.with(other, |a, b| a - b)
-    }
-
-    fn plus(&self, other: &Self) -> Self {
-        self.with(other, |a, b| a + b)
-    }
-
-    fn scaled(&self, factor: f64) -> Self {
-        self.with(self, |a, _| a * factor)
+    let (steps, scale) = (coordinates.steps(), coordinates.scale(x));
+    let faces: Vec<f64> = (0..steps).map(|step| scale * x[coordinates.position(step)]).collect();
+    // Whether a wheel has left a step behind: past its face by most of what is left to the
+    // corner of the next.
+    let is_behind = |k: usize, step: usize| {
+        let clear = |next: &f64| PART_OF_CLEAR * (next - faces[step] - CORNER_MM).max(0.0);
+        let past = |next: &f64| base.series[POSITION][k] > faces[step] + clear(next);
+        faces.get(step + 1).is_some_and(past)
+    };
+    // The part of a change that belongs to a step.
+    let belongs =
+        |k: usize, step: usize| (step == 0 || is_behind(k, step - 1)) && !is_behind(k, step);
+    // Heights add up over the travel: each step alone, above the wall before it.
+    let lower = |k: usize| (0..steps).filter(|&step| is_behind(k, step)).count() as f64;
+    let by_height = changes[1].map(|i, k, v| if i == HEIGHT { v - lower(k) } else { v });
+    for step in 0..steps {
+        let part = |k: usize, value: f64| if belongs(k, step) { value } else { 0.0 };
+        columns[coordinates.position(step)] =
+            by_change(&changes[0].map(|_, k, value| part(k, value)));
+        columns[coordinates.height(step)] = by_change(&by_height.map(|i, k, value| {
+            let raised = i == HEIGHT && is_behind(k, step);
+            part(k, value) + if raised { 1.0 } else { 0.0 }
+        }));
     }
 }

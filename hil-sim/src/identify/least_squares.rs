@@ -1,18 +1,18 @@
 //! Nonlinear least squares by Levenberg and Marquardt (MINPACK's form, by the crate of
-//! that name), for models that are dear to evaluate.
+//! that name), for models that are costly to evaluate.
 
 use std::ops::Range;
 
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt, TerminationReason};
-use nalgebra_lm::storage::Owned;
-use nalgebra_lm::{DMatrix, DVector, Dyn};
+use nalgebra::storage::Owned;
+use nalgebra::{DMatrix, DVector, Dyn};
 
 use super::IdentifyError;
 
 /// Relative change of the sum of squares, and of the coordinates, at which it has settled.
 const SETTLED: f64 = 1e-6;
 /// Most evaluations, in units of the number of coordinates.
-const PATIENCE: usize = 30;
+const MOST_EVALUATIONS: usize = 30;
 
 /// What is fitted.
 pub trait Model {
@@ -82,7 +82,7 @@ pub fn minimise<M: Model>(model: &M, start: &[f64]) -> Result<Fitted<M::At>, Ide
         .with_ftol(SETTLED)
         .with_xtol(SETTLED)
         .with_gtol(SETTLED)
-        .with_patience(PATIENCE);
+        .with_patience(MOST_EVALUATIONS);
     let (problem, report) = solver.minimize(problem);
     let settled = report.termination.was_successful()
         || matches!(report.termination, TerminationReason::NoImprovementPossible(_));

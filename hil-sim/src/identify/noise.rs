@@ -1,5 +1,5 @@
-//! What residuals say of their own noise: its size, and how many of them count as one
-//! because neighbours err alike.
+//! Noise of residuals: its size, and how many of them count as one because neighbours are
+//! correlated.
 
 /// Standard deviation about zero of residuals, and how much their correlation adds to the
 /// variance of a mean.

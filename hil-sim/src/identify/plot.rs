@@ -1,10 +1,10 @@
-//! What was left over, as a picture a log: a row a channel, with the band that 95 % of
-//! the residuals would fill if they were what their root mean square says.
+//! Residuals as a plot a log: a row a channel, with the band that would hold 95 % of them
+//! if they were normal with their root mean square.
 
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
-use super::result::{Left, NORMAL_95};
+use super::result::{NORMAL_95, Residuals};
 use crate::report::axis::{Scale, extent, label, padded, ticks};
 use crate::report::svg::{Area, Drawn, SCALE, fixed, font};
 use crate::report::{mesh, palette};
@@ -20,8 +20,8 @@ const LEFT: i32 = 78 * S;
 
 /// The residuals of a log as SVG.
 #[must_use]
-pub fn svg(rows: &[&Left]) -> String {
-    let times = rows.iter().flat_map(|row| row.course.iter().map(|(t, _)| *t));
+pub fn svg(rows: &[&Residuals]) -> String {
+    let times = rows.iter().flat_map(|row| row.series.iter().map(|(t, _)| *t));
     let x = padded(extent(times).unwrap_or((0.0, 1.0)), 0.01);
     fixed((WIDTH, ROW * rows.len() as u32), |area| {
         let cells = area.split_evenly((rows.len().max(1), 1));
@@ -41,7 +41,7 @@ fn colour(channel: &str) -> RGBColor {
     }
 }
 
-fn draw(row: &Left, x: (f64, f64), last: bool, cell: &Area) -> Drawn {
+fn draw(row: &Residuals, x: (f64, f64), last: bool, cell: &Area) -> Drawn {
     let (head, body) = cell.split_vertically(TITLE * SCALE);
     let title = format!(
         "{}, {}: rms {:.2e} {}, {} values, {:.0} of them independent",
@@ -50,7 +50,7 @@ fn draw(row: &Left, x: (f64, f64), last: bool, cell: &Area) -> Drawn {
     let style = font(TITLE_PX, palette::TEXT, HPos::Left, VPos::Center);
     head.draw(&Text::new(title, (LEFT, (TITLE * SCALE) as i32 / 2), style))?;
     let band = NORMAL_95 * row.rms;
-    let values = row.course.iter().map(|(_, r)| *r).chain([-1.2 * band, 1.2 * band]);
+    let values = row.series.iter().map(|(_, r)| *r).chain([-1.2 * band, 1.2 * band]);
     let y = padded(extent(values).unwrap_or((-1.0, 1.0)), 0.05);
     let (x_ticks, x_decimals) = ticks(x, 12);
     let (y_ticks, y_decimals) = ticks(y, 4);
@@ -68,7 +68,7 @@ fn draw(row: &Left, x: (f64, f64), last: bool, cell: &Area) -> Drawn {
         .y_desc(row.unit)
         .draw()?;
     let dot = |&(t, r): &(f64, f64)| Circle::new((t, r), 3, colour(row.channel).filled());
-    chart.draw_series(row.course.iter().map(dot))?;
+    chart.draw_series(row.series.iter().map(dot))?;
     Ok(())
 }
 
@@ -78,14 +78,14 @@ mod tests {
 
     #[test]
     fn every_residual_is_drawn_and_the_channel_named() {
-        let row = |channel| Left {
+        let row = |channel| Residuals {
             log: "a.csv".into(),
             channel,
             unit: "mm",
             rms: 0.1,
             count: 3,
             independent: 2.0,
-            course: vec![(0.0, 0.1), (1.0, -0.1), (2.0, 0.05)],
+            series: vec![(0.0, 0.1), (1.0, -0.1), (2.0, 0.05)],
         };
         let (first, second) = (row("compression"), row("preload"));
         let svg = svg(&[&first, &second]);

@@ -1,10 +1,9 @@
 //! The fit to what the study publishes: three gaps, three parameters of the tread.
 //!
-//! Three points fit three parameters: nothing is left to tell how well, so there is neither
-//! a validation nor an interval. Nor do they fit exactly: at one speed the ratio of two
-//! gaps hardly depends on the tread, so that what is left over is the model's and no noise,
-//! and one combination of the three parameters is all but free. It is held to the
-//! scenario's tread within a factor of two.
+//! Three points fit three parameters: there is neither a validation nor an interval. Nor
+//! do they fit exactly. At one speed the ratio of two gaps hardly depends on the tread, so
+//! what remains is the model's error and no noise, and one combination of the three
+//! parameters is all but free. It is held to the scenario's tread within a factor of two.
 
 use rayon::prelude::*;
 
@@ -22,31 +21,18 @@ pub const CASES: [(f64, f64); 4] = [(5.0, 100.0), (5.0, 120.0), (8.0, 100.0), (3
 /// Fig. 15). Stiffness, stiffening and relaxation time of the tread are fitted to these.
 pub const AMPLITUDE_MM: [f64; 3] = [1.7079, 1.5567, 1.9014];
 
+/// Elements around the ring and axial travel per step, mm: gaps within 0.1 % of the
+/// converged ones.
+pub const CONVERGED: (usize, f64) = (2880, 0.01);
+
 /// Change of a logarithm for the differences.
 const MOVED: f64 = 0.02;
-/// What the ring errs by in a gap, relative: the unit of the deviations.
+/// The ring's own error in a gap, relative: the unit of the deviations.
 const GAP_REL: f64 = 1e-3;
-/// How far a parameter may lie from where it starts, logarithm: a factor of two.
+/// How far a parameter may lie from its start, logarithm: a factor of two.
 const FREE_LN: f64 = 0.7;
 /// The same of one that is held.
 const HELD_LN: f64 = 1e-6;
-
-/// How finely the ring is computed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Fineness {
-    /// Elements around the ring.
-    pub elements: usize,
-    /// Axial way per step, mm.
-    pub stride_mm: f64,
-}
-
-impl Fineness {
-    /// A coarse ring, about as coarse as that which the presets' tread may have been fitted
-    /// with.
-    pub const STATED: Self = Self { elements: 720, stride_mm: 0.05 };
-    /// Gaps within 0.1 % of the converged ones.
-    pub const CONVERGED: Self = Self { elements: 2880, stride_mm: 0.01 };
-}
 
 /// The tread that shows the published gaps.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,27 +50,24 @@ pub struct Tread {
 /// The three crossings, pushed without friction.
 struct Gaps<'a> {
     scenario: &'a Scenario,
-    fineness: Fineness,
+    fineness: (usize, f64),
     start: [f64; 3],
     /// How far each may lie from there, logarithm.
     free: [f64; 3],
 }
 
-impl<'a> Gaps<'a> {
-    fn of(scenario: &'a Scenario, fineness: Fineness) -> Self {
-        let tread = &scenario.rig.tread;
-        let start = [tread.k_inf_pa_per_m * 1e-9, tread.stiffening, tread.tau_s].map(f64::ln);
-        Self { scenario, fineness, start, free: [FREE_LN; 3] }
-    }
+impl Model for Gaps<'_> {
+    type At = Vec<f64>;
 
     /// Gaps over the published ones, less 1, for these logarithms.
-    fn deviations(&self, x: &[f64]) -> Option<Vec<f64>> {
+    fn at(&self, x: &[f64]) -> Option<Vec<f64>> {
+        let (elements, stride_mm) = self.fineness;
         let k_inf = x[0].exp();
         let ring = RingParameters {
             k_inf,
             k_0: k_inf * x[1].exp(),
             tau_s: x[2].exp(),
-            ..RingParameters::of(&self.scenario.rig, self.fineness.elements)
+            ..RingParameters::of(&self.scenario.rig, elements)
         };
         let deviation = |case: usize| {
             let (speed_mm_s, preload_n) = CASES[case];
@@ -94,19 +77,11 @@ impl<'a> Gaps<'a> {
                 speed_mm_s,
                 preload_n,
                 axial: Axial::Pushed,
-                stride_mm: self.fineness.stride_mm,
+                stride_mm,
             };
             cross(&crossing).ok().map(|result| result.gap_mm / AMPLITUDE_MM[case] - 1.0)
         };
         (0..3).into_par_iter().map(deviation).collect()
-    }
-}
-
-impl Model for Gaps<'_> {
-    type At = Vec<f64>;
-
-    fn at(&self, x: &[f64]) -> Option<Vec<f64>> {
-        self.deviations(x)
     }
 
     fn residuals(&self, x: &[f64], at: &Vec<f64>) -> Vec<f64> {
@@ -121,7 +96,7 @@ impl Model for Gaps<'_> {
             let at = |by: f64| {
                 let mut x = x.to_vec();
                 x[index] += by;
-                self.deviations(&x)
+                self.at(&x)
             };
             let (up, down) = (at(MOVED)?, at(-MOVED)?);
             let slope = |(u, d): (&f64, &f64)| (u - d) / (2.0 * MOVED * GAP_REL);
@@ -133,34 +108,39 @@ impl Model for Gaps<'_> {
     }
 }
 
+impl<'a> Gaps<'a> {
+    fn of(scenario: &'a Scenario, fineness: (usize, f64)) -> Self {
+        let tread = &scenario.rig.tread;
+        let start = [tread.k_inf_pa_per_m * 1e-9, tread.stiffening, tread.tau_s].map(f64::ln);
+        Self { scenario, fineness, start, free: [FREE_LN; 3] }
+    }
+}
+
 /// Fits the tread to the three published gaps by least squares of their relative
-/// deviations, from the scenario's tread on.
+/// deviations, from the scenario's tread on; with `hold`, its stiffening is held.
 ///
 /// # Errors
 /// [`IdentifyError::NoFit`] if it does not settle.
-pub fn fit(scenario: &Scenario, fineness: Fineness) -> Result<Tread, IdentifyError> {
-    let gaps = Gaps::of(scenario, fineness);
+pub fn fit(
+    scenario: &Scenario,
+    fineness: (usize, f64),
+    hold: bool,
+) -> Result<Tread, IdentifyError> {
+    let mut gaps = Gaps::of(scenario, fineness);
+    if hold {
+        gaps.free[1] = HELD_LN;
+    }
     let fitted = minimise(&gaps, &gaps.start)?;
     Ok(tread(&fitted.x, &fitted.at))
 }
 
-/// The same with the stiffening that the scenario has: two parameters, which the gaps tell.
-///
-/// # Errors
-/// [`IdentifyError::NoFit`] if it does not settle.
-pub fn fit_held(scenario: &Scenario, fineness: Fineness) -> Result<Tread, IdentifyError> {
-    let gaps = Gaps { free: [FREE_LN, HELD_LN, FREE_LN], ..Gaps::of(scenario, fineness) };
-    let fitted = minimise(&gaps, &gaps.start)?;
-    Ok(tread(&fitted.x, &fitted.at))
-}
-
-/// The scenario's own tread with what its gaps leave to the published ones.
+/// The scenario's own tread with the residuals of its gaps.
 ///
 /// # Errors
 /// [`IdentifyError::NoFit`] if a crossing has no balance.
-pub fn stated(scenario: &Scenario, fineness: Fineness) -> Result<Tread, IdentifyError> {
+pub fn stated(scenario: &Scenario, fineness: (usize, f64)) -> Result<Tread, IdentifyError> {
     let gaps = Gaps::of(scenario, fineness);
-    let at = gaps.deviations(&gaps.start);
+    let at = gaps.at(&gaps.start);
     let at = at.ok_or_else(|| IdentifyError::NoFit { why: "a crossing has no balance".into() })?;
     Ok(tread(&gaps.start, &at))
 }

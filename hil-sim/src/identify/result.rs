@@ -1,5 +1,5 @@
-//! What was identified: each parameter with its interval and what it was identified by,
-//! what was left over, and the scenario with the new values in it.
+//! What was identified: each parameter with its interval and its evidence, the residuals,
+//! and the scenario with the new values in it.
 
 use std::f64::consts::TAU as TURN;
 
@@ -12,7 +12,7 @@ use super::coordinates::{
     ARM_ZERO, CREEP, Coordinates, DRIVE, FRICTION, GEARBOX, LOAD, LOAD_GAIN, RADIUS, STIFFENING,
     STIFFNESS, TAU, TREAD_GAIN,
 };
-use super::forward::{Channels, Fineness, Run};
+use super::forward::{CHANNELS, Run};
 use super::noise::Noise;
 use super::record::Record;
 use super::traces::Zero;
@@ -20,11 +20,13 @@ use crate::scenario::Scenario;
 
 /// Half-width of a 95 % interval in standard deviations.
 pub const NORMAL_95: f64 = 1.96;
-/// What the logs must leave of what was known before for a parameter to count as
+/// Part of the prior deviation that the logs must leave for a parameter to count as
 /// identified: where nothing was known, and where a tolerance was.
 const LEAVES: (f64, f64) = (0.1, 0.5);
 /// Variance of a whole number of ticks that stands for any dead time, ms^2.
 const TICK_VARIANCE: f64 = 1.0 / 12.0;
+/// Evidence of a parameter that has none.
+const NOTHING: &str = "not in these logs";
 
 /// A parameter with its 95 % interval.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -33,21 +35,21 @@ pub struct Parameter {
     pub name: String,
     /// Unit; empty for ratios.
     pub unit: &'static str,
-    /// Value; the most likely one, whether the logs tell it well or not.
+    /// The most likely value, whether the logs determine it well or not.
     pub value: f64,
-    /// Lower end of the interval; none where nothing is left to tell it.
+    /// Lower end of the interval; none where nothing determines it.
     pub low: Option<f64>,
     /// Its upper end.
     pub high: Option<f64>,
-    /// Whether the logs tell it.
+    /// Whether the logs determine it.
     pub identified: bool,
-    /// What tells it, or why nothing does.
+    /// By what, or why not.
     pub by: String,
 }
 
-/// What was left over in a channel of a log.
+/// Residuals of a channel of a log.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Left {
+pub struct Residuals {
     /// The log.
     pub log: String,
     /// The channel.
@@ -62,7 +64,27 @@ pub struct Left {
     pub independent: f64,
     /// Time, s, and residual of each.
     #[serde(skip)]
-    pub course: Vec<(f64, f64)>,
+    pub series: Vec<(f64, f64)>,
+}
+
+impl Residuals {
+    fn of(
+        run: &Run,
+        (channel, unit): (&'static str, &'static str),
+        times: &[f64],
+        values: &[f64],
+    ) -> Self {
+        let noise = Noise::of(values);
+        Self {
+            log: run.name.clone(),
+            channel,
+            unit,
+            rms: noise.deviation,
+            count: values.len(),
+            independent: values.len() as f64 / noise.inflation,
+            series: times.iter().copied().zip(values.iter().copied()).collect(),
+        }
+    }
 }
 
 /// Everything that was identified.
@@ -70,11 +92,11 @@ pub struct Left {
 pub struct Identification {
     /// The parameters.
     pub parameters: Vec<Parameter>,
-    /// What was left over.
-    pub residuals: Vec<Left>,
+    /// The residuals.
+    pub residuals: Vec<Residuals>,
     /// Values compared less parameters fitted.
     pub degrees_of_freedom: usize,
-    /// What the logs could not tell, in sentences.
+    /// What the logs do not determine, in sentences.
     pub notes: Vec<String>,
     /// The scenario with what was identified.
     #[serde(skip)]
@@ -85,11 +107,7 @@ pub struct Identification {
 ///
 /// # Errors
 /// [`IdentifyError`] if a log cannot be used or the fit does not settle.
-pub fn identify(
-    records: &[Record],
-    scenario: &Scenario,
-    fineness: Fineness,
-) -> Result<Identification, IdentifyError> {
+pub fn identify(records: &[Record], scenario: &Scenario) -> Result<Identification, IdentifyError> {
     for record in records {
         let (its, ours) = (&record.scenario.rig, &scenario.rig);
         if its.rig != ours.rig || its.sense != ours.sense || its.drive != ours.drive {
@@ -104,18 +122,18 @@ pub fn identify(
     let coordinates = Coordinates::of(scenario);
     let runs: Vec<Run> =
         records.iter().map(|record| Run::of(record, &coordinates)).collect::<Result<_, _>>()?;
-    let contact = contact::fit(&runs, &coordinates, fineness)?;
-    let actuator = actuator::fit(records, &runs, &contact.courses, contact.x[RADIUS])?;
+    let contact = contact::fit(&runs, &coordinates)?;
+    let actuator = actuator::fit(records, &runs, &contact.trajectories, contact.x[RADIUS])?;
     let report = Report { scenario, coordinates: &coordinates, runs: &runs, contact: &contact };
     let mut parameters = report.contact_parameters();
     parameters.extend(report.actuator_parameters(&actuator));
     parameters.extend(report.zeros());
-    let compared: usize = actuator.residuals.iter().map(Vec::len).sum();
+    let compared = contact.residuals.iter().flatten().chain(&actuator.residuals).map(Vec::len);
     let fitted = contact.x.len() + actuator.x.len();
     Ok(Identification {
         scenario: updated(scenario, &parameters),
-        residuals: report.left(&actuator),
-        degrees_of_freedom: (contact.values + compared).saturating_sub(fitted),
+        residuals: report.residuals(&actuator),
+        degrees_of_freedom: compared.sum::<usize>().saturating_sub(fitted),
         notes: report.notes(&parameters),
         parameters,
     })
@@ -128,126 +146,86 @@ struct Report<'a> {
     contact: &'a Contact,
 }
 
-/// A coordinate on its way to a parameter.
-struct Shown {
-    index: usize,
-    name: String,
-    unit: &'static str,
-    by: &'static str,
-}
+/// A coordinate as a parameter: its index, name, unit and evidence.
+type Shown<'a> = (usize, &'a str, &'static str, &'a str);
 
 impl Report<'_> {
     /// The parameter of a coordinate: `of` takes it to the parameter's own unit.
-    fn parameter(&self, shown: Shown, of: impl Fn(f64) -> f64) -> Parameter {
-        let Shown { index, name, unit, by } = shown;
+    fn parameter(&self, (index, name, unit, by): Shown<'_>, of: &dyn Fn(f64) -> f64) -> Parameter {
         let (x, prior) = (self.contact.x[index], self.coordinates.priors()[index]);
         let deviation = self.contact.covariance[(index, index)].sqrt();
         let ends = [of(x - NORMAL_95 * deviation), of(x + NORMAL_95 * deviation)];
         let leaves = if prior.tolerance { LEAVES.1 } else { LEAVES.0 };
         let identified = deviation < leaves * prior.deviation;
         let by = match (identified, prior.tolerance) {
-            (true, _) => by.to_owned(),
-            (false, true) => "its tolerance".to_owned(),
-            (false, false) => "not in these logs".to_owned(),
+            (true, _) => by,
+            (false, true) => "its tolerance",
+            (false, false) => NOTHING,
         };
         Parameter {
-            name,
+            name: name.to_owned(),
             unit,
             value: of(x),
             low: Some(ends[0].min(ends[1])),
             high: Some(ends[0].max(ends[1])),
             identified,
-            by,
+            by: by.to_owned(),
         }
     }
 
     fn contact_parameters(&self) -> Vec<Parameter> {
-        let shown = |index, name: &str, unit, by| Shown { index, name: name.to_owned(), unit, by };
         let rig = &self.scenario.rig;
-        let share = rig.plant.top_load_share;
+        let share = rig.plant.top_load_share.max(1e-9);
         let zero_code = rig.sense.angle_zero_code;
-        let friction = "creep at the climbs, by its law";
+        let itself = |x: f64| x;
         let pressed = "compression under known preload, at rest";
-        let mut list = vec![
-            self.parameter(shown(STIFFNESS, "tread.k_inf_pa_per_m", "Pa/m", pressed), |x| {
-                1e9 * x.exp()
+        let rolling = "compression at rest and rolling";
+        let speeds = "compression and lift at several speeds";
+        let arm_zero = |mrad: f64| zero_code + 16_384.0 * 1e-3 * mrad / TURN;
+        let all: [(Shown<'_>, &dyn Fn(f64) -> f64); 12] = [
+            ((STIFFNESS, "tread.k_inf_pa_per_m", "Pa/m", pressed), &|x| 1e9 * x.exp()),
+            ((STIFFENING, "tread.stiffening", "", rolling), &f64::exp),
+            ((TAU, "tread.tau_s", "s", speeds), &f64::exp),
+            ((FRICTION, "plant.mu", "", "creep at the climbs, by its law"), &f64::exp),
+            ((LOAD, "plant.top_load_n", "N", "wedge of the arm and drive effort"), &|x| {
+                x.exp() / share
             }),
-            self.parameter(
-                shown(STIFFENING, "tread.stiffening", "", "compression at rest and rolling"),
-                f64::exp,
-            ),
-            self.parameter(
-                shown(TAU, "tread.tau_s", "s", "compression and lift at several speeds"),
-                f64::exp,
-            ),
-            self.parameter(shown(FRICTION, "plant.mu", "", friction), f64::exp),
-            self.parameter(
-                shown(LOAD, "plant.top_load_n", "N", "wedge of the arm and drive effort"),
-                |x| x.exp() / share.max(1e-9),
-            ),
-            self.parameter(
-                shown(GEARBOX, "gearbox friction", "N", "drive effort on the smooth wall"),
-                |x| x,
-            ),
-            self.parameter(
-                shown(RADIUS, "rig.wheel_radius_mm", "mm", "shape of the climbs"),
-                |x| x,
-            ),
-            self.parameter(
-                shown(LOAD_GAIN, "load cell gain", "", "loads against the drive"),
-                f64::exp,
-            ),
-            self.parameter(
-                shown(TREAD_GAIN, "displacement gain", "", "compression against the arm"),
-                f64::exp,
-            ),
-            self.parameter(
-                shown(CREEP, "plant.elastic_creep", "", "creep at the climbs"),
-                f64::exp,
-            ),
-            self.parameter(
-                shown(DRIVE, "drive force over nominal", "", "effort against load"),
-                f64::exp,
-            ),
-            self.parameter(
-                shown(ARM_ZERO, "sense.angle_zero_code", "codes", "arm angle at known radii"),
-                |mrad| zero_code + 16_384.0 * 1e-3 * mrad / TURN,
-            ),
+            ((GEARBOX, "gearbox friction", "N", "drive effort on the smooth wall"), &itself),
+            ((RADIUS, "rig.wheel_radius_mm", "mm", "shape of the climbs"), &itself),
+            ((LOAD_GAIN, "load cell gain", "", "loads against the drive"), &f64::exp),
+            ((TREAD_GAIN, "displacement gain", "", "compression against the arm"), &f64::exp),
+            ((CREEP, "plant.elastic_creep", "", "creep at the climbs"), &f64::exp),
+            ((DRIVE, "drive force over nominal", "", "effort against load"), &f64::exp),
+            ((ARM_ZERO, "sense.angle_zero_code", "codes", "arm angle at known radii"), &arm_zero),
         ];
+        let mut list: Vec<Parameter> =
+            all.into_iter().map(|(shown, of)| self.parameter(shown, of)).collect();
         for step in 0..self.coordinates.steps() {
-            let index = self.coordinates.position(step);
             let name = format!("rig.step_positions_mm[{}]", step + 1);
             let by = "turn of the wheel at the climb";
-            let turned = self.parameter(Shown { index, name, unit: "mm", by }, |x| x);
-            // The turn is told by the logs; the way, by the radius as well.
+            let index = self.coordinates.position(step);
+            let turned = self.parameter((index, &name, "mm", by), &itself);
+            // The logs determine the turn; the position depends on the radius as well.
             let (value, variance) =
                 self.coordinates.place(step, &self.contact.x, &self.contact.covariance);
             let half = NORMAL_95 * variance.sqrt();
-            list.push(Parameter {
-                value,
-                low: Some(value - half),
-                high: Some(value + half),
-                ..turned
-            });
+            let (low, high) = (Some(value - half), Some(value + half));
+            list.push(Parameter { value, low, high, ..turned });
         }
         for step in 0..self.coordinates.steps() {
-            let index = self.coordinates.height(step);
             let name = format!("rig.step_height_mm[{}]", step + 1);
-            list.push(self.parameter(
-                Shown { index, name, unit: "mm", by: "arm angle before and after" },
-                |x| x,
-            ));
+            let by = "arm angle before and after";
+            list.push(self.parameter((self.coordinates.height(step), &name, "mm", by), &itself));
         }
         list
     }
 
     fn actuator_parameters(&self, actuator: &Actuator) -> Vec<Parameter> {
-        // What the load cell scales: its gain, and how well that is known.
+        // The gain of the preload sensor scales forces and their intervals.
         let gain = self.contact.x[LOAD_GAIN].exp();
         let gain_variance = self.contact.covariance[(LOAD_GAIN, LOAD_GAIN)];
         let x = &actuator.x;
         let variance = |index: usize| actuator.covariance[(index, index)];
-        let by = "load cell against duty".to_owned();
         let of = |name: &str, unit, value: f64, low: f64, high: f64| Parameter {
             name: name.to_owned(),
             unit,
@@ -255,7 +233,7 @@ impl Report<'_> {
             low: Some(low),
             high: Some(high),
             identified: high - low < 0.5 * value.abs(),
-            by: by.clone(),
+            by: "load cell against duty".to_owned(),
         };
         let around = |name: &str, unit, value: f64, deviation: f64| {
             let half = NORMAL_95 * deviation;
@@ -277,8 +255,9 @@ impl Report<'_> {
         ]
     }
 
-    fn zeros(&self) -> Vec<Parameter> {
-        let of = |name: &str, unit, zeros: Vec<Zero>| {
+    fn zeros(&self) -> [Parameter; 2] {
+        let of = |name: &str, unit, pick: fn(&Run) -> Zero| {
+            let zeros: Vec<Zero> = self.runs.iter().map(pick).collect();
             // Weighted by their readings.
             let count: usize = zeros.iter().map(|zero| zero.count).sum();
             let n = count.max(1) as f64;
@@ -295,79 +274,49 @@ impl Report<'_> {
                 low: known.then_some(value - half),
                 high: known.then_some(value + half),
                 identified: known,
-                by: if known { "the unloaded rig" } else { "not in these logs" }.to_owned(),
+                by: if known { "the unloaded rig" } else { NOTHING }.to_owned(),
             }
         };
-        let each = |pick: fn(&Run) -> Zero| self.runs.iter().map(pick).collect();
-        vec![
-            of("load cell zero", "N", each(|run| run.traces.load_cell)),
-            of("displacement zero", "mm", each(|run| run.traces.tread)),
+        [
+            of("load cell zero", "N", |run| run.traces.preload_zero),
+            of("displacement zero", "mm", |run| run.traces.compression_zero),
         ]
     }
 
-    fn left(&self, actuator: &Actuator) -> Vec<Left> {
-        let mut left = Vec::new();
+    fn residuals(&self, actuator: &Actuator) -> Vec<Residuals> {
+        let mut all = Vec::new();
         for (index, run) in self.runs.iter().enumerate() {
             let (times, values) = (run.times(), &self.contact.residuals[index]);
-            let channels = Channels::NAMES.into_iter().zip(times.each()).zip(values.each());
-            for (((channel, unit), times), values) in channels {
-                left.push(of_channel(&run.name, (channel, unit), times, values));
-            }
+            let channels = CHANNELS.into_iter().zip(&times).zip(values);
+            all.extend(channels.map(|((name, times), of)| Residuals::of(run, name, times, of)));
             let (times, values) = (&actuator.times[index], &actuator.residuals[index]);
-            left.push(of_channel(&run.name, ("preload", "N"), times, values));
+            all.push(Residuals::of(run, ("preload", "N"), times, values));
         }
-        left
+        all
     }
 
     fn notes(&self, parameters: &[Parameter]) -> Vec<String> {
-        let mut notes = Vec::new();
-        let courses = &self.contact.courses;
-        let most = courses.iter().map(|c| c.most_utilisation()).fold(0.0, f64::max);
-        notes.push(format!(
+        let trajectories = self.contact.trajectories.iter();
+        let most = trajectories.map(|t| t.most_utilisation()).fold(0.0, f64::max);
+        let mut notes = vec![format!(
             "friction: the climbs used {most:.2}, so that it is at least that; the rest is what \
              their creep tells, given plant.elastic_creep"
-        ));
-        for run in self.runs.iter().filter(|run| run.traces.slip.is_some()) {
-            notes.push(format!(
-                "{}: slips at a step without getting up; what comes after is not compared",
-                run.name
-            ));
+        )];
+        notes.extend(self.runs.iter().filter(|run| run.traces.slips).map(|run| {
+            let name = &run.name;
+            format!("{name}: slips at a step without getting up; what comes after is not compared")
+        }));
+        if self.runs.iter().all(|run| run.traces.preload_zero.count == 0) {
+            let note = "no log begins with the rig unloaded: the sensors' zeros are taken for none";
+            notes.push(note.to_owned());
         }
-        if self.runs.iter().all(|run| run.traces.load_cell.count == 0) {
-            notes.push(
-                "no log begins with the rig unloaded: the sensors' zeros are taken for \
-                        none"
-                    .to_owned(),
-            );
-        }
-        for parameter in parameters.iter().filter(|p| !p.identified) {
-            if parameter.by == "not in these logs" {
-                notes.push(format!("{}: not in these logs, left as it was", parameter.name));
-            }
-        }
+        let left = parameters.iter().filter(|p| !p.identified && p.by == NOTHING);
+        notes.extend(left.map(|p| format!("{}: {NOTHING}, left as it was", p.name)));
         notes
     }
 }
 
-fn of_channel(
-    log: &str,
-    (channel, unit): (&'static str, &'static str),
-    times: &[f64],
-    values: &[f64],
-) -> Left {
-    let noise = Noise::of(values);
-    Left {
-        log: log.to_owned(),
-        channel,
-        unit,
-        rms: noise.deviation,
-        count: values.len(),
-        independent: values.len() as f64 / noise.inflation,
-        course: times.iter().copied().zip(values.iter().copied()).collect(),
-    }
-}
-
-/// The scenario with what was identified in it; what was not stays as it was.
+/// The scenario with what was identified in it.
 fn updated(scenario: &Scenario, parameters: &[Parameter]) -> Scenario {
     let mut scenario = scenario.clone();
     let rig = &mut scenario.rig;

@@ -95,16 +95,16 @@ pub struct Traces {
     pub turn_rad: Vec<f64>,
     /// Preload without the load cell's zero, N, every tick.
     pub preload_n: Vec<f64>,
-    /// Zero of the load cell, N.
-    pub load_cell: Zero,
-    /// Zero of the displacement sensor, mm.
-    pub tread: Zero,
+    /// Zero of the preload sensor, N.
+    pub preload_zero: Zero,
+    /// Zero of the compression sensor, mm.
+    pub compression_zero: Zero,
     /// Bins of compression and arm angle.
     pub bins: Vec<Bin>,
     /// Bins of the drive's effort.
     pub efforts: Vec<Effort>,
-    /// Ticks of steady slip, if at the end the wheel turns at a step without getting up.
-    pub slip: Option<Range<usize>>,
+    /// Whether at the end the wheel turns at a step without getting up.
+    pub slips: bool,
 }
 
 impl Traces {
@@ -126,12 +126,12 @@ impl Traces {
         }
         // Unloaded: only before the first preload, and only on the way out.
         let idle = if record.deploys() { &samples[..start] } else { &samples[..0] };
-        let load_cell = zero(idle, |s| s.preload_n);
-        let tread = zero(idle, |s| s.compression_mm);
+        let preload_zero = zero(idle, |s| s.preload_n);
+        let compression_zero = zero(idle, |s| s.compression_mm);
         let per_count = TAU / record.scenario.rig.sense.encoder_counts;
         let turn_rad: Vec<f64> =
             turn(samples, moving).into_iter().map(|counts| counts * per_count).collect();
-        let raw: Vec<f64> = samples.iter().map(|s| s.preload_n - load_cell.value).collect();
+        let raw: Vec<f64> = samples.iter().map(|s| s.preload_n - preload_zero.value).collect();
         let delay = record.scenario.noise.load_cell_delay_s / TICK_S;
         let smooth = smoothed(&raw, SMOOTH_PRELOAD);
         let preload_n = (0..raw.len()).map(|n| at(&smooth, n as f64 + delay).max(0.0)).collect();
@@ -139,19 +139,19 @@ impl Traces {
             span: start..end,
             turn_rad,
             preload_n,
-            load_cell,
-            tread,
+            preload_zero,
+            compression_zero,
             bins: Vec::new(),
             efforts: Vec::new(),
-            slip: None,
+            slips: false,
         };
         traces.bin(record, moving);
         Ok(traces)
     }
 
-    /// Tick before the corner touches, and from when on the slip is steady, if at the end
-    /// the wheel turns at a step without rising.
-    fn onset_of_slip(&self, record: &Record) -> Option<(usize, usize)> {
+    /// Tick before the corner touches, if at the end the wheel turns at a step without
+    /// rising.
+    fn onset_of_slip(&self, record: &Record) -> Option<usize> {
         let rig = &record.scenario.rig.rig;
         if !record.deploys() {
             return None;
@@ -177,7 +177,7 @@ impl Traces {
         let way = |tick: usize| self.turn_rad[tick] * rig.wheel_radius_mm;
         let onset = (self.span.start..end).find(|&tick| way(tick) > face - BEFORE_SLIP_MM)?;
         let slips = steady > onset && way(end - 1) - way(steady.min(end - 1)) > SLIPS_MM;
-        slips.then_some((onset, steady))
+        slips.then_some(onset)
     }
 
     fn bin(&mut self, record: &Record, moving: usize) {
@@ -187,15 +187,12 @@ impl Traces {
             way / ((ticks.len() - 1) as f64 * TICK_S)
         };
         let radius = rig.rig.wheel_radius_mm;
-        let starting = moving..moving + STARTING;
-        let within =
-            |ticks: &Range<usize>| ticks.start < starting.end && ticks.end > starting.start;
-        // Where a wheel goes over from grip to slip hangs on a hair, and from there on it
+        let starting = |ticks: &Range<usize>| ticks.start < moving + STARTING && ticks.end > moving;
+        // The instant at which grip ends is ill-conditioned, and from there on the wheel
         // grips and slips by turns: nothing that can be followed tick by tick.
         let slip = self.onset_of_slip(record);
-        let onset = slip.as_ref().map_or(usize::MAX, |(onset, _)| *onset);
-        self.slip = slip.map(|(_, steady)| steady..self.span.end);
-        let between = |ticks: &Range<usize>| ticks.end > onset;
+        self.slips = slip.is_some();
+        let slipping = |ticks: &Range<usize>| slip.is_some_and(|onset| ticks.end > onset);
         let rings = |turn_rad_s: f64| {
             let hz = (turn_rad_s * radius).abs() / rig.drive.ripple_pitch_mm;
             rig.drive.modes_hz.iter().any(|mode| (hz / mode - 1.0).abs() < NEAR_MODE)
@@ -208,12 +205,15 @@ impl Traces {
                 let pressed = self.preload_n[ticks.start] > LEAST_PRELOAD_N;
                 let preload = of.iter().map(|s| s.preload_n).sum::<f64>() / of.len() as f64;
                 Bin {
-                    preload_n: preload - self.load_cell.value,
+                    preload_n: preload - self.preload_zero.value,
                     pressed,
-                    compression_mm: mean - self.tread.value,
+                    compression_mm: mean - self.compression_zero.value,
                     arm_rad: (!arms.is_empty())
                         .then(|| arms.iter().sum::<f64>() / arms.len() as f64),
-                    used: pressed && !rings(speed(&ticks)) && !within(&ticks) && !between(&ticks),
+                    used: pressed
+                        && !rings(speed(&ticks))
+                        && !starting(&ticks)
+                        && !slipping(&ticks),
                     ticks,
                 }
             })
@@ -234,7 +234,7 @@ impl Traces {
                 let free = of.iter().all(|s| s.drive_on && force(s).abs() < limit);
                 let turning = turn_rad_s.abs() * radius > 0.5;
                 let steady = (gain_rad_s2 * radius).abs() < MOST_ACCELERATION;
-                let used = free && turning && steady && !within(&ticks) && !between(&ticks);
+                let used = free && turning && steady && !starting(&ticks) && !slipping(&ticks);
                 Effort { ticks, duty, turn_rad_s, gain_rad_s2, used }
             })
             .collect();

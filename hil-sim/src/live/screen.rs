@@ -9,9 +9,9 @@ use ratatui::symbols::Marker;
 use ratatui::text::Line;
 use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph};
 
-use interstage::blackbox::Reset;
-use interstage::log::{Entry, Event};
+use interstage::restart::Reset;
 use interstage::supervise::Mode;
+use interstage::tick::{Entry, Event};
 
 use crate::record::{Controller, Counts, Item, Mark, View, text};
 

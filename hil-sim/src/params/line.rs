@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use interstage::link::{Gatherer, ToBoard, ToHost, frame};
+use interstage::params::link::{FrameReader, ToBoard, ToHost, frame};
 use interstage::params::service::{Description, Origin, PIECE, Piece, Request, Response};
 
 use super::{Held, Store, StoreError};
@@ -51,14 +51,14 @@ impl Wire for &mut dyn Port {
 #[derive(Debug)]
 pub struct Client<W> {
     wire: W,
-    gatherer: Gatherer,
+    gatherer: FrameReader,
     number: u16,
 }
 
 impl<W: Wire> Client<W> {
     /// Over this line.
     pub const fn new(wire: W) -> Self {
-        Self { wire, gatherer: Gatherer::new(), number: 0 }
+        Self { wire, gatherer: FrameReader::new(), number: 0 }
     }
 
     /// The line.
@@ -194,7 +194,7 @@ mod tests {
     /// A board's end of the line, with a narrow buffer and lost bytes.
     struct Board {
         service: Service<Flash>,
-        gatherer: Gatherer,
+        gatherer: FrameReader,
         answers: Vec<u8>,
         at_rest: bool,
         /// Every so many bytes down are lost; 0 for none.
@@ -208,7 +208,7 @@ mod tests {
             let flash = Flash([vec![0xFF; SLOT_BYTES], vec![0xFF; SLOT_BYTES]]);
             Self {
                 service: Service::new(flash, image, 0),
-                gatherer: Gatherer::new(),
+                gatherer: FrameReader::new(),
                 answers: Vec::new(),
                 at_rest: true,
                 loses: 0,

@@ -37,7 +37,7 @@ pub struct Turn {
 
 impl Turn {
     /// The wheel turns at this speed, mm/s, whatever resists.
-    pub(super) fn led(free_mm_s: f64) -> Self {
+    pub(super) fn imposed(free_mm_s: f64) -> Self {
         Self { free_mm_s, ..Self::default() }
     }
 }
@@ -126,7 +126,7 @@ pub struct Pretightener {
     /// Bounds of the screw as force at level 0, N.
     range: (f64, f64),
     /// Step, s, and what the lag keeps over it.
-    keeps: (f64, f64),
+    decay: (f64, f64),
 }
 
 impl Pretightener {
@@ -148,7 +148,7 @@ impl Pretightener {
             rate: 0.0,
             pipeline: std::iter::repeat_n(0.0, depth).collect(),
             range,
-            keeps: (dt_s, (-dt_s / lag).exp()),
+            decay: (dt_s, (-dt_s / lag).exp()),
         }
     }
 
@@ -163,10 +163,10 @@ impl Pretightener {
         }
         // Exact for the lag under a held command.
         let target = delayed * self.slew;
-        if self.keeps.0 != dt_s {
-            self.keeps = (dt_s, (-dt_s / self.lag).exp());
+        if self.decay.0 != dt_s {
+            self.decay = (dt_s, (-dt_s / self.lag).exp());
         }
-        let keep = self.keeps.1;
+        let keep = self.decay.1;
         let moved = target * dt_s + (self.rate - target) * self.lag * (1.0 - keep);
         self.rate = target + (self.rate - target) * keep;
         let next = self.seat + moved;
@@ -177,7 +177,7 @@ impl Pretightener {
     }
 
     /// Force and rate become this part: the spring yields where the screw stands.
-    pub(super) fn weaken(&mut self, part: f64) {
+    pub(super) fn scale_force(&mut self, part: f64) {
         self.slew *= part;
         self.seat *= part;
         self.rate *= part;

@@ -20,7 +20,7 @@ impl Arm {
 
     /// Radial force that an axial thrust adds, per unit of thrust.
     #[must_use]
-    pub fn wedge(&self, radius_mm: f64) -> f64 {
+    pub fn thrust_ratio(&self, radius_mm: f64) -> f64 {
         // Tangent of the angle from its sine.
         let sine = ((radius_mm - self.pivot_mm) / self.length_mm).clamp(-1.0, 1.0);
         self.coupling * sine / (1.0 - sine * sine).sqrt()
@@ -171,7 +171,7 @@ mod tests {
     fn the_wedge_falls_as_the_sleeve_narrows() {
         let arm = Arm { length_mm: 145.0, pivot_mm: 20.0, coupling: 1.0 };
         assert!((arm.angle(125.0).to_degrees() - 46.397).abs() < 1e-2);
-        assert!(arm.wedge(125.0) > arm.wedge(113.0));
-        assert!(arm.wedge(113.0) > 0.8);
+        assert!(arm.thrust_ratio(125.0) > arm.thrust_ratio(113.0));
+        assert!(arm.thrust_ratio(113.0) > 0.8);
     }
 }

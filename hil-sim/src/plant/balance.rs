@@ -70,7 +70,7 @@ const NEAR: f64 = 1e-4;
 impl Balance {
     /// Residual of the radial balance, N, its slope, N/mm, and the utilisation, from
     /// the contact's cosine and sine sums, N, and their derivatives by height, N/mm.
-    pub(crate) fn residual(
+    pub fn residual(
         &self,
         (c, s): (f64, f64),
         (dc, ds): (f64, f64),
@@ -114,9 +114,9 @@ impl Balance {
         self.search(ring, motion, None)
     }
 
-    /// The same where the height in `motion` is foreseen so well that one step of Newton's
+    /// The same where the height in `motion` is predicted so well that one step of Newton's
     /// method does: if less than a small part of the preload is left there, the contact is moved
-    /// by its derivatives and not computed anew. Its force errs by a part of 1e-7.
+    /// by its derivatives and not computed again. Its force errs by a part of 1e-7.
     ///
     /// # Errors
     /// As [`Balance::solve`].

@@ -52,7 +52,7 @@ pub struct Ended {
     /// Carriage's speed, mm/s.
     pub speed: f64,
     /// Force of the contact that resisted the tread, N, signed as the tread's speed.
-    pub resists_n: f64,
+    pub tread_load_n: f64,
 }
 
 impl Grip {
@@ -85,13 +85,13 @@ impl Grip {
     #[must_use]
     pub fn ended(&self, utilisation: f64, cosine: f64, sine: f64) -> Ended {
         let traction = utilisation * cosine;
-        let resists_n = if traction * self.tread > 0.0 { traction * self.normal } else { 0.0 };
-        let tread = self.tread - self.yields * resists_n;
+        let tread_load_n = if traction * self.tread > 0.0 { traction * self.normal } else { 0.0 };
+        let tread = self.tread - self.yields * tread_load_n;
         let tread = if tread * self.tread > 0.0 { tread } else { 0.0 };
         let speed = self.speed + (traction - sine - self.load_n) / self.inertia;
         // What is held stands.
         let stands = tread == 0.0 && speed.abs() < STANDS_BELOW;
-        Ended { tread, speed: if stands { 0.0 } else { speed }, resists_n }
+        Ended { tread, speed: if stands { 0.0 } else { speed }, tread_load_n }
     }
 
     /// Traction that takes the carriage to where a tread of this speed would without
@@ -288,6 +288,6 @@ mod tests {
         let (_, ended) = at(&grip, 33.3, 0.0);
         assert_eq!(ended.tread, 0.0);
         assert!(ended.speed <= 0.0 && ended.speed > -1.0, "{ended:?}");
-        assert!(ended.resists_n > 29.0);
+        assert!(ended.tread_load_n > 29.0);
     }
 }

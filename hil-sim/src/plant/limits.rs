@@ -91,7 +91,7 @@ impl PlantParameters {
         let radius_mm = self.ring.radius_mm;
         let k_inf_pa_per_m = self.ring.k_inf * 1e9;
         let most_mm = DEEPEST * radius_mm;
-        let wedge = self.arm.wedge(self.wall_radius_mm - radius_mm);
+        let wedge = self.arm.thrust_ratio(self.wall_radius_mm - radius_mm);
         let force_n = preload_n + (wedge * self.load_n).max(0.0);
         let depth_mm = corner_depth(self, force_n);
         if depth_mm > most_mm || depth_mm.is_nan() {

@@ -1,4 +1,4 @@
-//! Error against cost of the ring: the same crossings at every setting, measured on a
+//! Error against cost of the ring: the same crossings at every setting, compared with a
 //! setting twenty times as fine.
 
 use std::time::Instant;
@@ -8,12 +8,11 @@ use serde::Serialize;
 
 use super::balance::{Axial, BalanceError};
 use super::crossing::{CrossingCase, cross};
-use super::draw::{ELEMENTS, PlantParameters};
-use super::ledger::Crossing;
-use super::rig::{Drives, PlantError, Resolution, VirtualRig};
+use super::draw::ELEMENTS;
+use super::rig::Resolution;
 use super::ring::RingParameters;
 
-/// How much finer the measure is, in elements and in stride.
+/// How much finer the reference is, in elements and in stride.
 pub const FINER: usize = 20;
 
 /// How finely a ring is computed.
@@ -21,7 +20,7 @@ pub const FINER: usize = 20;
 pub struct Setting {
     /// Elements around the ring.
     pub elements: usize,
-    /// Longest axial way of a step, mm.
+    /// Longest axial travel of a step, mm.
     pub stride_mm: f64,
 }
 
@@ -52,7 +51,7 @@ impl Setting {
 pub struct Point {
     /// Elements around the ring.
     pub elements: usize,
-    /// Axial way of a step, mm.
+    /// Axial travel of a step, mm.
     pub stride_mm: f64,
     /// Largest relative error of the gap.
     pub gap_error: f64,
@@ -62,7 +61,8 @@ pub struct Point {
     pub wall_ns: f64,
 }
 
-/// The crossings that the error is measured on: both loads, both ways, pushed and driven.
+/// The crossings that the error is measured on: both loads and directions, pushed and
+/// driven.
 #[must_use]
 pub fn cases() -> Vec<(f64, f64, Axial)> {
     let mut all = Vec::new();
@@ -86,7 +86,7 @@ fn case(rig: &Rig, setting: Setting, (speed, preload, axial): (f64, f64, Axial))
 }
 
 /// Errors of isolated crossings at these settings, against the usual one made
-/// [`FINER`] times as fine; `done` is called after every crossing of the measure.
+/// [`FINER`] times as fine; `done` is called after every crossing of the reference.
 ///
 /// # Errors
 /// [`BalanceError`] if a crossing cannot be made.
@@ -96,10 +96,10 @@ pub fn work_precision(
     repeats: usize,
     done: impl Fn(),
 ) -> Result<Vec<Point>, BalanceError> {
-    let measure = Setting::usual().finer(FINER);
+    let reference = Setting::usual().finer(FINER);
     let mut exact = Vec::new();
     for of in cases() {
-        let result = cross(&case(rig, measure, of))?;
+        let result = cross(&case(rig, reference, of))?;
         exact.push((of, result.gap_mm, result.corner_force_n));
         done();
     }
@@ -126,33 +126,4 @@ pub fn work_precision(
         Ok(point)
     };
     settings.iter().map(point).collect()
-}
-
-/// The crossings of a whole way, out (speed above nought) or back, of the plant alone:
-/// duty and screw held, the drive a hundred times as strong as it is so that it does not
-/// yield: nothing but the setting and the tick differs.
-///
-/// # Errors
-/// [`PlantError`] if the plant leaves the set of meaningful states.
-pub fn crossings(
-    parameters: &PlantParameters,
-    setting: Setting,
-    tick_s: f64,
-    (speed_mm_s, preload_n): (f64, f64),
-) -> Result<Vec<Crossing>, PlantError> {
-    let mut parameters = parameters.clone();
-    parameters.ring.elements = setting.elements;
-    parameters.drive.stall_n *= 100.0;
-    parameters.drive.limit_n *= 100.0;
-    let duty = speed_mm_s / parameters.drive.no_load_mm_s;
-    let (low, high) = parameters.stops_mm;
-    let (from, to) = if speed_mm_s > 0.0 { (0.0, high - 1.0) } else { (high - 2.0, low + 1.0) };
-    let longest_s = 5.0 * (high - low) / speed_mm_s.abs();
-    let resolution = Resolution { stride_mm: setting.stride_mm, ..Resolution::default() };
-    let mut rig = VirtualRig::new(parameters, from, preload_n, tick_s).with_resolution(resolution);
-    let drives = Drives { drive: duty, drive_on: true, ..Drives::default() };
-    while (rig.truth().position_mm - to) * speed_mm_s < 0.0 && rig.truth().time_s < longest_s {
-        rig.step(&drives, tick_s)?;
-    }
-    Ok(rig.ledger().crossings().to_vec())
 }

@@ -1,8 +1,7 @@
 //! The whole rig, a millisecond at a time.
 
 mod contact;
-mod damage;
-mod follow;
+mod intervention;
 mod phases;
 mod traction;
 
@@ -15,7 +14,7 @@ use super::draw::PlantParameters;
 use super::ledger::Ledger;
 use super::ring::Ring;
 use super::rolling::{self, Steady};
-use contact::Calm;
+use contact::SettleTimer;
 use traction::Stride;
 
 pub use phases::{PHASES, Phase, PhaseWork};
@@ -23,7 +22,7 @@ pub use phases::{PHASES, Phase, PhaseWork};
 /// Most ring steps in a call: 10 mm of way at the usual stride.
 const MOST_STRIDES: f64 = 256.0;
 
-/// Way after which the stride is fitted anew to the speed, if the step of time is longer
+/// Way after which the stride is fitted again to the speed, if the step of time is longer
 /// than that, mm.
 const EXCHANGE_MM: f64 = 1.0;
 
@@ -57,7 +56,7 @@ pub struct Drives {
     /// Pre-tightener bridge enabled.
     pub preload_on: bool,
     /// Parts of drive and pre-tightener that are lost behind their bridges, in motor and
-    /// gear: nought where all is sound.
+    /// gear: zero where all is sound.
     pub lost: [f64; 2],
 }
 
@@ -109,7 +108,7 @@ pub struct Truth {
     pub separation_mm: f64,
     /// Axial force of the wall under the wheel against the motion of its tread, N.
     pub resistance_n: f64,
-    /// Radial force of the contact beyond what presses the wheel, N: nought but for what the
+    /// Radial force of the contact beyond what presses the wheel, N: zero but for what the
     /// solution leaves.
     pub unbalanced_n: f64,
     /// Gross slip so far, mm.
@@ -155,7 +154,7 @@ pub struct VirtualRig {
     ring: Ring,
     steady: Steady,
     awake: bool,
-    calm: Calm,
+    settle_timer: SettleTimer,
     preload: Pretightener,
     modes: Vec<Mode>,
     /// Sine and cosine of the ripple's phase.
@@ -167,7 +166,7 @@ pub struct VirtualRig {
     /// Sliding bodily over the wall.
     sliding: bool,
     /// Resting on the stop or latch that carries the load until the drive first turns.
-    parked: bool,
+    latched: bool,
     /// Tread speed of the last steady rolling, mm/s.
     rolled_mm_s: f64,
     /// Base of the wall under the centre in the last stride, mm.
@@ -177,19 +176,19 @@ pub struct VirtualRig {
     phase: Phase,
     /// Contact forces of the last stride: normal, cosine and sine sums, N.
     forces: (f64, f64, f64),
-    /// Way that the speeds of the last stride gave beyond the one foreseen: of the carriage
+    /// Way that the speeds of the last stride gave beyond the one predicted: of the carriage
     /// and of the tread, mm.
-    owed_mm: (f64, f64),
+    way_residual_mm: (f64, f64),
     /// Force that resisted the tread in the last stride, N, signed as its speed.
-    resists_n: f64,
+    tread_load_n: f64,
     /// Static thrust on the arm, N: the load, or at an end stop what the wheel pushes with.
     thrust_n: f64,
     /// Speed of the tread in place of what the motor makes of it, mm/s.
-    led_mm_s: Option<f64>,
+    imposed_speed_mm_s: Option<f64>,
     /// Rise of the centre per axial way in the last stride that no change of load explains.
     drift: f64,
     /// Rise per axial way beyond that along the step's force, for what the tread takes in.
-    swells: f64,
+    tread_intake: f64,
     /// Rise that no change of load explains while the wheel stands, mm/s.
     creep: f64,
     /// Derivatives of the resolved contact's cosine and sine sums by the height, N/mm.
@@ -224,7 +223,11 @@ impl VirtualRig {
             steady: Steady::default(),
             ledger: Ledger::new(parameters.wall.steps().to_vec(), radius),
             awake: false,
-            calm: Calm { tread_mm_s: 0.0, pressing_n: preload_n, for_s: f64::INFINITY },
+            settle_timer: SettleTimer {
+                tread_mm_s: 0.0,
+                pressing_n: preload_n,
+                for_s: f64::INFINITY,
+            },
             preload,
             modes,
             ripple_phase: (0.0, 1.0),
@@ -237,18 +240,18 @@ impl VirtualRig {
                 ..Truth::default()
             },
             sliding: false,
-            parked: true,
+            latched: true,
             rolled_mm_s: 0.0,
             base_mm: local.base_mm,
             phases: Default::default(),
             phase: Phase::Smooth,
             forces: (rest.normal_n, rest.cosine_n, 0.0),
-            owed_mm: (0.0, 0.0),
-            resists_n: 0.0,
+            way_residual_mm: (0.0, 0.0),
+            tread_load_n: 0.0,
             thrust_n: parameters.load_n,
-            led_mm_s: None,
+            imposed_speed_mm_s: None,
             drift: 0.0,
-            swells: 0.0,
+            tread_intake: 0.0,
             creep: 0.0,
             stiffness: None,
             parameters,
@@ -270,7 +273,7 @@ impl VirtualRig {
         self.truth.tread_mm_s = speed_mm_s;
         self.truth.speed_mm_s = speed_mm_s;
         self.rolled_mm_s = speed_mm_s;
-        self.parked = false;
+        self.latched = false;
         self
     }
 
@@ -278,7 +281,7 @@ impl VirtualRig {
     /// No bit of any result depends on it: it proves that what is skipped is not needed.
     #[must_use]
     pub fn visiting_all(mut self) -> Self {
-        self.ring = self.ring.whole(true);
+        self.ring = self.ring.visiting_all();
         self
     }
 
@@ -308,7 +311,6 @@ impl VirtualRig {
         let [drive, preload] = drives.worked();
         let worked = &Drives { drive, preload, ..*drives };
         self.preload.step(preload, drives.preload_on, dt_s);
-        let before = self.work();
         let mut left_s = dt_s;
         while left_s > 0.0 {
             let way = self.farthest(left_s);
@@ -322,7 +324,7 @@ impl VirtualRig {
             self.check()?;
             left_s -= part_s;
         }
-        self.count(&before, dt_s);
+        self.count(dt_s);
         self.vibrate(dt_s);
         self.truth.time_s += dt_s;
         // The self-locking screw stands at once; the wheel turns on for some milliseconds.
@@ -347,7 +349,7 @@ impl VirtualRig {
     }
 
     /// Strides of this time together: shorter ones where the forces that are found move the
-    /// wheel far from where it was foreseen.
+    /// wheel far from where it was predicted.
     fn roll(&mut self, drives: &Drives, dt_s: f64) -> Result<(), PlantError> {
         let shortest_s = dt_s / MOST_HALVINGS;
         let (mut left_s, mut part_s) = (dt_s, dt_s);
@@ -365,8 +367,8 @@ impl VirtualRig {
     /// One stride: motor, traction and radial balance at once. Unless it would have to go
     /// `finer`: then nothing has happened.
     fn stride(&mut self, drives: &Drives, dt_s: f64, finer: bool) -> Result<bool, PlantError> {
-        let (truth, calm, parked) = (self.truth, self.calm, self.parked);
-        let stride = self.set_out(drives, dt_s);
+        let (truth, settle_timer, latched) = (self.truth, self.settle_timer, self.latched);
+        let stride = self.predict(drives, dt_s);
         if !stride.tread_mm_s.is_finite() {
             return Err(PlantError::NotFinite { time_s: truth.time_s, name: "tread speed" });
         }
@@ -385,7 +387,7 @@ impl VirtualRig {
             self.roll_steadily(&local, stride, finer)?
         };
         if !done {
-            (self.truth, self.calm, self.parked) = (truth, calm, parked);
+            (self.truth, self.settle_timer, self.latched) = (truth, settle_timer, latched);
         }
         Ok(done)
     }

@@ -128,23 +128,11 @@ impl std::ops::AddAssign for Work {
     }
 }
 
-impl std::ops::Sub for Work {
-    type Output = Self;
-
-    fn sub(self, before: Self) -> Self {
-        Self {
-            strides: self.strides - before.strides,
-            iterations: self.iterations - before.iterations,
-            elements: self.elements - before.elements,
-        }
-    }
-}
-
 /// The ring's elements and how far the wheel has turned.
 #[derive(Clone, Debug)]
 pub struct Ring {
     parameters: RingParameters,
-    /// Sine and cosine of the elements' angles, by blocks; nought beyond the last.
+    /// Sine and cosine of the elements' angles, by blocks; zero beyond the last.
     sin: Vec<Lanes>,
     cos: Vec<Lanes>,
     /// Internal displacement and depth, mm.
@@ -160,7 +148,7 @@ pub struct Ring {
     time: f64,
     law: Law,
     ready: Ready,
-    whole: bool,
+    visit_all: bool,
     work: Work,
 }
 
@@ -222,7 +210,7 @@ impl Ring {
             time: 0.0,
             law: Law::new(&parameters, 0.0),
             ready: Ready::default(),
-            whole: false,
+            visit_all: false,
             work: Work::default(),
             parameters,
         }
@@ -231,8 +219,8 @@ impl Ring {
     /// The same ring, visiting every element that faces the wall, in reach or not: for
     /// proof that the others change nothing.
     #[must_use]
-    pub fn whole(mut self, whole: bool) -> Self {
-        self.whole = whole;
+    pub fn visiting_all(mut self) -> Self {
+        self.visit_all = true;
         self
     }
 
@@ -249,10 +237,9 @@ impl Ring {
         &self.parameters
     }
 
-    /// What has been computed so far.
-    #[must_use]
-    pub fn work(&self) -> Work {
-        self.work
+    /// What has been computed since the last call.
+    pub(super) fn take_work(&mut self) -> Work {
+        std::mem::take(&mut self.work)
     }
 
     /// Contact after `motion`, leaving the elements as they are.
@@ -394,7 +381,7 @@ impl Ring {
             return;
         }
         let radius = self.parameters.radius_mm;
-        // Lower than foreseen: by as much again.
+        // Lower than predicted: by as much again.
         let more =
             if self.ready.of == Some(of) { self.ready.lowest - motion.height_mm } else { 0.0 };
         let lowest = motion.height_mm - SLACK * radius - more;
@@ -404,7 +391,7 @@ impl Ring {
         let turned = self.rotation + motion.turn_rad;
         let (floor, step) = window::reach(&motion.wall, lowest, radius);
         let mut window = Window::default();
-        if self.whole {
+        if self.visit_all {
             let (first, last) = self.span(turned, -WIDEST, WIDEST);
             window.add(first, last);
         } else {
@@ -419,9 +406,9 @@ impl Ring {
         // Where the patch may end on the floor, and half an element more.
         let chord = (radius * radius - lowest * lowest).max(0.0).sqrt();
         let margin = radius * self.pitch() / floor.cos().max(0.05);
-        self.ready.rise = (self.whole || step.is_some()).then_some(motion.wall.rise_mm);
+        self.ready.rise = (self.visit_all || step.is_some()).then_some(motion.wall.rise_mm);
         self.ready.edge = motion.wall.behind_mm < chord + margin
-            || (self.whole && motion.wall.behind_mm < f64::INFINITY);
+            || (self.visit_all && motion.wall.behind_mm < f64::INFINITY);
         self.ready.window = window;
         self.ready.lowest = lowest;
         self.ready.of = Some(of);

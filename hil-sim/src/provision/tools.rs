@@ -4,22 +4,24 @@ use std::env;
 use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 
-use super::{ProvisionError, started};
-use crate::firmware;
+use super::ProvisionError;
+use crate::firmware::{self, output};
 
 /// The wheels, as tried.
 const WHEELS: [&str; 3] = ["cmake==4.4.4", "ninja==1.13.2", "libclang==18.1.1"];
+/// pip without questions, without talk, and without waiting for a network that is not
+/// there.
+const PIP: &str = "-m pip install --quiet --disable-pip-version-check --no-input \
+                   --only-binary=:all: --retries=2 --timeout=15";
 /// Folder in the target directory.
 const FOLDER: &str = "board-tools";
 /// Written last: says which wheels are there.
 const COMPLETE: &str = "complete";
 
-/// The tools, and what a build has to be told to use them.
-///
-/// What is told stays the same from build to build, or cargo would build the core
-/// anew each time.
+/// The tools, and what a build has to be told to use them. That stays the same from build
+/// to build, or cargo would build the core again each time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tools {
     /// Folder of the programs.
@@ -36,20 +38,15 @@ impl Tools {
     /// # Errors
     /// [`ProvisionError`] if they cannot be fetched or the C compiler is missing.
     pub fn ready() -> Result<Self, ProvisionError> {
-        let headers = headers()?;
         let place = firmware::target_directory().join(FOLDER);
+        let failed = |why: &str| ProvisionError::Tools { place: place.clone(), why: why.into() };
+        let headers = headers()?.ok_or_else(|| failed("the C compiler names no headers"))?;
         if !is_complete(&place) || !starts(&place) {
             eprintln!("fetching cmake, ninja and libclang into {}", place.display());
             fetch(&place)?;
         }
-        Self::at(&place, headers)
-    }
-
-    fn at(place: &Path, headers: PathBuf) -> Result<Self, ProvisionError> {
-        let libclang = find(place, "libclang").ok_or_else(|| ProvisionError::Tools {
-            place: place.to_owned(),
-            why: "no libclang in its wheel".to_owned(),
-        })?;
+        let libclang =
+            find(&place, "libclang").ok_or_else(|| failed("no libclang in its wheel"))?;
         Ok(Self { programs: place.join("bin"), libclang, headers })
     }
 
@@ -74,8 +71,8 @@ fn is_complete(place: &Path) -> bool {
     fs::read_to_string(place.join(COMPLETE)).is_ok_and(|text| text == WHEELS.join("\n"))
 }
 
-/// Whether the programs can be started at all: they name their interpreter by its place, so
-/// that a folder that has been moved or copied does not do.
+/// Whether the programs start: they name their interpreter by its path, so a folder that
+/// has been moved or copied does not do.
 fn starts(place: &Path) -> bool {
     ["cmake", "ninja"].iter().all(|program| {
         let mut command = Command::new(place.join("bin").join(program));
@@ -86,51 +83,31 @@ fn starts(place: &Path) -> bool {
 /// Puts the wheels there: into a virtual environment or, where Python has come without
 /// that, by pip into a plain folder.
 fn fetch(place: &Path) -> Result<(), ProvisionError> {
-    let file = |source| ProvisionError::File { path: place.to_owned(), source };
+    let failed = |why: String| ProvisionError::Tools { place: place.to_owned(), why };
+    let file = |error: std::io::Error| failed(error.to_string());
     if place.exists() {
         fs::remove_dir_all(place).map_err(file)?;
     }
     fs::create_dir_all(place).map_err(file)?;
-    let made = run(Command::new("python3").args(["-m", "venv"]).arg(place))?;
-    let installed = if made.status.success() {
-        let python = place.join("bin").join("python3");
-        run(Command::new(python).args(PIP).args(WHEELS))?
+    let made = output(Command::new("python3").args(["-m", "venv"]).arg(place))?;
+    let mut pip = if made.status.success() {
+        let mut pip = Command::new(place.join("bin").join("python3"));
+        pip.args(PIP.split_whitespace());
+        pip
     } else {
-        let target = [OsString::from("--target"), place.into()];
-        run(Command::new("python3").args(PIP).args(target).args(WHEELS))?
+        let mut pip = Command::new("python3");
+        pip.args(PIP.split_whitespace()).arg("--target").arg(place);
+        pip
     };
+    let installed = output(pip.args(WHEELS))?;
     if !installed.status.success() {
-        // What is half there must not be taken for whole.
+        // A part of them must not be taken for all.
         let _ = fs::remove_dir_all(place);
-        return Err(ProvisionError::Tools { place: place.to_owned(), why: last_line(&installed) });
+        let said = String::from_utf8_lossy(&installed.stderr);
+        let last = said.lines().rev().map(str::trim).find(|line| !line.is_empty());
+        return Err(failed(last.unwrap_or("it did not say why").to_owned()));
     }
     fs::write(place.join(COMPLETE), WHEELS.join("\n")).map_err(file)
-}
-
-/// pip without questions, without talk, and without waiting for a network that is not
-/// there.
-const PIP: [&str; 9] = [
-    "-m",
-    "pip",
-    "install",
-    "--quiet",
-    "--disable-pip-version-check",
-    "--no-input",
-    "--only-binary=:all:",
-    "--retries=2",
-    "--timeout=15",
-];
-
-fn run(command: &mut Command) -> Result<Output, ProvisionError> {
-    let program = command.get_program().to_string_lossy().into_owned();
-    command.output().map_err(|source| started(&program, source))
-}
-
-/// The last that a program said.
-fn last_line(output: &Output) -> String {
-    let text = String::from_utf8_lossy(&output.stderr);
-    let last = text.lines().rev().map(str::trim).find(|line| !line.is_empty());
-    last.unwrap_or("it did not say why").to_owned()
 }
 
 /// The folder below `place` in which a file begins with `name` and is a library.
@@ -150,16 +127,12 @@ fn find(place: &Path, name: &str) -> Option<PathBuf> {
     below.iter().find_map(|folder| find(folder, name))
 }
 
-/// Where the C compiler has `stddef.h` and the like.
-fn headers() -> Result<PathBuf, ProvisionError> {
+/// Where the C compiler has `stddef.h` and the like, if it says so.
+fn headers() -> Result<Option<PathBuf>, ProvisionError> {
     let compiler = env::var("CC").unwrap_or_else(|_| "cc".to_owned());
-    let said = run(Command::new(&compiler).arg("-print-file-name=include"))?;
+    let said = output(Command::new(compiler).arg("-print-file-name=include"))?;
     let folder = PathBuf::from(String::from_utf8_lossy(&said.stdout).trim());
-    if folder.is_absolute() && folder.is_dir() {
-        Ok(folder)
-    } else {
-        Err(ProvisionError::Headers(compiler))
-    }
+    Ok((folder.is_absolute() && folder.is_dir()).then_some(folder))
 }
 
 #[cfg(test)]
@@ -229,6 +202,6 @@ mod tests {
 
     #[test]
     fn the_compiler_tells_its_headers() {
-        assert!(headers().unwrap().join("stddef.h").is_file());
+        assert!(headers().unwrap().unwrap().join("stddef.h").is_file());
     }
 }

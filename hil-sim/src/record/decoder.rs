@@ -4,13 +4,14 @@
 //! Garbage ends at the next sound frame; a restart of the target is recognised by its
 //! sequence or its clock going back.
 
-use interstage::log::capture::Shots;
+use interstage::log::capture::CaptureChunk;
 use interstage::log::frame::{Body, Frame, Seen, look};
 use interstage::log::identity::SCHEMA;
 use interstage::log::ledger::Line;
-use interstage::log::{Entry, Identity, Record};
+use interstage::log::{Identity, Record};
 use interstage::model::{Plan, PlanRequest};
 use interstage::sense::raw::SensorFrame;
+use interstage::tick::Entry;
 use serde::{Deserialize, Serialize};
 
 /// What a log says, in its order.
@@ -27,7 +28,7 @@ pub enum Item {
     /// Something happened.
     Event(Entry),
     /// A piece of a capture.
-    Shots(Shots),
+    CaptureChunk(CaptureChunk),
     /// A crossing was closed.
     Ledger(Line),
     /// Here something is missing.
@@ -234,7 +235,7 @@ impl Decoder {
             Body::Plan(at, plan) => take(Item::Plan(at, plan)),
             Body::Request(at, request) => take(Item::Request(at, request)),
             Body::Event(entry) => take(Item::Event(entry)),
-            Body::Shots(shots) => take(Item::Shots(shots)),
+            Body::CaptureChunk(shots) => take(Item::CaptureChunk(shots)),
             Body::Ledger(line) => take(Item::Ledger(line)),
             Body::Unknown => {}
         }
@@ -306,15 +307,15 @@ impl Decoder {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use interstage::control::{Input, Output};
-    use interstage::log::{BATCH, Scribe, Tape, identity};
+    use interstage::log::{BATCH, LogEncoder, Tape, identity};
+    use interstage::tick::{Input, Output};
     use proptest::prelude::*;
 
     /// The frames of a target that runs for so many ticks from `from`.
     pub(crate) fn frames(from: u32, ticks: u32) -> Vec<Vec<u8>> {
         let identity =
             Identity { schema: SCHEMA, rig: identity::text("test"), ..Default::default() };
-        let (mut scribe, tape, mut frames) = (Scribe::new(identity), Tape::new(), Vec::new());
+        let (mut scribe, tape, mut frames) = (LogEncoder::new(identity), Tape::new(), Vec::new());
         for at in from..from + ticks {
             let mut output = Output::default();
             output.telemetry.at = at;
@@ -474,7 +475,7 @@ pub(super) mod tests {
         for (overrun, expected) in
             [(true, Mark::Overrun { ticks: 3 }), (false, Mark::Skipped { ticks: 3 })]
         {
-            let (mut scribe, tape) = (Scribe::new(Identity::default()), Tape::new());
+            let (mut scribe, tape) = (LogEncoder::new(Identity::default()), Tape::new());
             for at in [10, 11, 15] {
                 let mut output = Output::default();
                 output.telemetry.at = at;
@@ -495,7 +496,7 @@ pub(super) mod tests {
     #[test]
     fn another_layout_is_named_by_its_number() {
         let (mut scribe, tape) =
-            (Scribe::new(Identity { schema: 99, ..Identity::default() }), Tape::new());
+            (LogEncoder::new(Identity { schema: 99, ..Identity::default() }), Tape::new());
         tape.keep(&Input::default(), &Output::default());
         let mut bytes = Vec::new();
         scribe.read(&tape, &mut |frame: &[u8]| {

@@ -1,8 +1,7 @@
 //! A line of the crossings' ledger with names and units.
 
 use interstage::log::ledger::Line;
-use interstage::supervise::Direction;
-use interstage::units::Q16;
+use interstage::units::{Direction, Q16};
 use serde::{Deserialize, Serialize};
 
 /// A line of the ledger as the controller has it; it knows no truth.

@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, HashMap};
 use std::io::{Seek, Write};
 use std::path::Path;
 
-use interstage::blackbox::Reset;
-use interstage::log::{Entry, Event};
+use interstage::restart::Reset;
+use interstage::tick::{Entry, Event};
 use mcap::WriteOptions;
 use mcap::records::{MessageHeader, Metadata};
 use serde::Serialize;
@@ -101,7 +101,7 @@ pub fn messages(item: &Item) -> Option<(Topic, Vec<u8>)> {
             body(Topic::Log, &json::log_message(ns, level(entry), &text(&entry.event)))
         }
         Item::Mark(mark) => body(Topic::Log, &json::log_message(0, WARNING, &mark.to_string())),
-        Item::Identity(_) | Item::Plan(..) | Item::Request(..) | Item::Shots(_) => None,
+        Item::Identity(_) | Item::Plan(..) | Item::Request(..) | Item::CaptureChunk(_) => None,
     }
 }
 

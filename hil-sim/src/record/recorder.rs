@@ -1,8 +1,7 @@
 //! What is kept of a run while it goes on.
 
-use interstage::log::{CrossingRecord, Entry, Event, Telemetry};
-use interstage::supervise::Direction;
-use interstage::units::Q16;
+use interstage::tick::{CrossingRecord, Entry, Event, Telemetry};
+use interstage::units::{Direction, Q16};
 use sha2::{Digest, Sha256};
 
 use super::tally::{Ended, TICK_S, Tally, true_line};

@@ -1,10 +1,11 @@
 //! A log in memory.
 
-use interstage::blackbox::Restart;
-use interstage::log::capture::Shots;
+use interstage::log::Identity;
+use interstage::log::capture::CaptureChunk;
 use interstage::log::ledger::Line;
-use interstage::log::{Entry, Event, Identity};
 use interstage::model::{Plan, PlanRequest};
+use interstage::restart::Restart;
+use interstage::tick::{Entry, Event};
 use serde::{Deserialize, Serialize};
 
 use super::{Controller, Counts, Decoder, Item, Mark};
@@ -91,7 +92,7 @@ pub struct Run {
     /// Lines of the ledger.
     pub ledger: Vec<Line>,
     /// Pieces of captures.
-    pub shots: Vec<Shots>,
+    pub shots: Vec<CaptureChunk>,
     /// Where each start after the first begins.
     pub boots: Vec<Boot>,
     /// What is missing, and before which row.
@@ -121,7 +122,7 @@ impl Run {
             Item::Plan(at, plan) => self.plans.push((*at, *plan)),
             Item::Request(at, request) => self.requests.push((*at, *request)),
             Item::Event(entry) => self.events.push(*entry),
-            Item::Shots(shots) => self.shots.push(shots.clone()),
+            Item::CaptureChunk(shots) => self.shots.push(shots.clone()),
             Item::Ledger(line) => self.ledger.push(*line),
             Item::Mark(mark) => {
                 if *mark == Mark::Restart {

@@ -1,7 +1,7 @@
 //! The sums of a run, whatever ran the controller: when it moved, with what preload, how
 //! far wheel and wall separated, whether it arrived.
 
-use interstage::supervise::Direction;
+use interstage::units::Direction;
 use sha2::{Digest, Sha256};
 
 use super::{CrossingLine, LogLine, Recording, Report, Summary, Tick};

@@ -4,13 +4,13 @@
 //! place that lists them: names, order and schema in CSV, MCAP and JSON follow by serde. A new
 //! column is a new field and its value in the function below it.
 
-use interstage::hal::Duty;
-use interstage::log::{Flags, Record, Telemetry, number};
+use interstage::log::{Flags, Record, codes};
 use interstage::sense::raw::{
     AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
 };
 use interstage::supervise::Mode;
-use interstage::units::Q16;
+use interstage::tick::Telemetry;
+use interstage::units::{Duty, Q16};
 use serde::{Deserialize, Serialize};
 
 use crate::plant::rig::Truth;
@@ -65,7 +65,7 @@ const FAULT: u8 = 101;
 
 /// Number, whether it retracts, code of the fault that is held.
 fn split(mode: Mode) -> (u8, bool, u8) {
-    match number::of_mode(mode) {
+    match codes::of_mode(mode) {
         fault @ FAULT.. => (FAULT_HOLD, false, fault),
         code if code >= RETRACTING.0 => (code - RETRACTING.1, true, 0),
         code => (code, false, 0),
@@ -220,7 +220,7 @@ impl Controller {
             arm_angle_at: arm.map(|sample| sample.at),
             drive_code: bridges.map(|codes| codes.drive.get()),
             pretightener_code: bridges.map(|codes| codes.pretightener.get()),
-            command: number::of_command(flags.command()),
+            command: codes::of_command(flags.command()),
             flags: flags.to_bits(),
             position_mm: seen.position.to_num(),
             wheel_speed_mm_s: seen.speed.to_num(),
@@ -278,7 +278,7 @@ impl Controller {
             (number, true) => number + RETRACTING.1,
             (number, false) => number,
         };
-        number::mode(code).filter(|mode| split(*mode).0 == self.mode)
+        codes::mode(code).filter(|mode| split(*mode).0 == self.mode)
     }
 
     /// The controller's state in its own numbers; none if something in it has no
@@ -291,7 +291,7 @@ impl Controller {
         Some(Telemetry {
             at: self.tick,
             mode,
-            stage: number::stage(self.stage)?,
+            stage: codes::stage(self.stage)?,
             position: q(self.position_mm)?,
             speed: q(self.wheel_speed_mm_s)?,
             speed_ref: q(self.speed_ref_mm_s)?,
@@ -381,7 +381,7 @@ impl Tick {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use interstage::supervise::Fault;
+    use interstage::fault::Fault;
     use proptest::prelude::*;
 
     proptest! {

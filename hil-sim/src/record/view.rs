@@ -36,7 +36,7 @@ impl View {
             Item::Identity(identity) => self.rig = identity.rig.as_str().to_owned(),
             Item::Event(entry) => self.event = text(&entry.event),
             Item::Mark(mark) => self.mark = Some(*mark),
-            Item::Plan(..) | Item::Request(..) | Item::Shots(_) | Item::Ledger(_) => {}
+            Item::Plan(..) | Item::Request(..) | Item::CaptureChunk(_) | Item::Ledger(_) => {}
         }
     }
 

@@ -6,14 +6,14 @@ use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
 use plotters::coord::types::RangedCoordf64;
 
 /// An axis with ticks of our own choice.
-pub(crate) struct Scale {
+pub struct Scale {
     coord: RangedCoordf64,
     ticks: Vec<f64>,
 }
 
 impl Scale {
     /// An axis over `range` with `ticks`.
-    pub(crate) fn new(range: (f64, f64), ticks: Vec<f64>) -> Self {
+    pub fn new(range: (f64, f64), ticks: Vec<f64>) -> Self {
         Self { coord: (range.0..range.1).into(), ticks }
     }
 }
@@ -37,7 +37,7 @@ impl Ranged for Scale {
 }
 
 /// Least and largest finite number; None if there is none.
-pub(crate) fn extent(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
+pub fn extent(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
     values.into_iter().filter(|v| v.is_finite()).fold(None, |range, v| match range {
         None => Some((v, v)),
         Some((low, high)) => Some((low.min(v), high.max(v))),
@@ -45,7 +45,7 @@ pub(crate) fn extent(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)
 }
 
 /// `range` with a margin of `part` of it on both sides, and never empty.
-pub(crate) fn padded(range: (f64, f64), part: f64) -> (f64, f64) {
+pub fn padded(range: (f64, f64), part: f64) -> (f64, f64) {
     let least = 1e-3_f64.max(1e-3 * range.0.abs().max(range.1.abs()));
     let margin = if range.1 - range.0 < least { least } else { part * (range.1 - range.0) };
     (range.0 - margin, range.1 + margin)
@@ -53,7 +53,7 @@ pub(crate) fn padded(range: (f64, f64), part: f64) -> (f64, f64) {
 
 /// Round numbers inside `range`, at most `most` of them, and how many decimals tell
 /// them apart.
-pub(crate) fn ticks(range: (f64, f64), most: usize) -> (Vec<f64>, usize) {
+pub fn ticks(range: (f64, f64), most: usize) -> (Vec<f64>, usize) {
     let rough = (range.1 - range.0) / most.max(1) as f64;
     if !(rough.is_finite() && rough > 0.0) {
         return (Vec::new(), 0);
@@ -71,7 +71,7 @@ pub(crate) fn ticks(range: (f64, f64), most: usize) -> (Vec<f64>, usize) {
 }
 
 /// `value` with `decimals`, without a negative zero.
-pub(crate) fn label(value: f64, decimals: usize) -> String {
+pub fn label(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     if text.trim_start_matches(['-', '0', '.']).is_empty() {
         text.trim_start_matches('-').to_owned()

@@ -9,11 +9,11 @@ use super::palette;
 use super::svg::size;
 
 /// Text of axes, CSS pixels.
-pub(crate) const TEXT_PX: f64 = 12.0;
+pub const TEXT_PX: f64 = 12.0;
 
 /// Lines at the ticks and none between them, and the text of a plot. What a plot wants
 /// otherwise it sets afterwards.
-pub(crate) fn plain<'m, 'a, 'b, X: Ranged, Y: Ranged, DB: DrawingBackend>(
+pub fn plain<'m, 'a, 'b, X: Ranged, Y: Ranged, DB: DrawingBackend>(
     mesh: &'m mut MeshStyle<'a, 'b, X, Y, DB>,
 ) -> &'m mut MeshStyle<'a, 'b, X, Y, DB> {
     let text = || ("sans-serif", size(TEXT_PX), &palette::TEXT);

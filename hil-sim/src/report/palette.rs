@@ -3,34 +3,46 @@
 
 use plotters::style::RGBColor;
 
-pub(crate) const TRUTH: RGBColor = RGBColor(0x1f, 0x29, 0x37);
-/// Drawn dashed, see [`DASHES`].
-pub(crate) const WANTED: RGBColor = RGBColor(0x6b, 0x72, 0x80);
-/// Drawn dashed, see [`DASHES`].
-pub(crate) const LIMIT: RGBColor = RGBColor(0xb9, 0x1c, 0x1c);
+/// What is true.
+pub const TRUTH: RGBColor = RGBColor(0x1f, 0x29, 0x37);
+/// What is asked for; drawn dashed, see [`DASHES`].
+pub const WANTED: RGBColor = RGBColor(0x6b, 0x72, 0x80);
+/// Limits; drawn dashed, see [`DASHES`].
+pub const LIMIT: RGBColor = RGBColor(0xb9, 0x1c, 0x1c);
 
-/// Drawn dashed, see [`DASHES`].
-pub(crate) const SIMULATED: RGBColor = RGBColor(0x1c, 0x6f, 0xd6);
+/// Simulated by the reference models; drawn dashed, see [`DASHES`].
+pub const SIMULATED: RGBColor = RGBColor(0x1c, 0x6f, 0xd6);
 
-pub(crate) const SPEED: RGBColor = RGBColor(0x1d, 0x7f, 0xe0);
-pub(crate) const PRELOAD: RGBColor = RGBColor(0xe0, 0x7b, 0x12);
-pub(crate) const GAP: RGBColor = RGBColor(0xd0, 0x2f, 0x6b);
-pub(crate) const RADIUS: RGBColor = RGBColor(0x0f, 0x97, 0x97);
-pub(crate) const SLIP: RGBColor = RGBColor(0x35, 0xa1, 0x4a);
-pub(crate) const COMPRESSION: RGBColor = RGBColor(0x80, 0x5a, 0xd5);
-pub(crate) const FLOOR: RGBColor = RGBColor(0x3d, 0x8e, 0xb9);
+/// Speed.
+pub const SPEED: RGBColor = RGBColor(0x1d, 0x7f, 0xe0);
+/// Preload.
+pub const PRELOAD: RGBColor = RGBColor(0xe0, 0x7b, 0x12);
+/// Gap.
+pub const GAP: RGBColor = RGBColor(0xd0, 0x2f, 0x6b);
+/// Radius.
+pub const RADIUS: RGBColor = RGBColor(0x0f, 0x97, 0x97);
+/// Slip.
+pub const SLIP: RGBColor = RGBColor(0x35, 0xa1, 0x4a);
+/// Compression of the tread.
+pub const COMPRESSION: RGBColor = RGBColor(0x80, 0x5a, 0xd5);
+/// Force on the lower wall.
+pub const FLOOR: RGBColor = RGBColor(0x3d, 0x8e, 0xb9);
 
-pub(crate) const TEXT: RGBColor = RGBColor(0x37, 0x41, 0x51);
-pub(crate) const AXIS: RGBColor = RGBColor(0x9c, 0xa3, 0xaf);
-pub(crate) const GRID: RGBColor = RGBColor(0xe9, 0xeb, 0xef);
-pub(crate) const SHADE: RGBColor = RGBColor(0xfa, 0xf1, 0xdf);
+/// Text.
+pub const TEXT: RGBColor = RGBColor(0x37, 0x41, 0x51);
+/// Axes.
+pub const AXIS: RGBColor = RGBColor(0x9c, 0xa3, 0xaf);
+/// Lines of the grid.
+pub const GRID: RGBColor = RGBColor(0xe9, 0xeb, 0xef);
+/// Shaded stretches.
+pub const SHADE: RGBColor = RGBColor(0xfa, 0xf1, 0xdf);
 
 /// Stroke colours that are drawn dashed, as SVG writes them, with their dashes.
-pub(crate) const DASHES: [(&str, &str); 3] =
+pub const DASHES: [(&str, &str); 3] =
     [("#6B7280", "11 7"), ("#B91C1C", "22 8"), ("#1C6FD6", "16 8")];
 
 /// Pale fills for the modes, by mode number.
-pub(crate) const MODES: [RGBColor; 13] = [
+pub const MODES: [RGBColor; 13] = [
     RGBColor(0xe5, 0xe7, 0xeb),
     RGBColor(0xd1, 0xd5, 0xdb),
     RGBColor(0xc7, 0xd2, 0xe8),
@@ -47,7 +59,7 @@ pub(crate) const MODES: [RGBColor; 13] = [
 ];
 
 /// Pale fills for the contact stages, from number 1.
-pub(crate) const STAGES: [RGBColor; 6] = [
+pub const STAGES: [RGBColor; 6] = [
     RGBColor(0xe5, 0xe7, 0xeb),
     RGBColor(0xdd, 0xd0, 0xf2),
     RGBColor(0xfb, 0xd5, 0xb5),
@@ -57,4 +69,4 @@ pub(crate) const STAGES: [RGBColor; 6] = [
 ];
 
 /// Pale fills for the sleeve levels, repeated.
-pub(crate) const LEVELS: [RGBColor; 2] = [RGBColor(0xe9, 0xec, 0xf1), RGBColor(0xd6, 0xdc, 0xe5)];
+pub const LEVELS: [RGBColor; 2] = [RGBColor(0xe9, 0xec, 0xf1), RGBColor(0xd6, 0xdc, 0xe5)];

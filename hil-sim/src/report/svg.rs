@@ -7,24 +7,24 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use super::palette;
 
 /// A drawing area of an SVG.
-pub(crate) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 /// What drawing may end in; into a text it cannot fail.
-pub(crate) type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
+pub type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
 
 /// Drawing units to one CSS pixel. The backend draws in whole units, so that lines
 /// are placed to half a pixel.
-pub(crate) const SCALE: u32 = 2;
+pub const SCALE: u32 = 2;
 
 /// An SVG of `size` CSS pixels that is as wide as its surroundings and as bright, with
 /// `name` for those who do not see it.
-pub(crate) fn fluid(size: (u32, u32), name: &str, draw: impl FnOnce(&Area) -> Drawn) -> String {
+pub fn fluid(size: (u32, u32), name: &str, draw: impl FnOnce(&Area) -> Drawn) -> String {
     let attributes = format!(r#"role="img" aria-label="{}""#, escape(name));
     picture(size, &attributes, draw)
 }
 
 /// An SVG of just `size` CSS pixels on white ground.
-pub(crate) fn fixed(size: (u32, u32), draw: impl FnOnce(&Area) -> Drawn) -> String {
+pub fn fixed(size: (u32, u32), draw: impl FnOnce(&Area) -> Drawn) -> String {
     let attributes = format!(r#"width="{}" height="{}""#, size.0, size.1);
     picture(size, &attributes, |area| {
         area.fill(&WHITE)?;
@@ -50,22 +50,22 @@ fn picture(size: (u32, u32), attributes: &str, draw: impl FnOnce(&Area) -> Drawn
 }
 
 /// Text of `px` CSS pixels.
-pub(crate) fn font(px: f64, colour: RGBColor, h: HPos, v: VPos) -> TextStyle<'static> {
+pub fn font(px: f64, colour: RGBColor, h: HPos, v: VPos) -> TextStyle<'static> {
     ("sans-serif", size(px)).into_font().color(&colour).pos(Pos::new(h, v))
 }
 
 /// The backend's font size for text of `px` CSS pixels.
-pub(crate) fn size(px: f64) -> f64 {
+pub fn size(px: f64) -> f64 {
     px * f64::from(SCALE) * 1.24
 }
 
 /// Estimated width of `text` of `px` CSS pixels, in drawing units, on the wide side.
-pub(crate) fn text_width(text: &str, px: f64) -> i32 {
+pub fn text_width(text: &str, px: f64) -> i32 {
     (0.60 * px * f64::from(SCALE) * text.chars().count() as f64).ceil() as i32
 }
 
 /// `text` with what HTML would read as mark-up escaped.
-pub(crate) fn escape(text: &str) -> String {
+pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 

@@ -47,7 +47,7 @@ impl Direction {
     }
 }
 
-impl From<Direction> for interstage::supervise::Direction {
+impl From<Direction> for interstage::units::Direction {
     fn from(direction: Direction) -> Self {
         match direction {
             Direction::Deploy => Self::Deploy,

@@ -1,14 +1,13 @@
 //! A run in progress: controller and plant, a tick at a time, with commands and sensor
 //! failures given from outside.
 
-use interstage::blackbox::{Flight, Late, Recorder, Reset, Restart};
-use interstage::control::{Controller, Input, Output, State};
-use interstage::hal::MotorCommand;
-use interstage::log::Record;
+use interstage::log::{Record, SnapshotRecorder};
 use interstage::model::{Plan, Planner};
+use interstage::restart::{DriveSnapshot, MissedCheckIns, Reset, Restart};
 use interstage::sense::raw::{Sample, SensorFrame};
 use interstage::supervise::{Command, Mode};
-use interstage::units::Tick;
+use interstage::tick::{Controller, Input, Output, State};
+use interstage::units::{MotorCommand, Tick};
 
 use super::stream::Stream;
 use super::{Options, RunError, TICK_S};
@@ -226,21 +225,25 @@ impl Session {
 
     /// The record of the last tick, as memory keeps it.
     #[must_use]
-    pub fn record(&self) -> Flight {
-        Recorder::default().flight(&self.held.telemetry, self.state.trust(), Late::NOBODY)
+    pub fn record(&self) -> DriveSnapshot {
+        SnapshotRecorder::default().snapshot(
+            &self.held.telemetry,
+            self.state.confidence(),
+            MissedCheckIns::NOBODY,
+        )
     }
 
     /// A reset that leaves memory and takes the power from the bridges at once: the
     /// controller starts with the position that its record of the last tick has.
     pub fn restart(&mut self) {
-        let flight = Some(self.record());
-        self.restart_from(Restart { reset: Reset::Pin, flight, crash: None });
+        let snapshot = Some(self.record());
+        self.restart_from(Restart { reset: Reset::Pin, snapshot, crash: None });
     }
 
     /// A start that finds this of the time before it.
     pub fn restart_from(&mut self, restart: Restart) {
         self.reboot();
-        self.state = State::standing(restart.place());
+        self.state = State::restored(restart.place());
         if let Some(stream) = &mut self.stream {
             stream.report(restart);
         }

@@ -1,9 +1,9 @@
 //! What sound bridges read, for a controller that is fed without a plant.
 
-use interstage::control::Output;
-use interstage::hal::MotorCommand;
 use interstage::sense::raw::{BridgeCode, BridgeCodes};
 use interstage::supervise::Lag;
+use interstage::tick::Output;
+use interstage::units::MotorCommand;
 
 /// Two bridges that take what they are given, without noise.
 #[derive(Clone, Copy, Debug, Default)]

@@ -1,16 +1,16 @@
 //! The binary log of a run in software: the firmware's own tape and scribe, so that one
 //! decoder serves both.
 
-use interstage::blackbox::Restart;
-use interstage::control::{Controller, Input, Output};
-use interstage::log::{BATCH, Entry, Event, Identity, Scribe, Tape, identity};
+use interstage::log::{BATCH, Identity, LogEncoder, Tape, identity};
+use interstage::restart::Restart;
+use interstage::tick::{Controller, Entry, Event, Input, Output};
 
 use crate::scenario::Scenario;
 
 /// The binary log as it grows. Its channel has room for everything.
 pub struct Stream {
     tape: Tape,
-    scribe: Scribe,
+    scribe: LogEncoder,
     bytes: Vec<u8>,
 }
 
@@ -18,7 +18,7 @@ impl Stream {
     /// A log of this controller from its first tick on.
     #[must_use]
     pub fn new(scenario: &Scenario, controller: &Controller) -> Self {
-        let scribe = Scribe::new(of(scenario, controller));
+        let scribe = LogEncoder::new(of(scenario, controller));
         Self { tape: Tape::new(), scribe, bytes: Vec::new() }
     }
 

@@ -8,15 +8,15 @@
 use crate::session::Echo;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use interstage::control::{Controller, Input, Output, State};
 use interstage::model::reduced::{Point, ReducedModel, Scale};
 use interstage::model::{Plan, PlanRequest, Planner, Review};
 use interstage::rig::Rig;
 use interstage::sense::raw::{
     AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
 };
-use interstage::supervise::{Command, Direction, Mode};
-use interstage::units::{Q16, Tick};
+use interstage::supervise::{Command, Mode};
+use interstage::tick::{Controller, Input, Output, State};
+use interstage::units::{Direction, Q16, Tick};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;

@@ -245,7 +245,7 @@ def main():
                     continue
                 points.append({"name": name, "elements": elements, "tolerance": tolerance,
                                **point})
-    json.dump({"scipy": scipy.__version__, "points": points}, sys.stdout)
+    json.dump({"version": f"SciPy {scipy.__version__}", "points": points}, sys.stdout)
 
 
 if __name__ == "__main__":

@@ -1,90 +1,70 @@
-//! Run time against error, measured: the reduced model in five arithmetics, the plant's
-//! resolution, other engines and solvers on one identical crossing, and what skipping
-//! saves.
+//! Run time against error: the reduced model in three number formats, the plant's
+//! resolution, and other engines and solvers on one identical crossing.
 //!
-//! Times are processor time of one thread, the least of several runs from the same
-//! state, with the answer used and checked. They depend on the machine; the ratios
-//! within one run hardly do, and errors and counts do not at all. The last are held
-//! by `budget.toml`, the first two are kept in the history.
+//! Times are processor time of one thread, the least of several runs from the same state.
+//! They depend on the machine; errors and cycles do not.
 
-pub mod arithmetic;
-pub mod budget;
-pub mod chart;
-pub mod clock;
-pub mod history;
-pub mod machine;
+pub mod cycles;
+pub mod model;
 pub mod page;
 pub mod peers;
-pub mod problem;
-pub mod run;
-pub mod skipping;
+mod python;
+mod timing;
 
 use anyhow::Result;
 use interstage::rig::Rig;
 use serde::Serialize;
 
-use arithmetic::{Arithmetics, Variant};
-use budget::{Budget, Line};
-use machine::Machine;
-use peers::Peers;
-use problem::{Problem, Truth};
-use run::Costs;
-use skipping::Firmware;
-
 use hil_sim::plant::precision::{FINER, Point, Setting, work_precision};
 
-/// Crossings at a setting of which the fastest counts.
+use cycles::Tick;
+use model::Variant;
+use peers::Peers;
+
+/// Repeats of a crossing; the fastest counts.
 const REPEATS: usize = 5;
 
 /// What is measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Options {
-    /// The other engines and solvers too; sets up what they need.
+    /// Other engines and solvers too; sets up what they need.
     pub peers: bool,
-    /// Cycles on the emulated core, if this binary has it.
+    /// Cycles on the emulated core; builds it if need be.
     pub cycles: bool,
-    /// Fewer resolutions against a less converged run: for trying it out.
+    /// Two resolutions of the plant instead of all.
     pub quick: bool,
 }
 
 /// Everything that was measured.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
-    /// Version of this package.
-    pub version: &'static str,
-    /// What it was measured on.
-    pub machine: Machine,
-    /// The reduced model in five arithmetics.
+    /// The reduced model, the shipping variant first.
     pub variants: Vec<Variant>,
-    /// How they were compared.
-    pub arithmetics: Arithmetics,
-    /// Cycles of the control tick by phase and stage, if they were measured.
-    pub account: Option<Firmware>,
+    /// The control tick on the emulated core, if it was measured.
+    pub tick: Option<Tick>,
+    /// Why there are no cycles.
+    pub cycles_left_out: Option<String>,
     /// The plant.
     pub plant: Plant,
-    /// The others, if they were asked for and could be had.
+    /// Other engines and solvers, if they were asked for and available.
     pub peers: Option<Peers>,
     /// Why they are left out.
     pub peers_left_out: Option<String>,
-    /// Bounds and whether they are kept.
-    pub budgets: Vec<Line>,
 }
 
-/// Work and precision of the plant.
+/// Error and time of the plant by resolution.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Plant {
-    /// How much finer the measure of the errors is, in elements and in stride.
+    /// How much finer the reference of the errors is, in elements and in stride.
     pub finer: usize,
-    /// What it runs with unless told otherwise.
+    /// The setting of deployments.
     pub default: Setting,
-    /// Error and cost by setting.
+    /// Error and time by setting.
     pub settings: Vec<Point>,
-    /// Whole runs.
-    pub costs: Costs,
 }
 
 impl Plant {
-    /// The default setting's errors and cost.
+    /// The default setting's errors and time.
     #[must_use]
     pub fn usual(&self) -> Option<&Point> {
         self.settings.iter().find(|point| {
@@ -93,67 +73,40 @@ impl Plant {
     }
 }
 
-/// Measures; `say` hears what is going on.
+/// Measures; `say` is called with each part's name.
 ///
 /// # Errors
-/// If a crossing cannot be balanced or a run does not complete.
-pub fn measure(options: Options, say: &(dyn Fn(&str) + Sync)) -> Result<Report> {
-    say("arithmetics");
-    let mut arithmetics = arithmetic::measure(options.quick, options.cycles)?;
-    let variants = std::mem::take(&mut arithmetics.variants);
-    say("control tick");
-    let account = firmware(options.cycles)?;
-    say("whole runs");
-    let costs = run::measure(options.quick)?;
-    say("resolutions");
-    let default = Setting::usual();
-    let (sweep, repeats) = if options.quick { (few(), 1) } else { (Setting::sweep(), REPEATS) };
-    let settings = work_precision(&Rig::prototype(), &sweep, repeats, || ())?;
-    let plant = Plant { finer: FINER, default, settings, costs };
-    let (peers, peers_left_out) = peers_if(options.peers, say);
-    let mut report = Report {
-        version: env!("CARGO_PKG_VERSION"),
-        machine: Machine::here(),
-        variants,
-        arithmetics,
-        account,
-        plant,
-        peers,
-        peers_left_out,
-        budgets: Vec::new(),
+/// If the model cannot be built, a crossing cannot be balanced, or core and host differ.
+pub fn measure(options: Options, say: &dyn Fn(&str)) -> Result<Report> {
+    say("reduced model");
+    let mut variants = model::measure()?;
+    let (tick, cycles_left_out) = if options.cycles {
+        say("cycles");
+        match cycles::run() {
+            Ok(measured) => (cycles::fill(&measured, &mut variants)?, None),
+            Err(error) => (None, Some(one_line(&error))),
+        }
+    } else {
+        (None, Some("not asked for".to_owned()))
     };
-    report.budgets = Budget::shipped()?.lines(&report);
-    Ok(report)
+    say("plant");
+    let default = Setting::usual();
+    let coarse = Setting { elements: default.elements / 4, stride_mm: 4.0 * default.stride_mm };
+    let (sweep, repeats) =
+        if options.quick { (vec![coarse, default], 1) } else { (Setting::sweep(), REPEATS) };
+    let settings = work_precision(&Rig::prototype(), &sweep, repeats, || ())?;
+    let (peers, peers_left_out) = if options.peers {
+        match peers::compare(say) {
+            Ok(peers) => (Some(peers), None),
+            Err(error) => (None, Some(one_line(&error))),
+        }
+    } else {
+        (None, Some("not asked for: `rig bench --peers` sets them up".to_owned()))
+    };
+    let plant = Plant { finer: FINER, default, settings };
+    Ok(Report { variants, tick, cycles_left_out, plant, peers, peers_left_out })
 }
 
-/// The peers, or in one line why not.
-fn peers_if(wanted: bool, say: &(dyn Fn(&str) + Sync)) -> (Option<Peers>, Option<String>) {
-    if !wanted {
-        return (None, Some("not asked for: `rig bench --peers` sets them up".to_owned()));
-    }
-    say("converged crossing");
-    let found = Problem::published()
-        .converged()
-        .map_err(anyhow::Error::from)
-        .and_then(|truth: Truth| peers::compare(&truth, &|what| say(what)));
-    match found {
-        Ok(peers) => (Some(peers), None),
-        Err(error) => (None, Some(format!("{error:#}").replace('\n', " "))),
-    }
-}
-
-#[cfg(feature = "board")]
-fn firmware(wanted: bool) -> Result<Option<Firmware>> {
-    wanted.then(skipping::measure).transpose()
-}
-
-#[cfg(not(feature = "board"))]
-fn firmware(_: bool) -> Result<Option<Firmware>> {
-    Ok(None)
-}
-
-/// The default setting and a coarse one.
-fn few() -> Vec<Setting> {
-    let usual = Setting::usual();
-    vec![Setting { elements: usual.elements / 4, stride_mm: 4.0 * usual.stride_mm }, usual]
+fn one_line(error: &anyhow::Error) -> String {
+    format!("{error:#}").replace('\n', " ")
 }

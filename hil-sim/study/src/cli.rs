@@ -1,9 +1,12 @@
 //! The verbs of `rig` that show the study.
 
 mod bench;
+mod constants;
+mod figures;
 mod modes;
 mod paper;
 
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -22,6 +25,10 @@ enum Verb {
     Bench(bench::Args),
     Modes(modes::Args),
     Paper(paper::Args),
+    #[command(hide = true)]
+    Constants(constants::Args),
+    #[command(hide = true)]
+    Figures(figures::Args),
 }
 
 impl Verb {
@@ -30,6 +37,8 @@ impl Verb {
             Self::Bench(args) => bench::run(args),
             Self::Modes(args) => modes::run(args),
             Self::Paper(args) => paper::run(args),
+            Self::Constants(args) => constants::run(args),
+            Self::Figures(args) => figures::run(args),
         }
     }
 }
@@ -38,4 +47,29 @@ impl Verb {
 #[must_use]
 pub fn main() -> ExitCode {
     hil_sim::cli::run(|cli: &Cli| cli.verb.run())
+}
+
+/// The repository's root.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// The folder of the documentation.
+fn docs() -> PathBuf {
+    root().join("docs")
+}
+
+/// Writes texts to files of a folder, which is made; returns their paths.
+fn write(
+    folder: &Path,
+    files: impl IntoIterator<Item = (impl AsRef<Path>, String)>,
+) -> Result<Vec<PathBuf>, Failure> {
+    let put = |(name, text): (_, String)| {
+        let path = folder.join(name);
+        let made = path.parent().map_or(Ok(()), std::fs::create_dir_all);
+        let done = made.and_then(|()| std::fs::write(&path, text));
+        done.map_err(|error| Failure::input(format!("{}: {error}", path.display())))?;
+        Ok(path)
+    };
+    files.into_iter().map(put).collect()
 }

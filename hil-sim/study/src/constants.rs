@@ -14,7 +14,7 @@ use anyhow::{Context, Result, ensure};
 use interstage::model::felt::Kind;
 use interstage::model::formula::Formula;
 use interstage::rig::Rig;
-use interstage::supervise::Direction;
+use interstage::units::Direction;
 
 use data::{Row, run_all};
 use design::{Case, Use};

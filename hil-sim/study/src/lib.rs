@@ -4,6 +4,8 @@
 pub mod bench;
 pub mod cli;
 pub mod constants;
-pub mod docs;
+pub mod figure;
+pub mod figure_svg;
+pub mod model_figures;
 pub mod paper;
 pub mod reference;

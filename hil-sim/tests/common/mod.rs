@@ -8,10 +8,11 @@ use hil_sim::plant::ledger::Crossing;
 use hil_sim::plant::rig::Truth;
 use hil_sim::scenario::{Direction, Scenario};
 use hil_sim::session::{Options, Session};
-use interstage::hal::MotorCommand;
-use interstage::log::{CrossingRecord, Entry, Event, Telemetry};
+use interstage::fault::Fault;
 use interstage::sense::raw::SensorFrame;
-use interstage::supervise::{Command, Fault, Mode};
+use interstage::supervise::{Command, Mode};
+use interstage::tick::{CrossingRecord, Entry, Event, Telemetry};
+use interstage::units::MotorCommand;
 
 /// Both ways of a run.
 pub(crate) const WAYS: [Direction; 2] = [Direction::Deploy, Direction::Retract];

@@ -3,7 +3,7 @@
 use hil_sim::plant::balance::Axial;
 use hil_sim::plant::crossing::CrossingCase;
 
-use crate::bench::{close, crossed, elastic, fine, off, rubber, usual};
+use super::bench::{close, crossed, elastic, fine, off, rubber, usual};
 
 #[test]
 fn the_three_fitted_gaps_are_met() {

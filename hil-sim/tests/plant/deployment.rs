@@ -4,7 +4,7 @@ use hil_sim::plant::balance::Axial;
 use hil_sim::plant::rig::{Resolution, Truth};
 use hil_sim::plant::wall::{Step, Wall};
 
-use crate::bench::{TICK_S, close, crossed, deploy, elastic, fine, ideal, nominal, off, pairs};
+use super::bench::{TICK_S, close, crossed, deploy, elastic, fine, ideal, nominal, off, pairs};
 
 /// As runs are computed.
 const USUAL: Resolution = Resolution { stride_mm: 0.02, always_awake: false };
@@ -31,23 +31,6 @@ fn every_crossing_of_a_deployment_is_the_isolated_one() {
                 close(crossing.gap_mm, alone.gap_mm, 0.004);
                 close(crossing.peak_utilisation, alone.mu_needed, 0.004);
                 close(crossing.speed_mm_s, speed.abs(), 1e-3);
-            }
-        }
-    }
-}
-
-#[test]
-fn elements_and_stride_converge() {
-    for (preset, preload) in PRESETS {
-        for speed in [6.0, 20.0, 30.0, -6.0, -30.0] {
-            let usual = deploy(nominal(preset), USUAL, speed, preload, |_| {});
-            let mut plant = nominal(preset);
-            plant.ring.elements *= 4;
-            let fine = deploy(plant, FINE, speed, preload, |_| {});
-            for (usual, fine) in pairs(&usual, &fine) {
-                close(usual.gap_mm, fine.gap_mm, 0.004);
-                close(usual.corner_n, fine.corner_n, 0.004);
-                close(usual.speed_mm_s, fine.speed_mm_s, 0.004);
             }
         }
     }

@@ -1,17 +1,20 @@
-//! A rig led through the spin and the preload of a run goes the way of that run.
+//! A rig under the rotation and preload of a run moves as in that run, and parameters that
+//! change in a run act.
 
 use hil_sim::plant::draw::PlantParameters;
-use hil_sim::plant::rig::VirtualRig;
+use hil_sim::plant::rig::{Drives, VirtualRig};
 use hil_sim::scenario::Scenario;
 use hil_sim::session::{Options, Session};
 
-/// Bound on the way, mm: a twentieth of what a wheel does in a millisecond.
-const WAY_MM: f64 = 0.002;
-/// Bound on the height at any time, mm: the arm's modes, which a led rig does not have.
+use super::bench::{TICK_S, nominal};
+
+/// Bound on the position, mm: a twentieth of what a wheel does in a millisecond.
+const POSITION_MM: f64 = 0.002;
+/// Bound on the height at any time, mm: the arm's modes, which a rig that follows does not have.
 const SHAKEN_MM: f64 = 0.03;
 
 #[test]
-fn a_run_led_by_its_own_spin_and_preload_is_the_run() {
+fn following_the_rotation_and_preload_of_a_run_gives_that_run() {
     let mut scenario = Scenario::default();
     scenario.run.seed = 3;
     let mut session = Session::new(&scenario, Options::default()).unwrap();
@@ -25,15 +28,15 @@ fn a_run_led_by_its_own_spin_and_preload_is_the_run() {
     parameters.spring_n_per_mm = 0.0;
     for step in [1usize, 2, 4] {
         let dt = 1e-3 * step as f64;
-        let mut led = VirtualRig::new(parameters.clone(), 0.0, truths[0].preload_n, dt);
+        let mut rig = VirtualRig::new(parameters.clone(), 0.0, truths[0].preload_n, dt);
         let radius = parameters.ring.radius_mm;
         let (mut height, mut count) = (0.0, 0.0);
         for k in (step..5000).step_by(step) {
             let (a, b) = (truths[k - step], truths[k]);
             let tread = radius * (b.rotation_rad - a.rotation_rad) / dt;
-            led.follow(tread, b.preload_n, dt).unwrap();
-            let t = led.truth();
-            assert!((t.position_mm - b.position_mm).abs() < WAY_MM, "{step} {k}: {t:?} {b:?}");
+            rig.follow(tread, b.preload_n, dt).unwrap();
+            let t = rig.truth();
+            assert!((t.position_mm - b.position_mm).abs() < POSITION_MM, "{step} {k}: {t:?} {b:?}");
             assert!((t.height_mm - b.height_mm).abs() < SHAKEN_MM, "{step} {k}: {t:?} {b:?}");
             height += t.height_mm - b.height_mm;
             count += 1.0;
@@ -42,4 +45,23 @@ fn a_run_led_by_its_own_spin_and_preload_is_the_run() {
         let mean: f64 = height / count;
         assert!(mean.abs() < 2e-4, "{step}: {mean}");
     }
+}
+
+#[test]
+fn a_broken_spring_and_a_soft_tread_act_in_their_part() {
+    let run = |rig: &mut VirtualRig| {
+        (0..1000).for_each(|_| rig.step(&Drives::default(), TICK_S).unwrap());
+        *rig.truth()
+    };
+    let mut rig = VirtualRig::new(nominal("prototype"), 0.0, 30.0, TICK_S);
+    let before = run(&mut rig);
+    rig.break_spring(0.5);
+    let part = run(&mut rig).preload_n / before.preload_n;
+    assert!((part - 0.5).abs() < 0.01, "{part}");
+    let mut rig = VirtualRig::new(nominal("prototype"), 0.0, 30.0, TICK_S);
+    let (before, ring) = (run(&mut rig), rig.parameters().ring);
+    rig.set_stiffness(0.3 * ring.k_inf, 0.3 * ring.k_0);
+    // Force grows as compression to 3/2.
+    let deeper = run(&mut rig).depth_mm / before.depth_mm / (1.0f64 / 0.3).powf(2.0 / 3.0);
+    assert!((deeper - 1.0).abs() < 0.05, "{deeper}");
 }

@@ -5,7 +5,7 @@ use hil_sim::plant::wall::Wall;
 use hil_sim::scenario::Scenario;
 use hil_sim::session::{Options, run};
 
-use crate::bench::{TICK_S, close, deploy, drive, ideal, nominal, roll};
+use super::bench::{TICK_S, close, deploy, drive, ideal, nominal, roll};
 
 /// The scenario of a preset with these overrides.
 fn scenario(preset: &str, sets: &[&str]) -> Scenario {

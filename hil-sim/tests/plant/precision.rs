@@ -1,9 +1,11 @@
 //! Error of the usual setting against one twenty times as fine, and how it falls.
 
-use hil_sim::plant::precision::{FINER, Setting, crossings, work_precision};
+use hil_sim::plant::ledger::Crossing;
+use hil_sim::plant::precision::{FINER, Setting, work_precision};
+use hil_sim::plant::rig::{Drives, Resolution, VirtualRig};
 use interstage::rig::Rig;
 
-use crate::bench::{TICK_S, nominal, off};
+use super::bench::{TICK_S, nominal, off};
 
 #[test]
 fn an_isolated_crossing_is_within_its_error() {
@@ -12,13 +14,43 @@ fn an_isolated_crossing_is_within_its_error() {
     assert!(points[0].force_error < 3e-3, "{points:?}");
 }
 
+/// The crossings of the whole travel at constant duty with the screw held, the drive a
+/// hundred times as strong as it is: nothing but setting and tick differs.
+fn crossings(
+    preset: &str,
+    setting: Setting,
+    tick_s: f64,
+    (speed_mm_s, preload_n): (f64, f64),
+) -> Vec<Crossing> {
+    let mut plant = nominal(preset);
+    plant.ring.elements = setting.elements;
+    plant.drive.stall_n *= 100.0;
+    plant.drive.limit_n *= 100.0;
+    let duty = speed_mm_s / plant.drive.no_load_mm_s;
+    let (low, high) = plant.stops_mm;
+    let (from, to) = if speed_mm_s > 0.0 { (0.0, high - 1.0) } else { (high - 2.0, low + 1.0) };
+    let longest_s = 5.0 * (high - low) / speed_mm_s.abs();
+    let resolution = Resolution { stride_mm: setting.stride_mm, ..Resolution::default() };
+    let mut rig = VirtualRig::new(plant, from, preload_n, tick_s).with_resolution(resolution);
+    let drives = Drives { drive: duty, drive_on: true, ..Drives::default() };
+    while (rig.truth().position_mm - to) * speed_mm_s < 0.0 && rig.truth().time_s < longest_s {
+        rig.step(&drives, tick_s).unwrap();
+    }
+    rig.ledger().crossings().to_vec()
+}
+
 #[test]
 fn a_crossing_inside_a_deployment_is_within_its_error() {
-    for way in [(25.0, 48.0), (8.0, 33.3), (-8.0, 33.3)] {
-        let plant = nominal("prototype");
-        let usual = crossings(&plant, Setting::usual(), TICK_S, way).unwrap();
-        let tick = TICK_S / FINER as f64;
-        let fine = crossings(&plant, Setting::usual().finer(FINER), tick, way).unwrap();
+    let drives = [
+        ("prototype", (25.0, 48.0)),
+        ("prototype", (8.0, 33.3)),
+        ("prototype", (-8.0, 33.3)),
+        ("fe", (-30.0, 100.0)),
+    ];
+    for (preset, drive) in drives {
+        let usual = crossings(preset, Setting::usual(), TICK_S, drive);
+        let tick_s = TICK_S / FINER as f64;
+        let fine = crossings(preset, Setting::usual().finer(FINER), tick_s, drive);
         assert_eq!((usual.len(), fine.len()), (3, 3));
         for (usual, fine) in usual.iter().zip(&fine) {
             assert!(off(usual.gap_mm, fine.gap_mm).abs() < 2.5e-3, "{usual:?} {fine:?}");

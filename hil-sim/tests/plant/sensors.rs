@@ -8,7 +8,7 @@ use interstage::sense::raw::{Sample, SensorFrame};
 use interstage::sense::{SensedState, Senses, SensesState, Tuning, Validity};
 use interstage::units::MillimetresPerSecond2;
 
-use crate::bench::{TICK_S, nominal};
+use super::bench::{TICK_S, nominal};
 
 /// The firmware's sensors without filters, and the plant's, ideal but for `noise`.
 struct Chain {

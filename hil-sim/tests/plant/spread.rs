@@ -3,7 +3,7 @@
 use hil_sim::plant::draw::PlantParameters;
 use hil_sim::scenario::{Scenario, Spread};
 
-use crate::bench::nominal;
+use super::bench::nominal;
 
 const SEEDS: u64 = 2000;
 

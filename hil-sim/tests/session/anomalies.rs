@@ -8,7 +8,8 @@ use crate::common::{
 use hil_sim::record::Tick;
 use hil_sim::scenario::{Direction, Scenario, StepAnomaly};
 use hil_sim::session::{Options, run};
-use interstage::supervise::{Fault, Mode};
+use interstage::fault::Fault;
+use interstage::supervise::Mode;
 
 /// What comes of a run.
 #[derive(Debug)]

@@ -4,9 +4,10 @@
 use hil_sim::scenario::{Direction, Scenario};
 use hil_sim::session::{Options, Session};
 use hil_sim::testing::long;
-use interstage::blackbox::{Reset, Restart};
-use interstage::log::Event;
-use interstage::supervise::{Command, Fault, Limit, Mode};
+use interstage::fault::{Fault, Limit};
+use interstage::restart::{Reset, Restart};
+use interstage::supervise::{Command, Mode};
+use interstage::tick::Event;
 use interstage::units::Millimetres;
 use rayon::prelude::*;
 
@@ -105,9 +106,9 @@ fn lost_at_a_corner(
     off: f64,
 ) -> Session {
     let mut session = stopped_at_a_corner(seed, direction, step, before);
-    let mut flight = session.record();
-    flight.position += Millimetres::from_num(off);
-    session.restart_from(Restart { reset: Reset::Power, flight: Some(flight), crash: None });
+    let mut snapshot = session.record();
+    snapshot.position += Millimetres::from_num(off);
+    session.restart_from(Restart { reset: Reset::Power, snapshot: Some(snapshot), crash: None });
     session
 }
 
@@ -295,9 +296,9 @@ fn moved_on_the_last_wall(seed: u64, moved: f64, out: u32) -> (Session, Vec<Limi
     drive(&mut session, Direction::Deploy, 40_000, |session| {
         session.plant().truth().position_mm > 71.0
     });
-    let mut flight = session.record();
-    flight.position -= Millimetres::from_num(moved);
-    session.restart_from(Restart { reset: Reset::Power, flight: Some(flight), crash: None });
+    let mut snapshot = session.record();
+    snapshot.position -= Millimetres::from_num(moved);
+    session.restart_from(Restart { reset: Reset::Power, snapshot: Some(snapshot), crash: None });
     let limits = drive(&mut session, Direction::Deploy, out, |_| false);
     (session, limits)
 }
@@ -338,8 +339,8 @@ fn no_reset_makes_a_place_sure_that_no_step_has_confirmed() {
     for moved in MOVED {
         let (mut session, _) = moved_on_the_last_wall(3, moved, 40_000);
         for reset in [Reset::Pin, Reset::Software] {
-            let flight = Some(session.record());
-            let restart = Restart { reset, flight, crash: None };
+            let snapshot = Some(session.record());
+            let restart = Restart { reset, snapshot, crash: None };
             assert!(restart.place().is_some_and(|place| !place.sure), "{moved}: {restart}");
             session.restart_from(restart);
             // Idle for a second: nothing moves, and nothing is found out.
@@ -353,7 +354,7 @@ fn no_reset_makes_a_place_sure_that_no_step_has_confirmed() {
         assert_eq!(mode, Mode::Complete(Direction::Retract.into()), "{moved}");
         assert!(at.abs() < 2.6, "{moved}: {at}");
         // A step has been found: from here on it is sure again.
-        let restart = Restart { reset: Reset::Pin, flight: Some(session.record()), crash: None };
+        let restart = Restart { reset: Reset::Pin, snapshot: Some(session.record()), crash: None };
         assert!(restart.place().is_some_and(|place| place.sure), "{moved}: {restart}");
     }
 }

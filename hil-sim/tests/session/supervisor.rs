@@ -8,14 +8,14 @@ use hil_sim::plant::rig::VirtualRig;
 use hil_sim::plant::sensors::Sensors;
 use hil_sim::scenario::Scenario;
 use hil_sim::session::{Echo, drives, read};
-use interstage::control::{Controller, Input, Output, State};
-use interstage::hal::MotorCommand;
-use interstage::log::Event;
+use interstage::fault::Fault;
 use interstage::model::{Plan, Planner};
 use interstage::sense::raw::{
     AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
 };
-use interstage::supervise::{Command, Direction, Fault, Mode};
+use interstage::supervise::{Command, Mode};
+use interstage::tick::{Controller, Event, Input, Output, State};
+use interstage::units::{Direction, MotorCommand};
 use proptest::prelude::*;
 
 /// The controller in the middle of a mode, and what it was last given.

@@ -23,17 +23,18 @@ use hil_sim::plant::rig::{Drives, VirtualRig};
 use hil_sim::plant::sensors::{Codes, Sensors};
 use hil_sim::scenario::{Direction, Scenario};
 use hil_sim::session;
-use interstage::blackbox::Flight;
-use interstage::control::Controller;
+use interstage::fault::Fault;
 use interstage::hal::{
-    AnalogInput, AngleBus, CommandSource, Indicator, Journal, Light, MotorCommand, Motors,
-    Watchdog, WheelEncoder,
+    AnalogInput, AngleBus, CommandSource, Indicator, Journal, Light, Motors, Watchdog, WheelEncoder,
 };
-use interstage::log::{CrossingRecord, Entry, Event, Identity, Scribe, Telemetry};
+use interstage::log::{Identity, LogEncoder};
 use interstage::model::Planner;
+use interstage::restart::DriveSnapshot;
 use interstage::sense::raw::{AdcCode, AngleFrame, BridgeCodes, BusFault, EncoderCount};
-use interstage::supervise::{Command, Fault, Mode};
-use interstage::tasks::{self, Exchange, Station};
+use interstage::supervise::{Command, Mode};
+use interstage::tasks::{self, Exchange, TaskId};
+use interstage::tick::{Controller, CrossingRecord, Entry, Event, Telemetry};
+use interstage::units::MotorCommand;
 
 /// The clock is one for the whole process: one board at a time.
 static CLOCK: Mutex<()> = Mutex::new(());
@@ -121,7 +122,7 @@ impl Watchdog for Peripheral {
         self.0.fed.borrow_mut().push(Instant::now().as_millis());
     }
 
-    fn keep(&mut self, _: &Flight) {}
+    fn keep(&mut self, _: &DriveSnapshot) {}
 }
 
 impl Journal for Peripheral {
@@ -221,7 +222,7 @@ impl Board {
             Box::pin(async { tasks::tape(latest, exchange).await }),
             Box::pin(async { tasks::model(planner, exchange).await }),
             Box::pin(async {
-                let mut scribe = Scribe::new(Identity::NOBODY);
+                let mut scribe = LogEncoder::new(Identity::NOBODY);
                 tasks::journal(journal, light, &mut scribe, exchange).await
             }),
         ];
@@ -418,5 +419,5 @@ fn a_hanging_converter_stops_the_drive_while_the_board_lives_on() {
     let fed = board.shared.fed.borrow();
     let late = fed.iter().filter(|at| **at > u64::from(FIRST_TICK) + ticks as u64).count();
     assert!(late >= 299, "{late}");
-    assert!(board.exchange.bus_faults(Station::Pressure) > 50);
+    assert!(board.exchange.bus_faults(TaskId::Pressure) > 50);
 }

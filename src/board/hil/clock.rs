@@ -7,7 +7,7 @@ use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_time_driver::{Driver, TICK_HZ as CLOCK_HZ, time_driver_impl};
 use embassy_time_queue_utils::Queue;
-use interstage::hil::FIRST;
+use interstage::hal::hil::FIRST;
 use interstage::units::{TICK_HZ, Tick};
 
 /// Clock ticks in a control tick.

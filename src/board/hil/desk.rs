@@ -5,9 +5,9 @@ use core::cell::Cell;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
-use interstage::hal::MotorCommand;
-use interstage::hil::Given;
+use interstage::hal::hil::Given;
 use interstage::supervise::Command;
+use interstage::units::MotorCommand;
 
 /// Between the host's line and the parts of the board that it stands in for.
 pub(super) struct Desk {

@@ -2,12 +2,11 @@
 
 use embassy_stm32::gpio::{AnyPin, Level, Output, Speed};
 use embassy_stm32::{Peri, Peripherals};
-use interstage::hal::{
-    AnalogInput, AngleBus, CommandSource, MotorCommand, Motors, Parts, WheelEncoder,
-};
-use interstage::hil::Given;
+use interstage::hal::hil::Given;
+use interstage::hal::{AnalogInput, AngleBus, CommandSource, Motors, Parts, WheelEncoder};
 use interstage::sense::raw::{AdcCode, AngleFrame, BridgeCodes, BusFault, EncoderCount};
 use interstage::supervise::Command;
+use interstage::units::MotorCommand;
 use rtt_target::DownChannel;
 
 use super::desk::DESK;

@@ -2,9 +2,9 @@
 //! of them waiting.
 
 use cortex_m::peripheral::DWT;
-use interstage::hil::{FIRST, Given, PROTOCOL, Taken, ToBoard, ToHost};
-use interstage::link::{Gatherer, frame};
-use interstage::log::number;
+use interstage::hal::hil::{FIRST, Given, PROTOCOL, Taken, ToBoard, ToHost};
+use interstage::log::codes;
+use interstage::params::link::{FrameReader, frame};
 use interstage::tasks::Exchange;
 use interstage::units::Tick;
 use rtt_target::{ChannelMode, DownChannel, UpChannel};
@@ -31,7 +31,7 @@ type Channels = (UpChannel, DownChannel);
 /// that run. There is no way back but a restart.
 pub(crate) fn serve(channels: Channels, exchange: &Exchange, begin: impl FnOnce()) -> ! {
     count_cycles();
-    let mut line = Line { channels, gatherer: Gatherer::new() };
+    let mut line = Line { channels, gatherer: FrameReader::new() };
     while line.take() != Some(ToBoard::Hello { protocol: PROTOCOL }) {}
     begin();
     let mut course = Course { next: FIRST, last: None, alone: false };
@@ -83,7 +83,7 @@ impl Course {
             ToBoard::Tick(tick, given) if tick == self.next && !self.alone => {
                 self.tick(given);
                 let (drive, preload) = DESK.commands();
-                let mode = exchange.telemetry().map_or(0, |seen| number::of_mode(seen.mode));
+                let mode = exchange.telemetry().map_or(0, |seen| codes::of_mode(seen.mode));
                 let taken = Taken::new(drive, preload, mode);
                 self.last = Some((tick, taken));
                 Some(ToHost::Done(tick, taken))
@@ -99,7 +99,7 @@ impl Course {
     /// A tick: the command first, because its task has to pass it on.
     fn tick(&mut self, given: Given) {
         DESK.give(given);
-        if let Some(command) = number::command(given.command) {
+        if let Some(command) = codes::command(given.command) {
             DESK.pressed.signal(command);
             clock::settle();
         }
@@ -111,7 +111,7 @@ impl Course {
 /// Frames over the two channels.
 struct Line {
     channels: Channels,
-    gatherer: Gatherer,
+    gatherer: FrameReader,
 }
 
 impl Line {

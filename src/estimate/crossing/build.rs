@@ -19,9 +19,6 @@ const MEMORY_STIFFENING: f64 = 4.2235;
 
 impl CrossingWatch {
     /// The watch of a rig.
-    ///
-    /// # Errors
-    /// [`RigError`] if a length is out of range.
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         let (r, h) = (rig.rig.wheel_radius_mm, rig.rig.step_height_mm);
         Ok(Self {
@@ -40,14 +37,14 @@ impl CrossingWatch {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Contact, Seen, Sign, WatchState};
+    use super::super::{Contact, CrossingEvent, WatchInput, WatchState};
     use super::*;
-    use crate::supervise::Direction;
+    use crate::units::Direction;
     use crate::units::{Q16, q16};
     use proptest::prelude::*;
 
-    fn seen(radius: f64, compression: f64) -> Seen {
-        Seen {
+    fn seen(radius: f64, compression: f64) -> WatchInput {
+        WatchInput {
             radius: Q16::from_num(radius),
             compression: Q16::from_num(compression),
             near: false,
@@ -56,12 +53,17 @@ mod tests {
     }
 
     /// Rolls a wheel with constant corner depth over a step and returns the signs.
-    fn roll(depth: f64, height: f64, direction: Direction) -> Vec<Sign> {
+    fn roll(depth: f64, height: f64, direction: Direction) -> Vec<CrossingEvent> {
         roll_from(depth, height, direction, None)
     }
 
     /// The same from this place on the corner, known by the table alone.
-    fn roll_from(depth: f64, height: f64, direction: Direction, from: Option<f64>) -> Vec<Sign> {
+    fn roll_from(
+        depth: f64,
+        height: f64,
+        direction: Direction,
+        from: Option<f64>,
+    ) -> Vec<CrossingEvent> {
         let watch = CrossingWatch::try_build(&Rig::prototype()).unwrap();
         let mut state = WatchState::default();
         let flat = 0.3;
@@ -90,7 +92,7 @@ mod tests {
                 Direction::Retract => x < -15.0,
             };
             let near = x.abs() < 16.0;
-            let now = Seen { near, clear, ..seen(150.0 - y, compression) };
+            let now = WatchInput { near, clear, ..seen(150.0 - y, compression) };
             if index == 0 {
                 let level = u8::from(direction == Direction::Retract);
                 match from {
@@ -117,7 +119,12 @@ mod tests {
             assert!(
                 matches!(
                     signs[..],
-                    [Sign::Touched, Sign::Lifted(_), Sign::Over, Sign::Closed { .. }]
+                    [
+                        CrossingEvent::Touched,
+                        CrossingEvent::Lifted(_),
+                        CrossingEvent::Passed,
+                        CrossingEvent::GapClosed { .. }
+                    ]
                 ),
                 "{direction:?} {signs:?}"
             );
@@ -129,7 +136,14 @@ mod tests {
         for from in [-12.0, -9.0, -5.0, -2.0] {
             for direction in [Direction::Deploy, Direction::Retract] {
                 let signs = roll_from(0.7, 4.0, direction, Some(from));
-                let rest = matches!(signs[..], [Sign::Lifted(_), Sign::Over, Sign::Closed { .. }]);
+                let rest = matches!(
+                    signs[..],
+                    [
+                        CrossingEvent::Lifted(_),
+                        CrossingEvent::Passed,
+                        CrossingEvent::GapClosed { .. }
+                    ]
+                );
                 assert!(rest, "{direction:?} from {from}: {signs:?}");
             }
         }
@@ -164,11 +178,11 @@ mod tests {
             let exact = ((25.0 - depth).powi(2) + height * (2.0 * y - height)).sqrt() - 25.0;
             for sign in roll(depth, height, direction) {
                 match sign {
-                    Sign::Lifted(lift) => {
+                    CrossingEvent::Lifted(lift) => {
                         let distance = ((25.0 - depth).powi(2) - (y - 4.0).powi(2)).sqrt();
                         prop_assert!((lift.distance.to_num::<f64>() - distance).abs() < 1e-3);
                     }
-                    Sign::Closed { height: h, gap, plausible } => {
+                    CrossingEvent::GapClosed { height: h, gap, plausible } => {
                         prop_assert_eq!(plausible, (height - 4.0).abs() < 0.12);
                         prop_assert!((h.to_num::<f64>() - height).abs() < 0.02);
                         prop_assert!((gap.to_num::<f64>() - exact).abs() < 0.02, "{gap} {exact}");
@@ -227,7 +241,7 @@ mod tests {
         // So high over a wall of 125 mm with the tread 0.5 mm deep.
         let high = |rise: Q16| {
             let wall = seen(125.5, 0.5);
-            Seen { radius: wall.radius - rise, near: true, ..wall }
+            WatchInput { radius: wall.radius - rise, near: true, ..wall }
         };
         let out = Direction::Deploy;
         let signs = |rise: Q16| {
@@ -238,7 +252,7 @@ mod tests {
                 .find_map(|tick| watch.step(&mut state, out, &high(rise)).map(|sign| (sign, tick)))
         };
         let (touch, release) = (super::super::TOUCH, super::super::RELEASE);
-        assert_eq!(signs(touch), Some((Sign::Touched, 3)));
+        assert_eq!(signs(touch), Some((CrossingEvent::Touched, 3)));
         assert_eq!(signs(touch - Q16::DELTA), None);
         let after = |rise: Q16| {
             let watch = watch();
@@ -252,7 +266,7 @@ mod tests {
                 .find_map(|tick| watch.step(&mut state, out, &high(rise)).map(|sign| (sign, tick)))
         };
         assert_eq!(after(release), None);
-        assert_eq!(after(release - Q16::DELTA), Some((Sign::Released, 60)));
+        assert_eq!(after(release - Q16::DELTA), Some((CrossingEvent::Released, 60)));
     }
 
     #[test]
@@ -262,11 +276,14 @@ mod tests {
         // Back over the edge between walls at 121 and 125 mm, 0.3 mm deep in the tread.
         watch.begin(&mut state, &seen(121.3, 0.3));
         let back = [(121.3, 0.3), (121.9, 0.6), (121.9, 0.6), (121.9, 0.6), (125.3, 0.7)];
-        let signs: Vec<Sign> = back
+        let signs: Vec<CrossingEvent> = back
             .iter()
             .filter_map(|at| watch.step(&mut state, Direction::Retract, &seen(at.0, at.1)))
             .collect();
-        assert!(matches!(signs[..], [Sign::Touched, Sign::Lifted(_)]), "{signs:?}");
+        assert!(
+            matches!(signs[..], [CrossingEvent::Touched, CrossingEvent::Lifted(_)]),
+            "{signs:?}"
+        );
         // And up again: the lower wall stops to carry that much before the undeformed wheel.
         watch.reverse(&mut state, Direction::Deploy);
         let kept = 0.3 * watch.memory.to_num::<f64>();
@@ -274,7 +291,7 @@ mod tests {
         let up = |radius: f64| seen(radius, 0.7);
         assert_eq!(watch.step(&mut state, Direction::Deploy, &up(125.0 + kept + 0.01)), None);
         let sign = watch.step(&mut state, Direction::Deploy, &up(125.0 + kept - 0.01));
-        let Some(Sign::Lifted(lift)) = sign else { panic!("{sign:?}") };
+        let Some(CrossingEvent::Lifted(lift)) = sign else { panic!("{sign:?}") };
         assert!((lift.height.to_num::<f64>() - (25.0 - kept)).abs() < 1e-3, "{lift:?}");
     }
 
@@ -289,7 +306,7 @@ mod tests {
             // So far off the wall that this level has by the table, in the way of the run.
             let wall = watch.wall(level);
             let off = if direction == Direction::Deploy { -beyond } else { beyond };
-            let at = Seen { radius: wall + off, clear: false, ..seen(0.0, 0.0) };
+            let at = WatchInput { radius: wall + off, clear: false, ..seen(0.0, 0.0) };
             let sign = (1..50)
                 .find_map(|tick| watch.step(&mut state, direction, &at).map(|sign| (sign, tick)));
             (sign, watch.rise(&state, direction, &at), state.contact)
@@ -301,7 +318,11 @@ mod tests {
             assert_eq!(sign, None, "{direction:?}");
             let beyond = again + q16(10_000);
             let (sign, rise, now) = signs(direction, beyond);
-            assert_eq!(sign, Some((Sign::Again { gap: Q16::ZERO }, 3)), "{direction:?}");
+            assert_eq!(
+                sign,
+                Some((CrossingEvent::Retouched { gap: Q16::ZERO }, 3)),
+                "{direction:?}"
+            );
             // From now on off that wall.
             assert_eq!((rise, now), (beyond, contact));
         }
@@ -326,7 +347,7 @@ mod tests {
     fn back_over_a_step_lower_than_its_table_the_wall_carries_before_the_arm_says_so() {
         let watch = watch();
         let wall = seen(121.1, 0.1);
-        let high = |rise: Q16| Seen { radius: wall.radius + rise, near: true, ..wall };
+        let high = |rise: Q16| WatchInput { radius: wall.radius + rise, near: true, ..wall };
         let lifts = |rise: Q16| {
             let mut state = WatchState::default();
             watch.begin(&mut state, &wall);
@@ -335,7 +356,7 @@ mod tests {
             }
             assert_eq!(state.contact, Contact::Corner);
             let sign = watch.step(&mut state, Direction::Retract, &high(rise));
-            matches!(sign, Some(Sign::Lifted(_)))
+            matches!(sign, Some(CrossingEvent::Lifted(_)))
         };
         let over = watch.step - super::super::OVER;
         assert!(over + wall.compression < watch.step);

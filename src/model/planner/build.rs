@@ -8,7 +8,7 @@ use crate::model::reduced::ReducedModel;
 use crate::model::timing::Timing;
 use crate::numeric::checked;
 use crate::rig::{REGULATION_PART, Rig, RigError};
-use crate::supervise::Direction;
+use crate::units::Direction;
 
 /// Part of the pre-tightener's slew that the spring may use up while the wheel climbs.
 const CLIMB_PART: f64 = 0.9;
@@ -21,17 +21,11 @@ const DIP_PART: f64 = 0.12;
 
 impl Planner {
     /// The scheduler of a rig.
-    ///
-    /// # Errors
-    /// [`RigError`] if a parameter is out of range.
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         Self::try_build_as(rig, Strategy::Scheduled)
     }
 
     /// The scheduler of a rig with one of the strategies it is compared with.
-    ///
-    /// # Errors
-    /// [`RigError`] if a parameter is out of range.
     pub fn try_build_as(rig: &Rig, strategy: Strategy) -> Result<Self, RigError> {
         let model = ReducedModel::try_build(rig)?;
         let load = rig.plant.top_load_n * rig.plant.top_load_share;
@@ -100,9 +94,6 @@ impl Planner {
 
     /// Prescribes the crossing speed, mm/s, and whether it also holds between the
     /// steps: how the strategies of a comparison are tuned.
-    ///
-    /// # Errors
-    /// [`RigError`] if the speed is out of range.
     pub fn with_speed(mut self, crossing_mm_s: f64, uniform: bool) -> Result<Self, RigError> {
         self.prescribed_speed = Some(checked("drive.cruise_speed_mm_s", crossing_mm_s)?);
         self.uniform = uniform;

@@ -11,7 +11,7 @@ use crate::model::felt::{FAST_DEGREE, FORCE_END, Folded, Kind, RUN_DEGREE, RUN_E
 use crate::model::formula::{Formula, LEAST_RUN};
 use crate::numeric::{checked, fits, fits_with_slope};
 use crate::rig::{Rig, RigError};
-use crate::supervise::Direction;
+use crate::units::Direction;
 use polynomial::{interpolate, rows, value};
 
 /// Largest unit of force, N: forces from 8 to 256 N are told, of which no rig needs more.
@@ -24,17 +24,11 @@ const fn two_to(power: u32) -> f64 {
 
 impl ReducedModel {
     /// The model of a rig whose wheel is driven against its load.
-    ///
-    /// # Errors
-    /// [`RigError`] if a parameter is out of range or the formats cannot hold it.
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         Self::try_build_for(rig, Some(rig.plant.top_load_n * rig.plant.top_load_share))
     }
 
     /// The model of a rig driven against this load, N; `None` pushes a frictionless wheel.
-    ///
-    /// # Errors
-    /// As [`try_build`](Self::try_build).
     pub fn try_build_for(rig: &Rig, load_n: Option<f64>) -> Result<Self, RigError> {
         rig.validate()?;
         let formula = Formula::new(rig);

@@ -189,7 +189,7 @@ fn what_is_not_a_set_never_takes_force() {
     let mut foreign = set("foreign");
     foreign[0] = SCHEMA as u8 + 1;
     let end = foreign.len() - 4;
-    let sum = super::super::set::checksum(&foreign[..end]).to_le_bytes();
+    let sum = crate::log::crc32(&foreign[..end]).to_le_bytes();
     foreign[end..].copy_from_slice(&sum);
     let refused = Err(DraftError::Set(SetError::Schema { found: SCHEMA + 1 }));
     assert_eq!(block_on(save(&mut flash, &foreign)), refused);

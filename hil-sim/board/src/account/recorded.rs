@@ -1,7 +1,7 @@
 //! A run in software as the ticks of its controller.
 
-use interstage::control::Input;
 use interstage::supervise::{Command, Mode};
+use interstage::tick::Input;
 use interstage_images::tick::{Given, Taken};
 
 use super::Phase;

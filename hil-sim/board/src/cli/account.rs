@@ -52,6 +52,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let model = measure(&mut image, preset).map_err(Failure::run)?;
     let firmware =
         build_binary("interstage", "interstage", Profile::Release, &Vec::from_iter(level))?;
-    let flash = Footprint::of_file(&firmware)?.flash();
+    let bytes = std::fs::read(&firmware).map_err(Failure::run)?;
+    let flash = Footprint::of_elf(&bytes)?.flash;
     table::show(args, &table::Found { account: &account, model: &model, image: &image, flash })
 }

@@ -1,7 +1,7 @@
 //! One reset: the run up to it, the hold behind it, the command and what came of it.
 
-use interstage::blackbox::{Reset, Restart, Stopped};
-use interstage::log::Event;
+use interstage::restart::{Reset, Restart, Stopped};
+use interstage::tick::Event;
 use serde::Serialize;
 
 use super::ResetError;
@@ -253,8 +253,8 @@ const fn other(way: Direction) -> Direction {
     }
 }
 
-/// Code of [`interstage::supervise::Fault::PositionUnknown`].
-const POSITION_UNKNOWN: u16 = interstage::supervise::Fault::PositionUnknown.code();
+/// Code of [`interstage::fault::Fault::PositionUnknown`].
+const POSITION_UNKNOWN: u16 = interstage::fault::Fault::PositionUnknown.code();
 
 impl Case {
     /// Makes it; `place` is what the flash holds of parameters, `watch` sees the log.
@@ -332,7 +332,7 @@ impl Case {
         let unrecorded = self.misses(restart.as_ref(), &way, struck_ms);
         let record = unrecorded.is_none();
         let late = match restart.and_then(|restart| restart.crash).map(|crash| crash.stopped) {
-            Some(Stopped::Hang { late, .. }) => late.name().to_owned(),
+            Some(Stopped::Hang { missed, .. }) => missed.name().to_owned(),
             _ => String::new(),
         };
         wrong.extend(unrecorded);
@@ -456,8 +456,8 @@ impl Case {
         if restart.reset != self.kind.reset() {
             return fail("another reset");
         }
-        let Some(flight) = &restart.flight else { return fail("nothing of the run") };
-        let since_ms = struck_ms - f64::from(flight.tick);
+        let Some(snapshot) = &restart.snapshot else { return fail("nothing of the run") };
+        let since_ms = struck_ms - f64::from(snapshot.tick);
         let later_ms = f64::from(match self.kind {
             Kind::Watchdog => BITE_MS,
             Kind::BrownOut => FALLS_MS,
@@ -468,11 +468,11 @@ impl Case {
         }
         let back = (since_ms.max(0.0) as usize).min(way.len() - 1);
         let at = way[way.len() - 1 - back];
-        if (flight.position.to_num::<f64>() - at).abs() > RECORD_MM {
+        if (snapshot.position.to_num::<f64>() - at).abs() > RECORD_MM {
             return fail(&format!("not at {at:.2} mm"));
         }
         match (self.kind, restart.crash.map(|crash| crash.stopped)) {
-            (Kind::Watchdog, Some(Stopped::Hang { late, .. })) if !late.is_nobody() => None,
+            (Kind::Watchdog, Some(Stopped::Hang { missed, .. })) if !missed.is_nobody() => None,
             (Kind::BrownOut, Some(Stopped::Supply)) => None,
             (Kind::BrownOut, None) => fail("nothing of the supply"),
             // Caught in a critical section nothing gets through that could tell who.

@@ -1,6 +1,6 @@
 //! A host that saves parameters, and power or reset that comes while the board writes them.
 
-use interstage::link::{Gatherer, ToBoard, ToHost, frame};
+use interstage::params::link::{FrameReader, ToBoard, ToHost, frame};
 use interstage::params::service::{PIECE, Piece, Request, Response};
 
 use crate::machine::Machine;
@@ -37,7 +37,7 @@ pub(super) struct Save {
     pause: u32,
     /// Bytes on their way down.
     down: Vec<u8>,
-    gatherer: Gatherer,
+    gatherer: FrameReader,
     /// Restarts of the board before it began.
     restarts: usize,
 }
@@ -54,7 +54,7 @@ impl Save {
             number: 0,
             pause: 0,
             down: Vec::new(),
-            gatherer: Gatherer::new(),
+            gatherer: FrameReader::new(),
             restarts: machine.restarts().len(),
         }
     }

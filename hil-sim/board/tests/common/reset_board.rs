@@ -3,8 +3,8 @@
 
 use hil_sim::log::Run;
 use hil_sim::scenario::Scenario;
-use interstage::blackbox::Restart;
-use interstage::log::Event;
+use interstage::restart::Restart;
+use interstage::tick::Event;
 use rig_board::bench::{Bench, Passed};
 use rig_board::core::Register;
 use rig_board::peripherals::rcc::Cause;

@@ -1,8 +1,8 @@
 //! The control tick and its planner, one call each.
 
-use interstage::control::{Controller, Input, Output, State};
 use interstage::model::{Plan, Planner};
 use interstage::params::ParameterSet;
+use interstage::tick::{Controller, Input, Output, State};
 use interstage_images::tick::{Given, Preset, Taken};
 
 use super::slot::Slot;

@@ -1,6 +1,7 @@
 //! Who presses the buttons of a run: out, and, once it has arrived, back.
 
-use interstage::supervise::{Command, Direction, Mode};
+use interstage::supervise::{Command, Mode};
+use interstage::units::Direction;
 
 /// Ticks that the drive rests at the far end.
 const DWELL_TICKS: u32 = 100;

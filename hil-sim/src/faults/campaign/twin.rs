@@ -1,11 +1,11 @@
 //! The same run without the fault: when it moves and crosses, what it reports by itself, and
 //! where the rig is in every tick.
 
-use interstage::control::Output;
-use interstage::log::Event;
 use interstage::model::Planner;
 use interstage::rig::RigError;
-use interstage::supervise::{Direction, Leg, Mode};
+use interstage::supervise::{Leg, Mode};
+use interstage::tick::{Event, Output};
+use interstage::units::Direction;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 

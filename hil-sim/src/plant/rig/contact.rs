@@ -12,8 +12,8 @@ use crate::plant::wall::LocalWall;
 /// or rolls in a stride.
 const REACH_MM: f64 = 0.5;
 
-/// Largest change of height in a stride that is foreseen by the last contact, mm.
-const FORESEEN_MM: f64 = 0.05;
+/// Largest change of height in a stride that is predicted by the last contact, mm.
+const PREDICTED_MM: f64 = 0.05;
 
 /// Change of tread speed or radial force that ends steady rolling, relative and
 /// absolute, mm/s and N.
@@ -30,7 +30,7 @@ const FORGETS: f64 = 6.0;
 
 /// What the wheel has been rolling at, and for how long.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Calm {
+pub(super) struct SettleTimer {
     pub(super) tread_mm_s: f64,
     pub(super) pressing_n: f64,
     pub(super) for_s: f64,
@@ -44,17 +44,18 @@ impl VirtualRig {
         let (seat, added) = self.pressing(local);
         let pressing = (seat + added).max(0.0);
         let near = self.near_step(local);
-        let calm = &mut self.calm;
-        let most = UNSTEADY_PART * calm.tread_mm_s.abs() + UNSTEADY_MM_S;
-        let same = (tread - calm.tread_mm_s).abs() <= most
-            && (pressing - calm.pressing_n).abs() <= UNSTEADY_PART * calm.pressing_n + UNSTEADY_N;
+        let settle_timer = &mut self.settle_timer;
+        let most = UNSTEADY_PART * settle_timer.tread_mm_s.abs() + UNSTEADY_MM_S;
+        let same = (tread - settle_timer.tread_mm_s).abs() <= most
+            && (pressing - settle_timer.pressing_n).abs()
+                <= UNSTEADY_PART * settle_timer.pressing_n + UNSTEADY_N;
         // Nor does a wheel roll that is off the wall.
         if same && !near && self.truth.separation_mm < OFF_MM {
-            calm.for_s += dt_s;
+            settle_timer.for_s += dt_s;
         } else {
-            *calm = Calm { tread_mm_s: tread, pressing_n: pressing, for_s: 0.0 };
+            *settle_timer = SettleTimer { tread_mm_s: tread, pressing_n: pressing, for_s: 0.0 };
         }
-        let for_s = calm.for_s;
+        let for_s = settle_timer.for_s;
         // What is now under the wheel came in since.
         let patch = self.patch_mm(self.truth.height_mm - self.base_mm);
         for_s > FORGETS * self.parameters.ring.tau_s || for_s * tread.abs() > 2.0 * patch
@@ -66,7 +67,7 @@ impl VirtualRig {
     /// rises.
     fn pressing(&self, local: &LocalWall) -> (f64, f64) {
         let seat = self.preload.seat_n() + self.parameters.spring_n_per_mm * local.base_mm;
-        (seat, self.wedge() * self.thrust_n - self.vibration_n)
+        (seat, self.thrust_ratio() * self.thrust_n - self.vibration_n)
     }
 
     /// Radial balance over this wall.
@@ -120,31 +121,31 @@ impl VirtualRig {
         stride: Stride,
         finer: bool,
     ) -> Result<bool, PlantError> {
-        let Stride { way_mm, turn_rad, dt_s, .. } = stride;
+        let Stride { travel_mm, turn_rad, dt_s, .. } = stride;
         // Foreseen: what the way has brought, and what the new load brings by the last
         // contact's stiffness.
-        let sunk = self.sinks(local, &stride);
+        let sunk = self.load_response(local, &stride);
         let balance = self.balance(local, stride.axial());
         let stands = self.truth.height_mm - local.base_mm;
         let pressed = balance.pressed(stands - self.parameters.ring.radius_mm).0 > 0.0;
-        let foreseen = stands + self.drift * way_mm + self.creep * dt_s + sunk;
-        let height_mm = if pressed { foreseen } else { stands };
+        let predicted = stands + self.drift * travel_mm + self.creep * dt_s + sunk;
+        let height_mm = if pressed { predicted } else { stands };
         let motion = Motion { wall: *local, height_mm, turn_rad, dt_s };
         let solved = balance.solve_near(&mut self.ring, motion);
         let solved = solved.map_err(|source| self.unbalanced(source))?;
-        if finer && self.astray(&stride, &solved) {
+        if finer && self.off_prediction(&stride, &solved) {
             return Ok(false);
         }
         self.ring.commit(&Motion { height_mm: solved.height_mm, ..motion });
         let rise = solved.height_mm + local.base_mm - self.truth.height_mm;
-        self.learn_rise(&solved.contact, way_mm, rise);
-        if way_mm.abs() > 1e-6 {
-            (self.drift, self.creep) = ((rise - sunk) / way_mm, 0.0);
+        self.learn_rise(&solved.contact, travel_mm, rise);
+        if travel_mm.abs() > 1e-6 {
+            (self.drift, self.creep) = ((rise - sunk) / travel_mm, 0.0);
         } else {
             (self.drift, self.creep) = (0.0, (rise - sunk) / dt_s);
         }
         self.stiffness = Some(solved.contact.slope);
-        self.take(local, &solved, &stride);
+        self.adopt(local, &solved, &stride);
         self.truth.ring_awake = true;
         self.truth.preload_n = self.preload_now();
         self.ledger.record(&Moment {
@@ -163,7 +164,7 @@ impl VirtualRig {
     }
 
     /// Change of the height, mm, by which the last contact would carry the present load.
-    fn sinks(&self, local: &LocalWall, stride: &Stride) -> f64 {
+    fn load_response(&self, local: &LocalWall, stride: &Stride) -> f64 {
         let Some(slopes) = self.stiffness else { return 0.0 };
         let (_, cosine, sine) = self.forces;
         let lift = self.truth.height_mm - local.base_mm - self.parameters.ring.radius_mm;
@@ -175,7 +176,7 @@ impl VirtualRig {
         let (residual, slope, _) =
             self.balance(local, axial).residual((cosine, sine), slopes, lift);
         let change = -residual / slope;
-        if change.abs() < FORESEEN_MM { change } else { 0.0 }
+        if change.abs() < PREDICTED_MM { change } else { 0.0 }
     }
 
     /// Radial balance of steady rolling on the continuous wall.
@@ -185,17 +186,17 @@ impl VirtualRig {
         stride: Stride,
         finer: bool,
     ) -> Result<bool, PlantError> {
-        let guess = self.truth.height_mm - self.base_mm + self.sinks(local, &stride);
+        let guess = self.truth.height_mm - self.base_mm + self.load_response(local, &stride);
         let speed = stride.tread_mm_s;
         let solved = self.roll_balanced(local, stride.axial(), speed, guess);
         let solved = solved.map_err(|source| self.unbalanced(source))?;
-        if finer && self.astray(&stride, &solved) {
+        if finer && self.off_prediction(&stride, &solved) {
             return Ok(false);
         }
         self.rolled_mm_s = speed;
-        (self.drift, self.creep, self.swells) = (0.0, 0.0, 0.0);
+        (self.drift, self.creep, self.tread_intake) = (0.0, 0.0, 0.0);
         self.stiffness = Some(solved.contact.slope);
-        self.take(local, &solved, &stride);
+        self.adopt(local, &solved, &stride);
         self.truth.ring_awake = false;
         Ok(true)
     }
@@ -244,7 +245,7 @@ impl VirtualRig {
         }
     }
 
-    fn take(&mut self, local: &LocalWall, solved: &Solved, stride: &Stride) {
+    fn adopt(&mut self, local: &LocalWall, solved: &Solved, stride: &Stride) {
         let contact = &solved.contact;
         self.base_mm = local.base_mm;
         self.truth.height_mm = solved.height_mm + local.base_mm;
@@ -264,7 +265,7 @@ impl VirtualRig {
         let spring = (seat + self.parameters.spring_n_per_mm * lift).max(0.0);
         let carried = contact.cosine_n + solved.utilisation * contact.sine_n;
         self.truth.unbalanced_n = carried - (spring + added).max(0.0);
-        self.arrive(stride);
+        self.complete(stride);
     }
 }
 

@@ -1,4 +1,4 @@
-//! Which stages of the plant ran when: counted always, timed by who asks.
+//! What the plant computed, by what the contact was doing.
 
 use super::VirtualRig;
 use crate::plant::ring::Work;
@@ -50,7 +50,7 @@ impl VirtualRig {
         self.phase
     }
 
-    fn doing(&self) -> Phase {
+    fn present_phase(&self) -> Phase {
         let truth = &self.truth;
         let local = self.parameters.wall.local(truth.position_mm);
         let edge = || local.behind_mm < self.patch_mm(truth.height_mm - local.base_mm);
@@ -69,21 +69,14 @@ impl VirtualRig {
         &self.phases
     }
 
-    /// Everything computed so far.
-    pub(super) fn work(&self) -> PhaseWork {
-        let (steady_computed, steady_iterations) = self.steady.work();
-        let ring = self.ring.work();
-        PhaseWork { simulated_s: 0.0, ring, steady_computed, steady_iterations }
-    }
-
-    /// Books what was computed since `before` under the present phase.
-    pub(super) fn count(&mut self, before: &PhaseWork, dt_s: f64) {
-        let now = self.work();
-        self.phase = self.doing();
+    /// Books under the present phase what was computed since the last call.
+    pub(super) fn count(&mut self, dt_s: f64) {
+        self.phase = self.present_phase();
         let phase = &mut self.phases[self.phase as usize];
         phase.simulated_s += dt_s;
-        phase.ring += now.ring - before.ring;
-        phase.steady_computed += now.steady_computed - before.steady_computed;
-        phase.steady_iterations += now.steady_iterations - before.steady_iterations;
+        phase.ring += self.ring.take_work();
+        let (computed, iterations) = self.steady.take_work();
+        phase.steady_computed += computed;
+        phase.steady_iterations += iterations;
     }
 }

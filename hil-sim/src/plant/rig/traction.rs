@@ -14,34 +14,34 @@ const JAMMED_BELOW: f64 = 0.25;
 /// Way over which the wheel's rise is learnt, mm.
 const LEARNT_MM: f64 = 1.0;
 
-/// Farthest that a stride may end from where it was foreseen, mm.
-const ASTRAY_MM: f64 = 0.01;
+/// Farthest that a stride may end from where it was predicted, mm.
+const OFF_PREDICTION_MM: f64 = 0.01;
 
 /// What holds or moves the wheel in a stride.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Moves {
     /// The stop or latch that carries the load until the drive first turns.
-    Parked,
+    Latched,
     /// An end stop holds the carriage, and the wheel spins with this utilisation.
     Spins(f64),
     /// Motor, friction and inertia.
     Driven(Grip),
 }
 
-/// A stride as foreseen by the forces of the last.
+/// A stride as predicted by the forces of the last.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stride {
     pub(super) dt_s: f64,
     /// Where the carriage comes to, and by what way, mm.
     pub(super) position_mm: f64,
-    pub(super) way_mm: f64,
+    pub(super) travel_mm: f64,
     /// Angle that the wheel turns, rad, and the speed of its tread, mm/s.
     pub(super) turn_rad: f64,
     pub(super) tread_mm_s: f64,
     pub(super) moves: Moves,
     turn: Turn,
-    /// Speeds of carriage and tread, mm/s, as foreseen.
-    foreseen: (f64, f64),
+    /// Speeds of carriage and tread, mm/s, as predicted.
+    predicted: (f64, f64),
     /// An end stop holds the carriage.
     stopped: bool,
 }
@@ -50,7 +50,7 @@ impl Stride {
     /// How friction is used.
     pub(super) fn axial(&self) -> Axial {
         match self.moves {
-            Moves::Parked => Axial::Utilised(0.0),
+            Moves::Latched => Axial::Utilised(0.0),
             Moves::Spins(utilisation) => Axial::Utilised(utilisation),
             Moves::Driven(grip) => Axial::Carried(grip),
         }
@@ -59,8 +59,8 @@ impl Stride {
 
 impl VirtualRig {
     /// Radial force per axial thrust: none while a latch holds the carriage.
-    pub(super) fn wedge(&self) -> f64 {
-        if self.parked { 0.0 } else { self.parameters.arm.wedge(self.truth.radius_mm) }
+    pub(super) fn thrust_ratio(&self) -> f64 {
+        if self.latched { 0.0 } else { self.parameters.arm.thrust_ratio(self.truth.radius_mm) }
     }
 
     /// Largest acceleration of a sliding carriage, mm/s^2.
@@ -72,21 +72,21 @@ impl VirtualRig {
 
     /// What the motor makes of the next `dt_s`, and where the forces of the last stride
     /// would take the wheel.
-    pub(super) fn set_out(&mut self, drives: &Drives, dt_s: f64) -> Stride {
+    pub(super) fn predict(&mut self, drives: &Drives, dt_s: f64) -> Stride {
         let p = &self.parameters;
         let tread = self.truth.tread_mm_s;
-        let turn = match self.led_mm_s {
-            Some(led_mm_s) => Turn::led(led_mm_s),
-            None => p.drive.turn(tread, drives.drive, drives.drive_on, self.resists_n, dt_s),
+        let turn = match self.imposed_speed_mm_s {
+            Some(imposed_speed_mm_s) => Turn::imposed(imposed_speed_mm_s),
+            None => p.drive.turn(tread, drives.drive, drives.drive_on, self.tread_load_n, dt_s),
         };
         if turn.free_mm_s != 0.0 {
-            self.parked = false;
+            self.latched = false;
         }
         let (normal, cosine, sine) = self.forces;
         let grip = Grip {
             mu: p.mu,
             creep: p.elastic_creep,
-            rolling: self.led_mm_s.unwrap_or(tread).abs(),
+            rolling: self.imposed_speed_mm_s.unwrap_or(tread).abs(),
             load_n: p.load_n,
             inertia: 1e-3 * p.mass_kg / dt_s,
             speed: self.truth.speed_mm_s,
@@ -95,28 +95,29 @@ impl VirtualRig {
             advance: self.advance(),
             normal: if cosine > 0.0 { normal / cosine } else { 1.0 },
         };
-        let foreseen = self.foresee(&grip);
+        let predicted = self.predict_speeds(&grip);
         let mut stride = Stride {
             dt_s,
             position_mm: self.truth.position_mm,
-            way_mm: 0.0,
+            travel_mm: 0.0,
             turn_rad: 0.0,
-            tread_mm_s: foreseen.1,
-            moves: Moves::Parked,
+            tread_mm_s: predicted.1,
+            moves: Moves::Latched,
             turn,
-            foreseen,
+            predicted,
             stopped: false,
         };
-        if self.parked {
+        if self.latched {
             return stride;
         }
         stride.moves = Moves::Driven(grip);
         self.thrust_n = p.load_n;
-        stride.way_mm = self.mean(self.truth.speed_mm_s, foreseen.0) * dt_s + self.owed_mm.0;
+        stride.travel_mm =
+            self.mean(self.truth.speed_mm_s, predicted.0) * dt_s + self.way_residual_mm.0;
         let (low, high) = p.stops_mm;
-        let position = self.truth.position_mm + stride.way_mm;
+        let position = self.truth.position_mm + stride.travel_mm;
         if position < low || position > high {
-            stride.way_mm = position.clamp(low, high) - self.truth.position_mm;
+            stride.travel_mm = position.clamp(low, high) - self.truth.position_mm;
             let friction = p.mu.copysign(grip.tread);
             let slower = grip.tread - grip.yields * friction * normal;
             // The wheel spins, and presses itself in by what it pushes with; or it stands.
@@ -128,62 +129,62 @@ impl VirtualRig {
                 Moves::Driven(Grip { tread: 0.0, speed: 0.0, ..grip })
             };
             stride.tread_mm_s = tread;
-            stride.foreseen = (0.0, tread);
+            stride.predicted = (0.0, tread);
             stride.stopped = true;
             self.thrust_n = if spins { friction * cosine - sine } else { p.load_n };
         }
-        stride.position_mm = self.truth.position_mm + stride.way_mm;
-        let rolled = self.mean(tread, stride.tread_mm_s) * dt_s + self.owed_mm.1;
+        stride.position_mm = self.truth.position_mm + stride.travel_mm;
+        let rolled = self.mean(tread, stride.tread_mm_s) * dt_s + self.way_residual_mm.1;
         stride.turn_rad = rolled / p.ring.radius_mm;
         stride
     }
 
     /// Mean speed over a stride, mm/s: a tread that is led has its speed from the start on.
     fn mean(&self, before: f64, end: f64) -> f64 {
-        if self.led_mm_s.is_some() { end } else { 0.5 * (before + end) }
+        if self.imposed_speed_mm_s.is_some() { end } else { 0.5 * (before + end) }
     }
 
     /// Speeds of carriage and tread with which the stride will about end: with the slip of
     /// the last, or, sliding, with its forces.
-    fn foresee(&self, grip: &Grip) -> (f64, f64) {
+    fn predict_speeds(&self, grip: &Grip) -> (f64, f64) {
         let (_, cosine, sine) = self.forces;
         if self.sliding || cosine <= 0.0 {
             let (utilisation, _) = grip.utilisation(cosine, sine);
             let ended = grip.ended(utilisation, cosine, sine);
             return (ended.speed, ended.tread);
         }
-        let tread = grip.tread - grip.yields * self.resists_n;
+        let tread = grip.tread - grip.yields * self.tread_load_n;
         let slip = self.truth.tread_mm_s * grip.advance - self.truth.speed_mm_s;
         (tread * grip.advance - slip, tread)
     }
 
-    /// Whether the stride ends far from where it was foreseen.
-    pub(super) fn astray(&self, stride: &Stride, solved: &Solved) -> bool {
+    /// Whether the stride ends far from where it was predicted.
+    pub(super) fn off_prediction(&self, stride: &Stride, solved: &Solved) -> bool {
         let (Moves::Driven(grip), false) = (stride.moves, stride.stopped) else { return false };
         let (cosine, sine) = (solved.contact.cosine_n, solved.contact.sine_n);
         let ended = grip.ended(solved.utilisation, cosine, sine);
-        (ended.speed - stride.foreseen.0).abs() * stride.dt_s > ASTRAY_MM
+        (ended.speed - stride.predicted.0).abs() * stride.dt_s > OFF_PREDICTION_MM
     }
 
     /// Books what the stride came to in the contact that was found for it.
-    pub(super) fn arrive(&mut self, stride: &Stride) {
+    pub(super) fn complete(&mut self, stride: &Stride) {
         let (normal, cosine, sine) = self.forces;
         let truth = &mut self.truth;
         let before = truth.tread_mm_s;
-        let (mut resists_n, mut sliding) = (0.0, 0.0);
+        let (mut tread_load_n, mut sliding) = (0.0, 0.0);
         truth.speed_mm_s = 0.0;
         match stride.moves {
-            Moves::Parked => truth.tread_mm_s = 0.0,
+            Moves::Latched => truth.tread_mm_s = 0.0,
             Moves::Spins(utilisation) => {
                 truth.tread_mm_s = stride.tread_mm_s;
-                resists_n = utilisation * normal;
+                tread_load_n = utilisation * normal;
                 sliding = stride.tread_mm_s.abs();
             }
             Moves::Driven(grip) => {
                 let ended = grip.ended(truth.utilisation, cosine, sine);
                 truth.speed_mm_s = if stride.stopped { 0.0 } else { ended.speed };
                 truth.tread_mm_s = ended.tread;
-                resists_n = ended.resists_n;
+                tread_load_n = ended.tread_load_n;
                 sliding = grip.slides(&ended);
             }
         }
@@ -191,19 +192,19 @@ impl VirtualRig {
         let moves = truth.speed_mm_s != 0.0 || truth.tread_mm_s != 0.0;
         let dt_s = if moves { stride.dt_s } else { 0.0 };
         let (speed, tread) = (truth.speed_mm_s, truth.tread_mm_s);
-        self.owed_mm = (
-            self.mean(0.0, speed - stride.foreseen.0) * dt_s,
-            self.mean(0.0, tread - stride.foreseen.1) * dt_s,
+        self.way_residual_mm = (
+            self.mean(0.0, speed - stride.predicted.0) * dt_s,
+            self.mean(0.0, tread - stride.predicted.1) * dt_s,
         );
         let rolled = self.mean(before, tread) * stride.dt_s;
         let dt_s = stride.dt_s;
         self.sliding = sliding > 0.0;
-        self.resists_n = resists_n;
+        self.tread_load_n = tread_load_n;
         let truth = &mut self.truth;
         truth.slip_mm += sliding * dt_s;
         let creep = (truth.tread_mm_s - truth.speed_mm_s).abs() * dt_s;
         truth.wear_mj += truth.utilisation.abs() * normal * creep;
-        let force = stride.turn.force_n + stride.turn.force_rises * resists_n;
+        let force = stride.turn.force_n + stride.turn.force_rises * tread_load_n;
         truth.work_mj += (force * rolled).max(0.0);
     }
 
@@ -218,16 +219,16 @@ impl VirtualRig {
             return 1.0;
         }
         let step = sine - self.truth.resistance_n;
-        let along = cosine + step * (step / cosine + self.swells);
+        let along = cosine + step * (step / cosine + self.tread_intake);
         if along > normal { normal / along } else { 1.0 }
     }
 
     /// Learns how much more than by the direction of the step's force the wheel has risen.
-    pub(super) fn learn_rise(&mut self, contact: &Contact, way_mm: f64, rise_mm: f64) {
+    pub(super) fn learn_rise(&mut self, contact: &Contact, travel_mm: f64, rise_mm: f64) {
         if self.parameters.climb_slows && contact.cosine_n > 0.0 {
             let leans = contact.step_sine_n / contact.cosine_n;
-            let more = rise_mm - (leans + self.swells) * way_mm;
-            self.swells += more * way_mm.signum() / way_mm.abs().max(LEARNT_MM);
+            let more = rise_mm - (leans + self.tread_intake) * travel_mm;
+            self.tread_intake += more * travel_mm.signum() / travel_mm.abs().max(LEARNT_MM);
         }
     }
 
@@ -235,8 +236,8 @@ impl VirtualRig {
     /// force: the less there is, the more the arm presses it.
     fn freedom(&self, used: f64) -> f64 {
         let (normal, cosine, sine) = self.forces;
-        let wedge = self.wedge();
-        let carried = (1.0 - used * wedge) * cosine + (used + wedge) * sine;
+        let thrust_ratio = self.thrust_ratio();
+        let carried = (1.0 - used * thrust_ratio) * cosine + (used + thrust_ratio) * sine;
         if normal > 0.0 { carried / normal } else { 1.0 }
     }
 }

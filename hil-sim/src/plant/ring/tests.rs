@@ -68,7 +68,7 @@ proptest! {
                 "{got} {expected} {motion:?}");
         }
         // Whoever looks at all elements sees the same, to the last bit.
-        prop_assert_eq!(Ring::new(rubber(elements)).whole(true).trial(&motion), contact);
+        prop_assert_eq!(Ring::new(rubber(elements)).visiting_all().trial(&motion), contact);
         // And what a balance needs is the same but for the order of the additions.
         let ((c, s), (dc, ds)) = ring.forces(&motion);
         prop_assert!((c - contact.cosine_n).abs() < 1e-9 * (1.0 + c.abs()));

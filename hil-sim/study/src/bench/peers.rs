@@ -1,38 +1,42 @@
-//! Other engines and solvers on one identical crossing, beside the ring, in one run.
+//! SciPy's ODE solvers and MuJoCo on one identical crossing, beside the plant's ring.
 //!
-//! - A general ODE solver (SciPy's) on exactly the ring's equations, compiled: loose
-//!   to tight tolerances, in the form that is not stiff and in the one that is.
-//! - MuJoCo with its wheel, its step and its soft contacts, fitted to the ring at
-//!   loads around the crossing's own.
+//! - SciPy solves exactly the ring's equations, compiled, from loose to tight tolerances.
+//! - MuJoCo has its wheel, its step and its soft contacts, fitted to the ring at loads
+//!   around the crossing's own.
 //!
-//! Errors are those of gap and largest axial force against the converged ring; times
-//! are processor time of one thread, the least of several runs.
+//! Errors are those of gap and largest axial force against the converged ring.
 
-mod venv;
-
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result};
+use interstage::rig::Rig;
 use serde::{Deserialize, Serialize};
 
-use super::clock::{Effort, least};
-use super::problem::{Figures, Problem, Truth, lucks};
-use hil_sim::plant::crossing::cross;
-use hil_sim::plant::precision::Setting as Mesh;
+use hil_sim::plant::balance::{Axial, BalanceError};
+use hil_sim::plant::crossing::{CrossingCase, CrossingResult, cross};
+use hil_sim::plant::precision::{FINER, Setting as Mesh};
+use hil_sim::plant::ring::RingParameters;
 use hil_sim::plant::rolling;
 
-/// Element counts that the solvers are run with.
-const ELEMENTS: [usize; 4] = [240, 480, 960, 1920];
+use super::{python, timing::least};
 
+/// The published case: speed, mm/s, and preload, N.
+const SPEED_MM_S: f64 = 5.0;
+const PRELOAD_N: f64 = 100.0;
+
+/// Element counts of the solvers.
+const ELEMENTS: [usize; 4] = [240, 480, 960, 1920];
+/// Neighbouring element counts of which the worst error counts: where the elements lie at
+/// lift-off shifts the gap by about a third of their pitch.
+const NEIGHBOURS: [isize; 3] = [-3, 0, 3];
+/// The ring's element counts and strides over the usual ones.
+const FINENESS: [f64; 7] = [0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
 /// MuJoCo's time steps, s.
 const TIME_STEPS_S: [f64; 7] = [2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2];
-
 /// Preloads that MuJoCo's contacts are fitted at, over the crossing's own.
 const FITS: [f64; 2] = [0.8, 1.2];
-
-/// Speed that MuJoCo is then also run at, over the crossing's own.
-const OTHER_SPEED: f64 = 2.0;
-
-/// Errors at which the times are compared.
-const LEVELS: [f64; 2] = [0.005, 0.002];
+/// Error at which times are compared.
+pub const LEVEL: f64 = 0.005;
+/// Name of the ring among the methods.
+pub const RING: &str = "ring";
 
 /// One setting of one method.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -45,52 +49,21 @@ pub struct Setting {
     pub tolerance: Option<f64>,
     /// Time step, s.
     pub time_step_s: Option<f64>,
-    /// Largest relative error of the gap over the luck of where the elements stand;
-    /// none if there was no gap.
-    pub gap_error: Option<f64>,
-    /// The same of the largest axial force.
-    pub force_error: f64,
+    /// Relative error of gap or largest axial force, the larger; none without a gap.
+    pub error: Option<f64>,
     /// Processor time, s.
     pub seconds: f64,
-    /// Sums over the contact that it took, if it counts them.
-    pub contact_sums: Option<u64>,
-}
-
-impl Setting {
-    /// Largest relative error, infinite without a gap.
-    #[must_use]
-    pub fn error(&self) -> f64 {
-        self.gap_error.unwrap_or(f64::INFINITY).max(self.force_error)
-    }
-}
-
-/// How much longer a method takes than the ring at the same precision.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Ratio {
-    /// The method.
-    pub name: String,
-    /// Largest relative error of gap and force allowed.
-    pub level: f64,
-    /// Least time of the method over that of the ring; none if it does not get there.
-    pub time_ratio: Option<f64>,
 }
 
 /// The comparison.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Peers {
-    /// Versions of what was compared with.
-    pub versions: Vec<String>,
-    /// Doubt about the converged answer itself, relative.
-    pub doubt: f64,
-    /// The settings of every method, the ring first.
+    /// Versions of SciPy and MuJoCo.
+    pub versions: [String; 2],
+    /// Settings of every method, the ring first.
     pub settings: Vec<Setting>,
-    /// Times at equal precision.
-    pub ratios: Vec<Ratio>,
-    /// What MuJoCo gives at twice the speed with the contacts of the comparison:
-    /// relative error of the gap, which memory moves.
-    pub mujoco_gap_error_at_other_speed: Option<f64>,
-    /// What MuJoCo's cylinder in place of the disc gives.
-    pub mujoco_cylinder_gap_error: Option<f64>,
+    /// Least time within [`LEVEL`] by method, s; none if a method does not get there.
+    pub least_seconds: Vec<(String, Option<f64>)>,
 }
 
 /// What a script is given.
@@ -110,9 +83,8 @@ struct Given<'a> {
     budget_s: f64,
     folder: &'a str,
     elements: Vec<usize>,
-    time_steps_s: &'a [f64],
+    time_steps_s: [f64; 7],
     fits: Vec<Fit>,
-    other_speed_mm_s: f64,
 }
 
 /// A point that MuJoCo's contacts are fitted to.
@@ -123,18 +95,11 @@ struct Fit {
     gap_mm: f64,
 }
 
+/// What a script answers.
 #[derive(Deserialize)]
-struct Solved {
-    scipy: String,
+struct Answer {
+    version: String,
     points: Vec<Point>,
-}
-
-#[derive(Deserialize)]
-struct Engine {
-    mujoco: String,
-    points: Vec<Point>,
-    other_speed: Point,
-    cylinder: Point,
 }
 
 #[derive(Deserialize)]
@@ -146,99 +111,90 @@ struct Point {
     gap_mm: Option<f64>,
     corner_force_n: f64,
     seconds: f64,
-    contact_sums: Option<u64>,
+}
+
+/// Gap, mm, and largest axial force, N, of the converged ring.
+#[derive(Clone, Copy)]
+struct Exact(f64, f64);
+
+impl Exact {
+    fn error(self, gap_mm: f64, force_n: f64) -> f64 {
+        (gap_mm / self.0 - 1.0).abs().max((force_n / self.1 - 1.0).abs())
+    }
+}
+
+fn crossing(preload_n: f64, mesh: Mesh) -> Result<CrossingResult, BalanceError> {
+    let rig = Rig::fe();
+    cross(&CrossingCase {
+        ring: RingParameters::of(&rig, mesh.elements),
+        step_height_mm: rig.rig.step_height_mm,
+        speed_mm_s: SPEED_MM_S,
+        preload_n,
+        axial: Axial::Pushed,
+        stride_mm: mesh.stride_mm,
+    })
 }
 
 /// Runs the comparison; what it needs is set up first, under the target directory.
 ///
 /// # Errors
-/// If Python or a package cannot be had, or a script fails.
-pub fn compare(truth: &Truth, say: &dyn Fn(&str)) -> Result<Peers> {
-    let problem = Problem::published();
-    let python = venv::provide(say)?;
-    let given = given(&problem, python.folder())?;
+/// If Python or a package is not available, or a script fails.
+pub fn compare(say: &dyn Fn(&str)) -> Result<Peers> {
+    let python = python::provide(say)?;
+    say("converged ring");
+    let found = crossing(PRELOAD_N, Mesh::usual().finer(FINER))?;
+    let exact = Exact(found.gap_mm, found.corner_force_n);
+    let given = given(&python.folder)?;
     say("ring");
-    let mut settings = own(&problem, truth)?;
-    say("ODE solvers");
-    let solved: Solved = python.run("solvers.py", &given)?;
+    let mut settings =
+        FINENESS.into_iter().map(|factor| ring(factor, exact)).collect::<Result<Vec<_>>>()?;
+    say("SciPy");
+    let solved: Answer = python.run("solvers.py", &given)?;
     say("MuJoCo");
-    let engine: Engine = python.run("mujoco_crossing.py", &given)?;
-    let errors = |point: &Point| {
-        let gap = point.gap_mm.map(|gap| (gap / truth.figures.gap_mm - 1.0).abs());
-        (gap, (point.corner_force_n / truth.figures.force_n - 1.0).abs())
-    };
-    for points in grouped(solved.points) {
-        settings.push(worst(&points, errors));
-    }
-    for point in &engine.points {
-        settings.push(worst(std::slice::from_ref(point), errors));
-    }
-    let faster = Problem { speed_mm_s: OTHER_SPEED * problem.speed_mm_s, ..problem };
-    let faster_gap = cross(&faster.case(Mesh::usual().finer(2)))?.gap_mm;
+    let engine: Answer = python.run("mujoco_crossing.py", &given)?;
+    let points: Vec<Point> = solved.points.into_iter().chain(engine.points).collect();
+    settings.extend(merged(&points, exact));
     Ok(Peers {
-        versions: vec![format!("SciPy {}", solved.scipy), format!("MuJoCo {}", engine.mujoco)],
-        doubt: truth.doubt,
-        ratios: ratios(&settings),
+        versions: [solved.version, engine.version],
+        least_seconds: least_seconds(&settings),
         settings,
-        mujoco_gap_error_at_other_speed: engine
-            .other_speed
-            .gap_mm
-            .map(|gap| (gap / faster_gap - 1.0).abs()),
-        mujoco_cylinder_gap_error: errors(&engine.cylinder).0,
     })
 }
 
-/// Settings of the ring: elements and stride finer together.
-fn meshes() -> Vec<Mesh> {
+/// The ring at this fineness.
+fn ring(factor: f64, exact: Exact) -> Result<Setting> {
     let usual = Mesh::usual();
-    let by = |factor: f64| Mesh {
-        elements: (usual.elements as f64 * factor).round() as usize,
+    let mesh = |shift: isize| Mesh {
+        elements: ((usual.elements as f64 * factor).round() as usize).saturating_add_signed(shift),
         stride_mm: usual.stride_mm / factor,
     };
-    [0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0].into_iter().map(by).collect()
-}
-
-/// The ring itself.
-fn own(problem: &Problem, truth: &Truth) -> Result<Vec<Setting>> {
-    let mut settings = Vec::new();
-    for mesh in meshes() {
-        let timed = least(Effort::USUAL, || problem.case(mesh), |case| cross(&case));
-        let mut errors = (0.0_f64, 0.0_f64);
-        let mut found = vec![Figures::from(timed.answer?)];
-        for other in lucks(mesh) {
-            found.push(cross(&problem.case(other))?.into());
-        }
-        for figures in found {
-            let (gap, force) = figures.errors(&truth.figures);
-            errors = (errors.0.max(gap), errors.1.max(force));
-        }
-        settings.push(Setting {
-            name: RING.to_owned(),
-            elements: Some(mesh.elements),
-            tolerance: None,
-            time_step_s: Some(mesh.stride_mm / problem.speed_mm_s),
-            gap_error: Some(errors.0),
-            force_error: errors.1,
-            seconds: timed.seconds,
-            contact_sums: None,
-        });
+    let (seconds, _) = least(|| crossing(PRELOAD_N, mesh(0)));
+    let mut error = 0.0_f64;
+    for shift in NEIGHBOURS {
+        let found = crossing(PRELOAD_N, mesh(shift))?;
+        error = error.max(exact.error(found.gap_mm, found.corner_force_n));
     }
-    Ok(settings)
+    Ok(Setting {
+        name: RING.to_owned(),
+        elements: Some(mesh(0).elements),
+        tolerance: None,
+        time_step_s: Some(mesh(0).stride_mm / SPEED_MM_S),
+        error: Some(error),
+        seconds,
+    })
 }
 
-/// Name of the ring among the methods.
-pub const RING: &str = "ring";
-
-fn given<'a>(problem: &Problem, folder: &'a str) -> Result<Given<'a>> {
-    let ring = problem.ring;
-    let (radius, step) = (ring.radius_mm, problem.step_height_mm);
+fn given(folder: &str) -> Result<Given<'_>> {
+    let rig = Rig::fe();
+    let ring = RingParameters::of(&rig, Mesh::usual().elements);
+    let (radius, step) = (ring.radius_mm, rig.rig.step_height_mm);
     let run = (radius * radius - (radius - step) * (radius - step)).sqrt();
     let mut fits = Vec::new();
     for part in FITS {
-        let preload_n = part * problem.preload_n;
-        let gap_mm = cross(&problem.under(preload_n).case(Mesh::usual().finer(2)))?.gap_mm;
+        let preload_n = part * PRELOAD_N;
+        let gap_mm = crossing(preload_n, Mesh::usual().finer(2))?.gap_mm;
         let balance = |rolling: &rolling::Rolling| rolling.cosine_n - preload_n;
-        let rolled = rolling::solve(&ring, problem.speed_mm_s, radius - 0.1, balance);
+        let rolled = rolling::solve(&ring, SPEED_MM_S, radius - 0.1, balance);
         fits.push(Fit { preload_n, sinkage_mm: radius - rolled.height_mm, gap_mm });
     }
     Ok(Given {
@@ -248,170 +204,119 @@ fn given<'a>(problem: &Problem, folder: &'a str) -> Result<Given<'a>> {
         k_0: ring.k_0,
         tau_s: ring.tau_s,
         step_height_mm: step,
-        speed_mm_s: problem.speed_mm_s,
-        preload_n: problem.preload_n,
+        speed_mm_s: SPEED_MM_S,
+        preload_n: PRELOAD_N,
         // As `cross` does it: long enough to forget how the wheel was put down, and
         // past the corner until the patch has left its edge.
-        start_mm: -run - (8.0 * ring.tau_s * problem.speed_mm_s).min(2.0 * radius) - 0.5 * radius,
+        start_mm: -run - (8.0 * ring.tau_s * SPEED_MM_S).min(2.0 * radius) - 0.5 * radius,
         end_mm: 0.6 * radius,
         repeats: 5,
         budget_s: 0.6,
         folder,
-        elements: ELEMENTS.iter().flat_map(|&n| [n - 3, n, n + 3]).collect(),
-        time_steps_s: &TIME_STEPS_S,
+        elements: ELEMENTS
+            .iter()
+            .flat_map(|n| NEIGHBOURS.map(|shift| n.saturating_add_signed(shift)))
+            .collect(),
+        time_steps_s: TIME_STEPS_S,
         fits,
-        other_speed_mm_s: OTHER_SPEED * problem.speed_mm_s,
     })
 }
 
-/// Points of one method, tolerance and element count, whose neighbours belong to it.
-fn grouped(points: Vec<Point>) -> Vec<Vec<Point>> {
-    let mut groups: Vec<Vec<Point>> = Vec::new();
+/// One setting from neighbouring element counts: the least time and the largest error.
+fn merged(points: &[Point], exact: Exact) -> Vec<Setting> {
+    let nearest = |n: usize| ELEMENTS.into_iter().min_by_key(|m| m.abs_diff(n)).unwrap_or(n);
+    let mut settings: Vec<Setting> = Vec::new();
     for point in points {
-        let belongs = |group: &&mut Vec<Point>| {
-            let first = &group[0];
-            let near = |a: Option<usize>, b: Option<usize>| {
-                a.zip(b).is_some_and(|(a, b)| a.abs_diff(b) <= 6)
-            };
-            first.name == point.name
-                && first.tolerance == point.tolerance
-                && near(first.elements, point.elements)
+        let elements = point.elements.map(nearest);
+        let error = point.gap_mm.map(|gap| exact.error(gap, point.corner_force_n));
+        let same = |s: &&mut Setting| {
+            (s.name.as_str(), s.elements, s.tolerance, s.time_step_s)
+                == (point.name.as_str(), elements, point.tolerance, point.time_step_s)
         };
-        match groups.iter_mut().find(belongs) {
-            Some(group) => group.push(point),
-            None => groups.push(vec![point]),
+        if let Some(setting) = settings.iter_mut().find(same) {
+            setting.error = setting.error.zip(error).map(|(a, b)| a.max(b));
+            setting.seconds = setting.seconds.min(point.seconds);
+        } else {
+            settings.push(Setting {
+                name: point.name.clone(),
+                elements,
+                tolerance: point.tolerance,
+                time_step_s: point.time_step_s,
+                error,
+                seconds: point.seconds,
+            });
         }
     }
-    groups
+    settings
 }
 
-/// A setting from its points: the middle one's, with the least time and the largest
-/// errors of all.
-fn worst(points: &[Point], errors: impl Fn(&Point) -> (Option<f64>, f64)) -> Setting {
-    let middle = &points[points.len() / 2];
-    let all: Vec<_> = points.iter().map(errors).collect();
-    let gap = all.iter().map(|e| e.0.unwrap_or(f64::INFINITY)).fold(0.0, f64::max);
-    Setting {
-        name: middle.name.clone(),
-        elements: middle.elements,
-        tolerance: middle.tolerance,
-        time_step_s: middle.time_step_s,
-        gap_error: Some(gap).filter(|gap| gap.is_finite()),
-        force_error: all.iter().map(|e| e.1).fold(0.0, f64::max),
-        seconds: points.iter().map(|point| point.seconds).fold(f64::INFINITY, f64::min),
-        contact_sums: middle.contact_sums,
-    }
-}
-
-/// Times of all methods over the ring's where both are as precise as asked.
-fn ratios(settings: &[Setting]) -> Vec<Ratio> {
-    let mut names: Vec<&str> = Vec::new();
+/// Least time within [`LEVEL`] of every method, in the order in which they come.
+fn least_seconds(settings: &[Setting]) -> Vec<(String, Option<f64>)> {
+    let mut all: Vec<(String, Option<f64>)> = Vec::new();
     for setting in settings {
-        if setting.name != RING && !names.contains(&setting.name.as_str()) {
-            names.push(&setting.name);
+        let good = setting.error.is_some_and(|error| error <= LEVEL).then_some(setting.seconds);
+        match all.iter_mut().find(|(name, _)| *name == setting.name) {
+            Some((_, least)) => *least = least.iter().copied().chain(good).reduce(f64::min),
+            None => all.push((setting.name.clone(), good)),
         }
     }
-    let quickest = |name: &str, level: f64| {
-        let good = settings.iter().filter(|s| s.name == name && s.error() <= level);
-        good.map(|s| s.seconds).min_by(f64::total_cmp)
-    };
-    let pairs = LEVELS.iter().flat_map(|&level| names.iter().map(move |&name| (level, name)));
-    let ratio = |(level, name): (f64, &str)| Ratio {
-        name: name.to_owned(),
-        level,
-        time_ratio: quickest(name, level).zip(quickest(RING, level)).map(|(a, b)| a / b),
-    };
-    pairs.map(ratio).collect()
+    all
 }
 
-/// Checks that the solvers agree with the ring: the least error of any.
-///
-/// # Errors
-/// If none comes within `most`, so that one of the two is wrong.
-pub fn agree(peers: &Peers, most: f64) -> Result<f64> {
-    let solvers = peers.settings.iter().filter(|s| s.tolerance.is_some());
-    let least = solvers.map(Setting::error).min_by(f64::total_cmp).context("no solver was run")?;
-    ensure!(least <= most, "no solver comes within {most} of the ring: {least}");
-    Ok(least)
+impl Peers {
+    /// Least error of SciPy's solvers: how far two independent solutions agree.
+    ///
+    /// # Errors
+    /// If none was run.
+    pub fn agreement(&self) -> Result<f64> {
+        let solvers = self.settings.iter().filter(|s| s.tolerance.is_some());
+        let errors = solvers.filter_map(|s| s.error);
+        errors.reduce(f64::min).context("no solver was run")
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn point(name: &str, elements: usize, tolerance: f64, gap_mm: f64, seconds: f64) -> Point {
+    fn point(elements: usize, gap_mm: Option<f64>, seconds: f64) -> Point {
         Point {
-            name: name.to_owned(),
+            name: "A".to_owned(),
             elements: Some(elements),
-            tolerance: Some(tolerance),
+            tolerance: Some(1e-2),
             time_step_s: None,
-            gap_mm: Some(gap_mm),
+            gap_mm,
             corner_force_n: 50.0,
             seconds,
-            contact_sums: None,
         }
     }
 
     #[test]
     fn neighbours_count_as_one_setting_with_the_worst_error() {
-        let points = vec![
-            point("A", 237, 1e-2, 2.02, 3.0),
-            point("A", 237, 1e-3, 2.00, 9.0),
-            point("A", 240, 1e-2, 2.00, 2.0),
-            point("A", 243, 1e-2, 1.99, 4.0),
-            point("A", 480, 1e-2, 2.00, 5.0),
-            point("B", 240, 1e-2, 2.00, 5.0),
+        let points = [
+            point(237, Some(2.002), 3.0),
+            point(240, Some(2.0), 2.0),
+            point(243, Some(1.992), 4.0),
+            point(480, Some(2.04), 1.0),
+            point(960, None, 0.5),
         ];
-        let groups = grouped(points);
-        assert_eq!(groups.iter().map(Vec::len).collect::<Vec<_>>(), [3, 1, 1, 1]);
-        let errors = |p: &Point| (p.gap_mm.map(|gap| (gap / 2.0 - 1.0).abs()), 0.001);
-        let setting = worst(&groups[0], errors);
-        assert_eq!((setting.elements, setting.seconds), (Some(240), 2.0));
-        assert!((setting.error() - 0.01).abs() < 1e-12);
+        let found = merged(&points, Exact(2.0, 50.0));
+        assert_eq!(found.len(), 3);
+        assert_eq!((found[0].elements, found[0].seconds), (Some(240), 2.0));
+        assert!((found[0].error.unwrap() - 0.004).abs() < 1e-12);
+        // Without a gap a setting has no precision.
+        assert_eq!(found[2].error, None);
+        assert_eq!(least_seconds(&found), [("A".to_owned(), Some(2.0))]);
     }
 
     #[test]
-    fn a_crossing_without_a_gap_is_no_precision() {
-        let lost = Point { gap_mm: None, ..point("A", 240, 1e-2, 0.0, 1.0) };
-        let setting = worst(&[lost], |p| (p.gap_mm, 0.0));
-        assert_eq!((setting.gap_error, setting.error()), (None, f64::INFINITY));
-    }
-
-    #[test]
-    fn ratios_compare_the_quickest_that_are_precise_enough() {
-        let setting = |name: &str, error: f64, seconds: f64| Setting {
-            name: name.to_owned(),
-            elements: None,
-            tolerance: None,
-            time_step_s: None,
-            gap_error: Some(error),
-            force_error: 0.0,
-            seconds,
-            contact_sums: None,
-        };
-        let all = [
-            setting(RING, 0.01, 1.0),
-            setting(RING, 0.004, 2.0),
-            setting(RING, 0.001, 4.0),
-            setting("A", 0.004, 10.0),
-            setting("B", 0.02, 1.0),
-        ];
-        let found = ratios(&all);
-        let of = |name: &str, level: f64| {
-            found.iter().find(|r| r.name == name && r.level == level).unwrap().time_ratio
-        };
-        assert_eq!(of("A", LEVELS[0]), Some(5.0));
-        assert_eq!(of("A", LEVELS[1]), None);
-        assert_eq!(of("B", LEVELS[0]), None);
-    }
-
-    #[test]
-    fn what_the_scripts_are_given_is_the_crossing() {
-        let given = given(&Problem::published(), "/tmp").unwrap();
-        assert_eq!((given.speed_mm_s, given.preload_n), (5.0, 100.0));
-        assert!(given.start_mm < -13.6 && given.end_mm > 0.0);
+    fn the_crossing_is_the_one_that_the_rubber_was_fitted_to() {
+        let found = crossing(PRELOAD_N, Mesh { elements: 2880, stride_mm: 0.02 }).unwrap();
+        assert!(
+            (found.gap_mm - 1.744).abs() < 0.002 && (found.corner_force_n - 53.72).abs() < 0.05
+        );
+        let given = given("/tmp").unwrap();
         let [less, more] = &given.fits[..] else { panic!("two fits") };
-        assert!(less.preload_n < 100.0 && more.preload_n > 100.0);
         assert!(less.gap_mm > more.gap_mm && less.sinkage_mm < more.sinkage_mm);
     }
 }

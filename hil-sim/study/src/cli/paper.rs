@@ -1,13 +1,14 @@
 //! `rig paper`: the study's figures and claims, regenerated.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use serde::Serialize;
 
-use crate::paper::{self, Study, StudyError, draw, page};
+use super::{docs, write};
+use crate::figure_svg::svg;
+use crate::paper::{self, Study, StudyError, page};
 use hil_sim::cli::failure::{Failure, Outcome};
 use hil_sim::cli::output;
-use hil_sim::files::{make_directory, write_text};
 use hil_sim::progress;
 use hil_sim::table::plain;
 
@@ -36,34 +37,21 @@ struct Printed<'a> {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
-    let default = || Path::new(env!("CARGO_MANIFEST_DIR")).with_file_name("docs").join("paper");
-    let directory = args.out.clone().unwrap_or_else(default);
-    // Told before the runs rather than after them.
-    make_directory(&directory)?;
+    let directory = args.out.clone().unwrap_or_else(|| docs().join("paper"));
+    // A directory that cannot be made is reported before the runs.
+    std::fs::create_dir_all(&directory)
+        .map_err(|error| Failure::input(format!("{}: {error}", directory.display())))?;
     let study = {
         let bar = progress::bar("deployments", paper::runs() as u64);
         paper::regenerate(&|| bar.advance(1))?
     };
-    let files = write(&study, &directory)?;
-    let printed = Printed { study: &study, files: &files };
-    output::result(args.json, &printed, || human(&study, &files))?;
+    let mut files: Vec<(&str, String)> =
+        study.figures.iter().map(|figure| (figure.file.as_str(), svg(figure))).collect();
+    files.push(("README.md", page::markdown(&study)));
+    files.push(("paper.json", paper::json(&study).map_err(Failure::run)? + "\n"));
+    let files = write(&directory, files)?;
+    output::result(args.json, &Printed { study: &study, files: &files }, || human(&study, &files))?;
     Ok(Outcome::Good)
-}
-
-fn write(study: &Study, directory: &Path) -> Result<Vec<PathBuf>, Failure> {
-    let mut files = Vec::new();
-    let mut put = |name: &str, text: &str| -> Result<(), Failure> {
-        let path = directory.join(name);
-        write_text(&path, text)?;
-        files.push(path);
-        Ok(())
-    };
-    for figure in &study.figures {
-        put(&figure.file, &draw::svg(figure))?;
-    }
-    put("README.md", &page::markdown(study))?;
-    put("paper.json", &(paper::json(study).map_err(Failure::run)? + "\n"))?;
-    Ok(files)
 }
 
 fn human(study: &Study, files: &[PathBuf]) -> String {

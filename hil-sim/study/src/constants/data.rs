@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, ensure};
 use interstage::model::felt::Kind;
 use interstage::rig::Rig;
-use interstage::supervise::Direction;
+use interstage::units::Direction;
 use rayon::prelude::*;
 
 use super::design::{Case, Use};

@@ -2,7 +2,7 @@
 
 use interstage::model::felt::{FORCE_END, Kind};
 use interstage::model::formula::Formula;
-use interstage::supervise::Direction;
+use interstage::units::Direction;
 
 /// A crossing of the published wheel.
 #[derive(Clone, Copy, Debug, PartialEq)]

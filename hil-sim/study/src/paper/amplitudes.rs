@@ -3,12 +3,12 @@
 
 use super::case::Case;
 use super::experiment::{Experiment, Line, Run, marks as mark_runs};
-use super::figure::{Claim, Figure, Mark, Panel, Series, Source};
 use super::history::{Histories, Quantity};
 use super::published::{AMPLITUDE_MM, CASES, COLLISION_N, STRESS};
 use super::simulation;
 use super::theory::{self, Drive, Lift};
 use super::transitions::at;
+use crate::figure::{Claim, Figure, Mark, Panel, Series, Source};
 use crate::reference::impact::Rubber;
 use crate::reference::{Case as Reference, ReferenceError};
 

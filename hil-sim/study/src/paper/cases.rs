@@ -2,10 +2,10 @@
 //! loads.
 
 use super::case::{Case, Loads};
-use super::figure::{Claim, Figure, Series, Source};
 use super::history::{Histories, Quantity};
 use super::published::{CASES, COLLISION_N};
 use super::transitions::{SOURCES, count_humps, first_rises, peaks_text};
+use crate::figure::{Claim, Figure, Series, Source};
 
 const SECTION: &str = "Vibration transmission model";
 

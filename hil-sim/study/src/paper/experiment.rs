@@ -5,8 +5,8 @@
 //! Gap, embedding depth and contact area are what the sensors say; forces and arm
 //! vibration, for which the rig has no sensor, are what the plant did.
 
-use interstage::log::Event;
 use interstage::supervise::{Command, Mode};
+use interstage::tick::Event;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
@@ -15,10 +15,10 @@ use rayon::prelude::*;
 use super::StudyError;
 use super::case::Case;
 use super::course::Arms;
-use super::figure::Series;
 use super::measure::{CollisionGauge, impact_kpa};
 use super::published::{LOG_S, RUNS, RUNS_OF_A_MEAN};
 use super::theory::area_of_depth_mm2;
+use crate::figure::Series;
 use crate::reference::ReferenceError;
 use crate::reference::vibration::modal::Modal;
 use hil_sim::plant::rig::VirtualRig;

@@ -4,9 +4,9 @@
 use super::case::Case;
 use super::course::{Arms, Course, Points};
 use super::experiment::{Experiment, Line, STAGES, groups};
-use super::figure::{Panel, Series, Source};
 use super::published::LOG_S;
 use super::{simulation, theory};
+use crate::figure::{Panel, Series, Source};
 use crate::reference::ReferenceError;
 
 /// Points of theory and simulation of which one is shown.

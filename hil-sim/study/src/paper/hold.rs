@@ -3,17 +3,17 @@
 
 use interstage::model::formula::Formula;
 use interstage::rig::Rig;
-use interstage::supervise::Direction;
+use interstage::units::Direction;
 
 use super::case::{Case, Loads};
 use super::course::Points;
 use super::experiment::{Experiment, Reading, marks};
-use super::figure::{Claim, Figure, Panel, Series, Source};
 use super::published::{CONSTRAINED_HZ, FREE_HZ, LEAST_PRELOAD_N, LEAST_SPEED_MM_S, RIG_PRELOAD_N};
 use super::simulation;
 use super::sweeps::Sweep;
 use super::theory::{self, Drive};
 use super::transitions::SOURCES;
+use crate::figure::{Claim, Figure, Panel, Series, Source};
 use crate::reference::beam::{Ends, Forcing};
 use crate::reference::vibration::Arm;
 use crate::reference::{Case as Reference, ReferenceError};

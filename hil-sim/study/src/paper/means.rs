@@ -4,7 +4,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::experiment::{Experiment, Reading, groups};
-use super::figure::{Series, Source};
+use crate::figure::{Series, Source};
 
 /// A parabola.
 type Curve = [f64; 3];

@@ -94,9 +94,9 @@ pub fn corner_area_mm2((radius, width): (f64, f64), ahead_mm: f64, above_mm: f64
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::figure::Source;
     use crate::paper::case::{Case, Loads};
     use crate::paper::experiment;
-    use crate::paper::figure::Source;
     use crate::paper::history::{Histories, Quantity};
 
     #[test]

@@ -1,7 +1,7 @@
 //! Figure 19: modes of the drive arm.
 
-use super::figure::{Claim, Figure, Mark, Panel, Series, Source};
 use super::published::{CONSTRAINED_HZ, FREE_HZ};
+use crate::figure::{Claim, Figure, Mark, Panel, Series, Source};
 use crate::reference::beam::{Beam, BeamError, Ends, Shape, Tip};
 
 const SECTION: &str = "Experiment scheme";

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::Study;
-use super::figure::{Claim, Figure, Mark, Source};
+use crate::figure::{Claim, Figure, Mark, Source};
 
 /// What the study claims and nothing here can judge, and why.
 const NOT_JUDGED: [(&str, &str); 4] = [

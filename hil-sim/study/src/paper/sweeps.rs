@@ -7,11 +7,11 @@ use rayon::prelude::*;
 
 use super::case::{Case, Loads};
 use super::experiment::{Experiment, Reading};
-use super::figure::{Figure, Mark, Panel, Series, Source};
 use super::means::Means;
 use super::published::{AREA_SPREAD_MM2, DEPTH_SPREAD_MM, GAP_SPREAD_MM};
 use super::simulation;
 use super::theory::{self, Drive, Lift};
+use crate::figure::{Figure, Mark, Panel, Series, Source};
 use hil_sim::plant::balance::BalanceError;
 
 pub use claims::{preload_claims, speed_claims};

@@ -3,7 +3,7 @@
 //! effective stiffness.
 
 use interstage::model::formula::Formula;
-use interstage::supervise::Direction;
+use interstage::units::Direction;
 
 use super::case::Case;
 use super::course::{Arms, Course, Instant};

@@ -2,8 +2,8 @@
 
 use super::case::{Case, Loads};
 use super::experiment::STAGES;
-use super::figure::{Claim, Figure, Source};
 use super::history::{Histories, Quantity};
+use crate::figure::{Claim, Figure, Source};
 
 /// Cases: the study's four at a third of their preload, which spans the 33 to 40 N that
 /// it names. Its own table of them is not published.

@@ -1,7 +1,7 @@
 //! The study's claims about its figures 20 to 23.
 
 use super::{Curves, GRID, Sweep};
-use crate::paper::figure::Claim;
+use crate::figure::Claim;
 use crate::paper::means::bend;
 use crate::paper::published::{AREA_SPREAD_MM2, DEPTH_SPREAD_MM, GAP_SPREAD_MM};
 

@@ -1,0 +1,25 @@
+#!/bin/sh
+# Writes docs/figures/*.json and the README's picture again: about an hour on two cores, most
+# of it the campaign on the emulated board. Names of figures as arguments write those alone.
+set -eu
+cd "$(dirname "$0")/.."
+figures=docs/figures
+write() {
+    name=$1
+    shift
+    case " $wanted " in *" $name "* | "  ") ;; *) return 0 ;; esac
+    cargo rig "$@" --json > "$figures/$name.json.part"
+    mv "$figures/$name.json.part" "$figures/$name.json"
+}
+wanted=$*
+write deploy deploy --out target/figures
+[ ! -f target/figures/overview.svg ] || cp target/figures/overview.svg docs/deployment.svg
+write retract deploy --retract --no-files
+write montecarlo montecarlo -n 1000
+write montecarlo-retract montecarlo -n 1000 --retract
+write compare compare -n 200
+write faults-sil faults -n 100
+write faults-board faults --target board -n 20
+write paper paper
+write bench bench --peers
+write stress stress

@@ -1,0 +1,61 @@
+//! The rig under an imposed rotation and preload, and parameters that change in a run.
+
+use super::{Drives, MOST_STRIDES, PlantError, VirtualRig};
+use crate::plant::rolling::Steady;
+
+impl VirtualRig {
+    /// Advances by `dt_s` with the wheel turning at this tread speed, mm/s, under this
+    /// radial preload, N, in place of motor and pre-tightener. It is the total preload:
+    /// the spring's rate must be 0. Modes of the arm are at rest.
+    ///
+    /// # Errors
+    /// [`PlantError`] when the state stops meaning anything.
+    pub fn follow(&mut self, tread_mm_s: f64, preload_n: f64, dt_s: f64) -> Result<(), PlantError> {
+        self.preload.hold(preload_n);
+        self.imposed_speed_mm_s = Some(tread_mm_s);
+        let parts = (tread_mm_s.abs() * dt_s / self.resolution.stride_mm).ceil();
+        let parts = parts.clamp(1.0, MOST_STRIDES);
+        for _ in 0..parts as usize {
+            self.roll(&Drives::default(), dt_s / parts)?;
+        }
+        self.imposed_speed_mm_s = None;
+        self.truth.time_s += dt_s;
+        self.derive();
+        self.check()
+    }
+
+    /// Traction of the tread, N: the load of the drive.
+    #[must_use]
+    pub fn traction_n(&self) -> f64 {
+        self.truth.utilisation * self.forces.0
+    }
+
+    /// Friction of tread on wall becomes this.
+    pub fn set_friction(&mut self, mu: f64) {
+        self.parameters.mu = mu;
+        self.truth.friction = mu;
+    }
+
+    /// Axial load on the wheel becomes this, N.
+    pub fn set_load(&mut self, load_n: f64) {
+        self.parameters.load_n = load_n;
+    }
+
+    /// Stiffness of the tread becomes this, N/mm^3, relaxed and instant.
+    pub fn set_stiffness(&mut self, k_inf: f64, k_0: f64) {
+        let ring = &mut self.parameters.ring;
+        if (ring.k_inf, ring.k_0) != (k_inf, k_0) {
+            (ring.k_inf, ring.k_0) = (k_inf, k_0);
+            self.ring.set_stiffness(k_inf, k_0);
+            self.steady = Steady::default();
+            self.settle_timer.for_s = 0.0;
+        }
+    }
+
+    /// The preload spring keeps this part of its rate, and with it of its force.
+    pub fn break_spring(&mut self, part: f64) {
+        self.parameters.spring_n_per_mm *= part;
+        self.preload.scale_force(part);
+        self.derive();
+    }
+}

@@ -1,0 +1,235 @@
+//! A figure as data: what is drawn, what is printed as JSON, and what the study's claims
+//! are judged by.
+
+use serde::Serialize;
+
+/// Where the values of a series come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Source {
+    /// The reduced model.
+    Theory,
+    /// The reference models.
+    Simulation,
+    /// Means of ten runs of the virtual rig.
+    Experiment,
+    /// Printed in the study.
+    Published,
+    /// Printed in the study, and what the tread's parameters are fitted to.
+    Fitted,
+    /// One of several methods, by the number of its colour; the series has its name.
+    Method(usize),
+}
+
+impl Source {
+    /// Name in the legend.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Theory => "theory",
+            Self::Simulation => "simulation",
+            Self::Experiment => "experiment, four means of ten",
+            Self::Published => "published",
+            Self::Fitted => "published (fitted)",
+            Self::Method(_) => "",
+        }
+    }
+}
+
+/// Values of one source.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Series {
+    /// Where from.
+    pub source: Source,
+    /// Which of several; empty if there is one.
+    pub name: String,
+    /// Points, x and y.
+    pub points: Vec<(f64, f64)>,
+    /// Range over all runs: x, least and largest; empty if there is none.
+    pub range: Vec<(f64, f64, f64)>,
+}
+
+impl Series {
+    /// A series without name and range.
+    #[must_use]
+    pub fn new(source: Source, points: Vec<(f64, f64)>) -> Self {
+        Self { source, name: String::new(), points, range: Vec::new() }
+    }
+
+    /// A method of this number.
+    #[must_use]
+    pub fn method(number: usize, name: &str, points: Vec<(f64, f64)>) -> Self {
+        Self { name: name.to_owned(), ..Self::new(Source::Method(number), points) }
+    }
+
+    /// Its entry in the legend.
+    #[must_use]
+    pub fn legend(&self) -> (Source, &str) {
+        let method = matches!(self.source, Source::Method(_));
+        (self.source, if method { &self.name } else { self.source.name() })
+    }
+}
+
+/// One plot.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Panel {
+    /// Title.
+    pub title: String,
+    /// Name and unit of the horizontal axis.
+    pub x: String,
+    /// Name and unit of the vertical axis.
+    pub y: String,
+    /// Names of x = 0, 1, ... where x is no quantity; the series are marks then.
+    pub categories: Vec<String>,
+    /// Whether both axes are logarithmic.
+    #[serde(skip)]
+    pub logarithmic: bool,
+    /// Smallest vertical axis.
+    pub least_y: Option<(f64, f64)>,
+    /// What is drawn.
+    pub series: Vec<Series>,
+}
+
+impl Panel {
+    /// An empty plot.
+    #[must_use]
+    pub fn new(title: impl Into<String>, x: &str, y: &str) -> Self {
+        Self {
+            title: title.into(),
+            x: x.into(),
+            y: y.into(),
+            categories: Vec::new(),
+            logarithmic: false,
+            least_y: None,
+            series: Vec::new(),
+        }
+    }
+}
+
+/// A published number beside ours.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Mark {
+    /// What.
+    pub what: String,
+    /// Its unit; empty for ratios.
+    pub unit: &'static str,
+    /// As printed in the study.
+    pub published: f64,
+    /// Whether a parameter of ours is fitted to it.
+    pub fitted: bool,
+    /// Ours by source.
+    pub ours: Vec<Ours>,
+}
+
+/// One of ours beside a published number.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Ours {
+    /// Where from.
+    pub source: Source,
+    /// Ours.
+    pub value: f64,
+    /// Deviation from the published number, relative.
+    pub deviation: f64,
+}
+
+impl Mark {
+    /// A published number, and ours by source.
+    #[must_use]
+    pub fn new(
+        what: String,
+        unit: &'static str,
+        (published, fitted): (f64, bool),
+        ours: &[(Source, f64)],
+    ) -> Self {
+        let of = |&(source, value): &(Source, f64)| Ours {
+            source,
+            value,
+            deviation: value / published - 1.0,
+        };
+        Self { what, unit, published, fitted, ours: ours.iter().map(of).collect() }
+    }
+}
+
+/// A figure of the study.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Figure {
+    /// Number in the study, as `fig20`.
+    pub id: &'static str,
+    /// Name of the file.
+    pub file: String,
+    /// Title.
+    pub title: &'static str,
+    /// What is shown and how it was got.
+    pub caption: String,
+    /// Plots in a row.
+    pub columns: usize,
+    /// The plots, row by row.
+    pub panels: Vec<Panel>,
+    /// Published numbers beside ours.
+    pub published: Vec<Mark>,
+}
+
+/// A statement of the study, held against our data.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Claim {
+    /// Stable name.
+    pub id: &'static str,
+    /// The figure below which it stands.
+    pub figure: &'static str,
+    /// Where the study makes it.
+    pub section: &'static str,
+    /// What it says.
+    pub claim: &'static str,
+    /// Whether it holds in ours.
+    pub holds: bool,
+    /// Whether a parameter of ours is fitted to just this, so that holding proves nothing.
+    pub fitted: bool,
+    /// What was found, and if it does not hold, why.
+    pub why: String,
+}
+
+impl Claim {
+    /// The verdict, as the page has it.
+    #[must_use]
+    pub const fn verdict(&self) -> &'static str {
+        match (self.holds, self.fitted) {
+            (true, false) => "holds",
+            (true, true) => "holds (fitted)",
+            (false, _) => "**does not hold**",
+        }
+    }
+}
+
+impl Claim {
+    /// A claim of `figure`, made in `section`.
+    #[must_use]
+    pub const fn of(figure: &'static str, section: &'static str, id: &'static str) -> Open {
+        Open { figure, section, id, fitted: false }
+    }
+}
+
+/// A claim not yet judged.
+#[derive(Clone, Copy, Debug)]
+pub struct Open {
+    figure: &'static str,
+    section: &'static str,
+    id: &'static str,
+    fitted: bool,
+}
+
+impl Open {
+    /// The same, with a parameter of ours fitted to it.
+    #[must_use]
+    pub const fn fitted(self) -> Self {
+        Self { fitted: true, ..self }
+    }
+
+    /// What the claim says, whether it holds, what was found, and why it does not hold
+    /// if it does not.
+    #[must_use]
+    pub fn judged(self, claim: &'static str, holds: bool, found: String, but: &str) -> Claim {
+        let why = if holds || but.is_empty() { found } else { format!("{found} {but}") };
+        let Self { figure, section, id, fitted } = self;
+        Claim { id, figure, section, claim, holds, fitted, why }
+    }
+}

@@ -1,0 +1,306 @@
+//! Figures as SVG: plots in rows below one legend, each source with the same look in
+//! all of them.
+
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, VPos};
+
+use crate::figure::{Figure, Panel, Series, Source};
+use hil_sim::report::axis::{Scale, extent, label, padded, ticks};
+use hil_sim::report::mesh::{self, TEXT_PX};
+use hil_sim::report::palette;
+use hil_sim::report::svg::{Area, Drawn, SCALE, fixed, font, text_width};
+
+const S: i32 = SCALE as i32;
+/// Width of a figure, CSS pixels.
+const WIDTH: u32 = 1040;
+/// Height of a row of plots.
+const ROW: u32 = 270;
+/// Height of the row with the legend.
+const HEAD: u32 = 34;
+/// Height of a plot's title.
+const TITLE: u32 = 26;
+const TITLE_PX: f64 = 13.0;
+
+/// Colour of the band over all runs.
+const BAND: RGBColor = RGBColor(0xfb, 0xe9, 0xd2);
+const EXPERIMENT: RGBColor = palette::PRELOAD;
+const PUBLISHED: RGBColor = palette::GAP;
+/// Colours of methods by number.
+const METHODS: [RGBColor; 7] = [
+    palette::TRUTH,
+    palette::SPEED,
+    palette::PRELOAD,
+    palette::RADIUS,
+    palette::GAP,
+    palette::COMPRESSION,
+    palette::SLIP,
+];
+
+/// The figure as SVG.
+#[must_use]
+pub fn svg(figure: &Figure) -> String {
+    let rows = figure.panels.len().div_ceil(figure.columns.max(1)) as u32;
+    fixed((WIDTH, HEAD + rows * ROW), |area| {
+        let (head, body) = area.split_vertically(HEAD * SCALE);
+        legend(&entries(figure), banded(figure), &head)?;
+        let cells = body.split_evenly((rows as usize, figure.columns));
+        for (panel, cell) in figure.panels.iter().zip(&cells) {
+            draw(panel, cell)?;
+        }
+        Ok(())
+    })
+}
+
+/// Entries of the legend in its order.
+fn entries(figure: &Figure) -> Vec<(Source, &str)> {
+    let series = figure.panels.iter().flat_map(|panel| &panel.series);
+    let mut found: Vec<(Source, &str)> = series.map(Series::legend).collect();
+    found.sort_unstable();
+    found.dedup();
+    found
+}
+
+/// Whether a range over all runs is shown.
+fn banded(figure: &Figure) -> bool {
+    figure.panels.iter().flat_map(|panel| &panel.series).any(|series| !series.range.is_empty())
+}
+
+fn legend(entries: &[(Source, &str)], band: bool, head: &Area) -> Drawn {
+    let middle = (HEAD * SCALE) as i32 / 2;
+    let mut left = 16 * S;
+    let name = |text: &str, left: &mut i32| {
+        let style = font(TEXT_PX, palette::TEXT, HPos::Left, VPos::Center);
+        let at = *left + 34 * S;
+        *left = at + text_width(text, TEXT_PX) + 14 * S;
+        head.draw(&Text::new(text.to_owned(), (at, middle), style))
+    };
+    for &(source, text) in entries {
+        let ends = [(left, middle), (left + 28 * S, middle)];
+        match source {
+            Source::Theory | Source::Simulation | Source::Experiment => {
+                head.draw(&PathElement::new(ends, stroke(source)))?;
+            }
+            Source::Method(_) => {
+                head.draw(&PathElement::new(ends, stroke(source)))?;
+                head.draw(&Circle::new((left + 14 * S, middle), 4 * S, stroke(source).filled()))?;
+            }
+            Source::Published | Source::Fitted => {
+                for part in diamond((left + 14 * S, middle), source) {
+                    head.draw(&part)?;
+                }
+            }
+        }
+        name(text, &mut left)?;
+    }
+    if band {
+        let corners = [(left, middle - 7 * S), (left + 28 * S, middle + 7 * S)];
+        head.draw(&Rectangle::new(corners, BAND.filled()))?;
+        name("range of all forty runs", &mut left)?;
+    }
+    Ok(())
+}
+
+fn stroke(source: Source) -> ShapeStyle {
+    match source {
+        Source::Theory => palette::TRUTH.stroke_width(4),
+        Source::Simulation => palette::SIMULATED.stroke_width(4),
+        Source::Experiment => EXPERIMENT.stroke_width(3),
+        Source::Published | Source::Fitted => PUBLISHED.stroke_width(3),
+        Source::Method(number) => METHODS[number % METHODS.len()].stroke_width(3),
+    }
+}
+
+/// Order of drawing: what is wide stays below what is thin.
+fn layer(source: Source) -> u8 {
+    match source {
+        Source::Experiment => 0,
+        Source::Theory => 1,
+        Source::Simulation => 2,
+        Source::Published | Source::Fitted | Source::Method(_) => 3,
+    }
+}
+
+fn draw(panel: &Panel, cell: &Area) -> Drawn {
+    if panel.logarithmic {
+        return draw_scaled(&decimal_logarithms(panel), cell);
+    }
+    draw_scaled(panel, cell)
+}
+
+/// The panel with the decimal logarithms of its points; what is not above 0 is left out.
+fn decimal_logarithms(panel: &Panel) -> Panel {
+    let mut scaled = panel.clone();
+    for series in &mut scaled.series {
+        series.points.retain(|&(x, y)| x > 0.0 && y > 0.0 && (x * y).is_finite());
+        series.points.iter_mut().for_each(|p| *p = (p.0.log10(), p.1.log10()));
+    }
+    scaled
+}
+
+/// Ticks of a logarithmic axis: decades, or 1, 2 and 5 where these are few.
+fn decades((low, high): (f64, f64)) -> Vec<f64> {
+    let within: &[f64] = if high - low < 2.5 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+    let all = (low.floor() as i32..=high.ceil() as i32)
+        .flat_map(|decade| within.iter().map(move |part| part.log10() + f64::from(decade)));
+    all.filter(|tick| (low..=high).contains(tick)).collect()
+}
+
+/// A power of ten with as many digits as it takes.
+fn power(exponent: f64) -> String {
+    let value = 10_f64.powf(exponent);
+    if (1e-3..1e5).contains(&value) {
+        format!("{value:.3}").trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        format!("{value:.0e}")
+    }
+}
+
+fn draw_scaled(panel: &Panel, cell: &Area) -> Drawn {
+    let (head, body) = cell.split_vertically(TITLE * SCALE);
+    let style = font(TITLE_PX, palette::TRUTH, HPos::Left, VPos::Center);
+    head.draw(&Text::new(panel.title.clone(), (16 * S, (TITLE * SCALE) as i32 / 2), style))?;
+    let (x, y) = ranges(panel);
+    let (wide, high) = body.dim_in_pixel();
+    let (mut x_ticks, x_decimals) = ticks(x, (wide as i32 / (62 * S)).max(2) as usize);
+    if !panel.categories.is_empty() {
+        x_ticks = (0..panel.categories.len()).map(|i| i as f64).collect();
+    }
+    let (mut y_ticks, y_decimals) = ticks(y, (high as i32 / (30 * S)).clamp(2, 7) as usize);
+    if panel.logarithmic {
+        (x_ticks, y_ticks) = (decades(x), decades(y));
+    }
+    let shown = |value: f64, decimals| {
+        if panel.logarithmic { power(value) } else { label(value, decimals) }
+    };
+    let widest = y_ticks.iter().map(|&y| text_width(&shown(y, y_decimals), TEXT_PX)).max();
+    let mut chart = ChartBuilder::on(&body)
+        .margin_left(6 * S)
+        .margin_right(16 * S)
+        .margin_top(4 * S)
+        .x_label_area_size(38 * S)
+        .y_label_area_size(widest.unwrap_or(0) + 26 * S)
+        .build_cartesian_2d(Scale::new(x, x_ticks), Scale::new(y, y_ticks))?;
+    mesh::plain(&mut chart.configure_mesh())
+        .x_label_formatter(&|x| match panel.categories.get(x.round() as usize) {
+            Some(name) => name.clone(),
+            None if panel.categories.is_empty() => shown(*x, x_decimals),
+            None => String::new(),
+        })
+        .y_label_formatter(&|y| shown(*y, y_decimals))
+        .x_desc(panel.x.as_str())
+        .y_desc(panel.y.as_str())
+        .draw()?;
+    let mut series: Vec<&Series> = panel.series.iter().collect();
+    series.sort_by_key(|series| layer(series.source));
+    for one in series.iter().filter(|one| panel.categories.is_empty() && !one.range.is_empty()) {
+        let top = one.range.iter().map(|&(x, _, high)| (x, high));
+        let bottom = one.range.iter().rev().map(|&(x, low, _)| (x, low));
+        let band: Vec<(f64, f64)> = top.chain(bottom).collect();
+        chart.draw_series([Polygon::new(band, BAND.filled())])?;
+    }
+    for one in series {
+        let published = matches!(one.source, Source::Published | Source::Fitted);
+        if !published && panel.categories.is_empty() {
+            chart.draw_series([PathElement::new(one.points.clone(), stroke(one.source))])?;
+            if matches!(one.source, Source::Method(_)) {
+                let dot = |&point| Circle::new(point, 4 * S, stroke(one.source).filled());
+                chart.draw_series(one.points.iter().map(dot))?;
+            }
+            continue;
+        }
+        let shift = if panel.categories.is_empty() { 0 } else { beside(one.source) };
+        for &(x, low, high) in &one.range {
+            let [a, b] = [low, high].map(|y| chart.backend_coord(&(x, y)));
+            let corners = [(a.0 + shift - 5 * S, a.1), (b.0 + shift + 5 * S, b.1)];
+            chart.plotting_area().draw(
+                &(EmptyElement::at((x, low))
+                    + Rectangle::new(
+                        [
+                            (corners[0].0 - a.0, 0),
+                            (corners[1].0 - a.0, corners[1].1 - corners[0].1),
+                        ],
+                        BAND.filled(),
+                    )),
+            )?;
+        }
+        for &point in &one.points {
+            let [rim, body] = mark((shift, 0), one.source);
+            chart.draw_series([EmptyElement::at(point) + rim + body])?;
+        }
+    }
+    Ok(())
+}
+
+/// Shift of the marks of one source in a category, drawing units.
+fn beside(source: Source) -> i32 {
+    match source {
+        Source::Theory => -27 * S,
+        Source::Simulation => -9 * S,
+        Source::Experiment => 9 * S,
+        Source::Published | Source::Fitted => 27 * S,
+        Source::Method(_) => 0,
+    }
+}
+
+/// Ranges of the axes over everything that is shown.
+fn ranges(panel: &Panel) -> ((f64, f64), (f64, f64)) {
+    let points = || panel.series.iter().flat_map(|series| &series.points);
+    let bands = || panel.series.iter().flat_map(|series| &series.range);
+    let x = if panel.categories.is_empty() {
+        let all = points().map(|p| p.0).chain(bands().map(|b| b.0));
+        let (low, high) = extent(all).unwrap_or((0.0, 1.0));
+        let room = 0.03 * (high - low);
+        let keeps_zero = low == 0.0 && !panel.logarithmic;
+        (if keeps_zero { 0.0 } else { low - room }, high + room)
+    } else {
+        (-0.5, panel.categories.len() as f64 - 0.5)
+    };
+    let values = points().map(|p| p.1).chain(bands().flat_map(|b| [b.1, b.2]));
+    let least = panel.least_y.into_iter().flat_map(|(low, high)| [low, high]);
+    let y = extent(values.chain(least)).unwrap_or((0.0, 1.0));
+    let wide = padded(y, 0.07);
+    // What begins at zero keeps its zero line.
+    (x, if y.0 == 0.0 && !panel.logarithmic { (0.0, wide.1) } else { wide })
+}
+
+type Drawable<'a> = DynElement<'static, SVGBackend<'a>, (i32, i32)>;
+
+/// A mark with a white rim at `at`.
+fn mark<'a>(at: (i32, i32), source: Source) -> [Drawable<'a>; 2] {
+    const R: i32 = 5 * S;
+    match source {
+        Source::Theory => {
+            let ends = |wide| [(at.0 - wide, at.1), (at.0 + wide, at.1)];
+            [
+                PathElement::new(ends(8 * S + 2), WHITE.stroke_width(9)).into_dyn(),
+                PathElement::new(ends(8 * S), palette::TRUTH.stroke_width(5)).into_dyn(),
+            ]
+        }
+        Source::Simulation => [
+            Circle::new(at, R, WHITE.filled()).into_dyn(),
+            // Undashed: a mark is too small for dashes.
+            Circle::new(at, R, palette::SPEED.stroke_width(4)).into_dyn(),
+        ],
+        Source::Experiment | Source::Method(_) => [
+            Circle::new(at, R - 1, WHITE.filled()).into_dyn(),
+            Circle::new(at, R - 3, stroke(source).filled()).into_dyn(),
+        ],
+        Source::Published | Source::Fitted => diamond(at, source),
+    }
+}
+
+/// A diamond, hollow where it is fitted.
+fn diamond<'a>((x, y): (i32, i32), source: Source) -> [Drawable<'a>; 2] {
+    let corners = |r: i32| vec![(x, y - r), (x + r, y), (x, y + r), (x - r, y)];
+    let closed = |r: i32| vec![(x, y - r), (x + r, y), (x, y + r), (x - r, y), (x, y - r)];
+    match source {
+        Source::Fitted => [
+            Polygon::new(corners(6 * S), WHITE.filled()).into_dyn(),
+            PathElement::new(closed(6 * S), PUBLISHED.stroke_width(4)).into_dyn(),
+        ],
+        _ => [
+            Polygon::new(corners(7 * S), WHITE.filled()).into_dyn(),
+            Polygon::new(corners(6 * S), PUBLISHED.filled()).into_dyn(),
+        ],
+    }
+}

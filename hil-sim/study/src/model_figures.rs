@@ -1,0 +1,203 @@
+//! The reference models' figures of the study's three finite-element cases, for
+//! `docs/MODEL.md`: `docs/figures/model.json` and `model.svg`.
+
+use interstage::rig::Rig;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::figure::{Figure, Panel, Series, Source};
+use crate::paper::published::{AMPLITUDE_MM, CASES, COLLISION_N, STRESS};
+use crate::reference::impact::Rubber;
+use crate::reference::impact::dispersion::{Wave, front_attenuation_np_m};
+use crate::reference::impact::rubber::THICKNESS_MM;
+use crate::reference::vibration::{Arm, CONSTRAINED_HZ, FREE_HZ};
+use crate::reference::{Case, ReferenceError, Resolution, collision, impact, vibration};
+
+/// Travel before the edge from which on the grain of the ring shakes it, mm.
+const EDGE_MM: f64 = -0.2;
+
+/// Everything that the page refers to.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ModelFigures {
+    /// The three cases.
+    pub cases: Vec<CaseFigures>,
+    /// Waves in three rubbers.
+    pub rubbers: Vec<RubberFigures>,
+    /// First four modes of the bare arm, Hz.
+    pub bare_arm_hz: Vec<f64>,
+    /// Of the arm with the fitted mass at its tip.
+    pub arm_hz: Vec<f64>,
+    /// Of that arm on the tread.
+    pub arm_on_tread_hz: Vec<f64>,
+    /// Published: first constrained and seventh free mode, Hz.
+    pub published_hz: [f64; 2],
+}
+
+/// Figures of one case, published and ours.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CaseFigures {
+    /// Axial speed, mm/s.
+    pub speed_mm_s: f64,
+    /// Preload, N.
+    pub preload_n: f64,
+    /// Published gap, mm.
+    pub published_gap_mm: f64,
+    /// Gap without inertia, mm; the tread is fitted to it.
+    pub gap_mm: f64,
+    /// Published collision force, N.
+    pub published_force_n: f64,
+    /// Largest collision force without inertia, N.
+    pub force_n: f64,
+    /// Published impact stress; its unit is doubtful.
+    pub published_stress: f64,
+    /// Largest stress increment at the hub, Pa.
+    pub stress_pa: f64,
+    /// Speed at which tread and corner close, mm/s.
+    pub closing_mm_s: f64,
+    /// Largest force that accelerates the moved mass while it climbs, N.
+    pub inertia_n: f64,
+    /// That force if the rolling contact met the corner at once, N.
+    pub inertia_bound_n: f64,
+    /// Jump of stress if the face met the corner at once, Pa.
+    pub jump_pa: f64,
+    /// Largest deflection of the arm, mm.
+    pub bending_mm: f64,
+    /// Largest vibration of the arm while climbing, mm.
+    pub vibration_mm: f64,
+}
+
+/// Stress waves in one rubber.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RubberFigures {
+    /// The rubber.
+    pub name: &'static str,
+    /// Transit of the tread by the front, ms.
+    pub front_ms: f64,
+    /// By slow waves, ms.
+    pub slow_ms: f64,
+    /// Largest attenuation over the tread, dB.
+    pub loss_db: f64,
+}
+
+/// The case of this index in the study.
+fn case(index: usize, resolution: Resolution) -> Case {
+    let (speed_mm_s, preload_n) = CASES[index];
+    Case { resolution, ..Case::new(Rig::fe(), speed_mm_s, preload_n) }
+}
+
+/// Computes them.
+///
+/// # Errors
+/// If a reference refuses.
+pub fn compute() -> Result<ModelFigures, ReferenceError> {
+    let computed: Vec<(CaseFigures, f64)> =
+        (0..3).into_par_iter().map(of_case).collect::<Result<_, _>>()?;
+    let patch_mm2 = computed[0].1;
+    let first = case(0, Resolution::HISTORY);
+    let rubbers = [
+        ("the fitted tread", Rubber::of(&first)?),
+        ("sheets, tan delta 0.1 at 10 Hz", Rubber::of_sheets(0.1, 10.0)?),
+        ("sheets, tan delta 0.25 at 100 Hz", Rubber::of_sheets(0.25, 100.0)?),
+    ];
+    let arm = Arm::of(&first)?;
+    let bare = Arm { tip: Default::default(), ..arm };
+    let hertz = |arm: &Arm| -> Result<Vec<f64>, ReferenceError> {
+        Ok(arm.modes(4)?.iter().map(|mode| mode.frequency_hz).collect())
+    };
+    Ok(ModelFigures {
+        cases: computed.into_iter().map(|pair| pair.0).collect(),
+        rubbers: rubbers.map(|(name, rubber)| of_rubber(name, &rubber)).into(),
+        bare_arm_hz: hertz(&bare)?,
+        arm_hz: hertz(&arm)?,
+        arm_on_tread_hz: hertz(&arm.on_tread(&first, patch_mm2)?)?,
+        published_hz: [CONSTRAINED_HZ, FREE_HZ],
+    })
+}
+
+/// Figures of a case, and the patch of steady rolling, mm^2.
+fn of_case(index: usize) -> Result<(CaseFigures, f64), ReferenceError> {
+    let still = collision::quasi_static(&case(index, Resolution::FIGURE))?;
+    let case = case(index, Resolution { step_s: 2e-4, ..Resolution::FIGURE });
+    let moving = collision::dynamic(&case)?;
+    let climbing = moving.samples.iter().filter(|sample| sample.x_mm < EDGE_MM);
+    let climbing_s = climbing.clone().map(|sample| sample.t_s).fold(f64::NEG_INFINITY, f64::max);
+    let patch_mm2 = moving.samples[0].area_mm2;
+    let stiffness = case.tread()?.instant() * patch_mm2 * 1e-6;
+    let closing_mm_s = case.closing_speed_mm_s();
+    let bending = vibration::bending(&case, &moving)?;
+    let stress = impact::history_of(&case, &moving)?;
+    let shaken = bending.iter().filter(|now| now.t_s < climbing_s);
+    let figures = CaseFigures {
+        speed_mm_s: case.speed_mm_s,
+        preload_n: case.preload_n,
+        published_gap_mm: AMPLITUDE_MM[index],
+        gap_mm: still.lift.map_or(f64::NAN, |lift| lift.gap_mm),
+        published_force_n: COLLISION_N[index],
+        force_n: still.peak_n(),
+        published_stress: STRESS[index],
+        stress_pa: largest(stress.into_iter().map(|point| point.1)),
+        closing_mm_s,
+        inertia_n: largest(climbing.map(|sample| (sample.radial_n - case.preload_n).abs())),
+        inertia_bound_n: 1e-3 * closing_mm_s * (stiffness * case.rig.plant.moved_mass_kg).sqrt(),
+        jump_pa: Rubber::of(&case)?.impedance() * 1e-3 * closing_mm_s,
+        bending_mm: largest(bending.iter().map(|now| now.deflection_mm)),
+        vibration_mm: largest(shaken.map(|now| now.vibration_mm.abs())),
+    };
+    Ok((figures, patch_mm2))
+}
+
+fn largest(values: impl Iterator<Item = f64>) -> f64 {
+    values.fold(0.0, f64::max)
+}
+
+fn of_rubber(name: &'static str, rubber: &Rubber) -> RubberFigures {
+    let limit = Wave { number_rad_m: 0.0, attenuation_np_m: front_attenuation_np_m(rubber) };
+    RubberFigures {
+        name,
+        front_ms: THICKNESS_MM / rubber.front_speed_m_s(),
+        slow_ms: THICKNESS_MM / rubber.slow_speed_m_s(),
+        loss_db: limit.loss_db(1e-3 * THICKNESS_MM),
+    }
+}
+
+/// Gap and collision force of the ring over preload at 5 and 8 mm/s, with the published
+/// values.
+///
+/// # Errors
+/// If a crossing cannot be computed.
+pub fn figure() -> Result<Figure, ReferenceError> {
+    let mut gap = Panel::new("Gap: the tread is fitted to these marks", "preload, N", "gap, mm");
+    let mut force = Panel::new("Collision force: not fitted", "preload, N", "force, N");
+    for (number, speed) in [(1, 5.0), (2, 8.0)] {
+        let points: Vec<(f64, f64, f64)> = (0..=10)
+            .into_par_iter()
+            .map(|index| {
+                let preload = 80.0 + 6.0 * f64::from(index);
+                let case =
+                    Case { resolution: Resolution::FIGURE, ..Case::new(Rig::fe(), speed, preload) };
+                let crossing = collision::quasi_static(&case)?;
+                let gap = crossing.lift.map_or(f64::NAN, |lift| lift.gap_mm);
+                Ok((preload, gap, crossing.peak_n()))
+            })
+            .collect::<Result<_, ReferenceError>>()?;
+        let name = format!("ring, {speed} mm/s");
+        gap.series.push(Series::method(number, &name, points.iter().map(|p| (p.0, p.1)).collect()));
+        force.series.push(Series::method(
+            number,
+            &name,
+            points.iter().map(|p| (p.0, p.2)).collect(),
+        ));
+    }
+    let marks = |values: [f64; 3]| CASES.iter().zip(values).map(|(case, y)| (case.1, y)).collect();
+    gap.series.push(Series::new(Source::Fitted, marks(AMPLITUDE_MM)));
+    force.series.push(Series::new(Source::Published, marks(COLLISION_N)));
+    Ok(Figure {
+        id: "model",
+        file: "model.svg".to_owned(),
+        title: "Gap and collision force over preload",
+        caption: String::new(),
+        columns: 2,
+        panels: vec![gap, force],
+        published: Vec::new(),
+    })
+}

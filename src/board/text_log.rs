@@ -1,0 +1,158 @@
+//! Log entries as lines on the debug probe, and the binary log beside them.
+
+use defmt::{error, info, warn};
+use interstage::estimate::ContactStage;
+use interstage::hal::Journal;
+use interstage::log::Identity;
+use interstage::log::frame::Checker;
+use interstage::supervise::{Command, Leg, Mode};
+use interstage::tick::{CrossingRecord, Entry, Event};
+use interstage::units::{Direction, Q16};
+
+use super::Checksum;
+use super::rtt::{self, Frames};
+
+/// Writes entries, and owns up to what was lost; passes frames on.
+pub(crate) struct Lines {
+    frames: Frames,
+    checksum: Checksum,
+    identity: Identity,
+    lost: u32,
+}
+
+impl Lines {
+    /// Lines on the log's channel, frames on their own.
+    pub(crate) fn new(frames: Frames, checksum: Checksum) -> Self {
+        Self { frames, checksum, identity: Identity::default(), lost: 0 }
+    }
+
+    /// Says what the frames are to begin with; before the journal starts.
+    pub(crate) fn introduce(&mut self, identity: Identity) {
+        self.identity = identity;
+    }
+}
+
+impl Journal for Lines {
+    fn send(&mut self, frame: &[u8]) -> bool {
+        self.frames.send(frame)
+    }
+
+    fn checker(&self) -> Checker {
+        self.checksum.checker()
+    }
+
+    fn identity(&self) -> Identity {
+        self.identity.clone()
+    }
+
+    fn write(&mut self, entry: &Entry) {
+        let lost = rtt::lost();
+        if lost != self.lost {
+            warn!("{=u32} lines lost: the probe reads too slowly", lost.wrapping_sub(self.lost));
+            self.lost = lost;
+        }
+        let at = entry.at;
+        match entry.event {
+            Event::Mode(Mode::FaultHold(fault)) => {
+                error!("[{=u32} ms] mode: fault hold, {=u16}", at, fault.code());
+            }
+            Event::Mode(mode) => info!("[{=u32} ms] mode: {=str}", at, of_mode(mode)),
+            Event::Stage(stage) => {
+                info!("[{=u32} ms] stage {=u8}: {=str}", at, stage as u8, of_stage(stage));
+            }
+            Event::Command(command) => info!("[{=u32} ms] {=str}", at, of_command(command)),
+            Event::Refused(command) => {
+                warn!("[{=u32} ms] refused in this mode: {=str}", at, of_command(command));
+            }
+            Event::Fault(fault) => {
+                error!("[{=u32} ms] fault {=u16}: {=str}", at, fault.code(), fault.sentence());
+            }
+            Event::Limit(limit) => {
+                warn!("[{=u32} ms] limit {=u16}: {=str}", at, limit.code(), limit.sentence());
+            }
+            Event::Lost(entries) => {
+                warn!("[{=u32} ms] {=u32} log entries lost", at, entries);
+            }
+            Event::Crossing(record) => crossing(at, &record),
+            // Said when it was found, before there was a journal.
+            Event::Restart(_) => {}
+        }
+    }
+}
+
+/// The ledger line in physical units.
+fn crossing(at: u32, record: &CrossingRecord) {
+    let value = Q16::to_num::<f32>;
+    info!(
+        "[{=u32} ms] step {=u8} {=str}: at {=f32} mm ({=f32} off), {=f32} mm/s, preload {=f32} N (peak {=f32}) {=f32} s ahead, tread {=f32} mm, gap {=f32} mm (predicted {=f32}), slip margin {=f32}, stiffness x{=f32}",
+        at,
+        record.index,
+        of_direction(record.direction),
+        value(record.position),
+        value(record.residual),
+        value(record.speed),
+        value(record.preload),
+        value(record.peak_preload),
+        value(record.lead_time),
+        value(record.compression),
+        value(record.gap_measured),
+        value(record.gap_predicted),
+        value(record.slip_margin),
+        value(record.stiffness_scale),
+    );
+}
+
+fn of_direction(direction: Direction) -> &'static str {
+    match direction {
+        Direction::Deploy => "deploying",
+        Direction::Retract => "retracting",
+    }
+}
+
+fn of_command(command: Command) -> &'static str {
+    match command {
+        Command::Start => "start",
+        Command::Stop => "stop",
+        Command::Retract => "retract",
+        Command::Reset => "reset",
+    }
+}
+
+fn of_stage(stage: ContactStage) -> &'static str {
+    match stage {
+        ContactStage::Initial => "initial",
+        ContactStage::Preloaded => "preloaded",
+        ContactStage::StaticFriction => "static friction",
+        ContactStage::Sliding => "sliding on the corner",
+        ContactStage::Rolling => "rolling over the corner",
+        ContactStage::Continuous => "continuous wall",
+    }
+}
+
+fn of_mode(mode: Mode) -> &'static str {
+    match mode {
+        Mode::Boot => "boot",
+        Mode::SelfTest => "self-test",
+        Mode::Zero => "zeroing",
+        Mode::Idle => "idle",
+        Mode::Preload(Direction::Deploy) => "preloading to deploy",
+        Mode::Preload(Direction::Retract) => "preloading to retract",
+        Mode::Run(Direction::Deploy, leg) => match leg {
+            Leg::Cruise => "deploying: cruise",
+            Leg::Approach => "deploying: approach",
+            Leg::Crossing => "deploying: crossing",
+            Leg::Settle => "deploying: settle",
+        },
+        Mode::Run(Direction::Retract, leg) => match leg {
+            Leg::Cruise => "retracting: cruise",
+            Leg::Approach => "retracting: approach",
+            Leg::Crossing => "retracting: crossing",
+            Leg::Settle => "retracting: settle",
+        },
+        Mode::Stopping(Direction::Deploy) => "stopping while deploying",
+        Mode::Stopping(Direction::Retract) => "stopping while retracting",
+        Mode::Complete(Direction::Deploy) => "deployed",
+        Mode::Complete(Direction::Retract) => "retracted",
+        Mode::FaultHold(_) => "fault hold",
+    }
+}

@@ -1,0 +1,365 @@
+//! Follows a crossing: what the watch detects becomes odometry, level and review.
+
+use super::crossing::{Contact, CrossingEvent, Lift, WatchInput};
+use super::restore::UNSURE_WITHIN;
+use super::{EstimateState, Estimator, Expectation, Findings, LiftPoint, OpenCrossing, Position};
+use crate::fault::{Fault, Limit};
+use crate::sense::SensedState;
+use crate::units::{Direction, Millimetres, Newtons, Q16, Tick};
+
+/// What the estimator is given in a tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Follow<'a> {
+    /// Time.
+    pub now: Tick,
+    /// Sensors.
+    pub sensed: &'a SensedState,
+    /// Since when the crossing preload has been reached.
+    pub standing_since: Option<Tick>,
+}
+
+impl Estimator {
+    /// One tick in which the drive moves.
+    pub fn follow(&self, state: &mut EstimateState, tick: &Follow<'_>) -> Findings {
+        let mut found = Findings::default();
+        let direction = state.direction;
+        self.watch_slip(state, tick, &mut found);
+        let seen = self.watch_input(state, tick.sensed);
+        let event = self.watch.step(&mut state.watch, direction, &seen);
+        if let Some(open) = state.crossing.as_mut() {
+            open.peak_preload = open.peak_preload.max(tick.sensed.preload_filtered);
+        }
+        match event {
+            None => {}
+            Some(CrossingEvent::Touched) => self.touched(state, tick, &mut found),
+            Some(CrossingEvent::Released) => state.crossing = None,
+            Some(CrossingEvent::Lifted(lift)) => self.lifted(state, tick, lift, &mut found),
+            Some(CrossingEvent::Passed) => passed(state),
+            Some(CrossingEvent::GapClosed { gap, plausible, .. }) => {
+                close(state, gap, plausible, &mut found);
+            }
+            Some(CrossingEvent::Retouched { gap }) => {
+                close(state, gap, false, &mut found);
+                self.touched(state, tick, &mut found);
+            }
+        }
+        found
+    }
+
+    /// Late and missing steps.
+    pub fn watch_expectation(&self, state: &mut EstimateState) -> Findings {
+        let mut found = Findings::default();
+        if state.watch.contact != Contact::Wall || state.known.is_searching() {
+            return found;
+        }
+        match self.steps.expectation(state.direction, self.distance(state)) {
+            Expectation::Ahead | Expectation::Due => {}
+            Expectation::Late => {
+                if !state.late {
+                    state.late = true;
+                    found.limit(Limit::StepLate);
+                }
+            }
+            Expectation::Missing => {
+                found.limit(Limit::StepMissing);
+                state.missed_in_a_row = state.missed_in_a_row.saturating_add(1);
+                state.missed = match state.direction {
+                    Direction::Deploy => state.missed.saturating_add(1),
+                    Direction::Retract => state.missed.saturating_sub(1),
+                };
+                self.advance(state, &mut found);
+                if state.missed_in_a_row > 1 {
+                    found.fault = Some(Fault::StepsLost);
+                }
+            }
+        }
+        found
+    }
+
+    /// Ends a crossing that is past its lift-off, at the end of travel.
+    pub fn close_crossing(&self, state: &mut EstimateState) -> Findings {
+        let mut found = Findings::default();
+        if let Some(point) = state.crossing.as_ref().and_then(|open| open.lift) {
+            close(state, point.gap, false, &mut found);
+        }
+        found
+    }
+
+    /// Distance along the run to the face of the step ahead, mm; none if no step is left.
+    pub fn distance(&self, state: &EstimateState) -> Option<Millimetres> {
+        self.steps.distance(state.next_step, state.direction, state.position)
+    }
+
+    /// A wheel at rest under preload: the baseline follows its wall. Whether compression and
+    /// preload contradict each other there; `begin` starts the comparison again.
+    pub fn rest(
+        &self,
+        state: &mut EstimateState,
+        sensed: &SensedState,
+        arm_thrust: Newtons,
+        begin: bool,
+    ) -> bool {
+        let seen = self.watch_input(state, sensed);
+        self.watch.rest(&mut state.watch, &seen);
+        let (preload, compression) = (sensed.preload_filtered, sensed.compression_filtered);
+        if begin || state.on_corner() || state.known.is_searching() {
+            self.tread.begin(&mut state.tread, preload);
+            return false;
+        }
+        self.tread.step(&mut state.tread, preload, arm_thrust, compression)
+            && !self.steps.may_touch(state.position)
+    }
+
+    fn touched(&self, state: &mut EstimateState, tick: &Follow<'_>, found: &mut Findings) {
+        let distance = self.distance(state);
+        let expectation = self.steps.expectation(state.direction, distance);
+        let searching = state.known.is_searching() && state.next_step > 0;
+        let belongs = searching || self.steps.belongs(state.direction, distance);
+        if searching {
+            // Any step found now sets the position.
+        } else if !belongs {
+            found.limit(Limit::StepExtra);
+        } else if expectation == Expectation::Ahead {
+            found.limit(Limit::StepEarly);
+        }
+        state.crossing = Some(OpenCrossing {
+            step: if belongs { state.next_step } else { 0 },
+            direction: state.direction,
+            expected: belongs && !searching && expectation != Expectation::Ahead,
+            reported: expectation == Expectation::Ahead,
+            touched_at: tick.now,
+            standing_since: tick.standing_since,
+            peak_preload: tick.sensed.preload_filtered,
+            ..OpenCrossing::default()
+        });
+    }
+
+    /// A wheel that turns on a corner far longer than a crossing takes slips.
+    fn watch_slip(&self, state: &mut EstimateState, tick: &Follow<'_>, found: &mut Findings) {
+        let on_corner = matches!(state.watch.contact, Contact::Both | Contact::Corner);
+        let Some(open) = state.crossing.as_mut().filter(|_| on_corner) else { return };
+        let from = *open.from.get_or_insert(tick.sensed.travel);
+        let turned = tick.sensed.travel.saturating_sub(from).saturating_abs();
+        if turned > self.corner_travel.widen() {
+            found.fault = Some(Fault::WheelSlips);
+        }
+    }
+
+    fn lifted(
+        &self,
+        state: &mut EstimateState,
+        tick: &Follow<'_>,
+        lift: Lift,
+        found: &mut Findings,
+    ) {
+        let Some(mut open) = state.crossing else { return };
+        let sensed = tick.sensed;
+        let table = self.steps.face(open.step);
+        let seen = state.position + lift.distance;
+        let face = if open.resumed { table.unwrap_or(seen) } else { seen };
+        let residual = table.map_or(Q16::ZERO, |table| face - table);
+        open.lift = Some(LiftPoint {
+            at: tick.now,
+            gap: lift.gap,
+            speed: sensed.speed.value.abs(),
+            preload: sensed.preload_filtered,
+            tan_arm: sensed.tan_arm,
+            face,
+            residual,
+        });
+        state.crossing = Some(open);
+        if open.step > 0 {
+            if !open.turned {
+                self.correct(state, sensed, residual, found);
+            }
+            state.begin_tick(sensed.travel);
+            self.advance(state, found);
+        }
+        found.replan = true;
+    }
+
+    /// Corrects the odometry by a step's residual.
+    fn correct(
+        &self,
+        state: &mut EstimateState,
+        sensed: &SensedState,
+        residual: Millimetres,
+        found: &mut Findings,
+    ) {
+        let tolerance = self.steps.tolerance();
+        let alike = |other: Millimetres| (residual - other).abs() <= tolerance;
+        if state.known.is_searching() {
+            state.odometry.set(sensed.travel, state.position - residual);
+            state.known = Position::Located;
+        } else if residual.abs() <= tolerance {
+            state.odometry.correct(residual);
+            state.displaced = None;
+        } else if state.displaced.is_some_and(alike) {
+            // Two in a row off by the same: the odometry is wrong.
+            state.odometry.set(sensed.travel, state.position - residual);
+            state.displaced = None;
+        } else if state.displaced.is_some() {
+            // Two in a row off by different distances: the odometry has lost its scale, or the
+            // table is wrong throughout.
+            found.fault.get_or_insert(Fault::StepsDisagree);
+        } else {
+            // One alone: the step is displaced.
+            state.displaced = Some(residual);
+            report_displaced(state, residual, found);
+        }
+    }
+
+    /// Input of the crossing watch.
+    pub(super) fn watch_input(&self, state: &EstimateState, sensed: &SensedState) -> WatchInput {
+        let to_window = self.steps.to_window(state.direction, self.distance(state));
+        WatchInput {
+            radius: sensed.radius.value,
+            compression: sensed.compression_filtered,
+            near: to_window.is_some_and(|ahead| ahead <= Q16::ZERO),
+            clear: self.clear_of(state),
+        }
+    }
+
+    /// Whether the wheel has left the corner of the last step behind.
+    fn clear_of(&self, state: &EstimateState) -> bool {
+        let followed = state.crossing.as_ref().and_then(|open| open.lift).map(|point| point.face);
+        let Some(face) = followed.or(state.leaving) else { return true };
+        let past = match state.direction {
+            Direction::Deploy => state.position - face,
+            Direction::Retract => face - state.position,
+        };
+        // The patch must be clear of the edge: on the upper wall behind the centre, on the
+        // lower wall ahead of it. By the table, a doubtful record has that face elsewhere.
+        let unsure = state.known.is_unsure() && followed.is_some();
+        let doubt = if unsure { UNSURE_WITHIN } else { Q16::ZERO };
+        past > self.corner().first_contact(state.direction.opposite()) + doubt
+    }
+
+    /// On to the next step.
+    fn advance(&self, state: &mut EstimateState, found: &mut Findings) {
+        state.next_step = self.steps.after(state.next_step, state.direction);
+        state.late = false;
+        found.advanced = true;
+        found.replan = true;
+    }
+}
+
+/// One level on; the arm confirms the count at the end.
+fn passed(state: &mut EstimateState) {
+    let extra = u8::from(state.crossing.as_ref().is_some_and(|open| open.step == 0));
+    state.missed_in_a_row = 0;
+    match state.direction {
+        Direction::Deploy => {
+            state.level = state.level.saturating_add(1);
+            state.extra = state.extra.saturating_add(extra);
+        }
+        Direction::Retract => {
+            state.level = state.level.saturating_sub(1);
+            state.extra = state.extra.saturating_sub(extra);
+        }
+    }
+}
+
+/// The crossing is behind: reports it for review, unless only half of it was observed.
+fn close(state: &mut EstimateState, gap: Millimetres, plausible: bool, found: &mut Findings) {
+    let Some(mut open) = state.crossing.take() else { return };
+    open.gap = gap;
+    open.deepest = state.watch.deepest;
+    if open.lift.is_some() && !open.turned {
+        found.closed = Some((open, plausible));
+        found.replan = true;
+    }
+}
+
+/// Reports a step outside its window, unless it has been reported already.
+fn report_displaced(state: &EstimateState, residual: Millimetres, found: &mut Findings) {
+    let early = match state.direction {
+        Direction::Deploy => residual < Q16::ZERO,
+        Direction::Retract => residual > Q16::ZERO,
+    };
+    let reported = state.crossing.is_some_and(|open| open.reported) || state.late;
+    if !reported {
+        found.limit(if early { Limit::StepEarly } else { Limit::StepLate });
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "quantities of a test")]
+mod tests {
+    use super::super::restore::tests::{estimator, sensed};
+    use super::*;
+    use crate::units::q16;
+
+    #[test]
+    fn the_second_step_missed_in_a_row_is_one_too_many() {
+        for (direction, from) in [(Direction::Deploy, 1), (Direction::Retract, 3)] {
+            let mut state =
+                EstimateState { direction, next_step: from, ..EstimateState::default() };
+            // Past every step of the prototype, which are at 18, 40 and 62 mm.
+            state.position = Q16::from_num(if direction == Direction::Deploy { 79 } else { 1 });
+            for (missed, fault) in [(1, None), (2, Some(Fault::StepsLost))] {
+                let found = estimator().watch_expectation(&mut state);
+                assert_eq!(found.limits[..], [Limit::StepMissing]);
+                assert_eq!((state.missed_in_a_row, found.fault), (missed, fault));
+                assert!(found.advanced && found.replan);
+            }
+            assert_eq!(state.next_step, 3 - u8::from(direction == Direction::Retract) * 2);
+        }
+    }
+
+    #[test]
+    fn in_doubt_a_corner_is_left_behind_so_much_later() {
+        let face = q16(18_000_000);
+        for direction in Direction::ALL {
+            for known in [Position::Located, Position::Unconfirmed { searching: false }] {
+                let lift = Some(LiftPoint { face, ..LiftPoint::default() });
+                let crossing = Some(OpenCrossing { step: 1, lift, ..OpenCrossing::default() });
+                let mut state =
+                    EstimateState { direction, known, crossing, ..EstimateState::default() };
+                let estimator = estimator();
+                let doubt = if known.is_unsure() { UNSURE_WITHIN } else { Q16::ZERO };
+                let bound = estimator.corner().first_contact(direction.opposite()) + doubt;
+                let mut clear = |past: Millimetres| {
+                    state.position = face + past * Q16::from_num(direction.sign());
+                    estimator.clear_of(&state)
+                };
+                assert!(!clear(bound) && clear(bound + Q16::DELTA), "{direction:?} {known:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_displaced_step_is_early_where_it_comes_before_its_place() {
+        for (direction, residual, limit) in [
+            (Direction::Deploy, -2, Limit::StepEarly),
+            (Direction::Deploy, 2, Limit::StepLate),
+            (Direction::Retract, 2, Limit::StepEarly),
+            (Direction::Retract, -2, Limit::StepLate),
+        ] {
+            let state = EstimateState { direction, ..EstimateState::default() };
+            let mut found = Findings::default();
+            report_displaced(&state, Q16::from_num(residual), &mut found);
+            assert_eq!(found.limits[..], [limit]);
+        }
+    }
+
+    #[test]
+    fn a_tread_is_compared_on_a_wall_alone() {
+        // Pressed with 40 N, and the compression sensor reads nothing.
+        let strange = SensedState { preload_filtered: q16(40_000_000), ..sensed(0, 0.0, 0.0) };
+        let reported = |contact: Contact, known: Position, position: f64| {
+            let mut state = EstimateState { known, ..EstimateState::default() };
+            state.position = Q16::from_num(position);
+            state.watch.contact = contact;
+            let estimator = estimator();
+            let report = |tick: &i32| estimator.rest(&mut state, &strange, Q16::ZERO, *tick <= 1);
+            (1..500).filter(report).count()
+        };
+        assert_eq!(reported(Contact::Wall, Position::Located, 0.0), 1);
+        assert_eq!(reported(Contact::Both, Position::Located, 0.0), 0);
+        assert_eq!(reported(Contact::Leaving, Position::Located, 0.0), 0);
+        assert_eq!(reported(Contact::Wall, Position::Searching, 0.0), 0);
+        // The corner at 18 mm may carry a part.
+        assert_eq!(reported(Contact::Wall, Position::Located, 12.0), 0);
+    }
+}

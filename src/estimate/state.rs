@@ -1,0 +1,234 @@
+//! What the estimator remembers between ticks, and what it reports of one.
+
+use super::crossing::{Contact, WatchState};
+use super::odometry::Odometry;
+use super::tread::TreadState;
+use super::{Place, Position, PositionConfidence};
+use crate::fault::{Fault, Limit};
+use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Ratio, Tick, Travel};
+
+/// State of the estimator.
+#[derive(Clone, Debug, Default)]
+pub struct EstimateState {
+    /// Axial position in this tick, mm from the stow end.
+    pub position: Millimetres,
+    pub(super) odometry: Odometry,
+    pub(super) known: Position,
+    /// Crossing watch.
+    pub watch: WatchState,
+    pub(super) tread: TreadState,
+    /// Direction of the run.
+    pub direction: Direction,
+    /// Level by steps detected.
+    pub level: u8,
+    /// Step ahead, from 1; 0 if none is left.
+    pub next_step: u8,
+    /// The crossing under way or just behind.
+    pub crossing: Option<OpenCrossing>,
+    /// The step ahead is late and has been reported.
+    pub(super) late: bool,
+    /// Residual of the last step found, if it was beyond the tolerance, mm.
+    pub(super) displaced: Option<Millimetres>,
+    /// Face of the step being left although its crossing is not followed, mm.
+    pub(super) leaving: Option<Millimetres>,
+    /// Steps of the table given up since the stow end.
+    pub(super) missed: u8,
+    /// Steps given up since the last one found.
+    pub(super) missed_in_a_row: u8,
+    /// Steps climbed that the table lacks, since the stow end.
+    pub(super) extra: u8,
+}
+
+/// A crossing under way.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct OpenCrossing {
+    /// Step of the table; 0 if the table lacks it.
+    pub step: u8,
+    /// Direction in which it began.
+    pub direction: Direction,
+    /// Detected inside its window, so that baseline and preload were ready.
+    pub expected: bool,
+    /// The wheel turned back on this corner: its first half was not observed.
+    pub turned: bool,
+    /// The wheel was on it when the board started: its face was not observed.
+    pub resumed: bool,
+    /// That it is not where the table has it has been reported.
+    pub reported: bool,
+    /// When the corner was first detected.
+    pub touched_at: Tick,
+    /// Odometry at that time.
+    pub from: Option<Travel>,
+    /// Since when the crossing preload had been reached.
+    pub standing_since: Option<Tick>,
+    /// Largest preload so far, N.
+    pub peak_preload: Newtons,
+    /// Lift-off.
+    pub lift: Option<LiftPoint>,
+    /// Gap when closed, mm.
+    pub gap: Millimetres,
+    /// Largest compression when closed, mm.
+    pub deepest: Millimetres,
+}
+
+/// The instant of lift-off.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LiftPoint {
+    /// When.
+    pub at: Tick,
+    /// Gap with the nominal step height, mm.
+    pub gap: Millimetres,
+    /// Wheel speed, mm/s.
+    pub speed: MillimetresPerSecond,
+    /// Preload, N.
+    pub preload: Newtons,
+    /// Tangent of the arm angle.
+    pub tan_arm: Ratio,
+    /// Position of the face as found, mm.
+    pub face: Millimetres,
+    /// Found minus table, mm.
+    pub residual: Millimetres,
+}
+
+/// What a stage of the estimate has found in a tick.
+#[derive(Debug, Default)]
+pub struct Findings {
+    /// Limits to report, in order.
+    pub limits: heapless::Vec<Limit, 4>,
+    /// The fault found, if any.
+    pub fault: Option<Fault>,
+    /// Another step is ahead.
+    pub advanced: bool,
+    /// A crossing that was observed from touch to end, and whether its gap is plausible.
+    pub closed: Option<(OpenCrossing, bool)>,
+    /// A new plan is needed.
+    pub replan: bool,
+}
+
+impl Findings {
+    pub(super) fn limit(&mut self, limit: Limit) {
+        // No stage reports more than three.
+        let _ = self.limits.push(limit);
+    }
+}
+
+impl EstimateState {
+    /// A start with the wheel where a record has it, if there is one.
+    pub fn restored(record: Option<Place>) -> Self {
+        let mut state = Self::default();
+        if let Some(place) = record {
+            state.known = Position::Recorded(place);
+            // The wheel's travel begins with the start.
+            state.odometry.set(Travel::ZERO, place.position);
+        }
+        state
+    }
+
+    /// Begins a tick at this travel of the wheel.
+    pub fn begin_tick(&mut self, travel: Travel) {
+        self.position = self.odometry.position(travel);
+    }
+
+    /// Whether a start could go on from the position.
+    pub const fn confidence(&self) -> PositionConfidence {
+        let steps_found = self.missed == 0 && self.extra == 0;
+        match self.known {
+            Position::Recorded(_) => {}
+            _ if !self.known.is_located() || !steps_found => return PositionConfidence::Guess,
+            _ => {}
+        }
+        if self.known.is_unsure() {
+            PositionConfidence::Unsure
+        } else if self.known.is_searching() {
+            PositionConfidence::Guess
+        } else {
+            PositionConfidence::Sure
+        }
+    }
+
+    /// Declares the position of the wheel at this travel.
+    pub(super) fn set_position(&mut self, travel: Travel, position: Millimetres) {
+        self.odometry.set(travel, position);
+        self.position = position;
+    }
+
+    /// A corner carries and the lower wall has not been left (retract: reached).
+    pub fn critical(&self) -> bool {
+        let on_corner = matches!(self.watch.contact, Contact::Both | Contact::Corner);
+        on_corner && self.crossing.as_ref().is_some_and(|crossing| crossing.lift.is_none())
+    }
+
+    /// A corner is detected.
+    pub fn on_corner(&self) -> bool {
+        self.watch.contact != Contact::Wall
+    }
+
+    /// The step ahead is late.
+    pub const fn is_late(&self) -> bool {
+        self.late
+    }
+
+    /// Whether something unexpected asks for crossing speed.
+    pub fn slow_down(&self) -> bool {
+        self.late || self.known.is_searching() && self.next_step > 0 || self.critical()
+    }
+
+    /// What carries the wheel, as reported: a wheel that searches after a restart counts as on
+    /// the wall until a corner is detected.
+    pub fn contact(&self) -> Contact {
+        let followed = self.crossing.is_some();
+        if self.known.is_searching() && !followed { Contact::Wall } else { self.watch.contact }
+    }
+
+    /// Distance outwards from `at` to the face of a step that the table lacks, while the wheel
+    /// is on it, mm.
+    pub fn extra_face(&self, at: Millimetres) -> Option<Millimetres> {
+        let crossing = self.crossing.as_ref().filter(|crossing| crossing.step == 0)?;
+        let face = crossing.lift.as_ref()?.face;
+        (face > at).then_some(face - at)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::{Q16, q16};
+
+    #[test]
+    fn a_place_is_known_only_with_every_step_found_where_the_table_has_it() {
+        use PositionConfidence::{Guess, Sure, Unsure};
+        for (missed, extra) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+            let steps_found = missed == 0 && extra == 0;
+            for (known, confidence) in [
+                (Position::Unknown, Guess),
+                (Position::Restored { sure: true }, Sure),
+                (Position::Restored { sure: false }, Unsure),
+                (Position::Unconfirmed { searching: true }, Unsure),
+                (Position::Unconfirmed { searching: false }, Unsure),
+                (Position::Searching, Guess),
+                (Position::Located, Sure),
+            ] {
+                let state = EstimateState { known, missed, extra, ..EstimateState::default() };
+                let expected = if steps_found { confidence } else { Guess };
+                assert_eq!(state.confidence(), expected, "{known:?} {missed} {extra}");
+            }
+        }
+        for (sure, confidence) in [(true, Sure), (false, Unsure)] {
+            let record = Some(Place { position: Q16::ZERO, sure });
+            assert_eq!(EstimateState::restored(record).confidence(), confidence);
+        }
+    }
+
+    #[test]
+    fn a_step_that_the_table_lacks_is_ahead_until_its_face() {
+        let lifted = |step: u8| {
+            let lift = LiftPoint { face: q16(30_000_000), ..LiftPoint::default() };
+            let open = OpenCrossing { step, lift: Some(lift), ..OpenCrossing::default() };
+            EstimateState { crossing: Some(open), ..EstimateState::default() }
+        };
+        let unknown = lifted(0);
+        assert_eq!(unknown.extra_face(q16(25_000_000)), Some(q16(5_000_000)));
+        assert_eq!(unknown.extra_face(q16(30_000_000)), None);
+        assert_eq!(lifted(1).extra_face(q16(25_000_000)), None);
+        assert_eq!(EstimateState::default().extra_face(q16(25_000_000)), None);
+    }
+}

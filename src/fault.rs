@@ -1,0 +1,234 @@
+//! Latched faults (codes 100 to 199) and active limits (200 to 299). Codes are
+//! stable: a number is never given a second meaning.
+
+#[cfg(not(target_os = "none"))]
+mod description;
+
+#[cfg(not(target_os = "none"))]
+pub use description::FaultDescription;
+
+/// A latched fault: the drive holds until it is reset.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
+)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+#[repr(u16)]
+pub enum Fault {
+    /// The wheel encoder stopped answering.
+    SpeedStale = 101,
+    /// The load cell stopped answering.
+    PressureStale = 102,
+    /// The tread displacement sensor stopped answering.
+    DisplacementStale = 103,
+    /// The arm angle sensor stopped answering or answers with errors.
+    AngleStale = 104,
+    /// The readback of the bridges stopped answering.
+    ReadbackStale = 105,
+    /// The load cell reads outside its range.
+    PressureRange = 112,
+    /// The tread displacement sensor reads outside its range.
+    DisplacementRange = 113,
+    /// The arm angle lies outside the arm's reach.
+    AngleRange = 114,
+    /// The load cell's code stands still, or jumps as no force does.
+    PressureImplausible = 116,
+    /// The displacement sensor's code stands still, or jumps as no tread does.
+    DisplacementImplausible = 117,
+    /// The preload exceeded its limit by more than the regulation band.
+    Overpressure = 120,
+    /// The preload did not reach its reference in time.
+    PreloadNotReached = 121,
+    /// The wheel stands still although driven.
+    DriveStalled = 122,
+    /// The wheel turns against the command or far faster than asked.
+    DriveRunaway = 123,
+    /// Two steps in a row stand off the table by different ways.
+    StepsDisagree = 124,
+    /// The drive takes another duty than its speed needs.
+    DutyMismatch = 125,
+    /// The arm moves farther than the wheel turns.
+    ArmMismatch = 126,
+    /// The preload strays from what the pre-tightener is asked for.
+    PretightenerRunaway = 127,
+    /// The drive's bridge puts out another duty than it was given.
+    DriveBridge = 128,
+    /// The pre-tightener's bridge puts out another duty than it was given.
+    PretightenerBridge = 129,
+    /// Odometry and arm disagree on the sleeve level at the end of travel.
+    LevelMismatch = 131,
+    /// Two steps of the table in a row were not found.
+    StepsLost = 132,
+    /// The wheel turns at a corner without getting over it.
+    WheelSlips = 133,
+    /// The position is not known and no step lies ahead that could tell it.
+    PositionUnknown = 134,
+    /// The model task does not answer.
+    ModelSilent = 141,
+    /// A sensor was not at rest or not at zero in the self-test.
+    SelfTest = 150,
+    /// The emergency stop cut the bridges.
+    EmergencyStop = 151,
+    /// The control tick was late by more than a period.
+    TickOverrun = 160,
+}
+
+impl Fault {
+    /// Every fault, in the order of codes.
+    pub const ALL: [Self; 28] = [
+        Self::SpeedStale,
+        Self::PressureStale,
+        Self::DisplacementStale,
+        Self::AngleStale,
+        Self::ReadbackStale,
+        Self::PressureRange,
+        Self::DisplacementRange,
+        Self::AngleRange,
+        Self::PressureImplausible,
+        Self::DisplacementImplausible,
+        Self::Overpressure,
+        Self::PreloadNotReached,
+        Self::DriveStalled,
+        Self::DriveRunaway,
+        Self::StepsDisagree,
+        Self::DutyMismatch,
+        Self::ArmMismatch,
+        Self::PretightenerRunaway,
+        Self::DriveBridge,
+        Self::PretightenerBridge,
+        Self::LevelMismatch,
+        Self::StepsLost,
+        Self::WheelSlips,
+        Self::PositionUnknown,
+        Self::ModelSilent,
+        Self::SelfTest,
+        Self::EmergencyStop,
+        Self::TickOverrun,
+    ];
+
+    /// The stable code.
+    pub const fn code(self) -> u16 {
+        self as u16
+    }
+
+    /// One sentence for the operator.
+    pub const fn sentence(self) -> &'static str {
+        match self {
+            Self::SpeedStale => "the wheel encoder stopped answering",
+            Self::PressureStale => "the load cell stopped answering",
+            Self::DisplacementStale => "the tread displacement sensor stopped answering",
+            Self::AngleStale => "the arm angle sensor stopped answering or answers with errors",
+            Self::ReadbackStale => "the readback of the bridges stopped answering",
+            Self::PressureRange => "the load cell reads outside its range",
+            Self::DisplacementRange => "the tread displacement sensor reads outside its range",
+            Self::AngleRange => "the arm angle lies outside the arm's reach",
+            Self::PressureImplausible => "the load cell reads what no force can be",
+            Self::DisplacementImplausible => {
+                "the tread displacement sensor reads what no tread does"
+            }
+            Self::Overpressure => "the preload exceeded its limit",
+            Self::PreloadNotReached => "the preload did not reach its reference in time",
+            Self::DriveStalled => "the wheel stands still although driven",
+            Self::DriveRunaway => "the wheel turns otherwise than commanded",
+            Self::StepsDisagree => "two steps in a row are off the table by different ways",
+            Self::DutyMismatch => "duty and speed of the drive do not belong together",
+            Self::ArmMismatch => "the arm moves farther than the wheel turns",
+            Self::PretightenerRunaway => "the preload strays from its reference",
+            Self::DriveBridge => "the drive's bridge puts out another duty than it was given",
+            Self::PretightenerBridge => {
+                "the pre-tightener's bridge puts out another duty than it was given"
+            }
+            Self::LevelMismatch => "the arm does not confirm the sleeve level at the end of travel",
+            Self::StepsLost => "two steps of the table in a row were not found",
+            Self::WheelSlips => "the wheel turns at a corner without getting over it",
+            Self::PositionUnknown => {
+                "the position is not known and no step lies ahead that could tell it: go the other way"
+            }
+            Self::ModelSilent => "the model task does not answer",
+            Self::EmergencyStop => "the emergency stop cut the bridges",
+            Self::SelfTest => "a sensor was not at rest or not at zero in the self-test",
+            Self::TickOverrun => "the control tick came more than a period late",
+        }
+    }
+}
+
+/// An active limit: reported, acted on, gone when its cause is gone.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
+)]
+#[cfg_attr(target_os = "none", derive(defmt::Format))]
+#[repr(u16)]
+pub enum Limit {
+    /// A corner was met before its window.
+    StepEarly = 201,
+    /// A window passed without a corner; the search goes on at crossing speed.
+    StepLate = 202,
+    /// A step of the table was not found.
+    StepMissing = 203,
+    /// A corner was met where the table has none.
+    StepExtra = 204,
+    /// The preload that the gap asks for exceeds the limit: the crossing is slowed.
+    PreloadLimited = 205,
+    /// Even the least crossing speed does not hold the gap within the preload limit.
+    SpeedFloor = 206,
+    /// A speed was moved out of a mode's band.
+    ResonanceAvoided = 207,
+    /// The stiffness estimate reached the end of its range.
+    AdaptationBounded = 208,
+    /// The drive waits before a corner for the preload to stand.
+    PreloadWait = 209,
+    /// The friction utilisation leaves less than the wanted margin.
+    SlipMarginLow = 210,
+    /// The measured gap of a crossing is not the predicted one.
+    GapStrange = 211,
+    /// Compression and preload of a wheel that stands do not belong together.
+    TreadStrange = 212,
+    /// The position is that of a record which no step ahead can confirm.
+    PositionUnconfirmed = 213,
+}
+
+impl Limit {
+    /// Every limit, in the order of codes.
+    pub const ALL: [Self; 13] = [
+        Self::StepEarly,
+        Self::StepLate,
+        Self::StepMissing,
+        Self::StepExtra,
+        Self::PreloadLimited,
+        Self::SpeedFloor,
+        Self::ResonanceAvoided,
+        Self::AdaptationBounded,
+        Self::PreloadWait,
+        Self::SlipMarginLow,
+        Self::GapStrange,
+        Self::TreadStrange,
+        Self::PositionUnconfirmed,
+    ];
+
+    /// The stable code.
+    pub const fn code(self) -> u16 {
+        self as u16
+    }
+
+    /// One sentence for the operator.
+    pub const fn sentence(self) -> &'static str {
+        match self {
+            Self::StepEarly => "a corner was met before its window",
+            Self::StepLate => {
+                "a step's window passed without a corner; searching on at crossing speed"
+            }
+            Self::StepMissing => "a step of the table was not found",
+            Self::StepExtra => "a corner was met where the step table has none",
+            Self::PreloadLimited => "the preload limit was reached: the crossing is slowed",
+            Self::SpeedFloor => {
+                "the least crossing speed does not hold the gap within the preload limit"
+            }
+            Self::ResonanceAvoided => "a speed was moved out of a structural mode's band",
+            Self::AdaptationBounded => "the stiffness estimate reached the end of its range",
+            Self::PreloadWait => "waiting before a corner for the preload to stand",
+            Self::SlipMarginLow => "the friction utilisation leaves less than the wanted margin",
+            Self::GapStrange => "the measured gap is not the predicted one",
+            Self::TreadStrange => "compression of the tread and preload do not belong together",
+            Self::PositionUnconfirmed => "the position is of a record that no step ahead confirms",
+        }
+    }
+}

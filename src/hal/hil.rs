@@ -1,0 +1,232 @@
+//! Hardware in the loop: what host and firmware say to each other when the plant is the
+//! host's and the controller the board's.
+//!
+//! The loop runs in lockstep. The host sends a tick with the sensors' codes in it; the
+//! board's clock moves on by that one tick, every task that is due runs, and the bridge
+//! commands go back. Time on the board is the count of ticks, however long a tick takes
+//! to come; nothing is made up and nothing left out, so that a run gives the same bits
+//! through a slow probe as in software.
+//!
+//! Frames are those of the [binary line](crate::params::link), on RTT channels [`UP`] and
+//! [`DOWN`].
+
+use serde::{Deserialize, Serialize};
+
+use crate::sense::raw::{AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount};
+use crate::supervise::codes;
+use crate::supervise::{Command, Mode};
+use crate::units::{Duty, MotorCommand, Tick};
+
+/// RTT channel up.
+pub const UP: u32 = 3;
+
+/// RTT channel down.
+pub const DOWN: u32 = 2;
+
+/// Number of this protocol; another one is not answered.
+pub const PROTOCOL: u8 = 2;
+
+/// The board's first tick: its clock begins one before. Even, so that the angle sensor's
+/// turn comes in the first tick, as in software.
+pub const FIRST: Tick = 2;
+
+/// What the host sends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ToBoard {
+    /// Begins a run, or asks how the present one stands.
+    Hello {
+        /// [`PROTOCOL`].
+        protocol: u8,
+    },
+    /// The tick of this number, and what it finds.
+    Tick(Tick, Given),
+}
+
+/// What a tick finds at the board's inputs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Given {
+    /// Wheel encoder's counter.
+    pub wheel: u16,
+    /// Load cell; none for a sensor that does not answer.
+    pub load_cell: Option<u16>,
+    /// Tread displacement; none as above.
+    pub tread: Option<u16>,
+    /// Frame of the arm's angle sensor; none as above.
+    pub arm: Option<u16>,
+    /// Outputs of the bridges of drive and pre-tightener; none as above.
+    pub bridges: Option<[u16; 2]>,
+    /// The emergency stop's contact is open.
+    pub stop: bool,
+    /// Number of the operator's command, 0 for none ([`codes::of_command`]).
+    pub command: u8,
+}
+
+impl Given {
+    /// Every sensor answers with these codes; nothing else happens.
+    #[must_use]
+    pub const fn codes(
+        wheel: EncoderCount,
+        load_cell: AdcCode,
+        tread: AdcCode,
+        arm: AngleFrame,
+        bridges: BridgeCodes,
+    ) -> Self {
+        Self {
+            wheel: wheel.get(),
+            load_cell: Some(load_cell.get()),
+            tread: Some(tread.get()),
+            arm: Some(arm.get()),
+            bridges: Some([bridges.drive.get(), bridges.pretightener.get()]),
+            stop: false,
+            command: 0,
+        }
+    }
+
+    /// The same with an operator's command, or none.
+    #[must_use]
+    pub const fn with(self, command: Option<Command>) -> Self {
+        Self { command: codes::of_command(command), ..self }
+    }
+
+    /// The same with no sensor answering but the wheel's counter, which cannot fall
+    /// silent.
+    #[must_use]
+    pub const fn silent(self) -> Self {
+        Self { load_cell: None, tread: None, arm: None, bridges: None, command: 0, ..self }
+    }
+
+    /// What the bridges put out, if they were looked at.
+    #[must_use]
+    pub fn readback(&self) -> Option<BridgeCodes> {
+        self.bridges.map(|codes| BridgeCodes {
+            drive: BridgeCode::new(codes[0]),
+            pretightener: BridgeCode::new(codes[1]),
+        })
+    }
+}
+
+/// What the board sends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ToHost {
+    /// What the tick of this number gave.
+    Done(Tick, Taken),
+    /// The next tick that the board takes: the answer to a hello, and to another tick
+    /// than this or the last.
+    Next {
+        /// Its number.
+        tick: Tick,
+        /// The host was silent for too long: the board has gone on without it, takes no
+        /// more ticks, and has to be started anew.
+        alone: bool,
+    },
+}
+
+/// What a tick gave.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Taken {
+    /// Duty of the drive, Q15; none with the bridge off.
+    pub drive: Option<i16>,
+    /// Duty of the pre-tightener, Q15; none with the bridge off.
+    pub preload: Option<i16>,
+    /// Number of the mode after the tick ([`codes::of_mode`]).
+    pub mode: u8,
+}
+
+impl Taken {
+    /// Bridges commanded so, in the mode of this number.
+    #[must_use]
+    pub fn new(drive: MotorCommand, preload: MotorCommand, mode: u8) -> Self {
+        let duty = |command: MotorCommand| command.enable.then_some(command.duty.to_bits());
+        Self { drive: duty(drive), preload: duty(preload), mode }
+    }
+
+    /// Commands of drive and pre-tightener.
+    #[must_use]
+    pub fn commands(&self) -> (MotorCommand, MotorCommand) {
+        let command = |duty: Option<i16>| {
+            duty.map_or(MotorCommand::OFF, |bits| MotorCommand {
+                duty: Duty::from_bits(bits),
+                enable: true,
+            })
+        };
+        (command(self.drive), command(self.preload))
+    }
+
+    /// Mode after the tick; none if the number has no meaning.
+    #[must_use]
+    pub fn mode(&self) -> Option<Mode> {
+        codes::mode(self.mode)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::params::link::{FrameReader, frame};
+    use proptest::prelude::*;
+
+    /// Room in the board's ring for a tick and a hello behind it.
+    const RING: usize = 64;
+
+    #[test]
+    fn the_longest_messages_fit_the_rings() {
+        let code = Some(u16::MAX);
+        let given = Given {
+            wheel: u16::MAX,
+            load_cell: code,
+            tread: code,
+            arm: code,
+            bridges: Some([u16::MAX; 2]),
+            stop: true,
+            command: 4,
+        };
+        let down = [ToBoard::Tick(u32::MAX, given), ToBoard::Hello { protocol: PROTOCOL }];
+        let bytes: usize = down.iter().map(|message| frame(message).unwrap().len()).sum();
+        assert!(bytes < RING, "{bytes}");
+        let taken = Taken { drive: Some(i16::MIN), preload: Some(i16::MIN), mode: 160 };
+        let up = frame(&ToHost::Done(u32::MAX, taken)).unwrap();
+        assert!(up.len() < RING, "{}", up.len());
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_sent_arrives(
+            tick in any::<u32>(),
+            codes in any::<[u16; 4]>(),
+            answers in any::<[bool; 3]>(),
+            bridges in any::<Option<[u16; 2]>>(),
+            stop in any::<bool>(),
+            command in 0..5_u8,
+            duties in any::<[Option<i16>; 2]>(),
+        ) {
+            let code = |at: usize| answers[at].then_some(codes[at + 1]);
+            let given = Given {
+                wheel: codes[0],
+                load_cell: code(0),
+                tread: code(1),
+                arm: code(2),
+                bridges,
+                stop,
+                command,
+            };
+            let sent = ToBoard::Tick(tick, given);
+            let mut gatherer = FrameReader::new();
+            let come = frame(&sent).unwrap().iter().find_map(|byte| gatherer.take(*byte));
+            prop_assert_eq!(come, Some(sent));
+            let taken = Taken { drive: duties[0], preload: duties[1], mode: 3 };
+            let sent = ToHost::Done(tick, taken);
+            let come = frame(&sent).unwrap().iter().find_map(|byte| gatherer.take(*byte));
+            prop_assert_eq!(come, Some(sent));
+            let (drive, preload) = taken.commands();
+            prop_assert_eq!(Taken::new(drive, preload, 3), taken);
+        }
+    }
+
+    #[test]
+    fn a_bridge_that_is_off_has_no_duty() {
+        let off = MotorCommand { duty: Duty::from_bits(77), enable: false };
+        let taken = Taken::new(off, MotorCommand::OFF, codes::of_mode(Mode::Idle));
+        assert_eq!(taken.commands(), (MotorCommand::OFF, MotorCommand::OFF));
+        assert_eq!(taken.mode(), Some(Mode::Idle));
+    }
+}

@@ -1,0 +1,266 @@
+//! Records as words with a map of those that changed: what stays the same takes a bit,
+//! what changes little half a word.
+//!
+//! ```text
+//! map, whole words | differences, half a word or a whole one each | words that changed
+//! ```
+//! Two bits of the map for a number of which the difference is written: 0 none, 1 half a
+//! word, 2 a whole one; one for a word that is written as it is. The tick of a record is one
+//! more than that before, unless its difference to that is there. All is little end first.
+
+use super::record::{Flags, Record};
+use crate::supervise::codes;
+use crate::tick::Telemetry;
+use crate::units::{Duty, Q16};
+
+/// Numbers of a record that are written as differences, behind the tick: the ages, and the
+/// quantities of [`Telemetry`].
+const NUMBERS: usize = 1 + Telemetry::COLUMNS.len();
+
+/// Words of a record that are written as they are.
+const WORDS: usize = 6;
+
+/// Bits of the map before those of the words.
+const DIFFERENCES: usize = 2 * (1 + NUMBERS);
+
+/// Bytes of the map.
+const MAP: usize = (DIFFERENCES + WORDS).div_ceil(32) * 4;
+
+const _: () = assert!(MAP <= 8, "the map is kept in a u64");
+
+/// A record as whole numbers.
+///
+/// Differences wrap, so that any two records have one and no bit is lost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct DeltaRecord {
+    at: u32,
+    numbers: [u32; NUMBERS],
+    words: [u32; WORDS],
+}
+
+/// Most bytes that a [`DeltaRecord`] takes.
+pub(super) const LONGEST: usize = MAP + 4 * (1 + NUMBERS + WORDS);
+
+/// Two halves of a word.
+const fn word(low: u16, high: u16) -> u32 {
+    low as u32 | (high as u32) << 16
+}
+
+/// The halves of a word.
+const fn halves(word: u32) -> [u16; 2] {
+    [word as u16, (word >> 16) as u16]
+}
+
+impl DeltaRecord {
+    /// A record of zeros, which the first of a frame is written as the difference to.
+    pub(super) const ZERO: Self = Self { at: 0, numbers: [0; NUMBERS], words: [0; WORDS] };
+
+    /// The record as numbers.
+    pub(super) fn of(record: &Record) -> Self {
+        let Record { telemetry: t, codes, ages, bridges: [drive, pretightener], flags } = record;
+        let [wheel, load_cell, tread, arm] = codes;
+        let [wheel_age, load_cell_age, tread_age, arm_age] = *ages;
+        let mut numbers = [0; NUMBERS];
+        let (first, quantities) = numbers.split_at_mut(1);
+        // The arm's age lowest: read every second tick, it is the one that changes.
+        first[0] = u32::from_le_bytes([arm_age, wheel_age, load_cell_age, tread_age]);
+        for (number, quantity) in quantities.iter_mut().zip(t.quantities()) {
+            *number = quantity.to_bits() as u32;
+        }
+        Self {
+            at: t.at,
+            numbers,
+            words: [
+                word(*wheel, *load_cell),
+                word(*tread, *arm),
+                word(*drive, *pretightener),
+                word(t.drive.to_bits() as u16, t.pretightener.to_bits() as u16),
+                u32::from_le_bytes([t.level, t.stage as u8, codes::of_mode(t.mode), 0]),
+                flags.to_bits().into(),
+            ],
+        }
+    }
+
+    /// The record of the numbers; none if one of them has no meaning.
+    pub(super) fn record(&self) -> Option<Record> {
+        let [ages, quantities @ ..] = self.numbers;
+        let [wheel_and_cell, tread_and_arm, bridges, duties, state, flags] = self.words;
+        let [arm_age, wheel_age, load_cell_age, tread_age] = ages.to_le_bytes();
+        let [level, stage, mode, rest] = state.to_le_bytes();
+        let [wheel, load_cell] = halves(wheel_and_cell);
+        let [tread, arm] = halves(tread_and_arm);
+        let [drive, pretightener] = halves(duties).map(|half| Duty::from_bits(half as i16));
+        let (mode, stage) = (codes::mode(mode)?, codes::stage(stage)?);
+        (rest == 0).then_some(())?;
+        let state =
+            Telemetry { at: self.at, mode, stage, level, drive, pretightener, ..Telemetry::EMPTY };
+        Some(Record {
+            telemetry: state.with_quantities(quantities.map(|bits| Q16::from_bits(bits as i32))),
+            codes: [wheel, load_cell, tread, arm],
+            ages: [wheel_age, load_cell_age, tread_age, arm_age],
+            bridges: halves(bridges),
+            flags: Flags::from_bits(u16::try_from(flags).ok()?),
+        })
+    }
+
+    /// Writes what it is after `before`, and takes that one's place; so many bytes.
+    pub(super) fn put(&self, before: &mut Self, room: &mut [u8; LONGEST]) -> usize {
+        let mut list = List { map: 0, used: MAP, room };
+        list.number(0, self.at, before.at.wrapping_add(1));
+        for (place, (number, before)) in self.numbers.iter().zip(&before.numbers).enumerate() {
+            list.number(1 + place, *number, *before);
+        }
+        for (place, (word, before)) in self.words.iter().zip(&before.words).enumerate() {
+            if word != before {
+                list.map |= 1 << (DIFFERENCES + place);
+                list.put(word.to_le_bytes());
+            }
+        }
+        list.room[..MAP].copy_from_slice(&list.map.to_le_bytes()[..MAP]);
+        *before = *self;
+        list.used
+    }
+
+    /// Reads what comes after `before`, and what is left behind it; none if it is not complete.
+    pub(super) fn take<'a>(before: &Self, bytes: &'a [u8]) -> Option<(Self, &'a [u8])> {
+        let mut map = [0; 8];
+        let (start, mut rest) = bytes.split_first_chunk::<MAP>()?;
+        map[..MAP].copy_from_slice(start);
+        let map = u64::from_le_bytes(map);
+        let mut delta = *before;
+        delta.at = delta.at.wrapping_add(1);
+        let numbers = core::iter::once(&mut delta.at).chain(&mut delta.numbers);
+        for (place, number) in numbers.enumerate() {
+            let difference = match map >> (2 * place) & 3 {
+                0 => 0,
+                1 => i32::from(i16::from_le_bytes(*take(&mut rest)?)),
+                2 => i32::from_le_bytes(*take(&mut rest)?),
+                _ => return None,
+            };
+            *number = number.wrapping_add_signed(difference);
+        }
+        for (place, word) in delta.words.iter_mut().enumerate() {
+            if map >> (DIFFERENCES + place) & 1 != 0 {
+                *word = u32::from_le_bytes(*take(&mut rest)?);
+            }
+        }
+        Some((delta, rest))
+    }
+}
+
+/// What is written of a record, with the map of it.
+struct List<'a> {
+    map: u64,
+    used: usize,
+    room: &'a mut [u8; LONGEST],
+}
+
+impl List<'_> {
+    /// The number at this place of the map, by its difference to what was to be expected.
+    fn number(&mut self, place: usize, number: u32, expected: u32) {
+        let difference = number.wrapping_sub(expected) as i32;
+        if difference == 0 {
+            return;
+        }
+        if let Ok(half) = i16::try_from(difference) {
+            self.map |= 1 << (2 * place);
+            self.put(half.to_le_bytes());
+        } else {
+            self.map |= 2 << (2 * place);
+            self.put(difference.to_le_bytes());
+        }
+    }
+
+    /// Bytes for which there is room.
+    fn put<const N: usize>(&mut self, bytes: [u8; N]) {
+        let rest = self.room.get_mut(self.used..);
+        if let Some(place) = rest.and_then(|rest| rest.first_chunk_mut::<N>()) {
+            *place = bytes;
+        }
+        self.used += N;
+    }
+}
+
+fn take<'a, const N: usize>(rest: &mut &'a [u8]) -> Option<&'a [u8; N]> {
+    let (bytes, behind) = rest.split_first_chunk()?;
+    *rest = behind;
+    Some(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::record::tests::any_record;
+    use super::*;
+    use proptest::prelude::*;
+
+    /// The record behind another, as it is written.
+    fn written(one: &Record, other: &Record) -> Vec<u8> {
+        let mut room = [0xA5; LONGEST];
+        let mut before = DeltaRecord::of(one);
+        let used = DeltaRecord::of(other).put(&mut before, &mut room);
+        assert_eq!(before, DeltaRecord::of(other));
+        room[..used].to_vec()
+    }
+
+    proptest! {
+        #[test]
+        fn a_record_comes_back_from_its_difference(
+            one in any_record(),
+            other in any_record(),
+            behind in prop::collection::vec(any::<u8>(), 0..5),
+        ) {
+            prop_assert_eq!(DeltaRecord::of(&one).record(), Some(one));
+            let bytes = [written(&one, &other), behind.clone()].concat();
+            let (back, rest) = DeltaRecord::take(&DeltaRecord::of(&one), &bytes).unwrap();
+            prop_assert_eq!(back.record(), Some(other));
+            prop_assert_eq!(rest, &behind);
+        }
+
+        #[test]
+        fn what_is_cut_off_is_no_record(one in any_record(), other in any_record(), cut in 1..9_usize) {
+            let bytes = written(&one, &other);
+            prop_assert_eq!(DeltaRecord::take(&DeltaRecord::of(&one), &bytes[..bytes.len().saturating_sub(cut)]), None);
+        }
+
+        #[test]
+        fn differences_within_half_a_word_take_that(step in any::<i16>()) {
+            let one = Record::EMPTY;
+            let mut other = one;
+            other.telemetry.at = one.telemetry.at.wrapping_add(1);
+            other.telemetry.speed = Q16::from_bits(step.into());
+            prop_assert_eq!(written(&one, &other).len(), 4 + 2 * usize::from(step != 0));
+        }
+    }
+
+    #[test]
+    fn a_tick_without_news_takes_its_codes_and_ages_at_most() {
+        let before = Record::EMPTY;
+        let mut after = before;
+        after.telemetry.at += 1;
+        assert_eq!(written(&before, &after).len(), 4);
+        // Parity and age of the arm's frame alternate.
+        after.codes[3] ^= 0x8000;
+        after.ages[3] += 1;
+        assert_eq!(written(&before, &after).len(), 4 + 4 + 2);
+    }
+
+    #[test]
+    fn numbers_without_meaning_are_no_record() {
+        let sound = DeltaRecord::of(&Record::EMPTY);
+        assert!(sound.record().is_some());
+        // Stage 0, mode 99, a byte that says nothing, flags beyond 16 bits.
+        let state = |stage, mode, rest| u32::from_le_bytes([0, stage, mode, rest]);
+        for (place, number) in
+            [(4, state(0, 0, 0)), (4, state(1, 99, 0)), (4, state(1, 0, 1)), (5, 65_536)]
+        {
+            let mut meaningless = sound;
+            meaningless.words[place] = number;
+            assert_eq!(meaningless.record(), None, "{place}");
+        }
+        // A map with a difference of no length, and one with a word that is missing.
+        for (map, behind) in [(3_u32, LONGEST), (1 << 31, 3)] {
+            let bytes = [&map.to_le_bytes()[..], &vec![0; behind]].concat();
+            assert_eq!(DeltaRecord::take(&sound, &bytes), None);
+        }
+    }
+}

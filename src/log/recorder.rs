@@ -1,0 +1,70 @@
+//! From a tick's row to what a restart finds of it.
+
+use super::telemetry::Telemetry;
+use crate::restart::{DriveSnapshot, MissedCheckIns, PackedSpeed, PositionConfidence};
+use crate::supervise::{Mode, codes};
+
+/// Makes a [`DriveSnapshot`] of each tick. It remembers the last fault beyond its hold.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SnapshotRecorder {
+    fault: u16,
+}
+
+impl SnapshotRecorder {
+    /// The snapshot of a tick whose position had this confidence.
+    pub fn snapshot(
+        &mut self,
+        row: &Telemetry,
+        confidence: PositionConfidence,
+        missed: MissedCheckIns,
+    ) -> DriveSnapshot {
+        if let Mode::FaultHold(fault) = row.mode {
+            self.fault = fault.code();
+        }
+        let unsure = confidence == PositionConfidence::Unsure;
+        DriveSnapshot {
+            tick: row.at,
+            position: row.position,
+            mode: codes::of_mode(row.mode),
+            level: row.level | if unsure { DriveSnapshot::UNSURE } else { 0 },
+            fault: self.fault,
+            missed,
+            packed_speed: PackedSpeed::of(row.speed_ref, confidence != PositionConfidence::Guess),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::supervise::{Direction, Fault, Leg};
+    use crate::units::Q16;
+
+    #[test]
+    fn the_last_fault_is_kept_beyond_its_hold() {
+        let mut recorder = SnapshotRecorder::default();
+        let mut row =
+            Telemetry { at: 5, level: 2, position: Q16::from_num(41), ..Telemetry::EMPTY };
+        assert_eq!(
+            recorder.snapshot(&row, PositionConfidence::Sure, MissedCheckIns::NOBODY).mode(),
+            Some(Mode::Boot)
+        );
+        row.mode = Mode::Run(Direction::Deploy, Leg::Crossing);
+        let snapshot = recorder.snapshot(&row, PositionConfidence::Sure, MissedCheckIns::TICK);
+        assert_eq!((snapshot.mode(), snapshot.fault), (Some(row.mode), 0));
+        assert_eq!((snapshot.tick, snapshot.level, snapshot.position), (5, 2, row.position));
+        assert_eq!(snapshot.missed, MissedCheckIns::TICK);
+        assert!(snapshot.packed_speed.placed());
+        let unsure = recorder.snapshot(&row, PositionConfidence::Unsure, MissedCheckIns::TICK);
+        assert_eq!(unsure, DriveSnapshot { level: DriveSnapshot::UNSURE | 2, ..snapshot });
+        row.mode = Mode::FaultHold(Fault::DriveStalled);
+        assert_eq!(
+            recorder.snapshot(&row, PositionConfidence::Guess, MissedCheckIns::NOBODY).mode(),
+            Some(row.mode)
+        );
+        row.mode = Mode::Idle;
+        let snapshot = recorder.snapshot(&row, PositionConfidence::Guess, MissedCheckIns::NOBODY);
+        assert!(!snapshot.packed_speed.placed());
+        assert_eq!((snapshot.mode(), snapshot.fault), (Some(Mode::Idle), 122));
+    }
+}

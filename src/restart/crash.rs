@@ -1,0 +1,106 @@
+//! What stopped the program.
+
+use core::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use super::{CRASH_WORDS, MissedCheckIns, check};
+use crate::units::Tick;
+
+/// What stopped the program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Stopped {
+    /// A panic: where in flash the image says from where, and the line.
+    Panic {
+        /// Address of the place's description in the image.
+        place: u32,
+        /// Line in the source.
+        line: u32,
+    },
+    /// A hard fault.
+    Fault {
+        /// Instruction that faulted, 0 if the stack does not tell.
+        pc: u32,
+        /// Where it would have returned to, 0 likewise.
+        lr: u32,
+        /// Configurable fault status.
+        cfsr: u32,
+        /// Hard fault status.
+        hfsr: u32,
+    },
+    /// The watchdog was no longer fed.
+    Hang {
+        /// Where the processor was.
+        pc: u32,
+        /// Where that would have returned to.
+        lr: u32,
+        /// Who had not come.
+        missed: MissedCheckIns,
+        /// When the bridges were cut.
+        at: Tick,
+    },
+    /// The supply fell below what it has to be.
+    Supply,
+    /// A bit of the image had turned over.
+    Image,
+}
+
+/// The last words of a program that was stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Crash {
+    /// First word of the image's hash, by which its addresses are known.
+    pub build: u32,
+    /// What stopped it.
+    pub stopped: Stopped,
+}
+
+impl Crash {
+    /// What it is known by.
+    const SEED: u32 = 0xF11E_0002;
+
+    /// As words.
+    #[must_use]
+    pub fn seal(&self) -> [u32; CRASH_WORDS] {
+        let (kind, [a, b, c, d]) = match self.stopped {
+            Stopped::Panic { place, line } => (1, [place, line, 0, 0]),
+            Stopped::Fault { pc, lr, cfsr, hfsr } => (2, [pc, lr, cfsr, hfsr]),
+            Stopped::Hang { pc, lr, missed, at } => (3, [pc, lr, u32::from(missed.bits()), at]),
+            Stopped::Supply => (4, [0; 4]),
+            Stopped::Image => (5, [0; 4]),
+        };
+        let build = self.build;
+        [kind, build, a, b, c, d, check(Self::SEED, &[kind, build, a, b, c, d])]
+    }
+
+    /// From words, if they are whole.
+    #[must_use]
+    pub fn open(words: &[u32; CRASH_WORDS]) -> Option<Self> {
+        let [kind, build, a, b, c, d, sum] = *words;
+        let stopped = match kind {
+            1 => Stopped::Panic { place: a, line: b },
+            2 => Stopped::Fault { pc: a, lr: b, cfsr: c, hfsr: d },
+            3 => Stopped::Hang { pc: a, lr: b, missed: MissedCheckIns::from_bits(c as u16), at: d },
+            4 => Stopped::Supply,
+            5 => Stopped::Image,
+            _ => return None,
+        };
+        let whole = check(Self::SEED, &[kind, build, a, b, c, d]) == sum;
+        whole.then_some(Self { build, stopped })
+    }
+}
+
+impl fmt::Display for Stopped {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Panic { place, line } => write!(f, "a panic in line {line}, place {place:#x}"),
+            Self::Fault { pc, lr, cfsr, hfsr } => {
+                write!(f, "a hard fault at {pc:#x} from {lr:#x}, CFSR {cfsr:#x}, HFSR {hfsr:#x}")
+            }
+            Self::Hang { pc, lr, missed, .. } => {
+                write!(f, "{} did not come, at {pc:#x} from {lr:#x}", missed.name())
+            }
+            Self::Supply => f.write_str("the supply fell too low"),
+            Self::Image => f.write_str("a bit of the image had turned over"),
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! What a start knows of the run before.
+
+use core::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use super::{Crash, DriveSnapshot, PackedSpeed, Stopped};
+use crate::estimate::Place;
+use crate::fault::Fault;
+use crate::units::{Millimetres, Tick, ticks_to_seconds};
+
+/// What the chip says about why it started.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Reset {
+    /// Power came up, or fell too low and came back.
+    Power,
+    /// The reset pin.
+    Pin,
+    /// The program or a debugger asked for it.
+    Software,
+    /// The watchdog.
+    Watchdog,
+    /// Something else.
+    Other,
+}
+
+impl Reset {
+    /// In words.
+    #[must_use]
+    pub const fn sentence(self) -> &'static str {
+        match self {
+            Self::Power => "power came up",
+            Self::Pin => "by the reset pin",
+            Self::Software => "by software or debugger",
+            Self::Watchdog => "by the watchdog",
+            Self::Other => "for a reason that the chip does not tell",
+        }
+    }
+}
+
+/// What a start reports of the time before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Restart {
+    /// Why the chip started.
+    pub reset: Reset,
+    /// What the drive last did, if memory kept it.
+    pub snapshot: Option<DriveSnapshot>,
+    /// What stopped the program, if something did.
+    pub crash: Option<Crash>,
+}
+
+/// Ticks for which the wheel goes on at its speed after the record: what is left of the
+/// tick, and the coasting, in which the gears take half of the speed each ms.
+const COASTS: Tick = 2;
+
+/// Ticks from the watchdog's last feeding to its reset.
+const UNFED: Tick = 100;
+
+/// Longest time without a record within which it still tells all, ticks.
+const FRESH: Tick = 5;
+
+impl Restart {
+    /// Whether the program hung with interrupts shut out: nothing got through that could have
+    /// told who it was.
+    #[must_use]
+    pub const fn shut_out(&self) -> bool {
+        matches!(self.reset, Reset::Watchdog) && self.crash.is_none()
+    }
+
+    /// Where the wheel stands, if the record tells.
+    ///
+    /// A reset takes the power from the bridges at once, a panic or a hard fault before it
+    /// is recorded; then the wheel coasts by a tenth of a millimetre. If the tick hung, the
+    /// drive went on at its last duty until the bridges were cut, or until the watchdog
+    /// bit: at about the reference of the last tick, for a time that is known. Without a
+    /// supply the gears hold the wheel, but not against a hand. After a fault that may have
+    /// been one of the position it tells nothing.
+    #[inline(never)]
+    #[must_use]
+    pub fn place(&self) -> Option<Place> {
+        let snapshot = self
+            .snapshot
+            .filter(|snapshot| snapshot.packed_speed.placed() && spared(snapshot.fault))?;
+        let unwatched = match (self.reset, self.crash.map(|crash| crash.stopped)) {
+            (_, Some(Stopped::Hang { at, .. })) => at.wrapping_sub(snapshot.tick).min(UNFED),
+            (Reset::Watchdog, None) => UNFED,
+            _ => 0,
+        };
+        let way = snapshot.packed_speed.speed() * ticks_to_seconds(unwatched + COASTS);
+        Some(Place {
+            position: snapshot.position + way,
+            sure: unwatched <= FRESH && !self.was_away() && snapshot.level < DriveSnapshot::UNSURE,
+        })
+    }
+
+    /// Whether the supply was away, for nobody knows how long, since the drive last did
+    /// something.
+    fn was_away(&self) -> bool {
+        let fell = self.crash.is_some_and(|crash| crash.stopped == Stopped::Supply);
+        fell || self.reset == Reset::Power
+    }
+
+    /// What is to be kept of it until the first tick, for a reset that comes before: the
+    /// wheel stands where it came to rest, unless it is moved.
+    #[must_use]
+    pub fn standing(&self) -> Option<DriveSnapshot> {
+        let mut snapshot = self.snapshot?;
+        if let Some(place) = self.place() {
+            snapshot.position = place.position;
+            snapshot.packed_speed = PackedSpeed::of(Millimetres::ZERO, true);
+        }
+        snapshot.level |= DriveSnapshot::UNSURE;
+        Some(snapshot)
+    }
+}
+
+/// Whether the position was to be believed although this fault was reported: none, or one
+/// that has nothing to do with how the wheel's way is found.
+fn spared(code: u16) -> bool {
+    const OTHERS: [Fault; 11] = [
+        Fault::PressureStale,
+        Fault::DisplacementStale,
+        Fault::PressureRange,
+        Fault::DisplacementRange,
+        Fault::PressureImplausible,
+        Fault::DisplacementImplausible,
+        Fault::Overpressure,
+        Fault::PreloadNotReached,
+        Fault::PretightenerRunaway,
+        Fault::EmergencyStop,
+        Fault::TickOverrun,
+    ];
+    code == 0 || OTHERS.iter().any(|fault| fault.code() == code)
+}
+
+impl fmt::Display for Restart {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "started: {}", self.reset.sentence())?;
+        if let Some(crash) = &self.crash {
+            write!(f, "; {}", crash.stopped)?;
+        }
+        if self.shut_out() {
+            f.write_str("; a hang with interrupts shut out")?;
+        }
+        if let Some(snapshot) = &self.snapshot {
+            let DriveSnapshot { tick, position, level, fault, missed, .. } = *snapshot;
+            match snapshot.mode() {
+                Some(mode) => write!(f, "; before: {mode:?}")?,
+                None => write!(f, "; before: mode {}", snapshot.mode)?,
+            }
+            let level = level & !DriveSnapshot::UNSURE;
+            write!(f, " at tick {tick}, {position:.2} mm, level {level}")?;
+            if fault != 0 {
+                write!(f, ", last fault {fault}")?;
+            }
+            if !missed.is_nobody() {
+                write!(f, ", {} was late", missed.name())?;
+            }
+            if snapshot.level >= DriveSnapshot::UNSURE {
+                f.write_str(", its place unsure")?;
+            }
+        }
+        Ok(())
+    }
+}

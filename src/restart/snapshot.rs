@@ -1,0 +1,108 @@
+//! What the drive was doing, kept every tick.
+
+use serde::{Deserialize, Serialize};
+
+use super::{MissedCheckIns, SNAPSHOT_WORDS, check};
+use crate::estimate::PositionConfidence;
+use crate::supervise::Mode;
+use crate::supervise::codes;
+use crate::tick::Telemetry;
+use crate::units::{Millimetres, MillimetresPerSecond, Q16, Tick};
+
+/// Reference of the speed in a tick, signed outwards, in 1/32 mm/s, and in the last bit
+/// whether the position was more than a guess.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PackedSpeed(pub(super) i16);
+
+impl PackedSpeed {
+    /// Bits of a speed that it leaves out.
+    const COARSER: u32 = 11;
+
+    /// Of this speed, mm/s; half a metre a second counts for more.
+    #[must_use]
+    pub fn of(speed: MillimetresPerSecond, placed: bool) -> Self {
+        let most = i32::from(i16::MAX >> 1);
+        let speed = (speed.to_bits() >> Self::COARSER).clamp(-most, most);
+        Self((speed << 1) as i16 | i16::from(placed))
+    }
+
+    /// The speed, mm/s.
+    #[must_use]
+    pub fn speed(self) -> MillimetresPerSecond {
+        Q16::from_bits((i32::from(self.0) >> 1) << Self::COARSER)
+    }
+
+    /// Whether the position was more than a guess.
+    #[must_use]
+    pub const fn placed(self) -> bool {
+        self.0 & 1 != 0
+    }
+}
+
+/// What the drive was doing in a tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct DriveSnapshot {
+    /// The tick.
+    pub tick: Tick,
+    /// Estimated axial position, mm.
+    pub position: Millimetres,
+    /// Mode, by [`codes::mode`].
+    pub mode: u8,
+    /// Sleeve level, and [`UNSURE`](Self::UNSURE).
+    pub level: u8,
+    /// Code of the last fault since the start, 0 for none.
+    pub fault: u16,
+    /// Who had not come.
+    pub missed: MissedCheckIns,
+    /// How fast it was going, and whether the position was more than a guess.
+    pub packed_speed: PackedSpeed,
+}
+
+impl DriveSnapshot {
+    /// What it is known by.
+    const SEED: u32 = 0xF11E_0001;
+    /// Added to the level if the position may be off, and no step has confirmed it; and by
+    /// every start until its first tick, as nobody knows for how long the drive then stands
+    /// unwatched.
+    pub const UNSURE: u8 = 0x80;
+
+    /// As words.
+    #[must_use]
+    pub fn seal(&self) -> [u32; SNAPSHOT_WORDS] {
+        let state = u32::from(self.mode) | u32::from(self.level) << 8 | u32::from(self.fault) << 16;
+        let missed = u32::from(self.missed.bits()) | u32::from(self.packed_speed.0 as u16) << 16;
+        let [a, b, c, d] = [self.tick, self.position.to_bits() as u32, state, missed];
+        [a, b, c, d, check(Self::SEED, &[a, b, c, d])]
+    }
+
+    /// From words, if they are whole.
+    #[must_use]
+    pub fn open(words: &[u32; SNAPSHOT_WORDS]) -> Option<Self> {
+        let [tick, position, state, missed, sum] = *words;
+        (check(Self::SEED, &[tick, position, state, missed]) == sum).then_some(Self {
+            tick,
+            position: Q16::from_bits(position as i32),
+            mode: state as u8,
+            level: (state >> 8) as u8,
+            fault: (state >> 16) as u16,
+            missed: MissedCheckIns::from_bits(missed as u16),
+            packed_speed: PackedSpeed((missed >> 16) as i16),
+        })
+    }
+
+    /// The mode; none if the number has no meaning.
+    #[must_use]
+    pub fn mode(&self) -> Option<Mode> {
+        codes::mode(self.mode)
+    }
+}
+
+/// The later of two.
+#[must_use]
+pub fn later(one: Option<DriveSnapshot>, other: Option<DriveSnapshot>) -> Option<DriveSnapshot> {
+    match (one, other) {
+        (Some(a), Some(b)) if b.tick.wrapping_sub(a.tick) as i32 > 0 => Some(b),
+        (Some(a), _) => Some(a),
+        (None, b) => b,
+    }
+}

@@ -1,0 +1,89 @@
+//! Modes, stages and commands as numbers of the log. Numbers are stable: none is ever
+//! given a second meaning.
+
+use super::{Command, Direction, Fault, Mode};
+use crate::estimate::ContactStage;
+
+/// Number of a mode: its place in [`Mode::WITHOUT_FAULT`], or the code of the fault that
+/// is held, 101 to 160. Called every tick, so that it does not look for that place.
+#[must_use]
+pub const fn of_mode(mode: Mode) -> u8 {
+    /// Modes that have a way.
+    const WAY: u8 = 7;
+    let (first, direction) = match mode {
+        Mode::Boot => return 0,
+        Mode::SelfTest => return 1,
+        Mode::Zero => return 2,
+        Mode::Idle => return 3,
+        Mode::Preload(direction) => (4, direction),
+        Mode::Run(direction, leg) => (5 + leg as u8, direction),
+        Mode::Stopping(direction) => (9, direction),
+        Mode::Complete(direction) => (10, direction),
+        Mode::FaultHold(fault) => return fault.code() as u8,
+    };
+    match direction {
+        Direction::Deploy => first,
+        Direction::Retract => first + WAY,
+    }
+}
+
+/// The mode of a number; none if the number has no meaning.
+#[must_use]
+pub fn mode(number: u8) -> Option<Mode> {
+    let plain = Mode::WITHOUT_FAULT.get(usize::from(number)).copied();
+    plain.or_else(|| {
+        let held = Fault::ALL.iter().find(|fault| fault.code() == u16::from(number));
+        held.map(|fault| Mode::FaultHold(*fault))
+    })
+}
+
+/// The contact stage of a number, 1 to 6.
+#[must_use]
+pub fn stage(number: u8) -> Option<ContactStage> {
+    ContactStage::ALL.into_iter().find(|stage| *stage as u8 == number)
+}
+
+/// Number of a command, from 1 in the order of [`Command::ALL`]; 0 for none.
+#[must_use]
+pub const fn of_command(command: Option<Command>) -> u8 {
+    match command {
+        None => 0,
+        Some(command) => command as u8 + 1,
+    }
+}
+
+/// The command of a number; none for 0 and for what has no meaning.
+#[must_use]
+pub fn command(number: u8) -> Option<Command> {
+    Command::ALL.get(usize::from(number).checked_sub(1)?).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_mode_has_its_number() {
+        let held = Fault::ALL.into_iter().map(Mode::FaultHold);
+        let all: Vec<Mode> = Mode::WITHOUT_FAULT.into_iter().chain(held).collect();
+        for known in &all {
+            assert_eq!(mode(of_mode(*known)), Some(*known));
+        }
+        let places = Mode::WITHOUT_FAULT.into_iter().map(of_mode);
+        assert!(places.eq(0..Mode::WITHOUT_FAULT.len() as u8));
+        let known = (0..=u8::MAX).filter(|number| mode(*number).is_some()).count();
+        assert_eq!(known, all.len());
+    }
+
+    #[test]
+    fn stages_and_commands_have_theirs() {
+        for known in ContactStage::ALL {
+            assert_eq!(stage(known as u8), Some(known));
+        }
+        assert_eq!((stage(0), stage(7)), (None, None));
+        for known in Command::ALL {
+            assert_eq!(command(of_command(Some(known))), Some(known));
+        }
+        assert_eq!((of_command(None), command(0), command(5)), (0, None, None));
+    }
+}

@@ -1,0 +1,131 @@
+//! Boot, self-test and zero: what must hold before anything moves.
+
+#![deny(clippy::float_arithmetic)]
+
+use crate::fault::Fault;
+use crate::sense::SensedState;
+use crate::units::{Millimetres, MillimetresPerSecond, Newtons, q16};
+
+/// Ticks of rest that the self-test watches.
+pub const TEST_TICKS: u32 = 100;
+/// Speed that still counts as rest, mm/s.
+const REST: MillimetresPerSecond = q16(500_000);
+/// Preload that still counts as none, N: the load cell's zero before calibration.
+const UNLOADED: Newtons = q16(3_000_000);
+/// Compression that still counts as none, mm.
+const UNPRESSED: Millimetres = q16(100_000);
+
+/// Whether all sensors have answered with good codes.
+pub fn all_answer(sensed: &SensedState) -> bool {
+    sensed.speed.is_usable()
+        && sensed.preload.is_usable()
+        && sensed.compression.is_usable()
+        && sensed.radius.is_usable()
+}
+
+/// The fault of the first sensor that has not answered.
+pub fn silent(sensed: &SensedState) -> Fault {
+    if !sensed.speed.is_usable() {
+        Fault::SpeedStale
+    } else if !sensed.preload.is_usable() {
+        Fault::PressureStale
+    } else if !sensed.compression.is_usable() {
+        Fault::DisplacementStale
+    } else {
+        Fault::AngleStale
+    }
+}
+
+/// Whether the wheel rests.
+pub fn at_rest(sensed: &SensedState) -> bool {
+    sensed.speed.value.abs() < REST
+}
+
+/// Whether the wheel lies unloaded on the outermost wall, so that zeros can be taken.
+pub fn stowed(sensed: &SensedState) -> bool {
+    sensed.level == 0
+        && sensed.preload_filtered.abs() < UNLOADED
+        && sensed.compression_filtered.abs() < UNPRESSED
+}
+
+#[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "quantities of a test")]
+mod tests {
+    use super::*;
+    use crate::rig::Rig;
+    use crate::sense::raw::SensorFrame;
+    use crate::sense::{Reason, Senses, SensesState, Validity};
+    use crate::units::Q16;
+
+    /// What the senses say on this wall, at this speed, preload and compression.
+    fn sensed(level: u8, speed: f64, preload: f64, compression: f64) -> SensedState {
+        let senses = Senses::try_build(&Rig::prototype()).expect("sound");
+        let nothing = SensorFrame::default();
+        let mut sensed = senses.step(&mut SensesState::default(), 0, &nothing, Q16::ZERO);
+        sensed.level = level;
+        sensed.speed.value = Q16::from_num(speed);
+        sensed.preload_filtered = Q16::from_num(preload);
+        sensed.compression_filtered = Q16::from_num(compression);
+        sensed
+    }
+
+    #[test]
+    fn stowed_is_unloaded_and_on_the_outermost_wall() {
+        for (level, preload, compression, expected) in [
+            (0, 0.0, 0.0, true),
+            (0, 2.9, 0.09, true),
+            (0, -2.9, -0.09, true),
+            (1, 0.0, 0.0, false),
+            (0, 3.0, 0.0, false),
+            (0, -3.1, 0.0, false),
+            (0, 0.0, 0.11, false),
+            (0, 0.0, -0.11, false),
+        ] {
+            let seen = sensed(level, 0.0, preload, compression);
+            assert_eq!(stowed(&seen), expected, "{level} {preload} {compression}");
+        }
+        let mut edge = sensed(0, 0.0, 0.0, 0.0);
+        edge.compression_filtered = UNPRESSED;
+        assert!(!stowed(&edge));
+    }
+
+    #[test]
+    fn rest_is_less_than_half_a_millimetre_a_second() {
+        for (speed, expected) in
+            [(0.0, true), (0.49, true), (-0.49, true), (0.5, false), (-0.5, false)]
+        {
+            assert_eq!(at_rest(&sensed(0, speed, 0.0, 0.0)), expected, "{speed}");
+        }
+    }
+
+    #[test]
+    fn the_first_that_is_silent_is_named() {
+        let seen = sensed(0, 0.0, 0.0, 0.0);
+        assert!(!all_answer(&seen));
+        assert_eq!(silent(&seen), Fault::SpeedStale);
+    }
+
+    #[test]
+    fn each_sensor_that_has_not_answered_is_missed_and_named() {
+        let mut all = sensed(0, 0.0, 0.0, 0.0);
+        all.speed.validity = Validity::Valid;
+        all.preload.validity = Validity::Valid;
+        all.compression.validity = Validity::Held(Reason::OutOfRange);
+        all.radius.validity = Validity::Valid;
+        assert!(all_answer(&all));
+        let missing =
+            [Fault::SpeedStale, Fault::PressureStale, Fault::DisplacementStale, Fault::AngleStale];
+        for (sensor, fault) in missing.into_iter().enumerate() {
+            let mut seen = all;
+            let places = [
+                &mut seen.speed.validity,
+                &mut seen.preload.validity,
+                &mut seen.compression.validity,
+                &mut seen.radius.validity,
+            ];
+            *places.into_iter().nth(sensor).expect("one of four") = Validity::Absent;
+            assert!(!all_answer(&seen), "{fault:?}");
+            assert_eq!(silent(&seen), fault);
+        }
+    }
+}

@@ -1,0 +1,244 @@
+//! Which tasks are alive, and which one keeps the others from running.
+
+use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
+
+use crate::restart::MissedCheckIns;
+use crate::sense::freshness::age;
+use crate::units::Tick;
+
+/// Longest time without a check-in of a healthy task, ticks.
+pub const CHECK_IN_TICKS: u32 = 50;
+
+/// Ticks between two readings of each sensor, by [`TaskId`].
+pub(super) const PERIODS: [u32; 4] = [1, 1, 1, 2];
+
+/// Tasks that always run.
+const FIXED: usize = 6;
+
+/// Most operator tasks.
+const OPERATORS: usize = 4;
+
+/// A task that checks in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TaskId {
+    /// [`speed`](super::speed()).
+    Speed,
+    /// [`pressure`](super::pressure()).
+    Pressure,
+    /// [`displacement`](super::displacement()).
+    Displacement,
+    /// [`angle`](super::angle()).
+    Angle,
+    /// [`model`](super::model()).
+    Model,
+    /// [`journal`](super::journal()).
+    Journal,
+    /// [`operator`](super::operator()), numbered in the order of starting.
+    Operator(u8),
+}
+
+impl TaskId {
+    pub(super) const fn index(self) -> usize {
+        match self {
+            Self::Speed => 0,
+            Self::Pressure => 1,
+            Self::Displacement => 2,
+            Self::Angle => 3,
+            Self::Model => 4,
+            Self::Journal => 5,
+            Self::Operator(number) => FIXED + number as usize,
+        }
+    }
+}
+
+/// The check-ins of all tasks.
+pub(super) struct Liveness {
+    check_ins: [AtomicU32; FIXED + OPERATORS],
+    operators: AtomicU32,
+    /// The latest tick for which sensors and control tick were woken.
+    started: AtomicU32,
+    /// The control tick has begun and not ended.
+    in_tick: AtomicBool,
+    /// The task below the control rate that ran last.
+    background: AtomicU8,
+}
+
+impl Liveness {
+    pub(super) const fn new() -> Self {
+        Self {
+            check_ins: [const { AtomicU32::new(0) }; FIXED + OPERATORS],
+            operators: AtomicU32::new(0),
+            started: AtomicU32::new(0),
+            in_tick: AtomicBool::new(false),
+            background: AtomicU8::new(0),
+        }
+    }
+
+    /// Sensors and control tick are woken for this tick.
+    pub(super) fn start(&self, tick: Tick) {
+        self.started.store(tick, Ordering::Relaxed);
+    }
+
+    /// The control tick begins or ends.
+    pub(super) fn in_tick(&self, running: bool) {
+        self.in_tick.store(running, Ordering::Relaxed);
+    }
+
+    /// A task below the control rate runs.
+    pub(super) fn running(&self, task: TaskId) {
+        self.background.store(task.index() as u8, Ordering::Relaxed);
+    }
+
+    /// A task says that it is alive.
+    pub(super) fn check_in(&self, task: TaskId, now: Tick) {
+        if let Some(seen) = self.check_ins.get(task.index()) {
+            seen.store(now, Ordering::Relaxed);
+        }
+        if task.index() >= PERIODS.len() {
+            self.running(task);
+        }
+    }
+
+    /// The number of a further operator task; the last one is shared if there are
+    /// more than four.
+    pub(super) fn enrol_operator(&self) -> TaskId {
+        let number = (self.operators.load(Ordering::Relaxed) as usize).min(OPERATORS - 1);
+        self.operators.store(number as u32 + 1, Ordering::Relaxed);
+        TaskId::Operator(number as u8)
+    }
+
+    fn tasks(&self) -> usize {
+        FIXED + self.operators.load(Ordering::Relaxed) as usize
+    }
+
+    /// Tasks that have not checked in within [`CHECK_IN_TICKS`]. One that never started
+    /// counts as last seen at boot.
+    pub(super) fn missed(&self, now: Tick) -> MissedCheckIns {
+        let late = |task: &usize| {
+            let seen = self.check_ins.get(*task).map_or(now, |seen| seen.load(Ordering::Relaxed));
+            age(now, seen) > CHECK_IN_TICKS
+        };
+        all((0..self.tasks()).filter(late))
+    }
+
+    /// Why the watchdog is not fed: tasks that are late, or the one that keeps the control
+    /// tick from coming.
+    pub(super) fn unfed(&self, now: Tick) -> MissedCheckIns {
+        if age(now, self.started.load(Ordering::Relaxed)) > CHECK_IN_TICKS {
+            return self.stalled_task();
+        }
+        let missed = self.missed(now);
+        // One that does not return keeps all others of its executor waiting as well.
+        if missed == all(PERIODS.len()..self.tasks()) {
+            MissedCheckIns::task(self.background.load(Ordering::Relaxed).into())
+        } else {
+            missed
+        }
+    }
+
+    /// The task that keeps the control tick from coming: the tick itself, or the first of
+    /// the sensors' tasks, in the order in which they run, that has not checked in since it
+    /// was woken, or something outside of their executor.
+    fn stalled_task(&self) -> MissedCheckIns {
+        if self.in_tick.load(Ordering::Relaxed) {
+            return MissedCheckIns::TICK;
+        }
+        let started = self.started.load(Ordering::Relaxed);
+        let stalled = PERIODS
+            .iter()
+            .zip(&self.check_ins)
+            .position(|(period, seen)| seen.load(Ordering::Relaxed) != started - started % period);
+        stalled.map_or(MissedCheckIns::STARVED, MissedCheckIns::task)
+    }
+}
+
+/// All of these tasks.
+fn all(tasks: impl Iterator<Item = usize>) -> MissedCheckIns {
+    tasks.map(MissedCheckIns::task).fold(MissedCheckIns::NOBODY, MissedCheckIns::and)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ALWAYS: [TaskId; FIXED] = [
+        TaskId::Speed,
+        TaskId::Pressure,
+        TaskId::Displacement,
+        TaskId::Angle,
+        TaskId::Model,
+        TaskId::Journal,
+    ];
+
+    #[test]
+    fn one_silent_task_is_enough() {
+        let liveness = Liveness::new();
+        assert!(liveness.missed(CHECK_IN_TICKS).is_nobody(), "since boot");
+        assert_eq!(liveness.missed(CHECK_IN_TICKS + 1).bits(), 0x3F);
+        let operators = [liveness.enrol_operator(), liveness.enrol_operator()];
+        let tasks: Vec<_> = ALWAYS.into_iter().chain(operators).collect();
+        for silent in &tasks {
+            for task in &tasks {
+                liveness.check_in(*task, if task == silent { 1000 } else { 1030 });
+            }
+            assert!(liveness.missed(1050).is_nobody(), "{silent:?}");
+            let missed = liveness.missed(1051);
+            assert_eq!(missed, MissedCheckIns::task(silent.index()), "{silent:?}");
+        }
+    }
+
+    #[test]
+    fn operators_beyond_the_last_share_its_number() {
+        let liveness = Liveness::new();
+        let numbers: Vec<_> = (0..6).map(|_| liveness.enrol_operator()).collect();
+        assert_eq!(numbers[3..], [TaskId::Operator(3); 3]);
+        for task in ALWAYS.into_iter().chain(numbers) {
+            liveness.check_in(task, 500);
+        }
+        assert!(liveness.missed(500).is_nobody());
+    }
+
+    #[test]
+    fn of_tasks_that_wait_for_one_another_the_one_that_runs_is_named() {
+        let liveness = Liveness::new();
+        let operator = liveness.enrol_operator();
+        liveness.start(1000);
+        for task in ALWAYS.into_iter().take(4) {
+            liveness.check_in(task, 1000);
+        }
+        liveness.running(TaskId::Journal);
+        assert_eq!(liveness.unfed(1000).name(), "journal");
+        liveness.check_in(operator, 0);
+        assert_eq!(liveness.unfed(1000), MissedCheckIns::task(operator.index()));
+        // Where the others go on, the one that does not is it.
+        liveness.check_in(TaskId::Journal, 990);
+        liveness.check_in(operator, 990);
+        assert_eq!(liveness.unfed(1000).name(), "model");
+    }
+
+    #[test]
+    fn the_task_that_keeps_the_tick_from_coming_is_named() {
+        let liveness = Liveness::new();
+        for (index, task) in ALWAYS.into_iter().enumerate().take(PERIODS.len()) {
+            // Those before it have run in this tick, it and those behind it have not.
+            for other in ALWAYS {
+                liveness.check_in(other, if other.index() < index { 702 } else { 700 });
+            }
+            liveness.start(702);
+            assert_eq!(liveness.unfed(900), MissedCheckIns::task(task.index()));
+        }
+        for task in ALWAYS {
+            liveness.check_in(task, 702);
+        }
+        assert_eq!(liveness.unfed(900), MissedCheckIns::STARVED);
+        liveness.in_tick(true);
+        assert_eq!(liveness.unfed(900), MissedCheckIns::TICK);
+        liveness.in_tick(false);
+        // The angle is read every other tick alone.
+        liveness.start(703);
+        for task in ALWAYS.into_iter().take(3) {
+            liveness.check_in(task, 703);
+        }
+        assert_eq!(liveness.unfed(900), MissedCheckIns::STARVED);
+    }
+}

@@ -1,0 +1,235 @@
+//! One tick of the controller: the pipeline from sensor codes to bridge commands.
+
+#![deny(clippy::float_arithmetic)]
+
+#[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
+mod build;
+mod drive;
+mod event;
+mod modes;
+mod plans;
+mod report;
+mod state;
+mod telemetry;
+
+use crate::control::preload_loop::PreloadLoop;
+use crate::control::profile::Profile;
+use crate::control::schedule::Schedule;
+use crate::control::speed_loop::SpeedLoop;
+use crate::estimate::vibration::VibrationObserver;
+use crate::estimate::{Estimator, Follow};
+use crate::fault::Fault;
+use crate::model::{Plan, PlanRequest};
+use crate::sense::raw::SensorFrame;
+use crate::sense::{SensedState, Senses};
+use crate::supervise::{Command, Mode, Monitor, Observed, Trigger, next};
+use crate::units::{
+    Millimetres, MillimetresPerSecond, MotorCommand, Newtons, Q16, Ratio, Seconds, Tick,
+};
+
+pub use event::{CrossingRecord, Entry, Event};
+pub use state::State;
+pub use telemetry::Telemetry;
+
+/// Most log entries one tick can give.
+pub const EVENTS_PER_TICK: usize = 8;
+
+/// Ticks that a fault hold lasts at least.
+const HOLD_TICKS: u32 = 100;
+
+/// What a tick is given.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Input {
+    /// Time.
+    pub now: Tick,
+    /// Latest code of each sensor.
+    pub sensors: SensorFrame,
+    /// Operator command since the last tick.
+    pub command: Option<Command>,
+    /// Answer to an earlier [`Output::request`].
+    pub plan: Option<Plan>,
+    /// This tick starts more than a period late.
+    pub overrun: bool,
+    /// The emergency stop has cut the bridges.
+    pub emergency_stop: bool,
+}
+
+/// What a tick gives.
+#[derive(Clone, Debug, Default)]
+pub struct Output {
+    /// Drive bridge.
+    pub drive: MotorCommand,
+    /// Pre-tightener bridge.
+    pub preload: MotorCommand,
+    /// Work for the model task: the schedule of the segment ahead.
+    pub request: Option<PlanRequest>,
+    /// Give the bridges their power back after an emergency stop.
+    pub rearm: bool,
+    /// What happened.
+    pub events: heapless::Vec<Entry, EVENTS_PER_TICK>,
+    /// State after the tick.
+    pub telemetry: Telemetry,
+}
+
+/// The controller's configuration in machine units; its state is apart. The default is room
+/// to read one into, and controls nothing.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Controller {
+    senses: Senses,
+    monitor: Monitor,
+    estimator: Estimator,
+    vibration: VibrationObserver,
+    /// Stages that the phase does not need are skipped.
+    skipping: bool,
+    schedule: Schedule,
+    profile: Profile,
+    speed_loop: SpeedLoop,
+    preload_loop: PreloadLoop,
+    /// Ticks within which any preload can be reached.
+    preload_timeout: u32,
+    /// Speed times slope of the corner at which the spring uses the actuator up, mm/s.
+    rise_speed: MillimetresPerSecond,
+    /// Spring rate of the pre-tightener, N/mm.
+    spring: Q16,
+    /// Dead time and lag of the pre-tightener, s.
+    preload_latency: Seconds,
+    /// Axial load on this wheel, N.
+    load: Newtons,
+    /// Radial force per tangent of the arm angle: coupling times axial load, N.
+    arm_thrust_max: Newtons,
+    /// Inertia of rotor, gears and carriage at the tread, N s^2/mm.
+    inertia: Q16,
+    friction: Ratio,
+}
+
+/// What one tick carries from stage to stage.
+struct TickContext<'a> {
+    now: Tick,
+    sensed: &'a SensedState,
+    /// Radial force that the arm's inclination adds to the preload, N.
+    arm_thrust: Newtons,
+    /// The transition that the present stage asks for; its first one counts.
+    trigger: Option<Trigger>,
+    output: &'a mut Output,
+}
+
+impl TickContext<'_> {
+    fn log(&mut self, event: Event) {
+        // A tick with more events than fit reports the first eight.
+        let _ = self.output.events.push(Entry { at: self.now, event });
+    }
+
+    fn trigger(&mut self, trigger: Trigger) {
+        self.trigger.get_or_insert(trigger);
+    }
+
+    fn fail(&mut self, fault: Fault) {
+        self.trigger(Trigger::Fault(fault));
+    }
+
+    /// Radial force on the wheel, N.
+    fn pressed(&self) -> Newtons {
+        self.sensed.preload_filtered + self.arm_thrust
+    }
+}
+
+impl Controller {
+    /// Travel of the wheel over a corner, mm.
+    pub const fn corner_reach(&self) -> Millimetres {
+        self.estimator.steps().corner_reach()
+    }
+
+    /// One tick.
+    pub fn step(&self, state: &mut State, input: &Input) -> Output {
+        let mut output = Output::default();
+        self.step_into(state, input, &mut output);
+        output
+    }
+
+    /// One tick into an `output` that is used again: it is too large to be moved in every
+    /// tick. The transitions that a stage asks for are applied at its end, so that a fault
+    /// switches the bridges off in the same tick.
+    pub fn step_into(&self, state: &mut State, input: &Input, output: &mut Output) {
+        output.request = None;
+        output.rearm = false;
+        output.events.clear();
+        let acceleration = state.acceleration();
+        let sensed = self.senses.step(&mut state.senses, input.now, &input.sensors, acceleration);
+        state.estimate.begin_tick(sensed.travel);
+        let arm_thrust = self.arm_thrust_max * sensed.tan_arm;
+        let tick =
+            &mut TickContext { now: input.now, sensed: &sensed, arm_thrust, trigger: None, output };
+        self.take_plan(state, tick, input.plan.as_ref());
+        self.transit(state, tick);
+        self.look_for_faults(state, tick, input);
+        self.transit(state, tick);
+        self.take_command(state, tick, input.command);
+        self.advance_mode(state, tick);
+        self.transit(state, tick);
+        self.follow_contact(state, tick);
+        self.transit(state, tick);
+        let targets = self.targets(state, tick);
+        self.transit(state, tick);
+        let (drive, preload) = self.actuate(state, tick, &targets);
+        self.note_stage(state, tick);
+        self.follow_vibration(state, tick);
+        tick.output.drive = drive;
+        tick.output.preload = preload;
+        tick.output.telemetry = self.telemetry(state, tick, &targets);
+        let given = &tick.output.telemetry;
+        state.monitor.give(given.drive, given.pretightener);
+    }
+
+    fn look_for_faults(&self, state: &mut State, tick: &mut TickContext<'_>, input: &Input) {
+        let steady = state.profile.acceleration() == Q16::ZERO && !state.estimate.on_corner();
+        let observed = Observed {
+            now: tick.now,
+            mode: state.mode,
+            sensed: tick.sensed,
+            bridges: input.sensors.bridges,
+            speed_ref: state.signed_speed(),
+            preload_due: state.preload_loop.due(),
+            effort: steady.then(|| state.speed_loop.value()),
+            overrun: input.overrun,
+            emergency_stop: input.emergency_stop,
+        };
+        if let Some(fault) = self.monitor.step(&mut state.monitor, &observed) {
+            tick.fail(fault);
+        }
+    }
+
+    fn take_command(
+        &self,
+        state: &mut State,
+        tick: &mut TickContext<'_>,
+        command: Option<Command>,
+    ) {
+        let Some(command) = command else { return };
+        // A reset that was already on its way must not clear a fault unseen.
+        let hasty = matches!(state.mode, Mode::FaultHold(_)) && state.in_mode < HOLD_TICKS;
+        let trigger = Trigger::Command(command);
+        if hasty || next(state.mode, trigger).is_none() {
+            tick.log(Event::Refused(command));
+        } else {
+            tick.trigger(trigger);
+            self.transit(state, tick);
+            tick.log(Event::Command(command));
+        }
+    }
+
+    /// Follows steps and corners while the drive moves.
+    fn follow_contact(&self, state: &mut State, tick: &mut TickContext<'_>) {
+        if !state.mode.moves() {
+            return;
+        }
+        let standing_since = state.approach.standing_since;
+        let follow = Follow { now: tick.now, sensed: tick.sensed, standing_since };
+        let found = self.estimator.follow(&mut state.estimate, &follow);
+        self.take_findings(state, tick, found);
+    }
+}
+
+#[cfg(test)]
+#[path = "tick/tick_tests.rs"]
+#[allow(clippy::float_arithmetic, reason = "the rig is written in SI")]
+mod tests;

@@ -1,0 +1,67 @@
+//! From a rig to the controller's machine units, once at start.
+
+use super::Controller;
+use crate::control::preload_loop::PreloadLoop;
+use crate::control::profile::Profile;
+use crate::control::schedule::Schedule;
+use crate::control::speed_loop::SpeedLoop;
+use crate::estimate::Estimator;
+use crate::estimate::vibration::VibrationObserver;
+use crate::numeric::checked;
+use crate::rig::{Rig, RigError};
+use crate::sense::{Senses, Tuning};
+use crate::supervise::Monitor;
+use crate::units::TICK_HZ;
+
+/// Bandwidth of the speed observer, rad/s: three times the speed loop's crossover;
+/// an encoder count every 2 ms at crossing speed leaves it quiet enough.
+const OBSERVER_RAD_S: f64 = 60.0;
+
+/// Part of the pre-tightener's slew that the spring may use up while the wheel climbs.
+const CLIMB_PART: f64 = 0.9;
+
+impl Controller {
+    /// Turns a rig into machine units, once; fails where a parameter is out of range or does
+    /// not fit the others.
+    pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
+        rig.validate()?;
+        let tuning = Tuning { speed_bandwidth_rad_s: OBSERVER_RAD_S, ..Tuning::default() };
+        let (preload, load) = (&rig.preload, rig.plant.top_load_n * rig.plant.top_load_share);
+        Ok(Self {
+            senses: Senses::try_build_tuned(rig, &tuning)?,
+            monitor: Monitor::try_build(rig)?,
+            estimator: Estimator::try_build(rig)?,
+            vibration: VibrationObserver::try_build(rig)?,
+            skipping: true,
+            schedule: Schedule::try_build(rig)?,
+            profile: Profile::try_build(rig)?,
+            speed_loop: SpeedLoop::try_build(rig)?,
+            preload_loop: PreloadLoop::try_build(rig)?,
+            preload_timeout: ((2.0 * preload.limit_n / preload.slew_n_per_s + 1.0)
+                * f64::from(TICK_HZ)) as u32,
+            rise_speed: checked(
+                "preload.spring_n_per_mm",
+                (CLIMB_PART * preload.slew_n_per_s / preload.spring_n_per_mm).min(1000.0),
+            )?,
+            spring: checked("preload.spring_n_per_mm", preload.spring_n_per_mm)?,
+            preload_latency: checked("preload.delay_s", preload.delay_s + preload.lag_s)?,
+            load: checked("plant.top_load_n", load)?,
+            arm_thrust_max: checked(
+                "plant.arm_coupling",
+                rig.plant.arm_coupling * rig.plant.top_load_n * rig.plant.top_load_share,
+            )?,
+            inertia: checked(
+                "drive.reflected_mass_kg",
+                (rig.drive.reflected_mass_kg + rig.plant.moved_mass_kg) * 1e-3,
+            )?,
+            friction: checked("plant.mu", rig.plant.mu)?,
+        })
+    }
+
+    /// The same controller with every stage run in every tick, needed or not: its outputs are
+    /// the same to the bit.
+    pub fn without_skipping(mut self) -> Self {
+        self.skipping = false;
+        self
+    }
+}

@@ -1,0 +1,171 @@
+//! Targets of the tick, and the two loops that follow them.
+
+use super::{Controller, State, TickContext};
+use crate::control::schedule::{Course, Targets};
+use crate::numeric::divide;
+use crate::supervise::{Mode, Trigger};
+use crate::units::{
+    Direction, Millimetres, MillimetresPerSecond, MotorCommand, Newtons, NewtonsPerSecond, Q16,
+    Ratio, q16,
+};
+
+/// Slope below which a corner does not limit the speed.
+pub(super) const LEVEL_SLOPE: Ratio = q16(50_000);
+
+impl Controller {
+    /// Where the wheel is on its run.
+    pub(super) fn course(
+        &self,
+        state: &State,
+        tick: &TickContext<'_>,
+        direction: Direction,
+    ) -> Course {
+        let (steps, estimate) = (self.estimator.steps(), &state.estimate);
+        Course {
+            direction,
+            distance: steps.distance(estimate.next_step, direction, estimate.position),
+            remaining: steps.remaining(direction, estimate.position),
+            critical: estimate.critical(),
+            ramping: state.approach.ramping,
+            braking: state.approach.braking,
+            speed: state.profile.speed(),
+            acceleration: state.profile.acceleration(),
+            reference: state.preload_loop.reference(),
+            preload: tick.sensed.preload_filtered,
+        }
+    }
+
+    /// Schedule of this tick; holds preload and position while nothing runs.
+    pub(super) fn targets(&self, state: &mut State, tick: &mut TickContext<'_>) -> Targets {
+        let hold = Targets {
+            speed: Q16::ZERO,
+            preload: state.preload_loop.reference(),
+            ramping: state.approach.ramping,
+            braking: state.approach.braking,
+            approaching: false,
+            waiting: false,
+        };
+        let (direction, running) = match state.mode {
+            Mode::Preload(direction) => (direction, false),
+            Mode::Run(direction, _) => (direction, true),
+            _ => return hold,
+        };
+        let Some(plan) = state.planning.plan.as_ref() else { return hold };
+        let course = self.course(state, tick, direction);
+        let mut targets = self.schedule.targets(self.estimator.steps(), plan, &course);
+        let (step, cross_speed, cross_preload) = (plan.step, plan.cross_speed, plan.cross_preload);
+        state.approach.ramping = targets.ramping;
+        state.approach.braking = targets.braking;
+        if !running {
+            targets.speed = Q16::ZERO;
+            return targets;
+        }
+        let found = self.estimator.watch_expectation(&mut state.estimate);
+        self.take_findings(state, tick, found);
+        self.limit_climb(state, &mut targets);
+        if state.estimate.slow_down() || step != state.estimate.next_step {
+            targets.speed = targets.speed.min(cross_speed);
+            targets.preload = cross_preload;
+        }
+        self.note_preload(state, tick, cross_preload, &targets);
+        let leg = state.leg(targets.approaching);
+        if state.mode != Mode::Run(direction, leg) {
+            tick.trigger(Trigger::Leg(leg));
+        }
+        targets
+    }
+
+    /// On a corner the wheel's rise moves the spring: no faster than the pre-tightener can
+    /// follow.
+    pub(super) fn limit_climb(&self, state: &State, targets: &mut Targets) {
+        if state.estimate.on_corner() {
+            let slope = self.estimator.corner().slope(self.ahead(state, Q16::ZERO));
+            targets.speed = self.followed(targets.speed, slope);
+        }
+    }
+
+    /// `speed`, or the largest below it at which the pre-tightener still follows a spring
+    /// that moves on this slope, mm/s: `v s <= v_rise`.
+    pub(super) fn followed(
+        &self,
+        speed: MillimetresPerSecond,
+        slope: Ratio,
+    ) -> MillimetresPerSecond {
+        if slope > LEVEL_SLOPE && speed * slope > self.rise_speed {
+            speed.min(divide(self.rise_speed, slope))
+        } else {
+            speed
+        }
+    }
+
+    /// Loops and bridges: drive and pre-tightener.
+    pub(super) fn actuate(
+        &self,
+        state: &mut State,
+        tick: &TickContext<'_>,
+        targets: &Targets,
+    ) -> (MotorCommand, MotorCommand) {
+        match state.mode {
+            Mode::Run(..) | Mode::Stopping(_) => {}
+            Mode::Preload(_) => {
+                state.profile.halt();
+                state.speed_loop.reset();
+                return (MotorCommand::OFF, self.regulate(state, tick, targets, Q16::ZERO));
+            }
+            _ => {
+                state.halt();
+                return (MotorCommand::OFF, MotorCommand::OFF);
+            }
+        }
+        self.profile.step(&mut state.profile, targets.speed);
+        // Corners that are not detected are not fed forward: the table may be wrong. One that
+        // is detected is blended in, or the drive would jump.
+        let blend = state.blend_corner();
+        let wanted = state.signed_speed();
+        let (climb, drift) = if blend == Q16::ZERO {
+            (Q16::ZERO, Q16::ZERO)
+        } else {
+            self.corner(state, tick, blend)
+        };
+        let load = self.load + climb + self.inertia * state.acceleration();
+        let measured = tick.sensed.speed.value;
+        let duty = self.speed_loop.step(&mut state.speed_loop, wanted, measured, load);
+        (MotorCommand::on(duty), self.regulate(state, tick, targets, drift))
+    }
+
+    /// What a corner asks of the drive, N, and the rate at which it will move the spring, N/s.
+    fn corner(
+        &self,
+        state: &State,
+        tick: &TickContext<'_>,
+        blend: Ratio,
+    ) -> (Newtons, NewtonsPerSecond) {
+        let (corner, direction) = (self.estimator.corner(), state.estimate.direction);
+        let slope = blend * corner.drive_slope(direction, self.ahead(state, Q16::ZERO));
+        // The slope under the wheel when this tick's duty moves the screw.
+        let travel = state.signed_speed() * self.preload_latency;
+        let later = blend * corner.slope(self.ahead(state, travel));
+        (tick.pressed() * slope, self.spring * later * state.signed_speed())
+    }
+
+    fn regulate(
+        &self,
+        state: &mut State,
+        tick: &TickContext<'_>,
+        targets: &Targets,
+        drift: NewtonsPerSecond,
+    ) -> MotorCommand {
+        let measured = tick.sensed.preload.value;
+        let duty =
+            self.preload_loop.step(&mut state.preload_loop, targets.preload, measured, drift);
+        MotorCommand::on(duty)
+    }
+
+    /// Distance outwards from where the centre will be after `travel` to the face that it is
+    /// on or that is next, mm; large if there is none.
+    fn ahead(&self, state: &State, travel: Millimetres) -> Millimetres {
+        let at = state.estimate.position + travel;
+        let table = self.estimator.steps().next_face(at);
+        state.estimate.extra_face(at).or(table).unwrap_or(Q16::MAX)
+    }
+}

@@ -1,0 +1,71 @@
+//! Log entries: what happened, when.
+
+use crate::estimate::ContactStage;
+use crate::fault::{Fault, Limit};
+use crate::restart::Restart;
+use crate::supervise::{Command, Mode};
+use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Ratio, Seconds, Tick};
+
+/// One line of the log.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Entry {
+    /// When.
+    pub at: Tick,
+    /// What.
+    pub event: Event,
+}
+
+/// What can happen.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub enum Event {
+    /// The mode changed to this.
+    Mode(Mode),
+    /// The contact stage changed to this.
+    Stage(ContactStage),
+    /// A command was taken.
+    Command(Command),
+    /// A command that the present mode does not take was refused.
+    Refused(Command),
+    /// A fault was latched.
+    Fault(Fault),
+    /// A limit became active.
+    Limit(Limit),
+    /// A crossing's ledger line was closed.
+    Crossing(CrossingRecord),
+    /// So many log entries were dropped here because the journal did not keep up.
+    Lost(u32),
+    /// The board has started; what is known of the time before.
+    Restart(Restart),
+}
+
+/// Ledger line of one crossing as the controller saw it.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct CrossingRecord {
+    /// Step number, 1 at the outermost sleeve; 0 for a step that the table lacks.
+    pub index: u8,
+    /// Way of the crossing.
+    pub direction: Direction,
+    /// Where the step was found, mm of travel.
+    pub position: Millimetres,
+    /// Found position minus table, mm; 0 for a step that the table lacks.
+    pub residual: Millimetres,
+    /// Speed at floor lift-off (touch-down on retract), mm/s.
+    pub speed: MillimetresPerSecond,
+    /// Measured preload at that instant, N.
+    pub preload: Newtons,
+    /// Largest measured preload of the crossing, N.
+    pub peak_preload: Newtons,
+    /// Largest tread compression of the crossing, mm.
+    pub compression: Millimetres,
+    /// Gap that the reduced model gives for that speed and preload, mm.
+    pub gap_predicted: Millimetres,
+    /// Gap measured from compression and arm angle, mm.
+    pub gap_measured: Millimetres,
+    /// Time that the wanted preload stood before the corner touched, s; negative
+    /// when it came after.
+    pub lead_time: Seconds,
+    /// Friction that the crossing leaves unused by the model, absolute.
+    pub slip_margin: Ratio,
+    /// Stiffness scale after this crossing's correction.
+    pub stiffness_scale: Ratio,
+}

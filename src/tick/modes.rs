@@ -1,0 +1,254 @@
+//! What each mode waits for, and for how long.
+
+use super::{Controller, Event, State, TickContext};
+use crate::fault::{Fault, Limit};
+use crate::supervise::startup::{TEST_TICKS, all_answer, at_rest, silent, stowed};
+use crate::supervise::{Mode, Trigger, next};
+use crate::units::{Direction, Q16};
+
+/// Ticks for which a preload must be reached before the drive starts.
+const STANDING_TICKS: u32 = 60;
+/// Ticks after which a sensor that has not answered since boot counts as missing.
+const BOOT_TICKS: u32 = 2000;
+/// Ticks within which the wheel must come to rest for the self-test.
+const REST_TICKS: u32 = 2000;
+/// Ticks after which taking the zero counts as failed.
+const ZERO_TICKS: u32 = 2000;
+/// Ticks within which the wheel must be at rest after a stop.
+const STOP_TICKS: u32 = 1500;
+
+impl Controller {
+    /// Applies the transition that the stage asks for, and what follows from it.
+    pub(super) fn transit(&self, state: &mut State, tick: &mut TickContext<'_>) {
+        while let Some(trigger) = tick.trigger.take() {
+            let Some(mode) = next(state.mode, trigger) else { continue };
+            if let Trigger::Fault(fault) = trigger {
+                tick.log(Event::Fault(fault));
+            }
+            if mode != state.mode {
+                let before = core::mem::replace(&mut state.mode, mode);
+                state.in_mode = 0;
+                state.condition_ticks = 0;
+                tick.log(Event::Mode(mode));
+                self.enter(state, tick, before);
+            }
+        }
+    }
+
+    fn enter(&self, state: &mut State, tick: &mut TickContext<'_>, before: Mode) {
+        match state.mode {
+            Mode::SelfTest => tick.output.rearm = matches!(before, Mode::FaultHold(_)),
+            Mode::Zero => state.senses.begin_zero(),
+            Mode::Preload(direction) => self.begin_run(state, tick, direction),
+            Mode::Idle if matches!(before, Mode::SelfTest | Mode::Zero) => {
+                self.estimator.locate(&mut state.estimate, tick.sensed, before == Mode::Zero);
+            }
+            _ => {}
+        }
+    }
+
+    fn begin_run(&self, state: &mut State, tick: &mut TickContext<'_>, direction: Direction) {
+        let (found, on_corner) =
+            self.estimator.begin_run(&mut state.estimate, tick.sensed, tick.now, direction);
+        if on_corner {
+            // The drive has been off: a corner's force may be there at once, and without it
+            // the wheel would roll off before the speed loop has found it.
+            state.blend_at_once();
+        }
+        self.take_findings(state, tick, found);
+    }
+
+    /// What the present mode waits for.
+    pub(super) fn advance_mode(&self, state: &mut State, tick: &mut TickContext<'_>) {
+        state.in_mode = state.in_mode.saturating_add(1);
+        match state.mode {
+            Mode::Boot if all_answer(tick.sensed) => tick.trigger(Trigger::SensorsAnswer),
+            Mode::Boot if state.in_mode >= BOOT_TICKS => tick.fail(silent(tick.sensed)),
+            Mode::SelfTest => self.await_rest(state, tick),
+            Mode::Zero => self.await_zero(state, tick),
+            Mode::Preload(direction) => self.await_preload(state, tick, direction),
+            Mode::Run(direction, _) => self.await_arrival(state, tick, direction),
+            Mode::Stopping(_) if state.profile.speed() == Q16::ZERO && at_rest(tick.sensed) => {
+                tick.trigger(Trigger::AtRest);
+            }
+            Mode::Stopping(_) if state.in_mode >= STOP_TICKS => tick.fail(Fault::DriveRunaway),
+            _ => {}
+        }
+    }
+
+    fn await_rest(&self, state: &mut State, tick: &mut TickContext<'_>) {
+        state.condition_ticks = if at_rest(tick.sensed) { state.condition_ticks + 1 } else { 0 };
+        if state.condition_ticks >= TEST_TICKS {
+            tick.trigger(Trigger::TestPassed { stowed: stowed(tick.sensed) });
+        } else if state.in_mode >= REST_TICKS {
+            tick.fail(Fault::SelfTest);
+        }
+    }
+
+    fn await_zero(&self, state: &mut State, tick: &mut TickContext<'_>) {
+        match state.senses.zeroed() {
+            Some(true) => tick.trigger(Trigger::Zeroed),
+            None if state.in_mode < ZERO_TICKS => {}
+            _ => tick.fail(Fault::SelfTest),
+        }
+    }
+
+    fn await_preload(&self, state: &mut State, tick: &mut TickContext<'_>, direction: Direction) {
+        let begin = state.in_mode <= 1;
+        if self.estimator.rest(&mut state.estimate, tick.sensed, tick.arm_thrust, begin) {
+            tick.log(Event::Limit(Limit::TreadStrange));
+        }
+        let reached = state.planning.plan.as_ref().is_some_and(|plan| {
+            let course = self.course(state, tick, direction);
+            let wanted = self.schedule.targets(self.estimator.steps(), plan, &course).preload;
+            (tick.sensed.preload_filtered - wanted).abs() <= self.schedule.reached_within()
+        });
+        state.condition_ticks = if reached { state.condition_ticks + 1 } else { 0 };
+        if state.condition_ticks >= STANDING_TICKS {
+            tick.trigger(Trigger::PreloadStands);
+        } else if state.in_mode >= self.preload_timeout {
+            tick.fail(Fault::PreloadNotReached);
+        }
+    }
+
+    /// The end of travel, confirmed by the arm.
+    fn await_arrival(&self, state: &mut State, tick: &mut TickContext<'_>, direction: Direction) {
+        let steps = self.estimator.steps();
+        let remaining = steps.remaining(direction, state.estimate.position);
+        if !steps.arrived(remaining) || state.profile.speed() != Q16::ZERO {
+            return;
+        }
+        // A crossing still open gets its record first.
+        let found = self.estimator.close_crossing(&mut state.estimate);
+        self.take_findings(state, tick, found);
+        if state.planning.closed.is_some() {
+            return;
+        }
+        if self.estimator.confirms_end(&state.estimate, tick.sensed) {
+            tick.trigger(Trigger::Arrived);
+        } else {
+            tick.fail(Fault::LevelMismatch);
+        }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "quantities of a test")]
+mod tests {
+    use super::super::tests::{sensed, within};
+    use super::*;
+    use crate::sense::{SensedState, Validity};
+    use crate::supervise::Command;
+    use crate::units::q16;
+
+    /// Every sensor answers, and the wheel stands.
+    fn answering() -> SensedState {
+        let mut all = sensed(0, 0.0, 0.0);
+        all.speed.validity = Validity::Valid;
+        all.preload.validity = Validity::Valid;
+        all.compression.validity = Validity::Valid;
+        all.radius.validity = Validity::Valid;
+        all
+    }
+
+    fn advance(controller: &Controller, state: &mut State, tick: &mut TickContext<'_>) {
+        controller.advance_mode(state, tick);
+        controller.transit(state, tick);
+    }
+
+    #[test]
+    fn boot_waits_two_seconds_for_every_sensor() {
+        let mut state = State::default();
+        let mut deaf = answering();
+        deaf.radius.validity = Validity::Absent;
+        within(&deaf, |controller, pass| {
+            for tick in 1..2000 {
+                advance(controller, &mut state, pass);
+                assert_eq!(state.mode, Mode::Boot, "{tick}");
+            }
+            advance(controller, &mut state, pass);
+        });
+        assert_eq!(state.mode, Mode::FaultHold(Fault::AngleStale));
+        let mut state = State::default();
+        within(&answering(), |controller, pass| advance(controller, &mut state, pass));
+        assert_eq!(state.mode, Mode::SelfTest);
+    }
+
+    #[test]
+    fn a_zero_that_does_not_come_in_is_given_up_after_two_seconds() {
+        let mut state = State::default();
+        state.mode = Mode::Zero;
+        state.senses.begin_zero();
+        within(&answering(), |controller, pass| {
+            for tick in 1..2000 {
+                advance(controller, &mut state, pass);
+                assert_eq!(state.mode, Mode::Zero, "{tick}");
+            }
+            advance(controller, &mut state, pass);
+        });
+        assert_eq!(state.mode, Mode::FaultHold(Fault::SelfTest));
+    }
+
+    #[test]
+    fn a_wheel_that_does_not_stop_is_given_up_after_a_second_and_a_half() {
+        let stopping = |speed: Q16| {
+            let mut state = State::default();
+            state.mode = Mode::Stopping(Direction::Deploy);
+            let mut turning = answering();
+            turning.speed.value = speed;
+            let ticks = within(&turning, |controller, pass| {
+                (1..5000).find(|_| {
+                    advance(controller, &mut state, pass);
+                    state.mode != Mode::Stopping(Direction::Deploy)
+                })
+            });
+            (ticks, state.mode)
+        };
+        let runs = (Some(1500), Mode::FaultHold(Fault::DriveRunaway));
+        assert_eq!(stopping(q16(20_000_000)), runs);
+        assert_eq!(stopping(q16(-20_000_000)), runs);
+        assert_eq!(stopping(Q16::ZERO), (Some(1), Mode::Idle));
+    }
+
+    #[test]
+    fn a_preload_that_never_stands_is_given_up_after_twice_its_longest_rise_and_a_second() {
+        let mut rig = crate::rig::Rig::prototype();
+        for limit_n in [50.0, 60.0] {
+            rig.preload.limit_n = limit_n;
+            let controller = Controller::try_build(&rig).expect("sound");
+            let mut state = State::default();
+            state.mode = Mode::Preload(Direction::Deploy);
+            let ticks = within(&answering(), |_, pass| {
+                (1..20_000).find(|_| {
+                    advance(&controller, &mut state, pass);
+                    state.mode != Mode::Preload(Direction::Deploy)
+                })
+            });
+            assert_eq!(state.mode, Mode::FaultHold(Fault::PreloadNotReached));
+            let timeout_s = 2.0 * limit_n / rig.preload.slew_n_per_s + 1.0;
+            assert_eq!(ticks, Some((1000.0 * timeout_s) as u32));
+        }
+    }
+
+    #[test]
+    fn bridges_are_armed_again_by_a_reset_from_a_fault_alone() {
+        let idle = answering();
+        let armed = |from: Mode, trigger: Trigger| {
+            let mut state = State::default();
+            state.mode = from;
+            within(&idle, |controller, pass| {
+                assert!(next(state.mode, trigger).is_some());
+                pass.trigger(trigger);
+                controller.transit(&mut state, pass);
+                (state.mode, pass.output.rearm)
+            })
+        };
+        let reset = Trigger::Command(Command::Reset);
+        let fault = Mode::FaultHold(Fault::TickOverrun);
+        assert_eq!(armed(fault, reset), (Mode::SelfTest, true));
+        assert_eq!(armed(Mode::Boot, Trigger::SensorsAnswer), (Mode::SelfTest, false));
+        for from in [Mode::Idle, Mode::Complete(Direction::Retract)] {
+            assert_eq!(armed(from, reset), (Mode::SelfTest, false), "{from:?}");
+        }
+    }
+}

@@ -1,0 +1,209 @@
+//! The exchange with the model task, and what a tick makes of the plan.
+
+use super::{Controller, CrossingRecord, Event, State, TickContext};
+use crate::control::schedule::Targets;
+use crate::estimate::OpenCrossing;
+use crate::fault::{Fault, Limit};
+use crate::model::{Outcome, Plan, PlanRequest};
+use crate::supervise::Mode;
+use crate::units::{Newtons, Seconds, Tick, ticks_to_seconds};
+
+/// Ticks within which the model task must answer.
+const ANSWER_TICKS: u32 = 500;
+
+impl Controller {
+    /// Asks the model for the schedule of the step ahead.
+    pub(super) fn ask(&self, state: &mut State, tick: &mut TickContext<'_>) {
+        let (planning, estimate) = (&mut state.planning, &state.estimate);
+        planning.sequence = planning.sequence.wrapping_add(1);
+        planning.asked = 1;
+        if planning.plan.as_ref().is_some_and(|plan| plan.direction != estimate.direction) {
+            planning.plan = None;
+        }
+        tick.output.request = Some(PlanRequest {
+            sequence: planning.sequence,
+            direction: estimate.direction,
+            step: estimate.next_step,
+            scale: planning.scale,
+            review: planning.review,
+        });
+    }
+
+    /// Takes the model's answer if it is the one waited for.
+    pub(super) fn take_plan(
+        &self,
+        state: &mut State,
+        tick: &mut TickContext<'_>,
+        plan: Option<&Plan>,
+    ) {
+        let planning = &mut state.planning;
+        let Some(plan) = plan.filter(|plan| plan.sequence == planning.sequence) else {
+            self.await_answer(state, tick);
+            return;
+        };
+        planning.asked = 0;
+        for limit in plan.limits.into_iter().flatten() {
+            let known = planning.plan.as_ref().is_some_and(|old| old.limits.contains(&Some(limit)));
+            if !known {
+                tick.log(Event::Limit(limit));
+            }
+        }
+        if let Some(outcome) = plan.outcome.as_ref() {
+            planning.scale = outcome.scale;
+            if outcome.bounded {
+                tick.log(Event::Limit(Limit::AdaptationBounded));
+            }
+            if outcome.strange {
+                tick.log(Event::Limit(Limit::GapStrange));
+            }
+            planning.review = None;
+            if let Some(open) = planning.closed.take() {
+                record(tick, &open, outcome);
+            }
+        }
+        planning.plan = Some(*plan);
+    }
+
+    fn await_answer(&self, state: &mut State, tick: &mut TickContext<'_>) {
+        let asked = &mut state.planning.asked;
+        if *asked == 0 {
+            return;
+        }
+        *asked += 1;
+        if *asked > ANSWER_TICKS && matches!(state.mode, Mode::Preload(_) | Mode::Run(..)) {
+            *asked = 0;
+            tick.fail(Fault::ModelSilent);
+        }
+    }
+
+    /// Since when the crossing preload has been reached, and whether the drive waits for it.
+    pub(super) fn note_preload(
+        &self,
+        state: &mut State,
+        tick: &mut TickContext<'_>,
+        cross_preload: Newtons,
+        targets: &Targets,
+    ) {
+        let missing = cross_preload - tick.sensed.preload_filtered;
+        let reached = missing <= self.schedule.reached_within();
+        let approach = &mut state.approach;
+        let since = approach.standing_since.unwrap_or(tick.now);
+        approach.standing_since = reached.then_some(since);
+        approach.waiting = if targets.waiting { approach.waiting + 1 } else { 0 };
+        if targets.waiting && !approach.wait_reported {
+            approach.wait_reported = true;
+            tick.log(Event::Limit(Limit::PreloadWait));
+        }
+        if approach.waiting > self.preload_timeout {
+            tick.fail(Fault::PreloadNotReached);
+        }
+    }
+}
+
+/// Reports a crossing with the model's review.
+fn record(tick: &mut TickContext<'_>, open: &OpenCrossing, outcome: &Outcome) {
+    let Some(point) = open.lift else { return };
+    tick.log(Event::Crossing(CrossingRecord {
+        index: open.step,
+        direction: open.direction,
+        position: point.face,
+        residual: point.residual,
+        speed: point.speed,
+        preload: point.preload,
+        peak_preload: open.peak_preload,
+        compression: open.deepest,
+        gap_predicted: outcome.gap_predicted,
+        gap_measured: open.gap,
+        lead_time: lead_time(open, point.at),
+        slip_margin: outcome.slip_margin,
+        stiffness_scale: outcome.scale,
+    }));
+}
+
+/// Time for which the preload had been reached before the corner was detected; negative by how
+/// long it was still missing.
+fn lead_time(open: &OpenCrossing, lifted_at: Tick) -> Seconds {
+    match open.standing_since {
+        Some(since) => ticks_to_seconds(open.touched_at.wrapping_sub(since)),
+        None => -ticks_to_seconds(lifted_at.wrapping_sub(open.touched_at)),
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::float_arithmetic, reason = "quantities of a test")]
+mod tests {
+    use super::super::tests::{sensed, within};
+    use super::*;
+    use crate::supervise::Leg;
+    use crate::units::{Direction, q16};
+
+    /// Under way on the first wall.
+    fn running() -> State {
+        let mut state = State::default();
+        state.mode = Mode::Run(Direction::Deploy, Leg::Cruise);
+        state
+    }
+
+    #[test]
+    fn a_model_that_does_not_answer_is_given_up_after_half_a_second() {
+        let mut state = running();
+        within(&sensed(0, 0.0, 0.3), |controller, pass| {
+            controller.ask(&mut state, pass);
+            for tick in 1..500 {
+                controller.take_plan(&mut state, pass, None);
+                controller.transit(&mut state, pass);
+                assert_eq!(state.mode, running().mode, "{tick}");
+            }
+            controller.take_plan(&mut state, pass, None);
+            controller.transit(&mut state, pass);
+        });
+        assert_eq!(state.mode, Mode::FaultHold(Fault::ModelSilent));
+        // Nothing is missed that was not asked for.
+        let mut state = running();
+        within(&sensed(0, 0.0, 0.3), |controller, pass| {
+            for _ in 0..2000 {
+                controller.take_plan(&mut state, pass, None);
+                controller.transit(&mut state, pass);
+            }
+        });
+        assert_eq!(state.mode, running().mode);
+    }
+
+    #[test]
+    fn a_preload_that_never_stands_is_given_up_after_its_timeout() {
+        let mut state = running();
+        let waiting = Targets {
+            speed: q16(1_000_000),
+            preload: q16(48_000_000),
+            ramping: true,
+            braking: true,
+            approaching: true,
+            waiting: true,
+        };
+        within(&sensed(0, 0.0, 0.3), |controller, pass| {
+            let cross = waiting.preload;
+            for tick in 0..controller.preload_timeout {
+                controller.note_preload(&mut state, pass, cross, &waiting);
+                controller.transit(&mut state, pass);
+                assert_eq!(state.mode, running().mode, "{tick}");
+            }
+            // Told once.
+            let told = Event::Limit(Limit::PreloadWait);
+            assert_eq!(pass.output.events.iter().filter(|e| e.event == told).count(), 1);
+            controller.note_preload(&mut state, pass, cross, &waiting);
+            controller.transit(&mut state, pass);
+        });
+        assert_eq!(state.mode, Mode::FaultHold(Fault::PreloadNotReached));
+    }
+
+    #[test]
+    fn a_preload_that_came_too_late_has_a_negative_lead() {
+        let lead = |standing_since: Option<Tick>| {
+            let open = OpenCrossing { touched_at: 5000, standing_since, ..OpenCrossing::default() };
+            lead_time(&open, 5400).to_num::<f64>()
+        };
+        // Reached 0.25 s before the touch; or not yet when the wheel lifted, 0.4 s after it.
+        assert!((lead(Some(4750)) - 0.25).abs() < 1e-4, "{}", lead(Some(4750)));
+        assert!((lead(None) + 0.4).abs() < 1e-4, "{}", lead(None));
+    }
+}

@@ -1,0 +1,101 @@
+//! What a tick reports: findings of the estimate, contact stage, vibration, telemetry.
+
+use super::{Controller, Event, State, Telemetry, TickContext};
+use crate::control::schedule::Targets;
+use crate::estimate::crossing::Contact;
+use crate::estimate::{ContactStage, Findings};
+use crate::model::Review;
+use crate::numeric::part;
+use crate::supervise::{Leg, Mode};
+use crate::units::{Duty, MotorCommand, Q16, q16};
+
+use super::state::Approach;
+
+impl Controller {
+    /// Acts on what a stage of the estimate has found.
+    pub(super) fn take_findings(
+        &self,
+        state: &mut State,
+        tick: &mut TickContext<'_>,
+        found: Findings,
+    ) {
+        found.limits.into_iter().for_each(|limit| tick.log(Event::Limit(limit)));
+        if found.advanced {
+            state.approach = Approach::default();
+        }
+        if let Some((open, plausible)) = found.closed {
+            state.planning.closed = Some(open);
+            state.planning.review = open.lift.map(|point| Review {
+                direction: open.direction,
+                speed: point.speed,
+                preload: point.preload,
+                tan_arm: point.tan_arm,
+                gap: open.gap,
+                trusted: open.expected && plausible,
+            });
+        }
+        if found.replan {
+            self.ask(state, tick);
+        }
+        if let Some(fault) = found.fault {
+            tick.fail(fault);
+        }
+    }
+
+    /// Observes the arm's mode from the approach to a step until it is behind. The observer
+    /// starts again each time, so that what it did before does not matter.
+    pub(super) fn follow_vibration(&self, state: &mut State, tick: &TickContext<'_>) {
+        let awake = matches!(state.mode, Mode::Run(_, Leg::Approach | Leg::Crossing));
+        let compression = tick.sensed.compression.value;
+        self.vibration.track(&mut state.vibration, compression, awake, self.skipping);
+    }
+
+    pub(super) fn note_stage(&self, state: &mut State, tick: &mut TickContext<'_>) {
+        let stage = match (state.mode, state.estimate.contact()) {
+            (Mode::Run(..) | Mode::Stopping(_), Contact::Both) => ContactStage::StaticFriction,
+            (Mode::Run(..) | Mode::Stopping(_), Contact::Corner) => ContactStage::Sliding,
+            (Mode::Run(..) | Mode::Stopping(_), Contact::Leaving) => ContactStage::Rolling,
+            (Mode::Run(..) | Mode::Stopping(_), Contact::Wall) => ContactStage::Continuous,
+            (Mode::Preload(_), _) => ContactStage::Preloaded,
+            _ if tick.sensed.preload_filtered > q16(1_000_000) => state.stage,
+            _ => ContactStage::Initial,
+        };
+        if stage != state.stage {
+            state.stage = stage;
+            tick.log(Event::Stage(stage));
+        }
+    }
+
+    pub(super) fn telemetry(
+        &self,
+        state: &State,
+        tick: &TickContext<'_>,
+        targets: &Targets,
+    ) -> Telemetry {
+        let duty = |command: MotorCommand| if command.enable { command.duty } else { Duty::ZERO };
+        let crossing = matches!(state.mode, Mode::Run(_, Leg::Crossing | Leg::Approach));
+        let plan = state.planning.plan.as_ref();
+        let planned = plan.map_or(self.friction, |plan| plan.slip_margin);
+        let rolling = self.friction - part(self.load, tick.pressed());
+        let sensed = tick.sensed;
+        Telemetry {
+            at: tick.now,
+            mode: state.mode,
+            stage: state.stage,
+            position: state.estimate.position,
+            speed: sensed.speed.value,
+            speed_ref: state.signed_speed(),
+            preload: sensed.preload.value,
+            preload_ref: targets.preload,
+            compression: sensed.compression.value,
+            radius: sensed.radius.value,
+            level: state.estimate.level,
+            gap_predicted: plan.map_or(Q16::ZERO, |plan| plan.gap),
+            slip_margin: if crossing { planned.min(rolling) } else { rolling },
+            vibration: state.vibration.peak(),
+            distance: self.estimator.distance(&state.estimate).unwrap_or(Q16::MAX),
+            drive: duty(tick.output.drive),
+            pretightener: duty(tick.output.preload),
+        }
+    }
+}

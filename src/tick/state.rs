@@ -1,0 +1,166 @@
+//! What the controller remembers between ticks.
+
+use crate::control::preload_loop::PreloadLoopState;
+use crate::control::profile::ProfileState;
+use crate::control::speed_loop::SpeedLoopState;
+use crate::estimate::crossing::Contact;
+use crate::estimate::vibration::VibrationTracking;
+use crate::estimate::{ContactStage, EstimateState, OpenCrossing, Place, PositionConfidence};
+use crate::model::{Plan, Review};
+use crate::sense::SensesState;
+use crate::supervise::{Leg, Mode, MonitorState};
+use crate::units::{Direction, MillimetresPerSecond, MillimetresPerSecond2, Q16, Ratio, Tick};
+
+/// Ticks over which the feed-forward of a detected corner is blended in.
+const BLEND_TICKS: u8 = 32;
+
+/// State of the controller.
+#[derive(Clone, Debug, Default)]
+pub struct State {
+    pub(super) mode: Mode,
+    /// Ticks since the mode was entered.
+    pub(super) in_mode: u32,
+    /// Ticks for which the condition that the mode waits for has held.
+    pub(super) condition_ticks: u32,
+    pub(super) senses: SensesState,
+    pub(super) monitor: MonitorState,
+    pub(super) estimate: EstimateState,
+    pub(super) stage: ContactStage,
+    pub(super) vibration: VibrationTracking,
+    pub(super) profile: ProfileState,
+    pub(super) speed_loop: SpeedLoopState,
+    pub(super) preload_loop: PreloadLoopState,
+    pub(super) planning: Planning,
+    pub(super) approach: Approach,
+    /// Ticks for which a corner has been detected, up to [`BLEND_TICKS`].
+    corner_blend_ticks: u8,
+}
+
+/// The approach to the step ahead; it begins again with the next step and with each run.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Approach {
+    /// The preload is being raised for the step.
+    pub ramping: bool,
+    /// The speed is being brought down for the step.
+    pub braking: bool,
+    /// Since when the crossing preload has been reached.
+    pub standing_since: Option<Tick>,
+    /// Waiting for the preload has been reported.
+    pub wait_reported: bool,
+    /// Ticks for which the drive has waited for the preload.
+    pub waiting: u32,
+}
+
+/// The exchange with the model task.
+#[derive(Clone, Debug)]
+pub(super) struct Planning {
+    pub plan: Option<Plan>,
+    /// Sequence of the newest request.
+    pub sequence: u32,
+    /// Ticks for which it has waited for its answer, from 1; 0 when answered.
+    pub asked: u32,
+    /// Estimated over nominal stiffness of the tread.
+    pub scale: Ratio,
+    /// The last crossing, until its review is complete.
+    pub closed: Option<OpenCrossing>,
+    /// The review asked for and not yet answered; part of every request until then.
+    pub review: Option<Review>,
+}
+
+impl Default for Planning {
+    fn default() -> Self {
+        Self { plan: None, sequence: 0, asked: 0, scale: Q16::ONE, closed: None, review: None }
+    }
+}
+
+impl State {
+    /// A start with the wheel where a record has it, if there is one.
+    pub fn restored(record: Option<Place>) -> Self {
+        Self { estimate: EstimateState::restored(record), ..Self::default() }
+    }
+
+    /// Whether a start could go on from the position.
+    pub const fn confidence(&self) -> PositionConfidence {
+        self.estimate.confidence()
+    }
+
+    /// What the drive is doing.
+    pub const fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// Estimated over nominal stiffness of the tread.
+    pub const fn stiffness_scale(&self) -> Ratio {
+        self.planning.scale
+    }
+
+    /// Speed reference, signed outwards.
+    pub(super) fn signed_speed(&self) -> MillimetresPerSecond {
+        match self.estimate.direction {
+            Direction::Deploy => self.profile.speed(),
+            Direction::Retract => -self.profile.speed(),
+        }
+    }
+
+    /// Acceleration reference, signed outwards.
+    pub(super) fn acceleration(&self) -> MillimetresPerSecond2 {
+        match self.estimate.direction {
+            Direction::Deploy => self.profile.acceleration(),
+            Direction::Retract => -self.profile.acceleration(),
+        }
+    }
+
+    /// Part of a corner's feed-forward that is blended in, 0 to 1, after one more tick.
+    pub(super) fn blend_corner(&mut self) -> Ratio {
+        self.corner_blend_ticks = if self.estimate.on_corner() {
+            self.corner_blend_ticks.saturating_add(1).min(BLEND_TICKS)
+        } else {
+            self.corner_blend_ticks.saturating_sub(1)
+        };
+        // BLEND_TICKS is 2^5: bits of Q16 shifted.
+        Q16::from_bits(i32::from(self.corner_blend_ticks) << 11)
+    }
+
+    /// The feed-forward of a corner applies in full from now on.
+    pub(super) fn blend_at_once(&mut self) {
+        self.corner_blend_ticks = BLEND_TICKS;
+    }
+
+    /// Leg of the run.
+    pub(super) fn leg(&self, approaching: bool) -> Leg {
+        match self.estimate.contact() {
+            Contact::Both | Contact::Corner => Leg::Crossing,
+            Contact::Leaving => Leg::Settle,
+            Contact::Wall if approaching || self.estimate.is_late() => Leg::Approach,
+            Contact::Wall => Leg::Cruise,
+        }
+    }
+
+    /// Stops loops and profile where they are.
+    pub(super) fn halt(&mut self) {
+        self.profile.halt();
+        self.speed_loop.reset();
+        self.preload_loop.halt();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::q16;
+
+    #[test]
+    fn a_corner_is_blended_in_over_its_ticks_or_at_once() {
+        let mut state = State::default();
+        state.estimate.watch.contact = Contact::Both;
+        let parts: Vec<Ratio> = (0..40).map(|_| state.blend_corner()).collect();
+        assert_eq!((parts[0], parts[15], parts[31]), (q16(31_250), q16(500_000), q16(1_000_000)));
+        assert_eq!(parts[39], q16(1_000_000));
+        let mut state = State::default();
+        state.estimate.watch.contact = Contact::Corner;
+        state.blend_at_once();
+        assert_eq!(state.blend_corner(), q16(1_000_000));
+        state.estimate.watch.contact = Contact::Wall;
+        assert_eq!(state.blend_corner(), q16(968_750));
+    }
+}

@@ -1,0 +1,192 @@
+//! Tests of the control tick.
+
+use super::drive::LEVEL_SLOPE;
+use super::*;
+use crate::control::schedule::Targets;
+use crate::estimate::ContactStage;
+use crate::estimate::crossing::Contact;
+pub(super) use crate::estimate::sensed;
+use crate::rig::Rig;
+use crate::sense::Validity;
+use crate::sense::raw::{BridgeCode, BridgeCodes};
+use crate::supervise::Leg;
+use crate::units::{Direction, per_tick, q16};
+use proptest::prelude::*;
+
+/// With a stiff spring, whose pre-tightener follows at 6 mm/s of rise.
+fn stiff() -> Controller {
+    let mut rig = Rig::prototype();
+    rig.preload.spring_n_per_mm = 0.9 * rig.preload.slew_n_per_s / 6.0;
+    Controller::try_build(&rig).expect("a sound rig")
+}
+
+#[test]
+fn on_a_steep_corner_the_spring_limits_the_speed() {
+    let controller = stiff();
+    let limited = controller.followed(q16(20_000_000), q16(600_000));
+    assert!((limited - q16(10_000_000)).abs() < q16(1_000), "{limited}");
+    assert_eq!(controller.followed(q16(8_000_000), q16(600_000)), q16(8_000_000));
+    // Level wall, and down behind the edge.
+    assert_eq!(controller.followed(q16(20_000_000), Q16::ZERO), q16(20_000_000));
+    assert_eq!(controller.followed(q16(20_000_000), q16(-600_000)), q16(20_000_000));
+}
+
+proptest! {
+    #[test]
+    fn the_rise_stays_within_what_the_pretightener_follows(
+        speed in 0..100 << 16_i32,
+        slope in -(1 << 16)..1 << 16_i32,
+    ) {
+        let controller = stiff();
+        let (speed, slope) = (Q16::from_bits(speed), Q16::from_bits(slope));
+        let followed = controller.followed(speed, slope);
+        prop_assert!(followed >= Q16::ZERO && followed <= speed);
+        if slope > LEVEL_SLOPE {
+            prop_assert!(followed * slope <= controller.rise_speed + Q16::DELTA);
+        }
+        if speed * slope <= controller.rise_speed {
+            prop_assert_eq!(followed, speed);
+        }
+    }
+}
+
+/// Does something in a tick with these readings.
+pub(super) fn within<T>(
+    sensed: &SensedState,
+    act: impl FnOnce(&Controller, &mut TickContext<'_>) -> T,
+) -> T {
+    let controller = Controller::try_build(&Rig::prototype()).expect("sound");
+    let mut output = Output::default();
+    let (arm_thrust, output) = (Q16::ZERO, &mut output);
+    act(&controller, &mut TickContext { now: 0, sensed, arm_thrust, trigger: None, output })
+}
+
+#[test]
+fn a_slope_beyond_any_limits_alike_and_the_least_one_does_not() {
+    let controller = stiff();
+    // Down to 6 mm/s of rise, also where speed and slope together are less than that.
+    let limited = controller.followed(q16(2_500_000), q16(3_000_000));
+    assert!((limited - q16(2_000_000)).abs() < q16(1_000), "{limited}");
+    let fast = q16(128_000_000);
+    assert_eq!(controller.followed(fast, LEVEL_SLOPE), fast);
+    assert!(controller.followed(fast, LEVEL_SLOPE + Q16::DELTA) < fast);
+}
+
+#[test]
+fn a_reset_right_after_a_fault_is_refused() {
+    let idle = sensed(0, 0.0, 0.0);
+    for (ticks, taken) in [(0, false), (50, false), (99, false), (100, true), (5000, true)] {
+        let mut state = State::default();
+        state.mode = Mode::FaultHold(Fault::TickOverrun);
+        state.in_mode = ticks;
+        let events = within(&idle, |controller, pass| {
+            controller.take_command(&mut state, pass, Some(Command::Reset));
+            pass.output.events.clone()
+        });
+        let expected = if taken { Mode::SelfTest } else { Mode::FaultHold(Fault::TickOverrun) };
+        assert_eq!(state.mode, expected, "{ticks}");
+        let refused = events.iter().any(|e| e.event == Event::Refused(Command::Reset));
+        assert_eq!(refused, !taken, "{ticks}");
+    }
+}
+
+#[test]
+fn off_a_run_the_stage_stays_while_there_is_preload() {
+    for (preload, stage) in [
+        (q16(40_000_000), ContactStage::Rolling),
+        (q16(1_000_000) + Q16::DELTA, ContactStage::Rolling),
+        (q16(1_000_000), ContactStage::Initial),
+        (Q16::ZERO, ContactStage::Initial),
+    ] {
+        let seen = SensedState { preload_filtered: preload, ..sensed(0, 0.0, 0.3) };
+        let mut state = State::default();
+        (state.mode, state.stage) = (Mode::Idle, ContactStage::Rolling);
+        let told = within(&seen, |controller, pass| {
+            controller.note_stage(&mut state, pass);
+            pass.output.events.len()
+        });
+        assert_eq!(state.stage, stage, "{preload}");
+        assert_eq!(told, usize::from(stage != ContactStage::Rolling));
+    }
+}
+
+#[test]
+fn only_on_a_corner_the_climb_limits_the_speed() {
+    let fast = q16(60_000_000);
+    let limited = |contact: Contact| {
+        let mut state = State::default();
+        state.estimate.watch.contact = contact;
+        // Eight millimetres before the face at 18 mm.
+        state.estimate.position = Q16::from_num(10);
+        {
+            let mut targets = Targets {
+                speed: fast,
+                preload: Q16::ZERO,
+                ramping: false,
+                braking: false,
+                approaching: false,
+                waiting: false,
+            };
+            stiff().limit_climb(&state, &mut targets);
+            targets.speed
+        }
+    };
+    assert_eq!(limited(Contact::Wall), fast);
+    assert!(limited(Contact::Both) < q16(30_000_000));
+    assert!(limited(Contact::Corner) < q16(30_000_000));
+}
+
+#[test]
+fn the_duty_tells_the_load_only_at_a_steady_speed() {
+    let controller = Controller::try_build(&Rig::prototype()).expect("sound");
+    let idle = BridgeCode::of(0);
+    let input = Input {
+        sensors: SensorFrame {
+            bridges: Some(BridgeCodes { drive: idle, pretightener: idle }),
+            ..SensorFrame::default()
+        },
+        ..Input::default()
+    };
+    // At 20 mm/s, reached or on the way to 30, with an effort far beyond its band.
+    let found = |target: i32| {
+        let mut state = State::default();
+        state.mode = Mode::Run(Direction::Deploy, Leg::Cruise);
+        let wanted = Q16::from_num(target);
+        while state.profile.speed() < Q16::from_num(20) {
+            controller.profile.step(&mut state.profile, wanted);
+        }
+        if target == 20 {
+            (0..1000).for_each(|_| controller.profile.step(&mut state.profile, wanted));
+        }
+        assert_eq!(state.profile.acceleration() == Q16::ZERO, target == 20);
+        while state.speed_loop.value() < q16(200_000) {
+            controller.speed_loop.step(
+                &mut state.speed_loop,
+                Q16::from_num(20),
+                Q16::ZERO,
+                Q16::ZERO,
+            );
+        }
+        let speed = state.signed_speed();
+        let mut sensed = sensed(0, 0.0, 0.0);
+        let alive = [&mut sensed.speed, &mut sensed.preload, &mut sensed.compression];
+        alive.into_iter().for_each(|reading| reading.validity = Validity::Valid);
+        sensed.radius.validity = Validity::Valid;
+        sensed.speed.value = speed;
+        (0..300).find_map(|now| {
+            let mut output = Output::default();
+            sensed.travel += per_tick(speed);
+            sensed.speed.at = now;
+            // Codes that are alive.
+            sensed.preload.value = Q16::from_bits((now % 7) as i32);
+            sensed.compression.value = sensed.preload.value;
+            let (arm_thrust, output) = (Q16::ZERO, &mut output);
+            let mut tick = TickContext { now, sensed: &sensed, arm_thrust, trigger: None, output };
+            controller.look_for_faults(&mut state, &mut tick, &input);
+            controller.transit(&mut state, &mut tick);
+            if let Mode::FaultHold(fault) = state.mode { Some(fault) } else { None }
+        })
+    };
+    assert_eq!(found(20), Some(Fault::DutyMismatch));
+    assert_eq!(found(30), None);
+}
