@@ -9,6 +9,7 @@ mod decimate;
 mod gaps;
 pub(crate) mod ledger;
 pub(crate) mod mesh;
+mod overview;
 mod page;
 pub(crate) mod palette;
 mod panel;
@@ -21,6 +22,7 @@ use crate::record::Recording;
 
 pub use compare::{Difference, compare_html, differences};
 pub use gaps::{Published, published_svg};
+pub use overview::overview_svg;
 
 /// A section of a page beside those that every run has.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -164,7 +164,7 @@ fn directory(args: &Args, scenario: &Scenario) -> Result<PathBuf, Failure> {
     Ok(directory)
 }
 
-/// Writes logs, summary and the page with these sections more.
+/// Writes logs, summary, the page with these sections more, and the run in one picture.
 pub fn write(
     recording: &Recording,
     more: &[report::Section],
@@ -173,7 +173,10 @@ pub fn write(
     let mut files = record::write_all(recording, directory)?;
     let page = directory.join("report.html");
     write_text(&page, &report::html(recording, more))?;
+    let picture = directory.join("overview.svg");
+    write_text(&picture, &report::overview_svg(recording))?;
     files.insert(0, page);
+    files.push(picture);
     Ok(files)
 }
 

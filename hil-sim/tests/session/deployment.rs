@@ -60,7 +60,7 @@ fn every_drawn_rig_completes_without_fault_or_slip() {
         assert!(summary.slip_mm < NO_SLIP_MM, "{}: {}", run.name(), summary.slip_mm);
         let odd = summary.limits.iter().find(|limit| STEP_CODES.contains(&limit.code));
         assert_eq!(odd, None, "{}", run.name());
-        let end = run.recording.rows.last().expect("rows").position_true_mm;
+        let end = run.recording.rows.last().expect("rows").position_mm();
         let off = end - end_mm(&run.scenario, run.scenario.run.direction);
         assert!(off.abs() < 0.5, "{}: {off} mm from the end", run.name());
         // Between cruise speed throughout and 17 mm/s on average.
