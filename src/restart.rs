@@ -14,8 +14,8 @@ mod snapshot;
 
 pub use crash::{Crash, Stopped};
 pub use missed::MissedCheckIns;
-pub use report::{Place, Reset, Restart};
-pub use snapshot::{DriveSnapshot, PackedSpeed, PositionConfidence, later};
+pub use report::{Reset, Restart};
+pub use snapshot::{DriveSnapshot, PackedSpeed, later};
 
 /// Words of a [`DriveSnapshot`].
 pub const SNAPSHOT_WORDS: usize = 5;

@@ -2,7 +2,6 @@
 
 use crate::common::{Bench, Operator, Record, forever, now_ms};
 use embassy_time::Duration;
-use interstage::control::Output;
 use interstage::fault::Fault;
 use interstage::hal::Light;
 use interstage::log::{Identity, LogEncoder};
@@ -10,6 +9,7 @@ use interstage::model::{PlanRequest, Planner};
 use interstage::rig::Rig;
 use interstage::supervise::{Command, Mode};
 use interstage::tasks::{self, COMMANDS, ENTRIES, Exchange};
+use interstage::tick::Output;
 use interstage::tick::Telemetry;
 use interstage::tick::{Entry, Event};
 use interstage::units::{Direction, Ratio};

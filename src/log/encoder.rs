@@ -138,7 +138,7 @@ mod tests {
     use crate::model::{Outcome, Plan, PlanRequest, Review};
     use crate::supervise::Mode;
     use crate::tick::CrossingRecord;
-    use crate::tick::{Input, Output};
+
     use crate::units::{Direction, Q16};
 
     /// A channel that keeps what it is sent, as long as it has room.

@@ -1,8 +1,9 @@
 //! From a tick's row to what a restart finds of it.
 
-use super::telemetry::Telemetry;
-use crate::restart::{DriveSnapshot, MissedCheckIns, PackedSpeed, PositionConfidence};
+use crate::estimate::PositionConfidence;
+use crate::restart::{DriveSnapshot, MissedCheckIns, PackedSpeed};
 use crate::supervise::{Mode, codes};
+use crate::tick::Telemetry;
 
 /// Makes a [`DriveSnapshot`] of each tick. It remembers the last fault beyond its hold.
 #[derive(Clone, Copy, Debug, Default)]
@@ -37,7 +38,9 @@ impl SnapshotRecorder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::supervise::{Direction, Fault, Leg};
+    use crate::fault::Fault;
+    use crate::supervise::Leg;
+    use crate::units::Direction;
     use crate::units::Q16;
 
     #[test]

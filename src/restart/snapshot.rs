@@ -6,7 +6,6 @@ use super::{MissedCheckIns, SNAPSHOT_WORDS, check};
 use crate::estimate::PositionConfidence;
 use crate::supervise::Mode;
 use crate::supervise::codes;
-use crate::tick::Telemetry;
 use crate::units::{Millimetres, MillimetresPerSecond, Q16, Tick};
 
 /// Reference of the speed in a tick, signed outwards, in 1/32 mm/s, and in the last bit

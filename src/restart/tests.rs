@@ -1,7 +1,6 @@
 //! Records as words, and what a start makes of them.
 
 use super::*;
-use crate::estimate::PositionConfidence;
 use crate::fault::Fault;
 use crate::units::Q16;
 use proptest::prelude::*;

@@ -1,8 +1,10 @@
 //! Modes, stages and commands as numbers of the log. Numbers are stable: none is ever
 //! given a second meaning.
 
-use super::{Command, Direction, Fault, Mode};
+use super::{Command, Mode};
 use crate::estimate::ContactStage;
+use crate::fault::Fault;
+use crate::units::Direction;
 
 /// Number of a mode: its place in [`Mode::WITHOUT_FAULT`], or the code of the fault that
 /// is held, 101 to 160. Called every tick, so that it does not look for that place.
