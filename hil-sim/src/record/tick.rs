@@ -97,6 +97,7 @@ pub struct Controller {
     /// Number of the mode, see [`MODE_NAMES`].
     pub mode: u8,
     /// The mode is one of retraction.
+    #[serde(with = "bit")]
     pub retracts: bool,
     /// Code of the fault that is held; 0 for none.
     pub fault: u8,
@@ -155,9 +156,24 @@ pub struct Controller {
     /// Duty of the pre-tightener, -1 to 1.
     pub pretightener_duty: f64,
     /// The drive's bridge is on.
+    #[serde(with = "bit")]
     pub drive_on: bool,
     /// The pre-tightener's bridge is on.
+    #[serde(with = "bit")]
     pub pretightener_on: bool,
+}
+
+/// Yes and no as 1 and 0, so that every column is a number.
+mod bit {
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    pub(super) fn serialize<S: Serializer>(bit: &bool, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_u8((*bit).into())
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<bool, D::Error> {
+        u8::deserialize(from).map(|bit| bit != 0)
+    }
 }
 
 impl Default for Controller {
