@@ -24,6 +24,7 @@ mod probe;
 pub mod replay;
 mod report;
 pub mod scenario;
+pub mod source;
 mod stress;
 mod test;
 

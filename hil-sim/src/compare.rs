@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::record::Summary;
 use crate::scenario::{ControllerKind, Scenario};
-use crate::sil::{Options, RunError, run};
+use crate::session::{Options, RunError, run};
 
 /// Slip of a run that counts as an event, mm.
 pub const SLIP_EVENT_MM: f64 = 0.05;
@@ -63,7 +63,7 @@ pub struct Entry {
     pub wear_j: f64,
 }
 
-/// The whole comparison.
+/// A comparison.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Comparison {
     /// Rigs drawn.
@@ -147,7 +147,7 @@ impl Bench<'_> {
     /// The reserve at which the scheduled strategy's worst gap meets the reference.
     fn tune_reserve(&self, reference: f64) -> Result<Entry, RunError> {
         let kind = ControllerKind::Scheduled;
-        // A smaller reserve gives a larger gap: the tuning variable runs the other way.
+        // A smaller reserve gives a larger gap: the tuning variable runs in the other direction.
         self.tune(reference, (-MOST_RESERVE, 0.0), |x| {
             self.evaluate(kind, Policy::StepAware, None, -x)
         })
@@ -333,7 +333,7 @@ mod tests {
         for policy in [Policy::StepAware, Policy::OneSpeed] {
             assert!(comparison.speed_up(ControllerKind::Constant, policy).unwrap() > 1.3);
         }
-        // At the same speed what counts is the preload that stands at the step.
+        // At the same speed what counts is the preload at the step.
         let gap = |name| {
             let entry = comparison.equal_speed.iter().find(|e| e.controller == name).unwrap();
             assert_eq!(entry.crossing_speed_mm_s, Some(EQUAL_SPEED_MM_S));

@@ -36,14 +36,14 @@ pub enum HilError {
     /// The plant left the set of meaningful states.
     #[error(transparent)]
     Plant(#[from] PlantError),
-    /// Nobody answers who knows this protocol.
+    /// Nothing answers in this protocol.
     #[error("the board does not answer: it takes firmware with the feature `hil` of this version")]
     NoAnswer,
     /// The board fell silent.
     #[error("the board fell silent at tick {0}")]
     Silent(u32),
     /// The board is not where this host is.
-    #[error("the board is at tick {board}, this host at {host}: it was started anew meanwhile")]
+    #[error("the board is at tick {board}, this host at {host}: it has restarted meanwhile")]
     Apart {
         /// The board's next tick.
         board: u32,
@@ -72,6 +72,6 @@ pub enum HilError {
         scenario_hash: String,
     },
     /// Not every tick has come back in the log.
-    #[error("the log lacks tick {0}, so that the run cannot be told")]
+    #[error("the log lacks tick {0}, so that the run cannot be reported")]
     Incomplete(u32),
 }

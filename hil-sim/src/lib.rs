@@ -1,17 +1,15 @@
 //! The virtual rig: a physical plant for the controller, the scenarios it is run
 //! in, and what is shown of a run.
 
-pub mod capture;
 pub mod cli;
 pub mod compare;
-pub mod export;
 pub mod faults;
+pub mod files;
 pub mod firmware;
 pub mod hil;
 pub mod identify;
 pub mod injector;
 pub mod live;
-pub mod log;
 pub mod montecarlo;
 pub mod params;
 pub mod plant;
@@ -22,7 +20,7 @@ pub mod record;
 pub mod replay;
 pub mod report;
 pub mod scenario;
-pub mod sil;
+pub mod session;
 pub mod stress;
 pub mod table;
 pub mod testing;

@@ -1,9 +1,7 @@
 //! A log under way on the screen and on the network.
 
-mod picture;
 mod screen;
 mod server;
 
-pub use picture::svg;
 pub use screen::Screen;
-pub use server::{Server, Topic};
+pub use server::Server;

@@ -10,7 +10,7 @@ use serde::Serialize;
 use crate::record::{Report, Summary};
 use crate::report::verdict::SLIP_SEEN_MM;
 use crate::scenario::Scenario;
-use crate::sil::{self, Options, RunError};
+use crate::session::{self, Options, RunError};
 
 pub use outcome::{Least, LimitCount, Outcome, Quantiles, SeedReport};
 pub use shard::{Shard, ShardError};
@@ -30,7 +30,7 @@ pub struct RunLine {
     pub gap_over_ref: Option<f64>,
     /// Crossings with gross slip, or 1 if the run slipped but none of them did.
     pub slip_events: usize,
-    /// Least time for which the wanted preload stood before a corner touched, s.
+    /// Least time by which the preload was reached before a corner touched, s.
     pub least_lead_s: Option<f64>,
     /// Least of the plant's friction less the utilisation at its peak in a crossing.
     pub least_slip_margin: Option<f64>,
@@ -79,7 +79,7 @@ pub fn slip_events(summary: &Summary) -> usize {
 }
 
 /// Runs `scenario` once for each of `seeds`, on all processors, and calls `done`
-/// after each run. The lines stand in the order of the seeds and do not depend on
+/// after each run. The lines are in the order of the seeds and do not depend on
 /// the number of processors.
 ///
 /// # Errors
@@ -103,7 +103,7 @@ pub fn run(
 fn one(scenario: &Scenario, seed: u64) -> Result<RunLine, RunError> {
     let mut scenario = scenario.clone();
     scenario.run.seed = seed;
-    match sil::run(&scenario, Options::default()) {
+    match session::run(&scenario, Options::default()) {
         Ok(recording) => Ok(RunLine::new(recording.summary, scenario.plant().mu)),
         Err(error @ (RunError::Plant(_) | RunError::Refused(_))) => {
             Ok(RunLine { seed, error: Some(error.to_string()), ..RunLine::default() })
@@ -112,7 +112,7 @@ fn one(scenario: &Scenario, seed: u64) -> Result<RunLine, RunError> {
     }
 }
 
-/// What a limit's code stands for.
+/// The sentence of a limit's code.
 fn limit_text(code: u16) -> &'static str {
     let known = Limit::ALL.into_iter().find(|limit| limit.code() == code);
     known.map_or("unknown limit", Limit::sentence)

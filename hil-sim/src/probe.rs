@@ -1,15 +1,17 @@
 //! A debug probe as everything here needs it: rings in the board's memory, a reset, and
 //! memory itself. One interface, a real probe or the emulated board behind it.
 
-mod patient;
 #[cfg(feature = "probe")]
 mod real;
+mod reconnecting;
 
 use std::time::Duration;
 
-pub use patient::Patient;
 #[cfg(feature = "probe")]
 pub use real::RealPort;
+pub use reconnecting::ReconnectingPort;
+#[cfg(test)]
+pub(crate) use reconnecting::tests as script;
 
 /// Why a port did not do it. Each is one line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -25,13 +27,13 @@ pub enum PortError {
     Board(String),
 }
 
-/// The way to a board.
+/// The connection to a board.
 pub trait Port {
     /// Takes what an RTT channel has sent up; nothing before the firmware has set its
     /// channels up.
     ///
     /// # Errors
-    /// [`PortError`] if the way is broken, or the image has no such channel.
+    /// [`PortError`] if the connection is broken, or the image has no such channel.
     fn up(&mut self, channel: u32) -> Result<Vec<u8>, PortError>;
 
     /// Sends bytes down an RTT channel, as many as there is room for; gives how many.
@@ -40,7 +42,7 @@ pub trait Port {
     /// As [`Port::up`].
     fn down(&mut self, channel: u32, bytes: &[u8]) -> Result<usize, PortError>;
 
-    /// Starts the board anew.
+    /// Resets the board.
     ///
     /// # Errors
     /// As [`Port::up`].

@@ -5,11 +5,11 @@ use interstage::log::Record;
 use interstage::model::{Plan, PlanRequest, Planner};
 use interstage::rig::{Rig, RigError};
 use interstage::supervise::Mode;
-use interstage::tick::{Controller, Entry, Event, Input, Output, State, Telemetry};
+use interstage::tick::{Controller, Entry, Event, Input, Output, State};
 use serde::Serialize;
+use serde_json::Value;
 
-use crate::log::{Mark, Row, Run, Since};
-use crate::record::STAGE_NAMES;
+use crate::record::{self, Controller as Columns, Mark, Run, Since};
 
 /// What came of a replay.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -91,7 +91,7 @@ pub fn replay(run: &Run, rig: &Rig) -> Result<Replayed, RigError> {
                     replay.begin();
                 }
                 // What is no frame was none before either; ticks that never ran are
-                // told by the flag of the one that did.
+                // known by the flag of the one that did.
                 Mark::Garbage { .. } | Mark::Overrun { .. } => {}
                 Mark::Lost { .. }
                 | Mark::Skipped { .. }
@@ -117,11 +117,11 @@ pub fn replay(run: &Run, rig: &Rig) -> Result<Replayed, RigError> {
 
 /// A table of rows does not say where it begins; its first mode does.
 fn starts_late(run: &Run) -> bool {
-    let first = run.rows.first().and_then(Row::telemetry);
+    let first = run.rows.first().and_then(Columns::telemetry);
     first.is_some_and(|seen| !matches!(seen.mode, Mode::Boot | Mode::SelfTest))
 }
 
-/// A replay under way.
+/// A replay in progress.
 struct Replay<'a> {
     planner: Planner,
     /// What the log has of the present start.
@@ -140,7 +140,7 @@ impl Replay<'_> {
     }
 
     /// Runs a tick again; the first thing that differs.
-    fn tick(&mut self, controller: &Controller, row: &Row) -> Option<Difference> {
+    fn tick(&mut self, controller: &Controller, row: &Columns) -> Option<Difference> {
         let flags = row.flags();
         let input = Input {
             now: row.tick,
@@ -179,13 +179,10 @@ impl Replay<'_> {
         Some((*recorded, self.planner.plan(request)))
     }
 
-    fn compare(&mut self, row: &Row, input: &Input, output: &Output) -> Option<Difference> {
+    fn compare(&mut self, row: &Columns, input: &Input, output: &Output) -> Option<Difference> {
         let differs = |stage, quantity, recorded: String, replayed: String| Difference {
             tick: row.tick,
-            contact: STAGE_NAMES
-                .get(usize::from(row.stage).wrapping_sub(1))
-                .copied()
-                .unwrap_or("unknown stage"),
+            contact: record::stage_name(row.stage),
             stage,
             quantity,
             recorded,
@@ -201,16 +198,22 @@ impl Replay<'_> {
             let (recorded, replayed) = (format!("{recorded:?}"), format!("{replayed:?}"));
             return Some(differs("planner", "plan", recorded, replayed));
         }
-        for Quantity { stage, name, of } in QUANTITIES {
-            let (recorded, replayed) = (of(&seen), of(&output.telemetry));
-            if recorded != replayed {
-                return Some(differs(stage, name, recorded.to_string(), replayed.to_string()));
+        let again = Record::of(input, output);
+        if seen != output.telemetry {
+            let (recorded, replayed) =
+                (columns(row), columns(&Columns::of(&again, &input.sensors)));
+            let stages =
+                STAGES.iter().flat_map(|(stage, names)| names.iter().map(|n| (*stage, *n)));
+            for (stage, name) in stages {
+                if recorded[name] != replayed[name] {
+                    let (recorded, replayed) = (&recorded[name], &replayed[name]);
+                    return Some(differs(stage, name, recorded.to_string(), replayed.to_string()));
+                }
             }
         }
-        let again = Record::of(input, output).flags;
-        if again != row.flags() {
+        if again.flags != row.flags() {
             let bits = |bits: u16| format!("{bits:#018b}");
-            let (recorded, replayed) = (bits(row.flags), bits(again.to_bits()));
+            let (recorded, replayed) = (bits(row.flags), bits(again.flags.to_bits()));
             return Some(differs("bridges, requests and entries", "flags", recorded, replayed));
         }
         let asked = self.since.requests.iter().find(|(at, _)| *at == row.tick);
@@ -243,58 +246,22 @@ impl Replay<'_> {
     }
 }
 
-/// A quantity of the state after a tick, and the stage of the tick that gives it.
-struct Quantity {
-    stage: &'static str,
-    name: &'static str,
-    of: fn(&Telemetry) -> Value,
+/// The columns of a row by their names.
+fn columns(row: &Columns) -> Value {
+    serde_json::to_value(row).unwrap_or_default()
 }
 
-/// A value of a quantity: shown as it reads, compared by its bits.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Value {
-    Fixed(interstage::units::Q16),
-    Whole(i32),
-    Mode(Mode),
-}
-
-impl std::fmt::Display for Value {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Fixed(value) => {
-                write!(f, "{:.6} ({:#010x})", value.to_num::<f64>(), value.to_bits())
-            }
-            Self::Whole(value) => write!(f, "{value}"),
-            Self::Mode(mode) => write!(f, "{mode:?}"),
-        }
-    }
-}
-
-/// In the order of the tick's stages.
-const QUANTITIES: [Quantity; 16] = {
-    use Value::{Fixed, Mode, Whole};
-    const fn of(stage: &'static str, name: &'static str, of: fn(&Telemetry) -> Value) -> Quantity {
-        Quantity { stage, name, of }
-    }
-    [
-        of("sensing", "speed, mm/s", |t| Fixed(t.speed)),
-        of("sensing", "preload, N", |t| Fixed(t.preload)),
-        of("sensing", "compression, mm", |t| Fixed(t.compression)),
-        of("sensing", "radius, mm", |t| Fixed(t.radius)),
-        of("odometry", "position, mm", |t| Fixed(t.position)),
-        of("mode", "mode", |t| Mode(t.mode)),
-        of("contact", "contact stage", |t| Whole(t.stage as i32)),
-        of("contact", "level", |t| Whole(i32::from(t.level))),
-        of("contact", "distance, mm", |t| Fixed(t.distance)),
-        of("plan", "gap predicted, mm", |t| Fixed(t.gap_predicted)),
-        of("schedule", "preload wanted, N", |t| Fixed(t.preload_ref)),
-        of("schedule", "speed wanted, mm/s", |t| Fixed(t.speed_ref)),
-        of("schedule", "slip margin", |t| Fixed(t.slip_margin)),
-        of("loops", "drive duty, Q15", |t| Whole(i32::from(t.drive.to_bits()))),
-        of("loops", "pre-tightener duty, Q15", |t| Whole(i32::from(t.pretightener.to_bits()))),
-        of("vibration", "amplitude, mm", |t| Fixed(t.vibration)),
-    ]
-};
+/// The stages of a tick in their order, each with the columns that it gives.
+const STAGES: [(&str, &[&str]); 8] = [
+    ("sensing", &["wheel_speed_mm_s", "preload_n", "compression_mm", "radius_mm"]),
+    ("odometry", &["position_mm"]),
+    ("mode", &["mode", "retracts", "fault"]),
+    ("contact", &["stage", "level", "distance_mm"]),
+    ("plan", &["gap_predicted_mm"]),
+    ("schedule", &["preload_ref_n", "speed_ref_mm_s", "slip_margin"]),
+    ("loops", &["drive_duty", "pretightener_duty"]),
+    ("vibration", &["vibration_mm"]),
+];
 
 #[cfg(test)]
 mod tests {
@@ -302,15 +269,15 @@ mod tests {
 
     use super::*;
     use crate::scenario::Scenario;
-    use crate::sil;
+    use crate::session;
 
     fn stream() -> &'static [u8] {
         static STREAM: OnceLock<Vec<u8>> = OnceLock::new();
         STREAM.get_or_init(|| {
             let sets = ["run.seed=4".to_owned()];
             let scenario = Scenario::resolve(Some("prototype"), None, &sets).unwrap();
-            let options = sil::Options { rows: true, ..sil::Options::default() };
-            sil::run(&scenario, options).unwrap().stream
+            let options = session::Options { rows: true, ..session::Options::default() };
+            session::run(&scenario, options).unwrap().stream
         })
     }
 
@@ -347,19 +314,19 @@ mod tests {
     fn a_changed_code_is_found_where_it_first_matters() {
         let mut run = Run::of_stream(stream());
         let place = run.rows.len() / 2;
-        run.rows[place].tread_code = run.rows[place].tread_code.map(|code| code ^ 0x20);
+        run.rows[place].compression_code = run.rows[place].compression_code.map(|code| code ^ 0x20);
         let result = replay(&run, &Rig::prototype()).unwrap();
         let difference = result.difference.expect("different");
         assert_eq!((difference.tick, difference.stage), (run.rows[place].tick, "sensing"));
-        assert_eq!(difference.quantity, "compression, mm");
+        assert_eq!(difference.quantity, "compression_mm");
         assert_eq!(result.ticks as usize, place + 1);
     }
 
     #[test]
     fn a_start_from_the_record_of_the_run_before_is_run_again_from_there() {
         let scenario = Scenario::resolve(Some("prototype"), None, &[]).unwrap();
-        let options = sil::Options { rows: true, ..sil::Options::default() };
-        let mut session = sil::Session::new(&scenario, options).unwrap();
+        let options = session::Options { rows: true, ..session::Options::default() };
+        let mut session = session::Session::new(&scenario, options).unwrap();
         let mut bytes = Vec::new();
         for _ in 0..2 {
             let mut left = Some(interstage::supervise::Command::Start);
@@ -371,7 +338,7 @@ mod tests {
             session.restart();
         }
         let run = Run::of_stream(&bytes);
-        assert_eq!(run.tally.restarts, 1);
+        assert_eq!(run.counts.restarts, 1);
         let place = run.since_boot(1).restart().and_then(|restart| restart.place());
         assert!(
             place
@@ -392,24 +359,40 @@ mod tests {
     }
 
     #[test]
+    fn every_column_of_the_state_belongs_to_a_stage() {
+        let staged: Vec<&str> =
+            STAGES.iter().flat_map(|(_, names)| names.iter().copied()).collect();
+        let row = columns(&Columns::default());
+        let row = row.as_object().unwrap();
+        assert!(staged.iter().all(|name| row.contains_key(*name)));
+        let given = |name: &str| {
+            ["tick", "t_s", "command", "flags"].contains(&name)
+                || ["_code", "_at", "_on"].iter().any(|end| name.ends_with(end))
+        };
+        let missing: Vec<_> =
+            row.keys().filter(|n| !given(n) && !staged.contains(&&n[..])).collect();
+        assert!(missing.is_empty(), "{missing:?}");
+    }
+
+    #[test]
     fn another_rig_differs() {
         let mut rig = Rig::prototype();
         rig.sense.angle_zero_code += 2.0;
         let result = replay(&Run::of_stream(stream()), &rig).unwrap();
         assert!(!result.is_equal());
-        assert_eq!(result.difference.map(|difference| difference.quantity), Some("radius, mm"));
+        assert_eq!(result.difference.map(|difference| difference.quantity), Some("radius_mm"));
     }
 
     #[test]
     fn ticks_behind_a_gap_are_not_taken_for_equal() {
-        let frames: Vec<&[u8]> = crate::log::pieces(stream()).collect();
+        let frames: Vec<&[u8]> = crate::record::pieces(stream()).collect();
         let torn = [&frames[..40], &frames[41..]].concat().concat();
         let run = Run::of_stream(&torn);
         let result = replay(&run, &Rig::prototype()).unwrap();
         assert!(result.difference.is_none() && !result.is_equal());
         assert!(matches!(result.missing, Some((_, Mark::Lost { frames: 1, .. }))));
         assert_eq!(result.ticks + result.blind, run.rows.len() as u64);
-        // A target that starts anew is known again.
+        // After a restart the state is known again.
         let twice = [&torn[..], stream()].concat();
         let result = replay(&Run::of_stream(&twice), &Rig::prototype()).unwrap();
         assert!(result.ticks > result.blind && result.difference.is_none());

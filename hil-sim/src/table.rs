@@ -6,7 +6,9 @@ use std::path::PathBuf;
 use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
 use comfy_table::{Cell, CellAlignment, ContentArrangement, Table, TableComponent};
 
+use crate::cli::output::wrote;
 use crate::record::{CrossingLine, Report, Summary};
+use crate::report::ledger::COLUMNS;
 use crate::report::verdict::{gap_sentence, headline};
 
 /// Most columns that the output takes.
@@ -22,18 +24,14 @@ pub fn run(summary: &Summary, files: &[PathBuf]) -> String {
         text += &format!("{}\n", ledger(&summary.crossings));
     }
     for fault in &summary.injected {
-        text += &wrapped(&format!("brought about: {fault}"), "  ");
+        text += &wrapped(&format!("injected: {fault}"), "  ");
     }
     for (kind, reports) in [("fault", &summary.faults), ("limit", &summary.limits)] {
         for report in reports {
             text += &wrapped(&report_line(kind, report), "  ");
         }
     }
-    for file in files {
-        // Paths are not wrapped, so that they can be copied.
-        text += &format!("  wrote {}\n", file.display());
-    }
-    text
+    text + &wrote(files)
 }
 
 /// A table of `head` and `rows` in the style of the others, its first column on the
@@ -75,34 +73,14 @@ fn details(s: &Summary) -> String {
 }
 
 fn ledger(crossings: &[CrossingLine]) -> Table {
-    const HEAD: [&str; 10] = [
-        "step",
-        "speed\nmm/s",
-        "preload\nN",
-        "gap\nmm",
-        "predicted\nmm",
-        "measured\nmm",
-        "corner\nN",
-        "lead\ns",
-        "slip\nmm",
-        "step at (found)\nmm",
-    ];
-    plain(&HEAD, crossings.iter().map(ledger_row))
-}
-
-fn ledger_row(c: &CrossingLine) -> Vec<String> {
-    vec![
-        c.index.to_string(),
-        number(c.speed_mm_s, 2),
-        number(c.preload_n, 1),
-        number(c.gap_mm, 3),
-        number(c.gap_predicted_mm, 3),
-        number(c.gap_measured_mm, 3),
-        number(c.corner_force_n, 1),
-        number(c.lead_time_s, 3),
-        number(c.slip_mm, 3),
-        format!("{} ({})", number(c.step_mm, 2), number(c.step_found_mm, 2)),
-    ]
+    let columns = || COLUMNS.iter().filter(|column| column.on_terminal);
+    let names: Vec<String> = columns().map(|c| format!("{}\n{}", c.name, c.unit)).collect();
+    let head: Vec<&str> = std::iter::once("step").chain(names.iter().map(String::as_str)).collect();
+    let rows = crossings.iter().map(|line| {
+        let cells = columns().map(|column| number((column.of)(line), column.decimals));
+        std::iter::once(line.index.to_string()).chain(cells).collect()
+    });
+    plain(&head, rows)
 }
 
 /// `value` with `decimals`; a dash if it is missing or no number.
@@ -154,8 +132,9 @@ mod tests {
         let summary = example::deploy().summary;
         let text = run(&summary, &[PathBuf::from("out/run/report.html")]);
         let c = &summary.crossings[1];
-        let line = text.lines().find(|line| line.contains("39.80 (39.68)")).expect(&text);
-        assert!(line.contains(&format!("{:.3}", c.gap_mm)), "{line}");
+        let gap = format!(" {:.4} ", c.gap_mm);
+        let line = text.lines().find(|line| line.contains(&gap)).expect(&text);
+        assert!(line.contains(&format!(" {:.2} ", c.step_mm)), "{line}");
         assert!(line.contains(" - "), "the missing measurement is shown: {line}");
         assert!(text.ends_with("  wrote out/run/report.html\n"));
     }

@@ -1,7 +1,7 @@
 //! `rig crossing`: one isolated crossing at constant speed and preload.
 
 use clap::ValueEnum;
-use interstage::model::felt::Kind;
+use interstage::model::effective_stiffness::Kind;
 use interstage::model::formula::{Formula, LEAST_RUN};
 use interstage::model::reduced::{Point, ReducedModel, Scale};
 use interstage::rig::Rig;

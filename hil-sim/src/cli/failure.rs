@@ -5,12 +5,12 @@ use std::process::ExitCode;
 
 use interstage::rig::RigError;
 
-use crate::export::ExportError;
+use crate::files::FileError;
 use crate::firmware::FirmwareError;
 use crate::plant::balance::BalanceError;
 use crate::provision::ProvisionError;
 use crate::scenario::ScenarioError;
-use crate::sil::RunError;
+use crate::session::RunError;
 
 /// How a verb ended that did its work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -93,8 +93,8 @@ impl From<RigError> for Failure {
     }
 }
 
-impl From<ExportError> for Failure {
-    fn from(error: ExportError) -> Self {
+impl From<FileError> for Failure {
+    fn from(error: FileError) -> Self {
         Self::input(error)
     }
 }

@@ -14,7 +14,7 @@ use crate::identify::record::Record;
 use crate::identify::result::{Identification, Parameter, Residuals, identify};
 use crate::scenario::{PRESETS, Scenario};
 use crate::table::{number, plain};
-use crate::{export, progress};
+use crate::{files, progress};
 
 /// Identifies a rig's parameters from its logs, with 95 % intervals.
 ///
@@ -97,14 +97,14 @@ fn write(
     records: &[Record],
     directory: &Path,
 ) -> Result<Vec<PathBuf>, Failure> {
-    export::make_directory(directory)?;
+    files::make_directory(directory)?;
     let mut files = vec![directory.join("identified.toml")];
-    export::write_text(&files[0], &found.to_toml())?;
+    files::write_text(&files[0], &found.to_toml())?;
     for (index, record) in records.iter().enumerate() {
         let rows: Vec<&Residuals> =
             found.residuals.iter().filter(|of| of.log == record.name).collect();
         let path = directory.join(format!("residuals-{}.svg", index + 1));
-        export::write_text(&path, &plot::svg(&rows))?;
+        files::write_text(&path, &plot::svg(&rows))?;
         files.push(path);
     }
     Ok(files)

@@ -1,26 +1,17 @@
-//! `rig live`: a log under way, on the terminal and on the network.
+//! `rig live`: a log as it grows, on the terminal and on the network.
 
-use std::fs::File;
 use std::io::IsTerminal;
-use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use ratatui::Terminal;
-use ratatui::backend::TestBackend;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers};
 
 use super::failure::{Failure, Outcome};
-use super::scenario::RunArgs;
-use crate::capture::{Bytes, Source, Virtual, messages};
-use crate::export::write_text;
-use crate::live::{Screen, Server, svg};
-use crate::log::Decoder;
-use crate::scenario::Scenario;
+use super::source::SourceArgs;
+use crate::live::{Screen, Server};
+use crate::record::{Decoder, Item, Source, messages};
 
-/// Time between two pictures of the screen.
+/// Time between two frames of the screen.
 const REDRAW: Duration = Duration::from_millis(50);
-/// Size of the picture that `--picture` writes, cells.
-const PICTURE: (u16, u16) = (110, 36);
 
 /// Shows the controller's log as it comes: plots, contact stage, faults, and keys for
 /// start, stop and retract.
@@ -29,17 +20,9 @@ const PICTURE: (u16, u16) = (110, 36);
 /// and PlotJuggler.
 #[derive(Debug, clap::Args)]
 pub struct Args {
+    /// Where the log comes from.
     #[command(flatten)]
-    run: RunArgs,
-
-    /// Shows a recorded stream of the binary channel, as fast as it was.
-    #[arg(long, value_name = "FILE", conflicts_with = "target")]
-    stream: Option<PathBuf>,
-
-    /// What runs the controller: sil, this host; board, an emulated board; or probe, a
-    /// real one.
-    #[arg(long, value_name = "TARGET", default_value = "sil")]
-    target: String,
+    pub source: SourceArgs,
 
     /// Where the WebSocket listens.
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:8765")]
@@ -48,49 +31,19 @@ pub struct Args {
     /// Without the terminal: the drive starts by itself, and the run ends when it has
     /// arrived.
     #[arg(long)]
-    headless: bool,
+    pub headless: bool,
 
     /// As fast as it goes instead of in real time.
     #[arg(long)]
     fast: bool,
-
-    /// Writes the last screen as a picture, SVG.
-    #[arg(long, value_name = "FILE")]
-    picture: Option<PathBuf>,
 }
 
+/// Runs the verb.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     if !args.headless && !std::io::stdout().is_terminal() {
         return Err(Failure::input("standard output is no terminal: use --headless"));
     }
-    if let Some(path) = &args.stream {
-        let name = path.display().to_string();
-        let file = File::open(path).map_err(|error| Failure::input(format!("{name}: {error}")))?;
-        return watch(args, &mut Bytes::new(name, Box::new(file)));
-    }
-    let scenario = args.run.resolve()?;
-    match args.target.as_str() {
-        "sil" => watch(args, &mut Virtual::new(&scenario, !args.headless)?),
-        "board" => board(args, &scenario),
-        "probe" => probe(args),
-        other => Err(Failure::input(format!(
-            "--target {other}: not available; available targets: sil, board, probe"
-        ))),
-    }
-}
-
-#[cfg(not(feature = "probe"))]
-fn probe(_: &Args) -> Result<Outcome, Failure> {
-    Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Probe)?))
-}
-
-#[cfg(feature = "probe")]
-fn probe(args: &Args) -> Result<Outcome, Failure> {
-    watch(args, &mut crate::capture::Probed::new(super::probe::patient()?))
-}
-
-fn board(_: &Args, _: &Scenario) -> Result<Outcome, Failure> {
-    Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Board)?))
+    args.source.open(!args.headless, |source, _| watch(args, source))
 }
 
 /// A terminal that is given back however the view ends.
@@ -102,8 +55,8 @@ impl Drop for Display {
     }
 }
 
-/// Shows what `source` gives until it ends or the operator does.
-fn watch(args: &Args, source: &mut dyn Source) -> Result<Outcome, Failure> {
+/// Shows what `source` gives until it ends or the operator quits.
+pub fn watch(args: &Args, source: &mut dyn Source) -> Result<Outcome, Failure> {
     let server = Server::bind(&args.listen)
         .map_err(|error| Failure::input(format!("--listen {}: {error}", args.listen)))?;
     if args.headless {
@@ -120,7 +73,7 @@ fn watch(args: &Args, source: &mut dyn Source) -> Result<Outcome, Failure> {
     while let Some(bytes) = source.read().map_err(Failure::run)? {
         decoder.read(&bytes, &mut |item| {
             screen.see(&item);
-            if let crate::log::Item::Tick(record, _) = &item {
+            if let Item::Tick(record, _) = &item {
                 clock.tick(record.at());
             }
             if let Some((topic, body)) = messages(&item) {
@@ -130,14 +83,14 @@ fn watch(args: &Args, source: &mut dyn Source) -> Result<Outcome, Failure> {
         for line in source.news() {
             screen.note(line);
         }
-        screen.count(decoder.tally());
+        screen.count(decoder.counts());
         clock.wait();
         if drawn.elapsed() < REDRAW {
             continue;
         }
         drawn = Instant::now();
         if let Some(Display(terminal)) = &mut display {
-            let drawn = terminal.draw(|frame| screen.draw(frame, decoder.tally()));
+            let drawn = terminal.draw(|frame| screen.draw(frame, decoder.counts()));
             drawn.map_err(Failure::run)?;
             match key()? {
                 Some(Key::Quit) => break,
@@ -146,19 +99,7 @@ fn watch(args: &Args, source: &mut dyn Source) -> Result<Outcome, Failure> {
             }
         }
     }
-    drop(display);
-    if let Some(path) = &args.picture {
-        write_text(path, &picture(&screen, &decoder)?)?;
-    }
-    let tally = decoder.tally();
-    Ok(Outcome::of(tally.ticks > 0 && tally.lost_frames == 0 && tally.lost_ticks == 0))
-}
-
-fn picture(screen: &Screen, decoder: &Decoder) -> Result<String, Failure> {
-    let backend = TestBackend::new(PICTURE.0, PICTURE.1);
-    let mut terminal = Terminal::new(backend).map_err(Failure::run)?;
-    terminal.draw(|frame| screen.draw(frame, decoder.tally())).map_err(Failure::run)?;
-    Ok(svg(terminal.backend().buffer()))
+    Ok(Outcome::of(decoder.counts().is_complete()))
 }
 
 /// What the operator wants.
@@ -198,7 +139,7 @@ impl Clock {
         Self { fast, began: Instant::now(), first: None, tick: 0 }
     }
 
-    /// The log has come to this tick. A target that starts anew starts the clock anew.
+    /// The log has come to this tick. A restart of the target restarts the clock.
     fn tick(&mut self, tick: u32) {
         if self.first.is_none_or(|first| tick < first) {
             (self.first, self.began) = (Some(tick), Instant::now());

@@ -1,6 +1,7 @@
 //! Results on standard output.
 
 use std::io::{self, ErrorKind, Write};
+use std::path::PathBuf;
 
 use serde::Serialize;
 
@@ -18,6 +19,11 @@ pub fn result(
     } else {
         print(&human())
     }
+}
+
+/// The files that were written, a line each. Paths are not wrapped, so that they can be copied.
+pub fn wrote(files: &[PathBuf]) -> String {
+    files.iter().map(|file| format!("  wrote {}\n", file.display())).collect()
 }
 
 /// Prints `text`. A reader that has seen enough is no error.

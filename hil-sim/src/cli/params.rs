@@ -8,7 +8,7 @@ use toml::Value;
 
 use super::failure::{Failure, Outcome};
 use super::output;
-use crate::export::write_text;
+use crate::files::write_text;
 use crate::params::{Held, SetFile, Store, StoreError, set_of};
 use crate::scenario::{KeyInfo, PRESETS, Scenario};
 use crate::table::plain;

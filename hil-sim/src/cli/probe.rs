@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::failure::Failure;
-use crate::probe::{Patient, PortError, RealPort};
+use crate::probe::{PortError, RealPort, ReconnectingPort};
 
 /// Time between two attempts to find a probe again.
 const PAUSE: Duration = Duration::from_millis(500);
@@ -15,9 +15,10 @@ pub(super) fn attach(block: Option<u32>) -> Result<RealPort, Failure> {
     RealPort::attach(block).map_err(missing)
 }
 
-/// The same so that it outlives its cable.
-pub(super) fn patient() -> Result<Patient<'static>, Failure> {
-    Patient::open(|| Ok(Box::new(RealPort::attach(None)?)), PAUSE, PATIENCE).map_err(missing)
+/// The same, connected again whenever the probe was unplugged.
+pub(super) fn reconnecting() -> Result<ReconnectingPort<'static>, Failure> {
+    ReconnectingPort::open(|| Ok(Box::new(RealPort::attach(None)?)), PAUSE, PATIENCE)
+        .map_err(missing)
 }
 
 /// What is missing to begin with is the caller's to mend.

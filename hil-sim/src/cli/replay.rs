@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::failure::{Failure, Outcome};
 use super::output;
-use crate::log::{Mark, Run};
+use crate::record::{Mark, Run};
 use crate::replay::{Replayed, replay};
 use crate::scenario::Scenario;
 
@@ -48,6 +48,7 @@ struct Log {
     result: Replayed,
 }
 
+/// Runs the verb.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let mut logs = Vec::new();
     for file in &args.logs {
@@ -94,11 +95,12 @@ fn human(log: &Log) -> String {
     if let Some((tick, mark)) = result.missing {
         let why = match mark {
             Mark::Joined { .. } => "it does not begin with the target's start",
-            _ => "the controller's state is not known behind a gap",
+            _ => "the controller's state is not known after a gap",
         };
         text += &format!("  {} ticks from {tick} on not run again: {why} ({mark})\n", result.blind);
     } else if result.blind > 0 {
-        text += &format!("  {} ticks not run again: the log begins under way\n", result.blind);
+        text +=
+            &format!("  {} ticks not run again: the log does not begin at boot\n", result.blind);
     }
     text
 }

@@ -6,10 +6,9 @@ use serde::Serialize;
 
 use super::failure::{Failure, Outcome};
 use super::output;
-use crate::export::{make_directory, write_text};
-use crate::log::{self, recording};
-use crate::record::{Recording, Summary};
-use crate::report::{Difference, compare_html, differences, write_html};
+use crate::files::{make_directory, write_text};
+use crate::record::{Recording, Summary, recording};
+use crate::report::{Difference, compare_html, differences, html};
 use crate::table;
 
 /// The page of a log as `deploy` writes it, or of two logs crossing by crossing.
@@ -59,7 +58,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
 }
 
 fn read(path: &Path) -> Result<Recording, Failure> {
-    recording(path).map_err(|error: log::ReadError| Failure::input(error))
+    recording(path).map_err(Failure::input)
 }
 
 /// Where the page goes.
@@ -73,7 +72,7 @@ fn page(args: &Args, ending: &str) -> Result<PathBuf, Failure> {
 
 fn one(args: &Args, recording: &Recording) -> Result<Outcome, Failure> {
     let page = page(args, "html")?;
-    write_html(recording, &page)?;
+    write_text(&page, &html(recording, &[]))?;
     let printed = One { summary: &recording.summary, files: [&page] };
     output::result(args.json, &printed, || {
         table::run(&recording.summary, std::slice::from_ref(&page))
@@ -93,8 +92,8 @@ fn two(args: &Args, first: &Recording, path: &Path) -> Result<Outcome, Failure> 
 
 fn human(printed: &Two<'_>) -> String {
     let rows = printed.differences.iter().map(|difference| {
-        let Difference { index, quantity, unit, a, b, change } = difference;
-        let value = |value: &Option<f64>| table::number(*value, 3);
+        let Difference { index, quantity, unit, decimals, a, b, change } = difference;
+        let value = |value: &Option<f64>| table::number(*value, *decimals);
         vec![format!("{index}"), format!("{quantity}, {unit}"), value(a), value(b), value(change)]
     });
     let table = table::plain(&["step", "quantity", "A", "B", "B - A"], rows);

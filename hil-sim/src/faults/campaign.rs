@@ -15,7 +15,7 @@ use super::judge::{Finding, Judge};
 use crate::plant::rig::VirtualRig;
 use crate::scenario::Scenario;
 use crate::scenario::injection::{Injection, Kind, Target};
-use crate::sil::{Options, RunError, Session};
+use crate::session::{Options, RunError, Session};
 
 pub use case::{Case, StepFault};
 pub use matrix::{MatrixRow, MedianAndWorst, Outcome};

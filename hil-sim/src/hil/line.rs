@@ -10,10 +10,10 @@ use super::HilError;
 use crate::probe::Port;
 
 /// How long an answer is waited for before the question is asked again: well inside the
-/// board's own patience of 50 ms.
-const AGAIN: Duration = Duration::from_millis(10);
+/// board's own timeout of 50 ms.
+const RETRY: Duration = Duration::from_millis(10);
 /// How long it is asked in all: a board that starts takes a fifth of a second.
-const PATIENCE: Duration = Duration::from_secs(2);
+const TIMEOUT: Duration = Duration::from_secs(2);
 
 /// This host's end of the loop.
 pub struct HostLine<'a> {
@@ -22,7 +22,7 @@ pub struct HostLine<'a> {
 }
 
 impl<'a> HostLine<'a> {
-    /// Starts the board anew and waits until it is ready for its first tick.
+    /// Resets the board and waits until it is ready for its first tick.
     ///
     /// # Errors
     /// [`HilError`] if the port fails or no board of this protocol answers.
@@ -56,7 +56,7 @@ impl<'a> HostLine<'a> {
         }
     }
 
-    /// Asks how the board stands: its next tick, and whether it has gone on alone.
+    /// Asks for the board's state: its next tick, and whether it has gone on alone.
     ///
     /// # Errors
     /// As [`HostLine::tick`].
@@ -73,7 +73,7 @@ impl<'a> HostLine<'a> {
         self.port
     }
 
-    /// Asks, and again, until an answer comes that answers this; none if patience ends.
+    /// Asks, and again, until an answer comes that answers this; none if none comes in time.
     fn ask(
         &mut self,
         message: &ToBoard,
@@ -83,8 +83,8 @@ impl<'a> HostLine<'a> {
         let Some(bytes) = frame(message) else { return Ok(None) };
         let (mut waited, mut sent) = (Duration::ZERO, Duration::ZERO);
         let mut left = bytes.as_slice();
-        while waited < PATIENCE {
-            if left.is_empty() && waited >= sent + AGAIN {
+        while waited < TIMEOUT {
+            if left.is_empty() && waited >= sent + RETRY {
                 left = bytes.as_slice();
             }
             if !left.is_empty() {

@@ -1,4 +1,4 @@
-//! A whole run in the loop: reset, one command, arrival.
+//! A run in the loop: reset, one command, arrival.
 
 use std::collections::VecDeque;
 use std::time::Instant;
@@ -6,18 +6,18 @@ use std::time::Instant;
 use interstage::hal::hil::{FIRST, Given};
 use interstage::log::{Identity, Record, identity};
 use interstage::model::Planner;
+use interstage::sense::raw::SensorFrame;
 use interstage::supervise::Mode;
-use interstage::tick::{Entry, Event, Output};
+use interstage::tick::{Entry, Event};
 use interstage::units::Tick;
 
 use super::{HilError, HostLine};
-use crate::log::{Decoder, Item};
 use crate::plant::rig::{Truth, VirtualRig};
-use crate::plant::sensors::{Codes, Sensors};
+use crate::plant::sensors::Codes;
 use crate::probe::Port;
-use crate::record::Recording;
-use crate::scenario::{ControllerKind, Direction, Scenario};
-use crate::sil::{LONGEST_S, TICK_S, Trace, drives, read, start_of};
+use crate::record::{Controller, Decoder, Item, Recording, RunRecorder, starter};
+use crate::scenario::{ControllerKind, Scenario};
+use crate::session::{LONGEST_S, TICK_S, drives, initial_rig, read};
 
 /// RTT channel of the binary log.
 const LOG: u32 = 1;
@@ -52,26 +52,26 @@ pub fn run(
     if kind != ControllerKind::Scheduled {
         return Err(HilError::Controller(kind.name()));
     }
-    let mut rig = Rig::new(scenario)?;
-    let mut told = Told::new(scenario, &rig, asked.rows)?;
+    let (mut plant, mut sensors) = initial_rig(scenario)?;
+    let mut log = BoardLog::new(scenario, &plant, asked.rows)?;
     let mut line = HostLine::begin(port)?;
-    let mut start = Some(start_of(scenario));
+    let mut start = Some(starter(scenario.run.direction));
     let started = Instant::now();
     let (mut tick, mut mode) = (FIRST, Mode::Boot);
     let over = |mode: Mode| matches!(mode, Mode::Complete(_) | Mode::FaultHold(_));
     let mut given = Given::default();
     while !over(mode) && f64::from(tick - FIRST) * TICK_S < LONGEST_S {
-        let codes = read(&mut rig.sensors, &rig.plant);
+        let codes = read(&mut sensors, &plant);
         let command = if mode == Mode::Idle { start.take() } else { None };
         given = given_by(codes).with(command);
         let taken = line.tick(tick, given)?;
         mode = taken.mode().unwrap_or(mode);
-        told.truths.push_back(*rig.plant.truth());
+        log.truths.push_back(*plant.truth());
         let (drive, preload) = taken.commands();
-        rig.plant.step(&drives(drive, preload), TICK_S)?;
+        plant.step(&drives(drive, preload), TICK_S)?;
         tick += 1;
         if tick.is_multiple_of(LOOK) {
-            told.hear(line.port())?;
+            log.take(line.port())?;
             watch(f64::from(tick - FIRST) * TICK_S);
         }
     }
@@ -80,39 +80,20 @@ pub fn run(
     for tick in tick..tick + AFTER {
         line.tick(tick, given.with(None))?;
         if tick.is_multiple_of(LOOK) {
-            told.hear(line.port())?;
+            log.take(line.port())?;
         }
     }
-    told.hear(line.port())?;
-    told.finish(scenario, &rig.plant, asked.target, mode, wall_s)
+    log.take(line.port())?;
+    log.finish(scenario, &plant, asked.target, mode, wall_s)
 }
 
 const fn given_by(codes: Codes) -> Given {
     Given::codes(codes.wheel, codes.load_cell, codes.tread, codes.arm, codes.bridges)
 }
 
-/// The plant and its sensors.
-struct Rig {
-    plant: VirtualRig,
-    sensors: Sensors,
-}
-
-impl Rig {
-    fn new(scenario: &Scenario) -> Result<Self, HilError> {
-        let parameters = scenario.plant();
-        parameters.check(scenario.rig.preload.limit_n)?;
-        let (position, preload) = match scenario.run.direction {
-            Direction::Deploy => (0.0, 0.0),
-            Direction::Retract => (scenario.rig.rig.travel_mm, scenario.rig.preload.cruise_n),
-        };
-        let sensors = Sensors::new(parameters.sensors.clone(), scenario.run.seed);
-        Ok(Self { plant: VirtualRig::new(parameters, position, preload, TICK_S), sensors })
-    }
-}
-
-/// What the board tells of itself in its log, put to the plant's truth of the same tick.
-struct Told {
-    trace: Trace,
+/// The board's log, joined with the plant's truth of the same tick.
+struct BoardLog {
+    recorder: RunRecorder,
     decoder: Decoder,
     stream: Vec<u8>,
     rows: bool,
@@ -126,12 +107,12 @@ struct Told {
     parameters: u32,
 }
 
-impl Told {
-    fn new(scenario: &Scenario, rig: &Rig, rows: bool) -> Result<Self, HilError> {
+impl BoardLog {
+    fn new(scenario: &Scenario, plant: &VirtualRig, rows: bool) -> Result<Self, HilError> {
         let planner = Planner::try_build(&scenario.rig)?;
         let gap_ref = planner.gap_ref(scenario.run.direction.into()).to_num();
         Ok(Self {
-            trace: Trace::new(gap_ref, rig.plant.truth().position_mm),
+            recorder: RunRecorder::new(gap_ref, plant.truth().position_mm),
             decoder: Decoder::new(),
             stream: Vec::new(),
             rows,
@@ -144,7 +125,7 @@ impl Told {
     }
 
     /// Takes what the log has brought.
-    fn hear(&mut self, port: &mut dyn Port) -> Result<(), HilError> {
+    fn take(&mut self, port: &mut dyn Port) -> Result<(), HilError> {
         port.up(TEXT)?;
         let bytes = port.up(LOG)?;
         let mut items = Vec::new();
@@ -155,7 +136,7 @@ impl Told {
                 // Why the board has started is known: this host made it.
                 Item::Event(Entry { event: Event::Restart(_), .. }) => {}
                 Item::Event(entry) => self.events.push_back(entry),
-                Item::Tick(record, _) => self.tick(&record)?,
+                Item::Tick(record, sensors) => self.tick(&record, sensors)?,
                 _ => {}
             }
         }
@@ -178,21 +159,28 @@ impl Told {
         })
     }
 
-    /// A tick of the log; those behind the end have no truth and are passed over.
-    fn tick(&mut self, record: &Record) -> Result<(), HilError> {
+    /// A tick of the log; those after the end have no truth and are skipped.
+    fn tick(&mut self, record: &Record, mut sensors: SensorFrame) -> Result<(), HilError> {
         let at = record.at();
         if at != self.due {
             return Err(HilError::Incomplete(self.due));
         }
         self.due += 1;
-        let mut output = Output { telemetry: record.telemetry, ..Output::default() };
         // This host counts from zero.
-        output.telemetry.at = at - FIRST;
+        let from_zero = |at: Tick| at.wrapping_sub(FIRST);
+        let mut record = *record;
+        record.telemetry.at = from_zero(at);
+        sensors.wheel.iter_mut().for_each(|sample| sample.at = from_zero(sample.at));
+        sensors.load_cell.iter_mut().for_each(|sample| sample.at = from_zero(sample.at));
+        sensors.tread.iter_mut().for_each(|sample| sample.at = from_zero(sample.at));
+        sensors.arm.iter_mut().for_each(|sample| sample.at = from_zero(sample.at));
+        let mut events = Vec::new();
         while let Some(entry) = self.events.pop_front_if(|entry| entry.at <= at) {
-            let _ = output.events.push(Entry { at: entry.at.wrapping_sub(FIRST), ..entry });
+            events.push(Entry { at: from_zero(entry.at), ..entry });
         }
         if let Some(truth) = self.truths.pop_front() {
-            self.trace.look(&output, &truth, self.rows);
+            let columns = self.rows.then(|| Controller::of(&record, &sensors));
+            self.recorder.take(&record.telemetry, &events, &truth, columns);
         }
         Ok(())
     }
@@ -210,10 +198,10 @@ impl Told {
             return Err(HilError::Incomplete(self.due));
         }
         let arrived = match mode {
-            Mode::Complete(way) => Some(way),
+            Mode::Complete(direction) => Some(direction),
             _ => None,
         };
-        let mut recording = self.trace.finish(target, scenario, plant, arrived, wall_s);
+        let mut recording = self.recorder.finish(target, scenario, plant, arrived, wall_s);
         recording.stream = self.stream;
         Ok(recording)
     }

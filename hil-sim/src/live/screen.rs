@@ -1,4 +1,4 @@
-//! The log on a terminal: state, rolling plots, what happened, keys.
+//! The log on a terminal: state, rolling plots, events, keys.
 
 use std::collections::VecDeque;
 
@@ -6,17 +6,14 @@ use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Modifier, Style};
 use ratatui::symbols::Marker;
-use ratatui::text::{Line, Span};
+use ratatui::text::Line;
 use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph};
 
 use interstage::restart::Reset;
 use interstage::supervise::Mode;
 use interstage::tick::{Entry, Event};
 
-use crate::capture::{View, mode_name};
-use crate::log::{Item, Row, Tally};
-use crate::record::STAGE_NAMES;
-use crate::sil;
+use crate::record::{Controller, Counts, Item, Mark, View, text};
 
 /// What the plots show, s.
 const SPAN_S: f64 = 10.0;
@@ -25,55 +22,40 @@ const EVERY: u32 = 10;
 /// Lines of the log that are kept.
 const LINES: usize = 64;
 
-/// What stands at the bottom.
+/// The last line.
 const KEYS: &str = " s start   x stop   r retract   0 reset   q quit ";
 
 /// A line of a plot: name, colour, value.
-type Curve = (&'static str, Color, fn(&Row) -> f64);
+type Curve = (&'static str, Color, fn(&Controller) -> f64);
 
-/// A plot: title with unit, least span, and its lines, the later above the earlier.
-struct Plot {
-    title: &'static str,
-    least: f64,
-    lines: [Option<Curve>; 2],
-}
-
-const PLOTS: [Plot; 4] = [
-    Plot {
-        title: "speed, mm/s",
-        least: 2.0,
-        lines: [
-            Some(("wanted", Color::Gray, |row| row.speed_ref_mm_s)),
-            Some(("estimated", Color::Cyan, |row| row.speed_mm_s)),
+/// Plots: title with unit, least span, and lines, the later above the earlier.
+const PLOTS: [(&str, f64, &[Curve]); 4] = [
+    (
+        "speed, mm/s",
+        2.0,
+        &[
+            ("reference", Color::Gray, |row| row.speed_ref_mm_s),
+            ("estimated", Color::Cyan, |row| row.wheel_speed_mm_s),
         ],
-    },
-    Plot {
-        title: "preload, N",
-        least: 4.0,
-        lines: [
-            Some(("wanted", Color::Gray, |row| row.preload_ref_n)),
-            Some(("measured", Color::Yellow, |row| row.preload_n)),
+    ),
+    (
+        "preload, N",
+        4.0,
+        &[
+            ("reference", Color::Gray, |row| row.preload_ref_n),
+            ("measured", Color::Yellow, |row| row.preload_n),
         ],
-    },
-    Plot {
-        title: "tread compression, mm",
-        least: 0.2,
-        lines: [Some(("measured", Color::Green, |row| row.compression_mm)), None],
-    },
-    Plot {
-        title: "wheel centre from the axis, mm",
-        least: 2.0,
-        lines: [Some(("by the arm", Color::Magenta, |row| row.radius_mm)), None],
-    },
+    ),
+    ("tread compression, mm", 0.2, &[("measured", Color::Green, |row| row.compression_mm)]),
+    ("wheel centre from the axis, mm", 2.0, &[("by the arm", Color::Magenta, |row| row.radius_mm)]),
 ];
 
 /// What the terminal shows.
 #[derive(Default)]
 pub struct Screen {
     view: View,
-    rows: VecDeque<Row>,
+    rows: VecDeque<Controller>,
     lines: VecDeque<(Color, String)>,
-    mode: Option<Mode>,
 }
 
 impl Screen {
@@ -81,49 +63,46 @@ impl Screen {
     pub fn see(&mut self, item: &Item) {
         self.view.see(item);
         match item {
-            Item::Tick(record, sensors) => {
-                self.mode = Some(record.telemetry.mode);
-                if record.at().is_multiple_of(EVERY) {
-                    self.keep(Row::of(record, sensors));
+            Item::Tick(record, sensors) if record.at().is_multiple_of(EVERY) => {
+                let row = Controller::of(record, sensors);
+                self.rows.push_back(row);
+                while self.rows.front().is_some_and(|first| first.t_s < row.t_s - SPAN_S) {
+                    self.rows.pop_front();
                 }
             }
-            Item::Event(entry) => self.say(colour(entry), line(entry)),
+            Item::Event(entry) => {
+                let t_s = f64::from(entry.at) * 1e-3;
+                self.add(colour(entry), format!("{t_s:9.3} s  {}", text(&entry.event)));
+            }
             Item::Mark(mark) => {
-                if *mark == crate::log::Mark::Restart {
+                if *mark == Mark::Restart {
                     self.rows.clear();
                 }
-                self.say(Color::LightRed, mark.to_string());
+                self.note(mark.to_string());
             }
             _ => {}
         }
     }
 
-    /// Shows a line about the way to the board.
+    /// Shows a line about the connection.
     pub fn note(&mut self, text: String) {
-        self.say(Color::LightRed, text);
+        self.add(Color::LightRed, text);
     }
 
-    fn keep(&mut self, row: Row) {
-        self.rows.push_back(row);
-        while self.rows.front().is_some_and(|first| first.t_s < row.t_s - SPAN_S) {
-            self.rows.pop_front();
-        }
-    }
-
-    fn say(&mut self, colour: Color, text: String) {
+    fn add(&mut self, colour: Color, text: String) {
         self.lines.push_back((colour, text));
         while self.lines.len() > LINES {
             self.lines.pop_front();
         }
     }
 
-    /// Works the rates out now and then.
-    pub fn count(&mut self, tally: &Tally) {
-        self.view.count(tally);
+    /// Computes the rates now and then.
+    pub fn count(&mut self, counts: &Counts) {
+        self.view.count(counts);
     }
 
     /// Draws everything.
-    pub fn draw(&self, frame: &mut Frame<'_>, tally: &Tally) {
+    pub fn draw(&self, frame: &mut Frame<'_>, counts: &Counts) {
         let [head, plots, log, keys] = Layout::vertical([
             Constraint::Length(4),
             Constraint::Min(12),
@@ -131,101 +110,63 @@ impl Screen {
             Constraint::Length(1),
         ])
         .areas(frame.area());
-        frame.render_widget(self.head(tally), head);
+        let state = self.view.row().map_or("  no tick yet".to_owned(), |_| self.view.state_text());
+        let state = format!("{state}\n {}", self.view.rates_text(counts));
+        frame.render_widget(Paragraph::new(state).style(self.style()), head);
         let [upper, lower] = Layout::vertical([Constraint::Fill(1); 2]).areas(plots);
         let cells =
             [upper, lower].map(|row| Layout::horizontal([Constraint::Fill(1); 2]).areas::<2>(row));
         for (plot, area) in PLOTS.iter().zip(cells.into_iter().flatten()) {
             self.plot(frame, plot, area);
         }
-        frame.render_widget(self.log(log.height), log);
+        let skip = self.lines.len().saturating_sub(usize::from(log.height.saturating_sub(2)));
+        let lines = self.lines.iter().skip(skip);
+        let lines: Vec<Line<'_>> =
+            lines.map(|(colour, text)| Line::styled(text, Style::new().fg(*colour))).collect();
+        frame.render_widget(Paragraph::new(lines).block(Block::bordered().title("log")), log);
         let style = Style::new().fg(Color::Black).bg(Color::Gray);
         frame.render_widget(Paragraph::new(KEYS).style(style), keys);
     }
 
-    fn head(&self, tally: &Tally) -> Paragraph<'_> {
+    /// Of the state: red in a fault, green while the drive moves.
+    fn style(&self) -> Style {
         let strong = Style::new().add_modifier(Modifier::BOLD);
-        let mode = self.mode.map_or("no frame yet", mode_name);
-        let style = match self.mode {
+        match self.view.row().and_then(Controller::mode) {
             Some(Mode::FaultHold(_)) => strong.fg(Color::Red),
             Some(mode) if mode.moves() => strong.fg(Color::Green),
             _ => strong,
-        };
-        let row = self.view.row();
-        let stage = row.and_then(|row| STAGE_NAMES.get(usize::from(row.stage).wrapping_sub(1)));
-        let mut lines = vec![Line::from(vec![
-            Span::styled(format!(" {mode} "), style),
-            Span::raw(format!(
-                " contact: {}   level {}   {:.3} s",
-                stage.unwrap_or(&"?"),
-                row.map_or(0, |row| row.level),
-                row.map_or(0.0, |row| row.t_s),
-            )),
-        ])];
-        if let Some(row) = row {
-            lines.push(Line::raw(format!(
-                " position {:8.3} mm   next face in {:8.3} mm   gap predicted {:6.3} mm   slip margin {:5.2}",
-                row.position_mm,
-                row.distance_mm.min(999.999),
-                row.gap_predicted_mm,
-                row.slip_margin,
-            )));
         }
-        lines.push(Line::raw(format!(" {}", self.view.rates_text(tally))));
-        Paragraph::new(lines)
     }
 
-    fn plot(&self, frame: &mut Frame<'_>, plot: &Plot, area: Rect) {
-        let lines: Vec<_> = plot
-            .lines
-            .iter()
-            .flatten()
-            .map(|(name, colour, of)| {
-                let points: Vec<(f64, f64)> =
-                    self.rows.iter().map(|row| (row.t_s, of(row))).collect();
-                (*name, *colour, points)
-            })
-            .collect();
-        let values = lines.iter().flat_map(|(_, _, points)| points.iter().map(|point| point.1));
-        let (low, high) = range(values, plot.least);
+    fn plot(
+        &self,
+        frame: &mut Frame<'_>,
+        &(title, least, curves): &(&'static str, f64, &[Curve]),
+        area: Rect,
+    ) {
+        let points = |of: fn(&Controller) -> f64| -> Vec<(f64, f64)> {
+            self.rows.iter().map(|row| (row.t_s, of(row))).collect()
+        };
+        let lines: Vec<_> = curves.iter().map(|(.., of)| points(*of)).collect();
+        let (low, high) = range(lines.iter().flatten().map(|point| point.1), least);
         let end = self.rows.back().map_or(SPAN_S, |row| row.t_s.max(SPAN_S));
-        let sets = lines
-            .iter()
-            .map(|(name, colour, points)| {
-                Dataset::default()
-                    .name(*name)
-                    .marker(Marker::Braille)
-                    .graph_type(GraphType::Line)
-                    .style(Style::new().fg(*colour))
-                    .data(points)
-            })
-            .collect();
-        let label = |value: f64| Line::from(format!("{value:.1}"));
-        let chart = Chart::new(sets)
-            .block(Block::bordered().title(plot.title))
-            .x_axis(
-                Axis::default()
-                    .bounds([end - SPAN_S, end])
-                    .labels([label(end - SPAN_S), label(end)]),
-            )
-            .y_axis(Axis::default().bounds([low, high]).labels([
-                label(low),
-                label(0.5 * (low + high)),
-                label(high),
-            ]));
+        let sets = curves.iter().zip(&lines).map(|((name, colour, _), points)| {
+            Dataset::default()
+                .name(*name)
+                .marker(Marker::Braille)
+                .graph_type(GraphType::Line)
+                .style(Style::new().fg(*colour))
+                .data(points)
+        });
+        let axis = |low: f64, high: f64, labels: &[f64]| {
+            let labels = labels.iter().map(|value| Line::from(format!("{value:.1}")));
+            Axis::default().bounds([low, high]).labels(labels.collect::<Vec<_>>())
+        };
+        let chart = Chart::new(sets.collect())
+            .block(Block::bordered().title(title))
+            .x_axis(axis(end - SPAN_S, end, &[end - SPAN_S, end]))
+            .y_axis(axis(low, high, &[low, 0.5 * (low + high), high]));
         frame.render_widget(chart, area);
-    }
-
-    fn log(&self, height: u16) -> Paragraph<'_> {
-        let most = usize::from(height.saturating_sub(2));
-        let skip = self.lines.len().saturating_sub(most);
-        let lines: Vec<Line<'_>> = self
-            .lines
-            .iter()
-            .skip(skip)
-            .map(|(colour, text)| Line::styled(text.as_str(), Style::new().fg(*colour)))
-            .collect();
-        Paragraph::new(lines).block(Block::bordered().title("log"))
     }
 }
 
@@ -241,10 +182,6 @@ fn range(values: impl Iterator<Item = f64>, least: f64) -> (f64, f64) {
     (low - 0.5 * lacking, high + 0.5 * lacking)
 }
 
-fn line(entry: &Entry) -> String {
-    format!("{:9.3} s  {}", f64::from(entry.at) * 1e-3, sil::text(&entry.event))
-}
-
 fn colour(entry: &Entry) -> Color {
     match entry.event {
         Event::Fault(_) => Color::Red,
@@ -256,23 +193,24 @@ fn colour(entry: &Entry) -> Color {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
     use ratatui::Terminal;
     use ratatui::backend::TestBackend;
     use ratatui::buffer::Buffer;
 
     use super::*;
-    use crate::log::Decoder;
+    use crate::record::Decoder;
     use crate::scenario::Scenario;
+    use crate::session;
 
     /// The screen at the end of a run.
-    pub(in crate::live) fn drawn() -> Buffer {
-        let options = sil::Options { rows: true, ..sil::Options::default() };
-        let stream = sil::run(&Scenario::default(), options).unwrap().stream;
+    fn drawn() -> Buffer {
+        let options = session::Options { rows: true, ..session::Options::default() };
+        let stream = session::run(&Scenario::default(), options).unwrap().stream;
         let (mut screen, mut decoder) = (Screen::default(), Decoder::new());
         decoder.read(&stream, &mut |item| screen.see(&item));
         let mut terminal = Terminal::new(TestBackend::new(110, 36)).unwrap();
-        terminal.draw(|frame| screen.draw(frame, decoder.tally())).unwrap();
+        terminal.draw(|frame| screen.draw(frame, decoder.counts())).unwrap();
         terminal.backend().buffer().clone()
     }
 
@@ -303,8 +241,8 @@ pub(super) mod tests {
     fn nothing_yet_is_drawn_too() {
         let mut terminal = Terminal::new(TestBackend::new(60, 26)).unwrap();
         let screen = Screen::default();
-        terminal.draw(|frame| screen.draw(frame, &Tally::default())).unwrap();
-        assert!(text(terminal.backend().buffer()).contains("no frame yet"));
+        terminal.draw(|frame| screen.draw(frame, &Counts::default())).unwrap();
+        assert!(text(terminal.backend().buffer()).contains("no tick yet"));
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! Source: Foxglove, WebSocket protocol, version 1 (`ws-protocol`, `docs/spec.md`):
 //! a `serverInfo` and an `advertise` object as text once a client has come; from then on
 //! a binary message for each subscription: 1, its number, the time in nanoseconds, the
-//! body.
+//! body. A channel's number is that of its topic.
 
 use std::collections::HashMap;
 use std::io::{self, ErrorKind};
@@ -19,8 +19,7 @@ use tungstenite::handshake::server::{ErrorResponse, Request, Response};
 use tungstenite::http::{HeaderValue, StatusCode, header::SEC_WEBSOCKET_PROTOCOL};
 use tungstenite::{Message, WebSocket};
 
-use crate::capture::schemas;
-use crate::export::json;
+use crate::record::Topic;
 
 /// Names of the protocol that clients ask for.
 const PROTOCOLS: [&str; 2] = ["foxglove.websocket.v1", "foxglove.sdk.v1"];
@@ -30,62 +29,6 @@ const WAITING: usize = 4096;
 const LISTEN: Duration = Duration::from_millis(5);
 /// First byte of a message of data.
 const DATA: u8 = 1;
-
-/// What a message is about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Topic {
-    /// A [`crate::log::Row`].
-    Controller,
-    /// A line of the log.
-    Log,
-    /// A [`crate::log::LedgerLine`].
-    Ledger,
-}
-
-impl Topic {
-    /// Every topic.
-    pub const ALL: [Self; 3] = [Self::Controller, Self::Log, Self::Ledger];
-
-    /// Its number on the wire.
-    const fn channel(self) -> u32 {
-        match self {
-            Self::Controller => 1,
-            Self::Log => 2,
-            Self::Ledger => 3,
-        }
-    }
-
-    /// Its name.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Controller => "/controller",
-            Self::Log => "/log",
-            Self::Ledger => "/ledger",
-        }
-    }
-
-    /// Schema of its messages.
-    pub(crate) fn schema(self) -> Value {
-        match self {
-            Self::Controller => schemas::rows(),
-            Self::Log => json::log_schema(),
-            Self::Ledger => schemas::ledger(),
-        }
-    }
-
-    fn advertised(self) -> Value {
-        let schema = self.schema();
-        json!({
-            "id": self.channel(),
-            "topic": self.name(),
-            "encoding": "json",
-            "schemaName": schema["title"],
-            "schema": schema.to_string(),
-            "schemaEncoding": "jsonschema",
-        })
-    }
-}
 
 /// A message on its way to the clients.
 struct Published {
@@ -149,7 +92,7 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 /// Serves a client until it goes.
 fn serve(stream: TcpStream, messages: &Receiver<Arc<Published>>) {
     let Ok(mut socket) = tungstenite::accept_hdr(stream, agree) else { return };
-    // A client that goes ends in an error of whatever was under way.
+    // A client that disconnects ends in an error.
     let _ = greet(&mut socket).and_then(|()| talk(&mut socket, messages));
 }
 
@@ -177,7 +120,17 @@ fn greet(socket: &mut WebSocket<TcpStream>) -> tungstenite::Result<()> {
         "name": concat!("interstage ", env!("CARGO_PKG_VERSION")),
         "capabilities": [],
     });
-    let channels = Topic::ALL.map(Topic::advertised);
+    let channels = Topic::LIVE.map(|topic| {
+        let schema = topic.schema();
+        json!({
+            "id": topic as u32,
+            "topic": topic.name(),
+            "encoding": "json",
+            "schemaName": schema["title"],
+            "schema": schema.to_string(),
+            "schemaEncoding": "jsonschema",
+        })
+    });
     let advertise = json!({ "op": "advertise", "channels": channels });
     socket.send(Message::text(info.to_string()))?;
     socket.send(Message::text(advertise.to_string()))
@@ -200,7 +153,7 @@ fn talk(
             Err(error) => return Err(error),
         }
         for message in messages.try_iter() {
-            for number in subscribed.get(&message.topic.channel()).into_iter().flatten() {
+            for number in subscribed.get(&(message.topic as u32)).into_iter().flatten() {
                 socket.write(Message::binary(data(*number, &message)))?;
             }
         }
@@ -208,25 +161,21 @@ fn talk(
     }
 }
 
-/// Takes a client's wish in; what is none is passed over.
+/// Takes a client's request in; what is none is ignored.
 fn listen(text: &str, subscribed: &mut HashMap<u32, Vec<u32>>) {
-    let Ok(wish) = serde_json::from_str::<Value>(text) else { return };
+    let Ok(request) = serde_json::from_str::<Value>(text) else { return };
     let number = |value: &Value| value.as_u64().and_then(|number| u32::try_from(number).ok());
-    match wish["op"].as_str() {
+    let list = |key: &str| request[key].as_array().into_iter().flatten();
+    match request["op"].as_str() {
         Some("subscribe") => {
-            for one in wish["subscriptions"].as_array().into_iter().flatten() {
+            for one in list("subscriptions") {
                 if let (Some(id), Some(channel)) = (number(&one["id"]), number(&one["channelId"])) {
                     subscribed.entry(channel).or_default().push(id);
                 }
             }
         }
         Some("unsubscribe") => {
-            let gone: Vec<u32> = wish["subscriptionIds"]
-                .as_array()
-                .into_iter()
-                .flatten()
-                .filter_map(number)
-                .collect();
+            let gone: Vec<u32> = list("subscriptionIds").filter_map(number).collect();
             for ids in subscribed.values_mut() {
                 ids.retain(|id| !gone.contains(id));
             }
@@ -299,7 +248,7 @@ mod tests {
         let (stop, stopped) = sync_channel::<()>(1);
         let feeding = thread::spawn(move || {
             while stopped.try_recv().is_err() {
-                publisher.publish(Topic::Controller, 1, b"{}".to_vec());
+                publisher.publish(Topic::Tick, 1, b"{}".to_vec());
                 publisher.publish(Topic::Ledger, 123_456_789, b"{\"index\":2}".to_vec());
                 thread::sleep(Duration::from_millis(2));
             }

@@ -48,7 +48,7 @@ pub struct LimitCount {
     pub runs: usize,
 }
 
-/// A whole campaign; `rig montecarlo --json` prints it.
+/// A campaign; `rig montecarlo --json` prints it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Outcome {
     /// Runs made.
@@ -69,7 +69,7 @@ pub struct Outcome {
     pub duration_s: Option<Quantiles>,
     /// Worst gap of each run over the reference.
     pub gap_over_ref: Option<Quantiles>,
-    /// Least time for which the wanted preload stood before a corner touched, s.
+    /// Least time by which the preload was reached before a corner touched, s.
     pub lead_time_s: Option<Least>,
     /// Least of the plant's friction less its utilisation.
     pub slip_margin: Option<Least>,

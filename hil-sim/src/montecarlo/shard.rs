@@ -16,7 +16,7 @@ pub struct Shard {
 pub struct ShardError;
 
 impl Shard {
-    /// The whole campaign.
+    /// All of the campaign.
     pub const WHOLE: Self = Self { index: 1, of: 1 };
 
     /// Whether this part has what is at this place of the whole, counted from 0: every n-th.

@@ -26,13 +26,13 @@ const MARK: usize = 16;
 pub struct RealPort {
     session: Session,
     rtt: Option<Rtt>,
-    /// Where the control block lies; searched for in RAM if that is not known.
+    /// Where the control block is; searched for in RAM if that is not known.
     block: Option<u32>,
 }
 
 impl RealPort {
     /// Attaches to the board at the only probe, or at the one that `PROBE_RS_PROBE`
-    /// names, without disturbing what runs there. The control block of its channels lies
+    /// names, without disturbing what runs there. The control block of its channels is
     /// at `block`, if that is known.
     ///
     /// # Errors
@@ -119,7 +119,7 @@ fn only(probes: &[DebugProbeInfo]) -> Result<&DebugProbeInfo, PortError> {
     }
 }
 
-/// An error with all that is behind it, in one line.
+/// An error and its causes, in one line.
 fn said(error: &dyn std::error::Error) -> String {
     let mut text = error.to_string();
     let mut source = error.source();
@@ -145,7 +145,7 @@ impl Port for RealPort {
             let mut bytes = vec![0; up.buffer_size()];
             let read = match up.read(core, &mut bytes) {
                 Ok(read) => read,
-                // The firmware has just started anew.
+                // The firmware has just restarted.
                 Err(RttError::ReadPointerChanged | RttError::ControlBlockCorrupted(_)) => 0,
                 Err(error) => return Err(gone(error)),
             };

@@ -1,32 +1,32 @@
-//! What a run adds up to, whatever has run the controller: when it moved, with what
-//! preload, how far apart wheel and wall came, whether it arrived.
+//! The sums of a run, whatever ran the controller: when it moved, with what preload, how
+//! far wheel and wall separated, whether it arrived.
 
 use interstage::units::Direction;
 use sha2::{Digest, Sha256};
 
-use super::{CrossingLine, LogLine, Recording, Report, Row, Summary};
+use super::{CrossingLine, LogLine, Recording, Report, Summary, Tick};
 use crate::plant::ledger::Crossing;
 use crate::plant::rig::{Truth, VirtualRig};
 use crate::scenario::Scenario;
 
-/// Period of a row, s.
-const TICK_S: f64 = 1e-3;
-/// How far from the end of travel a run that arrived may stand, mm: twice what creep and
+/// Period of a tick, s.
+pub(super) const TICK_S: f64 = 1e-3;
+/// How far from the end of travel a run that arrived may be, mm: twice what creep and
 /// wheel radius leave on the drawn rigs.
 const ARRIVED_WITHIN_MM: f64 = 1.0;
 
 /// The sums of a run as it goes on.
-pub(crate) struct Tally {
-    /// Every bit that the run is to be known by.
-    pub(crate) digest: Sha256,
-    /// Rows kept.
-    pub(crate) rows: Vec<Row>,
+pub struct Tally {
+    /// Digest of every bit that identifies the run.
+    pub digest: Sha256,
+    /// One row a tick, if they are kept.
+    pub rows: Vec<Tick>,
     /// Log lines.
-    pub(crate) log: Vec<LogLine>,
+    pub log: Vec<LogLine>,
     /// Latched faults.
-    pub(crate) faults: Vec<Report>,
+    pub faults: Vec<Report>,
     /// Active limits.
-    pub(crate) limits: Vec<Report>,
+    pub limits: Vec<Report>,
     gap_ref_mm: f64,
     start_mm: f64,
     run_started: Option<f64>,
@@ -34,26 +34,27 @@ pub(crate) struct Tally {
     preload_sum: f64,
     moving: u32,
     worst_separation: f64,
-    ticks: u32,
+    passed: u32,
 }
 
 /// How a run has ended.
-pub(crate) struct Ended<'a> {
+pub struct Ended<'a> {
     /// What ran the controller.
-    pub(crate) target: &'static str,
+    pub target: &'static str,
     /// What was asked for.
-    pub(crate) scenario: &'a Scenario,
+    pub scenario: &'a Scenario,
     /// The plant as it was left.
-    pub(crate) plant: &'a VirtualRig,
-    /// At the end of this way, by the controller's word.
-    pub(crate) arrived: Option<Direction>,
+    pub plant: &'a VirtualRig,
+    /// The direction in which it has arrived, as the controller reports it.
+    pub arrived: Option<Direction>,
     /// Wall-clock time that it took, s.
-    pub(crate) wall_s: f64,
+    pub wall_s: f64,
 }
 
 impl Tally {
     /// A run that begins at `start_mm` and is planned for gaps of `gap_ref_mm`.
-    pub(crate) fn new(gap_ref_mm: f64, start_mm: f64) -> Self {
+    #[must_use]
+    pub fn new(gap_ref_mm: f64, start_mm: f64) -> Self {
         Self {
             digest: Sha256::new(),
             rows: Vec::new(),
@@ -67,17 +68,18 @@ impl Tally {
             preload_sum: 0.0,
             moving: 0,
             worst_separation: 0.0,
-            ticks: 0,
+            passed: 0,
         }
     }
 
-    /// Time at which the tick under way began, s.
-    pub(crate) fn time_s(&self) -> f64 {
-        f64::from(self.ticks) * TICK_S
+    /// Time at which this tick began, s.
+    #[must_use]
+    pub fn time_s(&self) -> f64 {
+        f64::from(self.passed) * TICK_S
     }
 
     /// Ends a tick, in which the drive moved or did not.
-    pub(crate) fn close_tick(&mut self, moves: bool, truth: &Truth) {
+    pub fn close_tick(&mut self, moves: bool, truth: &Truth) {
         if moves {
             let t_s = self.time_s();
             self.run_started.get_or_insert(t_s);
@@ -86,20 +88,17 @@ impl Tally {
             self.moving += 1;
             self.worst_separation = self.worst_separation.max(truth.separation_mm);
         }
-        self.ticks += 1;
+        self.passed += 1;
     }
 
     /// The record of the run with its ledger, a line of which `line` makes.
-    pub(crate) fn finish(
-        self,
-        ended: &Ended<'_>,
-        line: impl Fn(&Crossing) -> CrossingLine,
-    ) -> Recording {
+    #[must_use]
+    pub fn finish(self, ended: &Ended<'_>, line: impl Fn(&Crossing) -> CrossingLine) -> Recording {
         let Ended { target, scenario, plant, arrived, wall_s } = *ended;
         let truth = plant.truth();
         let steps = plant.parameters().wall.steps().len();
-        let there = arrived.is_some_and(|way| {
-            let end_mm = match way {
+        let there = arrived.is_some_and(|direction| {
+            let end_mm = match direction {
                 Direction::Deploy => scenario.rig.rig.travel_mm,
                 Direction::Retract => 0.0,
             };
@@ -141,38 +140,9 @@ impl Tally {
     }
 }
 
-/// A row with what the plant knows; what the controller believes is `NaN`.
-pub(crate) fn true_row(t_s: f64, truth: &Truth) -> Row {
-    let unknown = f64::NAN;
-    Row {
-        t_s,
-        position_true_mm: truth.position_mm,
-        position_est_mm: unknown,
-        speed_true_mm_s: truth.speed_mm_s,
-        speed_est_mm_s: unknown,
-        speed_ref_mm_s: unknown,
-        preload_true_n: truth.preload_n,
-        preload_meas_n: unknown,
-        preload_ref_n: unknown,
-        radius_true_mm: truth.radius_mm,
-        radius_est_mm: unknown,
-        compression_true_mm: truth.depth_mm,
-        compression_meas_mm: unknown,
-        root_clearance_mm: truth.root_clearance_mm.unwrap_or(f64::NAN),
-        gap_predicted_mm: unknown,
-        corner_force_n: truth.corner_n,
-        floor_force_n: truth.floor_n,
-        utilisation: truth.utilisation,
-        slip_margin_true: truth.friction - truth.utilisation.abs(),
-        slip_margin_est: unknown,
-        slip_mm: truth.slip_mm,
-        vibration_um: truth.vibration_mm * 1e3,
-        ..Row::default()
-    }
-}
-
 /// A ledger line with what the plant knows.
-pub(crate) fn true_line(crossing: &Crossing) -> CrossingLine {
+#[must_use]
+pub fn true_line(crossing: &Crossing) -> CrossingLine {
     CrossingLine {
         index: crossing.index as u8,
         speed_mm_s: crossing.speed_mm_s,
@@ -225,7 +195,7 @@ mod tests {
                 Ended { target: "sil", scenario: &scenario, plant: &plant, arrived, wall_s: 1.0 };
             Tally::new(2.5, 0.0).finish(&ended, true_line).summary
         };
-        // It stands at the end of travel, but no step has been crossed.
+        // It is at the end of travel, but no step has been crossed.
         assert!(!finish(Some(Direction::Deploy)).completed);
         assert_eq!(finish(Some(Direction::Deploy)).travel_mm, end);
         assert!(!finish(None).completed);

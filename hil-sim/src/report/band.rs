@@ -11,21 +11,21 @@ use super::palette;
 use super::panel::{HEAD, LEFT, RIGHT};
 use super::panels::View;
 use super::svg::{Area, Drawn, SCALE, escape, font, text_width};
-use crate::record::{MODE_NAMES, Row, STAGE_NAMES};
+use crate::record::{MODE_NAMES, STAGE_NAMES, Tick};
 
 const S: i32 = SCALE as i32;
 
 /// One band: its name, and what a row shows in it.
 struct Lane {
     name: &'static str,
-    of: fn(&Row) -> u8,
+    of: fn(&Tick) -> u8,
     show: fn(u8) -> (String, RGBColor),
 }
 
 const LANES: [Lane; 3] = [
-    Lane { name: "mode", of: |row| row.mode, show: mode },
-    Lane { name: "stage", of: |row| row.stage, show: stage },
-    Lane { name: "level", of: |row| row.level, show: level },
+    Lane { name: "mode", of: |row| row.controller.mode, show: mode },
+    Lane { name: "stage", of: |row| row.controller.stage, show: stage },
+    Lane { name: "level", of: |row| row.controller.level, show: level },
 ];
 
 fn mode(number: u8) -> (String, RGBColor) {
@@ -92,7 +92,7 @@ pub(super) fn draw(view: &View, area: &Area) -> Drawn {
 }
 
 /// Spans of the axis over which `of` stays the same.
-fn spans(view: &View, of: fn(&Row) -> u8) -> Vec<(f64, f64, u8)> {
+fn spans(view: &View, of: fn(&Tick) -> u8) -> Vec<(f64, f64, u8)> {
     let mut spans: Vec<(f64, f64, u8)> = Vec::new();
     for row in view.rows {
         let (x, value) = (view.across.of(row), of(row));
@@ -109,7 +109,7 @@ fn spans(view: &View, of: fn(&Row) -> u8) -> Vec<(f64, f64, u8)> {
 }
 
 /// The colours of the modes and stages that occur, as HTML.
-pub(super) fn legend(rows: &[Row]) -> String {
+pub(super) fn legend(rows: &[Tick]) -> String {
     let mut html = String::new();
     for lane in &LANES[..2] {
         let present: BTreeSet<u8> = rows.iter().map(lane.of).collect();
@@ -129,16 +129,22 @@ pub(super) fn legend(rows: &[Row]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::Recording;
+    use crate::record::{Controller, Recording};
     use crate::report::panels::Across;
 
     #[test]
     fn spans_join_and_name_what_follows() {
-        let row = |t_s, mode| Row { t_s, mode, ..Row::default() };
+        let row = |t_s, mode| {
+            let controller = Controller { t_s, mode, ..Controller::default() };
+            Tick { controller, truth: None }
+        };
         let rows = vec![row(0.0, 5), row(1.0, 5), row(2.0, 6), row(3.0, 7)];
         let recording = Recording { rows, ..Recording::default() };
         let view = View::new(&recording, Across::Time);
-        assert_eq!(spans(&view, |row| row.mode), [(0.0, 2.0, 5), (2.0, 3.0, 6), (3.0, 3.0, 7)]);
+        assert_eq!(
+            spans(&view, |row| row.controller.mode),
+            [(0.0, 2.0, 5), (2.0, 3.0, 6), (3.0, 3.0, 7)]
+        );
         let legend = legend(&recording.rows);
         assert!(legend.contains("cruise") && !legend.contains("fault"), "{legend}");
     }

@@ -1,34 +1,18 @@
 //! Two runs side by side, crossing by crossing.
 
-use super::page::{STYLE, section};
+use super::ledger::{COLUMNS, Column};
+use super::page::{head, section};
 use super::palette;
 use super::panel::{Line, Look, Panel};
 use super::panels::Across;
 use super::svg::{self, escape};
-use super::tables::number;
+use super::tables;
 use super::verdict::{gap_sentence, headline};
-use crate::record::{CrossingLine, Recording, Row};
+use crate::record::{CrossingLine, Recording, Tick};
+use crate::table::number;
 
 /// Size of a plot, CSS pixels.
 const SIZE: (u32, u32) = (1100, 240);
-
-/// A quantity of the ledger: name, unit, decimals, value.
-type Quantity = (&'static str, &'static str, usize, fn(&CrossingLine) -> Option<f64>);
-
-const QUANTITIES: [Quantity; 12] = [
-    ("gap", "mm", 4, |c| Some(c.gap_mm)),
-    ("gap measured", "mm", 4, |c| c.gap_measured_mm),
-    ("gap predicted", "mm", 4, |c| c.gap_predicted_mm),
-    ("speed", "mm/s", 3, |c| Some(c.speed_mm_s)),
-    ("preload", "N", 2, |c| Some(c.preload_n)),
-    ("peak preload", "N", 2, |c| Some(c.peak_preload_n)),
-    ("corner force", "N", 2, |c| Some(c.corner_force_n)),
-    ("lead", "s", 3, |c| c.lead_time_s),
-    ("slip", "mm", 3, |c| Some(c.slip_mm)),
-    ("step found at", "mm", 3, |c| c.step_found_mm),
-    ("touch to lift", "s", 3, |c| Some((c.lift_s - c.touch_s).abs())),
-    ("touch at", "s", 3, |c| Some(c.touch_s)),
-];
 
 /// A difference between the two runs at a crossing.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -39,6 +23,9 @@ pub struct Difference {
     pub quantity: &'static str,
     /// Its unit.
     pub unit: &'static str,
+    /// Decimals that are shown.
+    #[serde(skip)]
+    pub decimals: usize,
     /// In the first run.
     pub a: Option<f64>,
     /// In the second.
@@ -53,15 +40,14 @@ pub struct Difference {
 pub fn differences(a: &Recording, b: &Recording) -> Vec<Difference> {
     let mut all = Vec::new();
     for (index, a, b) in pairs(a, b) {
-        for (quantity, unit, _, of) in QUANTITIES {
+        for Column { name: quantity, unit, decimals, of, .. } in COLUMNS {
             let value =
                 |line: Option<&CrossingLine>| line.and_then(of).filter(|value| value.is_finite());
             let (a, b) = (value(a), value(b));
-            if a.is_none() && b.is_none() {
-                continue;
+            if a.is_some() || b.is_some() {
+                let change = a.zip(b).map(|(a, b)| b - a);
+                all.push(Difference { index, quantity, unit, decimals, a, b, change });
             }
-            let change = a.zip(b).map(|(a, b)| b - a);
-            all.push(Difference { index, quantity, unit, a, b, change });
         }
     }
     all
@@ -84,11 +70,7 @@ fn pairs<'a>(a: &'a Recording, b: &'a Recording) -> Vec<Pair<'a>> {
 /// The page of two runs, which are called by these names.
 #[must_use]
 pub fn compare_html((name_a, a): (&str, &Recording), (name_b, b): (&str, &Recording)) -> String {
-    let mut page = format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-<title>interstage: two runs</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<main>\n"
-    );
+    let mut page = head("two runs");
     for (letter, name, run) in [("A", name_a, a), ("B", name_b, b)] {
         page += &format!(
             "<header>\n<p class=\"what\">{letter}: {}</p>\n<p><b>{}</b>; {}</p>\n</header>\n",
@@ -98,7 +80,7 @@ pub fn compare_html((name_a, a): (&str, &Recording), (name_b, b): (&str, &Record
         );
     }
     page += &section("Crossing by crossing", &table(&differences(a, b)));
-    page += &section("Along the way", &plots(a, b));
+    page += &section("Along the travel", &plots(a, b));
     page + "</main>\n</body>\n</html>\n"
 }
 
@@ -106,50 +88,36 @@ fn table(differences: &[Difference]) -> String {
     if differences.is_empty() {
         return "<p>Neither run crossed a step.</p>\n".to_owned();
     }
-    let mut html = "<table class=\"ledger\">\n<thead>\n<tr><th>step</th><th>quantity</th>\
-<th>A</th><th>B</th><th>B - A</th></tr>\n</thead>\n<tbody>\n"
-        .to_owned();
-    for difference in differences {
-        let decimals = QUANTITIES
-            .iter()
-            .find(|(name, ..)| *name == difference.quantity)
-            .map_or(3, |(_, _, decimals, _)| *decimals);
-        let change = difference
-            .change
-            .map_or_else(|| number(None, 0), |change| format!("{change:+.decimals$}"));
-        html += &format!(
-            "<tr><td>{}</td><td>{}, {}</td><td>{}</td><td>{}</td><td>{change}</td></tr>\n",
-            difference.index,
-            difference.quantity,
-            difference.unit,
-            number(difference.a, decimals),
-            number(difference.b, decimals),
-        );
-    }
-    html + "</tbody>\n</table>\n"
+    let head = ["step", "quantity", "A", "B", "B - A"].map(str::to_owned);
+    let rows =
+        differences.iter().map(|Difference { index, quantity, unit, decimals, a, b, change }| {
+            let change =
+                change.map_or_else(|| number(None, 0), |change| format!("{change:+.decimals$}"));
+            let (a, b) = (number(*a, *decimals), number(*b, *decimals));
+            vec![index.to_string(), format!("{quantity}, {unit}"), a, b, change]
+        });
+    tables::table("ledger", &head, rows.collect())
 }
 
 /// A plot: title, name of the axis, what it shows.
-type Plot = (&'static str, &'static str, fn(&Row) -> f64);
+type Plot = (&'static str, &'static str, fn(&Tick) -> f64);
 
 fn plots(a: &Recording, b: &Recording) -> String {
-    let known = |truth: f64, belief: f64| if truth.is_finite() { truth } else { belief };
     let plots: [Plot; 4] = [
-        ("Speed", "speed, mm/s", |row| row.speed_est_mm_s),
-        ("Preload", "preload, N", |row| row.preload_meas_n),
-        ("Tread compression", "compression, mm", |row| row.compression_meas_mm),
-        ("Radial position", "radius, mm", |row| row.radius_est_mm),
+        ("Speed", "speed, mm/s", |row| row.controller.wheel_speed_mm_s),
+        ("Preload", "preload, N", |row| row.controller.preload_n),
+        ("Tread compression", "compression, mm", |row| row.controller.compression_mm),
+        ("Radial position", "radius, mm", |row| row.controller.radius_mm),
     ];
-    let place = |row: &Row| known(row.position_true_mm, row.position_est_mm);
     let mut html = String::new();
     for (title, y_name, of) in plots {
-        let line = |name, colour, rows: &[Row]| Line {
+        let line = |name, colour, rows: &[Tick]| Line {
             name,
             look: Look::Other(colour),
             points: rows
                 .iter()
-                .filter(|row| (5..=9).contains(&row.mode))
-                .map(|row| (place(row), of(row)))
+                .filter(|row| (5..=9).contains(&row.controller.mode))
+                .map(|row| (row.position_mm(), of(row)))
                 .collect(),
         };
         let rows = |run: &Recording| Across::Position.range(&run.rows);
@@ -183,7 +151,7 @@ mod tests {
         b.summary.crossings[0].preload_n += 1.5;
         let all = differences(&a, &b);
         // The second crossing's gap was measured in neither.
-        assert_eq!(all.len(), 3 * QUANTITIES.len() - 1);
+        assert_eq!(all.len(), 3 * COLUMNS.len() - 1);
         let at = |index, quantity| {
             all.iter().find(|d| d.index == index && d.quantity == quantity).unwrap()
         };

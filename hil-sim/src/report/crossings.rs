@@ -43,8 +43,8 @@ fn view<'a>(recording: &'a Recording, line: &CrossingLine) -> View<'a> {
     let (first, last) = (line.touch_s.min(line.lift_s), line.touch_s.max(line.lift_s));
     let x = (-BEFORE_S, last - first + AFTER_S);
     let rows = &recording.rows;
-    let from = rows.partition_point(|row| row.t_s < first + x.0);
-    let to = rows.partition_point(|row| row.t_s <= first + x.1).max(from);
+    let from = rows.partition_point(|row| row.controller.t_s < first + x.0);
+    let to = rows.partition_point(|row| row.controller.t_s <= first + x.1).max(from);
     View { rows: &rows[from..to], x, ..View::new(recording, Across::Since(first)) }
 }
 
@@ -53,11 +53,13 @@ fn panels(view: &View) -> [Panel; 6] {
     clearance.title = "Clearance at the step root".to_owned();
     let mut forces = view.panel("Forces of corner and lower wall", "force, N");
     forces.lines = vec![
-        view.line("corner", Look::Truth, |row| row.corner_force_n),
-        view.line("lower wall", Look::Other(palette::FLOOR), |row| row.floor_force_n),
+        view.line("corner", Look::Truth, |row| row.of_truth(|t| t.corner_force_n)),
+        view.line("lower wall", Look::Other(palette::FLOOR), |row| {
+            row.of_truth(|t| t.floor_force_n)
+        }),
     ];
     let mut preload = view.preload();
-    // The limit may lie far above; it is in the plot of the whole run.
+    // The limit may be far above; it is in the plot of the run.
     let shown = preload.lines.iter().flat_map(|line| &line.points).map(|point| point.1);
     let range = axis::padded(axis::extent(shown).unwrap_or((0.0, 1.0)), 0.08);
     preload.levels.retain(|level| level.2 <= range.1 + 0.5 * (range.1 - range.0));
@@ -82,8 +84,10 @@ mod tests {
         let recording = example::deploy();
         let line = &recording.summary.crossings[1];
         let view = view(&recording, line);
-        assert!((view.rows[0].t_s - (line.touch_s - BEFORE_S)).abs() < 2e-3);
-        assert!((view.rows[view.rows.len() - 1].t_s - (line.lift_s + AFTER_S)).abs() < 2e-3);
+        assert!((view.rows[0].controller.t_s - (line.touch_s - BEFORE_S)).abs() < 2e-3);
+        assert!(
+            (view.rows[view.rows.len() - 1].controller.t_s - (line.lift_s + AFTER_S)).abs() < 2e-3
+        );
     }
 
     #[test]

@@ -5,9 +5,10 @@ use super::svg::{self, escape};
 use super::verdict::{Grade, gap_sentence, headline};
 use super::{Section, band, crossings, tables};
 use crate::record::Recording;
+use crate::table::number;
 
-pub(super) const STYLE: &str = include_str!("style.css");
-/// Size of a plot of the whole run, CSS pixels.
+const STYLE: &str = include_str!("style.css");
+/// Size of a plot of the run, CSS pixels.
 const SIZE: (u32, u32) = (1100, 240);
 /// Size of the bands, CSS pixels.
 const BAND_SIZE: (u32, u32) = (1100, 175);
@@ -21,11 +22,7 @@ pub(super) fn html(recording: &Recording, more: &[Section]) -> String {
         Grade::Fair => "fair",
         Grade::Bad => "bad",
     };
-    let mut page = format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-<title>interstage: {title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<main>\n"
-    );
+    let mut page = head(&title);
     page += &format!(
         "<header class=\"{grade}\">\n<p class=\"what\">interstage · {} controller · {} · rig {} · seed {}</p>\n\
 <h1>{}</h1>\n<p>{}; gross slip {} mm; {}</p>\n</header>\n",
@@ -35,7 +32,7 @@ pub(super) fn html(recording: &Recording, more: &[Section]) -> String {
         s.seed,
         escape(&headline(s)),
         capital(&gap_sentence(s)),
-        tables::number(s.slip_mm, 3),
+        number(s.slip_mm, 3),
         count(s.faults.len(), "fault") + ", " + &count(s.limits.len(), "limit") + " reported",
     );
     page += &section("Summary", &tables::summary(s));
@@ -43,9 +40,9 @@ pub(super) fn html(recording: &Recording, more: &[Section]) -> String {
         "Crossings",
         &format!(
             "{}<p class=\"note\">The gap of a crossing is the clearance between the step root \
-and the undeformed wheel at the instant at which the lower wall stops carrying load (on the way \
-back: begins to). Errors are against the true value. Lead: how long the wanted preload stood \
-before the corner touched.</p>\n",
+and the undeformed wheel at the instant at which the lower wall stops carrying load (on retraction: \
+ begins to). Errors are against the true value. Lead: how long before the corner touched \
+the preload was reached.</p>\n",
             tables::ledger(&s.crossings)
         ),
     );
@@ -66,6 +63,15 @@ before the corner touched.</p>\n",
         escape(&s.trace_digest),
     );
     page
+}
+
+/// The beginning of a page, up to its content.
+pub(super) fn head(title: &str) -> String {
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+<title>interstage: {title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<main>\n"
+    )
 }
 
 pub(super) fn section(title: &str, body: &str) -> String {

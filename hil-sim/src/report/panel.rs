@@ -19,11 +19,11 @@ const MARGIN: i32 = 4 * S;
 pub(super) const LEFT: i32 = 72 * S;
 /// Right of the plot: half a tick label.
 pub(super) const RIGHT: i32 = 18 * S;
-/// Height of the row of a legend that stands below the title.
+/// Height of the row of a legend below the title.
 const LEGEND: i32 = 20 * S;
 const TITLE_PX: f64 = 14.0;
 
-/// What a line stands for.
+/// What a line shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Look {
     /// What a sensor said: thin, below the others.
@@ -86,7 +86,7 @@ pub(super) struct Marks {
     pub(super) name: &'static str,
     pub(super) shape: Shape,
     pub(super) colour: RGBColor,
-    /// Shift to the right, drawing units, so that marks of one place stand side by side.
+    /// Shift to the right, drawing units, so that marks of one place are side by side.
     pub(super) shift: i32,
     pub(super) points: Vec<(f64, f64)>,
 }
@@ -191,16 +191,16 @@ impl Panel {
     }
 
     /// Everything that the legend names, in its order.
-    fn legend(&self) -> Vec<(&'static str, Sign<'_>)> {
-        let lines = self.lines.iter().map(|line| (line.name, Sign::Line(line.look)));
-        let levels = self.levels.iter().map(|&(name, look, _)| (name, Sign::Line(look)));
-        let marks = self.marks.iter().map(|marks| (marks.name, Sign::Mark(marks)));
+    fn legend(&self) -> Vec<(&'static str, Sample<'_>)> {
+        let lines = self.lines.iter().map(|line| (line.name, Sample::Line(line.look)));
+        let levels = self.levels.iter().map(|&(name, look, _)| (name, Sample::Line(look)));
+        let marks = self.marks.iter().map(|marks| (marks.name, Sample::Mark(marks)));
         lines.chain(levels).chain(marks).collect()
     }
 
     /// One row, or two where title and legend do not fit side by side.
     fn head_height(&self, area: &Area) -> i32 {
-        let legend: i32 = self.legend().iter().map(Sign::width).sum();
+        let legend: i32 = self.legend().iter().map(Sample::width).sum();
         let title = text_width(&self.title, TITLE_PX);
         let fits = title + legend + RIGHT + 24 * S <= area.dim_in_pixel().0 as i32;
         if fits { HEAD } else { HEAD + LEGEND }
@@ -214,37 +214,37 @@ impl Panel {
         let middle = if high as i32 > HEAD { HEAD - 4 * S + LEGEND / 2 } else { HEAD / 2 };
         let mut right = wide as i32 - RIGHT;
         for entry in self.legend().iter().rev() {
-            let (name, sign) = entry;
+            let (name, sample) = entry;
             let style = font(TEXT_PX, palette::TEXT, HPos::Left, VPos::Center);
             let text = right - text_width(name, TEXT_PX);
             head.draw(&Text::new(*name, (text, middle), style))?;
-            match sign {
-                Sign::Line(look) => {
+            match sample {
+                Sample::Line(look) => {
                     let ends = [(text - 32 * S, middle), (text - 6 * S, middle)];
                     head.draw(&PathElement::new(ends, look.style()))?;
                 }
-                Sign::Mark(marks) => {
+                Sample::Mark(marks) => {
                     for part in mark(marks, (text - 13 * S, middle)) {
                         head.draw(&part)?;
                     }
                 }
             }
-            right -= Sign::width(entry);
+            right -= Sample::width(entry);
         }
         Ok(())
     }
 }
 
-/// What stands before a name in the legend.
-enum Sign<'a> {
+/// What is before a name in the legend.
+enum Sample<'a> {
     Line(Look),
     Mark(&'a Marks),
 }
 
-impl Sign<'_> {
+impl Sample<'_> {
     /// Width of an entry of the legend with the room before it, in drawing units.
-    fn width((name, sign): &(&str, Self)) -> i32 {
-        let room = match sign {
+    fn width((name, sample): &(&str, Self)) -> i32 {
+        let room = match sample {
             Self::Line(_) => 44 * S,
             Self::Mark(_) => 34 * S,
         };

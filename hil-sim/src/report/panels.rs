@@ -1,11 +1,11 @@
-//! The plots of a whole run, over time or over position.
+//! The plots of a run, over time or over position.
 
 use plotters::style::RGBColor;
 
 use super::axis;
 use super::palette;
 use super::panel::{Line, Look, Marks, Panel, Shape};
-use crate::record::{CrossingLine, Recording, Row};
+use crate::record::{CrossingLine, Recording, Tick};
 
 /// From one mark of a crossing to the next, drawing units.
 const SIDE: i32 = 22;
@@ -31,19 +31,19 @@ impl Across {
         }
     }
 
-    /// Where `row` stands on the axis.
-    pub(super) fn of(self, row: &Row) -> f64 {
+    /// The place of `row` on the axis.
+    pub(super) fn of(self, row: &Tick) -> f64 {
         match self {
-            Self::Time => row.t_s,
-            Self::Since(start_s) => row.t_s - start_s,
-            Self::Position if row.position_true_mm.is_finite() => row.position_true_mm,
-            Self::Position => row.position_est_mm,
+            Self::Time => row.controller.t_s,
+            Self::Since(start_s) => row.controller.t_s - start_s,
+            Self::Position => row.position_mm(),
         }
     }
 
-    /// Where the time `t_s` stands on the axis.
-    fn at(self, rows: &[Row], t_s: f64) -> f64 {
-        let place = rows.partition_point(|row| row.t_s < t_s).min(rows.len().saturating_sub(1));
+    /// The place of the time `t_s` on the axis.
+    fn at(self, rows: &[Tick], t_s: f64) -> f64 {
+        let place =
+            rows.partition_point(|row| row.controller.t_s < t_s).min(rows.len().saturating_sub(1));
         match self {
             Self::Time => t_s,
             Self::Since(start_s) => t_s - start_s,
@@ -52,7 +52,7 @@ impl Across {
     }
 
     /// Range of all rows.
-    pub(super) fn range(self, rows: &[Row]) -> (f64, f64) {
+    pub(super) fn range(self, rows: &[Tick]) -> (f64, f64) {
         let range = axis::extent(rows.iter().map(|row| self.of(row))).unwrap_or((0.0, 1.0));
         match self {
             Self::Time | Self::Since(_) => (range.0, range.1.max(range.0 + 1e-3)),
@@ -64,16 +64,16 @@ impl Across {
 /// The run as the plots need it.
 pub(super) struct View<'a> {
     pub(super) recording: &'a Recording,
-    pub(super) rows: &'a [Row],
+    pub(super) rows: &'a [Tick],
     pub(super) across: Across,
     pub(super) x: (f64, f64),
     pub(super) shades: Vec<(f64, f64)>,
-    /// Largest preload, N, if the parameters tell it.
+    /// Largest preload, N, if the parameters have it.
     pub(super) limit_n: Option<f64>,
 }
 
 impl<'a> View<'a> {
-    /// The whole of `recording`.
+    /// All of `recording`.
     pub(super) fn new(recording: &'a Recording, across: Across) -> Self {
         let rows = &recording.rows[..];
         let span = |c: &CrossingLine| {
@@ -107,7 +107,7 @@ impl<'a> View<'a> {
     }
 
     /// A line of one field.
-    pub(super) fn line(&self, name: &'static str, look: Look, of: impl Fn(&Row) -> f64) -> Line {
+    pub(super) fn line(&self, name: &'static str, look: Look, of: impl Fn(&Tick) -> f64) -> Line {
         let points = self.rows.iter().map(|row| (self.across.of(row), of(row))).collect();
         Line { name, look, points }
     }
@@ -140,9 +140,11 @@ impl<'a> View<'a> {
         let mut panel = self.panel("Speed", "speed, mm/s");
         panel.least_span = 2.0;
         panel.lines = vec![
-            self.line("wanted", Look::Wanted, |row| row.speed_ref_mm_s),
-            self.line("estimated", Look::Estimate(palette::SPEED), |row| row.speed_est_mm_s),
-            self.line("true", Look::Truth, |row| row.speed_true_mm_s),
+            self.line("reference", Look::Wanted, |row| row.controller.speed_ref_mm_s),
+            self.line("estimated", Look::Estimate(palette::SPEED), |row| {
+                row.controller.wheel_speed_mm_s
+            }),
+            self.line("true", Look::Truth, |row| row.of_truth(|t| t.speed_true_mm_s)),
         ];
         panel
     }
@@ -151,9 +153,9 @@ impl<'a> View<'a> {
         let mut panel = self.panel("Preload", "preload, N");
         panel.least_span = 4.0;
         panel.lines = vec![
-            self.line("wanted", Look::Wanted, |row| row.preload_ref_n),
-            self.line("measured", Look::Measured(palette::PRELOAD), |row| row.preload_meas_n),
-            self.line("true", Look::Truth, |row| row.preload_true_n),
+            self.line("reference", Look::Wanted, |row| row.controller.preload_ref_n),
+            self.line("measured", Look::Measured(palette::PRELOAD), |row| row.controller.preload_n),
+            self.line("true", Look::Truth, |row| row.of_truth(|t| t.preload_true_n)),
         ];
         panel.levels = self.limit_n.iter().map(|&n| ("limit", Look::Limit, n)).collect();
         panel
@@ -162,7 +164,8 @@ impl<'a> View<'a> {
     pub(super) fn gap(&self) -> Panel {
         let summary = &self.recording.summary;
         let mut panel = self.panel("Clearance at the step root, and the gap", "clearance, mm");
-        panel.lines = vec![self.line("clearance", Look::Truth, |row| row.root_clearance_mm)];
+        panel.lines =
+            vec![self.line("clearance", Look::Truth, |row| row.of_truth(|t| t.root_clearance_mm))];
         panel.marks = vec![
             self.marks("predicted", (Shape::Triangle, palette::FLOOR, -SIDE), |c| {
                 c.gap_predicted_mm
@@ -171,7 +174,7 @@ impl<'a> View<'a> {
             self.marks("measured", (Shape::Ring, palette::GAP, SIDE), |c| c.gap_measured_mm),
         ];
         if summary.gap_ref_mm > 0.0 {
-            panel.levels = vec![("reference", Look::Limit, summary.gap_ref_mm)];
+            panel.levels = vec![("reference gap", Look::Limit, summary.gap_ref_mm)];
         }
         // The clearance before touch and after the climb says nothing about the gap.
         let gaps = panel.marks.iter().flat_map(|marks| &marks.points).map(|point| point.1);
@@ -184,9 +187,9 @@ impl<'a> View<'a> {
         let mut panel = self.panel("Radial position of the wheel centre", "radius, mm");
         panel.lines = vec![
             self.line("from the arm angle", Look::Estimate(palette::RADIUS), |row| {
-                row.radius_est_mm
+                row.controller.radius_mm
             }),
-            self.line("true", Look::Truth, |row| row.radius_true_mm),
+            self.line("true", Look::Truth, |row| row.of_truth(|t| t.radius_true_mm)),
         ];
         panel
     }
@@ -195,8 +198,10 @@ impl<'a> View<'a> {
         let mut panel = self.panel("Slip margin", "friction left unused");
         panel.least_span = 0.2;
         panel.lines = vec![
-            self.line("by the model", Look::Estimate(palette::SLIP), |row| row.slip_margin_est),
-            self.line("true", Look::Truth, |row| row.slip_margin_true),
+            self.line("by the model", Look::Estimate(palette::SLIP), |row| {
+                row.controller.slip_margin
+            }),
+            self.line("true", Look::Truth, |row| row.of_truth(|t| t.slip_margin_true)),
         ];
         panel.levels = vec![("slip", Look::Limit, 0.0)];
         panel
@@ -207,9 +212,9 @@ impl<'a> View<'a> {
         panel.least_span = 0.1;
         panel.lines = vec![
             self.line("measured", Look::Measured(palette::COMPRESSION), |row| {
-                row.compression_meas_mm
+                row.controller.compression_mm
             }),
-            self.line("true", Look::Truth, |row| row.compression_true_mm),
+            self.line("true", Look::Truth, |row| row.of_truth(|t| t.compression_true_mm)),
         ];
         panel
     }

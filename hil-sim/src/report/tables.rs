@@ -1,15 +1,21 @@
 //! The tables of the page.
 
+use super::ledger::{COLUMNS, Column};
 use super::svg::escape;
 use crate::record::{CrossingLine, LogLine, Report, Summary};
+use crate::table::number;
 
-/// What has no value.
-const NONE: &str = "–";
-
-/// `value` with `decimals`; a dash if it is missing or no number.
-pub(super) fn number(value: impl Into<Option<f64>>, decimals: usize) -> String {
-    let value = value.into().filter(|value| value.is_finite());
-    value.map_or(NONE.to_owned(), |value| format!("{value:.decimals$}"))
+/// A table as HTML, without a head if that is empty; the cells are HTML already.
+pub(super) fn table(class: &str, head: &[String], rows: Vec<Vec<String>>) -> String {
+    let cells = |tag: &str, cells: &[String]| -> String {
+        let cells: String = cells.iter().map(|cell| format!("<{tag}>{cell}</{tag}>")).collect();
+        format!("<tr>{cells}</tr>\n")
+    };
+    let head = if head.is_empty() { String::new() } else { cells("th", head) };
+    let rows: String = rows.iter().map(|row| cells("td", row)).collect();
+    format!(
+        "<table class=\"{class}\">\n<thead>\n{head}</thead>\n<tbody>\n{rows}</tbody>\n</table>\n"
+    )
 }
 
 /// The summary as pairs.
@@ -41,50 +47,28 @@ pub(super) fn summary(s: &Summary) -> String {
 
 /// The ledger of the crossings.
 pub(super) fn ledger(crossings: &[CrossingLine]) -> String {
-    const HEAD: &str = "<table class=\"ledger\">\n<thead>\n<tr><th rowspan=2>step</th>\
-<th colspan=3>gap, mm</th><th colspan=2>preload, N</th><th rowspan=2>lead<br>s</th>\
-<th rowspan=2>speed<br>mm/s</th><th rowspan=2>slip<br>mm</th><th rowspan=2>corner<br>N</th>\
-<th rowspan=2>friction<br>used</th><th colspan=2>step position, mm</th></tr>\n\
-<tr><th>true</th><th>predicted</th><th>measured</th><th>at lift</th><th>peak</th>\
-<th>true</th><th>found</th></tr>\n</thead>\n<tbody>\n";
     if crossings.is_empty() {
         return "<p>No step was crossed.</p>\n".to_owned();
     }
-    let rows: String = crossings.iter().map(ledger_row).collect();
-    format!("{HEAD}{rows}</tbody>\n</table>\n")
+    let names = COLUMNS.iter().map(|column| format!("{}<br>{}", column.name, column.unit));
+    let head: Vec<String> = std::iter::once("step".to_owned()).chain(names).collect();
+    let rows = crossings.iter().map(|line| {
+        let cells = COLUMNS.iter().map(|column| cell(column, line));
+        std::iter::once(line.index.to_string()).chain(cells).collect()
+    });
+    table("ledger", &head, rows.collect())
 }
 
-fn ledger_row(c: &CrossingLine) -> String {
-    let cells = [
-        c.index.to_string(),
-        number(c.gap_mm, 4),
-        against(c.gap_predicted_mm, c.gap_mm),
-        against(c.gap_measured_mm, c.gap_mm),
-        number(c.preload_n, 2),
-        number(c.peak_preload_n, 2),
-        number(c.lead_time_s, 3),
-        number(c.speed_mm_s, 2),
-        number(c.slip_mm, 3),
-        number(c.corner_force_n, 1),
-        number(c.peak_utilisation, 2),
-        number(c.step_mm, 3),
-        number(c.step_found_mm, 3)
-            + &error(c.step_found_mm, c.step_mm, |error| format!("{:+.0} µm", 1e3 * error)),
-    ];
-    let cells: String = cells.iter().map(|cell| format!("<td>{cell}</td>")).collect();
-    format!("<tr>{cells}</tr>\n")
-}
-
-/// A gap with its error against the true one.
-fn against(gap_mm: Option<f64>, true_mm: f64) -> String {
-    let show = |error| format!("{:+.0} µm, {:+.1} %", 1e3 * error, 100.0 * error / true_mm);
-    number(gap_mm, 4) + &error(gap_mm, true_mm, show)
-}
-
-/// The error of `value` in small print, if there is a value and a true one.
-fn error(value: Option<f64>, true_value: f64, show: impl Fn(f64) -> String) -> String {
-    let error = value.map(|value| value - true_value).filter(|error| error.is_finite());
-    error.map_or(String::new(), |error| format!("<small>{}</small>", show(error)))
+/// A value, with its error in small print if there is a true one.
+fn cell(column: &Column, line: &CrossingLine) -> String {
+    let value = (column.of)(line);
+    let error = column.truth.zip(value).map(|((truth, show), value)| {
+        let truth = truth(line);
+        if truth.is_finite() { show(value - truth, truth) } else { String::new() }
+    });
+    let error = error.filter(|text| !text.is_empty());
+    number(value, column.decimals)
+        + &error.map_or_else(String::new, |text| format!("<small>{text}</small>"))
 }
 
 /// Faults and limits, in the order of time.
@@ -92,24 +76,19 @@ pub(super) fn reports(s: &Summary) -> String {
     let mut all: Vec<(&str, &Report)> = s.faults.iter().map(|r| ("fault", r)).collect();
     all.extend(s.limits.iter().map(|r| ("limit", r)));
     all.sort_by(|a, b| a.1.t_s.total_cmp(&b.1.t_s));
-    let injected =
-        s.injected.iter().map(|fault| format!("<p>Brought about: {}.</p>\n", escape(fault)));
+    let injected = s.injected.iter().map(|fault| format!("<p>Injected: {}.</p>\n", escape(fault)));
     let injected: String = injected.collect();
     if all.is_empty() {
         return injected + "<p>No fault, no limit.</p>\n";
     }
-    let rows: String = all
-        .iter()
-        .map(|(kind, r)| {
-            format!(
-                "<tr class={kind}><td>{:.3} s</td><td>{kind} {}</td><td>{}</td></tr>\n",
-                r.t_s,
-                r.code,
-                escape(&r.text)
-            )
-        })
-        .collect();
-    format!("{injected}<table class=\"lines\">\n{rows}</table>\n")
+    let rows = all.iter().map(|(kind, r)| {
+        vec![
+            format!("{:.3} s", r.t_s),
+            format!("<b class={kind}>{kind} {}</b>", r.code),
+            escape(&r.text),
+        ]
+    });
+    injected + &table("lines", &[], rows.collect())
 }
 
 /// The log.
@@ -117,11 +96,8 @@ pub(super) fn log(lines: &[LogLine]) -> String {
     if lines.is_empty() {
         return "<p>The log is empty.</p>\n".to_owned();
     }
-    let rows: String = lines
-        .iter()
-        .map(|line| format!("<tr><td>{:.3} s</td><td>{}</td></tr>\n", line.t_s, escape(&line.text)))
-        .collect();
-    format!("<table class=\"lines\">\n{rows}</table>\n")
+    let rows = lines.iter().map(|line| vec![format!("{:.3} s", line.t_s), escape(&line.text)]);
+    table("lines", &[], rows.collect())
 }
 
 #[cfg(test)]
@@ -130,10 +106,14 @@ mod tests {
     use crate::report::example;
 
     #[test]
-    fn errors_stand_beside_the_gaps() {
-        assert_eq!(against(Some(1.55), 1.5), "1.5500<small>+50 µm, +3.3 %</small>");
-        assert_eq!(against(None, 1.5), NONE);
-        assert_eq!(against(Some(1.55), f64::NAN), "1.5500");
+    fn errors_are_shown_beside_the_gaps() {
+        let line = CrossingLine { gap_mm: 1.5, ..CrossingLine::default() };
+        let measured = &COLUMNS[2];
+        let show = |gap_mm, gap_measured_mm| {
+            cell(measured, &CrossingLine { gap_mm, gap_measured_mm, ..line })
+        };
+        assert_eq!(show(1.5, Some(1.55)), "1.5500<small>+50 µm, +3.3 %</small>");
+        assert_eq!((show(1.5, None), show(f64::NAN, Some(1.55))), ("-".into(), "1.5500".into()));
     }
 
     #[test]
@@ -143,11 +123,11 @@ mod tests {
     }
 
     #[test]
-    fn what_was_brought_about_is_named_before_what_was_found() {
+    fn injected_faults_are_named_before_those_found() {
         let mut summary = example::faulted().summary;
         summary.injected = vec!["load-cell stuck from 2 s".to_owned()];
         let text = reports(&summary);
-        assert!(text.starts_with("<p>Brought about: load-cell stuck from 2 s.</p>"), "{text}");
+        assert!(text.starts_with("<p>Injected: load-cell stuck from 2 s.</p>"), "{text}");
         assert!(text.contains("fault 121"));
     }
 

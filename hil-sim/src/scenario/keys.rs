@@ -1,7 +1,7 @@
 //! The keys of a scenario: what each takes and in which unit.
 
 use documented::DocumentedFields;
-use interstage::rig::{Drive, Geometry, Goals, Loads, Pretightener, Sensors, Tread};
+use interstage::rig::{ControlSettings, Drive, Geometry, Loads, Pretightener, Sensors, Tread};
 use serde::Serialize;
 use toml::{Table, Value};
 
@@ -147,7 +147,7 @@ fn descriptions() -> Vec<(String, String)> {
         fields::<Pretightener>("preload"),
         fields::<Drive>("drive"),
         fields::<Sensors>("sense"),
-        fields::<Goals>("control"),
+        fields::<ControlSettings>("control"),
         fields::<Spread>("spread"),
         fields::<Noise>("noise"),
         fields::<RunOptions>("run"),

@@ -40,7 +40,7 @@ use sweeps::{Sweep, Variable};
 use crate::reference::ReferenceError;
 use crate::reference::beam::BeamError;
 use hil_sim::plant::balance::BalanceError;
-use hil_sim::sil::RunError;
+use hil_sim::session::RunError;
 
 /// Everything that is regenerated.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -4,7 +4,7 @@
 use hil_sim::faults::campaign::{Campaign, Case, MatrixRow, Outcome};
 use hil_sim::scenario::Scenario;
 use hil_sim::scenario::injection::{Injection, Kind, Target};
-use hil_sim::sil::{Options, run};
+use hil_sim::session::{Options, run};
 
 fn campaign(instants: usize, wanted: impl Fn(&str) -> bool) -> Outcome {
     let cases = Case::all().into_iter().filter(|case| wanted(&case.name())).collect();

@@ -1,8 +1,8 @@
 //! Stress of plant and controller, and what may be left out of a tick without a trace.
 
 use hil_sim::scenario::{Direction, Scenario};
-use hil_sim::sil::{Options, Session};
-use hil_sim::stress::{Figure, self};
+use hil_sim::session::{Options, Session};
+use hil_sim::stress::{self, Figure};
 use interstage::supervise::{Command, Leg, Mode};
 use interstage::tick::Output;
 

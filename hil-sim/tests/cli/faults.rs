@@ -1,8 +1,7 @@
 //! `rig faults`.
 
+use super::{code, good, rig};
 use serde_json::Value;
-
-use crate::{code, good, rig};
 
 /// What it said of an error.
 fn complaint(arguments: &[&str]) -> String {

@@ -2,7 +2,7 @@
 
 use std::process::{Command, Output};
 
-use crate::{code, said};
+use super::{code, said};
 
 fn flash_by(program: &str, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_rig"))

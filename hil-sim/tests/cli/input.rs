@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::{code, is_empty, rig_in};
+use super::{code, is_empty, rig_in};
 
 /// Runs the command and expects it to refuse, naming each of `names`.
 fn refused_in(directory: &Path, arguments: &[&str], names: &[&str]) {
@@ -115,10 +115,5 @@ fn the_other_verbs_name_what_they_refuse_too() {
     }
     refused(&["montecarlo", "-n", "0"], &["-n"]);
     refused(&["montecarlo", "-n", "-3"], &["-3"]);
-    refused(&["modes", "--ends", "glued-free"], &["--ends", "clamped-free"]);
-    refused(&["modes", "--tip-mass-kg", "-1"], &["--tip-mass-kg"]);
-    refused(&["modes", "--tip-mass-kg", "nan"], &["--tip-mass-kg"]);
-    refused(&["modes", "--count", "0"], &["--count"]);
-    refused(&["modes", "--count", "21"], &["--count"]);
     refused(&["keys", "--rig", "moon"], &["--rig"]);
 }

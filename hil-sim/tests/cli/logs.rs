@@ -3,16 +3,16 @@
 use std::path::{Path, PathBuf};
 
 use hil_sim::scenario::Scenario;
-use hil_sim::sil;
+use hil_sim::session;
 use serde_json::Value;
 
-use crate::{code, good, number, object, rig, rig_in, said};
+use super::{code, good, number, object, rig, rig_in, said};
 
 /// The frames of a deployment.
 fn frames() -> Vec<Vec<u8>> {
-    let options = sil::Options { rows: true, ..sil::Options::default() };
-    let stream = sil::run(&Scenario::default(), options).expect("a run").stream;
-    hil_sim::log::pieces(&stream).map(<[u8]>::to_vec).collect()
+    let options = session::Options { rows: true, ..session::Options::default() };
+    let stream = session::run(&Scenario::default(), options).expect("a run").stream;
+    hil_sim::record::pieces(&stream).map(<[u8]>::to_vec).collect()
 }
 
 /// A directory with a file in it.
@@ -72,7 +72,7 @@ fn a_log_that_was_tampered_with_shows_its_first_difference() {
     let csv = directory.path().join("log.csv");
     let table = std::fs::read_to_string(&csv).expect("readable");
     let mut lines: Vec<String> = table.lines().map(str::to_owned).collect();
-    let column = lines[0].split(',').position(|name| name == "load_cell_code").expect("there");
+    let column = lines[0].split(',').position(|name| name == "preload_code").expect("there");
     let mut cells: Vec<String> = lines[3001].split(',').map(str::to_owned).collect();
     let tick = cells[0].clone();
     let code_before: u16 = cells[column].parse().expect("a code");
@@ -83,7 +83,7 @@ fn a_log_that_was_tampered_with_shows_its_first_difference() {
     assert_eq!(code(&output), 1);
     let told = said(&output);
     assert!(told.contains(&format!("differs at tick {tick} ")), "{told}");
-    assert!(told.contains("sensing: preload, N was "), "{told}");
+    assert!(told.contains("sensing: preload_n was "), "{told}");
 }
 
 #[test]
@@ -110,14 +110,9 @@ fn a_log_has_its_report_and_two_logs_their_comparison() {
 }
 
 #[test]
-fn a_view_without_terminal_ends_by_itself_and_leaves_its_picture() {
-    let directory = tempfile::tempdir().expect("a directory");
-    let arguments =
-        ["live", "--headless", "--fast", "--listen", "127.0.0.1:0", "--picture", "view.svg"];
-    let output = rig_in(directory.path(), &arguments);
+fn a_view_without_terminal_ends_by_itself() {
+    let output = rig(&["live", "--headless", "--fast", "--listen", "127.0.0.1:0"]);
     assert_eq!(code(&output), 0, "{}", String::from_utf8_lossy(&output.stderr));
-    let picture = std::fs::read_to_string(directory.path().join("view.svg")).expect("a picture");
-    assert!(picture.contains("complete") && picture.contains("preload,\u{a0}N"));
     refused(&["live"], "no terminal");
     refused(&["live", "--headless", "--listen", "nowhere"], "--listen nowhere");
 }
@@ -146,7 +141,7 @@ fn a_log_of_other_parameters_is_refused_until_they_are_given() {
     let frames: Vec<u8> = mcap::MessageStream::new(&bytes)
         .expect("a file")
         .map(|message| message.expect("whole"))
-        .filter(|message| message.channel.topic == hil_sim::log::FRAMES)
+        .filter(|message| message.channel.topic == hil_sim::record::FRAMES)
         .flat_map(|message| message.data.to_vec())
         .collect();
     std::fs::write(directory.path().join("line.bin"), frames).expect("written");

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::{code, good, number, rig, said};
+use super::{code, good, number, rig, said};
 
 fn campaign(more: &[&str]) -> Value {
     good(&[&["montecarlo", "--json"], more].concat())

@@ -7,7 +7,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use hil_sim::plant::ledger::Crossing;
 use hil_sim::plant::rig::Truth;
 use hil_sim::scenario::{Direction, Scenario};
-use hil_sim::sil::{Options, Session};
+use hil_sim::session::{Options, Session};
 use interstage::fault::Fault;
 use interstage::sense::raw::SensorFrame;
 use interstage::supervise::{Command, Mode};

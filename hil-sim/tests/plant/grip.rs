@@ -3,7 +3,7 @@
 use hil_sim::plant::rig::{Drives, PlantError, Resolution, VirtualRig};
 use hil_sim::plant::wall::Wall;
 use hil_sim::scenario::Scenario;
-use hil_sim::sil::{Options, run};
+use hil_sim::session::{Options, run};
 
 use super::bench::{TICK_S, close, deploy, drive, ideal, nominal, roll};
 

@@ -37,7 +37,7 @@ pub(super) fn on_probe(
 }
 
 /// Runs the scenario over this port.
-fn close(
+pub fn close(
     args: &Args,
     port: &mut dyn crate::probe::Port,
     scenario: &Scenario,
@@ -48,10 +48,10 @@ fn close(
     use crate::progress;
 
     let asked = Asked { rows: directory.is_some(), target };
-    let way = scenario.run.direction.name();
+    let direction = scenario.run.direction.name();
     let recording = {
-        let progress = progress::spinner(way);
-        hil::run(port, scenario, asked, |t_s| progress.say(&format!("{way}, {t_s:.1} s")))
+        let progress = progress::spinner(direction);
+        hil::run(port, scenario, asked, |t_s| progress.say(&format!("{direction}, {t_s:.1} s")))
     };
     let recording = recording.map_err(|error| match error {
         HilError::Controller(_)

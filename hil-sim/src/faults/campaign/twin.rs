@@ -13,7 +13,7 @@ use super::LONGEST_S;
 use super::operator::Operator;
 use crate::plant::rig::Truth;
 use crate::scenario::Scenario;
-use crate::sil::{Options, RunError, Session};
+use crate::session::{Options, RunError, Session};
 
 /// Differences from the twin that count as a sign of the fault: preload, N; position, mm;
 /// speed, mm/s. Ten deviations of the load cell, five counts of the encoder, and what the

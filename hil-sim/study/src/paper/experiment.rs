@@ -22,7 +22,7 @@ use crate::figure::Series;
 use crate::reference::ReferenceError;
 use crate::reference::vibration::modal::Modal;
 use hil_sim::plant::rig::VirtualRig;
-use hil_sim::sil::{Options, Session};
+use hil_sim::session::{Options, Session};
 
 /// Crossings of a deployment.
 pub const STAGES: usize = 3;

@@ -1,0 +1,90 @@
+//! Files that are complete or absent.
+
+use std::error::Error;
+use std::fs::{self, File};
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// What may go wrong while a file is filled.
+pub(crate) type Failure = Box<dyn Error + Send + Sync>;
+
+/// A file that could not be written; displays as one line with its path.
+#[derive(Debug, thiserror::Error)]
+pub enum FileError {
+    /// The directory cannot be made.
+    #[error("{}: cannot make the directory: {source}", path.display())]
+    Directory {
+        /// The directory.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file cannot be written.
+    #[error("{}: cannot be written: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: Failure,
+    },
+}
+
+/// Fills the file at `path` by `fill`, under a temporary name beside it until it is complete.
+pub(crate) fn atomic_write(
+    path: &Path,
+    fill: impl FnOnce(&mut BufWriter<&File>) -> Result<(), Failure>,
+) -> Result<(), FileError> {
+    let write = || {
+        let mut builder = tempfile::Builder::new();
+        builder.suffix(".partial");
+        // As any new file: the user's mask decides.
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let file = builder.tempfile_in(folder.unwrap_or(Path::new(".")))?;
+        let mut out = BufWriter::with_capacity(1 << 18, file.as_file());
+        fill(&mut out)?;
+        out.flush()?;
+        drop(out);
+        file.persist(path)?;
+        Ok(())
+    };
+    write().map_err(|source| FileError::File { path: path.to_owned(), source })
+}
+
+/// Writes `text` to `path`, which is complete or as it was.
+///
+/// # Errors
+/// [`FileError::File`] with the reason.
+pub fn write_text(path: &Path, text: &str) -> Result<(), FileError> {
+    atomic_write(path, |out| Ok(out.write_all(text.as_bytes())?))
+}
+
+/// Makes `directory` and those above it.
+///
+/// # Errors
+/// [`FileError::Directory`] with the reason.
+pub fn make_directory(directory: &Path) -> Result<(), FileError> {
+    fs::create_dir_all(directory)
+        .map_err(|source| FileError::Directory { path: directory.to_owned(), source })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_fails_half_way_leaves_the_old_one() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("report.html");
+        write_text(&path, "old").unwrap();
+        let error = atomic_write(&path, |out| {
+            out.write_all(b"new")?;
+            Err("the disk is full".into())
+        })
+        .unwrap_err();
+        assert!(error.to_string().ends_with("report.html: cannot be written: the disk is full"));
+        assert_eq!(fs::read_to_string(&path).unwrap(), "old");
+        assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 1);
+    }
+}

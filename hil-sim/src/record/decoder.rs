@@ -1,0 +1,507 @@
+//! Bytes of the binary channel to what they say.
+//!
+//! Nothing is lost unnoticed: what is missing between two frames is an item of its own.
+//! Garbage ends at the next sound frame; a restart of the target is recognised by its
+//! sequence or its clock going back.
+
+use interstage::log::capture::CaptureChunk;
+use interstage::log::frame::{Body, Frame, Seen, look};
+use interstage::log::identity::SCHEMA;
+use interstage::log::ledger::Line;
+use interstage::log::{Identity, Record};
+use interstage::model::{Plan, PlanRequest};
+use interstage::sense::raw::SensorFrame;
+use interstage::tick::Entry;
+use serde::{Deserialize, Serialize};
+
+/// What a log says, in its order.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Item {
+    /// The target's identity; once a second.
+    Identity(Identity),
+    /// A tick, and the codes that it found with their times.
+    Tick(Record, SensorFrame),
+    /// A tick was given this plan.
+    Plan(u32, Plan),
+    /// A tick asked for a plan.
+    Request(u32, PlanRequest),
+    /// Something happened.
+    Event(Entry),
+    /// A piece of a capture.
+    CaptureChunk(CaptureChunk),
+    /// A crossing was closed.
+    Ledger(Line),
+    /// Here something is missing.
+    Mark(Mark),
+}
+
+/// What is missing at a place of a log, and why.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Mark {
+    /// Frames are missing; so many of them found no room on the channel.
+    Lost {
+        /// All that are missing.
+        frames: u32,
+        /// Those of them that the target dropped itself.
+        dropped: u32,
+    },
+    /// Bytes that are no frame.
+    Garbage {
+        /// How many.
+        bytes: u64,
+    },
+    /// Between two ticks there are others that are not in the log although no frame is
+    /// missing: the journal came too late.
+    Skipped {
+        /// How many.
+        ticks: u32,
+    },
+    /// Between two ticks there are others that never ran: the control tick came late.
+    Overrun {
+        /// How many.
+        ticks: u32,
+    },
+    /// The log does not begin with the target's first frame; so many went before.
+    Joined {
+        /// How many.
+        frames: u32,
+    },
+    /// The target restarted.
+    Restart,
+    /// A frame of another layout than this reader knows.
+    Schema {
+        /// Its number.
+        found: u16,
+    },
+}
+
+impl std::fmt::Display for Mark {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Lost { frames, dropped } => {
+                write!(f, "{frames} frames lost, {dropped} of them for lack of room")
+            }
+            Self::Garbage { bytes } => write!(f, "{bytes} bytes that are no frame"),
+            Self::Skipped { ticks } => write!(f, "{ticks} ticks not logged"),
+            Self::Overrun { ticks } => write!(f, "{ticks} ticks did not run"),
+            Self::Joined { frames } => {
+                write!(f, "the log begins {frames} frames after the target's first")
+            }
+            Self::Restart => write!(f, "the target restarted"),
+            Self::Schema { found } => {
+                write!(f, "frames of schema {found}, this reader knows {SCHEMA}")
+            }
+        }
+    }
+}
+
+/// What has come so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Counts {
+    /// Bytes.
+    pub bytes: u64,
+    /// Sound frames.
+    pub frames: u64,
+    /// Ticks.
+    pub ticks: u64,
+    /// Frames known to be missing.
+    pub lost_frames: u64,
+    /// Those of them that the target dropped.
+    pub dropped_frames: u64,
+    /// Bytes that are no frame.
+    pub garbage_bytes: u64,
+    /// Ticks known to be missing, by the clock.
+    pub lost_ticks: u64,
+    /// Ticks that never ran.
+    pub overrun_ticks: u64,
+    /// Times that the target restarted.
+    pub restarts: u64,
+}
+
+impl Counts {
+    /// Whether ticks came, and none is known to be missing.
+    #[must_use]
+    pub const fn is_complete(&self) -> bool {
+        self.ticks > 0 && self.lost_frames == 0 && self.lost_ticks == 0
+    }
+}
+
+/// A decoder. It takes bytes as they come.
+#[derive(Clone, Debug, Default)]
+pub struct Decoder {
+    /// The beginning of a frame that is not complete yet.
+    partial: Vec<u8>,
+    /// Bytes before it that are no frame.
+    garbage: u64,
+    /// Sequence and dropped frames that the next head should have.
+    due: Option<(u32, u32)>,
+    /// Time of the last tick, and its codes.
+    last: Option<(u32, SensorFrame)>,
+    /// Frames went missing since the last tick.
+    torn: bool,
+    counts: Counts,
+}
+
+impl Decoder {
+    /// A decoder at the beginning of a log, or anywhere in it.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// What has come so far.
+    #[must_use]
+    pub const fn counts(&self) -> &Counts {
+        &self.counts
+    }
+
+    /// Reads on, and hands each item to `take` in its order.
+    pub fn read(&mut self, bytes: &[u8], take: &mut impl FnMut(Item)) {
+        self.counts.bytes += bytes.len() as u64;
+        let mut held = std::mem::take(&mut self.partial);
+        held.extend_from_slice(bytes);
+        let used = self.look(&held, false, take);
+        held.drain(..used);
+        self.partial = held;
+    }
+
+    /// The log ends here: what has begun will not be completed.
+    pub fn finish(&mut self, take: &mut impl FnMut(Item)) {
+        let held = std::mem::take(&mut self.partial);
+        self.look(&held, true, take);
+        self.report_garbage(take);
+    }
+
+    /// Takes the complete frames at the beginning of `bytes`, everything if they are the last;
+    /// returns how many bytes it used.
+    fn look(&mut self, bytes: &[u8], last: bool, take: &mut impl FnMut(Item)) -> usize {
+        let mut used = 0;
+        while let Some(rest) = bytes.get(used..).filter(|rest| !rest.is_empty()) {
+            used += match look(rest) {
+                Seen::Frame(frame, length) => {
+                    self.report_garbage(take);
+                    self.frame(&frame, length as u64, take);
+                    length
+                }
+                Seen::Garbage(length) => {
+                    self.garbage += length as u64;
+                    length
+                }
+                // What looks like the beginning of a frame may be garbage before another one.
+                Seen::Part if last => {
+                    self.garbage += 1;
+                    1
+                }
+                Seen::Part => break,
+            };
+        }
+        used
+    }
+
+    /// Reports what was no frame.
+    fn report_garbage(&mut self, take: &mut impl FnMut(Item)) {
+        let bytes = std::mem::take(&mut self.garbage);
+        if bytes > 0 {
+            self.mark_garbage(bytes, take);
+        }
+    }
+
+    fn mark_garbage(&mut self, bytes: u64, take: &mut impl FnMut(Item)) {
+        self.counts.garbage_bytes += bytes;
+        take(Item::Mark(Mark::Garbage { bytes }));
+    }
+
+    fn frame(&mut self, frame: &Frame<'_>, length: u64, take: &mut impl FnMut(Item)) {
+        let Ok(body) = frame.body() else {
+            // The checksum matches by chance: its head is invalid, too.
+            return self.mark_garbage(length, take);
+        };
+        self.counts.frames += 1;
+        self.follow(frame, &body, take);
+        match body {
+            Body::Identity(identity) if identity.schema != SCHEMA => {
+                take(Item::Mark(Mark::Schema { found: identity.schema }));
+            }
+            Body::Identity(identity) => take(Item::Identity(identity)),
+            Body::Ticks(ticks) => {
+                for record in ticks {
+                    match record {
+                        Ok(record) => self.tick(&record, take),
+                        Err(_) => self.mark_garbage(length, take),
+                    }
+                }
+            }
+            Body::Plan(at, plan) => take(Item::Plan(at, plan)),
+            Body::Request(at, request) => take(Item::Request(at, request)),
+            Body::Event(entry) => take(Item::Event(entry)),
+            Body::CaptureChunk(shots) => take(Item::CaptureChunk(shots)),
+            Body::Ledger(line) => take(Item::Ledger(line)),
+            Body::Unknown => {}
+        }
+    }
+
+    /// Holds the head of a frame against the one before.
+    fn follow(&mut self, frame: &Frame<'_>, body: &Body<'_>, take: &mut impl FnMut(Item)) {
+        let head = frame.head;
+        if let Some((sequence, dropped)) = self.due {
+            let ahead = head.sequence.wrapping_sub(sequence) as i32;
+            if ahead < 0 || self.clock_went_back(body) {
+                self.restart(take);
+                self.lose(head.sequence, head.dropped, take);
+            } else {
+                self.lose(ahead as u32, head.dropped.wrapping_sub(dropped), take);
+            }
+        } else if head.sequence > 0 {
+            take(Item::Mark(Mark::Joined { frames: head.sequence }));
+        }
+        self.due = Some((head.sequence.wrapping_add(1), head.dropped));
+    }
+
+    fn clock_went_back(&self, body: &Body<'_>) -> bool {
+        let Some((last, _)) = self.last else { return false };
+        let Body::Ticks(ticks) = body else { return false };
+        let first = ticks.clone().find_map(Result::ok);
+        first.is_some_and(|first| (first.at().wrapping_sub(last) as i32) <= 0)
+    }
+
+    fn restart(&mut self, take: &mut impl FnMut(Item)) {
+        self.counts.restarts += 1;
+        self.last = None;
+        self.torn = false;
+        take(Item::Mark(Mark::Restart));
+    }
+
+    fn lose(&mut self, frames: u32, dropped: u32, take: &mut impl FnMut(Item)) {
+        if frames > 0 {
+            let dropped = dropped.min(frames);
+            self.torn = true;
+            self.counts.lost_frames += u64::from(frames);
+            self.counts.dropped_frames += u64::from(dropped);
+            take(Item::Mark(Mark::Lost { frames, dropped }));
+        }
+    }
+
+    fn tick(&mut self, record: &Record, take: &mut impl FnMut(Item)) {
+        let before = self.last.map_or(SensorFrame::default(), |(_, sensors)| sensors);
+        if let Some((last, _)) = self.last {
+            let ticks = record.at().wrapping_sub(last).wrapping_sub(1);
+            if ticks > 0 && record.flags.overrun() && !self.torn {
+                self.counts.overrun_ticks += u64::from(ticks);
+                take(Item::Mark(Mark::Overrun { ticks }));
+            } else if ticks > 0 {
+                self.counts.lost_ticks += u64::from(ticks);
+                if !self.torn {
+                    take(Item::Mark(Mark::Skipped { ticks }));
+                }
+            }
+        }
+        self.torn = false;
+        let sensors = record.sensors(&before);
+        self.last = Some((record.at(), sensors));
+        self.counts.ticks += 1;
+        take(Item::Tick(*record, sensors));
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use interstage::log::{LogEncoder, identity};
+    use interstage::tick::{Input, Output};
+    use proptest::prelude::*;
+
+    /// The frames of a target that runs for so many ticks from `from`.
+    pub(crate) fn frames(from: u32, ticks: u32) -> Vec<Vec<u8>> {
+        let identity =
+            Identity { schema: SCHEMA, rig: identity::text("test"), ..Default::default() };
+        let (mut encoder, mut frames) = (LogEncoder::new(identity), Vec::new());
+        for at in from..from + ticks {
+            let mut record = Record::EMPTY;
+            record.telemetry.at = at;
+            record.telemetry.level = (at / 7) as u8;
+            encoder.tick(&record, &mut |frame: &[u8]| {
+                frames.push(frame.to_vec());
+                true
+            });
+        }
+        frames
+    }
+
+    /// What an encoder sends of these ticks.
+    fn stream(mut encoder: LogEncoder, inputs: &[Input]) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let mut send = |frame: &[u8]| {
+            bytes.extend_from_slice(frame);
+            true
+        };
+        for input in inputs {
+            let mut output = Output::default();
+            output.telemetry.at = input.now;
+            encoder.tick(&Record::of(input, &output), &mut send);
+        }
+        encoder.flush(&mut send);
+        bytes
+    }
+
+    fn decode(bytes: &[u8], cut: usize) -> (Vec<Item>, Counts) {
+        let (mut decoder, mut items) = (Decoder::new(), Vec::new());
+        for part in bytes.chunks(cut.max(1)) {
+            decoder.read(part, &mut |item| items.push(item));
+        }
+        decoder.finish(&mut |item| items.push(item));
+        (items, decoder.counts)
+    }
+
+    fn ticks(items: &[Item]) -> Vec<u32> {
+        let at = |item: &Item| match item {
+            Item::Tick(record, _) => Some(record.at()),
+            _ => None,
+        };
+        items.iter().filter_map(at).collect()
+    }
+
+    fn marks(items: &[Item]) -> Vec<Mark> {
+        let mark = |item: &Item| match item {
+            Item::Mark(mark) => Some(*mark),
+            _ => None,
+        };
+        items.iter().filter_map(mark).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn bytes_come_in_any_pieces(cut in 1..700_usize) {
+            let bytes = frames(0, 400).concat();
+            let (items, counts) = decode(&bytes, cut);
+            prop_assert!(ticks(&items).into_iter().eq(0..400));
+            prop_assert_eq!(marks(&items), []);
+            prop_assert_eq!((counts.ticks, counts.lost_frames, counts.lost_ticks), (400, 0, 0));
+        }
+
+        #[test]
+        fn every_missing_frame_is_marked(gone in prop::collection::btree_set(1..49_usize, 0..30)) {
+            // 50 frames of ticks and one of identity before them.
+            let all = frames(0, 400);
+            prop_assert_eq!(all.len(), 51);
+            let kept: Vec<u8> = all
+                .iter()
+                .enumerate()
+                .filter(|(place, _)| !gone.contains(place))
+                .flat_map(|(_, frame)| frame.clone())
+                .collect();
+            let (items, counts) = decode(&kept, 64);
+            prop_assert_eq!(counts.lost_frames, gone.len() as u64);
+            let lost: u32 = marks(&items).iter().map(|mark| match mark {
+                Mark::Lost { frames, .. } => *frames,
+                other => panic!("{other:?}"),
+            }).sum();
+            prop_assert_eq!(lost as usize, gone.len());
+            prop_assert_eq!(ticks(&items).len(), 400 - 8 * gone.len());
+            // Those before the first tick that came cannot be known.
+            let head = ticks(&items)[0];
+            prop_assert_eq!(counts.lost_ticks as usize + head as usize, 8 * gone.len());
+        }
+
+        #[test]
+        fn a_log_cut_anywhere_gives_what_was_whole(at in 0..20_000_usize) {
+            let all = frames(0, 400);
+            let bytes = all.concat();
+            let at = at % bytes.len();
+            let (items, counts) = decode(&bytes[..at], 97);
+            let mut left = at;
+            let whole = all.iter().take_while(|frame| {
+                let fits = frame.len() <= left;
+                left = left.saturating_sub(frame.len());
+                fits
+            });
+            prop_assert_eq!(counts.frames, whole.count() as u64);
+            prop_assert!(ticks(&items).into_iter().eq(0..ticks(&items).len() as u32));
+        }
+
+        #[test]
+        fn garbage_ends_at_the_next_frame(
+            garbage in prop::collection::vec(any::<u8>(), 1..1500),
+            at in 1..50_usize,
+        ) {
+            let all = frames(0, 400);
+            let mut bytes = all[..at].concat();
+            bytes.extend(&garbage);
+            bytes.extend(all[at..].concat());
+            let (items, counts) = decode(&bytes, 333);
+            prop_assert!(ticks(&items).into_iter().eq(0..400));
+            prop_assert_eq!(counts.garbage_bytes as usize, garbage.len());
+            prop_assert_eq!(counts.lost_frames, 0);
+        }
+
+        #[test]
+        fn random_bytes_are_marked_and_no_panic(bytes in prop::collection::vec(any::<u8>(), 0..5000)) {
+            let (items, counts) = decode(&bytes, 512);
+            prop_assert_eq!(ticks(&items).len(), 0);
+            prop_assert_eq!(counts.garbage_bytes as usize, bytes.len());
+        }
+
+        #[test]
+        fn damaged_bytes_cost_their_frames_and_nothing_else(
+            damages in prop::collection::vec((0..20_000_usize, 1..=255_u8), 0..12),
+        ) {
+            let all = frames(0, 400);
+            let mut bytes = all.concat();
+            let length = bytes.len();
+            for (at, mask) in &damages {
+                bytes[at % length] ^= mask;
+            }
+            let (items, _) = decode(&bytes, 100);
+            let seen = ticks(&items);
+            prop_assert!(seen.windows(2).all(|pair| pair[0] < pair[1]));
+            prop_assert!(seen.len() + 8 * damages.len() >= 400, "{} left", seen.len());
+        }
+
+        #[test]
+        fn a_restart_of_the_target_is_marked(before in 20..300_u32, after in 20..300_u32, gone in 0..3_usize) {
+            let mut bytes = frames(5, before).concat();
+            bytes.truncate(bytes.len() - 3);
+            let second = frames(2, after);
+            bytes.extend(second[gone..].concat());
+            let (items, counts) = decode(&bytes, 50);
+            prop_assert_eq!(counts.restarts, 1);
+            let place = items.iter().position(|item| *item == Item::Mark(Mark::Restart)).unwrap();
+            prop_assert!(ticks(&items[..place]).iter().all(|tick| *tick >= 5));
+            let expected = after / 8 * 8 - 8 * (gone.max(1) as u32 - 1);
+            prop_assert_eq!(ticks(&items[place..]).len() as u32, expected);
+        }
+    }
+
+    #[test]
+    fn a_reader_that_comes_late_knows_within_a_second() {
+        let all = frames(0, 3000);
+        // Half way into a frame.
+        let bytes = all[60..].concat();
+        let (items, counts) = decode(&bytes[100..], 100);
+        assert_eq!(counts.lost_frames, 0, "what was before is not lost but past");
+        let first = items.iter().position(|item| matches!(item, Item::Identity(_))).unwrap();
+        assert!(ticks(&items[..first]).len() <= 1000);
+    }
+
+    #[test]
+    fn ticks_that_did_not_run_are_distinguished_from_those_not_logged() {
+        for (overrun, expected) in
+            [(true, Mark::Overrun { ticks: 3 }), (false, Mark::Skipped { ticks: 3 })]
+        {
+            let input = |now| Input { now, overrun: overrun && now == 15, ..Input::default() };
+            let encoder = LogEncoder::new(Identity::default());
+            let bytes = stream(encoder, &[10, 11, 15].map(input));
+            let (items, _) = decode(&bytes, 10);
+            let known = |mark: &Mark| !matches!(mark, Mark::Schema { .. });
+            assert_eq!(marks(&items).into_iter().filter(known).collect::<Vec<_>>(), [expected]);
+        }
+    }
+
+    #[test]
+    fn another_layout_is_named_by_its_number() {
+        let identity = Identity { schema: 99, ..Identity::default() };
+        let bytes = stream(LogEncoder::new(identity), &[Input::default()]);
+        let (items, _) = decode(&bytes, 10);
+        assert_eq!(marks(&items)[0], Mark::Schema { found: 99 });
+    }
+}

@@ -1,0 +1,293 @@
+//! MCAP files: ticks, ledger, events and the controller's own frames on one time axis, as
+//! JSON with a schema each, so that any MCAP viewer can plot them.
+
+use std::collections::{BTreeMap, HashMap};
+use std::io::{Seek, Write};
+use std::path::Path;
+
+use interstage::restart::Reset;
+use interstage::tick::{Entry, Event};
+use mcap::WriteOptions;
+use mcap::records::{MessageHeader, Metadata};
+use serde::Serialize;
+use serde_json::Value;
+
+use super::{
+    Controller, CrossingLine, Item, LedgerLine, Recording, Summary, Tick, TrueState, json, text,
+    timed,
+};
+use crate::files::{Failure, FileError, atomic_write};
+
+/// Topic that carries the frames as they were on the channel.
+pub const FRAMES: &str = "/frames";
+
+/// Levels of a log line, as viewers know them.
+const INFO: u8 = 2;
+const WARNING: u8 = 3;
+const ERROR: u8 = 4;
+
+/// Nanoseconds of a tick.
+pub(super) const TICK_NS: u64 = 1_000_000;
+
+/// What a message is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Topic {
+    /// A [`Tick`].
+    Tick,
+    /// An event, or what is missing, as a line of text.
+    Log,
+    /// A [`LedgerLine`].
+    Ledger,
+    /// A [`CrossingLine`].
+    Crossing,
+    /// A [`Summary`].
+    Summary,
+    /// A frame of the controller.
+    Frames,
+}
+
+impl Topic {
+    /// The topics that a log has while it grows.
+    pub const LIVE: [Self; 3] = [Self::Tick, Self::Log, Self::Ledger];
+
+    /// Its name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Tick => "/tick",
+            Self::Log => "/log",
+            Self::Ledger => "/ledger",
+            Self::Crossing => "/crossing",
+            Self::Summary => "/summary",
+            Self::Frames => FRAMES,
+        }
+    }
+
+    /// Schema of its messages; null for frames.
+    pub(crate) fn schema(self) -> Value {
+        match self {
+            Self::Tick => {
+                let controller = Controller::of(
+                    &interstage::log::Record::EMPTY,
+                    &interstage::sense::raw::SensorFrame::default(),
+                );
+                let tick = Tick { controller, truth: Some(TrueState::default()) };
+                json::schema("interstage.Tick", &tick, &["tick", "t_s", "mode"])
+            }
+            Self::Log => json::log_schema(),
+            Self::Ledger => {
+                json::schema("interstage.Ledger", &LedgerLine::default(), &["index", "count"])
+            }
+            Self::Crossing => {
+                let required = ["index", "touch_s", "lift_s"];
+                json::schema("interstage.Crossing", &CrossingLine::default(), &required)
+            }
+            Self::Summary => json::schema("interstage.Summary", &Summary::default(), &[]),
+            Self::Frames => Value::Null,
+        }
+    }
+}
+
+/// The message of an item; none for what only a reader of frames needs.
+pub fn messages(item: &Item) -> Option<(Topic, Vec<u8>)> {
+    match item {
+        Item::Tick(record, sensors) => {
+            let tick = Tick { controller: Controller::of(record, sensors), truth: None };
+            body(Topic::Tick, &tick)
+        }
+        Item::Ledger(line) => body(Topic::Ledger, &LedgerLine::from(line)),
+        Item::Event(entry) => {
+            let ns = u64::from(entry.at) * TICK_NS;
+            body(Topic::Log, &json::log_message(ns, level(entry), &text(&entry.event)))
+        }
+        Item::Mark(mark) => body(Topic::Log, &json::log_message(0, WARNING, &mark.to_string())),
+        Item::Identity(_) | Item::Plan(..) | Item::Request(..) | Item::CaptureChunk(_) => None,
+    }
+}
+
+fn body(topic: Topic, message: &impl Serialize) -> Option<(Topic, Vec<u8>)> {
+    // Numbers and texts always have a JSON form.
+    bytes(message).ok().map(|bytes| (topic, bytes))
+}
+
+fn bytes(message: &impl Serialize) -> serde_json::Result<Vec<u8>> {
+    serde_json::to_vec(&json::object(message)?)
+}
+
+fn level(entry: &Entry) -> u8 {
+    match entry.event {
+        Event::Fault(_) => ERROR,
+        Event::Restart(restart) if restart.reset != Reset::Power => ERROR,
+        Event::Limit(_) | Event::Lost(_) | Event::Refused(_) => WARNING,
+        _ => INFO,
+    }
+}
+
+/// An MCAP file as it grows.
+pub(super) struct McapFile<W: Write + Seek> {
+    out: mcap::Writer<W>,
+    /// Channel and messages of each topic so far.
+    channels: HashMap<Topic, (u16, u32)>,
+}
+
+impl<W: Write + Seek> McapFile<W> {
+    pub(super) fn new(out: W) -> Result<Self, Failure> {
+        let options = WriteOptions::new()
+            .compression(Some(mcap::Compression::Lz4))
+            .library(concat!("interstage ", env!("CARGO_PKG_VERSION")));
+        Ok(Self { out: options.create(out)?, channels: HashMap::new() })
+    }
+
+    /// Adds a record about the log, under this name.
+    pub(super) fn metadata(
+        &mut self,
+        name: &str,
+        pairs: impl IntoIterator<Item = (String, String)>,
+    ) -> Result<(), Failure> {
+        let metadata = pairs.into_iter().collect();
+        Ok(self.out.write_metadata(&Metadata { name: name.to_owned(), metadata })?)
+    }
+
+    /// The controller's parameters.
+    pub(super) fn parameters(&mut self, toml: &str) -> Result<(), Failure> {
+        self.metadata("parameters", [("toml".to_owned(), toml.to_owned())])
+    }
+
+    /// Adds a message at a time since boot, ns; a topic's channel comes with its first.
+    pub(super) fn message(&mut self, ns: u64, topic: Topic, body: &[u8]) -> Result<(), Failure> {
+        let (channel_id, sequence) = match self.channels.get(&topic) {
+            Some(known) => *known,
+            None => (self.channel(topic)?, 0),
+        };
+        self.channels.insert(topic, (channel_id, sequence.wrapping_add(1)));
+        let header = MessageHeader { channel_id, sequence, log_time: ns, publish_time: ns };
+        Ok(self.out.write_to_known_channel(&header, body)?)
+    }
+
+    fn channel(&mut self, topic: Topic) -> Result<u16, Failure> {
+        let (schema, encoding) = match topic.schema() {
+            Value::Null => (0, "interstage-frames"),
+            schema => {
+                let name = schema["title"].as_str().unwrap_or(topic.name());
+                let bytes = serde_json::to_vec(&schema)?;
+                (self.out.add_schema(name, "jsonschema", &bytes)?, "json")
+            }
+        };
+        Ok(self.out.add_channel(schema, topic.name(), encoding, &BTreeMap::new())?)
+    }
+
+    /// Hands all that has come to the system, as complete chunks.
+    pub(super) fn flush(&mut self) -> Result<(), Failure> {
+        Ok(self.out.flush()?)
+    }
+
+    pub(super) fn finish(&mut self) -> Result<(), Failure> {
+        self.out.finish()?;
+        Ok(())
+    }
+}
+
+/// Writes `recording` to `path`: a message a tick on `/tick`, one a crossing on `/crossing` at
+/// the time of lift-off, one a line on `/log`, one at the end on `/summary`, the controller's
+/// own log frame by frame on [`FRAMES`]; parameters, version and seed as metadata. Times count
+/// from boot.
+///
+/// # Errors
+/// [`FileError::File`] with the reason.
+pub fn write_mcap(recording: &Recording, path: &Path) -> Result<(), FileError> {
+    atomic_write(path, |out| {
+        let mut file = McapFile::new(out)?;
+        file.metadata("run", about(&recording.summary))?;
+        file.parameters(&recording.parameters)?;
+        let mut all = Vec::new();
+        for tick in &recording.rows {
+            all.push((tick.controller.t_s, Topic::Tick, bytes(tick)?));
+        }
+        for line in &recording.log {
+            let message = json::log_message(nanoseconds(line.t_s), INFO, &line.text);
+            all.push((line.t_s, Topic::Log, bytes(&message)?));
+        }
+        for line in &recording.summary.crossings {
+            all.push((line.lift_s, Topic::Crossing, bytes(line)?));
+        }
+        let frames = timed(&recording.stream);
+        all.extend(frames.map(|(t_s, frame)| (t_s, Topic::Frames, frame.to_vec())));
+        // What is of one time keeps its order.
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (t_s, topic, body) in &all {
+            file.message(nanoseconds(*t_s), *topic, body)?;
+        }
+        let last = all.last().map_or(recording.summary.total_s, |(t_s, ..)| *t_s);
+        file.message(nanoseconds(last), Topic::Summary, &bytes(&recording.summary)?)?;
+        file.finish()
+    })
+}
+
+fn about(summary: &Summary) -> [(String, String); 7] {
+    [
+        ("version", env!("CARGO_PKG_VERSION").to_owned()),
+        ("target", summary.target.clone()),
+        ("controller", summary.controller.clone()),
+        ("direction", summary.direction.clone()),
+        ("rig", summary.rig.clone()),
+        ("seed", summary.seed.to_string()),
+        ("trace_digest", summary.trace_digest.clone()),
+    ]
+    .map(|(key, value)| (key.to_owned(), value))
+}
+
+/// Time since boot in ns; what is before boot is boot.
+fn nanoseconds(t_s: f64) -> u64 {
+    (t_s * 1e9).round() as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::example;
+
+    #[test]
+    fn messages_and_metadata_are_read_back_in_order_of_time() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("log.mcap");
+        let recording = example::deploy();
+        write_mcap(&recording, &path).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+
+        let (mut counts, mut rows, mut last) = (BTreeMap::new(), recording.rows.iter(), 0);
+        for message in mcap::MessageStream::new(&bytes).unwrap() {
+            let message = message.unwrap();
+            assert!(message.log_time >= last, "{} went back in time", message.channel.topic);
+            last = message.log_time;
+            *counts.entry(message.channel.topic.clone()).or_insert(0) += 1;
+            assert_eq!(message.channel.schema.as_ref().unwrap().encoding, "jsonschema");
+            if message.channel.topic == "/tick" {
+                let body: Value = serde_json::from_slice(&message.data).unwrap();
+                let row = rows.next().unwrap();
+                let truth = row.truth.unwrap();
+                assert_eq!(message.log_time, nanoseconds(row.controller.t_s));
+                assert_eq!(body["speed_true_mm_s"], truth.speed_true_mm_s);
+                // A field without a value is absent.
+                let absent = truth.root_clearance_mm.is_nan();
+                assert_eq!(body.get("root_clearance_mm").is_none(), absent);
+            }
+        }
+        assert_eq!(counts["/tick"], recording.rows.len());
+        assert_eq!((counts["/crossing"], counts["/summary"]), (3, 1));
+        assert_eq!(counts["/log"], recording.log.len());
+
+        let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+        let read = |name: &str| {
+            let index = summary.metadata_indexes.iter().find(|index| index.name == name).unwrap();
+            mcap::read::metadata(&bytes, index).unwrap().metadata
+        };
+        assert_eq!(read("parameters")["toml"], recording.parameters);
+        assert_eq!(read("run")["version"], env!("CARGO_PKG_VERSION"));
+        assert_eq!(read("run")["seed"], recording.summary.seed.to_string());
+    }
+
+    #[test]
+    fn times_before_boot_and_no_times_become_boot() {
+        assert_eq!([-1.0, f64::NAN, 0.001].map(nanoseconds), [0, 0, 1_000_000]);
+    }
+}

@@ -1,0 +1,145 @@
+//! A board at a debug probe, as it runs.
+
+use std::collections::VecDeque;
+
+use super::{Source, SourceError};
+use crate::probe::{Port, ReconnectingPort};
+
+/// RTT channel of the binary log, up.
+const LOG: u32 = 1;
+/// RTT channel of the console, down.
+const CONSOLE: u32 = 0;
+/// Polls of the channel in each reading, so that the display gets its turn.
+const LOOKS: u32 = 20;
+
+/// The log of a board at a probe. It is not reset and gets no command but the
+/// operator's.
+///
+/// The probe may be unplugged and the board may restart: what was not read is missing, and
+/// marked where it is missing by the log's own numbers. It ends when the port gives up.
+pub struct Probed<'a> {
+    port: ReconnectingPort<'a>,
+    letters: VecDeque<u8>,
+}
+
+impl<'a> Probed<'a> {
+    /// Over this port.
+    #[must_use]
+    pub const fn new(port: ReconnectingPort<'a>) -> Self {
+        Self { port, letters: VecDeque::new() }
+    }
+}
+
+impl Source for Probed<'_> {
+    fn read(&mut self) -> Result<Option<Vec<u8>>, SourceError> {
+        let mut come = Vec::new();
+        for _ in 0..LOOKS {
+            if let Some(letter) = self.letters.front()
+                && self.port.down(CONSOLE, &[*letter])? == 1
+            {
+                self.letters.pop_front();
+            }
+            come.extend(self.port.up(LOG)?);
+            self.port.pass()?;
+        }
+        Ok(Some(come))
+    }
+
+    fn send(&mut self, letter: u8) -> Result<(), SourceError> {
+        self.letters.push_back(letter);
+        Ok(())
+    }
+
+    fn news(&mut self) -> Vec<String> {
+        self.port.take_news()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use crate::probe::script::{Next, open};
+    use crate::record::{Mark, Run, Virtual, Writer};
+    use crate::replay::replay;
+    use crate::scenario::Scenario;
+    use interstage::rig::Rig;
+
+    /// The frames of a run in software, as a board would send them.
+    fn sent() -> Vec<u8> {
+        let mut source = Virtual::new(&Scenario::default(), false).unwrap();
+        let mut bytes = Vec::new();
+        while let Some(part) = source.read().unwrap() {
+            bytes.extend(part);
+        }
+        bytes
+    }
+
+    /// Sends a letter, then captures what the polls of the channel bring, and after them
+    /// nothing for so long that all has been handed on.
+    fn captured(polls: impl Iterator<Item = Next>) -> (Run, Vec<String>) {
+        let letter = [Next::Opens, Next::bytes(b"s")].into_iter();
+        let quiet = (0..2 * LOOKS).map(|_| Next::bytes(b""));
+        let script = letter.chain(polls).chain(quiet).chain([Next::Wrong]);
+        let (port, left) = open(script, Duration::from_secs(60));
+        let mut source = Probed::new(port);
+        source.send(b's').unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.mcap");
+        let file = std::fs::File::create(&path).unwrap();
+        let mut writer = Writer::new(Some(file), None::<Vec<u8>>, None, false).unwrap();
+        let mut news = Vec::new();
+        while let Ok(Some(bytes)) = source.read() {
+            writer.take(&bytes, &mut |_| {}).unwrap();
+            news.extend(source.news());
+        }
+        writer.finish(&mut |_| {}).unwrap();
+        assert!(left.borrow().is_empty());
+        (Run::read(&path).unwrap(), news)
+    }
+
+    fn in_polls(bytes: &[u8]) -> impl Iterator<Item = Next> {
+        bytes.chunks(997).map(Next::bytes)
+    }
+
+    /// The cable is pulled; the first attempt to open the port again finds nothing yet.
+    fn pulled() -> [Next; 3] {
+        [Next::Unplugged, Next::NotThere, Next::Opens]
+    }
+
+    #[test]
+    fn a_cable_that_is_pulled_leaves_a_marked_gap_and_the_rest_whole() {
+        let bytes = sent();
+        let whole = Run::of_stream(&bytes);
+        // A third of the way in, at no particular byte, 20 kB are lost.
+        let (from, lost) = (bytes.len() / 3, 20_000);
+        let (before, after) = (in_polls(&bytes[..from]), in_polls(&bytes[from + lost..]));
+        let (run, news) = captured(before.chain(pulled()).chain(after));
+        assert_eq!(news.len(), 2, "{news:?}");
+        // Two halves of frames meet where the cable was out, and the rest is counted.
+        let lost = run.marks.iter().find_map(|(_, mark)| match mark {
+            Mark::Lost { frames, dropped: 0 } => Some(u64::from(*frames)),
+            _ => None,
+        });
+        assert_eq!(lost, Some(run.counts.lost_frames));
+        assert_eq!(run.counts.frames + run.counts.lost_frames, whole.counts.frames);
+        let missing = whole.rows.len() - run.rows.len();
+        assert!(missing > 300, "{missing}");
+        assert_eq!(run.counts.lost_ticks, missing as u64);
+        assert!(replay(&run, &Rig::prototype()).unwrap().difference.is_none());
+    }
+
+    #[test]
+    fn a_restart_in_the_middle_is_marked_and_both_parts_are_there() {
+        let bytes = sent();
+        let whole = Run::of_stream(&bytes);
+        let before = in_polls(&bytes[..bytes.len() / 2]);
+        let (run, _) = captured(before.chain(pulled()).chain(in_polls(&bytes)));
+        assert_eq!(run.counts.restarts, 1, "{:?}", run.marks);
+        let again = run.rows.iter().rposition(|row| row.tick == 0).unwrap();
+        assert_eq!(run.rows.len() - again, whole.rows.len());
+        assert!(again > whole.rows.len() / 3);
+        assert!(replay(&run, &Rig::prototype()).unwrap().difference.is_none());
+    }
+}

@@ -1,0 +1,183 @@
+//! What is kept of a run while it goes on.
+
+use interstage::tick::{CrossingRecord, Entry, Event, Telemetry};
+use interstage::units::{Direction, Q16};
+use sha2::{Digest, Sha256};
+
+use super::tally::{Ended, TICK_S, Tally, true_line};
+use super::{Controller, CrossingLine, LogLine, Recording, Report, Tick, mode_number};
+use crate::plant::ledger::Crossing;
+use crate::plant::rig::{Truth, VirtualRig};
+use crate::scenario::Scenario;
+
+/// The preload is reached when it lacks no more than this part of its reference: what the
+/// controller allows of measured preload, and three deviations of the sensor.
+const REACHED_PART: f64 = 0.035;
+
+/// A run's record as it grows.
+pub(crate) struct RunRecorder {
+    tally: Tally,
+    seen: ControllerView,
+}
+
+/// What the controller reported that the ledger of the crossings needs.
+#[derive(Default)]
+struct ControllerView {
+    /// Crossings, and when they were reported, s.
+    crossings: Vec<(f64, CrossingRecord)>,
+    /// True preload of every tick, N.
+    preload: Vec<f32>,
+    /// Preload reference of every tick, N.
+    reference: Vec<f32>,
+}
+
+impl RunRecorder {
+    pub(crate) fn new(gap_ref: f64, start_mm: f64) -> Self {
+        Self { tally: Tally::new(gap_ref, start_mm), seen: ControllerView::default() }
+    }
+
+    /// Takes a tick: the controller's state and events on the plant's `truth` before it, and
+    /// the columns of the controller if ticks are kept.
+    pub(crate) fn take(
+        &mut self,
+        telemetry: &Telemetry,
+        events: &[Entry],
+        truth: &Truth,
+        columns: Option<Controller>,
+    ) {
+        let Self { tally, seen } = self;
+        let t_s = tally.time_s();
+        digest(&mut tally.digest, telemetry);
+        for Entry { event, .. } in events {
+            tally.log.push(LogLine { t_s, text: text(event) });
+            match reported(t_s, event) {
+                Some((true, fault)) => tally.faults.push(fault),
+                Some((false, limit)) => tally.limits.push(limit),
+                None => {}
+            }
+            if let Event::Crossing(record) = event {
+                seen.crossings.push((t_s, *record));
+            }
+        }
+        seen.preload.push(truth.preload_n as f32);
+        seen.reference.push(telemetry.preload_ref.to_num());
+        if let Some(controller) = columns {
+            tally.rows.push(Tick { controller, truth: Some(truth.into()) });
+        }
+        tally.close_tick(telemetry.mode.moves(), truth);
+    }
+
+    /// The record of a run on `target` that took `wall_s` to compute, and the direction in
+    /// which it `arrived`, as the controller reports it.
+    pub(crate) fn finish(
+        self,
+        target: &'static str,
+        scenario: &Scenario,
+        plant: &VirtualRig,
+        arrived: Option<Direction>,
+        wall_s: f64,
+    ) -> Recording {
+        let Self { tally, seen } = self;
+        let ended = Ended { target, scenario, plant, arrived, wall_s };
+        tally.finish(&ended, |crossing| seen.line(crossing))
+    }
+}
+
+impl ControllerView {
+    /// Ledger line: the plant's truth with what the controller reported of the same
+    /// step beside it.
+    fn line(&self, crossing: &Crossing) -> CrossingLine {
+        // Reported when the crossing is closed: the first of this step after lift-off.
+        let same = |(t_s, r): &&(f64, CrossingRecord)| {
+            *t_s >= crossing.lift_s
+                && (r.direction == Direction::Deploy) == crossing.climbing
+                && (r.position.to_num::<f64>() - crossing.step_mm).abs() < 5.0
+        };
+        let reported = self.crossings.iter().find(same);
+        let num = |f: fn(&CrossingRecord) -> Q16| reported.map(|(_, r)| f(r).to_num::<f64>());
+        CrossingLine {
+            gap_predicted_mm: num(|r| r.gap_predicted),
+            gap_measured_mm: num(|r| r.gap_measured),
+            lead_time_s: Some(self.lead_time(crossing.touch_s)),
+            step_found_mm: num(|r| r.position),
+            ..true_line(crossing)
+        }
+    }
+
+    /// How long the true preload had been close to the reference when the corner touched, s;
+    /// negative by how long it still took.
+    fn lead_time(&self, touch_s: f64) -> f64 {
+        let touch = ((touch_s / TICK_S) as usize).min(self.preload.len().saturating_sub(1));
+        let wanted = self.reference.get(touch).copied().map_or(0.0, f64::from);
+        let reached = |n: &f32| f64::from(*n) >= wanted * (1.0 - REACHED_PART);
+        if self.preload.get(touch).is_some_and(reached) {
+            let since = self.preload[..touch].iter().rposition(|n| !reached(n));
+            (touch - since.map_or(0, |i| i + 1)) as f64 * TICK_S
+        } else {
+            let late = self.preload[touch..].iter().position(reached);
+            -(late.unwrap_or(self.preload.len() - touch) as f64) * TICK_S
+        }
+    }
+}
+
+/// Adds every bit that the controller put out in this tick.
+fn digest(digest: &mut Sha256, seen: &Telemetry) {
+    let quantities = [
+        seen.position,
+        seen.speed,
+        seen.speed_ref,
+        seen.preload,
+        seen.preload_ref,
+        seen.compression,
+        seen.radius,
+        seen.gap_predicted,
+        seen.slip_margin,
+        seen.vibration,
+        seen.distance,
+    ];
+    digest.update(seen.at.to_le_bytes());
+    for quantity in quantities {
+        digest.update(quantity.to_bits().to_le_bytes());
+    }
+    digest.update([mode_number(seen.mode), seen.stage as u8, seen.level]);
+    digest.update(seen.drive.to_bits().to_le_bytes());
+    digest.update(seen.pretightener.to_bits().to_le_bytes());
+}
+
+/// Code and sentence of a fault or a limit, and whether it is a fault.
+pub(super) fn reported(t_s: f64, event: &Event) -> Option<(bool, Report)> {
+    let (latched, code, text) = match event {
+        Event::Fault(fault) => (true, fault.code(), fault.sentence()),
+        Event::Limit(limit) => (false, limit.code(), limit.sentence()),
+        _ => return None,
+    };
+    Some((latched, Report { t_s, code, text: text.to_owned() }))
+}
+
+/// An event as one line of text.
+#[must_use]
+pub fn text(event: &Event) -> String {
+    match event {
+        Event::Mode(mode) => format!("mode {mode:?}"),
+        Event::Stage(stage) => format!("contact stage {} ({stage:?})", *stage as u8),
+        Event::Command(command) => format!("command {command:?}"),
+        Event::Refused(command) => format!("command {command:?} refused in this mode"),
+        Event::Fault(fault) => format!("fault {}: {}", fault.code(), fault.sentence()),
+        Event::Limit(limit) => format!("limit {}: {}", limit.code(), limit.sentence()),
+        Event::Lost(entries) => format!("{entries} log entries lost"),
+        Event::Restart(restart) => restart.to_string(),
+        Event::Crossing(c) => format!(
+            "crossing {} at {:.2} mm ({:+.2}): {:.2} mm/s, {:.1} N, gap {:.3} mm measured, \
+             {:.3} mm predicted, lead {:.2} s, stiffness x{:.3}",
+            c.index,
+            c.position.to_num::<f64>(),
+            c.residual.to_num::<f64>(),
+            c.speed.to_num::<f64>(),
+            c.preload.to_num::<f64>(),
+            c.gap_measured.to_num::<f64>(),
+            c.gap_predicted.to_num::<f64>(),
+            c.lead_time.to_num::<f64>(),
+            c.stiffness_scale.to_num::<f64>(),
+        ),
+    }
+}

@@ -1,0 +1,216 @@
+//! A recording from a log: what a report shows.
+//!
+//! The log of a deployment on the virtual rig has the truth in it. A log that was
+//! captured has what the controller believes, and nothing else is made up.
+
+use std::path::Path;
+
+use interstage::log::ledger::Line;
+use interstage::supervise::Mode;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+
+use super::read::{MCAP, ReadError, parameters, sound};
+use super::recorder::{reported, text};
+use super::{Controller, CrossingLine, LedgerLine, LogLine, Recording, Run, Summary, Tick};
+
+/// Reads what a report shows from any log.
+///
+/// # Errors
+/// [`ReadError`] if the file cannot be read or is no log.
+pub fn recording(path: &Path) -> Result<Recording, ReadError> {
+    let bytes =
+        std::fs::read(path).map_err(|source| ReadError::File { path: path.to_owned(), source })?;
+    if bytes.starts_with(MCAP)
+        && let Some(recording) = with_truth(&bytes)
+    {
+        return Ok(recording);
+    }
+    Ok(believed(&Run::read(path)?))
+}
+
+/// The recording in the log of a deployment; none if there is no summary in it.
+fn with_truth(bytes: &[u8]) -> Option<Recording> {
+    fn read<T: DeserializeOwned>(data: &[u8]) -> Option<T> {
+        serde_json::from_slice(data).ok()
+    }
+    let bytes = sound(bytes);
+    let (mut recording, mut summary) = (Recording::default(), None);
+    for message in
+        mcap::MessageStream::new_with_options(bytes, mcap::read::Options::IgnoreEndMagic.into())
+            .ok()?
+    {
+        let Ok(message) = message else { break };
+        let data = &message.data[..];
+        match message.channel.topic.as_str() {
+            "/tick" => recording.rows.extend(read::<Tick>(data)),
+            "/summary" => summary = read::<Summary>(data),
+            "/log" => {
+                let line = read::<Value>(data)?;
+                let text = line["message"].as_str().unwrap_or_default().to_owned();
+                recording.log.push(LogLine { t_s: message.log_time as f64 / 1e9, text });
+            }
+            _ => {}
+        }
+    }
+    recording.summary = summary?;
+    recording.parameters = parameters(bytes).unwrap_or_default();
+    Some(recording)
+}
+
+/// The recording of a log without truth.
+#[must_use]
+pub(crate) fn believed(run: &Run) -> Recording {
+    let mut summary = summary(run);
+    let mut log = Vec::new();
+    for entry in &run.events {
+        let t_s = f64::from(entry.at) * 1e-3;
+        log.push(LogLine { t_s, text: text(&entry.event) });
+        match reported(t_s, &entry.event) {
+            Some((true, fault)) => summary.faults.push(fault),
+            Some((false, limit)) => summary.limits.push(limit),
+            None => {}
+        }
+    }
+    summary.completed &= summary.faults.is_empty();
+    summary.crossings = run.ledger.iter().map(|line| crossing(run, line)).collect();
+    let rows = run.rows.iter().map(|row| Tick { controller: *row, truth: None }).collect();
+    let parameters = run.parameters.clone().unwrap_or_default();
+    Recording { summary, rows, log, parameters, ..Recording::default() }
+}
+
+/// Completes the rows of a recording, a millisecond each from boot, by those of the
+/// controller's log. A row whose tick is not in the log keeps what it has.
+pub fn complete(recording: &mut Recording, run: &Run) {
+    for row in &run.rows {
+        if let Some(place) = recording.rows.get_mut(row.tick as usize) {
+            place.controller = *row;
+        }
+    }
+}
+
+/// A run as the controller reports it.
+fn summary(run: &Run) -> Summary {
+    let moves = |row: &&Controller| row.mode().is_some_and(Mode::moves);
+    let (first, last) = (run.rows.iter().find(moves), run.rows.iter().rfind(moves));
+    let retracts = first.is_some_and(|row| row.retracts);
+    let moving: Vec<&Controller> = run.rows.iter().filter(moves).collect();
+    let preload: f64 = moving.iter().map(|row| row.preload_n).sum();
+    let between = |of: fn(&Controller) -> f64| match (first, last) {
+        (Some(first), Some(last)) => of(last) - of(first),
+        _ => 0.0,
+    };
+    let header = run.header.clone().unwrap_or_default();
+    let unknown = f64::NAN;
+    Summary {
+        completed: run
+            .rows
+            .last()
+            .and_then(Controller::mode)
+            .is_some_and(|mode| matches!(mode, Mode::Complete(_))),
+        target: format!("log of version {}, build {}", header.version, header.build),
+        controller: "recorded".to_owned(),
+        direction: if retracts { "retract" } else { "deploy" }.to_owned(),
+        rig: header.rig,
+        duration_s: between(|row| row.t_s),
+        total_s: run.rows.last().map_or(0.0, |row| row.t_s),
+        travel_mm: between(|row| row.position_mm).abs(),
+        gap_ref_mm: unknown,
+        max_gap_mm: unknown,
+        slip_mm: unknown,
+        mean_preload_n: preload / moving.len() as f64,
+        energy_j: unknown,
+        wear_j: unknown,
+        real_time_factor: 1.0,
+        ..Summary::default()
+    }
+}
+
+/// The line of a crossing as the controller saw it; its instants by the contact stage.
+fn crossing(run: &Run, line: &Line) -> CrossingLine {
+    let seen = LedgerLine::from(line);
+    let closed = run.rows.partition_point(|row| row.tick <= line.at);
+    let on_corner = |row: &Controller| (3..=5).contains(&row.stage);
+    let end = run.rows[..closed].iter().rposition(on_corner).map_or(closed, |place| place + 1);
+    let begin =
+        run.rows[..end].iter().rposition(|row| !on_corner(row)).map_or(0, |place| place + 1);
+    let span = &run.rows[begin..end.max(begin)];
+    let touch = span.first();
+    let lift = span.iter().find(|row| Some(row.stage) != touch.map(|first| first.stage));
+    CrossingLine {
+        index: seen.index,
+        speed_mm_s: seen.speed_mm_s,
+        preload_n: seen.preload_n,
+        gap_mm: f64::NAN,
+        gap_predicted_mm: Some(seen.gap_predicted_mm),
+        gap_measured_mm: Some(seen.gap_measured_mm),
+        corner_force_n: f64::NAN,
+        lead_time_s: Some(seen.lead_time_s),
+        // The ledger's has creep and tolerances in it.
+        slip_mm: f64::NAN,
+        touch_s: touch.map_or(seen.t_s, |row| row.t_s),
+        lift_s: lift.or(span.last()).map_or(seen.t_s, |row| row.t_s),
+        step_mm: seen.step_found_mm - seen.residual_mm,
+        step_found_mm: Some(seen.step_found_mm),
+        peak_preload_n: seen.peak_preload_n,
+        peak_utilisation: f64::NAN,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::write_mcap;
+    use crate::scenario::Scenario;
+    use crate::session;
+
+    fn run() -> Recording {
+        let options = session::Options { rows: true, ..session::Options::default() };
+        session::run(&Scenario::default(), options).unwrap()
+    }
+
+    #[test]
+    fn the_log_of_a_deployment_gives_its_recording_back() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("log.mcap");
+        let written = run();
+        write_mcap(&written, &path).unwrap();
+        let read = recording(&path).unwrap();
+        assert_eq!(read.summary, written.summary);
+        assert_eq!(format!("{:?}", read.rows), format!("{:?}", written.rows));
+        assert_eq!(read.log.len(), written.log.len());
+        for (read, written) in read.log.iter().zip(&written.log) {
+            assert_eq!(read.text, written.text);
+            assert!((read.t_s - written.t_s).abs() < 1e-9);
+        }
+        assert_eq!(read.parameters, written.parameters);
+    }
+
+    #[test]
+    fn a_log_without_truth_shows_what_the_controller_believes() {
+        let truth = run();
+        let believed = believed(&Run::of_stream(&truth.stream));
+        assert!(believed.summary.completed);
+        assert!((believed.summary.duration_s - truth.summary.duration_s).abs() < 2e-3);
+        assert_eq!(believed.summary.crossings.len(), 3);
+        for (seen, real) in believed.summary.crossings.iter().zip(&truth.summary.crossings) {
+            assert_eq!(seen.gap_measured_mm, real.gap_measured_mm);
+            assert!(seen.gap_mm.is_nan());
+            assert!((seen.touch_s - real.touch_s).abs() < 0.2, "{} {}", seen.touch_s, real.touch_s);
+            assert!((seen.lift_s - real.lift_s).abs() < 0.1, "{} {}", seen.lift_s, real.lift_s);
+            assert!((seen.step_mm - real.step_mm).abs() < 0.5);
+        }
+        assert_eq!(believed.log, truth.log);
+        // Every quantity of every tick in less than this.
+        let mean = truth.stream.len() as f64 / truth.rows.len() as f64;
+        assert!(mean < 50.0, "{mean} bytes a tick");
+        let mut bare = truth.clone();
+        for (tick, row) in (0..).zip(&mut bare.rows) {
+            row.controller = Controller::unknown(tick);
+        }
+        complete(&mut bare, &Run::of_stream(&truth.stream));
+        assert_eq!(format!("{:?}", bare.rows), format!("{:?}", truth.rows));
+        let page = crate::report::html(&believed, &[]);
+        assert!(page.contains("Deployed") && !page.contains("NaN"), "{}", &page[..2000]);
+    }
+}

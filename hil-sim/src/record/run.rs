@@ -1,0 +1,163 @@
+//! A log in memory.
+
+use interstage::log::Identity;
+use interstage::log::capture::CaptureChunk;
+use interstage::log::ledger::Line;
+use interstage::model::{Plan, PlanRequest};
+use interstage::restart::Restart;
+use interstage::tick::{Entry, Event};
+use serde::{Deserialize, Serialize};
+
+use super::{Controller, Counts, Decoder, Item, Mark};
+
+/// What made a log, with which parameters.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Header {
+    /// Layout of the frames.
+    pub schema: u16,
+    /// Version of the firmware.
+    pub version: String,
+    /// Hash of its image, hexadecimal; zeros on a host.
+    pub build: String,
+    /// Name of the rig.
+    pub rig: String,
+    /// CRC-32 of the rig's parameters, hexadecimal.
+    pub parameters: String,
+    /// CRC-32 of its sensors' parameters, hexadecimal.
+    pub calibration: String,
+    /// Travel of the wheel over a corner, mm.
+    pub corner_mm: f64,
+}
+
+impl From<&Identity> for Header {
+    fn from(identity: &Identity) -> Self {
+        Self {
+            schema: identity.schema,
+            version: identity.version.as_str().to_owned(),
+            build: identity.build.iter().map(|byte| format!("{byte:02x}")).collect(),
+            rig: identity.rig.as_str().to_owned(),
+            parameters: format!("{:08x}", identity.parameters),
+            calibration: format!("{:08x}", identity.calibration),
+            corner_mm: identity.corner.to_num(),
+        }
+    }
+}
+
+/// What came before a start of the target.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Boot {
+    /// Events.
+    pub events: usize,
+    /// Plans.
+    pub plans: usize,
+    /// Requests.
+    pub requests: usize,
+}
+
+/// What came from one start of the target to the next.
+#[derive(Clone, Copy, Debug)]
+pub struct Since<'a> {
+    /// What happened.
+    pub events: &'a [Entry],
+    /// Plans with the ticks that were given them.
+    pub plans: &'a [(u32, Plan)],
+    /// Requests with the ticks that made them.
+    pub requests: &'a [(u32, PlanRequest)],
+}
+
+impl Since<'_> {
+    /// Why the target started, if the log says so.
+    #[must_use]
+    pub fn restart(&self) -> Option<Restart> {
+        self.events.iter().find_map(|entry| match entry.event {
+            Event::Restart(restart) => Some(restart),
+            _ => None,
+        })
+    }
+}
+
+/// A log in memory.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Run {
+    /// What made it; none if the log does not say.
+    pub header: Option<Header>,
+    /// A row a tick, in the order of the log.
+    pub rows: Vec<Controller>,
+    /// What happened.
+    pub events: Vec<Entry>,
+    /// Plans with the ticks that were given them.
+    pub plans: Vec<(u32, Plan)>,
+    /// Requests with the ticks that made them.
+    pub requests: Vec<(u32, PlanRequest)>,
+    /// Lines of the ledger.
+    pub ledger: Vec<Line>,
+    /// Pieces of captures.
+    pub shots: Vec<CaptureChunk>,
+    /// Where each start after the first begins.
+    pub boots: Vec<Boot>,
+    /// What is missing, and before which row.
+    pub marks: Vec<(usize, Mark)>,
+    /// Counts of what came and what is missing.
+    pub counts: Counts,
+    /// The rig's parameters as TOML, if the file has them with it.
+    pub parameters: Option<String>,
+}
+
+impl Run {
+    /// Reads the bytes of the binary channel.
+    #[must_use]
+    pub fn of_stream(bytes: &[u8]) -> Self {
+        let (mut decoder, mut run) = (Decoder::new(), Self::default());
+        decoder.read(bytes, &mut |item| run.add(&item));
+        decoder.finish(&mut |item| run.add(&item));
+        run.counts = *decoder.counts();
+        run
+    }
+
+    /// Adds an item.
+    pub fn add(&mut self, item: &Item) {
+        match item {
+            Item::Identity(identity) => self.header = Some(identity.into()),
+            Item::Tick(record, sensors) => self.rows.push(Controller::of(record, sensors)),
+            Item::Plan(at, plan) => self.plans.push((*at, *plan)),
+            Item::Request(at, request) => self.requests.push((*at, *request)),
+            Item::Event(entry) => self.events.push(*entry),
+            Item::CaptureChunk(shots) => self.shots.push(shots.clone()),
+            Item::Ledger(line) => self.ledger.push(*line),
+            Item::Mark(mark) => {
+                if *mark == Mark::Restart {
+                    self.boots.push(Boot {
+                        events: self.events.len(),
+                        plans: self.plans.len(),
+                        requests: self.requests.len(),
+                    });
+                }
+                self.marks.push((self.rows.len(), *mark));
+            }
+        }
+    }
+
+    /// What a start of the target left in the log, counted from 0; ticks count from 0
+    /// again after each.
+    #[must_use]
+    pub fn since_boot(&self, boot: usize) -> Since<'_> {
+        let from = boot.checked_sub(1).and_then(|before| self.boots.get(before));
+        let (from, to) = (from.copied().unwrap_or_default(), self.boots.get(boot).copied());
+        let to = to.unwrap_or(Boot {
+            events: self.events.len(),
+            plans: self.plans.len(),
+            requests: self.requests.len(),
+        });
+        Since {
+            events: self.events.get(from.events..to.events).unwrap_or_default(),
+            plans: self.plans.get(from.plans..to.plans).unwrap_or_default(),
+            requests: self.requests.get(from.requests..to.requests).unwrap_or_default(),
+        }
+    }
+
+    /// Whether nothing is known to be missing.
+    #[must_use]
+    pub fn is_whole(&self) -> bool {
+        self.marks.is_empty()
+    }
+}

@@ -1,0 +1,210 @@
+//! Where a log comes from.
+
+use std::collections::VecDeque;
+use std::io::Read;
+
+use interstage::supervise::{Command, Mode};
+
+use crate::scenario::{Direction, Scenario};
+use crate::session::{self, Session};
+
+/// A source that failed.
+#[derive(Debug, thiserror::Error)]
+pub enum SourceError {
+    /// Its bytes cannot be read.
+    #[error("{name}: {source}")]
+    Read {
+        /// What was read.
+        name: String,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The run in software cannot be made.
+    #[error(transparent)]
+    Run(#[from] session::RunError),
+    /// A source of another crate.
+    #[error(transparent)]
+    Other(Box<dyn std::error::Error + Send + Sync>),
+    /// The board at a probe.
+    #[error(transparent)]
+    Port(#[from] crate::probe::PortError),
+}
+
+/// Something that speaks the binary log.
+pub trait Source {
+    /// What has come since the last call, possibly nothing; none at the end.
+    ///
+    /// # Errors
+    /// [`SourceError`] if it broke off.
+    fn read(&mut self) -> Result<Option<Vec<u8>>, SourceError>;
+
+    /// Sends a letter to the console; what has none drops it.
+    ///
+    /// # Errors
+    /// [`SourceError`] if it broke off.
+    fn send(&mut self, letter: u8) -> Result<(), SourceError>;
+
+    /// What has happened to the connection since the last call, a line each.
+    fn news(&mut self) -> Vec<String> {
+        Vec::new()
+    }
+}
+
+/// Letter of a command on the console.
+#[must_use]
+pub const fn letter(command: Command) -> u8 {
+    match command {
+        Command::Start => b's',
+        Command::Stop => b'x',
+        Command::Retract => b'r',
+        Command::Reset => b'0',
+    }
+}
+
+/// The command of a letter.
+fn command(letter: u8) -> Option<Command> {
+    Command::ALL.into_iter().find(|command| self::letter(*command) == letter)
+}
+
+/// The command that begins a run in this direction.
+#[must_use]
+pub const fn starter(direction: Direction) -> Command {
+    match direction {
+        Direction::Deploy => Command::Start,
+        Direction::Retract => Command::Retract,
+    }
+}
+
+/// A recorded stream, or one that comes through a pipe.
+pub struct Bytes {
+    name: String,
+    input: Box<dyn Read + Send>,
+}
+
+impl Bytes {
+    /// Reads from `input`, which is called `name`.
+    #[must_use]
+    pub fn new(name: String, input: Box<dyn Read + Send>) -> Self {
+        Self { name, input }
+    }
+}
+
+impl Source for Bytes {
+    fn read(&mut self) -> Result<Option<Vec<u8>>, SourceError> {
+        let mut bytes = vec![0; 1 << 16];
+        let read = self.input.read(&mut bytes);
+        let length =
+            read.map_err(|source| SourceError::Read { name: self.name.clone(), source })?;
+        bytes.truncate(length);
+        Ok((length > 0).then_some(bytes))
+    }
+
+    fn send(&mut self, _: u8) -> Result<(), SourceError> {
+        Ok(())
+    }
+}
+
+/// Ticks that the controller on this host runs at each reading.
+const TICKS: u32 = 20;
+/// Longest run without an operator, s.
+const LONGEST_S: f64 = 120.0;
+
+/// The controller on this host, in closed loop with the plant.
+pub struct Virtual {
+    session: Option<Session>,
+    letters: VecDeque<u8>,
+    /// Given as soon as the drive is idle; none if an operator gives the commands.
+    start: Option<Command>,
+    attended: bool,
+    /// How many of the next ticks are the last.
+    left: u32,
+}
+
+impl Virtual {
+    /// A session of this scenario. Unless it is `attended` by an operator it starts by
+    /// itself and ends when the drive has arrived.
+    ///
+    /// # Errors
+    /// [`session::RunError`] if the parameters do not make a controller.
+    pub fn new(scenario: &Scenario, attended: bool) -> Result<Self, session::RunError> {
+        let options = session::Options { rows: true, ..session::Options::default() };
+        Ok(Self {
+            session: Some(Session::new(scenario, options)?),
+            letters: VecDeque::new(),
+            start: (!attended).then(|| starter(scenario.run.direction)),
+            attended,
+            left: 100,
+        })
+    }
+
+    fn tick(&mut self) -> Result<bool, SourceError> {
+        let Some(session) = &mut self.session else { return Ok(false) };
+        let over = matches!(session.mode(), Mode::Complete(_) | Mode::FaultHold(_));
+        if !self.attended && (over || session.time_s() >= LONGEST_S) {
+            self.left = self.left.saturating_sub(1);
+            if self.left == 0 {
+                return Ok(false);
+            }
+        }
+        let typed = self.letters.pop_front().and_then(command);
+        let idle = session.mode() == Mode::Idle;
+        let command = typed.or_else(|| if idle { self.start.take() } else { None });
+        session.step(command)?;
+        Ok(true)
+    }
+}
+
+impl Source for Virtual {
+    fn read(&mut self) -> Result<Option<Vec<u8>>, SourceError> {
+        for _ in 0..TICKS {
+            if !self.tick()? {
+                let rest = self.session.take().map(|session| session.finish(1.0).stream);
+                return Ok(rest);
+            }
+        }
+        Ok(self.session.as_mut().map(Session::take_stream))
+    }
+
+    fn send(&mut self, letter: u8) -> Result<(), SourceError> {
+        self.letters.push_back(letter);
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::{Controller, Run};
+
+    #[test]
+    fn a_run_without_an_operator_starts_and_ends_by_itself() {
+        let mut source = Virtual::new(&Scenario::default(), false).unwrap();
+        let mut bytes = Vec::new();
+        while let Some(part) = source.read().unwrap() {
+            bytes.extend(part);
+        }
+        let run = Run::of_stream(&bytes);
+        assert!(run.is_whole());
+        let last = run.rows.last().and_then(Controller::mode).unwrap();
+        assert!(matches!(last, Mode::Complete(_)), "{last:?}");
+        assert_eq!(run.ledger.len(), 3);
+    }
+
+    #[test]
+    fn an_operator_starts_and_stops() {
+        let mut source = Virtual::new(&Scenario::default(), true).unwrap();
+        let mut bytes = Vec::new();
+        for round in 0..200 {
+            match round {
+                100 => source.send(letter(Command::Start)).unwrap(),
+                190 => source.send(letter(Command::Stop)).unwrap(),
+                _ => {}
+            }
+            bytes.extend(source.read().unwrap().unwrap());
+        }
+        let run = Run::of_stream(&bytes);
+        let commands: Vec<u8> =
+            run.rows.iter().map(|row| row.command).filter(|command| *command > 0).collect();
+        assert_eq!(commands, [1, 2]);
+    }
+}

@@ -1,0 +1,123 @@
+//! The summary of a run, and what it is made of.
+
+use serde::{Deserialize, Serialize};
+
+use super::Tick;
+
+/// Ledger line of one crossing: the plant's truth beside the controller's view.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct CrossingLine {
+    /// Step number, from 1.
+    pub index: u8,
+    /// True speed when the lower wall stopped (retract: began) to carry, mm/s.
+    pub speed_mm_s: f64,
+    /// True preload at that instant, N.
+    pub preload_n: f64,
+    /// True gap: clearance between step root and undeformed wheel at that instant, mm.
+    pub gap_mm: f64,
+    /// Gap that the controller predicted, mm.
+    pub gap_predicted_mm: Option<f64>,
+    /// Gap that the controller measured, mm.
+    pub gap_measured_mm: Option<f64>,
+    /// Largest force of corner and face on the wheel, N.
+    pub corner_force_n: f64,
+    /// How long before the corner touched the preload was reached, s.
+    pub lead_time_s: Option<f64>,
+    /// Gross slip during the crossing, mm.
+    pub slip_mm: f64,
+    /// True time of the corner's first touch, s.
+    pub touch_s: f64,
+    /// True time of lift-off (touch-down on retract), s.
+    pub lift_s: f64,
+    /// True position of the step, mm.
+    pub step_mm: f64,
+    /// Position of the step that the controller found, mm.
+    pub step_found_mm: Option<f64>,
+    /// Largest true preload during the crossing, N.
+    pub peak_preload_n: f64,
+    /// Largest friction utilisation during the crossing.
+    pub peak_utilisation: f64,
+}
+
+/// A fault or limit that the controller reported.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Report {
+    /// When, s since boot.
+    pub t_s: f64,
+    /// Stable code.
+    pub code: u16,
+    /// Sentence.
+    pub text: String,
+}
+
+/// One line of the log as text.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LogLine {
+    /// When, s since boot.
+    pub t_s: f64,
+    /// What.
+    pub text: String,
+}
+
+/// The summary of a run; `rig deploy --json` prints it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Summary {
+    /// Whether the drive reached the end of travel with every step crossed.
+    pub completed: bool,
+    /// `sil`, `board` or `probe`.
+    pub target: String,
+    /// `scheduled`, `constant`, `limit` or `reactive`.
+    pub controller: String,
+    /// `deploy` or `retract`.
+    pub direction: String,
+    /// Rig preset.
+    pub rig: String,
+    /// Seed of the plant's draw.
+    pub seed: u64,
+    /// From the start of motion to the end of travel, s.
+    pub duration_s: f64,
+    /// From boot to the end of the run, s.
+    pub total_s: f64,
+    /// Distance travelled, mm.
+    pub travel_mm: f64,
+    /// Reference gap of the schedule, mm.
+    pub gap_ref_mm: f64,
+    /// Largest gap at a step, or separation elsewhere, mm.
+    pub max_gap_mm: f64,
+    /// Gross slip, mm.
+    pub slip_mm: f64,
+    /// Mean true preload while moving, N.
+    pub mean_preload_n: f64,
+    /// Mechanical energy of the drive, J.
+    pub energy_j: f64,
+    /// Tread wear: friction work of creep and slip, J.
+    pub wear_j: f64,
+    /// Latched faults.
+    pub faults: Vec<Report>,
+    /// Active limits reported.
+    pub limits: Vec<Report>,
+    /// Faults that the scenario injected.
+    #[serde(default)]
+    pub injected: Vec<String>,
+    /// Simulated over wall-clock time.
+    pub real_time_factor: f64,
+    /// SHA-256 over the controller's trace.
+    pub trace_digest: String,
+    /// Ledger.
+    pub crossings: Vec<CrossingLine>,
+}
+
+/// A complete run.
+#[derive(Clone, Debug, Default)]
+pub struct Recording {
+    /// Summary and ledger.
+    pub summary: Summary,
+    /// One row a tick.
+    pub rows: Vec<Tick>,
+    /// Log lines.
+    pub log: Vec<LogLine>,
+    /// Parameters used, as TOML.
+    pub parameters: String,
+    /// The binary log as it was on its channel; empty if it was not kept.
+    pub stream: Vec<u8>,
+}

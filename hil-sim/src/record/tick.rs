@@ -1,0 +1,451 @@
+//! One row a tick: what the controller had and did, and what the plant knows beside it.
+//!
+//! The fields of [`Controller`] and [`TrueState`] are the log's columns, and this is the only
+//! place that lists them: names, order and schema in CSV, MCAP and JSON follow by serde. A new
+//! column is a new field and its value in the function below it.
+
+use interstage::log::{Flags, Record, codes};
+use interstage::sense::raw::{
+    AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
+};
+use interstage::supervise::Mode;
+use interstage::tick::Telemetry;
+use interstage::units::{Duty, Q16};
+use serde::{Deserialize, Serialize};
+
+use crate::plant::rig::Truth;
+
+/// Names of the numbers in [`Controller::mode`].
+pub const MODE_NAMES: [&str; 13] = [
+    "boot",
+    "self-test",
+    "zero",
+    "idle",
+    "preload",
+    "cruise",
+    "approach",
+    "crossing",
+    "settle",
+    "stopping",
+    "complete",
+    "fault hold",
+    "off",
+];
+const FAULT_HOLD: u8 = 11;
+/// The number of a tick in which the controller did not run.
+pub const OFF: u8 = 12;
+
+/// Names of the contact stages, from number 1.
+pub const STAGE_NAMES: [&str; 6] =
+    ["initial", "preloaded", "static friction", "sliding", "rolling", "continuous"];
+
+/// Index of a mode into [`MODE_NAMES`].
+#[must_use]
+pub fn mode_number(mode: Mode) -> u8 {
+    split(mode).0
+}
+
+/// Name of a mode, without its direction.
+#[must_use]
+pub fn mode_name(mode: Mode) -> &'static str {
+    MODE_NAMES[usize::from(mode_number(mode))]
+}
+
+/// Name of a contact stage's number.
+#[must_use]
+pub fn stage_name(stage: u8) -> &'static str {
+    STAGE_NAMES.get(usize::from(stage).wrapping_sub(1)).copied().unwrap_or("unknown stage")
+}
+
+/// First of the retracting modes in the firmware's numbers, and how far they lie from those
+/// that deploy.
+const RETRACTING: (u8, u8) = (11, 7);
+/// First code of a fault.
+const FAULT: u8 = 101;
+
+/// Number, whether it retracts, code of the fault that is held.
+fn split(mode: Mode) -> (u8, bool, u8) {
+    match codes::of_mode(mode) {
+        fault @ FAULT.. => (FAULT_HOLD, false, fault),
+        code if code >= RETRACTING.0 => (code - RETRACTING.1, true, 0),
+        code => (code, false, 0),
+    }
+}
+
+/// One tick of a log.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Tick {
+    /// What the controller has and does.
+    #[serde(flatten)]
+    pub controller: Controller,
+    /// What is true, if a plant was there to know it.
+    #[serde(flatten)]
+    pub truth: Option<TrueState>,
+}
+
+/// What the controller's sensors said, what it made of it, what it did.
+///
+/// Every quantity is exactly what the controller has: its fixed-point numbers are multiples
+/// of 2^-16 and have a place in an `f64`. What is unknown is `NaN`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Controller {
+    /// Ticks since boot, 1 ms each.
+    pub tick: u32,
+    /// The same, s.
+    pub t_s: f64,
+    /// Number of the mode, see [`MODE_NAMES`].
+    pub mode: u8,
+    /// The mode is one of retraction.
+    #[serde(with = "bit")]
+    pub retracts: bool,
+    /// Code of the fault that is held; 0 for none.
+    pub fault: u8,
+    /// Contact stage, 1 to 6.
+    pub stage: u8,
+    /// Sleeve level: 0 at the outermost wall.
+    pub level: u8,
+    /// Code of the wheel encoder, 16 bits, wraps; none before the first.
+    pub wheel_encoder_code: Option<u16>,
+    /// When it was taken, ticks.
+    pub wheel_encoder_at: Option<u32>,
+    /// Code of the preload sensor.
+    pub preload_code: Option<u16>,
+    /// When it was taken, ticks.
+    pub preload_at: Option<u32>,
+    /// Code of the compression sensor.
+    pub compression_code: Option<u16>,
+    /// When it was taken, ticks.
+    pub compression_at: Option<u32>,
+    /// Frame of the arm angle sensor, undecoded.
+    pub arm_angle_code: Option<u16>,
+    /// When it was taken, ticks.
+    pub arm_angle_at: Option<u32>,
+    /// Code of the drive's bridge, 12 bits, 2048 without voltage; none if none was taken.
+    pub drive_code: Option<u16>,
+    /// Code of the pre-tightener's bridge.
+    pub pretightener_code: Option<u16>,
+    /// Number of the command that was given, from 1; 0 for none.
+    pub command: u8,
+    /// Everything else that the tick was given and gave, as bits, see [`Flags`].
+    pub flags: u16,
+    /// Estimated axial position of the wheel centre, mm.
+    pub position_mm: f64,
+    /// Estimated speed of the wheel, mm/s.
+    pub wheel_speed_mm_s: f64,
+    /// Speed reference, mm/s.
+    pub speed_ref_mm_s: f64,
+    /// Measured preload, N.
+    pub preload_n: f64,
+    /// Preload reference, N.
+    pub preload_ref_n: f64,
+    /// Measured tread compression, mm.
+    pub compression_mm: f64,
+    /// Wheel centre's distance from the pillar axis by the arm angle, mm.
+    pub radius_mm: f64,
+    /// Gap predicted for the step ahead, mm.
+    pub gap_predicted_mm: f64,
+    /// Friction left unused, by the model.
+    pub slip_margin: f64,
+    /// Amplitude of the arm's mode, mm.
+    pub vibration_mm: f64,
+    /// Distance to the next face, mm; 32768 when none is left.
+    pub distance_mm: f64,
+    /// Duty of the drive, -1 to 1.
+    pub drive_duty: f64,
+    /// Duty of the pre-tightener, -1 to 1.
+    pub pretightener_duty: f64,
+    /// The drive's bridge is on.
+    #[serde(with = "bit")]
+    pub drive_on: bool,
+    /// The pre-tightener's bridge is on.
+    #[serde(with = "bit")]
+    pub pretightener_on: bool,
+}
+
+/// Yes and no as 1 and 0, so that every column is a number.
+mod bit {
+    use serde::{Deserialize, Deserializer, Serializer};
+
+    pub(super) fn serialize<S: Serializer>(bit: &bool, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_u8((*bit).into())
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<bool, D::Error> {
+        u8::deserialize(from).map(|bit| bit != 0)
+    }
+}
+
+impl Default for Controller {
+    fn default() -> Self {
+        Self::unknown(0)
+    }
+}
+
+/// One in the format of a duty.
+const DUTY: f64 = 32_768.0;
+
+impl Controller {
+    /// A tick that did not run, or is not in the log.
+    #[must_use]
+    pub fn unknown(tick: u32) -> Self {
+        let unknown = f64::NAN;
+        let nothing = Self::of(&Record::EMPTY, &SensorFrame::default());
+        Self {
+            tick,
+            t_s: f64::from(tick) * 1e-3,
+            mode: OFF,
+            position_mm: unknown,
+            wheel_speed_mm_s: unknown,
+            speed_ref_mm_s: unknown,
+            preload_n: unknown,
+            preload_ref_n: unknown,
+            compression_mm: unknown,
+            radius_mm: unknown,
+            gap_predicted_mm: unknown,
+            slip_margin: unknown,
+            vibration_mm: unknown,
+            distance_mm: unknown,
+            drive_duty: unknown,
+            pretightener_duty: unknown,
+            ..nothing
+        }
+    }
+
+    /// The columns of a record and of the codes that it was given.
+    #[must_use]
+    pub fn of(record: &Record, sensors: &SensorFrame) -> Self {
+        let Record { telemetry: seen, flags, .. } = record;
+        let SensorFrame { wheel, load_cell, tread, arm, bridges } = sensors;
+        let (mode, retracts, fault) = split(seen.mode);
+        Self {
+            tick: seen.at,
+            t_s: f64::from(seen.at) * 1e-3,
+            mode,
+            retracts,
+            fault,
+            stage: seen.stage as u8,
+            level: seen.level,
+            wheel_encoder_code: wheel.map(|sample| sample.code.get()),
+            wheel_encoder_at: wheel.map(|sample| sample.at),
+            preload_code: load_cell.map(|sample| sample.code.get()),
+            preload_at: load_cell.map(|sample| sample.at),
+            compression_code: tread.map(|sample| sample.code.get()),
+            compression_at: tread.map(|sample| sample.at),
+            arm_angle_code: arm.map(|sample| sample.code.get()),
+            arm_angle_at: arm.map(|sample| sample.at),
+            drive_code: bridges.map(|codes| codes.drive.get()),
+            pretightener_code: bridges.map(|codes| codes.pretightener.get()),
+            command: codes::of_command(flags.command()),
+            flags: flags.to_bits(),
+            position_mm: seen.position.to_num(),
+            wheel_speed_mm_s: seen.speed.to_num(),
+            speed_ref_mm_s: seen.speed_ref.to_num(),
+            preload_n: seen.preload.to_num(),
+            preload_ref_n: seen.preload_ref.to_num(),
+            compression_mm: seen.compression.to_num(),
+            radius_mm: seen.radius.to_num(),
+            gap_predicted_mm: seen.gap_predicted.to_num(),
+            slip_margin: seen.slip_margin.to_num(),
+            vibration_mm: seen.vibration.to_num(),
+            distance_mm: seen.distance.to_num(),
+            drive_duty: f64::from(seen.drive.to_bits()) / DUTY,
+            pretightener_duty: f64::from(seen.pretightener.to_bits()) / DUTY,
+            drive_on: flags.drive(),
+            pretightener_on: flags.preload(),
+        }
+    }
+
+    /// What the controller's sensors said.
+    #[must_use]
+    pub fn sensors(&self) -> SensorFrame {
+        fn sample<T>(
+            code: Option<u16>,
+            at: Option<u32>,
+            make: impl Fn(u16) -> T,
+        ) -> Option<Sample<T>> {
+            Some(Sample { code: make(code?), at: at? })
+        }
+        let bridges = self.drive_code.zip(self.pretightener_code);
+        SensorFrame {
+            wheel: sample(self.wheel_encoder_code, self.wheel_encoder_at, EncoderCount::new),
+            load_cell: sample(self.preload_code, self.preload_at, AdcCode::new),
+            tread: sample(self.compression_code, self.compression_at, AdcCode::new),
+            arm: sample(self.arm_angle_code, self.arm_angle_at, AngleFrame::new),
+            bridges: bridges.map(|(drive, pretightener)| BridgeCodes {
+                drive: BridgeCode::new(drive),
+                pretightener: BridgeCode::new(pretightener),
+            }),
+        }
+    }
+
+    /// Everything else that the tick was given and gave.
+    #[must_use]
+    pub const fn flags(&self) -> Flags {
+        Flags::from_bits(self.flags)
+    }
+
+    /// The mode; none if the numbers have no meaning.
+    #[must_use]
+    pub fn mode(&self) -> Option<Mode> {
+        let code = match (self.mode, self.retracts) {
+            (FAULT_HOLD, _) => self.fault,
+            (number, _) if number > FAULT_HOLD => return None,
+            (number, true) => number + RETRACTING.1,
+            (number, false) => number,
+        };
+        codes::mode(code).filter(|mode| split(*mode).0 == self.mode)
+    }
+
+    /// The controller's state in its own numbers; none if something in it has no
+    /// meaning.
+    #[must_use]
+    pub fn telemetry(&self) -> Option<Telemetry> {
+        let q = |value: f64| (!value.is_nan()).then(|| Q16::from_num(value));
+        let duty = |value: f64| Duty::from_bits((value * DUTY).round() as i16);
+        let mode = self.mode()?;
+        Some(Telemetry {
+            at: self.tick,
+            mode,
+            stage: codes::stage(self.stage)?,
+            position: q(self.position_mm)?,
+            speed: q(self.wheel_speed_mm_s)?,
+            speed_ref: q(self.speed_ref_mm_s)?,
+            preload: q(self.preload_n)?,
+            preload_ref: q(self.preload_ref_n)?,
+            compression: q(self.compression_mm)?,
+            radius: q(self.radius_mm)?,
+            level: self.level,
+            gap_predicted: q(self.gap_predicted_mm)?,
+            slip_margin: q(self.slip_margin)?,
+            vibration: q(self.vibration_mm)?,
+            distance: q(self.distance_mm)?,
+            drive: duty(self.drive_duty),
+            pretightener: duty(self.pretightener_duty),
+        })
+    }
+}
+
+/// What the plant knows of a tick, before it moves.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TrueState {
+    /// Axial position of the wheel centre, mm.
+    pub position_true_mm: f64,
+    /// Axial speed, mm/s.
+    pub speed_true_mm_s: f64,
+    /// Radial preload, N.
+    pub preload_true_n: f64,
+    /// Distance of the wheel centre from the pillar axis, mm.
+    pub radius_true_mm: f64,
+    /// Largest tread compression, mm.
+    pub compression_true_mm: f64,
+    /// Clearance between the root of the nearest step and the undeformed wheel
+    /// circle, mm; NaN away from a step.
+    #[serde(default = "nan")]
+    pub root_clearance_mm: f64,
+    /// Force of the step's corner and face on the wheel, N.
+    pub corner_force_n: f64,
+    /// Force of the lower wall on the wheel, N.
+    pub floor_force_n: f64,
+    /// Friction utilisation, traction over normal force.
+    pub utilisation: f64,
+    /// Friction left unused: mu minus utilisation.
+    pub slip_margin_true: f64,
+    /// Gross slip so far, mm.
+    pub slip_mm: f64,
+    /// Deflection of the arm by its modes, um.
+    pub vibration_true_um: f64,
+}
+
+fn nan() -> f64 {
+    f64::NAN
+}
+
+impl From<&Truth> for TrueState {
+    fn from(truth: &Truth) -> Self {
+        Self {
+            position_true_mm: truth.position_mm,
+            speed_true_mm_s: truth.speed_mm_s,
+            preload_true_n: truth.preload_n,
+            radius_true_mm: truth.radius_mm,
+            compression_true_mm: truth.depth_mm,
+            root_clearance_mm: truth.root_clearance_mm.unwrap_or(f64::NAN),
+            corner_force_n: truth.corner_n,
+            floor_force_n: truth.floor_n,
+            utilisation: truth.utilisation,
+            slip_margin_true: truth.friction - truth.utilisation.abs(),
+            slip_mm: truth.slip_mm,
+            vibration_true_um: truth.vibration_mm * 1e3,
+        }
+    }
+}
+
+impl Tick {
+    /// A true quantity; `NaN` if nothing is known to be true.
+    #[must_use]
+    pub fn of_truth(&self, of: impl Fn(&TrueState) -> f64) -> f64 {
+        self.truth.as_ref().map_or(f64::NAN, of)
+    }
+
+    /// Axial position, mm: the true one, or by odometry where there is none.
+    #[must_use]
+    pub fn position_mm(&self) -> f64 {
+        self.truth.map_or(self.controller.position_mm, |truth| truth.position_true_mm)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use interstage::fault::Fault;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_tick_keeps_every_bit(q in prop::array::uniform11(any::<i32>()), duties in any::<[i16; 2]>()) {
+            let q = q.map(Q16::from_bits);
+            let telemetry = Telemetry {
+                at: 77,
+                position: q[0],
+                speed: q[1],
+                speed_ref: q[2],
+                preload: q[3],
+                preload_ref: q[4],
+                compression: q[5],
+                radius: q[6],
+                gap_predicted: q[7],
+                slip_margin: q[8],
+                vibration: q[9],
+                distance: q[10],
+                drive: Duty::from_bits(duties[0]),
+                pretightener: Duty::from_bits(duties[1]),
+                ..Telemetry::default()
+            };
+            let record = Record { telemetry, ..Record::EMPTY };
+            let controller = Controller::of(&record, &SensorFrame::default());
+            prop_assert_eq!(controller.telemetry(), Some(telemetry));
+            // JSON keeps it too.
+            let tick = Tick { controller, truth: None };
+            let text = serde_json::to_string(&tick).unwrap();
+            prop_assert_eq!(serde_json::from_str::<Tick>(&text).unwrap(), tick);
+        }
+    }
+
+    #[test]
+    fn every_mode_has_a_name_and_comes_back() {
+        let held = Fault::ALL.into_iter().map(Mode::FaultHold);
+        for mode in Mode::WITHOUT_FAULT.into_iter().chain(held) {
+            let (number, retracts, fault) = split(mode);
+            let tick = Controller { mode: number, retracts, fault, ..Controller::default() };
+            assert_eq!(tick.mode(), Some(mode));
+            assert!(
+                format!("{mode:?}").to_lowercase().contains(&mode_name(mode)[..4].replace('-', ""))
+            );
+        }
+        for (mode, retracts) in [(OFF, false), (3, true), (FAULT_HOLD, false), (200, true)] {
+            let tick = Controller { mode, retracts, ..Controller::default() };
+            assert_eq!(tick.mode(), None, "{mode}");
+        }
+        assert_eq!((stage_name(0), stage_name(6)), ("unknown stage", "continuous"));
+    }
+}

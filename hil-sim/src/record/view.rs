@@ -1,0 +1,130 @@
+//! The state of a log that grows as a few lines of text.
+
+use std::time::Instant;
+
+use super::{Controller, Counts, Item, Mark, mode_name, stage_name, text};
+
+/// The latest of a log, and its rates.
+pub struct View {
+    row: Option<Controller>,
+    rig: String,
+    event: String,
+    mark: Option<Mark>,
+    counted: (Instant, Counts),
+    /// Ticks and bytes a second.
+    rates: (f64, f64),
+}
+
+impl Default for View {
+    fn default() -> Self {
+        Self {
+            row: None,
+            rig: "unknown".to_owned(),
+            event: String::new(),
+            mark: None,
+            counted: (Instant::now(), Counts::default()),
+            rates: (0.0, 0.0),
+        }
+    }
+}
+
+impl View {
+    /// Takes an item in.
+    pub fn see(&mut self, item: &Item) {
+        match item {
+            Item::Tick(record, sensors) => self.row = Some(Controller::of(record, sensors)),
+            Item::Identity(identity) => self.rig = identity.rig.as_str().to_owned(),
+            Item::Event(entry) => self.event = text(&entry.event),
+            Item::Mark(mark) => self.mark = Some(*mark),
+            Item::Plan(..) | Item::Request(..) | Item::CaptureChunk(_) | Item::Ledger(_) => {}
+        }
+    }
+
+    /// Computes the rates, at most once in half a second; whether it was time.
+    pub fn count(&mut self, counts: &Counts) -> bool {
+        let (since, before) = &self.counted;
+        let passed = since.elapsed().as_secs_f64();
+        if passed < 0.5 {
+            return false;
+        }
+        let rate = |now: u64, before: u64| (now - before) as f64 / passed;
+        self.rates = (rate(counts.ticks, before.ticks), rate(counts.bytes, before.bytes));
+        self.counted = (Instant::now(), *counts);
+        true
+    }
+
+    /// The latest tick.
+    #[must_use]
+    pub const fn row(&self) -> Option<&Controller> {
+        self.row.as_ref()
+    }
+
+    /// Rig, rates and losses as one line.
+    #[must_use]
+    pub fn rates_text(&self, counts: &Counts) -> String {
+        let (ticks, bytes) = self.rates;
+        format!(
+            "rig {}  {} ticks  {ticks:.0} ticks/s  {:.1} kB/s  lost {} frames, {} ticks  restarts {}",
+            self.rig,
+            counts.ticks,
+            bytes * 1e-3,
+            counts.lost_frames,
+            counts.lost_ticks,
+            counts.restarts,
+        )
+    }
+
+    /// Time, mode, contact and the quantities of the latest tick; empty before the first.
+    #[must_use]
+    pub fn state_text(&self) -> String {
+        self.row.map_or_else(String::new, |row| {
+            format!(
+                "  {:9.3} s  {:10}  contact: {:16} level {}\n  position {:8.3} mm   speed {:7.3} of {:7.3} mm/s   preload {:6.2} of {:6.2} N\n  compression {:6.3} mm   radius {:8.3} mm   gap predicted {:6.3} mm   slip margin {:5.2}",
+                row.t_s,
+                row.mode().map_or("?", mode_name),
+                stage_name(row.stage),
+                row.level,
+                row.position_mm,
+                row.wheel_speed_mm_s,
+                row.speed_ref_mm_s,
+                row.preload_n,
+                row.preload_ref_n,
+                row.compression_mm,
+                row.radius_mm,
+                row.gap_predicted_mm,
+                row.slip_margin,
+            )
+        })
+    }
+
+    /// The state as a few lines.
+    #[must_use]
+    pub fn text(&self, counts: &Counts) -> String {
+        let mut lines = vec![self.rates_text(counts)];
+        lines.extend(self.row.map(|_| self.state_text()));
+        lines.extend((!self.event.is_empty()).then(|| format!("  {}", self.event)));
+        lines.extend(self.mark.map(|mark| format!("  {mark}")));
+        lines.join("\n")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::Decoder;
+    use crate::scenario::Scenario;
+    use crate::session;
+
+    #[test]
+    fn the_state_shows_what_came_last() {
+        let options = session::Options { rows: true, ..session::Options::default() };
+        let stream = session::run(&Scenario::default(), options).unwrap().stream;
+        let (mut view, mut decoder) = (View::default(), Decoder::new());
+        decoder.read(&stream, &mut |item| view.see(&item));
+        let text = view.text(decoder.counts());
+        for part in ["rig prototype", "complete", "level 3", "lost 0 frames", "position"] {
+            assert!(text.contains(part), "{part} in {text}");
+        }
+        assert!(!view.count(decoder.counts()), "too early for a rate");
+    }
+}

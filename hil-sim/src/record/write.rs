@@ -1,0 +1,399 @@
+//! MCAP and CSV files of a log that grows, and the files of a run that is over.
+//!
+//! Once a second of the log's time all that has come is handed to the system, as complete
+//! chunks, so that a file which is cut off there, by a full disk or a lost supply, is
+//! read up to its last second.
+
+use std::io::{Seek, Write};
+use std::path::{Path, PathBuf};
+
+use interstage::log::frame::LONGEST;
+
+use super::mcap_file::{McapFile, TICK_NS};
+use super::{
+    Controller, Counts, Decoder, Header, Item, Mark, Recording, Tick, Topic, messages, pieces,
+    write_mcap,
+};
+use crate::files::{Failure, FileError, atomic_write, make_directory};
+
+/// Ticks between two hand-overs to the system.
+const FLUSH_TICKS: u64 = 1000;
+
+/// Why writing came to an end. What had been handed over before stays readable.
+#[derive(Debug, thiserror::Error)]
+#[error("writing stopped after {ticks} ticks, of which {kept} are safe: {}", chain(&**source))]
+pub struct WriteError {
+    /// Ticks that had come.
+    pub ticks: u64,
+    /// Ticks that the files hold for certain.
+    pub kept: u64,
+    /// What the system said.
+    source: Failure,
+}
+
+/// An error and its causes, the system's own last.
+fn chain(error: &(dyn std::error::Error + 'static)) -> String {
+    let causes = std::iter::successors(Some(error), |error| error.source());
+    let mut texts: Vec<String> = causes.map(ToString::to_string).collect();
+    texts.dedup();
+    texts.join(": ")
+}
+
+/// Adds a row. Numbers are written so that reading gives the same bits; what is unknown is
+/// `NaN`. Without truth its columns are absent.
+fn write_row<W: Write>(csv: &mut csv::Writer<W>, tick: &Tick) -> csv::Result<()> {
+    match tick.truth {
+        Some(truth) => csv.serialize((tick.controller, truth)),
+        None => csv.serialize(tick.controller),
+    }
+}
+
+/// Writes the rows of `recording` to `path`, below the names of the columns.
+///
+/// # Errors
+/// [`FileError::File`] with the reason.
+pub fn write_csv(recording: &Recording, path: &Path) -> Result<(), FileError> {
+    atomic_write(path, |out| {
+        let mut csv = csv::Writer::from_writer(out);
+        for tick in &recording.rows {
+            write_row(&mut csv, tick)?;
+        }
+        Ok(csv.flush()?)
+    })
+}
+
+/// Writes `log.csv`, `log.mcap` and `summary.json`, the object that `rig deploy --json`
+/// prints, into `directory`, which is made if it is missing, and returns their paths.
+///
+/// # Errors
+/// The first file that cannot be written; those before it stay.
+pub fn write_all(recording: &Recording, directory: &Path) -> Result<Vec<PathBuf>, FileError> {
+    make_directory(directory)?;
+    let [csv, mcap, summary] =
+        ["log.csv", "log.mcap", "summary.json"].map(|name| directory.join(name));
+    write_csv(recording, &csv)?;
+    write_mcap(recording, &mcap)?;
+    atomic_write(&summary, |out| {
+        serde_json::to_writer_pretty(&mut *out, &recording.summary)?;
+        Ok(out.write_all(b"\n")?)
+    })?;
+    Ok(vec![csv, mcap, summary])
+}
+
+/// Writes a log that grows to an MCAP file and a CSV file, of which each may be absent.
+pub struct Writer<M: Write + Seek, C: Write> {
+    mcap: Option<McapFile<M>>,
+    csv: Option<csv::Writer<C>>,
+    /// Whether ticks go into the MCAP file beside the frames.
+    decoded: bool,
+    decoder: Decoder,
+    partial: Vec<u8>,
+    header: Option<Header>,
+    /// Time of the latest message, ns; it never goes back.
+    now: u64,
+    /// Time at which the target started, ns.
+    start: u64,
+    /// Ticks handed over to the system.
+    kept: u64,
+}
+
+impl<M: Write + Seek, C: Write> Writer<M, C> {
+    /// Begins the files. `parameters` are those of the controller as TOML, if they are
+    /// known; `decoded` adds ticks to the MCAP file beside the frames.
+    ///
+    /// # Errors
+    /// [`WriteError`] with the reason.
+    pub fn new(
+        mcap: Option<M>,
+        csv: Option<C>,
+        parameters: Option<&str>,
+        decoded: bool,
+    ) -> Result<Self, WriteError> {
+        let begin = |out| {
+            let mut file = McapFile::new(out)?;
+            parameters.map_or(Ok(()), |toml| file.parameters(toml))?;
+            Ok(file)
+        };
+        let fail = |source: Failure| WriteError { ticks: 0, kept: 0, source };
+        Ok(Self {
+            mcap: mcap.map(begin).transpose().map_err(fail)?,
+            csv: csv.map(csv::Writer::from_writer),
+            decoded,
+            decoder: Decoder::new(),
+            partial: Vec::new(),
+            header: None,
+            now: 0,
+            start: 0,
+            kept: 0,
+        })
+    }
+
+    /// What has come so far.
+    pub const fn counts(&self) -> &Counts {
+        self.decoder.counts()
+    }
+
+    /// Takes bytes as they come; each item is shown to `see`.
+    ///
+    /// # Errors
+    /// [`WriteError`] if a file cannot grow any more.
+    pub fn take(&mut self, bytes: &[u8], see: &mut impl FnMut(&Item)) -> Result<(), WriteError> {
+        self.try_take(bytes, see).map_err(|source| self.failed(source))
+    }
+
+    fn try_take(&mut self, bytes: &[u8], see: &mut impl FnMut(&Item)) -> Result<(), Failure> {
+        let mut held = std::mem::take(&mut self.partial);
+        held.extend_from_slice(bytes);
+        let mut used = 0;
+        for frame in pieces(&held) {
+            used += frame.len();
+            self.frame(frame, see)?;
+        }
+        // Of what is no frame, only the end may become one.
+        let garbage = (held.len() - used).saturating_sub(LONGEST);
+        if garbage > LONGEST {
+            self.frame(&held[used..used + garbage], see)?;
+            used += garbage;
+        }
+        held.drain(..used);
+        self.partial = held;
+        if self.counts().ticks >= self.kept + FLUSH_TICKS {
+            self.flush()?;
+        }
+        Ok(())
+    }
+
+    fn failed(&self, source: Failure) -> WriteError {
+        WriteError { ticks: self.counts().ticks, kept: self.kept, source }
+    }
+
+    fn frame(&mut self, frame: &[u8], see: &mut impl FnMut(&Item)) -> Result<(), Failure> {
+        let mut items = Vec::new();
+        self.decoder.read(frame, &mut |item| items.push(item));
+        self.items(&items, see)?;
+        if let Some(mcap) = &mut self.mcap {
+            mcap.message(self.now, Topic::Frames, frame)?;
+        }
+        Ok(())
+    }
+
+    fn items(&mut self, items: &[Item], see: &mut impl FnMut(&Item)) -> Result<(), Failure> {
+        for item in items {
+            see(item);
+            match item {
+                Item::Tick(record, sensors) => {
+                    self.now = self.now.max(self.start + u64::from(record.at()) * TICK_NS);
+                    if let Some(csv) = &mut self.csv {
+                        let controller = Controller::of(record, sensors);
+                        write_row(csv, &Tick { controller, truth: None })?;
+                    }
+                }
+                Item::Mark(Mark::Restart) => self.start = self.now,
+                Item::Identity(identity) => self.header(Header::from(identity))?,
+                _ => {}
+            }
+            if let (Some(mcap), Some((topic, body))) = (&mut self.mcap, messages(item))
+                && (self.decoded || topic != Topic::Tick)
+            {
+                mcap.message(self.now, topic, &body)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds the target's identity if it is new.
+    fn header(&mut self, header: Header) -> Result<(), Failure> {
+        if let Some(mcap) = self.mcap.as_mut().filter(|_| self.header.as_ref() != Some(&header)) {
+            let value = serde_json::to_value(&header)?;
+            let pairs = value.as_object().into_iter().flatten().map(|(key, value)| {
+                (key.clone(), value.as_str().map_or_else(|| value.to_string(), str::to_owned))
+            });
+            mcap.metadata("identity", pairs)?;
+            self.header = Some(header);
+        }
+        Ok(())
+    }
+
+    fn flush(&mut self) -> Result<(), Failure> {
+        self.mcap.as_mut().map_or(Ok(()), McapFile::flush)?;
+        self.csv.as_mut().map_or(Ok(()), csv::Writer::flush)?;
+        self.kept = self.counts().ticks;
+        Ok(())
+    }
+
+    /// Closes the files; what came.
+    ///
+    /// # Errors
+    /// [`WriteError`] if a file cannot be closed.
+    pub fn finish(mut self, see: &mut impl FnMut(&Item)) -> Result<Counts, WriteError> {
+        let mut items = Vec::new();
+        self.decoder.finish(&mut |item| items.push(item));
+        let closed = self
+            .items(&items, see)
+            .and_then(|()| self.flush())
+            .and_then(|()| self.mcap.as_mut().map_or(Ok(()), McapFile::finish));
+        closed.map_err(|source| self.failed(source))?;
+        Ok(*self.counts())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::{Cursor, Error, ErrorKind, SeekFrom};
+    use std::sync::{Arc, Mutex};
+
+    use super::*;
+    use crate::record::{Run, Summary};
+    use crate::report::example;
+    use crate::scenario::Scenario;
+    use crate::session;
+
+    /// A disk of so many bytes.
+    #[derive(Clone)]
+    struct Disk(Arc<Mutex<Cursor<Vec<u8>>>>, u64);
+
+    impl Disk {
+        fn of(bytes: u64) -> Self {
+            Self(Arc::default(), bytes)
+        }
+
+        fn content(&self) -> Vec<u8> {
+            self.0.lock().unwrap().get_ref().clone()
+        }
+    }
+
+    impl Write for Disk {
+        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            let mut disk = self.0.lock().unwrap();
+            let left = self.1.saturating_sub(disk.position()) as usize;
+            if left == 0 {
+                return Err(Error::from(ErrorKind::StorageFull));
+            }
+            disk.write(&bytes[..bytes.len().min(left)])
+        }
+
+        fn flush(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+
+    impl Seek for Disk {
+        fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
+            self.0.lock().unwrap().seek(to)
+        }
+    }
+
+    fn stream() -> Vec<u8> {
+        let options = session::Options { rows: true, ..session::Options::default() };
+        session::run(&Scenario::default(), options).unwrap().stream
+    }
+
+    fn read(bytes: &[u8]) -> Run {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("log");
+        std::fs::write(&path, bytes).unwrap();
+        Run::read(&path).unwrap()
+    }
+
+    /// Writes the stream in pieces to disks of these sizes.
+    fn write(stream: &[u8], disks: (&Disk, &Disk)) -> Result<Counts, WriteError> {
+        let (mcap, csv) = (Some(disks.0.clone()), Some(disks.1.clone()));
+        let mut writer = Writer::new(mcap, csv, Some("[run]\nseed = 0\n"), true)?;
+        for part in stream.chunks(777) {
+            writer.take(part, &mut |_| {})?;
+        }
+        writer.finish(&mut |_| {})
+    }
+
+    #[test]
+    fn both_files_give_back_what_came() {
+        let (stream, disks) = (stream(), (Disk::of(u64::MAX), Disk::of(u64::MAX)));
+        let counts = write(&stream, (&disks.0, &disks.1)).unwrap();
+        let (whole, mcap, csv) =
+            (Run::of_stream(&stream), read(&disks.0.content()), read(&disks.1.content()));
+        assert_eq!(counts, whole.counts);
+        assert_eq!(csv.rows, whole.rows);
+        assert_eq!(mcap.parameters.as_deref(), Some("[run]\nseed = 0\n"));
+        assert_eq!(Run { parameters: None, ..mcap }, whole);
+    }
+
+    #[test]
+    fn a_full_disk_is_told_and_what_was_written_stays_readable() {
+        let stream = stream();
+        for (mcap, csv) in [(400_000, u64::MAX), (u64::MAX, 500_000)] {
+            let disks = (Disk::of(mcap), Disk::of(csv));
+            let error = write(&stream, (&disks.0, &disks.1)).unwrap_err();
+            let text = error.to_string();
+            assert!(text.contains("no storage space") && text.lines().count() == 1, "{text}");
+            assert!(error.kept >= 1000 && error.kept <= error.ticks, "{error}");
+            for disk in [&disks.0, &disks.1] {
+                let run = read(&disk.content());
+                assert!(run.rows.len() as u64 >= error.kept, "{} rows", run.rows.len());
+                assert!(run.rows.windows(2).all(|pair| pair[1].tick == pair[0].tick + 1));
+            }
+        }
+    }
+
+    #[test]
+    fn a_file_cut_anywhere_is_read_up_to_there() {
+        let (stream, disks) = (stream(), (Disk::of(u64::MAX), Disk::of(u64::MAX)));
+        write(&stream, (&disks.0, &disks.1)).unwrap();
+        let whole = disks.0.content();
+        let mut before = 0;
+        for tenth in 4..10 {
+            let rows = read(&whole[..whole.len() * tenth / 10]).rows.len();
+            assert!(rows >= before && rows > 500, "{rows} rows of {tenth} tenths");
+            before = rows;
+        }
+        assert!(before >= 3000, "{before}");
+    }
+
+    #[test]
+    fn time_in_the_file_never_goes_back_even_if_the_target_starts_anew() {
+        let disks = (Disk::of(u64::MAX), Disk::of(u64::MAX));
+        let twice = [stream(), stream()].concat();
+        let counts = write(&twice, (&disks.0, &disks.1)).unwrap();
+        assert_eq!(counts.restarts, 1);
+        let content = disks.0.content();
+        let mut last = 0;
+        for message in mcap::MessageStream::new(&content).unwrap() {
+            let message = message.unwrap();
+            assert!(message.log_time >= last, "{}", message.channel.topic);
+            last = message.log_time;
+        }
+    }
+
+    #[test]
+    fn every_file_is_written_without_a_temporary_one_and_rows_come_back_to_the_bit() {
+        let directory = tempfile::tempdir().unwrap();
+        let folder = directory.path().join("out/run");
+        let recording = example::deploy();
+        let files = write_all(&recording, &folder).unwrap();
+        assert_eq!(std::fs::read_dir(&folder).unwrap().count(), files.len());
+        let summary = std::fs::read_to_string(&files[2]).unwrap();
+        assert_eq!(serde_json::from_str::<Summary>(&summary).unwrap(), recording.summary);
+        let mut reader = csv::Reader::from_path(&files[0]).unwrap();
+        let head = reader.headers().unwrap().clone();
+        let rows: Vec<Tick> = reader
+            .records()
+            .map(|record| {
+                let record = record.unwrap();
+                let controller = record.deserialize(Some(&head)).unwrap();
+                Tick { controller, truth: Some(record.deserialize(Some(&head)).unwrap()) }
+            })
+            .collect();
+        // A NaN differs from itself; its text does not.
+        assert_eq!(format!("{rows:?}"), format!("{:?}", recording.rows));
+    }
+
+    #[test]
+    fn an_error_names_the_path() {
+        let directory = tempfile::tempdir().unwrap();
+        let file = directory.path().join("taken");
+        std::fs::write(&file, "").unwrap();
+        let error = write_all(&example::deploy(), &file.join("run")).unwrap_err().to_string();
+        assert!(error.contains("taken/run: cannot make the directory"), "{error}");
+        let error = write_csv(&Recording::default(), &file.join("log.csv")).unwrap_err();
+        assert!(error.to_string().contains("taken/log.csv: cannot be written"), "{error}");
+    }
+}

@@ -1,0 +1,58 @@
+//! The columns of the crossings' ledger, for page, terminal and comparison.
+
+use crate::record::CrossingLine;
+
+/// A column of the ledger.
+pub(crate) struct Column {
+    pub(crate) name: &'static str,
+    pub(crate) unit: &'static str,
+    pub(crate) decimals: usize,
+    pub(crate) of: fn(&CrossingLine) -> Option<f64>,
+    /// The true value of what the controller predicts, measures or finds, and how far it is
+    /// off, as text.
+    pub(crate) truth: Option<(fn(&CrossingLine) -> f64, fn(f64, f64) -> String)>,
+    /// A terminal has no room for all.
+    pub(crate) on_terminal: bool,
+}
+
+/// All of them, after the step's number.
+pub(crate) const COLUMNS: [Column; 13] = {
+    const fn new(
+        name: &'static str,
+        unit: &'static str,
+        decimals: usize,
+        of: fn(&CrossingLine) -> Option<f64>,
+    ) -> Column {
+        Column { name, unit, decimals, of, truth: None, on_terminal: true }
+    }
+    const GAP: Option<(fn(&CrossingLine) -> f64, fn(f64, f64) -> String)> =
+        Some((|c| c.gap_mm, gap_error));
+    const STEP: Option<(fn(&CrossingLine) -> f64, fn(f64, f64) -> String)> =
+        Some((|c| c.step_mm, step_error));
+    [
+        new("gap", "mm", 4, |c| Some(c.gap_mm)),
+        Column { truth: GAP, ..new("predicted", "mm", 4, |c| c.gap_predicted_mm) },
+        Column { truth: GAP, ..new("measured", "mm", 4, |c| c.gap_measured_mm) },
+        new("speed", "mm/s", 2, |c| Some(c.speed_mm_s)),
+        new("preload", "N", 2, |c| Some(c.preload_n)),
+        Column { on_terminal: false, ..new("peak preload", "N", 2, |c| Some(c.peak_preload_n)) },
+        new("corner", "N", 1, |c| Some(c.corner_force_n)),
+        Column { on_terminal: false, ..new("friction used", "", 2, |c| Some(c.peak_utilisation)) },
+        new("lead", "s", 3, |c| c.lead_time_s),
+        new("slip", "mm", 3, |c| Some(c.slip_mm)),
+        new("step at", "mm", 2, |c| Some(c.step_mm)),
+        Column { truth: STEP, ..new("found at", "mm", 2, |c| c.step_found_mm) },
+        Column {
+            on_terminal: false,
+            ..new("touch to lift", "s", 3, |c| Some((c.lift_s - c.touch_s).abs()))
+        },
+    ]
+};
+
+fn gap_error(error: f64, truth: f64) -> String {
+    format!("{:+.0} µm, {:+.1} %", 1e3 * error, 100.0 * error / truth)
+}
+
+fn step_error(error: f64, _: f64) -> String {
+    format!("{:+.0} µm", 1e3 * error)
+}

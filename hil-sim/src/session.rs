@@ -1,0 +1,96 @@
+//! A run in software: the shipping control tick in closed loop with the plant, a
+//! millisecond at a time, as fast as the host allows.
+
+mod closed_loop;
+mod echo;
+mod stream;
+
+use std::time::Instant;
+
+use interstage::model::Strategy;
+use interstage::rig::RigError;
+use interstage::supervise::{Command, Mode};
+use interstage::tick::Output;
+
+use crate::plant::limits::Refusal;
+use crate::plant::rig::PlantError;
+use crate::record::{Recording, starter};
+use crate::scenario::{ControllerKind, Scenario};
+
+pub use closed_loop::{Session, drives, initial_rig, read};
+pub use echo::Echo;
+pub use stream::Stream;
+
+/// Control period, s.
+pub(crate) const TICK_S: f64 = 1e-3;
+/// Longest run, s: three times the travel at the least useful speed.
+pub(crate) const LONGEST_S: f64 = 120.0;
+
+/// What is asked of a run beside its scenario.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Options {
+    /// Keep one row a tick.
+    pub rows: bool,
+    /// Crossing speed prescribed to the planner, mm/s, and whether it holds
+    /// throughout.
+    pub speed: Option<(f64, bool)>,
+}
+
+/// A run that could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The parameters do not make a controller.
+    #[error("{0}")]
+    Rig(#[from] RigError),
+    /// The plant of this seed cannot be computed, because it cannot be.
+    #[error("plant: {0}")]
+    Refused(#[from] Refusal),
+    /// The plant left the set of meaningful states.
+    #[error("{0}")]
+    Plant(#[from] PlantError),
+    /// There is no board that could break.
+    #[error("run.faults: {0} is a fault of the board's hardware: --target board")]
+    Hardware(String),
+}
+
+impl From<ControllerKind> for Strategy {
+    fn from(kind: ControllerKind) -> Self {
+        match kind {
+            ControllerKind::Scheduled => Self::Scheduled,
+            ControllerKind::Constant => Self::Constant,
+            ControllerKind::Limit => Self::Limit,
+            ControllerKind::Reactive => Self::Reactive,
+        }
+    }
+}
+
+/// Runs a scenario to its end: arrival, fault hold, or time. The operator presses the
+/// button once, as soon as the drive is idle.
+///
+/// # Errors
+/// [`RunError`] if the parameters are out of range or the plant fails. A run that
+/// ends in a fault is a result, not an error.
+pub fn run(scenario: &Scenario, options: Options) -> Result<Recording, RunError> {
+    run_session(Session::new(scenario, options)?, scenario)
+}
+
+/// [`run`] of a session that has been made ready for this scenario.
+///
+/// # Errors
+/// [`RunError::Plant`] if the plant fails.
+pub fn run_session(mut session: Session, scenario: &Scenario) -> Result<Recording, RunError> {
+    let mut start = Some(starter(scenario.run.direction));
+    let started = Instant::now();
+    while tick(&mut session, &mut start)?.is_some() {}
+    Ok(session.finish(started.elapsed().as_secs_f64()))
+}
+
+/// A tick of a run that gets `start` as soon as the drive is idle; none at its end.
+fn tick(session: &mut Session, start: &mut Option<Command>) -> Result<Option<Output>, RunError> {
+    let over = matches!(session.mode(), Mode::Complete(_) | Mode::FaultHold(_));
+    if over || session.time_s() >= LONGEST_S {
+        return Ok(None);
+    }
+    let command = if session.mode() == Mode::Idle { start.take() } else { None };
+    session.step(command).map(Some)
+}

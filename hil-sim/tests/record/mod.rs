@@ -1,0 +1,4 @@
+//! Logs: written, read, damaged, run again.
+
+mod fuzz;
+mod logs;

@@ -1,0 +1,7 @@
+//! Controller and plant in closed loop.
+
+mod anomalies;
+mod deployment;
+mod restarts;
+mod supervisor;
+mod tasks_on_the_plant;

@@ -1,0 +1,386 @@
+//! The firmware's asynchronous tasks in closed loop with the plant under virtual time,
+//! through a board whose peripherals are the plant's sensors and motors.
+//!
+//! Polled in the order of their data - sensors, tick, model - the tasks do exactly what
+//! the loop of `sil` does. Polled the other way round, as interrupts may have it, the
+//! tick finds samples that are a millisecond older, and the run differs by that.
+
+use std::cell::{Cell, RefCell};
+use std::future::{Future, poll_fn};
+use std::pin::Pin;
+use std::rc::Rc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::task::{Context, Poll, Wake, Waker};
+
+use crate::common::{
+    Bench, Moment, NO_SLIP_MM, RIGS, STEP_CODES, WAYS, back, end_mm, scenario, starter,
+};
+use embassy_time::{Duration, Instant, MockDriver};
+use hil_sim::plant::ledger::Crossing;
+use hil_sim::plant::rig::{Drives, VirtualRig};
+use hil_sim::plant::sensors::{Codes, Sensors};
+use hil_sim::scenario::{Direction, Scenario};
+use hil_sim::session;
+use interstage::fault::Fault;
+use interstage::hal::{
+    AnalogInput, AngleBus, CommandSource, Indicator, Journal, Light, Motors, Watchdog, WheelEncoder,
+};
+use interstage::log::{Identity, LogEncoder};
+use interstage::model::Planner;
+use interstage::restart::DriveSnapshot;
+use interstage::sense::raw::{AdcCode, AngleFrame, BridgeCodes, BusFault, EncoderCount};
+use interstage::supervise::{Command, Mode};
+use interstage::tasks::{self, Exchange, TickIo, TickIoCell};
+use interstage::tick::{Controller, CrossingRecord, Entry, Event, Telemetry};
+use interstage::units::MotorCommand;
+
+/// The clock is one for the whole process: one board at a time.
+static CLOCK: Mutex<()> = Mutex::new(());
+
+/// Tasks are started a millisecond after boot, so that all wake for the first time at
+/// the same even tick.
+const FIRST_TICK: u32 = 2;
+/// A control tick, s.
+const TICK_S: f64 = 1e-3;
+
+/// What plant, peripherals and test share.
+#[derive(Default)]
+struct Shared {
+    codes: Cell<Option<Codes>>,
+    drives: Cell<Drives>,
+    command: Cell<Option<Command>>,
+    /// Time of each feeding, ms.
+    fed: RefCell<Vec<u64>>,
+    /// Entries with the time of writing, ms.
+    written: RefCell<Vec<(u64, Entry)>>,
+    light: Cell<Light>,
+}
+
+impl Shared {
+    fn codes(&self) -> Codes {
+        self.codes.get().expect("the sensors read before any task runs")
+    }
+}
+
+/// Every peripheral of the board.
+#[derive(Clone)]
+struct Peripheral(Rc<Shared>);
+
+/// The converter behind the load cell; the tread's is another.
+#[derive(Clone)]
+struct LoadCell(Rc<Shared>);
+
+impl WheelEncoder for Peripheral {
+    fn count(&mut self) -> EncoderCount {
+        self.0.codes().wheel
+    }
+}
+
+impl AnalogInput for LoadCell {
+    async fn sample(&mut self) -> Result<AdcCode, BusFault> {
+        Ok(self.0.codes().load_cell)
+    }
+}
+
+impl AnalogInput for Peripheral {
+    async fn sample(&mut self) -> Result<AdcCode, BusFault> {
+        Ok(self.0.codes().tread)
+    }
+}
+
+impl AngleBus for Peripheral {
+    async fn frame(&mut self) -> Result<AngleFrame, BusFault> {
+        Ok(self.0.codes().arm)
+    }
+}
+
+impl Motors for Peripheral {
+    fn apply(&mut self, drive: MotorCommand, preload: MotorCommand) {
+        self.0.drives.set(session::drives(drive, preload));
+    }
+
+    fn readback(&mut self) -> Option<BridgeCodes> {
+        Some(self.0.codes().bridges)
+    }
+
+    fn stopped(&mut self) -> bool {
+        false
+    }
+
+    fn rearm(&mut self) {}
+}
+
+impl Watchdog for Peripheral {
+    fn feed(&mut self) {
+        self.0.fed.borrow_mut().push(Instant::now().as_millis());
+    }
+
+    fn keep(&mut self, _: &DriveSnapshot) {}
+}
+
+impl Journal for Peripheral {
+    fn write(&mut self, entry: &Entry) {
+        self.0.written.borrow_mut().push((Instant::now().as_millis(), *entry));
+    }
+}
+
+impl Indicator for Peripheral {
+    fn show(&mut self, light: Light) {
+        self.0.light.set(light);
+    }
+}
+
+impl CommandSource for Peripheral {
+    async fn next(&mut self) -> Command {
+        poll_fn(|_| self.0.command.take().map_or(Poll::Pending, Poll::Ready)).await
+    }
+}
+
+/// In which order tasks that are due together get the processor.
+#[derive(Clone, Copy, PartialEq)]
+enum Order {
+    /// As the data flow: what the tick reads is of this millisecond.
+    SensorsFirst,
+    /// The tick reads what was published a millisecond ago.
+    TickFirst,
+}
+
+/// The tasks on their board, and the plant.
+struct Board {
+    shared: Rc<Shared>,
+    tasks: Vec<Pin<Box<dyn Future<Output = ()>>>>,
+    exchange: &'static Exchange,
+    plant: VirtualRig,
+    sensors: Sensors,
+    /// The tick's row of each millisecond.
+    rows: Vec<Telemetry>,
+    _clock: MutexGuard<'static, ()>,
+}
+
+/// Whether the task that runs has asked to be run again.
+struct Again(AtomicBool);
+
+impl Wake for Again {
+    fn wake(self: Arc<Self>) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Something that lives as long as the test process, as a `static` would.
+fn forever<T>(value: T) -> &'static T {
+    Box::leak(Box::new(value))
+}
+
+impl Board {
+    fn new(scenario: &Scenario, order: Order) -> Self {
+        let clock = CLOCK.lock().unwrap_or_else(PoisonError::into_inner);
+        MockDriver::get().reset();
+        MockDriver::get().advance(Duration::from_millis(u64::from(FIRST_TICK) - 1));
+        let way = scenario.run.direction;
+        let pressed = match way {
+            Direction::Deploy => 0.0,
+            Direction::Retract => scenario.rig.preload.cruise_n,
+        };
+        let parameters = scenario.plant();
+        let mut this = Self {
+            shared: Rc::new(Shared::default()),
+            tasks: Vec::new(),
+            exchange: forever(Exchange::new()),
+            sensors: Sensors::new(parameters.sensors.clone(), scenario.run.seed),
+            plant: VirtualRig::new(parameters, end_mm(scenario, back(way)), pressed, TICK_S),
+            rows: Vec::new(),
+            _clock: clock,
+        };
+        this.start(scenario, order);
+        this.poll();
+        this
+    }
+
+    fn start(&mut self, scenario: &Scenario, order: Order) {
+        let exchange = self.exchange;
+        let controller = forever(Controller::try_build(&scenario.rig).expect("a sound rig"));
+        let planner = forever(Planner::try_build(&scenario.rig).expect("a sound rig"));
+        let latest = forever(TickIoCell::new(TickIo::default()));
+        let part = || Peripheral(Rc::clone(&self.shared));
+        let load_cell = LoadCell(Rc::clone(&self.shared));
+        let (wheel, tread, arm, button) = (part(), part(), part(), part());
+        let (motors, watchdog, journal, light) = (part(), part(), part(), part());
+        self.tasks = vec![
+            Box::pin(async { tasks::clock(exchange).await }),
+            Box::pin(async { tasks::speed(wheel, exchange).await }),
+            Box::pin(async { tasks::pressure(load_cell, exchange).await }),
+            Box::pin(async { tasks::displacement(tread, exchange).await }),
+            Box::pin(async { tasks::angle(arm, exchange).await }),
+            Box::pin(async { tasks::operator(button, exchange).await }),
+            Box::pin(async { tasks::motors(motors, watchdog, controller, latest, exchange).await }),
+            Box::pin(async { tasks::record(latest, exchange).await }),
+            Box::pin(async { tasks::model(planner, exchange).await }),
+            Box::pin(async {
+                let mut encoder = LogEncoder::new(Identity::NOBODY);
+                tasks::journal(journal, light, &mut encoder, exchange).await
+            }),
+        ];
+        if order == Order::TickFirst {
+            self.tasks[1..7].rotate_right(1);
+        }
+    }
+
+    /// Lets every task run once, and those again that have woken themselves meanwhile.
+    fn poll(&mut self) {
+        let again = Arc::new(Again(AtomicBool::new(false)));
+        let waker = Waker::from(again.clone());
+        let mut context = Context::from_waker(&waker);
+        for task in &mut self.tasks {
+            again.0.store(true, Ordering::Relaxed);
+            while again.0.swap(false, Ordering::Relaxed) {
+                assert_eq!(task.as_mut().poll(&mut context), Poll::Pending, "a task returned");
+            }
+        }
+    }
+
+    /// A millisecond: the sensors look at the plant, the tasks run, the plant moves.
+    fn tick(&mut self) -> Telemetry {
+        self.shared.codes.set(Some(session::read(&mut self.sensors, &self.plant)));
+        MockDriver::get().advance(Duration::from_millis(1));
+        self.poll();
+        let row = self.exchange.telemetry().expect("a tick");
+        assert_eq!(row.at, FIRST_TICK + self.rows.len() as u32, "a tick is missing");
+        self.rows.push(row);
+        self.plant.step(&self.shared.drives.get(), TICK_S).expect("a sound plant");
+        row
+    }
+
+    /// Runs until the condition holds.
+    fn until(&mut self, mut holds: impl FnMut(&Telemetry) -> bool) {
+        let done = (0..20_000).any(|_| holds(&self.tick()));
+        assert!(done, "it never came: {:?}", self.rows.last());
+    }
+
+    fn run_ms(&mut self, milliseconds: u32) {
+        for _ in 0..milliseconds {
+            self.tick();
+        }
+    }
+
+    /// A whole run: the button is pressed as soon as the drive is idle.
+    fn whole_run(scenario: &Scenario, order: Order) -> Self {
+        let mut board = Self::new(scenario, order);
+        board.until(|row| row.mode == Mode::Idle);
+        board.shared.command.set(Some(starter(scenario.run.direction)));
+        board.until(|row| matches!(row.mode, Mode::Complete(_) | Mode::FaultHold(_)));
+        board
+    }
+
+    /// Log entries in the order of writing.
+    fn entries(&self) -> Vec<Entry> {
+        self.shared.written.borrow().iter().map(|(_, entry)| *entry).collect()
+    }
+
+    fn records(&self) -> Vec<CrossingRecord> {
+        let record = |entry: Entry| match entry.event {
+            Event::Crossing(record) => Some(record),
+            _ => None,
+        };
+        self.entries().into_iter().filter_map(record).collect()
+    }
+}
+
+/// The same run by the loop of `sil`.
+fn reference(scenario: &Scenario) -> Bench {
+    let mut bench = Bench::idle(scenario);
+    bench.give(starter(scenario.run.direction));
+    bench.finish();
+    bench
+}
+
+/// All runs that are compared.
+fn all() -> impl Iterator<Item = (Scenario, String)> {
+    let runs = RIGS.iter().flat_map(|rig| WAYS.map(|way| (*rig, way)));
+    let runs = runs.flat_map(|(rig, way)| [0, 5].map(|seed| (rig, way, seed)));
+    runs.map(|(rig, way, seed)| {
+        (scenario(rig, way, seed), format!("{rig} {} seed {seed}", way.name()))
+    })
+}
+
+#[test]
+fn the_tasks_do_to_the_bit_what_the_loop_does() {
+    for (scenario, name) in all() {
+        let bench = reference(&scenario);
+        let mut board = Board::whole_run(&scenario, Order::SensorsFirst);
+        let shifted = |now: &Moment| Telemetry { at: now.seen.at + FIRST_TICK, ..now.seen };
+        let rows: Vec<_> = bench.moments.iter().map(shifted).collect();
+        let first = rows.iter().zip(&board.rows).find(|(ours, theirs)| ours != theirs);
+        assert_eq!(first, None, "{name}");
+        assert_eq!(rows.len(), board.rows.len(), "{name}");
+        assert_eq!(bench.crossings(), board.plant.ledger().crossings(), "{name}");
+        board.run_ms(50);
+        let log = bench.log.iter().map(|entry| Entry { at: entry.at + FIRST_TICK, ..*entry });
+        assert_eq!(log.collect::<Vec<_>>(), board.entries(), "{name}");
+    }
+}
+
+#[test]
+fn samples_a_millisecond_older_make_no_difference_that_matters() {
+    for (scenario, name) in all() {
+        let bench = reference(&scenario);
+        let mut board = Board::whole_run(&scenario, Order::TickFirst);
+        board.run_ms(50);
+        assert_eq!(board.rows.last().map(|row| row.mode), Some(bench.mode()), "{name}");
+        let (ours, theirs) = (bench.crossings(), board.plant.ledger().crossings());
+        assert_eq!(ours.len(), 3, "{name}");
+        assert_eq!(theirs.len(), 3, "{name}");
+        for (a, b) in ours.iter().zip(theirs) {
+            assert_alike(a, b, &name);
+        }
+        assert_ne!(ours, theirs, "{name}: the samples were not older");
+        assert!(board.plant.truth().slip_mm < NO_SLIP_MM, "{name}");
+        let off = board.plant.truth().position_mm - bench.position_mm();
+        assert!(off.abs() < 0.1, "{name}: {off}");
+        let records = board.records();
+        assert_eq!(records.len(), 3, "{name}");
+        for (record, crossing) in records.iter().zip(theirs) {
+            assert_eq!(usize::from(record.index), crossing.index, "{name}");
+            let measured = record.gap_measured.to_num::<f64>() / crossing.gap_mm - 1.0;
+            assert!(measured.abs() < 0.04, "{name}: {measured}");
+        }
+    }
+}
+
+/// The same crossing but for what a millisecond makes of noise and adaptation.
+fn assert_alike(a: &Crossing, b: &Crossing, name: &str) {
+    assert_eq!((a.index, a.climbing), (b.index, b.climbing), "{name}");
+    for (what, ours, theirs, most) in [
+        ("gap", a.gap_mm, b.gap_mm, 0.02),
+        ("preload", a.preload_n, b.preload_n, 0.015),
+        ("speed", a.speed_mm_s, b.speed_mm_s, 0.15),
+    ] {
+        let off = theirs / ours - 1.0;
+        assert!(off.abs() < most, "{name}, step {}: {what} {off:+.4}", a.index);
+    }
+    let later = b.lift_s - a.lift_s;
+    assert!(later.abs() < 0.05, "{name}, step {}: {later} s", a.index);
+}
+
+#[test]
+fn the_watchdog_is_fed_and_the_log_is_written_all_along() {
+    for way in WAYS {
+        let mut board = Board::whole_run(&scenario("prototype", way, 0), Order::TickFirst);
+        board.run_ms(50);
+        let fed = board.shared.fed.borrow();
+        assert_eq!(fed.len(), board.rows.len());
+        assert!(fed.windows(2).all(|pair| pair[1] - pair[0] == 1), "{}", way.name());
+        assert_eq!(board.exchange.lost_entries(), 0);
+        let written = board.shared.written.borrow();
+        assert!(written.len() > 30, "{}: {}", way.name(), written.len());
+        for (at, entry) in written.iter() {
+            assert!((0..=1).contains(&(at - u64::from(entry.at))), "{at} {entry:?}");
+        }
+        let odd = written.iter().find(|(_, entry)| match entry.event {
+            Event::Fault(_) | Event::Lost(_) | Event::Refused(_) => true,
+            Event::Limit(limit) => STEP_CODES.contains(&limit.code()),
+            _ => false,
+        });
+        assert_eq!(odd, None, "{}", way.name());
+    }
+}
