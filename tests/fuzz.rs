@@ -10,7 +10,6 @@ use interstage::params::{MAX_SET, ParameterSet, compile};
 use interstage::rig::Rig;
 use interstage::supervise::{Command, Mode};
 use interstage::tick::{Entry, Event};
-use interstage::tick::{Entry, Event};
 
 use crate::common::FixedFlash;
 use crate::common::mutate::fuzz;

@@ -5,7 +5,7 @@
 //! [`FloatModel`] solves the same equations by Newton's method to the last bit or so of its
 //! number. Nothing ships from here.
 
-use interstage::model::felt::{self, FAST_DEGREE, Kind, RUN_DEGREE, RUN_END};
+use interstage::model::effective_stiffness::{self, FAST_DEGREE, Kind, RUN_DEGREE, RUN_END};
 use interstage::model::formula::{Formula, LEAST_RUN};
 use interstage::model::reduced::{self, ReducedModel, Scale};
 use interstage::rig::Rig;
@@ -318,7 +318,9 @@ fn interpolated(of: impl Fn(f64) -> f64) -> Series<f64> {
     for node in 0..TERMS {
         let t = libm::cos(core::f64::consts::PI * (node as f64 + 0.5) / count);
         let value = of(t);
-        for (index, polynomial) in felt::chebyshev::<TERMS>(t).into_iter().enumerate() {
+        for (index, polynomial) in
+            effective_stiffness::chebyshev::<TERMS>(t).into_iter().enumerate()
+        {
             let weight = if index == 0 { 1.0 } else { 2.0 };
             series[index] += weight / count * value * polynomial;
         }

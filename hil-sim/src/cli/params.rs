@@ -93,6 +93,10 @@ struct Printed<'a> {
     before: Option<BTreeMap<&'a str, &'a Value>>,
 }
 
+/// Runs the verb.
+///
+/// # Errors
+/// [`Failure`] if it cannot be run as asked.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     match (&args.file, args.target.as_deref()) {
         (Some(file), _) => act(args, &mut SetFile::new(file)),

@@ -48,6 +48,7 @@ impl ScenarioArgs {
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct RunArgs {
     #[command(flatten)]
+    /// Which rig.
     pub scenario: ScenarioArgs,
 
     /// Retraction: from the end of travel, dropping off the steps.

@@ -4,7 +4,7 @@
 //!
 //! Overflow is checked in this build: a sum that wraps unintended panics.
 
-use hil_sim::sil::Echo;
+use hil_sim::session::Echo;
 use interstage::model::reduced::{Point, ReducedModel, Scale};
 use interstage::model::{Plan, PlanRequest, Planner, Review};
 use interstage::rig::Rig;

@@ -4,7 +4,6 @@
 use interstage::control::preload_loop::{PreloadLoop, PreloadLoopState};
 use interstage::control::profile::{Profile, ProfileState};
 use interstage::control::speed_loop::{SpeedLoop, SpeedLoopState};
-use interstage::control::{Controller, Input, State};
 use interstage::estimate::vibration::{VibrationObserver, VibrationState};
 use interstage::numeric::{LowPass, LowPassState};
 use interstage::rig::Rig;
@@ -12,6 +11,7 @@ use interstage::sense::raw::{
     AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
 };
 use interstage::sense::{Senses, SensesState};
+use interstage::tick::{Controller, Input, State};
 use interstage::units::Q16;
 
 /// Ticks for which an output must last.

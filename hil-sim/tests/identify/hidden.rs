@@ -50,7 +50,7 @@ pub(crate) fn found(seed: u64, mut book: impl FnMut(&str, &dyn Fn(&mut Line))) {
         (0..EXPERIMENTS.len()).map(|index| log(index, &scenario, zeros)).collect();
     let known = &records[0].scenario;
     let found = identify(&records, known).unwrap_or_else(|error| panic!("seed {seed}: {error}"));
-    for (name, truth) in hidden(&PlantParameters::draw(&scenario), known, zeros) {
+    for (name, truth) in hidden(&scenario.plant(), known, zeros) {
         let parameter = found.parameter(&name).unwrap_or_else(|| panic!("{name} is missing"));
         let (Some(low), Some(high)) = (parameter.low, parameter.high) else { continue };
         if parameter.identified {

@@ -24,7 +24,8 @@ fn with_too_little_friction_a_run_does_not_complete() {
         let summary = &recording.summary;
         assert!(!summary.completed, "{preset} at {friction}");
         assert!(summary.slip_mm > 10.0, "{}", summary.slip_mm);
-        for row in &recording.rows {
+        for tick in &recording.rows {
+            let row = tick.truth.expect("the plant's truth");
             let numbers = [row.position_true_mm, row.corner_force_n, row.floor_force_n];
             assert!(numbers.iter().all(|x| x.is_finite()), "{row:?}");
             assert!(row.utilisation.abs() <= friction + 1e-12, "{row:?}");

@@ -22,7 +22,6 @@ use hil_sim::plant::rig::{Drives, VirtualRig};
 use hil_sim::plant::sensors::{Codes, Sensors};
 use hil_sim::scenario::{Direction, Scenario};
 use hil_sim::session;
-use interstage::fault::Fault;
 use interstage::hal::{
     AnalogInput, AngleBus, CommandSource, Indicator, Journal, Light, Motors, Watchdog, WheelEncoder,
 };

@@ -1,6 +1,5 @@
 //! `rig-study constants`: the reduced model's constants and the image's parameter set.
 
-use interstage::model::effective_stiffness::Kind;
 use interstage::params::{MAX_SET, compile};
 use interstage::rig::Rig;
 

@@ -92,7 +92,7 @@ impl Case {
     #[must_use]
     pub fn pressing_n(&self, level: usize) -> f64 {
         let (arm, centre) = self.arm(level);
-        self.preload_n + arm.wedge(centre) * self.load_n()
+        self.preload_n + arm.thrust_ratio(centre) * self.load_n()
     }
 
     /// The deployment of the rig that `seed` draws: this preload and speed

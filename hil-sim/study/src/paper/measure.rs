@@ -37,7 +37,7 @@ impl CollisionGauge {
         let (truth, parameters) = (plant.truth(), plant.parameters());
         let used = truth.utilisation;
         let thrust = if used == 0.0 { 0.0 } else { parameters.load_n };
-        let pressing = truth.preload_n + parameters.arm.wedge(truth.radius_mm) * thrust;
+        let pressing = truth.preload_n + parameters.arm.thrust_ratio(truth.radius_mm) * thrust;
         let radial = (pressing + used * thrust) / (1.0 + used * used);
         let axial = used * radial - thrust;
         let beyond = (axial - self.resistance * truth.floor_n).max(0.0);
