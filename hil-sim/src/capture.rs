@@ -10,7 +10,7 @@ mod writer;
 
 pub(crate) use message::messages;
 pub use probed::Probed;
-pub use source::{Bytes, Source, SourceError, Virtual, letter};
+pub use source::{Bytes, Source, SourceError, Virtual, letter, starter};
 pub use view::View;
 pub(crate) use view::mode_name;
 pub use writer::{WriteError, Writer};

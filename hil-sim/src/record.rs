@@ -1,7 +1,7 @@
 //! What a run leaves behind: one row a tick, one ledger line a crossing, and the
 //! summary. Sensed, estimated and true values stand side by side.
 
-pub(crate) mod tally;
+pub mod tally;
 
 use interstage::supervise::{Leg, Mode};
 use serde::{Deserialize, Serialize};

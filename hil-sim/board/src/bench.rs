@@ -5,12 +5,12 @@
 //! cycle by cycle and takes the voltages, edges and frames as they stand.
 
 use super::chip::Motor;
-use super::image::ImageError;
+use super::error::ImageError;
+use super::fault_injector::{FaultInjector, Saving, letter};
 use super::log::{Line, Reader, Strings};
 use super::machine::Machine;
 use super::peripherals::HZ;
 use super::rtt::Probe;
-use super::tampered::{Saving, Tampered, letter};
 use hil_sim::faults::Tamper;
 use hil_sim::plant::draw::PlantParameters;
 use hil_sim::plant::rig::{Drives, PlantError, VirtualRig};
@@ -70,7 +70,7 @@ pub struct Bench<'a> {
     /// The text log as it came, if it is kept.
     text: Option<Vec<u8>>,
     /// The faults of the scenario, if it has some.
-    tampered: Option<Tampered>,
+    injector: Option<FaultInjector>,
 }
 
 impl<'a> Bench<'a> {
@@ -102,7 +102,7 @@ impl<'a> Bench<'a> {
             restarts: 0,
             frames: Some(Vec::new()),
             text: None,
-            tampered: Tamper::of(scenario).map(|tamper| Tampered::new(tamper, scenario)),
+            injector: Tamper::of(scenario).map(|tamper| FaultInjector::new(tamper, scenario)),
         };
         bench.speak(codes);
         Ok(bench)
@@ -115,13 +115,13 @@ impl<'a> Bench<'a> {
     pub fn step(&mut self) -> Result<(Passed, Vec<Line>), BenchError> {
         let end = self.end();
         self.save()?;
-        if let Some(tampered) = &mut self.tampered {
+        if let Some(injector) = &mut self.injector {
             // What is broken from the first is so before the first instruction.
             if self.millisecond == 0 {
-                tampered.begin(&mut self.machine, &mut self.plant, 0.0)?;
+                injector.begin(&mut self.machine, &mut self.plant, 0.0)?;
             }
-            let (command, noise) = (tampered.command(), tampered.noise());
-            tampered.hunt(&mut self.machine, end)?;
+            let (command, noise) = (injector.command(), injector.noise());
+            injector.hunt(&mut self.machine, end)?;
             if let Some(command) = command {
                 self.send(letter(command))?;
             }
@@ -135,11 +135,13 @@ impl<'a> Bench<'a> {
 
     /// A host that saves parameters, if a fault has it so, has its turn at the line.
     fn save(&mut self) -> Result<(), BenchError> {
-        let Some(says) = self.tampered.as_ref().and_then(Tampered::says) else { return Ok(()) };
+        let Some(says) = self.injector.as_ref().and_then(FaultInjector::says) else {
+            return Ok(());
+        };
         let went = self.line_send(&says)?;
         let came = self.line_take()?;
-        if let Some(tampered) = &mut self.tampered {
-            tampered.hears(&mut self.machine, &came, went);
+        if let Some(injector) = &mut self.injector {
+            injector.hears(&mut self.machine, &came, went);
         }
         Ok(())
     }
@@ -147,7 +149,7 @@ impl<'a> Bench<'a> {
     /// How far a save of parameters has come that a fault is to break off.
     #[must_use]
     pub(crate) fn saving(&self) -> Option<Saving> {
-        self.tampered.as_ref().and_then(Tampered::saving)
+        self.injector.as_ref().and_then(FaultInjector::saving)
     }
 
     /// Cycle at which the millisecond under way is over.
@@ -211,16 +213,16 @@ impl<'a> Bench<'a> {
             ..Drives::default()
         };
         let passed = Passed { codes: self.codes, drives };
-        let taken = self.tampered.as_mut().map_or(drives, |tampered| tampered.drives(drives));
+        let taken = self.injector.as_mut().map_or(drives, |injector| injector.drives(drives));
         self.plant.step(&taken, STEP_S)?;
         let mut codes = self.sensors.read(sensed(&self.plant), STEP_S);
-        if let Some(tampered) = &mut self.tampered {
+        if let Some(injector) = &mut self.injector {
             let t_s = self.millisecond as f64 * STEP_S;
-            tampered.begin(&mut self.machine, &mut self.plant, t_s)?;
-            codes = tampered.tell(&mut self.machine, codes, self.millisecond as u32);
+            injector.begin(&mut self.machine, &mut self.plant, t_s)?;
+            codes = injector.tell(&mut self.machine, codes, self.millisecond as u32);
         }
         self.speak(codes);
-        if self.tampered.as_ref().is_some_and(Tampered::log_gone) {
+        if self.injector.as_ref().is_some_and(FaultInjector::log_gone) {
             return Ok((passed, Vec::new()));
         }
         if let Some(frames) = &mut self.frames {
@@ -316,19 +318,19 @@ impl<'a> Bench<'a> {
     /// When the first of the scenario's faults came, s since power-up.
     #[must_use]
     pub fn struck_s(&self) -> Option<f64> {
-        self.tampered.as_ref().and_then(Tampered::struck_s)
+        self.injector.as_ref().and_then(FaultInjector::struck_s)
     }
 
     /// When it first did something, s since power-up.
     #[must_use]
     pub fn acts_s(&self) -> Option<f64> {
-        self.tampered.as_ref().and_then(Tampered::acts_s)
+        self.injector.as_ref().and_then(FaultInjector::acts_s)
     }
 
     /// When the readback had to tell it, s since power-up.
     #[must_use]
     pub fn tells_s(&self) -> Option<f64> {
-        self.tampered.as_ref().and_then(Tampered::tells_s)
+        self.injector.as_ref().and_then(FaultInjector::tells_s)
     }
 
     /// The plant.

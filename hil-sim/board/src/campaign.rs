@@ -12,18 +12,19 @@ use interstage::log::{Entry, Event};
 use interstage::supervise::{Command, Limit, Mode};
 use interstage::units::Q16;
 
-use super::super::judge::{Finding, Judge};
-use super::operator::Operator;
-use super::twin::Twin;
-use super::{
-    AFTER_S, Campaign, CampaignError, Injection, Instant, Kept, Outcome, Target, crossed, doing,
-};
 use crate::bench::Bench;
 use crate::chip::Pin;
+use crate::fault_injector::{Saving, letter};
 use crate::log::Strings;
 use crate::peripherals::rcc::Cause;
 use crate::run::{RunError, store};
-use crate::tampered::{Saving, letter};
+use hil_sim::faults::campaign::operator::Operator;
+use hil_sim::faults::campaign::twin::Twin;
+use hil_sim::faults::campaign::{
+    AFTER_S, Campaign, CampaignError, Instant, Kept, Outcome, crossed, doing,
+};
+use hil_sim::faults::judge::{Finding, Judge};
+use hil_sim::faults::{Injection, Target};
 use hil_sim::log::Run;
 use hil_sim::scenario::Scenario;
 use parameters::Parameters;
@@ -52,21 +53,19 @@ pub struct Firmware<'a> {
     pub strings: &'a Strings,
 }
 
-impl Campaign {
-    /// Makes all runs on the emulated board, as [`Campaign::run_keeping`] does in software.
-    ///
-    /// # Errors
-    /// [`CampaignError`] if what is done cannot be kept, or a run without a fault cannot be made.
-    pub fn run_on_board(
-        &self,
-        firmware: Firmware<'_>,
-        kept: &mut Kept,
-        done: &(dyn Fn() + Sync),
-    ) -> Result<Outcome, CampaignError<RunError>> {
-        let twin = |scenario: &Scenario| twin(firmware, scenario);
-        let watched = |scenario: &Scenario, twin: &Twin| watched(firmware, scenario, twin);
-        self.run_on("board", twin, watched, kept, done)
-    }
+/// Makes all runs of a campaign on the emulated board, as [`Campaign::run`] does in
+/// software.
+///
+/// # Errors
+/// [`CampaignError`] if a run without a fault cannot be made.
+pub fn run(
+    campaign: &Campaign,
+    firmware: Firmware<'_>,
+    done: &(dyn Fn() + Sync),
+) -> Result<Outcome, CampaignError<RunError>> {
+    let twin = |scenario: &Scenario| twin(firmware, scenario);
+    let watched = |scenario: &Scenario, twin: &Twin| watched(firmware, scenario, twin);
+    campaign.run_on("board", twin, watched, &mut Kept::default(), done)
 }
 
 /// A board under way.

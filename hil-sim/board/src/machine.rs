@@ -10,15 +10,15 @@ use std::path::Path;
 
 use super::chip::Chip;
 use super::core::unicorn::{Counted, UnicornCore};
-use super::core::{Access, Bus, Core, CoreError, Heat, Mark, MaskedBy, Register, Stop, passes};
+use super::core::{Access, Bus, Core, CoreError, Mark, Register, Stop, passes};
 use super::elf::{FLASH, Function, Loaded, RAM, named};
+use super::error::ImageError;
 use super::exceptions::number::{HARD_FAULT, SV_CALL};
-use super::image::ImageError;
 use super::peripherals::flash::Change;
 use super::peripherals::rcc::Cause as Restart;
 use super::peripherals::system::Cause;
 
-pub use profile::{Poll, Profile, Share, THREAD};
+pub use profile::{Poll, Profile};
 
 use tasks::Tasks;
 
@@ -110,31 +110,20 @@ impl Machine {
         self.core.bus_mut()
     }
 
-    /// What the core has spent its time on.
+    /// Cycles asleep since the start.
     #[must_use]
-    pub const fn profile(&self) -> &Profile {
-        &self.profile
+    pub const fn slept(&self) -> u64 {
+        self.profile.slept()
     }
 
-    /// The same, to take what has gathered.
+    /// Runs of tasks, to take what has gathered.
     pub fn profile_mut(&mut self) -> &mut Profile {
         &mut self.profile
     }
 
-    /// Takes the cycles by block of code since the last call, or since the start.
-    pub fn take_heat(&mut self) -> Heat {
-        self.core.take_heat()
-    }
-
-    /// Takes where interrupts were shut out since the last call, or since the start.
-    pub fn take_masked(&mut self) -> MaskedBy {
-        self.core.take_masked()
-    }
-
     /// Names of the tasks, by their numbers in the profile.
-    #[must_use]
-    pub fn tasks(&self) -> Vec<&str> {
-        self.tasks.names().collect()
+    pub fn tasks(&self) -> impl Iterator<Item = &str> {
+        self.tasks.names()
     }
 
     /// Name of the task that the executor is about to run, if it stands at that.
@@ -476,8 +465,8 @@ impl Machine {
             frame::change_handler(&mut self.core, number)?;
         }
         self.core.pass(if chained { CHAIN } else { ENTRY });
-        let since = self.chip_mut().system.exceptions.enter(number);
-        self.profile.enter(number, since, now, self.core.meter().cycles);
+        self.chip_mut().system.exceptions.enter(number);
+        self.profile.enter(now);
         let vector = self.chip().system.control.vector(number);
         self.pc = self.word(vector)? & !1;
         Ok(())
@@ -542,7 +531,7 @@ impl Machine {
         frame::go_to_handler(&mut self.core, HARD_FAULT, depth > 0)?;
         self.core.pass(ENTRY);
         self.chip_mut().system.exceptions.enter(HARD_FAULT);
-        self.profile.enter(HARD_FAULT, now, now, now + ENTRY);
+        self.profile.enter(now);
         let vector = self.chip().system.control.vector(HARD_FAULT);
         self.pc = self.word(vector)? & !1;
         Ok(())

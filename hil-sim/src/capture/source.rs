@@ -68,7 +68,7 @@ fn command(letter: u8) -> Option<Command> {
 
 /// The command that sets a run of this direction going.
 #[must_use]
-pub(super) const fn starter(direction: Direction) -> Command {
+pub const fn starter(direction: Direction) -> Command {
     match direction {
         Direction::Deploy => Command::Start,
         Direction::Retract => Command::Retract,

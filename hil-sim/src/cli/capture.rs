@@ -26,8 +26,9 @@ const TARGETS: [&str; 3] = ["sil", "board", "probe"];
 /// to its last second. The exit code is 1 if anything is missing.
 #[derive(Debug, clap::Args)]
 pub struct Args {
+    /// Which rig, and how it is run.
     #[command(flatten)]
-    run: RunArgs,
+    pub run: RunArgs,
 
     /// Reads a recorded stream of the binary channel; `-` is standard input.
     #[arg(long, value_name = "FILE", conflicts_with = "target")]
@@ -68,6 +69,7 @@ struct Printed {
     files: Vec<PathBuf>,
 }
 
+/// Runs the verb.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     if let Some(file) = &args.stream {
         return write(args, &mut opened(file)?, None);
@@ -110,7 +112,7 @@ fn board(_: &Args, _: &Scenario) -> Result<Outcome, Failure> {
 }
 
 /// Writes what `source` gives until it ends.
-fn write(
+pub fn write(
     args: &Args,
     source: &mut dyn Source,
     scenario: Option<&Scenario>,

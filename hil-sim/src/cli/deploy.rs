@@ -1,6 +1,6 @@
 //! `rig deploy`: a whole deployment, or the way back.
 
-mod looped;
+pub mod looped;
 
 use std::path::{Path, PathBuf};
 
@@ -24,35 +24,36 @@ const TARGETS: [&str; 3] = ["sil", "board", "probe"];
 /// does not complete.
 #[derive(Debug, clap::Args)]
 pub struct Args {
+    /// Which rig, and how it is run.
     #[command(flatten)]
-    run: RunArgs,
+    pub run: RunArgs,
 
     /// What runs the controller: sil, the shipping control tick on this host; board, the
     /// firmware itself on an emulated board; or probe, the firmware on a real board, the
     /// plant on this host in the loop over its debug probe.
     #[arg(long, value_name = "TARGET", default_value = "sil")]
-    target: String,
+    pub target: String,
 
     /// With --target board: the plant not at the board's pins, but in the loop as with
     /// --target probe.
     #[arg(long, conflicts_with_all = ["board_fault", "gdb"])]
-    hil: bool,
+    pub hil: bool,
 
     /// Fault of the emulated board's hardware and when it comes, may be repeated:
     /// load-cell=0x8000@5.2, tread=<code>, angle-bits=<mask>, angle-lost, encoder-a,
     /// encoder-b, dma-stalled, timer-flags, brown-out, supply-cut, supply-dip or
     /// flip=<address>.<bit>, each at its seconds from power-up.
     #[arg(long, value_name = "FAULT@S")]
-    board_fault: Vec<String>,
+    pub board_fault: Vec<String>,
 
     /// Waits for a debugger (GDB remote protocol) at this address and gives it the
     /// emulated board, whose run is then its own: no files, no summary.
     #[arg(long, value_name = "[HOST]:PORT", conflicts_with_all = ["out", "json"])]
-    gdb: Option<String>,
+    pub gdb: Option<String>,
 
     /// Shows the controller's log on standard error.
     #[arg(long)]
-    log: bool,
+    pub log: bool,
 
     /// Directory of the files; by default one in `out`, named after the run.
     #[arg(long, value_name = "DIR")]
@@ -64,7 +65,7 @@ pub struct Args {
 
     /// Prints the summary as one JSON object.
     #[arg(long)]
-    json: bool,
+    pub json: bool,
 }
 
 /// What `--json` prints.
@@ -75,10 +76,19 @@ struct Printed<'a> {
     files: &'a [PathBuf],
 }
 
+impl Args {
+    /// The scenario, and where the files go if there are to be any.
+    pub fn resolve(&self) -> Result<(Scenario, Option<PathBuf>), Failure> {
+        let scenario = self.run.resolve()?;
+        let directory = if self.no_files { None } else { Some(directory(self, &scenario)?) };
+        Ok((scenario, directory))
+    }
+}
+
+/// Runs the verb.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     check_target(&args.target)?;
-    let scenario = args.run.resolve()?;
-    let directory = if args.no_files { None } else { Some(directory(args, &scenario)?) };
+    let (scenario, directory) = args.resolve()?;
     match args.target.as_str() {
         "board" => return Ok(Outcome::Code(provision::go_on(Extra::Board)?)),
         "probe" => {
@@ -95,7 +105,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
 }
 
 /// Writes and prints a run.
-fn conclude(
+pub fn conclude(
     args: &Args,
     recording: &Recording,
     directory: Option<&Path>,
@@ -116,7 +126,7 @@ fn conclude(
 }
 
 /// An image that has been built.
-fn read(path: &Path) -> Result<Vec<u8>, Failure> {
+pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
     let read = std::fs::read(path);
     Ok(read.map_err(|source| FirmwareError::Read { path: path.to_owned(), source })?)
 }
@@ -161,7 +171,8 @@ fn directory(args: &Args, scenario: &Scenario) -> Result<PathBuf, Failure> {
     Ok(directory)
 }
 
-fn write(
+/// Writes files and page of a run, with these sections more on the page.
+pub fn write(
     recording: &Recording,
     more: &[report::Section],
     directory: &Path,

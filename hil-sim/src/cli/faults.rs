@@ -47,22 +47,31 @@ pub struct Args {
     json: bool,
 }
 
+impl Args {
+    /// The campaign that is asked for.
+    pub fn campaign(&self) -> Result<Campaign, Failure> {
+        let board = self.target == "board";
+        let all = if board { Case::all_on_board() } else { Case::all() };
+        let wanted = all.iter().filter(|case| case.is_one_of(&self.only));
+        let cases: Vec<Case> = wanted.copied().collect();
+        if cases.is_empty() {
+            let names: Vec<String> = all.iter().map(Case::name).collect();
+            let (text, names) = (self.only.join(", "), names.join(", "));
+            return Err(Failure::input(format!("--only {text}: no such fault; faults: {names}")));
+        }
+        let scenario = self.scenario.resolve()?;
+        Ok(Campaign { scenario, instants: self.count as usize, cases })
+    }
+}
+
+/// Runs the verb.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
-    let scenario = args.scenario.resolve()?;
     if let Some(count) = args.clean {
-        return clean(args, &scenario, count);
+        return clean(args, &args.scenario.resolve()?, count);
     }
-    let board = args.target == "board";
-    let all = if board { Case::all_on_board() } else { Case::all() };
-    let cases: Vec<Case> = all.iter().filter(|case| case.is_one_of(&args.only)).copied().collect();
-    if cases.is_empty() {
-        let names: Vec<String> = all.iter().map(Case::name).collect();
-        let (text, names) = (args.only.join(", "), names.join(", "));
-        return Err(Failure::input(format!("--only {text}: no such fault; faults: {names}")));
-    }
-    let campaign = Campaign { scenario, instants: args.count as usize, cases };
-    if board {
-        return on_board(args, &campaign);
+    let campaign = args.campaign()?;
+    if args.target == "board" {
+        return Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Board)?));
     }
     let mut kept = kept(args, &campaign, &[])?;
     let outcome = {
@@ -83,11 +92,6 @@ fn kept(args: &Args, campaign: &Campaign, elf: &[u8]) -> Result<Kept, Failure> {
     let Some(path) = &args.keep else { return Ok(Kept::default()) };
     let judge = std::env::current_exe().and_then(std::fs::read).map_err(Failure::run)?;
     Kept::at(path, &args.target, campaign, &[&judge, elf]).map_err(Failure::input)
-}
-
-/// Without the emulated board: go on with a binary that has it.
-fn on_board(_: &Args, _: &Campaign) -> Result<Outcome, Failure> {
-    Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Board)?))
 }
 
 /// Random deployments without a fault.

@@ -29,8 +29,9 @@ const PICTURE: (u16, u16) = (110, 36);
 /// and PlotJuggler.
 #[derive(Debug, clap::Args)]
 pub struct Args {
+    /// Which rig, and how it is run.
     #[command(flatten)]
-    run: RunArgs,
+    pub run: RunArgs,
 
     /// Shows a recorded stream of the binary channel, as fast as it was.
     #[arg(long, value_name = "FILE", conflicts_with = "target")]
@@ -48,7 +49,7 @@ pub struct Args {
     /// Without the terminal: the drive starts by itself, and the run ends when it has
     /// arrived.
     #[arg(long)]
-    headless: bool,
+    pub headless: bool,
 
     /// As fast as it goes instead of in real time.
     #[arg(long)]
@@ -59,6 +60,7 @@ pub struct Args {
     picture: Option<PathBuf>,
 }
 
+/// Runs the verb.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     if !args.headless && !std::io::stdout().is_terminal() {
         return Err(Failure::input("standard output is no terminal: use --headless"));
@@ -103,7 +105,7 @@ impl Drop for Display {
 }
 
 /// Shows what `source` gives until it ends or the operator does.
-fn watch(args: &Args, source: &mut dyn Source) -> Result<Outcome, Failure> {
+pub fn watch(args: &Args, source: &mut dyn Source) -> Result<Outcome, Failure> {
     let server = Server::bind(&args.listen)
         .map_err(|error| Failure::input(format!("--listen {}: {error}", args.listen)))?;
     if args.headless {

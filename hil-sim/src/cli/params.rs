@@ -31,11 +31,11 @@ pub struct Args {
     /// The place: board, the firmware on the emulated board, over its binary line; or
     /// probe, a real board.
     #[arg(long, global = true, value_name = "TARGET", value_parser = ["board", "probe"])]
-    target: Option<String>,
+    pub target: Option<String>,
 
     /// File that keeps the emulated board's flash from one time to the next.
     #[arg(long, global = true, value_name = "FILE", default_value = "out/board.flash")]
-    flash: PathBuf,
+    pub flash: PathBuf,
 
     /// Prints the result as one JSON object.
     #[arg(long, global = true)]
@@ -92,6 +92,7 @@ struct Printed {
     before: Option<Map<String, Value>>,
 }
 
+/// Runs the verb.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     match (&args.file, args.target.as_deref()) {
         (Some(file), _) => act(args, &mut SetFile::new(file)),
@@ -118,7 +119,8 @@ fn on_board(_: &Args) -> Result<Outcome, Failure> {
     Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Board)?))
 }
 
-fn act(args: &Args, store: &mut impl Store) -> Result<Outcome, Failure> {
+/// Does what was asked with the parameters of this place.
+pub fn act(args: &Args, store: &mut impl Store) -> Result<Outcome, Failure> {
     let held = match store.held() {
         // What cannot be read, or is damaged, can be replaced all the same.
         Err(StoreError::Set { .. } | StoreError::Refused(_))

@@ -48,6 +48,7 @@ struct Log {
     result: Replayed,
 }
 
+/// Runs the verb.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let mut logs = Vec::new();
     for file in &args.logs {

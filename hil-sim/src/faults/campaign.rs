@@ -2,8 +2,8 @@
 
 mod kept;
 mod matrix;
-mod operator;
-mod twin;
+pub mod operator;
+pub mod twin;
 
 use std::borrow::Cow;
 
@@ -28,7 +28,7 @@ use twin::Twin;
 /// Longest run, s.
 const LONGEST_S: f64 = 60.0;
 /// How long a run is watched after its end, s.
-const AFTER_S: f64 = 1.0;
+pub const AFTER_S: f64 = 1.0;
 /// How long an interrupt asks without end, s: longer than the watchdog waits, and not for
 /// ever, or the board would not come up again to tell.
 const STORM_S: f64 = 0.25;
@@ -276,7 +276,7 @@ impl Campaign {
 
     /// Makes all of them on a target: each rig without a fault first, then every fault on
     /// each. One that cannot be made counts as undetected.
-    fn run_on<E: std::fmt::Display + Send>(
+    pub fn run_on<E: std::fmt::Display + Send>(
         &self,
         target: &'static str,
         twin: impl Fn(&Scenario) -> Result<Twin, E> + Sync,
@@ -336,7 +336,8 @@ pub enum CampaignError<E> {
 }
 
 /// A name for what the drive is doing.
-fn doing(mode: Mode) -> &'static str {
+#[must_use]
+pub fn doing(mode: Mode) -> &'static str {
     match mode {
         Mode::Preload(_) => "preload",
         Mode::Run(_, Leg::Cruise) => "cruise",
@@ -372,7 +373,8 @@ fn failed(scenario: &Scenario, error: &impl std::fmt::Display) -> Instant {
 
 /// Largest gap over the reference gap, of crossings and elsewhere (`worst_mm`), and whether
 /// every step was crossed both ways.
-fn crossed(plant: &VirtualRig, twin: &Twin, worst_mm: f64) -> (f64, bool) {
+#[must_use]
+pub fn crossed(plant: &VirtualRig, twin: &Twin, worst_mm: f64) -> (f64, bool) {
     let crossings = plant.ledger().crossings();
     let steps = plant.parameters().wall.steps().len();
     let [out, back] = twin.gap_ref_mm;

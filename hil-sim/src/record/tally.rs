@@ -16,17 +16,17 @@ const TICK_S: f64 = 1e-3;
 const ARRIVED_WITHIN_MM: f64 = 1.0;
 
 /// The sums of a run as it goes on.
-pub(crate) struct Tally {
+pub struct Tally {
     /// Every bit that the run is to be known by.
-    pub(crate) digest: Sha256,
+    pub digest: Sha256,
     /// Rows kept.
-    pub(crate) rows: Vec<Row>,
+    pub rows: Vec<Row>,
     /// Log lines.
-    pub(crate) log: Vec<LogLine>,
+    pub log: Vec<LogLine>,
     /// Latched faults.
-    pub(crate) faults: Vec<Report>,
+    pub faults: Vec<Report>,
     /// Active limits.
-    pub(crate) limits: Vec<Report>,
+    pub limits: Vec<Report>,
     gap_ref_mm: f64,
     start_mm: f64,
     run_started: Option<f64>,
@@ -38,22 +38,22 @@ pub(crate) struct Tally {
 }
 
 /// How a run has ended.
-pub(crate) struct Ended<'a> {
+pub struct Ended<'a> {
     /// What ran the controller.
-    pub(crate) target: &'static str,
+    pub target: &'static str,
     /// What was asked for.
-    pub(crate) scenario: &'a Scenario,
+    pub scenario: &'a Scenario,
     /// The plant as it was left.
-    pub(crate) plant: &'a VirtualRig,
+    pub plant: &'a VirtualRig,
     /// At the end of this way, by the controller's word.
-    pub(crate) arrived: Option<Direction>,
+    pub arrived: Option<Direction>,
     /// Wall-clock time that it took, s.
-    pub(crate) wall_s: f64,
+    pub wall_s: f64,
 }
 
 impl Tally {
     /// A run that begins at `start_mm` and is planned for gaps of `gap_ref_mm`.
-    pub(crate) fn new(gap_ref_mm: f64, start_mm: f64) -> Self {
+    pub fn new(gap_ref_mm: f64, start_mm: f64) -> Self {
         Self {
             digest: Sha256::new(),
             rows: Vec::new(),
@@ -72,12 +72,12 @@ impl Tally {
     }
 
     /// Time at which the tick under way began, s.
-    pub(crate) fn time_s(&self) -> f64 {
+    pub fn time_s(&self) -> f64 {
         f64::from(self.ticks) * TICK_S
     }
 
     /// Ends a tick, in which the drive moved or did not.
-    pub(crate) fn close_tick(&mut self, moves: bool, truth: &Truth) {
+    pub fn close_tick(&mut self, moves: bool, truth: &Truth) {
         if moves {
             let t_s = self.time_s();
             self.run_started.get_or_insert(t_s);
@@ -90,11 +90,7 @@ impl Tally {
     }
 
     /// The record of the run with its ledger, a line of which `line` makes.
-    pub(crate) fn finish(
-        self,
-        ended: &Ended<'_>,
-        line: impl Fn(&Crossing) -> CrossingLine,
-    ) -> Recording {
+    pub fn finish(self, ended: &Ended<'_>, line: impl Fn(&Crossing) -> CrossingLine) -> Recording {
         let Ended { target, scenario, plant, arrived, wall_s } = *ended;
         let truth = plant.truth();
         let steps = plant.parameters().wall.steps().len();
@@ -142,7 +138,7 @@ impl Tally {
 }
 
 /// A row with what the plant knows; what the controller believes is `NaN`.
-pub(crate) fn true_row(t_s: f64, truth: &Truth) -> Row {
+pub fn true_row(t_s: f64, truth: &Truth) -> Row {
     let unknown = f64::NAN;
     Row {
         t_s,
@@ -172,7 +168,7 @@ pub(crate) fn true_row(t_s: f64, truth: &Truth) -> Row {
 }
 
 /// A ledger line with what the plant knows.
-pub(crate) fn true_line(crossing: &Crossing) -> CrossingLine {
+pub fn true_line(crossing: &Crossing) -> CrossingLine {
     CrossingLine {
         index: crossing.index as u8,
         speed_mm_s: crossing.speed_mm_s,

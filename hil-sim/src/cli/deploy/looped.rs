@@ -37,7 +37,7 @@ pub(super) fn on_probe(
 }
 
 /// Runs the scenario over this port.
-fn close(
+pub fn close(
     args: &Args,
     port: &mut dyn crate::probe::Port,
     scenario: &Scenario,

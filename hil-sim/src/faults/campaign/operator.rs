@@ -7,7 +7,7 @@ const DWELL_TICKS: u32 = 100;
 
 /// The operator.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Operator {
+pub struct Operator {
     started: bool,
     turned: bool,
     rested: u32,
@@ -15,7 +15,7 @@ pub(super) struct Operator {
 
 impl Operator {
     /// The command of a tick in which the drive is in this mode.
-    pub(super) fn command(&mut self, mode: Mode) -> Option<Command> {
+    pub fn command(&mut self, mode: Mode) -> Option<Command> {
         if mode == Mode::Idle && !self.started {
             self.started = true;
             return Some(Command::Start);
@@ -31,12 +31,12 @@ impl Operator {
     }
 
     /// Whether the run has been set going.
-    pub(super) const fn started(&self) -> bool {
+    pub const fn started(&self) -> bool {
         self.started
     }
 
     /// Whether it is over: at rest, and nobody wants it otherwise.
-    pub(super) fn over(&self, mode: Mode) -> bool {
+    pub fn over(&self, mode: Mode) -> bool {
         self.started
             && mode.is_at_rest()
             && (mode != Mode::Complete(Direction::Deploy) || self.turned)

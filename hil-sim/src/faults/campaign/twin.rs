@@ -22,25 +22,25 @@ const SIGNS: (f64, f64, f64) = (0.5, 0.1, 2.0);
 const LONGEST_S: f64 = 60.0;
 
 /// A run without fault.
-pub(super) struct Twin {
+pub struct Twin {
     /// From the command to the end, s since boot.
-    pub(super) started_s: f64,
+    pub started_s: f64,
     ended_s: f64,
     /// When the crossing under way began, s.
     crossing_s: Option<f64>,
     /// Stretches of time in which it crosses a step, s.
     crossings: Vec<(f64, f64)>,
     /// Codes of the limits that it reports.
-    pub(super) limits: Vec<u16>,
+    pub limits: Vec<u16>,
     /// Reference gap of the way out and of the way back, mm.
-    pub(super) gap_ref_mm: [f64; 2],
+    pub gap_ref_mm: [f64; 2],
     /// Preload, position, speed by tick.
     states: Vec<[f32; 3]>,
 }
 
 impl Twin {
     /// Runs it.
-    pub(super) fn run(scenario: &Scenario) -> Result<Self, RunError> {
+    pub fn run(scenario: &Scenario) -> Result<Self, RunError> {
         let mut session = Session::new(scenario, Options::default())?;
         let mut operator = Operator::default();
         let mut twin = Self::new(scenario)?;
@@ -60,7 +60,7 @@ impl Twin {
     }
 
     /// Before the first tick.
-    pub(super) fn new(scenario: &Scenario) -> Result<Self, RigError> {
+    pub fn new(scenario: &Scenario) -> Result<Self, RigError> {
         let planner = Planner::try_build(&scenario.rig)?;
         Ok(Self {
             started_s: 0.0,
@@ -74,14 +74,7 @@ impl Twin {
     }
 
     /// A tick, after which the drive is in this mode; `over` says that it counts no more.
-    pub(super) fn note(
-        &mut self,
-        t_s: f64,
-        mode: Mode,
-        output: &Output,
-        truth: &Truth,
-        over: bool,
-    ) {
+    pub fn note(&mut self, t_s: f64, mode: Mode, output: &Output, truth: &Truth, over: bool) {
         self.states.push(state(truth));
         for entry in &output.events {
             if let Event::Limit(limit) = entry.event {
@@ -102,7 +95,7 @@ impl Twin {
     }
 
     /// A random instant: of every three, one in a crossing and two anywhere under way.
-    pub(super) fn instant(&self, number: usize, random: &mut ChaCha8Rng) -> f64 {
+    pub fn instant(&self, number: usize, random: &mut ChaCha8Rng) -> f64 {
         let (from_s, to_s) = if number % 3 == 2 && !self.crossings.is_empty() {
             self.crossings[random.random_range(0..self.crossings.len())]
         } else {
@@ -114,7 +107,7 @@ impl Twin {
     }
 
     /// Whether the rig stands or moves otherwise in this tick.
-    pub(super) fn differs(&self, tick: usize, truth: &Truth) -> bool {
+    pub fn differs(&self, tick: usize, truth: &Truth) -> bool {
         let Some(then) = self.states.get(tick).or(self.states.last()) else { return false };
         let now = state(truth);
         let apart = |i: usize| f64::from(now[i] - then[i]).abs();

@@ -11,16 +11,12 @@ pub(super) const UNSEEN: u32 = u32::MAX;
 
 /// A straight piece of code.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Block {
-    pub(super) address: u32,
-    pub(super) size: u32,
+struct Block {
+    size: u32,
     instructions: u64,
     cycles: u64,
-    /// Address of the instruction that ends it, if that shuts interrupts out or lets them
-    /// in. The engine ends a block behind each of these.
-    masks: Option<u32>,
-    /// Cycles spent here since last asked.
-    pub(super) heat: u64,
+    /// Whether its beginning is marked.
+    marked: bool,
 }
 
 /// What the hooks keep.
@@ -29,19 +25,15 @@ pub(super) struct Count {
     pub(super) bytes: Vec<u8>,
     /// Block by the halfword it begins at.
     begins: Vec<u32>,
-    pub(super) blocks: Vec<Block>,
+    blocks: Vec<Block>,
+    /// Addresses whose coming up is noted.
+    marked: HashSet<u32>,
     /// Instructions whose cycles a hook of their own counts.
     late: HashMap<u32, Kind>,
     /// Those of them that are still without it, as no block with them has been met.
     unhooked: HashSet<u32>,
     /// A block has been met that holds some of those.
     pub(super) wanted: Vec<(u32, Kind)>,
-    /// Blocks that have heat.
-    pub(super) warm: Vec<u32>,
-    /// The block under way.
-    pub(super) current: u32,
-    /// Its end, see [`Block::masks`], if it is still to be looked at.
-    pub(super) masks: Option<u32>,
     /// Where the program is if it does not branch.
     pub(super) next: u32,
     pub(super) meter: Meter,
@@ -61,9 +53,7 @@ impl Count {
             late: HashMap::new(),
             unhooked: HashSet::new(),
             wanted: Vec::new(),
-            warm: Vec::new(),
-            current: UNSEEN,
-            masks: None,
+            marked: HashSet::new(),
             next: 0,
             meter: Meter::default(),
             limit: u64::MAX,
@@ -76,32 +66,33 @@ impl Count {
         thumb::decode(self.bytes.get((address & !1).wrapping_sub(self.base) as usize..)?)
     }
 
-    /// Adds cycles to the total and to the block under way.
+    /// Adds cycles.
     pub(super) fn spend(&mut self, cycles: u64) {
         self.meter.cycles += cycles;
-        if let Some(block) = self.blocks.get_mut(self.current as usize) {
-            if block.heat == 0 {
-                self.warm.push(self.current);
-            }
-            block.heat += cycles;
-        }
     }
 
-    /// Counts the block that begins here.
-    pub(super) fn enter(&mut self, address: u32, size: u32) {
+    /// Counts the block that begins here; whether its beginning is marked.
+    pub(super) fn enter(&mut self, address: u32, size: u32) -> bool {
         if self.next != address {
             // The branch belongs to the block that ends with it.
             self.spend(REFILL);
         }
         self.next = address.wrapping_add(size);
         let Some(index) = self.block(address, size) else {
-            self.current = UNSEEN;
-            return;
+            return self.marked.contains(&address);
         };
-        let Block { instructions, cycles, masks, .. } = self.blocks[index as usize];
-        (self.current, self.masks) = (index, masks);
+        let Block { instructions, cycles, marked, .. } = self.blocks[index as usize];
         self.meter.instructions += instructions;
         self.spend(cycles);
+        marked
+    }
+
+    /// Marks an address from now on.
+    pub(super) fn mark(&mut self, address: u32) {
+        self.marked.insert(address);
+        // What is known of blocks was decided before.
+        self.begins.fill(UNSEEN);
+        self.blocks.clear();
     }
 
     /// This instruction's cycles are known only when it is reached.
@@ -140,31 +131,18 @@ impl Count {
         }
         let offset = address.wrapping_sub(self.base) as usize;
         let code = self.bytes.get(offset..offset + size as usize)?;
-        let (mut instructions, mut cycles, mut masks) = (0, 0, None);
+        let (mut instructions, mut cycles) = (0, 0);
         // A block may begin under a condition, so the sweep of the whole code decides
         // what is late, not this one.
         for (at, instruction, _) in thumb::sweep(code, address) {
             let late = self.late.contains_key(&at);
             instructions += 1;
-            masks = code
-                .get((at - address) as usize..)
-                .filter(|rest| masks_interrupts(rest))
-                .map(|_| at);
             cycles += 1 + if late { 0 } else { timing::extra(instruction.kind) };
         }
         let index = u32::try_from(self.blocks.len()).ok()?;
-        self.blocks.push(Block { address, size, instructions, cycles, masks, heat: 0 });
+        let marked = self.marked.contains(&address);
+        self.blocks.push(Block { size, instructions, cycles, marked });
         *self.begins.get_mut(offset / 2)? = index;
         Some(index)
-    }
-}
-
-/// Whether code begins with an instruction that shuts interrupts out or lets them in:
-/// `CPSID i`, `CPSIE i` or `MSR PRIMASK, Rn`.
-fn masks_interrupts(code: &[u8]) -> bool {
-    match *code {
-        [0x72 | 0x62, 0xB6, ..] => true,
-        [first, 0xF3, 0x10, 0x88, ..] => first >> 4 == 8,
-        _ => false,
     }
 }

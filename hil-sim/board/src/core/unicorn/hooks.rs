@@ -3,8 +3,8 @@
 use unicorn_engine::{HookType, RegisterARM};
 
 use super::{
-    BREAKPOINT, Bus, CALL, CoreError, Counted, EXCEPTION, Fault, Hooked, Inside, Mark, RETURN,
-    RETURN_BITS, SEV, Stop, Touch, UnicornCore, WFE, engine, general, passes,
+    BREAKPOINT, Bus, CALL, CoreError, Counted, Fault, Hooked, Inside, Mark, RETURN, RETURN_BITS,
+    SEV, Stop, Touch, UnicornCore, WFE, engine, general, passes,
 };
 use crate::thumb::{self, Kind};
 use crate::timing;
@@ -14,9 +14,6 @@ impl<B: Bus + 'static> UnicornCore<B> {
     pub(super) fn hook(&mut self, counted: &Counted<'_>) -> Result<(), CoreError> {
         let uc = &mut self.engine;
         let blocks = uc.add_block_hook(1, 0, |uc, address, size| {
-            if let Some(at) = uc.get_data_mut().count.masks.take() {
-                look_at_mask(uc, at);
-            }
             let Inside { count, bus, .. } = uc.get_data_mut();
             let now = count.meter.cycles;
             // What stops here is not executed and so not counted.
@@ -30,13 +27,12 @@ impl<B: Bus + 'static> UnicornCore<B> {
                 halt(uc, Stop::Urgent(address as u32));
                 return;
             }
-            let Inside { count, marked, .. } = uc.get_data_mut();
+            let Inside { count, .. } = uc.get_data_mut();
             if count.wants_hooks(address as u32, size) {
                 halt(uc, Stop::Spent(address as u32));
                 return;
             }
-            count.enter(address as u32, size);
-            if marked.binary_search(&(address as u32)).is_ok() {
+            if count.enter(address as u32, size) {
                 note(uc, address as u32);
             }
         });
@@ -124,19 +120,6 @@ impl<B: Bus + 'static> UnicornCore<B> {
         };
         engine("hook an instruction", hooked).map(|_| ())
     }
-}
-
-/// The instruction at this place has shut interrupts out or let them in.
-#[cold]
-fn look_at_mask<B>(uc: &mut Hooked<'_, B>, address: u32) {
-    if uc.reg_read(RegisterARM::PRIMASK).unwrap_or_default() & 1 == 0 {
-        uc.get_data_mut().open();
-        return;
-    }
-    let flags = uc.reg_read(RegisterARM::XPSR).unwrap_or_default();
-    let inside = uc.get_data_mut();
-    let now = inside.count.meter.cycles;
-    inside.shut.get_or_insert((now, (address, (flags & EXCEPTION) as u32)));
 }
 
 /// Stops the engine from inside a hook.

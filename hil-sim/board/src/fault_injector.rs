@@ -16,11 +16,12 @@ use super::core::CoreError;
 use super::elf::FLASH;
 use super::faults::Fault;
 use super::machine::Machine;
+use super::params::PLACES;
 use super::peripherals::HZ;
 use super::peripherals::flash::Cut;
 use super::peripherals::rcc::Cause;
 use hil_sim::faults::{Injection, Kind, Tamper, Target, sets};
-use hil_sim::params::{board::PLACES, set_of};
+use hil_sim::params::set_of;
 use hil_sim::plant::rig::{Drives, VirtualRig};
 use hil_sim::plant::sensors::Codes;
 use hil_sim::scenario::Scenario;
@@ -36,7 +37,7 @@ const INTO_TURN: u64 = 100;
 const PATIENCE: u32 = 20;
 
 /// The faults of a run, and how far they have come.
-pub(super) struct Tampered {
+pub(super) struct FaultInjector {
     tamper: Tamper,
     hunt: Option<Hunt>,
     /// When the task that was to hang was caught, or the save broken off, s.
@@ -55,7 +56,7 @@ pub(super) struct Tampered {
     rig: Rig,
 }
 
-impl Tampered {
+impl FaultInjector {
     pub(super) fn new(tamper: Tamper, scenario: &Scenario) -> Self {
         Self {
             tamper,
