@@ -10,7 +10,7 @@ mod hooks;
 use std::collections::HashSet;
 
 use unicorn_engine::{
-    Arch, ArmCpuModel, MemType, Mode, Prot, RegisterARM, TlbEntry, TlbType, Unicorn, uc_error,
+    Arch, ArmCpuModel, MemType, Mode, Prot, RegisterARM, TlbEntry, TlbType, UcHookId, Unicorn, uc_error,
 };
 
 use self::count::Count;
@@ -74,6 +74,10 @@ struct Inside<B> {
 /// A Cortex-M4 on Unicorn.
 pub struct UnicornCore<B: Bus + 'static = NoBus> {
     engine: Unicorn<'static, Inside<B>>,
+    /// Hooks of late instructions, by their addresses.
+    own: Vec<(u32, UcHookId)>,
+    /// The hook of all of them.
+    common: Option<UcHookId>,
 }
 
 /// The engine as a hook sees it.
@@ -104,7 +108,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
         let inside = Inside { count: Count::new(counted), bus, marks: Vec::new() };
         // The flag for the microcontroller profile would select another core.
         let new = Unicorn::new_with_data(Arch::ARM, Mode::THUMB, inside);
-        let mut core = Self { engine: engine("start", new)? };
+        let mut core = Self { engine: engine("start", new)?, own: Vec::new(), common: None };
         let model = core.engine.ctl_set_cpu_model(ArmCpuModel::CORTEX_M4 as i32);
         engine("select the core", model)?;
         core.translate_pages(memories)?;
@@ -194,6 +198,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
         cycles: u64,
         (until, instructions): (u64, usize),
     ) -> Result<Stop, CoreError> {
+        self.choose_hooks()?;
         let count = &mut self.engine.get_data_mut().count;
         count.stop = None;
         count.limit = count.meter.cycles.saturating_add(cycles);
