@@ -133,7 +133,7 @@ pub struct Access {
     pub address: u32,
     /// Bytes: 1, 2 or 4.
     pub size: u32,
-    /// The program counter, as near as the core tells it.
+    /// The program counter: the beginning of the block under way.
     pub pc: u32,
     /// Cycles since the start.
     pub now: u64,

@@ -168,7 +168,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
         let touch = move |uc: &Hooked<'_, B>, offset: u64, size: usize| Touch {
             address: base + offset as u32,
             size: size as u32,
-            pc: uc.pc_read().unwrap_or_default() as u32 & !1,
+            pc: uc.get_data().count.block,
             now: uc.get_data().count.meter.cycles,
         };
         let read = move |uc: &mut Hooked<'_, B>, offset: u64, size: usize| {

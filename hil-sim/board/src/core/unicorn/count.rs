@@ -6,17 +6,15 @@ use super::{Counted, Meter, Stop};
 use crate::thumb::{self, Kind};
 use crate::timing::{self, REFILL};
 
-/// Marks a halfword at which no block has begun yet.
-const UNSEEN: u32 = u32::MAX;
-
 /// A straight piece of code.
-#[derive(Clone, Copy, Debug)]
-struct Block {
-    size: u32,
-    instructions: u64,
-    cycles: u64,
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Block {
+    /// Bytes; 0 where no block has begun yet.
+    size: u16,
+    instructions: u16,
+    cycles: u16,
     /// Whether its beginning is marked.
-    marked: bool,
+    pub(super) marked: bool,
 }
 
 /// What the hooks keep.
@@ -24,7 +22,6 @@ pub(super) struct Count {
     pub(super) base: u32,
     pub(super) bytes: Vec<u8>,
     /// Block by the halfword it begins at.
-    begins: Vec<u32>,
     blocks: Vec<Block>,
     /// Addresses whose coming up is noted.
     marked: HashSet<u32>,
@@ -40,6 +37,8 @@ pub(super) struct Count {
     pub(super) needless: u32,
     /// Cycle at which a block was last met that had not been seen.
     pub(super) met: u64,
+    /// Beginning of the block under way.
+    pub(super) block: u32,
     /// Where the program is if it does not branch.
     pub(super) next: u32,
     pub(super) meter: Meter,
@@ -66,8 +65,7 @@ impl Count {
         Self {
             base: counted.base,
             bytes: counted.bytes.to_vec(),
-            begins: vec![UNSEEN; halfwords],
-            blocks: Vec::new(),
+            blocks: vec![Block::default(); halfwords],
             marked: HashSet::new(),
             late,
             hooked: Vec::new(),
@@ -75,6 +73,7 @@ impl Count {
             common: false,
             needless: 0,
             met: 0,
+            block: 0,
             next: 0,
             meter: Meter::default(),
             limit: u64::MAX,
@@ -98,20 +97,16 @@ impl Count {
         self.meter.cycles += cycles;
     }
 
-    /// Counts the block that begins here; whether its beginning is marked.
-    pub(super) fn enter(&mut self, address: u32, size: u32) -> bool {
+    /// Counts a block that begins here.
+    #[inline]
+    pub(super) fn enter(&mut self, address: u32, size: u32, block: Block) {
         if self.next != address {
             // The branch belongs to the block that ends with it.
             self.spend(REFILL);
         }
-        self.next = address.wrapping_add(size);
-        let Some(index) = self.known(address, size).or_else(|| self.block(address, size)) else {
-            return self.marked.contains(&address);
-        };
-        let Block { instructions, cycles, marked, .. } = self.blocks[index as usize];
-        self.meter.instructions += instructions;
-        self.spend(cycles);
-        marked
+        (self.block, self.next) = (address, address.wrapping_add(size));
+        self.meter.instructions += u64::from(block.instructions);
+        self.spend(block.cycles.into());
     }
 
     /// Marks an address from now on.
@@ -122,21 +117,23 @@ impl Count {
 
     /// Every block is met as if for the first time.
     pub(super) fn forget(&mut self) {
-        self.begins.fill(UNSEEN);
-        self.blocks.clear();
+        self.blocks.fill(Block::default());
         self.met = self.meter.cycles;
+    }
+
+    fn halfword(&self, address: u32) -> usize {
+        address.wrapping_sub(self.base) as usize / 2
     }
 
     /// Whether a block begins here.
     pub(super) fn begins(&self, address: u32) -> bool {
-        let at = address.wrapping_sub(self.base) as usize / 2;
-        self.begins.get(at).is_some_and(|block| *block != UNSEEN)
+        self.blocks.get(self.halfword(address)).is_some_and(|block| block.size > 0)
     }
 
-    /// Whether the block that begins here needs hooks before it can be counted; they are
-    /// then in [`Count::wanted`].
+    /// Whether the block that begins here, and has not been seen, needs hooks before it can
+    /// be counted; they are then in [`Count::wanted`].
     pub(super) fn wants_hooks(&mut self, address: u32, size: u32) -> bool {
-        if self.common || self.known(address, size).is_some() {
+        if self.common {
             return false;
         }
         for at in (address..address.saturating_add(size)).step_by(2) {
@@ -150,28 +147,29 @@ impl Count {
     }
 
     /// The block of this place, if it has been seen.
-    fn known(&self, address: u32, size: u32) -> Option<u32> {
-        let index = *self.begins.get(address.wrapping_sub(self.base) as usize / 2)?;
-        self.blocks.get(index as usize).filter(|block| block.size == size).map(|_| index)
+    #[inline]
+    pub(super) fn known(&self, address: u32, size: u32) -> Option<Block> {
+        let block = self.blocks.get(self.halfword(address))?;
+        (u32::from(block.size) == size).then_some(*block)
     }
 
-    /// The block of this place, seen for the first time.
-    fn block(&mut self, address: u32, size: u32) -> Option<u32> {
+    /// The block of this place, seen for the first time. What does not lie in the counted
+    /// code costs nothing.
+    pub(super) fn meet(&mut self, address: u32, size: u32) -> Block {
+        let mut block = Block { marked: self.marked.contains(&address), ..Block::default() };
         let offset = address.wrapping_sub(self.base) as usize;
-        let code = self.bytes.get(offset..offset + size as usize)?;
-        let (mut instructions, mut cycles) = (0, 0);
+        let Some(code) = self.bytes.get(offset..offset + size as usize) else { return block };
         // A block may begin under a condition, so the sweep of the whole code decides
         // what is late, not this one.
         for (at, instruction, _) in thumb::sweep(code, address) {
-            instructions += 1;
             let late = self.late(at).is_some();
-            cycles += 1 + if late { 0 } else { timing::extra(instruction.kind) };
+            let extra = if late { 0 } else { timing::extra(instruction.kind) };
+            block.instructions += 1;
+            block.cycles += 1 + extra as u16;
         }
-        let index = u32::try_from(self.blocks.len()).ok()?;
-        let marked = self.marked.contains(&address);
-        self.blocks.push(Block { size, instructions, cycles, marked });
-        *self.begins.get_mut(offset / 2)? = index;
+        block.size = size as u16;
+        self.blocks[offset / 2] = block;
         self.met = self.meter.cycles;
-        Some(index)
+        block
     }
 }

@@ -10,9 +10,9 @@ use crate::thumb::{self, Kind};
 use crate::timing;
 
 /// Cycles without a new block after which the code in use is taken to be translated.
-const QUIET: u64 = 2_000_000;
+const QUIET: u64 = 500_000;
 /// Needless calls of the common hook after which blocks are translated again.
-const NEEDLESS: u32 = 20_000;
+const NEEDLESS: u32 = 10_000;
 
 impl<B: Bus + 'static> UnicornCore<B> {
     /// Hooks what is counted, reported or has to stop the program.
@@ -32,13 +32,16 @@ impl<B: Bus + 'static> UnicornCore<B> {
                 halt(uc, Stop::Urgent(address as u32));
                 return;
             }
-            let Inside { count, .. } = uc.get_data_mut();
-            if count.wants_hooks(address as u32, size) {
-                halt(uc, Stop::Spent(address as u32));
-                return;
-            }
-            if count.enter(address as u32, size) {
-                note(uc, address as u32);
+            let count = &mut uc.get_data_mut().count;
+            let at = address as u32;
+            let block = match count.known(at, size) {
+                Some(block) => block,
+                None if count.wants_hooks(at, size) => return halt(uc, Stop::Spent(at)),
+                None => count.meet(at, size),
+            };
+            count.enter(at, size, block);
+            if block.marked {
+                note(uc, at);
             }
         });
         engine("hook blocks", blocks)?;
