@@ -38,6 +38,13 @@ pub fn between<T: Ord>(value: T, low: T, high: T) -> T {
     value.max(low).min(high)
 }
 
+/// Arguments from `first` on by this stride, and the last; all of them with `RIG_LONG=1`.
+#[cfg(test)]
+fn lattice(first: u32, stride: usize) -> impl Iterator<Item = u32> {
+    let stride = if std::env::var_os("RIG_LONG").is_some() { 1 } else { stride };
+    (first..=u32::MAX).step_by(stride).chain([u32::MAX])
+}
+
 #[cfg(test)]
 mod tests {
     use super::between;

@@ -9,6 +9,7 @@ pub mod faults;
 pub mod firmware;
 pub mod hil;
 pub mod identify;
+pub mod injector;
 pub mod live;
 pub mod log;
 pub mod montecarlo;

@@ -4,6 +4,7 @@
 
 mod docs;
 mod error;
+pub mod injection;
 mod injections;
 mod keys;
 mod merge;

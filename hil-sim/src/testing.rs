@@ -270,6 +270,12 @@ fn image(root: &Path, profile: Profile) -> Result<Ended> {
     Ok(Ended::Passed)
 }
 
+/// Whether the tests take their long samples: `RIG_LONG=1`.
+#[must_use]
+pub fn long() -> bool {
+    std::env::var_os("RIG_LONG").is_some()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -105,6 +105,7 @@ fn digit(high: u32, next: u32, divisor: u32) -> u32 {
 #[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
+    use crate::numeric::lattice;
     use proptest::prelude::*;
 
     fn q(bits: i32) -> Q16 {
@@ -123,6 +124,14 @@ mod tests {
         let magnitude = (2 * n + d) / (2 * d);
         let signed = if (a < 0) != (b < 0) { -magnitude } else { magnitude };
         signed.clamp(i128::from(i32::MIN), i128::from(i32::MAX)) as i32
+    }
+
+    #[test]
+    fn reciprocals_are_exact_on_a_lattice() {
+        for x in lattice(0, 4001) {
+            let x = x as i32;
+            assert_eq!(reciprocal(q(x)).to_bits(), exact(1 << 16, x), "{x}");
+        }
     }
 
     #[test]

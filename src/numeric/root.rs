@@ -23,10 +23,20 @@ pub fn sqrt(x: Q16) -> Q16 {
 #[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
+    use crate::numeric::lattice;
     use proptest::prelude::*;
 
     fn q(bits: i32) -> Q16 {
         Q16::from_bits(bits)
+    }
+
+    #[test]
+    fn roots_are_within_their_bound_on_a_lattice() {
+        for bits in lattice(0, 4001) {
+            let exact = (f64::from(bits as i32).max(0.0) * 65_536.0).sqrt();
+            let error = f64::from(sqrt(q(bits as i32)).to_bits()) - exact;
+            assert!(error.abs() <= 0.51, "{bits}: {error}");
+        }
     }
 
     #[test]

@@ -41,11 +41,12 @@ pub const fn sin_cos(angle: u32) -> (i32, i32) {
 #[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
     use super::*;
+    use crate::numeric::lattice;
 
     #[test]
     fn both_are_within_their_bound_on_a_lattice() {
         let mut worst = 0.0_f64;
-        for angle in (0..=u32::MAX).step_by(997).chain([u32::MAX]) {
+        for angle in lattice(0, 997) {
             let exact = f64::from(angle) / 4_294_967_296.0 * core::f64::consts::TAU;
             let (sine, cosine) = sin_cos(angle);
             let scale = f64::from(1 << 30);

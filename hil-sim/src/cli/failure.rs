@@ -6,7 +6,6 @@ use std::process::ExitCode;
 use interstage::rig::RigError;
 
 use crate::export::ExportError;
-use crate::faults::campaign::CampaignError;
 use crate::firmware::FirmwareError;
 use crate::plant::balance::BalanceError;
 use crate::provision::ProvisionError;
@@ -106,15 +105,6 @@ impl From<RunError> for Failure {
             RunError::Rig(error) => error.into(),
             RunError::Refused(_) | RunError::Hardware(_) => Self::input(error),
             RunError::Plant(_) => Self::run(error),
-        }
-    }
-}
-
-impl From<CampaignError<RunError>> for Failure {
-    fn from(error: CampaignError<RunError>) -> Self {
-        match error {
-            CampaignError::Run(error) => error.into(),
-            CampaignError::Kept(error) => Self::run(error),
         }
     }
 }

@@ -1,12 +1,10 @@
 //! `rig faults`: every fault at random instants, and what became of it.
 
-use std::path::PathBuf;
-
 use super::failure::{Failure, Outcome};
 use super::output;
 use super::scenario::ScenarioArgs;
-use crate::faults::campaign::{Campaign, Case, Kept, Line, Outcome as Result_};
-use crate::montecarlo;
+use crate::faults::campaign::{Campaign, Case, Line, Outcome as Matrix};
+use crate::montecarlo::{self, Shard};
 use crate::progress;
 use crate::table::{number, plain};
 
@@ -35,9 +33,9 @@ pub struct Args {
           value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     clean: Option<u64>,
 
-    /// Keeps each fault that is done in this file, and goes on from what stands there.
-    #[arg(long, value_name = "FILE", conflicts_with = "clean")]
-    keep: Option<PathBuf>,
+    /// Only part i of n of the faults, or of the deployments without one.
+    #[arg(long, value_name = "i/n", default_value_t = Shard::WHOLE)]
+    shard: Shard,
 
     #[command(flatten)]
     scenario: ScenarioArgs,
@@ -49,22 +47,28 @@ pub struct Args {
 
 impl Args {
     /// The campaign that is asked for.
+    ///
+    /// # Errors
+    /// [`Failure::Input`] for a scenario that cannot be, or a fault that there is not.
     pub fn campaign(&self) -> Result<Campaign, Failure> {
         let board = self.target == "board";
         let all = if board { Case::all_on_board() } else { Case::all() };
-        let wanted = all.iter().filter(|case| case.is_one_of(&self.only));
-        let cases: Vec<Case> = wanted.copied().collect();
-        if cases.is_empty() {
+        let wanted: Vec<Case> = all.iter().filter(|c| c.is_one_of(&self.only)).copied().collect();
+        if wanted.is_empty() {
             let names: Vec<String> = all.iter().map(Case::name).collect();
             let (text, names) = (self.only.join(", "), names.join(", "));
             return Err(Failure::input(format!("--only {text}: no such fault; faults: {names}")));
         }
-        let scenario = self.scenario.resolve()?;
-        Ok(Campaign { scenario, instants: self.count as usize, cases })
+        let cases = (0..).zip(wanted).filter(|(index, _)| self.shard.has(*index));
+        let cases = cases.map(|(_, case)| case).collect();
+        Ok(Campaign { scenario: self.scenario.resolve()?, instants: self.count as usize, cases })
     }
 }
 
 /// Runs the verb.
+///
+/// # Errors
+/// [`Failure`] as for every verb.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     if let Some(count) = args.clean {
         return clean(args, &args.scenario.resolve()?, count);
@@ -73,25 +77,20 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     if args.target == "board" {
         return Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Board)?));
     }
-    let mut kept = kept(args, &campaign, &[])?;
     let outcome = {
         let bar = progress::bar("runs", campaign.runs());
-        campaign.run_keeping(&mut kept, &|| bar.advance(1))?
+        campaign.run(&|| bar.advance(1))?
     };
     ended(args, &outcome)
 }
 
 /// Prints the outcome.
-pub fn ended(args: &Args, outcome: &Result_) -> Result<Outcome, Failure> {
+///
+/// # Errors
+/// [`Failure`] if it cannot be written.
+pub fn ended(args: &Args, outcome: &Matrix) -> Result<Outcome, Failure> {
     output::result(args.json, outcome, || human(outcome))?;
     Ok(Outcome::of(outcome.is_good()))
-}
-
-/// What is done of the campaign on this image, if it is kept.
-fn kept(args: &Args, campaign: &Campaign, elf: &[u8]) -> Result<Kept, Failure> {
-    let Some(path) = &args.keep else { return Ok(Kept::default()) };
-    let judge = std::env::current_exe().and_then(std::fs::read).map_err(Failure::run)?;
-    Kept::at(path, &args.target, campaign, &[&judge, elf]).map_err(Failure::input)
 }
 
 /// Random deployments without a fault.
@@ -100,10 +99,9 @@ fn clean(
     scenario: &crate::scenario::Scenario,
     count: u64,
 ) -> Result<Outcome, Failure> {
-    let first = scenario.run.seed + 1;
-    let seeds: Vec<u64> = (first..first + count).collect();
+    let seeds = args.shard.seeds(scenario.run.seed, count);
     let lines = {
-        let bar = progress::bar("runs", count);
+        let bar = progress::bar("runs", seeds.len() as u64);
         montecarlo::run(scenario, &seeds, &|| bar.advance(1))?
     };
     let outcome = montecarlo::Outcome::of(&lines);
@@ -120,12 +118,12 @@ fn clean(
 }
 
 /// The matrix as a table, with what failed below it.
-pub fn human(outcome: &Result_) -> String {
+fn human(outcome: &Matrix) -> String {
     let head = [
         "fault",
         "code",
         "found",
-        "borne",
+        "tolerated",
         "missed",
         "unsafe",
         "median\nms",

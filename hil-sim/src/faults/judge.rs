@@ -1,29 +1,28 @@
-//! Judges a run that was tampered with, by what is true and not by what the controller
-//! believes: was the mechanism held, did it move uncommanded, was the fault reported.
+//! Judges a run with a fault by what is true and not by what the controller believes: was the mechanism held, did it move uncommanded, was the fault reported.
 
 use interstage::control::Output;
 use interstage::log::Event;
-use interstage::supervise::{Direction, Mode};
+use interstage::supervise::{Direction, Fault, Limit, Mode};
 use serde::{Deserialize, Serialize};
 
-use super::Target;
 use crate::plant::rig::Truth;
 use crate::scenario::Scenario;
+use crate::scenario::injection::{Kind, Target};
 
 /// Control period, s.
 const TICK_S: f64 = 1e-3;
 /// Preload that a run may reach, parts of its limit: what a load cell that reads a sixth too
 /// little makes of it. The screw has its own stop at 1.25, what the parts are made for.
 pub const PRELOAD_PART: f64 = 1.20;
-/// Way that the wheel may go uncommanded, mm: all ways added, until it rests.
+/// Distance that the wheel may move uncommanded, mm: either direction added, until it rests.
 pub const MOTION_MM: f64 = 0.75;
-/// Way that a wheel may slide that has lost half its grip, mm: the run over a corner, which no
+/// Distance that a wheel may slide that has lost half its grip, mm: the run over a corner, which no
 /// bridge can hold it on.
 pub const SLIDE_MM: f64 = 14.0;
 /// Part of its reference beyond which motion is uncommanded, and a constant, mm/s: half as
 /// fast again as asked is a wrong speed, but the one commanded.
 const BEYOND: (f64, f64) = (1.6, 3.0);
-/// How far from the end of travel a run that says it arrived may stand, mm: the room before
+/// How far from the end of travel a run that says it arrived may be, mm: the room before
 /// the end stop, which is where one ends whose encoder went wrong on the last millimetres.
 pub const POSITION_MM: f64 = 2.6;
 /// Gap that a run may have which reports nothing, parts of the reference gap.
@@ -56,7 +55,7 @@ pub struct Judge {
     asked_mm_s: f64,
     /// Largest preload since the fault came, N.
     pub peak_preload_n: f64,
-    /// Way gone uncommanded since the fault came, mm.
+    /// Distance moved uncommanded since the fault came, mm.
     pub motion_mm: f64,
     /// First fault latched since the fault came: when, s, and its code.
     pub fault: Option<(f64, u16)>,
@@ -65,17 +64,21 @@ pub struct Judge {
     /// When both bridges were off and nothing moved, for good so far, s.
     pub rest_s: Option<f64>,
     mode: Mode,
-    /// Way that it may go uncommanded, mm.
+    /// Distance that it may move uncommanded, mm.
     most_mm: f64,
-    /// Commands came that nobody foresaw: any rest is a right end.
+    /// Commands came at random: any rest is a right end.
     commanded: bool,
+    /// What was injected is a reset of this kind.
+    reset: Option<Kind>,
 }
 
 impl Judge {
     /// Before the first tick of a run.
     #[must_use]
     pub fn new(scenario: &Scenario, truth: &Truth) -> Self {
-        let target = scenario.run.faults.first().map(|fault| fault.target);
+        let fault = scenario.run.faults.first();
+        let target = fault.map(|fault| fault.target);
+        let reset = fault.filter(|fault| fault.target == Target::Reset);
         let slips = target == Some(Target::Wheel);
         let commanded = target == Some(Target::Commands);
         Self {
@@ -92,13 +95,14 @@ impl Judge {
             mode: Mode::Boot,
             most_mm: if slips { SLIDE_MM } else { MOTION_MM },
             commanded,
+            reset: reset.map(|fault| fault.kind),
         }
     }
 
     /// Looks at a tick: what the controller put out, and what is true after it. `struck`
     /// tells whether the fault has come.
     pub fn look(&mut self, t_s: f64, output: &Output, truth: &Truth, struck: bool) {
-        let way_mm = truth.position_mm - self.position_mm;
+        let moved_mm = truth.position_mm - self.position_mm;
         self.position_mm = truth.position_mm;
         self.mode = output.telemetry.mode;
         // What was asked lately: the wheel follows with a lag.
@@ -108,7 +112,7 @@ impl Judge {
             return;
         }
         self.peak_preload_n = self.peak_preload_n.max(truth.preload_n);
-        self.motion_mm += self.uncommanded(way_mm);
+        self.motion_mm += self.uncommanded(moved_mm);
         if let Mode::Complete(way) = self.mode {
             let end_mm = match way {
                 Direction::Deploy => self.ends_mm.1,
@@ -130,15 +134,15 @@ impl Judge {
         self.rest_s = (off && still).then(|| self.rest_s.unwrap_or(t_s));
     }
 
-    /// Way of a tick that nobody asked for, mm.
-    fn uncommanded(&self, way_mm: f64) -> f64 {
+    /// Distance of a tick that was not commanded, mm.
+    fn uncommanded(&self, moved_mm: f64) -> f64 {
         let direction = match self.mode {
             Mode::Run(way, _) | Mode::Stopping(way) => way,
-            _ => return way_mm.abs(),
+            _ => return moved_mm.abs(),
         };
         let along = match direction {
-            Direction::Deploy => way_mm,
-            Direction::Retract => -way_mm,
+            Direction::Deploy => moved_mm,
+            Direction::Retract => -moved_mm,
         };
         let most = (BEYOND.0 * self.asked_mm_s + BEYOND.1) * TICK_S;
         let back = BEYOND.1 * TICK_S;
@@ -175,7 +179,11 @@ impl Judge {
             Mode::Complete(_) => crossed || self.commanded,
             _ => self.mode.is_at_rest(),
         };
-        if self.fault.is_some() {
+        if let Some(kind) = self.reset {
+            // The start itself is reported: what counts is how the run goes on.
+            let ended = matches!(self.mode, Mode::Complete(_)) || self.fault.is_some();
+            if ended && !self.false_alarm(kind) { Finding::Found } else { Finding::Undetected }
+        } else if self.fault.is_some() {
             Finding::Found
         } else if self.new_limit(known).is_some() {
             Finding::Limited
@@ -184,6 +192,15 @@ impl Judge {
         } else {
             Finding::Undetected
         }
+    }
+
+    /// Whether a run after a reset reports what is not so. Only one that has lost its record,
+    /// or has it in doubt, may find that it does not know its position.
+    fn false_alarm(&self, kind: Kind) -> bool {
+        let untrue = [Limit::StepExtra, Limit::StepMissing, Limit::TreadStrange].map(Limit::code);
+        let lost = kind != Kind::Recorded;
+        self.fault.is_some_and(|(_, code)| !(lost && code == Fault::PositionUnknown.code()))
+            || self.limits.iter().any(|(_, code)| untrue.contains(code))
     }
 
     /// The first limit that the run without the fault does not report: when, s, and code.
@@ -265,10 +282,10 @@ mod tests {
         assert_eq!(good.finding(&[], 1.0, false), Finding::Undetected);
         assert_eq!(good.finding(&[], 1.3, true), Finding::Undetected);
         assert_eq!(judged(RUN, 8.0, 8.0, 40.0, 10).finding(&[], 1.0, true), Finding::Undetected);
-        let mut told = good.clone();
-        told.limits.push((0.1, Limit::StepLate.code()));
-        assert_eq!(told.finding(&[], 1.3, true), Finding::Limited);
-        assert_eq!(told.finding(&[Limit::StepLate.code()], 1.3, true), Finding::Undetected);
+        let mut limited = good.clone();
+        limited.limits.push((0.1, Limit::StepLate.code()));
+        assert_eq!(limited.finding(&[], 1.3, true), Finding::Limited);
+        assert_eq!(limited.finding(&[Limit::StepLate.code()], 1.3, true), Finding::Undetected);
     }
 
     #[test]

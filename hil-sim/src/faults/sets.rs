@@ -1,7 +1,7 @@
-//! Sets of parameters in flash to be damaged: which stand there, which one a save brings,
-//! and how far a fault of them reaches.
+//! Sets of parameters in flash to be damaged: which are stored, which one a save brings, and
+//! how many places a fault of them can hit.
 //!
-//! All are of one rig, but for a hair of preload in those that are not in force, so that no
+//! All are of one rig, but for a little preload in those that are not in force, so that no
 //! two have the same bytes and each is known by its name.
 
 use interstage::params::CompileError;
@@ -18,9 +18,9 @@ pub const SPARE: &str = "spare";
 /// Name of the one that a save brings.
 pub const SAVED: &str = "saved";
 
-/// Number of the set in force. It stands in the first place.
+/// Number of the set in force. It is in the first slot.
 const SEQUENCE: u32 = 7;
-/// Bits of what stands before a set in its place.
+/// Bits before a set in its slot.
 const PREFIX_BITS: u32 = 2 * 8 * WORD_BYTES as u32;
 /// Preload that the others have more, parts of a newton.
 const MORE_N: f64 = 1.0 / 64.0;

@@ -19,12 +19,18 @@ impl Shard {
     /// The whole campaign.
     pub const WHOLE: Self = Self { index: 1, of: 1 };
 
+    /// Whether this part has what is at this place of the whole, counted from 0: every n-th.
+    #[must_use]
+    pub const fn has(self, place: u64) -> bool {
+        place % self.of == self.index - 1
+    }
+
     /// Its part of the `count` seeds that follow `base`: every n-th of them, so that
     /// the parts together are the whole.
     #[must_use]
     pub fn seeds(self, base: u64, count: u64) -> Vec<u64> {
         (0..count)
-            .filter(|offset| offset % self.of == self.index - 1)
+            .filter(|offset| self.has(*offset))
             .map(|offset| base.saturating_add(1).saturating_add(offset))
             .collect()
     }

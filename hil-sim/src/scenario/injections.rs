@@ -2,10 +2,10 @@
 
 use toml::{Table, Value};
 
+use super::injection::{CATALOGUE, Entry, HARDWARE, entry};
 use super::keys::Kind as KeyKind;
 use super::merge::{Provenance, checked as checked_value, wrong_type};
 use super::{Origin, Scenario, ScenarioError};
-use crate::faults::{CATALOGUE, Entry, HARDWARE, entry};
 
 /// What an entry may say beside target and kind.
 const MAY: [&str; 5] = ["at_s", "at_mm", "at_crossing", "duration_s", "magnitude"];
@@ -107,8 +107,8 @@ pub(super) fn check(scenario: &Scenario, from: &Provenance) -> Result<(), Scenar
 
 #[cfg(test)]
 mod tests {
+    use crate::scenario::injection::{Injection, Kind, Target};
     use super::*;
-    use crate::faults::{Injection, Kind, Target};
 
     fn parse(text: &str) -> Result<Scenario, String> {
         Scenario::parse("bench.toml", text, &[]).map_err(|error| error.to_string())

@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::faults::Injection;
+use super::injection::Injection;
 
 /// Options of one run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -7,12 +7,12 @@ use interstage::hal::MotorCommand;
 use interstage::model::{Plan, Planner};
 use interstage::sense::raw::{Sample, SensorFrame};
 use interstage::supervise::{Command, Direction, Mode};
-use interstage::units::Tick;
+use interstage::units::{Millimetres, Tick};
 
 use super::stream::Stream;
 use super::trace::Trace;
 use super::{Options, RunError, TICK_S};
-use crate::faults::Tamper;
+use crate::injector::{FaultInjector, RecordFound};
 use crate::plant::draw::PlantParameters;
 use crate::plant::rig::{Drives, VirtualRig};
 use crate::plant::sensors::{Codes, Sensed, Sensors};
@@ -24,8 +24,8 @@ const ANGLE_EVERY: Tick = 2;
 
 /// A run under way.
 ///
-/// [`Session::step`] is one millisecond. Who wants to tamper with what the controller
-/// gets takes its two halves apart: [`Session::sense`] and [`Session::advance`].
+/// [`Session::step`] is one millisecond. To change what the controller gets, call its
+/// two halves: [`Session::sense`] and [`Session::advance`].
 pub struct Session {
     scenario: Scenario,
     options: Options,
@@ -39,7 +39,7 @@ pub struct Session {
     plan: Option<Plan>,
     trace: Trace,
     stream: Option<Stream>,
-    tamper: Option<Tamper>,
+    injector: Option<FaultInjector>,
     /// What the bridges and the record hold on to while ticks are lost.
     held: Output,
     /// Ticks were lost before this one, and with them this command.
@@ -76,7 +76,7 @@ impl Session {
         let plant = VirtualRig::new(parameters, position, preload, TICK_S);
         let controller = Controller::try_build(&scenario.rig)?;
         Ok(Self {
-            tamper: Tamper::of(scenario),
+            injector: FaultInjector::of(scenario),
             held: Output::default(),
             overrun: false,
             missed: None,
@@ -139,10 +139,13 @@ impl Session {
             self.frame.arm = Some(Sample { code: codes.arm, at });
         }
         let mut frame = self.frame;
-        if let Some(tamper) = &mut self.tamper {
-            tamper.begin(f64::from(at) * TICK_S, self.plant.truth());
-            tamper.plant(&mut self.plant);
-            tamper.sensors(&mut frame);
+        if let Some(injector) = &mut self.injector {
+            injector.begin(f64::from(at) * TICK_S, self.plant.truth());
+            injector.plant(&mut self.plant);
+            injector.sensors(&mut frame);
+            if let Some(record) = injector.reset() {
+                self.reset(record);
+            }
         }
         frame
     }
@@ -158,7 +161,7 @@ impl Session {
         command: Option<Command>,
     ) -> Result<Output, RunError> {
         let command = self.missed.take().or(command);
-        if self.tamper.as_ref().is_some_and(Tamper::lost) {
+        if self.injector.as_ref().is_some_and(FaultInjector::lost) {
             (self.overrun, self.missed) = (true, command);
         } else {
             self.control(sensors, command);
@@ -168,8 +171,8 @@ impl Session {
         self.held.request = None;
         self.trace.look(&output, self.plant.truth(), self.options.rows);
         let mut drives = drives(output.drive, output.preload);
-        if let Some(tamper) = &mut self.tamper {
-            drives = tamper.drives(drives);
+        if let Some(injector) = &mut self.injector {
+            drives = injector.drives(drives);
         }
         self.plant.step(&drives, TICK_S)?;
         self.tick += 1;
@@ -178,9 +181,9 @@ impl Session {
 
     /// The control tick and the model task behind it.
     fn control(&mut self, sensors: &SensorFrame, command: Option<Command>) {
-        let tamper = self.tamper.as_mut();
-        let (command, hangs, read) = tamper.map_or((command, false, true), |tamper| {
-            (tamper.command(command), tamper.model_hangs(), !tamper.log_gone())
+        let injector = self.injector.as_mut();
+        let (command, hangs, read) = injector.map_or((command, false, true), |injector| {
+            (injector.command(command), injector.model_hangs(), !injector.log_gone())
         });
         let input = Input {
             now: self.tick,
@@ -201,22 +204,22 @@ impl Session {
         }
     }
 
-    /// When it first did something, see [`Tamper::acts_s`], s since boot.
+    /// When it first did something, see [`FaultInjector::acts_s`], s since boot.
     #[must_use]
     pub fn acts_s(&self) -> Option<f64> {
-        self.tamper.as_ref().and_then(Tamper::acts_s)
+        self.injector.as_ref().and_then(FaultInjector::acts_s)
     }
 
-    /// When it first did what the readback must tell, see [`Tamper::tells_s`], s since boot.
+    /// When it first did what the readback must tell, see [`FaultInjector::tells_s`], s since boot.
     #[must_use]
     pub fn tells_s(&self) -> Option<f64> {
-        self.tamper.as_ref().and_then(Tamper::tells_s)
+        self.injector.as_ref().and_then(FaultInjector::tells_s)
     }
 
     /// When the first of the scenario's faults came, s since boot.
     #[must_use]
     pub fn struck_s(&self) -> Option<f64> {
-        self.tamper.as_ref().and_then(Tamper::struck_s)
+        self.injector.as_ref().and_then(FaultInjector::struck_s)
     }
 
     /// Power lost and back: the controller forgets everything, the rig stays where it is.
@@ -239,6 +242,20 @@ impl Session {
     pub fn restart(&mut self) {
         let flight = Some(self.record());
         self.restart_from(Restart { reset: Reset::Pin, flight, crash: None });
+    }
+
+    /// The reset of a fault.
+    fn reset(&mut self, record: RecordFound) {
+        match record {
+            RecordFound::Intact => self.restart(),
+            RecordFound::Off(mm) => {
+                let mut flight = self.record();
+                flight.position += Millimetres::from_num(mm);
+                let flight = Some(flight);
+                self.restart_from(Restart { reset: Reset::Power, flight, crash: None });
+            }
+            RecordFound::Gone => self.reboot(),
+        }
     }
 
     /// A start that finds this of the time before it.

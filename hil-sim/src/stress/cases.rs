@@ -6,9 +6,13 @@
 
 use serde::Serialize;
 
-use super::roll::{RADIUS_MM, WIDTH_MM};
-use super::{drive, roll};
+use crate::plant::draw::ELEMENTS;
 use crate::plant::limits::{DEEPEST, HIGHEST, leans, takes};
+use crate::plant::ring::RingParameters;
+
+/// Radius and width of the wheel, mm.
+pub(super) const RADIUS_MM: f64 = 25.0;
+const WIDTH_MM: f64 = 28.0;
 
 /// Range of a parameter, and how it is filled.
 #[derive(Clone, Copy, Debug)]
@@ -96,7 +100,7 @@ impl Course {
 
 /// One set of parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Case {
+pub struct StressCase {
     /// Its number.
     pub index: usize,
     /// Relaxed stiffness of the contact, Pa/m.
@@ -131,6 +135,32 @@ pub struct Case {
     pub phase: f64,
 }
 
+impl StressCase {
+    /// Wheel and rubber.
+    pub(super) fn ring(&self) -> RingParameters {
+        let k_inf = self.k_inf_pa_per_m * 1e-9;
+        RingParameters {
+            radius_mm: RADIUS_MM,
+            width_mm: WIDTH_MM,
+            k_inf,
+            k_0: k_inf * self.stiffening,
+            tau_s: self.tau_s,
+            elements: ELEMENTS,
+        }
+    }
+
+    /// Speed of the unloaded motor, mm/s.
+    pub(super) fn no_load_mm_s(&self) -> f64 {
+        (1.25 * self.speed_mm_s).max(1.0)
+    }
+
+    /// Axial distance between the step and a wheel that just touches its corner, mm.
+    pub(super) fn reach_mm(&self) -> f64 {
+        let below = RADIUS_MM - self.step_mm;
+        (RADIUS_MM * RADIUS_MM - below * below).max(0.0).sqrt()
+    }
+}
+
 /// Rate of the preload spring where the tread is stiff enough for it, N/mm.
 const SPRING: f64 = 1.2;
 
@@ -141,13 +171,13 @@ const PARTS: (f64, f64, f64) = (0.4, 0.3, 0.2);
 /// eight ranges for small counts, all corners from a thousand cases on, the rest from
 /// the sequence.
 #[must_use]
-pub fn draw(count: usize, seed: u64) -> Vec<Case> {
+pub(super) fn draw(count: usize, seed: u64) -> Vec<StressCase> {
     let every = if count < 1000 { 4 } else { 1 };
     let corners = (0..1 << ENDS).step_by(every).map(corner);
     let sequence = Sequence::new(seed);
     let inside = (0..).map(|n| of(&sequence.point(n)));
     let all = corners.chain(inside).take(count).enumerate();
-    all.map(|(index, case)| Case { index, ..case }).collect()
+    all.map(|(index, case)| StressCase { index, ..case }).collect()
 }
 
 /// Largest force on a corner of the step with this tread, N: relaxed, `F = k L d^2`.
@@ -163,14 +193,14 @@ fn deepest(step_mm: f64) -> f64 {
 /// Cases that cannot be, each with the name of its refusal: the first `count`, pressed with
 /// more than the tread carries, or braked with more momentum than it takes.
 #[must_use]
-pub fn beyond(count: usize, seed: u64) -> Vec<(Case, &'static str)> {
-    let changed = |case: Case| {
+pub(super) fn beyond(count: usize, seed: u64) -> Vec<(StressCase, &'static str)> {
+    let changed = |case: StressCase| {
         if case.index.is_multiple_of(3) {
             let mu = 1.05 / leans(RADIUS_MM, case.step_mm.max(2.0));
-            let case = Case { mu, step_mm: case.step_mm.max(2.0), load_n: 0.0, ..case };
-            let most = takes(&roll::rubber(&case), case.step_mm);
-            let mass_kg = 2.1e3 * most / drive::top(case.speed_mm_s).powi(2);
-            return (Case { mass_kg, ..case }, "braked wheel digs itself in");
+            let case = StressCase { mu, step_mm: case.step_mm.max(2.0), load_n: 0.0, ..case };
+            let most = takes(&case.ring(), case.step_mm);
+            let mass_kg = 2.1e3 * most / case.no_load_mm_s().powi(2);
+            return (StressCase { mass_kg, ..case }, "braked wheel digs itself in");
         }
         let most = carries(case.k_inf_pa_per_m, case.step_mm);
         // Where a deep corner is refused before a high one.
@@ -183,13 +213,13 @@ pub fn beyond(count: usize, seed: u64) -> Vec<(Case, &'static str)> {
         } else {
             ("preload sinks the wheel", 2.0 * most)
         };
-        let case = Case { preload_n: force_n, load_n: 0.0, spring_n_per_mm: 1e-6, ..case };
+        let case = StressCase { preload_n: force_n, load_n: 0.0, spring_n_per_mm: 1e-6, ..case };
         (case, name)
     };
     draw(count, seed).into_iter().map(changed).collect()
 }
 
-fn corner(bits: usize) -> Case {
+fn corner(bits: usize) -> StressCase {
     // The dimensions that have no ends cycle through their middle values.
     let cycle = |of: usize| ((bits * 7 + of * 3) % 10) as f64 / 10.0 + 0.05;
     let mut parts: [f64; DIMENSIONS] = std::array::from_fn(cycle);
@@ -199,12 +229,12 @@ fn corner(bits: usize) -> Case {
     of(&parts)
 }
 
-fn of(parts: &[f64; DIMENSIONS]) -> Case {
+fn of(parts: &[f64; DIMENSIONS]) -> StressCase {
     let [k, s, tau, dt, ratio, v, h, mu, preload, load, arm, course, phase] = *parts;
     let mass_ratio = MASS_RATIO.at(ratio);
     let (stiffness, step_mm) = (STIFFNESS.at(k), STEP.at(h));
     let carried_n = carries(stiffness, step_mm);
-    let mut case = Case {
+    let mut case = StressCase {
         index: 0,
         k_inf_pa_per_m: stiffness,
         // A fifth of the treads is without damping.
@@ -225,8 +255,8 @@ fn of(parts: &[f64; DIMENSIONS]) -> Case {
         phase,
     };
     // A braked wheel with more momentum than its tread takes digs itself in, unless it slides.
-    let top = drive::top(case.speed_mm_s);
-    if 0.5e-3 * case.mass_kg * top * top > takes(&roll::rubber(&case), step_mm) {
+    let top = case.no_load_mm_s();
+    if 0.5e-3 * case.mass_kg * top * top > takes(&case.ring(), step_mm) {
         let pressed_n = PARTS.0 + PARTS.1 + 1.2 * PARTS.2;
         let depth_mm = deepest(step_mm) * pressed_n.sqrt();
         case.mu = case.mu.min(0.95 / leans(RADIUS_MM, step_mm + depth_mm));
@@ -270,7 +300,7 @@ mod tests {
     #[test]
     fn every_range_is_reached_from_end_to_end() {
         let cases = draw(4000, 1);
-        type Pick = fn(&Case) -> f64;
+        type Pick = fn(&StressCase) -> f64;
         let ranges: [(Pick, f64, f64); 8] = [
             (|c| c.k_inf_pa_per_m, 1e6, 1e12),
             (|c| c.stiffening, 1.0, 100.0),

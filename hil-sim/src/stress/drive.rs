@@ -1,8 +1,7 @@
 //! A case on the whole rig: motor, arm, screw, friction and ring, along its course over
 //! the step, with its energies accounted for.
 
-use super::cases::{Case, Course};
-use super::roll::{self, RADIUS_MM};
+use super::cases::{Course, RADIUS_MM, StressCase};
 use crate::plant::actuators::DriveMotor;
 use crate::plant::draw::{ELEMENTS, PlantParameters};
 use crate::plant::rig::{Drives, PlantError, Truth, VirtualRig};
@@ -14,11 +13,6 @@ const BUDGET: f64 = 1000.0;
 
 /// Least number of steps of time.
 const LEAST_TICKS: f64 = 20.0;
-
-/// Speed of the unloaded motor for a case at this speed, mm/s.
-pub(super) fn top(speed_mm_s: f64) -> f64 {
-    (1.25 * speed_mm_s).max(1.0)
-}
 
 /// Force that is known no better than to the tolerance of the balance, N.
 const LEAST_N: f64 = 1e-2;
@@ -42,11 +36,11 @@ pub(super) struct Drove {
 }
 
 /// The rig of a case: the nominal one with the case's parameters.
-pub(super) fn plant(case: &Case) -> PlantParameters {
+pub(super) fn plant(case: &StressCase) -> PlantParameters {
     let mut plant = PlantParameters::draw(&Scenario::default());
     // Strong enough to climb.
     let limit_n = 2.0 * (case.load_n + case.preload_n);
-    plant.ring = roll::rubber(case);
+    plant.ring = case.ring();
     plant.wall = Wall::new(vec![Step { position_mm: 0.0, height_mm: case.step_mm }]);
     plant.arm.coupling = case.coupling;
     plant.stops_mm = (-100.0, 100.0);
@@ -58,7 +52,7 @@ pub(super) fn plant(case: &Case) -> PlantParameters {
     plant.spring_n_per_mm = case.spring_n_per_mm;
     plant.mass_kg = case.mass_kg;
     plant.drive = DriveMotor {
-        no_load_mm_s: top(case.speed_mm_s),
+        no_load_mm_s: case.no_load_mm_s(),
         stall_n: 2.0 * limit_n,
         limit_n,
         mass_kg: case.mass_kg / case.mass_ratio,
@@ -67,20 +61,19 @@ pub(super) fn plant(case: &Case) -> PlantParameters {
     plant
 }
 
-fn ticks(case: &Case) -> usize {
+fn ticks(case: &StressCase) -> usize {
     let per_tick = case.speed_mm_s * case.dt_s;
-    let way = 2.0 * roll::reach(case.step_mm) + RADIUS_MM;
+    let way = 2.0 * case.reach_mm() + RADIUS_MM;
     let strides = (per_tick / 0.02).ceil().clamp(1.0, BUDGET / LEAST_TICKS);
     (way / per_tick).ceil().clamp(LEAST_TICKS, BUDGET / strides) as usize
 }
 
 /// Drives `case`.
-pub(super) fn run(case: &Case, plant: &PlantParameters) -> Result<Drove, PlantError> {
+pub(super) fn run(case: &StressCase, plant: &PlantParameters) -> Result<Drove, PlantError> {
     let ticks = ticks(case);
     let way = case.speed_mm_s * case.dt_s * ticks as f64;
     let lead = (0.3 * way).clamp(0.01, 0.5 * RADIUS_MM);
-    let start =
-        if case.course == Course::Back { lead } else { -roll::reach(case.step_mm) - 2.0 - lead };
+    let start = if case.course == Course::Back { lead } else { -case.reach_mm() - 2.0 - lead };
     let mut rig = VirtualRig::new(plant.clone(), start, case.preload_n, case.dt_s)
         .with_speed(case.course.speed(0.0) * case.speed_mm_s);
     let mut out = Drove::default();

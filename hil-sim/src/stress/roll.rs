@@ -1,15 +1,11 @@
 //! A case on the ring alone: pushed, frictionless, along its course over the step. What
 //! wall and wheel put into the tread is accounted for: it may be lost, never gained.
 
-use super::cases::Case;
+use super::cases::{RADIUS_MM, StressCase};
 use crate::plant::balance::{Axial, Balance, BalanceError};
 use crate::plant::draw::ELEMENTS;
-use crate::plant::ring::{Motion, Ring, RingParameters};
+use crate::plant::ring::{Motion, Ring};
 use crate::plant::wall::{Step, Wall};
-
-/// Radius and width of the wheel, mm.
-pub(super) const RADIUS_MM: f64 = 25.0;
-pub(super) const WIDTH_MM: f64 = 28.0;
 
 /// Way of a ring step, mm, and the most ring steps in a step of time: as the plant has
 /// it for itself.
@@ -30,31 +26,12 @@ pub(super) struct Roll {
     pub resolved_mj: f64,
 }
 
-/// Wheel and rubber of a case.
-pub(super) fn rubber(case: &Case) -> RingParameters {
-    let k_inf = case.k_inf_pa_per_m * 1e-9;
-    RingParameters {
-        radius_mm: RADIUS_MM,
-        width_mm: WIDTH_MM,
-        k_inf,
-        k_0: k_inf * case.stiffening,
-        tau_s: case.tau_s,
-        elements: ELEMENTS,
-    }
-}
-
-/// Axial distance between the step and a wheel that just touches its corner, mm.
-pub(super) fn reach(step_mm: f64) -> f64 {
-    let below = RADIUS_MM - step_mm;
-    (RADIUS_MM * RADIUS_MM - below * below).max(0.0).sqrt()
-}
-
 /// Rolls `case`.
-pub(super) fn run(case: &Case) -> Result<Roll, BalanceError> {
+pub(super) fn run(case: &StressCase) -> Result<Roll, BalanceError> {
     let per_tick = case.speed_mm_s * case.dt_s;
     let parts = (per_tick / STRIDE_MM).ceil().clamp(1.0, MOST_STRIDES);
     let (dt_s, stride) = (case.dt_s / parts, per_tick / parts);
-    let reach = reach(case.step_mm);
+    let reach = case.reach_mm();
     let longest = 2.0 * reach + RADIUS_MM;
     let steps = if stride > 0.0 {
         (longest / stride).ceil().min(BUDGET as f64) as usize
@@ -68,7 +45,7 @@ pub(super) fn run(case: &Case) -> Result<Roll, BalanceError> {
     let first = if sense > 0.0 { -reach - lead } else { lead };
     let mut x = first + sense * case.phase * (longest - way).max(0.0);
     let wall = Wall::new(vec![Step { position_mm: 0.0, height_mm: case.step_mm }]);
-    let mut ring = Ring::new(rubber(case));
+    let mut ring = Ring::new(case.ring());
     let balance = Balance {
         preload_n: case.preload_n,
         spring_n_per_mm: 0.0,

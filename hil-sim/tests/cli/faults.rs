@@ -1,5 +1,7 @@
 //! `rig faults`.
 
+use serde_json::Value;
+
 use crate::{code, good, rig};
 
 /// What it said of an error.
@@ -10,29 +12,19 @@ fn complaint(arguments: &[&str]) -> String {
 }
 
 #[test]
-fn a_campaign_has_its_keys_and_goes_on_where_it_was_broken_off() {
-    let directory = tempfile::tempdir().expect("a directory");
-    let file = directory.path().join("kept.jsonl");
-    let file = file.to_str().expect("a path");
+fn a_campaign_has_its_keys_and_its_parts_are_the_whole() {
     let some = ["faults", "--json", "-n", "2", "--only", "runaway", "--only", "tick"];
     let whole = good(&some);
     assert_eq!((&whole["undetected"], &whole["unsafe"]), (&0.into(), &0.into()));
-    assert_eq!(whole["matrix"].as_array().expect("lines").len(), 3);
-    good(&["faults", "--json", "-n", "2", "--only", "tick", "--keep", file]);
-    assert_eq!(good(&[&some[..], &["--keep", file]].concat()), whole);
-    let text = std::fs::read_to_string(file).expect("a file");
-    assert_eq!(text.lines().count(), 4);
-    // A campaign of another number of instants does not go on from it, nor change it.
-    let other = complaint(&["faults", "-n", "3", "--only", "tick", "--keep", file]);
-    assert!(other.contains("kept.jsonl: is of a campaign with another -n"), "{other}");
-    assert_eq!(std::fs::read_to_string(file).expect("a file"), text);
+    let lines = |run: &Value| run["matrix"].as_array().expect("lines").clone();
+    let [first, second] =
+        ["1/2", "2/2"].map(|part| lines(&good(&[&some[..], &["--shard", part]].concat())));
+    assert_eq!((first.len(), second.len()), (2, 1));
+    assert_eq!([first[0].clone(), second[0].clone(), first[1].clone()].to_vec(), lines(&whole));
 }
 
 #[test]
 fn what_cannot_be_asked_for_is_refused_in_words() {
     let no = complaint(&["faults", "--only", "gremlin"]);
     assert!(no.contains("--only gremlin: no such fault") && no.contains("load-cell stuck"), "{no}");
-    // A part of the campaign is no table of all of it.
-    let part = complaint(&["faults", "--only", "tick", "--write-docs"]);
-    assert!(part.contains("--write-docs") && part.contains("--only"), "{part}");
 }

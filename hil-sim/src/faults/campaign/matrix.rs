@@ -37,7 +37,7 @@ pub struct Line {
     pub code: Option<u16>,
     /// Every code that it was reported by, with how often.
     pub codes: BTreeMap<u16, usize>,
-    /// Restarts that it was reported by, with how often; none in software.
+    /// Restarts of the controller that it was reported by, with how often.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub restarts: BTreeMap<Cow<'static, str>, usize>,
     /// Whether at every instant it was reported or tolerated.
@@ -73,14 +73,14 @@ pub struct Line {
     pub ends: BTreeMap<Cow<'static, str>, usize>,
     /// Largest preload, N.
     pub worst_preload_n: f64,
-    /// Longest way gone uncommanded, mm.
+    /// Longest distance moved uncommanded, mm.
     pub worst_motion_mm: f64,
     /// Instants undetected or unsafe, in full.
     pub failures: Vec<Instant>,
 }
 
 impl Line {
-    /// What it restarted the board by most often.
+    /// What it restarted the controller by most often.
     #[must_use]
     pub fn restarted(&self) -> Option<&str> {
         self.restarts.iter().max_by_key(|(_, times)| **times).map(|(cause, _)| cause.as_ref())
@@ -164,7 +164,7 @@ impl Outcome {
         Self { target, instants, matrix, undetected, unheld }
     }
 
-    /// Whether every fault was found or borne, and nothing was left unheld.
+    /// Whether every fault was found or tolerated, and nothing was left unheld.
     #[must_use]
     pub const fn is_good(&self) -> bool {
         self.undetected == 0 && self.unheld == 0

@@ -1,4 +1,4 @@
-//! Who presses the buttons of a run: out, and, once it has arrived, back.
+//! The operator of a run: sends it out and, once it has arrived, back.
 
 use interstage::supervise::{Command, Direction, Mode};
 
@@ -18,7 +18,7 @@ impl Operator {
     pub fn command(&mut self, mode: Mode) -> Option<Command> {
         if mode == Mode::Idle && !self.started {
             self.started = true;
-            return Some(Command::Start);
+            return Some(if self.turned { Command::Retract } else { Command::Start });
         }
         if mode == Mode::Complete(Direction::Deploy) && !self.turned {
             self.rested += 1;
@@ -30,12 +30,17 @@ impl Operator {
         None
     }
 
+    /// The controller has started again: the last command is given once more.
+    pub const fn press_again(&mut self) {
+        self.started = false;
+    }
+
     /// Whether the run has been set going.
     pub const fn started(&self) -> bool {
         self.started
     }
 
-    /// Whether it is over: at rest, and nobody wants it otherwise.
+    /// Whether it is over: at rest, and no further command comes.
     pub fn over(&self, mode: Mode) -> bool {
         self.started
             && mode.is_at_rest()

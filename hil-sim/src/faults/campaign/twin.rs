@@ -9,6 +9,7 @@ use interstage::supervise::{Direction, Leg, Mode};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
+use super::LONGEST_S;
 use super::operator::Operator;
 use crate::plant::rig::Truth;
 use crate::scenario::Scenario;
@@ -18,8 +19,6 @@ use crate::sil::{Options, RunError, Session};
 /// speed, mm/s. Ten deviations of the load cell, five counts of the encoder, and what the
 /// speed observer swings by itself.
 const SIGNS: (f64, f64, f64) = (0.5, 0.1, 2.0);
-/// Longest run, s.
-const LONGEST_S: f64 = 60.0;
 
 /// A run without fault.
 pub struct Twin {

@@ -1,4 +1,4 @@
-//! A sensor that lies: between what it gives and what the controller gets.
+//! A faulty sensor: between the code it gives and the code the controller gets.
 //!
 //! Every sensor is a number in codes, the wheel encoder's counter without its wrap; what a
 //! fault does to that number is the same for all.
@@ -12,7 +12,7 @@ use interstage::sense::raw::{AdcCode, AngleFrame, BridgeCode, EncoderCount, Samp
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-use super::{Kind, Target};
+use crate::scenario::injection::{Kind, Target};
 
 /// Largest code of a converter.
 const SPAN: f64 = 65_535.0;
@@ -25,9 +25,9 @@ const TIME_S: f64 = 1e-6;
 /// Period of an intermittent contact, s.
 const PERIOD_S: f64 = 0.1;
 
-/// A lying sensor.
+/// A sensor with its fault.
 #[derive(Clone, Debug)]
-pub(super) struct Lie {
+pub(super) struct FaultySensor {
     target: Target,
     kind: Kind,
     /// In codes where the kind has it in the sensor's unit.
@@ -46,7 +46,7 @@ pub(super) struct Lie {
     stands: SensorFrame,
 }
 
-impl Lie {
+impl FaultySensor {
     /// A sensor of `rig` whose wheel has this circumference, mm.
     pub(super) fn new(
         target: Target,
@@ -82,14 +82,14 @@ impl Lie {
 
     /// Puts into `frame` what the controller gets, `since_s` after the fault came; before
     /// that nothing is changed.
-    pub(super) fn tell(
+    pub(super) fn read(
         &mut self,
         frame: &mut SensorFrame,
         t_s: f64,
         since_s: Option<f64>,
         random: &mut ChaCha8Rng,
     ) {
-        let truth = self.read(frame);
+        let truth = self.code(frame);
         let Some(since_s) = since_s else {
             (self.stands, self.first) = (*frame, None);
             self.keep(t_s, truth);
@@ -111,7 +111,7 @@ impl Lie {
             return;
         }
         let first = *self.first.get_or_insert(self.last.map_or(truth, |(_, code)| code));
-        let told = match self.kind {
+        let given = match self.kind {
             Kind::Stuck => first,
             // The counter has no zero of its own: it goes wrong from where it stood.
             Kind::Gain if self.target == Target::Encoder => {
@@ -128,10 +128,10 @@ impl Lie {
             _ => truth,
         };
         self.remember(t_s, truth);
-        self.write(frame, told);
+        self.write(frame, given);
     }
 
-    /// Keeps what is true while the sensor is whole.
+    /// Keeps what is true while the sensor is intact.
     fn keep(&mut self, t_s: f64, truth: Option<f64>) {
         if let Some(truth) = truth {
             self.filtered = truth;
@@ -157,7 +157,7 @@ impl Lie {
     }
 
     /// The sensor's number in this frame; none before the first, or if it is not good.
-    fn read(&mut self, frame: &SensorFrame) -> Option<f64> {
+    fn code(&mut self, frame: &SensorFrame) -> Option<f64> {
         match self.target {
             Target::LoadCell => frame.load_cell.map(|s| f64::from(s.code.get())),
             Target::TreadSensor => frame.tread.map(|s| f64::from(s.code.get())),
@@ -195,7 +195,7 @@ impl Lie {
         }
     }
 
-    /// Puts the code of the bridge that is lied about.
+    /// Puts the code of the bridge of the faulty readback.
     fn put_output(&self, frame: &mut SensorFrame, code: BridgeCode) {
         if let Some(codes) = &mut frame.bridges {
             match self.target {
@@ -248,9 +248,9 @@ mod tests {
     use super::*;
 
     /// What the controller gets of a load cell that reads 10, 11, 12 ... N a millisecond.
-    fn told(kind: Kind, magnitude: f64) -> Vec<f64> {
+    fn given(kind: Kind, magnitude: f64) -> Vec<f64> {
         let rig = Rig::prototype().sense;
-        let mut lie = Lie::new(Target::LoadCell, kind, magnitude, &rig, 157.0);
+        let mut sensor = FaultySensor::new(Target::LoadCell, kind, magnitude, &rig, 157.0);
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let per_n = (FULL_AT - ZERO_AT) * SPAN / rig.load_cell_full_scale_n;
         (0..40u32)
@@ -261,7 +261,7 @@ mod tests {
                 let mut frame = SensorFrame { load_cell, ..SensorFrame::default() };
                 let t_s = f64::from(tick) * 1e-3;
                 let since_s = (tick >= 20).then_some(t_s - 0.020);
-                lie.tell(&mut frame, t_s, since_s, &mut random);
+                sensor.read(&mut frame, t_s, since_s, &mut random);
                 let sample = frame.load_cell.expect("a sample");
                 if sample.at < tick {
                     return f64::NAN;
@@ -272,48 +272,48 @@ mod tests {
     }
 
     #[test]
-    fn a_sensor_is_whole_until_its_fault_comes() {
+    fn a_sensor_is_intact_until_its_fault_comes() {
         for kind in [Kind::Off, Kind::Stuck, Kind::Garbage, Kind::Gain, Kind::Slow, Kind::Delayed] {
-            for (tick, force) in told(kind, 0.01).iter().take(20).enumerate() {
+            for (tick, force) in given(kind, 0.01).iter().take(20).enumerate() {
                 assert!((force - 10.0 - tick as f64).abs() < 0.01, "{kind:?} {tick} {force}");
             }
         }
     }
 
     #[test]
-    fn a_readback_lies_about_its_bridge_alone_and_falls_silent_with_both() {
+    fn a_readback_is_wrong_about_its_bridge_alone_and_falls_silent_with_both() {
         let rig = Rig::prototype().sense;
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let codes = BridgeCodes { drive: BridgeCode::of(3277), pretightener: BridgeCode::of(0) };
-        let mut told = |target, kind, magnitude| {
-            let mut lie = Lie::new(target, kind, magnitude, &rig, 157.0);
+        let mut given = |target, kind, magnitude| {
+            let mut sensor = FaultySensor::new(target, kind, magnitude, &rig, 157.0);
             let mut frame = SensorFrame { bridges: Some(codes), ..SensorFrame::default() };
-            lie.tell(&mut frame, 0.0, None, &mut random);
-            lie.tell(&mut frame, 1e-3, Some(0.0), &mut random);
+            sensor.read(&mut frame, 0.0, None, &mut random);
+            sensor.read(&mut frame, 1e-3, Some(0.0), &mut random);
             frame.bridges
         };
-        assert_eq!(told(Target::Readback, Kind::Off, 0.0), None);
-        let off = told(Target::DriveReadback, Kind::Offset, 0.1).expect("a code");
+        assert_eq!(given(Target::Readback, Kind::Off, 0.0), None);
+        let off = given(Target::DriveReadback, Kind::Offset, 0.1).expect("a code");
         assert!((off.drive.duty() - 6554).abs() <= BridgeCode::DUTY, "{off:?}");
         assert_eq!(off.pretightener, codes.pretightener);
-        let gain = told(Target::PretightenerReadback, Kind::Gain, 5.0).expect("a code");
+        let gain = given(Target::PretightenerReadback, Kind::Gain, 5.0).expect("a code");
         assert_eq!(gain, codes, "nothing is nothing at any gain");
     }
 
     #[test]
-    fn each_kind_tells_its_own_lie() {
+    fn each_kind_distorts_in_its_own_way() {
         let near = |a: f64, b: f64| assert!((a - b).abs() < 0.02, "{a} {b}");
-        assert!(told(Kind::Off, 0.0)[20..].iter().all(|force| force.is_nan()));
-        told(Kind::Stuck, 0.0)[20..].iter().for_each(|force| near(*force, 29.0));
-        near(told(Kind::Gain, 1.2)[30], 48.0);
-        near(told(Kind::Offset, -5.0)[30], 35.0);
-        near(told(Kind::Delayed, 0.005)[30], 35.0);
+        assert!(given(Kind::Off, 0.0)[20..].iter().all(|force| force.is_nan()));
+        given(Kind::Stuck, 0.0)[20..].iter().for_each(|force| near(*force, 29.0));
+        near(given(Kind::Gain, 1.2)[30], 48.0);
+        near(given(Kind::Offset, -5.0)[30], 35.0);
+        near(given(Kind::Delayed, 0.005)[30], 35.0);
         // A ramp through a low-pass lags by its time constant.
-        let slow = told(Kind::Slow, 0.002)[39];
+        let slow = given(Kind::Slow, 0.002)[39];
         assert!((46.5..48.5).contains(&slow), "{slow}");
-        let part = told(Kind::Intermittent, 0.1);
+        let part = given(Kind::Intermittent, 0.1);
         assert!(part[25].is_nan() && part[35] > 44.0, "{part:?}");
-        let garbage = told(Kind::Garbage, 0.0);
+        let garbage = given(Kind::Garbage, 0.0);
         assert!(garbage[20..].iter().filter(|f| (**f - 40.0).abs() > 20.0).count() > 10);
     }
 }

@@ -1,8 +1,6 @@
 //! Runs that cannot end well: each holds in the fault that says why, bridges off.
 
-mod common;
-
-use common::{Bench, starter};
+use crate::common::{Bench, starter};
 use hil_sim::scenario::{Direction, Scenario};
 use interstage::supervise::{Command, Fault, Mode};
 

@@ -1,5 +1,7 @@
-//! Tampering with a run under way: between sensors and controller, between controller and
-//! actuators, in the plant, with the tick itself and with who talks to it.
+//! Injects the faults of a scenario into a run: between sensors and controller, between
+//! controller and actuators, in the plant, in the tick itself, in the commands and the log.
+
+mod sensor;
 
 use std::collections::VecDeque;
 
@@ -8,9 +10,10 @@ use interstage::supervise::Command;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::sensors::Lie;
-use super::{From, Injection, Kind, Target};
+use sensor::FaultySensor;
+
 use crate::plant::rig::{Drives, Truth, VirtualRig};
+use crate::scenario::injection::{Injection, Kind, Onset, Target};
 use crate::scenario::{Direction, Scenario};
 
 /// Control period, s.
@@ -22,11 +25,22 @@ const ACTS: f64 = 0.02;
 const TELLS: (f64, f64) = (0.04, 0.0625);
 /// Half of the torn sector, rad.
 const TORN_RAD: f64 = 0.35;
-/// Way within which a corner that carries again is the same one, mm.
+/// Distance within which a corner that carries again is the same one, mm.
 const SAME_CORNER_MM: f64 = 5.0;
 
+/// What a reset finds of the record of the tick before it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RecordFound {
+    /// As it was written.
+    Intact,
+    /// In doubt, and its position off by so much, mm.
+    Off(f64),
+    /// Nothing.
+    Gone,
+}
+
 /// The faults of a run, and how far they have come.
-pub struct Tamper {
+pub struct FaultInjector {
     faults: Vec<Active>,
     random: ChaCha8Rng,
     t_s: f64,
@@ -44,13 +58,15 @@ struct Active {
     /// When it came, s.
     since_s: Option<f64>,
     over: bool,
+    /// Whether it has had its effect, if that comes once.
+    done: bool,
     /// Whether it was there when it was last asked for.
     known: bool,
     /// When it first did something, s.
     acts_s: Option<f64>,
     /// When it first did what the readback must tell, s.
     tells_s: Option<f64>,
-    lie: Option<Lie>,
+    sensor: Option<FaultySensor>,
     /// Duty of an actuator when the fault came.
     kept: Option<f64>,
     /// Duties on their way.
@@ -59,7 +75,7 @@ struct Active {
     torn_rad: f64,
 }
 
-impl Tamper {
+impl FaultInjector {
     /// The faults of a scenario; none if it has none.
     #[must_use]
     pub fn of(scenario: &Scenario) -> Option<Self> {
@@ -69,12 +85,13 @@ impl Tamper {
             injection: *injection,
             since_s: None,
             over: false,
+            done: false,
             known: false,
             acts_s: None,
             tells_s: None,
-            lie: injection.target.is_sensor().then(|| {
+            sensor: injection.target.is_sensor().then(|| {
                 let (target, kind) = (injection.target, injection.kind);
-                Lie::new(target, kind, injection.magnitude(), &scenario.rig.sense, turn_mm)
+                FaultySensor::new(target, kind, injection.magnitude(), &scenario.rig.sense, turn_mm)
             }),
             kept: None,
             pipeline: VecDeque::new(),
@@ -133,10 +150,10 @@ impl Tamper {
         }
         for fault in &mut self.faults {
             let due = match fault.injection.from() {
-                From::Time(at_s) => t_s >= at_s,
-                From::Position(mm) if self.outwards => truth.position_mm >= mm,
-                From::Position(mm) => truth.position_mm <= mm,
-                From::Crossing(crossing) => self.corners.0 >= crossing,
+                Onset::Time(at_s) => t_s >= at_s,
+                Onset::Position(mm) if self.outwards => truth.position_mm >= mm,
+                Onset::Position(mm) => truth.position_mm <= mm,
+                Onset::Crossing(crossing) => self.corners.0 >= crossing,
             };
             if due && fault.since_s.is_none() {
                 fault.since_s = Some(t_s);
@@ -164,8 +181,8 @@ impl Tamper {
         let t_s = self.t_s;
         for fault in &mut self.faults {
             let since_s = fault.since_s.filter(|_| !fault.over).map(|since_s| t_s - since_s);
-            if let Some(lie) = &mut fault.lie {
-                lie.tell(frame, t_s, since_s, &mut self.random);
+            if let Some(sensor) = &mut fault.sensor {
+                sensor.read(frame, t_s, since_s, &mut self.random);
             }
         }
     }
@@ -187,6 +204,20 @@ impl Tamper {
             let overrun = fault.injection.kind == Kind::Overrun;
             let since = fault.since_s.map_or(f64::INFINITY, |since_s| self.t_s - since_s);
             overrun && since < fault.injection.magnitude() - 0.5 * TICK_S
+        })
+    }
+
+    /// The reset that comes in this tick, if one does, by what it finds of the record.
+    pub fn reset(&mut self) -> Option<RecordFound> {
+        let here = |fault: &&mut Active| {
+            fault.injection.target == Target::Reset && fault.since_s.is_some() && !fault.done
+        };
+        let fault = self.faults.iter_mut().find(here)?;
+        fault.done = true;
+        Some(match fault.injection.kind {
+            Kind::Gone => RecordFound::Gone,
+            Kind::Offset => RecordFound::Off(fault.injection.magnitude()),
+            _ => RecordFound::Intact,
         })
     }
 
@@ -313,21 +344,21 @@ impl Active {
 mod tests {
     use super::*;
 
-    fn tamper(target: Target, kind: Kind, magnitude: f64) -> Tamper {
+    fn injector(target: Target, kind: Kind, magnitude: f64) -> FaultInjector {
         let mut scenario = Scenario::default();
         scenario.run.faults = vec![Injection::at(target, kind, 0.010, magnitude)];
-        Tamper::of(&scenario).expect("a fault")
+        FaultInjector::of(&scenario).expect("a fault")
     }
 
     /// Duties that reach the drive when 0.001, 0.002 ... are asked for.
     fn duties(kind: Kind, magnitude: f64) -> Vec<f64> {
-        let mut tamper = tamper(Target::Drive, kind, magnitude);
+        let mut injector = injector(Target::Drive, kind, magnitude);
         (1..=30)
             .map(|tick| {
-                tamper.begin(f64::from(tick) * TICK_S, &Truth::default());
+                injector.begin(f64::from(tick) * TICK_S, &Truth::default());
                 let drive = f64::from(tick) * 0.001;
                 let on = tick != 25;
-                tamper.drives(Drives { drive, drive_on: on, ..Drives::default() }).worked()[0]
+                injector.drives(Drives { drive, drive_on: on, ..Drives::default() }).worked()[0]
             })
             .collect()
     }
@@ -349,23 +380,23 @@ mod tests {
     #[test]
     fn a_fault_behind_the_bridge_does_not_show_at_its_output() {
         for (kind, seen) in [(Kind::Stalled, false), (Kind::Weak, false), (Kind::Reversed, true)] {
-            let mut tamper = tamper(Target::Pretightener, kind, 0.4);
-            tamper.begin(0.020, &Truth::default());
+            let mut injector = injector(Target::Pretightener, kind, 0.4);
+            injector.begin(0.020, &Truth::default());
             let asked = Drives { preload: 0.5, preload_on: true, ..Drives::default() };
-            let drives = tamper.drives(asked);
+            let drives = injector.drives(asked);
             assert_eq!(drives.preload != asked.preload, seen, "{kind:?}");
             assert!((drives.worked()[1] - 0.5).abs() > 0.1, "{kind:?}");
-            assert_eq!((tamper.acts_s(), tamper.tells_s()), (Some(0.020), Some(0.020)));
+            assert_eq!((injector.acts_s(), injector.tells_s()), (Some(0.020), Some(0.020)));
         }
     }
 
     #[test]
     fn what_the_readback_need_not_tell_acts_all_the_same() {
-        let mut tamper = tamper(Target::Drive, Kind::Runaway, 0.5);
+        let mut injector = injector(Target::Drive, Kind::Runaway, 0.5);
         let mut drive = |t_s: f64, drive: f64| {
-            tamper.begin(t_s, &Truth::default());
-            let _ = tamper.drives(Drives { drive, drive_on: true, ..Drives::default() });
-            (tamper.acts_s(), tamper.tells_s())
+            injector.begin(t_s, &Truth::default());
+            let _ = injector.drives(Drives { drive, drive_on: true, ..Drives::default() });
+            (injector.acts_s(), injector.tells_s())
         };
         assert_eq!(drive(0.010, 0.49), (None, None));
         assert_eq!(drive(0.011, 0.45), (Some(0.011), None));
@@ -380,11 +411,11 @@ mod tests {
 
     #[test]
     fn ticks_are_lost_once_and_for_as_long_as_said() {
-        let mut tamper = tamper(Target::Tick, Kind::Overrun, 0.003);
+        let mut injector = injector(Target::Tick, Kind::Overrun, 0.003);
         let lost: Vec<i32> = (0..100)
             .filter(|tick| {
-                tamper.begin(f64::from(*tick) * TICK_S, &Truth::default());
-                tamper.lost()
+                injector.begin(f64::from(*tick) * TICK_S, &Truth::default());
+                injector.lost()
             })
             .collect();
         assert_eq!(lost, [10, 11, 12]);
@@ -396,11 +427,11 @@ mod tests {
         let mut hung = Injection::at(Target::Model, Kind::Hung, 0.010, 0.0);
         hung.duration_s = Some(0.005);
         scenario.run.faults = vec![hung];
-        let mut tamper = Tamper::of(&scenario).expect("a fault");
+        let mut injector = FaultInjector::of(&scenario).expect("a fault");
         let hangs: Vec<i32> = (0..100)
             .filter(|tick| {
-                tamper.begin(f64::from(*tick) * TICK_S, &Truth::default());
-                tamper.model_hangs()
+                injector.begin(f64::from(*tick) * TICK_S, &Truth::default());
+                injector.model_hangs()
             })
             .collect();
         assert_eq!((hangs.first(), hangs.len()), (Some(&10), 5));
@@ -412,10 +443,10 @@ mod tests {
         let mut fault = Injection::at(Target::Log, Kind::Gone, 0.0, 0.0);
         (fault.at_s, fault.at_crossing) = (None, Some(2));
         scenario.run.faults = vec![fault];
-        let mut tamper = Tamper::of(&scenario).expect("a fault");
+        let mut injector = FaultInjector::of(&scenario).expect("a fault");
         let mut at = |position_mm: f64, corner_n: f64| {
-            tamper.begin(0.0, &Truth { position_mm, corner_n, ..Truth::default() });
-            tamper.log_gone()
+            injector.begin(0.0, &Truth { position_mm, corner_n, ..Truth::default() });
+            injector.log_gone()
         };
         assert!(!at(0.0, 0.0) && !at(8.0, 3.0) && !at(9.0, 0.0) && !at(9.5, 3.0));
         assert!(at(30.0, 4.0));

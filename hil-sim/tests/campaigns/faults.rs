@@ -2,8 +2,8 @@
 //! what must be found at once is found at once. `cargo rig faults` is the whole of it.
 
 use hil_sim::faults::campaign::{Campaign, Case, Line, Outcome};
-use hil_sim::faults::{Injection, Kind, Target};
 use hil_sim::scenario::Scenario;
+use hil_sim::scenario::injection::{Injection, Kind, Target};
 use hil_sim::sil::{Options, run};
 
 fn campaign(instants: usize, wanted: impl Fn(&str) -> bool) -> Outcome {
@@ -17,7 +17,7 @@ fn line<'a>(outcome: &'a Outcome, fault: &str) -> &'a Line {
 }
 
 #[test]
-fn every_fault_is_found_or_borne_and_the_mechanism_held() {
+fn every_fault_is_found_or_tolerated_and_the_mechanism_held() {
     let outcome = campaign(4, |_| true);
     assert!(outcome.matrix.len() > 50);
     let failures: Vec<_> = outcome.matrix.iter().flat_map(|line| &line.failures).collect();
@@ -68,17 +68,17 @@ fn a_run_with_a_fault_of_its_scenario_ends_in_it_and_says_so() {
 }
 
 #[test]
-fn a_displacement_sensor_that_is_far_off_from_before_boot_is_told() {
-    let told = |preset: &str, gain: f64| {
+fn a_displacement_sensor_that_is_far_off_from_before_boot_is_reported() {
+    let reported = |preset: &str, gain: f64| {
         let mut scenario = Scenario::named(preset).expect("a preset");
         scenario.run.faults = vec![Injection::at(Target::TreadSensor, Kind::Gain, 0.0, gain)];
         let summary = run(&scenario, Options::default()).expect("a run").summary;
         summary.limits.iter().any(|limit| limit.code == 212)
     };
     for preset in ["prototype", "fe"] {
-        assert!(told(preset, 1.4), "{preset}: too much");
-        assert!(told(preset, 0.75), "{preset}: too little");
-        assert!(!told(preset, 1.03) && !told(preset, 0.97), "{preset}");
+        assert!(reported(preset, 1.4), "{preset}: too much");
+        assert!(reported(preset, 0.75), "{preset}: too little");
+        assert!(!reported(preset, 1.03) && !reported(preset, 0.97), "{preset}");
     }
 }
 

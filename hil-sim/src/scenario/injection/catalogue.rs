@@ -1,6 +1,7 @@
-//! Everything that can be broken, with its usual measure.
+//! Everything that can be broken, with its usual measure: in software on every target, and
+//! of the board itself, in registers and on lines, on the emulated board alone.
 
-use super::{Kind, Target};
+use super::kinds::{Kind, Target};
 
 /// A fault that a scenario can name.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,7 +20,7 @@ pub struct Entry {
     pub text: &'static str,
 }
 
-pub(super) const fn one(
+const fn one(
     target: Target,
     kind: Kind,
     magnitude: f64,
@@ -31,7 +32,7 @@ pub(super) const fn one(
 }
 
 /// One that has no measure.
-pub(super) const fn plain(target: Target, kind: Kind, text: &'static str) -> Entry {
+const fn plain(target: Target, kind: Kind, text: &'static str) -> Entry {
     one(target, kind, 0.0, (0.0, 0.0), "", text)
 }
 
@@ -73,15 +74,15 @@ const fn runaway(target: Target) -> Entry {
     one(target, Kind::Runaway, 1.0, (-1.0, 1.0), "duty", text)
 }
 
-/// All of them, in the order of the matrix.
+/// Those of software, in the order of the matrix.
 pub const CATALOGUE: &[Entry] = {
     use Kind::{
-        Broken, Doubled, Flooding, Garbage, Gone, Hung, Off, Offset, Overrun, Random, Reversed,
-        Slip, Stalled, Stuck, Torn,
+        Broken, Doubled, Flooding, Garbage, Gone, Hung, Off, Offset, Overrun, Random, Recorded,
+        Reversed, Slip, Stalled, Stuck, Torn,
     };
     use Target::{
         Angle, Commands, Drive, DriveReadback, Encoder, Load, LoadCell, Log, Model, Pretightener,
-        PretightenerReadback, Readback, Spring, Tick, Tread, TreadSensor, Wheel,
+        PretightenerReadback, Readback, Reset, Spring, Tick, Tread, TreadSensor, Wheel,
     };
     &[
         plain(Encoder, Off, SILENT),
@@ -172,14 +173,91 @@ pub const CATALOGUE: &[Entry] = {
         plain(Log, Gone, "nobody reads the log"),
         plain(Commands, Flooding, "a command in every tick that no moving mode takes"),
         one(Commands, Random, 50.0, (0.0, 1000.0), "1/s", "so many random commands a second"),
+        plain(Reset, Recorded, "the controller starts again with its record"),
+        one(Reset, Offset, 1.5, (-6.5, 6.5), "mm", "by the supply, its record off by so much"),
+        plain(Reset, Gone, "the controller starts again without its record"),
+    ]
+};
+
+const GIVES: &str = "gives this code whatever the voltage";
+const TURNED: &str = "a bit of its bytes in flash is turned over";
+const CUT: &str = "power goes in the middle of an operation of the flash";
+const PULLED: &str = "the reset pin is pulled in the middle of an operation of the flash";
+const CAUGHT: &str = "is caught in a loop in one of its turns";
+
+const fn stuck(target: Target) -> Entry {
+    one(target, Kind::Stuck, 30_000.0, (0.0, 65_535.0), "of 65535", GIVES)
+}
+
+const fn hung(target: Target) -> Entry {
+    plain(target, Kind::Hung, CAUGHT)
+}
+
+/// By its number from the beginning; of the image's, from behind its last bit on again.
+const fn turned(target: Target) -> Entry {
+    one(target, Kind::BitErrors, 1000.0, (0.0, 32_767.0), "from its first", TURNED)
+}
+
+const fn broken_off(kind: Kind, text: &'static str) -> Entry {
+    one(Target::ParameterSave, kind, 100.0, (1.0, 10_000.0), "from its first", text)
+}
+
+/// Those of the board itself, in the order of the matrix.
+pub const HARDWARE: &[Entry] = {
+    use Kind::{BitErrors, Flooding, Gone, Hung, Off, Reset, Stalled, Stuck, Torn, Weak};
+    use Target::{
+        AngleBus, AngleTask, Debugger, DisplacementTask, Dma, EncoderLineA, EncoderLineB, HostLine,
+        Image, ImageSet, Interrupt, JournalTask, LineTask, LoadCellConverter, ModelTask,
+        PressureTask, Processor, ResetPin, SpareSet, SpeedTask, StoredSet, Supply, TickTask, Timer,
+        TreadConverter,
+    };
+    &[
+        stuck(LoadCellConverter),
+        stuck(TreadConverter),
+        one(AngleBus, BitErrors, 1.0, (1.0, 65_535.0), "mask", "these bits come turned over"),
+        plain(AngleBus, Off, "the line is broken"),
+        plain(EncoderLineA, Off, "the line is broken"),
+        plain(EncoderLineB, Off, "the line is broken"),
+        plain(Dma, Stalled, "moves nothing"),
+        plain(Timer, Stuck, "its flags cannot be cleared"),
+        plain(Interrupt, Flooding, "asks without end"),
+        plain(Processor, Hung, "what it executes is caught in a loop"),
+        hung(SpeedTask),
+        hung(PressureTask),
+        hung(DisplacementTask),
+        hung(AngleTask),
+        hung(TickTask),
+        hung(ModelTask),
+        hung(JournalTask),
+        hung(LineTask),
+        plain(Supply, Off, "falls too low for a moment: brown-out"),
+        plain(Supply, Gone, "is gone for a moment, without a warning"),
+        plain(Supply, Weak, "dips below its threshold for half a millisecond"),
+        plain(ResetPin, Reset, "is pulled for a moment"),
+        plain(Debugger, Reset, "asks for a reset"),
+        plain(HostLine, Flooding, "random bytes in every millisecond"),
+        turned(StoredSet),
+        turned(SpareSet),
+        turned(ImageSet),
+        one(Image, BitErrors, 100_000.0, (0.0, 1_048_575.0), "from its first", TURNED),
+        broken_off(Torn, CUT),
+        broken_off(Reset, PULLED),
     ]
 };
 
 /// The fault of this kind at this target, if there is one.
 #[must_use]
 pub fn entry(target: Target, kind: Kind) -> Option<&'static Entry> {
-    let mut all = CATALOGUE.iter().chain(super::HARDWARE);
+    let mut all = CATALOGUE.iter().chain(HARDWARE);
     all.find(|entry| entry.target == target && entry.kind == kind)
+}
+
+impl Target {
+    /// Whether it is of the board's hardware, which a run in software has not.
+    #[must_use]
+    pub fn is_hardware(self) -> bool {
+        HARDWARE.iter().any(|entry| entry.target == self)
+    }
 }
 
 #[cfg(test)]
@@ -188,12 +266,14 @@ mod tests {
 
     #[test]
     fn each_is_there_once_and_within_its_range() {
-        for entry in CATALOGUE {
-            let alike = |e: &&Entry| (e.target, e.kind) == (entry.target, entry.kind);
-            assert_eq!(CATALOGUE.iter().filter(alike).count(), 1, "{entry:?}");
+        let all: Vec<&Entry> = CATALOGUE.iter().chain(HARDWARE).collect();
+        for entry in &all {
+            let alike = |e: &&&Entry| (e.target, e.kind) == (entry.target, entry.kind);
+            assert_eq!(all.iter().filter(alike).count(), 1, "{entry:?}");
             let (low, high) = entry.range;
             assert!(low <= entry.magnitude && entry.magnitude <= high, "{entry:?}");
             assert_eq!(low == high, entry.unit.is_empty(), "{entry:?}");
         }
+        assert!(CATALOGUE.iter().all(|entry| !entry.target.is_hardware()));
     }
 }

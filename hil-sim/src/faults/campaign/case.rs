@@ -1,0 +1,178 @@
+//! The faults of the matrix, and what each is at an instant of a run.
+
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::twin::Twin;
+use crate::faults::sets;
+use crate::params::set_of;
+use crate::scenario::injection::{CATALOGUE, Entry, HARDWARE, Injection, Kind, Target};
+use crate::scenario::{Scenario, StepAnomaly};
+
+/// How long an interrupt asks without end, s: longer than the watchdog waits, and not for
+/// ever, or the board would not come up again to report.
+const STORM_S: f64 = 0.25;
+/// How long commands come at random, s.
+const COMMANDS_S: f64 = 1.0;
+
+/// A fault of the matrix.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Case {
+    /// One that comes under way.
+    Injected(&'static Entry),
+    /// A step that is not where or as the table says.
+    Step(StepFault),
+}
+
+/// How a step may differ from the table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StepFault {
+    /// 2 mm nearer to the stow end.
+    Early,
+    /// 2 mm farther out.
+    Late,
+    /// Not there.
+    Missing,
+    /// Followed by one that the table lacks, as close as the wheel can tell them apart.
+    Doubled,
+    /// A quarter higher.
+    Higher,
+}
+
+/// All of them.
+const STEP_FAULTS: [StepFault; 5] =
+    [StepFault::Early, StepFault::Late, StepFault::Missing, StepFault::Doubled, StepFault::Higher];
+
+impl Case {
+    /// Every fault of the matrix.
+    #[must_use]
+    pub fn all() -> Vec<Self> {
+        let injected = CATALOGUE.iter().map(Self::Injected);
+        injected.chain(STEP_FAULTS.into_iter().map(Self::Step)).collect()
+    }
+
+    /// Every fault of the matrix on the emulated board: those of software and of hardware. A
+    /// model that does not answer is a task that hangs there, and a reset has its own causes.
+    #[must_use]
+    pub fn all_on_board() -> Vec<Self> {
+        let software =
+            CATALOGUE.iter().filter(|e| !matches!(e.target, Target::Model | Target::Reset));
+        let injected = software.chain(HARDWARE).map(Self::Injected);
+        injected.chain(STEP_FAULTS.into_iter().map(Self::Step)).collect()
+    }
+
+    /// Its name in the matrix.
+    #[must_use]
+    pub fn name(&self) -> String {
+        match self {
+            Self::Injected(entry) => format!("{} {}", entry.target.name(), entry.kind.name()),
+            Self::Step(fault) => format!("step {fault:?}").to_lowercase(),
+        }
+    }
+
+    /// Whether the name of the fault contains one of these, or there are none.
+    #[must_use]
+    pub fn is_one_of(&self, wanted: &[String]) -> bool {
+        wanted.is_empty() || wanted.iter().any(|text| self.name().contains(text))
+    }
+
+    /// What happens, in words.
+    #[must_use]
+    pub fn text(&self) -> String {
+        match self {
+            Self::Injected(entry) if entry.unit.is_empty() => entry.text.to_owned(),
+            Self::Injected(entry) => {
+                format!("{}: {} {}", entry.text, entry.magnitude, entry.unit)
+            }
+            Self::Step(fault) => match fault {
+                StepFault::Early => "2 mm nearer to the stow end than the table says",
+                StepFault::Late => "2 mm farther out than the table says",
+                StepFault::Missing => "not there",
+                StepFault::Doubled => "another one 15 mm behind it",
+                StepFault::Higher => "1 mm higher than the table says",
+            }
+            .to_owned(),
+        }
+    }
+
+    /// The sign or direction of the measure by the number of the instant.
+    fn magnitude(entry: &Entry, instant: usize) -> f64 {
+        let other = instant % 4 >= 2;
+        match entry.kind {
+            Kind::Gain if other => 1.0 / entry.magnitude,
+            Kind::Offset | Kind::Runaway if other => -entry.magnitude,
+            // Along the word, one bit, which the parity shows, or two, which it does not.
+            Kind::BitErrors => f64::from((1 + 2 * u16::from(other)) << (instant % 14)),
+            Kind::Stuck if entry.target.is_hardware() && !entry.unit.is_empty() => {
+                [entry.magnitude, 0.0, 12_000.0, 65_535.0][instant % 4]
+            }
+            _ => entry.magnitude,
+        }
+    }
+
+    /// The measure of a fault of stored parameters: a random bit, every fourth time of the
+    /// seal and length, or a random operation of the flash.
+    fn measure(
+        entry: &Entry,
+        base: &Scenario,
+        instant: usize,
+        random: &mut ChaCha8Rng,
+    ) -> Option<f64> {
+        let stored = entry.target != Target::ImageSet;
+        let set = set_of(if stored { sets::KEPT } else { "prototype" }, &base.rig).ok()?;
+        let number = match entry.kind {
+            Kind::BitErrors if stored && instant % 4 == 1 => {
+                random.random_range(0..sets::seal_bits())
+            }
+            Kind::BitErrors => random.random_range(0..sets::bits(set.len(), stored)),
+            _ => random.random_range(1..=sets::operations(set.len())),
+        };
+        Some(f64::from(number))
+    }
+
+    /// The scenario of an instant.
+    pub(super) fn scenario(&self, base: &Scenario, twin: &Twin, instant: usize) -> Scenario {
+        let mut scenario = base.clone();
+        let mut random = ChaCha8Rng::seed_from_u64(base.run.seed ^ 0x00fa_017e);
+        match self {
+            Self::Injected(entry) => {
+                let mut at_s = twin.instant(instant, &mut random);
+                let mut magnitude = Self::magnitude(entry, instant);
+                if entry.target.is_of_sets() {
+                    magnitude = Self::measure(entry, base, instant, &mut random).unwrap_or(1.0);
+                    // One of three before the board starts.
+                    at_s = if instant.is_multiple_of(3) { 0.0 } else { at_s };
+                }
+                if entry.target == Target::Image {
+                    magnitude = random.random_range(entry.range.0..=entry.range.1).floor();
+                }
+                let mut fault = Injection::at(entry.target, entry.kind, at_s, magnitude);
+                // Random commands and interrupts end some time.
+                fault.duration_s = match entry.target {
+                    Target::Commands => Some(COMMANDS_S),
+                    Target::Interrupt => Some(STORM_S),
+                    _ => None,
+                };
+                scenario.run.faults = vec![fault];
+            }
+            Self::Step(fault) => {
+                let steps = &base.rig.rig.step_positions_mm;
+                let step = random.random_range(0..steps.len().max(1));
+                let number = step as u8 + 1;
+                let anomaly = match fault {
+                    StepFault::Early => StepAnomaly::Early { step: number, offset_mm: 2.0 },
+                    StepFault::Late => StepAnomaly::Late { step: number, offset_mm: 2.0 },
+                    StepFault::Missing => StepAnomaly::Missing { step: number },
+                    StepFault::Higher => StepAnomaly::Higher { step: number, offset_mm: 1.0 },
+                    StepFault::Doubled => {
+                        // In the widest room behind or before a step.
+                        let position_mm = steps.last().map_or(40.0, |last| last + 15.0);
+                        StepAnomaly::Extra { position_mm }
+                    }
+                };
+                scenario.run.anomalies = vec![anomaly];
+            }
+        }
+        scenario
+    }
+}

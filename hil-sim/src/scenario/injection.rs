@@ -1,0 +1,98 @@
+//! One fault of a scenario: what breaks, how, from when, for how long, how badly.
+
+mod catalogue;
+mod kinds;
+
+use serde::{Deserialize, Serialize};
+
+pub use catalogue::{CATALOGUE, Entry, HARDWARE, entry};
+pub use kinds::{Kind, Target};
+
+/// Onset when a fault is there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Onset {
+    /// Time since boot, s.
+    Time(f64),
+    /// True axial position that the wheel comes to, mm.
+    Position(f64),
+    /// The touch of this crossing's corner, counted from 1 over the run.
+    Crossing(u8),
+}
+
+/// A fault of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Injection {
+    /// What breaks.
+    pub target: Target,
+    /// How.
+    pub kind: Kind,
+    /// Onset this time since boot, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at_s: Option<f64>,
+    /// Onset this true position on, mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at_mm: Option<f64>,
+    /// Onset the touch of this crossing on, counted from 1 over the run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at_crossing: Option<u8>,
+    /// For so long, s; for good if it is not said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub duration_s: Option<f64>,
+    /// How badly, in the unit of the catalogue; the catalogue's own if it is not said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub magnitude: Option<f64>,
+}
+
+impl Injection {
+    /// A fault for good from `at_s` on.
+    #[must_use]
+    pub const fn at(target: Target, kind: Kind, at_s: f64, magnitude: f64) -> Self {
+        Self {
+            target,
+            kind,
+            at_s: Some(at_s),
+            at_mm: None,
+            at_crossing: None,
+            duration_s: None,
+            magnitude: Some(magnitude),
+        }
+    }
+
+    /// Onset when; time 0 if nothing is said.
+    #[must_use]
+    pub fn from(&self) -> Onset {
+        match (self.at_s, self.at_mm, self.at_crossing) {
+            (_, Some(mm), _) => Onset::Position(mm),
+            (_, _, Some(crossing)) => Onset::Crossing(crossing),
+            (at_s, ..) => Onset::Time(at_s.unwrap_or(0.0)),
+        }
+    }
+
+    /// How badly: as said, or as the catalogue has it.
+    #[must_use]
+    pub fn magnitude(&self) -> f64 {
+        let usual = entry(self.target, self.kind).map_or(0.0, |entry| entry.magnitude);
+        self.magnitude.unwrap_or(usual)
+    }
+}
+
+impl std::fmt::Display for Injection {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} {}", self.target.name(), self.kind.name())?;
+        if let Some(entry) = entry(self.target, self.kind)
+            && !entry.unit.is_empty()
+        {
+            write!(f, " ({} {})", self.magnitude(), entry.unit)?;
+        }
+        match self.from() {
+            Onset::Time(s) => write!(f, " from {s} s")?,
+            Onset::Position(mm) => write!(f, " from {mm} mm")?,
+            Onset::Crossing(n) => write!(f, " from crossing {n}")?,
+        }
+        match self.duration_s {
+            Some(s) => write!(f, " for {s} s"),
+            None => Ok(()),
+        }
+    }
+}
