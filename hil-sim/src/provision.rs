@@ -6,7 +6,6 @@
 //! directory; nothing is installed elsewhere, and nothing but the builds started here
 //! sees them. Whoever never asks for the emulated board needs none of it.
 
-mod printer;
 mod tools;
 
 use std::env;
@@ -15,7 +14,6 @@ use std::process::{Command, Stdio};
 
 use crate::firmware;
 
-pub use printer::defmt_print;
 pub use tools::Tools;
 
 /// A part of `rig` that is a binary of its own.
@@ -99,10 +97,6 @@ pub enum ProvisionError {
     /// cargo built something, but not that binary.
     #[error("cargo reported no executable for {0}")]
     NoExecutable(&'static str),
-    /// A tool of the tests could not be built; cargo's messages have gone to standard
-    /// error.
-    #[error("building {0} failed ({1})")]
-    Tool(&'static str, std::process::ExitStatus),
 }
 
 /// Builds `rig` with this in it, setting up what it needs, and returns the binary. A

@@ -6,12 +6,12 @@
 
 use super::chip::Motor;
 use super::error::ImageError;
-use super::fault_injector::{FaultInjector, Saving, letter};
+use super::fault_injector::{BoardInjector, Saving, letter};
 use super::log::{Line, Reader, Strings};
 use super::machine::Machine;
 use super::peripherals::HZ;
 use super::rtt::Probe;
-use hil_sim::faults::Tamper;
+use hil_sim::injector::FaultInjector;
 use hil_sim::plant::draw::PlantParameters;
 use hil_sim::plant::rig::{Drives, PlantError, VirtualRig};
 use hil_sim::plant::sensors::{Codes, Sensed, Sensors};
@@ -67,10 +67,8 @@ pub struct Bench<'a> {
     restarts: usize,
     /// What has come on the binary log's channel; none if nobody listens.
     frames: Option<Vec<u8>>,
-    /// The text log as it came, if it is kept.
-    text: Option<Vec<u8>>,
     /// The faults of the scenario, if it has some.
-    injector: Option<FaultInjector>,
+    injector: Option<BoardInjector>,
 }
 
 impl<'a> Bench<'a> {
@@ -101,8 +99,8 @@ impl<'a> Bench<'a> {
             end: STEP,
             restarts: 0,
             frames: Some(Vec::new()),
-            text: None,
-            injector: Tamper::of(scenario).map(|tamper| FaultInjector::new(tamper, scenario)),
+            injector: FaultInjector::of(scenario)
+                .map(|faults| BoardInjector::new(faults, scenario)),
         };
         bench.speak(codes);
         Ok(bench)
@@ -135,7 +133,7 @@ impl<'a> Bench<'a> {
 
     /// A host that saves parameters, if a fault has it so, has its turn at the line.
     fn save(&mut self) -> Result<(), BenchError> {
-        let Some(says) = self.injector.as_ref().and_then(FaultInjector::says) else {
+        let Some(says) = self.injector.as_ref().and_then(BoardInjector::says) else {
             return Ok(());
         };
         let went = self.line_send(&says)?;
@@ -149,7 +147,7 @@ impl<'a> Bench<'a> {
     /// How far a save of parameters has come that a fault is to break off.
     #[must_use]
     pub(crate) fn saving(&self) -> Option<Saving> {
-        self.injector.as_ref().and_then(FaultInjector::saving)
+        self.injector.as_ref().and_then(BoardInjector::saving)
     }
 
     /// Cycle at which the millisecond under way is over.
@@ -222,16 +220,13 @@ impl<'a> Bench<'a> {
             codes = injector.tell(&mut self.machine, codes, self.millisecond as u32);
         }
         self.speak(codes);
-        if self.injector.as_ref().is_some_and(FaultInjector::log_gone) {
+        if self.injector.as_ref().is_some_and(BoardInjector::log_gone) {
             return Ok((passed, Vec::new()));
         }
         if let Some(frames) = &mut self.frames {
             frames.extend(self.probe.up(&mut self.machine, 1)?);
         }
         let bytes = self.probe.up(&mut self.machine, 0)?;
-        if let Some(text) = &mut self.text {
-            text.extend(&bytes);
-        }
         Ok((passed, self.reader.read(&bytes)))
     }
 
@@ -288,16 +283,6 @@ impl<'a> Bench<'a> {
         self.frames = listen.then(|| self.take_frames());
     }
 
-    /// Keeps the text log as it comes from now on, for another reader.
-    pub fn keep_text(&mut self) {
-        self.text.get_or_insert_default();
-    }
-
-    /// The bytes of the text log since the last call, if they are kept.
-    pub fn take_text(&mut self) -> Vec<u8> {
-        self.text.as_mut().map(std::mem::take).unwrap_or_default()
-    }
-
     /// The board.
     #[must_use]
     pub const fn machine(&self) -> &Machine {
@@ -318,19 +303,19 @@ impl<'a> Bench<'a> {
     /// When the first of the scenario's faults came, s since power-up.
     #[must_use]
     pub fn struck_s(&self) -> Option<f64> {
-        self.injector.as_ref().and_then(FaultInjector::struck_s)
+        self.injector.as_ref().and_then(BoardInjector::struck_s)
     }
 
     /// When it first did something, s since power-up.
     #[must_use]
     pub fn acts_s(&self) -> Option<f64> {
-        self.injector.as_ref().and_then(FaultInjector::acts_s)
+        self.injector.as_ref().and_then(BoardInjector::acts_s)
     }
 
     /// When the readback had to tell it, s since power-up.
     #[must_use]
     pub fn tells_s(&self) -> Option<f64> {
-        self.injector.as_ref().and_then(FaultInjector::tells_s)
+        self.injector.as_ref().and_then(BoardInjector::tells_s)
     }
 
     /// The plant.

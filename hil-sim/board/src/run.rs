@@ -14,11 +14,12 @@ use interstage::params::{CompileError, slots};
 use interstage::rig::Rig;
 
 use crate::params::PLACES;
-use hil_sim::faults::{Injection, Target, sets};
+use hil_sim::faults::sets;
 use hil_sim::firmware::{FirmwareError, Footprint};
 use hil_sim::log;
 use hil_sim::params::set_of;
 use hil_sim::record::Recording;
+use hil_sim::scenario::injection::{Injection, Target};
 use hil_sim::scenario::{ControllerKind, Direction, Scenario};
 
 use trace::Trace;

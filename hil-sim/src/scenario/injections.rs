@@ -107,8 +107,8 @@ pub(super) fn check(scenario: &Scenario, from: &Provenance) -> Result<(), Scenar
 
 #[cfg(test)]
 mod tests {
-    use crate::scenario::injection::{Injection, Kind, Target};
     use super::*;
+    use crate::scenario::injection::{Injection, Kind, Target};
 
     fn parse(text: &str) -> Result<Scenario, String> {
         Scenario::parse("bench.toml", text, &[]).map_err(|error| error.to_string())

@@ -10,7 +10,8 @@ mod hooks;
 use std::collections::HashSet;
 
 use unicorn_engine::{
-    Arch, ArmCpuModel, MemType, Mode, Prot, RegisterARM, TlbEntry, TlbType, UcHookId, Unicorn, uc_error,
+    Arch, ArmCpuModel, MemType, Mode, Prot, RegisterARM, TlbEntry, TlbType, UcHookId, Unicorn,
+    uc_error,
 };
 
 use self::count::Count;
