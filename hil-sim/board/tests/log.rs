@@ -115,7 +115,7 @@ struct Ticks {
 impl Ticks {
     fn gather(&mut self, board: &mut Board) {
         let machine = board.bench.machine_mut();
-        let tick = machine.tasks().iter().position(|name| *name == "motors").expect("the tick");
+        let tick = machine.tasks().position(|name| name == "motors").expect("the tick");
         for turn in machine.profile_mut().take_polls().iter().filter(|turn| turn.task == tick) {
             self.cycles.push(turn.cycles);
             self.starts.push(turn.began);
