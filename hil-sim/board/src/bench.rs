@@ -5,13 +5,13 @@
 //! cycle by cycle and takes the voltages, edges and frames as they stand.
 
 use super::chip::Motor;
-use super::image::ImageError;
+use super::error::ImageError;
+use super::fault_injector::{BoardInjector, Saving, letter};
 use super::log::{Line, Reader, Strings};
 use super::machine::Machine;
 use super::peripherals::HZ;
 use super::rtt::Probe;
-use super::tampered::{Saving, Tampered, letter};
-use hil_sim::faults::Tamper;
+use hil_sim::injector::FaultInjector;
 use hil_sim::plant::rig::{Drives, PlantError, VirtualRig};
 use hil_sim::plant::sensors::{Codes, Sensed, Sensors};
 use hil_sim::scenario::{Direction, Scenario};
@@ -66,10 +66,8 @@ pub struct Bench<'a> {
     restarts: usize,
     /// What has come on the binary log's channel; none if nobody listens.
     frames: Option<Vec<u8>>,
-    /// The text log as it came, if it is kept.
-    text: Option<Vec<u8>>,
     /// The faults of the scenario, if it has some.
-    tampered: Option<Tampered>,
+    injector: Option<BoardInjector>,
 }
 
 impl<'a> Bench<'a> {
@@ -100,8 +98,8 @@ impl<'a> Bench<'a> {
             end: STEP,
             restarts: 0,
             frames: Some(Vec::new()),
-            text: None,
-            tampered: Tamper::of(scenario).map(|tamper| Tampered::new(tamper, scenario)),
+            injector: FaultInjector::of(scenario)
+                .map(|faults| BoardInjector::new(faults, scenario)),
         };
         bench.speak(codes);
         Ok(bench)
@@ -114,13 +112,13 @@ impl<'a> Bench<'a> {
     pub fn step(&mut self) -> Result<(Passed, Vec<Line>), BenchError> {
         let end = self.end();
         self.save()?;
-        if let Some(tampered) = &mut self.tampered {
+        if let Some(injector) = &mut self.injector {
             // What is broken from the first is so before the first instruction.
             if self.millisecond == 0 {
-                tampered.begin(&mut self.machine, &mut self.plant, 0.0)?;
+                injector.begin(&mut self.machine, &mut self.plant, 0.0)?;
             }
-            let (command, noise) = (tampered.command(), tampered.noise());
-            tampered.hunt(&mut self.machine, end)?;
+            let (command, noise) = (injector.command(), injector.noise());
+            injector.hunt(&mut self.machine, end)?;
             if let Some(command) = command {
                 self.send(letter(command))?;
             }
@@ -134,11 +132,13 @@ impl<'a> Bench<'a> {
 
     /// A host that saves parameters, if a fault has it so, has its turn at the line.
     fn save(&mut self) -> Result<(), BenchError> {
-        let Some(says) = self.tampered.as_ref().and_then(Tampered::says) else { return Ok(()) };
+        let Some(says) = self.injector.as_ref().and_then(BoardInjector::says) else {
+            return Ok(());
+        };
         let went = self.line_send(&says)?;
         let came = self.line_take()?;
-        if let Some(tampered) = &mut self.tampered {
-            tampered.hears(&mut self.machine, &came, went);
+        if let Some(injector) = &mut self.injector {
+            injector.hears(&mut self.machine, &came, went);
         }
         Ok(())
     }
@@ -146,7 +146,7 @@ impl<'a> Bench<'a> {
     /// How far a save of parameters has come that a fault is to break off.
     #[must_use]
     pub(crate) fn saving(&self) -> Option<Saving> {
-        self.tampered.as_ref().and_then(Tampered::saving)
+        self.injector.as_ref().and_then(BoardInjector::saving)
     }
 
     /// Cycle at which the millisecond under way is over.
@@ -210,25 +210,22 @@ impl<'a> Bench<'a> {
             ..Drives::default()
         };
         let passed = Passed { codes: self.codes, drives };
-        let taken = self.tampered.as_mut().map_or(drives, |tampered| tampered.drives(drives));
+        let taken = self.injector.as_mut().map_or(drives, |injector| injector.drives(drives));
         self.plant.step(&taken, STEP_S)?;
         let mut codes = self.sensors.read(sensed(&self.plant), STEP_S);
-        if let Some(tampered) = &mut self.tampered {
+        if let Some(injector) = &mut self.injector {
             let t_s = self.millisecond as f64 * STEP_S;
-            tampered.begin(&mut self.machine, &mut self.plant, t_s)?;
-            codes = tampered.tell(&mut self.machine, codes, self.millisecond as u32);
+            injector.begin(&mut self.machine, &mut self.plant, t_s)?;
+            codes = injector.tell(&mut self.machine, codes, self.millisecond as u32);
         }
         self.speak(codes);
-        if self.tampered.as_ref().is_some_and(Tampered::log_gone) {
+        if self.injector.as_ref().is_some_and(BoardInjector::log_gone) {
             return Ok((passed, Vec::new()));
         }
         if let Some(frames) = &mut self.frames {
             frames.extend(self.probe.up(&mut self.machine, 1)?);
         }
         let bytes = self.probe.up(&mut self.machine, 0)?;
-        if let Some(text) = &mut self.text {
-            text.extend(&bytes);
-        }
         Ok((passed, self.reader.read(&bytes)))
     }
 
@@ -285,16 +282,6 @@ impl<'a> Bench<'a> {
         self.frames = listen.then(|| self.take_frames());
     }
 
-    /// Keeps the text log as it comes from now on, for another reader.
-    pub fn keep_text(&mut self) {
-        self.text.get_or_insert_default();
-    }
-
-    /// The bytes of the text log since the last call, if they are kept.
-    pub fn take_text(&mut self) -> Vec<u8> {
-        self.text.as_mut().map(std::mem::take).unwrap_or_default()
-    }
-
     /// The board.
     #[must_use]
     pub const fn machine(&self) -> &Machine {
@@ -315,19 +302,19 @@ impl<'a> Bench<'a> {
     /// When the first of the scenario's faults came, s since power-up.
     #[must_use]
     pub fn struck_s(&self) -> Option<f64> {
-        self.tampered.as_ref().and_then(Tampered::struck_s)
+        self.injector.as_ref().and_then(BoardInjector::struck_s)
     }
 
     /// When it first did something, s since power-up.
     #[must_use]
     pub fn acts_s(&self) -> Option<f64> {
-        self.tampered.as_ref().and_then(Tampered::acts_s)
+        self.injector.as_ref().and_then(BoardInjector::acts_s)
     }
 
     /// When the readback had to tell it, s since power-up.
     #[must_use]
     pub fn tells_s(&self) -> Option<f64> {
-        self.tampered.as_ref().and_then(Tampered::tells_s)
+        self.injector.as_ref().and_then(BoardInjector::tells_s)
     }
 
     /// The plant.

@@ -5,28 +5,33 @@
 //! the board's memory; nothing is asked of the firmware for it.
 
 mod parameters;
+mod restart;
 
 use interstage::fault::Limit;
+use interstage::params::{CompileError, slots};
 use interstage::restart::{CRASH_WORDS, DriveSnapshot, SNAPSHOT_WORDS, later};
 use interstage::supervise::{Command, Mode};
 use interstage::tick::{Entry, Event, Output};
 use interstage::units::Q16;
 
-use super::super::judge::{Finding, Judge};
-use super::operator::Operator;
-use super::twin::Twin;
-use super::{
-    AFTER_S, Campaign, CampaignError, Injection, Instant, Kept, Outcome, Target, crossed, doing,
-};
-use crate::bench::Bench;
+use crate::bench::{Bench, BenchError, Passed};
 use crate::chip::Pin;
+use crate::fault_injector::{Saving, letter};
 use crate::log::Strings;
+use crate::params::PLACES;
 use crate::peripherals::rcc::Cause;
 use crate::run::{RunError, store};
-use crate::tampered::{Saving, letter};
+use hil_sim::faults::campaign::operator::Operator;
+use hil_sim::faults::campaign::twin::Twin;
+use hil_sim::faults::campaign::{AFTER_S, Campaign, Instant, LONGEST_S, Outcome, crossed, doing};
+use hil_sim::faults::judge::{Finding, Judge};
+use hil_sim::faults::sets;
 use hil_sim::log::Run;
+use hil_sim::params::set_of;
 use hil_sim::scenario::Scenario;
+use hil_sim::scenario::injection::{Injection, Target};
 use parameters::Parameters;
+use restart::Hold;
 
 /// Symbol of the record in the board's memory.
 const RECORD: &str = "INTERSTAGE_RETAINED";
@@ -38,8 +43,6 @@ const IMAGE_DAMAGED: &str = "image damaged";
 const IMAGE_LIGHT: &str = "image damaged, by the light alone";
 /// How long it may take to say what the light tells, s.
 const SAYS_S: f64 = 1.0;
-/// Longest run, s since power-up.
-const LONGEST_S: f64 = 60.0;
 /// Ticks that a record may be ahead of the clock since a restart.
 const AHEAD: u64 = 2;
 
@@ -52,21 +55,19 @@ pub struct Firmware<'a> {
     pub strings: &'a Strings,
 }
 
-impl Campaign {
-    /// Makes all runs on the emulated board, as [`Campaign::run_keeping`] does in software.
-    ///
-    /// # Errors
-    /// [`CampaignError`] if what is done cannot be kept, or a run without a fault cannot be made.
-    pub fn run_on_board(
-        &self,
-        firmware: Firmware<'_>,
-        kept: &mut Kept,
-        done: &(dyn Fn() + Sync),
-    ) -> Result<Outcome, CampaignError<RunError>> {
-        let twin = |scenario: &Scenario| twin(firmware, scenario);
-        let watched = |scenario: &Scenario, twin: &Twin| watched(firmware, scenario, twin);
-        self.run_on("board", twin, watched, kept, done)
-    }
+/// Makes all runs of a campaign on the emulated board, as [`Campaign::run`] does in
+/// software.
+///
+/// # Errors
+/// [`RunError`] if a run without a fault cannot be made.
+pub fn run(
+    campaign: &Campaign,
+    firmware: Firmware<'_>,
+    done: &(dyn Fn() + Sync),
+) -> Result<Outcome, RunError> {
+    let twin = |scenario: &Scenario| twin(firmware, scenario);
+    let watched = |scenario: &Scenario, twin: &Twin| watched(firmware, scenario, twin);
+    campaign.run_on("board", twin, watched, done)
 }
 
 /// A board under way.
@@ -97,10 +98,10 @@ struct Board<'a> {
 impl<'a> Board<'a> {
     fn new(firmware: Firmware<'a>, scenario: &Scenario) -> Result<Self, RunError> {
         let bench = Bench::new(firmware.elf, firmware.strings, scenario);
-        let mut bench = bench.map_err(crate::bench::BenchError::from)?;
+        let mut bench = bench.map_err(BenchError::from)?;
         store(bench.machine_mut(), scenario)?;
         let record = bench.machine().image().symbol(RECORD);
-        let record = record.map_err(crate::bench::BenchError::from)?;
+        let record = record.map_err(BenchError::from)?;
         Ok(Self {
             bench,
             record: record + 4 * CRASH_WORDS as u32,
@@ -121,6 +122,11 @@ impl<'a> Board<'a> {
     /// A millisecond with a command or none. Gives what the controller put out as far as it
     /// matters to the judge.
     fn step(&mut self, command: Option<Command>) -> Result<Output, RunError> {
+        Ok(self.step_with(command)?.0)
+    }
+
+    /// The same, with what passed at the pins.
+    fn step_with(&mut self, command: Option<Command>) -> Result<(Output, Passed), RunError> {
         self.owed = command.or(self.owed);
         if let Some(owed) = self.owed
             && self.bench.send(letter(owed))?
@@ -173,7 +179,7 @@ impl<'a> Board<'a> {
         }
         output.telemetry.mode = self.mode;
         output.telemetry.speed_ref = self.speed;
-        Ok(output)
+        Ok((output, passed))
     }
 
     /// The record of the latest tick since the board started.
@@ -183,7 +189,7 @@ impl<'a> Board<'a> {
             for (at, word) in (0..).zip(&mut words) {
                 let address = self.record + 4 * (place * SNAPSHOT_WORDS as u32 + at);
                 let read = self.bench.machine().word(address);
-                *word = read.map_err(crate::bench::BenchError::from)?;
+                *word = read.map_err(BenchError::from)?;
             }
             Ok(DriveSnapshot::open(&words))
         };
@@ -232,6 +238,8 @@ fn watched(firmware: Firmware<'_>, scenario: &Scenario, twin: &Twin) -> Result<I
     let mut board = Board::new(firmware, scenario)?;
     let mut judge = Judge::new(scenario, board.bench.plant().truth());
     let mut operator = Operator::default();
+    let reset = scenario.run.faults.first().is_some_and(Injection::resets_board);
+    let mut hold = reset.then(|| keep(&mut board, scenario)).transpose()?;
     let early = scenario.run.faults.is_empty();
     let of_image = scenario.run.faults.iter().any(|fault| fault.target == Target::Image);
     let (mut during, mut sign_s, mut tick, mut after_s) = (None, None, 0, 0.0);
@@ -242,7 +250,10 @@ fn watched(firmware: Firmware<'_>, scenario: &Scenario, twin: &Twin) -> Result<I
         // Who saves parameters does not press buttons meanwhile.
         let free = board.bench.saving() != Some(Saving::Writing);
         let command = if free { operator.command(before) } else { None };
-        let output = board.step(command)?;
+        let (output, passed) = board.step_with(command)?;
+        if let Some(hold) = &mut hold {
+            hold.look(&board, &passed, command);
+        }
         let struck = early || board.bench.struck_s().is_some();
         if struck && !early && during.is_none() {
             during = Some(doing(before));
@@ -292,6 +303,12 @@ fn watched(firmware: Firmware<'_>, scenario: &Scenario, twin: &Twin) -> Result<I
         None => board.image_s.or(board.light_s).or(back_s).filter(|_| restart.is_some()),
     };
     let since = |from_s: Option<f64>| Some(1e3 * (told_s? - from_s?).max(0.0));
+    let (around, unrecorded) = match hold {
+        Some(hold) => hold.judged(&mut board, scenario)?,
+        None => (Vec::new(), None),
+    };
+    let finding = if unrecorded.is_some() { Finding::Undetected } else { finding };
+    let harms = judge.harms().into_iter().chain(around).chain(unrecorded).collect();
     let injection = scenario.run.faults.first();
     let moving = injection.is_some_and(|fault| fault.target.moves());
     Ok(Instant {
@@ -310,6 +327,14 @@ fn watched(firmware: Firmware<'_>, scenario: &Scenario, twin: &Twin) -> Result<I
         peak_preload_n: judge.peak_preload_n,
         motion_mm: judge.motion_mm,
         gap_part,
-        harms: judge.harms(),
+        harms,
     })
+}
+
+/// Stores the rig's parameters in the board's flash, to be found there after a reset.
+fn keep(board: &mut Board<'_>, scenario: &Scenario) -> Result<Hold, RunError> {
+    let set = set_of(sets::KEPT, &scenario.rig)?;
+    let place = slots::place(&set, 7).ok_or(CompileError::Room)?;
+    board.bench.machine_mut().poke(PLACES, &place).map_err(BenchError::from)?;
+    Ok(Hold::new(place.to_vec()))
 }

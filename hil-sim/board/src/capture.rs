@@ -1,14 +1,18 @@
 //! The firmware on the emulated board as a source of its binary log.
 
-use hil_sim::capture::{Source, SourceError, letter, starter};
 use crate::bench::Bench;
 use crate::log::{Line, Strings};
+use hil_sim::capture::{Source, SourceError, letter, starter};
 use hil_sim::scenario::Scenario;
 
 /// Milliseconds that the board runs at each reading.
 const STEPS: u32 = 20;
 /// Longest run without an operator, s.
 const LONGEST_S: f64 = 120.0;
+
+fn broken(error: impl std::error::Error + Send + Sync + 'static) -> SourceError {
+    SourceError::Other(Box::new(error))
+}
 
 /// The firmware on the emulated board, the plant at its pins.
 pub struct Emulated<'a> {
@@ -25,15 +29,14 @@ impl<'a> Emulated<'a> {
     /// as soon as it is idle and ends when the drive has arrived.
     ///
     /// # Errors
-    /// [`SourceError::Board`] if the image is none.
+    /// [`SourceError::Other`] if the image is none.
     pub fn new(
         elf: &[u8],
         strings: &'a Strings,
         scenario: &Scenario,
         attended: bool,
     ) -> Result<Self, SourceError> {
-        let bench = Bench::new(elf, strings, scenario)
-            .map_err(crate::bench::BenchError::from)?;
+        let bench = Bench::new(elf, strings, scenario).map_err(broken)?;
         let start = letter(starter(scenario.run.direction));
         Ok(Self {
             bench,
@@ -62,11 +65,11 @@ impl<'a> Emulated<'a> {
         self.left = self.left.map(|left| left - 1);
         if self.idle
             && let Some(letter) = self.start
-            && self.bench.send(letter)?
+            && self.bench.send(letter).map_err(broken)?
         {
             self.start = None;
         }
-        let (_, lines) = self.bench.step()?;
+        let (_, lines) = self.bench.step().map_err(broken)?;
         for line in &lines {
             self.idle |= line.text.contains("mode: idle");
             let over = ["mode: deployed", "mode: retracted", "mode: fault hold"];
@@ -95,7 +98,7 @@ impl Source for Emulated<'_> {
     }
 
     fn send(&mut self, letter: u8) -> Result<(), SourceError> {
-        self.bench.send(letter)?;
+        self.bench.send(letter).map_err(broken)?;
         Ok(())
     }
 }

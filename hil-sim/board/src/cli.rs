@@ -1,6 +1,7 @@
 //! The verbs of `rig` that run on the emulated board.
 
 mod capture;
+mod cycles;
 mod deploy;
 mod faults;
 mod live;
@@ -10,6 +11,10 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use hil_sim::cli::failure::{Failure, Outcome};
+use hil_sim::firmware::{self, Profile};
+use hil_sim::scenario::Scenario;
+
+use crate::log::Strings;
 
 /// The verbs of `rig` on the emulated board; `rig` starts this where one needs it.
 #[derive(Debug, Parser)]
@@ -26,6 +31,8 @@ enum Verb {
     Live(hil_sim::cli::live::Args),
     Faults(hil_sim::cli::faults::Args),
     Params(hil_sim::cli::params::Args),
+    #[command(hide = true)]
+    Cycles(cycles::Args),
 }
 
 impl Verb {
@@ -36,6 +43,7 @@ impl Verb {
             Self::Live(args) => live::run(args),
             Self::Faults(args) => faults::run(args),
             Self::Params(args) => params::run(args),
+            Self::Cycles(args) => cycles::run(args),
         }
     }
 }
@@ -44,4 +52,13 @@ impl Verb {
 #[must_use]
 pub fn main() -> ExitCode {
     hil_sim::cli::run(|cli: &Cli| cli.verb.run())
+}
+
+/// The firmware as it is flashed, with the strings of its log, for a scenario that it can
+/// run.
+fn image(scenario: &Scenario) -> Result<(Vec<u8>, Strings), Failure> {
+    crate::run::check(scenario).map_err(Failure::input)?;
+    let elf = firmware::image(Profile::Release)?;
+    let strings = Strings::of(&elf).map_err(Failure::run)?;
+    Ok((elf, strings))
 }

@@ -2,8 +2,6 @@
 
 pub mod unicorn;
 
-use std::collections::BTreeMap;
-
 /// A core register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Register {
@@ -128,23 +126,6 @@ pub struct Mark {
     pub r0: u32,
 }
 
-/// Cycles by the basic block that spent them, given as address and bytes.
-pub type Heat = BTreeMap<(u32, u32), u64>;
-
-/// Stretches of code in which interrupts were shut out (`PRIMASK`), from one place on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Masked {
-    /// How often.
-    pub times: u64,
-    /// Cycles, all together.
-    pub cycles: u64,
-    /// Most cycles of one.
-    pub worst: u64,
-}
-
-/// These by where they began and in which exception, 0 in thread mode.
-pub type MaskedBy = BTreeMap<(u32, u32), Masked>;
-
 /// An access to an address that holds no memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Access {
@@ -152,7 +133,7 @@ pub struct Access {
     pub address: u32,
     /// Bytes: 1, 2 or 4.
     pub size: u32,
-    /// The program counter, as near as the core tells it.
+    /// The program counter: the beginning of the block under way.
     pub pc: u32,
     /// Cycles since the start.
     pub now: u64,
@@ -297,10 +278,4 @@ pub trait Core {
 
     /// Moves the notes taken since the last call into `marks`, in their order.
     fn take_marks(&mut self, marks: &mut Vec<Mark>);
-
-    /// Takes the cycles by block since the last call, or since the start.
-    fn take_heat(&mut self) -> Heat;
-
-    /// Takes where interrupts were shut out since the last call, or since the start.
-    fn take_masked(&mut self) -> MaskedBy;
 }

@@ -7,7 +7,7 @@ use object::read::elf::{ElfFile32, ProgramHeader};
 use object::{Endianness, Object, ObjectSymbol, SymbolKind, elf};
 
 use super::core::unicorn::{Access, Memory};
-use super::image::ImageError;
+use super::error::ImageError;
 
 /// The chip's flash.
 pub const FLASH: Memory = Memory { base: 0x0800_0000, size: 512 * 1024, access: Access::Code };
@@ -35,34 +35,33 @@ pub struct Loaded {
     symbols: BTreeMap<String, u32>,
 }
 
-pub(super) fn form(error: impl ToString) -> ImageError {
-    ImageError::Form(error.to_string())
-}
-
 impl Loaded {
     /// What of the image goes to flash, and what its symbols say.
     ///
     /// # Errors
     /// [`ImageError::Form`] if it is no image of the board.
     pub fn of(elf: &[u8]) -> Result<Self, ImageError> {
-        let file = ElfFile32::<Endianness>::parse(elf).map_err(form)?;
+        let file = ElfFile32::<Endianness>::parse(elf).map_err(ImageError::form)?;
         let endian = file.endian();
         let mut flash = vec![0xFF; FLASH.size as usize];
         for segment in file.elf_program_headers() {
-            let data = segment.data(endian, elf).map_err(|()| form("a segment is cut off"))?;
+            let data =
+                segment.data(endian, elf).map_err(|()| ImageError::form("a segment is cut off"))?;
             if segment.p_type(endian) != elf::PT_LOAD || data.is_empty() {
                 continue;
             }
             let at = segment.p_paddr(endian).wrapping_sub(FLASH.base) as usize;
             let place = flash.get_mut(at..at + data.len());
-            place.ok_or_else(|| form("a segment lies outside the flash"))?.copy_from_slice(data);
+            place
+                .ok_or_else(|| ImageError::form("a segment lies outside the flash"))?
+                .copy_from_slice(data);
         }
         let mut functions: Vec<Function> = file.symbols().filter_map(|s| function(&s)).collect();
         functions.sort_by_key(|f| f.range.start);
         functions.dedup_by_key(|f| f.range.start);
         let code = code(&file);
         if code.is_empty() {
-            return Err(form("its code is not marked by mapping symbols"));
+            return Err(ImageError::form("its code is not marked by mapping symbols"));
         }
         let named = |s: &object::read::elf::ElfSymbol32<'_, '_, _>| {
             Some((s.name().ok()?.to_owned(), s.address() as u32))

@@ -36,6 +36,8 @@ pub enum Fault {
     SupplyDip,
     /// The reset pin is pulled for a moment.
     ResetPin,
+    /// A debugger asks for a reset.
+    Software,
     /// What runs is caught in a loop without end: the task, or the interrupt.
     Caught,
     /// A bit of flash or RAM is turned over, past what the memory would correct: byte and
@@ -74,6 +76,7 @@ impl Fault {
                 machine.chip_mut().supply_falls(now + HOLDS / 2, Then::Back, now);
             }
             Self::ResetPin => return machine.restart(Cause::Pin),
+            Self::Software => return machine.restart(Cause::Software),
             Self::Caught => return machine.catch(),
             Self::BitFlip(address, bit) => {
                 let mut byte = [0];
@@ -102,6 +105,7 @@ impl Fault {
             Self::BrownOut
             | Self::SupplyCut
             | Self::SupplyDip
+            | Self::Software
             | Self::ResetPin
             | Self::Caught
             | Self::BitFlip(..) => {}
@@ -158,6 +162,7 @@ impl FromStr for Fault {
             ("brown-out", None) => Some(Self::BrownOut),
             ("supply-cut", None) => Some(Self::SupplyCut),
             ("supply-dip", None) => Some(Self::SupplyDip),
+            ("software-reset", None) => Some(Self::Software),
             ("reset-pin", None) => Some(Self::ResetPin),
             ("caught", None) => Some(Self::Caught),
             ("flip", Some(place)) => place.split_once('.').and_then(|(address, bit)| {
@@ -200,6 +205,7 @@ impl fmt::Display for Fault {
             Self::SupplyCut => write!(f, "supply-cut"),
             Self::SupplyDip => write!(f, "supply-dip"),
             Self::ResetPin => write!(f, "reset-pin"),
+            Self::Software => write!(f, "software-reset"),
             Self::Caught => write!(f, "caught"),
             Self::BitFlip(address, bit) => write!(f, "flip={address:#x}.{bit}"),
         }
@@ -228,6 +234,7 @@ mod tests {
             Fault::SupplyCut,
             Fault::SupplyDip,
             Fault::ResetPin,
+            Fault::Software,
             Fault::Caught,
             Fault::BitFlip(0x0800_1234, 7),
         ] {

@@ -1,13 +1,13 @@
 //! A measurement image on the core: its functions called from the host, each call with
 //! its cycles.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use super::account::Spread;
 use super::core::unicorn::{Access, Counted, Memory, UnicornCore};
-use super::core::{Core, CoreError, Heat, Meter, Register, Stop};
+use super::core::{Core, CoreError, Meter, Register, Stop};
 use super::elf::{FLASH, Loaded, RAM, named};
-use super::heat;
+use super::error::ImageError;
+use super::spread::Spread;
 
 /// System control space: the start-up code writes it and nothing is measured in it.
 const SYSTEM: Memory = Memory { base: 0xE000_0000, size: 1024 * 1024, access: Access::Data };
@@ -21,36 +21,6 @@ pub const ARGUMENTS: u32 = MAILBOX.base;
 const PATIENCE: u64 = 1_700_000_000;
 /// The breakpoint instruction.
 const BKPT: [u8; 2] = [0x00, 0xBE];
-
-/// What can go wrong with an image.
-#[derive(Debug, thiserror::Error)]
-pub enum ImageError {
-    /// The file could not be read.
-    #[error("could not read {path}: {source}")]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// It is no image of the board.
-    #[error("not an image of the board: {0}")]
-    Form(String),
-    /// It lacks a function.
-    #[error("the image has no function {0}")]
-    Missing(String),
-    /// The core stopped.
-    #[error(transparent)]
-    Core(#[from] CoreError),
-    /// A call ended where it should not have: it panicked, or did not end at all.
-    #[error("{function} ended in {at}")]
-    Lost {
-        /// What was called.
-        function: String,
-        /// The function it ended in.
-        at: String,
-    },
-}
 
 /// What one call took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -66,7 +36,6 @@ pub struct Image {
     core: UnicornCore,
     loaded: Loaded,
     stack: u32,
-    elf: Vec<u8>,
 }
 
 impl Image {
@@ -95,7 +64,7 @@ impl Image {
         };
         let (stack, reset) = (vector(0), vector(4));
         core.set_register(Register::Sp, stack)?;
-        let mut image = Self { core, loaded, stack, elf: elf.to_vec() };
+        let mut image = Self { core, loaded, stack };
         match image.core.run(reset, PATIENCE)? {
             Stop::Breakpoint(at) if image.name(at).contains("main") => Ok(image),
             stop => Err(image.lost("start-up", stop)),
@@ -177,58 +146,26 @@ impl Image {
     }
 
     /// Calls a function once for each input, given by reference: its words stand in the
-    /// mailbox. Returns what the calls gave, and what they took; `dearest` of that is
-    /// the index of an input.
+    /// mailbox. Returns what the calls gave, and what they took; `worst_input` of that
+    /// is the index of an input.
     ///
     /// # Errors
     /// As [`Image::call`], and [`ImageError::Missing`].
-    pub fn measure<const N: usize>(
+    pub fn measure<I: AsRef<[u32]>>(
         &mut self,
         function: &str,
-        inputs: &[[u32; N]],
+        inputs: &[I],
     ) -> Result<(Vec<u32>, Spread), ImageError> {
-        self.measure_prepared(None, function, inputs)
-    }
-
-    /// The same, `prepare` being called with each input before, which does not count.
-    ///
-    /// # Errors
-    /// As [`Image::measure`].
-    pub fn measure_prepared<const N: usize>(
-        &mut self,
-        prepare: Option<&str>,
-        function: &str,
-        inputs: &[[u32; N]],
-    ) -> Result<(Vec<u32>, Spread), ImageError> {
-        let prepare = prepare.map(|name| self.function(name)).transpose()?;
         let function = self.function(function)?;
         let mut values = Vec::with_capacity(inputs.len());
         let mut spread = Spread::default();
         for (index, words) in inputs.iter().enumerate() {
-            self.put(ARGUMENTS, words)?;
-            if let Some(prepare) = prepare {
-                self.call(prepare, &[ARGUMENTS])?;
-            }
+            self.put(ARGUMENTS, words.as_ref())?;
             let call = self.call(function, &[ARGUMENTS])?;
             values.push(call.value);
             spread.note(call.meter, index);
         }
         Ok((values, spread))
-    }
-
-    /// Cycles by block since the last time this was asked.
-    pub fn take_heat(&mut self) -> Heat {
-        self.core.take_heat()
-    }
-
-    /// Cycles by function as the source has it, those inlined into others on their own,
-    /// the most expensive first. A block's cycles go to its instructions in proportion
-    /// to what they cost by themselves.
-    ///
-    /// # Errors
-    /// [`ImageError::Form`] if the image's debug information cannot be read.
-    pub fn by_function(&self, heat: &Heat) -> Result<Vec<(String, u64)>, ImageError> {
-        heat::by_function(&self.elf, &self.loaded, heat)
     }
 
     /// Name of the function at an address.

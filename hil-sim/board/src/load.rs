@@ -1,158 +1,55 @@
-//! What a run on the board cost: tick by phase, tasks, interrupts, sleep, stack, memory.
+//! What a run on the board cost: load, control tick, stack, memory.
 //!
-//! Cycles are textbook ones, see [`super::timing`]. The start of the program, which
-//! builds the controller's tables, is left out: counting begins when the drive is idle.
-
-pub mod page;
-
-use std::collections::BTreeMap;
+//! Cycles are textbook ones, see [`super::timing`]. Counting begins with the command: the
+//! start of the program, which builds the controller's tables, is left out.
 
 use serde::Serialize;
 
 use super::chip::Stray;
-use super::core::Masked;
-use super::exceptions::number::SYS_TICK;
-use super::heat::by_function;
-use super::heat::names::Names;
-use super::image::ImageError;
-use super::machine::{Machine, Poll, Share, THREAD};
+use super::machine::{Machine, Poll};
 use super::peripherals::HZ;
-use crate::bench::budget::BoardBudget;
 use hil_sim::firmware::Footprint;
-use hil_sim::record::MODE_NAMES;
 
 /// Cycles from one control tick to the next.
 const PERIOD: u64 = HZ / 1000;
 /// Name of the task that runs the control tick.
 const TICK: &str = "motors";
+/// SRAM1 and SRAM2, bytes.
+const MEMORY: u64 = 96 * 1024;
+/// Largest mean load, largest control tick as a part of its period, and largest part of the
+/// memory left by the statics that the stack may use.
+const BUDGET: [f64; 3] = [0.05, 0.20, 0.5];
 
-/// Runs of something with their cycles.
+/// Heading of the page's section.
+pub const TITLE: &str = "What it cost on the core";
+
+/// Cycles of the control tick's task, from its wake-up to where it waits again.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Cost {
-    /// How often.
+    /// How often it ran.
     pub runs: u64,
     /// Mean cycles.
     pub mean: f64,
     /// Most cycles.
     pub worst: u64,
-    /// Part of all time.
-    pub share: f64,
-    #[serde(skip)]
-    sum: u64,
-}
-
-impl Cost {
-    fn note(&mut self, cycles: u64) {
-        self.runs += 1;
-        self.sum += cycles;
-        self.worst = self.worst.max(cycles);
-    }
-
-    fn closed(mut self, whole: u64) -> Self {
-        self.mean = self.sum as f64 / self.runs.max(1) as f64;
-        self.share = self.sum as f64 / whole.max(1) as f64;
-        self
-    }
-}
-
-/// Something that runs, with what it costs.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Named {
-    /// Its name.
-    pub name: String,
-    /// Its cost.
-    #[serde(flatten)]
-    pub cost: Cost,
-}
-
-/// An interrupt.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Interrupt {
-    /// Name of its vector.
-    pub name: String,
-    /// Its cost, tasks that run in it included.
-    #[serde(flatten)]
-    pub cost: Cost,
-    /// Mean cycles from its request to its first instruction.
-    pub latency_mean: f64,
-    /// Most of them.
-    pub latency_worst: u64,
-}
-
-/// Interrupts shut out, which delays them all by so much at most.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Shut {
-    /// By this function.
-    pub function: String,
-    /// In the exception of this name, or in thread mode.
-    pub level: String,
-    /// How often.
-    pub times: u64,
-    /// Mean cycles.
-    pub mean: f64,
-    /// Most cycles.
-    pub worst: u64,
-    /// Where it begins.
-    pub pc: u32,
-}
-
-impl Shut {
-    /// What it cost, as a row among the others.
-    #[must_use]
-    pub fn cost(&self, whole: u64) -> Cost {
-        let share = self.mean * self.times as f64 / whole.max(1) as f64;
-        Cost { runs: self.times, mean: self.mean, worst: self.worst, share, sum: 0 }
-    }
-}
-
-/// A function of the source.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Spent {
-    /// Its name.
-    pub function: String,
-    /// Cycles by itself, per millisecond.
-    pub cycles_per_ms: f64,
-}
-
-/// When the control tick begins, against an even beat.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Start {
-    /// Mean cycles behind the earliest.
-    pub late_mean: f64,
-    /// Most: the jitter, from the earliest to the latest.
+    /// Cycles from the earliest to the latest of its beginnings, against an even beat.
     pub jitter: u64,
 }
 
-/// The account of a run.
+/// The load of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Load {
     /// Clock of the core, Hz.
     pub clock_hz: u64,
-    /// Cycles accounted for.
+    /// Cycles counted.
     pub cycles: u64,
     /// Part of the time in which the core did not sleep.
     pub load: f64,
-    /// Part of the time in which it slept.
-    pub idle: f64,
     /// The control tick with its task.
     pub tick: Cost,
-    /// When it begins.
-    pub start: Start,
-    /// The control tick by phase.
-    pub phases: Vec<Named>,
-    /// Every task.
-    pub tasks: Vec<Named>,
-    /// Every exception that was taken.
-    pub interrupts: Vec<Interrupt>,
-    /// Cycles by function of the source, what was inlined by itself; the most expensive
-    /// first, as many as make up nearly all.
-    pub functions: Vec<Spent>,
-    /// Where interrupts were shut out, the longest first: each place, down to those that
-    /// hardly delay anything.
-    pub masked: Vec<Shut>,
-    /// Bytes of the stack that were used, and those set apart for it.
+    /// Bytes of the stack that were used.
     pub stack_used: u32,
-    /// See [`Load::stack_used`].
+    /// Bytes set apart for the stack.
     pub stack: u64,
     /// Bytes of flash.
     pub flash: u64,
@@ -162,85 +59,40 @@ pub struct Load {
     pub unmodelled: Vec<Stray>,
 }
 
-/// What is gathered for an account while a run goes on.
+/// What is gathered while a run goes on.
 #[derive(Debug, Default)]
 pub struct Gathered {
     from: Option<(u64, u64)>,
-    tasks: BTreeMap<usize, Cost>,
-    phases: BTreeMap<u8, Cost>,
-    tick: Cost,
-    starts: Vec<u64>,
+    ticks: Vec<Poll>,
 }
 
 impl Gathered {
     /// Counting begins.
     pub fn begin(&mut self, machine: &mut Machine) {
-        let now = machine.now();
-        machine.profile_mut().clear(now);
-        machine.take_heat();
-        machine.take_masked();
-        *self = Self { from: Some((now, machine.profile().slept())), ..Self::default() };
+        machine.profile_mut().take_polls();
+        *self = Self { from: Some((machine.now(), machine.slept())), ..Self::default() };
     }
 
-    /// Takes what has gathered in the board, in a phase of this number.
-    pub fn gather(&mut self, machine: &mut Machine, phase: u8) {
+    /// Takes the runs of the tick's task since the last call.
+    pub fn gather(&mut self, machine: &mut Machine) {
+        let tick = machine.tasks().position(|name| name == TICK);
         let polls = machine.profile_mut().take_polls();
-        if self.from.is_none() {
-            return;
-        }
-        let tick = machine.tasks().iter().position(|name| *name == TICK);
-        for Poll { task, began, cycles } in polls {
-            self.tasks.entry(task).or_default().note(cycles);
-            if Some(task) == tick {
-                self.tick.note(cycles);
-                self.phases.entry(phase).or_default().note(cycles);
-                self.starts.push(began);
-            }
+        if self.from.is_some() {
+            self.ticks.extend(polls.into_iter().filter(|poll| Some(poll.task) == tick));
         }
     }
 
-    /// The account; functions are not told apart yet.
+    /// The load from the first command to now.
     #[must_use]
     pub fn close(self, machine: &Machine, footprint: &Footprint, stack_used: u32) -> Load {
         let (from, slept) = self.from.unwrap_or_default();
         let cycles = machine.now() - from;
-        let idle = (machine.profile().slept() - slept) as f64 / cycles.max(1) as f64;
-        let names = machine.tasks();
-        let named =
-            |name: &str, cost: Cost| Named { name: name.to_owned(), cost: cost.closed(cycles) };
-        let task = |(number, cost): (&usize, &Cost)| {
-            named(names.get(*number).copied().unwrap_or("unknown"), *cost)
-        };
-        let phase = |(number, cost): (&u8, &Cost)| {
-            named(MODE_NAMES.get(usize::from(*number)).copied().unwrap_or("unknown"), *cost)
-        };
-        let interrupt = |(number, share): (u8, Share)| {
-            let runs = share.entries;
-            let cost = Cost { runs, sum: share.cycles, worst: share.worst, ..Cost::default() };
-            Interrupt {
-                name: vector(number),
-                cost: cost.closed(cycles),
-                latency_mean: share.latency as f64 / runs.max(1) as f64,
-                latency_worst: share.worst_latency,
-            }
-        };
+        let idle = (machine.slept() - slept) as f64 / cycles.max(1) as f64;
         Load {
             clock_hz: HZ,
             cycles,
             load: 1.0 - idle,
-            idle,
-            tick: self.tick.closed(cycles),
-            start: start(&self.starts),
-            phases: self.phases.iter().map(phase).collect(),
-            tasks: self.tasks.iter().map(task).collect(),
-            interrupts: machine
-                .profile()
-                .shares()
-                .filter(|(number, _)| *number != THREAD)
-                .map(interrupt)
-                .collect(),
-            functions: Vec::new(),
-            masked: Vec::new(),
+            tick: cost(&self.ticks),
             stack_used,
             stack: footprint.stack,
             flash: footprint.flash,
@@ -250,102 +102,71 @@ impl Gathered {
     }
 }
 
-/// Functions per millisecond of `cycles`, down to those that hardly count.
-fn spent(functions: Vec<(String, u64)>, cycles: u64) -> Vec<Spent> {
-    /// Of all that was spent, what is left out.
-    const REST: f64 = 0.02;
-    let mut left = functions.iter().map(|(_, spent)| *spent as f64).sum::<f64>();
-    let rest = REST * left;
-    let counts = |(_, spent): &(String, u64)| {
-        let counts = left > rest;
-        left -= *spent as f64;
-        counts
+fn cost(ticks: &[Poll]) -> Cost {
+    let first = ticks.first().map_or(0, |tick| tick.began);
+    let late = |tick: &Poll| {
+        let since = tick.began - first;
+        since as i64 - ((since + PERIOD / 2) / PERIOD * PERIOD) as i64
     };
-    let ms = cycles as f64 / PERIOD as f64;
-    let found = functions.into_iter().take_while(counts);
-    found.map(|(function, spent)| Spent { function, cycles_per_ms: spent as f64 / ms }).collect()
-}
-
-/// Places at which interrupts are shut out, as many as are kept.
-const PLACES: usize = 12;
-
-/// A place at which interrupts are shut out, by the function that asks for it: the first
-/// that is not about just that.
-fn shut((pc, exception): (u32, u32), by: &Masked, names: &Names<'_>) -> Shut {
-    let about =
-        ["core::", "cortex_m::", "critical_section::", "_critical_section", "blocking_mutex"];
-    let frames = names.frames(pc).into_iter().map(|frame| frame.function);
-    let mut others = frames.filter(|name| !about.iter().any(|about| name.contains(about)));
-    Shut {
-        function: others.next().unwrap_or_else(|| "unknown".to_owned()),
-        level: if exception == 0 { "thread mode".to_owned() } else { vector(exception as u8) },
-        times: by.times,
-        mean: by.cycles as f64 / by.times.max(1) as f64,
-        worst: by.worst,
-        pc,
-    }
-}
-
-/// Beginnings of the tick against a beat of one period.
-fn start(starts: &[u64]) -> Start {
-    let Some(first) = starts.first() else { return Start::default() };
-    let phase = |at: &u64| {
-        let beats = ((at - first) + PERIOD / 2) / PERIOD;
-        (at - first) as i64 - (beats * PERIOD) as i64
-    };
-    let earliest = starts.iter().map(phase).min().unwrap_or(0);
-    let late = |at: &u64| (phase(at) - earliest) as u64;
-    Start {
-        late_mean: starts.iter().map(late).sum::<u64>() as f64 / starts.len() as f64,
-        jitter: starts.iter().map(late).max().unwrap_or(0),
-    }
-}
-
-/// Name of a vector that the firmware uses.
-fn vector(number: u8) -> String {
-    match number.checked_sub(16) {
-        None if number == SYS_TICK => "SysTick".into(),
-        None => format!("exception {number}"),
-        Some(channel @ 11..=17) => format!("DMA1_CHANNEL{}", channel - 10),
-        Some(28) => "TIM2".into(),
-        Some(40) => "EXTI15_10".into(),
-        Some(53) => "UART5 (control)".into(),
-        Some(interrupt) => format!("interrupt {interrupt}"),
+    let earliest = ticks.iter().map(late).min().unwrap_or(0);
+    let latest = ticks.iter().map(late).max().unwrap_or(0);
+    Cost {
+        runs: ticks.len() as u64,
+        mean: ticks.iter().map(|tick| tick.cycles).sum::<u64>() as f64 / ticks.len().max(1) as f64,
+        worst: ticks.iter().map(|tick| tick.cycles).max().unwrap_or(0),
+        jitter: (latest - earliest) as u64,
     }
 }
 
 impl Load {
-    /// Tells apart the functions that the cycles since the account's beginning went to;
-    /// `elf` is the image.
-    ///
-    /// # Errors
-    /// [`ImageError`] if its debug information cannot be read.
-    pub fn name_functions(&mut self, machine: &mut Machine, elf: &[u8]) -> Result<(), ImageError> {
-        let heat = machine.take_heat();
-        self.functions = spent(by_function(elf, machine.image(), &heat)?, self.cycles);
-        let masked = machine.take_masked();
-        let names = Names::read(elf)?;
-        self.masked = masked.iter().map(|(place, by)| shut(*place, by, &names)).collect();
-        self.masked.sort_by_key(|shut| std::cmp::Reverse(shut.worst));
-        self.masked.truncate(PLACES);
-        Ok(())
+    /// Names and values of what is shown.
+    fn pairs(&self) -> [(&'static str, String); 7] {
+        let us = |cycles: f64| cycles * 1e6 / self.clock_hz as f64;
+        let (mean, worst) = (self.tick.mean, self.tick.worst);
+        [
+            ("Core busy", format!("{:.2} % of the time", 100.0 * self.load)),
+            ("Tick, mean", format!("{mean:.0} cycles, {:.1} µs", us(mean))),
+            ("Tick, worst", format!("{worst} cycles, {:.1} µs", us(worst as f64))),
+            ("Jitter of the tick", format!("{:.1} µs", us(self.tick.jitter as f64))),
+            ("Stack used", format!("{} of {} bytes", self.stack_used, self.stack)),
+            ("Flash", format!("{} bytes", self.flash)),
+            ("RAM, stack included", format!("{} bytes", self.ram)),
+        ]
     }
 
-    /// Holds the account against its budgets; says which is missed.
+    /// As a section of the run's page; `missed` are the budgets that were not kept.
     #[must_use]
-    pub fn missed(&self, budget: &BoardBudget) -> Vec<String> {
-        /// SRAM1 and SRAM2.
-        const MEMORY: u64 = 96 * 1024;
+    pub fn html(&self, missed: &[String]) -> String {
+        let pair = |(name, value)| format!("<div><dt>{name}</dt><dd>{value}</dd></div>\n");
+        let cells: String = self.pairs().map(pair).concat();
+        let missed: String =
+            missed.iter().map(|line| format!("<p>Over budget: {line}</p>\n")).collect();
+        format!(
+            "<dl>\n{cells}</dl>\n{missed}<p class=\"note\">Textbook cycles of a Cortex-M4 from \
+the first command on, without wait states of the flash. The tick is not charged for what \
+preempts it.</p>\n"
+        )
+    }
+
+    /// As text.
+    #[must_use]
+    pub fn text(&self, missed: &[String]) -> String {
+        let pairs = self.pairs().map(|(name, value)| format!("  {name}: {value}\n")).concat();
+        let missed: String = missed.iter().map(|line| format!("  over budget: {line}\n")).collect();
+        pairs + &missed
+    }
+
+    /// The budgets that are missed, a sentence each.
+    #[must_use]
+    pub fn missed(&self) -> Vec<String> {
         let left = MEMORY - (self.ram - self.stack);
-        let worst = self.tick.worst as f64 / PERIOD as f64;
-        let stack = f64::from(self.stack_used) / left as f64;
-        let checks = [
-            ("mean load", self.load, budget.mean_load),
-            ("worst tick, part of its period", worst, budget.worst_tick),
-            ("stack, part of what is left", stack, budget.stack),
+        let reached = [
+            ("mean load", self.load),
+            ("worst tick, part of its period", self.tick.worst as f64 / PERIOD as f64),
+            ("stack, part of what is left", f64::from(self.stack_used) / left as f64),
         ];
-        let missed = checks.into_iter().filter(|(_, value, most)| value > most);
-        missed.map(|(what, value, most)| format!("{what}: {value:.3}, at most {most}")).collect()
+        let missed = reached.into_iter().zip(BUDGET).filter(|((_, value), most)| value > most);
+        missed.map(|((what, value), most)| format!("{what}: {value:.3}, at most {most}")).collect()
     }
 }
 
@@ -354,20 +175,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lateness_is_counted_from_the_earliest_beat() {
+    fn jitter_is_counted_from_the_earliest_beat_to_the_latest() {
+        let tick = |began, cycles| Poll { task: 0, began, cycles };
         let starts = [1000, 1000 + PERIOD + 40, 1000 + 2 * PERIOD - 10, 1000 + 5 * PERIOD];
-        let start = start(&starts);
-        assert_eq!(start.jitter, 50);
-        assert_eq!(start.late_mean, (10.0 + 50.0 + 0.0 + 10.0) / 4.0);
-    }
-
-    #[test]
-    fn costs_close_to_means_and_shares() {
-        let mut cost = Cost::default();
-        for cycles in [10, 30] {
-            cost.note(cycles);
-        }
-        let closed = cost.closed(400);
-        assert_eq!((closed.mean, closed.worst, closed.share), (20.0, 30, 0.1));
+        let ticks: Vec<Poll> =
+            starts.iter().zip([30, 10, 20, 40]).map(|(s, c)| tick(*s, c)).collect();
+        let expected = Cost { runs: 4, mean: 25.0, worst: 40, jitter: 50 };
+        assert_eq!(cost(&ticks), expected);
     }
 }

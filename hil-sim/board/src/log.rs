@@ -2,7 +2,7 @@
 
 use defmt_decoder::{DecodeError, StreamDecoder, Table};
 
-use super::image::ImageError;
+use super::error::ImageError;
 
 /// A line of the log.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -2,6 +2,7 @@
 //! sleep passed over to the next event.
 
 mod access;
+mod exceptions;
 mod frame;
 mod profile;
 mod tasks;
@@ -10,25 +11,20 @@ use std::path::Path;
 
 use super::chip::Chip;
 use super::core::unicorn::{Counted, UnicornCore};
-use super::core::{Access, Bus, Core, CoreError, Heat, Mark, MaskedBy, Register, Stop, passes};
+use super::core::{Access, Bus, Core, CoreError, Mark, Register, Stop};
 use super::elf::{FLASH, Function, Loaded, RAM, named};
-use super::exceptions::number::{HARD_FAULT, SV_CALL};
-use super::image::ImageError;
+use super::error::ImageError;
+use super::exceptions::number::SV_CALL;
 use super::peripherals::flash::Change;
 use super::peripherals::rcc::Cause as Restart;
 use super::peripherals::system::Cause;
 
-pub use profile::{Poll, Profile, Share, THREAD};
+pub use profile::{Poll, Profile};
 
 use tasks::Tasks;
 
 /// What RAM holds when power comes up.
 pub const BLANK: u8 = 0xA5;
-/// Cycles of an exception's entry and return, and of going from one to the next.
-const ENTRY: u64 = 12;
-const EXIT: u64 = 10;
-const CHAIN: u64 = 6;
-
 /// Why the core does not execute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Asleep {
@@ -110,31 +106,20 @@ impl Machine {
         self.core.bus_mut()
     }
 
-    /// What the core has spent its time on.
+    /// Cycles asleep since the start.
     #[must_use]
-    pub const fn profile(&self) -> &Profile {
-        &self.profile
+    pub const fn slept(&self) -> u64 {
+        self.profile.slept()
     }
 
-    /// The same, to take what has gathered.
+    /// Runs of tasks, to take what has gathered.
     pub fn profile_mut(&mut self) -> &mut Profile {
         &mut self.profile
     }
 
-    /// Takes the cycles by block of code since the last call, or since the start.
-    pub fn take_heat(&mut self) -> Heat {
-        self.core.take_heat()
-    }
-
-    /// Takes where interrupts were shut out since the last call, or since the start.
-    pub fn take_masked(&mut self) -> MaskedBy {
-        self.core.take_masked()
-    }
-
     /// Names of the tasks, by their numbers in the profile.
-    #[must_use]
-    pub fn tasks(&self) -> Vec<&str> {
-        self.tasks.names().collect()
+    pub fn tasks(&self) -> impl Iterator<Item = &str> {
+        self.tasks.names()
     }
 
     /// Name of the task that the executor is about to run, if it stands at that.
@@ -449,108 +434,5 @@ impl Machine {
         }
         let next = self.chip().deadline().clamp(now, cycle);
         self.core.pass(next - now);
-    }
-
-    /// The exception to be taken now.
-    fn takeable(&self) -> Result<Option<u8>, CoreError> {
-        let Some((number, priority)) = self.chip().system.exceptions.urgent() else {
-            return Ok(None);
-        };
-        let primask = self.core.register(Register::Primask)?;
-        let basepri = self.core.register(Register::Basepri)?;
-        let faultmask = self.core.register(Register::Faultmask)?;
-        Ok(passes(priority, primask, basepri, faultmask).then_some(number))
-    }
-
-    /// Takes an exception; the program goes on at `back` afterwards. `chained`: straight
-    /// from another one, whose frame stands already.
-    fn enter(&mut self, number: u8, back: u32, chained: bool) -> Result<(), CoreError> {
-        let now = self.now();
-        if !chained {
-            if !frame::push(&mut self.core, back)? {
-                return self.stacking_failed(number, back);
-            }
-            let depth = self.chip().system.exceptions.depth();
-            frame::go_to_handler(&mut self.core, number, depth > 0)?;
-        } else {
-            frame::change_handler(&mut self.core, number)?;
-        }
-        self.core.pass(if chained { CHAIN } else { ENTRY });
-        let since = self.chip_mut().system.exceptions.enter(number);
-        self.profile.enter(number, since, now, self.core.meter().cycles);
-        let vector = self.chip().system.control.vector(number);
-        self.pc = self.word(vector)? & !1;
-        Ok(())
-    }
-
-    /// Returns from the exception that runs.
-    fn leave(&mut self, value: u32) -> Result<(), CoreError> {
-        let now = self.now();
-        let left = self.chip_mut().system.exceptions.leave(now);
-        self.profile.leave(now);
-        if left == HARD_FAULT {
-            self.core.set_register(Register::Faultmask, 0)?;
-        }
-        if let Some(next) = self.takeable()? {
-            // The frame stays where it is.
-            frame::keep_return(&mut self.core, value)?;
-            return self.enter(next, 0, true);
-        }
-        self.core.pass(EXIT);
-        let depth = self.chip().system.exceptions.depth();
-        match frame::pop(&mut self.core, value)? {
-            Some(pc) => self.pc = pc,
-            None => return self.fault(Cause::Unstacking, value),
-        }
-        if depth == 0 && self.chip().system.control.sleeps_on_exit() {
-            self.fall_asleep(Asleep::Interrupt);
-        }
-        Ok(())
-    }
-
-    /// The program did at `at` what a processor faults on.
-    fn fault(&mut self, cause: Cause, at: u32) -> Result<(), CoreError> {
-        let masked = self.core.register(Register::Primask)? & 1 != 0;
-        let system = &mut self.chip_mut().system;
-        let exceptions = system.exceptions.clone();
-        match system.control.fault(cause, &exceptions, masked) {
-            Some(number) => {
-                let now = self.now();
-                self.chip_mut().system.exceptions.pend(number, now);
-                self.enter(number, at, false)
-            }
-            None => {
-                self.pc = at;
-                self.lock_up();
-                Ok(())
-            }
-        }
-    }
-
-    /// There is no memory for the frame of exception `number`.
-    fn stacking_failed(&mut self, number: u8, back: u32) -> Result<(), CoreError> {
-        let exceptions = self.chip().system.exceptions.clone();
-        let fault = self.chip_mut().system.control.fault(Cause::Stacking, &exceptions, true);
-        if number == HARD_FAULT || fault.is_none() {
-            self.pc = back;
-            self.lock_up();
-            return Ok(());
-        }
-        // The hard fault is taken with what there is of a stack: it does not return.
-        let depth = self.chip().system.exceptions.depth();
-        let now = self.now();
-        frame::go_to_handler(&mut self.core, HARD_FAULT, depth > 0)?;
-        self.core.pass(ENTRY);
-        self.chip_mut().system.exceptions.enter(HARD_FAULT);
-        self.profile.enter(HARD_FAULT, now, now, now + ENTRY);
-        let vector = self.chip().system.control.vector(HARD_FAULT);
-        self.pc = self.word(vector)? & !1;
-        Ok(())
-    }
-
-    fn lock_up(&mut self) {
-        let now = self.now();
-        self.chip_mut().lock_up(now);
-        self.fall_asleep(Asleep::Locked);
     }
 }

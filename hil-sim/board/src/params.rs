@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use interstage::params::slots::SLOT_BYTES;
 
-use super::{StoreError, Wire};
 use crate::bench::Bench;
 use crate::log::Strings;
+use hil_sim::params::{StoreError, Wire};
 use hil_sim::scenario::Scenario;
 
 /// Where the places for sets begin in the board's memory.

@@ -2,8 +2,9 @@
 
 use std::time::Duration;
 
-use super::{Port, PortError};
-use crate::image::ImageError;
+use hil_sim::probe::{Port, PortError};
+
+use crate::error::ImageError;
 use crate::machine::Machine;
 use crate::peripherals::HZ;
 use crate::peripherals::rcc::Cause;

@@ -5,7 +5,7 @@
 //! control block.
 
 use super::core::CoreError;
-use super::image::ImageError;
+use super::error::ImageError;
 use super::machine::Machine;
 
 /// Symbol of the control block.

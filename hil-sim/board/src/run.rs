@@ -14,11 +14,12 @@ use interstage::params::{CompileError, slots};
 use interstage::rig::Rig;
 
 use crate::params::PLACES;
-use hil_sim::faults::{Injection, Target, sets};
+use hil_sim::faults::sets;
 use hil_sim::firmware::{FirmwareError, Footprint};
 use hil_sim::log;
 use hil_sim::params::set_of;
 use hil_sim::record::Recording;
+use hil_sim::scenario::injection::{Injection, Target};
 use hil_sim::scenario::{ControllerKind, Direction, Scenario};
 
 use trace::Trace;
@@ -152,7 +153,7 @@ pub fn run_with(
         for line in &lines {
             watch(bench.time_s(), line);
         }
-        gathered.gather(bench.machine_mut(), trace.mode());
+        gathered.gather(bench.machine_mut());
         stream.extend(bench.take_frames());
         trace.look(&passed, &lines, bench.plant().truth(), asked.rows);
         if trace.is_over() {
@@ -162,10 +163,9 @@ pub fn run_with(
     let mut recording = trace.finish(scenario, bench.plant(), started.elapsed().as_secs_f64());
     log::complete(&mut recording, &log::Run::of_stream(&stream));
     recording.stream = stream;
-    let mut machine = bench.into_machine();
+    let machine = bench.into_machine();
     let stack = stack_used(&machine)?;
-    let mut load = gathered.close(&machine, &footprint, stack);
-    load.name_functions(&mut machine, elf).map_err(BenchError::from)?;
+    let load = gathered.close(&machine, &footprint, stack);
     Ok(Ran { recording, load, machine })
 }
 

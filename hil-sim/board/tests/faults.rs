@@ -1,19 +1,18 @@
 //! The campaign of faults on the emulated board, a few of them at one instant each, and a
 //! scenario's faults in a run on the board. `cargo rig faults --target board` is the whole.
 
-#[path = "common/board.rs"]
-mod common;
-
-use hil_sim::faults::campaign::{Campaign, Case, Firmware, Kept, Outcome};
-use hil_sim::faults::{Entry, HARDWARE, Injection, Kind, Target, sets};
+use hil_sim::faults::campaign::{Campaign, Case, Outcome};
+use hil_sim::faults::sets;
 use hil_sim::scenario::Scenario;
+use hil_sim::scenario::injection::{Entry, HARDWARE, Injection, Kind, Target};
 use rig_board::bench::Bench;
+use rig_board::campaign::{self, Firmware};
 use rig_board::params::PLACES;
 use rig_board::run::run;
 
-use common::{elf, strings};
+use crate::common::{elf, strings};
 
-fn campaign(wanted: &[&str]) -> Outcome {
+fn matrix(wanted: &[&str]) -> Outcome {
     let named = |case: &Case| wanted.contains(&case.name().as_str());
     let cases: Vec<Case> = Case::all_on_board().into_iter().filter(named).collect();
     assert_eq!(cases.len(), wanted.len());
@@ -23,7 +22,7 @@ fn campaign(wanted: &[&str]) -> Outcome {
 fn tried(cases: Vec<Case>) -> Outcome {
     let campaign = Campaign { scenario: Scenario::default(), instants: 1, cases };
     let firmware = Firmware { elf: elf(), strings: strings() };
-    campaign.run_on_board(firmware, &mut Kept::default(), &|| {}).expect("a campaign")
+    campaign::run(&campaign, firmware, &|| {}).expect("a campaign")
 }
 
 #[test]
@@ -40,7 +39,7 @@ fn what_breaks_on_the_board_is_found_or_borne_and_the_mechanism_held() {
         ("supply off", None),
         ("journal-task hung", None),
     ];
-    let outcome = campaign(&faults.map(|(name, _)| name));
+    let outcome = matrix(&faults.map(|(name, _)| name));
     let failures: Vec<_> = outcome.matrix.iter().flat_map(|line| &line.failures).collect();
     assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{failures:#?}");
     for (name, code) in faults {
@@ -66,7 +65,7 @@ fn a_board_that_can_only_tell_by_its_light_is_found_by_that() {
     let bit = f64::from(8 * (copies.expect("it copies").range.start + 0x115 - 0x0800_0000) + 4);
     let image = HARDWARE.iter().find(|entry| entry.target == Target::Image).expect("an image");
     let entry = Box::leak(Box::new(Entry { range: (bit, bit), ..*image }));
-    let outcome = tried(vec![Case::Struck(entry)]);
+    let outcome = tried(vec![Case::Injected(entry)]);
     let line = &outcome.matrix[0];
     assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{line:#?}");
     assert_eq!(line.restarted(), Some("image damaged, by the light alone"), "{line:#?}");
@@ -84,7 +83,7 @@ fn parameters_in_flash_are_the_old_ones_the_new_ones_or_named_as_damaged() {
         ("parameter-save torn", Some("reset by supply")),
         ("parameter-save reset", Some("reset by pin")),
     ];
-    let outcome = campaign(&faults.map(|(name, _)| name));
+    let outcome = matrix(&faults.map(|(name, _)| name));
     let failures: Vec<_> = outcome.matrix.iter().flat_map(|line| &line.failures).collect();
     assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{failures:#?}");
     for (name, told) in faults {

@@ -1,9 +1,5 @@
 //! The firmware itself on the emulated board, the plant at its pins.
 
-#[path = "common/board.rs"]
-mod common;
-
-use hil_sim::bench::budget::Budget;
 use hil_sim::record::{CrossingLine, Summary};
 use hil_sim::scenario::Direction;
 use hil_sim::sil::{self, Options, Session};
@@ -15,7 +11,7 @@ use rig_board::log::Line;
 use rig_board::peripherals::rcc::Cause;
 use rig_board::run::{self, Ran};
 
-use common::{elf, scenario, strings};
+use crate::common::{elf, scenario, strings};
 
 /// A board under way, with what it has logged.
 struct Board {
@@ -156,41 +152,38 @@ fn assert_way(sets: &[&str]) {
     assert_alike(&first.recording.summary, &software(sets));
     assert!(first.load.unmodelled.is_empty(), "{:#?}", first.load.unmodelled);
     assert!(first.machine.restarts().is_empty());
-    let budget = Budget::shipped().expect("a budget").board;
-    assert_eq!(first.load.missed(&budget), Vec::<String>::new());
+    assert_eq!(first.load.missed(), Vec::<String>::new());
     // A sensor's frame more or less before it is all that moves the tick.
-    assert!(first.load.start.jitter < 4_000, "{:?}", first.load.start);
+    assert!(first.load.tick.jitter < 4_000, "{:?}", first.load.tick);
     assert!(u64::from(first.load.stack_used) < first.load.stack, "{}", first.load.stack_used);
     let ticks = first.load.cycles / first.load.clock_hz.div_euclid(1000);
     assert!(first.load.tick.runs.abs_diff(ticks) <= 1, "{} of {ticks}", first.load.tick.runs);
-    // Three runs, the same bytes.
-    for _ in 0..2 {
-        let again = ran(sets);
-        let (a, b) = (&again.recording, &first.recording);
-        assert_eq!(a.summary.trace_digest, b.summary.trace_digest);
-        assert_eq!(a.log, b.log);
-        assert_eq!(again.load, first.load);
-    }
+    // Again, the same bytes.
+    let again = ran(sets);
+    let (a, b) = (&again.recording, &first.recording);
+    assert_eq!(a.summary.trace_digest, b.summary.trace_digest);
+    assert_eq!(a.log, b.log);
+    assert_eq!(again.load, first.load);
 }
 
 #[test]
-fn a_deployment_is_that_of_the_software_three_times_alike() {
+fn a_deployment_is_that_of_the_software_and_the_same_again() {
     assert_way(&["run.seed=1"]);
 }
 
 #[test]
-fn a_retraction_is_that_of_the_software_three_times_alike() {
+fn a_retraction_is_that_of_the_software_and_the_same_again() {
     assert_way(&["run.seed=1", "run.direction=retract"]);
 }
 
-/// Ten times the rig's speed is asked of a release build on a machine that does nothing else,
-/// and `deploy` prints it. Machines differ by more than that, and tests share their cores, so
-/// here it is held against the same deployment in software, which takes a seventieth of it; a board
-/// that stops at every hook takes three times as much. By this thread's processor time, the best
-/// of turns about.
+/// The board against the same deployment in software, by this thread's processor time, the
+/// best of turns about: what a slow hook or a translation again and again would show.
 #[test]
 fn a_deployment_is_far_ahead_of_the_rig() {
-    const MOST: f64 = 150.0;
+    const MOST: f64 = 60.0;
+    if !hil_sim::testing::long() {
+        return;
+    }
     let timed = |run: &dyn Fn()| {
         let begun = cpu_time::ThreadTime::now();
         run();
@@ -203,7 +196,6 @@ fn a_deployment_is_far_ahead_of_the_rig() {
         let run = || drop(sil::run(&scenario(&sets), Options::default()).expect("a run"));
         software = software.min(timed(&run));
     }
-    println!("{:.1} times the time of the software", board / software);
     assert!(board <= MOST * software, "{board:.3} s on the board, {software:.4} s in software");
 }
 
@@ -330,22 +322,6 @@ fn an_interrupt_flag_that_is_not_cleared_is_caught() {
     machine.poke(range.start + place as u32 + 2, nop).expect("flash");
     board.run(2000);
     assert!(!board.said("mode: idle"), "it came up as if nothing were: {:#?}", board.log);
-}
-
-#[test]
-fn a_lost_angle_sensor_is_a_fault_of_its_own() {
-    let mut board = Board::idle(&[]);
-    Fault::AngleLost.strike(board.bench.machine_mut()).expect("strikes");
-    board.until("fault 104", 200);
-}
-
-#[test]
-fn a_dma_that_stands_still_is_a_fault_and_no_hang() {
-    let mut board = Board::idle(&[]);
-    Fault::DmaStalled.strike(board.bench.machine_mut()).expect("strikes");
-    board.until("] fault ", 200);
-    board.run(300);
-    assert!(board.bench.machine().restarts().is_empty(), "the tasks go on");
 }
 
 /// A run with a fault that comes when this is logged; what is logged after that.

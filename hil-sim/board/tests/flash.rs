@@ -1,9 +1,6 @@
 //! Parameters stored by the firmware in the emulated board's flash, and power that goes
 //! while it writes.
 
-#[path = "common/board.rs"]
-mod common;
-
 use hil_sim::scenario::Scenario;
 use interstage::params::link::{FrameReader, ToBoard, ToHost, frame};
 use interstage::params::service::{Origin, PIECE, Piece, Request, Response};
@@ -14,7 +11,7 @@ use rig_board::peripherals::flash::Cut;
 use rig_board::peripherals::rcc::Cause;
 use rig_board::rtt::Probe;
 
-use common::{elf, strings};
+use crate::common::{elf, strings};
 
 /// Channels of the binary line.
 const UP: u32 = 2;

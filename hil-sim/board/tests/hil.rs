@@ -1,9 +1,6 @@
 //! Hardware in the loop over the emulated board: the plant on this host, the controller
 //! in the firmware with the feature `hil`.
 
-#[path = "common/board.rs"]
-mod common;
-
 use std::sync::OnceLock;
 use std::time::Duration;
 
@@ -12,7 +9,7 @@ use hil_sim::hil::{self, Asked, HilError, HostLine, Image};
 use hil_sim::log::{Row, Run};
 use hil_sim::plant::rig::VirtualRig;
 use hil_sim::plant::sensors::Sensors;
-use hil_sim::probe::{EmulatedPort, Port, PortError};
+use hil_sim::probe::{Port, PortError};
 use hil_sim::record::Recording;
 use hil_sim::replay::replay;
 use hil_sim::scenario::Scenario;
@@ -21,8 +18,9 @@ use interstage::fault::Fault;
 use interstage::hal::hil::{FIRST, Given, Taken};
 use interstage::rig::Rig;
 use interstage::supervise::{Command, Mode};
+use rig_board::port::EmulatedPort;
 
-use common::scenario;
+use crate::common::scenario;
 
 fn elf() -> &'static [u8] {
     static ELF: OnceLock<Vec<u8>> = OnceLock::new();

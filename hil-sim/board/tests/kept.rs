@@ -1,11 +1,6 @@
 //! What the board's flash keeps beside parameters: what the drive was doing when the supply
 //! went, and the sum of the image at its first start.
 
-#[path = "common/board.rs"]
-mod common;
-#[path = "common/reset_board.rs"]
-mod reset_board;
-
 use interstage::params::slots::SLOT_BYTES;
 use interstage::restart::page::PAGE_BYTES;
 use interstage::restart::{DriveSnapshot, Reset, Stopped};
@@ -18,7 +13,7 @@ use rig_board::peripherals::pwr::{HOLDS, Then};
 use rig_board::peripherals::rcc::Cause;
 use rig_board::thumb::sweep;
 
-use reset_board::Board;
+use crate::common::reset::Board;
 
 /// Where the pages stand, by `docs/PARAMETERS.md`.
 const RECORDS: u32 = 0x0808_0000 - 2 * SLOT_BYTES as u32 - PAGE_BYTES as u32;

@@ -1,11 +1,6 @@
 //! The binary log of the firmware itself, on the emulated board.
 
-#[path = "common/board.rs"]
-mod common;
-
 use std::collections::VecDeque;
-use std::io::Write;
-use std::process::{Command, Stdio};
 
 use hil_sim::log::{Decoder, Item, Mark, Row, Run};
 use hil_sim::replay::replay;
@@ -19,7 +14,7 @@ use rig_board::log::Line;
 use rig_board::peripherals::rcc::Cause;
 use rig_board::run;
 
-use common::{elf, scenario, strings};
+use crate::common::{elf, scenario, strings};
 
 /// How far the log may be from the truth under way. Position: the tolerance of the steps'
 /// places, which the controller knows from its table and corrects itself by. Preload: two
@@ -120,7 +115,7 @@ struct Ticks {
 impl Ticks {
     fn gather(&mut self, board: &mut Board) {
         let machine = board.bench.machine_mut();
-        let tick = machine.tasks().iter().position(|name| *name == "motors").expect("the tick");
+        let tick = machine.tasks().position(|name| name == "motors").expect("the tick");
         for turn in machine.profile_mut().take_polls().iter().filter(|turn| turn.task == tick) {
             self.cycles.push(turn.cycles);
             self.starts.push(turn.began);
@@ -237,44 +232,6 @@ fn neither_telemetry_nor_its_reader_changes_when_the_tick_begins_or_what_it_take
 }
 
 #[test]
-fn the_text_log_reads_as_defmt_print_reads_it() {
-    let mut board = Board::off();
-    board.bench.keep_text();
-    board.until("mode: idle", 3000);
-    board.send(b's');
-    board.until("mode: deployed", 12_000);
-    board.run(100);
-    let text = board.bench.take_text();
-    let image = tempfile::NamedTempFile::new().expect("a file");
-    std::fs::write(image.path(), elf()).expect("written");
-    let mut reader = Command::new(hil_sim::provision::defmt_print().expect("it builds"))
-        .arg("-e")
-        .arg(image.path())
-        .args(["--log-format", "{L}|{s}"])
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("starts");
-    let mut input = reader.stdin.take().expect("piped");
-    input.write_all(&text).expect("it reads");
-    drop(input);
-    let output = reader.wait_with_output().expect("it ends");
-    let printed = String::from_utf8(output.stdout).expect("text");
-    let printed: Vec<(String, String)> = printed
-        .lines()
-        .map(|line| {
-            let (level, text) = line.split_once('|').unwrap_or_else(|| panic!("{line}"));
-            (level.trim().to_lowercase(), text.to_owned())
-        })
-        .collect();
-    let ours: Vec<(String, String)> =
-        board.lines.iter().map(|line| (line.level.clone(), line.text.clone())).collect();
-    assert!(ours.len() > 30, "{} lines", ours.len());
-    assert_eq!(ours, printed);
-}
-
-#[test]
 fn frames_that_found_no_room_are_marked_and_the_capture_waits_for_its_reader() {
     let mut board = Board::off();
     board.until("mode: idle", 3000);
@@ -350,6 +307,9 @@ fn resident() -> Option<u64> {
 /// round, and nothing on the board or about it grows.
 #[test]
 fn minutes_of_deploying_and_retracting_are_logged_without_a_gap_or_drift() {
+    if !hil_sim::testing::long() {
+        return;
+    }
     const ROUNDS: usize = 24;
     let mut board = Board::off();
     board.until("mode: idle", 3000);
@@ -411,7 +371,6 @@ fn minutes_of_deploying_and_retracting_are_logged_without_a_gap_or_drift() {
             settled = resident();
         }
     }
-    println!("off by, mm and N, round by round: {worst:.3?}");
     let tally = *decoder.tally();
     assert!(tally.ticks > 120_000, "{tally:?}");
     assert_eq!((tally.lost_frames, tally.lost_ticks, tally.garbage_bytes), (0, 0, 0));
@@ -422,7 +381,6 @@ fn minutes_of_deploying_and_retracting_are_logged_without_a_gap_or_drift() {
     // The engine's caches are full after eight rounds; the log in memory is 40 bytes a tick.
     if let (Some(before), Some(after)) = (settled, resident()) {
         let grown = after.saturating_sub(before);
-        println!("{} kB more than after eight rounds", grown / 1024);
         assert!(grown < (16 << 20), "{grown} bytes");
     }
     let run = Run::of_stream(&log);

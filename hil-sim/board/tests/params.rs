@@ -1,8 +1,5 @@
 //! `rig params` on the emulated board, as a user has it.
 
-#[path = "common/board.rs"]
-mod common;
-
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -15,7 +12,7 @@ use rig_board::log::Strings;
 use rig_board::params::PLACES;
 use serde_json::Value;
 
-use common::elf;
+use crate::common::elf;
 
 /// A place for the board's flash, and for files.
 struct Place(tempfile::TempDir);

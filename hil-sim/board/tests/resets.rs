@@ -1,23 +1,19 @@
 //! What ends the firmware, on the emulated board: each time the bridges go off, and the
 //! next start says what it was.
 
-#[path = "common/board.rs"]
-mod common;
-#[path = "common/reset_board.rs"]
-mod reset_board;
-
+use hil_sim::faults::campaign::{Campaign, Case};
 use hil_sim::scenario::Scenario;
 use interstage::restart::{MissedCheckIns, Reset, Restart, Stopped};
 use interstage::supervise::Mode;
 use interstage::units::Direction;
 use rig_board::bench::STEP;
+use rig_board::campaign::{self, Firmware};
 use rig_board::core::Register;
 use rig_board::faults::Fault;
 use rig_board::peripherals::rcc::Cause;
-use rig_board::resets;
 
-use common::{elf, strings};
-use reset_board::Board;
+use crate::common::reset::Board;
+use crate::common::{elf, strings};
 
 fn hang(restart: &Restart) -> (u32, MissedCheckIns) {
     match restart.crash.map(|crash| crash.stopped) {
@@ -213,11 +209,15 @@ fn a_report_is_made_once() {
 
 #[test]
 fn resets_at_random_instants_are_recorded_held_and_gone_on_from() {
-    let scenario = Scenario::default();
-    let cases: Vec<resets::Case> = (0..16).map(|index| resets::case(1, index)).collect();
-    let all =
-        resets::run(elf(), strings(), &scenario, &cases, &resets::Told::NOBODY).expect("runs");
-    let outcome = resets::Outcome::of(&all);
-    assert!(outcome.is_good(), "{:#?}", outcome.wrong);
-    assert_eq!(outcome.resets, 16);
+    if !hil_sim::testing::long() {
+        return;
+    }
+    let all = Case::all_on_board().into_iter();
+    let cases = all.filter(|case| case.is_one_of(&["reset".to_owned()])).collect();
+    let campaign = Campaign { scenario: Scenario::default(), instants: 4, cases };
+    let firmware = Firmware { elf: elf(), strings: strings() };
+    let outcome = campaign::run(&campaign, firmware, &|| {}).expect("a campaign");
+    let failures: Vec<_> = outcome.matrix.iter().flat_map(|line| &line.failures).collect();
+    assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{failures:#?}");
+    assert!(outcome.matrix.len() >= 5);
 }

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use hil_sim::firmware::{Profile, build_binary};
 use hil_sim::scenario::Scenario;
 use interstage_images::tick::{Preset, Taken};
-use rig_board::account::{IMAGE, record};
+use rig_board::cycles::{IMAGE, record};
 use rig_board::elf::{FLASH, Loaded, RAM};
 use rig_board::image::{ARGUMENTS, Image};
 use rsemu::core::space::{AddressSpace, RamStore, Region, UnassignedPolicy};
@@ -105,6 +105,9 @@ impl Second {
 
 #[test]
 fn another_core_takes_the_same_instructions_to_the_same_bits() {
+    if !hil_sim::testing::long() {
+        return;
+    }
     let path = build_binary(IMAGE.0, IMAGE.1, Profile::Release, &[]).expect("the image builds");
     let elf = std::fs::read(path).expect("readable");
     let second = Second::start(&elf);

@@ -32,11 +32,11 @@ pub struct Args {
     /// The place: board, the firmware on the emulated board, over its binary line; or
     /// probe, a real board.
     #[arg(long, global = true, value_name = "TARGET", value_parser = ["board", "probe"])]
-    target: Option<String>,
+    pub target: Option<String>,
 
     /// File that keeps the emulated board's flash from one time to the next.
     #[arg(long, global = true, value_name = "FILE", default_value = "out/board.flash")]
-    flash: PathBuf,
+    pub flash: PathBuf,
 
     /// Prints the result as one JSON object.
     #[arg(long, global = true)]
@@ -121,7 +121,11 @@ fn on_probe(args: &Args) -> Result<Outcome, Failure> {
     act(args, &mut crate::params::Client::new(&mut port as &mut dyn crate::probe::Port))
 }
 
-fn act(args: &Args, store: &mut impl Store) -> Result<Outcome, Failure> {
+/// Does what was asked with the parameters of this place.
+///
+/// # Errors
+/// [`Failure`] of the place or the input.
+pub fn act(args: &Args, store: &mut impl Store) -> Result<Outcome, Failure> {
     let held = match store.held() {
         // What cannot be read, or is damaged, can be replaced all the same.
         Err(StoreError::Set { .. } | StoreError::Refused(_))

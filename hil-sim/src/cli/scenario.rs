@@ -47,6 +47,7 @@ impl ScenarioArgs {
 /// Which rig, and how it is run.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct RunArgs {
+    /// Which rig.
     #[command(flatten)]
     /// Which rig.
     pub scenario: ScenarioArgs,

@@ -59,6 +59,12 @@ impl Injection {
         }
     }
 
+    /// Whether it resets the board, at once or by the watchdog.
+    #[must_use]
+    pub const fn resets_board(&self) -> bool {
+        self.target.resets_board(self.kind)
+    }
+
     /// Onset when; time 0 if nothing is said.
     #[must_use]
     pub fn from(&self) -> Onset {

@@ -16,8 +16,9 @@ use crate::peripherals::rcc::Cause;
 use crate::run::RunError;
 use hil_sim::faults::campaign::Instant;
 use hil_sim::faults::judge::{Finding, Judge};
-use hil_sim::faults::{From, Injection, Target, sets};
+use hil_sim::faults::sets;
 use hil_sim::scenario::Scenario;
+use hil_sim::scenario::injection::{Injection, Onset, Target};
 
 /// How a start that holds reports it, in the matrix.
 const HELD: &str = "parameters damaged";
@@ -64,7 +65,7 @@ pub(super) fn judged(
     let saving = board.bench.saving();
     let (mut finding, mut end) = (judge.finding(&twin.limits, gap_part, crossed), judge.end());
     let report = judge.fault.or_else(|| judge.new_limit(&twin.limits));
-    let before = injection.from() == From::Time(0.0);
+    let before = injection.from() == Onset::Time(0.0);
     if saving.is_none() && !before {
         restart(&mut board, &mut judge)?;
     }

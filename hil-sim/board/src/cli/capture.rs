@@ -1,16 +1,13 @@
 //! `rig capture --target board`.
 
-use hil_sim::cli::capture::Args;
+use hil_sim::cli::capture::{Args, write};
 use hil_sim::cli::failure::{Failure, Outcome};
 
-pub fn run(args: &Args, scenario: &Scenario) -> Result<Outcome, Failure> {
-    use crate::capture::Emulated;
-    use crate::log::Strings;
-    use hil_sim::firmware::{self, Profile};
+use crate::capture::Emulated;
 
-    crate::run::check(scenario).map_err(Failure::input)?;
-    let elf = firmware::image(Profile::Release)?;
-    let strings = Strings::of(&elf).map_err(Failure::run)?;
-    let mut source = Emulated::new(&elf, &strings, scenario, false).map_err(Failure::run)?;
-    write(args, &mut source, Some(scenario))
+pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
+    let scenario = args.run.resolve()?;
+    let (elf, strings) = super::image(&scenario)?;
+    let mut source = Emulated::new(&elf, &strings, &scenario, false).map_err(Failure::run)?;
+    write(args, &mut source, Some(&scenario))
 }

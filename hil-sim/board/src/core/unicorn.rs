@@ -10,13 +10,13 @@ mod hooks;
 use std::collections::HashSet;
 
 use unicorn_engine::{
-    Arch, ArmCpuModel, MemType, Mode, Prot, RegisterARM, TlbEntry, TlbType, Unicorn, uc_error,
+    Arch, ArmCpuModel, MemType, Mode, Prot, RegisterARM, TlbEntry, TlbType, UcHookId, Unicorn,
+    uc_error,
 };
 
-use self::count::{Count, UNSEEN};
+use self::count::Count;
 use super::{
-    Access as Touch, Bus, Core, CoreError, Fault, Heat, Mark, MaskedBy, Meter, NoBus, Register,
-    Stop, passes,
+    Access as Touch, Bus, Core, CoreError, Fault, Mark, Meter, NoBus, Register, Stop, passes,
 };
 use crate::timing;
 
@@ -63,42 +63,22 @@ const RETURN_BITS: u32 = 0xFFFF_FF01;
 const WFE: [u8; 2] = [0x20, 0xBF];
 const WFI: [u8; 2] = [0x30, 0xBF];
 const SEV: [u8; 2] = [0x40, 0xBF];
-/// The exception's number among the flags.
-const EXCEPTION: u64 = 0x1FF;
 /// The state of thumb code outside of a conditional block, among the flags.
 const THUMB: u64 = 1 << 24;
 /// What the engine carries.
 struct Inside<B> {
     count: Count,
     bus: B,
-    marked: Vec<u32>,
     marks: Vec<Mark>,
-    /// Interrupts are shut out since this cycle, by this place in this exception.
-    shut: Option<(u64, (u32, u32))>,
-    masked: MaskedBy,
-}
-
-impl<B> Inside<B> {
-    fn new(count: Count, bus: B) -> Self {
-        let (marked, marks, masked) = (Vec::new(), Vec::new(), MaskedBy::new());
-        Self { count, bus, marked, marks, shut: None, masked }
-    }
-
-    /// Interrupts are let in again.
-    fn open(&mut self) {
-        if let Some((since, place)) = self.shut.take() {
-            let cycles = self.count.meter.cycles.saturating_sub(since);
-            let masked = self.masked.entry(place).or_default();
-            masked.times += 1;
-            masked.cycles += cycles;
-            masked.worst = masked.worst.max(cycles);
-        }
-    }
 }
 
 /// A Cortex-M4 on Unicorn.
 pub struct UnicornCore<B: Bus + 'static = NoBus> {
     engine: Unicorn<'static, Inside<B>>,
+    /// Hooks of late instructions, by their addresses.
+    own: Vec<(u32, UcHookId)>,
+    /// The hook of all of them.
+    common: Option<UcHookId>,
 }
 
 /// The engine as a hook sees it.
@@ -126,10 +106,10 @@ impl<B: Bus + 'static> UnicornCore<B> {
     /// As [`UnicornCore::new`].
     pub fn with_bus(memories: &[Memory], counted: &Counted<'_>, bus: B) -> Result<Self, CoreError> {
         let ranges = bus.ranges();
-        let inside = Inside::new(Count::new(counted), bus);
+        let inside = Inside { count: Count::new(counted), bus, marks: Vec::new() };
         // The flag for the microcontroller profile would select another core.
         let new = Unicorn::new_with_data(Arch::ARM, Mode::THUMB, inside);
-        let mut core = Self { engine: engine("start", new)? };
+        let mut core = Self { engine: engine("start", new)?, own: Vec::new(), common: None };
         let model = core.engine.ctl_set_cpu_model(ArmCpuModel::CORTEX_M4 as i32);
         engine("select the core", model)?;
         core.translate_pages(memories)?;
@@ -189,7 +169,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
         let touch = move |uc: &Hooked<'_, B>, offset: u64, size: usize| Touch {
             address: base + offset as u32,
             size: size as u32,
-            pc: uc.pc_read().unwrap_or_default() as u32 & !1,
+            pc: uc.get_data().count.block,
             now: uc.get_data().count.meter.cycles,
         };
         let read = move |uc: &mut Hooked<'_, B>, offset: u64, size: usize| {
@@ -219,10 +199,10 @@ impl<B: Bus + 'static> UnicornCore<B> {
         cycles: u64,
         (until, instructions): (u64, usize),
     ) -> Result<Stop, CoreError> {
+        self.choose_hooks()?;
         let count = &mut self.engine.get_data_mut().count;
         count.stop = None;
         count.limit = count.meter.cycles.saturating_add(cycles);
-        count.current = UNSEEN;
         // Where the host starts the program, nothing has branched.
         count.next = address & !1;
         let mut address = address;
@@ -294,10 +274,6 @@ impl<B: Bus + 'static> Core for UnicornCore<B> {
     }
 
     fn set_register(&mut self, register: Register, value: u32) -> Result<(), CoreError> {
-        if register == Register::Primask && value & 1 == 0 {
-            // Set from outside: what was shut by the program is open.
-            self.engine.get_data_mut().shut = None;
-        }
         let uc = &mut self.engine;
         if register == Register::Xpsr {
             // This name takes every field; the plain one leaves some out. Only the
@@ -348,30 +324,12 @@ impl<B: Bus + 'static> Core for UnicornCore<B> {
     }
 
     fn mark(&mut self, address: u32) -> Result<(), CoreError> {
-        let marked = &mut self.engine.get_data_mut().marked;
-        if let Err(place) = marked.binary_search(&(address & !1)) {
-            marked.insert(place, address & !1);
-        }
+        self.engine.get_data_mut().count.mark(address & !1);
         Ok(())
     }
 
     fn take_marks(&mut self, marks: &mut Vec<Mark>) {
         marks.append(&mut self.engine.get_data_mut().marks);
-    }
-
-    fn take_masked(&mut self) -> MaskedBy {
-        std::mem::take(&mut self.engine.get_data_mut().masked)
-    }
-
-    fn take_heat(&mut self) -> Heat {
-        let count = &mut self.engine.get_data_mut().count;
-        let mut heat = Heat::new();
-        for index in std::mem::take(&mut count.warm) {
-            let block = &mut count.blocks[index as usize];
-            *heat.entry((block.address, block.size)).or_default() +=
-                std::mem::take(&mut block.heat);
-        }
-        heat
     }
 }
 

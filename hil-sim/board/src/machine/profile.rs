@@ -1,27 +1,4 @@
-//! What the core spends its time on: each exception by itself, each task by itself,
-//! sleep.
-
-use std::collections::BTreeMap;
-
-use serde::Serialize;
-
-/// Thread mode among the numbers of exceptions.
-pub const THREAD: u8 = 0;
-
-/// What one exception has taken.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Share {
-    /// How often it was taken.
-    pub entries: u64,
-    /// Cycles of its own, others that preempted it left out.
-    pub cycles: u64,
-    /// Most cycles of its own in one go.
-    pub worst: u64,
-    /// From pending to its first instruction, cycles: the sum.
-    pub latency: u64,
-    /// The most of these.
-    pub worst_latency: u64,
-}
+//! What the core spends its time on: each run of a task by itself, and sleep.
 
 /// A task run once, up to where it waits again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,19 +11,11 @@ pub struct Poll {
     pub cycles: u64,
 }
 
-/// What is open on one level: thread mode or an exception.
-#[derive(Clone, Copy, Debug, Default)]
-struct Level {
-    number: u8,
-    own: u64,
-    task: Option<Poll>,
-}
-
-/// All of them.
+/// Runs of tasks, and sleep.
 #[derive(Clone, Debug)]
 pub struct Profile {
-    shares: BTreeMap<u8, Share>,
-    levels: Vec<Level>,
+    /// The task under way in thread mode and in each exception that is active.
+    levels: Vec<Option<Poll>>,
     polls: Vec<Poll>,
     /// Up to here everything is booked.
     booked: u64,
@@ -56,14 +25,7 @@ pub struct Profile {
 
 impl Default for Profile {
     fn default() -> Self {
-        Self {
-            shares: BTreeMap::new(),
-            levels: vec![Level::default()],
-            polls: Vec::new(),
-            booked: 0,
-            asleep: false,
-            slept: 0,
-        }
+        Self { levels: vec![None], polls: Vec::new(), booked: 0, asleep: false, slept: 0 }
     }
 }
 
@@ -74,36 +36,22 @@ impl Profile {
         self.booked = self.booked.max(now);
         if self.asleep {
             self.slept += cycles;
-            return;
-        }
-        if let Some(level) = self.levels.last_mut() {
-            level.own += cycles;
-            if let Some(task) = &mut level.task {
-                task.cycles += cycles;
-            }
-            self.shares.entry(level.number).or_default().cycles += cycles;
+        } else if let Some(Some(task)) = self.levels.last_mut() {
+            task.cycles += cycles;
         }
     }
 
-    /// An exception that had been pending since `since` is taken at `now`; its handler
-    /// begins at `begins`.
-    pub(super) fn enter(&mut self, number: u8, since: u64, now: u64, begins: u64) {
+    /// An exception is taken.
+    pub(super) fn enter(&mut self, now: u64) {
         self.book(now);
-        self.levels.push(Level { number, ..Level::default() });
-        let share = self.shares.entry(number).or_default();
-        share.entries += 1;
-        let latency = begins.saturating_sub(since);
-        share.latency += latency;
-        share.worst_latency = share.worst_latency.max(latency);
+        self.levels.push(None);
     }
 
+    /// The exception that runs returns.
     pub(super) fn leave(&mut self, now: u64) {
         self.book(now);
-        if self.levels.len() > 1
-            && let Some(level) = self.levels.pop()
-        {
-            let share = self.shares.entry(level.number).or_default();
-            share.worst = share.worst.max(level.own);
+        if self.levels.len() > 1 {
+            self.levels.pop();
         }
     }
 
@@ -111,16 +59,14 @@ impl Profile {
     pub(super) fn begin(&mut self, task: usize, now: u64) {
         self.book(now);
         if let Some(level) = self.levels.last_mut() {
-            level.task = Some(Poll { task, began: now, cycles: 0 });
+            *level = Some(Poll { task, began: now, cycles: 0 });
         }
     }
 
     /// The task on the level that runs waits again.
     pub(super) fn end(&mut self, now: u64) {
         self.book(now);
-        if let Some(poll) = self.levels.last_mut().and_then(|level| level.task.take()) {
-            self.polls.push(poll);
-        }
+        self.polls.extend(self.levels.last_mut().and_then(Option::take));
     }
 
     pub(super) fn sleep(&mut self, now: u64) {
@@ -135,20 +81,8 @@ impl Profile {
 
     pub(super) fn restart(&mut self, now: u64) {
         self.book(now);
-        self.levels = vec![Level::default()];
+        self.levels = vec![None];
         self.asleep = false;
-    }
-
-    /// Forgets what was booked so far.
-    pub fn clear(&mut self, now: u64) {
-        self.book(now);
-        self.shares.clear();
-        self.polls.clear();
-    }
-
-    /// What each exception has taken, by its number; [`THREAD`] is thread mode.
-    pub fn shares(&self) -> impl Iterator<Item = (u8, Share)> {
-        self.shares.iter().map(|(number, share)| (*number, *share))
     }
 
     /// Runs of tasks that have ended since this was last asked.
@@ -168,33 +102,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_preempted_exception_is_not_charged_for_the_other() {
-        let mut profile = Profile::default();
-        profile.enter(20, 90, 100, 112);
-        profile.enter(30, 150, 150, 162);
-        profile.leave(180);
-        profile.leave(200);
-        profile.sleep(210);
-        profile.wake(300);
-        let shares: BTreeMap<_, _> = profile.shares().collect();
-        assert_eq!((shares[&20].cycles, shares[&20].worst), (70, 70));
-        assert_eq!((shares[&20].latency, shares[&20].worst_latency), (22, 22));
-        assert_eq!((shares[&30].cycles, shares[&30].entries), (30, 1));
-        assert_eq!((shares[&THREAD].cycles, profile.slept()), (110, 90));
-    }
-
-    #[test]
     fn a_task_is_not_charged_for_what_preempts_it() {
         let mut profile = Profile::default();
         profile.begin(3, 100);
-        profile.enter(20, 110, 110, 122);
+        profile.enter(110);
         profile.begin(7, 130);
         profile.end(150);
         profile.leave(160);
         profile.end(170);
+        profile.sleep(180);
+        profile.wake(200);
         let polls = profile.take_polls();
         assert_eq!(polls[0], Poll { task: 7, began: 130, cycles: 20 });
         assert_eq!(polls[1], Poll { task: 3, began: 100, cycles: 20 });
         assert!(profile.take_polls().is_empty());
+        assert_eq!(profile.slept(), 20);
     }
 }

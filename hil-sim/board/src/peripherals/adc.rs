@@ -19,7 +19,7 @@ const JSQR: u32 = 0x4C;
 /// First of the four data registers of the injected conversions.
 const JDR: u32 = 0x80;
 /// Data register.
-pub(in crate::board) const DR: u32 = 0x40;
+pub(crate) const DR: u32 = 0x40;
 const COMMON: u32 = 0x300;
 const CCR: u32 = 0x308;
 

@@ -11,7 +11,7 @@ const CR1: u32 = 0x00;
 const CR2: u32 = 0x04;
 const SR: u32 = 0x08;
 /// Data register.
-pub(in crate::board) const DR: u32 = 0x0C;
+pub(crate) const DR: u32 = 0x0C;
 
 const MASTER: u32 = 1 << 2;
 const ENABLE: u32 = 1 << 6;

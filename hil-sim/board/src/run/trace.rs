@@ -68,11 +68,6 @@ impl Trace {
         }
     }
 
-    /// What it does, as a number in [`hil_sim::record::MODE_NAMES`].
-    pub(super) const fn mode(&self) -> u8 {
-        self.mode
-    }
-
     /// Waiting for a command, by its own word.
     pub(super) const fn is_idle(&self) -> bool {
         self.mode == IDLE

@@ -70,10 +70,19 @@ impl Case {
         }
     }
 
-    /// Whether the name of the fault contains one of these, or there are none.
+    /// Whether it resets the board, at once or by the watchdog.
+    fn resets(&self) -> bool {
+        matches!(self, Self::Injected(entry) if entry.target.resets_board(entry.kind))
+    }
+
+    /// Whether the name of the fault contains one of these, or there are none; `reset` is
+    /// every reset.
     #[must_use]
     pub fn is_one_of(&self, wanted: &[String]) -> bool {
-        wanted.is_empty() || wanted.iter().any(|text| self.name().contains(text))
+        wanted.is_empty()
+            || wanted
+                .iter()
+                .any(|text| self.name().contains(text) || text == "reset" && self.resets())
     }
 
     /// What happens, in words.
@@ -142,6 +151,11 @@ impl Case {
                     magnitude = Self::measure(entry, base, instant, &mut random).unwrap_or(1.0);
                     // One of three before the board starts.
                     at_s = if instant.is_multiple_of(3) { 0.0 } else { at_s };
+                }
+                if self.resets() && instant % 4 == 3 {
+                    // In the start of the board.
+                    at_s =
+                        (random.random_range(0.05..twin.started_s.max(0.1)) * 1e3).round() * 1e-3;
                 }
                 if entry.target == Target::Image {
                     magnitude = random.random_range(entry.range.0..=entry.range.1).floor();

@@ -180,6 +180,16 @@ impl Target {
         )
     }
 
+    /// Whether such a fault of it resets the board, at once or by the watchdog.
+    #[must_use]
+    pub const fn resets_board(self, kind: Kind) -> bool {
+        match self {
+            Self::ResetPin | Self::Debugger | Self::Processor => true,
+            Self::Supply => !matches!(kind, Kind::Weak),
+            _ => false,
+        }
+    }
+
     /// Whether it is a set of parameters that is read at a start.
     #[must_use]
     pub const fn is_of_sets(self) -> bool {

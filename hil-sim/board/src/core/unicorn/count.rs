@@ -1,26 +1,20 @@
 //! Counts instructions and cycles, block by block.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 
 use super::{Counted, Meter, Stop};
 use crate::thumb::{self, Kind};
 use crate::timing::{self, REFILL};
 
-/// Marks a halfword at which no block has begun yet.
-pub(super) const UNSEEN: u32 = u32::MAX;
-
 /// A straight piece of code.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Block {
-    pub(super) address: u32,
-    pub(super) size: u32,
-    instructions: u64,
-    cycles: u64,
-    /// Address of the instruction that ends it, if that shuts interrupts out or lets them
-    /// in. The engine ends a block behind each of these.
-    masks: Option<u32>,
-    /// Cycles spent here since last asked.
-    pub(super) heat: u64,
+    /// Bytes; 0 where no block has begun yet.
+    size: u16,
+    instructions: u16,
+    cycles: u16,
+    /// Whether its beginning is marked.
+    pub(super) marked: bool,
 }
 
 /// What the hooks keep.
@@ -28,20 +22,23 @@ pub(super) struct Count {
     pub(super) base: u32,
     pub(super) bytes: Vec<u8>,
     /// Block by the halfword it begins at.
-    begins: Vec<u32>,
-    pub(super) blocks: Vec<Block>,
-    /// Instructions whose cycles a hook of their own counts.
-    late: HashMap<u32, Kind>,
-    /// Those of them that are still without it, as no block with them has been met.
-    unhooked: HashSet<u32>,
-    /// A block has been met that holds some of those.
+    blocks: Vec<Block>,
+    /// Addresses whose coming up is noted.
+    marked: HashSet<u32>,
+    /// Instructions whose cycles are known only when they are reached, by their halfword.
+    late: Vec<Option<Kind>>,
+    /// Those of them that have a hook of their own.
+    pub(super) hooked: Vec<(u32, Kind)>,
+    /// Those that are still without it, and in a block that has just been met.
     pub(super) wanted: Vec<(u32, Kind)>,
-    /// Blocks that have heat.
-    pub(super) warm: Vec<u32>,
-    /// The block under way.
-    pub(super) current: u32,
-    /// Its end, see [`Block::masks`], if it is still to be looked at.
-    pub(super) masks: Option<u32>,
+    /// One hook counts all late instructions instead.
+    pub(super) common: bool,
+    /// Calls of that hook for instructions that are not late.
+    pub(super) needless: u32,
+    /// Cycle at which a block was last met that had not been seen.
+    pub(super) met: u64,
+    /// Beginning of the block under way.
+    pub(super) block: u32,
     /// Where the program is if it does not branch.
     pub(super) next: u32,
     pub(super) meter: Meter,
@@ -53,17 +50,30 @@ pub(super) struct Count {
 
 impl Count {
     pub(super) fn new(counted: &Counted<'_>) -> Self {
+        let halfwords = counted.bytes.len() / 2;
+        let mut late = vec![None; halfwords];
+        for range in counted.code {
+            let from = range.start.wrapping_sub(counted.base) as usize;
+            let to = range.end.wrapping_sub(counted.base) as usize;
+            let code = counted.bytes.get(from..to).unwrap_or_default();
+            for (address, instruction, conditional) in thumb::sweep(code, range.start) {
+                if timing::is_late(&instruction, conditional) {
+                    late[(address - counted.base) as usize / 2] = Some(instruction.kind);
+                }
+            }
+        }
         Self {
             base: counted.base,
             bytes: counted.bytes.to_vec(),
-            begins: vec![UNSEEN; counted.bytes.len() / 2],
-            blocks: Vec::new(),
-            late: HashMap::new(),
-            unhooked: HashSet::new(),
+            blocks: vec![Block::default(); halfwords],
+            marked: HashSet::new(),
+            late,
+            hooked: Vec::new(),
             wanted: Vec::new(),
-            warm: Vec::new(),
-            current: UNSEEN,
-            masks: None,
+            common: false,
+            needless: 0,
+            met: 0,
+            block: 0,
             next: 0,
             meter: Meter::default(),
             limit: u64::MAX,
@@ -76,95 +86,90 @@ impl Count {
         thumb::decode(self.bytes.get((address & !1).wrapping_sub(self.base) as usize..)?)
     }
 
-    /// Adds cycles to the total and to the block under way.
-    pub(super) fn spend(&mut self, cycles: u64) {
-        self.meter.cycles += cycles;
-        if let Some(block) = self.blocks.get_mut(self.current as usize) {
-            if block.heat == 0 {
-                self.warm.push(self.current);
-            }
-            block.heat += cycles;
-        }
+    /// What decides about the cycles of the instruction at this address, if that is known
+    /// only when it is reached.
+    pub(super) fn late(&self, address: u32) -> Option<Kind> {
+        *self.late.get(address.wrapping_sub(self.base) as usize / 2)?
     }
 
-    /// Counts the block that begins here.
-    pub(super) fn enter(&mut self, address: u32, size: u32) {
+    /// Adds cycles.
+    pub(super) fn spend(&mut self, cycles: u64) {
+        self.meter.cycles += cycles;
+    }
+
+    /// Counts a block that begins here.
+    #[inline]
+    pub(super) fn enter(&mut self, address: u32, size: u32, block: Block) {
         if self.next != address {
             // The branch belongs to the block that ends with it.
             self.spend(REFILL);
         }
-        self.next = address.wrapping_add(size);
-        let Some(index) = self.block(address, size) else {
-            self.current = UNSEEN;
-            return;
-        };
-        let Block { instructions, cycles, masks, .. } = self.blocks[index as usize];
-        (self.current, self.masks) = (index, masks);
-        self.meter.instructions += instructions;
-        self.spend(cycles);
+        (self.block, self.next) = (address, address.wrapping_add(size));
+        self.meter.instructions += u64::from(block.instructions);
+        self.spend(block.cycles.into());
     }
 
-    /// This instruction's cycles are known only when it is reached.
-    pub(super) fn is_late(&mut self, address: u32, kind: Kind) {
-        self.late.insert(address, kind);
-        self.unhooked.insert(address);
+    /// Marks an address from now on.
+    pub(super) fn mark(&mut self, address: u32) {
+        self.marked.insert(address);
+        self.forget();
     }
 
-    /// Whether the block that begins here needs hooks before it can be counted; they are
-    /// then in [`Count::wanted`].
-    ///
-    /// The engine goes through all hooks of instructions whenever it calls one, so only
-    /// what the program comes to gets any.
+    /// Every block is met as if for the first time.
+    pub(super) fn forget(&mut self) {
+        self.blocks.fill(Block::default());
+        self.met = self.meter.cycles;
+    }
+
+    fn halfword(&self, address: u32) -> usize {
+        address.wrapping_sub(self.base) as usize / 2
+    }
+
+    /// Whether a block begins here.
+    pub(super) fn begins(&self, address: u32) -> bool {
+        self.blocks.get(self.halfword(address)).is_some_and(|block| block.size > 0)
+    }
+
+    /// Whether the block that begins here, and has not been seen, needs hooks before it can
+    /// be counted; they are then in [`Count::wanted`].
     pub(super) fn wants_hooks(&mut self, address: u32, size: u32) -> bool {
-        if self.unhooked.is_empty() || self.known(address, size).is_some() {
+        if self.common {
             return false;
         }
         for at in (address..address.saturating_add(size)).step_by(2) {
-            if let (true, Some(kind)) = (self.unhooked.remove(&at), self.late.get(&at)) {
-                self.wanted.push((at, *kind));
+            if let Some(kind) = self.late(at)
+                && !self.hooked.contains(&(at, kind))
+            {
+                self.wanted.push((at, kind));
             }
         }
         !self.wanted.is_empty()
     }
 
     /// The block of this place, if it has been seen.
-    fn known(&self, address: u32, size: u32) -> Option<u32> {
-        let index = *self.begins.get(address.wrapping_sub(self.base) as usize / 2)?;
-        self.blocks.get(index as usize).filter(|block| block.size == size).map(|_| index)
+    #[inline]
+    pub(super) fn known(&self, address: u32, size: u32) -> Option<Block> {
+        let block = self.blocks.get(self.halfword(address))?;
+        (u32::from(block.size) == size).then_some(*block)
     }
 
-    /// The block of this place, decoded when first seen.
-    fn block(&mut self, address: u32, size: u32) -> Option<u32> {
-        if let Some(index) = self.known(address, size) {
-            return Some(index);
-        }
+    /// The block of this place, seen for the first time. What does not lie in the counted
+    /// code costs nothing.
+    pub(super) fn meet(&mut self, address: u32, size: u32) -> Block {
+        let mut block = Block { marked: self.marked.contains(&address), ..Block::default() };
         let offset = address.wrapping_sub(self.base) as usize;
-        let code = self.bytes.get(offset..offset + size as usize)?;
-        let (mut instructions, mut cycles, mut masks) = (0, 0, None);
+        let Some(code) = self.bytes.get(offset..offset + size as usize) else { return block };
         // A block may begin under a condition, so the sweep of the whole code decides
         // what is late, not this one.
         for (at, instruction, _) in thumb::sweep(code, address) {
-            let late = self.late.contains_key(&at);
-            instructions += 1;
-            masks = code
-                .get((at - address) as usize..)
-                .filter(|rest| masks_interrupts(rest))
-                .map(|_| at);
-            cycles += 1 + if late { 0 } else { timing::extra(instruction.kind) };
+            let late = self.late(at).is_some();
+            let extra = if late { 0 } else { timing::extra(instruction.kind) };
+            block.instructions += 1;
+            block.cycles += 1 + extra as u16;
         }
-        let index = u32::try_from(self.blocks.len()).ok()?;
-        self.blocks.push(Block { address, size, instructions, cycles, masks, heat: 0 });
-        *self.begins.get_mut(offset / 2)? = index;
-        Some(index)
-    }
-}
-
-/// Whether code begins with an instruction that shuts interrupts out or lets them in:
-/// `CPSID i`, `CPSIE i` or `MSR PRIMASK, Rn`.
-fn masks_interrupts(code: &[u8]) -> bool {
-    match *code {
-        [0x72 | 0x62, 0xB6, ..] => true,
-        [first, 0xF3, 0x10, 0x88, ..] => first >> 4 == 8,
-        _ => false,
+        block.size = size as u16;
+        self.blocks[offset / 2] = block;
+        self.met = self.meter.cycles;
+        block
     }
 }

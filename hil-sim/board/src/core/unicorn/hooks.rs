@@ -3,20 +3,22 @@
 use unicorn_engine::{HookType, RegisterARM};
 
 use super::{
-    BREAKPOINT, Bus, CALL, CoreError, Counted, EXCEPTION, Fault, Hooked, Inside, Mark, RETURN,
-    RETURN_BITS, SEV, Stop, Touch, UnicornCore, WFE, engine, general, passes,
+    BREAKPOINT, Bus, CALL, CoreError, Counted, Fault, Hooked, Inside, Mark, RETURN, RETURN_BITS,
+    SEV, Stop, Touch, UnicornCore, WFE, engine, general, passes,
 };
 use crate::thumb::{self, Kind};
 use crate::timing;
+
+/// Cycles without a new block after which the code in use is taken to be translated.
+const QUIET: u64 = 500_000;
+/// Needless calls of the common hook after which blocks are translated again.
+const NEEDLESS: u32 = 10_000;
 
 impl<B: Bus + 'static> UnicornCore<B> {
     /// Hooks what is counted, reported or has to stop the program.
     pub(super) fn hook(&mut self, counted: &Counted<'_>) -> Result<(), CoreError> {
         let uc = &mut self.engine;
         let blocks = uc.add_block_hook(1, 0, |uc, address, size| {
-            if let Some(at) = uc.get_data_mut().count.masks.take() {
-                look_at_mask(uc, at);
-            }
             let Inside { count, bus, .. } = uc.get_data_mut();
             let now = count.meter.cycles;
             // What stops here is not executed and so not counted.
@@ -30,14 +32,16 @@ impl<B: Bus + 'static> UnicornCore<B> {
                 halt(uc, Stop::Urgent(address as u32));
                 return;
             }
-            let Inside { count, marked, .. } = uc.get_data_mut();
-            if count.wants_hooks(address as u32, size) {
-                halt(uc, Stop::Spent(address as u32));
-                return;
-            }
-            count.enter(address as u32, size);
-            if marked.binary_search(&(address as u32)).is_ok() {
-                note(uc, address as u32);
+            let count = &mut uc.get_data_mut().count;
+            let at = address as u32;
+            let block = match count.known(at, size) {
+                Some(block) => block,
+                None if count.wants_hooks(at, size) => return halt(uc, Stop::Spent(at)),
+                None => count.meet(at, size),
+            };
+            count.enter(at, size, block);
+            if block.marked {
+                note(uc, at);
             }
         });
         engine("hook blocks", blocks)?;
@@ -81,10 +85,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
             let bytes = (range.start.wrapping_sub(counted.base) as usize)
                 ..(range.end.wrapping_sub(counted.base) as usize);
             let code = counted.bytes.get(bytes).unwrap_or_default();
-            for (address, instruction, conditional) in thumb::sweep(code, range.start) {
-                if timing::is_late(&instruction, conditional) {
-                    self.engine.get_data_mut().count.is_late(address, instruction.kind);
-                }
+            for (address, instruction, _) in thumb::sweep(code, range.start) {
                 let at = (address - range.start) as usize;
                 if instruction.size == 2 && code.get(at..at + 2) == Some(&SEV[..]) {
                     let at = u64::from(address);
@@ -94,7 +95,9 @@ impl<B: Bus + 'static> UnicornCore<B> {
                 }
             }
         }
-        Ok(())
+        // Where there is but one such hook the engine calls it by itself, and would do so
+        // when it is gone.
+        engine("hook an instruction", self.engine.add_code_hook(1, 1, |_, _, _| {})).map(|_| ())
     }
 
     /// Hooks the instructions that the program has come to, see [`Count::wants_hooks`].
@@ -109,34 +112,78 @@ impl<B: Bus + 'static> UnicornCore<B> {
         Ok(())
     }
 
-    /// Adds what an instruction costs beyond its first cycle whenever it is carried out.
+    /// Has the cycles of this instruction added whenever it is carried out.
     fn hook_late(&mut self, address: u32, kind: Kind) -> Result<(), CoreError> {
         let at = u64::from(address);
-        let hooked = if let Kind::Divide { signed, n, m } = kind {
-            self.engine.add_code_hook(at, at, move |uc, _, _| {
-                let value = |number| uc.reg_read(general(number)).unwrap_or_default() as u32;
-                let cycles = timing::division(signed, value(n), value(m)) - 1;
-                uc.get_data_mut().count.spend(cycles);
-            })
-        } else {
-            let extra = timing::extra(kind);
-            self.engine.add_code_hook(at, at, move |uc, _, _| uc.get_data_mut().count.spend(extra))
-        };
-        engine("hook an instruction", hooked).map(|_| ())
+        let hooked = self.engine.add_code_hook(at, at, move |uc, _, _| {
+            if !uc.get_data().count.common {
+                spend(uc, kind);
+            }
+        });
+        self.own.push((address, engine("hook an instruction", hooked)?));
+        self.engine.get_data_mut().count.hooked.push((address, kind));
+        Ok(())
+    }
+
+    /// Chooses what hooks late instructions.
+    ///
+    /// The engine goes through all hooks of instructions whenever it calls one, so that one
+    /// hook for all of the code is fastest. But where it is there while a block is
+    /// translated, it is called for every instruction of that block. So each late
+    /// instruction has a hook of its own while blocks are being translated; when no new ones
+    /// have come for a while these go, their calls in the translated code stay, and the
+    /// common hook answers them.
+    pub(super) fn choose_hooks(&mut self) -> Result<(), CoreError> {
+        let count = &mut self.engine.get_data_mut().count;
+        match self.common {
+            None if count.meter.cycles > count.met + QUIET && !self.own.is_empty() => {
+                let (first, last) = (count.base, count.base + (count.bytes.len() as u32 - 1));
+                (count.common, count.needless) = (true, 0);
+                let own = std::mem::take(&mut self.own);
+                // With a hook at its beginning a block would be forgotten.
+                let (kept, gone): (Vec<_>, Vec<_>) =
+                    own.into_iter().partition(|(at, _)| count.begins(*at));
+                self.own = kept;
+                for (_, hook) in gone {
+                    engine("remove a hook", self.engine.remove_hook(hook))?;
+                }
+                let common = self.engine.add_code_hook(first.into(), last.into(), |uc, at, _| {
+                    match uc.get_data().count.late(at as u32) {
+                        Some(kind) => spend(uc, kind),
+                        None => uc.get_data_mut().count.needless += 1,
+                    }
+                });
+                self.common = Some(engine("hook all instructions", common)?);
+            }
+            Some(hook) if count.needless > NEEDLESS => {
+                count.common = false;
+                count.forget();
+                let own = &self.own;
+                let there = |at: u32| own.iter().any(|(place, _)| *place == at);
+                let (kept, again): (Vec<_>, Vec<_>) =
+                    std::mem::take(&mut count.hooked).into_iter().partition(|(at, _)| there(*at));
+                count.hooked = kept;
+                self.common = None;
+                engine("remove a hook", self.engine.remove_hook(hook))?;
+                for (address, kind) in again {
+                    self.hook_late(address, kind)?;
+                }
+            }
+            _ => {}
+        }
+        Ok(())
     }
 }
 
-/// The instruction at this place has shut interrupts out or let them in.
-#[cold]
-fn look_at_mask<B>(uc: &mut Hooked<'_, B>, address: u32) {
-    if uc.reg_read(RegisterARM::PRIMASK).unwrap_or_default() & 1 == 0 {
-        uc.get_data_mut().open();
-        return;
-    }
-    let flags = uc.reg_read(RegisterARM::XPSR).unwrap_or_default();
-    let inside = uc.get_data_mut();
-    let now = inside.count.meter.cycles;
-    inside.shut.get_or_insert((now, (address, (flags & EXCEPTION) as u32)));
+/// Adds what an instruction costs beyond its first cycle.
+fn spend<B>(uc: &mut Hooked<'_, B>, kind: Kind) {
+    let cycles = if let Kind::Divide { signed, n, m } = kind {
+        let value = |number| uc.reg_read(general(number)).unwrap_or_default() as u32;
+        timing::division(signed, value(n), value(m)) - 1
+    } else {
+        timing::extra(kind)
+    };
+    uc.get_data_mut().count.spend(cycles);
 }
 
 /// Stops the engine from inside a hook.

@@ -16,14 +16,16 @@ use super::core::CoreError;
 use super::elf::FLASH;
 use super::faults::Fault;
 use super::machine::Machine;
+use super::params::PLACES;
 use super::peripherals::HZ;
 use super::peripherals::flash::Cut;
-use super::peripherals::rcc::Cause;
-use hil_sim::faults::{Injection, Kind, Tamper, Target, sets};
-use hil_sim::params::{board::PLACES, set_of};
+use hil_sim::faults::sets;
+use hil_sim::injector::FaultInjector;
+use hil_sim::params::set_of;
 use hil_sim::plant::rig::{Drives, VirtualRig};
 use hil_sim::plant::sensors::Codes;
 use hil_sim::scenario::Scenario;
+use hil_sim::scenario::injection::{Injection, Kind, Target};
 use interstage::params::slots::SLOT_BYTES;
 use interstage::rig::Rig;
 
@@ -36,8 +38,8 @@ const INTO_TURN: u64 = 100;
 const PATIENCE: u32 = 20;
 
 /// The faults of a run, and how far they have come.
-pub(super) struct Tampered {
-    tamper: Tamper,
+pub(super) struct BoardInjector {
+    faults: FaultInjector,
     hunt: Option<Hunt>,
     /// When the task that was to hang was caught, or the save broken off, s.
     caught_s: Option<f64>,
@@ -45,6 +47,8 @@ pub(super) struct Tampered {
     waits: bool,
     /// Ticks are being lost.
     losing: bool,
+    /// A reset that comes within the millisecond, after this part of it.
+    reset: Option<(Fault, f64)>,
     /// Encoder and angle sensor give nothing.
     silent: [bool; 2],
     /// The host's line is flooded, and with what next.
@@ -53,20 +57,24 @@ pub(super) struct Tampered {
     save: Option<Save>,
     /// The rig of the parameters.
     rig: Rig,
+    /// Seed of the run.
+    seed: u64,
 }
 
-impl Tampered {
-    pub(super) fn new(tamper: Tamper, scenario: &Scenario) -> Self {
+impl BoardInjector {
+    pub(super) fn new(faults: FaultInjector, scenario: &Scenario) -> Self {
         Self {
-            tamper,
+            faults,
             hunt: None,
             caught_s: None,
             waits: false,
             losing: false,
+            reset: None,
             silent: [false; 2],
             flood: None,
             save: None,
             rig: scenario.rig.clone(),
+            seed: scenario.run.seed,
         }
     }
 
@@ -77,12 +85,12 @@ impl Tampered {
         plant: &mut VirtualRig,
         t_s: f64,
     ) -> Result<(), CoreError> {
-        self.tamper.begin(t_s, plant.truth());
-        self.tamper.plant(plant);
-        for (injection, comes) in self.tamper.changes() {
+        self.faults.begin(t_s, plant.truth());
+        self.faults.plant(plant);
+        for (injection, comes) in self.faults.changes() {
             self.change(machine, &injection, comes)?;
         }
-        let losing = self.tamper.lost();
+        let losing = self.faults.lost();
         if losing != std::mem::replace(&mut self.losing, losing) {
             switch(Fault::ButtonStorm, machine, losing)?;
         }
@@ -102,9 +110,6 @@ impl Tampered {
             self.waits = true;
             self.hunt = comes.then(|| Hunt::new(machine, task));
         }
-        if injection.target == Target::Debugger && comes {
-            machine.restart(Cause::Software)?;
-        }
         if injection.target == Target::ParameterSave {
             self.waits = true;
             // An unsound rig has been refused where the sets were put into flash.
@@ -115,6 +120,11 @@ impl Tampered {
             return bit.strike(machine);
         }
         match register(injection) {
+            Some(fault) if comes && injection.resets_board() => {
+                // Between any two instructions.
+                self.reset = Some((fault, (self.seed as f64 * 0.618_034).fract()));
+                Ok(())
+            }
             Some(fault) => switch(fault, machine, comes),
             None => Ok(()),
         }
@@ -122,6 +132,11 @@ impl Tampered {
 
     /// Runs the board towards the turn of a task that is to hang, up to this cycle.
     pub(super) fn hunt(&mut self, machine: &mut Machine, until: u64) -> Result<(), CoreError> {
+        if let Some((fault, part)) = self.reset.take() {
+            let now = machine.now();
+            machine.run_on(now + (part * until.saturating_sub(now) as f64) as u64)?;
+            fault.strike(machine)?;
+        }
         if let Some(hunt) = &mut self.hunt
             && hunt.go(machine, until)?
         {
@@ -159,7 +174,7 @@ impl Tampered {
             arm: Some(Sample { code: codes.arm, at: now }),
             bridges: Some(codes.bridges),
         };
-        self.tamper.sensors(&mut frame);
+        self.faults.sensors(&mut frame);
         let bridge = |sample: Option<Sample<AdcCode>>| match sample {
             Some(sample) if sample.at == now => sample.code,
             _ => AdcCode::new(0),
@@ -182,12 +197,12 @@ impl Tampered {
 
     /// The bridges as the plant gets them.
     pub(super) fn drives(&mut self, asked: Drives) -> Drives {
-        self.tamper.drives(asked)
+        self.faults.drives(asked)
     }
 
     /// A command that nobody gave.
     pub(super) fn command(&mut self) -> Option<Command> {
-        self.tamper.command(None)
+        self.faults.command(None)
     }
 
     /// Bytes that nobody meant for the host's line.
@@ -202,23 +217,23 @@ impl Tampered {
 
     /// Whether nobody reads the log.
     pub(super) fn log_gone(&self) -> bool {
-        self.tamper.log_gone()
+        self.faults.log_gone()
     }
 
     /// When the first fault came, s since power-up; of a task that hangs, when it was
     /// caught; of a save, when it was broken off.
     pub(super) fn struck_s(&self) -> Option<f64> {
-        if self.waits { self.caught_s } else { self.tamper.struck_s() }
+        if self.waits { self.caught_s } else { self.faults.struck_s() }
     }
 
-    /// When it first did something, see [`Tamper::acts_s`].
+    /// When it first did something, see [`FaultInjector::acts_s`].
     pub(super) fn acts_s(&self) -> Option<f64> {
-        if self.waits { self.caught_s } else { self.tamper.acts_s() }
+        if self.waits { self.caught_s } else { self.faults.acts_s() }
     }
 
-    /// When the readback had to tell it, see [`Tamper::tells_s`].
+    /// When the readback had to tell it, see [`FaultInjector::tells_s`].
     pub(super) fn tells_s(&self) -> Option<f64> {
-        if self.waits { self.caught_s } else { self.tamper.tells_s() }
+        if self.waits { self.caught_s } else { self.faults.tells_s() }
     }
 }
 
@@ -302,6 +317,7 @@ fn register(injection: &Injection) -> Option<Fault> {
         (Target::Supply, Kind::Weak) => Fault::SupplyDip,
         (Target::Supply, _) => Fault::SupplyCut,
         (Target::ResetPin, _) => Fault::ResetPin,
+        (Target::Debugger, _) => Fault::Software,
         _ => return None,
     })
 }

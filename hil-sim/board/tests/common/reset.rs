@@ -1,4 +1,3 @@
-#![allow(dead_code, reason = "every test takes what it needs")]
 //! A board under way that is reset, and what it reports then.
 
 use hil_sim::log::Run;
@@ -9,7 +8,7 @@ use rig_board::bench::{Bench, Passed};
 use rig_board::core::Register;
 use rig_board::peripherals::rcc::Cause;
 
-use super::common::{elf, strings};
+use super::{elf, strings};
 
 /// A board under way.
 pub(crate) struct Board {

@@ -6,29 +6,26 @@ use gimli::{Dwarf, EndianSlice, LittleEndian, SectionId};
 use object::read::elf::ElfFile32;
 use object::{Endianness, Object, ObjectSection};
 
-use crate::elf::form;
-use crate::image::ImageError;
-
 type Slice<'a> = EndianSlice<'a, LittleEndian>;
 
 /// Names of functions by address.
-pub(crate) struct Names<'a>(Context<Slice<'a>>);
+pub(super) struct Names<'a>(Context<Slice<'a>>);
 
 impl<'a> Names<'a> {
     /// Reads the debug information of `elf`.
-    pub(crate) fn read(elf: &'a [u8]) -> Result<Self, ImageError> {
-        let file = ElfFile32::<Endianness>::parse(elf).map_err(form)?;
+    pub(super) fn read(elf: &'a [u8]) -> Self {
+        let file = ElfFile32::<Endianness>::parse(elf).expect("an image");
         let section = |id: SectionId| -> Result<Slice<'a>, gimli::Error> {
             let data = file.section_by_name(id.name()).and_then(|s| s.data().ok());
             Ok(EndianSlice::new(data.unwrap_or_default(), LittleEndian))
         };
-        let dwarf = Dwarf::load(section).map_err(form)?;
-        Ok(Self(Context::from_dwarf(dwarf).map_err(form)?))
+        let dwarf = Dwarf::load(section).expect("debug information");
+        Self(Context::from_dwarf(dwarf).expect("debug information"))
     }
 
     /// The functions of the source at this address, innermost first, none without debug
     /// information.
-    pub(crate) fn frames(&self, address: u32) -> Vec<Frame> {
+    pub(super) fn frames(&self, address: u32) -> Vec<Frame> {
         let Ok(mut frames) = self.0.find_frames(address.into()).skip_all_loads() else {
             return Vec::new();
         };
@@ -44,30 +41,23 @@ impl<'a> Names<'a> {
         }
         found
     }
-
-    /// The innermost function at this address, without type parameters.
-    pub(super) fn at(&self, address: u32) -> Option<String> {
-        let mut frames = self.0.find_frames(address.into()).skip_all_loads().ok()?;
-        let name = frames.next().ok()??.function?;
-        Some(short(&name.demangle().ok()?))
-    }
 }
 
 /// A function of the source, and a place in it.
-#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
-pub struct Frame {
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Frame {
     /// Name, with the crate's.
-    pub function: String,
+    pub(super) function: String,
     /// File: of this project from its folder on, of others from that of their crate on.
-    pub file: String,
+    pub(super) file: String,
     /// Line, 0 where the compiler gives none.
-    pub line: u32,
+    pub(super) line: u32,
 }
 
 /// A path of the debug information from where it says something.
 fn shortened(path: &str) -> String {
     let own = concat!(env!("CARGO_MANIFEST_DIR"), "/");
-    let own = own.strip_suffix("hil-sim/").unwrap_or(own);
+    let own = own.strip_suffix("hil-sim/board/").unwrap_or(own);
     if let Some(rest) = path.strip_prefix(own) {
         return rest.to_owned();
     }
@@ -88,16 +78,5 @@ fn short(name: &str) -> String {
             path.to_owned()
         }
         _ => name.to_owned(),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_hash_is_cut_and_nothing_else() {
-        assert_eq!(short("a::b::h0123456789abcdef"), "a::b");
-        assert_eq!(short("a::halve"), "a::halve");
     }
 }

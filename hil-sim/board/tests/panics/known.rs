@@ -4,12 +4,12 @@
 //! The control tick's own code has none left: what is here is made by the compiler for
 //! every `async` function, or stands in the libraries under the tasks.
 
-use crate::heat::names::Frame;
+use super::names::Frame;
 
 use super::Site;
 
 /// Why.
-pub type Reason = &'static str;
+type Reason = &'static str;
 
 /// What a site looks like, and why it is never taken.
 struct Known {
@@ -82,54 +82,45 @@ fn find(known: &[Known], site: &Site) -> Option<Reason> {
 }
 
 /// Why this panic is never taken, if that is known.
-#[must_use]
-pub fn judge(site: &Site) -> Option<Reason> {
+pub(super) fn judge(site: &Site) -> Option<Reason> {
     find(&PANICS, site)
 }
 
 /// The same of a call through a register: why what it calls does not panic.
-#[must_use]
-pub fn judge_indirect(site: &Site) -> Option<Reason> {
+pub(super) fn judge_indirect(site: &Site) -> Option<Reason> {
     find(&INDIRECT, site)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn site(calls: &str, frames: &[(&str, &str)]) -> Site {
-        let frame = |(function, file): &(&str, &str)| Frame {
-            function: (*function).to_owned(),
-            file: (*file).to_owned(),
-            line: 1,
-        };
-        Site {
-            address: 0,
-            within: "f".to_owned(),
-            calls: calls.to_owned(),
-            frames: frames.iter().map(frame).collect(),
-            path: vec!["f".to_owned()],
-            reason: None,
-        }
+fn site(calls: &str, frames: &[(&str, &str)]) -> Site {
+    let frame = |(function, file): &(&str, &str)| Frame {
+        function: (*function).to_owned(),
+        file: (*file).to_owned(),
+        line: 1,
+    };
+    Site {
+        address: 0,
+        calls: calls.to_owned(),
+        frames: frames.iter().map(frame).collect(),
+        path: vec!["f".to_owned()],
     }
+}
 
-    #[test]
-    fn what_nobody_has_looked_at_is_not_harmless() {
-        let bounds = "core::panicking::panic_bounds_check";
-        let own = [("interstage::tick::Controller::step_into", "src/tick.rs")];
-        assert_eq!(judge(&site(bounds, &own)), None);
-        // An index in a task's own code is no end of its future.
-        let task = [("interstage::tasks::motors::motors::{{closure}}", "src/tasks/motors.rs")];
-        assert_eq!(judge(&site(bounds, &task)), None);
-        assert_eq!(judge(&site("core::cell::panic_already_borrowed", &task)), Some(RESUMED));
-        // A cell of our own, borrowed in a task.
-        let cell = [
-            ("core::cell::RefCell<T>::borrow_mut", "core/src/cell.rs"),
-            ("interstage::tasks::exchange::Exchange::record", "src/tasks/exchange.rs"),
-            task[0],
-        ];
-        assert_eq!(judge(&site("core::cell::panic_already_borrowed", &cell)), None);
-        assert_eq!(judge(&site(bounds, &[])), None);
-        assert_eq!(judge_indirect(&site("", &task)), None);
-    }
+#[test]
+fn what_nobody_has_looked_at_is_not_harmless() {
+    let bounds = "core::panicking::panic_bounds_check";
+    let own = [("interstage::tick::Controller::step_into", "src/tick.rs")];
+    assert_eq!(judge(&site(bounds, &own)), None);
+    // An index in a task's own code is no end of its future.
+    let task = [("interstage::tasks::motors::motors::{{closure}}", "src/tasks/motors.rs")];
+    assert_eq!(judge(&site(bounds, &task)), None);
+    assert_eq!(judge(&site("core::cell::panic_already_borrowed", &task)), Some(RESUMED));
+    // A cell of our own, borrowed in a task.
+    let cell = [
+        ("core::cell::RefCell<T>::borrow_mut", "core/src/cell.rs"),
+        ("interstage::tasks::exchange::Exchange::record", "src/tasks/exchange.rs"),
+        task[0],
+    ];
+    assert_eq!(judge(&site("core::cell::panic_already_borrowed", &cell)), None);
+    assert_eq!(judge(&site(bounds, &[])), None);
+    assert_eq!(judge_indirect(&site("", &task)), None);
 }

@@ -1,6 +1,6 @@
-//! The firmware for the emulated board, built once a test binary.
+//! The firmware for the emulated board, built once.
 
-#![allow(dead_code, reason = "each test file uses its part of this")]
+pub(crate) mod reset;
 
 use std::sync::OnceLock;
 

@@ -2,9 +2,8 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
-use crate::elf::{FLASH, Function, Loaded};
-use crate::image::ImageError;
-use crate::thumb;
+use rig_board::elf::{FLASH, Function, Loaded};
+use rig_board::thumb;
 
 /// A branch out of a function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,11 +89,11 @@ fn flow(a: u16, b: Option<u16>, address: u32) -> Flow {
 
 impl Graph {
     /// Reads the code of an image.
-    pub(super) fn of(elf: &[u8]) -> Result<Self, ImageError> {
-        let image = Loaded::of(elf)?;
+    pub(super) fn of(elf: &[u8]) -> Self {
+        let image = Loaded::of(elf).expect("an image");
         let functions = image.functions.clone();
         let branches = functions.iter().map(|function| branches(&image, &functions, function));
-        Ok(Self { branches: branches.collect(), functions })
+        Self { branches: branches.collect(), functions }
     }
 
     /// Everything that can be reached from the roots, with the way there, the root
@@ -158,62 +157,57 @@ fn branches(image: &Loaded, functions: &[Function], function: &Function) -> Vec<
     found
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn branches_lead_where_the_manual_says() {
-        let at = 0x0800_1000;
-        for (a, b, expected) in [
-            // b .; b .+0x10; bne .-8; beq.w .+0x200
-            (0xE7FE, None, Flow::To(at)),
-            (0xE006, None, Flow::To(at + 0x10)),
-            (0xD1FA, None, Flow::To(at - 8)),
-            (0xF000, Some(0x80FE), Flow::To(at + 0x200)),
-            // bl .+4; bl .-4; b.w .-0x800; bl far ahead and far behind
-            (0xF000, Some(0xF800), Flow::To(at + 4)),
-            (0xF7FF, Some(0xFFFE), Flow::To(at)),
-            (0xF7FF, Some(0xBBFE), Flow::To(at - 0x800)),
-            (0xF3FF, Some(0xD7FE), Flow::To(at + 0x00FF_F000 + 0x1000)),
-            // blx r3; bx r2; bx lr; mov pc, r1; udf; svc; ldr r0, [r1]
-            (0x4798, None, Flow::Register),
-            (0x4710, None, Flow::Register),
-            (0x4770, None, Flow::On),
-            (0x468F, None, Flow::Register),
-            (0xDE01, None, Flow::On),
-            (0xDF00, None, Flow::On),
-            (0x6808, None, Flow::On),
-            // ldr.w pc, [r0, r1, lsl #2]; ldr.w r1, [r0]; pop.w {pc}; dmb; msr
-            (0xF850, Some(0xF021), Flow::Register),
-            (0xF8D0, Some(0x1000), Flow::On),
-            (0xF85D, Some(0xFB04), Flow::On),
-            (0xF3BF, Some(0x8F5F), Flow::On),
-            (0xF380, Some(0x8810), Flow::On),
-        ] {
-            assert_eq!(flow(a, b, at), expected, "{a:#x} {b:x?}");
-        }
+#[test]
+fn branches_lead_where_the_manual_says() {
+    let at = 0x0800_1000;
+    for (a, b, expected) in [
+        // b .; b .+0x10; bne .-8; beq.w .+0x200
+        (0xE7FE, None, Flow::To(at)),
+        (0xE006, None, Flow::To(at + 0x10)),
+        (0xD1FA, None, Flow::To(at - 8)),
+        (0xF000, Some(0x80FE), Flow::To(at + 0x200)),
+        // bl .+4; bl .-4; b.w .-0x800; bl far ahead and far behind
+        (0xF000, Some(0xF800), Flow::To(at + 4)),
+        (0xF7FF, Some(0xFFFE), Flow::To(at)),
+        (0xF7FF, Some(0xBBFE), Flow::To(at - 0x800)),
+        (0xF3FF, Some(0xD7FE), Flow::To(at + 0x00FF_F000 + 0x1000)),
+        // blx r3; bx r2; bx lr; mov pc, r1; udf; svc; ldr r0, [r1]
+        (0x4798, None, Flow::Register),
+        (0x4710, None, Flow::Register),
+        (0x4770, None, Flow::On),
+        (0x468F, None, Flow::Register),
+        (0xDE01, None, Flow::On),
+        (0xDF00, None, Flow::On),
+        (0x6808, None, Flow::On),
+        // ldr.w pc, [r0, r1, lsl #2]; ldr.w r1, [r0]; pop.w {pc}; dmb; msr
+        (0xF850, Some(0xF021), Flow::Register),
+        (0xF8D0, Some(0x1000), Flow::On),
+        (0xF85D, Some(0xFB04), Flow::On),
+        (0xF3BF, Some(0x8F5F), Flow::On),
+        (0xF380, Some(0x8810), Flow::On),
+    ] {
+        assert_eq!(flow(a, b, at), expected, "{a:#x} {b:x?}");
     }
+}
 
-    #[test]
-    fn what_is_reached_is_reached_by_a_way() {
-        let function = |n: u32| Function { range: 16 * n..16 * n + 16, name: format!("f{n}") };
-        let to = |to| Branch { from: 0, to };
-        let graph = Graph {
-            functions: (0..6).map(function).collect(),
-            branches: vec![
-                vec![to(Some(1)), to(None)],
-                vec![to(Some(2)), to(Some(0))],
-                vec![to(Some(3))],
-                vec![to(Some(4))],
-                vec![],
-                vec![to(Some(0))],
-            ],
-        };
-        let reached = graph.reach(&[0], &|name| name == "f3");
-        assert_eq!(reached.keys().copied().collect::<Vec<_>>(), [0, 1, 2]);
-        assert_eq!(reached[&2], [0, 1, 2]);
-        assert_eq!(at(&graph.functions, 31), Some(1));
-        assert_eq!(at(&graph.functions, 96), None);
-    }
+#[test]
+fn what_is_reached_is_reached_by_a_way() {
+    let function = |n: u32| Function { range: 16 * n..16 * n + 16, name: format!("f{n}") };
+    let to = |to| Branch { from: 0, to };
+    let graph = Graph {
+        functions: (0..6).map(function).collect(),
+        branches: vec![
+            vec![to(Some(1)), to(None)],
+            vec![to(Some(2)), to(Some(0))],
+            vec![to(Some(3))],
+            vec![to(Some(4))],
+            vec![],
+            vec![to(Some(0))],
+        ],
+    };
+    let reached = graph.reach(&[0], &|name| name == "f3");
+    assert_eq!(reached.keys().copied().collect::<Vec<_>>(), [0, 1, 2]);
+    assert_eq!(reached[&2], [0, 1, 2]);
+    assert_eq!(at(&graph.functions, 31), Some(1));
+    assert_eq!(at(&graph.functions, 96), None);
 }

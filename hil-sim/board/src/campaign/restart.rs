@@ -1,0 +1,230 @@
+//! A reset at a random instant: is it recorded, does the drive hold until it is commanded,
+//! are the stored parameters as they were, and does it arrive where it is then sent?
+
+use interstage::blackbox::{Reset, Restart, Stopped};
+use interstage::log::Event;
+use interstage::supervise::{Command, Direction, Fault, Mode};
+
+use super::Board;
+use crate::bench::{BenchError, Passed};
+use crate::params::PLACES;
+use crate::peripherals::rcc::Cause;
+use crate::run::RunError;
+use hil_sim::log::Run;
+use hil_sim::plant::rig::Truth;
+use hil_sim::scenario::Scenario;
+
+/// Most motion from the reset to the command, mm: what the wheel runs on when its motor
+/// loses its power.
+const MOTION_MM: f64 = 0.5;
+/// Longest time from being caught to the cut of the bridges, s: where the tick is not what
+/// hangs, the run goes on under control until a task has been missed for 50 ms, and 80 ms
+/// more until the system timer finds the watchdog unfed.
+const HUNG_S: f64 = 0.131;
+/// Most change of the preload in the hold, parts of what it was: the rubber relaxes, the
+/// gears hold.
+const PRELOAD_PART: f64 = 0.25;
+/// The same whatever it was, N.
+const PRELOAD_N: f64 = 3.0;
+/// Largest error of the recorded position, mm: the estimate's over a run, and a tick.
+const RECORD_MM: f64 = 2.0;
+/// Oldest record, ticks before the reset.
+const RECORD_TICKS: usize = 3;
+/// From the supply's warning, or from being caught, to the reset, ticks.
+const FALLS_TICKS: usize = 2;
+const BITE_TICKS: usize = 250;
+/// Largest distance from the end of travel on arrival, mm.
+const ARRIVED_MM: f64 = 1.0;
+/// Longest run to either end, ms.
+const RUN_MS: u32 = 60_000;
+
+/// What is kept of the plant and the pins around a reset.
+pub(super) struct Hold {
+    /// What flash holds of parameters.
+    place: Vec<u8>,
+    /// Position in each millisecond up to the reset, mm.
+    positions_mm: Vec<f64>,
+    /// The plant when the fault came, behind the reset, and in the last millisecond before a
+    /// command.
+    struck: Option<Truth>,
+    reset: Option<Truth>,
+    last: Option<Truth>,
+    /// A bridge was driven without a command.
+    driven: bool,
+    /// A command has come since.
+    over: bool,
+}
+
+impl Hold {
+    /// Before the first millisecond, with this in the flash that holds parameters.
+    pub(super) fn new(place: Vec<u8>) -> Self {
+        Self {
+            place,
+            positions_mm: Vec::new(),
+            struck: None,
+            reset: None,
+            last: None,
+            driven: false,
+            over: false,
+        }
+    }
+
+    /// Looks at a millisecond.
+    pub(super) fn look(&mut self, board: &Board<'_>, passed: &Passed, command: Option<Command>) {
+        let truth = board.bench.plant().truth();
+        if board.bench.struck_s().is_some() {
+            self.struck.get_or_insert(*truth);
+        }
+        if board.restarts == 0 {
+            self.positions_mm.push(truth.position_mm);
+            return;
+        }
+        self.over |= command.is_some();
+        if self.over {
+            return;
+        }
+        // In the millisecond of the reset there was drive.
+        if self.last.is_some() {
+            self.reset.get_or_insert(*truth);
+            let drives = &passed.drives;
+            self.driven |= drives.drive_on && drives.drive != 0.0;
+            self.driven |= drives.preload_on && drives.preload != 0.0;
+        }
+        self.last = Some(*truth);
+    }
+
+    /// What was not held.
+    fn harms(&self, scenario: &Scenario) -> Vec<String> {
+        let (Some(struck), Some(reset), Some(last)) = (self.struck, self.reset, self.last) else {
+            return vec!["no hold after the reset".to_owned()];
+        };
+        let motion_mm = (last.position_mm - reset.position_mm).abs();
+        let hung_mm = (reset.position_mm - struck.position_mm).abs();
+        let hung_n = (reset.preload_n - struck.preload_n).abs();
+        let preload_n = (last.preload_n - reset.preload_n).abs();
+        let most_mm = HUNG_S * scenario.rig.drive.cruise_speed_mm_s + MOTION_MM;
+        let most_n = HUNG_S * scenario.rig.preload.slew_n_per_s + PRELOAD_N;
+        let changed_n = PRELOAD_N.max(PRELOAD_PART * reset.preload_n.abs());
+        let bounds = [
+            (motion_mm <= MOTION_MM, format!("moved by {motion_mm:.2} mm after the reset")),
+            (hung_mm <= most_mm, format!("ran on for {hung_mm:.2} mm")),
+            (hung_n <= most_n, format!("preload went on by {hung_n:.1} N")),
+            (preload_n <= changed_n, format!("preload changed by {preload_n:.1} N")),
+            (!self.driven, "driven without a command".to_owned()),
+        ];
+        bounds.into_iter().filter(|(good, _)| !good).map(|(_, harm)| harm).collect()
+    }
+
+    /// What the record lacks.
+    fn record(&self, cause: Cause, restart: Option<&Restart>) -> Option<String> {
+        let Some(restart) = restart else { return Some("no record".to_owned()) };
+        let fail = |what: &str| Some(format!("record: {what}: {restart}"));
+        let (reset, later) = match cause {
+            Cause::Power => (Reset::Power, FALLS_TICKS),
+            Cause::Watchdog => (Reset::Watchdog, BITE_TICKS),
+            Cause::Pin => (Reset::Pin, 0),
+            Cause::Software => (Reset::Software, 0),
+        };
+        if restart.reset != reset {
+            return fail("another reset");
+        }
+        // Power that goes without a warning takes the record with it.
+        let warned = matches!(restart.crash.map(|crash| crash.stopped), Some(Stopped::Supply));
+        let Some(flight) = &restart.flight else {
+            return (cause != Cause::Power).then(|| "record: nothing of the run".to_owned());
+        };
+        let ticks = self.positions_mm.len();
+        let tick = flight.tick as usize;
+        if tick > ticks + 1 || tick + RECORD_TICKS + later < ticks {
+            return fail("of another time");
+        }
+        let at = self.positions_mm[tick.min(ticks - 1)];
+        if (flight.position.to_num::<f64>() - at).abs() > RECORD_MM {
+            return fail(&format!("not at {at:.2} mm"));
+        }
+        match (cause, restart.crash.map(|crash| crash.stopped)) {
+            (Cause::Watchdog, Some(Stopped::Hang { late, .. })) if !late.is_nobody() => None,
+            (Cause::Power, _) if warned => None,
+            (Cause::Power, None) => fail("nothing of the supply"),
+            // Caught in a critical section nothing gets through that could name the task.
+            (_, None) => None,
+            (_, Some(_)) => fail("a crash that was none"),
+        }
+    }
+
+    /// What went wrong around the reset, and with the run that is commanded afterwards.
+    pub(super) fn judged(
+        self,
+        board: &mut Board<'_>,
+        scenario: &Scenario,
+    ) -> Result<(Vec<String>, Option<String>), RunError> {
+        let Some((_, cause)) = board.bench.machine().restarts().first().copied() else {
+            return Ok((Vec::new(), Some("no reset".to_owned())));
+        };
+        let events = Run::of_stream(&board.frames).events;
+        let mut restarts = events.into_iter().filter_map(|entry| match entry.event {
+            Event::Restart(restart) => Some(restart),
+            _ => None,
+        });
+        // Power that came up the first time is reported as well.
+        let first = restarts.next();
+        let restart = restarts.next().or(first);
+        let unrecorded = self.record(cause, restart.as_ref());
+        let mut harms = self.harms(scenario);
+        harms.extend(go_on(board, scenario)?);
+        let mut stored = vec![0; self.place.len()];
+        board.bench.machine().peek(PLACES, &mut stored).map_err(BenchError::from)?;
+        if stored != self.place {
+            harms.push("the stored parameters changed".to_owned());
+        }
+        Ok((harms, unrecorded))
+    }
+}
+
+/// Sends the drive to an end, to the other one first if it says that it does not know its
+/// position; what went wrong.
+fn go_on(board: &mut Board<'_>, scenario: &Scenario) -> Result<Option<String>, RunError> {
+    let mut direction = Direction::ALL[(scenario.run.seed % 2) as usize];
+    for _ in 0..2 {
+        let command = match direction {
+            Direction::Deploy => Command::Start,
+            Direction::Retract => Command::Retract,
+        };
+        board.step(Some(command))?;
+        let mut left = false;
+        for _ in 0..RUN_MS {
+            board.step(None)?;
+            left |= !matches!(board.mode, Mode::Idle | Mode::Complete(_));
+            let there = board.mode == Mode::Complete(direction);
+            if there || left && board.mode.is_at_rest() {
+                break;
+            }
+        }
+        if board.mode == Mode::Complete(direction) {
+            let end_mm = match direction {
+                Direction::Deploy => scenario.rig.rig.travel_mm,
+                Direction::Retract => 0.0,
+            };
+            let at_mm = board.bench.plant().truth().position_mm;
+            let far = (at_mm - end_mm).abs() > ARRIVED_MM;
+            return Ok(far.then(|| format!("says it arrived at {at_mm:.2} mm")));
+        }
+        if board.mode != Mode::FaultHold(Fault::PositionUnknown) {
+            break;
+        }
+        // As its sentence says: the other direction.
+        direction = match direction {
+            Direction::Deploy => Direction::Retract,
+            Direction::Retract => Direction::Deploy,
+        };
+        board.step(Some(Command::Reset))?;
+        for _ in 0..RUN_MS {
+            if board.mode == Mode::Idle {
+                break;
+            }
+            board.step(None)?;
+        }
+    }
+    let at_mm = board.bench.plant().truth().position_mm;
+    Ok(Some(format!("did not arrive after the reset: {:?}, {at_mm:.2} mm", board.mode)))
+}

@@ -1,0 +1,116 @@
+//! Exceptions as the core takes them and returns from them.
+
+use super::{Asleep, Machine, frame};
+use crate::core::{Core, CoreError, Register, passes};
+use crate::exceptions::number::HARD_FAULT;
+use crate::peripherals::system::Cause;
+
+/// Cycles of an exception's entry and return, and of going from one to the next.
+const ENTRY: u64 = 12;
+const EXIT: u64 = 10;
+const CHAIN: u64 = 6;
+
+impl Machine {
+    /// The exception to be taken now.
+    pub(super) fn takeable(&self) -> Result<Option<u8>, CoreError> {
+        let Some((number, priority)) = self.chip().system.exceptions.urgent() else {
+            return Ok(None);
+        };
+        let primask = self.core.register(Register::Primask)?;
+        let basepri = self.core.register(Register::Basepri)?;
+        let faultmask = self.core.register(Register::Faultmask)?;
+        Ok(passes(priority, primask, basepri, faultmask).then_some(number))
+    }
+
+    /// Takes an exception; the program goes on at `back` afterwards. `chained`: straight
+    /// from another one, whose frame stands already.
+    pub(super) fn enter(&mut self, number: u8, back: u32, chained: bool) -> Result<(), CoreError> {
+        let now = self.now();
+        if !chained {
+            if !frame::push(&mut self.core, back)? {
+                return self.stacking_failed(number, back);
+            }
+            let depth = self.chip().system.exceptions.depth();
+            frame::go_to_handler(&mut self.core, number, depth > 0)?;
+        } else {
+            frame::change_handler(&mut self.core, number)?;
+        }
+        self.core.pass(if chained { CHAIN } else { ENTRY });
+        self.chip_mut().system.exceptions.enter(number);
+        self.profile.enter(now);
+        let vector = self.chip().system.control.vector(number);
+        self.pc = self.word(vector)? & !1;
+        Ok(())
+    }
+
+    /// Returns from the exception that runs.
+    pub(super) fn leave(&mut self, value: u32) -> Result<(), CoreError> {
+        let now = self.now();
+        let left = self.chip_mut().system.exceptions.leave(now);
+        self.profile.leave(now);
+        if left == HARD_FAULT {
+            self.core.set_register(Register::Faultmask, 0)?;
+        }
+        if let Some(next) = self.takeable()? {
+            // The frame stays where it is.
+            frame::keep_return(&mut self.core, value)?;
+            return self.enter(next, 0, true);
+        }
+        self.core.pass(EXIT);
+        let depth = self.chip().system.exceptions.depth();
+        match frame::pop(&mut self.core, value)? {
+            Some(pc) => self.pc = pc,
+            None => return self.fault(Cause::Unstacking, value),
+        }
+        if depth == 0 && self.chip().system.control.sleeps_on_exit() {
+            self.fall_asleep(Asleep::Interrupt);
+        }
+        Ok(())
+    }
+
+    /// The program did at `at` what a processor faults on.
+    pub(super) fn fault(&mut self, cause: Cause, at: u32) -> Result<(), CoreError> {
+        let masked = self.core.register(Register::Primask)? & 1 != 0;
+        let system = &mut self.chip_mut().system;
+        let exceptions = system.exceptions.clone();
+        match system.control.fault(cause, &exceptions, masked) {
+            Some(number) => {
+                let now = self.now();
+                self.chip_mut().system.exceptions.pend(number, now);
+                self.enter(number, at, false)
+            }
+            None => {
+                self.pc = at;
+                self.lock_up();
+                Ok(())
+            }
+        }
+    }
+
+    /// There is no memory for the frame of exception `number`.
+    fn stacking_failed(&mut self, number: u8, back: u32) -> Result<(), CoreError> {
+        let exceptions = self.chip().system.exceptions.clone();
+        let fault = self.chip_mut().system.control.fault(Cause::Stacking, &exceptions, true);
+        if number == HARD_FAULT || fault.is_none() {
+            self.pc = back;
+            self.lock_up();
+            return Ok(());
+        }
+        // The hard fault is taken with what there is of a stack: it does not return.
+        let depth = self.chip().system.exceptions.depth();
+        let now = self.now();
+        frame::go_to_handler(&mut self.core, HARD_FAULT, depth > 0)?;
+        self.core.pass(ENTRY);
+        self.chip_mut().system.exceptions.enter(HARD_FAULT);
+        self.profile.enter(now);
+        let vector = self.chip().system.control.vector(HARD_FAULT);
+        self.pc = self.word(vector)? & !1;
+        Ok(())
+    }
+
+    pub(super) fn lock_up(&mut self) {
+        let now = self.now();
+        self.chip_mut().lock_up(now);
+        self.fall_asleep(Asleep::Locked);
+    }
+}

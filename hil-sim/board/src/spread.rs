@@ -1,0 +1,58 @@
+//! Cycles of repeated calls.
+
+use serde::Serialize;
+
+use crate::core::Meter;
+
+/// What calls of one function took, textbook cycles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Spread {
+    /// Calls.
+    pub calls: u64,
+    /// Cycles of all calls.
+    pub cycles: u64,
+    /// Instructions of all calls.
+    pub instructions: u64,
+    /// Cycles of the cheapest call.
+    pub min: u64,
+    /// Cycles of the costliest call.
+    pub max: u64,
+    /// Index of that call.
+    pub worst_input: usize,
+}
+
+impl Spread {
+    /// Adds call number `index`.
+    pub fn note(&mut self, cost: Meter, index: usize) {
+        if self.calls == 0 || cost.cycles < self.min {
+            self.min = cost.cycles;
+        }
+        if cost.cycles > self.max {
+            (self.max, self.worst_input) = (cost.cycles, index);
+        }
+        self.calls += 1;
+        self.cycles += cost.cycles;
+        self.instructions += cost.instructions;
+    }
+
+    /// Mean cycles of a call; 0 without any.
+    #[must_use]
+    pub fn mean(&self) -> f64 {
+        self.cycles as f64 / self.calls.max(1) as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_spread_knows_its_ends_and_its_mean() {
+        let mut spread = Spread::default();
+        for (index, cycles) in [30, 10, 50, 50].into_iter().enumerate() {
+            spread.note(Meter { cycles, instructions: 1 }, index);
+        }
+        assert_eq!((spread.min, spread.max, spread.worst_input), (10, 50, 2));
+        assert_eq!((spread.mean(), spread.instructions), (35.0, 4));
+    }
+}
