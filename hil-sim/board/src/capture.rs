@@ -2,7 +2,7 @@
 
 use crate::bench::Bench;
 use crate::log::{Line, Strings};
-use hil_sim::capture::{Source, SourceError, letter, starter};
+use hil_sim::record::{Source, SourceError, letter, starter};
 use hil_sim::scenario::Scenario;
 
 /// Milliseconds that the board runs at each reading.

@@ -1,8 +1,8 @@
 //! Cycles of the measuring image's functions, which are built like the firmware's.
 
-use interstage::control::Input;
 use interstage::estimate::ContactStage;
 use interstage::supervise::{Command, Leg, Mode};
+use interstage::tick::Input;
 use interstage_images::tick::{Given, Preset, Taken};
 use serde::{Deserialize, Serialize};
 
@@ -10,7 +10,7 @@ use crate::error::ImageError;
 use crate::image::{ARGUMENTS, Image};
 use crate::spread::Spread;
 use hil_sim::scenario::{Direction, Scenario};
-use hil_sim::sil::{Options, RunError, Session};
+use hil_sim::session::{Options, RunError, Session};
 
 /// Package and binary of the measuring image.
 pub const IMAGE: (&str, &str) = ("interstage-images", "measure");

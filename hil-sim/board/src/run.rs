@@ -16,8 +16,8 @@ use interstage::rig::Rig;
 use crate::params::PLACES;
 use hil_sim::faults::sets;
 use hil_sim::firmware::{FirmwareError, Footprint};
-use hil_sim::log;
 use hil_sim::params::set_of;
+use hil_sim::record;
 use hil_sim::record::Recording;
 use hil_sim::scenario::injection::{Injection, Target};
 use hil_sim::scenario::{ControllerKind, Direction, Scenario};
@@ -161,7 +161,7 @@ pub fn run_with(
         }
     }
     let mut recording = trace.finish(scenario, bench.plant(), started.elapsed().as_secs_f64());
-    log::complete(&mut recording, &log::Run::of_stream(&stream));
+    record::complete(&mut recording, &record::Run::of_stream(&stream));
     recording.stream = stream;
     let machine = bench.into_machine();
     let stack = stack_used(&machine)?;

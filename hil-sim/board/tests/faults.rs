@@ -130,7 +130,7 @@ fn a_scenario_s_faults_come_on_the_board_too() {
 fn in_software_there_is_no_board_that_could_break() {
     let mut scenario = Scenario::default();
     scenario.run.faults = vec![Injection::at(Target::Dma, Kind::Stalled, 1.0, 0.0)];
-    let error = hil_sim::sil::run(&scenario, hil_sim::sil::Options::default());
+    let error = hil_sim::session::run(&scenario, hil_sim::session::Options::default());
     let Err(error) = error else { panic!("it was taken") };
     let error = error.to_string();
     assert!(error.contains("dma stalled") && error.contains("--target board"), "{error}");

@@ -2,7 +2,7 @@
 
 use hil_sim::record::{CrossingLine, Summary};
 use hil_sim::scenario::Direction;
-use hil_sim::sil::{self, Options, Session};
+use hil_sim::session::{self, Options, Session};
 use interstage::supervise::{Command, Mode};
 use rig_board::bench::Bench;
 use rig_board::chip::Pin;
@@ -193,7 +193,7 @@ fn a_deployment_is_far_ahead_of_the_rig() {
     let (mut board, mut software) = (f64::INFINITY, f64::INFINITY);
     for _ in 0..4 {
         board = board.min(timed(&|| drop(ran(&sets))));
-        let run = || drop(sil::run(&scenario(&sets), Options::default()).expect("a run"));
+        let run = || drop(session::run(&scenario(&sets), Options::default()).expect("a run"));
         software = software.min(timed(&run));
     }
     assert!(board <= MOST * software, "{board:.3} s on the board, {software:.4} s in software");

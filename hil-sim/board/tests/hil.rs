@@ -6,14 +6,14 @@ use std::time::Duration;
 
 use hil_sim::firmware::{self, Profile};
 use hil_sim::hil::{self, Asked, HilError, HostLine, Image};
-use hil_sim::log::{Row, Run};
 use hil_sim::plant::rig::VirtualRig;
 use hil_sim::plant::sensors::Sensors;
 use hil_sim::probe::{Port, PortError};
 use hil_sim::record::Recording;
+use hil_sim::record::{Controller, Run};
 use hil_sim::replay::replay;
 use hil_sim::scenario::Scenario;
-use hil_sim::sil;
+use hil_sim::session;
 use interstage::fault::Fault;
 use interstage::hal::hil::{FIRST, Given, Taken};
 use interstage::rig::Rig;
@@ -45,8 +45,8 @@ fn a_run_in_the_loop_is_the_run_in_software_bit_for_bit() {
         let scenario = scenario(sets);
         let mut port = board();
         let board = looped(&mut port, &scenario).expect("a run");
-        let options = sil::Options { rows: true, ..sil::Options::default() };
-        let software = sil::run(&scenario, options).expect("a run");
+        let options = session::Options { rows: true, ..session::Options::default() };
+        let software = session::run(&scenario, options).expect("a run");
         let (seen, wanted) = (&board.summary, &software.summary);
         assert!(seen.completed && seen.faults.is_empty(), "{:?}", seen.faults);
         assert_eq!((seen.target.as_str(), wanted.target.as_str()), ("board", "sil"));
@@ -159,10 +159,10 @@ fn a_reader_that_stalls_or_is_not_there_changes_no_bit_of_the_control_trace() {
     let (stalled, part) = told(|tick| tick % 1000 < 300);
     assert!(stalled == read, "stalled");
     let part = Run::of_stream(&part);
-    assert!(part.tally.lost_frames > 100, "{:?}", part.tally);
+    assert!(part.counts.lost_frames > 100, "{:?}", part.counts);
     // What was lost is marked, and what was read is true.
     assert!(replay(&part, &Rig::prototype()).expect("a sound rig").difference.is_none());
-    let lost = part.tally.lost_ticks as usize + part.rows.len();
+    let lost = part.counts.lost_ticks as usize + part.rows.len();
     assert!(lost.abs_diff(run.rows.len()) < 110, "{lost} of {}", run.rows.len());
 }
 
@@ -183,12 +183,12 @@ impl Rigged {
 
     /// A millisecond of both.
     fn tick(&mut self, line: &mut HostLine<'_>, tick: u32, command: Option<Command>) -> Taken {
-        let codes = sil::read(&mut self.sensors, &self.plant);
+        let codes = session::read(&mut self.sensors, &self.plant);
         self.given =
             Given::codes(codes.wheel, codes.load_cell, codes.tread, codes.arm, codes.bridges);
         let taken = line.tick(tick, self.given.with(command)).expect("goes");
         let (drive, preload) = taken.commands();
-        self.plant.step(&sil::drives(drive, preload), 1e-3).expect("moves");
+        self.plant.step(&session::drives(drive, preload), 1e-3).expect("moves");
         taken
     }
 }
@@ -225,7 +225,7 @@ fn a_host_that_falls_silent_leaves_the_bridges_off() {
     let run = Run::of_stream(&stream);
     let alone = run.rows.iter().position(|row| row.tick >= FIRST + 3000).expect("it goes on");
     let rows = &run.rows[alone..];
-    let seen: Vec<_> = rows.iter().filter_map(Row::telemetry).collect();
+    let seen: Vec<_> = rows.iter().filter_map(Controller::telemetry).collect();
     // It went on alone: after 50 ms a tick a millisecond, of which the last few are not
     // in the log yet.
     assert!((935..=950).contains(&seen.len()), "{} ticks", seen.len());
@@ -246,7 +246,7 @@ fn a_host_that_falls_silent_leaves_the_bridges_off() {
         "{:?}",
         seen[held].mode
     );
-    assert!(rows[held..].iter().all(|row| !row.drive_on && !row.preload_on));
+    assert!(rows[held..].iter().all(|row| !row.drive_on && !row.pretightener_on));
     // What is still driven are ticks that ran: the watchdog has not bitten.
     assert_eq!(port.machine().restarts().len(), 1);
     bridges_have_no_power(&mut port);

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use hil_sim::log::{Decoder, Item, Mark, Row, Run};
+use hil_sim::record::{Controller, Decoder, Item, Mark, Run};
 use hil_sim::replay::replay;
 use interstage::log::capture::Trigger;
 use interstage::rig::Rig;
@@ -81,7 +81,7 @@ fn every_tick_of_a_run_is_logged_and_runs_again_on_this_host() {
         let rows = &ran.recording.rows;
         // But for the last ticks, which had not left the board when the run ended.
         let logged = &rows[2000..rows.len() - 24];
-        assert!(logged.iter().all(|row| row.position_est_mm.is_finite()));
+        assert!(logged.iter().all(|row| row.controller.position_mm.is_finite()));
         // Bytes a tick: what a probe has to keep up with.
         let mean = ran.recording.stream.len() as f64 / run.rows.len() as f64;
         assert!(mean < 50.0, "{mean}");
@@ -258,7 +258,7 @@ fn frames_that_found_no_room_are_marked_and_the_capture_waits_for_its_reader() {
         ticks += u64::from(pair[1].tick - pair[0].tick - 1);
     }
     assert!(frames > 300 && ticks > 2400, "{frames} frames, {ticks} ticks");
-    assert_eq!((run.tally.lost_frames, run.tally.lost_ticks), (u64::from(frames), ticks));
+    assert_eq!((run.counts.lost_frames, run.counts.lost_ticks), (u64::from(frames), ticks));
     // The command came first, and its capture is kept whole until it has been read.
     let first = run.shots.first().expect("captured");
     assert_eq!(first.trigger, Trigger::Command);
@@ -287,12 +287,12 @@ fn a_restart_in_the_middle_is_marked_and_both_parts_run_again() {
     board.until("mode: idle", 3000);
     board.run(200);
     let run = board.log();
-    assert_eq!(run.tally.restarts, 2, "{:?}", run.marks);
+    assert_eq!(run.counts.restarts, 2, "{:?}", run.marks);
     let placed = |boot| run.since_boot(boot).restart().and_then(|restart| restart.place());
     assert_eq!([0, 1, 2].map(|boot| placed(boot).is_some()), [false, true, false]);
     let result = replay(&run, &Rig::prototype()).expect("a sound rig");
     assert!(result.difference.is_none(), "{result:?}");
-    let idle = run.rows.last().and_then(Row::telemetry).expect("a row");
+    let idle = run.rows.last().and_then(Controller::telemetry).expect("a row");
     assert_eq!(idle.mode, Mode::Idle);
     assert!(result.ticks as usize > run.rows.len() / 2, "{result:?}");
 }
@@ -371,7 +371,7 @@ fn minutes_of_deploying_and_retracting_are_logged_without_a_gap_or_drift() {
             settled = resident();
         }
     }
-    let tally = *decoder.tally();
+    let tally = *decoder.counts();
     assert!(tally.ticks > 120_000, "{tally:?}");
     assert_eq!((tally.lost_frames, tally.lost_ticks, tally.garbage_bytes), (0, 0, 0));
     for (round, (position, preload)) in worst.iter().enumerate() {

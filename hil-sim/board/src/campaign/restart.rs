@@ -1,17 +1,19 @@
 //! A reset at a random instant: is it recorded, does the drive hold until it is commanded,
 //! are the stored parameters as they were, and does it arrive where it is then sent?
 
-use interstage::blackbox::{Reset, Restart, Stopped};
-use interstage::log::Event;
-use interstage::supervise::{Command, Direction, Fault, Mode};
+use interstage::fault::Fault;
+use interstage::restart::{Reset, Restart, Stopped};
+use interstage::supervise::{Command, Mode};
+use interstage::tick::Event;
+use interstage::units::Direction;
 
 use super::Board;
 use crate::bench::{BenchError, Passed};
 use crate::params::PLACES;
 use crate::peripherals::rcc::Cause;
 use crate::run::RunError;
-use hil_sim::log::Run;
 use hil_sim::plant::rig::Truth;
+use hil_sim::record::Run;
 use hil_sim::scenario::Scenario;
 
 /// Most motion from the reset to the command, mm: what the wheel runs on when its motor
@@ -130,20 +132,20 @@ impl Hold {
         }
         // Power that goes without a warning takes the record with it.
         let warned = matches!(restart.crash.map(|crash| crash.stopped), Some(Stopped::Supply));
-        let Some(flight) = &restart.flight else {
+        let Some(snapshot) = &restart.snapshot else {
             return (cause != Cause::Power).then(|| "record: nothing of the run".to_owned());
         };
         let ticks = self.positions_mm.len();
-        let tick = flight.tick as usize;
+        let tick = snapshot.tick as usize;
         if tick > ticks + 1 || tick + RECORD_TICKS + later < ticks {
             return fail("of another time");
         }
         let at = self.positions_mm[tick.min(ticks - 1)];
-        if (flight.position.to_num::<f64>() - at).abs() > RECORD_MM {
+        if (snapshot.position.to_num::<f64>() - at).abs() > RECORD_MM {
             return fail(&format!("not at {at:.2} mm"));
         }
         match (cause, restart.crash.map(|crash| crash.stopped)) {
-            (Cause::Watchdog, Some(Stopped::Hang { late, .. })) if !late.is_nobody() => None,
+            (Cause::Watchdog, Some(Stopped::Hang { missed, .. })) if !missed.is_nobody() => None,
             (Cause::Power, _) if warned => None,
             (Cause::Power, None) => fail("nothing of the supply"),
             // Caught in a critical section nothing gets through that could name the task.

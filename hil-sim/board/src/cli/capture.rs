@@ -6,7 +6,7 @@ use hil_sim::cli::failure::{Failure, Outcome};
 use crate::capture::Emulated;
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
-    let scenario = args.run.resolve()?;
+    let scenario = args.source.scenario()?;
     let (elf, strings) = super::image(&scenario)?;
     let mut source = Emulated::new(&elf, &strings, &scenario, false).map_err(Failure::run)?;
     write(args, &mut source, Some(&scenario))

@@ -9,7 +9,7 @@ use hil_sim::firmware::{self, Profile};
 use hil_sim::record::Summary;
 use hil_sim::report::Section;
 use hil_sim::scenario::Scenario;
-use hil_sim::{export, progress, table};
+use hil_sim::{files, progress, table};
 
 use crate::gdb;
 use crate::load::{Load, TITLE};
@@ -64,7 +64,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         let lines = ran.recording.log.iter();
         let text: String =
             lines.map(|line| format!("[{:8.3}] {}\n", line.t_s, line.text)).collect();
-        export::write_text(&log, &text)?;
+        files::write_text(&log, &text)?;
         files.push(log);
     }
     let summary = &ran.recording.summary;

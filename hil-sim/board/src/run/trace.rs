@@ -8,8 +8,9 @@ use crate::bench::Passed;
 use crate::log::Line;
 use hil_sim::plant::ledger::Crossing;
 use hil_sim::plant::rig::{Truth, VirtualRig};
-use hil_sim::record::tally::{Ended, Tally, true_line, true_row};
-use hil_sim::record::{CrossingLine, LogLine, Recording, Report, Row};
+use hil_sim::record::{
+    Controller, CrossingLine, Ended, LogLine, Recording, Report, Tally, Tick, true_line,
+};
 use hil_sim::scenario::Scenario;
 
 /// What the log says of a mode, and its number in [`hil_sim::record::MODE_NAMES`].
@@ -87,7 +88,7 @@ impl Trace {
             self.read(t_s, line);
         }
         if keep_row {
-            let row = self.row(t_s, passed, truth);
+            let row = self.row(passed, truth);
             self.tally.rows.push(row);
         }
         self.tally.close_tick(MOVING.contains(&self.mode), truth);
@@ -138,15 +139,16 @@ impl Trace {
     }
 
     /// A row of what the plant and the pins tell, and the log.
-    fn row(&self, t_s: f64, passed: &Passed, truth: &Truth) -> Row {
-        Row {
+    fn row(&self, passed: &Passed, truth: &Truth) -> Tick {
+        let controller = Controller {
             mode: self.mode,
             stage: self.stage,
             level: self.reported.len() as u8,
             drive_duty: passed.drives.drive,
-            preload_duty: passed.drives.preload,
-            ..true_row(t_s, truth)
-        }
+            pretightener_duty: passed.drives.preload,
+            ..Controller::unknown(self.tally.rows.len() as u32)
+        };
+        Tick { controller, truth: Some(truth.into()) }
     }
 
     /// The record of a run that took `wall_s` to compute.

@@ -1,6 +1,6 @@
 //! A board under way that is reset, and what it reports then.
 
-use hil_sim::log::Run;
+use hil_sim::record::Run;
 use hil_sim::scenario::Scenario;
 use interstage::restart::Restart;
 use interstage::tick::Event;
