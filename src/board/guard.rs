@@ -6,7 +6,7 @@ use embassy_stm32::peripherals::IWDG;
 use embassy_stm32::wdg::IndependentWatchdog;
 use interstage::estimate::Place;
 use interstage::hal::Watchdog;
-use interstage::restart::{DriveSnapshot, Place};
+use interstage::restart::DriveSnapshot;
 
 use super::{retained, safety};
 
