@@ -53,8 +53,6 @@ fn is_machinery(name: &str) -> bool {
 /// A place that can panic, or that calls through a register.
 #[derive(Clone, Debug)]
 struct Site {
-    /// Address of the branch.
-    address: u32,
     /// What is called, empty through a register.
     calls: String,
     /// Functions of the source, innermost first, with file and line.
@@ -98,7 +96,6 @@ fn walk(elf: &[u8]) -> Found {
                 continue;
             }
             let site = Site {
-                address: branch.from,
                 calls: called.unwrap_or_default(),
                 frames: names.frames(branch.from),
                 path: path.iter().map(|at| graph.functions[*at].name.clone()).collect(),

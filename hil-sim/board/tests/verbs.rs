@@ -26,6 +26,5 @@ fn a_run_of_the_board_is_captured_and_shown_live() {
     assert_eq!((&caught["lost_ticks"], &caught["garbage_bytes"]), (&0.into(), &0.into()));
 
     let live = ["live", "--target", "board", "--headless", "--fast", "--listen", "127.0.0.1:0"];
-    good(place, &[&live[..], &["--picture", "view.svg"]].concat());
-    assert!(std::fs::read_to_string(place.join("view.svg")).is_ok_and(|svg| svg.contains("<svg")));
+    good(place, &live);
 }

@@ -11,7 +11,8 @@ use interstage::sense::raw::{
 use interstage::supervise::Mode;
 use interstage::tick::Telemetry;
 use interstage::units::{Duty, Q16};
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::plant::rig::Truth;
 
@@ -73,7 +74,7 @@ fn split(mode: Mode) -> (u8, bool, u8) {
 }
 
 /// One tick of a log.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Tick {
     /// What the controller has and does.
     #[serde(flatten)]
@@ -81,6 +82,16 @@ pub struct Tick {
     /// What is true, if a plant was there to know it.
     #[serde(flatten)]
     pub truth: Option<TrueState>,
+}
+
+impl<'de> Deserialize<'de> for Tick {
+    /// Reads the same object as either half: `flatten` would lose every number where another
+    /// crate of the build has switched `arbitrary_precision` of `serde_json` on.
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let row = serde_json::Value::deserialize(from)?;
+        let controller = Controller::deserialize(&row).map_err(D::Error::custom)?;
+        Ok(Self { controller, truth: TrueState::deserialize(&row).ok() })
+    }
 }
 
 /// What the controller's sensors said, what it made of it, what it did.

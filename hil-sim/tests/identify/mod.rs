@@ -127,7 +127,7 @@ fn what_is_no_log_is_one_clear_line_and_exit_code_2() {
     std::fs::write(directory.path().join("notes.csv"), "a,b\n1,2\n").unwrap();
     for (arguments, expected) in [
         (&["identify", "missing.mcap"][..], "missing.mcap: No such file"),
-        (&["identify", "notes.csv"][..], "notes.csv: no log of a run"),
+        (&["identify", "notes.csv"][..], "notes.csv: it holds no tick"),
         (&["identify"][..], "<LOG>"),
         (&["identify", "--published", "notes.csv"][..], "cannot be used with"),
     ] {

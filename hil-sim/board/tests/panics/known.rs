@@ -49,7 +49,7 @@ const WAKES: Reason = "through a waker's table: the executors' `wake`, `clone` a
 /// function in the image, so that the place tells which it is.
 const PANICS: [Known; 10] = [
     known("embassy_sync::", "embassy-sync-", "", BORROWED),
-    known("interstage::tasks::exchange::Exchange::sensors", "", "panic_already_borrowed", BORROWED),
+    known("interstage::tasks::exchange::Exchange::sensors", "", "borrowed", BORROWED),
     // Several of the channels' places put together by the compiler, which then has no line
     // for them. Nothing of this project panics through the logger.
     known("interstage::tasks::motors::motors::{{closure}}", "", "defmt_default_panic", BORROWED),
@@ -62,7 +62,11 @@ const PANICS: [Known; 10] = [
     known("TimeoutFuture", "embassy-time-", "panic_already_borrowed", RESUMED),
 ];
 
-const INDIRECT: [Known; 1] = [known("core::task::wake::Waker", "core/", "", WAKES)];
+const INDIRECT: [Known; 2] = [
+    known("core::task::wake::Waker", "core/", "", WAKES),
+    // The same, inlined: it keeps the waker of who waits and drops the one before.
+    known("embassy_sync::signal::Signal", "embassy-sync-", "", WAKES),
+];
 
 fn find(known: &[Known], site: &Site) -> Option<Reason> {
     let is = |known: &Known, frame: &Frame| {
@@ -98,7 +102,6 @@ fn site(calls: &str, frames: &[(&str, &str)]) -> Site {
         line: 1,
     };
     Site {
-        address: 0,
         calls: calls.to_owned(),
         frames: frames.iter().map(frame).collect(),
         path: vec!["f".to_owned()],
