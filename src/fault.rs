@@ -25,7 +25,7 @@ pub enum Fault {
     CompressionSensorRange = 113,
     /// The arm angle lies outside the arm's reach.
     ArmAngleRange = 114,
-    /// The load cell's code does not change, or jumps as no force does.
+    /// The preload sensor's code does not change, or jumps as no force does.
     PreloadSensorImplausible = 116,
     /// The compression sensor's code does not change, or jumps as no tread does.
     CompressionSensorImplausible = 117,
@@ -109,17 +109,15 @@ impl Fault {
     pub const fn sentence(self) -> &'static str {
         match self {
             Self::WheelEncoderStale => "the wheel encoder stopped answering",
-            Self::PreloadSensorStale => "the load cell stopped answering",
-            Self::CompressionSensorStale => "the tread displacement sensor stopped answering",
+            Self::PreloadSensorStale => "the preload sensor stopped answering",
+            Self::CompressionSensorStale => "the compression sensor stopped answering",
             Self::ArmAngleStale => "the arm angle sensor stopped answering or answers with errors",
             Self::ReadbackStale => "the readback of the bridges stopped answering",
-            Self::PreloadSensorRange => "the load cell reads outside its range",
-            Self::CompressionSensorRange => "the tread displacement sensor reads outside its range",
+            Self::PreloadSensorRange => "the preload sensor reads outside its range",
+            Self::CompressionSensorRange => "the compression sensor reads outside its range",
             Self::ArmAngleRange => "the arm angle lies outside the arm's reach",
-            Self::PreloadSensorImplausible => "the load cell reads what no force can be",
-            Self::CompressionSensorImplausible => {
-                "the tread displacement sensor reads what no tread does"
-            }
+            Self::PreloadSensorImplausible => "the preload sensor reads what no force can be",
+            Self::CompressionSensorImplausible => "the compression sensor reads what no tread does",
             Self::Overpressure => "the preload exceeded its limit",
             Self::PreloadNotReached => "the preload did not reach its reference in time",
             Self::DriveStalled => "the wheel stands still although driven",

@@ -133,9 +133,9 @@ pub trait Indicator {
 pub trait Board {
     /// Wheel encoder.
     type Wheel: WheelEncoder;
-    /// Load cell.
-    type LoadCell: AnalogInput;
-    /// Tread displacement sensor.
+    /// Preload sensor.
+    type PreloadSensor: AnalogInput;
+    /// Compression sensor.
     type Tread: AnalogInput;
     /// Arm angle sensor.
     type Arm: AngleBus;
@@ -158,7 +158,7 @@ pub struct Parts<B: Board> {
     /// For the speed task.
     pub wheel: B::Wheel,
     /// For the pressure task.
-    pub load_cell: B::LoadCell,
+    pub preload_sensor: B::PreloadSensor,
     /// For the displacement task.
     pub tread: B::Tread,
     /// For the angle task.

@@ -30,7 +30,7 @@ mod firmware {
     use crate::board::rtt::{self, Channels};
     use crate::board::{self, EXCHANGE, guard, image, light, safety, start, supply};
     use crate::board::{Angle, Bridges, Button, Console, Guard, HostLine, Lamp, Lines};
-    use crate::board::{LoadCell, Nucleo, Pages, Tread, Wheel};
+    use crate::board::{Nucleo, Pages, PreloadSensor, Tread, Wheel};
 
     static LATEST: StaticCell<TickIoCell> = StaticCell::new();
     static ENCODER: ConstStaticCell<LogEncoder> =
@@ -110,7 +110,7 @@ mod firmware {
         let latest = LATEST.init_with(|| TickIoCell::new(TickIo::default()));
         control.spawn(clock().unwrap());
         control.spawn(speed(parts.wheel).unwrap());
-        control.spawn(pressure(parts.load_cell).unwrap());
+        control.spawn(pressure(parts.preload_sensor).unwrap());
         control.spawn(displacement(parts.tread).unwrap());
         control.spawn(angle(parts.arm).unwrap());
         control.spawn(motors(parts.motors, parts.watchdog, controller, latest).unwrap());
@@ -134,7 +134,7 @@ mod firmware {
     tasks! {
         clock() => tasks::clock(&EXCHANGE);
         speed(wheel: Wheel) => tasks::speed(wheel, &EXCHANGE);
-        pressure(input: LoadCell) => tasks::pressure(input, &EXCHANGE);
+        pressure(input: PreloadSensor) => tasks::pressure(input, &EXCHANGE);
         displacement(input: Tread) => tasks::displacement(input, &EXCHANGE);
         angle(bus: Angle) => tasks::angle(bus, &EXCHANGE);
         motors(

@@ -168,9 +168,9 @@ pub struct Drive {
 pub struct Sensors {
     /// Encoder counts per wheel turn, all edges.
     pub encoder_counts: f64,
-    /// Load cell full scale, N, at 90 % of the converter; zero is at 5 %.
-    pub load_cell_full_scale_n: f64,
-    /// Tread displacement full scale, mm, at 90 % of the converter; zero at 5 %.
+    /// Preload sensor full scale, N, at 90 % of the converter; zero is at 5 %.
+    pub preload_sensor_full_scale_n: f64,
+    /// Tread compression full scale, mm, at 90 % of the converter; zero at 5 %.
     pub tread_full_scale_mm: f64,
     /// Code of the angle sensor at which the arm lies along the pillar, 0 to 16383.
     pub angle_zero_code: f64,

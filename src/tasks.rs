@@ -4,8 +4,8 @@
 //! |---|---|---|
 //! | [`clock()`] | 1 kHz | wakes sensors and control tick at each whole millisecond |
 //! | [`speed()`] | 1 kHz | publishes the wheel counter |
-//! | [`pressure()`] | 1 kHz | publishes the load cell's code |
-//! | [`displacement()`] | 1 kHz | publishes the tread sensor's code |
+//! | [`pressure()`] | 1 kHz | publishes the preload sensor's code |
+//! | [`displacement()`] | 1 kHz | publishes the compression sensor's code |
 //! | [`angle()`] | 500 Hz | publishes the arm sensor's frame |
 //! | [`motors()`] | 1 kHz | the control tick: latest codes in, bridges out |
 //! | [`record()`] | 1 kHz | copies the tick for the log, behind it |

@@ -110,9 +110,9 @@ fn codes_given_in_the_loop_are_the_sensors() {
     );
     let readback = given.readback().map(|codes| (codes.drive.get(), codes.pretightener.get()));
     assert_eq!(readback, Some((3000, 17)));
-    assert_eq!((given.wheel, given.load_cell), (40_000, Some(1_234)));
+    assert_eq!((given.wheel, given.preload_sensor), (40_000, Some(1_234)));
     assert_eq!(
-        (given.tread, given.arm, given.stop, given.command),
+        (given.compression_sensor, given.arm, given.stop, given.command),
         (Some(777), Some(0x8421), false, 0)
     );
     let commanded = given.with(Some(Command::Retract));
@@ -120,6 +120,6 @@ fn codes_given_in_the_loop_are_the_sensors() {
     assert_eq!(commanded.with(None), given);
     let silent = commanded.silent();
     assert_eq!((silent.wheel, silent.command), (40_000, 0));
-    assert_eq!((silent.load_cell, silent.tread, silent.arm), (None, None, None));
+    assert_eq!((silent.preload_sensor, silent.compression_sensor, silent.arm), (None, None, None));
     assert_eq!(silent.readback(), None);
 }

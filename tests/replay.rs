@@ -112,8 +112,8 @@ fn a_sensor_that_never_answers_is_named() {
     type Silence = fn(&mut SensorFrame);
     let all: [(Silence, Fault); 4] = [
         (|sensors| sensors.wheel = None, Fault::WheelEncoderStale),
-        (|sensors| sensors.load_cell = None, Fault::PreloadSensorStale),
-        (|sensors| sensors.tread = None, Fault::CompressionSensorStale),
+        (|sensors| sensors.preload_sensor = None, Fault::PreloadSensorStale),
+        (|sensors| sensors.compression_sensor = None, Fault::CompressionSensorStale),
         (|sensors| sensors.arm = None, Fault::ArmAngleStale),
     ];
     for (silence, fault) in all {
@@ -223,12 +223,12 @@ fn a_wheel_that_slips_on_a_corner() {
 }
 
 #[test]
-fn a_load_cell_that_stands_still() {
+fn a_preload_sensor_that_stands_still() {
     assert!(matches!(replayed("stuck.mcap", 0), Mode::FaultHold(_)));
 }
 
 #[test]
-fn a_tread_sensor_that_reads_too_much() {
+fn a_compression_sensor_that_reads_too_much() {
     assert!(matches!(replayed("tread-gain.mcap", 2), Mode::FaultHold(_)));
 }
 

@@ -1,8 +1,8 @@
 //! The motor task with the shipped controller and all other tasks around it.
 
 use crate::common::{
-    Answer, Bench, Bridges, Dog, Operator, Record, Sensor, UNLOADED, arm_frame, forever,
-    load_cell_code, now_ms,
+    Answer, Bench, Bridges, Dog, Operator, Record, Sensor, UNLOADED, arm_frame, forever, now_ms,
+    preload_sensor_code,
 };
 use interstage::fault::Fault;
 use interstage::hal::Light;
@@ -20,7 +20,7 @@ struct Board {
     bench: Bench,
     exchange: &'static Exchange,
     wheel: Sensor,
-    load_cell: Sensor,
+    preload_sensor: Sensor,
     tread: Sensor,
     arm: Sensor,
     operator: Operator,
@@ -47,7 +47,7 @@ impl Board {
             bench: Bench::new(),
             exchange,
             wheel: Sensor::new(0),
-            load_cell: Sensor::alive(UNLOADED),
+            preload_sensor: Sensor::alive(UNLOADED),
             tread: Sensor::alive(UNLOADED),
             arm: Sensor::new(arm_frame(0)),
             operator: Operator::default(),
@@ -65,8 +65,8 @@ impl Board {
             bench.spawn(async { tasks::speed(wheel, exchange).await });
         }
         if runs(TaskId::Pressure) {
-            let load_cell = board.load_cell.clone();
-            bench.spawn(async { tasks::pressure(load_cell, exchange).await });
+            let preload_sensor = board.preload_sensor.clone();
+            bench.spawn(async { tasks::pressure(preload_sensor, exchange).await });
         }
         if runs(TaskId::Displacement) {
             let tread = board.tread.clone();
@@ -221,7 +221,7 @@ fn what_the_drive_does_is_kept_every_tick() {
 fn a_hanging_sensor_is_a_fault_and_stops_neither_tick_nor_watchdog() {
     type Pick = fn(&Board) -> &Sensor;
     let sensors: [(Pick, Fault); 3] = [
-        (|board| &board.load_cell, Fault::PreloadSensorStale),
+        (|board| &board.preload_sensor, Fault::PreloadSensorStale),
         (|board| &board.tread, Fault::CompressionSensorStale),
         (|board| &board.arm, Fault::ArmAngleStale),
     ];
@@ -272,7 +272,7 @@ fn a_dead_model_task_does_not_hold_up_the_tick() {
     board.operator.gives(&[Command::Start]);
     board.reach(Mode::Preload(Direction::Deploy), 20);
     // Some preload comes up, but no plan: the drive has nothing to follow.
-    board.load_cell.answers(Answer::Code(load_cell_code(5.0)));
+    board.preload_sensor.answers(Answer::Code(preload_sensor_code(5.0)));
     let before = now_ms();
     board.bench.run_ms(300);
     let ticks: Vec<u32> = board.motors.times().into_iter().filter(|&at| at > before).collect();

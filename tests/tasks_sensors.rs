@@ -31,8 +31,8 @@ fn latest(exchange: &Exchange, task: TaskId) -> Option<u32> {
     let frame = exchange.sensors();
     match task {
         TaskId::Speed => frame.wheel.map(|sample| sample.at),
-        TaskId::Pressure => frame.load_cell.map(|sample| sample.at),
-        TaskId::Displacement => frame.tread.map(|sample| sample.at),
+        TaskId::Pressure => frame.preload_sensor.map(|sample| sample.at),
+        TaskId::Displacement => frame.compression_sensor.map(|sample| sample.at),
         TaskId::Angle => frame.arm.map(|sample| sample.at),
         other => panic!("{other:?} is not a sensor"),
     }
@@ -70,14 +70,14 @@ fn codes_are_published_with_the_tick_at_which_they_were_taken() {
     bench.run_ms(10);
     let frame = exchange.sensors();
     assert_eq!(frame.wheel, Some(Sample { code: EncoderCount::new(11), at: 10 }));
-    assert_eq!(frame.load_cell, Some(Sample { code: AdcCode::new(22), at: 9 }));
-    assert_eq!(frame.tread, Some(Sample { code: AdcCode::new(33), at: 10 }));
+    assert_eq!(frame.preload_sensor, Some(Sample { code: AdcCode::new(22), at: 9 }));
+    assert_eq!(frame.compression_sensor, Some(Sample { code: AdcCode::new(33), at: 10 }));
     assert_eq!(frame.arm, Some(Sample { code: AngleFrame::new(44), at: 10 }));
     sensors[2].answers(Answer::Code(55));
     bench.run_ms(1);
     let frame = exchange.sensors();
-    assert_eq!(frame.load_cell, Some(Sample { code: AdcCode::new(22), at: 10 }));
-    assert_eq!(frame.tread, Some(Sample { code: AdcCode::new(55), at: 11 }));
+    assert_eq!(frame.preload_sensor, Some(Sample { code: AdcCode::new(22), at: 10 }));
+    assert_eq!(frame.compression_sensor, Some(Sample { code: AdcCode::new(55), at: 11 }));
 }
 
 #[test]

@@ -351,8 +351,16 @@ type Silence = (&'static str, fn(&mut SensorFrame, &SensorFrame), Fault);
 
 const SENSORS: [Silence; 4] = [
     ("wheel", |now, old| now.wheel = old.wheel, Fault::WheelEncoderStale),
-    ("load cell", |now, old| now.load_cell = old.load_cell, Fault::PreloadSensorStale),
-    ("tread", |now, old| now.tread = old.tread, Fault::CompressionSensorStale),
+    (
+        "preload sensor",
+        |now, old| now.preload_sensor = old.preload_sensor,
+        Fault::PreloadSensorStale,
+    ),
+    (
+        "tread",
+        |now, old| now.compression_sensor = old.compression_sensor,
+        Fault::CompressionSensorStale,
+    ),
     ("arm", |now, old| now.arm = old.arm, Fault::ArmAngleStale),
 ];
 

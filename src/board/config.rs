@@ -80,10 +80,20 @@ pub(crate) enum Held {
 
 /// Has the drive stay off, and says why.
 pub(crate) fn hold(threads: Spawner, parts: Parts<Nucleo>, why: Held) {
-    let Parts { motors, light, wheel, load_cell, tread, arm, watchdog, button, console, journal } =
-        parts;
+    let Parts {
+        motors,
+        light,
+        wheel,
+        preload_sensor,
+        tread,
+        arm,
+        watchdog,
+        button,
+        console,
+        journal,
+    } = parts;
     // As they are until the next start: to switch them off would be code for nothing.
-    core::mem::forget((wheel, load_cell, tread, arm, watchdog, button, console, journal));
+    core::mem::forget((wheel, preload_sensor, tread, arm, watchdog, button, console, journal));
     threads.spawn(stay_off(motors, light, why).unwrap());
 }
 

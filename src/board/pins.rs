@@ -23,13 +23,13 @@ pub(crate) use button::Button;
 use readback::Readback;
 pub(crate) use wheel::Wheel;
 
-/// The load cell's converter.
-pub(crate) type LoadCell = Analog<ADC1>;
+/// The preload sensor's converter.
+pub(crate) type PreloadSensor = Analog<ADC1>;
 
-/// The tread sensor's converter.
+/// The compression sensor's converter.
 pub(crate) type Tread = Analog<ADC2>;
 
-static LOAD_CELL: Ring = Ring::new();
+static PRELOAD_SENSOR: Ring = Ring::new();
 static TREAD: Ring = Ring::new();
 
 /// Assigns peripherals and pins; the bridges come up off.
@@ -40,11 +40,11 @@ pub(crate) fn split(
 ) -> (Parts<Nucleo>, Peri<'static, AnyPin>, Pages) {
     let parts = Parts {
         wheel: Wheel::new(p.TIM5, p.PA0, p.PA1),
-        load_cell: Analog::new(
+        preload_sensor: Analog::new(
             (p.ADC1, pac::ADC1),
             p.PC2,
             (p.DMA1_CH1, pac::DMA1.ch(0)),
-            &LOAD_CELL,
+            &PRELOAD_SENSOR,
         ),
         tread: Analog::new((p.ADC2, pac::ADC2), p.PC3, (p.DMA1_CH2, pac::DMA1.ch(1)), &TREAD),
         arm: Angle::new(p.SPI1, (p.PB3, p.PA7, p.PA6), p.PB10),

@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn a_displacement_sensor_that_is_a_fifth_off_is_told() {
+    fn a_compression_sensor_that_is_a_fifth_off_is_told() {
         for name in ["prototype", "fe"] {
             assert_eq!(pressed(name, 1.0, 1.0, 1.0), None);
             assert!(pressed(name, 1.0, 1.0, 1.2).is_some());

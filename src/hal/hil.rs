@@ -47,10 +47,10 @@ pub enum ToBoard {
 pub struct Given {
     /// Wheel encoder's counter.
     pub wheel: u16,
-    /// Load cell; none for a sensor that does not answer.
-    pub load_cell: Option<u16>,
-    /// Tread displacement; none as above.
-    pub tread: Option<u16>,
+    /// Preload sensor; none for a sensor that does not answer.
+    pub preload_sensor: Option<u16>,
+    /// Tread compression; none as above.
+    pub compression_sensor: Option<u16>,
     /// Frame of the arm's angle sensor; none as above.
     pub arm: Option<u16>,
     /// Outputs of the bridges of drive and pre-tightener; none as above.
@@ -66,15 +66,15 @@ impl Given {
     #[must_use]
     pub const fn codes(
         wheel: EncoderCount,
-        load_cell: AdcCode,
-        tread: AdcCode,
+        preload_sensor: AdcCode,
+        compression_sensor: AdcCode,
         arm: AngleFrame,
         bridges: BridgeCodes,
     ) -> Self {
         Self {
             wheel: wheel.get(),
-            load_cell: Some(load_cell.get()),
-            tread: Some(tread.get()),
+            preload_sensor: Some(preload_sensor.get()),
+            compression_sensor: Some(compression_sensor.get()),
             arm: Some(arm.get()),
             bridges: Some([bridges.drive.get(), bridges.pretightener.get()]),
             stop: false,
@@ -92,7 +92,14 @@ impl Given {
     /// silent.
     #[must_use]
     pub const fn silent(self) -> Self {
-        Self { load_cell: None, tread: None, arm: None, bridges: None, command: 0, ..self }
+        Self {
+            preload_sensor: None,
+            compression_sensor: None,
+            arm: None,
+            bridges: None,
+            command: 0,
+            ..self
+        }
     }
 
     /// What the bridges put out, if they were looked at.
@@ -173,8 +180,8 @@ mod tests {
         let code = Some(u16::MAX);
         let given = Given {
             wheel: u16::MAX,
-            load_cell: code,
-            tread: code,
+            preload_sensor: code,
+            compression_sensor: code,
             arm: code,
             bridges: Some([u16::MAX; 2]),
             stop: true,
@@ -202,8 +209,8 @@ mod tests {
             let code = |at: usize| answers[at].then_some(codes[at + 1]);
             let given = Given {
                 wheel: codes[0],
-                load_cell: code(0),
-                tread: code(1),
+                preload_sensor: code(0),
+                compression_sensor: code(1),
                 arm: code(2),
                 bridges,
                 stop,

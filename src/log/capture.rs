@@ -46,7 +46,7 @@ pub enum Trigger {
 pub struct CaptureSample {
     /// Low half of its tick.
     pub at: u16,
-    /// Codes of wheel, load cell, tread, arm.
+    /// Codes of wheel, preload sensor, tread, arm.
     pub codes: [u16; 4],
     /// Duties of drive and pre-tightener, Q15.
     pub duties: [i16; 2],

@@ -58,12 +58,13 @@ impl DeltaRecord {
     /// The record as numbers.
     pub(super) fn of(record: &Record) -> Self {
         let Record { telemetry: t, codes, ages, bridges: [drive, pretightener], flags } = record;
-        let [wheel, load_cell, tread, arm] = codes;
-        let [wheel_age, load_cell_age, tread_age, arm_age] = *ages;
+        let [wheel, preload_sensor, compression_sensor, arm] = codes;
+        let [wheel_age, preload_sensor_age, compression_sensor_age, arm_age] = *ages;
         let mut numbers = [0; NUMBERS];
         let (first, quantities) = numbers.split_at_mut(1);
         // The arm's age lowest: read every second tick, it is the one that changes.
-        first[0] = u32::from_le_bytes([arm_age, wheel_age, load_cell_age, tread_age]);
+        first[0] =
+            u32::from_le_bytes([arm_age, wheel_age, preload_sensor_age, compression_sensor_age]);
         for (number, quantity) in quantities.iter_mut().zip(t.quantities()) {
             *number = quantity.to_bits() as u32;
         }
@@ -71,8 +72,8 @@ impl DeltaRecord {
             at: t.at,
             numbers,
             words: [
-                word(*wheel, *load_cell),
-                word(*tread, *arm),
+                word(*wheel, *preload_sensor),
+                word(*compression_sensor, *arm),
                 word(*drive, *pretightener),
                 word(t.drive.to_bits() as u16, t.pretightener.to_bits() as u16),
                 u32::from_le_bytes([t.level, t.stage as u8, codes::of_mode(t.mode), 0]),
@@ -85,10 +86,10 @@ impl DeltaRecord {
     pub(super) fn record(&self) -> Option<Record> {
         let [ages, quantities @ ..] = self.numbers;
         let [wheel_and_cell, tread_and_arm, bridges, duties, state, flags] = self.words;
-        let [arm_age, wheel_age, load_cell_age, tread_age] = ages.to_le_bytes();
+        let [arm_age, wheel_age, preload_sensor_age, compression_sensor_age] = ages.to_le_bytes();
         let [level, stage, mode, rest] = state.to_le_bytes();
-        let [wheel, load_cell] = halves(wheel_and_cell);
-        let [tread, arm] = halves(tread_and_arm);
+        let [wheel, preload_sensor] = halves(wheel_and_cell);
+        let [compression_sensor, arm] = halves(tread_and_arm);
         let [drive, pretightener] = halves(duties).map(|half| Duty::from_bits(half as i16));
         let (mode, stage) = (codes::mode(mode)?, codes::stage(stage)?);
         (rest == 0).then_some(())?;
@@ -96,8 +97,8 @@ impl DeltaRecord {
             Telemetry { at: self.at, mode, stage, level, drive, pretightener, ..Telemetry::EMPTY };
         Some(Record {
             telemetry: state.with_quantities(quantities.map(|bits| Q16::from_bits(bits as i32))),
-            codes: [wheel, load_cell, tread, arm],
-            ages: [wheel_age, load_cell_age, tread_age, arm_age],
+            codes: [wheel, preload_sensor, compression_sensor, arm],
+            ages: [wheel_age, preload_sensor_age, compression_sensor_age, arm_age],
             bridges: halves(bridges),
             flags: Flags::from_bits(u16::try_from(flags).ok()?),
         })

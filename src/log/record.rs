@@ -22,7 +22,7 @@ const NEVER: u8 = 255;
 pub struct Record {
     /// State after the tick; its time is that of the input.
     pub telemetry: Telemetry,
-    /// Codes of wheel, load cell, tread and arm; 0 for one that never came.
+    /// Codes of wheel, preload sensor, compression_sensor and arm; 0 for one that never came.
     pub codes: [u16; 4],
     /// Ages of the codes as they travel, see [`Record::sensors`].
     pub ages: [u8; 4],
@@ -146,11 +146,12 @@ impl Record {
     /// The record of a tick.
     #[must_use]
     pub fn of(input: &Input, output: &Output) -> Self {
-        let SensorFrame { wheel, load_cell, tread, arm, bridges } = &input.sensors;
+        let SensorFrame { wheel, preload_sensor, compression_sensor, arm, bridges } =
+            &input.sensors;
         let sensors = [
             pack(input.now, wheel.as_ref(), EncoderCount::get),
-            pack(input.now, load_cell.as_ref(), AdcCode::get),
-            pack(input.now, tread.as_ref(), AdcCode::get),
+            pack(input.now, preload_sensor.as_ref(), AdcCode::get),
+            pack(input.now, compression_sensor.as_ref(), AdcCode::get),
             pack(input.now, arm.as_ref(), AngleFrame::get),
         ];
         let bridges = bridges.unwrap_or_default();
@@ -173,7 +174,7 @@ impl Record {
     /// taken: it is then the one of the tick `before`.
     #[must_use]
     pub fn sensors(&self, before: &SensorFrame) -> SensorFrame {
-        let [wheel, load_cell, tread, arm] = [0, 1, 2, 3].map(|sensor| {
+        let [wheel, preload_sensor, compression_sensor, arm] = [0, 1, 2, 3].map(|sensor| {
             let taken = match self.ages[sensor] {
                 NEVER => return None,
                 OLD => None,
@@ -184,8 +185,13 @@ impl Record {
         let oldest = self.at().wrapping_add(NOW).wrapping_sub(u32::from(OLD));
         SensorFrame {
             wheel: unpack(wheel, before.wheel, EncoderCount::new, oldest),
-            load_cell: unpack(load_cell, before.load_cell, AdcCode::new, oldest),
-            tread: unpack(tread, before.tread, AdcCode::new, oldest),
+            preload_sensor: unpack(preload_sensor, before.preload_sensor, AdcCode::new, oldest),
+            compression_sensor: unpack(
+                compression_sensor,
+                before.compression_sensor,
+                AdcCode::new,
+                oldest,
+            ),
             arm: unpack(arm, before.arm, AngleFrame::new, oldest),
             bridges: self.flags.readback().then(|| {
                 let [drive, pretightener] = self.bridges.map(BridgeCode::new);
@@ -300,8 +306,8 @@ pub(super) mod tests {
             let at = |sensor: usize| ages[sensor].map(|age| now.wrapping_sub(age as u32));
             let sensors = SensorFrame {
                 wheel: at(0).and_then(|at| sample(EncoderCount::new(codes[0]), at)),
-                load_cell: at(1).and_then(|at| sample(AdcCode::new(codes[1]), at)),
-                tread: at(2).and_then(|at| sample(AdcCode::new(codes[2]), at)),
+                preload_sensor: at(1).and_then(|at| sample(AdcCode::new(codes[1]), at)),
+                compression_sensor: at(2).and_then(|at| sample(AdcCode::new(codes[2]), at)),
                 arm: at(3).and_then(|at| sample(AngleFrame::new(codes[3]), at)),
                 bridges: bridges.map(|codes| BridgeCodes {
                     drive: BridgeCode::new(codes[0]),
@@ -324,7 +330,7 @@ pub(super) mod tests {
         #[test]
         fn a_code_too_old_to_tell_keeps_its_time(now in 1000..u32::MAX, age in 246..900_u32) {
             let old = sample(AdcCode::new(7), now - age);
-            let frame = SensorFrame { tread: old, ..SensorFrame::default() };
+            let frame = SensorFrame { compression_sensor: old, ..SensorFrame::default() };
             let input = Input { now, sensors: frame, ..Input::default() };
             let output = Output {
                 telemetry: Telemetry { at: now, ..Telemetry::default() },
@@ -333,7 +339,7 @@ pub(super) mod tests {
             let record = Record::of(&input, &output);
             prop_assert_eq!(record.sensors(&frame), frame);
             // Without a tick before, it is at least old.
-            let alone = record.sensors(&SensorFrame::default()).tread.unwrap();
+            let alone = record.sensors(&SensorFrame::default()).compression_sensor.unwrap();
             prop_assert_eq!(now - alone.at, 246);
         }
     }

@@ -135,9 +135,9 @@ pub struct SensorFrame {
     /// Wheel encoder.
     pub wheel: Option<Sample<EncoderCount>>,
     /// Preload sensor between pre-tightener and arm.
-    pub load_cell: Option<Sample<AdcCode>>,
-    /// Tread displacement between arm and wheel.
-    pub tread: Option<Sample<AdcCode>>,
+    pub preload_sensor: Option<Sample<AdcCode>>,
+    /// Tread compression between arm and wheel.
+    pub compression_sensor: Option<Sample<AdcCode>>,
     /// Arm angle at the pillar.
     pub arm: Option<Sample<AngleFrame>>,
     /// Output of the bridges, converted since the tick before; none if nothing has been.

@@ -25,7 +25,7 @@ pub struct Tuning {
     /// Bandwidth of the speed observer, rad/s.
     pub speed_bandwidth_rad_s: f64,
     /// Low-pass of the preload sensor, s.
-    pub load_cell_tau_s: f64,
+    pub preload_sensor_tau_s: f64,
     /// Low-pass of the compression sensor, s.
     pub tread_tau_s: f64,
     /// Low-pass of the arm angle, s. A code is 0.04 mm of radius; 5 ms smooths the
@@ -37,7 +37,7 @@ impl Default for Tuning {
     fn default() -> Self {
         Self {
             speed_bandwidth_rad_s: speed::BANDWIDTH_RAD_S,
-            load_cell_tau_s: FILTER_S,
+            preload_sensor_tau_s: FILTER_S,
             tread_tau_s: FILTER_S,
             arm_tau_s: 0.005,
         }
@@ -108,9 +108,9 @@ impl Senses {
         Ok(Self {
             wheel_encoder: Speedometer::try_build(rig, tuning.speed_bandwidth_rad_s)?,
             preload_sensor: AnalogChannel::try_build(
-                "sense.load_cell_full_scale_n",
-                rig.sense.load_cell_full_scale_n,
-                tuning.load_cell_tau_s,
+                "sense.preload_sensor_full_scale_n",
+                rig.sense.preload_sensor_full_scale_n,
+                tuning.preload_sensor_tau_s,
             )?,
             compression_sensor: AnalogChannel::try_build(
                 "sense.tread_full_scale_mm",
@@ -141,9 +141,10 @@ impl Senses {
             limit,
         );
         let preload = &mut state.preload_sensor;
-        let preload = self.preload_sensor.step(preload, now, frame.load_cell, limit);
+        let preload = self.preload_sensor.step(preload, now, frame.preload_sensor, limit);
         let compression = &mut state.compression_sensor;
-        let compression = self.compression_sensor.step(compression, now, frame.tread, limit);
+        let compression =
+            self.compression_sensor.step(compression, now, frame.compression_sensor, limit);
         let angle = self.arm_angle.step(&mut state.arm_angle, now, frame.arm, limit);
         let (radius, tan_arm) = self.arm.stance(angle.filtered);
         let steps_up = self.arm.steps_up(radius, compression.filtered);
@@ -218,8 +219,8 @@ mod tests {
         let parity = (code.count_ones() % 2) as u16;
         SensorFrame {
             wheel: Some(Sample { code: EncoderCount::new(counts), at }),
-            load_cell: Some(Sample { code: analog(truth.preload_n / 200.0), at }),
-            tread: Some(Sample { code: analog(truth.compression_mm / 5.0), at }),
+            preload_sensor: Some(Sample { code: analog(truth.preload_n / 200.0), at }),
+            compression_sensor: Some(Sample { code: analog(truth.compression_mm / 5.0), at }),
             arm: Some(Sample { code: AngleFrame::new(code | parity << 15), at }),
             bridges: None,
         }
@@ -279,8 +280,16 @@ mod tests {
                 let (old, new) = (frame(&STOWED, 0), frame(&STOWED, now));
                 let mixed = SensorFrame {
                     wheel: if silent == 0 { old.wheel } else { new.wheel },
-                    load_cell: if silent == 1 { old.load_cell } else { new.load_cell },
-                    tread: if silent == 2 { old.tread } else { new.tread },
+                    preload_sensor: if silent == 1 {
+                        old.preload_sensor
+                    } else {
+                        new.preload_sensor
+                    },
+                    compression_sensor: if silent == 2 {
+                        old.compression_sensor
+                    } else {
+                        new.compression_sensor
+                    },
                     arm: if silent == 3 { old.arm } else { new.arm },
                     bridges: None,
                 };
@@ -341,7 +350,7 @@ mod tests {
         // Each of them tells of a step while the other is sound.
         assert_eq!((level(pressed, |_| ()), level(up, |_| ())), (1, 1));
         assert_eq!(level(pressed, |frame| frame.arm = None), 0);
-        assert_eq!(level(up, |frame| frame.tread = None), 0);
+        assert_eq!(level(up, |frame| frame.compression_sensor = None), 0);
     }
 
     #[test]

@@ -33,7 +33,7 @@ const ROLLS: Rolls = Rolls {
 };
 
 /// Ticks until a fault when `at` tells what is true at each, after 100 ticks of settling;
-/// the encoder counts, and load cell and displacement sensor make noise.
+/// the encoder counts, and preload sensor and compression sensor make noise.
 fn found(mut at: impl FnMut(f64) -> Rolls) -> Option<(Fault, i32)> {
     let check = CrossCheck::try_build(&Rig::prototype()).expect("a sound rig");
     let mut state = CrossState::default();

@@ -10,7 +10,7 @@ use crate::units::{Millimetres, MillimetresPerSecond, Newtons, q16};
 pub const TEST_TICKS: u32 = 100;
 /// Speed that still counts as rest, mm/s.
 const REST: MillimetresPerSecond = q16(500_000);
-/// Preload that still counts as none, N: the load cell's zero before calibration.
+/// Preload that still counts as none, N: the preload sensor's zero before calibration.
 const UNLOADED: Newtons = q16(3_000_000);
 /// Compression that still counts as none, mm.
 const UNPRESSED: Millimetres = q16(100_000);

@@ -43,8 +43,8 @@ pub struct Exchange {
     pub(super) tick_started: Signal<Raw, ()>,
     pub(super) tick_ended: Signal<Raw, ()>,
     pub(super) wheel: Latest<Sample<EncoderCount>>,
-    pub(super) load_cell: Latest<Sample<AdcCode>>,
-    pub(super) tread: Latest<Sample<AdcCode>>,
+    pub(super) preload_sensor: Latest<Sample<AdcCode>>,
+    pub(super) compression_sensor: Latest<Sample<AdcCode>>,
     pub(super) arm: Latest<Sample<AngleFrame>>,
     pub(super) request: Slot<PlanRequest>,
     pub(super) answer: Slot<Plan>,
@@ -68,8 +68,8 @@ impl Exchange {
             tick_started: Signal::new(),
             tick_ended: Signal::new(),
             wheel: Watch::new(),
-            load_cell: Watch::new(),
-            tread: Watch::new(),
+            preload_sensor: Watch::new(),
+            compression_sensor: Watch::new(),
             arm: Watch::new(),
             request: Channel::new(),
             answer: Channel::new(),
@@ -153,8 +153,8 @@ impl Exchange {
     pub fn sensors(&self) -> SensorFrame {
         SensorFrame {
             wheel: self.wheel.try_get(),
-            load_cell: self.load_cell.try_get(),
-            tread: self.tread.try_get(),
+            preload_sensor: self.preload_sensor.try_get(),
+            compression_sensor: self.compression_sensor.try_get(),
             arm: self.arm.try_get(),
             bridges: None,
         }

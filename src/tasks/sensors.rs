@@ -16,14 +16,15 @@ pub async fn speed(mut wheel: impl WheelEncoder, exchange: &Exchange) -> ! {
         .await
 }
 
-/// Publishes the load cell's code at 1 kHz.
+/// Publishes the preload sensor's code at 1 kHz.
 pub async fn pressure(input: impl AnalogInput, exchange: &Exchange) -> ! {
-    analog(TaskId::Pressure, exchange, input, |s| exchange.load_cell.sender().send(s)).await
+    analog(TaskId::Pressure, exchange, input, |s| exchange.preload_sensor.sender().send(s)).await
 }
 
-/// Publishes the tread displacement sensor's code at 1 kHz.
+/// Publishes the compression sensor's code at 1 kHz.
 pub async fn displacement(input: impl AnalogInput, exchange: &Exchange) -> ! {
-    analog(TaskId::Displacement, exchange, input, |s| exchange.tread.sender().send(s)).await
+    analog(TaskId::Displacement, exchange, input, |s| exchange.compression_sensor.sender().send(s))
+        .await
 }
 
 /// Publishes the arm angle sensor's frame at 500 Hz, good or bad: the tick judges.

@@ -238,7 +238,12 @@ impl<'a> Bench<'a> {
         let chip = self.machine.chip_mut();
         // Twelve bits and no more is what the readback takes of the sixteen.
         let bridges = [codes.bridges.drive, codes.bridges.pretightener].map(|code| code.get() << 4);
-        chip.set_analog([codes.load_cell.get(), codes.tread.get(), bridges[0], bridges[1]]);
+        chip.set_analog([
+            codes.preload_sensor.get(),
+            codes.compression_sensor.get(),
+            bridges[0],
+            bridges[1],
+        ]);
         chip.angle.angle = codes.arm.get();
         chip.turn_wheel(self.wheel, STEP);
     }

@@ -40,7 +40,7 @@ const REQUESTS: [u32; 4] = [5, 36, 10, 11];
 pub struct Defects {
     /// Lines of the wheel encoder that are broken: the pull-up holds them high.
     pub encoder_lines: [bool; 2],
-    /// The input of load cell, tread sensor, drive's or pre-tightener's bridge reads this,
+    /// The input of preload sensor, compression sensor, drive's or pre-tightener's bridge reads this,
     /// in parts of 2^16, whatever the voltage.
     pub stuck_codes: [Option<u16>; 4],
     /// DMA moves nothing.

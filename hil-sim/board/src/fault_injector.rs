@@ -169,8 +169,8 @@ impl BoardInjector {
     pub(super) fn tell(&mut self, machine: &mut Machine, codes: Codes, now: u32) -> Codes {
         let mut frame = SensorFrame {
             wheel: Some(Sample { code: codes.wheel, at: now }),
-            load_cell: Some(Sample { code: codes.load_cell, at: now }),
-            tread: Some(Sample { code: codes.tread, at: now }),
+            preload_sensor: Some(Sample { code: codes.preload_sensor, at: now }),
+            compression_sensor: Some(Sample { code: codes.compression_sensor, at: now }),
             arm: Some(Sample { code: codes.arm, at: now }),
             bridges: Some(codes.bridges),
         };
@@ -188,8 +188,8 @@ impl BoardInjector {
         }
         Codes {
             wheel: frame.wheel.filter(|_| !silent[0]).map_or(codes.wheel, |s| s.code),
-            load_cell: bridge(frame.load_cell),
-            tread: bridge(frame.tread),
+            preload_sensor: bridge(frame.preload_sensor),
+            compression_sensor: bridge(frame.compression_sensor),
             arm: frame.arm.filter(|_| !silent[1]).map_or(codes.arm, |s| s.code),
             bridges: frame.bridges.unwrap_or_default(),
         }
@@ -303,7 +303,7 @@ fn flipped(machine: &Machine, injection: &Injection) -> Result<Option<Fault>, Co
 fn register(injection: &Injection) -> Option<Fault> {
     let word = injection.magnitude() as u16;
     Some(match (injection.target, injection.kind) {
-        (Target::LoadCellConverter, _) => Fault::StuckCode(0, word),
+        (Target::PreloadSensorConverter, _) => Fault::StuckCode(0, word),
         (Target::TreadConverter, _) => Fault::StuckCode(1, word),
         (Target::AngleBus, Kind::BitErrors) => Fault::BitErrors(word),
         (Target::AngleBus, _) => Fault::AngleLost,

@@ -12,7 +12,7 @@ use super::peripherals::rcc::Cause;
 /// A fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// The input of load cell (0), tread sensor (1), drive's (2) or pre-tightener's bridge (3)
+    /// The input of preload sensor (0), compression sensor (1), drive's (2) or pre-tightener's bridge (3)
     /// reads this, in parts of 2^16.
     StuckCode(usize, u16),
     /// These bits of the angle sensor's answers are turned over.
@@ -125,7 +125,7 @@ pub struct Timed {
 /// A fault that is spelt wrong.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{0}`: expected <fault>@<seconds> with load-cell=<code>, tread=<code>, \
+    "`{0}`: expected <fault>@<seconds> with preload-sensor=<code>, tread=<code>, \
      drive-readback=<code>, pretightener-readback=<code>, angle-bits=<mask>, angle-lost, encoder-a, encoder-b, dma-stalled, timer-flags, button-storm, \
      brown-out, supply-cut, supply-dip, reset-pin, caught or flip=<address>.<bit>"
 )]
@@ -146,7 +146,7 @@ impl FromStr for Fault {
         let (name, value) = text.split_once('=').map_or((text, None), |(n, v)| (n, Some(v)));
         let half = |text: &str| u16::try_from(number(text)?).ok();
         let fault = match (name, value) {
-            ("load-cell", Some(code)) => half(code).map(|code| Self::StuckCode(0, code)),
+            ("preload-sensor", Some(code)) => half(code).map(|code| Self::StuckCode(0, code)),
             ("tread", Some(code)) => half(code).map(|code| Self::StuckCode(1, code)),
             ("drive-readback", Some(code)) => half(code).map(|code| Self::StuckCode(2, code)),
             ("pretightener-readback", Some(code)) => {
@@ -190,7 +190,7 @@ impl FromStr for Timed {
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
-            Self::StuckCode(0, code) => write!(f, "load-cell={code:#x}"),
+            Self::StuckCode(0, code) => write!(f, "preload-sensor={code:#x}"),
             Self::StuckCode(1, code) => write!(f, "tread={code:#x}"),
             Self::StuckCode(2, code) => write!(f, "drive-readback={code:#x}"),
             Self::StuckCode(_, code) => write!(f, "pretightener-readback={code:#x}"),

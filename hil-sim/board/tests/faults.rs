@@ -28,7 +28,7 @@ fn tried(cases: Vec<Case>) -> Outcome {
 #[test]
 fn what_breaks_on_the_board_is_found_or_borne_and_the_mechanism_held() {
     let faults = [
-        ("load-cell off", Some(102)),
+        ("preload-sensor off", Some(102)),
         ("encoder-line-a off", Some(123)),
         ("angle-bus off", Some(104)),
         ("dma stalled", Some(102)),

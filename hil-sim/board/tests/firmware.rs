@@ -251,7 +251,7 @@ fn a_tick_that_hangs_is_ended_by_the_watchdog() {
     board.send(b's');
     board.until("deploying: crossing", 8000);
     let at = board.position_mm();
-    // What every tick calls for the load cell never returns.
+    // What every tick calls for the preload sensor never returns.
     let functions = &board.bench.machine().image().functions;
     let found = functions.iter().find(|f| f.name.ends_with("AnalogChannel::step"));
     let stage = found.expect("a function").range.start;

@@ -184,8 +184,13 @@ impl Rigged {
     /// A millisecond of both.
     fn tick(&mut self, line: &mut HostLine<'_>, tick: u32, command: Option<Command>) -> Taken {
         let codes = session::read(&mut self.sensors, &self.plant);
-        self.given =
-            Given::codes(codes.wheel, codes.load_cell, codes.tread, codes.arm, codes.bridges);
+        self.given = Given::codes(
+            codes.wheel,
+            codes.preload_sensor,
+            codes.compression_sensor,
+            codes.arm,
+            codes.bridges,
+        );
         let taken = line.tick(tick, self.given.with(command)).expect("goes");
         let (drive, preload) = taken.commands();
         self.plant.step(&session::drives(drive, preload), 1e-3).expect("moves");

@@ -27,7 +27,7 @@ pub struct Code {
 pub struct Given {
     /// Time, ticks.
     pub now: u32,
-    /// Wheel, load cell, tread, arm.
+    /// Wheel, preload sensor, tread, arm.
     pub codes: [Code; 4],
     /// Codes of the bridges of drive and pre-tightener in low and high half, or
     /// [`NO_BRIDGES`].
@@ -104,8 +104,8 @@ impl Given {
             now: input.now,
             codes: [
                 code(frame.wheel, EncoderCount::get),
-                code(frame.load_cell, AdcCode::get),
-                code(frame.tread, AdcCode::get),
+                code(frame.preload_sensor, AdcCode::get),
+                code(frame.compression_sensor, AdcCode::get),
                 code(frame.arm, AngleFrame::get),
             ],
             bridges: frame.bridges.map_or(NO_BRIDGES, |codes| {
@@ -120,13 +120,13 @@ impl Given {
     /// The input of these words with this plan.
     #[must_use]
     pub fn input(&self, plan: Option<Plan>) -> Input {
-        let [wheel, load_cell, tread, arm] = &self.codes;
+        let [wheel, preload_sensor, tread, arm] = &self.codes;
         Input {
             now: self.now,
             sensors: SensorFrame {
                 wheel: sample(wheel, EncoderCount::new),
-                load_cell: sample(load_cell, AdcCode::new),
-                tread: sample(tread, AdcCode::new),
+                preload_sensor: sample(preload_sensor, AdcCode::new),
+                compression_sensor: sample(tread, AdcCode::new),
                 arm: sample(arm, AngleFrame::new),
                 bridges: (self.bridges != NO_BRIDGES).then_some(BridgeCodes {
                     drive: BridgeCode::new(self.bridges as u16),
@@ -201,8 +201,8 @@ mod tests {
             now: 9,
             sensors: SensorFrame {
                 wheel: Some(Sample { code: EncoderCount::new(65_535), at }),
-                load_cell: None,
-                tread: Some(Sample { code: AdcCode::new(1), at }),
+                preload_sensor: None,
+                compression_sensor: Some(Sample { code: AdcCode::new(1), at }),
                 arm: Some(Sample { code: AngleFrame::new(0x8001), at: 6 }),
                 bridges: Some(BridgeCodes {
                     drive: BridgeCode::new(4095),

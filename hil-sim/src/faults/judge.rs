@@ -12,7 +12,7 @@ use crate::scenario::injection::{Kind, Target};
 
 /// Control period, s.
 const TICK_S: f64 = 1e-3;
-/// Preload that a run may reach, parts of its limit: what a load cell that reads a sixth too
+/// Preload that a run may reach, parts of its limit: what a preload sensor that reads a sixth too
 /// little makes of it. The screw has its own stop at 1.25, what the parts are made for.
 pub const PRELOAD_PART: f64 = 1.20;
 /// Distance that the wheel may move uncommanded, mm: either direction added, until it rests.

@@ -88,7 +88,13 @@ pub fn run(
 }
 
 const fn given_by(codes: Codes) -> Given {
-    Given::codes(codes.wheel, codes.load_cell, codes.tread, codes.arm, codes.bridges)
+    Given::codes(
+        codes.wheel,
+        codes.preload_sensor,
+        codes.compression_sensor,
+        codes.arm,
+        codes.bridges,
+    )
 }
 
 /// The board's log, joined with the plant's truth of the same tick.
@@ -171,8 +177,8 @@ impl BoardLog {
         let mut record = *record;
         record.telemetry.at = from_zero(at);
         sensors.wheel.iter_mut().for_each(|sample| sample.at = from_zero(sample.at));
-        sensors.load_cell.iter_mut().for_each(|sample| sample.at = from_zero(sample.at));
-        sensors.tread.iter_mut().for_each(|sample| sample.at = from_zero(sample.at));
+        sensors.preload_sensor.iter_mut().for_each(|sample| sample.at = from_zero(sample.at));
+        sensors.compression_sensor.iter_mut().for_each(|sample| sample.at = from_zero(sample.at));
         sensors.arm.iter_mut().for_each(|sample| sample.at = from_zero(sample.at));
         let mut events = Vec::new();
         while let Some(entry) = self.events.pop_front_if(|entry| entry.at <= at) {

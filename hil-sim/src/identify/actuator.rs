@@ -83,7 +83,7 @@ fn seat(samples: &[Sample], delay: usize, lag_s: f64) -> Vec<f64> {
 
 impl<'a> Log<'a> {
     fn of(record: &'a Record, run: &Run, at: &Trajectory, radius_mm: f64) -> Self {
-        let delay = record.scenario.noise.load_cell_delay_s / TICK_S;
+        let delay = record.scenario.noise.preload_sensor_delay_s / TICK_S;
         let used = run.traces.bins.iter().filter(|bin| bin.pressed);
         let bins: Vec<_> = used.map(|bin| (bin.ticks.clone(), bin.preload_n)).collect();
         let middle = |ticks: &Range<usize>| 0.5 * (ticks.start + ticks.end - 1) as f64 - delay;

@@ -24,9 +24,9 @@ pub const LOAD: usize = 4;
 pub const GEARBOX: usize = 5;
 /// Wheel radius, mm.
 pub const RADIUS: usize = 6;
-/// Gain of the load cell over nominal, logarithm.
+/// Gain of the preload sensor over nominal, logarithm.
 pub const LOAD_GAIN: usize = 7;
-/// Gain of the displacement sensor over nominal, logarithm.
+/// Gain of the compression sensor over nominal, logarithm.
 pub const TREAD_GAIN: usize = 8;
 /// Zero of the arm angle, mrad.
 pub const ARM_ZERO: usize = 9;
@@ -100,7 +100,7 @@ impl Coordinates {
             free(nominal.load_n.ln(), UNKNOWN_LN),
             free(nominal.drive.friction_n, UNKNOWN_GEARBOX_N),
             radius,
-            known(0.0, spread.load_cell_gain_rel),
+            known(0.0, spread.preload_sensor_gain_rel),
             known(0.0, spread.tread_gain_rel),
             free(0.0, UNKNOWN_ARM_MRAD),
             known(nominal.elastic_creep.ln(), CREEP_REL),
@@ -224,7 +224,7 @@ mod tests {
     #[test]
     fn tolerances_follow_the_spread_and_an_exact_rig_is_held() {
         let mut scenario = Scenario::default();
-        scenario.spread.load_cell_gain_rel = 0.02;
+        scenario.spread.preload_sensor_gain_rel = 0.02;
         let coordinates = Coordinates::of(&scenario);
         assert_eq!(coordinates.priors()[LOAD_GAIN].deviation, 0.02);
         assert!(coordinates.priors()[LOAD_GAIN].tolerance);

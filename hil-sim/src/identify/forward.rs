@@ -282,7 +282,7 @@ pub fn derivatives(
     for index in [GEARBOX, TREAD_GAIN, ARM_ZERO, DRIVE] {
         columns[index] = by_sensors(index, 1e-4);
     }
-    // All forces scaled alike change no geometry: a load cell that reads high is a
+    // All forces scaled alike change no geometry: a preload sensor that reads high is a
     // stiffer tread under a larger load, its forces taken too large.
     let (stiffer, loaded) = (&changes[0], &changes[4]);
     let mut scaled = stiffer.plus(loaded, 1.0);

@@ -26,9 +26,9 @@ const CONVERTER: f64 = 65_535.0;
 pub struct Sample {
     /// Wheel encoder since boot, counts, unwrapped.
     pub counts: f64,
-    /// Load cell, N.
+    /// Preload sensor, N.
     pub preload_n: f64,
-    /// Tread displacement, mm.
+    /// Tread compression, mm.
     pub compression_mm: f64,
     /// Arm angle from the pillar, rad, where a new frame came.
     pub arm_rad: Option<f64>,
@@ -114,7 +114,7 @@ impl Record {
 /// Makes samples of raw codes, tick after tick.
 #[derive(Clone, Debug)]
 pub struct Reader {
-    load_cell_n: f64,
+    preload_sensor_n: f64,
     tread_mm: f64,
     angle_zero_code: f64,
     wheel: Option<EncoderCount>,
@@ -128,7 +128,7 @@ impl Reader {
     pub fn new(scenario: &Scenario) -> Self {
         let sense = &scenario.rig.sense;
         Self {
-            load_cell_n: sense.load_cell_full_scale_n,
+            preload_sensor_n: sense.preload_sensor_full_scale_n,
             tread_mm: sense.tread_full_scale_mm,
             angle_zero_code: sense.angle_zero_code,
             wheel: None,
@@ -154,8 +154,10 @@ impl Reader {
         });
         Sample {
             counts: self.counts as f64,
-            preload_n: self.load_cell_n * frame.load_cell.map_or(0.0, |c| bridge(c.code.get())),
-            compression_mm: self.tread_mm * frame.tread.map_or(0.0, |c| bridge(c.code.get())),
+            preload_n: self.preload_sensor_n
+                * frame.preload_sensor.map_or(0.0, |c| bridge(c.code.get())),
+            compression_mm: self.tread_mm
+                * frame.compression_sensor.map_or(0.0, |c| bridge(c.code.get())),
             arm_rad,
             drive: driven.drive,
             drive_on: driven.drive_on,
@@ -196,8 +198,11 @@ mod tests {
         let mut reader = Reader::new(&Scenario::default());
         let mut frame = SensorFrame {
             wheel: Some(At { code: EncoderCount::new(65_530), at: 0 }),
-            load_cell: Some(At { code: AdcCode::new((0.475f64 * CONVERTER) as u16), at: 0 }),
-            tread: Some(At { code: AdcCode::new((0.05f64 * CONVERTER) as u16), at: 0 }),
+            preload_sensor: Some(At { code: AdcCode::new((0.475f64 * CONVERTER) as u16), at: 0 }),
+            compression_sensor: Some(At {
+                code: AdcCode::new((0.05f64 * CONVERTER) as u16),
+                at: 0,
+            }),
             // 2000 + 2048 has seven bits: the parity bit is set.
             arm: Some(At { code: AngleFrame::new(0x8000 | 4048), at: 0 }),
             bridges: None,

@@ -192,7 +192,7 @@ impl Report<'_> {
             }),
             ((GEARBOX, "gearbox friction", "N", "drive effort on the smooth wall"), &itself),
             ((RADIUS, "rig.wheel_radius_mm", "mm", "shape of the climbs"), &itself),
-            ((LOAD_GAIN, "load cell gain", "", "loads against the drive"), &f64::exp),
+            ((LOAD_GAIN, "preload sensor gain", "", "loads against the drive"), &f64::exp),
             ((TREAD_GAIN, "displacement gain", "", "compression against the arm"), &f64::exp),
             ((CREEP, "plant.elastic_creep", "", "creep at the climbs"), &f64::exp),
             ((DRIVE, "drive force over nominal", "", "effort against load"), &f64::exp),
@@ -233,7 +233,7 @@ impl Report<'_> {
             low: Some(low),
             high: Some(high),
             identified: high - low < 0.5 * value.abs(),
-            by: "load cell against duty".to_owned(),
+            by: "preload sensor against duty".to_owned(),
         };
         let around = |name: &str, unit, value: f64, deviation: f64| {
             let half = NORMAL_95 * deviation;
@@ -278,7 +278,7 @@ impl Report<'_> {
             }
         };
         [
-            of("load cell zero", "N", |run| run.traces.preload_zero),
+            of("preload sensor zero", "N", |run| run.traces.preload_zero),
             of("displacement zero", "mm", |run| run.traces.compression_zero),
         ]
     }
@@ -402,7 +402,7 @@ mod tests {
             parameter("rig.step_positions_mm[2]", 40.25, true),
             parameter("rig.step_height_mm[1]", 4.1, true),
             parameter("rig.step_height_mm[2]", 4.0, true),
-            parameter("load cell zero", 3.0, true),
+            parameter("preload sensor zero", 3.0, true),
         ];
         let after = updated(&before, &parameters);
         assert_eq!(after.rig.tread.tau_s, 0.2);

@@ -63,7 +63,7 @@ pub struct Bin {
     pub compression_mm: f64,
     /// Arm angle, rad; none if no frame came.
     pub arm_rad: Option<f64>,
-    /// Preload as read without the load cell's zero, N.
+    /// Preload as read without the preload sensor's zero, N.
     pub preload_n: f64,
     /// Whether the preload is compared.
     pub pressed: bool,
@@ -93,7 +93,7 @@ pub struct Traces {
     pub span: Range<usize>,
     /// Rotation since the start, rad, every tick.
     pub turn_rad: Vec<f64>,
-    /// Preload without the load cell's zero, N, every tick.
+    /// Preload without the preload sensor's zero, N, every tick.
     pub preload_n: Vec<f64>,
     /// Zero of the preload sensor, N.
     pub preload_zero: Zero,
@@ -132,7 +132,7 @@ impl Traces {
         let turn_rad: Vec<f64> =
             turn(samples, moving).into_iter().map(|counts| counts * per_count).collect();
         let raw: Vec<f64> = samples.iter().map(|s| s.preload_n - preload_zero.value).collect();
-        let delay = record.scenario.noise.load_cell_delay_s / TICK_S;
+        let delay = record.scenario.noise.preload_sensor_delay_s / TICK_S;
         let smooth = smoothed(&raw, SMOOTH_PRELOAD);
         let preload_n = (0..raw.len()).map(|n| at(&smooth, n as f64 + delay).max(0.0)).collect();
         let mut traces = Self {

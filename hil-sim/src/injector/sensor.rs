@@ -57,8 +57,8 @@ impl FaultySensor {
     ) -> Self {
         let bridge = |full_scale: f64| (FULL_AT - ZERO_AT) * SPAN / full_scale;
         let (per_unit, zero) = match target {
-            Target::LoadCell => (bridge(rig.load_cell_full_scale_n), ZERO_AT * SPAN),
-            Target::TreadSensor => (bridge(rig.tread_full_scale_mm), ZERO_AT * SPAN),
+            Target::PreloadSensor => (bridge(rig.preload_sensor_full_scale_n), ZERO_AT * SPAN),
+            Target::CompressionSensor => (bridge(rig.tread_full_scale_mm), ZERO_AT * SPAN),
             Target::Angle => (TURN / 360.0, rig.angle_zero_code),
             Target::DriveReadback | Target::PretightenerReadback => {
                 (BRIDGE.1, f64::from(BridgeCode::CENTRE))
@@ -159,8 +159,8 @@ impl FaultySensor {
     /// The sensor's number in this frame; none before the first, or if it is not good.
     fn code(&mut self, frame: &SensorFrame) -> Option<f64> {
         match self.target {
-            Target::LoadCell => frame.load_cell.map(|s| f64::from(s.code.get())),
-            Target::TreadSensor => frame.tread.map(|s| f64::from(s.code.get())),
+            Target::PreloadSensor => frame.preload_sensor.map(|s| f64::from(s.code.get())),
+            Target::CompressionSensor => frame.compression_sensor.map(|s| f64::from(s.code.get())),
             Target::Angle => decode(frame.arm?.code).ok().map(f64::from),
             Target::Readback => frame.bridges.map(|_| 0.0),
             Target::DriveReadback => frame.bridges.map(|codes| codes.drive.get().into()),
@@ -181,8 +181,8 @@ impl FaultySensor {
         let bridge = AdcCode::new(code.round().clamp(0.0, SPAN) as u16);
         let output = BridgeCode::new(code.round().clamp(0.0, BRIDGE.0) as u16);
         match self.target {
-            Target::LoadCell => put(&mut frame.load_cell, bridge),
-            Target::TreadSensor => put(&mut frame.tread, bridge),
+            Target::PreloadSensor => put(&mut frame.preload_sensor, bridge),
+            Target::CompressionSensor => put(&mut frame.compression_sensor, bridge),
             Target::Angle => {
                 let bits = (code.round() as i64 & 0x3fff) as u16;
                 let parity = (bits.count_ones() as u16 & 1) << 15;
@@ -209,8 +209,8 @@ impl FaultySensor {
     fn garble(&self, frame: &mut SensorFrame, random: &mut ChaCha8Rng) {
         let code: u16 = random.random();
         match self.target {
-            Target::LoadCell => put(&mut frame.load_cell, AdcCode::new(code)),
-            Target::TreadSensor => put(&mut frame.tread, AdcCode::new(code)),
+            Target::PreloadSensor => put(&mut frame.preload_sensor, AdcCode::new(code)),
+            Target::CompressionSensor => put(&mut frame.compression_sensor, AdcCode::new(code)),
             Target::Angle => put(&mut frame.arm, AngleFrame::new(code)),
             Target::Readback | Target::DriveReadback | Target::PretightenerReadback => {
                 self.put_output(frame, BridgeCode::new(code & 0xFFF));
@@ -222,8 +222,8 @@ impl FaultySensor {
     /// Gives the sample before again.
     fn silence(&self, frame: &mut SensorFrame) {
         match self.target {
-            Target::LoadCell => frame.load_cell = self.held.load_cell,
-            Target::TreadSensor => frame.tread = self.held.tread,
+            Target::PreloadSensor => frame.preload_sensor = self.held.preload_sensor,
+            Target::CompressionSensor => frame.compression_sensor = self.held.compression_sensor,
             Target::Angle => frame.arm = self.held.arm,
             Target::Readback | Target::DriveReadback | Target::PretightenerReadback => {
                 frame.bridges = None;
@@ -247,22 +247,22 @@ mod tests {
 
     use super::*;
 
-    /// What the controller gets of a load cell that reads 10, 11, 12 ... N a millisecond.
+    /// What the controller gets of a preload sensor that reads 10, 11, 12 ... N a millisecond.
     fn given(kind: Kind, magnitude: f64) -> Vec<f64> {
         let rig = Rig::prototype().sense;
-        let mut sensor = FaultySensor::new(Target::LoadCell, kind, magnitude, &rig, 157.0);
+        let mut sensor = FaultySensor::new(Target::PreloadSensor, kind, magnitude, &rig, 157.0);
         let mut random = ChaCha8Rng::seed_from_u64(1);
-        let per_n = (FULL_AT - ZERO_AT) * SPAN / rig.load_cell_full_scale_n;
+        let per_n = (FULL_AT - ZERO_AT) * SPAN / rig.preload_sensor_full_scale_n;
         (0..40u32)
             .map(|tick| {
                 let force = 10.0 + f64::from(tick);
                 let code = AdcCode::new((ZERO_AT * SPAN + force * per_n).round() as u16);
-                let load_cell = Some(Sample { code, at: tick });
-                let mut frame = SensorFrame { load_cell, ..SensorFrame::default() };
+                let preload_sensor = Some(Sample { code, at: tick });
+                let mut frame = SensorFrame { preload_sensor, ..SensorFrame::default() };
                 let t_s = f64::from(tick) * 1e-3;
                 let since_s = (tick >= 20).then_some(t_s - 0.020);
                 sensor.read(&mut frame, t_s, since_s, &mut random);
-                let sample = frame.load_cell.expect("a sample");
+                let sample = frame.preload_sensor.expect("a sample");
                 if sample.at < tick {
                     return f64::NAN;
                 }

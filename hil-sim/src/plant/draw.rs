@@ -72,9 +72,9 @@ pub struct SensorParameters {
     /// Encoder counts per turn.
     pub counts_per_turn: f64,
     /// Full scale at 90 % of the converter, N.
-    pub load_cell_full_scale_n: f64,
+    pub preload_sensor_full_scale_n: f64,
     /// Gain error factor.
-    pub load_cell_gain: f64,
+    pub preload_sensor_gain: f64,
     /// Full scale at 90 % of the converter, mm.
     pub tread_full_scale_mm: f64,
     /// Gain error factor.
@@ -143,7 +143,7 @@ impl PlantParameters {
         let slew_n_per_s = rig.preload.slew_n_per_s * draw.factor(spread.slew_rel);
         let radius_mm = rig.rig.wheel_radius_mm + draw.offset(spread.wheel_radius_mm)
             - draw.up_to(spread.wear_mm);
-        let load_cell_gain = draw.factor(spread.load_cell_gain_rel);
+        let preload_sensor_gain = draw.factor(spread.preload_sensor_gain_rel);
         let tread_gain = draw.factor(spread.tread_gain_rel);
         let angle_zero_rad = draw.offset(spread.arm_zero_deg).to_radians();
         let steps = steps
@@ -198,8 +198,8 @@ impl PlantParameters {
             ripple: (0.006 * rig.drive.force_limit_n, rig.drive.ripple_pitch_mm),
             sensors: SensorParameters {
                 counts_per_turn: rig.sense.encoder_counts,
-                load_cell_full_scale_n: rig.sense.load_cell_full_scale_n,
-                load_cell_gain,
+                preload_sensor_full_scale_n: rig.sense.preload_sensor_full_scale_n,
+                preload_sensor_gain,
                 tread_full_scale_mm: rig.sense.tread_full_scale_mm,
                 tread_gain,
                 angle_zero_code: rig.sense.angle_zero_code,

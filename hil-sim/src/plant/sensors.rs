@@ -31,10 +31,10 @@ pub struct Sensed {
 pub struct Codes {
     /// Wheel encoder.
     pub wheel: EncoderCount,
-    /// Load cell.
-    pub load_cell: AdcCode,
-    /// Tread displacement.
-    pub tread: AdcCode,
+    /// Preload sensor.
+    pub preload_sensor: AdcCode,
+    /// Tread compression.
+    pub compression_sensor: AdcCode,
     /// Arm angle.
     pub arm: AngleFrame,
     /// Outputs of the bridges.
@@ -124,19 +124,19 @@ impl Sensors {
             let normal: f64 = StandardNormal.sample(random);
             deviation * normal
         };
-        let preload = aged(|s| s.preload_n, noise.load_cell_delay_s) * p.load_cell_gain;
+        let preload = aged(|s| s.preload_n, noise.preload_sensor_delay_s) * p.preload_sensor_gain;
         let depth = aged(|s| s.depth_mm, noise.tread_delay_s) * p.tread_gain;
         let arm = aged(|s| s.arm_rad, noise.angle_delay_s) + p.angle_zero_rad;
         let turns = now.rotation_rad / std::f64::consts::TAU;
         let counts = turns * p.counts_per_turn + normal(noise.encoder_jitter_counts);
-        let preload = preload + normal(noise.load_cell_n);
+        let preload = preload + normal(noise.preload_sensor_n);
         let depth = depth + normal(noise.tread_mm);
         let code =
             arm / std::f64::consts::TAU * 16_384.0 + p.angle_zero_code + normal(noise.angle_lsb);
         Codes {
             wheel: EncoderCount::new((counts.floor() as i64) as u16),
-            load_cell: bridge(preload / p.load_cell_full_scale_n),
-            tread: bridge(depth / p.tread_full_scale_mm),
+            preload_sensor: bridge(preload / p.preload_sensor_full_scale_n),
+            compression_sensor: bridge(depth / p.tread_full_scale_mm),
             arm: frame(code),
             bridges: self.readback.read(now.bridges, &self.parameters, dt_s),
         }

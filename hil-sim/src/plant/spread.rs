@@ -35,9 +35,9 @@ pub struct Spread {
     pub lag_rel: f64,
     /// Largest rate of the pre-tightener, relative.
     pub slew_rel: f64,
-    /// Gain of the load cell, relative.
-    pub load_cell_gain_rel: f64,
-    /// Gain of the tread displacement sensor, relative.
+    /// Gain of the preload sensor, relative.
+    pub preload_sensor_gain_rel: f64,
+    /// Gain of the compression sensor, relative.
     pub tread_gain_rel: f64,
     /// Zero of the arm angle sensor, degrees.
     pub arm_zero_deg: f64,
@@ -69,7 +69,7 @@ impl Spread {
             delay_rel: 0.15,
             lag_rel: 0.15,
             slew_rel: 0.05,
-            load_cell_gain_rel: 0.005,
+            preload_sensor_gain_rel: 0.005,
             tread_gain_rel: 0.005,
             arm_zero_deg: 0.05,
             supply_rel: 0.006,
@@ -90,16 +90,16 @@ impl Spread {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, DocumentedFields)]
 #[serde(deny_unknown_fields)]
 pub struct Noise {
-    /// Load cell, N.
-    pub load_cell_n: f64,
-    /// Tread displacement, mm.
+    /// Preload sensor, N.
+    pub preload_sensor_n: f64,
+    /// Tread compression, mm.
     pub tread_mm: f64,
     /// Arm angle, steps of its 14-bit code.
     pub angle_lsb: f64,
     /// Edges of the wheel encoder, counts.
     pub encoder_jitter_counts: f64,
-    /// Age of a load-cell reading when it is handed over, s.
-    pub load_cell_delay_s: f64,
+    /// Age of a preload-sensor reading when it is handed over, s.
+    pub preload_sensor_delay_s: f64,
     /// Age of a displacement reading when it is handed over, s.
     pub tread_delay_s: f64,
     /// Age of an angle reading when it is handed over, s.
@@ -113,11 +113,11 @@ impl Noise {
     #[must_use]
     pub const fn usual() -> Self {
         Self {
-            load_cell_n: 0.05,
+            preload_sensor_n: 0.05,
             tread_mm: 0.002,
             angle_lsb: 0.5,
             encoder_jitter_counts: 0.0,
-            load_cell_delay_s: 0.000_5,
+            preload_sensor_delay_s: 0.000_5,
             tread_delay_s: 0.000_5,
             angle_delay_s: 0.000_1,
             readback_duty: 0.002,

@@ -276,7 +276,7 @@ mod tests {
             let error = Run::read(&path).unwrap_err().to_string();
             assert!(error.contains("no log") && error.lines().count() == 1, "{error}");
         }
-        let (_directory, path) = file(b"tick,t_s,mode,load_cell_code\n1,0.001,0,7\n");
+        let (_directory, path) = file(b"tick,t_s,mode,preload_sensor_code\n1,0.001,0,7\n");
         let error = Run::read(&path).unwrap_err().to_string();
         assert!(error.contains("it lacks the column arm_angle_at"), "{error}");
         let missing = Run::read(Path::new("/nowhere/log.mcap")).unwrap_err();

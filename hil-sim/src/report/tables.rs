@@ -125,9 +125,9 @@ mod tests {
     #[test]
     fn injected_faults_are_named_before_those_found() {
         let mut summary = example::faulted().summary;
-        summary.injected = vec!["load-cell stuck from 2 s".to_owned()];
+        summary.injected = vec!["preload-sensor stuck from 2 s".to_owned()];
         let text = reports(&summary);
-        assert!(text.starts_with("<p>Injected: load-cell stuck from 2 s.</p>"), "{text}");
+        assert!(text.starts_with("<p>Injected: preload-sensor stuck from 2 s.</p>"), "{text}");
         assert!(text.contains("fault 121"));
     }
 

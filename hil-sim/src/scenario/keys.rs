@@ -77,7 +77,7 @@ impl Kind {
                 "a list such as [{ kind = \"late\", step = 2, offset_mm = 1.0 }]".to_owned()
             }
             Self::Faults => {
-                "a list such as [{ target = \"load-cell\", kind = \"stuck\", at_s = 2.0 }]"
+                "a list such as [{ target = \"preload-sensor\", kind = \"stuck\", at_s = 2.0 }]"
                     .to_owned()
             }
         }

@@ -253,13 +253,13 @@ fn values_that_make_no_plant_are_refused_with_the_one_to_change() {
 
 #[test]
 fn faults_are_read_and_written_back() {
-    let text = "[[run.faults]]\ntarget = \"load-cell\"\nkind = \"gain\"\nat_mm = 20\n\
+    let text = "[[run.faults]]\ntarget = \"preload-sensor\"\nkind = \"gain\"\nat_mm = 20\n\
                 magnitude = 1.1\n[[run.faults]]\ntarget = \"drive\"\nkind = \"runaway\"\n\
                 at_crossing = 2\nduration_s = 0.5\n";
     let parse = |text: &str| Scenario::parse("bench.toml", text, &[]).unwrap();
     let scenario = parse(text);
     let [first, second] = scenario.run.faults.as_slice() else { panic!("two") };
-    let gain = Injection::at(Target::LoadCell, Kind::Gain, 0.0, 1.1);
+    let gain = Injection::at(Target::PreloadSensor, Kind::Gain, 0.0, 1.1);
     assert_eq!(*first, Injection { at_s: None, at_mm: Some(20.0), ..gain });
     assert_eq!((second.at_crossing, second.duration_s), (Some(2), Some(0.5)));
     assert_eq!(second.magnitude(), 1.0, "as the catalogue has it");

@@ -123,8 +123,8 @@ impl Session {
         let codes = read(&mut self.sensors, &self.plant);
         let at = self.tick;
         self.frame.wheel = Some(Sample { code: codes.wheel, at });
-        self.frame.load_cell = Some(Sample { code: codes.load_cell, at });
-        self.frame.tread = Some(Sample { code: codes.tread, at });
+        self.frame.preload_sensor = Some(Sample { code: codes.preload_sensor, at });
+        self.frame.compression_sensor = Some(Sample { code: codes.compression_sensor, at });
         self.frame.bridges = Some(codes.bridges);
         if at.is_multiple_of(ANGLE_EVERY) {
             self.frame.arm = Some(Sample { code: codes.arm, at });

@@ -38,7 +38,7 @@ fn what_must_be_found_at_once_is() {
 
 #[test]
 fn a_silent_sensor_is_named_within_its_age() {
-    let sensors = ["encoder off", "load-cell off", "tread-sensor off", "angle off"];
+    let sensors = ["encoder off", "preload-sensor off", "compression-sensor off", "angle off"];
     let outcome = campaign(4, |name| sensors.contains(&name));
     for (fault, code) in sensors.into_iter().zip(101..) {
         let line = line(&outcome, fault);
@@ -58,20 +58,20 @@ fn the_same_campaign_comes_out_the_same_on_any_number_of_processors() {
 #[test]
 fn a_run_with_a_fault_of_its_scenario_ends_in_it_and_says_so() {
     let mut scenario = Scenario::default();
-    let stuck = Injection::at(Target::LoadCell, Kind::Stuck, 0.0, 0.0);
+    let stuck = Injection::at(Target::PreloadSensor, Kind::Stuck, 0.0, 0.0);
     scenario.run.faults = vec![Injection { at_s: None, at_mm: Some(10.0), ..stuck }];
     let recording = run(&scenario, Options { rows: true, speed: None }).expect("a run");
     let summary = recording.summary;
     assert_eq!(summary.faults.iter().map(|fault| fault.code).collect::<Vec<_>>(), [116]);
     assert!(!summary.completed && (10.0..14.0).contains(&summary.travel_mm), "{summary:?}");
-    assert_eq!(summary.injected, ["load-cell stuck from 10 mm"]);
+    assert_eq!(summary.injected, ["preload-sensor stuck from 10 mm"]);
 }
 
 #[test]
-fn a_displacement_sensor_that_is_far_off_from_before_boot_is_reported() {
+fn a_compression_sensor_that_is_far_off_from_before_boot_is_reported() {
     let reported = |preset: &str, gain: f64| {
         let mut scenario = Scenario::named(preset).expect("a preset");
-        scenario.run.faults = vec![Injection::at(Target::TreadSensor, Kind::Gain, 0.0, gain)];
+        scenario.run.faults = vec![Injection::at(Target::CompressionSensor, Kind::Gain, 0.0, gain)];
         let summary = run(&scenario, Options::default()).expect("a run").summary;
         summary.limits.iter().any(|limit| limit.code == 212)
     };

@@ -144,8 +144,8 @@ fn frame(
 ) -> SensorFrame {
     let made = |wheel: u16, load: u16, tread: u16, arm: u16| SensorFrame {
         wheel: Some(Sample { code: EncoderCount::new(wheel), at: now }),
-        load_cell: Some(Sample { code: AdcCode::new(load), at: now }),
-        tread: Some(Sample { code: AdcCode::new(tread), at: now }),
+        preload_sensor: Some(Sample { code: AdcCode::new(load), at: now }),
+        compression_sensor: Some(Sample { code: AdcCode::new(tread), at: now }),
         arm: Some(Sample { code: AngleFrame::new(arm), at: now }),
         bridges,
     };
@@ -180,7 +180,7 @@ fn frame(
                 time(&mut sample.at, random);
             }
             if random.random_range(0..20) == 0 {
-                frame.load_cell = None;
+                frame.preload_sensor = None;
             }
             frame
         }
@@ -282,7 +282,12 @@ const ENDS: [Ends; 31] = [
     ("drive.jerk_mm_s3", |r| &mut r.drive.jerk_mm_s3, 50.0, 30_000.0),
     ("drive.ripple_pitch_mm", |r| &mut r.drive.ripple_pitch_mm, 0.01, 100.0),
     ("sense.encoder_counts", |r| &mut r.sense.encoder_counts, 1024.0, 65_536.0),
-    ("sense.load_cell_full_scale_n", |r| &mut r.sense.load_cell_full_scale_n, 60.0, 2000.0),
+    (
+        "sense.preload_sensor_full_scale_n",
+        |r| &mut r.sense.preload_sensor_full_scale_n,
+        60.0,
+        2000.0,
+    ),
     ("sense.tread_full_scale_mm", |r| &mut r.sense.tread_full_scale_mm, 0.5, 50.0),
     ("control.gap_ref_mm", |r| &mut r.control.gap_ref_mm, 0.0, 10.0),
 ];

@@ -25,5 +25,8 @@ fn a_campaign_has_its_keys_and_its_parts_are_the_whole() {
 #[test]
 fn what_cannot_be_asked_for_is_refused_in_words() {
     let no = complaint(&["faults", "--only", "gremlin"]);
-    assert!(no.contains("--only gremlin: no such fault") && no.contains("load-cell stuck"), "{no}");
+    assert!(
+        no.contains("--only gremlin: no such fault") && no.contains("preload-sensor stuck"),
+        "{no}"
+    );
 }

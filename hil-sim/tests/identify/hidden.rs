@@ -95,7 +95,7 @@ fn hidden(p: &PlantParameters, known: &Scenario, zeros: (f64, f64)) -> Vec<(Stri
         ("preload.lag_s", p.lag_s),
         ("preload.slew_n_per_s", p.slew_n_per_s),
         ("preload.spring_n_per_mm", p.spring_n_per_mm),
-        ("load cell zero", zeros.0),
+        ("preload sensor zero", zeros.0),
     ]
     .map(|(name, value)| (name.to_owned(), value))
     .into();
@@ -129,8 +129,8 @@ fn log(index: usize, wide: &Scenario, zeros: (f64, f64)) -> Record {
         }
         let frame = SensorFrame {
             wheel: Some(Sample { code: codes.wheel, at }),
-            load_cell: Some(Sample { code: codes.load_cell, at }),
-            tread: Some(Sample { code: codes.tread, at }),
+            preload_sensor: Some(Sample { code: codes.preload_sensor, at }),
+            compression_sensor: Some(Sample { code: codes.compression_sensor, at }),
             arm,
             bridges: Some(codes.bridges),
         };

@@ -21,8 +21,12 @@ struct Chain {
 
 impl Chain {
     fn new(noise: Noise) -> Self {
-        let tuning =
-            Tuning { load_cell_tau_s: 0.0, tread_tau_s: 0.0, arm_tau_s: 0.0, ..Tuning::default() };
+        let tuning = Tuning {
+            preload_sensor_tau_s: 0.0,
+            tread_tau_s: 0.0,
+            arm_tau_s: 0.0,
+            ..Tuning::default()
+        };
         let parameters = SensorParameters { noise, ..nominal("prototype").sensors };
         Self {
             plant: Sensors::new(parameters, 1),
@@ -41,8 +45,8 @@ impl Chain {
         let at = self.now;
         let frame = SensorFrame {
             wheel: Some(Sample { code: codes.wheel, at }),
-            load_cell: Some(Sample { code: codes.load_cell, at }),
-            tread: Some(Sample { code: codes.tread, at }),
+            preload_sensor: Some(Sample { code: codes.preload_sensor, at }),
+            compression_sensor: Some(Sample { code: codes.compression_sensor, at }),
             arm: Some(Sample { code: codes.arm, at }),
             bridges: Some(codes.bridges),
         };
@@ -98,7 +102,7 @@ fn a_reading_is_as_old_as_its_delay() {
     for ticks in [0.0, 0.4, 1.0, 3.5, 20.0] {
         let delay = ticks * TICK_S;
         let noise = Noise {
-            load_cell_delay_s: delay,
+            preload_sensor_delay_s: delay,
             tread_delay_s: delay,
             angle_delay_s: delay,
             ..Noise::none()
@@ -126,7 +130,7 @@ fn a_reading_is_as_old_as_its_delay() {
 
 #[test]
 fn noise_has_its_deviation_and_no_bias() {
-    let noise = Noise { load_cell_n: 0.05, tread_mm: 0.002, angle_lsb: 2.0, ..Noise::none() };
+    let noise = Noise { preload_sensor_n: 0.05, tread_mm: 0.002, angle_lsb: 2.0, ..Noise::none() };
     let mut chain = Chain::new(noise);
     let (count, radius) = (5000, 120.0);
     let mut sums = [(0.0, 0.0); 3];
@@ -162,7 +166,7 @@ fn codes_stop_at_the_converters_ends() {
     let mut chain = Chain::new(Noise::none());
     let mut codes = |preload_n| {
         let codes = chain.read(Sensed { preload_n, ..Sensed::default() });
-        codes.load_cell.get()
+        codes.preload_sensor.get()
     };
     assert_eq!((codes(1e6), codes(-1e6)), (u16::MAX, 0));
 }

@@ -23,7 +23,7 @@ use serde_json::Value;
 
 /// How far the log may be from the truth under way. Position: the tolerance of the steps'
 /// places, which the controller knows from its table and corrects itself by. Preload: two
-/// deviations of the load cell's gain at 50 N, six of its noise, and its age.
+/// deviations of the preload sensor's gain at 50 N, six of its noise, and its age.
 const POSITION_MM: f64 = 0.8;
 const PRELOAD_N: f64 = 1.0;
 

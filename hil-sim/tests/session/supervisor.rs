@@ -47,8 +47,8 @@ fn snapshots() -> Vec<(Mode, Snapshot)> {
         for now in 0..30_000 {
             let codes = read(&mut sensors, &plant);
             frame.wheel = Some(Sample { code: codes.wheel, at: now });
-            frame.load_cell = Some(Sample { code: codes.load_cell, at: now });
-            frame.tread = Some(Sample { code: codes.tread, at: now });
+            frame.preload_sensor = Some(Sample { code: codes.preload_sensor, at: now });
+            frame.compression_sensor = Some(Sample { code: codes.compression_sensor, at: now });
             frame.bridges = Some(codes.bridges);
             if now % 2 == 0 {
                 frame.arm = Some(Sample { code: codes.arm, at: now });
@@ -119,8 +119,10 @@ const SPOILS: [Spoil; 12] = [
     (Fault::PretightenerBridge, |input| {
         spoil(input, |codes| codes.pretightener = BridgeCode::of(-29_000));
     }),
-    (Fault::PreloadSensorRange, |input| set(&mut input.sensors.load_cell, AdcCode::new(0))),
-    (Fault::CompressionSensorRange, |input| set(&mut input.sensors.tread, AdcCode::new(0xffff))),
+    (Fault::PreloadSensorRange, |input| set(&mut input.sensors.preload_sensor, AdcCode::new(0))),
+    (Fault::CompressionSensorRange, |input| {
+        set(&mut input.sensors.compression_sensor, AdcCode::new(0xffff))
+    }),
     (Fault::ArmAngleRange, |input| set(&mut input.sensors.arm, AngleFrame::new(2000))),
 ];
 
@@ -145,8 +147,11 @@ fn next(input: &Input, silent: Fault) -> Input {
         }
     };
     frame.wheel.iter_mut().for_each(|s| fresh(Fault::WheelEncoderStale, &mut s.at));
-    frame.load_cell.iter_mut().for_each(|s| fresh(Fault::PreloadSensorStale, &mut s.at));
-    frame.tread.iter_mut().for_each(|s| fresh(Fault::CompressionSensorStale, &mut s.at));
+    frame.preload_sensor.iter_mut().for_each(|s| fresh(Fault::PreloadSensorStale, &mut s.at));
+    frame
+        .compression_sensor
+        .iter_mut()
+        .for_each(|s| fresh(Fault::CompressionSensorStale, &mut s.at));
     frame.arm.iter_mut().for_each(|s| fresh(Fault::ArmAngleStale, &mut s.at));
     input
 }
@@ -197,7 +202,7 @@ fn sample<T: std::fmt::Debug>(
 #[derive(Clone, Debug)]
 struct Tick {
     wheel: Option<(i16, u32)>,
-    load_cell: Option<(u16, u32)>,
+    preload_sensor: Option<(u16, u32)>,
     tread: Option<(u16, u32)>,
     arm: Option<(u16, u32)>,
     /// What the drive's bridge reads if it does not read what it should; none for silence.
@@ -224,10 +229,10 @@ fn tick() -> impl Strategy<Value = Tick> {
         prop::bool::weighted(0.02),
         any::<bool>(),
     )
-        .prop_map(|(wheel, load_cell, tread, arm, bridges, command, overrun, stop, plan)| {
-            Tick {
+        .prop_map(
+            |(wheel, preload_sensor, tread, arm, bridges, command, overrun, stop, plan)| Tick {
                 wheel,
-                load_cell,
+                preload_sensor,
                 tread,
                 arm,
                 bridges,
@@ -235,8 +240,8 @@ fn tick() -> impl Strategy<Value = Tick> {
                 overrun,
                 emergency_stop: stop,
                 plan,
-            }
-        })
+            },
+        )
 }
 
 proptest! {
@@ -263,10 +268,10 @@ proptest! {
                     code: EncoderCount::new(count),
                     at: at(age),
                 }),
-                load_cell: tick
-                    .load_cell
+                preload_sensor: tick
+                    .preload_sensor
                     .map(|(code, age)| Sample { code: AdcCode::new(code), at: at(age) }),
-                tread: tick
+                compression_sensor: tick
                     .tread
                     .map(|(code, age)| Sample { code: AdcCode::new(code), at: at(age) }),
                 arm: tick

@@ -66,9 +66,9 @@ impl Shared {
 #[derive(Clone)]
 struct Peripheral(Rc<Shared>);
 
-/// The converter behind the load cell; the tread's is another.
+/// The converter behind the preload sensor; the tread's is another.
 #[derive(Clone)]
-struct LoadCell(Rc<Shared>);
+struct PreloadSensor(Rc<Shared>);
 
 impl WheelEncoder for Peripheral {
     fn count(&mut self) -> EncoderCount {
@@ -76,15 +76,15 @@ impl WheelEncoder for Peripheral {
     }
 }
 
-impl AnalogInput for LoadCell {
+impl AnalogInput for PreloadSensor {
     async fn sample(&mut self) -> Result<AdcCode, BusFault> {
-        Ok(self.0.codes().load_cell)
+        Ok(self.0.codes().preload_sensor)
     }
 }
 
 impl AnalogInput for Peripheral {
     async fn sample(&mut self) -> Result<AdcCode, BusFault> {
-        Ok(self.0.codes().tread)
+        Ok(self.0.codes().compression_sensor)
     }
 }
 
@@ -202,13 +202,13 @@ impl Board {
         let planner = forever(Planner::try_build(&scenario.rig).expect("a sound rig"));
         let latest = forever(TickIoCell::new(TickIo::default()));
         let part = || Peripheral(Rc::clone(&self.shared));
-        let load_cell = LoadCell(Rc::clone(&self.shared));
+        let preload_sensor = PreloadSensor(Rc::clone(&self.shared));
         let (wheel, tread, arm, button) = (part(), part(), part(), part());
         let (motors, watchdog, journal, light) = (part(), part(), part(), part());
         self.tasks = vec![
             Box::pin(async { tasks::clock(exchange).await }),
             Box::pin(async { tasks::speed(wheel, exchange).await }),
-            Box::pin(async { tasks::pressure(load_cell, exchange).await }),
+            Box::pin(async { tasks::pressure(preload_sensor, exchange).await }),
             Box::pin(async { tasks::displacement(tread, exchange).await }),
             Box::pin(async { tasks::angle(arm, exchange).await }),
             Box::pin(async { tasks::operator(button, exchange).await }),

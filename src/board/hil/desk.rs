@@ -23,8 +23,8 @@ pub(super) struct Desk {
 pub(super) static DESK: Desk = Desk {
     given: Mutex::new(Cell::new(Given {
         wheel: 0,
-        load_cell: None,
-        tread: None,
+        preload_sensor: None,
+        compression_sensor: None,
         arm: None,
         bridges: None,
         stop: false,

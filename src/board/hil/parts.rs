@@ -22,10 +22,10 @@ impl WheelEncoder for Wheel {
     }
 }
 
-/// The load cell.
-pub(crate) type LoadCell = Analog;
+/// The preload sensor.
+pub(crate) type PreloadSensor = Analog;
 
-/// The tread sensor.
+/// The compression sensor.
 pub(crate) type Tread = Analog;
 
 /// One of the two analogue sensors.
@@ -89,8 +89,8 @@ pub(crate) fn split(
         [p.PA8.into(), p.PA9.into(), p.PA10.into(), p.PC6.into(), p.PC8.into(), p.PC9.into()];
     let parts = Parts {
         wheel: Wheel,
-        load_cell: Analog(|given| given.load_cell),
-        tread: Analog(|given| given.tread),
+        preload_sensor: Analog(|given| given.preload_sensor),
+        tread: Analog(|given| given.compression_sensor),
         arm: Angle,
         motors: Bridges { _low: pins.map(|pin| Output::new(pin, Level::Low, Speed::Low)) },
         watchdog: Guard::new(p.IWDG),

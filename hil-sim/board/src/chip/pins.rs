@@ -163,7 +163,7 @@ impl Chip {
         [wired && (lines[0] || broken[0]), wired && (lines[1] || broken[1])]
     }
 
-    /// Voltages at the analogue inputs of load cell, tread sensor and the bridges of drive
+    /// Voltages at the analogue inputs of preload sensor, compression sensor and the bridges of drive
     /// and pre-tightener, in parts of 2^16 of the reference.
     pub fn set_analog(&mut self, inputs: [u16; 4]) {
         self.inputs = inputs;

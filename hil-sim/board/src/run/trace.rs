@@ -100,8 +100,8 @@ impl Trace {
         let digest = &mut self.tally.digest;
         for code in [
             codes.wheel.get(),
-            codes.load_cell.get(),
-            codes.tread.get(),
+            codes.preload_sensor.get(),
+            codes.compression_sensor.get(),
             codes.arm.get(),
             codes.bridges.drive.get(),
             codes.bridges.pretightener.get(),

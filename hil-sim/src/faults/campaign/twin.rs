@@ -16,7 +16,7 @@ use crate::scenario::Scenario;
 use crate::session::{Options, RunError, Session};
 
 /// Differences from the twin that count as a sign of the fault: preload, N; position, mm;
-/// speed, mm/s. Ten deviations of the load cell, five counts of the encoder, and what the
+/// speed, mm/s. Ten deviations of the preload sensor, five counts of the encoder, and what the
 /// speed observer swings by itself.
 const SIGNS: (f64, f64, f64) = (0.5, 0.1, 2.0);
 

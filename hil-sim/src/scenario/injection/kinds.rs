@@ -8,10 +8,10 @@ use serde::{Deserialize, Serialize};
 pub enum Target {
     /// Wheel encoder.
     Encoder,
-    /// Load cell.
-    LoadCell,
-    /// Tread displacement sensor.
-    TreadSensor,
+    /// Preload sensor.
+    PreloadSensor,
+    /// Compression sensor.
+    CompressionSensor,
     /// Arm angle sensor.
     Angle,
     /// Converter that reads the outputs of both bridges.
@@ -42,9 +42,9 @@ pub enum Target {
     Commands,
     /// The controller, which starts again.
     Reset,
-    /// Converter of the load cell.
-    LoadCellConverter,
-    /// Converter of the tread sensor.
+    /// Converter of the preload sensor.
+    PreloadSensorConverter,
+    /// Converter of the compression sensor.
     TreadConverter,
     /// Bus of the angle sensor.
     AngleBus,
@@ -62,9 +62,9 @@ pub enum Target {
     Processor,
     /// Task of the wheel encoder.
     SpeedTask,
-    /// Task of the load cell.
+    /// Task of the preload sensor.
     PressureTask,
-    /// Task of the tread sensor.
+    /// Task of the compression sensor.
     DisplacementTask,
     /// Task of the angle sensor.
     AngleTask,
@@ -171,8 +171,8 @@ impl Target {
         matches!(
             self,
             Self::Encoder
-                | Self::LoadCell
-                | Self::TreadSensor
+                | Self::PreloadSensor
+                | Self::CompressionSensor
                 | Self::Angle
                 | Self::Readback
                 | Self::DriveReadback

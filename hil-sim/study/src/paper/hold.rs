@@ -199,7 +199,7 @@ impl Hold {
             ),
             of(INTRODUCED, "preload-follows-the-diameter").judged(
                 "At constant speed the radial preload fluctuates with the sleeve's diameter.",
-                swing > hil_sim::plant::spread::Noise::usual().load_cell_n,
+                swing > hil_sim::plant::spread::Noise::usual().preload_sensor_n,
                 format!(
                     "By {swing:.2} N on average up to lift-off, with the preload loop closed; the spring \
                      alone would give {unregulated:.1} N a step."
