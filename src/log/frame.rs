@@ -90,6 +90,12 @@ pub struct Head {
 #[repr(align(4))]
 pub struct FrameBuffer([u8; LONGEST]);
 
+impl Default for FrameBuffer {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl FrameBuffer {
     /// An empty one.
     #[must_use]

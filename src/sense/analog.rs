@@ -270,8 +270,7 @@ mod tests {
     #[test]
     fn a_zero_too_far_off_is_rejected() {
         let channel = channel();
-        let mut state = AnalogState::default();
-        state.offset = Q16::from_num(1);
+        let mut state = AnalogState { offset: Q16::from_num(1), ..AnalogState::default() };
         state.begin_zero();
         for now in 0..ZERO_SAMPLES {
             channel.step(&mut state, now, sample(code_of(6.1, 200.0), now), LIMIT);

@@ -2,6 +2,9 @@
 
 use crate::record::CrossingLine;
 
+/// The true value that a column is compared with, and the error as text.
+type Truth = (fn(&CrossingLine) -> f64, fn(f64, f64) -> String);
+
 /// A column of the ledger.
 pub(crate) struct Column {
     pub(crate) name: &'static str,
@@ -10,7 +13,7 @@ pub(crate) struct Column {
     pub(crate) of: fn(&CrossingLine) -> Option<f64>,
     /// The true value of what the controller predicts, measures or finds, and how far it is
     /// off, as text.
-    pub(crate) truth: Option<(fn(&CrossingLine) -> f64, fn(f64, f64) -> String)>,
+    pub(crate) truth: Option<Truth>,
     /// A terminal has no room for all.
     pub(crate) on_terminal: bool,
 }
@@ -25,10 +28,8 @@ pub(crate) const COLUMNS: [Column; 13] = {
     ) -> Column {
         Column { name, unit, decimals, of, truth: None, on_terminal: true }
     }
-    const GAP: Option<(fn(&CrossingLine) -> f64, fn(f64, f64) -> String)> =
-        Some((|c| c.gap_mm, gap_error));
-    const STEP: Option<(fn(&CrossingLine) -> f64, fn(f64, f64) -> String)> =
-        Some((|c| c.step_mm, step_error));
+    const GAP: Option<Truth> = Some((|c| c.gap_mm, gap_error));
+    const STEP: Option<Truth> = Some((|c| c.step_mm, step_error));
     [
         new("gap", "mm", 4, |c| Some(c.gap_mm)),
         Column { truth: GAP, ..new("predicted", "mm", 4, |c| c.gap_predicted_mm) },

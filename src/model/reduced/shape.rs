@@ -206,7 +206,7 @@ impl Shape {
     /// The force beyond the lift of the load on the steepest slope, from 2^-7 to a quarter of
     /// the unit.
     pub(super) fn beyond_lift(&self, sought: i32) -> Excess {
-        let force = (sought - self.most_lifting).min((1 << 28) - 1).max(LEAST_EXCESS);
+        let force = (sought - self.most_lifting).clamp(LEAST_EXCESS, (1 << 28) - 1);
         let octave = (force as u32).leading_zeros();
         Excess { octave, normalised: (force as u32) << octave }
     }
