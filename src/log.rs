@@ -3,7 +3,7 @@
 //!
 //! | part | does |
 //! |---|---|
-//! | [`Entry`], [`Telemetry`] | what happened; the state after a tick |
+//! | [`Entry`](crate::tick::Entry), [`Telemetry`](crate::tick::Telemetry) | what happened; the state after a tick |
 //! | [`Record`] | a tick's whole input and output, for the stream |
 //! | [`LogEncoder`] | makes frames of them, below the control rate |
 //! | [`frame`] | how a frame lies on the channel |

@@ -125,7 +125,7 @@ pub struct Timed {
 /// A fault that is spelt wrong.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{0}`: expected <fault>@<seconds> with preload-sensor=<code>, tread=<code>, \
+    "`{0}`: expected <fault>@<seconds> with preload-sensor=<code>, compression-sensor=<code>, \
      drive-readback=<code>, pretightener-readback=<code>, angle-bits=<mask>, angle-lost, encoder-a, encoder-b, dma-stalled, timer-flags, button-storm, \
      brown-out, supply-cut, supply-dip, reset-pin, caught or flip=<address>.<bit>"
 )]
@@ -147,7 +147,7 @@ impl FromStr for Fault {
         let half = |text: &str| u16::try_from(number(text)?).ok();
         let fault = match (name, value) {
             ("preload-sensor", Some(code)) => half(code).map(|code| Self::StuckCode(0, code)),
-            ("tread", Some(code)) => half(code).map(|code| Self::StuckCode(1, code)),
+            ("compression-sensor", Some(code)) => half(code).map(|code| Self::StuckCode(1, code)),
             ("drive-readback", Some(code)) => half(code).map(|code| Self::StuckCode(2, code)),
             ("pretightener-readback", Some(code)) => {
                 half(code).map(|code| Self::StuckCode(3, code))
@@ -191,7 +191,7 @@ impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self::StuckCode(0, code) => write!(f, "preload-sensor={code:#x}"),
-            Self::StuckCode(1, code) => write!(f, "tread={code:#x}"),
+            Self::StuckCode(1, code) => write!(f, "compression-sensor={code:#x}"),
             Self::StuckCode(2, code) => write!(f, "drive-readback={code:#x}"),
             Self::StuckCode(_, code) => write!(f, "pretightener-readback={code:#x}"),
             Self::BitErrors(mask) => write!(f, "angle-bits={mask:#x}"),
@@ -251,7 +251,7 @@ mod tests {
             "angle-lost@",
             "angle-lost@-1",
             "tread@1",
-            "tread=70000@1",
+            "compression-sensor=70000@1",
             "flip=1.9@1",
         ] {
             let error = text.parse::<Timed>().expect_err("misspelt").to_string();

@@ -39,9 +39,9 @@ pub struct Args {
     pub hil: bool,
 
     /// Fault of the emulated board's hardware and when it comes, may be repeated:
-    /// preload-sensor=0x8000@5.2, tread=<code>, angle-bits=<mask>, angle-lost, encoder-a,
+    /// preload-sensor=0x8000@5.2, compression-sensor=CODE, angle-bits=MASK, angle-lost, encoder-a,
     /// encoder-b, dma-stalled, timer-flags, brown-out, supply-cut, supply-dip or
-    /// flip=<address>.<bit>, each at its seconds from power-up.
+    /// flip=ADDRESS.BIT, each at its seconds from power-up.
     #[arg(long, value_name = "FAULT@S")]
     pub board_fault: Vec<String>,
 

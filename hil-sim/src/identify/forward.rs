@@ -29,7 +29,7 @@ const HEIGHT: usize = 1;
 const TRACTION: usize = 2;
 const POSITION: usize = 3;
 
-/// What the forward model gives, every [`STEP`] ticks, or a change of it.
+/// What the forward model gives, every few ticks, or a change of it.
 #[derive(Clone, Debug)]
 pub struct Trajectory {
     first: usize,
