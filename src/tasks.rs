@@ -30,12 +30,12 @@ mod operator;
 mod sensors;
 
 pub use clock::{clock, mid_tick_deadline};
-pub use exchange::{COMMANDS, ENTRIES, Exchange};
+pub use exchange::{COMMANDS, ENTRIES, Exchange, TickIo};
 pub use journal::journal;
 pub use link::link;
 pub use liveness::{CHECK_IN_TICKS, TaskId};
 pub use model::model;
-pub use motors::{TickIo, TickIoCell, motors, record};
+pub use motors::{TickIoCell, motors, record};
 pub use operator::operator;
 pub use sensors::{SENSOR_TIMEOUT, angle, displacement, pressure, speed};
 

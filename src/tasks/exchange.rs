@@ -3,7 +3,6 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use super::liveness::{Liveness, PERIODS, TaskId};
-use super::motors::TickIo;
 use crate::hal::Light;
 use crate::log::Record;
 use crate::model::{Plan, PlanRequest};
@@ -34,6 +33,13 @@ type Latest<T> = Watch<Raw, T, 0>;
 /// Room for one value, see [`replace`]. Unlike a `Signal`'s its empty state is all zeros
 /// whatever it holds, so that the exchange takes no room in flash.
 pub(super) type Slot<T> = Channel<Raw, T, 1>;
+
+/// What a tick was given and gave.
+#[derive(Default)]
+pub struct TickIo {
+    pub(super) input: Input,
+    pub(super) output: Output,
+}
 
 /// Everything the tasks share: one in a `static`, or one per test.
 pub struct Exchange {

@@ -4,18 +4,11 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::mutex::Mutex;
 
 use super::clock::uptime;
-use super::exchange::Exchange;
+use super::exchange::{Exchange, TickIo};
 use crate::hal::{Motors, Watchdog};
 use crate::log::SnapshotRecorder;
-use crate::tick::{Controller, Input, Output, State};
+use crate::tick::{Controller, State};
 use crate::units::MotorCommand;
-
-/// What a tick was given and gave.
-#[derive(Default)]
-pub struct TickIo {
-    pub(super) input: Input,
-    pub(super) output: Output,
-}
 
 /// The latest tick: [`motors()`] fills it, [`record()`] reads it before the next. Both run
 /// on one executor and hold it across no await, so that neither finds it in use.

@@ -16,9 +16,9 @@ use interstage::units::Q16;
 
 use crate::bench::{Bench, BenchError, Passed};
 use crate::chip::Pin;
+use crate::chip::map::PARAMETER_SETS;
 use crate::fault_injector::{Saving, letter};
 use crate::log::Strings;
-use crate::params::PLACES;
 use crate::peripherals::rcc::Cause;
 use crate::run::{RunError, store};
 use hil_sim::faults::campaign::operator::Operator;
@@ -335,6 +335,6 @@ fn watched(firmware: Firmware<'_>, scenario: &Scenario, twin: &Twin) -> Result<I
 fn keep(board: &mut Board<'_>, scenario: &Scenario) -> Result<Hold, RunError> {
     let set = set_of(sets::KEPT, &scenario.rig)?;
     let place = slots::place(&set, 7).ok_or(CompileError::Room)?;
-    board.bench.machine_mut().poke(PLACES, &place).map_err(BenchError::from)?;
+    board.bench.machine_mut().poke(PARAMETER_SETS, &place).map_err(BenchError::from)?;
     Ok(Hold::new(place.to_vec()))
 }

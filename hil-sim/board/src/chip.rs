@@ -1,7 +1,7 @@
 //! The chip around the core: every peripheral at its address, and what leads from one
 //! to another: clocks, interrupt lines, DMA requests, pins.
 
-mod map;
+pub mod map;
 mod pins;
 mod stray;
 

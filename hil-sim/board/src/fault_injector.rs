@@ -12,11 +12,11 @@ mod save;
 use interstage::sense::raw::{AdcCode, Sample, SensorFrame};
 use interstage::supervise::Command;
 
+use super::chip::map::PARAMETER_SETS;
 use super::core::CoreError;
 use super::elf::FLASH;
 use super::faults::Fault;
 use super::machine::Machine;
-use super::params::PLACES;
 use super::peripherals::HZ;
 use super::peripherals::flash::Cut;
 use hil_sim::faults::sets;
@@ -284,8 +284,8 @@ fn cut(injection: &Injection) -> Cut {
 fn flipped(machine: &Machine, injection: &Injection) -> Result<Option<Fault>, CoreError> {
     let bit = injection.magnitude() as u32;
     let (place, bit) = match injection.target {
-        Target::StoredSet => (Some(PLACES), bit),
-        Target::SpareSet => (Some(PLACES + SLOT_BYTES as u32), bit),
+        Target::StoredSet => (Some(PARAMETER_SETS), bit),
+        Target::SpareSet => (Some(PARAMETER_SETS + SLOT_BYTES as u32), bit),
         Target::ImageSet => {
             let set = set_of("prototype", &Rig::prototype()).unwrap_or_default();
             (machine.find(&set)?, bit % (8 * set.len() as u32).max(1))

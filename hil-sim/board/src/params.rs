@@ -6,12 +6,10 @@ use std::path::{Path, PathBuf};
 use interstage::params::slots::SLOT_BYTES;
 
 use crate::bench::Bench;
+use crate::chip::map::PARAMETER_SETS;
 use crate::log::Strings;
 use hil_sim::params::{StoreError, Wire};
 use hil_sim::scenario::Scenario;
-
-/// Where the places for sets begin in the board's memory.
-pub const PLACES: u32 = 0x0808_0000 - 2 * SLOT_BYTES as u32;
 
 /// Longest start-up, ms.
 const START_MS: u32 = 3000;
@@ -43,7 +41,7 @@ impl EmulatedBoard {
                     bytes.len()
                 )));
             }
-            bench.machine_mut().poke(PLACES, &bytes).map_err(|error| wire(&error))?;
+            bench.machine_mut().poke(PARAMETER_SETS, &bytes).map_err(|error| wire(&error))?;
         }
         let mut board = Self { bench, flash: flash.to_owned() };
         for _ in 0..START_MS {
@@ -65,7 +63,7 @@ impl EmulatedBoard {
         let mut bytes = vec![0; 2 * SLOT_BYTES];
         self.bench
             .machine()
-            .peek(PLACES, &mut bytes)
+            .peek(PARAMETER_SETS, &mut bytes)
             .map_err(|error| StoreError::Wire(error.to_string()))?;
         fs::write(&self.flash, bytes).map_err(|source| failed(&self.flash, source))
     }

@@ -13,7 +13,7 @@ use super::machine::Machine;
 use interstage::params::{CompileError, slots};
 use interstage::rig::Rig;
 
-use crate::params::PLACES;
+use crate::chip::map::PARAMETER_SETS;
 use hil_sim::faults::sets;
 use hil_sim::firmware::{FirmwareError, Footprint};
 use hil_sim::params::set_of;
@@ -77,7 +77,7 @@ pub(crate) fn store(machine: &mut Machine, scenario: &Scenario) -> Result<(), Ru
     let of_sets = |fault: &Injection| fault.target.is_of_sets();
     let mut faults = scenario.run.faults.iter().filter(|fault| of_sets(fault));
     if faults.any(|fault| fault.target != Target::ImageSet) {
-        machine.poke(PLACES, &sets::places(scenario)?).map_err(BenchError::from)?;
+        machine.poke(PARAMETER_SETS, &sets::places(scenario)?).map_err(BenchError::from)?;
         return Ok(());
     }
     if scenario.rig == Rig::prototype() {
@@ -85,7 +85,7 @@ pub(crate) fn store(machine: &mut Machine, scenario: &Scenario) -> Result<(), Ru
     }
     let set = set_of(&scenario.preset, &scenario.rig)?;
     let place = slots::place(&set, 1).ok_or(CompileError::Room)?;
-    machine.poke(PLACES, &place).map_err(BenchError::from)?;
+    machine.poke(PARAMETER_SETS, &place).map_err(BenchError::from)?;
     Ok(())
 }
 

@@ -7,7 +7,7 @@ use hil_sim::scenario::Scenario;
 use hil_sim::scenario::injection::{Entry, HARDWARE, Injection, Kind, Target};
 use rig_board::bench::Bench;
 use rig_board::campaign::{self, Firmware};
-use rig_board::params::PLACES;
+use rig_board::chip::map::PARAMETER_SETS;
 use rig_board::run::run;
 
 use crate::common::{elf, strings};
@@ -101,7 +101,7 @@ fn a_scenario_can_have_a_set_damaged_in_flash_and_the_board_started_anew() {
     let scenario = Scenario::parse("bench.toml", text, &[]).expect("a scenario");
     let mut bench = Bench::new(elf(), strings(), &scenario).expect("a bench");
     let places = sets::places(&scenario).expect("sets");
-    bench.machine_mut().poke(PLACES, &places).expect("flash");
+    bench.machine_mut().poke(PARAMETER_SETS, &places).expect("flash");
     let mut said = Vec::new();
     for _ in 0..1500 {
         let (passed, lines) = bench.step().expect("runs");

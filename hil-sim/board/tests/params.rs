@@ -8,8 +8,8 @@ use hil_sim::scenario::Scenario;
 use interstage::params::{ParameterSet, SCHEMA, SetError, slots};
 use interstage::rig::Rig;
 use rig_board::bench::Bench;
+use rig_board::chip::map::PARAMETER_SETS;
 use rig_board::log::Strings;
-use rig_board::params::PLACES;
 use serde_json::Value;
 
 use crate::common::elf;
@@ -113,7 +113,7 @@ fn parameters_are_read_changed_saved_and_restored() {
 fn powered(flash: &[u8], milliseconds: u32) -> (Vec<String>, bool) {
     let strings = Strings::of(elf()).expect("it logs");
     let mut bench = Bench::new(elf(), &strings, &Scenario::default()).expect("a bench");
-    bench.machine_mut().poke(PLACES, flash).expect("flash");
+    bench.machine_mut().poke(PARAMETER_SETS, flash).expect("flash");
     let (mut said, mut driven) = (Vec::new(), false);
     for _ in 0..milliseconds {
         let (passed, lines) = bench.step().expect("runs");

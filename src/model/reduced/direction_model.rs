@@ -1,7 +1,6 @@
 //! The effective stiffness in one direction, for one rig, step and load.
 
 use super::centred;
-use super::shape::Excess;
 use crate::numeric::{
     high, horner, horner_with_curvature, inverse_sqrt_guess, part_of_sum, reciprocal_of_normalised,
 };
@@ -19,6 +18,15 @@ pub(super) const LOWEST_OCTAVE: u32 = 8;
 /// Coefficients of a guess of the run in its cell, Q14: `u^i m^j`, by the mantissa m of
 /// the force and then the part u of the range of x: 4, 3 and 3 of them, two to a word.
 pub(super) type RunCell = [Pair; 5];
+
+/// What a force exceeds the lift of the load on the steepest slope by: it goes nearly with
+/// the square of the run.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Excess {
+    /// Leading zeros of its Q30, and that without them.
+    pub(super) octave: u32,
+    pub(super) normalised: u32,
+}
 
 /// Two numbers in a word, 16 bits each: what one access brings costs half.
 ///

@@ -1,7 +1,7 @@
 //! What a rig's geometry and load make of a run over the corner; the same in both directions.
 
 use super::centred;
-use super::direction_model::{DirectionModel, Guess, LOWEST_OCTAVE};
+use super::direction_model::{DirectionModel, Excess, Guess, LOWEST_OCTAVE};
 use crate::numeric::{fraction, high, horner, horner_with_slope, sqrt_fraction};
 use crate::units::{Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio};
 
@@ -54,15 +54,6 @@ pub(super) struct Shape {
     pub(super) deflection: i32,
     /// Swing that the unit of force leaves after the longest run, um s/mm, Q28.
     pub(super) swing: i32,
-}
-
-/// What a force exceeds the lift of the load on the steepest slope by: it goes nearly with
-/// the square of the run.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Excess {
-    /// Leading zeros of its Q30, and that without them.
-    pub(super) octave: u32,
-    pub(super) normalised: u32,
 }
 
 /// A run with the slope of the contact there, Q30.

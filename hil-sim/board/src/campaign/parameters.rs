@@ -11,7 +11,7 @@ use interstage::params::slots::SLOT_BYTES;
 
 use super::{AFTER_S, Board, IMAGE, IMAGE_DAMAGED, Saving, Twin};
 use crate::bench::BenchError;
-use crate::params::PLACES;
+use crate::chip::map::PARAMETER_SETS;
 use crate::peripherals::rcc::Cause;
 use crate::run::RunError;
 use hil_sim::faults::campaign::Instant;
@@ -146,7 +146,7 @@ fn harm(
         return Ok(Some(format!("runs on the set `{name}`")));
     }
     let mut flash = vec![0; 2 * SLOT_BYTES];
-    board.bench.machine().peek(PLACES, &mut flash).map_err(BenchError::from)?;
+    board.bench.machine().peek(PARAMETER_SETS, &mut flash).map_err(BenchError::from)?;
     let set = sets::set(name, &scenario.rig)?;
     let whole = flash.windows(set.len()).any(|bytes| bytes == set);
     Ok((!whole).then(|| format!("runs on the set `{name}`, of which a bit is another")))

@@ -9,7 +9,7 @@ use interstage::units::Direction;
 
 use super::Board;
 use crate::bench::{BenchError, Passed};
-use crate::params::PLACES;
+use crate::chip::map::PARAMETER_SETS;
 use crate::peripherals::rcc::Cause;
 use crate::run::RunError;
 use hil_sim::plant::rig::Truth;
@@ -175,7 +175,7 @@ impl Hold {
         let mut harms = self.harms(scenario);
         harms.extend(go_on(board, scenario)?);
         let mut stored = vec![0; self.place.len()];
-        board.bench.machine().peek(PLACES, &mut stored).map_err(BenchError::from)?;
+        board.bench.machine().peek(PARAMETER_SETS, &mut stored).map_err(BenchError::from)?;
         if stored != self.place {
             harms.push("the stored parameters changed".to_owned());
         }

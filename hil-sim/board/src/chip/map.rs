@@ -1,6 +1,10 @@
 //! What lies where, and which clock it needs.
 
 use crate::peripherals::rcc::Rcc;
+use interstage::params::slots::SLOT_BYTES;
+
+/// Where the two parameter sets begin in the board's flash.
+pub const PARAMETER_SETS: u32 = 0x0808_0000 - 2 * SLOT_BYTES as u32;
 
 /// A block of registers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
