@@ -169,7 +169,7 @@ pub struct Sensors {
     /// Encoder counts per wheel turn, all edges.
     pub encoder_counts: f64,
     /// Preload sensor full scale, N, at 90 % of the converter; zero is at 5 %.
-    pub preload_sensor_full_scale_n: f64,
+    pub preload_full_scale_n: f64,
     /// Tread compression full scale, mm, at 90 % of the converter; zero at 5 %.
     pub tread_full_scale_mm: f64,
     /// Code of the angle sensor at which the arm lies along the pillar, 0 to 16383.

@@ -54,7 +54,7 @@ impl Rig {
             },
             sense: Sensors {
                 encoder_counts: 8192.0,
-                preload_sensor_full_scale_n: 200.0,
+                preload_full_scale_n: 200.0,
                 tread_full_scale_mm: 5.0,
                 angle_zero_code: 2000.0,
                 stale_after_s: 0.020,

@@ -140,12 +140,7 @@ impl Rig {
             ("drive.ripple_pitch_mm", self.drive.ripple_pitch_mm, 0.01, 100.0),
             ("drive.guard_band", self.drive.guard_band, 0.0, 0.5),
             ("sense.encoder_counts", self.sense.encoder_counts, 1024.0, 65_536.0),
-            (
-                "sense.preload_sensor_full_scale_n",
-                self.sense.preload_sensor_full_scale_n,
-                20.0,
-                2000.0,
-            ),
+            ("sense.preload_full_scale_n", self.sense.preload_full_scale_n, 20.0, 2000.0),
             ("sense.tread_full_scale_mm", self.sense.tread_full_scale_mm, 0.5, 50.0),
             ("sense.angle_zero_code", self.sense.angle_zero_code, 0.0, 16_383.0),
             ("sense.stale_after_s", self.sense.stale_after_s, 0.005, 1.0),

@@ -108,8 +108,8 @@ impl Senses {
         Ok(Self {
             wheel_encoder: Speedometer::try_build(rig, tuning.speed_bandwidth_rad_s)?,
             preload_sensor: AnalogChannel::try_build(
-                "sense.preload_sensor_full_scale_n",
-                rig.sense.preload_sensor_full_scale_n,
+                "sense.preload_full_scale_n",
+                rig.sense.preload_full_scale_n,
                 tuning.preload_sensor_tau_s,
             )?,
             compression_sensor: AnalogChannel::try_build(

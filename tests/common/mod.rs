@@ -372,7 +372,7 @@ pub(crate) const UNLOADED: u16 = 3277;
 
 /// Code of the prototype's preload sensor under a force, N.
 pub(crate) fn preload_sensor_code(force_n: f64) -> u16 {
-    let part = 0.05 + 0.85 * force_n / Rig::prototype().sense.preload_sensor_full_scale_n;
+    let part = 0.05 + 0.85 * force_n / Rig::prototype().sense.preload_full_scale_n;
     (65_535.0 * part).round() as u16
 }
 

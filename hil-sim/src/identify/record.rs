@@ -128,7 +128,7 @@ impl Reader {
     pub fn new(scenario: &Scenario) -> Self {
         let sense = &scenario.rig.sense;
         Self {
-            preload_sensor_n: sense.preload_sensor_full_scale_n,
+            preload_sensor_n: sense.preload_full_scale_n,
             tread_mm: sense.tread_full_scale_mm,
             angle_zero_code: sense.angle_zero_code,
             wheel: None,

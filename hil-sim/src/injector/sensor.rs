@@ -57,7 +57,7 @@ impl FaultySensor {
     ) -> Self {
         let bridge = |full_scale: f64| (FULL_AT - ZERO_AT) * SPAN / full_scale;
         let (per_unit, zero) = match target {
-            Target::PreloadSensor => (bridge(rig.preload_sensor_full_scale_n), ZERO_AT * SPAN),
+            Target::PreloadSensor => (bridge(rig.preload_full_scale_n), ZERO_AT * SPAN),
             Target::CompressionSensor => (bridge(rig.tread_full_scale_mm), ZERO_AT * SPAN),
             Target::Angle => (TURN / 360.0, rig.angle_zero_code),
             Target::DriveReadback | Target::PretightenerReadback => {
@@ -252,7 +252,7 @@ mod tests {
         let rig = Rig::prototype().sense;
         let mut sensor = FaultySensor::new(Target::PreloadSensor, kind, magnitude, &rig, 157.0);
         let mut random = ChaCha8Rng::seed_from_u64(1);
-        let per_n = (FULL_AT - ZERO_AT) * SPAN / rig.preload_sensor_full_scale_n;
+        let per_n = (FULL_AT - ZERO_AT) * SPAN / rig.preload_full_scale_n;
         (0..40u32)
             .map(|tick| {
                 let force = 10.0 + f64::from(tick);

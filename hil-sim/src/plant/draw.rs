@@ -72,7 +72,7 @@ pub struct SensorParameters {
     /// Encoder counts per turn.
     pub counts_per_turn: f64,
     /// Full scale at 90 % of the converter, N.
-    pub preload_sensor_full_scale_n: f64,
+    pub preload_full_scale_n: f64,
     /// Gain error factor.
     pub preload_sensor_gain: f64,
     /// Full scale at 90 % of the converter, mm.
@@ -198,7 +198,7 @@ impl PlantParameters {
             ripple: (0.006 * rig.drive.force_limit_n, rig.drive.ripple_pitch_mm),
             sensors: SensorParameters {
                 counts_per_turn: rig.sense.encoder_counts,
-                preload_sensor_full_scale_n: rig.sense.preload_sensor_full_scale_n,
+                preload_full_scale_n: rig.sense.preload_full_scale_n,
                 preload_sensor_gain,
                 tread_full_scale_mm: rig.sense.tread_full_scale_mm,
                 tread_gain,

@@ -135,7 +135,7 @@ impl Sensors {
             arm / std::f64::consts::TAU * 16_384.0 + p.angle_zero_code + normal(noise.angle_lsb);
         Codes {
             wheel: EncoderCount::new((counts.floor() as i64) as u16),
-            preload_sensor: bridge(preload / p.preload_sensor_full_scale_n),
+            preload_sensor: bridge(preload / p.preload_full_scale_n),
             compression_sensor: bridge(depth / p.tread_full_scale_mm),
             arm: frame(code),
             bridges: self.readback.read(now.bridges, &self.parameters, dt_s),

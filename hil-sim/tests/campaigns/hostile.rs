@@ -282,12 +282,7 @@ const ENDS: [Ends; 31] = [
     ("drive.jerk_mm_s3", |r| &mut r.drive.jerk_mm_s3, 50.0, 30_000.0),
     ("drive.ripple_pitch_mm", |r| &mut r.drive.ripple_pitch_mm, 0.01, 100.0),
     ("sense.encoder_counts", |r| &mut r.sense.encoder_counts, 1024.0, 65_536.0),
-    (
-        "sense.preload_sensor_full_scale_n",
-        |r| &mut r.sense.preload_sensor_full_scale_n,
-        60.0,
-        2000.0,
-    ),
+    ("sense.preload_full_scale_n", |r| &mut r.sense.preload_full_scale_n, 60.0, 2000.0),
     ("sense.tread_full_scale_mm", |r| &mut r.sense.tread_full_scale_mm, 0.5, 50.0),
     ("control.gap_ref_mm", |r| &mut r.control.gap_ref_mm, 0.0, 10.0),
 ];
