@@ -39,6 +39,8 @@ const BITE_TICKS: usize = 250;
 const ARRIVED_MM: f64 = 1.0;
 /// Longest run to either end, ms.
 const RUN_MS: u32 = 60_000;
+/// A fault hold takes no reset before it has lasted 100 ms.
+const HOLD_MS: u32 = 150;
 
 /// What is kept of the plant and the pins around a reset.
 pub(super) struct Hold {
@@ -219,6 +221,9 @@ fn go_on(board: &mut Board<'_>, scenario: &Scenario) -> Result<Option<String>, R
             Direction::Deploy => Direction::Retract,
             Direction::Retract => Direction::Deploy,
         };
+        for _ in 0..HOLD_MS {
+            board.step(None)?;
+        }
         board.step(Some(Command::Reset))?;
         for _ in 0..RUN_MS {
             if board.mode == Mode::Idle {
