@@ -84,3 +84,27 @@ impl Position {
             if self.is_unsure() { Self::Unconfirmed { searching: false } } else { Self::Located };
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_from_a_doubtful_position_searches_for_its_step() {
+        for (sure, after) in
+            [(true, Position::Located), (false, Position::Unconfirmed { searching: true })]
+        {
+            let mut position = Position::Restored { sure };
+            assert_eq!(position.is_unsure(), !sure);
+            assert!(position.begin_run(), "the wheel is looked for on a corner");
+            assert_eq!((position, position.is_searching()), (after, !sure));
+            assert!(!position.begin_run(), "once alone");
+        }
+        let mut position = Position::Unconfirmed { searching: true };
+        position.stop_searching();
+        assert_eq!(position, Position::Unconfirmed { searching: false });
+        let mut position = Position::Searching;
+        position.stop_searching();
+        assert_eq!(position, Position::Located);
+    }
+}
