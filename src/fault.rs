@@ -174,7 +174,7 @@ pub enum Limit {
     /// The measured gap of a crossing is not the predicted one.
     GapStrange = 211,
     /// Compression and preload of a wheel at rest contradict each other.
-    TreadStrange = 212,
+    CompressionStrange = 212,
     /// The position is that of a record which no step ahead can confirm.
     PositionUnconfirmed = 213,
 }
@@ -193,7 +193,7 @@ impl Limit {
         Self::PreloadWait,
         Self::SlipMarginLow,
         Self::GapStrange,
-        Self::TreadStrange,
+        Self::CompressionStrange,
         Self::PositionUnconfirmed,
     ];
 
@@ -220,7 +220,9 @@ impl Limit {
             Self::PreloadWait => "waiting before a corner for the preload to stand",
             Self::SlipMarginLow => "the friction utilisation leaves less than the wanted margin",
             Self::GapStrange => "the measured gap is not the predicted one",
-            Self::TreadStrange => "compression of the tread and preload do not belong together",
+            Self::CompressionStrange => {
+                "compression of the tread and preload do not belong together"
+            }
             Self::PositionUnconfirmed => "the position is of a record that no step ahead confirms",
         }
     }

@@ -136,7 +136,7 @@ pub trait Board {
     /// Preload sensor.
     type PreloadSensor: AnalogInput;
     /// Compression sensor.
-    type Tread: AnalogInput;
+    type CompressionSensor: AnalogInput;
     /// Arm angle sensor.
     type Arm: AngleBus;
     /// Motor bridges.
@@ -156,13 +156,13 @@ pub trait Board {
 /// A board taken apart, so that each task owns what it uses and nothing else.
 pub struct Parts<B: Board> {
     /// For the speed task.
-    pub wheel: B::Wheel,
+    pub wheel_encoder: B::Wheel,
     /// For the pressure task.
     pub preload_sensor: B::PreloadSensor,
     /// For the displacement task.
-    pub tread: B::Tread,
+    pub compression_sensor: B::CompressionSensor,
     /// For the angle task.
-    pub arm: B::Arm,
+    pub arm_angle: B::Arm,
     /// For the motor task.
     pub motors: B::Motors,
     /// For the motor task, which feeds it when all tasks have checked in.

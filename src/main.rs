@@ -30,7 +30,7 @@ mod firmware {
     use crate::board::rtt::{self, Channels};
     use crate::board::{self, EXCHANGE, guard, image, light, safety, start, supply};
     use crate::board::{Angle, Bridges, Button, Console, Guard, HostLine, Lamp, Lines};
-    use crate::board::{Nucleo, Pages, PreloadSensor, Tread, Wheel};
+    use crate::board::{CompressionSensor, Nucleo, Pages, PreloadSensor, Wheel};
 
     static LATEST: StaticCell<TickIoCell> = StaticCell::new();
     static ENCODER: ConstStaticCell<LogEncoder> =
@@ -109,10 +109,10 @@ mod firmware {
         parts.watchdog.start();
         let latest = LATEST.init_with(|| TickIoCell::new(TickIo::default()));
         control.spawn(clock().unwrap());
-        control.spawn(speed(parts.wheel).unwrap());
-        control.spawn(pressure(parts.preload_sensor).unwrap());
-        control.spawn(displacement(parts.tread).unwrap());
-        control.spawn(angle(parts.arm).unwrap());
+        control.spawn(speed(parts.wheel_encoder).unwrap());
+        control.spawn(preload_sensor(parts.preload_sensor).unwrap());
+        control.spawn(compression_sensor(parts.compression_sensor).unwrap());
+        control.spawn(angle(parts.arm_angle).unwrap());
         control.spawn(motors(parts.motors, parts.watchdog, controller, latest).unwrap());
         control.spawn(record(latest).unwrap());
         threads.spawn(model(planner).unwrap());
@@ -133,10 +133,10 @@ mod firmware {
 
     tasks! {
         clock() => tasks::clock(&EXCHANGE);
-        speed(wheel: Wheel) => tasks::speed(wheel, &EXCHANGE);
-        pressure(input: PreloadSensor) => tasks::pressure(input, &EXCHANGE);
-        displacement(input: Tread) => tasks::displacement(input, &EXCHANGE);
-        angle(bus: Angle) => tasks::angle(bus, &EXCHANGE);
+        wheel_encoder(wheel: Wheel) => tasks::wheel_encoder(wheel, &EXCHANGE);
+        preload_sensor(input: PreloadSensor) => tasks::preload_sensor(input, &EXCHANGE);
+        compression_sensor(input: CompressionSensor) => tasks::compression_sensor(input, &EXCHANGE);
+        arm_angle(bus: Angle) => tasks::arm_arm_angle(bus, &EXCHANGE);
         motors(
             motors: Bridges, watchdog: Guard, controller: &'static Controller,
             latest: &'static TickIoCell

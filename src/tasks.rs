@@ -3,10 +3,10 @@
 //! | task | rate | does |
 //! |---|---|---|
 //! | [`clock()`] | 1 kHz | wakes sensors and control tick at each whole millisecond |
-//! | [`speed()`] | 1 kHz | publishes the wheel counter |
-//! | [`pressure()`] | 1 kHz | publishes the preload sensor's code |
-//! | [`displacement()`] | 1 kHz | publishes the compression sensor's code |
-//! | [`angle()`] | 500 Hz | publishes the arm sensor's frame |
+//! | [`wheel_encoder()`] | 1 kHz | publishes the wheel counter |
+//! | [`preload_sensor()`] | 1 kHz | publishes the preload sensor's code |
+//! | [`compression_sensor()`] | 1 kHz | publishes the compression sensor's code |
+//! | [`arm_angle()`] | 500 Hz | publishes the arm sensor's frame |
 //! | [`motors()`] | 1 kHz | the control tick: latest codes in, bridges out |
 //! | [`record()`] | 1 kHz | copies the tick for the log, behind it |
 //! | [`model()`] | on request | plans the next segment |
@@ -37,7 +37,7 @@ pub use liveness::{CHECK_IN_TICKS, TaskId};
 pub use model::model;
 pub use motors::{TickIoCell, motors, record};
 pub use operator::operator;
-pub use sensors::{SENSOR_TIMEOUT, angle, displacement, pressure, speed};
+pub use sensors::{SENSOR_TIMEOUT, arm_angle, compression_sensor, preload_sensor, wheel_encoder};
 
 use embassy_time::Duration;
 

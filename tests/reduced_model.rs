@@ -110,16 +110,19 @@ fn codes_given_in_the_loop_are_the_sensors() {
     );
     let readback = given.readback().map(|codes| (codes.drive.get(), codes.pretightener.get()));
     assert_eq!(readback, Some((3000, 17)));
-    assert_eq!((given.wheel, given.preload_sensor), (40_000, Some(1_234)));
+    assert_eq!((given.wheel_encoder, given.preload_sensor), (40_000, Some(1_234)));
     assert_eq!(
-        (given.compression_sensor, given.arm, given.stop, given.command),
+        (given.compression_sensor, given.arm_angle, given.stop, given.command),
         (Some(777), Some(0x8421), false, 0)
     );
     let commanded = given.with(Some(Command::Retract));
     assert_ne!(commanded.command, 0);
     assert_eq!(commanded.with(None), given);
     let silent = commanded.silent();
-    assert_eq!((silent.wheel, silent.command), (40_000, 0));
-    assert_eq!((silent.preload_sensor, silent.compression_sensor, silent.arm), (None, None, None));
+    assert_eq!((silent.wheel_encoder, silent.command), (40_000, 0));
+    assert_eq!(
+        (silent.preload_sensor, silent.compression_sensor, silent.arm_angle),
+        (None, None, None)
+    );
     assert_eq!(silent.readback(), None);
 }

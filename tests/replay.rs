@@ -111,10 +111,10 @@ fn a_sensor_that_never_answers_is_named() {
     let Recorded(boots) = Recorded::read("deploy.mcap");
     type Silence = fn(&mut SensorFrame);
     let all: [(Silence, Fault); 4] = [
-        (|sensors| sensors.wheel = None, Fault::WheelEncoderStale),
+        (|sensors| sensors.wheel_encoder = None, Fault::WheelEncoderStale),
         (|sensors| sensors.preload_sensor = None, Fault::PreloadSensorStale),
         (|sensors| sensors.compression_sensor = None, Fault::CompressionSensorStale),
-        (|sensors| sensors.arm = None, Fault::ArmAngleStale),
+        (|sensors| sensors.arm_angle = None, Fault::ArmAngleStale),
     ];
     for (silence, fault) in all {
         let mut said = None;

@@ -60,21 +60,21 @@ impl Board {
         let runs = |station| !missing.contains(&station);
         let bench = &mut board.bench;
         bench.spawn(async { tasks::clock(exchange).await });
-        if runs(TaskId::Speed) {
+        if runs(TaskId::WheelEncoder) {
             let wheel = board.wheel.clone();
-            bench.spawn(async { tasks::speed(wheel, exchange).await });
+            bench.spawn(async { tasks::wheel_encoder(wheel, exchange).await });
         }
-        if runs(TaskId::Pressure) {
+        if runs(TaskId::PreloadSensor) {
             let preload_sensor = board.preload_sensor.clone();
-            bench.spawn(async { tasks::pressure(preload_sensor, exchange).await });
+            bench.spawn(async { tasks::preload_sensor(preload_sensor, exchange).await });
         }
-        if runs(TaskId::Displacement) {
+        if runs(TaskId::CompressionSensor) {
             let tread = board.tread.clone();
-            bench.spawn(async { tasks::displacement(tread, exchange).await });
+            bench.spawn(async { tasks::compression_sensor(tread, exchange).await });
         }
-        if runs(TaskId::Angle) {
+        if runs(TaskId::ArmAngle) {
             let arm = board.arm.clone();
-            bench.spawn(async { tasks::angle(arm, exchange).await });
+            bench.spawn(async { tasks::arm_angle(arm, exchange).await });
         }
         let (motors, watchdog) = (board.bridges.clone(), board.watchdog.clone());
         let latest = forever(TickIoCell::new(TickIo::default()));
@@ -174,10 +174,10 @@ fn the_watchdog_is_fed_every_tick_while_all_tasks_live() {
 #[test]
 fn the_watchdog_starves_when_any_task_is_dead_and_the_record_names_it() {
     for (station, name) in [
-        (TaskId::Speed, "speed"),
-        (TaskId::Pressure, "pressure"),
-        (TaskId::Displacement, "displacement"),
-        (TaskId::Angle, "angle"),
+        (TaskId::WheelEncoder, "wheel encoder"),
+        (TaskId::PreloadSensor, "preload sensor"),
+        (TaskId::CompressionSensor, "compression sensor"),
+        (TaskId::ArmAngle, "arm angle"),
         (TaskId::Model, "model"),
         (TaskId::Journal, "journal"),
     ] {

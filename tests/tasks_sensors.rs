@@ -16,12 +16,14 @@ fn clocked(bench: &mut Bench) -> &'static Exchange {
 fn spawn(bench: &mut Bench, sensor: &Sensor, task: TaskId, exchange: &'static Exchange) {
     let sensor = sensor.clone();
     match task {
-        TaskId::Speed => bench.spawn(async { tasks::speed(sensor, exchange).await }),
-        TaskId::Pressure => bench.spawn(async { tasks::pressure(sensor, exchange).await }),
-        TaskId::Displacement => {
-            bench.spawn(async { tasks::displacement(sensor, exchange).await });
+        TaskId::WheelEncoder => bench.spawn(async { tasks::wheel_encoder(sensor, exchange).await }),
+        TaskId::PreloadSensor => {
+            bench.spawn(async { tasks::preload_sensor(sensor, exchange).await })
         }
-        TaskId::Angle => bench.spawn(async { tasks::angle(sensor, exchange).await }),
+        TaskId::CompressionSensor => {
+            bench.spawn(async { tasks::compression_sensor(sensor, exchange).await });
+        }
+        TaskId::ArmAngle => bench.spawn(async { tasks::arm_angle(sensor, exchange).await }),
         other => panic!("{other:?} is not a sensor"),
     }
 }
@@ -30,16 +32,20 @@ fn spawn(bench: &mut Bench, sensor: &Sensor, task: TaskId, exchange: &'static Ex
 fn latest(exchange: &Exchange, task: TaskId) -> Option<u32> {
     let frame = exchange.sensors();
     match task {
-        TaskId::Speed => frame.wheel.map(|sample| sample.at),
-        TaskId::Pressure => frame.preload_sensor.map(|sample| sample.at),
-        TaskId::Displacement => frame.compression_sensor.map(|sample| sample.at),
-        TaskId::Angle => frame.arm.map(|sample| sample.at),
+        TaskId::WheelEncoder => frame.wheel_encoder.map(|sample| sample.at),
+        TaskId::PreloadSensor => frame.preload_sensor.map(|sample| sample.at),
+        TaskId::CompressionSensor => frame.compression_sensor.map(|sample| sample.at),
+        TaskId::ArmAngle => frame.arm_angle.map(|sample| sample.at),
         other => panic!("{other:?} is not a sensor"),
     }
 }
 
-const SENSORS: [(TaskId, u32); 4] =
-    [(TaskId::Speed, 1), (TaskId::Pressure, 1), (TaskId::Displacement, 1), (TaskId::Angle, 2)];
+const SENSORS: [(TaskId, u32); 4] = [
+    (TaskId::WheelEncoder, 1),
+    (TaskId::PreloadSensor, 1),
+    (TaskId::CompressionSensor, 1),
+    (TaskId::ArmAngle, 2),
+];
 
 /// Those that can fail: a counter cannot.
 const BUSES: [(TaskId, u32); 3] = [SENSORS[1], SENSORS[2], SENSORS[3]];
@@ -69,10 +75,10 @@ fn codes_are_published_with_the_tick_at_which_they_were_taken() {
     sensors[1].takes(Duration::from_micros(500));
     bench.run_ms(10);
     let frame = exchange.sensors();
-    assert_eq!(frame.wheel, Some(Sample { code: EncoderCount::new(11), at: 10 }));
+    assert_eq!(frame.wheel_encoder, Some(Sample { code: EncoderCount::new(11), at: 10 }));
     assert_eq!(frame.preload_sensor, Some(Sample { code: AdcCode::new(22), at: 9 }));
     assert_eq!(frame.compression_sensor, Some(Sample { code: AdcCode::new(33), at: 10 }));
-    assert_eq!(frame.arm, Some(Sample { code: AngleFrame::new(44), at: 10 }));
+    assert_eq!(frame.arm_angle, Some(Sample { code: AngleFrame::new(44), at: 10 }));
     sensors[2].answers(Answer::Code(55));
     bench.run_ms(1);
     let frame = exchange.sensors();
@@ -128,8 +134,8 @@ fn a_hang_of_one_sensor_leaves_the_others_alone() {
     bench.run_ms(10);
     sensors[3].answers(Answer::Hang);
     bench.run_ms(50);
-    assert_eq!(latest(exchange, TaskId::Angle), Some(10));
-    for task in [TaskId::Speed, TaskId::Pressure, TaskId::Displacement] {
+    assert_eq!(latest(exchange, TaskId::ArmAngle), Some(10));
+    for task in [TaskId::WheelEncoder, TaskId::PreloadSensor, TaskId::CompressionSensor] {
         assert_eq!(latest(exchange, task), Some(60), "{task:?}");
     }
 }
@@ -158,7 +164,7 @@ fn time_stamps_do_not_depend_on_when_a_task_was_started() {
     embassy_time::MockDriver::get().advance(Duration::from_micros(750));
     let exchange = clocked(&mut bench);
     let sensor = Sensor::new(7);
-    spawn(&mut bench, &sensor, TaskId::Angle, exchange);
+    spawn(&mut bench, &sensor, TaskId::ArmAngle, exchange);
     bench.run_ms(10);
     assert_eq!(sensor.reads(), [4, 6, 8, 10, 12]);
 }

@@ -307,7 +307,7 @@ fn through_every_mode(way: Direction, pester: bool) -> (Bench, usize) {
         pestered += usize::from(pester && wanted.is_none());
         bench.spoiled(command, |frame| {
             if tick < 50 {
-                frame.arm = None;
+                frame.arm_angle = None;
             }
             if matches!(mode, Mode::Complete(_) | Mode::FaultHold(_)) && waited > 50 {
                 *frame = *last.get_or_insert(*frame);
@@ -350,7 +350,7 @@ fn commands_in_the_wrong_mode_are_refused_and_change_nothing() {
 type Silence = (&'static str, fn(&mut SensorFrame, &SensorFrame), Fault);
 
 const SENSORS: [Silence; 4] = [
-    ("wheel", |now, old| now.wheel = old.wheel, Fault::WheelEncoderStale),
+    ("wheel", |now, old| now.wheel_encoder = old.wheel_encoder, Fault::WheelEncoderStale),
     (
         "preload sensor",
         |now, old| now.preload_sensor = old.preload_sensor,
@@ -361,7 +361,7 @@ const SENSORS: [Silence; 4] = [
         |now, old| now.compression_sensor = old.compression_sensor,
         Fault::CompressionSensorStale,
     ),
-    ("arm", |now, old| now.arm = old.arm, Fault::ArmAngleStale),
+    ("arm", |now, old| now.arm_angle = old.arm_angle, Fault::ArmAngleStale),
 ];
 
 /// The sensor is silent for so long from now on.

@@ -27,7 +27,7 @@ pub(crate) use wheel::Wheel;
 pub(crate) type PreloadSensor = Analog<ADC1>;
 
 /// The compression sensor's converter.
-pub(crate) type Tread = Analog<ADC2>;
+pub(crate) type CompressionSensor = Analog<ADC2>;
 
 static PRELOAD_SENSOR: Ring = Ring::new();
 static TREAD: Ring = Ring::new();

@@ -46,13 +46,13 @@ pub enum ToBoard {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Given {
     /// Wheel encoder's counter.
-    pub wheel: u16,
+    pub wheel_encoder: u16,
     /// Preload sensor; none for a sensor that does not answer.
     pub preload_sensor: Option<u16>,
     /// Tread compression; none as above.
     pub compression_sensor: Option<u16>,
     /// Frame of the arm's angle sensor; none as above.
-    pub arm: Option<u16>,
+    pub arm_angle: Option<u16>,
     /// Outputs of the bridges of drive and pre-tightener; none as above.
     pub bridges: Option<[u16; 2]>,
     /// The emergency stop's contact is open.
@@ -65,17 +65,17 @@ impl Given {
     /// Every sensor answers with these codes; nothing else happens.
     #[must_use]
     pub const fn codes(
-        wheel: EncoderCount,
+        wheel_encoder: EncoderCount,
         preload_sensor: AdcCode,
         compression_sensor: AdcCode,
-        arm: AngleFrame,
+        arm_angle: AngleFrame,
         bridges: BridgeCodes,
     ) -> Self {
         Self {
-            wheel: wheel.get(),
+            wheel_encoder: wheel_encoder.get(),
             preload_sensor: Some(preload_sensor.get()),
             compression_sensor: Some(compression_sensor.get()),
-            arm: Some(arm.get()),
+            arm_angle: Some(arm_angle.get()),
             bridges: Some([bridges.drive.get(), bridges.pretightener.get()]),
             stop: false,
             command: 0,
@@ -95,7 +95,7 @@ impl Given {
         Self {
             preload_sensor: None,
             compression_sensor: None,
-            arm: None,
+            arm_angle: None,
             bridges: None,
             command: 0,
             ..self
@@ -179,10 +179,10 @@ mod tests {
     fn the_longest_messages_fit_the_rings() {
         let code = Some(u16::MAX);
         let given = Given {
-            wheel: u16::MAX,
+            wheel_encoder: u16::MAX,
             preload_sensor: code,
             compression_sensor: code,
-            arm: code,
+            arm_angle: code,
             bridges: Some([u16::MAX; 2]),
             stop: true,
             command: 4,
@@ -208,10 +208,10 @@ mod tests {
         ) {
             let code = |at: usize| answers[at].then_some(codes[at + 1]);
             let given = Given {
-                wheel: codes[0],
+                wheel_encoder: codes[0],
                 preload_sensor: code(0),
                 compression_sensor: code(1),
-                arm: code(2),
+                arm_angle: code(2),
                 bridges,
                 stop,
                 command,

@@ -146,13 +146,13 @@ impl Record {
     /// The record of a tick.
     #[must_use]
     pub fn of(input: &Input, output: &Output) -> Self {
-        let SensorFrame { wheel, preload_sensor, compression_sensor, arm, bridges } =
+        let SensorFrame { wheel_encoder, preload_sensor, compression_sensor, arm_angle, bridges } =
             &input.sensors;
         let sensors = [
-            pack(input.now, wheel.as_ref(), EncoderCount::get),
+            pack(input.now, wheel_encoder.as_ref(), EncoderCount::get),
             pack(input.now, preload_sensor.as_ref(), AdcCode::get),
             pack(input.now, compression_sensor.as_ref(), AdcCode::get),
-            pack(input.now, arm.as_ref(), AngleFrame::get),
+            pack(input.now, arm_angle.as_ref(), AngleFrame::get),
         ];
         let bridges = bridges.unwrap_or_default();
         Self {
@@ -184,7 +184,7 @@ impl Record {
         });
         let oldest = self.at().wrapping_add(NOW).wrapping_sub(u32::from(OLD));
         SensorFrame {
-            wheel: unpack(wheel, before.wheel, EncoderCount::new, oldest),
+            wheel_encoder: unpack(wheel, before.wheel_encoder, EncoderCount::new, oldest),
             preload_sensor: unpack(preload_sensor, before.preload_sensor, AdcCode::new, oldest),
             compression_sensor: unpack(
                 compression_sensor,
@@ -192,7 +192,7 @@ impl Record {
                 AdcCode::new,
                 oldest,
             ),
-            arm: unpack(arm, before.arm, AngleFrame::new, oldest),
+            arm_angle: unpack(arm, before.arm_angle, AngleFrame::new, oldest),
             bridges: self.flags.readback().then(|| {
                 let [drive, pretightener] = self.bridges.map(BridgeCode::new);
                 BridgeCodes { drive, pretightener }
@@ -305,10 +305,10 @@ pub(super) mod tests {
         ) {
             let at = |sensor: usize| ages[sensor].map(|age| now.wrapping_sub(age as u32));
             let sensors = SensorFrame {
-                wheel: at(0).and_then(|at| sample(EncoderCount::new(codes[0]), at)),
+                wheel_encoder: at(0).and_then(|at| sample(EncoderCount::new(codes[0]), at)),
                 preload_sensor: at(1).and_then(|at| sample(AdcCode::new(codes[1]), at)),
                 compression_sensor: at(2).and_then(|at| sample(AdcCode::new(codes[2]), at)),
-                arm: at(3).and_then(|at| sample(AngleFrame::new(codes[3]), at)),
+                arm_angle: at(3).and_then(|at| sample(AngleFrame::new(codes[3]), at)),
                 bridges: bridges.map(|codes| BridgeCodes {
                     drive: BridgeCode::new(codes[0]),
                     pretightener: BridgeCode::new(codes[1]),

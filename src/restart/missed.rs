@@ -17,7 +17,7 @@ impl MissedCheckIns {
     /// Names by bit; those between are operators' tasks and the host's line, in the order
     /// in which they began.
     const NAMES: [&'static str; 6] =
-        ["speed", "pressure", "displacement", "angle", "model", "journal"];
+        ["wheel encoder", "preload sensor", "compression sensor", "arm angle", "model", "journal"];
 
     /// The task of this number, by [`TaskId`](crate::tasks::TaskId).
     #[must_use]

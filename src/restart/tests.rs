@@ -216,6 +216,6 @@ fn everyone_has_a_name() {
     let names: std::collections::BTreeSet<_> =
         (0..16).map(|bit| MissedCheckIns::from_bits(1 << bit).name()).collect();
     assert_eq!(names.len(), 9, "{names:?}");
-    assert_eq!(MissedCheckIns::TICK.and(MissedCheckIns::task(1)).name(), "pressure");
+    assert_eq!(MissedCheckIns::TICK.and(MissedCheckIns::task(1)).name(), "preload sensor");
     assert_eq!(MissedCheckIns::STARVED.name(), "the control tick, kept from the processor");
 }

@@ -133,13 +133,13 @@ pub struct Sample<T> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SensorFrame {
     /// Wheel encoder.
-    pub wheel: Option<Sample<EncoderCount>>,
+    pub wheel_encoder: Option<Sample<EncoderCount>>,
     /// Preload sensor between pre-tightener and arm.
     pub preload_sensor: Option<Sample<AdcCode>>,
     /// Tread compression between arm and wheel.
     pub compression_sensor: Option<Sample<AdcCode>>,
     /// Arm angle at the pillar.
-    pub arm: Option<Sample<AngleFrame>>,
+    pub arm_angle: Option<Sample<AngleFrame>>,
     /// Output of the bridges, converted since the tick before; none if nothing has been.
     pub bridges: Option<BridgeCodes>,
 }

@@ -136,7 +136,7 @@ impl Senses {
         let motion = self.wheel_encoder.step(
             &mut state.wheel_encoder,
             now,
-            frame.wheel,
+            frame.wheel_encoder,
             acceleration,
             limit,
         );
@@ -145,7 +145,7 @@ impl Senses {
         let compression = &mut state.compression_sensor;
         let compression =
             self.compression_sensor.step(compression, now, frame.compression_sensor, limit);
-        let angle = self.arm_angle.step(&mut state.arm_angle, now, frame.arm, limit);
+        let angle = self.arm_angle.step(&mut state.arm_angle, now, frame.arm_angle, limit);
         let (radius, tan_arm) = self.arm.stance(angle.filtered);
         let steps_up = self.arm.steps_up(radius, compression.filtered);
         let level = self.arm.level(state.level, steps_up);
@@ -218,10 +218,10 @@ mod tests {
         let code = angle.round() as u16;
         let parity = (code.count_ones() % 2) as u16;
         SensorFrame {
-            wheel: Some(Sample { code: EncoderCount::new(counts), at }),
+            wheel_encoder: Some(Sample { code: EncoderCount::new(counts), at }),
             preload_sensor: Some(Sample { code: analog(truth.preload_n / 200.0), at }),
             compression_sensor: Some(Sample { code: analog(truth.compression_mm / 5.0), at }),
-            arm: Some(Sample { code: AngleFrame::new(code | parity << 15), at }),
+            arm_angle: Some(Sample { code: AngleFrame::new(code | parity << 15), at }),
             bridges: None,
         }
     }
@@ -279,7 +279,7 @@ mod tests {
             for now in 1..=21 {
                 let (old, new) = (frame(&STOWED, 0), frame(&STOWED, now));
                 let mixed = SensorFrame {
-                    wheel: if silent == 0 { old.wheel } else { new.wheel },
+                    wheel_encoder: if silent == 0 { old.wheel_encoder } else { new.wheel_encoder },
                     preload_sensor: if silent == 1 {
                         old.preload_sensor
                     } else {
@@ -290,7 +290,7 @@ mod tests {
                     } else {
                         new.compression_sensor
                     },
-                    arm: if silent == 3 { old.arm } else { new.arm },
+                    arm_angle: if silent == 3 { old.arm_angle } else { new.arm_angle },
                     bridges: None,
                 };
                 sensed = senses.step(&mut state, now, &mixed, Default::default());
@@ -349,7 +349,7 @@ mod tests {
             (Truth { compression_mm: 3.6, ..STOWED }, Truth { radius_mm: 121.0, ..STOWED });
         // Each of them tells of a step while the other is sound.
         assert_eq!((level(pressed, |_| ()), level(up, |_| ())), (1, 1));
-        assert_eq!(level(pressed, |frame| frame.arm = None), 0);
+        assert_eq!(level(pressed, |frame| frame.arm_angle = None), 0);
         assert_eq!(level(up, |frame| frame.compression_sensor = None), 0);
     }
 

@@ -48,10 +48,10 @@ pub struct Exchange {
     pub(super) sensor_ticks: [Signal<Raw, Tick>; PERIODS.len()],
     pub(super) tick_started: Signal<Raw, ()>,
     pub(super) tick_ended: Signal<Raw, ()>,
-    pub(super) wheel: Latest<Sample<EncoderCount>>,
+    pub(super) wheel_encoder: Latest<Sample<EncoderCount>>,
     pub(super) preload_sensor: Latest<Sample<AdcCode>>,
     pub(super) compression_sensor: Latest<Sample<AdcCode>>,
-    pub(super) arm: Latest<Sample<AngleFrame>>,
+    pub(super) arm_angle: Latest<Sample<AngleFrame>>,
     pub(super) request: Slot<PlanRequest>,
     pub(super) answer: Slot<Plan>,
     pub(super) commands: Channel<Raw, Command, COMMANDS>,
@@ -73,10 +73,10 @@ impl Exchange {
             sensor_ticks: [const { Signal::new() }; PERIODS.len()],
             tick_started: Signal::new(),
             tick_ended: Signal::new(),
-            wheel: Watch::new(),
+            wheel_encoder: Watch::new(),
             preload_sensor: Watch::new(),
             compression_sensor: Watch::new(),
-            arm: Watch::new(),
+            arm_angle: Watch::new(),
             request: Channel::new(),
             answer: Channel::new(),
             commands: Channel::new(),
@@ -158,10 +158,10 @@ impl Exchange {
     #[must_use]
     pub fn sensors(&self) -> SensorFrame {
         SensorFrame {
-            wheel: self.wheel.try_get(),
+            wheel_encoder: self.wheel_encoder.try_get(),
             preload_sensor: self.preload_sensor.try_get(),
             compression_sensor: self.compression_sensor.try_get(),
-            arm: self.arm.try_get(),
+            arm_angle: self.arm_angle.try_get(),
             bridges: None,
         }
     }

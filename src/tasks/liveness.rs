@@ -21,14 +21,14 @@ const OPERATORS: usize = 4;
 /// A task that checks in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TaskId {
-    /// [`speed`](super::speed()).
-    Speed,
-    /// [`pressure`](super::pressure()).
-    Pressure,
-    /// [`displacement`](super::displacement()).
-    Displacement,
-    /// [`angle`](super::angle()).
-    Angle,
+    /// [`wheel_encoder`](super::wheel_encoder()).
+    WheelEncoder,
+    /// [`preload_sensor`](super::preload_sensor()).
+    PreloadSensor,
+    /// [`compression_sensor`](super::compression_sensor()).
+    CompressionSensor,
+    /// [`arm_angle`](super::arm_angle()).
+    ArmAngle,
     /// [`model`](super::model()).
     Model,
     /// [`journal`](super::journal()).
@@ -40,10 +40,10 @@ pub enum TaskId {
 impl TaskId {
     pub(super) const fn index(self) -> usize {
         match self {
-            Self::Speed => 0,
-            Self::Pressure => 1,
-            Self::Displacement => 2,
-            Self::Angle => 3,
+            Self::WheelEncoder => 0,
+            Self::PreloadSensor => 1,
+            Self::CompressionSensor => 2,
+            Self::ArmAngle => 3,
             Self::Model => 4,
             Self::Journal => 5,
             Self::Operator(number) => FIXED + number as usize,
@@ -162,10 +162,10 @@ mod tests {
     use super::*;
 
     const ALWAYS: [TaskId; FIXED] = [
-        TaskId::Speed,
-        TaskId::Pressure,
-        TaskId::Displacement,
-        TaskId::Angle,
+        TaskId::WheelEncoder,
+        TaskId::PreloadSensor,
+        TaskId::CompressionSensor,
+        TaskId::ArmAngle,
         TaskId::Model,
         TaskId::Journal,
     ];

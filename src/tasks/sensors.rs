@@ -11,26 +11,39 @@ use embassy_time::{Duration, with_timeout};
 pub const SENSOR_TIMEOUT: Duration = Duration::from_millis(2);
 
 /// Publishes the wheel counter at 1 kHz.
-pub async fn speed(mut wheel: impl WheelEncoder, exchange: &Exchange) -> ! {
-    run(TaskId::Speed, exchange, async || Ok(wheel.count()), |s| exchange.wheel.sender().send(s))
-        .await
+pub async fn wheel_encoder(mut wheel: impl WheelEncoder, exchange: &Exchange) -> ! {
+    run(
+        TaskId::WheelEncoder,
+        exchange,
+        async || Ok(wheel.count()),
+        |s| exchange.wheel_encoder.sender().send(s),
+    )
+    .await
 }
 
 /// Publishes the preload sensor's code at 1 kHz.
-pub async fn pressure(input: impl AnalogInput, exchange: &Exchange) -> ! {
-    analog(TaskId::Pressure, exchange, input, |s| exchange.preload_sensor.sender().send(s)).await
+pub async fn preload_sensor(input: impl AnalogInput, exchange: &Exchange) -> ! {
+    analog(TaskId::PreloadSensor, exchange, input, |s| exchange.preload_sensor.sender().send(s))
+        .await
 }
 
 /// Publishes the compression sensor's code at 1 kHz.
-pub async fn displacement(input: impl AnalogInput, exchange: &Exchange) -> ! {
-    analog(TaskId::Displacement, exchange, input, |s| exchange.compression_sensor.sender().send(s))
-        .await
+pub async fn compression_sensor(input: impl AnalogInput, exchange: &Exchange) -> ! {
+    analog(TaskId::CompressionSensor, exchange, input, |s| {
+        exchange.compression_sensor.sender().send(s)
+    })
+    .await
 }
 
 /// Publishes the arm angle sensor's frame at 500 Hz, good or bad: the tick judges.
-pub async fn angle(mut bus: impl AngleBus, exchange: &Exchange) -> ! {
-    run(TaskId::Angle, exchange, async || bus.frame().await, |s| exchange.arm.sender().send(s))
-        .await
+pub async fn arm_angle(mut bus: impl AngleBus, exchange: &Exchange) -> ! {
+    run(
+        TaskId::ArmAngle,
+        exchange,
+        async || bus.frame().await,
+        |s| exchange.arm_angle.sender().send(s),
+    )
+    .await
 }
 
 async fn analog(

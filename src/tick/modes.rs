@@ -96,7 +96,7 @@ impl Controller {
     fn await_preload(&self, state: &mut State, tick: &mut TickContext<'_>, direction: Direction) {
         let begin = state.in_mode <= 1;
         if self.estimator.rest(&mut state.estimate, tick.sensed, tick.arm_thrust, begin) {
-            tick.log(Event::Limit(Limit::TreadStrange));
+            tick.log(Event::Limit(Limit::CompressionStrange));
         }
         let reached = state.planning.plan.as_ref().is_some_and(|plan| {
             let course = self.course(state, tick, direction);

@@ -232,7 +232,8 @@ impl<'a> Bench<'a> {
     /// The sensors' lines take on these codes.
     fn speak(&mut self, codes: Codes) {
         // More than a wheel can do is what can be made of noise on its lines.
-        let turned = codes.wheel.since(self.codes.wheel).clamp(-MOST_COUNTS, MOST_COUNTS);
+        let turned =
+            codes.wheel_encoder.since(self.codes.wheel_encoder).clamp(-MOST_COUNTS, MOST_COUNTS);
         self.wheel += i64::from(turned);
         self.codes = codes;
         let chip = self.machine.chip_mut();
@@ -244,7 +245,7 @@ impl<'a> Bench<'a> {
             bridges[0],
             bridges[1],
         ]);
-        chip.angle.angle = codes.arm.get();
+        chip.angle.angle = codes.arm_angle.get();
         chip.turn_wheel(self.wheel, STEP);
     }
 

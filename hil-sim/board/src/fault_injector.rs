@@ -168,10 +168,10 @@ impl BoardInjector {
     /// What the sensors say at the pins, of what they would.
     pub(super) fn tell(&mut self, machine: &mut Machine, codes: Codes, now: u32) -> Codes {
         let mut frame = SensorFrame {
-            wheel: Some(Sample { code: codes.wheel, at: now }),
+            wheel_encoder: Some(Sample { code: codes.wheel_encoder, at: now }),
             preload_sensor: Some(Sample { code: codes.preload_sensor, at: now }),
             compression_sensor: Some(Sample { code: codes.compression_sensor, at: now }),
-            arm: Some(Sample { code: codes.arm, at: now }),
+            arm_angle: Some(Sample { code: codes.arm_angle, at: now }),
             bridges: Some(codes.bridges),
         };
         self.faults.sensors(&mut frame);
@@ -179,7 +179,7 @@ impl BoardInjector {
             Some(sample) if sample.at == now => sample.code,
             _ => AdcCode::new(0),
         };
-        let fresh = [frame.wheel.map(|s| s.at), frame.arm.map(|s| s.at)];
+        let fresh = [frame.wheel_encoder.map(|s| s.at), frame.arm_angle.map(|s| s.at)];
         let silent = fresh.map(|at| at != Some(now));
         if silent != std::mem::replace(&mut self.silent, silent) {
             let chip = machine.chip_mut();
@@ -187,10 +187,13 @@ impl BoardInjector {
             chip.angle.lost = silent[1];
         }
         Codes {
-            wheel: frame.wheel.filter(|_| !silent[0]).map_or(codes.wheel, |s| s.code),
+            wheel_encoder: frame
+                .wheel_encoder
+                .filter(|_| !silent[0])
+                .map_or(codes.wheel_encoder, |s| s.code),
             preload_sensor: bridge(frame.preload_sensor),
             compression_sensor: bridge(frame.compression_sensor),
-            arm: frame.arm.filter(|_| !silent[1]).map_or(codes.arm, |s| s.code),
+            arm_angle: frame.arm_angle.filter(|_| !silent[1]).map_or(codes.arm_angle, |s| s.code),
             bridges: frame.bridges.unwrap_or_default(),
         }
     }
@@ -259,10 +262,10 @@ fn switch(fault: Fault, machine: &mut Machine, on: bool) -> Result<(), CoreError
 fn task(injection: &Injection) -> Option<&'static str> {
     Some(match injection.target {
         Target::Model | Target::ModelTask => "model",
-        Target::SpeedTask => "speed",
-        Target::PressureTask => "pressure",
-        Target::DisplacementTask => "displacement",
-        Target::AngleTask => "angle",
+        Target::WheelEncoderTask => "wheel_encoder",
+        Target::PreloadSensorTask => "preload_sensor",
+        Target::CompressionSensorTask => "compression_sensor",
+        Target::ArmAngleTask => "arm_angle",
         Target::TickTask => "motors",
         Target::JournalTask => "journal",
         Target::LineTask => "link",

@@ -185,10 +185,10 @@ impl Rigged {
     fn tick(&mut self, line: &mut HostLine<'_>, tick: u32, command: Option<Command>) -> Taken {
         let codes = session::read(&mut self.sensors, &self.plant);
         self.given = Given::codes(
-            codes.wheel,
+            codes.wheel_encoder,
             codes.preload_sensor,
             codes.compression_sensor,
-            codes.arm,
+            codes.arm_angle,
             codes.bridges,
         );
         let taken = line.tick(tick, self.given.with(command)).expect("goes");

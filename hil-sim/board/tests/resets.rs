@@ -98,10 +98,10 @@ fn a_stack_that_overflows_is_reported_too() {
 /// Tasks by their functions in `main.rs`, how the record calls them, and cycles that lead
 /// into the middle of a turn.
 const TASKS: [(&str, &str, u64); 8] = [
-    ("speed", "speed", 90),
-    ("pressure", "pressure", 130),
-    ("displacement", "displacement", 130),
-    ("angle", "angle", 60),
+    ("wheel_encoder", "wheel encoder", 90),
+    ("preload_sensor", "preload sensor", 130),
+    ("compression_sensor", "compression sensor", 130),
+    ("arm_angle", "arm angle", 60),
     ("motors", "the control tick", 100),
     ("model", "model", 250),
     ("journal", "journal", 1500),

@@ -103,10 +103,10 @@ impl Given {
         Self {
             now: input.now,
             codes: [
-                code(frame.wheel, EncoderCount::get),
+                code(frame.wheel_encoder, EncoderCount::get),
                 code(frame.preload_sensor, AdcCode::get),
                 code(frame.compression_sensor, AdcCode::get),
-                code(frame.arm, AngleFrame::get),
+                code(frame.arm_angle, AngleFrame::get),
             ],
             bridges: frame.bridges.map_or(NO_BRIDGES, |codes| {
                 u32::from(codes.drive.get()) | u32::from(codes.pretightener.get()) << 16
@@ -124,10 +124,10 @@ impl Given {
         Input {
             now: self.now,
             sensors: SensorFrame {
-                wheel: sample(wheel, EncoderCount::new),
+                wheel_encoder: sample(wheel, EncoderCount::new),
                 preload_sensor: sample(preload_sensor, AdcCode::new),
                 compression_sensor: sample(tread, AdcCode::new),
-                arm: sample(arm, AngleFrame::new),
+                arm_angle: sample(arm, AngleFrame::new),
                 bridges: (self.bridges != NO_BRIDGES).then_some(BridgeCodes {
                     drive: BridgeCode::new(self.bridges as u16),
                     pretightener: BridgeCode::new((self.bridges >> 16) as u16),
@@ -200,10 +200,10 @@ mod tests {
         let input = Input {
             now: 9,
             sensors: SensorFrame {
-                wheel: Some(Sample { code: EncoderCount::new(65_535), at }),
+                wheel_encoder: Some(Sample { code: EncoderCount::new(65_535), at }),
                 preload_sensor: None,
                 compression_sensor: Some(Sample { code: AdcCode::new(1), at }),
-                arm: Some(Sample { code: AngleFrame::new(0x8001), at: 6 }),
+                arm_angle: Some(Sample { code: AngleFrame::new(0x8001), at: 6 }),
                 bridges: Some(BridgeCodes {
                     drive: BridgeCode::new(4095),
                     pretightener: BridgeCode::new(7),

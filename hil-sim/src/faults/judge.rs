@@ -198,7 +198,8 @@ impl Judge {
     /// Whether a run after a reset reports what is not so. Only one that has lost its record,
     /// or has it in doubt, may find that it does not know its position.
     fn false_alarm(&self, kind: Kind) -> bool {
-        let untrue = [Limit::StepExtra, Limit::StepMissing, Limit::TreadStrange].map(Limit::code);
+        let untrue =
+            [Limit::StepExtra, Limit::StepMissing, Limit::CompressionStrange].map(Limit::code);
         let lost = kind != Kind::Recorded;
         self.fault.is_some_and(|(_, code)| !(lost && code == Fault::PositionUnknown.code()))
             || self.limits.iter().any(|(_, code)| untrue.contains(code))

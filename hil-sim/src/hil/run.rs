@@ -89,10 +89,10 @@ pub fn run(
 
 const fn given_by(codes: Codes) -> Given {
     Given::codes(
-        codes.wheel,
+        codes.wheel_encoder,
         codes.preload_sensor,
         codes.compression_sensor,
-        codes.arm,
+        codes.arm_angle,
         codes.bridges,
     )
 }
@@ -176,10 +176,10 @@ impl BoardLog {
         let from_zero = |at: Tick| at.wrapping_sub(FIRST);
         let mut record = *record;
         record.telemetry.at = from_zero(at);
-        sensors.wheel.iter_mut().for_each(|sample| sample.at = from_zero(sample.at));
+        sensors.wheel_encoder.iter_mut().for_each(|sample| sample.at = from_zero(sample.at));
         sensors.preload_sensor.iter_mut().for_each(|sample| sample.at = from_zero(sample.at));
         sensors.compression_sensor.iter_mut().for_each(|sample| sample.at = from_zero(sample.at));
-        sensors.arm.iter_mut().for_each(|sample| sample.at = from_zero(sample.at));
+        sensors.arm_angle.iter_mut().for_each(|sample| sample.at = from_zero(sample.at));
         let mut events = Vec::new();
         while let Some(entry) = self.events.pop_front_if(|entry| entry.at <= at) {
             events.push(Entry { at: from_zero(entry.at), ..entry });

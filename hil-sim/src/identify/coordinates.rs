@@ -101,7 +101,7 @@ impl Coordinates {
             free(nominal.drive.friction_n, UNKNOWN_GEARBOX_N),
             radius,
             known(0.0, spread.preload_sensor_gain_rel),
-            known(0.0, spread.tread_gain_rel),
+            known(0.0, spread.compression_sensor_gain_rel),
             free(0.0, UNKNOWN_ARM_MRAD),
             known(nominal.elastic_creep.ln(), CREEP_REL),
             known(0.0, DRIVE_REL),

@@ -78,7 +78,7 @@ impl Run {
         Ok(Self {
             start_mm: record.start_mm(),
             arm_delay: record.arm_delay_s / TICK_S,
-            compression_delay: record.scenario.noise.tread_delay_s / TICK_S,
+            compression_delay: record.scenario.noise.compression_sensor_delay_s / TICK_S,
             nominal: coordinates.nominal().clone(),
             traces: Traces::of(record)?,
             name: record.name.clone(),

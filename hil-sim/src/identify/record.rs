@@ -94,7 +94,7 @@ impl Record {
             samples.push(sample);
             last = Some(tick);
         }
-        let arm_delay_s = scenario.noise.angle_delay_s;
+        let arm_delay_s = scenario.noise.arm_angle_delay_s;
         Ok(Self { name: name.to_owned(), scenario, arm_delay_s, samples })
     }
 
@@ -139,14 +139,14 @@ impl Reader {
 
     /// The sample of a tick: what the sensors said before it, and its duties.
     pub fn sample(&mut self, frame: &SensorFrame, driven: &Drives) -> Sample {
-        if let Some(wheel) = frame.wheel {
+        if let Some(wheel) = frame.wheel_encoder {
             let since = self.wheel.map_or_else(|| wheel.code.get() as i16, |b| wheel.code.since(b));
             self.counts += i64::from(since);
             self.wheel = Some(wheel.code);
         }
         let bridge = |code: u16| (f64::from(code) / CONVERTER - BRIDGE.0) / BRIDGE.1;
-        let new = frame.arm.filter(|arm| self.angle_at != Some(arm.at));
-        self.angle_at = frame.arm.map(|arm| arm.at);
+        let new = frame.arm_angle.filter(|arm| self.angle_at != Some(arm.at));
+        self.angle_at = frame.arm_angle.map(|arm| arm.at);
         // A frame that fails its parity is no reading.
         let arm_rad = new.and_then(|arm| angle::decode(arm.code).ok()).map(|code| {
             let turned = (f64::from(code) - self.angle_zero_code) / 16_384.0;
@@ -197,14 +197,14 @@ mod tests {
         use interstage::sense::raw::{AdcCode, AngleFrame, Sample as At};
         let mut reader = Reader::new(&Scenario::default());
         let mut frame = SensorFrame {
-            wheel: Some(At { code: EncoderCount::new(65_530), at: 0 }),
+            wheel_encoder: Some(At { code: EncoderCount::new(65_530), at: 0 }),
             preload_sensor: Some(At { code: AdcCode::new((0.475f64 * CONVERTER) as u16), at: 0 }),
             compression_sensor: Some(At {
                 code: AdcCode::new((0.05f64 * CONVERTER) as u16),
                 at: 0,
             }),
             // 2000 + 2048 has seven bits: the parity bit is set.
-            arm: Some(At { code: AngleFrame::new(0x8000 | 4048), at: 0 }),
+            arm_angle: Some(At { code: AngleFrame::new(0x8000 | 4048), at: 0 }),
             bridges: None,
         };
         let first = reader.sample(&frame, &Drives::default());
@@ -212,7 +212,7 @@ mod tests {
         assert!((first.preload_n - 100.0).abs() < 0.005, "{}", first.preload_n);
         assert!(first.compression_mm.abs() < 1e-4);
         assert!((first.arm_rad.unwrap() - TAU / 8.0).abs() < 1e-12);
-        frame.wheel = Some(At { code: EncoderCount::new(4), at: 1 });
+        frame.wheel_encoder = Some(At { code: EncoderCount::new(4), at: 1 });
         let second = reader.sample(&frame, &Drives::default());
         assert_eq!((second.counts, second.arm_rad), (4.0, None));
     }

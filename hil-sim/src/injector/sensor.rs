@@ -161,14 +161,14 @@ impl FaultySensor {
         match self.target {
             Target::PreloadSensor => frame.preload_sensor.map(|s| f64::from(s.code.get())),
             Target::CompressionSensor => frame.compression_sensor.map(|s| f64::from(s.code.get())),
-            Target::Angle => decode(frame.arm?.code).ok().map(f64::from),
+            Target::Angle => decode(frame.arm_angle?.code).ok().map(f64::from),
             Target::Readback => frame.bridges.map(|_| 0.0),
             Target::DriveReadback => frame.bridges.map(|codes| codes.drive.get().into()),
             Target::PretightenerReadback => {
                 frame.bridges.map(|codes| codes.pretightener.get().into())
             }
             _ => {
-                let code = frame.wheel?.code;
+                let code = frame.wheel_encoder?.code;
                 let (before, sum) = self.counter.unwrap_or((code, i64::from(code.get())));
                 let sum = sum + i64::from(code.since(before));
                 self.counter = Some((code, sum));
@@ -186,12 +186,12 @@ impl FaultySensor {
             Target::Angle => {
                 let bits = (code.round() as i64 & 0x3fff) as u16;
                 let parity = (bits.count_ones() as u16 & 1) << 15;
-                put(&mut frame.arm, AngleFrame::new(bits | parity));
+                put(&mut frame.arm_angle, AngleFrame::new(bits | parity));
             }
             Target::Readback | Target::DriveReadback | Target::PretightenerReadback => {
                 self.put_output(frame, output);
             }
-            _ => put(&mut frame.wheel, EncoderCount::new(code.floor() as i64 as u16)),
+            _ => put(&mut frame.wheel_encoder, EncoderCount::new(code.floor() as i64 as u16)),
         }
     }
 
@@ -211,11 +211,11 @@ impl FaultySensor {
         match self.target {
             Target::PreloadSensor => put(&mut frame.preload_sensor, AdcCode::new(code)),
             Target::CompressionSensor => put(&mut frame.compression_sensor, AdcCode::new(code)),
-            Target::Angle => put(&mut frame.arm, AngleFrame::new(code)),
+            Target::Angle => put(&mut frame.arm_angle, AngleFrame::new(code)),
             Target::Readback | Target::DriveReadback | Target::PretightenerReadback => {
                 self.put_output(frame, BridgeCode::new(code & 0xFFF));
             }
-            _ => put(&mut frame.wheel, EncoderCount::new(code)),
+            _ => put(&mut frame.wheel_encoder, EncoderCount::new(code)),
         }
     }
 
@@ -224,11 +224,11 @@ impl FaultySensor {
         match self.target {
             Target::PreloadSensor => frame.preload_sensor = self.held.preload_sensor,
             Target::CompressionSensor => frame.compression_sensor = self.held.compression_sensor,
-            Target::Angle => frame.arm = self.held.arm,
+            Target::Angle => frame.arm_angle = self.held.arm_angle,
             Target::Readback | Target::DriveReadback | Target::PretightenerReadback => {
                 frame.bridges = None;
             }
-            _ => frame.wheel = self.held.wheel,
+            _ => frame.wheel_encoder = self.held.wheel_encoder,
         }
     }
 }

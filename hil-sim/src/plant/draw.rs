@@ -144,8 +144,8 @@ impl PlantParameters {
         let radius_mm = rig.rig.wheel_radius_mm + draw.offset(spread.wheel_radius_mm)
             - draw.up_to(spread.wear_mm);
         let preload_sensor_gain = draw.factor(spread.preload_sensor_gain_rel);
-        let tread_gain = draw.factor(spread.tread_gain_rel);
-        let angle_zero_rad = draw.offset(spread.arm_zero_deg).to_radians();
+        let tread_gain = draw.factor(spread.compression_sensor_gain_rel);
+        let angle_zero_rad = draw.offset(spread.arm_angle_zero_deg).to_radians();
         let steps = steps
             .iter()
             .map(|(position, higher)| Step {

@@ -30,13 +30,13 @@ pub struct Sensed {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Codes {
     /// Wheel encoder.
-    pub wheel: EncoderCount,
+    pub wheel_encoder: EncoderCount,
     /// Preload sensor.
     pub preload_sensor: AdcCode,
     /// Tread compression.
     pub compression_sensor: AdcCode,
     /// Arm angle.
-    pub arm: AngleFrame,
+    pub arm_angle: AngleFrame,
     /// Outputs of the bridges.
     pub bridges: BridgeCodes,
 }
@@ -125,19 +125,20 @@ impl Sensors {
             deviation * normal
         };
         let preload = aged(|s| s.preload_n, noise.preload_sensor_delay_s) * p.preload_sensor_gain;
-        let depth = aged(|s| s.depth_mm, noise.tread_delay_s) * p.tread_gain;
-        let arm = aged(|s| s.arm_rad, noise.angle_delay_s) + p.angle_zero_rad;
+        let depth = aged(|s| s.depth_mm, noise.compression_sensor_delay_s) * p.tread_gain;
+        let arm = aged(|s| s.arm_rad, noise.arm_angle_delay_s) + p.angle_zero_rad;
         let turns = now.rotation_rad / std::f64::consts::TAU;
-        let counts = turns * p.counts_per_turn + normal(noise.encoder_jitter_counts);
+        let counts = turns * p.counts_per_turn + normal(noise.wheel_encoder_jitter_counts);
         let preload = preload + normal(noise.preload_sensor_n);
-        let depth = depth + normal(noise.tread_mm);
-        let code =
-            arm / std::f64::consts::TAU * 16_384.0 + p.angle_zero_code + normal(noise.angle_lsb);
+        let depth = depth + normal(noise.compression_sensor_mm);
+        let code = arm / std::f64::consts::TAU * 16_384.0
+            + p.angle_zero_code
+            + normal(noise.arm_angle_lsb);
         Codes {
-            wheel: EncoderCount::new((counts.floor() as i64) as u16),
+            wheel_encoder: EncoderCount::new((counts.floor() as i64) as u16),
             preload_sensor: bridge(preload / p.preload_full_scale_n),
             compression_sensor: bridge(depth / p.tread_full_scale_mm),
-            arm: frame(code),
+            arm_angle: frame(code),
             bridges: self.readback.read(now.bridges, &self.parameters, dt_s),
         }
     }

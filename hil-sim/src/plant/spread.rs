@@ -38,9 +38,9 @@ pub struct Spread {
     /// Gain of the preload sensor, relative.
     pub preload_sensor_gain_rel: f64,
     /// Gain of the compression sensor, relative.
-    pub tread_gain_rel: f64,
+    pub compression_sensor_gain_rel: f64,
     /// Zero of the arm angle sensor, degrees.
-    pub arm_zero_deg: f64,
+    pub arm_angle_zero_deg: f64,
     /// Supply of the bridges, relative.
     pub supply_rel: f64,
     /// Dividers of their readback, relative.
@@ -70,8 +70,8 @@ impl Spread {
             lag_rel: 0.15,
             slew_rel: 0.05,
             preload_sensor_gain_rel: 0.005,
-            tread_gain_rel: 0.005,
-            arm_zero_deg: 0.05,
+            compression_sensor_gain_rel: 0.005,
+            arm_angle_zero_deg: 0.05,
             supply_rel: 0.006,
             readback_gain_rel: 0.002,
             readback_zero_duty: 0.002,
@@ -92,18 +92,18 @@ impl Spread {
 pub struct Noise {
     /// Preload sensor, N.
     pub preload_sensor_n: f64,
-    /// Tread compression, mm.
-    pub tread_mm: f64,
+    /// Compression sensor, mm.
+    pub compression_sensor_mm: f64,
     /// Arm angle, steps of its 14-bit code.
-    pub angle_lsb: f64,
+    pub arm_angle_lsb: f64,
     /// Edges of the wheel encoder, counts.
-    pub encoder_jitter_counts: f64,
+    pub wheel_encoder_jitter_counts: f64,
     /// Age of a preload-sensor reading when it is handed over, s.
     pub preload_sensor_delay_s: f64,
-    /// Age of a displacement reading when it is handed over, s.
-    pub tread_delay_s: f64,
-    /// Age of an angle reading when it is handed over, s.
-    pub angle_delay_s: f64,
+    /// Age of a compression-sensor reading when it is handed over, s.
+    pub compression_sensor_delay_s: f64,
+    /// Age of an arm angle reading when it is handed over, s.
+    pub arm_angle_delay_s: f64,
     /// Readback of the bridges, parts of the supply.
     pub readback_duty: f64,
 }
@@ -114,12 +114,12 @@ impl Noise {
     pub const fn usual() -> Self {
         Self {
             preload_sensor_n: 0.05,
-            tread_mm: 0.002,
-            angle_lsb: 0.5,
-            encoder_jitter_counts: 0.0,
+            compression_sensor_mm: 0.002,
+            arm_angle_lsb: 0.5,
+            wheel_encoder_jitter_counts: 0.0,
             preload_sensor_delay_s: 0.000_5,
-            tread_delay_s: 0.000_5,
-            angle_delay_s: 0.000_1,
+            compression_sensor_delay_s: 0.000_5,
+            arm_angle_delay_s: 0.000_1,
             readback_duty: 0.002,
         }
     }

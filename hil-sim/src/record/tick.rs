@@ -227,7 +227,8 @@ impl Controller {
     #[must_use]
     pub fn of(record: &Record, sensors: &SensorFrame) -> Self {
         let Record { telemetry: seen, flags, .. } = record;
-        let SensorFrame { wheel, preload_sensor, compression_sensor, arm, bridges } = sensors;
+        let SensorFrame { wheel_encoder, preload_sensor, compression_sensor, arm_angle, bridges } =
+            sensors;
         let (mode, retracts, fault) = split(seen.mode);
         Self {
             tick: seen.at,
@@ -237,14 +238,14 @@ impl Controller {
             fault,
             stage: seen.stage as u8,
             level: seen.level,
-            wheel_encoder_code: wheel.map(|sample| sample.code.get()),
-            wheel_encoder_at: wheel.map(|sample| sample.at),
+            wheel_encoder_code: wheel_encoder.map(|sample| sample.code.get()),
+            wheel_encoder_at: wheel_encoder.map(|sample| sample.at),
             preload_code: preload_sensor.map(|sample| sample.code.get()),
             preload_at: preload_sensor.map(|sample| sample.at),
             compression_code: compression_sensor.map(|sample| sample.code.get()),
             compression_at: compression_sensor.map(|sample| sample.at),
-            arm_angle_code: arm.map(|sample| sample.code.get()),
-            arm_angle_at: arm.map(|sample| sample.at),
+            arm_angle_code: arm_angle.map(|sample| sample.code.get()),
+            arm_angle_at: arm_angle.map(|sample| sample.at),
             drive_code: bridges.map(|codes| codes.drive.get()),
             pretightener_code: bridges.map(|codes| codes.pretightener.get()),
             command: codes::of_command(flags.command()),
@@ -279,10 +280,14 @@ impl Controller {
         }
         let bridges = self.drive_code.zip(self.pretightener_code);
         SensorFrame {
-            wheel: sample(self.wheel_encoder_code, self.wheel_encoder_at, EncoderCount::new),
+            wheel_encoder: sample(
+                self.wheel_encoder_code,
+                self.wheel_encoder_at,
+                EncoderCount::new,
+            ),
             preload_sensor: sample(self.preload_code, self.preload_at, AdcCode::new),
             compression_sensor: sample(self.compression_code, self.compression_at, AdcCode::new),
-            arm: sample(self.arm_angle_code, self.arm_angle_at, AngleFrame::new),
+            arm_angle: sample(self.arm_angle_code, self.arm_angle_at, AngleFrame::new),
             bridges: bridges.map(|(drive, pretightener)| BridgeCodes {
                 drive: BridgeCode::new(drive),
                 pretightener: BridgeCode::new(pretightener),

@@ -122,12 +122,12 @@ impl Session {
     pub fn sense(&mut self) -> SensorFrame {
         let codes = read(&mut self.sensors, &self.plant);
         let at = self.tick;
-        self.frame.wheel = Some(Sample { code: codes.wheel, at });
+        self.frame.wheel_encoder = Some(Sample { code: codes.wheel_encoder, at });
         self.frame.preload_sensor = Some(Sample { code: codes.preload_sensor, at });
         self.frame.compression_sensor = Some(Sample { code: codes.compression_sensor, at });
         self.frame.bridges = Some(codes.bridges);
         if at.is_multiple_of(ANGLE_EVERY) {
-            self.frame.arm = Some(Sample { code: codes.arm, at });
+            self.frame.arm_angle = Some(Sample { code: codes.arm_angle, at });
         }
         let mut frame = self.frame;
         if let Some(injector) = &mut self.injector {

@@ -143,10 +143,10 @@ fn frame(
     random: &mut ChaCha8Rng,
 ) -> SensorFrame {
     let made = |wheel: u16, load: u16, tread: u16, arm: u16| SensorFrame {
-        wheel: Some(Sample { code: EncoderCount::new(wheel), at: now }),
+        wheel_encoder: Some(Sample { code: EncoderCount::new(wheel), at: now }),
         preload_sensor: Some(Sample { code: AdcCode::new(load), at: now }),
         compression_sensor: Some(Sample { code: AdcCode::new(tread), at: now }),
-        arm: Some(Sample { code: AngleFrame::new(arm), at: now }),
+        arm_angle: Some(Sample { code: AngleFrame::new(arm), at: now }),
         bridges,
     };
     let even = |angle: u16| {
@@ -173,10 +173,10 @@ fn frame(
                 2 => *at = now.wrapping_add(random.random_range(0..2000)),
                 _ => {}
             };
-            if let Some(sample) = &mut frame.wheel {
+            if let Some(sample) = &mut frame.wheel_encoder {
                 time(&mut sample.at, random);
             }
-            if let Some(sample) = &mut frame.arm {
+            if let Some(sample) = &mut frame.arm_angle {
                 time(&mut sample.at, random);
             }
             if random.random_range(0..20) == 0 {

@@ -112,10 +112,10 @@ fn loops(rig: &Rig) {
 
 fn sensed(rig: &Rig) {
     let frame = |at, code: (u16, u16, u16, u16)| SensorFrame {
-        wheel: Some(Sample { code: EncoderCount::new(code.0), at }),
+        wheel_encoder: Some(Sample { code: EncoderCount::new(code.0), at }),
         preload_sensor: Some(Sample { code: AdcCode::new(code.1), at }),
         compression_sensor: Some(Sample { code: AdcCode::new(code.2), at }),
-        arm: Some(Sample { code: AngleFrame::new(code.3 | parity(code.3)), at }),
+        arm_angle: Some(Sample { code: AngleFrame::new(code.3 | parity(code.3)), at }),
         bridges: Some(BridgeCodes { drive: BridgeCode::of(0), pretightener: BridgeCode::of(0) }),
     };
     let senses = Senses::try_build(rig).expect("a preset");

@@ -125,13 +125,13 @@ fn log(index: usize, wide: &Scenario, zeros: (f64, f64)) -> Record {
         let (codes, at) = (read(&mut sensors, session.plant()), samples.len() as u32);
         // Every code new, the arm's every second tick.
         if at.is_multiple_of(2) {
-            arm = Some(Sample { code: codes.arm, at });
+            arm = Some(Sample { code: codes.arm_angle, at });
         }
         let frame = SensorFrame {
-            wheel: Some(Sample { code: codes.wheel, at }),
+            wheel_encoder: Some(Sample { code: codes.wheel_encoder, at }),
             preload_sensor: Some(Sample { code: codes.preload_sensor, at }),
             compression_sensor: Some(Sample { code: codes.compression_sensor, at }),
-            arm,
+            arm_angle: arm,
             bridges: Some(codes.bridges),
         };
         let output = session.advance(&frame, command).expect("a sound plant");

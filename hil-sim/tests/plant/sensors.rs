@@ -44,10 +44,10 @@ impl Chain {
         let codes = self.read(sensed);
         let at = self.now;
         let frame = SensorFrame {
-            wheel: Some(Sample { code: codes.wheel, at }),
+            wheel_encoder: Some(Sample { code: codes.wheel_encoder, at }),
             preload_sensor: Some(Sample { code: codes.preload_sensor, at }),
             compression_sensor: Some(Sample { code: codes.compression_sensor, at }),
-            arm: Some(Sample { code: codes.arm, at }),
+            arm_angle: Some(Sample { code: codes.arm_angle, at }),
             bridges: Some(codes.bridges),
         };
         self.now += 1;
@@ -103,8 +103,8 @@ fn a_reading_is_as_old_as_its_delay() {
         let delay = ticks * TICK_S;
         let noise = Noise {
             preload_sensor_delay_s: delay,
-            tread_delay_s: delay,
-            angle_delay_s: delay,
+            compression_sensor_delay_s: delay,
+            arm_angle_delay_s: delay,
             ..Noise::none()
         };
         let mut chain = Chain::new(noise);
@@ -130,7 +130,12 @@ fn a_reading_is_as_old_as_its_delay() {
 
 #[test]
 fn noise_has_its_deviation_and_no_bias() {
-    let noise = Noise { preload_sensor_n: 0.05, tread_mm: 0.002, angle_lsb: 2.0, ..Noise::none() };
+    let noise = Noise {
+        preload_sensor_n: 0.05,
+        compression_sensor_mm: 0.002,
+        arm_angle_lsb: 2.0,
+        ..Noise::none()
+    };
     let mut chain = Chain::new(noise);
     let (count, radius) = (5000, 120.0);
     let mut sums = [(0.0, 0.0); 3];

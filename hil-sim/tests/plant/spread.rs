@@ -65,7 +65,7 @@ fn the_draws_mean_what_the_spread_documents() {
         ("lag", spread.lag_rel, |p| p.lag_s),
         ("slew", spread.slew_rel, |p| p.slew_n_per_s),
         ("preload_sensor_gain", spread.preload_sensor_gain_rel, |p| p.sensors.preload_sensor_gain),
-        ("tread_gain", spread.tread_gain_rel, |p| p.sensors.tread_gain),
+        ("tread_gain", spread.compression_sensor_gain_rel, |p| p.sensors.tread_gain),
     ];
     let mut columns = Vec::new();
     for (name, deviation, of) in relative {
@@ -93,7 +93,7 @@ fn the_draws_mean_what_the_spread_documents() {
         even("step_height", spread.step_height_mm, of(|step| step.height_mm));
     }
     let zero = plants.iter().map(|plant| plant.sensors.angle_zero_rad.to_degrees());
-    even("arm_zero", spread.arm_zero_deg, zero.collect());
+    even("arm_zero", spread.arm_angle_zero_deg, zero.collect());
     // The radius: as made, within its half-width, less wear from none to all.
     let lost: Vec<f64> =
         plants.iter().map(|plant| nominal.ring.radius_mm - plant.ring.radius_mm).collect();

@@ -140,7 +140,7 @@ fn draws(direction: Direction, count: u64) -> impl ParallelIterator<Item = (u64,
 
 /// Whether a rig without a fault never reports it.
 fn untrue(limit: &Limit) -> bool {
-    matches!(limit, Limit::StepExtra | Limit::StepMissing | Limit::TreadStrange)
+    matches!(limit, Limit::StepExtra | Limit::StepMissing | Limit::CompressionStrange)
 }
 
 #[test]

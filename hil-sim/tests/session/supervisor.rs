@@ -46,12 +46,12 @@ fn snapshots() -> Vec<(Mode, Snapshot)> {
         let (mut plan, mut within) = (None, 0);
         for now in 0..30_000 {
             let codes = read(&mut sensors, &plant);
-            frame.wheel = Some(Sample { code: codes.wheel, at: now });
+            frame.wheel_encoder = Some(Sample { code: codes.wheel_encoder, at: now });
             frame.preload_sensor = Some(Sample { code: codes.preload_sensor, at: now });
             frame.compression_sensor = Some(Sample { code: codes.compression_sensor, at: now });
             frame.bridges = Some(codes.bridges);
             if now % 2 == 0 {
-                frame.arm = Some(Sample { code: codes.arm, at: now });
+                frame.arm_angle = Some(Sample { code: codes.arm_angle, at: now });
             }
             let before = state.mode();
             let command = match before {
@@ -123,7 +123,7 @@ const SPOILS: [Spoil; 12] = [
     (Fault::CompressionSensorRange, |input| {
         set(&mut input.sensors.compression_sensor, AdcCode::new(0xffff))
     }),
-    (Fault::ArmAngleRange, |input| set(&mut input.sensors.arm, AngleFrame::new(2000))),
+    (Fault::ArmAngleRange, |input| set(&mut input.sensors.arm_angle, AngleFrame::new(2000))),
 ];
 
 fn spoil(input: &mut Input, of: fn(&mut BridgeCodes)) {
@@ -146,13 +146,13 @@ fn next(input: &Input, silent: Fault) -> Input {
             *at = now;
         }
     };
-    frame.wheel.iter_mut().for_each(|s| fresh(Fault::WheelEncoderStale, &mut s.at));
+    frame.wheel_encoder.iter_mut().for_each(|s| fresh(Fault::WheelEncoderStale, &mut s.at));
     frame.preload_sensor.iter_mut().for_each(|s| fresh(Fault::PreloadSensorStale, &mut s.at));
     frame
         .compression_sensor
         .iter_mut()
         .for_each(|s| fresh(Fault::CompressionSensorStale, &mut s.at));
-    frame.arm.iter_mut().for_each(|s| fresh(Fault::ArmAngleStale, &mut s.at));
+    frame.arm_angle.iter_mut().for_each(|s| fresh(Fault::ArmAngleStale, &mut s.at));
     input
 }
 
@@ -256,7 +256,7 @@ proptest! {
         let Snapshot { mut state, input, plan } =
             FROM.with(|all| all[from % all.len()].1.clone());
         let controller = controller();
-        let mut count = input.sensors.wheel.map_or(0, |wheel| wheel.code.get());
+        let mut count = input.sensors.wheel_encoder.map_or(0, |wheel| wheel.code.get());
         let (mut echo, mut sound) = (Echo::default(), input.sensors.bridges.unwrap_or_default());
         for (now, tick) in (input.now + 1..).zip(ticks) {
             let before = state.mode();
@@ -264,7 +264,7 @@ proptest! {
             let at = |age: u32| now.saturating_sub(age);
             let parity = |code: u16| (code & 0x3fff) | ((code & 0x3fff).count_ones() as u16 & 1) << 15;
             let sensors = SensorFrame {
-                wheel: tick.wheel.map(|(_, age)| Sample {
+                wheel_encoder: tick.wheel.map(|(_, age)| Sample {
                     code: EncoderCount::new(count),
                     at: at(age),
                 }),
@@ -274,7 +274,7 @@ proptest! {
                 compression_sensor: tick
                     .tread
                     .map(|(code, age)| Sample { code: AdcCode::new(code), at: at(age) }),
-                arm: tick
+                arm_angle: tick
                     .arm
                     .map(|(code, age)| Sample { code: AngleFrame::new(parity(code)), at: at(age) }),
                 bridges: tick.bridges.map(|drive| BridgeCodes {

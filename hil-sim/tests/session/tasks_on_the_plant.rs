@@ -72,7 +72,7 @@ struct PreloadSensor(Rc<Shared>);
 
 impl WheelEncoder for Peripheral {
     fn count(&mut self) -> EncoderCount {
-        self.0.codes().wheel
+        self.0.codes().wheel_encoder
     }
 }
 
@@ -90,7 +90,7 @@ impl AnalogInput for Peripheral {
 
 impl AngleBus for Peripheral {
     async fn frame(&mut self) -> Result<AngleFrame, BusFault> {
-        Ok(self.0.codes().arm)
+        Ok(self.0.codes().arm_angle)
     }
 }
 
@@ -207,10 +207,10 @@ impl Board {
         let (motors, watchdog, journal, light) = (part(), part(), part(), part());
         self.tasks = vec![
             Box::pin(async { tasks::clock(exchange).await }),
-            Box::pin(async { tasks::speed(wheel, exchange).await }),
-            Box::pin(async { tasks::pressure(preload_sensor, exchange).await }),
-            Box::pin(async { tasks::displacement(tread, exchange).await }),
-            Box::pin(async { tasks::angle(arm, exchange).await }),
+            Box::pin(async { tasks::wheel_encoder(wheel, exchange).await }),
+            Box::pin(async { tasks::preload_sensor(preload_sensor, exchange).await }),
+            Box::pin(async { tasks::compression_sensor(tread, exchange).await }),
+            Box::pin(async { tasks::arm_angle(arm, exchange).await }),
             Box::pin(async { tasks::operator(button, exchange).await }),
             Box::pin(async { tasks::motors(motors, watchdog, controller, latest, exchange).await }),
             Box::pin(async { tasks::record(latest, exchange).await }),

@@ -25,7 +25,7 @@ pub(super) static DESK: Desk = Desk {
         wheel: 0,
         preload_sensor: None,
         compression_sensor: None,
-        arm: None,
+        arm_angle: None,
         bridges: None,
         stop: false,
         command: 0,

@@ -26,7 +26,7 @@ impl WheelEncoder for Wheel {
 pub(crate) type PreloadSensor = Analog;
 
 /// The compression sensor.
-pub(crate) type Tread = Analog;
+pub(crate) type CompressionSensor = Analog;
 
 /// One of the two analogue sensors.
 pub(crate) struct Analog(fn(&Given) -> Option<u16>);

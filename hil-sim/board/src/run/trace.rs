@@ -99,10 +99,10 @@ impl Trace {
         let Passed { codes, drives } = passed;
         let digest = &mut self.tally.digest;
         for code in [
-            codes.wheel.get(),
+            codes.wheel_encoder.get(),
             codes.preload_sensor.get(),
             codes.compression_sensor.get(),
-            codes.arm.get(),
+            codes.arm_angle.get(),
             codes.bridges.drive.get(),
             codes.bridges.pretightener.get(),
         ] {

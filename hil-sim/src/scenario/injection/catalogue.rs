@@ -207,10 +207,10 @@ const fn broken_off(kind: Kind, text: &'static str) -> Entry {
 pub const HARDWARE: &[Entry] = {
     use Kind::{BitErrors, Flooding, Gone, Hung, Off, Reset, Stalled, Stuck, Torn, Weak};
     use Target::{
-        AngleBus, AngleTask, Debugger, DisplacementTask, Dma, EncoderLineA, EncoderLineB, HostLine,
-        Image, ImageSet, Interrupt, JournalTask, LineTask, ModelTask, PreloadSensorConverter,
-        PressureTask, Processor, ResetPin, SpareSet, SpeedTask, StoredSet, Supply, TickTask, Timer,
-        TreadConverter,
+        AngleBus, ArmAngleTask, CompressionSensorTask, Debugger, Dma, EncoderLineA, EncoderLineB,
+        HostLine, Image, ImageSet, Interrupt, JournalTask, LineTask, ModelTask,
+        PreloadSensorConverter, PreloadSensorTask, Processor, ResetPin, SpareSet, StoredSet,
+        Supply, TickTask, Timer, TreadConverter, WheelEncoderTask,
     };
     &[
         stuck(PreloadSensorConverter),
@@ -223,10 +223,10 @@ pub const HARDWARE: &[Entry] = {
         plain(Timer, Stuck, "its flags cannot be cleared"),
         plain(Interrupt, Flooding, "asks without end"),
         plain(Processor, Hung, "what it executes is caught in a loop"),
-        hung(SpeedTask),
-        hung(PressureTask),
-        hung(DisplacementTask),
-        hung(AngleTask),
+        hung(WheelEncoderTask),
+        hung(PreloadSensorTask),
+        hung(CompressionSensorTask),
+        hung(ArmAngleTask),
         hung(TickTask),
         hung(ModelTask),
         hung(JournalTask),

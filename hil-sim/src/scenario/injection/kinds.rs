@@ -61,13 +61,13 @@ pub enum Target {
     /// Whatever the processor executes.
     Processor,
     /// Task of the wheel encoder.
-    SpeedTask,
+    WheelEncoderTask,
     /// Task of the preload sensor.
-    PressureTask,
+    PreloadSensorTask,
     /// Task of the compression sensor.
-    DisplacementTask,
+    CompressionSensorTask,
     /// Task of the angle sensor.
-    AngleTask,
+    ArmAngleTask,
     /// Task of the control tick.
     TickTask,
     /// Task of the model.
