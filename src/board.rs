@@ -24,11 +24,11 @@ pub(crate) use console::Console;
 pub(crate) use flash::Pages;
 pub(crate) use guard::Guard;
 #[cfg(feature = "hil")]
-pub(crate) use hil::{Angle, Bridges, Button, PreloadSensor, Tread, Wheel, split};
+pub(crate) use hil::{Angle, Bridges, Button, CompressionSensor, PreloadSensor, Wheel, split};
 pub(crate) use light::Lamp;
 pub(crate) use line::HostLine;
 #[cfg(not(feature = "hil"))]
-pub(crate) use pins::{Angle, Bridges, Button, PreloadSensor, Tread, Wheel, split};
+pub(crate) use pins::{Angle, Bridges, Button, CompressionSensor, PreloadSensor, Wheel, split};
 pub(crate) use text_log::Lines;
 
 use embassy_stm32::peripherals::{DMA1_CH1, DMA1_CH2};
@@ -45,7 +45,7 @@ pub(crate) struct Nucleo;
 impl Board for Nucleo {
     type Wheel = Wheel;
     type PreloadSensor = PreloadSensor;
-    type Tread = Tread;
+    type CompressionSensor = CompressionSensor;
     type Arm = Angle;
     type Motors = Bridges;
     type Watchdog = Guard;

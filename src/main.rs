@@ -109,10 +109,10 @@ mod firmware {
         parts.watchdog.start();
         let latest = LATEST.init_with(|| TickIoCell::new(TickIo::default()));
         control.spawn(clock().unwrap());
-        control.spawn(speed(parts.wheel_encoder).unwrap());
+        control.spawn(wheel_encoder(parts.wheel_encoder).unwrap());
         control.spawn(preload_sensor(parts.preload_sensor).unwrap());
         control.spawn(compression_sensor(parts.compression_sensor).unwrap());
-        control.spawn(angle(parts.arm_angle).unwrap());
+        control.spawn(arm_angle(parts.arm_angle).unwrap());
         control.spawn(motors(parts.motors, parts.watchdog, controller, latest).unwrap());
         control.spawn(record(latest).unwrap());
         threads.spawn(model(planner).unwrap());
@@ -136,7 +136,7 @@ mod firmware {
         wheel_encoder(wheel: Wheel) => tasks::wheel_encoder(wheel, &EXCHANGE);
         preload_sensor(input: PreloadSensor) => tasks::preload_sensor(input, &EXCHANGE);
         compression_sensor(input: CompressionSensor) => tasks::compression_sensor(input, &EXCHANGE);
-        arm_angle(bus: Angle) => tasks::arm_arm_angle(bus, &EXCHANGE);
+        arm_angle(bus: Angle) => tasks::arm_angle(bus, &EXCHANGE);
         motors(
             motors: Bridges, watchdog: Guard, controller: &'static Controller,
             latest: &'static TickIoCell

@@ -83,17 +83,26 @@ pub(crate) fn hold(threads: Spawner, parts: Parts<Nucleo>, why: Held) {
     let Parts {
         motors,
         light,
-        wheel,
+        wheel_encoder,
         preload_sensor,
-        tread,
-        arm,
+        compression_sensor,
+        arm_angle,
         watchdog,
         button,
         console,
         journal,
     } = parts;
     // As they are until the next start: to switch them off would be code for nothing.
-    core::mem::forget((wheel, preload_sensor, tread, arm, watchdog, button, console, journal));
+    core::mem::forget((
+        wheel_encoder,
+        preload_sensor,
+        compression_sensor,
+        arm_angle,
+        watchdog,
+        button,
+        console,
+        journal,
+    ));
     threads.spawn(stay_off(motors, light, why).unwrap());
 }
 

@@ -9,7 +9,7 @@ mod desk;
 mod parts;
 mod serve;
 
-pub(crate) use parts::{Angle, Bridges, Button, PreloadSensor, Tread, Wheel, split};
+pub(crate) use parts::{Angle, Bridges, Button, CompressionSensor, PreloadSensor, Wheel, split};
 
 use embassy_executor::{InterruptExecutor, Spawner};
 use embassy_stm32::interrupt::{self, InterruptExt, Priority};

@@ -39,15 +39,20 @@ pub(crate) fn split(
     frames: Frames,
 ) -> (Parts<Nucleo>, Peri<'static, AnyPin>, Pages) {
     let parts = Parts {
-        wheel: Wheel::new(p.TIM5, p.PA0, p.PA1),
+        wheel_encoder: Wheel::new(p.TIM5, p.PA0, p.PA1),
         preload_sensor: Analog::new(
             (p.ADC1, pac::ADC1),
             p.PC2,
             (p.DMA1_CH1, pac::DMA1.ch(0)),
             &PRELOAD_SENSOR,
         ),
-        tread: Analog::new((p.ADC2, pac::ADC2), p.PC3, (p.DMA1_CH2, pac::DMA1.ch(1)), &TREAD),
-        arm: Angle::new(p.SPI1, (p.PB3, p.PA7, p.PA6), p.PB10),
+        compression_sensor: Analog::new(
+            (p.ADC2, pac::ADC2),
+            p.PC3,
+            (p.DMA1_CH2, pac::DMA1.ch(1)),
+            &TREAD,
+        ),
+        arm_angle: Angle::new(p.SPI1, (p.PB3, p.PA7, p.PA6), p.PB10),
         motors: Bridges {
             drive: Bridge::new((p.TIM1, pac::TIM1), p.PA8, p.PA9.into(), p.PA10.into(), p.PB12),
             preload: Bridge::new((p.TIM8, pac::TIM8), p.PC6, p.PC8.into(), p.PC9.into(), p.PB7),

@@ -22,7 +22,7 @@ pub(super) struct Desk {
 /// The only one.
 pub(super) static DESK: Desk = Desk {
     given: Mutex::new(Cell::new(Given {
-        wheel: 0,
+        wheel_encoder: 0,
         preload_sensor: None,
         compression_sensor: None,
         arm_angle: None,

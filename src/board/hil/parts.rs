@@ -18,7 +18,7 @@ pub(crate) struct Wheel;
 
 impl WheelEncoder for Wheel {
     fn count(&mut self) -> EncoderCount {
-        EncoderCount::new(DESK.given().wheel)
+        EncoderCount::new(DESK.given().wheel_encoder)
     }
 }
 
@@ -42,7 +42,7 @@ pub(crate) struct Angle;
 
 impl AngleBus for Angle {
     async fn frame(&mut self) -> Result<AngleFrame, BusFault> {
-        DESK.given().arm.map(AngleFrame::new).ok_or(BusFault::Timeout)
+        DESK.given().arm_angle.map(AngleFrame::new).ok_or(BusFault::Timeout)
     }
 }
 
@@ -88,10 +88,10 @@ pub(crate) fn split(
     let pins: [Peri<'static, AnyPin>; 6] =
         [p.PA8.into(), p.PA9.into(), p.PA10.into(), p.PC6.into(), p.PC8.into(), p.PC9.into()];
     let parts = Parts {
-        wheel: Wheel,
+        wheel_encoder: Wheel,
         preload_sensor: Analog(|given| given.preload_sensor),
-        tread: Analog(|given| given.compression_sensor),
-        arm: Angle,
+        compression_sensor: Analog(|given| given.compression_sensor),
+        arm_angle: Angle,
         motors: Bridges { _low: pins.map(|pin| Output::new(pin, Level::Low, Speed::Low)) },
         watchdog: Guard::new(p.IWDG),
         button: Button,
