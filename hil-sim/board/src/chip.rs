@@ -149,7 +149,7 @@ impl Chip {
             self.ports[port] = Gpio::new(port, driven, levels);
         }
         self.angle = old.angle;
-        self.wheel = old.wheel_encoder;
+        self.wheel = old.wheel;
         self.bridges = old.bridges;
         self.defects = old.defects;
         self.strays = old.strays;
