@@ -1,4 +1,4 @@
-//! The NUCLEO-G474RE behind [`interstage::hal::Board`]: one driver a file. Its pins are
+//! The NUCLEO-G474RE behind the traits of [`interstage::hal`]: one driver a file. Its pins are
 //! listed in `docs/HARDWARE.md`.
 
 pub(crate) mod config;
@@ -21,7 +21,7 @@ pub(crate) mod supply;
 mod text_log;
 
 pub(crate) use console::Console;
-pub(crate) use flash::Pages;
+pub(crate) use flash::ParameterFlash;
 pub(crate) use guard::Guard;
 #[cfg(feature = "hil")]
 pub(crate) use hil::{Angle, Bridges, Button, CompressionSensor, PreloadSensor, Wheel, split};
@@ -29,30 +29,27 @@ pub(crate) use light::Lamp;
 pub(crate) use line::HostLine;
 #[cfg(not(feature = "hil"))]
 pub(crate) use pins::{Angle, Bridges, Button, CompressionSensor, PreloadSensor, Wheel, split};
-pub(crate) use text_log::Lines;
+pub(crate) use text_log::TextLog;
 
 use embassy_stm32::peripherals::{DMA1_CH1, DMA1_CH2};
 use embassy_stm32::{Config, bind_interrupts, dma, exti, flash as flash_driver, interrupt, rcc};
-use interstage::hal::Board;
 use interstage::tasks::Exchange;
 
 /// What all tasks share.
 pub(crate) static EXCHANGE: Exchange = Exchange::new();
 
-/// The board.
-pub(crate) struct Nucleo;
-
-impl Board for Nucleo {
-    type Wheel = Wheel;
-    type PreloadSensor = PreloadSensor;
-    type CompressionSensor = CompressionSensor;
-    type Arm = Angle;
-    type Motors = Bridges;
-    type Watchdog = Guard;
-    type Button = Button;
-    type Console = Console;
-    type Journal = Lines;
-    type Light = Lamp;
+/// The board taken apart: each task owns what it uses and nothing else.
+pub(crate) struct Parts {
+    pub(crate) wheel_encoder: Wheel,
+    pub(crate) preload_sensor: PreloadSensor,
+    pub(crate) compression_sensor: CompressionSensor,
+    pub(crate) arm_angle: Angle,
+    pub(crate) motors: Bridges,
+    pub(crate) watchdog: Guard,
+    pub(crate) button: Button,
+    pub(crate) console: Console,
+    pub(crate) journal: TextLog,
+    pub(crate) light: Lamp,
 }
 
 bind_interrupts!(pub(crate) struct Irqs {
@@ -65,9 +62,8 @@ bind_interrupts!(pub(crate) struct Irqs {
 /// The core's clock, Hz.
 const SYSCLK_HZ: u32 = 170_000_000;
 
-/// [`SYSCLK_HZ`] from the internal oscillator: 16 MHz / 4 x 85 / 2. Its 1 % is ample,
-/// because positions come from the encoder and the plan is redone at every step;
-/// a crystal would be one more part that can stop.
+/// [`SYSCLK_HZ`] from the internal oscillator: 16 MHz / 4 x 85 / 2. Its 1 % suffices: positions
+/// come from the encoder, and every step is planned again.
 pub(crate) fn clocks() -> Config {
     let mut config = Config::default();
     config.rcc.pll = Some(rcc::Pll {

@@ -6,7 +6,6 @@
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
 )]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
 #[repr(u16)]
 pub enum Fault {
     /// The wheel encoder stopped answering.
@@ -148,7 +147,6 @@ impl Fault {
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
 )]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
 #[repr(u16)]
 pub enum Limit {
     /// A corner was met before its window.

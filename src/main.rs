@@ -1,12 +1,12 @@
-//! The firmware: clocks, resource split, spawn. Everything it runs is in the
-//! library; what is particular to the board is in [`board`].
+//! The firmware: clocks, resource split, spawn. Everything that it runs is in the library; the
+//! drivers are in [`board`].
 
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
 mod board;
 
-/// The image is for the board alone; on a host this says where to go.
+/// On a host: how to flash or simulate the image.
 #[cfg(not(target_os = "none"))]
 fn main() -> std::process::ExitCode {
     eprintln!("interstage is firmware for the NUCLEO-G474RE and does not run here.");
@@ -18,7 +18,6 @@ fn main() -> std::process::ExitCode {
 mod firmware {
     use embassy_executor::{InterruptExecutor, Spawner};
     use embassy_stm32::interrupt::{self, InterruptExt, Priority};
-    use interstage::hal::Parts;
     use interstage::log::{Identity, LogEncoder};
     use interstage::model::Planner;
     use interstage::params::service::Service;
@@ -26,28 +25,27 @@ mod firmware {
     use interstage::tick::{Controller, Entry, Event};
     use static_cell::{ConstStaticCell, StaticCell};
 
-    use crate::board::config::{self, Held};
+    use crate::board::config::{self, HoldReason};
     use crate::board::rtt::{self, Channels};
     use crate::board::{self, EXCHANGE, guard, image, light, safety, start, supply};
-    use crate::board::{Angle, Bridges, Button, Console, Guard, HostLine, Lamp, Lines};
-    use crate::board::{CompressionSensor, Nucleo, Pages, PreloadSensor, Wheel};
+    use crate::board::{Angle, Bridges, Button, Console, Guard, HostLine, Lamp, Parts, TextLog};
+    use crate::board::{CompressionSensor, ParameterFlash, PreloadSensor, Wheel};
 
     static LATEST: StaticCell<TickIoCell> = StaticCell::new();
     static ENCODER: ConstStaticCell<LogEncoder> =
         ConstStaticCell::new(LogEncoder::new(Identity::NOBODY));
 
-    /// Runs the control tick and the sensors, above everything that may take long.
+    /// Runs the control tick and the sensors, above all work without a deadline.
     ///
-    /// The deadline is the next tick, 1 ms on. The time driver's interrupt wakes the clock's
-    /// task at each whole millisecond, and that all others here. What can delay this
-    /// executor: that and the other interrupts above it, which only wake tasks (two DMA
-    /// channels, button) or count (system timer), and critical sections, of which the
-    /// longest wakes a task in the queue of timers or copies a log entry, 3 us. Those of
-    /// thread mode come in the middle between two ticks or right behind one, see
-    /// [`tasks::mid_tick_deadline`]. What can delay the tick on it: the four sensor tasks,
-    /// of which the longest exchanges two frames of 3 us. Model, log and operator run in
-    /// thread mode and are preempted, however long they take. The tick measures its own
-    /// lateness, and a whole period of it is a fault.
+    /// The deadline is the next tick, 1 ms later. At each whole millisecond the time driver's
+    /// interrupt wakes the clock's task, which wakes the others. This executor is delayed by
+    /// the interrupts above it, which only wake tasks (two DMA channels, button) or count
+    /// (system timer), and by critical sections, of which the longest wakes a task in the timer
+    /// queue or copies a log entry, 3 us. Those of thread mode run in the middle between two
+    /// ticks or directly after one, see [`tasks::mid_tick_deadline`]. On this executor the four
+    /// sensor tasks delay the tick; the longest exchanges two frames of 3 us. Model, log and
+    /// operator run in thread mode and are preempted. The tick measures its own lateness, and a
+    /// full period of it is a fault.
     static CONTROL: InterruptExecutor = InterruptExecutor::new();
 
     /// The board has no use for UART5; its vector carries [`CONTROL`].
@@ -73,34 +71,34 @@ mod firmware {
     fn begin(threads: Spawner, channels: Channels) {
         let p = embassy_stm32::init(board::clocks());
         let waited = supply::watch();
-        // Before anything that it may have damaged.
+        // First: a damaged image may not reach what follows.
         let image = image::verify();
         defmt::info!("interstage {=str}", env!("CARGO_PKG_VERSION"));
         let restart = start::report(waited);
         EXCHANGE.log(Entry { at: 0, event: Event::Restart(restart) });
         guard::arm();
-        let (mut parts, lamp, pages) = board::split(p, channels.console, channels.telemetry);
+        let (mut parts, lamp, flash) = board::split(p, channels.console, channels.telemetry);
         parts.watchdog.place = restart.place();
         threads.spawn(light::show(lamp).unwrap());
         match image {
-            Some(sealed) => threads.spawn(safety::watch_image(sealed).unwrap()),
-            None => return config::hold(threads, parts, Held::Image),
+            Some(checksum) => threads.spawn(safety::watch_image(checksum).unwrap()),
+            None => return config::hold(threads, parts, HoldReason::Image),
         }
-        let (constants, service) = config::build(pages);
+        let (constants, service) = config::build(flash);
         threads.spawn(link(HostLine::new(channels.line), service).unwrap());
         match constants {
             Ok((controller, planner, identity)) => {
-                parts.journal.introduce(identity);
+                parts.journal.set_identity(identity);
                 run(threads, parts, controller, planner);
             }
-            Err(error) => config::hold(threads, parts, Held::Parameters(error)),
+            Err(error) => config::hold(threads, parts, HoldReason::Parameters(error)),
         }
     }
 
     /// Hands every part to its task.
     fn run(
         threads: Spawner,
-        mut parts: Parts<Nucleo>,
+        mut parts: Parts,
         controller: &'static Controller,
         planner: &'static Planner,
     ) {
@@ -121,7 +119,7 @@ mod firmware {
         threads.spawn(journal(parts.journal, parts.light).unwrap());
     }
 
-    /// Makes tasks of the library's functions.
+    /// Makes executor tasks, which cannot be generic, of the library's functions.
     macro_rules! tasks {
         ($($name:ident($($part:ident: $type:ty),*) => $call:expr;)*) => {$(
             #[embassy_executor::task]
@@ -145,9 +143,11 @@ mod firmware {
         model(planner: &'static Planner) => tasks::model(planner, &EXCHANGE);
         pressed(button: Button) => tasks::operator(button, &EXCHANGE);
         typed(console: Console) => tasks::operator(console, &EXCHANGE);
-        link(line: HostLine, service: Service<Pages>) => tasks::link(line, service, &EXCHANGE);
-        journal(lines: Lines, lamp: Lamp) => {
-            tasks::journal(lines, lamp, ENCODER.take(), &EXCHANGE)
+        link(line: HostLine, service: Service<ParameterFlash>) => {
+            tasks::link(line, service, &EXCHANGE)
+        };
+        journal(log: TextLog, lamp: Lamp) => {
+            tasks::journal(log, lamp, ENCODER.take(), &EXCHANGE)
         };
     }
 }

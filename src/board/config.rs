@@ -2,7 +2,7 @@
 
 use embassy_executor::Spawner;
 use embassy_time::Timer;
-use interstage::hal::{Indicator, Light, Motors, Parts};
+use interstage::hal::{Indicator, Light, Motors};
 use interstage::log::{Identity, identity};
 use interstage::model::Planner;
 use interstage::params::service::{Service, in_force};
@@ -11,28 +11,30 @@ use interstage::tick::Controller;
 use interstage::units::MotorCommand;
 use static_cell::StaticCell;
 
-use super::{Bridges, Lamp, Nucleo, Pages, image};
+use super::{Bridges, Lamp, ParameterFlash, Parts, image};
 
-/// The set that the image carries: the prototype, written by `rig-study constants`.
+/// Parameter set in the image: the prototype, written by `rig-study constants`.
 static PROTOTYPE: &[u8] = include_bytes!("../params/prototype.set");
 
 static CONTROLLER: StaticCell<Controller> = StaticCell::new();
 static PLANNER: StaticCell<Planner> = StaticCell::new();
 
-/// What the tasks run on, and what the binary log begins with.
+/// What the tasks run on, and the head of the binary log.
 pub(crate) type Constants = (&'static Controller, &'static Planner, Identity);
 
-/// Controller and planner of the set in force, in place for good, and the service that
-/// can replace it. Call once.
+/// Controller and planner of the set in force, at their final place, and the service that can
+/// replace the set. Call once.
 ///
-/// A stored set that the firmware cannot run, or that is damaged, is not passed over for
-/// another one: the drive would move by parameters that nobody chose.
-pub(crate) fn build(pages: Pages) -> (Result<Constants, SetError>, Service<Pages>) {
-    let Ok((_, set)) = in_force(&pages, PROTOTYPE) else {
-        return (Err(SetError::Damaged), Service::new(pages, PROTOTYPE, 0));
+/// A stored set that is damaged or that the firmware cannot run is not replaced by another one:
+/// the drive would move by parameters that nobody chose.
+pub(crate) fn build(
+    flash: ParameterFlash,
+) -> (Result<Constants, SetError>, Service<ParameterFlash>) {
+    let Ok((_, set)) = in_force(&flash, PROTOTYPE) else {
+        return (Err(SetError::Damaged), Service::new(flash, PROTOTYPE, 0));
     };
     let running = ParameterSet::open_any(set).map_or(0, |set| set.header().parameters);
-    (constants(set), Service::new(pages, PROTOTYPE, running))
+    (constants(set), Service::new(flash, PROTOTYPE, running))
 }
 
 #[inline(never)]
@@ -42,7 +44,7 @@ fn constants(set: &[u8]) -> Result<Constants, SetError> {
     let rest = set.controller_into(controller)?;
     let planner = PLANNER.init_with(Planner::default);
     rest.planner_into(planner)?;
-    announce(set.header());
+    log_header(set.header());
     Ok((controller, planner, identity(set.header(), controller)))
 }
 
@@ -58,8 +60,7 @@ fn identity(header: &Header, controller: &Controller) -> Identity {
     }
 }
 
-/// Which parameters these are, for whoever reads the log.
-fn announce(header: &Header) {
+fn log_header(header: &Header) {
     defmt::info!(
         "rig {=str}, schema {=u16}, parameters {=u32:08x}, calibration {=u32:08x}",
         header.name.as_str(),
@@ -71,52 +72,37 @@ fn announce(header: &Header) {
 
 /// Why the drive stays off.
 #[derive(Clone, Copy)]
-pub(crate) enum Held {
-    /// A bit of the image has turned over: what would run is not what was tested.
+pub(crate) enum HoldReason {
+    /// A bit of the image has flipped: the code is no longer the tested one.
     Image,
     /// No controller can be read from the parameters.
     Parameters(SetError),
 }
 
-/// Has the drive stay off, and says why.
-pub(crate) fn hold(threads: Spawner, parts: Parts<Nucleo>, why: Held) {
+/// Keeps the drive off, and logs why.
+pub(crate) fn hold(threads: Spawner, parts: Parts, why: HoldReason) {
     let Parts {
-        motors,
-        light,
-        wheel_encoder,
-        preload_sensor,
-        compression_sensor,
-        arm_angle,
-        watchdog,
-        button,
-        console,
-        journal,
+        motors, light, wheel_encoder, preload_sensor, compression_sensor, arm_angle, ..
     } = parts;
-    // As they are until the next start: to switch them off would be code for nothing.
-    core::mem::forget((
-        wheel_encoder,
-        preload_sensor,
-        compression_sensor,
-        arm_angle,
-        watchdog,
-        button,
-        console,
-        journal,
-    ));
+    // Left as they are until the next start: dropping them would only add code.
+    core::mem::forget((wheel_encoder, preload_sensor, compression_sensor, arm_angle));
+    core::mem::forget((parts.watchdog, parts.button, parts.console, parts.journal));
     threads.spawn(stay_off(motors, light, why).unwrap());
 }
 
 #[embassy_executor::task]
-async fn stay_off(mut motors: Bridges, mut light: Lamp, why: Held) -> ! {
+async fn stay_off(mut motors: Bridges, mut light: Lamp, why: HoldReason) -> ! {
     motors.apply(MotorCommand::OFF, MotorCommand::OFF);
     light.show(Light::Alarm);
     loop {
         match why {
-            Held::Image => image::say_damaged(),
-            Held::Parameters(error @ SetError::Schema { found }) => {
+            HoldReason::Image => image::log_damaged(),
+            HoldReason::Parameters(error @ SetError::Schema { found }) => {
                 defmt::error!("parameters: {=str}, {=u16}", error.sentence(), found);
             }
-            Held::Parameters(error) => defmt::error!("parameters: {=str}", error.sentence()),
+            HoldReason::Parameters(error) => {
+                defmt::error!("parameters: {=str}", error.sentence());
+            }
         }
         Timer::after_secs(1).await;
     }

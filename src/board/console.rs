@@ -6,7 +6,7 @@ use interstage::supervise::Command;
 use interstage::tasks::mid_tick_deadline;
 use rtt_target::DownChannel;
 
-/// The probe writes into memory without telling the core: look this often.
+/// Polling interval: the probe writes into memory without an interrupt.
 const POLL: Duration = Duration::from_millis(20);
 
 /// RTT down channel 0.
@@ -32,7 +32,7 @@ impl CommandSource for Console {
     }
 }
 
-/// The command of a letter; line ends and mistypings have none.
+/// The command of a letter; none for line ends and other letters.
 fn decode(letter: u8) -> Option<Command> {
     match letter {
         b's' => Some(Command::Start),

@@ -1,8 +1,7 @@
-//! Two places for a set of parameters at the end of the chip's flash.
+//! The two slots of the parameter set at the end of the chip's flash.
 //!
-//! They lie in the second bank: while a page of it is erased or a double word
-//! programmed, the first, with the code, can be read on, so that the control tick goes
-//! on as ever.
+//! They are in the second bank: while a page of it is erased or a double word programmed, the
+//! core still reads code from the first, so the control tick continues.
 
 use cortex_m_rt::exception;
 use embassy_stm32::Peri;
@@ -13,35 +12,35 @@ use interstage::params::slots::{FlashFault, PAGE_BYTES, SLOT_BYTES, SetMemory, S
 
 use super::Irqs;
 
-/// Where flash begins in memory.
+/// Begin of flash in memory.
 const BASE: usize = 0x0800_0000;
 
 /// The last 8 KiB of 512.
-const PLACES: usize = 512 * 1024 - 2 * SLOT_BYTES;
+const SLOTS: usize = 512 * 1024 - 2 * SLOT_BYTES;
 
 /// The chip's flash controller.
-pub(crate) struct Pages(Flash<'static, Async>);
+pub(crate) struct ParameterFlash(Flash<'static, Async>);
 
-impl Pages {
+impl ParameterFlash {
     /// Takes the controller.
     pub(crate) fn new(flash: Peri<'static, FLASH>) -> Self {
         Self(Flash::new(flash, Irqs))
     }
 }
 
-/// Offset of a place from the start of flash, bytes.
+/// Offset of a slot from the begin of flash, bytes.
 const fn offset_of(slot: Slot) -> usize {
     match slot {
-        Slot::A => PLACES,
-        Slot::B => PLACES + SLOT_BYTES,
+        Slot::A => SLOTS,
+        Slot::B => SLOTS + SLOT_BYTES,
     }
 }
 
-impl SetMemory for Pages {
+impl SetMemory for ParameterFlash {
     fn bytes(&self, slot: Slot) -> &[u8] {
         let start = (BASE + offset_of(slot)) as *const u8;
         // SAFETY: inside flash, which is always mapped and holds plain bytes; it changes
-        // through `&mut self` alone, so not while this borrow lives.
+        // through `&mut self` alone, so not during this borrow.
         unsafe { core::slice::from_raw_parts(start, SLOT_BYTES) }
     }
 
@@ -61,9 +60,9 @@ impl SetMemory for Pages {
     }
 }
 
-/// A double word that lost its power half way reads with an error that no code can
-/// correct, and the chip says so here. What was read is not a set: its check tells. To
-/// go on is right; to stop would be a board that never starts again.
+/// The chip reports an uncorrectable double word here, as after a write that lost its power.
+/// The checks of sets and records reject it, so the program continues: stopping would leave a
+/// board that never starts again.
 #[exception]
 unsafe fn NonMaskableInt() {
     let status = pac::FLASH.eccr().read();

@@ -1,4 +1,4 @@
-//! The watchdog, and what a debugger or a core that is locked up means to the bridges.
+//! The watchdog, and the bridges' reaction to a debugger or a locked-up core.
 
 use embassy_stm32::Peri;
 use embassy_stm32::pac;
@@ -16,7 +16,7 @@ const TIMEOUT_US: u32 = 100_000;
 /// The independent watchdog.
 pub(crate) struct Guard {
     dog: IndependentWatchdog<'static, IWDG>,
-    /// Where the wheel stands by the record of the run before.
+    /// Position of the wheel by the record of the run before.
     pub(crate) place: Option<Place>,
 }
 
@@ -26,7 +26,7 @@ impl Guard {
         Self { dog: IndependentWatchdog::new(watchdog, TIMEOUT_US), place: None }
     }
 
-    /// Starts it; from here on nothing but a reset stops it.
+    /// Starts it; only a reset stops it.
     pub(crate) fn start(&mut self) {
         self.dog.unleash();
         safety::watch_feeding();
@@ -48,11 +48,11 @@ impl Watchdog for Guard {
     }
 }
 
-/// Ties the core's failures to the PWM timers' break and lets a debugger halt
-/// the core without running into the watchdog.
+/// Connects a lock-up of the core to the break of the PWM timers, and stops the watchdog while a
+/// debugger halts the core.
 pub(crate) fn arm() {
-    // A locked-up core (a fault inside the fault handler, as after a stack
-    // overflow) executes nothing any more: the timers cut the bridges themselves.
+    // A locked-up core (a fault inside the fault handler, as after a stack overflow) executes
+    // nothing any more: the timers cut the bridges themselves.
     pac::SYSCFG.cfgr2().modify(|w| w.set_cll(true));
     // Halted at a breakpoint, TIM1 and TIM8 stop with their outputs off, and the clock stops.
     pac::DBGMCU.apb1lfzr().modify(|w| {

@@ -1,11 +1,10 @@
 //! Hardware in the loop: sensors, bridges, button and time are the host's
 //! ([`interstage::hal::hil`]). Everything else is the firmware as it is flashed.
 //!
-//! The real bridges have no power: their pins are outputs that are held low, and no timer
-//! drives them.
+//! The real bridges have no power: no timer drives their pins, which are held low.
 
 mod clock;
-mod desk;
+mod host_io;
 mod parts;
 mod serve;
 
@@ -17,7 +16,7 @@ use rtt_target::{DownChannel, UpChannel};
 
 use super::rtt::Channels;
 
-/// In the place of the thread executor.
+/// Replaces the thread executor.
 static THREADS: InterruptExecutor = InterruptExecutor::new();
 
 #[embassy_stm32::interrupt]
@@ -26,11 +25,11 @@ unsafe fn UART4() {
     unsafe { THREADS.on_interrupt() }
 }
 
-/// What starts everything.
+/// Starts all tasks.
 type Begin = fn(Spawner, Channels);
 
-/// Runs the host's line in thread mode, where it moves time on when every task waits; what
-/// runs there otherwise has an executor of its own.
+/// Runs the host's line in thread mode, where it advances time when every task waits; the tasks
+/// that otherwise run there have an executor of their own.
 pub(crate) fn run((channels, host): (Channels, (UpChannel, DownChannel)), begin: Begin) -> ! {
     serve::serve(host, || {
         interrupt::UART4.set_priority(Priority::P15);

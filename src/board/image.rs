@@ -1,10 +1,10 @@
-//! Which image this is, and whether it is still what was flashed.
+//! Hash of the image, and whether the image is intact.
 
 use core::slice;
 
 use interstage::restart::image_checksum;
 
-use super::flash_page::SEALS;
+use super::flash_page::IMAGE_CHECKSUMS;
 use super::light;
 
 unsafe extern "C" {
@@ -18,80 +18,77 @@ unsafe extern "C" {
     static __edata: u8;
 }
 
-/// First eight bytes of the image's hash. `readelf -n` shows the whole of it.
+/// First eight bytes of the image's hash; `readelf -n` shows all of it.
 pub(super) fn id() -> [u8; 8] {
     let mut id = [0; 8];
-    // SAFETY: the linker script keeps the note, which is longer than what is read, in
-    // flash, where nothing changes it.
+    // SAFETY: the linker script keeps the note in flash, where nothing changes it; it is longer
+    // than what is read.
     let note = unsafe { &__build_id };
     id.copy_from_slice(&note[16..]);
     id
 }
 
-/// Its words, as they stand in flash; what is left of a last one is no part of any image.
+/// Its words in flash; the rest of an incomplete last word belongs to no image.
 pub(super) fn words() -> &'static [u32] {
     let first = &raw const __vector_table;
     let values = &raw const __edata as usize - &raw const __sdata as usize;
     let length = &raw const __sidata as usize + values - first as usize;
-    // SAFETY: flash from the vectors, which are aligned, to the end of the image, which nothing
-    // writes to.
+    // SAFETY: flash from the aligned vectors to the end of the image, never written.
     unsafe { slice::from_raw_parts(first, length / 4) }
 }
 
-/// Time for which the light is dark, and then tells of a damaged image, before the clocks run:
-/// in cycles of the oscillator that the chip starts on.
+/// Time for which the light is off and then on for a damaged image, cycles of the oscillator
+/// that the chip starts on.
 const SHOWN: u32 = 16_000_000 / 4;
 
-/// The very first of a start, before statics have their values: looks at the image, and shows
-/// by the light for a while if a bit has turned over. What comes behind says so too, if it
-/// still works; if it does not and starts over and over, the light blinks.
-///
-/// Needs nothing of the image but itself, [`seals`] and some registers.
+/// Runs first of all, before statics have their values: shows a damaged image by the light, in
+/// case the code that would log it no longer works. A damaged image that restarts in a loop
+/// blinks. Needs only this function, [`checksums`] and some registers.
 #[unsafe(export_name = "__pre_init")]
 extern "C" fn look() {
-    let (sum, sealed) = sums();
-    if sealed.is_some_and(|sealed| sealed != sum) {
+    let (now, first) = checksums();
+    if first.is_some_and(|first| first != now) {
         cortex_m::asm::delay(SHOWN);
         light::glow();
         cortex_m::asm::delay(SHOWN);
     }
 }
 
-/// The image's sum, and that of its first start, if this is not the first.
+/// The image's checksum, and that of its first start; none if this is the first.
 #[inline(never)]
-fn sums() -> (u32, Option<u32>) {
-    (image_checksum::sum_on(0, words()), image_checksum::sum_of(SEALS.bytes(), id()))
+fn checksums() -> (u32, Option<u32>) {
+    (image_checksum::sum_on(0, words()), image_checksum::sum_of(IMAGE_CHECKSUMS.bytes(), id()))
 }
 
-/// The image's sum, if it is the one of its first start, or this is its first; none if a bit
-/// has turned over since, which is said at once: what comes behind may no longer work.
+/// The image's checksum; none, and an error in the log, if it has changed since the first
+/// start of the image.
 pub(crate) fn verify() -> Option<u32> {
-    let (sum, sealed) = sums();
-    match sealed {
-        None => seal(sum),
-        Some(sealed) if sealed != sum => {
-            say_damaged();
+    let (now, first) = checksums();
+    match first {
+        None => store(now),
+        Some(first) if first != now => {
+            log_damaged();
             return None;
         }
         Some(_) => {}
     }
-    Some(sum)
+    Some(now)
 }
 
-/// Keeps the sum for the starts to come.
-fn seal(sum: u32) {
+/// Stores the checksum for later starts.
+fn store(sum: u32) {
     defmt::info!("first start of this image, sum {=u32:08x}", sum);
-    let first = image_checksum::free(SEALS.bytes()).unwrap_or_else(|| {
-        SEALS.erase();
+    let first = image_checksum::free(IMAGE_CHECKSUMS.bytes()).unwrap_or_else(|| {
+        IMAGE_CHECKSUMS.erase();
         0
     });
     for (index, word) in image_checksum::entry(id(), sum).into_iter().enumerate() {
-        SEALS.program(first + index, word);
+        IMAGE_CHECKSUMS.program(first + index, word);
     }
 }
 
-/// Says that it is no longer what it was.
+/// Logs that the image is damaged.
 #[inline(never)]
-pub(super) fn say_damaged() {
+pub(super) fn log_damaged() {
     defmt::error!("image: a bit has turned over since its first start; flash it again");
 }

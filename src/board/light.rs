@@ -1,5 +1,4 @@
-//! LD2. Blinking needs time of its own, so a task turns the pin and the
-//! indicator only leaves word what to show.
+//! LD2. A task drives the pin, because blinking takes time; the indicator only signals it.
 
 use embassy_futures::select::{Either, select};
 use embassy_stm32::Peri;
@@ -16,14 +15,14 @@ const HALF_PERIOD: Duration = Duration::from_millis(125);
 
 static WANTED: Signal<CriticalSectionRawMutex, Light> = Signal::new();
 
-/// Lights it by registers alone, where nothing else runs yet.
+/// Switches it on by registers alone, before anything else runs.
 pub(super) fn glow() {
     pac::RCC.ahb2enr().modify(|w| w.set_gpioaen(true));
     pac::GPIOA.bsrr().write(|w| w.set_bs(5, true));
     pac::GPIOA.moder().modify(|w| w.set_moder(5, Moder::OUTPUT));
 }
 
-/// Leaves word for [`show`].
+/// Signals [`show`].
 pub(crate) struct Lamp;
 
 impl Indicator for Lamp {

@@ -10,7 +10,7 @@ pub(crate) struct HostLine {
 }
 
 impl HostLine {
-    /// Over these channels.
+    /// A line over these channels.
     pub(crate) fn new((up, down): (UpChannel, DownChannel)) -> Self {
         Self { up, down }
     }

@@ -10,11 +10,10 @@ mod wheel;
 use embassy_stm32::gpio::AnyPin;
 use embassy_stm32::peripherals::{ADC1, ADC2};
 use embassy_stm32::{Peri, Peripherals, pac};
-use interstage::hal::Parts;
 use rtt_target::DownChannel;
 
 use super::rtt::Frames;
-use super::{Console, Guard, Lamp, Lines, Nucleo, Pages};
+use super::{Console, Guard, Lamp, ParameterFlash, Parts, TextLog};
 use analog::{Analog, Ring};
 pub(crate) use angle::Angle;
 use bridge::Bridge;
@@ -30,14 +29,14 @@ pub(crate) type PreloadSensor = Analog<ADC1>;
 pub(crate) type CompressionSensor = Analog<ADC2>;
 
 static PRELOAD_SENSOR: Ring = Ring::new();
-static TREAD: Ring = Ring::new();
+static COMPRESSION_SENSOR: Ring = Ring::new();
 
 /// Assigns peripherals and pins; the bridges come up off.
 pub(crate) fn split(
     p: Peripherals,
     console: DownChannel,
     frames: Frames,
-) -> (Parts<Nucleo>, Peri<'static, AnyPin>, Pages) {
+) -> (Parts, Peri<'static, AnyPin>, ParameterFlash) {
     let parts = Parts {
         wheel_encoder: Wheel::new(p.TIM5, p.PA0, p.PA1),
         preload_sensor: Analog::new(
@@ -50,7 +49,7 @@ pub(crate) fn split(
             (p.ADC2, pac::ADC2),
             p.PC3,
             (p.DMA1_CH2, pac::DMA1.ch(1)),
-            &TREAD,
+            &COMPRESSION_SENSOR,
         ),
         arm_angle: Angle::new(p.SPI1, (p.PB3, p.PA7, p.PA6), p.PB10),
         motors: Bridges {
@@ -61,8 +60,8 @@ pub(crate) fn split(
         watchdog: Guard::new(p.IWDG),
         button: Button::new(p.PC13, p.EXTI13),
         console: Console::new(console),
-        journal: Lines::new(frames),
+        journal: TextLog::new(frames),
         light: Lamp,
     };
-    (parts, p.PA5.into(), Pages::new(p.FLASH))
+    (parts, p.PA5.into(), ParameterFlash::new(p.FLASH))
 }

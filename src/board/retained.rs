@@ -1,4 +1,4 @@
-//! Memory that no start clears: every reset but that of a lost supply leaves it as it is.
+//! Memory that no start clears: every reset keeps it except a loss of the supply.
 
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
@@ -17,12 +17,12 @@ struct Kept {
 
 struct Shared(UnsafeCell<MaybeUninit<Kept>>);
 
-// SAFETY: written by the control tick, and by handlers that never return, on one core;
-// read before the tick begins. What is torn or never written is words like any other,
-// and told from a record by its check.
+// SAFETY: written by the control tick, and by handlers that never return, on one core; read
+// before the tick begins. Torn or unwritten words are plain integers, and the record's check
+// rejects them.
 unsafe impl Sync for Shared {}
 
-/// By this name a probe finds it.
+/// A probe finds it by this name.
 #[unsafe(link_section = ".uninit.retained")]
 #[unsafe(export_name = "INTERSTAGE_RETAINED")]
 static KEPT: Shared = Shared(UnsafeCell::new(MaybeUninit::uninit()));
@@ -31,14 +31,14 @@ fn kept() -> *mut Kept {
     KEPT.0.get().cast()
 }
 
-/// Keeps what the drive does in a tick.
+/// Keeps the snapshot of a tick.
 pub(super) fn keep(snapshot: &DriveSnapshot) {
     let place = (snapshot.tick & 1) as usize;
     // SAFETY: see `Shared`; the index is 0 or 1.
     unsafe { (&raw mut (*kept()).snapshots[place]).write_volatile(snapshot.seal()) }
 }
 
-/// What is kept of the last complete tick.
+/// Snapshot of the last complete tick.
 #[inline(never)]
 pub(super) fn snapshot() -> Option<DriveSnapshot> {
     // SAFETY: see `Shared`; read by a start, and by handlers that never return.
@@ -48,8 +48,7 @@ pub(super) fn snapshot() -> Option<DriveSnapshot> {
 
 /// What stopped the program before this start, if something did.
 pub(super) fn crash() -> Option<Crash> {
-    // SAFETY: nobody else is there yet. The words may never have been written, so they are
-    // read as volatile memory that holds anything.
+    // SAFETY: nothing else runs yet. The words may be unwritten: a volatile read of any value.
     Crash::open(&unsafe { (&raw const (*kept()).crash).read_volatile() })
 }
 
@@ -66,11 +65,11 @@ pub(super) fn now(stopped: Stopped) -> Crash {
     Crash { build: u32::from_le_bytes([a, b, c, d]), stopped }
 }
 
-/// Keeps this alone until the first tick writes over it.
-pub(super) fn forget_but(snapshot: Option<DriveSnapshot>) {
+/// Keeps this alone, until the first tick overwrites it.
+pub(super) fn keep_only(snapshot: Option<DriveSnapshot>) {
     let first = snapshot.map_or([0; SNAPSHOT_WORDS], |snapshot| snapshot.seal());
-    // SAFETY: a start is alone. In this order: a reset that comes again finds here what it
-    // was, in one place or the other.
+    // SAFETY: nothing else runs at a start. The order matters: a reset in between finds the
+    // snapshot in one place or the other.
     unsafe {
         (&raw mut (*kept()).snapshots).write_volatile([first, [0; SNAPSHOT_WORDS]]);
         (&raw mut (*kept()).crash).write_volatile([0; CRASH_WORDS]);

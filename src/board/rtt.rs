@@ -1,14 +1,13 @@
 //! Real-time transfer to the debug probe: log, telemetry and console.
 //!
-//! A probe that attaches may switch the log channel to blocking, and once it has
-//! left, the first full buffer would stall the core until the watchdog bites.
-//! So the log has a logger of its own here: it gathers a frame, puts the channel
-//! back to skipping, and writes the frame whole or not at all. What is lost is
-//! counted.
+//! A probe that attaches may switch the log channel to blocking, and once it has left, the
+//! first full buffer would stall the core until the watchdog bites. So this logger gathers a
+//! frame, sets the channel back to skipping, and writes the frame completely or not at all.
+//! Lost frames are counted.
 //!
-//! It shuts out no interrupt meanwhile: a line of many numbers takes as long as half a
-//! control tick, which would begin that much later. All lines come from thread mode; one
-//! of an interrupt that finds another under way is lost, and counted.
+//! It masks no interrupt: a line of many numbers takes half a control tick, which would delay
+//! the next. All lines come from thread mode; one of an interrupt that finds another in
+//! progress is lost and counted.
 
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -16,12 +15,12 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use defmt::Encoder;
 use rtt_target::{ChannelMode, DownChannel, UpChannel, rtt_init};
 
-/// Longest frame, bytes: a panic message with its place.
+/// Longest frame, bytes.
 const FRAME: usize = 512;
 
 static LOST: AtomicU32 = AtomicU32::new(0);
 
-/// The channels that are not the log.
+/// The channels other than the log.
 pub(crate) struct Channels {
     /// Up 1: frames of the binary log.
     pub(crate) telemetry: Frames,
@@ -31,10 +30,10 @@ pub(crate) struct Channels {
     pub(crate) line: (UpChannel, DownChannel),
 }
 
-/// Sets up the channels; the log works from here on. Call once, first of all.
+/// Sets up the channels and the log. Call once, first of all.
 ///
-/// The binary log's buffer lies where all else is whole words, and so on a whole word, like
-/// the frames: copied word by word they cost a third.
+/// The binary log's buffer has a section of its own for word alignment: frames are copied by
+/// words, at a third of the cost.
 #[cfg(not(feature = "hil"))]
 pub(crate) fn init() -> Channels {
     let channels = rtt_init! {
@@ -56,7 +55,7 @@ pub(crate) fn init() -> Channels {
     }
 }
 
-/// The same with up 3 and down 2, over which the host closes the loop.
+/// The same with up 3 and down 2 for the closed loop with the host.
 #[cfg(feature = "hil")]
 pub(crate) fn init() -> (Channels, (UpChannel, DownChannel)) {
     let channels = rtt_init! {
@@ -90,8 +89,8 @@ fn log_to(channel: UpChannel) {
 pub(crate) struct Frames(UpChannel);
 
 impl Frames {
-    /// Writes a frame whole, or not at all; says which. What a probe may have set the
-    /// channel to does not matter.
+    /// Writes a frame completely or not at all, and returns which; resets a channel that a
+    /// probe has switched to blocking.
     pub(crate) fn send(&mut self, frame: &[u8]) -> bool {
         self.0.set_mode(ChannelMode::NoBlockSkip);
         self.0.write(frame) == frame.len()
@@ -103,7 +102,7 @@ pub(crate) fn lost() -> u32 {
     LOST.load(Ordering::Relaxed)
 }
 
-/// The frame under way.
+/// The frame in progress.
 struct State {
     channel: Option<UpChannel>,
     encoder: Encoder,
@@ -113,7 +112,7 @@ struct State {
 }
 
 impl State {
-    /// Runs one call of the encoder, its output appended to the frame.
+    /// Runs one call of the encoder, and appends its output to the frame.
     fn encode(&mut self, call: impl FnOnce(&mut Encoder, &mut dyn FnMut(&[u8]))) {
         let Self { encoder, bytes, length, cut, .. } = self;
         call(encoder, &mut |part| match bytes.get_mut(*length..*length + part.len()) {
@@ -137,8 +136,8 @@ impl State {
 
 struct Shared(UnsafeCell<State>);
 
-// SAFETY: touched only in `init`, before anything is logged, and by who has found `OPEN`
-// false and made it true, until that makes it false again; this chip has one core.
+// SAFETY: touched only in `init`, before anything is logged, and by the caller that changed
+// `OPEN` from false to true, until it resets it; this chip has one core.
 unsafe impl Sync for Shared {}
 
 static STATE: Shared = Shared(UnsafeCell::new(State {
@@ -149,18 +148,17 @@ static STATE: Shared = Shared(UnsafeCell::new(State {
     cut: false,
 }));
 
-/// A frame is under way.
+/// A frame is in progress.
 static OPEN: AtomicBool = AtomicBool::new(false);
 
-/// Frames that have begun meanwhile, in interrupts, and have not ended.
+/// Frames begun in interrupts meanwhile that have not ended.
 static NESTED: AtomicU32 = AtomicU32::new(0);
 
 #[defmt::global_logger]
 struct Logger;
 
-// SAFETY: `acquire` either has the state to itself until `release`, or gives the frame up
-// and what it writes is left out. An interrupt that logs has ended its frame when the one
-// that it interrupted goes on.
+// SAFETY: `acquire` either owns the state until `release`, or drops the frame and its writes.
+// An interrupt that logs has ended its frame when the interrupted one continues.
 unsafe impl defmt::Logger for Logger {
     fn acquire() {
         if OPEN.swap(true, Ordering::Acquire) {
@@ -168,7 +166,7 @@ unsafe impl defmt::Logger for Logger {
             LOST.fetch_add(1, Ordering::Relaxed);
             return;
         }
-        // SAFETY: nobody else has found it free.
+        // SAFETY: this call changed `OPEN`, see `Shared`.
         let state = unsafe { &mut *STATE.0.get() };
         state.length = 0;
         state.cut = false;
@@ -176,14 +174,14 @@ unsafe impl defmt::Logger for Logger {
     }
 
     unsafe fn flush() {
-        // Would wait for the probe.
+        // It would wait for the probe.
     }
 
     unsafe fn write(bytes: &[u8]) {
         if NESTED.load(Ordering::Relaxed) > 0 {
             return;
         }
-        // SAFETY: between `acquire` and `release` of the frame that has it.
+        // SAFETY: between `acquire` and `release` of the owning frame.
         let state = unsafe { &mut *STATE.0.get() };
         state.encode(|encoder, out| encoder.write(bytes, out));
     }
@@ -194,7 +192,7 @@ unsafe impl defmt::Logger for Logger {
             NESTED.store(nested - 1, Ordering::Relaxed);
             return;
         }
-        // SAFETY: as in `write`; let go before the next can have it.
+        // SAFETY: as in `write`; released before the next frame can own it.
         let state = unsafe { &mut *STATE.0.get() };
         state.encode(|encoder, out| encoder.end_frame(out));
         state.send();

@@ -1,9 +1,8 @@
-//! What makes the bridges safe when the software no longer does, and ends the program.
+//! Cuts the bridges when the software fails, and ends the program.
 //!
-//! Panics and hard faults end here; so does a program that no longer feeds the watchdog,
-//! shortly before that bites, as long as the system timer's interrupt, the most urgent
-//! there is, gets through. Each cuts the bridges first, then writes what it knows where
-//! the next start finds it.
+//! Panics and hard faults end here. So does a hang: shortly before the watchdog bites, the
+//! system timer's interrupt, which has the highest priority, finds it unfed. Each path cuts the
+//! bridges first, then writes what it knows where the next start finds it.
 
 use core::arch::naked_asm;
 use core::panic::{Location, PanicInfo};
@@ -18,13 +17,13 @@ use interstage::tasks::mid_tick_deadline;
 
 use super::{EXCHANGE, SYSCLK_HZ, image, retained};
 
-/// Takes the power from both bridges, for good.
+/// Switches both bridges off until the next start.
 pub(super) fn cut() {
     pac::TIM1.bdtr().modify(|w| w.set_moe(false));
     pac::TIM8.bdtr().modify(|w| w.set_moe(false));
 }
 
-/// Ends the program for this: bridges off, the reason kept, a new start.
+/// Ends the program: bridges off, the reason kept, a restart.
 fn end(stopped: Stopped) -> ! {
     cortex_m::interrupt::disable();
     cut();
@@ -32,16 +31,16 @@ fn end(stopped: Stopped) -> ! {
     restart()
 }
 
-/// Starts again, with the bridges off until then and after it.
+/// Restarts, with the bridges off.
 pub(super) fn restart() -> ! {
-    // For the probe to fetch the end of the log: 5 ms at least, some times that at most.
+    // At least 5 ms for the probe to fetch the end of the log.
     cortex_m::asm::delay(SYSCLK_HZ / 200);
     SCB::sys_reset()
 }
 
-/// Milliseconds without feeding after which nothing good is to be expected: before the
-/// watchdog bites, also with its oscillator at the fast end.
-const PATIENCE: u32 = 75;
+/// Milliseconds without feeding that count as a hang: less than the watchdog's time-out at the
+/// fast end of its oscillator.
+const HANG_MS: u32 = 75;
 
 /// Milliseconds since the watchdog was fed.
 static UNFED: AtomicU32 = AtomicU32::new(0);
@@ -51,9 +50,9 @@ pub(super) fn fed() {
     UNFED.store(0, Ordering::Relaxed);
 }
 
-/// Starts looking once a millisecond whether the watchdog is fed.
+/// Starts the check, once a millisecond, that the watchdog is fed.
 pub(super) fn watch_feeding() {
-    // SAFETY: nobody else has the system timer: the time driver runs on another one.
+    // SAFETY: nothing else uses the system timer: the time driver runs on another one.
     let mut timer = unsafe { cortex_m::Peripherals::steal() }.SYST;
     timer.set_clock_source(SystClkSource::Core);
     timer.set_reload(SYSCLK_HZ / 1000 - 1);
@@ -62,19 +61,19 @@ pub(super) fn watch_feeding() {
     timer.enable_counter();
 }
 
-/// The system timer, of the highest priority as every interrupt that is given none, and
-/// before the others among these: it passes on where the processor was.
+/// Interrupt of the system timer, of the highest priority; passes on where the core saved its
+/// registers.
 #[unsafe(naked)]
 #[unsafe(export_name = "SysTick")]
 unsafe extern "C" fn sys_tick() {
     naked_asm!("mrs r0, msp", "b {look}", look = sym look_at)
 }
 
-/// `frame` is where the core put its registers when the interrupt came.
+/// `frame` is the address of the registers saved at the interrupt.
 unsafe extern "C" fn look_at(frame: u32) {
     let unfed = UNFED.load(Ordering::Relaxed);
     UNFED.store(unfed + 1, Ordering::Relaxed);
-    if unfed < PATIENCE {
+    if unfed < HANG_MS {
         return;
     }
     cut();
@@ -82,7 +81,7 @@ unsafe extern "C" fn look_at(frame: u32) {
     let now = embassy_time::Instant::now().as_millis() as u32;
     let missed = EXCHANGE.unfed(now);
     retained::stop(Stopped::Hang { pc, lr, missed, at: now });
-    // The watchdog ends it: it would also had this not been reached.
+    // The watchdog ends this, as it would without this handler.
     loop {
         cortex_m::asm::nop();
     }
@@ -93,21 +92,21 @@ unsafe extern "C" {
     static _stack_end: u32;
 }
 
-/// Program counter and link register of a frame, 0 if it does not lie in the stack.
+/// Program counter and link register of a frame, 0 if it is outside the stack.
 fn returns(frame: u32) -> (u32, u32) {
     let (from, to) = (&raw const _stack_end as u32, &raw const _stack_start as u32);
     if !frame.is_multiple_of(4) || frame < from || frame > to - 32 {
         return (0, 0);
     }
     let word = |index: u32| {
-        // SAFETY: inside the stack, see above, which is memory and aligned.
+        // SAFETY: inside the stack, as checked above, and aligned.
         unsafe { ((frame + 4 * index) as *const u32).read_volatile() }
     };
     (word(6), word(5))
 }
 
-/// A hard fault, or a fault that came where it could not be served. If the stack is used
-/// up, what follows starts it again from its top: nothing returns to what was using it.
+/// A hard fault, or a fault that could not be served. With the stack used up, the handler
+/// continues from its top: nothing returns to what used it.
 #[unsafe(naked)]
 #[unsafe(export_name = "HardFault")]
 #[unsafe(link_section = ".HardFault.user")]
@@ -128,7 +127,7 @@ unsafe extern "C" fn hard_fault() {
 unsafe extern "C" fn fault_at(frame: u32) -> ! {
     cut();
     let (pc, lr) = returns(frame);
-    // SAFETY: reading these registers changes nothing.
+    // SAFETY: reads of these registers have no effect.
     let (cfsr, hfsr) = unsafe { ((*SCB::PTR).cfsr.read(), (*SCB::PTR).hfsr.read()) };
     end(Stopped::Fault { pc, lr, cfsr, hfsr })
 }
@@ -141,25 +140,23 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     end(Stopped::Panic { place, line })
 }
 
-/// Words of the image that are summed up in one go.
+/// Words of the image per step of the checksum.
 const PART: usize = 256;
 
-/// From one part to the next: a round takes six seconds, and no more than a thousandth of
-/// the core.
-const PACE: Duration = Duration::from_millis(50);
+/// Interval between two steps: the image takes six seconds, and a thousandth of the core.
+const INTERVAL: Duration = Duration::from_millis(50);
 
-/// Sums up the image over and over, and ends the program if it has changed.
+/// Checks the image over and over, and ends the program if its checksum has changed.
 #[embassy_executor::task]
-pub(crate) async fn watch_image(sealed: u32) -> ! {
+pub(crate) async fn watch_image(checksum: u32) -> ! {
     loop {
         let mut sum = 0;
         for part in image::words().chunks(PART) {
-            Timer::at(mid_tick_deadline(PACE)).await;
+            Timer::at(mid_tick_deadline(INTERVAL)).await;
             sum = image_checksum::sum_on(sum, part);
         }
-        if sum != sealed {
-            // Also for the case that what starts next cannot say it any more.
-            image::say_damaged();
+        if sum != checksum {
+            image::log_damaged();
             end(Stopped::Image);
         }
     }

@@ -1,15 +1,15 @@
-//! What a start finds of the time before it.
+//! What a start reports of the run before.
 
 use embassy_stm32::pac;
 use interstage::restart::{DriveSnapshot, Reset, Restart, Stopped};
 
 use super::{retained, supply};
 
-/// What there is to report of the time before this start, which may have `waited` for its
-/// supply. Call once, before the control tick begins.
+/// Report of the run before this start, which may have `waited` for its supply. Call once,
+/// before the control tick begins.
 ///
-/// What the drive was doing stays kept until the tick writes over it, so that a second reset
-/// right behind the first, as of a pin that bounces or a supply that flickers, finds it too.
+/// The snapshot stays kept until the first tick overwrites it, so that a second reset directly
+/// after the first finds it too: a bouncing pin, a flickering supply.
 pub(crate) fn report(waited: bool) -> Restart {
     let found = supply::found();
     let in_flash = found.and_then(|latest| latest.snapshot);
@@ -18,22 +18,21 @@ pub(crate) fn report(waited: bool) -> Restart {
         snapshot: retained::snapshot().or(in_flash),
         crash: retained::crash().or(in_flash.map(|_| retained::now(Stopped::Supply))),
     };
-    // The watchdog has reasons of its own for doubt.
+    // After the watchdog the position is doubtful anyway.
     if waited && restart.reset != Reset::Watchdog {
         restart.reset = Reset::Power;
     }
-    retained::forget_but(restart.standing());
+    retained::keep_only(restart.at_start());
     pac::RCC.csr().modify(|w| w.set_rmvf(true));
     supply::take(found);
-    say(&restart);
+    log(&restart);
     restart
 }
 
-/// Why the chip started, by its flags, which gather until they are forgotten.
+/// Why the chip started, by flags that accumulate until they are cleared.
 fn reset() -> Reset {
     let flags = pac::RCC.csr().read();
-    // Every reset of the chip's own pulls the pin too; a supply that comes up raises the
-    // flag of one that was too low.
+    // Every internal reset pulls the pin too; a supply that comes up sets the brown-out flag.
     if flags.iwdgrstf() {
         Reset::Watchdog
     } else if flags.borrstf() {
@@ -47,12 +46,12 @@ fn reset() -> Reset {
     }
 }
 
-/// Says it, if it was not the operator's switch.
-fn say(restart: &Restart) {
+/// Logs it; a plain power-up is not worth an error.
+fn log(restart: &Restart) {
     if restart.reset != Reset::Power {
         defmt::error!("restarted {=str}", restart.reset.sentence());
     }
-    if restart.shut_out() {
+    if restart.interrupts_masked() {
         defmt::error!("a hang with interrupts shut out");
     }
     if let Some(crash) = &restart.crash {

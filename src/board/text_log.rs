@@ -10,26 +10,26 @@ use interstage::units::{Direction, Q16};
 
 use super::rtt::{self, Frames};
 
-/// Writes entries, and owns up to what was lost; passes frames on.
-pub(crate) struct Lines {
+/// Writes entries as text and reports lost ones; passes frames on.
+pub(crate) struct TextLog {
     frames: Frames,
     identity: Identity,
     lost: u32,
 }
 
-impl Lines {
-    /// Lines on the log's channel, frames on their own.
+impl TextLog {
+    /// Text on the log's channel, frames on their own.
     pub(crate) fn new(frames: Frames) -> Self {
         Self { frames, identity: Identity::default(), lost: 0 }
     }
 
-    /// Says what the frames are to begin with; before the journal starts.
-    pub(crate) fn introduce(&mut self, identity: Identity) {
+    /// Sets the head of the binary log; before the journal starts.
+    pub(crate) fn set_identity(&mut self, identity: Identity) {
         self.identity = identity;
     }
 }
 
-impl Journal for Lines {
+impl Journal for TextLog {
     fn send(&mut self, frame: &[u8]) -> bool {
         self.frames.send(frame)
     }
@@ -67,7 +67,7 @@ impl Journal for Lines {
                 warn!("[{=u32} ms] {=u32} log entries lost", at, entries);
             }
             Event::Crossing(record) => crossing(at, &record),
-            // Said when it was found, before there was a journal.
+            // Logged by the start, before the journal ran.
             Event::Restart(_) => {}
         }
     }

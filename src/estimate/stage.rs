@@ -2,7 +2,6 @@
 
 /// Stage of the contact between wheel and sleeve, as the study numbers them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
 #[repr(u8)]
 pub enum ContactStage {
     /// 1: the wheel lies on the wall without preload.

@@ -63,7 +63,6 @@ pub struct Given {
 
 impl Given {
     /// Every sensor answers with these codes; nothing else happens.
-    #[must_use]
     pub const fn codes(
         wheel_encoder: EncoderCount,
         preload_sensor: AdcCode,
@@ -83,14 +82,12 @@ impl Given {
     }
 
     /// The same with an operator's command, or none.
-    #[must_use]
     pub const fn with(self, command: Option<Command>) -> Self {
         Self { command: codes::of_command(command), ..self }
     }
 
     /// The same with no sensor answering but the wheel's counter, which cannot fall
     /// silent.
-    #[must_use]
     pub const fn silent(self) -> Self {
         Self {
             preload_sensor: None,
@@ -103,7 +100,6 @@ impl Given {
     }
 
     /// What the bridges put out, if they were looked at.
-    #[must_use]
     pub fn readback(&self) -> Option<BridgeCodes> {
         self.bridges.map(|codes| BridgeCodes {
             drive: BridgeCode::new(codes[0]),
@@ -141,14 +137,12 @@ pub struct Taken {
 
 impl Taken {
     /// Bridges commanded so, in the mode of this number.
-    #[must_use]
     pub fn new(drive: MotorCommand, preload: MotorCommand, mode: u8) -> Self {
         let duty = |command: MotorCommand| command.enable.then_some(command.duty.to_bits());
         Self { drive: duty(drive), preload: duty(preload), mode }
     }
 
     /// Commands of drive and pre-tightener.
-    #[must_use]
     pub fn commands(&self) -> (MotorCommand, MotorCommand) {
         let command = |duty: Option<i16>| {
             duty.map_or(MotorCommand::OFF, |bits| MotorCommand {
@@ -160,7 +154,6 @@ impl Taken {
     }
 
     /// Mode after the tick; none if the number has no meaning.
-    #[must_use]
     pub fn mode(&self) -> Option<Mode> {
         codes::mode(self.mode)
     }

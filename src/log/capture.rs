@@ -109,7 +109,6 @@ pub struct Capture {
 
 impl Capture {
     /// A capture that waits.
-    #[must_use]
     pub const fn new() -> Self {
         Self {
             shots: HistoryBuf::new(),
@@ -174,7 +173,6 @@ impl Capture {
     }
 
     /// The next piece to be sent, if there is one; [`Capture::sent`] says that it was.
-    #[must_use]
     pub fn piece(&self) -> Option<CaptureChunk> {
         let Doing::Draining(trigger, at, first) = self.doing else { return None };
         let rest = self.shots.oldest_ordered().skip(usize::from(first));

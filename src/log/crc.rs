@@ -5,7 +5,6 @@ use crc::{CRC_32_ISO_HDLC, Crc, Table};
 static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
 /// CRC-32 (ISO-HDLC, as of Ethernet) of these bytes. Cost: eight cycles a byte.
-#[must_use]
 pub fn crc32(bytes: &[u8]) -> u32 {
     CRC.checksum(bytes)
 }

@@ -33,7 +33,6 @@ pub struct LogEncoder {
 
 impl LogEncoder {
     /// An encoder that has written nothing yet.
-    #[must_use]
     pub const fn new(identity: Identity) -> Self {
         Self {
             identity,

@@ -98,7 +98,6 @@ impl Default for FrameBuffer {
 
 impl FrameBuffer {
     /// An empty one.
-    #[must_use]
     pub const fn new() -> Self {
         Self([0; LONGEST])
     }
@@ -177,7 +176,6 @@ pub enum Seen<'a> {
 }
 
 /// Looks at the beginning of bytes.
-#[must_use]
 pub fn look(bytes: &[u8]) -> Seen<'_> {
     let begins = |at: &usize| {
         let seen = &bytes[*at..bytes.len().min(at + SYNC.len())];

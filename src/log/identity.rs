@@ -48,7 +48,6 @@ impl Identity {
 }
 
 /// As much of a text as fits.
-#[must_use]
 pub fn text(from: &str) -> Text {
     let mut text = Text::new();
     for letter in from.chars() {
@@ -60,7 +59,6 @@ pub fn text(from: &str) -> Text {
 }
 
 /// CRC-32 of what postcard makes of `value`, which takes 4 KiB at most; for the host.
-#[must_use]
 pub fn fingerprint(value: &impl Serialize) -> u32 {
     postcard::to_slice(value, &mut [0; 4096]).map_or(0, |written| crc32(written))
 }

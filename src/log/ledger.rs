@@ -52,7 +52,6 @@ pub struct Ledger {
 
 impl Ledger {
     /// A ledger without lines.
-    #[must_use]
     pub const fn new() -> Self {
         Self {
             count: 0,

@@ -66,13 +66,11 @@ impl Flags {
     }
 
     /// Flags from their bits.
-    #[must_use]
     pub const fn from_bits(bits: u16) -> Self {
         Self(bits)
     }
 
     /// Their bits.
-    #[must_use]
     pub const fn to_bits(self) -> u16 {
         self.0
     }
@@ -82,61 +80,51 @@ impl Flags {
     }
 
     /// The command that the tick was given.
-    #[must_use]
     pub fn command(self) -> Option<Command> {
         codes::command((self.0 & Self::COMMAND) as u8)
     }
 
     /// The tick was given a plan.
-    #[must_use]
     pub const fn plan(self) -> bool {
         self.has(Self::PLAN)
     }
 
     /// It began more than a period late.
-    #[must_use]
     pub const fn overrun(self) -> bool {
         self.has(Self::OVERRUN)
     }
 
     /// The emergency stop had cut the bridges.
-    #[must_use]
     pub const fn emergency_stop(self) -> bool {
         self.has(Self::EMERGENCY)
     }
 
     /// It asked for a plan.
-    #[must_use]
     pub const fn request(self) -> bool {
         self.has(Self::REQUEST)
     }
 
     /// It gave the bridges their power back.
-    #[must_use]
     pub const fn rearm(self) -> bool {
         self.has(Self::REARM)
     }
 
     /// The drive's bridge is on.
-    #[must_use]
     pub const fn drive(self) -> bool {
         self.has(Self::DRIVE)
     }
 
     /// The pre-tightener's bridge is on.
-    #[must_use]
     pub const fn preload(self) -> bool {
         self.has(Self::PRELOAD)
     }
 
     /// It was given what the bridges put out.
-    #[must_use]
     pub const fn readback(self) -> bool {
         self.has(Self::READBACK)
     }
 
     /// Log entries that it gave.
-    #[must_use]
     pub const fn events(self) -> u16 {
         self.0 >> Self::EVENTS & Self::MOST_EVENTS
     }
@@ -144,7 +132,6 @@ impl Flags {
 
 impl Record {
     /// The record of a tick.
-    #[must_use]
     pub fn of(input: &Input, output: &Output) -> Self {
         let SensorFrame { wheel_encoder, preload_sensor, compression_sensor, arm_angle, bridges } =
             &input.sensors;
@@ -165,14 +152,12 @@ impl Record {
     }
 
     /// Time of the tick.
-    #[must_use]
     pub const fn at(&self) -> Tick {
         self.telemetry.at
     }
 
     /// The codes with their times. A code older than 245 ticks does not tell when it was
     /// taken: it is then the one of the tick `before`.
-    #[must_use]
     pub fn sensors(&self, before: &SensorFrame) -> SensorFrame {
         let [wheel, preload_sensor, compression_sensor, arm] = [0, 1, 2, 3].map(|sensor| {
             let taken = match self.ages[sensor] {
@@ -202,7 +187,6 @@ impl Record {
 
     /// What the tick was given, apart from the plan; `before` as for
     /// [`Record::sensors`].
-    #[must_use]
     pub fn input(&self, before: &SensorFrame) -> Input {
         Input {
             now: self.at(),
@@ -215,13 +199,11 @@ impl Record {
     }
 
     /// What the drive's bridge was told.
-    #[must_use]
     pub fn drive(&self) -> MotorCommand {
         MotorCommand { duty: self.telemetry.drive, enable: self.flags.drive() }
     }
 
     /// What the pre-tightener's bridge was told.
-    #[must_use]
     pub fn preload(&self) -> MotorCommand {
         MotorCommand { duty: self.telemetry.pretightener, enable: self.flags.preload() }
     }

@@ -59,13 +59,11 @@ pub struct FrameReader {
 
 impl FrameReader {
     /// Nothing gathered.
-    #[must_use]
     pub const fn new() -> Self {
         Self { bytes: Frame::new(), too_long: false, dropped: 0 }
     }
 
     /// Frames dropped so far because they were damaged, unknown or too long.
-    #[must_use]
     pub const fn dropped(&self) -> u32 {
         self.dropped
     }

@@ -27,7 +27,6 @@ pub enum Refusal {
 
 impl Refusal {
     /// Why, in words.
-    #[must_use]
     pub const fn sentence(self) -> &'static str {
         match self {
             Self::Moving => "the drive is not at rest",

@@ -58,7 +58,6 @@ pub enum SetError {
 
 impl SetError {
     /// What is wrong, in words.
-    #[must_use]
     pub const fn sentence(self) -> &'static str {
         match self {
             Self::Short => "the set is cut off",
@@ -120,7 +119,6 @@ impl<'a> ParameterSet<'a> {
     }
 
     /// What the set says of itself.
-    #[must_use]
     pub const fn header(&self) -> &Header {
         &self.header
     }

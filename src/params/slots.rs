@@ -43,7 +43,6 @@ pub enum Slot {
 
 impl Slot {
     /// The other one.
-    #[must_use]
     pub const fn other(self) -> Self {
         match self {
             Self::A => Self::B,
@@ -224,7 +223,6 @@ impl Draft {
     }
 
     /// Bytes that are still to come.
-    #[must_use]
     pub const fn missing(&self) -> usize {
         self.length - self.written
     }
@@ -295,7 +293,6 @@ fn read_planner(rest: Rest<'_>) -> Result<(), SetError> {
 
 /// A place as it stands with this set in force under this sequence number, for flash
 /// that is written from outside; none if the set is too long.
-#[must_use]
 pub fn place(set: &[u8], sequence: u32) -> Option<[u8; SLOT_BYTES]> {
     let word = length_word(u16::try_from(set.len()).ok()?.into(), sequence);
     let mut bytes = [0xFF; SLOT_BYTES];

@@ -59,7 +59,6 @@ impl Crash {
     const SEED: u32 = 0xF11E_0002;
 
     /// As words.
-    #[must_use]
     pub fn seal(&self) -> [u32; CRASH_WORDS] {
         let (kind, [a, b, c, d]) = match self.stopped {
             Stopped::Panic { place, line } => (1, [place, line, 0, 0]),
@@ -73,7 +72,6 @@ impl Crash {
     }
 
     /// From words, if they are whole.
-    #[must_use]
     pub fn open(words: &[u32; CRASH_WORDS]) -> Option<Self> {
         let [kind, build, a, b, c, d, sum] = *words;
         let stopped = match kind {

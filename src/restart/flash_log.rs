@@ -21,14 +21,12 @@ const PLACES: usize = PAGE_WORDS / PLACE_WORDS;
 pub const TAKEN: Word = [0; 2];
 
 /// The first double word of the place for the next record; none if the page is full.
-#[must_use]
 pub fn free(page: &Page) -> Option<usize> {
     let next = used(page, PLACE_WORDS);
     (next < PLACES).then_some(next * PLACE_WORDS)
 }
 
 /// The double words of a record.
-#[must_use]
 pub fn words(snapshot: &DriveSnapshot) -> [Word; 3] {
     let [a, b, c, d, e] = snapshot.seal();
     [[a, b], [c, d], [e, u32::MAX]]
@@ -45,7 +43,6 @@ pub struct Latest {
 
 /// The last record, unless it has been reported; of one that was broken off the one before
 /// it, of which the start before may not have come to report it either.
-#[must_use]
 pub fn latest(page: &Page) -> Option<Latest> {
     let last = used(page, PLACE_WORDS).checked_sub(1)?;
     let mark = |place: usize| (place + 1) * PLACE_WORDS - 1;

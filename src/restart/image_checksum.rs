@@ -21,20 +21,17 @@ const ENTRY_WORDS: usize = 2;
 /// one word always shows. So does any pair of bits of a double word, the least that the
 /// chip's own correction leaves; all else with all but one in 2^32 or so. It costs half of
 /// what a CRC does.
-#[must_use]
 pub fn sum_on(sum: u32, words: &[u32]) -> u32 {
     words.iter().fold(sum, |sum, word| (sum ^ sum >> 15 ^ word).wrapping_mul(0x9E37_79B1))
 }
 
 /// The entry of an image with this sum.
-#[must_use]
 pub fn entry(id: [u8; 8], sum: u32) -> [Word; ENTRY_WORDS] {
     let [low, high] = halves(id);
     [[low, high], [sum, !sum]]
 }
 
 /// First double word of the next entry; none if the page is full.
-#[must_use]
 pub fn free(page: &Page) -> Option<usize> {
     let next = used(page, ENTRY_WORDS) * ENTRY_WORDS;
     (next < PAGE_WORDS).then_some(next)
@@ -44,7 +41,6 @@ pub fn free(page: &Page) -> Option<usize> {
 ///
 /// A hash with one or two bits turned over is the same image: a damaged one would pass for
 /// new.
-#[must_use]
 pub fn sum_of(page: &Page, id: [u8; 8]) -> Option<u32> {
     let own = number(halves(id));
     (0..PAGE_WORDS).step_by(ENTRY_WORDS).find_map(|index| {

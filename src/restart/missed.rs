@@ -20,37 +20,31 @@ impl MissedCheckIns {
         ["wheel encoder", "preload sensor", "compression sensor", "arm angle", "model", "journal"];
 
     /// The task of this number, by [`TaskId`](crate::tasks::TaskId).
-    #[must_use]
     pub const fn task(index: usize) -> Self {
         Self(1 << (index & 0xF))
     }
 
     /// Both.
-    #[must_use]
     pub const fn and(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
     /// Whether everyone is there.
-    #[must_use]
     pub const fn is_nobody(self) -> bool {
         self.0 == 0
     }
 
     /// The bits.
-    #[must_use]
     pub const fn bits(self) -> u16 {
         self.0
     }
 
     /// From the bits.
-    #[must_use]
     pub const fn from_bits(bits: u16) -> Self {
         Self(bits)
     }
 
     /// Name of the first.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self.0.trailing_zeros() as usize {
             16 => "nobody",

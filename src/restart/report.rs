@@ -26,7 +26,6 @@ pub enum Reset {
 
 impl Reset {
     /// In words.
-    #[must_use]
     pub const fn sentence(self) -> &'static str {
         match self {
             Self::Power => "power came up",
@@ -60,23 +59,19 @@ const UNFED: Tick = 100;
 const FRESH: Tick = 5;
 
 impl Restart {
-    /// Whether the program hung with interrupts shut out: nothing got through that could have
-    /// told who it was.
-    #[must_use]
-    pub const fn shut_out(&self) -> bool {
+    /// Whether the program hung with interrupts masked: nothing could record the task.
+    pub const fn interrupts_masked(&self) -> bool {
         matches!(self.reset, Reset::Watchdog) && self.crash.is_none()
     }
 
-    /// Where the wheel stands, if the record tells.
+    /// Position of the wheel, if the record gives it.
     ///
-    /// A reset takes the power from the bridges at once, a panic or a hard fault before it
-    /// is recorded; then the wheel coasts by a tenth of a millimetre. If the tick hung, the
-    /// drive went on at its last duty until the bridges were cut, or until the watchdog
-    /// bit: at about the reference of the last tick, for a time that is known. Without a
-    /// supply the gears hold the wheel, but not against a hand. After a fault that may have
-    /// been one of the position it tells nothing.
+    /// A reset switches the bridges off at once, a panic or a hard fault before it is recorded;
+    /// then the wheel coasts by a tenth of a millimetre. If the tick hung, the drive went on at
+    /// its last duty until the bridges were cut or the watchdog bit: at about the last
+    /// reference, for a known time. Without a supply the gears hold the wheel, but not against
+    /// a hand. After a fault that may concern the position, the record gives none.
     #[inline(never)]
-    #[must_use]
     pub fn place(&self) -> Option<Place> {
         let snapshot = self
             .snapshot
@@ -86,24 +81,22 @@ impl Restart {
             (Reset::Watchdog, None) => UNFED,
             _ => 0,
         };
-        let way = snapshot.packed_speed.speed() * ticks_to_seconds(unwatched + COASTS);
+        let travel = snapshot.packed_speed.speed() * ticks_to_seconds(unwatched + COASTS);
         Some(Place {
-            position: snapshot.position + way,
+            position: snapshot.position + travel,
             sure: unwatched <= FRESH && !self.was_away() && snapshot.level < DriveSnapshot::UNSURE,
         })
     }
 
-    /// Whether the supply was away, for nobody knows how long, since the drive last did
-    /// something.
+    /// Whether the supply was off, for an unknown time, since the record.
     fn was_away(&self) -> bool {
         let fell = self.crash.is_some_and(|crash| crash.stopped == Stopped::Supply);
         fell || self.reset == Reset::Power
     }
 
-    /// What is to be kept of it until the first tick, for a reset that comes before: the
-    /// wheel stands where it came to rest, unless it is moved.
-    #[must_use]
-    pub fn standing(&self) -> Option<DriveSnapshot> {
+    /// What a start keeps of it until the first tick, for a reset that comes before: the wheel
+    /// at rest, unless it is moved.
+    pub fn at_start(&self) -> Option<DriveSnapshot> {
         let mut snapshot = self.snapshot?;
         if let Some(place) = self.place() {
             snapshot.position = place.position;
@@ -114,8 +107,8 @@ impl Restart {
     }
 }
 
-/// Whether the position was to be believed although this fault was reported: none, or one
-/// that has nothing to do with how the wheel's way is found.
+/// Whether the position is valid despite this fault: none, or one that does not concern the
+/// wheel's travel.
 fn spared(code: u16) -> bool {
     const OTHERS: [Fault; 11] = [
         Fault::PreloadSensorStale,
@@ -139,7 +132,7 @@ impl fmt::Display for Restart {
         if let Some(crash) = &self.crash {
             write!(f, "; {}", crash.stopped)?;
         }
-        if self.shut_out() {
+        if self.interrupts_masked() {
             f.write_str("; a hang with interrupts shut out")?;
         }
         if let Some(snapshot) = &self.snapshot {

@@ -17,7 +17,6 @@ impl PackedSpeed {
     const COARSER: u32 = 11;
 
     /// Of this speed, mm/s; half a metre a second counts for more.
-    #[must_use]
     pub fn of(speed: MillimetresPerSecond, placed: bool) -> Self {
         let most = i32::from(i16::MAX >> 1);
         let speed = (speed.to_bits() >> Self::COARSER).clamp(-most, most);
@@ -25,13 +24,11 @@ impl PackedSpeed {
     }
 
     /// The speed, mm/s.
-    #[must_use]
     pub fn speed(self) -> MillimetresPerSecond {
         Q16::from_bits((i32::from(self.0) >> 1) << Self::COARSER)
     }
 
     /// Whether the position was more than a guess.
-    #[must_use]
     pub const fn placed(self) -> bool {
         self.0 & 1 != 0
     }
@@ -65,7 +62,6 @@ impl DriveSnapshot {
     pub const UNSURE: u8 = 0x80;
 
     /// As words.
-    #[must_use]
     pub fn seal(&self) -> [u32; SNAPSHOT_WORDS] {
         let state = u32::from(self.mode) | u32::from(self.level) << 8 | u32::from(self.fault) << 16;
         let missed = u32::from(self.missed.bits()) | u32::from(self.packed_speed.0 as u16) << 16;
@@ -74,7 +70,6 @@ impl DriveSnapshot {
     }
 
     /// From words, if they are whole.
-    #[must_use]
     pub fn open(words: &[u32; SNAPSHOT_WORDS]) -> Option<Self> {
         let [tick, position, state, missed, sum] = *words;
         (check(Self::SEED, &[tick, position, state, missed]) == sum).then_some(Self {
@@ -89,14 +84,12 @@ impl DriveSnapshot {
     }
 
     /// The mode; none if the number has no meaning.
-    #[must_use]
     pub fn mode(&self) -> Option<Mode> {
         codes::mode(self.mode)
     }
 }
 
 /// The later of two.
-#[must_use]
 pub fn later(one: Option<DriveSnapshot>, other: Option<DriveSnapshot>) -> Option<DriveSnapshot> {
     match (one, other) {
         (Some(a), Some(b)) if b.tick.wrapping_sub(a.tick) as i32 > 0 => Some(b),

@@ -150,25 +150,25 @@ fn what_a_start_keeps_is_where_the_wheel_came_to_rest_and_unsure() {
     let hung = Restart { reset: Reset::Watchdog, snapshot: Some(snapshot), crash };
     let sure = Restart { reset: Reset::Pin, crash: None, ..hung };
     for (first, way) in [(hung, 40.0 * 0.077), (sure, 40.0 * 0.002)] {
-        let kept = first.standing().expect("a record");
+        let kept = first.at_start().expect("a record");
         assert_eq!((kept.tick, kept.level), (900, DriveSnapshot::UNSURE | 1));
         let again = Restart { reset: Reset::Pin, snapshot: Some(kept), crash: None };
         let place = again.place().expect("a place");
         assert!((place.position.to_num::<f64>() - 30.0 - way).abs() < 1e-3 && !place.sure);
         // And a third changes nothing more.
-        assert_eq!(again.standing(), Some(kept));
+        assert_eq!(again.at_start(), Some(kept));
     }
     // What was a guess stays one; what was a fault too.
     let guess =
         DriveSnapshot { packed_speed: PackedSpeed::of(Q16::from_num(40), false), ..snapshot };
     let held = DriveSnapshot { fault: 123, ..snapshot };
     for snapshot in [guess, held] {
-        let kept = Restart { snapshot: Some(snapshot), ..hung }.standing().expect("a record");
+        let kept = Restart { snapshot: Some(snapshot), ..hung }.at_start().expect("a record");
         assert_eq!(kept, DriveSnapshot { level: DriveSnapshot::UNSURE | 1, ..snapshot });
         let again = Restart { reset: Reset::Pin, snapshot: Some(kept), crash: None };
         assert_eq!(again.place(), None);
     }
-    assert_eq!(Restart { snapshot: None, ..hung }.standing(), None);
+    assert_eq!(Restart { snapshot: None, ..hung }.at_start(), None);
 }
 
 #[test]

@@ -36,7 +36,6 @@ impl<T> Reading<T> {
 
 /// Whether a value may be used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub enum Validity {
     /// No reading since boot.
     #[default]
@@ -60,7 +59,6 @@ impl Validity {
 
 /// What is wrong with a code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub enum Reason {
     /// Outside what the sensor can give when it is intact, or the arm can reach.
     OutOfRange,

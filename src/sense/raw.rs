@@ -6,7 +6,6 @@ use crate::units::Tick;
 /// two readings are taken with wrapping arithmetic, so at most half a turn of
 /// the counter (32767 counts, 628 mm) may lie between them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub struct EncoderCount(u16);
 
 impl EncoderCount {
@@ -29,7 +28,6 @@ impl EncoderCount {
 /// Result of an oversampled conversion, left-justified to 16 bits whatever the
 /// oversampling: 0 is the negative reference, 65535 the positive one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub struct AdcCode(u16);
 
 impl AdcCode {
@@ -47,7 +45,6 @@ impl AdcCode {
 /// A 16-bit frame of the magnetic angle encoder, undecoded: bit 15 even parity
 /// over the frame, bit 14 error flag, bits 13 to 0 the angle (16384 a turn).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub struct AngleFrame(u16);
 
 impl AngleFrame {
@@ -67,7 +64,6 @@ impl AngleFrame {
 /// 2^15 of the supply, so that the range ends at a duty of 1.25 in either direction, and its noise
 /// takes one byte a tick in the log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub struct BridgeCode(u16);
 
 impl BridgeCode {
@@ -101,7 +97,6 @@ impl BridgeCode {
 
 /// What both bridges were found to put out. One converter reads them, one after the other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub struct BridgeCodes {
     /// Drive.
     pub drive: BridgeCode,
@@ -111,7 +106,6 @@ pub struct BridgeCodes {
 
 /// Why a sensor gave no code this time. The last good one stays in force and ages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub enum BusFault {
     /// The transfer did not end in time.
     Timeout,

@@ -8,7 +8,6 @@ use crate::units::Direction;
 
 /// Number of a mode: its place in [`Mode::WITHOUT_FAULT`], or the code of the fault that
 /// is held, 101 to 160. Called every tick, so that it does not look for that place.
-#[must_use]
 pub const fn of_mode(mode: Mode) -> u8 {
     /// Modes that have a way.
     const WAY: u8 = 7;
@@ -30,7 +29,6 @@ pub const fn of_mode(mode: Mode) -> u8 {
 }
 
 /// The mode of a number; none if the number has no meaning.
-#[must_use]
 pub fn mode(number: u8) -> Option<Mode> {
     let plain = Mode::WITHOUT_FAULT.get(usize::from(number)).copied();
     plain.or_else(|| {
@@ -40,13 +38,11 @@ pub fn mode(number: u8) -> Option<Mode> {
 }
 
 /// The contact stage of a number, 1 to 6.
-#[must_use]
 pub fn stage(number: u8) -> Option<ContactStage> {
     ContactStage::ALL.into_iter().find(|stage| *stage as u8 == number)
 }
 
 /// Number of a command, from 1 in the order of [`Command::ALL`]; 0 for none.
-#[must_use]
 pub const fn of_command(command: Option<Command>) -> u8 {
     match command {
         None => 0,
@@ -55,7 +51,6 @@ pub const fn of_command(command: Option<Command>) -> u8 {
 }
 
 /// The command of a number; none for 0 and for what has no meaning.
-#[must_use]
 pub fn command(number: u8) -> Option<Command> {
     Command::ALL.get(usize::from(number).checked_sub(1)?).copied()
 }

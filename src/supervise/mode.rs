@@ -5,7 +5,6 @@ use crate::units::Direction;
 
 /// An operator's command, from the board button or the log channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub enum Command {
     /// Deploy from where the wheel is.
     Start,
@@ -19,7 +18,6 @@ pub enum Command {
 
 /// Part of a run between two steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub enum Leg {
     /// On the continuous wall, no step inside the horizon.
     Cruise,
@@ -33,7 +31,6 @@ pub enum Leg {
 
 /// What the drive is doing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub enum Mode {
     /// Waiting for every sensor's first reading.
     #[default]

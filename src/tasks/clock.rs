@@ -24,7 +24,6 @@ pub(super) fn uptime() -> Tick {
 /// When a task below the control rate that waits for nothing but time goes on: in so
 /// long, by half a millisecond more or less, in the middle between two ticks. So neither
 /// its timer nor what it does with interrupts masked delays the start of a tick.
-#[must_use]
 pub fn mid_tick_deadline(wait: Duration) -> Instant {
     Instant::from_millis((Instant::now() + wait).as_millis()) + Duration::from_micros(500)
 }

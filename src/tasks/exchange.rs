@@ -66,7 +66,6 @@ pub struct Exchange {
 
 impl Exchange {
     /// An exchange with nothing in it.
-    #[must_use]
     pub const fn new() -> Self {
         Self {
             liveness: Liveness::new(),
@@ -106,7 +105,6 @@ impl Exchange {
 
     /// What a tick at `now` is given; takes the oldest command and the plan out. Bridge
     /// codes and emergency stop are added by the task that drives the bridges.
-    #[must_use]
     pub fn input(&self, now: Tick, overrun: bool) -> Input {
         Input {
             now,
@@ -155,7 +153,6 @@ impl Exchange {
     }
 
     /// The latest code of each sensor, without the bridges'.
-    #[must_use]
     pub fn sensors(&self) -> SensorFrame {
         SensorFrame {
             wheel_encoder: self.wheel_encoder.try_get(),
@@ -167,32 +164,27 @@ impl Exchange {
     }
 
     /// The row of the latest tick; none before the first.
-    #[must_use]
     pub fn telemetry(&self) -> Option<Telemetry> {
         self.telemetry.try_get()
     }
 
     /// What the light is to show, as of the latest tick.
-    #[must_use]
     pub fn light(&self) -> Light {
         self.telemetry().map_or(Light::Off, |row| light_of(row.mode))
     }
 
     /// Whether nothing is driven, as of the latest tick.
-    #[must_use]
     pub fn at_rest(&self) -> bool {
         self.telemetry().is_none_or(|row| row.mode.is_at_rest())
     }
 
     /// Log entries dropped since boot because the journal did not keep up.
-    #[must_use]
     pub fn lost_entries(&self) -> u32 {
         self.lost_entries.load(Ordering::Relaxed)
     }
 
     /// Why the watchdog is not fed: tasks that are late, or the one that keeps the control
     /// tick from coming.
-    #[must_use]
     pub fn unfed(&self, now: Tick) -> MissedCheckIns {
         self.liveness.unfed(now)
     }

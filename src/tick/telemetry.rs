@@ -42,13 +42,11 @@ macro_rules! telemetry {
             };
 
             /// The quantities, in the order of their declaration.
-            #[must_use]
             pub const fn quantities(&self) -> [Q16; Self::COLUMNS.len()] {
                 [$(self.$field),*]
             }
 
             /// The row with these quantities.
-            #[must_use]
             pub const fn with_quantities(mut self, all: [Q16; Self::COLUMNS.len()]) -> Self {
                 [$(self.$field),*] = all;
                 self

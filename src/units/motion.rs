@@ -2,7 +2,6 @@
 
 /// Direction of axial motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub enum Direction {
     /// Outwards, onto the smaller radius: the wheel climbs the steps.
     #[default]
@@ -35,7 +34,6 @@ impl Direction {
 /// Signed duty of a bridge, Q15: -32768 is full reverse, 32767 full forward,
 /// LSB 3.1e-5. Forward deploys (drive) or raises the preload (pre-tightener).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub struct Duty(i16);
 
 impl Duty {
@@ -62,7 +60,6 @@ impl Duty {
 
 /// What one motor's bridge is to do until the next call.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(target_os = "none", derive(defmt::Format))]
 pub struct MotorCommand {
     /// Signed duty.
     pub duty: Duty,

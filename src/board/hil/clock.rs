@@ -1,4 +1,4 @@
-//! The clock: it stands until the host's next tick has come.
+//! The clock: it advances with the host's ticks.
 
 use core::cell::{Cell, RefCell};
 use core::task::Waker;
@@ -13,7 +13,7 @@ use interstage::units::{TICK_HZ, Tick};
 /// Clock ticks in a control tick.
 const CLOCKS: u64 = CLOCK_HZ / TICK_HZ as u64;
 
-/// Time that moves in whole control ticks, when it is told to.
+/// Time that advances in whole control ticks.
 struct Steps {
     now: Mutex<CriticalSectionRawMutex, Cell<u64>>,
     timers: Mutex<CriticalSectionRawMutex, RefCell<Queue>>,
@@ -34,15 +34,14 @@ impl Driver for Steps {
         self.timers.lock(|timers| {
             let mut timers = timers.borrow_mut();
             if timers.schedule_wake(at, waker) {
-                // What is due already is woken here; the rest by the tick that comes.
+                // Wakes what is due already; the next tick wakes the rest.
                 timers.next_expiration(now);
             }
         });
     }
 }
 
-/// Moves time on to the beginning of a tick. What is due runs before this returns to
-/// thread mode.
+/// Advances time to the start of a tick. What is due runs before this returns to thread mode.
 pub(super) fn advance(to: Tick) {
     let now = u64::from(to) * CLOCKS;
     CLOCK.now.lock(|place| place.set(now));
@@ -52,8 +51,7 @@ pub(super) fn advance(to: Tick) {
     settle();
 }
 
-/// Lets every task run that has been woken: the executors' interrupts are pending, and
-/// are taken here and not some instructions later.
+/// Runs every woken task: takes the executors' pending interrupts now.
 pub(super) fn settle() {
     cortex_m::asm::dsb();
     cortex_m::asm::isb();

@@ -1,24 +1,24 @@
-//! The parts of the board that the host stands in for.
+//! The parts of the board that the host replaces.
 
 use embassy_stm32::gpio::{AnyPin, Level, Output, Speed};
 use embassy_stm32::{Peri, Peripherals};
 use interstage::hal::hil::Given;
-use interstage::hal::{AnalogInput, AngleBus, CommandSource, Motors, Parts, WheelEncoder};
+use interstage::hal::{AnalogInput, AngleBus, CommandSource, Motors, WheelEncoder};
 use interstage::sense::raw::{AdcCode, AngleFrame, BridgeCodes, BusFault, EncoderCount};
 use interstage::supervise::Command;
 use interstage::units::MotorCommand;
 use rtt_target::DownChannel;
 
-use super::desk::DESK;
+use super::host_io::HOST_IO;
 use crate::board::rtt::Frames;
-use crate::board::{Console, Guard, Lamp, Lines, Nucleo, Pages};
+use crate::board::{Console, Guard, Lamp, ParameterFlash, Parts, TextLog};
 
 /// The wheel's counter.
 pub(crate) struct Wheel;
 
 impl WheelEncoder for Wheel {
     fn count(&mut self) -> EncoderCount {
-        EncoderCount::new(DESK.given().wheel_encoder)
+        EncoderCount::new(HOST_IO.given().wheel_encoder)
     }
 }
 
@@ -33,7 +33,7 @@ pub(crate) struct Analog(fn(&Given) -> Option<u16>);
 
 impl AnalogInput for Analog {
     async fn sample(&mut self) -> Result<AdcCode, BusFault> {
-        (self.0)(&DESK.given()).map(AdcCode::new).ok_or(BusFault::Timeout)
+        (self.0)(&HOST_IO.given()).map(AdcCode::new).ok_or(BusFault::Timeout)
     }
 }
 
@@ -42,7 +42,7 @@ pub(crate) struct Angle;
 
 impl AngleBus for Angle {
     async fn frame(&mut self) -> Result<AngleFrame, BusFault> {
-        DESK.given().arm_angle.map(AngleFrame::new).ok_or(BusFault::Timeout)
+        HOST_IO.given().arm_angle.map(AngleFrame::new).ok_or(BusFault::Timeout)
     }
 }
 
@@ -53,19 +53,19 @@ pub(crate) struct Bridges {
 
 impl Motors for Bridges {
     fn apply(&mut self, drive: MotorCommand, preload: MotorCommand) {
-        DESK.apply(drive, preload);
+        HOST_IO.apply(drive, preload);
     }
 
     fn readback(&mut self) -> Option<BridgeCodes> {
-        DESK.given().readback()
+        HOST_IO.given().readback()
     }
 
     fn stopped(&mut self) -> bool {
-        DESK.is_cut()
+        HOST_IO.is_cut()
     }
 
     fn rearm(&mut self) {
-        DESK.rearm();
+        HOST_IO.rearm();
     }
 }
 
@@ -74,16 +74,16 @@ pub(crate) struct Button;
 
 impl CommandSource for Button {
     async fn next(&mut self) -> Command {
-        DESK.pressed.wait().await
+        HOST_IO.pressed.wait().await
     }
 }
 
-/// Who gets what: the host's parts and the real ones that are left.
+/// Assigns the host's parts and the real ones that are left.
 pub(crate) fn split(
     p: Peripherals,
     console: DownChannel,
     frames: Frames,
-) -> (Parts<Nucleo>, Peri<'static, AnyPin>, Pages) {
+) -> (Parts, Peri<'static, AnyPin>, ParameterFlash) {
     // PWM, direction and enable of the drive, then of the pre-tightener.
     let pins: [Peri<'static, AnyPin>; 6] =
         [p.PA8.into(), p.PA9.into(), p.PA10.into(), p.PC6.into(), p.PC8.into(), p.PC9.into()];
@@ -96,8 +96,8 @@ pub(crate) fn split(
         watchdog: Guard::new(p.IWDG),
         button: Button,
         console: Console::new(console),
-        journal: Lines::new(frames),
+        journal: TextLog::new(frames),
         light: Lamp,
     };
-    (parts, p.PA5.into(), Pages::new(p.FLASH))
+    (parts, p.PA5.into(), ParameterFlash::new(p.FLASH))
 }

@@ -1,5 +1,4 @@
-//! The host's line, in thread mode: below every task, so that what runs here finds all
-//! of them waiting.
+//! The host's line, in thread mode: below every task, so it runs only while all of them wait.
 
 use cortex_m::peripheral::DWT;
 use interstage::hal::hil::{FIRST, Given, PROTOCOL, Taken, ToBoard, ToHost};
@@ -9,98 +8,96 @@ use interstage::units::Tick;
 use rtt_target::{ChannelMode, DownChannel, UpChannel};
 
 use super::clock;
-use super::desk::DESK;
+use super::host_io::HOST_IO;
 use crate::board::EXCHANGE;
 
 /// Cycles of a millisecond.
 const MILLISECOND: u32 = 170_000;
 
-/// Without a tick for so long, the host is taken for gone: half of what the watchdog,
-/// which the ticks feed, allows.
+/// Time without a tick after which the host counts as gone: half of the watchdog's time-out.
 const SILENCE: u32 = 50 * MILLISECOND;
 
 /// The channels up and down.
 type Channels = (UpChannel, DownChannel);
 
-/// Waits for a host, calls `begin`, which starts the tasks, and goes through the host's
-/// ticks. Before a host has come nothing runs, and nothing bites.
+/// Waits for a host, calls `begin`, which starts the tasks, and serves the host's ticks. Before
+/// a host has come nothing runs, the watchdog included.
 ///
-/// A host that falls silent is to the controller what it is to a drive: sensors that
-/// answer no more. The board goes on alone, a tick a millisecond, so that the controller
-/// finds the fault, turns the bridges off and holds, and the watchdog is fed by ticks
-/// that run. There is no way back but a restart.
+/// When the host falls silent, the sensors do. The board continues alone, a tick a millisecond,
+/// so that the controller finds the fault, switches the bridges off and holds, and the ticks
+/// feed the watchdog. Only a restart ends that.
 pub(super) fn serve(channels: Channels, begin: impl FnOnce()) -> ! {
     count_cycles();
     let mut line = Line { channels, reader: FrameReader::new() };
     while line.take() != Some(ToBoard::Hello { protocol: PROTOCOL }) {}
     begin();
-    let mut course = Course { next: FIRST, last: None, alone: false };
-    line.send(&course.stands());
+    let mut run = Run { next: FIRST, last: None, alone: false };
+    line.send(&run.next_tick());
     let mut heard = DWT::cycle_count();
     loop {
         if let Some(message) = line.take() {
-            if let Some(answer) = course.answer(message) {
+            if let Some(answer) = run.answer(message) {
                 line.send(&answer);
             }
-            if !course.alone {
+            if !run.alone {
                 heard = DWT::cycle_count();
             }
-        } else if course.alone && DWT::cycle_count().wrapping_sub(heard) >= MILLISECOND {
+        } else if run.alone && DWT::cycle_count().wrapping_sub(heard) >= MILLISECOND {
             heard = heard.wrapping_add(MILLISECOND);
-            course.tick(DESK.given().silent());
+            run.tick(HOST_IO.given().silent());
         } else if DWT::cycle_count().wrapping_sub(heard) >= SILENCE {
             heard = DWT::cycle_count();
-            course.alone = true;
+            run.alone = true;
         }
     }
 }
 
-/// Lets the core count its cycles, of which the silence is measured.
+/// Starts the cycle counter, which measures the silence.
 fn count_cycles() {
-    // SAFETY: nobody else uses either, and nothing is taken away from anybody.
+    // SAFETY: nothing else uses these two peripherals.
     let mut core = unsafe { cortex_m::Peripherals::steal() };
     core.DCB.enable_trace();
     core.DWT.enable_cycle_counter();
 }
 
-/// How far the run has come.
-struct Course {
+/// Progress of the run.
+struct Run {
     next: Tick,
     /// The latest tick and what it gave.
     last: Option<(Tick, Taken)>,
     alone: bool,
 }
 
-impl Course {
-    const fn stands(&self) -> ToHost {
+impl Run {
+    const fn next_tick(&self) -> ToHost {
         ToHost::Next { tick: self.next, alone: self.alone }
     }
 
-    /// Does what the host wants; none for what is not of this protocol.
+    /// Executes a message; no answer to one of another protocol.
     fn answer(&mut self, message: ToBoard) -> Option<ToHost> {
         match message {
-            ToBoard::Hello { protocol } => (protocol == PROTOCOL).then(|| self.stands()),
+            ToBoard::Hello { protocol } => (protocol == PROTOCOL).then(|| self.next_tick()),
             ToBoard::Tick(tick, given) if tick == self.next && !self.alone => {
                 self.tick(given);
-                let (drive, preload) = DESK.commands();
+                let (drive, preload) = HOST_IO.commands();
                 let mode = EXCHANGE.telemetry().map_or(0, |seen| codes::of_mode(seen.mode));
                 let taken = Taken::new(drive, preload, mode);
                 self.last = Some((tick, taken));
                 Some(ToHost::Done(tick, taken))
             }
-            // The answer has not been heard.
+            // The host missed the answer.
             ToBoard::Tick(tick, _) => Some(match self.last {
                 Some((last, taken)) if last == tick && !self.alone => ToHost::Done(last, taken),
-                _ => self.stands(),
+                _ => self.next_tick(),
             }),
         }
     }
 
-    /// A tick: the command first, because its task has to pass it on.
+    /// A tick; the command first, because its task has to pass it on.
     fn tick(&mut self, given: Given) {
-        DESK.give(given);
+        HOST_IO.give(given);
         if let Some(command) = codes::command(given.command) {
-            DESK.pressed.signal(command);
+            HOST_IO.pressed.signal(command);
             clock::settle();
         }
         clock::advance(self.next);
@@ -115,7 +112,7 @@ struct Line {
 }
 
 impl Line {
-    /// A message, if one is complete with what has come.
+    /// The next complete message that has arrived.
     fn take(&mut self) -> Option<ToBoard> {
         let mut byte = [0];
         while self.channels.1.read(&mut byte) > 0 {

@@ -1,9 +1,9 @@
 //! The two analogue sensors: one converter and one DMA channel each, so that
 //! neither waits for the other.
 //!
-//! Each converts without end and DMA puts its codes into a ring; who samples takes the
-//! latest, by the channel's own count, and goes on. Nothing is started and nothing waited
-//! for, so that a sample costs no interrupt and no second turn of its task.
+//! Each converts continuously, and DMA writes its codes into a ring; a sample is the latest of
+//! them, by the channel's own count. Nothing is started or awaited, so that a sample needs no
+//! interrupt and no second poll of its task.
 
 use embassy_stm32::adc::{
     Adc, AdcChannel, AdcConfig, CONTINUOUS, DefaultInstance, Resolution, RingBufferedAdc, Rovsm,
@@ -27,15 +27,14 @@ const RATIO_256: u8 = 7;
 /// 12 bits summed 256 times are 20 bits; four off leave 16, left-justified.
 const SHIFT: u8 = 4;
 
-/// A code takes 256 x (12.5 + 12.5) / 42.5 MHz = 151 us; what is not there after
-/// three times that will not come.
+/// A code takes 256 x (12.5 + 12.5) / 42.5 MHz = 151 us; after three times that none will come.
 const LIMIT: Duration = Duration::from_micros(500);
 
-/// Codes in a ring: 9.6 ms of them, so that a count which stands still between two samples
-/// has not gone round.
+/// Codes in a ring: 9.6 ms of them, so that an unchanged count between two samples means no new
+/// code.
 const RING: usize = 64;
 
-/// Where DMA puts the codes of a sensor.
+/// Ring for the codes of a sensor.
 pub(crate) struct Ring(StaticCell<[u16; RING]>);
 
 impl Ring {
@@ -45,10 +44,10 @@ impl Ring {
     }
 }
 
-/// What DMA writes, to be read from one task.
+/// The ring, as one task reads it.
 struct Written(*const u16);
 
-// SAFETY: it points to a static that nobody but DMA writes, and is only read.
+// SAFETY: it points to a static that only DMA writes, and is only read.
 unsafe impl Send for Written {}
 
 /// One sensor on its converter.
@@ -58,13 +57,13 @@ pub(crate) struct Analog<T: DefaultInstance> {
     written: Written,
     /// The channel's count when the latest code was taken.
     left: u16,
-    /// Dropped, it would stop.
+    /// Dropping it would stop the conversions.
     _converter: RingBufferedAdc<'static, T>,
 }
 
 impl<T: DefaultInstance> Analog<T> {
-    /// Calibrates the converter with these registers and has it convert `pin` from now
-    /// on, by the DMA channel of these. Each ring serves once.
+    /// Calibrates the converter and starts converting `pin` through this DMA channel. Each ring
+    /// serves once.
     pub(crate) fn new<D: RxDma<T>>(
         (adc, registers): (Peri<'static, T>, Registers),
         pin: impl AdcChannel<T> + 'static,
@@ -81,8 +80,7 @@ impl<T: DefaultInstance> Analog<T> {
             oversampling_mode: Some((Rovsm::CONTINUED, Trovs::AUTOMATIC, true)),
             ..AdcConfig::default()
         };
-        // The amplifiers are buffered: the shortest sampling time that the slow
-        // channels allow suffices, and the average counts for more.
+        // The amplifiers are buffered: the shortest sampling time of the slow channels suffices.
         let sequence = [(pin.degrade_adc(), SampleTime::CYCLES12_5)];
         let ring = ring.0.init([0; RING]);
         let written = Written(ring.as_ptr());
@@ -95,7 +93,7 @@ impl<T: DefaultInstance> Analog<T> {
             Exten::DISABLED,
         );
         converter.start();
-        // Nobody waits for the ring's half or its end.
+        // No interrupt at the ring's half or end.
         channel.cr().modify(|w| {
             w.set_htie(false);
             w.set_tcie(false);
@@ -103,17 +101,17 @@ impl<T: DefaultInstance> Analog<T> {
         Self { registers, channel, written, left: RING as u16, _converter: converter }
     }
 
-    /// The latest code, if one has come since this was last asked.
+    /// The latest code, if one has arrived since the last call.
     fn latest(&mut self) -> Option<AdcCode> {
         let left = self.channel.ndtr().read().ndt();
         if left == self.left {
             return None;
         }
         self.left = left;
-        // The count is that of the codes up to the ring's end, and full again behind it.
+        // The channel counts the codes left to the ring's end, from full down.
         let latest = (2 * RING - 1 - usize::from(left)) % RING;
-        // SAFETY: within the ring, which is static; DMA has written this code and comes
-        // back to it after 63 others.
+        // SAFETY: within the static ring; DMA has written this code and overwrites it after 63
+        // others.
         Some(AdcCode::new(unsafe { self.written.0.add(latest).read_volatile() }))
     }
 }
@@ -123,8 +121,7 @@ impl<T: DefaultInstance> AnalogInput for Analog<T> {
         if let Some(code) = self.latest() {
             return Ok(code);
         }
-        // Just started, or DMA did not keep up: after an overrun the converter keeps its
-        // codes to itself until told that it was seen.
+        // Just started, or an overrun: the converter stops until its flag is cleared.
         self.registers.isr().write(|w| w.set_ovr(true));
         Timer::after(LIMIT).await;
         self.latest().ok_or(BusFault::Timeout)

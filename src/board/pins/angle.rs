@@ -1,7 +1,7 @@
 //! The arm's angle sensor, an AS5048A: 16-bit frames on SPI1, mode 1.
 //!
-//! A frame takes 3 us, and a reading two of them. They are waited for: the bus clocks by
-//! itself, so that the wait always ends.
+//! A frame takes 3 us, a reading two of them. The driver busy-waits: the bus clocks by itself,
+//! so the wait always ends.
 
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{Level, Output, Pull, Speed};
@@ -20,11 +20,11 @@ const READ_ANGLE: u16 = 0xFFFF;
 /// 170 MHz / 32. The sensor takes 10 MHz; the next divider would give 10.6.
 const CLOCK: Hertz = Hertz(5_312_500);
 
-/// Least time from select to clock, and between frames, is 350 ns or 60 cycles: the
-/// delay goes round once more than this, and a round takes the core three at least.
+/// Least time from select to clock, and between frames: 350 ns or 60 cycles. The delay loops
+/// once more than this, with three cycles at least a loop.
 const SELECT_ROUNDS: u32 = 20;
 
-/// Looks at the bus in which a frame of 512 cycles has come: a look takes four at least.
+/// Polls of the bus for a frame of 512 cycles: a poll takes four at least.
 const FRAME_ROUNDS: u32 = 500;
 
 /// The sensor on its bus.
@@ -49,14 +49,13 @@ impl Angle {
         config.miso_pull = Pull::Up;
         let select = Output::new(select, Level::High, Speed::Medium);
         let mut bus = Spi::new_blocking(spi, clock, out, input, config);
-        // Nobody is selected; from here on the bus stands at frames of 16 bits. The driver
-        // would set it up for each of them, which takes as long as half a frame.
+        // With nothing selected, sets the bus to frames of 16 bits once: the driver would do it
+        // for each frame, which takes half as long as the frame.
         let _ = bus.blocking_transfer_in_place(&mut [READ_ANGLE]);
         Self { _bus: bus, select }
     }
 
-    /// Sends the read command and returns what comes back meanwhile: the answer
-    /// to the command before.
+    /// Sends the read command and returns the answer to the command before.
     fn exchange(&mut self) -> Result<u16, BusFault> {
         self.select.set_low();
         cortex_m::asm::delay(SELECT_ROUNDS);

@@ -22,14 +22,13 @@ use interstage::units::MotorCommand;
 
 use super::readback::Readback;
 
-/// One bridge in phase/enable control: PWM chops, the direction line chooses the
-/// sense, the enable line wakes the bridge.
+/// One bridge in phase/enable control: PWM chops, the direction line sets the sign, the enable
+/// line wakes the bridge.
 ///
-/// It is never given back: that would let go of the lines that hold the bridge off.
+/// It is never dropped: that would release the lines that hold the bridge off.
 pub(crate) struct Bridge<T: AdvancedInstance4Channel> {
     pwm: ManuallyDrop<ComplementaryPwm<'static, T>>,
-    /// The timer's registers: the driver's way to them asks in every tick what could only
-    /// have been wrong from the start on, and panics.
+    /// The timer's registers: the driver's own access checks and can panic in every tick.
     registers: TimAdv,
     /// Counts of a period.
     period: u32,
@@ -55,8 +54,8 @@ impl<T: AdvancedInstance4Channel> Bridge<T> {
         let pin =
             PwmPinConfig { output_type: OutputType::PushPull, speed: Speed::Low, pull: Pull::Down };
         let pin = PwmPin::new_with_config(pwm, pin);
-        // The plain PWM driver has no break input; of the complementary one the
-        // second output of each pair simply has no pin.
+        // The plain PWM driver has no break input; the second outputs of the complementary one
+        // have no pin.
         let mut pwm = ComplementaryPwm::new(
             timer,
             Some(pin),
@@ -76,7 +75,7 @@ impl<T: AdvancedInstance4Channel> Bridge<T> {
         pwm.set_break_polarity(BreakInputPolarity::ACTIVE_HIGH);
         pwm.set_break_filter(FilterValue::FDTS_DIV32_N8);
         pwm.set_break_input_pin_enable(true);
-        // With the outputs off the timer goes on holding the PWM line low.
+        // With the outputs off the timer keeps the PWM line low.
         pwm.set_off_state_selection_idle(Ossi::IDLE_LEVEL);
         pwm.set_duty(Channel::Ch1, 0);
         pwm.enable(Channel::Ch1);
@@ -92,12 +91,12 @@ impl<T: AdvancedInstance4Channel> Bridge<T> {
         }
     }
 
-    /// Whether the break input has taken the outputs away.
+    /// Whether the break input has switched the outputs off.
     fn stopped(&self) -> bool {
         !self.pwm.get_master_output_enable()
     }
 
-    /// Gives the outputs back; without effect while the break input is active.
+    /// Re-enables the outputs; without effect while the break input is active.
     fn rearm(&mut self) {
         self.pwm.set_master_output_enable(true);
     }
@@ -123,13 +122,10 @@ impl<T: AdvancedInstance4Channel> Bridge<T> {
     }
 }
 
-/// Both bridges.
+/// Both bridges: of the wheel's motor and of the pre-tightener's.
 pub(crate) struct Bridges {
-    /// The wheel's motor.
     pub(crate) drive: Bridge<TIM1>,
-    /// The pre-tightener's motor.
     pub(crate) preload: Bridge<TIM8>,
-    /// What both put out.
     pub(crate) readback: Readback,
 }
 
@@ -147,8 +143,7 @@ impl Motors for Bridges {
         self.drive.stopped() || self.preload.stopped()
     }
 
-    // Only a reset out of the fault hold comes here: releasing the button starts
-    // nothing.
+    // Called only by a reset out of the fault hold: releasing the button starts nothing.
     fn rearm(&mut self) {
         self.drive.rearm();
         self.preload.rearm();

@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | short press | start | 0.4 s after release, when no second press came |
 //! | two short presses | retract | at the second release |
-//! | held for 1 s | stop | while still held: a stop does not wait for a release |
+//! | held for 1 s | stop | while still held |
 //! | held on to 3 s | reset | while still held, after the stop |
 
 use embassy_stm32::Peri;
@@ -18,7 +18,7 @@ use interstage::supervise::Command;
 
 use crate::board::Irqs;
 
-/// Contacts have come to rest after this.
+/// Time for which contacts bounce.
 const BOUNCE: Duration = Duration::from_millis(20);
 
 /// A second press within this after a release makes the two one gesture.
@@ -30,27 +30,27 @@ const STOP: Duration = Duration::from_secs(1);
 /// Holding on for this much longer resets.
 const RESET: Duration = Duration::from_secs(2);
 
-/// What the finger last did.
+/// Progress of a gesture.
 #[derive(Clone, Copy)]
-enum Finger {
-    /// Nothing, or its gesture is complete.
-    Up,
-    /// Held the button until stop was given, and has not let go.
-    Holding,
-    /// Held it until reset was given too.
-    Done,
+enum Gesture {
+    /// None, or complete.
+    None,
+    /// Held until stop was given, not released.
+    Stopped,
+    /// Held until reset was given, not released.
+    Reset,
 }
 
 /// B1.
 pub(crate) struct Button {
     pin: ExtiInput<'static, Async>,
-    finger: Finger,
+    gesture: Gesture,
 }
 
 impl Button {
     /// The button; on this board it connects the pin to the supply.
     pub(crate) fn new(pin: Peri<'static, PC13>, line: Peri<'static, EXTI13>) -> Self {
-        Self { pin: ExtiInput::new(pin, line, Pull::Down, Irqs), finger: Finger::Up }
+        Self { pin: ExtiInput::new(pin, line, Pull::Down, Irqs), gesture: Gesture::None }
     }
 
     async fn pressed(&mut self) {
@@ -61,7 +61,7 @@ impl Button {
         self.settled(false).await;
     }
 
-    /// Waits until the pin stands at a level and still does after the bounce.
+    /// Waits until the pin has a level and keeps it over the bounce.
     async fn settled(&mut self, high: bool) {
         loop {
             if high {
@@ -80,13 +80,13 @@ impl Button {
 impl CommandSource for Button {
     async fn next(&mut self) -> Command {
         loop {
-            match self.finger {
-                Finger::Up => {
+            match self.gesture {
+                Gesture::None => {
                     self.pressed().await;
                     let mut tapped = Command::Start;
                     loop {
                         if with_timeout(STOP, self.released()).await.is_err() {
-                            self.finger = Finger::Holding;
+                            self.gesture = Gesture::Stopped;
                             return Command::Stop;
                         }
                         if tapped == Command::Retract
@@ -97,16 +97,16 @@ impl CommandSource for Button {
                         tapped = Command::Retract;
                     }
                 }
-                Finger::Holding => {
+                Gesture::Stopped => {
                     if with_timeout(RESET, self.released()).await.is_err() {
-                        self.finger = Finger::Done;
+                        self.gesture = Gesture::Reset;
                         return Command::Reset;
                     }
-                    self.finger = Finger::Up;
+                    self.gesture = Gesture::None;
                 }
-                Finger::Done => {
+                Gesture::Reset => {
                     self.released().await;
-                    self.finger = Finger::Up;
+                    self.gesture = Gesture::None;
                 }
             }
         }

@@ -1,8 +1,7 @@
-//! What the bridges put out: one converter for both, in injected conversions.
+//! Readback of the bridges' outputs: one converter for both, in injected conversions.
 //!
-//! They are started anew whenever their results are taken, once a tick, and are done long
-//! before the next. Each has its own result register, so that neither DMA nor an interrupt
-//! is needed.
+//! Taking the results, once a tick, starts the next conversions, which end long before the next
+//! tick. Each has its own result register: neither DMA nor an interrupt is needed.
 
 use embassy_stm32::Peri;
 use embassy_stm32::adc::{Adc, AdcChannel, AdcConfig, AnyAdcChannel, SampleTime};
@@ -29,7 +28,7 @@ impl Readback {
         drive: impl AdcChannel<ADC3> + 'static,
         preload: impl AdcChannel<ADC3> + 'static,
     ) -> Self {
-        // Dropped, the driver leaves the converter as it is: on and calibrated.
+        // Dropping the driver leaves the converter on and calibrated.
         let _ = Adc::new(adc, AdcConfig::default());
         let pins = [drive.degrade_adc(), preload.degrade_adc()];
         let channels = [pins[0].get_hw_channel(), pins[1].get_hw_channel()];
@@ -58,13 +57,12 @@ impl Readback {
     }
 
     fn start(&self) {
-        // The other bits of this register do something only where a one is written, but for
-        // the regulator's, which stay as they are.
+        // The other bits of this register act only when one is written, except the regulator's,
+        // which stay as they are.
         self.registers.cr().modify(|w| w.set_jadstart(true));
     }
 
-    /// The codes converted since this was last asked, if all of them are there. Starts the
-    /// next ones.
+    /// The codes converted since the last call, if both are complete; starts the next ones.
     pub(crate) fn take(&mut self) -> Option<BridgeCodes> {
         if !self.registers.isr().read().jeos() {
             return None;

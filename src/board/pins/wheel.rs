@@ -27,9 +27,8 @@ impl Wheel {
             ..Config::default()
         };
         let counter = Qei::new(timer, a, b, config);
-        // An edge counts when the line has stood for 8 samples at 170 MHz / 32,
-        // 1.5 us: far below the 120 us between two counts at 160 mm/s, far above
-        // the ringing that the bridges couple in.
+        // An edge counts after 8 equal samples at 170 MHz / 32, 1.5 us: far below the 120 us
+        // between two counts at 160 mm/s, far above the ringing that the bridges couple in.
         pac::TIM5.ccmr_input(0).modify(|w| {
             w.set_icf(0, FilterValue::FDTS_DIV32_N8);
             w.set_icf(1, FilterValue::FDTS_DIV32_N8);

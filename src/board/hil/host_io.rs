@@ -1,26 +1,26 @@
-//! What the host's line and the tasks leave for each other.
+//! Inputs and outputs between the host's line and the tasks.
 
 use core::cell::Cell;
 
 use embassy_sync::blocking_mutex::Mutex;
-use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex as Raw;
 use embassy_sync::signal::Signal;
 use interstage::hal::hil::Given;
 use interstage::supervise::Command;
 use interstage::units::MotorCommand;
 
-/// Between the host's line and the parts of the board that it stands in for.
-pub(super) struct Desk {
-    given: Mutex<CriticalSectionRawMutex, Cell<Given>>,
-    commands: Mutex<CriticalSectionRawMutex, Cell<(MotorCommand, MotorCommand)>>,
-    /// The emergency stop has cut the bridges and they have not been given back.
-    cut: Mutex<CriticalSectionRawMutex, Cell<bool>>,
+/// What the host's line exchanges with the parts of the board that it replaces.
+pub(super) struct HostIo {
+    given: Mutex<Raw, Cell<Given>>,
+    commands: Mutex<Raw, Cell<(MotorCommand, MotorCommand)>>,
+    /// The emergency stop has cut the bridges, and no reset has re-enabled them.
+    cut: Mutex<Raw, Cell<bool>>,
     /// The operator's command.
-    pub(super) pressed: Signal<CriticalSectionRawMutex, Command>,
+    pub(super) pressed: Signal<Raw, Command>,
 }
 
-/// The only one.
-pub(super) static DESK: Desk = Desk {
+/// The only instance.
+pub(super) static HOST_IO: HostIo = HostIo {
     given: Mutex::new(Cell::new(Given {
         wheel_encoder: 0,
         preload_sensor: None,
@@ -35,13 +35,13 @@ pub(super) static DESK: Desk = Desk {
     pressed: Signal::new(),
 };
 
-impl Desk {
-    /// What the present tick finds.
+impl HostIo {
+    /// Inputs of the present tick.
     pub(super) fn given(&self) -> Given {
         self.given.lock(Cell::get)
     }
 
-    /// Leaves what the next tick is to find.
+    /// Sets the inputs of the next tick.
     pub(super) fn give(&self, given: Given) {
         self.given.lock(|place| place.set(given));
         if given.stop {
@@ -49,12 +49,12 @@ impl Desk {
         }
     }
 
-    /// What the bridges were last told.
+    /// The bridges' last commands.
     pub(super) fn commands(&self) -> (MotorCommand, MotorCommand) {
         self.commands.lock(Cell::get)
     }
 
-    /// Tells the bridges.
+    /// Commands the bridges.
     pub(super) fn apply(&self, drive: MotorCommand, preload: MotorCommand) {
         self.commands.lock(|place| place.set((drive, preload)));
     }
@@ -64,7 +64,7 @@ impl Desk {
         self.cut.lock(Cell::get)
     }
 
-    /// Gives the bridges back, if the stop's contact is closed again.
+    /// Re-enables the bridges, if the stop's contact is closed again.
     pub(super) fn rearm(&self) {
         if !self.given().stop {
             self.cut.lock(|cut| cut.set(false));
