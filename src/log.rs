@@ -1,14 +1,14 @@
-//! What the controller reports: entries for the log, one telemetry row a tick, and the
-//! binary stream that carries both to a host.
+//! What the controller reports: log entries, one telemetry row a tick, and the binary stream
+//! that carries both to a host.
 //!
 //! | part | does |
 //! |---|---|
 //! | [`Entry`](crate::tick::Entry), [`Telemetry`](crate::tick::Telemetry) | what happened; the state after a tick |
-//! | [`Record`] | a tick's whole input and output, for the stream |
+//! | [`Record`] | a tick's complete input and output, for the stream |
 //! | [`LogEncoder`] | makes frames of them, below the control rate |
-//! | [`frame`] | how a frame lies on the channel |
-//! | [`capture`] | moments that matter, kept until they have been read |
-//! | [`ledger`] | a line a crossing |
+//! | [`frame`] | layout of a frame |
+//! | [`capture`] | samples around a trigger, kept until they have been read |
+//! | [`ledger`] | one line a crossing |
 
 pub mod capture;
 mod crc;

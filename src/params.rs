@@ -1,11 +1,10 @@
 //! Parameters as the firmware runs on them.
 //!
 //! A rig is written in SI numbers ([`Rig`](crate::rig::Rig)); the control path runs on
-//! fixed-point constants derived from them. The derivation needs the mathematics of a
-//! host, so the host does it, once, and what the board carries is the result: a *set*,
-//! with the rig it was made from behind it. The image holds no floating-point
-//! arithmetic in software, starts at once, and its constants are those of the virtual
-//! rig to the bit.
+//! fixed-point constants derived from them. The derivation needs the host's mathematics, so the
+//! host does it once, and the board carries the result: a *set*, which contains its rig too. The
+//! image holds no software floating point, starts at once, and its constants are those of the
+//! virtual rig to the bit.
 
 mod compile;
 pub mod link;

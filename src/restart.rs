@@ -1,9 +1,9 @@
-//! What outlives a restart: why the program was stopped, and what the drive was doing.
+//! What survives a restart: why the program was stopped, and what the drive was doing.
 //!
-//! The board keeps it as words in memory that no start clears. After power was lost they
-//! hold anything, so that each record carries a check of its own; a record that is not
-//! whole is none. What the drive does is kept every tick, in two places by turns, so that
-//! a reset in the middle of writing leaves the tick before.
+//! The board keeps it as words in memory that no start clears. After a loss of power they hold
+//! anything, so each record carries a check; a record that is not intact counts as none. The
+//! snapshot of each tick goes to two places alternately, so that a reset during a write leaves
+//! the tick before.
 mod crash;
 pub mod flash_log;
 pub mod image_checksum;
@@ -25,8 +25,8 @@ pub const CRASH_WORDS: usize = 7;
 
 /// Check of a record's words.
 ///
-/// Each word is mixed in by steps of which every one can be undone: a change within one
-/// word always shows, any other with all but one in 2^32.
+/// Each word is mixed in by invertible steps: a change within one word always shows, any other
+/// with all but one in 2^32.
 fn check(seed: u32, words: &[u32]) -> u32 {
     words.iter().fold(seed, |sum, word| (sum.rotate_left(7) ^ word).wrapping_mul(0x9E37_79B1))
 }

@@ -3,21 +3,20 @@
 
 use interstage::log::frame::{Body, Frame, FrameBuffer, Head, Kind, LONGEST};
 use interstage::log::{Identity, crc32};
+use interstage::model::Planner;
 use interstage::params::link::{FrameReader, ToBoard, ToHost, frame};
 use interstage::params::service::{Piece, Request, Response};
-use interstage::params::slots::{SLOT_BYTES, place, stored};
-use interstage::params::{MAX_SET, ParameterSet, compile};
+use interstage::params::slots::{SLOT_BYTES, slot_image, stored};
+use interstage::params::{ParameterSet, compile};
 use interstage::rig::Rig;
 use interstage::supervise::{Command, Mode};
-use interstage::tick::{Entry, Event};
+use interstage::tick::{Controller, Entry, Event};
 
 use crate::common::FixedFlash;
 use crate::common::mutate::fuzz;
 
 fn set(rig: &Rig) -> Vec<u8> {
-    let mut room = [0; MAX_SET];
-    let length = compile("fuzz", rig, &mut room).expect("a sound rig");
-    room[..length].to_vec()
+    compile("fuzz", rig).expect("a sound rig").to_vec()
 }
 
 fn postcard<T: serde::Serialize>(value: &T) -> Vec<u8> {
@@ -35,11 +34,12 @@ fn open_set(bytes: &[u8]) {
         let _ = set.rig();
         let _ = set.header().name.as_str();
     }
+    let mut controller = Controller::default();
     if let Ok(set) = ParameterSet::open(bytes)
-        && let Ok((controller, rest)) = set.controller()
+        && let Ok(rest) = set.read_controller(&mut controller)
     {
         let _ = controller.corner_reach();
-        let _ = rest.planner();
+        let _ = rest.read_planner(&mut Planner::default());
     }
 }
 
@@ -53,7 +53,7 @@ fn parameter_sets() {
 
 #[test]
 fn places_of_parameter_sets() {
-    let slot = |sequence| place(&set(&Rig::prototype()), sequence).expect("fits").to_vec();
+    let slot = |sequence| slot_image(&set(&Rig::prototype()), sequence).expect("fits").to_vec();
     let corpus = [slot(1), slot(u32::MAX), vec![0xFF; SLOT_BYTES]];
     fuzz("places", &corpus, 4000, 2.0, |bytes| {
         let (a, b) = bytes.split_at(bytes.len().min(SLOT_BYTES));

@@ -12,8 +12,8 @@
 use std::path::Path;
 
 use interstage::fault::Fault;
-use interstage::log::Record;
 use interstage::log::frame::{Body, Frame};
+use interstage::log::{Flags, Record};
 use interstage::model::{Plan, PlanRequest, Planner};
 use interstage::restart::Restart;
 use interstage::rig::Rig;
@@ -96,7 +96,11 @@ fn step_through(
     let (mut state, mut sensors) = (State::restored(place), SensorFrame::default());
     for record in &boot.ticks {
         let mut input = Input {
-            plan: record.flags.plan().then(|| Boot::of(&boot.plans, record.at())).flatten(),
+            plan: record
+                .flags
+                .has(Flags::PLAN)
+                .then(|| Boot::of(&boot.plans, record.at()))
+                .flatten(),
             ..record.input(&sensors)
         };
         sensors = input.sensors;

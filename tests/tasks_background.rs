@@ -184,7 +184,7 @@ fn the_light_is_set_when_it_changes_and_only_then() {
     assert_eq!(shown.items(), [Light::Off]);
     let modes = [Mode::Preload(Direction::Deploy), Mode::FaultHold(Fault::SelfTest), Mode::Idle];
     for (mode, light) in modes.into_iter().zip([Light::On, Light::Alarm, Light::Off]) {
-        let telemetry = Telemetry { mode, ..Telemetry::EMPTY };
+        let telemetry = Telemetry { mode, ..Telemetry::default() };
         exchange.publish(&Output { telemetry, ..Output::default() });
         let asked = now_ms();
         bench.run_ms(200);

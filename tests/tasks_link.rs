@@ -7,9 +7,9 @@ use std::sync::OnceLock;
 
 use crate::common::{Bench, FixedFlash, forever};
 use interstage::hal::Line;
+use interstage::params::compile;
 use interstage::params::link::{FrameReader, ToBoard, ToHost, frame};
 use interstage::params::service::{Origin, Refusal, Request, Response, Service};
-use interstage::params::{MAX_SET, compile};
 use interstage::rig::Rig;
 use interstage::tasks::{self, Exchange};
 
@@ -59,12 +59,7 @@ impl Wire {
 
 fn image() -> &'static [u8] {
     static SET: OnceLock<Vec<u8>> = OnceLock::new();
-    SET.get_or_init(|| {
-        let mut room = vec![0; MAX_SET];
-        let length = compile("mocked", &Rig::prototype(), &mut room).expect("sound");
-        room.truncate(length);
-        room
-    })
+    SET.get_or_init(|| compile("mocked", &Rig::prototype()).expect("sound").to_vec())
 }
 
 fn bench() -> (Bench, Wire, &'static Exchange) {

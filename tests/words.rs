@@ -1,4 +1,4 @@
-//! What the controller says of itself in words: each thing a sentence, no two the same.
+//! Texts for operators: each code has a sentence of its own.
 
 use std::collections::HashSet;
 use std::fmt::Debug;
@@ -6,7 +6,6 @@ use std::fmt::Debug;
 use interstage::fault::{Fault, Limit};
 use interstage::params::service::Refusal;
 use interstage::params::{SCHEMA, SetError};
-use interstage::units::Q16;
 
 fn differ<T: Copy + Debug>(all: &[T], say: impl Fn(T) -> &'static str) {
     let mut said = HashSet::new();
@@ -42,20 +41,4 @@ fn sets_that_cannot_be_read() {
     }
     let schema = errors[2].to_string();
     assert!(schema.contains("77") && schema.contains(&SCHEMA.to_string()), "{schema}");
-}
-
-#[test]
-fn numbers_read_as_they_are() {
-    let value = Q16::from_num(-3.25);
-    assert_eq!(
-        (format!("{value}"), format!("{value:?}")),
-        ("-3.25".to_owned(), "-3.25".to_owned())
-    );
-    let mut changed = value;
-    changed += Q16::from_num(10);
-    assert_eq!(changed, Q16::from_num(6.75));
-    changed -= Q16::from_num(0.5);
-    assert_eq!(changed, Q16::from_num(6.25));
-    changed *= Q16::from_num(4);
-    assert_eq!(changed, Q16::from_num(25));
 }

@@ -4,7 +4,7 @@
 
 use std::{env, error::Error, fs, path::PathBuf};
 
-use interstage::params::{MAX_SET, compile};
+use interstage::params::compile;
 use interstage::rig::Rig;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -15,9 +15,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rustc-link-arg-bin=measure=--defsym=_stack_size=40K");
     let out = PathBuf::from(env::var("OUT_DIR")?);
     for (name, rig) in [("prototype", Rig::prototype()), ("fe", Rig::fe())] {
-        let mut room = [0; MAX_SET];
-        let length = compile(name, &rig, &mut room)?;
-        fs::write(out.join(name).with_extension("set"), &room[..length])?;
+        fs::write(out.join(name).with_extension("set"), compile(name, &rig)?)?;
     }
     Ok(())
 }

@@ -7,7 +7,7 @@
 mod file;
 mod line;
 
-use interstage::params::{CompileError, MAX_SET, ParameterSet, SCHEMA, SetError, compile};
+use interstage::params::{CompileError, ParameterSet, SCHEMA, SetError, compile};
 use interstage::rig::Rig;
 
 pub use file::SetFile;
@@ -117,7 +117,5 @@ pub trait Store {
 /// # Errors
 /// [`CompileError`] if the rig is not sound.
 pub fn set_of(name: &str, rig: &Rig) -> Result<Vec<u8>, CompileError> {
-    let mut room = [0; MAX_SET];
-    let length = compile(name, rig, &mut room)?;
-    Ok(room[..length].to_vec())
+    Ok(compile(name, rig)?.to_vec())
 }

@@ -1,7 +1,7 @@
 //! A log run again: the recorded inputs through the controller on this host, whose
 //! outputs must be the recorded ones to the bit.
 
-use interstage::log::Record;
+use interstage::log::{Flags, Record};
 use interstage::model::{Plan, PlanRequest, Planner};
 use interstage::rig::{Rig, RigError};
 use interstage::supervise::Mode;
@@ -146,9 +146,9 @@ impl Replay<'_> {
             now: row.tick,
             sensors: row.sensors(),
             command: flags.command(),
-            plan: flags.plan().then(|| self.plan(row.tick)).flatten(),
-            overrun: flags.overrun(),
-            emergency_stop: flags.emergency_stop(),
+            plan: flags.has(Flags::PLAN).then(|| self.plan(row.tick)).flatten(),
+            overrun: flags.has(Flags::OVERRUN),
+            emergency_stop: flags.has(Flags::EMERGENCY),
         };
         let output = controller.step(&mut self.state, &input);
         if let Some(request) = output.request {

@@ -41,9 +41,9 @@ pub(crate) fn build(
 fn constants(set: &[u8]) -> Result<Constants, SetError> {
     let set = ParameterSet::open(set)?;
     let controller = CONTROLLER.init_with(Controller::default);
-    let rest = set.controller_into(controller)?;
+    let rest = set.read_controller(controller)?;
     let planner = PLANNER.init_with(Planner::default);
-    rest.planner_into(planner)?;
+    rest.read_planner(planner)?;
     log_header(set.header());
     Ok((controller, planner, identity(set.header(), controller)))
 }

@@ -1,11 +1,9 @@
-//! Hardware in the loop: what host and firmware say to each other when the plant is the
-//! host's and the controller the board's.
+//! Hardware in the loop: the protocol of a host with the plant and a board with the controller.
 //!
-//! The loop runs in lockstep. The host sends a tick with the sensors' codes in it; the
-//! board's clock moves on by that one tick, every task that is due runs, and the bridge
-//! commands go back. Time on the board is the count of ticks, however long a tick takes
-//! to come; nothing is made up and nothing left out, so that a run gives the same bits
-//! through a slow probe as in software.
+//! The loop runs in lockstep. The host sends a tick with the sensors' codes; the board's clock
+//! advances by that tick, every task that is due runs, and the bridge commands go back. Time on
+//! the board is the count of ticks, however long one takes to arrive; so a run through a slow
+//! probe gives the same bits as in software.
 //!
 //! Frames are those of the [binary line](crate::params::link), on RTT channels [`UP`] and
 //! [`DOWN`].
@@ -23,33 +21,33 @@ pub const UP: u32 = 3;
 /// RTT channel down.
 pub const DOWN: u32 = 2;
 
-/// Number of this protocol; another one is not answered.
+/// Number of this protocol; messages of another one are not answered.
 pub const PROTOCOL: u8 = 2;
 
-/// The board's first tick: its clock begins one before. Even, so that the angle sensor's
-/// turn comes in the first tick, as in software.
+/// The board's first tick; its clock begins one before. Even, so that the first tick reads the
+/// angle sensor, as in software.
 pub const FIRST: Tick = 2;
 
-/// What the host sends.
+/// Messages of the host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ToBoard {
-    /// Begins a run, or asks how the present one stands.
+    /// Begins a run, or asks for the state of the present one.
     Hello {
         /// [`PROTOCOL`].
         protocol: u8,
     },
-    /// The tick of this number, and what it finds.
+    /// The tick of this number, and its inputs.
     Tick(Tick, Given),
 }
 
-/// What a tick finds at the board's inputs.
+/// Inputs of a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Given {
     /// Wheel encoder's counter.
     pub wheel_encoder: u16,
     /// Preload sensor; none for a sensor that does not answer.
     pub preload_sensor: Option<u16>,
-    /// Tread compression; none as above.
+    /// Compression sensor; none as above.
     pub compression_sensor: Option<u16>,
     /// Frame of the arm's angle sensor; none as above.
     pub arm_angle: Option<u16>,
@@ -86,8 +84,7 @@ impl Given {
         Self { command: codes::of_command(command), ..self }
     }
 
-    /// The same with no sensor answering but the wheel's counter, which cannot fall
-    /// silent.
+    /// The same with no sensor answering but the wheel's counter, which cannot fail.
     pub const fn silent(self) -> Self {
         Self {
             preload_sensor: None,
@@ -99,7 +96,7 @@ impl Given {
         }
     }
 
-    /// What the bridges put out, if they were looked at.
+    /// Output of the bridges, if it was converted.
     pub fn readback(&self) -> Option<BridgeCodes> {
         self.bridges.map(|codes| BridgeCodes {
             drive: BridgeCode::new(codes[0]),
@@ -108,23 +105,23 @@ impl Given {
     }
 }
 
-/// What the board sends.
+/// Messages of the board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ToHost {
-    /// What the tick of this number gave.
+    /// Outputs of the tick of this number.
     Done(Tick, Taken),
-    /// The next tick that the board takes: the answer to a hello, and to another tick
-    /// than this or the last.
+    /// The next tick that the board takes: the answer to a hello, and to any other tick but the
+    /// last.
     Next {
         /// Its number.
         tick: Tick,
-        /// The host was silent for too long: the board has gone on without it, takes no
-        /// more ticks, and has to be started anew.
+        /// The host was silent for too long: the board continues alone, takes no more ticks,
+        /// and has to be restarted.
         alone: bool,
     },
 }
 
-/// What a tick gave.
+/// Outputs of a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Taken {
     /// Duty of the drive, Q15; none with the bridge off.
@@ -136,7 +133,7 @@ pub struct Taken {
 }
 
 impl Taken {
-    /// Bridges commanded so, in the mode of this number.
+    /// Outputs with these bridge commands and the number of this mode.
     pub fn new(drive: MotorCommand, preload: MotorCommand, mode: u8) -> Self {
         let duty = |command: MotorCommand| command.enable.then_some(command.duty.to_bits());
         Self { drive: duty(drive), preload: duty(preload), mode }
@@ -190,7 +187,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_sent_arrives(
+        fn messages_come_back_from_their_frames(
             tick in any::<u32>(),
             codes in any::<[u16; 4]>(),
             answers in any::<[bool; 3]>(),

@@ -1,10 +1,6 @@
-//! The capture: what happened around a moment that matters, kept in memory until it has
-//! been read.
-//!
-//! The stream of ticks tells more while someone reads it. The capture is for when nobody
-//! does, or too slowly: it keeps raw codes and both bridges' duties at 100 Hz from 0.3 s
-//! before its trigger to 0.9 s after it, and holds them until they have found room on
-//! the channel.
+//! Capture: sensor codes and duties around a trigger, at 100 Hz from 0.3 s before it to 0.9 s
+//! after it, kept in memory until they have been sent. It serves a reader that is absent or too
+//! slow for the stream of ticks.
 
 #![deny(clippy::float_arithmetic)]
 
@@ -15,25 +11,25 @@ use super::record::Record;
 use crate::supervise::{Leg, Mode, codes};
 use crate::units::{Direction, Millimetres, Q16, Tick, q16};
 
-/// Ticks from one shot to the next.
+/// Ticks from one sample to the next.
 pub const EVERY: u32 = 10;
 
-/// CaptureChunk that a capture has.
-pub const SHOTS: usize = 120;
+/// Samples of a capture.
+pub const SAMPLES: usize = 120;
 
-/// CaptureChunk after the trigger; the others are history.
+/// Samples after the trigger; the others are history.
 pub const AFTER: u8 = 90;
 
-/// CaptureChunk in a frame.
-pub const IN_FRAME: usize = 16;
+/// Samples in a chunk.
+pub const CHUNK_SAMPLES: usize = 16;
 
-/// Way before the face at which a step counts as reached when it is dropped off, mm.
+/// Distance to the face at which a retracting wheel counts as there, mm.
 const CLOSE: Millimetres = q16(500_000);
 
-/// What set a capture off.
+/// What triggered a capture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Trigger {
-    /// By position, the wheel should be touching the step ahead now.
+    /// By position, the wheel touches the step ahead.
     Step,
     /// A fault was latched.
     Fault,
@@ -41,12 +37,12 @@ pub enum Trigger {
     Command,
 }
 
-/// A moment of a capture, 16 bytes.
+/// A sample of a capture, 16 bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CaptureSample {
     /// Low half of its tick.
     pub at: u16,
-    /// Codes of wheel, preload sensor, tread, arm.
+    /// Codes of wheel, preload sensor, compression sensor, arm.
     pub codes: [u16; 4],
     /// Duties of drive and pre-tightener, Q15.
     pub duties: [i16; 2],
@@ -69,41 +65,41 @@ impl CaptureSample {
     }
 }
 
-/// A piece of a capture, as it is sent.
+/// A part of a capture, in one frame.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CaptureChunk {
-    /// What set it off.
+    /// The trigger.
     pub trigger: Trigger,
-    /// When.
+    /// Time of the trigger.
     pub at: Tick,
-    /// Place of the piece's first shot in the capture.
+    /// Index of the chunk's first sample in the capture.
     pub first: u8,
-    /// CaptureChunk of the whole capture.
+    /// Samples of the complete capture.
     pub of: u8,
-    /// The shots.
-    pub shots: Vec<CaptureSample, IN_FRAME>,
+    /// The samples.
+    pub samples: Vec<CaptureSample, CHUNK_SAMPLES>,
 }
 
-/// What a capture is doing.
+/// Progress of a capture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Doing {
-    /// Keeps the latest, waits for a trigger.
+enum Progress {
+    /// Keeps the latest samples, waits for a trigger.
     #[default]
     Watching,
-    /// Triggered; so many shots are still to come.
+    /// Triggered; so many samples are still to come.
     Filling(Trigger, Tick, u8),
-    /// Whole; so many shots have been sent.
+    /// Complete; so many samples have been sent.
     Draining(Trigger, Tick, u8),
 }
 
-/// The ring of a capture, and what it waits for.
+/// The ring of samples and the trigger's state.
 #[derive(Debug, Default)]
 pub struct Capture {
-    shots: HistoryBuf<CaptureSample, SHOTS>,
-    doing: Doing,
+    samples: HistoryBuf<CaptureSample, SAMPLES>,
+    progress: Progress,
     since: u32,
-    /// This approach has set it off already.
-    told: bool,
+    /// This approach has triggered already.
+    triggered: bool,
     held: bool,
 }
 
@@ -111,39 +107,39 @@ impl Capture {
     /// A capture that waits.
     pub const fn new() -> Self {
         Self {
-            shots: HistoryBuf::new(),
-            doing: Doing::Watching,
+            samples: HistoryBuf::new(),
+            progress: Progress::Watching,
             since: 0,
-            told: false,
+            triggered: false,
             held: false,
         }
     }
 
-    /// Looks at a tick; `corner` is the way of the wheel over a corner, mm.
+    /// Takes one tick into account; `corner` is the travel of the wheel over a corner, mm.
     pub fn look(&mut self, record: &Record, corner: Millimetres) {
         let trigger = self.trigger(record, corner);
-        match (self.doing, trigger) {
-            (Doing::Watching, Some(trigger)) => {
-                self.doing = Doing::Filling(trigger, record.at(), AFTER);
+        match (self.progress, trigger) {
+            (Progress::Watching, Some(trigger)) => {
+                self.progress = Progress::Filling(trigger, record.at(), AFTER);
             }
             // A fault outweighs what was to be seen before it.
             (
-                Doing::Filling(Trigger::Step | Trigger::Command, ..)
-                | Doing::Draining(Trigger::Step | Trigger::Command, ..),
+                Progress::Filling(Trigger::Step | Trigger::Command, ..)
+                | Progress::Draining(Trigger::Step | Trigger::Command, ..),
                 Some(Trigger::Fault),
-            ) => self.doing = Doing::Filling(Trigger::Fault, record.at(), AFTER),
+            ) => self.progress = Progress::Filling(Trigger::Fault, record.at(), AFTER),
             _ => {}
         }
         self.since += 1;
-        if self.since < EVERY || matches!(self.doing, Doing::Draining(..)) {
+        if self.since < EVERY || matches!(self.progress, Progress::Draining(..)) {
             return;
         }
         self.since = 0;
-        self.shots.write(CaptureSample::of(record));
-        if let Doing::Filling(trigger, at, left) = self.doing {
-            self.doing = match left {
-                0 | 1 => Doing::Draining(trigger, at, 0),
-                _ => Doing::Filling(trigger, at, left - 1),
+        self.samples.write(CaptureSample::of(record));
+        if let Progress::Filling(trigger, at, left) = self.progress {
+            self.progress = match left {
+                0 | 1 => Progress::Draining(trigger, at, 0),
+                _ => Progress::Filling(trigger, at, left - 1),
             };
         }
     }
@@ -157,12 +153,12 @@ impl Capture {
             Mode::Run(Direction::Deploy, Leg::Approach | Leg::Crossing) => seen.distance <= corner,
             Mode::Run(Direction::Retract, Leg::Approach | Leg::Crossing) => seen.distance <= CLOSE,
             _ => {
-                self.told = false;
+                self.triggered = false;
                 false
             }
         };
-        let step = reached && !self.told;
-        self.told |= reached;
+        let step = reached && !self.triggered;
+        self.triggered |= reached;
         if fault {
             Some(Trigger::Fault)
         } else if step {
@@ -172,28 +168,29 @@ impl Capture {
         }
     }
 
-    /// The next piece to be sent, if there is one; [`Capture::sent`] says that it was.
-    pub fn piece(&self) -> Option<CaptureChunk> {
-        let Doing::Draining(trigger, at, first) = self.doing else { return None };
-        let rest = self.shots.oldest_ordered().skip(usize::from(first));
-        let shots: Vec<CaptureSample, IN_FRAME> = rest.take(IN_FRAME).copied().collect();
-        Some(CaptureChunk { trigger, at, first, of: self.shots.len() as u8, shots })
+    /// The next chunk to send, if there is one; [`Capture::sent`] confirms it.
+    pub fn chunk(&self) -> Option<CaptureChunk> {
+        let Progress::Draining(trigger, at, first) = self.progress else { return None };
+        let rest = self.samples.oldest_ordered().skip(usize::from(first));
+        let samples: Vec<CaptureSample, CHUNK_SAMPLES> =
+            rest.take(CHUNK_SAMPLES).copied().collect();
+        Some(CaptureChunk { trigger, at, first, of: self.samples.len() as u8, samples })
     }
 
-    /// A piece has found room on the channel. After the last, the capture watches again.
-    pub fn sent(&mut self, piece: &CaptureChunk) {
-        let Doing::Draining(trigger, at, _) = self.doing else { return };
-        let next = piece.first + piece.shots.len() as u8;
-        if next < piece.of {
-            self.doing = Doing::Draining(trigger, at, next);
+    /// The chunk has been sent. After the last, the capture watches again.
+    pub fn sent(&mut self, chunk: &CaptureChunk) {
+        let Progress::Draining(trigger, at, _) = self.progress else { return };
+        let next = chunk.first + chunk.samples.len() as u8;
+        if next < chunk.of {
+            self.progress = Progress::Draining(trigger, at, next);
         } else {
-            self.shots.clear();
-            self.doing = Doing::Watching;
+            self.samples.clear();
+            self.progress = Progress::Watching;
         }
     }
 }
 
-const _: () = assert!(SHOTS <= u8::MAX as usize && (AFTER as usize) < SHOTS);
+const _: () = assert!(SAMPLES <= u8::MAX as usize && (AFTER as usize) < SAMPLES);
 const _: () = assert!(CLOSE.to_bits() < Q16::ONE.to_bits());
 
 #[cfg(test)]
@@ -205,7 +202,7 @@ mod tests {
     const CORNER: Millimetres = q16(13_500_000);
 
     fn row(at: Tick, mode: Mode, distance_mm: f64) -> Record {
-        let mut record = Record::EMPTY;
+        let mut record = Record::default();
         record.telemetry.at = at;
         record.telemetry.mode = mode;
         record.telemetry.distance = Q16::from_num(distance_mm);
@@ -220,14 +217,14 @@ mod tests {
         from + ticks
     }
 
-    fn whole(capture: &mut Capture) -> Option<(Trigger, Tick, std::vec::Vec<CaptureSample>)> {
+    fn drained(capture: &mut Capture) -> Option<(Trigger, Tick, std::vec::Vec<CaptureSample>)> {
         let mut all = std::vec::Vec::new();
-        let first = capture.piece()?;
-        while let Some(piece) = capture.piece() {
-            assert_eq!((piece.trigger, piece.at), (first.trigger, first.at));
-            assert_eq!(usize::from(piece.first), all.len());
-            all.extend(piece.shots.iter().copied());
-            capture.sent(&piece);
+        let first = capture.chunk()?;
+        while let Some(chunk) = capture.chunk() {
+            assert_eq!((chunk.trigger, chunk.at), (first.trigger, first.at));
+            assert_eq!(usize::from(chunk.first), all.len());
+            all.extend(chunk.samples.iter().copied());
+            capture.sent(&chunk);
         }
         assert_eq!(all.len(), usize::from(first.of));
         Some((first.trigger, first.at, all))
@@ -237,24 +234,24 @@ mod tests {
     fn a_step_is_seen_from_before_the_predicted_touch_to_after_it() {
         let mut capture = Capture::new();
         approach(&mut capture, 1000, 2000, Mode::Run(Direction::Deploy, Leg::Approach));
-        let (trigger, at, shots) = whole(&mut capture).expect("captured");
+        let (trigger, at, samples) = drained(&mut capture).expect("captured");
         assert_eq!(trigger, Trigger::Step);
         // 20 mm less 13.5 mm at 0.01 mm a tick.
         assert_eq!(at, 1650);
-        assert_eq!(shots.len(), SHOTS);
-        for pair in shots.windows(2) {
+        assert_eq!(samples.len(), SAMPLES);
+        for pair in samples.windows(2) {
             assert_eq!(u32::from(pair[1].at.wrapping_sub(pair[0].at)), EVERY);
         }
-        let before = shots.iter().filter(|shot| u32::from(shot.at) < at).count();
-        assert_eq!(before, SHOTS - usize::from(AFTER));
-        assert!(capture.piece().is_none());
+        let before = samples.iter().filter(|sample| u32::from(sample.at) < at).count();
+        assert_eq!(before, SAMPLES - usize::from(AFTER));
+        assert!(capture.chunk().is_none());
     }
 
     #[test]
     fn a_step_that_is_dropped_off_is_reached_at_its_face() {
         let mut capture = Capture::new();
         approach(&mut capture, 0, 3000, Mode::Run(Direction::Retract, Leg::Approach));
-        assert_eq!(whole(&mut capture).map(|(_, at, _)| at), Some(1950));
+        assert_eq!(drained(&mut capture).map(|(_, at, _)| at), Some(1950));
     }
 
     #[test]
@@ -262,11 +259,11 @@ mod tests {
         let mut capture = Capture::new();
         let crossing = Mode::Run(Direction::Deploy, Leg::Crossing);
         approach(&mut capture, 0, 2000, crossing);
-        assert!(whole(&mut capture).is_some());
+        assert!(drained(&mut capture).is_some());
         for tick in 2000..5000 {
             capture.look(&row(tick, crossing, 1.0), CORNER);
         }
-        assert!(whole(&mut capture).is_none());
+        assert!(drained(&mut capture).is_none());
     }
 
     #[test]
@@ -278,7 +275,7 @@ mod tests {
             capture.look(&row(tick, hold, 100.0), CORNER);
         }
         approach(&mut capture, 3000, 2000, Mode::Run(Direction::Deploy, Leg::Approach));
-        let (trigger, at, _) = whole(&mut capture).expect("captured");
+        let (trigger, at, _) = drained(&mut capture).expect("captured");
         assert_eq!((trigger, at), (Trigger::Fault, 700));
     }
 
@@ -291,10 +288,10 @@ mod tests {
         for tick in 6..2000 {
             capture.look(&row(tick, Mode::Idle, 100.0), CORNER);
         }
-        let piece = capture.piece().expect("captured");
-        assert_eq!(capture.piece(), Some(piece.clone()));
-        assert_eq!(piece.trigger, Trigger::Command);
-        capture.sent(&piece);
-        assert_eq!(capture.piece().map(|next| next.first), Some(IN_FRAME as u8));
+        let chunk = capture.chunk().expect("captured");
+        assert_eq!(capture.chunk(), Some(chunk.clone()));
+        assert_eq!(chunk.trigger, Trigger::Command);
+        capture.sent(&chunk);
+        assert_eq!(capture.chunk().map(|next| next.first), Some(CHUNK_SAMPLES as u8));
     }
 }

@@ -1,4 +1,4 @@
-//! The one check of frames, messages and parameter sets: CRC-32 (ISO-HDLC).
+//! Check of frames, messages and parameter sets: CRC-32 (ISO-HDLC).
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 

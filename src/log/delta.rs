@@ -1,23 +1,22 @@
-//! Records as words with a map of those that changed: what stays the same takes a bit,
-//! what changes little half a word.
+//! Delta code of records: a map of the fields that changed, then their differences and words.
 //!
 //! ```text
-//! map, whole words | differences, half a word or a whole one each | words that changed
+//! map, complete words | differences, half a word or a word each | words that changed
 //! ```
-//! Two bits of the map for a number of which the difference is written: 0 none, 1 half a
-//! word, 2 a whole one; one for a word that is written as it is. The tick of a record is one
-//! more than that before, unless its difference to that is there. All is little end first.
+//! Two bits of the map for each field coded as a difference: 0 none, 1 half a word, 2 a word;
+//! one bit for each word that is copied. The tick of a record is coded as its difference from
+//! one more than that before. Little-endian throughout.
 
 use super::record::{Flags, Record};
 use crate::supervise::codes;
 use crate::tick::Telemetry;
 use crate::units::{Duty, Q16};
 
-/// Numbers of a record that are written as differences, behind the tick: the ages, and the
-/// quantities of [`Telemetry`].
+/// Fields of a record coded as differences, after the tick: the ages, and the quantities of
+/// [`Telemetry`].
 const NUMBERS: usize = 1 + Telemetry::COLUMNS.len();
 
-/// Words of a record that are written as they are.
+/// Words of a record that are copied.
 const WORDS: usize = 6;
 
 /// Bits of the map before those of the words.
@@ -28,10 +27,8 @@ const MAP: usize = (DIFFERENCES + WORDS).div_ceil(32) * 4;
 
 const _: () = assert!(MAP <= 8, "the map is kept in a u64");
 
-/// A record as whole numbers.
-///
-/// Differences wrap, so that any two records have one and no bit is lost.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// A record as integers. Differences wrap, so that no bit is lost between any two records.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct DeltaRecord {
     pub(super) at: u32,
     numbers: [u32; NUMBERS],
@@ -52,7 +49,7 @@ const fn halves(word: u32) -> [u16; 2] {
 }
 
 impl DeltaRecord {
-    /// A record of zeros, which the first of a frame is written as the difference to.
+    /// Zeros: the first record of a frame is coded as the difference from them.
     pub(super) const ZERO: Self = Self { at: 0, numbers: [0; NUMBERS], words: [0; WORDS] };
 
     /// The record as numbers.
@@ -62,7 +59,7 @@ impl DeltaRecord {
         let [wheel_age, preload_sensor_age, compression_sensor_age, arm_age] = *ages;
         let mut numbers = [0; NUMBERS];
         let (first, quantities) = numbers.split_at_mut(1);
-        // The arm's age lowest: read every second tick, it is the one that changes.
+        // The arm's age lowest: it changes in every tick, as the arm is read every second one.
         first[0] =
             u32::from_le_bytes([arm_age, wheel_age, preload_sensor_age, compression_sensor_age]);
         for (number, quantity) in quantities.iter_mut().zip(t.quantities()) {
@@ -82,7 +79,7 @@ impl DeltaRecord {
         }
     }
 
-    /// The record of the numbers; none if one of them has no meaning.
+    /// The record of the integers; none if one of them has no meaning.
     pub(super) fn record(&self) -> Option<Record> {
         let [ages, quantities @ ..] = self.numbers;
         let [wheel_and_cell, tread_and_arm, bridges, duties, state, flags] = self.words;
@@ -93,8 +90,15 @@ impl DeltaRecord {
         let [drive, pretightener] = halves(duties).map(|half| Duty::from_bits(half as i16));
         let (mode, stage) = (codes::mode(mode)?, codes::stage(stage)?);
         (rest == 0).then_some(())?;
-        let state =
-            Telemetry { at: self.at, mode, stage, level, drive, pretightener, ..Telemetry::EMPTY };
+        let state = Telemetry {
+            at: self.at,
+            mode,
+            stage,
+            level,
+            drive,
+            pretightener,
+            ..Telemetry::default()
+        };
         Some(Record {
             telemetry: state.with_quantities(quantities.map(|bits| Q16::from_bits(bits as i32))),
             codes: [wheel, preload_sensor, compression_sensor, arm],
@@ -104,7 +108,7 @@ impl DeltaRecord {
         })
     }
 
-    /// Writes what it is after `before`, and takes that one's place; so many bytes.
+    /// Writes the difference from `before`, and replaces that; returns the bytes written.
     pub(super) fn put(&self, before: &mut Self, room: &mut [u8; LONGEST]) -> usize {
         let mut list = List { map: 0, used: MAP, room };
         list.number(0, self.at, before.at.wrapping_add(1));
@@ -122,7 +126,7 @@ impl DeltaRecord {
         list.used
     }
 
-    /// Reads what comes after `before`, and what is left behind it; none if it is not complete.
+    /// Reads the record that follows `before`, and the bytes after it; none if incomplete.
     pub(super) fn take<'a>(before: &Self, bytes: &'a [u8]) -> Option<(Self, &'a [u8])> {
         let mut map = [0; 8];
         let (start, mut rest) = bytes.split_first_chunk::<MAP>()?;
@@ -149,7 +153,7 @@ impl DeltaRecord {
     }
 }
 
-/// What is written of a record, with the map of it.
+/// The code of a record as it is written.
 struct List<'a> {
     map: u64,
     used: usize,
@@ -157,7 +161,7 @@ struct List<'a> {
 }
 
 impl List<'_> {
-    /// The number at this place of the map, by its difference to what was to be expected.
+    /// Codes the number with this index in the map by its difference from the expected one.
     fn number(&mut self, place: usize, number: u32, expected: u32) {
         let difference = number.wrapping_sub(expected) as i32;
         if difference == 0 {
@@ -172,7 +176,7 @@ impl List<'_> {
         }
     }
 
-    /// Bytes for which there is room.
+    /// Appends bytes; the room suffices for every record.
     fn put<const N: usize>(&mut self, bytes: [u8; N]) {
         let rest = self.room.get_mut(self.used..);
         if let Some(place) = rest.and_then(|rest| rest.first_chunk_mut::<N>()) {
@@ -225,7 +229,7 @@ mod tests {
 
         #[test]
         fn differences_within_half_a_word_take_that(step in any::<i16>()) {
-            let one = Record::EMPTY;
+            let one = Record::default();
             let mut other = one;
             other.telemetry.at = one.telemetry.at.wrapping_add(1);
             other.telemetry.speed = Q16::from_bits(step.into());
@@ -235,7 +239,7 @@ mod tests {
 
     #[test]
     fn a_tick_without_news_takes_its_codes_and_ages_at_most() {
-        let before = Record::EMPTY;
+        let before = Record::default();
         let mut after = before;
         after.telemetry.at += 1;
         assert_eq!(written(&before, &after).len(), 4);
@@ -247,7 +251,7 @@ mod tests {
 
     #[test]
     fn numbers_without_meaning_are_no_record() {
-        let sound = DeltaRecord::of(&Record::EMPTY);
+        let sound = DeltaRecord::of(&Record::default());
         assert!(sound.record().is_some());
         // Stage 0, mode 99, a byte that says nothing, flags beyond 16 bits.
         let state = |stage, mode, rest| u32::from_le_bytes([0, stage, mode, rest]);

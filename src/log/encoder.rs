@@ -1,4 +1,4 @@
-//! From ticks and entries to frames: the journal's part of the binary log.
+//! From ticks and entries to frames of the binary log; run by the journal.
 
 use super::capture::Capture;
 use super::frame::{FrameBuffer, Head, Kind, TicksFrame};
@@ -16,10 +16,10 @@ const IDENTITY_EVERY: u32 = 1000;
 /// Ticks in a frame, as far as they fit.
 pub const TICKS_PER_FRAME: usize = 8;
 
-/// Takes a frame complete, or says that it did not.
+/// Takes a complete frame, and returns whether it did.
 pub type FrameSink<'a> = &'a mut dyn FnMut(&[u8]) -> bool;
 
-/// Writes frames. It never waits: what finds no room is dropped as a whole and counted.
+/// Writes frames. It never waits: a frame that finds no room is dropped and counted.
 pub struct LogEncoder {
     identity: Identity,
     introduced: Option<Tick>,
@@ -74,7 +74,7 @@ impl LogEncoder {
         self.one(Kind::Request, &(at, request), send);
     }
 
-    /// Writes a log entry; of a crossing, its line of the ledger as well.
+    /// Writes a log entry, and after a crossing its line of the ledger.
     pub fn entry(&mut self, entry: &Entry, send: FrameSink<'_>) {
         self.one(Kind::Event, entry, send);
         if let Event::Crossing(crossing) = &entry.event {
@@ -83,8 +83,8 @@ impl LogEncoder {
         }
     }
 
-    /// Sends the ticks that wait for their frame to fill, the identity before them once a
-    /// second, and a piece of a capture behind them.
+    /// Sends the buffered ticks, once a second the identity before them, and a chunk of a
+    /// capture after them.
     pub fn flush(&mut self, send: FrameSink<'_>) {
         if self.ticks.ticks() == 0 {
             return;
@@ -98,19 +98,19 @@ impl LogEncoder {
         }
         let room = send(self.ticks.close(self.sequence, self.dropped));
         self.count(room);
-        // A capture waits for the room that the ticks leave.
-        if let Some(piece) = self.capture.piece()
-            && self.one(Kind::CaptureChunk, &piece, send)
+        // A capture uses the room that the ticks leave.
+        if let Some(chunk) = self.capture.chunk()
+            && self.one(Kind::CaptureChunk, &chunk, send)
         {
-            self.capture.sent(&piece);
+            self.capture.sent(&chunk);
         }
     }
 
-    /// A frame of one value; whether there was room for it.
+    /// Sends a frame of one value; returns whether there was room.
     #[inline(never)]
     fn one(&mut self, kind: Kind, value: &impl Serialize, send: FrameSink<'_>) -> bool {
         let head = Head { kind: kind as u8, sequence: self.sequence, dropped: self.dropped };
-        // All of them fit, see the test.
+        // All values fit, see the test.
         let frame = self
             .buffer
             .write(head, |body| postcard::to_slice(value, body).map_or(0, |used| used.len()));
@@ -119,7 +119,7 @@ impl LogEncoder {
         room
     }
 
-    /// A frame has been made, and has found room or not.
+    /// Counts a frame, sent or not.
     fn count(&mut self, room: bool) {
         self.sequence = self.sequence.wrapping_add(1);
         self.dropped = self.dropped.wrapping_add(u32::from(!room));
@@ -129,7 +129,7 @@ impl LogEncoder {
 #[cfg(test)]
 #[allow(clippy::float_arithmetic, reason = "positions of the test")]
 mod tests {
-    use super::super::capture::{CaptureChunk, CaptureSample, IN_FRAME, Trigger};
+    use super::super::capture::{CHUNK_SAMPLES, CaptureChunk, CaptureSample, Trigger};
     use super::super::frame::{Body, Frame};
     use super::super::identity;
     use super::super::ledger::tests::crossing;
@@ -184,7 +184,7 @@ mod tests {
 
     fn run(encoder: &mut LogEncoder, channel: &mut Channel, ticks: core::ops::Range<Tick>) {
         for at in ticks {
-            let mut record = Record::EMPTY;
+            let mut record = Record::default();
             record.telemetry.at = at;
             record.telemetry.mode = Mode::Idle;
             record.telemetry.position = Q16::from_num(f64::from(at) * 0.008);
@@ -205,19 +205,19 @@ mod tests {
     }
 
     #[test]
-    fn it_speaks_for_whom_it_was_told_to() {
+    fn it_sends_the_identity_that_was_set() {
         let mut encoder = LogEncoder::new(Identity::NOBODY);
-        let somebody =
+        let identity =
             Identity { parameters: 0xABCD, rig: identity::text("fe"), ..Identity::NOBODY };
-        encoder.set_identity(somebody.clone());
+        encoder.set_identity(identity.clone());
         let mut channel = Channel::default();
         run(&mut encoder, &mut channel, 0..TICKS_PER_FRAME as u32);
-        let said = Frame::open(&channel.frames[0]).unwrap().body().unwrap();
-        assert_eq!(said, Body::Identity(somebody));
+        let sent = Frame::open(&channel.frames[0]).unwrap().body().unwrap();
+        assert_eq!(sent, Body::Identity(identity));
     }
 
     #[test]
-    fn what_finds_no_room_is_counted_and_takes_nothing_else_with_it() {
+    fn a_frame_without_room_is_counted_and_alone_is_lost() {
         let (mut encoder, mut channel) = (encoder(), Channel::default());
         run(&mut encoder, &mut channel, 0..80);
         channel.room = Some(0);
@@ -299,19 +299,19 @@ mod tests {
             limits: [Some(Limit::SlipMarginLow); 3],
             outcome: Some(outcome),
         };
-        let shot = CaptureSample {
+        let sample = CaptureSample {
             at: u16::MAX,
             codes: [u16::MAX; 4],
             duties: [i16::MIN; 2],
             mode: 255,
             stage: 255,
         };
-        let piece = CaptureChunk {
+        let chunk = CaptureChunk {
             trigger: Trigger::Command,
             at: u32::MAX,
             first: 255,
             of: 255,
-            shots: core::iter::repeat_n(shot, IN_FRAME).collect(),
+            samples: core::iter::repeat_n(sample, CHUNK_SAMPLES).collect(),
         };
         let text = "x".repeat(identity::MAX_TEXT);
         let identity = Identity {
@@ -326,23 +326,21 @@ mod tests {
         let mut encoder = encoder();
         encoder.sequence = u32::MAX;
         encoder.dropped = u32::MAX;
-        let mut bodies = Vec::new();
-        let mut send = |frame: &[u8]| {
-            bodies.push(frame.to_vec());
-            true
-        };
+        let mut frames = Channel::default();
+        let mut send = |frame: &[u8]| frames.send(frame);
         let entry = Entry { at: u32::MAX, event: Event::Crossing(crossing) };
         encoder.entry(&entry, &mut send);
         encoder.one(Kind::Plan, &(u32::MAX, plan), &mut send);
         encoder.one(Kind::Request, &(u32::MAX, request), &mut send);
-        encoder.one(Kind::CaptureChunk, &piece, &mut send);
+        encoder.one(Kind::CaptureChunk, &chunk, &mut send);
         encoder.one(Kind::Identity, &identity, &mut send);
-        let mut read = bodies.iter().map(|bytes| Frame::open(bytes).unwrap().body().unwrap());
+        let mut read =
+            frames.frames.iter().map(|bytes| Frame::open(bytes).unwrap().body().unwrap());
         assert_eq!(read.next(), Some(Body::Event(entry)));
         assert!(matches!(read.next(), Some(Body::Ledger(line)) if line.crossing == crossing));
         assert_eq!(read.next(), Some(Body::Plan(u32::MAX, plan)));
         assert_eq!(read.next(), Some(Body::Request(u32::MAX, request)));
-        assert_eq!(read.next(), Some(Body::CaptureChunk(piece)));
+        assert_eq!(read.next(), Some(Body::CaptureChunk(chunk)));
         assert_eq!(read.next(), Some(Body::Identity(identity)));
     }
 }

@@ -1,16 +1,14 @@
-//! A frame of the binary log: how it lies on the channel.
+//! Layout of a frame of the binary log.
 //!
 //! ```text
-//! sync | length | kind | 0 | sequence | dropped | body, zeros to a whole word | CRC-32
+//! sync | length | kind | 0 | sequence | dropped | body, zeros to a full word | CRC-32
 //!    4 |      2 |    1 | 1 |        4 |       4 |                   length .. |      4
 //! ```
-//! Numbers have their little end first; the check is over all between sync and itself.
-//! Everything stands on whole words, so that the core copies words and its CRC unit takes
-//! them; stuffing bytes would cost several times all the rest. A reader that comes late or
-//! meets garbage looks for the next sync with a sound frame behind it: a sync in the middle
-//! of other content is told by the check. Every frame stands for itself: the loss of one
-//! takes nothing from the others. The sequence counts frames since boot, those that found
-//! no room too; `dropped` counts these.
+//! Little-endian; the check covers everything between the sync and itself. Everything is
+//! word-aligned, so that the core copies words; byte stuffing would cost several times as much.
+//! A reader that joins late or meets garbage searches the next sync with a sound frame behind
+//! it; the check rejects a sync inside other content. Frames are independent: the loss of one
+//! affects no other. The sequence counts all frames since boot, `dropped` those without room.
 
 use serde::Deserialize;
 
@@ -41,21 +39,21 @@ const CHECK: usize = 4;
 
 const _: () = assert!(BODY.is_multiple_of(4) && HEAD.is_multiple_of(4));
 
-/// What a frame holds, as a number that stays.
+/// Content of a frame; the numbers are stable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Kind {
     /// An [`Identity`].
     Identity = 1,
-    /// [`Record`]s, each but the first as difference to the one before.
+    /// [`Record`]s, each but the first as its difference from the one before.
     Ticks = 2,
-    /// A plan with the tick that was given it.
+    /// A plan with the tick that received it.
     Plan = 3,
     /// A request with the tick that made it.
     Request = 4,
     /// A log [`Entry`].
     Event = 5,
-    /// A piece of a capture: [`CaptureChunk`].
+    /// A chunk of a capture: [`CaptureChunk`].
     CaptureChunk = 6,
     /// A [`Line`] of the crossings' ledger.
     Ledger = 7,
@@ -74,18 +72,18 @@ impl Kind {
     ];
 }
 
-/// What stands before a frame's body.
+/// Head of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Head {
-    /// What it holds.
+    /// [`Kind`] of its content.
     pub kind: u8,
     /// Frames since boot before this one.
     pub sequence: u32,
-    /// Of these, the ones that found no room on the channel.
+    /// Those of them that found no room on the channel.
     pub dropped: u32,
 }
 
-/// Room for a frame.
+/// Buffer of a frame.
 #[derive(Debug)]
 #[repr(align(4))]
 pub struct FrameBuffer([u8; LONGEST]);
@@ -97,25 +95,26 @@ impl Default for FrameBuffer {
 }
 
 impl FrameBuffer {
-    /// An empty one.
+    /// An empty buffer.
     pub const fn new() -> Self {
         Self([0; LONGEST])
     }
 
-    /// Makes it the frame whose body `fill` writes, so many bytes of it, and returns that.
+    /// Builds a frame in the buffer and returns it; `fill` writes the body and returns its
+    /// length, bytes.
     #[inline]
     pub fn write(&mut self, head: Head, fill: impl FnOnce(&mut [u8; BODY]) -> usize) -> &[u8] {
         let Some((start, rest)) = self.0.split_first_chunk_mut::<HEAD>() else { return &[] };
         let Some(body) = rest.first_chunk_mut::<BODY>() else { return &[] };
         let length = fill(body).min(BODY);
-        let whole = length.next_multiple_of(4);
-        body[length..whole].fill(0);
+        let padded = length.next_multiple_of(4);
+        body[length..padded].fill(0);
         let [a, b] = (length as u16).to_le_bytes();
         start[..4].copy_from_slice(&SYNC);
         start[4..8].copy_from_slice(&[a, b, head.kind, 0]);
         start[8..12].copy_from_slice(&head.sequence.to_le_bytes());
         start[12..].copy_from_slice(&head.dropped.to_le_bytes());
-        let end = HEAD + whole;
+        let end = HEAD + padded;
         let sum = crc32(&self.0[SYNC.len()..end]);
         if let Some(place) = self.0[end..].first_chunk_mut() {
             *place = sum.to_le_bytes();
@@ -127,91 +126,88 @@ impl FrameBuffer {
 /// Why bytes are not a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameError {
-    /// It does not begin as one, or has another length.
+    /// Not the begin of a frame, or another length.
     Form,
     /// The check does not fit.
     Check,
-    /// The check fits and the content does not: not written by this program.
+    /// The check fits and the content does not: written by another program.
     Content,
 }
 
 /// A frame whose check fits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame<'a> {
-    /// What stands before the body.
+    /// Its head.
     pub head: Head,
     body: &'a [u8],
 }
 
-/// What a frame says.
+/// Content of a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Body<'a> {
-    /// Who speaks.
+    /// The source of the log.
     Identity(Identity),
     /// Ticks.
     Ticks(Ticks<'a>),
-    /// A tick was given this plan.
+    /// The plan that a tick received.
     Plan(Tick, Plan),
-    /// A tick asked for a plan.
+    /// The request of a tick.
     Request(Tick, PlanRequest),
-    /// Something happened.
+    /// A log entry.
     Event(Entry),
-    /// A piece of a capture.
+    /// A chunk of a capture.
     CaptureChunk(CaptureChunk),
-    /// A crossing was closed.
+    /// The ledger line of a crossing.
     Ledger(Line),
-    /// Something that this reader does not know.
+    /// A kind that this reader does not know.
     Unknown,
 }
 
-/// What stands at the beginning of bytes.
+/// What bytes begin with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Seen<'a> {
-    /// A frame, and its length with all that belongs to it.
+pub enum Found<'a> {
+    /// A frame, and its complete length.
     Frame(Frame<'a>, usize),
-    /// The beginning of a frame, or of what looks like one: more has to come.
+    /// A possible begin of a frame: more bytes are needed.
     Part,
-    /// So many bytes that are no frame, one at least.
+    /// So many bytes that belong to no frame, at least one.
     Garbage(usize),
 }
 
-/// Looks at the beginning of bytes.
-pub fn look(bytes: &[u8]) -> Seen<'_> {
-    let begins = |at: &usize| {
-        let seen = &bytes[*at..bytes.len().min(at + SYNC.len())];
-        SYNC.starts_with(seen)
-    };
+/// Finds what bytes begin with.
+pub fn find(bytes: &[u8]) -> Found<'_> {
+    let begins = |at: &usize| SYNC.starts_with(&bytes[*at..bytes.len().min(at + SYNC.len())]);
     match (0..bytes.len()).find(begins) {
         Some(0) => {}
-        Some(garbage) => return Seen::Garbage(garbage),
-        None if bytes.is_empty() => return Seen::Part,
-        None => return Seen::Garbage(bytes.len()),
+        Some(garbage) => return Found::Garbage(garbage),
+        None if bytes.is_empty() => return Found::Part,
+        None => return Found::Garbage(bytes.len()),
     }
-    let Some((start, rest)) = bytes.split_first_chunk::<HEAD>() else { return Seen::Part };
+    let Some((start, rest)) = bytes.split_first_chunk::<HEAD>() else { return Found::Part };
     let &[_, _, _, _, a, b, kind, zero, ..] = start;
     let length = usize::from(u16::from_le_bytes([a, b]));
     if length > BODY || zero != 0 {
-        return Seen::Garbage(1);
+        return Found::Garbage(1);
     }
     let word = |at: usize| start[at..].first_chunk().map_or(0, |word| u32::from_le_bytes(*word));
     let end = HEAD + length.next_multiple_of(4);
-    let Some(sum) = bytes.get(end..end + CHECK) else { return Seen::Part };
+    let Some(sum) = bytes.get(end..end + CHECK) else { return Found::Part };
     if crc32(&bytes[SYNC.len()..end]).to_le_bytes() != sum {
-        return Seen::Garbage(1);
+        return Found::Garbage(1);
     }
     let head = Head { kind, sequence: word(8), dropped: word(12) };
-    Seen::Frame(Frame { head, body: &rest[..length] }, end + CHECK)
+    Found::Frame(Frame { head, body: &rest[..length] }, end + CHECK)
 }
 
 impl<'a> Frame<'a> {
     /// Opens bytes that are one frame.
     ///
     /// # Errors
-    /// [`FrameError`] for anything but a whole frame.
+    /// [`FrameError`] for anything but one complete frame.
     pub fn open(bytes: &'a [u8]) -> Result<Self, FrameError> {
-        match look(bytes) {
-            Seen::Frame(frame, length) if length == bytes.len() => Ok(frame),
-            Seen::Garbage(1) => Err(FrameError::Check),
+        match find(bytes) {
+            Found::Frame(frame, length) if length == bytes.len() => Ok(frame),
+            Found::Garbage(1) => Err(FrameError::Check),
             _ => Err(FrameError::Form),
         }
     }
@@ -225,13 +221,13 @@ impl<'a> Frame<'a> {
             return Ok(Body::Unknown);
         };
         Ok(match kind {
-            Kind::Identity => Body::Identity(whole(self.body)?),
-            Kind::Ticks => Body::Ticks(Ticks { before: DeltaRecord::default(), rest: self.body }),
-            Kind::Plan => whole(self.body).map(|(at, plan)| Body::Plan(at, plan))?,
-            Kind::Request => whole(self.body).map(|(at, request)| Body::Request(at, request))?,
-            Kind::Event => Body::Event(whole(self.body)?),
-            Kind::CaptureChunk => Body::CaptureChunk(whole(self.body)?),
-            Kind::Ledger => Body::Ledger(whole(self.body)?),
+            Kind::Identity => Body::Identity(complete(self.body)?),
+            Kind::Ticks => Body::Ticks(Ticks { before: DeltaRecord::ZERO, rest: self.body }),
+            Kind::Plan => complete(self.body).map(|(at, plan)| Body::Plan(at, plan))?,
+            Kind::Request => complete(self.body).map(|(at, request)| Body::Request(at, request))?,
+            Kind::Event => Body::Event(complete(self.body)?),
+            Kind::CaptureChunk => Body::CaptureChunk(complete(self.body)?),
+            Kind::Ledger => Body::Ledger(complete(self.body)?),
         })
     }
 }
@@ -240,7 +236,7 @@ fn take<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<(T, &'a [u8]), FrameE
     postcard::take_from_bytes(bytes).map_err(|_| FrameError::Content)
 }
 
-fn whole<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, FrameError> {
+fn complete<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, FrameError> {
     match take(bytes)? {
         (value, []) => Ok(value),
         _ => Err(FrameError::Content),
@@ -261,9 +257,9 @@ impl Iterator for Ticks<'_> {
         if self.rest.is_empty() {
             return None;
         }
-        let read = DeltaRecord::take(&self.before, self.rest).and_then(|(wire, rest)| {
-            let record = wire.record()?;
-            (self.before, self.rest) = (wire, rest);
+        let read = DeltaRecord::take(&self.before, self.rest).and_then(|(delta, rest)| {
+            let record = delta.record()?;
+            (self.before, self.rest) = (delta, rest);
             Some(record)
         });
         if read.is_none() {
@@ -273,7 +269,7 @@ impl Iterator for Ticks<'_> {
     }
 }
 
-/// A frame of ticks that fills up, one record behind the other.
+/// A frame of ticks that is being filled.
 #[derive(Debug)]
 pub(super) struct TicksFrame {
     buffer: FrameBuffer,
@@ -283,22 +279,22 @@ pub(super) struct TicksFrame {
 }
 
 impl TicksFrame {
-    /// Without a tick.
+    /// An empty frame.
     pub(super) const fn new() -> Self {
         Self { buffer: FrameBuffer::new(), before: DeltaRecord::ZERO, length: 0, ticks: 0 }
     }
 
-    /// Ticks in it.
+    /// Number of its ticks.
     pub(super) const fn ticks(&self) -> usize {
         self.ticks
     }
 
-    /// The latest of them.
+    /// The latest tick.
     pub(super) const fn latest(&self) -> Tick {
         self.before.at
     }
 
-    /// Adds a record; false if there is no room for one of any kind.
+    /// Adds a record; false if there might be no room.
     pub(super) fn push(&mut self, record: &Record) -> bool {
         let rest = self.buffer.0.get_mut(HEAD + self.length..LONGEST - CHECK);
         let Some(room) = rest.and_then(|rest| rest.first_chunk_mut()) else { return false };
@@ -307,7 +303,7 @@ impl TicksFrame {
         true
     }
 
-    /// The frame; the next record begins another.
+    /// Returns the frame and begins the next.
     pub(super) fn close(&mut self, sequence: u32, dropped: u32) -> &[u8] {
         let length = self.length;
         (self.before, self.length, self.ticks) = (DeltaRecord::ZERO, 0, 0);
@@ -334,22 +330,22 @@ mod tests {
         (frame.close(sequence, sequence / 3).to_vec(), put)
     }
 
-    /// Frames found one after the other in bytes, and how many bytes are none.
+    /// Heads of the frames in these bytes, and how many bytes belong to none.
     fn read(mut bytes: &[u8]) -> (Vec<Head>, usize) {
         let (mut heads, mut garbage) = (Vec::new(), 0);
         loop {
-            let used = match look(bytes) {
-                Seen::Frame(frame, length) => {
+            let used = match find(bytes) {
+                Found::Frame(frame, length) => {
                     heads.push(frame.head);
                     length
                 }
-                Seen::Part if bytes.is_empty() => return (heads, garbage),
-                // Nothing more comes.
-                Seen::Part => {
+                Found::Part if bytes.is_empty() => return (heads, garbage),
+                // The input ends here.
+                Found::Part => {
                     garbage += 1;
                     1
                 }
-                Seen::Garbage(used) => {
+                Found::Garbage(used) => {
                     garbage += used;
                     used
                 }
@@ -388,10 +384,10 @@ mod tests {
             garbage in prop::collection::vec(prop_oneof![any::<u8>(), prop::sample::select(SYNC.to_vec())], 0..600),
             cut in any::<prop::sample::Index>(),
         ) {
-            let whole = [frame(&[record], 1).0, frame(&[record, record], 2).0].concat();
-            // A part of a frame too is garbage, as for a reader that comes late.
-            let part = &whole[cut.index(whole.len() / 2)..];
-            let bytes = [&garbage[..], part, &whole].concat();
+            let frames = [frame(&[record], 1).0, frame(&[record, record], 2).0].concat();
+            // A partial frame is garbage too, as for a reader that joins late.
+            let part = &frames[cut.index(frames.len() / 2)..];
+            let bytes = [&garbage[..], part, &frames].concat();
             let heads = read(&bytes).0;
             let sequences: Vec<u32> = heads.iter().map(|head| head.sequence).collect();
             prop_assert!(sequences.ends_with(&[1, 2]), "{sequences:?}");
@@ -409,7 +405,7 @@ mod tests {
                 BODY
             });
             prop_assert_eq!(read(bytes).0.len(), 1);
-            // Of a frame that lost its beginning nothing is made up.
+            // A frame without its begin yields nothing.
             prop_assert_eq!(read(&bytes[1..]), (vec![], bytes.len() - 1));
         }
     }

@@ -1,12 +1,12 @@
-//! What every log begins with: who speaks, with which parameters.
+//! Head of every log: firmware, image, rig and parameters.
 
 use serde::{Deserialize, Serialize};
 
 use super::crc::crc32;
 use crate::units::Millimetres;
 
-/// Layout of the frames. Raised with every change of it; a reader of another number says
-/// so and decodes nothing.
+/// Layout of the frames. Raised with every change of it; a reader of another number reports
+/// that and decodes nothing.
 pub const SCHEMA: u16 = 2;
 
 /// Longest version, build and name, bytes.
@@ -15,7 +15,7 @@ pub const MAX_TEXT: usize = 24;
 /// A short text.
 pub type Text = heapless::String<MAX_TEXT>;
 
-/// Who speaks. Sent first and every second, so that a reader that comes late knows.
+/// Source of a log. Sent first and every second, for readers that join late.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Identity {
     /// Layout of the frames, [`SCHEMA`].
@@ -30,12 +30,12 @@ pub struct Identity {
     pub parameters: u32,
     /// CRC-32 of its sensors' parameters alone.
     pub calibration: u32,
-    /// Way of the wheel over a corner, mm.
+    /// Travel of the wheel over a corner, mm.
     pub corner: Millimetres,
 }
 
 impl Identity {
-    /// Nobody yet.
+    /// Not known yet.
     pub const NOBODY: Self = Self {
         schema: 0,
         version: Text::new(),
@@ -58,7 +58,7 @@ pub fn text(from: &str) -> Text {
     text
 }
 
-/// CRC-32 of what postcard makes of `value`, which takes 4 KiB at most; for the host.
+/// CRC-32 of a value as postcard, 4 KiB at most; for the host.
 pub fn fingerprint(value: &impl Serialize) -> u32 {
     postcard::to_slice(value, &mut [0; 4096]).map_or(0, |written| crc32(written))
 }

@@ -1,8 +1,5 @@
-//! The ledger of the crossings: what the controller says of each, and what only the rows
-//! around it tell.
-//!
-//! It is kept by the journal, from the records that pass through it, so that the tick
-//! does nothing for it.
+//! Ledger of the crossings: the controller's record of each, and what only the ticks around it
+//! show. The journal keeps it from the records that it encodes, at no cost to the tick.
 
 #![deny(clippy::float_arithmetic)]
 
@@ -24,27 +21,27 @@ pub struct Line {
     pub at: Tick,
     /// Crossings since boot, this one included.
     pub count: u16,
-    /// What the controller says.
+    /// The controller's record.
     pub crossing: CrossingRecord,
-    /// Most that the wheel was slower than asked while it was on the corner, mm/s.
+    /// Largest shortfall of the speed below its reference on the corner, mm/s.
     pub speed_dip: MillimetresPerSecond,
-    /// How much farther the wheel turned than it went since the last step that was found,
-    /// mm: creep, slip, and the two steps' tolerances.
+    /// Travel of the wheel beyond the distance from the last step found, mm: creep, slip, and
+    /// the tolerances of both steps.
     pub slip: Millimetres,
     /// Measured minus predicted gap, mm.
     pub gap_residual: Millimetres,
-    /// Change of the stiffness scale per crossing, the newest weighing a quarter: wear
-    /// and ageing of the tread show here.
+    /// Change of the stiffness scale per crossing, the newest weighing a quarter: shows wear
+    /// and ageing of the tread.
     pub trend: Ratio,
 }
 
-/// What the ledger remembers between its lines.
+/// State of the ledger between its lines.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Ledger {
     count: u16,
-    /// Dip of the crossing under way, and of the one whose line is due.
+    /// Dip of the crossing in progress, and of the one whose line is due.
     dip: MillimetresPerSecond,
-    behind: MillimetresPerSecond,
+    due: MillimetresPerSecond,
     on_corner: bool,
     scale: Option<Ratio>,
     trend: Ratio,
@@ -56,14 +53,14 @@ impl Ledger {
         Self {
             count: 0,
             dip: Q16::ZERO,
-            behind: Q16::ZERO,
+            due: Q16::ZERO,
             on_corner: false,
             scale: None,
             trend: Q16::ZERO,
         }
     }
 
-    /// Looks at a tick.
+    /// Takes one tick into account.
     pub fn look(&mut self, record: &Record) {
         let seen = &record.telemetry;
         let touched = matches!(
@@ -76,7 +73,7 @@ impl Ledger {
                 self.dip = Q16::ZERO;
             }
             self.dip = self.dip.max(seen.speed_ref.abs() - seen.speed.abs());
-            self.behind = self.dip;
+            self.due = self.dip;
         }
         self.on_corner = on_corner;
     }
@@ -94,7 +91,7 @@ impl Ledger {
             at,
             count: self.count,
             crossing: *crossing,
-            speed_dip: self.behind,
+            speed_dip: self.due,
             slip: ahead,
             gap_residual: crossing.gap_measured - crossing.gap_predicted,
             trend: self.trend,
@@ -130,7 +127,7 @@ pub(super) mod tests {
     }
 
     fn row(stage: ContactStage, speed: f64, speed_ref: f64) -> Record {
-        let mut record = Record::EMPTY;
+        let mut record = Record::default();
         record.telemetry.mode = Mode::Run(Direction::Retract, Leg::Crossing);
         record.telemetry.stage = stage;
         record.telemetry.speed = Q16::from_num(speed);

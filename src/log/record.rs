@@ -1,5 +1,5 @@
-//! One tick as the log keeps it: all that the tick was given and all that it gave, so
-//! that a host can run it again and compare bits.
+//! One tick in the log: all inputs and outputs, so that a host can run it again and compare
+//! bits.
 
 use crate::sense::raw::{
     AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
@@ -9,48 +9,56 @@ use crate::supervise::codes;
 use crate::tick::{Input, Output, Telemetry};
 use crate::units::{MotorCommand, Tick};
 
-/// Age of a code that was taken at its tick, and so the farthest ahead that one may be.
+/// Code of age 0, and so the farthest that a code may be ahead of its tick.
 const NOW: u32 = 8;
-/// Age of a code that is older than can be said; the time of the one before holds.
+/// Code of an age that is too large to encode; the time of the tick before holds.
 const OLD: u8 = 254;
-/// Age of a code that never came.
+/// Code of a sensor without a reading.
 const NEVER: u8 = 255;
 
-/// A tick's input and output in 88 bytes. Plan, request and log entries, of which a run
-/// has few, go beside it; flags tell that they were there.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A tick's input and output in 88 bytes. Plan, request and log entries are rare and have frames
+/// of their own; flags show that there were some.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Record {
     /// State after the tick; its time is that of the input.
     pub telemetry: Telemetry,
-    /// Codes of wheel, preload sensor, compression_sensor and arm; 0 for one that never came.
+    /// Codes of wheel, preload sensor, compression sensor and arm; 0 without a reading.
     pub codes: [u16; 4],
-    /// Ages of the codes as they travel, see [`Record::sensors`].
+    /// Coded ages of the codes, see [`Record::sensors`].
     pub ages: [u8; 4],
     /// Codes of the bridges of drive and pre-tightener; 0 if there were none.
     pub bridges: [u16; 2],
-    /// What else there was.
+    /// Everything else.
     pub flags: Flags,
 }
 
-/// What a tick was given and gave beside codes and state.
+/// Inputs and outputs beside codes and state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Flags(u16);
 
 impl Flags {
     const COMMAND: u16 = 0b111;
-    const PLAN: u16 = 1 << 3;
-    const OVERRUN: u16 = 1 << 4;
-    const EMERGENCY: u16 = 1 << 5;
-    const REQUEST: u16 = 1 << 6;
-    const REARM: u16 = 1 << 7;
-    const DRIVE: u16 = 1 << 8;
-    const PRELOAD: u16 = 1 << 9;
+    /// The tick was given a plan.
+    pub const PLAN: Self = Self(1 << 3);
+    /// It began more than a period late.
+    pub const OVERRUN: Self = Self(1 << 4);
+    /// The emergency stop had cut the bridges.
+    pub const EMERGENCY: Self = Self(1 << 5);
+    /// It asked for a plan.
+    pub const REQUEST: Self = Self(1 << 6);
+    /// It re-enabled the bridges.
+    pub const REARM: Self = Self(1 << 7);
+    /// The drive's bridge is on.
+    pub const DRIVE: Self = Self(1 << 8);
+    /// The pre-tightener's bridge is on.
+    pub const PRELOAD: Self = Self(1 << 9);
     const EVENTS: u32 = 10;
     const MOST_EVENTS: u16 = 0b1111;
-    const READBACK: u16 = 1 << 14;
+    /// It was given the readback of the bridges.
+    pub const READBACK: Self = Self(1 << 14);
 
     fn of(input: &Input, output: &Output) -> Self {
-        let bit = |set: bool, bit: u16| if set { bit } else { 0 };
+        let bit = |set: bool, flag: Self| if set { flag.0 } else { 0 };
         Self(
             u16::from(codes::of_command(input.command))
                 | bit(input.plan.is_some(), Self::PLAN)
@@ -75,8 +83,9 @@ impl Flags {
         self.0
     }
 
-    const fn has(self, bit: u16) -> bool {
-        self.0 & bit != 0
+    /// Whether this flag is set.
+    pub const fn has(self, flag: Self) -> bool {
+        self.0 & flag.0 != 0
     }
 
     /// The command that the tick was given.
@@ -84,47 +93,7 @@ impl Flags {
         codes::command((self.0 & Self::COMMAND) as u8)
     }
 
-    /// The tick was given a plan.
-    pub const fn plan(self) -> bool {
-        self.has(Self::PLAN)
-    }
-
-    /// It began more than a period late.
-    pub const fn overrun(self) -> bool {
-        self.has(Self::OVERRUN)
-    }
-
-    /// The emergency stop had cut the bridges.
-    pub const fn emergency_stop(self) -> bool {
-        self.has(Self::EMERGENCY)
-    }
-
-    /// It asked for a plan.
-    pub const fn request(self) -> bool {
-        self.has(Self::REQUEST)
-    }
-
-    /// It gave the bridges their power back.
-    pub const fn rearm(self) -> bool {
-        self.has(Self::REARM)
-    }
-
-    /// The drive's bridge is on.
-    pub const fn drive(self) -> bool {
-        self.has(Self::DRIVE)
-    }
-
-    /// The pre-tightener's bridge is on.
-    pub const fn preload(self) -> bool {
-        self.has(Self::PRELOAD)
-    }
-
-    /// It was given what the bridges put out.
-    pub const fn readback(self) -> bool {
-        self.has(Self::READBACK)
-    }
-
-    /// Log entries that it gave.
+    /// Number of its log entries.
     pub const fn events(self) -> u16 {
         self.0 >> Self::EVENTS & Self::MOST_EVENTS
     }
@@ -156,8 +125,8 @@ impl Record {
         self.telemetry.at
     }
 
-    /// The codes with their times. A code older than 245 ticks does not tell when it was
-    /// taken: it is then the one of the tick `before`.
+    /// The codes with their times. For a code older than 245 ticks that is the time in the
+    /// tick `before`.
     pub fn sensors(&self, before: &SensorFrame) -> SensorFrame {
         let [wheel, preload_sensor, compression_sensor, arm] = [0, 1, 2, 3].map(|sensor| {
             let taken = match self.ages[sensor] {
@@ -178,14 +147,14 @@ impl Record {
                 oldest,
             ),
             arm_angle: unpack(arm, before.arm_angle, AngleFrame::new, oldest),
-            bridges: self.flags.readback().then(|| {
+            bridges: self.flags.has(Flags::READBACK).then(|| {
                 let [drive, pretightener] = self.bridges.map(BridgeCode::new);
                 BridgeCodes { drive, pretightener }
             }),
         }
     }
 
-    /// What the tick was given, apart from the plan; `before` as for
+    /// Input of the tick except the plan; `before` as for
     /// [`Record::sensors`].
     pub fn input(&self, before: &SensorFrame) -> Input {
         Input {
@@ -193,32 +162,24 @@ impl Record {
             sensors: self.sensors(before),
             command: self.flags.command(),
             plan: None,
-            overrun: self.flags.overrun(),
-            emergency_stop: self.flags.emergency_stop(),
+            overrun: self.flags.has(Flags::OVERRUN),
+            emergency_stop: self.flags.has(Flags::EMERGENCY),
         }
     }
 
-    /// What the drive's bridge was told.
+    /// Command of the drive's bridge.
     pub fn drive(&self) -> MotorCommand {
-        MotorCommand { duty: self.telemetry.drive, enable: self.flags.drive() }
+        MotorCommand { duty: self.telemetry.drive, enable: self.flags.has(Flags::DRIVE) }
     }
 
-    /// What the pre-tightener's bridge was told.
+    /// Command of the pre-tightener's bridge.
     pub fn preload(&self) -> MotorCommand {
-        MotorCommand { duty: self.telemetry.pretightener, enable: self.flags.preload() }
+        let enable = self.flags.has(Flags::PRELOAD);
+        MotorCommand { duty: self.telemetry.pretightener, enable }
     }
-
-    /// A record of nothing.
-    pub const EMPTY: Self = Self {
-        telemetry: Telemetry::EMPTY,
-        codes: [0; 4],
-        ages: [0; 4],
-        bridges: [0; 2],
-        flags: Flags(0),
-    };
 }
 
-/// Code and age of a sample as they travel.
+/// Code and coded age of a sample.
 fn pack<T: Copy>(now: Tick, sample: Option<&Sample<T>>, code: impl Fn(T) -> u16) -> (u16, u8) {
     let Some(sample) = sample else { return (0, NEVER) };
     let age = now.wrapping_sub(sample.at).wrapping_add(NOW);
@@ -262,7 +223,7 @@ pub(super) mod tests {
                         level,
                         drive,
                         pretightener,
-                        ..Telemetry::EMPTY
+                        ..Telemetry::default()
                     };
                     let telemetry = state.with_quantities(q.map(Q16::from_bits));
                     Record { telemetry, codes, ages, bridges, flags: Flags::from_bits(flags) }
@@ -333,7 +294,8 @@ pub(super) mod tests {
         output.telemetry.drive = output.drive.duty;
         let record = Record::of(&Input::default(), &output);
         assert_eq!((record.drive(), record.preload()), (on(-5), MotorCommand::OFF));
-        assert!(record.flags.rearm() && !record.flags.request() && !record.flags.plan());
+        assert!(record.flags.has(Flags::REARM));
+        assert!(!record.flags.has(Flags::REQUEST) && !record.flags.has(Flags::PLAN));
         assert_eq!(record.flags.events(), 0);
     }
 }

@@ -1,11 +1,11 @@
-//! From a tick's row to what a restart finds of it.
+//! From a tick's telemetry to the snapshot that a restart finds.
 
 use crate::estimate::PositionConfidence;
 use crate::restart::{DriveSnapshot, MissedCheckIns, PackedSpeed};
 use crate::supervise::{Mode, codes};
 use crate::tick::Telemetry;
 
-/// Makes a [`DriveSnapshot`] of each tick. It remembers the last fault beyond its hold.
+/// Makes a [`DriveSnapshot`] of each tick; keeps the last fault beyond its hold.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SnapshotRecorder {
     fault: u16,
@@ -47,7 +47,7 @@ mod tests {
     fn the_last_fault_is_kept_beyond_its_hold() {
         let mut recorder = SnapshotRecorder::default();
         let mut row =
-            Telemetry { at: 5, level: 2, position: Q16::from_num(41), ..Telemetry::EMPTY };
+            Telemetry { at: 5, level: 2, position: Q16::from_num(41), ..Telemetry::default() };
         assert_eq!(
             recorder.snapshot(&row, PositionConfidence::Sure, MissedCheckIns::NOBODY).mode(),
             Some(Mode::Boot)

@@ -1,21 +1,20 @@
-//! The binary line to the host: framed, checked, in both directions.
+//! The binary line to the host: framed and checked in both directions.
 //!
-//! A frame is postcard, CRC-32 behind it, all in COBS with a zero at the end: whoever
-//! joins late or loses bytes is in step again at the next zero, and what was damaged is
-//! not taken.
+//! A frame is postcard with its CRC-32, coded in COBS, with a zero at the end. A reader that
+//! joins late or loses bytes is in step again at the next zero, and drops damaged frames.
 
 use serde::{Deserialize, Serialize};
 
 use crate::log::crc32;
 use crate::params::service::{Request, Response};
 
-/// Longest frame, bytes, its end included.
+/// Longest frame including its end, bytes.
 pub const LONGEST: usize = 96;
 
 /// What the host sends.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ToBoard {
-    /// A request about the parameters; the number comes back with the answer.
+    /// A request about the parameters, with a number that the answer repeats.
     Parameters(u16, Request),
 }
 
@@ -32,8 +31,8 @@ pub type Frame = heapless::Vec<u8, LONGEST>;
 /// Bytes of the check.
 const CHECK: usize = 4;
 
-/// The frame of a message; none if it were longer than [`LONGEST`], which no message of
-/// this module is.
+/// The frame of a message; none if it is longer than [`LONGEST`], which no message of this
+/// module is.
 pub fn frame(message: &impl Serialize) -> Option<Frame> {
     let mut plain = [0; LONGEST];
     let length = postcard::to_slice(message, plain.get_mut(..LONGEST - CHECK)?).ok()?.len();
@@ -48,17 +47,17 @@ pub fn frame(message: &impl Serialize) -> Option<Frame> {
     Some(coded)
 }
 
-/// Puts bytes together to frames.
+/// Assembles bytes to frames.
 #[derive(Clone, Debug, Default)]
 pub struct FrameReader {
     bytes: Frame,
-    /// More came than fits: all is dropped up to the next end.
+    /// More bytes than fit: all are dropped up to the next end.
     too_long: bool,
     dropped: u32,
 }
 
 impl FrameReader {
-    /// Nothing gathered.
+    /// An empty reader.
     pub const fn new() -> Self {
         Self { bytes: Frame::new(), too_long: false, dropped: 0 }
     }
@@ -68,7 +67,7 @@ impl FrameReader {
         self.dropped
     }
 
-    /// Takes one byte; the message that it completes.
+    /// Takes one byte; returns the message that it completes.
     pub fn take<T: for<'de> Deserialize<'de>>(&mut self, byte: u8) -> Option<T> {
         if byte != 0 {
             self.too_long |= self.bytes.push(byte).is_err();

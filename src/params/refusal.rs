@@ -1,19 +1,19 @@
-//! Why the board does not do what a host asks of its parameters.
+//! Reasons to refuse a host's request about the parameters.
 
 use serde::{Deserialize, Serialize};
 
 use super::SetError;
 
-/// Why a request is refused.
+/// Reason of a refusal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Refusal {
-    /// The drive is moving, or about to.
+    /// The drive is not at rest.
     Moving,
     /// There is no draft: `Begin` comes first.
     NoDraft,
-    /// The set is too long, or not all there.
+    /// The set is too long or incomplete.
     Length,
-    /// A piece is no multiple of eight bytes.
+    /// A piece is not a multiple of eight bytes.
     Piece,
     /// The flash failed.
     Flash,
@@ -26,7 +26,7 @@ pub enum Refusal {
 }
 
 impl Refusal {
-    /// Why, in words.
+    /// The reason in words.
     pub const fn sentence(self) -> &'static str {
         match self {
             Self::Moving => "the drive is not at rest",

@@ -1,8 +1,8 @@
 //! Reading and replacing the stored parameters, request by request.
 //!
-//! The host reads the set in force piece by piece, makes the new one and sends it back;
-//! here it is checked as a whole before it takes force. Nothing of it touches the
-//! controller that runs: a new set counts from the next start on.
+//! The host reads the set in force in pieces, makes a new one and sends it back. The board
+//! checks the complete set before it comes into force. The running controller does not change:
+//! a new set applies from the next start on.
 
 use serde::{Deserialize, Serialize};
 
@@ -16,12 +16,12 @@ pub const PIECE: usize = 48;
 /// Bytes of a set.
 pub type Piece = heapless::Vec<u8, PIECE>;
 
-/// What the host may ask.
+/// Requests of the host.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Request {
-    /// What is in force.
+    /// Describe the set in force.
     Describe,
-    /// A piece of the set in force.
+    /// Read a piece of the set in force.
     Read {
         /// From this byte on.
         offset: u16,
@@ -31,17 +31,17 @@ pub enum Request {
         /// Its bytes.
         length: u16,
     },
-    /// The next piece of it.
+    /// Append the next piece of it.
     Append(Piece),
     /// Check it and put it in force.
     Seal,
-    /// Put the set that the image carries in force.
+    /// Put the set of the image in force.
     Restore,
-    /// Start anew, with what is in force then.
+    /// Restart, with the set then in force.
     Restart,
 }
 
-/// What the board answers.
+/// Answers of the board.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Response {
     /// To [`Request::Describe`].
@@ -50,37 +50,37 @@ pub enum Response {
     Piece(Piece),
     /// Done.
     Done,
-    /// Not done, and nothing that was in force has changed.
+    /// Not done; the set in force is unchanged.
     Refused(Refusal),
 }
 
-/// What is in force.
+/// The set in force.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Description {
-    /// Where it lies.
+    /// Where it is stored.
     pub origin: Origin,
     /// Its bytes.
     pub length: u16,
     /// Its schema.
     pub schema: u16,
-    /// The firmware's schema: of another one, the set is kept and not run.
+    /// The firmware's schema: a set of another one is kept and not run.
     pub expected: u16,
     /// Name of the rig.
     pub name: heapless::String<MAX_NAME>,
     /// Hash of its parameters.
     pub parameters: u32,
-    /// Hash of the parameters that the controller has run on since the start.
+    /// Hash of the parameters that the controller runs on.
     pub running: u32,
 }
 
-/// Where a set lies.
+/// Where a set is stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Origin {
     /// In the image: nothing is stored.
     Image,
     /// In flash.
     Stored {
-        /// How many sets have been stored before it, and one.
+        /// Number of sets stored so far.
         sequence: u32,
     },
 }
@@ -89,7 +89,7 @@ pub enum Origin {
 #[derive(Debug)]
 pub struct Service<M> {
     memory: M,
-    /// The set of the image.
+    /// Set of the image.
     image: &'static [u8],
     /// Hash of the parameters that run.
     running: u32,
@@ -97,14 +97,14 @@ pub struct Service<M> {
 }
 
 impl<M: SetMemory> Service<M> {
-    /// Over this flash, with the set of the image and the hash of what runs.
+    /// A service over this flash, with the set of the image and the hash of the running
+    /// parameters.
     pub const fn new(memory: M, image: &'static [u8], running: u32) -> Self {
         Self { memory, image, running, draft: None }
     }
 
-    /// Answers one request. With the drive not `at_rest`, what is stored cannot be
-    /// changed. [`Request::Restart`] is [`Response::Done`] here: whoever sent the answer
-    /// restarts.
+    /// Answers one request. Unless the drive is `at_rest`, the stored set cannot change. To
+    /// [`Request::Restart`] this answers [`Response::Done`]; the caller restarts.
     pub async fn answer(&mut self, request: Request, at_rest: bool) -> Response {
         let answer = match request {
             Request::Describe => self.describe(),
@@ -168,7 +168,7 @@ impl<M: SetMemory> Service<M> {
 /// The set in force: the stored one, or that of the image if none is stored.
 ///
 /// # Errors
-/// [`Damaged`] if one was stored and is damaged: no other one is in force for it.
+/// [`Damaged`] if the stored one is damaged: no other one replaces it.
 pub fn in_force<'m>(
     memory: &'m impl SetMemory,
     image: &'static [u8],
@@ -181,17 +181,10 @@ pub fn in_force<'m>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::slots::tests::Flash;
-    use super::super::{MAX_SET, compile};
+    use super::super::MAX_SET;
+    use super::super::slots::tests::{Flash, set};
     use super::*;
-    use crate::rig::Rig;
     use embassy_futures::block_on;
-
-    fn set(name: &str) -> Vec<u8> {
-        let mut room = [0; MAX_SET];
-        let length = compile(name, &Rig::prototype(), &mut room).unwrap();
-        room[..length].to_vec()
-    }
 
     fn service() -> Service<Flash> {
         Service::new(Flash::blank(), set("image").leak(), 7)

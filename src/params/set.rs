@@ -1,10 +1,10 @@
-//! A set of parameters as bytes: what it is, the rig, the constants made of it, a check.
+//! A parameter set as bytes: header, rig, constants made of it, check.
 //!
 //! ```text
 //! header | rig | controller | planner | CRC-32 of all before it, little end first
 //! ```
-//! All but the last four bytes is postcard. The rig stands first, so that the host can
-//! read it out of a set whose constants are of another schema, and make the set anew.
+//! All but the last four bytes is postcard. The rig comes first, so that the host can read it
+//! from a set with constants of another schema, and make the set again.
 
 use core::fmt;
 
@@ -15,8 +15,8 @@ use crate::model::Planner;
 use crate::rig::Rig;
 use crate::tick::Controller;
 
-/// Layout of the constants. Raised with every change of a type that a set holds; a set
-/// of another number is not read but refused, and the host makes it anew from its rig.
+/// Layout of the constants. Raised with every change of a type that a set holds; a set of
+/// another number is refused, and the host makes it again from its rig.
 pub const SCHEMA: u16 = 5;
 
 /// Longest name of a set, bytes.
@@ -25,7 +25,7 @@ pub const MAX_NAME: usize = 24;
 /// Bytes of the check.
 const CHECK: usize = 4;
 
-/// What a set says of itself.
+/// Head of a set.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Header {
     /// Layout of what follows, [`SCHEMA`].
@@ -43,7 +43,7 @@ pub struct Header {
 /// Why bytes are not a set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SetError {
-    /// Fewer bytes than the least set.
+    /// Shorter than any set.
     Short,
     /// The check does not fit the bytes.
     Damaged,
@@ -52,12 +52,12 @@ pub enum SetError {
         /// That of the set.
         found: u16,
     },
-    /// The check fits and the content does not: not written by this program.
+    /// The check fits and the content does not: written by another program.
     Content,
 }
 
 impl SetError {
-    /// What is wrong, in words.
+    /// The error in words.
     pub const fn sentence(self) -> &'static str {
         match self {
             Self::Short => "the set is cut off",
@@ -80,7 +80,7 @@ impl fmt::Display for SetError {
 
 impl core::error::Error for SetError {}
 
-/// A set whose check has been found right.
+/// A set whose check fits.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ParameterSet<'a> {
     header: Header,
@@ -90,10 +90,10 @@ pub struct ParameterSet<'a> {
 }
 
 impl<'a> ParameterSet<'a> {
-    /// Checks the bytes of a set; bytes behind it are not allowed.
+    /// Checks the bytes of a set; trailing bytes are an error.
     ///
     /// # Errors
-    /// [`SetError`] for anything but a whole set of this layout.
+    /// [`SetError`] for anything but a complete set of this layout.
     pub fn open(bytes: &'a [u8]) -> Result<Self, SetError> {
         let set = Self::open_any(bytes)?;
         match set.header.schema {
@@ -102,11 +102,11 @@ impl<'a> ParameterSet<'a> {
         }
     }
 
-    /// The same for any layout: of another one, the constants mean nothing here, but
-    /// [`header`](Self::header) and [`rig`](Self::rig) do.
+    /// The same for any layout; of another one only [`header`](Self::header) and
+    /// [`rig`](Self::rig) can be read.
     ///
     /// # Errors
-    /// [`SetError`] if the bytes are not a whole set.
+    /// [`SetError`] if the bytes are not a complete set.
     pub fn open_any(bytes: &'a [u8]) -> Result<Self, SetError> {
         let (content, sum) = bytes.split_last_chunk::<CHECK>().ok_or(SetError::Short)?;
         if crc32(content) != u32::from_le_bytes(*sum) {
@@ -118,29 +118,19 @@ impl<'a> ParameterSet<'a> {
         Ok(Self { header, rig, constants })
     }
 
-    /// What the set says of itself.
+    /// Head of the set.
     pub const fn header(&self) -> &Header {
         &self.header
     }
 
-    /// The controller, and what is left of the constants.
+    /// Reads the controller into its final place; returns the rest of the constants. A return
+    /// by value would copy it at every level of its parts, and the copies would be most of the
+    /// stack; the same holds for the planner.
     ///
     /// # Errors
-    /// [`SetError::Content`] if the bytes are not one.
-    pub fn controller(&self) -> Result<(Controller, Rest<'a>), SetError> {
-        let mut controller = Controller::default();
-        let rest = self.controller_into(&mut controller)?;
-        Ok((controller, rest))
-    }
-
-    /// The controller, read where it is to stay, and what is left of the constants. Returned
-    /// by value it would be copied at every level of what it is made of, and the copies would
-    /// be most of the stack; so it is with the planner.
-    ///
-    /// # Errors
-    /// [`SetError::Content`] if the bytes are not one; in `place` is then anything.
+    /// [`SetError::Content`] if the bytes are not one; `place` then holds anything.
     #[inline(never)]
-    pub fn controller_into(&self, place: &mut Controller) -> Result<Rest<'a>, SetError> {
+    pub fn read_controller(&self, place: &mut Controller) -> Result<Rest<'a>, SetError> {
         into(self.constants, place).map(Rest)
     }
 
@@ -149,31 +139,24 @@ impl<'a> ParameterSet<'a> {
     /// # Errors
     /// [`SetError::Content`] if the bytes are not one.
     pub fn rig(&self) -> Result<Rig, SetError> {
-        whole(self.rig)
+        match take(self.rig)? {
+            (rig, []) => Ok(rig),
+            _ => Err(SetError::Content),
+        }
     }
 }
 
-/// The constants of a set behind the controller.
+/// The constants of a set after the controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rest<'a>(&'a [u8]);
 
 impl Rest<'_> {
-    /// The planner.
+    /// Reads the planner into its final place.
     ///
     /// # Errors
-    /// [`SetError::Content`] if the bytes are not one.
-    pub fn planner(self) -> Result<Planner, SetError> {
-        let mut planner = Planner::default();
-        self.planner_into(&mut planner)?;
-        Ok(planner)
-    }
-
-    /// The planner, read where it is to stay.
-    ///
-    /// # Errors
-    /// [`SetError::Content`] if the bytes are not one; in `place` is then anything.
+    /// [`SetError::Content`] if the bytes are not one; `place` then holds anything.
     #[inline(never)]
-    pub fn planner_into(self, place: &mut Planner) -> Result<(), SetError> {
+    pub fn read_planner(self, place: &mut Planner) -> Result<(), SetError> {
         match into(self.0, place)? {
             [] => Ok(()),
             _ => Err(SetError::Content),
@@ -181,7 +164,7 @@ impl Rest<'_> {
     }
 }
 
-/// Reads a value where it is to stay; what is left of the bytes.
+/// Reads a value into its final place; returns the bytes after it.
 fn into<'a, T: Deserialize<'a>>(bytes: &'a [u8], place: &mut T) -> Result<&'a [u8], SetError> {
     let mut bytes = postcard::Deserializer::from_bytes(bytes);
     T::deserialize_in_place(&mut bytes, place).map_err(|_| SetError::Content)?;
@@ -192,22 +175,13 @@ fn take<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<(T, &'a [u8]), SetErr
     postcard::take_from_bytes(bytes).map_err(|_| SetError::Content)
 }
 
-fn whole<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, SetError> {
-    match take(bytes)? {
-        (value, []) => Ok(value),
-        _ => Err(SetError::Content),
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::{MAX_SET, compile};
+    use super::super::compile;
     use super::*;
 
     fn set(name: &str, rig: &Rig) -> Vec<u8> {
-        let mut room = [0; MAX_SET];
-        let length = compile(name, rig, &mut room).expect("a sound rig");
-        room[..length].to_vec()
+        compile(name, rig).expect("a sound rig").to_vec()
     }
 
     #[test]
@@ -216,9 +190,11 @@ mod tests {
             let bytes = set(name, &rig);
             let set = ParameterSet::open(&bytes).expect("a set");
             assert_eq!(set.header().name.as_str(), name);
-            let (controller, rest) = set.controller().expect("a controller");
+            let (mut controller, mut planner) = (Controller::default(), Planner::default());
+            let rest = set.read_controller(&mut controller).expect("a controller");
+            rest.read_planner(&mut planner).expect("a planner");
             assert_eq!(controller, Controller::try_build(&rig).unwrap());
-            assert_eq!(rest.planner().unwrap(), Planner::try_build(&rig).unwrap());
+            assert_eq!(planner, Planner::try_build(&rig).unwrap());
             assert_eq!(set.rig().unwrap(), rig);
         }
     }
@@ -255,8 +231,9 @@ mod tests {
         bytes.push(0);
         let sum = crc32(&bytes).to_le_bytes();
         bytes.extend(sum);
-        let (_, rest) = ParameterSet::open(&bytes).unwrap().controller().unwrap();
-        assert_eq!(rest.planner(), Err(SetError::Content));
+        let set = ParameterSet::open(&bytes).unwrap();
+        let rest = set.read_controller(&mut Controller::default()).unwrap();
+        assert_eq!(rest.read_planner(&mut Planner::default()), Err(SetError::Content));
     }
 
     #[test]

@@ -1,38 +1,40 @@
-//! Two places in flash for a set, so that a whole one is always there.
+//! Two slots in flash for a parameter set, so that one of them always holds an intact one.
 //!
-//! A set is written into the place that is not in force and takes force with the last
-//! double word written, its seal. Power may fail at any moment: before the seal the old
-//! set is in force, after it the new one, and of a seal half written neither the magic
-//! nor the sequence counts unless the set behind it is whole.
+//! A set is written into the slot that is not in force. It comes into force with its header,
+//! the last double word written. Power may fail at any moment: before the header the old set is
+//! in force, after it the new one; a half-written header counts only if the set behind it is
+//! intact.
 //!
 //! ```text
-//! 0   seal: magic, sequence number       (written last)
+//! 0   header: magic, sequence number     (written last)
 //! 8   length of the set, fold of the sequence number, their complement
 //! 16  the set, filled up with 0xFF to a double word
 //! ```
 //!
-//! A bit that turns over later is another matter: the set in force is then lost, and neither
-//! the one before it nor the image's takes its place in silence, which nobody chose. What was
-//! never sealed is passed over; what was sealed and is not whole any more is told, unless the
-//! other place shows that it was out of force. The fold holds the sequence number to that: by
-//! itself, a number with a bit turned over would make a spare set the younger.
+//! A later bit flip in the set in force loses that set. Neither the one before it nor that of
+//! the image replaces it silently, because nobody chose them. An uncommitted slot is skipped. A
+//! committed slot that is no longer intact is reported, unless the other slot shows that it was
+//! out of force. The fold guards the sequence number: alone, a flipped bit in it would make the
+//! spare set the younger one.
 
 use super::refusal::Refusal;
 use super::{MAX_SET, ParameterSet, Rest, SetError};
+use crate::model::Planner;
 pub use crate::restart::page::{PAGE_BYTES, WORD_BYTES};
+use crate::tick::Controller;
 
-/// Bytes of one place: two pages of the chip's flash.
+/// Bytes of one slot: two pages of the chip's flash.
 pub const SLOT_BYTES: usize = 4096;
 
 /// Bytes before the set.
 const PREFIX: usize = 2 * WORD_BYTES;
 
-/// First half of a seal.
+/// First word of the header.
 const MAGIC: u32 = 0x5053_4931;
 
 const _: () = assert!(PREFIX + MAX_SET <= SLOT_BYTES);
 
-/// One of the two places.
+/// One of the two slots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Slot {
     /// The lower.
@@ -61,12 +63,12 @@ impl From<FlashFault> for Refusal {
     }
 }
 
-/// Flash that holds both places, mapped into memory.
+/// Flash that holds both slots, mapped into memory.
 pub trait SetMemory {
-    /// The place as it is now, [`SLOT_BYTES`] long.
+    /// The content of a slot, [`SLOT_BYTES`] long.
     fn bytes(&self, slot: Slot) -> &[u8];
 
-    /// Erases one page of a place to 0xFF; takes about 25 ms.
+    /// Erases one page of a slot to 0xFF; takes about 25 ms.
     ///
     /// # Errors
     /// [`FlashFault`] if the page is not blank afterwards.
@@ -85,18 +87,18 @@ pub trait SetMemory {
     ) -> Result<(), FlashFault>;
 }
 
-/// A whole set in its place.
+/// An intact set in its slot.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Stored<'a> {
-    /// Where.
+    /// The slot.
     pub slot: Slot,
-    /// One more than that of the set before; wraps.
+    /// One more than the sequence number of the set before; wraps.
     pub sequence: u32,
-    /// The set as it was written.
+    /// The set.
     pub set: &'a [u8],
 }
 
-/// The set in force is damaged: stored in this place, and not whole any more.
+/// The set in force, in this slot, is damaged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Damaged(pub Slot);
 
@@ -106,55 +108,55 @@ impl From<Damaged> for Refusal {
     }
 }
 
-/// The set in force: the younger of those that are whole; none if none was ever stored.
+/// The set in force: the younger intact one; none if none was ever stored.
 ///
 /// # Errors
-/// [`Damaged`] if a place is sealed, not whole, and not known to have been out of force.
+/// [`Damaged`] if a committed slot is not intact and not known to have been out of force.
 pub fn stored(memory: &impl SetMemory) -> Result<Option<Stored<'_>>, Damaged> {
-    use Found::{Broken, Open, Whole};
-    let found = |slot| look(memory.bytes(slot), slot).unwrap_or(Open);
+    use Found::{Broken, Intact, Uncommitted};
+    let found = |slot| inspect(memory.bytes(slot), slot).unwrap_or(Uncommitted);
     match (found(Slot::A), found(Slot::B)) {
-        (Whole(a), Whole(b)) => {
+        (Intact(a), Intact(b)) => {
             let b_is_younger = b.sequence.wrapping_sub(a.sequence) as i32 > 0;
             Ok(Some(if b_is_younger { b } else { a }))
         }
-        (Whole(whole), other) | (other, Whole(whole)) => {
-            let lost = other.may_follow(whole.sequence);
-            if lost { Err(Damaged(whole.slot.other())) } else { Ok(Some(whole)) }
+        (Intact(set), other) | (other, Intact(set)) => {
+            let lost = other.may_follow(set.sequence);
+            if lost { Err(Damaged(set.slot.other())) } else { Ok(Some(set)) }
         }
         (Broken { .. }, _) => Err(Damaged(Slot::A)),
         (_, Broken { .. }) => Err(Damaged(Slot::B)),
-        (Open, Open) => Ok(None),
+        (Uncommitted, Uncommitted) => Ok(None),
     }
 }
 
-/// What stands in a place.
+/// Content of a slot.
 enum Found<'a> {
-    /// Nothing that was sealed.
-    Open,
-    /// A whole set.
-    Whole(Stored<'a>),
-    /// What was sealed once.
+    /// No committed set.
+    Uncommitted,
+    /// An intact set.
+    Intact(Stored<'a>),
+    /// A set that was committed and is damaged.
     Broken {
         sequence: u32,
-        /// Fold of the sequence number, if it has one that can be read.
+        /// Fold of the sequence number, if it can be read.
         fold: Option<u16>,
     },
 }
 
 impl Found<'_> {
-    /// Whether this place is broken, and its set may have been stored after that of this
-    /// number. One thing is broken: the fold, or else the sequence number itself, is right.
+    /// Whether this slot is broken, and its set may be younger than this sequence number. Only
+    /// one thing is broken: either the fold or the sequence number itself is right.
     const fn may_follow(&self, before: u32) -> bool {
         match *self {
             Self::Broken { fold: Some(found), .. } => found != fold(before.wrapping_sub(1)),
             Self::Broken { sequence, fold: None } => before.wrapping_sub(sequence) as i32 <= 0,
-            Self::Open | Self::Whole(_) => false,
+            Self::Uncommitted | Self::Intact(_) => false,
         }
     }
 }
 
-/// Of a sequence number, so that no bit of it turns over unseen.
+/// Fold of a sequence number, which detects any flipped bit of it.
 const fn fold(sequence: u32) -> u16 {
     (sequence ^ sequence >> 16) as u16
 }
@@ -164,30 +166,30 @@ const fn length_word(length: u32, sequence: u32) -> u32 {
     length | (fold(sequence) as u32) << 16
 }
 
-fn look(bytes: &[u8], slot: Slot) -> Option<Found<'_>> {
+fn inspect(bytes: &[u8], slot: Slot) -> Option<Found<'_>> {
     let number = |at: usize| Some(u32::from_le_bytes(*bytes.get(at..)?.first_chunk()?));
     let (magic, sequence, word) = (number(0)?, number(4)?, number(8)?);
-    // A seal half written or half erased is farther off than one bit.
+    // A header half written or half erased differs by more than one bit.
     if (magic ^ MAGIC).count_ones() > 1 {
-        return Some(Found::Open);
+        return Some(Found::Uncommitted);
     }
     let sound = number(12)? == !word;
-    // Sets of earlier firmware have none.
+    // Sets of earlier firmware have no fold.
     let known = Some((word >> 16) as u16).filter(|found| sound && *found != 0);
-    // Of a seal half written the sequence number may be blank.
+    // In a header half written the sequence number may be blank.
     let named = sequence == u32::MAX || known.is_none_or(|found| found == fold(sequence));
     let set = bytes.get(PREFIX..)?.get(..(word & 0xFFFF) as usize);
-    let whole = set.filter(|set| {
-        // Of another schema it is still the user's, and told apart by whoever opens it.
+    let intact = set.filter(|set| {
+        // A set of another schema is still the user's; who opens it finds out.
         magic == MAGIC && sound && named && ParameterSet::open_any(set).is_ok()
     });
-    Some(match whole {
-        Some(set) => Found::Whole(Stored { slot, sequence, set }),
+    Some(match intact {
+        Some(set) => Found::Intact(Stored { slot, sequence, set }),
         None => Found::Broken { sequence, fold: known },
     })
 }
 
-/// A set on its way into the place that is not in force.
+/// A set that is being written into the slot that is not in force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Draft {
     slot: Slot,
@@ -198,9 +200,8 @@ pub struct Draft {
 }
 
 impl Draft {
-    /// Clears the place that is not in force, or is damaged, for a set of `length` bytes. Of
-    /// the pages the one with the seal goes first, so that no old set is left half erased
-    /// under its seal.
+    /// Erases the slot that is not in force, or is damaged, for a set of `length` bytes. The
+    /// page with the header goes first, so that no half-erased set keeps its header.
     ///
     /// # Errors
     /// [`Refusal`]; the set in force stays.
@@ -211,8 +212,8 @@ impl Draft {
         let (slot, sequence) = match stored(memory) {
             Ok(Some(old)) => (old.slot.other(), old.sequence.wrapping_add(1)),
             Ok(None) => (Slot::A, 1),
-            Err(Damaged(slot)) => match look(memory.bytes(slot.other()), slot.other()) {
-                Some(Found::Whole(old)) => (slot, old.sequence.wrapping_add(1)),
+            Err(Damaged(slot)) => match inspect(memory.bytes(slot.other()), slot.other()) {
+                Some(Found::Intact(old)) => (slot, old.sequence.wrapping_add(1)),
                 _ => (slot, 1),
             },
         };
@@ -222,7 +223,7 @@ impl Draft {
         Ok(Self { slot, sequence, length, written: 0 })
     }
 
-    /// Bytes that are still to come.
+    /// Bytes still to come.
     pub const fn missing(&self) -> usize {
         self.length - self.written
     }
@@ -251,7 +252,7 @@ impl Draft {
         Ok(())
     }
 
-    /// What has been written, if it is a whole and sound set of this schema.
+    /// The written set, if it is complete and sound and of this schema.
     ///
     /// # Errors
     /// [`Refusal::Length`] if pieces are missing, another otherwise.
@@ -261,8 +262,7 @@ impl Draft {
         }
         let bytes = memory.bytes(self.slot).get(PREFIX..PREFIX + self.length);
         let set = ParameterSet::open(bytes.ok_or(Refusal::Length)?)?;
-        let rest = behind_controller(&set)?;
-        read_planner(rest)?;
+        check_planner(check_controller(&set)?)?;
         Ok(set)
     }
 
@@ -279,21 +279,21 @@ impl Draft {
     }
 }
 
-/// What stands behind a readable controller; like the planner in a frame of its own, so that
-/// the stack never holds both.
+/// Reads a controller; like the planner in a frame of its own, so that the stack never holds
+/// both.
 #[inline(never)]
-fn behind_controller<'a>(set: &ParameterSet<'a>) -> Result<Rest<'a>, SetError> {
-    set.controller().map(|(_, rest)| rest)
+fn check_controller<'a>(set: &ParameterSet<'a>) -> Result<Rest<'a>, SetError> {
+    set.read_controller(&mut Controller::default())
 }
 
 #[inline(never)]
-fn read_planner(rest: Rest<'_>) -> Result<(), SetError> {
-    rest.planner().map(drop)
+fn check_planner(rest: Rest<'_>) -> Result<(), SetError> {
+    rest.read_planner(&mut Planner::default())
 }
 
-/// A place as it stands with this set in force under this sequence number, for flash
-/// that is written from outside; none if the set is too long.
-pub fn place(set: &[u8], sequence: u32) -> Option<[u8; SLOT_BYTES]> {
+/// A slot with this set in force under this sequence number, for flash that is written from
+/// outside; none if the set is too long.
+pub fn slot_image(set: &[u8], sequence: u32) -> Option<[u8; SLOT_BYTES]> {
     let word = length_word(u16::try_from(set.len()).ok()?.into(), sequence);
     let mut bytes = [0xFF; SLOT_BYTES];
     bytes.get_mut(..WORD_BYTES)?.copy_from_slice(&pair(MAGIC, sequence));

@@ -10,7 +10,7 @@ use crate::units::Tick;
 /// What stopped the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Stopped {
-    /// A panic: where in flash the image says from where, and the line.
+    /// A panic.
     Panic {
         /// Address of the place's description in the image.
         place: u32,
@@ -23,39 +23,39 @@ pub enum Stopped {
         pc: u32,
         /// Where it would have returned to, 0 likewise.
         lr: u32,
-        /// Configurable fault status.
+        /// Configurable fault status register.
         cfsr: u32,
-        /// Hard fault status.
+        /// Hard fault status register.
         hfsr: u32,
     },
     /// The watchdog was no longer fed.
     Hang {
-        /// Where the processor was.
+        /// Instruction at which the processor was.
         pc: u32,
-        /// Where that would have returned to.
+        /// Its return address.
         lr: u32,
-        /// Who had not come.
+        /// Tasks that had not checked in.
         missed: MissedCheckIns,
         /// When the bridges were cut.
         at: Tick,
     },
-    /// The supply fell below what it has to be.
+    /// The supply fell too low.
     Supply,
-    /// A bit of the image had turned over.
+    /// A bit of the image had flipped.
     Image,
 }
 
-/// The last words of a program that was stopped.
+/// Record of a program that was stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Crash {
-    /// First word of the image's hash, by which its addresses are known.
+    /// First word of the image's hash, which identifies its addresses.
     pub build: u32,
     /// What stopped it.
     pub stopped: Stopped,
 }
 
 impl Crash {
-    /// What it is known by.
+    /// Seed of its check.
     const SEED: u32 = 0xF11E_0002;
 
     /// As words.
@@ -71,7 +71,7 @@ impl Crash {
         [kind, build, a, b, c, d, check(Self::SEED, &[kind, build, a, b, c, d])]
     }
 
-    /// From words, if they are whole.
+    /// From words, if they are intact.
     pub fn open(words: &[u32; CRASH_WORDS]) -> Option<Self> {
         let [kind, build, a, b, c, d, sum] = *words;
         let stopped = match kind {
@@ -82,8 +82,8 @@ impl Crash {
             5 => Stopped::Image,
             _ => return None,
         };
-        let whole = check(Self::SEED, &[kind, build, a, b, c, d]) == sum;
-        whole.then_some(Self { build, stopped })
+        let sound = check(Self::SEED, &[kind, build, a, b, c, d]) == sum;
+        sound.then_some(Self { build, stopped })
     }
 }
 

@@ -1,21 +1,20 @@
-//! Which images have run on this board, and their sums: by these a start, and the board
-//! while it runs, know that no bit of the image has turned over.
+//! Images that have run on this board, and their checksums: by these the board knows, at the
+//! start and while it runs, that no bit of the image has flipped.
 //!
 //! ```text
-//! 0   hash of the image, by which it is known, eight bytes
-//! 8   sum over the image, its complement
+//! 0   hash of the image, eight bytes
+//! 8   checksum of the image, its complement
 //! ```
 //!
-//! The first start of an image writes its entry: what was flashed was read back by whoever
-//! flashed it, and a sum made on the host would have to be put into every image after it is
-//! linked.
+//! The first start of an image writes its entry: the flashing tool has read the image back, and
+//! a checksum made on the host would have to be patched into every linked image.
 
 use super::page::{PAGE_WORDS, Page, Word, used, word};
 
 /// Double words of an entry.
 const ENTRY_WORDS: usize = 2;
 
-/// A sum over the words of an image so far, with some more of them.
+/// A checksum of an image so far, continued by some of its words.
 ///
 /// Each word is mixed in by steps of which every one can be undone, so that a change within
 /// one word always shows. So does any pair of bits of a double word, the least that the
@@ -25,7 +24,7 @@ pub fn sum_on(sum: u32, words: &[u32]) -> u32 {
     words.iter().fold(sum, |sum, word| (sum ^ sum >> 15 ^ word).wrapping_mul(0x9E37_79B1))
 }
 
-/// The entry of an image with this sum.
+/// Entry of an image with this checksum.
 pub fn entry(id: [u8; 8], sum: u32) -> [Word; ENTRY_WORDS] {
     let [low, high] = halves(id);
     [[low, high], [sum, !sum]]
@@ -37,10 +36,8 @@ pub fn free(page: &Page) -> Option<usize> {
     (next < PAGE_WORDS).then_some(next)
 }
 
-/// The sum of the image of this hash, as at its first start; none if it has not run here.
-///
-/// A hash with one or two bits turned over is the same image: a damaged one would pass for
-/// new.
+/// Checksum of the image of this hash at its first start; none if it has not run here. A hash
+/// with one or two flipped bits is the same image: a damaged one would pass for new.
 pub fn sum_of(page: &Page, id: [u8; 8]) -> Option<u32> {
     let own = number(halves(id));
     (0..PAGE_WORDS).step_by(ENTRY_WORDS).find_map(|index| {

@@ -1,21 +1,21 @@
-//! Who keeps the watchdog from being fed.
+//! Tasks that keep the watchdog from being fed.
 
 use serde::{Deserialize, Serialize};
 
-/// Who had not come when the watchdog was no longer fed, one bit a task.
+/// Tasks that had not checked in when the watchdog was no longer fed, one bit a task.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MissedCheckIns(u16);
 
 impl MissedCheckIns {
-    /// Everyone is there.
+    /// All tasks have checked in.
     pub const NOBODY: Self = Self(0);
     /// The control tick began and did not end.
     pub const TICK: Self = Self(1 << 14);
-    /// The control tick was not reached: something more urgent keeps the processor.
+    /// The control tick did not start: something of higher priority keeps the processor.
     pub const STARVED: Self = Self(1 << 15);
 
-    /// Names by bit; those between are operators' tasks and the host's line, in the order
-    /// in which they began.
+    /// Names by bit; the bits after them are operators' tasks and the host's line, in the order
+    /// of their start.
     const NAMES: [&'static str; 6] =
         ["wheel encoder", "preload sensor", "compression sensor", "arm angle", "model", "journal"];
 
@@ -24,12 +24,12 @@ impl MissedCheckIns {
         Self(1 << (index & 0xF))
     }
 
-    /// Both.
+    /// The tasks of both.
     pub const fn and(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
-    /// Whether everyone is there.
+    /// Whether all tasks have checked in.
     pub const fn is_nobody(self) -> bool {
         self.0 == 0
     }
@@ -44,7 +44,7 @@ impl MissedCheckIns {
         Self(bits)
     }
 
-    /// Name of the first.
+    /// Name of the first task.
     pub fn name(self) -> &'static str {
         match self.0.trailing_zeros() as usize {
             16 => "nobody",

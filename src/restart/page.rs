@@ -1,8 +1,8 @@
-//! Pages of flash that are written double word by double word from their beginning on, and
-//! erased when they are full: what has to be known after the supply was away.
+//! Pages of flash that are written double word by double word from the begin on, and erased when
+//! full: for what must survive a loss of the supply.
 //!
-//! A double word is programmed as a whole or torn by a supply that goes in the middle of it,
-//! and then holds anything; so each entry has a check of its own.
+//! A double word is programmed completely, or torn by a loss of the supply and then holds
+//! anything; so each entry has a check of its own.
 
 /// Bytes that are erased at once.
 pub const PAGE_BYTES: usize = 2048;
@@ -13,13 +13,13 @@ pub const WORD_BYTES: usize = 8;
 /// Double words of a page.
 pub const PAGE_WORDS: usize = PAGE_BYTES / WORD_BYTES;
 
-/// A page as it stands in memory.
+/// A page in memory.
 pub type Page = [u8; PAGE_BYTES];
 
 /// A double word, the half at the lower address first.
 pub type Word = [u32; 2];
 
-/// The double word of this number; blank behind the end of the page.
+/// The double word of this index; blank beyond the end of the page.
 #[inline(never)]
 pub(super) fn word(page: &Page, index: usize) -> Word {
     let half = |at: usize| page.get(at..)?.first_chunk().copied().map(u32::from_le_bytes);
@@ -27,7 +27,7 @@ pub(super) fn word(page: &Page, index: usize) -> Word {
     [half(at).unwrap_or(u32::MAX), half(at.saturating_add(4)).unwrap_or(u32::MAX)]
 }
 
-/// How many places of so many double words are in use: all up to the last that is not blank.
+/// Number of entries of so many double words in use: all up to the last that is not blank.
 #[inline(never)]
 pub(super) fn used(page: &Page, words: usize) -> usize {
     let blank = |index: usize| word(page, index) == [u32::MAX; 2];

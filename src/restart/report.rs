@@ -9,7 +9,7 @@ use crate::estimate::Place;
 use crate::fault::Fault;
 use crate::units::{Millimetres, Tick, ticks_to_seconds};
 
-/// What the chip says about why it started.
+/// Reason of a start, by the chip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Reset {
     /// Power came up, or fell too low and came back.
@@ -20,7 +20,7 @@ pub enum Reset {
     Software,
     /// The watchdog.
     Watchdog,
-    /// Something else.
+    /// Another reason.
     Other,
 }
 
@@ -37,25 +37,25 @@ impl Reset {
     }
 }
 
-/// What a start reports of the time before it.
+/// What a start reports of the run before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Restart {
     /// Why the chip started.
     pub reset: Reset,
-    /// What the drive last did, if memory kept it.
+    /// The last snapshot, if memory kept it.
     pub snapshot: Option<DriveSnapshot>,
     /// What stopped the program, if something did.
     pub crash: Option<Crash>,
 }
 
-/// Ticks for which the wheel goes on at its speed after the record: what is left of the
-/// tick, and the coasting, in which the gears take half of the speed each ms.
+/// Ticks for which the wheel keeps its speed after the record: the rest of the tick, and the
+/// coasting, in which the gears halve the speed each ms.
 const COASTS: Tick = 2;
 
 /// Ticks from the watchdog's last feeding to its reset.
 const UNFED: Tick = 100;
 
-/// Longest time without a record within which it still tells all, ticks.
+/// Longest time without a record after which the position is still sure, ticks.
 const FRESH: Tick = 5;
 
 impl Restart {

@@ -1,4 +1,4 @@
-//! What the drive was doing, kept every tick.
+//! What the drive was doing in a tick.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,16 +7,16 @@ use crate::supervise::Mode;
 use crate::supervise::codes;
 use crate::units::{Millimetres, MillimetresPerSecond, Q16, Tick};
 
-/// Reference of the speed in a tick, signed outwards, in 1/32 mm/s, and in the last bit
-/// whether the position was more than a guess.
+/// Speed reference of a tick, signed outwards, in 1/32 mm/s; the last bit is whether the
+/// position was better than a guess.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PackedSpeed(pub(super) i16);
 
 impl PackedSpeed {
-    /// Bits of a speed that it leaves out.
+    /// Bits of a speed that are cut.
     const COARSER: u32 = 11;
 
-    /// Of this speed, mm/s; half a metre a second counts for more.
+    /// From a speed, mm/s, saturating at half a metre a second.
     pub fn of(speed: MillimetresPerSecond, placed: bool) -> Self {
         let most = i32::from(i16::MAX >> 1);
         let speed = (speed.to_bits() >> Self::COARSER).clamp(-most, most);
@@ -28,7 +28,7 @@ impl PackedSpeed {
         Q16::from_bits((i32::from(self.0) >> 1) << Self::COARSER)
     }
 
-    /// Whether the position was more than a guess.
+    /// Whether the position was better than a guess.
     pub const fn placed(self) -> bool {
         self.0 & 1 != 0
     }
@@ -47,18 +47,17 @@ pub struct DriveSnapshot {
     pub level: u8,
     /// Code of the last fault since the start, 0 for none.
     pub fault: u16,
-    /// Who had not come.
+    /// Tasks that had not checked in.
     pub missed: MissedCheckIns,
-    /// How fast it was going, and whether the position was more than a guess.
+    /// Speed reference, and whether the position was better than a guess.
     pub packed_speed: PackedSpeed,
 }
 
 impl DriveSnapshot {
-    /// What it is known by.
+    /// Seed of its check.
     const SEED: u32 = 0xF11E_0001;
-    /// Added to the level if the position may be off, and no step has confirmed it; and by
-    /// every start until its first tick, as nobody knows for how long the drive then stands
-    /// unwatched.
+    /// Added to the level if the position may be off and no step has confirmed it; and by every
+    /// start until its first tick, as the wheel may be moved unobserved before that.
     pub const UNSURE: u8 = 0x80;
 
     /// As words.
@@ -69,7 +68,7 @@ impl DriveSnapshot {
         [a, b, c, d, check(Self::SEED, &[a, b, c, d])]
     }
 
-    /// From words, if they are whole.
+    /// From words, if they are intact.
     pub fn open(words: &[u32; SNAPSHOT_WORDS]) -> Option<Self> {
         let [tick, position, state, missed, sum] = *words;
         (check(Self::SEED, &[tick, position, state, missed]) == sum).then_some(Self {

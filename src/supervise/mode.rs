@@ -58,11 +58,6 @@ impl Command {
     pub const ALL: [Self; 4] = [Self::Start, Self::Stop, Self::Retract, Self::Reset];
 }
 
-impl Leg {
-    /// Every leg, in the order of a run.
-    pub const ALL: [Self; 4] = [Self::Cruise, Self::Approach, Self::Crossing, Self::Settle];
-}
-
 impl Mode {
     /// Every mode but the fault holds, of which there is one per [`Fault`].
     pub const WITHOUT_FAULT: [Self; 18] = {

@@ -4,8 +4,8 @@ use crate::estimate::ContactStage;
 use crate::supervise::Mode;
 use crate::units::{Duty, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Tick};
 
-/// Declares the row. A quantity is listed once, with its unit and the name of its column:
-/// its field, its place in the binary log and its column all come from that line.
+/// Declares the row. Each quantity has one line with its unit and column name; field, position
+/// in the binary log and column come from it.
 macro_rules! telemetry {
     ($($(#[$doc:meta])* $field:ident: $unit:ty = $column:literal,)*) => {
         /// All control-rate quantities of one tick.
@@ -30,16 +30,6 @@ macro_rules! telemetry {
             /// Columns of the quantities, in the order of [`quantities`](Self::quantities).
             pub const COLUMNS: [&'static str; [$($column),*].len()] = [$($column),*];
 
-            /// The state before the first tick.
-            pub const EMPTY: Self = Self {
-                at: 0,
-                mode: Mode::Boot,
-                stage: ContactStage::Initial,
-                level: 0,
-                drive: Duty::ZERO,
-                pretightener: Duty::ZERO,
-                $($field: Q16::ZERO,)*
-            };
 
             /// The quantities, in the order of their declaration.
             pub const fn quantities(&self) -> [Q16; Self::COLUMNS.len()] {

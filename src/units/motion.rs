@@ -58,7 +58,7 @@ impl Duty {
     }
 }
 
-/// What one motor's bridge is to do until the next call.
+/// Command of one motor's bridge until the next call.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MotorCommand {
     /// Signed duty.

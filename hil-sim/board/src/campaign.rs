@@ -334,7 +334,7 @@ fn watched(firmware: Firmware<'_>, scenario: &Scenario, twin: &Twin) -> Result<I
 /// Stores the rig's parameters in the board's flash, to be found there after a reset.
 fn keep(board: &mut Board<'_>, scenario: &Scenario) -> Result<Hold, RunError> {
     let set = set_of(sets::KEPT, &scenario.rig)?;
-    let place = slots::place(&set, 7).ok_or(CompileError::Room)?;
+    let place = slots::slot_image(&set, 7).ok_or(CompileError::Room)?;
     board.bench.machine_mut().poke(PARAMETER_SETS, &place).map_err(BenchError::from)?;
     Ok(Hold::new(place.to_vec()))
 }

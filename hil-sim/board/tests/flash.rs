@@ -2,9 +2,9 @@
 //! while it writes.
 
 use hil_sim::scenario::Scenario;
+use interstage::params::compile;
 use interstage::params::link::{FrameReader, ToBoard, ToHost, frame};
 use interstage::params::service::{Origin, PIECE, Piece, Request, Response};
-use interstage::params::{MAX_SET, compile};
 use interstage::rig::Rig;
 use rig_board::bench::Bench;
 use rig_board::peripherals::flash::Cut;
@@ -21,10 +21,7 @@ const DOWN: u32 = 1;
 fn set() -> Vec<u8> {
     let mut rig = Rig::prototype();
     rig.preload.cruise_n += 1.0;
-    let mut room = vec![0; MAX_SET];
-    let length = compile("changed", &rig, &mut room).expect("a sound rig");
-    room.truncate(length);
-    room
+    compile("changed", &rig).expect("a sound rig").to_vec()
 }
 
 /// A board and the host at its binary line.

@@ -263,7 +263,7 @@ fn frames_that_found_no_room_are_marked_and_the_capture_waits_for_its_reader() {
     let first = run.shots.first().expect("captured");
     assert_eq!(first.trigger, Trigger::Command);
     let pieces: Vec<_> = run.shots.iter().take_while(|piece| piece.at == first.at).collect();
-    let shots: usize = pieces.iter().map(|piece| piece.shots.len()).sum();
+    let shots: usize = pieces.iter().map(|piece| piece.samples.len()).sum();
     assert_eq!(shots, usize::from(first.of));
     assert_eq!(pieces.len(), usize::from(first.of).div_ceil(16));
 }

@@ -5,10 +5,10 @@
 //! sequence or its clock going back.
 
 use interstage::log::capture::CaptureChunk;
-use interstage::log::frame::{Body, Frame, Seen, look};
+use interstage::log::frame::{Body, Found, Frame, find};
 use interstage::log::identity::SCHEMA;
 use interstage::log::ledger::Line;
-use interstage::log::{Identity, Record};
+use interstage::log::{Flags, Identity, Record};
 use interstage::model::{Plan, PlanRequest};
 use interstage::sense::raw::SensorFrame;
 use interstage::tick::Entry;
@@ -161,7 +161,7 @@ impl Decoder {
         self.counts.bytes += bytes.len() as u64;
         let mut held = std::mem::take(&mut self.partial);
         held.extend_from_slice(bytes);
-        let used = self.look(&held, false, take);
+        let used = self.find(&held, false, take);
         held.drain(..used);
         self.partial = held;
     }
@@ -169,31 +169,31 @@ impl Decoder {
     /// The log ends here: what has begun will not be completed.
     pub fn finish(&mut self, take: &mut impl FnMut(Item)) {
         let held = std::mem::take(&mut self.partial);
-        self.look(&held, true, take);
+        self.find(&held, true, take);
         self.report_garbage(take);
     }
 
     /// Takes the complete frames at the beginning of `bytes`, everything if they are the last;
     /// returns how many bytes it used.
-    fn look(&mut self, bytes: &[u8], last: bool, take: &mut impl FnMut(Item)) -> usize {
+    fn find(&mut self, bytes: &[u8], last: bool, take: &mut impl FnMut(Item)) -> usize {
         let mut used = 0;
         while let Some(rest) = bytes.get(used..).filter(|rest| !rest.is_empty()) {
-            used += match look(rest) {
-                Seen::Frame(frame, length) => {
+            used += match find(rest) {
+                Found::Frame(frame, length) => {
                     self.report_garbage(take);
                     self.frame(&frame, length as u64, take);
                     length
                 }
-                Seen::Garbage(length) => {
+                Found::Garbage(length) => {
                     self.garbage += length as u64;
                     length
                 }
                 // What looks like the beginning of a frame may be garbage before another one.
-                Seen::Part if last => {
+                Found::Part if last => {
                     self.garbage += 1;
                     1
                 }
-                Seen::Part => break,
+                Found::Part => break,
             };
         }
         used
@@ -286,7 +286,7 @@ impl Decoder {
         let before = self.last.map_or(SensorFrame::default(), |(_, sensors)| sensors);
         if let Some((last, _)) = self.last {
             let ticks = record.at().wrapping_sub(last).wrapping_sub(1);
-            if ticks > 0 && record.flags.overrun() && !self.torn {
+            if ticks > 0 && record.flags.has(Flags::OVERRUN) && !self.torn {
                 self.counts.overrun_ticks += u64::from(ticks);
                 take(Item::Mark(Mark::Overrun { ticks }));
             } else if ticks > 0 {

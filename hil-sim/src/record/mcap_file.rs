@@ -68,7 +68,7 @@ impl Topic {
         match self {
             Self::Tick => {
                 let controller = Controller::of(
-                    &interstage::log::Record::EMPTY,
+                    &interstage::log::Record::default(),
                     &interstage::sense::raw::SensorFrame::default(),
                 );
                 let tick = Tick { controller, truth: Some(TrueState::default()) };

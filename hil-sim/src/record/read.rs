@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::tick::OFF;
 use super::{Controller, Decoder, FRAMES, Item, Run};
-use interstage::log::frame::{Seen, look};
+use interstage::log::frame::{Found, find};
 use mcap::read::Options;
 use mcap::records::Record;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -67,10 +67,10 @@ pub fn pieces(stream: &[u8]) -> impl Iterator<Item = &[u8]> {
     std::iter::from_fn(move || {
         let mut used = 0;
         loop {
-            used += match look(rest.get(used..).filter(|rest| !rest.is_empty())?) {
-                Seen::Garbage(length) => length,
-                Seen::Part => 1,
-                Seen::Frame(_, length) => {
+            used += match find(rest.get(used..).filter(|rest| !rest.is_empty())?) {
+                Found::Garbage(length) => length,
+                Found::Part => 1,
+                Found::Frame(_, length) => {
                     let (piece, behind) = rest.split_at(used + length);
                     rest = behind;
                     return Some(piece);

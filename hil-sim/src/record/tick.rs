@@ -201,7 +201,7 @@ impl Controller {
     #[must_use]
     pub fn unknown(tick: u32) -> Self {
         let unknown = f64::NAN;
-        let nothing = Self::of(&Record::EMPTY, &SensorFrame::default());
+        let nothing = Self::of(&Record::default(), &SensorFrame::default());
         Self {
             tick,
             t_s: f64::from(tick) * 1e-3,
@@ -263,8 +263,8 @@ impl Controller {
             distance_mm: seen.distance.to_num(),
             drive_duty: f64::from(seen.drive.to_bits()) / DUTY,
             pretightener_duty: f64::from(seen.pretightener.to_bits()) / DUTY,
-            drive_on: flags.drive(),
-            pretightener_on: flags.preload(),
+            drive_on: flags.has(Flags::DRIVE),
+            pretightener_on: flags.has(Flags::PRELOAD),
         }
     }
 
@@ -437,7 +437,7 @@ mod tests {
                 pretightener: Duty::from_bits(duties[1]),
                 ..Telemetry::default()
             };
-            let record = Record { telemetry, ..Record::EMPTY };
+            let record = Record { telemetry, ..Record::default() };
             let controller = Controller::of(&record, &SensorFrame::default());
             prop_assert_eq!(controller.telemetry(), Some(telemetry));
             // JSON keeps it too.

@@ -88,10 +88,8 @@ impl SetMemory for Flash {
     }
 }
 
-fn set(name: &str) -> Vec<u8> {
-    let mut room = [0; MAX_SET];
-    let length = compile(name, &Rig::prototype(), &mut room).unwrap();
-    room[..length].to_vec()
+pub(in crate::params) fn set(name: &str) -> Vec<u8> {
+    compile(name, &Rig::prototype()).unwrap().to_vec()
 }
 
 async fn save(flash: &mut Flash, set: &[u8]) -> Result<(), Refusal> {
@@ -127,8 +125,8 @@ fn a_place_written_from_outside_is_the_same() {
     let mut flash = Flash::blank();
     let set = set("mine");
     block_on(save(&mut flash, &set)).unwrap();
-    assert_eq!(place(&set, 1).unwrap(), *flash.bytes(Slot::A));
-    assert_eq!(place(&[0; MAX_SET + 1], 1), None);
+    assert_eq!(slot_image(&set, 1).unwrap(), *flash.bytes(Slot::A));
+    assert_eq!(slot_image(&[0; MAX_SET + 1], 1), None);
 }
 
 #[test]
@@ -231,8 +229,8 @@ fn flip(in_b: bool, first: u32, spare: bool, bit: usize) {
     let (old, new) = (set("old"), set("new"));
     let mut flash = Flash::blank();
     let (to, from) = if in_b { (1, 0) } else { (0, 1) };
-    flash.slots[from] = place(&old, first).unwrap().to_vec();
-    flash.slots[to] = place(&new, first.wrapping_add(1)).unwrap().to_vec();
+    flash.slots[from] = slot_image(&old, first).unwrap().to_vec();
+    flash.slots[to] = slot_image(&new, first.wrapping_add(1)).unwrap().to_vec();
     assert_eq!(name(&flash).as_deref(), Some("new"));
     flash.slots[if spare { from } else { to }][bit / 8] ^= 1 << (bit % 8);
     let filler = bit / 8 >= PREFIX + new.len();
@@ -277,7 +275,7 @@ fn a_set_that_is_damaged_alone_is_not_replaced_by_silence() {
 fn a_place_of_earlier_firmware_without_a_fold_is_read() {
     let mut flash = Flash::blank();
     let set = set("old");
-    flash.slots[0] = place(&set, 7).unwrap().to_vec();
+    flash.slots[0] = slot_image(&set, 7).unwrap().to_vec();
     let length = set.len() as u32;
     flash.slots[0][8..16].copy_from_slice(&pair(length, !length));
     assert_eq!(name(&flash).as_deref(), Some("old"));

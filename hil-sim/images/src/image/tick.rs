@@ -31,11 +31,11 @@ pub(super) extern "C" fn tick_build(preset: u32) -> u32 {
     STATE.put(State::default);
     OUTPUT.put(Output::default);
     PLAN.take();
-    let Ok((controller, rest)) = set.controller() else { return 0 };
-    CONTROLLER.put(|| controller);
-    let Ok(planner) = rest.planner() else { return 0 };
-    PLANNER.put(|| planner);
-    1
+    CONTROLLER.put(Controller::default);
+    PLANNER.put(Planner::default);
+    let (Some(controller), Some(planner)) = (CONTROLLER.get(), PLANNER.get()) else { return 0 };
+    let Ok(rest) = set.read_controller(controller) else { return 0 };
+    u32::from(rest.read_planner(planner).is_ok())
 }
 
 /// Has the controller run every stage in every tick.

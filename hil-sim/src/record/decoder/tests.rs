@@ -8,7 +8,7 @@ pub(crate) fn frames(from: u32, ticks: u32) -> Vec<Vec<u8>> {
     let identity = Identity { schema: SCHEMA, rig: identity::text("test"), ..Default::default() };
     let (mut encoder, mut frames) = (LogEncoder::new(identity), Vec::new());
     for at in from..from + ticks {
-        let mut record = Record::EMPTY;
+        let mut record = Record::default();
         record.telemetry.at = at;
         record.telemetry.level = (at / 7) as u8;
         encoder.tick(&record, &mut |frame: &[u8]| {

@@ -1,6 +1,6 @@
 //! `rig-study constants`: the reduced model's constants and the image's parameter set.
 
-use interstage::params::{MAX_SET, compile};
+use interstage::params::compile;
 use interstage::rig::Rig;
 
 use super::{root, write};
@@ -23,10 +23,9 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let failed = |error: anyhow::Error| Failure::run(format!("{error:#}"));
     if args.set {
-        let mut room = [0; MAX_SET];
-        let length = compile("prototype", &Rig::prototype(), &mut room).map_err(Failure::run)?;
+        let set = compile("prototype", &Rig::prototype()).map_err(Failure::run)?;
         let path = root().join("src/params/prototype.set");
-        std::fs::write(path, &room[..length]).map_err(Failure::run)?;
+        std::fs::write(path, set).map_err(Failure::run)?;
         return Ok(Outcome::Good);
     }
     if args.sweep {
