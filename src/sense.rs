@@ -1,6 +1,6 @@
-//! From raw codes to checked quantities: [`Senses`] gives every quantity with its time and
-//! [`Validity`]. A sensor that falls silent or answers with errors keeps its last good value,
-//! which ages; it never holds up the tick.
+//! From raw codes to checked quantities, each with its time and [`Validity`]. A sensor that
+//! falls silent or answers with errors keeps its last good value, which ages; it never delays
+//! the tick.
 
 pub mod analog;
 pub mod angle;

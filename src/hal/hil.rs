@@ -206,6 +206,8 @@ mod tests {
                 stop,
                 command,
             };
+            let silent = Given { wheel_encoder: codes[0], stop, ..Given::default() };
+            prop_assert_eq!(given.silent(), silent);
             let sent = ToBoard::Tick(tick, given);
             let mut gatherer = FrameReader::new();
             let come = frame(&sent).unwrap().iter().find_map(|byte| gatherer.take(*byte));

@@ -8,16 +8,15 @@ use crate::numeric::{LowPass, LowPassState};
 use crate::rig::RigError;
 use crate::units::{Q16, Tick};
 
-/// Part of the converter at which the sensor reads zero.
+/// Part of the converter at zero.
 pub const ZERO_AT: f64 = 0.05;
-/// Part of the converter at which the sensor reads full scale.
+/// Part of the converter at full scale.
 pub const FULL_AT: f64 = 0.90;
-/// Below this part of the converter the bridge is broken.
+/// Least part of the converter of an intact bridge.
 pub const BROKEN_BELOW: f64 = 0.02;
-/// Above this part of the converter the bridge is broken.
+/// Largest part of the converter of an intact bridge.
 pub const BROKEN_ABOVE: f64 = 0.98;
-/// Largest zero correction, part of full scale: what stays clear of
-/// [`BROKEN_BELOW`].
+/// Largest zero correction, part of full scale: it stays clear of [`BROKEN_BELOW`].
 pub const ZERO_LIMIT: f64 = 0.03;
 /// Samples in the mean of a zero, a power of two.
 pub const ZERO_SAMPLES: u32 = 1 << ZERO_SHIFT;
@@ -80,9 +79,9 @@ pub enum Zeroing {
         /// Number of values so far.
         count: u32,
     },
-    /// Taken and in force.
+    /// Taken and applied.
     Done,
-    /// The mean lies too far from the nominal zero; the offset before stays in force.
+    /// The mean is too far from the nominal zero; the offset before still applies.
     Rejected,
 }
 
@@ -106,8 +105,7 @@ impl AnalogChannel {
         })
     }
 
-    /// One tick with the latest sample, which may be one already seen; `limit` is
-    /// the largest age, ticks.
+    /// One tick with the latest sample, new or not; `limit` is the largest age, ticks.
     pub fn step(
         &self,
         state: &mut AnalogState,
@@ -125,8 +123,7 @@ impl AnalogChannel {
                 state.freshness.judge(Err(Reason::OutOfRange));
             }
         }
-        // The filter runs on the held value, so that it keeps the tick's time
-        // whatever the jitter of the samples.
+        // The filter runs on the held value in every tick, whatever the jitter of the samples.
         let filtered = match &mut state.filter {
             Some(filter) => self.filter.step(filter, state.uncorrected),
             none => {

@@ -7,8 +7,8 @@ use super::raw::{AngleFrame, Sample};
 use crate::numeric::{LowPass, LowPassState};
 use crate::units::{Q16, Tick};
 
-/// Angle from the pillar in codes of the sensor, 16384 a turn, LSB 2^-16 code = 5.9 nrad. It
-/// grows as the arm leans outwards.
+/// Angle from the pillar in codes of the sensor, 16384 a turn, LSB 2^-16 code = 5.9 nrad;
+/// positive outwards.
 pub type Codes = Q16;
 
 /// The 14-bit code of a frame with even parity and without the error flag, bit 14.
@@ -41,7 +41,6 @@ pub struct AngleState {
     freshness: Freshness,
     angle: Codes,
     filter: Option<LowPassState>,
-    bad_frames: u32,
 }
 
 /// What an [`AngleSensor`] gives.
@@ -63,8 +62,7 @@ impl AngleSensor {
         Self { zero, lo, hi, filter: LowPass::build(tau_s) }
     }
 
-    /// One tick with the latest sample, which may be one already seen; `limit` is
-    /// the largest age, ticks.
+    /// One tick with the latest sample, new or not; `limit` is the largest age, ticks.
     pub fn step(
         &self,
         state: &mut AngleState,
@@ -76,8 +74,6 @@ impl AngleSensor {
             let verdict = decode(sample.code).and_then(|code| self.within(code));
             if let Ok(angle) = verdict {
                 state.angle = angle;
-            } else {
-                state.bad_frames = state.bad_frames.saturating_add(1);
             }
             state.freshness.judge(verdict.map(|_| ()));
         }
@@ -91,18 +87,11 @@ impl AngleSensor {
         Angle { reading: state.freshness.reading(state.angle, now, limit), filtered }
     }
 
-    /// A code as an angle that the arm can take.
+    /// A code as an angle within the arm's reach.
     fn within(&self, code: u16) -> Result<Codes, Reason> {
         let angle = (u32::from(code) << 18).wrapping_sub(self.zero) as i32;
         let angle = Q16::from_bits(angle >> 2);
         if (self.lo..=self.hi).contains(&angle) { Ok(angle) } else { Err(Reason::OutOfRange) }
-    }
-}
-
-impl AngleState {
-    /// Frames refused since boot: parity, error flag or out of reach.
-    pub const fn bad_frames(&self) -> u32 {
-        self.bad_frames
     }
 }
 
@@ -114,7 +103,7 @@ mod tests {
 
     const LIMIT: u32 = 20;
 
-    /// A whole frame of a code.
+    /// A sound frame of a code.
     fn frame(code: u16) -> AngleFrame {
         let parity = (code.count_ones() % 2) as u16;
         AngleFrame::new(code | parity << 15)
@@ -125,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn every_frame_is_told_good_from_bad() {
+    fn every_frame_is_judged() {
         for bits in 0..=u16::MAX {
             let ones = (0..16).filter(|bit| bits >> bit & 1 == 1).count();
             let expected = if ones % 2 == 1 {
@@ -153,14 +142,13 @@ mod tests {
                     assert_eq!(angle.reading.validity, Validity::Valid);
                 } else if !(99.999..=4000.001).contains(&exact) {
                     assert_eq!(angle.reading.validity, Validity::Invalid(Reason::OutOfRange));
-                    assert_eq!(state.bad_frames(), 1);
                 }
             }
         }
     }
 
     #[test]
-    fn bad_frames_hold_the_angle_and_are_counted() {
+    fn bad_frames_hold_the_angle() {
         let sensor = sensor(2000.0);
         let mut state = AngleState::default();
         sensor.step(&mut state, 0, Some(Sample { code: frame(3000), at: 0 }), LIMIT);
@@ -173,10 +161,6 @@ mod tests {
             assert_eq!(angle.reading.value, Codes::from_num(1000));
             assert_eq!(angle.reading.at, 0);
         }
-        assert_eq!(state.bad_frames(), 2);
-        // Repeating the tick with the same frame counts nothing.
-        sensor.step(&mut state, 5, Some(Sample { code: flagged, at: 4 }), LIMIT);
-        assert_eq!(state.bad_frames(), 2);
         let angle = sensor.step(&mut state, 21, Some(Sample { code: flagged, at: 20 }), LIMIT);
         assert_eq!(angle.reading.validity, Validity::Invalid(Reason::SensorError));
     }

@@ -1,4 +1,4 @@
-//! The arm's geometry: from its angle to the wheel centre and the sleeve level.
+//! Arm geometry: from its angle to the wheel centre and the sleeve level.
 
 #![deny(clippy::float_arithmetic)]
 
@@ -7,12 +7,12 @@ use crate::numeric::{between, checked, reciprocal_of_normalised, sin_cos};
 use crate::rig::{MAX_STEPS, Rig, RigError};
 use crate::units::{Millimetres, Q16, Ratio, q16};
 
-/// Least and largest sine of the arm angle that is not taken for a sensor fault:
-/// the reach that the parameters are checked against is 0.1 to 0.9.
+/// Least and largest sine of a plausible arm angle; the parameters are checked against 0.1 to
+/// 0.9.
 const SINE: (f64, f64) = (0.05, 0.95);
 
-/// How far the wheel must be from a level, in steps, before the next is
-/// reported: a tenth of a step (0.4 mm, ten codes of the sensor) beyond the middle.
+/// Distance from a level at which the next one is reported, steps: a tenth of a step (0.4 mm,
+/// ten codes of the sensor) beyond the middle.
 const LEVEL_SWITCH: Ratio = q16(600_000);
 
 /// Geometry of arm and sleeve: `r = r_pivot + L sin(angle)` is the distance of the wheel centre
@@ -20,7 +20,7 @@ const LEVEL_SWITCH: Ratio = q16(600_000);
 /// the radius, 2e-5 in the tangent; the sensor's half code is 0.019 to 0.022 mm.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Arm {
-    /// Least and largest angle that is not taken for a sensor fault.
+    /// Least and largest plausible angle.
     reach: (Codes, Codes),
     pivot: Millimetres,
     length: Millimetres,
@@ -51,14 +51,14 @@ impl Arm {
         self.reach
     }
 
-    /// Radius of the wheel centre, mm, and tangent of the arm angle: radial force per axial
-    /// thrust through the arm. Outside its reach the arm counts as at the end of it.
+    /// Radius of the wheel centre, mm, and tangent of the arm angle (radial force per axial
+    /// thrust). Beyond its reach the arm counts as at the end of it.
     pub fn stance(&self, angle: Codes) -> (Millimetres, Ratio) {
         let angle = between(angle, self.reach.0, self.reach.1);
         // A turn is 2^14 codes of Q16, so 2^30: to 2^32.
         let (sine, cosine) = sin_cos((angle.to_bits() as u32) << 2);
         let lever = (i64::from(self.length.to_bits()) * i64::from(sine) + (1 << 29)) >> 30;
-        // Inside the reach the cosine is positive; said again for the shift.
+        // Positive within the reach; the bound is for the shift.
         let cosine = cosine.max(1) as u32;
         let shift = cosine.leading_zeros();
         let tangent = u64::from(reciprocal_of_normalised(cosine << shift)) * sine.max(0) as u64;
@@ -74,8 +74,8 @@ impl Arm {
         (self.outermost + compression - radius) * self.per_step
     }
 
-    /// Sleeve level under the wheel: 0 at the outermost wall, one more per step. A `previous`
-    /// level changes only when the wheel is 0.6 steps from it, so that it does not flutter.
+    /// Sleeve level under the wheel: 0 at the outermost wall, one more per step. It changes from
+    /// `previous` only when the wheel is 0.6 steps from that.
     pub fn level(&self, previous: Option<u8>, steps: Ratio) -> u8 {
         match previous {
             Some(level)

@@ -1,5 +1,4 @@
-//! How far a value can be trusted: when it was taken and whether its sensor
-//! still answers.
+//! Validity of a reading: when it was taken, and whether its sensor still answers.
 
 #![deny(clippy::float_arithmetic)]
 
@@ -28,7 +27,7 @@ impl<T> Reading<T> {
         age(now, self.at)
     }
 
-    /// Whether the value may be acted on: taken lately, by a sensor that answers.
+    /// Whether the value may be acted on.
     pub fn is_usable(&self) -> bool {
         self.validity.is_usable()
     }
@@ -42,11 +41,11 @@ pub enum Validity {
     Absent,
     /// The newest code is good.
     Valid,
-    /// The newest code is bad, but the value before it is young enough to go on with.
+    /// The newest code is bad, but the last good value is young enough.
     Held(Reason),
     /// No code has come for longer than the limit.
     Stale,
-    /// Codes come, but no good one for longer than the limit.
+    /// Codes arrive, but no good one for longer than the limit.
     Invalid(Reason),
 }
 
@@ -60,9 +59,9 @@ impl Validity {
 /// What is wrong with a code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reason {
-    /// Outside what the sensor can give when it is intact, or the arm can reach.
+    /// Outside the range of an intact sensor or the arm's reach.
     OutOfRange,
-    /// Further from the code before than the mechanism can move.
+    /// A larger change than the mechanism can make.
     Implausible,
     /// The frame's parity is wrong.
     Parity,
@@ -70,14 +69,14 @@ pub enum Reason {
     SensorError,
 }
 
-/// Ticks from `at` to `now`. A time stamp up to a second ahead counts as zero, so
-/// that a sensor task running between two ticks never looks ancient.
+/// Ticks from `at` to `now`. A time stamp up to a second ahead counts as zero: a sensor task may
+/// run between two ticks.
 pub const fn age(now: Tick, at: Tick) -> u32 {
     let age = now.wrapping_sub(at);
     if age > u32::MAX - 1000 { 0 } else { age }
 }
 
-/// What is remembered of one sensor's codes.
+/// History of one sensor's codes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Freshness {
     newest: Option<Tick>,

@@ -1,10 +1,9 @@
-//! Raw codes as the peripherals deliver them, one type each, and their time stamp.
+//! Raw codes of the peripherals, one type each, and their time stamp.
 
 use crate::units::Tick;
 
-/// Quadrature counter of the wheel encoder: 16 bits, wraps. Differences between
-/// two readings are taken with wrapping arithmetic, so at most half a turn of
-/// the counter (32767 counts, 628 mm) may lie between them.
+/// Quadrature counter of the wheel encoder: 16 bits, wraps. At most half a turn of the counter
+/// (32767 counts, 628 mm) may lie between two readings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct EncoderCount(u16);
 
@@ -59,10 +58,10 @@ impl AngleFrame {
     }
 }
 
-/// Mean output of a motor's bridge, the difference of its two legs, behind divider and
-/// low-pass: 12 bits, of which [`BridgeCode::CENTRE`] is no voltage. A code is 20 parts of
-/// 2^15 of the supply, so that the range ends at a duty of 1.25 in either direction, and its noise
-/// takes one byte a tick in the log.
+/// Mean output of a motor's bridge, the difference of its two legs, through divider and
+/// low-pass: 12 bits, [`BridgeCode::CENTRE`] is no voltage. A code is 20 parts in 2^15 of the
+/// supply: the range ends at a duty of 1.25 either way, and the noise fits one byte a tick in
+/// the log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BridgeCode(u16);
 
@@ -77,7 +76,7 @@ impl BridgeCode {
         Self(code)
     }
 
-    /// The code of a duty, Q15, at the nominal supply; the nearest end if it is beyond.
+    /// The code of a duty, Q15, at the nominal supply; saturates.
     pub const fn of(duty: i32) -> Self {
         let code = (duty + Self::DUTY * Self::CENTRE as i32 + Self::DUTY / 2) / Self::DUTY;
         let end = 2 * Self::CENTRE as i32 - 1;
@@ -95,7 +94,7 @@ impl BridgeCode {
     }
 }
 
-/// What both bridges were found to put out. One converter reads them, one after the other.
+/// Readback of both bridges, converted one after the other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BridgeCodes {
     /// Drive.
@@ -104,7 +103,7 @@ pub struct BridgeCodes {
     pub pretightener: BridgeCode,
 }
 
-/// Why a sensor gave no code this time. The last good one stays in force and ages.
+/// Why a sensor gave no code this time. Its last good one stays valid and ages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BusFault {
     /// The transfer did not end in time.
@@ -122,8 +121,7 @@ pub struct Sample<T> {
     pub at: Tick,
 }
 
-/// The latest code of each sensor as the control tick finds them; `None` until a
-/// sensor has answered for the first time.
+/// The latest code of each sensor; none until its first answer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SensorFrame {
     /// Wheel encoder.
@@ -134,7 +132,7 @@ pub struct SensorFrame {
     pub compression_sensor: Option<Sample<AdcCode>>,
     /// Arm angle at the pillar.
     pub arm_angle: Option<Sample<AngleFrame>>,
-    /// Output of the bridges, converted since the tick before; none if nothing has been.
+    /// Output of the bridges since the tick before; none if nothing was converted.
     pub bridges: Option<BridgeCodes>,
 }
 

@@ -7,16 +7,15 @@ use super::angle::{AngleSensor, AngleState};
 use super::arm::Arm;
 use super::freshness::Reading;
 use super::raw::SensorFrame;
-use super::speed;
-use super::speed::{SpeedState, Speedometer};
+use super::speed::{self, SpeedState, Speedometer};
 use crate::rig::{Rig, RigError};
 use crate::units::{
     Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, Ratio, TICK_HZ, Tick, Travel,
 };
 
-/// Time constant of the low-pass of preload and compression sensor, s. Chosen: takes off a
-/// millisecond's noise by a factor of three and costs the preload loop 5 ms beside the 140 ms
-/// of its actuator; alike, so that both see a crossing with the same lag.
+/// Time constant of the low-pass of preload and compression sensor, s. Chosen: reduces a
+/// millisecond's noise to a third and costs the preload loop 5 ms beside the 140 ms of its
+/// actuator; equal, so that both see a crossing with the same lag.
 const FILTER_S: f64 = 0.005;
 
 /// Choices of the filters; the defaults hold for both rigs.
@@ -66,13 +65,11 @@ pub struct SensesState {
     level: Option<u8>,
 }
 
-/// What the sensors say in one tick.
+/// Sensor values of one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SensedState {
     /// Odometry since the first reading, mm, positive outwards, exact.
     pub travel: Travel,
-    /// The same in the control format, mm.
-    pub position: Millimetres,
     /// Speed along the sleeve, mm/s; its validity is the odometry's too.
     pub speed: Reading<MillimetresPerSecond>,
     /// Radial preload, N.
@@ -123,8 +120,8 @@ impl Senses {
         })
     }
 
-    /// One tick: `frame` holds the latest codes, new or not; `acceleration` is
-    /// what the speed profile asks for in this tick, mm/s^2.
+    /// One tick: `frame` holds the latest codes, new or not; `acceleration` is that of the speed
+    /// profile in this tick, mm/s^2.
     pub fn step(
         &self,
         state: &mut SensesState,
@@ -154,7 +151,6 @@ impl Senses {
         }
         SensedState {
             travel: motion.travel,
-            position: motion.position,
             speed: motion.speed,
             preload: preload.reading,
             preload_filtered: preload.filtered,
@@ -175,8 +171,7 @@ impl SensesState {
         self.compression_sensor.begin_zero();
     }
 
-    /// Whether the zeros of both are in: `None` while running, then whether both
-    /// were accepted.
+    /// Result of taking both zeros: none while in progress, then whether both were accepted.
     pub const fn zeroed(&self) -> Option<bool> {
         match (self.preload_sensor.zeroing(), self.compression_sensor.zeroing()) {
             (Zeroing::Done, Zeroing::Done) => Some(true),
@@ -249,7 +244,6 @@ mod tests {
             let error = (got.to_num::<f64>() - exact).abs();
             assert!(error <= bound, "{got} for {exact}");
         };
-        near(sensed.position, 36.0, 0.02);
         near(sensed.speed.value, 12.0, 0.02);
         near(sensed.preload.value, 33.3, 0.002);
         near(sensed.preload_filtered, 33.3, 0.002);

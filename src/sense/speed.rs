@@ -6,15 +6,15 @@ use super::freshness::{Freshness, Reading, Reason, age};
 use super::raw::{EncoderCount, Sample};
 use crate::numeric::checked;
 use crate::rig::{Rig, RigError};
-use crate::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Q16, Tick, Travel};
+use crate::units::{MillimetresPerSecond, MillimetresPerSecond2, Q16, Tick, Travel};
 
 /// Default bandwidth of the observer, rad/s. Chosen: the fastest that keeps the
 /// ripple of the counts within 1 % from 3 to 30 mm/s, also where counts and ticks
 /// beat (3.19 mm/s is a count every sixth tick, nearly).
 pub const BANDWIDTH_RAD_S: f64 = 23.0;
 
-/// Speed above which a change of the counter is taken for a disturbance, mm/s,
-/// unless the motor is faster than half of it.
+/// Speed above which a change of the counter counts as a disturbance, mm/s, unless the motor
+/// reaches more than half of it.
 const IMPLAUSIBLE_MM_S: f64 = 200.0;
 
 /// Longest gap between samples that the plausibility check scales with, ticks:
@@ -61,8 +61,6 @@ pub struct SpeedState {
 pub struct Motion {
     /// Travel since the first sample, mm, exact.
     pub travel: Travel,
-    /// The same in the control format.
-    pub position: Millimetres,
     /// Speed, with the time and validity of the counter.
     pub speed: Reading<MillimetresPerSecond>,
 }
@@ -89,9 +87,8 @@ impl Speedometer {
         })
     }
 
-    /// One tick with the latest sample, which may be one already seen;
-    /// `acceleration` is what the profile asks for in this tick, `limit` the
-    /// largest age, ticks.
+    /// One tick with the latest sample, new or not; `acceleration` is that of the profile in
+    /// this tick, `limit` the largest age, ticks.
     pub fn step(
         &self,
         state: &mut SpeedState,
@@ -106,12 +103,11 @@ impl Speedometer {
             self.correct(state, now, sample, before, limit);
         }
         let speed = state.freshness.reading(speed_mm_s(state.speed), now, limit);
-        Motion { travel: state.travel, position: millimetres(state.travel), speed }
+        Motion { travel: state.travel, speed }
     }
 
-    /// Takes a new sample into odometry and observer, unless the counter changed
-    /// faster than the wheel can turn. One that has jumped once is not believed again: the
-    /// way between would be lost.
+    /// Takes a new sample into odometry and observer, unless the counter changed faster than the
+    /// wheel can turn. After one jump it stays invalid: the travel in between is lost.
     fn correct(
         &self,
         state: &mut SpeedState,
@@ -139,13 +135,13 @@ impl Speedometer {
         let moved = i64::from(counts) * self.count;
         state.travel = state.travel.saturating_add(Travel::from_bits(moved));
         if gap > limit {
-            // The model has run blind for too long to be corrected: start anew.
+            // Too long without a correction: start again.
             state.error = 0;
             state.speed = 0;
             return;
         }
         state.error += moved << 16;
-        // A sample a few ticks old is compared with where the wheel was then.
+        // A sample a few ticks old is compared with the position at that time.
         let late = i64::from(age(now, sample.at).min(limit));
         let innovation = state.error + state.speed * late;
         // Q48 to Q28; beyond 8 mm the correction is bounded.
@@ -156,7 +152,7 @@ impl Speedometer {
     }
 }
 
-/// Moves the tracked position and speed on by a tick.
+/// Advances the tracked position and speed by a tick.
 fn predict(state: &mut SpeedState, acceleration: MillimetresPerSecond2) {
     // 1e-6 s^2 in Q48: mm/s^2 in Q16 to mm/tick^2 in Q48.
     const TICK_SQUARED: i64 = 281_474_977;
@@ -172,12 +168,6 @@ const ERROR_LIMIT: i64 = 4096 << 48;
 /// mm per tick, Q48, as mm/s.
 fn speed_mm_s(speed: i64) -> MillimetresPerSecond {
     let bits = ((speed >> 16) * i64::from(crate::units::TICK_HZ) + (1 << 15)) >> 16;
-    Q16::saturating_from_bits(bits)
-}
-
-/// Travel in the control format, saturated.
-fn millimetres(travel: Travel) -> Millimetres {
-    let bits = travel.to_bits() >> 16;
     Q16::saturating_from_bits(bits)
 }
 

@@ -192,7 +192,7 @@ mod tests {
     use crate::sense::Reading;
     use crate::sense::raw::BridgeCode;
     use crate::supervise::Leg;
-    use crate::units::{Direction, Millimetres, Q16, Travel};
+    use crate::units::{Direction, Q16, Travel};
     use proptest::prelude::*;
 
     const RUN: Mode = Mode::Run(Direction::Deploy, Leg::Cruise);
@@ -205,7 +205,6 @@ mod tests {
             |value: f64| Reading { value: Q16::from_num(value), at: 0, validity: Validity::Valid };
         SensedState {
             travel: Travel::ZERO,
-            position: Millimetres::ZERO,
             speed: reading(speed),
             preload: reading(preload),
             preload_filtered: Q16::from_num(preload),

@@ -1,5 +1,5 @@
-//! Valid bytes made invalid: what a reader must survive. The same seed gives the same
-//! bytes on every machine.
+//! Mutated input that a reader must survive. The same seed gives the same bytes on every
+//! machine.
 
 #![allow(dead_code, reason = "each test file uses its part of this")]
 
@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 /// Environment variable with the seconds that each target is given instead of the usual.
 pub(crate) const SECONDS: &str = "FUZZ_SECONDS";
 
-/// Numbers that look random: SplitMix64.
+/// Pseudo-random numbers: SplitMix64.
 pub(crate) struct Chance(u64);
 
 impl Chance {
@@ -36,33 +36,9 @@ impl Chance {
     }
 }
 
-/// Texts that readers stumble over.
-const WORDS: [&str; 24] = [
-    "0",
-    "-1",
-    "1e999",
-    "-1e999",
-    "nan",
-    "NaN",
-    "inf",
-    "18446744073709551616",
-    "-0.0",
-    "1e-320",
-    "true",
-    "[]",
-    "{}",
-    "\"\"",
-    "''",
-    "=",
-    ".",
-    ",",
-    "\n",
-    "\0",
-    "\u{FEFF}",
-    "ä\u{0301}",
-    "#",
-    "[[",
-];
+/// Texts that readers stumble over, separated by blanks.
+const WORDS: &str = "0 -1 1e999 -1e999 nan NaN inf 18446744073709551616 -0.0 1e-320 true [] {} \
+    \"\" '' = . , \n \0 \u{FEFF} ä\u{0301} # [[";
 
 /// Bytes that lengths and counts are made of.
 const NUMBERS: [&[u8]; 6] = [
@@ -101,8 +77,8 @@ pub(crate) fn mutant(corpus: &[Vec<u8>], chance: &mut Chance) -> Vec<u8> {
                 bytes.splice(at..end, other[from..to].iter().copied());
             }
             7 => {
-                let word = WORDS[chance.below(WORDS.len())];
-                bytes.splice(at..end.min(at + 8), word.bytes());
+                let word = WORDS.split(' ').nth(chance.below(WORDS.split(' ').count()));
+                bytes.splice(at..end.min(at + 8), word.unwrap_or_default().bytes());
             }
             _ => {
                 let number = NUMBERS[chance.below(NUMBERS.len())];
