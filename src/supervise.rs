@@ -1,4 +1,4 @@
-//! Modes and their one table of transitions, self-test, and the monitors that find faults.
+//! Modes and their transition table, self-test, and the monitors that find faults.
 
 pub mod codes;
 mod crosscheck;

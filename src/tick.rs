@@ -177,7 +177,7 @@ impl Controller {
         tick.output.preload = preload;
         tick.output.telemetry = self.telemetry(state, tick, &targets);
         let given = &tick.output.telemetry;
-        state.monitor.give(given.drive, given.pretightener);
+        state.monitor.set_duties(given.drive, given.pretightener);
     }
 
     fn look_for_faults(&self, state: &mut State, tick: &mut TickContext<'_>, input: &Input) {

@@ -1,4 +1,4 @@
-//! Coefficients of the felt stiffening in 1e-8, in the order of
+//! Coefficients of the effective stiffness in 1e-8, in the order of
 //! [`Kind::terms`](super::effective_stiffness::Kind::terms). Written by `rig-study constants` from
 //! crossings of the converged ring; do not edit.
 

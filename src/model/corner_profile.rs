@@ -1,13 +1,12 @@
-//! Rise of the wheel over a corner: for the spring that the climb compresses and the force
-//! that it costs.
+//! Rise of the wheel over a corner, which compresses the spring, and the drive force that it
+//! takes.
 
 #![deny(clippy::float_arithmetic)]
 
 use super::formula::Formula;
 use crate::numeric::{Table, checked};
 use crate::rig::{Rig, RigError};
-use crate::units::Direction;
-use crate::units::{Millimetres, Q16, Ratio};
+use crate::units::{Direction, Millimetres, Q16, Ratio};
 
 /// Tread depth at the corner, as a part of the step height; it varies little over
 /// the preloads of a crossing.
@@ -61,6 +60,7 @@ impl CornerProfile {
             let part = if d > 0.0 { 1.0 - d / rolls } else { 1.0 + d / patch };
             most * part.max(0.0)
         };
+        let high = RigError::OutOfRange { key: "rig.step_height_mm", value: h, min: 0.5, max: 8.0 };
         let slope = Table::build(-patch, touch, |d| {
             if d <= rolls {
                 on_corner(d) + recovery(d)
@@ -69,26 +69,16 @@ impl CornerProfile {
                 on_corner(rolls) * part * part
             }
         })
-        .ok_or(RigError::OutOfRange {
-            key: "rig.step_height_mm",
-            value: h,
-            min: 0.5,
-            max: 8.0,
-        })?;
-        // The load passes from wall to corner between first touch and lift-off, and back
+        .ok_or(high)?;
+        // The load passes from wall to corner between first touch and lift-off. Back it passes
         // within a few tenths of that travel: the relaxed tread is still deep at the corner.
         let drive_slope = |ends: f64| {
             Table::build(0.0, touch, |d| {
-                let whole = DRIVE_SLOPE_PART * on_corner(d.min(lift));
+                let full = DRIVE_SLOPE_PART * on_corner(d.min(lift));
                 let part = ((ends - d) / (ends - lift)).clamp(0.0, 1.0);
-                whole * part
+                full * part
             })
-            .ok_or(RigError::OutOfRange {
-                key: "rig.step_height_mm",
-                value: h,
-                min: 0.5,
-                max: 8.0,
-            })
+            .ok_or(high)
         };
         let back = lift + BACK_PART * (touch - lift);
         Ok(Self {
@@ -154,8 +144,8 @@ mod tests {
             let ahead = Q16::from_bits(bits);
             let within = |x: Ratio| (-0.01..1.0).contains(&x.to_num::<f64>());
             proptest::prop_assert!(within(corner.slope(ahead)));
-            for way in Direction::ALL {
-                proptest::prop_assert!(within(corner.drive_slope(way, ahead)));
+            for direction in Direction::ALL {
+                proptest::prop_assert!(within(corner.drive_slope(direction, ahead)));
             }
         }
     }

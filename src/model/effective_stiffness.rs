@@ -1,10 +1,9 @@
 //! Effective stiffness of the tread in a crossing: the polynomial fitted to the ring.
 //!
-//! In units of the wheel (lengths over R, forces over k_inf R^2 L) the crossing of a
-//! quasi-static ring depends on the speed v tau / R, the run over the corner r / R, the step h
-//! / R, the load T / (k_inf R^2 L) and the stiffening s alone. `k_eff / k_inf = 1 + (s - 1) x
-//! E`, with the fast part `x = speed / (speed + l)` of the crossing, and E a polynomial in x,
-//! run, step and load. At rest it is 1 exactly.
+//! In units of the wheel (lengths over R, forces over k_inf R^2 L) the crossing of a quasi-static
+//! ring depends on the speed v tau / R, the run over the corner r / R, the step h / R, the load
+//! T / (k_inf R^2 L) and the stiffening s alone. `k_eff / k_inf = 1 + (s - 1) x E`, with the fast
+//! part `x = speed / (speed + l)` of the crossing, and E a polynomial in x, run, step and load.
 
 use super::constants::{DEPLOY, DEPLOY_PUSHED, RETRACT, RETRACT_PUSHED};
 use crate::units::Direction;

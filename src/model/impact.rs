@@ -1,5 +1,5 @@
-//! What the corner does beyond the quasi-static climb: the stress of its first touch, and the
-//! vibration that it leaves in the arm. Both are small at the rig's speeds and grow with them.
+//! Dynamic effects of the corner: the stress of its first touch, and the vibration that it
+//! leaves in the arm. Both are small at the rig's speeds and grow with them.
 
 use crate::rig::Rig;
 

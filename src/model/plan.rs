@@ -1,10 +1,10 @@
-//! What the tick asks the model task, and what it is answered.
+//! Requests of the tick to the model task, and its answers.
 
 use crate::fault::Limit;
 use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Ratio, Seconds};
 
-/// How preload and speed are chosen. The product is [`Strategy::Scheduled`]; the
-/// others are what it is compared with.
+/// How preload and speed are chosen. The product is [`Strategy::Scheduled`]; the others are for
+/// comparison.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Strategy {
     /// Preload raised ahead of each step as far as the speed needs.
@@ -35,8 +35,7 @@ pub struct Review {
     pub trusted: bool,
 }
 
-/// What the tick asks for: the schedule of the step ahead, and first the review of
-/// the step behind.
+/// Request for the schedule of the step ahead, and first for the review of the step behind.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct PlanRequest {
     /// Numbers the requests, so that a late answer is recognised.
@@ -51,7 +50,7 @@ pub struct PlanRequest {
     pub review: Option<Review>,
 }
 
-/// What the model makes of a review.
+/// Result of a review.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Outcome {
     /// Gap that the model gives for the reviewed speed and preload, mm.
@@ -60,9 +59,9 @@ pub struct Outcome {
     pub slip_margin: Ratio,
     /// Corrected stiffness scale.
     pub scale: Ratio,
-    /// Whether the correction met the end of its range.
+    /// Whether the correction reached the end of its range.
     pub bounded: bool,
-    /// Whether the measured gap asks for a stiffness far from the estimated one.
+    /// Whether the measured gap implies a stiffness far from the estimated one.
     pub strange: bool,
 }
 
@@ -71,7 +70,7 @@ pub struct Outcome {
 pub struct Plan {
     /// Sequence of the request answered.
     pub sequence: u32,
-    /// Step that it is for; 0 when none is left.
+    /// Its step; 0 when none is left.
     pub step: u8,
     /// Direction of the run.
     pub direction: Direction,
@@ -87,7 +86,7 @@ pub struct Plan {
     pub gap: Millimetres,
     /// Friction left unused at the step.
     pub slip_margin: Ratio,
-    /// Distance that braking from cruise to crossing speed takes, mm.
+    /// Braking distance from cruise to crossing speed, mm.
     pub brake_way: Millimetres,
     /// Time that this braking takes, s.
     pub brake_time: Seconds,

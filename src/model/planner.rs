@@ -16,19 +16,18 @@ use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Ratio,
 /// Largest correction of the stiffness scale by one crossing.
 const LARGEST_CORRECTION: Ratio = q16(100_000);
 
-/// Relative difference of an observed stiffness beyond which it is not believed.
+/// Relative difference of an observed stiffness above which it is rejected.
 const OUTLIER: Ratio = q16(350_000);
-/// Stiffness that a measured gap may ask for beyond the estimated one, part of that: what is
-/// more is reported. Rubber that is off by three deviations makes 0.12 at the first crossing;
-/// the rest is the measurement, of which a stiff guess costs most. Of 1,500 random rigs two
-/// come beyond 0.20.
+/// Relative difference of an observed stiffness above which it is reported. Rubber that is off
+/// by three deviations makes 0.12 at the first crossing; the rest is the measurement, where a
+/// stiff guess costs most. Two of 1,500 random rigs exceed 0.20.
 const STRANGE: Ratio = q16(270_000);
 
 /// Sixteenths of the gap taken off until the slip margin holds, at most.
 const SLIP_TRIES: usize = 8;
 
-/// The model side of the schedule; runs outside the tick. The default is room to read one
-/// into, and plans nothing.
+/// The model side of the schedule; runs outside the tick. The default is a place to read one
+/// into.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Planner {
     model: ReducedModel,
@@ -37,7 +36,7 @@ pub struct Planner {
     strategy: Strategy,
     /// Radial force that the arm's inclination adds at each step, N.
     arm_thrust: heapless::Vec<Newtons, MAX_STEPS>,
-    /// Coupling times load: arm_thrust per tangent of the arm angle, N.
+    /// Coupling times load: arm thrust per tangent of the arm angle, N.
     coupling: Newtons,
     /// Gap to hold, deploy and retract, mm.
     gap_ref: [Millimetres; 2],
@@ -48,9 +47,9 @@ pub struct Planner {
     safe_speed: MillimetresPerSecond,
     /// Speed at which the pre-tightener just follows the spring at lift-off, mm/s.
     climb_speed: MillimetresPerSecond,
-    /// Crossing speed that a comparison prescribes, mm/s.
+    /// Crossing speed set by a comparison, mm/s.
     prescribed_speed: Option<MillimetresPerSecond>,
-    /// Whether the crossing speed holds between the steps as well.
+    /// Whether the crossing speed also applies between the steps.
     uniform: bool,
     cruise_preload: Newtons,
     /// Preload that the plan may ask for, N.
@@ -94,7 +93,7 @@ impl Planner {
         if self.uniform {
             plan.cruise_speed = plan.cross_speed;
         }
-        self.ways(&mut plan);
+        self.braking(&mut plan);
         plan
     }
 
@@ -123,7 +122,7 @@ impl Planner {
         if moved {
             add(&mut plan.limits, Limit::ResonanceAvoided);
         }
-        // A band that reaches below the floor is crossed in: too slow is worse.
+        // A band that reaches below the floor is entered: too slow would be worse.
         let speed = speed.max(floor);
         let at = Point { speed, ..at };
         let wanted = self.model.force(&at, gap) - arm_thrust;
@@ -161,8 +160,8 @@ impl Planner {
         gap
     }
 
-    /// How far and how long before the step braking must begin.
-    fn ways(&self, plan: &mut Plan) {
+    /// Distance and time of braking before the step.
+    fn braking(&self, plan: &mut Plan) {
         plan.brake_horizon = self.timing.longest_brake_way(plan.cruise_speed.max(plan.cross_speed));
         plan.brake_way = self.timing.brake_way(plan.cruise_speed, plan.cross_speed);
         plan.brake_time = self.timing.speed_change(plan.cruise_speed - plan.cross_speed);
@@ -174,22 +173,28 @@ impl Planner {
             Point { direction: review.direction, speed: review.speed, scale: Scale::new(scale) };
         let force = review.preload + self.coupling * review.tan_arm;
         let crossing = self.model.crossing(&at, force);
-        let (gap_predicted, slip_margin) = (crossing.gap, crossing.slip_margin);
+        let unchanged = |strange| Outcome {
+            gap_predicted: crossing.gap,
+            slip_margin: crossing.slip_margin,
+            scale,
+            bounded: false,
+            strange,
+        };
         if !review.trusted {
-            return Outcome { gap_predicted, slip_margin, scale, bounded: false, strange: false };
+            return unchanged(false);
         }
         let observed = self.model.observed_scale(&at, review.gap, force);
         let off = (observed - scale).abs();
         let strange = off > STRANGE * scale;
-        // Farther off than any tread or tolerance, it is the measurement that is wrong.
+        // Further off than any tread or tolerance, the measurement is wrong.
         if off > OUTLIER * scale {
-            return Outcome { gap_predicted, slip_margin, scale, bounded: false, strange };
+            return unchanged(strange);
         }
         let step = ((observed - scale) * self.gain).clamp(-LARGEST_CORRECTION, LARGEST_CORRECTION);
         let (low, high) = self.scale_range;
         let wanted = scale + step;
         let scale = wanted.clamp(low, high);
-        Outcome { gap_predicted, slip_margin, scale, bounded: scale != wanted, strange }
+        Outcome { scale, bounded: scale != wanted, ..unchanged(strange) }
     }
 
     fn arm_thrust_at(&self, step: u8) -> Newtons {
@@ -294,19 +299,10 @@ mod tests {
     }
 
     #[test]
-    fn a_crossing_that_the_preload_slows_is_told() {
+    fn a_crossing_slowed_by_its_preload_is_reported() {
         let (mut limited, mut free) = (0, 0);
         for gap_mm in [0.0, 1.5, 1.75, 2.0, 2.25, 2.5] {
-            let mut rig = Rig::prototype();
-            rig.control.gap_ref_mm = gap_mm;
-            let planner = Planner::try_build(&rig).expect("a sound rig");
-            for (scale, direction) in [0.8, 1.0, 1.25]
-                .into_iter()
-                .flat_map(|scale| Direction::ALL.map(|way| (scale, way)))
-            {
-                let scale = Ratio::from_num(scale);
-                let request = PlanRequest { sequence: 1, direction, step: 2, scale, review: None };
-                let plan = planner.plan(&request);
+            for (planner, plan) in plans(|rig| rig.control.gap_ref_mm = gap_mm) {
                 let told = plan.limits.contains(&Some(Limit::PreloadLimited));
                 let floored = plan.limits.contains(&Some(Limit::SpeedFloor));
                 let at_limit = plan.cross_preload >= planner.most_preload * q16(980_000);
@@ -335,7 +331,7 @@ mod tests {
     }
 
     #[test]
-    fn a_crossing_that_no_speed_makes_narrow_enough_is_told() {
+    fn a_crossing_that_no_speed_makes_narrow_enough_is_reported() {
         let (mut floored, mut free) = (0, 0);
         for gap_mm in [0.6, 0.8, 1.0, 1.25, 1.5, 2.0, 2.5] {
             for (planner, plan) in plans(|rig| rig.control.gap_ref_mm = gap_mm) {
@@ -352,14 +348,14 @@ mod tests {
     }
 
     #[test]
-    fn a_crossing_that_leaves_too_little_friction_is_told() {
+    fn a_crossing_that_leaves_too_little_friction_is_reported() {
         let (mut slips, mut grips) = (0, 0);
         for mu in [0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.1] {
             for (planner, plan) in plans(|rig| rig.plant.mu = mu) {
                 let told = plan.limits.contains(&Some(Limit::SlipMarginLow));
                 let wanted = planner.friction - planner.usable;
                 assert_eq!(told, plan.slip_margin < wanted, "{mu} {plan:?}");
-                // Told or not, the margin is that of the friction left over.
+                // Reported or not, the margin is what the friction leaves.
                 let margin = plan.slip_margin.to_num::<f64>();
                 assert!(
                     margin < mu && (wanted.to_num::<f64>() - 0.1).abs() < 1e-4,

@@ -1,10 +1,10 @@
 //! The reduced model in fixed point: forward (speed and force to gap and what follows from it)
 //! and inverse (gap to force, gap and force to speed).
 //!
-//! For one rig the fitted polynomial depends on speed and run alone. Both inverses are the
-//! zero of one polynomial, found in one step from a guess: a low polynomial in its cell of
-//! speed and force, or of stiffness. Lengths over R and parts are Q32 without sign, forces
-//! over the unit of `Shape` Q30.
+//! For one rig the fitted polynomial depends on speed and run alone. Both inverses are the zero
+//! of one polynomial, found in one step from a guess: a low polynomial in its cell of speed and
+//! force, or of stiffness. Lengths over R and parts are unsigned Q32, forces over the unit of
+//! `Shape` Q30.
 
 #![deny(clippy::float_arithmetic)]
 
@@ -58,9 +58,9 @@ impl Scale {
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ReducedModel {
     shape: Shape,
-    ways: [DirectionModel; 2],
-    /// All bits if friction drives the wheel; none if it is pushed and needs none.
-    driven: i32,
+    directions: [DirectionModel; 2],
+    /// Friction drives the wheel; a wheel that is pushed needs none.
+    driven: bool,
     /// Friction of tread on wall.
     friction: Ratio,
 }
@@ -76,7 +76,7 @@ pub struct Point {
     pub scale: Scale,
 }
 
-/// What the model says of a crossing, see [`formula::Crossing`](super::formula::Crossing).
+/// A crossing by the model, see [`formula::Crossing`](super::formula::Crossing).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Crossing {
     /// Clearance at the root of the step, mm.
@@ -105,14 +105,14 @@ impl ReducedModel {
     /// = P` by one step from a guess; then
     /// [`Formula::crossing`](super::formula::Formula::crossing).
     pub fn crossing(&self, point: &Point, force: Newtons) -> Crossing {
-        let (shape, way) = (&self.shape, self.way(point.direction));
+        let (shape, model) = (&self.shape, self.direction(point.direction));
         let wanted = shape.part(force);
         let sought = shape.unscaled(wanted, point.scale.inverse);
         let speed = shape::speed(point.speed);
-        let x = way.fast_part(speed);
+        let x = model.fast_part(speed);
         let excess = shape.beyond_lift(sought);
-        let guess = way.guess_run(x, &excess);
-        let Refined { run, slope } = shape.refine(way, x, &guess, sought, &excess);
+        let guess = model.guess_run(x, &excess);
+        let Refined { run, slope } = shape.refine(model, x, &guess, sought, &excess);
         let w = centred(run);
         let radial = shape.radial_part(wanted, slope, w);
         let corner_force = shape.newtons(high(radial, slope) << 2);
@@ -158,12 +158,12 @@ impl ReducedModel {
         floor: MillimetresPerSecond,
         ceiling: MillimetresPerSecond,
     ) -> MillimetresPerSecond {
-        let (shape, way) = (&self.shape, self.way(point.direction));
+        let (shape, model) = (&self.shape, self.direction(point.direction));
         let run = shape.run(gap);
         let w = centred(run);
         let sought = shape.unscaled(shape.part(force), point.scale.inverse);
         let stiffness = shape.stiffness_for(sought - shape.lifting(w), run);
-        match way.speed(stiffness, w) {
+        match model.speed(stiffness, w) {
             Some(speed) => speed.min(ceiling).max(floor),
             None => floor,
         }
@@ -187,25 +187,25 @@ impl ReducedModel {
 
     /// Radial force after this run, Q30.
     fn force_part(&self, point: &Point, run: u32) -> i32 {
-        let (shape, way) = (&self.shape, self.way(point.direction));
+        let (shape, model) = (&self.shape, self.direction(point.direction));
         let w = centred(run);
-        let stiffness = way.stiffness(way.fast_part(shape::speed(point.speed)), w);
+        let stiffness = model.stiffness(model.fast_part(shape::speed(point.speed)), w);
         let force = shape.elastic(run, stiffness) + shape.lifting(w);
         shape.scaled(force, point.scale.ratio)
     }
 
     /// Friction used under a radial reaction on this slope, both Q30.
     fn used(&self, radial: i32, slope: i32) -> Ratio {
-        Ratio::from_bits(self.shape.utilisation(radial, slope).to_bits() & self.driven)
+        if self.driven { self.shape.utilisation(radial, slope) } else { Ratio::ZERO }
     }
 
     /// Coefficients of a direction.
-    fn way(&self, direction: Direction) -> &DirectionModel {
-        &self.ways[direction as usize % 2]
+    fn direction(&self, direction: Direction) -> &DirectionModel {
+        &self.directions[direction as usize % 2]
     }
 }
 
-/// A part of a whole, Q32 without sign, as its difference from one half, Q32 with sign.
+/// A part, unsigned Q32, as its difference from one half, signed Q32.
 const fn centred(part: u32) -> i32 {
     (part ^ 0x8000_0000) as i32
 }

@@ -1,4 +1,4 @@
-//! How long speed and preload take to change, and how far the wheel rolls meanwhile.
+//! Duration of changes of speed and preload, and the distance rolled meanwhile.
 
 #![deny(clippy::float_arithmetic)]
 
@@ -33,9 +33,8 @@ impl Timing {
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         let (a, j) = (rig.drive.acceleration_mm_s2, rig.drive.jerk_mm_s3);
-        // Behind the end of a ramp the force lags by slew x lag, which two more lags
-        // bring to a few tenths of a newton; the reserve covers an actuator whose times
-        // are half as long again.
+        // After the end of a ramp the force lags by slew x lag, which two more lags bring to a
+        // few tenths of a newton; the reserve covers times that are half as long again.
         let rate_part = SLEW_PART.to_num::<f64>();
         let times = rig.preload.delay_s + 2.0 * rig.preload.lag_s;
         Ok(Self {
@@ -72,7 +71,7 @@ impl Timing {
         self.speed_change(from - to) * mean
     }
 
-    /// Time in which the jerk takes this acceleration back, s.
+    /// Time in which the jerk reduces this acceleration to zero, s.
     pub fn until_level(&self, acceleration: MillimetresPerSecond2) -> Seconds {
         self.by_acceleration.divide(acceleration) * self.build_up
     }
@@ -87,8 +86,8 @@ impl Timing {
         self.by_rate.divide(change)
     }
 
-    /// Distance that no braking from up to `cruise` exceeds, whatever the acceleration, mm:
-    /// the highest speed that it leads to, for as long as it takes to lose all of it.
+    /// Upper bound of the braking distance from up to `cruise` at any acceleration, mm: the
+    /// highest speed that it leads to, for as long as it takes to lose all of it.
     pub fn longest_brake_way(&self, cruise: MillimetresPerSecond) -> Millimetres {
         let peak = cruise + (self.acceleration * self.build_up).half();
         self.speed_change(peak) * peak + q16(100_000)
@@ -122,9 +121,9 @@ mod tests {
             let rising = q(rising * rig.drive.acceleration_mm_s2);
             let until = timing.until_level(rising);
             let peak = q(cruise * part) + (rising * until).half();
-            let way = (peak * until) + timing.brake_way(peak, q(cruise * to));
+            let distance = (peak * until) + timing.brake_way(peak, q(cruise * to));
             let longest = timing.longest_brake_way(q(cruise));
-            prop_assert!(way <= longest, "{way} {longest}");
+            prop_assert!(distance <= longest, "{distance} {longest}");
         }
 
         #[test]
@@ -137,8 +136,10 @@ mod tests {
                 if change >= a * a / j { change / a + a / j } else { 2.0 * (change / j).sqrt() };
             let got = timing.speed_change(Q16::from_num(from - to)).to_num::<f64>();
             prop_assert!((got - exact).abs() < 2e-4 + 1e-3 * exact, "{got} {exact}");
-            let way = timing.brake_way(Q16::from_num(from), Q16::from_num(to)).to_num::<f64>();
-            prop_assert!((way - exact * 0.5 * (from + to)).abs() < 0.02 + 1e-3 * way, "{way}");
+            let distance = timing.brake_way(Q16::from_num(from), Q16::from_num(to));
+            let distance = distance.to_num::<f64>();
+            let error = (distance - exact * 0.5 * (from + to)).abs();
+            prop_assert!(error < 0.02 + 1e-3 * distance, "{distance}");
         }
     }
 }

@@ -1,16 +1,16 @@
-//! Modes, stages and commands as numbers of the log. Numbers are stable: none is ever
-//! given a second meaning.
+//! Modes, stages and commands as numbers of the log. The numbers are stable: none is ever given
+//! a second meaning.
 
 use super::{Command, Mode};
 use crate::estimate::ContactStage;
 use crate::fault::Fault;
 use crate::units::Direction;
 
-/// Number of a mode: its place in [`Mode::WITHOUT_FAULT`], or the code of the fault that
-/// is held, 101 to 160. Called every tick, so that it does not look for that place.
+/// Number of a mode: its index in [`Mode::WITHOUT_FAULT`], or the code of the fault held, 101 to
+/// 160. Called every tick, so it does not search.
 pub const fn of_mode(mode: Mode) -> u8 {
-    /// Modes that have a way.
-    const WAY: u8 = 7;
+    /// Modes of each direction.
+    const OF_DIRECTION: u8 = 7;
     let (first, direction) = match mode {
         Mode::Boot => return 0,
         Mode::SelfTest => return 1,
@@ -24,7 +24,7 @@ pub const fn of_mode(mode: Mode) -> u8 {
     };
     match direction {
         Direction::Deploy => first,
-        Direction::Retract => first + WAY,
+        Direction::Retract => first + OF_DIRECTION,
     }
 }
 

@@ -1,9 +1,9 @@
-//! What the drive is doing, and what an operator may ask for.
+//! Modes of the drive, and the operator's commands.
 
 use crate::fault::Fault;
 use crate::units::Direction;
 
-/// An operator's command, from the board button or the log channel.
+/// An operator's command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Command {
     /// Deploy from where the wheel is.
@@ -29,7 +29,7 @@ pub enum Leg {
     Settle,
 }
 
-/// What the drive is doing.
+/// Mode of the drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Mode {
     /// Waiting for every sensor's first reading.

@@ -12,17 +12,17 @@ use crate::sense::raw::BridgeCodes;
 use crate::sense::{Reason, SensedState, Validity};
 use crate::units::{Duty, MillimetresPerSecond, Newtons, Ratio, Tick, q16};
 
-/// Preload above the limit that counts as overpressure, relative: regulation and
-/// the spring that a climb compresses stay below it.
+/// Preload above the limit that counts as overpressure, relative: regulation and the spring that
+/// a climb compresses stay below it.
 const OVERPRESSURE_PART: f64 = 0.10;
-/// Ticks that overpressure must last: noise does not.
+/// Ticks that overpressure must last, longer than noise.
 const OVERPRESSURE_TICKS: u16 = 10;
 /// Speed of a wheel whose bridge is off, mm/s: the observer's ringing is less.
 const BEYOND: MillimetresPerSecond = q16(5_000_000);
-/// Ticks that it must last.
+/// Ticks that this must last.
 const RUNAWAY_TICKS: u16 = 12;
-/// Ticks that a preload may be short of what the actuator should have reached: dead time
-/// and lag are in that already, so these are for their tolerance.
+/// Ticks for which a preload may be short of the actuator's model, which includes dead time and
+/// lag: for their tolerance.
 const PRELOAD_TICKS: u16 = 400;
 
 /// Bounds of a rig.
@@ -46,7 +46,7 @@ pub struct MonitorState {
     readback: Readback,
 }
 
-/// What is looked at beside the sensors.
+/// Inputs of the monitor.
 #[derive(Clone, Copy, Debug)]
 pub struct Observed<'a> {
     /// Tick.
@@ -55,7 +55,7 @@ pub struct Observed<'a> {
     pub mode: Mode,
     /// Sensors.
     pub sensed: &'a SensedState,
-    /// What the bridges were found to put out since the last tick.
+    /// Readback of the bridges since the last tick.
     pub bridges: Option<BridgeCodes>,
     /// Speed reference, signed, mm/s.
     pub speed_ref: MillimetresPerSecond,
@@ -93,8 +93,8 @@ impl Monitor {
         let preload = seen.sensed.preload.value;
         let speed = seen.sensed.speed.value;
         let acting = seen.mode.moves() || matches!(seen.mode, Mode::Preload(_));
-        // With the bridges off nothing here could relieve it; while it falls as it should,
-        // it is being relieved.
+        // With the bridges off nothing could relieve it; a preload that falls as planned is being
+        // relieved.
         let pressed = preload > self.overpressure
             && (seen.mode.moves() || acting && preload - seen.preload_due > self.short);
         lasting(&mut state.overpressure, pressed);
@@ -156,9 +156,9 @@ impl Monitor {
 }
 
 impl MonitorState {
-    /// What the bridges are given until the next tick; off is none.
-    pub fn give(&mut self, drive: Duty, pretightener: Duty) {
-        self.readback.give(drive, pretightener);
+    /// Sets the bridges' duties until the next tick; 0 with the bridge off.
+    pub fn set_duties(&mut self, drive: Duty, pretightener: Duty) {
+        self.readback.set_duties(drive, pretightener);
     }
 }
 
@@ -196,7 +196,7 @@ mod tests {
     use proptest::prelude::*;
 
     const RUN: Mode = Mode::Run(Direction::Deploy, Leg::Cruise);
-    /// Of bridges that were given nothing.
+    /// Readback of bridges that are off.
     const IDLE: BridgeCodes =
         BridgeCodes { drive: BridgeCode::of(0), pretightener: BridgeCode::of(0) };
 
@@ -247,6 +247,21 @@ mod tests {
         }
     }
 
+    /// A tick in this mode with all references zero and the bridges off.
+    fn observed(mode: Mode, sensed: &SensedState) -> Observed<'_> {
+        Observed {
+            now: 0,
+            mode,
+            sensed,
+            bridges: Some(IDLE),
+            speed_ref: Q16::ZERO,
+            preload_due: Q16::ZERO,
+            effort: None,
+            overrun: false,
+            emergency_stop: false,
+        }
+    }
+
     /// Ticks until a fault under a condition that lasts; `None` within five seconds.
     fn found(
         mode: Mode,
@@ -259,21 +274,16 @@ mod tests {
         let mut state = MonitorState::default();
         let mut sensed = sensed(speed, preload);
         (1..5000).find_map(|tick| {
-            // The way that the speed makes, and codes that are alive.
+            // Travel at this speed, and codes that are alive.
             sensed.travel = Travel::from_num(speed * tick as f64 * 1e-3);
             sensed.speed.at = tick as Tick;
             sensed.preload.value = Q16::from_num(preload) + Q16::from_bits(tick as i32 % 50);
             sensed.compression.value += Q16::from_bits(if tick % 2 == 0 { 1 } else { -1 });
             let seen = Observed {
                 now: tick as Tick,
-                mode,
-                sensed: &sensed,
-                bridges: Some(IDLE),
                 speed_ref: Q16::from_num(wanted),
                 preload_due: Q16::from_num(due),
-                effort: None,
-                overrun: false,
-                emergency_stop: false,
+                ..observed(mode, &sensed)
             };
             monitor.step(&mut state, &seen).map(|fault| (fault, tick))
         })
@@ -314,17 +324,7 @@ mod tests {
     fn a_late_tick_and_the_emergency_stop_are_faults_at_once() {
         let monitor = Monitor::try_build(&Rig::prototype()).unwrap();
         let sensed = sensed(0.0, 0.0);
-        let mut seen = Observed {
-            now: 0,
-            mode: Mode::Idle,
-            sensed: &sensed,
-            bridges: Some(IDLE),
-            speed_ref: Q16::ZERO,
-            preload_due: Q16::ZERO,
-            effort: None,
-            overrun: true,
-            emergency_stop: false,
-        };
+        let mut seen = Observed { overrun: true, ..observed(Mode::Idle, &sensed) };
         let mut state = MonitorState::default();
         assert_eq!(monitor.step(&mut state, &seen), Some(Fault::TickOverrun));
         seen.emergency_stop = true;
@@ -354,17 +354,8 @@ mod tests {
             let sensed = sensed(0.0, 0.0);
             let generates = BridgeCodes { drive: BridgeCode::of(3000), ..IDLE };
             (0..40).find_map(|now| {
-                let seen = Observed {
-                    now,
-                    mode,
-                    sensed: &sensed,
-                    bridges: Some(generates),
-                    speed_ref: Q16::ZERO,
-                    preload_due: Q16::ZERO,
-                    effort: None,
-                    overrun: false,
-                    emergency_stop: false,
-                };
+                let bridges = Some(generates);
+                let seen = Observed { now, bridges, ..observed(mode, &sensed) };
                 monitor.step(&mut state, &seen)
             })
         };
@@ -375,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn under_way_a_preload_beyond_its_limit_is_one_even_if_it_was_asked_for() {
+    fn in_motion_a_preload_beyond_its_limit_is_a_fault_even_if_commanded() {
         let press = usize::from(OVERPRESSURE_TICKS);
         assert_eq!(found(RUN, 8.0, 8.0, 56.0, 56.0), Some((Fault::Overpressure, press)));
     }

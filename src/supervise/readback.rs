@@ -1,9 +1,9 @@
-//! The bridges against what they are given: each bridge's output, the difference of its two
-//! legs, goes through a low-pass to a converter, and the tick compares it with the duty that
-//! it gave, through the same low-pass. A wrong duty shows within milliseconds.
+//! Compares each bridge's output with its duty. The output, the difference of its two legs, goes
+//! through a low-pass to a converter; the duty goes through the same low-pass here. A wrong duty
+//! shows within milliseconds.
 //!
-//! What lies behind the output (a motor without force, a slipping gear, a jammed screw) is
-//! left to the comparison of the sensors with one another, in `crosscheck`.
+//! Faults behind the output (a motor without force, a slipping gear, a jammed screw) are left to
+//! the comparison of the sensors in `crosscheck`.
 
 #![deny(clippy::float_arithmetic)]
 
@@ -11,28 +11,28 @@ use crate::fault::Fault;
 use crate::sense::raw::{BridgeCode, BridgeCodes};
 use crate::units::Duty;
 
-/// Time constant of the low-pass before the converter, ticks. A period of the PWM, 50 us,
-/// leaves 1 % of ripple behind it, the mean of 0.15 ms nothing to speak of.
+/// Time constant of the low-pass before the converter, ticks. A period of the PWM, 50 us, leaves
+/// 1 % of ripple after it, and next to none in the mean of 0.15 ms.
 pub const LAG_TICKS: f64 = 1.0;
-/// What the low-pass takes of a step within a tick, Q15: `1 - exp(-1 / LAG_TICKS)`.
+/// Response of the low-pass to a step within a tick, Q15: `1 - exp(-1 / LAG_TICKS)`.
 const TAKES: i32 = 20_713;
-/// Output may be off by so much, Q15 duty: five deviations of its noise, 0.002 each, and
-/// three of its zero, as much again; what the transistors of the bridge drop is less.
+/// Tolerance of the output, Q15 duty: five deviations of its noise, 0.002 each, and three of its
+/// zero, as much again; the voltage drop of the transistors is less.
 pub const BAND: i32 = 655;
-/// And by this part of what is expected, as a shift: three deviations of supply, divider and
-/// reference together, 0.7 % each.
+/// Tolerance relative to the expected output, as a shift: three deviations of supply, divider
+/// and reference together, 0.7 % each.
 pub const BAND_SHIFT: u32 = 5;
-/// Ticks that it must be: a low-pass that is off by 15 % leaves of the largest step 0.05
-/// after one tick, 0.04 after two, 0.02 after three.
+/// Ticks for which the output must be off: a low-pass that is off by 15 % leaves 0.05 of the
+/// largest step after one tick, 0.04 after two, 0.02 after three.
 pub const OFF_TICKS: i8 = 4;
-/// Ticks without a conversion after which the readback is given up, as for the sensors.
+/// Ticks without a conversion that count as a fault, as for the sensors.
 const SILENT_TICKS: u8 = 20;
 
-/// Ticks after the start in which nothing is judged: of what was given before a restart the
-/// low-pass keeps a thousandth then.
+/// Ticks after the start that are not judged: then the low-pass keeps a thousandth of the duty
+/// before a restart.
 const SETTLES: i8 = 7;
 
-/// What is remembered of both bridges.
+/// State of both bridges' comparison.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Readback {
     drive: Bridge,
@@ -41,21 +41,21 @@ pub struct Readback {
     silent: u8,
 }
 
-/// The same of one.
+/// The same of one bridge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Bridge {
-    /// Duty given until now, Q15.
-    given: i16,
+    /// Duty commanded until now, Q15.
+    commanded: i16,
     lag: Lag,
     /// Output a tick ago, Q15.
     before: i32,
-    /// Ticks for which it has been off; below 0, those until it is judged.
+    /// Ticks for which it has been off; if negative, ticks until it is judged.
     off: i8,
 }
 
 impl Default for Bridge {
     fn default() -> Self {
-        Self { given: 0, lag: Lag(0), before: 0, off: -SETTLES }
+        Self { commanded: 0, lag: Lag(0), before: 0, off: -SETTLES }
     }
 }
 
@@ -74,18 +74,18 @@ impl Lag {
 }
 
 impl Readback {
-    /// What the bridges are given until the next tick; off is none.
-    pub const fn give(&mut self, drive: Duty, pretightener: Duty) {
-        self.drive.given = drive.to_bits();
-        self.pretightener.given = pretightener.to_bits();
+    /// Sets the duties until the next tick; 0 with the bridge off.
+    pub const fn set_duties(&mut self, drive: Duty, pretightener: Duty) {
+        self.drive.commanded = drive.to_bits();
+        self.pretightener.commanded = pretightener.to_bits();
     }
 
-    /// The tick after it, with what was found. A wheel that may coast, as after a restart in
-    /// motion, drives its motor as a generator: its bridge is not judged.
+    /// One tick with the readback of the duties set before it. A wheel that may coast, as after a
+    /// restart in motion, drives its motor as a generator: then its bridge is not judged.
     pub fn step(&mut self, found: Option<BridgeCodes>, coasts: bool) -> Option<Fault> {
         let Some(found) = found else {
-            self.drive.lag.step(self.drive.given.into());
-            self.pretightener.lag.step(self.pretightener.given.into());
+            self.drive.lag.step(self.drive.commanded.into());
+            self.pretightener.lag.step(self.pretightener.commanded.into());
             self.silent = self.silent.saturating_add(1);
             return (self.silent >= SILENT_TICKS).then_some(Fault::ReadbackStale);
         };
@@ -103,11 +103,11 @@ impl Readback {
 }
 
 impl Bridge {
-    /// Whether it has been off for too long. The code was taken at some moment of the last
-    /// two ticks, so that it may lie anywhere between the outputs of three.
+    /// Whether it has been off for too long. The code was taken at some moment of the last two
+    /// ticks: it may lie anywhere between the outputs of three.
     fn is_off(&mut self, code: BridgeCode) -> bool {
         let (older, before) = (self.before, self.lag.0);
-        let now = self.lag.step(self.given.into());
+        let now = self.lag.step(self.commanded.into());
         self.before = before;
         let (low, high) = if before < now { (before, now) } else { (now, before) };
         let (low, high) = (low.min(older), high.max(older));
@@ -162,12 +162,11 @@ mod tests {
         readback
     }
 
-    /// First fault of a drive that is given these duties, and in which tick. The other
-    /// bridge is given nothing and puts nothing out.
-    fn found(given: &[f64], codes: &[BridgeCode]) -> Option<(Fault, usize)> {
+    /// First fault of a drive with these duties, and its tick. The other bridge is off.
+    fn found(duties: &[f64], codes: &[BridgeCode]) -> Option<(Fault, usize)> {
         let mut readback = settled();
-        given.iter().zip(codes).enumerate().find_map(|(tick, (given, code))| {
-            readback.give(q15(*given), Duty::ZERO);
+        duties.iter().zip(codes).enumerate().find_map(|(tick, (duty, code))| {
+            readback.set_duties(q15(*duty), Duty::ZERO);
             let pretightener = BridgeCode::of(0);
             let fault = readback.step(Some(BridgeCodes { drive: *code, pretightener }), false);
             fault.map(|fault| (fault, tick))
@@ -303,7 +302,7 @@ mod tests {
     fn off_by_the_band_is_borne_and_by_more_is_not() {
         let step = |given: i16, found: i32| {
             let lag = Lag(given.into());
-            let mut bridge = Bridge { given, lag, before: given.into(), off: 0 };
+            let mut bridge = Bridge { commanded: given, lag, before: given.into(), off: 0 };
             // The code's own steps are coarser than what is asked here.
             let code = BridgeCode::of(found);
             assert_eq!(code.duty(), found);

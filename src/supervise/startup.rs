@@ -1,4 +1,4 @@
-//! Boot, self-test and zero: what must hold before anything moves.
+//! Conditions of boot, self-test and zero.
 
 #![deny(clippy::float_arithmetic)]
 
@@ -57,7 +57,7 @@ mod tests {
     use crate::sense::{Reason, Senses, SensesState, Validity};
     use crate::units::Q16;
 
-    /// What the senses say on this wall, at this speed, preload and compression.
+    /// Sensor values on this wall, at this speed, preload and compression.
     fn sensed(level: u8, speed: f64, preload: f64, compression: f64) -> SensedState {
         let senses = Senses::try_build(&Rig::prototype()).expect("sound");
         let nothing = SensorFrame::default();
@@ -99,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn each_sensor_that_has_not_answered_is_missed_and_named() {
+    fn each_sensor_that_has_not_answered_is_named() {
         let mut all = sensed(0, 0.0, 0.0, 0.0);
         all.speed.validity = Validity::Valid;
         all.preload.validity = Validity::Valid;

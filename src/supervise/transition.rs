@@ -1,26 +1,25 @@
-//! The one table of transitions.
+//! The transition table.
 
 use super::{Command, Leg, Mode};
 use crate::fault::Fault;
 use crate::units::Direction;
 
-/// What can move the drive from one mode to another.
+/// Cause of a transition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trigger {
     /// Every sensor has answered.
     SensorsAnswer,
-    /// The self-test passed; `stowed`: whether the wheel is at the stow end and
-    /// unloaded, so that the zeros can be taken.
+    /// The self-test passed.
     TestPassed {
-        /// At the stow end and unloaded.
+        /// The wheel is at the stow end and unloaded, so that the zeros can be taken.
         stowed: bool,
     },
-    /// The zeros are in.
+    /// The zeros are taken.
     Zeroed,
     /// An operator's command.
     Command(Command),
     /// The preload is reached.
-    PreloadStands,
+    PreloadReached,
     /// The run enters this leg.
     Leg(Leg),
     /// The wheel has come to rest.
@@ -42,7 +41,7 @@ impl Trigger {
         Self::Command(Command::Stop),
         Self::Command(Command::Retract),
         Self::Command(Command::Reset),
-        Self::PreloadStands,
+        Self::PreloadReached,
         Self::Leg(Leg::Cruise),
         Self::Leg(Leg::Approach),
         Self::Leg(Leg::Crossing),
@@ -52,9 +51,9 @@ impl Trigger {
     ];
 }
 
-/// The mode after `trigger` in `mode`; `None` if the mode does not take it. A fault leads to the
-/// fault hold from everywhere, and the first fault is kept. While something moves, start and
-/// retract mean stop.
+/// The mode after `trigger` in `mode`; none if the mode ignores it. A fault leads to the fault
+/// hold from every mode, and the first fault is kept. During motion, start and retract mean
+/// stop.
 pub const fn next(mode: Mode, trigger: Trigger) -> Option<Mode> {
     use Command::{Reset, Retract, Start, Stop};
     use Direction::{Deploy, Retract as Back};
@@ -71,7 +70,7 @@ pub const fn next(mode: Mode, trigger: Trigger) -> Option<Mode> {
         (M::Idle | M::Complete(_), T::Command(Reset)) => M::SelfTest,
         (M::Idle | M::Complete(Back), T::Command(Start)) => M::Preload(Deploy),
         (M::Idle | M::Complete(Deploy), T::Command(Retract)) => M::Preload(Back),
-        (M::Preload(direction), T::PreloadStands) => M::Run(direction, Leg::Cruise),
+        (M::Preload(direction), T::PreloadReached) => M::Run(direction, Leg::Cruise),
         // A press of the button stops whatever moves.
         (M::Preload(_), T::Command(Stop | Start | Retract)) => M::Idle,
         (M::Run(direction, _), T::Leg(leg)) => M::Run(direction, leg),
@@ -111,11 +110,11 @@ mod tests {
     }
 
     #[test]
-    fn only_a_standing_preload_starts_motion() {
+    fn only_a_reached_preload_starts_motion() {
         for mode in modes() {
             for trigger in triggers() {
                 let starts = next(mode, trigger).is_some_and(Mode::moves) && !mode.moves();
-                assert!(!starts || trigger == Trigger::PreloadStands, "{mode:?} {trigger:?}");
+                assert!(!starts || trigger == Trigger::PreloadReached, "{mode:?} {trigger:?}");
             }
         }
     }
@@ -125,15 +124,15 @@ mod tests {
         let mut reached = vec![Mode::Boot];
         let mut at = 0;
         while let Some(&mode) = reached.get(at) {
-            let ways: Vec<Mode> = triggers()
+            let next: Vec<Mode> = triggers()
                 .into_iter()
                 .filter_map(|t| next(mode, t))
                 .filter(|m| *m != mode)
                 .collect();
-            assert!(!ways.is_empty(), "{mode:?} is a trap");
-            for way in ways {
-                if !reached.contains(&way) {
-                    reached.push(way);
+            assert!(!next.is_empty(), "{mode:?} is a trap");
+            for mode in next {
+                if !reached.contains(&mode) {
+                    reached.push(mode);
                 }
             }
             at += 1;

@@ -105,7 +105,7 @@ impl Controller {
         });
         state.condition_ticks = if reached { state.condition_ticks + 1 } else { 0 };
         if state.condition_ticks >= STANDING_TICKS {
-            tick.trigger(Trigger::PreloadStands);
+            tick.trigger(Trigger::PreloadReached);
         } else if state.in_mode >= self.preload_timeout {
             tick.fail(Fault::PreloadNotReached);
         }

@@ -15,8 +15,8 @@ const CLIMB_PART: f64 = 0.9;
 /// Steepest rise of the wheel over a corner, that behind lift-off.
 const LIFT_SLOPE: f64 = 0.5;
 
-/// What the least planned speed lies above the least useful one, relative: creep of
-/// the tread and the dip under the load of the corner take up to a tenth.
+/// Part by which the least planned speed exceeds the least useful one: creep of the tread and
+/// the dip under the corner's load take up to a tenth.
 const DIP_PART: f64 = 0.12;
 
 impl Planner {
@@ -92,8 +92,8 @@ impl Planner {
         })
     }
 
-    /// Prescribes the crossing speed, mm/s, and whether it also holds between the
-    /// steps: how the strategies of a comparison are tuned.
+    /// Sets the crossing speed, mm/s, and whether it also applies between the steps: for tuning
+    /// the strategies of a comparison.
     pub fn with_speed(mut self, crossing_mm_s: f64, uniform: bool) -> Result<Self, RigError> {
         self.prescribed_speed = Some(checked("drive.cruise_speed_mm_s", crossing_mm_s)?);
         self.uniform = uniform;

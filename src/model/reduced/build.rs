@@ -37,9 +37,12 @@ impl ReducedModel {
         let start = Start::new(&formula, load_n);
         let shape = start.shape(rig)?;
         Ok(Self {
-            ways: [start.way(rig, Direction::Deploy)?, start.way(rig, Direction::Retract)?],
+            directions: [
+                start.direction(rig, Direction::Deploy)?,
+                start.direction(rig, Direction::Retract)?,
+            ],
             shape,
-            driven: if load_n.is_some() { -1 } else { 0 },
+            driven: load_n.is_some(),
             friction: checked("plant.mu", rig.plant.mu)?,
         })
     }
@@ -148,16 +151,16 @@ impl<'a> Start<'a> {
         })
     }
 
-    fn way(&self, rig: &Rig, direction: Direction) -> Result<DirectionModel, RigError> {
+    fn direction(&self, rig: &Rig, direction: Direction) -> Result<DirectionModel, RigError> {
         let f = self.formula;
         let kind = Kind { direction, driven: self.driven };
         let stiff = || refused("tread.stiffening", rig.tread.stiffening, 1.0, 20.0);
-        let felt = self.felt(&f.fold(kind, self.load_n));
+        let stiffening = self.stiffening(&f.fold(kind, self.load_n));
         let mut terms = [0; TERMS];
-        for (slot, value) in terms.iter_mut().zip(triangle(&felt)) {
+        for (slot, value) in terms.iter_mut().zip(triangle(&stiffening)) {
             *slot = bits(value, 23).ok_or_else(stiff)?;
         }
-        if !holds(&felt) {
+        if !holds(&stiffening) {
             return Err(stiff());
         }
         let half_speed = (f.half_speed_mm_s(kind) * two_to(16)).clamp(1.0, two_to(31) - 1.0) as u32;
@@ -167,35 +170,35 @@ impl<'a> Start<'a> {
             half_speed_normalised: half_speed << half_speed_shift,
             half_speed_shift,
             relaxed: (two_to(26) / f.stiffening) as i32,
-            felt: terms,
-            run_cells: self.run_cells(&felt).ok_or_else(stiff)?,
-            speed_cells: self.speed_cells(&felt).ok_or_else(stiff)?,
+            stiffening: terms,
+            run_cells: self.run_cells(&stiffening).ok_or_else(stiff)?,
+            speed_cells: self.speed_cells(&stiffening).ok_or_else(stiff)?,
         })
     }
 
     /// `(s - 1)/s E` by powers of the centred fast part u and of w.
-    fn felt(&self, folded: &Folded) -> Folded {
+    fn stiffening(&self, folded: &Folded) -> Folded {
         let part = (self.formula.stiffening - 1.0) / self.formula.stiffening;
         let by_speed = rows::<{ FAST_DEGREE + 1 }>(2.0, 0.0);
         let longest = self.longest_mm / (RUN_END * self.formula.radius_mm);
         let by_run = rows::<{ RUN_DEGREE + 1 }>(2.0 * longest, longest - 1.0);
-        let mut felt = Folded::default();
+        let mut stiffening = Folded::default();
         for (row, speed) in folded.iter().zip(&by_speed) {
             for (c, run) in row.iter().zip(&by_run) {
-                for (out, u) in felt.iter_mut().zip(speed) {
+                for (out, u) in stiffening.iter_mut().zip(speed) {
                     for (out, w) in out.iter_mut().zip(run) {
                         *out += part * c * u * w;
                     }
                 }
             }
         }
-        felt
+        stiffening
     }
 
     /// Stiffness over the instant one, at a fast part by powers of w.
-    fn stiffness_by_run(&self, felt: &Folded, x: f64) -> [f64; RUN_DEGREE + 1] {
+    fn stiffness_by_run(&self, stiffening: &Folded, x: f64) -> [f64; RUN_DEGREE + 1] {
         let mut row = [0.0; RUN_DEGREE + 1];
-        for terms in felt.iter().rev() {
+        for terms in stiffening.iter().rev() {
             for (sum, c) in row.iter_mut().zip(terms) {
                 *sum = *sum * (x - 0.5) + c;
             }
@@ -206,29 +209,29 @@ impl<'a> Start<'a> {
     }
 
     /// The same at one run.
-    fn stiffness(&self, felt: &Folded, x: f64, w: f64) -> f64 {
-        value(&self.stiffness_by_run(felt, x), w)
+    fn stiffness(&self, stiffening: &Folded, x: f64, w: f64) -> f64 {
+        value(&self.stiffness_by_run(stiffening, x), w)
     }
 }
 
-/// The terms in the order of [`DirectionModel::felt`].
-fn triangle(felt: &Folded) -> impl Iterator<Item = f64> {
+/// The terms in the order of [`DirectionModel::stiffening`].
+fn triangle(stiffening: &Folded) -> impl Iterator<Item = f64> {
     (0..=RUN_DEGREE).flat_map(move |j| {
         let most = (30 - 5 * j) / 6;
-        felt.iter().take(most + 1).map(move |row| row.get(j).copied().unwrap_or(0.0))
+        stiffening.iter().take(most + 1).map(move |row| row.get(j).copied().unwrap_or(0.0))
     })
 }
 
 /// Whether the effective stiffness stays below 16, and its derivatives in their formats,
 /// for every speed and run.
-fn holds(felt: &Folded) -> bool {
+fn holds(stiffening: &Folded) -> bool {
     let bound = |sum: f64, c: f64| 0.5 * sum + libm::fabs(c);
     let mut by_speed = [0.0; FAST_DEGREE + 1];
     let mut by_run = [0.0; RUN_DEGREE + 1];
-    for (sum, row) in by_speed.iter_mut().zip(felt) {
+    for (sum, row) in by_speed.iter_mut().zip(stiffening) {
         *sum = row.iter().rev().fold(0.0, |sum, c| bound(sum, *c));
     }
-    for row in felt.iter().rev() {
+    for row in stiffening.iter().rev() {
         for (sum, c) in by_run.iter_mut().zip(row) {
             *sum = bound(*sum, *c);
         }
@@ -274,7 +277,7 @@ mod tests {
             let formula = Formula::new(&rig);
             let start = Start::new(&formula, None);
             let shape = start.shape(&rig).err();
-            let error = shape.or_else(|| start.way(&rig, Direction::Deploy).err());
+            let error = shape.or_else(|| start.direction(&rig, Direction::Deploy).err());
             let named =
                 matches!(error, Some(RigError::OutOfRange { key: named, .. }) if named == key);
             assert!(named, "{key}: {error:?}");
@@ -284,11 +287,9 @@ mod tests {
         refuses(|rig| rig.tread.stiffening = 0.1, "tread.stiffening");
     }
 
-    const WAYS: [Direction; 2] = [Direction::Deploy, Direction::Retract];
-
-    /// Largest relative errors against the formulas over a grid of the domain: gap,
-    /// force of the inverse, corner force, utilisation (absolute), speed as the force
-    /// that it needs, and gap of another scale.
+    /// Largest relative errors against the formulas over a grid of the domain: gap, force of the
+    /// inverse, corner force, utilisation (absolute), speed as the force that it needs, and gap
+    /// of another scale.
     #[derive(Debug, Default)]
     struct Errors {
         gap: f64,
@@ -307,7 +308,7 @@ mod tests {
         let mut errors = Errors::default();
         let (low, high) = model.gap_range();
         let lsb = 1.0 / 65_536.0;
-        for direction in WAYS {
+        for direction in Direction::ALL {
             if direction == Direction::Retract && load.is_none() {
                 continue;
             }
@@ -330,10 +331,7 @@ mod tests {
                     let off = (got.to_num::<f64>() - exact).abs() - lsbs * lsb;
                     off.max(0.0) / exact.abs()
                 };
-                let gap = beyond(got.gap, exact.gap_mm, 1.0);
-                if gap > errors.gap {
-                    errors.gap = gap;
-                }
+                errors.gap = errors.gap.max(beyond(got.gap, exact.gap_mm, 1.0));
                 errors.corner =
                     errors.corner.max(beyond(got.corner_force, exact.corner_force_n, 1.0));
                 errors.vibration =
@@ -347,7 +345,6 @@ mod tests {
                 let needs = formula.force_n(direction, fastest.to_num(), near.to_num(), load);
                 if fastest > Q16::ZERO {
                     errors.speed = errors.speed.max((needs / force - 1.0).abs());
-                } else {
                     // The force that has this gap holds it at the speed that it has it at.
                     errors.lost += 1;
                 }
@@ -414,7 +411,7 @@ mod tests {
             let model = ReducedModel::try_build(&rig).unwrap();
             let q = Q16::from_bits;
             let at = Point {
-                direction: WAYS[usize::from(back)],
+                direction: Direction::ALL[usize::from(back)],
                 speed: q(speed),
                 scale: Scale::new(q(scale)),
             };
@@ -431,18 +428,18 @@ mod tests {
 
     #[test]
     fn a_stiffening_beyond_its_format_is_refused() {
-        let mut felt = Folded::default();
-        assert!(holds(&felt));
-        felt[0][0] = 15.9;
-        assert!(holds(&felt));
-        felt[0][0] = 20.0;
-        assert!(!holds(&felt));
+        let mut stiffening = Folded::default();
+        assert!(holds(&stiffening));
+        stiffening[0][0] = 15.9;
+        assert!(holds(&stiffening));
+        stiffening[0][0] = 20.0;
+        assert!(!holds(&stiffening));
         // Not at the middle of speed and run, but at an end.
-        felt[0][0] = 15.0;
-        felt[1][0] = 1.5;
-        assert!(holds(&felt));
-        felt[0][1] = 1.5;
-        assert!(!holds(&felt));
+        stiffening[0][0] = 15.0;
+        stiffening[1][0] = 1.5;
+        assert!(holds(&stiffening));
+        stiffening[0][1] = 1.5;
+        assert!(!holds(&stiffening));
     }
 
     #[test]

@@ -28,10 +28,8 @@ pub(super) struct Excess {
     pub(super) normalised: u32,
 }
 
-/// Two numbers in a word, 16 bits each: what one access brings costs half.
-///
-/// The upper one is read with the lower one behind its point, half a unit at most: no more
-/// than it was rounded by.
+/// Two numbers of 16 bits in a word: half the memory accesses. The upper one is read with the
+/// lower one as its fraction, half a unit at most: no more than it was rounded by.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Pair(#[serde(with = "postcard::fixint::le")] i32);
 
@@ -71,7 +69,7 @@ pub(super) struct DirectionModel {
     pub(super) half_speed_shift: u32,
     /// 1/s, Q26.
     pub(super) relaxed: i32,
-    pub(super) felt: [i32; TERMS],
+    pub(super) stiffening: [i32; TERMS],
     pub(super) run_cells: [[RunCell; FORCE_CELLS]; FAST_CELLS],
     pub(super) speed_cells: [SpeedCell; STIFFNESS_CELLS],
 }
@@ -95,9 +93,9 @@ impl DirectionModel {
     pub(super) fn stiffness(&self, x: u32, w: i32) -> i32 {
         #[rustfmt::skip]
         let [a0, a1, a2, a3, a4, a5, b0, b1, b2, b3, b4, c0, c1, c2, c3, d0, d1, d2, e0, e1, f0,
-            g0] = self.felt;
+            g0] = self.stiffening;
         let u = centred(x);
-        let felt = horner!(
+        let stiffening = horner!(
             w;
             horner!(u; a0, a1, a2, a3, a4, a5),
             horner!(u; b0, b1, b2, b3, b4),
@@ -107,14 +105,14 @@ impl DirectionModel {
             f0,
             g0
         );
-        self.relaxed + high(felt << 4, (x >> 1) as i32)
+        self.relaxed + high(stiffening << 4, (x >> 1) as i32)
     }
 
     /// The stiffening after one run, by the centred fast part.
     fn along_speed(&self, w: i32) -> [i32; 6] {
         #[rustfmt::skip]
         let [a0, a1, a2, a3, a4, a5, b0, b1, b2, b3, b4, c0, c1, c2, c3, d0, d1, d2, e0, e1, f0,
-            g0] = self.felt;
+            g0] = self.stiffening;
         [
             horner!(w; a0, b0, c0, d0, e0, f0, g0),
             horner!(w; a1, b1, c1, d1, e1),
@@ -129,7 +127,7 @@ impl DirectionModel {
     pub(super) fn guess_run(&self, x: u32, excess: &Excess) -> Guess {
         let half = excess.normalised >> 30 & 1;
         let row = (2 * (LOWEST_OCTAVE - excess.octave) + half) as usize;
-        // Both within their ranges as they are; said again for the compiler.
+        // Both are in range; the bounds are for the compiler.
         let cells = &self.run_cells[(x >> 30) as usize % FAST_CELLS];
         let [p, q, r, s, t] = cells[row.min(FORCE_CELLS - 1)];
         let (u, m) = (centred(x << 2), centred(excess.normalised << 2));
@@ -151,19 +149,19 @@ impl DirectionModel {
     pub(super) fn speed(&self, stiffness: i32, w: i32) -> Option<MillimetresPerSecond> {
         let [c0, c1, c2, c3, c4, c5] = self.along_speed(w);
         let guess = self.guess_fast_part(stiffness, w);
-        let (felt, slope, bend) = horner_with_curvature!(centred(guess); c0, c1, c2, c3, c4, c5);
+        let (value, slope, bend) = horner_with_curvature!(centred(guess); c0, c1, c2, c3, c4, c5);
         let half = (guess >> 1) as i32;
-        let lacking = stiffness - self.relaxed - high(felt << 4, half);
+        let lacking = stiffness - self.relaxed - high(value << 4, half);
         // Of the stiffness by x: derivative, Q24, and half the second, Q23.
         let bend = slope + (high(bend, half) << 1);
-        let slope = (felt << 1) + (high(slope, half) << 2);
+        let slope = (value << 1) + (high(slope, half) << 2);
         let half = half.saturating_add(step(slope, bend, lacking)?).max(1 << 15);
         Some(self.speed_of((half as u32) << 1))
     }
 
     /// Guess of the fast part, Q32, from the stiffness and the run.
     fn guess_fast_part(&self, stiffness: i32, w: i32) -> u32 {
-        // Stiffnesses up to that at no pause for relaxation.
+        // Stiffnesses up to the instant one.
         let part = (stiffness.clamp(0, (1 << 26) - 1) as u32) << 6;
         let [a0, a1, a2, b0, b1, c0] = self.speed_cells[(part >> 29) as usize % STIFFNESS_CELLS];
         let p = centred(part << 3);

@@ -1,4 +1,4 @@
-//! What a rig's geometry and load make of a run over the corner; the same in both directions.
+//! What geometry and load of a rig make of a run over the corner; the same in both directions.
 
 use super::centred;
 use super::direction_model::{DirectionModel, Excess, Guess, LOWEST_OCTAVE};
@@ -81,8 +81,8 @@ impl Shape {
         bits.min(self.most_force) << self.force_places
     }
 
-    /// Whether a force, the same on the unscaled tread or the run that it gives is beyond
-    /// what the model knows: one of four differences is negative.
+    /// Whether a force, its unscaled value or its run is beyond the model: one of four
+    /// differences is negative.
     pub(super) fn is_at_end(&self, force: Newtons, sought: i32, run: u32) -> bool {
         let half = (run >> 1) as i32;
         let force = self.most_force.saturating_sub(force.to_bits());
@@ -91,13 +91,13 @@ impl Shape {
         (force | excess | short | long) < 0
     }
 
-    /// What force has the same run on the unscaled tread, Q30; what exceeds the format
-    /// lies beyond the model anyway and saturates.
+    /// The force with the same run on the unscaled tread, Q30. A value that exceeds the format
+    /// is beyond the model and saturates.
     pub(super) fn unscaled(&self, force: i32, inverse_scale: i32) -> i32 {
         (high(force - self.middle_lifting, inverse_scale) << 4).saturating_add(self.middle_lifting)
     }
 
-    /// What force has the same run on the scaled tread, Q30, below one half.
+    /// The force with the same run on the scaled tread, Q30, below one half.
     pub(super) fn scaled(&self, force: i32, scale: Ratio) -> i32 {
         let wide = i64::from(force - self.middle_lifting) * i64::from(scale.to_bits());
         // At most 4 times 3/4, over 16 places.
@@ -111,7 +111,7 @@ impl Shape {
 
     /// Run with this gap, Q32, within the model.
     pub(super) fn run(&self, gap: Millimetres) -> u32 {
-        // Gaps up to 32 mm; the ends below hold what is beyond.
+        // Gaps up to 32 mm; the ends below bound the rest.
         let bits = gap.to_bits().clamp(0, (32 << 16) - 1);
         let part = (high(bits << 10, self.inverse_radius) as u32).min((1 << 26) - 1) << 5;
         let square = ((u64::from(part) * u64::from(part)) >> 32) as u32;
@@ -208,14 +208,14 @@ impl Shape {
     /// guess within 0.2 % with a derivative within 2 % leaves 1e-5 of the run.
     pub(super) fn refine(
         &self,
-        way: &DirectionModel,
+        model: &DirectionModel,
         x: u32,
         guess: &Guess,
         sought: i32,
         excess: &Excess,
     ) -> Refined {
         let w = centred(guess.run);
-        let elastic = self.elastic(guess.run, way.stiffness(x, w));
+        let elastic = self.elastic(guess.run, model.stiffness(x, w));
         let [s0, s1, s2, s3, s4] = self.slope;
         let (slope, tilt) = horner_with_slope!(w; s0, s1, s2, s3, s4);
         let lacking = sought - elastic - (high(self.load, slope) << 2);
@@ -235,8 +235,7 @@ impl Shape {
 
     /// Vibration that is left, um, at a speed of [`speed`].
     pub(super) fn vibration(&self, speed: u32, radial: i32, run: u32) -> Q16 {
-        // Brought to the top; over 18 bits of the run, Q(p - 2), in the middle of what it may
-        // be.
+        // Normalised; divided by 18 bits of the run, Q(p - 2), rounded to the middle.
         let speed = speed | 1;
         let places = speed.leading_zeros();
         let pace = (speed << places) / (run >> 14 | 1);
@@ -269,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn each_end_of_the_model_is_told_alone_and_together() {
+    fn each_end_of_the_model_is_reported_alone_and_together() {
         let shape = shape_of(&Rig::prototype());
         let force = |beyond: i32| Q16::from_bits(shape.most_force + beyond);
         let sought = |beyond: i32| shape.most_lifting + LEAST_EXCESS + beyond;

@@ -34,14 +34,17 @@ type SpeedFit = LeastSquares<6, 21>;
 
 impl Start<'_> {
     /// Guesses of the run; none if one does not fit its format.
-    pub(super) fn run_cells(&self, felt: &Folded) -> Option<[[RunCell; FORCE_CELLS]; FAST_CELLS]> {
+    pub(super) fn run_cells(
+        &self,
+        stiffening: &Folded,
+    ) -> Option<[[RunCell; FORCE_CELLS]; FAST_CELLS]> {
         let mut cells = [[RunCell::default(); FORCE_CELLS]; FAST_CELLS];
         for (index, row) in cells.iter_mut().enumerate() {
             let mut fits = [RunFit::new(); FORCE_CELLS];
             for k in 0..FAST_NODES {
                 let u = 0.5 * node(k, FAST_NODES);
                 let x = (index as f64 + 0.5 + u) / FAST_CELLS as f64;
-                self.along_runs(felt, x, |excess, run, weight| {
+                self.along_runs(stiffening, x, |excess, run, weight| {
                     if let Some((fit, m)) = force_cell(excess, &mut fits) {
                         fit.add(&run_terms(u, m), run, weight / (run * run));
                     }
@@ -68,11 +71,11 @@ impl Start<'_> {
 
     /// What the force exceeds the lift on the steepest slope by, run and weight along the
     /// runs at a fast part.
-    fn along_runs(&self, felt: &Folded, x: f64, mut at: impl FnMut(f64, f64, f64)) {
+    fn along_runs(&self, stiffening: &Folded, x: f64, mut at: impl FnMut(f64, f64, f64)) {
         let load = self.load_n / self.unit_n;
         let most_of_use = FORCE_OF_USE * self.formula.unit_force_n() / self.unit_n;
         let steepest = value(&self.slope, -0.5);
-        let by_run = self.stiffness_by_run(felt, x);
+        let by_run = self.stiffness_by_run(stiffening, x);
         let (first, last) = RUN_RANGE;
         let ratio = libm::pow(last / first, 1.0 / (RUNS - 1) as f64);
         let (mut run, mut most) = (first, 0.0);
@@ -98,7 +101,7 @@ impl Start<'_> {
     }
 
     /// Guesses of the fast part; none if one does not fit its format.
-    pub(super) fn speed_cells(&self, felt: &Folded) -> Option<[SpeedCell; STIFFNESS_CELLS]> {
+    pub(super) fn speed_cells(&self, stiffening: &Folded) -> Option<[SpeedCell; STIFFNESS_CELLS]> {
         let mut fits = [SpeedFit::new(); STIFFNESS_CELLS];
         let mut add = |stiffness: f64, w: f64, x: f64, weight: f64| {
             let part = stiffness * STIFFNESS_CELLS as f64;
@@ -109,11 +112,11 @@ impl Start<'_> {
         };
         for k in 0..RUN_NODES {
             let w = 0.5 * node(k, RUN_NODES);
-            let (mut x, mut stiffness) = (1.0, self.stiffness(felt, 1.0, w));
+            let (mut x, mut stiffness) = (1.0, self.stiffness(stiffening, 1.0, w));
             for step in (0..FAST_STEPS).rev() {
                 add(stiffness, w, x, 1.0);
                 let next = step as f64 / FAST_STEPS as f64;
-                let less = self.stiffness(felt, next, w);
+                let less = self.stiffness(stiffening, next, w);
                 if less >= stiffness {
                     break;
                 }
