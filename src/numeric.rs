@@ -4,24 +4,20 @@
 
 mod build;
 mod divide;
-mod divisor;
-mod fraction_root;
 mod high;
 mod low_pass;
 mod quotient;
-mod root;
+mod roots;
 mod sine;
 mod table;
 
 pub use build::{checked, cosine_of_turns};
-pub use divide::{divide, part};
-pub use divisor::Divisor;
-pub use fraction_root::{inverse_sqrt_guess, inverse_sqrt_normalised, sqrt_fraction};
+pub use divide::{Divisor, divide, part};
 pub use high::{fits, fits_with_slope, high};
 pub(crate) use high::{horner, horner_with_curvature, horner_with_slope};
 pub use low_pass::{LowPass, LowPassState};
 pub use quotient::{fraction, part_of_sum, reciprocal_of_normalised};
-pub use root::sqrt;
+pub use roots::{inverse_sqrt_guess, inverse_sqrt_normalised, sqrt, sqrt_fraction};
 pub use sine::sin_cos;
 pub use table::Table;
 

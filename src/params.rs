@@ -8,7 +8,6 @@
 
 mod compile;
 pub mod link;
-mod refusal;
 pub mod service;
 mod set;
 pub mod slots;

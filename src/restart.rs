@@ -7,15 +7,13 @@
 mod crash;
 pub mod flash_log;
 pub mod image_checksum;
-mod missed;
 pub mod page;
 mod report;
 mod snapshot;
 
 pub use crash::{Crash, Stopped};
-pub use missed::MissedCheckIns;
 pub use report::{Reset, Restart};
-pub use snapshot::{DriveSnapshot, PackedSpeed, later};
+pub use snapshot::{DriveSnapshot, MissedCheckIns, PackedSpeed, later};
 
 /// Words of a [`DriveSnapshot`].
 pub const SNAPSHOT_WORDS: usize = 5;

@@ -14,29 +14,22 @@
 //! | [`link()`] | on request | reads and replaces the stored parameters |
 //! | [`journal()`] | on entry | writes the log, shows the light |
 //!
-//! They share one [`Exchange`] and nothing else. The tick waits for time only: what it
-//! reads is there already or is taken as absent. A sensor that hangs makes
-//! its reading age; a task that hangs starves the watchdog, which is fed only while
-//! every task has checked in within [`CHECK_IN_TICKS`].
+//! They share one [`Exchange`] alone. The tick waits for time only, never for data. The reading of
+//! a sensor that hangs ages; a task that hangs stops the feeding of the watchdog, which needs
+//! every task's check-in within [`CHECK_IN_TICKS`].
 
+mod background;
 mod clock;
 mod exchange;
-mod journal;
-mod link;
 mod liveness;
-mod model;
 mod motors;
-mod operator;
 mod sensors;
 
+pub use background::{journal, link, model, operator};
 pub use clock::{clock, mid_tick_deadline};
 pub use exchange::{COMMANDS, ENTRIES, Exchange, TickIo};
-pub use journal::journal;
-pub use link::link;
 pub use liveness::{CHECK_IN_TICKS, TaskId};
-pub use model::model;
 pub use motors::{TickIoCell, motors, record};
-pub use operator::operator;
 pub use sensors::{SENSOR_TIMEOUT, arm_angle, compression_sensor, preload_sensor, wheel_encoder};
 
 use embassy_time::Duration;

@@ -31,13 +31,13 @@ pub use event::{CrossingRecord, Entry, Event};
 pub use state::State;
 pub use telemetry::Telemetry;
 
-/// Most log entries one tick can give.
+/// Most log entries of a tick.
 pub const EVENTS_PER_TICK: usize = 8;
 
 /// Ticks that a fault hold lasts at least.
 const HOLD_TICKS: u32 = 100;
 
-/// What a tick is given.
+/// Input of a tick.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Input {
     /// Time.
@@ -54,7 +54,7 @@ pub struct Input {
     pub emergency_stop: bool,
 }
 
-/// What a tick gives.
+/// Output of a tick.
 #[derive(Clone, Debug, Default)]
 pub struct Output {
     /// Drive bridge.
@@ -63,7 +63,7 @@ pub struct Output {
     pub preload: MotorCommand,
     /// Work for the model task: the schedule of the segment ahead.
     pub request: Option<PlanRequest>,
-    /// Give the bridges their power back after an emergency stop.
+    /// Re-enable the bridges after an emergency stop.
     pub rearm: bool,
     /// What happened.
     pub events: heapless::Vec<Entry, EVENTS_PER_TICK>,
@@ -71,8 +71,8 @@ pub struct Output {
     pub telemetry: Telemetry,
 }
 
-/// The controller's configuration in machine units; its state is apart. The default is room
-/// to read one into, and controls nothing.
+/// The controller's configuration in machine units; its state is apart. The default is a place to
+/// read one into.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Controller {
     senses: Senses,
@@ -87,8 +87,8 @@ pub struct Controller {
     preload_loop: PreloadLoop,
     /// Ticks within which any preload can be reached.
     preload_timeout: u32,
-    /// Speed times slope of the corner at which the spring uses the actuator up, mm/s.
-    rise_speed: MillimetresPerSecond,
+    /// Speed times slope of the corner at which the spring takes the actuator's full slew, mm/s.
+    climb_speed: MillimetresPerSecond,
     /// Spring rate of the pre-tightener, N/mm.
     spring: Q16,
     /// Dead time and lag of the pre-tightener, s.
@@ -102,13 +102,13 @@ pub struct Controller {
     friction: Ratio,
 }
 
-/// What one tick carries from stage to stage.
+/// Data of a tick that the stages share.
 struct TickContext<'a> {
     now: Tick,
     sensed: &'a SensedState,
     /// Radial force that the arm's inclination adds to the preload, N.
     arm_thrust: Newtons,
-    /// The transition that the present stage asks for; its first one counts.
+    /// The transition that the present stage asks for; the first one counts.
     trigger: Option<Trigger>,
     output: &'a mut Output,
 }
@@ -146,9 +146,9 @@ impl Controller {
         output
     }
 
-    /// One tick into an `output` that is used again: it is too large to be moved in every
-    /// tick. The transitions that a stage asks for are applied at its end, so that a fault
-    /// switches the bridges off in the same tick.
+    /// One tick into a reused `output`, which is too large to be moved in every tick. The
+    /// transitions that a stage asks for are applied at its end, so that a fault switches the
+    /// bridges off in the same tick.
     pub fn step_into(&self, state: &mut State, input: &Input, output: &mut Output) {
         output.request = None;
         output.rearm = false;
@@ -176,8 +176,8 @@ impl Controller {
         tick.output.drive = drive;
         tick.output.preload = preload;
         tick.output.telemetry = self.telemetry(state, tick, &targets);
-        let given = &tick.output.telemetry;
-        state.monitor.set_duties(given.drive, given.pretightener);
+        let row = &tick.output.telemetry;
+        state.monitor.set_duties(row.drive, row.pretightener);
     }
 
     fn look_for_faults(&self, state: &mut State, tick: &mut TickContext<'_>, input: &Input) {
@@ -205,7 +205,7 @@ impl Controller {
         command: Option<Command>,
     ) {
         let Some(command) = command else { return };
-        // A reset that was already sent must not clear a fault unseen.
+        // A reset sent before the fault must not clear it unseen.
         let hasty = matches!(state.mode, Mode::FaultHold(_)) && state.in_mode < HOLD_TICKS;
         let trigger = Trigger::Command(command);
         if hasty || next(state.mode, trigger).is_none() {

@@ -13,7 +13,7 @@
 use serde::Deserialize;
 
 use super::capture::CaptureChunk;
-use super::crc::crc32;
+use super::crc32;
 use super::delta::DeltaRecord;
 use super::identity::Identity;
 use super::ledger::Line;

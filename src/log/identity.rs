@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::crc::crc32;
+use super::crc32;
 use crate::units::Millimetres;
 
 /// Layout of the frames. Raised with every change of it; a reader of another number reports

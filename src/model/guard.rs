@@ -17,12 +17,9 @@ impl Guard {
     #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         let mut guard = Self::default();
-        let mut below = 0.0;
-        // At most four modes: the next higher one each time, which needs no sort.
-        for _ in 0..rig.drive.modes_hz.len() {
-            let above = rig.drive.modes_hz.iter().filter(|hz| **hz > below);
-            let Some(hz) = above.copied().reduce(f64::min) else { break };
-            below = hz;
+        let mut modes = rig.drive.modes_hz.clone();
+        modes.sort_unstable_by(f64::total_cmp);
+        for hz in modes {
             let centre = hz * rig.drive.ripple_pitch_mm;
             let ends = [1.0 - rig.drive.guard_band, 1.0 + rig.drive.guard_band]
                 .map(|part| (centre * part).min(30_000.0));

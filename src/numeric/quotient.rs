@@ -1,5 +1,5 @@
-//! Reciprocal and quotient that keep all 32 bits, by one 32-bit division and one step
-//! of Newton's iteration.
+//! Reciprocal and quotient of 32 significant bits, by one 32-bit division and one step of
+//! Newton's iteration.
 
 #![deny(clippy::float_arithmetic)]
 
@@ -75,12 +75,6 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(20_000))]
-
-        #[test]
-        fn reciprocals_agree_with_f64(n in 1_u32 << 31..) {
-            let error = reciprocal_error(n);
-            prop_assert!((-16.0..=0.0).contains(&error), "{error}");
-        }
 
         #[test]
         fn parts_of_sums_agree_with_f64(

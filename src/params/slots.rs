@@ -17,7 +17,7 @@
 //! out of force. The fold guards the sequence number: alone, a flipped bit in it would make the
 //! spare set the younger one.
 
-use super::refusal::Refusal;
+use super::service::Refusal;
 use super::{MAX_SET, ParameterSet, Rest, SetError};
 use crate::model::Planner;
 pub use crate::restart::page::{PAGE_BYTES, WORD_BYTES};
@@ -252,26 +252,18 @@ impl Draft {
         Ok(())
     }
 
-    /// The written set, if it is complete and sound and of this schema.
+    /// Checks the set and puts it in force.
     ///
     /// # Errors
-    /// [`Refusal::Length`] if pieces are missing, another otherwise.
-    pub fn check<'m>(&self, memory: &'m impl SetMemory) -> Result<ParameterSet<'m>, Refusal> {
+    /// [`Refusal::Length`] if pieces are missing, another one otherwise; the set that was in force
+    /// stays.
+    pub async fn seal(self, memory: &mut impl SetMemory) -> Result<(), Refusal> {
         if self.missing() > 0 {
             return Err(Refusal::Length);
         }
         let bytes = memory.bytes(self.slot).get(PREFIX..PREFIX + self.length);
         let set = ParameterSet::open(bytes.ok_or(Refusal::Length)?)?;
         check_planner(check_controller(&set)?)?;
-        Ok(set)
-    }
-
-    /// Checks the set and puts it in force.
-    ///
-    /// # Errors
-    /// [`Refusal`]; the set that was in force stays.
-    pub async fn seal(self, memory: &mut impl SetMemory) -> Result<(), Refusal> {
-        self.check(memory)?;
         let word = length_word(self.length as u32, self.sequence);
         memory.program(self.slot, 8, pair(word, !word)).await?;
         memory.program(self.slot, 0, pair(MAGIC, self.sequence)).await?;

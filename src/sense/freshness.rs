@@ -155,15 +155,6 @@ mod tests {
     }
 
     #[test]
-    fn a_sample_is_taken_once() {
-        let mut freshness = Freshness::default();
-        assert!(freshness.take(sample(5)).is_some());
-        assert!(freshness.take(sample(5)).is_none());
-        assert!(freshness.take::<()>(None).is_none());
-        assert!(freshness.take(sample(6)).is_some());
-    }
-
-    #[test]
     fn bad_codes_hold_the_last_good_value_and_then_invalidate_it() {
         let mut freshness = Freshness::default();
         freshness.take(sample(100));
@@ -184,14 +175,6 @@ mod tests {
         freshness.take(sample(200));
         freshness.judge(Ok(()));
         assert_eq!(validity(&freshness, 200), Validity::Valid);
-    }
-
-    #[test]
-    fn a_first_code_that_is_bad_is_invalid_at_once() {
-        let mut freshness = Freshness::default();
-        freshness.take(sample(1));
-        freshness.judge(Err(Reason::OutOfRange));
-        assert_eq!(validity(&freshness, 1), Validity::Invalid(Reason::OutOfRange));
     }
 
     #[test]

@@ -271,22 +271,13 @@ mod tests {
             let mut state = SensesState::default();
             let mut sensed = still(&senses, &mut state, 0, &STOWED);
             for now in 1..=21 {
-                let (old, new) = (frame(&STOWED, 0), frame(&STOWED, now));
-                let mixed = SensorFrame {
-                    wheel_encoder: if silent == 0 { old.wheel_encoder } else { new.wheel_encoder },
-                    preload_sensor: if silent == 1 {
-                        old.preload_sensor
-                    } else {
-                        new.preload_sensor
-                    },
-                    compression_sensor: if silent == 2 {
-                        old.compression_sensor
-                    } else {
-                        new.compression_sensor
-                    },
-                    arm_angle: if silent == 3 { old.arm_angle } else { new.arm_angle },
-                    bridges: None,
-                };
+                let (old, mut mixed) = (frame(&STOWED, 0), frame(&STOWED, now));
+                match silent {
+                    0 => mixed.wheel_encoder = old.wheel_encoder,
+                    1 => mixed.preload_sensor = old.preload_sensor,
+                    2 => mixed.compression_sensor = old.compression_sensor,
+                    _ => mixed.arm_angle = old.arm_angle,
+                }
                 sensed = senses.step(&mut state, now, &mixed, Default::default());
             }
             let validities = [

@@ -1,4 +1,4 @@
-//! Each check at its threshold, and within the noise that it must bear.
+//! Each check at its threshold, and within tolerated noise.
 
 use super::*;
 use proptest::prelude::*;
@@ -9,8 +9,8 @@ const COUNT_MM: f64 = 2.0 * core::f64::consts::PI * 25.0 / 8192.0;
 /// What is true of a drive that the checks look at.
 #[derive(Clone, Copy, Debug)]
 struct Rolls {
-    /// Way of wheel and reference, mm.
-    way: f64,
+    /// Travel of wheel and reference, mm.
+    travel: f64,
     reference: f64,
     radius: f64,
     preload: f64,
@@ -22,7 +22,7 @@ struct Rolls {
 }
 
 const ROLLS: Rolls = Rolls {
-    way: 0.0,
+    travel: 0.0,
     reference: 0.0,
     radius: 125.0,
     preload: 40.0,
@@ -42,7 +42,7 @@ fn found(mut at: impl FnMut(f64) -> Rolls) -> Option<(Fault, i32)> {
         let now = at(f64::from(tick - 100) * 1e-3);
         // Any noise that keeps the last bits moving.
         let noise = if now.stuck { 0.0 } else { f64::from((tick * 7919) % 101) / 101.0 - 0.5 };
-        let counts = (now.way / COUNT_MM).floor();
+        let counts = (now.travel / COUNT_MM).floor();
         let speed_ref = (now.reference - before) * 1e3;
         before = now.reference;
         let seen = Compared {
@@ -69,7 +69,7 @@ fn leaves(speed: f64, acceleration: f64) -> Option<(Fault, i32)> {
     found(|t| {
         let reference = speed * (t + 0.1);
         let late = t.max(0.0);
-        Rolls { way: reference + 0.5 * acceleration * late * late, reference, ..ROLLS }
+        Rolls { travel: reference + 0.5 * acceleration * late * late, reference, ..ROLLS }
     })
 }
 
@@ -85,21 +85,6 @@ fn a_wheel_that_runs_away_is_found_within_ten_ticks() {
     }
 }
 
-/// Everything as it should be, with a reference that does not move.
-fn commanded_to_rest(now: Tick, travel: Travel) -> Compared {
-    Compared {
-        now,
-        read_at: now,
-        travel,
-        radius: Q16::from_num(125),
-        preload: Q16::from_num(40),
-        preload_due: Q16::from_num(40),
-        compression: Q16::from_num(0.4),
-        speed_ref: Q16::ZERO,
-        effort: None,
-    }
-}
-
 #[test]
 fn a_bridge_at_full_duty_from_the_first_tick_is_found_as_soon() {
     let check = CrossCheck::try_build(&Rig::prototype()).expect("a sound rig");
@@ -107,7 +92,7 @@ fn a_bridge_at_full_duty_from_the_first_tick_is_found_as_soon() {
     let found = (0..100).find(|&tick| {
         let t = f64::from(tick) * 1e-3;
         let travel = (0.5 * 1700.0 * t * t / COUNT_MM).floor() * COUNT_MM;
-        let seen = commanded_to_rest(tick, Travel::from_num(travel));
+        let seen = Compared { travel: Travel::from_num(travel), ..off_by(tick, Q16::ZERO) };
         if tick == 0 {
             state.begin(&seen);
         }
@@ -117,14 +102,14 @@ fn a_bridge_at_full_duty_from_the_first_tick_is_found_as_soon() {
 }
 
 #[test]
-fn what_bends_less_than_the_threshold_is_borne() {
+fn what_bends_less_than_the_threshold_is_tolerated() {
     // A whole count more than quantisation needs 530 mm/s^2 over the spans; but what lasts
     // adds up to a way off the reference.
     for acceleration in [0.0, 250.0, -250.0] {
         let found = found(|t| {
             let reference = 8.0 * (t + 0.1);
             let late = t.clamp(0.0, 0.012);
-            Rolls { way: reference + 0.5 * acceleration * late * late, reference, ..ROLLS }
+            Rolls { travel: reference + 0.5 * acceleration * late * late, reference, ..ROLLS }
         });
         assert_eq!(found, None, "{acceleration}");
     }
@@ -145,7 +130,7 @@ fn a_wheel_that_stands_is_found_by_the_way_of_its_reference() {
         let stands = found(|t| {
             let reference = speed * (t + 0.1);
             // It has turned before.
-            Rolls { way: reference.min(0.6f64.max(speed * 0.1)), reference, ..ROLLS }
+            Rolls { travel: reference.min(0.6f64.max(speed * 0.1)), reference, ..ROLLS }
         });
         let (fault, after) = stands.expect("found");
         assert!(matches!(fault, Fault::DriveStalled | Fault::DriveRunaway), "{speed}");
@@ -161,8 +146,8 @@ fn an_arm_that_outruns_the_wheel_is_found() {
     assert_eq!(moved(0.26).map(|(fault, _)| fault), Some(Fault::ArmMismatch));
     // On the steepest corner the arm moves as far as the wheel.
     let climbs = found(|t| {
-        let way = 8.0 * (t + 0.1);
-        Rolls { way, reference: way, radius: 125.0 - way, ..ROLLS }
+        let travel = 8.0 * (t + 0.1);
+        Rolls { travel, reference: travel, radius: 125.0 - travel, ..ROLLS }
     });
     assert_eq!(climbs, None);
 }
@@ -171,9 +156,9 @@ fn an_arm_that_outruns_the_wheel_is_found() {
 fn effort_outside_its_band_is_found_at_speed_and_after_its_time() {
     let cruising = |speed: f64, effort: f64| {
         found(|t| {
-            let way = speed * (t + 0.1);
+            let travel = speed * (t + 0.1);
             let effort = (t >= 0.0).then_some(effort * speed.signum());
-            Rolls { way, reference: way, effort, ..ROLLS }
+            Rolls { travel, reference: travel, effort, ..ROLLS }
         })
     };
     for speed in [30.0, -30.0] {
@@ -211,7 +196,7 @@ fn a_code_that_stands_still_is_found_and_one_bit_of_noise_is_none() {
 }
 
 #[test]
-fn a_jump_is_borne_and_jumping_about_is_not() {
+fn a_jump_is_tolerated_and_jumping_about_is_not() {
     let jumps = |every: i32| {
         let mut state = CodeState::default();
         (0..5000).find(|tick| {
@@ -241,7 +226,7 @@ proptest! {
         let found = found(|t| {
             let reference = speed * (t + 0.1);
             Rolls {
-                way: reference + off * (20.0 * (t + phase)).sin(),
+                travel: reference + off * (20.0 * (t + phase)).sin(),
                 reference,
                 due: 40.0 + strayed,
                 effort: Some(effort * speed.signum()),
@@ -314,7 +299,7 @@ fn across_a_reading_that_is_missing_no_way_is_judged() {
 }
 
 #[test]
-fn off_by_exactly_the_threshold_is_borne() {
+fn off_by_exactly_the_threshold_is_tolerated() {
     let check = CrossCheck::try_build(&Rig::prototype()).expect("a sound rig");
     // Steadily away from the reference: half of the way in each span.
     let drifts = |way: Q16| {

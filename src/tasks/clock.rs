@@ -1,4 +1,4 @@
-//! Time in whole ticks.
+//! The control clock.
 
 use super::exchange::Exchange;
 use crate::units::Tick;
@@ -6,9 +6,8 @@ use embassy_time::{Duration, Instant, Timer};
 
 /// Wakes the sensor tasks and the control tick at each whole millisecond.
 ///
-/// Time stamps lie on whole milliseconds, so that they do not jitter between two numbers.
-/// A millisecond that is missed is left out: a late tick is followed by a timely one and
-/// not by a burst.
+/// Time stamps are whole milliseconds, so that they do not jitter. A missed millisecond is
+/// skipped: a late tick is followed by a timely one, not by a burst.
 pub async fn clock(exchange: &Exchange) -> ! {
     loop {
         Timer::at(Instant::from_millis(Instant::now().as_millis() + 1)).await;
@@ -21,9 +20,9 @@ pub(super) fn uptime() -> Tick {
     Instant::now().as_millis() as Tick
 }
 
-/// When a task below the control rate that waits for nothing but time goes on: in so
-/// long, by half a millisecond more or less, in the middle between two ticks. So neither
-/// its timer nor what it does with interrupts masked delays the start of a tick.
+/// Deadline of a task below the control rate that waits for time alone: after `wait`, half a
+/// millisecond more or less, in the middle between two ticks. So neither its timer nor its
+/// critical sections delay the start of a tick.
 pub fn mid_tick_deadline(wait: Duration) -> Instant {
     Instant::from_millis((Instant::now() + wait).as_millis()) + Duration::from_micros(500)
 }

@@ -1,4 +1,4 @@
-//! What the tasks hand to one another.
+//! Data exchanged by the tasks.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -16,25 +16,24 @@ use embassy_sync::channel::Channel;
 use embassy_sync::signal::Signal;
 use embassy_sync::watch::Watch;
 
-/// Log entries that wait for the journal at most; beyond, new ones are dropped and
-/// counted.
+/// Log entries that wait for the journal at most; further ones are dropped and counted.
 pub const ENTRIES: usize = 32;
 
 /// Commands that wait for the tick at most; beyond, their source waits.
 pub const COMMANDS: usize = 4;
 
-/// Ticks that wait for the journal at most; beyond, new ones are left out of the log. What
-/// keeps the journal longest is the model's task, less than 2 ms.
+/// Ticks that wait for the journal at most; further ones are missing in the log. The longest
+/// delay of the journal is the model's task, less than 2 ms.
 const RECORDS: usize = 8;
 
 /// The latest value of something, which nobody waits for.
 type Latest<T> = Watch<Raw, T, 0>;
 
-/// Room for one value, see [`replace`]. Unlike a `Signal`'s its empty state is all zeros
-/// whatever it holds, so that the exchange takes no room in flash.
+/// Room for one value, see [`replace`]. Unlike a `Signal`'s its empty state is all zeros, so that
+/// the exchange takes no room in flash.
 pub(super) type Slot<T> = Channel<Raw, T, 1>;
 
-/// What a tick was given and gave.
+/// Input and output of a tick.
 #[derive(Default)]
 pub struct TickIo {
     pub(super) input: Input,
@@ -44,7 +43,7 @@ pub struct TickIo {
 /// Everything the tasks share: one in a `static`, or one per test.
 pub struct Exchange {
     pub(super) liveness: Liveness,
-    /// What wakes each sensor's task, by [`TaskId`]: the tick for which it reads.
+    /// Wakes each sensor's task, by [`TaskId`]: the tick for which it reads.
     pub(super) sensor_ticks: [Signal<Raw, Tick>; PERIODS.len()],
     pub(super) tick_started: Signal<Raw, ()>,
     pub(super) tick_ended: Signal<Raw, ()>,
@@ -90,8 +89,8 @@ impl Exchange {
 
     /// Wakes the sensors that are due in this tick, and the control tick.
     ///
-    /// The executor runs a batch of tasks that were woken from its end: the sensors in the
-    /// order of [`TaskId`], the control tick behind them. So it finds the codes of its own
+    /// The executor runs tasks woken together from the last to the first: the sensors in the
+    /// order of [`TaskId`], then the control tick, which so finds the codes of its own
     /// millisecond.
     pub(super) fn start_tick(&self, tick: Tick) {
         self.liveness.start(tick);
@@ -103,8 +102,8 @@ impl Exchange {
         }
     }
 
-    /// What a tick at `now` is given; takes the oldest command and the plan out. Bridge
-    /// codes and emergency stop are added by the task that drives the bridges.
+    /// Input of the tick at `now`; takes the oldest command and the plan out. The motors' task
+    /// adds bridge codes and emergency stop.
     pub fn input(&self, now: Tick, overrun: bool) -> Input {
         Input {
             now,
@@ -116,7 +115,7 @@ impl Exchange {
         }
     }
 
-    /// Passes on what a tick gave, except the motors' part.
+    /// Passes on the output of a tick, except the motors' part.
     pub fn publish(&self, output: &Output) {
         if let Some(request) = output.request {
             self.request_plan(request);
@@ -136,7 +135,7 @@ impl Exchange {
         if let Some(request) = output.request {
             replace(&self.logged_request, (input.now, request));
         }
-        // A reader sees by the tick's number that one is missing.
+        // A reader notices a missing tick by its number.
         let _ = self.records.try_send(Record::of(input, output));
     }
 
@@ -168,7 +167,7 @@ impl Exchange {
         self.telemetry.try_get()
     }
 
-    /// What the light is to show, as of the latest tick.
+    /// What the light shows, as of the latest tick.
     pub fn light(&self) -> Light {
         self.telemetry().map_or(Light::Off, |row| light_of(row.mode))
     }
@@ -183,13 +182,12 @@ impl Exchange {
         self.lost_entries.load(Ordering::Relaxed)
     }
 
-    /// Why the watchdog is not fed: tasks that are late, or the one that keeps the control
-    /// tick from coming.
+    /// Why the watchdog is not fed: tasks that are late, or the one that blocks the control tick.
     pub fn unfed(&self, now: Tick) -> MissedCheckIns {
         self.liveness.unfed(now)
     }
 
-    /// A task says that it is alive.
+    /// Check-in of a task.
     pub(super) fn check_in(&self, task: TaskId, now: Tick) {
         self.liveness.check_in(task, now);
     }
@@ -201,10 +199,10 @@ impl Default for Exchange {
     }
 }
 
-/// Puts a value in the place of the one that may be there. For one writer.
+/// Puts a value in the slot, replacing the one that may be there. For one writer.
 pub(super) fn replace<T>(slot: &Slot<T>, value: T) {
     slot.clear();
-    // Nobody else writes, so there is room.
+    // With one writer there is room.
     let _ = slot.try_send(value);
 }
 

@@ -1,4 +1,4 @@
-//! Which tasks are alive, and which one keeps the others from running.
+//! Check-ins of the tasks, and the task that blocks the others.
 
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
@@ -89,7 +89,7 @@ impl Liveness {
         self.background.store(task.index() as u8, Ordering::Relaxed);
     }
 
-    /// A task says that it is alive.
+    /// Check-in of a task.
     pub(super) fn check_in(&self, task: TaskId, now: Tick) {
         if let Some(seen) = self.check_ins.get(task.index()) {
             seen.store(now, Ordering::Relaxed);
@@ -99,8 +99,7 @@ impl Liveness {
         }
     }
 
-    /// The number of a further operator task; the last one is shared if there are
-    /// more than four.
+    /// Number of a further operator task; beyond four, tasks share the last one.
     pub(super) fn enrol_operator(&self) -> TaskId {
         let number = (self.operators.load(Ordering::Relaxed) as usize).min(OPERATORS - 1);
         self.operators.store(number as u32 + 1, Ordering::Relaxed);
@@ -121,14 +120,13 @@ impl Liveness {
         all((0..self.tasks()).filter(late))
     }
 
-    /// Why the watchdog is not fed: tasks that are late, or the one that keeps the control
-    /// tick from coming.
+    /// Why the watchdog is not fed: tasks that are late, or the one that blocks the control tick.
     pub(super) fn unfed(&self, now: Tick) -> MissedCheckIns {
         if age(now, self.started.load(Ordering::Relaxed)) > CHECK_IN_TICKS {
             return self.stalled_task();
         }
         let missed = self.missed(now);
-        // One that does not return keeps all others of its executor waiting as well.
+        // A task that does not return blocks all others of its executor.
         if missed == all(PERIODS.len()..self.tasks()) {
             MissedCheckIns::task(self.background.load(Ordering::Relaxed).into())
         } else {
@@ -136,9 +134,9 @@ impl Liveness {
         }
     }
 
-    /// The task that keeps the control tick from coming: the tick itself, or the first of
-    /// the sensors' tasks, in the order in which they run, that has not checked in since it
-    /// was woken, or something outside of their executor.
+    /// What blocks the control tick: the tick itself, the first of the sensors' tasks, in the
+    /// order in which they run, without a check-in since its wake-up, or something outside their
+    /// executor.
     fn stalled_task(&self) -> MissedCheckIns {
         if self.in_tick.load(Ordering::Relaxed) {
             return MissedCheckIns::TICK;
@@ -199,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn of_tasks_that_wait_for_one_another_the_one_that_runs_is_named() {
+    fn of_tasks_that_wait_the_running_one_is_named() {
         let liveness = Liveness::new();
         let operator = liveness.enrol_operator();
         liveness.start(1000);
@@ -217,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn the_task_that_keeps_the_tick_from_coming_is_named() {
+    fn the_task_that_blocks_the_tick_is_named() {
         let liveness = Liveness::new();
         for (index, task) in ALWAYS.into_iter().enumerate().take(PERIODS.len()) {
             // Those before it have run in this tick, it and those behind it have not.

@@ -10,17 +10,16 @@ use crate::log::SnapshotRecorder;
 use crate::tick::{Controller, State};
 use crate::units::MotorCommand;
 
-/// The latest tick: [`motors()`] fills it, [`record()`] reads it before the next. Both run
-/// on one executor and hold it across no await, so that neither finds it in use.
+/// The latest tick: [`motors()`] fills it, [`record()`] reads it before the next. Both run on one
+/// executor and hold it across no await, so neither finds it locked.
 pub type TickIoCell = Mutex<CriticalSectionRawMutex, TickIo>;
 
-/// Runs the control tick at 1 kHz: latest codes, command and plan in; bridges,
-/// request and log entries out. Feeds the watchdog while every task is alive, and keeps
-/// for a restart what the drive does and which tasks are missing.
+/// Runs the control tick at 1 kHz: latest codes, command and plan in; bridges, request and log
+/// entries out. Feeds the watchdog while every task is alive, and keeps a snapshot of the drive
+/// and of missing tasks for a restart.
 ///
-/// It waits for nothing but time. A tick that starts more than a period late is
-/// marked as an overrun and the ticks missed are left out; the tick number is
-/// always that of the clock.
+/// It waits for time alone. A tick that starts more than a period late counts as an overrun, and
+/// missed ticks are skipped; the tick's number is always that of the clock.
 pub async fn motors(
     mut motors: impl Motors,
     mut watchdog: impl Watchdog,
@@ -62,8 +61,8 @@ pub async fn motors(
     }
 }
 
-/// Copies every tick for the log. It runs right behind the tick, so that the tick takes as
-/// long with a log as without, and its bridges and its watchdog do not wait for the copy.
+/// Copies every tick for the log. It runs directly after the tick, so that bridges and watchdog
+/// do not wait for the copy.
 pub async fn record(latest: &TickIoCell, exchange: &Exchange) -> ! {
     loop {
         exchange.tick_ended.wait().await;

@@ -6,8 +6,8 @@ use crate::hal::{AnalogInput, AngleBus, WheelEncoder};
 use crate::sense::raw::{AdcCode, BusFault, Sample};
 use embassy_time::{Duration, with_timeout};
 
-/// After this long a reading is given up and begun again: ten times what the board
-/// takes. The task lives on and checks in; the reading ages.
+/// Time-out of a reading, ten times what the board takes. The task goes on and checks in; the
+/// reading ages.
 pub const SENSOR_TIMEOUT: Duration = Duration::from_millis(2);
 
 /// Publishes the wheel counter at 1 kHz.

@@ -17,7 +17,7 @@ use crate::units::TICK_HZ;
 /// an encoder count every 2 ms at crossing speed leaves it quiet enough.
 const OBSERVER_RAD_S: f64 = 60.0;
 
-/// Part of the pre-tightener's slew that the spring may use up while the wheel climbs.
+/// Part of the pre-tightener's slew that the spring may take while the wheel climbs.
 const CLIMB_PART: f64 = 0.9;
 
 impl Controller {
@@ -39,7 +39,7 @@ impl Controller {
             preload_loop: PreloadLoop::try_build(rig)?,
             preload_timeout: ((2.0 * preload.limit_n / preload.slew_n_per_s + 1.0)
                 * f64::from(TICK_HZ)) as u32,
-            rise_speed: checked(
+            climb_speed: checked(
                 "preload.spring_n_per_mm",
                 (CLIMB_PART * preload.slew_n_per_s / preload.spring_n_per_mm).min(1000.0),
             )?,
@@ -58,8 +58,8 @@ impl Controller {
         })
     }
 
-    /// The same controller with every stage run in every tick, needed or not: its outputs are
-    /// the same to the bit.
+    /// The same controller without skipping: every stage runs in every tick, with the same
+    /// outputs to the bit.
     pub fn without_skipping(mut self) -> Self {
         self.skipping = false;
         self

@@ -75,8 +75,8 @@ impl Controller {
         targets
     }
 
-    /// On a corner the wheel's rise moves the spring: no faster than the pre-tightener can
-    /// follow.
+    /// On a corner the wheel's rise compresses the spring: limits the speed to what the
+    /// pre-tightener can follow.
     pub(super) fn limit_climb(&self, state: &State, targets: &mut Targets) {
         if state.estimate.on_corner() {
             let slope = self.estimator.corner().slope(self.ahead(state, Q16::ZERO));
@@ -91,14 +91,14 @@ impl Controller {
         speed: MillimetresPerSecond,
         slope: Ratio,
     ) -> MillimetresPerSecond {
-        if slope > LEVEL_SLOPE && speed * slope > self.rise_speed {
-            speed.min(divide(self.rise_speed, slope))
+        if slope > LEVEL_SLOPE && speed * slope > self.climb_speed {
+            speed.min(divide(self.climb_speed, slope))
         } else {
             speed
         }
     }
 
-    /// Loops and bridges: drive and pre-tightener.
+    /// Loops: commands of drive and pre-tightener.
     pub(super) fn actuate(
         &self,
         state: &mut State,
@@ -118,8 +118,8 @@ impl Controller {
             }
         }
         self.profile.step(&mut state.profile, targets.speed);
-        // Corners that are not detected are not fed forward: the table may be wrong. One that
-        // is detected is blended in, or the drive would jump.
+        // Only detected corners are fed forward: the table may be wrong. The feed-forward is
+        // blended in, or the drive would jump.
         let blend = state.blend_corner();
         let wanted = state.signed_speed();
         let (climb, drift) = if blend == Q16::ZERO {
@@ -133,7 +133,7 @@ impl Controller {
         (MotorCommand::on(duty), self.regulate(state, tick, targets, drift))
     }
 
-    /// What a corner asks of the drive, N, and the rate at which it will move the spring, N/s.
+    /// Force that a corner needs of the drive, N, and the rate at which it moves the spring, N/s.
     fn corner(
         &self,
         state: &State,

@@ -1,4 +1,4 @@
-//! Log entries: what happened, when.
+//! Log entries.
 
 use crate::estimate::ContactStage;
 use crate::fault::{Fault, Limit};
@@ -9,20 +9,20 @@ use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Ratio,
 /// One line of the log.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Entry {
-    /// When.
+    /// Time.
     pub at: Tick,
-    /// What.
+    /// Event.
     pub event: Event,
 }
 
-/// What can happen.
+/// Event of a log entry.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub enum Event {
     /// The mode changed to this.
     Mode(Mode),
     /// The contact stage changed to this.
     Stage(ContactStage),
-    /// A command was taken.
+    /// A command was accepted.
     Command(Command),
     /// A command that the present mode does not take was refused.
     Refused(Command),
@@ -32,13 +32,13 @@ pub enum Event {
     Limit(Limit),
     /// A crossing's ledger line was closed.
     Crossing(CrossingRecord),
-    /// So many log entries were dropped here because the journal did not keep up.
+    /// Number of log entries dropped here because the journal did not keep up.
     Lost(u32),
-    /// The board has started; what is known of the time before.
+    /// The board has started; its report of the run before.
     Restart(Restart),
 }
 
-/// Ledger line of one crossing as the controller saw it.
+/// Crossing as the controller observed it.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CrossingRecord {
     /// Step number, 1 at the outermost sleeve; 0 for a step that the table lacks.
@@ -61,8 +61,8 @@ pub struct CrossingRecord {
     pub gap_predicted: Millimetres,
     /// Gap measured from compression and arm angle, mm.
     pub gap_measured: Millimetres,
-    /// Time for which the wanted preload was reached before the corner touched, s; negative
-    /// when it came after.
+    /// Time for which the wanted preload was reached before the corner touched, s; negative when
+    /// it was late.
     pub lead_time: Seconds,
     /// Friction that the crossing leaves unused by the model, absolute.
     pub slip_margin: Ratio,

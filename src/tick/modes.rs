@@ -1,4 +1,4 @@
-//! What each mode waits for, and for how long.
+//! Conditions and time-outs of the modes.
 
 use super::{Controller, Event, State, TickContext};
 use crate::fault::{Fault, Limit};
@@ -8,11 +8,11 @@ use crate::units::{Direction, Q16};
 
 /// Ticks for which a preload must be reached before the drive starts.
 const STANDING_TICKS: u32 = 60;
-/// Ticks after which a sensor that has not answered since boot counts as missing.
+/// Ticks after boot within which every sensor must answer.
 const BOOT_TICKS: u32 = 2000;
 /// Ticks within which the wheel must come to rest for the self-test.
 const REST_TICKS: u32 = 2000;
-/// Ticks after which taking the zero counts as failed.
+/// Ticks within which the zero must be taken.
 const ZERO_TICKS: u32 = 2000;
 /// Ticks within which the wheel must be at rest after a stop.
 const STOP_TICKS: u32 = 1500;
@@ -51,14 +51,14 @@ impl Controller {
         let (found, on_corner) =
             self.estimator.begin_run(&mut state.estimate, tick.sensed, tick.now, direction);
         if on_corner {
-            // The drive has been off: a corner's force may be there at once, and without it
-            // the wheel would roll off before the speed loop has found it.
+            // The drive has been off: without the corner's full feed-forward the wheel would roll
+            // off before the speed loop reacts.
             state.blend_at_once();
         }
         self.take_findings(state, tick, found);
     }
 
-    /// What the present mode waits for.
+    /// Checks the condition of the present mode.
     pub(super) fn advance_mode(&self, state: &mut State, tick: &mut TickContext<'_>) {
         state.in_mode = state.in_mode.saturating_add(1);
         match state.mode {
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn a_zero_that_does_not_come_in_is_given_up_after_two_seconds() {
+    fn a_zero_that_is_not_taken_is_a_fault_after_two_seconds() {
         let mut state = State::default();
         state.mode = Mode::Zero;
         state.senses.begin_zero();
@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wheel_that_does_not_stop_is_given_up_after_a_second_and_a_half() {
+    fn a_wheel_that_does_not_stop_is_a_fault_after_a_second_and_a_half() {
         let stopping = |speed: Q16| {
             let mut state = State::default();
             state.mode = Mode::Stopping(Direction::Deploy);
@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn a_preload_that_never_stands_is_given_up_after_twice_its_longest_rise_and_a_second() {
+    fn a_preload_that_is_never_reached_is_a_fault_after_twice_its_longest_rise_and_a_second() {
         let mut rig = crate::rig::Rig::prototype();
         for limit_n in [50.0, 60.0] {
             rig.preload.limit_n = limit_n;

@@ -1,4 +1,4 @@
-//! The exchange with the model task, and what a tick makes of the plan.
+//! The exchange with the model task.
 
 use super::{Controller, CrossingRecord, Event, State, TickContext};
 use crate::control::schedule::Targets;
@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn a_model_that_does_not_answer_is_given_up_after_half_a_second() {
+    fn a_model_that_does_not_answer_is_a_fault_after_half_a_second() {
         let mut state = running();
         within(&sensed(0, 0.0, 0.3), |controller, pass| {
             controller.ask(&mut state, pass);
@@ -158,7 +158,7 @@ mod tests {
             controller.transit(&mut state, pass);
         });
         assert_eq!(state.mode, Mode::FaultHold(Fault::ModelSilent));
-        // Nothing is missed that was not asked for.
+        // Without a request no answer is missed.
         let mut state = running();
         within(&sensed(0, 0.0, 0.3), |controller, pass| {
             for _ in 0..2000 {
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn a_preload_that_never_stands_is_given_up_after_its_timeout() {
+    fn a_preload_that_is_never_reached_is_a_fault_after_its_timeout() {
         let mut state = running();
         let waiting = Targets {
             speed: q16(1_000_000),
@@ -187,9 +187,9 @@ mod tests {
                 controller.transit(&mut state, pass);
                 assert_eq!(state.mode, running().mode, "{tick}");
             }
-            // Told once.
-            let told = Event::Limit(Limit::PreloadWait);
-            assert_eq!(pass.output.events.iter().filter(|e| e.event == told).count(), 1);
+            // Reported once.
+            let wait = Event::Limit(Limit::PreloadWait);
+            assert_eq!(pass.output.events.iter().filter(|e| e.event == wait).count(), 1);
             controller.note_preload(&mut state, pass, cross, &waiting);
             controller.transit(&mut state, pass);
         });

@@ -1,4 +1,4 @@
-//! What a tick reports: findings of the estimate, contact stage, vibration, telemetry.
+//! Reports of a tick: findings of the estimate, contact stage, vibration, telemetry.
 
 use super::{Controller, Event, State, Telemetry, TickContext};
 use crate::control::schedule::Targets;
@@ -12,7 +12,7 @@ use crate::units::{Duty, MotorCommand, Q16, q16};
 use super::state::Approach;
 
 impl Controller {
-    /// Acts on what a stage of the estimate has found.
+    /// Acts on the findings of a stage of the estimate.
     pub(super) fn take_findings(
         &self,
         state: &mut State,
@@ -42,8 +42,8 @@ impl Controller {
         }
     }
 
-    /// Observes the arm's mode from the approach to a step until it is behind. The observer
-    /// starts again each time, so that what it did before does not matter.
+    /// Observes the arm's mode from the approach to a step until the step is passed. The observer
+    /// starts again each time, so its earlier state does not matter.
     pub(super) fn follow_vibration(&self, state: &mut State, tick: &TickContext<'_>) {
         let awake = matches!(state.mode, Mode::Run(_, Leg::Approach | Leg::Crossing));
         let compression = tick.sensed.compression.value;

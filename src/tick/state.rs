@@ -1,4 +1,4 @@
-//! What the controller remembers between ticks.
+//! State of the controller between ticks.
 
 use crate::control::preload_loop::PreloadLoopState;
 use crate::control::profile::ProfileState;
@@ -43,7 +43,7 @@ pub(super) struct Approach {
     pub ramping: bool,
     /// The speed is being brought down for the step.
     pub braking: bool,
-    /// Since when the crossing preload has been reached.
+    /// Time since which the crossing preload is reached.
     pub standing_since: Option<Tick>,
     /// Waiting for the preload has been reported.
     pub wait_reported: bool,
@@ -57,13 +57,13 @@ pub(super) struct Planning {
     pub plan: Option<Plan>,
     /// Sequence of the newest request.
     pub sequence: u32,
-    /// Ticks for which it has waited for its answer, from 1; 0 when answered.
+    /// Ticks for which it has waited for its answer, from 1; 0 if answered.
     pub asked: u32,
     /// Estimated over nominal stiffness of the tread.
     pub scale: Ratio,
     /// The last crossing, until its review is complete.
     pub closed: Option<OpenCrossing>,
-    /// The review asked for and not yet answered; part of every request until then.
+    /// The review without an answer; part of every request until then.
     pub review: Option<Review>,
 }
 
@@ -74,17 +74,17 @@ impl Default for Planning {
 }
 
 impl State {
-    /// A start with the wheel where a record has it, if there is one.
+    /// State of a start with this record of the wheel's position, if there is one.
     pub fn restored(record: Option<Place>) -> Self {
         Self { estimate: EstimateState::restored(record), ..Self::default() }
     }
 
-    /// Whether a start could go on from the position.
+    /// Confidence of the position, for a restart.
     pub const fn confidence(&self) -> PositionConfidence {
         self.estimate.confidence()
     }
 
-    /// What the drive is doing.
+    /// Mode of the drive.
     pub const fn mode(&self) -> Mode {
         self.mode
     }

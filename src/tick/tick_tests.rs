@@ -42,9 +42,9 @@ proptest! {
         let followed = controller.followed(speed, slope);
         prop_assert!(followed >= Q16::ZERO && followed <= speed);
         if slope > LEVEL_SLOPE {
-            prop_assert!(followed * slope <= controller.rise_speed + Q16::DELTA);
+            prop_assert!(followed * slope <= controller.climb_speed + Q16::DELTA);
         }
-        if speed * slope <= controller.rise_speed {
+        if speed * slope <= controller.climb_speed {
             prop_assert_eq!(followed, speed);
         }
     }
@@ -107,18 +107,16 @@ fn only_on_a_corner_the_climb_limits_the_speed() {
         state.estimate.watch.contact = contact;
         // Eight millimetres before the face at 18 mm.
         state.estimate.position = Q16::from_num(10);
-        {
-            let mut targets = Targets {
-                speed: fast,
-                preload: Q16::ZERO,
-                ramping: false,
-                braking: false,
-                approaching: false,
-                waiting: false,
-            };
-            stiff().limit_climb(&state, &mut targets);
-            targets.speed
-        }
+        let mut targets = Targets {
+            speed: fast,
+            preload: Q16::ZERO,
+            ramping: false,
+            braking: false,
+            approaching: false,
+            waiting: false,
+        };
+        stiff().limit_climb(&state, &mut targets);
+        targets.speed
     };
     assert_eq!(limited(Contact::Wall), fast);
     assert!(limited(Contact::Both) < q16(30_000_000));

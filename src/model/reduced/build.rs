@@ -345,7 +345,9 @@ mod tests {
                 let needs = formula.force_n(direction, fastest.to_num(), near.to_num(), load);
                 if fastest > Q16::ZERO {
                     errors.speed = errors.speed.max((needs / force - 1.0).abs());
-                    // The force that has this gap holds it at the speed that it has it at.
+                } else {
+                } else {
+                    // The force of a gap holds it at the speed that it was computed for.
                     errors.lost += 1;
                 }
                 for scale in [0.8, 1.25] {
