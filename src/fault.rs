@@ -1,6 +1,5 @@
-//! Latched faults (codes 100 to 199) and active limits (200 to 299). Codes are
-//! stable: a number is never given a second meaning. Cause, detection, reaction and reset of
-//! each: `docs/MODES.md`.
+//! Latched faults (codes 100 to 199) and active limits (200 to 299). Codes are stable: no number
+//! gets a second meaning. Cause, detection, reaction and reset of each: `docs/MODES.md`.
 
 /// A latched fault: the drive holds until it is reset.
 #[derive(

@@ -1,6 +1,6 @@
-//! Fixed-point primitives that [`fixed`] lacks or makes slow on a 32-bit core, exact to the bit
-//! on every machine. Nothing here divides 64-bit numbers, loops without a bound or panics. The
-//! conversion from SI numbers uses floats; it runs at start, in `build` alone.
+//! Fixed-point primitives that [`fixed`] lacks or makes slow on a 32-bit core, exact to the bit on
+//! every machine. None divides 64-bit numbers, loops without a bound or panics. Floats convert SI
+//! numbers at the start, in `build` alone.
 
 mod build;
 mod divide;
@@ -21,13 +21,13 @@ pub use roots::{inverse_sqrt_guess, inverse_sqrt_normalised, sqrt, sqrt_fraction
 pub use sine::sin_cos;
 pub use table::Table;
 
-/// `value`, but no less than `low` and no more than `high`; `high` where the two are the
-/// wrong way round, which [`Ord::clamp`] panics on. For bounds out of the parameters.
+/// `value`, but no less than `low` and no more than `high`; `high` if the bounds are reversed,
+/// where [`Ord::clamp`] panics. For bounds from the parameters.
 pub fn between<T: Ord>(value: T, low: T, high: T) -> T {
     value.max(low).min(high)
 }
 
-/// Arguments from `first` on by this stride, and the last; all of them with `RIG_LONG=1`.
+/// Arguments from `first` on by this stride, and the last; all with `RIG_LONG=1`.
 #[cfg(test)]
 fn lattice(first: u32, stride: usize) -> impl Iterator<Item = u32> {
     let stride = if std::env::var_os("RIG_LONG").is_some() { 1 } else { stride };
@@ -39,7 +39,7 @@ mod tests {
     use super::between;
 
     #[test]
-    fn a_value_stays_between_its_bounds_and_wrong_bounds_end_at_the_upper() {
+    fn reversed_bounds_end_at_the_upper() {
         assert_eq!([-3, 1, 9].map(|value| between(value, 0, 5)), [0, 1, 5]);
         assert_eq!([-3, 1, 9].map(|value| between(value, 5, 0)), [0, 0, 0]);
     }

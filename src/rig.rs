@@ -1,6 +1,6 @@
 //! The rig: geometry, material, actuators, sensors, limits. Every number is here once, in SI or
-//! millimetres as its suffix says, with its source. The plant of the virtual rig reads the same
-//! struct; mismatch between the two is drawn there on purpose.
+//! millimetres as its suffix says, with its source. The virtual rig's plant reads the same struct;
+//! scenarios add deliberate mismatch.
 //!
 //! Sources: *published* is the study of the deployable mechanism; *derived* is computed from
 //! published numbers; *chosen* is ours, with the reason beside it.
@@ -36,7 +36,7 @@ pub struct Rig {
     pub drive: Drive,
     /// Sensors.
     pub sense: Sensors,
-    /// What the controller is asked to hold.
+    /// Settings of the controller.
     pub control: ControlSettings,
 }
 
@@ -57,7 +57,7 @@ pub struct Geometry {
     /// Half-width of the window in which a step is expected, mm. Chosen: machining
     /// of the sleeves (0.3) plus odometry between two steps (2 % of 22 mm).
     pub step_tolerance_mm: f64,
-    /// Whole travel, mm. Chosen: 10 s at 8 mm/s, inside the published 85 mm of the
+    /// Complete travel, mm. Chosen: 10 s at 8 mm/s, inside the published 85 mm of the
     /// sliding connector.
     pub travel_mm: f64,
     /// Radius of the outermost sleeve wall from the pillar axis, mm. Published: 150.
@@ -178,7 +178,7 @@ pub struct Sensors {
     pub stale_after_s: f64,
 }
 
-/// What the controller is asked to hold.
+/// Settings of the controller.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[cfg_attr(not(target_os = "none"), derive(documented::DocumentedFields))]
 #[serde(deny_unknown_fields)]

@@ -1,8 +1,8 @@
-//! Fixed-point quantities, named by what they measure, and what moves the drive.
+//! Fixed-point quantities, named by what they measure, and the drive's commands.
 //!
-//! Every quantity of the control path is a [`Q16`]: 32 bits, 16 of them fraction, saturating.
-//! One format keeps the tick in 32 x 32 -> 64 multiplies, bit-identical on host and target.
-//! What needs more resolution is an accumulator of its own (see [`Travel`]).
+//! Every quantity of the control path is a [`Q16`]: 32 bits, 16 of them fraction, saturating. One
+//! format keeps the tick in 32 x 32 -> 64 multiplies, bit-identical on host and target. Quantities
+//! that need more resolution have a format of their own (see [`Travel`]).
 
 mod motion;
 mod q16;

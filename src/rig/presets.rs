@@ -2,7 +2,7 @@
 
 use super::{ControlSettings, Drive, Geometry, List, Loads, Pretightener, Rig, Sensors, Tread};
 
-/// A list from a slice; what does not fit is a mistake of this file.
+/// A list from a slice, which must fit.
 fn list<const N: usize>(values: &[f64]) -> List<N> {
     List::from_slice(values).unwrap_or_default()
 }

@@ -1,16 +1,16 @@
-//! The checks that a parameter set must pass before anything is built from it.
+//! Checks of a rig's parameters.
 
 use super::Rig;
 
-/// Preload kept free below the limit for regulation, relative to the limit: gain of
-/// the preload sensor, and what a climb compresses the spring beyond the feed-forward.
-/// On the presets no rig drawn within its tolerances exceeds the limit with it.
+/// Preload kept free below the limit for regulation, relative to the limit: gain of the preload
+/// sensor, and the spring's compression in a climb beyond the feed-forward. On the presets no rig
+/// within its tolerances exceeds the limit with it.
 pub(crate) const REGULATION_PART: f64 = 0.04;
 
-/// Least speed of the unloaded motor over the cruise speed: what it needs to regulate.
+/// Least speed of the unloaded motor over the cruise speed, for regulation.
 const TOP_SPEED_RESERVE: f64 = 1.2;
 
-/// What is wrong with a parameter set: the key, its value, what was expected.
+/// Error of a parameter set: the key, its value, the expected range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RigError {
     /// A value lies outside its range.

@@ -1,8 +1,7 @@
-//! Checks of the sensors against one another and against what the bridges are asked for. Each
-//! compares two things that no single fault spoils alike. They run while the drive is on and
-//! start again when it has been off. Each threshold is above the worst of fault-free random
-//! rigs of both presets by the part that its constant gives; a campaign of 10,000 rigs
-//! confirms it.
+//! Checks of the sensors against one another and against the bridges' commands. Each compares two
+//! quantities that no single fault changes alike. They run while the drive is on and start again
+//! when it has been off. Each threshold exceeds the worst of fault-free random rigs of both
+//! presets by the part given with its constant; a campaign of 10,000 rigs confirms it.
 
 #![deny(clippy::float_arithmetic)]
 
@@ -13,55 +12,55 @@ use crate::units::{
     Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Tick, Travel, per_tick, q16,
 };
 
-/// Ticks between the three positions that make an acceleration.
+/// Ticks between the three positions of an acceleration.
 const SPAN: usize = 6;
 /// Room for the positions of two spans.
 const KEPT: usize = 16;
 /// Distance by which reference and encoder may bend apart within two spans, counts. Three
-/// readings of a counter are off by less than 2 counts together, and a third whole count takes
-/// `1 / (6 ms)^2`, 530 mm/s^2 beyond the reference: twice what the profile asks for. The worst
-/// of the random rigs is 2.1.
+/// readings of a counter are off by less than 2 counts together; a third full count takes
+/// `1 / (6 ms)^2`, 530 mm/s^2 beyond the reference: twice the acceleration of the profile. The
+/// worst of the random rigs is 2.1.
 const BENT_COUNTS: f64 = 2.5;
 /// Distance off the reference within two spans, mm: the dips behind a step make 0.11.
 const OFF: Millimetres = q16(150_000);
 /// Distance that counts as progress of the wheel, mm: two counts and a half.
 const PROGRESS: Millimetres = q16(50_000);
-/// Distance that the reference may go while a wheel that has turned makes no progress, mm.
+/// Travel of the reference that a wheel which has turned may stay behind, mm.
 const LAG: Millimetres = q16(400_000);
-/// The same before it has turned, mm: on a corner the speed loop first has to find the duty
-/// that lifts it, 0.2 s at half the crossing speed.
+/// The same before it has turned, mm: on a corner the speed loop first has to find the duty that
+/// lifts it, 0.2 s at half the crossing speed.
 const START_LAG: Millimetres = q16(2_000_000);
-/// Progress, by times, after which it has turned.
+/// Number of progresses after which the wheel counts as turned.
 const TURNED: u8 = 10;
 /// Ticks within which arm and wheel are compared.
 const ARM_TICKS: u8 = 32;
-/// Distance that the arm may move beyond the wheel's within them, mm; noise and the slope of a
+/// Distance that the arm may move more than the wheel within them, mm; noise and the slope of a
 /// corner, at most 1, make 0.08.
 const ARM_BEYOND: Millimetres = q16(250_000);
 /// Least speed at which duty and speed are compared, mm/s.
 const TELLING: MillimetresPerSecond = q16(10_000_000);
-/// Duty beyond the feed-forward that cruising takes, least and most: gearbox friction and
-/// rolling resistance make 0.02 to 0.07, twice the top load 0.05 more, a motor that is off
-/// by 5 % 0.03 either way at cruise speed.
+/// Least and largest duty beyond the feed-forward at cruise: gearbox friction and rolling
+/// resistance make 0.02 to 0.07, twice the top load 0.05 more, a motor that is off by 5 % 0.03
+/// either way.
 const EFFORT: (Ratio, Ratio) = (q16(-50_000), q16(130_000));
-/// Ticks that it must be outside: two time constants of the loop and more, in which it
-/// forgets the last corner.
+/// Ticks for which it must be outside: more than two time constants of the loop, in which it
+/// settles after a corner.
 const EFFORT_TICKS: u8 = 120;
-/// Preload off its model, part of the cruise preload: 0.18 at the ramps of an actuator whose
-/// dead time, lag and slew are all three off.
+/// Deviation of the preload from its model, part of the cruise preload: 0.18 at the ramps of an
+/// actuator whose dead time, lag and slew are all off.
 const STRAYED_PART: f64 = 0.25;
-/// Ticks that it must be.
+/// Ticks for which it must deviate.
 const STRAYED_TICKS: u8 = 10;
-/// Equal codes in a row of a converter that no signal moves: with noise of half a code it
-/// gives the same code again with a chance of 0.6, and 64 times with 1e-14.
+/// Equal codes in a row that count as stuck: with noise of half a code a converter repeats a code
+/// with a chance of 0.6, and 64 times with 1e-14.
 const STUCK: u8 = 64;
-/// Change within a tick that no force makes, N: the spring yields 36 N/s at cruise speed.
+/// Change within a tick that no force can make, N: the spring yields 36 N/s at cruise speed.
 const JUMP_N: Newtons = q16(4_000_000);
 /// The same of the tread's compression, mm: it runs in at 20 mm/s.
 const JUMP_MM: Millimetres = q16(100_000);
-/// What a jump adds to the count of them, of which each good tick takes one off.
+/// Increment of the jump count at a jump; each good tick decrements it by one.
 const JUMP_COUNTS: u8 = 8;
-/// Count at which a sensor is given up: eight jumps close together.
+/// Jump count of a fault: eight jumps close together.
 const ERRATIC: u8 = 60;
 
 /// Thresholds of a rig.
@@ -73,7 +72,7 @@ pub(super) struct CrossCheck {
     strayed: Newtons,
 }
 
-/// What is remembered of the ticks before.
+/// State between ticks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct CrossState {
     /// Travel of the reference since the drive was switched on.
@@ -86,7 +85,7 @@ pub(super) struct CrossState {
     at: Tick,
     /// Encoder and reference at the last progress.
     progress: (Travel, Travel),
-    /// Times that there was some, up to [`TURNED`].
+    /// Number of progresses, up to [`TURNED`].
     turned: u8,
     /// Radius and encoder when arm and wheel were last set equal, and the ticks since.
     arm: (Millimetres, Travel),
@@ -97,7 +96,7 @@ pub(super) struct CrossState {
     compression: CodeState,
 }
 
-/// What is remembered of a converter.
+/// History of a converter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct CodeState {
     value: Q16,
@@ -105,7 +104,7 @@ struct CodeState {
     erratic: u8,
 }
 
-/// What is compared in a tick.
+/// Inputs of a tick.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Compared {
     /// Tick.
@@ -141,7 +140,7 @@ impl CrossCheck {
         })
     }
 
-    /// The pre-tightener and its sensor, whenever that is on.
+    /// Check of the pre-tightener and its sensor, whenever that is on.
     pub(super) fn preload(
         &self,
         state: &mut CrossState,
@@ -161,7 +160,7 @@ impl CrossCheck {
     /// Every check of a tick in which the drive is on.
     pub(super) fn step(&self, state: &mut CrossState, seen: &Compared) -> Option<Fault> {
         let bent = self.bends(state, seen);
-        // A wheel of which nothing new is known may have gone anywhere.
+        // Without a new reading the wheel's position is unknown.
         let fresh = seen.read_at == seen.now;
         let lags = fresh && lags(state, seen);
         let preload = self.preload(state, seen.preload, seen.preload_due);
@@ -217,8 +216,8 @@ impl CrossCheck {
 /// Whether the reference goes on while the wheel does not.
 fn lags(state: &mut CrossState, seen: &Compared) -> bool {
     let (travel, reference) = state.progress;
-    let way = Q16::narrow(seen.travel.saturating_sub(travel));
-    if way.abs() > PROGRESS {
+    let moved = Q16::narrow(seen.travel.saturating_sub(travel));
+    if moved.abs() > PROGRESS {
         state.progress = (seen.travel, state.reference);
         state.turned = state.turned.saturating_add(1).min(TURNED);
         return false;
@@ -239,7 +238,7 @@ fn arm_runs_ahead(state: &mut CrossState, seen: &Compared) -> bool {
     (seen.radius - radius).abs() > rolled + ARM_BEYOND
 }
 
-/// Whether a converter gives the same code over and over, or jumps about.
+/// Whether a converter is stuck or jumps repeatedly.
 fn judge(state: &mut CodeState, value: Q16, jump: Q16) -> bool {
     let change = (value - state.value).abs();
     state.value = value;
@@ -259,7 +258,7 @@ fn lasts(count: &mut u8, condition: bool, enough: u8) -> bool {
 }
 
 impl CrossState {
-    /// The drive is switched on: from here on. The wheel has been at rest until now.
+    /// Starts with the drive, which has been at rest until now.
     pub(super) fn begin(&mut self, seen: &Compared) {
         *self = Self {
             past: [Q16::narrow(seen.travel); KEPT],

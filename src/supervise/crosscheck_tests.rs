@@ -6,7 +6,7 @@ use proptest::prelude::*;
 /// One count of the prototype's encoder, mm.
 const COUNT_MM: f64 = 2.0 * core::f64::consts::PI * 25.0 / 8192.0;
 
-/// What is true of a drive that the checks look at.
+/// True state of a drive.
 #[derive(Clone, Copy, Debug)]
 struct Rolls {
     /// Travel of wheel and reference, mm.
@@ -32,8 +32,8 @@ const ROLLS: Rolls = Rolls {
     stuck: false,
 };
 
-/// Ticks until a fault when `at` tells what is true at each, after 100 ticks of settling;
-/// the encoder counts, and preload sensor and compression sensor make noise.
+/// First fault, and its tick, of a drive with this state at each time, after 100 ticks of
+/// settling; the encoder counts, and preload and compression sensor are noisy.
 fn found(mut at: impl FnMut(f64) -> Rolls) -> Option<(Fault, i32)> {
     let check = CrossCheck::try_build(&Rig::prototype()).expect("a sound rig");
     let mut state = CrossState::default();
@@ -103,8 +103,8 @@ fn a_bridge_at_full_duty_from_the_first_tick_is_found_as_soon() {
 
 #[test]
 fn what_bends_less_than_the_threshold_is_tolerated() {
-    // A whole count more than quantisation needs 530 mm/s^2 over the spans; but what lasts
-    // adds up to a way off the reference.
+    // A full count beyond quantisation needs 530 mm/s^2 over the spans; a lasting deviation adds
+    // up to a distance off the reference.
     for acceleration in [0.0, 250.0, -250.0] {
         let found = found(|t| {
             let reference = 8.0 * (t + 0.1);
@@ -116,14 +116,14 @@ fn what_bends_less_than_the_threshold_is_tolerated() {
 }
 
 #[test]
-fn a_way_off_the_reference_is_found_however_slowly_it_is_left() {
+fn a_distance_off_the_reference_is_found_however_slowly_it_grows() {
     let (fault, after) = leaves(8.0, 300.0).expect("found");
     // 0.15 mm in 12 ms is 12.5 mm/s, and 300 mm/s^2 take 42 ms to that.
     assert!(fault == Fault::DriveRunaway && (40..60).contains(&after), "{fault:?} {after}");
 }
 
 #[test]
-fn a_wheel_that_stands_is_found_by_the_way_of_its_reference() {
+fn a_stalled_wheel_is_found_by_the_travel_of_its_reference() {
     // At 3 mm/s it stands after 100 ticks, and the reference takes 133 for 0.4 mm from the
     // last progress, which is up to 17 ticks back.
     for (speed, least, most) in [(3.0, 216, 234), (8.0, 5, 60), (30.0, 1, 20)] {
@@ -183,7 +183,7 @@ fn a_preload_that_strays_is_found_after_its_time() {
 }
 
 #[test]
-fn a_code_that_stands_still_is_found_and_one_bit_of_noise_is_none() {
+fn a_stuck_code_is_found_and_one_bit_of_noise_is_not_stuck() {
     let stands = found(|t| Rolls { stuck: t >= 0.0, ..ROLLS });
     let (fault, after) = stands.expect("found");
     assert_eq!(fault, Fault::PreloadSensorImplausible);
@@ -196,7 +196,7 @@ fn a_code_that_stands_still_is_found_and_one_bit_of_noise_is_none() {
 }
 
 #[test]
-fn a_jump_is_tolerated_and_jumping_about_is_not() {
+fn a_jump_is_tolerated_and_repeated_jumps_are_not() {
     let jumps = |every: i32| {
         let mut state = CodeState::default();
         (0..5000).find(|tick| {
@@ -283,7 +283,7 @@ fn rested() -> (CrossCheck, CrossState) {
 }
 
 #[test]
-fn across_a_reading_that_is_missing_no_way_is_judged() {
+fn across_a_missing_reading_no_distance_is_judged() {
     let far = q16(200_000);
     // The tick's own reading is old, or the tick before was lost.
     let old = Compared { read_at: 100, ..off_by(101, far) };
@@ -301,17 +301,17 @@ fn across_a_reading_that_is_missing_no_way_is_judged() {
 #[test]
 fn off_by_exactly_the_threshold_is_tolerated() {
     let check = CrossCheck::try_build(&Rig::prototype()).expect("a sound rig");
-    // Steadily away from the reference: half of the way in each span.
-    let drifts = |way: Q16| {
+    // Steadily away from the reference: half of the distance in each span.
+    let drifts = |distance: Q16| {
         let mut past = [Q16::ZERO; KEPT];
-        past[SPAN] = way.half();
+        past[SPAN] = distance.half();
         let mut state = CrossState {
             past,
             held: 2 * SPAN as u8,
             head: 2 * SPAN as u8,
             ..CrossState::default()
         };
-        check.bends(&mut state, &off_by(1, way))
+        check.bends(&mut state, &off_by(1, distance))
     };
     assert!(!drifts(OFF) && !drifts(-OFF));
     assert!(drifts(OFF + Q16::DELTA) && drifts(-OFF - Q16::DELTA));
@@ -343,6 +343,6 @@ fn a_preload_astray_before_the_drive_starts_is_counted_on() {
     }
     state.begin(&astray(Tick::from(before)));
     let start = Tick::from(before);
-    let told: Vec<_> = (start..start + 3).map(|t| check.step(&mut state, &astray(t))).collect();
-    assert_eq!(told, [None, None, Some(Fault::PretightenerRunaway)]);
+    let found: Vec<_> = (start..start + 3).map(|t| check.step(&mut state, &astray(t))).collect();
+    assert_eq!(found, [None, None, Some(Fault::PretightenerRunaway)]);
 }

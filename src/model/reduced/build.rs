@@ -346,7 +346,6 @@ mod tests {
                 if fastest > Q16::ZERO {
                     errors.speed = errors.speed.max((needs / force - 1.0).abs());
                 } else {
-                } else {
                     // The force of a gap holds it at the speed that it was computed for.
                     errors.lost += 1;
                 }
