@@ -92,7 +92,7 @@ pub struct Loads {
     /// 2A12; dry rubber on metal lies in 0.5 to 1.2 and the paper's own cases need
     /// 0.94 at (5 mm/s, 33.3 N).
     pub mu: f64,
-    /// Top load of the whole unit, N. Published: 20 on the rig, 60 in the study.
+    /// Top load of the complete unit, N. Published: 20 on the rig, 60 in the study.
     pub top_load_n: f64,
     /// Share of the top load that this wheel lifts. Chosen: one third; the guide
     /// and the neighbouring units carry the rest.

@@ -1,4 +1,4 @@
-//! What comes to the firmware from outside, damaged in every way: its readers refuse it
+//! Damaged input of every kind from outside the firmware: its readers refuse it
 //! and never panic. `FUZZ_SECONDS` gives each target that long instead.
 
 use interstage::log::frame::{Body, Frame, FrameBuffer, Head, Kind, LONGEST};
@@ -134,8 +134,9 @@ fn frames_of_the_log() {
         (Kind::Plan, vec![1; 60]),
         (Kind::Ticks, vec![3; 90]),
     ];
-    let whole: Vec<Vec<u8>> = bodies.iter().map(|(kind, body)| framed(head(*kind), body)).collect();
-    fuzz("log frames", &whole, 20_000, 1.5, read_frame);
+    let frames: Vec<Vec<u8>> =
+        bodies.iter().map(|(kind, body)| framed(head(*kind), body)).collect();
+    fuzz("log frames", &frames, 20_000, 1.5, read_frame);
     let plain: Vec<Vec<u8>> = bodies.iter().map(|(_, body)| body.clone()).collect();
     fuzz("log frames with their check", &plain, 10_000, 2.0, |bytes| {
         for kind in Kind::ALL {

@@ -1,10 +1,8 @@
-//! Recorded runs, given to the controller again: every output of every tick has to be the
+//! Recorded runs, replayed through the controller: every output of every tick has to be the
 //! recorded one, to the bit.
 //!
-//! The recordings in `hil-sim/tests/data` are the frames that the image would send, in an
-//! MCAP file: a deployment and a retraction, steps that stand elsewhere or are missing, lost
-//! friction, sensors that stand still or read wrong, commands at random, resets near corners.
-//! After a change of the controller that is wanted they are made anew: those of the scenarios
+//! The recordings in `hil-sim/tests/data` are the frames that the image would send, in an MCAP
+//! file. After a wanted change of the controller they are recorded again: those of the scenarios
 //! beside them by `cargo rig capture --bare NAME.toml --out hil-sim/tests/data --name NAME`,
 //! the first two as `hil-sim/tests/logs.rs` says, those with resets as
 //! `hil-sim/examples/resets.rs` does, from the seeds 1 to 3.
@@ -22,10 +20,10 @@ use interstage::supervise::Mode;
 use interstage::tick::{Controller, Entry, Event, Input, Output, State};
 use interstage::units::Direction;
 
-/// What the frames of a log tell of the time from one start to the next.
+/// The log from one start to the next.
 #[derive(Default)]
 struct Boot {
-    /// What was left of the run before.
+    /// Report of the run before.
     restart: Option<Restart>,
     ticks: Vec<Record>,
     plans: Vec<(u32, Plan)>,
@@ -34,19 +32,19 @@ struct Boot {
 }
 
 impl Boot {
-    /// What the log has of this tick, in its order.
+    /// The item of this tick, if there is one.
     fn of<T: Clone>(all: &[(u32, T)], tick: u32) -> Option<T> {
         all.iter().find(|(at, _)| *at == tick).map(|(_, what)| what.clone())
     }
 
-    /// Up to its last tick: of what came behind that a reset has kept nothing but events.
+    /// Events up to the last tick: after that a reset keeps events alone.
     fn events(&self) -> Vec<Entry> {
         let last = self.ticks.last().map_or(0, Record::at);
         self.events.iter().filter(|entry| entry.at <= last).cloned().collect()
     }
 }
 
-/// A run as its log tells it: its starts.
+/// A recorded run, start by start.
 struct Recorded(Vec<Boot>);
 
 impl Recorded {
@@ -133,7 +131,7 @@ fn a_sensor_that_never_answers_is_named() {
     }
 }
 
-/// Runs it again; the mode of its last tick.
+/// Replays a run; returns the mode of its last tick.
 fn replayed(name: &str, crossings: usize) -> Mode {
     let run = Recorded::read(name);
     assert!(run.ticks() > 2000, "{name}: {} ticks", run.ticks());
@@ -162,7 +160,7 @@ fn replayed(name: &str, crossings: usize) -> Mode {
     last.expect("ticks")
 }
 
-/// Each plan is what the planner makes of the request that it answers.
+/// Each plan is the planner's answer to its request.
 fn plans_again(boot: &Boot, name: &str) {
     let planner = Planner::try_build(&Rig::prototype()).expect("the prototype is sound");
     for (at, plan) in &boot.plans {
@@ -175,14 +173,14 @@ fn plans_again(boot: &Boot, name: &str) {
 
 #[test]
 fn what_is_skipped_changes_no_bit() {
-    let whole = Controller::try_build(&Rig::prototype()).expect("sound").without_skipping();
+    let unskipped = Controller::try_build(&Rig::prototype()).expect("sound").without_skipping();
     for name in ["deploy.mcap", "slip.mcap"] {
         let mut state = State::default();
         step_through(
             &Recorded::read(name).0[0],
             |_| {},
             |record, input, output| {
-                let again = whole.step(&mut state, input);
+                let again = unskipped.step(&mut state, input);
                 assert_eq!(again.telemetry, output.telemetry, "{name}, tick {}", record.at());
                 assert_eq!(state.mode(), output.telemetry.mode);
                 assert!((0.5..2.0).contains(&state.stiffness_scale().to_num::<f64>()));
@@ -198,7 +196,7 @@ fn every_recorded_run_is_replayed_to_the_bit() {
     for (name, crossings, end) in [
         ("deploy", 3, Some(Deploy)),
         ("retract", 3, Some(Retract)),
-        // Steps elsewhere than in the table; the table's first step missing on the way back; a
+        // Steps elsewhere than in the table; the table's first step missing on retract; a
         // step higher than the table has it.
         ("astray", 3, Some(Deploy)),
         ("back", 1, None),
@@ -206,7 +204,7 @@ fn every_recorded_run_is_replayed_to_the_bit() {
         // Commands on a corner that end at the start, at the end; buttons pressed at random.
         ("back-again", 2, Some(Retract)),
         ("on-again", 3, Some(Deploy)),
-        ("presses", 0, Some(Deploy)),
+        ("presses", 0, Some(Retract)),
         // A wheel that slips on a corner; a late and weak preload; twice the load; late ticks.
         ("slip", 1, None),
         ("soft", 2, None),

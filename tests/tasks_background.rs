@@ -9,9 +9,7 @@ use interstage::model::{PlanRequest, Planner};
 use interstage::rig::Rig;
 use interstage::supervise::{Command, Mode};
 use interstage::tasks::{self, COMMANDS, ENTRIES, Exchange};
-use interstage::tick::Output;
-use interstage::tick::Telemetry;
-use interstage::tick::{Entry, Event};
+use interstage::tick::{Entry, Event, Output, Telemetry};
 use interstage::units::{Direction, Ratio};
 
 fn planner() -> &'static Planner {
@@ -32,7 +30,7 @@ fn entry(at: u32) -> Entry {
     Entry { at, event: Event::Command(Command::Stop) }
 }
 
-/// What the tick would find now.
+/// Command for a tick now.
 fn command(exchange: &Exchange) -> Option<Command> {
     exchange.input(0, false).command
 }
@@ -41,8 +39,19 @@ fn plan_sequence(exchange: &Exchange) -> Option<u32> {
     exchange.input(0, false).plan.map(|plan| plan.sequence)
 }
 
+/// The journal's task with its exchange.
+fn journal(written: &Record<Entry>, shown: &Record<Light>) -> (Bench, &'static Exchange) {
+    let (mut bench, exchange) = (Bench::new(), forever(Exchange::new()));
+    let (journal, light) = (written.clone(), shown.clone());
+    bench.spawn(async {
+        let mut encoder = LogEncoder::new(Identity::NOBODY);
+        tasks::journal(journal, light, &mut encoder, exchange).await
+    });
+    (bench, exchange)
+}
+
 #[test]
-fn a_request_is_answered_once() {
+fn a_request_is_answered_once_and_of_several_the_latest() {
     let mut bench = Bench::new();
     let exchange = forever(Exchange::new());
     bench.spawn(async { tasks::model(planner(), exchange).await });
@@ -52,14 +61,6 @@ fn a_request_is_answered_once() {
     bench.poll();
     assert_eq!(plan_sequence(exchange), Some(5));
     assert_eq!(plan_sequence(exchange), None);
-}
-
-#[test]
-fn the_latest_request_counts() {
-    let mut bench = Bench::new();
-    let exchange = forever(Exchange::new());
-    bench.spawn(async { tasks::model(planner(), exchange).await });
-    bench.poll();
     for sequence in 1..=3 {
         exchange.request_plan(request(sequence));
     }
@@ -84,7 +85,7 @@ fn commands_reach_the_tick_in_their_order_and_none_is_lost() {
         Command::Stop,
     ];
     operator.gives(&given);
-    // Nobody takes them: the queue fills and the source waits.
+    // Without a reader the queue fills and the source waits.
     bench.run_ms(100);
     assert_eq!(operator.left(), given.len() - COMMANDS - 1);
     let mut taken = Vec::new();
@@ -127,13 +128,8 @@ fn two_sources_do_not_wait_for_one_another() {
 
 #[test]
 fn entries_are_written_in_their_order() {
-    let mut bench = Bench::new();
-    let (exchange, written) = (forever(Exchange::new()), Record::<Entry>::default());
-    let (journal, light) = (written.clone(), Record::<Light>::default());
-    bench.spawn(async {
-        let mut encoder = LogEncoder::new(Identity::NOBODY);
-        tasks::journal(journal, light, &mut encoder, exchange).await
-    });
+    let written = Record::default();
+    let (mut bench, exchange) = journal(&written, &Record::default());
     for at in 0..ENTRIES as u32 {
         exchange.log(entry(at));
     }
@@ -147,13 +143,8 @@ fn entries_are_written_in_their_order() {
 
 #[test]
 fn entries_that_do_not_fit_are_counted_and_the_others_kept() {
-    let mut bench = Bench::new();
-    let (exchange, written) = (forever(Exchange::new()), Record::<Entry>::default());
-    let (journal, light) = (written.clone(), Record::<Light>::default());
-    bench.spawn(async {
-        let mut encoder = LogEncoder::new(Identity::NOBODY);
-        tasks::journal(journal, light, &mut encoder, exchange).await
-    });
+    let written = Record::default();
+    let (mut bench, exchange) = journal(&written, &Record::default());
     bench.poll();
     for at in 0..ENTRIES as u32 + 9 {
         exchange.log(entry(at));
@@ -173,13 +164,8 @@ fn entries_that_do_not_fit_are_counted_and_the_others_kept() {
 
 #[test]
 fn the_light_is_set_when_it_changes_and_only_then() {
-    let mut bench = Bench::new();
-    let (exchange, shown) = (forever(Exchange::new()), Record::<Light>::default());
-    let (journal, light) = (Record::<Entry>::default(), shown.clone());
-    bench.spawn(async {
-        let mut encoder = LogEncoder::new(Identity::NOBODY);
-        tasks::journal(journal, light, &mut encoder, exchange).await
-    });
+    let shown = Record::default();
+    let (mut bench, exchange) = journal(&Record::default(), &shown);
     bench.run_ms(100);
     assert_eq!(shown.items(), [Light::Off]);
     let modes = [Mode::Preload(Direction::Deploy), Mode::FaultHold(Fault::SelfTest), Mode::Idle];

@@ -80,11 +80,11 @@ fn each_request_has_its_answer_with_its_number() {
     wire.ask(9, Request::Seal);
     bench.run_ms(20);
     let answers = wire.answers();
-    let [ToHost::Parameters(7, Response::Description(told)), piece, refused] = &answers[..] else {
+    let [ToHost::Parameters(7, Response::Description(found)), piece, refused] = &answers[..] else {
         panic!("{answers:?}");
     };
-    assert_eq!((told.origin, told.name.as_str()), (Origin::Image, "mocked"));
-    assert_eq!((usize::from(told.length), told.running), (image().len(), 0xAFFE));
+    assert_eq!((found.origin, found.name.as_str()), (Origin::Image, "mocked"));
+    assert_eq!((usize::from(found.length), found.running), (image().len(), 0xAFFE));
     let ToHost::Parameters(8, Response::Piece(piece)) = piece else { panic!("{piece:?}") };
     assert!(!piece.is_empty() && image().starts_with(piece));
     assert_eq!(*refused, ToHost::Parameters(9, Response::Refused(Refusal::NoDraft)));

@@ -4,6 +4,7 @@ use crate::common::{
     Answer, Bench, Bridges, Dog, Operator, Record, Sensor, UNLOADED, arm_frame, forever, now_ms,
     preload_sensor_code,
 };
+use crate::tasks_sensors::spawn;
 use interstage::fault::Fault;
 use interstage::hal::Light;
 use interstage::log::{Identity, LogEncoder};
@@ -57,24 +58,18 @@ impl Board {
             journal: Record::default(),
             light: Record::default(),
         };
-        let runs = |station| !missing.contains(&station);
+        let runs = |task| !missing.contains(&task);
         let bench = &mut board.bench;
         bench.spawn(async { tasks::clock(exchange).await });
-        if runs(TaskId::WheelEncoder) {
-            let wheel = board.wheel.clone();
-            bench.spawn(async { tasks::wheel_encoder(wheel, exchange).await });
-        }
-        if runs(TaskId::PreloadSensor) {
-            let preload_sensor = board.preload_sensor.clone();
-            bench.spawn(async { tasks::preload_sensor(preload_sensor, exchange).await });
-        }
-        if runs(TaskId::CompressionSensor) {
-            let tread = board.tread.clone();
-            bench.spawn(async { tasks::compression_sensor(tread, exchange).await });
-        }
-        if runs(TaskId::ArmAngle) {
-            let arm = board.arm.clone();
-            bench.spawn(async { tasks::arm_angle(arm, exchange).await });
+        for (task, sensor) in [
+            (TaskId::WheelEncoder, &board.wheel),
+            (TaskId::PreloadSensor, &board.preload_sensor),
+            (TaskId::CompressionSensor, &board.tread),
+            (TaskId::ArmAngle, &board.arm),
+        ] {
+            if runs(task) {
+                spawn(bench, sensor, task, exchange);
+            }
         }
         let (motors, watchdog) = (board.bridges.clone(), board.watchdog.clone());
         let latest = forever(TickIoCell::new(TickIo::default()));
@@ -139,14 +134,15 @@ fn bridges_are_off_from_the_first_instant_until_a_command() {
 }
 
 #[test]
-fn the_tick_runs_at_a_kilohertz_and_is_numbered_by_the_clock() {
+fn the_tick_runs_at_a_kilohertz_is_numbered_by_the_clock_and_feeds_the_watchdog() {
     let mut board = Board::new();
-    for expected in 1..=500 {
+    for expected in 1..=1000 {
         board.bench.run_ms(1);
         assert_eq!(board.exchange.telemetry().map(|row| row.at), Some(expected));
     }
     // One call before the first tick, then one a tick.
-    assert_eq!(board.motors.times(), (0..=500).collect::<Vec<_>>());
+    assert_eq!(board.motors.times(), (0..=1000).collect::<Vec<_>>());
+    assert_eq!(board.watchdog.fed.times(), (1..=1000).collect::<Vec<_>>());
 }
 
 #[test]
@@ -165,15 +161,8 @@ fn start_raises_the_preload_before_the_drive_moves() {
 }
 
 #[test]
-fn the_watchdog_is_fed_every_tick_while_all_tasks_live() {
-    let mut board = Board::new();
-    board.bench.run_ms(1000);
-    assert_eq!(board.watchdog.fed.times(), (1..=1000).collect::<Vec<_>>());
-}
-
-#[test]
 fn the_watchdog_starves_when_any_task_is_dead_and_the_record_names_it() {
-    for (station, name) in [
+    for (task, name) in [
         (TaskId::WheelEncoder, "wheel encoder"),
         (TaskId::PreloadSensor, "preload sensor"),
         (TaskId::CompressionSensor, "compression sensor"),
@@ -181,10 +170,10 @@ fn the_watchdog_starves_when_any_task_is_dead_and_the_record_names_it() {
         (TaskId::Model, "model"),
         (TaskId::Journal, "journal"),
     ] {
-        let mut board = Board::without(&[station]);
+        let mut board = Board::without(&[task]);
         board.bench.run_ms(500);
         let last = board.watchdog.fed.times().last().copied();
-        assert_eq!(last, Some(CHECK_IN_TICKS), "{station:?}");
+        assert_eq!(last, Some(CHECK_IN_TICKS), "{task:?}");
         let kept = board.watchdog.kept.items();
         let named: Vec<&str> = kept.iter().map(|snapshot| snapshot.missed.name()).collect();
         assert!(named[..CHECK_IN_TICKS as usize].iter().all(|name| *name == "nobody"));
@@ -194,11 +183,11 @@ fn the_watchdog_starves_when_any_task_is_dead_and_the_record_names_it() {
 }
 
 #[test]
-fn a_tick_that_comes_no_more_is_told_from_one_that_hangs() {
+fn a_tick_that_does_not_start_is_distinguished_from_one_that_hangs() {
     let mut board = Board::idle();
     let now = now_ms();
     assert_eq!(board.exchange.unfed(now), MissedCheckIns::NOBODY);
-    // Nobody gets the processor, and all had ended their turns.
+    // No task gets the processor, and none was running.
     board.bench.freeze_ms(100);
     assert_eq!(board.exchange.unfed(now_ms()), MissedCheckIns::STARVED);
 }
@@ -236,8 +225,8 @@ fn a_hanging_sensor_is_a_fault_and_stops_neither_tick_nor_watchdog() {
         let ticks: Vec<u32> = board.motors.times().into_iter().filter(|&at| at > hung).collect();
         assert_eq!(ticks, (hung + 1..=now_ms()).collect::<Vec<_>>(), "{fault:?}");
         assert_eq!(board.watchdog.fed.times().last(), Some(&now_ms()), "{fault:?}");
-        let told = board.journal.items().iter().any(|entry| entry.event == Event::Fault(fault));
-        assert!(told, "{fault:?} is in the log");
+        let logged = board.journal.items().iter().any(|entry| entry.event == Event::Fault(fault));
+        assert!(logged, "{fault:?} is in the log");
     }
 }
 
@@ -277,7 +266,7 @@ fn a_dead_model_task_does_not_hold_up_the_tick() {
     board.bench.run_ms(300);
     let ticks: Vec<u32> = board.motors.times().into_iter().filter(|&at| at > before).collect();
     assert_eq!(ticks, (before + 1..=before + 300).collect::<Vec<_>>());
-    // Nor is it waited for without end.
+    // The wait has a time-out.
     board.reach(Mode::FaultHold(Fault::ModelSilent), 300);
     board.bench.run_ms(1);
     assert!(board.bridges_are_off());

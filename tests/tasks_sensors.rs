@@ -13,7 +13,7 @@ fn clocked(bench: &mut Bench) -> &'static Exchange {
 }
 
 /// Spawns one sensor's task on its part of the exchange.
-fn spawn(bench: &mut Bench, sensor: &Sensor, task: TaskId, exchange: &'static Exchange) {
+pub(crate) fn spawn(bench: &mut Bench, sensor: &Sensor, task: TaskId, exchange: &'static Exchange) {
     let sensor = sensor.clone();
     match task {
         TaskId::WheelEncoder => bench.spawn(async { tasks::wheel_encoder(sensor, exchange).await }),

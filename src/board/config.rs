@@ -79,7 +79,6 @@ pub(crate) enum HoldReason {
     Parameters(SetError),
 }
 
-/// Keeps the drive off, and logs why.
 pub(crate) fn hold(threads: Spawner, parts: Parts, why: HoldReason) {
     let Parts {
         motors, light, wheel_encoder, preload_sensor, compression_sensor, arm_angle, ..

@@ -13,7 +13,6 @@ const POLL: Duration = Duration::from_millis(20);
 pub(crate) struct Console(DownChannel);
 
 impl Console {
-    /// Reads from `channel`.
     pub(crate) fn new(channel: DownChannel) -> Self {
         Self(channel)
     }

@@ -12,7 +12,6 @@ use interstage::params::slots::{FlashFault, PAGE_BYTES, SLOT_BYTES, SetMemory, S
 
 use super::Irqs;
 
-/// Begin of flash in memory.
 const BASE: usize = 0x0800_0000;
 
 /// The last 8 KiB of 512.
@@ -22,7 +21,6 @@ const SLOTS: usize = 512 * 1024 - 2 * SLOT_BYTES;
 pub(crate) struct ParameterFlash(Flash<'static, Async>);
 
 impl ParameterFlash {
-    /// Takes the controller.
     pub(crate) fn new(flash: Peri<'static, FLASH>) -> Self {
         Self(Flash::new(flash, Irqs))
     }

@@ -25,7 +25,6 @@ pub(super) const RECORDS: Page = Page(END - (2 * SLOT_BYTES + PAGE_BYTES) as u32
 pub(super) const IMAGE_CHECKSUMS: Page = Page(RECORDS.0 - PAGE_BYTES as u32);
 
 impl Page {
-    /// Its content.
     pub(super) fn bytes(self) -> &'static page::Page {
         // SAFETY: inside flash, which is always mapped and holds plain bytes. It changes only
         // before the tasks, and in a handler that does not return; readers read it again after

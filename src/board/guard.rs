@@ -13,7 +13,6 @@ use super::{retained, safety};
 /// Time-out of the watchdog, us, by the nominal 32 kHz of its oscillator.
 const TIMEOUT_US: u32 = 100_000;
 
-/// The independent watchdog.
 pub(crate) struct Guard {
     dog: IndependentWatchdog<'static, IWDG>,
     /// Position of the wheel by the record of the run before.

@@ -25,7 +25,6 @@ unsafe fn UART4() {
     unsafe { THREADS.on_interrupt() }
 }
 
-/// Starts all tasks.
 type Begin = fn(Spawner, Channels);
 
 /// Runs the host's line in thread mode, where it advances time when every task waits; the tasks

@@ -75,7 +75,6 @@ pub(crate) fn verify() -> Option<u32> {
     Some(now)
 }
 
-/// Stores the checksum for later starts.
 fn store(sum: u32) {
     defmt::info!("first start of this image, sum {=u32:08x}", sum);
     let first = image_checksum::free(IMAGE_CHECKSUMS.bytes()).unwrap_or_else(|| {
@@ -87,7 +86,6 @@ fn store(sum: u32) {
     }
 }
 
-/// Logs that the image is damaged.
 #[inline(never)]
 pub(super) fn log_damaged() {
     defmt::error!("image: a bit has turned over since its first start; flash it again");

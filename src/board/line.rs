@@ -10,7 +10,6 @@ pub(crate) struct HostLine {
 }
 
 impl HostLine {
-    /// A line over these channels.
     pub(crate) fn new((up, down): (UpChannel, DownChannel)) -> Self {
         Self { up, down }
     }

@@ -7,7 +7,6 @@ use interstage::restart::{CRASH_WORDS, Crash, DriveSnapshot, SNAPSHOT_WORDS, Sto
 
 use super::image;
 
-/// What is kept.
 #[repr(C)]
 struct Kept {
     crash: [u32; CRASH_WORDS],
@@ -31,7 +30,6 @@ fn kept() -> *mut Kept {
     KEPT.0.get().cast()
 }
 
-/// Keeps the snapshot of a tick.
 pub(super) fn keep(snapshot: &DriveSnapshot) {
     let place = (snapshot.tick & 1) as usize;
     // SAFETY: see `Shared`; the index is 0 or 1.

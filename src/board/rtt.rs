@@ -102,7 +102,6 @@ pub(crate) fn lost() -> u32 {
     LOST.load(Ordering::Relaxed)
 }
 
-/// The frame in progress.
 struct State {
     channel: Option<UpChannel>,
     encoder: Encoder,
@@ -148,7 +147,6 @@ static STATE: Shared = Shared(UnsafeCell::new(State {
     cut: false,
 }));
 
-/// A frame is in progress.
 static OPEN: AtomicBool = AtomicBool::new(false);
 
 /// Frames begun in interrupts meanwhile that have not ended.

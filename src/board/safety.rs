@@ -42,10 +42,8 @@ pub(super) fn restart() -> ! {
 /// fast end of its oscillator.
 const HANG_MS: u32 = 75;
 
-/// Milliseconds since the watchdog was fed.
 static UNFED: AtomicU32 = AtomicU32::new(0);
 
-/// The watchdog has been fed.
 pub(super) fn fed() {
     UNFED.store(0, Ordering::Relaxed);
 }

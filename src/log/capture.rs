@@ -80,7 +80,6 @@ pub struct CaptureChunk {
     pub samples: Vec<CaptureSample, CHUNK_SAMPLES>,
 }
 
-/// Progress of a capture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Progress {
     /// Keeps the latest samples, waits for a trigger.

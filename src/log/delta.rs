@@ -22,7 +22,6 @@ const WORDS: usize = 6;
 /// Bits of the map before those of the words.
 const DIFFERENCES: usize = 2 * (1 + NUMBERS);
 
-/// Bytes of the map.
 const MAP: usize = (DIFFERENCES + WORDS).div_ceil(32) * 4;
 
 const _: () = assert!(MAP <= 8, "the map is kept in a u64");
@@ -38,12 +37,10 @@ pub(super) struct DeltaRecord {
 /// Most bytes that a [`DeltaRecord`] takes.
 pub(super) const LONGEST: usize = MAP + 4 * (1 + NUMBERS + WORDS);
 
-/// Two halves of a word.
 const fn word(low: u16, high: u16) -> u32 {
     low as u32 | (high as u32) << 16
 }
 
-/// The halves of a word.
 const fn halves(word: u32) -> [u16; 2] {
     [word as u16, (word >> 16) as u16]
 }

@@ -239,6 +239,20 @@ impl Formula {
         self.gap_after_mm(halve(least, most, 40, |run| !carries(run)))
     }
 
+    /// Friction that the lift of `load_n` uses at that instant: `T / C + s`, with the radial
+    /// reaction `C = (P - T s) / (1 + s^2)`.
+    pub fn utilisation(
+        &self,
+        direction: Direction,
+        speed_mm_s: f64,
+        gap_mm: f64,
+        load_n: f64,
+    ) -> f64 {
+        let force = self.force_n(direction, speed_mm_s, gap_mm, Some(load_n));
+        let slope = self.contact(gap_mm).slope();
+        load_n * (1.0 + slope * slope) / (force - load_n * slope) + slope
+    }
+
     /// The complete crossing.
     pub fn crossing(
         &self,
@@ -407,6 +421,9 @@ mod tests {
             let radial = axial / slope;
             prop_assert!((used * radial - axial - load).abs() < 1e-9);
             prop_assert!((radial + used * axial - force).abs() < 1e-9);
+            let direction = Direction::ALL[usize::from(back)];
+            let same = f.utilisation(direction, speed, crossing.gap_mm, load);
+            prop_assert!((same / used - 1.0).abs() < 1e-6, "{same} {used}");
         }
     }
 }

@@ -303,24 +303,26 @@ mod tests {
         let (mut limited, mut free) = (0, 0);
         for gap_mm in [0.0, 1.5, 1.75, 2.0, 2.25, 2.5] {
             for (planner, plan) in plans(|rig| rig.control.gap_ref_mm = gap_mm) {
-                let told = plan.limits.contains(&Some(Limit::PreloadLimited));
+                let reported = plan.limits.contains(&Some(Limit::PreloadLimited));
                 let floored = plan.limits.contains(&Some(Limit::SpeedFloor));
                 let at_limit = plan.cross_preload >= planner.most_preload * q16(980_000);
                 let slow = plan.cross_speed < planner.safe_speed;
-                assert_eq!(told, at_limit && slow && !floored, "{gap_mm} {plan:?}");
-                limited += u32::from(told);
-                free += u32::from(!told && !floored);
+                assert_eq!(reported, at_limit && slow && !floored, "{gap_mm} {plan:?}");
+                limited += u32::from(reported);
+                free += u32::from(!reported && !floored);
             }
         }
         assert!(limited > 0 && free > 0, "{limited} {free}");
     }
 
-    /// Plans of a rig that is changed like this, either way, for treads around the nominal.
+    /// Plans of a rig that is changed like this, in both directions, for treads around the nominal.
     fn plans(change: impl Fn(&mut Rig)) -> Vec<(Planner, Plan)> {
         let mut rig = Rig::prototype();
         change(&mut rig);
         let Ok(planner) = Planner::try_build(&rig) else { return Vec::new() };
-        let cases = [0.8, 1.0, 1.25].into_iter().flat_map(|s| Direction::ALL.map(|way| (s, way)));
+        let cases = [0.8, 1.0, 1.25]
+            .into_iter()
+            .flat_map(|s| Direction::ALL.map(|direction| (s, direction)));
         cases
             .map(|(scale, direction)| {
                 let scale = Ratio::from_num(scale);
@@ -335,13 +337,13 @@ mod tests {
         let (mut floored, mut free) = (0, 0);
         for gap_mm in [0.6, 0.8, 1.0, 1.25, 1.5, 2.0, 2.5] {
             for (planner, plan) in plans(|rig| rig.control.gap_ref_mm = gap_mm) {
-                let told = plan.limits.contains(&Some(Limit::SpeedFloor));
+                let reported = plan.limits.contains(&Some(Limit::SpeedFloor));
                 let slowest = plan.cross_speed <= planner.least_speed;
                 let hardest = plan.cross_preload == planner.most_preload;
                 let wide = plan.gap > planner.target_of(plan.direction);
-                assert_eq!(told, slowest && hardest && wide, "{gap_mm} {plan:?}");
-                floored += u32::from(told);
-                free += u32::from(!told);
+                assert_eq!(reported, slowest && hardest && wide, "{gap_mm} {plan:?}");
+                floored += u32::from(reported);
+                free += u32::from(!reported);
             }
         }
         assert!(floored > 0 && free > 0, "{floored} {free}");
@@ -352,17 +354,17 @@ mod tests {
         let (mut slips, mut grips) = (0, 0);
         for mu in [0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.1] {
             for (planner, plan) in plans(|rig| rig.plant.mu = mu) {
-                let told = plan.limits.contains(&Some(Limit::SlipMarginLow));
+                let reported = plan.limits.contains(&Some(Limit::SlipMarginLow));
                 let wanted = planner.friction - planner.usable;
-                assert_eq!(told, plan.slip_margin < wanted, "{mu} {plan:?}");
+                assert_eq!(reported, plan.slip_margin < wanted, "{mu} {plan:?}");
                 // Reported or not, the margin is what the friction leaves.
                 let margin = plan.slip_margin.to_num::<f64>();
                 assert!(
                     margin < mu && (wanted.to_num::<f64>() - 0.1).abs() < 1e-4,
                     "{mu} {margin}"
                 );
-                slips += u32::from(told);
-                grips += u32::from(!told);
+                slips += u32::from(reported);
+                grips += u32::from(!reported);
             }
         }
         assert!(slips > 0 && grips > 0, "{slips} {grips}");

@@ -19,7 +19,7 @@ pub struct LowPass {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LowPassState {
     /// Bits of Q16.
-    whole: i32,
+    integer: i32,
     /// The bits behind them, 0 to 65535.
     rest: u32,
 }
@@ -27,23 +27,23 @@ pub struct LowPassState {
 impl LowPassState {
     /// A filter at rest at `value`.
     pub const fn at(value: Q16) -> Self {
-        Self { whole: value.to_bits(), rest: 0 }
+        Self { integer: value.to_bits(), rest: 0 }
     }
 
     /// The present output.
     pub const fn output(&self) -> Q16 {
-        Q16::from_bits(self.whole.saturating_add((self.rest >> 15) as i32))
+        Q16::from_bits(self.integer.saturating_add((self.rest >> 15) as i32))
     }
 }
 
 impl LowPass {
     /// One tick with input `x`.
     pub fn step(&self, state: &mut LowPassState, x: Q16) -> Q16 {
-        // a (x - y) in two products: y's whole bits, then the 16 behind them.
-        let error = i64::from(x.to_bits()) - i64::from(state.whole);
+        // a (x - y) in two products: y's integer bits, then the 16 behind them.
+        let error = i64::from(x.to_bits()) - i64::from(state.integer);
         let gained = error * i64::from(self.gain) - i64::from((state.rest * self.gain) >> 16);
-        let moved = (i64::from(state.whole) << 16) + i64::from(state.rest) + gained;
-        state.whole = (moved >> 16) as i32;
+        let moved = (i64::from(state.integer) << 16) + i64::from(state.rest) + gained;
+        state.integer = (moved >> 16) as i32;
         state.rest = moved as u32 & 0xFFFF;
         state.output()
     }

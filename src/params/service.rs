@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::slots::{Damaged, Draft, SetMemory, stored};
 use super::{MAX_NAME, ParameterSet, SCHEMA, SetError};
 
-/// Most bytes of a set in one request or answer; whole double words.
+/// Most bytes of a set in one request or answer; full double words.
 pub const PIECE: usize = 48;
 
 /// Bytes of a set.

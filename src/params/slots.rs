@@ -180,7 +180,7 @@ fn inspect(bytes: &[u8], slot: Slot) -> Option<Found<'_>> {
     let named = sequence == u32::MAX || known.is_none_or(|found| found == fold(sequence));
     let set = bytes.get(PREFIX..)?.get(..(word & 0xFFFF) as usize);
     let intact = set.filter(|set| {
-        // A set of another schema is still the user's; who opens it finds out.
+        // A set of another schema is still the user's; opening it reports that.
         magic == MAGIC && sound && named && ParameterSet::open_any(set).is_ok()
     });
     Some(match intact {
@@ -228,7 +228,7 @@ impl Draft {
         self.length - self.written
     }
 
-    /// Programs the next piece: whole double words, but for the last.
+    /// Programs the next piece: complete double words, except the last.
     ///
     /// # Errors
     /// [`Refusal`]; the set in force stays.

@@ -110,8 +110,8 @@ fn the_place_is_the_record_s_and_the_way_gone_after_it() {
         restart.place().map(|place| (place.position.to_num::<f64>(), place.sure))
     };
     let near = |restart, mm: f64, sure| {
-        let (position, told) = at(restart).expect("a place");
-        assert!((position - mm).abs() < 1e-3 && told == sure, "{restart}: {position}");
+        let (position, is_sure) = at(restart).expect("a place");
+        assert!((position - mm).abs() < 1e-3 && is_sure == sure, "{restart}: {position}");
     };
     near(restart(Reset::Pin, None), 29.92, true);
     near(restart(Reset::Watchdog, None), 30.0 - 40.0 * 0.102, false);
@@ -149,12 +149,12 @@ fn what_a_start_keeps_is_where_the_wheel_came_to_rest_and_unsure() {
     let crash = Some(Crash { build: 1, stopped: hang });
     let hung = Restart { reset: Reset::Watchdog, snapshot: Some(snapshot), crash };
     let sure = Restart { reset: Reset::Pin, crash: None, ..hung };
-    for (first, way) in [(hung, 40.0 * 0.077), (sure, 40.0 * 0.002)] {
+    for (first, travel) in [(hung, 40.0 * 0.077), (sure, 40.0 * 0.002)] {
         let kept = first.at_start().expect("a record");
         assert_eq!((kept.tick, kept.level), (900, DriveSnapshot::UNSURE | 1));
         let again = Restart { reset: Reset::Pin, snapshot: Some(kept), crash: None };
         let place = again.place().expect("a place");
-        assert!((place.position.to_num::<f64>() - 30.0 - way).abs() < 1e-3 && !place.sure);
+        assert!((place.position.to_num::<f64>() - 30.0 - travel).abs() < 1e-3 && !place.sure);
         // And a third changes nothing more.
         assert_eq!(again.at_start(), Some(kept));
     }

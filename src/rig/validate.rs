@@ -176,7 +176,7 @@ impl Rig {
         Ok(())
     }
 
-    /// Steps ascend, with the contact run of a whole wheel between them and before
+    /// Steps ascend, with the contact run of a wheel between them and before
     /// the first, and lie inside the travel.
     fn step_table(&self) -> Result<(), RigError> {
         let radius = self.rig.wheel_radius_mm;

@@ -60,7 +60,7 @@ impl AngleFrame {
 
 /// Mean output of a motor's bridge, the difference of its two legs, through divider and
 /// low-pass: 12 bits, [`BridgeCode::CENTRE`] is no voltage. A code is 20 parts in 2^15 of the
-/// supply: the range ends at a duty of 1.25 either way, and the noise fits one byte a tick in
+/// supply: the range ends at a duty of 1.25 in both directions, and the noise fits one byte a tick in
 /// the log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct BridgeCode(u16);

@@ -332,7 +332,7 @@ mod tests {
         };
         let (pressed, up) =
             (Truth { compression_mm: 3.6, ..STOWED }, Truth { radius_mm: 121.0, ..STOWED });
-        // Each of them tells of a step while the other is sound.
+        // Each of them shows a step while the other is sound.
         assert_eq!((level(pressed, |_| ()), level(up, |_| ())), (1, 1));
         assert_eq!(level(pressed, |frame| frame.arm_angle = None), 0);
         assert_eq!(level(up, |frame| frame.compression_sensor = None), 0);

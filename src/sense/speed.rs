@@ -193,6 +193,11 @@ mod tests {
         Some(Sample { code: EncoderCount::new(counts as u16), at })
     }
 
+    /// One tick with the wheel at this position, mm.
+    fn read(meter: &Speedometer, state: &mut SpeedState, now: Tick, position: f64) -> Motion {
+        meter.step(state, now, sample(position, now), Default::default(), LIMIT)
+    }
+
     /// Runs at constant speed and gives the mean relative error and the largest,
     /// after settling.
     fn steady(meter: &Speedometer, speed_mm_s: f64) -> (f64, f64) {
@@ -201,8 +206,7 @@ mod tests {
         let (settle, total) = (1000, 21_000_u32);
         for now in 0..total {
             let position = 0.003 + speed_mm_s * f64::from(now) * 1e-3;
-            let motion =
-                meter.step(&mut state, now, sample(position, now), Default::default(), LIMIT);
+            let motion = read(meter, &mut state, now, position);
             if now >= settle {
                 let error = motion.speed.value.to_num::<f64>() / speed_mm_s - 1.0;
                 sum += error;
@@ -342,13 +346,7 @@ mod tests {
         for now in 0..1000_u32 {
             let position = 8e-3 * f64::from(now);
             let glitch = if now == 700 { 30.0 } else { 0.0 };
-            let motion = meter.step(
-                &mut state,
-                now,
-                sample(position + glitch, now),
-                Default::default(),
-                LIMIT,
-            );
+            let motion = read(&meter, &mut state, now, position + glitch);
             if now == 700 {
                 assert_eq!(motion.speed.validity, Validity::Held(Reason::Implausible));
             } else {
@@ -362,14 +360,14 @@ mod tests {
     }
 
     #[test]
-    fn a_counter_that_lost_its_place_becomes_invalid() {
+    fn a_counter_that_jumped_becomes_invalid() {
         let meter = build();
         let mut state = SpeedState::default();
         for now in 0..100_u32 {
-            meter.step(&mut state, now, sample(0.0, now), Default::default(), LIMIT);
+            read(&meter, &mut state, now, 0.0);
         }
         for now in 100..130_u32 {
-            let motion = meter.step(&mut state, now, sample(300.0, now), Default::default(), LIMIT);
+            let motion = read(&meter, &mut state, now, 300.0);
             let expected = if now < 120 {
                 Validity::Held(Reason::Implausible)
             } else {
@@ -380,7 +378,7 @@ mod tests {
     }
 
     #[test]
-    fn the_limit_of_plausibility_is_where_it_is_said_to_be() {
+    fn the_limit_of_plausibility_is_eleven_counts_a_tick() {
         let meter = build();
         for (counts, good) in [(11, true), (-11, true), (12, false), (-12, false)] {
             let mut state = SpeedState::default();
@@ -407,7 +405,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_within_the_limit_is_bridged_and_a_longer_one_starts_anew() {
+    fn a_gap_within_the_limit_is_bridged_and_after_a_longer_one_the_observer_starts_again() {
         let after = |gap: u32| {
             let meter = build();
             let mut state = SpeedState::default();
@@ -430,7 +428,7 @@ mod tests {
     }
 
     #[test]
-    fn twice_what_the_motor_can_is_still_believed() {
+    fn twice_the_motor_s_speed_is_still_plausible() {
         let mut rig = Rig::prototype();
         rig.drive.no_load_speed_mm_s = 2.0 * IMPLAUSIBLE_MM_S;
         let meter = Speedometer::try_build(&rig, BANDWIDTH_RAD_S).expect("in range");

@@ -41,7 +41,7 @@ const ARM_BEYOND: Millimetres = q16(250_000);
 const TELLING: MillimetresPerSecond = q16(10_000_000);
 /// Least and largest duty beyond the feed-forward at cruise: gearbox friction and rolling
 /// resistance make 0.02 to 0.07, twice the top load 0.05 more, a motor that is off by 5 % 0.03
-/// either way.
+/// in either direction.
 const EFFORT: (Ratio, Ratio) = (q16(-50_000), q16(130_000));
 /// Ticks for which it must be outside: more than two time constants of the loop, in which it
 /// settles after a corner.
@@ -63,7 +63,6 @@ const JUMP_COUNTS: u8 = 8;
 /// Jump count of a fault: eight jumps close together.
 const ERRATIC: u8 = 60;
 
-/// Thresholds of a rig.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct CrossCheck {
     /// See [`BENT_COUNTS`], mm.
@@ -96,7 +95,6 @@ pub(super) struct CrossState {
     compression: CodeState,
 }
 
-/// History of a converter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct CodeState {
     value: Q16,
@@ -104,7 +102,6 @@ struct CodeState {
     erratic: u8,
 }
 
-/// Inputs of a tick.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Compared {
     /// Tick.

@@ -124,15 +124,15 @@ fn a_distance_off_the_reference_is_found_however_slowly_it_grows() {
 
 #[test]
 fn a_stalled_wheel_is_found_by_the_travel_of_its_reference() {
-    // At 3 mm/s it stands after 100 ticks, and the reference takes 133 for 0.4 mm from the
+    // At 3 mm/s it is stalled after 100 ticks, and the reference takes 133 for 0.4 mm from the
     // last progress, which is up to 17 ticks back.
     for (speed, least, most) in [(3.0, 216, 234), (8.0, 5, 60), (30.0, 1, 20)] {
-        let stands = found(|t| {
+        let stalled = found(|t| {
             let reference = speed * (t + 0.1);
             // It has turned before.
             Rolls { travel: reference.min(0.6f64.max(speed * 0.1)), reference, ..ROLLS }
         });
-        let (fault, after) = stands.expect("found");
+        let (fault, after) = stalled.expect("found");
         assert!(matches!(fault, Fault::DriveStalled | Fault::DriveRunaway), "{speed}");
         assert!((least..=most).contains(&after), "{speed}: {after}");
     }
@@ -184,8 +184,8 @@ fn a_preload_that_strays_is_found_after_its_time() {
 
 #[test]
 fn a_stuck_code_is_found_and_one_bit_of_noise_is_not_stuck() {
-    let stands = found(|t| Rolls { stuck: t >= 0.0, ..ROLLS });
-    let (fault, after) = stands.expect("found");
+    let stalled = found(|t| Rolls { stuck: t >= 0.0, ..ROLLS });
+    let (fault, after) = stalled.expect("found");
     assert_eq!(fault, Fault::PreloadSensorImplausible);
     assert!((64..=66).contains(&after), "{after}");
     let mut state = CodeState::default();
@@ -258,7 +258,7 @@ proptest! {
     }
 }
 
-/// A tick of a wheel that is so far off a reference that stands, mm.
+/// A tick of a wheel that is this far off a reference at rest, mm.
 fn off_by(now: Tick, off: Millimetres) -> Compared {
     Compared {
         now,

@@ -301,8 +301,8 @@ mod tests {
         }
         let (fault, tick) = found(RUN, 0.0, 8.0, 48.0, 48.0).expect("found");
         // One that starts with a jerk, which no profile does, bends away at once.
-        let stands = matches!(fault, Fault::DriveStalled | Fault::DriveRunaway);
-        assert!(stands && tick < 60, "{fault:?} {tick}");
+        let stalled = matches!(fault, Fault::DriveStalled | Fault::DriveRunaway);
+        assert!(stalled && tick < 60, "{fault:?} {tick}");
         let short = usize::from(PRELOAD_TICKS);
         assert_eq!(found(RUN, 8.0, 8.0, 40.0, 48.0), Some((Fault::PreloadNotReached, short)));
     }
@@ -314,7 +314,7 @@ mod tests {
         assert_eq!(found(preload, 0.0, 0.0, 60.0, 60.0), None);
         assert!(found(preload, 0.0, 0.0, 60.0, 40.0).is_some());
         // A tenth of the 33.3 N above what is due there, and still less than the quarter that
-        // tells a pre-tightener gone astray.
+        // shows a runaway pre-tightener.
         assert_eq!(found(preload, 0.0, 0.0, 60.0, 57.0), None);
         let press = usize::from(OVERPRESSURE_TICKS);
         assert_eq!(found(preload, 0.0, 0.0, 60.0, 56.0), Some((Fault::Overpressure, press)));

@@ -41,7 +41,6 @@ pub struct Readback {
     silent: u8,
 }
 
-/// The same of one bridge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Bridge {
     /// Duty commanded until now, Q15.

@@ -23,7 +23,7 @@ const POLL: Duration = Duration::from_millis(10);
 /// the latest counts.
 pub async fn model(planner: &Planner, exchange: &Exchange) -> ! {
     loop {
-        exchange.check_in(TaskId::Model, uptime());
+        exchange.liveness.check_in(TaskId::Model, uptime());
         let request = with_deadline(mid_tick_deadline(ROUND), exchange.request.receive()).await;
         if let Ok(request) = request {
             exchange.liveness.running(TaskId::Model);
@@ -41,7 +41,7 @@ pub async fn operator(mut source: impl CommandSource, exchange: &Exchange) -> ! 
             // Kept across check-ins, so that a gesture in progress is not lost.
             let mut next = pin!(source.next());
             loop {
-                exchange.check_in(task, uptime());
+                exchange.liveness.check_in(task, uptime());
                 match select(next.as_mut(), Timer::at(mid_tick_deadline(ROUND))).await {
                     Either::First(command) => break command,
                     Either::Second(()) => {}
@@ -62,7 +62,7 @@ pub async fn link<M: SetMemory>(
     let task = exchange.liveness.enrol_operator();
     let mut reader = FrameReader::new();
     loop {
-        exchange.check_in(task, uptime());
+        exchange.liveness.check_in(task, uptime());
         let mut byte = [0];
         if line.read(&mut byte) == 0 {
             Timer::at(mid_tick_deadline(POLL)).await;
@@ -98,7 +98,7 @@ pub async fn journal(
     encoder.set_identity(journal.identity());
     light.show(shown);
     loop {
-        exchange.check_in(TaskId::Journal, uptime());
+        exchange.liveness.check_in(TaskId::Journal, uptime());
         if exchange.light() != shown {
             shown = exchange.light();
             light.show(shown);

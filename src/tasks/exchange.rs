@@ -2,7 +2,7 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use super::liveness::{Liveness, PERIODS, TaskId};
+use super::liveness::{Liveness, PERIODS};
 use crate::hal::Light;
 use crate::log::Record;
 use crate::model::{Plan, PlanRequest};
@@ -43,7 +43,7 @@ pub struct TickIo {
 /// Everything the tasks share: one in a `static`, or one per test.
 pub struct Exchange {
     pub(super) liveness: Liveness,
-    /// Wakes each sensor's task, by [`TaskId`]: the tick for which it reads.
+    /// Wakes each sensor's task, by [`TaskId`](super::TaskId): the tick for which it reads.
     pub(super) sensor_ticks: [Signal<Raw, Tick>; PERIODS.len()],
     pub(super) tick_started: Signal<Raw, ()>,
     pub(super) tick_ended: Signal<Raw, ()>,
@@ -90,7 +90,7 @@ impl Exchange {
     /// Wakes the sensors that are due in this tick, and the control tick.
     ///
     /// The executor runs tasks woken together from the last to the first: the sensors in the
-    /// order of [`TaskId`], then the control tick, which so finds the codes of its own
+    /// order of [`TaskId`](super::TaskId), then the control tick, which so finds the codes of its own
     /// millisecond.
     pub(super) fn start_tick(&self, tick: Tick) {
         self.liveness.start(tick);
@@ -186,11 +186,6 @@ impl Exchange {
     pub fn unfed(&self, now: Tick) -> MissedCheckIns {
         self.liveness.unfed(now)
     }
-
-    /// Check-in of a task.
-    pub(super) fn check_in(&self, task: TaskId, now: Tick) {
-        self.liveness.check_in(task, now);
-    }
 }
 
 impl Default for Exchange {
@@ -206,7 +201,6 @@ pub(super) fn replace<T>(slot: &Slot<T>, value: T) {
     let _ = slot.try_send(value);
 }
 
-/// What the light shows in a mode.
 const fn light_of(mode: Mode) -> Light {
     match mode {
         Mode::Boot | Mode::SelfTest | Mode::Zero | Mode::Idle | Mode::Complete(_) => Light::Off,

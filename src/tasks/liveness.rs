@@ -51,7 +51,6 @@ impl TaskId {
     }
 }
 
-/// The check-ins of all tasks.
 pub(super) struct Liveness {
     check_ins: [AtomicU32; FIXED + OPERATORS],
     operators: AtomicU32,
@@ -74,22 +73,18 @@ impl Liveness {
         }
     }
 
-    /// Sensors and control tick are woken for this tick.
     pub(super) fn start(&self, tick: Tick) {
         self.started.store(tick, Ordering::Relaxed);
     }
 
-    /// The control tick begins or ends.
     pub(super) fn in_tick(&self, running: bool) {
         self.in_tick.store(running, Ordering::Relaxed);
     }
 
-    /// A task below the control rate runs.
     pub(super) fn running(&self, task: TaskId) {
         self.background.store(task.index() as u8, Ordering::Relaxed);
     }
 
-    /// Check-in of a task.
     pub(super) fn check_in(&self, task: TaskId, now: Tick) {
         if let Some(seen) = self.check_ins.get(task.index()) {
             seen.store(now, Ordering::Relaxed);
@@ -150,7 +145,6 @@ impl Liveness {
     }
 }
 
-/// All of these tasks.
 fn all(tasks: impl Iterator<Item = usize>) -> MissedCheckIns {
     tasks.map(MissedCheckIns::task).fold(MissedCheckIns::NOBODY, MissedCheckIns::and)
 }

@@ -69,6 +69,6 @@ async fn run<T>(
         if let Ok(Ok(code)) = with_timeout(SENSOR_TIMEOUT, read()).await {
             publish(Sample { code, at });
         }
-        exchange.check_in(task, at);
+        exchange.liveness.check_in(task, at);
     }
 }

@@ -141,7 +141,7 @@ mod tests {
     use crate::supervise::Command;
     use crate::units::q16;
 
-    /// Every sensor answers, and the wheel stands.
+    /// Every sensor answers, and the wheel is at rest.
     fn answering() -> SensedState {
         let mut all = sensed(0, 0.0, 0.0);
         all.speed.validity = Validity::Valid;

@@ -137,7 +137,7 @@ mod tests {
     use crate::supervise::Leg;
     use crate::units::{Direction, q16};
 
-    /// Under way on the first wall.
+    /// In motion on the first wall.
     fn running() -> State {
         let mut state = State::default();
         state.mode = Mode::Run(Direction::Deploy, Leg::Cruise);

@@ -12,7 +12,6 @@ use crate::units::{Duty, MotorCommand, Q16, q16};
 use super::state::Approach;
 
 impl Controller {
-    /// Acts on the findings of a stage of the estimate.
     pub(super) fn take_findings(
         &self,
         state: &mut State,

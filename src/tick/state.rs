@@ -126,7 +126,6 @@ impl State {
         self.corner_blend_ticks = BLEND_TICKS;
     }
 
-    /// Leg of the run.
     pub(super) fn leg(&self, approaching: bool) -> Leg {
         match self.estimate.contact() {
             Contact::Both | Contact::Corner => Leg::Crossing,

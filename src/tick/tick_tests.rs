@@ -90,12 +90,12 @@ fn off_a_run_the_stage_stays_while_there_is_preload() {
         let seen = SensedState { preload_filtered: preload, ..sensed(0, 0.0, 0.3) };
         let mut state = State::default();
         (state.mode, state.stage) = (Mode::Idle, ContactStage::Rolling);
-        let told = within(&seen, |controller, pass| {
+        let events = within(&seen, |controller, pass| {
             controller.note_stage(&mut state, pass);
             pass.output.events.len()
         });
         assert_eq!(state.stage, stage, "{preload}");
-        assert_eq!(told, usize::from(stage != ContactStage::Rolling));
+        assert_eq!(events, usize::from(stage != ContactStage::Rolling));
     }
 }
 
@@ -124,7 +124,7 @@ fn only_on_a_corner_the_climb_limits_the_speed() {
 }
 
 #[test]
-fn the_duty_tells_the_load_only_at_a_steady_speed() {
+fn the_duty_shows_the_load_only_at_a_steady_speed() {
     let controller = Controller::try_build(&Rig::prototype()).expect("sound");
     let idle = BridgeCode::of(0);
     let input = Input {
@@ -134,7 +134,7 @@ fn the_duty_tells_the_load_only_at_a_steady_speed() {
         },
         ..Input::default()
     };
-    // At 20 mm/s, reached or on the way to 30, with an effort far beyond its band.
+    // At 20 mm/s, reached or accelerating to 30, with an effort far beyond its band.
     let found = |target: i32| {
         let mut state = State::default();
         state.mode = Mode::Run(Direction::Deploy, Leg::Cruise);

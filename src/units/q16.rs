@@ -87,13 +87,13 @@ impl Q16 {
         Self(self.0 >> 1)
     }
 
-    /// The whole number nearest to it, halves away from zero.
+    /// The integer nearest to it, halves away from zero.
     pub const fn round(self) -> i32 {
         let magnitude = ((self.0.unsigned_abs() >> 15) + 1) >> 1;
         if self.0 < 0 { -(magnitude as i32) } else { magnitude as i32 }
     }
 
-    /// The whole number at or below it.
+    /// The integer at or below it.
     pub const fn floor(self) -> i32 {
         self.0 >> 16
     }

@@ -25,10 +25,10 @@ use interstage::supervise::{Command, Lag};
 use interstage::tick::Entry;
 use interstage::units::MotorCommand;
 
-/// The clock is one for the whole process: one bench at a time.
+/// The process has one clock: one bench at a time.
 static CLOCK: Mutex<()> = Mutex::new(());
 
-/// Whether the task that runs has asked to be run again.
+/// Whether the running task has woken itself.
 struct Again(AtomicBool);
 
 impl Wake for Again {
@@ -148,7 +148,7 @@ impl Sensor {
         self.0.answer.get()
     }
 
-    /// One whose last bit never rests, as that of any converter.
+    /// A sensor whose last bit toggles, as that of a real converter.
     pub(crate) fn alive(code: u16) -> Self {
         let sensor = Self::new(code);
         sensor.0.alive.set(true);

@@ -5,7 +5,7 @@
 //! two have the same bytes and each is known by its name.
 
 use interstage::params::CompileError;
-use interstage::params::slots::{PAGE_BYTES, SLOT_BYTES, WORD_BYTES, place};
+use interstage::params::slots::{PAGE_BYTES, SLOT_BYTES, WORD_BYTES, slot_image};
 use interstage::rig::Rig;
 
 use crate::params::set_of;
@@ -45,7 +45,7 @@ pub fn places(scenario: &Scenario) -> Result<Vec<u8>, CompileError> {
     let mut flash = Vec::with_capacity(2 * SLOT_BYTES);
     for (name, sequence) in [(KEPT, SEQUENCE), (SPARE, SEQUENCE - 1)] {
         let set = set(name, &scenario.rig)?;
-        flash.extend(place(&set, sequence).ok_or(CompileError::Room)?);
+        flash.extend(slot_image(&set, sequence).ok_or(CompileError::Room)?);
     }
     Ok(flash)
 }

@@ -19,7 +19,6 @@ pub(super) struct HostIo {
     pub(super) pressed: Signal<Raw, Command>,
 }
 
-/// The only instance.
 pub(super) static HOST_IO: HostIo = HostIo {
     given: Mutex::new(Cell::new(Given {
         wheel_encoder: 0,
@@ -36,12 +35,10 @@ pub(super) static HOST_IO: HostIo = HostIo {
 };
 
 impl HostIo {
-    /// Inputs of the present tick.
     pub(super) fn given(&self) -> Given {
         self.given.lock(Cell::get)
     }
 
-    /// Sets the inputs of the next tick.
     pub(super) fn give(&self, given: Given) {
         self.given.lock(|place| place.set(given));
         if given.stop {
@@ -49,17 +46,14 @@ impl HostIo {
         }
     }
 
-    /// The bridges' last commands.
     pub(super) fn commands(&self) -> (MotorCommand, MotorCommand) {
         self.commands.lock(Cell::get)
     }
 
-    /// Commands the bridges.
     pub(super) fn apply(&self, drive: MotorCommand, preload: MotorCommand) {
         self.commands.lock(|place| place.set((drive, preload)));
     }
 
-    /// Whether the emergency stop has cut the bridges.
     pub(super) fn is_cut(&self) -> bool {
         self.cut.lock(Cell::get)
     }

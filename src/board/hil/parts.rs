@@ -22,10 +22,8 @@ impl WheelEncoder for Wheel {
     }
 }
 
-/// The preload sensor.
 pub(crate) type PreloadSensor = Analog;
 
-/// The compression sensor.
 pub(crate) type CompressionSensor = Analog;
 
 /// One of the two analogue sensors.

@@ -17,7 +17,6 @@ const MILLISECOND: u32 = 170_000;
 /// Time without a tick after which the host counts as gone: half of the watchdog's time-out.
 const SILENCE: u32 = 50 * MILLISECOND;
 
-/// The channels up and down.
 type Channels = (UpChannel, DownChannel);
 
 /// Waits for a host, calls `begin`, which starts the tasks, and serves the host's ticks. Before
@@ -60,7 +59,6 @@ fn count_cycles() {
     core.DWT.enable_cycle_counter();
 }
 
-/// Progress of the run.
 struct Run {
     next: Tick,
     /// The latest tick and what it gave.
@@ -105,7 +103,6 @@ impl Run {
     }
 }
 
-/// Frames over the two channels.
 struct Line {
     channels: Channels,
     reader: FrameReader,

@@ -38,7 +38,6 @@ const RING: usize = 64;
 pub(crate) struct Ring(StaticCell<[u16; RING]>);
 
 impl Ring {
-    /// An empty one.
     pub(crate) const fn new() -> Self {
         Self(StaticCell::new())
     }
@@ -50,7 +49,6 @@ struct Written(*const u16);
 // SAFETY: it points to a static that only DMA writes, and is only read.
 unsafe impl Send for Written {}
 
-/// One sensor on its converter.
 pub(crate) struct Analog<T: DefaultInstance> {
     registers: Registers,
     channel: Channel,

@@ -27,7 +27,6 @@ const SELECT_ROUNDS: u32 = 20;
 /// Polls of the bus for a frame of 512 cycles: a poll takes four at least.
 const FRAME_ROUNDS: u32 = 500;
 
-/// The sensor on its bus.
 pub(crate) struct Angle {
     _bus: Spi<'static, Blocking, Master>,
     select: Output<'static>,
@@ -69,7 +68,7 @@ impl Angle {
 
 impl AngleBus for Angle {
     async fn frame(&mut self) -> Result<AngleFrame, BusFault> {
-        // Two frames, because the answer to the last call's command is a whole
+        // Two frames, because the answer to the last call's command is a full
         // sampling period old.
         self.exchange()?;
         cortex_m::asm::delay(SELECT_ROUNDS);

@@ -91,7 +91,6 @@ impl<T: AdvancedInstance4Channel> Bridge<T> {
         }
     }
 
-    /// Whether the break input has switched the outputs off.
     fn stopped(&self) -> bool {
         !self.pwm.get_master_output_enable()
     }

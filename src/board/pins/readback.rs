@@ -15,7 +15,6 @@ const RATIO_256: u8 = 7;
 /// Their sum becomes a mean of 12 bits.
 const SHIFT: u8 = 8;
 
-/// The converter of both bridges' outputs.
 pub(crate) struct Readback {
     registers: Registers,
     _pins: [AnyAdcChannel<'static, ADC3>; 2],

@@ -9,12 +9,11 @@ use embassy_stm32::timer::qei::{Config, Qei, QeiMode};
 use interstage::hal::WheelEncoder;
 use interstage::sense::raw::EncoderCount;
 
-/// TIM5 as quadrature counter.
 pub(crate) struct Wheel(Qei<'static, TIM5>);
 
 impl Wheel {
     /// Lines A and B. Both are pulled up, so that an open-collector encoder
-    /// works as it is and a lost line reads as one that stands still.
+    /// works as it is and a lost line reads as one that does not move.
     pub(crate) fn new(
         timer: Peri<'static, TIM5>,
         a: Peri<'static, PA0>,

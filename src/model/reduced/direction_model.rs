@@ -79,7 +79,7 @@ pub(super) struct DirectionModel {
 pub(super) struct Guess {
     /// The run, Q32.
     pub(super) run: u32,
-    /// Its derivative by the mantissa of the force, of which a half octave is the whole, Q30.
+    /// Its derivative by the mantissa of the force, a half octave being 1, Q30.
     pub(super) by_force: i32,
 }
 

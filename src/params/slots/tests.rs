@@ -61,13 +61,13 @@ impl SetMemory for Flash {
     }
 
     async fn erase(&mut self, slot: Slot, page: usize) -> Result<(), FlashFault> {
-        let whole = self.operate()?;
+        let complete = self.operate()?;
         let range = page * PAGE_BYTES..(page + 1) * PAGE_BYTES;
         for at in range {
-            let bits = if whole { u64::MAX } else { self.random() };
+            let bits = if complete { u64::MAX } else { self.random() };
             self.slots[slot as usize][at] |= bits as u8;
         }
-        if whole { Ok(()) } else { Err(FlashFault) }
+        if complete { Ok(()) } else { Err(FlashFault) }
     }
 
     async fn program(
@@ -77,14 +77,14 @@ impl SetMemory for Flash {
         word: [u8; WORD_BYTES],
     ) -> Result<(), FlashFault> {
         assert!(offset.is_multiple_of(WORD_BYTES), "{offset}");
-        let whole = self.operate()?;
-        let kept = if whole { 0 } else { self.random() };
+        let complete = self.operate()?;
+        let kept = if complete { 0 } else { self.random() };
         let place = &mut self.slots[slot as usize][offset..offset + WORD_BYTES];
         assert!(place.iter().all(|byte| *byte == 0xFF), "programmed twice");
         for (index, (to, from)) in place.iter_mut().zip(word).enumerate() {
             *to = from | (kept >> (8 * index)) as u8;
         }
-        if whole { Ok(()) } else { Err(FlashFault) }
+        if complete { Ok(()) } else { Err(FlashFault) }
     }
 }
 
@@ -147,12 +147,12 @@ fn power_lost_at_any_operation_leaves_the_old_set_or_the_new() {
         for _ in 0..before {
             block_on(save(&mut flash, &old)).unwrap();
         }
-        let mut whole = flash.clone();
-        whole.operations = 0;
-        block_on(save(&mut whole, &new)).unwrap();
-        assert_eq!(name(&whole).as_deref(), Some("new"));
-        let (mut kept, mut torn_seals) = (0, 0);
-        for cut in 0..whole.operations {
+        let mut uncut = flash.clone();
+        uncut.operations = 0;
+        block_on(save(&mut uncut, &new)).unwrap();
+        assert_eq!(name(&uncut).as_deref(), Some("new"));
+        let (mut kept, mut torn_headers) = (0, 0);
+        for cut in 0..uncut.operations {
             for seed in 1..=3 {
                 let mut flash = flash.clone();
                 flash.left = Some(cut);
@@ -161,8 +161,8 @@ fn power_lost_at_any_operation_leaves_the_old_set_or_the_new() {
                 let mut after = flash.restart();
                 match name(&after).as_deref() {
                     Some("old") => kept += 1,
-                    // The last operation may have been as good as whole.
-                    Some("new") if cut + 1 >= whole.operations => torn_seals += 1,
+                    // The last operation may have been complete in effect.
+                    Some("new") if cut + 1 >= uncut.operations => torn_headers += 1,
                     other => panic!("cut at {cut}: {other:?}"),
                 }
                 // And the next save does it.
@@ -170,7 +170,7 @@ fn power_lost_at_any_operation_leaves_the_old_set_or_the_new() {
                 assert_eq!(name(&after).as_deref(), Some("new"), "cut at {cut}");
             }
         }
-        assert!(kept > 3 * (whole.operations - 2), "{kept}, {torn_seals}");
+        assert!(kept > 3 * (uncut.operations - 2), "{kept}, {torn_headers}");
     }
 }
 
@@ -281,7 +281,7 @@ fn a_place_of_earlier_firmware_without_a_fold_is_read() {
     assert_eq!(name(&flash).as_deref(), Some("old"));
     block_on(save(&mut flash, &self::set("new"))).unwrap();
     assert_eq!(name(&flash).as_deref(), Some("new"));
-    // Out of force, and damaged: its number still tells.
+    // Out of force, and damaged: its number still shows that.
     flash.slots[0][500] ^= 1;
     assert_eq!(name(&flash).as_deref(), Some("new"));
 }

@@ -52,7 +52,7 @@ impl Start<'_> {
             }
             for (cell, fit) in row.iter_mut().zip(fits) {
                 let found = fit.solve();
-                // Neither the whole nor a row of it reaches twice the longest run.
+                // Neither the sum nor a row of it reaches twice the longest run.
                 let most = |weights: &[f64; 10], from: usize| {
                     let terms = found.iter().zip(weights).skip(from);
                     terms.map(|(c, weight)| libm::fabs(c * weight)).sum::<f64>()
