@@ -84,7 +84,7 @@ pub(crate) fn store(machine: &mut Machine, scenario: &Scenario) -> Result<(), Ru
         return Ok(());
     }
     let set = set_of(&scenario.preset, &scenario.rig)?;
-    let place = slots::place(&set, 1).ok_or(CompileError::Room)?;
+    let place = slots::slot_image(&set, 1).ok_or(CompileError::Room)?;
     machine.poke(PARAMETER_SETS, &place).map_err(BenchError::from)?;
     Ok(())
 }

@@ -377,7 +377,9 @@ fn what_a_start_does_first_needs_no_floating_point_unit() {
     let board = Board::idle();
     let image = board.bench.machine().image();
     let mut looked_at = 0;
-    for name in ["__pre_init", "board::image::sums", "interstage::restart::page::word", "Reset"] {
+    for name in
+        ["__pre_init", "board::image::checksums", "interstage::restart::page::word", "Reset"]
+    {
         for function in image.functions.iter().filter(|function| function.name.contains(name)) {
             let range = function.range.start - 0x0800_0000..function.range.end - 0x0800_0000;
             let code = &image.flash[range.start as usize..range.end as usize];

@@ -152,7 +152,7 @@ fn old_set(name: &str, rig: &Rig) -> Vec<u8> {
 
 /// Flash with this set in its first place.
 fn flash_with(set: &[u8], path: &Path) -> Vec<u8> {
-    let mut flash = slots::place(set, 7).expect("it fits").to_vec();
+    let mut flash = slots::slot_image(set, 7).expect("it fits").to_vec();
     flash.resize(2 * slots::SLOT_BYTES, 0xFF);
     std::fs::write(path, &flash).expect("written");
     flash
