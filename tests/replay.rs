@@ -208,7 +208,7 @@ fn every_recorded_run_is_replayed_to_the_bit() {
         // A wheel that slips on a corner; a late and weak preload; twice the load; late ticks.
         ("slip", 1, None),
         ("soft", 2, None),
-        ("load", 3, Some(Deploy)),
+        ("load", 3, Some(Retract)),
         ("late", 0, None),
         // Preload sensor stuck, compression sensor too high, encoder losing counts, arm angle
         // jumping.
