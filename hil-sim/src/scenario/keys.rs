@@ -32,8 +32,8 @@ pub struct KeyInfo {
 pub(super) enum Kind {
     /// A finite number.
     Number,
-    /// A whole number, not negative.
-    Whole,
+    /// An integer, not negative.
+    Integer,
     /// A list of at most so many numbers.
     Numbers(usize),
     /// One of these words.
@@ -55,20 +55,17 @@ impl Kind {
             ("run.faults", _) => Self::Faults,
             ("drive.modes_hz", _) => Self::Numbers(interstage::rig::MAX_MODES),
             (_, Value::Array(_)) => Self::Numbers(interstage::rig::MAX_STEPS),
-            (_, Value::Integer(_)) => Self::Whole,
+            (_, Value::Integer(_)) => Self::Integer,
             _ => Self::Number,
         }
     }
 
     /// Half a sentence: what the key takes.
     pub(super) fn expected(self, path: &str) -> String {
-        let unit = match unit(path) {
-            "" => String::new(),
-            unit => format!(" in {unit}"),
-        };
+        let unit = in_unit(path);
         match self {
             Self::Number => format!("a number{unit}"),
-            Self::Whole => "a whole number, 0 or more".to_owned(),
+            Self::Integer => "a whole number, 0 or more".to_owned(),
             Self::Numbers(most) => format!("a list of at most {most} numbers{unit}"),
             Self::Word(words) => {
                 words.iter().map(|w| format!("\"{w}\"")).collect::<Vec<_>>().join(" or ")
@@ -107,8 +104,16 @@ const UNITS: [(&str, &str); 18] = [
 ];
 
 /// Unit that the end of the key's name says; empty if none.
-pub(super) fn unit(path: &str) -> &'static str {
+fn unit(path: &str) -> &'static str {
     UNITS.iter().find(|(end, _)| path.ends_with(end)).map_or("", |(_, unit)| unit)
+}
+
+/// The unit as half a sentence; empty if there is none.
+pub(super) fn in_unit(path: &str) -> String {
+    match unit(path) {
+        "" => String::new(),
+        unit => format!(" in {unit}"),
+    }
 }
 
 /// The key's name without its unit.
@@ -158,17 +163,12 @@ fn descriptions() -> Vec<(String, String)> {
 /// Every key of the scenario in `table`, in the order of declaration.
 pub(super) fn list(table: &Table) -> Vec<KeyInfo> {
     let values = leaves(table);
-    let described = descriptions().into_iter().filter_map(|(key, description)| {
+    let info = |(key, description): (String, String)| {
         let (_, value) = values.iter().find(|(name, _)| *name == key)?;
-        Some(KeyInfo {
-            unit: unit(&key),
-            value: (*value).clone(),
-            expected: Kind::of(&key, value).expected(&key),
-            description,
-            key,
-        })
-    });
-    described.collect()
+        let expected = Kind::of(&key, value).expected(&key);
+        Some(KeyInfo { unit: unit(&key), value: (*value).clone(), expected, description, key })
+    };
+    descriptions().into_iter().filter_map(info).collect()
 }
 
 #[cfg(test)]

@@ -68,7 +68,7 @@ fn lists_and_anomalies_can_be_set_on_the_command_line() {
     .map(str::to_owned);
     let scenario = Scenario::resolve(None, None, &sets).unwrap();
     assert_eq!(scenario.rig.rig.step_positions_mm.as_slice(), [20.0, 42.0]);
-    assert_eq!(scenario.true_steps_mm(), [20.0, 40.0]);
+    assert_eq!(scenario.true_steps(), [(20.0, 0.0), (40.0, 0.0)]);
 }
 
 #[test]
