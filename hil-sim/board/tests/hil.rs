@@ -61,7 +61,7 @@ fn a_run_in_the_loop_is_the_run_in_software_bit_for_bit() {
         assert_eq!(lines(&board), lines(&software));
         // The log is the board's own, and replays.
         let run = Run::of_stream(&board.stream);
-        assert!(run.is_whole(), "{:?}", run.marks);
+        assert!(run.is_complete(), "{:?}", run.marks);
         assert!(replay(&run, &Rig::prototype()).expect("a sound rig").is_equal());
         // Nothing but the host's side was driven, and the watchdog never bit.
         bridges_have_no_power(&mut port);
@@ -153,7 +153,7 @@ fn told(reads: impl Fn(u32) -> bool) -> (Vec<Taken>, Vec<u8>) {
 fn a_reader_that_stalls_or_is_not_there_changes_no_bit_of_the_control_trace() {
     let (read, log) = told(|_| true);
     let run = Run::of_stream(&log);
-    assert!(run.is_whole() && run.rows.len() > 6000, "{:?}", run.marks);
+    assert!(run.is_complete() && run.rows.len() > 6000, "{:?}", run.marks);
     let (absent, nothing) = told(|_| false);
     assert!(nothing.is_empty() && absent == read, "absent");
     let (stalled, part) = told(|tick| tick % 1000 < 300);

@@ -67,7 +67,7 @@ fn every_tick_of_a_run_is_logged_and_runs_again_on_this_host() {
     for sets in [&["run.seed=1"][..], &["run.seed=1", "run.direction=retract"]] {
         let ran = run::run(elf(), &scenario(sets), true, |_, _| {}).expect("a run");
         let run = Run::of_stream(&ran.recording.stream);
-        assert!(run.is_whole(), "{:?}", run.marks);
+        assert!(run.is_complete(), "{:?}", run.marks);
         assert_eq!(run.ledger.len(), 3);
         let header = run.header.clone().expect("it says who it is");
         assert_eq!((header.rig.as_str(), header.build.len()), ("prototype", 16));

@@ -10,6 +10,7 @@ use probe_rs::rtt::{Error as RttError, Rtt, ScanRegion};
 use probe_rs::{Core, MemoryInterface, Permissions, Session};
 
 use super::{Port, PortError};
+use crate::files::with_causes;
 
 /// The chip.
 const CHIP: &str = "STM32G474RETx";
@@ -49,11 +50,13 @@ impl RealPort {
                     .open(selector)
                     .map_err(|error| PortError::Absent(format!("{SELECTOR}={text}: {error}")))?
             }
-            Err(_) => only(&lister.list_all())?.open().map_err(|error| absent(&said(&error)))?,
+            Err(_) => {
+                only(&lister.list_all())?.open().map_err(|error| absent(&with_causes(&error)))?
+            }
         };
         let session = probe
             .attach(CHIP, Permissions::default())
-            .map_err(|error| PortError::Gone(said(&error)))?;
+            .map_err(|error| PortError::Gone(with_causes(&error)))?;
         Ok(Self { session, rtt: None, block })
     }
 
@@ -67,7 +70,7 @@ impl RealPort {
         options.verify = true;
         let loader = ElfLoader(ElfOptions::default());
         download_file_with_options(&mut self.session, elf, loader, options)
-            .map_err(|error| PortError::Board(format!("flashing failed: {}", said(&error))))
+            .map_err(|error| PortError::Board(format!("flashing failed: {}", with_causes(&error))))
     }
 
     /// Does something with core and channels, which are looked for first; `otherwise` if
@@ -119,19 +122,8 @@ fn only(probes: &[DebugProbeInfo]) -> Result<&DebugProbeInfo, PortError> {
     }
 }
 
-/// An error and its causes, in one line.
-fn said(error: &dyn std::error::Error) -> String {
-    let mut text = error.to_string();
-    let mut source = error.source();
-    while let Some(cause) = source {
-        text += &format!(": {cause}");
-        source = cause.source();
-    }
-    text
-}
-
 fn gone(error: impl std::error::Error + 'static) -> PortError {
-    PortError::Gone(said(&error))
+    PortError::Gone(with_causes(&error))
 }
 
 fn missing(channel: u32) -> PortError {

@@ -13,8 +13,8 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::{
-    Controller, CrossingLine, Item, LedgerLine, Recording, Summary, Tick, TrueState, json, text,
-    timed,
+    Controller, CrossingLine, Decoder, Item, LedgerLine, Recording, Summary, Tick, TrueState, json,
+    pieces, text,
 };
 use crate::files::{Failure, FileError, atomic_write};
 
@@ -193,7 +193,7 @@ impl<W: Write + Seek> McapFile<W> {
 /// from boot.
 ///
 /// # Errors
-/// [`FileError::File`] with the reason.
+/// [`FileError`] with the reason.
 pub fn write_mcap(recording: &Recording, path: &Path) -> Result<(), FileError> {
     atomic_write(path, |out| {
         let mut file = McapFile::new(out)?;
@@ -210,8 +210,16 @@ pub fn write_mcap(recording: &Recording, path: &Path) -> Result<(), FileError> {
         for line in &recording.summary.crossings {
             all.push((line.lift_s, Topic::Crossing, bytes(line)?));
         }
-        let frames = timed(&recording.stream);
-        all.extend(frames.map(|(t_s, frame)| (t_s, Topic::Frames, frame.to_vec())));
+        // A frame is of the time of the newest tick up to it.
+        let (mut decoder, mut t_s) = (Decoder::new(), 0.0);
+        for frame in pieces(&recording.stream) {
+            decoder.read(frame, &mut |item| {
+                if let Item::Tick(record, _) = item {
+                    t_s = f64::from(record.at()) * 1e-3;
+                }
+            });
+            all.push((t_s, Topic::Frames, frame.to_vec()));
+        }
         // What is of one time keeps its order.
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
         for (t_s, topic, body) in &all {

@@ -126,11 +126,7 @@ impl Run {
             Item::Ledger(line) => self.ledger.push(*line),
             Item::Mark(mark) => {
                 if *mark == Mark::Restart {
-                    self.boots.push(Boot {
-                        events: self.events.len(),
-                        plans: self.plans.len(),
-                        requests: self.requests.len(),
-                    });
+                    self.boots.push(self.end());
                 }
                 self.marks.push((self.rows.len(), *mark));
             }
@@ -142,12 +138,8 @@ impl Run {
     #[must_use]
     pub fn since_boot(&self, boot: usize) -> Since<'_> {
         let from = boot.checked_sub(1).and_then(|before| self.boots.get(before));
-        let (from, to) = (from.copied().unwrap_or_default(), self.boots.get(boot).copied());
-        let to = to.unwrap_or(Boot {
-            events: self.events.len(),
-            plans: self.plans.len(),
-            requests: self.requests.len(),
-        });
+        let from = from.copied().unwrap_or_default();
+        let to = self.boots.get(boot).copied().unwrap_or_else(|| self.end());
         Since {
             events: self.events.get(from.events..to.events).unwrap_or_default(),
             plans: self.plans.get(from.plans..to.plans).unwrap_or_default(),
@@ -155,9 +147,15 @@ impl Run {
         }
     }
 
+    /// What has come so far.
+    fn end(&self) -> Boot {
+        let Self { events, plans, requests, .. } = self;
+        Boot { events: events.len(), plans: plans.len(), requests: requests.len() }
+    }
+
     /// Whether nothing is known to be missing.
     #[must_use]
-    pub fn is_whole(&self) -> bool {
+    pub fn is_complete(&self) -> bool {
         self.marks.is_empty()
     }
 }

@@ -11,14 +11,9 @@ use crate::session::{self, Session};
 /// A source that failed.
 #[derive(Debug, thiserror::Error)]
 pub enum SourceError {
-    /// Its bytes cannot be read.
-    #[error("{name}: {source}")]
-    Read {
-        /// What was read.
-        name: String,
-        /// Why.
-        source: std::io::Error,
-    },
+    /// The bytes of the input of this name cannot be read.
+    #[error("{0}: {1}")]
+    Read(String, std::io::Error),
     /// The run in software cannot be made.
     #[error(transparent)]
     Run(#[from] session::RunError),
@@ -92,9 +87,8 @@ impl Bytes {
 impl Source for Bytes {
     fn read(&mut self) -> Result<Option<Vec<u8>>, SourceError> {
         let mut bytes = vec![0; 1 << 16];
-        let read = self.input.read(&mut bytes);
-        let length =
-            read.map_err(|source| SourceError::Read { name: self.name.clone(), source })?;
+        let length = self.input.read(&mut bytes);
+        let length = length.map_err(|error| SourceError::Read(self.name.clone(), error))?;
         bytes.truncate(length);
         Ok((length > 0).then_some(bytes))
     }
@@ -184,7 +178,7 @@ mod tests {
             bytes.extend(part);
         }
         let run = Run::of_stream(&bytes);
-        assert!(run.is_whole());
+        assert!(run.is_complete());
         let last = run.rows.last().and_then(Controller::mode).unwrap();
         assert!(matches!(last, Mode::Complete(_)), "{last:?}");
         assert_eq!(run.ledger.len(), 3);

@@ -14,14 +14,14 @@ use super::{
     Controller, Counts, Decoder, Header, Item, Mark, Recording, Tick, Topic, messages, pieces,
     write_mcap,
 };
-use crate::files::{Failure, FileError, atomic_write, make_directory};
+use crate::files::{Failure, FileError, atomic_write, make_directory, with_causes};
 
 /// Ticks between two hand-overs to the system.
 const FLUSH_TICKS: u64 = 1000;
 
 /// Why writing came to an end. What had been handed over before stays readable.
 #[derive(Debug, thiserror::Error)]
-#[error("writing stopped after {ticks} ticks, of which {kept} are safe: {}", chain(&**source))]
+#[error("writing stopped after {ticks} ticks, of which {kept} are safe: {}", with_causes(&**source))]
 pub struct WriteError {
     /// Ticks that had come.
     pub ticks: u64,
@@ -29,14 +29,6 @@ pub struct WriteError {
     pub kept: u64,
     /// What the system said.
     source: Failure,
-}
-
-/// An error and its causes, the system's own last.
-fn chain(error: &(dyn std::error::Error + 'static)) -> String {
-    let causes = std::iter::successors(Some(error), |error| error.source());
-    let mut texts: Vec<String> = causes.map(ToString::to_string).collect();
-    texts.dedup();
-    texts.join(": ")
 }
 
 /// Adds a row. Numbers are written so that reading gives the same bits; what is unknown is
@@ -51,7 +43,7 @@ fn write_row<W: Write>(csv: &mut csv::Writer<W>, tick: &Tick) -> csv::Result<()>
 /// Writes the rows of `recording` to `path`, below the names of the columns.
 ///
 /// # Errors
-/// [`FileError::File`] with the reason.
+/// [`FileError`] with the reason.
 pub fn write_csv(recording: &Recording, path: &Path) -> Result<(), FileError> {
     atomic_write(path, |out| {
         let mut csv = csv::Writer::from_writer(out);
@@ -309,16 +301,16 @@ mod tests {
     fn both_files_give_back_what_came() {
         let (stream, disks) = (stream(), (Disk::of(u64::MAX), Disk::of(u64::MAX)));
         let counts = write(&stream, (&disks.0, &disks.1)).unwrap();
-        let (whole, mcap, csv) =
+        let (run, mcap, csv) =
             (Run::of_stream(&stream), read(&disks.0.content()), read(&disks.1.content()));
-        assert_eq!(counts, whole.counts);
-        assert_eq!(csv.rows, whole.rows);
+        assert_eq!(counts, run.counts);
+        assert_eq!(csv.rows, run.rows);
         assert_eq!(mcap.parameters.as_deref(), Some("[run]\nseed = 0\n"));
-        assert_eq!(Run { parameters: None, ..mcap }, whole);
+        assert_eq!(Run { parameters: None, ..mcap }, run);
     }
 
     #[test]
-    fn a_full_disk_is_told_and_what_was_written_stays_readable() {
+    fn a_full_disk_is_reported_and_what_was_written_stays_readable() {
         let stream = stream();
         for (mcap, csv) in [(400_000, u64::MAX), (u64::MAX, 500_000)] {
             let disks = (Disk::of(mcap), Disk::of(csv));
@@ -338,10 +330,10 @@ mod tests {
     fn a_file_cut_anywhere_is_read_up_to_there() {
         let (stream, disks) = (stream(), (Disk::of(u64::MAX), Disk::of(u64::MAX)));
         write(&stream, (&disks.0, &disks.1)).unwrap();
-        let whole = disks.0.content();
+        let file = disks.0.content();
         let mut before = 0;
         for tenth in 4..10 {
-            let rows = read(&whole[..whole.len() * tenth / 10]).rows.len();
+            let rows = read(&file[..file.len() * tenth / 10]).rows.len();
             assert!(rows >= before && rows > 500, "{rows} rows of {tenth} tenths");
             before = rows;
         }
@@ -349,7 +341,7 @@ mod tests {
     }
 
     #[test]
-    fn time_in_the_file_never_goes_back_even_if_the_target_starts_anew() {
+    fn time_in_the_file_never_goes_back_even_if_the_target_restarts() {
         let disks = (Disk::of(u64::MAX), Disk::of(u64::MAX));
         let twice = [stream(), stream()].concat();
         let counts = write(&twice, (&disks.0, &disks.1)).unwrap();
