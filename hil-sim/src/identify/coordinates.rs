@@ -38,7 +38,7 @@ pub const DRIVE: usize = 11;
 /// mm, so that a wheel of another radius meets them at the same turn; then all heights, mm.
 pub const STEPS: usize = 12;
 
-/// How little is known of what only the logs can tell: a factor of two (one standard
+/// Deviation of what only the logs can show: a factor of two (one standard
 /// deviation), and lengths, forces and angles beyond any tolerance.
 const UNKNOWN_LN: f64 = 0.7;
 const UNKNOWN_GEARBOX_N: f64 = 10.0;
@@ -173,7 +173,7 @@ impl Coordinates {
         }
     }
 
-    /// Way over way at the nominal radius.
+    /// Travel over the travel at the nominal radius.
     #[must_use]
     pub fn scale(&self, x: &[f64]) -> f64 {
         x[RADIUS] / self.nominal.ring.radius_mm

@@ -76,7 +76,6 @@ impl<M: Model> LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_, M> {
 /// # Errors
 /// [`IdentifyError::NoFit`] if it does not settle or the model has no answer on the way.
 pub fn minimise<M: Model>(model: &M, start: &[f64]) -> Result<Fitted<M::At>, IdentifyError> {
-    let no_fit = |why: String| IdentifyError::NoFit { why };
     let problem = Problem { model, x: DVector::from_column_slice(start), at: model.at(start) };
     let solver = LevenbergMarquardt::new()
         .with_ftol(SETTLED)
@@ -87,15 +86,13 @@ pub fn minimise<M: Model>(model: &M, start: &[f64]) -> Result<Fitted<M::At>, Ide
     let settled = report.termination.was_successful()
         || matches!(report.termination, TerminationReason::NoImprovementPossible(_));
     if !settled {
-        return Err(no_fit(format!("{:?}", report.termination)));
+        return Err(IdentifyError::NoFit(format!("{:?}", report.termination)));
     }
-    let jacobian = problem.jacobian();
-    let residuals = problem.residuals();
-    match (jacobian, residuals, problem.at) {
+    match (problem.jacobian(), problem.residuals(), problem.at) {
         (Some(jacobian), Some(residuals), Some(at)) => {
             Ok(Fitted { x: problem.x.as_slice().to_vec(), at, residuals, jacobian })
         }
-        _ => Err(no_fit("the model has no answer at its end".into())),
+        _ => Err(IdentifyError::NoFit("the model has no answer at its end".into())),
     }
 }
 
@@ -106,9 +103,8 @@ pub fn minimise<M: Model>(model: &M, start: &[f64]) -> Result<Fitted<M::At>, Ide
 pub fn covariance(jacobian: &DMatrix<f64>) -> Result<DMatrix<f64>, IdentifyError> {
     let normal = jacobian.transpose() * jacobian;
     let inverse = normal.cholesky().map(|root| root.inverse());
-    inverse.ok_or_else(|| IdentifyError::NoFit {
-        why: "the logs do not determine the parameters".into(),
-    })
+    let why = "the logs do not determine the parameters";
+    inverse.ok_or_else(|| IdentifyError::NoFit(why.into()))
 }
 
 /// The covariance, each variance no less than what blocks of residuals that err alike

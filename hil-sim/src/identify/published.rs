@@ -141,7 +141,7 @@ pub fn fit(
 pub fn stated(scenario: &Scenario, fineness: (usize, f64)) -> Result<Tread, IdentifyError> {
     let gaps = Gaps::of(scenario, fineness);
     let at = gaps.at(&gaps.start);
-    let at = at.ok_or_else(|| IdentifyError::NoFit { why: "a crossing has no balance".into() })?;
+    let at = at.ok_or_else(|| IdentifyError::NoFit("a crossing has no balance".into()))?;
     Ok(tread(&gaps.start, &at))
 }
 

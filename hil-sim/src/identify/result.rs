@@ -4,6 +4,7 @@
 use std::f64::consts::TAU as TURN;
 
 use serde::Serialize;
+use toml::{Table, Value};
 
 use super::IdentifyError;
 use super::actuator::{self, Actuator};
@@ -23,7 +24,7 @@ pub const NORMAL_95: f64 = 1.96;
 /// Part of the prior deviation that the logs must leave for a parameter to count as
 /// identified: where nothing was known, and where a tolerance was.
 const LEAVES: (f64, f64) = (0.1, 0.5);
-/// Variance of a whole number of ticks that stands for any dead time, ms^2.
+/// Variance of rounding a dead time to ticks, ms^2.
 const TICK_VARIANCE: f64 = 1.0 / 12.0;
 /// Evidence of a parameter that has none.
 const NOTHING: &str = "not in these logs";
@@ -111,12 +112,9 @@ pub fn identify(records: &[Record], scenario: &Scenario) -> Result<Identificatio
     for record in records {
         let (its, ours) = (&record.scenario.rig, &scenario.rig);
         if its.rig != ours.rig || its.sense != ours.sense || its.drive != ours.drive {
-            return Err(IdentifyError::Log {
-                name: record.name.clone(),
-                why: "its sleeve, wheel, drive or sensors are not those of the rig that is \
-                      identified"
-                    .into(),
-            });
+            let why = "its sleeve, wheel, drive or sensors are not those of the rig that is \
+                       identified";
+            return Err(IdentifyError::Log(record.name.clone(), why.to_owned()));
         }
     }
     let coordinates = Coordinates::of(scenario);
@@ -297,10 +295,10 @@ impl Report<'_> {
 
     fn notes(&self, parameters: &[Parameter]) -> Vec<String> {
         let trajectories = self.contact.trajectories.iter();
-        let most = trajectories.map(|t| t.most_utilisation()).fold(0.0, f64::max);
+        let most = trajectories.map(|t| t.most_utilisation).fold(0.0, f64::max);
         let mut notes = vec![format!(
             "friction: the climbs used {most:.2}, so that it is at least that; the rest is what \
-             their creep tells, given plant.elastic_creep"
+             their creep shows, given plant.elastic_creep"
         )];
         notes.extend(self.runs.iter().filter(|run| run.traces.slips).map(|run| {
             let name = &run.name;
@@ -318,40 +316,29 @@ impl Report<'_> {
 
 /// The scenario with what was identified in it.
 fn updated(scenario: &Scenario, parameters: &[Parameter]) -> Scenario {
-    let mut scenario = scenario.clone();
-    let rig = &mut scenario.rig;
+    let mut table = Table::try_from(scenario).expect("a scenario is always TOML");
     let mut heights = Vec::new();
-    for parameter in parameters.iter().filter(|parameter| parameter.identified) {
-        let value = parameter.value;
-        let (key, index) = match parameter.name.split_once('[') {
-            Some((key, index)) => (key, index.trim_end_matches(']').parse().unwrap_or(0)),
-            None => (parameter.name.as_str(), 0usize),
-        };
-        match key {
-            "tread.k_inf_pa_per_m" => rig.tread.k_inf_pa_per_m = value,
-            "tread.stiffening" => rig.tread.stiffening = value,
-            "tread.tau_s" => rig.tread.tau_s = value,
-            "plant.mu" => rig.plant.mu = value,
-            "plant.elastic_creep" => rig.plant.elastic_creep = value,
-            "plant.top_load_n" => rig.plant.top_load_n = value,
-            "rig.wheel_radius_mm" => rig.rig.wheel_radius_mm = value,
-            "sense.angle_zero_code" => rig.sense.angle_zero_code = value,
-            "preload.delay_s" => rig.preload.delay_s = value,
-            "preload.lag_s" => rig.preload.lag_s = value,
-            "preload.slew_n_per_s" => rig.preload.slew_n_per_s = value,
-            "preload.spring_n_per_mm" => rig.preload.spring_n_per_mm = value,
-            "rig.step_height_mm" => heights.push(value),
-            "rig.step_positions_mm" => {
-                if let Some(position) = rig.rig.step_positions_mm.get_mut(index.wrapping_sub(1)) {
-                    *position = value;
-                }
+    for Parameter { name, value, .. } in parameters.iter().filter(|p| p.identified) {
+        // What is no key of a scenario has no section.
+        let Some((section, name)) = name.split_once('.') else { continue };
+        let (name, index) = name.split_once('[').unwrap_or((name, ""));
+        if name == "step_height_mm" {
+            heights.push(value);
+        }
+        let index = index.trim_end_matches(']').parse().ok().and_then(|i: usize| i.checked_sub(1));
+        match (table.get_mut(section).and_then(|keys| keys.get_mut(name)), index) {
+            (Some(Value::Array(list)), Some(index)) => {
+                list.get_mut(index).into_iter().for_each(|place| *place = (*value).into());
             }
+            (Some(place), None) => *place = (*value).into(),
             _ => {}
         }
     }
+    let mut scenario: Scenario = table.try_into().expect("numbers replace numbers");
     // A scenario has one height for all steps.
     if !heights.is_empty() {
-        rig.rig.step_height_mm = heights.iter().sum::<f64>() / heights.len() as f64;
+        scenario.rig.rig.step_height_mm =
+            heights.iter().copied().sum::<f64>() / heights.len() as f64;
     }
     scenario
 }
@@ -363,7 +350,7 @@ impl Identification {
         self.parameters.iter().find(|parameter| parameter.name == name)
     }
 
-    /// The scenario file: what was identified stands in it, with its interval above.
+    /// The scenario file: the identified values, with their intervals in a comment above.
     #[must_use]
     pub fn to_toml(&self) -> String {
         let mut text = String::from("# Identified from logs; 95 % intervals:\n");
@@ -372,7 +359,8 @@ impl Identification {
                 text += &format!("#   {} = {} ({low} to {high}) {}\n", p.name, p.value, p.unit);
             }
         }
-        text += "# One height stands for all steps; sensors' zeros are taken anew at each start.\n";
+        text +=
+            "# One height is that of all steps; sensors' zeros are taken again at each start.\n";
         text + "\n" + &self.scenario.to_toml()
     }
 }
@@ -410,15 +398,15 @@ mod tests {
         assert_eq!(after.rig.rig.step_positions_mm[1], 40.25);
         assert_eq!(after.rig.rig.step_positions_mm[0], before.rig.rig.step_positions_mm[0]);
         assert!((after.rig.rig.step_height_mm - 4.05).abs() < 1e-12);
-        let whole = Identification {
+        let found = Identification {
             parameters: parameters.to_vec(),
             residuals: Vec::new(),
             degrees_of_freedom: 1,
             notes: Vec::new(),
             scenario: after.clone(),
         };
-        let read = Scenario::parse("identified.toml", &whole.to_toml(), &[]).unwrap();
+        let read = Scenario::parse("identified.toml", &found.to_toml(), &[]).unwrap();
         assert_eq!(read, after);
-        assert!(whole.to_toml().contains("tread.tau_s = 0.2 (0.1 to 0.3"));
+        assert!(found.to_toml().contains("tread.tau_s = 0.2 (0.1 to 0.3"));
     }
 }

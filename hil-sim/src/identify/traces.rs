@@ -113,7 +113,7 @@ impl Traces {
     /// # Errors
     /// [`IdentifyError::Log`] if the wheel was never pressed or never driven.
     pub fn of(record: &Record) -> Result<Self, IdentifyError> {
-        let bad = |why: &str| IdentifyError::Log { name: record.name.clone(), why: why.into() };
+        let bad = |why: &str| IdentifyError::Log(record.name.clone(), why.into());
         let samples = &record.samples;
         let pressed = samples.iter().position(|s| s.pretightener_on);
         let start = pressed.ok_or_else(|| bad("the pre-tightener was never on"))?;
@@ -183,8 +183,8 @@ impl Traces {
     fn bin(&mut self, record: &Record, moving: usize) {
         let (samples, rig) = (&record.samples, &record.scenario.rig);
         let speed = |ticks: &Range<usize>| {
-            let way = self.turn_rad[ticks.end - 1] - self.turn_rad[ticks.start];
-            way / ((ticks.len() - 1) as f64 * TICK_S)
+            let turn = self.turn_rad[ticks.end - 1] - self.turn_rad[ticks.start];
+            turn / ((ticks.len() - 1) as f64 * TICK_S)
         };
         let radius = rig.rig.wheel_radius_mm;
         let starting = |ticks: &Range<usize>| ticks.start < moving + STARTING && ticks.end > moving;
@@ -241,7 +241,7 @@ impl Traces {
     }
 }
 
-/// Whole bins of a span.
+/// The complete bins of a span.
 fn ranges(span: &Range<usize>, length: usize) -> impl Iterator<Item = Range<usize>> + use<> {
     let (start, count) = (span.start, span.len() / length);
     (0..count).map(move |i| start + i * length..start + (i + 1) * length)
@@ -328,16 +328,17 @@ mod tests {
     }
 
     proptest! {
-        /// Known to a third of a count at any speed of the drive, either way. At a count a tick
-        /// the edges keep their place within the tick, and nothing tells it: half a count.
+        /// Known to a third of a count at any speed of the drive, in both directions. At a
+        /// count a tick the edges keep their place within the tick, which no reading shows:
+        /// half a count.
         #[test]
         fn the_turn_is_known_finer_than_a_count(per_s in 100.0f64..1600.0, back in any::<bool>()) {
             let sign = if back { -1.0 } else { 1.0 };
-            let way = |t: f64| sign * per_s * (t - 0.05 * (1.0 - (-t / 0.05).exp()));
-            let samples = turning(1500, way);
+            let travel = |t: f64| sign * per_s * (t - 0.05 * (1.0 - (-t / 0.05).exp()));
+            let samples = turning(1500, travel);
             let turn = turn(&samples, 100);
             let square: f64 = (400..1400)
-                .map(|n| (turn[n] - way((n as f64 - 100.0) * TICK_S)).powi(2))
+                .map(|n| (turn[n] - travel((n as f64 - 100.0) * TICK_S)).powi(2))
                 .sum();
             let off = (square / 1000.0).sqrt();
             let drifts = (per_s * TICK_S - 1.0).abs() * 1000.0;
@@ -370,7 +371,7 @@ mod tests {
     }
 
     #[test]
-    fn a_log_that_tells_nothing_is_refused() {
+    fn a_log_without_information_is_refused() {
         let refused = |samples: Vec<Sample>| {
             let ticked = samples.into_iter().enumerate().map(|(n, s)| (n as u32, s));
             let record = Record::new("b", Scenario::default(), ticked).unwrap();
