@@ -10,13 +10,15 @@ mod line;
 use interstage::params::{CompileError, MAX_SET, ParameterSet, SCHEMA, SetError, compile};
 use interstage::rig::Rig;
 
+use crate::files::FileError;
+
 pub use file::SetFile;
 pub use line::{Client, Wire};
 
 /// What went wrong. Each is one line.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    /// A file could not be read or written.
+    /// A file could not be read, or the emulated board's flash written.
     #[error("{path}: {source}")]
     File {
         /// The file.
@@ -24,6 +26,9 @@ pub enum StoreError {
         /// Why.
         source: std::io::Error,
     },
+    /// A file could not be written.
+    #[error(transparent)]
+    Write(#[from] FileError),
     /// What lies there is no set.
     #[error("{place}: {source}")]
     Set {

@@ -113,7 +113,7 @@ impl FaultySensor {
         let first = *self.first.get_or_insert(self.last.map_or(truth, |(_, code)| code));
         let given = match self.kind {
             Kind::Stuck => first,
-            // The counter has no zero of its own: it goes wrong from where it stood.
+            // The counter has no zero of its own: it goes wrong from where it was.
             Kind::Gain if self.target == Target::Encoder => {
                 first + (truth - first) * self.magnitude
             }
@@ -177,46 +177,40 @@ impl FaultySensor {
         }
     }
 
+    /// Puts in the code nearest to this number.
     fn write(&self, frame: &mut SensorFrame, code: f64) {
-        let bridge = AdcCode::new(code.round().clamp(0.0, SPAN) as u16);
-        let output = BridgeCode::new(code.round().clamp(0.0, BRIDGE.0) as u16);
-        match self.target {
-            Target::PreloadSensor => put(&mut frame.preload_sensor, bridge),
-            Target::CompressionSensor => put(&mut frame.compression_sensor, bridge),
+        let most = if self.target.is_readback() { BRIDGE.0 } else { SPAN };
+        let code = match self.target {
             Target::Angle => {
                 let bits = (code.round() as i64 & 0x3fff) as u16;
-                let parity = (bits.count_ones() as u16 & 1) << 15;
-                put(&mut frame.arm_angle, AngleFrame::new(bits | parity));
+                bits | (bits.count_ones() as u16 & 1) << 15
             }
-            Target::Readback | Target::DriveReadback | Target::PretightenerReadback => {
-                self.put_output(frame, output);
-            }
-            _ => put(&mut frame.wheel_encoder, EncoderCount::new(code.floor() as i64 as u16)),
-        }
+            Target::Encoder => code.floor() as i64 as u16,
+            _ => code.round().clamp(0.0, most) as u16,
+        };
+        self.put(frame, code);
     }
 
-    /// Puts the code of the bridge of the faulty readback.
-    fn put_output(&self, frame: &mut SensorFrame, code: BridgeCode) {
-        if let Some(codes) = &mut frame.bridges {
-            match self.target {
-                Target::DriveReadback => codes.drive = code,
-                Target::PretightenerReadback => codes.pretightener = code,
-                _ => {}
+    /// Puts in a code as it is.
+    fn put(&self, frame: &mut SensorFrame, code: u16) {
+        match (self.target, &mut frame.bridges) {
+            (Target::PreloadSensor, _) => put(&mut frame.preload_sensor, AdcCode::new(code)),
+            (Target::CompressionSensor, _) => {
+                put(&mut frame.compression_sensor, AdcCode::new(code));
             }
+            (Target::Angle, _) => put(&mut frame.arm_angle, AngleFrame::new(code)),
+            (Target::DriveReadback, Some(codes)) => codes.drive = BridgeCode::new(code),
+            (Target::PretightenerReadback, Some(codes)) => {
+                codes.pretightener = BridgeCode::new(code);
+            }
+            (Target::Encoder, _) => put(&mut frame.wheel_encoder, EncoderCount::new(code)),
+            _ => {}
         }
     }
 
     fn garble(&self, frame: &mut SensorFrame, random: &mut ChaCha8Rng) {
         let code: u16 = random.random();
-        match self.target {
-            Target::PreloadSensor => put(&mut frame.preload_sensor, AdcCode::new(code)),
-            Target::CompressionSensor => put(&mut frame.compression_sensor, AdcCode::new(code)),
-            Target::Angle => put(&mut frame.arm_angle, AngleFrame::new(code)),
-            Target::Readback | Target::DriveReadback | Target::PretightenerReadback => {
-                self.put_output(frame, BridgeCode::new(code & 0xFFF));
-            }
-            _ => put(&mut frame.wheel_encoder, EncoderCount::new(code)),
-        }
+        self.put(frame, if self.target.is_readback() { code & 0xFFF } else { code });
     }
 
     /// Gives the sample before again.
@@ -225,9 +219,7 @@ impl FaultySensor {
             Target::PreloadSensor => frame.preload_sensor = self.held.preload_sensor,
             Target::CompressionSensor => frame.compression_sensor = self.held.compression_sensor,
             Target::Angle => frame.arm_angle = self.held.arm_angle,
-            Target::Readback | Target::DriveReadback | Target::PretightenerReadback => {
-                frame.bridges = None;
-            }
+            target if target.is_readback() => frame.bridges = None,
             _ => frame.wheel_encoder = self.held.wheel_encoder,
         }
     }

@@ -1,11 +1,13 @@
 //! A set of parameters in a file.
 
 use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use interstage::rig::Rig;
 
 use super::{Held, Store, StoreError, set_of};
+use crate::files::atomic_write;
 
 /// A file that holds one set. If there is none yet, the prototype's is in force.
 #[derive(Clone, Debug)]
@@ -23,16 +25,14 @@ impl SetFile {
     fn place(&self) -> String {
         self.path.display().to_string()
     }
-
-    fn failed(&self, source: std::io::Error) -> StoreError {
-        StoreError::File { path: self.place(), source }
-    }
 }
 
 impl Store for SetFile {
     fn held(&mut self) -> Result<Held, StoreError> {
         let (set, origin) = if self.path.exists() {
-            (fs::read(&self.path).map_err(|source| self.failed(source))?, self.place())
+            let set = fs::read(&self.path);
+            let failed = |source| StoreError::File { path: self.place(), source };
+            (set.map_err(failed)?, self.place())
         } else {
             let set = set_of("prototype", &Rig::prototype())?;
             (set, format!("defaults: {} does not exist yet", self.place()))
@@ -41,11 +41,7 @@ impl Store for SetFile {
     }
 
     fn put(&mut self, set: &[u8]) -> Result<(), StoreError> {
-        // Beside it first, then in its place at once.
-        let beside = self.path.with_extension("part");
-        fs::write(&beside, set)
-            .and_then(|()| fs::rename(&beside, &self.path))
-            .map_err(|source| self.failed(source))
+        Ok(atomic_write(&self.path, |out| Ok(out.write_all(set)?))?)
     }
 
     fn restore(&mut self) -> Result<(), StoreError> {

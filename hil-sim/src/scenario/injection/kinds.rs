@@ -168,16 +168,14 @@ impl Target {
     /// Whether it is one of the four sensors or the readback of a bridge.
     #[must_use]
     pub const fn is_sensor(self) -> bool {
-        matches!(
-            self,
-            Self::Encoder
-                | Self::PreloadSensor
-                | Self::CompressionSensor
-                | Self::Angle
-                | Self::Readback
-                | Self::DriveReadback
-                | Self::PretightenerReadback
-        )
+        use Target::{Angle, CompressionSensor, Encoder, PreloadSensor};
+        self.is_readback() || matches!(self, Encoder | PreloadSensor | CompressionSensor | Angle)
+    }
+
+    /// Whether it is the readback of a bridge or of both.
+    #[must_use]
+    pub const fn is_readback(self) -> bool {
+        matches!(self, Self::Readback | Self::DriveReadback | Self::PretightenerReadback)
     }
 
     /// Whether such a fault of it resets the board, at once or by the watchdog.
@@ -199,15 +197,8 @@ impl Target {
     /// Whether a fault of it moves something before the controller does.
     #[must_use]
     pub const fn moves(self) -> bool {
-        matches!(
-            self,
-            Self::Drive
-                | Self::Pretightener
-                | Self::Wheel
-                | Self::Tread
-                | Self::Spring
-                | Self::Load
-        )
+        use Target::{Drive, Load, Pretightener, Spring, Tread, Wheel};
+        matches!(self, Drive | Pretightener | Wheel | Tread | Spring | Load)
     }
 }
 
