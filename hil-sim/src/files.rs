@@ -5,7 +5,7 @@ use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// What may go wrong while a file is filled.
+/// Why a file could not be filled.
 pub(crate) type Failure = Box<dyn Error + Send + Sync>;
 
 /// A file or directory that could not be written; displays as one line with its path.
@@ -49,7 +49,7 @@ pub(crate) fn atomic_write(
     write().map_err(|source| FileError { path: path.to_owned(), what, source })
 }
 
-/// Writes `text` to `path`, which is complete or as it was.
+/// Writes `text` to `path`; if that fails, the file stays as it was.
 ///
 /// # Errors
 /// [`FileError`] with the reason.

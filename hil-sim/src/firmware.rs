@@ -1,4 +1,4 @@
-//! The firmware image: building it, and what it takes of flash and RAM.
+//! Builds the firmware image and measures its flash and RAM.
 
 use std::env;
 use std::ffi::OsString;
@@ -9,7 +9,7 @@ use std::process::{Command, ExitStatus, Output, Stdio};
 
 use object::read::elf::ElfFile32;
 use object::{Endianness, Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, elf};
-use serde::Deserialize;
+use serde_json::Value;
 
 /// Compilation target of the board.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
@@ -20,25 +20,17 @@ const PACKAGE: &str = "interstage";
 /// The chip's flash, both banks.
 const FLASH: Range<u64> = 0x0800_0000..0x0808_0000;
 
-/// What can go wrong with the image.
+/// Why an image is not available.
 #[derive(Debug, thiserror::Error)]
 pub enum FirmwareError {
-    /// A program could not be started.
-    #[error("could not start `{program}`: {source}")]
-    Start {
-        /// The program.
-        program: String,
-        /// Why.
-        source: io::Error,
-    },
-    /// The target is missing and could not be added.
+    /// This program could not be started.
+    #[error("could not start `{0}`: {1}")]
+    Start(String, io::Error),
+    /// The target is missing and could not be added, and why.
     #[error(
-        "the Rust target {TARGET} is not installed and `rustup target add {TARGET}` failed: {why}"
+        "the Rust target {TARGET} is not installed and `rustup target add {TARGET}` failed: {0}"
     )]
-    Target {
-        /// What rustup said, or why it could not be asked.
-        why: String,
-    },
+    Target(String),
     /// cargo did not build the binary; its own messages have gone to standard error.
     #[error("building {0} failed ({1})")]
     Build(String, ExitStatus),
@@ -78,21 +70,21 @@ pub(crate) fn target_directory() -> PathBuf {
     env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace().join("target"), PathBuf::from)
 }
 
-/// Settings of cargo that keep this machine's folders out of the image. Panic messages
-/// name the sources of libraries, so the length of their paths would be in its size.
+/// Settings of cargo that keep this machine's folders out of the image: panic messages
+/// contain the paths of libraries, so that its size would depend on them.
 fn remapped_paths() -> String {
     let home = env::var_os("CARGO_HOME").map(PathBuf::from);
     let home = home.or_else(|| Some(env::home_dir()?.join(".cargo"))).unwrap_or_default();
     let folders = std::fs::read_dir(home.join("registry/src")).into_iter().flatten().flatten();
     let mut folders: Vec<PathBuf> = folders.map(|folder| folder.path()).collect();
     folders.sort();
-    // To the root, so that the rest cannot be taken for a relative path.
+    // To the root, so that the rest is no relative path.
     let flag = |folder: &PathBuf| Some(format!("--remap-path-prefix={}=/", folder.to_str()?));
     let flags: Vec<String> = folders.iter().filter_map(flag).collect();
     format!("target.{TARGET}.rustflags={flags:?}")
 }
 
-/// A tool of the toolchain that runs this program, if it is known.
+/// A tool of the toolchain: from the environment, or by its name.
 pub(crate) fn tool(variable: &str, name: &str) -> OsString {
     env::var_os(variable).unwrap_or_else(|| name.into())
 }
@@ -102,8 +94,13 @@ pub(crate) fn output(command: &mut Command) -> Result<Output, FirmwareError> {
     command.output().map_err(|source| could_not_start(command, source))
 }
 
+/// A program's exit code; 1 if it was killed.
+pub(crate) fn exit_code(status: ExitStatus) -> u8 {
+    status.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(1)
+}
+
 pub(crate) fn could_not_start(command: &Command, source: io::Error) -> FirmwareError {
-    FirmwareError::Start { program: command.get_program().to_string_lossy().into_owned(), source }
+    FirmwareError::Start(command.get_program().to_string_lossy().into_owned(), source)
 }
 
 /// Adds the board's target to the toolchain if it is missing.
@@ -121,19 +118,18 @@ pub fn ensure_target() -> Result<(), FirmwareError> {
     }
     let mut rustup = Command::new("rustup");
     rustup.args(["target", "add", TARGET]).current_dir(workspace());
-    let added =
-        output(&mut rustup).map_err(|error| FirmwareError::Target { why: error.to_string() })?;
+    let added = output(&mut rustup).map_err(|error| FirmwareError::Target(error.to_string()))?;
     if added.status.success() {
         return Ok(());
     }
-    Err(FirmwareError::Target { why: String::from_utf8_lossy(&added.stderr).trim().to_owned() })
+    Err(FirmwareError::Target(String::from_utf8_lossy(&added.stderr).trim().to_owned()))
 }
 
 /// Builds the image, adding the target first if it is missing, and returns its path.
 /// cargo's progress and messages go to standard error.
 ///
 /// # Errors
-/// [`FirmwareError`] if the target cannot be had or the build fails.
+/// [`FirmwareError`] if the target is not available or the build fails.
 pub fn build(profile: Profile) -> Result<PathBuf, FirmwareError> {
     build_binary(PACKAGE, PACKAGE, profile, &[])
 }
@@ -181,25 +177,11 @@ pub(crate) fn executable(cargo: &mut Command, binary: &str) -> Result<PathBuf, F
         .ok_or_else(|| FirmwareError::NoExecutable(binary.to_owned()))
 }
 
-/// The part of a cargo message that names an executable.
-#[derive(Deserialize)]
-struct Artifact {
-    target: ArtifactTarget,
-    executable: Option<PathBuf>,
-}
-
-#[derive(Deserialize)]
-struct ArtifactTarget {
-    name: String,
-}
-
 /// The binary's path from cargo's messages, one JSON object a line.
 fn named(messages: &str, binary: &str) -> Option<PathBuf> {
-    messages
-        .lines()
-        .filter_map(|line| serde_json::from_str::<Artifact>(line).ok())
-        .filter(|artifact| artifact.target.name == binary)
-        .find_map(|artifact| artifact.executable)
+    let messages = messages.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
+    let mut executables = messages.filter(|message| message["target"]["name"] == binary);
+    executables.find_map(|message| message["executable"].as_str().map(PathBuf::from))
 }
 
 /// Builds the firmware and returns the image.
@@ -211,7 +193,7 @@ pub fn image(profile: Profile) -> Result<Vec<u8>, FirmwareError> {
     std::fs::read(&path).map_err(|source| FirmwareError::Read { path, source })
 }
 
-/// What an image takes, bytes. Its bounds are asserted in `memory.x`.
+/// Memory of an image, bytes. Its bounds are asserted in `memory.x`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Footprint {
     /// Flash, with the copies that fill RAM at start.

@@ -1,5 +1,5 @@
-//! Injects the faults of a scenario into a run: between sensors and controller, between
-//! controller and actuators, in the plant, in the tick itself, in the commands and the log.
+//! Injects the faults of a scenario into a run: into sensor codes, bridge duties, the plant,
+//! the tick, the commands and the log.
 
 mod sensor;
 
@@ -25,28 +25,28 @@ const ACTS: f64 = 0.02;
 const SHOWS: (f64, f64) = (0.04, 0.0625);
 /// Half of the torn sector, rad.
 const TORN_RAD: f64 = 0.35;
-/// Distance within which a corner that carries again is the same one, mm.
+/// Distance within which a corner that carries again is the same corner, mm.
 const SAME_CORNER_MM: f64 = 5.0;
 
-/// What a reset finds of the record of the tick before it.
+/// The snapshot of the last tick that a reset finds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RecordFound {
     /// As it was written.
     Intact,
-    /// In doubt, and its position off by so much, mm.
+    /// Not trusted, with its position off by so much, mm.
     Off(f64),
     /// Nothing.
     Gone,
 }
 
-/// The faults of a run, and how far they have come.
+/// The faults of a run and their states.
 pub struct FaultInjector {
     faults: Vec<Active>,
     random: ChaCha8Rng,
     t_s: f64,
-    /// Corners touched so far, and where the last one carried.
+    /// Corners touched so far, and the position of the last one, mm.
     corners: (u8, Option<f64>),
-    /// The run goes outwards.
+    /// Whether the run deploys.
     outwards: bool,
     /// Undamaged plant: friction, load, relaxed and instant stiffness.
     undamaged: Option<(f64, f64, f64, f64)>,
@@ -131,7 +131,7 @@ impl FaultInjector {
         self.first(|fault| if fault.is_in_bridge() { fault.shows_s } else { fault.acts_s() })
     }
 
-    /// A tick begins: faults come and go.
+    /// Begins a tick: faults start and end.
     pub fn begin(&mut self, t_s: f64, truth: &Truth) {
         self.t_s = t_s;
         if truth.corner_n > 0.0 {
@@ -157,7 +157,7 @@ impl FaultInjector {
         }
     }
 
-    /// The faults that have come, and those that have gone, since the last call.
+    /// The faults that have started (true) or ended since the last call.
     pub fn changes(&mut self) -> Vec<(Injection, bool)> {
         let mut changes = Vec::new();
         for fault in &mut self.faults {
@@ -169,7 +169,7 @@ impl FaultInjector {
         changes
     }
 
-    /// The sensors as the controller gets them.
+    /// Distorts the sensor codes for the controller.
     pub fn sensors(&mut self, frame: &mut SensorFrame) {
         let t_s = self.t_s;
         for fault in &mut self.faults {
@@ -180,7 +180,7 @@ impl FaultInjector {
         }
     }
 
-    /// The command as the controller gets it.
+    /// The command that the controller gets.
     pub fn command(&mut self, given: Option<Command>) -> Option<Command> {
         let flooding = self.is(Target::Commands, Kind::Flooding).is_some();
         let rate = self.is(Target::Commands, Kind::Random);
@@ -200,7 +200,7 @@ impl FaultInjector {
         })
     }
 
-    /// The reset that comes in this tick, if one does, by what it finds of the record.
+    /// The reset of this tick, if there is one, by the snapshot that it finds.
     pub fn reset(&mut self) -> Option<RecordFound> {
         let here = |fault: &&mut Active| {
             fault.injection.target == Target::Reset && fault.since_s.is_some() && !fault.done
@@ -226,7 +226,7 @@ impl FaultInjector {
         self.is(Target::Log, Kind::Gone).is_some()
     }
 
-    /// The bridges as the plant gets them.
+    /// The bridge duties that the plant gets.
     #[must_use]
     pub fn drives(&mut self, asked: Drives) -> Drives {
         let (mut drives, t_s) = (asked, self.t_s);
@@ -255,7 +255,7 @@ impl FaultInjector {
         drives
     }
 
-    /// The plant as it is left.
+    /// Damages the plant.
     pub fn plant(&mut self, plant: &mut VirtualRig) {
         if !self.faults.iter().any(|fault| fault.damages()) {
             return;
@@ -285,7 +285,7 @@ impl FaultInjector {
         }
     }
 
-    /// Magnitude of such a fault, if it is there now.
+    /// Magnitude of such a fault, if it is active.
     fn is(&self, target: Target, kind: Kind) -> Option<f64> {
         let is = |injection: &Injection| (injection.target, injection.kind) == (target, kind);
         let fault = self.faults.iter().find(|fault| is(&fault.injection) && fault.is_active());

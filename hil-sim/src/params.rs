@@ -1,8 +1,8 @@
-//! Stored parameters from the host's side: read, change, put in force, wherever they lie.
+//! Reads, changes and activates stored parameters of a board or a file.
 //!
 //! A board keeps its parameters as a set that this program makes
-//! ([`interstage::params`]). A file may hold one as well, so that everything that can be
-//! done to a board can be tried without one.
+//! ([`interstage::params`]). A file may hold a set as well, so that every operation can be
+//! tried without a board.
 
 mod file;
 mod line;
@@ -15,7 +15,7 @@ use crate::files::FileError;
 pub use file::SetFile;
 pub use line::{Client, Wire};
 
-/// What went wrong. Each is one line.
+/// Why an operation on parameters failed. Displays as one line.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
     /// A file could not be read, or the emulated board's flash written.
@@ -29,7 +29,7 @@ pub enum StoreError {
     /// A file could not be written.
     #[error(transparent)]
     Write(#[from] FileError),
-    /// What lies there is no set.
+    /// There is no valid set.
     #[error("{place}: {source}")]
     Set {
         /// Where.
@@ -43,10 +43,10 @@ pub enum StoreError {
     /// The board does not answer.
     #[error("the board does not answer within {seconds} s")]
     Silent {
-        /// How long it was waited for.
+        /// The timeout, s.
         seconds: f64,
     },
-    /// The board refuses; what was in force still is.
+    /// The board refuses; the active set is unchanged.
     #[error("the board refuses: {0}")]
     Refused(&'static str),
     /// The board answered another question.
@@ -57,18 +57,18 @@ pub enum StoreError {
     Wire(String),
 }
 
-/// The parameters in force at a place.
+/// The active parameters of a place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Held {
     /// Name of the rig.
     pub name: String,
     /// The rig.
     pub rig: Rig,
-    /// Layout of its constants; if it is not [`SCHEMA`], they have to be made again.
+    /// Layout of its constants; if it is not [`SCHEMA`], they must be made again.
     pub schema: u16,
     /// Hash of the parameters.
     pub hash: u32,
-    /// Where it lies, in words.
+    /// Where it is, in words.
     pub origin: String,
 }
 
@@ -76,7 +76,7 @@ impl Held {
     /// From the bytes of a set of any schema.
     ///
     /// # Errors
-    /// [`SetError`] if they are none.
+    /// [`SetError`] if they are no set.
     pub fn of(set: &[u8], origin: String) -> Result<Self, SetError> {
         let set = ParameterSet::open_any(set)?;
         let header = set.header();
@@ -89,7 +89,7 @@ impl Held {
         })
     }
 
-    /// Whether this program's constants are the ones that it holds.
+    /// Whether its constants are of this program's layout.
     #[must_use]
     pub const fn is_current(&self) -> bool {
         self.schema == SCHEMA
@@ -98,19 +98,19 @@ impl Held {
 
 /// A place that holds parameters.
 pub trait Store {
-    /// What is in force there.
+    /// The active parameters.
     ///
     /// # Errors
     /// [`StoreError`] if it cannot be read.
     fn held(&mut self) -> Result<Held, StoreError>;
 
-    /// Makes a set the active one: completely or not at all.
+    /// Makes a set the active one, completely or not at all.
     ///
     /// # Errors
-    /// [`StoreError`]; what was in force still is.
+    /// [`StoreError`]; the active set is then unchanged.
     fn put(&mut self, set: &[u8]) -> Result<(), StoreError>;
 
-    /// Puts the defaults back in force.
+    /// Makes the defaults the active set.
     ///
     /// # Errors
     /// As [`put`](Self::put).
@@ -120,7 +120,7 @@ pub trait Store {
 /// The set of a rig.
 ///
 /// # Errors
-/// [`CompileError`] if the rig is not sound.
+/// [`CompileError`] if the rig is not valid.
 pub fn set_of(name: &str, rig: &Rig) -> Result<Vec<u8>, CompileError> {
     let mut room = [0; MAX_SET];
     let length = compile(name, rig, &mut room)?;

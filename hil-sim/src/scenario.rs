@@ -1,6 +1,6 @@
-//! What a run is made of: the rig, how far the plant may differ from it, the noise
-//! of its sensors, and how it is run. A scenario starts from a preset, takes any
-//! subset of keys from a TOML file, and then what `--set key=value` overrides.
+//! The inputs of a run: the rig, the tolerances of the plant, the noise of its sensors, and
+//! the options of the run. A scenario starts from a preset, takes any subset of keys from a
+//! TOML file, and then what `--set key=value` overrides.
 
 mod error;
 pub mod injection;
@@ -31,14 +31,14 @@ pub use run::{ControllerKind, Direction, RunOptions, StepAnomaly};
 pub struct Scenario {
     /// The preset that it started from, one of [`PRESETS`].
     pub preset: String,
-    /// The rig as the controller believes it to be; its sections are beside the others.
+    /// The rig by the controller's parameters; its sections are beside the others.
     #[serde(flatten)]
     pub rig: Rig,
-    /// How far the plant may differ from the rig.
+    /// Tolerances of the plant.
     pub spread: Spread,
     /// Noise and delay of the sensors.
     pub noise: Noise,
-    /// How it is run.
+    /// Options of the run.
     pub run: RunOptions,
 }
 

@@ -259,7 +259,7 @@ fn a_host_that_falls_silent_leaves_the_bridges_off() {
     let next = FIRST + 3000;
     let mut line = HostLine::begin_at(&mut port);
     assert!(matches!(line.tick(next, given), Err(HilError::Alone(_))));
-    assert!(matches!(line.stands(), Ok((_, true))));
+    assert!(matches!(line.state(), Ok((_, true))));
     let ran = looped(&mut port, &scenario(&["run.seed=3"])).expect("a run");
     assert!(ran.summary.completed);
 }
@@ -273,7 +273,7 @@ fn a_question_asked_twice_is_answered_twice_and_done_once() {
     let (first, again) =
         (line.tick(last, given).expect("told again"), line.tick(last, given).expect("and again"));
     assert_eq!(first, again);
-    assert_eq!(line.stands().expect("stands"), (FIRST + 3000, false));
+    assert_eq!(line.state().expect("stands"), (FIRST + 3000, false));
     let error = line.tick(FIRST + 3200, given).unwrap_err();
     assert!(matches!(error, HilError::Apart { board, .. } if board == FIRST + 3000), "{error}");
 }

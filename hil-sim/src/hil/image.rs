@@ -1,4 +1,4 @@
-//! Which image a board has in its flash.
+//! Identifies the image in a board's flash.
 
 use object::read::elf::ElfFile32;
 use object::{Endianness, Object, ObjectSection, ObjectSymbol};
@@ -11,7 +11,7 @@ const BLOCK: &str = "_SEGGER_RTT";
 /// Section of the linker's hash over the image.
 const ID: &str = ".note.gnu.build-id";
 
-/// What an image is known by.
+/// Identity of an image: the linker's hash and its address.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
     /// Address of the channels' control block.

@@ -31,7 +31,7 @@ const LONGEST_MS: f64 = 250.0;
 /// Changes for the differences: ms, and relative.
 const MOVED_MS: f64 = 0.5;
 const MOVED_LAG: f64 = 0.01;
-/// Deviation that the first fit assumes, N, and the least of the second.
+/// Deviation of the first fit, N, and the least of the second.
 const FIRST_N: f64 = 0.1;
 const LEAST_N: f64 = 1e-4;
 

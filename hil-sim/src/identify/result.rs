@@ -1,5 +1,5 @@
-//! What was identified: each parameter with its interval and its evidence, the residuals,
-//! and the scenario with the new values in it.
+//! The result of identification: each parameter with its interval and its evidence, the
+//! residuals, and the scenario with the new values.
 
 use std::f64::consts::TAU as TURN;
 
@@ -185,9 +185,7 @@ impl Report<'_> {
             ((STIFFENING, "tread.stiffening", "", rolling), &f64::exp),
             ((TAU, "tread.tau_s", "s", speeds), &f64::exp),
             ((FRICTION, "plant.mu", "", "creep at the climbs, by its law"), &f64::exp),
-            ((LOAD, "plant.top_load_n", "N", "wedge of the arm and drive effort"), &|x| {
-                x.exp() / share
-            }),
+            ((LOAD, "plant.top_load_n", "N", "arm thrust and drive effort"), &|x| x.exp() / share),
             ((GEARBOX, "gearbox friction", "N", "drive effort on the smooth wall"), &itself),
             ((RADIUS, "rig.wheel_radius_mm", "mm", "shape of the climbs"), &itself),
             ((LOAD_GAIN, "preload sensor gain", "", "loads against the drive"), &f64::exp),

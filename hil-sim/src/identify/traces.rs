@@ -124,7 +124,7 @@ impl Traces {
         if end < start + 4 * EFFORT_BIN {
             return Err(bad("the run is too short"));
         }
-        // Unloaded: only before the first preload, and only on the way out.
+        // Unloaded: only before the first preload of a deployment.
         let idle = if record.deploys() { &samples[..start] } else { &samples[..0] };
         let preload_zero = zero(idle, |s| s.preload_n);
         let compression_zero = zero(idle, |s| s.compression_mm);

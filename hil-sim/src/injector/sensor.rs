@@ -1,7 +1,7 @@
-//! A faulty sensor: between the code it gives and the code the controller gets.
+//! A faulty sensor: distorts its code before the controller gets it.
 //!
-//! Every sensor is a number in codes, the wheel encoder's counter without its wrap; what a
-//! fault does to that number is the same for all.
+//! Every sensor is a number in codes, the wheel encoder's counter without its wrap. A fault
+//! changes that number alike for all.
 
 use std::collections::VecDeque;
 
@@ -20,7 +20,7 @@ const SPAN: f64 = 65_535.0;
 const TURN: f64 = 16_384.0;
 /// Largest code of a bridge, and the codes of a duty of one.
 const BRIDGE: (f64, f64) = (4095.0, 32_768.0 / BridgeCode::DUTY as f64);
-/// What sums of milliseconds may be off, s.
+/// Rounding error of sums of milliseconds, s.
 const TIME_S: f64 = 1e-6;
 /// Period of an intermittent contact, s.
 const PERIOD_S: f64 = 0.1;
@@ -36,9 +36,9 @@ pub(super) struct FaultySensor {
     zero: f64,
     /// Counter of the encoder before, and without its wrap.
     counter: Option<(EncoderCount, i64)>,
-    /// What the sensor truly read last, s and codes.
+    /// The last true reading, s and codes.
     last: Option<(f64, f64)>,
-    /// What it gave when the fault came.
+    /// The true reading when the fault began.
     first: Option<f64>,
     filtered: f64,
     past: VecDeque<(f64, f64)>,
@@ -80,8 +80,8 @@ impl FaultySensor {
         }
     }
 
-    /// Puts into `frame` what the controller gets, `since_s` after the fault came; before
-    /// that nothing is changed.
+    /// Puts the faulty code into `frame`, `since_s` after the fault began; without a fault
+    /// nothing is changed.
     pub(super) fn read(
         &mut self,
         frame: &mut SensorFrame,
@@ -131,7 +131,7 @@ impl FaultySensor {
         self.write(frame, given);
     }
 
-    /// Keeps what is true while the sensor is intact.
+    /// Keeps the true reading while the sensor is intact.
     fn keep(&mut self, t_s: f64, truth: Option<f64>) {
         if let Some(truth) = truth {
             self.filtered = truth;
@@ -149,14 +149,14 @@ impl FaultySensor {
         }
     }
 
-    /// What was true so long ago.
+    /// The true reading so long ago.
     fn late(&self, t_s: f64) -> f64 {
         let due = |(at_s, _): &&(f64, f64)| *at_s <= t_s - self.magnitude + TIME_S;
         let then = self.past.iter().rev().find(due).or(self.past.front());
         then.map_or(0.0, |(_, code)| *code)
     }
 
-    /// The sensor's number in this frame; none before the first, or if it is not good.
+    /// The sensor's number in this frame; none before the first, or if it is invalid.
     fn code(&mut self, frame: &SensorFrame) -> Option<f64> {
         match self.target {
             Target::PreloadSensor => frame.preload_sensor.map(|s| f64::from(s.code.get())),

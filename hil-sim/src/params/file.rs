@@ -9,14 +9,14 @@ use interstage::rig::Rig;
 use super::{Held, Store, StoreError, set_of};
 use crate::files::atomic_write;
 
-/// A file that holds one set. If there is none yet, the prototype's is in force.
+/// A file that holds one set. Until it exists, the prototype's set is active.
 #[derive(Clone, Debug)]
 pub struct SetFile {
     path: PathBuf,
 }
 
 impl SetFile {
-    /// This file, which need not be there yet.
+    /// This file, which need not exist.
     #[must_use]
     pub fn new(path: &Path) -> Self {
         Self { path: path.to_owned() }

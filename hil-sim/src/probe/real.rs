@@ -18,8 +18,8 @@ const CHIP: &str = "STM32G474RETx";
 const SELECTOR: &str = "PROBE_RS_PROBE";
 /// Longest wait for the core to stop.
 const HALT: Duration = Duration::from_millis(500);
-/// Pause between two looks: less than a transfer over USB takes.
-const LOOK: Duration = Duration::from_micros(200);
+/// Pause between two polls: less than a transfer over USB takes.
+const PAUSE: Duration = Duration::from_micros(200);
 /// Bytes of the mark at the beginning of the control block.
 const MARK: usize = 16;
 
@@ -27,7 +27,7 @@ const MARK: usize = 16;
 pub struct RealPort {
     session: Session,
     rtt: Option<Rtt>,
-    /// Where the control block is; searched for in RAM if that is not known.
+    /// Address of the control block; unknown, it is searched for in RAM.
     block: Option<u32>,
 }
 
@@ -73,8 +73,8 @@ impl RealPort {
             .map_err(|error| PortError::Board(format!("flashing failed: {}", with_causes(&error))))
     }
 
-    /// Does something with core and channels, which are looked for first; `otherwise` if
-    /// there are none yet.
+    /// Acts on core and channels, which are searched for first; returns `otherwise` if there
+    /// are none yet.
     fn with<T>(
         &mut self,
         otherwise: T,
@@ -162,7 +162,7 @@ impl Port for RealPort {
         let mut core = self.session.core(0).map_err(gone)?;
         core.reset_and_halt(HALT).map_err(gone)?;
         if let Some(block) = self.block {
-            // What the run before has left in its rings is not this one's.
+            // The rings may hold data of the run before.
             core.write_8(block.into(), &[0; MARK]).map_err(gone)?;
         }
         core.run().map_err(gone)
@@ -174,7 +174,7 @@ impl Port for RealPort {
     }
 
     fn pass(&mut self) -> Result<Duration, PortError> {
-        std::thread::sleep(LOOK);
-        Ok(LOOK)
+        std::thread::sleep(PAUSE);
+        Ok(PAUSE)
     }
 }

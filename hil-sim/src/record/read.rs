@@ -1,4 +1,4 @@
-//! Logs out of files: MCAP, CSV, or the bare bytes of the channel.
+//! Reads logs from files: MCAP, CSV, or the bare bytes of the channel.
 
 use std::path::Path;
 
@@ -40,7 +40,7 @@ pub(super) fn content(path: &Path) -> Result<Vec<u8>, ReadError> {
     std::fs::read(path).map_err(|error| ReadError::File(path.display().to_string(), error))
 }
 
-/// A stream cut after every frame; what follows the last one is left out.
+/// The stream, cut after every frame; what follows the last one is left out.
 pub fn pieces(stream: &[u8]) -> impl Iterator<Item = &[u8]> {
     let mut rest = stream;
     std::iter::from_fn(move || {
@@ -61,8 +61,7 @@ pub fn pieces(stream: &[u8]) -> impl Iterator<Item = &[u8]> {
 
 impl Run {
     /// Reads a log of any form: MCAP with the controller's frames, CSV of rows, or the
-    /// bytes of the channel. What was cut off is missing and everything before it is
-    /// there.
+    /// bytes of the channel. A file that was cut off is read up to there.
     ///
     /// # Errors
     /// [`ReadError`] if the file cannot be read or holds no tick.
@@ -83,15 +82,15 @@ impl Run {
     }
 }
 
-/// Longest record, bytes: a few hundred times what this program writes.
+/// Longest record, bytes: some hundred times those that this program writes.
 const LONGEST_RECORD: usize = 1 << 26;
 
-/// Most that a chunk's content may be longer than it is in the file: what LZ4 can reach.
+/// Largest ratio of a chunk's content to its size in the file: the limit of LZ4.
 const EXPANSION: u64 = 256;
 
-/// The file up to the first record that says it is longer than what is left, or a chunk that
-/// says it holds more than it can: the reader takes such a length for the memory it needs.
-fn sound(bytes: &[u8]) -> &[u8] {
+/// The file up to the first record whose length cannot be true: longer than the rest of the
+/// file, or a chunk larger than LZ4 can expand to. The reader would allocate that length.
+fn credible(bytes: &[u8]) -> &[u8] {
     const CHUNK: u8 = 6;
     // An opcode and a length; in a chunk two times come before the length of its content.
     const HEAD: usize = 9;
@@ -111,7 +110,7 @@ fn sound(bytes: &[u8]) -> &[u8] {
 /// Hands over the records of an MCAP file, those of its chunks one by one, up to the end or to
 /// where the file was cut off or damaged.
 pub(super) fn records(bytes: &[u8], mut take: impl FnMut(Record<'_>)) {
-    let mut rest = sound(bytes);
+    let mut rest = credible(bytes);
     let options = LinearReaderOptions::default()
         .with_skip_end_magic(true)
         .with_record_length_limit(LONGEST_RECORD);
@@ -154,8 +153,8 @@ fn of_mcap(bytes: &[u8]) -> Run {
     run
 }
 
-/// Reads the controller's columns; a last row that was cut off is left out, and so are ticks
-/// that did not run.
+/// Reads the controller's columns. Ticks that did not run and an incomplete last row are left
+/// out.
 fn of_csv(bytes: &[u8]) -> Result<Run, String> {
     let mut run = Run::default();
     let mut reader = csv::Reader::from_reader(bytes);
@@ -201,16 +200,16 @@ mod tests {
         };
         let head = [MCAP, b"0\r\n"].concat();
         let good = [head, record(1, 3, b"abc"), record(6, 40, &[0; 40])].concat();
-        assert_eq!(sound(&good), good);
+        assert_eq!(credible(&good), good);
         let long = [good.clone(), record(5, 1 << 62, b"xyz")].concat();
-        assert_eq!(sound(&long), good);
-        // A chunk of 24 bytes that says it holds more than 6 KiB.
+        assert_eq!(credible(&long), good);
+        // A chunk of 24 bytes that claims to hold more than 6 KiB.
         let mut body = [0; 24];
         body[16..].copy_from_slice(&10_000_u64.to_le_bytes());
         let swollen = [good.clone(), record(6, 24, &body)].concat();
-        assert_eq!(sound(&swollen), good);
+        assert_eq!(credible(&swollen), good);
         for cut in 0..good.len() {
-            assert!(sound(&good[..cut]).len() <= cut);
+            assert!(credible(&good[..cut]).len() <= cut);
         }
     }
 

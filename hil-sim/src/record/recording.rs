@@ -1,7 +1,7 @@
-//! A recording from a log: what a report shows.
+//! Makes the recording that a report shows from a log.
 //!
-//! The log of a deployment on the virtual rig has the truth in it. A log that was
-//! captured has what the controller believes, and nothing else is made up.
+//! The log of a deployment on the virtual rig contains the plant's truth. A captured log has
+//! the controller's estimates alone; what is unknown there is `NaN`.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -16,7 +16,7 @@ use super::read::{MCAP, ReadError, content, parameters, records};
 use super::recorder::{reported, text};
 use super::{Controller, CrossingLine, LedgerLine, LogLine, Recording, Run, Summary, Tick};
 
-/// Reads what a report shows from any log.
+/// Reads the recording of any log.
 ///
 /// # Errors
 /// [`ReadError`] if the file cannot be read or is no log.
@@ -123,7 +123,7 @@ fn summary(run: &Run) -> Summary {
     }
 }
 
-/// The line of a crossing as the controller saw it; its instants by the contact stage.
+/// A crossing by the controller's estimates; its instants follow from the contact stage.
 fn crossing(run: &Run, line: &Line) -> CrossingLine {
     let seen = LedgerLine::from(line);
     let closed = run.rows.partition_point(|row| row.tick <= line.at);
@@ -143,7 +143,7 @@ fn crossing(run: &Run, line: &Line) -> CrossingLine {
         gap_measured_mm: Some(seen.gap_measured_mm),
         corner_force_n: f64::NAN,
         lead_time_s: Some(seen.lead_time_s),
-        // The ledger's has creep and tolerances in it.
+        // The ledger's slip includes creep and tolerances.
         slip_mm: f64::NAN,
         touch_s: touch.map_or(seen.t_s, |row| row.t_s),
         lift_s: lift.or(span.last()).map_or(seen.t_s, |row| row.t_s),

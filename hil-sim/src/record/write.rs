@@ -1,8 +1,7 @@
-//! MCAP and CSV files of a log that grows, and the files of a run that is over.
+//! Writes MCAP and CSV files of a log that grows, and the files of a completed run.
 //!
-//! Once a second of the log's time all that has come is handed to the system, as complete
-//! chunks, so that a file which is cut off there, by a full disk or a lost supply, is
-//! read up to its last second.
+//! Once a second of the log's time everything is flushed as complete chunks, so that a file
+//! that was cut off by a full disk or a lost supply is read up to its last second.
 
 use std::io::{Seek, Write};
 use std::path::{Path, PathBuf};
@@ -16,23 +15,23 @@ use super::{
 };
 use crate::files::{Failure, FileError, atomic_write, make_directory, with_causes};
 
-/// Ticks between two hand-overs to the system.
+/// Ticks between two flushes.
 const FLUSH_TICKS: u64 = 1000;
 
-/// Why writing came to an end. What had been handed over before stays readable.
+/// Why writing stopped. What was flushed before stays readable.
 #[derive(Debug, thiserror::Error)]
 #[error("writing stopped after {ticks} ticks, of which {kept} are safe: {}", with_causes(&**source))]
 pub struct WriteError {
-    /// Ticks that had come.
+    /// Ticks taken.
     pub ticks: u64,
-    /// Ticks that the files hold for certain.
+    /// Ticks flushed.
     pub kept: u64,
-    /// What the system said.
+    /// The system's error.
     source: Failure,
 }
 
-/// Adds a row. Numbers are written so that reading gives the same bits; what is unknown is
-/// `NaN`. Without truth its columns are absent.
+/// Adds a row. Reading gives the same bits; what is unknown is `NaN`. Without truth its
+/// columns are absent.
 fn write_row<W: Write>(csv: &mut csv::Writer<W>, tick: &Tick) -> csv::Result<()> {
     match tick.truth {
         Some(truth) => csv.serialize((tick.controller, truth)),
@@ -85,13 +84,13 @@ pub struct Writer<M: Write + Seek, C: Write> {
     now: u64,
     /// Time at which the target started, ns.
     start: u64,
-    /// Ticks handed over to the system.
+    /// Ticks flushed.
     kept: u64,
 }
 
 impl<M: Write + Seek, C: Write> Writer<M, C> {
-    /// Begins the files. `parameters` are those of the controller as TOML, if they are
-    /// known; `decoded` adds ticks to the MCAP file beside the frames.
+    /// Begins the files. `parameters` are the controller's as TOML, if known; `decoded` adds
+    /// ticks to the MCAP file beside the frames.
     ///
     /// # Errors
     /// [`WriteError`] with the reason.
@@ -120,12 +119,12 @@ impl<M: Write + Seek, C: Write> Writer<M, C> {
         })
     }
 
-    /// What has come so far.
+    /// What has been read so far.
     pub const fn counts(&self) -> &Counts {
         self.decoder.counts()
     }
 
-    /// Takes bytes as they come; each item is shown to `see`.
+    /// Takes bytes in pieces of any size; passes each item to `see`.
     ///
     /// # Errors
     /// [`WriteError`] if a file cannot grow any more.
@@ -141,7 +140,7 @@ impl<M: Write + Seek, C: Write> Writer<M, C> {
             used += frame.len();
             self.frame(frame, see)?;
         }
-        // Of what is no frame, only the end may become one.
+        // Only the end of the rest may become a frame.
         let garbage = (held.len() - used).saturating_sub(LONGEST);
         if garbage > LONGEST {
             self.frame(&held[used..used + garbage], see)?;
@@ -213,7 +212,7 @@ impl<M: Write + Seek, C: Write> Writer<M, C> {
         Ok(())
     }
 
-    /// Closes the files; what came.
+    /// Closes the files; returns the counts.
     ///
     /// # Errors
     /// [`WriteError`] if a file cannot be closed.

@@ -1,4 +1,4 @@
-//! Laying values over a preset, key by key, each checked for its kind.
+//! Lays values over a preset key by key and checks each for its kind.
 
 use std::collections::BTreeMap;
 use std::path::Path;

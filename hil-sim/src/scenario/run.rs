@@ -65,7 +65,7 @@ pub enum ControllerKind {
     Constant,
     /// The preload limit throughout.
     Limit,
-    /// Preload raised when the step is felt.
+    /// Preload raised when the step is detected.
     Reactive,
 }
 

@@ -21,17 +21,17 @@ fn nearest<'a>(key: &str, known: &'a [String]) -> Option<&'a str> {
 /// Edits from `key` to `candidate`. The wrong section costs one edit, a forgotten
 /// unit or a wrong one as well.
 fn distance(key: &str, candidate: &str) -> usize {
-    let whole = strsim::damerau_levenshtein(key, candidate);
+    let edits = strsim::damerau_levenshtein(key, candidate);
     let (_, found) = split(key);
     let (_, wanted) = split(candidate);
     if wanted.is_empty() || found.is_empty() {
-        return whole;
+        return edits;
     }
     let leaf = 1 + strsim::damerau_levenshtein(found, wanted);
     let same_stem = wanted.strip_prefix(found).is_some_and(|rest| rest.starts_with('_'))
         || super::keys::stem(found) == super::keys::stem(wanted);
-    let stem = if same_stem { 1 + usize::from(split(key).0 != split(candidate).0) } else { whole };
-    whole.min(leaf).min(stem)
+    let stem = if same_stem { 1 + usize::from(split(key).0 != split(candidate).0) } else { edits };
+    edits.min(leaf).min(stem)
 }
 
 /// Section and name; a key without a dot is a name without section.

@@ -1,4 +1,4 @@
-//! The checks of a whole scenario, after the rig's own.
+//! Checks a scenario, after the rig's own checks.
 
 use super::injection::entry;
 use super::merge::Provenance;

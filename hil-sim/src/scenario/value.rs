@@ -1,5 +1,5 @@
-//! Values of keys: from the text of an override, checked for what the key takes, and units
-//! written where none belong.
+//! Values of keys: read from the text of an override, checked for what the key takes and for
+//! units that are part of the key's name.
 
 use interstage::rig::MAX_STEPS;
 use toml::{Table, Value};
@@ -16,9 +16,8 @@ pub(super) fn split(text: &str) -> Option<(&str, &str)> {
     (!key.is_empty() && !value.is_empty()).then_some((key, value))
 }
 
-/// The value that `text` means where a key takes `kind`: TOML, but words need
-/// no quotes and lists of numbers no brackets. What is neither stays text, which
-/// [`checked`] refuses.
+/// The value of `text` where a key takes `kind`: TOML, but words need no quotes and lists of
+/// numbers no brackets. Anything else stays text, which [`checked`] refuses.
 pub(super) fn from_text(kind: Kind, text: &str) -> Value {
     let as_text = || Value::String(text.trim_matches('"').to_owned());
     match kind {

@@ -1,5 +1,5 @@
-//! Everything that can be broken, with its usual measure: in software on every target, and
-//! of the board itself, in registers and on lines, on the emulated board alone.
+//! All faults with their default magnitudes: those of software on every target, and those of
+//! the board, in registers and on lines, on the emulated board alone.
 
 use std::sync::LazyLock;
 
@@ -12,9 +12,9 @@ pub struct Entry {
     pub target: Target,
     /// How.
     pub kind: Kind,
-    /// How badly, unless a scenario says otherwise.
+    /// Default magnitude.
     pub magnitude: f64,
-    /// Least and largest magnitude that a scenario may say; equal where it says none.
+    /// Least and largest magnitude of a scenario; equal where there is none.
     pub range: (f64, f64),
     /// Unit of the magnitude.
     pub unit: &'static str,
@@ -33,7 +33,7 @@ const fn one(
     Entry { target, kind, magnitude, range, unit, text }
 }
 
-/// One that has no measure.
+/// A fault without magnitude.
 const fn plain(target: Target, kind: Kind, text: &'static str) -> Entry {
     one(target, kind, 0.0, (0.0, 0.0), "", text)
 }
@@ -188,7 +188,7 @@ pub fn entry(target: Target, kind: Kind) -> Option<&'static Entry> {
 }
 
 impl Target {
-    /// Whether it is of the board's hardware, which a run in software has not.
+    /// Whether it is hardware of the board, which a run in software lacks.
     #[must_use]
     pub fn is_hardware(self) -> bool {
         HARDWARE.iter().any(|entry| entry.target == self)

@@ -1,4 +1,4 @@
-//! What can break, and how.
+//! Targets and kinds of faults.
 
 use serde::{Deserialize, Serialize};
 
@@ -194,7 +194,7 @@ impl Target {
         matches!(self, Self::StoredSet | Self::SpareSet | Self::ImageSet | Self::ParameterSave)
     }
 
-    /// Whether a fault of it moves something before the controller does.
+    /// Whether a fault of it changes forces or motion of the plant directly.
     #[must_use]
     pub const fn moves(self) -> bool {
         use Target::{Drive, Load, Pretightener, Spring, Tread, Wheel};
