@@ -8,14 +8,21 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Output, Stdio};
 
 use object::read::elf::ElfFile32;
-use object::{Endianness, Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, elf};
+use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, elf};
 use serde_json::Value;
+
+use crate::probe::{Port, PortError};
 
 /// Compilation target of the board.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 
 /// Name of the package and of its binary.
 const PACKAGE: &str = "interstage";
+
+/// Symbol of the channels' control block.
+const BLOCK: &str = "_SEGGER_RTT";
+/// Section of the linker's hash over the image.
+const ID: &str = ".note.gnu.build-id";
 
 /// The chip's flash, both banks.
 const FLASH: Range<u64> = 0x0800_0000..0x0808_0000;
@@ -193,6 +200,51 @@ pub fn image(profile: Profile) -> Result<Vec<u8>, FirmwareError> {
     std::fs::read(&path).map_err(|source| FirmwareError::Read { path, source })
 }
 
+/// Identity of an image: the linker's hash and its address.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Image {
+    /// Address of the channels' control block.
+    pub block: u32,
+    place: u32,
+    id: Vec<u8>,
+}
+
+impl Image {
+    /// Of the image in `elf`.
+    ///
+    /// # Errors
+    /// [`FirmwareError::Image`] if it is no image of the firmware.
+    pub fn of(elf: &[u8]) -> Result<Self, FirmwareError> {
+        let file = parse(elf)?;
+        let section = file.section_by_name(ID);
+        let section = section.ok_or_else(|| FirmwareError::Image("it has no hash".to_owned()))?;
+        let id = section.data().map_err(|error| FirmwareError::Image(error.to_string()))?.to_vec();
+        // Addresses of a chip with 32 bits.
+        Ok(Self { block: symbol(&file, BLOCK)? as u32, place: section.address() as u32, id })
+    }
+
+    /// Whether a board has this image in its flash.
+    ///
+    /// # Errors
+    /// [`PortError`] if its memory cannot be read.
+    pub fn is_on(&self, port: &mut dyn Port) -> Result<bool, PortError> {
+        let mut there = vec![0; self.id.len()];
+        port.memory(self.place, &mut there)?;
+        Ok(there == self.id)
+    }
+}
+
+fn parse(elf: &[u8]) -> Result<ElfFile32<'_>, FirmwareError> {
+    ElfFile32::parse(elf).map_err(|error| FirmwareError::Image(error.to_string()))
+}
+
+/// Address of a symbol.
+fn symbol(file: &ElfFile32<'_>, name: &str) -> Result<u64, FirmwareError> {
+    let symbol = file.symbols().find(|symbol| symbol.name() == Ok(name));
+    let address = symbol.map(|symbol| symbol.address());
+    address.ok_or_else(|| FirmwareError::Image(format!("no symbol {name}")))
+}
+
 /// Memory of an image, bytes. Its bounds are asserted in `memory.x`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Footprint {
@@ -210,15 +262,8 @@ impl Footprint {
     /// # Errors
     /// [`FirmwareError::Image`] if it is not an image of this board.
     pub fn of_elf(bytes: &[u8]) -> Result<Self, FirmwareError> {
-        let file = ElfFile32::<Endianness>::parse(bytes)
-            .map_err(|error| FirmwareError::Image(error.to_string()))?;
-        let symbol = |name: &str| {
-            let symbol = file.symbols().find(|symbol| symbol.name() == Ok(name));
-            symbol
-                .map(|symbol| symbol.address())
-                .ok_or_else(|| FirmwareError::Image(format!("no symbol {name}")))
-        };
-        let stack = symbol("_stack_start")?.saturating_sub(symbol("_stack_end")?);
+        let file = parse(bytes)?;
+        let stack = symbol(&file, "_stack_start")?.saturating_sub(symbol(&file, "_stack_end")?);
         let mut taken = Self { flash: 0, ram: stack, stack };
         for section in file.sections() {
             let SectionFlags::Elf { sh_flags } = section.flags() else { continue };

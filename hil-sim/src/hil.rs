@@ -4,7 +4,6 @@
 //! The loop runs in lockstep, so that the speed of the port has no effect: a run gives the
 //! same trace as in software, bit for bit.
 
-mod image;
 mod line;
 mod run;
 
@@ -14,7 +13,7 @@ use crate::plant::limits::Refusal;
 use crate::plant::rig::PlantError;
 use crate::probe::PortError;
 
-pub use image::Image;
+pub use crate::firmware::Image;
 pub use line::HostLine;
 pub use run::{Asked, run};
 

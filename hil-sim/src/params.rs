@@ -4,15 +4,17 @@
 //! ([`interstage::params`]). A file may hold a set as well, so that every operation can be
 //! tried without a board.
 
-mod file;
 mod line;
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
 
 use interstage::params::{CompileError, MAX_SET, ParameterSet, SCHEMA, SetError, compile};
 use interstage::rig::Rig;
 
-use crate::files::FileError;
+use crate::files::{FileError, atomic_write};
 
-pub use file::SetFile;
 pub use line::{Client, Wire};
 
 /// Why an operation on parameters failed. Displays as one line.
@@ -125,4 +127,74 @@ pub fn set_of(name: &str, rig: &Rig) -> Result<Vec<u8>, CompileError> {
     let mut room = [0; MAX_SET];
     let length = compile(name, rig, &mut room)?;
     Ok(room[..length].to_vec())
+}
+
+/// A file that holds one set. Until it exists, the prototype's set is active.
+#[derive(Clone, Debug)]
+pub struct SetFile {
+    path: PathBuf,
+}
+
+impl SetFile {
+    /// This file, which need not exist.
+    #[must_use]
+    pub fn new(path: &Path) -> Self {
+        Self { path: path.to_owned() }
+    }
+
+    fn place(&self) -> String {
+        self.path.display().to_string()
+    }
+}
+
+impl Store for SetFile {
+    fn held(&mut self) -> Result<Held, StoreError> {
+        let (set, origin) = if self.path.exists() {
+            let set = fs::read(&self.path);
+            let failed = |source| StoreError::File { path: self.place(), source };
+            (set.map_err(failed)?, self.place())
+        } else {
+            let set = set_of("prototype", &Rig::prototype())?;
+            (set, format!("defaults: {} does not exist yet", self.place()))
+        };
+        Held::of(&set, origin).map_err(|source| StoreError::Set { place: self.place(), source })
+    }
+
+    fn put(&mut self, set: &[u8]) -> Result<(), StoreError> {
+        Ok(atomic_write(&self.path, |out| Ok(out.write_all(set)?))?)
+    }
+
+    fn restore(&mut self) -> Result<(), StoreError> {
+        self.put(&set_of("prototype", &Rig::prototype())?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_holds_what_was_put_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mine.set");
+        let mut file = SetFile::new(&path);
+        assert_eq!(file.held().unwrap().rig, Rig::prototype());
+        file.put(&set_of("mine", &Rig::fe()).unwrap()).unwrap();
+        let held = file.held().unwrap();
+        assert_eq!((held.name.as_str(), &held.rig), ("mine", &Rig::fe()));
+        assert!(held.is_current());
+        file.restore().unwrap();
+        assert_eq!(file.held().unwrap().rig, Rig::prototype());
+    }
+
+    #[test]
+    fn a_damaged_file_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mine.set");
+        let mut set = set_of("mine", &Rig::fe()).unwrap();
+        set[300] ^= 1;
+        fs::write(&path, &set).unwrap();
+        let error = SetFile::new(&path).held().unwrap_err().to_string();
+        assert!(error.contains("mine.set") && error.contains("damaged"), "{error}");
+    }
 }

@@ -7,7 +7,6 @@ pub mod injection;
 mod keys;
 mod merge;
 mod run;
-mod suggest;
 mod validate;
 mod value;
 

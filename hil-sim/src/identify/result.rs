@@ -48,6 +48,20 @@ pub struct Parameter {
     pub by: String,
 }
 
+impl Parameter {
+    fn new(
+        name: &str,
+        unit: &'static str,
+        value: f64,
+        interval: Option<[f64; 2]>,
+        identified: bool,
+        by: &str,
+    ) -> Self {
+        let (low, high) = interval.map(|[low, high]| (low, high)).unzip();
+        Self { name: name.to_owned(), unit, value, low, high, identified, by: by.to_owned() }
+    }
+}
+
 /// Residuals of a channel of a log.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Residuals {
@@ -160,15 +174,8 @@ impl Report<'_> {
             (false, true) => "its tolerance",
             (false, false) => NOTHING,
         };
-        Parameter {
-            name: name.to_owned(),
-            unit,
-            value: of(x),
-            low: Some(ends[0].min(ends[1])),
-            high: Some(ends[0].max(ends[1])),
-            identified,
-            by: by.to_owned(),
-        }
+        let interval = [ends[0].min(ends[1]), ends[0].max(ends[1])];
+        Parameter::new(name, unit, of(x), Some(interval), identified, by)
     }
 
     fn contact_parameters(&self) -> Vec<Parameter> {
@@ -222,18 +229,14 @@ impl Report<'_> {
         let gain_variance = self.contact.covariance[(LOAD_GAIN, LOAD_GAIN)];
         let x = &actuator.x;
         let variance = |index: usize| actuator.covariance[(index, index)];
-        let of = |name: &str, unit, value: f64, low: f64, high: f64| Parameter {
-            name: name.to_owned(),
-            unit,
-            value,
-            low: Some(low),
-            high: Some(high),
-            identified: high - low < 0.5 * value.abs(),
-            by: "preload sensor against duty".to_owned(),
+        let of = |name: &str, unit, value: f64, [low, high]: [f64; 2]| {
+            let identified = high - low < 0.5 * value.abs();
+            let by = "preload sensor against duty";
+            Parameter::new(name, unit, value, Some([low, high]), identified, by)
         };
         let around = |name: &str, unit, value: f64, deviation: f64| {
             let half = NORMAL_95 * deviation;
-            of(name, unit, value, value - half, value + half)
+            of(name, unit, value, [value - half, value + half])
         };
         let scaled = |name: &str, unit, index: usize| {
             let value = x[index] / gain;
@@ -245,7 +248,7 @@ impl Report<'_> {
         let lag = [lag, lag - NORMAL_95 * deviation, lag + NORMAL_95 * deviation].map(f64::exp);
         vec![
             around("preload.delay_s", "s", 1e-3 * x[actuator::DELAY], 1e-3 * delay),
-            of("preload.lag_s", "s", lag[0], lag[1], lag[2]),
+            of("preload.lag_s", "s", lag[0], [lag[1], lag[2]]),
             scaled("preload.slew_n_per_s", "N/s", actuator::SLEW),
             scaled("preload.spring_n_per_mm", "N/mm", actuator::SPRING),
         ]
@@ -262,16 +265,9 @@ impl Report<'_> {
             let variance: f64 =
                 zeros.iter().map(|zero| (part(zero) * zero.error).powi(2)).sum::<f64>();
             let half = NORMAL_95 * variance.sqrt();
-            let known = count > 0;
-            Parameter {
-                name: name.to_owned(),
-                unit,
-                value,
-                low: known.then_some(value - half),
-                high: known.then_some(value + half),
-                identified: known,
-                by: if known { "the unloaded rig" } else { NOTHING }.to_owned(),
-            }
+            let interval = (count > 0).then_some([value - half, value + half]);
+            let by = interval.map_or(NOTHING, |_| "the unloaded rig");
+            Parameter::new(name, unit, value, interval, count > 0, by)
         };
         [
             of("preload sensor zero", "N", |run| run.traces.preload_zero),
@@ -368,15 +364,7 @@ mod tests {
     use super::*;
 
     fn parameter(name: &str, value: f64, identified: bool) -> Parameter {
-        Parameter {
-            name: name.into(),
-            unit: "",
-            value,
-            low: Some(value - 0.1),
-            high: Some(value + 0.1),
-            identified,
-            by: String::new(),
-        }
+        Parameter::new(name, "", value, Some([value - 0.1, value + 0.1]), identified, "")
     }
 
     #[test]

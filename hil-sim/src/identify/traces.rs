@@ -200,14 +200,12 @@ impl Traces {
         self.bins = ranges(&self.span, BIN)
             .map(|ticks| {
                 let of = &samples[ticks.clone()];
-                let mean = of.iter().map(|s| s.compression_mm).sum::<f64>() / of.len() as f64;
                 let arms: Vec<f64> = of.iter().filter_map(|s| s.arm_rad).collect();
                 let pressed = self.preload_n[ticks.start] > LEAST_PRELOAD_N;
-                let preload = of.iter().map(|s| s.preload_n).sum::<f64>() / of.len() as f64;
                 Bin {
-                    preload_n: preload - self.preload_zero.value,
+                    preload_n: mean(of, |s| s.preload_n) - self.preload_zero.value,
                     pressed,
-                    compression_mm: mean - self.compression_zero.value,
+                    compression_mm: mean(of, |s| s.compression_mm) - self.compression_zero.value,
                     arm_rad: (!arms.is_empty())
                         .then(|| arms.iter().sum::<f64>() / arms.len() as f64),
                     used: pressed
@@ -222,7 +220,7 @@ impl Traces {
         self.efforts = ranges(&(moving..self.span.end), EFFORT_BIN)
             .map(|ticks| {
                 let of = &samples[ticks.clone()];
-                let duty = of.iter().map(|s| s.drive).sum::<f64>() / of.len() as f64;
+                let duty = mean(of, |s| s.drive);
                 let turn_rad_s = speed(&ticks);
                 let mid = (ticks.start + ticks.end) / 2;
                 let (first, second) = (speed(&(ticks.start..mid)), speed(&(mid..ticks.end)));
@@ -247,13 +245,17 @@ fn ranges(span: &Range<usize>, length: usize) -> impl Iterator<Item = Range<usiz
     (0..count).map(move |i| start + i * length..start + (i + 1) * length)
 }
 
+fn mean(samples: &[Sample], of: impl Fn(&Sample) -> f64) -> f64 {
+    samples.iter().map(of).sum::<f64>() / samples.len() as f64
+}
+
 fn zero(idle: &[Sample], of: impl Fn(&Sample) -> f64) -> Zero {
     let count = idle.len();
     if count < LEAST_UNLOADED {
         return Zero::default();
     }
     let n = count as f64;
-    let value = idle.iter().map(&of).sum::<f64>() / n;
+    let value = mean(idle, &of);
     let square = idle.iter().map(|s| (of(s) - value).powi(2)).sum::<f64>();
     Zero { value, error: (square / (n - 1.0) / n).sqrt(), count }
 }

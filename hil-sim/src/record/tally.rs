@@ -16,6 +16,7 @@ pub(super) const TICK_S: f64 = 1e-3;
 const ARRIVED_WITHIN_MM: f64 = 1.0;
 
 /// The sums of a run as it goes on.
+#[derive(Default)]
 pub struct Tally {
     /// Digest of the controller's outputs.
     pub digest: Sha256,
@@ -55,21 +56,7 @@ impl Tally {
     /// A run that begins at `start_mm` and is planned for gaps of `gap_ref_mm`.
     #[must_use]
     pub fn new(gap_ref_mm: f64, start_mm: f64) -> Self {
-        Self {
-            digest: Sha256::new(),
-            rows: Vec::new(),
-            log: Vec::new(),
-            faults: Vec::new(),
-            limits: Vec::new(),
-            gap_ref_mm,
-            start_mm,
-            run_started: None,
-            run_ended: 0.0,
-            preload_sum: 0.0,
-            moving: 0,
-            worst_separation: 0.0,
-            passed: 0,
-        }
+        Self { gap_ref_mm, start_mm, ..Self::default() }
     }
 
     /// Time at which this tick began, s.

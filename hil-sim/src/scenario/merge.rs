@@ -7,7 +7,6 @@ use toml::{Table, Value};
 
 use super::error::ScenarioError;
 use super::keys::{self, Kind};
-use super::suggest;
 use super::value::{checked, from_text, has_unit, split};
 
 /// Origin of what `--set` overrides.
@@ -86,7 +85,7 @@ impl Merged {
         let mut known: Vec<String> =
             keys::leaves(&self.table).into_iter().map(|(key, _)| key).collect();
         known.extend(self.table.keys().cloned());
-        ScenarioError::unknown_key(origin, key, &suggest::hint(key, &known))
+        ScenarioError::unknown_key(origin, key, &keys::hint(key, &known))
     }
 
     fn find(&self, key: &str) -> Option<&Value> {
