@@ -5,28 +5,24 @@ use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// What may go wrong while a file is filled.
+/// Why a file could not be filled.
 pub(crate) type Failure = Box<dyn Error + Send + Sync>;
 
-/// A file that could not be written; displays as one line with its path.
+/// A file or directory that could not be written; displays as one line with its path.
 #[derive(Debug, thiserror::Error)]
-pub enum FileError {
-    /// The directory cannot be made.
-    #[error("{}: cannot make the directory: {source}", path.display())]
-    Directory {
-        /// The directory.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// The file cannot be written.
-    #[error("{}: cannot be written: {source}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: Failure,
-    },
+#[error("{}: {what}: {source}", path.display())]
+pub struct FileError {
+    path: PathBuf,
+    what: &'static str,
+    source: Failure,
+}
+
+/// An error and its causes in one line, the system's own last.
+pub(crate) fn with_causes(error: &(dyn Error + 'static)) -> String {
+    let causes = std::iter::successors(Some(error), |&error| error.source());
+    let mut texts: Vec<String> = causes.map(ToString::to_string).collect();
+    texts.dedup();
+    texts.join(": ")
 }
 
 /// Fills the file at `path` by `fill`, under a temporary name beside it until it is complete.
@@ -49,13 +45,14 @@ pub(crate) fn atomic_write(
         file.persist(path)?;
         Ok(())
     };
-    write().map_err(|source| FileError::File { path: path.to_owned(), source })
+    let what = "cannot be written";
+    write().map_err(|source| FileError { path: path.to_owned(), what, source })
 }
 
-/// Writes `text` to `path`, which is complete or as it was.
+/// Writes `text` to `path`; if that fails, the file stays as it was.
 ///
 /// # Errors
-/// [`FileError::File`] with the reason.
+/// [`FileError`] with the reason.
 pub fn write_text(path: &Path, text: &str) -> Result<(), FileError> {
     atomic_write(path, |out| Ok(out.write_all(text.as_bytes())?))
 }
@@ -63,10 +60,14 @@ pub fn write_text(path: &Path, text: &str) -> Result<(), FileError> {
 /// Makes `directory` and those above it.
 ///
 /// # Errors
-/// [`FileError::Directory`] with the reason.
+/// [`FileError`] with the reason.
 pub fn make_directory(directory: &Path) -> Result<(), FileError> {
-    fs::create_dir_all(directory)
-        .map_err(|source| FileError::Directory { path: directory.to_owned(), source })
+    let what = "cannot make the directory";
+    fs::create_dir_all(directory).map_err(|error| FileError {
+        path: directory.to_owned(),
+        what,
+        source: error.into(),
+    })
 }
 
 #[cfg(test)]

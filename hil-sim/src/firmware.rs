@@ -1,4 +1,4 @@
-//! The firmware image: building it, and what it takes of flash and RAM.
+//! Builds the firmware image and measures its flash and RAM.
 
 use std::env;
 use std::ffi::OsString;
@@ -8,8 +8,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Output, Stdio};
 
 use object::read::elf::ElfFile32;
-use object::{Endianness, Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, elf};
-use serde::Deserialize;
+use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, elf};
+use serde_json::Value;
+
+use crate::probe::{Port, PortError};
 
 /// Compilation target of the board.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
@@ -17,28 +19,25 @@ pub const TARGET: &str = "thumbv7em-none-eabihf";
 /// Name of the package and of its binary.
 const PACKAGE: &str = "interstage";
 
+/// Symbol of the channels' control block.
+const BLOCK: &str = "_SEGGER_RTT";
+/// Section of the linker's hash over the image.
+const ID: &str = ".note.gnu.build-id";
+
 /// The chip's flash, both banks.
 const FLASH: Range<u64> = 0x0800_0000..0x0808_0000;
 
-/// What can go wrong with the image.
+/// Why an image is not available.
 #[derive(Debug, thiserror::Error)]
 pub enum FirmwareError {
-    /// A program could not be started.
-    #[error("could not start `{program}`: {source}")]
-    Start {
-        /// The program.
-        program: String,
-        /// Why.
-        source: io::Error,
-    },
-    /// The target is missing and could not be added.
+    /// This program could not be started.
+    #[error("could not start `{0}`: {1}")]
+    Start(String, io::Error),
+    /// The target is missing and could not be added, and why.
     #[error(
-        "the Rust target {TARGET} is not installed and `rustup target add {TARGET}` failed: {why}"
+        "the Rust target {TARGET} is not installed and `rustup target add {TARGET}` failed: {0}"
     )]
-    Target {
-        /// What rustup said, or why it could not be asked.
-        why: String,
-    },
+    Target(String),
     /// cargo did not build the binary; its own messages have gone to standard error.
     #[error("building {0} failed ({1})")]
     Build(String, ExitStatus),
@@ -78,21 +77,21 @@ pub(crate) fn target_directory() -> PathBuf {
     env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace().join("target"), PathBuf::from)
 }
 
-/// Settings of cargo that keep this machine's folders out of the image. Panic messages
-/// name the sources of libraries, so the length of their paths would be in its size.
+/// Settings of cargo that keep this machine's folders out of the image: panic messages
+/// contain the paths of libraries, so that its size would depend on them.
 fn remapped_paths() -> String {
     let home = env::var_os("CARGO_HOME").map(PathBuf::from);
     let home = home.or_else(|| Some(env::home_dir()?.join(".cargo"))).unwrap_or_default();
     let folders = std::fs::read_dir(home.join("registry/src")).into_iter().flatten().flatten();
     let mut folders: Vec<PathBuf> = folders.map(|folder| folder.path()).collect();
     folders.sort();
-    // To the root, so that the rest cannot be taken for a relative path.
+    // To the root, so that the rest is no relative path.
     let flag = |folder: &PathBuf| Some(format!("--remap-path-prefix={}=/", folder.to_str()?));
     let flags: Vec<String> = folders.iter().filter_map(flag).collect();
     format!("target.{TARGET}.rustflags={flags:?}")
 }
 
-/// A tool of the toolchain that runs this program, if it is known.
+/// A tool of the toolchain: from the environment, or by its name.
 pub(crate) fn tool(variable: &str, name: &str) -> OsString {
     env::var_os(variable).unwrap_or_else(|| name.into())
 }
@@ -102,8 +101,13 @@ pub(crate) fn output(command: &mut Command) -> Result<Output, FirmwareError> {
     command.output().map_err(|source| could_not_start(command, source))
 }
 
+/// A program's exit code; 1 if it was killed.
+pub(crate) fn exit_code(status: ExitStatus) -> u8 {
+    status.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(1)
+}
+
 pub(crate) fn could_not_start(command: &Command, source: io::Error) -> FirmwareError {
-    FirmwareError::Start { program: command.get_program().to_string_lossy().into_owned(), source }
+    FirmwareError::Start(command.get_program().to_string_lossy().into_owned(), source)
 }
 
 /// Adds the board's target to the toolchain if it is missing.
@@ -121,19 +125,18 @@ pub fn ensure_target() -> Result<(), FirmwareError> {
     }
     let mut rustup = Command::new("rustup");
     rustup.args(["target", "add", TARGET]).current_dir(workspace());
-    let added =
-        output(&mut rustup).map_err(|error| FirmwareError::Target { why: error.to_string() })?;
+    let added = output(&mut rustup).map_err(|error| FirmwareError::Target(error.to_string()))?;
     if added.status.success() {
         return Ok(());
     }
-    Err(FirmwareError::Target { why: String::from_utf8_lossy(&added.stderr).trim().to_owned() })
+    Err(FirmwareError::Target(String::from_utf8_lossy(&added.stderr).trim().to_owned()))
 }
 
 /// Builds the image, adding the target first if it is missing, and returns its path.
 /// cargo's progress and messages go to standard error.
 ///
 /// # Errors
-/// [`FirmwareError`] if the target cannot be had or the build fails.
+/// [`FirmwareError`] if the target is not available or the build fails.
 pub fn build(profile: Profile) -> Result<PathBuf, FirmwareError> {
     build_binary(PACKAGE, PACKAGE, profile, &[])
 }
@@ -181,25 +184,11 @@ pub(crate) fn executable(cargo: &mut Command, binary: &str) -> Result<PathBuf, F
         .ok_or_else(|| FirmwareError::NoExecutable(binary.to_owned()))
 }
 
-/// The part of a cargo message that names an executable.
-#[derive(Deserialize)]
-struct Artifact {
-    target: ArtifactTarget,
-    executable: Option<PathBuf>,
-}
-
-#[derive(Deserialize)]
-struct ArtifactTarget {
-    name: String,
-}
-
 /// The binary's path from cargo's messages, one JSON object a line.
 fn named(messages: &str, binary: &str) -> Option<PathBuf> {
-    messages
-        .lines()
-        .filter_map(|line| serde_json::from_str::<Artifact>(line).ok())
-        .filter(|artifact| artifact.target.name == binary)
-        .find_map(|artifact| artifact.executable)
+    let messages = messages.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
+    let mut executables = messages.filter(|message| message["target"]["name"] == binary);
+    executables.find_map(|message| message["executable"].as_str().map(PathBuf::from))
 }
 
 /// Builds the firmware and returns the image.
@@ -211,7 +200,52 @@ pub fn image(profile: Profile) -> Result<Vec<u8>, FirmwareError> {
     std::fs::read(&path).map_err(|source| FirmwareError::Read { path, source })
 }
 
-/// What an image takes, bytes. Its bounds are asserted in `memory.x`.
+/// Identity of an image: the linker's hash and its address.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Image {
+    /// Address of the channels' control block.
+    pub block: u32,
+    place: u32,
+    id: Vec<u8>,
+}
+
+impl Image {
+    /// Of the image in `elf`.
+    ///
+    /// # Errors
+    /// [`FirmwareError::Image`] if it is no image of the firmware.
+    pub fn of(elf: &[u8]) -> Result<Self, FirmwareError> {
+        let file = parse(elf)?;
+        let section = file.section_by_name(ID);
+        let section = section.ok_or_else(|| FirmwareError::Image("it has no hash".to_owned()))?;
+        let id = section.data().map_err(|error| FirmwareError::Image(error.to_string()))?.to_vec();
+        // Addresses of a chip with 32 bits.
+        Ok(Self { block: symbol(&file, BLOCK)? as u32, place: section.address() as u32, id })
+    }
+
+    /// Whether a board has this image in its flash.
+    ///
+    /// # Errors
+    /// [`PortError`] if its memory cannot be read.
+    pub fn is_on(&self, port: &mut dyn Port) -> Result<bool, PortError> {
+        let mut there = vec![0; self.id.len()];
+        port.memory(self.place, &mut there)?;
+        Ok(there == self.id)
+    }
+}
+
+fn parse(elf: &[u8]) -> Result<ElfFile32<'_>, FirmwareError> {
+    ElfFile32::parse(elf).map_err(|error| FirmwareError::Image(error.to_string()))
+}
+
+/// Address of a symbol.
+fn symbol(file: &ElfFile32<'_>, name: &str) -> Result<u64, FirmwareError> {
+    let symbol = file.symbols().find(|symbol| symbol.name() == Ok(name));
+    let address = symbol.map(|symbol| symbol.address());
+    address.ok_or_else(|| FirmwareError::Image(format!("no symbol {name}")))
+}
+
+/// Memory of an image, bytes. Its bounds are asserted in `memory.x`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Footprint {
     /// Flash, with the copies that fill RAM at start.
@@ -228,15 +262,8 @@ impl Footprint {
     /// # Errors
     /// [`FirmwareError::Image`] if it is not an image of this board.
     pub fn of_elf(bytes: &[u8]) -> Result<Self, FirmwareError> {
-        let file = ElfFile32::<Endianness>::parse(bytes)
-            .map_err(|error| FirmwareError::Image(error.to_string()))?;
-        let symbol = |name: &str| {
-            let symbol = file.symbols().find(|symbol| symbol.name() == Ok(name));
-            symbol
-                .map(|symbol| symbol.address())
-                .ok_or_else(|| FirmwareError::Image(format!("no symbol {name}")))
-        };
-        let stack = symbol("_stack_start")?.saturating_sub(symbol("_stack_end")?);
+        let file = parse(bytes)?;
+        let stack = symbol(&file, "_stack_start")?.saturating_sub(symbol(&file, "_stack_end")?);
         let mut taken = Self { flash: 0, ram: stack, stack };
         for section in file.sections() {
             let SectionFlags::Elf { sh_flags } = section.flags() else { continue };

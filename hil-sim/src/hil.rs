@@ -1,10 +1,9 @@
 //! Hardware in the loop: the plant on this host, the controller on a board, a port in
 //! between ([`interstage::hal::hil`]).
 //!
-//! The loop is closed in lockstep, so that nothing depends on how fast the port is: a run
-//! gives the same trace as in software, bit for bit, and takes as long as it takes.
+//! The loop runs in lockstep, so that the speed of the port has no effect: a run gives the
+//! same trace as in software, bit for bit.
 
-mod image;
 mod line;
 mod run;
 
@@ -14,14 +13,14 @@ use crate::plant::limits::Refusal;
 use crate::plant::rig::PlantError;
 use crate::probe::PortError;
 
-pub use image::Image;
+pub use crate::firmware::Image;
 pub use line::HostLine;
 pub use run::{Asked, run};
 
 /// Why a run could not be made. Each is one line.
 #[derive(Debug, thiserror::Error)]
 pub enum HilError {
-    /// The port.
+    /// The port failed.
     #[error(transparent)]
     Port(#[from] PortError),
     /// The firmware has one controller.
@@ -33,7 +32,7 @@ pub enum HilError {
     /// The plant of this seed cannot be computed.
     #[error("plant: {0}")]
     Refused(#[from] Refusal),
-    /// The plant left the set of meaningful states.
+    /// The plant's state became invalid.
     #[error(transparent)]
     Plant(#[from] PlantError),
     /// Nothing answers in this protocol.
@@ -42,7 +41,7 @@ pub enum HilError {
     /// The board fell silent.
     #[error("the board fell silent at tick {0}")]
     Silent(u32),
-    /// The board is not where this host is.
+    /// Board and host are at different ticks.
     #[error("the board is at tick {board}, this host at {host}: it has restarted meanwhile")]
     Apart {
         /// The board's next tick.
@@ -50,13 +49,13 @@ pub enum HilError {
         /// This host's.
         host: u32,
     },
-    /// The board has heard nothing for too long.
+    /// The board's timeout for its host has passed.
     #[error(
         "this host was too slow: the board has turned its bridges off and gone on alone at \
          tick {0}"
     )]
     Alone(u32),
-    /// The board's parameters are others than the scenario's.
+    /// The board's parameters differ from the scenario's.
     #[error(
         "the board runs on {board} ({board_hash}), the scenario is {scenario} \
          ({scenario_hash}): `rig params restore FILE` puts a scenario's rig into the board"
@@ -71,7 +70,7 @@ pub enum HilError {
         /// Hash of its parameters.
         scenario_hash: String,
     },
-    /// Not every tick has come back in the log.
+    /// The log lacks a tick.
     #[error("the log lacks tick {0}, so that the run cannot be reported")]
     Incomplete(u32),
 }

@@ -1,4 +1,4 @@
-//! Parameters of a rig out of its logs.
+//! Identifies the parameters of a rig from its logs.
 
 pub mod actuator;
 pub mod contact;
@@ -8,7 +8,6 @@ pub mod least_squares;
 pub mod noise;
 pub mod plot;
 pub mod published;
-pub mod read;
 pub mod record;
 pub mod result;
 pub mod traces;
@@ -16,18 +15,10 @@ pub mod traces;
 /// Why nothing was identified.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum IdentifyError {
-    /// A log cannot be used.
-    #[error("{name}: {why}")]
-    Log {
-        /// The log.
-        name: String,
-        /// Why.
-        why: String,
-    },
-    /// The fit found nothing.
-    #[error("the fit did not settle: {why}")]
-    NoFit {
-        /// Why.
-        why: String,
-    },
+    /// The log of this name cannot be used, and why.
+    #[error("{0}: {1}")]
+    Log(String, String),
+    /// The fit found nothing, and why.
+    #[error("the fit did not settle: {0}")]
+    NoFit(String),
 }

@@ -1,5 +1,5 @@
-//! Injects the faults of a scenario into a run: between sensors and controller, between
-//! controller and actuators, in the plant, in the tick itself, in the commands and the log.
+//! Injects the faults of a scenario into a run: into sensor codes, bridge duties, the plant,
+//! the tick, the commands and the log.
 
 mod sensor;
 
@@ -18,38 +18,38 @@ use crate::scenario::{Direction, Scenario};
 
 /// Control period, s.
 const TICK_S: f64 = 1e-3;
-/// Difference of duty that is one.
+/// Difference of duty from which on a fault acts.
 const ACTS: f64 = 0.02;
-/// Difference of duty from which on the readback must show it: its band, and as much for what
-/// the supply may be off. A constant, and a part of the duty.
-const TELLS: (f64, f64) = (0.04, 0.0625);
+/// Difference of duty from which on the readback must show the fault: its tolerance band, and
+/// as much for an error of the supply. A constant, and a part of the duty.
+const SHOWS: (f64, f64) = (0.04, 0.0625);
 /// Half of the torn sector, rad.
 const TORN_RAD: f64 = 0.35;
-/// Distance within which a corner that carries again is the same one, mm.
+/// Distance within which a corner that carries again is the same corner, mm.
 const SAME_CORNER_MM: f64 = 5.0;
 
-/// What a reset finds of the record of the tick before it.
+/// The snapshot of the last tick that a reset finds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RecordFound {
     /// As it was written.
     Intact,
-    /// In doubt, and its position off by so much, mm.
+    /// Not trusted, with its position off by so much, mm.
     Off(f64),
     /// Nothing.
     Gone,
 }
 
-/// The faults of a run, and how far they have come.
+/// The faults of a run and their states.
 pub struct FaultInjector {
     faults: Vec<Active>,
     random: ChaCha8Rng,
     t_s: f64,
-    /// Corners touched so far, and where the last one carried.
+    /// Corners touched so far, and the position of the last one, mm.
     corners: (u8, Option<f64>),
-    /// The run goes outwards.
+    /// Whether the run deploys.
     outwards: bool,
-    /// Undamaged plant: friction, load, stiffness.
-    whole: Option<(f64, f64, f64, f64)>,
+    /// Undamaged plant: friction, load, relaxed and instant stiffness.
+    undamaged: Option<(f64, f64, f64, f64)>,
 }
 
 /// One fault.
@@ -58,14 +58,14 @@ struct Active {
     /// When it came, s.
     since_s: Option<f64>,
     over: bool,
-    /// Whether it has had its effect, if that comes once.
+    /// Whether a fault that acts once has acted.
     done: bool,
-    /// Whether it was there when it was last asked for.
+    /// Whether it was active at the last call of [`FaultInjector::changes`].
     known: bool,
-    /// When it first did something, s.
+    /// When it first changed a duty, s.
     acts_s: Option<f64>,
-    /// When it first did what the readback must show, s.
-    tells_s: Option<f64>,
+    /// When it first changed a duty so far that the readback must show it, s.
+    shows_s: Option<f64>,
     sensor: Option<FaultySensor>,
     /// Duty of an actuator when the fault came.
     kept: Option<f64>,
@@ -88,7 +88,7 @@ impl FaultInjector {
             done: false,
             known: false,
             acts_s: None,
-            tells_s: None,
+            shows_s: None,
             sensor: injection.target.is_sensor().then(|| {
                 let (target, kind) = (injection.target, injection.kind);
                 FaultySensor::new(target, kind, injection.magnitude(), &scenario.rig.sense, turn_mm)
@@ -103,42 +103,35 @@ impl FaultInjector {
             t_s: 0.0,
             corners: (0, None),
             outwards: scenario.run.direction == Direction::Deploy,
-            whole: None,
+            undamaged: None,
         })
     }
 
     /// When the first fault came, s since boot.
     #[must_use]
     pub fn struck_s(&self) -> Option<f64> {
-        self.faults.iter().filter_map(|fault| fault.since_s).min_by(f64::total_cmp)
+        self.first(|fault| fault.since_s)
     }
 
-    /// When it first made an actuator take another duty than it was asked for, s since boot;
-    /// for all other faults, when it came.
+    fn first(&self, time: impl Fn(&Active) -> Option<f64>) -> Option<f64> {
+        self.faults.iter().filter_map(time).min_by(f64::total_cmp)
+    }
+
+    /// When a fault first changed the duty of an actuator, s since boot; other faults act as
+    /// soon as they come.
     #[must_use]
     pub fn acts_s(&self) -> Option<f64> {
-        let acts = |fault: &Active| match fault.injection.target {
-            Target::Drive | Target::Pretightener => fault.acts_s,
-            _ => fault.since_s,
-        };
-        self.faults.iter().filter_map(acts).min_by(f64::total_cmp)
+        self.first(Active::acts_s)
     }
 
-    /// The same with the difference of duty being one that the readback must show, where the
-    /// fault lies in the bridge.
+    /// The same, where a fault of a bridge counts only from a difference of duty on that the
+    /// readback must show.
     #[must_use]
     pub fn tells_s(&self) -> Option<f64> {
-        let tells = |fault: &Active| match fault.injection.target {
-            Target::Drive | Target::Pretightener if fault.injection.kind.is_in_bridge() => {
-                fault.tells_s
-            }
-            Target::Drive | Target::Pretightener => fault.acts_s,
-            _ => fault.since_s,
-        };
-        self.faults.iter().filter_map(tells).min_by(f64::total_cmp)
+        self.first(|fault| if fault.is_in_bridge() { fault.shows_s } else { fault.acts_s() })
     }
 
-    /// A tick begins: faults come and go.
+    /// Begins a tick: faults start and end.
     pub fn begin(&mut self, t_s: f64, truth: &Truth) {
         self.t_s = t_s;
         if truth.corner_n > 0.0 {
@@ -164,19 +157,19 @@ impl FaultInjector {
         }
     }
 
-    /// The faults that have come, and those that have gone, since the last call.
+    /// The faults that have started (true) or ended since the last call.
     pub fn changes(&mut self) -> Vec<(Injection, bool)> {
         let mut changes = Vec::new();
         for fault in &mut self.faults {
-            let there = fault.since_s.is_some() && !fault.over;
-            if there != std::mem::replace(&mut fault.known, there) {
-                changes.push((fault.injection, there));
+            let active = fault.is_active();
+            if active != std::mem::replace(&mut fault.known, active) {
+                changes.push((fault.injection, active));
             }
         }
         changes
     }
 
-    /// The sensors as the controller gets them.
+    /// Distorts the sensor codes for the controller.
     pub fn sensors(&mut self, frame: &mut SensorFrame) {
         let t_s = self.t_s;
         for fault in &mut self.faults {
@@ -187,7 +180,7 @@ impl FaultInjector {
         }
     }
 
-    /// The command as the controller gets it.
+    /// The command that the controller gets.
     pub fn command(&mut self, given: Option<Command>) -> Option<Command> {
         let flooding = self.is(Target::Commands, Kind::Flooding).is_some();
         let rate = self.is(Target::Commands, Kind::Random);
@@ -207,7 +200,7 @@ impl FaultInjector {
         })
     }
 
-    /// The reset that comes in this tick, if one does, by what it finds of the record.
+    /// The reset of this tick, if there is one, by the snapshot that it finds.
     pub fn reset(&mut self) -> Option<RecordFound> {
         let here = |fault: &&mut Active| {
             fault.injection.target == Target::Reset && fault.since_s.is_some() && !fault.done
@@ -233,18 +226,18 @@ impl FaultInjector {
         self.is(Target::Log, Kind::Gone).is_some()
     }
 
-    /// The bridges as the plant gets them.
+    /// The bridge duties that the plant gets.
     #[must_use]
     pub fn drives(&mut self, asked: Drives) -> Drives {
         let (mut drives, t_s) = (asked, self.t_s);
         for fault in &mut self.faults {
-            let active = fault.since_s.is_some() && !fault.over;
+            let active = fault.is_active();
             match fault.injection.target {
                 Target::Drive => {
-                    drives.lost[0] = fault.turn(active, &mut drives.drive, drives.drive_on);
+                    drives.lost[0] = fault.drive(active, &mut drives.drive, drives.drive_on);
                 }
                 Target::Pretightener => {
-                    drives.lost[1] = fault.turn(active, &mut drives.preload, drives.preload_on);
+                    drives.lost[1] = fault.drive(active, &mut drives.preload, drives.preload_on);
                 }
                 _ => continue,
             }
@@ -254,25 +247,25 @@ impl FaultInjector {
                 if other > ACTS {
                     fault.acts_s.get_or_insert(t_s);
                 }
-                if other > TELLS.0 + TELLS.1 * asked.abs() {
-                    fault.tells_s.get_or_insert(t_s);
+                if other > SHOWS.0 + SHOWS.1 * asked.abs() {
+                    fault.shows_s.get_or_insert(t_s);
                 }
             }
         }
         drives
     }
 
-    /// The plant as it is left.
+    /// Damages the plant.
     pub fn plant(&mut self, plant: &mut VirtualRig) {
         if !self.faults.iter().any(|fault| fault.damages()) {
             return;
         }
         let p = plant.parameters();
-        let whole = (p.mu, p.load_n, p.ring.k_inf, p.ring.k_0);
-        let (mu, load_n, k_inf, k_0) = *self.whole.get_or_insert(whole);
+        let undamaged = (p.mu, p.load_n, p.ring.k_inf, p.ring.k_0);
+        let (mu, load_n, k_inf, k_0) = *self.undamaged.get_or_insert(undamaged);
         let turned = plant.truth().rotation_rad;
         for fault in &mut self.faults {
-            let active = fault.since_s.is_some() && !fault.over;
+            let active = fault.is_active();
             let part = if active { fault.injection.magnitude() } else { 1.0 };
             match (fault.injection.target, fault.injection.kind) {
                 (Target::Wheel, Kind::Slip) => plant.set_friction(mu * part),
@@ -292,26 +285,38 @@ impl FaultInjector {
         }
     }
 
-    /// Magnitude of such a fault, if it is there now.
+    /// Magnitude of such a fault, if it is active.
     fn is(&self, target: Target, kind: Kind) -> Option<f64> {
-        let fault = self.faults.iter().find(|fault| {
-            let injection = &fault.injection;
-            (injection.target, injection.kind) == (target, kind)
-                && fault.since_s.is_some()
-                && !fault.over
-        });
+        let is = |injection: &Injection| (injection.target, injection.kind) == (target, kind);
+        let fault = self.faults.iter().find(|fault| is(&fault.injection) && fault.is_active());
         fault.map(|fault| fault.injection.magnitude())
     }
 }
 
 impl Active {
-    fn damages(&self) -> bool {
+    const fn is_active(&self) -> bool {
+        self.since_s.is_some() && !self.over
+    }
+
+    const fn is_of_actuator(&self) -> bool {
+        matches!(self.injection.target, Target::Drive | Target::Pretightener)
+    }
+
+    const fn is_in_bridge(&self) -> bool {
+        self.is_of_actuator() && self.injection.kind.is_in_bridge()
+    }
+
+    const fn acts_s(&self) -> Option<f64> {
+        if self.is_of_actuator() { self.acts_s } else { self.since_s }
+    }
+
+    const fn damages(&self) -> bool {
         use Target::{Load, Spring, Tread, Wheel};
         matches!(self.injection.target, Wheel | Tread | Spring | Load)
     }
 
-    /// What a faulty bridge makes of its duty. Gives the part that is lost behind it.
-    fn turn(&mut self, active: bool, duty: &mut f64, on: bool) -> f64 {
+    /// Puts in the duty of the faulty bridge. Returns the part that is lost behind it.
+    fn drive(&mut self, active: bool, duty: &mut f64, on: bool) -> f64 {
         let kind = self.injection.kind;
         if kind == Kind::Delayed {
             let depth = (self.injection.magnitude() / TICK_S).round() as usize;
@@ -345,9 +350,23 @@ mod tests {
     use super::*;
 
     fn injector(target: Target, kind: Kind, magnitude: f64) -> FaultInjector {
+        injecting(Injection::at(target, kind, 0.010, magnitude))
+    }
+
+    fn injecting(fault: Injection) -> FaultInjector {
         let mut scenario = Scenario::default();
-        scenario.run.faults = vec![Injection::at(target, kind, 0.010, magnitude)];
+        scenario.run.faults = vec![fault];
         FaultInjector::of(&scenario).expect("a fault")
+    }
+
+    /// The first of 100 ticks in which something is so, and in how many it is.
+    fn ticks(mut of: FaultInjector, is_so: impl Fn(&FaultInjector) -> bool) -> (u32, usize) {
+        let so = (0..100u32).filter(|tick| {
+            of.begin(f64::from(*tick) * TICK_S, &Truth::default());
+            is_so(&of)
+        });
+        let so: Vec<u32> = so.collect();
+        (so[0], so.len())
     }
 
     /// Duties that reach the drive when 0.001, 0.002 ... are asked for.
@@ -364,7 +383,7 @@ mod tests {
     }
 
     #[test]
-    fn an_actuator_turns_as_its_fault_has_it() {
+    fn each_kind_changes_the_duty_in_its_own_manner() {
         let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} {b}");
         for kind in [Kind::Stalled, Kind::Stuck, Kind::Weak, Kind::Reversed, Kind::Delayed] {
             near(duties(kind, 0.005)[8], 0.009);
@@ -391,7 +410,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_readback_need_not_tell_acts_all_the_same() {
+    fn a_fault_below_the_band_of_the_readback_acts_too() {
         let mut injector = injector(Target::Drive, Kind::Runaway, 0.5);
         let mut drive = |t_s: f64, drive: f64| {
             injector.begin(t_s, &Truth::default());
@@ -410,40 +429,23 @@ mod tests {
     }
 
     #[test]
-    fn ticks_are_lost_once_and_for_as_long_as_said() {
-        let mut injector = injector(Target::Tick, Kind::Overrun, 0.003);
-        let lost: Vec<i32> = (0..100)
-            .filter(|tick| {
-                injector.begin(f64::from(*tick) * TICK_S, &Truth::default());
-                injector.lost()
-            })
-            .collect();
-        assert_eq!(lost, [10, 11, 12]);
+    fn ticks_are_lost_once_and_for_as_long_as_asked() {
+        let injector = injector(Target::Tick, Kind::Overrun, 0.003);
+        assert_eq!(ticks(injector, FaultInjector::lost), (10, 3));
     }
 
     #[test]
     fn a_fault_ends_when_its_time_is_over() {
-        let mut scenario = Scenario::default();
-        let mut hung = Injection::at(Target::Model, Kind::Hung, 0.010, 0.0);
-        hung.duration_s = Some(0.005);
-        scenario.run.faults = vec![hung];
-        let mut injector = FaultInjector::of(&scenario).expect("a fault");
-        let hangs: Vec<i32> = (0..100)
-            .filter(|tick| {
-                injector.begin(f64::from(*tick) * TICK_S, &Truth::default());
-                injector.model_hangs()
-            })
-            .collect();
-        assert_eq!((hangs.first(), hangs.len()), (Some(&10), 5));
+        let hung = Injection::at(Target::Model, Kind::Hung, 0.010, 0.0);
+        let injector = injecting(Injection { duration_s: Some(0.005), ..hung });
+        assert_eq!(ticks(injector, FaultInjector::model_hangs), (10, 5));
     }
 
     #[test]
     fn a_crossing_counts_once_however_its_corner_chatters() {
-        let mut scenario = Scenario::default();
         let mut fault = Injection::at(Target::Log, Kind::Gone, 0.0, 0.0);
         (fault.at_s, fault.at_crossing) = (None, Some(2));
-        scenario.run.faults = vec![fault];
-        let mut injector = FaultInjector::of(&scenario).expect("a fault");
+        let mut injector = injecting(fault);
         let mut at = |position_mm: f64, corner_n: f64| {
             injector.begin(0.0, &Truth { position_mm, corner_n, ..Truth::default() });
             injector.log_gone()

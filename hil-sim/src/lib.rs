@@ -1,5 +1,5 @@
-//! The virtual rig: a physical plant for the controller, the scenarios it is run
-//! in, and what is shown of a run.
+//! The virtual rig: a physical plant for the controller, the scenarios of its runs, and the
+//! reports on them.
 
 pub mod cli;
 pub mod compare;

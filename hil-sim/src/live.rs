@@ -1,4 +1,4 @@
-//! A log under way on the screen and on the network.
+//! Shows a growing log on the terminal and publishes it on the network.
 
 mod screen;
 mod server;

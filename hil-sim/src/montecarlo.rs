@@ -1,4 +1,4 @@
-//! Many random rigs: one run a seed, in parallel, and what limits them.
+//! Runs many random rigs, one per seed, in parallel, and finds what limits them.
 
 mod outcome;
 mod shard;
@@ -15,7 +15,7 @@ use crate::session::{self, Options, RunError};
 pub use outcome::{Least, LimitCount, Outcome, Quantiles, SeedReport};
 pub use shard::{Shard, ShardError};
 
-/// What is kept of one run.
+/// The result of one run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct RunLine {
     /// Seed of the plant.
@@ -71,7 +71,7 @@ impl RunLine {
     }
 }
 
-/// Crossings with gross slip; a run that slipped elsewhere alone counts as one.
+/// Crossings with gross slip; a run that slipped only elsewhere counts as one.
 #[must_use]
 pub fn slip_events(summary: &Summary) -> usize {
     let crossings = summary.crossings.iter().filter(|c| c.slip_mm > SLIP_SEEN_MM).count();

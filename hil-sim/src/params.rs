@@ -1,22 +1,26 @@
-//! Stored parameters from the host's side: read, change, put in force, wherever they lie.
+//! Reads, changes and activates stored parameters of a board or a file.
 //!
 //! A board keeps its parameters as a set that this program makes
-//! ([`interstage::params`]). A file may hold one as well, so that everything that can be
-//! done to a board can be tried without one.
+//! ([`interstage::params`]). A file may hold a set as well, so that every operation can be
+//! tried without a board.
 
-mod file;
 mod line;
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
 
 use interstage::params::{CompileError, ParameterSet, SCHEMA, SetError, compile};
 use interstage::rig::Rig;
 
-pub use file::SetFile;
+use crate::files::{FileError, atomic_write};
+
 pub use line::{Client, Wire};
 
-/// What went wrong. Each is one line.
+/// Why an operation on parameters failed. Displays as one line.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
-    /// A file could not be read or written.
+    /// A file could not be read, or the emulated board's flash written.
     #[error("{path}: {source}")]
     File {
         /// The file.
@@ -24,7 +28,10 @@ pub enum StoreError {
         /// Why.
         source: std::io::Error,
     },
-    /// What lies there is no set.
+    /// A file could not be written.
+    #[error(transparent)]
+    Write(#[from] FileError),
+    /// There is no valid set.
     #[error("{place}: {source}")]
     Set {
         /// Where.
@@ -38,10 +45,10 @@ pub enum StoreError {
     /// The board does not answer.
     #[error("the board does not answer within {seconds} s")]
     Silent {
-        /// How long it was waited for.
+        /// The timeout, s.
         seconds: f64,
     },
-    /// The board refuses; what was in force still is.
+    /// The board refuses; the active set is unchanged.
     #[error("the board refuses: {0}")]
     Refused(&'static str),
     /// The board answered another question.
@@ -52,18 +59,18 @@ pub enum StoreError {
     Wire(String),
 }
 
-/// The parameters in force at a place.
+/// The active parameters of a place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Held {
     /// Name of the rig.
     pub name: String,
     /// The rig.
     pub rig: Rig,
-    /// Layout of its constants; if it is not [`SCHEMA`], they have to be made again.
+    /// Layout of its constants; if it is not [`SCHEMA`], they must be made again.
     pub schema: u16,
     /// Hash of the parameters.
     pub hash: u32,
-    /// Where it lies, in words.
+    /// Where it is, in words.
     pub origin: String,
 }
 
@@ -71,7 +78,7 @@ impl Held {
     /// From the bytes of a set of any schema.
     ///
     /// # Errors
-    /// [`SetError`] if they are none.
+    /// [`SetError`] if they are no set.
     pub fn of(set: &[u8], origin: String) -> Result<Self, SetError> {
         let set = ParameterSet::open_any(set)?;
         let header = set.header();
@@ -84,7 +91,7 @@ impl Held {
         })
     }
 
-    /// Whether this program's constants are the ones that it holds.
+    /// Whether its constants are of this program's layout.
     #[must_use]
     pub const fn is_current(&self) -> bool {
         self.schema == SCHEMA
@@ -93,19 +100,19 @@ impl Held {
 
 /// A place that holds parameters.
 pub trait Store {
-    /// What is in force there.
+    /// The active parameters.
     ///
     /// # Errors
     /// [`StoreError`] if it cannot be read.
     fn held(&mut self) -> Result<Held, StoreError>;
 
-    /// Makes a set the active one: completely or not at all.
+    /// Makes a set the active one, completely or not at all.
     ///
     /// # Errors
-    /// [`StoreError`]; what was in force still is.
+    /// [`StoreError`]; the active set is then unchanged.
     fn put(&mut self, set: &[u8]) -> Result<(), StoreError>;
 
-    /// Puts the defaults back in force.
+    /// Makes the defaults the active set.
     ///
     /// # Errors
     /// As [`put`](Self::put).
@@ -115,7 +122,77 @@ pub trait Store {
 /// The set of a rig.
 ///
 /// # Errors
-/// [`CompileError`] if the rig is not sound.
+/// [`CompileError`] if the rig is not valid.
 pub fn set_of(name: &str, rig: &Rig) -> Result<Vec<u8>, CompileError> {
     Ok(compile(name, rig)?.to_vec())
+}
+
+/// A file that holds one set. Until it exists, the prototype's set is active.
+#[derive(Clone, Debug)]
+pub struct SetFile {
+    path: PathBuf,
+}
+
+impl SetFile {
+    /// This file, which need not exist.
+    #[must_use]
+    pub fn new(path: &Path) -> Self {
+        Self { path: path.to_owned() }
+    }
+
+    fn place(&self) -> String {
+        self.path.display().to_string()
+    }
+}
+
+impl Store for SetFile {
+    fn held(&mut self) -> Result<Held, StoreError> {
+        let (set, origin) = if self.path.exists() {
+            let set = fs::read(&self.path);
+            let failed = |source| StoreError::File { path: self.place(), source };
+            (set.map_err(failed)?, self.place())
+        } else {
+            let set = set_of("prototype", &Rig::prototype())?;
+            (set, format!("defaults: {} does not exist yet", self.place()))
+        };
+        Held::of(&set, origin).map_err(|source| StoreError::Set { place: self.place(), source })
+    }
+
+    fn put(&mut self, set: &[u8]) -> Result<(), StoreError> {
+        Ok(atomic_write(&self.path, |out| Ok(out.write_all(set)?))?)
+    }
+
+    fn restore(&mut self) -> Result<(), StoreError> {
+        self.put(&set_of("prototype", &Rig::prototype())?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_holds_what_was_put_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mine.set");
+        let mut file = SetFile::new(&path);
+        assert_eq!(file.held().unwrap().rig, Rig::prototype());
+        file.put(&set_of("mine", &Rig::fe()).unwrap()).unwrap();
+        let held = file.held().unwrap();
+        assert_eq!((held.name.as_str(), &held.rig), ("mine", &Rig::fe()));
+        assert!(held.is_current());
+        file.restore().unwrap();
+        assert_eq!(file.held().unwrap().rig, Rig::prototype());
+    }
+
+    #[test]
+    fn a_damaged_file_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("mine.set");
+        let mut set = set_of("mine", &Rig::fe()).unwrap();
+        set[300] ^= 1;
+        fs::write(&path, &set).unwrap();
+        let error = SetFile::new(&path).held().unwrap_err().to_string();
+        assert!(error.contains("mine.set") && error.contains("damaged"), "{error}");
+    }
 }

@@ -1,5 +1,5 @@
-//! A debug probe as everything here needs it: rings in the board's memory, a reset, and
-//! memory itself. One interface, a real probe or the emulated board behind it.
+//! The interface of a debug probe: RTT channels, reset, memory. Behind it is a real probe or
+//! the emulated board.
 
 #[cfg(feature = "probe")]
 mod real;
@@ -13,7 +13,7 @@ pub use reconnecting::ReconnectingPort;
 #[cfg(test)]
 pub(crate) use reconnecting::tests as script;
 
-/// Why a port did not do it. Each is one line.
+/// Why a port failed. Displays as one line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PortError {
     /// There is no probe, or more than one.
@@ -22,21 +22,21 @@ pub enum PortError {
     /// Probe or board no longer answer; they may come back.
     #[error("the debug probe does not answer: {0}")]
     Gone(String),
-    /// The board is not what it should be.
+    /// The board is not the expected one.
     #[error("{0}")]
     Board(String),
 }
 
 /// The connection to a board.
 pub trait Port {
-    /// Takes what an RTT channel has sent up; nothing before the firmware has set its
+    /// Takes the bytes that an RTT channel has sent up; none before the firmware has set its
     /// channels up.
     ///
     /// # Errors
     /// [`PortError`] if the connection is broken, or the image has no such channel.
     fn up(&mut self, channel: u32) -> Result<Vec<u8>, PortError>;
 
-    /// Sends bytes down an RTT channel, as many as there is room for; gives how many.
+    /// Sends bytes down an RTT channel, as many as there is room for; returns how many.
     ///
     /// # Errors
     /// As [`Port::up`].
@@ -54,7 +54,7 @@ pub trait Port {
     /// As [`Port::up`].
     fn memory(&mut self, address: u32, into: &mut [u8]) -> Result<(), PortError>;
 
-    /// Lets a little time pass before the board is looked at again, and gives how much.
+    /// Waits before the next poll of the board; returns how long.
     ///
     /// # Errors
     /// As [`Port::up`].

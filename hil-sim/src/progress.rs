@@ -1,5 +1,5 @@
-//! Progress on standard error, hidden when that is no terminal: standard output holds
-//! results and nothing else.
+//! Progress on standard error, hidden when that is no terminal; standard output is for
+//! results alone.
 
 use std::time::Duration;
 
@@ -8,7 +8,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 /// Time between two frames of a spinner.
 const FRAME: Duration = Duration::from_millis(120);
 
-/// A bar over `length` items of `what`. It goes away when it is dropped.
+/// A bar over `length` items of `what`. Dropping it removes it.
 #[must_use]
 pub fn bar(what: &str, length: u64) -> Progress {
     Progress::new(Some(length), "{msg} {wide_bar} {pos}/{len}, {eta} left", what)
@@ -39,7 +39,7 @@ impl Progress {
         self.0.inc(count);
     }
 
-    /// Says what is being done.
+    /// Shows what is being done.
     pub fn say(&self, what: &str) {
         self.0.set_message(what.to_owned());
     }

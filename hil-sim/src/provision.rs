@@ -1,9 +1,9 @@
-//! Parts of `rig` that are built only where they are asked for: the emulated board with
-//! the tools that its core needs, the study, and probe-rs.
+//! Builds the optional parts of `rig` on demand: the emulated board with the tools that its
+//! core needs, the study, and probe-rs.
 //!
-//! The core is C behind generated bindings: it needs cmake, ninja and libclang. They come
-//! as wheels from PyPI into a virtual environment in the target directory. Nothing is
-//! installed elsewhere, and only the builds started here see them.
+//! The core is C with generated bindings: it needs cmake, ninja and libclang. They are
+//! wheels from PyPI in a virtual environment in the target directory. Nothing is installed
+//! elsewhere, and only builds started here use them.
 
 mod tools;
 
@@ -40,30 +40,25 @@ impl Extra {
     }
 }
 
-/// Why it cannot be had. Each is one line.
+/// Why a part is not available. Displays as one line.
 #[derive(Debug, thiserror::Error)]
 pub enum ProvisionError {
     /// A program could not be started or a build failed.
     #[error(transparent)]
     Build(#[from] FirmwareError),
-    /// The tools could not be fetched.
+    /// The tools could not be put into this folder, and why.
     #[error(
-        "could not set up cmake, ninja and libclang for the emulated board in {place}: {why} \
+        "could not set up cmake, ninja and libclang for the emulated board in {0}: {1} \
          (it takes Python 3 with venv or pip, PyPI within reach, and a C compiler)"
     )]
-    Tools {
-        /// Where they were to go.
-        place: PathBuf,
-        /// The last that was said.
-        why: String,
-    },
+    Tools(PathBuf, String),
 }
 
-/// Builds this part of `rig`, setting up what it needs, and returns the binary. A second
-/// call finds everything there. cargo's messages go to standard error.
+/// Builds this part of `rig` with the tools it needs and returns the binary. A second call
+/// builds nothing. cargo's messages go to standard error.
 ///
 /// # Errors
-/// [`ProvisionError`] if tools cannot be had or the build fails.
+/// [`ProvisionError`] if tools are not available or the build fails.
 pub fn featured(extra: Extra) -> Result<PathBuf, ProvisionError> {
     let (_, binary, arguments) = extra.build();
     let mut cargo = firmware::build_command(arguments);
@@ -74,8 +69,8 @@ pub fn featured(extra: Extra) -> Result<PathBuf, ProvisionError> {
     Ok(firmware::executable(&mut cargo, binary)?)
 }
 
-/// Goes on with the arguments of this process in that part of `rig`, which is built first
-/// if need be, and returns its exit code. Standard output is its own.
+/// Runs that part of `rig`, built first if need be, with the arguments of this process, and
+/// returns its exit code. Standard output is its own.
 ///
 /// # Errors
 /// As [`featured`].
@@ -84,5 +79,5 @@ pub fn go_on(extra: Extra) -> Result<u8, ProvisionError> {
     let mut command = Command::new(featured(extra)?);
     command.args(env::args_os().skip(1));
     let status = command.status().map_err(|e| firmware::could_not_start(&command, e))?;
-    Ok(status.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(1))
+    Ok(firmware::exit_code(status))
 }

@@ -23,7 +23,7 @@ pub use decoder::{Counts, Decoder, Item, Mark};
 pub use ledger::LedgerLine;
 pub use mcap_file::{FRAMES, Topic, messages, write_mcap};
 pub use probed::Probed;
-pub use read::{ReadError, pieces, timed};
+pub use read::{ReadError, pieces};
 pub(crate) use recorder::RunRecorder;
 pub use recorder::text;
 pub use recording::{complete, recording};

@@ -1,104 +1,49 @@
-//! What a run is made of: the rig, how far the plant may differ from it, the noise
-//! of its sensors, and how it is run. A scenario starts from a preset, takes any
-//! subset of keys from a TOML file, and then what `--set key=value` overrides.
+//! The inputs of a run: the rig, the tolerances of the plant, the noise of its sensors, and
+//! the options of the run. A scenario starts from a preset, takes any subset of keys from a
+//! TOML file, and then what `--set key=value` overrides.
 
 mod error;
 pub mod injection;
 mod keys;
 mod merge;
 mod run;
-mod suggest;
 mod validate;
 mod value;
 
 use std::path::Path;
 
-use interstage::rig::{ControlSettings, Drive, Geometry, Loads, Pretightener, Rig, Sensors, Tread};
+use interstage::rig::Rig;
 use serde::{Deserialize, Serialize};
-use toml::Table;
+use toml::{Table, Value};
 
 use crate::plant::draw::PlantParameters;
 use crate::plant::spread::{Noise, Spread};
 
-pub use error::{Origin, ScenarioError};
+pub use error::ScenarioError;
+use keys::Kind;
 pub use keys::{KeyInfo, PRESETS};
+use merge::{COMMAND_LINE, Merged, Provenance};
 pub use run::{ControllerKind, Direction, RunOptions, StepAnomaly};
 
 /// One rig, its mismatch, its noise and its run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(from = "Document", into = "Document")]
 pub struct Scenario {
     /// The preset that it started from, one of [`PRESETS`].
     pub preset: String,
-    /// The rig as the controller believes it to be.
+    /// The rig by the controller's parameters; its sections are beside the others.
+    #[serde(flatten)]
     pub rig: Rig,
-    /// How far the plant may differ from the rig.
+    /// Tolerances of the plant.
     pub spread: Spread,
     /// Noise and delay of the sensors.
     pub noise: Noise,
-    /// How it is run.
+    /// Options of the run.
     pub run: RunOptions,
-}
-
-/// The scenario as it is in a file: the rig's sections beside the others.
-#[derive(Clone, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Document {
-    preset: String,
-    rig: Geometry,
-    tread: Tread,
-    plant: Loads,
-    preload: Pretightener,
-    drive: Drive,
-    sense: Sensors,
-    control: ControlSettings,
-    spread: Spread,
-    noise: Noise,
-    run: RunOptions,
-}
-
-impl From<Document> for Scenario {
-    fn from(d: Document) -> Self {
-        Self {
-            preset: d.preset,
-            rig: Rig {
-                rig: d.rig,
-                tread: d.tread,
-                plant: d.plant,
-                preload: d.preload,
-                drive: d.drive,
-                sense: d.sense,
-                control: d.control,
-            },
-            spread: d.spread,
-            noise: d.noise,
-            run: d.run,
-        }
-    }
-}
-
-impl From<Scenario> for Document {
-    fn from(s: Scenario) -> Self {
-        let Rig { rig, tread, plant, preload, drive, sense, control } = s.rig;
-        Self {
-            preset: s.preset,
-            rig,
-            tread,
-            plant,
-            preload,
-            drive,
-            sense,
-            control,
-            spread: s.spread,
-            noise: s.noise,
-            run: s.run,
-        }
-    }
 }
 
 impl Default for Scenario {
     fn default() -> Self {
-        Self::from_rig("prototype", Rig::prototype())
+        Self::of_rig("prototype", Rig::prototype())
     }
 }
 
@@ -106,9 +51,9 @@ impl Scenario {
     /// The scenario of a preset: its rig, with the usual spread and noise.
     ///
     /// # Errors
-    /// [`ScenarioError::UnknownPreset`] if there is none of that name.
+    /// [`ScenarioError`] if there is none of that name.
     pub fn named(preset: &str) -> Result<Self, ScenarioError> {
-        Self::from_preset(preset, Origin::Set)
+        Self::from_preset(preset, COMMAND_LINE)
     }
 
     /// Preset, then file, then overrides; then every check.
@@ -124,11 +69,7 @@ impl Scenario {
         file: Option<&Path>,
         sets: &[String],
     ) -> Result<Self, ScenarioError> {
-        let mut given = Vec::new();
-        if let Some(path) = file {
-            given.push((Origin::File(path.to_owned()), merge::read(path)?));
-        }
-        Self::resolve_layers(preset, given, sets)
+        Self::layered(preset, file.map(merge::read).transpose()?, sets)
     }
 
     /// As [`Scenario::resolve`], with the text of the file; `name` is its
@@ -137,14 +78,19 @@ impl Scenario {
     /// # Errors
     /// The first thing found wrong, with the key and where it was written.
     pub fn parse(name: &str, text: &str, sets: &[String]) -> Result<Self, ScenarioError> {
-        let table = merge::parse(Path::new(name), text)?;
-        Self::resolve_layers(None, vec![(Origin::File(name.into()), table)], sets)
+        Self::layered(None, Some((name.to_owned(), merge::parse(name, text)?)), sets)
     }
 
     /// The scenario of a rig that is near this preset's, with the usual spread and noise.
     #[must_use]
     pub fn of_rig(preset: &str, rig: Rig) -> Self {
-        Self::from_rig(preset, rig)
+        Self {
+            preset: preset.to_owned(),
+            rig,
+            spread: Spread::usual(),
+            noise: Noise::usual(),
+            run: RunOptions::default(),
+        }
     }
 
     /// This scenario with overrides, each `key=value`; then every check.
@@ -152,7 +98,7 @@ impl Scenario {
     /// # Errors
     /// The first thing found wrong.
     pub fn with(self, sets: &[String]) -> Result<Self, ScenarioError> {
-        self.overlaid(&[], sets)
+        self.overlaid(None, sets)
     }
 
     /// Every key with its unit, value, what it takes, and its description.
@@ -161,7 +107,7 @@ impl Scenario {
         keys::list(&self.table())
     }
 
-    /// The whole scenario as TOML; reading it back gives the same scenario.
+    /// The complete scenario as TOML; reading it back gives the same scenario.
     #[must_use]
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("numbers, words and lists are always TOML")
@@ -174,14 +120,8 @@ impl Scenario {
         PlantParameters::draw(&self.rig, &self.true_steps(), &self.spread, &self.noise, seed)
     }
 
-    /// Step positions of the nominal plant, mm, ascending: the step table with the
-    /// anomalies of the run applied.
-    #[must_use]
-    pub fn true_steps_mm(&self) -> Vec<f64> {
-        self.true_steps().into_iter().map(|(position, _)| position).collect()
-    }
-
-    /// The same, each with how much higher than the table says it is, mm.
+    /// Steps of the nominal plant, ascending: position, mm, and how much higher than the
+    /// step table says each is, mm. The anomalies of the run are applied.
     #[must_use]
     pub fn true_steps(&self) -> Vec<(f64, f64)> {
         run::apply(&self.rig.rig.step_positions_mm, &self.run.anomalies)
@@ -192,60 +132,62 @@ impl Scenario {
     /// # Errors
     /// The first thing found wrong.
     pub fn validate(&self) -> Result<(), ScenarioError> {
-        validate::check(self, &merge::Provenance::new(&self.preset))
+        validate::check(self, &Provenance::new(&self.preset))
     }
 
-    fn from_preset(preset: &str, origin: Origin) -> Result<Self, ScenarioError> {
-        Rig::named(preset)
-            .map(|rig| Self::from_rig(preset, rig))
-            .ok_or_else(|| ScenarioError::UnknownPreset { origin, name: preset.to_owned() })
+    fn from_preset(preset: &str, origin: &str) -> Result<Self, ScenarioError> {
+        let rig = Rig::named(preset).ok_or_else(|| no_preset(origin, &preset.into()))?;
+        Ok(Self::of_rig(preset, rig))
     }
 
-    fn from_rig(preset: &str, rig: Rig) -> Self {
-        Self {
-            preset: preset.to_owned(),
-            rig,
-            spread: Spread::usual(),
-            noise: Noise::usual(),
-            run: RunOptions::default(),
-        }
-    }
-
-    fn resolve_layers(
+    /// The preset, then the file of this name, then the overrides.
+    fn layered(
         preset: Option<&str>,
-        mut layers: Vec<(Origin, Table)>,
+        mut file: Option<(String, Table)>,
         sets: &[String],
     ) -> Result<Self, ScenarioError> {
-        let from_file = merge::take_preset(&mut layers)?;
+        let mut from_file = None;
+        if let Some((origin, table)) = &mut file
+            && let Some(name) = table.remove("preset")
+        {
+            let name = name.as_str().ok_or_else(|| no_preset(origin, &name))?;
+            from_file = Some((name.to_owned(), origin.clone()));
+        }
         let from_set = sets.iter().rev().filter_map(|text| value::split(text));
         let from_set = from_set.filter(|(key, _)| *key == "preset").map(|(_, name)| name).next();
         let base = match (from_set.or(preset), from_file) {
-            (Some(name), _) => Self::from_preset(name.trim_matches('"'), Origin::Set)?,
-            (None, Some((name, origin))) => Self::from_preset(&name, origin)?,
+            (Some(name), _) => Self::named(name.trim_matches('"'))?,
+            (None, Some((name, origin))) => Self::from_preset(&name, &origin)?,
             (None, None) => Self::default(),
         };
-        base.overlaid(&layers, sets)
+        base.overlaid(file.as_ref(), sets)
     }
 
-    /// This scenario as a table, with layers and then overrides laid over it.
-    fn overlaid(&self, layers: &[(Origin, Table)], sets: &[String]) -> Result<Self, ScenarioError> {
-        let mut merged = merge::Merged::new(&self.preset, self.table());
-        for (origin, table) in layers {
+    /// This scenario with a file and then overrides laid over it.
+    fn overlaid(
+        &self,
+        file: Option<&(String, Table)>,
+        sets: &[String],
+    ) -> Result<Self, ScenarioError> {
+        let provenance = Provenance::new(&self.preset);
+        let mut merged = Merged { table: self.table(), provenance };
+        if let Some((origin, table)) = file {
             merged.layer(origin, table)?;
         }
-        for text in sets {
-            merged.set(text)?;
-        }
-        let (table, provenance) = merged.finish();
+        sets.iter().try_for_each(|text| merged.set(text))?;
         let scenario: Self =
-            table.try_into().expect("every value was checked for the kind of its key");
-        validate::check(&scenario, &provenance)?;
+            merged.table.try_into().expect("every value was checked for the kind of its key");
+        validate::check(&scenario, &merged.provenance)?;
         Ok(scenario)
     }
 
     fn table(&self) -> Table {
         Table::try_from(self).expect("numbers, words and lists are always TOML")
     }
+}
+
+fn no_preset(origin: &str, found: &Value) -> ScenarioError {
+    ScenarioError::wrong(origin, "preset", found, Kind::Word(&PRESETS).expected("preset"))
 }
 
 #[cfg(test)]

@@ -1,5 +1,5 @@
 //! A run in software: the shipping control tick in closed loop with the plant, a
-//! millisecond at a time, as fast as the host allows.
+//! millisecond per step, as fast as the host allows.
 
 mod closed_loop;
 mod echo;
@@ -26,7 +26,7 @@ pub(crate) const TICK_S: f64 = 1e-3;
 /// Longest run, s: three times the travel at the least useful speed.
 pub(crate) const LONGEST_S: f64 = 120.0;
 
-/// What is asked of a run beside its scenario.
+/// Options of a run beside its scenario.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Options {
     /// Keep one row a tick.
@@ -36,19 +36,19 @@ pub struct Options {
     pub speed: Option<(f64, bool)>,
 }
 
-/// A run that could not be made.
+/// Why a run could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// The parameters do not make a controller.
     #[error("{0}")]
     Rig(#[from] RigError),
-    /// The plant of this seed cannot be computed, because it cannot be.
+    /// The plant of this seed is not possible.
     #[error("plant: {0}")]
     Refused(#[from] Refusal),
-    /// The plant left the set of meaningful states.
+    /// The plant's state became invalid.
     #[error("{0}")]
     Plant(#[from] PlantError),
-    /// There is no board that could break.
+    /// A fault of a board's hardware, without a board.
     #[error("run.faults: {0} is a fault of the board's hardware: --target board")]
     Hardware(String),
 }

@@ -1,5 +1,5 @@
-//! A run on the terminal: verdict, ledger, faults and limits, and where the files
-//! are. At most [`WIDTH`] columns wide.
+//! A run on the terminal: verdict, ledger, faults, limits and the paths of its files. At most
+//! [`WIDTH`] columns wide.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! `rig test`: what must hold on every change, in few passes of cargo.
+//! `rig test`: checks every change in a few passes of cargo.
 //!
 //! Format, lints, documentation, the images that the tests run, the tests. All but the
 //! images use the profile that `rig` itself is built in, so nothing is compiled twice.
@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
 
-use crate::firmware::{self, Profile, TARGET};
+use crate::firmware::{self, Profile, TARGET, exit_code};
 use crate::provision::Tools;
 
 /// Set while the long samples are wanted.
@@ -57,7 +57,7 @@ pub fn run(arguments: &[String], long: bool) -> Result<u8> {
             continue;
         }
         tools.apply(&mut command);
-        let code = timed(name, &mut || Ok(code(started(&mut command)?)))?;
+        let code = timed(name, &mut || Ok(exit_code(started(&mut command)?)))?;
         if code != 0 {
             return Ok(code);
         }
@@ -74,7 +74,7 @@ pub fn run(arguments: &[String], long: bool) -> Result<u8> {
         tests.env(LONG, "1");
     }
     tools.apply(&mut tests);
-    Ok(code(started(&mut tests)?))
+    Ok(exit_code(started(&mut tests)?))
 }
 
 /// The passes before the images, each with the component of cargo that it needs.
@@ -116,14 +116,6 @@ fn started(command: &mut Command) -> Result<ExitStatus> {
     command.status().with_context(|| format!("could not start {:?}", command.get_program()))
 }
 
-/// A program's exit code; 1 if it was killed.
-fn code(status: ExitStatus) -> u8 {
-    if status.success() {
-        return 0;
-    }
-    status.code().and_then(|code| u8::try_from(code).ok()).filter(|&code| code != 0).unwrap_or(1)
-}
-
 /// Whether cargo has this component.
 fn has(component: &str) -> bool {
     let mut command = cargo(&[component, "-h"]);
@@ -138,8 +130,8 @@ mod tests {
     #[test]
     fn a_failure_is_never_zero_and_a_missing_component_is_noticed() {
         let status = |text| Command::new("sh").args(["-c", text]).status().unwrap();
-        assert_eq!(code(status("exit 101")), 101);
-        assert_eq!(code(status("kill -9 $$")), 1);
+        assert_eq!(exit_code(status("exit 101")), 101);
+        assert_eq!(exit_code(status("kill -9 $$")), 1);
         assert!(!has("no-such-component"));
     }
 }

@@ -61,7 +61,7 @@ fn a_run_in_the_loop_is_the_run_in_software_bit_for_bit() {
         assert_eq!(lines(&board), lines(&software));
         // The log is the board's own, and replays.
         let run = Run::of_stream(&board.stream);
-        assert!(run.is_whole(), "{:?}", run.marks);
+        assert!(run.is_complete(), "{:?}", run.marks);
         assert!(replay(&run, &Rig::prototype()).expect("a sound rig").is_equal());
         // Nothing but the host's side was driven, and the watchdog never bit.
         bridges_have_no_power(&mut port);
@@ -153,7 +153,7 @@ fn told(reads: impl Fn(u32) -> bool) -> (Vec<Taken>, Vec<u8>) {
 fn a_reader_that_stalls_or_is_not_there_changes_no_bit_of_the_control_trace() {
     let (read, log) = told(|_| true);
     let run = Run::of_stream(&log);
-    assert!(run.is_whole() && run.rows.len() > 6000, "{:?}", run.marks);
+    assert!(run.is_complete() && run.rows.len() > 6000, "{:?}", run.marks);
     let (absent, nothing) = told(|_| false);
     assert!(nothing.is_empty() && absent == read, "absent");
     let (stalled, part) = told(|tick| tick % 1000 < 300);
@@ -259,7 +259,7 @@ fn a_host_that_falls_silent_leaves_the_bridges_off() {
     let next = FIRST + 3000;
     let mut line = HostLine::begin_at(&mut port);
     assert!(matches!(line.tick(next, given), Err(HilError::Alone(_))));
-    assert!(matches!(line.stands(), Ok((_, true))));
+    assert!(matches!(line.state(), Ok((_, true))));
     let ran = looped(&mut port, &scenario(&["run.seed=3"])).expect("a run");
     assert!(ran.summary.completed);
 }
@@ -273,7 +273,7 @@ fn a_question_asked_twice_is_answered_twice_and_done_once() {
     let (first, again) =
         (line.tick(last, given).expect("told again"), line.tick(last, given).expect("and again"));
     assert_eq!(first, again);
-    assert_eq!(line.stands().expect("stands"), (FIRST + 3000, false));
+    assert_eq!(line.state().expect("stands"), (FIRST + 3000, false));
     let error = line.tick(FIRST + 3200, given).unwrap_err();
     assert!(matches!(error, HilError::Apart { board, .. } if board == FIRST + 3000), "{error}");
 }

@@ -67,7 +67,7 @@ fn every_tick_of_a_run_is_logged_and_runs_again_on_this_host() {
     for sets in [&["run.seed=1"][..], &["run.seed=1", "run.direction=retract"]] {
         let ran = run::run(elf(), &scenario(sets), true, |_, _| {}).expect("a run");
         let run = Run::of_stream(&ran.recording.stream);
-        assert!(run.is_whole(), "{:?}", run.marks);
+        assert!(run.is_complete(), "{:?}", run.marks);
         assert_eq!(run.ledger.len(), 3);
         let header = run.header.clone().expect("it says who it is");
         assert_eq!((header.rig.as_str(), header.build.len()), ("prototype", 16));
@@ -260,9 +260,9 @@ fn frames_that_found_no_room_are_marked_and_the_capture_waits_for_its_reader() {
     assert!(frames > 300 && ticks > 2400, "{frames} frames, {ticks} ticks");
     assert_eq!((run.counts.lost_frames, run.counts.lost_ticks), (u64::from(frames), ticks));
     // The command came first, and its capture is kept whole until it has been read.
-    let first = run.shots.first().expect("captured");
+    let first = run.captures.first().expect("captured");
     assert_eq!(first.trigger, Trigger::Command);
-    let pieces: Vec<_> = run.shots.iter().take_while(|piece| piece.at == first.at).collect();
+    let pieces: Vec<_> = run.captures.iter().take_while(|piece| piece.at == first.at).collect();
     let shots: usize = pieces.iter().map(|piece| piece.samples.len()).sum();
     assert_eq!(shots, usize::from(first.of));
     assert_eq!(pieces.len(), usize::from(first.of).div_ceil(16));

@@ -34,7 +34,7 @@ pub struct Args {
     clean: Option<u64>,
 
     /// Only part i of n of the faults, or of the deployments without one.
-    #[arg(long, value_name = "i/n", default_value_t = Shard::WHOLE)]
+    #[arg(long, value_name = "i/n", default_value_t = Shard::ALL)]
     shard: Shard,
 
     #[command(flatten)]

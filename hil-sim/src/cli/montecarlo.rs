@@ -19,7 +19,7 @@ pub(super) struct Args {
     count: u64,
 
     /// Runs every n-th of the seeds alone, beginning with the i-th.
-    #[arg(long, value_name = "I/N", default_value_t = Shard::WHOLE)]
+    #[arg(long, value_name = "I/N", default_value_t = Shard::ALL)]
     shard: Shard,
 
     #[command(flatten)]

@@ -1,4 +1,4 @@
-//! Tick by tick over a port.
+//! Exchanges ticks with the board over a port.
 
 use std::time::Duration;
 
@@ -9,10 +9,9 @@ use interstage::units::Tick;
 use super::HilError;
 use crate::probe::Port;
 
-/// How long an answer is waited for before the question is asked again: well inside the
-/// board's own timeout of 50 ms.
+/// Time after which a request is repeated: well below the board's own timeout of 50 ms.
 const RETRY: Duration = Duration::from_millis(10);
-/// How long it is asked in all: a board that starts takes a fifth of a second.
+/// Longest time to an answer: a board that starts takes a fifth of a second.
 const TIMEOUT: Duration = Duration::from_secs(2);
 
 /// This host's end of the loop.
@@ -36,7 +35,7 @@ impl<'a> HostLine<'a> {
         }
     }
 
-    /// Goes on with a board that runs already.
+    /// Continues with a board that runs already.
     #[must_use]
     pub const fn begin_at(port: &'a mut dyn Port) -> Self {
         Self { port, gatherer: FrameReader::new() }
@@ -60,7 +59,7 @@ impl<'a> HostLine<'a> {
     ///
     /// # Errors
     /// As [`HostLine::tick`].
-    pub fn stands(&mut self) -> Result<(Tick, bool), HilError> {
+    pub fn state(&mut self) -> Result<(Tick, bool), HilError> {
         let hello = ToBoard::Hello { protocol: PROTOCOL };
         match self.ask(&hello, |answer| matches!(answer, ToHost::Next { .. }))? {
             Some(ToHost::Next { tick, alone }) => Ok((tick, alone)),
@@ -68,12 +67,12 @@ impl<'a> HostLine<'a> {
         }
     }
 
-    /// The port, for what else goes over it.
+    /// The port, for its other channels.
     pub fn port(&mut self) -> &mut dyn Port {
         self.port
     }
 
-    /// Asks, and again, until an answer comes that answers this; none if none comes in time.
+    /// Repeats the request until its answer arrives; none if there is none in time.
     fn ask(
         &mut self,
         message: &ToBoard,

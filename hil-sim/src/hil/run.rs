@@ -21,14 +21,14 @@ use crate::session::{LONGEST_S, TICK_S, drives, initial_rig, read};
 
 /// RTT channel of the binary log.
 const LOG: u32 = 1;
-/// RTT channel of the text log, which is read so that it does not fill.
+/// RTT channel of the text log, read only so that it does not fill.
 const TEXT: u32 = 0;
-/// Ticks between two looks at the log, of which the channel holds a hundred.
-const LOOK: Tick = 16;
-/// Ticks after the end within which the log has come: two frames and a look.
+/// Ticks between two polls of the log; the channel holds a hundred.
+const POLL: Tick = 16;
+/// Ticks after the end within which the log arrives: two frames and a poll.
 const AFTER: Tick = 64;
 
-/// What is asked of a run beside its scenario.
+/// Options of a run beside its scenario.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Asked {
     /// Keep one row a tick, and the log's bytes.
@@ -37,8 +37,8 @@ pub struct Asked {
     pub target: &'static str,
 }
 
-/// Runs a scenario with the controller on the board behind `port`; `watch` is given the
-/// time of each tick, s.
+/// Runs a scenario with the controller on the board behind `port`; passes the time, s, to
+/// `watch` now and then.
 ///
 /// # Errors
 /// [`HilError`] if the run cannot be made. One that ends in a fault is a result.
@@ -70,16 +70,16 @@ pub fn run(
         let (drive, preload) = taken.commands();
         plant.step(&drives(drive, preload), TICK_S)?;
         tick += 1;
-        if tick.is_multiple_of(LOOK) {
+        if tick.is_multiple_of(POLL) {
             log.take(line.port())?;
             watch(f64::from(tick - FIRST) * TICK_S);
         }
     }
     let wall_s = started.elapsed().as_secs_f64();
-    // The plant stands still while the rest of the log comes.
+    // The plant does not move while the rest of the log arrives.
     for tick in tick..tick + AFTER {
         line.tick(tick, given.with(None))?;
-        if tick.is_multiple_of(LOOK) {
+        if tick.is_multiple_of(POLL) {
             log.take(line.port())?;
         }
     }
@@ -103,11 +103,11 @@ struct BoardLog {
     decoder: Decoder,
     stream: Vec<u8>,
     rows: bool,
-    /// The plant's states that no tick of the log has come for yet.
+    /// States of the plant whose ticks are not in the log yet.
     truths: VecDeque<Truth>,
-    /// Entries of ticks that have not come yet.
+    /// Entries of ticks that are not in the log yet.
     events: VecDeque<Entry>,
-    /// The tick that is due.
+    /// The next tick.
     due: Tick,
     name: String,
     parameters: u32,
@@ -130,7 +130,7 @@ impl BoardLog {
         })
     }
 
-    /// Takes what the log has brought.
+    /// Reads the log.
     fn take(&mut self, port: &mut dyn Port) -> Result<(), HilError> {
         port.up(TEXT)?;
         let bytes = port.up(LOG)?;
@@ -138,8 +138,8 @@ impl BoardLog {
         self.decoder.read(&bytes, &mut |item| items.push(item));
         for item in items {
             match item {
-                Item::Identity(identity) => self.is_scenarios(&identity)?,
-                // Why the board has started is known: this host made it.
+                Item::Identity(identity) => self.check_parameters(&identity)?,
+                // This host has reset the board.
                 Item::Event(Entry { event: Event::Restart(_), .. }) => {}
                 Item::Event(entry) => self.events.push_back(entry),
                 Item::Tick(record, sensors) => self.tick(&record, sensors)?,
@@ -152,8 +152,8 @@ impl BoardLog {
         Ok(())
     }
 
-    /// Whether the board runs on the scenario's parameters.
-    fn is_scenarios(&self, identity: &Identity) -> Result<(), HilError> {
+    /// Refuses a board with other parameters than the scenario's.
+    fn check_parameters(&self, identity: &Identity) -> Result<(), HilError> {
         if identity.parameters == self.parameters {
             return Ok(());
         }

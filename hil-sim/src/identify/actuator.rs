@@ -1,5 +1,5 @@
 //! The fit of the pre-tightener: its duty through dead time, lag and slew, and the spring
-//! that the wheel's rise compresses, against the preload sensor.
+//! that the rising wheel compresses, against the preload sensor.
 //!
 //! `P(t) = seat + slew int lag(duty(t - delay)) dt + spring (height(t) - R)`, as the screw
 //! locks itself while its bridge is off. The height of the centre comes from the fit of
@@ -31,7 +31,7 @@ const LONGEST_MS: f64 = 250.0;
 /// Changes for the differences: ms, and relative.
 const MOVED_MS: f64 = 0.5;
 const MOVED_LAG: f64 = 0.01;
-/// Deviation that the first fit assumes, N, and the least of the second.
+/// Deviation of the first fit, N, and the least of the second.
 const FIRST_N: f64 = 0.1;
 const LEAST_N: f64 = 1e-4;
 
@@ -92,11 +92,11 @@ impl<'a> Log<'a> {
         Self { samples: &record.samples, bins, rise_mm, delay, weight: 1.0 / FIRST_N }
     }
 
-    /// The seat for a slew of 1 N/s in the bins, interpolated between two whole dead times.
+    /// The seat for a slew of 1 N/s in the bins, interpolated between two dead times of integer ticks.
     fn seats(&self, delay_ms: f64, lag_s: f64) -> Vec<f64> {
-        let whole = delay_ms.floor();
-        let [early, late] = [0, 1].map(|more| seat(self.samples, whole as usize + more, lag_s));
-        let part = delay_ms - whole;
+        let ticks = delay_ms.floor();
+        let [early, late] = [0, 1].map(|more| seat(self.samples, ticks as usize + more, lag_s));
+        let part = delay_ms - ticks;
         let mixed: Vec<f64> = early.iter().zip(&late).map(|(a, b)| a + part * (b - a)).collect();
         let mean = |(ticks, _): &(Range<usize>, f64)| {
             let of = |tick: usize| super::traces::at(&mixed, tick as f64 - self.delay);
@@ -172,7 +172,7 @@ pub fn fit(
     trajectories: &[Trajectory],
     radius_mm: f64,
 ) -> Result<Actuator, IdentifyError> {
-    let no_logs = || IdentifyError::NoFit { why: "there are no logs".into() };
+    let no_logs = || IdentifyError::NoFit("there are no logs".into());
     let preload = &records.first().ok_or_else(no_logs)?.scenario.rig.preload;
     let of = |((record, run), at): ((_, &Run), _)| Log::of(record, run, at, radius_mm);
     let mut model = Screw(records.iter().zip(runs).zip(trajectories).map(of).collect());

@@ -2,8 +2,8 @@
 //! of compression, arm angle and drive effort over all logs at once.
 //!
 //! Each channel of each log is weighted by the noise of its own residuals, correlation
-//! included, so that a lasting model error counts as one error and not as many readings
-//! that agree.
+//! included, so that a systematic model error counts as one error and not as many
+//! independent readings.
 
 use std::ops::Range;
 
@@ -20,7 +20,7 @@ use super::noise::Noise;
 const FIRST: [f64; 3] = [5e-3, 0.3, 0.5];
 /// Least deviations: the forward model's own errors.
 const LEAST: [f64; 3] = [2e-4, 2e-2, 2e-2];
-/// Values that may err alike, by channel: 0.16 s, the shortest crossing.
+/// Length of a block of correlated values, by channel: 0.16 s, the shortest crossing.
 const BLOCKS: [usize; 3] = [16, 16, 4];
 /// By how much the scatter of the blocks is widened. Some nine crossings determine steps,
 /// friction and wheel: Student's t with eight degrees of freedom in place of the normal
@@ -28,9 +28,9 @@ const BLOCKS: [usize; 3] = [16, 16, 4];
 /// drive's load between two counts, which raises the creep: 1.9, by the hidden rigs of
 /// seeds 1 to 10.
 const WIDENED: f64 = 1.18 * 1.9;
-/// How far friction may stray while nothing determines it, logarithm.
+/// Deviation of friction while nothing determines it, logarithm.
 const HELD_LN: f64 = 0.02;
-/// How closely the creep law is held, logarithm.
+/// Deviation of the held creep law, logarithm.
 const HELD_CREEP_LN: f64 = 1e-5;
 
 /// The result.
@@ -66,7 +66,7 @@ impl<'a> Weighted<'a> {
         runs.map(|((run, at), measured)| quotient(&run.predicted(at, x), measured, 1.0)).collect()
     }
 
-    /// Rows of the residuals that may err alike.
+    /// Blocks of rows whose residuals may be correlated.
     fn blocks(&self) -> Vec<Range<usize>> {
         let (mut blocks, mut from) = (Vec::new(), 0);
         for (values, length) in self.measured.iter().flat_map(|log| log.iter().zip(BLOCKS)) {

@@ -1,6 +1,5 @@
-//! What is fitted, as the numbers that the solver moves: logarithms where only the ratio
-//! matters, the rest in units of about their tolerance; and what is known of each before
-//! any log is read.
+//! The coordinates of the fit: logarithms where only the ratio matters, the rest in units of
+//! about their tolerance; and the prior of each.
 
 use nalgebra::DMatrix;
 
@@ -38,7 +37,7 @@ pub const DRIVE: usize = 11;
 /// mm, so that a wheel of another radius meets them at the same turn; then all heights, mm.
 pub const STEPS: usize = 12;
 
-/// How little is known of what only the logs can tell: a factor of two (one standard
+/// Deviation of what only the logs can show: a factor of two (one standard
 /// deviation), and lengths, forces and angles beyond any tolerance.
 const UNKNOWN_LN: f64 = 0.7;
 const UNKNOWN_GEARBOX_N: f64 = 10.0;
@@ -49,7 +48,7 @@ const UNKNOWN_HEIGHT_MM: f64 = 0.5;
 /// law, relative: no scenario states them.
 const DRIVE_REL: f64 = 0.01;
 const CREEP_REL: f64 = 0.05;
-/// What is stated to have no tolerance is held to this.
+/// Deviation of a coordinate that is stated without tolerance.
 const EXACT: f64 = 1e-6;
 
 /// Mean and standard deviation of a coordinate before any log is read.
@@ -59,8 +58,7 @@ pub struct Prior {
     pub mean: f64,
     /// Standard deviation.
     pub deviation: f64,
-    /// Whether it states a tolerance of the rig; else it only keeps the solver from
-    /// wandering where the logs say nothing.
+    /// Whether it states a tolerance of the rig; else it only regularises the fit.
     pub tolerance: bool,
 }
 
@@ -173,7 +171,7 @@ impl Coordinates {
         }
     }
 
-    /// Way over way at the nominal radius.
+    /// Travel over the travel at the nominal radius.
     #[must_use]
     pub fn scale(&self, x: &[f64]) -> f64 {
         x[RADIUS] / self.nominal.ring.radius_mm

@@ -15,7 +15,7 @@ use super::coordinates::{
     STIFFNESS, TAU, TREAD_GAIN,
 };
 use super::record::{Record, TICK_S};
-use super::traces::{Traces, at};
+use super::traces::{Bin, Effort, Traces, at};
 use crate::plant::draw::PlantParameters;
 use crate::plant::rig::{PlantError, VirtualRig};
 
@@ -34,7 +34,8 @@ const POSITION: usize = 3;
 pub struct Trajectory {
     first: usize,
     series: [Vec<f64>; 4],
-    most_utilisation: f64,
+    /// Largest friction utilisation.
+    pub most_utilisation: f64,
 }
 
 /// A record with what the forward model needs of it.
@@ -77,7 +78,7 @@ impl Run {
     pub fn of(record: &Record, coordinates: &Coordinates) -> Result<Self, super::IdentifyError> {
         Ok(Self {
             start_mm: record.start_mm(),
-            arm_delay: record.arm_delay_s / TICK_S,
+            arm_delay: record.scenario.noise.arm_angle_delay_s / TICK_S,
             compression_delay: record.scenario.noise.compression_sensor_delay_s / TICK_S,
             nominal: coordinates.nominal().clone(),
             traces: Traces::of(record)?,
@@ -112,50 +113,53 @@ impl Run {
     /// What the sensors would have shown in the used bins.
     #[must_use]
     pub fn predicted(&self, of: &Trajectory, x: &[f64]) -> Channels {
-        let [mut compression, mut arm, mut effort] = Channels::default();
         let (plant, radius) = (&self.nominal, x[RADIUS]);
-        for bin in self.traces.bins.iter().filter(|bin| bin.used) {
-            let depth = of.mean(COMPRESSION, &bin.ticks, self.compression_delay);
-            compression.push(depth * x[TREAD_GAIN].exp());
-            if bin.arm_rad.is_some() {
-                let height = of.mean(HEIGHT, &bin.ticks, self.arm_delay);
-                arm.push(1e3 * plant.arm.angle(plant.wall_radius_mm - height) + x[ARM_ZERO]);
-            }
-        }
-        for bin in self.traces.efforts.iter().filter(|effort| effort.used) {
-            let sense = bin.turn_rad_s.signum();
+        let compression = |bin: &Bin| {
+            of.mean(COMPRESSION, &bin.ticks, self.compression_delay) * x[TREAD_GAIN].exp()
+        };
+        let arm = |bin: &Bin, _| {
+            let height = of.mean(HEIGHT, &bin.ticks, self.arm_delay);
+            1e3 * plant.arm.angle(plant.wall_radius_mm - height) + x[ARM_ZERO]
+        };
+        let effort = |bin: &Effort| {
+            let direction = bin.turn_rad_s.signum();
             // The worm gear holds a load along the motion.
-            let traction = of.mean(TRACTION, &bin.ticks, 0.0) * sense;
+            let traction = of.mean(TRACTION, &bin.ticks, 0.0) * direction;
             let inertia = 1e-3 * plant.drive.mass_kg * bin.gain_rad_s2 * radius;
             let loss = plant.drive.stall_n * bin.turn_rad_s * radius / plant.drive.no_load_mm_s;
-            let force = sense * (traction.max(0.0) + x[GEARBOX]) + inertia;
-            effort.push(force / x[DRIVE].exp() + loss);
-        }
-        [compression, arm, effort]
+            let force = direction * (traction.max(0.0) + x[GEARBOX]) + inertia;
+            force / x[DRIVE].exp() + loss
+        };
+        self.used(compression, arm, effort)
     }
 
     /// What the sensors did show there.
     #[must_use]
     pub fn measured(&self) -> Channels {
-        let used = self.traces.bins.iter().filter(|bin| bin.used);
-        let efforts = self.traces.efforts.iter().filter(|effort| effort.used);
-        [
-            used.clone().map(|bin| bin.compression_mm).collect(),
-            used.filter_map(|bin| bin.arm_rad).map(|arm| 1e3 * arm).collect(),
-            efforts.map(|effort| self.nominal.drive.stall_n * effort.duty).collect(),
-        ]
+        let stall_n = self.nominal.drive.stall_n;
+        self.used(|bin| bin.compression_mm, |_, arm| 1e3 * arm, |effort| stall_n * effort.duty)
     }
 
     /// Times of the values of each channel, s.
     #[must_use]
     pub fn times(&self) -> Channels {
         let mid = |ticks: &Range<usize>| 0.5e-3 * (ticks.start + ticks.end) as f64;
-        let used = self.traces.bins.iter().filter(|bin| bin.used);
+        self.used(|bin| mid(&bin.ticks), |bin, _| mid(&bin.ticks), |effort| mid(&effort.ticks))
+    }
+
+    /// What these functions give for the used bins, the second for those with an arm angle.
+    fn used(
+        &self,
+        compression: impl Fn(&Bin) -> f64,
+        arm: impl Fn(&Bin, f64) -> f64,
+        effort: impl Fn(&Effort) -> f64,
+    ) -> Channels {
+        let bins = self.traces.bins.iter().filter(|bin| bin.used);
         let efforts = self.traces.efforts.iter().filter(|effort| effort.used);
         [
-            used.clone().map(|bin| mid(&bin.ticks)).collect(),
-            used.filter(|bin| bin.arm_rad.is_some()).map(|bin| mid(&bin.ticks)).collect(),
-            efforts.map(|effort| mid(&effort.ticks)).collect(),
+            bins.clone().map(compression).collect(),
+            bins.filter_map(|bin| Some(arm(bin, bin.arm_rad?))).collect(),
+            efforts.map(effort).collect(),
         ]
     }
 }
@@ -182,12 +186,6 @@ impl Trajectory {
     #[must_use]
     pub fn height_mm(&self, tick: f64) -> f64 {
         self.at(HEIGHT, tick)
-    }
-
-    /// Largest friction utilisation.
-    #[must_use]
-    pub const fn most_utilisation(&self) -> f64 {
-        self.most_utilisation
     }
 
     /// Each value replaced by what `of` gives for its series, its index and itself.

@@ -9,16 +9,16 @@ use nalgebra::{DMatrix, DVector, Dyn};
 
 use super::IdentifyError;
 
-/// Relative change of the sum of squares, and of the coordinates, at which it has settled.
+/// Relative change of the sum of squares and of the coordinates at convergence.
 const SETTLED: f64 = 1e-6;
 /// Most evaluations, in units of the number of coordinates.
 const MOST_EVALUATIONS: usize = 30;
 
 /// What is fitted.
 pub trait Model {
-    /// What is computed at a point before its residuals and derivatives.
+    /// The model's values at a point, shared by residuals and derivatives.
     type At;
-    /// Evaluates the model; none where it has no answer.
+    /// Evaluates the model; none where it has no value.
     fn at(&self, x: &[f64]) -> Option<Self::At>;
     /// Residuals, each over its standard deviation.
     fn residuals(&self, x: &[f64], at: &Self::At) -> Vec<f64>;
@@ -26,7 +26,7 @@ pub trait Model {
     fn jacobian(&self, x: &[f64], at: &Self::At) -> Option<Vec<Vec<f64>>>;
 }
 
-/// Where it ended.
+/// The minimum.
 #[derive(Clone, Debug)]
 pub struct Fitted<A> {
     /// Coordinates.
@@ -74,9 +74,8 @@ impl<M: Model> LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_, M> {
 /// Minimises the sum of squares from `start` on.
 ///
 /// # Errors
-/// [`IdentifyError::NoFit`] if it does not settle or the model has no answer on the way.
+/// [`IdentifyError::NoFit`] if it does not converge or the model has no value at a point.
 pub fn minimise<M: Model>(model: &M, start: &[f64]) -> Result<Fitted<M::At>, IdentifyError> {
-    let no_fit = |why: String| IdentifyError::NoFit { why };
     let problem = Problem { model, x: DVector::from_column_slice(start), at: model.at(start) };
     let solver = LevenbergMarquardt::new()
         .with_ftol(SETTLED)
@@ -87,15 +86,13 @@ pub fn minimise<M: Model>(model: &M, start: &[f64]) -> Result<Fitted<M::At>, Ide
     let settled = report.termination.was_successful()
         || matches!(report.termination, TerminationReason::NoImprovementPossible(_));
     if !settled {
-        return Err(no_fit(format!("{:?}", report.termination)));
+        return Err(IdentifyError::NoFit(format!("{:?}", report.termination)));
     }
-    let jacobian = problem.jacobian();
-    let residuals = problem.residuals();
-    match (jacobian, residuals, problem.at) {
+    match (problem.jacobian(), problem.residuals(), problem.at) {
         (Some(jacobian), Some(residuals), Some(at)) => {
             Ok(Fitted { x: problem.x.as_slice().to_vec(), at, residuals, jacobian })
         }
-        _ => Err(no_fit("the model has no answer at its end".into())),
+        _ => Err(IdentifyError::NoFit("the model has no answer at its end".into())),
     }
 }
 
@@ -106,16 +103,15 @@ pub fn minimise<M: Model>(model: &M, start: &[f64]) -> Result<Fitted<M::At>, Ide
 pub fn covariance(jacobian: &DMatrix<f64>) -> Result<DMatrix<f64>, IdentifyError> {
     let normal = jacobian.transpose() * jacobian;
     let inverse = normal.cholesky().map(|root| root.inverse());
-    inverse.ok_or_else(|| IdentifyError::NoFit {
-        why: "the logs do not determine the parameters".into(),
-    })
+    let why = "the logs do not determine the parameters";
+    inverse.ok_or_else(|| IdentifyError::NoFit(why.into()))
 }
 
-/// The covariance, each variance no less than what blocks of residuals that err alike
-/// make of it: `H^-1 (w^2 sum g g' + P) H^-1` with a block's gradient g, the normal matrix
-/// H and the part P of it that is no data (White 1980, Liang and Zeger 1986). Covers noise
-/// that lasts and noise that differs from place to place; `blocks` are rows, what is in
-/// none is no data. `widened` is w, for what no scatter shows.
+/// The covariance, each variance at least that of the cluster-robust estimate
+/// `H^-1 (w^2 sum g g' + P) H^-1` with a block's gradient g, the normal matrix H and the
+/// part P of it that is no data (White 1980, Liang and Zeger 1986). It covers correlated
+/// noise and noise that differs from place to place. `blocks` are ranges of rows; rows
+/// after the last block are no data. `widened` is w, for errors that no scatter shows.
 ///
 /// # Errors
 /// [`IdentifyError::NoFit`] if the residuals do not determine the coordinates.
@@ -209,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn residuals_that_err_alike_widen_and_those_that_do_not_leave_it() {
+    fn correlated_residuals_widen_the_covariance_and_independent_ones_do_not() {
         // A mean of 40: by tens alike, or each for itself.
         let jacobian = DMatrix::from_element(40, 1, 1.0);
         let blocks: Vec<Range<usize>> = (0..4).map(|b| 10 * b..10 * b + 10).collect();
@@ -221,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_held_brings_its_own_uncertainty() {
+    fn a_held_coordinate_adds_its_own_uncertainty() {
         // Readings of a + c, 25 of deviation 1, c held by a last row.
         let held = 1e6;
         let jacobian = DMatrix::from_fn(26, 2, |row, column| match (row, column) {

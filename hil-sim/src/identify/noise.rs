@@ -1,5 +1,5 @@
-//! Noise of residuals: its size, and how many of them count as one because neighbours are
-//! correlated.
+//! Noise of residuals: its standard deviation, and how far correlation inflates the variance
+//! of a mean.
 
 /// Standard deviation about zero of residuals, and how much their correlation adds to the
 /// variance of a mean.
@@ -33,7 +33,7 @@ impl Noise {
         Self { deviation: (square / n as f64).sqrt(), inflation: inflation.max(1.0) }
     }
 
-    /// Standard deviation that makes independent residuals of correlated ones.
+    /// Standard deviation of independent residuals with the same variance of the mean.
     #[must_use]
     pub fn effective(&self) -> f64 {
         self.deviation * self.inflation.sqrt()
@@ -69,7 +69,7 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_that_err_alike_count_less() {
+    fn correlated_residuals_count_less() {
         // (1 + a) / (1 - a) of a first-order autoregression.
         for part in [0.5, 0.8] {
             let noise = Noise::of(&series(part, 2));
@@ -79,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn little_or_nothing_is_no_noise_at_all() {
+    fn no_residuals_or_zeros_are_no_noise() {
         assert_eq!(Noise::of(&[]), Noise { deviation: 0.0, inflation: 1.0 });
         assert_eq!(Noise::of(&[0.0; 9]).effective(), 0.0);
     }

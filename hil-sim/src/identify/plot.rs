@@ -1,5 +1,5 @@
-//! Residuals as a plot a log: a row a channel, with the band that would hold 95 % of them
-//! if they were normal with their root mean square.
+//! Plots the residuals of a log, a row per channel, with the 95 % band of a normal
+//! distribution with their root mean square.
 
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};

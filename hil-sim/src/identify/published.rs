@@ -1,9 +1,9 @@
 //! The fit to what the study publishes: three gaps, three parameters of the tread.
 //!
-//! Three points fit three parameters: there is neither a validation nor an interval. Nor
-//! do they fit exactly. At one speed the ratio of two gaps hardly depends on the tread, so
-//! what remains is the model's error and no noise, and one combination of the three
-//! parameters is all but free. It is held to the scenario's tread within a factor of two.
+//! Three points fit three parameters: there is neither a validation nor an interval, and
+//! the fit is not exact. At one speed the ratio of two gaps hardly depends on the tread, so
+//! the residual is the model's error, not noise, and one combination of the three parameters
+//! is nearly undetermined. It is held to the scenario's tread within a factor of two.
 
 use rayon::prelude::*;
 
@@ -141,7 +141,7 @@ pub fn fit(
 pub fn stated(scenario: &Scenario, fineness: (usize, f64)) -> Result<Tread, IdentifyError> {
     let gaps = Gaps::of(scenario, fineness);
     let at = gaps.at(&gaps.start);
-    let at = at.ok_or_else(|| IdentifyError::NoFit { why: "a crossing has no balance".into() })?;
+    let at = at.ok_or_else(|| IdentifyError::NoFit("a crossing has no balance".into()))?;
     Ok(tread(&gaps.start, &at))
 }
 

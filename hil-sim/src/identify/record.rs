@@ -1,14 +1,17 @@
 //! The input of identification: the sensors' readings and the bridges' duties of every
 //! tick, in the units of the rig that the log names, and nothing that the plant alone
-//! knows.
+//! knows. Logs of `rig capture` and `rig deploy`, MCAP and CSV alike, have the sensors' own
+//! codes of every tick, and the rig's parameters if they are known.
 
 use std::f64::consts::TAU;
+use std::path::Path;
 
 use interstage::sense::angle;
 use interstage::sense::raw::{EncoderCount, SensorFrame};
 
 use super::IdentifyError;
 use crate::plant::rig::Drives;
+use crate::record::{Controller, Run};
 use crate::scenario::{Direction, Scenario};
 
 /// Length of a tick, s.
@@ -49,14 +52,38 @@ pub struct Record {
     pub name: String,
     /// The rig as the controller believed it to be, and how the log was made.
     pub scenario: Scenario,
-    /// Age of an arm angle when it is logged, s: conversion, and the filter if the log has
-    /// the filtered one.
-    pub arm_delay_s: f64,
     /// One a tick, without gaps.
     pub samples: Vec<Sample>,
 }
 
 impl Record {
+    /// Reads a log; `scenario` is the rig's where the log does not say.
+    ///
+    /// # Errors
+    /// [`IdentifyError::Log`] if it cannot be read or is no log of a run.
+    pub fn read(path: &Path, scenario: &Scenario) -> Result<Self, IdentifyError> {
+        let name = path.display().to_string();
+        let bad = |why| IdentifyError::Log(name.clone(), why);
+        let run = Run::read(path).map_err(|error| bad(error.reason()))?;
+        let scenario = match &run.parameters {
+            Some(text) => Scenario::parse(&name, text, &[]).map_err(|e| bad(e.to_string()))?,
+            None => scenario.clone(),
+        };
+        let mut reader = Reader::new(&scenario);
+        let sample = |row: &Controller| {
+            let driven = Drives {
+                drive: row.drive_duty,
+                drive_on: row.drive_on,
+                preload: row.pretightener_duty,
+                preload_on: row.pretightener_on,
+                ..Drives::default()
+            };
+            (row.tick, reader.sample(&row.sensors(), &driven))
+        };
+        let ticked: Vec<_> = run.rows.iter().map(sample).collect();
+        Self::new(&name, scenario, ticked)
+    }
+
     /// A record of samples with their ticks.
     ///
     /// # Errors
@@ -66,7 +93,7 @@ impl Record {
         scenario: Scenario,
         ticked: impl IntoIterator<Item = (u32, Sample)>,
     ) -> Result<Self, IdentifyError> {
-        let bad = |why: String| IdentifyError::Log { name: name.to_owned(), why };
+        let bad = |why| IdentifyError::Log(name.to_owned(), why);
         let mut samples: Vec<Sample> = Vec::new();
         let mut last: Option<u32> = None;
         for (tick, sample) in ticked {
@@ -94,8 +121,7 @@ impl Record {
             samples.push(sample);
             last = Some(tick);
         }
-        let arm_delay_s = scenario.noise.arm_angle_delay_s;
-        Ok(Self { name: name.to_owned(), scenario, arm_delay_s, samples })
+        Ok(Self { name: name.to_owned(), scenario, samples })
     }
 
     /// Whether the wheel goes out, onto the smaller radius.
@@ -170,6 +196,9 @@ impl Reader {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::record::{write_csv, write_mcap};
+    use crate::session;
+    use interstage::supervise::{Command, Mode};
 
     fn record(ticks: &[u32]) -> Result<Record, IdentifyError> {
         let sample = |tick: u32| Sample { counts: f64::from(tick), ..Sample::default() };
@@ -215,5 +244,47 @@ mod tests {
         frame.wheel_encoder = Some(At { code: EncoderCount::new(4), at: 1 });
         let second = reader.sample(&frame, &Drives::default());
         assert_eq!((second.counts, second.arm_rad), (4.0, None));
+    }
+
+    #[test]
+    fn both_files_of_a_run_give_the_codes_of_the_sensors() {
+        let mut scenario = Scenario::default();
+        scenario.run.seed = 3;
+        let directory = tempfile::tempdir().unwrap();
+        let options = session::Options { rows: true, ..session::Options::default() };
+        let recording = session::run(&scenario, options).unwrap();
+        let (csv, mcap) = (directory.path().join("log.csv"), directory.path().join("log.mcap"));
+        write_csv(&recording, &csv).unwrap();
+        write_mcap(&recording, &mcap).unwrap();
+        let [csv, mcap] = [csv, mcap].map(|path| Record::read(&path, &scenario).unwrap());
+        assert_eq!(csv.samples.len(), mcap.samples.len());
+        assert_eq!(mcap.scenario, scenario);
+        assert_eq!(csv.samples, mcap.samples);
+
+        let mut session = session::Session::new(&scenario, session::Options::default()).unwrap();
+        let mut reader = Reader::new(&scenario);
+        let mut start = Some(Command::Start);
+        for coded in &mcap.samples {
+            let idle = session.mode() == Mode::Idle;
+            let command = if idle { start.take() } else { None };
+            let frame = session.sense();
+            let output = session.advance(&frame, command).unwrap();
+            let sample = reader.sample(&frame, &session::drives(output.drive, output.preload));
+            assert_eq!(&sample, coded, "the codes are the sensors' own");
+        }
+    }
+
+    #[test]
+    fn what_is_no_log_is_refused_in_a_line_with_its_name() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("notes.csv");
+        let refused = || Record::read(&path, &Scenario::default()).unwrap_err().to_string();
+        assert!(refused().contains("notes.csv: No such file"), "{}", refused());
+        std::fs::write(&path, "a,b\n1,2\n").unwrap();
+        assert!(refused().contains("notes.csv: it holds no tick"), "{}", refused());
+        std::fs::write(&path, "").unwrap();
+        assert!(refused().contains("it holds no tick"), "{}", refused());
+        std::fs::write(&path, b"\x89MCAP and no more").unwrap();
+        assert!(refused().contains("notes.csv: "), "{}", refused());
     }
 }

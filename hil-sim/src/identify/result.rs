@@ -1,9 +1,10 @@
-//! What was identified: each parameter with its interval and its evidence, the residuals,
-//! and the scenario with the new values in it.
+//! The result of identification: each parameter with its interval and its evidence, the
+//! residuals, and the scenario with the new values.
 
 use std::f64::consts::TAU as TURN;
 
 use serde::Serialize;
+use toml::{Table, Value};
 
 use super::IdentifyError;
 use super::actuator::{self, Actuator};
@@ -23,7 +24,7 @@ pub const NORMAL_95: f64 = 1.96;
 /// Part of the prior deviation that the logs must leave for a parameter to count as
 /// identified: where nothing was known, and where a tolerance was.
 const LEAVES: (f64, f64) = (0.1, 0.5);
-/// Variance of a whole number of ticks that stands for any dead time, ms^2.
+/// Variance of rounding a dead time to ticks, ms^2.
 const TICK_VARIANCE: f64 = 1.0 / 12.0;
 /// Evidence of a parameter that has none.
 const NOTHING: &str = "not in these logs";
@@ -45,6 +46,20 @@ pub struct Parameter {
     pub identified: bool,
     /// By what, or why not.
     pub by: String,
+}
+
+impl Parameter {
+    fn new(
+        name: &str,
+        unit: &'static str,
+        value: f64,
+        interval: Option<[f64; 2]>,
+        identified: bool,
+        by: &str,
+    ) -> Self {
+        let (low, high) = interval.map(|[low, high]| (low, high)).unzip();
+        Self { name: name.to_owned(), unit, value, low, high, identified, by: by.to_owned() }
+    }
 }
 
 /// Residuals of a channel of a log.
@@ -111,12 +126,9 @@ pub fn identify(records: &[Record], scenario: &Scenario) -> Result<Identificatio
     for record in records {
         let (its, ours) = (&record.scenario.rig, &scenario.rig);
         if its.rig != ours.rig || its.sense != ours.sense || its.drive != ours.drive {
-            return Err(IdentifyError::Log {
-                name: record.name.clone(),
-                why: "its sleeve, wheel, drive or sensors are not those of the rig that is \
-                      identified"
-                    .into(),
-            });
+            let why = "its sleeve, wheel, drive or sensors are not those of the rig that is \
+                       identified";
+            return Err(IdentifyError::Log(record.name.clone(), why.to_owned()));
         }
     }
     let coordinates = Coordinates::of(scenario);
@@ -162,15 +174,8 @@ impl Report<'_> {
             (false, true) => "its tolerance",
             (false, false) => NOTHING,
         };
-        Parameter {
-            name: name.to_owned(),
-            unit,
-            value: of(x),
-            low: Some(ends[0].min(ends[1])),
-            high: Some(ends[0].max(ends[1])),
-            identified,
-            by: by.to_owned(),
-        }
+        let interval = [ends[0].min(ends[1]), ends[0].max(ends[1])];
+        Parameter::new(name, unit, of(x), Some(interval), identified, by)
     }
 
     fn contact_parameters(&self) -> Vec<Parameter> {
@@ -187,9 +192,7 @@ impl Report<'_> {
             ((STIFFENING, "tread.stiffening", "", rolling), &f64::exp),
             ((TAU, "tread.tau_s", "s", speeds), &f64::exp),
             ((FRICTION, "plant.mu", "", "creep at the climbs, by its law"), &f64::exp),
-            ((LOAD, "plant.top_load_n", "N", "wedge of the arm and drive effort"), &|x| {
-                x.exp() / share
-            }),
+            ((LOAD, "plant.top_load_n", "N", "arm thrust and drive effort"), &|x| x.exp() / share),
             ((GEARBOX, "gearbox friction", "N", "drive effort on the smooth wall"), &itself),
             ((RADIUS, "rig.wheel_radius_mm", "mm", "shape of the climbs"), &itself),
             ((LOAD_GAIN, "preload sensor gain", "", "loads against the drive"), &f64::exp),
@@ -226,18 +229,14 @@ impl Report<'_> {
         let gain_variance = self.contact.covariance[(LOAD_GAIN, LOAD_GAIN)];
         let x = &actuator.x;
         let variance = |index: usize| actuator.covariance[(index, index)];
-        let of = |name: &str, unit, value: f64, low: f64, high: f64| Parameter {
-            name: name.to_owned(),
-            unit,
-            value,
-            low: Some(low),
-            high: Some(high),
-            identified: high - low < 0.5 * value.abs(),
-            by: "preload sensor against duty".to_owned(),
+        let of = |name: &str, unit, value: f64, [low, high]: [f64; 2]| {
+            let identified = high - low < 0.5 * value.abs();
+            let by = "preload sensor against duty";
+            Parameter::new(name, unit, value, Some([low, high]), identified, by)
         };
         let around = |name: &str, unit, value: f64, deviation: f64| {
             let half = NORMAL_95 * deviation;
-            of(name, unit, value, value - half, value + half)
+            of(name, unit, value, [value - half, value + half])
         };
         let scaled = |name: &str, unit, index: usize| {
             let value = x[index] / gain;
@@ -249,7 +248,7 @@ impl Report<'_> {
         let lag = [lag, lag - NORMAL_95 * deviation, lag + NORMAL_95 * deviation].map(f64::exp);
         vec![
             around("preload.delay_s", "s", 1e-3 * x[actuator::DELAY], 1e-3 * delay),
-            of("preload.lag_s", "s", lag[0], lag[1], lag[2]),
+            of("preload.lag_s", "s", lag[0], [lag[1], lag[2]]),
             scaled("preload.slew_n_per_s", "N/s", actuator::SLEW),
             scaled("preload.spring_n_per_mm", "N/mm", actuator::SPRING),
         ]
@@ -266,16 +265,9 @@ impl Report<'_> {
             let variance: f64 =
                 zeros.iter().map(|zero| (part(zero) * zero.error).powi(2)).sum::<f64>();
             let half = NORMAL_95 * variance.sqrt();
-            let known = count > 0;
-            Parameter {
-                name: name.to_owned(),
-                unit,
-                value,
-                low: known.then_some(value - half),
-                high: known.then_some(value + half),
-                identified: known,
-                by: if known { "the unloaded rig" } else { NOTHING }.to_owned(),
-            }
+            let interval = (count > 0).then_some([value - half, value + half]);
+            let by = interval.map_or(NOTHING, |_| "the unloaded rig");
+            Parameter::new(name, unit, value, interval, count > 0, by)
         };
         [
             of("preload sensor zero", "N", |run| run.traces.preload_zero),
@@ -297,10 +289,10 @@ impl Report<'_> {
 
     fn notes(&self, parameters: &[Parameter]) -> Vec<String> {
         let trajectories = self.contact.trajectories.iter();
-        let most = trajectories.map(|t| t.most_utilisation()).fold(0.0, f64::max);
+        let most = trajectories.map(|t| t.most_utilisation).fold(0.0, f64::max);
         let mut notes = vec![format!(
             "friction: the climbs used {most:.2}, so that it is at least that; the rest is what \
-             their creep tells, given plant.elastic_creep"
+             their creep shows, given plant.elastic_creep"
         )];
         notes.extend(self.runs.iter().filter(|run| run.traces.slips).map(|run| {
             let name = &run.name;
@@ -318,40 +310,29 @@ impl Report<'_> {
 
 /// The scenario with what was identified in it.
 fn updated(scenario: &Scenario, parameters: &[Parameter]) -> Scenario {
-    let mut scenario = scenario.clone();
-    let rig = &mut scenario.rig;
+    let mut table = Table::try_from(scenario).expect("a scenario is always TOML");
     let mut heights = Vec::new();
-    for parameter in parameters.iter().filter(|parameter| parameter.identified) {
-        let value = parameter.value;
-        let (key, index) = match parameter.name.split_once('[') {
-            Some((key, index)) => (key, index.trim_end_matches(']').parse().unwrap_or(0)),
-            None => (parameter.name.as_str(), 0usize),
-        };
-        match key {
-            "tread.k_inf_pa_per_m" => rig.tread.k_inf_pa_per_m = value,
-            "tread.stiffening" => rig.tread.stiffening = value,
-            "tread.tau_s" => rig.tread.tau_s = value,
-            "plant.mu" => rig.plant.mu = value,
-            "plant.elastic_creep" => rig.plant.elastic_creep = value,
-            "plant.top_load_n" => rig.plant.top_load_n = value,
-            "rig.wheel_radius_mm" => rig.rig.wheel_radius_mm = value,
-            "sense.angle_zero_code" => rig.sense.angle_zero_code = value,
-            "preload.delay_s" => rig.preload.delay_s = value,
-            "preload.lag_s" => rig.preload.lag_s = value,
-            "preload.slew_n_per_s" => rig.preload.slew_n_per_s = value,
-            "preload.spring_n_per_mm" => rig.preload.spring_n_per_mm = value,
-            "rig.step_height_mm" => heights.push(value),
-            "rig.step_positions_mm" => {
-                if let Some(position) = rig.rig.step_positions_mm.get_mut(index.wrapping_sub(1)) {
-                    *position = value;
-                }
+    for Parameter { name, value, .. } in parameters.iter().filter(|p| p.identified) {
+        // What is no key of a scenario has no section.
+        let Some((section, name)) = name.split_once('.') else { continue };
+        let (name, index) = name.split_once('[').unwrap_or((name, ""));
+        if name == "step_height_mm" {
+            heights.push(value);
+        }
+        let index = index.trim_end_matches(']').parse().ok().and_then(|i: usize| i.checked_sub(1));
+        match (table.get_mut(section).and_then(|keys| keys.get_mut(name)), index) {
+            (Some(Value::Array(list)), Some(index)) => {
+                list.get_mut(index).into_iter().for_each(|place| *place = (*value).into());
             }
+            (Some(place), None) => *place = (*value).into(),
             _ => {}
         }
     }
+    let mut scenario: Scenario = table.try_into().expect("numbers replace numbers");
     // A scenario has one height for all steps.
     if !heights.is_empty() {
-        rig.rig.step_height_mm = heights.iter().sum::<f64>() / heights.len() as f64;
+        scenario.rig.rig.step_height_mm =
+            heights.iter().copied().sum::<f64>() / heights.len() as f64;
     }
     scenario
 }
@@ -363,7 +344,7 @@ impl Identification {
         self.parameters.iter().find(|parameter| parameter.name == name)
     }
 
-    /// The scenario file: what was identified stands in it, with its interval above.
+    /// The scenario file: the identified values, with their intervals in a comment above.
     #[must_use]
     pub fn to_toml(&self) -> String {
         let mut text = String::from("# Identified from logs; 95 % intervals:\n");
@@ -372,7 +353,8 @@ impl Identification {
                 text += &format!("#   {} = {} ({low} to {high}) {}\n", p.name, p.value, p.unit);
             }
         }
-        text += "# One height stands for all steps; sensors' zeros are taken anew at each start.\n";
+        text +=
+            "# One height is that of all steps; sensors' zeros are taken again at each start.\n";
         text + "\n" + &self.scenario.to_toml()
     }
 }
@@ -382,15 +364,7 @@ mod tests {
     use super::*;
 
     fn parameter(name: &str, value: f64, identified: bool) -> Parameter {
-        Parameter {
-            name: name.into(),
-            unit: "",
-            value,
-            low: Some(value - 0.1),
-            high: Some(value + 0.1),
-            identified,
-            by: String::new(),
-        }
+        Parameter::new(name, "", value, Some([value - 0.1, value + 0.1]), identified, "")
     }
 
     #[test]
@@ -410,15 +384,15 @@ mod tests {
         assert_eq!(after.rig.rig.step_positions_mm[1], 40.25);
         assert_eq!(after.rig.rig.step_positions_mm[0], before.rig.rig.step_positions_mm[0]);
         assert!((after.rig.rig.step_height_mm - 4.05).abs() < 1e-12);
-        let whole = Identification {
+        let found = Identification {
             parameters: parameters.to_vec(),
             residuals: Vec::new(),
             degrees_of_freedom: 1,
             notes: Vec::new(),
             scenario: after.clone(),
         };
-        let read = Scenario::parse("identified.toml", &whole.to_toml(), &[]).unwrap();
+        let read = Scenario::parse("identified.toml", &found.to_toml(), &[]).unwrap();
         assert_eq!(read, after);
-        assert!(whole.to_toml().contains("tread.tau_s = 0.2 (0.1 to 0.3"));
+        assert!(found.to_toml().contains("tread.tau_s = 0.2 (0.1 to 0.3"));
     }
 }

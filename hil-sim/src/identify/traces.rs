@@ -113,7 +113,7 @@ impl Traces {
     /// # Errors
     /// [`IdentifyError::Log`] if the wheel was never pressed or never driven.
     pub fn of(record: &Record) -> Result<Self, IdentifyError> {
-        let bad = |why: &str| IdentifyError::Log { name: record.name.clone(), why: why.into() };
+        let bad = |why: &str| IdentifyError::Log(record.name.clone(), why.into());
         let samples = &record.samples;
         let pressed = samples.iter().position(|s| s.pretightener_on);
         let start = pressed.ok_or_else(|| bad("the pre-tightener was never on"))?;
@@ -124,7 +124,7 @@ impl Traces {
         if end < start + 4 * EFFORT_BIN {
             return Err(bad("the run is too short"));
         }
-        // Unloaded: only before the first preload, and only on the way out.
+        // Unloaded: only before the first preload of a deployment.
         let idle = if record.deploys() { &samples[..start] } else { &samples[..0] };
         let preload_zero = zero(idle, |s| s.preload_n);
         let compression_zero = zero(idle, |s| s.compression_mm);
@@ -183,8 +183,8 @@ impl Traces {
     fn bin(&mut self, record: &Record, moving: usize) {
         let (samples, rig) = (&record.samples, &record.scenario.rig);
         let speed = |ticks: &Range<usize>| {
-            let way = self.turn_rad[ticks.end - 1] - self.turn_rad[ticks.start];
-            way / ((ticks.len() - 1) as f64 * TICK_S)
+            let turn = self.turn_rad[ticks.end - 1] - self.turn_rad[ticks.start];
+            turn / ((ticks.len() - 1) as f64 * TICK_S)
         };
         let radius = rig.rig.wheel_radius_mm;
         let starting = |ticks: &Range<usize>| ticks.start < moving + STARTING && ticks.end > moving;
@@ -200,14 +200,12 @@ impl Traces {
         self.bins = ranges(&self.span, BIN)
             .map(|ticks| {
                 let of = &samples[ticks.clone()];
-                let mean = of.iter().map(|s| s.compression_mm).sum::<f64>() / of.len() as f64;
                 let arms: Vec<f64> = of.iter().filter_map(|s| s.arm_rad).collect();
                 let pressed = self.preload_n[ticks.start] > LEAST_PRELOAD_N;
-                let preload = of.iter().map(|s| s.preload_n).sum::<f64>() / of.len() as f64;
                 Bin {
-                    preload_n: preload - self.preload_zero.value,
+                    preload_n: mean(of, |s| s.preload_n) - self.preload_zero.value,
                     pressed,
-                    compression_mm: mean - self.compression_zero.value,
+                    compression_mm: mean(of, |s| s.compression_mm) - self.compression_zero.value,
                     arm_rad: (!arms.is_empty())
                         .then(|| arms.iter().sum::<f64>() / arms.len() as f64),
                     used: pressed
@@ -222,7 +220,7 @@ impl Traces {
         self.efforts = ranges(&(moving..self.span.end), EFFORT_BIN)
             .map(|ticks| {
                 let of = &samples[ticks.clone()];
-                let duty = of.iter().map(|s| s.drive).sum::<f64>() / of.len() as f64;
+                let duty = mean(of, |s| s.drive);
                 let turn_rad_s = speed(&ticks);
                 let mid = (ticks.start + ticks.end) / 2;
                 let (first, second) = (speed(&(ticks.start..mid)), speed(&(mid..ticks.end)));
@@ -241,10 +239,14 @@ impl Traces {
     }
 }
 
-/// Whole bins of a span.
+/// The complete bins of a span.
 fn ranges(span: &Range<usize>, length: usize) -> impl Iterator<Item = Range<usize>> + use<> {
     let (start, count) = (span.start, span.len() / length);
     (0..count).map(move |i| start + i * length..start + (i + 1) * length)
+}
+
+fn mean(samples: &[Sample], of: impl Fn(&Sample) -> f64) -> f64 {
+    samples.iter().map(of).sum::<f64>() / samples.len() as f64
 }
 
 fn zero(idle: &[Sample], of: impl Fn(&Sample) -> f64) -> Zero {
@@ -253,7 +255,7 @@ fn zero(idle: &[Sample], of: impl Fn(&Sample) -> f64) -> Zero {
         return Zero::default();
     }
     let n = count as f64;
-    let value = idle.iter().map(&of).sum::<f64>() / n;
+    let value = mean(idle, &of);
     let square = idle.iter().map(|s| (of(s) - value).powi(2)).sum::<f64>();
     Zero { value, error: (square / (n - 1.0) / n).sqrt(), count }
 }
@@ -328,16 +330,17 @@ mod tests {
     }
 
     proptest! {
-        /// Known to a third of a count at any speed of the drive, either way. At a count a tick
-        /// the edges keep their place within the tick, and nothing tells it: half a count.
+        /// Known to a third of a count at any speed of the drive, in both directions. At a
+        /// count a tick the edges keep their place within the tick, which no reading shows:
+        /// half a count.
         #[test]
         fn the_turn_is_known_finer_than_a_count(per_s in 100.0f64..1600.0, back in any::<bool>()) {
             let sign = if back { -1.0 } else { 1.0 };
-            let way = |t: f64| sign * per_s * (t - 0.05 * (1.0 - (-t / 0.05).exp()));
-            let samples = turning(1500, way);
+            let travel = |t: f64| sign * per_s * (t - 0.05 * (1.0 - (-t / 0.05).exp()));
+            let samples = turning(1500, travel);
             let turn = turn(&samples, 100);
             let square: f64 = (400..1400)
-                .map(|n| (turn[n] - way((n as f64 - 100.0) * TICK_S)).powi(2))
+                .map(|n| (turn[n] - travel((n as f64 - 100.0) * TICK_S)).powi(2))
                 .sum();
             let off = (square / 1000.0).sqrt();
             let drifts = (per_s * TICK_S - 1.0).abs() * 1000.0;
@@ -370,7 +373,7 @@ mod tests {
     }
 
     #[test]
-    fn a_log_that_tells_nothing_is_refused() {
+    fn a_log_without_information_is_refused() {
         let refused = |samples: Vec<Sample>| {
             let ticked = samples.into_iter().enumerate().map(|(n, s)| (n as u32, s));
             let record = Record::new("b", Scenario::default(), ticked).unwrap();

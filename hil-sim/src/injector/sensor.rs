@@ -1,7 +1,7 @@
-//! A faulty sensor: between the code it gives and the code the controller gets.
+//! A faulty sensor: distorts its code before the controller gets it.
 //!
-//! Every sensor is a number in codes, the wheel encoder's counter without its wrap; what a
-//! fault does to that number is the same for all.
+//! Every sensor is a number in codes, the wheel encoder's counter without its wrap. A fault
+//! changes that number alike for all.
 
 use std::collections::VecDeque;
 
@@ -20,7 +20,7 @@ const SPAN: f64 = 65_535.0;
 const TURN: f64 = 16_384.0;
 /// Largest code of a bridge, and the codes of a duty of one.
 const BRIDGE: (f64, f64) = (4095.0, 32_768.0 / BridgeCode::DUTY as f64);
-/// What sums of milliseconds may be off, s.
+/// Rounding error of sums of milliseconds, s.
 const TIME_S: f64 = 1e-6;
 /// Period of an intermittent contact, s.
 const PERIOD_S: f64 = 0.1;
@@ -36,9 +36,9 @@ pub(super) struct FaultySensor {
     zero: f64,
     /// Counter of the encoder before, and without its wrap.
     counter: Option<(EncoderCount, i64)>,
-    /// What the sensor truly read last, s and codes.
+    /// The last true reading, s and codes.
     last: Option<(f64, f64)>,
-    /// What it gave when the fault came.
+    /// The true reading when the fault began.
     first: Option<f64>,
     filtered: f64,
     past: VecDeque<(f64, f64)>,
@@ -80,8 +80,8 @@ impl FaultySensor {
         }
     }
 
-    /// Puts into `frame` what the controller gets, `since_s` after the fault came; before
-    /// that nothing is changed.
+    /// Puts the faulty code into `frame`, `since_s` after the fault began; without a fault
+    /// nothing is changed.
     pub(super) fn read(
         &mut self,
         frame: &mut SensorFrame,
@@ -113,7 +113,7 @@ impl FaultySensor {
         let first = *self.first.get_or_insert(self.last.map_or(truth, |(_, code)| code));
         let given = match self.kind {
             Kind::Stuck => first,
-            // The counter has no zero of its own: it goes wrong from where it stood.
+            // The counter has no zero of its own: it goes wrong from where it was.
             Kind::Gain if self.target == Target::Encoder => {
                 first + (truth - first) * self.magnitude
             }
@@ -131,7 +131,7 @@ impl FaultySensor {
         self.write(frame, given);
     }
 
-    /// Keeps what is true while the sensor is intact.
+    /// Keeps the true reading while the sensor is intact.
     fn keep(&mut self, t_s: f64, truth: Option<f64>) {
         if let Some(truth) = truth {
             self.filtered = truth;
@@ -149,14 +149,14 @@ impl FaultySensor {
         }
     }
 
-    /// What was true so long ago.
+    /// The true reading so long ago.
     fn late(&self, t_s: f64) -> f64 {
         let due = |(at_s, _): &&(f64, f64)| *at_s <= t_s - self.magnitude + TIME_S;
         let then = self.past.iter().rev().find(due).or(self.past.front());
         then.map_or(0.0, |(_, code)| *code)
     }
 
-    /// The sensor's number in this frame; none before the first, or if it is not good.
+    /// The sensor's number in this frame; none before the first, or if it is invalid.
     fn code(&mut self, frame: &SensorFrame) -> Option<f64> {
         match self.target {
             Target::PreloadSensor => frame.preload_sensor.map(|s| f64::from(s.code.get())),
@@ -177,46 +177,40 @@ impl FaultySensor {
         }
     }
 
+    /// Puts in the code nearest to this number.
     fn write(&self, frame: &mut SensorFrame, code: f64) {
-        let bridge = AdcCode::new(code.round().clamp(0.0, SPAN) as u16);
-        let output = BridgeCode::new(code.round().clamp(0.0, BRIDGE.0) as u16);
-        match self.target {
-            Target::PreloadSensor => put(&mut frame.preload_sensor, bridge),
-            Target::CompressionSensor => put(&mut frame.compression_sensor, bridge),
+        let most = if self.target.is_readback() { BRIDGE.0 } else { SPAN };
+        let code = match self.target {
             Target::Angle => {
                 let bits = (code.round() as i64 & 0x3fff) as u16;
-                let parity = (bits.count_ones() as u16 & 1) << 15;
-                put(&mut frame.arm_angle, AngleFrame::new(bits | parity));
+                bits | (bits.count_ones() as u16 & 1) << 15
             }
-            Target::Readback | Target::DriveReadback | Target::PretightenerReadback => {
-                self.put_output(frame, output);
-            }
-            _ => put(&mut frame.wheel_encoder, EncoderCount::new(code.floor() as i64 as u16)),
-        }
+            Target::Encoder => code.floor() as i64 as u16,
+            _ => code.round().clamp(0.0, most) as u16,
+        };
+        self.put(frame, code);
     }
 
-    /// Puts the code of the bridge of the faulty readback.
-    fn put_output(&self, frame: &mut SensorFrame, code: BridgeCode) {
-        if let Some(codes) = &mut frame.bridges {
-            match self.target {
-                Target::DriveReadback => codes.drive = code,
-                Target::PretightenerReadback => codes.pretightener = code,
-                _ => {}
+    /// Puts in a code as it is.
+    fn put(&self, frame: &mut SensorFrame, code: u16) {
+        match (self.target, &mut frame.bridges) {
+            (Target::PreloadSensor, _) => put(&mut frame.preload_sensor, AdcCode::new(code)),
+            (Target::CompressionSensor, _) => {
+                put(&mut frame.compression_sensor, AdcCode::new(code));
             }
+            (Target::Angle, _) => put(&mut frame.arm_angle, AngleFrame::new(code)),
+            (Target::DriveReadback, Some(codes)) => codes.drive = BridgeCode::new(code),
+            (Target::PretightenerReadback, Some(codes)) => {
+                codes.pretightener = BridgeCode::new(code);
+            }
+            (Target::Encoder, _) => put(&mut frame.wheel_encoder, EncoderCount::new(code)),
+            _ => {}
         }
     }
 
     fn garble(&self, frame: &mut SensorFrame, random: &mut ChaCha8Rng) {
         let code: u16 = random.random();
-        match self.target {
-            Target::PreloadSensor => put(&mut frame.preload_sensor, AdcCode::new(code)),
-            Target::CompressionSensor => put(&mut frame.compression_sensor, AdcCode::new(code)),
-            Target::Angle => put(&mut frame.arm_angle, AngleFrame::new(code)),
-            Target::Readback | Target::DriveReadback | Target::PretightenerReadback => {
-                self.put_output(frame, BridgeCode::new(code & 0xFFF));
-            }
-            _ => put(&mut frame.wheel_encoder, EncoderCount::new(code)),
-        }
+        self.put(frame, if self.target.is_readback() { code & 0xFFF } else { code });
     }
 
     /// Gives the sample before again.
@@ -225,9 +219,7 @@ impl FaultySensor {
             Target::PreloadSensor => frame.preload_sensor = self.held.preload_sensor,
             Target::CompressionSensor => frame.compression_sensor = self.held.compression_sensor,
             Target::Angle => frame.arm_angle = self.held.arm_angle,
-            Target::Readback | Target::DriveReadback | Target::PretightenerReadback => {
-                frame.bridges = None;
-            }
+            target if target.is_readback() => frame.bridges = None,
             _ => frame.wheel_encoder = self.held.wheel_encoder,
         }
     }

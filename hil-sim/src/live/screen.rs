@@ -15,20 +15,20 @@ use interstage::tick::{Entry, Event};
 
 use crate::record::{Controller, Counts, Item, Mark, View, text};
 
-/// What the plots show, s.
+/// Time span of the plots, s.
 const SPAN_S: f64 = 10.0;
-/// Ticks from one point of a plot to the next.
+/// Ticks between two points of a plot.
 const EVERY: u32 = 10;
 /// Lines of the log that are kept.
 const LINES: usize = 64;
 
-/// The last line.
+/// The last line: what the keys do.
 const KEYS: &str = " s start   x stop   r retract   0 reset   q quit ";
 
 /// A line of a plot: name, colour, value.
 type Curve = (&'static str, Color, fn(&Controller) -> f64);
 
-/// Plots: title with unit, least span, and lines, the later above the earlier.
+/// Plots: title with unit, least span, and curves; later ones are drawn on top.
 const PLOTS: [(&str, f64, &[Curve]); 4] = [
     (
         "speed, mm/s",
@@ -50,7 +50,7 @@ const PLOTS: [(&str, f64, &[Curve]); 4] = [
     ("wheel centre from the axis, mm", 2.0, &[("by the arm", Color::Magenta, |row| row.radius_mm)]),
 ];
 
-/// What the terminal shows.
+/// The state of the terminal.
 #[derive(Default)]
 pub struct Screen {
     view: View,
@@ -59,7 +59,7 @@ pub struct Screen {
 }
 
 impl Screen {
-    /// Takes an item in.
+    /// Takes an item.
     pub fn see(&mut self, item: &Item) {
         self.view.see(item);
         match item {
@@ -96,7 +96,7 @@ impl Screen {
         }
     }
 
-    /// Computes the rates now and then.
+    /// Updates the rates.
     pub fn count(&mut self, counts: &Counts) {
         self.view.count(counts);
     }
@@ -128,7 +128,7 @@ impl Screen {
         frame.render_widget(Paragraph::new(KEYS).style(style), keys);
     }
 
-    /// Of the state: red in a fault, green while the drive moves.
+    /// Style of the state: red in a fault, green while the drive moves.
     fn style(&self) -> Style {
         let strong = Style::new().add_modifier(Modifier::BOLD);
         match self.view.row().and_then(Controller::mode) {

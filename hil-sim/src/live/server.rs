@@ -2,9 +2,9 @@
 //! PlotJuggler read.
 //!
 //! Source: Foxglove, WebSocket protocol, version 1 (`ws-protocol`, `docs/spec.md`):
-//! a `serverInfo` and an `advertise` object as text once a client has come; from then on
-//! a binary message for each subscription: 1, its number, the time in nanoseconds, the
-//! body. A channel's number is that of its topic.
+//! a `serverInfo` and an `advertise` object as text for a new client; then a binary message
+//! for each subscription: 1, its number, the time in nanoseconds, the body. A channel's
+//! number is that of its topic.
 
 use std::collections::HashMap;
 use std::io::{self, ErrorKind};
@@ -23,21 +23,21 @@ use crate::record::Topic;
 
 /// Names of the protocol that clients ask for.
 const PROTOCOLS: [&str; 2] = ["foxglove.websocket.v1", "foxglove.sdk.v1"];
-/// Messages that wait for a client at most; beyond, the newest are dropped.
+/// Longest queue of a client; if it is full, new messages are dropped.
 const WAITING: usize = 4096;
-/// How long a client is listened to before it is sent to again.
+/// Longest wait for a client's request between two messages to it.
 const LISTEN: Duration = Duration::from_millis(5);
 /// First byte of a message of data.
 const DATA: u8 = 1;
 
-/// A message on its way to the clients.
+/// A message for the clients.
 struct Published {
     topic: Topic,
     time_ns: u64,
     body: Vec<u8>,
 }
 
-/// A server that publishes to whoever comes.
+/// A server that publishes to every client.
 pub struct Server {
     address: SocketAddr,
     clients: Arc<Mutex<Vec<SyncSender<Arc<Published>>>>>,
@@ -47,7 +47,7 @@ impl Server {
     /// Listens at `address`.
     ///
     /// # Errors
-    /// If the address cannot be had.
+    /// If the address is not available.
     pub fn bind(address: &str) -> io::Result<Self> {
         let listener = TcpListener::bind(address)?;
         let address = listener.local_addr()?;
@@ -69,14 +69,14 @@ impl Server {
         self.address
     }
 
-    /// Clients that have come and not gone.
+    /// Number of connected clients.
     #[must_use]
     pub fn clients(&self) -> usize {
         lock(&self.clients).len()
     }
 
-    /// Sends a message to every client that has subscribed to its topic. One that does
-    /// not keep up loses messages; it holds up nobody.
+    /// Sends a message to every client that has subscribed to its topic. A slow client loses
+    /// messages and does not delay the others.
     pub fn publish(&self, topic: Topic, time_ns: u64, body: Vec<u8>) {
         let message = Arc::new(Published { topic, time_ns, body });
         lock(&self.clients).retain(|client| {
@@ -89,14 +89,14 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Serves a client until it goes.
+/// Serves a client until it disconnects.
 fn serve(stream: TcpStream, messages: &Receiver<Arc<Published>>) {
     let Ok(mut socket) = tungstenite::accept_hdr(stream, agree) else { return };
     // A client that disconnects ends in an error.
     let _ = greet(&mut socket).and_then(|()| talk(&mut socket, messages));
 }
 
-/// Takes the first of the protocol's names that the client offers.
+/// Accepts the first of the protocol's names that the client offers.
 #[expect(clippy::result_large_err, reason = "the type of the callback is the library's")]
 fn agree(request: &Request, mut response: Response) -> Result<Response, ErrorResponse> {
     let offered = request.headers().get_all(SEC_WEBSOCKET_PROTOCOL).iter();
@@ -161,7 +161,7 @@ fn talk(
     }
 }
 
-/// Takes a client's request in; what is none is ignored.
+/// Takes a client's request; ignores what is none.
 fn listen(text: &str, subscribed: &mut HashMap<u32, Vec<u32>>) {
     let Ok(request) = serde_json::from_str::<Value>(text) else { return };
     let number = |value: &Value| value.as_u64().and_then(|number| u32::try_from(number).ok());
@@ -224,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn a_client_is_told_the_channels_and_gets_what_it_subscribes_to() {
+    fn a_client_learns_the_channels_and_gets_what_it_subscribes_to() {
         let server = Server::bind("127.0.0.1:0").unwrap();
         let mut client = connect(&server, "other, foxglove.websocket.v1").unwrap();
         assert_eq!(text(&mut client)["op"], "serverInfo");
@@ -237,12 +237,12 @@ mod tests {
             assert_eq!(channel["encoding"], "json");
         }
         let id = &channels.iter().find(|c| c["topic"] == "/ledger").unwrap()["id"];
-        let wish = json!({
+        let request = json!({
             "op": "subscribe",
             "subscriptions": [{ "id": 77, "channelId": id }],
         });
-        client.send(Message::text(wish.to_string())).unwrap();
-        // Until the wish has been heard the messages go to nobody.
+        client.send(Message::text(request.to_string())).unwrap();
+        // Until the server has the request, no client gets the messages.
         let server = Arc::new(server);
         let publisher = Arc::clone(&server);
         let (stop, stopped) = sync_channel::<()>(1);
@@ -269,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn wishes_are_taken_back_and_nonsense_is_passed_over() {
+    fn subscriptions_end_and_nonsense_is_ignored() {
         let mut subscribed = HashMap::new();
         for text in [
             "nonsense",
@@ -284,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn a_client_that_goes_is_forgotten() {
+    fn a_client_that_disconnects_is_forgotten() {
         let server = Server::bind("127.0.0.1:0").unwrap();
         let client = connect(&server, PROTOCOLS[1]).unwrap();
         assert_eq!(server.clients(), 1);

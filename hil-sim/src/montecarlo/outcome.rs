@@ -1,15 +1,15 @@
-//! What a campaign shows.
+//! Statistics of a campaign.
 
 use serde::Serialize;
 
 use super::{RunLine, limit_text};
 
-/// Middle, nearly all, and worst of a figure over the runs that have it.
+/// Median, 95th percentile and maximum of a figure over the runs that have it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Quantiles {
-    /// Half of the runs lie at or below.
+    /// Median.
     pub p50: f64,
-    /// 95 of a hundred lie at or below.
+    /// 95th percentile.
     pub p95: f64,
     /// Largest.
     pub max: f64,
@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_run_is_nothing_shown() {
+    fn a_campaign_without_runs_has_no_figures() {
         let outcome = Outcome::of(&[]);
         assert_eq!((outcome.runs, outcome.worst_gap_mm), (0, None));
     }

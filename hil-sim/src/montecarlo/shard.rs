@@ -1,4 +1,4 @@
-//! A campaign cut into parts for several machines.
+//! Splits a campaign into parts for several machines.
 
 use std::fmt;
 use std::str::FromStr;
@@ -10,23 +10,22 @@ pub struct Shard {
     of: u64,
 }
 
-/// A part that is none.
+/// The text is no part.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("expected i/n with i from 1 to n, as in 1/4")]
 pub struct ShardError;
 
 impl Shard {
     /// All of the campaign.
-    pub const WHOLE: Self = Self { index: 1, of: 1 };
+    pub const ALL: Self = Self { index: 1, of: 1 };
 
-    /// Whether this part has what is at this place of the whole, counted from 0: every n-th.
+    /// Whether the item at this place, counted from 0, belongs to this part: every n-th does.
     #[must_use]
     pub const fn has(self, place: u64) -> bool {
         place % self.of == self.index - 1
     }
 
-    /// Its part of the `count` seeds that follow `base`: every n-th of them, so that
-    /// the parts together are the whole.
+    /// Every n-th of the `count` seeds that follow `base`: the parts together are all seeds.
     #[must_use]
     pub fn seeds(self, base: u64, count: u64) -> Vec<u64> {
         (0..count)
@@ -58,7 +57,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_parts_are_the_whole() {
+    fn the_parts_together_are_all_seeds() {
         for of in 1..=7 {
             let mut seeds: Vec<u64> = (1..=of)
                 .flat_map(|index| format!("{index}/{of}").parse::<Shard>().unwrap().seeds(10, 5))
@@ -66,7 +65,7 @@ mod tests {
             seeds.sort_unstable();
             assert_eq!(seeds, [11, 12, 13, 14, 15], "{of}");
         }
-        assert_eq!(Shard::WHOLE.seeds(0, 3), [1, 2, 3]);
+        assert_eq!(Shard::ALL.seeds(0, 3), [1, 2, 3]);
     }
 
     #[test]

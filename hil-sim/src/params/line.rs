@@ -8,21 +8,21 @@ use interstage::params::service::{Description, Origin, PIECE, Piece, Request, Re
 use super::{Held, Store, StoreError};
 use crate::probe::Port;
 
-/// How long an answer is waited for, ms of the board's time: erasing takes 50.
+/// Timeout of an answer, ms of the board's time: erasing takes 50.
 const TIMEOUT_MS: u32 = 1000;
 
 /// Steps of waiting, ms.
 const STEP_MS: u32 = 5;
 
-/// The line to a board: bytes down, bytes up, and time that passes.
+/// The line to a board: bytes down, bytes up, and its time.
 pub trait Wire {
-    /// Sends bytes; as many as there is room for.
+    /// Sends as many bytes as there is room for; returns how many.
     ///
     /// # Errors
     /// Why the line is broken.
     fn send(&mut self, bytes: &[u8]) -> Result<usize, String>;
 
-    /// Lets so many milliseconds pass and gives what has come.
+    /// Waits so many milliseconds and returns the bytes received.
     ///
     /// # Errors
     /// Why the line is broken.
@@ -66,7 +66,7 @@ impl<W: Wire> Client<W> {
         self.wire
     }
 
-    /// One request, one answer; answers to earlier ones are passed over.
+    /// One request, one answer; ignores answers to earlier requests.
     ///
     /// # Errors
     /// [`StoreError`] if the line is broken, the board silent or refusing.
@@ -101,7 +101,7 @@ impl<W: Wire> Client<W> {
         }
     }
 
-    /// What the board says of its parameters.
+    /// The board's description of its parameters.
     ///
     /// # Errors
     /// As [`ask`](Self::ask).

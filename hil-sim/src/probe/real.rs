@@ -10,6 +10,7 @@ use probe_rs::rtt::{Error as RttError, Rtt, ScanRegion};
 use probe_rs::{Core, MemoryInterface, Permissions, Session};
 
 use super::{Port, PortError};
+use crate::files::with_causes;
 
 /// The chip.
 const CHIP: &str = "STM32G474RETx";
@@ -17,8 +18,8 @@ const CHIP: &str = "STM32G474RETx";
 const SELECTOR: &str = "PROBE_RS_PROBE";
 /// Longest wait for the core to stop.
 const HALT: Duration = Duration::from_millis(500);
-/// Pause between two looks: less than a transfer over USB takes.
-const LOOK: Duration = Duration::from_micros(200);
+/// Pause between two polls: less than a transfer over USB takes.
+const PAUSE: Duration = Duration::from_micros(200);
 /// Bytes of the mark at the beginning of the control block.
 const MARK: usize = 16;
 
@@ -26,7 +27,7 @@ const MARK: usize = 16;
 pub struct RealPort {
     session: Session,
     rtt: Option<Rtt>,
-    /// Where the control block is; searched for in RAM if that is not known.
+    /// Address of the control block; unknown, it is searched for in RAM.
     block: Option<u32>,
 }
 
@@ -49,11 +50,13 @@ impl RealPort {
                     .open(selector)
                     .map_err(|error| PortError::Absent(format!("{SELECTOR}={text}: {error}")))?
             }
-            Err(_) => only(&lister.list_all())?.open().map_err(|error| absent(&said(&error)))?,
+            Err(_) => {
+                only(&lister.list_all())?.open().map_err(|error| absent(&with_causes(&error)))?
+            }
         };
         let session = probe
             .attach(CHIP, Permissions::default())
-            .map_err(|error| PortError::Gone(said(&error)))?;
+            .map_err(|error| PortError::Gone(with_causes(&error)))?;
         Ok(Self { session, rtt: None, block })
     }
 
@@ -67,11 +70,11 @@ impl RealPort {
         options.verify = true;
         let loader = ElfLoader(ElfOptions::default());
         download_file_with_options(&mut self.session, elf, loader, options)
-            .map_err(|error| PortError::Board(format!("flashing failed: {}", said(&error))))
+            .map_err(|error| PortError::Board(format!("flashing failed: {}", with_causes(&error))))
     }
 
-    /// Does something with core and channels, which are looked for first; `otherwise` if
-    /// there are none yet.
+    /// Acts on core and channels, which are searched for first; returns `otherwise` if there
+    /// are none yet.
     fn with<T>(
         &mut self,
         otherwise: T,
@@ -119,19 +122,8 @@ fn only(probes: &[DebugProbeInfo]) -> Result<&DebugProbeInfo, PortError> {
     }
 }
 
-/// An error and its causes, in one line.
-fn said(error: &dyn std::error::Error) -> String {
-    let mut text = error.to_string();
-    let mut source = error.source();
-    while let Some(cause) = source {
-        text += &format!(": {cause}");
-        source = cause.source();
-    }
-    text
-}
-
 fn gone(error: impl std::error::Error + 'static) -> PortError {
-    PortError::Gone(said(&error))
+    PortError::Gone(with_causes(&error))
 }
 
 fn missing(channel: u32) -> PortError {
@@ -170,7 +162,7 @@ impl Port for RealPort {
         let mut core = self.session.core(0).map_err(gone)?;
         core.reset_and_halt(HALT).map_err(gone)?;
         if let Some(block) = self.block {
-            // What the run before has left in its rings is not this one's.
+            // The rings may hold data of the run before.
             core.write_8(block.into(), &[0; MARK]).map_err(gone)?;
         }
         core.run().map_err(gone)
@@ -182,7 +174,7 @@ impl Port for RealPort {
     }
 
     fn pass(&mut self) -> Result<Duration, PortError> {
-        std::thread::sleep(LOOK);
-        Ok(LOOK)
+        std::thread::sleep(PAUSE);
+        Ok(PAUSE)
     }
 }

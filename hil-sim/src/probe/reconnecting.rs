@@ -1,4 +1,4 @@
-//! A port that is opened again after its cable was unplugged.
+//! A port that reconnects after its cable was unplugged.
 
 use std::time::{Duration, Instant};
 
@@ -7,8 +7,8 @@ use super::{Port, PortError};
 /// How a port is opened.
 type Connect<'a> = Box<dyn FnMut() -> Result<Box<dyn Port + 'a>, PortError> + 'a>;
 
-/// A port that is opened again when it fails, until its timeout has passed. What the
-/// board sends meanwhile finds no reader: the log's own numbers show how much that was.
+/// A port that is opened again when it fails, until its timeout has passed. What the board
+/// sends meanwhile is lost; the sequence numbers of the log show how much.
 pub struct ReconnectingPort<'a> {
     connect: Connect<'a>,
     port: Option<Box<dyn Port + 'a>>,
@@ -16,9 +16,8 @@ pub struct ReconnectingPort<'a> {
     pause: Duration,
     /// Longest time without the board.
     timeout: Duration,
-    /// When it was last there, and when it was last tried.
+    /// When it was lost, and when it was last tried.
     lost: Option<(Instant, Instant)>,
-    interruptions: u32,
     news: Vec<String>,
 }
 
@@ -26,8 +25,7 @@ impl<'a> ReconnectingPort<'a> {
     /// Opens the port by `connect`, and again at most every `pause` when it fails.
     ///
     /// # Errors
-    /// [`PortError`] if it cannot be opened the first time: there is nothing to be
-    /// patient about.
+    /// [`PortError`] if it cannot be opened the first time.
     pub fn open(
         mut connect: impl FnMut() -> Result<Box<dyn Port + 'a>, PortError> + 'a,
         pause: Duration,
@@ -40,23 +38,16 @@ impl<'a> ReconnectingPort<'a> {
             pause,
             timeout,
             lost: None,
-            interruptions: 0,
             news: Vec::new(),
         })
     }
 
-    /// How often the port was lost and found again.
-    #[must_use]
-    pub const fn interruptions(&self) -> u32 {
-        self.interruptions
-    }
-
-    /// What has happened to the port since the last call, a line each.
+    /// Events of the port since the last call, a line each.
     pub fn take_news(&mut self) -> Vec<String> {
         std::mem::take(&mut self.news)
     }
 
-    /// Tries once; `otherwise` while the board is away.
+    /// Tries once; returns `otherwise` while the board is disconnected.
     fn attempt<T>(
         &mut self,
         otherwise: T,
@@ -76,7 +67,7 @@ impl<'a> ReconnectingPort<'a> {
         }
     }
 
-    /// Opens the port again if it is lost and it is time to.
+    /// Opens the port again if it is lost and the pause is over.
     fn reopen(&mut self) -> Result<(), PortError> {
         let Some((since, tried)) = self.lost else { return Ok(()) };
         if tried.elapsed() < self.pause {
@@ -86,7 +77,6 @@ impl<'a> ReconnectingPort<'a> {
             Ok(port) => {
                 self.port = Some(port);
                 self.lost = None;
-                self.interruptions += 1;
                 let away = since.elapsed().as_secs_f64();
                 self.news.push(format!("the debug probe is back after {away:.1} s"));
                 Ok(())
@@ -145,7 +135,7 @@ pub(crate) mod tests {
 
     use super::*;
 
-    /// What comes of the next calls, of the port or of opening it.
+    /// Results of the next calls, of the port or of opening it.
     #[derive(Clone)]
     pub(crate) enum Next {
         Bytes(Vec<u8>),
@@ -215,18 +205,17 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn what_is_unplugged_and_plugged_in_again_goes_on() {
+    fn a_port_continues_after_it_was_unplugged() {
         use Next::{NotThere, Opens, Unplugged};
         let [ab, c, d] = [&b"ab"[..], b"c", b"d"].map(Next::bytes);
         let script = [Opens, ab, Unplugged, NotThere, NotThere, Opens, c, d];
         let (mut port, left) = open(script, Duration::from_secs(60));
-        let mut come = Vec::new();
+        let mut read = Vec::new();
         for _ in 0..6 {
-            come.extend(port.up(1).unwrap());
+            read.extend(port.up(1).unwrap());
         }
-        assert_eq!(come, b"abcd");
+        assert_eq!(read, b"abcd");
         assert!(left.borrow().is_empty());
-        assert_eq!(port.interruptions(), 1);
         let news = port.take_news();
         assert!(news.len() == 2 && news[0].contains("USB error"), "{news:?}");
         assert!(news[1].contains("back"), "{news:?}");
@@ -247,7 +236,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn nothing_to_begin_with_is_told_at_once() {
+    fn a_port_that_cannot_be_opened_is_an_error_at_once() {
         let connect = || Err(PortError::Absent("no probe".to_owned()));
         let opened = ReconnectingPort::open(connect, Duration::ZERO, Duration::from_secs(60));
         assert_eq!(opened.err(), Some(PortError::Absent("no probe".to_owned())));

@@ -11,17 +11,16 @@ use crate::firmware::{self, output};
 
 /// The wheels, as tried.
 const WHEELS: [&str; 3] = ["cmake==4.4.4", "ninja==1.13.2", "libclang==18.1.1"];
-/// pip without questions, without talk, and without waiting for a network that is not
-/// there.
+/// pip without questions, without messages, and with short timeouts.
 const PIP: &str = "-m pip install --quiet --disable-pip-version-check --no-input \
                    --only-binary=:all: --retries=2 --timeout=15";
 /// Folder in the target directory.
 const FOLDER: &str = "board-tools";
-/// Written last: says which wheels are there.
+/// File that is written last and names the wheels.
 const COMPLETE: &str = "complete";
 
-/// The tools, and what a build has to be told to use them. That stays the same from build
-/// to build, or cargo would build the core again each time.
+/// The tools, and the settings of a build that uses them. They stay the same from build to
+/// build, or cargo would build the core again each time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tools {
     /// Folder of the programs.
@@ -33,13 +32,13 @@ pub struct Tools {
 }
 
 impl Tools {
-    /// The tools, fetched first if they are not there.
+    /// The tools, fetched first if they are missing.
     ///
     /// # Errors
     /// [`ProvisionError`] if they cannot be fetched or the C compiler is missing.
     pub fn ready() -> Result<Self, ProvisionError> {
         let place = firmware::target_directory().join(FOLDER);
-        let failed = |why: &str| ProvisionError::Tools { place: place.clone(), why: why.into() };
+        let failed = |why: &str| ProvisionError::Tools(place.clone(), why.into());
         let headers = headers()?.ok_or_else(|| failed("the C compiler names no headers"))?;
         if !is_complete(&place) || !starts(&place) {
             eprintln!("fetching cmake, ninja and libclang into {}", place.display());
@@ -50,7 +49,7 @@ impl Tools {
         Ok(Self { programs: place.join("bin"), libclang, headers })
     }
 
-    /// Tells a build started by `command` where the tools are.
+    /// Makes the build of `command` use the tools.
     pub fn apply(&self, command: &mut Command) {
         let old = env::var_os("PATH").unwrap_or_default();
         let paths = std::iter::once(self.programs.clone())
@@ -66,13 +65,13 @@ impl Tools {
     }
 }
 
-/// Whether these very wheels have been put there.
+/// Whether these versions of the wheels are there.
 fn is_complete(place: &Path) -> bool {
     fs::read_to_string(place.join(COMPLETE)).is_ok_and(|text| text == WHEELS.join("\n"))
 }
 
-/// Whether the programs start: they name their interpreter by its path, so a folder that
-/// has been moved or copied does not do.
+/// Whether the programs start: they name their interpreter by its path, so that a moved or
+/// copied folder fails.
 fn starts(place: &Path) -> bool {
     ["cmake", "ninja"].iter().all(|program| {
         let mut command = Command::new(place.join("bin").join(program));
@@ -80,10 +79,10 @@ fn starts(place: &Path) -> bool {
     })
 }
 
-/// Puts the wheels there: into a virtual environment or, where Python has come without
-/// that, by pip into a plain folder.
+/// Puts the wheels there: into a virtual environment or, where Python lacks `venv`, by pip
+/// into a plain folder.
 fn fetch(place: &Path) -> Result<(), ProvisionError> {
-    let failed = |why: String| ProvisionError::Tools { place: place.to_owned(), why };
+    let failed = |why| ProvisionError::Tools(place.to_owned(), why);
     let file = |error: std::io::Error| failed(error.to_string());
     if place.exists() {
         fs::remove_dir_all(place).map_err(file)?;
@@ -101,7 +100,7 @@ fn fetch(place: &Path) -> Result<(), ProvisionError> {
     };
     let installed = output(pip.args(WHEELS))?;
     if !installed.status.success() {
-        // A part of them must not be taken for all.
+        // An incomplete folder must not remain.
         let _ = fs::remove_dir_all(place);
         let said = String::from_utf8_lossy(&installed.stderr);
         let last = said.lines().rev().map(str::trim).find(|line| !line.is_empty());
@@ -127,7 +126,7 @@ fn find(place: &Path, name: &str) -> Option<PathBuf> {
     below.iter().find_map(|folder| find(folder, name))
 }
 
-/// Where the C compiler has `stddef.h` and the like, if it says so.
+/// The C compiler's folder of `stddef.h` and the like, if it names one.
 fn headers() -> Result<Option<PathBuf>, ProvisionError> {
     let compiler = env::var("CC").unwrap_or_else(|_| "cc".to_owned());
     let said = output(Command::new(compiler).arg("-print-file-name=include"))?;
@@ -182,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn a_build_is_told_where_everything_is() {
+    fn a_build_gets_the_places_of_all_tools() {
         let place = tempfile::tempdir().unwrap();
         let tools = Tools {
             programs: place.path().join("bin"),
@@ -191,17 +190,17 @@ mod tests {
         };
         let mut command = Command::new("cargo");
         tools.apply(&mut command);
-        let told = |name: &str| {
+        let variable = |name: &str| {
             let found = command.get_envs().find(|(key, _)| *key == name);
             found.and_then(|(_, value)| value).unwrap().to_string_lossy().into_owned()
         };
-        assert!(told("PATH").starts_with(&tools.programs.display().to_string()));
-        assert_eq!(told("LIBCLANG_PATH"), tools.libclang.display().to_string());
-        assert_eq!(told("BINDGEN_EXTRA_CLANG_ARGS"), format!("-I{}", tools.headers.display()));
+        assert!(variable("PATH").starts_with(&tools.programs.display().to_string()));
+        assert_eq!(variable("LIBCLANG_PATH"), tools.libclang.display().to_string());
+        assert_eq!(variable("BINDGEN_EXTRA_CLANG_ARGS"), format!("-I{}", tools.headers.display()));
     }
 
     #[test]
-    fn the_compiler_tells_its_headers() {
+    fn the_compiler_names_its_headers() {
         assert!(headers().unwrap().unwrap().join("stddef.h").is_file());
     }
 }

@@ -1,8 +1,7 @@
-//! Bytes of the binary channel to what they say.
+//! Decodes the bytes of the binary channel.
 //!
-//! Nothing is lost unnoticed: what is missing between two frames is an item of its own.
-//! Garbage ends at the next sound frame; a restart of the target is recognised by its
-//! sequence or its clock going back.
+//! What is missing between two frames is an item of its own. Garbage ends at the next valid
+//! frame. A target has restarted if its sequence or its clock goes back.
 
 use interstage::log::capture::CaptureChunk;
 use interstage::log::frame::{Body, Found, Frame, find};
@@ -14,24 +13,24 @@ use interstage::sense::raw::SensorFrame;
 use interstage::tick::Entry;
 use serde::{Deserialize, Serialize};
 
-/// What a log says, in its order.
+/// An item of a log.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Item {
     /// The target's identity; once a second.
     Identity(Identity),
-    /// A tick, and the codes that it found with their times.
+    /// A tick, and the sensor codes that it used, with their times.
     Tick(Record, SensorFrame),
-    /// A tick was given this plan.
+    /// A plan that this tick received.
     Plan(u32, Plan),
-    /// A tick asked for a plan.
+    /// A request for a plan that this tick made.
     Request(u32, PlanRequest),
-    /// Something happened.
+    /// An event.
     Event(Entry),
-    /// A piece of a capture.
+    /// A part of a capture.
     CaptureChunk(CaptureChunk),
-    /// A crossing was closed.
+    /// The ledger line of a crossing.
     Ledger(Line),
-    /// Here something is missing.
+    /// Something is missing here.
     Mark(Mark),
 }
 
@@ -39,32 +38,31 @@ pub enum Item {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Mark {
-    /// Frames are missing; so many of them found no room on the channel.
+    /// Frames are missing.
     Lost {
-        /// All that are missing.
+        /// How many.
         frames: u32,
-        /// Those of them that the target dropped itself.
+        /// How many of them the target dropped because its channel was full.
         dropped: u32,
     },
-    /// Bytes that are no frame.
+    /// Bytes that belong to no frame.
     Garbage {
         /// How many.
         bytes: u64,
     },
-    /// Between two ticks there are others that are not in the log although no frame is
-    /// missing: the journal came too late.
+    /// Ticks are missing although no frame is: the journal task was too late.
     Skipped {
         /// How many.
         ticks: u32,
     },
-    /// Between two ticks there are others that never ran: the control tick came late.
+    /// Ticks did not run: the control tick was late.
     Overrun {
         /// How many.
         ticks: u32,
     },
-    /// The log does not begin with the target's first frame; so many went before.
+    /// The log does not begin with the target's first frame.
     Joined {
-        /// How many.
+        /// How many went before.
         frames: u32,
     },
     /// The target restarted.
@@ -96,12 +94,12 @@ impl std::fmt::Display for Mark {
     }
 }
 
-/// What has come so far.
+/// What the decoder has read so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counts {
     /// Bytes.
     pub bytes: u64,
-    /// Sound frames.
+    /// Valid frames.
     pub frames: u64,
     /// Ticks.
     pub ticks: u64,
@@ -120,43 +118,43 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Whether ticks came, and none is known to be missing.
+    /// Whether there are ticks, and none is known to be missing.
     #[must_use]
     pub const fn is_complete(&self) -> bool {
         self.ticks > 0 && self.lost_frames == 0 && self.lost_ticks == 0
     }
 }
 
-/// A decoder. It takes bytes as they come.
+/// Decodes bytes in pieces of any size.
 #[derive(Clone, Debug, Default)]
 pub struct Decoder {
     /// The beginning of a frame that is not complete yet.
     partial: Vec<u8>,
     /// Bytes before it that are no frame.
     garbage: u64,
-    /// Sequence and dropped frames that the next head should have.
+    /// Sequence and count of dropped frames expected in the next head.
     due: Option<(u32, u32)>,
-    /// Time of the last tick, and its codes.
+    /// Time of the last tick and its codes.
     last: Option<(u32, SensorFrame)>,
-    /// Frames went missing since the last tick.
+    /// Frames are missing since the last tick.
     torn: bool,
     counts: Counts,
 }
 
 impl Decoder {
-    /// A decoder at the beginning of a log, or anywhere in it.
+    /// A decoder that starts anywhere in a log.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// What has come so far.
+    /// What has been read so far.
     #[must_use]
     pub const fn counts(&self) -> &Counts {
         &self.counts
     }
 
-    /// Reads on, and hands each item to `take` in its order.
+    /// Reads on and passes each item to `take`.
     pub fn read(&mut self, bytes: &[u8], take: &mut impl FnMut(Item)) {
         self.counts.bytes += bytes.len() as u64;
         let mut held = std::mem::take(&mut self.partial);
@@ -166,15 +164,15 @@ impl Decoder {
         self.partial = held;
     }
 
-    /// The log ends here: what has begun will not be completed.
+    /// The log ends here; a frame that has begun is garbage.
     pub fn finish(&mut self, take: &mut impl FnMut(Item)) {
         let held = std::mem::take(&mut self.partial);
         self.find(&held, true, take);
         self.report_garbage(take);
     }
 
-    /// Takes the complete frames at the beginning of `bytes`, everything if they are the last;
-    /// returns how many bytes it used.
+    /// Takes the complete frames at the beginning of `bytes`, or everything if they are the
+    /// last; returns how many bytes it used.
     fn find(&mut self, bytes: &[u8], last: bool, take: &mut impl FnMut(Item)) -> usize {
         let mut used = 0;
         while let Some(rest) = bytes.get(used..).filter(|rest| !rest.is_empty()) {
@@ -188,7 +186,7 @@ impl Decoder {
                     self.garbage += length as u64;
                     length
                 }
-                // What looks like the beginning of a frame may be garbage before another one.
+                // What looks like the beginning of a frame may be garbage before a frame.
                 Found::Part if last => {
                     self.garbage += 1;
                     1
@@ -199,7 +197,6 @@ impl Decoder {
         used
     }
 
-    /// Reports what was no frame.
     fn report_garbage(&mut self, take: &mut impl FnMut(Item)) {
         let bytes = std::mem::take(&mut self.garbage);
         if bytes > 0 {
@@ -214,7 +211,7 @@ impl Decoder {
 
     fn frame(&mut self, frame: &Frame<'_>, length: u64, take: &mut impl FnMut(Item)) {
         let Ok(body) = frame.body() else {
-            // The checksum matches by chance: its head is invalid, too.
+            // The checksum matches by chance.
             return self.mark_garbage(length, take);
         };
         self.counts.frames += 1;
@@ -235,13 +232,13 @@ impl Decoder {
             Body::Plan(at, plan) => take(Item::Plan(at, plan)),
             Body::Request(at, request) => take(Item::Request(at, request)),
             Body::Event(entry) => take(Item::Event(entry)),
-            Body::CaptureChunk(shots) => take(Item::CaptureChunk(shots)),
+            Body::CaptureChunk(chunk) => take(Item::CaptureChunk(chunk)),
             Body::Ledger(line) => take(Item::Ledger(line)),
             Body::Unknown => {}
         }
     }
 
-    /// Holds the head of a frame against the one before.
+    /// Compares the head of a frame with the one before.
     fn follow(&mut self, frame: &Frame<'_>, body: &Body<'_>, take: &mut impl FnMut(Item)) {
         let head = frame.head;
         if let Some((sequence, dropped)) = self.due {

@@ -43,7 +43,7 @@ pub(crate) fn log_schema() -> Value {
     })
 }
 
-/// A log line of this form, at `ns` nanoseconds.
+/// A log line of this form at a time in ns.
 pub(crate) fn log_message(ns: u64, level: u8, text: &str) -> Value {
     json!({
         "timestamp": { "sec": ns / 1_000_000_000, "nsec": ns % 1_000_000_000 },
@@ -57,7 +57,7 @@ fn kind(value: &Value) -> &'static str {
     match value {
         Value::Bool(_) => "boolean",
         Value::Number(n) if !n.is_f64() => "integer",
-        // A number that the example does not know.
+        // A number without a value in the example.
         Value::Number(_) | Value::Null => "number",
         Value::Array(_) => "array",
         Value::Object(_) => "object",

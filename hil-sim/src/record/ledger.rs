@@ -4,7 +4,7 @@ use interstage::log::ledger::Line;
 use interstage::units::{Direction, Q16};
 use serde::{Deserialize, Serialize};
 
-/// A line of the ledger as the controller has it; it knows no truth.
+/// A line of the controller's ledger: estimates, no plant truth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LedgerLine {
     /// When it was closed, s since boot.
@@ -13,9 +13,9 @@ pub struct LedgerLine {
     pub count: u16,
     /// Step number, from 1; 0 for a step that the table lacks.
     pub index: u8,
-    /// The step was climbed, not dropped off.
+    /// Whether the step was climbed; else it was dropped off.
     pub climbed: bool,
-    /// Where the step was found, mm.
+    /// Position at which the step was detected, mm.
     pub step_found_mm: f64,
     /// Found position minus table, mm.
     pub residual_mm: f64,

@@ -13,8 +13,8 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::{
-    Controller, CrossingLine, Item, LedgerLine, Recording, Summary, Tick, TrueState, json, text,
-    timed,
+    Controller, CrossingLine, Decoder, Item, LedgerLine, Recording, Summary, Tick, TrueState, json,
+    pieces, text,
 };
 use crate::files::{Failure, FileError, atomic_write};
 
@@ -29,12 +29,12 @@ const ERROR: u8 = 4;
 /// Nanoseconds of a tick.
 pub(super) const TICK_NS: u64 = 1_000_000;
 
-/// What a message is about.
+/// The topic of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Topic {
     /// A [`Tick`].
     Tick,
-    /// An event, or what is missing, as a line of text.
+    /// An event or a mark as a line of text.
     Log,
     /// A [`LedgerLine`].
     Ledger,
@@ -47,7 +47,7 @@ pub enum Topic {
 }
 
 impl Topic {
-    /// The topics that a log has while it grows.
+    /// The topics of a log that grows.
     pub const LIVE: [Self; 3] = [Self::Tick, Self::Log, Self::Ledger];
 
     /// Its name.
@@ -88,7 +88,7 @@ impl Topic {
     }
 }
 
-/// The message of an item; none for what only a reader of frames needs.
+/// The message of an item; none for an item that only a reader of frames needs.
 pub fn messages(item: &Item) -> Option<(Topic, Vec<u8>)> {
     match item {
         Item::Tick(record, sensors) => {
@@ -123,10 +123,10 @@ fn level(entry: &Entry) -> u8 {
     }
 }
 
-/// An MCAP file as it grows.
+/// An MCAP file that grows.
 pub(super) struct McapFile<W: Write + Seek> {
     out: mcap::Writer<W>,
-    /// Channel and messages of each topic so far.
+    /// Channel and number of messages of each topic.
     channels: HashMap<Topic, (u16, u32)>,
 }
 
@@ -138,7 +138,7 @@ impl<W: Write + Seek> McapFile<W> {
         Ok(Self { out: options.create(out)?, channels: HashMap::new() })
     }
 
-    /// Adds a record about the log, under this name.
+    /// Adds a metadata record of this name.
     pub(super) fn metadata(
         &mut self,
         name: &str,
@@ -153,7 +153,7 @@ impl<W: Write + Seek> McapFile<W> {
         self.metadata("parameters", [("toml".to_owned(), toml.to_owned())])
     }
 
-    /// Adds a message at a time since boot, ns; a topic's channel comes with its first.
+    /// Adds a message at a time since boot, ns. A topic's first message adds its channel.
     pub(super) fn message(&mut self, ns: u64, topic: Topic, body: &[u8]) -> Result<(), Failure> {
         let (channel_id, sequence) = match self.channels.get(&topic) {
             Some(known) => *known,
@@ -176,7 +176,7 @@ impl<W: Write + Seek> McapFile<W> {
         Ok(self.out.add_channel(schema, topic.name(), encoding, &BTreeMap::new())?)
     }
 
-    /// Hands all that has come to the system, as complete chunks.
+    /// Passes everything to the system as complete chunks.
     pub(super) fn flush(&mut self) -> Result<(), Failure> {
         Ok(self.out.flush()?)
     }
@@ -193,7 +193,7 @@ impl<W: Write + Seek> McapFile<W> {
 /// from boot.
 ///
 /// # Errors
-/// [`FileError::File`] with the reason.
+/// [`FileError`] with the reason.
 pub fn write_mcap(recording: &Recording, path: &Path) -> Result<(), FileError> {
     atomic_write(path, |out| {
         let mut file = McapFile::new(out)?;
@@ -210,9 +210,17 @@ pub fn write_mcap(recording: &Recording, path: &Path) -> Result<(), FileError> {
         for line in &recording.summary.crossings {
             all.push((line.lift_s, Topic::Crossing, bytes(line)?));
         }
-        let frames = timed(&recording.stream);
-        all.extend(frames.map(|(t_s, frame)| (t_s, Topic::Frames, frame.to_vec())));
-        // What is of one time keeps its order.
+        // A frame is of the time of the newest tick up to it.
+        let (mut decoder, mut t_s) = (Decoder::new(), 0.0);
+        for frame in pieces(&recording.stream) {
+            decoder.read(frame, &mut |item| {
+                if let Item::Tick(record, _) = item {
+                    t_s = f64::from(record.at()) * 1e-3;
+                }
+            });
+            all.push((t_s, Topic::Frames, frame.to_vec()));
+        }
+        // A stable sort: messages of one time keep their order.
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
         for (t_s, topic, body) in &all {
             file.message(nanoseconds(*t_s), *topic, body)?;
@@ -236,7 +244,7 @@ fn about(summary: &Summary) -> [(String, String); 7] {
     .map(|(key, value)| (key.to_owned(), value))
 }
 
-/// Time since boot in ns; what is before boot is boot.
+/// Time since boot, ns; 0 for times before boot.
 fn nanoseconds(t_s: f64) -> u64 {
     (t_s * 1e9).round() as u64
 }

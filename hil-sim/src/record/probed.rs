@@ -1,4 +1,4 @@
-//! A board at a debug probe, as it runs.
+//! The log of a running board at a debug probe.
 
 use std::collections::VecDeque;
 
@@ -9,14 +9,14 @@ use crate::probe::{Port, ReconnectingPort};
 const LOG: u32 = 1;
 /// RTT channel of the console, down.
 const CONSOLE: u32 = 0;
-/// Polls of the channel in each reading, so that the display gets its turn.
-const LOOKS: u32 = 20;
+/// Polls of the channel per call, so that the display is updated in between.
+const POLLS: u32 = 20;
 
-/// The log of a board at a probe. It is not reset and gets no command but the
-/// operator's.
+/// The log of a board at a probe. The board is not reset and gets only the operator's
+/// commands.
 ///
-/// The probe may be unplugged and the board may restart: what was not read is missing, and
-/// marked where it is missing by the log's own numbers. It ends when the port gives up.
+/// The probe may be unplugged and the board may restart. The sequence numbers of the log show
+/// what was not read. The log ends when the port gives up.
 pub struct Probed<'a> {
     port: ReconnectingPort<'a>,
     letters: VecDeque<u8>,
@@ -32,17 +32,17 @@ impl<'a> Probed<'a> {
 
 impl Source for Probed<'_> {
     fn read(&mut self) -> Result<Option<Vec<u8>>, SourceError> {
-        let mut come = Vec::new();
-        for _ in 0..LOOKS {
+        let mut read = Vec::new();
+        for _ in 0..POLLS {
             if let Some(letter) = self.letters.front()
                 && self.port.down(CONSOLE, &[*letter])? == 1
             {
                 self.letters.pop_front();
             }
-            come.extend(self.port.up(LOG)?);
+            read.extend(self.port.up(LOG)?);
             self.port.pass()?;
         }
-        Ok(Some(come))
+        Ok(Some(read))
     }
 
     fn send(&mut self, letter: u8) -> Result<(), SourceError> {
@@ -76,11 +76,11 @@ mod tests {
         bytes
     }
 
-    /// Sends a letter, then captures what the polls of the channel bring, and after them
-    /// nothing for so long that all has been handed on.
+    /// Sends a letter, then captures what the polls of the channel return; empty polls after
+    /// them pass the rest on.
     fn captured(polls: impl Iterator<Item = Next>) -> (Run, Vec<String>) {
         let letter = [Next::Opens, Next::bytes(b"s")].into_iter();
-        let quiet = (0..2 * LOOKS).map(|_| Next::bytes(b""));
+        let quiet = (0..2 * POLLS).map(|_| Next::bytes(b""));
         let script = letter.chain(polls).chain(quiet).chain([Next::Wrong]);
         let (port, left) = open(script, Duration::from_secs(60));
         let mut source = Probed::new(port);
@@ -103,28 +103,28 @@ mod tests {
         bytes.chunks(997).map(Next::bytes)
     }
 
-    /// The cable is pulled; the first attempt to open the port again finds nothing yet.
+    /// The cable is pulled; the first attempt to open the port again fails.
     fn pulled() -> [Next; 3] {
         [Next::Unplugged, Next::NotThere, Next::Opens]
     }
 
     #[test]
-    fn a_cable_that_is_pulled_leaves_a_marked_gap_and_the_rest_whole() {
+    fn a_cable_that_is_pulled_leaves_a_marked_gap_and_the_rest_intact() {
         let bytes = sent();
-        let whole = Run::of_stream(&bytes);
-        // A third of the way in, at no particular byte, 20 kB are lost.
+        let all = Run::of_stream(&bytes);
+        // At a third of the log, at an arbitrary byte, 20 kB are lost.
         let (from, lost) = (bytes.len() / 3, 20_000);
         let (before, after) = (in_polls(&bytes[..from]), in_polls(&bytes[from + lost..]));
         let (run, news) = captured(before.chain(pulled()).chain(after));
         assert_eq!(news.len(), 2, "{news:?}");
-        // Two halves of frames meet where the cable was out, and the rest is counted.
+        // Parts of two frames meet where the cable was out; the lost frames are counted.
         let lost = run.marks.iter().find_map(|(_, mark)| match mark {
             Mark::Lost { frames, dropped: 0 } => Some(u64::from(*frames)),
             _ => None,
         });
         assert_eq!(lost, Some(run.counts.lost_frames));
-        assert_eq!(run.counts.frames + run.counts.lost_frames, whole.counts.frames);
-        let missing = whole.rows.len() - run.rows.len();
+        assert_eq!(run.counts.frames + run.counts.lost_frames, all.counts.frames);
+        let missing = all.rows.len() - run.rows.len();
         assert!(missing > 300, "{missing}");
         assert_eq!(run.counts.lost_ticks, missing as u64);
         assert!(replay(&run, &Rig::prototype()).unwrap().difference.is_none());
@@ -133,13 +133,13 @@ mod tests {
     #[test]
     fn a_restart_in_the_middle_is_marked_and_both_parts_are_there() {
         let bytes = sent();
-        let whole = Run::of_stream(&bytes);
+        let all = Run::of_stream(&bytes);
         let before = in_polls(&bytes[..bytes.len() / 2]);
         let (run, _) = captured(before.chain(pulled()).chain(in_polls(&bytes)));
         assert_eq!(run.counts.restarts, 1, "{:?}", run.marks);
         let again = run.rows.iter().rposition(|row| row.tick == 0).unwrap();
-        assert_eq!(run.rows.len() - again, whole.rows.len());
-        assert!(again > whole.rows.len() / 3);
+        assert_eq!(run.rows.len() - again, all.rows.len());
+        assert!(again > all.rows.len() / 3);
         assert!(replay(&run, &Rig::prototype()).unwrap().difference.is_none());
     }
 }

@@ -1,12 +1,11 @@
-//! Logs out of files: MCAP, CSV, or the bare bytes of the channel.
+//! Reads logs from files: MCAP, CSV, or the bare bytes of the channel.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::tick::OFF;
-use super::{Controller, Decoder, FRAMES, Item, Run};
+use super::{Controller, Decoder, FRAMES, Run};
 use interstage::log::frame::{Found, find};
-use mcap::read::Options;
-use mcap::records::Record;
+use mcap::records::{Metadata, Record};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 /// First bytes of an MCAP file.
@@ -17,22 +16,12 @@ const CSV: &[u8] = b"tick,";
 /// A log that cannot be read; displays as one line with its path.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
-    /// The file cannot be read.
-    #[error("{}: {source}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// It is no log.
-    #[error("{}: no log of the controller: {why}", path.display())]
-    Content {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong with it.
-        why: String,
-    },
+    /// The file at this path cannot be read.
+    #[error("{0}: {1}")]
+    File(String, std::io::Error),
+    /// The file at this path is no log, and why.
+    #[error("{0}: no log of the controller: {1}")]
+    Content(String, String),
 }
 
 impl ReadError {
@@ -40,28 +29,18 @@ impl ReadError {
     #[must_use]
     pub fn reason(&self) -> String {
         match self {
-            Self::File { source, .. } => source.to_string(),
-            Self::Content { why, .. } => why.clone(),
+            Self::File(_, why) => why.to_string(),
+            Self::Content(_, why) => why.clone(),
         }
     }
 }
 
-/// The frames of a stream, each with what is none before it and the time at which it was
-/// written, s: that of the newest tick up to it. What follows the last is no frame.
-pub fn timed(stream: &[u8]) -> impl Iterator<Item = (f64, &[u8])> {
-    let (mut decoder, mut now, mut frames) = (Decoder::new(), 0.0, Vec::new());
-    for frame in pieces(stream) {
-        decoder.read(frame, &mut |item| {
-            if let Item::Tick(record, _) = item {
-                now = f64::from(record.at()) * 1e-3;
-            }
-        });
-        frames.push((now, frame));
-    }
-    frames.into_iter()
+/// The content of the file at `path`.
+pub(super) fn content(path: &Path) -> Result<Vec<u8>, ReadError> {
+    std::fs::read(path).map_err(|error| ReadError::File(path.display().to_string(), error))
 }
 
-/// A stream cut after every frame; what follows the last one is left out.
+/// The stream, cut after every frame; what follows the last one is left out.
 pub fn pieces(stream: &[u8]) -> impl Iterator<Item = &[u8]> {
     let mut rest = stream;
     std::iter::from_fn(move || {
@@ -82,38 +61,36 @@ pub fn pieces(stream: &[u8]) -> impl Iterator<Item = &[u8]> {
 
 impl Run {
     /// Reads a log of any form: MCAP with the controller's frames, CSV of rows, or the
-    /// bytes of the channel. What was cut off is missing and everything before it is
-    /// there.
+    /// bytes of the channel. A file that was cut off is read up to there.
     ///
     /// # Errors
     /// [`ReadError`] if the file cannot be read or holds no tick.
     pub fn read(path: &Path) -> Result<Self, ReadError> {
-        let bytes = std::fs::read(path)
-            .map_err(|source| ReadError::File { path: path.to_owned(), source })?;
-        let content = |why: String| ReadError::Content { path: path.to_owned(), why };
+        let bytes = content(path)?;
+        let no_log = |why: String| ReadError::Content(path.display().to_string(), why);
         let run = if bytes.starts_with(MCAP) {
             of_mcap(&bytes)
         } else if bytes.starts_with(CSV) {
-            of_csv(&bytes).map_err(content)?
+            of_csv(&bytes).map_err(no_log)?
         } else {
             Self::of_stream(&bytes)
         };
         if run.rows.is_empty() {
-            return Err(content("it holds no tick".to_owned()));
+            return Err(no_log("it holds no tick".to_owned()));
         }
         Ok(run)
     }
 }
 
-/// Longest record, bytes: a few hundred times what this program writes.
+/// Longest record, bytes: some hundred times those that this program writes.
 const LONGEST_RECORD: usize = 1 << 26;
 
-/// Most that a chunk's content may be longer than it is in the file: what LZ4 can reach.
+/// Largest ratio of a chunk's content to its size in the file: the limit of LZ4.
 const EXPANSION: u64 = 256;
 
-/// The file up to the first record that says it is longer than what is left, or a chunk that
-/// says it holds more than it can: the reader takes such a length for the memory it needs.
-pub(super) fn sound(bytes: &[u8]) -> &[u8] {
+/// The file up to the first record whose length cannot be true: longer than the rest of the
+/// file, or a chunk larger than LZ4 can expand to. The reader would allocate that length.
+fn credible(bytes: &[u8]) -> &[u8] {
     const CHUNK: u8 = 6;
     // An opcode and a length; in a chunk two times come before the length of its content.
     const HEAD: usize = 9;
@@ -130,15 +107,14 @@ pub(super) fn sound(bytes: &[u8]) -> &[u8] {
     bytes
 }
 
-/// Reads frames up to the end, or to where the file was cut off or damaged.
-fn of_mcap(bytes: &[u8]) -> Run {
-    let bytes = sound(bytes);
-    let (mut decoder, mut run) = (Decoder::new(), Run::default());
+/// Hands over the records of an MCAP file, those of its chunks one by one, up to the end or to
+/// where the file was cut off or damaged.
+pub(super) fn records(bytes: &[u8], mut take: impl FnMut(Record<'_>)) {
+    let mut rest = credible(bytes);
     let options = LinearReaderOptions::default()
         .with_skip_end_magic(true)
         .with_record_length_limit(LONGEST_RECORD);
     let mut reader = LinearReader::new_with_options(options);
-    let (mut rest, mut frames) = (bytes, None);
     while let Some(Ok(event)) = reader.next_event() {
         match event {
             LinearReadEvent::ReadRequest(wanted) => {
@@ -148,38 +124,37 @@ fn of_mcap(bytes: &[u8]) -> Run {
                 rest = later;
             }
             LinearReadEvent::Record { data, opcode } => match mcap::parse_record(opcode, data) {
-                Ok(Record::Channel(channel)) if channel.topic == FRAMES => {
-                    frames = Some(channel.id)
-                }
-                Ok(Record::Message { header, data }) if Some(header.channel_id) == frames => {
-                    decoder.read(&data, &mut |item| run.add(&item));
-                }
-                Ok(_) => {}
-                Err(_) => break,
+                Ok(record) => take(record),
+                Err(_) => return,
             },
         }
     }
+}
+
+/// The rig's parameters, if this is where a file has them.
+pub(super) fn parameters(metadata: &Metadata) -> Option<String> {
+    metadata.metadata.get("toml").filter(|_| metadata.name == "parameters").cloned()
+}
+
+fn of_mcap(bytes: &[u8]) -> Run {
+    let (mut decoder, mut run, mut frames) = (Decoder::new(), Run::default(), None);
+    records(bytes, |record| match record {
+        Record::Channel(channel) if channel.topic == FRAMES => frames = Some(channel.id),
+        Record::Message { header, data } if Some(header.channel_id) == frames => {
+            decoder.read(&data, &mut |item| run.add(&item));
+        }
+        Record::Metadata(metadata) => {
+            run.parameters = run.parameters.take().or(parameters(&metadata))
+        }
+        _ => {}
+    });
     decoder.finish(&mut |item| run.add(&item));
     run.counts = *decoder.counts();
-    run.parameters = parameters(bytes);
     run
 }
 
-/// The parameters that the file has beside the messages.
-pub(super) fn parameters(bytes: &[u8]) -> Option<String> {
-    let records =
-        mcap::read::LinearReader::new_with_options(sound(bytes), Options::IgnoreEndMagic.into())
-            .ok()?;
-    records.map_while(Result::ok).find_map(|record| match record {
-        Record::Metadata(metadata) if metadata.name == "parameters" => {
-            metadata.metadata.get("toml").cloned()
-        }
-        _ => None,
-    })
-}
-
-/// Reads the controller's columns; a last row that was cut off is left out, and so are ticks
-/// that did not run.
+/// Reads the controller's columns. Ticks that did not run and an incomplete last row are left
+/// out.
 fn of_csv(bytes: &[u8]) -> Result<Run, String> {
     let mut run = Run::default();
     let mut reader = csv::Reader::from_reader(bytes);
@@ -207,6 +182,8 @@ fn of_csv(bytes: &[u8]) -> Result<Run, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::path::PathBuf;
+
     use crate::record::decoder::tests::frames;
 
     fn file(bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
@@ -223,16 +200,16 @@ mod tests {
         };
         let head = [MCAP, b"0\r\n"].concat();
         let good = [head, record(1, 3, b"abc"), record(6, 40, &[0; 40])].concat();
-        assert_eq!(sound(&good), good);
+        assert_eq!(credible(&good), good);
         let long = [good.clone(), record(5, 1 << 62, b"xyz")].concat();
-        assert_eq!(sound(&long), good);
-        // A chunk of 24 bytes that says it holds more than 6 KiB.
+        assert_eq!(credible(&long), good);
+        // A chunk of 24 bytes that claims to hold more than 6 KiB.
         let mut body = [0; 24];
         body[16..].copy_from_slice(&10_000_u64.to_le_bytes());
         let swollen = [good.clone(), record(6, 24, &body)].concat();
-        assert_eq!(sound(&swollen), good);
+        assert_eq!(credible(&swollen), good);
         for cut in 0..good.len() {
-            assert!(sound(&good[..cut]).len() <= cut);
+            assert!(credible(&good[..cut]).len() <= cut);
         }
     }
 
@@ -241,7 +218,7 @@ mod tests {
         let (_directory, path) = file(&frames(0, 80).concat());
         let run = Run::read(&path).unwrap();
         assert_eq!(run.rows.len(), 80);
-        assert!(run.is_whole());
+        assert!(run.is_complete());
         assert_eq!(run.header.unwrap().rig, "test");
     }
 
@@ -280,6 +257,6 @@ mod tests {
         let error = Run::read(&path).unwrap_err().to_string();
         assert!(error.contains("it lacks the column arm_angle_at"), "{error}");
         let missing = Run::read(Path::new("/nowhere/log.mcap")).unwrap_err();
-        assert!(matches!(missing, ReadError::File { .. }));
+        assert!(matches!(missing, ReadError::File(..)));
     }
 }

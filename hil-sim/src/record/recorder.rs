@@ -1,4 +1,4 @@
-//! What is kept of a run while it goes on.
+//! Records a run as it goes on.
 
 use interstage::tick::{CrossingRecord, Entry, Event, Telemetry};
 use interstage::units::{Direction, Q16};
@@ -10,11 +10,11 @@ use crate::plant::ledger::Crossing;
 use crate::plant::rig::{Truth, VirtualRig};
 use crate::scenario::Scenario;
 
-/// The preload is reached when it lacks no more than this part of its reference: what the
-/// controller allows of measured preload, and three deviations of the sensor.
+/// The preload is reached within this part of its reference: the controller's tolerance of
+/// the measured preload, and three standard deviations of the sensor.
 const REACHED_PART: f64 = 0.035;
 
-/// A run's record as it grows.
+/// The record of a run that goes on.
 pub(crate) struct RunRecorder {
     tally: Tally,
     seen: ControllerView,
@@ -36,8 +36,8 @@ impl RunRecorder {
         Self { tally: Tally::new(gap_ref, start_mm), seen: ControllerView::default() }
     }
 
-    /// Takes a tick: the controller's state and events on the plant's `truth` before it, and
-    /// the columns of the controller if ticks are kept.
+    /// Takes a tick: the controller's state and events, the plant's `truth` before it, and the
+    /// controller's columns if rows are kept.
     pub(crate) fn take(
         &mut self,
         telemetry: &Telemetry,
@@ -67,8 +67,8 @@ impl RunRecorder {
         tally.close_tick(telemetry.mode.moves(), truth);
     }
 
-    /// The record of a run on `target` that took `wall_s` to compute, and the direction in
-    /// which it `arrived`, as the controller reports it.
+    /// The record of a run on `target` that took `wall_s` to compute. `arrived` is the
+    /// direction of a completed run, as the controller reports it.
     pub(crate) fn finish(
         self,
         target: &'static str,
@@ -84,8 +84,7 @@ impl RunRecorder {
 }
 
 impl ControllerView {
-    /// Ledger line: the plant's truth with what the controller reported of the same
-    /// step beside it.
+    /// Ledger line: the plant's truth beside what the controller reported of the same step.
     fn line(&self, crossing: &Crossing) -> CrossingLine {
         // Reported when the crossing is closed: the first of this step after lift-off.
         let same = |(t_s, r): &&(f64, CrossingRecord)| {
@@ -105,7 +104,7 @@ impl ControllerView {
     }
 
     /// How long the true preload had been close to the reference when the corner touched, s;
-    /// negative by how long it still took.
+    /// negative if it was reached later.
     fn lead_time(&self, touch_s: f64) -> f64 {
         let touch = ((touch_s / TICK_S) as usize).min(self.preload.len().saturating_sub(1));
         let wanted = self.reference.get(touch).copied().map_or(0.0, f64::from);
@@ -120,7 +119,7 @@ impl ControllerView {
     }
 }
 
-/// Adds every bit that the controller put out in this tick.
+/// Adds every bit of the controller's output in this tick.
 fn digest(digest: &mut Sha256, seen: &Telemetry) {
     let quantities = [
         seen.position,

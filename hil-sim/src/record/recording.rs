@@ -1,26 +1,27 @@
-//! A recording from a log: what a report shows.
+//! Makes the recording that a report shows from a log.
 //!
-//! The log of a deployment on the virtual rig has the truth in it. A log that was
-//! captured has what the controller believes, and nothing else is made up.
+//! The log of a deployment on the virtual rig contains the plant's truth. A captured log has
+//! the controller's estimates alone; what is unknown there is `NaN`.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use interstage::log::ledger::Line;
 use interstage::supervise::Mode;
+use mcap::records::Record;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use super::read::{MCAP, ReadError, parameters, sound};
+use super::read::{MCAP, ReadError, content, parameters, records};
 use super::recorder::{reported, text};
 use super::{Controller, CrossingLine, LedgerLine, LogLine, Recording, Run, Summary, Tick};
 
-/// Reads what a report shows from any log.
+/// Reads the recording of any log.
 ///
 /// # Errors
 /// [`ReadError`] if the file cannot be read or is no log.
 pub fn recording(path: &Path) -> Result<Recording, ReadError> {
-    let bytes =
-        std::fs::read(path).map_err(|source| ReadError::File { path: path.to_owned(), source })?;
+    let bytes = content(path)?;
     if bytes.starts_with(MCAP)
         && let Some(recording) = with_truth(&bytes)
     {
@@ -34,27 +35,23 @@ fn with_truth(bytes: &[u8]) -> Option<Recording> {
     fn read<T: DeserializeOwned>(data: &[u8]) -> Option<T> {
         serde_json::from_slice(data).ok()
     }
-    let bytes = sound(bytes);
-    let (mut recording, mut summary) = (Recording::default(), None);
-    for message in
-        mcap::MessageStream::new_with_options(bytes, mcap::read::Options::IgnoreEndMagic.into())
-            .ok()?
-    {
-        let Ok(message) = message else { break };
-        let data = &message.data[..];
-        match message.channel.topic.as_str() {
-            "/tick" => recording.rows.extend(read::<Tick>(data)),
-            "/summary" => summary = read::<Summary>(data),
-            "/log" => {
-                let line = read::<Value>(data)?;
-                let text = line["message"].as_str().unwrap_or_default().to_owned();
-                recording.log.push(LogLine { t_s: message.log_time as f64 / 1e9, text });
+    let (mut recording, mut summary, mut topics) = (Recording::default(), None, HashMap::new());
+    records(bytes, |record| match record {
+        Record::Channel(channel) => drop(topics.insert(channel.id, channel.topic)),
+        Record::Metadata(metadata) => recording.parameters.extend(parameters(&metadata)),
+        Record::Message { header, data } => match topics.get(&header.channel_id).map(|t| &**t) {
+            Some("/tick") => recording.rows.extend(read::<Tick>(&data)),
+            Some("/summary") => summary = read::<Summary>(&data),
+            Some("/log") => {
+                let text = read::<Value>(&data).unwrap_or_default();
+                let text = text["message"].as_str().unwrap_or_default().to_owned();
+                recording.log.push(LogLine { t_s: header.log_time as f64 / 1e9, text });
             }
             _ => {}
-        }
-    }
+        },
+        _ => {}
+    });
     recording.summary = summary?;
-    recording.parameters = parameters(bytes).unwrap_or_default();
     Some(recording)
 }
 
@@ -126,7 +123,7 @@ fn summary(run: &Run) -> Summary {
     }
 }
 
-/// The line of a crossing as the controller saw it; its instants by the contact stage.
+/// A crossing by the controller's estimates; its instants follow from the contact stage.
 fn crossing(run: &Run, line: &Line) -> CrossingLine {
     let seen = LedgerLine::from(line);
     let closed = run.rows.partition_point(|row| row.tick <= line.at);
@@ -146,7 +143,7 @@ fn crossing(run: &Run, line: &Line) -> CrossingLine {
         gap_measured_mm: Some(seen.gap_measured_mm),
         corner_force_n: f64::NAN,
         lead_time_s: Some(seen.lead_time_s),
-        // The ledger's has creep and tolerances in it.
+        // The ledger's slip includes creep and tolerances.
         slip_mm: f64::NAN,
         touch_s: touch.map_or(seen.t_s, |row| row.t_s),
         lift_s: lift.or(span.last()).map_or(seen.t_s, |row| row.t_s),

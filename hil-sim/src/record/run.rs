@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Controller, Counts, Decoder, Item, Mark};
 
-/// What made a log, with which parameters.
+/// Firmware and parameters that made a log.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Header {
     /// Layout of the frames.
@@ -43,7 +43,7 @@ impl From<&Identity> for Header {
     }
 }
 
-/// What came before a start of the target.
+/// Numbers of items before a start of the target.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Boot {
     /// Events.
@@ -54,19 +54,19 @@ pub struct Boot {
     pub requests: usize,
 }
 
-/// What came from one start of the target to the next.
+/// Items from one start of the target to the next.
 #[derive(Clone, Copy, Debug)]
 pub struct Since<'a> {
-    /// What happened.
+    /// Events.
     pub events: &'a [Entry],
-    /// Plans with the ticks that were given them.
+    /// Plans with the ticks that received them.
     pub plans: &'a [(u32, Plan)],
     /// Requests with the ticks that made them.
     pub requests: &'a [(u32, PlanRequest)],
 }
 
 impl Since<'_> {
-    /// Why the target started, if the log says so.
+    /// Why the target started, if the log has it.
     #[must_use]
     pub fn restart(&self) -> Option<Restart> {
         self.events.iter().find_map(|entry| match entry.event {
@@ -79,27 +79,27 @@ impl Since<'_> {
 /// A log in memory.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Run {
-    /// What made it; none if the log does not say.
+    /// Its header; none if the log has no identity.
     pub header: Option<Header>,
     /// A row a tick, in the order of the log.
     pub rows: Vec<Controller>,
-    /// What happened.
+    /// Events.
     pub events: Vec<Entry>,
-    /// Plans with the ticks that were given them.
+    /// Plans with the ticks that received them.
     pub plans: Vec<(u32, Plan)>,
     /// Requests with the ticks that made them.
     pub requests: Vec<(u32, PlanRequest)>,
     /// Lines of the ledger.
     pub ledger: Vec<Line>,
-    /// Pieces of captures.
-    pub shots: Vec<CaptureChunk>,
-    /// Where each start after the first begins.
+    /// Parts of captures.
+    pub captures: Vec<CaptureChunk>,
+    /// Each start after the first.
     pub boots: Vec<Boot>,
-    /// What is missing, and before which row.
+    /// Marks with the row that each precedes.
     pub marks: Vec<(usize, Mark)>,
-    /// Counts of what came and what is missing.
+    /// Counts of what was read and what is missing.
     pub counts: Counts,
-    /// The rig's parameters as TOML, if the file has them with it.
+    /// The rig's parameters as TOML, if the file has them.
     pub parameters: Option<String>,
 }
 
@@ -122,32 +122,23 @@ impl Run {
             Item::Plan(at, plan) => self.plans.push((*at, *plan)),
             Item::Request(at, request) => self.requests.push((*at, *request)),
             Item::Event(entry) => self.events.push(*entry),
-            Item::CaptureChunk(shots) => self.shots.push(shots.clone()),
+            Item::CaptureChunk(chunk) => self.captures.push(chunk.clone()),
             Item::Ledger(line) => self.ledger.push(*line),
             Item::Mark(mark) => {
                 if *mark == Mark::Restart {
-                    self.boots.push(Boot {
-                        events: self.events.len(),
-                        plans: self.plans.len(),
-                        requests: self.requests.len(),
-                    });
+                    self.boots.push(self.end());
                 }
                 self.marks.push((self.rows.len(), *mark));
             }
         }
     }
 
-    /// What a start of the target left in the log, counted from 0; ticks count from 0
-    /// again after each.
+    /// The items of a start of the target, counted from 0. Each start counts its ticks from 0.
     #[must_use]
     pub fn since_boot(&self, boot: usize) -> Since<'_> {
         let from = boot.checked_sub(1).and_then(|before| self.boots.get(before));
-        let (from, to) = (from.copied().unwrap_or_default(), self.boots.get(boot).copied());
-        let to = to.unwrap_or(Boot {
-            events: self.events.len(),
-            plans: self.plans.len(),
-            requests: self.requests.len(),
-        });
+        let from = from.copied().unwrap_or_default();
+        let to = self.boots.get(boot).copied().unwrap_or_else(|| self.end());
         Since {
             events: self.events.get(from.events..to.events).unwrap_or_default(),
             plans: self.plans.get(from.plans..to.plans).unwrap_or_default(),
@@ -155,9 +146,15 @@ impl Run {
         }
     }
 
+    /// What has come so far.
+    fn end(&self) -> Boot {
+        let Self { events, plans, requests, .. } = self;
+        Boot { events: events.len(), plans: plans.len(), requests: requests.len() }
+    }
+
     /// Whether nothing is known to be missing.
     #[must_use]
-    pub fn is_whole(&self) -> bool {
+    pub fn is_complete(&self) -> bool {
         self.marks.is_empty()
     }
 }

@@ -1,4 +1,4 @@
-//! Where a log comes from.
+//! Sources of a log.
 
 use std::collections::VecDeque;
 use std::io::Read;
@@ -11,40 +11,35 @@ use crate::session::{self, Session};
 /// A source that failed.
 #[derive(Debug, thiserror::Error)]
 pub enum SourceError {
-    /// Its bytes cannot be read.
-    #[error("{name}: {source}")]
-    Read {
-        /// What was read.
-        name: String,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// The run in software cannot be made.
+    /// The bytes of the input of this name cannot be read.
+    #[error("{0}: {1}")]
+    Read(String, std::io::Error),
+    /// The run in software failed.
     #[error(transparent)]
     Run(#[from] session::RunError),
-    /// A source of another crate.
+    /// A source of another crate failed.
     #[error(transparent)]
     Other(Box<dyn std::error::Error + Send + Sync>),
-    /// The board at a probe.
+    /// The board at a probe failed.
     #[error(transparent)]
     Port(#[from] crate::probe::PortError),
 }
 
-/// Something that speaks the binary log.
+/// A source of the binary log.
 pub trait Source {
-    /// What has come since the last call, possibly nothing; none at the end.
+    /// The bytes since the last call, possibly empty; none at the end.
     ///
     /// # Errors
     /// [`SourceError`] if it broke off.
     fn read(&mut self) -> Result<Option<Vec<u8>>, SourceError>;
 
-    /// Sends a letter to the console; what has none drops it.
+    /// Sends a letter to the console; a source without a console drops it.
     ///
     /// # Errors
     /// [`SourceError`] if it broke off.
     fn send(&mut self, letter: u8) -> Result<(), SourceError>;
 
-    /// What has happened to the connection since the last call, a line each.
+    /// Events of the connection since the last call, a line each.
     fn news(&mut self) -> Vec<String> {
         Vec::new()
     }
@@ -75,7 +70,7 @@ pub const fn starter(direction: Direction) -> Command {
     }
 }
 
-/// A recorded stream, or one that comes through a pipe.
+/// A recorded stream, or one from a pipe.
 pub struct Bytes {
     name: String,
     input: Box<dyn Read + Send>,
@@ -92,9 +87,8 @@ impl Bytes {
 impl Source for Bytes {
     fn read(&mut self) -> Result<Option<Vec<u8>>, SourceError> {
         let mut bytes = vec![0; 1 << 16];
-        let read = self.input.read(&mut bytes);
-        let length =
-            read.map_err(|source| SourceError::Read { name: self.name.clone(), source })?;
+        let length = self.input.read(&mut bytes);
+        let length = length.map_err(|error| SourceError::Read(self.name.clone(), error))?;
         bytes.truncate(length);
         Ok((length > 0).then_some(bytes))
     }
@@ -104,7 +98,7 @@ impl Source for Bytes {
     }
 }
 
-/// Ticks that the controller on this host runs at each reading.
+/// Ticks that the controller on this host runs per call.
 const TICKS: u32 = 20;
 /// Longest run without an operator, s.
 const LONGEST_S: f64 = 120.0;
@@ -113,16 +107,16 @@ const LONGEST_S: f64 = 120.0;
 pub struct Virtual {
     session: Option<Session>,
     letters: VecDeque<u8>,
-    /// Given as soon as the drive is idle; none if an operator gives the commands.
+    /// Command as soon as the drive is idle; none if an operator commands.
     start: Option<Command>,
     attended: bool,
-    /// How many of the next ticks are the last.
+    /// Ticks still logged after the end.
     left: u32,
 }
 
 impl Virtual {
-    /// A session of this scenario. Unless it is `attended` by an operator it starts by
-    /// itself and ends when the drive has arrived.
+    /// A session of this scenario. Unless an operator attends it, it starts by itself and
+    /// ends when the drive has arrived.
     ///
     /// # Errors
     /// [`session::RunError`] if the parameters do not make a controller.
@@ -184,7 +178,7 @@ mod tests {
             bytes.extend(part);
         }
         let run = Run::of_stream(&bytes);
-        assert!(run.is_whole());
+        assert!(run.is_complete());
         let last = run.rows.last().and_then(Controller::mode).unwrap();
         assert!(matches!(last, Mode::Complete(_)), "{last:?}");
         assert_eq!(run.ledger.len(), 3);

@@ -1,4 +1,4 @@
-//! The summary of a run, and what it is made of.
+//! The summary of a run and its parts.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,5 +1,5 @@
-//! The sums of a run, whatever ran the controller: when it moved, with what preload, how
-//! far wheel and wall separated, whether it arrived.
+//! The sums of a run on any target: when it moved, with what preload, how far wheel and
+//! wall separated, whether it arrived.
 
 use interstage::units::Direction;
 use sha2::{Digest, Sha256};
@@ -11,13 +11,14 @@ use crate::scenario::Scenario;
 
 /// Period of a tick, s.
 pub(super) const TICK_S: f64 = 1e-3;
-/// How far from the end of travel a run that arrived may be, mm: twice what creep and
-/// wheel radius leave on the drawn rigs.
+/// Largest distance from the end of travel after arrival, mm: twice the effect of creep and
+/// wheel radius on the drawn rigs.
 const ARRIVED_WITHIN_MM: f64 = 1.0;
 
 /// The sums of a run as it goes on.
+#[derive(Default)]
 pub struct Tally {
-    /// Digest of every bit that identifies the run.
+    /// Digest of the controller's outputs.
     pub digest: Sha256,
     /// One row a tick, if they are kept.
     pub rows: Vec<Tick>,
@@ -37,15 +38,15 @@ pub struct Tally {
     passed: u32,
 }
 
-/// How a run has ended.
+/// The end of a run.
 pub struct Ended<'a> {
     /// What ran the controller.
     pub target: &'static str,
-    /// What was asked for.
+    /// Its scenario.
     pub scenario: &'a Scenario,
-    /// The plant as it was left.
+    /// The plant at the end.
     pub plant: &'a VirtualRig,
-    /// The direction in which it has arrived, as the controller reports it.
+    /// Direction of a completed run, as the controller reports it.
     pub arrived: Option<Direction>,
     /// Wall-clock time that it took, s.
     pub wall_s: f64,
@@ -55,21 +56,7 @@ impl Tally {
     /// A run that begins at `start_mm` and is planned for gaps of `gap_ref_mm`.
     #[must_use]
     pub fn new(gap_ref_mm: f64, start_mm: f64) -> Self {
-        Self {
-            digest: Sha256::new(),
-            rows: Vec::new(),
-            log: Vec::new(),
-            faults: Vec::new(),
-            limits: Vec::new(),
-            gap_ref_mm,
-            start_mm,
-            run_started: None,
-            run_ended: 0.0,
-            preload_sum: 0.0,
-            moving: 0,
-            worst_separation: 0.0,
-            passed: 0,
-        }
+        Self { gap_ref_mm, start_mm, ..Self::default() }
     }
 
     /// Time at which this tick began, s.
@@ -78,7 +65,7 @@ impl Tally {
         f64::from(self.passed) * TICK_S
     }
 
-    /// Ends a tick, in which the drive moved or did not.
+    /// Ends a tick; `moves` if the drive moved in it.
     pub fn close_tick(&mut self, moves: bool, truth: &Truth) {
         if moves {
             let t_s = self.time_s();
@@ -91,7 +78,7 @@ impl Tally {
         self.passed += 1;
     }
 
-    /// The record of the run with its ledger, a line of which `line` makes.
+    /// The record of the run; `line` makes a line of its ledger.
     #[must_use]
     pub fn finish(self, ended: &Ended<'_>, line: impl Fn(&Crossing) -> CrossingLine) -> Recording {
         let Ended { target, scenario, plant, arrived, wall_s } = *ended;

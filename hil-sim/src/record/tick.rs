@@ -1,8 +1,8 @@
-//! One row a tick: what the controller had and did, and what the plant knows beside it.
+//! One row a tick: the controller's inputs and outputs, and the plant's truth beside them.
 //!
-//! The fields of [`Controller`] and [`TrueState`] are the log's columns, and this is the only
-//! place that lists them: names, order and schema in CSV, MCAP and JSON follow by serde. A new
-//! column is a new field and its value in the function below it.
+//! The fields of [`Controller`] and [`TrueState`] are the columns of CSV, MCAP and JSON; serde
+//! derives their names, order and schema. A new column is a new field with its value in the
+//! function below it.
 
 use interstage::log::{Flags, Record, codes};
 use interstage::sense::raw::{
@@ -58,8 +58,8 @@ pub fn stage_name(stage: u8) -> &'static str {
     STAGE_NAMES.get(usize::from(stage).wrapping_sub(1)).copied().unwrap_or("unknown stage")
 }
 
-/// First of the retracting modes in the firmware's numbers, and how far they lie from those
-/// that deploy.
+/// First of the retracting modes in the firmware's numbers, and their offset from those that
+/// deploy.
 const RETRACTING: (u8, u8) = (11, 7);
 /// First code of a fault.
 const FAULT: u8 = 101;
@@ -76,17 +76,17 @@ fn split(mode: Mode) -> (u8, bool, u8) {
 /// One tick of a log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Tick {
-    /// What the controller has and does.
+    /// The controller's inputs and outputs.
     #[serde(flatten)]
     pub controller: Controller,
-    /// What is true, if a plant was there to know it.
+    /// The plant's truth, if there is a plant.
     #[serde(flatten)]
     pub truth: Option<TrueState>,
 }
 
 impl<'de> Deserialize<'de> for Tick {
-    /// Reads the same object as either half: `flatten` would lose every number where another
-    /// crate of the build has switched `arbitrary_precision` of `serde_json` on.
+    /// Reads both halves from one object: `flatten` would lose every number if another crate
+    /// of the build enables `arbitrary_precision` of `serde_json`.
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         let row = serde_json::Value::deserialize(from)?;
         let controller = Controller::deserialize(&row).map_err(D::Error::custom)?;
@@ -94,16 +94,16 @@ impl<'de> Deserialize<'de> for Tick {
     }
 }
 
-/// What the controller's sensors said, what it made of it, what it did.
+/// The controller's sensor codes, estimates and outputs.
 ///
-/// Every quantity is exactly what the controller has: its fixed-point numbers are multiples
-/// of 2^-16 and have a place in an `f64`. What is unknown is `NaN`.
+/// Every quantity is exact: the controller's fixed-point numbers are multiples of 2^-16,
+/// which an `f64` represents. What is unknown is `NaN`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Controller {
     /// Ticks since boot, 1 ms each.
     pub tick: u32,
-    /// The same, s.
+    /// Time since boot, s.
     pub t_s: f64,
     /// Number of the mode, see [`MODE_NAMES`].
     pub mode: u8,
@@ -138,7 +138,7 @@ pub struct Controller {
     pub pretightener_code: Option<u16>,
     /// Number of the command that was given, from 1; 0 for none.
     pub command: u8,
-    /// Everything else that the tick was given and gave, as bits, see [`Flags`].
+    /// All other inputs and outputs of the tick as bits, see [`Flags`].
     pub flags: u16,
     /// Estimated axial position of the wheel centre, mm.
     pub position_mm: f64,
@@ -223,7 +223,7 @@ impl Controller {
         }
     }
 
-    /// The columns of a record and of the codes that it was given.
+    /// The columns of a record and of the codes that the tick used.
     #[must_use]
     pub fn of(record: &Record, sensors: &SensorFrame) -> Self {
         let Record { telemetry: seen, flags, .. } = record;
@@ -268,7 +268,7 @@ impl Controller {
         }
     }
 
-    /// What the controller's sensors said.
+    /// The controller's sensor codes.
     #[must_use]
     pub fn sensors(&self) -> SensorFrame {
         fn sample<T>(
@@ -295,13 +295,13 @@ impl Controller {
         }
     }
 
-    /// Everything else that the tick was given and gave.
+    /// All other inputs and outputs of the tick.
     #[must_use]
     pub const fn flags(&self) -> Flags {
         Flags::from_bits(self.flags)
     }
 
-    /// The mode; none if the numbers have no meaning.
+    /// The mode; none if the numbers are invalid.
     #[must_use]
     pub fn mode(&self) -> Option<Mode> {
         let code = match (self.mode, self.retracts) {
@@ -313,8 +313,7 @@ impl Controller {
         codes::mode(code).filter(|mode| split(*mode).0 == self.mode)
     }
 
-    /// The controller's state in its own numbers; none if something in it has no
-    /// meaning.
+    /// The controller's state in its own numbers; none if one of them is invalid.
     #[must_use]
     pub fn telemetry(&self) -> Option<Telemetry> {
         let q = |value: f64| (!value.is_nan()).then(|| Q16::from_num(value));
@@ -342,7 +341,7 @@ impl Controller {
     }
 }
 
-/// What the plant knows of a tick, before it moves.
+/// The plant's truth at a tick, before it moves.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TrueState {
     /// Axial position of the wheel centre, mm.
@@ -397,7 +396,7 @@ impl From<&Truth> for TrueState {
 }
 
 impl Tick {
-    /// A true quantity; `NaN` if nothing is known to be true.
+    /// A true quantity; `NaN` without truth.
     #[must_use]
     pub fn of_truth(&self, of: impl Fn(&TrueState) -> f64) -> f64 {
         self.truth.as_ref().map_or(f64::NAN, of)

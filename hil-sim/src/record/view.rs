@@ -1,10 +1,10 @@
-//! The state of a log that grows as a few lines of text.
+//! Shows the state of a growing log as a few lines of text.
 
 use std::time::Instant;
 
 use super::{Controller, Counts, Item, Mark, mode_name, stage_name, text};
 
-/// The latest of a log, and its rates.
+/// The latest items of a log, and its rates.
 pub struct View {
     row: Option<Controller>,
     rig: String,
@@ -29,7 +29,7 @@ impl Default for View {
 }
 
 impl View {
-    /// Takes an item in.
+    /// Takes an item.
     pub fn see(&mut self, item: &Item) {
         match item {
             Item::Tick(record, sensors) => self.row = Some(Controller::of(record, sensors)),
@@ -40,7 +40,7 @@ impl View {
         }
     }
 
-    /// Computes the rates, at most once in half a second; whether it was time.
+    /// Computes the rates at most once in half a second; returns whether it did.
     pub fn count(&mut self, counts: &Counts) -> bool {
         let (since, before) = &self.counted;
         let passed = since.elapsed().as_secs_f64();

@@ -1,8 +1,7 @@
-//! MCAP and CSV files of a log that grows, and the files of a run that is over.
+//! Writes MCAP and CSV files of a log that grows, and the files of a completed run.
 //!
-//! Once a second of the log's time all that has come is handed to the system, as complete
-//! chunks, so that a file which is cut off there, by a full disk or a lost supply, is
-//! read up to its last second.
+//! Once a second of the log's time everything is flushed as complete chunks, so that a file
+//! that was cut off by a full disk or a lost supply is read up to its last second.
 
 use std::io::{Seek, Write};
 use std::path::{Path, PathBuf};
@@ -14,33 +13,25 @@ use super::{
     Controller, Counts, Decoder, Header, Item, Mark, Recording, Tick, Topic, messages, pieces,
     write_mcap,
 };
-use crate::files::{Failure, FileError, atomic_write, make_directory};
+use crate::files::{Failure, FileError, atomic_write, make_directory, with_causes};
 
-/// Ticks between two hand-overs to the system.
+/// Ticks between two flushes.
 const FLUSH_TICKS: u64 = 1000;
 
-/// Why writing came to an end. What had been handed over before stays readable.
+/// Why writing stopped. What was flushed before stays readable.
 #[derive(Debug, thiserror::Error)]
-#[error("writing stopped after {ticks} ticks, of which {kept} are safe: {}", chain(&**source))]
+#[error("writing stopped after {ticks} ticks, of which {kept} are safe: {}", with_causes(&**source))]
 pub struct WriteError {
-    /// Ticks that had come.
+    /// Ticks taken.
     pub ticks: u64,
-    /// Ticks that the files hold for certain.
+    /// Ticks flushed.
     pub kept: u64,
-    /// What the system said.
+    /// The system's error.
     source: Failure,
 }
 
-/// An error and its causes, the system's own last.
-fn chain(error: &(dyn std::error::Error + 'static)) -> String {
-    let causes = std::iter::successors(Some(error), |error| error.source());
-    let mut texts: Vec<String> = causes.map(ToString::to_string).collect();
-    texts.dedup();
-    texts.join(": ")
-}
-
-/// Adds a row. Numbers are written so that reading gives the same bits; what is unknown is
-/// `NaN`. Without truth its columns are absent.
+/// Adds a row. Reading gives the same bits; what is unknown is `NaN`. Without truth its
+/// columns are absent.
 fn write_row<W: Write>(csv: &mut csv::Writer<W>, tick: &Tick) -> csv::Result<()> {
     match tick.truth {
         Some(truth) => csv.serialize((tick.controller, truth)),
@@ -51,7 +42,7 @@ fn write_row<W: Write>(csv: &mut csv::Writer<W>, tick: &Tick) -> csv::Result<()>
 /// Writes the rows of `recording` to `path`, below the names of the columns.
 ///
 /// # Errors
-/// [`FileError::File`] with the reason.
+/// [`FileError`] with the reason.
 pub fn write_csv(recording: &Recording, path: &Path) -> Result<(), FileError> {
     atomic_write(path, |out| {
         let mut csv = csv::Writer::from_writer(out);
@@ -93,13 +84,13 @@ pub struct Writer<M: Write + Seek, C: Write> {
     now: u64,
     /// Time at which the target started, ns.
     start: u64,
-    /// Ticks handed over to the system.
+    /// Ticks flushed.
     kept: u64,
 }
 
 impl<M: Write + Seek, C: Write> Writer<M, C> {
-    /// Begins the files. `parameters` are those of the controller as TOML, if they are
-    /// known; `decoded` adds ticks to the MCAP file beside the frames.
+    /// Begins the files. `parameters` are the controller's as TOML, if known; `decoded` adds
+    /// ticks to the MCAP file beside the frames.
     ///
     /// # Errors
     /// [`WriteError`] with the reason.
@@ -128,12 +119,12 @@ impl<M: Write + Seek, C: Write> Writer<M, C> {
         })
     }
 
-    /// What has come so far.
+    /// What has been read so far.
     pub const fn counts(&self) -> &Counts {
         self.decoder.counts()
     }
 
-    /// Takes bytes as they come; each item is shown to `see`.
+    /// Takes bytes in pieces of any size; passes each item to `see`.
     ///
     /// # Errors
     /// [`WriteError`] if a file cannot grow any more.
@@ -149,7 +140,7 @@ impl<M: Write + Seek, C: Write> Writer<M, C> {
             used += frame.len();
             self.frame(frame, see)?;
         }
-        // Of what is no frame, only the end may become one.
+        // Only the end of the rest may become a frame.
         let garbage = (held.len() - used).saturating_sub(LONGEST);
         if garbage > LONGEST {
             self.frame(&held[used..used + garbage], see)?;
@@ -221,7 +212,7 @@ impl<M: Write + Seek, C: Write> Writer<M, C> {
         Ok(())
     }
 
-    /// Closes the files; what came.
+    /// Closes the files; returns the counts.
     ///
     /// # Errors
     /// [`WriteError`] if a file cannot be closed.
@@ -309,16 +300,16 @@ mod tests {
     fn both_files_give_back_what_came() {
         let (stream, disks) = (stream(), (Disk::of(u64::MAX), Disk::of(u64::MAX)));
         let counts = write(&stream, (&disks.0, &disks.1)).unwrap();
-        let (whole, mcap, csv) =
+        let (run, mcap, csv) =
             (Run::of_stream(&stream), read(&disks.0.content()), read(&disks.1.content()));
-        assert_eq!(counts, whole.counts);
-        assert_eq!(csv.rows, whole.rows);
+        assert_eq!(counts, run.counts);
+        assert_eq!(csv.rows, run.rows);
         assert_eq!(mcap.parameters.as_deref(), Some("[run]\nseed = 0\n"));
-        assert_eq!(Run { parameters: None, ..mcap }, whole);
+        assert_eq!(Run { parameters: None, ..mcap }, run);
     }
 
     #[test]
-    fn a_full_disk_is_told_and_what_was_written_stays_readable() {
+    fn a_full_disk_is_reported_and_what_was_written_stays_readable() {
         let stream = stream();
         for (mcap, csv) in [(400_000, u64::MAX), (u64::MAX, 500_000)] {
             let disks = (Disk::of(mcap), Disk::of(csv));
@@ -338,10 +329,10 @@ mod tests {
     fn a_file_cut_anywhere_is_read_up_to_there() {
         let (stream, disks) = (stream(), (Disk::of(u64::MAX), Disk::of(u64::MAX)));
         write(&stream, (&disks.0, &disks.1)).unwrap();
-        let whole = disks.0.content();
+        let file = disks.0.content();
         let mut before = 0;
         for tenth in 4..10 {
-            let rows = read(&whole[..whole.len() * tenth / 10]).rows.len();
+            let rows = read(&file[..file.len() * tenth / 10]).rows.len();
             assert!(rows >= before && rows > 500, "{rows} rows of {tenth} tenths");
             before = rows;
         }
@@ -349,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn time_in_the_file_never_goes_back_even_if_the_target_starts_anew() {
+    fn time_in_the_file_never_goes_back_even_if_the_target_restarts() {
         let disks = (Disk::of(u64::MAX), Disk::of(u64::MAX));
         let twice = [stream(), stream()].concat();
         let counts = write(&twice, (&disks.0, &disks.1)).unwrap();

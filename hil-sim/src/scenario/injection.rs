@@ -1,4 +1,4 @@
-//! One fault of a scenario: what breaks, how, from when, for how long, how badly.
+//! One fault of a scenario: target, kind, onset, duration, magnitude.
 
 mod catalogue;
 mod kinds;
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub use catalogue::{CATALOGUE, Entry, HARDWARE, entry};
 pub use kinds::{Kind, Target};
 
-/// Onset when a fault is there.
+/// When a fault begins.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Onset {
     /// Time since boot, s.
@@ -27,25 +27,25 @@ pub struct Injection {
     pub target: Target,
     /// How.
     pub kind: Kind,
-    /// Onset this time since boot, s.
+    /// Onset: time since boot, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at_s: Option<f64>,
-    /// Onset this true position on, mm.
+    /// Onset: true position, mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at_mm: Option<f64>,
-    /// Onset the touch of this crossing on, counted from 1 over the run.
+    /// Onset: touch of this crossing, counted from 1 over the run.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub at_crossing: Option<u8>,
-    /// For so long, s; for good if it is not said.
+    /// Duration, s; permanent if absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub duration_s: Option<f64>,
-    /// How badly, in the unit of the catalogue; the catalogue's own if it is not said.
+    /// Magnitude in the unit of the catalogue, which has the default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub magnitude: Option<f64>,
 }
 
 impl Injection {
-    /// A fault for good from `at_s` on.
+    /// A permanent fault from `at_s` on.
     #[must_use]
     pub const fn at(target: Target, kind: Kind, at_s: f64, magnitude: f64) -> Self {
         Self {
@@ -65,7 +65,7 @@ impl Injection {
         self.target.resets_board(self.kind)
     }
 
-    /// Onset when; time 0 if nothing is said.
+    /// The onset; time 0 if there is none.
     #[must_use]
     pub fn from(&self) -> Onset {
         match (self.at_s, self.at_mm, self.at_crossing) {
@@ -75,7 +75,7 @@ impl Injection {
         }
     }
 
-    /// How badly: as said, or as the catalogue has it.
+    /// Magnitude; by default that of the catalogue.
     #[must_use]
     pub fn magnitude(&self) -> f64 {
         let usual = entry(self.target, self.kind).map_or(0.0, |entry| entry.magnitude);

@@ -32,8 +32,8 @@ pub struct KeyInfo {
 pub(super) enum Kind {
     /// A finite number.
     Number,
-    /// A whole number, not negative.
-    Whole,
+    /// An integer, not negative.
+    Integer,
     /// A list of at most so many numbers.
     Numbers(usize),
     /// One of these words.
@@ -55,20 +55,17 @@ impl Kind {
             ("run.faults", _) => Self::Faults,
             ("drive.modes_hz", _) => Self::Numbers(interstage::rig::MAX_MODES),
             (_, Value::Array(_)) => Self::Numbers(interstage::rig::MAX_STEPS),
-            (_, Value::Integer(_)) => Self::Whole,
+            (_, Value::Integer(_)) => Self::Integer,
             _ => Self::Number,
         }
     }
 
     /// Half a sentence: what the key takes.
     pub(super) fn expected(self, path: &str) -> String {
-        let unit = match unit(path) {
-            "" => String::new(),
-            unit => format!(" in {unit}"),
-        };
+        let unit = in_unit(path);
         match self {
             Self::Number => format!("a number{unit}"),
-            Self::Whole => "a whole number, 0 or more".to_owned(),
+            Self::Integer => "a whole number, 0 or more".to_owned(),
             Self::Numbers(most) => format!("a list of at most {most} numbers{unit}"),
             Self::Word(words) => {
                 words.iter().map(|w| format!("\"{w}\"")).collect::<Vec<_>>().join(" or ")
@@ -107,12 +104,20 @@ const UNITS: [(&str, &str); 18] = [
 ];
 
 /// Unit that the end of the key's name says; empty if none.
-pub(super) fn unit(path: &str) -> &'static str {
+fn unit(path: &str) -> &'static str {
     UNITS.iter().find(|(end, _)| path.ends_with(end)).map_or("", |(_, unit)| unit)
 }
 
+/// The unit as half a sentence; empty if there is none.
+pub(super) fn in_unit(path: &str) -> String {
+    match unit(path) {
+        "" => String::new(),
+        unit => format!(" in {unit}"),
+    }
+}
+
 /// The key's name without its unit.
-pub(super) fn stem(name: &str) -> &str {
+fn stem(name: &str) -> &str {
     UNITS.iter().find_map(|(end, _)| name.strip_suffix(end)).unwrap_or(name)
 }
 
@@ -158,22 +163,82 @@ fn descriptions() -> Vec<(String, String)> {
 /// Every key of the scenario in `table`, in the order of declaration.
 pub(super) fn list(table: &Table) -> Vec<KeyInfo> {
     let values = leaves(table);
-    let described = descriptions().into_iter().filter_map(|(key, description)| {
+    let info = |(key, description): (String, String)| {
         let (_, value) = values.iter().find(|(name, _)| *name == key)?;
-        Some(KeyInfo {
-            unit: unit(&key),
-            value: (*value).clone(),
-            expected: Kind::of(&key, value).expected(&key),
-            description,
-            key,
-        })
-    });
-    described.collect()
+        let expected = Kind::of(&key, value).expected(&key);
+        Some(KeyInfo { unit: unit(&key), value: (*value).clone(), expected, description, key })
+    };
+    descriptions().into_iter().filter_map(info).collect()
+}
+
+/// A half-sentence that points at the known key nearest to `key`, or at the list.
+pub(super) fn hint(key: &str, known: &[String]) -> String {
+    match nearest(key, known) {
+        Some(found) => format!(", did you mean {found}?"),
+        None => "; `rig keys` lists them".to_owned(),
+    }
+}
+
+/// The known key nearest to `key`, if any is near.
+fn nearest<'a>(key: &str, known: &'a [String]) -> Option<&'a str> {
+    known
+        .iter()
+        .map(|candidate| (distance(key, candidate), candidate.as_str()))
+        .min()
+        .filter(|&(distance, _)| distance <= 2 + key.len() / 6)
+        .map(|(_, candidate)| candidate)
+}
+
+/// Edits from `key` to `candidate`. The wrong section costs one edit, a forgotten
+/// unit or a wrong one as well.
+fn distance(key: &str, candidate: &str) -> usize {
+    let edits = strsim::damerau_levenshtein(key, candidate);
+    let ((section, found), (its_section, wanted)) = (split(key), split(candidate));
+    if wanted.is_empty() || found.is_empty() {
+        return edits;
+    }
+    let leaf = 1 + strsim::damerau_levenshtein(found, wanted);
+    let same_stem = wanted.strip_prefix(found).is_some_and(|rest| rest.starts_with('_'))
+        || stem(found) == stem(wanted);
+    let stem = if same_stem { 1 + usize::from(section != its_section) } else { edits };
+    edits.min(leaf).min(stem)
+}
+
+/// Section and name; a key without a dot is a name without section.
+fn split(key: &str) -> (&str, &str) {
+    key.rsplit_once('.').unwrap_or(("", key))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn known() -> Vec<String> {
+        crate::scenario::Scenario::default().keys().into_iter().map(|k| k.key).collect()
+    }
+
+    #[test]
+    fn finds_typing_errors_wrong_sections_and_forgotten_units() {
+        let known = known();
+        for (key, wanted) in [
+            ("tread.tau", "tread.tau_s"),
+            ("tread.tau_ms", "tread.tau_s"),
+            ("tau_s", "tread.tau_s"),
+            ("tread.stifening", "tread.stiffening"),
+            ("rig.mu", "plant.mu"),
+            ("prelaod.limit_n", "preload.limit_n"),
+            ("rig.step_height", "rig.step_height_mm"),
+            ("seed", "run.seed"),
+            ("drive.cruise_speed_m_s", "drive.cruise_speed_mm_s"),
+        ] {
+            assert_eq!(nearest(key, &known), Some(wanted), "{key}");
+        }
+    }
+
+    #[test]
+    fn does_not_guess_when_nothing_is_near() {
+        assert_eq!(nearest("colour.of_the_sleeve", &known()), None);
+    }
 
     #[test]
     fn every_key_has_a_description_and_every_description_a_key() {

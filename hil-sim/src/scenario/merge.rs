@@ -1,95 +1,75 @@
-//! Laying values over a preset, key by key, each checked for its kind.
+//! Lays values over a preset key by key and checks each for its kind.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use toml::{Table, Value};
 
-use super::error::{Origin, ScenarioError};
-use super::keys::{self, Kind, PRESETS};
-use super::suggest;
-use super::value::{checked, from_text, has_unit, split, wrong_type};
+use super::error::ScenarioError;
+use super::keys::{self, Kind};
+use super::value::{checked, from_text, has_unit, split};
 
-/// Where each overridden key was written.
+/// Origin of what `--set` overrides.
+pub(super) const COMMAND_LINE: &str = "command line";
+
+/// Where each value was written.
 #[derive(Clone, Debug)]
 pub(super) struct Provenance {
-    preset: Origin,
-    written: BTreeMap<String, Origin>,
+    preset: String,
+    written: BTreeMap<String, String>,
 }
 
 impl Provenance {
-    /// Everything comes from the preset.
+    /// Every value is that of the preset.
     pub(super) fn new(preset: &str) -> Self {
-        Self { preset: Origin::Preset(preset.to_owned()), written: BTreeMap::new() }
+        Self { preset: format!("preset {preset}"), written: BTreeMap::new() }
     }
 
     /// Where the value of `key` was written.
-    pub(super) fn of(&self, key: &str) -> Origin {
-        self.written.get(key).unwrap_or(&self.preset).clone()
+    pub(super) fn of(&self, key: &str) -> &str {
+        self.written.get(key).unwrap_or(&self.preset)
     }
 
     /// Where the first key of `message` that is not the preset's own was written.
-    pub(super) fn of_message(&self, message: &str) -> Origin {
+    pub(super) fn of_message(&self, message: &str) -> &str {
         let written = message.split([' ', ':', ',']).find_map(|word| self.written.get(word));
-        written.unwrap_or(&self.preset).clone()
+        written.unwrap_or(&self.preset)
     }
 }
 
-/// A scenario under construction.
+/// A scenario under construction: each value is of the kind of its key.
 pub(super) struct Merged {
-    table: Table,
-    provenance: Provenance,
+    pub(super) table: Table,
+    pub(super) provenance: Provenance,
 }
 
 impl Merged {
-    /// Starts from the values in `table`, those of a preset.
-    pub(super) fn new(preset: &str, table: Table) -> Self {
-        Self { table, provenance: Provenance::new(preset) }
+    /// Lays one `key=value` over it.
+    pub(super) fn set(&mut self, text: &str) -> Result<(), ScenarioError> {
+        let (key, text) = split(text).ok_or_else(|| {
+            let example = "as in --set tread.tau_s=0.12";
+            ScenarioError(format!("--set {text}: expected key=value, {example}"))
+        })?;
+        let kind = self.find(key).map_or(Kind::Number, |place| Kind::of(key, place));
+        self.put(COMMAND_LINE, key, &from_text(kind, text))
     }
 
     /// Lays a file over it.
-    pub(super) fn layer(&mut self, origin: &Origin, given: &Table) -> Result<(), ScenarioError> {
-        self.section("", origin, given)
+    pub(super) fn layer(&mut self, origin: &str, given: &Table) -> Result<(), ScenarioError> {
+        given.iter().try_for_each(|(key, value)| self.put(origin, key, value))
     }
 
-    /// Lays one `key=value` over it.
-    pub(super) fn set(&mut self, text: &str) -> Result<(), ScenarioError> {
-        let (key, text) =
-            split(text).ok_or_else(|| ScenarioError::NotAnAssignment { text: text.to_owned() })?;
-        match self.find(key) {
-            Some(Value::Table(_)) => Err(self.is_section(&Origin::Set, key, text)),
-            Some(leaf) => {
-                let value = from_text(Kind::of(key, leaf), text);
-                self.put(&Origin::Set, key, &value)
-            }
-            None => Err(self.unknown(&Origin::Set, key)),
+    fn put(&mut self, origin: &str, key: &str, value: &Value) -> Result<(), ScenarioError> {
+        let place = self.find(key).ok_or_else(|| self.unknown(origin, key))?;
+        if let Value::Table(section) = place {
+            let Value::Table(inner) = value else {
+                let first = section.keys().next().map_or("", String::as_str);
+                let expected = format!("a section with keys such as {key}.{first}");
+                return Err(ScenarioError::wrong(origin, key, value, expected));
+            };
+            let mut inner = inner.iter();
+            return inner.try_for_each(|(name, v)| self.put(origin, &format!("{key}.{name}"), v));
         }
-    }
-
-    /// The table, each value of the kind of its key, and where the values come from.
-    pub(super) fn finish(self) -> (Table, Provenance) {
-        (self.table, self.provenance)
-    }
-
-    fn section(&mut self, at: &str, origin: &Origin, given: &Table) -> Result<(), ScenarioError> {
-        for (name, value) in given {
-            let key = if at.is_empty() { name.clone() } else { format!("{at}.{name}") };
-            match (self.find(&key), value) {
-                (None, _) => return Err(self.unknown(origin, &key)),
-                (Some(Value::Table(_)), Value::Table(inner)) => {
-                    self.section(&key, origin, inner)?
-                }
-                (Some(Value::Table(_)), _) => {
-                    return Err(self.is_section(origin, &key, &value.to_string()));
-                }
-                (Some(_), _) => self.put(origin, &key, value)?,
-            }
-        }
-        Ok(())
-    }
-
-    fn put(&mut self, origin: &Origin, key: &str, value: &Value) -> Result<(), ScenarioError> {
-        let place = self.find(key).expect("the key was found before");
         let checked = checked(origin, key, Kind::of(key, place), value)?;
         let (section, name) = key.rsplit_once('.').unwrap_or(("", key));
         let table = match self.table.get_mut(section) {
@@ -97,8 +77,15 @@ impl Merged {
             _ => &mut self.table,
         };
         table.insert(name.to_owned(), checked);
-        self.provenance.written.insert(key.to_owned(), origin.clone());
+        self.provenance.written.insert(key.to_owned(), origin.to_owned());
         Ok(())
+    }
+
+    fn unknown(&self, origin: &str, key: &str) -> ScenarioError {
+        let mut known: Vec<String> =
+            keys::leaves(&self.table).into_iter().map(|(key, _)| key).collect();
+        known.extend(self.table.keys().cloned());
+        ScenarioError::unknown_key(origin, key, &keys::hint(key, &known))
     }
 
     fn find(&self, key: &str) -> Option<&Value> {
@@ -106,87 +93,38 @@ impl Merged {
         let first = self.table.get(names.next()?)?;
         names.try_fold(first, |value, name| value.get(name))
     }
-
-    fn unknown(&self, origin: &Origin, key: &str) -> ScenarioError {
-        let mut known: Vec<String> =
-            keys::leaves(&self.table).into_iter().map(|(key, _)| key).collect();
-        known.extend(self.table.keys().cloned());
-        ScenarioError::UnknownKey {
-            origin: origin.clone(),
-            key: key.to_owned(),
-            hint: suggest::hint(key, &known),
-        }
-    }
-
-    fn is_section(&self, origin: &Origin, key: &str, found: &str) -> ScenarioError {
-        let inside = match self.find(key) {
-            Some(Value::Table(inner)) => inner.keys().next().cloned().unwrap_or_default(),
-            _ => String::new(),
-        };
-        ScenarioError::WrongType {
-            origin: origin.clone(),
-            key: key.to_owned(),
-            found: found.to_owned(),
-            expected: format!("a section with keys such as {key}.{inside}"),
-        }
-    }
 }
 
-/// Takes the `preset` keys out of the layers; the last one counts.
-pub(super) fn take_preset(
-    layers: &mut [(Origin, Table)],
-) -> Result<Option<(String, Origin)>, ScenarioError> {
-    let mut found = None;
-    for (origin, table) in layers {
-        match table.remove("preset") {
-            Some(Value::String(name)) => found = Some((name, origin.clone())),
-            Some(other) => {
-                return Err(wrong_type(origin, "preset", Kind::Word(&PRESETS), &other));
-            }
-            None => {}
-        }
-    }
-    Ok(found)
-}
-
-/// The table in the file at `path`.
-pub(super) fn read(path: &Path) -> Result<Table, ScenarioError> {
+/// A file's path and its table.
+pub(super) fn read(path: &Path) -> Result<(String, Table), ScenarioError> {
+    let name = path.display().to_string();
     let text = std::fs::read_to_string(path)
-        .map_err(|source| ScenarioError::Unreadable { path: path.to_owned(), source })?;
-    parse(path, &text)
+        .map_err(|error| ScenarioError::at(&name, format!("cannot be read: {error}")))?;
+    let table = parse(&name, &text)?;
+    Ok((name, table))
 }
 
-/// The table in `text`.
-pub(super) fn parse(path: &Path, text: &str) -> Result<Table, ScenarioError> {
+/// The table in the `text` of the file of this name.
+pub(super) fn parse(name: &str, text: &str) -> Result<Table, ScenarioError> {
     text.parse::<Table>().map_err(|error| {
         let at = error.span().map_or(0, |span| span.start.min(text.len()));
         let line = 1 + text.as_bytes()[..at].iter().filter(|&&b| b == b'\n').count();
-        unit_at(path, text, line).unwrap_or_else(|| ScenarioError::NotToml {
-            path: path.to_owned(),
-            line,
-            message: error.message().replace('\n', ", "),
+        unit_at(name, text, line).unwrap_or_else(|| {
+            let why = error.message().replace('\n', ", ");
+            ScenarioError::at(&format!("{name}, line {line}"), format!("not valid TOML: {why}"))
         })
     })
 }
 
 /// A line such as `tau_s = 0.1 s`, which is no TOML because of the unit.
-fn unit_at(path: &Path, text: &str, line: usize) -> Option<ScenarioError> {
+fn unit_at(file: &str, text: &str, line: usize) -> Option<ScenarioError> {
     let (name, value) = text.lines().nth(line - 1)?.split_once('=')?;
-    let value = value.split('#').next()?.trim();
+    let (name, value) = (name.trim(), value.split('#').next()?.trim());
     if !has_unit(value) {
         return None;
     }
-    let section = text
-        .lines()
-        .take(line)
-        .filter_map(|l| l.trim().strip_prefix('[')?.split_once(']').map(|(name, _)| name.trim()))
-        .last();
-    let name = name.trim();
-    let key = section.map_or_else(|| name.to_owned(), |section| format!("{section}.{name}"));
-    Some(ScenarioError::UnitInValue {
-        origin: Origin::File(path.to_owned()),
-        unit: keys::unit(&key),
-        key,
-        found: value.to_owned(),
-    })
+    let sections = text.lines().take(line);
+    let section = sections.filter_map(|l| l.trim().strip_prefix('[')?.split_once(']')).last();
+    let key = section.map_or(name.to_owned(), |(section, _)| format!("{}.{name}", section.trim()));
+    Some(ScenarioError::unit_in_value(file, &key, value))
 }

@@ -41,10 +41,7 @@ impl Direction {
     /// Its name.
     #[must_use]
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::Deploy => Self::NAMES[0],
-            Self::Retract => Self::NAMES[1],
-        }
+        Self::NAMES[self as usize]
     }
 }
 
@@ -68,7 +65,7 @@ pub enum ControllerKind {
     Constant,
     /// The preload limit throughout.
     Limit,
-    /// Preload raised when the step is felt.
+    /// Preload raised when the step is detected.
     Reactive,
 }
 
@@ -79,12 +76,7 @@ impl ControllerKind {
     /// Its name.
     #[must_use]
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::Scheduled => Self::NAMES[0],
-            Self::Constant => Self::NAMES[1],
-            Self::Limit => Self::NAMES[2],
-            Self::Reactive => Self::NAMES[3],
-        }
+        Self::NAMES[self as usize]
     }
 }
 
@@ -191,14 +183,9 @@ mod tests {
 
     #[test]
     fn names_are_those_of_the_serialised_form() {
-        for (kind, name) in [
-            (ControllerKind::Scheduled, "scheduled"),
-            (ControllerKind::Constant, "constant"),
-            (ControllerKind::Limit, "limit"),
-            (ControllerKind::Reactive, "reactive"),
-        ] {
-            assert_eq!(kind.name(), name);
-            assert_eq!(serde_json::to_value(kind).unwrap(), name);
+        use ControllerKind::{Constant, Limit, Reactive, Scheduled};
+        for kind in [Scheduled, Constant, Limit, Reactive] {
+            assert_eq!(serde_json::to_value(kind).unwrap(), kind.name());
         }
         for direction in [Direction::Deploy, Direction::Retract] {
             assert_eq!(serde_json::to_value(direction).unwrap(), direction.name());

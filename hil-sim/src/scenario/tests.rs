@@ -68,119 +68,102 @@ fn lists_and_anomalies_can_be_set_on_the_command_line() {
     .map(str::to_owned);
     let scenario = Scenario::resolve(None, None, &sets).unwrap();
     assert_eq!(scenario.rig.rig.step_positions_mm.as_slice(), [20.0, 42.0]);
-    assert_eq!(scenario.true_steps_mm(), [20.0, 40.0]);
+    assert_eq!(scenario.true_steps(), [(20.0, 0.0), (40.0, 0.0)]);
+}
+
+/// Each override is refused with this message after the origin.
+fn refused_sets(cases: &[(&str, &str)]) {
+    for (text, message) in cases {
+        assert_eq!(set_error(text), format!("command line: {message}"));
+    }
+}
+
+/// Each file is refused with this message after its name.
+fn refused_files(cases: &[(&str, &str)]) {
+    for (text, message) in cases {
+        assert_eq!(error(text), format!("bench.toml: {message}"));
+    }
 }
 
 #[test]
 fn an_unknown_key_is_named_with_its_file_and_the_nearest_known_one() {
-    assert_eq!(
-        error("[tread]\ntau = 0.1\n"),
-        "bench.toml: tread.tau: no such key, did you mean tread.tau_s?"
-    );
-    assert_eq!(
-        error("[treads]\ntau_s = 1\n"),
-        "bench.toml: treads: no such key, did you mean tread?"
-    );
-    assert_eq!(
-        set_error("plant.my=1"),
-        "command line: plant.my: no such key, did you mean plant.mu?"
-    );
-    assert_eq!(
-        set_error("zzz.zzzzzz=1"),
-        "command line: zzz.zzzzzz: no such key; `rig keys` lists them"
-    );
+    refused_files(&[
+        ("[tread]\ntau = 0.1\n", "tread.tau: no such key, did you mean tread.tau_s?"),
+        ("[treads]\ntau_s = 1\n", "treads: no such key, did you mean tread?"),
+    ]);
+    refused_sets(&[
+        ("plant.my=1", "plant.my: no such key, did you mean plant.mu?"),
+        ("zzz.zzzzzz=1", "zzz.zzzzzz: no such key; `rig keys` lists them"),
+    ]);
 }
 
 #[test]
 fn a_value_of_another_kind_is_refused_with_what_was_expected() {
-    assert_eq!(
-        set_error("tread.tau_s=abc"),
-        "command line: tread.tau_s = \"abc\": expected a number in s"
-    );
-    assert_eq!(
-        error("[tread]\nstiffening = true\n"),
-        "bench.toml: tread.stiffening = true: expected a number"
-    );
-    assert_eq!(
-        error("[tread]\ntau_s = nan\n"),
-        "bench.toml: tread.tau_s = nan: expected a number in s"
-    );
-    assert_eq!(
-        error("tread = 3\n"),
-        "bench.toml: tread = 3: expected a section with keys such as tread.k_inf_pa_per_m"
-    );
-    assert_eq!(
-        set_error("run.controller=clever"),
-        "command line: run.controller = \"clever\": expected \"scheduled\" or \"constant\" or \"limit\" or \"reactive\""
-    );
-    assert_eq!(
-        set_error("run.seed=-1"),
-        "command line: run.seed = -1: expected a whole number, 0 or more"
-    );
-    assert_eq!(
-        set_error("drive.modes_hz=1,2,3,4,5"),
-        "command line: drive.modes_hz = [1, 2, 3, 4, 5]: expected a list of at most 4 numbers in Hz"
-    );
+    let section = "tread = 3: expected a section with keys such as tread.k_inf_pa_per_m";
+    refused_files(&[
+        ("[tread]\nstiffening = true\n", "tread.stiffening = true: expected a number"),
+        ("[tread]\ntau_s = nan\n", "tread.tau_s = nan: expected a number in s"),
+        ("tread = 3\n", section),
+    ]);
+    let words = "\"scheduled\" or \"constant\" or \"limit\" or \"reactive\"";
+    let modes = "[1, 2, 3, 4, 5]: expected a list of at most 4 numbers in Hz";
+    refused_sets(&[
+        ("tread=3", section),
+        ("tread.tau_s=abc", "tread.tau_s = \"abc\": expected a number in s"),
+        ("run.controller=clever", &format!("run.controller = \"clever\": expected {words}")),
+        ("run.seed=-1", "run.seed = -1: expected a whole number, 0 or more"),
+        ("drive.modes_hz=1,2,3,4,5", &format!("drive.modes_hz = {modes}")),
+    ]);
+    let example = "as in --set tread.tau_s=0.12";
     assert_eq!(
         set_error("tread.tau_s"),
-        "--set tread.tau_s: expected key=value, as in --set tread.tau_s=0.12"
+        format!("--set tread.tau_s: expected key=value, {example}")
     );
 }
 
 #[test]
 fn a_unit_behind_a_number_is_explained() {
-    let said = "expected a bare number in s, without the unit: that is part of the key's name";
-    assert_eq!(set_error("tread.tau_s=0.1s"), format!("command line: tread.tau_s = 0.1s: {said}"));
-    assert_eq!(
-        error("[tread]\ntau_s = \"0.1 s\"\n"),
-        format!("bench.toml: tread.tau_s = 0.1 s: {said}")
-    );
-    assert_eq!(
-        error("[tread]\nstiffening = 4\ntau_s = 0.1 s # long\n"),
-        format!("bench.toml: tread.tau_s = 0.1 s: {said}")
-    );
+    let bare = "expected a bare number in s, without the unit: that is part of the key's name";
+    let spaced = format!("tread.tau_s = 0.1 s: {bare}");
+    refused_sets(&[
+        ("tread.tau_s=0.1s", &format!("tread.tau_s = 0.1s: {bare}")),
+        ("tread.stiffening=4x", "tread.stiffening = 4x: expected a bare number, without the unit"),
+    ]);
+    refused_files(&[
+        ("[tread]\ntau_s = \"0.1 s\"\n", &spaced),
+        ("[tread]\nstiffening = 4\ntau_s = 0.1 s # long\n", &spaced),
+    ]);
     assert!(set_error("drive.cruise_speed_mm_s=5mm/s").contains("a bare number in mm/s"));
-    assert_eq!(
-        set_error("tread.stiffening=4x"),
-        "command line: tread.stiffening = 4x: expected a bare number, without the unit"
-    );
 }
 
 #[test]
 fn a_value_out_of_range_is_named_with_its_range() {
-    assert_eq!(
-        set_error("plant.mu=12"),
-        "command line: plant.mu = 12: expected a value from 0 to 3"
-    );
-    assert_eq!(
-        error("[spread]\nk_inf_rel = 4.0\n"),
-        "bench.toml: spread.k_inf_rel = 4: expected a value from 0 to 0.3"
-    );
+    refused_sets(&[
+        ("plant.mu=12", "plant.mu = 12: expected a value from 0 to 3"),
+        ("preload.limit_n=2", "preload.limit_n = 2: expected a value from 5 to 180"),
+    ]);
+    refused_files(&[(
+        "[spread]\nk_inf_rel = 4.0\n",
+        "spread.k_inf_rel = 4: expected a value from 0 to 0.3",
+    )]);
+}
+
+#[test]
+fn a_preload_limit_without_room_above_the_cruise_preload_is_refused() {
+    for (text, limit, least, cruise) in
+        [("limit_n = 30", "30", "34.7", "33.3"), ("cruise_n = 60", "50", "62.5", "60")]
+    {
+        let room = format!("that is preload.cruise_n = {cruise} and room to regulate");
+        let message = format!("preload.limit_n = {limit}: expected at least {least}, {room}");
+        refused_files(&[(&format!("[preload]\n{text}\n"), &message)]);
+    }
 }
 
 #[test]
 fn a_step_table_out_of_order_is_refused() {
     let said = error("[rig]\nstep_positions_mm = [18, 62, 40]\n");
-    assert!(
-        said.starts_with("bench.toml: rig.step_positions_mm: step 3 stands at 40 mm"),
-        "{said}"
-    );
-}
-
-#[test]
-fn a_preload_limit_below_the_cruise_preload_or_the_minimum_is_refused() {
-    assert_eq!(
-        error("[preload]\nlimit_n = 30\n"),
-        "bench.toml: preload.limit_n = 30: expected at least 34.7, that is preload.cruise_n = 33.3 and room to regulate"
-    );
-    assert_eq!(
-        error("[preload]\ncruise_n = 60\n"),
-        "bench.toml: preload.limit_n = 50: expected at least 62.5, that is preload.cruise_n = 60 and room to regulate"
-    );
-    assert_eq!(
-        set_error("preload.limit_n=2"),
-        "command line: preload.limit_n = 2: expected a value from 5 to 180"
-    );
+    assert!(said.starts_with("bench.toml: rig.step_positions_mm: step 3 "), "{said}");
+    assert!(said.contains(" at 40 mm"), "{said}");
 }
 
 #[test]
@@ -199,31 +182,24 @@ fn a_file_that_cannot_be_read_or_is_not_toml_is_named() {
 
 #[test]
 fn anomalies_are_checked_key_by_key() {
-    let of = |inside: &str| error(&format!("[[run.anomalies]]\n{inside}\n"));
-    assert_eq!(
-        of("step = 1"),
-        "bench.toml: run.anomalies[1].kind = nothing: expected \"early\" or \"late\" or \"missing\" or \"higher\" or \"extra\""
-    );
-    assert_eq!(
-        of("kind = \"late\"\nstep = 1\noffset = 2"),
-        "bench.toml: run.anomalies[1].offset: no such key; kind = \"late\" takes step and offset_mm"
-    );
-    assert_eq!(
-        of("kind = \"extra\""),
-        "bench.toml: run.anomalies[1].position_mm = nothing: expected a number in mm"
-    );
-    assert_eq!(
-        of("kind = \"missing\"\nstep = 4"),
-        "bench.toml: run.anomalies[1].step = 4: expected a value from 1 to 3"
-    );
-    assert_eq!(
-        of("kind = \"missing\"\nstep = 400"),
-        "bench.toml: run.anomalies[1].step = 400: expected a value from 1 to 8"
-    );
-    assert_eq!(
-        of("kind = \"extra\"\nposition_mm = 45"),
-        "bench.toml: run.anomalies: steps at 40.0 and 45.0 mm, expected at least 13.6 mm between them"
-    );
+    let kinds = "\"early\" or \"late\" or \"missing\" or \"higher\" or \"extra\"";
+    for (inside, message) in [
+        ("step = 1", &*format!("[1].kind = nothing: expected {kinds}")),
+        (
+            "kind = \"late\"\nstep = 1\noffset = 2",
+            "[1].offset: no such key; kind = \"late\" takes step and offset_mm",
+        ),
+        ("kind = \"extra\"", "[1].position_mm = nothing: expected a number in mm"),
+        ("kind = \"missing\"\nstep = 4", "[1].step = 4: expected a value from 1 to 3"),
+        ("kind = \"missing\"\nstep = 400", "[1].step = 400: expected a value from 1 to 8"),
+        (
+            "kind = \"extra\"\nposition_mm = 45",
+            ": steps at 40.0 and 45.0 mm, expected at least 13.6 mm between them",
+        ),
+    ] {
+        let text = format!("[[run.anomalies]]\n{inside}\n");
+        refused_files(&[(&text, &format!("run.anomalies{message}"))]);
+    }
 }
 
 #[test]
@@ -268,47 +244,21 @@ fn faults_are_read_and_written_back() {
 
 #[test]
 fn every_mistake_of_a_fault_is_named() {
-    let fault = |rest: &str| error(&format!("[[run.faults]]\n{rest}"));
-    for (rest, said) in [
-        ("kind = \"off\"\nat_s = 1", "run.faults[1].target = nothing: expected \"encoder\""),
-        (
-            "target = \"angel\"\nkind = \"off\"\nat_s = 1",
-            "run.faults[1].target = \"angel\": expected \"encoder\"",
-        ),
-        (
-            "target = \"model\"\nkind = \"off\"\nat_s = 1",
-            "run.faults[1].kind = \"off\": expected \"hung\"",
-        ),
-        (
-            "target = \"model\"\nkind = \"hung\"",
-            "run.faults[1].at_s = nothing: expected one of at_s, at_mm and at_crossing",
-        ),
-        (
-            "target = \"model\"\nkind = \"hung\"\nat_s = 1\nat_mm = 2",
-            "run.faults[1].at_s = at_s and at_mm: expected one of",
-        ),
-        (
-            "target = \"model\"\nkind = \"hung\"\nat = 1",
-            "run.faults[1].at: no such key; a fault takes target, kind, at_s",
-        ),
-        (
-            "target = \"model\"\nkind = \"hung\"\nat_s = \"1 s\"",
-            "run.faults[1].at_s = 1 s: expected a bare number in s",
-        ),
-        (
-            "target = \"model\"\nkind = \"hung\"\nat_s = 1\nmagnitude = 2",
-            "run.faults[1].magnitude = 2: expected a value from 0 to 0",
-        ),
-        (
-            "target = \"drive\"\nkind = \"weak\"\nat_s = -1",
-            "run.faults[1].at_s = -1: expected a value from 0 to 3600",
-        ),
-        (
-            "target = \"drive\"\nkind = \"weak\"\nat_crossing = 300",
-            "run.faults[1].at_crossing = 300: expected a value from 1 to 250",
-        ),
+    for (target, kind, rest, message) in [
+        ("angel", "off", "at_s = 1", "target = \"angel\": expected \"encoder\""),
+        ("model", "off", "at_s = 1", "kind = \"off\": expected \"hung\""),
+        ("model", "hung", "", "at_s = nothing: expected one of at_s, at_mm and at_crossing"),
+        ("model", "hung", "at_s = 1\nat_mm = 2", "at_s = at_s and at_mm: expected one of"),
+        ("model", "hung", "at = 1", "at: no such key; a fault takes target, kind, at_s"),
+        ("model", "hung", "at_s = \"1 s\"", "at_s = 1 s: expected a bare number in s"),
+        ("model", "hung", "at_s = 1\nmagnitude = 2", "magnitude = 2: expected a value from 0 to 0"),
+        ("drive", "weak", "at_s = -1", "at_s = -1: expected a value from 0 to 3600"),
+        ("drive", "weak", "at_crossing = 300", "at_crossing = 300: expected a value from 1 to 250"),
     ] {
-        let found = fault(rest);
-        assert!(found.starts_with("bench.toml: ") && found.contains(said), "{found}");
+        let fault = format!("[[run.faults]]\ntarget = \"{target}\"\nkind = \"{kind}\"\n{rest}");
+        let (found, message) = (error(&fault), format!("bench.toml: run.faults[1].{message}"));
+        assert!(found.starts_with(&message), "{found}");
     }
+    let found = error("[[run.faults]]\nkind = \"off\"\nat_s = 1");
+    assert!(found.contains("run.faults[1].target = nothing: expected \"encoder\""), "{found}");
 }

@@ -1,4 +1,4 @@
-//! The checks of a whole scenario, after the rig's own.
+//! Checks a scenario, after the rig's own checks.
 
 use super::injection::entry;
 use super::merge::Provenance;
@@ -12,64 +12,70 @@ const MAX_HIGHER_MM: f64 = 4.0;
 
 /// Checks every value against its range and the values against one another.
 pub(super) fn check(scenario: &Scenario, from: &Provenance) -> Result<(), ScenarioError> {
-    scenario.rig.validate().map_err(|error| ScenarioError::Rig {
-        origin: from.of_message(&error.to_string()),
-        error,
-    })?;
-    for (key, value, min, max) in ranges(scenario) {
-        // Written so that a NaN fails.
-        if !(value >= min && value <= max) {
-            let (origin, key) = (from.of(key), key.to_owned());
-            return Err(ScenarioError::OutOfRange { origin, key, value, min, max });
-        }
+    let refused = |message: String| ScenarioError::at(from.of_message(&message), &message);
+    scenario.rig.validate().map_err(|error| refused(error.to_string()))?;
+    for (key, value, max) in ranges(scenario) {
+        in_range(from.of(key), key, value, (0.0, max))?;
     }
-    anomalies(scenario, from)?;
-    spacing(scenario, from)?;
-    faults(scenario, from)?;
-    scenario.plant().check(scenario.rig.preload.limit_n).map_err(|refusal| ScenarioError::Refused {
-        origin: from.of_message(&refusal.to_string()),
-        refusal,
-    })
+    anomalies(scenario, from.of("run.anomalies"))?;
+    spacing(scenario, from.of("run.anomalies"))?;
+    faults(scenario, from.of("run.faults"))?;
+    let checked = scenario.plant().check(scenario.rig.preload.limit_n);
+    checked.map_err(|refusal| refused(refusal.to_string()))
 }
 
-fn ranges(scenario: &Scenario) -> [(&'static str, f64, f64, f64); 29] {
+fn in_range(
+    origin: &str,
+    key: &str,
+    value: f64,
+    (min, max): (f64, f64),
+) -> Result<(), ScenarioError> {
+    // Not a number is in no range.
+    if (min..=max).contains(&value) {
+        return Ok(());
+    }
+    Err(ScenarioError::out_of_range(origin, key, value, (min, max)))
+}
+
+/// Keys with their value and largest value; the least is 0.
+fn ranges(scenario: &Scenario) -> [(&'static str, f64, f64); 29] {
     let (s, n) = (&scenario.spread, &scenario.noise);
     [
-        ("spread.k_inf_rel", s.k_inf_rel, 0.0, 0.3),
-        ("spread.stiffening_rel", s.stiffening_rel, 0.0, 0.3),
-        ("spread.tau_rel", s.tau_rel, 0.0, 0.3),
-        ("spread.mu_rel", s.mu_rel, 0.0, 0.3),
-        ("spread.top_load_rel", s.top_load_rel, 0.0, 0.3),
-        ("spread.step_position_mm", s.step_position_mm, 0.0, 5.0),
-        ("spread.step_height_mm", s.step_height_mm, 0.0, 0.5),
-        ("spread.wheel_radius_mm", s.wheel_radius_mm, 0.0, 1.0),
-        ("spread.wear_mm", s.wear_mm, 0.0, 2.0),
-        ("spread.spring_rel", s.spring_rel, 0.0, 0.3),
-        ("spread.delay_rel", s.delay_rel, 0.0, 0.3),
-        ("spread.lag_rel", s.lag_rel, 0.0, 0.3),
-        ("spread.slew_rel", s.slew_rel, 0.0, 0.3),
-        ("spread.preload_sensor_gain_rel", s.preload_sensor_gain_rel, 0.0, 0.1),
-        ("spread.compression_sensor_gain_rel", s.compression_sensor_gain_rel, 0.0, 0.1),
-        ("spread.arm_angle_zero_deg", s.arm_angle_zero_deg, 0.0, 2.0),
-        ("spread.supply_rel", s.supply_rel, 0.0, 0.1),
-        ("spread.readback_gain_rel", s.readback_gain_rel, 0.0, 0.1),
-        ("spread.readback_zero_duty", s.readback_zero_duty, 0.0, 0.1),
-        ("spread.readback_lag_rel", s.readback_lag_rel, 0.0, 0.3),
-        ("noise.preload_sensor_n", n.preload_sensor_n, 0.0, 10.0),
-        ("noise.compression_sensor_mm", n.compression_sensor_mm, 0.0, 0.5),
-        ("noise.arm_angle_lsb", n.arm_angle_lsb, 0.0, 50.0),
-        ("noise.wheel_encoder_jitter_counts", n.wheel_encoder_jitter_counts, 0.0, 10.0),
-        ("noise.preload_sensor_delay_s", n.preload_sensor_delay_s, 0.0, 0.02),
-        ("noise.compression_sensor_delay_s", n.compression_sensor_delay_s, 0.0, 0.02),
-        ("noise.arm_angle_delay_s", n.arm_angle_delay_s, 0.0, 0.02),
-        ("noise.readback_duty", n.readback_duty, 0.0, 0.1),
+        ("spread.k_inf_rel", s.k_inf_rel, 0.3),
+        ("spread.stiffening_rel", s.stiffening_rel, 0.3),
+        ("spread.tau_rel", s.tau_rel, 0.3),
+        ("spread.mu_rel", s.mu_rel, 0.3),
+        ("spread.top_load_rel", s.top_load_rel, 0.3),
+        ("spread.step_position_mm", s.step_position_mm, 5.0),
+        ("spread.step_height_mm", s.step_height_mm, 0.5),
+        ("spread.wheel_radius_mm", s.wheel_radius_mm, 1.0),
+        ("spread.wear_mm", s.wear_mm, 2.0),
+        ("spread.spring_rel", s.spring_rel, 0.3),
+        ("spread.delay_rel", s.delay_rel, 0.3),
+        ("spread.lag_rel", s.lag_rel, 0.3),
+        ("spread.slew_rel", s.slew_rel, 0.3),
+        ("spread.preload_sensor_gain_rel", s.preload_sensor_gain_rel, 0.1),
+        ("spread.compression_sensor_gain_rel", s.compression_sensor_gain_rel, 0.1),
+        ("spread.arm_angle_zero_deg", s.arm_angle_zero_deg, 2.0),
+        ("spread.supply_rel", s.supply_rel, 0.1),
+        ("spread.readback_gain_rel", s.readback_gain_rel, 0.1),
+        ("spread.readback_zero_duty", s.readback_zero_duty, 0.1),
+        ("spread.readback_lag_rel", s.readback_lag_rel, 0.3),
+        ("noise.preload_sensor_n", n.preload_sensor_n, 10.0),
+        ("noise.compression_sensor_mm", n.compression_sensor_mm, 0.5),
+        ("noise.arm_angle_lsb", n.arm_angle_lsb, 50.0),
+        ("noise.wheel_encoder_jitter_counts", n.wheel_encoder_jitter_counts, 10.0),
+        ("noise.preload_sensor_delay_s", n.preload_sensor_delay_s, 0.02),
+        ("noise.compression_sensor_delay_s", n.compression_sensor_delay_s, 0.02),
+        ("noise.arm_angle_delay_s", n.arm_angle_delay_s, 0.02),
+        ("noise.readback_duty", n.readback_duty, 0.1),
         // TOML has no larger integer.
-        ("run.seed", scenario.run.seed as f64, 0.0, i64::MAX as f64),
+        ("run.seed", scenario.run.seed as f64, i64::MAX as f64),
     ]
 }
 
-fn anomalies(scenario: &Scenario, from: &Provenance) -> Result<(), ScenarioError> {
-    let steps = scenario.rig.rig.step_positions_mm.len();
+fn anomalies(scenario: &Scenario, origin: &str) -> Result<(), ScenarioError> {
+    let steps = scenario.rig.rig.step_positions_mm.len() as f64;
     for (index, anomaly) in scenario.run.anomalies.iter().enumerate() {
         let (step, length) = match *anomaly {
             StepAnomaly::Early { step, offset_mm } | StepAnomaly::Late { step, offset_mm } => {
@@ -83,40 +89,26 @@ fn anomalies(scenario: &Scenario, from: &Provenance) -> Result<(), ScenarioError
                 (None, Some(("position_mm", position_mm, scenario.rig.rig.travel_mm)))
             }
         };
-        let step = step.map(|n| ("step", f64::from(n), 1.0, steps as f64));
-        let length = length.map(|(name, value, max)| (name, value, 0.0, max));
-        for (name, value, min, max) in step.into_iter().chain(length) {
-            if !(value >= min && value <= max) {
-                return Err(ScenarioError::OutOfRange {
-                    origin: from.of("run.anomalies"),
-                    key: format!("run.anomalies[{}].{name}", index + 1),
-                    value,
-                    min,
-                    max,
-                });
-            }
+        let step = step.map(|n| ("step", f64::from(n), (1.0, steps)));
+        let length = length.map(|(name, value, max)| (name, value, (0.0, max)));
+        for (name, value, range) in step.into_iter().chain(length) {
+            in_range(origin, &format!("run.anomalies[{}].{name}", index + 1), value, range)?;
         }
     }
     Ok(())
 }
 
-fn faults(scenario: &Scenario, from: &Provenance) -> Result<(), ScenarioError> {
+fn faults(scenario: &Scenario, origin: &str) -> Result<(), ScenarioError> {
     for (index, fault) in scenario.run.faults.iter().enumerate() {
         let measure = entry(fault.target, fault.kind).map_or((0.0, 0.0), |entry| entry.range);
-        let ranges = [
+        for (name, value, range) in [
             ("at_s", fault.at_s, (0.0, 3600.0)),
             ("at_mm", fault.at_mm, (-10.0, 1e4)),
             ("duration_s", fault.duration_s, (0.001, 3600.0)),
             ("magnitude", fault.magnitude, measure),
-        ];
-        for (name, value, (min, max)) in ranges {
-            // Written so that a NaN fails.
-            if let Some(value) = value
-                && !(value >= min && value <= max)
-            {
-                let origin = from.of("run.faults");
-                let key = format!("run.faults[{}].{name}", index + 1);
-                return Err(ScenarioError::OutOfRange { origin, key, value, min, max });
+        ] {
+            if let Some(value) = value {
+                in_range(origin, &format!("run.faults[{}].{name}", index + 1), value, range)?;
             }
         }
     }
@@ -124,20 +116,23 @@ fn faults(scenario: &Scenario, from: &Provenance) -> Result<(), ScenarioError> {
 }
 
 /// The wheel finishes one step before it touches the next, with the anomalies too.
-fn spacing(scenario: &Scenario, from: &Provenance) -> Result<(), ScenarioError> {
+fn spacing(scenario: &Scenario, origin: &str) -> Result<(), ScenarioError> {
     if scenario.run.anomalies.is_empty() {
         return Ok(());
     }
     let geometry = &scenario.rig.rig;
     let radius = geometry.wheel_radius_mm;
-    let least_mm = (radius * radius - (radius - geometry.step_height_mm).powi(2)).sqrt();
-    let mut first_mm = 0.0;
-    for second_mm in scenario.true_steps_mm() {
-        if second_mm - first_mm < least_mm {
-            let origin = from.of("run.anomalies");
-            return Err(ScenarioError::StepsTooClose { origin, first_mm, second_mm, least_mm });
+    let least = (radius * radius - (radius - geometry.step_height_mm).powi(2)).sqrt();
+    let mut first = 0.0;
+    for (second, _) in scenario.true_steps() {
+        if second - first < least {
+            let what = format!(
+                "run.anomalies: steps at {first:.1} and {second:.1} mm, expected at least \
+                 {least:.1} mm between them"
+            );
+            return Err(ScenarioError::at(origin, what));
         }
-        first_mm = second_mm;
+        first = second;
     }
     Ok(())
 }

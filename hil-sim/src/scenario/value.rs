@@ -1,12 +1,12 @@
-//! Values of keys: from the text of an override, checked for what the key takes, and units
-//! written where none belong.
+//! Values of keys: read from the text of an override, checked for what the key takes and for
+//! units that are part of the key's name.
 
 use interstage::rig::MAX_STEPS;
 use toml::{Table, Value};
 
-use super::error::{Origin, ScenarioError};
+use super::error::ScenarioError;
 use super::injection::{self, CATALOGUE, HARDWARE};
-use super::keys::{self, Kind};
+use super::keys::Kind;
 use super::run::StepAnomaly;
 
 /// Key and text of `key=value`.
@@ -16,9 +16,8 @@ pub(super) fn split(text: &str) -> Option<(&str, &str)> {
     (!key.is_empty() && !value.is_empty()).then_some((key, value))
 }
 
-/// The value that `text` means where a key takes `kind`: TOML, but words need
-/// no quotes and lists of numbers no brackets. What is neither stays text, which
-/// [`checked`] refuses.
+/// The value of `text` where a key takes `kind`: TOML, but words need no quotes and lists of
+/// numbers no brackets. Anything else stays text, which [`checked`] refuses.
 pub(super) fn from_text(kind: Kind, text: &str) -> Value {
     let as_text = || Value::String(text.trim_matches('"').to_owned());
     match kind {
@@ -40,14 +39,11 @@ fn toml_value(text: &str) -> Option<Value> {
 /// Whether `text` is a number with a unit behind it.
 pub(super) fn has_unit(text: &str) -> bool {
     let text = text.trim();
-    let number = (1..=text.len())
-        .rev()
-        .filter(|&end| text.is_char_boundary(end))
-        .find(|&end| text[..end].trim_end().parse::<f64>().is_ok());
-    number.is_some_and(|end| {
-        text[end..]
-            .trim_start()
-            .starts_with(|c: char| c.is_alphabetic() || matches!(c, '%' | '°' | '/'))
+    let is_number =
+        |end: &usize| text.get(..*end).is_some_and(|n| n.trim_end().parse::<f64>().is_ok());
+    (1..=text.len()).rev().find(is_number).is_some_and(|end| {
+        let rest = text[end..].trim_start();
+        rest.starts_with(|c: char| c.is_alphabetic() || matches!(c, '%' | '°' | '/'))
     })
 }
 
@@ -56,15 +52,18 @@ pub(super) fn has_unit(text: &str) -> bool {
 /// # Errors
 /// What the key takes instead.
 pub(super) fn checked(
-    origin: &Origin,
+    origin: &str,
     key: &str,
     kind: Kind,
     value: &Value,
 ) -> Result<Value, ScenarioError> {
-    let wrong = || wrong_type(origin, key, kind, value);
+    let wrong = |key: &str, value: &Value| {
+        let found = value.to_string().replace('\n', " ");
+        ScenarioError::wrong(origin, key, found, kind.expected(key))
+    };
     let entry = |(index, one): (usize, &Value)| {
         let at = format!("{key}[{}]", index + 1);
-        let given = one.as_table().ok_or_else(|| wrong_type(origin, &at, kind, one))?;
+        let given = one.as_table().ok_or_else(|| wrong(&at, one))?;
         let entry = Entry { origin, at, given, found: Table::new() };
         let table = if kind == Kind::Faults { entry.fault() } else { entry.anomaly() };
         table.map(Value::Table)
@@ -72,42 +71,27 @@ pub(super) fn checked(
     match (kind, value) {
         (Kind::Number, Value::Float(x)) if x.is_finite() => Ok(value.clone()),
         (Kind::Number, Value::Integer(n)) => Ok(Value::Float(*n as f64)),
-        (Kind::Whole, Value::Integer(0..)) => Ok(value.clone()),
+        (Kind::Integer, Value::Integer(0..)) => Ok(value.clone()),
         (Kind::Word(words), Value::String(word)) if words.contains(&word.as_str()) => {
             Ok(value.clone())
         }
         (Kind::Numbers(most), Value::Array(list)) if list.len() <= most => {
-            let one = |one| checked(origin, key, Kind::Number, one).map_err(|_| wrong());
+            let one = |one| checked(origin, key, Kind::Number, one).map_err(|_| wrong(key, value));
             list.iter().map(one).collect::<Result<_, _>>().map(Value::Array)
         }
         (Kind::Anomalies | Kind::Faults, Value::Array(list)) => {
             list.iter().enumerate().map(entry).collect::<Result<_, _>>().map(Value::Array)
         }
-        (Kind::Number | Kind::Whole, Value::String(text)) if has_unit(text) => {
-            Err(ScenarioError::UnitInValue {
-                origin: origin.clone(),
-                key: key.to_owned(),
-                found: text.clone(),
-                unit: keys::unit(key),
-            })
+        (Kind::Number | Kind::Integer, Value::String(text)) if has_unit(text) => {
+            Err(ScenarioError::unit_in_value(origin, key, text))
         }
-        _ => Err(wrong()),
-    }
-}
-
-/// The error of a value that is not what the key takes.
-pub(super) fn wrong_type(origin: &Origin, key: &str, kind: Kind, value: &Value) -> ScenarioError {
-    ScenarioError::WrongType {
-        origin: origin.clone(),
-        key: key.to_owned(),
-        found: value.to_string().replace('\n', " "),
-        expected: kind.expected(key),
+        _ => Err(wrong(key, value)),
     }
 }
 
 /// An entry of a list of anomalies or faults, under check.
 struct Entry<'a> {
-    origin: &'a Origin,
+    origin: &'a str,
     /// Its key, with its number from 1.
     at: String,
     given: &'a Table,
@@ -122,10 +106,12 @@ impl Entry<'_> {
         let takes = fields.join(" and ");
         self.known(&["kind"], fields, &format!("; kind = \"{kind}\" takes {takes}"))?;
         for name in fields {
-            if !self.field(name, if *name == "step" { MAX_STEPS as f64 } else { f64::MAX })? {
-                let key = self.key(name);
-                let kind = if *name == "step" { Kind::Whole } else { Kind::Number };
-                return Err(self.wrong(name, "nothing", kind.expected(&key)));
+            let (kind, most) = match *name {
+                "step" => (Kind::Integer, Some(MAX_STEPS as f64)),
+                _ => (Kind::Number, None),
+            };
+            if !self.field(name, most)? {
+                return Err(self.wrong(name, "nothing", &kind.expected(&self.key(name))));
             }
         }
         Ok(self.found)
@@ -133,38 +119,38 @@ impl Entry<'_> {
 
     /// A fault: its target decides which kinds there are.
     fn fault(mut self) -> Result<Table, ScenarioError> {
-        const WHEN: [&str; 3] = ["at_s", "at_mm", "at_crossing"];
+        const ONSETS: [&str; 3] = ["at_s", "at_mm", "at_crossing"];
         const FIELDS: [&str; 5] = ["at_s", "at_mm", "at_crossing", "duration_s", "magnitude"];
-        let all = || -> Vec<&injection::Entry> { CATALOGUE.iter().chain(HARDWARE).collect() };
-        let mut targets: Vec<String> = all().iter().map(|entry| entry.target.name()).collect();
+        let all: Vec<&injection::Entry> = CATALOGUE.iter().chain(HARDWARE).collect();
+        let mut targets: Vec<String> = all.iter().map(|entry| entry.target.name()).collect();
         targets.dedup();
         let target = self.word("target", targets)?;
-        let of = all().into_iter().filter(|entry| entry.target.name() == target);
-        self.word("kind", of.map(|entry| entry.kind.name()).collect())?;
+        let kinds = all.iter().filter(|entry| entry.target.name() == target);
+        self.word("kind", kinds.map(|entry| entry.kind.name()).collect())?;
         let hint = format!("; a fault takes target, kind, {}", FIELDS.join(", "));
         self.known(&["target", "kind"], &FIELDS, &hint)?;
         for name in FIELDS {
-            self.field(name, if name == "at_crossing" { 250.0 } else { f64::MAX })?;
+            self.field(name, (name == "at_crossing").then_some(250.0))?;
         }
-        let when = WHEN.into_iter().filter(|name| self.given.contains_key(*name));
-        let found = match when.collect::<Vec<_>>().as_slice() {
+        let onsets: Vec<&str> =
+            ONSETS.into_iter().filter(|name| self.given.contains_key(*name)).collect();
+        let found = match onsets.as_slice() {
             [_] => return Ok(self.found),
             [] => "nothing".to_owned(),
             several => several.join(" and "),
         };
-        Err(self.wrong("at_s", &found, "one of at_s, at_mm and at_crossing".to_owned()))
+        Err(self.wrong("at_s", &found, "one of at_s, at_mm and at_crossing"))
     }
 
     fn key(&self, name: &str) -> String {
         format!("{}.{name}", self.at)
     }
 
-    fn wrong(&self, name: &str, found: &str, expected: String) -> ScenarioError {
-        let (origin, key) = (self.origin.clone(), self.key(name));
-        ScenarioError::WrongType { origin, key, found: found.to_owned(), expected }
+    fn wrong(&self, name: &str, found: &str, expected: &str) -> ScenarioError {
+        ScenarioError::wrong(self.origin, &self.key(name), found, expected)
     }
 
-    /// Takes one of these words, which has to be there.
+    /// Takes one of these words, which must be there.
     fn word(&mut self, name: &str, known: Vec<String>) -> Result<String, ScenarioError> {
         match self.given.get(name) {
             Some(Value::String(word)) if known.contains(word) => {
@@ -174,41 +160,29 @@ impl Entry<'_> {
             other => {
                 let found = other.map_or_else(|| "nothing".to_owned(), Value::to_string);
                 let known: Vec<String> = known.iter().map(|word| format!("\"{word}\"")).collect();
-                Err(self.wrong(name, &found, known.join(" or ")))
+                Err(self.wrong(name, &found, &known.join(" or ")))
             }
         }
     }
 
     /// Refuses every other key than these.
     fn known(&self, words: &[&str], fields: &[&str], hint: &str) -> Result<(), ScenarioError> {
-        let known = |name: &str| words.contains(&name) || fields.contains(&name);
-        match self.given.keys().find(|name| !known(name)) {
-            Some(name) => Err(ScenarioError::UnknownKey {
-                origin: self.origin.clone(),
-                key: self.key(name),
-                hint: hint.to_owned(),
-            }),
-            None => Ok(()),
-        }
+        let unknown = |name: &&String| !words.iter().chain(fields).any(|known| known == name);
+        self.given.keys().find(unknown).map_or(Ok(()), |name| {
+            Err(ScenarioError::unknown_key(self.origin, &self.key(name), hint))
+        })
     }
 
-    /// Takes a number, or a whole number from 1 to `most` where it counts something. Gives
-    /// whether it is there.
-    fn field(&mut self, name: &str, most: f64) -> Result<bool, ScenarioError> {
+    /// Takes a number; an integer from 1 to `most` where the field counts something. Returns
+    /// whether the field is there.
+    fn field(&mut self, name: &str, most: Option<f64>) -> Result<bool, ScenarioError> {
         let Some(value) = self.given.get(name) else { return Ok(false) };
-        let kind = if most < f64::MAX { Kind::Whole } else { Kind::Number };
-        let value = checked(self.origin, &self.key(name), kind, value)?;
-        if let Some(number) = value.as_integer().map(|n| n as f64)
+        let (key, kind) = (self.key(name), most.map_or(Kind::Number, |_| Kind::Integer));
+        let value = checked(self.origin, &key, kind, value)?;
+        if let (Some(number), Some(most)) = (value.as_integer().map(|n| n as f64), most)
             && !(1.0..=most).contains(&number)
         {
-            let (origin, key) = (self.origin.clone(), self.key(name));
-            return Err(ScenarioError::OutOfRange {
-                origin,
-                key,
-                value: number,
-                min: 1.0,
-                max: most,
-            });
+            return Err(ScenarioError::out_of_range(self.origin, &key, number, (1.0, most)));
         }
         self.found.insert(name.to_owned(), value);
         Ok(true)
@@ -220,7 +194,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn units_are_told_from_other_text() {
+    fn units_are_distinguished_from_other_text() {
         for text in ["0.1s", "5mm/s", "5 mm/s", "3 %", "1e-3 s", "-2N", "0.5°", "12µm"] {
             assert!(has_unit(text), "{text}");
         }

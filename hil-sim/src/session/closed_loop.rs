@@ -1,5 +1,5 @@
-//! A run in progress: controller and plant, a tick at a time, with commands and sensor
-//! failures given from outside.
+//! A run in progress: controller and plant, a tick per step, with commands and sensor
+//! failures from outside.
 
 use interstage::log::{Record, SnapshotRecorder};
 use interstage::model::{Plan, Planner};
@@ -39,9 +39,9 @@ pub struct Session {
     recorder: RunRecorder,
     stream: Option<Stream>,
     injector: Option<FaultInjector>,
-    /// What the bridges and the record hold on to while ticks are lost.
+    /// Output that bridges and record keep while ticks are lost.
     held: Output,
-    /// Ticks were lost before this one, and with them this command.
+    /// Whether ticks were lost before this one, and the command that was lost with them.
     overrun: bool,
     missed: Option<Command>,
 }
@@ -86,8 +86,7 @@ impl Session {
         })
     }
 
-    /// The same session with every stage of the controller run in every tick, needed or
-    /// not.
+    /// The same session with every stage of the controller run in every tick.
     #[must_use]
     pub fn without_skipping(mut self) -> Self {
         self.controller = self.controller.without_skipping();
@@ -111,7 +110,7 @@ impl Session {
     /// One millisecond with an operator's command or none.
     ///
     /// # Errors
-    /// [`RunError::Plant`] if the plant leaves the set of meaningful states.
+    /// [`RunError::Plant`] if the plant's state becomes invalid.
     pub fn step(&mut self, command: Option<Command>) -> Result<Output, RunError> {
         let frame = self.sense();
         self.advance(&frame, command)
@@ -145,7 +144,7 @@ impl Session {
     /// its output.
     ///
     /// # Errors
-    /// [`RunError::Plant`] if the plant leaves the set of meaningful states.
+    /// [`RunError::Plant`] if the plant's state becomes invalid.
     pub fn advance(
         &mut self,
         sensors: &SensorFrame,
@@ -198,13 +197,14 @@ impl Session {
         rows.then(|| Columns::of(&Record::of(&input, output), sensors))
     }
 
-    /// When it first did something, see [`FaultInjector::acts_s`], s since boot.
+    /// When a fault first acted, see [`FaultInjector::acts_s`], s since boot.
     #[must_use]
     pub fn acts_s(&self) -> Option<f64> {
         self.injector.as_ref().and_then(FaultInjector::acts_s)
     }
 
-    /// When it first did what the readback must show, see [`FaultInjector::tells_s`], s since boot.
+    /// When the readback first had to show a fault, see [`FaultInjector::tells_s`], s since
+    /// boot.
     #[must_use]
     pub fn tells_s(&self) -> Option<f64> {
         self.injector.as_ref().and_then(FaultInjector::tells_s)
@@ -216,7 +216,7 @@ impl Session {
         self.injector.as_ref().and_then(FaultInjector::struck_s)
     }
 
-    /// Power lost and back: the controller forgets everything, the rig stays where it is.
+    /// A power cycle: the controller forgets everything, the rig stays where it is.
     pub fn reboot(&mut self) {
         self.state = State::default();
         self.plan = None;
@@ -225,7 +225,7 @@ impl Session {
         }
     }
 
-    /// The record of the last tick, as memory keeps it.
+    /// The snapshot of the last tick that memory keeps over a reset.
     #[must_use]
     pub fn record(&self) -> DriveSnapshot {
         SnapshotRecorder::default().snapshot(
@@ -235,8 +235,8 @@ impl Session {
         )
     }
 
-    /// A reset that leaves memory and takes the power from the bridges at once: the
-    /// controller starts with the position that its record of the last tick has.
+    /// A reset that keeps memory and switches the bridges off at once: the controller starts
+    /// with the position of its last snapshot.
     pub fn restart(&mut self) {
         let snapshot = Some(self.record());
         self.restart_from(Restart { reset: Reset::Pin, snapshot, crash: None });
@@ -256,7 +256,7 @@ impl Session {
         }
     }
 
-    /// A start that finds this of the time before it.
+    /// A start that finds this state of the time before it.
     pub fn restart_from(&mut self, restart: Restart) {
         self.reboot();
         self.state = State::restored(restart.place());
@@ -265,7 +265,7 @@ impl Session {
         }
     }
 
-    /// What the drive is doing.
+    /// The controller's mode.
     #[must_use]
     pub const fn mode(&self) -> Mode {
         self.state.mode()

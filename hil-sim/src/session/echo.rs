@@ -1,16 +1,16 @@
-//! What sound bridges read, for a controller that is fed without a plant.
+//! Readback of healthy bridges, for a controller that runs without a plant.
 
 use interstage::sense::raw::{BridgeCode, BridgeCodes};
 use interstage::supervise::Lag;
 use interstage::tick::Output;
 use interstage::units::MotorCommand;
 
-/// Two bridges that take what they are given, without noise.
+/// Two bridges that follow their command, without noise.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Echo([Lag; 2]);
 
 impl Echo {
-    /// What they read a tick after this output.
+    /// Their readback a tick after this output.
     pub fn read(&mut self, output: &Output) -> BridgeCodes {
         let [drive, pretightener] = &mut self.0;
         let code = |lag: &mut Lag, command: MotorCommand| {

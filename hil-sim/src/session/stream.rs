@@ -7,7 +7,7 @@ use interstage::tick::{Controller, Entry, Event, Input, Output};
 
 use crate::scenario::Scenario;
 
-/// The binary log as it grows. Its channel has room for everything.
+/// The binary log of a run. Its channel is never full.
 pub struct Stream {
     encoder: LogEncoder,
     bytes: Vec<u8>,
@@ -20,8 +20,8 @@ impl Stream {
         Self { encoder: LogEncoder::new(of(scenario, controller)), bytes: Vec::new() }
     }
 
-    /// Keeps a tick and what happened in it, as the journal does on the board, if it is
-    /// read.
+    /// Keeps a tick and its events, as the journal task does on the board; drops them unless
+    /// the log is read.
     pub fn keep(&mut self, input: &Input, output: &Output, read: bool) {
         let mut send = |frame: &[u8]| {
             if read {
@@ -41,34 +41,36 @@ impl Stream {
         self.encoder.tick(&Record::of(input, output), &mut send);
     }
 
-    /// What has come since the last call.
+    /// The bytes since the last call.
     pub fn take(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.bytes)
     }
 
-    /// The controller restarts; what it had not yet sent is lost.
+    /// The controller restarts; what it had not sent is lost.
     pub(super) fn restart(&mut self, scenario: &Scenario, controller: &Controller) {
         let bytes = self.take();
         *self = Self { bytes, ..Self::new(scenario, controller) };
     }
 
-    /// The controller reports why it has started, as the board does first of all.
+    /// The controller reports why it has started, as the board does first.
     pub(super) fn report(&mut self, restart: Restart) {
         let entry = Entry { at: 0, event: Event::Restart(restart) };
-        self.encoder.entry(&entry, &mut |frame: &[u8]| {
-            self.bytes.extend_from_slice(frame);
-            true
-        });
+        self.encoder.entry(&entry, &mut into(&mut self.bytes));
     }
 
     /// The rest of the log.
     #[must_use]
     pub fn finish(mut self) -> Vec<u8> {
-        self.encoder.flush(&mut |frame: &[u8]| {
-            self.bytes.extend_from_slice(frame);
-            true
-        });
+        self.encoder.flush(&mut into(&mut self.bytes));
         self.bytes
+    }
+}
+
+/// Sends frames into these bytes.
+fn into(bytes: &mut Vec<u8>) -> impl FnMut(&[u8]) -> bool {
+    |frame| {
+        bytes.extend_from_slice(frame);
+        true
     }
 }
 

@@ -78,7 +78,7 @@ fn logs() {
     let mut read = |bytes: &[u8]| {
         fs::write(&path, bytes).expect("written");
         if let Ok(run) = Run::read(&path) {
-            let _ = run.is_whole();
+            let _ = run.is_complete();
         }
     };
     let mcap = fixture("deploy.mcap");
@@ -102,11 +102,11 @@ fn mcap_files() {
     let path = directory.path().join("log.mcap");
     let whole = Run::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/deploy.mcap"));
     let whole = whole.expect("a log");
-    assert!(whole.is_whole() && whole.rows.len() > 5000, "{} rows", whole.rows.len());
+    assert!(whole.is_complete() && whole.rows.len() > 5000, "{} rows", whole.rows.len());
     fuzz("MCAP files", &[fixture("deploy.mcap")], 300, 4.0, |bytes| {
         fs::write(&path, bytes).expect("written");
         if let Ok(run) = Run::read(&path) {
-            let _ = run.is_whole();
+            let _ = run.is_complete();
         }
     });
 }

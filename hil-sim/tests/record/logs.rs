@@ -35,7 +35,7 @@ fn data(name: &str) -> PathBuf {
 fn recorded_runs_give_the_same_bits() {
     for (name, least) in [("deploy.mcap", 6000), ("retract.mcap", 4500)] {
         let run = Run::read(&data(name)).expect("a log");
-        assert!(run.is_whole() && run.rows.len() > least, "{name}: {:?}", run.counts);
+        assert!(run.is_complete() && run.rows.len() > least, "{name}: {:?}", run.counts);
         assert_eq!(run.ledger.len(), 3, "{name}");
         let result = replay(&run, &Rig::prototype()).expect("a sound rig");
         assert!(

@@ -231,7 +231,7 @@ fn the_way_back_over_a_sleeve_already_travelled_ends_at_the_stow_end() {
         assert!(bench.now().truth.slip_mm < NO_SLIP_MM, "{what:?}");
         let peak = bench.peak_preload_n();
         assert!(peak <= scenario.rig.preload.limit_n, "{what:?}: {peak} N");
-        let steps = scenario.true_steps_mm().len();
+        let steps = scenario.true_steps().len();
         let climbs = bench.crossings().iter().filter(|crossing| crossing.climbing).count();
         assert_eq!((climbs, bench.crossings().len()), (steps, 2 * steps), "{what:?}");
         if let [StepAnomaly::Missing { .. }] = what[..] {

@@ -89,24 +89,24 @@ proptest! {
         }).sum();
         prop_assert_eq!(lost as usize, gone.len());
         prop_assert_eq!(ticks(&items).len(), 400 - 8 * gone.len());
-        // Those before the first tick that came cannot be known.
+        // Those before the first tick read are unknown.
         let head = ticks(&items)[0];
         prop_assert_eq!(counts.lost_ticks as usize + head as usize, 8 * gone.len());
     }
 
     #[test]
-    fn a_log_cut_anywhere_gives_what_was_whole(at in 0..20_000_usize) {
+    fn a_log_cut_anywhere_gives_its_complete_frames(at in 0..20_000_usize) {
         let all = frames(0, 400);
         let bytes = all.concat();
         let at = at % bytes.len();
         let (items, counts) = decode(&bytes[..at], 97);
         let mut left = at;
-        let whole = all.iter().take_while(|frame| {
+        let complete = all.iter().take_while(|frame| {
             let fits = frame.len() <= left;
             left = left.saturating_sub(frame.len());
             fits
         });
-        prop_assert_eq!(counts.frames, whole.count() as u64);
+        prop_assert_eq!(counts.frames, complete.count() as u64);
         prop_assert!(ticks(&items).into_iter().eq(0..ticks(&items).len() as u32));
     }
 
@@ -166,10 +166,10 @@ proptest! {
 #[test]
 fn a_reader_that_comes_late_knows_within_a_second() {
     let all = frames(0, 3000);
-    // Half way into a frame.
+    // In the middle of a frame.
     let bytes = all[60..].concat();
     let (items, counts) = decode(&bytes[100..], 100);
-    assert_eq!(counts.lost_frames, 0, "what was before is not lost but past");
+    assert_eq!(counts.lost_frames, 0, "frames before the first one read are not lost");
     let first = items.iter().position(|item| matches!(item, Item::Identity(_))).unwrap();
     assert!(ticks(&items[..first]).len() <= 1000);
 }

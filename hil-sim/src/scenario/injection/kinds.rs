@@ -1,4 +1,4 @@
-//! What can break, and how.
+//! Targets and kinds of faults.
 
 use serde::{Deserialize, Serialize};
 
@@ -58,7 +58,7 @@ pub enum Target {
     Timer,
     /// The button's interrupt line.
     Interrupt,
-    /// Whatever the processor executes.
+    /// The code that the processor executes.
     Processor,
     /// Task of the wheel encoder.
     WheelEncoderTask,
@@ -100,25 +100,25 @@ pub enum Target {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Kind {
-    /// Gives nothing any more.
+    /// Gives nothing.
     Off,
-    /// Gives what it gave last.
+    /// Keeps its last value.
     Stuck,
     /// Gives random codes.
     Garbage,
-    /// Gives too much or too little.
+    /// Multiplies its value.
     Gain,
-    /// Gives a constant more.
+    /// Adds a constant.
     Offset,
     /// Follows slowly.
     Slow,
     /// Follows late.
     Delayed,
-    /// Comes and goes.
+    /// Fails for a part of every 100 ms.
     Intermittent,
     /// Does not move.
     Stalled,
-    /// Gives a part of its force.
+    /// Keeps a part of its force.
     Weak,
     /// Moves in the wrong direction.
     Reversed,
@@ -126,23 +126,23 @@ pub enum Kind {
     Runaway,
     /// Loses friction.
     Slip,
-    /// Is torn: a sector of it is soft; of a save, power goes in its middle.
+    /// A sector is soft; a save is cut by a loss of power.
     Torn,
     /// Is broken.
     Broken,
     /// Is doubled.
     Doubled,
-    /// Comes late, ticks being lost.
+    /// Is late, so that ticks are lost.
     Overrun,
     /// Does not answer.
     Hung,
-    /// Reads no more.
+    /// Is absent.
     Gone,
-    /// Comes in every tick.
+    /// Occurs in every tick.
     Flooding,
-    /// Comes at random.
+    /// Occurs at random.
     Random,
-    /// Turns bits over.
+    /// Flips bits.
     BitErrors,
     /// Resets the board.
     Reset,
@@ -168,16 +168,14 @@ impl Target {
     /// Whether it is one of the four sensors or the readback of a bridge.
     #[must_use]
     pub const fn is_sensor(self) -> bool {
-        matches!(
-            self,
-            Self::Encoder
-                | Self::PreloadSensor
-                | Self::CompressionSensor
-                | Self::Angle
-                | Self::Readback
-                | Self::DriveReadback
-                | Self::PretightenerReadback
-        )
+        use Target::{Angle, CompressionSensor, Encoder, PreloadSensor};
+        self.is_readback() || matches!(self, Encoder | PreloadSensor | CompressionSensor | Angle)
+    }
+
+    /// Whether it is the readback of a bridge or of both.
+    #[must_use]
+    pub const fn is_readback(self) -> bool {
+        matches!(self, Self::Readback | Self::DriveReadback | Self::PretightenerReadback)
     }
 
     /// Whether such a fault of it resets the board, at once or by the watchdog.
@@ -196,18 +194,11 @@ impl Target {
         matches!(self, Self::StoredSet | Self::SpareSet | Self::ImageSet | Self::ParameterSave)
     }
 
-    /// Whether a fault of it moves something before the controller does.
+    /// Whether a fault of it changes forces or motion of the plant directly.
     #[must_use]
     pub const fn moves(self) -> bool {
-        matches!(
-            self,
-            Self::Drive
-                | Self::Pretightener
-                | Self::Wheel
-                | Self::Tread
-                | Self::Spring
-                | Self::Load
-        )
+        use Target::{Drive, Load, Pretightener, Spring, Tread, Wheel};
+        matches!(self, Drive | Pretightener | Wheel | Tread | Spring | Load)
     }
 }
 
