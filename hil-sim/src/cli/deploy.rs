@@ -4,16 +4,14 @@ pub mod looped;
 
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
-
 use super::failure::{Failure, Outcome};
-use super::output;
+use super::output::{self, WithFiles};
 use super::scenario::RunArgs;
 use super::source::check_target;
 use crate::files::write_text;
 use crate::firmware::FirmwareError;
 use crate::provision::{self, Extra};
-use crate::record::{Recording, Summary};
+use crate::record::Recording;
 use crate::scenario::Scenario;
 use crate::{progress, record, report, session, table};
 
@@ -67,14 +65,6 @@ pub struct Args {
     pub json: bool,
 }
 
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Printed<'a> {
-    #[serde(flatten)]
-    summary: &'a Summary,
-    files: &'a [PathBuf],
-}
-
 impl Args {
     /// The scenario, and where the files go if there are to be any.
     pub fn resolve(&self) -> Result<(Scenario, Option<PathBuf>), Failure> {
@@ -119,7 +109,7 @@ pub fn conclude(
         None => Vec::new(),
     };
     let summary = &recording.summary;
-    let printed = Printed { summary, files: &files };
+    let printed = WithFiles { result: summary, files: &files };
     output::result(args.json, &printed, || table::run(summary, &files))?;
     Ok(Outcome::of(summary.completed && summary.faults.is_empty()))
 }
@@ -130,7 +120,7 @@ pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
     Ok(read.map_err(|source| FirmwareError::Read { path: path.to_owned(), source })?)
 }
 
-/// Refuses what the emulated board alone can do.
+/// Refuses options that need the emulated board.
 fn takes_board(args: &Args) -> Result<(), Failure> {
     let fault = args.board_fault.first().map(|fault| format!("--board-fault {fault}"));
     let debugger = args.gdb.as_ref().map(|address| format!("--gdb {address}"));
@@ -156,7 +146,7 @@ fn directory(args: &Args, scenario: &Scenario) -> Result<PathBuf, Failure> {
         Path::new("out")
             .join(format!("{direction}-{rig}-{controller}-{}{board}", scenario.run.seed))
     });
-    // Told before the run rather than after it.
+    // Reported before the run, not after it.
     if directory.exists() && !directory.is_dir() {
         let path = directory.display();
         return Err(Failure::input(format!("--out {path}: exists and is not a directory")));
@@ -192,48 +182,34 @@ mod tests {
         args: Args,
     }
 
-    fn default_directory(arguments: &[&str]) -> PathBuf {
-        let all = std::iter::once("rig").chain(arguments.iter().copied());
-        let args = Only::try_parse_from(all).unwrap().args;
-        directory(&args, &args.run.resolve().unwrap()).unwrap()
+    fn parsed(arguments: &str) -> Args {
+        let all = std::iter::once("rig").chain(arguments.split_whitespace());
+        Only::try_parse_from(all).unwrap().args
     }
 
     #[test]
     fn the_directory_is_named_after_the_run() {
-        assert_eq!(default_directory(&[]), Path::new("out/deploy-prototype-scheduled-0"));
-        assert_eq!(
-            default_directory(&[
-                "--retract",
-                "--rig",
-                "fe",
-                "--controller",
-                "limit",
-                "--seed",
-                "7"
-            ]),
-            Path::new("out/retract-fe-limit-7")
-        );
-        assert_eq!(
-            default_directory(&["--target", "board"]),
-            Path::new("out/deploy-prototype-scheduled-0-board")
-        );
-        assert_eq!(
-            default_directory(&["--target", "board", "--hil"]),
-            Path::new("out/deploy-prototype-scheduled-0-board-hil")
-        );
-        assert_eq!(default_directory(&["--out", "here"]), Path::new("here"));
+        for (arguments, expected) in [
+            ("", "out/deploy-prototype-scheduled-0"),
+            ("--retract --rig fe --controller limit --seed 7", "out/retract-fe-limit-7"),
+            ("--target board", "out/deploy-prototype-scheduled-0-board"),
+            ("--target board --hil", "out/deploy-prototype-scheduled-0-board-hil"),
+            ("--out here", "here"),
+        ] {
+            let args = parsed(arguments);
+            let directory = directory(&args, &args.run.resolve().unwrap()).unwrap();
+            assert_eq!(directory, Path::new(expected), "{arguments}");
+        }
     }
 
     #[test]
-    fn what_the_emulated_board_alone_can_do_is_refused_elsewhere() {
+    fn options_of_the_emulated_board_are_refused_elsewhere() {
         for (arguments, named) in [
-            (&["--hil"][..], "--hil"),
-            (&["--target", "probe", "--board-fault", "encoder-a@1"], "--board-fault encoder-a@1"),
-            (&["--gdb", ":3333"], "--gdb :3333"),
+            ("--hil", "--hil"),
+            ("--target probe --board-fault encoder-a@1", "--board-fault encoder-a@1"),
+            ("--gdb :3333", "--gdb :3333"),
         ] {
-            let all = std::iter::once("rig").chain(arguments.iter().copied());
-            let args = Only::try_parse_from(all).unwrap().args;
-            let error = takes_board(&args).unwrap_err().to_string();
+            let error = takes_board(&parsed(arguments)).unwrap_err().to_string();
             assert_eq!(error, format!("{named}: takes --target board"));
         }
     }

@@ -7,7 +7,17 @@ use serde::Serialize;
 
 use super::failure::Failure;
 
-/// Prints `value` as one line of JSON, or what `human` makes of it.
+/// A result with the files that were written, as `--json` prints both.
+#[derive(Serialize)]
+pub struct WithFiles<'a, T: Serialize> {
+    /// The result.
+    #[serde(flatten)]
+    pub result: &'a T,
+    /// The files.
+    pub files: &'a [PathBuf],
+}
+
+/// Prints `value` as one line of JSON, or the text of `human`.
 pub fn result(
     json: bool,
     value: &impl Serialize,

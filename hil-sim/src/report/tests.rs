@@ -1,6 +1,7 @@
 pub(crate) mod example;
 
 use super::*;
+use crate::record::Recording;
 
 #[test]
 fn the_page_stands_alone_and_is_small() {
