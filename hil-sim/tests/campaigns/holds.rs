@@ -6,12 +6,12 @@ use interstage::fault::Fault;
 use interstage::supervise::{Command, Mode};
 
 /// The prototype with these overrides, run to its end in this direction.
-fn run(sets: &[&str], way: Direction) -> Bench {
+fn run(sets: &[&str], direction: Direction) -> Bench {
     let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
     let mut scenario = Scenario::resolve(None, None, &sets).expect("a sound scenario");
-    scenario.run.direction = way;
+    scenario.run.direction = direction;
     let mut bench = Bench::idle(&scenario);
-    bench.give(starter(way));
+    bench.give(starter(direction));
     bench.finish();
     bench
 }

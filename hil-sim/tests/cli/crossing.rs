@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::{good, number, object, rig};
+use super::{good, number, object, rig, stderr, stdout};
 
 /// A crossing on the study's rig.
 fn crossing(speed: f64, preload: f64, more: &[&str]) -> Value {
@@ -66,18 +66,18 @@ fn driving_takes_the_published_friction_and_widens_the_gap() {
 }
 
 #[test]
-fn a_wheel_that_sinks_in_ends_with_one_and_says_why() {
+fn a_wheel_that_sinks_in_has_no_gap_and_exits_with_one() {
     let output = rig(&["crossing", "--speed-mm-s", "5", "--preload-n", "1000", "--json"]);
     assert_eq!(output.status.code(), Some(1));
     assert!(output.stdout.is_empty());
-    let text = String::from_utf8(output.stderr).unwrap();
+    let text = stderr(&output);
     assert!(text.starts_with("error: ") && text.contains("no gap"), "{text}");
 }
 
 #[test]
 fn a_table_is_printed_for_people() {
     let output = rig(&["crossing", "--speed-mm-s", "5", "--preload-n", "33.3", "--driven"]);
-    let text = String::from_utf8_lossy(&output.stdout);
+    let text = stdout(&output);
     assert!(text.starts_with("Climb at 5 mm/s under 33.3 N, driven against 6.67 N"), "{text}");
     assert!(text.contains("friction needed"), "{text}");
     let json = rig(&["crossing", "--speed-mm-s", "5", "--preload-n", "33.3", "--json"]);

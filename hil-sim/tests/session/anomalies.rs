@@ -3,7 +3,7 @@
 //! is named, and no step costs the wheel its wall.
 
 use crate::common::{
-    Bench, NO_SLIP_MM, STEP_CODES, WAYS, back, check_each, end_mm, scenario, starter,
+    Bench, DIRECTIONS, NO_SLIP_MM, STEP_CODES, check_each, end_mm, opposite, scenario, starter,
 };
 use hil_sim::record::Tick;
 use hil_sim::scenario::{Direction, Scenario, StepAnomaly};
@@ -88,7 +88,7 @@ fn code(direction: Direction, anomaly: StepAnomaly) -> u16 {
 /// Every step displaced every way, on the way out and on the way back. After a boot at
 /// the end of travel the third step is not among them: it tells where the wheel is.
 fn all_displaced() -> Vec<(Direction, StepAnomaly)> {
-    let all = |(way, last)| (1..=last).flat_map(displaced).map(move |a| (way, a));
+    let all = |(direction, last)| (1..=last).flat_map(displaced).map(move |a| (direction, a));
     [(Direction::Deploy, 3), (Direction::Retract, 2)].into_iter().flat_map(all).collect()
 }
 
@@ -113,16 +113,17 @@ fn assert_found(got: &Outcome, name: &str) {
 
 #[test]
 fn a_displaced_step_is_found_reported_once_and_crossed_like_any_other() {
-    check_each(all_displaced(), |(way, anomaly)| {
-        let scenario = with(*way, *anomaly);
+    check_each(all_displaced(), |(direction, anomaly)| {
+        let scenario = with(*direction, *anomaly);
         let got = outcome(&scenario);
-        let name = format!("{} {anomaly:?}", way.name());
+        let name = format!("{} {anomaly:?}", direction.name());
         assert!(got.completed && got.faults.is_empty(), "{name}: {got:?}");
         assert_safe(&got, &scenario, 0.06, &name);
-        assert_eq!(got.codes, [code(*way, *anomaly)], "{name}");
+        assert_eq!(got.codes, [code(*direction, *anomaly)], "{name}");
         // On the way back the last step's line is closed 14 mm behind it: it may be reported
         // by the end of the run alone.
-        if matches!((way, anomaly), (Direction::Retract, StepAnomaly::Early { step: 1, .. })) {
+        if matches!((direction, anomaly), (Direction::Retract, StepAnomaly::Early { step: 1, .. }))
+        {
             assert!(got.found.iter().all(Option::is_some), "{:?}", got.found);
         } else {
             assert_found(&got, &name);
@@ -146,26 +147,28 @@ fn a_step_inside_its_window_raises_no_alarm() {
         let offset_mm = 0.5;
         [StepAnomaly::Early { step, offset_mm }, StepAnomaly::Late { step, offset_mm }]
     };
-    let all = WAYS.into_iter().flat_map(|way| (1..=3).flat_map(inside).map(move |a| (way, a)));
-    check_each(all, |(way, anomaly)| {
-        let got = outcome(&with(*way, *anomaly));
-        assert!(got.completed, "{} {anomaly:?}", way.name());
-        assert!(got.codes.is_empty(), "{} {anomaly:?}: {:?}", way.name(), got.codes);
+    let all = DIRECTIONS
+        .into_iter()
+        .flat_map(|direction| (1..=3).flat_map(inside).map(move |a| (direction, a)));
+    check_each(all, |(direction, anomaly)| {
+        let got = outcome(&with(*direction, *anomaly));
+        assert!(got.completed, "{} {anomaly:?}", direction.name());
+        assert!(got.codes.is_empty(), "{} {anomaly:?}: {:?}", direction.name(), got.codes);
     });
 }
 
 #[test]
 fn an_extra_step_is_recognised_and_crossed() {
-    for way in WAYS {
-        let scenario = with_extra(way);
+    for direction in DIRECTIONS {
+        let scenario = with_extra(direction);
         let got = outcome(&scenario);
-        assert!(got.completed && got.faults.is_empty(), "{}", way.name());
-        assert_eq!((&got.codes[..], got.gaps.len()), (&[204][..], 3), "{}", way.name());
+        assert!(got.completed && got.faults.is_empty(), "{}", direction.name());
+        assert_eq!((&got.codes[..], got.gaps.len()), (&[204][..], 3), "{}", direction.name());
         // The preload was not raised for the one that nobody expected.
-        assert_safe(&got, &scenario, 0.10, way.name());
+        assert_safe(&got, &scenario, 0.10, direction.name());
         let known = got.gaps.iter().filter(|(step, _)| *step != 38.0);
         assert!(known.clone().all(|(_, gap)| (gap - 1.0).abs() < 0.06), "{:?}", got.gaps);
-        assert_found(&got, way.name());
+        assert_found(&got, direction.name());
     }
 }
 
@@ -207,11 +210,11 @@ fn a_retraction_that_starts_a_level_off_ends_safely() {
 
 /// Out and back in one session, so that the odometry knows where it is.
 fn there_and_back(scenario: &Scenario) -> Bench {
-    let way = scenario.run.direction;
+    let direction = scenario.run.direction;
     let mut bench = Bench::idle(scenario);
-    for way in [way, back(way)] {
-        bench.give(starter(way));
-        assert_eq!(bench.finish(), Mode::Complete(way.into()), "{:?}", scenario.run);
+    for direction in [direction, opposite(direction)] {
+        bench.give(starter(direction));
+        assert_eq!(bench.finish(), Mode::Complete(direction.into()), "{:?}", scenario.run);
     }
     bench
 }

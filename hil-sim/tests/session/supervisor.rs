@@ -57,7 +57,9 @@ fn snapshots() -> Vec<(Mode, Snapshot)> {
             let command = match before {
                 Mode::Idle if within > 20 => Some(Command::Start),
                 Mode::Complete(Direction::Deploy) if within > 20 => Some(Command::Retract),
-                Mode::Run(way, _) if stop_at == Some(way) && within > 20 => Some(Command::Stop),
+                Mode::Run(direction, _) if stop_at == Some(direction) && within > 20 => {
+                    Some(Command::Stop)
+                }
                 _ => None,
             };
             let input = Input { now, sensors: frame, command, plan, ..Input::default() };

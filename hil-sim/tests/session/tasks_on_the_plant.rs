@@ -14,7 +14,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Wake, Waker};
 
 use crate::common::{
-    Bench, Moment, NO_SLIP_MM, RIGS, STEP_CODES, WAYS, back, end_mm, scenario, starter,
+    Bench, DIRECTIONS, Moment, NO_SLIP_MM, RIGS, STEP_CODES, end_mm, opposite, scenario, starter,
 };
 use embassy_time::{Duration, Instant, MockDriver};
 use hil_sim::plant::ledger::Crossing;
@@ -176,8 +176,8 @@ impl Board {
         let clock = CLOCK.lock().unwrap_or_else(PoisonError::into_inner);
         MockDriver::get().reset();
         MockDriver::get().advance(Duration::from_millis(u64::from(FIRST_TICK) - 1));
-        let way = scenario.run.direction;
-        let pressed = match way {
+        let direction = scenario.run.direction;
+        let pressed = match direction {
             Direction::Deploy => 0.0,
             Direction::Retract => scenario.rig.preload.cruise_n,
         };
@@ -187,7 +187,12 @@ impl Board {
             tasks: Vec::new(),
             exchange: forever(Exchange::new()),
             sensors: Sensors::new(parameters.sensors.clone(), scenario.run.seed),
-            plant: VirtualRig::new(parameters, end_mm(scenario, back(way)), pressed, TICK_S),
+            plant: VirtualRig::new(
+                parameters,
+                end_mm(scenario, opposite(direction)),
+                pressed,
+                TICK_S,
+            ),
             rows: Vec::new(),
             _clock: clock,
         };
@@ -295,10 +300,10 @@ fn reference(scenario: &Scenario) -> Bench {
 
 /// All runs that are compared.
 fn all() -> impl Iterator<Item = (Scenario, String)> {
-    let runs = RIGS.iter().flat_map(|rig| WAYS.map(|way| (*rig, way)));
-    let runs = runs.flat_map(|(rig, way)| [0, 5].map(|seed| (rig, way, seed)));
-    runs.map(|(rig, way, seed)| {
-        (scenario(rig, way, seed), format!("{rig} {} seed {seed}", way.name()))
+    let runs = RIGS.iter().flat_map(|rig| DIRECTIONS.map(|direction| (*rig, direction)));
+    let runs = runs.flat_map(|(rig, direction)| [0, 5].map(|seed| (rig, direction, seed)));
+    runs.map(|(rig, direction, seed)| {
+        (scenario(rig, direction, seed), format!("{rig} {} seed {seed}", direction.name()))
     })
 }
 
@@ -363,15 +368,15 @@ fn assert_alike(a: &Crossing, b: &Crossing, name: &str) {
 
 #[test]
 fn the_watchdog_is_fed_and_the_log_is_written_all_along() {
-    for way in WAYS {
-        let mut board = Board::whole_run(&scenario("prototype", way, 0), Order::TickFirst);
+    for direction in DIRECTIONS {
+        let mut board = Board::whole_run(&scenario("prototype", direction, 0), Order::TickFirst);
         board.run_ms(50);
         let fed = board.shared.fed.borrow();
         assert_eq!(fed.len(), board.rows.len());
-        assert!(fed.windows(2).all(|pair| pair[1] - pair[0] == 1), "{}", way.name());
+        assert!(fed.windows(2).all(|pair| pair[1] - pair[0] == 1), "{}", direction.name());
         assert_eq!(board.exchange.lost_entries(), 0);
         let written = board.shared.written.borrow();
-        assert!(written.len() > 30, "{}: {}", way.name(), written.len());
+        assert!(written.len() > 30, "{}: {}", direction.name(), written.len());
         for (at, entry) in written.iter() {
             assert!((0..=1).contains(&(at - u64::from(entry.at))), "{at} {entry:?}");
         }
@@ -380,6 +385,6 @@ fn the_watchdog_is_fed_and_the_log_is_written_all_along() {
             Event::Limit(limit) => STEP_CODES.contains(&limit.code()),
             _ => false,
         });
-        assert_eq!(odd, None, "{}", way.name());
+        assert_eq!(odd, None, "{}", direction.name());
     }
 }
