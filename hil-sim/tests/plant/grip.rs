@@ -1,4 +1,4 @@
-//! Friction and its end: slip, stall, stops, the worm gear, the inclined arm.
+//! Friction and its limits: slip, stall, stops, the worm gear, the inclined arm.
 
 use hil_sim::plant::rig::{Drives, PlantError, Resolution, VirtualRig};
 use hil_sim::plant::wall::Wall;
@@ -53,7 +53,7 @@ fn friction_decides_at_what_the_climb_needs() {
 }
 
 #[test]
-fn slip_is_the_way_of_the_tread_beyond_its_creep() {
+fn slip_is_the_travel_of_the_tread_beyond_its_creep() {
     let mut plant = ideal("prototype");
     plant.mu = 0.8;
     let mut rig = VirtualRig::new(plant, 0.0, 33.3, TICK_S);
@@ -228,7 +228,7 @@ fn the_stops_hold() {
             let jams = coupling == 1.0 && speed > 0.0;
             assert_eq!(slides, !jams, "{truth:?}");
             assert_eq!(truth.slip_mm > 1.0, slides, "{truth:?}");
-            // And the way back is free.
+            // The reverse direction is free.
             assert_eq!(roll(&mut rig, -speed, 40.0, 10.0, |_| {}), Ok(true));
         }
     }
@@ -269,7 +269,7 @@ fn the_guarded_speed_shakes_the_arm() {
 }
 
 #[test]
-fn what_is_not_a_number_ends_the_run_by_name() {
+fn a_value_that_is_not_finite_ends_the_run_by_its_name() {
     let end = |drives: Drives| {
         let mut rig = VirtualRig::new(nominal("prototype"), 0.0, 33.3, TICK_S);
         (0..500).find_map(|_| rig.step(&drives, TICK_S).err()).unwrap()
