@@ -202,7 +202,7 @@ impl Replay<'_> {
             let replayed = Columns::of(&again, &input.sensors);
             let (recorded, replayed) = (columns(row), columns(&replayed));
             for (stage, names) in STAGES {
-                for name in names.iter().filter(|name| recorded[**name] != replayed[**name]) {
+                if let Some(name) = names.iter().find(|name| recorded[**name] != replayed[**name]) {
                     let (recorded, replayed) = (&recorded[name], &replayed[name]);
                     return Some(differs(stage, name, recorded.to_string(), replayed.to_string()));
                 }

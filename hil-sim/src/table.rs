@@ -136,6 +136,7 @@ mod tests {
         let line = text.lines().find(|line| line.contains(&gap)).expect(&text);
         assert!(line.contains(&format!(" {:.2} ", c.step_mm)), "{line}");
         assert!(line.contains(" - "), "the missing measurement is shown: {line}");
+        assert!(text.contains(" predicted "), "no heading is broken: {text}");
         assert!(text.ends_with("  wrote out/run/report.html\n"));
     }
 

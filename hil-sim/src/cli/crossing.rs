@@ -30,7 +30,7 @@ const NEAR_END_MM: f64 = 1e-7;
 
 /// One isolated crossing at constant speed and preload, without arm and controller.
 ///
-/// Figures of the ring are taken over the whole crossing: the largest axial force of
+/// Figures of the ring are taken over the complete crossing: the largest axial force of
 /// the contact, its work, the largest tread compression, the largest friction utilisation.
 /// The reduced model gives force, compression and utilisation at the instant at which the
 /// lower wall stops carrying (on retract: begins to). Its work is the elastic one, preload

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::failure::{Failure, Outcome};
 use super::output::{self, WithFiles};
 use super::scenario::RunArgs;
-use super::source::check_target;
+use super::source::TARGETS;
 use crate::files::write_text;
 use crate::firmware::FirmwareError;
 use crate::provision::{self, Extra};
@@ -28,23 +28,23 @@ pub struct Args {
     /// What runs the controller: sil, the shipping control tick on this host; board, the
     /// firmware itself on an emulated board; or probe, the firmware on a real board, the
     /// plant on this host in the loop over its debug probe.
-    #[arg(long, value_name = "TARGET", default_value = "sil")]
+    #[arg(long, value_name = "TARGET", default_value = "sil", value_parser = TARGETS)]
     pub target: String,
 
-    /// With --target board: the plant not at the board's pins, but in the loop as with
-    /// --target probe.
+    /// With --target board: the plant is in the loop as with --target probe, not at the
+    /// board's pins.
     #[arg(long, conflicts_with_all = ["board_fault", "gdb"])]
     pub hil: bool,
 
-    /// Fault of the emulated board's hardware and when it comes, may be repeated:
+    /// Fault of the emulated board's hardware and its time, may be repeated:
     /// preload-sensor=0x8000@5.2, compression-sensor=CODE, angle-bits=MASK, angle-lost, encoder-a,
     /// encoder-b, dma-stalled, timer-flags, brown-out, supply-cut, supply-dip or
     /// flip=ADDRESS.BIT, each at its seconds from power-up.
     #[arg(long, value_name = "FAULT@S")]
     pub board_fault: Vec<String>,
 
-    /// Waits for a debugger (GDB remote protocol) at this address and gives it the
-    /// emulated board, whose run is then its own: no files, no summary.
+    /// Waits for a debugger (GDB remote protocol) at this address and gives it control of the
+    /// emulated board: no files, no summary.
     #[arg(long, value_name = "[HOST]:PORT", conflicts_with_all = ["out", "json"])]
     pub gdb: Option<String>,
 
@@ -76,7 +76,6 @@ impl Args {
 
 /// Runs the verb.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
-    check_target(&args.target)?;
     let (scenario, directory) = args.resolve()?;
     match args.target.as_str() {
         "board" => return Ok(Outcome::Code(provision::go_on(Extra::Board)?)),
@@ -131,7 +130,7 @@ fn takes_board(args: &Args) -> Result<(), Failure> {
     }
 }
 
-/// Where the files go: as asked, or named after what distinguishes the run.
+/// Where the files go: as given, or named after the run.
 fn directory(args: &Args, scenario: &Scenario) -> Result<PathBuf, Failure> {
     let directory = args.out.clone().unwrap_or_else(|| {
         let file = args.run.scenario.file().and_then(Path::file_stem);
@@ -154,7 +153,7 @@ fn directory(args: &Args, scenario: &Scenario) -> Result<PathBuf, Failure> {
     Ok(directory)
 }
 
-/// Writes logs, summary, the page with these sections more, and the run in one picture.
+/// Writes logs, summary, the page with `more` sections, and the overview picture.
 pub fn write(
     recording: &Recording,
     more: &[report::Section],

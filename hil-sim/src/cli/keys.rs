@@ -1,7 +1,7 @@
 //! `rig keys`: the parameters of a scenario.
 
 use clap::builder::PossibleValuesParser;
-use comfy_table::Cell;
+use comfy_table::{Cell, ColumnConstraint};
 use serde_json::json;
 
 use super::failure::{Failure, Outcome};
@@ -35,6 +35,10 @@ fn human(keys: &[KeyInfo]) -> String {
     for info in keys {
         let value = info.value.to_string();
         table.add_row([&*info.key, &*value, info.unit, &*info.description].map(Cell::new));
+    }
+    // A broken key cannot be copied.
+    if let Some(keys) = table.column_mut(0) {
+        keys.set_constraint(ColumnConstraint::ContentWidth);
     }
     format!("{table}\n")
 }

@@ -142,7 +142,7 @@ pub fn doing(mode: Mode) -> &'static str {
 }
 
 /// Largest gap over the reference gap, of crossings and elsewhere (`worst_mm`), and whether
-/// every step was crossed both ways.
+/// every step was crossed in both directions.
 #[must_use]
 pub fn crossed(plant: &VirtualRig, twin: &Twin, worst_mm: f64) -> (f64, bool) {
     let crossings = plant.ledger().crossings();
@@ -165,7 +165,7 @@ fn watched(scenario: &Scenario, twin: &Twin) -> Result<Instant, RunError> {
         let before = session.mode();
         let command = operator.command(before);
         let output = session.step(command)?;
-        let struck = injection.is_none() || session.struck_s().is_some();
+        let active = injection.is_none() || session.struck_s().is_some();
         if session.struck_s() == Some(t_s) {
             during = doing(before);
             if reset.is_some() {
@@ -173,7 +173,7 @@ fn watched(scenario: &Scenario, twin: &Twin) -> Result<Instant, RunError> {
             }
         }
         let truth = session.plant().truth();
-        judge.look(t_s, &output, truth, struck);
+        judge.look(t_s, &output, truth, active);
         if session.mode().moves() {
             worst_mm = worst_mm.max(truth.separation_mm);
         }

@@ -102,16 +102,16 @@ impl Judge {
         }
     }
 
-    /// Looks at a tick: the controller's output and the true state after it. `struck`: the
+    /// Looks at a tick: the controller's output and the true state after it. `active`: the
     /// fault is active.
-    pub fn look(&mut self, t_s: f64, output: &Output, truth: &Truth, struck: bool) {
+    pub fn look(&mut self, t_s: f64, output: &Output, truth: &Truth, active: bool) {
         let moved_mm = truth.position_mm - self.position_mm;
         self.position_mm = truth.position_mm;
         self.mode = output.telemetry.mode;
         // The wheel follows the reference with a lag: the recent maximum counts.
         let asked = f64::from(output.telemetry.speed_ref.to_bits()) / 65_536.0;
         self.asked_mm_s = asked.abs().max(self.asked_mm_s - 250.0 * TICK_S);
-        if !struck {
+        if !active {
             return;
         }
         self.peak_preload_n = self.peak_preload_n.max(truth.preload_n);
@@ -293,14 +293,14 @@ mod tests {
     }
 
     #[test]
-    fn the_first_fault_after_the_strike_counts() {
+    fn the_first_fault_after_the_injection_counts() {
         let mut judge = Judge::new(&Scenario::default(), &Truth::default());
         let mut output = Output::default();
-        let mut say = |at: u32, fault, struck| {
+        let mut say = |at: u32, fault, active| {
             output.events.clear();
             let event = Event::Fault(fault);
             output.events.push(Entry { at, event }).expect("room");
-            judge.look(f64::from(at) * TICK_S, &output, &Truth::default(), struck);
+            judge.look(f64::from(at) * TICK_S, &output, &Truth::default(), active);
         };
         say(1, Fault::SelfTest, false);
         say(2, Fault::ArmAngleStale, true);

@@ -275,10 +275,4 @@ mod tests {
             assert!(position.0 < position.1 && position.1 < line.step_mm);
         }
     }
-
-    #[test]
-    fn a_run_without_rows_still_has_plots() {
-        let recording = Recording::default();
-        assert_eq!(View::new(&recording, Across::Position).all().len(), 6);
-    }
 }

@@ -10,22 +10,22 @@ fn campaign(more: &[&str]) -> Value {
 
 #[test]
 fn five_rigs_complete_with_every_key_and_the_shards_are_the_whole() {
-    let whole = campaign(&["-n", "5"]);
-    assert_eq!((&whole["runs"], &whole["completed"]), (&Value::from(5), &Value::from(5)));
-    assert!((1..=5).contains(&whole["worst_gap_seed"].as_u64().unwrap()));
-    assert!(whole["slip_events"].is_u64() && whole["faults"].is_array());
-    assert_eq!(whole["incomplete"], serde_json::json!([]));
-    assert!(number(&whole["duration_s"], "p50") <= number(&whole["duration_s"], "max"));
-    assert!(number(&whole["gap_over_ref"], "p95") > 0.5);
-    assert!(whole["lead_time_s"]["seed"].is_u64() && whole["slip_margin"]["seed"].is_u64());
+    let all = campaign(&["-n", "5"]);
+    assert_eq!((&all["runs"], &all["completed"]), (&Value::from(5), &Value::from(5)));
+    assert!((1..=5).contains(&all["worst_gap_seed"].as_u64().unwrap()));
+    assert!(all["slip_events"].is_u64() && all["faults"].is_array());
+    assert_eq!(all["incomplete"], serde_json::json!([]));
+    assert!(number(&all["duration_s"], "p50") <= number(&all["duration_s"], "max"));
+    assert!(number(&all["gap_over_ref"], "p95") > 0.5);
+    assert!(all["lead_time_s"]["seed"].is_u64() && all["slip_margin"]["seed"].is_u64());
     let shards = ["1/2", "2/2"].map(|shard| campaign(&["-n", "5", "--shard", shard]));
     let sum = |key: &str| shards.iter().map(|shard| number(shard, key)).sum::<f64>();
     for key in ["runs", "completed", "slip_events"] {
-        assert_eq!(sum(key), number(&whole, key), "{key}");
+        assert_eq!(sum(key), number(&all, key), "{key}");
     }
     assert_eq!(number(&shards[0], "runs"), 3.0);
     let worst = shards.iter().map(|shard| number(shard, "worst_gap_mm")).fold(0.0, f64::max);
-    assert_eq!(worst, number(&whole, "worst_gap_mm"));
+    assert_eq!(worst, number(&all, "worst_gap_mm"));
 }
 
 #[test]
@@ -49,11 +49,11 @@ fn rigs_that_do_not_complete_are_named() {
 #[test]
 fn the_parts_of_a_fault_campaign_are_the_whole() {
     let some = ["faults", "--json", "-n", "2", "--only", "runaway", "--only", "tick"];
-    let whole = good(&some);
-    assert_eq!((&whole["undetected"], &whole["unsafe"]), (&0.into(), &0.into()));
+    let all = good(&some);
+    assert_eq!((&all["undetected"], &all["unsafe"]), (&0.into(), &0.into()));
     let lines = |run: &Value| run["matrix"].as_array().expect("lines").clone();
     let [first, second] =
         ["1/2", "2/2"].map(|part| lines(&good(&[&some[..], &["--shard", part]].concat())));
     assert_eq!((first.len(), second.len()), (2, 1));
-    assert_eq!([first[0].clone(), second[0].clone(), first[1].clone()].to_vec(), lines(&whole));
+    assert_eq!([first[0].clone(), second[0].clone(), first[1].clone()].to_vec(), lines(&all));
 }

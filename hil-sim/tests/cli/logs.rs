@@ -120,7 +120,7 @@ fn a_log_of_other_parameters_is_refused_until_they_are_given() {
     let bytes = std::fs::read(directory.path().join("log.mcap")).expect("there");
     let frames: Vec<u8> = mcap::MessageStream::new(&bytes)
         .expect("a file")
-        .map(|message| message.expect("whole"))
+        .map(|message| message.expect("intact"))
         .filter(|message| message.channel.topic == hil_sim::record::FRAMES)
         .flat_map(|message| message.data.to_vec())
         .collect();

@@ -5,7 +5,7 @@ use hil_sim::plant::wall::Wall;
 use hil_sim::scenario::Scenario;
 use hil_sim::session::{Options, run};
 
-use super::bench::{TICK_S, close, deploy, drive, ideal, nominal, roll};
+use super::bench::{TICK_S, close, deploy, drive, ideal, nominal, roll, steps};
 
 /// The scenario of a preset with these overrides.
 fn scenario(preset: &str, sets: &[&str]) -> Scenario {
@@ -153,13 +153,9 @@ fn the_load_does_not_turn_the_worm() {
             // Off the latch first.
             roll(&mut rig, 5.0, 41.0, 10.0, |_| {}).unwrap();
             let idle = Drives { drive_on, ..Drives::default() };
-            for _ in 0..200 {
-                rig.step(&idle, TICK_S).unwrap();
-            }
+            steps(&mut rig, &idle, 200);
             let held = rig.truth().position_mm;
-            for _ in 0..1000 {
-                rig.step(&idle, TICK_S).unwrap();
-            }
+            steps(&mut rig, &idle, 1000);
             assert_eq!(rig.truth().tread_mm_s, 0.0);
             assert_eq!(rig.truth().position_mm, held);
         }
@@ -171,15 +167,11 @@ fn the_latch_holds_until_the_drive_turns() {
     let mut plant = ideal("prototype");
     plant.drive = nominal("prototype").drive;
     let mut rig = VirtualRig::new(plant, 0.0, 0.0, TICK_S);
-    for _ in 0..500 {
-        rig.step(&Drives::default(), TICK_S).unwrap();
-    }
+    steps(&mut rig, &Drives::default(), 500);
     assert_eq!(rig.truth().position_mm, 0.0);
     // Unpressed, it then falls to the stop.
     let drives = drive(rig.parameters(), 20.0);
-    for _ in 0..500 {
-        rig.step(&drives, TICK_S).unwrap();
-    }
+    steps(&mut rig, &drives, 500);
     assert_eq!(rig.truth().position_mm, rig.parameters().stops_mm.0);
     assert!(rig.truth().slip_mm > 2.5);
 }

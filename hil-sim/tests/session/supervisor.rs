@@ -30,7 +30,7 @@ fn controller() -> Controller {
 }
 
 /// One snapshot of every mode and leg that a run out and back passes through, taken some
-/// ticks after it was entered, and of a stop each way.
+/// ticks after it was entered, and of a stop in each direction.
 fn snapshots() -> Vec<(Mode, Snapshot)> {
     let scenario = Scenario::default();
     let controller = controller();
