@@ -7,11 +7,10 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::record::Summary;
+use crate::report::verdict::SLIP_SEEN_MM;
 use crate::scenario::{ControllerKind, Scenario};
 use crate::session::{Options, RunError, run};
 
-/// Slip of a run that counts as an event, mm.
-pub const SLIP_EVENT_MM: f64 = 0.05;
 /// Largest reserve below the reference gap that the tuning tries.
 const MOST_RESERVE: f64 = 0.25;
 /// How close to the reference the worst gap is tuned, relative.
@@ -134,7 +133,7 @@ impl Bench<'_> {
             return Ok(Entry { tuned: off(&at_high) >= -TUNED_WITHIN, ..at_high });
         }
         let (mut f_low, mut f_high) = (off(&at_low), off(&at_high));
-        // The fastest that keeps the reference, should the tries run out.
+        // The fastest that keeps the reference, if the tries run out.
         let mut best = at_low;
         for _ in 2..MOST_TRIES {
             let x = (low * f_high - high * f_low) / (f_high - f_low);
@@ -188,7 +187,7 @@ impl Bench<'_> {
             tuned: false,
             deploy_time_s: mean(|s| s.duration_s),
             worst_gap_mm: summaries.iter().map(|s| s.max_gap_mm).fold(0.0, f64::max),
-            slip_events: summaries.iter().filter(|s| s.slip_mm > SLIP_EVENT_MM).count(),
+            slip_events: summaries.iter().filter(|s| s.slip_mm > SLIP_SEEN_MM).count(),
             incomplete: summaries.iter().filter(|s| !s.completed).count(),
             mean_preload_n: mean(|s| s.mean_preload_n),
             energy_j: mean(|s| s.energy_j),

@@ -11,12 +11,12 @@ use serde_json::Value;
 
 use crate::record::{self, Controller as Columns, Mark, Run, Since};
 
-/// What came of a replay.
+/// Outcome of a replay.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Replayed {
     /// Ticks run again.
     pub ticks: u64,
-    /// Ticks that could not be, because something before them is missing.
+    /// Ticks that could not be run, because data before them is missing.
     pub blind: u64,
     /// The first mark of missing data, and the tick after it.
     pub missing: Option<(u32, Mark)>,
@@ -168,9 +168,8 @@ impl Replay<'_> {
         self.request.map(|request| self.planner.plan(&request))
     }
 
-    /// The plan that the log has for this tick, and the planner's own answer to the
-    /// request that it answers; none if one of them is not in the log, or there are two of
-    /// this number.
+    /// The logged plan of this tick and the planner's answer to the same request; none if plan
+    /// or request is not in the log, or two requests have this number.
     fn planned(&self, tick: u32) -> Option<(Plan, Plan)> {
         let (_, recorded) = self.since.plans.iter().find(|(at, _)| *at == tick)?;
         let all = self.since.requests.iter().map(|(_, request)| request);
@@ -224,8 +223,7 @@ impl Replay<'_> {
             .then(|| differs("log entries", "entries", text(&recorded), text(&replayed)))
     }
 
-    /// Entries of a tick in the log, and those of the replay; none of either if they are
-    /// not in the log.
+    /// Entries of a tick in the log and in the replay; none of either if the log lacks them.
     fn events(&mut self, tick: u32, output: &Output) -> (Vec<Entry>, Vec<Entry>) {
         let from = self.since.events.iter().filter(|entry| entry.at == tick);
         let logged: Vec<Entry> = from
@@ -345,7 +343,7 @@ mod tests {
         );
         let result = replay(&run, &Rig::prototype()).unwrap();
         assert!(result.difference.is_none() && result.blind == 0, "{result:?}");
-        // Ticks of both starts have the same numbers, and their plans other answers.
+        // Ticks of both starts have the same numbers but different plans.
         assert!(result.plans.0 >= 3 && result.plans.1 == 0, "{:?}", result.plans);
         let mut forgotten = run.clone();
         forgotten.events.retain(|entry| !matches!(entry.event, Event::Restart(_)));

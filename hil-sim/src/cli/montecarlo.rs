@@ -19,7 +19,7 @@ pub(super) struct Args {
           value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     count: u64,
 
-    /// Runs every n-th of the seeds alone, beginning with the i-th.
+    /// Runs only every n-th seed, beginning with the i-th.
     #[arg(long, value_name = "I/N", default_value_t = Shard::WHOLE)]
     shard: Shard,
 
@@ -47,7 +47,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     Ok(Outcome::of(outcome.completed == outcome.runs))
 }
 
-/// Runs this part of so many rigs, with a progress bar.
+/// Runs this part of `count` rigs, with a progress bar.
 pub(super) fn campaign(
     scenario: &Scenario,
     shard: Shard,

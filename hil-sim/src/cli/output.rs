@@ -36,7 +36,7 @@ pub fn wrote(files: &[PathBuf]) -> String {
     files.iter().map(|file| format!("  wrote {}\n", file.display())).collect()
 }
 
-/// Prints `text`. A reader that has seen enough is no error.
+/// Prints `text`. A reader that closes the pipe early is no error.
 pub fn print(text: &str) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {

@@ -18,8 +18,8 @@ const ELSEWHERE: [&str; 4] = ["preset", "spread.", "noise.", "run."];
 
 /// Reads and changes the parameters that a board, or a file, holds.
 ///
-/// A change is checked before it is sent, stored beside what is in force, and becomes
-/// active completely or not at all; a board runs on it from its next start.
+/// A change is checked before it is sent, stored beside the active set, and becomes active
+/// completely or not at all; a board uses it from its next start.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(subcommand)]
@@ -34,7 +34,7 @@ pub struct Args {
     #[arg(long, global = true, value_name = "TARGET", value_parser = ["board", "probe"])]
     pub target: Option<String>,
 
-    /// File that keeps the emulated board's flash from one time to the next.
+    /// File that keeps the emulated board's flash between runs.
     #[arg(long, global = true, value_name = "FILE", default_value = "out/board.flash")]
     pub flash: PathBuf,
 
@@ -50,7 +50,7 @@ enum Action {
         /// Keys such as tread.tau_s; `rig keys` lists them.
         keys: Vec<String>,
     },
-    /// Changes parameters and puts them in force.
+    /// Changes parameters and makes them active.
     Set {
         /// Keys and their values.
         #[arg(required = true, value_name = "KEY=VALUE")]
@@ -64,13 +64,13 @@ enum Action {
         /// The file.
         to: PathBuf,
     },
-    /// Puts the defaults in force, or the parameters of a scenario file.
+    /// Makes the defaults active, or the parameters of a scenario file.
     Restore {
         /// The file.
         from: Option<PathBuf>,
     },
-    /// Makes the constants again from the rig that is there, for a board whose firmware is
-    /// of another schema than its parameters.
+    /// Computes the constants again from the stored rig, for a board whose firmware has
+    /// another schema than its parameters.
     Migrate,
     /// Shows what differs from the defaults, or from a scenario file.
     Diff {
@@ -121,7 +121,7 @@ fn on_probe(args: &Args) -> Result<Outcome, Failure> {
     act(args, &mut crate::params::Client::new(&mut port as &mut dyn crate::probe::Port))
 }
 
-/// Does what was asked with the parameters of this place.
+/// Carries out the action on the parameters of this place.
 ///
 /// # Errors
 /// [`Failure`] of the place or the input.
@@ -175,7 +175,7 @@ pub fn act(args: &Args, store: &mut impl Store) -> Result<Outcome, Failure> {
     }
 }
 
-/// Puts the rig of `new` in force and shows what has changed.
+/// Makes the rig of `new` active and shows the changes.
 fn replace(
     args: &Args,
     store: &mut impl Store,

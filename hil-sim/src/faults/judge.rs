@@ -183,7 +183,7 @@ impl Judge {
             _ => self.mode.is_at_rest(),
         };
         if let Some(kind) = self.reset {
-            // The start itself is reported: what counts is how the run goes on.
+            // The start itself is reported: the judgement is of the rest of the run.
             let ended = matches!(self.mode, Mode::Complete(_)) || self.fault.is_some();
             if ended && !self.false_alarm(kind) { Finding::Found } else { Finding::Undetected }
         } else if self.fault.is_some() {
@@ -223,12 +223,6 @@ impl Judge {
             Mode::Boot | Mode::SelfTest | Mode::Zero => "start",
             Mode::Preload(_) | Mode::Run(..) | Mode::Stopping(_) => "under way",
         }
-    }
-
-    /// Mode in the last tick.
-    #[must_use]
-    pub const fn mode(&self) -> Mode {
-        self.mode
     }
 }
 

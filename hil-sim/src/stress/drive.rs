@@ -14,23 +14,23 @@ const BUDGET: f64 = 1000.0;
 /// Least number of steps of time.
 const LEAST_TICKS: f64 = 20.0;
 
-/// Force that is known no better than to the tolerance of the balance, N.
+/// Tolerance of the balance, N.
 const LEAST_N: f64 = 1e-2;
 
 /// Longest stride, mm: the distance of the fastest and longest tick over the plant's most
 /// strides.
 const LONGEST_MM: f64 = 0.16;
 
-/// What a run shows.
+/// Figures of a run.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Drove {
     /// Largest depth of the tread, mm.
     pub depth_mm: f64,
-    /// Largest radial force left unbalanced over what is balanced.
+    /// Largest unbalanced radial force over the balanced one.
     pub unbalanced: f64,
     /// Largest speed of the tread over that of the unloaded motor.
     pub overspeed: f64,
-    /// Energy that nothing put in, mJ.
+    /// Energy gained without a source, mJ.
     pub created_mj: f64,
     /// What the stated approximations can account for, mJ.
     pub allowed_mj: f64,
@@ -97,8 +97,8 @@ pub(super) fn run(case: &StressCase, plant: &PlantParameters) -> Result<Drove, P
         arm_work += plant.load_n * slope * rise;
         force = force.max(force_of(&now));
         fastest = fastest.max(now.speed_mm_s.abs()).max(now.tread_mm_s.abs());
-        // Rolling resistance is taken from the carriage, that of a sliding wheel too, whose
-        // tread it would have to be taken from.
+        // Rolling resistance acts on the carriage, even of a sliding wheel, where it should act
+        // on the tread.
         let slid = (now.tread_mm_s - now.speed_mm_s) * case.dt_s;
         misplaced += (now.resistance_n * slid).max(0.0);
         let held = mechanical(plant, &now, seat_n) + arm_work - now.work_mj;
@@ -132,7 +132,7 @@ fn force_of(truth: &Truth) -> f64 {
 /// Kinetic and potential energy of masses, load and spring, mJ.
 fn mechanical(plant: &PlantParameters, truth: &Truth, seat_n: f64) -> f64 {
     let spring = plant.spring_n_per_mm;
-    // A spring that is slack pulls nothing.
+    // A slack spring does not pull.
     let pressed = (seat_n + spring * (truth.height_mm - RADIUS_MM)).max(0.0);
     let kinetic =
         plant.mass_kg * truth.speed_mm_s.powi(2) + plant.drive.mass_kg * truth.tread_mm_s.powi(2);

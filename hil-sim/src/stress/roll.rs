@@ -14,7 +14,7 @@ const MOST_STRIDES: f64 = 256.0;
 /// Ring steps of a run.
 const BUDGET: usize = 1000;
 
-/// What a run shows.
+/// Figures of a run.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Roll {
     /// Largest depth of the tread, mm.
@@ -75,13 +75,13 @@ pub(super) fn run(case: &StressCase) -> Result<Roll, BalanceError> {
             lift += dy.abs();
         }
         (y, forces) = (height, now);
-        // Written so that what is not a number shows.
+        // Written so that a value that is not finite shows.
         out.created_mj =
             if given.is_nan() { f64::NAN } else { out.created_mj.max(-given - stored) };
         out.depth_mm = if y.is_nan() { f64::NAN } else { out.depth_mm.max(contact.depth_mm) };
     }
-    // A corner between two elements is met by neither: the wheel knows heights to the
-    // distance of its elements, and work to that and the trapezoids of a stride.
+    // A corner between two elements touches neither: heights are known to the distance of the
+    // elements, work to that and the trapezoids of a stride.
     let grain = std::f64::consts::TAU * RADIUS_MM / ELEMENTS as f64 + stride;
     out.resolved_mj = case.preload_n * (grain + 0.01 * lift);
     Ok(out)

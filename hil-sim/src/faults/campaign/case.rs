@@ -1,4 +1,4 @@
-//! The faults of the matrix, and what each is at an instant of a run.
+//! The faults of the matrix, and each at an instant of a run.
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -20,7 +20,7 @@ const COMMANDS_S: f64 = 1.0;
 pub enum Case {
     /// One that is injected into the run.
     Injected(&'static Entry),
-    /// A step that is not where or as the table says.
+    /// A step that differs from the table.
     Step(&'static StepFault),
 }
 
@@ -122,7 +122,7 @@ impl Case {
         match entry.kind {
             Kind::Gain if other => 1.0 / entry.magnitude,
             Kind::Offset | Kind::Runaway if other => -entry.magnitude,
-            // Along the word, one bit, which the parity shows, or two, which it does not.
+            // One bit of the word, which the parity shows, or two, which it does not.
             Kind::BitErrors => f64::from((1 + 2 * u16::from(other)) << (instant % 14)),
             Kind::Stuck if entry.target.is_hardware() && !entry.unit.is_empty() => {
                 [entry.magnitude, 0.0, 12_000.0, 65_535.0][instant % 4]
@@ -173,7 +173,7 @@ impl Case {
                     magnitude = random.random_range(entry.range.0..=entry.range.1).floor();
                 }
                 let mut fault = Injection::at(entry.target, entry.kind, at_s, magnitude);
-                // Random commands and interrupts end some time.
+                // Random commands and interrupts have an end.
                 fault.duration_s = match entry.target {
                     Target::Commands => Some(COMMANDS_S),
                     Target::Interrupt => Some(STORM_S),

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::{Case, Finding, Instant};
 
-/// Median and worst of what varies between instants.
+/// Median and worst of a figure over the instants.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct MedianAndWorst {
     /// Median.
@@ -48,18 +48,18 @@ pub struct MatrixRow {
     pub rest_ms: Option<MedianAndWorst>,
     /// Whether at every instant the mechanism was held.
     pub safe: bool,
-    /// Instants by what became of them.
+    /// Instants with a latched fault.
     pub found: usize,
-    /// Limited.
+    /// Instants with a reported limit.
     pub limited: usize,
-    /// Tolerated.
+    /// Instants tolerated without a report.
     pub tolerated: usize,
-    /// Undetected.
+    /// Instants undetected.
     pub undetected: usize,
-    /// Unsafe.
+    /// Instants at which a bound of the mechanism was exceeded.
     #[serde(rename = "unsafe")]
     pub unheld: usize,
-    /// How the runs ended, with how many did.
+    /// Ends of the runs and how often each occurred.
     pub ends: BTreeMap<&'static str, usize>,
     /// Largest preload, N.
     pub worst_preload_n: f64,
@@ -70,7 +70,7 @@ pub struct MatrixRow {
 }
 
 impl MatrixRow {
-    /// What it restarted the controller by most often.
+    /// The most frequent restart of the controller.
     #[must_use]
     pub fn restarted(&self) -> Option<&'static str> {
         most_frequent(&self.restarts)
@@ -145,7 +145,7 @@ impl Outcome {
         Self { target, instants, matrix, undetected, unheld }
     }
 
-    /// Whether every fault was found or tolerated, and nothing was left unheld.
+    /// Whether every fault was found or tolerated and every bound kept.
     #[must_use]
     pub const fn is_good(&self) -> bool {
         self.undetected == 0 && self.unheld == 0

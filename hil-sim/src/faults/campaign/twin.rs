@@ -18,9 +18,9 @@ pub struct Twin {
     /// From the command to the end, s since boot.
     pub started_s: f64,
     ended_s: f64,
-    /// When the present crossing began, s.
+    /// Start of the present crossing, s.
     crossing_s: Option<f64>,
-    /// Stretches of time in which it crosses a step, s.
+    /// Begin and end of its crossings, s.
     crossings: Vec<(f64, f64)>,
     /// Codes of the limits that it reports.
     pub limits: Vec<u16>,
@@ -29,7 +29,7 @@ pub struct Twin {
 }
 
 impl Twin {
-    /// Runs it.
+    /// Runs it in software.
     pub fn run(scenario: &Scenario) -> Result<Self, RunError> {
         let mut session = Session::new(scenario, Options::default())?;
         let mut operator = Operator::default();
