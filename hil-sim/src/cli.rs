@@ -1,9 +1,9 @@
-//! The `rig` command. A verb is one file with its `Args` and its `run`; what they
-//! share is in `scenario`, `output` and `failure`.
+//! The `rig` command. A verb is one file with its `Args` and its `run`; shared parts are in
+//! `scenario`, `output` and `failure`.
 //!
 //! Results go to standard output, progress and errors to standard error. The exit
-//! code is 0 if all is well, 1 if what was run did not end well, 2 if it could not
-//! be run as asked; an error is one line.
+//! code is 0 on success, 1 if a run, log or check failed, 2 for bad input; an error is one
+//! line.
 
 pub mod capture;
 mod compare;
@@ -74,7 +74,7 @@ enum Verb {
 #[derive(Debug, clap::Args)]
 #[command(disable_help_flag = true)]
 struct Passed {
-    /// What that part takes; `--help` shows it.
+    /// Arguments of that part; `--help` shows them.
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "ARGS")]
     _all: Vec<OsString>,
 }
@@ -110,7 +110,7 @@ pub fn main() -> ExitCode {
     run(|cli: &Cli| cli.verb.run())
 }
 
-/// Parses the arguments of this process and runs what they ask for. Errors are one line.
+/// Parses the arguments of this process and runs the verb. Errors are one line.
 pub fn run<C: Parser>(run: impl FnOnce(&C) -> Result<Outcome, Failure>) -> ExitCode {
     let cli = match C::try_parse() {
         Ok(cli) => cli,

@@ -1,5 +1,5 @@
-//! A log run again: the recorded inputs through the controller on this host, whose
-//! outputs must be the recorded ones to the bit.
+//! A log run again: recorded inputs through the controller on this host, whose outputs must
+//! be the recorded ones to the bit.
 
 use interstage::log::{Flags, Record};
 use interstage::model::{Plan, PlanRequest, Planner};
@@ -11,18 +11,18 @@ use serde_json::Value;
 
 use crate::record::{self, Controller as Columns, Mark, Run, Since};
 
-/// What came of a replay.
+/// Outcome of a replay.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Replayed {
     /// Ticks run again.
     pub ticks: u64,
-    /// Ticks that could not be, because something before them is missing.
+    /// Ticks that could not be run, because data before them is missing.
     pub blind: u64,
-    /// The first thing missing that made them so, and the tick before which it is.
+    /// The first mark of missing data, and the tick after it.
     pub missing: Option<(u32, Mark)>,
     /// Log entries compared.
     pub events: u64,
-    /// Plans that were in the log, and plans that had to be worked out again.
+    /// Plans from the log, and plans that were computed again.
     pub plans: (u64, u64),
     /// The first difference.
     pub difference: Option<Difference>,
@@ -36,7 +36,7 @@ impl Replayed {
     }
 }
 
-/// Where replay and log part.
+/// First difference between replay and log.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Difference {
     /// The tick.
@@ -47,9 +47,9 @@ pub struct Difference {
     pub stage: &'static str,
     /// The quantity.
     pub quantity: &'static str,
-    /// What was recorded.
+    /// Recorded value.
     pub recorded: String,
-    /// What came out this time.
+    /// Value of the replay.
     pub replayed: String,
 }
 
@@ -90,8 +90,8 @@ pub fn replay(run: &Run, rig: &Rig) -> Result<Replayed, RigError> {
                     replay.since = run.since_boot(boot);
                     replay.begin();
                 }
-                // What is no frame was none before either; ticks that never ran are
-                // known by the flag of the one that did.
+                // Garbage was no frame before either; the flag of the next tick marks those
+                // that never ran.
                 Mark::Garbage { .. } | Mark::Overrun { .. } => {}
                 Mark::Lost { .. }
                 | Mark::Skipped { .. }
@@ -115,7 +115,7 @@ pub fn replay(run: &Run, rig: &Rig) -> Result<Replayed, RigError> {
     Ok(replay.result)
 }
 
-/// A table of rows does not say where it begins; its first mode does.
+/// Whether the rows begin after boot: their first mode shows it.
 fn starts_late(run: &Run) -> bool {
     let first = run.rows.first().and_then(Columns::telemetry);
     first.is_some_and(|seen| !matches!(seen.mode, Mode::Boot | Mode::SelfTest))
@@ -124,7 +124,7 @@ fn starts_late(run: &Run) -> bool {
 /// A replay in progress.
 struct Replay<'a> {
     planner: Planner,
-    /// What the log has of the present start.
+    /// The part of the log since the present start.
     since: Since<'a>,
     state: State,
     /// The latest request, for a plan that is not in the log.
@@ -133,7 +133,7 @@ struct Replay<'a> {
 }
 
 impl Replay<'_> {
-    /// The target starts, with the wheel where its record of the run before has it.
+    /// The target starts; the position is that of the record of the run before.
     fn begin(&mut self) {
         let place = self.since.restart().and_then(|restart| restart.place());
         (self.state, self.request) = (State::restored(place), None);
@@ -168,9 +168,8 @@ impl Replay<'_> {
         self.request.map(|request| self.planner.plan(&request))
     }
 
-    /// The plan that the log has for this tick, and the planner's own answer to the
-    /// request that it answers; none if one of them is not in the log, or there are two of
-    /// this number.
+    /// The logged plan of this tick and the planner's answer to the same request; none if plan
+    /// or request is not in the log, or two requests have this number.
     fn planned(&self, tick: u32) -> Option<(Plan, Plan)> {
         let (_, recorded) = self.since.plans.iter().find(|(at, _)| *at == tick)?;
         let all = self.since.requests.iter().map(|(_, request)| request);
@@ -195,17 +194,14 @@ impl Replay<'_> {
         if let Some((recorded, replayed)) = self.planned(row.tick)
             && recorded != replayed
         {
-            let (recorded, replayed) = (format!("{recorded:?}"), format!("{replayed:?}"));
-            return Some(differs("planner", "plan", recorded, replayed));
+            return Some(differs("planner", "plan", text(&recorded), text(&replayed)));
         }
         let again = Record::of(input, output);
         if seen != output.telemetry {
-            let (recorded, replayed) =
-                (columns(row), columns(&Columns::of(&again, &input.sensors)));
-            let stages =
-                STAGES.iter().flat_map(|(stage, names)| names.iter().map(|n| (*stage, *n)));
-            for (stage, name) in stages {
-                if recorded[name] != replayed[name] {
+            let replayed = Columns::of(&again, &input.sensors);
+            let (recorded, replayed) = (columns(row), columns(&replayed));
+            for (stage, names) in STAGES {
+                if let Some(name) = names.iter().find(|name| recorded[**name] != replayed[**name]) {
                     let (recorded, replayed) = (&recorded[name], &replayed[name]);
                     return Some(differs(stage, name, recorded.to_string(), replayed.to_string()));
                 }
@@ -213,25 +209,21 @@ impl Replay<'_> {
         }
         if again.flags != row.flags() {
             let bits = |bits: u16| format!("{bits:#018b}");
-            let (recorded, replayed) = (bits(row.flags), bits(again.flags.to_bits()));
-            return Some(differs("bridges, requests and entries", "flags", recorded, replayed));
+            let (flags, again) = (bits(row.flags), bits(again.flags.to_bits()));
+            return Some(differs("bridges, requests and entries", "flags", flags, again));
         }
         let asked = self.since.requests.iter().find(|(at, _)| *at == row.tick);
         if let (Some((_, recorded)), Some(replayed)) = (asked, output.request)
             && *recorded != replayed
         {
-            let (recorded, replayed) = (format!("{recorded:?}"), format!("{replayed:?}"));
-            return Some(differs("request", "request for a plan", recorded, replayed));
+            return Some(differs("request", "request for a plan", text(recorded), text(&replayed)));
         }
         let (recorded, replayed) = self.events(row.tick, output);
-        (recorded != replayed).then(|| {
-            let (recorded, replayed) = (format!("{recorded:?}"), format!("{replayed:?}"));
-            differs("log entries", "entries", recorded, replayed)
-        })
+        (recorded != replayed)
+            .then(|| differs("log entries", "entries", text(&recorded), text(&replayed)))
     }
 
-    /// Entries of a tick in the log, and those of the replay; none of either if they are
-    /// not in the log.
+    /// Entries of a tick in the log and in the replay; none of either if the log lacks them.
     fn events(&mut self, tick: u32, output: &Output) -> (Vec<Entry>, Vec<Entry>) {
         let from = self.since.events.iter().filter(|entry| entry.at == tick);
         let logged: Vec<Entry> = from
@@ -244,6 +236,10 @@ impl Replay<'_> {
         self.result.events += logged.len() as u64;
         (logged, output.events.to_vec())
     }
+}
+
+fn text(value: &impl std::fmt::Debug) -> String {
+    format!("{value:?}")
 }
 
 /// The columns of a row by their names.
@@ -301,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn a_plan_that_the_planner_does_not_make_is_found() {
+    fn a_plan_that_is_not_the_planner_s_is_found() {
         let mut run = Run::of_stream(stream());
         let (tick, plan) = &mut run.plans[1];
         plan.gap += interstage::units::Q16::from_bits(1);
@@ -347,7 +343,7 @@ mod tests {
         );
         let result = replay(&run, &Rig::prototype()).unwrap();
         assert!(result.difference.is_none() && result.blind == 0, "{result:?}");
-        // Ticks of both starts have the same numbers, and their plans other answers.
+        // Ticks of both starts have the same numbers but different plans.
         assert!(result.plans.0 >= 3 && result.plans.1 == 0, "{:?}", result.plans);
         let mut forgotten = run.clone();
         forgotten.events.retain(|entry| !matches!(entry.event, Event::Restart(_)));
@@ -384,7 +380,7 @@ mod tests {
     }
 
     #[test]
-    fn ticks_behind_a_gap_are_not_taken_for_equal() {
+    fn ticks_after_a_gap_do_not_count_as_equal() {
         let frames: Vec<&[u8]> = crate::record::pieces(stream()).collect();
         let torn = [&frames[..40], &frames[41..]].concat().concat();
         let run = Run::of_stream(&torn);

@@ -22,13 +22,13 @@ const OVERSPEED: f64 = 1.0 + 1e-9;
 /// Worst cases listed for each figure.
 const LISTED: usize = 3;
 
-/// Part of the radial force that may be left unbalanced.
+/// Largest unbalanced part of the radial force.
 const UNBALANCED: f64 = 2e-4;
 
-/// Cases that can be for every one that cannot.
+/// Possible cases for every impossible one.
 const PER_REFUSED: usize = 20;
 
-/// What is looked at in every case.
+/// Figures of every case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Figure {
@@ -36,11 +36,11 @@ pub enum Figure {
     RingPenetration,
     /// Energy taken out of the tread over what the resolution explains, ring alone.
     RingEnergy,
-    /// Depth of the tread over the deepest allowed, whole rig.
+    /// Depth of the tread over the deepest allowed, complete rig.
     Penetration,
-    /// Energy gained over what the stated approximations explain, whole rig.
+    /// Energy gained over what the stated approximations explain, complete rig.
     Energy,
-    /// Radial force left unbalanced over what the solution may leave, whole rig.
+    /// Unbalanced radial force over the tolerance of the solution, complete rig.
     Unbalanced,
     /// Speed of the tread over that of the unloaded motor.
     Overspeed,
@@ -75,12 +75,12 @@ pub struct Refused {
     pub example: String,
 }
 
-/// What the plant withstands.
+/// Outcome of the stress.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct StressReport {
     /// Cases run.
     pub cases: usize,
-    /// Cases that cannot be, refused as they have to be, by reason.
+    /// Impossible cases that were refused, by reason.
     pub refused: BTreeMap<&'static str, Refused>,
     /// Cases that failed.
     pub failed: Vec<StressFailure>,
@@ -88,60 +88,56 @@ pub struct StressReport {
     pub worst: Vec<Worst>,
 }
 
-/// How a case ended.
-enum Ended {
-    Refused(&'static str, String),
-    Failed(String),
-    Ran(Vec<(Figure, f64)>),
-}
+/// A case that was run: its figures, or why it failed.
+type Ran = (StressCase, Result<Vec<(Figure, f64)>, String>);
 
-/// Runs `count` cases, and sees a twentieth as many refused that cannot be; `done` is called
-/// after each of the former.
+/// Runs `count` cases and calls `done` after each; checks that a twentieth as many impossible
+/// ones are refused.
 #[must_use]
 pub fn run(count: usize, seed: u64, done: &(dyn Fn() + Sync)) -> StressReport {
-    let mut ended: Vec<(StressCase, Ended)> = draw(count, seed)
-        .into_par_iter()
-        .map(|case| {
-            let ended = one(&case);
-            done();
-            (case, ended)
-        })
-        .collect();
-    let beyond = beyond(count.div_ceil(PER_REFUSED), seed);
-    ended.extend(beyond.into_iter().map(|(case, name)| (case, refused(&case, name))));
-    gather(ended)
+    let run = |case| {
+        let figures = one(&case);
+        done();
+        (case, figures)
+    };
+    let mut report = gather(draw(count, seed).into_par_iter().map(run).collect());
+    for (case, name) in beyond(count.div_ceil(PER_REFUSED), seed) {
+        match refused(&case, name) {
+            Ok(text) => {
+                let refused: &mut Refused = report.refused.entry(name).or_default();
+                refused.count += 1;
+                refused.example = text;
+            }
+            Err(why) => {
+                report.cases += 1;
+                report.failed.push(StressFailure { why, case });
+            }
+        }
+    }
+    report
 }
 
-/// What presses the wheel at most before the load does: preload, and the spring on top of
-/// the step, N.
+/// Largest force on the wheel without the load: preload, and the spring on top of the step, N.
 fn pressed_n(case: &StressCase) -> f64 {
     case.preload_n + case.spring_n_per_mm * case.step_mm
 }
 
-fn refused(case: &StressCase, name: &str) -> Ended {
+/// The message of the refusal of an impossible case, or why it was not refused by this name.
+fn refused(case: &StressCase, name: &str) -> Result<String, String> {
     match drive::plant(case).check(pressed_n(case)) {
-        Err(refusal) if refusal.name() == name => {
-            Ended::Refused(refusal.name(), refusal.to_string())
-        }
-        Err(refusal) => Ended::Failed(format!("refused as {}, not as {name}", refusal.name())),
-        Ok(()) => Ended::Failed(format!("not refused, though {name}")),
+        Err(refusal) if refusal.name() == name => Ok(refusal.to_string()),
+        Err(refusal) => Err(format!("refused as {}, not as {name}", refusal.name())),
+        Ok(()) => Err(format!("not refused, though {name}")),
     }
 }
 
-fn one(case: &StressCase) -> Ended {
-    if let Err(refusal) = drive::plant(case).check(pressed_n(case)) {
-        return Ended::Failed(format!("refused: {refusal}"));
-    }
-    let rolled = match roll::run(case) {
-        Ok(rolled) => rolled,
-        Err(error) => return Ended::Failed(format!("ring: {error}")),
-    };
-    let drove = match drive::run(case, &drive::plant(case)) {
-        Ok(drove) => drove,
-        Err(error) => return Ended::Failed(error.to_string()),
-    };
+fn one(case: &StressCase) -> Result<Vec<(Figure, f64)>, String> {
+    let plant = drive::plant(case);
+    plant.check(pressed_n(case)).map_err(|refusal| format!("refused: {refusal}"))?;
+    let rolled = roll::run(case).map_err(|error| format!("ring: {error}"))?;
+    let drove = drive::run(case, &plant).map_err(|error| error.to_string())?;
     let deepest = DEEPEST * RADIUS_MM;
-    Ended::Ran(vec![
+    Ok(vec![
         (Figure::RingPenetration, rolled.depth_mm / deepest),
         (Figure::RingEnergy, rolled.created_mj / rolled.resolved_mj),
         (Figure::Penetration, drove.depth_mm / deepest),
@@ -151,19 +147,13 @@ fn one(case: &StressCase) -> Ended {
     ])
 }
 
-fn gather(ended: Vec<(StressCase, Ended)>) -> StressReport {
-    let mut report = StressReport::default();
+fn gather(ran: Vec<Ran>) -> StressReport {
+    let mut report = StressReport { cases: ran.len(), ..StressReport::default() };
     let mut figures: BTreeMap<Figure, Vec<(f64, StressCase)>> = BTreeMap::new();
-    for (case, ended) in ended {
-        match ended {
-            Ended::Refused(name, text) => {
-                let refused: &mut Refused = report.refused.entry(name).or_default();
-                refused.count += 1;
-                refused.example = text;
-                continue;
-            }
-            Ended::Failed(why) => report.failed.push(StressFailure { why, case }),
-            Ended::Ran(found) => {
+    for (case, ran) in ran {
+        match ran {
+            Err(why) => report.failed.push(StressFailure { why, case }),
+            Ok(found) => {
                 for (figure, value) in found {
                     if value > 1.0 || value.is_nan() {
                         let why = format!("{figure:?} at {value:.3} of its limit");
@@ -173,7 +163,6 @@ fn gather(ended: Vec<(StressCase, Ended)>) -> StressReport {
                 }
             }
         }
-        report.cases += 1;
     }
     for (figure, mut values) in figures {
         values.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -187,8 +176,8 @@ fn gather(ended: Vec<(StressCase, Ended)>) -> StressReport {
 mod tests {
     use super::*;
 
-    /// Cases of the first seed that gained energy while friction, arm and motor were
-    /// computed one after the other, and the carriage was caught at once.
+    /// Cases of the first seed that gained energy when friction, arm and motor were computed in
+    /// sequence and the carriage was stopped at once.
     const ONCE_GAINED: [usize; 24] = [
         766, 866, 931, 1130, 1545, 1846, 2034, 2511, 2930, 3143, 3243, 4904, 5045, 6716, 8416,
         8754, 8872, 8972, 9254, 9421, 10950, 12152, 13195, 13927,
@@ -199,20 +188,16 @@ mod tests {
         let cases = draw(ONCE_GAINED[ONCE_GAINED.len() - 1] + 1, 1);
         for index in ONCE_GAINED {
             let case = &cases[index];
-            match one(case) {
-                Ended::Ran(found) => {
-                    assert!(found.iter().all(|(_, value)| *value <= 1.0), "{found:?}: {case:?}");
-                }
-                Ended::Failed(why) | Ended::Refused(_, why) => panic!("{why}: {case:?}"),
-            }
+            let found = one(case).unwrap_or_else(|why| panic!("{why}: {case:?}"));
+            assert!(found.iter().all(|(_, value)| *value <= 1.0), "{found:?}: {case:?}");
         }
     }
 
     #[test]
-    fn what_cannot_be_is_refused_by_its_name() {
+    fn an_impossible_case_is_refused_by_its_name() {
         let cases = beyond(400, 3);
         for (case, name) in &cases {
-            assert!(matches!(refused(case, name), Ended::Refused(..)), "{name}: {case:?}");
+            refused(case, name).unwrap_or_else(|why| panic!("{why}: {case:?}"));
         }
         let names: std::collections::BTreeSet<_> = cases.iter().map(|(_, name)| name).collect();
         assert_eq!(names.len(), 3);
@@ -221,8 +206,8 @@ mod tests {
     #[test]
     fn a_figure_beyond_its_limit_is_a_failure() {
         let case = draw(1, 1)[0];
-        let ended = |value| (case, Ended::Ran(vec![(Figure::Energy, value)]));
-        let report = gather(vec![ended(0.9), ended(1.1), ended(f64::NAN)]);
+        let ran = |value| (case, Ok(vec![(Figure::Energy, value)]));
+        let report = gather(vec![ran(0.9), ran(1.1), ran(f64::NAN)]);
         assert_eq!((report.cases, report.failed.len()), (3, 2));
     }
 }

@@ -132,10 +132,11 @@ mod tests {
         let summary = example::deploy().summary;
         let text = run(&summary, &[PathBuf::from("out/run/report.html")]);
         let c = &summary.crossings[1];
-        let gap = format!(" {:.4} ", c.gap_mm);
+        let gap = format!(" {:.3} ", c.gap_mm);
         let line = text.lines().find(|line| line.contains(&gap)).expect(&text);
         assert!(line.contains(&format!(" {:.2} ", c.step_mm)), "{line}");
         assert!(line.contains(" - "), "the missing measurement is shown: {line}");
+        assert!(text.contains(" predicted "), "no heading is broken: {text}");
         assert!(text.ends_with("  wrote out/run/report.html\n"));
     }
 

@@ -34,7 +34,7 @@ fn every_code_has_its_row_once_and_every_fault_its_reaction() {
     }
 }
 
-/// Transitions by the pair of their ends, without the faults; both ways of a run and
+/// Transitions by the pair of their ends, without the faults; both directions of a run and
 /// its legs are drawn as one.
 fn edges() -> BTreeMap<(String, String), Vec<String>> {
     let mut edges: BTreeMap<(String, String), Vec<String>> = BTreeMap::new();

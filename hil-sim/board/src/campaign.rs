@@ -227,7 +227,7 @@ fn twin(firmware: Firmware<'_>, scenario: &Scenario) -> Result<Twin, RunError> {
         }
         let output = board.step(command)?;
         let over = operator.over(board.mode);
-        twin.note(t_s, board.mode, &output, board.bench.plant().truth(), over);
+        twin.note(t_s, board.mode, &output, over);
         over_s = if over { over_s + 1e-3 } else { 0.0 };
     }
     Ok(twin)
@@ -242,7 +242,7 @@ fn watched(firmware: Firmware<'_>, scenario: &Scenario, twin: &Twin) -> Result<I
     let mut hold = reset.then(|| keep(&mut board, scenario)).transpose()?;
     let early = scenario.run.faults.is_empty();
     let of_image = scenario.run.faults.iter().any(|fault| fault.target == Target::Image);
-    let (mut during, mut sign_s, mut tick, mut after_s) = (None, None, 0, 0.0);
+    let (mut during, mut after_s) = (None, 0.0);
     let (mut worst_mm, mut back_s) = (0.0f64, None);
     while board.bench.time_s() < LONGEST_S && after_s < AFTER_S {
         let t_s = board.bench.time_s();
@@ -263,9 +263,6 @@ fn watched(firmware: Firmware<'_>, scenario: &Scenario, twin: &Twin) -> Result<I
         if board.mode.moves() {
             worst_mm = worst_mm.max(truth.separation_mm);
         }
-        if struck && sign_s.is_none() && twin.differs(tick, truth) {
-            sign_s = Some(t_s);
-        }
         if board.restarts > 0 && back_s.is_none() {
             back_s = Some(t_s);
         }
@@ -280,7 +277,6 @@ fn watched(firmware: Firmware<'_>, scenario: &Scenario, twin: &Twin) -> Result<I
             (None, None) => !saves && (operator.over(board.mode) || board.parameters.holds()),
         };
         after_s = if over { after_s + 1e-3 } else { 0.0 };
-        tick += 1;
     }
     let (gap_part, crossed) = crossed(board.bench.plant(), twin, worst_mm);
     if scenario.run.faults.first().is_some_and(|fault| fault.target.is_of_sets()) {
@@ -310,20 +306,17 @@ fn watched(firmware: Firmware<'_>, scenario: &Scenario, twin: &Twin) -> Result<I
     let finding = if unrecorded.is_some() { Finding::Undetected } else { finding };
     let harms = judge.harms().into_iter().chain(around).chain(unrecorded).collect();
     let injection = scenario.run.faults.first();
-    let moving = injection.is_some_and(|fault| fault.target.moves());
     Ok(Instant {
         seed: scenario.run.seed,
         at_s,
         magnitude: injection.map(Injection::magnitude),
-        during: during.unwrap_or("at rest").into(),
+        during: during.unwrap_or("at rest"),
         finding,
         code: report.map(|(_, code)| code),
-        restart: restart.map(Into::into),
+        restart,
         latency_ms: since(board.bench.tells_s()).or(since(board.bench.acts_s()).map(|_| 0.0)),
-        latency_any_ms: since(board.bench.acts_s()),
-        after_sign_ms: if moving { since(sign_s.or(told_s)) } else { None },
         rest_ms: judge.fault.and_then(|(at_s, _)| Some(1e3 * (judge.rest_s? - at_s).max(0.0))),
-        end: if board.image_s.is_some() { "hold" } else { judge.end() }.into(),
+        end: if board.image_s.is_some() { "hold" } else { judge.end() },
         peak_preload_n: judge.peak_preload_n,
         motion_mm: judge.motion_mm,
         gap_part,

@@ -1,21 +1,19 @@
-//! `rig capture`: a log into files, as it comes.
+//! `rig capture`: writes a log into files as it arrives.
 
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use serde::Serialize;
-
 use super::failure::{Failure, Outcome};
-use super::output;
+use super::output::{self, WithFiles};
 use super::source::SourceArgs;
 use crate::files::make_directory;
 use crate::progress;
-use crate::record::{Counts, Source, View, WriteError, Writer};
+use crate::record::{Source, View, WriteError, Writer};
 use crate::scenario::Scenario;
 
-/// Writes the controller's log into an MCAP and a CSV file as it comes.
+/// Writes the controller's log into an MCAP and a CSV file as it arrives.
 ///
 /// Of a deployment that it runs; from a board at a debug probe, until Ctrl-C or --seconds; or
 /// from a recorded stream. What is missing is marked; a file that is cut off is read up to its
@@ -45,14 +43,6 @@ pub struct Args {
     /// Prints what came as one JSON object.
     #[arg(long)]
     json: bool,
-}
-
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Printed {
-    #[serde(flatten)]
-    counts: Counts,
-    files: Vec<PathBuf>,
 }
 
 /// Runs the verb.
@@ -92,10 +82,8 @@ pub fn write(
     }
     let counts = writer.finish(&mut |item| view.see(item)).map_err(failed)?;
     drop(progress);
-    let printed = Printed { counts, files };
-    output::result(args.json, &printed, || {
-        view.text(&counts) + "\n" + &output::wrote(&printed.files)
-    })?;
+    let printed = WithFiles { result: &counts, files: &files };
+    output::result(args.json, &printed, || view.text(&counts) + "\n" + &output::wrote(&files))?;
     Ok(Outcome::of(counts.is_complete()))
 }
 

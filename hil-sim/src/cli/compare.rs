@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 use super::failure::{Failure, Outcome};
 use super::output;
 use super::scenario::RunArgs;
-use crate::compare::{self, Comparison, EQUAL_SPEED_MM_S, Entry, Policy};
+use crate::compare::{self, Comparison, Policy};
 use crate::progress;
 use crate::table::{number, plain};
 
@@ -14,7 +14,7 @@ use crate::table::{number, plain};
 ///
 /// Each is tuned until its worst gap over all rigs is the reference; then the times
 /// are comparable. Once with the step-aware speed for all, once with one speed
-/// throughout for those without look-ahead. A second table crosses at equal speed.
+/// throughout for those without look-ahead.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// How many rigs: the seeds that follow --seed.
@@ -38,53 +38,24 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         compare::compare(&scenario, scenario.run.seed + 1, rigs, &|| bar.advance(1))?
     };
     output::result(args.json, &machine(&comparison), || human(&comparison))?;
-    Ok(Outcome::of(true))
+    Ok(Outcome::Good)
 }
 
-/// The JSON object: per controller under `controllers`, the other tables beside it.
+/// The JSON object: the entries by the names of their controllers, those with one speed apart.
 fn machine(comparison: &Comparison) -> Value {
-    let pick = |entries: &[Entry], policy: Policy| -> Map<String, Value> {
-        let of_policy = entries.iter().filter(|entry| entry.policy == policy);
-        of_policy.map(|entry| (entry.controller.clone(), json!(entry))).collect()
+    let entries = |policy: Policy| -> Map<String, Value> {
+        let of_policy = comparison.entries.iter().filter(|entry| entry.policy == policy);
+        of_policy.map(|entry| (entry.controller.to_owned(), json!(entry))).collect()
     };
-    let aims: Vec<Value> = compare::aims(comparison)
-        .into_iter()
-        .map(|(aim, holds)| json!({ "aim": aim, "holds": holds }))
-        .collect();
     json!({
         "runs": comparison.runs,
         "gap_ref_mm": comparison.gap_ref_mm,
-        "controllers": pick(&comparison.equal_gap, Policy::StepAware),
-        "one_speed": pick(&comparison.equal_gap, Policy::OneSpeed),
-        "equal_speed": pick(&comparison.equal_speed, Policy::StepAware),
-        "aims": aims,
+        "controllers": entries(Policy::StepAware),
+        "one_speed": entries(Policy::OneSpeed),
     })
 }
 
-pub(super) fn human(comparison: &Comparison) -> String {
-    let mut text = format!(
-        "{} rigs, each strategy tuned to a worst gap of {:.3} mm\n{}\n",
-        comparison.runs,
-        comparison.gap_ref_mm,
-        table(&comparison.equal_gap)
-    );
-    text += &format!(
-        "The same rigs, all crossing at {EQUAL_SPEED_MM_S} mm/s\n{}\n",
-        table(&comparison.equal_speed)
-    );
-    text += "speed: by steps, slow at the steps alone; one, the same throughout. crossing: speed \
-             in mm/s, or\nthe reserve below the reference gap that the schedule aims at. short: \
-             incomplete runs.\n\nScheduled, at equal worst gap\n";
-    for (aim, holds) in compare::aims(comparison) {
-        text += &format!("  {} {aim}\n", if holds { "yes" } else { "no " });
-    }
-    if comparison.equal_gap.iter().any(|entry| !entry.tuned) {
-        text += "~ could not be brought to the reference gap within its range of speeds\n";
-    }
-    text
-}
-
-fn table(entries: &[Entry]) -> comfy_table::Table {
+fn human(comparison: &Comparison) -> String {
     let head = [
         "controller",
         "speed",
@@ -97,7 +68,7 @@ fn table(entries: &[Entry]) -> comfy_table::Table {
         "J",
         "wear mJ",
     ];
-    let rows = entries.iter().map(|entry| {
+    let rows = comparison.entries.iter().map(|entry| {
         let mark = if entry.tuned { "" } else { "~" };
         let speed = match entry.policy {
             Policy::StepAware => "by steps",
@@ -107,17 +78,28 @@ fn table(entries: &[Entry]) -> comfy_table::Table {
             .crossing_speed_mm_s
             .map_or_else(|| format!("-{:.1} %", entry.gap_reserve * 100.0), |v| format!("{v:.2}"));
         vec![
-            entry.controller.clone(),
+            entry.controller.to_owned(),
             speed.to_owned(),
             crossing,
-            number(Some(entry.deploy_time_s), 2),
-            format!("{mark}{}", number(Some(entry.worst_gap_mm), 3)),
+            number(entry.deploy_time_s, 2),
+            format!("{mark}{}", number(entry.worst_gap_mm, 3)),
             entry.slip_events.to_string(),
             entry.incomplete.to_string(),
-            number(Some(entry.mean_preload_n), 1),
-            number(Some(entry.energy_j), 2),
-            number(Some(entry.wear_j * 1e3), 2),
+            number(entry.mean_preload_n, 1),
+            number(entry.energy_j, 2),
+            number(entry.wear_j * 1e3, 2),
         ]
     });
-    plain(&head, rows)
+    let mut text = format!(
+        "{} rigs, each strategy tuned to a worst gap of {:.3} mm\n{}\nspeed: by steps, slow at the \
+         steps alone; one, the same throughout. crossing: speed in mm/s, or\nthe reserve below the \
+         reference gap that the schedule aims at. short: incomplete runs.\n",
+        comparison.runs,
+        comparison.gap_ref_mm,
+        plain(&head, rows)
+    );
+    if comparison.entries.iter().any(|entry| !entry.tuned) {
+        text += "~ could not be brought to the reference gap within its range of speeds\n";
+    }
+    text
 }

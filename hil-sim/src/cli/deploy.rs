@@ -4,16 +4,14 @@ pub mod looped;
 
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
-
 use super::failure::{Failure, Outcome};
-use super::output;
+use super::output::{self, WithFiles};
 use super::scenario::RunArgs;
-use super::source::check_target;
+use super::source::TARGETS;
 use crate::files::write_text;
 use crate::firmware::FirmwareError;
 use crate::provision::{self, Extra};
-use crate::record::{Recording, Summary};
+use crate::record::Recording;
 use crate::scenario::Scenario;
 use crate::{progress, record, report, session, table};
 
@@ -30,23 +28,23 @@ pub struct Args {
     /// What runs the controller: sil, the shipping control tick on this host; board, the
     /// firmware itself on an emulated board; or probe, the firmware on a real board, the
     /// plant on this host in the loop over its debug probe.
-    #[arg(long, value_name = "TARGET", default_value = "sil")]
+    #[arg(long, value_name = "TARGET", default_value = "sil", value_parser = TARGETS)]
     pub target: String,
 
-    /// With --target board: the plant not at the board's pins, but in the loop as with
-    /// --target probe.
+    /// With --target board: the plant is in the loop as with --target probe, not at the
+    /// board's pins.
     #[arg(long, conflicts_with_all = ["board_fault", "gdb"])]
     pub hil: bool,
 
-    /// Fault of the emulated board's hardware and when it comes, may be repeated:
+    /// Fault of the emulated board's hardware and its time, may be repeated:
     /// preload-sensor=0x8000@5.2, compression-sensor=CODE, angle-bits=MASK, angle-lost, encoder-a,
     /// encoder-b, dma-stalled, timer-flags, brown-out, supply-cut, supply-dip or
     /// flip=ADDRESS.BIT, each at its seconds from power-up.
     #[arg(long, value_name = "FAULT@S")]
     pub board_fault: Vec<String>,
 
-    /// Waits for a debugger (GDB remote protocol) at this address and gives it the
-    /// emulated board, whose run is then its own: no files, no summary.
+    /// Waits for a debugger (GDB remote protocol) at this address and gives it control of the
+    /// emulated board: no files, no summary.
     #[arg(long, value_name = "[HOST]:PORT", conflicts_with_all = ["out", "json"])]
     pub gdb: Option<String>,
 
@@ -67,14 +65,6 @@ pub struct Args {
     pub json: bool,
 }
 
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Printed<'a> {
-    #[serde(flatten)]
-    summary: &'a Summary,
-    files: &'a [PathBuf],
-}
-
 impl Args {
     /// The scenario, and where the files go if there are to be any.
     pub fn resolve(&self) -> Result<(Scenario, Option<PathBuf>), Failure> {
@@ -86,7 +76,6 @@ impl Args {
 
 /// Runs the verb.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
-    check_target(&args.target)?;
     let (scenario, directory) = args.resolve()?;
     match args.target.as_str() {
         "board" => return Ok(Outcome::Code(provision::go_on(Extra::Board)?)),
@@ -119,7 +108,7 @@ pub fn conclude(
         None => Vec::new(),
     };
     let summary = &recording.summary;
-    let printed = Printed { summary, files: &files };
+    let printed = WithFiles { result: summary, files: &files };
     output::result(args.json, &printed, || table::run(summary, &files))?;
     Ok(Outcome::of(summary.completed && summary.faults.is_empty()))
 }
@@ -130,7 +119,7 @@ pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
     Ok(read.map_err(|source| FirmwareError::Read { path: path.to_owned(), source })?)
 }
 
-/// Refuses what the emulated board alone can do.
+/// Refuses options that need the emulated board.
 fn takes_board(args: &Args) -> Result<(), Failure> {
     let fault = args.board_fault.first().map(|fault| format!("--board-fault {fault}"));
     let debugger = args.gdb.as_ref().map(|address| format!("--gdb {address}"));
@@ -141,7 +130,7 @@ fn takes_board(args: &Args) -> Result<(), Failure> {
     }
 }
 
-/// Where the files go: as asked, or named after what distinguishes the run.
+/// Where the files go: as given, or named after the run.
 fn directory(args: &Args, scenario: &Scenario) -> Result<PathBuf, Failure> {
     let directory = args.out.clone().unwrap_or_else(|| {
         let file = args.run.scenario.file().and_then(Path::file_stem);
@@ -156,7 +145,7 @@ fn directory(args: &Args, scenario: &Scenario) -> Result<PathBuf, Failure> {
         Path::new("out")
             .join(format!("{direction}-{rig}-{controller}-{}{board}", scenario.run.seed))
     });
-    // Told before the run rather than after it.
+    // Reported before the run, not after it.
     if directory.exists() && !directory.is_dir() {
         let path = directory.display();
         return Err(Failure::input(format!("--out {path}: exists and is not a directory")));
@@ -164,7 +153,7 @@ fn directory(args: &Args, scenario: &Scenario) -> Result<PathBuf, Failure> {
     Ok(directory)
 }
 
-/// Writes logs, summary, the page with these sections more, and the run in one picture.
+/// Writes logs, summary, the page with `more` sections, and the overview picture.
 pub fn write(
     recording: &Recording,
     more: &[report::Section],
@@ -192,48 +181,34 @@ mod tests {
         args: Args,
     }
 
-    fn default_directory(arguments: &[&str]) -> PathBuf {
-        let all = std::iter::once("rig").chain(arguments.iter().copied());
-        let args = Only::try_parse_from(all).unwrap().args;
-        directory(&args, &args.run.resolve().unwrap()).unwrap()
+    fn parsed(arguments: &str) -> Args {
+        let all = std::iter::once("rig").chain(arguments.split_whitespace());
+        Only::try_parse_from(all).unwrap().args
     }
 
     #[test]
     fn the_directory_is_named_after_the_run() {
-        assert_eq!(default_directory(&[]), Path::new("out/deploy-prototype-scheduled-0"));
-        assert_eq!(
-            default_directory(&[
-                "--retract",
-                "--rig",
-                "fe",
-                "--controller",
-                "limit",
-                "--seed",
-                "7"
-            ]),
-            Path::new("out/retract-fe-limit-7")
-        );
-        assert_eq!(
-            default_directory(&["--target", "board"]),
-            Path::new("out/deploy-prototype-scheduled-0-board")
-        );
-        assert_eq!(
-            default_directory(&["--target", "board", "--hil"]),
-            Path::new("out/deploy-prototype-scheduled-0-board-hil")
-        );
-        assert_eq!(default_directory(&["--out", "here"]), Path::new("here"));
+        for (arguments, expected) in [
+            ("", "out/deploy-prototype-scheduled-0"),
+            ("--retract --rig fe --controller limit --seed 7", "out/retract-fe-limit-7"),
+            ("--target board", "out/deploy-prototype-scheduled-0-board"),
+            ("--target board --hil", "out/deploy-prototype-scheduled-0-board-hil"),
+            ("--out here", "here"),
+        ] {
+            let args = parsed(arguments);
+            let directory = directory(&args, &args.run.resolve().unwrap()).unwrap();
+            assert_eq!(directory, Path::new(expected), "{arguments}");
+        }
     }
 
     #[test]
-    fn what_the_emulated_board_alone_can_do_is_refused_elsewhere() {
+    fn options_of_the_emulated_board_are_refused_elsewhere() {
         for (arguments, named) in [
-            (&["--hil"][..], "--hil"),
-            (&["--target", "probe", "--board-fault", "encoder-a@1"], "--board-fault encoder-a@1"),
-            (&["--gdb", ":3333"], "--gdb :3333"),
+            ("--hil", "--hil"),
+            ("--target probe --board-fault encoder-a@1", "--board-fault encoder-a@1"),
+            ("--gdb :3333", "--gdb :3333"),
         ] {
-            let all = std::iter::once("rig").chain(arguments.iter().copied());
-            let args = Only::try_parse_from(all).unwrap().args;
-            let error = takes_board(&args).unwrap_err().to_string();
+            let error = takes_board(&parsed(arguments)).unwrap_err().to_string();
             assert_eq!(error, format!("{named}: takes --target board"));
         }
     }

@@ -1,4 +1,4 @@
-//! How a verb ends.
+//! Result of a verb.
 
 use std::fmt;
 use std::process::ExitCode;
@@ -12,14 +12,14 @@ use crate::provision::ProvisionError;
 use crate::scenario::ScenarioError;
 use crate::session::RunError;
 
-/// How a verb ended that did its work.
+/// Result of a verb that did its work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// All is well.
+    /// Success.
     Good,
-    /// What was run did not end well: a fault, a stale file, a size above budget.
+    /// The run, log or check failed: a fault, missing data, a difference.
     Bad,
-    /// As a program that was started ended.
+    /// Exit code of a program that was started.
     Code(u8),
 }
 
@@ -39,10 +39,10 @@ impl Outcome {
     }
 }
 
-/// Why a verb did not do its work. Displays as one line.
+/// Why a verb could not do its work. Displays as one line.
 #[derive(Debug)]
 pub enum Failure {
-    /// It was asked for something that cannot be: exit code 2.
+    /// Bad input: exit code 2.
     Input(String),
     /// It failed while running: exit code 1.
     Run(String),
@@ -75,7 +75,7 @@ impl fmt::Display for Failure {
     }
 }
 
-/// `text` with every run of white space that breaks a line as one blank.
+/// `text` as one line: its lines trimmed and joined by blanks.
 pub fn one_line(text: &str) -> String {
     let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
     lines.collect::<Vec<_>>().join(" ")

@@ -1,15 +1,15 @@
-//! `rig faults`: every fault at random instants, and what became of it.
+//! `rig faults`: every fault at random instants, and its outcome.
 
 use super::failure::{Failure, Outcome};
-use super::output;
 use super::scenario::ScenarioArgs;
+use super::{montecarlo, output};
 use crate::faults::campaign::{Campaign, Case, MatrixRow, Outcome as Matrix};
-use crate::montecarlo::{self, Shard};
+use crate::montecarlo::Shard;
 use crate::progress;
 use crate::table::{number, plain};
 
 /// Breaks everything that can break, each fault at random instants of random rigs, out and
-/// back, and judges what became of it by what is true.
+/// back, and judges the outcome by the true state of the plant.
 ///
 /// The exit code is 1 if a fault goes undetected or the mechanism is not held.
 #[derive(Debug, clap::Args)]
@@ -49,7 +49,7 @@ impl Args {
     /// The campaign that is asked for.
     ///
     /// # Errors
-    /// [`Failure::Input`] for a scenario that cannot be, or a fault that there is not.
+    /// [`Failure::Input`] for an invalid scenario or an unknown fault.
     pub fn campaign(&self) -> Result<Campaign, Failure> {
         let board = self.target == "board";
         let all = if board { Case::all_on_board() } else { Case::all() };
@@ -71,7 +71,7 @@ impl Args {
 /// [`Failure`] as for every verb.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     if let Some(count) = args.clean {
-        return clean(args, &args.scenario.resolve()?, count);
+        return clean(args, count);
     }
     let campaign = args.campaign()?;
     if args.target == "board" {
@@ -94,24 +94,15 @@ pub fn ended(args: &Args, outcome: &Matrix) -> Result<Outcome, Failure> {
 }
 
 /// Random deployments without a fault.
-fn clean(
-    args: &Args,
-    scenario: &crate::scenario::Scenario,
-    count: u64,
-) -> Result<Outcome, Failure> {
-    let seeds = args.shard.seeds(scenario.run.seed, count);
-    let lines = {
-        let bar = progress::bar("runs", seeds.len() as u64);
-        montecarlo::run(scenario, &seeds, &|| bar.advance(1))?
-    };
-    let outcome = montecarlo::Outcome::of(&lines);
+fn clean(args: &Args, count: u64) -> Result<Outcome, Failure> {
+    let outcome = montecarlo::campaign(&args.scenario.resolve()?, args.shard, count)?;
     let alarms = outcome.faults.len();
     output::result(args.json, &outcome, || {
         format!(
             "{} deployments without a fault: {alarms} false alarms, {} incomplete\n{}",
             outcome.runs,
             outcome.runs - outcome.completed,
-            super::montecarlo::human(&outcome)
+            montecarlo::human(&outcome)
         )
     })?;
     Ok(Outcome::of(alarms == 0 && outcome.completed == outcome.runs))

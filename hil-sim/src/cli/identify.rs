@@ -3,10 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use clap::builder::PossibleValuesParser;
-use serde::Serialize;
 
 use super::failure::{Failure, Outcome};
-use super::output;
+use super::output::{self, WithFiles};
 use crate::identify::IdentifyError;
 use crate::identify::plot;
 use crate::identify::published::{self, CONVERGED, Tread};
@@ -18,7 +17,7 @@ use crate::{files, progress};
 
 /// Identifies a rig's parameters from its logs, with 95 % intervals.
 ///
-/// Several logs of one rig tell more than one: a scheduled deployment and two at constant
+/// Several logs of one rig give narrower intervals: a scheduled deployment and two at constant
 /// preloads, one light, one heavy. Writes a scenario file with what was identified and a
 /// picture of the residuals of each log.
 #[derive(Debug, clap::Args)]
@@ -31,8 +30,7 @@ pub(super) struct Args {
     #[arg(long)]
     published: bool,
 
-    /// Rig preset that the logs are of; by default what the first log says, or that of the
-    /// file.
+    /// Rig preset of the logs; by default that of the first log, or of the file.
     #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(PRESETS))]
     rig: Option<String>,
 
@@ -62,14 +60,6 @@ impl From<IdentifyError> for Failure {
     }
 }
 
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Printed<'a> {
-    #[serde(flatten)]
-    found: &'a Identification,
-    files: &'a [PathBuf],
-}
-
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let given = Scenario::resolve(args.rig.as_deref(), args.scenario.as_deref(), &args.set)?;
     if args.published {
@@ -77,9 +67,9 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     }
     let records: Vec<Record> =
         args.logs.iter().map(|path| Record::read(path, &given)).collect::<Result<_, _>>()?;
-    let told = args.rig.is_none() && args.scenario.is_none() && args.set.is_empty();
+    let unnamed = args.rig.is_none() && args.scenario.is_none() && args.set.is_empty();
     let scenario = match records.first() {
-        Some(record) if told => record.scenario.clone(),
+        Some(record) if unnamed => record.scenario.clone(),
         _ => given,
     };
     let found = {
@@ -87,8 +77,12 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         identify(&records, &scenario)?
     };
     let files = write(&found, &records, &args.out)?;
-    let printed = Printed { found: &found, files: &files };
-    output::result(args.json, &printed, || human(&found, &files))?;
+    print(args, &found, &files)
+}
+
+fn print(args: &Args, found: &Identification, files: &[PathBuf]) -> Result<Outcome, Failure> {
+    let printed = WithFiles { result: found, files };
+    output::result(args.json, &printed, || human(found) + &output::wrote(files))?;
     Ok(Outcome::Good)
 }
 
@@ -123,7 +117,7 @@ fn figures(value: f64, width: f64) -> String {
     format!("{value:.decimals$}")
 }
 
-fn human(found: &Identification, files: &[PathBuf]) -> String {
+fn human(found: &Identification) -> String {
     let rows = found.parameters.iter().map(|p| {
         let width = p.high.zip(p.low).map_or(0.0, |(high, low)| high - low);
         let end = |end: Option<f64>| end.map_or("-".to_owned(), |end| figures(end, width));
@@ -144,9 +138,6 @@ fn human(found: &Identification, files: &[PathBuf]) -> String {
     text += &format!("{}\n", plain(&["residuals", "unit", "rms", "values", "independent"], rows));
     for note in &found.notes {
         text += &format!("  {note}\n");
-    }
-    for file in files {
-        text += &format!("  wrote {}\n", file.display());
     }
     text
 }
@@ -199,9 +190,7 @@ fn by_published(args: &Args, scenario: &Scenario) -> Result<Outcome, Failure> {
         ],
         scenario: scenario.clone(),
     };
-    let printed = Printed { found: &found, files: &[] };
-    output::result(args.json, &printed, || human(&found, &[]))?;
-    Ok(Outcome::Good)
+    print(args, &found, &[])
 }
 
 fn of_tread(what: &str, tread: &Tread) -> String {

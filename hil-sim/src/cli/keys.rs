@@ -1,8 +1,8 @@
 //! `rig keys`: the parameters of a scenario.
 
 use clap::builder::PossibleValuesParser;
-use comfy_table::{Cell, Table};
-use serde::Serialize;
+use comfy_table::{Cell, ColumnConstraint};
+use serde_json::json;
 
 use super::failure::{Failure, Outcome};
 use super::output;
@@ -22,27 +22,23 @@ pub(super) struct Args {
     json: bool,
 }
 
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Printed<'a> {
-    rig: &'a str,
-    keys: &'a [KeyInfo],
-}
-
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let keys = Scenario::named(&args.rig)?.keys();
-    let printed = Printed { rig: &args.rig, keys: &keys };
-    output::result(args.json, &printed, || human(&keys))?;
+    output::result(args.json, &json!({ "rig": args.rig, "keys": keys }), || human(&keys))?;
     Ok(Outcome::Good)
 }
 
 fn human(keys: &[KeyInfo]) -> String {
     // Text throughout: every column is aligned to the left.
-    let mut table: Table = plain(&[], []);
+    let mut table = plain(&[], []);
     table.set_header(["key", "default", "unit", "what"].map(Cell::new));
     for info in keys {
         let value = info.value.to_string();
         table.add_row([&*info.key, &*value, info.unit, &*info.description].map(Cell::new));
+    }
+    // A broken key cannot be copied.
+    if let Some(keys) = table.column_mut(0) {
+        keys.set_constraint(ColumnConstraint::ContentWidth);
     }
     format!("{table}\n")
 }

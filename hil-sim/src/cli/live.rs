@@ -1,4 +1,4 @@
-//! `rig live`: a log as it grows, on the terminal and on the network.
+//! `rig live`: a log as it grows, on the terminal and over the network.
 
 use std::io::IsTerminal;
 use std::time::{Duration, Instant};
@@ -13,7 +13,7 @@ use crate::record::{Decoder, Item, Source, messages};
 /// Time between two frames of the screen.
 const REDRAW: Duration = Duration::from_millis(50);
 
-/// Shows the controller's log as it comes: plots, contact stage, faults, and keys for
+/// Shows the controller's log as it arrives: plots, contact stage, faults, and keys for
 /// start, stop and retract.
 ///
 /// The same goes out over a WebSocket in the Foxglove protocol, for Foxglove, Lichtblick
@@ -46,7 +46,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     args.source.open(!args.headless, |source, _| watch(args, source))
 }
 
-/// A terminal that is given back however the view ends.
+/// A terminal that is restored however the view ends.
 struct Display(ratatui::DefaultTerminal);
 
 impl Drop for Display {
@@ -93,8 +93,8 @@ pub fn watch(args: &Args, source: &mut dyn Source) -> Result<Outcome, Failure> {
             let drawn = terminal.draw(|frame| screen.draw(frame, decoder.counts()));
             drawn.map_err(Failure::run)?;
             match key()? {
-                Some(Key::Quit) => break,
-                Some(Key::Letter(letter)) => source.send(letter).map_err(Failure::run)?,
+                Some(QUIT) => break,
+                Some(letter) => source.send(letter).map_err(Failure::run)?,
                 None => {}
             }
         }
@@ -102,14 +102,11 @@ pub fn watch(args: &Args, source: &mut dyn Source) -> Result<Outcome, Failure> {
     Ok(Outcome::of(decoder.counts().is_complete()))
 }
 
-/// What the operator wants.
-enum Key {
-    Quit,
-    Letter(u8),
-}
+/// Key that ends the view; Escape and Ctrl-C do too.
+const QUIT: u8 = b'q';
 
-/// The key that was pressed, if one was.
-fn key() -> Result<Option<Key>, Failure> {
+/// The key that was pressed, if one was and has a meaning.
+fn key() -> Result<Option<u8>, Failure> {
     if !event::poll(Duration::ZERO).map_err(Failure::run)? {
         return Ok(None);
     }
@@ -118,15 +115,15 @@ fn key() -> Result<Option<Key>, Failure> {
         return Ok(None);
     }
     Ok(match key.code {
-        KeyCode::Char('q') | KeyCode::Esc => Some(Key::Quit),
-        // The terminal does not end the program by itself while it is drawn on.
-        KeyCode::Char('c') if key.modifiers.contains(KeyModifiers::CONTROL) => Some(Key::Quit),
-        KeyCode::Char(letter @ ('s' | 'x' | 'r' | '0')) => Some(Key::Letter(letter as u8)),
+        KeyCode::Esc => Some(QUIT),
+        // In raw mode the terminal does not end the program.
+        KeyCode::Char('c') if key.modifiers.contains(KeyModifiers::CONTROL) => Some(QUIT),
+        KeyCode::Char(letter @ ('q' | 's' | 'x' | 'r' | '0')) => Some(letter as u8),
         _ => None,
     })
 }
 
-/// The log's time against this host's.
+/// The log's time and this host's.
 struct Clock {
     fast: bool,
     began: Instant,
@@ -139,7 +136,7 @@ impl Clock {
         Self { fast, began: Instant::now(), first: None, tick: 0 }
     }
 
-    /// The log has come to this tick. A restart of the target restarts the clock.
+    /// The log has reached this tick. A restart of the target restarts the clock.
     fn tick(&mut self, tick: u32) {
         if self.first.is_none_or(|first| tick < first) {
             (self.first, self.began) = (Some(tick), Instant::now());

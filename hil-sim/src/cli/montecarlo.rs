@@ -5,6 +5,7 @@ use super::output;
 use super::scenario::RunArgs;
 use crate::montecarlo::{self, Least, Quantiles, Shard};
 use crate::progress;
+use crate::scenario::Scenario;
 use crate::table::{number, plain};
 
 /// Runs many random rigs, each drawn from its own seed, and shows what limits them.
@@ -18,7 +19,7 @@ pub(super) struct Args {
           value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     count: u64,
 
-    /// Runs every n-th of the seeds alone, beginning with the i-th.
+    /// Runs only every n-th seed, beginning with the i-th.
     #[arg(long, value_name = "I/N", default_value_t = Shard::ALL)]
     shard: Shard,
 
@@ -32,12 +33,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let scenario = args.run.resolve()?;
-    let seeds = args.shard.seeds(scenario.run.seed, args.count);
-    let lines = {
-        let bar = progress::bar("runs", seeds.len() as u64);
-        montecarlo::run(&scenario, &seeds, &|| bar.advance(1))?
-    };
-    let outcome = montecarlo::Outcome::of(&lines);
+    let outcome = campaign(&scenario, args.shard, args.count)?;
     let head = format!(
         "{} runs of {}, {} controller, rig {}: {} completed, {} slip events\n",
         outcome.runs,
@@ -49,6 +45,18 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     );
     output::result(args.json, &outcome, || head + &human(&outcome))?;
     Ok(Outcome::of(outcome.completed == outcome.runs))
+}
+
+/// Runs this part of `count` rigs, with a progress bar.
+pub(super) fn campaign(
+    scenario: &Scenario,
+    shard: Shard,
+    count: u64,
+) -> Result<montecarlo::Outcome, Failure> {
+    let seeds = shard.seeds(scenario.run.seed, count);
+    let bar = progress::bar("runs", seeds.len() as u64);
+    let lines = montecarlo::run(scenario, &seeds, &|| bar.advance(1))?;
+    Ok(montecarlo::Outcome::of(&lines))
 }
 
 pub(super) fn human(outcome: &montecarlo::Outcome) -> String {

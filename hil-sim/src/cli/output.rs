@@ -7,7 +7,17 @@ use serde::Serialize;
 
 use super::failure::Failure;
 
-/// Prints `value` as one line of JSON, or what `human` makes of it.
+/// A result with the files that were written, as `--json` prints both.
+#[derive(Serialize)]
+pub struct WithFiles<'a, T: Serialize> {
+    /// The result.
+    #[serde(flatten)]
+    pub result: &'a T,
+    /// The files.
+    pub files: &'a [PathBuf],
+}
+
+/// Prints `value` as one line of JSON, or the text of `human`.
 pub fn result(
     json: bool,
     value: &impl Serialize,
@@ -26,7 +36,7 @@ pub fn wrote(files: &[PathBuf]) -> String {
     files.iter().map(|file| format!("  wrote {}\n", file.display())).collect()
 }
 
-/// Prints `text`. A reader that has seen enough is no error.
+/// Prints `text`. A reader that closes the pipe early is no error.
 pub fn print(text: &str) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {

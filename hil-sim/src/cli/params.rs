@@ -18,8 +18,8 @@ const ELSEWHERE: [&str; 4] = ["preset", "spread.", "noise.", "run."];
 
 /// Reads and changes the parameters that a board, or a file, holds.
 ///
-/// A change is checked before it is sent, stored beside what is in force, and becomes
-/// active completely or not at all; a board runs on it from its next start.
+/// A change is checked before it is sent, stored beside the active set, and becomes active
+/// completely or not at all; a board uses it from its next start.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(subcommand)]
@@ -34,7 +34,7 @@ pub struct Args {
     #[arg(long, global = true, value_name = "TARGET", value_parser = ["board", "probe"])]
     pub target: Option<String>,
 
-    /// File that keeps the emulated board's flash from one time to the next.
+    /// File that keeps the emulated board's flash between runs.
     #[arg(long, global = true, value_name = "FILE", default_value = "out/board.flash")]
     pub flash: PathBuf,
 
@@ -50,7 +50,7 @@ enum Action {
         /// Keys such as tread.tau_s; `rig keys` lists them.
         keys: Vec<String>,
     },
-    /// Changes parameters and puts them in force.
+    /// Changes parameters and makes them active.
     Set {
         /// Keys and their values.
         #[arg(required = true, value_name = "KEY=VALUE")]
@@ -64,13 +64,13 @@ enum Action {
         /// The file.
         to: PathBuf,
     },
-    /// Puts the defaults in force, or the parameters of a scenario file.
+    /// Makes the defaults active, or the parameters of a scenario file.
     Restore {
         /// The file.
         from: Option<PathBuf>,
     },
-    /// Makes the constants again from the rig that is there, for a board whose firmware is
-    /// of another schema than its parameters.
+    /// Computes the constants again from the stored rig, for a board whose firmware has
+    /// another schema than its parameters.
     Migrate,
     /// Shows what differs from the defaults, or from a scenario file.
     Diff {
@@ -121,13 +121,13 @@ fn on_probe(args: &Args) -> Result<Outcome, Failure> {
     act(args, &mut crate::params::Client::new(&mut port as &mut dyn crate::probe::Port))
 }
 
-/// Does what was asked with the parameters of this place.
+/// Carries out the action on the parameters of this place.
 ///
 /// # Errors
 /// [`Failure`] of the place or the input.
 pub fn act(args: &Args, store: &mut impl Store) -> Result<Outcome, Failure> {
     let held = match store.held() {
-        // What cannot be read, or is damaged, can be replaced all the same.
+        // A set that is unreadable or damaged can still be replaced.
         Err(StoreError::Set { .. } | StoreError::Refused(_))
             if matches!(args.action, Action::Restore { .. }) =>
         {
@@ -138,10 +138,7 @@ pub fn act(args: &Args, store: &mut impl Store) -> Result<Outcome, Failure> {
     };
     let scenario = scenario_of(&held);
     match &args.action {
-        Action::Get { keys } => {
-            let rows = chosen(&scenario, keys)?;
-            show(args, &held, false, rows, None)
-        }
+        Action::Get { keys } => show(args, &held, false, &chosen(&scenario, keys)?, None),
         Action::Set { sets, name } => {
             let new = scenario.clone().with(sets)?;
             let name = name.as_deref().unwrap_or(&held.name);
@@ -156,7 +153,7 @@ pub fn act(args: &Args, store: &mut impl Store) -> Result<Outcome, Failure> {
         }
         Action::Save { to } => {
             write_text(to, &scenario.to_toml())?;
-            show(args, &held, false, Vec::new(), None)
+            show(args, &held, false, &[], None)
         }
         Action::Restore { from: Some(path) } => {
             let new = Scenario::resolve(None, Some(path), &[])?;
@@ -165,8 +162,7 @@ pub fn act(args: &Args, store: &mut impl Store) -> Result<Outcome, Failure> {
         Action::Restore { from: None } => {
             store.restore()?;
             let now = store.held()?;
-            let (before, after) = differing(&scenario, &scenario_of(&now));
-            show(args, &now, true, after, Some(before))
+            show_changes(args, &now, true, &scenario, &scenario_of(&now))
         }
         Action::Migrate => replace(args, store, &scenario, &scenario, &held.name),
         Action::Diff { from } => {
@@ -174,13 +170,12 @@ pub fn act(args: &Args, store: &mut impl Store) -> Result<Outcome, Failure> {
                 Some(path) => Scenario::resolve(None, Some(path), &[])?,
                 None => Scenario::named(&scenario.preset)?,
             };
-            let (before, after) = differing(&other, &scenario);
-            show(args, &held, false, after, Some(before))
+            show_changes(args, &held, false, &other, &scenario)
         }
     }
 }
 
-/// Puts the rig of `new` in force and shows what has changed.
+/// Makes the rig of `new` active and shows the changes.
 fn replace(
     args: &Args,
     store: &mut impl Store,
@@ -192,14 +187,12 @@ fn replace(
     store.put(&set)?;
     let now = store.held()?;
     if now.rig != new.rig {
-        return Err(Failure::run("what is in force is not what was put there"));
+        return Err(Failure::run("the active parameters are not those that were stored"));
     }
-    let (before, after) = differing(old, new);
-    show(args, &now, true, after, Some(before))
+    show_changes(args, &now, true, old, new)
 }
 
-/// The scenario of a rig that a place holds; a name that is no preset's is compared with
-/// the prototype.
+/// The scenario of a held rig; one whose name is no preset is compared with the prototype.
 fn scenario_of(held: &Held) -> Scenario {
     let preset = PRESETS.iter().find(|preset| **preset == held.name).unwrap_or(&PRESETS[0]);
     Scenario::of_rig(preset, held.rig.clone())
@@ -236,18 +229,26 @@ fn chosen(scenario: &Scenario, keys: &[String]) -> Result<Vec<KeyInfo>, Failure>
     keys.iter().map(one).collect()
 }
 
-/// The keys whose values differ, as they were and as they are.
-fn differing(old: &Scenario, new: &Scenario) -> (Vec<KeyInfo>, Vec<KeyInfo>) {
+/// Shows the keys whose values differ between two scenarios.
+fn show_changes(
+    args: &Args,
+    held: &Held,
+    changed: bool,
+    old: &Scenario,
+    new: &Scenario,
+) -> Result<Outcome, Failure> {
     let pairs = held_keys(old).into_iter().zip(held_keys(new));
-    pairs.filter(|(old, new)| old.value != new.value).unzip()
+    let (before, after): (Vec<_>, Vec<_>) =
+        pairs.filter(|(old, new)| old.value != new.value).unzip();
+    show(args, held, changed, &after, Some(&before))
 }
 
 fn show(
     args: &Args,
     held: &Held,
     changed: bool,
-    rows: Vec<KeyInfo>,
-    before: Option<Vec<KeyInfo>>,
+    rows: &[KeyInfo],
+    before: Option<&[KeyInfo]>,
 ) -> Result<Outcome, Failure> {
     let printed = Printed {
         name: &held.name,
@@ -255,10 +256,10 @@ fn show(
         schema: held.schema,
         hash: format!("{:08x}", held.hash),
         changed,
-        parameters: values(&rows),
-        before: before.as_deref().map(values),
+        parameters: values(rows),
+        before: before.map(values),
     };
-    output::result(args.json, &printed, || human(held, &rows, before.as_deref()))?;
+    output::result(args.json, &printed, || human(held, rows, before))?;
     Ok(Outcome::Good)
 }
 
@@ -271,28 +272,21 @@ fn human(held: &Held, rows: &[KeyInfo], before: Option<&[KeyInfo]>) -> String {
     if !held.is_current() {
         text += "its constants are of another schema: `migrate` makes them again from its rig\n";
     }
+    let head = if before.is_some() {
+        &["key", "was", "is", "unit"][..]
+    } else {
+        &["key", "value", "unit"]
+    };
+    let cells = rows.iter().enumerate().map(|(place, info)| {
+        let old = before.map(|before| before[place].value.to_string());
+        let values = old.into_iter().chain([info.value.to_string(), info.unit.to_owned()]);
+        std::iter::once(info.key.clone()).chain(values).collect()
+    });
     match before {
-        Some([]) => text += "no difference\n",
-        Some(before) => {
-            let rows = before.iter().zip(rows).map(|(old, new)| {
-                vec![
-                    new.key.clone(),
-                    old.value.to_string(),
-                    new.value.to_string(),
-                    new.unit.to_owned(),
-                ]
-            });
-            text += &format!("{}\n", plain(&["key", "was", "is", "unit"], rows));
-        }
-        None if rows.is_empty() => {}
-        None => {
-            let rows = rows
-                .iter()
-                .map(|info| vec![info.key.clone(), info.value.to_string(), info.unit.to_owned()]);
-            text += &format!("{}\n", plain(&["key", "value", "unit"], rows));
-        }
+        Some([]) => text + "no difference\n",
+        None if rows.is_empty() => text,
+        _ => text + &format!("{}\n", plain(head, cells)),
     }
-    text
 }
 
 impl From<StoreError> for Failure {

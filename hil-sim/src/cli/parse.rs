@@ -1,4 +1,4 @@
-//! What the argument parser has to say, in the form of every other error.
+//! Messages of the argument parser, in the form of every other error.
 
 use std::process::ExitCode;
 
@@ -12,7 +12,7 @@ pub(super) fn report(error: &clap::Error) -> ExitCode {
         ErrorKind::DisplayHelp
         | ErrorKind::DisplayVersion
         | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
-            // Help that is not read to the end is no error.
+            // A reader that closes the pipe early is no error.
             let _ = error.print();
         }
         _ => eprintln!("{}", line(&error.to_string())),

@@ -21,7 +21,7 @@ pub(super) fn reconnecting() -> Result<ReconnectingPort<'static>, Failure> {
         .map_err(missing)
 }
 
-/// What is missing to begin with is the caller's to mend.
+/// A probe that is missing at the start is bad input.
 fn missing(error: PortError) -> Failure {
     Failure::input(format!("--target probe: {error}"))
 }

@@ -1,4 +1,4 @@
-//! `rig replay`: recorded logs through the controller again, bit by bit.
+//! `rig replay`: runs recorded logs through the controller again, bit by bit.
 
 use std::path::{Path, PathBuf};
 
@@ -14,17 +14,16 @@ use crate::scenario::Scenario;
 
 /// Runs recorded logs through the controller again; it must give the same bits.
 ///
-/// The parameters are those that the log has with it, or the preset that it names. The
-/// exit code is 1 at the first difference, which is shown, or if a part of a log could
-/// not be run again because something before it is missing.
+/// The parameters are those in the log, or the preset that it names. The exit code is 1 at
+/// the first difference, which is shown, or if a part of a log cannot be run again because
+/// something before it is missing.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Logs: MCAP, CSV of rows, or bytes of the channel.
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
 
-    /// Overrides a parameter, any number of times; for logs that do not have theirs with
-    /// them.
+    /// Overrides a parameter, any number of times; for logs without their parameters.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
 
@@ -65,17 +64,14 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
 /// The parameters of the controller that made a log.
 fn parameters(file: &Path, run: &Run, sets: &[String]) -> Result<Rig, Failure> {
     let header = run.header.as_ref();
-    let rig = match (&run.parameters, header) {
-        (Some(toml), _) => Scenario::parse("parameters of the log", toml, sets)?.rig,
-        (None, header) => {
-            let name = header.map_or("prototype", |header| header.rig.as_str());
-            Scenario::resolve(Some(name), None, sets)?.rig
-        }
+    let name = header.map_or("prototype", |header| header.rig.as_str());
+    let rig = match &run.parameters {
+        Some(toml) => Scenario::parse("parameters of the log", toml, sets)?.rig,
+        None => Scenario::resolve(Some(name), None, sets)?.rig,
     };
-    let made = header.map(|header| header.parameters.clone());
     let here = format!("{:08x}", fingerprint(&rig));
-    match made {
-        Some(made) if made != here => Err(Failure::input(format!(
+    match header.map(|header| &header.parameters) {
+        Some(made) if *made != here => Err(Failure::input(format!(
             "{}: made with parameters {made}, these are {here}: give the others with --set",
             file.display()
         ))),

@@ -2,19 +2,19 @@
 
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
+use serde_json::json;
 
 use super::failure::{Failure, Outcome};
-use super::output;
+use super::output::{self, WithFiles};
 use crate::files::{make_directory, write_text};
-use crate::record::{Recording, Summary, recording};
+use crate::record::{Recording, recording};
 use crate::report::{Difference, compare_html, differences, html};
 use crate::table;
 
 /// The page of a log as `deploy` writes it, or of two logs crossing by crossing.
 ///
-/// A log of the virtual rig has the truth in it; one that was captured shows what the
-/// controller believes.
+/// A log of the virtual rig contains the truth; a captured one shows the controller's
+/// estimates.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// The log: MCAP, CSV of rows, or bytes of the binary channel.
@@ -34,31 +34,12 @@ pub(super) struct Args {
     json: bool,
 }
 
-/// What `--json` prints of one log.
-#[derive(Serialize)]
-struct One<'a> {
-    #[serde(flatten)]
-    summary: &'a Summary,
-    files: [&'a Path; 1],
-}
-
-/// What `--json` prints of two.
-#[derive(Serialize)]
-struct Two<'a> {
-    differences: Vec<Difference>,
-    files: [&'a Path; 1],
-}
-
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
-    let first = read(&args.log)?;
+    let first = recording(&args.log).map_err(Failure::input)?;
     match &args.other {
         None => one(args, &first),
         Some(other) => two(args, &first, other),
     }
-}
-
-fn read(path: &Path) -> Result<Recording, Failure> {
-    recording(path).map_err(Failure::input)
 }
 
 /// Where the page goes.
@@ -71,31 +52,29 @@ fn page(args: &Args, ending: &str) -> Result<PathBuf, Failure> {
 }
 
 fn one(args: &Args, recording: &Recording) -> Result<Outcome, Failure> {
-    let page = page(args, "html")?;
-    write_text(&page, &html(recording, &[]))?;
-    let printed = One { summary: &recording.summary, files: [&page] };
-    output::result(args.json, &printed, || {
-        table::run(&recording.summary, std::slice::from_ref(&page))
-    })?;
+    let files = [page(args, "html")?];
+    write_text(&files[0], &html(recording, &[]))?;
+    let printed = WithFiles { result: &recording.summary, files: &files };
+    output::result(args.json, &printed, || table::run(&recording.summary, &files))?;
     Ok(Outcome::Good)
 }
 
 fn two(args: &Args, first: &Recording, path: &Path) -> Result<Outcome, Failure> {
-    let second = read(path)?;
-    let page = page(args, "compare.html")?;
+    let second = recording(path).map_err(Failure::input)?;
+    let files = [page(args, "compare.html")?];
     let names = (args.log.display().to_string(), path.display().to_string());
-    write_text(&page, &compare_html((&names.0, first), (&names.1, &second)))?;
-    let printed = Two { differences: differences(first, &second), files: [&page] };
-    output::result(args.json, &printed, || human(&printed))?;
+    write_text(&files[0], &compare_html((&names.0, first), (&names.1, &second)))?;
+    let differences = differences(first, &second);
+    let printed = json!({ "differences": differences, "files": files });
+    output::result(args.json, &printed, || human(&differences) + &output::wrote(&files))?;
     Ok(Outcome::Good)
 }
 
-fn human(printed: &Two<'_>) -> String {
-    let rows = printed.differences.iter().map(|difference| {
+fn human(differences: &[Difference]) -> String {
+    let rows = differences.iter().map(|difference| {
         let Difference { index, quantity, unit, decimals, a, b, change } = difference;
         let value = |value: &Option<f64>| table::number(*value, *decimals);
         vec![format!("{index}"), format!("{quantity}, {unit}"), value(a), value(b), value(change)]
     });
-    let table = table::plain(&["step", "quantity", "A", "B", "B - A"], rows);
-    format!("{table}\n  wrote {}\n", printed.files[0].display())
+    format!("{}\n", table::plain(&["step", "quantity", "A", "B", "B - A"], rows))
 }

@@ -11,11 +11,11 @@ use crate::table::plain;
 /// The plant at the ends of every range.
 ///
 /// Every case stays finite, in radial balance, with bounded penetration and without
-/// creating energy. Combinations that make no rig are refused by name before the run.
+/// creating energy. Impossible combinations are refused by name before the run.
 /// The ten thousand cases of the default take less than a minute.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// Cases, not counting those that have to be refused.
+    /// Cases, without those that must be refused.
     #[arg(short = 'n', long = "cases", value_name = "CASES", default_value_t = 10_000,
           value_parser = clap::value_parser!(u64).range(1..))]
     cases: u64,

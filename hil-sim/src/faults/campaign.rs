@@ -5,11 +5,9 @@ mod matrix;
 pub mod operator;
 pub mod twin;
 
-use std::borrow::Cow;
-
 use interstage::supervise::{Leg, Mode};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::judge::{Finding, Judge};
 use crate::plant::rig::VirtualRig;
@@ -17,7 +15,7 @@ use crate::scenario::Scenario;
 use crate::scenario::injection::{Injection, Kind, Target};
 use crate::session::{Options, RunError, Session};
 
-pub use case::{Case, StepFault};
+pub use case::Case;
 pub use matrix::{MatrixRow, MedianAndWorst, Outcome};
 use operator::Operator;
 use twin::Twin;
@@ -28,41 +26,37 @@ pub const LONGEST_S: f64 = 60.0;
 pub const AFTER_S: f64 = 1.0;
 
 /// What became of one fault at one instant.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Instant {
     /// Seed of the rig.
     pub seed: u64,
-    /// When the fault came, s since boot; none if it was there from the start.
+    /// When the fault came, s since boot; none if it was present from the start.
     pub at_s: Option<f64>,
     /// Measure of the fault, in the unit of the catalogue.
     pub magnitude: Option<f64>,
     /// What the drive was doing.
-    pub during: Cow<'static, str>,
+    pub during: &'static str,
     /// What became of it.
     pub finding: Finding,
     /// Code of the fault, or of the limit.
     pub code: Option<u16>,
     /// What restarted the controller, if something did and it was reported.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub restart: Option<Cow<'static, str>>,
-    /// From when the fault first did something to its report, ms. Where it lies in a bridge:
-    /// from when the duty was off by more than the readback's band.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub restart: Option<&'static str>,
+    /// From the first effect of the fault to its report, ms. Of a fault of a bridge: from when
+    /// the duty was off by more than the readback's band.
     pub latency_ms: Option<f64>,
-    /// The same from when the duty was off by two parts in a hundred, ms.
-    pub latency_any_ms: Option<f64>,
-    /// The same from when the plant first ran otherwise than without the fault, ms.
-    pub after_sign_ms: Option<f64>,
     /// From the report to rest with both bridges off, ms.
     pub rest_ms: Option<f64>,
     /// How the run ended.
-    pub end: Cow<'static, str>,
+    pub end: &'static str,
     /// Largest preload, N.
     pub peak_preload_n: f64,
     /// Distance moved uncommanded, mm.
     pub motion_mm: f64,
     /// Largest gap over the reference gap.
     pub gap_part: f64,
-    /// What the mechanism was not spared; empty if it was safe.
+    /// Which bounds of the mechanism were exceeded; empty if it was safe.
     pub harms: Vec<String>,
 }
 
@@ -78,13 +72,13 @@ pub struct Campaign {
 }
 
 impl Campaign {
-    /// Runs that it takes.
+    /// Number of its runs.
     #[must_use]
     pub fn runs(&self) -> u64 {
         (self.instants * (self.cases.len() + 1)) as u64
     }
 
-    /// Makes all of them, on all processors, and calls `done` after each. The outcome does
+    /// Runs it in software on all processors and calls `done` after each run. The outcome does
     /// not depend on the number of processors.
     ///
     /// # Errors
@@ -93,8 +87,8 @@ impl Campaign {
         self.run_on("sil", Twin::run, watched, done)
     }
 
-    /// Makes all of them on a target: each rig without a fault first, then every fault on
-    /// each. One that cannot be made counts as undetected.
+    /// Runs it on a target: each rig without a fault first, then every fault on each. A run
+    /// that cannot be made counts as undetected.
     ///
     /// # Errors
     /// Those of `twin`.
@@ -105,32 +99,31 @@ impl Campaign {
         watched: impl Fn(&Scenario, &Twin) -> Result<Instant, E> + Sync,
         done: &(dyn Fn() + Sync),
     ) -> Result<Outcome, E> {
-        let scenarios: Vec<Scenario> = (0..self.instants).map(|i| self.base(i)).collect();
-        let twin = |scenario: &Scenario| {
-            let twin = twin(scenario);
+        let rig = |instant: usize| {
+            let mut scenario = self.scenario.clone();
+            scenario.run.seed += 1 + instant as u64;
+            let twin = twin(&scenario)?;
             done();
-            twin
+            Ok((scenario, twin))
         };
-        let twins: Vec<Twin> = scenarios.par_iter().map(twin).collect::<Result<_, _>>()?;
+        let rigs = (0..self.instants).into_par_iter().map(rig).collect::<Result<Vec<_>, E>>()?;
         let row = |case: &Case| {
-            let one = |instant: usize| {
-                let twin = &twins[instant];
-                let scenario = case.scenario(&scenarios[instant], twin, instant);
+            let one = |(instant, (rig, twin)): (usize, &(Scenario, Twin))| {
+                let scenario = case.scenario(rig, twin, instant);
                 let found = watched(&scenario, twin);
                 done();
-                found.unwrap_or_else(|error| failed(&scenario, &error))
+                found.unwrap_or_else(|error| Instant {
+                    seed: scenario.run.seed,
+                    during: "at rest",
+                    end: "plant failed",
+                    harms: vec![error.to_string()],
+                    ..Instant::default()
+                })
             };
-            let instants: Vec<Instant> = (0..self.instants).into_par_iter().map(one).collect();
+            let instants: Vec<Instant> = rigs.par_iter().enumerate().map(one).collect();
             MatrixRow::of(case, &instants)
         };
         Ok(Outcome::of(target, self.cases.iter().map(row).collect(), self.instants))
-    }
-
-    /// Rig of an instant.
-    fn base(&self, instant: usize) -> Scenario {
-        let mut scenario = self.scenario.clone();
-        scenario.run.seed += 1 + instant as u64;
-        scenario
     }
 }
 
@@ -148,30 +141,8 @@ pub fn doing(mode: Mode) -> &'static str {
     }
 }
 
-/// A run that could not be made.
-fn failed(scenario: &Scenario, error: &impl std::fmt::Display) -> Instant {
-    Instant {
-        seed: scenario.run.seed,
-        at_s: None,
-        magnitude: None,
-        during: "at rest".into(),
-        finding: Finding::Undetected,
-        code: None,
-        restart: None,
-        latency_ms: None,
-        latency_any_ms: None,
-        after_sign_ms: None,
-        rest_ms: None,
-        end: "plant failed".into(),
-        peak_preload_n: 0.0,
-        motion_mm: 0.0,
-        gap_part: 0.0,
-        harms: vec![error.to_string()],
-    }
-}
-
 /// Largest gap over the reference gap, of crossings and elsewhere (`worst_mm`), and whether
-/// every step was crossed both ways.
+/// every step was crossed in both directions.
 #[must_use]
 pub fn crossed(plant: &VirtualRig, twin: &Twin, worst_mm: f64) -> (f64, bool) {
     let crossings = plant.ledger().crossings();
@@ -188,14 +159,13 @@ fn watched(scenario: &Scenario, twin: &Twin) -> Result<Instant, RunError> {
     let mut operator = Operator::default();
     let injection = scenario.run.faults.first();
     let reset = injection.filter(|fault| fault.target == Target::Reset).map(|fault| fault.kind);
-    let (mut during, mut sign_s, mut tick, mut after_s) = ("at rest", None, 0, 0.0);
-    let mut worst_mm = 0.0f64;
+    let (mut during, mut after_s, mut worst_mm) = ("at rest", 0.0, 0.0f64);
     while session.time_s() < LONGEST_S && after_s < AFTER_S {
         let t_s = session.time_s();
         let before = session.mode();
         let command = operator.command(before);
         let output = session.step(command)?;
-        let struck = injection.is_none() || session.struck_s().is_some();
+        let active = injection.is_none() || session.struck_s().is_some();
         if session.struck_s() == Some(t_s) {
             during = doing(before);
             if reset.is_some() {
@@ -203,15 +173,11 @@ fn watched(scenario: &Scenario, twin: &Twin) -> Result<Instant, RunError> {
             }
         }
         let truth = session.plant().truth();
-        judge.look(t_s, &output, truth, struck);
+        judge.look(t_s, &output, truth, active);
         if session.mode().moves() {
             worst_mm = worst_mm.max(truth.separation_mm);
         }
-        if struck && sign_s.is_none() && twin.differs(tick, truth) {
-            sign_s = Some(t_s);
-        }
         after_s = if operator.over(session.mode()) { after_s + 1e-3 } else { 0.0 };
-        tick += 1;
     }
     let (gap_part, crossed) = crossed(session.plant(), twin, worst_mm);
     let finding = judge.finding(&twin.limits, gap_part, crossed);
@@ -221,24 +187,21 @@ fn watched(scenario: &Scenario, twin: &Twin) -> Result<Instant, RunError> {
         let ((to_s, _), from_s) = (report?, from_s?);
         Some(1e3 * (to_s - from_s).max(0.0))
     };
-    let moving = injection.is_some_and(|fault| fault.target.moves());
     Ok(Instant {
         seed: scenario.run.seed,
         at_s,
         magnitude: injection.map(Injection::magnitude),
-        during: during.into(),
+        during,
         finding,
         code: report.map(|(_, code)| code),
         restart: reset.map(|kind| match kind {
-            Kind::Recorded => "reset by pin".into(),
-            _ => "reset by supply".into(),
+            Kind::Recorded => "reset by pin",
+            _ => "reset by supply",
         }),
-        // Found before it had to be is found at once.
+        // A report before the first effect has no latency.
         latency_ms: since(session.tells_s()).or(since(session.acts_s()).map(|_| 0.0)),
-        latency_any_ms: since(session.acts_s()),
-        after_sign_ms: if moving { since(sign_s.or(report.map(|r| r.0))) } else { None },
         rest_ms: judge.fault.and_then(|(at_s, _)| Some(1e3 * (judge.rest_s? - at_s).max(0.0))),
-        end: judge.end().into(),
+        end: judge.end(),
         peak_preload_n: judge.peak_preload_n,
         motion_mm: judge.motion_mm,
         gap_part,

@@ -1,10 +1,11 @@
-//! Judges a run with a fault by what is true and not by what the controller believes: was the mechanism held, did it move uncommanded, was the fault reported.
+//! Judges a run with a fault by the true state of the plant, not by the controller's estimate:
+//! was the mechanism held, did it move uncommanded, was the fault reported.
 
 use interstage::fault::{Fault, Limit};
 use interstage::supervise::Mode;
 use interstage::tick::{Event, Output};
 use interstage::units::Direction;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::plant::rig::Truth;
 use crate::scenario::Scenario;
@@ -32,7 +33,7 @@ pub const GAP_PART: f64 = 1.25;
 const REST_MM_S: f64 = 0.01;
 
 /// What became of a fault.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Finding {
     /// A fault was latched.
@@ -41,7 +42,8 @@ pub enum Finding {
     Limited,
     /// Nothing was reported, and the run ended as it should, within all bounds.
     Tolerated,
-    /// Nothing was reported, and the run left a bound or ended otherwise than it says.
+    /// Nothing was reported, and the run left a bound or did not end as it reports.
+    #[default]
     Undetected,
 }
 
@@ -50,7 +52,7 @@ pub enum Finding {
 pub struct Judge {
     limit_n: f64,
     ends_mm: (f64, f64),
-    /// How far from the end it stood whenever it said that it had arrived, mm, at most.
+    /// Largest distance from the end while it reported arrival, mm.
     off_mm: f64,
     position_mm: f64,
     asked_mm_s: f64,
@@ -62,7 +64,7 @@ pub struct Judge {
     pub fault: Option<(f64, u16)>,
     /// Limits since the fault came: when, s, and code.
     pub limits: Vec<(f64, u16)>,
-    /// When both bridges were off and nothing moved, for good so far, s.
+    /// Since when both bridges have been off and nothing has moved, s.
     pub rest_s: Option<f64>,
     mode: Mode,
     /// Distance that it may move uncommanded, mm.
@@ -100,22 +102,22 @@ impl Judge {
         }
     }
 
-    /// Looks at a tick: what the controller put out, and what is true after it. `struck`:
-    /// whether the fault has come.
-    pub fn look(&mut self, t_s: f64, output: &Output, truth: &Truth, struck: bool) {
+    /// Looks at a tick: the controller's output and the true state after it. `active`: the
+    /// fault is active.
+    pub fn look(&mut self, t_s: f64, output: &Output, truth: &Truth, active: bool) {
         let moved_mm = truth.position_mm - self.position_mm;
         self.position_mm = truth.position_mm;
         self.mode = output.telemetry.mode;
-        // What was asked lately: the wheel follows with a lag.
+        // The wheel follows the reference with a lag: the recent maximum counts.
         let asked = f64::from(output.telemetry.speed_ref.to_bits()) / 65_536.0;
         self.asked_mm_s = asked.abs().max(self.asked_mm_s - 250.0 * TICK_S);
-        if !struck {
+        if !active {
             return;
         }
         self.peak_preload_n = self.peak_preload_n.max(truth.preload_n);
         self.motion_mm += self.uncommanded(moved_mm);
-        if let Mode::Complete(way) = self.mode {
-            let end_mm = match way {
+        if let Mode::Complete(direction) = self.mode {
+            let end_mm = match direction {
                 Direction::Deploy => self.ends_mm.1,
                 Direction::Retract => self.ends_mm.0,
             };
@@ -138,7 +140,7 @@ impl Judge {
     /// Distance of a tick that was not commanded, mm.
     fn uncommanded(&self, moved_mm: f64) -> f64 {
         let direction = match self.mode {
-            Mode::Run(way, _) | Mode::Stopping(way) => way,
+            Mode::Run(direction, _) | Mode::Stopping(direction) => direction,
             _ => return moved_mm.abs(),
         };
         let along = match direction {
@@ -150,7 +152,7 @@ impl Judge {
         (along - most).max(-along - back).max(0.0)
     }
 
-    /// What the mechanism was not spared, in words; empty if it was safe.
+    /// Which bounds of the mechanism were exceeded, in words; empty if it was safe.
     #[must_use]
     pub fn harms(&self) -> Vec<String> {
         let mut harms = Vec::new();
@@ -159,8 +161,8 @@ impl Judge {
             harms.push(format!("preload {:.1} N, at most {most:.1}", self.peak_preload_n));
         }
         if self.motion_mm > self.most_mm {
-            let (way, most) = (self.motion_mm, self.most_mm);
-            harms.push(format!("{way:.2} mm uncommanded, at most {most}"));
+            let (moved, most) = (self.motion_mm, self.most_mm);
+            harms.push(format!("{moved:.2} mm uncommanded, at most {most}"));
         }
         if self.off_mm > POSITION_MM {
             harms.push(format!("{:.1} mm from the end it says it reached", self.off_mm));
@@ -181,7 +183,7 @@ impl Judge {
             _ => self.mode.is_at_rest(),
         };
         if let Some(kind) = self.reset {
-            // The start itself is reported: what counts is how the run goes on.
+            // The start itself is reported: the judgement is of the rest of the run.
             let ended = matches!(self.mode, Mode::Complete(_)) || self.fault.is_some();
             if ended && !self.false_alarm(kind) { Finding::Found } else { Finding::Undetected }
         } else if self.fault.is_some() {
@@ -195,8 +197,8 @@ impl Judge {
         }
     }
 
-    /// Whether a run after a reset reports what is not so. Only one that has lost its record,
-    /// or has it in doubt, may find that it does not know its position.
+    /// Whether a run after a reset reports something untrue. Only a run without a confirmed
+    /// record may report that its position is unknown.
     fn false_alarm(&self, kind: Kind) -> bool {
         let untrue =
             [Limit::StepExtra, Limit::StepMissing, Limit::CompressionStrange].map(Limit::code);
@@ -221,12 +223,6 @@ impl Judge {
             Mode::Boot | Mode::SelfTest | Mode::Zero => "start",
             Mode::Preload(_) | Mode::Run(..) | Mode::Stopping(_) => "under way",
         }
-    }
-
-    /// Mode in the last tick.
-    #[must_use]
-    pub const fn mode(&self) -> Mode {
-        self.mode
     }
 }
 
@@ -291,14 +287,14 @@ mod tests {
     }
 
     #[test]
-    fn the_first_fault_after_the_strike_counts() {
+    fn the_first_fault_after_the_injection_counts() {
         let mut judge = Judge::new(&Scenario::default(), &Truth::default());
         let mut output = Output::default();
-        let mut say = |at: u32, fault, struck| {
+        let mut say = |at: u32, fault, active| {
             output.events.clear();
             let event = Event::Fault(fault);
             output.events.push(Entry { at, event }).expect("room");
-            judge.look(f64::from(at) * TICK_S, &output, &Truth::default(), struck);
+            judge.look(f64::from(at) * TICK_S, &output, &Truth::default(), active);
         };
         say(1, Fault::SelfTest, false);
         say(2, Fault::ArmAngleStale, true);

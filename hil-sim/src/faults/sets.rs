@@ -1,8 +1,8 @@
-//! Sets of parameters in flash to be damaged: which are stored, which one a save brings, and
-//! how many places a fault of them can hit.
+//! Sets of parameters in flash for faults of them: the stored ones, the saved one, and the
+//! number of places that a fault can hit.
 //!
-//! All are of one rig, but for a little preload in those that are not in force, so that no
-//! two have the same bytes and each is known by its name.
+//! All are of one rig, with slightly more preload in those that are not active, so that no two
+//! have the same bytes; each is identified by its name.
 
 use interstage::params::CompileError;
 use interstage::params::slots::{PAGE_BYTES, SLOT_BYTES, WORD_BYTES, slot_image};
@@ -11,18 +11,18 @@ use interstage::rig::Rig;
 use crate::params::set_of;
 use crate::scenario::Scenario;
 
-/// Name of the set in force.
+/// Name of the active set.
 pub const KEPT: &str = "kept";
 /// Name of the one before it.
 pub const SPARE: &str = "spare";
-/// Name of the one that a save brings.
+/// Name of the set that is saved.
 pub const SAVED: &str = "saved";
 
-/// Number of the set in force. It is in the first slot.
+/// Number of the active set, which is in the first slot.
 const SEQUENCE: u32 = 7;
 /// Bits before a set in its slot.
 const PREFIX_BITS: u32 = 2 * 8 * WORD_BYTES as u32;
-/// Preload that the others have more, parts of a newton.
+/// Additional preload of the others, N.
 const MORE_N: f64 = 1.0 / 64.0;
 
 /// A set as it is stored.
@@ -37,7 +37,7 @@ pub fn set(name: &str, rig: &Rig) -> Result<Vec<u8>, CompileError> {
     set_of(name, &rig)
 }
 
-/// Both places in flash with the set in force and the spare one.
+/// Both slots in flash, with the active and the spare set.
 ///
 /// # Errors
 /// [`CompileError`] if the rig is not sound.
@@ -62,8 +62,8 @@ pub const fn seal_bits() -> u32 {
     PREFIX_BITS
 }
 
-/// Operations of the flash that a save of so many bytes takes: it erases, writes the set,
-/// its length and its seal.
+/// Operations of the flash in a save of this many bytes: it erases, writes the set, its length
+/// and its seal.
 #[must_use]
 pub const fn operations(length: usize) -> u32 {
     (SLOT_BYTES / PAGE_BYTES + length.div_ceil(WORD_BYTES) + 2) as u32

@@ -51,8 +51,8 @@ pub fn padded(range: (f64, f64), part: f64) -> (f64, f64) {
     (range.0 - margin, range.1 + margin)
 }
 
-/// Round numbers inside `range`, at most `most` of them, and how many decimals tell
-/// them apart.
+/// Round numbers inside `range`, at most `most` of them, and how many decimals
+/// distinguish them.
 pub fn ticks(range: (f64, f64), most: usize) -> (Vec<f64>, usize) {
     let rough = (range.1 - range.0) / most.max(1) as f64;
     if !(rough.is_finite() && rough > 0.0) {

@@ -93,19 +93,11 @@ pub(super) fn draw(view: &View, area: &Area) -> Drawn {
 
 /// Spans of the axis over which `of` stays the same.
 fn spans(view: &View, of: fn(&Tick) -> u8) -> Vec<(f64, f64, u8)> {
-    let mut spans: Vec<(f64, f64, u8)> = Vec::new();
-    for row in view.rows {
-        let (x, value) = (view.across.of(row), of(row));
-        match spans.last_mut() {
-            Some(last) if last.2 == value => last.1 = x,
-            Some(last) => {
-                last.1 = x;
-                spans.push((x, x, value));
-            }
-            None => spans.push((x, x, value)),
-        }
-    }
-    spans.into_iter().map(|(a, b, value)| (a.min(b), a.max(b), value)).collect()
+    let x = |row: &Tick| view.across.of(row);
+    let runs: Vec<&[Tick]> = view.rows.chunk_by(|a, b| of(a) == of(b)).collect();
+    let next = runs.iter().skip(1).map(|run| x(&run[0])).chain(view.rows.last().map(x));
+    let spans = runs.iter().zip(next).map(|(run, end)| (x(&run[0]), end, of(&run[0])));
+    spans.map(|(a, b, value)| (a.min(b), a.max(b), value)).collect()
 }
 
 /// The colours of the modes and stages that occur, as HTML.

@@ -4,7 +4,7 @@ use super::ledger::{COLUMNS, Column};
 use super::page::{head, section};
 use super::palette;
 use super::panel::{Line, Look, Panel};
-use super::panels::Across;
+use super::panels::{Across, View};
 use super::svg::{self, escape};
 use super::tables;
 use super::verdict::{gap_sentence, headline};
@@ -34,8 +34,7 @@ pub struct Difference {
     pub change: Option<f64>,
 }
 
-/// Every quantity that either run has of a crossing; crossings of one step are paired
-/// in their order.
+/// Every quantity of a crossing in either run; crossings of one step are paired in their order.
 #[must_use]
 pub fn differences(a: &Recording, b: &Recording) -> Vec<Difference> {
     let mut all = Vec::new();
@@ -67,7 +66,7 @@ fn pairs<'a>(a: &'a Recording, b: &'a Recording) -> Vec<Pair<'a>> {
     pairs
 }
 
-/// The page of two runs, which are called by these names.
+/// The page of two runs with their names.
 #[must_use]
 pub fn compare_html((name_a, a): (&str, &Recording), (name_b, b): (&str, &Recording)) -> String {
     let mut page = head("two runs");
@@ -99,7 +98,7 @@ fn table(differences: &[Difference]) -> String {
     tables::table("ledger", &head, rows.collect())
 }
 
-/// A plot: title, name of the axis, what it shows.
+/// A plot: title, name of the axis, quantity.
 type Plot = (&'static str, &'static str, fn(&Tick) -> f64);
 
 fn plots(a: &Recording, b: &Recording) -> String {
@@ -109,30 +108,19 @@ fn plots(a: &Recording, b: &Recording) -> String {
         ("Tread compression", "compression, mm", |row| row.controller.compression_mm),
         ("Radial position", "radius, mm", |row| row.controller.radius_mm),
     ];
+    let (a, b) = (View::new(a, Across::Position), View::new(b, Across::Position));
     let mut html = String::new();
     for (title, y_name, of) in plots {
-        let line = |name, colour, rows: &[Tick]| Line {
-            name,
-            look: Look::Other(colour),
-            points: rows
-                .iter()
-                .filter(|row| (5..=9).contains(&row.controller.mode))
-                .map(|row| (row.position_mm(), of(row)))
-                .collect(),
+        let line = |name, colour, view: &View| {
+            let moving = view.rows.iter().filter(|row| (5..=9).contains(&row.controller.mode));
+            let points = moving.map(|row| (row.position_mm(), of(row))).collect();
+            Line { name, look: Look::Other(colour), points }
         };
-        let rows = |run: &Recording| Across::Position.range(&run.rows);
-        let ((a0, a1), (b0, b1)) = (rows(a), rows(b));
         let panel = Panel {
-            title: title.to_owned(),
-            y_name,
-            x_name: Some(Across::Position.name()),
-            x: (a0.min(b0), a1.max(b1)),
-            y: None,
-            least_span: 0.0,
-            lines: vec![line("A", palette::SPEED, &a.rows), line("B", palette::PRELOAD, &b.rows)],
-            marks: Vec::new(),
-            levels: Vec::new(),
+            x: (a.x.0.min(b.x.0), a.x.1.max(b.x.1)),
+            lines: vec![line("A", palette::SPEED, &a), line("B", palette::PRELOAD, &b)],
             shades: Vec::new(),
+            ..a.panel(title, y_name)
         };
         html += &format!("<figure>{}</figure>\n", svg::fluid(SIZE, title, |area| panel.draw(area)));
     }

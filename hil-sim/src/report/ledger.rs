@@ -11,10 +11,9 @@ pub(crate) struct Column {
     pub(crate) unit: &'static str,
     pub(crate) decimals: usize,
     pub(crate) of: fn(&CrossingLine) -> Option<f64>,
-    /// The true value of what the controller predicts, measures or finds, and how far it is
-    /// off, as text.
+    /// The true value of a prediction or measurement, and the error as text.
     pub(crate) truth: Option<Truth>,
-    /// A terminal has no room for all.
+    /// Shown on a terminal, which has no room for all.
     pub(crate) on_terminal: bool,
 }
 
@@ -31,15 +30,15 @@ pub(crate) const COLUMNS: [Column; 13] = {
     const GAP: Option<Truth> = Some((|c| c.gap_mm, gap_error));
     const STEP: Option<Truth> = Some((|c| c.step_mm, step_error));
     [
-        new("gap", "mm", 4, |c| Some(c.gap_mm)),
-        Column { truth: GAP, ..new("predicted", "mm", 4, |c| c.gap_predicted_mm) },
-        Column { truth: GAP, ..new("measured", "mm", 4, |c| c.gap_measured_mm) },
+        new("gap", "mm", 3, |c| Some(c.gap_mm)),
+        Column { truth: GAP, ..new("predicted", "mm", 3, |c| c.gap_predicted_mm) },
+        Column { truth: GAP, ..new("measured", "mm", 3, |c| c.gap_measured_mm) },
         new("speed", "mm/s", 2, |c| Some(c.speed_mm_s)),
         new("preload", "N", 2, |c| Some(c.preload_n)),
         Column { on_terminal: false, ..new("peak preload", "N", 2, |c| Some(c.peak_preload_n)) },
         new("corner", "N", 1, |c| Some(c.corner_force_n)),
         Column { on_terminal: false, ..new("friction used", "", 2, |c| Some(c.peak_utilisation)) },
-        new("lead", "s", 3, |c| c.lead_time_s),
+        new("lead", "s", 2, |c| c.lead_time_s),
         new("slip", "mm", 3, |c| Some(c.slip_mm)),
         new("step at", "mm", 2, |c| Some(c.step_mm)),
         Column { truth: STEP, ..new("found at", "mm", 2, |c| c.step_found_mm) },

@@ -1,4 +1,4 @@
-//! Grid, axes and their text as all plots have them.
+//! Grid, axes and their text, for all plots.
 
 use plotters::chart::MeshStyle;
 use plotters::coord::ranged1d::Ranged;
@@ -11,8 +11,8 @@ use super::svg::size;
 /// Text of axes, CSS pixels.
 pub const TEXT_PX: f64 = 12.0;
 
-/// Lines at the ticks and none between them, and the text of a plot. What a plot wants
-/// otherwise it sets afterwards.
+/// Lines at the ticks and none between them, and the text of a plot. A plot may override them
+/// afterwards.
 pub fn plain<'m, 'a, 'b, X: Ranged, Y: Ranged, DB: DrawingBackend>(
     mesh: &'m mut MeshStyle<'a, 'b, X, Y, DB>,
 ) -> &'m mut MeshStyle<'a, 'b, X, Y, DB> {

@@ -3,7 +3,7 @@
 use super::panels::{Across, View};
 use super::svg::{self, escape};
 use super::verdict::{Grade, gap_sentence, headline};
-use super::{Section, band, crossings, tables};
+use super::{band, crossings, tables};
 use crate::record::Recording;
 use crate::table::number;
 
@@ -13,8 +13,18 @@ const SIZE: (u32, u32) = (1100, 240);
 /// Size of the bands, CSS pixels.
 const BAND_SIZE: (u32, u32) = (1100, 175);
 
-/// The page of `recording` with these sections more.
-pub(super) fn html(recording: &Recording, more: &[Section]) -> String {
+/// A section of a page beside those that every run has.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Section {
+    /// Its heading.
+    pub title: &'static str,
+    /// Its content, as HTML.
+    pub body: String,
+}
+
+/// The page of `recording`, with `more` sections. It needs no other file and no script.
+#[must_use]
+pub fn html(recording: &Recording, more: &[Section]) -> String {
     let s = &recording.summary;
     let title = escape(&format!("{} on {}, seed {}", s.direction, s.rig, s.seed));
     let grade = match Grade::of(s) {

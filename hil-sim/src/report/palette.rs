@@ -1,11 +1,11 @@
-//! One colour a quantity, one look a role, in every plot alike: truth is dark, what
-//! is asked for is dashed, what is sensed or estimated has the quantity's colour.
+//! One colour for a quantity, one look for a role, in every plot: truth is dark, references are
+//! dashed, measurements and estimates have the quantity's colour.
 
 use plotters::style::RGBColor;
 
-/// What is true.
+/// Truth.
 pub const TRUTH: RGBColor = RGBColor(0x1f, 0x29, 0x37);
-/// What is asked for; drawn dashed, see [`DASHES`].
+/// References; drawn dashed, see [`DASHES`].
 pub const WANTED: RGBColor = RGBColor(0x6b, 0x72, 0x80);
 /// Limits; drawn dashed, see [`DASHES`].
 pub const LIMIT: RGBColor = RGBColor(0xb9, 0x1c, 0x1c);

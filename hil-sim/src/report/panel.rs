@@ -5,7 +5,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
 use super::axis::{self, Scale};
-use super::decimate::{Pieces, decimate};
+use super::decimate::{decimate, inside};
 use super::mesh::{self, TEXT_PX};
 use super::palette;
 use super::svg::{Area, Drawn, SCALE, font, text_width};
@@ -26,41 +26,30 @@ const TITLE_PX: f64 = 14.0;
 /// What a line shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Look {
-    /// What a sensor said: thin, below the others.
+    /// A sensor's reading: thin, below the others.
     Measured(RGBColor),
-    /// What the plant did: dark and wide.
+    /// True state of the plant: dark and wide.
     Truth,
-    /// Something else that the plant did.
+    /// Another true state of the plant.
     Other(RGBColor),
-    /// What the controller believes: thin, above the truth.
+    /// The controller's estimate: thin, above the truth.
     Estimate(RGBColor),
-    /// What was asked for: dashed.
+    /// A reference: dashed.
     Wanted,
     /// A bound: dashed, red.
     Limit,
 }
 
 impl Look {
-    /// Order of drawing: what is wide or noisy stays below what is thin.
-    fn layer(self) -> u8 {
+    /// Order of drawing, wide or noisy lines below thin ones, and the stroke.
+    fn style(self) -> (u8, ShapeStyle) {
         match self {
-            Self::Measured(_) => 0,
-            Self::Other(_) => 1,
-            Self::Truth => 2,
-            Self::Estimate(_) => 3,
-            Self::Wanted => 4,
-            Self::Limit => 5,
-        }
-    }
-
-    fn style(self) -> ShapeStyle {
-        match self {
-            Self::Measured(colour) => colour.stroke_width(2),
-            Self::Truth => palette::TRUTH.stroke_width(5),
-            Self::Other(colour) => colour.stroke_width(4),
-            Self::Estimate(colour) => colour.stroke_width(3),
-            Self::Wanted => palette::WANTED.stroke_width(3),
-            Self::Limit => palette::LIMIT.stroke_width(2),
+            Self::Measured(colour) => (0, colour.stroke_width(2)),
+            Self::Other(colour) => (1, colour.stroke_width(4)),
+            Self::Truth => (2, palette::TRUTH.stroke_width(5)),
+            Self::Estimate(colour) => (3, colour.stroke_width(3)),
+            Self::Wanted => (4, palette::WANTED.stroke_width(3)),
+            Self::Limit => (5, palette::LIMIT.stroke_width(2)),
         }
     }
 }
@@ -148,12 +137,14 @@ impl Panel {
             .draw()?;
         for &(_, look, level) in &self.levels {
             let ends = [(self.x.0, level), (self.x.1, level)];
-            chart.draw_series([PathElement::new(ends, look.style())])?;
+            chart.draw_series([PathElement::new(ends, look.style().1)])?;
         }
         let columns = (wide as i32 - LEFT - RIGHT).max(1) as usize / 2;
-        for line in self.layers() {
-            for piece in self.pieces(line, y, columns) {
-                chart.draw_series([PathElement::new(piece, line.look.style())])?;
+        let mut lines: Vec<&Line> = self.lines.iter().collect();
+        lines.sort_by_key(|line| line.look.style().0);
+        for line in lines {
+            for piece in decimate(&line.points, self.x, y, columns) {
+                chart.draw_series([PathElement::new(piece, line.look.style().1)])?;
             }
         }
         for marks in &self.marks {
@@ -164,16 +155,6 @@ impl Panel {
             }
         }
         Ok(())
-    }
-
-    fn layers(&self) -> Vec<&Line> {
-        let mut lines: Vec<&Line> = self.lines.iter().collect();
-        lines.sort_by_key(|line| line.look.layer());
-        lines
-    }
-
-    fn pieces(&self, line: &Line, y: (f64, f64), columns: usize) -> Pieces {
-        decimate(line.points.iter().copied(), self.x, y, columns)
     }
 
     /// Vertical range of all that is shown.
@@ -221,7 +202,7 @@ impl Panel {
             match sample {
                 Sample::Line(look) => {
                     let ends = [(text - 32 * S, middle), (text - 6 * S, middle)];
-                    head.draw(&PathElement::new(ends, look.style()))?;
+                    head.draw(&PathElement::new(ends, look.style().1))?;
                 }
                 Sample::Mark(marks) => {
                     for part in mark(marks, (text - 13 * S, middle)) {
@@ -250,10 +231,6 @@ impl Sample<'_> {
         };
         room + text_width(name, TEXT_PX)
     }
-}
-
-fn inside(point: (f64, f64), x: (f64, f64), y: (f64, f64)) -> bool {
-    point.0 >= x.0 && point.0 <= x.1 && point.1 >= y.0 && point.1 <= y.1
 }
 
 /// One mark with a white rim at `at`.

@@ -1,4 +1,4 @@
-//! Drawing into SVG text, and the text that is drawn.
+//! Drawing into SVG text.
 
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -9,21 +9,21 @@ use super::palette;
 /// A drawing area of an SVG.
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-/// What drawing may end in; into a text it cannot fail.
+/// Result of drawing; into a text it cannot fail.
 pub type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
 
 /// Drawing units to one CSS pixel. The backend draws in whole units, so that lines
 /// are placed to half a pixel.
 pub const SCALE: u32 = 2;
 
-/// An SVG of `size` CSS pixels that is as wide as its surroundings and as bright, with
-/// `name` for those who do not see it.
+/// An SVG of `size` CSS pixels that scales to its container, on transparent ground, with `name`
+/// for screen readers.
 pub fn fluid(size: (u32, u32), name: &str, draw: impl FnOnce(&Area) -> Drawn) -> String {
     let attributes = format!(r#"role="img" aria-label="{}""#, escape(name));
     picture(size, &attributes, draw)
 }
 
-/// An SVG of just `size` CSS pixels on white ground.
+/// An SVG of exactly `size` CSS pixels on white ground.
 pub fn fixed(size: (u32, u32), draw: impl FnOnce(&Area) -> Drawn) -> String {
     let attributes = format!(r#"width="{}" height="{}""#, size.0, size.1);
     picture(size, &attributes, |area| {

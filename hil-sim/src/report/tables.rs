@@ -112,8 +112,8 @@ mod tests {
         let show = |gap_mm, gap_measured_mm| {
             cell(measured, &CrossingLine { gap_mm, gap_measured_mm, ..line })
         };
-        assert_eq!(show(1.5, Some(1.55)), "1.5500<small>+50 µm, +3.3 %</small>");
-        assert_eq!((show(1.5, None), show(f64::NAN, Some(1.55))), ("-".into(), "1.5500".into()));
+        assert_eq!(show(1.5, Some(1.55)), "1.550<small>+50 µm, +3.3 %</small>");
+        assert_eq!((show(1.5, None), show(f64::NAN, Some(1.55))), ("-".into(), "1.550".into()));
     }
 
     #[test]
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_and_limits_stand_in_order_of_time() {
+    fn faults_and_limits_are_in_the_order_of_time() {
         let html = reports(&example::faulted().summary);
         assert!(html.find("limit 201").unwrap() < html.find("fault 121").unwrap());
         assert!(html.contains("limit &amp; speed"));

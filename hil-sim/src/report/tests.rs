@@ -1,9 +1,10 @@
 pub(crate) mod example;
 
 use super::*;
+use crate::record::Recording;
 
 #[test]
-fn the_page_stands_alone_and_is_small() {
+fn the_page_needs_no_other_file_and_is_small() {
     let page = html(&example::deploy(), &[]);
     for outside in ["http://", "https://", "<script", "<link", "url(", "@import"] {
         let found = page.replace("http://www.w3.org/2000/svg", "");
@@ -13,7 +14,7 @@ fn the_page_stands_alone_and_is_small() {
 }
 
 #[test]
-fn the_page_shows_what_was_asked_for() {
+fn the_page_shows_every_plot_and_figure() {
     let recording = example::deploy();
     let page = html(&recording, &[]);
     // Six plots and the bands on two axes, six plots for each of three crossings.

@@ -1,8 +1,7 @@
-//! What the plant is stressed with: all corners of the ranges, and a low-discrepancy
-//! sequence between them.
+//! Cases of the stress: all corners of the ranges, and a low-discrepancy sequence between them.
 //!
-//! Every case can be: preload, load and spring press no more than the tread carries under
-//! the corner of its step. What cannot be is drawn apart, to see it refused.
+//! Every case is possible: preload, load and spring press no more than the tread carries under
+//! the corner of its step. Impossible cases are drawn separately: they must be refused.
 
 use serde::Serialize;
 
@@ -190,8 +189,8 @@ fn deepest(step_mm: f64) -> f64 {
     (DEEPEST * RADIUS_MM).min(HIGHEST * RADIUS_MM - step_mm)
 }
 
-/// Cases that cannot be, each with the name of its refusal: the first `count`, pressed with
-/// more than the tread carries, or braked with more momentum than it takes.
+/// Impossible cases, each with the name of its refusal: the first `count`, pressed with more
+/// than the tread carries, or braked with more momentum than it takes.
 #[must_use]
 pub(super) fn beyond(count: usize, seed: u64) -> Vec<(StressCase, &'static str)> {
     let changed = |case: StressCase| {

@@ -1,4 +1,4 @@
-//! A case on the whole rig: motor, arm, screw, friction and ring, along its course over
+//! A case on the complete rig: motor, arm, screw, friction and ring, along its course over
 //! the step, with its energies accounted for.
 
 use super::cases::{Course, RADIUS_MM, StressCase};
@@ -14,22 +14,23 @@ const BUDGET: f64 = 1000.0;
 /// Least number of steps of time.
 const LEAST_TICKS: f64 = 20.0;
 
-/// Force that is known no better than to the tolerance of the balance, N.
+/// Tolerance of the balance, N.
 const LEAST_N: f64 = 1e-2;
 
-/// Longest stride, mm: the distance of the fastest and longest step, cut into as many as the plant takes.
+/// Longest stride, mm: the distance of the fastest and longest tick over the plant's most
+/// strides.
 const LONGEST_MM: f64 = 0.16;
 
-/// What a run shows.
+/// Figures of a run.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Drove {
     /// Largest depth of the tread, mm.
     pub depth_mm: f64,
-    /// Largest radial force left unbalanced over what is balanced.
+    /// Largest unbalanced radial force over the balanced one.
     pub unbalanced: f64,
     /// Largest speed of the tread over that of the unloaded motor.
     pub overspeed: f64,
-    /// Energy that nothing put in, mJ.
+    /// Energy gained without a source, mJ.
     pub created_mj: f64,
     /// What the stated approximations can account for, mJ.
     pub allowed_mj: f64,
@@ -63,16 +64,16 @@ pub(super) fn plant(case: &StressCase) -> PlantParameters {
 
 fn ticks(case: &StressCase) -> usize {
     let per_tick = case.speed_mm_s * case.dt_s;
-    let way = 2.0 * case.reach_mm() + RADIUS_MM;
+    let travel = 2.0 * case.reach_mm() + RADIUS_MM;
     let strides = (per_tick / 0.02).ceil().clamp(1.0, BUDGET / LEAST_TICKS);
-    (way / per_tick).ceil().clamp(LEAST_TICKS, BUDGET / strides) as usize
+    (travel / per_tick).ceil().clamp(LEAST_TICKS, BUDGET / strides) as usize
 }
 
 /// Drives `case`.
 pub(super) fn run(case: &StressCase, plant: &PlantParameters) -> Result<Drove, PlantError> {
     let ticks = ticks(case);
-    let way = case.speed_mm_s * case.dt_s * ticks as f64;
-    let lead = (0.3 * way).clamp(0.01, 0.5 * RADIUS_MM);
+    let travel = case.speed_mm_s * case.dt_s * ticks as f64;
+    let lead = (0.3 * travel).clamp(0.01, 0.5 * RADIUS_MM);
     let start = if case.course == Course::Back { lead } else { -case.reach_mm() - 2.0 - lead };
     let mut rig = VirtualRig::new(plant.clone(), start, case.preload_n, case.dt_s)
         .with_speed(case.course.speed(0.0) * case.speed_mm_s);
@@ -81,7 +82,7 @@ pub(super) fn run(case: &StressCase, plant: &PlantParameters) -> Result<Drove, P
     // The screw does not move.
     let seat_n = before.preload_n - plant.spring_n_per_mm * (before.height_mm - RADIUS_MM);
     let (mut first, rest_mm) = (0.0, before.depth_mm);
-    let (mut wedged, mut misplaced, mut force) = (0.0, 0.0, 0.0f64);
+    let (mut arm_work, mut misplaced, mut force) = (0.0, 0.0, 0.0f64);
     let mut fastest = case.speed_mm_s;
     for tick in 0..ticks {
         let part = tick as f64 / ticks as f64;
@@ -91,18 +92,18 @@ pub(super) fn run(case: &StressCase, plant: &PlantParameters) -> Result<Drove, P
         rig.step(&Drives { drive, drive_on, ..Drives::default() }, case.dt_s)?;
         let now = *rig.truth();
         let rise = now.height_mm - before.height_mm;
-        // An arm that leans carries its load along as the wheel rises.
-        let lean = plant.arm.coupling * 0.5 * (now.arm_rad.tan() + before.arm_rad.tan());
-        wedged += plant.load_n * lean * rise;
+        // An inclined arm carries its load along as the wheel rises.
+        let slope = plant.arm.coupling * 0.5 * (now.arm_rad.tan() + before.arm_rad.tan());
+        arm_work += plant.load_n * slope * rise;
         force = force.max(force_of(&now));
         fastest = fastest.max(now.speed_mm_s.abs()).max(now.tread_mm_s.abs());
-        // Rolling resistance is taken from the carriage, that of a sliding wheel too, whose
-        // tread it would have to be taken from.
+        // Rolling resistance acts on the carriage, even of a sliding wheel, where it should act
+        // on the tread.
         let slid = (now.tread_mm_s - now.speed_mm_s) * case.dt_s;
         misplaced += (now.resistance_n * slid).max(0.0);
-        let held = mechanical(plant, &now, seat_n) + wedged - now.work_mj;
+        let held = mechanical(plant, &now, seat_n) + arm_work - now.work_mj;
         if tick == 0 {
-            // Brought to its speed in no time, the wheel rises in the first step.
+            // The speed is set in no time: the wheel rises in the first step.
             first = held;
         }
         let gained = held - first;
@@ -131,7 +132,7 @@ fn force_of(truth: &Truth) -> f64 {
 /// Kinetic and potential energy of masses, load and spring, mJ.
 fn mechanical(plant: &PlantParameters, truth: &Truth, seat_n: f64) -> f64 {
     let spring = plant.spring_n_per_mm;
-    // A spring that is slack pulls nothing.
+    // A slack spring does not pull.
     let pressed = (seat_n + spring * (truth.height_mm - RADIUS_MM)).max(0.0);
     let kinetic =
         plant.mass_kg * truth.speed_mm_s.powi(2) + plant.drive.mass_kg * truth.tread_mm_s.powi(2);

@@ -1,5 +1,5 @@
-//! A case on the ring alone: pushed, frictionless, along its course over the step. What
-//! wall and wheel put into the tread is accounted for: it may be lost, never gained.
+//! A case on the ring alone: pushed, frictionless, along its course over the step. Energy that
+//! wall and wheel put into the tread may be lost, never gained.
 
 use super::cases::{RADIUS_MM, StressCase};
 use crate::plant::balance::{Axial, Balance, BalanceError};
@@ -7,15 +7,14 @@ use crate::plant::draw::ELEMENTS;
 use crate::plant::ring::{Motion, Ring};
 use crate::plant::wall::{Step, Wall};
 
-/// Way of a ring step, mm, and the most ring steps in a step of time: as the plant has
-/// it for itself.
+/// Stride, mm, and the most strides in a step of time: those of the plant.
 const STRIDE_MM: f64 = 0.02;
 const MOST_STRIDES: f64 = 256.0;
 
 /// Ring steps of a run.
 const BUDGET: usize = 1000;
 
-/// What a run shows.
+/// Figures of a run.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Roll {
     /// Largest depth of the tread, mm.
@@ -38,12 +37,12 @@ pub(super) fn run(case: &StressCase) -> Result<Roll, BalanceError> {
     } else {
         BUDGET / 4
     };
-    // A run too short for the whole step begins somewhere on the step.
-    let way = stride * steps as f64;
-    let lead = (way * 0.4).min(0.5 * RADIUS_MM);
+    // A run too short for the complete step begins somewhere on the step.
+    let travel = stride * steps as f64;
+    let lead = (travel * 0.4).min(0.5 * RADIUS_MM);
     let sense = case.course.speed(0.0);
     let first = if sense > 0.0 { -reach - lead } else { lead };
-    let mut x = first + sense * case.phase * (longest - way).max(0.0);
+    let mut x = first + sense * case.phase * (longest - travel).max(0.0);
     let wall = Wall::new(vec![Step { position_mm: 0.0, height_mm: case.step_mm }]);
     let mut ring = Ring::new(case.ring());
     let balance = Balance {
@@ -76,13 +75,13 @@ pub(super) fn run(case: &StressCase) -> Result<Roll, BalanceError> {
             lift += dy.abs();
         }
         (y, forces) = (height, now);
-        // Written so that what is not a number shows.
+        // Written so that a value that is not finite shows.
         out.created_mj =
             if given.is_nan() { f64::NAN } else { out.created_mj.max(-given - stored) };
         out.depth_mm = if y.is_nan() { f64::NAN } else { out.depth_mm.max(contact.depth_mm) };
     }
-    // A corner between two elements is met by neither: the wheel knows heights to the
-    // distance of its elements, and work to that and the trapezoids of a stride.
+    // A corner between two elements touches neither: heights are known to the distance of the
+    // elements, work to that and the trapezoids of a stride.
     let grain = std::f64::consts::TAU * RADIUS_MM / ELEMENTS as f64 + stride;
     out.resolved_mj = case.preload_n * (grain + 0.01 * lift);
     Ok(out)

@@ -1,5 +1,5 @@
-//! The campaign of faults, at a few instants each: nothing undetected, nothing unsafe, and
-//! what must be found at once is found at once. `cargo rig faults` is the complete campaign.
+//! The campaign of faults at a few instants each: nothing undetected, nothing unsafe, and urgent
+//! faults are found at once. `cargo rig faults` is the complete campaign.
 
 use hil_sim::faults::campaign::{Campaign, Case, MatrixRow, Outcome};
 use hil_sim::scenario::Scenario;
@@ -25,7 +25,7 @@ fn every_fault_is_found_or_tolerated_and_the_mechanism_held() {
 }
 
 #[test]
-fn what_must_be_found_at_once_is() {
+fn urgent_faults_are_found_at_once() {
     let faults = [("drive runaway", 128), ("pretightener runaway", 129), ("tick overrun", 160)];
     let outcome = campaign(100, |name| faults.iter().any(|(fault, _)| name == *fault));
     for (fault, code) in faults {
@@ -48,7 +48,7 @@ fn a_silent_sensor_is_named_within_its_age() {
 }
 
 #[test]
-fn the_same_campaign_comes_out_the_same_on_any_number_of_processors() {
+fn a_campaign_is_the_same_on_any_number_of_processors() {
     let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
     let some = |name: &str| name == "angle stuck" || name == "commands random";
     let text = |outcome: &Outcome| serde_json::to_string(outcome).expect("JSON");
@@ -56,7 +56,7 @@ fn the_same_campaign_comes_out_the_same_on_any_number_of_processors() {
 }
 
 #[test]
-fn a_run_with_a_fault_of_its_scenario_ends_in_it_and_says_so() {
+fn a_run_with_a_fault_of_its_scenario_ends_in_it_and_reports_it() {
     let mut scenario = Scenario::default();
     let stuck = Injection::at(Target::PreloadSensor, Kind::Stuck, 0.0, 0.0);
     scenario.run.faults = vec![Injection { at_s: None, at_mm: Some(10.0), ..stuck }];
@@ -83,7 +83,7 @@ fn a_compression_sensor_that_is_far_off_from_before_boot_is_reported() {
 }
 
 #[test]
-fn a_log_that_nobody_reads_does_not_change_the_run() {
+fn a_log_without_a_reader_does_not_change_the_run() {
     let clean = Scenario::default();
     let mut gone = clean.clone();
     gone.run.faults = vec![Injection::at(Target::Log, Kind::Gone, 1.0, 0.0)];

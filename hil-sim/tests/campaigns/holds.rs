@@ -1,4 +1,4 @@
-//! Runs that cannot end well: each holds in the fault that says why, bridges off.
+//! Runs that cannot complete: each holds in the fault that names the cause, bridges off.
 
 use crate::common::{Bench, starter};
 use hil_sim::scenario::{Direction, Scenario};
@@ -6,12 +6,12 @@ use interstage::fault::Fault;
 use interstage::supervise::{Command, Mode};
 
 /// The prototype with these overrides, run to its end in this direction.
-fn run(sets: &[&str], way: Direction) -> Bench {
+fn run(sets: &[&str], direction: Direction) -> Bench {
     let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
     let mut scenario = Scenario::resolve(None, None, &sets).expect("a sound scenario");
-    scenario.run.direction = way;
+    scenario.run.direction = direction;
     let mut bench = Bench::idle(&scenario);
-    bench.give(starter(way));
+    bench.give(starter(direction));
     bench.finish();
     bench
 }
@@ -44,7 +44,7 @@ fn a_wheel_that_turns_on_the_spot_finds_no_steps() {
 }
 
 #[test]
-fn nothing_moves_where_no_step_can_tell_the_position() {
+fn nothing_moves_where_no_step_can_give_the_position() {
     let bench = run(&["rig.step_positions_mm=[]"], Direction::Retract);
     let from = bench.moments.first().expect("a tick").truth.position_mm;
     assert_eq!(bench.position_mm(), from);
@@ -52,7 +52,7 @@ fn nothing_moves_where_no_step_can_tell_the_position() {
 }
 
 #[test]
-fn a_reset_that_was_on_its_way_does_not_clear_a_fault_unseen() {
+fn a_reset_given_before_the_fault_does_not_clear_it() {
     let mut bench = run(&["plant.mu=0.3"], Direction::Deploy);
     bench.give(Command::Reset);
     assert_eq!(bench.mode(), Mode::FaultHold(Fault::WheelSlips));

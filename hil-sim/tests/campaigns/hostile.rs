@@ -1,9 +1,10 @@
-//! The controller under hostile inputs: on rigs at the ends of every parameter, with the
-//! least and largest codes, alternating ones and garbage, silent and lying clocks, plans
-//! that no planner would give. Nothing panics, and no bridge is on where none may be.
+//! The controller under hostile inputs: rigs at the ends of every parameter; least, largest,
+//! alternating and random codes; stale and wrong times; plans that no planner gives. Nothing
+//! panics, and no bridge is on in a mode that forbids it.
 //!
-//! Overflow is checked in this build: a sum that wraps unintended panics.
+//! Overflow is checked in this build: a sum that wraps by mistake panics.
 
+use super::parity;
 use hil_sim::session::Echo;
 use interstage::model::reduced::{Point, ReducedModel, Scale};
 use interstage::model::{Plan, PlanRequest, Planner, Review};
@@ -18,20 +19,20 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-/// What is fed to the controller.
+/// Inputs of the controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Feed {
     /// Every code at its least.
     Least,
     /// Every code at its largest.
     Largest,
-    /// Least and largest by turns.
+    /// Least and largest in alternation.
     Alternating,
-    /// Codes that mean something, of a rig that jumps about.
+    /// Valid codes of a rig that jumps.
     Jumping,
-    /// Any codes at any times.
+    /// Random codes at random times.
     Garbage,
-    /// Plausible codes at rest, plans and commands as wild as they come.
+    /// Plausible codes at rest, random plans and commands.
     Plans,
 }
 
@@ -95,7 +96,7 @@ fn fed(
             emergency_stop: feed == Feed::Garbage && random.random_range(0..400) == 0,
         };
         let output = controller.step(&mut state, &input);
-        // Sound bridges, or the controller would hold before it has met the rest.
+        // Sound bridges: with others the controller would hold before it meets the rest.
         let sound = echo.read(&output);
         bridges = match feed {
             Feed::Garbage if random.random_range(0..50) == 0 => None,
@@ -116,7 +117,7 @@ fn fed(
     None
 }
 
-/// What must not be put out whatever comes in.
+/// Outputs that no input may cause.
 fn unsafe_output(output: &Output) -> Option<String> {
     let mode = output.telemetry.mode;
     let drives = matches!(mode, Mode::Run(..) | Mode::Stopping(_));
@@ -149,10 +150,7 @@ fn frame(
         arm_angle: Some(Sample { code: AngleFrame::new(arm), at: now }),
         bridges,
     };
-    let even = |angle: u16| {
-        let angle = angle & 0x3FFF;
-        angle | ((angle.count_ones() & 1) as u16) << 15
-    };
+    let even = |angle: u16| angle & 0x3FFF | parity(angle & 0x3FFF);
     match feed {
         Feed::Least => made(0, 0, 0, 0),
         Feed::Largest => made(u16::MAX, u16::MAX, u16::MAX, u16::MAX),
@@ -216,7 +214,7 @@ fn wild(request: &PlanRequest, planner: &Planner, random: &mut ChaCha8Rng) -> Pl
     plan
 }
 
-/// The model at the corners of its arguments: what leaves its range, if anything does.
+/// The model at the corners of its arguments: a result out of its range, if there is one.
 fn asked(planner: &Planner, model: &ReducedModel) -> Option<String> {
     let ends = [Q16::MIN, Q16::from_num(-1), Q16::ZERO, Q16::DELTA, Q16::from_num(1), Q16::MAX];
     let (low, high) = model.gap_range();

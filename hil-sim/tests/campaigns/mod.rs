@@ -6,3 +6,8 @@ mod hostile;
 mod refine;
 mod settle;
 mod stress;
+
+/// The parity bit of an angle's word.
+fn parity(angle: u16) -> u16 {
+    ((angle.count_ones() & 1) as u16) << 15
+}

@@ -1,12 +1,11 @@
-//! Refined runs: how fast stride and step of time bring the plant to its limit.
+//! Convergence of the plant with stride and step of time.
 //!
-//! What is looked at must be smooth in what is refined: taken at a fixed place, reached by a
-//! whole number of strides, on a ring so fine that single elements do not show, and free of
-//! events, whose instants jump from stride to stride. The height of a wheel that is half way
-//! up a step is of the second order: the ring is exact in time for a depth that runs
-//! linearly. The work up to there is of the first: what a contact that begins between two
-//! strides has done is known to a stride. So is the distance of the rig over the step of time,
-//! its friction being that of the step's end.
+//! A figure must be smooth in what is refined: taken at a fixed position, reached by an integer
+//! number of strides, on a ring so fine that single elements do not show, and free of events,
+//! whose instants jump between strides. The height of a wheel halfway up a step is of second
+//! order: the ring is exact in time for a linear depth. The work up to there is of first order:
+//! the start of a contact is known to a stride. So is the distance of the rig over the step of
+//! time: its friction is that of the step's end.
 
 use hil_sim::plant::balance::{Axial, Balance};
 use hil_sim::plant::rig::{Drives, Resolution, VirtualRig};
@@ -27,7 +26,7 @@ const ROUNDING: f64 = 1e-8;
 /// Strides, mm.
 const STRIDES_MM: [f64; 3] = [0.08, 0.04, 0.02];
 
-/// Half way up the step of 4 mm, before its face, and where the wheel starts, mm.
+/// Halfway up the step of 4 mm, before its face, and where the wheel starts, mm.
 const PLACE_MM: f64 = -6.72;
 const FROM_MM: (f64, f64) = (-20.16, 10.08);
 
@@ -87,7 +86,7 @@ fn the_order_is_that_of_the_differences() {
     assert_eq!(order([1.0, 1.0, 1.0]), None);
 }
 
-/// Height of the wheel half way up the step, mm, and the work of the axial force up to there,
+/// Height of the wheel halfway up the step, mm, and the work of the axial force up to there,
 /// mJ, pushed at constant speed.
 fn climb(ring: RingParameters, speed: f64, preload_n: f64, stride: f64) -> Option<(f64, f64)> {
     let wall = Wall::new(vec![Step { position_mm: 0.0, height_mm: 4.0 }]);
@@ -121,9 +120,9 @@ fn distance(speed: f64, dt_s: f64) -> Option<f64> {
     let mut plant = Scenario::default().plant();
     plant.ripple.0 = 0.0;
     plant.drive.no_load_mm_s = 2.0 * speed;
-    // The step of time alone: no stride cuts it.
-    let whole = Resolution { stride_mm: 1e3, ..Resolution::default() };
-    let mut rig = VirtualRig::new(plant, 0.0, 33.3, dt_s).with_resolution(whole);
+    // The step of time alone: no stride divides it.
+    let undivided = Resolution { stride_mm: 1e3, ..Resolution::default() };
+    let mut rig = VirtualRig::new(plant, 0.0, 33.3, dt_s).with_resolution(undivided);
     for _ in 0..(0.2 / dt_s).round() as usize {
         rig.step(&Drives { drive: 0.5, drive_on: true, ..Drives::default() }, dt_s).ok()?;
     }

@@ -1,6 +1,7 @@
 //! No limit cycles: under constant inputs every filter, observer and loop settles to the last
-//! bit within a stated time, from the far end of its range as well.
+//! bit within a stated time, also from the far end of its range.
 
+use super::parity;
 use interstage::control::preload_loop::{PreloadLoop, PreloadLoopState};
 use interstage::control::profile::{Profile, ProfileState};
 use interstage::control::speed_loop::{SpeedLoop, SpeedLoopState};
@@ -14,11 +15,10 @@ use interstage::sense::{Senses, SensesState};
 use interstage::tick::{Controller, Input, State};
 use interstage::units::Q16;
 
-/// Ticks for which an output must last.
+/// Ticks for which an output must stay constant.
 const LASTS: u32 = 3000;
 
-/// Ticks after which the output of `step` changed no more, run until `within` and as long
-/// again as an output must last.
+/// The last tick in which the output of `step` changed, within `within` and [`LASTS`] more.
 fn settled_after<T: PartialEq>(within: u32, mut step: impl FnMut(u32) -> T) -> u32 {
     let (mut last, mut changed) = (None, 0);
     for tick in 0..within + LASTS {
@@ -139,7 +139,7 @@ fn sensed(rig: &Rig) {
             sensed.level,
         )
     });
-    // The whole tick, idle.
+    // The complete tick, idle.
     let controller = Controller::try_build(rig).expect("a preset");
     let mut state = State::default();
     assert_settles("controller at rest", 4000, |now| {
@@ -149,8 +149,4 @@ fn sensed(rig: &Rig) {
         telemetry.at = 0;
         (output.drive, output.preload, telemetry)
     });
-}
-
-fn parity(angle: u16) -> u16 {
-    ((angle.count_ones() & 1) as u16) << 15
 }

@@ -1,26 +1,15 @@
-//! Stress of plant and controller, and what may be left out of a tick without a trace.
+//! Stress of plant and controller; skipped stages change no output.
 
-use hil_sim::scenario::{Direction, Scenario};
+use crate::common::{DIRECTIONS, scenario, starter};
+use hil_sim::scenario::Scenario;
 use hil_sim::session::{Options, Session};
 use hil_sim::stress::{self, Figure};
-use interstage::supervise::{Command, Leg, Mode};
+use interstage::supervise::{Leg, Mode};
 use interstage::tick::Output;
 
-/// A whole run of `scenario`: `look` at every output.
-fn run(
-    scenario: &Scenario,
-    options: Options,
-    without_skipping: bool,
-    mut look: impl FnMut(&Output),
-) {
-    let mut session = Session::new(scenario, options).unwrap();
-    if without_skipping {
-        session = session.without_skipping();
-    }
-    let mut start = Some(match scenario.run.direction {
-        Direction::Deploy => Command::Start,
-        Direction::Retract => Command::Retract,
-    });
+/// A complete run of `session`: `look` at every output.
+fn run(mut session: Session, scenario: &Scenario, mut look: impl FnMut(&Output)) {
+    let mut start = Some(starter(scenario.run.direction));
     while !matches!(session.mode(), Mode::Complete(_)) {
         assert!(session.time_s() < 60.0, "{:?}", session.mode());
         let command = if session.mode() == Mode::Idle { start.take() } else { None };
@@ -30,18 +19,14 @@ fn run(
 
 #[test]
 fn a_stage_that_is_skipped_leaves_no_trace_in_the_outputs() {
-    for direction in [Direction::Deploy, Direction::Retract] {
-        let mut scenario = Scenario::default();
-        scenario.run.direction = direction;
-        let outputs = |without_skipping| {
+    for direction in DIRECTIONS {
+        let scenario = scenario("prototype", direction, 0);
+        let session = || Session::new(&scenario, Options::default()).unwrap();
+        let [skipping, not] = [session(), session().without_skipping()].map(|session| {
             let mut outputs = Vec::new();
-            let options = Options::default();
-            run(&scenario, options, without_skipping, |output| {
-                outputs.push(format!("{output:?}"));
-            });
+            run(session, &scenario, |output| outputs.push(format!("{output:?}")));
             outputs
-        };
-        let (skipping, not) = (outputs(false), outputs(true));
+        });
         assert!(skipping.len() > 3000);
         assert_eq!(skipping.len(), not.len());
         for (a, b) in skipping.iter().zip(&not) {
@@ -55,7 +40,7 @@ fn shaken(scenario: &Scenario) -> Vec<f64> {
     let mut peaks = Vec::new();
     let mut crossing = false;
     let options = Options { speed: Some((8.0, true)), ..Options::default() };
-    run(scenario, options, false, |output| {
+    run(Session::new(scenario, options).unwrap(), scenario, |output| {
         let now = matches!(output.telemetry.mode, Mode::Run(_, Leg::Crossing));
         if crossing && !now {
             peaks.push(output.telemetry.vibration.to_num::<f64>() * 1e3);
@@ -66,7 +51,7 @@ fn shaken(scenario: &Scenario) -> Vec<f64> {
 }
 
 #[test]
-fn a_crossing_at_resonance_is_seen_to_shake() {
+fn a_crossing_at_resonance_shows_vibration() {
     // Kept away from the modes, the arm shakes less than the sensor's noise, 2 um.
     let quiet = shaken(&Scenario::default());
     assert_eq!(quiet.len(), 3);
@@ -80,14 +65,14 @@ fn a_crossing_at_resonance_is_seen_to_shake() {
 }
 
 #[test]
-fn the_plant_stands_the_corners_of_its_ranges() {
+fn the_plant_withstands_the_corners_of_its_ranges() {
     let report = stress::run(200, 1, &|| {});
     assert_eq!(report.cases, 200);
     assert!(report.failed.is_empty(), "{:#?}", report.failed);
-    // Refused is what cannot be and nothing else, each with its parameters and its limit.
+    // Only impossible cases are refused, each with its parameters and its limit.
     assert_eq!(report.refused.values().map(|refused| refused.count).sum::<usize>(), 10);
     assert!(report.refused.values().all(|refused| refused.example.contains("at most")));
-    // The figures are looked at: somewhere each comes near its limit.
+    // Each figure comes near its limit in some case.
     for figure in [Figure::RingPenetration, Figure::Penetration, Figure::Unbalanced] {
         let worst = report.worst.iter().find(|worst| worst.figure == figure).unwrap();
         assert!(worst.value > 0.2, "{worst:?}");

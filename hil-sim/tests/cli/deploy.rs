@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::{code, is_empty, object, rig, rig_in, said};
+use super::{code, is_empty, object, rig, rig_in, stdout};
 
 /// Keys of the summary that others rely on.
 const KEYS: [&str; 12] = [
@@ -69,11 +69,11 @@ fn writes_its_files_and_prints_every_key() {
 }
 
 #[test]
-fn a_directory_of_ones_own_and_a_table_for_people() {
+fn files_go_to_the_given_directory_and_a_table_is_printed() {
     let directory = tempfile::tempdir().unwrap();
     let output = rig_in(directory.path(), &["deploy", "--out", "mine/run"]);
     assert_eq!(code(&output), 0);
-    let text = said(&output);
+    let text = stdout(&output);
     assert!(text.starts_with("Deployed "), "{text}");
     assert!(text.contains("wrote mine/run/report.html"), "{text}");
     assert!(directory.path().join("mine/run/log.csv").is_file());

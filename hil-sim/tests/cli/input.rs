@@ -1,27 +1,6 @@
 //! What cannot be run as asked: exit code 2, one line that names it, no files.
 
-use std::path::Path;
-
-use super::{code, is_empty, rig_in};
-
-/// Runs the command and expects it to refuse, naming each of `names`.
-fn refused_in(directory: &Path, arguments: &[&str], names: &[&str]) {
-    let output = rig_in(directory, arguments);
-    let text = String::from_utf8(output.stderr.clone()).unwrap();
-    assert_eq!(code(&output), 2, "{arguments:?}: {text}");
-    assert!(output.stdout.is_empty(), "{arguments:?}");
-    assert!(text.starts_with("error: ") && text.ends_with('\n'), "{text:?}");
-    assert_eq!(text.lines().count(), 1, "{text}");
-    for name in names {
-        assert!(text.contains(name), "{name}: {text}");
-    }
-}
-
-fn refused(arguments: &[&str], names: &[&str]) {
-    let directory = tempfile::tempdir().unwrap();
-    refused_in(directory.path(), arguments, names);
-    assert!(is_empty(directory.path()), "{arguments:?} left files");
-}
+use super::{refused, refused_in};
 
 #[test]
 fn parameters_are_checked_before_anything_is_written() {
@@ -45,15 +24,32 @@ fn parameters_are_checked_before_anything_is_written() {
 
 #[test]
 fn options_are_checked_by_name() {
-    refused(&["deploy", "--rig", "moon"], &["--rig", "moon", "prototype"]);
-    refused(&["deploy", "--controller", "clever"], &["--controller", "scheduled"]);
-    refused(&["deploy", "--seed", "x"], &["--seed", "'x'"]);
-    refused(&["deploy", "--seed", "-1"], &["-1"]);
-    refused(&["deploy", "--seed", "18446744073709551615"], &["run.seed"]);
-    refused(&["deploy", "--target", "moon"], &["--target moon", "available targets: sil, board"]);
-    refused(&["deploy", "--sead", "1"], &["--sead"]);
-    refused(&["deploy", "--out", "a", "--no-files"], &["--out", "--no-files"]);
-    refused(&["fly"], &["fly"]);
+    for (arguments, names) in [
+        ("deploy --rig moon", &["--rig", "moon", "prototype"][..]),
+        ("deploy --controller clever", &["--controller", "scheduled"]),
+        ("deploy --seed x", &["--seed", "'x'"]),
+        ("deploy --seed -1", &["-1"]),
+        ("deploy --seed 18446744073709551615", &["run.seed"]),
+        ("deploy --target moon", &["--target <TARGET>", "moon", "sil, board, probe"]),
+        ("deploy --sead 1", &["--sead"]),
+        ("deploy --out a --no-files", &["--out", "--no-files"]),
+        ("fly", &["fly"]),
+        ("montecarlo -n 0", &["-n"]),
+        ("montecarlo -n -3", &["-3"]),
+        ("montecarlo -n 4 --shard 5/4", &["--shard", "i/n"]),
+        ("keys --rig moon", &["--rig"]),
+        ("faults --only gremlin", &["--only gremlin: no such fault", "preload-sensor stuck"]),
+        ("live", &["no terminal"]),
+        ("live --headless --listen nowhere", &["--listen nowhere"]),
+        ("capture --target moon", &["--target <TARGET>"]),
+        ("capture --stream /nowhere/line.bin", &["/nowhere/line.bin"]),
+        ("replay /nowhere/log.mcap", &["/nowhere/log.mcap"]),
+        ("identify", &["<LOG>"]),
+        ("identify missing.mcap", &["missing.mcap: No such file"]),
+        ("identify --published notes.csv", &["cannot be used with"]),
+    ] {
+        refused(&arguments.split(' ').collect::<Vec<_>>(), names);
+    }
 }
 
 #[test]
@@ -78,7 +74,17 @@ fn scenario_files_are_checked() {
 }
 
 #[test]
-fn a_place_that_cannot_be_written_is_told() {
+fn what_is_no_log_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    std::fs::write(directory.path().join("log.mcap"), "hello").unwrap();
+    std::fs::write(directory.path().join("notes.csv"), "a,b\n1,2\n").unwrap();
+    refused_in(directory.path(), &["replay", "log.mcap"], &["no log"]);
+    refused_in(directory.path(), &["report", "log.mcap"], &["no log"]);
+    refused_in(directory.path(), &["identify", "notes.csv"], &["notes.csv: it holds no tick"]);
+}
+
+#[test]
+fn a_directory_that_cannot_be_written_is_reported() {
     let directory = tempfile::tempdir().unwrap();
     std::fs::write(directory.path().join("taken"), "mine").unwrap();
     refused_in(directory.path(), &["deploy", "--out", "taken"], &["--out taken"]);
@@ -106,14 +112,4 @@ fn a_crossing_has_a_range_of_speed_and_preload() {
         &["crossing", "--speed-mm-s", "5", "--preload-n", "33", "--set", "tread.tau_s=0"],
         &["tread.tau_s"],
     );
-}
-
-#[test]
-fn the_other_verbs_name_what_they_refuse_too() {
-    for shard in ["0/4", "5/4", "1/0", "a/b", "1"] {
-        refused(&["montecarlo", "-n", "4", "--shard", shard], &["--shard", "i/n"]);
-    }
-    refused(&["montecarlo", "-n", "0"], &["-n"]);
-    refused(&["montecarlo", "-n", "-3"], &["-3"]);
-    refused(&["keys", "--rig", "moon"], &["--rig"]);
 }

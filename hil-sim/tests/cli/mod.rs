@@ -1,12 +1,10 @@
 //! The `rig` command as a user meets it: arguments, JSON, exit codes, files.
 
+mod campaigns;
 mod crossing;
 mod deploy;
-mod faults;
-mod flash;
 mod input;
 mod logs;
-mod montecarlo;
 mod others;
 
 use std::path::Path;
@@ -15,7 +13,7 @@ use std::process::{Command, Output};
 use serde_json::Value;
 
 /// Runs the command in `directory`.
-fn rig_in(directory: &Path, arguments: &[&str]) -> Output {
+pub(crate) fn rig_in(directory: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_rig"))
         .current_dir(directory)
         .args(arguments)
@@ -30,20 +28,24 @@ fn rig(arguments: &[&str]) -> Output {
 }
 
 /// The exit code.
-fn code(output: &Output) -> i32 {
+pub(crate) fn code(output: &Output) -> i32 {
     output.status.code().expect("the command was not killed")
 }
 
 /// Standard output as text.
-fn said(output: &Output) -> &str {
+fn stdout(output: &Output) -> &str {
     std::str::from_utf8(&output.stdout).expect("text")
 }
 
+/// Standard error as text.
+pub(crate) fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
 /// The one JSON object on standard output.
-fn object(output: &Output) -> Value {
-    let stderr = String::from_utf8_lossy(&output.stderr);
+pub(crate) fn object(output: &Output) -> Value {
     let value: Value = serde_json::from_slice(&output.stdout)
-        .unwrap_or_else(|error| panic!("no JSON: {error}; {stderr}"));
+        .unwrap_or_else(|error| panic!("no JSON: {error}; {}", stderr(output)));
     assert!(value.is_object(), "{value}");
     value
 }
@@ -51,13 +53,34 @@ fn object(output: &Output) -> Value {
 /// The object of a command that must end well.
 fn good(arguments: &[&str]) -> Value {
     let output = rig(arguments);
-    assert_eq!(code(&output), 0, "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(code(&output), 0, "{arguments:?}: {}", stderr(&output));
     object(&output)
 }
 
 /// The number at `key`.
 fn number(value: &Value, key: &str) -> f64 {
     value[key].as_f64().unwrap_or_else(|| panic!("{key} is no number in {value}"))
+}
+
+/// Runs the command in `directory` and expects it to refuse in one line that names each of
+/// `names`.
+pub(crate) fn refused_in(directory: &Path, arguments: &[&str], names: &[&str]) {
+    let output = rig_in(directory, arguments);
+    let text = stderr(&output);
+    assert_eq!(code(&output), 2, "{arguments:?}: {text}");
+    assert!(output.stdout.is_empty(), "{arguments:?}");
+    assert!(text.starts_with("error: ") && text.ends_with('\n'), "{text:?}");
+    assert_eq!(text.lines().count(), 1, "{text}");
+    for name in names {
+        assert!(text.contains(name), "{name}: {text}");
+    }
+}
+
+/// The same where no file may be left.
+fn refused(arguments: &[&str], names: &[&str]) {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    refused_in(directory.path(), arguments, names);
+    assert!(is_empty(directory.path()), "{arguments:?} left files");
 }
 
 /// Whether `directory` is empty.

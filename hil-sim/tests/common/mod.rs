@@ -6,6 +6,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use hil_sim::plant::ledger::Crossing;
 use hil_sim::plant::rig::Truth;
+pub(crate) use hil_sim::record::starter;
 use hil_sim::scenario::{Direction, Scenario};
 use hil_sim::session::{Options, Session};
 use interstage::fault::Fault;
@@ -14,8 +15,8 @@ use interstage::supervise::{Command, Mode};
 use interstage::tick::{CrossingRecord, Entry, Event, Telemetry};
 use interstage::units::MotorCommand;
 
-/// Both ways of a run.
-pub(crate) const WAYS: [Direction; 2] = [Direction::Deploy, Direction::Retract];
+/// Both directions of a run.
+pub(crate) const DIRECTIONS: [Direction; 2] = [Direction::Deploy, Direction::Retract];
 
 /// Both rigs.
 pub(crate) const RIGS: [&str; 2] = ["prototype", "fe"];
@@ -23,7 +24,7 @@ pub(crate) const RIGS: [&str; 2] = ["prototype", "fe"];
 /// Largest gross slip of a run that counts as none, mm.
 pub(crate) const NO_SLIP_MM: f64 = 0.05;
 
-/// A run of a preset.
+/// A run of a preset's rig.
 pub(crate) fn scenario(preset: &str, direction: Direction, seed: u64) -> Scenario {
     let mut scenario = Scenario::named(preset).expect("a preset");
     scenario.run.direction = direction;
@@ -31,23 +32,15 @@ pub(crate) fn scenario(preset: &str, direction: Direction, seed: u64) -> Scenari
     scenario
 }
 
-/// The command that begins a run this way.
-pub(crate) fn starter(direction: Direction) -> Command {
-    match direction {
-        Direction::Deploy => Command::Start,
-        Direction::Retract => Command::Retract,
-    }
-}
-
-/// The other way.
-pub(crate) fn back(direction: Direction) -> Direction {
+/// The opposite direction.
+pub(crate) fn opposite(direction: Direction) -> Direction {
     match direction {
         Direction::Deploy => Direction::Retract,
         Direction::Retract => Direction::Deploy,
     }
 }
 
-/// Axial position at which a run this way ends, mm.
+/// Axial position at which a run in this direction ends, mm.
 pub(crate) fn end_mm(scenario: &Scenario, direction: Direction) -> f64 {
     match direction {
         Direction::Deploy => scenario.rig.rig.travel_mm,
@@ -55,7 +48,7 @@ pub(crate) fn end_mm(scenario: &Scenario, direction: Direction) -> f64 {
     }
 }
 
-/// Checks every case, and names all that fail.
+/// Checks every case and names all that fail.
 pub(crate) fn check_each<C>(cases: impl IntoIterator<Item = C>, check: impl Fn(&C)) {
     let failed = |case| {
         let panic = catch_unwind(AssertUnwindSafe(|| check(&case))).err()?;
@@ -65,7 +58,7 @@ pub(crate) fn check_each<C>(cases: impl IntoIterator<Item = C>, check: impl Fn(&
     assert!(failed.is_empty(), "{} cases failed:\n{}", failed.len(), failed.join("\n"));
 }
 
-/// One millisecond: what the controller put out, and what is true after it.
+/// One millisecond: the controller's output and the true state after it.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Moment {
     /// The controller's row.
@@ -208,7 +201,7 @@ impl Bench {
         })
     }
 
-    /// Codes of the limits that tell of steps out of place.
+    /// Codes of the limits that report steps out of place.
     pub(crate) fn step_codes(&self) -> Vec<u16> {
         let codes = self.pick(|event| match event {
             Event::Limit(limit) => Some(limit.code()),

@@ -1,18 +1,15 @@
-//! Identification from logs: hidden parameters are found within their intervals, the
-//! command reads the files of a deployment, and what it writes can be run.
+//! Identification from logs: hidden parameters are within their intervals, the command reads
+//! the files of a deployment, and the scenario that it writes can be run.
 
 mod hidden;
 
 use std::collections::BTreeMap;
-use std::path::Path;
-use std::process::{Command, Output};
 
+use crate::cli::{code, object, rig_in, stderr};
+use hidden::Line;
 use hil_sim::identify::published::{self, AMPLITUDE_MM};
 use hil_sim::scenario::Scenario;
 use hil_sim::testing::long;
-use serde_json::Value;
-
-use hidden::Line;
 
 #[test]
 fn hidden_parameters_lie_within_their_intervals() {
@@ -24,7 +21,7 @@ fn hidden_parameters_lie_within_their_intervals() {
     assert_eq!(lines.len(), 17);
     let (mut within, mut all) = (0, 0);
     for (name, line) in &lines {
-        // Of a hundred, two have a run that does not start.
+        // Two of a hundred rigs have a run that does not start.
         assert!(line.identified + cases as usize / 20 >= cases as usize, "{name}: {line:?}");
         // Of ten at 95 %, fewer than seven is one in a thousand.
         assert!(10 * line.within >= 7 * line.identified, "{name}: {line:?}");
@@ -75,18 +72,6 @@ fn three_published_gaps_are_met_as_far_as_the_ring_can() {
     assert!(square(&held) < square(&stated) && square(&held) > square(&fitted));
 }
 
-fn rig(directory: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_rig"))
-        .current_dir(directory)
-        .args(arguments)
-        .output()
-        .expect("the command starts")
-}
-
-fn said(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
 #[test]
 fn the_command_reads_what_deployments_leave_and_writes_what_one_can_run() {
     let directory = tempfile::tempdir().unwrap();
@@ -97,13 +82,13 @@ fn the_command_reads_what_deployments_leave_and_writes_what_one_can_run() {
     ];
     for (name, arguments) in runs {
         let arguments = [&["deploy", "--out", name], arguments].concat();
-        let output = rig(at, &arguments);
-        assert!(output.status.success(), "{}", said(&output));
+        let output = rig_in(at, &arguments);
+        assert_eq!(code(&output), 0, "{}", stderr(&output));
     }
     let output =
-        rig(at, &["identify", "fast/log.mcap", "light/log.mcap", "--out", "found", "--json"]);
-    assert!(output.status.success(), "{}", said(&output));
-    let found: Value = serde_json::from_slice(&output.stdout).expect("one object");
+        rig_in(at, &["identify", "fast/log.mcap", "light/log.mcap", "--out", "found", "--json"]);
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    let found = object(&output);
     assert!(found["degrees_of_freedom"].as_u64().unwrap() > 1000);
     assert!(found["residuals"].as_array().unwrap().len() == 8, "{found}");
     let parameters = found["parameters"].as_array().unwrap();
@@ -117,25 +102,6 @@ fn the_command_reads_what_deployments_leave_and_writes_what_one_can_run() {
     for file in found["files"].as_array().unwrap() {
         assert!(at.join(file.as_str().unwrap()).is_file(), "{file}");
     }
-    let output = rig(at, &["deploy", "found/identified.toml", "--no-files", "--json"]);
-    assert!(output.status.success(), "{}", said(&output));
-}
-
-#[test]
-fn what_is_no_log_is_one_clear_line_and_exit_code_2() {
-    let directory = tempfile::tempdir().unwrap();
-    std::fs::write(directory.path().join("notes.csv"), "a,b\n1,2\n").unwrap();
-    for (arguments, expected) in [
-        (&["identify", "missing.mcap"][..], "missing.mcap: No such file"),
-        (&["identify", "notes.csv"][..], "notes.csv: it holds no tick"),
-        (&["identify"][..], "<LOG>"),
-        (&["identify", "--published", "notes.csv"][..], "cannot be used with"),
-    ] {
-        let output = rig(directory.path(), arguments);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
-        let said = said(&output);
-        assert_eq!(said.trim_end().lines().count(), 1, "{said}");
-        assert!(said.contains(expected), "{said}");
-        assert!(output.stdout.is_empty());
-    }
+    let output = rig_in(at, &["deploy", "found/identified.toml", "--no-files", "--json"]);
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
 }

@@ -20,7 +20,7 @@ pub(crate) fn nominal(preset: &str) -> PlantParameters {
 }
 
 /// A plant whose preload and speed are what is asked for: no spring, no ripple, an arm
-/// that does not wedge, a drive that does not yield.
+/// without thrust on the wheel, a drive that does not yield.
 pub(crate) fn ideal(preset: &str) -> PlantParameters {
     let mut plant = nominal(preset);
     plant.spring_n_per_mm = 0.0;
@@ -71,7 +71,12 @@ pub(crate) fn drive(plant: &PlantParameters, speed_mm_s: f64) -> Drives {
     Drives { drive: speed_mm_s / plant.drive.no_load_mm_s, drive_on: true, ..Drives::default() }
 }
 
-/// Rolls a rig, its tread held at this speed and its screw locked, until it stands past
+/// Steps a rig for this many ticks under these commands.
+pub(crate) fn steps(rig: &mut VirtualRig, drives: &Drives, ticks: u32) {
+    (0..ticks).for_each(|_| rig.step(drives, TICK_S).unwrap());
+}
+
+/// Rolls a rig, its tread held at this speed and its screw locked, until it has passed
 /// `to_mm` or the time is over; whether it got there.
 pub(crate) fn roll(
     rig: &mut VirtualRig,
@@ -95,7 +100,7 @@ pub(crate) fn roll(
     Ok(false)
 }
 
-/// Deploys (or, at a negative speed, retracts) over the whole travel from this preload,
+/// Deploys (or, at a negative speed, retracts) over the full travel from this preload,
 /// and returns the rig at the end.
 pub(crate) fn deploy(
     plant: PlantParameters,

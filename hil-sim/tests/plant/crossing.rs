@@ -90,7 +90,7 @@ fn the_gap_of_a_climb_falls_with_preload_and_rises_with_speed() {
 #[test]
 fn the_gap_of_a_driven_drop_is_flat_below_8_mm_s() {
     // Slow drops differ by less than a percent and not always upwards; above, the gap
-    // rises with speed as on the way out.
+    // rises with speed as on a climb.
     for axial in [Axial::Pushed, Axial::Driven(6.7)] {
         let gap = |speed: f64, preload| crossed(&usual(-speed, preload, axial)).gap_mm;
         grid(gap, 0.006);

@@ -1,7 +1,8 @@
-//! Whole deployments and retractions of the plant alone.
+//! Complete deployments and retractions of the plant alone.
 
 use hil_sim::plant::balance::Axial;
-use hil_sim::plant::rig::{Resolution, Truth};
+use hil_sim::plant::draw::PlantParameters;
+use hil_sim::plant::rig::{Resolution, Truth, VirtualRig};
 use hil_sim::plant::wall::{Step, Wall};
 
 use super::bench::{TICK_S, close, crossed, deploy, elastic, fine, ideal, nominal, off, pairs};
@@ -36,15 +37,25 @@ fn every_crossing_of_a_deployment_is_the_isolated_one() {
     }
 }
 
+/// The same deployment with the ring asleep where it may be and always awake: every state.
+fn asleep_and_awake(
+    plant: &PlantParameters,
+    speed: f64,
+    preload: f64,
+) -> [(VirtualRig, Vec<Truth>); 2] {
+    [USUAL, AWAKE].map(|resolution| {
+        let mut states = Vec::new();
+        let look = |rig: &VirtualRig| states.push(*rig.truth());
+        (deploy(plant.clone(), resolution, speed, preload, look), states)
+    })
+}
+
 #[test]
 fn the_sleeping_ring_changes_nothing() {
     for (preset, preload) in PRESETS {
         for speed in [6.0, 30.0, -6.0, -30.0] {
-            let (mut slept, mut woke) = (Vec::new(), Vec::new());
-            let usual =
-                deploy(nominal(preset), USUAL, speed, preload, |rig| slept.push(*rig.truth()));
-            let awake =
-                deploy(nominal(preset), AWAKE, speed, preload, |rig| woke.push(*rig.truth()));
+            let [(usual, slept), (awake, woke)] =
+                asleep_and_awake(&nominal(preset), speed, preload);
             for (usual, awake) in pairs(&usual, &awake) {
                 close(usual.gap_mm, awake.gap_mm, 0.001);
                 close(usual.corner_n, awake.corner_n, 0.005);
@@ -58,13 +69,11 @@ fn the_sleeping_ring_changes_nothing() {
 fn on_a_long_wall_the_ring_sleeps() {
     let mut plant = nominal("prototype");
     plant.wall = Wall::new(vec![Step { position_mm: 70.0, height_mm: 4.0 }]);
-    let (mut slept, mut woke) = (Vec::new(), Vec::new());
-    let usual = deploy(plant.clone(), USUAL, 10.0, 33.3, |rig| slept.push(*rig.truth()));
-    let awake = deploy(plant, AWAKE, 10.0, 33.3, |rig| woke.push(*rig.truth()));
+    let [(usual, slept), (awake, woke)] = asleep_and_awake(&plant, 10.0, 33.3);
     let asleep = slept.iter().filter(|truth| !truth.ring_awake).count();
     assert!(asleep * 2 > slept.len(), "asleep for {asleep} of {}", slept.len());
     let gaps = [&usual, &awake].map(|rig| rig.ledger().crossings()[0].gap_mm);
-    // Apart by where in the patch the ring's elements happen to stand.
+    // They differ by the phase of the ring's elements in the patch.
     close(gaps[0], gaps[1], 0.003);
     assert_alike(&slept, &woke);
 }
@@ -144,7 +153,7 @@ fn a_climb_that_slows_creates_no_work() {
             plant.climb_slows = slows;
             deploy(plant, FINE, 10.0, preload, |_| {})
         };
-        let gain = |rig: &hil_sim::plant::rig::VirtualRig| {
+        let gain = |rig: &VirtualRig| {
             let truth = rig.truth();
             let lifted = rig.parameters().load_n * truth.position_mm;
             off(truth.work_mj, lifted + preload * 12.0)

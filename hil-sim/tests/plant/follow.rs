@@ -1,15 +1,15 @@
-//! A rig under the rotation and preload of a run moves as in that run, and parameters that
-//! change in a run act.
+//! A rig under the rotation and preload of a run moves as in that run; changes of parameters
+//! during a run have their effect.
 
 use hil_sim::plant::rig::{Drives, VirtualRig};
 use hil_sim::scenario::Scenario;
 use hil_sim::session::{Options, Session};
 
-use super::bench::{TICK_S, nominal};
+use super::bench::{TICK_S, nominal, steps};
 
-/// Bound on the position, mm: a twentieth of what a wheel does in a millisecond.
+/// Bound on the position, mm: a twentieth of the travel of a millisecond.
 const POSITION_MM: f64 = 0.002;
-/// Bound on the height at any time, mm: the arm's modes, which a rig that follows does not have.
+/// Bound on the height, mm: the arm's modes, which a following rig does not have.
 const SHAKEN_MM: f64 = 0.03;
 
 #[test]
@@ -40,16 +40,16 @@ fn following_the_rotation_and_preload_of_a_run_gives_that_run() {
             height += t.height_mm - b.height_mm;
             count += 1.0;
         }
-        // Of the arm's modes nothing is left in the mean.
+        // The arm's modes vanish in the mean.
         let mean: f64 = height / count;
         assert!(mean.abs() < 2e-4, "{step}: {mean}");
     }
 }
 
 #[test]
-fn a_broken_spring_and_a_soft_tread_act_in_their_part() {
+fn a_broken_spring_and_a_soft_tread_have_their_effect() {
     let run = |rig: &mut VirtualRig| {
-        (0..1000).for_each(|_| rig.step(&Drives::default(), TICK_S).unwrap());
+        steps(rig, &Drives::default(), 1000);
         *rig.truth()
     };
     let mut rig = VirtualRig::new(nominal("prototype"), 0.0, 30.0, TICK_S);

@@ -1,11 +1,11 @@
-//! Friction and its end: slip, stall, stops, the worm gear, the inclined arm.
+//! Friction and its limits: slip, stall, stops, the worm gear, the inclined arm.
 
 use hil_sim::plant::rig::{Drives, PlantError, Resolution, VirtualRig};
 use hil_sim::plant::wall::Wall;
 use hil_sim::scenario::Scenario;
 use hil_sim::session::{Options, run};
 
-use super::bench::{TICK_S, close, deploy, drive, ideal, nominal, roll};
+use super::bench::{TICK_S, close, deploy, drive, ideal, nominal, roll, steps};
 
 /// The scenario of a preset with these overrides.
 fn scenario(preset: &str, sets: &[&str]) -> Scenario {
@@ -53,7 +53,7 @@ fn friction_decides_at_what_the_climb_needs() {
 }
 
 #[test]
-fn slip_is_the_way_of_the_tread_beyond_its_creep() {
+fn slip_is_the_travel_of_the_tread_beyond_its_creep() {
     let mut plant = ideal("prototype");
     plant.mu = 0.8;
     let mut rig = VirtualRig::new(plant, 0.0, 33.3, TICK_S);
@@ -153,13 +153,9 @@ fn the_load_does_not_turn_the_worm() {
             // Off the latch first.
             roll(&mut rig, 5.0, 41.0, 10.0, |_| {}).unwrap();
             let idle = Drives { drive_on, ..Drives::default() };
-            for _ in 0..200 {
-                rig.step(&idle, TICK_S).unwrap();
-            }
+            steps(&mut rig, &idle, 200);
             let held = rig.truth().position_mm;
-            for _ in 0..1000 {
-                rig.step(&idle, TICK_S).unwrap();
-            }
+            steps(&mut rig, &idle, 1000);
             assert_eq!(rig.truth().tread_mm_s, 0.0);
             assert_eq!(rig.truth().position_mm, held);
         }
@@ -171,15 +167,11 @@ fn the_latch_holds_until_the_drive_turns() {
     let mut plant = ideal("prototype");
     plant.drive = nominal("prototype").drive;
     let mut rig = VirtualRig::new(plant, 0.0, 0.0, TICK_S);
-    for _ in 0..500 {
-        rig.step(&Drives::default(), TICK_S).unwrap();
-    }
+    steps(&mut rig, &Drives::default(), 500);
     assert_eq!(rig.truth().position_mm, 0.0);
     // Unpressed, it then falls to the stop.
     let drives = drive(rig.parameters(), 20.0);
-    for _ in 0..500 {
-        rig.step(&drives, TICK_S).unwrap();
-    }
+    steps(&mut rig, &drives, 500);
     assert_eq!(rig.truth().position_mm, rig.parameters().stops_mm.0);
     assert!(rig.truth().slip_mm > 2.5);
 }
@@ -228,7 +220,7 @@ fn the_stops_hold() {
             let jams = coupling == 1.0 && speed > 0.0;
             assert_eq!(slides, !jams, "{truth:?}");
             assert_eq!(truth.slip_mm > 1.0, slides, "{truth:?}");
-            // And the way back is free.
+            // The reverse direction is free.
             assert_eq!(roll(&mut rig, -speed, 40.0, 10.0, |_| {}), Ok(true));
         }
     }
@@ -269,7 +261,7 @@ fn the_guarded_speed_shakes_the_arm() {
 }
 
 #[test]
-fn what_is_not_a_number_ends_the_run_by_name() {
+fn a_value_that_is_not_finite_ends_the_run_by_its_name() {
     let end = |drives: Drives| {
         let mut rig = VirtualRig::new(nominal("prototype"), 0.0, 33.3, TICK_S);
         (0..500).find_map(|_| rig.step(&drives, TICK_S).err()).unwrap()

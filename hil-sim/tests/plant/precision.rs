@@ -7,15 +7,8 @@ use interstage::rig::Rig;
 
 use super::bench::{TICK_S, nominal, off};
 
-#[test]
-fn an_isolated_crossing_is_within_its_error() {
-    let points = work_precision(&Rig::prototype(), &[Setting::usual()], 1, || ()).unwrap();
-    assert!(points[0].gap_error < 2e-3, "{points:?}");
-    assert!(points[0].force_error < 3e-3, "{points:?}");
-}
-
-/// The crossings of the whole travel at constant duty with the screw held, the drive a
-/// hundred times as strong as it is: nothing but setting and tick differs.
+/// The crossings of the full travel at constant duty with the screw held and the drive a
+/// hundred times as strong: nothing but setting and tick differs.
 fn crossings(
     preset: &str,
     setting: Setting,

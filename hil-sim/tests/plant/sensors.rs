@@ -87,7 +87,7 @@ fn every_quantity_comes_back_within_its_quantisation() {
         let off = seen.radius.value.to_num::<f64>() - radius;
         assert!(off.abs() < 0.024, "{off} at {radius}");
         offset[0] += off;
-        // A whole count, 19 um, from where the wheel started.
+        // A full count, 19 um, from where the wheel started.
         let off = travel - seen.travel.to_num::<f64>();
         assert!((-1e-6..0.0193).contains(&off), "{off} at {travel}");
         offset[1] += off;

@@ -1,4 +1,4 @@
-//! What is not computed is not needed: bit for bit.
+//! Skipped computations change no bit.
 
 use hil_sim::plant::rig::{PHASES, Resolution, Truth, VirtualRig};
 use hil_sim::plant::wall::{Step, Wall};
@@ -7,7 +7,7 @@ use hil_sim::session::{Options, Session, run_session};
 
 use super::bench::{TICK_S, nominal, roll};
 
-/// All states of a way out or back, and the crossings.
+/// All states of a deployment or retraction, and the rig at its end.
 fn states(all: bool, speed: f64) -> (Vec<Truth>, VirtualRig) {
     let (from, to) = if speed > 0.0 { (0.0, 80.0) } else { (80.0, 0.0) };
     let mut rig = VirtualRig::new(nominal("prototype"), from, 45.0, TICK_S);
@@ -23,11 +23,11 @@ fn states(all: bool, speed: f64) -> (Vec<Truth>, VirtualRig) {
 fn elements_out_of_reach_change_no_bit() {
     for speed in [8.0, 30.0, -8.0, -30.0] {
         let (few, rig) = states(false, speed);
-        let (all, whole) = states(true, speed);
+        let (all, complete) = states(true, speed);
         assert_eq!(few, all);
-        assert_eq!(rig.ledger().crossings(), whole.ledger().crossings());
+        assert_eq!(rig.ledger().crossings(), complete.ledger().crossings());
         let visited = |rig: &VirtualRig| rig.phases().map(|work| work.ring.elements).iter().sum();
-        let (some, every): (u64, u64) = (visited(&rig), visited(&whole));
+        let (some, every): (u64, u64) = (visited(&rig), visited(&complete));
         assert!(some * 5 < every, "{some} of {every}");
     }
 }
@@ -47,7 +47,7 @@ fn a_run_is_the_same_with_skipping_and_without() {
         let usual = made(Options::default(), false);
         let all = made(Options::default(), true);
         assert_eq!((&usual.summary, &usual.log), (&all.summary, &all.log));
-        // Nor do the rows that were not asked for.
+        // Recording rows changes nothing either.
         let rows = made(Options { rows: true, ..Options::default() }, false);
         assert_eq!((&usual.summary, &usual.log), (&rows.summary, &rows.log));
         assert!(usual.rows.is_empty() && !rows.rows.is_empty());
@@ -55,9 +55,9 @@ fn a_run_is_the_same_with_skipping_and_without() {
 }
 
 #[test]
-fn memory_is_the_same_looked_at_late() {
-    // Back and forth, so that elements come back with what they remember: closed form
-    // against step by step.
+fn memory_evaluated_lazily_is_the_same() {
+    // Back and forth, so that elements return with their memory: closed form against step by
+    // step.
     let ends = [false, true].map(|all| {
         let mut plant = nominal("prototype");
         plant.wall = Wall::new(vec![Step { position_mm: 50.0, height_mm: 4.0 }]);
@@ -73,9 +73,9 @@ fn memory_is_the_same_looked_at_late() {
         }
         *rig.truth()
     });
-    let [late, ever] = ends;
-    assert!((late.height_mm - ever.height_mm).abs() < 1e-9, "{late:?} {ever:?}");
-    assert!((late.utilisation - ever.utilisation).abs() < 1e-8, "{late:?} {ever:?}");
+    let [lazy, eager] = ends;
+    assert!((lazy.height_mm - eager.height_mm).abs() < 1e-9, "{lazy:?} {eager:?}");
+    assert!((lazy.utilisation - eager.utilisation).abs() < 1e-8, "{lazy:?} {eager:?}");
 }
 
 #[test]
@@ -88,7 +88,7 @@ fn the_phases_of_a_run_add_up() {
     let [smooth, awake, crossing] = PHASES.map(|phase| phases[phase as usize]);
     assert!(smooth.ring.strides == 0 && smooth.steady_iterations > 0, "{smooth:?}");
     assert!(awake.ring.strides > 0 && crossing.ring.strides > 0, "{phases:?}");
-    // Foreseen well enough for two or three heights a stride.
+    // The first guess is good enough for two or three heights a stride.
     assert!(crossing.ring.iterations < 3 * crossing.ring.strides, "{crossing:?}");
 }
 

@@ -1,5 +1,5 @@
-//! What users and boards give the host tools, damaged in every way: the tools refuse it
-//! and never panic. `FUZZ_SECONDS` gives each target that long instead.
+//! Damaged inputs of the host tools: the tools refuse them and never panic. `FUZZ_SECONDS` is
+//! the time for each target.
 
 #[path = "../../../tests/common/mutate.rs"]
 mod mutate;
@@ -7,7 +7,6 @@ mod mutate;
 use std::fs;
 use std::io::{Read, Write};
 use std::net::TcpStream;
-use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
@@ -18,6 +17,7 @@ use hil_sim::replay::replay;
 use hil_sim::scenario::Scenario;
 use interstage::rig::Rig;
 
+use super::logs::data;
 use mutate::{Chance, fuzz, mutant};
 
 fn text(bytes: &[u8]) -> String {
@@ -33,7 +33,7 @@ fn scenario_files() {
         b"preset = \"fe\"\n[tread]\ntau_s = 0.2\n[plant]\nmu = 0.9\n".to_vec(),
         anomalies.as_bytes().to_vec(),
     ];
-    // The last is refused, which is an answer too.
+    // The last one is refused, which is fine.
     fuzz("scenario files", &corpus, 1500, 4.0, |bytes| {
         let _ = Scenario::parse("fuzz.toml", &text(bytes), &[]);
     });
@@ -52,11 +52,10 @@ fn overrides() {
 }
 
 fn fixture(name: &str) -> Vec<u8> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name);
-    fs::read(path).expect("a fixture")
+    fs::read(data(name)).expect("a fixture")
 }
 
-/// The frames of a fixture as they lay on the channel.
+/// The frames of a fixture as on the channel.
 fn stream(mcap: &[u8]) -> Vec<u8> {
     let messages = mcap::MessageStream::new(mcap).expect("an MCAP file");
     messages
@@ -66,7 +65,7 @@ fn stream(mcap: &[u8]) -> Vec<u8> {
         .collect()
 }
 
-/// A short piece of a stream from its beginning on.
+/// The beginning of a stream.
 fn beginning(stream: &[u8]) -> Vec<u8> {
     stream[..stream.len().min(8000)].to_vec()
 }
@@ -100,9 +99,8 @@ fn logs() {
 fn mcap_files() {
     let directory = tempfile::tempdir().expect("a directory");
     let path = directory.path().join("log.mcap");
-    let whole = Run::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/deploy.mcap"));
-    let whole = whole.expect("a log");
-    assert!(whole.is_complete() && whole.rows.len() > 5000, "{} rows", whole.rows.len());
+    let intact = Run::read(&data("deploy.mcap")).expect("a log");
+    assert!(intact.is_complete() && intact.rows.len() > 5000, "{} rows", intact.rows.len());
     fuzz("MCAP files", &[fixture("deploy.mcap")], 300, 4.0, |bytes| {
         fs::write(&path, bytes).expect("written");
         if let Ok(run) = Run::read(&path) {
@@ -134,8 +132,8 @@ fn parameter_files() {
 
 #[test]
 fn clients_of_the_live_view() {
-    // The server's threads panic by themselves: only a hook tells. In the other tests here
-    // nothing panics either, or they fail.
+    // A panic of the server's threads shows only in a hook. No other test here panics unless
+    // it fails.
     static PANICS: AtomicUsize = AtomicUsize::new(0);
     let before = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {

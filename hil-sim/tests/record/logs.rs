@@ -1,4 +1,4 @@
-//! Logs over a long time, as regression fixtures, and in the hands of another program.
+//! Logs over a long time, as regression fixtures, and read by another program.
 //!
 //! The fixtures are written by
 //! `cargo rig capture --bare --seed 1 --out hil-sim/tests/data --name deploy` and the same
@@ -21,13 +21,13 @@ use interstage::supervise::{Command as Order, Mode};
 use interstage::units::Q16;
 use serde_json::Value;
 
-/// How far the log may be from the truth under way. Position: the tolerance of the steps'
+/// Largest error of the log while moving. Position: the tolerance of the steps'
 /// places, which the controller knows from its table and corrects itself by. Preload: two
 /// deviations of the preload sensor's gain at 50 N, six of its noise, and its age.
 const POSITION_MM: f64 = 0.8;
 const PRELOAD_N: f64 = 1.0;
 
-fn data(name: &str) -> PathBuf {
+pub(super) fn data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
 }
 
@@ -46,13 +46,13 @@ fn recorded_runs_give_the_same_bits() {
     }
 }
 
-/// Resident memory of this process, bytes; none where the system does not tell.
+/// Resident memory of this process, bytes; none where the system does not report it.
 fn resident() -> Option<u64> {
     let text = std::fs::read_to_string("/proc/self/statm").ok()?;
     text.split_whitespace().nth(1)?.parse::<u64>().ok().map(|pages| pages * 4096)
 }
 
-/// How far the log was from the truth under way in a minute: position, mm, preload, N.
+/// Largest error of the log while moving, in a minute: position, mm, preload, N.
 #[derive(Clone, Copy, Debug, Default)]
 struct Off {
     position_mm: f64,

@@ -1,54 +1,47 @@
-//! Steps that do not stand where the step table says: early, late, missing, extra, on
-//! the way out and on the way back. A run ends at the end of travel or in a fault that
-//! is named, and no step costs the wheel its wall.
+//! Steps that differ from the step table: early, late, missing, extra, in both directions. A run
+//! ends at the end of travel or in a named fault, and the wheel never loses the wall.
 
 use crate::common::{
-    Bench, NO_SLIP_MM, STEP_CODES, WAYS, back, check_each, end_mm, scenario, starter,
+    Bench, DIRECTIONS, NO_SLIP_MM, STEP_CODES, check_each, end_mm, opposite, scenario, starter,
 };
-use hil_sim::record::Tick;
+use hil_sim::record::{CrossingLine, Summary};
 use hil_sim::scenario::{Direction, Scenario, StepAnomaly};
 use hil_sim::session::{Options, run};
 use interstage::fault::Fault;
 use interstage::supervise::Mode;
 
-/// What comes of a run.
+/// The outcome of a run.
 #[derive(Debug)]
 struct Outcome {
-    completed: bool,
-    faults: Vec<u16>,
-    /// Limits that tell of steps out of place.
+    summary: Summary,
+    /// Limits that report steps out of place.
     codes: Vec<u16>,
-    /// True place of each crossing and its gap over the reference.
+    /// True position of each crossing and its gap over the reference.
     gaps: Vec<(f64, f64)>,
-    /// Where the controller found each of them, mm.
-    found: Vec<Option<f64>>,
     peak_preload_n: f64,
-    slip_mm: f64,
     /// True distance from the end of travel, mm.
     short_mm: f64,
+}
+
+impl Outcome {
+    fn completed(&self) -> bool {
+        self.summary.completed && self.summary.faults.is_empty()
+    }
 }
 
 fn outcome(scenario: &Scenario) -> Outcome {
     let recording = run(scenario, Options { rows: true, speed: None }).expect("a run");
     let (summary, rows) = (recording.summary, recording.rows);
-    let last: &Tick = rows.last().expect("rows");
+    let end_mm = rows.last().expect("rows").of_truth(|t| t.position_true_mm);
     let codes = summary.limits.iter().map(|limit| limit.code);
+    let preloads = rows.iter().map(|row| row.of_truth(|t| t.preload_true_n));
+    let part = |line: &CrossingLine| (line.step_mm, line.gap_mm / summary.gap_ref_mm);
     Outcome {
-        completed: summary.completed,
-        faults: summary.faults.iter().map(|fault| fault.code).collect(),
         codes: codes.filter(|code| STEP_CODES.contains(code)).collect(),
-        gaps: (summary.crossings.iter())
-            .map(|line| (line.step_mm, line.gap_mm / summary.gap_ref_mm))
-            .collect(),
-        found: summary.crossings.iter().map(|line| line.step_found_mm).collect(),
-        peak_preload_n: rows
-            .iter()
-            .map(|row| row.of_truth(|t| t.preload_true_n))
-            .fold(0.0, f64::max),
-        slip_mm: summary.slip_mm,
-        short_mm: (last.of_truth(|t| t.position_true_mm)
-            - end_mm(scenario, scenario.run.direction))
-        .abs(),
+        gaps: summary.crossings.iter().map(part).collect(),
+        peak_preload_n: preloads.fold(0.0, f64::max),
+        short_mm: (end_mm - self::end_mm(scenario, scenario.run.direction)).abs(),
+        summary,
     }
 }
 
@@ -76,7 +69,7 @@ fn displaced(step: u8) -> [StepAnomaly; 4] {
     ]
 }
 
-/// How the wheel meets a displaced step on its way: 201 early, 202 late.
+/// The report of a displaced step: 201 early, 202 late.
 fn code(direction: Direction, anomaly: StepAnomaly) -> u16 {
     match (direction, anomaly) {
         (Direction::Deploy, StepAnomaly::Early { .. })
@@ -85,17 +78,17 @@ fn code(direction: Direction, anomaly: StepAnomaly) -> u16 {
     }
 }
 
-/// Every step displaced every way, on the way out and on the way back. After a boot at
-/// the end of travel the third step is not among them: it tells where the wheel is.
+/// Every step with every displacement in both directions. After a boot at the end of travel the
+/// third step is not among them: it gives the position.
 fn all_displaced() -> Vec<(Direction, StepAnomaly)> {
-    let all = |(way, last)| (1..=last).flat_map(displaced).map(move |a| (way, a));
+    let all = |(direction, last)| (1..=last).flat_map(displaced).map(move |a| (direction, a));
     [(Direction::Deploy, 3), (Direction::Retract, 2)].into_iter().flat_map(all).collect()
 }
 
-/// What holds whatever is out of place: no slip, the preload limit, gaps within `part` of the
+/// Bounds that hold for any step table: no slip, the preload limit, gaps within `part` of the
 /// reference.
 fn assert_safe(got: &Outcome, scenario: &Scenario, part: f64, name: &str) {
-    assert!(got.slip_mm < NO_SLIP_MM, "{name}: {} mm", got.slip_mm);
+    assert!(got.summary.slip_mm < NO_SLIP_MM, "{name}: {} mm", got.summary.slip_mm);
     let limit = scenario.rig.preload.limit_n;
     assert!(got.peak_preload_n <= limit, "{name}: {} N", got.peak_preload_n);
     for (step, gap) in &got.gaps {
@@ -103,27 +96,29 @@ fn assert_safe(got: &Outcome, scenario: &Scenario, part: f64, name: &str) {
     }
 }
 
-/// Every step was found where it is.
+/// Every step was found at its true position.
 fn assert_found(got: &Outcome, name: &str) {
-    for ((step, _), found) in got.gaps.iter().zip(&got.found) {
-        let off = found.expect("reported") - step;
-        assert!(off.abs() < 0.5, "{name}, step at {step}: {off}");
+    for line in &got.summary.crossings {
+        let off = line.step_found_mm.expect("reported") - line.step_mm;
+        assert!(off.abs() < 0.5, "{name}, step at {}: {off}", line.step_mm);
     }
 }
 
 #[test]
 fn a_displaced_step_is_found_reported_once_and_crossed_like_any_other() {
-    check_each(all_displaced(), |(way, anomaly)| {
-        let scenario = with(*way, *anomaly);
+    check_each(all_displaced(), |(direction, anomaly)| {
+        let scenario = with(*direction, *anomaly);
         let got = outcome(&scenario);
-        let name = format!("{} {anomaly:?}", way.name());
-        assert!(got.completed && got.faults.is_empty(), "{name}: {got:?}");
+        let name = format!("{} {anomaly:?}", direction.name());
+        assert!(got.completed(), "{name}: {got:?}");
         assert_safe(&got, &scenario, 0.06, &name);
-        assert_eq!(got.codes, [code(*way, *anomaly)], "{name}");
-        // On the way back the last step's line is closed 14 mm behind it: it may be reported
-        // by the end of the run alone.
-        if matches!((way, anomaly), (Direction::Retract, StepAnomaly::Early { step: 1, .. })) {
-            assert!(got.found.iter().all(Option::is_some), "{:?}", got.found);
+        assert_eq!(got.codes, [code(*direction, *anomaly)], "{name}");
+        // On retraction the last step's record is closed 14 mm behind it: its position may be
+        // reported by the end of the run alone.
+        if matches!((direction, anomaly), (Direction::Retract, StepAnomaly::Early { step: 1, .. }))
+        {
+            let mut lines = got.summary.crossings.iter();
+            assert!(lines.all(|line| line.step_found_mm.is_some()), "{got:?}");
         } else {
             assert_found(&got, &name);
         }
@@ -131,11 +126,11 @@ fn a_displaced_step_is_found_reported_once_and_crossed_like_any_other() {
 }
 
 #[test]
-fn the_step_that_tells_the_place_after_boot_may_be_displaced_as_well() {
+fn the_step_that_gives_the_position_after_boot_may_be_displaced_too() {
     check_each(displaced(3), |&anomaly| {
         let scenario = with(Direction::Retract, anomaly);
         let got = outcome(&scenario);
-        assert!(got.completed, "{anomaly:?}: {got:?}");
+        assert!(got.summary.completed, "{anomaly:?}: {got:?}");
         assert_safe(&got, &scenario, f64::INFINITY, &format!("{anomaly:?}"));
     });
 }
@@ -146,45 +141,47 @@ fn a_step_inside_its_window_raises_no_alarm() {
         let offset_mm = 0.5;
         [StepAnomaly::Early { step, offset_mm }, StepAnomaly::Late { step, offset_mm }]
     };
-    let all = WAYS.into_iter().flat_map(|way| (1..=3).flat_map(inside).map(move |a| (way, a)));
-    check_each(all, |(way, anomaly)| {
-        let got = outcome(&with(*way, *anomaly));
-        assert!(got.completed, "{} {anomaly:?}", way.name());
-        assert!(got.codes.is_empty(), "{} {anomaly:?}: {:?}", way.name(), got.codes);
+    let all = DIRECTIONS
+        .into_iter()
+        .flat_map(|direction| (1..=3).flat_map(inside).map(move |a| (direction, a)));
+    check_each(all, |(direction, anomaly)| {
+        let got = outcome(&with(*direction, *anomaly));
+        assert!(got.summary.completed, "{} {anomaly:?}", direction.name());
+        assert!(got.codes.is_empty(), "{} {anomaly:?}: {:?}", direction.name(), got.codes);
     });
 }
 
 #[test]
 fn an_extra_step_is_recognised_and_crossed() {
-    for way in WAYS {
-        let scenario = with_extra(way);
+    for direction in DIRECTIONS {
+        let scenario = with_extra(direction);
         let got = outcome(&scenario);
-        assert!(got.completed && got.faults.is_empty(), "{}", way.name());
-        assert_eq!((&got.codes[..], got.gaps.len()), (&[204][..], 3), "{}", way.name());
-        // The preload was not raised for the one that nobody expected.
-        assert_safe(&got, &scenario, 0.10, way.name());
+        assert!(got.completed(), "{}", direction.name());
+        assert_eq!((&got.codes[..], got.gaps.len()), (&[204][..], 3), "{}", direction.name());
+        // The preload was not raised for the unexpected step.
+        assert_safe(&got, &scenario, 0.10, direction.name());
         let known = got.gaps.iter().filter(|(step, _)| *step != 38.0);
         assert!(known.clone().all(|(_, gap)| (gap - 1.0).abs() < 0.06), "{:?}", got.gaps);
-        assert_found(&got, way.name());
+        assert_found(&got, direction.name());
     }
 }
 
 #[test]
-fn a_missing_step_is_searched_and_given_up() {
+fn a_missing_step_is_searched_for_and_given_up() {
     for step in 1..=3 {
         let scenario = with(Direction::Deploy, StepAnomaly::Missing { step });
         let got = outcome(&scenario);
         let name = format!("step {step}");
-        assert!(got.completed && got.faults.is_empty(), "{name}");
+        assert!(got.completed(), "{name}");
         assert_eq!((&got.codes[..], got.gaps.len()), (&[202, 203][..], 2), "{name}");
         assert_safe(&got, &scenario, 0.06, &name);
         assert_found(&got, &name);
     }
 }
 
-/// Started at the end of travel of a sleeve that lacks a step, the controller knows by the arm
-/// alone where it is, and that is wrong by a level. With the first step missing the sensors see
-/// what they would on a sleeve that begins a step later: the two cannot be told apart without
+/// Started at the end of travel of a sleeve that lacks a step, the controller takes its position
+/// from the arm alone, which is wrong by a level. With the first step missing the sensors read
+/// what they would on a sleeve that begins a step later: the two cannot be distinguished without
 /// driving onto the stow stop.
 #[test]
 fn a_retraction_that_starts_a_level_off_ends_safely() {
@@ -197,27 +194,28 @@ fn a_retraction_that_starts_a_level_off_ends_safely() {
         let peak = got.peak_preload_n;
         assert!(peak <= scenario.rig.preload.limit_n, "{name}: {peak} N");
         let Some(expected) = expected else { continue };
-        assert_eq!(got.completed, expected.is_empty(), "{name}");
-        assert_eq!(got.faults, expected, "{name}");
+        let faults: Vec<u16> = got.summary.faults.iter().map(|fault| fault.code).collect();
+        assert_eq!(got.summary.completed, expected.is_empty(), "{name}");
+        assert_eq!(faults, expected, "{name}");
         assert_safe(&got, &scenario, 0.06, &name);
         let arrived = got.short_mm < 1.0;
-        assert!(!got.faults.is_empty() || arrived, "{name}: {} mm short", got.short_mm);
+        assert!(!faults.is_empty() || arrived, "{name}: {} mm short", got.short_mm);
     }
 }
 
-/// Out and back in one session, so that the odometry knows where it is.
+/// Both directions in one session, so that the odometry knows its position.
 fn there_and_back(scenario: &Scenario) -> Bench {
-    let way = scenario.run.direction;
+    let direction = scenario.run.direction;
     let mut bench = Bench::idle(scenario);
-    for way in [way, back(way)] {
-        bench.give(starter(way));
-        assert_eq!(bench.finish(), Mode::Complete(way.into()), "{:?}", scenario.run);
+    for direction in [direction, opposite(direction)] {
+        bench.give(starter(direction));
+        assert_eq!(bench.finish(), Mode::Complete(direction.into()), "{:?}", scenario.run);
     }
     bench
 }
 
 #[test]
-fn the_way_back_over_a_sleeve_already_travelled_ends_at_the_stow_end() {
+fn a_retraction_over_a_sleeve_already_travelled_ends_at_the_stow_end() {
     let steps = (1..=3).flat_map(|step| {
         let far = displaced(step).into_iter();
         far.chain([StepAnomaly::Missing { step }]).map(|a| with(Direction::Deploy, a))
@@ -235,7 +233,7 @@ fn the_way_back_over_a_sleeve_already_travelled_ends_at_the_stow_end() {
         let climbs = bench.crossings().iter().filter(|crossing| crossing.climbing).count();
         assert_eq!((climbs, bench.crossings().len()), (steps, 2 * steps), "{what:?}");
         if let [StepAnomaly::Missing { .. }] = what[..] {
-            // Missed once each way, and no step of the table is taken for an extra one.
+            // Missed once in each direction; no step of the table is reported as extra.
             assert_eq!(bench.step_codes(), [202, 203, 202, 203], "{what:?}");
         }
     });

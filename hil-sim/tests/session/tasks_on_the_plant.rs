@@ -1,9 +1,9 @@
-//! The firmware's asynchronous tasks in closed loop with the plant under virtual time,
-//! through a board whose peripherals are the plant's sensors and motors.
+//! The firmware's asynchronous tasks in closed loop with the plant under virtual time, through a
+//! board whose peripherals are the plant's sensors and motors.
 //!
-//! Polled in the order of their data - sensors, tick, model - the tasks do exactly what
-//! the loop of `sil` does. Polled the other way round, as interrupts may have it, the
-//! tick finds samples that are a millisecond older, and the run differs by that.
+//! Polled in the order of their data - sensors, tick, model - the tasks do exactly the same as
+//! the loop of `sil`. Polled in the opposite order, as interrupts may cause it, the tick reads
+//! samples that are a millisecond older, and the run differs by that.
 
 use std::cell::{Cell, RefCell};
 use std::future::{Future, poll_fn};
@@ -14,7 +14,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll, Wake, Waker};
 
 use crate::common::{
-    Bench, Moment, NO_SLIP_MM, RIGS, STEP_CODES, WAYS, back, end_mm, scenario, starter,
+    Bench, DIRECTIONS, Moment, NO_SLIP_MM, RIGS, STEP_CODES, end_mm, opposite, scenario, starter,
 };
 use embassy_time::{Duration, Instant, MockDriver};
 use hil_sim::plant::ledger::Crossing;
@@ -34,16 +34,15 @@ use interstage::tasks::{self, Exchange, TickIo, TickIoCell};
 use interstage::tick::{Controller, CrossingRecord, Entry, Event, Telemetry};
 use interstage::units::MotorCommand;
 
-/// The clock is one for the whole process: one board at a time.
+/// The process has one clock: one board at a time.
 static CLOCK: Mutex<()> = Mutex::new(());
 
-/// Tasks are started a millisecond after boot, so that all wake for the first time at
-/// the same even tick.
+/// Tasks are started a millisecond after boot, so that all wake first at the same even tick.
 const FIRST_TICK: u32 = 2;
 /// A control tick, s.
 const TICK_S: f64 = 1e-3;
 
-/// What plant, peripherals and test share.
+/// State that plant, peripherals and test share.
 #[derive(Default)]
 struct Shared {
     codes: Cell<Option<Codes>>,
@@ -66,9 +65,8 @@ impl Shared {
 #[derive(Clone)]
 struct Peripheral(Rc<Shared>);
 
-/// The converter behind the preload sensor; the tread's is another.
-#[derive(Clone)]
-struct PreloadSensor(Rc<Shared>);
+/// A converter, and its code.
+struct Converter(Rc<Shared>, fn(&Codes) -> AdcCode);
 
 impl WheelEncoder for Peripheral {
     fn count(&mut self) -> EncoderCount {
@@ -76,15 +74,9 @@ impl WheelEncoder for Peripheral {
     }
 }
 
-impl AnalogInput for PreloadSensor {
+impl AnalogInput for Converter {
     async fn sample(&mut self) -> Result<AdcCode, BusFault> {
-        Ok(self.0.codes().preload_sensor)
-    }
-}
-
-impl AnalogInput for Peripheral {
-    async fn sample(&mut self) -> Result<AdcCode, BusFault> {
-        Ok(self.0.codes().compression_sensor)
+        Ok((self.1)(&self.0.codes()))
     }
 }
 
@@ -136,12 +128,12 @@ impl CommandSource for Peripheral {
     }
 }
 
-/// In which order tasks that are due together get the processor.
+/// The order in which tasks that are due together run.
 #[derive(Clone, Copy, PartialEq)]
 enum Order {
-    /// As the data flow: what the tick reads is of this millisecond.
+    /// In the order of the data: the tick reads samples of this millisecond.
     SensorsFirst,
-    /// The tick reads what was published a millisecond ago.
+    /// The tick reads samples of the millisecond before.
     TickFirst,
 }
 
@@ -157,10 +149,10 @@ struct Board {
     _clock: MutexGuard<'static, ()>,
 }
 
-/// Whether the task that runs has asked to be run again.
-struct Again(AtomicBool);
+/// Whether the running task has woken itself.
+struct Woken(AtomicBool);
 
-impl Wake for Again {
+impl Wake for Woken {
     fn wake(self: Arc<Self>) {
         self.0.store(true, Ordering::Relaxed);
     }
@@ -176,8 +168,8 @@ impl Board {
         let clock = CLOCK.lock().unwrap_or_else(PoisonError::into_inner);
         MockDriver::get().reset();
         MockDriver::get().advance(Duration::from_millis(u64::from(FIRST_TICK) - 1));
-        let way = scenario.run.direction;
-        let pressed = match way {
+        let direction = scenario.run.direction;
+        let pressed = match direction {
             Direction::Deploy => 0.0,
             Direction::Retract => scenario.rig.preload.cruise_n,
         };
@@ -187,7 +179,12 @@ impl Board {
             tasks: Vec::new(),
             exchange: forever(Exchange::new()),
             sensors: Sensors::new(parameters.sensors.clone(), scenario.run.seed),
-            plant: VirtualRig::new(parameters, end_mm(scenario, back(way)), pressed, TICK_S),
+            plant: VirtualRig::new(
+                parameters,
+                end_mm(scenario, opposite(direction)),
+                pressed,
+                TICK_S,
+            ),
             rows: Vec::new(),
             _clock: clock,
         };
@@ -202,14 +199,16 @@ impl Board {
         let planner = forever(Planner::try_build(&scenario.rig).expect("a sound rig"));
         let latest = forever(TickIoCell::new(TickIo::default()));
         let part = || Peripheral(Rc::clone(&self.shared));
-        let preload_sensor = PreloadSensor(Rc::clone(&self.shared));
-        let (wheel, tread, arm, button) = (part(), part(), part(), part());
+        let converter = |code| Converter(Rc::clone(&self.shared), code);
+        let preload = converter(|codes| codes.preload_sensor);
+        let compression = converter(|codes| codes.compression_sensor);
+        let (wheel, arm, button) = (part(), part(), part());
         let (motors, watchdog, journal, light) = (part(), part(), part(), part());
         self.tasks = vec![
             Box::pin(async { tasks::clock(exchange).await }),
             Box::pin(async { tasks::wheel_encoder(wheel, exchange).await }),
-            Box::pin(async { tasks::preload_sensor(preload_sensor, exchange).await }),
-            Box::pin(async { tasks::compression_sensor(tread, exchange).await }),
+            Box::pin(async { tasks::preload_sensor(preload, exchange).await }),
+            Box::pin(async { tasks::compression_sensor(compression, exchange).await }),
             Box::pin(async { tasks::arm_angle(arm, exchange).await }),
             Box::pin(async { tasks::operator(button, exchange).await }),
             Box::pin(async { tasks::motors(motors, watchdog, controller, latest, exchange).await }),
@@ -225,20 +224,20 @@ impl Board {
         }
     }
 
-    /// Lets every task run once, and those again that have woken themselves meanwhile.
+    /// Polls every task once, and again while it has woken itself.
     fn poll(&mut self) {
-        let again = Arc::new(Again(AtomicBool::new(false)));
-        let waker = Waker::from(again.clone());
+        let woken = Arc::new(Woken(AtomicBool::new(false)));
+        let waker = Waker::from(woken.clone());
         let mut context = Context::from_waker(&waker);
         for task in &mut self.tasks {
-            again.0.store(true, Ordering::Relaxed);
-            while again.0.swap(false, Ordering::Relaxed) {
+            woken.0.store(true, Ordering::Relaxed);
+            while woken.0.swap(false, Ordering::Relaxed) {
                 assert_eq!(task.as_mut().poll(&mut context), Poll::Pending, "a task returned");
             }
         }
     }
 
-    /// A millisecond: the sensors look at the plant, the tasks run, the plant moves.
+    /// A millisecond: the sensors read the plant, the tasks run, the plant moves.
     fn tick(&mut self) -> Telemetry {
         self.shared.codes.set(Some(session::read(&mut self.sensors, &self.plant)));
         MockDriver::get().advance(Duration::from_millis(1));
@@ -262,8 +261,8 @@ impl Board {
         }
     }
 
-    /// A whole run: the button is pressed as soon as the drive is idle.
-    fn whole_run(scenario: &Scenario, order: Order) -> Self {
+    /// A complete run: the button is pressed as soon as the drive is idle.
+    fn run(scenario: &Scenario, order: Order) -> Self {
         let mut board = Self::new(scenario, order);
         board.until(|row| row.mode == Mode::Idle);
         board.shared.command.set(Some(starter(scenario.run.direction)));
@@ -295,10 +294,10 @@ fn reference(scenario: &Scenario) -> Bench {
 
 /// All runs that are compared.
 fn all() -> impl Iterator<Item = (Scenario, String)> {
-    let runs = RIGS.iter().flat_map(|rig| WAYS.map(|way| (*rig, way)));
-    let runs = runs.flat_map(|(rig, way)| [0, 5].map(|seed| (rig, way, seed)));
-    runs.map(|(rig, way, seed)| {
-        (scenario(rig, way, seed), format!("{rig} {} seed {seed}", way.name()))
+    let runs = RIGS.iter().flat_map(|rig| DIRECTIONS.map(|direction| (*rig, direction)));
+    let runs = runs.flat_map(|(rig, direction)| [0, 5].map(|seed| (rig, direction, seed)));
+    runs.map(|(rig, direction, seed)| {
+        (scenario(rig, direction, seed), format!("{rig} {} seed {seed}", direction.name()))
     })
 }
 
@@ -306,7 +305,7 @@ fn all() -> impl Iterator<Item = (Scenario, String)> {
 fn the_tasks_do_to_the_bit_what_the_loop_does() {
     for (scenario, name) in all() {
         let bench = reference(&scenario);
-        let mut board = Board::whole_run(&scenario, Order::SensorsFirst);
+        let mut board = Board::run(&scenario, Order::SensorsFirst);
         let shifted = |now: &Moment| Telemetry { at: now.seen.at + FIRST_TICK, ..now.seen };
         let rows: Vec<_> = bench.moments.iter().map(shifted).collect();
         let first = rows.iter().zip(&board.rows).find(|(ours, theirs)| ours != theirs);
@@ -323,7 +322,7 @@ fn the_tasks_do_to_the_bit_what_the_loop_does() {
 fn samples_a_millisecond_older_make_no_difference_that_matters() {
     for (scenario, name) in all() {
         let bench = reference(&scenario);
-        let mut board = Board::whole_run(&scenario, Order::TickFirst);
+        let mut board = Board::run(&scenario, Order::TickFirst);
         board.run_ms(50);
         assert_eq!(board.rows.last().map(|row| row.mode), Some(bench.mode()), "{name}");
         let (ours, theirs) = (bench.crossings(), board.plant.ledger().crossings());
@@ -346,7 +345,7 @@ fn samples_a_millisecond_older_make_no_difference_that_matters() {
     }
 }
 
-/// The same crossing but for what a millisecond makes of noise and adaptation.
+/// The same crossing, but for the effect of a millisecond on noise and adaptation.
 fn assert_alike(a: &Crossing, b: &Crossing, name: &str) {
     assert_eq!((a.index, a.climbing), (b.index, b.climbing), "{name}");
     for (what, ours, theirs, most) in [
@@ -363,15 +362,15 @@ fn assert_alike(a: &Crossing, b: &Crossing, name: &str) {
 
 #[test]
 fn the_watchdog_is_fed_and_the_log_is_written_all_along() {
-    for way in WAYS {
-        let mut board = Board::whole_run(&scenario("prototype", way, 0), Order::TickFirst);
+    for direction in DIRECTIONS {
+        let mut board = Board::run(&scenario("prototype", direction, 0), Order::TickFirst);
         board.run_ms(50);
         let fed = board.shared.fed.borrow();
         assert_eq!(fed.len(), board.rows.len());
-        assert!(fed.windows(2).all(|pair| pair[1] - pair[0] == 1), "{}", way.name());
+        assert!(fed.windows(2).all(|pair| pair[1] - pair[0] == 1), "{}", direction.name());
         assert_eq!(board.exchange.lost_entries(), 0);
         let written = board.shared.written.borrow();
-        assert!(written.len() > 30, "{}: {}", way.name(), written.len());
+        assert!(written.len() > 30, "{}: {}", direction.name(), written.len());
         for (at, entry) in written.iter() {
             assert!((0..=1).contains(&(at - u64::from(entry.at))), "{at} {entry:?}");
         }
@@ -380,6 +379,6 @@ fn the_watchdog_is_fed_and_the_log_is_written_all_along() {
             Event::Limit(limit) => STEP_CODES.contains(&limit.code()),
             _ => false,
         });
-        assert_eq!(odd, None, "{}", way.name());
+        assert_eq!(odd, None, "{}", direction.name());
     }
 }

@@ -88,21 +88,18 @@ pub(super) fn judged(
     } else if saving.is_some() && finding == Finding::Tolerated {
         finding = Finding::Found;
     }
-    let damaged_ms = board.parameters.damaged.map(|up| up as f64);
     Ok(Instant {
         seed: scenario.run.seed,
         at_s: board.bench.struck_s(),
         magnitude: Some(injection.magnitude()),
-        during: "at rest".into(),
+        during: "at rest",
         finding,
         code: report.map(|(_, code)| code),
-        restart: told.map(Into::into),
+        restart: told,
         // From the start that meets it.
-        latency_ms: damaged_ms,
-        latency_any_ms: damaged_ms,
-        after_sign_ms: None,
+        latency_ms: board.parameters.damaged.map(|up| up as f64),
         rest_ms: None,
-        end: end.into(),
+        end,
         peak_preload_n: judge.peak_preload_n,
         motion_mm: judge.motion_mm,
         gap_part,

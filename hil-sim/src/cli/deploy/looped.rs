@@ -6,7 +6,7 @@ use super::Args;
 use crate::cli::failure::{Failure, Outcome};
 use crate::scenario::Scenario;
 
-/// Without probe-rs: go on with a binary that has it.
+/// Without probe-rs: starts a binary that has it.
 #[cfg(not(feature = "probe"))]
 pub(super) fn on_probe(_: &Args, _: &Scenario, _: Option<&Path>) -> Result<Outcome, Failure> {
     Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Probe)?))
@@ -23,7 +23,7 @@ pub(super) fn on_probe(
     use crate::hil::Image;
     use crate::progress;
 
-    // Told before minutes of building.
+    // Reported before minutes of building.
     attach(None)?;
     let path = firmware::build(Profile::Loop)?;
     let image = Image::of(&super::read(&path)?)?;

@@ -1,4 +1,4 @@
-//! The faults of the matrix, and what each is at an instant of a run.
+//! The faults of the matrix, and each at an instant of a run.
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -9,46 +9,65 @@ use crate::params::set_of;
 use crate::scenario::injection::{CATALOGUE, Entry, HARDWARE, Injection, Kind, Target};
 use crate::scenario::{Scenario, StepAnomaly};
 
-/// How long an interrupt asks without end, s: longer than the watchdog waits, and not for
-/// ever, or the board would not come up again to report.
+/// Duration of an interrupt storm, s: longer than the watchdog waits, and finite, so that the
+/// board comes up again to report.
 const STORM_S: f64 = 0.25;
-/// How long commands come at random, s.
+/// Duration of random commands, s.
 const COMMANDS_S: f64 = 1.0;
 
 /// A fault of the matrix.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub enum Case {
     /// One that is injected into the run.
     Injected(&'static Entry),
-    /// A step that is not where or as the table says.
-    Step(StepFault),
+    /// A step that differs from the table.
+    Step(&'static StepFault),
 }
 
-/// How a step may differ from the table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StepFault {
-    /// 2 mm nearer to the stow end.
-    Early,
-    /// 2 mm farther out.
-    Late,
-    /// Not there.
-    Missing,
-    /// Followed by one that the table lacks, as close as the wheel can distinguish.
-    Doubled,
-    /// A quarter higher.
-    Higher,
+/// A step that differs from the table.
+#[derive(Debug)]
+pub struct StepFault {
+    name: &'static str,
+    /// What happens, in words.
+    text: &'static str,
+    /// The anomaly of the step of this number; an extra step is at this position, mm.
+    anomaly: fn(u8, f64) -> StepAnomaly,
 }
 
-/// All of them.
-const STEP_FAULTS: [StepFault; 5] =
-    [StepFault::Early, StepFault::Late, StepFault::Missing, StepFault::Doubled, StepFault::Higher];
+const STEP_FAULTS: [StepFault; 5] = [
+    StepFault {
+        name: "step early",
+        text: "2 mm nearer to the stow end than the table says",
+        anomaly: |step, _| StepAnomaly::Early { step, offset_mm: 2.0 },
+    },
+    StepFault {
+        name: "step late",
+        text: "2 mm farther out than the table says",
+        anomaly: |step, _| StepAnomaly::Late { step, offset_mm: 2.0 },
+    },
+    StepFault {
+        name: "step missing",
+        text: "not there",
+        anomaly: |step, _| StepAnomaly::Missing { step },
+    },
+    StepFault {
+        name: "step doubled",
+        text: "another one 15 mm behind it",
+        anomaly: |_, position_mm| StepAnomaly::Extra { position_mm },
+    },
+    StepFault {
+        name: "step higher",
+        text: "1 mm higher than the table says",
+        anomaly: |step, _| StepAnomaly::Higher { step, offset_mm: 1.0 },
+    },
+];
 
 impl Case {
     /// Every fault of the matrix.
     #[must_use]
     pub fn all() -> Vec<Self> {
         let injected = CATALOGUE.iter().map(Self::Injected);
-        injected.chain(STEP_FAULTS.into_iter().map(Self::Step)).collect()
+        injected.chain(STEP_FAULTS.iter().map(Self::Step)).collect()
     }
 
     /// Every fault of the matrix on the emulated board: those of software and of hardware. A
@@ -58,7 +77,7 @@ impl Case {
         let software =
             CATALOGUE.iter().filter(|e| !matches!(e.target, Target::Model | Target::Reset));
         let injected = software.chain(HARDWARE).map(Self::Injected);
-        injected.chain(STEP_FAULTS.into_iter().map(Self::Step)).collect()
+        injected.chain(STEP_FAULTS.iter().map(Self::Step)).collect()
     }
 
     /// Its name in the matrix.
@@ -66,7 +85,7 @@ impl Case {
     pub fn name(&self) -> String {
         match self {
             Self::Injected(entry) => format!("{} {}", entry.target.name(), entry.kind.name()),
-            Self::Step(fault) => format!("step {fault:?}").to_lowercase(),
+            Self::Step(fault) => fault.name.to_owned(),
         }
     }
 
@@ -93,14 +112,7 @@ impl Case {
             Self::Injected(entry) => {
                 format!("{}: {} {}", entry.text, entry.magnitude, entry.unit)
             }
-            Self::Step(fault) => match fault {
-                StepFault::Early => "2 mm nearer to the stow end than the table says",
-                StepFault::Late => "2 mm farther out than the table says",
-                StepFault::Missing => "not there",
-                StepFault::Doubled => "another one 15 mm behind it",
-                StepFault::Higher => "1 mm higher than the table says",
-            }
-            .to_owned(),
+            Self::Step(fault) => fault.text.to_owned(),
         }
     }
 
@@ -110,7 +122,7 @@ impl Case {
         match entry.kind {
             Kind::Gain if other => 1.0 / entry.magnitude,
             Kind::Offset | Kind::Runaway if other => -entry.magnitude,
-            // Along the word, one bit, which the parity shows, or two, which it does not.
+            // One bit of the word, which the parity shows, or two, which it does not.
             Kind::BitErrors => f64::from((1 + 2 * u16::from(other)) << (instant % 14)),
             Kind::Stuck if entry.target.is_hardware() && !entry.unit.is_empty() => {
                 [entry.magnitude, 0.0, 12_000.0, 65_535.0][instant % 4]
@@ -161,7 +173,7 @@ impl Case {
                     magnitude = random.random_range(entry.range.0..=entry.range.1).floor();
                 }
                 let mut fault = Injection::at(entry.target, entry.kind, at_s, magnitude);
-                // Random commands and interrupts end some time.
+                // Random commands and interrupts have an end.
                 fault.duration_s = match entry.target {
                     Target::Commands => Some(COMMANDS_S),
                     Target::Interrupt => Some(STORM_S),
@@ -172,19 +184,9 @@ impl Case {
             Self::Step(fault) => {
                 let steps = &base.rig.rig.step_positions_mm;
                 let step = random.random_range(0..steps.len().max(1));
-                let number = step as u8 + 1;
-                let anomaly = match fault {
-                    StepFault::Early => StepAnomaly::Early { step: number, offset_mm: 2.0 },
-                    StepFault::Late => StepAnomaly::Late { step: number, offset_mm: 2.0 },
-                    StepFault::Missing => StepAnomaly::Missing { step: number },
-                    StepFault::Higher => StepAnomaly::Higher { step: number, offset_mm: 1.0 },
-                    StepFault::Doubled => {
-                        // In the widest room behind or before a step.
-                        let position_mm = steps.last().map_or(40.0, |last| last + 15.0);
-                        StepAnomaly::Extra { position_mm }
-                    }
-                };
-                scenario.run.anomalies = vec![anomaly];
+                // In the widest room behind a step.
+                let extra_mm = steps.last().map_or(40.0, |last| last + 15.0);
+                scenario.run.anomalies = vec![(fault.anomaly)(step as u8 + 1, extra_mm)];
             }
         }
         scenario

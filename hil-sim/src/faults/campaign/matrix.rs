@@ -1,14 +1,13 @@
 //! The outcome of a campaign: a row for each fault.
 
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::{Case, Finding, Instant};
 
-/// Median and worst of what varies between instants.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// Median and worst of a figure over the instants.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct MedianAndWorst {
     /// Median.
     pub median: f64,
@@ -17,9 +16,8 @@ pub struct MedianAndWorst {
 }
 
 impl MedianAndWorst {
-    /// Of these values; none of nothing.
-    #[must_use]
-    pub fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
+    /// Of these values; none without a value.
+    fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
         let mut all: Vec<f64> = values.collect();
         all.sort_by(f64::total_cmp);
         Some(Self { median: *all.get(all.len() / 2)?, worst: *all.last()? })
@@ -27,7 +25,7 @@ impl MedianAndWorst {
 }
 
 /// A fault at all its instants.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize)]
 pub struct MatrixRow {
     /// The fault.
     pub fault: String,
@@ -38,39 +36,31 @@ pub struct MatrixRow {
     /// Every code that it was reported by, with how often.
     pub codes: BTreeMap<u16, usize>,
     /// Restarts of the controller that it was reported by, with how often.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub restarts: BTreeMap<Cow<'static, str>, usize>,
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub restarts: BTreeMap<&'static str, usize>,
     /// Whether at every instant it was reported or tolerated.
     pub detected: bool,
     /// Worst time from fault to report, ms; none if nothing was reported.
     pub latency_ms: Option<f64>,
     /// Median of the same, ms.
     pub latency_median_ms: Option<f64>,
-    /// The same from when the duty was off by two parts in a hundred, ms.
-    pub latency_any_ms: Option<MedianAndWorst>,
-    /// The same of the instants outside of crossings, ms.
-    pub latency_off_corner_ms: Option<MedianAndWorst>,
-    /// The same from when the plant first ran otherwise than without the fault, ms.
-    pub after_sign_ms: Option<MedianAndWorst>,
     /// From the report to rest with both bridges off, ms.
     pub rest_ms: Option<MedianAndWorst>,
-    /// The same of the instants in a crossing.
-    pub rest_in_crossing_ms: Option<MedianAndWorst>,
     /// Whether at every instant the mechanism was held.
     pub safe: bool,
-    /// Instants by what became of them.
+    /// Instants with a latched fault.
     pub found: usize,
-    /// Limited.
+    /// Instants with a reported limit.
     pub limited: usize,
-    /// Tolerated.
+    /// Instants tolerated without a report.
     pub tolerated: usize,
-    /// Undetected.
+    /// Instants undetected.
     pub undetected: usize,
-    /// Unsafe.
+    /// Instants at which a bound of the mechanism was exceeded.
     #[serde(rename = "unsafe")]
     pub unheld: usize,
-    /// How the runs ended, with how many did.
-    pub ends: BTreeMap<Cow<'static, str>, usize>,
+    /// Ends of the runs and how often each occurred.
+    pub ends: BTreeMap<&'static str, usize>,
     /// Largest preload, N.
     pub worst_preload_n: f64,
     /// Longest distance moved uncommanded, mm.
@@ -80,58 +70,38 @@ pub struct MatrixRow {
 }
 
 impl MatrixRow {
-    /// What it restarted the controller by most often.
+    /// The most frequent restart of the controller.
     #[must_use]
-    pub fn restarted(&self) -> Option<&str> {
-        self.restarts.iter().max_by_key(|(_, times)| **times).map(|(cause, _)| cause.as_ref())
+    pub fn restarted(&self) -> Option<&'static str> {
+        most_frequent(&self.restarts)
     }
 
     /// The row of a fault.
     #[must_use]
     pub fn of(case: &Case, instants: &[Instant]) -> Self {
         let count = |finding| instants.iter().filter(|i| i.finding == finding).count();
-        let mut codes = BTreeMap::new();
-        let mut restarts = BTreeMap::new();
-        let mut ends = BTreeMap::new();
-        for instant in instants {
-            *ends.entry(instant.end.clone()).or_default() += 1;
-            if let Some(code) = instant.code {
-                *codes.entry(code).or_default() += 1;
-            }
-            if let Some(cause) = &instant.restart {
-                *restarts.entry(cause.clone()).or_default() += 1;
-            }
-        }
+        let codes = counts(instants.iter().filter_map(|i| i.code));
         let failed = |i: &&Instant| i.finding == Finding::Undetected || !i.harms.is_empty();
         let failures: Vec<Instant> = instants.iter().filter(failed).cloned().collect();
         let latency = MedianAndWorst::of(instants.iter().filter_map(|i| i.latency_ms));
-        let crossing = |i: &&Instant| i.during == "crossing";
         let unheld = instants.iter().filter(|i| !i.harms.is_empty()).count();
         Self {
             fault: case.name(),
             text: case.text(),
-            code: codes.iter().max_by_key(|(_, n)| **n).map(|(code, _)| *code),
+            code: most_frequent(&codes),
             codes,
-            restarts,
+            restarts: counts(instants.iter().filter_map(|i| i.restart)),
             detected: count(Finding::Undetected) == 0,
             latency_ms: latency.map(|l| l.worst),
             latency_median_ms: latency.map(|l| l.median),
-            latency_any_ms: MedianAndWorst::of(instants.iter().filter_map(|i| i.latency_any_ms)),
-            latency_off_corner_ms: MedianAndWorst::of(
-                instants.iter().filter(|i| !crossing(i)).filter_map(|i| i.latency_ms),
-            ),
-            after_sign_ms: MedianAndWorst::of(instants.iter().filter_map(|i| i.after_sign_ms)),
             rest_ms: MedianAndWorst::of(instants.iter().filter_map(|i| i.rest_ms)),
-            rest_in_crossing_ms: MedianAndWorst::of(
-                instants.iter().filter(crossing).filter_map(|i| i.rest_ms),
-            ),
             safe: unheld == 0,
             found: count(Finding::Found),
             limited: count(Finding::Limited),
             tolerated: count(Finding::Tolerated),
             undetected: count(Finding::Undetected),
             unheld,
-            ends,
+            ends: counts(instants.iter().map(|i| i.end)),
             worst_preload_n: instants.iter().map(|i| i.peak_preload_n).fold(0.0, f64::max),
             worst_motion_mm: instants.iter().map(|i| i.motion_mm).fold(0.0, f64::max),
             failures,
@@ -139,7 +109,18 @@ impl MatrixRow {
     }
 }
 
-/// A whole campaign.
+/// How often each value occurs.
+fn counts<T: Ord>(values: impl Iterator<Item = T>) -> BTreeMap<T, usize> {
+    let mut counts = BTreeMap::new();
+    values.for_each(|value| *counts.entry(value).or_default() += 1);
+    counts
+}
+
+fn most_frequent<T: Copy>(counts: &BTreeMap<T, usize>) -> Option<T> {
+    counts.iter().max_by_key(|(_, times)| **times).map(|(value, _)| *value)
+}
+
+/// A complete campaign.
 #[derive(Clone, Debug, Serialize)]
 pub struct Outcome {
     /// What ran the controller.
@@ -164,7 +145,7 @@ impl Outcome {
         Self { target, instants, matrix, undetected, unheld }
     }
 
-    /// Whether every fault was found or tolerated, and nothing was left unheld.
+    /// Whether every fault was found or tolerated and every bound kept.
     #[must_use]
     pub const fn is_good(&self) -> bool {
         self.undetected == 0 && self.unheld == 0

@@ -1,4 +1,4 @@
-//! The operator of a run: sends it out and, once it has arrived, back.
+//! The operator of a run: deploys and, after arrival, retracts.
 
 use interstage::supervise::{Command, Mode};
 use interstage::units::Direction;
@@ -31,12 +31,12 @@ impl Operator {
         None
     }
 
-    /// The controller has started again: the last command is given once more.
+    /// The controller has restarted: the last command is given again.
     pub const fn press_again(&mut self) {
         self.started = false;
     }
 
-    /// Whether the run has been set going.
+    /// Whether the run has been started.
     pub const fn started(&self) -> bool {
         self.started
     }

@@ -1,5 +1,4 @@
-//! The same run without the fault: when it moves and crosses, what it reports by itself, and
-//! where the rig is in every tick.
+//! The same run without the fault: when it moves and crosses, and what it reports.
 
 use interstage::model::Planner;
 use interstage::rig::RigError;
@@ -11,34 +10,26 @@ use rand_chacha::ChaCha8Rng;
 
 use super::LONGEST_S;
 use super::operator::Operator;
-use crate::plant::rig::Truth;
 use crate::scenario::Scenario;
 use crate::session::{Options, RunError, Session};
-
-/// Differences from the twin that count as a sign of the fault: preload, N; position, mm;
-/// speed, mm/s. Ten deviations of the preload sensor, five counts of the encoder, and what the
-/// speed observer swings by itself.
-const SIGNS: (f64, f64, f64) = (0.5, 0.1, 2.0);
 
 /// A run without fault.
 pub struct Twin {
     /// From the command to the end, s since boot.
     pub started_s: f64,
     ended_s: f64,
-    /// When the present crossing began, s.
+    /// Start of the present crossing, s.
     crossing_s: Option<f64>,
-    /// Stretches of time in which it crosses a step, s.
+    /// Begin and end of its crossings, s.
     crossings: Vec<(f64, f64)>,
     /// Codes of the limits that it reports.
     pub limits: Vec<u16>,
     /// Reference gap of deployment and retraction, mm.
     pub gap_ref_mm: [f64; 2],
-    /// Preload, position, speed by tick.
-    states: Vec<[f32; 3]>,
 }
 
 impl Twin {
-    /// Runs it.
+    /// Runs it in software.
     pub fn run(scenario: &Scenario) -> Result<Self, RunError> {
         let mut session = Session::new(scenario, Options::default())?;
         let mut operator = Operator::default();
@@ -50,7 +41,7 @@ impl Twin {
                 twin.started_s = t_s;
             }
             let output = session.step(command)?;
-            twin.note(t_s, session.mode(), &output, session.plant().truth(), false);
+            twin.note(t_s, session.mode(), &output, false);
             if operator.over(session.mode()) && command.is_none() {
                 break;
             }
@@ -67,26 +58,21 @@ impl Twin {
             crossing_s: None,
             crossings: Vec::new(),
             limits: Vec::new(),
-            gap_ref_mm: Direction::ALL.map(|way| planner.gap_ref(way).to_num()),
-            states: Vec::new(),
+            gap_ref_mm: Direction::ALL.map(|direction| planner.gap_ref(direction).to_num()),
         })
     }
 
-    /// A tick, after which the drive is in this mode; `over` says that it counts no more.
-    pub fn note(&mut self, t_s: f64, mode: Mode, output: &Output, truth: &Truth, over: bool) {
-        self.states.push(state(truth));
+    /// A tick, after which the drive is in this mode; `over`: it is behind the end of the run.
+    pub fn note(&mut self, t_s: f64, mode: Mode, output: &Output, over: bool) {
         for entry in &output.events {
             if let Event::Limit(limit) = entry.event {
                 self.limits.push(limit.code());
             }
         }
-        match (mode, self.crossing_s) {
-            (Mode::Run(_, Leg::Crossing), None) => self.crossing_s = Some(t_s),
-            (Mode::Run(_, Leg::Crossing), Some(_)) | (_, None) => {}
-            (_, Some(from_s)) => {
-                self.crossings.push((from_s, t_s));
-                self.crossing_s = None;
-            }
+        if let Mode::Run(_, Leg::Crossing) = mode {
+            self.crossing_s.get_or_insert(t_s);
+        } else if let Some(from_s) = self.crossing_s.take() {
+            self.crossings.push((from_s, t_s));
         }
         if !over {
             self.ended_s = t_s;
@@ -104,16 +90,4 @@ impl Twin {
         // On a tick.
         (at_s * 1e3).round() * 1e-3
     }
-
-    /// Whether the state of the rig differs in this tick.
-    pub fn differs(&self, tick: usize, truth: &Truth) -> bool {
-        let Some(then) = self.states.get(tick).or(self.states.last()) else { return false };
-        let now = state(truth);
-        let apart = |i: usize| f64::from(now[i] - then[i]).abs();
-        apart(0) > SIGNS.0 || apart(1) > SIGNS.1 || apart(2) > SIGNS.2
-    }
-}
-
-fn state(truth: &Truth) -> [f32; 3] {
-    [truth.preload_n as f32, truth.position_mm as f32, truth.tread_mm_s as f32]
 }

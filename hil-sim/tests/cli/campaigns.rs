@@ -1,0 +1,59 @@
+//! `rig montecarlo` and `rig faults`.
+
+use serde_json::Value;
+
+use super::{code, good, number, rig, stdout};
+
+fn campaign(more: &[&str]) -> Value {
+    good(&[&["montecarlo", "--json"], more].concat())
+}
+
+#[test]
+fn five_rigs_complete_with_every_key_and_the_shards_are_the_whole() {
+    let all = campaign(&["-n", "5"]);
+    assert_eq!((&all["runs"], &all["completed"]), (&Value::from(5), &Value::from(5)));
+    assert!((1..=5).contains(&all["worst_gap_seed"].as_u64().unwrap()));
+    assert!(all["slip_events"].is_u64() && all["faults"].is_array());
+    assert_eq!(all["incomplete"], serde_json::json!([]));
+    assert!(number(&all["duration_s"], "p50") <= number(&all["duration_s"], "max"));
+    assert!(number(&all["gap_over_ref"], "p95") > 0.5);
+    assert!(all["lead_time_s"]["seed"].is_u64() && all["slip_margin"]["seed"].is_u64());
+    let shards = ["1/2", "2/2"].map(|shard| campaign(&["-n", "5", "--shard", shard]));
+    let sum = |key: &str| shards.iter().map(|shard| number(shard, key)).sum::<f64>();
+    for key in ["runs", "completed", "slip_events"] {
+        assert_eq!(sum(key), number(&all, key), "{key}");
+    }
+    assert_eq!(number(&shards[0], "runs"), 3.0);
+    let worst = shards.iter().map(|shard| number(shard, "worst_gap_mm")).fold(0.0, f64::max);
+    assert_eq!(worst, number(&all, "worst_gap_mm"));
+}
+
+#[test]
+fn the_worst_run_can_be_repeated() {
+    let outcome = campaign(&["-n", "2", "--seed", "40"]);
+    let seed = outcome["worst_gap_seed"].as_u64().unwrap();
+    assert!([41, 42].contains(&seed));
+    let run = good(&["deploy", "--json", "--no-files", "--seed", &seed.to_string()]);
+    assert_eq!(run["max_gap_mm"], outcome["worst_gap_mm"]);
+}
+
+#[test]
+fn rigs_that_do_not_complete_are_named() {
+    let output = rig(&["montecarlo", "-n", "2", "--set", "plant.mu=0.05"]);
+    assert_eq!(code(&output), 1);
+    let text = stdout(&output);
+    assert!(text.contains("0 completed") && text.contains("incomplete: seeds 1, 2"), "{text}");
+    assert!(text.contains("What limits it"), "{text}");
+}
+
+#[test]
+fn the_parts_of_a_fault_campaign_are_the_whole() {
+    let some = ["faults", "--json", "-n", "2", "--only", "runaway", "--only", "tick"];
+    let all = good(&some);
+    assert_eq!((&all["undetected"], &all["unsafe"]), (&0.into(), &0.into()));
+    let lines = |run: &Value| run["matrix"].as_array().expect("lines").clone();
+    let [first, second] =
+        ["1/2", "2/2"].map(|part| lines(&good(&[&some[..], &["--shard", part]].concat())));
+    assert_eq!((first.len(), second.len()), (2, 1));
+    assert_eq!([first[0].clone(), second[0].clone(), first[1].clone()].to_vec(), lines(&all));
+}
