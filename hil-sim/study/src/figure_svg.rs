@@ -211,17 +211,9 @@ fn draw_scaled(panel: &Panel, cell: &Area) -> Drawn {
         let shift = if panel.categories.is_empty() { 0 } else { beside(one.source) };
         for &(x, low, high) in &one.range {
             let [a, b] = [low, high].map(|y| chart.backend_coord(&(x, y)));
-            let corners = [(a.0 + shift - 5 * S, a.1), (b.0 + shift + 5 * S, b.1)];
-            chart.plotting_area().draw(
-                &(EmptyElement::at((x, low))
-                    + Rectangle::new(
-                        [
-                            (corners[0].0 - a.0, 0),
-                            (corners[1].0 - a.0, corners[1].1 - corners[0].1),
-                        ],
-                        BAND.filled(),
-                    )),
-            )?;
+            let corners = [(shift - 5 * S, 0), (shift + 5 * S, b.1 - a.1)];
+            let bar = EmptyElement::at((x, low)) + Rectangle::new(corners, BAND.filled());
+            chart.plotting_area().draw(&bar)?;
         }
         for &point in &one.points {
             let [rim, body] = mark((shift, 0), one.source);

@@ -10,7 +10,7 @@ use interstage_images::model::{
 use interstage_images::number::Number;
 use serde::Serialize;
 
-use super::timing::least;
+use super::least;
 
 /// Steps of the domain, mm.
 const STEPS_MM: [f64; 5] = [2.0, 3.0, 4.0, 5.0, 6.0];

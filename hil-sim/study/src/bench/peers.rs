@@ -6,6 +6,8 @@
 //!
 //! Errors are those of gap and largest axial force against the converged ring.
 
+use std::path::Path;
+
 use anyhow::{Context, Result};
 use interstage::rig::Rig;
 use serde::{Deserialize, Serialize};
@@ -16,7 +18,7 @@ use hil_sim::plant::precision::{FINER, Setting as Mesh};
 use hil_sim::plant::ring::RingParameters;
 use hil_sim::plant::rolling;
 
-use super::{python, timing::least};
+use super::{least, python};
 
 /// The published case: speed, mm/s, and preload, N.
 const SPEED_MM_S: f64 = 5.0;
@@ -81,7 +83,7 @@ struct Given<'a> {
     end_mm: f64,
     repeats: usize,
     budget_s: f64,
-    folder: &'a str,
+    folder: &'a Path,
     elements: Vec<usize>,
     time_steps_s: [f64; 7],
     fits: Vec<Fit>,
@@ -184,7 +186,7 @@ fn ring(factor: f64, exact: Exact) -> Result<Setting> {
     })
 }
 
-fn given(folder: &str) -> Result<Given<'_>> {
+fn given(folder: &Path) -> Result<Given<'_>> {
     let rig = Rig::fe();
     let ring = RingParameters::of(&rig, Mesh::usual().elements);
     let (radius, step) = (ring.radius_mm, rig.rig.step_height_mm);
@@ -315,7 +317,7 @@ mod tests {
         assert!(
             (found.gap_mm - 1.744).abs() < 0.002 && (found.corner_force_n - 53.72).abs() < 0.05
         );
-        let given = given("/tmp").unwrap();
+        let given = given(Path::new("/tmp")).unwrap();
         let [less, more] = &given.fits[..] else { panic!("two fits") };
         assert!(less.gap_mm > more.gap_mm && less.sinkage_mm < more.sinkage_mm);
     }

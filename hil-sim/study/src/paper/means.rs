@@ -4,7 +4,7 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::experiment::{Experiment, Reading, groups};
-use crate::figure::{Series, Source};
+use crate::figure::Series;
 
 /// A parabola.
 type Curve = [f64; 3];
@@ -112,14 +112,12 @@ impl Means {
     pub fn series(&self) -> Vec<Series> {
         let band = self.at.iter().zip(&self.range).map(|(&x, &(low, high))| (x, low, high));
         let mut range: Vec<_> = band.collect();
-        let curves = self.curves.iter().enumerate();
-        curves
-            .map(|(index, curve)| Series {
-                source: Source::Experiment,
-                name: format!("mean {}", index + 1),
-                points: self.at.iter().copied().zip(curve.iter().copied()).collect(),
-                range: std::mem::take(&mut range),
-            })
+        let curves = self
+            .curves
+            .iter()
+            .map(|curve| self.at.iter().copied().zip(curve.iter().copied()).collect());
+        Series::means(curves)
+            .map(|one| Series { range: std::mem::take(&mut range), ..one })
             .collect()
     }
 }

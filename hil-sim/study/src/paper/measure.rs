@@ -9,7 +9,7 @@
 use hil_sim::plant::rig::VirtualRig;
 use hil_sim::plant::rolling;
 
-/// Way behind an edge, mm, over which the patch leaves it: the next corner is farther.
+/// Distance behind an edge, mm, over which the patch leaves it: the next corner is farther.
 const LEAVES_MM: f64 = 8.0;
 
 /// Watches a plant for the force of its corners.
@@ -63,7 +63,7 @@ pub fn impact_kpa(plant: &VirtualRig, collision_n: f64) -> f64 {
     let size = (ring.radius_mm, ring.width_mm);
     let ahead = corner_area_mm2(size, local.ahead_mm, height - local.rise_mm);
     let area = if ahead > 0.0 { ahead } else { corner_area_mm2(size, -local.behind_mm, height) };
-    // Elements of the plant's ring touch whole.
+    // Elements of the plant's ring touch as a whole.
     let element = std::f64::consts::TAU * size.0 * size.1 / ring.elements as f64;
     stress_kpa(collision_n, area.max(element))
 }
@@ -77,9 +77,9 @@ pub fn stress_kpa(force_n: f64, area_mm2: f64) -> f64 {
 /// Part of the undeformed surface of a wheel of this radius and width that face and top
 /// of a step cut off, mm^2.
 ///
-/// Equation: `A = R L (acos(u/R) - asin(d/R))`, d the way to the face, negative once the
+/// Equation: `A = R L (acos(u/R) - asin(d/R))`, d the distance to the face, negative once the
 /// centre has passed it, and u the height of the centre above the top, both mm. Range: 0
-/// where the corner stands ahead of the wheel; the whole patch where it lies behind.
+/// where the corner is ahead of the wheel; the whole patch where it lies behind.
 /// Memory lets the trailing part of the patch go earlier: the true area is smaller.
 #[must_use]
 pub fn corner_area_mm2((radius, width): (f64, f64), ahead_mm: f64, above_mm: f64) -> f64 {

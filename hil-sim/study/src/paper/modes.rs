@@ -65,14 +65,18 @@ impl Modes {
     /// The figure.
     #[must_use]
     pub fn figure(&self) -> Figure {
-        let mut hertz = Panel::new("Natural frequency", "mode", "frequency, Hz");
-        hertz.categories = vec!["first constrained".into(), "seventh free".into()];
-        for (source, index) in [(Source::Theory, 0), (Source::Simulation, 1)] {
-            let points = vec![(0.0, self.constrained[index].1), (1.0, self.free[index].1)];
-            hertz.series.push(Series::new(source, points));
-        }
-        hertz.series.push(Series::new(Source::Fitted, vec![(0.0, CONSTRAINED_HZ)]));
-        hertz.series.push(Series::new(Source::Published, vec![(1.0, FREE_HZ)]));
+        let of = |source, index: usize| {
+            Series::new(source, vec![(0.0, self.constrained[index].1), (1.0, self.free[index].1)])
+        };
+        let series = vec![
+            of(Source::Theory, 0),
+            of(Source::Simulation, 1),
+            Series::new(Source::Fitted, vec![(0.0, CONSTRAINED_HZ)]),
+            Series::new(Source::Published, vec![(1.0, FREE_HZ)]),
+        ];
+        let names = vec!["first constrained".into(), "seventh free".into()];
+        let mut hertz =
+            Panel::of_categories("Natural frequency", ("mode", names), "frequency, Hz", series);
         hertz.least_y = Some((0.0, 0.0));
         let classical = [
             ("First constrained mode", clamped as Classical, self.constrained[0].0),
@@ -80,37 +84,34 @@ impl Modes {
         ];
         let mut panels = vec![hertz];
         for ((title, shape, beta_l), waves) in classical.into_iter().zip(&self.shapes) {
-            let mut panel = Panel::new(title, "along the arm, mm", "deflection over largest");
             let theory = self.shape(|part| shape(beta_l, part));
             let simulation = self.shape(|part| waves.at(part * self.beam.length_m));
-            panel.series.push(Series::new(Source::Theory, theory));
-            panel.series.push(Series::new(Source::Simulation, simulation));
-            panels.push(panel);
+            let series = vec![
+                Series::new(Source::Theory, theory),
+                Series::new(Source::Simulation, simulation),
+            ];
+            let (x, y) = ("along the arm, mm", "deflection over largest");
+            panels.push(Panel::new(title, x, y, series));
         }
         let mark = |what: &str, published, of: [(f64, f64); 2]| {
             let ours = [(Source::Theory, of[0].1), (Source::Simulation, of[1].1)];
             Mark::new(what.into(), "Hz", published, &ours)
         };
-        Figure {
-            id: "fig19",
-            file: "fig19.svg".into(),
-            title: "Modes of the drive arm",
-            caption: format!(
-                "The arm with {:.1} g at the wheel's end, the mass with which its first constrained mode is \
+        let caption = format!(
+            "The arm with {:.1} g at the wheel's end, the mass with which its first constrained mode is \
                  the published one: fitted. Theory: the classical frequency equations of a beam with a point \
                  mass. Simulation: the wave-vector method (equations 54 and 55). The free arm's seventh mode is its \
                  first bending mode, after six of a rigid body. The virtual rig is given the two \
                  published frequencies as parameters and is no test of them; the study's table of six \
                  constrained modes is not published.",
-                self.tip_mass_kg * 1e3
-            ),
-            columns: 3,
-            panels,
-            published: vec![
-                mark("first constrained mode", (CONSTRAINED_HZ, true), self.constrained),
-                mark("seventh free mode", (FREE_HZ, false), self.free),
-            ],
-        }
+            self.tip_mass_kg * 1e3
+        );
+        let published = vec![
+            mark("first constrained mode", (CONSTRAINED_HZ, true), self.constrained),
+            mark("seventh free mode", (FREE_HZ, false), self.free),
+        ];
+        let title = "Modes of the drive arm";
+        Figure { published, ..Figure::new("fig19", title, caption, 3, panels) }
     }
 
     /// Shape of a mode over the arm, mm, its largest deflection 1.
