@@ -16,11 +16,8 @@ use interstage::model::formula::Formula;
 use interstage::rig::Rig;
 use interstage::units::Direction;
 
-use data::{Row, run_all};
+use data::Row;
 use design::{Case, Use};
-
-/// Largest difference of a row from a fresh crossing that is not staleness, relative.
-const SAME: f64 = 2e-9;
 
 /// All crossings of the file, in its order.
 #[must_use]
@@ -35,14 +32,6 @@ pub fn plan() -> Vec<(Case, Use)> {
     all
 }
 
-/// Runs all crossings, some minutes.
-///
-/// # Errors
-/// If a crossing cannot be balanced.
-pub fn sweep(progress: &(dyn Fn() + Sync)) -> Result<Vec<Row>> {
-    run_all(&plan(), progress)
-}
-
 /// The crossings of the file in place.
 ///
 /// # Errors
@@ -51,30 +40,6 @@ pub fn stored() -> Result<Vec<Row>> {
     let path = data::path();
     let text = std::fs::read_to_string(&path).with_context(|| format!("{}", path.display()))?;
     data::read(&text)
-}
-
-/// Runs every `stride`-th crossing of the file again.
-///
-/// # Errors
-/// If the file is not of today's design, or a row not what the ring gives.
-pub fn verify(rows: &[Row], stride: usize, progress: &(dyn Fn() + Sync)) -> Result<()> {
-    let plan = plan();
-    ensure!(
-        rows.len() == plan.len() && rows.iter().zip(&plan).all(|(r, p)| (r.case, r.of) == *p),
-        "the stored crossings are not those of the design"
-    );
-    let sample: Vec<Row> = rows.iter().step_by(stride).copied().collect();
-    let cases: Vec<(Case, Use)> = sample.iter().map(|row| (row.case, row.of)).collect();
-    for (stored, fresh) in sample.iter().zip(run_all(&cases, progress)?) {
-        let same = |a: f64, b: f64| (a - b).abs() <= SAME * b.abs().max(1.0);
-        ensure!(
-            same(stored.gap_mm, fresh.gap_mm)
-                && same(stored.utilisation, fresh.utilisation)
-                && same(stored.corner_force_n, fresh.corner_force_n),
-            "a stored crossing is not what the ring gives: {stored:?}, now {fresh:?}"
-        );
-    }
-    Ok(())
 }
 
 /// The source of `src/model/constants.rs` that follows from the crossings.

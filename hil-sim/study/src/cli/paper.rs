@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use super::{docs, write};
+use super::{docs, failed, write};
 use crate::figure_svg::svg;
 use crate::paper::{self, Study, page};
 use hil_sim::cli::failure::{Failure, Outcome};
@@ -43,7 +43,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         .map_err(|error| Failure::input(format!("{}: {error}", directory.display())))?;
     let study = {
         let bar = progress::bar("deployments", paper::runs() as u64);
-        paper::regenerate(&|| bar.advance(1)).map_err(|e| Failure::run(format!("{e:#}")))?
+        paper::regenerate(&|| bar.advance(1)).map_err(failed)?
     };
     let mut files: Vec<(&str, String)> =
         study.figures.iter().map(|figure| (figure.file.as_str(), svg(figure))).collect();

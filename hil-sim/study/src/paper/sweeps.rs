@@ -170,19 +170,13 @@ impl Sweep {
     /// Figure 22 or 23.
     #[must_use]
     pub fn depth_figure(&self) -> Figure {
-        let (id, title, depth, area) = match self.variable {
-            Variable::Preload => (
-                "fig22",
-                "Embedding depth and contact area against preload",
-                DEPTH_SPREAD_MM.0,
-                AREA_SPREAD_MM2.0,
-            ),
-            Variable::Speed => (
-                "fig23",
-                "Embedding depth and contact area against speed",
-                DEPTH_SPREAD_MM.1,
-                AREA_SPREAD_MM2.1,
-            ),
+        let (preload, speed) = (
+            ("fig22", "Embedding depth and contact area against preload"),
+            ("fig23", "Embedding depth and contact area against speed"),
+        );
+        let ((id, title), depth, area) = match self.variable {
+            Variable::Preload => (preload, DEPTH_SPREAD_MM.0, AREA_SPREAD_MM2.0),
+            Variable::Speed => (speed, DEPTH_SPREAD_MM.1, AREA_SPREAD_MM2.1),
         };
         let panels = vec![
             self.panel("(a) Embedding depth", "depth, mm", &self.depth),
