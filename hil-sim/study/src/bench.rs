@@ -80,16 +80,17 @@ impl Plant {
 /// # Errors
 /// If the model cannot be built, a crossing cannot be balanced, or core and host differ.
 pub fn measure(options: Options, say: &dyn Fn(&str)) -> Result<Report> {
+    let one_line = |error: &anyhow::Error| Some(format!("{error:#}").replace('\n', " "));
     say("reduced model");
     let mut variants = model::measure()?;
     let (tick, cycles_left_out) = if options.cycles {
         say("cycles");
         match cycles::run() {
-            Ok(measured) => {
-                cycles::fill(&measured, &mut variants)?;
-                (Some(measured.tick), None)
+            Ok((calls, tick)) => {
+                cycles::fill(&calls, &mut variants)?;
+                (Some(tick), None)
             }
-            Err(error) => (None, Some(one_line(&error))),
+            Err(error) => (None, one_line(&error)),
         }
     } else {
         (None, Some("not asked for".to_owned()))
@@ -103,17 +104,13 @@ pub fn measure(options: Options, say: &dyn Fn(&str)) -> Result<Report> {
     let (peers, peers_left_out) = if options.peers {
         match peers::compare(say) {
             Ok(peers) => (Some(peers), None),
-            Err(error) => (None, Some(one_line(&error))),
+            Err(error) => (None, one_line(&error)),
         }
     } else {
         (None, Some("not asked for: `rig bench --peers` sets them up".to_owned()))
     };
     let plant = Plant { finer: FINER, default, settings };
     Ok(Report { variants, tick, cycles_left_out, plant, peers, peers_left_out })
-}
-
-fn one_line(error: &anyhow::Error) -> String {
-    format!("{error:#}").replace('\n', " ")
 }
 
 /// Repeats after the run that warms up.
