@@ -49,17 +49,19 @@ pub fn stored() -> Result<Vec<Row>> {
 pub fn source(rows: &[Row]) -> Result<String> {
     let formula = Formula::new(&Rig::fe());
     let mut source = String::from(
-        "//! Coefficients of the felt stiffening in 1e-8, in the order of\n\
+        "//! Coefficients of the effective stiffness in 1e-8, in the order of\n\
          //! [`Kind::terms`](super::effective_stiffness::Kind::terms). Written by `rig-study constants` from\n\
          //! crossings of the converged ring; do not edit.\n",
     );
     for kind in Kind::ALL {
         let coefficients = fit::fit(&formula, kind, rows).context(data::kind_name(kind))?;
         let (name, doc) = match (kind.direction, kind.driven) {
-            (Direction::Deploy, true) => ("DEPLOY", "Way out, driven by friction."),
-            (Direction::Deploy, false) => ("DEPLOY_PUSHED", "Way out, pushed and frictionless."),
-            (Direction::Retract, true) => ("RETRACT", "Way back, driven by friction."),
-            (Direction::Retract, false) => ("RETRACT_PUSHED", "Way back, pushed."),
+            (Direction::Deploy, true) => ("DEPLOY", "Deploying, driven by friction."),
+            (Direction::Deploy, false) => ("DEPLOY_PUSHED", "Deploying, pushed and frictionless."),
+            (Direction::Retract, true) => ("RETRACT", "Retracting, driven by friction."),
+            (Direction::Retract, false) => {
+                ("RETRACT_PUSHED", "Retracting, pushed and frictionless.")
+            }
         };
         let count = coefficients.len();
         let _ =

@@ -3,7 +3,7 @@
 //! rig, forty runs and four means of ten), with the numbers that it prints as marks, and
 //! every claim of it judged by these data.
 //!
-//! A claim is judged by code from the data of the figure below which it stands; nothing
+//! A claim is judged by code from the data of the figure below which it is printed; nothing
 //! is fitted but the three numbers of the tread, and nothing is tuned so that a claim
 //! would hold. Everything is deterministic: the same build writes the same bytes.
 

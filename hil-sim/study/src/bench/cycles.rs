@@ -131,8 +131,8 @@ pub fn fill(measured: &[Calls], variants: &mut [Variant]) -> Result<()> {
             let same = host.abs_diff(core) <= most;
             ensure!(same, "{name}, point {point}: {core} on the core, {host} on the host");
         }
-        let course = if back { &mut variant.inverse } else { &mut variant.forward };
-        course.cycles = Some(calls.cost.max);
+        let measurement = if back { &mut variant.inverse } else { &mut variant.forward };
+        measurement.cycles = Some(calls.cost.max);
     }
     Ok(())
 }

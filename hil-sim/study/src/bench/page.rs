@@ -4,7 +4,7 @@ use hil_sim::plant::precision::Point;
 use hil_sim::table::{number, plain};
 
 use super::Report;
-use super::model::{Course, Variant};
+use super::model::{Measurement, Variant};
 use super::peers::{LEVEL, Peers, RING};
 use crate::figure::{Figure, Panel, Series};
 use crate::figure_svg::svg;
@@ -31,8 +31,11 @@ fn figure(id: &'static str, columns: usize, panels: Vec<Panel>) -> Figure {
 
 fn model_panel(report: &Report) -> Panel {
     let series = report.variants.iter().enumerate().map(|(index, variant)| {
-        let point = |course: &Course| {
-            (course.cycles.map_or(course.host_ns, |cycles| cycles as f64), course.max_rel_error)
+        let point = |measurement: &Measurement| {
+            (
+                measurement.cycles.map_or(measurement.host_ns, |cycles| cycles as f64),
+                measurement.max_rel_error,
+            )
         };
         let points = vec![point(&variant.forward), point(&variant.inverse)];
         Series::method(index, variant.name, points)
@@ -92,13 +95,13 @@ pub fn tables(report: &Report) -> String {
 }
 
 fn model_table(report: &Report) -> String {
-    let row = |name: &str, course: &Course| {
+    let row = |name: &str, measurement: &Measurement| {
         vec![
             name.to_owned(),
-            format!("{:.1e}", course.max_rel_error),
-            format!("{:.1e}", course.rms_rel_error),
-            course.cycles.map_or_else(|| "-".to_owned(), |cycles| cycles.to_string()),
-            number(course.host_ns, 0),
+            format!("{:.1e}", measurement.max_rel_error),
+            format!("{:.1e}", measurement.rms_rel_error),
+            measurement.cycles.map_or_else(|| "-".to_owned(), |cycles| cycles.to_string()),
+            number(measurement.host_ns, 0),
         ]
     };
     let rows = report.variants.iter().flat_map(|Variant { name, forward, inverse }| {

@@ -1,4 +1,4 @@
-//! Least squares of the felt stiffening.
+//! Least squares of the effective stiffening.
 
 use anyhow::{Context, Result};
 use interstage::model::effective_stiffness::{

@@ -118,8 +118,8 @@ impl Amplitudes {
                       the instant at which the lower wall stops carrying, simulation the largest of the \
                       crossing. Experiment: the virtual rig at the study's loads, torque-driven, largest \
                       value of its 0.1 s log. The unit of the published stress is doubtful, so \
-                      that ratios stand here; ours are of hundreds of kPa, and the wave alone that the touch launches at \
-                      5 mm/s (impedance times closing speed, at once over the whole face) is {:.0} Pa. Nothing in \
+                      that ratios are given here; ours are of hundreds of kPa, and the wave alone that the touch launches at \
+                      5 mm/s (impedance times closing speed, at once over the entire face) is {:.0} Pa. Nothing in \
                       this figure is fitted.",
             self.touch_pa
         );
@@ -270,7 +270,7 @@ impl Amplitudes {
                 "",
             ),
             of("fig15-16", "simulated-curves-resemble-theory").judged(
-                "The simulated amplitude curves closely resemble the theoretical ones over the whole transition.",
+                "The simulated amplitude curves closely resemble the theoretical ones throughout the transition.",
                 resemblance < CLOSE,
                 format!(
                     "Clearance at the first step from lift-off on: up to {:.1} % apart.",
@@ -296,7 +296,7 @@ impl Amplitudes {
                     "The largest deflection of the arm in the experiment is {:.2} of the gap.",
                     arm_over_gap(all, self)
                 ),
-                "The gap is the quasi-static clearance under a wheel that stands on floor and corner; it is \
+                "The gap is the quasi-static clearance under a wheel that floor and corner carry; it is \
                  there at rest as well. Inertia of the impact is about a newton, and waves cross the tread \
                  in a tenth of a millisecond.",
             ),

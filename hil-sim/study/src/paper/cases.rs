@@ -122,7 +122,7 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
                     .collect::<Vec<_>>()
                     .join("; ")
             ),
-            "The two do not even stand in the same order: the speed stiffens the tread and narrows the contact, \
+            "The two are not even in the same order: the speed stiffens the tread and narrows the contact, \
              which raises the stress at nearly the same force.",
         ),
         of("impact-decays-to-zero").judged(
@@ -131,7 +131,7 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
                 SOURCES.into_iter().all(|source| one.left_over(impact, source) < GONE)
             }),
             format!(
-                "Once the wheel stands on the last sleeve at most {:.3} of the peak is left, in any case and \
+                "Once the wheel is on the last sleeve at most {:.3} of the peak is left, in any case and \
                  source.",
                 all.iter()
                     .flat_map(|one| SOURCES.map(|source| one.left_over(impact, source)))

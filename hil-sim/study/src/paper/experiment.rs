@@ -27,7 +27,7 @@ use hil_sim::session::{Options, Session};
 /// Crossings of a deployment.
 pub const STAGES: usize = 3;
 
-/// Longest run, s: the whole travel at the slowest case, with room.
+/// Longest run, s: all of the travel in the slowest case, with room.
 const LONGEST_S: f64 = 60.0;
 
 /// A tick of the session, s.

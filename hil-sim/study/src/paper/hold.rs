@@ -201,7 +201,7 @@ impl Hold {
                 "",
             ),
             of(INTRODUCED, "least-preload-100").judged(
-                "Under its top load the drive needs a radial preload of about 100 N (one third of the whole \
+                "Under its top load the drive needs a radial preload of about 100 N (one third of the entire \
                  drive) to work.",
                 (self.least_preload_n / LEAST_PRELOAD_N - 1.0).abs() < 0.2,
                 format!(
@@ -216,7 +216,7 @@ impl Hold {
                 "At a step the drive may slip or retreat.",
                 self.friction_alone > rig.plant.mu,
                 format!(
-                    "One wheel that lifts the rig's whole 20 N at 5 mm/s and 33.3 N between parallel guides \
+                    "One wheel that lifts all of the rig's 20 N at 5 mm/s and 33.3 N between parallel guides \
                      needs a friction of {:.2}; ours has {}.",
                     self.friction_alone, rig.plant.mu
                 ),

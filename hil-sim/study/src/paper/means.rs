@@ -100,7 +100,7 @@ impl Means {
         self.curves.iter().map(|curve| bend(curve)).collect()
     }
 
-    /// Whether every mean goes the same way from each place to the next: up for a
+    /// Whether every mean changes with the same sign from each place to the next: up for a
     /// positive `sense`.
     #[must_use]
     pub fn all_go(&self, sense: f64) -> bool {

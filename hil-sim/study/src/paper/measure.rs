@@ -79,7 +79,7 @@ pub fn stress_kpa(force_n: f64, area_mm2: f64) -> f64 {
 ///
 /// Equation: `A = R L (acos(u/R) - asin(d/R))`, d the distance to the face, negative once the
 /// centre has passed it, and u the height of the centre above the top, both mm. Range: 0
-/// where the corner is ahead of the wheel; the whole patch where it lies behind.
+/// where the corner is ahead of the wheel; the entire patch where it lies behind.
 /// Memory lets the trailing part of the patch go earlier: the true area is smaller.
 #[must_use]
 pub fn corner_area_mm2((radius, width): (f64, f64), ahead_mm: f64, above_mm: f64) -> f64 {

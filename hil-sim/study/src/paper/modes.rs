@@ -136,7 +136,7 @@ impl Modes {
                 "The first constrained mode is 276 Hz.",
                 near(constrained, CONSTRAINED_HZ),
                 format!(
-                    "{:.1} Hz with {:.1} g at the wheel's end, a mass that is fitted to it and stands for \
+                    "{:.1} Hz with {:.1} g at the wheel's end, a mass that is fitted to it and represents \
                      wheel, axle and what yields in the clamp; {:.1} Hz without.",
                     constrained, self.tip_mass_kg * 1e3, self.bare_hz.0
                 ),
@@ -146,7 +146,7 @@ impl Modes {
                 "The seventh free mode is 163 Hz.",
                 near(free, FREE_HZ) || near(self.bare_hz.1, FREE_HZ),
                 format!("{free:.0} Hz with the mass at the wheel's end, {:.0} Hz without.", self.bare_hz.1),
-                "The arm alone is far too stiff for it. The published mode is that of the whole device, \
+                "The arm alone is far too stiff for it. The published mode is that of the entire device, \
                  whose masses and joints the study does not give; a free body softer than the clamped arm \
                  bends somewhere else.",
             ),

@@ -1,5 +1,5 @@
 //! What the reference models say: gap, depth and area of the converged ring with memory,
-//! and a whole deployment as ring with inertia, waves in the tread and bending of the arm.
+//! and a deployment as ring with inertia, waves in the tread and bending of the arm.
 
 use anyhow::Result;
 
@@ -63,7 +63,7 @@ pub fn lift(case: &Case, drive: Drive, level: usize) -> Result<Lift, BalanceErro
 /// Cells of the tread in which waves run to the hub.
 const CELLS: usize = 4;
 
-/// A whole deployment of the driven wheel by the reference models, a crossing a step: the
+/// A deployment of the driven wheel by the reference models, a crossing a step: the
 /// ring with memory and inertia, the waves that its stress sends through the tread, and the
 /// arm that it bends.
 ///

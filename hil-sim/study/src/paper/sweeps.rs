@@ -200,7 +200,7 @@ impl Sweep {
     ) -> Figure {
         let caption = format!(
             "At rig loads, {}, torque-driven against a third of the 20 N on top, with the arm \
-             that wedges the wheel into the wall. Theory: reduced model, closed form. \
+             that presses the wheel into the wall. Theory: reduced model, closed form. \
              Simulation: the converged ring with memory. Experiment: forty rigs within their \
              tolerances, each value as its sensors give it, mean of the three transitions of \
              a deployment, a parabola fitted to each rig's readings, four means of ten. The \

@@ -18,7 +18,7 @@ use hil_sim::plant::wall::{Step, Wall};
 pub enum Drive {
     /// Pushed at its axle over a frictionless wall.
     Pushed,
-    /// Driven by torque, with the arm that wedges it into the wall.
+    /// Driven by torque, with the arm that presses it into the wall.
     Driven,
 }
 
@@ -89,10 +89,10 @@ pub fn area_of_depth_mm2(case: &Case, depth_mm: f64) -> f64 {
     corner_area_mm2((formula.radius_mm, formula.width_mm), ahead, above)
 }
 
-/// Elements of the elastic ring of a whole deployment and its axial travel per step, mm.
+/// Elements of the elastic ring of a deployment and its axial travel per step, mm.
 const COARSE: (usize, f64) = (1440, 0.02);
 
-/// A whole deployment of the driven wheel as the reduced model has it: an elastic ring of the
+/// A deployment of the driven wheel as the reduced model has it: an elastic ring of the
 /// stiffness that is effective at lift-off, and an arm that bends as under a static force.
 ///
 /// # Errors

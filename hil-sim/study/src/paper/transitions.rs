@@ -77,7 +77,7 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
         let all: Vec<String> = all.iter().map(|one| peaks_text(one, quantity)).collect();
         format!(
             "By stage, {} (theory; simulation; experiment). {}. Of what makes the stages differ there is \
-             the inclination of the arm alone: its wedge falls by a few per cent from sleeve to sleeve.",
+             the inclination of the arm alone: its thrust on the wheel falls by a few per cent from sleeve to sleeve.",
             quantity.axis(),
             all.join(". ")
         )

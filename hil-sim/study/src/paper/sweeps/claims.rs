@@ -24,7 +24,7 @@ fn ends(curves: &Curves, decimals: usize, unit: &str) -> String {
     )
 }
 
-/// Whether theory and simulation, and all four means, go the same way throughout.
+/// Whether theory and simulation, and all four means, change with one sign throughout.
 fn all_go(curves: &Curves, sense: f64) -> bool {
     let goes = |values: &[f64]| values.windows(2).all(|w| sense * (w[1] - w[0]) > 0.0);
     goes(&curves.theory) && goes(&curves.simulation) && curves.experiment.all_go(sense)
@@ -35,7 +35,7 @@ fn bends(curves: &Curves) -> [f64; 3] {
     [&curves.theory, &curves.simulation, &curves.experiment.middle()].map(|values| bend(values))
 }
 
-/// Whether theory, simulation and all four means bend the same way off a straight line.
+/// Whether theory, simulation and all four means bend to the same side of a straight line.
 fn nonlinear(curves: &Curves) -> bool {
     let [theory, simulation, _] = bends(curves);
     let means = curves.experiment.bends();
@@ -107,7 +107,7 @@ pub fn preload_claims(sweep: &Sweep) -> Vec<Claim> {
             "At constant speed the embedding depth grows with the preload, nonlinearly.",
             all_go(depth, 1.0) && nonlinear(depth),
             format!("{} {}", ends(depth, 3, "mm"), bent(depth)),
-            "It grows, but not all six curves bend the same way.",
+            "It grows, but not all six curves bend to the same side.",
         ),
         of("fig22", "area-grows-with-depth-preload").judged(
             "As the embedding depth grows with the preload, so does the contact area.",
@@ -163,14 +163,14 @@ pub fn speed_claims(sweep: &Sweep, preload: &Sweep) -> Vec<Claim> {
                  at most {:.3} mm.",
                 sweep.slip_mm
             ),
-            "The same forty rigs make both sweeps, and their tolerances move the whole curve.",
+            "The same forty rigs make both sweeps, and their tolerances move the entire curve.",
         ),
         of("fig23", "depth-grows-with-speed").judged(
             "At constant preload the embedding depth grows with the speed.",
             all_go(depth, 1.0),
             ends(depth, 3, "mm"),
             "It falls. Rubber stiffens with speed, so that the wheel sinks in less: that is why its \
-             gap grows. A wheel that sank in deeper would stand lower over the root of the step \
+             gap grows. A wheel that sank in deeper would be lower over the root of the step \
              and leave a smaller gap, against figure 21.",
         ),
         of("fig23", "area-grows-with-depth-speed").judged(
@@ -182,7 +182,7 @@ pub fn speed_claims(sweep: &Sweep, preload: &Sweep) -> Vec<Claim> {
         of("fig23", "area-follows-depth").judged(
             "Contact area and embedding depth change alike.",
             all_go(area, 1.0) == all_go(depth, 1.0) && all_go(area, -1.0) == all_go(depth, -1.0),
-            "Both go the same way in theory, simulation and all four means.".into(),
+            "Both change with the same sign in theory, simulation and all four means.".into(),
             "",
         ),
         spread(

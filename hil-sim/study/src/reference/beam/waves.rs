@@ -107,7 +107,7 @@ impl Load {
     }
 }
 
-/// Propagation matrix over the whole beam, `f(L)` (eq 44).
+/// Propagation matrix over the beam, `f(L)` (eq 44).
 #[must_use]
 pub fn propagation(beta_l: f64) -> Transfer {
     Transfer::new(
