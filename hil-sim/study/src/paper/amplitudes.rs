@@ -115,12 +115,12 @@ impl Amplitudes {
         );
         let caption = format!(
             "First transition. Theory and simulation: pushed over a frictionless wall; theory at \
-                      the instant at which the lower wall stops carrying, simulation the largest of the \
-                      crossing. Experiment: the virtual rig at the study's loads, torque-driven, largest \
-                      value of its 0.1 s log. The unit of the published stress is doubtful, so \
-                      that ratios are given here; ours are of hundreds of kPa, and the wave alone that the touch launches at \
-                      5 mm/s (impedance times closing speed, at once over the entire face) is {:.0} Pa. Nothing in \
-                      this figure is fitted.",
+             the instant at which the lower wall stops carrying, simulation the largest of the \
+             crossing. Experiment: the virtual rig at the study's loads, torque-driven, largest \
+             value of its 0.1 s log. The unit of the published stress is doubtful, so \
+             that ratios are given here; ours are of hundreds of kPa, and the wave alone that the touch launches at \
+             5 mm/s (impedance times closing speed, at once over the entire face) is {:.0} Pa. Nothing in \
+             this figure is fitted.",
             self.touch_pa
         );
         let title = "Collision force and impact stress of the finite-element cases";
@@ -140,12 +140,12 @@ impl Amplitudes {
                 self.values(source, |lift| lift.gap_mm)[i]
             });
         let caption = "Stiffness, stiffening and relaxation time of the tread are fitted to the three \
-                      published amplitudes with the frictionless ring, which is theory and simulation of \
-                      the first plot: their agreement there is no validation. The experiment drives itself \
-                      by friction against a third of the 60 N, which opens the gap by some per cent, and \
-                      so do theory and simulation of the other plots: the clearance between the root of \
-                      the first step and the undeformed wheel until the centre passes the step. The gap is \
-                      its value when the lower wall stops carrying.";
+             published amplitudes with the frictionless ring, which is theory and simulation of \
+             the first plot: their agreement there is no validation. The experiment drives itself \
+             by friction against a third of the 60 N, which opens the gap by some per cent, and \
+             so do theory and simulation of the other plots: the clearance between the root of \
+             the first step and the undeformed wheel until the centre passes the step. The gap is \
+             its value when the lower wall stops carrying.";
         let title = "Vibration amplitude of the finite-element cases";
         Figure { published, ..Figure::new("fig15-16", title, caption.to_owned(), 2, panels) }
     }

@@ -146,14 +146,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_arm_presses_less_from_sleeve_to_sleeve() {
-        let case = Case::new(Loads::Prototype, 5.0, 40.0);
-        let pressing: Vec<f64> = (0..3).map(|level| case.pressing_n(level)).collect();
-        assert!(pressing.windows(2).all(|pair| pair[1] < pair[0]), "{pressing:?}");
-        assert!((pressing[0] - 40.0 - 1.05 * 20.0 / 3.0).abs() < 0.01, "{pressing:?}");
-    }
-
-    #[test]
     fn scenarios_are_valid() {
         for case in [Case::new(Loads::Fe, 3.0, 120.0), Case::new(Loads::Prototype, 8.0, 50.0)] {
             let scenario = case.scenario(7);
@@ -164,7 +156,11 @@ mod tests {
     }
 
     #[test]
-    fn the_arm_lies_flatter_from_sleeve_to_sleeve() {
+    fn the_arm_lies_flatter_and_presses_less_from_sleeve_to_sleeve() {
+        let case = Case::new(Loads::Prototype, 5.0, 40.0);
+        let pressing: Vec<f64> = (0..3).map(|level| case.pressing_n(level)).collect();
+        assert!(pressing.windows(2).all(|pair| pair[1] < pair[0]), "{pressing:?}");
+        assert!((pressing[0] - 40.0 - 1.05 * 20.0 / 3.0).abs() < 0.01, "{pressing:?}");
         let arms = Arms::of(&Case::new(Loads::Fe, 5.0, 100.0)).unwrap();
         let bent: Vec<f64> = (0..3).map(|level| arms.static_mm(level, 50.0)).collect();
         assert!(bent.windows(2).all(|pair| pair[1] < pair[0]), "{bent:?}");

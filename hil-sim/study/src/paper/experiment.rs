@@ -15,13 +15,14 @@ use rayon::prelude::*;
 
 use super::case::{Arms, Case};
 use super::history::{History, Instant};
-use super::measure::{CollisionGauge, impact_kpa};
+use super::measure::{collision_n, impact_kpa, resistance};
 use super::published::{LOG_S, RUNS, RUNS_OF_A_MEAN};
 use super::theory::area_of_depth_mm2;
 use crate::figure::Series;
 use crate::reference::beam::BeamError;
 use crate::reference::vibration::Modal;
 use hil_sim::plant::rig::VirtualRig;
+use hil_sim::report::axis::extent;
 use hil_sim::session::{Options, Session};
 
 /// Crossings of a deployment.
@@ -98,10 +99,7 @@ pub fn marks(x: f64, all: &[f64], series: &mut Series) {
         let of: Vec<f64> = group.iter().filter_map(|&run| all.get(run).copied()).collect();
         series.points.push((x, of.iter().sum::<f64>() / of.len() as f64));
     }
-    let (low, high) = all
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| (low.min(*y), high.max(*y)));
-    series.range.push((x, low, high));
+    series.range.extend(extent(all.iter().copied()).map(|(low, high)| (x, low, high)));
 }
 
 /// Runs every case on forty rigs; `done` is called after each run.
@@ -158,7 +156,8 @@ struct Watch {
     measured: Vec<(usize, f64)>,
     /// Measured compression and true preload of every tick.
     ticks: Vec<(f32, f32)>,
-    gauge: CollisionGauge,
+    /// Rolling resistance over radial force on the continuous wall.
+    resistance: f64,
     arms: Arms,
     arm: Modal,
     moving_since: Option<f64>,
@@ -171,7 +170,7 @@ impl Watch {
             run: Run::default(),
             measured: Vec::new(),
             ticks: Vec::new(),
-            gauge: CollisionGauge::new(plant, case.speed_mm_s, case.pressing_n(1)),
+            resistance: resistance(plant, case.speed_mm_s, case.pressing_n(1)),
             arm: arms.modal()?,
             arms,
             moving_since: None,
@@ -182,7 +181,7 @@ impl Watch {
     fn look(&mut self, moves: bool, compression_mm: f64, plant: &VirtualRig) {
         let truth = plant.truth();
         self.ticks.push((compression_mm as f32, truth.preload_n as f32));
-        let axial = self.gauge.read_n(plant);
+        let axial = collision_n(plant, self.resistance);
         let level = plant.parameters().wall.local(truth.position_mm).level;
         self.arm.step(self.arms.across_n(level, axial), TICK_S);
         if moves {
@@ -211,8 +210,6 @@ impl Watch {
             };
             let since = ((crossing.touch_s / TICK_S) as usize).min(tick);
             let preloads = self.ticks[since..=tick].iter().map(|tick| f64::from(tick.1));
-            let (low, high) =
-                preloads.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), n| (a.min(n), b.max(n)));
             // The experimenter knows the drawing, not the rig as built.
             let depth_mm = f64::from(depth);
             self.run.crossings.push(Reading {
@@ -220,7 +217,7 @@ impl Watch {
                 true_gap_mm: crossing.gap_mm,
                 depth_mm,
                 area_mm2: area_of_depth_mm2(case, depth_mm),
-                preload_swing_n: high - low,
+                preload_swing_n: extent(preloads).map_or(0.0, |(low, high)| high - low),
             });
         }
         self.run

@@ -13,7 +13,7 @@ use super::published::{CONSTRAINED_HZ, FREE_HZ, LEAST_PRELOAD_N, LEAST_SPEED_MM_
 use super::simulation;
 use super::sweeps::Sweep;
 use super::theory::{self, Drive};
-use crate::figure::{Claim, Figure, Panel, SOURCES, Series, Source};
+use crate::figure::{Claim, Figure, Panel, Series, Source};
 use crate::reference::beam::BeamError;
 use crate::reference::vibration::Arm;
 use hil_sim::plant::balance::{Axial, BalanceError};
@@ -110,16 +110,16 @@ impl Hold {
             Series::new(Source::Theory, self.preload.0.clone()),
             Series::new(Source::Simulation, self.preload.1.clone()),
         ];
-        let mut gap = Vec::new();
-        for (source, gaps) in SOURCES.into_iter().zip(self.gaps).take(2) {
-            let points = gaps.into_iter().enumerate().map(|(i, gap)| (i as f64, gap)).collect();
-            gap.push(Series::new(source, points));
-        }
         let mut experiment = Series::new(Source::Experiment, Vec::new());
         for (x, read) in self.read.iter().enumerate() {
             marks(x as f64, read, &mut experiment);
         }
-        gap.push(experiment);
+        let numbered = |index: usize| (0_u8..).map(f64::from).zip(self.gaps[index]).collect();
+        let gap = vec![
+            Series::new(Source::Theory, numbered(0)),
+            Series::new(Source::Simulation, numbered(1)),
+            experiment,
+        ];
         let title = "Preload that holds the gap of 5 mm/s, 33.3 N";
         let cases = ("speed and preload", CASES.map(|(v, p)| format!("{v} mm/s, {p} N")).to_vec());
         let panels = vec![

@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::experiment::{Experiment, Reading, groups};
 use crate::figure::Series;
+use hil_sim::report::axis::extent;
 
 /// A parabola.
 type Curve = [f64; 3];
@@ -54,13 +55,8 @@ impl Means {
                 .collect();
             of.iter().sum::<f64>() / of.len() as f64
         };
-        let range = at
-            .iter()
-            .map(|&x| {
-                let all = curves.iter().flatten().map(|curve| value(curve, x));
-                all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), y| (a.min(y), b.max(y)))
-            })
-            .collect();
+        let range_at = |&x: &f64| extent(curves.iter().flatten().map(|curve| value(curve, x)));
+        let range = at.iter().filter_map(range_at).collect();
         let curves =
             groups().iter().map(|group| at.iter().map(|&x| mean(group, x)).collect()).collect();
         Self { at, curves, range }
@@ -78,13 +74,8 @@ impl Means {
     /// Largest difference between two of the means at one place.
     #[must_use]
     pub fn spread(&self) -> f64 {
-        let difference = |i: usize| {
-            let all = self.curves.iter().map(|curve| curve[i]);
-            let (low, high) =
-                all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), y| (a.min(y), b.max(y)));
-            high - low
-        };
-        (0..self.at.len()).map(difference).fold(0.0, f64::max)
+        let ranges = (0..self.at.len()).filter_map(|i| extent(self.curves.iter().map(|c| c[i])));
+        ranges.map(|(low, high)| high - low).fold(0.0, f64::max)
     }
 
     /// Rise from the first place to the last, of the mean of means.

@@ -208,16 +208,6 @@ fn the_two_resolutions_are_converged() {
 }
 
 #[test]
-fn without_memory_the_climb_costs_the_work_of_lifting_the_preload() {
-    // Short of P h by the angle of the rays from the wall's normal.
-    let work = still(&without_memory(5.0, 100.0).0).climb_work_mj;
-    assert!((0.999..1.0).contains(&(work / 400.0)), "{work}");
-    // Memory costs more.
-    let work = still(&Case::first()).climb_work_mj;
-    assert!(work > 1.05 * 400.0, "{work}");
-}
-
-#[test]
 fn a_stiff_tread_climbs_as_a_rigid_wheel() {
     let (case, mut elastic) = without_memory(5.0, 100.0);
     // P tan(phi).
@@ -349,29 +339,6 @@ fn without_memory_a_ringing_wheel_keeps_its_energy() {
     let last = *ringing(&case, 1e-3, 1e-4, 2.0).last().unwrap();
     let kept = energy(last) / energy((0.0, 1e-3));
     assert!((kept - 1.0).abs() < 1e-2, "{kept}");
-}
-
-#[test]
-fn a_driven_wheel_opens_a_wider_gap() {
-    let pushed = coarse(Case::first());
-    let (free, driven) = (still(&pushed), still(&pushed.driven()));
-    assert!(driven.gap_mm > 1.05 * free.gap_mm);
-    // 20 N on this wheel at (5, 100).
-    assert!((driven.mu_needed - 0.86).abs() < 0.05 && free.mu_needed == 0.0, "{driven:?}");
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(12))]
-
-    #[test]
-    fn the_gap_falls_with_preload_and_grows_with_speed(
-        speed in 1.0..30.0_f64, preload in 20.0..120.0_f64, factor in 1.15..1.5_f64,
-    ) {
-        let gap = |speed, preload| still(&coarse(Case::new(Rig::fe(), speed, preload))).gap_mm;
-        let here = gap(speed, preload);
-        prop_assert!(gap(speed, factor * preload) < here);
-        prop_assert!(gap(factor * speed, preload) > here);
-    }
 }
 
 proptest! {
