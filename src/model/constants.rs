@@ -2,7 +2,7 @@
 //! [`Kind::terms`](super::effective_stiffness::Kind::terms). Written by `rig-study constants` from
 //! crossings of the converged ring; do not edit.
 
-/// Way out, driven by friction.
+/// Deploying, driven by friction.
 #[rustfmt::skip]
 pub const DEPLOY: [i32; 60] = [
     69889504, -1742627, 208236, 3022, -705622, -569515, 16552, -1369216,
@@ -15,7 +15,7 @@ pub const DEPLOY: [i32; 60] = [
     8301310, 438914, 5933989, 361867,
 ];
 
-/// Way out, pushed and frictionless.
+/// Deploying, pushed and frictionless.
 #[rustfmt::skip]
 pub const DEPLOY_PUSHED: [i32; 38] = [
     67783868, 1754726, -1094007, 140221, -76129396, -26426, -975775, 25735893,
@@ -25,7 +25,7 @@ pub const DEPLOY_PUSHED: [i32; 38] = [
     105981, 1745513, 4108558, -83004, 3097703, 257170,
 ];
 
-/// Way back, driven by friction.
+/// Retracting, driven by friction.
 #[rustfmt::skip]
 pub const RETRACT: [i32; 60] = [
     47750605, -5989452, 506830, -21178, 4274131, -657056, -2082, 2201283,
@@ -38,7 +38,7 @@ pub const RETRACT: [i32; 60] = [
     5643754, 2367424, 3325916, 455099,
 ];
 
-/// Way back, pushed.
+/// Retracting, pushed and frictionless.
 #[rustfmt::skip]
 pub const RETRACT_PUSHED: [i32; 38] = [
     57768434, 6634204, 2062450, -344675, -16995170, -12414338, -483005, 23969910,

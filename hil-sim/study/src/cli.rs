@@ -49,6 +49,11 @@ pub fn main() -> ExitCode {
     hil_sim::cli::run(|cli: &Cli| cli.verb.run())
 }
 
+/// An error of the study, with its causes in one line.
+fn failed(error: anyhow::Error) -> Failure {
+    Failure::run(format!("{error:#}"))
+}
+
 /// The repository's root.
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")

@@ -16,11 +16,8 @@ use interstage::model::formula::Formula;
 use interstage::rig::Rig;
 use interstage::units::Direction;
 
-use data::{Row, run_all};
+use data::Row;
 use design::{Case, Use};
-
-/// Largest difference of a row from a fresh crossing that is not staleness, relative.
-const SAME: f64 = 2e-9;
 
 /// All crossings of the file, in its order.
 #[must_use]
@@ -35,14 +32,6 @@ pub fn plan() -> Vec<(Case, Use)> {
     all
 }
 
-/// Runs all crossings, some minutes.
-///
-/// # Errors
-/// If a crossing cannot be balanced.
-pub fn sweep(progress: &(dyn Fn() + Sync)) -> Result<Vec<Row>> {
-    run_all(&plan(), progress)
-}
-
 /// The crossings of the file in place.
 ///
 /// # Errors
@@ -53,30 +42,6 @@ pub fn stored() -> Result<Vec<Row>> {
     data::read(&text)
 }
 
-/// Runs every `stride`-th crossing of the file again.
-///
-/// # Errors
-/// If the file is not of today's design, or a row not what the ring gives.
-pub fn verify(rows: &[Row], stride: usize, progress: &(dyn Fn() + Sync)) -> Result<()> {
-    let plan = plan();
-    ensure!(
-        rows.len() == plan.len() && rows.iter().zip(&plan).all(|(r, p)| (r.case, r.of) == *p),
-        "the stored crossings are not those of the design"
-    );
-    let sample: Vec<Row> = rows.iter().step_by(stride).copied().collect();
-    let cases: Vec<(Case, Use)> = sample.iter().map(|row| (row.case, row.of)).collect();
-    for (stored, fresh) in sample.iter().zip(run_all(&cases, progress)?) {
-        let same = |a: f64, b: f64| (a - b).abs() <= SAME * b.abs().max(1.0);
-        ensure!(
-            same(stored.gap_mm, fresh.gap_mm)
-                && same(stored.utilisation, fresh.utilisation)
-                && same(stored.corner_force_n, fresh.corner_force_n),
-            "a stored crossing is not what the ring gives: {stored:?}, now {fresh:?}"
-        );
-    }
-    Ok(())
-}
-
 /// The source of `src/model/constants.rs` that follows from the crossings.
 ///
 /// # Errors
@@ -84,17 +49,19 @@ pub fn verify(rows: &[Row], stride: usize, progress: &(dyn Fn() + Sync)) -> Resu
 pub fn source(rows: &[Row]) -> Result<String> {
     let formula = Formula::new(&Rig::fe());
     let mut source = String::from(
-        "//! Coefficients of the felt stiffening in 1e-8, in the order of\n\
+        "//! Coefficients of the effective stiffness in 1e-8, in the order of\n\
          //! [`Kind::terms`](super::effective_stiffness::Kind::terms). Written by `rig-study constants` from\n\
          //! crossings of the converged ring; do not edit.\n",
     );
     for kind in Kind::ALL {
         let coefficients = fit::fit(&formula, kind, rows).context(data::kind_name(kind))?;
         let (name, doc) = match (kind.direction, kind.driven) {
-            (Direction::Deploy, true) => ("DEPLOY", "Way out, driven by friction."),
-            (Direction::Deploy, false) => ("DEPLOY_PUSHED", "Way out, pushed and frictionless."),
-            (Direction::Retract, true) => ("RETRACT", "Way back, driven by friction."),
-            (Direction::Retract, false) => ("RETRACT_PUSHED", "Way back, pushed."),
+            (Direction::Deploy, true) => ("DEPLOY", "Deploying, driven by friction."),
+            (Direction::Deploy, false) => ("DEPLOY_PUSHED", "Deploying, pushed and frictionless."),
+            (Direction::Retract, true) => ("RETRACT", "Retracting, driven by friction."),
+            (Direction::Retract, false) => {
+                ("RETRACT_PUSHED", "Retracting, pushed and frictionless.")
+            }
         };
         let count = coefficients.len();
         let _ =

@@ -36,6 +36,9 @@ impl Source {
     }
 }
 
+/// The three sources that every figure compares.
+pub const SOURCES: [Source; 3] = [Source::Theory, Source::Simulation, Source::Experiment];
+
 /// Values of one source.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Series {
@@ -60,6 +63,14 @@ impl Series {
     #[must_use]
     pub fn method(number: usize, name: &str, points: Vec<(f64, f64)>) -> Self {
         Self { name: name.to_owned(), ..Self::new(Source::Method(number), points) }
+    }
+
+    /// The means of the experiment, numbered.
+    pub fn means(means: impl Iterator<Item = Vec<(f64, f64)>>) -> impl Iterator<Item = Self> {
+        means.enumerate().map(|(index, points)| Self {
+            name: format!("mean {}", index + 1),
+            ..Self::new(Source::Experiment, points)
+        })
     }
 
     /// Its entry in the legend.
@@ -91,18 +102,29 @@ pub struct Panel {
 }
 
 impl Panel {
-    /// An empty plot.
+    /// A plot with these names and units of its axes.
     #[must_use]
-    pub fn new(title: impl Into<String>, x: &str, y: &str) -> Self {
-        Self {
-            title: title.into(),
-            x: x.into(),
-            y: y.into(),
-            categories: Vec::new(),
-            logarithmic: false,
-            least_y: None,
-            series: Vec::new(),
-        }
+    pub fn new(title: impl Into<String>, x: &str, y: &str, series: Vec<Series>) -> Self {
+        let (title, x, y) = (title.into(), x.into(), y.into());
+        let (categories, logarithmic, least_y) = (Vec::new(), false, None);
+        Self { title, x, y, categories, logarithmic, least_y, series }
+    }
+
+    /// The same with logarithmic axes.
+    #[must_use]
+    pub fn logarithmic(self) -> Self {
+        Self { logarithmic: true, ..self }
+    }
+
+    /// A plot of marks at x = 0, 1, ... with these names.
+    #[must_use]
+    pub fn of_categories(
+        title: &str,
+        (x, categories): (&str, Vec<String>),
+        y: &str,
+        series: Vec<Series>,
+    ) -> Self {
+        Self { categories, ..Self::new(title, x, y, series) }
     }
 }
 
@@ -169,12 +191,27 @@ pub struct Figure {
     pub published: Vec<Mark>,
 }
 
-/// A statement of the study, held against our data.
+impl Figure {
+    /// A figure without published numbers, in the file of its name.
+    #[must_use]
+    pub fn new(
+        id: &'static str,
+        title: &'static str,
+        caption: String,
+        columns: usize,
+        panels: Vec<Panel>,
+    ) -> Self {
+        let (file, published) = (format!("{id}.svg"), Vec::new());
+        Self { id, file, title, caption, columns, panels, published }
+    }
+}
+
+/// A statement of the study, judged by our data.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Claim {
     /// Stable name.
     pub id: &'static str,
-    /// The figure below which it stands.
+    /// The figure below which it is printed.
     pub figure: &'static str,
     /// Where the study makes it.
     pub section: &'static str,
@@ -198,38 +235,25 @@ impl Claim {
             (false, _) => "**does not hold**",
         }
     }
-}
 
-impl Claim {
-    /// A claim of `figure`, made in `section`.
+    /// A claim of `figure`, made in `section`, not yet judged.
     #[must_use]
-    pub const fn of(figure: &'static str, section: &'static str, id: &'static str) -> Open {
-        Open { figure, section, id, fitted: false }
+    pub fn of(figure: &'static str, section: &'static str, id: &'static str) -> Self {
+        let (claim, holds, fitted, why) = ("", false, false, String::new());
+        Self { id, figure, section, claim, holds, fitted, why }
     }
-}
 
-/// A claim not yet judged.
-#[derive(Clone, Copy, Debug)]
-pub struct Open {
-    figure: &'static str,
-    section: &'static str,
-    id: &'static str,
-    fitted: bool,
-}
-
-impl Open {
     /// The same, with a parameter of ours fitted to it.
     #[must_use]
-    pub const fn fitted(self) -> Self {
+    pub fn fitted(self) -> Self {
         Self { fitted: true, ..self }
     }
 
-    /// What the claim says, whether it holds, what was found, and why it does not hold
-    /// if it does not.
+    /// What the claim says, whether it holds, what was found, and the reason if it does
+    /// not hold.
     #[must_use]
-    pub fn judged(self, claim: &'static str, holds: bool, found: String, but: &str) -> Claim {
+    pub fn judged(self, claim: &'static str, holds: bool, found: String, but: &str) -> Self {
         let why = if holds || but.is_empty() { found } else { format!("{found} {but}") };
-        let Self { figure, section, id, fitted } = self;
-        Claim { id, figure, section, claim, holds, fitted, why }
+        Self { claim, holds, why, ..self }
     }
 }

@@ -1,6 +1,8 @@
 //! Figures as SVG: plots in rows below one legend, each source with the same look in
 //! all of them.
 
+use std::collections::BTreeSet;
+
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
@@ -42,7 +44,7 @@ pub fn svg(figure: &Figure) -> String {
     let rows = figure.panels.len().div_ceil(figure.columns.max(1)) as u32;
     fixed((WIDTH, HEAD + rows * ROW), |area| {
         let (head, body) = area.split_vertically(HEAD * SCALE);
-        legend(&entries(figure), banded(figure), &head)?;
+        legend(figure, &head)?;
         let cells = body.split_evenly((rows as usize, figure.columns));
         for (panel, cell) in figure.panels.iter().zip(&cells) {
             draw(panel, cell)?;
@@ -51,21 +53,9 @@ pub fn svg(figure: &Figure) -> String {
     })
 }
 
-/// Entries of the legend in its order.
-fn entries(figure: &Figure) -> Vec<(Source, &str)> {
-    let series = figure.panels.iter().flat_map(|panel| &panel.series);
-    let mut found: Vec<(Source, &str)> = series.map(Series::legend).collect();
-    found.sort_unstable();
-    found.dedup();
-    found
-}
-
-/// Whether a range over all runs is shown.
-fn banded(figure: &Figure) -> bool {
-    figure.panels.iter().flat_map(|panel| &panel.series).any(|series| !series.range.is_empty())
-}
-
-fn legend(entries: &[(Source, &str)], band: bool, head: &Area) -> Drawn {
+fn legend(figure: &Figure, head: &Area) -> Drawn {
+    let series = || figure.panels.iter().flat_map(|panel| &panel.series);
+    let entries: BTreeSet<(Source, &str)> = series().map(Series::legend).collect();
     let middle = (HEAD * SCALE) as i32 / 2;
     let mut left = 16 * S;
     let name = |text: &str, left: &mut i32| {
@@ -74,25 +64,22 @@ fn legend(entries: &[(Source, &str)], band: bool, head: &Area) -> Drawn {
         *left = at + text_width(text, TEXT_PX) + 14 * S;
         head.draw(&Text::new(text.to_owned(), (at, middle), style))
     };
-    for &(source, text) in entries {
-        let ends = [(left, middle), (left + 28 * S, middle)];
-        match source {
-            Source::Theory | Source::Simulation | Source::Experiment => {
-                head.draw(&PathElement::new(ends, stroke(source)))?;
+    for (source, text) in entries {
+        let centre = (left + 14 * S, middle);
+        if matches!(source, Source::Published | Source::Fitted) {
+            for part in diamond(centre, source) {
+                head.draw(&part)?;
             }
-            Source::Method(_) => {
-                head.draw(&PathElement::new(ends, stroke(source)))?;
-                head.draw(&Circle::new((left + 14 * S, middle), 4 * S, stroke(source).filled()))?;
-            }
-            Source::Published | Source::Fitted => {
-                for part in diamond((left + 14 * S, middle), source) {
-                    head.draw(&part)?;
-                }
-            }
+        } else {
+            let ends = [(left, middle), (left + 28 * S, middle)];
+            head.draw(&PathElement::new(ends, stroke(source)))?;
+        }
+        if matches!(source, Source::Method(_)) {
+            head.draw(&Circle::new(centre, 4 * S, stroke(source).filled()))?;
         }
         name(text, &mut left)?;
     }
-    if band {
+    if series().any(|one| !one.range.is_empty()) {
         let corners = [(left, middle - 7 * S), (left + 28 * S, middle + 7 * S)];
         head.draw(&Rectangle::new(corners, BAND.filled()))?;
         name("range of all forty runs", &mut left)?;
@@ -121,20 +108,16 @@ fn layer(source: Source) -> u8 {
 }
 
 fn draw(panel: &Panel, cell: &Area) -> Drawn {
-    if panel.logarithmic {
-        return draw_scaled(&decimal_logarithms(panel), cell);
+    if !panel.logarithmic {
+        return draw_scaled(panel, cell);
     }
-    draw_scaled(panel, cell)
-}
-
-/// The panel with the decimal logarithms of its points; what is not above 0 is left out.
-fn decimal_logarithms(panel: &Panel) -> Panel {
+    // Decimal logarithms; what is not above 0 is left out.
     let mut scaled = panel.clone();
     for series in &mut scaled.series {
         series.points.retain(|&(x, y)| x > 0.0 && y > 0.0 && (x * y).is_finite());
         series.points.iter_mut().for_each(|p| *p = (p.0.log10(), p.1.log10()));
     }
-    scaled
+    draw_scaled(&scaled, cell)
 }
 
 /// Ticks of a logarithmic axis: decades, or 1, 2 and 5 where these are few.
@@ -211,17 +194,9 @@ fn draw_scaled(panel: &Panel, cell: &Area) -> Drawn {
         let shift = if panel.categories.is_empty() { 0 } else { beside(one.source) };
         for &(x, low, high) in &one.range {
             let [a, b] = [low, high].map(|y| chart.backend_coord(&(x, y)));
-            let corners = [(a.0 + shift - 5 * S, a.1), (b.0 + shift + 5 * S, b.1)];
-            chart.plotting_area().draw(
-                &(EmptyElement::at((x, low))
-                    + Rectangle::new(
-                        [
-                            (corners[0].0 - a.0, 0),
-                            (corners[1].0 - a.0, corners[1].1 - corners[0].1),
-                        ],
-                        BAND.filled(),
-                    )),
-            )?;
+            let corners = [(shift - 5 * S, 0), (shift + 5 * S, b.1 - a.1)];
+            let bar = EmptyElement::at((x, low)) + Rectangle::new(corners, BAND.filled());
+            chart.plotting_area().draw(&bar)?;
         }
         for &point in &one.points {
             let [rim, body] = mark((shift, 0), one.source);

@@ -1,19 +1,20 @@
 //! The reference models' figures of the study's three finite-element cases, for
 //! `docs/MODEL.md`: `docs/figures/model.json` and `model.svg`.
 
+use anyhow::Result;
 use interstage::rig::Rig;
 use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::figure::{Figure, Panel, Series, Source};
 use crate::paper::published::{AMPLITUDE_MM, CASES, COLLISION_N, STRESS};
-use crate::reference::impact::Rubber;
-use crate::reference::impact::dispersion::{Wave, front_attenuation_np_m};
-use crate::reference::impact::rubber::THICKNESS_MM;
-use crate::reference::vibration::{Arm, CONSTRAINED_HZ, FREE_HZ};
-use crate::reference::{Case, ReferenceError, Resolution, collision, impact, vibration};
+use crate::reference::rubber::{Rubber, THICKNESS_MM};
+use crate::reference::vibration::{Arm, CONSTRAINED_HZ, FREE_HZ, bending};
+use crate::reference::{Case, Resolution, collision, impact};
+use hil_sim::plant::balance::BalanceError;
+use hil_sim::plant::crossing::{CrossingCase, CrossingResult, cross};
 
-/// Travel before the edge from which on the grain of the ring shakes it, mm.
+/// Place of the centre from the edge, mm, from which on single elements shake the ring.
 const EDGE_MM: f64 = -0.2;
 
 /// Everything that the page refers to.
@@ -79,67 +80,75 @@ pub struct RubberFigures {
     pub loss_db: f64,
 }
 
-/// The case of this index in the study.
-fn case(index: usize, resolution: Resolution) -> Case {
-    let (speed_mm_s, preload_n) = CASES[index];
-    Case { resolution, ..Case::new(Rig::fe(), speed_mm_s, preload_n) }
+/// A crossing at the study's loads.
+fn case(speed_mm_s: f64, preload_n: f64) -> Case {
+    Case { resolution: Resolution::FIGURE, ..Case::new(Rig::fe(), speed_mm_s, preload_n) }
+}
+
+/// The same without inertia.
+fn still(case: &Case) -> Result<CrossingResult, BalanceError> {
+    cross(&CrossingCase {
+        ring: case.ring(),
+        step_height_mm: case.rig.rig.step_height_mm,
+        speed_mm_s: case.speed_mm_s,
+        preload_n: case.preload_n,
+        axial: case.axial,
+        stride_mm: case.resolution.stride_mm,
+    })
 }
 
 /// Computes them.
 ///
 /// # Errors
-/// If a reference refuses.
-pub fn compute() -> Result<ModelFigures, ReferenceError> {
+/// If a crossing cannot be balanced or the arm is out of range.
+pub fn compute() -> Result<ModelFigures> {
     let computed: Vec<(CaseFigures, f64)> =
-        (0..3).into_par_iter().map(of_case).collect::<Result<_, _>>()?;
+        (0..3).into_par_iter().map(of_case).collect::<Result<_>>()?;
     let patch_mm2 = computed[0].1;
-    let first = case(0, Resolution::HISTORY);
+    let first = Case::first();
     let rubbers = [
-        ("the fitted tread", Rubber::of(&first)?),
-        ("sheets, tan delta 0.1 at 10 Hz", Rubber::of_sheets(0.1, 10.0)?),
-        ("sheets, tan delta 0.25 at 100 Hz", Rubber::of_sheets(0.25, 100.0)?),
+        ("the fitted tread", Rubber::of(&first)),
+        ("sheets, tan delta 0.1 at 10 Hz", Rubber::of_sheets(0.1, 10.0)),
+        ("sheets, tan delta 0.25 at 100 Hz", Rubber::of_sheets(0.25, 100.0)),
     ];
-    let arm = Arm::of(&first)?;
+    let arm = Arm::of(&first.rig)?;
     let bare = Arm { tip: Default::default(), ..arm };
-    let hertz = |arm: &Arm| -> Result<Vec<f64>, ReferenceError> {
-        Ok(arm.modes(4)?.iter().map(|mode| mode.frequency_hz).collect())
-    };
     Ok(ModelFigures {
         cases: computed.into_iter().map(|pair| pair.0).collect(),
         rubbers: rubbers.map(|(name, rubber)| of_rubber(name, &rubber)).into(),
-        bare_arm_hz: hertz(&bare)?,
-        arm_hz: hertz(&arm)?,
-        arm_on_tread_hz: hertz(&arm.on_tread(&first, patch_mm2)?)?,
+        bare_arm_hz: bare.frequencies_hz(4)?,
+        arm_hz: arm.frequencies_hz(4)?,
+        arm_on_tread_hz: arm.on_tread(&first, patch_mm2).frequencies_hz(4)?,
         published_hz: [CONSTRAINED_HZ, FREE_HZ],
     })
 }
 
 /// Figures of a case, and the patch of steady rolling, mm^2.
-fn of_case(index: usize) -> Result<(CaseFigures, f64), ReferenceError> {
-    let still = collision::quasi_static(&case(index, Resolution::FIGURE))?;
-    let case = case(index, Resolution { step_s: 2e-4, ..Resolution::FIGURE });
+fn of_case(index: usize) -> Result<(CaseFigures, f64)> {
+    let (speed_mm_s, preload_n) = CASES[index];
+    let case = case(speed_mm_s, preload_n);
+    let still = still(&case)?;
     let moving = collision::dynamic(&case)?;
     let climbing = moving.samples.iter().filter(|sample| sample.x_mm < EDGE_MM);
     let climbing_s = climbing.clone().map(|sample| sample.t_s).fold(f64::NEG_INFINITY, f64::max);
     let patch_mm2 = moving.samples[0].area_mm2;
-    let stiffness = case.tread()?.instant() * patch_mm2 * 1e-6;
+    let stiffness = case.instant_pa_per_m() * patch_mm2 * 1e-6;
     let closing_mm_s = case.closing_speed_mm_s();
-    let bending = vibration::bending(&case, &moving)?;
-    let stresses = impact::stress(&case, &moving)?;
+    let bending = bending(&case, &moving)?;
     let shaken = bending.iter().filter(|now| now.t_s < climbing_s);
     let figures = CaseFigures {
-        speed_mm_s: case.speed_mm_s,
-        preload_n: case.preload_n,
+        speed_mm_s,
+        preload_n,
         published_gap_mm: AMPLITUDE_MM[index],
-        gap_mm: still.lift.map_or(f64::NAN, |lift| lift.gap_mm),
+        gap_mm: still.gap_mm,
         published_force_n: COLLISION_N[index],
-        force_n: still.peak_n(),
+        force_n: still.corner_force_n,
         published_stress: STRESS[index],
-        stress_pa: largest(stresses.into_iter().map(|point| point.1)),
+        stress_pa: largest(impact::stress(&case, &moving).into_iter().map(|point| point.1)),
         closing_mm_s,
-        inertia_n: largest(climbing.map(|sample| (sample.radial_n - case.preload_n).abs())),
+        inertia_n: largest(climbing.map(|sample| (sample.radial_n - preload_n).abs())),
         inertia_bound_n: 1e-3 * closing_mm_s * (stiffness * case.rig.plant.moved_mass_kg).sqrt(),
-        jump_pa: Rubber::of(&case)?.impedance() * 1e-3 * closing_mm_s,
+        jump_pa: Rubber::of(&case).impedance() * 1e-3 * closing_mm_s,
         bending_mm: largest(bending.iter().map(|now| now.deflection_mm)),
         vibration_mm: largest(shaken.map(|now| now.vibration_mm.abs())),
     };
@@ -151,12 +160,11 @@ fn largest(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 fn of_rubber(name: &'static str, rubber: &Rubber) -> RubberFigures {
-    let limit = Wave { number_rad_m: 0.0, attenuation_np_m: front_attenuation_np_m(rubber) };
     RubberFigures {
         name,
         front_ms: THICKNESS_MM / rubber.front_speed_m_s(),
         slow_ms: THICKNESS_MM / rubber.slow_speed_m_s(),
-        loss_db: limit.loss_db(1e-3 * THICKNESS_MM),
+        loss_db: rubber.loss_db(1e-3 * THICKNESS_MM),
     }
 }
 
@@ -165,39 +173,30 @@ fn of_rubber(name: &'static str, rubber: &Rubber) -> RubberFigures {
 ///
 /// # Errors
 /// If a crossing cannot be computed.
-pub fn figure() -> Result<Figure, ReferenceError> {
-    let mut gap = Panel::new("Gap: the tread is fitted to these marks", "preload, N", "gap, mm");
-    let mut force = Panel::new("Collision force: not fitted", "preload, N", "force, N");
+pub fn figure() -> Result<Figure> {
+    let (mut gaps, mut forces) = (Vec::new(), Vec::new());
     for (number, speed) in [(1, 5.0), (2, 8.0)] {
-        let points: Vec<(f64, f64, f64)> = (0..=10)
+        let points: Vec<(f64, CrossingResult)> = (0..=10)
             .into_par_iter()
             .map(|index| {
                 let preload = 80.0 + 6.0 * f64::from(index);
-                let case =
-                    Case { resolution: Resolution::FIGURE, ..Case::new(Rig::fe(), speed, preload) };
-                let crossing = collision::quasi_static(&case)?;
-                let gap = crossing.lift.map_or(f64::NAN, |lift| lift.gap_mm);
-                Ok((preload, gap, crossing.peak_n()))
+                Ok((preload, still(&case(speed, preload))?))
             })
-            .collect::<Result<_, ReferenceError>>()?;
-        let name = format!("ring, {speed} mm/s");
-        gap.series.push(Series::method(number, &name, points.iter().map(|p| (p.0, p.1)).collect()));
-        force.series.push(Series::method(
-            number,
-            &name,
-            points.iter().map(|p| (p.0, p.2)).collect(),
-        ));
+            .collect::<Result<_, BalanceError>>()?;
+        let series = |of: fn(&CrossingResult) -> f64| {
+            let points = points.iter().map(|(preload, result)| (*preload, of(result)));
+            Series::method(number, &format!("ring, {speed} mm/s"), points.collect())
+        };
+        gaps.push(series(|result| result.gap_mm));
+        forces.push(series(|result| result.corner_force_n));
     }
     let marks = |values: [f64; 3]| CASES.iter().zip(values).map(|(case, y)| (case.1, y)).collect();
-    gap.series.push(Series::new(Source::Fitted, marks(AMPLITUDE_MM)));
-    force.series.push(Series::new(Source::Published, marks(COLLISION_N)));
-    Ok(Figure {
-        id: "model",
-        file: "model.svg".to_owned(),
-        title: "Gap and collision force over preload",
-        caption: String::new(),
-        columns: 2,
-        panels: vec![gap, force],
-        published: Vec::new(),
-    })
+    gaps.push(Series::new(Source::Fitted, marks(AMPLITUDE_MM)));
+    forces.push(Series::new(Source::Published, marks(COLLISION_N)));
+    let (gap, force) = ("Gap: the tread is fitted to these marks", "Collision force: not fitted");
+    let panels = vec![
+        Panel::new(gap, "preload, N", "gap, mm", gaps),
+        Panel::new(force, "preload, N", "force, N", forces),
+    ];
+    Ok(Figure::new("model", "Gap and collision force over preload", String::new(), 2, panels))
 }

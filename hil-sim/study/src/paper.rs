@@ -3,14 +3,13 @@
 //! rig, forty runs and four means of ten), with the numbers that it prints as marks, and
 //! every claim of it judged by these data.
 //!
-//! A claim is judged by code from the data of the figure below which it stands; nothing
+//! A claim is judged by code from the data of the figure below which it is printed; nothing
 //! is fitted but the three numbers of the tread, and nothing is tuned so that a claim
 //! would hold. Everything is deterministic: the same build writes the same bytes.
 
 pub mod amplitudes;
 pub mod case;
 pub mod cases;
-pub mod course;
 pub mod experiment;
 pub mod history;
 pub mod hold;
@@ -24,6 +23,7 @@ pub mod sweeps;
 pub mod theory;
 pub mod transitions;
 
+use anyhow::Result;
 use interstage::rig::Rig;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -37,11 +37,6 @@ use hold::Hold;
 use modes::Modes;
 use sweeps::{Sweep, Variable};
 
-use crate::reference::ReferenceError;
-use crate::reference::beam::BeamError;
-use hil_sim::plant::balance::BalanceError;
-use hil_sim::session::RunError;
-
 /// Everything that is regenerated.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Study {
@@ -49,23 +44,6 @@ pub struct Study {
     pub figures: Vec<Figure>,
     /// The claims, by figure.
     pub claims: Vec<Claim>,
-}
-
-/// Why it could not be regenerated.
-#[derive(Debug, thiserror::Error)]
-pub enum StudyError {
-    /// A deployment failed.
-    #[error(transparent)]
-    Run(#[from] RunError),
-    /// A crossing of the ring could not be balanced.
-    #[error(transparent)]
-    Balance(#[from] BalanceError),
-    /// A reference model refused.
-    #[error(transparent)]
-    Reference(#[from] ReferenceError),
-    /// The arm refused.
-    #[error(transparent)]
-    Beam(#[from] BeamError),
 }
 
 /// Deployments that [`regenerate`] runs.
@@ -96,15 +74,15 @@ fn cases() -> Vec<Case> {
 /// is called after each deployment.
 ///
 /// # Errors
-/// [`StudyError`] if a deployment or a reference fails.
-pub fn regenerate(done: &(dyn Fn() + Sync)) -> Result<Study, StudyError> {
+/// If a deployment or a reference fails.
+pub fn regenerate(done: &(dyn Fn() + Sync)) -> Result<Study> {
     let experiments = experiment::run_all(&cases(), done)?;
     let find = |wanted: &[Case]| -> Vec<&Experiment> {
         let of = |case: &Case| experiments.iter().find(|e| e.case == *case);
         wanted.iter().filter_map(of).collect()
     };
     let histories = |wanted: &[Case]| {
-        find(wanted).into_par_iter().map(Histories::new).collect::<Result<Vec<_>, _>>()
+        find(wanted).into_par_iter().map(Histories::new).collect::<Result<Vec<_>>>()
     };
     let four = histories(&cases::cases())?;
     let three = histories(&transitions::cases())?;

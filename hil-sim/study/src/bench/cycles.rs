@@ -22,14 +22,9 @@ use super::model::Variant;
 /// may be rounded once on the one and twice on the other.
 const FLOAT_LSB: u32 = 64;
 
-/// What the core measured.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Measured {
-    /// Forward and inverse calls of each of [`VARIANTS`], in turn.
-    pub calls: Vec<Calls>,
-    /// The control tick.
-    pub tick: Tick,
-}
+/// What the core measured: forward and inverse calls of each of [`VARIANTS`], in turn, and
+/// the control tick.
+pub type Measured = (Vec<Calls>, Tick);
 
 /// Calls of one function.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -81,7 +76,7 @@ pub fn run() -> Result<Measured> {
     ensure!(built.values == [1], "the core cannot build the models");
     let TickCost { tick } = start(&binary, &[])?;
     let mean = tick.cycles as f64 / tick.calls.max(1) as f64;
-    Ok(Measured { calls, tick: Tick { mean, worst: tick.max } })
+    Ok((calls, Tick { mean, worst: tick.max }))
 }
 
 /// Runs `rig-board cycles` with these arguments.
@@ -124,10 +119,10 @@ fn inputs() -> Result<[Vec<Given>; 2]> {
 ///
 /// # Errors
 /// If an answer differs.
-pub fn fill(measured: &Measured, variants: &mut [Variant]) -> Result<()> {
+pub fn fill(measured: &[Calls], variants: &mut [Variant]) -> Result<()> {
     let host = on_host()?;
-    ensure!(measured.calls.len() == host.len(), "other functions on the core");
-    for (index, (calls, host)) in measured.calls.iter().zip(&host).enumerate() {
+    ensure!(measured.len() == host.len(), "other functions on the core");
+    for (index, (calls, host)) in measured.iter().zip(&host).enumerate() {
         let (variant, back) = (&mut variants[index / 2], index % 2 == 1);
         ensure!(calls.values.len() == host.len(), "{}: other points on the core", variant.name);
         let most = if index < 2 { 0 } else { FLOAT_LSB };
@@ -136,13 +131,13 @@ pub fn fill(measured: &Measured, variants: &mut [Variant]) -> Result<()> {
             let same = host.abs_diff(core) <= most;
             ensure!(same, "{name}, point {point}: {core} on the core, {host} on the host");
         }
-        let course = if back { &mut variant.inverse } else { &mut variant.forward };
-        course.cycles = Some(calls.cost.max);
+        let measurement = if back { &mut variant.inverse } else { &mut variant.forward };
+        measurement.cycles = Some(calls.cost.max);
     }
     Ok(())
 }
 
-/// Answers of this host, in the order of [`Measured::calls`].
+/// Answers of this host, in the same order.
 fn on_host() -> Result<[Vec<i32>; 6]> {
     let rig = rig()?;
     let fixed = ReducedModel::try_build(&rig)?;
@@ -169,21 +164,18 @@ mod tests {
         let answers = on_host().unwrap();
         assert_eq!(steps().unwrap().len(), 1 + answers.len());
         let calls = answers.iter().zip([500, 300, 1500, 600, 60_000, 20_000]);
-        let mut measured = Measured {
-            calls: calls
-                .map(|(values, max)| Calls {
-                    values: values.iter().map(|&value| value as u32).collect(),
-                    cost: Cost { calls: 1, cycles: max, max },
-                })
-                .collect(),
-            tick: Tick { mean: 4e3, worst: 5000 },
-        };
+        let mut measured: Vec<Calls> = calls
+            .map(|(values, max)| Calls {
+                values: values.iter().map(|&value| value as u32).collect(),
+                cost: Cost { calls: 1, cycles: max, max },
+            })
+            .collect();
         fill(&measured, &mut variants).unwrap();
         assert_eq!(variants[1].inverse.cycles, Some(600));
         // Fixed point is the same to the bit, floating point nearly.
-        measured.calls[2].values[3] += 1;
+        measured[2].values[3] += 1;
         fill(&measured, &mut variants).unwrap();
-        measured.calls[0].values[3] += 1;
+        measured[0].values[3] += 1;
         let error = fill(&measured, &mut variants).unwrap_err().to_string();
         assert!(error.starts_with("fixed, point 3:"), "{error}");
     }

@@ -10,7 +10,7 @@ use interstage_images::model::{
 use interstage_images::number::Number;
 use serde::Serialize;
 
-use super::timing::least;
+use super::least;
 
 /// Steps of the domain, mm.
 const STEPS_MM: [f64; 5] = [2.0, 3.0, 4.0, 5.0, 6.0];
@@ -23,7 +23,7 @@ const ONE: f64 = 65_536.0;
 
 /// Error and cost of one direction of the model.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Course {
+pub struct Measurement {
     /// Largest error, relative to the force, or to the gap or [`LEAST_GAP_MM`], whichever is
     /// larger.
     pub max_rel_error: f64,
@@ -42,9 +42,9 @@ pub struct Variant {
     pub name: &'static str,
     /// Gap from speed and force.
     #[serde(flatten)]
-    pub forward: Course,
+    pub forward: Measurement,
     /// Force from speed and gap.
-    pub inverse: Course,
+    pub inverse: Measurement,
 }
 
 /// Both presets with every step of the domain.
@@ -96,17 +96,17 @@ fn variant<M>(
 ) -> Variant {
     Variant {
         name,
-        forward: course(scenes, |p| (&p.forward, p.gap_mm), forward),
-        inverse: course(scenes, |p| (&p.inverse, p.force_n), inverse),
+        forward: measured(scenes, |p| (&p.forward, p.gap_mm), forward),
+        inverse: measured(scenes, |p| (&p.inverse, p.force_n), inverse),
     }
 }
 
 /// Errors and time over all points of all rigs.
-fn course<M>(
+fn measured<M>(
     scenes: &[(M, &[Point])],
     pick: impl Fn(&Point) -> (&Given, f64),
     call: impl Fn(&M, &Given) -> f64,
-) -> Course {
+) -> Measurement {
     let calls = || scenes.iter().flat_map(|(model, points)| points.iter().map(move |p| (model, p)));
     let errors: Vec<f64> = calls()
         .map(|(model, point)| {
@@ -119,7 +119,7 @@ fn course<M>(
         calls().map(|(model, p)| call(model, std::hint::black_box(pick(p).0))).sum::<f64>()
     });
     let count = errors.len() as f64;
-    Course {
+    Measurement {
         max_rel_error: errors.iter().copied().fold(0.0, f64::max),
         rms_rel_error: (errors.iter().map(|e| e * e).sum::<f64>() / count).sqrt(),
         cycles: None,
@@ -136,9 +136,12 @@ mod tests {
         let variants = measure().unwrap();
         assert_eq!(variants.iter().map(|v| v.name).collect::<Vec<_>>(), ["fixed", "f32", "f64"]);
         for Variant { name, forward, inverse } in &variants {
-            for course in [forward, inverse] {
-                assert!(course.max_rel_error < 1e-4, "{name}: {course:?}");
-                assert!(course.rms_rel_error <= course.max_rel_error && course.host_ns > 0.0);
+            for measurement in [forward, inverse] {
+                assert!(measurement.max_rel_error < 1e-4, "{name}: {measurement:?}");
+                assert!(
+                    measurement.rms_rel_error <= measurement.max_rel_error
+                        && measurement.host_ns > 0.0
+                );
             }
         }
     }

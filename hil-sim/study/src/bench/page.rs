@@ -1,9 +1,10 @@
 //! What was measured as tables and as plots, and `docs/PERFORMANCE.md`.
 
+use hil_sim::plant::precision::Point;
 use hil_sim::table::{number, plain};
 
 use super::Report;
-use super::model::{Course, Variant};
+use super::model::{Measurement, Variant};
 use super::peers::{LEVEL, Peers, RING};
 use crate::figure::{Figure, Panel, Series};
 use crate::figure_svg::svg;
@@ -25,52 +26,44 @@ pub fn files(report: &Report) -> Vec<(&'static str, String)> {
 }
 
 fn figure(id: &'static str, columns: usize, panels: Vec<Panel>) -> Figure {
-    let (file, caption) = (String::new(), String::new());
-    Figure { id, file, title: "", caption, columns, panels, published: Vec::new() }
+    Figure::new(id, "", String::new(), columns, panels)
 }
 
 fn model_panel(report: &Report) -> Panel {
-    let mut panel = Panel::new(
-        "Reduced model: gap, then force",
-        "cycles (without: host ns)",
-        "largest relative error",
-    );
-    panel.logarithmic = true;
-    for (index, variant) in report.variants.iter().enumerate() {
-        let point = |course: &Course| {
-            (course.cycles.map_or(course.host_ns, |cycles| cycles as f64), course.max_rel_error)
+    let series = report.variants.iter().enumerate().map(|(index, variant)| {
+        let point = |measurement: &Measurement| {
+            (
+                measurement.cycles.map_or(measurement.host_ns, |cycles| cycles as f64),
+                measurement.max_rel_error,
+            )
         };
         let points = vec![point(&variant.forward), point(&variant.inverse)];
-        panel.series.push(Series::method(index, variant.name, points));
-    }
-    panel
+        Series::method(index, variant.name, points)
+    });
+    let (title, x) = ("Reduced model: gap, then force", "cycles (without: host ns)");
+    Panel::new(title, x, "largest relative error", series.collect()).logarithmic()
 }
 
 fn plant_panel(report: &Report) -> Panel {
-    let mut panel =
-        Panel::new("Plant: worst of twelve crossings", "time of a crossing, ms", "relative error");
-    panel.logarithmic = true;
     // At the default's ratio of elements and stride.
     let usual = report.plant.default;
     let product = usual.elements as f64 * usual.stride_mm;
-    let line = report
-        .plant
-        .settings
-        .iter()
-        .filter(|point| (point.elements as f64 * point.stride_mm / product - 1.0).abs() < 1e-9);
-    let points = |of: fn(&hil_sim::plant::precision::Point) -> f64| {
-        line.clone().map(|point| (1e-6 * point.wall_ns, of(point))).collect()
+    let of = |error: fn(&Point) -> f64| {
+        let line = report.plant.settings.iter();
+        let line = line
+            .filter(|point| (point.elements as f64 * point.stride_mm / product - 1.0).abs() < 1e-9);
+        line.map(|point| (1e-6 * point.wall_ns, error(point))).collect()
     };
-    panel.series.push(Series::method(3, "gap", points(|point| point.gap_error)));
-    panel.series.push(Series::method(4, "force", points(|point| point.force_error)));
-    panel
+    let series = vec![
+        Series::method(3, "gap", of(|point| point.gap_error)),
+        Series::method(4, "force", of(|point| point.force_error)),
+    ];
+    let (title, x) = ("Plant: worst of twelve crossings", "time of a crossing, ms");
+    Panel::new(title, x, "relative error", series).logarithmic()
 }
 
 fn peers_panel(peers: &Peers) -> Panel {
-    let mut panel =
-        Panel::new("One crossing (5 mm/s, 100 N)", "time, ms", "relative error of gap or force");
-    panel.logarithmic = true;
-    for (index, (name, _)) in peers.least_seconds.iter().enumerate() {
+    let series = peers.least_seconds.iter().enumerate().map(|(index, (name, _))| {
         let of = peers.settings.iter().filter(|setting| setting.name == *name);
         let mut points: Vec<(f64, f64)> =
             of.filter_map(|s| Some((1e3 * s.seconds, s.error?))).collect();
@@ -82,9 +75,10 @@ fn peers_panel(peers: &Peers) -> Panel {
             least = least.min(error);
             better
         });
-        panel.series.push(Series::method(index, name, points));
-    }
-    panel
+        Series::method(index, name, points)
+    });
+    let (title, y) = ("One crossing (5 mm/s, 100 N)", "relative error of gap or force");
+    Panel::new(title, "time, ms", y, series.collect()).logarithmic()
 }
 
 /// The tables of a measurement.
@@ -101,13 +95,13 @@ pub fn tables(report: &Report) -> String {
 }
 
 fn model_table(report: &Report) -> String {
-    let row = |name: &str, course: &Course| {
+    let row = |name: &str, measurement: &Measurement| {
         vec![
             name.to_owned(),
-            format!("{:.1e}", course.max_rel_error),
-            format!("{:.1e}", course.rms_rel_error),
-            course.cycles.map_or_else(|| "-".to_owned(), |cycles| cycles.to_string()),
-            number(course.host_ns, 0),
+            format!("{:.1e}", measurement.max_rel_error),
+            format!("{:.1e}", measurement.rms_rel_error),
+            measurement.cycles.map_or_else(|| "-".to_owned(), |cycles| cycles.to_string()),
+            number(measurement.host_ns, 0),
         ]
     };
     let rows = report.variants.iter().flat_map(|Variant { name, forward, inverse }| {

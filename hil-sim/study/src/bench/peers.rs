@@ -6,6 +6,8 @@
 //!
 //! Errors are those of gap and largest axial force against the converged ring.
 
+use std::path::Path;
+
 use anyhow::{Context, Result};
 use interstage::rig::Rig;
 use serde::{Deserialize, Serialize};
@@ -16,7 +18,7 @@ use hil_sim::plant::precision::{FINER, Setting as Mesh};
 use hil_sim::plant::ring::RingParameters;
 use hil_sim::plant::rolling;
 
-use super::{python, timing::least};
+use super::{least, python};
 
 /// The published case: speed, mm/s, and preload, N.
 const SPEED_MM_S: f64 = 5.0;
@@ -38,8 +40,8 @@ pub const LEVEL: f64 = 0.005;
 /// Name of the ring among the methods.
 pub const RING: &str = "ring";
 
-/// One setting of one method.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+/// One setting of one method; a script's answer has no error yet.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Setting {
     /// The method.
     pub name: String,
@@ -49,6 +51,10 @@ pub struct Setting {
     pub tolerance: Option<f64>,
     /// Time step, s.
     pub time_step_s: Option<f64>,
+    /// Gap, mm, if the wheel lifted off.
+    pub gap_mm: Option<f64>,
+    /// Largest axial force, N.
+    pub corner_force_n: f64,
     /// Relative error of gap or largest axial force, the larger; none without a gap.
     pub error: Option<f64>,
     /// Processor time, s.
@@ -81,7 +87,7 @@ struct Given<'a> {
     end_mm: f64,
     repeats: usize,
     budget_s: f64,
-    folder: &'a str,
+    folder: &'a Path,
     elements: Vec<usize>,
     time_steps_s: [f64; 7],
     fits: Vec<Fit>,
@@ -99,18 +105,7 @@ struct Fit {
 #[derive(Deserialize)]
 struct Answer {
     version: String,
-    points: Vec<Point>,
-}
-
-#[derive(Deserialize)]
-struct Point {
-    name: String,
-    elements: Option<usize>,
-    tolerance: Option<f64>,
-    time_step_s: Option<f64>,
-    gap_mm: Option<f64>,
-    corner_force_n: f64,
-    seconds: f64,
+    points: Vec<Setting>,
 }
 
 /// Gap, mm, and largest axial force, N, of the converged ring.
@@ -152,8 +147,7 @@ pub fn compare(say: &dyn Fn(&str)) -> Result<Peers> {
     let solved: Answer = python.run("solvers.py", &given)?;
     say("MuJoCo");
     let engine: Answer = python.run("mujoco_crossing.py", &given)?;
-    let points: Vec<Point> = solved.points.into_iter().chain(engine.points).collect();
-    settings.extend(merged(&points, exact));
+    settings.extend(merged(solved.points.into_iter().chain(engine.points), exact));
     Ok(Peers {
         versions: [solved.version, engine.version],
         least_seconds: least_seconds(&settings),
@@ -168,7 +162,8 @@ fn ring(factor: f64, exact: Exact) -> Result<Setting> {
         elements: ((usual.elements as f64 * factor).round() as usize).saturating_add_signed(shift),
         stride_mm: usual.stride_mm / factor,
     };
-    let (seconds, _) = least(|| crossing(PRELOAD_N, mesh(0)));
+    let (seconds, found) = least(|| crossing(PRELOAD_N, mesh(0)));
+    let found = found?;
     let mut error = 0.0_f64;
     for shift in NEIGHBOURS {
         let found = crossing(PRELOAD_N, mesh(shift))?;
@@ -179,12 +174,14 @@ fn ring(factor: f64, exact: Exact) -> Result<Setting> {
         elements: Some(mesh(0).elements),
         tolerance: None,
         time_step_s: Some(mesh(0).stride_mm / SPEED_MM_S),
+        gap_mm: Some(found.gap_mm),
+        corner_force_n: found.corner_force_n,
         error: Some(error),
         seconds,
     })
 }
 
-fn given(folder: &str) -> Result<Given<'_>> {
+fn given(folder: &Path) -> Result<Given<'_>> {
     let rig = Rig::fe();
     let ring = RingParameters::of(&rig, Mesh::usual().elements);
     let (radius, step) = (ring.radius_mm, rig.rig.step_height_mm);
@@ -223,28 +220,21 @@ fn given(folder: &str) -> Result<Given<'_>> {
 }
 
 /// One setting from neighbouring element counts: the least time and the largest error.
-fn merged(points: &[Point], exact: Exact) -> Vec<Setting> {
+fn merged(points: impl Iterator<Item = Setting>, exact: Exact) -> Vec<Setting> {
     let nearest = |n: usize| ELEMENTS.into_iter().min_by_key(|m| m.abs_diff(n)).unwrap_or(n);
     let mut settings: Vec<Setting> = Vec::new();
     for point in points {
         let elements = point.elements.map(nearest);
         let error = point.gap_mm.map(|gap| exact.error(gap, point.corner_force_n));
         let same = |s: &&mut Setting| {
-            (s.name.as_str(), s.elements, s.tolerance, s.time_step_s)
-                == (point.name.as_str(), elements, point.tolerance, point.time_step_s)
+            (&s.name, s.elements, s.tolerance, s.time_step_s)
+                == (&point.name, elements, point.tolerance, point.time_step_s)
         };
         if let Some(setting) = settings.iter_mut().find(same) {
             setting.error = setting.error.zip(error).map(|(a, b)| a.max(b));
             setting.seconds = setting.seconds.min(point.seconds);
         } else {
-            settings.push(Setting {
-                name: point.name.clone(),
-                elements,
-                tolerance: point.tolerance,
-                time_step_s: point.time_step_s,
-                error,
-                seconds: point.seconds,
-            });
+            settings.push(Setting { elements, error, ..point });
         }
     }
     settings
@@ -279,14 +269,15 @@ impl Peers {
 mod tests {
     use super::*;
 
-    fn point(elements: usize, gap_mm: Option<f64>, seconds: f64) -> Point {
-        Point {
+    fn point(elements: usize, gap_mm: Option<f64>, seconds: f64) -> Setting {
+        Setting {
             name: "A".to_owned(),
             elements: Some(elements),
             tolerance: Some(1e-2),
             time_step_s: None,
             gap_mm,
             corner_force_n: 50.0,
+            error: None,
             seconds,
         }
     }
@@ -300,7 +291,7 @@ mod tests {
             point(480, Some(2.04), 1.0),
             point(960, None, 0.5),
         ];
-        let found = merged(&points, Exact(2.0, 50.0));
+        let found = merged(points.into_iter(), Exact(2.0, 50.0));
         assert_eq!(found.len(), 3);
         assert_eq!((found[0].elements, found[0].seconds), (Some(240), 2.0));
         assert!((found[0].error.unwrap() - 0.004).abs() < 1e-12);
@@ -315,7 +306,7 @@ mod tests {
         assert!(
             (found.gap_mm - 1.744).abs() < 0.002 && (found.corner_force_n - 53.72).abs() < 0.05
         );
-        let given = given("/tmp").unwrap();
+        let given = given(Path::new("/tmp")).unwrap();
         let [less, more] = &given.fits[..] else { panic!("two fits") };
         assert!(less.gap_mm > more.gap_mm && less.sinkage_mm < more.sinkage_mm);
     }

@@ -14,7 +14,7 @@ use serde::de::DeserializeOwned;
 pub(super) struct Python {
     program: PathBuf,
     /// A folder for what the scripts build.
-    pub(super) folder: String,
+    pub(super) folder: PathBuf,
 }
 
 /// The folder of the scripts.
@@ -33,26 +33,26 @@ pub(super) fn provide(say: &dyn Fn(&str)) -> Result<Python> {
     if fs::read_to_string(&stamp).ok().as_ref() != Some(&wanted) || !program.is_file() {
         say("setting up Python");
         fs::create_dir_all(&folder)?;
-        quiet(Command::new("python3").args(["-m", "venv"]).arg(&folder))?;
+        output(Command::new("python3").args(["-m", "venv"]).arg(&folder), b"")?;
         let install = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r"];
-        quiet(Command::new(&program).args(install).arg(scripts().join("requirements.txt")))?;
+        output(Command::new(&program).args(install).arg(scripts().join("requirements.txt")), b"")?;
         fs::write(&stamp, &wanted)?;
     }
-    let folder = folder.to_str().context("the target directory's name is not text")?.to_owned();
     Ok(Python { program, folder })
 }
 
-/// Runs a command whose output matters only if it fails.
-fn quiet(command: &mut Command) -> Result<()> {
-    let name = command.get_program().to_string_lossy().into_owned();
-    let output = command.output().with_context(|| format!("could not start `{name}`"))?;
-    ensure!(output.status.success(), "`{name}` failed: {}", last_line(&output.stderr));
-    Ok(())
-}
-
-fn last_line(text: &[u8]) -> String {
-    let text = String::from_utf8_lossy(text);
-    text.lines().map(str::trim).rfind(|line| !line.is_empty()).unwrap_or("no message").to_owned()
+/// Standard output of a command that is given `input`; an error with the last line of its
+/// standard error if it fails.
+fn output(command: &mut Command, input: &[u8]) -> Result<Vec<u8>> {
+    let name = format!("{command:?}");
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().with_context(|| format!("could not start {name}"))?;
+    child.stdin.take().context("no standard input")?.write_all(input)?;
+    let output = child.wait_with_output()?;
+    let said = String::from_utf8_lossy(&output.stderr);
+    let last = said.lines().rfind(|line| !line.trim().is_empty()).unwrap_or("no message");
+    ensure!(output.status.success(), "{name} failed: {}", last.trim());
+    Ok(output.stdout)
 }
 
 impl Python {
@@ -63,21 +63,14 @@ impl Python {
         script: &str,
         given: &impl Serialize,
     ) -> Result<T> {
-        let mut child = Command::new(&self.program)
+        let mut command = Command::new(&self.program);
+        command
             .arg(scripts().join(script))
             // Single threads are compared.
             .envs([("OMP_NUM_THREADS", "1"), ("OPENBLAS_NUM_THREADS", "1")])
-            .env("PYTHONDONTWRITEBYTECODE", "1")
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .with_context(|| format!("could not start `{}`", self.program.display()))?;
-        let text = serde_json::to_vec(given)?;
-        child.stdin.take().context("the script has no input")?.write_all(&text)?;
-        let output = child.wait_with_output()?;
-        ensure!(output.status.success(), "{script} failed: {}", last_line(&output.stderr));
-        serde_json::from_slice(&output.stdout).with_context(|| format!("output of {script}"))
+            .env("PYTHONDONTWRITEBYTECODE", "1");
+        let text = output(&mut command, &serde_json::to_vec(given)?)?;
+        serde_json::from_slice(&text).with_context(|| format!("output of {script}"))
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use crate::bench::{self, Options, Report, page};
-use crate::cli::{docs, write};
+use crate::cli::{docs, failed, write};
 use hil_sim::cli::failure::{Failure, Outcome};
 use hil_sim::cli::output;
 use hil_sim::progress;
@@ -45,8 +45,8 @@ pub(super) struct Args {
 struct Printed<'a> {
     #[serde(flatten)]
     report: &'a Report,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    written: Vec<PathBuf>,
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    written: &'a [PathBuf],
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
@@ -54,19 +54,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         let spinner = progress::spinner("bench");
         let options = Options { peers: args.peers, quick: args.quick, cycles: !args.host };
         let measured = bench::measure(options, &|what| spinner.say(what));
-        measured.map_err(|error| Failure::run(format!("{error:#}")))?
+        measured.map_err(failed)?
     };
     let files = if args.docs { page::files(&report) } else { Vec::new() };
     let written = write(&docs(), files)?;
-    let printed = Printed { report: &report, written };
-    output::result(args.json, &printed, || human(&printed))?;
+    let printed = Printed { report: &report, written: &written };
+    output::result(args.json, &printed, || page::tables(&report) + &output::wrote(&written))?;
     Ok(Outcome::Good)
-}
-
-fn human(printed: &Printed<'_>) -> String {
-    let mut text = page::tables(printed.report);
-    for path in &printed.written {
-        text += &format!("wrote {}\n", path.display());
-    }
-    text
 }

@@ -3,8 +3,8 @@
 use interstage::params::compile;
 use interstage::rig::Rig;
 
-use super::{root, write};
-use crate::constants::{data, plan, source, stored, sweep};
+use super::{failed, root, write};
+use crate::constants::{data, plan, source, stored};
 use hil_sim::cli::failure::{Failure, Outcome};
 use hil_sim::progress;
 
@@ -21,7 +21,6 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
-    let failed = |error: anyhow::Error| Failure::run(format!("{error:#}"));
     if args.set {
         let set = compile("prototype", &Rig::prototype()).map_err(Failure::run)?;
         let path = root().join("src/params/prototype.set");
@@ -30,7 +29,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     }
     if args.sweep {
         let bar = progress::bar("crossings", plan().len() as u64);
-        let rows = sweep(&|| bar.advance(1)).map_err(failed)?;
+        let rows = data::run_all(&plan(), &|| bar.advance(1)).map_err(failed)?;
         std::fs::write(data::path(), data::write(&rows)).map_err(Failure::run)?;
     }
     let text = source(&stored().map_err(failed)?).map_err(failed)?;

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use super::{docs, write};
+use super::{docs, failed, write};
 use crate::figure_svg::svg;
-use crate::paper::{self, Study, StudyError, page};
+use crate::paper::{self, Study, page};
 use hil_sim::cli::failure::{Failure, Outcome};
 use hil_sim::cli::output;
 use hil_sim::progress;
@@ -43,7 +43,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         .map_err(|error| Failure::input(format!("{}: {error}", directory.display())))?;
     let study = {
         let bar = progress::bar("deployments", paper::runs() as u64);
-        paper::regenerate(&|| bar.advance(1))?
+        paper::regenerate(&|| bar.advance(1)).map_err(failed)?
     };
     let mut files: Vec<(&str, String)> =
         study.figures.iter().map(|figure| (figure.file.as_str(), svg(figure))).collect();
@@ -60,24 +60,12 @@ fn human(study: &Study, files: &[PathBuf]) -> String {
         let verdict = if claim.holds { "holds" } else { "does not hold" };
         vec![claim.claim.to_owned(), claim.figure.to_owned(), verdict.to_owned()]
     });
-    let mut text = format!(
-        "{} figures; of {} claims {held} hold and {} do not\n{}\n",
+    format!(
+        "{} figures; of {} claims {held} hold and {} do not\n{}\n{}",
         study.figures.len(),
         study.claims.len(),
         study.claims.len() - held,
-        plain(&["the study says", "figure", "in ours"], rows)
-    );
-    for file in files {
-        text += &format!("  wrote {}\n", file.display());
-    }
-    text
-}
-
-impl From<StudyError> for Failure {
-    fn from(error: StudyError) -> Self {
-        match error {
-            StudyError::Run(error) => error.into(),
-            other => Self::run(other),
-        }
-    }
+        plain(&["the study says", "figure", "in ours"], rows),
+        output::wrote(files)
+    )
 }

@@ -16,7 +16,7 @@ use hil_sim::plant::ring::RingParameters;
 /// Elements around the ring. With the stride below, twice the elements at half of it
 /// move no gap by more than a fiftieth of what the model may be off.
 pub const ELEMENTS: usize = 2880;
-/// Axial way per step, mm.
+/// Axial travel per step, mm.
 pub const STRIDE_MM: f64 = 0.01;
 
 /// A crossing and what the ring makes of it.

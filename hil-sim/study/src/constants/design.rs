@@ -7,7 +7,7 @@ use interstage::units::Direction;
 /// A crossing of the published wheel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Case {
-    /// Way, and whether it is driven.
+    /// Direction, and whether it is driven.
     pub kind: Kind,
     /// Step height, mm.
     pub step_mm: f64,

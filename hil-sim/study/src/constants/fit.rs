@@ -1,4 +1,4 @@
-//! Least squares of the felt stiffening.
+//! Least squares of the effective stiffening.
 
 use anyhow::{Context, Result};
 use interstage::model::effective_stiffness::{
@@ -90,16 +90,6 @@ fn weight(shape: &Formula, row: &Row, stiffness: f64) -> f64 {
         * inside(speed_mm_s, WEIGHTED_MM_S)
         * (sensitivity / SENSITIVITY).clamp(0.1, 10.0).sqrt()
         * held
-}
-
-/// Relative error of the built-in constants' effective stiffness at a crossing.
-#[must_use]
-pub fn stiffness_error(formula: &Formula, row: &Row) -> f64 {
-    let Case { kind, step_mm, speed_mm_s, load_n, .. } = row.case;
-    let shape = Formula { step_mm, ..*formula };
-    let load = kind.driven.then_some(load_n);
-    let stiffness = shape.stiffness(kind.direction, speed_mm_s, row.gap_mm, load);
-    stiffness / observed_stiffness(formula, row) - 1.0
 }
 
 /// Error of the built-in constants' gap at a crossing, in parts of 1 % of the gap or

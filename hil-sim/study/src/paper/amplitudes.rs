@@ -1,16 +1,17 @@
 //! Figures 13 to 16: collision force, impact stress and vibration amplitude of the three
 //! finite-element cases. The study's vibration amplitude is its contact gap.
 
+use anyhow::Result;
+
 use super::case::Case;
-use super::experiment::{Experiment, Line, Run, marks as mark_runs};
-use super::history::{Histories, Quantity};
-use super::published::{AMPLITUDE_MM, CASES, COLLISION_N, STRESS};
+use super::experiment::{Experiment, Run, marks as mark_runs};
+use super::history::{Histories, Points, Quantity, stage_ends_s};
+use super::published::{AMPLITUDE_MM, CASES, COLLISION_N, LOG_S, STRESS};
 use super::simulation;
 use super::theory::{self, Drive, Lift};
 use super::transitions::at;
-use crate::figure::{Claim, Figure, Mark, Panel, Series, Source};
-use crate::reference::impact::Rubber;
-use crate::reference::{Case as Reference, ReferenceError};
+use crate::figure::{Claim, Figure, Mark, Panel, SOURCES, Series, Source};
+use crate::reference::{Case as Reference, Rubber};
 
 const SECTION: &str = "Simulation analysis results";
 
@@ -54,8 +55,8 @@ impl Amplitudes {
     /// first transition of the experiments, in the order of the study's cases.
     ///
     /// # Errors
-    /// [`ReferenceError`] if a crossing cannot be computed.
-    pub fn new(experiments: &[&Experiment]) -> Result<Self, ReferenceError> {
+    /// If a crossing cannot be computed.
+    pub fn new(experiments: &[&Experiment]) -> Result<Self> {
         let of = |experiment: &&Experiment| {
             let case = &experiment.case;
             Ok(Three {
@@ -64,11 +65,10 @@ impl Amplitudes {
                 experiment: experiment.runs.iter().filter_map(|run| first(case, run)).collect(),
             })
         };
-        let all: Vec<Three> =
-            experiments[..3].iter().map(of).collect::<Result<_, ReferenceError>>()?;
-        let first = &Reference::study()[0];
-        let touch_pa = Rubber::of(first)?.impedance() * first.closing_speed_mm_s() * 1e-3;
-        Ok(Self { cases: all, touch_pa })
+        let cases = experiments[..3].iter().map(of).collect::<Result<_>>()?;
+        let first = Reference::first();
+        let touch_pa = Rubber::of(&first).impedance() * first.closing_speed_mm_s() * 1e-3;
+        Ok(Self { cases, touch_pa })
     }
 
     fn values(&self, source: Source, pick: impl Fn(&Lift) -> f64) -> [f64; 3] {
@@ -96,15 +96,15 @@ impl Amplitudes {
         let unit = |source| self.values(source, |lift| lift.impact_kpa)[0];
         let ratios = |source| self.values(source, |lift| lift.impact_kpa / unit(source));
         let stress = STRESS.map(|value| value / STRESS[0]);
-        let mut force = categories("Collision force (Fig. 13)", "force, N");
-        let mut impact = categories("Impact stress over that at 5 mm/s, 100 N (Fig. 14)", "ratio");
-        for source in SOURCES {
-            force.series.push(self.series(source, 1.0, |lift| lift.collision_n));
-            impact.series.push(self.series(source, unit(source), |lift| lift.impact_kpa));
-        }
-        force.series.push(Series::new(Source::Published, numbered(COLLISION_N)));
-        impact.series.push(Series::new(Source::Published, numbered(stress)));
+        let force = |source| self.series(source, 1.0, |lift| lift.collision_n);
+        let impact = |source| self.series(source, unit(source), |lift| lift.impact_kpa);
+        let published_by = |values| Series::new(Source::Published, numbered(values));
+        let force = SOURCES.map(force).into_iter().chain([published_by(COLLISION_N)]);
+        let impact = SOURCES.map(impact).into_iter().chain([published_by(stress)]);
+        let mut force = categories("Collision force (Fig. 13)", "force, N", force);
         force.least_y = Some((40.0, 65.0));
+        let title = "Impact stress over that at 5 mm/s, 100 N (Fig. 14)";
+        let impact = categories(title, "ratio", impact);
         let mut published = marks("collision force", "N", COLLISION_N, false, |source, i| {
             self.values(source, |lift| lift.collision_n)[i]
         });
@@ -113,61 +113,41 @@ impl Amplitudes {
                 .into_iter()
                 .skip(1),
         );
-        Figure {
-            id: "fig13-14",
-            file: "fig13-14.svg".into(),
-            title: "Collision force and impact stress of the finite-element cases",
-            caption: format!(
-                "First transition. Theory and simulation: pushed over a frictionless wall; theory at \
-                      the instant at which the lower wall stops carrying, simulation the largest of the \
-                      crossing. Experiment: the virtual rig at the study's loads, torque-driven, largest \
-                      value of its 0.1 s log. The unit of the published stress is doubtful, so \
-                      that ratios stand here; ours are of hundreds of kPa, and the wave alone that the touch launches at \
-                      5 mm/s (impedance times closing speed, at once over the whole face) is {:.0} Pa. Nothing in \
-                      this figure is fitted.",
-                self.touch_pa
-            ),
-            columns: 2,
-            panels: vec![force, impact],
-            published,
-        }
+        let caption = format!(
+            "First transition. Theory and simulation: pushed over a frictionless wall; theory at \
+             the instant at which the lower wall stops carrying, simulation the largest of the \
+             crossing. Experiment: the virtual rig at the study's loads, torque-driven, largest \
+             value of its 0.1 s log. The unit of the published stress is doubtful, so \
+             that ratios are given here; ours are of hundreds of kPa, and the wave alone that the touch launches at \
+             5 mm/s (impedance times closing speed, at once over the entire face) is {:.0} Pa. Nothing in \
+             this figure is fitted.",
+            self.touch_pa
+        );
+        let title = "Collision force and impact stress of the finite-element cases";
+        Figure { published, ..Figure::new("fig13-14", title, caption, 2, vec![force, impact]) }
     }
 
     /// Figures 15 and 16: the vibration amplitude, which is the gap.
     #[must_use]
     pub fn gap_figure(&self, all: &[Histories]) -> Figure {
-        let mut gap = categories("Vibration amplitude = contact gap (Fig. 15)", "gap, mm");
-        for source in SOURCES {
-            gap.series.push(self.series(source, 1.0, |lift| lift.gap_mm));
-        }
-        gap.series.push(Series::new(Source::Fitted, numbered(AMPLITUDE_MM)));
-        let mut panels = vec![gap];
-        panels.extend(all[..3].iter().map(|one| {
-            one.clearance_panel(format!(
-                "Clearance at the first step (Fig. 16): {}",
-                one.case.name()
-            ))
-        }));
+        let gap = SOURCES.map(|source| self.series(source, 1.0, |lift| lift.gap_mm)).into_iter();
+        let gap = gap.chain([Series::new(Source::Fitted, numbered(AMPLITUDE_MM))]);
+        let mut panels =
+            vec![categories("Vibration amplitude = contact gap (Fig. 15)", "gap, mm", gap)];
+        panels.extend(all[..3].iter().map(Histories::clearance_panel));
         let published =
             marks("vibration amplitude = gap", "mm", AMPLITUDE_MM, true, |source, i| {
                 self.values(source, |lift| lift.gap_mm)[i]
             });
-        Figure {
-            id: "fig15-16",
-            file: "fig15-16.svg".into(),
-            title: "Vibration amplitude of the finite-element cases",
-            caption: "Stiffness, stiffening and relaxation time of the tread are fitted to the three \
-                      published amplitudes with the frictionless ring, which is theory and simulation of \
-                      the first plot: their agreement there is no validation. The experiment drives itself \
-                      by friction against a third of the 60 N, which opens the gap by some per cent, and \
-                      so do theory and simulation of the other plots: the clearance between the root of \
-                      the first step and the undeformed wheel until the centre passes the step. The gap is \
-                      its value when the lower wall stops carrying."
-                .into(),
-            columns: 2,
-            panels,
-            published,
-        }
+        let caption = "Stiffness, stiffening and relaxation time of the tread are fitted to the three \
+             published amplitudes with the frictionless ring, which is theory and simulation of \
+             the first plot: their agreement there is no validation. The experiment drives itself \
+             by friction against a third of the 60 N, which opens the gap by some per cent, and \
+             so do theory and simulation of the other plots: the clearance between the root of \
+             the first step and the undeformed wheel until the centre passes the step. The gap is \
+             its value when the lower wall stops carrying.";
+        let title = "Vibration amplitude of the finite-element cases";
+        Figure { published, ..Figure::new("fig15-16", title, caption.to_owned(), 2, panels) }
     }
 
     /// The claims of both.
@@ -290,7 +270,7 @@ impl Amplitudes {
                 "",
             ),
             of("fig15-16", "simulated-curves-resemble-theory").judged(
-                "The simulated amplitude curves closely resemble the theoretical ones over the whole transition.",
+                "The simulated amplitude curves closely resemble the theoretical ones throughout the transition.",
                 resemblance < CLOSE,
                 format!(
                     "Clearance at the first step from lift-off on: up to {:.1} % apart.",
@@ -316,15 +296,13 @@ impl Amplitudes {
                     "The largest deflection of the arm in the experiment is {:.2} of the gap.",
                     arm_over_gap(all, self)
                 ),
-                "The gap is the quasi-static clearance under a wheel that stands on floor and corner; it is \
+                "The gap is the quasi-static clearance under a wheel that floor and corner carry; it is \
                  there at rest as well. Inertia of the impact is about a newton, and waves cross the tread \
                  in a tenth of a millisecond.",
             ),
         ]
     }
 }
-
-const SOURCES: [Source; 3] = super::transitions::SOURCES;
 
 /// Largest deflection of the arm over the gap of the same case.
 fn arm_over_gap(all: &[Histories], amplitudes: &Amplitudes) -> f64 {
@@ -339,10 +317,10 @@ fn arm_over_gap(all: &[Histories], amplitudes: &Amplitudes) -> f64 {
 /// least value, relative.
 fn resemblance(all: &[Histories]) -> f64 {
     let of = |one: &Histories| {
-        let (theory, simulation) = &one.clearance;
+        let [theory, simulation] = one.clearance();
         let least = theory.iter().enumerate().min_by(|a, b| a.1.1.total_cmp(&b.1.1));
         let from = least.map_or(0, |(index, _)| index);
-        let apart = |&(t, y): &(f64, f64)| Some((at(simulation, t)? / y - 1.0).abs());
+        let apart = |&(t, y): &(f64, f64)| Some((at(&simulation, t)? / y - 1.0).abs());
         theory[from..].iter().filter_map(apart).fold(0.0, f64::max)
     };
     all[..3].iter().map(of).fold(0.0, f64::max)
@@ -351,23 +329,24 @@ fn resemblance(all: &[Histories]) -> f64 {
 /// The first transition of a run; none if it was not completed.
 fn first(case: &Case, run: &Run) -> Option<Lift> {
     let reading = run.crossings.first()?;
-    let passed = super::history::stage_ends_s(case)[0];
-    let most = |pick: fn(&Line) -> f64| {
-        run.log.iter().take_while(|line| line.time_s < passed).map(pick).fold(0.0, f64::max)
+    let passed_s = stage_ends_s(case)[0];
+    let most = |points: &Points| {
+        let times = (0..).map(|line| f64::from(line) * LOG_S);
+        let until = times.zip(points).take_while(|(time_s, _)| *time_s < passed_s);
+        until.map(|(_, point)| point.1).fold(0.0, f64::max)
     };
     Some(Lift {
         gap_mm: reading.gap_mm,
         depth_mm: reading.depth_mm,
         area_mm2: reading.area_mm2,
-        collision_n: most(|line| line.collision_n),
-        impact_kpa: most(|line| line.impact_kpa),
+        collision_n: most(&run.log.collision),
+        impact_kpa: most(&run.log.impact),
     })
 }
 
-fn categories(title: &str, y: &str) -> Panel {
-    let mut panel = Panel::new(title, "speed and preload", y);
-    panel.categories = CASES[..3].iter().map(|(v, p)| format!("{v} mm/s, {p} N")).collect();
-    panel
+fn categories(title: &str, y: &str, series: impl Iterator<Item = Series>) -> Panel {
+    let names = CASES[..3].iter().map(|(v, p)| format!("{v} mm/s, {p} N")).collect();
+    Panel::of_categories(title, ("speed and preload", names), y, series.collect())
 }
 
 fn numbered(values: [f64; 3]) -> Vec<(f64, f64)> {

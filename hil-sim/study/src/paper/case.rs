@@ -1,14 +1,14 @@
 //! Speed, preload and loads of a crossing, and the rig that is run with them.
 
 use interstage::rig::Rig;
-use serde::Serialize;
 
+use crate::reference::beam::BeamError;
+use crate::reference::vibration::{self, MODES, Modal};
 use hil_sim::plant::arm::Arm;
 use hil_sim::scenario::{ControllerKind, Scenario};
 
 /// Loads of the study.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Loads {
     /// Of its theory and finite elements: 60 N on top, 100 N and more of preload.
     Fe,
@@ -17,15 +17,6 @@ pub enum Loads {
 }
 
 impl Loads {
-    /// Name of the rig's preset.
-    #[must_use]
-    pub const fn preset(self) -> &'static str {
-        match self {
-            Self::Fe => "fe",
-            Self::Prototype => "prototype",
-        }
-    }
-
     /// The rig with these loads.
     #[must_use]
     pub fn rig(self) -> Rig {
@@ -37,7 +28,7 @@ impl Loads {
 }
 
 /// A deployment at constant speed and preload.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Case {
     /// Loads.
     pub loads: Loads,
@@ -67,7 +58,7 @@ impl Case {
         plant.top_load_n * plant.top_load_share
     }
 
-    /// Arm, and the radius of a wheel that stands on sleeve `level`, mm.
+    /// Arm, and the radius of a wheel on sleeve `level`, mm.
     fn arm(&self, level: usize) -> (Arm, f64) {
         let rig = self.loads.rig();
         let step = rig.rig.step_height_mm;
@@ -78,13 +69,6 @@ impl Case {
             coupling: rig.plant.arm_coupling,
         };
         (arm, centre)
-    }
-
-    /// Angle of the arm from the pillar with the wheel on sleeve `level`, rad.
-    #[must_use]
-    pub fn arm_rad(&self, level: usize) -> f64 {
-        let (arm, centre) = self.arm(level);
-        arm.angle(centre)
     }
 
     /// Radial force on a wheel that lifts its load from sleeve `level`, N: the preload,
@@ -100,7 +84,7 @@ impl Case {
     #[must_use]
     pub fn scenario(&self, seed: u64) -> Scenario {
         let mut scenario = Scenario { rig: self.loads.rig(), ..Scenario::default() };
-        scenario.preset = self.loads.preset().to_owned();
+        scenario.preset = if self.loads == Loads::Fe { "fe" } else { "prototype" }.to_owned();
         let preload = &mut scenario.rig.preload;
         preload.cruise_n = self.preload_n;
         preload.limit_n = preload.limit_n.max(1.25 * self.preload_n);
@@ -114,17 +98,52 @@ impl Case {
     }
 }
 
+/// The arm on each sleeve: the reference's, bent by the part of the collision force that
+/// lies across it.
+#[derive(Clone, Debug)]
+pub struct Arms {
+    arm: vibration::Arm,
+    /// Sine of its angle from the pillar, by level.
+    across: [f64; 3],
+}
+
+impl Arms {
+    /// The arm of a case.
+    ///
+    /// # Errors
+    /// [`BeamError`] if the arm is out of range.
+    pub fn of(case: &Case) -> Result<Self, BeamError> {
+        let across = std::array::from_fn(|level| {
+            let (arm, centre) = case.arm(level);
+            arm.angle(centre).sin()
+        });
+        Ok(Self { arm: vibration::Arm::of(&case.loads.rig())?, across })
+    }
+
+    /// Force across the arm of a collision force from sleeve `level`, N.
+    #[must_use]
+    pub fn across_n(&self, level: usize, collision_n: f64) -> f64 {
+        self.across[level.min(2)] * collision_n
+    }
+
+    /// Deflection under a static collision force, mm.
+    #[must_use]
+    pub fn static_mm(&self, level: usize, collision_n: f64) -> f64 {
+        1e3 * self.arm.compliance_m_per_n() * self.across_n(level, collision_n)
+    }
+
+    /// Its motion.
+    ///
+    /// # Errors
+    /// [`BeamError`] if the arm is out of range.
+    pub fn modal(&self) -> Result<Modal, BeamError> {
+        self.arm.modal(MODES)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_arm_presses_less_from_sleeve_to_sleeve() {
-        let case = Case::new(Loads::Prototype, 5.0, 40.0);
-        let pressing: Vec<f64> = (0..3).map(|level| case.pressing_n(level)).collect();
-        assert!(pressing.windows(2).all(|pair| pair[1] < pair[0]), "{pressing:?}");
-        assert!((pressing[0] - 40.0 - 1.05 * 20.0 / 3.0).abs() < 0.01, "{pressing:?}");
-    }
 
     #[test]
     fn scenarios_are_valid() {
@@ -134,5 +153,18 @@ mod tests {
             interstage::model::Planner::try_build(&scenario.rig).unwrap();
             assert_eq!(scenario.rig.preload.cruise_n, case.preload_n);
         }
+    }
+
+    #[test]
+    fn the_arm_lies_flatter_and_presses_less_from_sleeve_to_sleeve() {
+        let case = Case::new(Loads::Prototype, 5.0, 40.0);
+        let pressing: Vec<f64> = (0..3).map(|level| case.pressing_n(level)).collect();
+        assert!(pressing.windows(2).all(|pair| pair[1] < pair[0]), "{pressing:?}");
+        assert!((pressing[0] - 40.0 - 1.05 * 20.0 / 3.0).abs() < 0.01, "{pressing:?}");
+        let arms = Arms::of(&Case::new(Loads::Fe, 5.0, 100.0)).unwrap();
+        let bent: Vec<f64> = (0..3).map(|level| arms.static_mm(level, 50.0)).collect();
+        assert!(bent.windows(2).all(|pair| pair[1] < pair[0]), "{bent:?}");
+        // 50 N sin(46.4 deg) on a cantilever of 145 mm.
+        assert!((bent[0] / (36.2 * 0.145_f64.powi(3) / (3.0 * 244.69) * 1e3) - 1.0).abs() < 1e-3);
     }
 }

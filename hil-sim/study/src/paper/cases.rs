@@ -2,10 +2,10 @@
 //! loads.
 
 use super::case::{Case, Loads};
-use super::history::{Histories, Quantity};
+use super::history::{Histories, Quantity, panels};
 use super::published::{CASES, COLLISION_N};
-use super::transitions::{SOURCES, count_humps, first_rises, peaks_text};
-use crate::figure::{Claim, Figure, Series, Source};
+use super::transitions::{count_humps, first_rises, peaks_text};
+use crate::figure::{Claim, Figure, SOURCES, Series, Source};
 
 const SECTION: &str = "Vibration transmission model";
 
@@ -24,12 +24,7 @@ pub fn cases() -> Vec<Case> {
 /// The figure.
 #[must_use]
 pub fn figure(all: &[Histories]) -> Figure {
-    let mut panels: Vec<_> = Quantity::ALL
-        .into_iter()
-        .flat_map(|quantity| {
-            all.iter().map(move |one| one.panel(quantity, quantity.title(&one.case)))
-        })
-        .collect();
+    let mut panels = panels(all);
     for ((panel, one), force) in panels.iter_mut().zip(all).zip(COLLISION_N) {
         let when = one.peaks(Quantity::Collision, Source::Simulation)[0].0;
         panel.series.push(Series::new(Source::Published, vec![(when, force)]));
@@ -41,15 +36,8 @@ pub fn figure(all: &[Histories]) -> Figure {
                    collision forces of the first transition (figure 13), drawn at the time of our \
                    peak; it prints no other value of these curves."
             .to_owned();
-    Figure {
-        id: "fig11",
-        file: "fig11.svg".into(),
-        title: "Collision, impact and vibration of the four cases",
-        caption,
-        columns: CASES.len(),
-        panels,
-        published: Vec::new(),
-    }
+    let title = "Collision, impact and vibration of the four cases";
+    Figure::new("fig11", title, caption, CASES.len(), panels)
 }
 
 /// The claims about it; `all` in the order of [`CASES`].
@@ -67,21 +55,15 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
     let (collision, impact, vibration) =
         (Quantity::Collision, Quantity::Impact, Quantity::Vibration);
     let stage = |number: usize| {
-        SOURCES.map(|source| {
-            let peak = |one: &Histories| one.peaks(collision, source)[number].1;
-            peak(pressed) / peak(slow) - 1.0
-        })
+        let [of_pressed, of_slow] = [pressed, slow].map(|one| one.stage(collision, number));
+        std::array::from_fn::<f64, 3, _>(|source| of_pressed[source] / of_slow[source] - 1.0)
     };
     let percent = |parts: [f64; 3]| parts.map(|part| format!("{:+.1} %", 100.0 * part)).join(", ");
-    let humps = all
-        .iter()
-        .map(|one| {
-            let points = one.points(collision, Source::Simulation);
-            let values: Vec<f64> = points.iter().map(|p| p.1).collect();
-            count_humps(&values, 0.02)
-        })
-        .max()
-        .unwrap_or(0);
+    let humps = |one: &Histories| {
+        let points = one.points(collision, Source::Simulation);
+        count_humps(points.iter().map(|p| p.1), 0.02)
+    };
+    let humps = all.iter().map(humps).max().unwrap_or(0);
     vec![
         of("collision-decays-periodically").judged(
             "The collision force decays periodically, because the tread is elastic.",
@@ -140,7 +122,7 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
                     .collect::<Vec<_>>()
                     .join("; ")
             ),
-            "The two do not even stand in the same order: the speed stiffens the tread and narrows the contact, \
+            "The two are not even in the same order: the speed stiffens the tread and narrows the contact, \
              which raises the stress at nearly the same force.",
         ),
         of("impact-decays-to-zero").judged(
@@ -149,7 +131,7 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
                 SOURCES.into_iter().all(|source| one.left_over(impact, source) < GONE)
             }),
             format!(
-                "Once the wheel stands on the last sleeve at most {:.3} of the peak is left, in any case and \
+                "Once the wheel is on the last sleeve at most {:.3} of the peak is left, in any case and \
                  source.",
                 all.iter()
                     .flat_map(|one| SOURCES.map(|source| one.left_over(impact, source)))

@@ -5,6 +5,7 @@
 //! Gap, embedding depth and contact area are what the sensors say; forces and arm
 //! vibration, for which the rig has no sensor, are what the plant did.
 
+use anyhow::Result;
 use interstage::supervise::{Command, Mode};
 use interstage::tick::Event;
 use rand::SeedableRng;
@@ -12,25 +13,22 @@ use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use super::StudyError;
-use super::case::Case;
-use super::course::Arms;
-use super::measure::{CollisionGauge, impact_kpa};
+use super::case::{Arms, Case};
+use super::history::{History, Instant};
+use super::measure::{collision_n, impact_kpa, resistance};
 use super::published::{LOG_S, RUNS, RUNS_OF_A_MEAN};
 use super::theory::area_of_depth_mm2;
 use crate::figure::Series;
-use crate::reference::ReferenceError;
-use crate::reference::vibration::modal::Modal;
+use crate::reference::beam::BeamError;
+use crate::reference::vibration::Modal;
 use hil_sim::plant::rig::VirtualRig;
+use hil_sim::report::axis::extent;
 use hil_sim::session::{Options, Session};
 
 /// Crossings of a deployment.
 pub const STAGES: usize = 3;
 
-/// Means of an experiment.
-pub const MEANS: usize = RUNS / RUNS_OF_A_MEAN;
-
-/// Longest run, s: the whole travel at the slowest case, with room.
+/// Longest run, s: all of the travel in the slowest case, with room.
 const LONGEST_S: f64 = 60.0;
 
 /// A tick of the session, s.
@@ -54,36 +52,17 @@ pub struct Reading {
     pub preload_swing_n: f64,
 }
 
-/// One line of the log: what is true at its time; of the arm's deflection, the largest
-/// since the last line.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Line {
-    /// Time since the motion began, s.
-    pub time_s: f64,
-    /// Axial force of the contact against the motion, N.
-    pub collision_n: f64,
-    /// Stress that the collision adds to the tread, kPa.
-    pub impact_kpa: f64,
-    /// Deflection of the arm, um.
-    pub vibration_um: f64,
-    /// Separation of wheel and wall away from the steps, mm.
-    pub separation_mm: f64,
-    /// Clearance of the undeformed wheel from the root of the step ahead, mm; none
-    /// farther than a radius from it.
-    pub clearance_mm: Option<f64>,
-}
-
 /// One deployment.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Run {
     /// Readings of the three crossings; none of one that was not completed.
     pub crossings: Vec<Reading>,
-    /// The log.
-    pub log: Vec<Line>,
+    /// The log: what is true at its times.
+    pub log: History,
+    /// Largest separation of wheel and wall away from the steps, at the times of the log, mm.
+    pub separation_mm: f64,
     /// Contact stages that the controller went through, 1 to 6.
     pub stages: [bool; 6],
-    /// From the start of motion to the end of travel, s.
-    pub duration_s: f64,
     /// Gross slip, mm.
     pub slip_mm: f64,
 }
@@ -120,17 +99,14 @@ pub fn marks(x: f64, all: &[f64], series: &mut Series) {
         let of: Vec<f64> = group.iter().filter_map(|&run| all.get(run).copied()).collect();
         series.points.push((x, of.iter().sum::<f64>() / of.len() as f64));
     }
-    let (low, high) = all
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| (low.min(*y), high.max(*y)));
-    series.range.push((x, low, high));
+    series.range.extend(extent(all.iter().copied()).map(|(low, high)| (x, low, high)));
 }
 
 /// Runs every case on forty rigs; `done` is called after each run.
 ///
 /// # Errors
-/// [`StudyError`] if a case makes no controller or a plant fails.
-pub fn run_all(cases: &[Case], done: &(dyn Fn() + Sync)) -> Result<Vec<Experiment>, StudyError> {
+/// If a case makes no controller or a plant fails.
+pub fn run_all(cases: &[Case], done: &(dyn Fn() + Sync)) -> Result<Vec<Experiment>> {
     let pairs: Vec<(Case, u64)> =
         cases.iter().flat_map(|case| (1..=RUNS as u64).map(move |seed| (*case, seed))).collect();
     let runs: Vec<Run> = pairs
@@ -140,7 +116,7 @@ pub fn run_all(cases: &[Case], done: &(dyn Fn() + Sync)) -> Result<Vec<Experimen
             done();
             run
         })
-        .collect::<Result<_, StudyError>>()?;
+        .collect::<Result<_>>()?;
     let by_case = cases.iter().zip(runs.chunks(RUNS));
     Ok(by_case.map(|(case, runs)| Experiment { case: *case, runs: runs.to_vec() }).collect())
 }
@@ -148,8 +124,8 @@ pub fn run_all(cases: &[Case], done: &(dyn Fn() + Sync)) -> Result<Vec<Experimen
 /// One deployment of the rig that `seed` draws.
 ///
 /// # Errors
-/// [`StudyError`] if the case makes no controller or the plant fails.
-pub fn run(case: &Case, seed: u64) -> Result<Run, StudyError> {
+/// If the case makes no controller or the plant fails.
+pub fn run(case: &Case, seed: u64) -> Result<Run> {
     let scenario = case.scenario(seed);
     let options = Options { speed: Some((case.speed_mm_s, true)), ..Options::default() };
     let mut session = Session::new(&scenario, options)?;
@@ -180,25 +156,24 @@ struct Watch {
     measured: Vec<(usize, f64)>,
     /// Measured compression and true preload of every tick.
     ticks: Vec<(f32, f32)>,
-    gauge: CollisionGauge,
+    /// Rolling resistance over radial force on the continuous wall.
+    resistance: f64,
     arms: Arms,
     arm: Modal,
     moving_since: Option<f64>,
-    largest_um: f64,
 }
 
 impl Watch {
-    fn new(case: &Case, plant: &VirtualRig) -> Result<Self, ReferenceError> {
+    fn new(case: &Case, plant: &VirtualRig) -> Result<Self, BeamError> {
         let arms = Arms::of(case)?;
         Ok(Self {
             run: Run::default(),
             measured: Vec::new(),
             ticks: Vec::new(),
-            gauge: CollisionGauge::new(plant, case.speed_mm_s, case.pressing_n(1)),
+            resistance: resistance(plant, case.speed_mm_s, case.pressing_n(1)),
             arm: arms.modal()?,
             arms,
             moving_since: None,
-            largest_um: 0.0,
         })
     }
 
@@ -206,27 +181,22 @@ impl Watch {
     fn look(&mut self, moves: bool, compression_mm: f64, plant: &VirtualRig) {
         let truth = plant.truth();
         self.ticks.push((compression_mm as f32, truth.preload_n as f32));
-        let axial = self.gauge.read_n(plant);
+        let axial = collision_n(plant, self.resistance);
         let level = plant.parameters().wall.local(truth.position_mm).level;
         self.arm.step(self.arms.across_n(level, axial), TICK_S);
-        // The plant's own vibration is that of the torque ripple.
-        let deflection_um = 1e6 * self.arm.deflection_m() + 1e3 * truth.vibration_mm;
-        self.largest_um = self.largest_um.max(deflection_um.abs());
         if moves {
-            self.run.duration_s = truth.time_s - *self.moving_since.get_or_insert(truth.time_s);
+            self.moving_since.get_or_insert(truth.time_s);
         }
-        let Some(since) = self.moving_since else { return };
-        let due = self.run.log.len() as f64 * LOG_S;
-        if truth.time_s - since >= due - 1e-9 {
-            self.run.log.push(Line {
-                time_s: due,
-                collision_n: axial,
-                impact_kpa: impact_kpa(plant, axial),
-                vibration_um: self.largest_um,
-                separation_mm: truth.separation_mm,
-                clearance_mm: truth.root_clearance_mm,
-            });
-            self.largest_um = 0.0;
+        let now = Instant {
+            time_s: truth.time_s - self.moving_since.unwrap_or(f64::INFINITY),
+            collision_n: axial,
+            impact_kpa: impact_kpa(plant, axial),
+            // The plant's own vibration is that of the torque ripple.
+            arm_um: 1e6 * self.arm.deflection_m() + 1e3 * truth.vibration_mm,
+            clearance_mm: truth.root_clearance_mm,
+        };
+        if self.run.log.push(&now, LOG_S) {
+            self.run.separation_mm = self.run.separation_mm.max(truth.separation_mm);
         }
     }
 
@@ -240,8 +210,6 @@ impl Watch {
             };
             let since = ((crossing.touch_s / TICK_S) as usize).min(tick);
             let preloads = self.ticks[since..=tick].iter().map(|tick| f64::from(tick.1));
-            let (low, high) =
-                preloads.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), n| (a.min(n), b.max(n)));
             // The experimenter knows the drawing, not the rig as built.
             let depth_mm = f64::from(depth);
             self.run.crossings.push(Reading {
@@ -249,7 +217,7 @@ impl Watch {
                 true_gap_mm: crossing.gap_mm,
                 depth_mm,
                 area_mm2: area_of_depth_mm2(case, depth_mm),
-                preload_swing_n: high - low,
+                preload_swing_n: extent(preloads).map_or(0.0, |(low, high)| high - low),
             });
         }
         self.run

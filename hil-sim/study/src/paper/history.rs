@@ -1,34 +1,110 @@
 //! Collision, impact and vibration over the three transitions of a deployment, from all
 //! three sources.
 
-use super::case::Case;
-use super::course::{Arms, Course, Points};
-use super::experiment::{Experiment, Line, STAGES, groups};
+use anyhow::Result;
+
+use super::case::{Arms, Case};
+use super::experiment::{Experiment, STAGES, groups};
 use super::published::LOG_S;
 use super::{simulation, theory};
-use crate::figure::{Panel, Series, Source};
-use crate::reference::ReferenceError;
+use crate::figure::{Panel, SOURCES, Series, Source};
 
-/// Points of theory and simulation of which one is shown.
+/// Interval of theory and simulation, s.
+pub const INTERVAL_S: f64 = 0.01;
+
+/// One of this many points of theory and simulation is shown.
 const SHOWN_OF: usize = 8;
 
-/// Way over which its patch does, mm.
+/// Travel over which the contact patch leaves an edge, mm.
 const LEAVES_MM: f64 = 8.0;
 
-/// Way of a deployment before the first corner is touched, mm.
+/// Travel of a deployment before the first corner is touched, mm.
 const BEFORE_MM: f64 = 3.0;
 
-/// Way behind a step within which the wheel has left its edge, mm.
+/// Travel behind a step within which the wheel has left its edge, mm.
 const LEFT_MM: f64 = 2.0;
 
-/// What is followed.
+/// Points: time, s, and value.
+pub type Points = Vec<(f64, f64)>;
+
+/// The state of a deployment.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Instant {
+    /// Time since the motion began, s.
+    pub time_s: f64,
+    /// Collision force, N.
+    pub collision_n: f64,
+    /// Impact stress, kPa.
+    pub impact_kpa: f64,
+    /// Deflection of the arm at the wheel, um.
+    pub arm_um: f64,
+    /// Clearance of the undeformed wheel from the root of the step ahead, mm; none
+    /// farther than a radius from it.
+    pub clearance_mm: Option<f64>,
+}
+
+/// A deployment, one point an interval: collision and impact at its time, of the arm's
+/// deflection the largest in the interval before.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct History {
+    /// Axial force of the contact beyond rolling resistance, N.
+    pub collision: Points,
+    /// That force over the surface that the step cuts off, at the hub, kPa.
+    pub impact: Points,
+    /// Deflection of the arm, um.
+    pub vibration: Points,
+    /// Clearance at the step ahead, mm; not a number where there is none.
+    pub clearance: Points,
+    largest_um: f64,
+}
+
+impl History {
+    /// Takes an instant not before the last; whether it makes a point.
+    pub fn push(&mut self, now: &Instant, interval_s: f64) -> bool {
+        self.largest_um = self.largest_um.max(now.arm_um.abs());
+        let due_s = self.collision.len() as f64 * interval_s;
+        if now.time_s < due_s - 1e-9 {
+            return false;
+        }
+        self.collision.push((now.time_s, now.collision_n));
+        self.impact.push((now.time_s, now.impact_kpa));
+        self.vibration.push((now.time_s, self.largest_um));
+        self.clearance.push((now.time_s, now.clearance_mm.unwrap_or(f64::NAN)));
+        self.largest_um = 0.0;
+        true
+    }
+
+    /// The mean of the first `lines` of some logs.
+    fn mean(logs: &[&Self], lines: usize) -> Self {
+        let mean = |of: fn(&Self) -> &Points| {
+            let sum = |line: usize| logs.iter().map(|log| of(log)[line].1).sum::<f64>();
+            let point = |line| (line as f64 * LOG_S, sum(line) / logs.len() as f64);
+            (0..lines).map(point).collect()
+        };
+        Self {
+            collision: mean(|log| &log.collision),
+            impact: mean(|log| &log.impact),
+            vibration: mean(|log| &log.vibration),
+            clearance: mean(|log| &log.clearance),
+            largest_um: 0.0,
+        }
+    }
+
+    /// Clearance at the first step before this time, s, where there is one.
+    fn clearance_until(&self, end_s: f64) -> Points {
+        let shown = |p: &(f64, f64)| p.0 < end_s && p.1.is_finite();
+        self.clearance.iter().copied().filter(shown).collect()
+    }
+}
+
+/// One of the quantities of a [`History`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
-    /// Axial force of the contact beyond rolling resistance, N.
+    /// [`History::collision`].
     Collision,
-    /// That force over the surface that the step cuts off, at the hub, kPa.
+    /// [`History::impact`].
     Impact,
-    /// Deflection of the arm, um.
+    /// [`History::vibration`].
     Vibration,
 }
 
@@ -39,31 +115,11 @@ impl Quantity {
     /// Name and unit.
     #[must_use]
     pub const fn axis(self) -> &'static str {
-        match self {
-            Self::Collision => "collision, N",
-            Self::Impact => "impact, kPa",
-            Self::Vibration => "vibration, µm",
-        }
+        ["collision, N", "impact, kPa", "vibration, µm"][self as usize]
     }
 
-    /// Title of its plot for a case.
-    #[must_use]
-    pub fn title(self, case: &Case) -> String {
-        let letter = ["(a)", "(b)", "(c)"][self.index()];
-        format!("{letter} {}", case.name())
-    }
-
-    /// It in a course.
-    fn of(self, course: &Course) -> &Points {
-        match self {
-            Self::Collision => &course.collision,
-            Self::Impact => &course.impact,
-            Self::Vibration => &course.vibration,
-        }
-    }
-
-    const fn index(self) -> usize {
-        self as usize
+    fn of(self, history: &History) -> &Points {
+        [&history.collision, &history.impact, &history.vibration][self as usize]
     }
 }
 
@@ -72,13 +128,12 @@ impl Quantity {
 pub struct Histories {
     /// The case.
     pub case: Case,
-    /// Of each quantity: reduced model, ring, and four means of the virtual rig.
-    of: [(Points, Points, Vec<Points>); 3],
-    /// Clearance from the root of the first step until the centre passes it: theory and
-    /// simulation.
-    pub clearance: (Points, Points),
-    /// The same from the virtual rig, four means.
-    pub clearance_means: Vec<Points>,
+    /// The reduced model.
+    theory: History,
+    /// The ring.
+    simulation: History,
+    /// Four means of the virtual rig.
+    means: Vec<History>,
     /// When the first step has been passed, s.
     pub first_passed_s: f64,
 }
@@ -87,37 +142,33 @@ impl Histories {
     /// Theory and simulation of the experiment's case, and its four means.
     ///
     /// # Errors
-    /// [`ReferenceError`] if a crossing cannot be computed.
-    pub fn new(experiment: &Experiment) -> Result<Self, ReferenceError> {
+    /// If a crossing cannot be computed.
+    pub fn new(experiment: &Experiment) -> Result<Self> {
         let case = experiment.case;
         let arms = Arms::of(&case)?;
-        let theory = theory::deployment(&case, &arms)?;
-        let simulation = simulation::deployment(&case, &arms)?;
-        let first_passed_s = case.loads.rig().rig.step_positions_mm[0] / case.speed_mm_s;
-        let of = Quantity::ALL.map(|quantity| {
-            let pair = (quantity.of(&theory).clone(), quantity.of(&simulation).clone());
-            (pair.0, pair.1, means(experiment, |line| Some(pick(quantity, line))))
-        });
-        let clearance_means = means(experiment, |line| {
-            line.clearance_mm.filter(|_| line.time_s < first_passed_s - 0.2)
-        });
+        // All means are as long as the shortest log of all runs.
+        let lines = experiment.runs.iter().map(|run| run.log.collision.len()).min().unwrap_or(0);
+        let mean = |group: &Vec<usize>| {
+            let logs: Vec<&History> = group.iter().map(|&rig| &experiment.runs[rig].log).collect();
+            History::mean(&logs, lines)
+        };
         Ok(Self {
             case,
-            of,
-            clearance: (theory.clearance, simulation.clearance),
-            clearance_means,
-            first_passed_s,
+            theory: theory::deployment(&case, &arms)?,
+            simulation: simulation::deployment(&case, &arms)?,
+            means: groups().iter().map(mean).collect(),
+            first_passed_s: case.loads.rig().rig.step_positions_mm[0] / case.speed_mm_s,
         })
     }
 
     /// Values of a quantity from a source; of the experiment the mean of its means.
     #[must_use]
     pub fn points(&self, quantity: Quantity, source: Source) -> Points {
-        let (theory, simulation, means) = &self.of[quantity.index()];
         match source {
-            Source::Theory => theory.clone(),
-            Source::Simulation => simulation.clone(),
+            Source::Theory => quantity.of(&self.theory).clone(),
+            Source::Simulation => quantity.of(&self.simulation).clone(),
             _ => {
+                let means: Vec<&Points> = self.means.iter().map(|m| quantity.of(m)).collect();
                 let count = means.len() as f64;
                 let sum = |i: usize| means.iter().map(|mean| mean[i].1).sum::<f64>();
                 (0..means[0].len()).map(|i| (means[0][i].0, sum(i) / count)).collect()
@@ -135,6 +186,12 @@ impl Histories {
             let within = points.iter().filter(|p| p.0 >= from && p.0 < ends[stage]);
             within.copied().fold((from, 0.0), |most, p| if p.1 > most.1 { p } else { most })
         })
+    }
+
+    /// The largest value of a stage from each source.
+    #[must_use]
+    pub fn stage(&self, quantity: Quantity, stage: usize) -> [f64; 3] {
+        SOURCES.map(|source| self.peaks(quantity, source)[stage].1)
     }
 
     /// Largest value after the third transition, beyond the largest before the first, over
@@ -155,24 +212,41 @@ impl Histories {
 
     /// The quantity as a plot.
     #[must_use]
-    pub fn panel(&self, quantity: Quantity, title: String) -> Panel {
-        let (theory, simulation, means) = &self.of[quantity.index()];
-        let mut panel = Panel::new(title, "time, s", quantity.axis());
-        panel.series.push(Series::new(Source::Theory, thin(theory)));
-        panel.series.push(Series::new(Source::Simulation, thin(simulation)));
-        panel.series.extend(named(means));
-        panel
+    pub fn panel(&self, quantity: Quantity) -> Panel {
+        let title = format!("{} {}", ["(a)", "(b)", "(c)"][quantity as usize], self.case.name());
+        let means = self.means.iter().map(|mean| quantity.of(mean).clone());
+        let theory = Series::new(Source::Theory, thin(quantity.of(&self.theory)));
+        let simulation = Series::new(Source::Simulation, thin(quantity.of(&self.simulation)));
+        let series = [theory, simulation].into_iter().chain(Series::means(means)).collect();
+        Panel::new(title, "time, s", quantity.axis(), series)
+    }
+
+    /// Clearance from the root of the first step until the centre passes it, theory and
+    /// simulation.
+    #[must_use]
+    pub fn clearance(&self) -> [Points; 2] {
+        [&self.theory, &self.simulation].map(|history| history.clearance_until(f64::INFINITY))
     }
 
     /// The clearance at the first step as a plot.
     #[must_use]
-    pub fn clearance_panel(&self, title: String) -> Panel {
-        let mut panel = Panel::new(title, "time, s", "root clearance, mm");
-        panel.series.push(Series::new(Source::Theory, every(&self.clearance.0)));
-        panel.series.push(Series::new(Source::Simulation, every(&self.clearance.1)));
-        panel.series.extend(named(&self.clearance_means));
-        panel
+    pub fn clearance_panel(&self) -> Panel {
+        let title = format!("Clearance at the first step (Fig. 16): {}", self.case.name());
+        let [theory, simulation] =
+            self.clearance().map(|points| points.into_iter().step_by(SHOWN_OF).collect());
+        let means = self.means.iter().map(|m| m.clearance_until(self.first_passed_s - 0.2));
+        let series = [(Source::Theory, theory), (Source::Simulation, simulation)]
+            .map(|(source, points)| Series::new(source, points));
+        let series = series.into_iter().chain(Series::means(means)).collect();
+        Panel::new(title, "time, s", "root clearance, mm", series)
     }
+}
+
+/// All quantities of all cases as plots.
+#[must_use]
+pub fn panels(all: &[Histories]) -> Vec<Panel> {
+    let row = |quantity| all.iter().map(move |one| one.panel(quantity));
+    Quantity::ALL.into_iter().flat_map(row).collect()
 }
 
 /// The largest of every few points, so that no peak is lost, without those that lie
@@ -189,48 +263,11 @@ fn thin(points: &[(f64, f64)]) -> Points {
     (0..shown.len()).filter(|&i| !flat(i)).map(|i| shown[i]).collect()
 }
 
-/// One of every few points.
-fn every(points: &[(f64, f64)]) -> Points {
-    points.iter().copied().step_by(SHOWN_OF).collect()
-}
-
 /// When the wheel has left each of the steps behind, s.
 #[must_use]
 pub fn stage_ends_s(case: &Case) -> [f64; STAGES] {
     let steps = case.loads.rig().rig.step_positions_mm;
     std::array::from_fn(|stage| (steps[stage] + LEFT_MM) / case.speed_mm_s)
-}
-
-fn named(means: &[Points]) -> impl Iterator<Item = Series> {
-    means.iter().enumerate().map(|(index, points)| Series {
-        name: format!("mean {}", index + 1),
-        ..Series::new(Source::Experiment, points.clone())
-    })
-}
-
-fn pick(quantity: Quantity, line: &Line) -> f64 {
-    match quantity {
-        Quantity::Collision => line.collision_n,
-        Quantity::Impact => line.impact_kpa,
-        Quantity::Vibration => line.vibration_um,
-    }
-}
-
-/// The four means of a quantity of the log, as long as every run has it.
-fn means(experiment: &Experiment, pick: impl Fn(&Line) -> Option<f64>) -> Vec<Points> {
-    let runs = &experiment.runs;
-    let lines = runs.iter().map(|run| run.log.len()).min().unwrap_or(0);
-    let mean = |group: &Vec<usize>| {
-        (0..lines)
-            .filter_map(|line| {
-                let values: Option<Vec<f64>> =
-                    group.iter().map(|&rig| pick(&runs[rig].log[line])).collect();
-                let values = values?;
-                Some((line as f64 * LOG_S, values.iter().sum::<f64>() / values.len() as f64))
-            })
-            .collect()
-    };
-    groups().iter().map(mean).collect()
 }
 
 #[cfg(test)]
@@ -246,5 +283,19 @@ mod tests {
         assert!(shown.contains(&(50.0, 10.0)) && shown.len() < 14, "{shown:?}");
         assert_eq!((shown[0].1, shown[shown.len() - 1].1), (0.0, 0.0));
         assert!(shown.windows(2).all(|pair| pair[1].0 > pair[0].0));
+    }
+
+    #[test]
+    fn a_history_is_even_and_keeps_the_arm_s_peaks() {
+        let mut history = History::default();
+        for index in 0..100 {
+            let arm_um = if index == 55 { -9.0 } else { 1.0 };
+            let time_s = f64::from(index) * 1e-3;
+            let now = Instant { time_s, arm_um, collision_n: time_s, ..Instant::default() };
+            assert_eq!(history.push(&now, INTERVAL_S), index % 10 == 0);
+        }
+        assert_eq!(history.vibration.iter().map(|p| p.1).fold(0.0, f64::max), 9.0);
+        assert!((history.collision[7].1 - 0.07).abs() < 1e-9);
+        assert!(history.clearance_until(1.0).is_empty());
     }
 }

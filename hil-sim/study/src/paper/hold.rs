@@ -1,22 +1,21 @@
 //! What the study concludes, on the rig: the gap held at a step by raising the preload,
-//! and what it takes for granted of speed, preload, grip and resonance.
+//! and its assumptions on speed, preload, grip and resonance.
 
+use anyhow::Result;
 use interstage::model::formula::Formula;
 use interstage::rig::Rig;
 use interstage::units::Direction;
 
 use super::case::{Case, Loads};
-use super::course::Points;
 use super::experiment::{Experiment, Reading, marks};
+use super::history::Points;
 use super::published::{CONSTRAINED_HZ, FREE_HZ, LEAST_PRELOAD_N, LEAST_SPEED_MM_S, RIG_PRELOAD_N};
 use super::simulation;
 use super::sweeps::Sweep;
 use super::theory::{self, Drive};
-use super::transitions::SOURCES;
 use crate::figure::{Claim, Figure, Panel, Series, Source};
-use crate::reference::beam::{Ends, Forcing};
+use crate::reference::beam::BeamError;
 use crate::reference::vibration::Arm;
-use crate::reference::{Case as Reference, ReferenceError};
 use hil_sim::plant::balance::{Axial, BalanceError};
 use hil_sim::plant::crossing::{CrossingCase, cross};
 use hil_sim::plant::ring::RingParameters;
@@ -30,7 +29,7 @@ const SPEEDS_MM_S: [f64; 6] = [3.0, 4.0, 5.0, 6.0, 7.0, 8.0];
 /// Two gaps no farther apart than this, relative, are the same.
 const SAME: f64 = 0.01;
 
-/// Elements and stride of crossings that are looked at for their friction alone.
+/// Elements and stride of crossings of which the friction alone counts.
 const COARSE: (usize, f64) = (1440, 0.02);
 
 const INTRODUCED: &str = "Analysis of inter-stage transition state";
@@ -47,7 +46,7 @@ pub struct Hold {
     read: Vec<Vec<f64>>,
     /// Preload below which one wheel cannot lift its share of the study's top load, N.
     least_preload_n: f64,
-    /// Friction that lifting the rig's whole top load takes at cruise preload.
+    /// Friction that lifting the rig's entire top load takes at cruise preload.
     friction_alone: f64,
     /// Amplitude of the arm under 1 N at its first mode, and at the frequency of the torque
     /// ripple at 8 mm/s, um.
@@ -64,8 +63,8 @@ impl Hold {
     /// Theory and simulation, and the experiments on [`Hold::cases`].
     ///
     /// # Errors
-    /// [`ReferenceError`] if a crossing cannot be computed.
-    pub fn new(experiments: &[&Experiment]) -> Result<Self, ReferenceError> {
+    /// If a crossing cannot be computed.
+    pub fn new(experiments: &[&Experiment]) -> Result<Self> {
         let case = |index: usize| Case::new(Loads::Prototype, CASES[index].0, CASES[index].1);
         let simulated = |case: &Case| simulation::lift(case, Drive::Driven, 1).map(|l| l.gap_mm);
         let mut gaps = [[0.0; 3]; 3];
@@ -79,11 +78,11 @@ impl Hold {
             all_read.push(read);
         }
         let formula = Formula::new(&Loads::Prototype.rig());
-        let wedged = case(0).pressing_n(1) - case(0).preload_n;
+        let thrust = case(0).pressing_n(1) - case(0).preload_n;
         let load = Some(case(0).load_n());
         let wanted = formula.gap_mm(Direction::Deploy, CASES[0].0, case(0).pressing_n(1), load);
         let theory = SPEEDS_MM_S
-            .map(|v| (v, formula.force_n(Direction::Deploy, v, wanted, load) - wedged))
+            .map(|v| (v, formula.force_n(Direction::Deploy, v, wanted, load) - thrust))
             .to_vec();
         let target = gaps[1][0];
         let mut simulation = Vec::new();
@@ -107,34 +106,33 @@ impl Hold {
     /// The figure.
     #[must_use]
     pub fn figure(&self) -> Figure {
-        let mut preload =
-            Panel::new("Preload that holds the gap of 5 mm/s, 33.3 N", "speed, mm/s", "preload, N");
-        preload.series.push(Series::new(Source::Theory, self.preload.0.clone()));
-        preload.series.push(Series::new(Source::Simulation, self.preload.1.clone()));
-        let mut gap =
-            Panel::new("Gap without and with more preload", "speed and preload", "gap, mm");
-        gap.categories = CASES.map(|(v, p)| format!("{v} mm/s, {p} N")).to_vec();
-        for (source, gaps) in SOURCES.into_iter().zip(self.gaps).take(2) {
-            let points = gaps.into_iter().enumerate().map(|(i, gap)| (i as f64, gap)).collect();
-            gap.series.push(Series::new(source, points));
-        }
+        let preload = vec![
+            Series::new(Source::Theory, self.preload.0.clone()),
+            Series::new(Source::Simulation, self.preload.1.clone()),
+        ];
         let mut experiment = Series::new(Source::Experiment, Vec::new());
         for (x, read) in self.read.iter().enumerate() {
             marks(x as f64, read, &mut experiment);
         }
-        gap.series.push(experiment);
-        Figure {
-            id: "conclusion",
-            file: "conclusion.svg".into(),
-            title: "The gap held by raising the preload at the step",
-            caption: "The study's conclusion, at rig loads: the preload with which a faster wheel keeps \
-                      the gap of 5 mm/s and 33.3 N. Theory: the reduced model in closed form, as the \
-                      controller uses it. Simulation: the ring, solved for the preload. Experiment: forty runs, mean of the three transitions. The study has no figure of this."
-                .into(),
-            columns: 2,
-            panels: vec![preload, gap],
-            published: Vec::new(),
-        }
+        let numbered = |index: usize| (0_u8..).map(f64::from).zip(self.gaps[index]).collect();
+        let gap = vec![
+            Series::new(Source::Theory, numbered(0)),
+            Series::new(Source::Simulation, numbered(1)),
+            experiment,
+        ];
+        let title = "Preload that holds the gap of 5 mm/s, 33.3 N";
+        let cases = ("speed and preload", CASES.map(|(v, p)| format!("{v} mm/s, {p} N")).to_vec());
+        let panels = vec![
+            Panel::new(title, "speed, mm/s", "preload, N", preload),
+            Panel::of_categories("Gap without and with more preload", cases, "gap, mm", gap),
+        ];
+        let caption = "The study's conclusion, at rig loads: the preload with which a faster wheel \
+                       keeps the gap of 5 mm/s and 33.3 N. Theory: the reduced model in closed \
+                       form, as the controller uses it. Simulation: the ring, solved for the \
+                       preload. Experiment: forty runs, mean of the three transitions. The study \
+                       has no figure of this.";
+        let title = "The gap held by raising the preload at the step";
+        Figure::new("conclusion", title, caption.to_owned(), 2, panels)
     }
 
     /// The claims. `all` are all experiments at rig loads.
@@ -146,17 +144,13 @@ impl Hold {
             |parts: [f64; 3]| parts.map(|part| format!("{:+.2} %", 100.0 * part)).join(", ");
         let at_8 = self.preload.1[SPEEDS_MM_S.len() - 1].1;
         let readings = || all.iter().flat_map(|e| &e.runs).flat_map(|run| &run.crossings);
-        let separation = all
-            .iter()
-            .flat_map(|e| &e.runs)
-            .flat_map(|run| &run.log)
-            .map(|line| line.separation_mm)
-            .fold(0.0, f64::max);
+        let runs = || all.iter().flat_map(|e| &e.runs);
+        let separation = runs().map(|run| run.separation_mm).fold(0.0, f64::max);
         let swings: Vec<f64> = readings().map(|r: &Reading| r.preload_swing_n).collect();
         let swing = swings.iter().sum::<f64>() / swings.len().max(1) as f64;
         let rig = Rig::prototype();
         let unregulated = rig.preload.spring_n_per_mm * rig.rig.step_height_mm;
-        let staged = all.iter().flat_map(|e| &e.runs).all(|run| run.stages.iter().all(|&s| s));
+        let staged = runs().all(|run| run.stages.iter().all(|&s| s));
         let gap = &speed.gap;
         let (low, high) = (gap.simulation[0], gap.simulation[gap.simulation.len() - 1]);
         let (from, to) = (gap.at[0], gap.at[gap.at.len() - 1]);
@@ -207,7 +201,7 @@ impl Hold {
                 "",
             ),
             of(INTRODUCED, "least-preload-100").judged(
-                "Under its top load the drive needs a radial preload of about 100 N (one third of the whole \
+                "Under its top load the drive needs a radial preload of about 100 N (one third of the entire \
                  drive) to work.",
                 (self.least_preload_n / LEAST_PRELOAD_N - 1.0).abs() < 0.2,
                 format!(
@@ -222,7 +216,7 @@ impl Hold {
                 "At a step the drive may slip or retreat.",
                 self.friction_alone > rig.plant.mu,
                 format!(
-                    "One wheel that lifts the rig's whole 20 N at 5 mm/s and 33.3 N between parallel guides \
+                    "One wheel that lifts all of the rig's 20 N at 5 mm/s and 33.3 N between parallel guides \
                      needs a friction of {:.2}; ours has {}.",
                     self.friction_alone, rig.plant.mu
                 ),
@@ -311,18 +305,15 @@ fn least_preload_n() -> Result<f64, BalanceError> {
     Ok(high)
 }
 
-/// Friction that the rig's whole top load takes, without the arm's wedge.
+/// Friction that the rig's entire top load takes, without the thrust through the arm.
 fn friction_alone() -> Result<f64, BalanceError> {
     let rig = Rig::prototype();
     friction(&rig, rig.preload.cruise_n, rig.plant.top_load_n)
 }
 
-/// Amplitude of the arm at the wheel under 1 N at this frequency, um (56).
-fn response_um(hz: f64) -> Result<f64, ReferenceError> {
-    let arm = Arm::of(&Reference::study()[0])?;
-    let at_m = arm.beam.length_m;
-    let forcing = Forcing { at_m, frequency_hz: hz, loss_factor: arm.loss_factor };
-    Ok(1e6 * arm.beam.receptance(Ends::ClampedFree, arm.tip, forcing, at_m)?.norm())
+/// Amplitude of the arm at the wheel under 1 N at this frequency, um.
+fn response_um(hz: f64) -> Result<f64, BeamError> {
+    Ok(1e6 * Arm::of(&Rig::fe())?.receptance_m_per_n(hz)?.norm())
 }
 
 #[cfg(test)]

@@ -4,7 +4,8 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::experiment::{Experiment, Reading, groups};
-use crate::figure::{Series, Source};
+use crate::figure::Series;
+use hil_sim::report::axis::extent;
 
 /// A parabola.
 type Curve = [f64; 3];
@@ -54,13 +55,8 @@ impl Means {
                 .collect();
             of.iter().sum::<f64>() / of.len() as f64
         };
-        let range = at
-            .iter()
-            .map(|&x| {
-                let all = curves.iter().flatten().map(|curve| value(curve, x));
-                all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), y| (a.min(y), b.max(y)))
-            })
-            .collect();
+        let range_at = |&x: &f64| extent(curves.iter().flatten().map(|curve| value(curve, x)));
+        let range = at.iter().filter_map(range_at).collect();
         let curves =
             groups().iter().map(|group| at.iter().map(|&x| mean(group, x)).collect()).collect();
         Self { at, curves, range }
@@ -78,13 +74,8 @@ impl Means {
     /// Largest difference between two of the means at one place.
     #[must_use]
     pub fn spread(&self) -> f64 {
-        let difference = |i: usize| {
-            let all = self.curves.iter().map(|curve| curve[i]);
-            let (low, high) =
-                all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), y| (a.min(y), b.max(y)));
-            high - low
-        };
-        (0..self.at.len()).map(difference).fold(0.0, f64::max)
+        let ranges = (0..self.at.len()).filter_map(|i| extent(self.curves.iter().map(|c| c[i])));
+        ranges.map(|(low, high)| high - low).fold(0.0, f64::max)
     }
 
     /// Rise from the first place to the last, of the mean of means.
@@ -100,7 +91,7 @@ impl Means {
         self.curves.iter().map(|curve| bend(curve)).collect()
     }
 
-    /// Whether every mean goes the same way from each place to the next: up for a
+    /// Whether every mean changes with the same sign from each place to the next: up for a
     /// positive `sense`.
     #[must_use]
     pub fn all_go(&self, sense: f64) -> bool {
@@ -112,14 +103,12 @@ impl Means {
     pub fn series(&self) -> Vec<Series> {
         let band = self.at.iter().zip(&self.range).map(|(&x, &(low, high))| (x, low, high));
         let mut range: Vec<_> = band.collect();
-        let curves = self.curves.iter().enumerate();
-        curves
-            .map(|(index, curve)| Series {
-                source: Source::Experiment,
-                name: format!("mean {}", index + 1),
-                points: self.at.iter().copied().zip(curve.iter().copied()).collect(),
-                range: std::mem::take(&mut range),
-            })
+        let curves = self
+            .curves
+            .iter()
+            .map(|curve| self.at.iter().copied().zip(curve.iter().copied()).collect());
+        Series::means(curves)
+            .map(|one| Series { range: std::mem::take(&mut range), ..one })
             .collect()
     }
 }

@@ -9,47 +9,38 @@
 use hil_sim::plant::rig::VirtualRig;
 use hil_sim::plant::rolling;
 
-/// Way behind an edge, mm, over which the patch leaves it: the next corner is farther.
+/// Distance behind an edge, mm, over which the patch leaves it: the next corner is farther.
 const LEAVES_MM: f64 = 8.0;
 
-/// Watches a plant for the force of its corners.
-#[derive(Clone, Copy, Debug)]
-pub struct CollisionGauge {
-    /// Rolling resistance over radial force on the continuous wall.
-    resistance: f64,
+/// Rolling resistance over radial force of this plant on the continuous wall at this
+/// speed, mm/s, and pressing force, N.
+#[must_use]
+pub fn resistance(plant: &VirtualRig, speed_mm_s: f64, pressing_n: f64) -> f64 {
+    let ring = &plant.parameters().ring;
+    let guess = ring.radius_mm - 0.3;
+    let steady = rolling::solve(ring, speed_mm_s, guess, |c| c.cosine_n - pressing_n);
+    steady.sine_n / steady.cosine_n.max(f64::MIN_POSITIVE)
 }
 
-impl CollisionGauge {
-    /// A gauge for this plant at this speed, mm/s, and pressing force, N, whose rolling
-    /// resistance it takes off.
-    #[must_use]
-    pub fn new(plant: &VirtualRig, speed_mm_s: f64, pressing_n: f64) -> Self {
-        let ring = &plant.parameters().ring;
-        let guess = ring.radius_mm - 0.3;
-        let steady = rolling::solve(ring, speed_mm_s, guess, |c| c.cosine_n - pressing_n);
-        Self { resistance: steady.sine_n / steady.cosine_n.max(f64::MIN_POSITIVE) }
+/// Collision force, N, beyond this [`resistance`], within the inertia of the carriage,
+/// 0.3 N, as long as the wheel grips; 0 where the wheel has not yet touched the step ahead.
+#[must_use]
+pub fn collision_n(plant: &VirtualRig, resistance: f64) -> f64 {
+    let (truth, parameters) = (plant.truth(), plant.parameters());
+    let used = truth.utilisation;
+    let thrust = if used == 0.0 { 0.0 } else { parameters.load_n };
+    let pressing = truth.preload_n + parameters.arm.thrust_ratio(truth.radius_mm) * thrust;
+    let radial = (pressing + used * thrust) / (1.0 + used * used);
+    let axial = used * radial - thrust;
+    let beyond = (axial - resistance * truth.floor_n).max(0.0);
+    let local = parameters.wall.local(truth.position_mm);
+    let (radius, height) = (parameters.ring.radius_mm, truth.height_mm - local.base_mm);
+    if local.behind_mm < LEAVES_MM {
+        return beyond;
     }
-
-    /// Collision force, N, within the inertia of the carriage, 0.3 N, as long as the wheel
-    /// grips; 0 where the wheel has not yet touched the step ahead.
-    #[must_use]
-    pub fn read_n(&self, plant: &VirtualRig) -> f64 {
-        let (truth, parameters) = (plant.truth(), plant.parameters());
-        let used = truth.utilisation;
-        let thrust = if used == 0.0 { 0.0 } else { parameters.load_n };
-        let pressing = truth.preload_n + parameters.arm.thrust_ratio(truth.radius_mm) * thrust;
-        let radial = (pressing + used * thrust) / (1.0 + used * used);
-        let axial = used * radial - thrust;
-        let beyond = (axial - self.resistance * truth.floor_n).max(0.0);
-        let local = parameters.wall.local(truth.position_mm);
-        let (radius, height) = (parameters.ring.radius_mm, truth.height_mm - local.base_mm);
-        if local.behind_mm < LEAVES_MM {
-            return beyond;
-        }
-        // No part of the corner's force is steeper than the end of its arc.
-        let end = ((height - local.rise_mm) / radius).clamp(-1.0, 1.0).acos();
-        beyond.min(truth.corner_n * end.sin())
-    }
+    // No part of the corner's force is steeper than the end of its arc.
+    let end = ((height - local.rise_mm) / radius).clamp(-1.0, 1.0).acos();
+    beyond.min(truth.corner_n * end.sin())
 }
 
 /// Mean stress that this collision force puts on the wheel, kPa (1e-3 N/mm^2): the force
@@ -63,7 +54,7 @@ pub fn impact_kpa(plant: &VirtualRig, collision_n: f64) -> f64 {
     let size = (ring.radius_mm, ring.width_mm);
     let ahead = corner_area_mm2(size, local.ahead_mm, height - local.rise_mm);
     let area = if ahead > 0.0 { ahead } else { corner_area_mm2(size, -local.behind_mm, height) };
-    // Elements of the plant's ring touch whole.
+    // Elements of the plant's ring touch as a whole.
     let element = std::f64::consts::TAU * size.0 * size.1 / ring.elements as f64;
     stress_kpa(collision_n, area.max(element))
 }
@@ -77,9 +68,9 @@ pub fn stress_kpa(force_n: f64, area_mm2: f64) -> f64 {
 /// Part of the undeformed surface of a wheel of this radius and width that face and top
 /// of a step cut off, mm^2.
 ///
-/// Equation: `A = R L (acos(u/R) - asin(d/R))`, d the way to the face, negative once the
+/// Equation: `A = R L (acos(u/R) - asin(d/R))`, d the distance to the face, negative once the
 /// centre has passed it, and u the height of the centre above the top, both mm. Range: 0
-/// where the corner stands ahead of the wheel; the whole patch where it lies behind.
+/// where the corner is ahead of the wheel; the entire patch where it lies behind.
 /// Memory lets the trailing part of the patch go earlier: the true area is smaller.
 #[must_use]
 pub fn corner_area_mm2((radius, width): (f64, f64), ahead_mm: f64, above_mm: f64) -> f64 {
@@ -121,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn the_gauge_reads_what_the_reference_gives() {
+    fn the_measured_force_is_the_one_that_the_reference_gives() {
         let case = Case::new(Loads::Prototype, 8.0, 40.0);
         let run = experiment::run(&case, 0).unwrap();
         let nominal = experiment::Experiment { case, runs: vec![run; 40] };

@@ -1,50 +1,44 @@
 //! What the reference models say: gap, depth and area of the converged ring with memory,
-//! and a whole deployment as ring with inertia, waves in the tread and bending of the arm.
+//! and a deployment as ring with inertia, waves in the tread and bending of the arm.
 
-use super::case::Case;
-use super::course::{Arms, Course, Instant};
+use anyhow::Result;
+
+use super::case::{Arms, Case};
+use super::history::{History, INTERVAL_S, Instant};
 use super::measure::{corner_area_mm2, stress_kpa};
 use super::theory::{Drive, Lift};
 use crate::reference::collision::dynamic;
-use crate::reference::impact::rod::{Face, Rod};
-use crate::reference::impact::rubber::THICKNESS_MM;
-use crate::reference::impact::{Rubber, hub_reflection};
-use crate::reference::{Case as Reference, ReferenceError};
+use crate::reference::impact::Rod;
+use crate::reference::{Case as Reference, Rubber};
 use hil_sim::plant::balance::{Axial, BalanceError};
 use hil_sim::plant::crossing::{CrossingCase, cross};
 use hil_sim::plant::ring::RingParameters;
 
-/// Elements of the ring and axial way of a step, mm, of single crossings: the gap is
+/// Elements of the ring and axial travel of a step, mm, of single crossings: the gap is
 /// within 0.2 % of the converged one.
 const ELEMENTS: usize = 2880;
 const STRIDE_MM: f64 = 0.01;
 
-/// Way before a step at which its crossing begins, mm: touch, and a tenth of a radius.
+/// Distance before a step at which its crossing begins, mm: touch, and a tenth of a radius.
 const BEGINS_MM: f64 = 16.1;
 
 /// Longest time that waves and arm are followed over where nothing happens, s.
 const QUIET_S: f64 = 1e-3;
 
-/// Axial forces of a wheel that crosses from sleeve `level`, and the force that presses
-/// it, N.
-fn loading(case: &Case, drive: Drive, level: usize) -> (Axial, f64) {
-    match drive {
-        Drive::Pushed => (Axial::Pushed, case.preload_n),
-        Drive::Driven => (Axial::Driven(case.load_n()), case.pressing_n(level)),
-    }
-}
-
 /// The ring's crossing from sleeve `level`, at the instant at which the lower wall stops
 /// carrying; the collision is the largest of the crossing.
 ///
 /// The area is the part of the wheel that the step cuts off, as a compression sensor
-/// would have it: elements of the ring enter and leave whole.
+/// would have it: elements of the ring enter and leave as a whole.
 ///
 /// # Errors
 /// [`BalanceError`] if no height of the centre balances the preload.
 pub fn lift(case: &Case, drive: Drive, level: usize) -> Result<Lift, BalanceError> {
     let rig = case.loads.rig();
-    let (axial, preload_n) = loading(case, drive, level);
+    let (axial, preload_n) = match drive {
+        Drive::Pushed => (Axial::Pushed, case.preload_n),
+        Drive::Driven => (Axial::Driven(case.load_n()), case.pressing_n(level)),
+    };
     let ring = RingParameters::of(&rig, ELEMENTS);
     let step = rig.rig.step_height_mm;
     let result = cross(&CrossingCase {
@@ -69,25 +63,24 @@ pub fn lift(case: &Case, drive: Drive, level: usize) -> Result<Lift, BalanceErro
 /// Cells of the tread in which waves run to the hub.
 const CELLS: usize = 4;
 
-/// A whole deployment of the driven wheel by the reference models, a crossing a step: the
+/// A deployment of the driven wheel by the reference models, a crossing a step: the
 /// ring with memory and inertia, the waves that its stress sends through the tread, and the
 /// arm that it bends.
 ///
 /// # Errors
-/// [`ReferenceError`] if an argument is out of range or the preload cannot be carried.
-pub fn deployment(case: &Case, arms: &Arms) -> Result<Course, ReferenceError> {
+/// If the preload cannot be carried or the arm is out of range.
+pub fn deployment(case: &Case, arms: &Arms) -> Result<History> {
     let rig = case.loads.rig();
     let size = (rig.rig.wheel_radius_mm, rig.rig.wheel_width_mm);
     let steps = rig.rig.step_positions_mm.clone();
-    let mut course = Course::default();
+    let mut history = History::default();
     let mut modal = arms.modal()?;
     let mut last_s = 0.0;
     for (level, &step) in steps.iter().enumerate() {
         let reference =
             Reference::new(rig.clone(), case.speed_mm_s, case.pressing_n(level)).driven();
         let crossing = dynamic(&reference)?;
-        let rubber = Rubber::of(&reference)?;
-        let mut rod = Rod::new(rubber, THICKNESS_MM * 1e-3, CELLS, hub_reflection(&rubber))?;
+        let mut rod = Rod::tread(Rubber::of(&reference), CELLS);
         let before = crossing.samples.iter().filter(|sample| sample.t_s < 0.0);
         let (axial, floor) =
             before.fold((0.0, 0.0), |(a, b), sample| (a + sample.axial_n, b + sample.floor_n));
@@ -106,25 +99,26 @@ pub fn deployment(case: &Case, arms: &Arms) -> Result<Course, ReferenceError> {
             let stress = stress_kpa(collision_n, corner_area_mm2(size, -sample.x_mm, top));
             let waves = (dt_s.min(QUIET_S) / rod.step_s()).ceil();
             for _ in 0..waves as usize {
-                rod.step(Face::Pressure(1e3 * stress));
+                rod.step(1e3 * stress);
             }
             modal.step(arms.across_n(level, collision_n), dt_s);
-            course.push(&Instant {
+            let now = Instant {
                 time_s,
                 collision_n,
                 impact_kpa: 1e-3 * rod.hub_pa(),
                 arm_um: 1e6 * modal.deflection_m(),
                 clearance_mm: (level == 0 && sample.x_mm < 0.0).then_some(sample.clearance_mm),
-            });
+            };
+            history.push(&now, INTERVAL_S);
         }
     }
-    // The rest of the way, on the last sleeve.
+    // The rest of the travel, on the last sleeve.
     let end_s = rig.rig.travel_mm / case.speed_mm_s;
     while last_s < end_s {
         last_s += QUIET_S;
         modal.step(0.0, QUIET_S);
         let arm_um = 1e6 * modal.deflection_m();
-        course.push(&Instant { time_s: last_s, arm_um, ..Instant::default() });
+        history.push(&Instant { time_s: last_s, arm_um, ..Instant::default() }, INTERVAL_S);
     }
-    Ok(course)
+    Ok(history)
 }

@@ -93,7 +93,7 @@ pub struct Curves {
     pub experiment: Means,
 }
 
-/// A whole sweep.
+/// A sweep.
 #[derive(Clone, Debug)]
 pub struct Sweep {
     /// What is swept.
@@ -124,7 +124,7 @@ impl Sweep {
             .par_iter()
             .map(|&value| {
                 let case = variable.case(value);
-                // The middle stage stands for the mean of the three: the arm's wedge is
+                // The middle stage represents the mean of the three: the arm's thrust is
                 // nearly linear over them.
                 let simulated = simulation::lift(&case, Drive::Driven, 1)?;
                 Ok((theory::mean_lift(&case, Drive::Driven), simulated))
@@ -170,19 +170,13 @@ impl Sweep {
     /// Figure 22 or 23.
     #[must_use]
     pub fn depth_figure(&self) -> Figure {
-        let (id, title, depth, area) = match self.variable {
-            Variable::Preload => (
-                "fig22",
-                "Embedding depth and contact area against preload",
-                DEPTH_SPREAD_MM.0,
-                AREA_SPREAD_MM2.0,
-            ),
-            Variable::Speed => (
-                "fig23",
-                "Embedding depth and contact area against speed",
-                DEPTH_SPREAD_MM.1,
-                AREA_SPREAD_MM2.1,
-            ),
+        let (preload, speed) = (
+            ("fig22", "Embedding depth and contact area against preload"),
+            ("fig23", "Embedding depth and contact area against speed"),
+        );
+        let ((id, title), depth, area) = match self.variable {
+            Variable::Preload => (preload, DEPTH_SPREAD_MM.0, AREA_SPREAD_MM2.0),
+            Variable::Speed => (speed, DEPTH_SPREAD_MM.1, AREA_SPREAD_MM2.1),
         };
         let panels = vec![
             self.panel("(a) Embedding depth", "depth, mm", &self.depth),
@@ -206,7 +200,7 @@ impl Sweep {
     ) -> Figure {
         let caption = format!(
             "At rig loads, {}, torque-driven against a third of the 20 N on top, with the arm \
-             that wedges the wheel into the wall. Theory: reduced model, closed form. \
+             that presses the wheel into the wall. Theory: reduced model, closed form. \
              Simulation: the converged ring with memory. Experiment: forty rigs within their \
              tolerances, each value as its sensors give it, mean of the three transitions of \
              a deployment, a parabola fitted to each rig's readings, four means of ten. The \
@@ -214,39 +208,35 @@ impl Sweep {
              means, by which the two marks are apart.",
             self.variable.fixed()
         );
-        Figure { id, file: format!("{id}.svg"), title, caption, columns: 2, panels, published }
+        Figure { published, ..Figure::new(id, title, caption, 2, panels) }
     }
 
     fn panel(&self, title: &str, y: &str, curves: &Curves) -> Panel {
         let pairs =
             |values: &[f64]| curves.at.iter().copied().zip(values.iter().copied()).collect();
-        let mut panel =
-            Panel::new(format!("{title}, {}", self.variable.fixed()), self.variable.axis(), y);
-        panel.series.push(Series::new(Source::Theory, pairs(&curves.theory)));
-        panel.series.push(Series::new(Source::Simulation, pairs(&curves.simulation)));
-        panel.series.extend(curves.experiment.series());
-        panel
+        let mut series = vec![
+            Series::new(Source::Theory, pairs(&curves.theory)),
+            Series::new(Source::Simulation, pairs(&curves.simulation)),
+        ];
+        series.extend(curves.experiment.series());
+        let title = format!("{title}, {}", self.variable.fixed());
+        Panel::new(title, self.variable.axis(), y, series)
     }
 
     /// The means alone, about their middle, between two marks that are as far apart as the
     /// published means are at most.
     fn differences(&self, what: &str, unit: &str, published: f64, curves: &Curves) -> Panel {
-        let mut panel = Panel::new(
-            format!("Differences between the means of the {what}"),
-            self.variable.axis(),
-            &format!("off the mean, {unit}"),
-        );
         let middle = curves.experiment.middle();
-        for mut series in curves.experiment.series() {
-            let off = |(point, middle): ((f64, f64), &f64)| (point.0, point.1 - middle);
-            series.points = series.points.into_iter().zip(&middle).map(off).collect();
+        let mut all = curves.experiment.series();
+        for series in &mut all {
+            series.points.iter_mut().zip(&middle).for_each(|(point, middle)| point.1 -= middle);
             series.range.clear();
-            panel.series.push(series);
         }
         let x = 0.5 * (curves.at[0] + curves.at[GRID - 1]);
         let half = 0.5 * published;
-        panel.series.push(Series::new(Source::Published, vec![(x, -half), (x, half)]));
-        panel
+        all.push(Series::new(Source::Published, vec![(x, -half), (x, half)]));
+        let title = format!("Differences between the means of the {what}");
+        Panel::new(title, self.variable.axis(), &format!("off the mean, {unit}"), all)
     }
 }
 

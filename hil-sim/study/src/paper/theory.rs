@@ -5,8 +5,8 @@
 use interstage::model::formula::Formula;
 use interstage::units::Direction;
 
-use super::case::Case;
-use super::course::{Arms, Course, Instant};
+use super::case::{Arms, Case};
+use super::history::{History, INTERVAL_S, Instant};
 use super::measure::{corner_area_mm2, stress_kpa};
 use hil_sim::plant::balance::{Axial, Balance, BalanceError};
 use hil_sim::plant::ring::{Motion, Ring, RingParameters};
@@ -18,7 +18,7 @@ use hil_sim::plant::wall::{Step, Wall};
 pub enum Drive {
     /// Pushed at its axle over a frictionless wall.
     Pushed,
-    /// Driven by torque, with the arm that wedges it into the wall.
+    /// Driven by torque, with the arm that presses it into the wall.
     Driven,
 }
 
@@ -89,15 +89,15 @@ pub fn area_of_depth_mm2(case: &Case, depth_mm: f64) -> f64 {
     corner_area_mm2((formula.radius_mm, formula.width_mm), ahead, above)
 }
 
-/// Elements of the elastic ring of a whole deployment and its axial way per step, mm.
+/// Elements of the elastic ring of a deployment and its axial travel per step, mm.
 const COARSE: (usize, f64) = (1440, 0.02);
 
-/// A whole deployment of the driven wheel as the reduced model has it: an elastic ring of the
-/// stiffness that is effective at lift-off, and an arm that bends as under a still force.
+/// A deployment of the driven wheel as the reduced model has it: an elastic ring of the
+/// stiffness that is effective at lift-off, and an arm that bends as under a static force.
 ///
 /// # Errors
 /// [`BalanceError`] if no height of the centre balances the preload.
-pub fn deployment(case: &Case, arms: &Arms) -> Result<Course, BalanceError> {
+pub fn deployment(case: &Case, arms: &Arms) -> Result<History, BalanceError> {
     let rig = case.loads.rig();
     let formula = Formula::new(&rig);
     let gap = mean_lift(case, Drive::Driven).gap_mm;
@@ -112,7 +112,7 @@ pub fn deployment(case: &Case, arms: &Arms) -> Result<Course, BalanceError> {
     let (dt_s, turn_rad) = (stride / case.speed_mm_s, stride / radius);
     let mut height = radius - 0.01;
     let mut base = 0.0;
-    let mut course = Course::default();
+    let mut history = History::default();
     for index in 0..(rig.rig.travel_mm / stride) as usize {
         let x = (index + 1) as f64 * stride;
         let local = wall.local(x);
@@ -134,16 +134,17 @@ pub fn deployment(case: &Case, arms: &Arms) -> Result<Course, BalanceError> {
         let ahead = corner_area_mm2(size, local.ahead_mm, height - local.rise_mm);
         let area =
             if ahead > 0.0 { ahead } else { corner_area_mm2(size, -local.behind_mm, height) };
-        course.push(&Instant {
+        let now = Instant {
             time_s: x / case.speed_mm_s,
             collision_n,
             impact_kpa: stress_kpa(collision_n, area),
-            arm_um: 1e3 * arms.still_mm(local.level, collision_n),
+            arm_um: 1e3 * arms.static_mm(local.level, collision_n),
             clearance_mm: (local.ahead_mm < radius && local.level == 0)
                 .then(|| local.ahead_mm.hypot(height) - radius),
-        });
+        };
+        history.push(&now, INTERVAL_S);
     }
-    Ok(course)
+    Ok(history)
 }
 
 #[cfg(test)]

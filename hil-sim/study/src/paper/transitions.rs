@@ -2,23 +2,20 @@
 
 use super::case::{Case, Loads};
 use super::experiment::STAGES;
-use super::history::{Histories, Quantity};
-use crate::figure::{Claim, Figure, Source};
+use super::history::{Histories, Quantity, panels};
+use crate::figure::{Claim, Figure, SOURCES, Source};
 
 /// Cases: the study's four at a third of their preload, which spans the 33 to 40 N that
 /// it names. Its own table of them is not published.
 pub const CASES: [(f64, f64); 4] = [(5.0, 33.3), (5.0, 40.0), (8.0, 33.3), (3.0, 40.0)];
-
-/// All three sources.
-pub const SOURCES: [Source; 3] = [Source::Theory, Source::Simulation, Source::Experiment];
 
 const SECTION: &str = "Analysis and discussion of test results";
 
 /// Time of the first collision in the study, s.
 const FIRST_BEFORE_S: f64 = 2.0;
 
-/// Time that the study's figure allows for a peak "at 2 s", s: its log's interval either
-/// way.
+/// Time that the study's figure allows for a peak "at 2 s", s: plus or minus its log's
+/// interval.
 const AT_2_S: (f64, f64) = (1.9, 2.1);
 
 /// The cases of the figure.
@@ -30,9 +27,6 @@ pub fn cases() -> Vec<Case> {
 /// The figure.
 #[must_use]
 pub fn figure(all: &[Histories]) -> Figure {
-    let panels = Quantity::ALL.into_iter().flat_map(|quantity| {
-        all.iter().map(move |one| one.panel(quantity, quantity.title(&one.case)))
-    });
     let caption = "Three transitions at rig loads (20 N on top, of which this wheel lifts a \
                    third). (a) Collision: axial force of the contact against the motion, beyond \
                    rolling resistance. (b) Impact: that force over the part of the wheel that the \
@@ -47,15 +41,8 @@ pub fn figure(all: &[Histories]) -> Figure {
                    study; its own table of cases is not published, and no value of its curves is \
                    printed."
         .to_owned();
-    Figure {
-        id: "fig24",
-        file: "fig24.svg".into(),
-        title: "Collision, impact and vibration over the three transitions",
-        caption,
-        columns: CASES.len(),
-        panels: panels.collect(),
-        published: Vec::new(),
-    }
+    let title = "Collision, impact and vibration over the three transitions";
+    Figure::new("fig24", title, caption, CASES.len(), panels(all))
 }
 
 /// The peaks of the stages as text.
@@ -76,43 +63,32 @@ pub(super) fn fall(one: &Histories, quantity: Quantity) -> bool {
     })
 }
 
-fn case(all: &[Histories], speed: f64, preload: f64) -> &Histories {
-    let found = |one: &&Histories| one.case.speed_mm_s == speed && one.case.preload_n == preload;
-    all.iter().find(found).unwrap_or(&all[0])
-}
-
-/// The claims about it.
+/// The claims about it; `all` in the order of [`CASES`].
 #[must_use]
 pub fn claims(all: &[Histories]) -> Vec<Claim> {
     let of = |id| Claim::of("fig24", SECTION, id);
     let shapes = Quantity::ALL.map(|quantity| {
         all.iter().map(|one| likeness(one, quantity)).fold(f64::INFINITY, f64::min)
     });
-    let fast = case(all, 8.0, 33.3);
+    let fast = &all[2];
     let first = |quantity| SOURCES.map(|source| fast.peaks(quantity, source)[0].0);
     let falls = |quantity| all.iter().all(|one| fall(one, quantity));
     let texts = |quantity: Quantity| {
         let all: Vec<String> = all.iter().map(|one| peaks_text(one, quantity)).collect();
         format!(
             "By stage, {} (theory; simulation; experiment). {}. Of what makes the stages differ there is \
-             the inclination of the arm alone: its wedge falls by a few per cent from sleeve to sleeve.",
+             the inclination of the arm alone: its thrust on the wheel falls by a few per cent from sleeve to sleeve.",
             quantity.axis(),
             all.join(". ")
         )
     };
     let left = SOURCES.map(|source| {
-        let over = |one: &Histories| {
-            Quantity::ALL
-                .map(|quantity| one.left_over(quantity, source))
-                .into_iter()
-                .fold(0.0, f64::max)
-        };
-        all.iter().map(over).fold(0.0, f64::max)
+        let over = |one: &Histories| Quantity::ALL.map(|quantity| one.left_over(quantity, source));
+        all.iter().flat_map(over).fold(0.0, f64::max)
     });
     let [collided, hit, shaken] = Quantity::ALL.map(first);
     let seconds = |times: [f64; 3]| times.map(|t| format!("{t:.2}")).join(", ");
-    let twice = Quantity::Vibration;
-    let humps = SOURCES.map(|source| humps(fast, twice, source));
+    let humps = SOURCES.map(|source| humps(fast, Quantity::Vibration, source));
     let faster = all_pairs(all, |a, b| a.preload_n == b.preload_n && a.speed_mm_s < b.speed_mm_s);
     let pressed = all_pairs(all, |a, b| a.speed_mm_s == b.speed_mm_s && a.preload_n < b.preload_n);
     vec![
@@ -221,28 +197,22 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
 type Pair<'a> = (&'a Histories, &'a Histories);
 
 fn all_pairs(all: &[Histories], related: impl Fn(&Case, &Case) -> bool) -> Vec<Pair<'_>> {
-    let firsts = all.iter();
-    firsts
-        .flat_map(|a| all.iter().map(move |b| (a, b)))
-        .filter(|(a, b)| related(&a.case, &b.case))
-        .collect()
+    let pairs = all.iter().flat_map(|a| all.iter().map(move |b| (a, b)));
+    pairs.filter(|(a, b)| related(&a.case, &b.case)).collect()
 }
 
 /// Whether the first peak rises (falls) from one case to another in every source.
 pub(super) fn first_rises(a: &Histories, b: &Histories, quantity: Quantity, sense: f64) -> bool {
-    SOURCES.into_iter().all(|source| {
-        let first = |one: &Histories| one.peaks(quantity, source)[0].1;
-        sense * (first(b) - first(a)) > 0.0
-    })
+    let firsts = a.stage(quantity, 0).into_iter().zip(b.stage(quantity, 0));
+    firsts.into_iter().all(|(a, b)| sense * (b - a) > 0.0)
 }
 
 fn pairs_text(pairs: &[Pair]) -> String {
     let text = |(a, b): &Pair| {
-        let change = |source| {
-            let first = |one: &Histories| one.peaks(Quantity::Collision, source)[0].1;
-            format!("{:.1} to {:.1} N", first(a), first(b))
-        };
-        format!("{} to {}: {}", a.case.name(), b.case.name(), SOURCES.map(change).join(", "))
+        let [first_a, first_b] = [a, b].map(|one| one.stage(Quantity::Collision, 0));
+        let change = |(a, b)| format!("{a:.1} to {b:.1} N");
+        let changes: Vec<String> = first_a.into_iter().zip(first_b).map(change).collect();
+        format!("{} to {}: {}", a.case.name(), b.case.name(), changes.join(", "))
     };
     let all: Vec<String> = pairs.iter().map(text).collect();
     format!("{} (theory, simulation, experiment).", all.join("; "))
@@ -250,29 +220,27 @@ fn pairs_text(pairs: &[Pair]) -> String {
 
 /// Whether the highest peak is that of the first stage, in every source.
 fn highest_first(one: &Histories, quantity: Quantity) -> bool {
-    SOURCES.into_iter().all(|source| {
-        let peaks = one.peaks(quantity, source);
-        (1..STAGES).all(|stage| peaks[stage].1 <= peaks[0].1)
-    })
+    let first = one.stage(quantity, 0);
+    (1..STAGES)
+        .all(|n| one.stage(quantity, n).iter().zip(first).all(|(peak, first)| *peak <= first))
 }
 
-/// Local maxima of the first transition that stand out of both neighbouring minima by a
+/// Local maxima of the first transition that exceed both neighbouring minima by a
 /// twentieth of its peak.
 fn humps(one: &Histories, quantity: Quantity, source: Source) -> usize {
     let until = one.first_passed_s + 0.25;
     let points = one.points(quantity, source);
-    let values: Vec<f64> = points.iter().take_while(|p| p.0 <= until).map(|p| p.1).collect();
-    count_humps(&values, 0.05)
+    count_humps(points.iter().take_while(|p| p.0 <= until).map(|p| p.1), 0.05)
 }
 
-/// Local maxima that stand out of what is before and after them by this part of the
-/// largest value.
-pub(super) fn count_humps(values: &[f64], part: f64) -> usize {
-    let least = part * values.iter().copied().fold(0.0, f64::max);
-    let first = values.first().copied().unwrap_or(0.0);
+/// Local maxima that exceed the minima before and after them by this part of the largest
+/// value.
+pub(super) fn count_humps(values: impl Iterator<Item = f64> + Clone, part: f64) -> usize {
+    let least = part * values.clone().fold(0.0, f64::max);
+    let first = values.clone().next().unwrap_or(0.0);
     // The valley before, and the extreme since.
     let (mut valley, mut extreme, mut rising, mut count) = (first, first, true, 0);
-    for &value in values {
+    for value in values {
         extreme = if rising { f64::max(extreme, value) } else { f64::min(extreme, value) };
         if (value - extreme).abs() <= least {
             continue;
@@ -338,11 +306,15 @@ mod tests {
 
     #[test]
     fn humps_are_counted() {
-        assert_eq!(count_humps(&[0.0, 1.0, 3.0, 2.0, 1.0, 0.0], 0.05), 1);
-        assert_eq!(count_humps(&[0.0, 3.0, 1.0, 3.0, 0.0], 0.05), 2);
-        assert_eq!(count_humps(&[0.0, 3.0, 2.99, 3.0, 0.0], 0.05), 1);
-        assert_eq!(count_humps(&[0.0, 0.0, 0.0], 0.05), 0);
-        assert_eq!(count_humps(&[5.0, 3.0, 1.0, 4.0, 0.0], 0.05), 1);
+        for (values, count) in [
+            ([0.0, 1.0, 3.0, 2.0, 1.0], 1),
+            ([0.0, 3.0, 1.0, 3.0, 0.0], 2),
+            ([0.0, 3.0, 2.99, 3.0, 0.0], 1),
+            ([0.0, 0.0, 0.0, 0.0, 0.0], 0),
+            ([5.0, 3.0, 1.0, 4.0, 0.0], 1),
+        ] {
+            assert_eq!(count_humps([values.as_slice(), &[0.0]].concat().into_iter(), 0.05), count);
+        }
     }
 
     #[test]

@@ -1,5 +1,5 @@
 //! The drive arm by the wave-vector method: natural frequencies here, their [`Shape`]s
-//! (55), the forced response ([`Forcing`], 56).
+//! (55) beside them.
 //!
 //! An Euler-Bernoulli beam with end A at the pillar and end B at the wheel; end B may
 //! carry a mass and press on a spring to ground (the contact). A wave that runs from A
@@ -9,7 +9,6 @@
 //! times as long as it is thick the frequencies come out somewhat high, the more so
 //! the higher the mode.
 
-mod forced;
 mod roots;
 mod shapes;
 pub mod waves;
@@ -18,15 +17,12 @@ pub mod waves;
 mod tests;
 
 use std::f64::consts::PI;
-use std::fmt;
-use std::str::FromStr;
 
 use interstage::rig::Rig;
-use thiserror::Error;
+use serde::Serialize;
 
 use waves::{End, Load, frequency_function};
 
-pub use forced::Forcing;
 pub use shapes::Shape;
 
 /// Most modes that may be asked for.
@@ -39,26 +35,21 @@ pub const MAX_MASS_RATIO: f64 = 1e6;
 /// sink into rounding, stiffer ones are pins.
 pub const SPRING_RATIOS: (f64, f64) = (1e-6, 1e12);
 
-/// What cannot be computed, and what was expected instead.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum BeamError {
-    /// An argument outside its range.
-    #[error("{argument} is {value}, expected {expected}")]
-    OutOfRange {
-        /// Name of the argument.
-        argument: &'static str,
-        /// What was given, in the unit of the argument's name.
-        value: f64,
-        /// What it should have been.
-        expected: String,
-    },
-    /// A name of no [`Ends`].
-    #[error("ends is `{0}`, expected clamped-free, pinned-free or free-free")]
-    UnknownEnds(String),
+/// An argument outside its range.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{argument} is {value}, expected {expected}")]
+pub struct BeamError {
+    /// Name of the argument.
+    pub argument: &'static str,
+    /// What was given, in the unit of the argument's name.
+    pub value: f64,
+    /// What it should have been.
+    pub expected: String,
 }
 
 /// How the beam is held: end A, then end B before any [`Tip`] is put on it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
 pub enum Ends {
     /// Held fast at the pillar.
     ClampedFree,
@@ -69,19 +60,6 @@ pub enum Ends {
 }
 
 impl Ends {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::ClampedFree, Self::PinnedFree, Self::FreeFree];
-
-    /// The name, as [`FromStr`] reads it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::ClampedFree => "clamped-free",
-            Self::PinnedFree => "pinned-free",
-            Self::FreeFree => "free-free",
-        }
-    }
-
     /// End A alone.
     fn end_a(self) -> End {
         match self {
@@ -89,21 +67,6 @@ impl Ends {
             Self::PinnedFree => End::Pinned,
             Self::FreeFree => End::Free,
         }
-    }
-}
-
-impl fmt::Display for Ends {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl FromStr for Ends {
-    type Err = BeamError;
-
-    fn from_str(s: &str) -> Result<Self, BeamError> {
-        let named = Self::ALL.into_iter().find(|ends| ends.name() == s);
-        named.ok_or_else(|| BeamError::UnknownEnds(s.to_owned()))
     }
 }
 
@@ -146,8 +109,7 @@ impl Beam {
     ///
     /// Published: length, section 12 x 15 mm, alloy 2A12 (density 2780 kg/m^3, modulus
     /// 70 to 73 GPa by the source; 72.5 taken). Not published: which side of the
-    /// section lies in that plane. Chosen: the 15 mm one, as one would mount it;
-    /// [`Self::turned`] is the other reading.
+    /// section lies in that plane. Chosen: the 15 mm one, as one would mount it.
     #[must_use]
     pub fn drive_arm() -> Self {
         Self {
@@ -157,13 +119,6 @@ impl Beam {
             width_m: 0.012,
             height_m: 0.015,
         }
-    }
-
-    /// The same beam turned by a right angle about its length: width and height change
-    /// places.
-    #[must_use]
-    pub fn turned(self) -> Self {
-        Self { width_m: self.height_m, height_m: self.width_m, ..self }
     }
 
     /// Mass of the beam, kg.
@@ -178,8 +133,8 @@ impl Beam {
         self.e_pa * self.width_m * self.height_m.powi(3) / 12.0
     }
 
-    /// The first `count` natural modes, ascending; motion of the whole beam at zero
-    /// frequency is left out.
+    /// The first `count` natural modes, ascending; rigid motion at zero frequency is
+    /// left out.
     ///
     /// Equation: `det(R_A f R_B f - I) = 0` (54) with R_B from
     /// [`Load::mass_and_spring`]; `frequency = beta_l^2 / (2 pi L^2) sqrt(EI / rho A)`
@@ -192,9 +147,8 @@ impl Beam {
     /// Natural Frequency and Mode Shape", table 8-1.
     ///
     /// # Errors
-    /// [`BeamError::OutOfRange`] names the argument that is not in its range.
+    /// [`BeamError`] names the argument that is not in its range.
     pub fn modes(&self, ends: Ends, tip: Tip, count: usize) -> Result<Vec<Mode>, BeamError> {
-        self.check()?;
         let (mass, spring) = self.ratios(tip)?;
         require("count", count as f64, (1..=MAX_COUNT).contains(&count), || {
             format!("1 to {MAX_COUNT} modes")
@@ -213,14 +167,12 @@ impl Beam {
     /// [`MAX_MASS_RATIO`] beam masses.
     ///
     /// The published first constrained mode of the rig, 276 Hz, takes 62.9 g on
-    /// [`Self::drive_arm`] (bare: 588.5 Hz) and 34.0 g on its [`Self::turned`] reading
-    /// (470.8 Hz). That is an equivalent mass, not a weighed one: it stands for wheel
-    /// and axle, and for whatever yields in the clamp.
+    /// [`Self::drive_arm`] (bare: 588.5 Hz). That is an equivalent mass, not a weighed one:
+    /// it represents wheel and axle, and whatever yields in the clamp.
     ///
     /// # Errors
-    /// [`BeamError::OutOfRange`] if no mass in range gives that frequency.
+    /// [`BeamError`] if no mass in range gives that frequency.
     pub fn tip_mass_for(&self, frequency_hz: f64) -> Result<f64, BeamError> {
-        self.check()?;
         let first = |mass| self.mode(roots::first(End::Clamped, mass, 0.0, 1)[0]).frequency_hz;
         let (bare_hz, least_hz) = (first(0.0), first(MAX_MASS_RATIO));
         let in_range = (least_hz..=bare_hz).contains(&frequency_hz);
@@ -244,21 +196,6 @@ impl Beam {
         let per_length = self.mass_kg() / self.length_m;
         let celerity = (self.bending_stiffness_n_m2() / per_length).sqrt();
         celerity / (2.0 * PI * self.length_m.powi(2))
-    }
-
-    /// Every dimension and property is a positive number.
-    fn check(&self) -> Result<(), BeamError> {
-        for (argument, value) in [
-            ("length_m", self.length_m),
-            ("e_pa", self.e_pa),
-            ("rho_kg_m3", self.rho_kg_m3),
-            ("width_m", self.width_m),
-            ("height_m", self.height_m),
-        ] {
-            let ok = value.is_finite() && value > 0.0;
-            require(argument, value, ok, || "a finite number above 0".to_owned())?;
-        }
-        Ok(())
     }
 
     /// Tip mass in beam masses and tip spring in `EI / L^3`.
@@ -285,5 +222,5 @@ fn require(
     ok: bool,
     expected: impl FnOnce() -> String,
 ) -> Result<(), BeamError> {
-    if ok { Ok(()) } else { Err(BeamError::OutOfRange { argument, value, expected: expected() }) }
+    if ok { Ok(()) } else { Err(BeamError { argument, value, expected: expected() }) }
 }

@@ -7,18 +7,6 @@ use crate::paper::published::{AREA_SPREAD_MM2, DEPTH_SPREAD_MM, GAP_SPREAD_MM};
 
 const SECTION: &str = "Analysis and discussion of test results";
 
-/// The tolerances that would be needed for a published spread, as a sentence.
-fn narrower(published: f64, ours: f64, unit: &str) -> String {
-    format!(
-        "Ours is {:.0} % of the published one: between means of ten, {published} {unit} takes \
-         single runs {:.1} times as far apart as the tolerances of the virtual rig make them. \
-         These are chosen, not published; wear within a series of runs, which the study \
-         names as a source, is not modelled as a drift.",
-        100.0 * ours / published,
-        published / ours
-    )
-}
-
 /// Whether a spread is the published one within a factor of two.
 fn alike(published: f64, ours: f64) -> bool {
     (0.5..=2.0).contains(&(ours / published))
@@ -36,7 +24,7 @@ fn ends(curves: &Curves, decimals: usize, unit: &str) -> String {
     )
 }
 
-/// Whether theory and simulation, and all four means, go the same way throughout.
+/// Whether theory and simulation, and all four means, change with one sign throughout.
 fn all_go(curves: &Curves, sense: f64) -> bool {
     let goes = |values: &[f64]| values.windows(2).all(|w| sense * (w[1] - w[0]) > 0.0);
     goes(&curves.theory) && goes(&curves.simulation) && curves.experiment.all_go(sense)
@@ -47,7 +35,7 @@ fn bends(curves: &Curves) -> [f64; 3] {
     [&curves.theory, &curves.simulation, &curves.experiment.middle()].map(|values| bend(values))
 }
 
-/// Whether theory, simulation and all four means bend the same way off a straight line.
+/// Whether theory, simulation and all four means bend to the same side of a straight line.
 fn nonlinear(curves: &Curves) -> bool {
     let [theory, simulation, _] = bends(curves);
     let means = curves.experiment.bends();
@@ -62,16 +50,33 @@ fn bent(curves: &Curves) -> String {
     )
 }
 
+/// A claim about the largest difference between the four means.
+fn spread(
+    of: Claim,
+    claim: &'static str,
+    published: f64,
+    ours: f64,
+    (unit, decimals): (&str, usize),
+) -> Claim {
+    // The tolerances that would be needed for the published one.
+    let narrower = format!(
+        "Ours is {:.0} % of the published one: between means of ten, {published} {unit} takes \
+         single runs {:.1} times as far apart as the tolerances of the virtual rig make them. \
+         These are chosen, not published; wear within a series of runs, which the study \
+         names as a source, is not modelled as a drift.",
+        100.0 * ours / published,
+        published / ours
+    );
+    of.judged(claim, alike(published, ours), format!("{ours:.decimals$} {unit}."), &narrower)
+}
+
 /// Claims about the sweep over the preload: figures 20 and 22.
 #[must_use]
 pub fn preload_claims(sweep: &Sweep) -> Vec<Claim> {
     let of = |figure, id| Claim::of(figure, SECTION, id);
-    let gap = &sweep.gap;
-    let spread = gap.experiment.spread();
+    let (gap, depth, area) = (&sweep.gap, &sweep.depth, &sweep.area);
+    let gap_spread = gap.experiment.spread();
     let fall = -gap.experiment.rise();
-    let (depth, area) = (&sweep.depth, &sweep.area);
-    let depth_spread = depth.experiment.spread();
-    let area_spread = area.experiment.spread();
     vec![
         of("fig20", "gap-falls-with-preload").judged(
             "At constant speed, more preload in the transition leaves a smaller contact gap; all \
@@ -80,18 +85,19 @@ pub fn preload_claims(sweep: &Sweep) -> Vec<Claim> {
             ends(gap, 3, "mm"),
             "",
         ),
-        of("fig20", "gap-spread-preload").judged(
+        spread(
+            of("fig20", "gap-spread-preload"),
             "The largest difference between the four mean curves of the gap is 0.24 mm.",
-            alike(GAP_SPREAD_MM.0, spread),
-            format!("{spread:.3} mm."),
-            &narrower(GAP_SPREAD_MM.0, spread, "mm"),
+            GAP_SPREAD_MM.0,
+            gap.experiment.spread(),
+            ("mm", 3),
         ),
         of("fig20", "errors-do-not-hide-the-trend").judged(
             "Wear, delayed preload and part tolerances do not hide how the gap depends on the \
              conditions.",
-            fall > spread,
+            fall > gap_spread,
             format!(
-                "The gap changes by {fall:.3} mm over the sweep, the means differ by {spread:.3} mm \
+                "The gap changes by {fall:.3} mm over the sweep, the means differ by {gap_spread:.3} mm \
                  at most; measured and true gap differ by {:.3} mm at most.",
                 measured_off(sweep)
             ),
@@ -101,7 +107,7 @@ pub fn preload_claims(sweep: &Sweep) -> Vec<Claim> {
             "At constant speed the embedding depth grows with the preload, nonlinearly.",
             all_go(depth, 1.0) && nonlinear(depth),
             format!("{} {}", ends(depth, 3, "mm"), bent(depth)),
-            "It grows, but not all six curves bend the same way.",
+            "It grows, but not all six curves bend to the same side.",
         ),
         of("fig22", "area-grows-with-depth-preload").judged(
             "As the embedding depth grows with the preload, so does the contact area.",
@@ -109,17 +115,19 @@ pub fn preload_claims(sweep: &Sweep) -> Vec<Claim> {
             ends(area, 1, "mm²"),
             "",
         ),
-        of("fig22", "depth-spread-preload").judged(
+        spread(
+            of("fig22", "depth-spread-preload"),
             "The largest difference between the four means of the depth is 0.18 mm.",
-            alike(DEPTH_SPREAD_MM.0, depth_spread),
-            format!("{depth_spread:.3} mm."),
-            &narrower(DEPTH_SPREAD_MM.0, depth_spread, "mm"),
+            DEPTH_SPREAD_MM.0,
+            depth.experiment.spread(),
+            ("mm", 3),
         ),
-        of("fig22", "area-spread-preload").judged(
+        spread(
+            of("fig22", "area-spread-preload"),
             "The largest difference between the four means of the area is 2.04 mm².",
-            alike(AREA_SPREAD_MM2.0, area_spread),
-            format!("{area_spread:.2} mm²."),
-            &narrower(AREA_SPREAD_MM2.0, area_spread, "mm²"),
+            AREA_SPREAD_MM2.0,
+            area.experiment.spread(),
+            ("mm²", 2),
         ),
         spreads_agree(sweep, "fig22", "depth-and-area-spreads-agree-preload", (DEPTH_SPREAD_MM.0, AREA_SPREAD_MM2.0)),
     ]
@@ -130,10 +138,8 @@ pub fn preload_claims(sweep: &Sweep) -> Vec<Claim> {
 pub fn speed_claims(sweep: &Sweep, preload: &Sweep) -> Vec<Claim> {
     let of = |figure, id| Claim::of(figure, SECTION, id);
     let (gap, depth, area) = (&sweep.gap, &sweep.depth, &sweep.area);
-    let spread = gap.experiment.spread();
+    let gap_spread = gap.experiment.spread();
     let other = preload.gap.experiment.spread();
-    let depth_spread = depth.experiment.spread();
-    let area_spread = area.experiment.spread();
     vec![
         of("fig21", "gap-grows-with-speed").judged(
             "At constant preload the contact gap grows with the speed, nonlinearly.",
@@ -141,29 +147,30 @@ pub fn speed_claims(sweep: &Sweep, preload: &Sweep) -> Vec<Claim> {
             format!("{} {}", ends(gap, 3, "mm"), bent(gap)),
             "",
         ),
-        of("fig21", "gap-spread-speed").judged(
+        spread(
+            of("fig21", "gap-spread-speed"),
             "The largest difference between the four mean curves of the gap is 0.32 mm.",
-            alike(GAP_SPREAD_MM.1, spread),
-            format!("{spread:.3} mm."),
-            &narrower(GAP_SPREAD_MM.1, spread, "mm"),
+            GAP_SPREAD_MM.1,
+            gap.experiment.spread(),
+            ("mm", 3),
         ),
         of("fig21", "speed-spreads-more").judged(
             "The means differ more over the speed (0.32 mm) than over the preload (0.24 mm), \
              because of wear and momentary slip.",
-            spread > 1.1 * other,
+            gap_spread > 1.1 * other,
             format!(
-                "{spread:.3} mm over the speed, {other:.3} mm over the preload; gross slip of a run \
+                "{gap_spread:.3} mm over the speed, {other:.3} mm over the preload; gross slip of a run \
                  at most {:.3} mm.",
                 sweep.slip_mm
             ),
-            "The same forty rigs make both sweeps, and their tolerances move the whole curve.",
+            "The same forty rigs make both sweeps, and their tolerances move the entire curve.",
         ),
         of("fig23", "depth-grows-with-speed").judged(
             "At constant preload the embedding depth grows with the speed.",
             all_go(depth, 1.0),
             ends(depth, 3, "mm"),
             "It falls. Rubber stiffens with speed, so that the wheel sinks in less: that is why its \
-             gap grows. A wheel that sank in deeper would stand lower over the root of the step \
+             gap grows. A wheel that sank in deeper would be lower over the root of the step \
              and leave a smaller gap, against figure 21.",
         ),
         of("fig23", "area-grows-with-depth-speed").judged(
@@ -175,20 +182,22 @@ pub fn speed_claims(sweep: &Sweep, preload: &Sweep) -> Vec<Claim> {
         of("fig23", "area-follows-depth").judged(
             "Contact area and embedding depth change alike.",
             all_go(area, 1.0) == all_go(depth, 1.0) && all_go(area, -1.0) == all_go(depth, -1.0),
-            "Both go the same way in theory, simulation and all four means.".into(),
+            "Both change with the same sign in theory, simulation and all four means.".into(),
             "",
         ),
-        of("fig23", "depth-spread-speed").judged(
+        spread(
+            of("fig23", "depth-spread-speed"),
             "The largest difference between the four means of the depth is 0.21 mm.",
-            alike(DEPTH_SPREAD_MM.1, depth_spread),
-            format!("{depth_spread:.3} mm."),
-            &narrower(DEPTH_SPREAD_MM.1, depth_spread, "mm"),
+            DEPTH_SPREAD_MM.1,
+            depth.experiment.spread(),
+            ("mm", 3),
         ),
-        of("fig23", "area-spread-speed").judged(
+        spread(
+            of("fig23", "area-spread-speed"),
             "The largest difference between the four means of the area is 2.71 mm².",
-            alike(AREA_SPREAD_MM2.1, area_spread),
-            format!("{area_spread:.2} mm²."),
-            &narrower(AREA_SPREAD_MM2.1, area_spread, "mm²"),
+            AREA_SPREAD_MM2.1,
+            area.experiment.spread(),
+            ("mm²", 2),
         ),
         spreads_agree(sweep, "fig23", "depth-and-area-spreads-agree-speed", (DEPTH_SPREAD_MM.1, AREA_SPREAD_MM2.1)),
     ]

@@ -18,7 +18,7 @@ const PINNED_BRACKET: f64 = 0.1;
 /// (EI / L^3).
 pub(super) fn first(a: End, mass: f64, spring: f64, count: usize) -> Vec<f64> {
     // Below the first pinned root lies the first mode of an arm that is held, by its
-    // clamp or by the spring; an arm that is not moves there as a whole at zero
+    // clamp or by the spring; an arm that is not moves there as a rigid body at zero
     // frequency, and its first mode is in the second interval.
     let held = a == End::Clamped || spring > 0.0;
     let skipped = usize::from(!held);

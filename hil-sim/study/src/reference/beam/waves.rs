@@ -55,7 +55,7 @@ impl End {
     }
 }
 
-/// What end B hangs on: the shear per deflection of an end without moment,
+/// What end B carries: the shear per deflection of an end without moment,
 /// `z = W''' / (k^3 W)`, as a direction `(cos, sin)` so that neither free (z = 0)
 /// nor pinned (z infinite) is a special case.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,7 +107,7 @@ impl Load {
     }
 }
 
-/// Propagation matrix over the whole beam, `f(L)` (eq 44).
+/// Propagation matrix over the beam, `f(L)` (eq 44).
 #[must_use]
 pub fn propagation(beta_l: f64) -> Transfer {
     Transfer::new(
@@ -118,24 +118,14 @@ pub fn propagation(beta_l: f64) -> Transfer {
     )
 }
 
-/// The frequency equation (54), `det(R_A f R_B f - I)`, turned by its known phase:
-/// the real part is always zero, the imaginary part is returned by
-/// [`frequency_function`].
+/// A real function of `beta_l` whose roots are the roots of the frequency equation (54),
+/// `det(R_A f R_B f - I) = 0`, linear in `(b.shear, b.deflection)`.
 ///
-/// Conjugating a deflection swaps its two propagating waves. The determinant of the
-/// four end conditions, which are real, so changes its sign under conjugation: it is
-/// purely imaginary. The determinant of eq 54 is that one over the denominators of
-/// R_A and R_B and the factor `e^{i beta_l}` of the two columns; multiplying by
-/// these three makes it imaginary again.
-pub(super) fn turned_determinant(a: End, b: Load, beta_l: f64) -> Complex<f64> {
-    let f = propagation(beta_l);
-    let round_trip = a.reflection() * f * b.reflection() * f;
-    let phase = Complex::from_polar(1.0, beta_l) * a.denominator() * b.denominator();
-    (round_trip - Transfer::identity()).determinant() * phase
-}
-
-/// A real function of `beta_l` whose roots are the roots of eq 54, linear in
-/// `(b.shear, b.deflection)`.
+/// The determinant is turned by its known phase, so that it is imaginary. Conjugating a
+/// deflection swaps its two propagating waves. The determinant of the four end conditions,
+/// which are real, so changes its sign under conjugation: it is imaginary. The determinant
+/// of (54) is that one over the denominators of R_A and R_B and the factor `e^{i beta_l}` of
+/// the two columns; multiplying by these three makes it imaginary again.
 ///
 /// Equation: for a clamped end A and z = deflection / shear it is
 /// `-8 e^{-beta_l} shear [1 + cos cosh - z (cos sinh - sin cosh)](beta_l)`.
@@ -144,5 +134,8 @@ pub(super) fn turned_determinant(a: End, b: Load, beta_l: f64) -> Complex<f64> {
 /// Cost: three products and one determinant of 2 x 2 complex matrices.
 #[must_use]
 pub fn frequency_function(a: End, b: Load, beta_l: f64) -> f64 {
-    turned_determinant(a, b, beta_l).im
+    let f = propagation(beta_l);
+    let round_trip = a.reflection() * f * b.reflection() * f;
+    let phase = Complex::from_polar(1.0, beta_l) * a.denominator() * b.denominator();
+    ((round_trip - Transfer::identity()).determinant() * phase).im
 }

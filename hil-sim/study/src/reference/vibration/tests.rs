@@ -1,0 +1,174 @@
+//! The arm against statics, the published mode and the cantilever's receptance.
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::reference::collision::dynamic;
+
+fn arm() -> Arm {
+    Arm::of(&Rig::fe()).unwrap()
+}
+
+#[test]
+fn the_published_constrained_mode_is_met_by_a_stated_mass() {
+    let arm = arm();
+    assert!((arm.tip.mass_kg - 0.062_857).abs() < 5e-7);
+    assert!((arm.frequencies_hz(1).unwrap()[0] - CONSTRAINED_HZ).abs() < 1e-9);
+    assert!((arm.angle_rad.to_degrees() - 46.397).abs() < 1e-2);
+}
+
+#[test]
+fn on_its_tread_the_arm_is_stiffer() {
+    let held = arm().on_tread(&Case::first(), 250.0);
+    let spring = held.tip.spring_n_per_m;
+    assert!((spring / 304e3 - 1.0).abs() < 0.01, "{spring}");
+    let (held, free) = (held.frequencies_hz(3).unwrap(), arm().frequencies_hz(3).unwrap());
+    assert!(held.iter().zip(&free).all(|(held, free)| held > free), "{held:?} {free:?}");
+}
+
+/// Tip receptance of a cantilever with a mass, m/N (Bishop and Johnson), for complex `E I`:
+/// `L^3/(EI) (sin cosh - cos sinh)/(l^3 (1 + cos cosh))`.
+fn cantilever(arm: &Arm, hz: f64) -> Complex<f64> {
+    let (beam, omega) = (arm.beam, TAU * hz);
+    let ei = Complex::new(1.0, arm.loss_factor) * beam.bending_stiffness_n_m2();
+    let per_length = beam.mass_kg() / beam.length_m;
+    let l = (Complex::from(omega * omega * per_length) / ei).powf(0.25) * beam.length_m;
+    let bare = (l.sin() * l.cosh() - l.cos() * l.sinh())
+        / (l.powi(3) * (Complex::from(1.0) + l.cos() * l.cosh()))
+        * beam.length_m.powi(3)
+        / ei;
+    bare / (bare * (-arm.tip.mass_kg * omega * omega) + 1.0)
+}
+
+#[test]
+fn tip_response_is_the_cantilevers_receptance() {
+    for loss_factor in [0.0, 0.02, 0.3] {
+        let arm = Arm { loss_factor, ..arm() };
+        for hz in [20.0, 150.0, 260.0, 290.0, 600.0] {
+            let found = arm.receptance_m_per_n(hz).unwrap();
+            let wanted = cantilever(&arm, hz);
+            let error = (found - wanted).norm() / wanted.norm();
+            assert!(error < 1e-6, "{hz} Hz, loss {loss_factor}: {error:e}");
+        }
+    }
+}
+
+#[test]
+fn it_settles_to_the_static_deflection() {
+    let arm = arm();
+    let mut modal = arm.modal(4).unwrap();
+    modal.step(50.0, 1e-6);
+    for _ in 0..200 {
+        modal.step(50.0, 0.1);
+    }
+    let wanted = 50.0 * arm.beam.length_m.powi(3) / (3.0 * 244.6875);
+    assert!((modal.deflection_m() / wanted - 1.0).abs() < 1e-9);
+    assert!(modal.vibration_m().abs() < 1e-9 * wanted);
+    let mut held = arm.modal(4).unwrap();
+    held.rest(50.0);
+    held.step(50.0, 0.3);
+    assert!((held.deflection_m() / wanted - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_sine_is_followed_as_its_straight_pieces_get_short() {
+    let arm = Arm { loss_factor: 0.1, ..arm() };
+    let mut modal = arm.modal(1).unwrap();
+    let (omega, dt) = (TAU * 200.0, 2e-5);
+    let own = TAU * 276.0;
+    let gain = arm.shapes(1).unwrap()[0].tip().powi(2);
+    let rest = arm.compliance_m_per_n() - gain / own.powi(2);
+    let mut worst = 0.0_f64;
+    for step in 1..=20_000 {
+        let t = dt * f64::from(step);
+        modal.step((omega * t).sin(), dt);
+        if step > 15_000 {
+            let (a, b) = (own * own - omega * omega, 0.1 * own * omega);
+            let wanted = gain * (a * (omega * t).sin() - b * (omega * t).cos()) / (a * a + b * b);
+            worst = worst.max((modal.deflection_m() - wanted - rest * (omega * t).sin()).abs());
+        }
+    }
+    // (omega dt)^2/12 of the force is lost with the corners; 2.1 is the resonance.
+    let lost = (omega * dt).powi(2) / 12.0;
+    assert!(worst < 2.2 * lost * gain / own.powi(2), "{worst:e}");
+}
+
+/// The history at this speed, and the static deflection under its climbing force, mm.
+fn history(speed_mm_s: f64) -> (Vec<Bending>, f64) {
+    let case = Case { speed_mm_s, ..Case::first() };
+    let crossing = dynamic(&case).unwrap();
+    let climb = crossing.peak_n() - crossing.samples[0].axial_n;
+    (bending(&case, &crossing).unwrap(), climb * arm().compliance_m_per_n() * 1e3)
+}
+
+/// Largest vibration before this time, mm.
+fn shaken(history: &[Bending], before_s: f64) -> f64 {
+    let climbing = history.iter().filter(|now| now.t_s < before_s);
+    climbing.map(|now| now.vibration_mm.abs()).fold(0.0, f64::max)
+}
+
+#[test]
+fn at_millimetres_per_second_the_arm_bends_as_under_a_static_force() {
+    let (history, static_mm) = history(5.0);
+    let most = history.iter().map(|now| now.deflection_mm).fold(0.0, f64::max);
+    // sin(46.4 deg) of the climbing force, less rolling resistance, lies across the arm.
+    assert!((most / (0.724 * static_mm) - 1.0).abs() < 0.01, "{most} {static_mm}");
+    assert!((0.1..0.25).contains(&most), "{most}");
+    assert!(shaken(&history, 2.0) < 0.01 * most);
+    // Nothing moves before the touch.
+    for now in history.iter().filter(|now| now.t_s < -0.02) {
+        assert!(now.deflection_mm.abs() < 0.02 * static_mm, "{now:?}");
+    }
+}
+
+#[test]
+fn vibration_grows_with_speed() {
+    // Before the edge passes under the centre, where single elements shake the ring.
+    let [slow, medium, fast] = [8.0, 50.0, 400.0].map(|v| shaken(&history(v).0, 10.0 / v));
+    assert!(slow < medium && medium < fast, "{slow} {medium} {fast}");
+}
+
+proptest! {
+    #[test]
+    fn no_tip_mass_brings_the_free_arm_below_the_clamped_one(exponent in -3.0..4.0_f64) {
+        let beam = Beam::drive_arm();
+        let tip = Tip { mass_kg: beam.mass_kg() * 10_f64.powf(exponent), spring_n_per_m: 0.0 };
+        let first = |ends| beam.modes(ends, tip, 1).unwrap()[0].frequency_hz;
+        prop_assert!(first(Ends::FreeFree) > first(Ends::ClampedFree));
+        prop_assert!(first(Ends::PinnedFree) > first(Ends::ClampedFree));
+    }
+
+    #[test]
+    fn the_cut_into_pieces_does_not_matter(
+        forces in prop::collection::vec(-100.0..100.0_f64, 1..12), cuts in 2..9_u32,
+    ) {
+        let [mut uncut, mut cut] = [arm().modal(5).unwrap(), arm().modal(5).unwrap()];
+        let mut last = 0.0;
+        for force in forces {
+            uncut.step(force, 3e-3);
+            for piece in 1..=cuts {
+                let part = f64::from(piece) / f64::from(cuts);
+                cut.step(last + part * (force - last), 3e-3 / f64::from(cuts));
+            }
+            last = force;
+            prop_assert!((uncut.deflection_m() - cut.deflection_m()).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn left_alone_it_only_calms_down(force in 1.0..100.0_f64, dt in 1e-5..1e-1_f64) {
+        let mut modal = arm().modal(1).unwrap();
+        modal.rest(force);
+        modal.step(0.0, 1e-6);
+        let energy = |modal: &Modal| {
+            let o = modal.oscillators[0];
+            (o.omega * o.state.0).powi(2) + o.state.1.powi(2)
+        };
+        let mut last = energy(&modal);
+        for _ in 0..50 {
+            modal.step(0.0, dt);
+            prop_assert!(energy(&modal) <= last);
+            last = energy(&modal);
+        }
+    }
+}
