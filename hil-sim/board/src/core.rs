@@ -106,7 +106,6 @@ pub struct Meter {
 
 impl Meter {
     /// What has been executed since `earlier`.
-    #[must_use]
     pub const fn since(self, earlier: Self) -> Self {
         Self {
             cycles: self.cycles - earlier.cycles,
@@ -197,7 +196,6 @@ impl Bus for NoBus {
 /// Whether an exception of this priority passes the masks.
 ///
 /// Source: ARMv7-M Architecture Reference Manual, B1.5.4 (`ExecutionPriority`).
-#[must_use]
 pub fn passes(priority: i16, primask: u32, basepri: u32, faultmask: u32) -> bool {
     let mut level = i16::MAX;
     if basepri & 0xFF != 0 {

@@ -85,7 +85,6 @@ impl Loaded {
 }
 
 /// Name of the function at an address, of functions in the order of their addresses.
-#[must_use]
 pub fn named(functions: &[Function], address: u32) -> &str {
     let after = functions.partition_point(|f| f.range.start <= address);
     let found = functions[..after].last().filter(|f| f.range.contains(&address));

@@ -117,44 +117,37 @@ impl Exceptions {
     }
 
     /// A word of the enable registers.
-    #[must_use]
     pub fn enabled(&self, word: u32) -> u32 {
         (self.enabled >> (16 + 32 * word)) as u32
     }
 
     /// A word of the pending registers.
-    #[must_use]
     pub fn pending(&self, word: u32) -> u32 {
         (self.pending >> (16 + 32 * word)) as u32
     }
 
     /// A word of the active registers.
-    #[must_use]
     pub fn active(&self, word: u32) -> u32 {
         let set = self.active.iter().fold(0_u128, |set, number| set | 1 << number);
         (set >> (16 + 32 * word)) as u32
     }
 
     /// Whether an exception is pending.
-    #[must_use]
     pub fn is_pending(&self, number: u8) -> bool {
         self.pending >> number & 1 != 0
     }
 
     /// Whether an exception is active.
-    #[must_use]
     pub fn is_active(&self, number: u8) -> bool {
         self.active.contains(&number)
     }
 
     /// The exception that runs; 0 in thread mode.
-    #[must_use]
     pub fn running(&self) -> u8 {
         self.active.last().copied().unwrap_or(0)
     }
 
     /// How many are active.
-    #[must_use]
     pub fn depth(&self) -> usize {
         self.active.len()
     }
@@ -168,7 +161,6 @@ impl Exceptions {
     }
 
     /// The priority of an exception.
-    #[must_use]
     pub fn priority_set(&self, number: u8) -> u8 {
         self.priorities.get(usize::from(number)).copied().unwrap_or(0)
     }
@@ -180,7 +172,6 @@ impl Exceptions {
     }
 
     /// `PRIGROUP`.
-    #[must_use]
     pub fn group(&self) -> u8 {
         self.group
     }
@@ -201,7 +192,6 @@ impl Exceptions {
     }
 
     /// Priority at which the core executes, masks apart.
-    #[must_use]
     pub fn level(&self) -> i16 {
         self.active.iter().map(|number| self.preempts(*number)).min().unwrap_or(THREAD)
     }
@@ -214,7 +204,6 @@ impl Exceptions {
 
     /// The exception to be taken next with the priority that the masks have to let
     /// through, if it preempts what runs.
-    #[must_use]
     pub fn urgent(&self) -> Option<(u8, i16)> {
         self.urgent
     }

@@ -16,9 +16,11 @@ use gdbstub::conn::ConnectionExt;
 use gdbstub::stub::run_blocking::{BlockingEventLoop, Event, WaitForStopReasonError};
 use gdbstub::stub::{DisconnectReason, GdbStub, SingleThreadStopReason};
 
-use super::bench::{Bench, BenchError};
+use super::bench::Bench;
+use super::error::BoardError;
 use super::log::{Line, Strings};
-use hil_sim::scenario::{Direction, Scenario};
+use hil_sim::record::{letter, starter};
+use hil_sim::scenario::Scenario;
 
 use target::Fatal;
 
@@ -43,7 +45,7 @@ pub enum GdbError {
     Connection(String),
     /// The board or its plant.
     #[error(transparent)]
-    Bench(#[from] BenchError),
+    Bench(#[from] BoardError),
 }
 
 /// Listens at `[host]:[port]`; without a host on this machine alone.
@@ -72,17 +74,13 @@ pub fn serve(
     watch: impl FnMut(f64, &Line),
 ) -> Result<(), GdbError> {
     let (stream, _) = listener.accept().map_err(|error| GdbError::Connection(error.to_string()))?;
-    let strings = Strings::of(elf).map_err(BenchError::from)?;
-    let bench = Bench::new(elf, &strings, scenario).map_err(BenchError::from)?;
-    let start = match scenario.run.direction {
-        Direction::Deploy => b's',
-        Direction::Retract => b'r',
-    };
+    let strings = Strings::of(elf).map_err(BoardError::from)?;
+    let bench = Bench::new(elf, &strings, scenario).map_err(BoardError::from)?;
     let mut board = Debugged {
         bench,
         breaks: BTreeMap::new(),
         steps: false,
-        start: Some(start),
+        start: Some(letter(starter(scenario.run.direction))),
         idle: false,
         watch: Box::new(watch),
     };
@@ -115,7 +113,7 @@ struct Debugged<'a> {
 
 impl Debugged<'_> {
     /// Ends the millisecond if its time is over.
-    fn close(&mut self) -> Result<(), BenchError> {
+    fn close(&mut self) -> Result<(), BoardError> {
         if self.bench.is_due() {
             let (_, lines) = self.bench.close()?;
             for line in &lines {
@@ -133,7 +131,7 @@ impl Debugged<'_> {
     }
 
     /// Carries out what stands at the program counter, a breakpoint or not.
-    fn step(&mut self) -> Result<(), BenchError> {
+    fn step(&mut self) -> Result<(), BoardError> {
         let machine = self.bench.machine_mut();
         let place = machine.pc();
         if let Some(kept) = self.breaks.get(&place) {
@@ -147,7 +145,7 @@ impl Debugged<'_> {
     }
 
     /// Goes on up to a breakpoint, or a millisecond at most.
-    fn run(&mut self) -> Result<Option<SingleThreadStopReason<u32>>, BenchError> {
+    fn run(&mut self) -> Result<Option<SingleThreadStopReason<u32>>, BoardError> {
         if self.breaks.contains_key(&self.bench.machine().pc()) {
             self.step()?;
         }
@@ -174,7 +172,7 @@ impl<'a> BlockingEventLoop for Loop<'a> {
     type StopReason = SingleThreadStopReason<u32>;
 
     fn wait_for_stop_reason(board: &mut Debugged<'a>, stream: &mut TcpStream) -> Waited<'a> {
-        let failed = |error: BenchError| WaitForStopReasonError::Target(Fatal(error));
+        let failed = |error: BoardError| WaitForStopReasonError::Target(Fatal(error));
         loop {
             if stream.peek().map_err(WaitForStopReasonError::Connection)?.is_some() {
                 let byte =

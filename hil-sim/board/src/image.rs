@@ -1,8 +1,6 @@
 //! A measurement image on the core: its functions called from the host, each call with
 //! its cycles.
 
-use std::path::Path;
-
 use super::core::unicorn::{Access, Counted, Memory, UnicornCore};
 use super::core::{Core, CoreError, Meter, Register, Stop};
 use super::elf::{FLASH, Loaded, RAM, named};
@@ -39,20 +37,10 @@ pub struct Image {
 }
 
 impl Image {
-    /// Loads the image at `path` and runs its start-up code.
-    ///
-    /// # Errors
-    /// [`ImageError`] if it is no image, or does not come up.
-    pub fn open(path: &Path) -> Result<Self, ImageError> {
-        let bytes = std::fs::read(path)
-            .map_err(|source| ImageError::Read { path: path.to_owned(), source })?;
-        Self::start(&bytes)
-    }
-
     /// Loads the image in `elf` and runs its start-up code.
     ///
     /// # Errors
-    /// As [`Image::open`].
+    /// [`ImageError`] if it is no image, or does not start.
     pub fn start(elf: &[u8]) -> Result<Self, ImageError> {
         let loaded = Loaded::of(elf)?;
         let counted = Counted { base: FLASH.base, bytes: &loaded.flash, code: &loaded.code };

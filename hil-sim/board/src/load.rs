@@ -83,7 +83,6 @@ impl Gathered {
     }
 
     /// The load from the first command to now.
-    #[must_use]
     pub fn close(self, machine: &Machine, footprint: &Footprint, stack_used: u32) -> Load {
         let (from, slept) = self.from.unwrap_or_default();
         let cycles = machine.now() - from;
@@ -135,7 +134,6 @@ impl Load {
     }
 
     /// As a section of the run's page; `missed` are the budgets that were not kept.
-    #[must_use]
     pub fn html(&self, missed: &[String]) -> String {
         let pair = |(name, value)| format!("<div><dt>{name}</dt><dd>{value}</dd></div>\n");
         let cells: String = self.pairs().map(pair).concat();
@@ -149,7 +147,6 @@ preempts it.</p>\n"
     }
 
     /// As text.
-    #[must_use]
     pub fn text(&self, missed: &[String]) -> String {
         let pairs = self.pairs().map(|(name, value)| format!("  {name}: {value}\n")).concat();
         let missed: String = missed.iter().map(|line| format!("  over budget: {line}\n")).collect();
@@ -157,7 +154,6 @@ preempts it.</p>\n"
     }
 
     /// The budgets that are missed, a sentence each.
-    #[must_use]
     pub fn missed(&self) -> Vec<String> {
         let left = MEMORY - (self.ram - self.stack);
         let reached = [

@@ -17,13 +17,11 @@ pub struct Line {
 
 impl Line {
     /// Numbers among the values, in their order.
-    #[must_use]
     pub fn numbers(&self) -> Vec<f64> {
         self.parts.iter().filter_map(|part| part.trim().parse().ok()).collect()
     }
 
     /// What stands behind `mark` in the message.
-    #[must_use]
     pub fn behind(&self, mark: &str) -> Option<&str> {
         self.text.split_once(mark).map(|(_, rest)| rest)
     }
@@ -43,7 +41,6 @@ impl Strings {
     }
 
     /// A reader at the beginning of a log.
-    #[must_use]
     pub fn reader(&self) -> Reader<'_> {
         Reader { decoder: self.0.new_stream_decoder(), broken: 0 }
     }
@@ -57,7 +54,6 @@ pub struct Reader<'a> {
 
 impl Reader<'_> {
     /// Frames that could not be read: a reset cuts the last one off.
-    #[must_use]
     pub const fn broken(&self) -> u64 {
         self.broken
     }

@@ -27,7 +27,6 @@ pub const REFILL: u64 = 2;
 
 /// Cycles beyond the first that this instruction takes whatever its operands, branches
 /// apart.
-#[must_use]
 pub const fn extra(kind: Kind) -> u64 {
     match kind {
         Kind::Plain | Kind::IfThen(_) => 0,
@@ -42,7 +41,6 @@ pub const fn extra(kind: Kind) -> u64 {
 
 /// Whether the cycles beyond the first are known only when the instruction is reached:
 /// it may be skipped, or its operands decide.
-#[must_use]
 pub fn is_late(instruction: &Instruction, conditional: bool) -> bool {
     matches!(instruction.kind, Kind::Divide { .. }) || conditional && extra(instruction.kind) > 0
 }
@@ -52,7 +50,6 @@ pub fn is_late(instruction: &Instruction, conditional: bool) -> bool {
 ///
 /// The manual says 2 to 12 by the leading zeros and ones of the operands; the
 /// proportion is our reading of it.
-#[must_use]
 pub const fn division(signed: bool, n: u32, m: u32) -> u64 {
     let (n, m) =
         if signed { ((n as i32).unsigned_abs(), (m as i32).unsigned_abs()) } else { (n, m) };

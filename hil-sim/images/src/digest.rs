@@ -20,7 +20,6 @@ impl Default for Digest {
 
 impl Digest {
     /// The digest of a value's `Debug` text.
-    #[must_use]
     pub fn of(value: &impl fmt::Debug) -> u64 {
         let mut digest = Self::default();
         // Writing to a digest cannot fail.

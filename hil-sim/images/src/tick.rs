@@ -70,13 +70,11 @@ impl Preset {
     pub const ALL: [Self; 2] = [Self::Prototype, Self::Fe];
 
     /// The preset of this name.
-    #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|preset| preset.name() == name)
     }
 
     /// Its name, as [`interstage::rig::Rig::named`] takes it.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Prototype => "prototype",
@@ -95,7 +93,6 @@ fn sample<T>(code: &Code, new: impl Fn(u16) -> T) -> Option<Sample<T>> {
 
 impl Given {
     /// The words of an input.
-    #[must_use]
     pub fn of(input: &Input) -> Self {
         let frame = input.sensors;
         let position =
@@ -118,7 +115,6 @@ impl Given {
     }
 
     /// The input of these words with this plan.
-    #[must_use]
     pub fn input(&self, plan: Option<Plan>) -> Input {
         let [wheel, preload_sensor, tread, arm] = &self.codes;
         Input {
@@ -141,7 +137,6 @@ impl Given {
     }
 
     /// The words as the image's memory holds them.
-    #[must_use]
     pub fn words(&self) -> [u32; 17] {
         let [w, l, t, a] = self.codes;
         let [head, tail] = [self.now, self.command];
@@ -169,7 +164,6 @@ impl Given {
 
 impl Taken {
     /// What is looked at of this output.
-    #[must_use]
     pub fn of(output: &Output) -> Self {
         let digest = Digest::of(output);
         let duty = |command: interstage::units::MotorCommand| {
@@ -183,7 +177,6 @@ impl Taken {
     }
 
     /// From the words of the image's memory.
-    #[must_use]
     pub const fn from_words(words: [u32; 4]) -> Self {
         let [low, high, drive, preload] = words;
         Self { digest: [low, high], drive, preload }

@@ -129,7 +129,6 @@ impl Chip {
     }
 
     /// Level at a pin.
-    #[must_use]
     pub fn level(&self, pin: Pin) -> bool {
         self.ports[pin.0].level(pin.1)
     }
@@ -208,8 +207,8 @@ impl Chip {
             let port = self.syscfg.port(*line) as usize;
             self.ports.get(port).is_some_and(|port| port.level(*line))
         });
-        let supply = u32::from(self.power.tells()) << super::SUPPLY_LINE;
-        self.exti.look(levels.fold(supply, |word, line| word | 1 << line));
+        let supply = u32::from(self.power.signals_low()) << super::SUPPLY_LINE;
+        self.exti.sample(levels.fold(supply, |word, line| word | 1 << line));
         for (index, wired) in BRIDGES.iter().enumerate() {
             let reaches = self.role(wired.stop) == Role::Alternate(wired.stop_function);
             let open = reaches && self.level(wired.stop);

@@ -13,14 +13,14 @@ use gdbstub::target::{Target, TargetError, TargetResult};
 
 use super::arch::{Core, CortexM, PC};
 use super::{BREAK, Debugged};
-use crate::bench::BenchError;
 use crate::core::{CoreError, Register};
 use crate::elf::{FLASH, RAM};
+use crate::error::BoardError;
 
 /// The board or its plant failed.
 #[derive(Debug, thiserror::Error)]
 #[error(transparent)]
-pub(super) struct Fatal(pub(super) BenchError);
+pub(super) struct Fatal(pub(super) BoardError);
 
 fn fatal(error: CoreError) -> TargetError<Fatal> {
     TargetError::Fatal(Fatal(error.into()))

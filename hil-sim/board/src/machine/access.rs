@@ -63,7 +63,6 @@ impl Machine {
     }
 
     /// Where the program stands.
-    #[must_use]
     pub const fn pc(&self) -> u32 {
         self.pc
     }

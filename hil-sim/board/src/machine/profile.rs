@@ -91,7 +91,6 @@ impl Profile {
     }
 
     /// Cycles asleep.
-    #[must_use]
     pub const fn slept(&self) -> u64 {
         self.slept
     }

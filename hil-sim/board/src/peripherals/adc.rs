@@ -51,7 +51,7 @@ const INJECTED_OVERSAMPLED: u32 = 1 << 1;
 const CALIBRATION: u64 = 116;
 
 /// IER, CFGR, CFGR2, sampling times, watchdogs, sequences, DIFSEL, CALFACT.
-const REGISTERS: [Kept; 17] = [
+const REGISTERS: [Kept; 14] = [
     Kept { offset: 0x04, reset: 0, mask: 0x7FF },
     Kept { offset: CFGR, reset: 0x8000_0000, mask: ALL },
     Kept { offset: CFGR2, reset: 0, mask: 0x0E0F_07FF },
@@ -64,11 +64,8 @@ const REGISTERS: [Kept; 17] = [
     Kept { offset: SQR1 + 4, reset: 0, mask: 0x1F7D_F7DF },
     Kept { offset: SQR1 + 8, reset: 0, mask: 0x1F7D_F7DF },
     Kept { offset: SQR1 + 12, reset: 0, mask: 0x7DF },
-    Kept { offset: JSQR, reset: 0, mask: ALL },
     Kept { offset: 0xB0, reset: 0, mask: 0x0007_FFFF },
     Kept { offset: 0xB4, reset: 0, mask: 0x007F_007F },
-    Kept { offset: 0xA0, reset: 0, mask: 0 },
-    Kept { offset: 0xA4, reset: 0, mask: 0 },
 ];
 
 /// One converter.
@@ -88,7 +85,7 @@ struct Converter {
 impl Converter {
     fn new() -> Self {
         Self {
-            registers: Registers::new(&REGISTERS),
+            registers: Registers::new(&REGISTERS, &[JSQR], &[0xA0, 0xA4]),
             control: DEEP,
             flags: 0,
             data: 0,
@@ -269,7 +266,6 @@ impl Adc {
     }
 
     /// Whether a converter asks DMA to take its code.
-    #[must_use]
     pub fn wants_dma(&self, converter: usize) -> bool {
         let converter = &self.converters[converter];
         converter.wants_dma(converter.registers.get(CFGR))

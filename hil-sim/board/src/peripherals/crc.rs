@@ -18,8 +18,7 @@ const SIZE: u32 = 3 << 3;
 const REVERSE_IN: u32 = 3 << 5;
 const REVERSE_OUT: u32 = 1 << 7;
 
-const REGISTERS: [Kept; 4] = [
-    Kept { offset: 0x04, reset: 0, mask: u32::MAX },
+const REGISTERS: [Kept; 3] = [
     // Other sizes than 32 bits are not modelled: they read back as not taken.
     Kept { offset: CR, reset: 0, mask: REVERSE_IN | REVERSE_OUT },
     Kept { offset: INIT, reset: u32::MAX, mask: u32::MAX },
@@ -35,7 +34,7 @@ pub struct CrcUnit {
 
 impl Default for CrcUnit {
     fn default() -> Self {
-        Self { registers: Registers::new(&REGISTERS), sum: u32::MAX }
+        Self { registers: Registers::new(&REGISTERS, &[0x04], &[]), sum: u32::MAX }
     }
 }
 

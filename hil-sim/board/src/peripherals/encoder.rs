@@ -16,24 +16,16 @@ const ALL: u32 = u32::MAX;
 /// Mode of the slave controller.
 const MODE: u32 = 7;
 
-const REGISTERS: [Kept; 12] = [
+const REGISTERS: [Kept; 5] = [
     Kept { offset: CR1, reset: 0, mask: 0x87 },
-    Kept { offset: 0x04, reset: 0, mask: 0 },
     Kept { offset: SMCR, reset: 0, mask: MODE },
-    Kept { offset: 0x0C, reset: 0, mask: 0 },
     Kept { offset: CCMR1, reset: 0, mask: 0xF3F3 },
-    Kept { offset: 0x1C, reset: 0, mask: 0 },
     Kept { offset: CCER, reset: 0, mask: 0x33 },
-    Kept { offset: CNT, reset: 0, mask: ALL },
-    Kept { offset: 0x28, reset: 0, mask: 0 },
     Kept { offset: ARR, reset: ALL, mask: ALL },
-    Kept { offset: 0x34, reset: 0, mask: 0 },
-    Kept { offset: 0x38, reset: 0, mask: 0 },
 ];
 
 /// Cycles that a line has to stand for an input filter (`ICxF`, `BKF`) to take it, with
 /// the filter's clock at the timer's own.
-#[must_use]
 pub const fn filter_cycles(setting: u32) -> u64 {
     let (divider, samples) = match setting & 0xF {
         0 => (1, 0),
@@ -65,9 +57,11 @@ pub struct Encoder {
 
 impl Encoder {
     /// After reset, with these levels at its inputs.
-    #[must_use]
     pub fn new(lines: [bool; 2]) -> Self {
-        Self { registers: Registers::new(&REGISTERS), lines }
+        Self {
+            registers: Registers::new(&REGISTERS, &[CNT], &[0x04, 0x0C, 0x1C, 0x28, 0x34, 0x38]),
+            lines,
+        }
     }
 
     /// The lines change to these levels and stand so for `cycles`; what the filter does

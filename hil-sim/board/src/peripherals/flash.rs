@@ -70,9 +70,8 @@ const PROGRAM_CYCLES: u64 = 82 * (HZ / 1_000_000);
 const ERASE_CYCLES: u64 = 22 * (HZ / 1000);
 
 /// ACR, ECCR, OPTR (as delivered: two banks).
-const REGISTERS: [Kept; 3] = [
+const REGISTERS: [Kept; 2] = [
     Kept { offset: 0x00, reset: 0x0004_0600, mask: 0x0004_7F0F },
-    Kept { offset: 0x18, reset: 0, mask: 0 },
     Kept { offset: 0x20, reset: 0xFFEF_F8AA, mask: 0 },
 ];
 
@@ -127,7 +126,7 @@ pub struct Flash {
 impl Default for Flash {
     fn default() -> Self {
         Self {
-            registers: Registers::new(&REGISTERS),
+            registers: Registers::new(&REGISTERS, &[], &[0x18]),
             keys: Some(0),
             control: 0xC000_0000,
             flags: 0,
@@ -168,7 +167,6 @@ impl Flash {
     }
 
     /// Place of which it has to be known what stands there.
-    #[must_use]
     pub fn asks_for(&self) -> Option<u32> {
         self.wanted.map(|(address, _)| address)
     }
@@ -215,9 +213,8 @@ impl Flash {
         self.finished.take()
     }
 
-    /// Whether it asks for its interrupt.
-    #[must_use]
-    pub const fn asks(&self) -> bool {
+    /// Whether it requests its interrupt.
+    pub const fn requests(&self) -> bool {
         self.control & END_INTERRUPT != 0 && self.flags & END != 0
             || self.control & ERROR_INTERRUPT != 0 && self.flags & ERRORS != 0
     }

@@ -24,11 +24,9 @@ const BREAK_ENABLE: u32 = 1 << 12;
 const BREAK_HIGH: u32 = 1 << 13;
 const BREAK_FLAG: u32 = 1 << 7;
 
-const REGISTERS: [Kept; 17] = [
+const REGISTERS: [Kept; 15] = [
     Kept { offset: CR1, reset: 0, mask: PLAIN | 0x300 },
     Kept { offset: 0x04, reset: 0, mask: 0x7F77 },
-    Kept { offset: 0x08, reset: 0, mask: 0 },
-    Kept { offset: 0x0C, reset: 0, mask: 0 },
     Kept { offset: CCMR1, reset: 0, mask: 0x0101_FFFF },
     Kept { offset: CCMR1 + 4, reset: 0, mask: 0x0101_FFFF },
     Kept { offset: CCER, reset: 0, mask: 0x33_FFFF },
@@ -67,10 +65,9 @@ pub struct Pwm {
 
 impl Pwm {
     /// After reset, with this level at the break input.
-    #[must_use]
     pub fn new(pin: bool) -> Self {
         Self {
-            registers: Registers::new(&REGISTERS),
+            registers: Registers::new(&REGISTERS, &[], &[0x08, 0x0C]),
             flags: 0,
             origin: 0,
             prescaler: 1,
@@ -98,7 +95,6 @@ impl Pwm {
     }
 
     /// Part of the period in which channel `channel` (from 0) is high at its pin.
-    #[must_use]
     pub fn duty(&self, channel: u32) -> f64 {
         let enable = self.registers.get(CCER) >> (4 * channel);
         if self.registers.get(BDTR) & MOE == 0 || enable & 1 == 0 {

@@ -22,11 +22,10 @@ const EMPTY: u32 = 1 << 1;
 const OVERRUN: u32 = 1 << 6;
 const BUSY: u32 = 1 << 7;
 
-const REGISTERS: [Kept; 4] = [
+const REGISTERS: [Kept; 3] = [
     Kept { offset: CR1, reset: 0, mask: PLAIN },
     Kept { offset: CR2, reset: 0x700, mask: 0x7FFF },
     Kept { offset: 0x10, reset: 7, mask: 0xFFFF },
-    Kept { offset: 0x1C, reset: 0, mask: 0 },
 ];
 
 /// A frame as it goes over the lines.
@@ -58,7 +57,7 @@ pub struct Spi {
 impl Default for Spi {
     fn default() -> Self {
         Self {
-            registers: Registers::new(&REGISTERS),
+            registers: Registers::new(&REGISTERS, &[], &[0x1C]),
             next: None,
             shifting: None,
             taken: None,
@@ -81,19 +80,16 @@ impl Spi {
     }
 
     /// Whether it asks DMA for the next word to send.
-    #[must_use]
     pub fn wants_word(&self) -> bool {
         self.is_on() && self.registers.get(CR2) & 2 != 0 && self.next.is_none()
     }
 
     /// Whether it asks DMA to take the word that has come.
-    #[must_use]
     pub fn has_word(&self) -> bool {
         self.registers.get(CR2) & 1 != 0 && self.taken.is_some()
     }
 
     /// Whether a frame is on the lines.
-    #[must_use]
     pub const fn is_busy(&self) -> bool {
         self.shifting.is_some()
     }

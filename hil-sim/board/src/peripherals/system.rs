@@ -28,7 +28,6 @@ pub struct System {
 
 impl System {
     /// After reset, with the vectors at `vectors`.
-    #[must_use]
     pub fn new(vectors: u32) -> Self {
         Self {
             exceptions: Exceptions::default(),

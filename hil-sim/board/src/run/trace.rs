@@ -80,7 +80,7 @@ impl Trace {
     }
 
     /// Looks at a millisecond that ended with the plant in `truth`.
-    pub(super) fn look(&mut self, passed: &Passed, lines: &[Line], truth: &Truth, keep_row: bool) {
+    pub(super) fn add(&mut self, passed: &Passed, lines: &[Line], truth: &Truth, keep_row: bool) {
         let t_s = self.tally.time_s();
         self.digest_pins(passed);
         for line in lines {

@@ -25,7 +25,6 @@ impl Flash {
     }
 
     /// Operations begun since the board was made.
-    #[must_use]
     pub const fn begun(&self) -> u64 {
         self.begun
     }
@@ -48,7 +47,6 @@ impl Flash {
     }
 
     /// What ends it all now.
-    #[must_use]
     pub fn ends_by(&self) -> Option<Cause> {
         let pulled = matches!(self.cut, Some(Cut::Pulled(_)));
         self.ends.then_some(if pulled { Cause::Pin } else { Cause::Power })

@@ -147,11 +147,11 @@ fn the_end_and_errors_interrupt_where_that_is_wanted() {
     let mut flash = unlocked();
     write(&mut flash, CR, PROGRAM | END_INTERRUPT | ERROR_INTERRUPT, 0);
     assert!(program(&mut flash, PLACE, 1, ERASED).is_some());
-    assert!(flash.asks());
+    assert!(flash.requests());
     write(&mut flash, SR, END, 0);
-    assert!(!flash.asks());
+    assert!(!flash.requests());
     flash.store(PLACE, 1, 0);
-    assert!(flash.asks());
+    assert!(flash.requests());
 }
 
 #[test]

@@ -83,25 +83,21 @@ impl Control {
     }
 
     /// Address of an exception's vector.
-    #[must_use]
     pub fn vector(&self, number: u8) -> u32 {
         self.vectors + 4 * u32::from(number)
     }
 
     /// `SLEEPONEXIT`: back in thread mode the core sleeps.
-    #[must_use]
     pub const fn sleeps_on_exit(&self) -> bool {
         self.sleep & 2 != 0
     }
 
     /// `SEVONPEND`: an interrupt that becomes pending is an event.
-    #[must_use]
     pub const fn pending_is_event(&self) -> bool {
         self.sleep & 1 << 4 != 0
     }
 
     /// Status of configurable faults and of the hard fault.
-    #[must_use]
     pub const fn status(&self) -> (u32, u32) {
         (self.faults, self.hard)
     }
