@@ -1,8 +1,6 @@
 //! The control tick on the emulated core: the same bits as on the host, and the same cycles
 //! each time.
 
-use std::path::PathBuf;
-
 use hil_sim::firmware::{Profile, build_binary};
 use interstage_images::tick::Preset;
 use rig_board::cycles::{CyclesError, IMAGE, Step, record, replay, run, tick};
@@ -12,9 +10,8 @@ use rig_board::spread::Spread;
 use crate::common::scenario;
 
 fn image() -> Image {
-    let path: PathBuf =
-        build_binary(IMAGE.0, IMAGE.1, Profile::Release, &[]).expect("the image builds");
-    Image::open(&path).expect("an image")
+    let path = build_binary(IMAGE.0, IMAGE.1, Profile::Release, &[]).expect("the image builds");
+    Image::start(&std::fs::read(path).expect("readable")).expect("an image")
 }
 
 #[test]

@@ -65,8 +65,10 @@ impl Board {
         let before = self.restarts();
         self.number += 1;
         let frame = frame(&ToBoard::Parameters(self.number, request)).expect("fits");
-        for byte in frame {
-            while !self.probe.down(self.bench.machine_mut(), DOWN, byte).expect("runs") {
+        let mut sent = 0;
+        while sent < frame.len() {
+            sent += self.probe.down(self.bench.machine_mut(), DOWN, &frame[sent..]).expect("runs");
+            if sent < frame.len() {
                 self.bench.step().expect("runs");
             }
         }

@@ -13,7 +13,7 @@ use rig_board::peripherals::pwr::{HOLDS, Then};
 use rig_board::peripherals::rcc::Cause;
 use rig_board::thumb::sweep;
 
-use crate::common::reset::Board;
+use crate::common::Board;
 
 /// Where the pages stand, by `docs/PARAMETERS.md`.
 const RECORDS: u32 = 0x0808_0000 - 2 * SLOT_BYTES as u32 - PAGE_BYTES as u32;
@@ -31,13 +31,9 @@ fn page(board: &Board, address: u32) -> Vec<u8> {
     bytes
 }
 
-fn strike(board: &mut Board, fault: Fault) {
-    fault.strike(board.bench.machine_mut()).expect("strikes");
-}
-
 /// Falls in the middle of a run, and is judged by what the next start reports.
 fn falls(board: &mut Board) -> Option<DriveSnapshot> {
-    strike(board, Fault::BrownOut);
+    board.strike(Fault::BrownOut);
     let (cause, after, driven) = board.reset(5);
     assert_eq!(cause, Cause::Power);
     assert!(after <= 1, "{after} ms");
@@ -54,7 +50,7 @@ fn falls(board: &mut Board) -> Option<DriveSnapshot> {
 #[test]
 fn a_supply_that_falls_leaves_what_the_drive_did() {
     let mut board = Board::moving();
-    let at = board.bench.plant().truth().position_mm;
+    let at = board.position_mm();
     let snapshot = falls(&mut board).expect("a record");
     assert!(matches!(snapshot.mode(), Some(Mode::Run(..))), "{snapshot:?}");
     assert!((snapshot.position.to_num::<f64>() - at).abs() < 0.3, "{snapshot:?} at {at}");
@@ -69,13 +65,13 @@ fn a_record_of_the_supply_is_written_in_half_of_its_time() {
     // An empty page, which is looked through from its end, and one with room for one more.
     for filled in [0, PAGE_BYTES - 32] {
         let mut board = Board::moving();
-        board.bench.machine_mut().poke(RECORDS, &vec![0; filled]).expect("flash");
-        strike(&mut board, Fault::BrownOut);
+        board.machine().poke(RECORDS, &vec![0; filled]).expect("flash");
+        board.strike(Fault::BrownOut);
         let fell = board.bench.machine().now();
         // The record's last word is the lower one of its third double word.
         let written = |board: &Board| page(board, RECORDS)[filled + 16..filled + 20] != [0xFF; 4];
         while !written(&board) {
-            let machine = board.bench.machine_mut();
+            let machine = board.machine();
             let now = machine.now();
             assert!(now - fell < HOLDS / 2, "{filled}: not yet");
             machine.run_on(now + STEP / 100).expect("runs");
@@ -90,7 +86,7 @@ fn a_record_of_the_supply_is_reported_once() {
     let mut board = Board::moving();
     falls(&mut board).expect("a record");
     // The memory is lost, and this time without a warning.
-    strike(&mut board, Fault::SupplyCut);
+    board.strike(Fault::SupplyCut);
     let second = board.report();
     assert_eq!((second.reset, second.snapshot, second.crash), (Reset::Power, None, None));
 }
@@ -98,10 +94,10 @@ fn a_record_of_the_supply_is_reported_once() {
 #[test]
 fn a_supply_that_flickers_leaves_its_first_record() {
     let mut board = Board::moving();
-    strike(&mut board, Fault::BrownOut);
+    board.strike(Fault::BrownOut);
     // Back until the record has been taken, 24 bytes on: the tick has not begun.
     let taken = (0..200).any(|_| {
-        let machine = board.bench.machine_mut();
+        let machine = board.machine();
         machine.run_on(machine.now() + STEP / 20).expect("runs");
         page(&board, RECORDS)[24..32] == [0; 8]
     });
@@ -117,11 +113,11 @@ fn a_record_is_whole_or_none_wherever_power_goes() {
         let mut board = Board::moving();
         // One from before, which must not pass for this one.
         let earlier = falls(&mut board).expect("a record");
-        assert!(board.bench.send(b's').expect("runs"));
+        board.send(b's');
         board.until("deploying: cruise", 6000);
-        board.bench.take_frames();
-        board.bench.machine_mut().chip_mut().flash.cut_power(Cut::Within(operations));
-        strike(&mut board, Fault::BrownOut);
+        board.frames.clear();
+        board.machine().chip_mut().flash.cut_power(Cut::Within(operations));
+        board.strike(Fault::BrownOut);
         board.reset(5);
         let restart = board.report();
         assert_eq!(restart.snapshot.is_some(), whole, "{operations}: {restart}");
@@ -141,11 +137,11 @@ fn a_record_is_whole_or_none_wherever_power_goes() {
 fn a_full_page_of_records_makes_room() {
     let mut board = Board::idle();
     let full = [0; PAGE_BYTES];
-    board.bench.machine_mut().poke(RECORDS, &full).expect("flash");
-    strike(&mut board, Fault::ResetPin);
+    board.machine().poke(RECORDS, &full).expect("flash");
+    board.strike(Fault::ResetPin);
     board.until("mode: idle", 3000);
     assert_eq!(page(&board, RECORDS), [0xFF; PAGE_BYTES]);
-    board.bench.take_frames();
+    board.frames.clear();
     let snapshot = falls(&mut board).expect("a record");
     assert_eq!(snapshot.mode(), Some(Mode::Idle));
 }
@@ -153,8 +149,8 @@ fn a_full_page_of_records_makes_room() {
 #[test]
 fn a_dip_of_the_supply_cuts_the_bridges_and_starts_anew() {
     let mut board = Board::moving();
-    let at = board.bench.plant().truth().position_mm;
-    strike(&mut board, Fault::SupplyDip);
+    let at = board.position_mm();
+    board.strike(Fault::SupplyDip);
     let (cause, after, driven) = board.reset(60);
     assert_eq!(cause, Cause::Software);
     assert!(after < 40, "{after} ms");
@@ -167,7 +163,7 @@ fn a_dip_of_the_supply_cuts_the_bridges_and_starts_anew() {
 
 /// Too low for a while, without being gone.
 fn sags(board: &mut Board, milliseconds: u64) {
-    let machine = board.bench.machine_mut();
+    let machine = board.machine();
     let now = machine.now();
     machine.chip_mut().supply_falls(now + milliseconds * STEP, Then::Back, now);
 }
@@ -175,7 +171,7 @@ fn sags(board: &mut Board, milliseconds: u64) {
 #[test]
 fn a_supply_that_sags_until_the_watchdog_bites_is_no_hang() {
     let mut board = Board::moving();
-    let at = board.bench.plant().truth().position_mm;
+    let at = board.position_mm();
     sags(&mut board, 400);
     let (cause, after, driven) = board.reset(150);
     assert_eq!(cause, Cause::Watchdog);
@@ -192,16 +188,16 @@ fn a_supply_that_sags_until_the_watchdog_bites_is_no_hang() {
 #[test]
 fn a_reset_behind_a_lost_supply_makes_its_place_no_surer() {
     let mut board = Board::moving();
-    strike(&mut board, Fault::BrownOut);
+    board.strike(Fault::BrownOut);
     board.reset(5);
     // The start has taken the record; the tick has not begun.
     let taken = (0..200).any(|_| {
-        let machine = board.bench.machine_mut();
+        let machine = board.machine();
         machine.run_on(machine.now() + STEP / 20).expect("runs");
         page(&board, RECORDS)[24..32] == [0; 8]
     });
     assert!(taken, "{:#?}", board.log);
-    strike(&mut board, Fault::ResetPin);
+    board.strike(Fault::ResetPin);
     let restart = board.report();
     assert_eq!((restart.reset, restart.crash), (Reset::Pin, None));
     assert!(restart.place().is_some_and(|place| !place.sure), "{restart}");
@@ -210,13 +206,11 @@ fn a_reset_behind_a_lost_supply_makes_its_place_no_surer() {
 #[test]
 fn a_place_without_a_step_found_stays_unsure_however_long_it_idles() {
     let mut board = Board::moving();
-    let at = board.bench.plant().truth().position_mm;
+    let at = board.position_mm();
     let lost = falls(&mut board).expect("a record");
     for _ in 0..2 {
-        for _ in 0..50 {
-            board.step();
-        }
-        strike(&mut board, Fault::ResetPin);
+        board.run(50);
+        board.strike(Fault::ResetPin);
         let restart = board.report();
         assert!(restart.snapshot.is_some_and(|snapshot| snapshot.tick != lost.tick), "{restart}");
         let place = restart.place().expect("a place");
@@ -228,7 +222,7 @@ fn a_place_without_a_step_found_stays_unsure_however_long_it_idles() {
 #[test]
 fn a_reset_into_a_low_supply_leaves_its_place_unsure() {
     let mut board = Board::moving();
-    strike(&mut board, Fault::ResetPin);
+    board.strike(Fault::ResetPin);
     sags(&mut board, 300);
     let restart = board.report();
     assert_eq!((restart.reset, restart.crash), (Reset::Power, None));
@@ -239,7 +233,7 @@ fn a_reset_into_a_low_supply_leaves_its_place_unsure() {
 fn a_supply_that_sags_is_named_without_its_record_too() {
     let mut board = Board::moving();
     // No room for one.
-    board.bench.machine_mut().poke(RECORDS, &[0; PAGE_BYTES]).expect("flash");
+    board.machine().poke(RECORDS, &[0; PAGE_BYTES]).expect("flash");
     sags(&mut board, 400);
     assert_eq!(board.reset(150).0, Cause::Watchdog);
     let restart = board.report();
@@ -250,14 +244,12 @@ fn a_supply_that_sags_is_named_without_its_record_too() {
 #[test]
 fn a_start_waits_for_its_supply() {
     let mut board = Board::idle();
-    board.bench.take_frames();
+    board.frames.clear();
     // Comes back too low, for a tenth of a second.
-    board.bench.machine_mut().restart(Cause::Power).expect("restarts");
+    board.machine().restart(Cause::Power).expect("restarts");
     sags(&mut board, 100);
     let lines = board.log.len();
-    for _ in 0..99 {
-        board.step();
-    }
+    board.run(99);
     assert_eq!(board.log.len(), lines, "{:#?}", &board.log[lines..]);
     board.until("mode: idle", 3000);
 }
@@ -272,7 +264,7 @@ fn the_first_start_of_an_image_keeps_its_sum() {
     let seals = page(&board, SEALS);
     assert_ne!(seals[..16], [0xFF; 16]);
     assert_eq!(seals[16..], [0xFF; PAGE_BYTES - 16]);
-    strike(&mut board, Fault::ResetPin);
+    board.strike(Fault::ResetPin);
     board.until("mode: idle", 3000);
     assert_eq!(first(&board), 1, "known by now");
     assert_eq!(page(&board, SEALS), seals);
@@ -291,7 +283,7 @@ fn a_bit_of_the_image_that_turns_over_is_told_and_held() {
     for place in places(&Board::idle()) {
         let mut board = Board::moving();
         let flip = Fault::BitFlip(place, 4);
-        strike(&mut board, flip);
+        board.strike(flip);
         board.until(DAMAGED, LOOKED_AT_MS);
         let (cause, _, driven) = board.reset(20);
         assert_eq!(cause, Cause::Software, "{place:#x}");
@@ -301,13 +293,10 @@ fn a_bit_of_the_image_that_turns_over_is_told_and_held() {
             board.until(DAMAGED, 1100);
             board.bench.send(b's').expect("runs");
         }
-        for _ in 0..500 {
-            let drives = board.step().drives;
-            assert!(!drives.drive_on && !drives.preload_on);
-        }
+        board.assert_off(500);
         // Flashed again, it goes on.
-        strike(&mut board, flip);
-        strike(&mut board, Fault::ResetPin);
+        board.strike(flip);
+        board.strike(Fault::ResetPin);
         board.until("mode: idle", 3000);
     }
 }
@@ -330,14 +319,11 @@ fn an_image_names_no_folder_of_the_machine_that_built_it() {
 fn a_damaged_image_that_no_longer_starts_says_so_too() {
     let mut board = Board::moving();
     let copies = board.function("compiler_builtins::mem::memcpy");
-    strike(&mut board, Fault::BitFlip(copies + 0x22F, 4));
+    board.strike(Fault::BitFlip(copies + 0x22F, 4));
     board.until(DAMAGED, LOOKED_AT_MS);
     // Off from here on, how often ever it starts.
     board.step();
-    for _ in 0..500 {
-        let drives = board.step().drives;
-        assert!(!drives.drive_on && !drives.preload_on);
-    }
+    board.assert_off(500);
 }
 
 /// One that comes to nothing at all shows so by the light, over and over; on a sound board it
@@ -346,7 +332,7 @@ fn a_damaged_image_that_no_longer_starts_says_so_too() {
 fn a_damaged_image_that_says_nothing_any_more_blinks() {
     let lit = |board: &Board| board.bench.machine().chip().level(Pin::LIGHT);
     let mut board = Board::moving();
-    strike(&mut board, Fault::ResetPin);
+    board.strike(Fault::ResetPin);
     let from = board.log.len();
     while board.log.len() == from {
         board.step();
@@ -354,8 +340,8 @@ fn a_damaged_image_that_says_nothing_any_more_blinks() {
     }
     let mut board = Board::moving();
     let copies = board.function("compiler_builtins::mem::memcpy");
-    strike(&mut board, Fault::BitFlip(copies + 0x115, 4));
-    strike(&mut board, Fault::ResetPin);
+    board.strike(Fault::BitFlip(copies + 0x115, 4));
+    board.strike(Fault::ResetPin);
     board.step();
     let from = board.log.len();
     let mut seen = Vec::new();

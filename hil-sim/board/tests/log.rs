@@ -9,58 +9,17 @@ use interstage::rig::Rig;
 use interstage::supervise::Mode;
 use interstage::tick::Event;
 use interstage::units::Q16;
-use rig_board::bench::{Bench, STEP};
-use rig_board::log::Line;
+use rig_board::bench::STEP;
 use rig_board::peripherals::rcc::Cause;
 use rig_board::run;
 
-use crate::common::{elf, scenario, strings};
+use crate::common::{Board, elf, scenario};
 
 /// How far the log may be from the truth under way. Position: the tolerance of the steps'
 /// places, which the controller knows from its table and corrects itself by. Preload: two
 /// deviations of the preload sensor's gain at 50 N, six of its noise, and its age.
 const POSITION_MM: f64 = 0.8;
 const PRELOAD_N: f64 = 1.0;
-
-/// A board under way, with what it has said on both channels.
-struct Board {
-    bench: Bench<'static>,
-    lines: Vec<Line>,
-    frames: Vec<u8>,
-}
-
-impl Board {
-    fn off() -> Self {
-        let bench = Bench::new(elf(), strings(), &scenario(&["run.seed=1"])).expect("a bench");
-        Self { bench, lines: Vec::new(), frames: Vec::new() }
-    }
-
-    fn run(&mut self, milliseconds: u32) {
-        for _ in 0..milliseconds {
-            self.lines.extend(self.bench.step().expect("runs").1);
-            self.frames.extend(self.bench.take_frames());
-        }
-    }
-
-    fn until(&mut self, text: &str, milliseconds: u32) {
-        let from = self.lines.len();
-        for _ in 0..milliseconds {
-            self.run(1);
-            if self.lines[from..].iter().any(|line| line.text.contains(text)) {
-                return;
-            }
-        }
-        panic!("no `{text}` within {milliseconds} ms");
-    }
-
-    fn send(&mut self, letter: u8) {
-        assert!(self.bench.send(letter).expect("runs"), "the console listens");
-    }
-
-    fn log(&self) -> Run {
-        Run::of_stream(&self.frames)
-    }
-}
 
 #[test]
 fn every_tick_of_a_run_is_logged_and_runs_again_on_this_host() {
@@ -164,7 +123,7 @@ fn mute(board: &mut Board) {
 /// A run until the drive has arrived: how long it took, ms, what the text log says of the
 /// crossings, and what the tick cost.
 fn deployment(reader: Reader) -> (u32, Crossings, Ticks) {
-    let mut board = Board::off();
+    let mut board = Board::off(&["run.seed=1"]);
     board.bench.listen(reader == Reader::There);
     if reader == Reader::Mute {
         mute(&mut board);
@@ -233,7 +192,7 @@ fn neither_telemetry_nor_its_reader_changes_when_the_tick_begins_or_what_it_take
 
 #[test]
 fn frames_that_found_no_room_are_marked_and_the_capture_waits_for_its_reader() {
-    let mut board = Board::off();
+    let mut board = Board::off(&["run.seed=1"]);
     board.until("mode: idle", 3000);
     // Nobody listens while the drive is started and goes over the first step.
     board.bench.listen(false);
@@ -242,7 +201,7 @@ fn frames_that_found_no_room_are_marked_and_the_capture_waits_for_its_reader() {
     board.run(1500);
     board.bench.listen(true);
     board.run(1500);
-    let run = board.log();
+    let run = Run::of_stream(&board.frames);
     // A short frame may find room where a long one did not, so there are several marks.
     let (mut frames, mut ticks) = (0, 0);
     for (_, mark) in &run.marks {
@@ -270,7 +229,7 @@ fn frames_that_found_no_room_are_marked_and_the_capture_waits_for_its_reader() {
 
 #[test]
 fn a_restart_in_the_middle_is_marked_and_both_parts_run_again() {
-    let mut board = Board::off();
+    let mut board = Board::off(&["run.seed=1"]);
     board.until("mode: idle", 3000);
     board.send(b's');
     board.until("deploying: crossing", 8000);
@@ -286,7 +245,7 @@ fn a_restart_in_the_middle_is_marked_and_both_parts_run_again() {
     board.bench.machine_mut().restart(Cause::Power).expect("restarts");
     board.until("mode: idle", 3000);
     board.run(200);
-    let run = board.log();
+    let run = Run::of_stream(&board.frames);
     assert_eq!(run.counts.restarts, 2, "{:?}", run.marks);
     let placed = |boot| run.since_boot(boot).restart().and_then(|restart| restart.place());
     assert_eq!([0, 1, 2].map(|boot| placed(boot).is_some()), [false, true, false]);
@@ -311,7 +270,7 @@ fn minutes_of_deploying_and_retracting_are_logged_without_a_gap_or_drift() {
         return;
     }
     const ROUNDS: usize = 24;
-    let mut board = Board::off();
+    let mut board = Board::off(&["run.seed=1"]);
     board.until("mode: idle", 3000);
     let (mut decoder, mut truths) = (Decoder::new(), VecDeque::new());
     let mut due: Option<u32> = None;

@@ -32,7 +32,8 @@ const TIM3: u8 = INTERRUPT + 29;
 /// The board at the end of the checks.
 fn checked() -> Machine {
     let path = build_binary("interstage-images", "selftest", Profile::Release, &[]);
-    let mut machine = Machine::open(&path.expect("the image builds")).expect("an image");
+    let elf = std::fs::read(path.expect("the image builds")).expect("readable");
+    let mut machine = Machine::new(&elf).expect("an image");
     let stop = machine.run_until(PATIENCE).expect("runs");
     assert!(stop.is_some() && machine.place().contains("main"), "ended in {}", machine.place());
     machine

@@ -12,8 +12,7 @@ use rig_board::core::Register;
 use rig_board::faults::Fault;
 use rig_board::peripherals::rcc::Cause;
 
-use crate::common::reset::Board;
-use crate::common::{elf, strings};
+use crate::common::{Board, elf, strings};
 
 fn hang(restart: &Restart) -> (u32, MissedCheckIns) {
     match restart.crash.map(|crash| crash.stopped) {
@@ -38,7 +37,7 @@ fn a_first_start_reports_nothing_but_power() {
 #[test]
 fn a_panic_is_reported_with_its_line_and_what_the_drive_did() {
     let mut board = Board::moving();
-    let at = board.bench.plant().truth().position_mm;
+    let at = board.position_mm();
     let panics = board.function("panic_bounds_check");
     // Index and length, and a place that has some line.
     let place = 0x0800_1000;
@@ -118,7 +117,7 @@ fn into_turn(board: &mut Board, task: &str, cycles: u64) {
         .collect();
     for poll in polls {
         for _ in 0..60 {
-            let machine = board.bench.machine_mut();
+            let machine = board.machine();
             let until = (machine.now() / STEP + 1) * STEP;
             if machine.run_to(poll, until).expect("runs") {
                 if machine.task() != Some(task) {
@@ -149,7 +148,7 @@ fn the_task_that_hangs_is_named_whichever_it_is() {
     for (task, name, cycles) in TASKS {
         let mut board = Board::moving();
         into_turn(&mut board, task, cycles);
-        Fault::Caught.strike(board.bench.machine_mut()).expect("strikes");
+        board.strike(Fault::Caught);
         let (cause, after, driven) = board.reset(250);
         assert_eq!(cause, Cause::Watchdog, "{task}");
         // The time to be missed, and that of the watchdog.
@@ -166,19 +165,19 @@ fn the_task_that_hangs_is_named_whichever_it_is() {
 #[test]
 fn an_interrupt_that_never_ceases_ends_in_a_reset_that_names_the_starved_tick() {
     let mut board = Board::moving();
-    let at = board.bench.plant().truth().position_mm;
-    Fault::ButtonStorm.strike(board.bench.machine_mut()).expect("strikes");
+    let at = board.position_mm();
+    board.strike(Fault::ButtonStorm);
     let (cause, after, driven) = board.reset(150);
     assert_eq!(cause, Cause::Watchdog);
     assert!(after <= 115, "{after} ms");
     // The system timer's interrupt gets through and cuts before the watchdog bites.
     assert_cut(&driven, 85);
-    Fault::ButtonStorm.heal(board.bench.machine_mut());
+    Fault::ButtonStorm.switch(board.machine(), false).expect("a fault");
     let restart = board.report();
     let (pc, missed) = hang(&restart);
     assert_eq!(missed, MissedCheckIns::STARVED);
     assert_ne!(pc, 0);
-    let on = board.bench.plant().truth().position_mm - at;
+    let on = board.position_mm() - at;
     assert!(on < 1.0, "it went on for {on} mm");
 }
 
@@ -186,7 +185,7 @@ fn an_interrupt_that_never_ceases_ends_in_a_reset_that_names_the_starved_tick() 
 fn interrupts_masked_for_good_end_in_a_reset_with_what_the_drive_did() {
     let mut board = Board::moving();
     board.set(Register::Primask, 1);
-    Fault::Caught.strike(board.bench.machine_mut()).expect("strikes");
+    board.strike(Fault::Caught);
     let (cause, _, _) = board.reset(150);
     assert_eq!(cause, Cause::Watchdog);
     let restart = board.report();
@@ -197,11 +196,11 @@ fn interrupts_masked_for_good_end_in_a_reset_with_what_the_drive_did() {
 #[test]
 fn a_report_is_made_once() {
     let mut board = Board::moving();
-    Fault::ResetPin.strike(board.bench.machine_mut()).expect("strikes");
+    board.strike(Fault::ResetPin);
     let first = board.report();
     assert_eq!(first.reset, Reset::Pin);
     assert!(matches!(first.snapshot.and_then(|f| f.mode()), Some(Mode::Run(..))));
-    board.bench.machine_mut().restart(Cause::Software).expect("restarts");
+    board.machine().restart(Cause::Software).expect("restarts");
     let second = board.report();
     assert_eq!(second.reset, Reset::Software);
     assert_eq!(second.snapshot.and_then(|f| f.mode()), Some(Mode::Idle));
