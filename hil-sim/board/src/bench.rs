@@ -13,9 +13,10 @@ use super::peripherals::HZ;
 use super::rtt::Probe;
 use hil_sim::injector::FaultInjector;
 use hil_sim::plant::rig::{Drives, VirtualRig};
-use hil_sim::plant::sensors::{Codes, Sensed, Sensors};
+use hil_sim::plant::sensors::{Codes, Sensors};
 use hil_sim::record::letter;
 use hil_sim::scenario::{Direction, Scenario};
+use hil_sim::session;
 
 /// Step of the plant, s and cycles.
 const STEP_S: f64 = 1e-3;
@@ -57,9 +58,7 @@ pub struct Bench<'a> {
 impl<'a> Bench<'a> {
     /// A board with this image, off, and the plant of a scenario: for deployment with
     /// the wheel unloaded at the stow end, for retraction pressed at the end of travel.
-    ///
-    /// # Errors
-    /// [`ImageError`] if the image is none, or lacks its log.
+    /// Errors: [`ImageError`] if the image is none, or lacks its log.
     pub fn new(elf: &[u8], strings: &'a Strings, scenario: &Scenario) -> Result<Self, ImageError> {
         let parameters = scenario.plant();
         let (position, preload) = match scenario.run.direction {
@@ -69,7 +68,7 @@ impl<'a> Bench<'a> {
         let machine = Machine::new(elf)?;
         let mut sensors = Sensors::new(parameters.sensors.clone(), scenario.run.seed);
         let plant = VirtualRig::new(parameters, position, preload, STEP_S);
-        let codes = sensors.read(sensed(&plant), STEP_S);
+        let codes = session::read(&mut sensors, &plant);
         let mut bench = Self {
             probe: Probe::of(&machine)?,
             machine,
@@ -90,9 +89,7 @@ impl<'a> Bench<'a> {
     }
 
     /// Runs one millisecond. Returns inputs and outputs, and the lines of the log.
-    ///
-    /// # Errors
-    /// [`BoardError`] if the engine or the plant fails.
+    /// Errors: [`BoardError`] if the engine or the plant fails.
     pub fn step(&mut self) -> Result<(Passed, Vec<Line>), BoardError> {
         let end = self.end();
         self.save()?;
@@ -149,18 +146,14 @@ impl<'a> Bench<'a> {
     }
 
     /// Runs to the end of the millisecond or to a breakpoint, whose address is returned.
-    ///
-    /// # Errors
-    /// As [`Bench::step`].
+    /// Errors: as [`Bench::step`].
     pub fn run_to_break(&mut self) -> Result<Option<u32>, BoardError> {
         let end = self.end();
         Ok(self.machine.run_until(end)?)
     }
 
     /// Executes one instruction.
-    ///
-    /// # Errors
-    /// As [`Bench::step`].
+    /// Errors: as [`Bench::step`].
     pub fn step_instruction(&mut self) -> Result<(), BoardError> {
         let end = self.end();
         Ok(self.machine.step(end)?)
@@ -172,9 +165,7 @@ impl<'a> Bench<'a> {
     }
 
     /// Closes a millisecond that is over: the plant makes its step.
-    ///
-    /// # Errors
-    /// As [`Bench::step`].
+    /// Errors: as [`Bench::step`].
     pub fn close(&mut self) -> Result<(Passed, Vec<Line>), BoardError> {
         self.millisecond += 1;
         self.end = self.end() + STEP;
@@ -194,7 +185,7 @@ impl<'a> Bench<'a> {
             None => drives,
         };
         self.plant.step(&taken, STEP_S)?;
-        let mut codes = self.sensors.read(sensed(&self.plant), STEP_S);
+        let mut codes = session::read(&mut self.sensors, &self.plant);
         if let Some(injector) = &mut self.injector {
             let t_s = self.millisecond as f64 * STEP_S;
             injector.begin(&mut self.machine, &mut self.plant, t_s)?;
@@ -232,25 +223,19 @@ impl<'a> Bench<'a> {
     }
 
     /// Sends a letter to the board's console; false if it has no room or is not set up yet.
-    ///
-    /// # Errors
-    /// [`BoardError`] if the engine fails.
+    /// Errors: [`BoardError`] if the engine fails.
     pub fn send(&mut self, letter: u8) -> Result<bool, BoardError> {
         Ok(self.probe.down(&mut self.machine, 0, &[letter])? == 1)
     }
 
     /// Sends bytes down the binary line; returns how many it had room for.
-    ///
-    /// # Errors
-    /// [`BoardError`] if the engine fails.
+    /// Errors: [`BoardError`] if the engine fails.
     pub fn line_send(&mut self, bytes: &[u8]) -> Result<usize, BoardError> {
         Ok(self.probe.down(&mut self.machine, 1, bytes)?)
     }
 
     /// Bytes that the board has sent up its binary line.
-    ///
-    /// # Errors
-    /// [`BoardError`] if the engine fails.
+    /// Errors: [`BoardError`] if the engine fails.
     pub fn line_take(&mut self) -> Result<Vec<u8>, BoardError> {
         Ok(self.probe.up(&mut self.machine, 2)?)
     }
@@ -293,17 +278,5 @@ impl<'a> Bench<'a> {
     /// Time since power came up, s.
     pub fn time_s(&self) -> f64 {
         self.millisecond as f64 * STEP_S
-    }
-}
-
-/// Quantities that the sensors measure.
-fn sensed(plant: &VirtualRig) -> Sensed {
-    let truth = plant.truth();
-    Sensed {
-        rotation_rad: truth.rotation_rad,
-        preload_n: truth.preload_n,
-        depth_mm: truth.depth_mm,
-        arm_rad: truth.arm_rad,
-        bridges: truth.bridges,
     }
 }

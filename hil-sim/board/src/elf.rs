@@ -37,9 +37,7 @@ pub struct Loaded {
 
 impl Loaded {
     /// What of the image goes to flash, and what its symbols say.
-    ///
-    /// # Errors
-    /// [`ImageError::Form`] if it is no image of the board.
+    /// Errors: [`ImageError::Form`] if it is no image of the board.
     pub fn of(elf: &[u8]) -> Result<Self, ImageError> {
         let file = ElfFile32::<Endianness>::parse(elf).map_err(ImageError::form)?;
         let endian = file.endian();
@@ -76,9 +74,7 @@ impl Loaded {
     }
 
     /// Value of a symbol.
-    ///
-    /// # Errors
-    /// [`ImageError::Missing`] if the image has none of this name.
+    /// Errors: [`ImageError::Missing`] if the image has none of this name.
     pub fn symbol(&self, name: &str) -> Result<u32, ImageError> {
         self.symbols.get(name).copied().ok_or_else(|| ImageError::Missing(name.to_owned()))
     }

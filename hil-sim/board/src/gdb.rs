@@ -49,9 +49,7 @@ pub enum GdbError {
 }
 
 /// Listens at `[host]:[port]`; without a host on this machine alone.
-///
-/// # Errors
-/// [`GdbError::Listen`] if that cannot be done.
+/// Errors: [`GdbError::Listen`] if that cannot be done.
 pub fn listen(address: &str) -> Result<TcpListener, GdbError> {
     let (host, port) = address.rsplit_once(':').unwrap_or((address, ""));
     let host = if host.is_empty() { "127.0.0.1" } else { host };
@@ -64,9 +62,7 @@ pub fn listen(address: &str) -> Result<TcpListener, GdbError> {
 /// Waits for a debugger and lets it have the board with the image in `elf`, before its
 /// first instruction. The command to set off is given once the drive is idle. Returns when
 /// the debugger goes.
-///
-/// # Errors
-/// [`GdbError`] if the board or the connection fails.
+/// Errors: [`GdbError`] if the board or the connection fails.
 pub fn serve(
     listener: &TcpListener,
     elf: &[u8],

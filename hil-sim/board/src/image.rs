@@ -38,9 +38,7 @@ pub struct Image {
 
 impl Image {
     /// Loads the image in `elf` and runs its start-up code.
-    ///
-    /// # Errors
-    /// [`ImageError`] if it is no image, or does not start.
+    /// Errors: [`ImageError`] if it is no image, or does not start.
     pub fn start(elf: &[u8]) -> Result<Self, ImageError> {
         let loaded = Loaded::of(elf)?;
         let counted = Counted { base: FLASH.base, bytes: &loaded.flash, code: &loaded.code };
@@ -60,18 +58,14 @@ impl Image {
     }
 
     /// Writes words to the mailbox from `address` on.
-    ///
-    /// # Errors
-    /// [`ImageError::Core`] if the mailbox is too small.
+    /// Errors: [`ImageError::Core`] if the mailbox is too small.
     pub fn put(&mut self, address: u32, words: &[u32]) -> Result<(), ImageError> {
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
         Ok(self.core.write(address, &bytes)?)
     }
 
     /// Reads words from the mailbox.
-    ///
-    /// # Errors
-    /// [`ImageError::Core`] if nothing lies there.
+    /// Errors: [`ImageError::Core`] if nothing lies there.
     pub fn get<const N: usize>(&self, address: u32) -> Result<[u32; N], ImageError> {
         let mut words = [0; N];
         for (index, word) in words.iter_mut().enumerate() {
@@ -83,9 +77,7 @@ impl Image {
     }
 
     /// Address of a function, for [`Image::call`].
-    ///
-    /// # Errors
-    /// [`ImageError::Missing`] if the image has none of this name.
+    /// Errors: [`ImageError::Missing`] if the image has none of this name.
     pub fn function(&self, name: &str) -> Result<u32, ImageError> {
         let found = self.loaded.functions.iter().find(|function| function.name == name);
         found
@@ -94,9 +86,7 @@ impl Image {
     }
 
     /// Calls a function with at most four arguments.
-    ///
-    /// # Errors
-    /// [`ImageError::Lost`] if it panics or does not return, [`ImageError::Core`] if it
+    /// Errors: [`ImageError::Lost`] if it panics or does not return, [`ImageError::Core`] if it
     /// faults.
     pub fn call(&mut self, function: u32, arguments: &[u32]) -> Result<Call, ImageError> {
         for (number, value) in arguments.iter().enumerate() {
@@ -136,9 +126,7 @@ impl Image {
     /// Calls a function once for each input, given by reference: its words stand in the
     /// mailbox. Returns what the calls gave, and what they took; `worst_input` of that
     /// is the index of an input.
-    ///
-    /// # Errors
-    /// As [`Image::call`], and [`ImageError::Missing`].
+    /// Errors: as [`Image::call`], and [`ImageError::Missing`].
     pub fn measure<I: AsRef<[u32]>>(
         &mut self,
         function: &str,

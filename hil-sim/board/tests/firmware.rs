@@ -5,6 +5,7 @@ use hil_sim::scenario::Direction;
 use hil_sim::session::{self, Options, Session};
 use interstage::supervise::{Command, Mode};
 use rig_board::chip::Pin;
+use rig_board::core::{Access, Bus};
 use rig_board::faults::Fault;
 use rig_board::peripherals::rcc::Cause;
 use rig_board::run::{self, Ran};
@@ -206,10 +207,11 @@ fn power_lost_in_the_middle_of_a_crossing_is_survived() {
 fn a_driver_on_the_wrong_timer_channel_is_caught() {
     const TIM1_CCER: u32 = 0x4001_2C20;
     let mut board = Board::idle();
-    let enables = board.machine().peek_register(TIM1_CCER);
+    let at = Access { address: TIM1_CCER, size: 4, pc: 0, now: board.machine().now() };
+    let enables = board.machine().chip_mut().read(at);
     assert_eq!(enables & 0xF0, 0, "only channel 1 and its complement: {enables:#x}");
     // Channel 2 instead of channel 1.
-    board.machine().poke_register(TIM1_CCER, enables << 4);
+    board.machine().chip_mut().write(at, enables << 4);
     board.send(b's');
     board.until("] fault ", 10_000);
     assert!(board.position_mm().abs() < 0.1, "{}", board.position_mm());

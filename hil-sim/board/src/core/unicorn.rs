@@ -91,9 +91,7 @@ fn engine<T>(what: &'static str, result: Result<T, impl std::fmt::Debug>) -> Res
 
 impl UnicornCore {
     /// A core with these memories and nothing else, counting the cycles of `counted`.
-    ///
-    /// # Errors
-    /// [`CoreError::Engine`] if the engine cannot be had or a memory overlaps.
+    /// Errors: [`CoreError::Engine`] if the engine cannot be had or a memory overlaps.
     pub fn new(memories: &[Memory], counted: &Counted<'_>) -> Result<Self, CoreError> {
         Self::with_bus(memories, counted, NoBus)
     }
@@ -101,9 +99,7 @@ impl UnicornCore {
 
 impl<B: Bus + 'static> UnicornCore<B> {
     /// A core with these memories and a bus, counting the cycles of `counted`.
-    ///
-    /// # Errors
-    /// As [`UnicornCore::new`].
+    /// Errors: as [`UnicornCore::new`].
     pub fn with_bus(memories: &[Memory], counted: &Counted<'_>, bus: B) -> Result<Self, CoreError> {
         let ranges = bus.ranges();
         let inside = Inside { count: Count::new(counted), bus, marks: Vec::new() };
@@ -323,9 +319,8 @@ impl<B: Bus + 'static> Core for UnicornCore<B> {
         self.engine.get_data().count.meter
     }
 
-    fn mark(&mut self, address: u32) -> Result<(), CoreError> {
+    fn mark(&mut self, address: u32) {
         self.engine.get_data_mut().count.mark(address & !1);
-        Ok(())
     }
 
     fn take_marks(&mut self, marks: &mut Vec<Mark>) {

@@ -12,10 +12,9 @@ use embassy_stm32::pac::Interrupt;
 
 use crate::assembly::{conditional, float_across};
 use crate::handlers::{BEATS, CALLS, NUMBER, note, order};
-use crate::storage::flash;
 
 /// Their order is known to the host.
-pub(crate) const ALL: [fn() -> bool; 16] = [
+pub(crate) const ALL: [fn() -> bool; 15] = [
     supervisor_calls,
     conditional_blocks,
     float_context,
@@ -31,7 +30,6 @@ pub(crate) const ALL: [fn() -> bool; 16] = [
     float_results,
     compares_under_interrupts,
     cycle_counter,
-    flash,
 ];
 
 /// Priorities and enables.
