@@ -159,7 +159,7 @@ impl<'a> Board<'a> {
             say(Event::Fault(fault));
         }
         for line in &lines {
-            let limit = line.behind("] limit ").and_then(|said| said.split_once(": "));
+            let limit = line.after("] limit ").and_then(|said| said.split_once(": "));
             let code = limit.and_then(|(code, _)| code.parse().ok());
             let known = Limit::ALL.into_iter().find(|limit| Some(limit.code()) == code);
             known.into_iter().for_each(|limit| say(Event::Limit(limit)));
@@ -265,7 +265,7 @@ fn watched(
             back_s = Some(t_s);
         }
         // Only a save in progress delays the end of the run.
-        let saves = matches!(board.bench.saving(), Some(Saving::Asked | Saving::Writing));
+        let saves = matches!(board.bench.saving(), Some(Saving::Requested | Saving::Writing));
         let over = match (board.image_s, board.light_s) {
             (Some(_), _) => true,
             // The log's line can still follow.

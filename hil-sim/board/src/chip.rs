@@ -85,7 +85,7 @@ pub struct Chip {
     crc: CrcUnit,
     /// The angle sensor.
     pub angle: AngleSensor,
-    /// The select line was high during the frame under way.
+    /// The select line was high during the current frame.
     deselected: bool,
     /// The wheel encoder's position, in quarters of a line pair.
     wheel: i64,

@@ -1,4 +1,4 @@
-//! Exceptions of the core: what is pending, enabled and active, and which is next.
+//! Exceptions of the core: pending, enabled, active, and the next one.
 //!
 //! Source: ARMv7-M Architecture Reference Manual, B1.5 and B3.4.
 
@@ -36,7 +36,7 @@ pub struct Exceptions {
     pending: u128,
     enabled: u128,
     lines: u128,
-    /// Active ones, the one that runs last.
+    /// Active ones, the running one at the end.
     active: Vec<u8>,
     priorities: [u8; COUNT],
     /// `PRIGROUP`: bits of a priority, from 0 to this, that do not preempt.
@@ -85,7 +85,7 @@ impl Exceptions {
         }
     }
 
-    /// Takes the request back.
+    /// Clears the request.
     pub fn clear(&mut self, number: u8) {
         self.pending &= !(1 << number);
         self.refresh();
@@ -176,8 +176,8 @@ impl Exceptions {
         self.group
     }
 
-    /// Priority with its whole number of bits.
-    fn whole(&self, number: u8) -> i16 {
+    /// Priority with all its bits.
+    fn priority(&self, number: u8) -> i16 {
         match number {
             2 => -2,
             number::HARD_FAULT => -1,
@@ -187,8 +187,8 @@ impl Exceptions {
 
     /// The part of a priority that preempts.
     fn preempts(&self, number: u8) -> i16 {
-        let whole = self.whole(number);
-        if whole < 0 { whole } else { whole & !((1 << (self.group + 1)) - 1) }
+        let priority = self.priority(number);
+        if priority < 0 { priority } else { priority & !((1 << (self.group + 1)) - 1) }
     }
 
     /// Priority at which the core executes, masks apart.
@@ -197,7 +197,7 @@ impl Exceptions {
     }
 
     fn refresh(&mut self) {
-        let next = bits(self.pending & self.enabled).min_by_key(|n| (self.whole(*n), *n));
+        let next = bits(self.pending & self.enabled).min_by_key(|n| (self.priority(*n), *n));
         let next = next.map(|number| (number, self.preempts(number)));
         self.urgent = next.filter(|(_, priority)| *priority < self.level());
     }

@@ -277,7 +277,7 @@ fn flipped(machine: &Machine, injection: &Injection) -> Result<Option<Fault>, Co
     Ok(place.map(|place| Fault::BitFlip(place + bit / 8, (bit % 8) as u8)))
 }
 
-/// The fault of registers and lines that stands for an injection.
+/// The fault of registers and lines for an injection.
 fn register(injection: &Injection) -> Option<Fault> {
     let word = injection.magnitude() as u16;
     Some(match (injection.target, injection.kind) {

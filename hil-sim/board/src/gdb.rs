@@ -1,8 +1,8 @@
 //! A debugger on the emulated board, over GDB's remote protocol: registers, memory,
-//! breakpoints, single steps, while the plant goes on with the board's own clock.
+//! breakpoints, single steps. The plant follows the board's own clock.
 //!
-//! A breakpoint is the processor's own instruction for it in the place of another, which
-//! is put back before it is carried out. Whatever is looked at, no time passes.
+//! A breakpoint is a `BKPT` in the place of an instruction, which is restored before it is
+//! executed. Access to memory and registers takes no time.
 
 mod arch;
 mod target;
@@ -59,9 +59,8 @@ pub fn listen(address: &str) -> Result<TcpListener, GdbError> {
     TcpListener::bind((host, port)).map_err(failed)
 }
 
-/// Waits for a debugger and lets it have the board with the image in `elf`, before its
-/// first instruction. The command to set off is given once the drive is idle. Returns when
-/// the debugger goes.
+/// Waits for a debugger and serves the board with the image in `elf` to it, from the first
+/// instruction on. The drive starts once it is idle. Returns when the debugger disconnects.
 /// Errors: [`GdbError`] if the board or the connection fails.
 pub fn serve(
     listener: &TcpListener,
@@ -90,19 +89,19 @@ pub fn serve(
     }
 }
 
-/// Is shown each line of the log as it comes.
+/// Gets each line of the log with its time, s.
 type Watch<'a> = Box<dyn FnMut(f64, &Line) + 'a>;
 
-/// A board in the hands of a debugger.
+/// A board under a debugger.
 struct Debugged<'a> {
     bench: Bench<'a>,
-    /// Breakpoints with what stands in their places.
+    /// Breakpoints with the code that they replace.
     breaks: BTreeMap<u32, [u8; 2]>,
-    /// Asked to go on by one instruction.
+    /// The debugger has requested a single step.
     steps: bool,
-    /// The letter that sets off, until it is sent.
+    /// The letter that starts the drive, until it is sent.
     start: Option<u8>,
-    /// The drive has said that it is idle.
+    /// The log has reported idle.
     idle: bool,
     watch: Watch<'a>,
 }
@@ -126,7 +125,7 @@ impl Debugged<'_> {
         Ok(())
     }
 
-    /// Carries out what stands at the program counter, a breakpoint or not.
+    /// Executes the instruction at the program counter, even under a breakpoint.
     fn step(&mut self) -> Result<(), BoardError> {
         let machine = self.bench.machine_mut();
         let place = machine.pc();
@@ -140,7 +139,7 @@ impl Debugged<'_> {
         self.close()
     }
 
-    /// Goes on up to a breakpoint, or a millisecond at most.
+    /// Runs to a breakpoint, or to the end of the millisecond.
     fn run(&mut self) -> Result<Option<SingleThreadStopReason<u32>>, BoardError> {
         if self.breaks.contains_key(&self.bench.machine().pc()) {
             self.step()?;
@@ -154,7 +153,7 @@ impl Debugged<'_> {
     }
 }
 
-/// What the debugger and the board wait for.
+/// Connects the debugger's loop to the board.
 struct Loop<'a>(std::marker::PhantomData<&'a ()>);
 
 type Waited<'a> = Result<
@@ -195,13 +194,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn without_a_host_it_is_this_machine_alone() {
+    fn without_a_host_it_listens_on_this_machine_only() {
         let listener = listen(":0").expect("a port");
         assert!(listener.local_addr().expect("bound").ip().is_loopback());
     }
 
     #[test]
-    fn an_address_that_is_none_is_named() {
+    fn an_invalid_address_is_named() {
         for address in [":x", ":99999", "no such host:1"] {
             let error = listen(address).expect_err("none").to_string();
             assert!(error.starts_with(address), "{error}");

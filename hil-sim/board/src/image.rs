@@ -1,5 +1,4 @@
-//! A measurement image on the core: its functions called from the host, each call with
-//! its cycles.
+//! A measurement image on the core: the host calls its functions and counts their cycles.
 
 use super::core::unicorn::{Access, Counted, Memory, UnicornCore};
 use super::core::{Core, CoreError, Meter, Register, Stop};
@@ -7,29 +6,29 @@ use super::elf::{FLASH, Loaded, RAM, named};
 use super::error::ImageError;
 use super::spread::Spread;
 
-/// System control space: the start-up code writes it and nothing is measured in it.
+/// System control space, which the start-up code writes; here plain memory.
 const SYSTEM: Memory = Memory { base: 0xE000_0000, size: 1024 * 1024, access: Access::Data };
-/// Where the host leaves arguments, in the chip's window for external memory.
+/// Memory for arguments and results, in the chip's window for external memory.
 const MAILBOX: Memory = Memory { base: 0x6000_0000, size: 1024 * 1024, access: Access::Data };
-/// Where calls return to: a breakpoint at the mailbox's end.
+/// Return address of calls: a breakpoint at the mailbox's end.
 const RETURN: u32 = MAILBOX.base + MAILBOX.size - 4;
 /// First address for arguments.
 pub const ARGUMENTS: u32 = MAILBOX.base;
-/// Cycles after which a call has lost its way: ten seconds of the chip's time.
+/// Longest call, cycles: ten seconds of the chip's time.
 const PATIENCE: u64 = 1_700_000_000;
 /// The breakpoint instruction.
 const BKPT: [u8; 2] = [0x00, 0xBE];
 
-/// What one call took.
+/// Result of a call.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Call {
-    /// What it returned.
+    /// Its return value.
     pub value: u32,
-    /// What it took.
+    /// Its cost.
     pub meter: Meter,
 }
 
-/// An image that has started and waits to be called.
+/// An image after its start-up code.
 pub struct Image {
     core: UnicornCore,
     loaded: Loaded,
@@ -104,7 +103,7 @@ impl Image {
         }
     }
 
-    /// What a stop means where a call should have ended.
+    /// The error of a call that stopped elsewhere than at its end.
     fn lost(&self, function: &str, stop: Stop) -> ImageError {
         let at = match stop {
             Stop::Fault { at, fault } => {
@@ -123,9 +122,8 @@ impl Image {
         ImageError::Lost { function: function.to_owned(), at: self.name(at).to_owned() }
     }
 
-    /// Calls a function once for each input, given by reference: its words stand in the
-    /// mailbox. Returns what the calls gave, and what they took; `worst_input` of that
-    /// is the index of an input.
+    /// Calls a function once for each input, whose words are passed by reference. Returns the
+    /// values and the cost of the calls; `worst_input` is the index of an input.
     /// Errors: as [`Image::call`], and [`ImageError::Missing`].
     pub fn measure<I: AsRef<[u32]>>(
         &mut self,

@@ -319,7 +319,7 @@ impl Machine {
             let found = self.carry(due)?;
             self.chip_mut().moved(due.channel, found, now);
         }
-        if let Some(place) = self.chip().flash.asks_for() {
+        if let Some(place) = self.chip().flash.needs() {
             let mut before = [0; 8];
             self.core.read(place, &mut before)?;
             self.chip_mut().flash.found(before, now);

@@ -1,4 +1,4 @@
-//! The emulated board at the other end of the line, with flash that outlasts the run.
+//! The emulated board at the end of the host's line, with flash that outlasts the run.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -44,7 +44,7 @@ impl EmulatedBoard {
         let mut board = Self { bench, flash: flash.to_owned() };
         for _ in 0..START_MS {
             let (_, lines) = board.bench.step().map_err(|error| wire(&error))?;
-            // Parameters that the firmware cannot run are a reason to be asked for them.
+            // Parameters that the firmware refuses can still be read and changed.
             let up = |text: &str| text.contains("mode: idle") || text.contains("parameters: ");
             if lines.iter().any(|line| up(&line.text)) {
                 return Ok(board);

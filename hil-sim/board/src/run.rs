@@ -69,7 +69,7 @@ pub(crate) fn store(machine: &mut Machine, scenario: &Scenario) -> Result<(), Bo
 
 /// Options of a run beside its scenario.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Asked {
+pub struct RunOptions {
     /// Keep one row a millisecond.
     pub rows: bool,
     /// Faults of the hardware during the run.
@@ -85,7 +85,7 @@ pub fn run(
     rows: bool,
     watch: impl FnMut(f64, &Line),
 ) -> Result<Ran, BoardError> {
-    run_with(elf, scenario, &Asked { rows, ..Asked::default() }, watch)
+    run_with(elf, scenario, &RunOptions { rows, ..RunOptions::default() }, watch)
 }
 
 /// The same with all options.
@@ -93,7 +93,7 @@ pub fn run(
 pub fn run_with(
     elf: &[u8],
     scenario: &Scenario,
-    asked: &Asked,
+    options: &RunOptions,
     mut watch: impl FnMut(f64, &Line),
 ) -> Result<Ran, BoardError> {
     check(scenario)?;
@@ -107,7 +107,7 @@ pub fn run_with(
     let mut after = AFTER;
     let mut gathered = Gathered::default();
     let mut stream = Vec::new();
-    let mut faults = asked.faults.clone();
+    let mut faults = options.faults.clone();
     while bench.time_s() < LONGEST_S && after > 0 {
         let now = bench.time_s();
         for due in faults.extract_if(.., |due| due.at_s <= now) {
@@ -126,7 +126,7 @@ pub fn run_with(
         }
         gathered.gather(bench.machine_mut());
         stream.extend(bench.take_frames());
-        trace.add(&passed, &lines, bench.plant().truth(), asked.rows);
+        trace.add(&passed, &lines, bench.plant().truth(), options.rows);
         if trace.is_over() {
             after -= 1;
         }

@@ -1,9 +1,9 @@
-//! What the board's flash keeps beside parameters: what the drive was doing when the supply
-//! went, and the sum of the image at its first start.
+//! What the board's flash keeps beside parameters: the state of the drive when the supply
+//! fell, and the checksum of the image.
 
 use interstage::params::slots::SLOT_BYTES;
 use interstage::restart::page::PAGE_BYTES;
-use interstage::restart::{DriveSnapshot, Reset, Stopped};
+use interstage::restart::{DriveSnapshot, Reset, Restart, Stopped};
 use interstage::supervise::Mode;
 use rig_board::bench::STEP;
 use rig_board::chip::Pin;
@@ -15,15 +15,15 @@ use rig_board::thumb::sweep;
 
 use crate::common::Board;
 
-/// Where the pages stand, by `docs/PARAMETERS.md`.
+/// Addresses of the pages, as in `docs/PARAMETERS.md`.
 const RECORDS: u32 = 0x0808_0000 - 2 * SLOT_BYTES as u32 - PAGE_BYTES as u32;
-const SEALS: u32 = RECORDS - PAGE_BYTES as u32;
+const CHECKSUMS: u32 = RECORDS - PAGE_BYTES as u32;
 
-/// What every image says that finds itself damaged.
+/// The log's line of a damaged image.
 const DAMAGED: &str = "image: a bit has turned over";
 
-/// Longest time in which the whole image is looked at twice, ms.
-const LOOKED_AT_MS: u32 = 14_000;
+/// Longest time of two checks of the image, ms.
+const CHECKED_MS: u32 = 14_000;
 
 fn page(board: &Board, address: u32) -> Vec<u8> {
     let mut bytes = vec![0; PAGE_BYTES];
@@ -31,7 +31,23 @@ fn page(board: &Board, address: u32) -> Vec<u8> {
     bytes
 }
 
-/// Falls in the middle of a run, and is judged by what the next start reports.
+/// Runs until the start has taken the record, 24 bytes on; the tick has not begun.
+fn until_taken(board: &mut Board) {
+    let taken = (0..200).any(|_| {
+        let now = board.machine().now();
+        board.machine().run_on(now + STEP / 20).expect("runs");
+        page(board, RECORDS)[24..32] == [0; 8]
+    });
+    assert!(taken, "{:#?}", board.log);
+}
+
+/// Asserts that a start restored the position near `at`, mm, as an unconfirmed one.
+fn assert_unconfirmed(restart: &Restart, at: f64) {
+    let place = restart.place().expect("a position");
+    assert!((place.position.to_num::<f64>() - at).abs() < 0.3 && !place.sure, "{restart} at {at}");
+}
+
+/// Lets the supply fall during a run; the snapshot in the report of the next start.
 fn falls(board: &mut Board) -> Option<DriveSnapshot> {
     board.strike(Fault::BrownOut);
     let (cause, after, driven) = board.reset(5);
@@ -48,21 +64,25 @@ fn falls(board: &mut Board) -> Option<DriveSnapshot> {
 }
 
 #[test]
-fn a_supply_that_falls_leaves_what_the_drive_did() {
+fn a_supply_that_falls_leaves_a_record_that_is_reported_once() {
     let mut board = Board::moving();
     let at = board.position_mm();
     let snapshot = falls(&mut board).expect("a record");
     assert!(matches!(snapshot.mode(), Some(Mode::Run(..))), "{snapshot:?}");
     assert!((snapshot.position.to_num::<f64>() - at).abs() < 0.3, "{snapshot:?} at {at}");
     for said in ["the supply fell too low", "before: tick"] {
-        assert!(board.log.iter().any(|line| line.contains(said)), "{said}: {:#?}", board.log);
+        assert!(board.said(said), "{said}: {:#?}", board.log);
     }
+    // RAM is lost again, without a warning.
+    board.strike(Fault::SupplyCut);
+    let second = board.report();
+    assert_eq!((second.reset, second.snapshot, second.crash), (Reset::Power, None, None));
 }
 
-/// Of the millisecond that the wiring has to give it, it takes the half at most.
+/// The wiring has to give it a millisecond, of which it takes at most half.
 #[test]
 fn a_record_of_the_supply_is_written_in_half_of_its_time() {
-    // An empty page, which is looked through from its end, and one with room for one more.
+    // An empty page, which is searched from its end, and one with room for one more.
     for filled in [0, PAGE_BYTES - 32] {
         let mut board = Board::moving();
         board.machine().poke(RECORDS, &vec![0; filled]).expect("flash");
@@ -82,36 +102,20 @@ fn a_record_of_the_supply_is_written_in_half_of_its_time() {
 }
 
 #[test]
-fn a_record_of_the_supply_is_reported_once() {
-    let mut board = Board::moving();
-    falls(&mut board).expect("a record");
-    // The memory is lost, and this time without a warning.
-    board.strike(Fault::SupplyCut);
-    let second = board.report();
-    assert_eq!((second.reset, second.snapshot, second.crash), (Reset::Power, None, None));
-}
-
-#[test]
 fn a_supply_that_flickers_leaves_its_first_record() {
     let mut board = Board::moving();
     board.strike(Fault::BrownOut);
-    // Back until the record has been taken, 24 bytes on: the tick has not begun.
-    let taken = (0..200).any(|_| {
-        let machine = board.machine();
-        machine.run_on(machine.now() + STEP / 20).expect("runs");
-        page(&board, RECORDS)[24..32] == [0; 8]
-    });
-    assert!(taken, "{:#?}", board.log);
+    until_taken(&mut board);
     let snapshot = falls(&mut board).expect("the same record");
     assert!(matches!(snapshot.mode(), Some(Mode::Run(..))), "{snapshot:?}");
 }
 
 #[test]
-fn a_record_is_whole_or_none_wherever_power_goes() {
+fn a_record_is_intact_or_absent_whenever_power_is_lost() {
     // Of the third double word the lower half is the record's last.
-    for (operations, whole) in [(1, false), (2, false), (3, true), (4, true)] {
+    for (operations, intact) in [(1, false), (2, false), (3, true), (4, true)] {
         let mut board = Board::moving();
-        // One from before, which must not pass for this one.
+        // An earlier one, which must not be reported as this one.
         let earlier = falls(&mut board).expect("a record");
         board.send(b's');
         board.until("deploying: cruise", 6000);
@@ -120,13 +124,13 @@ fn a_record_is_whole_or_none_wherever_power_goes() {
         board.strike(Fault::BrownOut);
         board.reset(5);
         let restart = board.report();
-        assert_eq!(restart.snapshot.is_some(), whole, "{operations}: {restart}");
+        assert_eq!(restart.snapshot.is_some(), intact, "{operations}: {restart}");
         assert!(
             restart.snapshot.is_none_or(|snapshot| snapshot.tick != earlier.tick),
             "{operations}"
         );
-        if !whole {
-            // What was torn is in nobody's way.
+        if !intact {
+            // A torn record does not block the next.
             let next = falls(&mut board).expect("the next record");
             assert_eq!(next.mode(), Some(Mode::Idle));
         }
@@ -147,7 +151,7 @@ fn a_full_page_of_records_makes_room() {
 }
 
 #[test]
-fn a_dip_of_the_supply_cuts_the_bridges_and_starts_anew() {
+fn a_dip_of_the_supply_cuts_the_bridges_and_restarts() {
     let mut board = Board::moving();
     let at = board.position_mm();
     board.strike(Fault::SupplyDip);
@@ -157,54 +161,52 @@ fn a_dip_of_the_supply_cuts_the_bridges_and_starts_anew() {
     assert!(!driven[1..].contains(&true), "{driven:?}");
     let restart = board.report();
     assert_eq!(restart.crash.expect("a crash").stopped, Stopped::Supply);
-    let place = restart.place().expect("a place");
-    assert!((place.position.to_num::<f64>() - at).abs() < 0.3 && !place.sure, "{restart} at {at}");
+    assert_unconfirmed(&restart, at);
 }
 
-/// Too low for a while, without being gone.
+/// A low supply for a while, without a loss of power.
 fn sags(board: &mut Board, milliseconds: u64) {
     let machine = board.machine();
     let now = machine.now();
     machine.chip_mut().supply_falls(now + milliseconds * STEP, Then::Back, now);
 }
 
+/// With and without room for its record.
 #[test]
-fn a_supply_that_sags_until_the_watchdog_bites_is_no_hang() {
-    let mut board = Board::moving();
-    let at = board.position_mm();
-    sags(&mut board, 400);
-    let (cause, after, driven) = board.reset(150);
-    assert_eq!(cause, Cause::Watchdog);
-    assert!((80..130).contains(&after), "{after} ms");
-    assert!(!driven[1..].contains(&true), "{driven:?}");
-    let restart = board.report();
-    assert_eq!(restart.crash.expect("a crash").stopped, Stopped::Supply);
-    // What it was doing when the bridges went off, and no way gone since; but it may have
-    // been moved meanwhile.
-    let place = restart.place().expect("a place");
-    assert!((place.position.to_num::<f64>() - at).abs() < 0.3 && !place.sure, "{restart} at {at}");
+fn a_low_supply_until_the_watchdog_resets_is_no_hang() {
+    for has_room in [true, false] {
+        let mut board = Board::moving();
+        let at = board.position_mm();
+        if !has_room {
+            board.machine().poke(RECORDS, &[0; PAGE_BYTES]).expect("flash");
+        }
+        sags(&mut board, 400);
+        let (cause, after, driven) = board.reset(150);
+        assert_eq!(cause, Cause::Watchdog);
+        assert!((80..130).contains(&after), "{after} ms");
+        assert!(!driven[1..].contains(&true), "{driven:?}");
+        let restart = board.report();
+        assert_eq!(restart.crash.expect("a crash").stopped, Stopped::Supply);
+        // Where the bridges went off; but the drive may have been moved since.
+        assert_unconfirmed(&restart, at);
+    }
 }
 
 #[test]
-fn a_reset_behind_a_lost_supply_makes_its_place_no_surer() {
+fn a_reset_after_a_lost_supply_leaves_its_position_unconfirmed() {
     let mut board = Board::moving();
+    let at = board.position_mm();
     board.strike(Fault::BrownOut);
     board.reset(5);
-    // The start has taken the record; the tick has not begun.
-    let taken = (0..200).any(|_| {
-        let machine = board.machine();
-        machine.run_on(machine.now() + STEP / 20).expect("runs");
-        page(&board, RECORDS)[24..32] == [0; 8]
-    });
-    assert!(taken, "{:#?}", board.log);
+    until_taken(&mut board);
     board.strike(Fault::ResetPin);
     let restart = board.report();
     assert_eq!((restart.reset, restart.crash), (Reset::Pin, None));
-    assert!(restart.place().is_some_and(|place| !place.sure), "{restart}");
+    assert_unconfirmed(&restart, at);
 }
 
 #[test]
-fn a_place_without_a_step_found_stays_unsure_however_long_it_idles() {
+fn a_position_without_a_detected_step_stays_unconfirmed() {
     let mut board = Board::moving();
     let at = board.position_mm();
     let lost = falls(&mut board).expect("a record");
@@ -213,9 +215,7 @@ fn a_place_without_a_step_found_stays_unsure_however_long_it_idles() {
         board.strike(Fault::ResetPin);
         let restart = board.report();
         assert!(restart.snapshot.is_some_and(|snapshot| snapshot.tick != lost.tick), "{restart}");
-        let place = restart.place().expect("a place");
-        let off = (place.position.to_num::<f64>() - at).abs();
-        assert!(off < 0.3 && !place.sure, "{restart} at {at}");
+        assert_unconfirmed(&restart, at);
     }
 }
 
@@ -230,22 +230,10 @@ fn a_reset_into_a_low_supply_leaves_its_place_unsure() {
 }
 
 #[test]
-fn a_supply_that_sags_is_named_without_its_record_too() {
-    let mut board = Board::moving();
-    // No room for one.
-    board.machine().poke(RECORDS, &[0; PAGE_BYTES]).expect("flash");
-    sags(&mut board, 400);
-    assert_eq!(board.reset(150).0, Cause::Watchdog);
-    let restart = board.report();
-    assert_eq!(restart.crash.expect("a crash").stopped, Stopped::Supply);
-    assert!(restart.place().is_some_and(|place| !place.sure), "{restart}");
-}
-
-#[test]
 fn a_start_waits_for_its_supply() {
     let mut board = Board::idle();
     board.frames.clear();
-    // Comes back too low, for a tenth of a second.
+    // Power comes back with a low supply for a tenth of a second.
     board.machine().restart(Cause::Power).expect("restarts");
     sags(&mut board, 100);
     let lines = board.log.len();
@@ -255,19 +243,19 @@ fn a_start_waits_for_its_supply() {
 }
 
 #[test]
-fn the_first_start_of_an_image_keeps_its_sum() {
+fn the_first_start_of_an_image_stores_its_checksum() {
     let first = |board: &Board| {
         board.log.iter().filter(|line| line.contains("first start of this image")).count()
     };
     let mut board = Board::idle();
     assert_eq!(first(&board), 1, "{:#?}", board.log);
-    let seals = page(&board, SEALS);
-    assert_ne!(seals[..16], [0xFF; 16]);
-    assert_eq!(seals[16..], [0xFF; PAGE_BYTES - 16]);
+    let checksums = page(&board, CHECKSUMS);
+    assert_ne!(checksums[..16], [0xFF; 16]);
+    assert_eq!(checksums[16..], [0xFF; PAGE_BYTES - 16]);
     board.strike(Fault::ResetPin);
     board.until("mode: idle", 3000);
     assert_eq!(first(&board), 1, "known by now");
-    assert_eq!(page(&board, SEALS), seals);
+    assert_eq!(page(&board, CHECKSUMS), checksums);
 }
 
 /// Bytes of the image: of its vectors, its code, its constants, its hash.
@@ -279,16 +267,16 @@ fn places(board: &Board) -> Vec<u32> {
 }
 
 #[test]
-fn a_bit_of_the_image_that_turns_over_is_told_and_held() {
+fn an_inverted_bit_of_the_image_is_reported_and_held() {
     for place in places(&Board::idle()) {
         let mut board = Board::moving();
         let flip = Fault::BitFlip(place, 4);
         board.strike(flip);
-        board.until(DAMAGED, LOOKED_AT_MS);
+        board.until(DAMAGED, CHECKED_MS);
         let (cause, _, driven) = board.reset(20);
         assert_eq!(cause, Cause::Software, "{place:#x}");
         assert!(!driven[1..].contains(&true), "{driven:?}");
-        // It stays off, and says so every second; commands are nothing to it.
+        // It stays off and reports every second; it ignores commands.
         for _ in 0..2 {
             board.until(DAMAGED, 1100);
             board.bench.send(b's').expect("runs");
@@ -313,23 +301,22 @@ fn an_image_names_no_folder_of_the_machine_that_built_it() {
     }
 }
 
-/// A start that no longer gets to its tasks, because what copies its parts about is broken,
-/// has said so before.
+/// A start that fails before its tasks, because `memcpy` is damaged, has reported it before.
 #[test]
-fn a_damaged_image_that_no_longer_starts_says_so_too() {
+fn a_damaged_image_that_no_longer_starts_is_reported() {
     let mut board = Board::moving();
     let copies = board.function("compiler_builtins::mem::memcpy");
     board.strike(Fault::BitFlip(copies + 0x22F, 4));
-    board.until(DAMAGED, LOOKED_AT_MS);
-    // Off from here on, how often ever it starts.
+    board.until(DAMAGED, CHECKED_MS);
+    // Off from here on, however often it restarts.
     board.step();
     board.assert_off(500);
 }
 
-/// One that comes to nothing at all shows so by the light, over and over; on a sound board it
-/// stays dark until the first word.
+/// An image that cannot log blinks the light; on a sound board the light is off until the first
+/// line of the log.
 #[test]
-fn a_damaged_image_that_says_nothing_any_more_blinks() {
+fn a_damaged_image_that_cannot_log_blinks() {
     let lit = |board: &Board| board.bench.machine().chip().level(Pin::LIGHT);
     let mut board = Board::moving();
     board.strike(Fault::ResetPin);
@@ -356,13 +343,13 @@ fn a_damaged_image_that_says_nothing_any_more_blinks() {
     assert!(blinks >= 3 && (200..800).contains(&share), "{blinks} times, {share} ms");
 }
 
-/// The floating-point unit is off until a start has turned it on: what comes before must do
-/// without, whatever the compiler would like for its copies.
+/// The floating-point unit is off until the start-up code enables it; code before that must not
+/// use it, not even for copies.
 #[test]
-fn what_a_start_does_first_needs_no_floating_point_unit() {
+fn the_first_code_of_a_start_uses_no_floating_point() {
     let board = Board::idle();
     let image = board.bench.machine().image();
-    let mut looked_at = 0;
+    let mut checked = 0;
     for name in ["__pre_init", "board::image::sums", "interstage::restart::page::word", "Reset"] {
         for function in image.functions.iter().filter(|function| function.name.contains(name)) {
             let range = function.range.start - 0x0800_0000..function.range.end - 0x0800_0000;
@@ -374,8 +361,8 @@ fn what_a_start_does_first_needs_no_floating_point_unit() {
                 let float = wide && matches!(half(at + 2) >> 8 & 0xF, 10 | 11);
                 assert!(!float, "{} at {place:#x}", function.name);
             }
-            looked_at += 1;
+            checked += 1;
         }
     }
-    assert!(looked_at >= 3, "{looked_at}");
+    assert!(checked >= 3, "{checked}");
 }

@@ -15,7 +15,7 @@ use rig_board::run;
 
 use crate::common::{Board, elf, scenario};
 
-/// How far the log may be from the truth under way. Position: the tolerance of the steps'
+/// How far the log may be from the truth during a run. Position: the tolerance of the steps'
 /// places, which the controller knows from its table and corrects itself by. Preload: two
 /// deviations of the preload sensor's gain at 50 N, six of its noise, and its age.
 const POSITION_MM: f64 = 0.8;
@@ -47,21 +47,20 @@ fn every_tick_of_a_run_is_logged_and_runs_again_on_this_host() {
     }
 }
 
-/// Who reads the binary log's channel.
+/// Reader of the binary log's channel.
 #[derive(Clone, Copy, PartialEq)]
 enum Reader {
-    /// One who keeps up.
+    /// One that keeps up.
     There,
-    /// Nobody.
+    /// None.
     Absent,
-    /// One who stands still for 700 of every 1000 ms.
+    /// One that stalls for 700 of every 1000 ms.
     Stalled,
-    /// Nobody, and nothing to read: the image keeps no tick.
+    /// None, and the image records no tick.
     Mute,
 }
 
-/// What the text log says of a crossing's ledger from the speed on: what stands before it
-/// is the time and the place.
+/// Values of the text log's crossings, from the speed on.
 type Crossings = Vec<Vec<f64>>;
 
 /// What the control tick cost, tick by tick, and when it began.
@@ -160,22 +159,20 @@ fn alike(name: &str, read: &(u32, Crossings, Ticks), other: &(u32, Crossings, Ti
     }
 }
 
-/// Telemetry at full rate changes nothing of the control tick's beginning, whoever reads it
-/// or does not, and whether there is any.
+/// Telemetry at full rate changes nothing of the control tick's beginning, with or without a
+/// reader, and whether there is any.
 #[test]
 fn neither_telemetry_nor_its_reader_changes_when_the_tick_begins_or_what_it_takes() {
     /// What two runs may differ by, relative.
     const SAME: f64 = 0.02;
     let read = deployment(Reader::There);
     let off = |one: f64, other: f64| (one / other - 1.0).abs();
-    println!("there: cycles {:.1?}; beginning {:.1?}", read.2.cost(), read.2.jitter());
     for (name, reader) in
         [("absent", Reader::Absent), ("stalled", Reader::Stalled), ("mute", Reader::Mute)]
     {
         let other = deployment(reader);
         alike(name, &read, &other);
         let (cost, jitter) = (other.2.cost(), other.2.jitter());
-        println!("{name}: cycles {cost:.1?}; beginning {jitter:.1?}");
         for (what, one, other) in [
             ("deviation of its beginning", read.2.jitter()[0], jitter[0]),
             ("earliest to latest beginning", read.2.jitter()[1], jitter[1]),
@@ -194,7 +191,7 @@ fn neither_telemetry_nor_its_reader_changes_when_the_tick_begins_or_what_it_take
 fn frames_that_found_no_room_are_marked_and_the_capture_waits_for_its_reader() {
     let mut board = Board::off(&["run.seed=1"]);
     board.until("mode: idle", 3000);
-    // Nobody listens while the drive is started and goes over the first step.
+    // The channel is not read during the start and the first crossing.
     board.bench.listen(false);
     board.send(b's');
     board.until("deploying: settle", 9000);
@@ -218,7 +215,7 @@ fn frames_that_found_no_room_are_marked_and_the_capture_waits_for_its_reader() {
     }
     assert!(frames > 300 && ticks > 2400, "{frames} frames, {ticks} ticks");
     assert_eq!((run.counts.lost_frames, run.counts.lost_ticks), (u64::from(frames), ticks));
-    // The command came first, and its capture is kept whole until it has been read.
+    // The command came first, and its capture is kept complete until it has been read.
     let first = run.shots.first().expect("captured");
     assert_eq!(first.trigger, Trigger::Command);
     let pieces: Vec<_> = run.shots.iter().take_while(|piece| piece.at == first.at).collect();
@@ -233,7 +230,7 @@ fn a_restart_in_the_middle_is_marked_and_both_parts_run_again() {
     board.until("mode: idle", 3000);
     board.send(b's');
     board.until("deploying: crossing", 8000);
-    // This one leaves the record of the run before, from which it goes on.
+    // The record of the first run survives this restart.
     board.bench.machine_mut().restart(Cause::Pin).expect("restarts");
     board.until("mode: idle", 3000);
     board.send(b's');
@@ -256,7 +253,7 @@ fn a_restart_in_the_middle_is_marked_and_both_parts_run_again() {
     assert!(result.ticks as usize > run.rows.len() / 2, "{result:?}");
 }
 
-/// Resident memory of this process, bytes; none where the system does not tell.
+/// Resident memory of this process, bytes; none if the system does not report it.
 fn resident() -> Option<u64> {
     let text = std::fs::read_to_string("/proc/self/statm").ok()?;
     text.split_whitespace().nth(1)?.parse::<u64>().ok().map(|pages| pages * 4096)

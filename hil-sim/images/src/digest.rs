@@ -5,7 +5,7 @@ use core::fmt::{self, Write};
 /// FNV-1a, 64 bits, over what is written to it.
 ///
 /// Used on the `Debug` text of a value, it sees every field without naming one: fixed
-/// point prints enough digits to tell every two values apart. Not cryptographic; the
+/// point prints enough digits to distinguish any two values. Not cryptographic; the
 /// chance that two different outputs meet is 2^-64.
 ///
 /// Source: Fowler, Noll and Vo, IETF draft-eastlake-fnv.

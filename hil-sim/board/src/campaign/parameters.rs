@@ -72,7 +72,7 @@ pub(super) fn judged(
     let held = board.parameters.holds();
     let lost = matches!(injection.target, Target::StoredSet | Target::ImageSet);
     if held && !lost {
-        harms.push("holds although its parameters are whole".to_owned());
+        harms.push("holds although its parameters are intact".to_owned());
     }
     if saving.is_some() && before && !crossed {
         harms.push("does not complete after the save".to_owned());

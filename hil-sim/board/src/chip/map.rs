@@ -48,7 +48,7 @@ const APB2: u32 = 0x60;
 
 /// Enable register and bit of a clock.
 type Clock = (u32, u32);
-/// Stands for a clock that is always on, or not modelled.
+/// A clock that is always on, or not modelled.
 const ON: Clock = (0, 0);
 
 /// First address, bytes, block, name in the reference manual, clock. Source: RM0440, table 3

@@ -13,7 +13,7 @@ const RETRY: u32 = 10;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Saving {
     /// Requested; the board refuses, or has not answered yet.
-    Asked,
+    Requested,
     /// The board writes.
     Writing,
     /// The board restarted before it confirmed the save.
@@ -48,7 +48,7 @@ impl Save {
             set,
             cut,
             armed: false,
-            state: Saving::Asked,
+            state: Saving::Requested,
             accepted: 0,
             open: None,
             number: 0,
@@ -115,7 +115,7 @@ impl Save {
 
     fn take(&mut self, response: &Response) {
         if *response != Response::Done {
-            (self.accepted, self.pause, self.state) = (0, RETRY, Saving::Asked);
+            (self.accepted, self.pause, self.state) = (0, RETRY, Saving::Requested);
             return;
         }
         self.state = Saving::Writing;

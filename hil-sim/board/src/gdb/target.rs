@@ -1,4 +1,4 @@
-//! What the debugger may do with the board.
+//! The debugger's access to the board.
 
 use gdbstub::common::Signal;
 use gdbstub::target::ext::base::BaseOps;
@@ -26,8 +26,8 @@ fn fatal(error: CoreError) -> TargetError<Fatal> {
     TargetError::Fatal(Fatal(error.into()))
 }
 
-/// Whether these bytes lie in flash or RAM. Registers of peripherals are left alone: some
-/// change by being read.
+/// Whether these bytes are in flash or RAM. The debugger has no access to peripherals, some of
+/// which a read changes.
 fn is_memory(start: u32, bytes: usize) -> bool {
     [FLASH, RAM].iter().any(|memory| {
         let offset = start.wrapping_sub(memory.base) as usize;

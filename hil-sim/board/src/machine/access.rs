@@ -35,7 +35,7 @@ impl Machine {
     }
 
     /// A register of the core.
-    /// Errors: [`CoreError::Engine`] if the engine does not tell.
+    /// Errors: [`CoreError::Engine`] if the engine refuses.
     pub fn register(&self, register: Register) -> Result<u32, CoreError> {
         self.core.register(register)
     }
@@ -46,7 +46,7 @@ impl Machine {
     }
 
     /// Sets a register of the core.
-    /// Errors: [`CoreError::Engine`] if the engine does not take it.
+    /// Errors: [`CoreError::Engine`] if the engine refuses.
     pub fn set_register(&mut self, register: Register, value: u32) -> Result<(), CoreError> {
         if register == Register::Pc {
             self.pc = value & !1;

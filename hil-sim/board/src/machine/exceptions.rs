@@ -1,11 +1,11 @@
-//! Exceptions as the core takes them and returns from them.
+//! Entry to and return from exceptions.
 
 use super::{Asleep, Machine, frame};
 use crate::core::{Core, CoreError, Register, passes};
 use crate::exceptions::number::HARD_FAULT;
 use crate::peripherals::system::Cause;
 
-/// Cycles of an exception's entry and return, and of going from one to the next.
+/// Cycles of an exception's entry and return, and of tail-chaining.
 const ENTRY: u64 = 12;
 const EXIT: u64 = 10;
 const CHAIN: u64 = 6;
@@ -22,8 +22,8 @@ impl Machine {
         Ok(passes(priority, primask, basepri, faultmask).then_some(number))
     }
 
-    /// Takes an exception; the program goes on at `back` afterwards. `chained`: straight
-    /// from another one, whose frame stands already.
+    /// Takes an exception that returns to `back`. `chained`: directly after another one, with
+    /// its frame.
     pub(super) fn enter(&mut self, number: u8, back: u32, chained: bool) -> Result<(), CoreError> {
         let now = self.now();
         if !chained {
@@ -68,7 +68,7 @@ impl Machine {
         Ok(())
     }
 
-    /// The program did at `at` what a processor faults on.
+    /// The program caused a fault at `at`.
     pub(super) fn fault(&mut self, cause: Cause, at: u32) -> Result<(), CoreError> {
         let masked = self.core.register(Register::Primask)? & 1 != 0;
         let system = &mut self.chip_mut().system;

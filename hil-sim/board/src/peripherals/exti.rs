@@ -78,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_edge_asked_for_is_kept_until_it_is_cleared() {
+    fn the_selected_edge_is_kept_until_it_is_cleared() {
         let mut exti = Exti::new(0);
         let bit = 1 << 13;
         let all = |value| Write { value, mask: ALL };
@@ -89,6 +89,6 @@ mod tests {
         assert!(exti.requests(0xFC00) && !exti.requests(0x3E0));
         exti.write(PR, all(bit), 0).expect("modelled");
         exti.sample(0);
-        assert!(!exti.requests(bit), "the other edge was not asked for");
+        assert!(!exti.requests(bit), "the other edge is not selected");
     }
 }

@@ -22,7 +22,7 @@ const IS_LOW: u32 = 1 << 11;
 pub const HOLDS: u64 = HZ / 1000;
 
 /// CR1 to CR4, CR5 (with the boost of the main regulator), and the status registers,
-/// which report no change under way. Pull-ups in standby are not used.
+/// which report no change in progress. Pull-ups in standby are not used.
 const REGISTERS: [Kept; 5] = [
     Kept { offset: 0x00, reset: 0x200, mask: 0x4707 },
     Kept { offset: CR2, reset: 0, mask: 0xFFFF },

@@ -1,8 +1,5 @@
-//! Reset and clock control: oscillators that are ready as soon as they are on, clock
-//! and reset switches that are kept, and the cause of the last reset.
-//!
-//! Time is counted at the core's full clock from the start on; the few microseconds
-//! before the switch to it are not slower here.
+//! Reset and clock control: oscillators that are ready at once, clock and reset switches, and
+//! the cause of the last reset. The core runs at its full clock from the start.
 
 use super::registers::{Kept, Registers};
 use super::{Peripheral, Write};
@@ -46,11 +43,11 @@ const REGISTERS: [Kept; 15] = [
 /// Why the chip started, as flags of `CSR`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
-    /// Power came up, or fell too low and came back.
+    /// Power-up, or a supply that was too low.
     Power,
     /// The independent watchdog.
     Watchdog,
-    /// The program or a debugger asked for it.
+    /// The program or a debugger requested it.
     Software,
     /// The reset pin was pulled from outside.
     Pin,
@@ -76,7 +73,7 @@ pub struct Rcc {
 }
 
 impl Rcc {
-    /// After a reset; `earlier` are the flags that no one has cleared yet.
+    /// After a reset; `earlier` are the flags that were not cleared.
     pub fn new(cause: Cause, earlier: u32) -> Self {
         Self {
             registers: Registers::new(&REGISTERS, &WORDS, &READY),
@@ -84,7 +81,7 @@ impl Rcc {
         }
     }
 
-    /// Flags of the causes of resets that no one has cleared.
+    /// Flags of earlier resets that were not cleared.
     pub const fn flags(&self) -> u32 {
         self.flags
     }
@@ -101,7 +98,7 @@ impl Peripheral for Rcc {
         Some(match offset {
             // HSI, HSE and PLL are ready when they are on.
             CR => value | (value & 0x0101_0100 & !0x100) << 1 | (value & 0x100) << 2,
-            // The clock in use is the one asked for.
+            // A selected clock is in use at once.
             CFGR => value | (value & 3) << 2,
             BDCR | CRRCR => value | (value & 1) << 1,
             CSR => value | (value & 1) << 1 | self.flags,

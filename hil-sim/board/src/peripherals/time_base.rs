@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn a_compare_asks_when_it_is_met_and_not_before() {
+    fn a_compare_requests_its_interrupt_when_it_is_reached() {
         let mut timer = running();
         write(&mut timer, CCR1 + 4, 500, 1000);
         write(&mut timer, DIER, 1 << 2, 1000);
@@ -229,7 +229,7 @@ mod tests {
         assert!(!timer.requests());
         timer.advance(due);
         assert!(timer.requests());
-        assert_eq!(timer.deadline(), u64::MAX, "it asks already");
+        assert_eq!(timer.deadline(), u64::MAX, "already requested");
         write(&mut timer, SR, !(1 << 2), due + 5);
         assert!(!timer.requests());
         assert_eq!(timer.deadline(), due + 170 * 65_536);

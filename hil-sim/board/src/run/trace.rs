@@ -16,7 +16,7 @@ use hil_sim::scenario::Scenario;
 const COMPLETE: u8 = 10;
 const FAULT_HOLD: u8 = 11;
 const IDLE: u8 = 3;
-/// Under way or coming to rest.
+/// Moving or stopping.
 const MOVING: std::ops::Range<u8> = 5..10;
 
 /// Values of the log's line about a crossing, in their order: milliseconds, step,
@@ -105,7 +105,7 @@ impl Trace {
         let level = if line.level.is_empty() { "" } else { " " };
         let text = format!("{}{level}{}", line.level, line.text);
         self.tally.log.push(LogLine { t_s, text });
-        if let Some(mode) = line.behind("mode: ") {
+        if let Some(mode) = line.after("mode: ") {
             self.mode = number_of(mode);
         } else if line.text.contains("] stage ") {
             self.stage = line.numbers().get(1).map_or(self.stage, |number| *number as u8);
@@ -114,7 +114,7 @@ impl Trace {
         } else {
             let Tally { faults, limits, .. } = &mut self.tally;
             for (kind, reports) in [("] fault ", faults), ("] limit ", limits)] {
-                let said = line.behind(kind).and_then(|rest| rest.split_once(": "));
+                let said = line.after(kind).and_then(|rest| rest.split_once(": "));
                 if let Some((code, text)) = said
                     && let Ok(code) = code.parse()
                 {

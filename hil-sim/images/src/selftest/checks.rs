@@ -191,7 +191,7 @@ fn float_results() -> bool {
         && black_box(-7.9_f32) as i32 == -7
 }
 
-/// Sums, compares and carries while the system timer beats every 211 cycles.
+/// Sums, compares and carries while the system timer interrupts every 211 cycles.
 fn compares_under_interrupts() -> bool {
     // SAFETY: the timer is this check's own.
     let mut core = unsafe { Peripherals::steal() };
@@ -221,8 +221,8 @@ fn compares_under_interrupts() -> bool {
     above == same && wide == also && float == 12_500.0 && BEATS.load(Ordering::Relaxed) > 1000
 }
 
-/// The emulator counts the cycles of a straight piece of code as a whole: it has to end
-/// behind the reading.
+/// The emulator counts the cycles of a block at its beginning: the block has to end after the
+/// reading.
 #[inline(never)]
 fn cycle_counter() -> bool {
     // SAFETY: the counter is this check's own.
