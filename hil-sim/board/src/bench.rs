@@ -14,7 +14,7 @@ use super::rtt::Probe;
 use hil_sim::injector::FaultInjector;
 use hil_sim::plant::rig::{Drives, VirtualRig};
 use hil_sim::plant::sensors::{Codes, Sensors};
-use hil_sim::record::letter;
+use hil_sim::record::{letter, starter};
 use hil_sim::scenario::{Direction, Scenario};
 use hil_sim::session;
 
@@ -53,6 +53,12 @@ pub struct Bench<'a> {
     frames: Option<Vec<u8>>,
     /// The faults of the scenario, if it has some.
     injector: Option<BoardInjector>,
+    /// The letter that starts the drive.
+    start: u8,
+    /// The drive starts when it is idle.
+    starts: bool,
+    /// The log has reported idle.
+    idle: bool,
 }
 
 impl<'a> Bench<'a> {
@@ -83,6 +89,9 @@ impl<'a> Bench<'a> {
             frames: Some(Vec::new()),
             injector: FaultInjector::of(scenario)
                 .map(|faults| BoardInjector::new(faults, scenario)),
+            start: letter(starter(scenario.run.direction)),
+            starts: false,
+            idle: false,
         };
         bench.set_sensors(codes);
         Ok(bench)
@@ -199,7 +208,22 @@ impl<'a> Bench<'a> {
             frames.extend(self.probe.up(&mut self.machine, 1)?);
         }
         let bytes = self.probe.up(&mut self.machine, 0)?;
-        Ok((passed, self.reader.read(&bytes)))
+        let lines = self.reader.read(&bytes);
+        self.idle |= lines.iter().any(|line| line.text.contains("mode: idle"));
+        if self.starts && self.idle {
+            self.starts = !self.send(self.start)?;
+        }
+        Ok((passed, lines))
+    }
+
+    /// Sends the command to start as soon as the drive is idle.
+    pub fn start_when_idle(&mut self) {
+        self.starts = true;
+    }
+
+    /// Whether that command is still to be sent.
+    pub const fn waits_to_start(&self) -> bool {
+        self.starts
     }
 
     /// Applies these codes to the sensors' lines.

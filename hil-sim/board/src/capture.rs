@@ -2,7 +2,7 @@
 
 use crate::bench::Bench;
 use crate::log::Strings;
-use hil_sim::record::{Source, SourceError, letter, starter};
+use hil_sim::record::{Source, SourceError};
 use hil_sim::scenario::Scenario;
 
 /// Milliseconds that the board runs at each reading.
@@ -21,10 +21,7 @@ fn broken(error: impl std::error::Error + Send + Sync + 'static) -> SourceError 
 /// The firmware on the emulated board, the plant at its pins.
 pub struct Emulated<'a> {
     bench: Bench<'a>,
-    /// The letter that starts the drive, until it is sent.
-    start: Option<u8>,
     attended: bool,
-    idle: bool,
     /// Milliseconds until the run ends, once that is known.
     left: Option<u32>,
 }
@@ -39,9 +36,11 @@ impl<'a> Emulated<'a> {
         scenario: &Scenario,
         attended: bool,
     ) -> Result<Self, SourceError> {
-        let bench = Bench::new(elf, strings, scenario).map_err(broken)?;
-        let start = (!attended).then_some(letter(starter(scenario.run.direction)));
-        Ok(Self { bench, start, attended, idle: false, left: None })
+        let mut bench = Bench::new(elf, strings, scenario).map_err(broken)?;
+        if !attended {
+            bench.start_when_idle();
+        }
+        Ok(Self { bench, attended, left: None })
     }
 
     /// Runs the board for a millisecond; false if the run is over.
@@ -50,15 +49,8 @@ impl<'a> Emulated<'a> {
             return Ok(false);
         }
         self.left = self.left.map(|left| left - 1);
-        if self.idle
-            && let Some(letter) = self.start
-            && self.bench.send(letter).map_err(broken)?
-        {
-            self.start = None;
-        }
         let (_, lines) = self.bench.step().map_err(broken)?;
         for line in &lines {
-            self.idle |= line.text.contains("mode: idle");
             if !self.attended && OVER.iter().any(|mode| line.text.contains(mode)) {
                 self.left.get_or_insert(AFTER);
             }

@@ -254,6 +254,12 @@ impl Chip {
 
     /// The same after an access to one block, for the lines that it can change.
     fn settle_after(&mut self, block: Block, offset: u32, write: bool, now: u64) {
+        // Reading a data register changes state.
+        let by_reading = match block {
+            Block::Adc => offset & 0xFF == adc::DR,
+            Block::Spi => offset == spi::DR,
+            _ => false,
+        };
         match block {
             Block::Port(_) | Block::Syscfg | Block::Motor(_) | Block::Exti | Block::Pwr
                 if write =>
@@ -263,15 +269,9 @@ impl Chip {
                 }
                 self.settle(now);
             }
-            Block::Adc | Block::Readback | Block::Spi if write => self.settle_lines(now),
-            // Reading the data registers changes state.
-            Block::Adc if offset & 0xFF == adc::DR => self.settle_lines(now),
-            Block::Spi if offset == spi::DR => self.settle_lines(now),
-            Block::Time | Block::Dma | Block::Mux | Block::Watchdog | Block::Flash if write => {
-                self.settle_lines(now);
-            }
             // The interrupt controller updates itself.
-            Block::System if write && !(0x100..0x500).contains(&offset) => self.settle_lines(now),
+            Block::System if (0x100..0x500).contains(&offset) => {}
+            _ if write || by_reading => self.settle_lines(now),
             _ => {}
         }
     }

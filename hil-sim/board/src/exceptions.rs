@@ -75,6 +75,11 @@ fn bits(mut set: u128) -> impl Iterator<Item = u8> {
     })
 }
 
+/// Word `word` of the interrupts in a set of exceptions.
+const fn interrupts(set: u128, word: u32) -> u32 {
+    (set >> (16 + 32 * word)) as u32
+}
+
 impl Exceptions {
     /// Makes an exception pending.
     pub fn pend(&mut self, number: u8, now: u64) {
@@ -116,30 +121,24 @@ impl Exceptions {
         self.refresh();
     }
 
-    /// A word of the enable registers.
+    /// Word `word` of the enable registers.
     pub fn enabled(&self, word: u32) -> u32 {
-        (self.enabled >> (16 + 32 * word)) as u32
+        interrupts(self.enabled, word)
     }
 
-    /// A word of the pending registers.
+    /// Word `word` of the pending registers.
     pub fn pending(&self, word: u32) -> u32 {
-        (self.pending >> (16 + 32 * word)) as u32
+        interrupts(self.pending, word)
     }
 
-    /// A word of the active registers.
+    /// Word `word` of the active registers.
     pub fn active(&self, word: u32) -> u32 {
-        let set = self.active.iter().fold(0_u128, |set, number| set | 1 << number);
-        (set >> (16 + 32 * word)) as u32
+        interrupts(self.active.iter().fold(0, |set, number| set | 1 << number), word)
     }
 
     /// Whether an exception is pending.
     pub fn is_pending(&self, number: u8) -> bool {
         self.pending >> number & 1 != 0
-    }
-
-    /// Whether an exception is active.
-    pub fn is_active(&self, number: u8) -> bool {
-        self.active.contains(&number)
     }
 
     /// The exception that runs; 0 in thread mode.

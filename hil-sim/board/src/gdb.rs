@@ -19,7 +19,6 @@ use gdbstub::stub::{DisconnectReason, GdbStub, SingleThreadStopReason};
 use super::bench::Bench;
 use super::error::BoardError;
 use super::log::{Line, Strings};
-use hil_sim::record::{letter, starter};
 use hil_sim::scenario::Scenario;
 
 use target::Fatal;
@@ -70,15 +69,10 @@ pub fn serve(
 ) -> Result<(), GdbError> {
     let (stream, _) = listener.accept().map_err(|error| GdbError::Connection(error.to_string()))?;
     let strings = Strings::of(elf).map_err(BoardError::from)?;
-    let bench = Bench::new(elf, &strings, scenario).map_err(BoardError::from)?;
-    let mut board = Debugged {
-        bench,
-        breaks: BTreeMap::new(),
-        steps: false,
-        start: Some(letter(starter(scenario.run.direction))),
-        idle: false,
-        watch: Box::new(watch),
-    };
+    let mut bench = Bench::new(elf, &strings, scenario).map_err(BoardError::from)?;
+    bench.start_when_idle();
+    let mut board =
+        Debugged { bench, breaks: BTreeMap::new(), steps: false, watch: Box::new(watch) };
     match GdbStub::new(stream).run_blocking::<Loop>(&mut board) {
         Ok(DisconnectReason::Disconnect | DisconnectReason::Kill) => Ok(()),
         Ok(reason) => Err(GdbError::Connection(format!("{reason:?}"))),
@@ -99,10 +93,6 @@ struct Debugged<'a> {
     breaks: BTreeMap<u32, [u8; 2]>,
     /// The debugger has requested a single step.
     steps: bool,
-    /// The letter that starts the drive, until it is sent.
-    start: Option<u8>,
-    /// The log has reported idle.
-    idle: bool,
     watch: Watch<'a>,
 }
 
@@ -112,15 +102,8 @@ impl Debugged<'_> {
         if self.bench.is_due() {
             let (_, lines) = self.bench.close()?;
             for line in &lines {
-                self.idle |= line.text.contains("mode: idle");
                 (self.watch)(self.bench.time_s(), line);
             }
-        }
-        if self.idle
-            && let Some(letter) = self.start
-            && self.bench.send(letter)?
-        {
-            self.start = None;
         }
         Ok(())
     }

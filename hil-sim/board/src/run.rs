@@ -18,7 +18,7 @@ use crate::chip::map::PARAMETER_SETS;
 use hil_sim::faults::sets;
 use hil_sim::firmware::Footprint;
 use hil_sim::params::set_of;
-use hil_sim::record::{self, Recording, letter, starter};
+use hil_sim::record::{self, Recording};
 use hil_sim::scenario::injection::{Injection, Target};
 use hil_sim::scenario::{ControllerKind, Scenario};
 
@@ -102,7 +102,7 @@ pub fn run_with(
     let mut bench = Bench::new(elf, &strings, scenario)?;
     store(bench.machine_mut(), scenario)?;
     let mut trace = Trace::new(scenario, bench.plant());
-    let mut start = Some(letter(starter(scenario.run.direction)));
+    bench.start_when_idle();
     let started = Instant::now();
     let mut after = AFTER;
     let mut gathered = Gathered::default();
@@ -113,18 +113,16 @@ pub fn run_with(
         for due in faults.extract_if(.., |due| due.at_s <= now) {
             due.fault.strike(bench.machine_mut())?;
         }
-        if trace.is_idle()
-            && let Some(letter) = start
-            && bench.send(letter)?
-        {
-            start = None;
-            gathered.begin(bench.machine_mut());
-        }
+        let waited = bench.waits_to_start();
         let (passed, lines) = bench.step()?;
         for line in &lines {
             watch(bench.time_s(), line);
         }
-        gathered.gather(bench.machine_mut());
+        if waited && !bench.waits_to_start() {
+            gathered.begin(bench.machine_mut());
+        } else {
+            gathered.gather(bench.machine_mut());
+        }
         stream.extend(bench.take_frames());
         trace.add(&passed, &lines, bench.plant().truth(), options.rows);
         if trace.is_over() {

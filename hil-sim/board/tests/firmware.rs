@@ -3,6 +3,7 @@
 use hil_sim::record::{CrossingLine, Summary};
 use hil_sim::scenario::Direction;
 use hil_sim::session::{self, Options, Session};
+use interstage::restart::{Reset, Restart};
 use interstage::supervise::{Command, Mode};
 use rig_board::chip::Pin;
 use rig_board::core::{Access, Bus};
@@ -144,13 +145,14 @@ fn a_deployment_is_far_ahead_of_the_rig() {
 }
 
 #[test]
-fn power_comes_up_to_idle_with_the_bridges_off() {
+fn power_up_leads_to_idle_with_the_bridges_off_and_reports_power_alone() {
     let mut board = Board::off(&[]);
-    assert!(!drives(&mut board, 3000), "nothing may move before a command");
+    let power = Restart { reset: Reset::Power, snapshot: None, crash: None };
+    assert_eq!(board.report(), power);
     for text in ["interstage", "mode: self-test", "mode: zeroing", "mode: idle"] {
         assert!(board.said(text), "{text}: {:#?}", board.log);
     }
-    assert!(!board.said("restarted"));
+    assert!(!board.said("restarted") && !board.said("before:"), "{:#?}", board.log);
     assert_no_strays(&board);
 }
 

@@ -27,14 +27,6 @@ fn assert_cut(driven: &[bool], within: usize) {
 }
 
 #[test]
-fn a_first_start_reports_nothing_but_power() {
-    let mut board = Board::idle();
-    let nothing = Restart { reset: Reset::Power, snapshot: None, crash: None };
-    assert_eq!(board.report(), nothing);
-    assert!(!board.log.iter().any(|line| line.contains("restarted") || line.contains("before:")));
-}
-
-#[test]
 fn a_panic_is_reported_with_its_line_and_what_the_drive_did() {
     let mut board = Board::moving();
     let at = board.position_mm();

@@ -81,11 +81,6 @@ pub(super) fn change_handler(core: &mut impl Core, number: u8) -> Result<(), Cor
     core.set_register(Register::Xpsr, status)
 }
 
-/// The next handler returns with the same value.
-pub(super) fn keep_return(core: &mut impl Core, value: u32) -> Result<(), CoreError> {
-    core.set_register(Register::Lr, value)
-}
-
 /// Pops the frame of this return value, and restores its mode. Returns the address at which
 /// the program continues; `None` if the frame is not in memory.
 pub(super) fn pop(core: &mut impl Core, value: u32) -> Result<Option<u32>, CoreError> {

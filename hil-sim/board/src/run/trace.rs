@@ -15,7 +15,6 @@ use hil_sim::scenario::Scenario;
 
 const COMPLETE: u8 = 10;
 const FAULT_HOLD: u8 = 11;
-const IDLE: u8 = 3;
 /// Moving or stopping.
 const MOVING: std::ops::Range<u8> = 5..10;
 
@@ -53,11 +52,6 @@ impl Trace {
             mode: 0,
             stage: 1,
         }
-    }
-
-    /// Whether the firmware waits for a command.
-    pub(super) const fn is_idle(&self) -> bool {
-        self.mode == IDLE
     }
 
     /// Whether it has arrived, or holds because of a fault.
