@@ -1,8 +1,8 @@
-//! The campaign on the emulated board: the firmware as it is flashed, broken at its pins and
-//! registers, judged by the same judge.
+//! The fault campaign on the emulated board: the firmware as it is flashed, faults at its pins
+//! and registers, and the judge of the software campaign.
 //!
-//! What the drive does in each tick is read where a restart would find it, in the record in
-//! the board's memory; nothing is asked of the firmware for it.
+//! The state of the drive in each tick is read from the restart record in the board's memory,
+//! without a request to the firmware.
 
 mod parameters;
 mod restart;
@@ -14,20 +14,21 @@ use interstage::supervise::{Command, Mode};
 use interstage::tick::{Entry, Event, Output};
 use interstage::units::Q16;
 
-use crate::bench::{Bench, BenchError, Passed};
+use crate::bench::{Bench, Passed};
 use crate::chip::Pin;
 use crate::chip::map::PARAMETER_SETS;
-use crate::fault_injector::{Saving, letter};
+use crate::error::BoardError;
+use crate::fault_injector::Saving;
 use crate::log::Strings;
 use crate::peripherals::rcc::Cause;
-use crate::run::{RunError, store};
+use crate::run::store;
 use hil_sim::faults::campaign::operator::Operator;
 use hil_sim::faults::campaign::twin::Twin;
 use hil_sim::faults::campaign::{AFTER_S, Campaign, Instant, LONGEST_S, Outcome, crossed, doing};
 use hil_sim::faults::judge::{Finding, Judge};
 use hil_sim::faults::sets;
 use hil_sim::params::set_of;
-use hil_sim::record::Run;
+use hil_sim::record::{Run, letter};
 use hil_sim::scenario::Scenario;
 use hil_sim::scenario::injection::{Injection, Target};
 use parameters::Parameters;
@@ -35,18 +36,18 @@ use restart::Hold;
 
 /// Symbol of the record in the board's memory.
 const RECORD: &str = "INTERSTAGE_RETAINED";
-/// What it says of an image of which a bit has turned over.
+/// Beginning of the log's line about a damaged image.
 const IMAGE: &str = "image: ";
-/// How that is reported, in the matrix.
+/// The same in the matrix.
 const IMAGE_DAMAGED: &str = "image damaged";
-/// The same where it can no longer say so.
+/// A damaged image that only the light reports, in the matrix.
 const IMAGE_LIGHT: &str = "image damaged, by the light alone";
-/// How long it may take to say what the light tells, s.
-const SAYS_S: f64 = 1.0;
-/// Ticks that a record may be ahead of the clock since a restart.
+/// Longest time from the light to the log's line, s.
+const LIGHT_TO_LOG_S: f64 = 1.0;
+/// Most ticks that a record is ahead of the milliseconds since the start.
 const AHEAD: u64 = 2;
 
-/// An image and how its log reads.
+/// An image and the strings of its log.
 #[derive(Clone, Copy)]
 pub struct Firmware<'a> {
     /// The image.
@@ -55,53 +56,49 @@ pub struct Firmware<'a> {
     pub strings: &'a Strings,
 }
 
-/// Makes all runs of a campaign on the emulated board, as [`Campaign::run`] does in
-/// software.
-///
-/// # Errors
-/// [`RunError`] if a run without a fault cannot be made.
+/// Runs a campaign on the emulated board, as [`Campaign::run`] does in software.
+/// Errors: [`BoardError`] if a run without a fault cannot be made.
 pub fn run(
     campaign: &Campaign,
     firmware: Firmware<'_>,
     done: &(dyn Fn() + Sync),
-) -> Result<Outcome, RunError> {
+) -> Result<Outcome, BoardError> {
     let twin = |scenario: &Scenario| twin(firmware, scenario);
     let watched = |scenario: &Scenario, twin: &Twin| watched(firmware, scenario, twin);
     campaign.run_on("board", twin, watched, done)
 }
 
-/// A board under way.
+/// A running board.
 struct Board<'a> {
     bench: Bench<'a>,
+    /// Address of the first snapshot of the restart record.
     record: u32,
-    /// The last tick of which there is a record.
+    /// Mode and speed in the last snapshot.
     mode: Mode,
     speed: Q16,
-    /// Milliseconds since the board last started.
+    /// Milliseconds since the last start.
     up: u64,
     restarts: usize,
-    /// A command that the console has not taken yet.
-    owed: Option<Command>,
+    /// A command that the console has not accepted yet.
+    pending: Option<Command>,
     frames: Vec<u8>,
-    /// What it said of why it restarted.
-    said: usize,
-    /// What it said of its parameters since it last started.
+    /// Lines of the log about a restart.
+    restart_lines: usize,
+    /// The log about parameters since the last start.
     parameters: Parameters,
-    /// When it first said that its image is damaged, s.
+    /// First line of the log about a damaged image, s.
     image_s: Option<f64>,
-    /// It has said something since it last started.
-    heard: bool,
-    /// When the light first told of a damaged image, s.
+    /// The log has a line since the last start.
+    has_logged: bool,
+    /// When the light first reported a damaged image, s.
     light_s: Option<f64>,
 }
 
 impl<'a> Board<'a> {
-    fn new(firmware: Firmware<'a>, scenario: &Scenario) -> Result<Self, RunError> {
-        let bench = Bench::new(firmware.elf, firmware.strings, scenario);
-        let mut bench = bench.map_err(BenchError::from)?;
+    fn new(firmware: Firmware<'a>, scenario: &Scenario) -> Result<Self, BoardError> {
+        let mut bench = Bench::new(firmware.elf, firmware.strings, scenario)?;
         store(bench.machine_mut(), scenario)?;
-        let record = bench.machine().image().symbol(RECORD);
-        let record = record.map_err(BenchError::from)?;
+        let record = bench.machine().image().symbol(RECORD)?;
         Ok(Self {
             bench,
             record: record + 4 * CRASH_WORDS as u32,
@@ -109,29 +106,24 @@ impl<'a> Board<'a> {
             speed: Q16::ZERO,
             up: 0,
             restarts: 0,
-            owed: None,
+            pending: None,
             frames: Vec::new(),
-            said: 0,
+            restart_lines: 0,
             parameters: Parameters::default(),
             image_s: None,
-            heard: false,
+            has_logged: false,
             light_s: None,
         })
     }
 
-    /// A millisecond with a command or none. Gives what the controller put out as far as it
-    /// matters to the judge.
-    fn step(&mut self, command: Option<Command>) -> Result<Output, RunError> {
-        Ok(self.step_with(command)?.0)
-    }
-
-    /// The same, with what passed at the pins.
-    fn step_with(&mut self, command: Option<Command>) -> Result<(Output, Passed), RunError> {
-        self.owed = command.or(self.owed);
-        if let Some(owed) = self.owed
-            && self.bench.send(letter(owed))?
+    /// Runs a millisecond. Returns the controller's output as far as the judge needs it, and
+    /// the board's inputs and outputs.
+    fn step(&mut self, command: Option<Command>) -> Result<(Output, Passed), BoardError> {
+        self.pending = command.or(self.pending);
+        if let Some(pending) = self.pending
+            && self.bench.send(letter(pending))?
         {
-            self.owed = None;
+            self.pending = None;
         }
         let (passed, lines) = self.bench.step()?;
         self.frames.extend(self.bench.take_frames());
@@ -140,11 +132,11 @@ impl<'a> Board<'a> {
         if restarts > std::mem::replace(&mut self.restarts, restarts) {
             (self.mode, self.speed, self.up) = (Mode::Boot, Q16::ZERO, 0);
             self.parameters = Parameters::default();
-            self.heard = false;
+            self.has_logged = false;
         }
-        self.heard |= !lines.is_empty();
-        // Nothing else lights it before the first word of a start.
-        if self.restarts > 0 && !self.heard && self.bench.machine().chip().level(Pin::LIGHT) {
+        self.has_logged |= !lines.is_empty();
+        // Before the first line of a start, the light is on for a damaged image only.
+        if self.restarts > 0 && !self.has_logged && self.bench.machine().chip().level(Pin::LIGHT) {
             self.light_s.get_or_insert(self.bench.time_s());
         }
         let mut output = Output::default();
@@ -158,7 +150,7 @@ impl<'a> Board<'a> {
             (self.mode, self.speed) = (mode, snapshot.packed_speed.speed());
         }
         let mut say = |event| {
-            // More than there is room for comes in no millisecond.
+            // A millisecond has fewer events than the output holds.
             let _ = output.events.push(Entry { at: 0, event });
         };
         if let Mode::FaultHold(fault) = self.mode
@@ -167,12 +159,12 @@ impl<'a> Board<'a> {
             say(Event::Fault(fault));
         }
         for line in &lines {
-            let limit = line.behind("] limit ").and_then(|said| said.split_once(": "));
+            let limit = line.after("] limit ").and_then(|said| said.split_once(": "));
             let code = limit.and_then(|(code, _)| code.parse().ok());
             let known = Limit::ALL.into_iter().find(|limit| Some(limit.code()) == code);
             known.into_iter().for_each(|limit| say(Event::Limit(limit)));
-            self.said += usize::from(line.text.starts_with("restarted "));
-            self.parameters.look(&line.text, self.up);
+            self.restart_lines += usize::from(line.text.starts_with("restarted "));
+            self.parameters.read(&line.text, self.up);
             if line.text.starts_with(IMAGE) {
                 self.image_s.get_or_insert(self.bench.time_s());
             }
@@ -182,29 +174,28 @@ impl<'a> Board<'a> {
         Ok((output, passed))
     }
 
-    /// The record of the latest tick since the board started.
-    fn snapshot(&self) -> Result<Option<DriveSnapshot>, RunError> {
-        let read = |place: u32| -> Result<Option<DriveSnapshot>, RunError> {
+    /// Snapshot of the latest tick since the board started.
+    fn snapshot(&self) -> Result<Option<DriveSnapshot>, BoardError> {
+        let read = |place: u32| -> Result<Option<DriveSnapshot>, BoardError> {
             let mut words = [0; SNAPSHOT_WORDS];
             for (at, word) in (0..).zip(&mut words) {
                 let address = self.record + 4 * (place * SNAPSHOT_WORDS as u32 + at);
-                let read = self.bench.machine().word(address);
-                *word = read.map_err(BenchError::from)?;
+                *word = self.bench.machine().word(address)?;
             }
             Ok(DriveSnapshot::open(&words))
         };
         let snapshot = later(read(0)?, read(1)?);
-        // That of before a restart is not of now.
+        // A snapshot from before the restart is excluded.
         Ok(snapshot.filter(|snapshot| u64::from(snapshot.tick) <= self.up + AHEAD))
     }
 
-    /// What restarted it first, if it reported every restart.
+    /// Cause of the first restart, if the board reported every restart.
     fn restart(&self) -> Option<&'static str> {
         let (_, cause) = self.bench.machine().restarts().first()?;
-        let told = Run::of_stream(&self.frames).events;
-        let told = told.iter().filter(|entry| matches!(entry.event, Event::Restart(_))).count();
-        // Power that came up the first time is told as well.
-        (self.said > 0 || told > self.restarts).then_some(match cause {
+        let events = Run::of_stream(&self.frames).events;
+        let reports = events.iter().filter(|entry| matches!(entry.event, Event::Restart(_)));
+        // The first power-up is reported as well.
+        (self.restart_lines > 0 || reports.count() > self.restarts).then_some(match cause {
             Cause::Power => "reset by supply",
             Cause::Pin => "reset by pin",
             Cause::Software => "reset by software",
@@ -213,11 +204,11 @@ impl<'a> Board<'a> {
     }
 }
 
-/// The same run without the fault.
-fn twin(firmware: Firmware<'_>, scenario: &Scenario) -> Result<Twin, RunError> {
+/// The run without the fault.
+fn twin(firmware: Firmware<'_>, scenario: &Scenario) -> Result<Twin, BoardError> {
     let mut board = Board::new(firmware, scenario)?;
     let mut operator = Operator::default();
-    let mut twin = Twin::new(scenario).map_err(|error| RunError::Scenario(error.to_string()))?;
+    let mut twin = Twin::new(scenario).map_err(|error| BoardError::Scenario(error.to_string()))?;
     let mut over_s = 0.0;
     while board.bench.time_s() < LONGEST_S && over_s < AFTER_S {
         let t_s = board.bench.time_s();
@@ -225,7 +216,7 @@ fn twin(firmware: Firmware<'_>, scenario: &Scenario) -> Result<Twin, RunError> {
         if !operator.started() {
             twin.started_s = t_s;
         }
-        let output = board.step(command)?;
+        let (output, _) = board.step(command)?;
         let over = operator.over(board.mode);
         twin.note(t_s, board.mode, &output, over);
         over_s = if over { over_s + 1e-3 } else { 0.0 };
@@ -233,13 +224,17 @@ fn twin(firmware: Firmware<'_>, scenario: &Scenario) -> Result<Twin, RunError> {
     Ok(twin)
 }
 
-/// A run with its fault beside its twin.
-fn watched(firmware: Firmware<'_>, scenario: &Scenario, twin: &Twin) -> Result<Instant, RunError> {
+/// A run with its fault, compared with its twin.
+fn watched(
+    firmware: Firmware<'_>,
+    scenario: &Scenario,
+    twin: &Twin,
+) -> Result<Instant, BoardError> {
     let mut board = Board::new(firmware, scenario)?;
     let mut judge = Judge::new(scenario, board.bench.plant().truth());
     let mut operator = Operator::default();
     let reset = scenario.run.faults.first().is_some_and(Injection::resets_board);
-    let mut hold = reset.then(|| keep(&mut board, scenario)).transpose()?;
+    let mut hold = reset.then(|| store_kept(&mut board, scenario)).transpose()?;
     let early = scenario.run.faults.is_empty();
     let of_image = scenario.run.faults.iter().any(|fault| fault.target == Target::Image);
     let (mut during, mut after_s) = (None, 0.0);
@@ -247,14 +242,14 @@ fn watched(firmware: Firmware<'_>, scenario: &Scenario, twin: &Twin) -> Result<I
     while board.bench.time_s() < LONGEST_S && after_s < AFTER_S {
         let t_s = board.bench.time_s();
         let before = board.mode;
-        // Who saves parameters does not press buttons meanwhile.
+        // During a save of parameters the operator gives no command.
         let free = board.bench.saving() != Some(Saving::Writing);
         let command = if free { operator.command(before) } else { None };
-        let (output, passed) = board.step_with(command)?;
+        let (output, passed) = board.step(command)?;
         if let Some(hold) = &mut hold {
             hold.look(&board, &passed, command);
         }
-        let struck = early || board.bench.struck_s().is_some();
+        let struck = early || board.bench.fault_times().struck_s.is_some();
         if struck && !early && during.is_none() {
             during = Some(doing(before));
         }
@@ -266,13 +261,13 @@ fn watched(firmware: Firmware<'_>, scenario: &Scenario, twin: &Twin) -> Result<I
         if board.restarts > 0 && back_s.is_none() {
             back_s = Some(t_s);
         }
-        // A fault that is still to come is waited for only where something goes on.
-        let saves = matches!(board.bench.saving(), Some(Saving::Asked | Saving::Writing));
+        // Only a save in progress delays the end of the run.
+        let saves = matches!(board.bench.saving(), Some(Saving::Requested | Saving::Writing));
         let over = match (board.image_s, board.light_s) {
             (Some(_), _) => true,
-            // It may still say so.
-            (None, Some(light_s)) => t_s > light_s + SAYS_S,
-            // The whole of it is looked at in some seconds.
+            // The log's line can still follow.
+            (None, Some(light_s)) => t_s > light_s + LIGHT_TO_LOG_S,
+            // The check of the image takes some seconds.
             (None, None) if of_image => false,
             (None, None) => !saves && (operator.over(board.mode) || board.parameters.holds()),
         };
@@ -293,12 +288,12 @@ fn watched(firmware: Firmware<'_>, scenario: &Scenario, twin: &Twin) -> Result<I
         _ => Finding::Undetected,
     };
     let report = judge.fault.or_else(|| judge.new_limit(&twin.limits));
-    let at_s = board.bench.struck_s();
-    let told_s = match report {
+    let times = board.bench.fault_times();
+    let reported_s = match report {
         Some((at_s, _)) => Some(at_s),
         None => board.image_s.or(board.light_s).or(back_s).filter(|_| restart.is_some()),
     };
-    let since = |from_s: Option<f64>| Some(1e3 * (told_s? - from_s?).max(0.0));
+    let since = |from_s: Option<f64>| Some(1e3 * (reported_s? - from_s?).max(0.0));
     let (around, unrecorded) = match hold {
         Some(hold) => hold.judged(&mut board, scenario)?,
         None => (Vec::new(), None),
@@ -308,13 +303,13 @@ fn watched(firmware: Firmware<'_>, scenario: &Scenario, twin: &Twin) -> Result<I
     let injection = scenario.run.faults.first();
     Ok(Instant {
         seed: scenario.run.seed,
-        at_s,
+        at_s: times.struck_s,
         magnitude: injection.map(Injection::magnitude),
         during: during.unwrap_or("at rest"),
         finding,
         code: report.map(|(_, code)| code),
         restart,
-        latency_ms: since(board.bench.tells_s()).or(since(board.bench.acts_s()).map(|_| 0.0)),
+        latency_ms: since(times.visible_s).or(since(times.acts_s).map(|_| 0.0)),
         rest_ms: judge.fault.and_then(|(at_s, _)| Some(1e3 * (judge.rest_s? - at_s).max(0.0))),
         end: if board.image_s.is_some() { "hold" } else { judge.end() },
         peak_preload_n: judge.peak_preload_n,
@@ -324,10 +319,10 @@ fn watched(firmware: Firmware<'_>, scenario: &Scenario, twin: &Twin) -> Result<I
     })
 }
 
-/// Stores the rig's parameters in the board's flash, to be found there after a reset.
-fn keep(board: &mut Board<'_>, scenario: &Scenario) -> Result<Hold, RunError> {
+/// Stores the rig's parameters in the board's flash, which the reset must not change.
+fn store_kept(board: &mut Board<'_>, scenario: &Scenario) -> Result<Hold, BoardError> {
     let set = set_of(sets::KEPT, &scenario.rig)?;
     let place = slots::slot_image(&set, 7).ok_or(CompileError::Room)?;
-    board.bench.machine_mut().poke(PARAMETER_SETS, &place).map_err(BenchError::from)?;
+    board.bench.machine_mut().poke(PARAMETER_SETS, &place)?;
     Ok(Hold::new(place.to_vec()))
 }

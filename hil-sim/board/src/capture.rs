@@ -1,14 +1,18 @@
 //! The firmware on the emulated board as a source of its binary log.
 
 use crate::bench::Bench;
-use crate::log::{Line, Strings};
-use hil_sim::record::{Source, SourceError, letter, starter};
+use crate::log::Strings;
+use hil_sim::record::{Source, SourceError};
 use hil_sim::scenario::Scenario;
 
 /// Milliseconds that the board runs at each reading.
 const STEPS: u32 = 20;
+/// Milliseconds that the board runs on after the drive has arrived.
+const AFTER: u32 = 100;
 /// Longest run without an operator, s.
 const LONGEST_S: f64 = 120.0;
+/// Modes in which a run without an operator is over.
+const OVER: [&str; 3] = ["mode: deployed", "mode: retracted", "mode: fault hold"];
 
 fn broken(error: impl std::error::Error + Send + Sync + 'static) -> SourceError {
     SourceError::Other(Box::new(error))
@@ -17,68 +21,40 @@ fn broken(error: impl std::error::Error + Send + Sync + 'static) -> SourceError 
 /// The firmware on the emulated board, the plant at its pins.
 pub struct Emulated<'a> {
     bench: Bench<'a>,
-    lines: Vec<Line>,
-    start: Option<u8>,
     attended: bool,
-    idle: bool,
+    /// Milliseconds until the run ends, once that is known.
     left: Option<u32>,
 }
 
 impl<'a> Emulated<'a> {
-    /// A board with this image. Unless it is `attended` by an operator it is started
-    /// as soon as it is idle and ends when the drive has arrived.
-    ///
-    /// # Errors
-    /// [`SourceError::Other`] if the image is none.
+    /// A board with this image. Without an operator (`attended`) the drive starts as soon as
+    /// it is idle, and the source ends when the drive has arrived.
+    /// Errors: [`SourceError::Other`] if `elf` is no image of the board.
     pub fn new(
         elf: &[u8],
         strings: &'a Strings,
         scenario: &Scenario,
         attended: bool,
     ) -> Result<Self, SourceError> {
-        let bench = Bench::new(elf, strings, scenario).map_err(broken)?;
-        let start = letter(starter(scenario.run.direction));
-        Ok(Self {
-            bench,
-            lines: Vec::new(),
-            start: (!attended).then_some(start),
-            attended,
-            idle: false,
-            left: None,
-        })
+        let mut bench = Bench::new(elf, strings, scenario).map_err(broken)?;
+        if !attended {
+            bench.start_when_idle();
+        }
+        Ok(Self { bench, attended, left: None })
     }
 
-    /// The board and what is at its pins, to be tampered with.
-    pub fn bench(&mut self) -> &mut Bench<'a> {
-        &mut self.bench
-    }
-
-    /// Lines of the text log since the last call.
-    pub fn take_lines(&mut self) -> Vec<Line> {
-        std::mem::take(&mut self.lines)
-    }
-
+    /// Runs the board for a millisecond; false if the run is over.
     fn step(&mut self) -> Result<bool, SourceError> {
         if self.left == Some(0) {
             return Ok(false);
         }
         self.left = self.left.map(|left| left - 1);
-        if self.idle
-            && let Some(letter) = self.start
-            && self.bench.send(letter).map_err(broken)?
-        {
-            self.start = None;
-        }
         let (_, lines) = self.bench.step().map_err(broken)?;
         for line in &lines {
-            self.idle |= line.text.contains("mode: idle");
-            let over = ["mode: deployed", "mode: retracted", "mode: fault hold"];
-            let over = over.iter().any(|mode| line.text.contains(mode));
-            if over && !self.attended {
-                self.left.get_or_insert(100);
+            if !self.attended && OVER.iter().any(|mode| line.text.contains(mode)) {
+                self.left.get_or_insert(AFTER);
             }
         }
-        self.lines.extend(lines);
         if !self.attended && self.bench.time_s() >= LONGEST_S {
             self.left.get_or_insert(1);
         }

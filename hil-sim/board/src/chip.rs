@@ -1,5 +1,5 @@
-//! The chip around the core: every peripheral at its address, and what leads from one
-//! to another: clocks, interrupt lines, DMA requests, pins.
+//! The chip around the core: every peripheral at its address, and the connections between
+//! them: clocks, interrupt lines, DMA requests, pins.
 
 pub mod map;
 mod pins;
@@ -8,7 +8,6 @@ mod stray;
 use super::core::{Access, Bus};
 use super::peripherals::adc::{self, Adc};
 use super::peripherals::crc::CrcUnit;
-use super::peripherals::dbgmcu::Dbgmcu;
 use super::peripherals::dma::{CHANNELS, Dma, Dmamux, Move};
 use super::peripherals::encoder::Encoder;
 use super::peripherals::exti::Exti;
@@ -18,6 +17,7 @@ use super::peripherals::iwdg::Iwdg;
 use super::peripherals::pwm::Pwm;
 use super::peripherals::pwr::{Pwr, Then};
 use super::peripherals::rcc::{Cause, Rcc};
+use super::peripherals::registers::{Kept, Registers};
 use super::peripherals::spi::{self, AngleSensor, Spi};
 use super::peripherals::syscfg::Syscfg;
 use super::peripherals::system::{Counter, System};
@@ -27,27 +27,30 @@ use super::peripherals::{Peripheral, Write};
 pub use pins::{Bridge, Motor, Pin};
 pub use stray::{Stray, Strays, Why};
 
-use map::Block;
+use map::{Block, Place};
 
-/// Line of the supply's detector among the external interrupts.
+/// External interrupt line of the voltage detector.
 const SUPPLY_LINE: u32 = 16;
+
+/// `DBGMCU_IDCODE`: category 3, revision X.
+const DEBUG_IDENTITY: Kept = Kept { offset: 0, reset: 0x2003_6469, mask: 0 };
 
 /// Requests of the multiplexer: ADC1, ADC2, SPI1 in and out.
 const REQUESTS: [u32; 4] = [5, 36, 10, 11];
 
-/// Faults of the hardware that a test or a campaign may switch on.
+/// Faults of the hardware that a test or a campaign can switch on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Defects {
     /// Lines of the wheel encoder that are broken: the pull-up holds them high.
     pub encoder_lines: [bool; 2],
-    /// The input of preload sensor, compression sensor, drive's or pre-tightener's bridge reads this,
-    /// in parts of 2^16, whatever the voltage.
+    /// Codes, in parts of 2^16, that the inputs of preload sensor, compression sensor, drive's
+    /// and pre-tightener's bridge read instead of their voltages.
     pub stuck_codes: [Option<u16>; 4],
     /// DMA moves nothing.
     pub dma_stalled: bool,
-    /// Clearing the flags of the time driver's timer has no effect.
+    /// Writes that clear the flags of the time driver's timer have no effect.
     pub timer_flags_stick: bool,
-    /// The line of the external interrupts 10 to 15, the button's, asks without end.
+    /// The line of the external interrupts 10 to 15, the button's, stays active.
     pub button_storm: bool,
 }
 
@@ -70,18 +73,19 @@ pub struct Chip {
     /// The timers of drive and pre-tightener.
     motors: [Pwm; 2],
     adc: Adc,
-    /// The converters of which the first reads the bridges.
+    /// ADC3 and ADC4; ADC3 reads the bridges.
     readback: Adc,
     dma: Dma,
     mux: Dmamux,
     spi: Spi,
     /// Independent watchdog.
     pub watchdog: Iwdg,
-    debug: Dbgmcu,
+    /// Debug support: only kept, since no debugger halts the core.
+    debug: Registers,
     crc: CrcUnit,
     /// The angle sensor.
     pub angle: AngleSensor,
-    /// The select line was high during the frame under way.
+    /// The select line was high during the current frame.
     deselected: bool,
     /// The wheel encoder's position, in quarters of a line pair.
     wheel: i64,
@@ -97,7 +101,6 @@ pub struct Chip {
 impl Chip {
     /// The chip as power comes up, with the vectors at `vectors`: emergency stop closed,
     /// button released.
-    #[must_use]
     pub fn new(vectors: u32) -> Self {
         let ports: [Gpio; 7] = std::array::from_fn(|port| {
             let outside = pins::OUTSIDE[port];
@@ -121,7 +124,7 @@ impl Chip {
             mux: Dmamux::default(),
             spi: Spi::default(),
             watchdog: Iwdg::default(),
-            debug: Dbgmcu::default(),
+            debug: Registers::new(&[DEBUG_IDENTITY], &[0x04, 0x08, 0x0C, 0x10], &[]),
             crc: CrcUnit::default(),
             angle: AngleSensor::default(),
             deselected: false,
@@ -137,12 +140,12 @@ impl Chip {
         chip
     }
 
-    /// Starts every register afresh. What is outside the chip stays as it is. Returns what
-    /// the flash was at, as far as it came.
+    /// Resets every register; everything outside the chip stays. Returns the change of an
+    /// interrupted flash operation.
     pub fn reset(&mut self, cause: Cause, vectors: u32, now: u64) -> Option<Change> {
         let torn = self.flash.reset();
         let old = std::mem::replace(self, Self::new(vectors));
-        // Power that was lost takes the flags of earlier resets with it.
+        // A loss of power clears the flags of earlier resets.
         let earlier = if cause == Cause::Power { 0 } else { old.rcc.flags() };
         self.rcc = Rcc::new(cause, earlier);
         for (port, (driven, levels)) in old.ports.iter().map(Gpio::outside).enumerate() {
@@ -160,26 +163,20 @@ impl Chip {
         torn
     }
 
-    /// The supply falls below the detector's threshold, up to this cycle.
+    /// The supply is below the detector's threshold until this cycle.
     pub fn supply_falls(&mut self, until: u64, then: Then, now: u64) {
         self.power.fall(until, then);
         self.settle(now);
     }
 
-    /// A reset that the chip wants, once.
+    /// Takes a reset that the chip requests.
     pub fn take_reset(&mut self) -> Option<Cause> {
         self.reset.take()
     }
 
-    /// Accesses that no model has answered.
-    #[must_use]
+    /// Accesses that no model answered.
     pub const fn strays(&self) -> &Strays {
         &self.strays
-    }
-
-    /// Has every line looked at anew after a change from outside.
-    pub fn look_again(&mut self, now: u64) {
-        self.settle(now);
     }
 
     /// Does what is due at `now`.
@@ -193,25 +190,19 @@ impl Chip {
             self.spi.answer(answer, now);
         }
         self.flash.advance(now);
-        let low = self.power.tells();
+        let low = self.power.signals_low();
         self.power.advance(now);
-        if let Some(cause) = self.flash.ends_by() {
-            self.reset = Some(cause);
-        }
-        if self.watchdog.has_bitten(now) {
-            self.reset = Some(Cause::Watchdog);
-        }
-        if self.power.is_gone(now) {
-            self.reset = Some(Cause::Power);
-        }
-        let mut turned = self.power.tells() != low;
+        let watchdog = self.watchdog.has_expired(now).then_some(Cause::Watchdog);
+        let power = self.power.is_gone(now).then_some(Cause::Power);
+        self.reset = power.or(watchdog).or(self.flash.ends_by()).or(self.reset);
+        let mut changed = self.power.signals_low() != low;
         for motor in &mut self.motors {
             if motor.deadline() <= now {
                 motor.advance(now);
-                turned = true;
+                changed = true;
             }
         }
-        if turned {
+        if changed {
             self.settle_pins(now);
         }
         self.settle_lines(now);
@@ -229,41 +220,46 @@ impl Chip {
     }
 
     /// The transfer that DMA makes next.
-    #[must_use]
     pub fn next_move(&self) -> Option<Move> {
         if self.defects.dma_stalled {
             return None;
         }
-        let asked = [
+        let requested = [
             self.adc.wants_dma(0),
             self.adc.wants_dma(1),
             self.spi.has_word(),
             self.spi.wants_word(),
         ];
-        if asked == [false; REQUESTS.len()] {
+        if requested == [false; REQUESTS.len()] {
             return None;
         }
         (0..CHANNELS).find_map(|channel| {
             let request = self.mux.request(channel);
             let source = REQUESTS.iter().position(|known| *known == request)?;
-            if asked[source] { self.dma.due(channel) } else { None }
+            if requested[source] { self.dma.due(channel) } else { None }
         })
     }
 
-    /// A transfer is done, or met an address where nothing lies.
+    /// A transfer is done, or `found` no memory or register at its address.
     pub fn moved(&mut self, channel: usize, found: bool, now: u64) {
         self.dma.moved(channel, found);
         self.settle_lines(now);
     }
 
-    /// Lets everything that follows from a change follow: pins, lines, deadlines.
-    fn settle(&mut self, now: u64) {
+    /// Updates pins, lines and deadlines after a change.
+    pub(crate) fn settle(&mut self, now: u64) {
         self.settle_pins(now);
         self.settle_lines(now);
     }
 
-    /// The same after an access to one block: what cannot have changed is left alone.
+    /// The same after an access to one block, for the lines that it can change.
     fn settle_after(&mut self, block: Block, offset: u32, write: bool, now: u64) {
+        // Reading a data register changes state.
+        let by_reading = match block {
+            Block::Adc => offset & 0xFF == adc::DR,
+            Block::Spi => offset == spi::DR,
+            _ => false,
+        };
         match block {
             Block::Port(_) | Block::Syscfg | Block::Motor(_) | Block::Exti | Block::Pwr
                 if write =>
@@ -273,42 +269,36 @@ impl Chip {
                 }
                 self.settle(now);
             }
-            Block::Adc | Block::Readback | Block::Spi if write => self.settle_lines(now),
-            // Their data registers are changed by being read.
-            Block::Adc if offset & 0xFF == adc::DR => self.settle_lines(now),
-            Block::Spi if offset == spi::DR => self.settle_lines(now),
-            Block::Time | Block::Dma | Block::Mux | Block::Watchdog | Block::Flash if write => {
-                self.settle_lines(now);
-            }
-            // The interrupt controller keeps its own account.
-            Block::System if write && !(0x100..0x500).contains(&offset) => self.settle_lines(now),
+            // The interrupt controller updates itself.
+            Block::System if (0x100..0x500).contains(&offset) => {}
+            _ if write || by_reading => self.settle_lines(now),
             _ => {}
         }
     }
 
-    /// Interrupt lines, and when something is due next.
+    /// Updates interrupt lines and the next deadline.
     fn settle_lines(&mut self, now: u64) {
         if self.system.control.wants_reset {
             self.reset = Some(Cause::Software);
         }
         let lines = [
-            (1, self.exti.asks(1 << SUPPLY_LINE)),
-            (4, self.flash.asks()),
-            (23, self.exti.asks(0x03E0)),
-            (28, self.time.asks()),
-            (40, self.exti.asks(0xFC00) || self.defects.button_storm),
+            (1, self.exti.requests(1 << SUPPLY_LINE)),
+            (4, self.flash.requests()),
+            (23, self.exti.requests(0x03E0)),
+            (28, self.time.requests()),
+            (40, self.exti.requests(0xFC00) || self.defects.button_storm),
         ];
         let exceptions = &mut self.system.exceptions;
         for (interrupt, high) in lines {
             exceptions.set_line(interrupt, high, now);
         }
         for line in 0..5 {
-            exceptions.set_line(6 + line, self.exti.asks(1 << line), now);
+            exceptions.set_line(6 + line, self.exti.requests(1 << line), now);
         }
         for channel in 0..CHANNELS as u8 {
-            // Channel 8 has its interrupt elsewhere.
+            // Channel 8 has an interrupt number of its own.
             let interrupt = if channel == 7 { 96 } else { 11 + channel };
-            exceptions.set_line(interrupt, self.dma.asks(channel.into()), now);
+            exceptions.set_line(interrupt, self.dma.requests(channel.into()), now);
         }
         let due = [
             self.system.deadline(),
@@ -353,26 +343,24 @@ impl Chip {
         }
     }
 
-    /// Reads the word that holds an address.
-    fn read_word(&mut self, access: Access) -> u32 {
-        let Some((block, offset)) = map::find(access.address & !3) else {
-            self.strays.note(map::nobody(access.address), access, false, Why::NoModel);
-            return 0;
+    /// The register of an access, if a model with a clock answers it. Other accesses are noted.
+    fn target(&mut self, access: Access, write: bool) -> Option<Place> {
+        let Some(place) = map::find(access.address & !3) else {
+            let register = ("unknown peripheral", access.address & !3);
+            self.strays.note(register, access, write, Why::NoModel);
+            return None;
         };
-        if !map::is_clocked(block, &self.rcc) {
-            self.strays.note((map::name(block), offset), access, false, Why::NoClock);
-            return 0;
+        if !place.is_clocked(&self.rcc) {
+            self.strays.note((place.name, place.offset), access, write, Why::NoClock);
+            return None;
         }
-        let value = self.block(block).read(offset, access.now);
-        self.settle_after(block, offset, false, access.now);
-        match value {
-            Some(value) => value,
-            None => {
-                self.strays.note((map::name(block), offset), access, false, Why::NoModel);
-                0
-            }
-        }
+        Some(place)
     }
+}
+
+/// Bits of an access in the lowest bytes of a word.
+const fn lowest(bytes: u32) -> u32 {
+    if bytes >= 4 { u32::MAX } else { (1 << (8 * bytes)) - 1 }
 }
 
 impl Bus for Chip {
@@ -381,26 +369,22 @@ impl Bus for Chip {
     }
 
     fn read(&mut self, access: Access) -> u32 {
-        let word = self.read_word(access);
-        let kept = if access.size >= 4 { u32::MAX } else { (1 << (8 * access.size)) - 1 };
-        word >> (8 * (access.address & 3)) & kept
+        let Some(Place { block, offset, name, .. }) = self.target(access, false) else { return 0 };
+        let word = self.block(block).read(offset, access.now);
+        self.settle_after(block, offset, false, access.now);
+        if word.is_none() {
+            self.strays.note((name, offset), access, false, Why::NoModel);
+        }
+        word.unwrap_or(0) >> (8 * (access.address & 3)) & lowest(access.size)
     }
 
     fn write(&mut self, access: Access, value: u32) {
-        let shift = 8 * (access.address & 3);
-        let kept = if access.size >= 4 { u32::MAX } else { (1 << (8 * access.size)) - 1 };
+        let Some(Place { block, offset, name, .. }) = self.target(access, true) else { return };
+        let (shift, kept) = (8 * (access.address & 3), lowest(access.size));
         let write = Write { value: (value & kept) << shift, mask: kept << shift };
-        let Some((block, offset)) = map::find(access.address & !3) else {
-            self.strays.note(map::nobody(access.address), access, true, Why::NoModel);
-            return;
-        };
-        if !map::is_clocked(block, &self.rcc) {
-            self.strays.note((map::name(block), offset), access, true, Why::NoClock);
-            return;
-        }
         let sticks = self.defects.timer_flags_stick && (block, offset) == (Block::Time, 0x10);
         if !sticks && self.block(block).write(offset, write, access.now).is_none() {
-            self.strays.note((map::name(block), offset), access, true, Why::NoModel);
+            self.strays.note((name, offset), access, true, Why::NoModel);
         }
         self.settle_after(block, offset, true, access.now);
     }

@@ -1,22 +1,27 @@
 //! The verbs of `rig` that run on the emulated board.
 
-mod capture;
-mod cycles;
 mod deploy;
-mod faults;
-mod live;
-mod params;
 
+use std::fs;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use hil_sim::cli::failure::{Failure, Outcome};
-use hil_sim::firmware::{self, Profile};
+use hil_sim::cli::{capture, faults, live, output, params};
+use hil_sim::firmware::{self, Profile, build_binary};
+use hil_sim::params::Client;
+use hil_sim::progress;
 use hil_sim::scenario::Scenario;
 
+use crate::campaign::{self, Firmware};
+use crate::capture::Emulated;
+use crate::cycles::{self, Step};
+use crate::image::Image;
 use crate::log::Strings;
+use crate::params::EmulatedBoard;
 
-/// The verbs of `rig` on the emulated board; `rig` starts this where one needs it.
+/// The verbs of `rig` on the emulated board; `rig` starts this program where one needs it.
 #[derive(Debug, Parser)]
 #[command(name = "rig-board", bin_name = "cargo rig", version, disable_help_subcommand = true)]
 struct Cli {
@@ -27,31 +32,39 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Verb {
     Deploy(hil_sim::cli::deploy::Args),
-    Capture(hil_sim::cli::capture::Args),
-    Live(hil_sim::cli::live::Args),
-    Faults(hil_sim::cli::faults::Args),
-    Params(hil_sim::cli::params::Args),
+    Capture(capture::Args),
+    Live(live::Args),
+    Faults(faults::Args),
+    Params(params::Args),
     #[command(hide = true)]
-    Cycles(cycles::Args),
+    Cycles(CyclesArgs),
 }
 
-impl Verb {
-    fn run(&self) -> Result<Outcome, Failure> {
-        match self {
-            Self::Deploy(args) => deploy::run(args),
-            Self::Capture(args) => capture::run(args),
-            Self::Live(args) => live::run(args),
-            Self::Faults(args) => faults::run(args),
-            Self::Params(args) => params::run(args),
-            Self::Cycles(args) => cycles::run(args),
-        }
-    }
+/// Textbook cycles of the measuring image's functions.
+///
+/// With a script, the results of its steps; without one, the control tick over a deployment
+/// and a retraction of the prototype.
+#[derive(Debug, clap::Args)]
+struct CyclesArgs {
+    /// Steps to carry out, a JSON array: see `rig_board::cycles::Step`.
+    #[arg(long, value_name = "FILE")]
+    script: Option<PathBuf>,
+
+    /// Prints one JSON object, as is the default.
+    #[arg(long)]
+    json: bool,
 }
 
 /// Runs the command with the arguments of this process.
-#[must_use]
 pub fn main() -> ExitCode {
-    hil_sim::cli::run(|cli: &Cli| cli.verb.run())
+    hil_sim::cli::run(|cli: &Cli| match &cli.verb {
+        Verb::Deploy(args) => deploy::run(args),
+        Verb::Capture(args) => capture(args),
+        Verb::Live(args) => live(args),
+        Verb::Faults(args) => faults(args),
+        Verb::Params(args) => params(args),
+        Verb::Cycles(args) => cycles(args),
+    })
 }
 
 /// The firmware as it is flashed, with the strings of its log, for a scenario that it can
@@ -61,4 +74,63 @@ fn image(scenario: &Scenario) -> Result<(Vec<u8>, Strings), Failure> {
     let elf = firmware::image(Profile::Release)?;
     let strings = Strings::of(&elf).map_err(Failure::run)?;
     Ok((elf, strings))
+}
+
+fn capture(args: &capture::Args) -> Result<Outcome, Failure> {
+    let scenario = args.source.scenario()?;
+    let (elf, strings) = image(&scenario)?;
+    let mut source = Emulated::new(&elf, &strings, &scenario, false).map_err(Failure::run)?;
+    capture::write(args, &mut source, Some(&scenario))
+}
+
+fn live(args: &live::Args) -> Result<Outcome, Failure> {
+    let scenario = args.source.scenario()?;
+    let (elf, strings) = image(&scenario)?;
+    let source = Emulated::new(&elf, &strings, &scenario, !args.headless);
+    live::watch(args, &mut source.map_err(Failure::run)?)
+}
+
+fn faults(args: &faults::Args) -> Result<Outcome, Failure> {
+    let campaign = args.campaign()?;
+    let (elf, strings) = image(&campaign.scenario)?;
+    let firmware = Firmware { elf: &elf, strings: &strings };
+    let outcome = {
+        let bar = progress::bar("runs", campaign.runs());
+        campaign::run(&campaign, firmware, &|| bar.advance(1)).map_err(Failure::run)?
+    };
+    faults::ended(args, &outcome)
+}
+
+/// Starts the board with the flash that the file holds, does what was asked with its
+/// parameters, and writes the flash back to the file even if that failed.
+fn params(args: &params::Args) -> Result<Outcome, Failure> {
+    let elf = firmware::image(Profile::Release)?;
+    if let Some(folder) = args.flash.parent() {
+        fs::create_dir_all(folder)
+            .map_err(|error| Failure::input(format!("{}: {error}", folder.display())))?;
+    }
+    let mut client = {
+        let _progress = progress::spinner("starting the board");
+        Client::new(EmulatedBoard::start(&elf, &args.flash)?)
+    };
+    let outcome = params::act(args, &mut client);
+    client.into_wire().keep()?;
+    outcome
+}
+
+fn cycles(args: &CyclesArgs) -> Result<Outcome, Failure> {
+    let (package, binary) = cycles::IMAGE;
+    let read = hil_sim::cli::deploy::read;
+    let elf = read(&build_binary(package, binary, Profile::Release, &[])?)?;
+    let mut image = Image::start(&elf).map_err(Failure::run)?;
+    let none = String::new;
+    if let Some(path) = &args.script {
+        let steps: Vec<Step> = serde_json::from_slice(&read(path)?).map_err(Failure::input)?;
+        let done = cycles::run(&mut image, &steps).map_err(Failure::run)?;
+        output::result(true, &done, none)?;
+    } else {
+        let tick = cycles::tick(&mut image, &Scenario::default());
+        output::result(true, &tick.map_err(Failure::run)?, none)?;
+    }
+    Ok(Outcome::Good)
 }

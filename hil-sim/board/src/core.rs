@@ -1,4 +1,4 @@
-//! The processor core as the rest of the emulated board sees it.
+//! The processor core, as the rest of the emulated board uses it.
 
 pub mod unicorn;
 
@@ -19,11 +19,11 @@ pub enum Register {
     Xpsr,
     /// Which stack, whether the floating-point context is live.
     Control,
-    /// Shuts out every exception with a priority that can be set.
+    /// Masks every exception with a configurable priority.
     Primask,
-    /// Shuts out exceptions of this priority and less urgent ones.
+    /// Masks exceptions of this priority and less urgent ones.
     Basepri,
-    /// Shuts out all but the non-maskable interrupt.
+    /// Masks all but the non-maskable interrupt.
     Faultmask,
     /// S0 to S31.
     Float(u8),
@@ -31,16 +31,16 @@ pub enum Register {
     Fpscr,
 }
 
-/// Why the core stopped, and where it goes on.
+/// Why the core stopped, and the address at which it continues.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
     /// At this breakpoint instruction.
     Breakpoint(u32),
-    /// The cycles allowed were used up, or the bus wants to be looked after.
+    /// The cycles are used up, or the bus has a deadline.
     Spent(u32),
-    /// An exception wants to be taken that no mask shuts out.
+    /// An exception that no mask excludes is pending.
     Urgent(u32),
-    /// Behind a supervisor call.
+    /// After a supervisor call.
     Call(u32),
     /// An exception handler returned, with this value.
     Return(u32),
@@ -48,65 +48,64 @@ pub enum Stop {
     Event(u32),
     /// Waiting for an interrupt.
     Wait(u32),
-    /// The program did what a processor faults on.
+    /// The program caused a fault.
     Fault {
         /// Program counter.
         at: u32,
-        /// What it did.
+        /// Its kind.
         fault: Fault,
     },
 }
 
-/// What a processor faults on.
+/// Kind of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// An instruction that is none.
+    /// An undefined instruction.
     Undefined,
-    /// Nothing to run there.
+    /// A fetch from an address without code.
     Fetch,
-    /// Reading where nothing answers.
+    /// A read without an answer.
     Read,
-    /// Writing where nothing takes it.
+    /// A write without an answer.
     Write,
-    /// Something else that the engine does not name.
+    /// Any other.
     Other,
 }
 
 /// What can go wrong on the core.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum CoreError {
-    /// The engine refused something.
+    /// The engine refused a request.
     #[error("the emulator failed to {what}: {why}")]
     Engine {
-        /// What it was to do.
+        /// The request.
         what: &'static str,
-        /// What it said.
+        /// Its answer.
         why: String,
     },
-    /// The program did what a processor faults on.
+    /// The program caused a fault.
     #[error("the core stopped at {at:#010x} (called from {lr:#010x}): {why}")]
     Fault {
         /// Program counter.
         at: u32,
         /// Link register.
         lr: u32,
-        /// What the engine said.
+        /// Kind of the fault.
         why: String,
     },
 }
 
-/// What has been executed since the start.
+/// Cycles and instructions since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Meter {
     /// Textbook cycles, see [`super::timing`].
     pub cycles: u64,
-    /// Instructions, those skipped by a condition included.
+    /// Instructions, including those that a condition skips.
     pub instructions: u64,
 }
 
 impl Meter {
-    /// What has been executed since `earlier`.
-    #[must_use]
+    /// The difference to `earlier`.
     pub const fn since(self, earlier: Self) -> Self {
         Self {
             cycles: self.cycles - earlier.cycles,
@@ -115,89 +114,73 @@ impl Meter {
     }
 }
 
-/// The program has come to a marked address.
+/// The program got to a marked address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mark {
-    /// Cycles so far, the block that begins there included.
+    /// Cycles so far, including the block that begins there.
     pub cycles: u64,
     /// Where.
     pub address: u32,
-    /// What R0 held.
+    /// Value of R0.
     pub r0: u32,
 }
 
-/// An access to an address that holds no memory.
+/// An access to an address without memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Access {
     /// Where.
     pub address: u32,
     /// Bytes: 1, 2 or 4.
     pub size: u32,
-    /// The program counter: the beginning of the block under way.
+    /// The program counter: the beginning of the current block.
     pub pc: u32,
     /// Cycles since the start.
     pub now: u64,
 }
 
-/// What answers the addresses that hold no memory, and interrupts the core.
+/// The devices at addresses without memory, which interrupt the core.
 pub trait Bus {
     /// Ranges that it answers: first address and bytes, a multiple of 4096.
-    fn ranges(&self) -> Vec<(u32, u32)>;
-
-    /// Reads.
-    fn read(&mut self, access: Access) -> u32;
-
-    /// Writes.
-    fn write(&mut self, access: Access, value: u32);
-
-    /// Writes where code lies, which may not be written as memory. False if nothing takes
-    /// it: a fault.
-    fn write_code(&mut self, _access: Access, _value: u32) -> bool {
-        false
-    }
-
-    /// Cycle at which something happens by itself; the core stops no earlier than its
-    /// next block after it.
-    fn deadline(&self) -> u64;
-
-    /// Priority of the exception that is to be taken next, if it preempts what runs
-    /// and no mask shuts it out.
-    fn urgent(&self) -> Option<i16>;
-
-    /// The program has sent an event.
-    fn event(&mut self);
-}
-
-/// A core by itself: nothing answers.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct NoBus;
-
-impl Bus for NoBus {
     fn ranges(&self) -> Vec<(u32, u32)> {
         Vec::new()
     }
 
-    fn read(&mut self, _: Access) -> u32 {
+    /// Reads.
+    fn read(&mut self, _access: Access) -> u32 {
         0
     }
 
-    fn write(&mut self, _: Access, _: u32) {}
+    /// Writes.
+    fn write(&mut self, _access: Access, _value: u32) {}
 
+    /// Writes to flash, which is not writable as memory; false is a fault.
+    fn write_code(&mut self, _access: Access, _value: u32) -> bool {
+        false
+    }
+
+    /// Cycle at which something happens by itself; the core stops at the first block after it.
     fn deadline(&self) -> u64 {
         u64::MAX
     }
 
+    /// Priority of the pending exception that preempts the running code unless it is masked.
     fn urgent(&self) -> Option<i16> {
         None
     }
 
+    /// The program has sent an event.
     fn event(&mut self) {}
 }
 
-/// Whether an exception of this priority passes the masks.
+/// No bus: nothing answers and nothing interrupts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NoBus;
+
+impl Bus for NoBus {}
+
+/// Whether the masks let an exception of this priority through.
 ///
 /// Source: ARMv7-M Architecture Reference Manual, B1.5.4 (`ExecutionPriority`).
-#[must_use]
 pub fn passes(priority: i16, primask: u32, basepri: u32, faultmask: u32) -> bool {
     let mut level = i16::MAX;
     if basepri & 0xFF != 0 {
@@ -214,68 +197,41 @@ pub fn passes(priority: i16, primask: u32, basepri: u32, faultmask: u32) -> bool
 
 /// A Cortex-M4 with its memory: registers, running, counting.
 ///
-/// Addresses that hold no memory are the board's to answer; an access to one that
-/// nothing answers ends the run.
+/// The bus answers addresses without memory; an access without an answer is a fault.
+/// Errors: Every method: [`CoreError::Engine`] if the engine refuses, as for an address without
+/// memory.
 pub trait Core {
     /// Reads memory.
-    ///
-    /// # Errors
-    /// [`CoreError::Engine`] if nothing lies there.
     fn read(&self, address: u32, into: &mut [u8]) -> Result<(), CoreError>;
 
     /// Writes memory, flash too.
-    ///
-    /// # Errors
-    /// [`CoreError::Engine`] if nothing lies there.
     fn write(&mut self, address: u32, bytes: &[u8]) -> Result<(), CoreError>;
 
     /// A register's value.
-    ///
-    /// # Errors
-    /// [`CoreError::Engine`] if the engine does not tell.
     fn register(&self, register: Register) -> Result<u32, CoreError>;
 
     /// Sets a register.
-    ///
-    /// # Errors
-    /// [`CoreError::Engine`] if the engine does not take it.
     fn set_register(&mut self, register: Register, value: u32) -> Result<(), CoreError>;
 
     /// Runs from `address` until something stops the core, `cycles` at most.
-    ///
-    /// # Errors
-    /// [`CoreError::Engine`] if the engine fails.
     fn run(&mut self, address: u32, cycles: u64) -> Result<Stop, CoreError>;
 
-    /// Runs from `address` until the program comes to `until`, or as [`Core::run`].
-    ///
-    /// Slow: code is translated anew for the place to stop at.
-    ///
-    /// # Errors
-    /// As [`Core::run`].
+    /// The same, or until the program gets to `until`. Slow: the engine translates again.
     fn run_to(&mut self, address: u32, cycles: u64, until: u32) -> Result<Stop, CoreError>;
 
-    /// Carries out the one instruction at `address`, or the conditional block that begins
-    /// there.
-    ///
-    /// Slow: code is translated anew for it.
-    ///
-    /// # Errors
-    /// As [`Core::run`].
+    /// Executes the instruction at `address`, or the conditional block that begins there. Slow:
+    /// the engine translates again.
     fn step(&mut self, address: u32) -> Result<Stop, CoreError>;
 
     /// Lets time pass in which no instruction is executed.
     fn pass(&mut self, cycles: u64);
 
-    /// What has been executed so far.
+    /// Cycles and instructions so far.
     fn meter(&self) -> Meter;
 
-    /// Notes from now on whenever the program comes to this address.
-    ///
-    /// # Errors
-    /// [`CoreError::Engine`] if the engine refuses.
-    fn mark(&mut self, address: u32) -> Result<(), CoreError>;
+    /// Notes from now on when the program gets to this address.
+    fn mark(&mut self, address: u32);
 
-    /// Moves the notes taken since the last call into `marks`, in their order.
+    /// Moves the notes since the last call into `marks`, in their order.
     fn take_marks(&mut self, marks: &mut Vec<Mark>);
 }

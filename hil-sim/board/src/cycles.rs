@@ -1,21 +1,23 @@
 //! Cycles of the measuring image's functions, which are built like the firmware's.
 
 use interstage::estimate::ContactStage;
-use interstage::supervise::{Command, Leg, Mode};
+use interstage::supervise::{Leg, Mode};
 use interstage::tick::Input;
 use interstage_images::tick::{Given, Preset, Taken};
 use serde::{Deserialize, Serialize};
 
+use crate::core::Meter;
 use crate::error::ImageError;
 use crate::image::{ARGUMENTS, Image};
 use crate::spread::Spread;
+use hil_sim::record::starter;
 use hil_sim::scenario::{Direction, Scenario};
 use hil_sim::session::{Options, RunError, Session};
 
 /// Package and binary of the measuring image.
 pub const IMAGE: (&str, &str) = ("interstage-images", "measure");
 
-/// Where the image writes what is compared of an output.
+/// Address at which the image writes its outputs.
 const ANSWERS: u32 = ARGUMENTS + 0x1000;
 /// Longest run recorded, ticks.
 const LONGEST: usize = 120_000;
@@ -24,7 +26,7 @@ const LONGEST: usize = 120_000;
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Step {
-    /// Puts words where functions find what they are given by reference.
+    /// Writes words to the memory of arguments by reference.
     Put(Vec<u32>),
     /// Calls a function with at most four arguments.
     Call {
@@ -43,19 +45,17 @@ pub enum Step {
     },
 }
 
-/// What came of a step.
+/// Result of a step.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Done {
-    /// What each call returned.
+    /// Return value of each call.
     pub values: Vec<u32>,
-    /// What the calls took.
+    /// Cost of the calls.
     pub cost: Spread,
 }
 
 /// Carries out the steps of a script.
-///
-/// # Errors
-/// [`ImageError`] at the first call that fails.
+/// Errors: [`ImageError`] at the first call that fails.
 pub fn run(image: &mut Image, steps: &[Step]) -> Result<Vec<Done>, ImageError> {
     let one = |step: &Step| {
         let (values, cost) = match step {
@@ -77,7 +77,7 @@ pub fn run(image: &mut Image, steps: &[Step]) -> Result<Vec<Done>, ImageError> {
     steps.iter().map(one).collect()
 }
 
-/// Why the tick was not measured.
+/// Why the tick cannot be measured.
 #[derive(Debug, thiserror::Error)]
 pub enum CyclesError {
     /// The run in software cannot be made.
@@ -86,45 +86,40 @@ pub enum CyclesError {
     /// The image failed.
     #[error(transparent)]
     Image(#[from] ImageError),
-    /// The core answered otherwise than the host.
+    /// The core's output differs from the host's.
     #[error("tick {0} differs between host and core")]
     Differs(usize),
 }
 
-/// Cycles of the control tick over whole runs.
+/// Cycles of the control tick over complete runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct TickCycles {
     /// Every tick.
     pub tick: Spread,
     /// Ticks on the continuous wall, no step inside the horizon.
     pub smooth: Spread,
-    /// Every tick, with every stage run in each.
+    /// Every tick, with every stage executed.
     pub without_skipping: Spread,
-    /// The planner's answers between the ticks.
+    /// The planner's answers between ticks.
     pub plan: Spread,
 }
 
 /// A tick of a run in software.
 #[derive(Clone, Copy, Debug)]
 pub struct Recorded {
-    /// What the controller was given; the plan is worked out again.
+    /// Input of the controller; the image computes the plan again.
     pub given: Given,
-    /// What is compared of what it gave.
+    /// Its output, as far as it is compared.
     pub taken: Taken,
-    /// Whether it was under way on the continuous wall.
+    /// Whether the drive was in cruise on the continuous wall.
     pub smooth: bool,
 }
 
-/// Runs a scenario in software and keeps each tick.
-///
-/// # Errors
-/// [`RunError`] as for a run in software.
+/// Runs a scenario in software and records each tick.
+/// Errors: [`RunError`] as for a run in software.
 pub fn record(scenario: &Scenario) -> Result<Vec<Recorded>, RunError> {
     let mut session = Session::new(scenario, Options::default())?;
-    let mut start = Some(match scenario.run.direction {
-        Direction::Deploy => Command::Start,
-        Direction::Retract => Command::Retract,
-    });
+    let mut start = Some(starter(scenario.run.direction));
     let mut ticks = Vec::new();
     while ticks.len() < LONGEST {
         let command = if session.mode() == Mode::Idle { start.take() } else { None };
@@ -142,18 +137,24 @@ pub fn record(scenario: &Scenario) -> Result<Vec<Recorded>, RunError> {
     Ok(ticks)
 }
 
-/// Gives ticks to the image's controller, built from this preset. Every output must be the
-/// recorded one to the bit.
-///
-/// # Errors
-/// [`CyclesError::Differs`] at the first tick that the image answers otherwise.
+/// Cost of a replayed tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TickCost {
+    /// Of the control tick.
+    pub step: Meter,
+    /// Of the planner's answer, if the tick requested one.
+    pub plan: Option<Meter>,
+}
+
+/// Replays ticks on the image's controller, built from this preset. Every output must equal
+/// the recorded one to the bit.
+/// Errors: [`CyclesError::Differs`] at the first tick whose output differs.
 pub fn replay(
     image: &mut Image,
     preset: Preset,
     ticks: &[Recorded],
     skips: bool,
-    mut note: impl FnMut(&Recorded, &dyn Fn(&mut Spread), Option<&dyn Fn(&mut Spread)>),
-) -> Result<(), CyclesError> {
+) -> Result<Vec<TickCost>, CyclesError> {
     let function = |image: &Image, name: &str| image.function(name);
     let (load, step) = (function(image, "tick_load")?, function(image, "tick_step")?);
     let (plan, save) = (function(image, "tick_plan")?, function(image, "tick_save")?);
@@ -161,26 +162,23 @@ pub fn replay(
     if !skips {
         image.call(function(image, "tick_skip_nothing")?, &[])?;
     }
+    let mut costs = Vec::with_capacity(ticks.len());
     for (number, tick) in ticks.iter().enumerate() {
         image.put(ARGUMENTS, &tick.given.words())?;
         image.call(load, &[ARGUMENTS])?;
-        let cost = image.call(step, &[])?.meter;
+        let step = image.call(step, &[])?.meter;
         let planned = image.call(plan, &[])?;
-        let add = |spread: &mut Spread| spread.note(cost, number);
-        let add_plan = |spread: &mut Spread| spread.note(planned.meter, number);
-        note(tick, &add, if planned.value != 0 { Some(&add_plan) } else { None });
         image.call(save, &[ANSWERS])?;
         if Taken::from_words(image.get(ANSWERS)?) != tick.taken {
             return Err(CyclesError::Differs(number));
         }
+        costs.push(TickCost { step, plan: (planned.value != 0).then_some(planned.meter) });
     }
-    Ok(())
+    Ok(costs)
 }
 
 /// Measures the control tick over a deployment and a retraction of a preset's scenario.
-///
-/// # Errors
-/// [`CyclesError`] if it cannot be run, or host and core differ.
+/// Errors: [`CyclesError`] if it cannot be run, or host and core differ.
 pub fn tick(image: &mut Image, scenario: &Scenario) -> Result<TickCycles, CyclesError> {
     let preset = Preset::named(&scenario.preset).unwrap_or(Preset::Prototype);
     let mut cycles = TickCycles::default();
@@ -188,16 +186,19 @@ pub fn tick(image: &mut Image, scenario: &Scenario) -> Result<TickCycles, Cycles
         let mut scenario = scenario.clone();
         scenario.run.direction = direction;
         let ticks = record(&scenario)?;
-        replay(image, preset, &ticks, true, |tick, add, add_plan| {
-            add(&mut cycles.tick);
+        let costs = replay(image, preset, &ticks, true)?;
+        for (number, (tick, cost)) in ticks.iter().zip(costs).enumerate() {
+            cycles.tick.note(cost.step, number);
             if tick.smooth {
-                add(&mut cycles.smooth);
+                cycles.smooth.note(cost.step, number);
             }
-            if let Some(add) = add_plan {
-                add(&mut cycles.plan);
+            if let Some(plan) = cost.plan {
+                cycles.plan.note(plan, number);
             }
-        })?;
-        replay(image, preset, &ticks, false, |_, add, _| add(&mut cycles.without_skipping))?;
+        }
+        for (number, cost) in replay(image, preset, &ticks, false)?.into_iter().enumerate() {
+            cycles.without_skipping.note(cost.step, number);
+        }
     }
     Ok(cycles)
 }

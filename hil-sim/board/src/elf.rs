@@ -1,4 +1,4 @@
-//! An image of the board: what goes to flash, where code stands, what things are called.
+//! An image of the board: its flash, its code, its symbols.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -23,23 +23,21 @@ pub struct Function {
     pub name: String,
 }
 
-/// An image's memory and names.
+/// An image's memory and symbols.
 pub struct Loaded {
-    /// The whole flash.
+    /// The complete flash.
     pub flash: Vec<u8>,
-    /// Where instructions stand.
+    /// Address ranges of instructions.
     pub code: Vec<Range<u32>>,
-    /// In the order of their addresses.
+    /// Functions in the order of their addresses.
     pub functions: Vec<Function>,
     /// Every symbol with its value.
     symbols: BTreeMap<String, u32>,
 }
 
 impl Loaded {
-    /// What of the image goes to flash, and what its symbols say.
-    ///
-    /// # Errors
-    /// [`ImageError::Form`] if it is no image of the board.
+    /// Reads segments and symbols of an image.
+    /// Errors: [`ImageError::Form`] if it is no image of the board.
     pub fn of(elf: &[u8]) -> Result<Self, ImageError> {
         let file = ElfFile32::<Endianness>::parse(elf).map_err(ImageError::form)?;
         let endian = file.endian();
@@ -76,16 +74,13 @@ impl Loaded {
     }
 
     /// Value of a symbol.
-    ///
-    /// # Errors
-    /// [`ImageError::Missing`] if the image has none of this name.
+    /// Errors: [`ImageError::Missing`] if the image has none of this name.
     pub fn symbol(&self, name: &str) -> Result<u32, ImageError> {
         self.symbols.get(name).copied().ok_or_else(|| ImageError::Missing(name.to_owned()))
     }
 }
 
 /// Name of the function at an address, of functions in the order of their addresses.
-#[must_use]
 pub fn named(functions: &[Function], address: u32) -> &str {
     let after = functions.partition_point(|f| f.range.start <= address);
     let found = functions[..after].last().filter(|f| f.range.contains(&address));
@@ -102,7 +97,7 @@ fn function<'a>(symbol: &impl ObjectSymbol<'a>) -> Option<Function> {
     Some(Function { range: start..start + symbol.size() as u32, name })
 }
 
-/// Where instructions stand in flash: from each `$t` to the next mapping symbol.
+/// Address ranges of instructions in flash: from each `$t` to the next mapping symbol.
 fn code(file: &ElfFile32<'_, Endianness>) -> Vec<Range<u32>> {
     let kind = |name: &str| match name.as_bytes() {
         [b'$', kind @ (b't' | b'd' | b'a')] => Some(*kind),

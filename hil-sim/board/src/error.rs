@@ -1,20 +1,14 @@
-//! What can go wrong with an image.
+//! What can go wrong with an image and with a run.
 
-use std::path::PathBuf;
+use hil_sim::firmware::FirmwareError;
+use hil_sim::plant::rig::PlantError;
+use interstage::params::CompileError;
 
 use crate::core::CoreError;
 
 /// Why an image does not run.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
-    /// The file could not be read.
-    #[error("could not read {path}: {source}")]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
     /// It is no image of the board.
     #[error("not an image of the board: {0}")]
     Form(String),
@@ -24,12 +18,12 @@ pub enum ImageError {
     /// The core stopped.
     #[error(transparent)]
     Core(#[from] CoreError),
-    /// A call ended where it should not have: it panicked, or did not end at all.
+    /// A call panicked or did not return.
     #[error("{function} ended in {at}")]
     Lost {
-        /// What was called.
+        /// The function that was called.
         function: String,
-        /// The function it ended in.
+        /// The function in which it ended.
         at: String,
     },
 }
@@ -38,5 +32,34 @@ impl ImageError {
     /// The file has another form than an image.
     pub(crate) fn form(error: impl ToString) -> Self {
         Self::Form(error.to_string())
+    }
+}
+
+/// Why a run on the board cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum BoardError {
+    /// The image or the core.
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    /// The plant left the set of meaningful states.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
+    /// The image's sections.
+    #[error(transparent)]
+    Firmware(#[from] FirmwareError),
+    /// The firmware has one controller.
+    #[error("the firmware schedules: --controller {0} runs in software alone")]
+    Controller(String),
+    /// The scenario's parameters.
+    #[error("{0}")]
+    Scenario(String),
+    /// The rig cannot be put into the board's flash.
+    #[error(transparent)]
+    Parameters(#[from] CompileError),
+}
+
+impl From<CoreError> for BoardError {
+    fn from(error: CoreError) -> Self {
+        Self::Image(error.into())
     }
 }

@@ -1,4 +1,4 @@
-//! Exceptions of the core: what is pending, enabled and active, and which is next.
+//! Exceptions of the core: pending, enabled, active, and the next one.
 //!
 //! Source: ARMv7-M Architecture Reference Manual, B1.5 and B3.4.
 
@@ -36,7 +36,7 @@ pub struct Exceptions {
     pending: u128,
     enabled: u128,
     lines: u128,
-    /// Active ones, the one that runs last.
+    /// Active ones, the running one at the end.
     active: Vec<u8>,
     priorities: [u8; COUNT],
     /// `PRIGROUP`: bits of a priority, from 0 to this, that do not preempt.
@@ -75,6 +75,11 @@ fn bits(mut set: u128) -> impl Iterator<Item = u8> {
     })
 }
 
+/// Word `word` of the interrupts in a set of exceptions.
+const fn interrupts(set: u128, word: u32) -> u32 {
+    (set >> (16 + 32 * word)) as u32
+}
+
 impl Exceptions {
     /// Makes an exception pending.
     pub fn pend(&mut self, number: u8, now: u64) {
@@ -85,7 +90,7 @@ impl Exceptions {
         }
     }
 
-    /// Takes the request back.
+    /// Clears the request.
     pub fn clear(&mut self, number: u8) {
         self.pending &= !(1 << number);
         self.refresh();
@@ -116,45 +121,32 @@ impl Exceptions {
         self.refresh();
     }
 
-    /// A word of the enable registers.
-    #[must_use]
+    /// Word `word` of the enable registers.
     pub fn enabled(&self, word: u32) -> u32 {
-        (self.enabled >> (16 + 32 * word)) as u32
+        interrupts(self.enabled, word)
     }
 
-    /// A word of the pending registers.
-    #[must_use]
+    /// Word `word` of the pending registers.
     pub fn pending(&self, word: u32) -> u32 {
-        (self.pending >> (16 + 32 * word)) as u32
+        interrupts(self.pending, word)
     }
 
-    /// A word of the active registers.
-    #[must_use]
+    /// Word `word` of the active registers.
     pub fn active(&self, word: u32) -> u32 {
-        let set = self.active.iter().fold(0_u128, |set, number| set | 1 << number);
-        (set >> (16 + 32 * word)) as u32
+        interrupts(self.active.iter().fold(0, |set, number| set | 1 << number), word)
     }
 
     /// Whether an exception is pending.
-    #[must_use]
     pub fn is_pending(&self, number: u8) -> bool {
         self.pending >> number & 1 != 0
     }
 
-    /// Whether an exception is active.
-    #[must_use]
-    pub fn is_active(&self, number: u8) -> bool {
-        self.active.contains(&number)
-    }
-
     /// The exception that runs; 0 in thread mode.
-    #[must_use]
     pub fn running(&self) -> u8 {
         self.active.last().copied().unwrap_or(0)
     }
 
     /// How many are active.
-    #[must_use]
     pub fn depth(&self) -> usize {
         self.active.len()
     }
@@ -168,7 +160,6 @@ impl Exceptions {
     }
 
     /// The priority of an exception.
-    #[must_use]
     pub fn priority_set(&self, number: u8) -> u8 {
         self.priorities.get(usize::from(number)).copied().unwrap_or(0)
     }
@@ -180,13 +171,12 @@ impl Exceptions {
     }
 
     /// `PRIGROUP`.
-    #[must_use]
     pub fn group(&self) -> u8 {
         self.group
     }
 
-    /// Priority with its whole number of bits.
-    fn whole(&self, number: u8) -> i16 {
+    /// Priority with all its bits.
+    fn priority(&self, number: u8) -> i16 {
         match number {
             2 => -2,
             number::HARD_FAULT => -1,
@@ -196,25 +186,23 @@ impl Exceptions {
 
     /// The part of a priority that preempts.
     fn preempts(&self, number: u8) -> i16 {
-        let whole = self.whole(number);
-        if whole < 0 { whole } else { whole & !((1 << (self.group + 1)) - 1) }
+        let priority = self.priority(number);
+        if priority < 0 { priority } else { priority & !((1 << (self.group + 1)) - 1) }
     }
 
     /// Priority at which the core executes, masks apart.
-    #[must_use]
     pub fn level(&self) -> i16 {
         self.active.iter().map(|number| self.preempts(*number)).min().unwrap_or(THREAD)
     }
 
     fn refresh(&mut self) {
-        let next = bits(self.pending & self.enabled).min_by_key(|n| (self.whole(*n), *n));
+        let next = bits(self.pending & self.enabled).min_by_key(|n| (self.priority(*n), *n));
         let next = next.map(|number| (number, self.preempts(number)));
         self.urgent = next.filter(|(_, priority)| *priority < self.level());
     }
 
     /// The exception to be taken next with the priority that the masks have to let
     /// through, if it preempts what runs.
-    #[must_use]
     pub fn urgent(&self) -> Option<(u8, i16)> {
         self.urgent
     }

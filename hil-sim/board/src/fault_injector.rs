@@ -1,16 +1,15 @@
 //! The faults of a scenario on the board: at its pins and registers, or in its plant.
 //!
-//! What software breaks between sensor and controller breaks here before the pin. A sensor
-//! that gives nothing is a broken line: a bridge reads the low end, the encoder's lines stay
-//! high, the angle sensor does not answer. Lost ticks are an interrupt that asks without end
-//! for as long; a task that hangs is caught in a loop in its next turn. Of parameters in flash a
-//! bit is turned over, or a host saves new ones, as soon as the drive rests, and power goes or
-//! the reset pin is pulled while the flash is at work.
+//! A fault that the software campaign injects between sensor and controller is injected here
+//! before the pin. A silent sensor is a broken line: a bridge reads the low end, the encoder's
+//! lines stay high, the angle sensor does not answer. Lost ticks are an interrupt line that
+//! stays active; a hanging task loops in its next poll. In the stored parameters a bit is
+//! inverted, or a host saves new ones as soon as the drive rests, and power is lost or the
+//! reset pin is pulled during a flash operation.
 
 mod save;
 
 use interstage::sense::raw::{AdcCode, Sample, SensorFrame};
-use interstage::supervise::Command;
 
 use super::chip::map::PARAMETER_SETS;
 use super::core::CoreError;
@@ -22,7 +21,7 @@ use super::peripherals::flash::Cut;
 use hil_sim::faults::sets;
 use hil_sim::injector::FaultInjector;
 use hil_sim::params::set_of;
-use hil_sim::plant::rig::{Drives, VirtualRig};
+use hil_sim::plant::rig::VirtualRig;
 use hil_sim::plant::sensors::Codes;
 use hil_sim::scenario::Scenario;
 use hil_sim::scenario::injection::{Injection, Kind, Target};
@@ -32,32 +31,42 @@ use interstage::rig::Rig;
 use save::Save;
 pub(crate) use save::Saving;
 
-/// Cycles into its turn at which a task is caught.
-const INTO_TURN: u64 = 100;
-/// Milliseconds for which a function that runs tasks is waited for, before the next is.
+/// Cycles into its poll at which a task hangs.
+const INTO_POLL: u64 = 100;
+/// Milliseconds to wait for one poll function before the next is tried.
 const PATIENCE: u32 = 20;
 
-/// The faults of a run, and how far they have come.
+/// When faults struck and acted, s since power-up. For a hanging task, all are the time at
+/// which it was made to hang; for a save, the time at which it was interrupted.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct FaultTimes {
+    /// The first fault struck.
+    pub(crate) struck_s: Option<f64>,
+    /// It first had an effect, see [`FaultInjector::acts_s`].
+    pub(crate) acts_s: Option<f64>,
+    /// The readback could first show it, see [`FaultInjector::tells_s`].
+    pub(crate) visible_s: Option<f64>,
+}
+
+/// The faults of a run, and their progress.
 pub(super) struct BoardInjector {
-    faults: FaultInjector,
-    hunt: Option<Hunt>,
-    /// When the task that was to hang was caught, or the save broken off, s.
-    caught_s: Option<f64>,
-    /// A task is to hang, or a save to be broken off: it strikes later than it comes.
+    /// The faults that are injected as in software.
+    pub(super) faults: FaultInjector,
+    search: Option<TaskSearch>,
+    /// When the task was made to hang, or the save was interrupted, s.
+    struck_later_s: Option<f64>,
+    /// A task is to hang, or a save to be interrupted: the fault strikes after its onset.
     waits: bool,
     /// Ticks are being lost.
     losing: bool,
-    /// A reset that comes within the millisecond, after this part of it.
+    /// A reset within the millisecond, after this part of it.
     reset: Option<(Fault, f64)>,
-    /// Encoder and angle sensor give nothing.
+    /// Encoder and angle sensor are silent.
     silent: [bool; 2],
-    /// The host's line is flooded, and with what next.
+    /// State of the noise on the host's line, while it is flooded.
     flood: Option<u32>,
-    /// A host that saves parameters.
     save: Option<Save>,
-    /// The rig of the parameters.
     rig: Rig,
-    /// Seed of the run.
     seed: u64,
 }
 
@@ -65,8 +74,8 @@ impl BoardInjector {
     pub(super) fn new(faults: FaultInjector, scenario: &Scenario) -> Self {
         Self {
             faults,
-            hunt: None,
-            caught_s: None,
+            search: None,
+            struck_later_s: None,
             waits: false,
             losing: false,
             reset: None,
@@ -78,7 +87,7 @@ impl BoardInjector {
         }
     }
 
-    /// A millisecond begins: faults come and go.
+    /// A millisecond begins: switches faults on and off.
     pub(super) fn begin(
         &mut self,
         machine: &mut Machine,
@@ -87,12 +96,12 @@ impl BoardInjector {
     ) -> Result<(), CoreError> {
         self.faults.begin(t_s, plant.truth());
         self.faults.plant(plant);
-        for (injection, comes) in self.faults.changes() {
-            self.change(machine, &injection, comes)?;
+        for (injection, on) in self.faults.changes() {
+            self.change(machine, &injection, on)?;
         }
         let losing = self.faults.lost();
         if losing != std::mem::replace(&mut self.losing, losing) {
-            switch(Fault::ButtonStorm, machine, losing)?;
+            Fault::ButtonStorm.switch(machine, losing)?;
         }
         Ok(())
     }
@@ -101,72 +110,77 @@ impl BoardInjector {
         &mut self,
         machine: &mut Machine,
         injection: &Injection,
-        comes: bool,
+        on: bool,
     ) -> Result<(), CoreError> {
         if injection.target == Target::HostLine {
-            self.flood = comes.then_some(1);
+            self.flood = on.then_some(1);
         }
         if let Some(task) = task(injection) {
             self.waits = true;
-            self.hunt = comes.then(|| Hunt::new(machine, task));
+            self.search = on.then(|| TaskSearch::new(machine, task));
         }
         if injection.target == Target::ParameterSave {
             self.waits = true;
-            // An unsound rig has been refused where the sets were put into flash.
-            let set = sets::set(sets::SAVED, &self.rig).ok().filter(|_| comes);
+            // An invalid rig was refused when the sets were stored in flash.
+            let set = sets::set(sets::SAVED, &self.rig).ok().filter(|_| on);
             self.save = set.map(|set| Save::new(machine, set, cut(injection)));
         }
-        if let Some(bit) = flipped(machine, injection)?.filter(|_| comes) {
+        if let Some(bit) = flipped(machine, injection)?.filter(|_| on) {
             return bit.strike(machine);
         }
         match register(injection) {
-            Some(fault) if comes && injection.resets_board() => {
-                // Between any two instructions.
+            Some(fault) if on && injection.resets_board() => {
+                // At a cycle that depends on the seed.
                 self.reset = Some((fault, (self.seed as f64 * 0.618_034).fract()));
                 Ok(())
             }
-            Some(fault) => switch(fault, machine, comes),
+            Some(fault) => fault.switch(machine, on),
             None => Ok(()),
         }
     }
 
-    /// Runs the board towards the turn of a task that is to hang, up to this cycle.
-    pub(super) fn hunt(&mut self, machine: &mut Machine, until: u64) -> Result<(), CoreError> {
+    /// Runs the board to a reset, or to the poll of a task that is to hang, `until` this cycle
+    /// at most.
+    pub(super) fn run_to_strike(
+        &mut self,
+        machine: &mut Machine,
+        until: u64,
+    ) -> Result<(), CoreError> {
         if let Some((fault, part)) = self.reset.take() {
             let now = machine.now();
             machine.run_on(now + (part * until.saturating_sub(now) as f64) as u64)?;
             fault.strike(machine)?;
         }
-        if let Some(hunt) = &mut self.hunt
-            && hunt.go(machine, until)?
+        if let Some(search) = &mut self.search
+            && search.run(machine, until)?
         {
-            self.hunt = None;
-            self.caught_s = Some(machine.now() as f64 / HZ as f64);
+            self.search = None;
+            self.struck_later_s = Some(machine.now() as f64 / HZ as f64);
         }
         Ok(())
     }
 
-    /// What a host that saves parameters has to send, if there is one.
-    pub(super) fn says(&self) -> Option<Vec<u8>> {
-        self.save.as_ref().map(Save::says)
+    /// Bytes from a host that saves parameters, if there is one.
+    pub(super) fn to_board(&self) -> Option<Vec<u8>> {
+        self.save.as_ref().map(|save| save.to_board.clone())
     }
 
-    /// So much of it went, and this came back.
-    pub(super) fn hears(&mut self, machine: &mut Machine, came: &[u8], went: usize) {
+    /// The board took `sent` of these bytes and answered with `received`.
+    pub(super) fn exchanged(&mut self, machine: &mut Machine, received: &[u8], sent: usize) {
         let Some(save) = &mut self.save else { return };
-        save.turn(machine, came, went);
-        if self.caught_s.is_none() {
-            self.caught_s = save.cut_at(machine).map(|at| at as f64 / HZ as f64);
+        save.exchanged(machine, received, sent);
+        if self.struck_later_s.is_none() {
+            self.struck_later_s = save.cut_at(machine).map(|at| at as f64 / HZ as f64);
         }
     }
 
-    /// How far a save of parameters has come, if there is one.
+    /// State of a save of parameters, if there is one.
     pub(super) fn saving(&self) -> Option<Saving> {
-        self.save.as_ref().map(Save::state)
+        self.save.as_ref().map(|save| save.state)
     }
 
-    /// What the sensors say at the pins, of what they would.
-    pub(super) fn tell(&mut self, machine: &mut Machine, codes: Codes, now: u32) -> Codes {
+    /// The codes at the pins in tick `now`, from those of sound sensors.
+    pub(super) fn sensors(&mut self, machine: &mut Machine, codes: Codes, now: u32) -> Codes {
         let mut frame = SensorFrame {
             wheel_encoder: Some(Sample { code: codes.wheel_encoder, at: now }),
             preload_sensor: Some(Sample { code: codes.preload_sensor, at: now }),
@@ -198,17 +212,7 @@ impl BoardInjector {
         }
     }
 
-    /// The bridges as the plant gets them.
-    pub(super) fn drives(&mut self, asked: Drives) -> Drives {
-        self.faults.drives(asked)
-    }
-
-    /// A command that nobody gave.
-    pub(super) fn command(&mut self) -> Option<Command> {
-        self.faults.command(None)
-    }
-
-    /// Bytes that nobody meant for the host's line.
+    /// Noise on the host's line.
     pub(super) fn noise(&mut self) -> Option<[u8; 4]> {
         let state = self.flood.as_mut()?;
         // Marsaglia's xorshift.
@@ -218,44 +222,15 @@ impl BoardInjector {
         Some(state.to_le_bytes())
     }
 
-    /// Whether nobody reads the log.
-    pub(super) fn log_gone(&self) -> bool {
-        self.faults.log_gone()
+    /// When the faults struck and acted.
+    pub(super) fn times(&self) -> FaultTimes {
+        let faults = &self.faults;
+        let times = match self.waits {
+            true => [self.struck_later_s; 3],
+            false => [faults.struck_s(), faults.acts_s(), faults.tells_s()],
+        };
+        FaultTimes { struck_s: times[0], acts_s: times[1], visible_s: times[2] }
     }
-
-    /// When the first fault came, s since power-up; of a task that hangs, when it was
-    /// caught; of a save, when it was broken off.
-    pub(super) fn struck_s(&self) -> Option<f64> {
-        if self.waits { self.caught_s } else { self.faults.struck_s() }
-    }
-
-    /// When it first did something, see [`FaultInjector::acts_s`].
-    pub(super) fn acts_s(&self) -> Option<f64> {
-        if self.waits { self.caught_s } else { self.faults.acts_s() }
-    }
-
-    /// When the readback had to tell it, see [`FaultInjector::tells_s`].
-    pub(super) fn tells_s(&self) -> Option<f64> {
-        if self.waits { self.caught_s } else { self.faults.tells_s() }
-    }
-}
-
-/// The letter of a command on the console.
-pub(crate) const fn letter(command: Command) -> u8 {
-    match command {
-        Command::Start => b's',
-        Command::Stop => b'x',
-        Command::Retract => b'r',
-        Command::Reset => b'0',
-    }
-}
-
-fn switch(fault: Fault, machine: &mut Machine, on: bool) -> Result<(), CoreError> {
-    if on {
-        return fault.strike(machine);
-    }
-    fault.heal(machine);
-    Ok(())
 }
 
 /// Name of the task that is to hang.
@@ -273,7 +248,7 @@ fn task(injection: &Injection) -> Option<&'static str> {
     })
 }
 
-/// When a save is broken off.
+/// When a save is interrupted.
 fn cut(injection: &Injection) -> Cut {
     let operation = injection.magnitude() as u64;
     match injection.kind {
@@ -282,8 +257,8 @@ fn cut(injection: &Injection) -> Cut {
     }
 }
 
-/// The bit of the image or of a set of parameters that is turned over; none if it is another
-/// fault, or the image has no such set.
+/// The bit of the image or of a parameter set that is inverted; none for another fault, or if
+/// the image has no such set.
 fn flipped(machine: &Machine, injection: &Injection) -> Result<Option<Fault>, CoreError> {
     let bit = injection.magnitude() as u32;
     let (place, bit) = match injection.target {
@@ -302,7 +277,7 @@ fn flipped(machine: &Machine, injection: &Injection) -> Result<Option<Fault>, Co
     Ok(place.map(|place| Fault::BitFlip(place + bit / 8, (bit % 8) as u8)))
 }
 
-/// What it is in registers and lines.
+/// The fault of registers and lines for an injection.
 fn register(injection: &Injection) -> Option<Fault> {
     let word = injection.magnitude() as u16;
     Some(match (injection.target, injection.kind) {
@@ -325,23 +300,21 @@ fn register(injection: &Injection) -> Option<Fault> {
     })
 }
 
-/// The search for a task's next turn.
-struct Hunt {
+/// The search for a task's next poll.
+struct TaskSearch {
     task: &'static str,
-    /// Functions that run tasks, of which each runs one, and may run this one.
+    /// Poll functions, of which one belongs to the task.
     places: Vec<u32>,
     tried: u32,
 }
 
-impl Hunt {
+impl TaskSearch {
     fn new(machine: &Machine, task: &'static str) -> Self {
-        let functions = &machine.image().functions;
-        let polls = functions.iter().filter(|f| f.name.contains("TaskStorage<F>::poll"));
-        Self { task, places: polls.map(|f| f.range.start).collect(), tried: 0 }
+        Self { task, places: machine.polls().to_vec(), tried: 0 }
     }
 
-    /// Goes on up to this cycle; whether the task was caught.
-    fn go(&mut self, machine: &mut Machine, until: u64) -> Result<bool, CoreError> {
+    /// Runs to this cycle at most; returns whether the task hangs.
+    fn run(&mut self, machine: &mut Machine, until: u64) -> Result<bool, CoreError> {
         while let Some(&place) = self.places.first() {
             if !machine.run_to(place, until)? {
                 self.tried += 1;
@@ -351,8 +324,8 @@ impl Hunt {
                 return Ok(false);
             }
             if machine.task() == Some(self.task) {
-                machine.run_on(machine.now() + INTO_TURN)?;
-                machine.catch()?;
+                machine.run_on(machine.now() + INTO_POLL)?;
+                machine.hang()?;
                 return Ok(true);
             }
             self.places.remove(0);

@@ -1,5 +1,4 @@
-//! Faults of the hardware at the level of registers and pins, to be switched on while a
-//! run goes on.
+//! Faults of the hardware at registers and pins, which can be switched on during a run.
 
 use std::fmt;
 use std::str::FromStr;
@@ -12,10 +11,10 @@ use super::peripherals::rcc::Cause;
 /// A fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// The input of preload sensor (0), compression sensor (1), drive's (2) or pre-tightener's bridge (3)
-    /// reads this, in parts of 2^16.
+    /// An analogue input reads this code, in parts of 2^16: preload sensor (0), compression
+    /// sensor (1), drive's (2) or pre-tightener's bridge (3).
     StuckCode(usize, u16),
-    /// These bits of the angle sensor's answers are turned over.
+    /// These bits of the angle sensor's answers are inverted.
     BitErrors(u16),
     /// The angle sensor does not answer.
     AngleLost,
@@ -23,61 +22,60 @@ pub enum Fault {
     EncoderLine(usize),
     /// DMA moves nothing.
     DmaStalled,
-    /// Clearing the flags of the time driver's timer has no effect.
+    /// Writes that clear the flags of the time driver's timer have no effect.
     TimerFlags,
-    /// The button's interrupt line asks without end, whatever the handler does.
+    /// The button's interrupt line stays active.
     ButtonStorm,
-    /// The supply falls too low for a moment: the detector tells of it, and a millisecond later
-    /// power is gone.
+    /// The supply falls below the detector's threshold, and a millisecond later power is lost.
     BrownOut,
-    /// The supply is gone for a moment, without a warning.
+    /// Power is lost without a warning, and comes back.
     SupplyCut,
-    /// The supply falls below the detector's threshold for half a millisecond, and comes back.
+    /// The supply falls below the detector's threshold for half a millisecond.
     SupplyDip,
     /// The reset pin is pulled for a moment.
     ResetPin,
-    /// A debugger asks for a reset.
+    /// A debugger requests a reset.
     Software,
-    /// What runs is caught in a loop without end: the task, or the interrupt.
+    /// The running task or interrupt hangs in an endless loop.
     Caught,
-    /// A bit of flash or RAM is turned over, past what the memory would correct: byte and
-    /// bit in it.
+    /// A bit of flash or RAM is inverted, beyond what the memory corrects: address of the
+    /// byte, and bit in it.
     BitFlip(u32, u8),
 }
 
 impl Fault {
     /// Switches the fault on.
-    ///
-    /// # Errors
-    /// [`CoreError`] if the engine fails or there is no memory at the address.
+    /// Errors: [`CoreError`] if the engine fails or there is no memory at the address.
     pub fn strike(self, machine: &mut Machine) -> Result<(), CoreError> {
+        self.switch(machine, true)
+    }
+
+    /// Switches the fault on or off. A single event (a reset, a hang, a flipped bit) is not
+    /// undone.
+    /// Errors: as [`Fault::strike`].
+    pub fn switch(self, machine: &mut Machine, on: bool) -> Result<(), CoreError> {
+        let now = machine.now();
         let chip = machine.chip_mut();
         match self {
-            Self::StuckCode(converter, code) => {
-                chip.defects.stuck_codes[converter & 3] = Some(code);
+            Self::StuckCode(input, code) => {
+                chip.defects.stuck_codes[input & 3] = on.then_some(code);
             }
-            Self::BitErrors(bits) => chip.angle.bit_errors = bits,
-            Self::AngleLost => chip.angle.lost = true,
-            Self::EncoderLine(line) => chip.defects.encoder_lines[line & 1] = true,
-            Self::DmaStalled => chip.defects.dma_stalled = true,
-            Self::TimerFlags => chip.defects.timer_flags_stick = true,
+            Self::BitErrors(bits) => chip.angle.bit_errors = if on { bits } else { 0 },
+            Self::AngleLost => chip.angle.lost = on,
+            Self::EncoderLine(line) => chip.defects.encoder_lines[line & 1] = on,
+            Self::DmaStalled => chip.defects.dma_stalled = on,
+            Self::TimerFlags => chip.defects.timer_flags_stick = on,
             Self::ButtonStorm => {
-                chip.defects.button_storm = true;
-                let now = machine.now();
-                machine.chip_mut().look_again(now);
+                chip.defects.button_storm = on;
+                chip.settle(now);
             }
-            Self::BrownOut => {
-                let now = machine.now();
-                machine.chip_mut().supply_falls(now + HOLDS, Then::Gone, now);
-            }
+            _ if !on => {}
+            Self::BrownOut => chip.supply_falls(now + HOLDS, Then::Gone, now),
+            Self::SupplyDip => chip.supply_falls(now + HOLDS / 2, Then::Back, now),
             Self::SupplyCut => return machine.restart(Cause::Power),
-            Self::SupplyDip => {
-                let now = machine.now();
-                machine.chip_mut().supply_falls(now + HOLDS / 2, Then::Back, now);
-            }
             Self::ResetPin => return machine.restart(Cause::Pin),
             Self::Software => return machine.restart(Cause::Software),
-            Self::Caught => return machine.catch(),
+            Self::Caught => return machine.hang(),
             Self::BitFlip(address, bit) => {
                 let mut byte = [0];
                 machine.peek(address, &mut byte)?;
@@ -86,39 +84,14 @@ impl Fault {
         }
         Ok(())
     }
-
-    /// Switches it off. What has happened once stays so.
-    pub fn heal(self, machine: &mut Machine) {
-        let chip = machine.chip_mut();
-        match self {
-            Self::StuckCode(converter, _) => chip.defects.stuck_codes[converter & 3] = None,
-            Self::BitErrors(_) => chip.angle.bit_errors = 0,
-            Self::AngleLost => chip.angle.lost = false,
-            Self::EncoderLine(line) => chip.defects.encoder_lines[line & 1] = false,
-            Self::DmaStalled => chip.defects.dma_stalled = false,
-            Self::TimerFlags => chip.defects.timer_flags_stick = false,
-            Self::ButtonStorm => {
-                chip.defects.button_storm = false;
-                let now = machine.now();
-                machine.chip_mut().look_again(now);
-            }
-            Self::BrownOut
-            | Self::SupplyCut
-            | Self::SupplyDip
-            | Self::Software
-            | Self::ResetPin
-            | Self::Caught
-            | Self::BitFlip(..) => {}
-        }
-    }
 }
 
-/// A fault with the time at which it comes.
+/// A fault with the time at which it strikes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Timed {
     /// From power-up, s.
     pub at_s: f64,
-    /// What.
+    /// The fault.
     pub fault: Fault,
 }
 
@@ -131,7 +104,26 @@ pub struct Timed {
 )]
 pub struct Misspelt(String);
 
-/// A number in decimal or, behind 0x, in hexadecimal.
+/// Names of the faults without a value.
+const PLAIN: [(&str, Fault); 12] = [
+    ("angle-lost", Fault::AngleLost),
+    ("encoder-a", Fault::EncoderLine(0)),
+    ("encoder-b", Fault::EncoderLine(1)),
+    ("dma-stalled", Fault::DmaStalled),
+    ("timer-flags", Fault::TimerFlags),
+    ("button-storm", Fault::ButtonStorm),
+    ("brown-out", Fault::BrownOut),
+    ("supply-cut", Fault::SupplyCut),
+    ("supply-dip", Fault::SupplyDip),
+    ("software-reset", Fault::Software),
+    ("reset-pin", Fault::ResetPin),
+    ("caught", Fault::Caught),
+];
+/// Names of the analogue inputs that can be stuck, in the order of [`Fault::StuckCode`].
+const INPUTS: [&str; 4] =
+    ["preload-sensor", "compression-sensor", "drive-readback", "pretightener-readback"];
+
+/// A number in decimal or, after 0x, in hexadecimal.
 fn number(text: &str) -> Option<u32> {
     match text.strip_prefix("0x") {
         Some(digits) => u32::from_str_radix(digits, 16).ok(),
@@ -139,49 +131,30 @@ fn number(text: &str) -> Option<u32> {
     }
 }
 
-impl FromStr for Fault {
-    type Err = ();
-
-    fn from_str(text: &str) -> Result<Self, ()> {
-        let (name, value) = text.split_once('=').map_or((text, None), |(n, v)| (n, Some(v)));
-        let half = |text: &str| u16::try_from(number(text)?).ok();
-        let fault = match (name, value) {
-            ("preload-sensor", Some(code)) => half(code).map(|code| Self::StuckCode(0, code)),
-            ("compression-sensor", Some(code)) => half(code).map(|code| Self::StuckCode(1, code)),
-            ("drive-readback", Some(code)) => half(code).map(|code| Self::StuckCode(2, code)),
-            ("pretightener-readback", Some(code)) => {
-                half(code).map(|code| Self::StuckCode(3, code))
-            }
-            ("angle-bits", Some(mask)) => half(mask).map(Self::BitErrors),
-            ("angle-lost", None) => Some(Self::AngleLost),
-            ("encoder-a", None) => Some(Self::EncoderLine(0)),
-            ("encoder-b", None) => Some(Self::EncoderLine(1)),
-            ("dma-stalled", None) => Some(Self::DmaStalled),
-            ("timer-flags", None) => Some(Self::TimerFlags),
-            ("button-storm", None) => Some(Self::ButtonStorm),
-            ("brown-out", None) => Some(Self::BrownOut),
-            ("supply-cut", None) => Some(Self::SupplyCut),
-            ("supply-dip", None) => Some(Self::SupplyDip),
-            ("software-reset", None) => Some(Self::Software),
-            ("reset-pin", None) => Some(Self::ResetPin),
-            ("caught", None) => Some(Self::Caught),
-            ("flip", Some(place)) => place.split_once('.').and_then(|(address, bit)| {
-                let bit = bit.parse().ok().filter(|bit| *bit < 8)?;
-                Some(Self::BitFlip(number(address)?, bit))
-            }),
-            _ => None,
-        };
-        fault.ok_or(())
+fn fault(text: &str) -> Option<Fault> {
+    let Some((name, value)) = text.split_once('=') else {
+        return PLAIN.into_iter().find(|(name, _)| *name == text).map(|(_, fault)| fault);
+    };
+    if name == "flip" {
+        let (address, bit) = value.split_once('.')?;
+        let bit = bit.parse().ok().filter(|bit| *bit < 8)?;
+        return Some(Fault::BitFlip(number(address)?, bit));
     }
+    let half = u16::try_from(number(value)?).ok()?;
+    if name == "angle-bits" {
+        return Some(Fault::BitErrors(half));
+    }
+    let input = INPUTS.iter().position(|input| *input == name)?;
+    Some(Fault::StuckCode(input, half))
 }
 
 impl FromStr for Timed {
     type Err = Misspelt;
 
     fn from_str(text: &str) -> Result<Self, Misspelt> {
-        let parsed = text.split_once('@').and_then(|(fault, at)| {
+        let parsed = text.split_once('@').and_then(|(name, at)| {
             let at_s = at.parse().ok().filter(|at: &f64| at.is_finite() && *at >= 0.0)?;
-            Some(Self { at_s, fault: fault.parse().ok()? })
+            Some(Self { at_s, fault: fault(name)? })
         });
         parsed.ok_or_else(|| Misspelt(text.to_owned()))
     }
@@ -190,24 +163,13 @@ impl FromStr for Timed {
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
-            Self::StuckCode(0, code) => write!(f, "preload-sensor={code:#x}"),
-            Self::StuckCode(1, code) => write!(f, "compression-sensor={code:#x}"),
-            Self::StuckCode(2, code) => write!(f, "drive-readback={code:#x}"),
-            Self::StuckCode(_, code) => write!(f, "pretightener-readback={code:#x}"),
+            Self::StuckCode(input, code) => write!(f, "{}={code:#x}", INPUTS[input & 3]),
             Self::BitErrors(mask) => write!(f, "angle-bits={mask:#x}"),
-            Self::AngleLost => write!(f, "angle-lost"),
-            Self::EncoderLine(0) => write!(f, "encoder-a"),
-            Self::EncoderLine(_) => write!(f, "encoder-b"),
-            Self::DmaStalled => write!(f, "dma-stalled"),
-            Self::TimerFlags => write!(f, "timer-flags"),
-            Self::ButtonStorm => write!(f, "button-storm"),
-            Self::BrownOut => write!(f, "brown-out"),
-            Self::SupplyCut => write!(f, "supply-cut"),
-            Self::SupplyDip => write!(f, "supply-dip"),
-            Self::ResetPin => write!(f, "reset-pin"),
-            Self::Software => write!(f, "software-reset"),
-            Self::Caught => write!(f, "caught"),
             Self::BitFlip(address, bit) => write!(f, "flip={address:#x}.{bit}"),
+            plain => {
+                let named = PLAIN.iter().find(|(_, fault)| *fault == plain);
+                f.write_str(named.map_or("encoder-b", |(name, _)| name))
+            }
         }
     }
 }
@@ -218,33 +180,17 @@ mod tests {
 
     #[test]
     fn a_fault_reads_as_it_is_written() {
-        for fault in [
-            Fault::StuckCode(0, 0x1234),
-            Fault::StuckCode(1, 0),
-            Fault::StuckCode(2, 0x8000),
-            Fault::StuckCode(3, 7),
-            Fault::BitErrors(0x8000),
-            Fault::AngleLost,
-            Fault::EncoderLine(0),
-            Fault::EncoderLine(1),
-            Fault::DmaStalled,
-            Fault::TimerFlags,
-            Fault::ButtonStorm,
-            Fault::BrownOut,
-            Fault::SupplyCut,
-            Fault::SupplyDip,
-            Fault::ResetPin,
-            Fault::Software,
-            Fault::Caught,
-            Fault::BitFlip(0x0800_1234, 7),
-        ] {
+        let mut faults = PLAIN.map(|(_, fault)| fault).to_vec();
+        faults.extend([0, 1, 2, 3].map(|input| Fault::StuckCode(input, 0x1234)));
+        faults.extend([Fault::BitErrors(0x8000), Fault::BitFlip(0x0800_1234, 7)]);
+        for fault in faults {
             let timed = format!("{fault}@5.25").parse();
             assert_eq!(timed, Ok(Timed { at_s: 5.25, fault }));
         }
     }
 
     #[test]
-    fn what_is_none_is_named() {
+    fn a_misspelt_fault_is_named() {
         for text in [
             "",
             "angle-lost",

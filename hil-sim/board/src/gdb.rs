@@ -1,8 +1,8 @@
 //! A debugger on the emulated board, over GDB's remote protocol: registers, memory,
-//! breakpoints, single steps, while the plant goes on with the board's own clock.
+//! breakpoints, single steps. The plant follows the board's own clock.
 //!
-//! A breakpoint is the processor's own instruction for it in the place of another, which
-//! is put back before it is carried out. Whatever is looked at, no time passes.
+//! A breakpoint is a `BKPT` in the place of an instruction, which is restored before it is
+//! executed. Access to memory and registers takes no time.
 
 mod arch;
 mod target;
@@ -16,9 +16,10 @@ use gdbstub::conn::ConnectionExt;
 use gdbstub::stub::run_blocking::{BlockingEventLoop, Event, WaitForStopReasonError};
 use gdbstub::stub::{DisconnectReason, GdbStub, SingleThreadStopReason};
 
-use super::bench::{Bench, BenchError};
+use super::bench::Bench;
+use super::error::BoardError;
 use super::log::{Line, Strings};
-use hil_sim::scenario::{Direction, Scenario};
+use hil_sim::scenario::Scenario;
 
 use target::Fatal;
 
@@ -43,13 +44,11 @@ pub enum GdbError {
     Connection(String),
     /// The board or its plant.
     #[error(transparent)]
-    Bench(#[from] BenchError),
+    Bench(#[from] BoardError),
 }
 
 /// Listens at `[host]:[port]`; without a host on this machine alone.
-///
-/// # Errors
-/// [`GdbError::Listen`] if that cannot be done.
+/// Errors: [`GdbError::Listen`] if that cannot be done.
 pub fn listen(address: &str) -> Result<TcpListener, GdbError> {
     let (host, port) = address.rsplit_once(':').unwrap_or((address, ""));
     let host = if host.is_empty() { "127.0.0.1" } else { host };
@@ -59,12 +58,9 @@ pub fn listen(address: &str) -> Result<TcpListener, GdbError> {
     TcpListener::bind((host, port)).map_err(failed)
 }
 
-/// Waits for a debugger and lets it have the board with the image in `elf`, before its
-/// first instruction. The command to set off is given once the drive is idle. Returns when
-/// the debugger goes.
-///
-/// # Errors
-/// [`GdbError`] if the board or the connection fails.
+/// Waits for a debugger and serves the board with the image in `elf` to it, from the first
+/// instruction on. The drive starts once it is idle. Returns when the debugger disconnects.
+/// Errors: [`GdbError`] if the board or the connection fails.
 pub fn serve(
     listener: &TcpListener,
     elf: &[u8],
@@ -72,20 +68,11 @@ pub fn serve(
     watch: impl FnMut(f64, &Line),
 ) -> Result<(), GdbError> {
     let (stream, _) = listener.accept().map_err(|error| GdbError::Connection(error.to_string()))?;
-    let strings = Strings::of(elf).map_err(BenchError::from)?;
-    let bench = Bench::new(elf, &strings, scenario).map_err(BenchError::from)?;
-    let start = match scenario.run.direction {
-        Direction::Deploy => b's',
-        Direction::Retract => b'r',
-    };
-    let mut board = Debugged {
-        bench,
-        breaks: BTreeMap::new(),
-        steps: false,
-        start: Some(start),
-        idle: false,
-        watch: Box::new(watch),
-    };
+    let strings = Strings::of(elf).map_err(BoardError::from)?;
+    let mut bench = Bench::new(elf, &strings, scenario).map_err(BoardError::from)?;
+    bench.start_when_idle();
+    let mut board =
+        Debugged { bench, breaks: BTreeMap::new(), steps: false, watch: Box::new(watch) };
     match GdbStub::new(stream).run_blocking::<Loop>(&mut board) {
         Ok(DisconnectReason::Disconnect | DisconnectReason::Kill) => Ok(()),
         Ok(reason) => Err(GdbError::Connection(format!("{reason:?}"))),
@@ -96,44 +83,33 @@ pub fn serve(
     }
 }
 
-/// Is shown each line of the log as it comes.
+/// Gets each line of the log with its time, s.
 type Watch<'a> = Box<dyn FnMut(f64, &Line) + 'a>;
 
-/// A board in the hands of a debugger.
+/// A board under a debugger.
 struct Debugged<'a> {
     bench: Bench<'a>,
-    /// Breakpoints with what stands in their places.
+    /// Breakpoints with the code that they replace.
     breaks: BTreeMap<u32, [u8; 2]>,
-    /// Asked to go on by one instruction.
+    /// The debugger has requested a single step.
     steps: bool,
-    /// The letter that sets off, until it is sent.
-    start: Option<u8>,
-    /// The drive has said that it is idle.
-    idle: bool,
     watch: Watch<'a>,
 }
 
 impl Debugged<'_> {
     /// Ends the millisecond if its time is over.
-    fn close(&mut self) -> Result<(), BenchError> {
+    fn close(&mut self) -> Result<(), BoardError> {
         if self.bench.is_due() {
             let (_, lines) = self.bench.close()?;
             for line in &lines {
-                self.idle |= line.text.contains("mode: idle");
                 (self.watch)(self.bench.time_s(), line);
             }
-        }
-        if self.idle
-            && let Some(letter) = self.start
-            && self.bench.send(letter)?
-        {
-            self.start = None;
         }
         Ok(())
     }
 
-    /// Carries out what stands at the program counter, a breakpoint or not.
-    fn step(&mut self) -> Result<(), BenchError> {
+    /// Executes the instruction at the program counter, even under a breakpoint.
+    fn step(&mut self) -> Result<(), BoardError> {
         let machine = self.bench.machine_mut();
         let place = machine.pc();
         if let Some(kept) = self.breaks.get(&place) {
@@ -146,8 +122,8 @@ impl Debugged<'_> {
         self.close()
     }
 
-    /// Goes on up to a breakpoint, or a millisecond at most.
-    fn run(&mut self) -> Result<Option<SingleThreadStopReason<u32>>, BenchError> {
+    /// Runs to a breakpoint, or to the end of the millisecond.
+    fn run(&mut self) -> Result<Option<SingleThreadStopReason<u32>>, BoardError> {
         if self.breaks.contains_key(&self.bench.machine().pc()) {
             self.step()?;
         }
@@ -160,7 +136,7 @@ impl Debugged<'_> {
     }
 }
 
-/// What the debugger and the board wait for.
+/// Connects the debugger's loop to the board.
 struct Loop<'a>(std::marker::PhantomData<&'a ()>);
 
 type Waited<'a> = Result<
@@ -174,7 +150,7 @@ impl<'a> BlockingEventLoop for Loop<'a> {
     type StopReason = SingleThreadStopReason<u32>;
 
     fn wait_for_stop_reason(board: &mut Debugged<'a>, stream: &mut TcpStream) -> Waited<'a> {
-        let failed = |error: BenchError| WaitForStopReasonError::Target(Fatal(error));
+        let failed = |error: BoardError| WaitForStopReasonError::Target(Fatal(error));
         loop {
             if stream.peek().map_err(WaitForStopReasonError::Connection)?.is_some() {
                 let byte =
@@ -201,13 +177,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn without_a_host_it_is_this_machine_alone() {
+    fn without_a_host_it_listens_on_this_machine_only() {
         let listener = listen(":0").expect("a port");
         assert!(listener.local_addr().expect("bound").ip().is_loopback());
     }
 
     #[test]
-    fn an_address_that_is_none_is_named() {
+    fn an_invalid_address_is_named() {
         for address in [":x", ":99999", "no such host:1"] {
             let error = listen(address).expect_err("none").to_string();
             assert!(error.starts_with(address), "{error}");

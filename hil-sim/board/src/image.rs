@@ -1,7 +1,4 @@
-//! A measurement image on the core: its functions called from the host, each call with
-//! its cycles.
-
-use std::path::Path;
+//! A measurement image on the core: the host calls its functions and counts their cycles.
 
 use super::core::unicorn::{Access, Counted, Memory, UnicornCore};
 use super::core::{Core, CoreError, Meter, Register, Stop};
@@ -9,29 +6,29 @@ use super::elf::{FLASH, Loaded, RAM, named};
 use super::error::ImageError;
 use super::spread::Spread;
 
-/// System control space: the start-up code writes it and nothing is measured in it.
+/// System control space, which the start-up code writes; here plain memory.
 const SYSTEM: Memory = Memory { base: 0xE000_0000, size: 1024 * 1024, access: Access::Data };
-/// Where the host leaves arguments, in the chip's window for external memory.
+/// Memory for arguments and results, in the chip's window for external memory.
 const MAILBOX: Memory = Memory { base: 0x6000_0000, size: 1024 * 1024, access: Access::Data };
-/// Where calls return to: a breakpoint at the mailbox's end.
+/// Return address of calls: a breakpoint at the mailbox's end.
 const RETURN: u32 = MAILBOX.base + MAILBOX.size - 4;
 /// First address for arguments.
 pub const ARGUMENTS: u32 = MAILBOX.base;
-/// Cycles after which a call has lost its way: ten seconds of the chip's time.
+/// Longest call, cycles: ten seconds of the chip's time.
 const PATIENCE: u64 = 1_700_000_000;
 /// The breakpoint instruction.
 const BKPT: [u8; 2] = [0x00, 0xBE];
 
-/// What one call took.
+/// Result of a call.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Call {
-    /// What it returned.
+    /// Its return value.
     pub value: u32,
-    /// What it took.
+    /// Its cost.
     pub meter: Meter,
 }
 
-/// An image that has started and waits to be called.
+/// An image after its start-up code.
 pub struct Image {
     core: UnicornCore,
     loaded: Loaded,
@@ -39,20 +36,8 @@ pub struct Image {
 }
 
 impl Image {
-    /// Loads the image at `path` and runs its start-up code.
-    ///
-    /// # Errors
-    /// [`ImageError`] if it is no image, or does not come up.
-    pub fn open(path: &Path) -> Result<Self, ImageError> {
-        let bytes = std::fs::read(path)
-            .map_err(|source| ImageError::Read { path: path.to_owned(), source })?;
-        Self::start(&bytes)
-    }
-
     /// Loads the image in `elf` and runs its start-up code.
-    ///
-    /// # Errors
-    /// As [`Image::open`].
+    /// Errors: [`ImageError`] if it is no image, or does not start.
     pub fn start(elf: &[u8]) -> Result<Self, ImageError> {
         let loaded = Loaded::of(elf)?;
         let counted = Counted { base: FLASH.base, bytes: &loaded.flash, code: &loaded.code };
@@ -72,18 +57,14 @@ impl Image {
     }
 
     /// Writes words to the mailbox from `address` on.
-    ///
-    /// # Errors
-    /// [`ImageError::Core`] if the mailbox is too small.
+    /// Errors: [`ImageError::Core`] if the mailbox is too small.
     pub fn put(&mut self, address: u32, words: &[u32]) -> Result<(), ImageError> {
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
         Ok(self.core.write(address, &bytes)?)
     }
 
     /// Reads words from the mailbox.
-    ///
-    /// # Errors
-    /// [`ImageError::Core`] if nothing lies there.
+    /// Errors: [`ImageError::Core`] if nothing lies there.
     pub fn get<const N: usize>(&self, address: u32) -> Result<[u32; N], ImageError> {
         let mut words = [0; N];
         for (index, word) in words.iter_mut().enumerate() {
@@ -95,9 +76,7 @@ impl Image {
     }
 
     /// Address of a function, for [`Image::call`].
-    ///
-    /// # Errors
-    /// [`ImageError::Missing`] if the image has none of this name.
+    /// Errors: [`ImageError::Missing`] if the image has none of this name.
     pub fn function(&self, name: &str) -> Result<u32, ImageError> {
         let found = self.loaded.functions.iter().find(|function| function.name == name);
         found
@@ -106,9 +85,7 @@ impl Image {
     }
 
     /// Calls a function with at most four arguments.
-    ///
-    /// # Errors
-    /// [`ImageError::Lost`] if it panics or does not return, [`ImageError::Core`] if it
+    /// Errors: [`ImageError::Lost`] if it panics or does not return, [`ImageError::Core`] if it
     /// faults.
     pub fn call(&mut self, function: u32, arguments: &[u32]) -> Result<Call, ImageError> {
         for (number, value) in arguments.iter().enumerate() {
@@ -126,7 +103,7 @@ impl Image {
         }
     }
 
-    /// What a stop means where a call should have ended.
+    /// The error of a call that stopped elsewhere than at its end.
     fn lost(&self, function: &str, stop: Stop) -> ImageError {
         let at = match stop {
             Stop::Fault { at, fault } => {
@@ -145,12 +122,9 @@ impl Image {
         ImageError::Lost { function: function.to_owned(), at: self.name(at).to_owned() }
     }
 
-    /// Calls a function once for each input, given by reference: its words stand in the
-    /// mailbox. Returns what the calls gave, and what they took; `worst_input` of that
-    /// is the index of an input.
-    ///
-    /// # Errors
-    /// As [`Image::call`], and [`ImageError::Missing`].
+    /// Calls a function once for each input, whose words are passed by reference. Returns the
+    /// values and the cost of the calls; `worst_input` is the index of an input.
+    /// Errors: as [`Image::call`], and [`ImageError::Missing`].
     pub fn measure<I: AsRef<[u32]>>(
         &mut self,
         function: &str,

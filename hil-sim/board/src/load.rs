@@ -1,4 +1,4 @@
-//! What a run on the board cost: load, control tick, stack, memory.
+//! Load of the core in a run: control tick, stack, memory.
 //!
 //! Cycles are textbook ones, see [`super::timing`]. Counting begins with the command: the
 //! start of the program, which builds the controller's tables, is left out.
@@ -23,16 +23,16 @@ const BUDGET: [f64; 3] = [0.10, 0.20, 0.5];
 /// Heading of the page's section.
 pub const TITLE: &str = "What it cost on the core";
 
-/// Cycles of the control tick's task, from its wake-up to where it waits again.
+/// Cycles of the control tick's task, a poll each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Cost {
-    /// How often it ran.
+    /// Number of polls.
     pub runs: u64,
     /// Mean cycles.
     pub mean: f64,
     /// Most cycles.
     pub worst: u64,
-    /// Cycles from the earliest to the latest of its beginnings, against an even beat.
+    /// Range of its beginnings against an even period, cycles.
     pub jitter: u64,
 }
 
@@ -59,7 +59,7 @@ pub struct Load {
     pub unmodelled: Vec<Stray>,
 }
 
-/// What is gathered while a run goes on.
+/// Measurements during a run.
 #[derive(Debug, Default)]
 pub struct Gathered {
     from: Option<(u64, u64)>,
@@ -73,7 +73,7 @@ impl Gathered {
         *self = Self { from: Some((machine.now(), machine.slept())), ..Self::default() };
     }
 
-    /// Takes the runs of the tick's task since the last call.
+    /// Takes the polls of the tick's task since the last call.
     pub fn gather(&mut self, machine: &mut Machine) {
         let tick = machine.tasks().position(|name| name == TICK);
         let polls = machine.profile_mut().take_polls();
@@ -83,7 +83,6 @@ impl Gathered {
     }
 
     /// The load from the first command to now.
-    #[must_use]
     pub fn close(self, machine: &Machine, footprint: &Footprint, stack_used: u32) -> Load {
         let (from, slept) = self.from.unwrap_or_default();
         let cycles = machine.now() - from;
@@ -104,12 +103,12 @@ impl Gathered {
 
 fn cost(ticks: &[Poll]) -> Cost {
     let first = ticks.first().map_or(0, |tick| tick.began);
-    let late = |tick: &Poll| {
+    let offset = |tick: &Poll| {
         let since = tick.began - first;
         since as i64 - ((since + PERIOD / 2) / PERIOD * PERIOD) as i64
     };
-    let earliest = ticks.iter().map(late).min().unwrap_or(0);
-    let latest = ticks.iter().map(late).max().unwrap_or(0);
+    let earliest = ticks.iter().map(offset).min().unwrap_or(0);
+    let latest = ticks.iter().map(offset).max().unwrap_or(0);
     Cost {
         runs: ticks.len() as u64,
         mean: ticks.iter().map(|tick| tick.cycles).sum::<u64>() as f64 / ticks.len().max(1) as f64,
@@ -119,7 +118,7 @@ fn cost(ticks: &[Poll]) -> Cost {
 }
 
 impl Load {
-    /// Names and values of what is shown.
+    /// Names and values of the report.
     fn pairs(&self) -> [(&'static str, String); 7] {
         let us = |cycles: f64| cycles * 1e6 / self.clock_hz as f64;
         let (mean, worst) = (self.tick.mean, self.tick.worst);
@@ -135,7 +134,6 @@ impl Load {
     }
 
     /// As a section of the run's page; `missed` are the budgets that were not kept.
-    #[must_use]
     pub fn html(&self, missed: &[String]) -> String {
         let pair = |(name, value)| format!("<div><dt>{name}</dt><dd>{value}</dd></div>\n");
         let cells: String = self.pairs().map(pair).concat();
@@ -149,7 +147,6 @@ preempts it.</p>\n"
     }
 
     /// As text.
-    #[must_use]
     pub fn text(&self, missed: &[String]) -> String {
         let pairs = self.pairs().map(|(name, value)| format!("  {name}: {value}\n")).concat();
         let missed: String = missed.iter().map(|line| format!("  over budget: {line}\n")).collect();
@@ -157,7 +154,6 @@ preempts it.</p>\n"
     }
 
     /// The budgets that are missed, a sentence each.
-    #[must_use]
     pub fn missed(&self) -> Vec<String> {
         let left = MEMORY - (self.ram - self.stack);
         let reached = [
@@ -175,7 +171,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn jitter_is_counted_from_the_earliest_beat_to_the_latest() {
+    fn jitter_is_the_range_of_the_beginnings() {
         let tick = |began, cycles| Poll { task: 0, began, cycles };
         let starts = [1000, 1000 + PERIOD + 40, 1000 + 2 * PERIOD - 10, 1000 + 5 * PERIOD];
         let ticks: Vec<Poll> =

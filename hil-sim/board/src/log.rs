@@ -17,51 +17,39 @@ pub struct Line {
 
 impl Line {
     /// Numbers among the values, in their order.
-    #[must_use]
     pub fn numbers(&self) -> Vec<f64> {
         self.parts.iter().filter_map(|part| part.trim().parse().ok()).collect()
     }
 
-    /// What stands behind `mark` in the message.
-    #[must_use]
-    pub fn behind(&self, mark: &str) -> Option<&str> {
+    /// The message after `mark`.
+    pub fn after(&self, mark: &str) -> Option<&str> {
         self.text.split_once(mark).map(|(_, rest)| rest)
     }
 }
 
-/// What is needed to read an image's log.
+/// The strings of an image's log.
 pub struct Strings(Table);
 
 impl Strings {
-    /// Reads the strings that the image has interned.
-    ///
-    /// # Errors
-    /// [`ImageError::Form`] if it has none, or of another version.
+    /// Reads the strings of an image.
+    /// Errors: [`ImageError::Form`] if it has none, or of another version.
     pub fn of(elf: &[u8]) -> Result<Self, ImageError> {
         let table = Table::parse(elf).map_err(|error| ImageError::Form(format!("{error:#}")))?;
         table.map(Self).ok_or_else(|| ImageError::Form("it logs nothing".to_owned()))
     }
 
     /// A reader at the beginning of a log.
-    #[must_use]
     pub fn reader(&self) -> Reader<'_> {
-        Reader { decoder: self.0.new_stream_decoder(), broken: 0 }
+        Reader { decoder: self.0.new_stream_decoder() }
     }
 }
 
 /// Reads a log as it comes.
 pub struct Reader<'a> {
     decoder: Box<dyn StreamDecoder + Send + Sync + 'a>,
-    broken: u64,
 }
 
 impl Reader<'_> {
-    /// Frames that could not be read: a reset cuts the last one off.
-    #[must_use]
-    pub const fn broken(&self) -> u64 {
-        self.broken
-    }
-
     /// The lines that are complete with these bytes.
     pub fn read(&mut self, bytes: &[u8]) -> Vec<Line> {
         let mut lines = Vec::new();
@@ -77,7 +65,8 @@ impl Reader<'_> {
                     parts: frame.display_fragments().collect(),
                 }),
                 Err(DecodeError::UnexpectedEof) => return lines,
-                Err(DecodeError::Malformed) => self.broken += 1,
+                // A reset truncates the last frame.
+                Err(DecodeError::Malformed) => {}
             }
         }
     }

@@ -1,5 +1,5 @@
-//! The board under way: core and chip in lockstep, exceptions taken and returned from,
-//! sleep passed over to the next event.
+//! The running board: core and chip in lockstep, entry to and return from exceptions, sleep
+//! up to the next event.
 
 mod access;
 mod exceptions;
@@ -7,12 +7,10 @@ mod frame;
 mod profile;
 mod tasks;
 
-use std::path::Path;
-
 use super::chip::Chip;
 use super::core::unicorn::{Counted, UnicornCore};
 use super::core::{Access, Bus, Core, CoreError, Mark, Register, Stop};
-use super::elf::{FLASH, Function, Loaded, RAM, named};
+use super::elf::{FLASH, Loaded, RAM, named};
 use super::error::ImageError;
 use super::exceptions::number::SV_CALL;
 use super::peripherals::flash::Change;
@@ -23,7 +21,7 @@ pub use profile::{Poll, Profile};
 
 use tasks::Tasks;
 
-/// What RAM holds when power comes up.
+/// Content of every byte of RAM at power-up.
 pub const BLANK: u8 = 0xA5;
 /// Why the core does not execute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,7 +30,7 @@ enum Asleep {
     Event,
     /// Until an interrupt.
     Interrupt,
-    /// For good: it has locked up.
+    /// For ever: it has locked up.
     Locked,
 }
 
@@ -44,27 +42,13 @@ pub struct Machine {
     profile: Profile,
     tasks: Tasks,
     marks: Vec<Mark>,
-    functions: Vec<Function>,
     restarts: Vec<(u64, Restart)>,
-    /// Symbols of the image.
     loaded: Loaded,
 }
 
 impl Machine {
-    /// A board with the image at `path` in its flash, before its first instruction.
-    ///
-    /// # Errors
-    /// [`ImageError`] if it is no image of the board.
-    pub fn open(path: &Path) -> Result<Self, ImageError> {
-        let bytes = std::fs::read(path)
-            .map_err(|source| ImageError::Read { path: path.to_owned(), source })?;
-        Self::new(&bytes)
-    }
-
-    /// The same with the image in `elf`.
-    ///
-    /// # Errors
-    /// As [`Machine::open`].
+    /// A board with the image in `elf`, before its first instruction.
+    /// Errors: [`ImageError`] if it is no image of the board.
     pub fn new(elf: &[u8]) -> Result<Self, ImageError> {
         let loaded = Loaded::of(elf)?;
         let counted = Counted { base: FLASH.base, bytes: &loaded.flash, code: &loaded.code };
@@ -78,41 +62,37 @@ impl Machine {
             profile: Profile::default(),
             tasks: Tasks::of(&loaded),
             marks: Vec::new(),
-            functions: loaded.functions.clone(),
             restarts: Vec::new(),
             loaded,
         };
         for address in machine.tasks.marks() {
-            machine.core.mark(address)?;
+            machine.core.mark(address);
         }
         machine.start()?;
         Ok(machine)
     }
 
     /// Cycles since the start.
-    #[must_use]
     pub fn now(&self) -> u64 {
         self.core.meter().cycles
     }
 
     /// The chip.
-    #[must_use]
     pub fn chip(&self) -> &Chip {
         self.core.bus()
     }
 
-    /// The chip, to work its pins.
+    /// The chip, to change its pins.
     pub fn chip_mut(&mut self) -> &mut Chip {
         self.core.bus_mut()
     }
 
     /// Cycles asleep since the start.
-    #[must_use]
     pub const fn slept(&self) -> u64 {
         self.profile.slept()
     }
 
-    /// Runs of tasks, to take what has gathered.
+    /// Polls of tasks, and sleep.
     pub fn profile_mut(&mut self) -> &mut Profile {
         &mut self.profile
     }
@@ -122,43 +102,35 @@ impl Machine {
         self.tasks.names()
     }
 
-    /// Name of the task that the executor is about to run, if it stands at that.
-    #[must_use]
+    /// Name of the task that the executor is about to poll.
     pub fn task(&self) -> Option<&str> {
         let pointer = self.core.register(Register::R(0)).ok()?;
         self.tasks.names().nth(self.tasks.begins(self.pc, pointer)?)
     }
 
-    /// Restarts so far: when, and why.
-    #[must_use]
+    /// Addresses of the functions through which the executors poll tasks.
+    pub fn polls(&self) -> &[u32] {
+        self.tasks.polls()
+    }
+
+    /// Cycle and cause of each restart so far.
     pub fn restarts(&self) -> &[(u64, Restart)] {
         &self.restarts
     }
 
     /// The image.
-    #[must_use]
     pub const fn image(&self) -> &Loaded {
         &self.loaded
     }
 
     /// Name of the function that the core is in.
-    #[must_use]
     pub fn place(&self) -> &str {
-        named(&self.functions, self.pc)
+        named(&self.loaded.functions, self.pc)
     }
 
-    /// Whether the core has locked up.
-    #[must_use]
-    pub fn is_locked_up(&self) -> bool {
-        self.asleep == Some(Asleep::Locked)
-    }
-
-    /// Catches what runs in a loop without end: it goes on at an instruction that branches
-    /// to itself.
-    ///
-    /// # Errors
-    /// [`CoreError::Engine`] if the image has no such instruction, or the engine fails.
-    pub fn catch(&mut self) -> Result<(), CoreError> {
+    /// Makes the running code hang: it continues at an instruction that branches to itself.
+    /// Errors: [`CoreError::Engine`] if the image has no such instruction, or the engine fails.
+    pub fn hang(&mut self) -> Result<(), CoreError> {
         const TO_ITSELF: [u8; 2] = [0xFE, 0xE7];
         let flash = &self.loaded.flash;
         let place = self.loaded.code.iter().find_map(|code| {
@@ -168,21 +140,19 @@ impl Machine {
             })
         });
         let place = place.ok_or_else(|| CoreError::Engine {
-            what: "catch the program",
+            what: "make the program hang",
             why: "the image has no loop".to_owned(),
         })?;
         self.set_register(Register::Pc, place)
     }
 
-    /// Power lost and back, or another restart from outside.
-    ///
-    /// # Errors
-    /// [`CoreError::Engine`] if the engine fails.
+    /// Resets the board; [`Restart::Power`] also clears RAM.
+    /// Errors: [`CoreError::Engine`] if the engine fails.
     pub fn restart(&mut self, cause: Restart) -> Result<(), CoreError> {
         let now = self.now();
         self.restarts.push((now, cause));
         if let Some(change) = self.chip_mut().reset(cause, FLASH.base, now) {
-            self.take_over(change)?;
+            self.apply(change)?;
         }
         if cause == Restart::Power {
             self.core.write(RAM.base, &vec![BLANK; RAM.size as usize])?;
@@ -190,7 +160,7 @@ impl Machine {
         self.start()
     }
 
-    /// Puts the core to its state after a reset.
+    /// Sets the core to its state after a reset.
     fn start(&mut self) -> Result<(), CoreError> {
         // Thread mode on the main stack, no mask, floating point without a context.
         self.core.set_register(Register::Xpsr, 1 << 24)?;
@@ -209,10 +179,10 @@ impl Machine {
         Ok(())
     }
 
-    /// Sees to what is due, to sleep and to an interrupt that can be taken; whether nothing
-    /// of that was to be done, so that the next instruction is the program's.
+    /// Handles what is due, sleep and an exception that can be taken; true if there was
+    /// nothing of these and the program executes next.
     fn executes(&mut self, cycle: u64) -> Result<bool, CoreError> {
-        self.look_after()?;
+        self.advance_chip()?;
         if self.asleep.is_some() {
             self.sleep(cycle);
             return Ok(false);
@@ -224,12 +194,9 @@ impl Machine {
         Ok(true)
     }
 
-    /// Runs until this cycle, or the first block behind it. Returns early at a
-    /// breakpoint instruction, with its address.
-    ///
-    /// # Errors
-    /// [`CoreError`] if the engine fails. What a processor faults on is the program's
-    /// to handle.
+    /// Runs until this cycle, or the first block after it. Returns early at a breakpoint
+    /// instruction, with its address.
+    /// Errors: [`CoreError`] if the engine fails. A fault of the program is an exception.
     pub fn run_until(&mut self, cycle: u64) -> Result<Option<u32>, CoreError> {
         while self.now() < cycle {
             if !self.executes(cycle)? {
@@ -243,7 +210,7 @@ impl Machine {
         Ok(None)
     }
 
-    /// Does what follows from a stop of the core; the address if it is a breakpoint.
+    /// Handles a stop of the core; returns the address of a breakpoint.
     fn follow(&mut self, stop: Stop) -> Result<Option<u32>, CoreError> {
         self.note_tasks();
         match stop {
@@ -257,7 +224,7 @@ impl Machine {
                 let now = self.now();
                 self.chip_mut().system.exceptions.pend(SV_CALL, now);
                 if self.takeable()? != Some(SV_CALL) {
-                    // Masked or no more urgent than what runs: not to be waited for.
+                    // Masked, or no more urgent than the running exception: a fault.
                     self.chip_mut().system.exceptions.clear(SV_CALL);
                     self.fault(Cause::Program(super::core::Fault::Undefined), at)?;
                 }
@@ -279,42 +246,33 @@ impl Machine {
         Ok(None)
     }
 
-    /// Carries out one instruction, or takes an exception; asleep it passes time, up to
-    /// this cycle at most.
-    ///
-    /// Slow: code is translated anew for it.
-    ///
-    /// # Errors
-    /// As [`Machine::run_until`].
+    /// Executes one instruction, or takes an exception; asleep it passes time, up to this
+    /// cycle at most. Slow: the engine translates the code again.
+    /// Errors: as [`Machine::run_until`].
     pub fn step(&mut self, cycle: u64) -> Result<(), CoreError> {
         while self.now() < cycle {
-            self.look_after()?;
-            if self.asleep.is_some() {
-                self.sleep(cycle);
-                continue;
+            let depth = self.chip().system.exceptions.depth();
+            if self.executes(cycle)? {
+                let stop = self.core.step(self.pc)?;
+                return self.follow(stop).map(|_| ());
             }
-            if let Some(number) = self.takeable()? {
-                return self.enter(number, self.pc, false);
+            if self.chip().system.exceptions.depth() != depth {
+                break;
             }
-            let stop = self.core.step(self.pc)?;
-            return self.follow(stop).map(|_| ());
         }
         Ok(())
     }
 
-    /// Runs until this cycle whatever the program does at breakpoints.
-    ///
-    /// # Errors
-    /// As [`Machine::run_until`].
+    /// Runs until this cycle; a breakpoint instruction is a fault, as without a debugger.
+    /// Errors: as [`Machine::run_until`].
     pub fn run_on(&mut self, cycle: u64) -> Result<(), CoreError> {
         while self.run_until(cycle)?.is_some() {
-            // Without a debugger a breakpoint is a fault.
             self.fault(Cause::Program(super::core::Fault::Undefined), self.pc)?;
         }
         Ok(())
     }
 
-    /// Books the tasks that have begun and ended.
+    /// Books the polls that have begun and ended.
     fn note_tasks(&mut self) {
         self.core.take_marks(&mut self.marks);
         for mark in self.marks.drain(..) {
@@ -325,11 +283,9 @@ impl Machine {
         }
     }
 
-    /// Runs up to this address, in any place of the code, or until the cycle. False if
-    /// the program did not come there.
-    ///
-    /// # Errors
-    /// As [`Machine::run_until`].
+    /// Runs to this address, anywhere in the code, or to the cycle; true if it got to the
+    /// address.
+    /// Errors: as [`Machine::run_until`].
     pub fn run_to(&mut self, address: u32, cycle: u64) -> Result<bool, CoreError> {
         while self.now() < cycle {
             if !self.executes(cycle)? {
@@ -347,13 +303,13 @@ impl Machine {
         Ok(false)
     }
 
-    /// Goes on behind the breakpoint instruction that the core stands at.
+    /// Continues after the breakpoint instruction at which the core stopped.
     pub fn step_over_breakpoint(&mut self) {
         self.pc += 2;
     }
 
-    /// Everything of the chip that is due.
-    fn look_after(&mut self) -> Result<(), CoreError> {
+    /// Does everything of the chip that is due.
+    fn advance_chip(&mut self) -> Result<(), CoreError> {
         let now = self.now();
         if self.chip().deadline() > now {
             return Ok(());
@@ -363,14 +319,14 @@ impl Machine {
             let found = self.carry(due)?;
             self.chip_mut().moved(due.channel, found, now);
         }
-        if let Some(place) = self.chip().flash.asks_for() {
+        if let Some(place) = self.chip().flash.needs() {
             let mut before = [0; 8];
             self.core.read(place, &mut before)?;
             self.chip_mut().flash.found(before, now);
             self.chip_mut().advance(now);
         }
         if let Some(change) = self.chip_mut().flash.take_change() {
-            self.take_over(change)?;
+            self.apply(change)?;
             self.chip_mut().advance(now);
         }
         if let Some(cause) = self.chip_mut().take_reset() {
@@ -379,8 +335,8 @@ impl Machine {
         Ok(())
     }
 
-    /// Puts into memory what the flash was told to.
-    fn take_over(&mut self, change: Change) -> Result<(), CoreError> {
+    /// Applies a change by the flash's interface to the memory.
+    fn apply(&mut self, change: Change) -> Result<(), CoreError> {
         match change {
             Change::Programmed { address, bytes } => self.core.write(address, &bytes),
             Change::Erased { address, size } => {
@@ -389,7 +345,7 @@ impl Machine {
         }
     }
 
-    /// Carries a word for DMA. False if nothing lies at an address.
+    /// Moves a word for DMA; false if an address holds nothing.
     fn carry(&mut self, due: super::peripherals::dma::Move) -> Result<bool, CoreError> {
         let now = self.now();
         let (memory, bytes) = due.memory;
@@ -413,12 +369,11 @@ impl Machine {
         self.profile.sleep(now);
     }
 
-    /// Passes time up to the next event, `cycle` at most, and wakes if something is
-    /// there to wake for.
+    /// Wakes, or passes time up to the next event, `cycle` at most.
     fn sleep(&mut self, cycle: u64) {
         let exceptions = &mut self.core.bus_mut().system.exceptions;
         let wakes = match self.asleep {
-            // What would be taken if the interrupt mask were open wakes the core.
+            // An exception wakes the core even if PRIMASK masks it.
             Some(Asleep::Event) => {
                 std::mem::take(&mut exceptions.event) || exceptions.urgent().is_some()
             }

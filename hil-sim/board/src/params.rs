@@ -1,4 +1,4 @@
-//! The emulated board at the other end of the line, with flash that outlasts the run.
+//! The emulated board at the end of the host's line, with flash that outlasts the run.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -22,9 +22,7 @@ pub struct EmulatedBoard {
 
 impl EmulatedBoard {
     /// Switches a board with this image on and waits until it is idle.
-    ///
-    /// # Errors
-    /// [`StoreError`] if the file cannot be read or the board does not start.
+    /// Errors: [`StoreError`] if the file cannot be read or the board does not start.
     pub fn start(elf: &[u8], flash: &Path) -> Result<Self, StoreError> {
         let wire = |error: &dyn std::fmt::Display| StoreError::Wire(error.to_string());
         let strings: &'static Strings =
@@ -46,7 +44,7 @@ impl EmulatedBoard {
         let mut board = Self { bench, flash: flash.to_owned() };
         for _ in 0..START_MS {
             let (_, lines) = board.bench.step().map_err(|error| wire(&error))?;
-            // Parameters that the firmware cannot run are a reason to be asked for them.
+            // Parameters that the firmware refuses can still be read and changed.
             let up = |text: &str| text.contains("mode: idle") || text.contains("parameters: ");
             if lines.iter().any(|line| up(&line.text)) {
                 return Ok(board);
@@ -56,9 +54,7 @@ impl EmulatedBoard {
     }
 
     /// Keeps the flash for the next time.
-    ///
-    /// # Errors
-    /// [`StoreError`] if the file cannot be written.
+    /// Errors: [`StoreError`] if the file cannot be written.
     pub fn keep(&self) -> Result<(), StoreError> {
         let mut bytes = vec![0; 2 * SLOT_BYTES];
         self.bench

@@ -7,7 +7,6 @@
 
 pub mod adc;
 pub mod crc;
-pub mod dbgmcu;
 pub mod dma;
 pub mod encoder;
 pub mod exti;
@@ -37,13 +36,11 @@ pub struct Write {
 
 impl Write {
     /// The register afterwards.
-    #[must_use]
     pub const fn onto(self, old: u32) -> u32 {
         old & !self.mask | self.value & self.mask
     }
 
     /// The bits written as 1, for registers in which the others do nothing.
-    #[must_use]
     pub const fn ones(self) -> u32 {
         self.value & self.mask
     }

@@ -10,10 +10,10 @@ use crate::peripherals::HZ;
 use crate::peripherals::rcc::Cause;
 use crate::rtt::Probe;
 
-/// Cycles between two looks at the board: a tenth of what a probe on USB needs.
+/// Cycles between two accesses of the probe: a tenth of what a probe on USB needs.
 const LOOK: u64 = 4000;
 
-/// An emulated board with nothing at its pins, and its memory in reach.
+/// An emulated board with nothing at its pins.
 pub struct EmulatedPort {
     machine: Machine,
     probe: Probe,
@@ -21,27 +21,24 @@ pub struct EmulatedPort {
 
 impl EmulatedPort {
     /// A board with this image, before its first instruction.
-    ///
-    /// # Errors
-    /// [`ImageError`] if the image is none, or has no RTT channels.
+    /// Errors: [`ImageError`] if the image is none, or has no RTT channels.
     pub fn new(elf: &[u8]) -> Result<Self, ImageError> {
         let machine = Machine::new(elf)?;
         Ok(Self { probe: Probe::of(&machine)?, machine })
     }
 
     /// The board.
-    #[must_use]
     pub const fn machine(&self) -> &Machine {
         &self.machine
     }
 
-    /// The board, to be tampered with.
+    /// The board, to be changed.
     pub fn machine_mut(&mut self) -> &mut Machine {
         &mut self.machine
     }
 }
 
-/// The engine's failure is the probe's.
+/// A failure of the engine as one of the probe.
 fn gone(error: impl std::fmt::Display) -> PortError {
     PortError::Gone(error.to_string())
 }
@@ -52,17 +49,12 @@ impl Port for EmulatedPort {
     }
 
     fn down(&mut self, channel: u32, bytes: &[u8]) -> Result<usize, PortError> {
-        for (sent, byte) in bytes.iter().enumerate() {
-            if !self.probe.down(&mut self.machine, channel, *byte).map_err(gone)? {
-                return Ok(sent);
-            }
-        }
-        Ok(bytes.len())
+        self.probe.down(&mut self.machine, channel, bytes).map_err(gone)
     }
 
     fn reset(&mut self) -> Result<(), PortError> {
         self.machine.restart(Cause::Software).map_err(gone)?;
-        // What the run before has left in its rings is not this one's.
+        // The rings still hold bytes of the run before.
         self.probe.forget(&mut self.machine).map_err(gone)
     }
 

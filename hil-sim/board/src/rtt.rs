@@ -12,19 +12,19 @@ use super::machine::Machine;
 const SYMBOL: &str = "_SEGGER_RTT";
 /// Its first bytes once the program has set it up.
 const MARK: &[u8; 16] = b"SEGGER RTT\0\0\0\0\0\0";
-/// Bytes before the channels, and of a channel.
+/// Bytes before the channels, and of a channel's record.
 const HEAD: u32 = 24;
 const CHANNEL: u32 = 24;
-/// Largest ring believed.
+/// Largest plausible ring, bytes.
 const LARGEST: u32 = 64 * 1024;
 
-/// A probe that knows where the control block is.
+/// A probe with the address of the control block.
 #[derive(Clone, Copy, Debug)]
 pub struct Probe {
     block: u32,
 }
 
-/// A ring: where it is, bytes, and where the next are written and read.
+/// A ring: address of its record and its buffer, bytes, write and read offsets.
 struct Ring {
     at: u32,
     buffer: u32,
@@ -34,10 +34,8 @@ struct Ring {
 }
 
 impl Probe {
-    /// Looks the control block up in the image.
-    ///
-    /// # Errors
-    /// [`ImageError::Missing`] if it has none.
+    /// Finds the control block of the image.
+    /// Errors: [`ImageError::Missing`] if it has none.
     pub fn of(machine: &Machine) -> Result<Self, ImageError> {
         Ok(Self { block: machine.image().symbol(SYMBOL)? })
     }
@@ -58,18 +56,14 @@ impl Probe {
         Ok(sound.then_some(ring))
     }
 
-    /// Makes the channels unknown until the program has set them up anew.
-    ///
-    /// # Errors
-    /// [`CoreError`] if the control block does not lie in memory.
+    /// Makes the channels unknown until the program sets them up again.
+    /// Errors: [`CoreError`] if the control block does not lie in memory.
     pub fn forget(self, machine: &mut Machine) -> Result<(), CoreError> {
         machine.poke(self.block, &[0; MARK.len()])
     }
 
-    /// Takes what channel `index` has sent.
-    ///
-    /// # Errors
-    /// [`CoreError`] if the ring does not lie in memory.
+    /// Takes the bytes that channel `index` has sent.
+    /// Errors: [`CoreError`] if the ring does not lie in memory.
     pub fn up(self, machine: &mut Machine, index: u32) -> Result<Vec<u8>, CoreError> {
         let Some(ring) = self.ring(machine, index, false)? else { return Ok(Vec::new()) };
         let mut taken = Vec::new();
@@ -87,18 +81,20 @@ impl Probe {
         Ok(taken)
     }
 
-    /// Sends a byte down channel `index`; false if there is no room.
-    ///
-    /// # Errors
-    /// As [`Probe::up`].
-    pub fn down(self, machine: &mut Machine, index: u32, byte: u8) -> Result<bool, CoreError> {
-        let Some(ring) = self.ring(machine, index, true)? else { return Ok(false) };
-        let next = (ring.write + 1) % ring.size;
-        if next == ring.read {
-            return Ok(false);
+    /// Sends bytes down channel `index`; returns how many it had room for.
+    /// Errors: as [`Probe::up`].
+    pub fn down(self, machine: &mut Machine, index: u32, bytes: &[u8]) -> Result<usize, CoreError> {
+        let Some(ring) = self.ring(machine, index, true)? else { return Ok(0) };
+        let mut write = ring.write;
+        for (sent, byte) in bytes.iter().enumerate() {
+            let next = (write + 1) % ring.size;
+            if next == ring.read {
+                return Ok(sent);
+            }
+            machine.poke(ring.buffer + write, &[*byte])?;
+            machine.poke(ring.at + 12, &next.to_le_bytes())?;
+            write = next;
         }
-        machine.poke(ring.buffer + ring.write, &[byte])?;
-        machine.poke(ring.at + 12, &next.to_le_bytes())?;
-        Ok(true)
+        Ok(bytes.len())
     }
 }

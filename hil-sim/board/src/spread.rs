@@ -36,7 +36,6 @@ impl Spread {
     }
 
     /// Mean cycles of a call; 0 without any.
-    #[must_use]
     pub fn mean(&self) -> f64 {
         self.cycles as f64 / self.calls.max(1) as f64
     }

@@ -1,10 +1,10 @@
-//! Thumb-2 as far as timing needs it: how long an instruction is, what class of cost
-//! it has, and whether it stands under a condition.
+//! Thumb-2 as far as timing needs it: length and cost class of an instruction, and whether it is
+//! conditional.
 
-/// What an instruction costs is decided by.
+/// Cost class of an instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Neither of the others.
+    /// Any other.
     Plain,
     /// Reads or writes so many words.
     Access(u8),
@@ -41,7 +41,6 @@ pub struct Instruction {
 /// Decodes the instruction at the beginning of `code`; `None` if it is cut off there.
 ///
 /// Source: ARMv7-M Architecture Reference Manual, A5 (encodings).
-#[must_use]
 pub fn decode(code: &[u8]) -> Option<Instruction> {
     let half = |at: usize| Some(u16::from_le_bytes([*code.get(at)?, *code.get(at + 1)?]));
     let first = half(0)?;
@@ -120,8 +119,7 @@ fn float_operation(a: u16, b: u16) -> Kind {
     }
 }
 
-/// Every instruction of `code`, which lies at `address`, with whether it stands under
-/// a condition.
+/// Every instruction of `code`, which begins at `address`, and whether it is conditional.
 pub fn sweep(code: &[u8], address: u32) -> impl Iterator<Item = (u32, Instruction, bool)> {
     let (mut at, mut under) = (0, 0);
     std::iter::from_fn(move || {
@@ -142,13 +140,13 @@ mod tests {
 
     fn kind(halves: &[u16]) -> Kind {
         let bytes: Vec<u8> = halves.iter().flat_map(|h| h.to_le_bytes()).collect();
-        let found = decode(&bytes).expect("whole");
+        let found = decode(&bytes).expect("complete");
         assert_eq!(found.size as usize, bytes.len());
         found.kind
     }
 
     #[test]
-    fn loads_and_stores_are_told_by_their_words() {
+    fn loads_and_stores_count_their_words() {
         assert_eq!(kind(&[0x4801]), Kind::Access(1)); // ldr r0, [pc, #4]
         assert_eq!(kind(&[0x9001]), Kind::Access(1)); // str r0, [sp, #4]
         assert_eq!(kind(&[0xB5F0]), Kind::Access(5)); // push {r4-r7, lr}

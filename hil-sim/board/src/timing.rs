@@ -18,7 +18,7 @@
 //! Source: ARM, Cortex-M4 Technical Reference Manual r0p1 (DDI 0439), tables 3-1 and
 //! 7-1. There are no wait states of the flash in it, no contention on the bus, no
 //! dependency between floating-point results. So it compares programs; what a chip
-//! takes, its cycle counter tells.
+//! takes, its cycle counter measures.
 
 use super::thumb::{Instruction, Kind};
 
@@ -27,7 +27,6 @@ pub const REFILL: u64 = 2;
 
 /// Cycles beyond the first that this instruction takes whatever its operands, branches
 /// apart.
-#[must_use]
 pub const fn extra(kind: Kind) -> u64 {
     match kind {
         Kind::Plain | Kind::IfThen(_) => 0,
@@ -40,10 +39,9 @@ pub const fn extra(kind: Kind) -> u64 {
     }
 }
 
-/// Whether the cycles beyond the first are known only when the instruction is reached:
-/// it may be skipped, or its operands decide.
-#[must_use]
-pub fn is_late(instruction: &Instruction, conditional: bool) -> bool {
+/// Whether the cycles beyond the first are known only at execution: a condition or the
+/// operands decide.
+pub fn is_deferred(instruction: &Instruction, conditional: bool) -> bool {
     matches!(instruction.kind, Kind::Divide { .. }) || conditional && extra(instruction.kind) > 0
 }
 
@@ -52,7 +50,6 @@ pub fn is_late(instruction: &Instruction, conditional: bool) -> bool {
 ///
 /// The manual says 2 to 12 by the leading zeros and ones of the operands; the
 /// proportion is our reading of it.
-#[must_use]
 pub const fn division(signed: bool, n: u32, m: u32) -> u64 {
     let (n, m) =
         if signed { ((n as i32).unsigned_abs(), (m as i32).unsigned_abs()) } else { (n, m) };
@@ -84,11 +81,11 @@ mod tests {
     }
 
     #[test]
-    fn only_what_may_be_skipped_or_depends_on_operands_is_late() {
+    fn only_what_may_be_skipped_or_depends_on_operands_is_deferred() {
         let load = Instruction { size: 2, kind: Kind::Access(1) };
         let sum = Instruction { size: 2, kind: Kind::Plain };
         let quotient = Instruction { size: 4, kind: Kind::Divide { signed: true, n: 0, m: 1 } };
-        assert!(is_late(&load, true) && !is_late(&load, false));
-        assert!(!is_late(&sum, true) && is_late(&quotient, false));
+        assert!(is_deferred(&load, true) && !is_deferred(&load, false));
+        assert!(!is_deferred(&sum, true) && is_deferred(&quotient, false));
     }
 }

@@ -1,20 +1,16 @@
 //! The control tick on the emulated core: the same bits as on the host, and the same cycles
 //! each time.
 
-use std::path::PathBuf;
-
 use hil_sim::firmware::{Profile, build_binary};
 use interstage_images::tick::Preset;
 use rig_board::cycles::{CyclesError, IMAGE, Step, record, replay, run, tick};
 use rig_board::image::Image;
-use rig_board::spread::Spread;
 
 use crate::common::scenario;
 
 fn image() -> Image {
-    let path: PathBuf =
-        build_binary(IMAGE.0, IMAGE.1, Profile::Release, &[]).expect("the image builds");
-    Image::open(&path).expect("an image")
+    let path = build_binary(IMAGE.0, IMAGE.1, Profile::Release, &[]).expect("the image builds");
+    Image::start(&std::fs::read(path).expect("readable")).expect("an image")
 }
 
 #[test]
@@ -29,25 +25,18 @@ fn a_deployment_and_a_retraction_give_the_same_bits_on_the_core() {
 }
 
 #[test]
-fn a_tick_fed_another_code_is_told_apart() {
+fn a_tick_with_another_code_differs() {
     let mut ticks = record(&scenario(&[])).expect("a run");
     ticks.truncate(300);
-    ticks[200].given.codes[1].code ^= 0x40;
-    let error = replay(&mut image(), Preset::Prototype, &ticks, true, |_, _, _| {});
+    ticks[200].given.codes[1][1] ^= 0x40;
+    let error = replay(&mut image(), Preset::Prototype, &ticks, true);
     assert!(matches!(error, Err(CyclesError::Differs(200))), "{error:?}");
 }
 
 #[test]
 fn the_same_run_costs_the_same_cycles() {
     let ticks = &record(&scenario(&[])).expect("a run")[..500];
-    let cycles = || {
-        let mut spread = Spread::default();
-        let note = |_: &_, add: &dyn Fn(&mut Spread), _: Option<&dyn Fn(&mut Spread)>| {
-            add(&mut spread);
-        };
-        replay(&mut image(), Preset::Prototype, ticks, true, note).expect("equal");
-        spread
-    };
+    let cycles = || replay(&mut image(), Preset::Prototype, ticks, true).expect("equal");
     assert_eq!(cycles(), cycles());
 }
 

@@ -1,5 +1,5 @@
 //! The campaign of faults on the emulated board, a few of them at one instant each, and a
-//! scenario's faults in a run on the board. `cargo rig faults --target board` is the whole.
+//! scenario's faults in a run on the board. `cargo rig faults --target board` runs all.
 
 use hil_sim::faults::campaign::{Campaign, Case, Outcome};
 use hil_sim::faults::sets;
@@ -26,7 +26,7 @@ fn tried(cases: Vec<Case>) -> Outcome {
 }
 
 #[test]
-fn what_breaks_on_the_board_is_found_or_borne_and_the_mechanism_held() {
+fn faults_on_the_board_are_detected_or_tolerated_and_every_bound_is_kept() {
     let faults = [
         ("preload-sensor off", Some(102)),
         ("encoder-line-a off", Some(123)),
@@ -58,7 +58,7 @@ fn what_breaks_on_the_board_is_found_or_borne_and_the_mechanism_held() {
 
 /// The very bit of `memcpy` after which no start comes to its first word.
 #[test]
-fn a_board_that_can_only_tell_by_its_light_is_found_by_that() {
+fn damage_that_only_the_light_reports_is_found() {
     let bench = Bench::new(elf(), strings(), &Scenario::default()).expect("a bench");
     let functions = &bench.machine().image().functions;
     let copies = functions.iter().find(|f| f.name == "compiler_builtins::mem::memcpy");
@@ -69,8 +69,8 @@ fn a_board_that_can_only_tell_by_its_light_is_found_by_that() {
     let line = &outcome.matrix[0];
     assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{line:#?}");
     assert_eq!(line.restarted(), Some("image damaged, by the light alone"), "{line:#?}");
-    let told_ms = line.latency_ms.expect("a time at which it was told");
-    assert!((1.0..13_000.0).contains(&told_ms), "{line:#?}");
+    let latency_ms = line.latency_ms.expect("a latency");
+    assert!((1.0..13_000.0).contains(&latency_ms), "{line:#?}");
     assert!(line.worst_motion_mm < 0.75, "{line:#?}");
 }
 
@@ -86,16 +86,16 @@ fn parameters_in_flash_are_the_old_ones_the_new_ones_or_named_as_damaged() {
     let outcome = matrix(&faults.map(|(name, _)| name));
     let failures: Vec<_> = outcome.matrix.iter().flat_map(|line| &line.failures).collect();
     assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{failures:#?}");
-    for (name, told) in faults {
+    for (name, restart) in faults {
         let line = outcome.matrix.iter().find(|line| line.fault == name).expect(name);
         // A limit that comes now and then without a fault too, as 209, is none of it.
         let no_fault = line.codes.keys().all(|code| *code >= 200);
-        assert!(line.restarted() == told && no_fault, "{line:?}");
+        assert!(line.restarted() == restart && no_fault, "{line:?}");
     }
 }
 
 #[test]
-fn a_scenario_can_have_a_set_damaged_in_flash_and_the_board_started_anew() {
+fn a_scenario_can_damage_a_stored_set_and_restart_the_board() {
     let text = "[[run.faults]]\ntarget = \"stored-set\"\nkind = \"bit-errors\"\nat_s = 0.5\n\
                 magnitude = 4321\n[[run.faults]]\ntarget = \"supply\"\nkind = \"off\"\nat_s = 0.6\n";
     let scenario = Scenario::parse("bench.toml", text, &[]).expect("a scenario");
@@ -127,7 +127,7 @@ fn a_scenario_s_faults_come_on_the_board_too() {
 }
 
 #[test]
-fn in_software_there_is_no_board_that_could_break() {
+fn software_refuses_the_board_s_faults() {
     let mut scenario = Scenario::default();
     scenario.run.faults = vec![Injection::at(Target::Dma, Kind::Stalled, 1.0, 0.0)];
     let error = hil_sim::session::run(&scenario, hil_sim::session::Options::default());

@@ -3,87 +3,32 @@
 use hil_sim::record::{CrossingLine, Summary};
 use hil_sim::scenario::Direction;
 use hil_sim::session::{self, Options, Session};
+use interstage::restart::{Reset, Restart};
 use interstage::supervise::{Command, Mode};
-use rig_board::bench::Bench;
 use rig_board::chip::Pin;
+use rig_board::core::{Access, Bus};
 use rig_board::faults::Fault;
-use rig_board::log::Line;
 use rig_board::peripherals::rcc::Cause;
 use rig_board::run::{self, Ran};
 
-use crate::common::{elf, scenario, strings};
+use crate::common::{Board, elf, scenario};
 
-/// A board under way, with what it has logged.
-struct Board {
-    bench: Bench<'static>,
-    log: Vec<Line>,
+fn press(board: &mut Board, pressed: bool) {
+    let now = board.machine().now();
+    board.machine().chip_mut().drive(Pin::BUTTON, pressed, now);
 }
 
-impl Board {
-    fn off(sets: &[&str]) -> Self {
-        let bench = Bench::new(elf(), strings(), &scenario(sets)).expect("a bench");
-        Self { bench, log: Vec::new() }
-    }
+fn assert_no_strays(board: &Board) {
+    let strays: Vec<_> = board.bench.machine().chip().strays().iter().collect();
+    assert!(strays.is_empty(), "{strays:#?}");
+}
 
-    /// Powered up and idle.
-    fn idle(sets: &[&str]) -> Self {
-        let mut board = Self::off(sets);
-        board.until("mode: idle", 3000);
-        board
-    }
-
-    /// Goes on for so many milliseconds.
-    fn run(&mut self, milliseconds: u32) {
-        for _ in 0..milliseconds {
-            self.log.extend(self.bench.step().expect("runs").1);
-        }
-    }
-
-    fn said(&self, text: &str) -> bool {
-        self.log.iter().any(|line| line.text.contains(text))
-    }
-
-    /// Goes on until this is logged.
-    fn until(&mut self, text: &str, milliseconds: u32) {
-        let from = self.log.len();
-        for _ in 0..milliseconds {
-            self.run(1);
-            if self.log[from..].iter().any(|line| line.text.contains(text)) {
-                return;
-            }
-        }
-        let last: Vec<&str> = self.log[from..].iter().map(|line| line.text.as_str()).collect();
-        panic!("no `{text}` within {milliseconds} ms: {last:#?}");
-    }
-
-    fn send(&mut self, letter: u8) {
-        assert!(self.bench.send(letter).expect("runs"), "the console listens");
-    }
-
-    fn press(&mut self, pressed: bool) {
-        let now = self.bench.machine().now();
-        self.bench.machine_mut().chip_mut().drive(Pin::BUTTON, pressed, now);
-    }
-
-    fn position_mm(&self) -> f64 {
-        self.bench.plant().truth().position_mm
-    }
-
-    fn assert_no_strays(&self) {
-        let strays: Vec<String> =
-            self.bench.machine().chip().strays().iter().map(ToString::to_string).collect();
-        assert!(strays.is_empty(), "{strays:#?}");
-    }
-
-    /// Whether a motor is driven within the next milliseconds.
-    fn drives(&mut self, milliseconds: u32) -> bool {
-        (0..milliseconds).any(|_| {
-            let (passed, lines) = self.bench.step().expect("runs");
-            self.log.extend(lines);
-            let drives = passed.drives;
-            drives.drive_on && drives.drive != 0.0 || drives.preload_on && drives.preload != 0.0
-        })
-    }
+/// Whether a motor is driven within the next milliseconds.
+fn drives(board: &mut Board, milliseconds: u32) -> bool {
+    (0..milliseconds).any(|_| {
+        let drives = board.step().drives;
+        drives.drive_on && drives.drive != 0.0 || drives.preload_on && drives.preload != 0.0
+    })
 }
 
 fn ran(sets: &[&str]) -> Ran {
@@ -147,7 +92,7 @@ fn assert_alike(board: &Summary, software: &[Summary]) {
     }
 }
 
-fn assert_way(sets: &[&str]) {
+fn assert_as_in_software(sets: &[&str]) {
     let first = ran(sets);
     assert_alike(&first.recording.summary, &software(sets));
     assert!(first.load.unmodelled.is_empty(), "{:#?}", first.load.unmodelled);
@@ -168,16 +113,16 @@ fn assert_way(sets: &[&str]) {
 
 #[test]
 fn a_deployment_is_that_of_the_software_and_the_same_again() {
-    assert_way(&["run.seed=1"]);
+    assert_as_in_software(&["run.seed=1"]);
 }
 
 #[test]
 fn a_retraction_is_that_of_the_software_and_the_same_again() {
-    assert_way(&["run.seed=1", "run.direction=retract"]);
+    assert_as_in_software(&["run.seed=1", "run.direction=retract"]);
 }
 
-/// The board against the same deployment in software, by this thread's processor time, the
-/// best of turns about: what a slow hook or a translation again and again would show.
+/// The board against the same deployment in software, by processor time of
+/// this thread, the best of alternating runs: a slow hook or repeated translation would show.
 #[test]
 fn a_deployment_is_far_ahead_of_the_rig() {
     const MOST: f64 = 60.0;
@@ -200,100 +145,75 @@ fn a_deployment_is_far_ahead_of_the_rig() {
 }
 
 #[test]
-fn power_comes_up_to_idle_with_the_bridges_off() {
+fn power_up_leads_to_idle_with_the_bridges_off_and_reports_power_alone() {
     let mut board = Board::off(&[]);
-    assert!(!board.drives(3000), "nothing may move before a command");
+    let power = Restart { reset: Reset::Power, snapshot: None, crash: None };
+    assert_eq!(board.report(), power);
     for text in ["interstage", "mode: self-test", "mode: zeroing", "mode: idle"] {
         assert!(board.said(text), "{text}: {:#?}", board.log);
     }
-    assert!(!board.said("restarted"));
-    board.assert_no_strays();
+    assert!(!board.said("restarted") && !board.said("before:"), "{:#?}", board.log);
+    assert_no_strays(&board);
 }
 
 #[test]
 fn a_short_press_starts_and_holding_stops() {
-    let mut board = Board::idle(&[]);
-    board.press(true);
+    let mut board = Board::idle();
+    press(&mut board, true);
     board.run(100);
-    board.press(false);
+    press(&mut board, false);
     board.until("preloading to deploy", 500);
-    board.press(true);
+    press(&mut board, true);
     board.until("stop", 1100);
-    board.assert_no_strays();
+    assert_no_strays(&board);
 }
 
 #[test]
 fn an_open_emergency_stop_takes_the_drive_away_until_it_is_reset() {
-    let mut board = Board::idle(&[]);
+    let mut board = Board::idle();
     board.send(b's');
     board.until("deploying: cruise", 4000);
     board.run(100);
     let open = |board: &mut Board, open| {
         let now = board.bench.machine().now();
         for pin in [Pin::STOP_DRIVE, Pin::STOP_PRELOAD] {
-            board.bench.machine_mut().chip_mut().drive(pin, open, now);
+            board.machine().chip_mut().drive(pin, open, now);
         }
     };
     open(&mut board, true);
     board.until("fault 151", 20);
-    assert!(!board.drives(200));
+    assert!(!drives(&mut board, 200));
     open(&mut board, false);
-    assert!(!board.drives(200), "closing the contact starts nothing");
+    assert!(!drives(&mut board, 200), "closing the contact starts nothing");
     board.send(b'0');
     board.until("mode: idle", 1500);
     board.send(b's');
-    assert!(board.drives(500));
-}
-
-#[test]
-fn a_tick_that_hangs_is_ended_by_the_watchdog() {
-    let mut board = Board::idle(&[]);
-    board.send(b's');
-    board.until("deploying: crossing", 8000);
-    let at = board.position_mm();
-    // What every tick calls for the preload sensor never returns.
-    let functions = &board.bench.machine().image().functions;
-    let found = functions.iter().find(|f| f.name.ends_with("AnalogChannel::step"));
-    let stage = found.expect("a function").range.start;
-    let mut whole = [0; 2];
-    board.bench.machine().peek(stage, &mut whole).expect("flash");
-    board.bench.machine_mut().poke(stage, &[0xFE, 0xE7]).expect("flash");
-    board.run(110);
-    let [(_, cause)] = board.bench.machine().restarts() else {
-        panic!("one restart: {:?}", board.bench.machine().restarts());
-    };
-    assert_eq!(*cause, Cause::Watchdog);
-    board.bench.machine_mut().poke(stage, &whole).expect("flash");
-    // The start has found its image damaged, and shows that first.
-    board.run(300);
-    assert!(board.said("restarted by the watchdog"), "{:#?}", board.log);
-    assert!(!board.drives(900), "nothing moves after a restart");
-    assert!(board.position_mm() - at < 1.2, "it went on for {}", board.position_mm() - at);
-    assert_eq!(board.bench.machine().restarts().len(), 1);
+    assert!(drives(&mut board, 500));
 }
 
 #[test]
 fn power_lost_in_the_middle_of_a_crossing_is_survived() {
-    let mut board = Board::idle(&[]);
+    let mut board = Board::idle();
     board.send(b's');
     board.until("sliding on the corner", 8000);
-    board.bench.machine_mut().restart(Cause::Power).expect("restarts");
-    assert!(!board.drives(3000), "nothing moves before a command");
+    board.machine().restart(Cause::Power).expect("restarts");
+    assert!(!drives(&mut board, 3000), "nothing moves before a command");
     assert!(board.said("mode: idle") && !board.said("restarted by the watchdog"));
     board.send(b's');
     board.until("mode: deployed", 40_000);
     assert!((board.position_mm() - 80.0).abs() < 1.0, "{}", board.position_mm());
-    board.assert_no_strays();
+    assert_no_strays(&board);
 }
 
 #[test]
 fn a_driver_on_the_wrong_timer_channel_is_caught() {
     const TIM1_CCER: u32 = 0x4001_2C20;
-    let mut board = Board::idle(&[]);
-    let enables = board.bench.machine_mut().peek_register(TIM1_CCER);
+    let mut board = Board::idle();
+    let at = Access { address: TIM1_CCER, size: 4, pc: 0, now: board.machine().now() };
+    let enables = board.machine().chip_mut().read(at);
     assert_eq!(enables & 0xF0, 0, "only channel 1 and its complement: {enables:#x}");
     // Channel 2 instead of channel 1.
-    board.bench.machine_mut().poke_register(TIM1_CCER, enables << 4);
+    board.machine().chip_mut().write(at, enables << 4);
     board.send(b's');
     board.until("] fault ", 10_000);
     assert!(board.position_mm().abs() < 0.1, "{}", board.position_mm());
@@ -302,37 +222,20 @@ fn a_driver_on_the_wrong_timer_channel_is_caught() {
 #[test]
 fn an_interrupt_flag_that_is_not_cleared_is_caught() {
     let mut board = Board::off(&[]);
-    // In the time driver's handler, the write that clears the flags: `mvns` of what was
-    // read, then its `str`, which becomes a `nop`.
-    let machine = board.bench.machine_mut();
-    let handler = machine.image().functions.iter().find(|f| f.name == "TIM2").expect("a handler");
-    let range = handler.range.clone();
-    let mut code = vec![0; (range.end - range.start) as usize];
-    machine.peek(range.start, &mut code).expect("flash");
-    let half = |at: usize| u16::from_le_bytes([code[at], code[at + 1]]);
-    let inverts = |half: u16| half & 0xFFC0 == 0x43C0;
-    // The long or the short form of a store.
-    let stores = |half: u16| half & 0xFFF0 == 0xF8C0 || half & 0xF800 == 0x6000;
-    let place = (0..code.len() - 2)
-        .step_by(2)
-        .find(|at| inverts(half(*at)) && stores(half(*at + 2)))
-        .expect("the write");
-    let nop: &[u8] =
-        if half(place + 2) & 0xFFF0 == 0xF8C0 { &[0xAF, 0xF3, 0x00, 0x80] } else { &[0x00, 0xBF] };
-    machine.poke(range.start + place as u32 + 2, nop).expect("flash");
+    board.strike(Fault::TimerFlags);
     board.run(2000);
-    assert!(!board.said("mode: idle"), "it came up as if nothing were: {:#?}", board.log);
+    assert!(!board.said("mode: idle"), "it starts as if nothing were wrong: {:#?}", board.log);
 }
 
 /// A run with a fault that comes when this is logged; what is logged after that.
 fn struck(text: &str, fault: Fault, milliseconds: u32) -> (Board, Vec<String>) {
-    let mut board = Board::idle(&[]);
+    let mut board = Board::idle();
     board.send(b's');
     board.until(text, 8000);
     let from = board.log.len();
-    fault.strike(board.bench.machine_mut()).expect("strikes");
+    board.strike(fault);
     board.run(milliseconds);
-    let lines = board.log[from..].iter().map(|line| line.text.clone()).collect();
+    let lines = board.log.split_off(from);
     (board, lines)
 }
 
@@ -348,21 +251,21 @@ fn a_broken_sensor_under_way_stops_the_drive_with_a_fault() {
     ] {
         let (mut board, lines) = struck("deploying: approach", fault, 1500);
         assert!(lines.iter().any(|line| line.contains("] fault ")), "{fault}: {lines:#?}");
-        assert!(!board.drives(300), "{fault}");
+        assert!(!drives(&mut board, 300), "{fault}");
         assert!(board.bench.machine().restarts().is_empty(), "{fault}: the tasks live on");
     }
 }
 
 #[test]
 fn bit_errors_that_pass_are_ridden_out() {
-    let mut board = Board::idle(&[]);
+    let mut board = Board::idle();
     board.send(b's');
     board.until("deploying: approach", 8000);
     for _ in 0..5 {
         let fault = Fault::BitErrors(1 << 5);
-        fault.strike(board.bench.machine_mut()).expect("strikes");
+        board.strike(fault);
         board.run(3);
-        fault.heal(board.bench.machine_mut());
+        fault.switch(board.machine(), false).expect("a fault");
         board.run(40);
     }
     assert!(!board.said("] fault "), "{:#?}", board.log);

@@ -28,7 +28,7 @@ fn set() -> Vec<u8> {
 struct Board {
     bench: Bench<'static>,
     probe: Probe,
-    gatherer: FrameReader,
+    reader: FrameReader,
     number: u16,
 }
 
@@ -38,7 +38,7 @@ impl Board {
         let scenario = Scenario::resolve(Some("prototype"), None, &[]).expect("a scenario");
         let bench = Bench::new(elf(), strings(), &scenario).expect("a bench");
         let probe = Probe::of(bench.machine()).expect("a control block");
-        let mut board = Self { bench, probe, gatherer: FrameReader::new(), number: 0 };
+        let mut board = Self { bench, probe, reader: FrameReader::new(), number: 0 };
         board.until_idle();
         board
     }
@@ -57,24 +57,26 @@ impl Board {
         self.bench.machine().restarts().len()
     }
 
-    /// Asks; none if the board restarts before it answers.
+    /// Sends a request; no response if the board restarts first.
     fn ask(&mut self, request: Request) -> Option<Response> {
         let before = self.restarts();
         self.number += 1;
         let frame = frame(&ToBoard::Parameters(self.number, request)).expect("fits");
-        for byte in frame {
-            while !self.probe.down(self.bench.machine_mut(), DOWN, byte).expect("runs") {
+        let mut sent = 0;
+        while sent < frame.len() {
+            sent += self.probe.down(self.bench.machine_mut(), DOWN, &frame[sent..]).expect("runs");
+            if sent < frame.len() {
                 self.bench.step().expect("runs");
             }
         }
         for _ in 0..500 {
             self.bench.step().expect("runs");
             if self.restarts() > before {
-                self.gatherer = FrameReader::new();
+                self.reader = FrameReader::new();
                 return None;
             }
             for byte in self.probe.up(self.bench.machine_mut(), UP).expect("runs") {
-                if let Some(ToHost::Parameters(number, response)) = self.gatherer.take(byte)
+                if let Some(ToHost::Parameters(number, response)) = self.reader.take(byte)
                     && number == self.number
                 {
                     return Some(response);
@@ -98,8 +100,8 @@ impl Board {
         true
     }
 
-    /// Where what is in force lies, and its rig's name.
-    fn in_force(&mut self) -> (Origin, String) {
+    /// Origin of the active set, and its rig's name.
+    fn active(&mut self) -> (Origin, String) {
         match self.ask(Request::Describe) {
             Some(Response::Description(d)) => (d.origin, d.name.as_str().to_owned()),
             other => panic!("{other:?}"),
@@ -112,21 +114,21 @@ impl Board {
 }
 
 #[test]
-fn a_stored_set_is_in_force_after_power_was_lost() {
+fn a_stored_set_is_active_after_a_loss_of_power() {
     let mut board = Board::idle();
-    assert_eq!(board.in_force().0, Origin::Image);
+    assert_eq!(board.active().0, Origin::Image);
     assert!(board.store(&set()));
     let stored = (Origin::Stored { sequence: 1 }, "changed".to_owned());
-    assert_eq!(board.in_force(), stored);
+    assert_eq!(board.active(), stored);
     board.bench.machine_mut().restart(Cause::Power).expect("restarts");
     board.until_idle();
-    assert_eq!(board.in_force(), stored);
+    assert_eq!(board.active(), stored);
     let strays = board.bench.machine().chip().strays().count();
     assert_eq!(strays, 0);
 }
 
 #[test]
-fn power_that_goes_in_any_write_leaves_the_old_set_or_the_new() {
+fn power_lost_in_any_write_leaves_the_old_set_or_the_new() {
     let set = set();
     let mut board = Board::idle();
     let before = board.operations();
@@ -145,14 +147,14 @@ fn power_that_goes_in_any_write_leaves_the_old_set_or_the_new() {
             }
             board.until_idle();
             assert_eq!(board.restarts(), 1, "{cut:?}");
-            let (origin, name) = board.in_force();
-            // Whole, whatever its number: of a seal half written that reads all ones.
+            let (origin, name) = board.active();
+            // Intact; a half-written header reads as an erased number.
             let new = origin != Origin::Image && name == "changed";
             assert!(new || origin == Origin::Image, "{cut:?}: {origin:?} {name}");
             assert!(new || !done, "{cut:?}: it had said that it is stored");
-            // And what is half written is no obstacle to the next.
+            // A half-written set does not block the next save.
             assert!(board.store(&set), "{cut:?}");
-            assert_eq!(board.in_force().1, "changed", "{cut:?}");
+            assert_eq!(board.active().1, "changed", "{cut:?}");
         }
     }
 }

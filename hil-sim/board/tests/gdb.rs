@@ -93,7 +93,7 @@ fn a_debugger_reads_stops_at_a_function_steps_and_goes_on() {
     let registers = client.registers();
     assert_eq!((registers[PC], registers[16] & 0x1FF), (handler, 16 + 28), "in the handler");
 
-    // What stands there is the program's, not the breakpoint's.
+    // The debugger reads the program's code, not the breakpoint.
     let at = (handler - 0x0800_0000) as usize;
     let code = &loaded.flash[at..at + 4];
     let text: String = code.iter().map(|byte| format!("{byte:02x}")).collect();

@@ -127,9 +127,9 @@ fn a_slow_port_stretches_time_and_changes_nothing() {
     assert!(fast_log.len() > 10_000 && slow_log == fast_log, "{} bytes", fast_log.len());
 }
 
-/// What the bridges were told in every tick of a deployment, with the log's channel read
+/// Commands of the bridges in every tick of a deployment, with the log's channel read
 /// in the ticks that `reads` names, and what was read.
-fn told(reads: impl Fn(u32) -> bool) -> (Vec<Taken>, Vec<u8>) {
+fn commands(reads: impl Fn(u32) -> bool) -> (Vec<Taken>, Vec<u8>) {
     let (mut port, mut rig) = (board(), Rigged::new(3));
     let mut line = HostLine::begin(&mut port).expect("ready");
     let (mut start, mut mode) = (Some(Command::Start), Mode::Boot);
@@ -151,12 +151,12 @@ fn told(reads: impl Fn(u32) -> bool) -> (Vec<Taken>, Vec<u8>) {
 
 #[test]
 fn a_reader_that_stalls_or_is_not_there_changes_no_bit_of_the_control_trace() {
-    let (read, log) = told(|_| true);
+    let (read, log) = commands(|_| true);
     let run = Run::of_stream(&log);
     assert!(run.is_complete() && run.rows.len() > 6000, "{:?}", run.marks);
-    let (absent, nothing) = told(|_| false);
+    let (absent, nothing) = commands(|_| false);
     assert!(nothing.is_empty() && absent == read, "absent");
-    let (stalled, part) = told(|tick| tick % 1000 < 300);
+    let (stalled, part) = commands(|tick| tick % 1000 < 300);
     assert!(stalled == read, "stalled");
     let part = Run::of_stream(&part);
     assert!(part.counts.lost_frames > 100, "{:?}", part.counts);
@@ -228,7 +228,7 @@ fn a_host_that_falls_silent_leaves_the_bridges_off() {
         stream.extend(port.up(1).expect("reads"));
     }
     let run = Run::of_stream(&stream);
-    let alone = run.rows.iter().position(|row| row.tick >= FIRST + 3000).expect("it goes on");
+    let alone = run.rows.iter().position(|row| row.tick >= FIRST + 3000).expect("it continues");
     let rows = &run.rows[alone..];
     let seen: Vec<_> = rows.iter().filter_map(Controller::telemetry).collect();
     // It went on alone: after 50 ms a tick a millisecond, of which the last few are not
@@ -238,7 +238,7 @@ fn a_host_that_falls_silent_leaves_the_bridges_off() {
     let held = held.expect("a fault hold");
     let stale = (Rig::prototype().sense.stale_after_s * 1e3) as usize;
     assert!(held <= stale + 3, "{held} ticks alone");
-    // The counter cannot fall silent: it stands, and the reference goes on.
+    // The counter cannot be silent: it stops, and the reference advances.
     let found = [
         Fault::PreloadSensorStale,
         Fault::CompressionSensorStale,
@@ -255,7 +255,7 @@ fn a_host_that_falls_silent_leaves_the_bridges_off() {
     // What is still driven are ticks that ran: the watchdog has not bitten.
     assert_eq!(port.machine().restarts().len(), 1);
     bridges_have_no_power(&mut port);
-    // A host that comes back is told, and has to start anew.
+    // A host that comes back gets an error, and has to start again.
     let next = FIRST + 3000;
     let mut line = HostLine::begin_at(&mut port);
     assert!(matches!(line.tick(next, given), Err(HilError::Alone(_))));
@@ -271,7 +271,7 @@ fn a_question_asked_twice_is_answered_twice_and_done_once() {
     let mut line = HostLine::begin_at(&mut port);
     let last = FIRST + 2999;
     let (first, again) =
-        (line.tick(last, given).expect("told again"), line.tick(last, given).expect("and again"));
+        (line.tick(last, given).expect("repeated"), line.tick(last, given).expect("and again"));
     assert_eq!(first, again);
     assert_eq!(line.state().expect("stands"), (FIRST + 3000, false));
     let error = line.tick(FIRST + 3200, given).unwrap_err();

@@ -1,9 +1,9 @@
-//! What the board's flash keeps beside parameters: what the drive was doing when the supply
-//! went, and the sum of the image at its first start.
+//! What the board's flash keeps beside parameters: the state of the drive when the supply
+//! fell, and the checksum of the image.
 
 use interstage::params::slots::SLOT_BYTES;
 use interstage::restart::page::PAGE_BYTES;
-use interstage::restart::{DriveSnapshot, Reset, Stopped};
+use interstage::restart::{DriveSnapshot, Reset, Restart, Stopped};
 use interstage::supervise::Mode;
 use rig_board::bench::STEP;
 use rig_board::chip::Pin;
@@ -13,17 +13,17 @@ use rig_board::peripherals::pwr::{HOLDS, Then};
 use rig_board::peripherals::rcc::Cause;
 use rig_board::thumb::sweep;
 
-use crate::common::reset::Board;
+use crate::common::Board;
 
-/// Where the pages stand, by `docs/PARAMETERS.md`.
+/// Addresses of the pages, as in `docs/PARAMETERS.md`.
 const RECORDS: u32 = 0x0808_0000 - 2 * SLOT_BYTES as u32 - PAGE_BYTES as u32;
-const SEALS: u32 = RECORDS - PAGE_BYTES as u32;
+const CHECKSUMS: u32 = RECORDS - PAGE_BYTES as u32;
 
-/// What every image says that finds itself damaged.
+/// The log's line of a damaged image.
 const DAMAGED: &str = "image: a bit has turned over";
 
-/// Longest time in which the whole image is looked at twice, ms.
-const LOOKED_AT_MS: u32 = 14_000;
+/// Longest time of two checks of the image, ms.
+const CHECKED_MS: u32 = 14_000;
 
 fn page(board: &Board, address: u32) -> Vec<u8> {
     let mut bytes = vec![0; PAGE_BYTES];
@@ -31,13 +31,25 @@ fn page(board: &Board, address: u32) -> Vec<u8> {
     bytes
 }
 
-fn strike(board: &mut Board, fault: Fault) {
-    fault.strike(board.bench.machine_mut()).expect("strikes");
+/// Runs until the start has taken the record, 24 bytes on; the tick has not begun.
+fn until_taken(board: &mut Board) {
+    let taken = (0..200).any(|_| {
+        let now = board.machine().now();
+        board.machine().run_on(now + STEP / 20).expect("runs");
+        page(board, RECORDS)[24..32] == [0; 8]
+    });
+    assert!(taken, "{:#?}", board.log);
 }
 
-/// Falls in the middle of a run, and is judged by what the next start reports.
+/// Asserts that a start restored the position near `at`, mm, as an unconfirmed one.
+fn assert_unconfirmed(restart: &Restart, at: f64) {
+    let place = restart.place().expect("a position");
+    assert!((place.position.to_num::<f64>() - at).abs() < 0.3 && !place.sure, "{restart} at {at}");
+}
+
+/// Lets the supply fall during a run; the snapshot in the report of the next start.
 fn falls(board: &mut Board) -> Option<DriveSnapshot> {
-    strike(board, Fault::BrownOut);
+    board.strike(Fault::BrownOut);
     let (cause, after, driven) = board.reset(5);
     assert_eq!(cause, Cause::Power);
     assert!(after <= 1, "{after} ms");
@@ -52,30 +64,34 @@ fn falls(board: &mut Board) -> Option<DriveSnapshot> {
 }
 
 #[test]
-fn a_supply_that_falls_leaves_what_the_drive_did() {
+fn a_supply_that_falls_leaves_a_record_that_is_reported_once() {
     let mut board = Board::moving();
-    let at = board.bench.plant().truth().position_mm;
+    let at = board.position_mm();
     let snapshot = falls(&mut board).expect("a record");
     assert!(matches!(snapshot.mode(), Some(Mode::Run(..))), "{snapshot:?}");
     assert!((snapshot.position.to_num::<f64>() - at).abs() < 0.3, "{snapshot:?} at {at}");
     for said in ["the supply fell too low", "before: tick"] {
-        assert!(board.log.iter().any(|line| line.contains(said)), "{said}: {:#?}", board.log);
+        assert!(board.said(said), "{said}: {:#?}", board.log);
     }
+    // RAM is lost again, without a warning.
+    board.strike(Fault::SupplyCut);
+    let second = board.report();
+    assert_eq!((second.reset, second.snapshot, second.crash), (Reset::Power, None, None));
 }
 
-/// Of the millisecond that the wiring has to give it, it takes the half at most.
+/// The wiring has to give it a millisecond, of which it takes at most half.
 #[test]
 fn a_record_of_the_supply_is_written_in_half_of_its_time() {
-    // An empty page, which is looked through from its end, and one with room for one more.
+    // An empty page, which is searched from its end, and one with room for one more.
     for filled in [0, PAGE_BYTES - 32] {
         let mut board = Board::moving();
-        board.bench.machine_mut().poke(RECORDS, &vec![0; filled]).expect("flash");
-        strike(&mut board, Fault::BrownOut);
+        board.machine().poke(RECORDS, &vec![0; filled]).expect("flash");
+        board.strike(Fault::BrownOut);
         let fell = board.bench.machine().now();
         // The record's last word is the lower one of its third double word.
         let written = |board: &Board| page(board, RECORDS)[filled + 16..filled + 20] != [0xFF; 4];
         while !written(&board) {
-            let machine = board.bench.machine_mut();
+            let machine = board.machine();
             let now = machine.now();
             assert!(now - fell < HOLDS / 2, "{filled}: not yet");
             machine.run_on(now + STEP / 100).expect("runs");
@@ -86,51 +102,35 @@ fn a_record_of_the_supply_is_written_in_half_of_its_time() {
 }
 
 #[test]
-fn a_record_of_the_supply_is_reported_once() {
-    let mut board = Board::moving();
-    falls(&mut board).expect("a record");
-    // The memory is lost, and this time without a warning.
-    strike(&mut board, Fault::SupplyCut);
-    let second = board.report();
-    assert_eq!((second.reset, second.snapshot, second.crash), (Reset::Power, None, None));
-}
-
-#[test]
 fn a_supply_that_flickers_leaves_its_first_record() {
     let mut board = Board::moving();
-    strike(&mut board, Fault::BrownOut);
-    // Back until the record has been taken, 24 bytes on: the tick has not begun.
-    let taken = (0..200).any(|_| {
-        let machine = board.bench.machine_mut();
-        machine.run_on(machine.now() + STEP / 20).expect("runs");
-        page(&board, RECORDS)[24..32] == [0; 8]
-    });
-    assert!(taken, "{:#?}", board.log);
+    board.strike(Fault::BrownOut);
+    until_taken(&mut board);
     let snapshot = falls(&mut board).expect("the same record");
     assert!(matches!(snapshot.mode(), Some(Mode::Run(..))), "{snapshot:?}");
 }
 
 #[test]
-fn a_record_is_whole_or_none_wherever_power_goes() {
+fn a_record_is_intact_or_absent_whenever_power_is_lost() {
     // Of the third double word the lower half is the record's last.
-    for (operations, whole) in [(1, false), (2, false), (3, true), (4, true)] {
+    for (operations, intact) in [(1, false), (2, false), (3, true), (4, true)] {
         let mut board = Board::moving();
-        // One from before, which must not pass for this one.
+        // An earlier one, which must not be reported as this one.
         let earlier = falls(&mut board).expect("a record");
-        assert!(board.bench.send(b's').expect("runs"));
+        board.send(b's');
         board.until("deploying: cruise", 6000);
-        board.bench.take_frames();
-        board.bench.machine_mut().chip_mut().flash.cut_power(Cut::Within(operations));
-        strike(&mut board, Fault::BrownOut);
+        board.frames.clear();
+        board.machine().chip_mut().flash.cut_power(Cut::Within(operations));
+        board.strike(Fault::BrownOut);
         board.reset(5);
         let restart = board.report();
-        assert_eq!(restart.snapshot.is_some(), whole, "{operations}: {restart}");
+        assert_eq!(restart.snapshot.is_some(), intact, "{operations}: {restart}");
         assert!(
             restart.snapshot.is_none_or(|snapshot| snapshot.tick != earlier.tick),
             "{operations}"
         );
-        if !whole {
-            // What was torn is in nobody's way.
+        if !intact {
+            // A torn record does not block the next.
             let next = falls(&mut board).expect("the next record");
             assert_eq!(next.mode(), Some(Mode::Idle));
         }
@@ -141,94 +141,88 @@ fn a_record_is_whole_or_none_wherever_power_goes() {
 fn a_full_page_of_records_makes_room() {
     let mut board = Board::idle();
     let full = [0; PAGE_BYTES];
-    board.bench.machine_mut().poke(RECORDS, &full).expect("flash");
-    strike(&mut board, Fault::ResetPin);
+    board.machine().poke(RECORDS, &full).expect("flash");
+    board.strike(Fault::ResetPin);
     board.until("mode: idle", 3000);
     assert_eq!(page(&board, RECORDS), [0xFF; PAGE_BYTES]);
-    board.bench.take_frames();
+    board.frames.clear();
     let snapshot = falls(&mut board).expect("a record");
     assert_eq!(snapshot.mode(), Some(Mode::Idle));
 }
 
 #[test]
-fn a_dip_of_the_supply_cuts_the_bridges_and_starts_anew() {
+fn a_dip_of_the_supply_cuts_the_bridges_and_restarts() {
     let mut board = Board::moving();
-    let at = board.bench.plant().truth().position_mm;
-    strike(&mut board, Fault::SupplyDip);
+    let at = board.position_mm();
+    board.strike(Fault::SupplyDip);
     let (cause, after, driven) = board.reset(60);
     assert_eq!(cause, Cause::Software);
     assert!(after < 40, "{after} ms");
     assert!(!driven[1..].contains(&true), "{driven:?}");
     let restart = board.report();
     assert_eq!(restart.crash.expect("a crash").stopped, Stopped::Supply);
-    let place = restart.place().expect("a place");
-    assert!((place.position.to_num::<f64>() - at).abs() < 0.3 && !place.sure, "{restart} at {at}");
+    assert_unconfirmed(&restart, at);
 }
 
-/// Too low for a while, without being gone.
+/// A low supply for a while, without a loss of power.
 fn sags(board: &mut Board, milliseconds: u64) {
-    let machine = board.bench.machine_mut();
+    let machine = board.machine();
     let now = machine.now();
     machine.chip_mut().supply_falls(now + milliseconds * STEP, Then::Back, now);
 }
 
+/// With and without room for its record.
 #[test]
-fn a_supply_that_sags_until_the_watchdog_bites_is_no_hang() {
-    let mut board = Board::moving();
-    let at = board.bench.plant().truth().position_mm;
-    sags(&mut board, 400);
-    let (cause, after, driven) = board.reset(150);
-    assert_eq!(cause, Cause::Watchdog);
-    assert!((80..130).contains(&after), "{after} ms");
-    assert!(!driven[1..].contains(&true), "{driven:?}");
-    let restart = board.report();
-    assert_eq!(restart.crash.expect("a crash").stopped, Stopped::Supply);
-    // What it was doing when the bridges went off, and no way gone since; but it may have
-    // been moved meanwhile.
-    let place = restart.place().expect("a place");
-    assert!((place.position.to_num::<f64>() - at).abs() < 0.3 && !place.sure, "{restart} at {at}");
+fn a_low_supply_until_the_watchdog_resets_is_no_hang() {
+    for has_room in [true, false] {
+        let mut board = Board::moving();
+        let at = board.position_mm();
+        if !has_room {
+            board.machine().poke(RECORDS, &[0; PAGE_BYTES]).expect("flash");
+        }
+        sags(&mut board, 400);
+        let (cause, after, driven) = board.reset(150);
+        assert_eq!(cause, Cause::Watchdog);
+        assert!((80..130).contains(&after), "{after} ms");
+        assert!(!driven[1..].contains(&true), "{driven:?}");
+        let restart = board.report();
+        assert_eq!(restart.crash.expect("a crash").stopped, Stopped::Supply);
+        // Where the bridges went off; but the drive may have been moved since.
+        assert_unconfirmed(&restart, at);
+    }
 }
 
 #[test]
-fn a_reset_behind_a_lost_supply_makes_its_place_no_surer() {
+fn a_reset_after_a_lost_supply_leaves_its_position_unconfirmed() {
     let mut board = Board::moving();
-    strike(&mut board, Fault::BrownOut);
+    let at = board.position_mm();
+    board.strike(Fault::BrownOut);
     board.reset(5);
-    // The start has taken the record; the tick has not begun.
-    let taken = (0..200).any(|_| {
-        let machine = board.bench.machine_mut();
-        machine.run_on(machine.now() + STEP / 20).expect("runs");
-        page(&board, RECORDS)[24..32] == [0; 8]
-    });
-    assert!(taken, "{:#?}", board.log);
-    strike(&mut board, Fault::ResetPin);
+    until_taken(&mut board);
+    board.strike(Fault::ResetPin);
     let restart = board.report();
     assert_eq!((restart.reset, restart.crash), (Reset::Pin, None));
-    assert!(restart.place().is_some_and(|place| !place.sure), "{restart}");
+    assert_unconfirmed(&restart, at);
 }
 
 #[test]
-fn a_place_without_a_step_found_stays_unsure_however_long_it_idles() {
+fn a_position_without_a_detected_step_stays_unconfirmed() {
     let mut board = Board::moving();
-    let at = board.bench.plant().truth().position_mm;
+    let at = board.position_mm();
     let lost = falls(&mut board).expect("a record");
     for _ in 0..2 {
-        for _ in 0..50 {
-            board.step();
-        }
-        strike(&mut board, Fault::ResetPin);
+        board.run(50);
+        board.strike(Fault::ResetPin);
         let restart = board.report();
         assert!(restart.snapshot.is_some_and(|snapshot| snapshot.tick != lost.tick), "{restart}");
-        let place = restart.place().expect("a place");
-        let off = (place.position.to_num::<f64>() - at).abs();
-        assert!(off < 0.3 && !place.sure, "{restart} at {at}");
+        assert_unconfirmed(&restart, at);
     }
 }
 
 #[test]
 fn a_reset_into_a_low_supply_leaves_its_place_unsure() {
     let mut board = Board::moving();
-    strike(&mut board, Fault::ResetPin);
+    board.strike(Fault::ResetPin);
     sags(&mut board, 300);
     let restart = board.report();
     assert_eq!((restart.reset, restart.crash), (Reset::Power, None));
@@ -236,46 +230,32 @@ fn a_reset_into_a_low_supply_leaves_its_place_unsure() {
 }
 
 #[test]
-fn a_supply_that_sags_is_named_without_its_record_too() {
-    let mut board = Board::moving();
-    // No room for one.
-    board.bench.machine_mut().poke(RECORDS, &[0; PAGE_BYTES]).expect("flash");
-    sags(&mut board, 400);
-    assert_eq!(board.reset(150).0, Cause::Watchdog);
-    let restart = board.report();
-    assert_eq!(restart.crash.expect("a crash").stopped, Stopped::Supply);
-    assert!(restart.place().is_some_and(|place| !place.sure), "{restart}");
-}
-
-#[test]
 fn a_start_waits_for_its_supply() {
     let mut board = Board::idle();
-    board.bench.take_frames();
-    // Comes back too low, for a tenth of a second.
-    board.bench.machine_mut().restart(Cause::Power).expect("restarts");
+    board.frames.clear();
+    // Power comes back with a low supply for a tenth of a second.
+    board.machine().restart(Cause::Power).expect("restarts");
     sags(&mut board, 100);
     let lines = board.log.len();
-    for _ in 0..99 {
-        board.step();
-    }
+    board.run(99);
     assert_eq!(board.log.len(), lines, "{:#?}", &board.log[lines..]);
     board.until("mode: idle", 3000);
 }
 
 #[test]
-fn the_first_start_of_an_image_keeps_its_sum() {
+fn the_first_start_of_an_image_stores_its_checksum() {
     let first = |board: &Board| {
         board.log.iter().filter(|line| line.contains("first start of this image")).count()
     };
     let mut board = Board::idle();
     assert_eq!(first(&board), 1, "{:#?}", board.log);
-    let seals = page(&board, SEALS);
-    assert_ne!(seals[..16], [0xFF; 16]);
-    assert_eq!(seals[16..], [0xFF; PAGE_BYTES - 16]);
-    strike(&mut board, Fault::ResetPin);
+    let checksums = page(&board, CHECKSUMS);
+    assert_ne!(checksums[..16], [0xFF; 16]);
+    assert_eq!(checksums[16..], [0xFF; PAGE_BYTES - 16]);
+    board.strike(Fault::ResetPin);
     board.until("mode: idle", 3000);
     assert_eq!(first(&board), 1, "known by now");
-    assert_eq!(page(&board, SEALS), seals);
+    assert_eq!(page(&board, CHECKSUMS), checksums);
 }
 
 /// Bytes of the image: of its vectors, its code, its constants, its hash.
@@ -287,27 +267,24 @@ fn places(board: &Board) -> Vec<u32> {
 }
 
 #[test]
-fn a_bit_of_the_image_that_turns_over_is_told_and_held() {
+fn an_inverted_bit_of_the_image_is_reported_and_held() {
     for place in places(&Board::idle()) {
         let mut board = Board::moving();
         let flip = Fault::BitFlip(place, 4);
-        strike(&mut board, flip);
-        board.until(DAMAGED, LOOKED_AT_MS);
+        board.strike(flip);
+        board.until(DAMAGED, CHECKED_MS);
         let (cause, _, driven) = board.reset(20);
         assert_eq!(cause, Cause::Software, "{place:#x}");
         assert!(!driven[1..].contains(&true), "{driven:?}");
-        // It stays off, and says so every second; commands are nothing to it.
+        // It stays off and reports every second; it ignores commands.
         for _ in 0..2 {
             board.until(DAMAGED, 1100);
             board.bench.send(b's').expect("runs");
         }
-        for _ in 0..500 {
-            let drives = board.step().drives;
-            assert!(!drives.drive_on && !drives.preload_on);
-        }
+        board.assert_off(500);
         // Flashed again, it goes on.
-        strike(&mut board, flip);
-        strike(&mut board, Fault::ResetPin);
+        board.strike(flip);
+        board.strike(Fault::ResetPin);
         board.until("mode: idle", 3000);
     }
 }
@@ -324,29 +301,25 @@ fn an_image_names_no_folder_of_the_machine_that_built_it() {
     }
 }
 
-/// A start that no longer gets to its tasks, because what copies its parts about is broken,
-/// has said so before.
+/// A start that fails before its tasks, because `memcpy` is damaged, has reported it before.
 #[test]
-fn a_damaged_image_that_no_longer_starts_says_so_too() {
+fn a_damaged_image_that_no_longer_starts_is_reported() {
     let mut board = Board::moving();
     let copies = board.function("compiler_builtins::mem::memcpy");
-    strike(&mut board, Fault::BitFlip(copies + 0x22F, 4));
-    board.until(DAMAGED, LOOKED_AT_MS);
-    // Off from here on, how often ever it starts.
+    board.strike(Fault::BitFlip(copies + 0x22F, 4));
+    board.until(DAMAGED, CHECKED_MS);
+    // Off from here on, however often it restarts.
     board.step();
-    for _ in 0..500 {
-        let drives = board.step().drives;
-        assert!(!drives.drive_on && !drives.preload_on);
-    }
+    board.assert_off(500);
 }
 
-/// One that comes to nothing at all shows so by the light, over and over; on a sound board it
-/// stays dark until the first word.
+/// An image that cannot log blinks the light; on a sound board the light is off until the first
+/// line of the log.
 #[test]
-fn a_damaged_image_that_says_nothing_any_more_blinks() {
+fn a_damaged_image_that_cannot_log_blinks() {
     let lit = |board: &Board| board.bench.machine().chip().level(Pin::LIGHT);
     let mut board = Board::moving();
-    strike(&mut board, Fault::ResetPin);
+    board.strike(Fault::ResetPin);
     let from = board.log.len();
     while board.log.len() == from {
         board.step();
@@ -354,8 +327,8 @@ fn a_damaged_image_that_says_nothing_any_more_blinks() {
     }
     let mut board = Board::moving();
     let copies = board.function("compiler_builtins::mem::memcpy");
-    strike(&mut board, Fault::BitFlip(copies + 0x115, 4));
-    strike(&mut board, Fault::ResetPin);
+    board.strike(Fault::BitFlip(copies + 0x115, 4));
+    board.strike(Fault::ResetPin);
     board.step();
     let from = board.log.len();
     let mut seen = Vec::new();
@@ -370,13 +343,13 @@ fn a_damaged_image_that_says_nothing_any_more_blinks() {
     assert!(blinks >= 3 && (200..800).contains(&share), "{blinks} times, {share} ms");
 }
 
-/// The floating-point unit is off until a start has turned it on: what comes before must do
-/// without, whatever the compiler would like for its copies.
+/// The floating-point unit is off until the start-up code enables it; code before that must not
+/// use it, not even for copies.
 #[test]
-fn what_a_start_does_first_needs_no_floating_point_unit() {
+fn the_first_code_of_a_start_uses_no_floating_point() {
     let board = Board::idle();
     let image = board.bench.machine().image();
-    let mut looked_at = 0;
+    let mut checked = 0;
     for name in
         ["__pre_init", "board::image::checksums", "interstage::restart::page::word", "Reset"]
     {
@@ -390,8 +363,8 @@ fn what_a_start_does_first_needs_no_floating_point_unit() {
                 let float = wide && matches!(half(at + 2) >> 8 & 0xF, 10 | 11);
                 assert!(!float, "{} at {place:#x}", function.name);
             }
-            looked_at += 1;
+            checked += 1;
         }
     }
-    assert!(looked_at >= 3, "{looked_at}");
+    assert!(checked >= 3, "{checked}");
 }

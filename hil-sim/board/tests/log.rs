@@ -9,58 +9,17 @@ use interstage::rig::Rig;
 use interstage::supervise::Mode;
 use interstage::tick::Event;
 use interstage::units::Q16;
-use rig_board::bench::{Bench, STEP};
-use rig_board::log::Line;
+use rig_board::bench::STEP;
 use rig_board::peripherals::rcc::Cause;
 use rig_board::run;
 
-use crate::common::{elf, scenario, strings};
+use crate::common::{Board, elf, scenario};
 
-/// How far the log may be from the truth under way. Position: the tolerance of the steps'
+/// How far the log may be from the truth during a run. Position: the tolerance of the steps'
 /// places, which the controller knows from its table and corrects itself by. Preload: two
 /// deviations of the preload sensor's gain at 50 N, six of its noise, and its age.
 const POSITION_MM: f64 = 0.8;
 const PRELOAD_N: f64 = 1.0;
-
-/// A board under way, with what it has said on both channels.
-struct Board {
-    bench: Bench<'static>,
-    lines: Vec<Line>,
-    frames: Vec<u8>,
-}
-
-impl Board {
-    fn off() -> Self {
-        let bench = Bench::new(elf(), strings(), &scenario(&["run.seed=1"])).expect("a bench");
-        Self { bench, lines: Vec::new(), frames: Vec::new() }
-    }
-
-    fn run(&mut self, milliseconds: u32) {
-        for _ in 0..milliseconds {
-            self.lines.extend(self.bench.step().expect("runs").1);
-            self.frames.extend(self.bench.take_frames());
-        }
-    }
-
-    fn until(&mut self, text: &str, milliseconds: u32) {
-        let from = self.lines.len();
-        for _ in 0..milliseconds {
-            self.run(1);
-            if self.lines[from..].iter().any(|line| line.text.contains(text)) {
-                return;
-            }
-        }
-        panic!("no `{text}` within {milliseconds} ms");
-    }
-
-    fn send(&mut self, letter: u8) {
-        assert!(self.bench.send(letter).expect("runs"), "the console listens");
-    }
-
-    fn log(&self) -> Run {
-        Run::of_stream(&self.frames)
-    }
-}
 
 #[test]
 fn every_tick_of_a_run_is_logged_and_runs_again_on_this_host() {
@@ -88,21 +47,20 @@ fn every_tick_of_a_run_is_logged_and_runs_again_on_this_host() {
     }
 }
 
-/// Who reads the binary log's channel.
+/// Reader of the binary log's channel.
 #[derive(Clone, Copy, PartialEq)]
 enum Reader {
-    /// One who keeps up.
+    /// One that keeps up.
     There,
-    /// Nobody.
+    /// None.
     Absent,
-    /// One who stands still for 700 of every 1000 ms.
+    /// One that stalls for 700 of every 1000 ms.
     Stalled,
-    /// Nobody, and nothing to read: the image keeps no tick.
+    /// None, and the image records no tick.
     Mute,
 }
 
-/// What the text log says of a crossing's ledger from the speed on: what stands before it
-/// is the time and the place.
+/// Values of the text log's crossings, from the speed on.
 type Crossings = Vec<Vec<f64>>;
 
 /// What the control tick cost, tick by tick, and when it began.
@@ -164,7 +122,7 @@ fn mute(board: &mut Board) {
 /// A run until the drive has arrived: how long it took, ms, what the text log says of the
 /// crossings, and what the tick cost.
 fn deployment(reader: Reader) -> (u32, Crossings, Ticks) {
-    let mut board = Board::off();
+    let mut board = Board::off(&["run.seed=1"]);
     board.bench.listen(reader == Reader::There);
     if reader == Reader::Mute {
         mute(&mut board);
@@ -201,22 +159,20 @@ fn alike(name: &str, read: &(u32, Crossings, Ticks), other: &(u32, Crossings, Ti
     }
 }
 
-/// Telemetry at full rate changes nothing of the control tick's beginning, whoever reads it
-/// or does not, and whether there is any.
+/// Telemetry at full rate changes nothing of the control tick's beginning, with or without a
+/// reader, and whether there is any.
 #[test]
 fn neither_telemetry_nor_its_reader_changes_when_the_tick_begins_or_what_it_takes() {
     /// What two runs may differ by, relative.
     const SAME: f64 = 0.02;
     let read = deployment(Reader::There);
     let off = |one: f64, other: f64| (one / other - 1.0).abs();
-    println!("there: cycles {:.1?}; beginning {:.1?}", read.2.cost(), read.2.jitter());
     for (name, reader) in
         [("absent", Reader::Absent), ("stalled", Reader::Stalled), ("mute", Reader::Mute)]
     {
         let other = deployment(reader);
         alike(name, &read, &other);
         let (cost, jitter) = (other.2.cost(), other.2.jitter());
-        println!("{name}: cycles {cost:.1?}; beginning {jitter:.1?}");
         for (what, one, other) in [
             ("deviation of its beginning", read.2.jitter()[0], jitter[0]),
             ("earliest to latest beginning", read.2.jitter()[1], jitter[1]),
@@ -233,16 +189,16 @@ fn neither_telemetry_nor_its_reader_changes_when_the_tick_begins_or_what_it_take
 
 #[test]
 fn frames_that_found_no_room_are_marked_and_the_capture_waits_for_its_reader() {
-    let mut board = Board::off();
+    let mut board = Board::off(&["run.seed=1"]);
     board.until("mode: idle", 3000);
-    // Nobody listens while the drive is started and goes over the first step.
+    // The channel is not read during the start and the first crossing.
     board.bench.listen(false);
     board.send(b's');
     board.until("deploying: settle", 9000);
     board.run(1500);
     board.bench.listen(true);
     board.run(1500);
-    let run = board.log();
+    let run = Run::of_stream(&board.frames);
     // A short frame may find room where a long one did not, so there are several marks.
     let (mut frames, mut ticks) = (0, 0);
     for (_, mark) in &run.marks {
@@ -259,7 +215,7 @@ fn frames_that_found_no_room_are_marked_and_the_capture_waits_for_its_reader() {
     }
     assert!(frames > 300 && ticks > 2400, "{frames} frames, {ticks} ticks");
     assert_eq!((run.counts.lost_frames, run.counts.lost_ticks), (u64::from(frames), ticks));
-    // The command came first, and its capture is kept whole until it has been read.
+    // The command came first, and its capture is kept complete until it has been read.
     let first = run.captures.first().expect("captured");
     assert_eq!(first.trigger, Trigger::Command);
     let pieces: Vec<_> = run.captures.iter().take_while(|piece| piece.at == first.at).collect();
@@ -270,11 +226,11 @@ fn frames_that_found_no_room_are_marked_and_the_capture_waits_for_its_reader() {
 
 #[test]
 fn a_restart_in_the_middle_is_marked_and_both_parts_run_again() {
-    let mut board = Board::off();
+    let mut board = Board::off(&["run.seed=1"]);
     board.until("mode: idle", 3000);
     board.send(b's');
     board.until("deploying: crossing", 8000);
-    // This one leaves the record of the run before, from which it goes on.
+    // The record of the first run survives this restart.
     board.bench.machine_mut().restart(Cause::Pin).expect("restarts");
     board.until("mode: idle", 3000);
     board.send(b's');
@@ -286,7 +242,7 @@ fn a_restart_in_the_middle_is_marked_and_both_parts_run_again() {
     board.bench.machine_mut().restart(Cause::Power).expect("restarts");
     board.until("mode: idle", 3000);
     board.run(200);
-    let run = board.log();
+    let run = Run::of_stream(&board.frames);
     assert_eq!(run.counts.restarts, 2, "{:?}", run.marks);
     let placed = |boot| run.since_boot(boot).restart().and_then(|restart| restart.place());
     assert_eq!([0, 1, 2].map(|boot| placed(boot).is_some()), [false, true, false]);
@@ -297,7 +253,7 @@ fn a_restart_in_the_middle_is_marked_and_both_parts_run_again() {
     assert!(result.ticks as usize > run.rows.len() / 2, "{result:?}");
 }
 
-/// Resident memory of this process, bytes; none where the system does not tell.
+/// Resident memory of this process, bytes; none if the system does not report it.
 fn resident() -> Option<u64> {
     let text = std::fs::read_to_string("/proc/self/statm").ok()?;
     text.split_whitespace().nth(1)?.parse::<u64>().ok().map(|pages| pages * 4096)
@@ -311,7 +267,7 @@ fn minutes_of_deploying_and_retracting_are_logged_without_a_gap_or_drift() {
         return;
     }
     const ROUNDS: usize = 24;
-    let mut board = Board::off();
+    let mut board = Board::off(&["run.seed=1"]);
     board.until("mode: idle", 3000);
     let (mut decoder, mut truths) = (Decoder::new(), VecDeque::new());
     let mut due: Option<u32> = None;

@@ -1,7 +1,7 @@
 //! No panic that the control tick can reach in the image, but those that are known never to
 //! be taken.
 //!
-//! A function of the image calls, or goes on in, what its branches name. From the functions
+//! A function of the image calls, or continues in, the targets of its branches. From the functions
 //! in which the task of the control tick and those of the sensors were put together, all
 //! that can be reached is walked; where a branch leads into the machinery of panics, that
 //! is a site. Its place in the source comes from the debug information, with everything
@@ -19,7 +19,7 @@ use names::{Frame, Names};
 use crate::common::elf;
 
 /// Functions of the source whose tasks run on the control tick's executor: their names
-/// stand among what was inlined into the function that the executor calls.
+/// are among what was inlined into the function that the executor calls.
 const ROOTS: [&str; 5] = [
     "interstage::tasks::motors::motors",
     "interstage::tasks::sensors::wheel_encoder",

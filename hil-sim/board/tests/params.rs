@@ -139,7 +139,7 @@ fn checksum(bytes: &[u8]) -> u32 {
 /// that mean nothing here.
 fn old_set(name: &str, rig: &Rig) -> Vec<u8> {
     let mut set = set_of(name, rig).expect("a sound rig");
-    assert_eq!(set[0], SCHEMA as u8, "its number stands first");
+    assert_eq!(set[0], SCHEMA as u8, "its number is first");
     set[0] -= 1;
     set.truncate(set.len() - 4 - 200);
     let end = set.len();
@@ -209,8 +209,8 @@ fn a_damaged_set_is_named_drives_nothing_and_can_be_restored() {
 }
 
 #[test]
-fn parameters_that_nobody_can_read_are_named_and_can_be_restored() {
-    // A rig of another layout: what stands in its place is no rig.
+fn unreadable_parameters_are_reported_and_can_be_restored() {
+    // A rig of another layout: its bytes are no rig.
     let mut set = set_of("odd", &Rig::prototype()).expect("a sound rig");
     let length = usize::from(ParameterSet::open(&set).expect("a set").header().rig_length);
     set[0] -= 1;

@@ -1,5 +1,5 @@
-//! What ends the firmware, on the emulated board: each time the bridges go off, and the
-//! next start says what it was.
+//! Every end of the firmware, on the emulated board: the bridges go off, and the next start
+//! reports the cause.
 
 use hil_sim::faults::campaign::{Campaign, Case};
 use hil_sim::scenario::Scenario;
@@ -12,8 +12,7 @@ use rig_board::core::Register;
 use rig_board::faults::Fault;
 use rig_board::peripherals::rcc::Cause;
 
-use crate::common::reset::Board;
-use crate::common::{elf, strings};
+use crate::common::{Board, elf, strings};
 
 fn hang(restart: &Restart) -> (u32, MissedCheckIns) {
     match restart.crash.map(|crash| crash.stopped) {
@@ -22,25 +21,17 @@ fn hang(restart: &Restart) -> (u32, MissedCheckIns) {
     }
 }
 
-/// The bridges go off within the first of these times, and not again on, ms.
+/// The bridges go off within so many ms, and stay off.
 fn assert_cut(driven: &[bool], within: usize) {
     assert!(!driven[within..].contains(&true), "{driven:?}");
 }
 
 #[test]
-fn a_first_start_reports_nothing_but_power() {
-    let mut board = Board::idle();
-    let nothing = Restart { reset: Reset::Power, snapshot: None, crash: None };
-    assert_eq!(board.report(), nothing);
-    assert!(!board.log.iter().any(|line| line.contains("restarted") || line.contains("before:")));
-}
-
-#[test]
 fn a_panic_is_reported_with_its_line_and_what_the_drive_did() {
     let mut board = Board::moving();
-    let at = board.bench.plant().truth().position_mm;
+    let at = board.position_mm();
     let panics = board.function("panic_bounds_check");
-    // Index and length, and a place that has some line.
+    // Index, length, and the address of some location.
     let place = 0x0800_1000;
     let line = board.bench.machine().word(place + 8).expect("flash");
     for (register, value) in [(Register::R(0), 7), (Register::R(1), 3), (Register::R(2), place)] {
@@ -65,7 +56,7 @@ fn a_panic_is_reported_with_its_line_and_what_the_drive_did() {
 #[test]
 fn a_hard_fault_is_reported_with_where_and_why() {
     let mut board = Board::moving();
-    // Nothing lies there.
+    // No memory.
     board.set(Register::Pc, 0x0900_0000);
     let (cause, _, driven) = board.reset(60);
     assert_eq!(cause, Cause::Software);
@@ -95,8 +86,8 @@ fn a_stack_that_overflows_is_reported_too() {
     assert!(restart.snapshot.is_some());
 }
 
-/// Tasks by their functions in `main.rs`, how the record calls them, and cycles that lead
-/// into the middle of a turn.
+/// Tasks by their functions in `main.rs`, their names in the record, and cycles into the middle
+/// of a poll.
 const TASKS: [(&str, &str, u64); 8] = [
     ("wheel_encoder", "wheel encoder", 90),
     ("preload_sensor", "preload sensor", 130),
@@ -108,28 +99,23 @@ const TASKS: [(&str, &str, u64); 8] = [
     ("link", "an operator's task or the host's line", 300),
 ];
 
-/// Runs the board up to the next turn of a task, and so many cycles into it.
-fn into_turn(board: &mut Board, task: &str, cycles: u64) {
-    let functions = &board.bench.machine().image().functions;
-    let polls: Vec<u32> = functions
-        .iter()
-        .filter(|function| function.name.contains("TaskStorage<F>::poll"))
-        .map(|function| function.range.start)
-        .collect();
+/// Runs the board to the next poll of a task, and so many cycles into it.
+fn into_poll(board: &mut Board, task: &str, cycles: u64) {
+    let polls = board.machine().polls().to_vec();
     for poll in polls {
         for _ in 0..60 {
-            let machine = board.bench.machine_mut();
+            let machine = board.machine();
             let until = (machine.now() / STEP + 1) * STEP;
             if machine.run_to(poll, until).expect("runs") {
                 if machine.task() != Some(task) {
                     break;
                 }
                 machine.run_on(machine.now() + cycles).expect("runs");
-                // A turn in which it only sets its timer anew is over by now.
+                // A poll that only restarts its timer is over by now.
                 if machine.place().contains("Executor::run") {
                     continue;
                 }
-                // Caught in a critical section, nothing but the watchdog gets through.
+                // A hang in a critical section is for the watchdog alone.
                 while machine.register(Register::Primask).expect("a register") & 1 != 0 {
                     machine.run_on(machine.now() + 5).expect("runs");
                 }
@@ -141,18 +127,18 @@ fn into_turn(board: &mut Board, task: &str, cycles: u64) {
             }
         }
     }
-    panic!("{task} has no turn");
+    panic!("{task} is not polled");
 }
 
 #[test]
 fn the_task_that_hangs_is_named_whichever_it_is() {
     for (task, name, cycles) in TASKS {
         let mut board = Board::moving();
-        into_turn(&mut board, task, cycles);
-        Fault::Caught.strike(board.bench.machine_mut()).expect("strikes");
+        into_poll(&mut board, task, cycles);
+        board.strike(Fault::Caught);
         let (cause, after, driven) = board.reset(250);
         assert_eq!(cause, Cause::Watchdog, "{task}");
-        // The time to be missed, and that of the watchdog.
+        // Time until the task is missed, and that of the watchdog.
         assert!(after <= 160, "{task}: {after} ms");
         assert_cut(&driven, driven.len().min(135));
         let restart = board.report();
@@ -166,27 +152,27 @@ fn the_task_that_hangs_is_named_whichever_it_is() {
 #[test]
 fn an_interrupt_that_never_ceases_ends_in_a_reset_that_names_the_starved_tick() {
     let mut board = Board::moving();
-    let at = board.bench.plant().truth().position_mm;
-    Fault::ButtonStorm.strike(board.bench.machine_mut()).expect("strikes");
+    let at = board.position_mm();
+    board.strike(Fault::ButtonStorm);
     let (cause, after, driven) = board.reset(150);
     assert_eq!(cause, Cause::Watchdog);
     assert!(after <= 115, "{after} ms");
-    // The system timer's interrupt gets through and cuts before the watchdog bites.
+    // The system timer's interrupt is more urgent and cuts before the watchdog resets.
     assert_cut(&driven, 85);
-    Fault::ButtonStorm.heal(board.bench.machine_mut());
+    Fault::ButtonStorm.switch(board.machine(), false).expect("a fault");
     let restart = board.report();
     let (pc, missed) = hang(&restart);
     assert_eq!(missed, MissedCheckIns::STARVED);
     assert_ne!(pc, 0);
-    let on = board.bench.plant().truth().position_mm - at;
-    assert!(on < 1.0, "it went on for {on} mm");
+    let on = board.position_mm() - at;
+    assert!(on < 1.0, "it moved on by {on} mm");
 }
 
 #[test]
 fn interrupts_masked_for_good_end_in_a_reset_with_what_the_drive_did() {
     let mut board = Board::moving();
     board.set(Register::Primask, 1);
-    Fault::Caught.strike(board.bench.machine_mut()).expect("strikes");
+    board.strike(Fault::Caught);
     let (cause, _, _) = board.reset(150);
     assert_eq!(cause, Cause::Watchdog);
     let restart = board.report();
@@ -197,18 +183,18 @@ fn interrupts_masked_for_good_end_in_a_reset_with_what_the_drive_did() {
 #[test]
 fn a_report_is_made_once() {
     let mut board = Board::moving();
-    Fault::ResetPin.strike(board.bench.machine_mut()).expect("strikes");
+    board.strike(Fault::ResetPin);
     let first = board.report();
     assert_eq!(first.reset, Reset::Pin);
     assert!(matches!(first.snapshot.and_then(|f| f.mode()), Some(Mode::Run(..))));
-    board.bench.machine_mut().restart(Cause::Software).expect("restarts");
+    board.machine().restart(Cause::Software).expect("restarts");
     let second = board.report();
     assert_eq!(second.reset, Reset::Software);
     assert_eq!(second.snapshot.and_then(|f| f.mode()), Some(Mode::Idle));
 }
 
 #[test]
-fn resets_at_random_instants_are_recorded_held_and_gone_on_from() {
+fn after_resets_at_random_instants_the_drive_holds_and_the_next_run_arrives() {
     if !hil_sim::testing::long() {
         return;
     }

@@ -32,7 +32,7 @@ fn main() -> ! {
     }
 }
 
-/// Tells the host: a breakpoint anywhere but in `main` ends the measurement.
+/// A breakpoint outside of `main` reports it to the host.
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
     loop {

@@ -53,7 +53,6 @@ pub struct Given {
 
 impl Given {
     /// The words as memory holds them.
-    #[must_use]
     pub const fn words(&self) -> [u32; 3] {
         [self.direction, self.speed as u32, self.wanted as u32]
     }
@@ -69,14 +68,12 @@ impl Given {
 }
 
 /// Gap by the shipping model, bits of Q15.16, mm.
-#[must_use]
 #[inline(always)]
 pub fn fixed_forward(model: &ReducedModel, given: &Given) -> i32 {
     model.gap(&given.point(), Q16::from_bits(given.wanted)).to_bits()
 }
 
 /// Force by the shipping model, bits of Q15.16, N.
-#[must_use]
 #[inline(always)]
 pub fn fixed_inverse(model: &ReducedModel, given: &Given) -> i32 {
     model.force(&given.point(), Q16::from_bits(given.wanted)).to_bits()
@@ -177,7 +174,6 @@ struct FloatDirection<N> {
 
 impl<N: Number> FloatModel<N> {
     /// The model of a rig.
-    #[must_use]
     pub fn of(rig: &Rig) -> Self {
         let formula = Formula::new(rig);
         let kind = |direction| Kind { direction, driven: true };
@@ -207,21 +203,18 @@ impl<N: Number> FloatModel<N> {
 
     /// Gap at this speed and force, bits of Q15.16, mm.
     #[inline(always)]
-    #[must_use]
     pub fn forward(&self, given: &Given) -> i32 {
         self.gap_mm(given).output()
     }
 
     /// Radial force that gives this gap at this speed, bits of Q15.16, N.
     #[inline(always)]
-    #[must_use]
     pub fn inverse(&self, given: &Given) -> i32 {
         self.radial_n(given).output()
     }
 
     /// Gap at this speed and force, mm; at the ends of the model the gap there.
     #[inline(always)]
-    #[must_use]
     pub fn gap_mm(&self, given: &Given) -> N {
         let (series, fast) = self.stiffening_at(given);
         let wanted = N::input(given.wanted);
@@ -242,7 +235,6 @@ impl<N: Number> FloatModel<N> {
 
     /// Radial force that gives this gap at this speed, N.
     #[inline(always)]
-    #[must_use]
     pub fn radial_n(&self, given: &Given) -> N {
         let (series, fast) = self.stiffening_at(given);
         let gap = N::input(given.wanted);

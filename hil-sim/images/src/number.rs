@@ -1,6 +1,6 @@
 //! Floating-point numbers that the reduced model is computed with.
 
-use core::ops::{Add, Div, Mul, Neg, Sub};
+use core::ops::{Add, Div, Mul, Sub};
 
 /// A floating-point number, on the core and on the host.
 pub trait Number:
@@ -10,7 +10,6 @@ pub trait Number:
     + Sub<Output = Self>
     + Mul<Output = Self>
     + Div<Output = Self>
-    + Neg<Output = Self>
 {
     /// The nearest number.
     fn of(value: f64) -> Self;

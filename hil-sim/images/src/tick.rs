@@ -1,4 +1,4 @@
-//! One control tick as words: what goes in, and what is looked at of what comes out.
+//! One control tick as words: its input, and the compared part of its output.
 
 use interstage::model::Plan;
 use interstage::sense::raw::{
@@ -9,25 +9,16 @@ use interstage::tick::{Input, Output};
 
 use crate::digest::Digest;
 
-/// A sensor's code with its tick.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Code {
-    /// 1 if the sensor has answered at all.
-    pub valid: u32,
-    /// The code.
-    pub code: u32,
-    /// When it was taken, ticks.
-    pub at: u32,
-}
+/// A sensor's code: 1 if the sensor has answered at all, the code, the tick at which it was taken.
+pub type Code = [u32; 3];
 
-/// What a tick is given, apart from the plan, which the image works out itself.
+/// Input of a tick without the plan, which the image computes itself.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Given {
     /// Time, ticks.
     pub now: u32,
-    /// Wheel, preload sensor, tread, arm.
+    /// Wheel encoder, preload sensor, compression sensor, arm angle.
     pub codes: [Code; 4],
     /// Codes of the bridges of drive and pre-tightener in low and high half, or
     /// [`NO_BRIDGES`].
@@ -43,7 +34,7 @@ pub struct Given {
 /// No conversion of the bridges' outputs.
 pub const NO_BRIDGES: u32 = u32::MAX;
 
-/// What is looked at of a tick's output.
+/// The compared part of a tick's output.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Taken {
@@ -55,7 +46,7 @@ pub struct Taken {
     pub preload: u32,
 }
 
-/// Which rig's controller an image is to build.
+/// The rig of the image's controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Preset {
@@ -70,13 +61,11 @@ impl Preset {
     pub const ALL: [Self; 2] = [Self::Prototype, Self::Fe];
 
     /// The preset of this name.
-    #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|preset| preset.name() == name)
     }
 
     /// Its name, as [`interstage::rig::Rig::named`] takes it.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Prototype => "prototype",
@@ -86,16 +75,16 @@ impl Preset {
 }
 
 fn code<T>(sample: Option<Sample<T>>, get: impl Fn(T) -> u16) -> Code {
-    sample.map_or(Code::default(), |s| Code { valid: 1, code: get(s.code).into(), at: s.at })
+    sample.map_or([0; 3], |s| [1, get(s.code).into(), s.at])
 }
 
 fn sample<T>(code: &Code, new: impl Fn(u16) -> T) -> Option<Sample<T>> {
-    (code.valid != 0).then(|| Sample { code: new(code.code as u16), at: code.at })
+    let [valid, code, at] = *code;
+    (valid != 0).then(|| Sample { code: new(code as u16), at })
 }
 
 impl Given {
-    /// The words of an input.
-    #[must_use]
+    /// From an input.
     pub fn of(input: &Input) -> Self {
         let frame = input.sensors;
         let position =
@@ -117,16 +106,15 @@ impl Given {
         }
     }
 
-    /// The input of these words with this plan.
-    #[must_use]
+    /// The input, with this plan.
     pub fn input(&self, plan: Option<Plan>) -> Input {
-        let [wheel, preload_sensor, tread, arm] = &self.codes;
+        let [wheel, preload, compression, arm] = &self.codes;
         Input {
             now: self.now,
             sensors: SensorFrame {
                 wheel_encoder: sample(wheel, EncoderCount::new),
-                preload_sensor: sample(preload_sensor, AdcCode::new),
-                compression_sensor: sample(tread, AdcCode::new),
+                preload_sensor: sample(preload, AdcCode::new),
+                compression_sensor: sample(compression, AdcCode::new),
                 arm_angle: sample(arm, AngleFrame::new),
                 bridges: (self.bridges != NO_BRIDGES).then_some(BridgeCodes {
                     drive: BridgeCode::new(self.bridges as u16),
@@ -140,36 +128,19 @@ impl Given {
         }
     }
 
-    /// The words as the image's memory holds them.
-    #[must_use]
+    /// The words in the image's memory.
     pub fn words(&self) -> [u32; 17] {
-        let [w, l, t, a] = self.codes;
-        let [head, tail] = [self.now, self.command];
-        [
-            head,
-            w.valid,
-            w.code,
-            w.at,
-            l.valid,
-            l.code,
-            l.at,
-            t.valid,
-            t.code,
-            t.at,
-            a.valid,
-            a.code,
-            a.at,
-            self.bridges,
-            tail,
-            self.overrun,
-            self.emergency_stop,
-        ]
+        let mut words = [0; 17];
+        words[0] = self.now;
+        words[1..13].copy_from_slice(self.codes.as_flattened());
+        let rest = [self.bridges, self.command, self.overrun, self.emergency_stop];
+        words[13..].copy_from_slice(&rest);
+        words
     }
 }
 
 impl Taken {
-    /// What is looked at of this output.
-    #[must_use]
+    /// From an output.
     pub fn of(output: &Output) -> Self {
         let digest = Digest::of(output);
         let duty = |command: interstage::units::MotorCommand| {
@@ -183,7 +154,6 @@ impl Taken {
     }
 
     /// From the words of the image's memory.
-    #[must_use]
     pub const fn from_words(words: [u32; 4]) -> Self {
         let [low, high, drive, preload] = words;
         Self { digest: [low, high], drive, preload }
@@ -220,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn the_words_lie_as_the_structure_does() {
+    fn the_words_have_the_order_of_the_structure() {
         assert_eq!(size_of::<Given>(), size_of_val(&Given::default().words()));
         assert_eq!(core::mem::offset_of!(Given, command), 14 * 4);
     }

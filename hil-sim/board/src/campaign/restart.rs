@@ -1,5 +1,5 @@
-//! A reset at a random instant: is it recorded, does the drive hold until it is commanded,
-//! are the stored parameters as they were, and does it arrive where it is then sent?
+//! A reset at a random instant: it must be recorded, the drive must hold until a command, the
+//! stored parameters must be unchanged, and the next run must arrive.
 
 use interstage::fault::Fault;
 use interstage::restart::{Reset, Restart, Stopped};
@@ -8,33 +8,31 @@ use interstage::tick::Event;
 use interstage::units::Direction;
 
 use super::Board;
-use crate::bench::{BenchError, Passed};
+use crate::bench::Passed;
 use crate::chip::map::PARAMETER_SETS;
+use crate::error::BoardError;
 use crate::peripherals::rcc::Cause;
-use crate::run::RunError;
 use hil_sim::plant::rig::Truth;
 use hil_sim::record::Run;
 use hil_sim::scenario::Scenario;
 
-/// Most motion from the reset to the command, mm: what the wheel runs on when its motor
-/// loses its power.
+/// Most motion from the reset to the command, mm: the wheel coasts when its motor loses power.
 const MOTION_MM: f64 = 0.5;
-/// Longest time from being caught to the cut of the bridges, s: where the tick is not what
-/// hangs, the run goes on under control until a task has been missed for 50 ms, and 80 ms
-/// more until the system timer finds the watchdog unfed.
+/// Longest time from a hang to the cut of the bridges, s. If another task than the tick hangs,
+/// the run stays under control until the task has been missed for 50 ms; 80 ms later the system
+/// timer finds that the watchdog was not refreshed.
 const HUNG_S: f64 = 0.131;
-/// Most change of the preload in the hold, parts of what it was: the rubber relaxes, the
-/// gears hold.
+/// Most change of the preload in the hold, relative: the rubber relaxes, the gears hold.
 const PRELOAD_PART: f64 = 0.25;
-/// The same whatever it was, N.
+/// The same, absolute, N.
 const PRELOAD_N: f64 = 3.0;
-/// Largest error of the recorded position, mm: the estimate's over a run, and a tick.
+/// Largest error of the recorded position, mm: that of the estimate, and a tick's travel.
 const RECORD_MM: f64 = 2.0;
 /// Oldest record, ticks before the reset.
 const RECORD_TICKS: usize = 3;
-/// From the supply's warning, or from being caught, to the reset, ticks.
+/// From the supply's warning, or from the hang, to the reset, ticks.
 const FALLS_TICKS: usize = 2;
-const BITE_TICKS: usize = 250;
+const WATCHDOG_TICKS: usize = 250;
 /// Largest distance from the end of travel on arrival, mm.
 const ARRIVED_MM: f64 = 1.0;
 /// Longest run to either end, ms.
@@ -42,25 +40,25 @@ const RUN_MS: u32 = 60_000;
 /// A fault hold takes no reset before it has lasted 100 ms.
 const HOLD_MS: u32 = 150;
 
-/// What is kept of the plant and the pins around a reset.
+/// The plant and the pins around a reset.
 pub(super) struct Hold {
-    /// What flash holds of parameters.
+    /// Bytes of the stored parameters.
     place: Vec<u8>,
     /// Position in each millisecond up to the reset, mm.
     positions_mm: Vec<f64>,
-    /// The plant when the fault came, behind the reset, and in the last millisecond before a
+    /// The plant when the fault struck, after the reset, and in the last millisecond before a
     /// command.
     struck: Option<Truth>,
     reset: Option<Truth>,
     last: Option<Truth>,
     /// A bridge was driven without a command.
     driven: bool,
-    /// A command has come since.
-    over: bool,
+    /// A command has been given since.
+    commanded: bool,
 }
 
 impl Hold {
-    /// Before the first millisecond, with this in the flash that holds parameters.
+    /// Before the first millisecond, with these stored parameters.
     pub(super) fn new(place: Vec<u8>) -> Self {
         Self {
             place,
@@ -69,25 +67,25 @@ impl Hold {
             reset: None,
             last: None,
             driven: false,
-            over: false,
+            commanded: false,
         }
     }
 
     /// Looks at a millisecond.
     pub(super) fn look(&mut self, board: &Board<'_>, passed: &Passed, command: Option<Command>) {
         let truth = board.bench.plant().truth();
-        if board.bench.struck_s().is_some() {
+        if board.bench.fault_times().struck_s.is_some() {
             self.struck.get_or_insert(*truth);
         }
         if board.restarts == 0 {
             self.positions_mm.push(truth.position_mm);
             return;
         }
-        self.over |= command.is_some();
-        if self.over {
+        self.commanded |= command.is_some();
+        if self.commanded {
             return;
         }
-        // In the millisecond of the reset there was drive.
+        // The bridges were driven in the millisecond of the reset.
         if self.last.is_some() {
             self.reset.get_or_insert(*truth);
             let drives = &passed.drives;
@@ -97,7 +95,7 @@ impl Hold {
         self.last = Some(*truth);
     }
 
-    /// What was not held.
+    /// Bounds that the hold violated.
     fn harms(&self, scenario: &Scenario) -> Vec<String> {
         let (Some(struck), Some(reset), Some(last)) = (self.struck, self.reset, self.last) else {
             return vec!["no hold after the reset".to_owned()];
@@ -119,20 +117,20 @@ impl Hold {
         bounds.into_iter().filter(|(good, _)| !good).map(|(_, harm)| harm).collect()
     }
 
-    /// What the record lacks.
+    /// Defect of the record.
     fn record(&self, cause: Cause, restart: Option<&Restart>) -> Option<String> {
         let Some(restart) = restart else { return Some("no record".to_owned()) };
         let fail = |what: &str| Some(format!("record: {what}: {restart}"));
         let (reset, later) = match cause {
             Cause::Power => (Reset::Power, FALLS_TICKS),
-            Cause::Watchdog => (Reset::Watchdog, BITE_TICKS),
+            Cause::Watchdog => (Reset::Watchdog, WATCHDOG_TICKS),
             Cause::Pin => (Reset::Pin, 0),
             Cause::Software => (Reset::Software, 0),
         };
         if restart.reset != reset {
             return fail("another reset");
         }
-        // Power that goes without a warning takes the record with it.
+        // A loss of power without a warning erases the record.
         let warned = matches!(restart.crash.map(|crash| crash.stopped), Some(Stopped::Supply));
         let Some(snapshot) = &restart.snapshot else {
             return (cause != Cause::Power).then(|| "record: nothing of the run".to_owned());
@@ -150,18 +148,18 @@ impl Hold {
             (Cause::Watchdog, Some(Stopped::Hang { missed, .. })) if !missed.is_nobody() => None,
             (Cause::Power, _) if warned => None,
             (Cause::Power, None) => fail("nothing of the supply"),
-            // Caught in a critical section nothing gets through that could name the task.
+            // A hang in a critical section masks the interrupt that names the task.
             (_, None) => None,
             (_, Some(_)) => fail("a crash that was none"),
         }
     }
 
-    /// What went wrong around the reset, and with the run that is commanded afterwards.
+    /// Harms around the reset and in the run after it, and the defect of the record.
     pub(super) fn judged(
         self,
         board: &mut Board<'_>,
         scenario: &Scenario,
-    ) -> Result<(Vec<String>, Option<String>), RunError> {
+    ) -> Result<(Vec<String>, Option<String>), BoardError> {
         let Some((_, cause)) = board.bench.machine().restarts().first().copied() else {
             return Ok((Vec::new(), Some("no reset".to_owned())));
         };
@@ -170,14 +168,14 @@ impl Hold {
             Event::Restart(restart) => Some(restart),
             _ => None,
         });
-        // Power that came up the first time is reported as well.
+        // The first power-up is reported as well.
         let first = restarts.next();
         let restart = restarts.next().or(first);
         let unrecorded = self.record(cause, restart.as_ref());
         let mut harms = self.harms(scenario);
-        harms.extend(go_on(board, scenario)?);
+        harms.extend(next_run(board, scenario)?);
         let mut stored = vec![0; self.place.len()];
-        board.bench.machine().peek(PARAMETER_SETS, &mut stored).map_err(BenchError::from)?;
+        board.bench.machine().peek(PARAMETER_SETS, &mut stored)?;
         if stored != self.place {
             harms.push("the stored parameters changed".to_owned());
         }
@@ -185,9 +183,9 @@ impl Hold {
     }
 }
 
-/// Sends the drive to an end, to the other one first if it says that it does not know its
-/// position; what went wrong.
-fn go_on(board: &mut Board<'_>, scenario: &Scenario) -> Result<Option<String>, RunError> {
+/// Runs the drive to an end, to the other one first if it does not know its position; returns
+/// the harm.
+fn next_run(board: &mut Board<'_>, scenario: &Scenario) -> Result<Option<String>, BoardError> {
     let mut direction = Direction::ALL[(scenario.run.seed % 2) as usize];
     for _ in 0..2 {
         let command = match direction {
@@ -199,8 +197,8 @@ fn go_on(board: &mut Board<'_>, scenario: &Scenario) -> Result<Option<String>, R
         for _ in 0..RUN_MS {
             board.step(None)?;
             left |= !matches!(board.mode, Mode::Idle | Mode::Complete(_));
-            let there = board.mode == Mode::Complete(direction);
-            if there || left && board.mode.is_at_rest() {
+            let arrived = board.mode == Mode::Complete(direction);
+            if arrived || left && board.mode.is_at_rest() {
                 break;
             }
         }
@@ -216,11 +214,8 @@ fn go_on(board: &mut Board<'_>, scenario: &Scenario) -> Result<Option<String>, R
         if board.mode != Mode::FaultHold(Fault::PositionUnknown) {
             break;
         }
-        // As its sentence says: the other direction.
-        direction = match direction {
-            Direction::Deploy => Direction::Retract,
-            Direction::Retract => Direction::Deploy,
-        };
+        // As the fault's text advises: the other direction.
+        direction = direction.opposite();
         for _ in 0..HOLD_MS {
             board.step(None)?;
         }

@@ -1,5 +1,4 @@
-//! The chip's pins as the board has them wired (docs/HARDWARE.md): what goes in, what
-//! comes out.
+//! The chip's pins as they are wired on the board (docs/HARDWARE.md): inputs and outputs.
 
 use super::Chip;
 use crate::peripherals::gpio::Role;
@@ -22,8 +21,8 @@ impl Pin {
     const SELECT: Self = Self(1, 10);
 }
 
-/// Pins that the world outside drives from the start, port by port, with their levels:
-/// emergency stop closed, button released.
+/// Pins with an external level at power-up, by port, and the levels: emergency stop closed,
+/// button released.
 pub(super) const OUTSIDE: [(u32, u32); 7] =
     [(0, 0), (1 << 12 | 1 << 7, 0), (1 << 13, 0), (0, 0), (0, 0), (0, 0), (0, 0)];
 
@@ -36,7 +35,7 @@ const ANGLE_FUNCTION: u32 = 5;
 /// Analogue inputs: pin and channel of ADC1 and of ADC2, then two of ADC3.
 const ANALOG: [(Pin, usize); 4] = [(Pin(2, 2), 8), (Pin(2, 3), 9), (Pin(1, 0), 12), (Pin(1, 1), 1)];
 
-/// What a motor's bridge is wired to.
+/// Wiring of a motor's bridge.
 struct Wired {
     pwm: Pin,
     pwm_function: u32,
@@ -66,7 +65,7 @@ const BRIDGES: [Wired; 2] = [
     },
 ];
 
-/// What a bridge's three lines have said over a stretch of time.
+/// Mean command of a bridge over some time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Motor {
     /// Mean signed duty, -1 to 1, over the time in which the bridge was enabled.
@@ -75,44 +74,44 @@ pub struct Motor {
     pub enabled: f64,
 }
 
-/// A bridge's lines, summed up.
+/// A bridge's lines, integrated over time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bridge {
     /// Signed duty and enable now.
     duty: f64,
     on: bool,
     since: u64,
-    /// Sums since they were last taken: duty times cycles, cycles enabled, from when.
-    turned: f64,
+    /// Integrals since `from`: duty times cycles, and cycles enabled.
+    duty_cycles: f64,
     enabled: u64,
     from: u64,
 }
 
 impl Bridge {
-    fn gather(&mut self, now: u64) {
+    fn integrate(&mut self, now: u64) {
         let cycles = now.saturating_sub(self.since);
         self.since = now;
         if self.on {
-            self.turned += self.duty * cycles as f64;
+            self.duty_cycles += self.duty * cycles as f64;
             self.enabled += cycles;
         }
     }
 
     fn set(&mut self, duty: f64, on: bool, now: u64) {
         if (duty, on) != (self.duty, self.on) {
-            self.gather(now);
+            self.integrate(now);
             (self.duty, self.on) = (duty, on);
         }
     }
 
     fn take(&mut self, now: u64) -> Motor {
-        self.gather(now);
-        let whole = now.saturating_sub(self.from).max(1);
+        self.integrate(now);
+        let cycles = now.saturating_sub(self.from).max(1);
         let motor = Motor {
-            duty: if self.enabled == 0 { 0.0 } else { self.turned / self.enabled as f64 },
-            enabled: self.enabled as f64 / whole as f64,
+            duty: if self.enabled == 0 { 0.0 } else { self.duty_cycles / self.enabled as f64 },
+            enabled: self.enabled as f64 / cycles as f64,
         };
-        (self.turned, self.enabled, self.from) = (0.0, 0, now);
+        (self.duty_cycles, self.enabled, self.from) = (0.0, 0, now);
         motor
     }
 }
@@ -129,33 +128,32 @@ impl Chip {
     }
 
     /// Level at a pin.
-    #[must_use]
     pub fn level(&self, pin: Pin) -> bool {
         self.ports[pin.0].level(pin.1)
     }
 
-    /// The world outside puts a pin to this level.
+    /// Applies an external level to a pin.
     pub fn drive(&mut self, pin: Pin, level: bool, now: u64) {
         self.ports[pin.0].drive(pin.1, Some(level));
         self.settle(now);
     }
 
-    /// The wheel encoder's lines have turned on to this position, in quarters of a line
-    /// pair, evenly over the last `cycles`.
+    /// Turns the wheel encoder's lines to this position, in quarters of a line pair, at a
+    /// constant rate over `cycles`.
     pub fn turn_wheel(&mut self, position: i64, cycles: u64) {
         let edges = self.wheel.abs_diff(position);
         for _ in 0..edges {
             self.wheel += (position - self.wheel).signum();
-            self.encoder.look(self.wheel_lines(), cycles / edges);
+            self.encoder.set_lines(self.wheel_lines(), cycles / edges);
         }
     }
 
-    /// The encoder's counter sees the levels that its lines have now.
+    /// Passes the present levels of the lines to the encoder's counter.
     pub(super) fn look_at_wheel(&mut self) {
-        self.encoder.look(self.wheel_lines(), u64::MAX);
+        self.encoder.set_lines(self.wheel_lines(), u64::MAX);
     }
 
-    /// What the encoder's counter has at its inputs: nothing before its pins are its own.
+    /// Levels at the inputs of the encoder's counter; low until its pins are configured.
     fn wheel_lines(&self) -> [bool; 2] {
         let wired = WHEEL.iter().all(|pin| self.role(*pin) == Role::Alternate(WHEEL_FUNCTION));
         let lines = lines_at(self.wheel);
@@ -182,7 +180,7 @@ impl Chip {
         }
     }
 
-    /// What drive and pre-tightener were driven with since this was last asked.
+    /// Mean commands of drive and pre-tightener since the last call.
     pub fn take_motors(&mut self, now: u64) -> [Motor; 2] {
         [self.bridges[0].take(now), self.bridges[1].take(now)]
     }
@@ -196,7 +194,7 @@ impl Chip {
         self.angle.exchange(frame, selected)
     }
 
-    /// What follows at the pins from a change inside.
+    /// Updates pins and bridges after a change of registers.
     pub(super) fn settle_pins(&mut self, now: u64) {
         if self.level(Pin::SELECT) {
             self.deselected = true;
@@ -208,14 +206,14 @@ impl Chip {
             let port = self.syscfg.port(*line) as usize;
             self.ports.get(port).is_some_and(|port| port.level(*line))
         });
-        let supply = u32::from(self.power.tells()) << super::SUPPLY_LINE;
-        self.exti.look(levels.fold(supply, |word, line| word | 1 << line));
+        let supply = u32::from(self.power.signals_low()) << super::SUPPLY_LINE;
+        self.exti.sample(levels.fold(supply, |word, line| word | 1 << line));
         for (index, wired) in BRIDGES.iter().enumerate() {
             let reaches = self.role(wired.stop) == Role::Alternate(wired.stop_function);
             let open = reaches && self.level(wired.stop);
-            self.motors[index].look(open, now);
-            let comes_out = self.role(wired.pwm) == Role::Alternate(wired.pwm_function);
-            let duty = if comes_out { self.motors[index].duty(0) } else { 0.0 };
+            self.motors[index].set_break(open, now);
+            let is_output = self.role(wired.pwm) == Role::Alternate(wired.pwm_function);
+            let duty = if is_output { self.motors[index].duty(0) } else { 0.0 };
             let out = |pin: Pin| self.ports[pin.0].puts_out(pin.1);
             let sense = if out(wired.forward) { 1.0 } else { -1.0 };
             let on = out(wired.enable);
@@ -242,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wheel_that_turns_before_its_pins_are_wired_is_not_counted_and_none_is_afterwards_lost() {
+    fn counting_begins_with_the_configuration_of_the_pins_and_loses_nothing() {
         for early in -6..=6 {
             let mut chip = Chip::new(0);
             chip.turn_wheel(early, 1_000_000);

@@ -1,4 +1,4 @@
-//! Accesses that no model has answered.
+//! Accesses that no model answered.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -7,11 +7,11 @@ use serde::Serialize;
 
 use crate::core::Access;
 
-/// Why an access went nowhere.
+/// Why an access was not answered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Why {
-    /// No model has the register, or this use of it.
+    /// No model implements the register, or this use of it.
     NoModel,
     /// The peripheral's clock is off.
     NoClock,
@@ -20,33 +20,36 @@ pub enum Why {
 /// Accesses of one kind to one register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Stray {
-    /// Peripheral, as the reference manual has it.
+    /// Name of the peripheral in the reference manual.
     pub peripheral: &'static str,
     /// Offset of the register; its address if the peripheral is unknown.
     pub register: u32,
-    /// Written, or else read.
+    /// A write, else a read.
     pub write: bool,
-    /// Why it went nowhere.
+    /// Why it was not answered.
     pub why: Why,
-    /// How often.
+    /// Number of accesses.
     pub count: u64,
-    /// Program counter of the first.
+    /// Program counter at the first.
     pub pc: u32,
 }
 
 impl fmt::Display for Stray {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let way = if self.write { "write to" } else { "read of" };
+        let access = if self.write { "write to" } else { "read of" };
         let why = match self.why {
             Why::NoModel => "not modelled",
             Why::NoClock => "clock off",
         };
         let Self { peripheral, register, count, pc, .. } = self;
-        write!(f, "{way} {peripheral} {register:#05x}: {why}, {count} times, first at {pc:#010x}")
+        write!(
+            f,
+            "{access} {peripheral} {register:#05x}: {why}, {count} times, first at {pc:#010x}"
+        )
     }
 }
 
-/// All of them.
+/// All unanswered accesses.
 #[derive(Clone, Debug, Default)]
 pub struct Strays(BTreeMap<(&'static str, u32, bool, Why), Stray>);
 
@@ -63,13 +66,12 @@ impl Strays {
         self.0.entry(key).or_insert(first).count += 1;
     }
 
-    /// Each, in the order of peripheral and register.
+    /// Each kind, in the order of peripheral and register.
     pub fn iter(&self) -> impl Iterator<Item = &Stray> {
         self.0.values()
     }
 
-    /// How many accesses there were.
-    #[must_use]
+    /// Number of all accesses.
     pub fn count(&self) -> u64 {
         self.0.values().map(|stray| stray.count).sum()
     }

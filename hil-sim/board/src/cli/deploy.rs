@@ -15,7 +15,7 @@ use crate::gdb;
 use crate::load::{Load, TITLE};
 use crate::log::Line;
 use crate::port::EmulatedPort;
-use crate::run::{self, Asked};
+use crate::run::{self, RunOptions};
 
 /// What `--json` prints.
 #[derive(serde::Serialize)]
@@ -50,10 +50,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         gdb::serve(&listener, &elf, &scenario, show).map_err(Failure::run)?;
         return Ok(Outcome::Good);
     }
-    let asked = Asked { rows: directory.is_some(), faults };
+    let options = RunOptions { rows: directory.is_some(), faults };
     let ran = {
         let _progress = (!args.log).then(|| progress::spinner(scenario.run.direction.name()));
-        run::run_with(&elf, &scenario, &asked, show).map_err(Failure::run)?
+        run::run_with(&elf, &scenario, &options, show).map_err(Failure::run)?
     };
     let missed = ran.load.missed();
     let mut files = Vec::new();

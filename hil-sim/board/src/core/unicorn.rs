@@ -1,8 +1,8 @@
 //! The core on Unicorn, with a counter of cycles in its block hook.
 //!
-//! Most of an instruction's cost is known when its block is first seen; what depends
-//! on operands or on a condition is added by a hook on just those instructions, which
-//! the engine calls only if the instruction is carried out.
+//! Most of an instruction's cost is known at the first execution of its block. A cost that
+//! depends on operands or on a condition is deferred to a hook on that instruction, which the
+//! engine calls only if the instruction is executed.
 
 mod count;
 mod hooks;
@@ -20,7 +20,7 @@ use super::{
 };
 use crate::timing;
 
-/// Memory of the board, or a stand-in for it.
+/// Memory of the board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Memory {
     /// First address.
@@ -47,7 +47,7 @@ pub struct Counted<'a> {
     pub base: u32,
     /// Everything from there on, data between the code included.
     pub bytes: &'a [u8],
-    /// Where in it instructions stand.
+    /// Address ranges of instructions.
     pub code: &'a [std::ops::Range<u32>],
 }
 
@@ -59,13 +59,13 @@ const BREAKPOINT: u32 = 7;
 const RETURN: u32 = 8;
 /// Bits of a return value that the program counter does not keep.
 const RETURN_BITS: u32 = 0xFFFF_FF01;
-/// `WFE`, `WFI` and `SEV`, as they stand in memory.
+/// `WFE`, `WFI` and `SEV` in memory.
 const WFE: [u8; 2] = [0x20, 0xBF];
 const WFI: [u8; 2] = [0x30, 0xBF];
 const SEV: [u8; 2] = [0x40, 0xBF];
 /// The state of thumb code outside of a conditional block, among the flags.
 const THUMB: u64 = 1 << 24;
-/// What the engine carries.
+/// The engine's data.
 struct Inside<B> {
     count: Count,
     bus: B,
@@ -75,7 +75,7 @@ struct Inside<B> {
 /// A Cortex-M4 on Unicorn.
 pub struct UnicornCore<B: Bus + 'static = NoBus> {
     engine: Unicorn<'static, Inside<B>>,
-    /// Hooks of late instructions, by their addresses.
+    /// Hooks of deferred instructions, by their addresses.
     own: Vec<(u32, UcHookId)>,
     /// The hook of all of them.
     common: Option<UcHookId>,
@@ -84,16 +84,14 @@ pub struct UnicornCore<B: Bus + 'static = NoBus> {
 /// The engine as a hook sees it.
 type Hooked<'a, B> = Unicorn<'a, Inside<B>>;
 
-/// Gives an engine's error its place.
+/// Names the request of an engine's error.
 fn engine<T>(what: &'static str, result: Result<T, impl std::fmt::Debug>) -> Result<T, CoreError> {
     result.map_err(|error| CoreError::Engine { what, why: format!("{error:?}") })
 }
 
 impl UnicornCore {
     /// A core with these memories and nothing else, counting the cycles of `counted`.
-    ///
-    /// # Errors
-    /// [`CoreError::Engine`] if the engine cannot be had or a memory overlaps.
+    /// Errors: [`CoreError::Engine`] if the engine cannot be had or a memory overlaps.
     pub fn new(memories: &[Memory], counted: &Counted<'_>) -> Result<Self, CoreError> {
         Self::with_bus(memories, counted, NoBus)
     }
@@ -101,9 +99,7 @@ impl UnicornCore {
 
 impl<B: Bus + 'static> UnicornCore<B> {
     /// A core with these memories and a bus, counting the cycles of `counted`.
-    ///
-    /// # Errors
-    /// As [`UnicornCore::new`].
+    /// Errors: as [`UnicornCore::new`].
     pub fn with_bus(memories: &[Memory], counted: &Counted<'_>, bus: B) -> Result<Self, CoreError> {
         let ranges = bus.ranges();
         let inside = Inside { count: Count::new(counted), bus, marks: Vec::new() };
@@ -139,9 +135,9 @@ impl<B: Bus + 'static> UnicornCore<B> {
         &mut self.engine.get_data_mut().bus
     }
 
-    /// Tells the engine what a page may be used for. Left to itself it takes every page
-    /// for code, and then looks for translated blocks behind every write to RAM, which
-    /// is most of its time. Here RAM holds data until the program runs in it.
+    /// Sets what the engine may use a page for. By default every page is code, and the engine
+    /// searches for translated blocks at every write to RAM, which takes most of its time.
+    /// Here RAM is data until the program executes in it.
     fn translate_pages(&mut self, memories: &[Memory]) -> Result<(), CoreError> {
         engine("take over pages", self.engine.ctl_set_tlb_type(TlbType::VIRTUAL))?;
         let data = memories.iter().filter(|m| m.access == Access::Data);
@@ -152,13 +148,12 @@ impl<B: Bus + 'static> UnicornCore<B> {
             if access == MemType::FETCH {
                 run.insert(page);
             } else {
-                // The engine has put its record of a conditional block to where the
-                // access stands. In the middle of a translated block it has to be empty,
-                // or what follows is skipped.
+                // The engine has set its IT state to that of the access. Inside a translated
+                // block it has to be empty, or the following instructions are skipped.
                 uc.reg_write(RegisterARM::EPSR, THUMB).ok()?;
             }
             let is_data = data.iter().any(|range| range.contains(&page)) && !run.contains(&page);
-            // What a memory does not allow, the engine finds out by itself.
+            // The engine checks the permissions of the memory itself.
             let perms = if is_data { Prot::READ | Prot::WRITE } else { Prot::ALL };
             Some(TlbEntry { paddr: address, perms })
         });
@@ -184,15 +179,15 @@ impl<B: Bus + 'static> UnicornCore<B> {
         engine("map the bus", mapped)
     }
 
-    /// Whether a wait for an interrupt stands there.
+    /// Whether the instruction there is `WFI`.
     fn is_wait(&self, address: u32) -> Result<bool, CoreError> {
         let mut code = [0; 2];
         self.read(address & !1, &mut code)?;
         Ok(code == WFI)
     }
 
-    /// Runs from `address` until a hook stops it, or it comes to `until` or has carried
-    /// out so many instructions, if that is not 0.
+    /// Runs from `address` until a hook stops it, it gets to `until`, or it has executed so many
+    /// instructions, if that is not 0.
     fn go(
         &mut self,
         address: u32,
@@ -203,7 +198,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
         let count = &mut self.engine.get_data_mut().count;
         count.stop = None;
         count.limit = count.meter.cycles.saturating_add(cycles);
-        // Where the host starts the program, nothing has branched.
+        // A start by the host is no branch.
         count.next = address & !1;
         let mut address = address;
         let ended = loop {
@@ -261,7 +256,7 @@ impl<B: Bus + 'static> Core for UnicornCore<B> {
         engine("write memory", self.engine.mem_write(address.into(), bytes))?;
         let count = &self.engine.get_data().count;
         if (address.wrapping_sub(count.base) as usize) < count.bytes.len() {
-            // Code that was translated already must not go on as it was.
+            // Discard the translation of changed code.
             let (from, to) = (u64::from(address & !0xFFF), u64::from(address) + bytes.len() as u64);
             return engine("forget code", self.engine.ctl_remove_cache(from, to));
         }
@@ -276,10 +271,10 @@ impl<B: Bus + 'static> Core for UnicornCore<B> {
     fn set_register(&mut self, register: Register, value: u32) -> Result<(), CoreError> {
         let uc = &mut self.engine;
         if register == Register::Xpsr {
-            // This name takes every field; the plain one leaves some out. Only the
-            // other makes the engine look at the new mode and state.
-            let whole = uc.reg_write(RegisterARM::XPSR_NZCVQG, value.into());
-            engine("set a register", whole)?;
+            // The first name sets every field; only the second makes the engine apply the new
+            // mode and state.
+            let all = uc.reg_write(RegisterARM::XPSR_NZCVQG, value.into());
+            engine("set a register", all)?;
             return engine("set flags", uc.reg_write(RegisterARM::APSR_NZCV, value.into()));
         }
         engine("set a register", uc.reg_write(name(register), value.into()))
@@ -294,7 +289,7 @@ impl<B: Bus + 'static> Core for UnicornCore<B> {
         engine("forget code", self.engine.ctl_flush_tb())?;
         let stop = self.go(address, 1, (u64::MAX, 1))?;
         engine("forget code", self.engine.ctl_flush_tb())?;
-        // The whole piece of code was counted of which one instruction was carried out.
+        // The hook counted the complete block, of which one instruction was executed.
         let count = &mut self.engine.get_data_mut().count;
         let instruction = count.at(address).map_or(0, |found| timing::extra(found.kind));
         count.meter.cycles = before.cycles + 1 + instruction;
@@ -323,9 +318,8 @@ impl<B: Bus + 'static> Core for UnicornCore<B> {
         self.engine.get_data().count.meter
     }
 
-    fn mark(&mut self, address: u32) -> Result<(), CoreError> {
+    fn mark(&mut self, address: u32) {
         self.engine.get_data_mut().count.mark(address & !1);
-        Ok(())
     }
 
     fn take_marks(&mut self, marks: &mut Vec<Mark>) {
@@ -333,7 +327,7 @@ impl<B: Bus + 'static> Core for UnicornCore<B> {
     }
 }
 
-/// What a processor makes of an engine's error.
+/// The fault for an engine's error.
 fn fault(error: uc_error) -> Fault {
     match error {
         uc_error::INSN_INVALID => Fault::Undefined,

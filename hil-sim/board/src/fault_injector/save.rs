@@ -1,4 +1,4 @@
-//! A host that saves parameters, and power or reset that comes while the board writes them.
+//! A host that saves parameters, while power is lost or the board is reset.
 
 use interstage::params::link::{FrameReader, ToBoard, ToHost, frame};
 use interstage::params::service::{PIECE, Piece, Request, Response};
@@ -6,19 +6,19 @@ use interstage::params::service::{PIECE, Piece, Request, Response};
 use crate::machine::Machine;
 use crate::peripherals::flash::Cut;
 
-/// How long it is waited before a save that was refused is tried again, ms.
-const AGAIN: u32 = 10;
+/// Time after which a refused save is tried again, ms.
+const RETRY: u32 = 10;
 
-/// How far a save has come.
+/// State of a save.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Saving {
-    /// Asked for; so far the board refuses, or has not answered.
-    Asked,
+    /// Requested; the board refuses, or has not answered yet.
+    Requested,
     /// The board writes.
     Writing,
-    /// The board restarted before it had said that all is stored.
-    BrokenOff,
-    /// The board has said that all is stored.
+    /// The board restarted before it confirmed the save.
+    Interrupted,
+    /// The board has confirmed the save.
     Stored,
 }
 
@@ -27,17 +27,17 @@ pub(super) struct Save {
     set: Vec<u8>,
     cut: Cut,
     armed: bool,
-    state: Saving,
-    /// Pieces that have been taken, the beginning among them.
-    taken: usize,
-    /// Number of the request that has not been answered yet.
+    pub(super) state: Saving,
+    /// Requests that the board has accepted.
+    accepted: usize,
+    /// Number of the request without an answer.
     open: Option<u16>,
     number: u16,
-    /// Milliseconds until it asks again.
+    /// Milliseconds until the next request.
     pause: u32,
-    /// Bytes on their way down.
-    down: Vec<u8>,
-    gatherer: FrameReader,
+    /// Bytes that the board has not taken yet.
+    pub(super) to_board: Vec<u8>,
+    reader: FrameReader,
     /// Restarts of the board before it began.
     restarts: usize,
 }
@@ -48,31 +48,27 @@ impl Save {
             set,
             cut,
             armed: false,
-            state: Saving::Asked,
-            taken: 0,
+            state: Saving::Requested,
+            accepted: 0,
             open: None,
             number: 0,
             pause: 0,
-            down: Vec::new(),
-            gatherer: FrameReader::new(),
+            to_board: Vec::new(),
+            reader: FrameReader::new(),
             restarts: machine.restarts().len(),
         }
     }
 
-    pub(super) const fn state(&self) -> Saving {
-        self.state
-    }
-
-    /// When the board restarted under it, in cycles.
+    /// Cycle at which the board restarted during the save.
     pub(super) fn cut_at(&self, machine: &Machine) -> Option<u64> {
         machine.restarts().get(self.restarts).map(|(at, _)| *at)
     }
 
-    /// A millisecond begins: what has come up, and how much of what was to go down went.
-    pub(super) fn turn(&mut self, machine: &mut Machine, came: &[u8], went: usize) {
-        self.down.drain(..went.min(self.down.len()));
-        for byte in came {
-            if let Some(ToHost::Parameters(number, response)) = self.gatherer.take(*byte)
+    /// A millisecond begins: the board took `sent` bytes and answered with `received`.
+    pub(super) fn exchanged(&mut self, machine: &mut Machine, received: &[u8], sent: usize) {
+        self.to_board.drain(..sent.min(self.to_board.len()));
+        for byte in received {
+            if let Some(ToHost::Parameters(number, response)) = self.reader.take(*byte)
                 && self.open == Some(number)
             {
                 self.open = None;
@@ -80,10 +76,10 @@ impl Save {
             }
         }
         if self.cut_at(machine).is_some() && self.state != Saving::Stored {
-            self.state = Saving::BrokenOff;
-            self.down.clear();
+            self.state = Saving::Interrupted;
+            self.to_board.clear();
         }
-        if matches!(self.state, Saving::BrokenOff | Saving::Stored) || self.open.is_some() {
+        if matches!(self.state, Saving::Interrupted | Saving::Stored) || self.open.is_some() {
             return;
         }
         if self.pause > 0 {
@@ -97,13 +93,8 @@ impl Save {
         let message = ToBoard::Parameters(self.number, self.request());
         if let Some(bytes) = frame(&message) {
             self.open = Some(self.number);
-            self.down.extend(bytes);
+            self.to_board.extend(bytes);
         }
-    }
-
-    /// The bytes that are to go down.
-    pub(super) fn says(&self) -> Vec<u8> {
-        self.down.clone()
     }
 
     fn pieces(&self) -> usize {
@@ -111,7 +102,7 @@ impl Save {
     }
 
     fn request(&self) -> Request {
-        match self.taken.checked_sub(1) {
+        match self.accepted.checked_sub(1) {
             None => Request::Begin { length: self.set.len() as u16 },
             Some(piece) if piece < self.pieces() => {
                 let from = piece * PIECE;
@@ -124,13 +115,13 @@ impl Save {
 
     fn take(&mut self, response: &Response) {
         if *response != Response::Done {
-            (self.taken, self.pause, self.state) = (0, AGAIN, Saving::Asked);
+            (self.accepted, self.pause, self.state) = (0, RETRY, Saving::Requested);
             return;
         }
         self.state = Saving::Writing;
-        if self.taken > self.pieces() {
+        if self.accepted > self.pieces() {
             self.state = Saving::Stored;
         }
-        self.taken += 1;
+        self.accepted += 1;
     }
 }

@@ -1,4 +1,4 @@
-//! What the debugger may do with the board.
+//! The debugger's access to the board.
 
 use gdbstub::common::Signal;
 use gdbstub::target::ext::base::BaseOps;
@@ -13,21 +13,21 @@ use gdbstub::target::{Target, TargetError, TargetResult};
 
 use super::arch::{Core, CortexM, PC};
 use super::{BREAK, Debugged};
-use crate::bench::BenchError;
 use crate::core::{CoreError, Register};
 use crate::elf::{FLASH, RAM};
+use crate::error::BoardError;
 
 /// The board or its plant failed.
 #[derive(Debug, thiserror::Error)]
 #[error(transparent)]
-pub(super) struct Fatal(pub(super) BenchError);
+pub(super) struct Fatal(pub(super) BoardError);
 
 fn fatal(error: CoreError) -> TargetError<Fatal> {
     TargetError::Fatal(Fatal(error.into()))
 }
 
-/// Whether these bytes lie in flash or RAM. Registers of peripherals are left alone: some
-/// change by being read.
+/// Whether these bytes are in flash or RAM. The debugger has no access to peripherals, some of
+/// which a read changes.
 fn is_memory(start: u32, bytes: usize) -> bool {
     [FLASH, RAM].iter().any(|memory| {
         let offset = start.wrapping_sub(memory.base) as usize;

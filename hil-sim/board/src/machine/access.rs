@@ -1,22 +1,18 @@
-//! What a debug probe may do to a board: memory, peripherals' registers, the core's.
+//! Access of a debug probe to memory and core registers.
 
 use super::Machine;
-use crate::core::{Access, Bus, Core, CoreError, Register};
+use crate::core::{Core, CoreError, Register};
 use crate::elf::FLASH;
 
 impl Machine {
     /// Reads memory, as a debug probe does.
-    ///
-    /// # Errors
-    /// [`CoreError::Engine`] if nothing lies there.
+    /// Errors: [`CoreError::Engine`] if nothing lies there.
     pub fn peek(&self, address: u32, into: &mut [u8]) -> Result<(), CoreError> {
         self.core.read(address, into)
     }
 
-    /// Where these bytes stand in flash, at their first place if there are several.
-    ///
-    /// # Errors
-    /// [`CoreError::Engine`] if flash cannot be read.
+    /// Address of the first occurrence of these bytes in flash.
+    /// Errors: [`CoreError::Engine`] if flash cannot be read.
     pub fn find(&self, bytes: &[u8]) -> Result<Option<u32>, CoreError> {
         let mut flash = vec![0; FLASH.size as usize];
         self.core.read(FLASH.base, &mut flash)?;
@@ -25,9 +21,7 @@ impl Machine {
     }
 
     /// A word of memory.
-    ///
-    /// # Errors
-    /// [`CoreError::Engine`] if nothing lies there.
+    /// Errors: [`CoreError::Engine`] if nothing lies there.
     pub fn word(&self, address: u32) -> Result<u32, CoreError> {
         let mut bytes = [0; 4];
         self.core.read(address, &mut bytes)?;
@@ -35,43 +29,24 @@ impl Machine {
     }
 
     /// Writes memory, as a debug probe does.
-    ///
-    /// # Errors
-    /// [`CoreError::Engine`] if nothing lies there.
+    /// Errors: [`CoreError::Engine`] if nothing lies there.
     pub fn poke(&mut self, address: u32, bytes: &[u8]) -> Result<(), CoreError> {
         self.core.write(address, bytes)
     }
 
-    /// Writes a word to a peripheral's register, as a debug probe does.
-    pub fn poke_register(&mut self, address: u32, value: u32) {
-        let access = Access { address, size: 4, pc: self.pc, now: self.now() };
-        self.chip_mut().write(access, value);
-    }
-
-    /// Reads a word from a peripheral's register, with what reading it does.
-    pub fn peek_register(&mut self, address: u32) -> u32 {
-        let access = Access { address, size: 4, pc: self.pc, now: self.now() };
-        self.chip_mut().read(access)
-    }
-
     /// A register of the core.
-    ///
-    /// # Errors
-    /// [`CoreError::Engine`] if the engine does not tell.
+    /// Errors: [`CoreError::Engine`] if the engine refuses.
     pub fn register(&self, register: Register) -> Result<u32, CoreError> {
         self.core.register(register)
     }
 
-    /// Where the program stands.
-    #[must_use]
+    /// The program counter.
     pub const fn pc(&self) -> u32 {
         self.pc
     }
 
     /// Sets a register of the core.
-    ///
-    /// # Errors
-    /// [`CoreError::Engine`] if the engine does not take it.
+    /// Errors: [`CoreError::Engine`] if the engine refuses.
     pub fn set_register(&mut self, register: Register, value: u32) -> Result<(), CoreError> {
         if register == Register::Pc {
             self.pc = value & !1;

@@ -1,11 +1,11 @@
-//! Exceptions as the core takes them and returns from them.
+//! Entry to and return from exceptions.
 
 use super::{Asleep, Machine, frame};
 use crate::core::{Core, CoreError, Register, passes};
 use crate::exceptions::number::HARD_FAULT;
 use crate::peripherals::system::Cause;
 
-/// Cycles of an exception's entry and return, and of going from one to the next.
+/// Cycles of an exception's entry and return, and of tail-chaining.
 const ENTRY: u64 = 12;
 const EXIT: u64 = 10;
 const CHAIN: u64 = 6;
@@ -22,20 +22,25 @@ impl Machine {
         Ok(passes(priority, primask, basepri, faultmask).then_some(number))
     }
 
-    /// Takes an exception; the program goes on at `back` afterwards. `chained`: straight
-    /// from another one, whose frame stands already.
+    /// Takes an exception that returns to `back`. `chained`: directly after another one, with
+    /// its frame.
     pub(super) fn enter(&mut self, number: u8, back: u32, chained: bool) -> Result<(), CoreError> {
-        let now = self.now();
-        if !chained {
-            if !frame::push(&mut self.core, back)? {
-                return self.stacking_failed(number, back);
-            }
-            let depth = self.chip().system.exceptions.depth();
-            frame::go_to_handler(&mut self.core, number, depth > 0)?;
-        } else {
+        if chained {
             frame::change_handler(&mut self.core, number)?;
+            return self.start_handler(number, CHAIN);
         }
-        self.core.pass(if chained { CHAIN } else { ENTRY });
+        if !frame::push(&mut self.core, back)? {
+            return self.stacking_failed(number, back);
+        }
+        let depth = self.chip().system.exceptions.depth();
+        frame::go_to_handler(&mut self.core, number, depth > 0)?;
+        self.start_handler(number, ENTRY)
+    }
+
+    /// Continues with the handler of an exception after so many cycles.
+    fn start_handler(&mut self, number: u8, cycles: u64) -> Result<(), CoreError> {
+        let now = self.now();
+        self.core.pass(cycles);
         self.chip_mut().system.exceptions.enter(number);
         self.profile.enter(now);
         let vector = self.chip().system.control.vector(number);
@@ -52,8 +57,8 @@ impl Machine {
             self.core.set_register(Register::Faultmask, 0)?;
         }
         if let Some(next) = self.takeable()? {
-            // The frame stays where it is.
-            frame::keep_return(&mut self.core, value)?;
+            // The frame stays on the stack.
+            self.core.set_register(Register::Lr, value)?;
             return self.enter(next, 0, true);
         }
         self.core.pass(EXIT);
@@ -68,7 +73,7 @@ impl Machine {
         Ok(())
     }
 
-    /// The program did at `at` what a processor faults on.
+    /// The program caused a fault at `at`.
     pub(super) fn fault(&mut self, cause: Cause, at: u32) -> Result<(), CoreError> {
         let masked = self.core.register(Register::Primask)? & 1 != 0;
         let system = &mut self.chip_mut().system;
@@ -96,16 +101,10 @@ impl Machine {
             self.lock_up();
             return Ok(());
         }
-        // The hard fault is taken with what there is of a stack: it does not return.
+        // The hard fault is taken without a frame: it does not return.
         let depth = self.chip().system.exceptions.depth();
-        let now = self.now();
         frame::go_to_handler(&mut self.core, HARD_FAULT, depth > 0)?;
-        self.core.pass(ENTRY);
-        self.chip_mut().system.exceptions.enter(HARD_FAULT);
-        self.profile.enter(now);
-        let vector = self.chip().system.control.vector(HARD_FAULT);
-        self.pc = self.word(vector)? & !1;
-        Ok(())
+        self.start_handler(HARD_FAULT, ENTRY)
     }
 
     pub(super) fn lock_up(&mut self) {

@@ -1,8 +1,7 @@
-//! What an exception leaves on the stack, and how the core goes there and back.
+//! The stack frame of an exception, its entry and its return.
 //!
 //! Source: ARMv7-M Architecture Reference Manual, B1.5.6 to B1.5.8. The floating-point
-//! registers are put into their place in the frame at once; the lazy way writes them
-//! later into the same place, so that only the moment differs.
+//! registers are stacked at once; lazy stacking writes them later to the same addresses.
 
 use crate::core::{Core, CoreError, Register};
 
@@ -10,7 +9,7 @@ use crate::core::{Core, CoreError, Register};
 const BASIC: u32 = 0x20;
 const EXTENDED: u32 = 0x68;
 
-/// In the saved status: the stack pointer was moved by four to stand at eight.
+/// In the saved status: the stack pointer was aligned to eight bytes.
 const ALIGNED: u32 = 1 << 9;
 /// In the status: state of a conditional block.
 const CONDITIONAL: u32 = 0x0600_FC00;
@@ -27,7 +26,7 @@ const RETURN_PROCESS: u32 = 1 << 2;
 const SAVED: [Register; 6] =
     [Register::R(0), Register::R(1), Register::R(2), Register::R(3), Register::R(12), Register::Lr];
 
-/// Pushes a frame that goes on at `back`. False if there is no memory for it.
+/// Pushes a frame that returns to `back`; false if there is no memory for it.
 pub(super) fn push(core: &mut impl Core, back: u32) -> Result<bool, CoreError> {
     let status = core.register(Register::Xpsr)?;
     let float = core.register(Register::Control)? & FLOAT_CONTEXT != 0;
@@ -52,7 +51,7 @@ pub(super) fn push(core: &mut impl Core, back: u32) -> Result<bool, CoreError> {
     Ok(core.write(base, &frame).is_ok())
 }
 
-/// Goes to handler mode for exception `number`; `nested` if another one is active.
+/// Enters handler mode for exception `number`; `nested` if another one is active.
 pub(super) fn go_to_handler(
     core: &mut impl Core,
     number: u8,
@@ -74,7 +73,7 @@ pub(super) fn go_to_handler(
     core.set_register(Register::Lr, back)
 }
 
-/// Goes to the handler of exception `number`, being in handler mode or going there.
+/// Sets the status for the handler of exception `number`.
 pub(super) fn change_handler(core: &mut impl Core, number: u8) -> Result<(), CoreError> {
     let status = core.register(Register::Xpsr)?;
     let status = status & !(CONDITIONAL | EXCEPTION) | THUMB | u32::from(number);
@@ -82,13 +81,8 @@ pub(super) fn change_handler(core: &mut impl Core, number: u8) -> Result<(), Cor
     core.set_register(Register::Xpsr, status)
 }
 
-/// The next handler returns to where this one would have.
-pub(super) fn keep_return(core: &mut impl Core, value: u32) -> Result<(), CoreError> {
-    core.set_register(Register::Lr, value)
-}
-
-/// Pops the frame that this return value says, and goes back to its mode. Returns where
-/// the program goes on; `None` if the frame does not lie in memory.
+/// Pops the frame of this return value, and restores its mode. Returns the address at which
+/// the program continues; `None` if the frame is not in memory.
 pub(super) fn pop(core: &mut impl Core, value: u32) -> Result<Option<u32>, CoreError> {
     let float = value & RETURN_BASIC == 0;
     let process = value & RETURN_PROCESS != 0;

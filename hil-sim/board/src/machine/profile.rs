@@ -1,23 +1,23 @@
-//! What the core spends its time on: each run of a task by itself, and sleep.
+//! The core's time: each poll of a task, and sleep.
 
-/// A task run once, up to where it waits again.
+/// A poll of a task, until it waits again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Poll {
-    /// Which task.
+    /// Number of the task.
     pub task: usize,
     /// Cycle at which it began.
     pub began: u64,
-    /// Cycles of its own, interrupts that preempted it left out.
+    /// Its own cycles, without interrupts that preempted it.
     pub cycles: u64,
 }
 
-/// Runs of tasks, and sleep.
+/// Polls of tasks, and sleep.
 #[derive(Clone, Debug)]
 pub struct Profile {
-    /// The task under way in thread mode and in each exception that is active.
+    /// The current poll in thread mode and in each active exception.
     levels: Vec<Option<Poll>>,
     polls: Vec<Poll>,
-    /// Up to here everything is booked.
+    /// Cycle up to which the time is booked.
     booked: u64,
     asleep: bool,
     slept: u64,
@@ -30,7 +30,7 @@ impl Default for Profile {
 }
 
 impl Profile {
-    /// Books the time since the last call on what was running.
+    /// Books the time since the last call on the running poll or on sleep.
     fn book(&mut self, now: u64) {
         let cycles = now.saturating_sub(self.booked);
         self.booked = self.booked.max(now);
@@ -55,7 +55,7 @@ impl Profile {
         }
     }
 
-    /// A task begins on the level that runs.
+    /// A poll begins on the running level.
     pub(super) fn begin(&mut self, task: usize, now: u64) {
         self.book(now);
         if let Some(level) = self.levels.last_mut() {
@@ -63,7 +63,7 @@ impl Profile {
         }
     }
 
-    /// The task on the level that runs waits again.
+    /// The poll on the running level ends.
     pub(super) fn end(&mut self, now: u64) {
         self.book(now);
         self.polls.extend(self.levels.last_mut().and_then(Option::take));
@@ -85,13 +85,12 @@ impl Profile {
         self.asleep = false;
     }
 
-    /// Runs of tasks that have ended since this was last asked.
+    /// Polls that have ended since the last call.
     pub fn take_polls(&mut self) -> Vec<Poll> {
         std::mem::take(&mut self.polls)
     }
 
     /// Cycles asleep.
-    #[must_use]
     pub const fn slept(&self) -> u64 {
         self.slept
     }

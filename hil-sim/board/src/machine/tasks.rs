@@ -1,10 +1,10 @@
-//! Which task runs: the executor calls each through the same kind of function, with a
+//! The running task: the executor polls each through the same kind of function, with a
 //! pointer into the task's own memory.
 
 use crate::elf::Loaded;
 use crate::thumb;
 
-/// Part of the name of the functions through which tasks are run.
+/// Part of the names of the functions through which tasks are polled.
 const POLL: &str = "TaskStorage<F>::poll";
 /// Name of the memory of a task inside the function that spawns it.
 const POOL: &str = "POOL";
@@ -14,9 +14,9 @@ const POOL: &str = "POOL";
 pub(super) struct Tasks {
     /// Address of a task's memory, and its name, in the order of the addresses.
     pools: Vec<(u32, String)>,
-    /// Where a task begins to run.
-    begins: Vec<u32>,
-    /// Where it is back in the executor.
+    /// Where a poll begins.
+    polls: Vec<u32>,
+    /// Where it has returned to the executor.
     ends: Vec<u32>,
 }
 
@@ -33,21 +33,26 @@ impl Tasks {
             .collect();
         pools.sort();
         let polls = image.functions.iter().filter(|f| f.name.contains(POLL));
-        let begins = polls.map(|f| f.range.start).collect();
-        Self { pools, begins, ends: ends(image) }
+        let polls = polls.map(|f| f.range.start).collect();
+        Self { pools, polls, ends: ends(image) }
     }
 
     /// Every address to be marked.
     pub(super) fn marks(&self) -> impl Iterator<Item = u32> {
-        self.begins.iter().chain(&self.ends).copied()
+        self.polls.iter().chain(&self.ends).copied()
     }
 
     /// The task that begins at `address` with this pointer; none where one ends.
     pub(super) fn begins(&self, address: u32, pointer: u32) -> Option<usize> {
-        if !self.begins.contains(&address) {
+        if !self.polls.contains(&address) {
             return None;
         }
         self.pools.partition_point(|(at, _)| *at <= pointer).checked_sub(1)
+    }
+
+    /// Where polls begin.
+    pub(super) fn polls(&self) -> &[u32] {
+        &self.polls
     }
 
     /// Names, by the numbers that [`Tasks::begins`] gives.
@@ -56,7 +61,7 @@ impl Tasks {
     }
 }
 
-/// Addresses behind calls through a register in the executor's functions.
+/// Addresses after calls through a register in the executor's functions.
 fn ends(image: &Loaded) -> Vec<u32> {
     let executor = |name: &str| {
         name.contains("Executor::poll")

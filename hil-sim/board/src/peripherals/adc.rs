@@ -2,9 +2,9 @@
 //! registers.
 //!
 //! Modelled: regulator, calibration, software start, regular conversions of one channel,
-//! single or without end, with sampling time and oversampling, requests to DMA, overrun; on a
-//! converter without regular ones, injected conversions of up to four channels.
-//! The code is taken from the pin when the conversion is done.
+//! single or continuous, with sampling time and oversampling, DMA requests, overrun; on a
+//! converter without regular ones, injected conversions of up to four channels. The code is
+//! that of the voltage at the end of the conversion.
 
 use super::registers::{Kept, Registers};
 use super::{Peripheral, Write};
@@ -51,7 +51,7 @@ const INJECTED_OVERSAMPLED: u32 = 1 << 1;
 const CALIBRATION: u64 = 116;
 
 /// IER, CFGR, CFGR2, sampling times, watchdogs, sequences, DIFSEL, CALFACT.
-const REGISTERS: [Kept; 17] = [
+const REGISTERS: [Kept; 14] = [
     Kept { offset: 0x04, reset: 0, mask: 0x7FF },
     Kept { offset: CFGR, reset: 0x8000_0000, mask: ALL },
     Kept { offset: CFGR2, reset: 0, mask: 0x0E0F_07FF },
@@ -64,11 +64,8 @@ const REGISTERS: [Kept; 17] = [
     Kept { offset: SQR1 + 4, reset: 0, mask: 0x1F7D_F7DF },
     Kept { offset: SQR1 + 8, reset: 0, mask: 0x1F7D_F7DF },
     Kept { offset: SQR1 + 12, reset: 0, mask: 0x7DF },
-    Kept { offset: JSQR, reset: 0, mask: ALL },
     Kept { offset: 0xB0, reset: 0, mask: 0x0007_FFFF },
     Kept { offset: 0xB4, reset: 0, mask: 0x007F_007F },
-    Kept { offset: 0xA0, reset: 0, mask: 0 },
-    Kept { offset: 0xA4, reset: 0, mask: 0 },
 ];
 
 /// One converter.
@@ -78,9 +75,9 @@ struct Converter {
     control: u32,
     flags: u32,
     data: u32,
-    /// Cycle at which the calibration or the conversion under way is done.
+    /// Cycle at which the current calibration or conversion is done.
     done: u64,
-    /// The injected conversion under way: its rank, and the cycle at which it is done.
+    /// The current injected conversion: rank, and cycle at which it is done.
     injected: Option<(usize, u64)>,
     injected_data: [u32; 4],
 }
@@ -88,7 +85,7 @@ struct Converter {
 impl Converter {
     fn new() -> Self {
         Self {
-            registers: Registers::new(&REGISTERS),
+            registers: Registers::new(&REGISTERS, &[JSQR], &[0xA0, 0xA4]),
             control: DEEP,
             flags: 0,
             data: 0,
@@ -133,9 +130,8 @@ impl Converter {
 
     /// The code of `sixteen`, the voltage at the pin in parts of 2^16 of the reference.
     ///
-    /// The noise at a real pin is worth more than a step of 12 bits, so that the mean of
-    /// many conversions has more than 12; here one conversion after the other reads
-    /// evenly through the step, and the sum is exact to one part of 2^16.
+    /// The noise at a real pin exceeds a step of 12 bits, so that the mean of many conversions
+    /// has a finer resolution; here the sum is exact to one part of 2^16.
     fn code(&self, rank: Option<usize>, sixteen: u16) -> u32 {
         let setting = self.registers.get(CFGR2);
         let sum = u64::from(sixteen) * self.ratio(rank) / 16;
@@ -216,7 +212,7 @@ impl Converter {
         }
     }
 
-    /// What was under way is done, with this at its channel.
+    /// The current calibration or conversion is done, with this voltage at its channel.
     fn finish(&mut self, voltage: u16, clock: u64) {
         let done = std::mem::replace(&mut self.done, u64::MAX);
         if self.control & CALIBRATE != 0 {
@@ -240,8 +236,7 @@ impl Converter {
         self.flags |= END | END_OF_SEQUENCE;
     }
 
-    /// Whether it asks DMA to take its code. After an overrun it does not until the flag
-    /// is cleared.
+    /// Whether it requests DMA; after an overrun not until the flag is cleared.
     const fn wants_dma(&self, config: u32) -> bool {
         config & DMA != 0 && self.flags & (END | OVERRUN) == END
     }
@@ -268,8 +263,7 @@ impl Adc {
         self.inputs[converter][channel] = sixteen;
     }
 
-    /// Whether a converter asks DMA to take its code.
-    #[must_use]
+    /// Whether a converter requests DMA.
     pub fn wants_dma(&self, converter: usize) -> bool {
         let converter = &self.converters[converter];
         converter.wants_dma(converter.registers.get(CFGR))
@@ -386,7 +380,7 @@ mod tests {
     }
 
     #[test]
-    fn a_code_that_no_one_took_is_kept_and_the_next_is_lost() {
+    fn a_code_that_is_not_read_is_kept_and_the_next_is_lost() {
         let mut adc = ready();
         for code in [1600, 3200] {
             adc.set_input(1, 9, code);
@@ -406,7 +400,7 @@ mod tests {
             let due = 1000 + round * 256 * 25 * 4;
             assert_eq!(adc.deadline(), due);
             adc.set_input(1, 9, 100 * round as u16);
-            // Looked after a little late: the next is none the later for it.
+            // A delayed update does not delay the next code.
             adc.advance(due + 17);
             assert_eq!(adc.read(0x100 + DR, due), Some(100 * round as u32));
         }
@@ -415,7 +409,7 @@ mod tests {
     }
 
     #[test]
-    fn after_an_overrun_it_asks_for_dma_only_when_the_flag_is_cleared() {
+    fn after_an_overrun_it_requests_dma_only_when_the_flag_is_cleared() {
         let mut adc = ready();
         write(&mut adc, 0x100 + CFGR, DMA | CONTINUOUS, 0).expect("modelled");
         write(&mut adc, 0x100 + CR, REGULATOR | START, 0).expect("modelled");

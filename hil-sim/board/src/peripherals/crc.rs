@@ -12,15 +12,14 @@ const INIT: u32 = 0x10;
 /// `POL`.
 const POL: u32 = 0x14;
 
-/// Bits of `CR`: start anew, size of the polynomial, order of the bits that go in and out.
+/// Bits of `CR`: reset, size of the polynomial, bit order of input and output.
 const RESET: u32 = 1;
 const SIZE: u32 = 3 << 3;
 const REVERSE_IN: u32 = 3 << 5;
 const REVERSE_OUT: u32 = 1 << 7;
 
-const REGISTERS: [Kept; 4] = [
-    Kept { offset: 0x04, reset: 0, mask: u32::MAX },
-    // Other sizes than 32 bits are not modelled: they read back as not taken.
+const REGISTERS: [Kept; 3] = [
+    // Polynomials of other sizes than 32 bits are not modelled.
     Kept { offset: CR, reset: 0, mask: REVERSE_IN | REVERSE_OUT },
     Kept { offset: INIT, reset: u32::MAX, mask: u32::MAX },
     Kept { offset: POL, reset: 0x04C1_1DB7, mask: u32::MAX },
@@ -35,12 +34,12 @@ pub struct CrcUnit {
 
 impl Default for CrcUnit {
     fn default() -> Self {
-        Self { registers: Registers::new(&REGISTERS), sum: u32::MAX }
+        Self { registers: Registers::new(&REGISTERS, &[0x04], &[]), sum: u32::MAX }
     }
 }
 
 impl CrcUnit {
-    /// Takes in the lowest `bits` of a word, the highest of them first.
+    /// Feeds the lowest `bits` of a word, the highest of them first.
     fn feed(&mut self, word: u32, bits: u32) {
         let word = match self.registers.get(CR) & REVERSE_IN {
             0 => word,
@@ -68,7 +67,7 @@ impl Peripheral for CrcUnit {
 
     fn write(&mut self, offset: u32, write: Write, _: u64) -> Option<()> {
         match offset {
-            // By the width of the access, which stands in the lowest bytes.
+            // An access feeds its own width, in the lowest bytes.
             DR => {
                 self.feed(write.ones(), write.mask.count_ones());
                 Some(())

@@ -1,7 +1,7 @@
 //! DMA1 with its request multiplexer.
 //!
-//! Transfers between a peripheral and memory, one for each request. Who asks and what
-//! is moved is the chip's; here are the channels, their counters and flags.
+//! Transfers between a peripheral and memory, one for each request: channels with their
+//! counters and flags. The chip connects the requests and moves the data.
 
 use super::registers::{Kept, Registers};
 use super::{Peripheral, Write};
@@ -32,8 +32,8 @@ struct Channel {
     left: u32,
     peripheral: u32,
     memory: u32,
-    /// Transfers that it was enabled for, and how many are done.
-    whole: u32,
+    /// Transfers at the enabling, and transfers done since.
+    total: u32,
     done: u32,
     flags: u32,
 }
@@ -43,7 +43,7 @@ struct Channel {
 pub struct Move {
     /// Channel, from 0.
     pub channel: usize,
-    /// From memory to the peripheral, or the other way.
+    /// From memory to the peripheral, else from the peripheral to memory.
     pub from_memory: bool,
     /// Address in memory and bytes there.
     pub memory: (u32, u32),
@@ -58,8 +58,7 @@ pub struct Dma {
 }
 
 impl Dma {
-    /// The transfer that channel `index` makes if it is asked now.
-    #[must_use]
+    /// The transfer that channel `index` makes at a request.
     pub fn due(&self, index: usize) -> Option<Move> {
         let c = self.channels.get(index)?;
         if c.config & ENABLE == 0 || c.left == 0 || c.config & MEMORY_TO_MEMORY != 0 {
@@ -78,7 +77,7 @@ impl Dma {
         })
     }
 
-    /// The channel's transfer is done, or has met an address where nothing lies.
+    /// The channel's transfer is done, or `found` no memory or register at its address.
     pub fn moved(&mut self, index: usize, found: bool) {
         let c = &mut self.channels[index];
         if !found {
@@ -88,22 +87,21 @@ impl Dma {
         }
         c.left -= 1;
         c.done += 1;
-        if c.done * 2 == c.whole {
+        if c.done * 2 == c.total {
             c.flags |= HALF;
         }
         if c.left == 0 {
             c.flags |= COMPLETE;
             if c.config & CIRCULAR != 0 {
-                c.left = c.whole;
+                c.left = c.total;
                 c.done = 0;
             }
         }
     }
 
-    /// Whether a channel asks for its interrupt.
-    #[must_use]
-    pub fn asks(&self, index: usize) -> bool {
-        // Flags and their enables stand at the same bits.
+    /// Whether a channel requests its interrupt.
+    pub fn requests(&self, index: usize) -> bool {
+        // Flags and their enables have the same bits.
         self.channels[index].flags & self.channels[index].config & (COMPLETE | HALF | ERROR) != 0
     }
 }
@@ -153,11 +151,11 @@ impl Peripheral for Dma {
                     return None;
                 }
                 if next & ENABLE != 0 && !enabled {
-                    (c.whole, c.done) = (c.left, 0);
+                    (c.total, c.done) = (c.left, 0);
                 }
                 c.config = next;
             }
-            // While a channel runs, these are its own.
+            // These are locked while the channel is enabled.
             _ if enabled => {}
             0x4 => c.left = write.onto(c.left) & 0xFFFF,
             0x8 => c.peripheral = write.onto(c.peripheral),
@@ -167,23 +165,9 @@ impl Peripheral for Dma {
     }
 }
 
-/// Request of a channel; number of requests let through at a time, and whether others
-/// hear of it.
+/// Request of a channel; requests of a synchronisation event, and event generation.
 const REQUEST: u32 = 0x7F;
 const COUNT: u32 = 0x1F << 19 | 1 << 9;
-/// Requests of every channel of both controllers, and the flags of synchronisation,
-/// which is not used.
-const MUX: [Kept; 18] = {
-    let mut kept = [Kept { offset: 0, reset: 0, mask: REQUEST | COUNT }; 18];
-    let mut index = 0;
-    while index < 16 {
-        kept[index].offset = 4 * index as u32;
-        index += 1;
-    }
-    kept[16] = Kept { offset: 0x80, reset: 0, mask: 0 };
-    kept[17] = Kept { offset: 0x84, reset: 0, mask: 0 };
-    kept
-};
 
 /// The request multiplexer.
 #[derive(Clone, Debug)]
@@ -191,13 +175,18 @@ pub struct Dmamux(Registers);
 
 impl Default for Dmamux {
     fn default() -> Self {
-        Self(Registers::new(&MUX))
+        let request = |channel| Kept { offset: 4 * channel, reset: 0, mask: REQUEST | COUNT };
+        // Without synchronisation its flags are zero.
+        Self(Registers::new(
+            &std::array::from_fn::<_, 16, _>(|at| request(at as u32)),
+            &[],
+            &[0x80, 0x84],
+        ))
     }
 }
 
 impl Dmamux {
     /// The request that channel `index` of DMA1 listens to; 0 is none.
-    #[must_use]
     pub fn request(&self, index: usize) -> u32 {
         self.0.get(4 * index as u32) & REQUEST
     }
@@ -209,8 +198,8 @@ impl Peripheral for Dmamux {
     }
 
     fn write(&mut self, offset: u32, write: Write, _: u64) -> Option<()> {
-        // Synchronisation and events of the multiplexer are not modelled; how many
-        // requests one of them would let through does not matter then.
+        // Synchronisation and event generation are not modelled; the count of their requests
+        // has no effect.
         if offset < 0x40 && write.ones() & !(REQUEST | COUNT) != 0 {
             return None;
         }
@@ -246,14 +235,14 @@ mod tests {
         assert_eq!(first.memory, (0x2000_0100, 2));
         assert_eq!((first.peripheral, first.from_memory), ((0x4001_300C, 2), false));
         dma.moved(2, true);
-        assert!(!dma.asks(2));
+        assert!(!dma.requests(2));
         assert_eq!(dma.due(2).expect("due").memory, (0x2000_0102, 2));
         dma.moved(2, true);
-        assert!(dma.asks(2));
+        assert!(dma.requests(2));
         assert_eq!(dma.due(2), None);
         assert_eq!(dma.read(ISR, 0), Some((COMPLETE | HALF | 1) << 8));
         write(&mut dma, IFCR, 1 << 8);
-        assert!(!dma.asks(2));
+        assert!(!dma.requests(2));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! A counter that two lines in quadrature drive: TIM5.
+//! A quadrature counter: TIM5.
 
 use super::registers::{Kept, Registers};
 use super::{Peripheral, Write};
@@ -16,24 +16,16 @@ const ALL: u32 = u32::MAX;
 /// Mode of the slave controller.
 const MODE: u32 = 7;
 
-const REGISTERS: [Kept; 12] = [
+const REGISTERS: [Kept; 5] = [
     Kept { offset: CR1, reset: 0, mask: 0x87 },
-    Kept { offset: 0x04, reset: 0, mask: 0 },
     Kept { offset: SMCR, reset: 0, mask: MODE },
-    Kept { offset: 0x0C, reset: 0, mask: 0 },
     Kept { offset: CCMR1, reset: 0, mask: 0xF3F3 },
-    Kept { offset: 0x1C, reset: 0, mask: 0 },
     Kept { offset: CCER, reset: 0, mask: 0x33 },
-    Kept { offset: CNT, reset: 0, mask: ALL },
-    Kept { offset: 0x28, reset: 0, mask: 0 },
     Kept { offset: ARR, reset: ALL, mask: ALL },
-    Kept { offset: 0x34, reset: 0, mask: 0 },
-    Kept { offset: 0x38, reset: 0, mask: 0 },
 ];
 
-/// Cycles that a line has to stand for an input filter (`ICxF`, `BKF`) to take it, with
-/// the filter's clock at the timer's own.
-#[must_use]
+/// Cycles for which a level has to last to pass an input filter (`ICxF`, `BKF`) with the
+/// timer's clock.
 pub const fn filter_cycles(setting: u32) -> u64 {
     let (divider, samples) = match setting & 0xF {
         0 => (1, 0),
@@ -65,14 +57,15 @@ pub struct Encoder {
 
 impl Encoder {
     /// After reset, with these levels at its inputs.
-    #[must_use]
     pub fn new(lines: [bool; 2]) -> Self {
-        Self { registers: Registers::new(&REGISTERS), lines }
+        Self {
+            registers: Registers::new(&REGISTERS, &[CNT], &[0x04, 0x0C, 0x1C, 0x28, 0x34, 0x38]),
+            lines,
+        }
     }
 
-    /// The lines change to these levels and stand so for `cycles`; what the filter does
-    /// not take is not seen.
-    pub fn look(&mut self, lines: [bool; 2], cycles: u64) {
+    /// The lines take these levels for `cycles`; the filter drops shorter ones.
+    pub fn set_lines(&mut self, lines: [bool; 2], cycles: u64) {
         for (line, level) in lines.into_iter().enumerate() {
             if level != self.lines[line] && cycles >= self.filter(line) {
                 self.lines[line] = level;
@@ -160,11 +153,11 @@ mod tests {
     fn every_edge_counts_up_and_down() {
         let mut encoder = ready(3);
         for quarters in 1..=10 {
-            encoder.look(at(quarters), 1000);
+            encoder.set_lines(at(quarters), 1000);
             assert_eq!(count(&mut encoder), quarters as u16);
         }
         for quarters in (-3..10).rev() {
-            encoder.look(at(quarters), 1000);
+            encoder.set_lines(at(quarters), 1000);
             assert_eq!(count(&mut encoder), quarters as u16);
         }
     }
@@ -174,27 +167,27 @@ mod tests {
         for mode in [1, 2] {
             let mut encoder = ready(mode);
             for quarters in 1..=8 {
-                encoder.look(at(quarters), 1000);
+                encoder.set_lines(at(quarters), 1000);
             }
             assert_eq!(count(&mut encoder), 4);
         }
     }
 
     #[test]
-    fn a_lost_line_stands_still_to_one_count() {
+    fn a_broken_line_holds_the_count_within_one() {
         let mut encoder = ready(3);
         for quarters in 1..=40 {
-            encoder.look([at(quarters)[0], false], 1000);
+            encoder.set_lines([at(quarters)[0], false], 1000);
         }
         assert!(matches!(count(&mut encoder), 0 | 1));
     }
 
     #[test]
-    fn what_is_shorter_than_the_filter_is_not_seen() {
+    fn the_filter_drops_shorter_levels() {
         let mut encoder = ready(3);
-        encoder.look(at(1), 255);
+        encoder.set_lines(at(1), 255);
         assert_eq!(count(&mut encoder), 0);
-        encoder.look(at(1), 256);
+        encoder.set_lines(at(1), 256);
         assert_eq!(count(&mut encoder), 1);
     }
 }

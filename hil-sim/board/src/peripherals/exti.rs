@@ -13,17 +13,9 @@ const PR: u32 = 0x14;
 const ALL: u32 = u32::MAX;
 
 /// Both banks of masks and edges; nothing here drives the lines of the second.
-const REGISTERS: [Kept; 10] = [
+const REGISTERS: [Kept; 2] = [
     Kept { offset: IMR, reset: 0x1F84_0000, mask: ALL },
-    Kept { offset: 0x04, reset: 0, mask: ALL },
-    Kept { offset: RTSR, reset: 0, mask: ALL },
-    Kept { offset: FTSR, reset: 0, mask: ALL },
     Kept { offset: 0x20, reset: 0xFF88, mask: ALL },
-    Kept { offset: 0x24, reset: 0, mask: ALL },
-    Kept { offset: 0x28, reset: 0, mask: ALL },
-    Kept { offset: 0x2C, reset: 0, mask: ALL },
-    Kept { offset: 0x30, reset: 0, mask: 0 },
-    Kept { offset: 0x34, reset: 0, mask: 0 },
 ];
 
 /// External interrupts.
@@ -36,22 +28,28 @@ pub struct Exti {
 
 impl Exti {
     /// After reset, with these levels at the lines.
-    #[must_use]
     pub fn new(levels: u32) -> Self {
-        Self { registers: Registers::new(&REGISTERS), pending: 0, levels }
+        Self {
+            registers: Registers::new(
+                &REGISTERS,
+                &[0x04, RTSR, FTSR, 0x24, 0x28, 0x2C],
+                &[0x30, 0x34],
+            ),
+            pending: 0,
+            levels,
+        }
     }
 
-    /// Levels of the lines as they stand now: 0 to 15 of pins, 16 of the supply's detector.
-    pub fn look(&mut self, levels: u32) {
+    /// Takes the present levels of the lines: 0 to 15 of pins, 16 of the voltage detector.
+    pub fn sample(&mut self, levels: u32) {
         let rising = levels & !self.levels & self.registers.get(RTSR);
         let falling = !levels & self.levels & self.registers.get(FTSR);
         self.pending |= rising | falling;
         self.levels = levels;
     }
 
-    /// Whether one of these lines asks for an interrupt.
-    #[must_use]
-    pub fn asks(&self, lines: u32) -> bool {
+    /// Whether one of these lines requests an interrupt.
+    pub fn requests(&self, lines: u32) -> bool {
         self.pending & self.registers.get(IMR) & lines != 0
     }
 }
@@ -80,17 +78,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_edge_asked_for_is_kept_until_it_is_cleared() {
+    fn the_selected_edge_is_kept_until_it_is_cleared() {
         let mut exti = Exti::new(0);
         let bit = 1 << 13;
         let all = |value| Write { value, mask: ALL };
         exti.write(RTSR, all(bit), 0).expect("modelled");
-        exti.look(bit);
-        assert!(!exti.asks(bit), "masked");
+        exti.sample(bit);
+        assert!(!exti.requests(bit), "masked");
         exti.write(IMR, all(bit), 0).expect("modelled");
-        assert!(exti.asks(0xFC00) && !exti.asks(0x3E0));
+        assert!(exti.requests(0xFC00) && !exti.requests(0x3E0));
         exti.write(PR, all(bit), 0).expect("modelled");
-        exti.look(0);
-        assert!(!exti.asks(bit), "the other edge was not asked for");
+        exti.sample(0);
+        assert!(!exti.requests(bit), "the other edge is not selected");
     }
 }

@@ -1,10 +1,8 @@
-//! The flash's interface: locks, programming by double words, erasing by pages and banks,
-//! and what goes wrong if its rules are broken. Wait states and caches are kept and cost
-//! nothing here.
+//! The flash's interface: locks, programming by double words, erasing by pages and banks, and
+//! its errors. Wait states and caches are kept and have no effect.
 //!
-//! A double word is 64 bits; it is written as two words, the one at the lower address
-//! first, into erased flash. The memory itself is the machine's: it says what stands where
-//! something is to be programmed, and takes over the [`Change`] when it is done.
+//! A double word of 64 bits is written as two words, the lower one first, into erased flash.
+//! The machine holds the memory: it supplies the old content, and applies the [`Change`].
 //!
 //! Source: RM0440, 5.3 (operations) and 5.7 (registers), dual bank as delivered.
 
@@ -49,18 +47,18 @@ const CONTROL: u32 = PROGRAM
 
 /// Of the status register.
 const END: u32 = 1;
-/// What stands there is not erased.
+/// The double word is not erased.
 const NOT_ERASED: u32 = 1 << 3;
 /// The second word does not belong to the first, or the first is not the lower one.
 const ALIGNMENT: u32 = 1 << 5;
 /// Written by bytes or halfwords.
 const SIZE: u32 = 1 << 6;
-/// Written without being told to program, or with an earlier error not cleared.
+/// Written without `PG`, or with an error that is not cleared.
 const SEQUENCE: u32 = 1 << 7;
 const ERRORS: u32 = NOT_ERASED | 1 << 4 | ALIGNMENT | SIZE | SEQUENCE | 1 << 1 | 1 << 8 | 1 << 9;
 const BUSY: u32 = 1 << 16;
 
-/// Of the whole flash: first address, bytes of a bank and of a page.
+/// First address of the flash, bytes of a bank and of a page.
 const BASE: u32 = 0x0800_0000;
 const BANK_BYTES: u32 = 256 * 1024;
 const PAGE_BYTES: u32 = 2 * 1024;
@@ -70,20 +68,19 @@ const PROGRAM_CYCLES: u64 = 82 * (HZ / 1_000_000);
 const ERASE_CYCLES: u64 = 22 * (HZ / 1000);
 
 /// ACR, ECCR, OPTR (as delivered: two banks).
-const REGISTERS: [Kept; 3] = [
+const REGISTERS: [Kept; 2] = [
     Kept { offset: 0x00, reset: 0x0004_0600, mask: 0x0004_7F0F },
-    Kept { offset: 0x18, reset: 0, mask: 0 },
     Kept { offset: 0x20, reset: 0xFFEF_F8AA, mask: 0 },
 ];
 
-/// What an operation makes of the memory.
+/// Change of the memory by an operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
-    /// A double word, or the part of it that was written before power went.
+    /// A double word, or the part of it that was written before power was lost.
     Programmed {
         /// Where.
         address: u32,
-        /// What stands there afterwards.
+        /// The new content.
         bytes: [u8; 8],
     },
     /// Every bit set.
@@ -95,11 +92,11 @@ pub enum Change {
     },
 }
 
-/// An operation under way.
+/// A current operation.
 #[derive(Clone, Copy, Debug)]
 struct Operation {
     change: Change,
-    /// What stands there before, of a double word.
+    /// Old content of a double word.
     before: [u8; 8],
     due: u64,
 }
@@ -108,13 +105,13 @@ struct Operation {
 #[derive(Clone, Debug)]
 pub struct Flash {
     registers: Registers,
-    /// Keys taken; none more is taken after a wrong one until reset.
+    /// Keys accepted; none is accepted after a wrong one until reset.
     keys: Option<usize>,
     control: u32,
     flags: u32,
     /// The lower word of a double word, and where.
     first: Option<(u32, u32)>,
-    /// A double word whose place has not been looked at yet.
+    /// A double word whose old content is not known yet.
     wanted: Option<(u32, [u8; 8])>,
     operation: Option<Operation>,
     finished: Option<Change>,
@@ -127,7 +124,7 @@ pub struct Flash {
 impl Default for Flash {
     fn default() -> Self {
         Self {
-            registers: Registers::new(&REGISTERS),
+            registers: Registers::new(&REGISTERS, &[], &[0x18]),
             keys: Some(0),
             control: 0xC000_0000,
             flags: 0,
@@ -167,16 +164,15 @@ impl Flash {
         self.first = None;
     }
 
-    /// Place of which it has to be known what stands there.
-    #[must_use]
-    pub fn asks_for(&self) -> Option<u32> {
+    /// Address whose content the interface needs.
+    pub fn needs(&self) -> Option<u32> {
         self.wanted.map(|(address, _)| address)
     }
 
-    /// What stands at the place that was asked for.
+    /// Supplies the content at the address that was needed.
     pub fn found(&mut self, before: [u8; 8], now: u64) {
         let Some((address, bytes)) = self.wanted.take() else { return };
-        // A double word of zeros may be written over anything.
+        // A double word of zeros overwrites any content.
         if before != [0xFF; 8] && bytes != [0; 8] {
             self.flags |= NOT_ERASED;
             return;
@@ -210,14 +206,13 @@ impl Flash {
         self.operation = Some(Operation { change, before, due });
     }
 
-    /// What the memory has to take over, once.
+    /// Takes the change of a finished operation.
     pub fn take_change(&mut self) -> Option<Change> {
         self.finished.take()
     }
 
-    /// Whether it asks for its interrupt.
-    #[must_use]
-    pub const fn asks(&self) -> bool {
+    /// Whether it requests its interrupt.
+    pub const fn requests(&self) -> bool {
         self.control & END_INTERRUPT != 0 && self.flags & END != 0
             || self.control & ERROR_INTERRUPT != 0 && self.flags & ERRORS != 0
     }
@@ -227,7 +222,7 @@ impl Flash {
     }
 
     fn write_control(&mut self, write: Write, now: u64) -> Option<()> {
-        // Locked or busy, it takes nothing.
+        // Locked or busy, it ignores writes.
         if self.control & LOCK != 0 || self.is_busy() {
             return Some(());
         }
@@ -280,7 +275,7 @@ impl Peripheral for Flash {
     fn advance(&mut self, now: u64) {
         if let Some(operation) = self.operation
             && operation.due <= now
-            && !self.goes_dark()
+            && !self.is_interrupted()
         {
             self.operation = None;
             self.finished = Some(operation.change);

@@ -14,15 +14,10 @@ const BRR: u32 = 0x28;
 const ALL: u32 = u32::MAX;
 
 /// Everything but input, set and reset; the values after reset are those of ports C to G.
-const REGISTERS: [Kept; 8] = [
+const REGISTERS: [Kept; 3] = [
     Kept { offset: MODER, reset: ALL, mask: ALL },
     Kept { offset: 0x04, reset: 0, mask: 0xFFFF },
-    Kept { offset: 0x08, reset: 0, mask: ALL },
-    Kept { offset: PUPDR, reset: 0, mask: ALL },
     Kept { offset: ODR, reset: 0, mask: 0xFFFF },
-    Kept { offset: AFRL, reset: 0, mask: ALL },
-    Kept { offset: AFRL + 4, reset: 0, mask: ALL },
-    Kept { offset: 0x1C, reset: 0, mask: 0 },
 ];
 
 /// What a pin does.
@@ -50,9 +45,8 @@ pub struct Gpio {
 impl Gpio {
     /// Port number `port` (0 is A) after reset; `driven` and `levels` say what the world
     /// outside does with the pins.
-    #[must_use]
     pub fn new(port: usize, driven: u32, levels: u32) -> Self {
-        let mut registers = Registers::new(&REGISTERS);
+        let mut registers = Registers::new(&REGISTERS, &[0x08, PUPDR, AFRL, AFRL + 4], &[0x1C]);
         // The pins of the debug probe.
         let (mode, speed, pull) = match port {
             0 => (0xABFF_FFFF, 0x0C00_0000, 0x6400_0000),
@@ -66,7 +60,6 @@ impl Gpio {
     }
 
     /// What a pin does.
-    #[must_use]
     pub fn role(&self, pin: u32) -> Role {
         match self.registers.get(MODER) >> (2 * pin) & 3 {
             0 => Role::Input,
@@ -81,7 +74,6 @@ impl Gpio {
 
     /// Level at a pin: what the program drives, or else the world outside, or else the
     /// pull resistor. What a peripheral puts out is not among these.
-    #[must_use]
     pub fn level(&self, pin: u32) -> bool {
         if self.role(pin) == Role::Output {
             return self.registers.get(ODR) >> pin & 1 != 0;
@@ -93,7 +85,6 @@ impl Gpio {
     }
 
     /// Whether the program drives this pin high.
-    #[must_use]
     pub fn puts_out(&self, pin: u32) -> bool {
         self.role(pin) == Role::Output && self.level(pin)
     }
@@ -106,7 +97,6 @@ impl Gpio {
     }
 
     /// What the world outside does: pins driven, and their levels.
-    #[must_use]
     pub const fn outside(&self) -> (u32, u32) {
         (self.driven, self.levels)
     }

@@ -19,11 +19,9 @@ pub struct Iwdg {
     reload: u32,
     window: u32,
     open: bool,
-    /// Cycle at which it bites, once started.
-    bites: u64,
+    /// Cycle at which it expires, once started.
+    expires: u64,
     started: bool,
-    /// How often it was fed.
-    pub fed: u64,
 }
 
 impl Default for Iwdg {
@@ -33,30 +31,27 @@ impl Default for Iwdg {
             reload: 0xFFF,
             window: 0xFFF,
             open: false,
-            bites: u64::MAX,
+            expires: u64::MAX,
             started: false,
-            fed: 0,
         }
     }
 }
 
 impl Iwdg {
-    /// Cycles from being fed to biting.
-    #[must_use]
+    /// Core cycles from a refresh to expiry.
     pub fn timeout(&self) -> u64 {
         let divider = 4_u64 << self.prescaler.min(6);
         (u64::from(self.reload) + 1) * divider * HZ / LSI_HZ
     }
 
-    /// Whether its time is over.
-    #[must_use]
-    pub const fn has_bitten(&self, now: u64) -> bool {
-        self.bites <= now
+    /// Whether it has expired.
+    pub const fn has_expired(&self, now: u64) -> bool {
+        self.expires <= now
     }
 
-    fn feed(&mut self, now: u64) {
+    fn refresh(&mut self, now: u64) {
         if self.started {
-            self.bites = now + self.timeout();
+            self.expires = now + self.timeout();
         }
     }
 }
@@ -64,7 +59,7 @@ impl Iwdg {
 impl Peripheral for Iwdg {
     fn read(&mut self, offset: u32, _: u64) -> Option<u32> {
         match offset {
-            // Writes are taken at once.
+            // A write is complete at once.
             KR | SR => Some(0),
             PR => Some(self.prescaler),
             RLR => Some(self.reload),
@@ -78,22 +73,19 @@ impl Peripheral for Iwdg {
             (KR, key) => {
                 self.open = key == 0x5555;
                 match key {
-                    0xAAAA => {
-                        self.fed += 1;
-                        self.feed(now);
-                    }
+                    0xAAAA => self.refresh(now),
                     0xCCCC => {
                         self.started = true;
-                        self.feed(now);
+                        self.refresh(now);
                     }
                     _ => {}
                 }
             }
             (PR, value) if self.open => self.prescaler = value & 7,
             (RLR, value) if self.open => self.reload = value & 0xFFF,
-            // A window that shuts out early feeding is not modelled.
+            // A window that forbids early refreshes is not modelled.
             (WINR, value) if value & 0xFFF != 0xFFF => return None,
-            (WINR, _) => self.feed(now),
+            (WINR, _) => self.refresh(now),
             (PR | RLR, _) => {}
             _ => return None,
         }
@@ -101,7 +93,7 @@ impl Peripheral for Iwdg {
     }
 
     fn deadline(&self) -> u64 {
-        self.bites
+        self.expires
     }
 }
 
@@ -114,16 +106,16 @@ mod tests {
     }
 
     #[test]
-    fn it_bites_after_its_time_unless_it_is_fed() {
+    fn it_expires_after_its_time_unless_it_is_refreshed() {
         let mut dog = Iwdg::default();
         for (offset, value) in [(KR, 0xCCCC), (KR, 0x5555), (PR, 0), (RLR, 799), (KR, 0xAAAA)] {
             write(&mut dog, offset, value, 0);
         }
         // 800 * 4 / 32 kHz = 100 ms.
         assert_eq!(dog.timeout(), HZ / 10);
-        assert!(!dog.has_bitten(HZ / 10 - 1) && dog.has_bitten(HZ / 10));
+        assert!(!dog.has_expired(HZ / 10 - 1) && dog.has_expired(HZ / 10));
         write(&mut dog, KR, 0xAAAA, HZ / 20);
-        assert!(!dog.has_bitten(HZ / 10));
+        assert!(!dog.has_expired(HZ / 10));
     }
 
     #[test]

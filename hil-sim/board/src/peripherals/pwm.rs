@@ -24,11 +24,9 @@ const BREAK_ENABLE: u32 = 1 << 12;
 const BREAK_HIGH: u32 = 1 << 13;
 const BREAK_FLAG: u32 = 1 << 7;
 
-const REGISTERS: [Kept; 17] = [
+const REGISTERS: [Kept; 15] = [
     Kept { offset: CR1, reset: 0, mask: PLAIN | 0x300 },
     Kept { offset: 0x04, reset: 0, mask: 0x7F77 },
-    Kept { offset: 0x08, reset: 0, mask: 0 },
-    Kept { offset: 0x0C, reset: 0, mask: 0 },
     Kept { offset: CCMR1, reset: 0, mask: 0x0101_FFFF },
     Kept { offset: CCMR1 + 4, reset: 0, mask: 0x0101_FFFF },
     Kept { offset: CCER, reset: 0, mask: 0x33_FFFF },
@@ -49,28 +47,27 @@ const REGISTERS: [Kept; 17] = [
 pub struct Pwm {
     registers: Registers,
     flags: u32,
-    /// Cycle at which the counter stood at zero, while it runs.
+    /// Cycle at which the counter was zero, while it runs.
     origin: u64,
     /// In use until the next update: prescaler, period, compares.
     prescaler: u64,
     period: u64,
     compares: [u32; 4],
-    /// Cycle of the update that takes over new values.
+    /// Cycle of the next update event.
     update: u64,
     /// Level at the break input.
     pin: bool,
     /// Cycle at which the filter takes the break input for active.
     breaks: u64,
-    /// A locked-up core breaks too.
+    /// The core has locked up, which breaks too.
     locked_up: bool,
 }
 
 impl Pwm {
     /// After reset, with this level at the break input.
-    #[must_use]
     pub fn new(pin: bool) -> Self {
         Self {
-            registers: Registers::new(&REGISTERS),
+            registers: Registers::new(&REGISTERS, &[], &[0x08, 0x0C]),
             flags: 0,
             origin: 0,
             prescaler: 1,
@@ -98,7 +95,6 @@ impl Pwm {
     }
 
     /// Part of the period in which channel `channel` (from 0) is high at its pin.
-    #[must_use]
     pub fn duty(&self, channel: u32) -> f64 {
         let enable = self.registers.get(CCER) >> (4 * channel);
         if self.registers.get(BDTR) & MOE == 0 || enable & 1 == 0 {
@@ -114,13 +110,13 @@ impl Pwm {
         if enable & 2 == 0 { high } else { 1.0 - high }
     }
 
-    /// The level at the break input's pin.
-    pub fn look(&mut self, pin: bool, now: u64) {
+    /// Sets the level at the break input's pin.
+    pub fn set_break(&mut self, pin: bool, now: u64) {
         self.pin = pin;
         self.rearm(now);
     }
 
-    /// The core has locked up and that is to stop the timer.
+    /// A lock-up of the core breaks the outputs.
     pub fn lock_up(&mut self, now: u64) {
         self.locked_up = true;
         self.breaks = now;
@@ -143,8 +139,8 @@ impl Pwm {
         }
     }
 
-    /// Takes over what was written since the last update.
-    fn take_over(&mut self) {
+    /// Loads the preloaded values: an update event.
+    fn load(&mut self) {
         self.prescaler = u64::from(self.registers.get(PSC)) + 1;
         self.period = u64::from(self.registers.get(ARR)) + 1;
         for channel in 0..4 {
@@ -158,7 +154,7 @@ impl Pwm {
         self.origin + ((now - self.origin) / cycles + 1) * cycles
     }
 
-    /// What a write to period or compare does: at once, or with the next update.
+    /// Applies a write to period or compare, at once or with the next update.
     fn renew(&mut self, offset: u32, now: u64) {
         let channel = offset.wrapping_sub(CCR1) / 4;
         let waits = match offset {
@@ -195,7 +191,7 @@ impl Peripheral for Pwm {
             CNT => self.origin = now.wrapping_sub(u64::from(write.value) * self.prescaler),
             EGR if write.ones() & !1 == 0 => {
                 if write.ones() & 1 != 0 {
-                    self.take_over();
+                    self.load();
                     self.origin = now;
                 }
             }
@@ -238,7 +234,7 @@ impl Peripheral for Pwm {
 
     fn advance(&mut self, now: u64) {
         if self.update <= now {
-            self.take_over();
+            self.load();
         }
         if self.breaks <= now && self.registers.get(BDTR) & MOE != 0 {
             self.registers.set(BDTR, self.registers.get(BDTR) & !MOE);
@@ -287,10 +283,10 @@ mod tests {
     }
 
     #[test]
-    fn an_open_emergency_stop_takes_the_outputs_away_and_keeps_them() {
+    fn an_open_emergency_stop_disables_the_outputs_until_they_are_enabled_again() {
         let mut timer = running();
         timer.advance(PERIOD);
-        timer.look(true, 10_000);
+        timer.set_break(true, 10_000);
         timer.advance(10_255);
         assert!(moe(&mut timer), "shorter than the filter");
         timer.advance(10_256);
@@ -298,7 +294,7 @@ mod tests {
         assert_eq!(timer.read(SR, 0), Some(BREAK_FLAG));
         write(&mut timer, BDTR, 0xFB400, 10_300);
         assert!(!moe(&mut timer), "still open");
-        timer.look(false, 20_000);
+        timer.set_break(false, 20_000);
         timer.advance(30_000);
         assert!(!moe(&mut timer), "closing gives nothing back");
         write(&mut timer, BDTR, 0xFB400, 40_000);
@@ -308,8 +304,8 @@ mod tests {
     #[test]
     fn a_bounce_does_not_stop_it() {
         let mut timer = running();
-        timer.look(true, 10_000);
-        timer.look(false, 10_200);
+        timer.set_break(true, 10_000);
+        timer.set_break(false, 10_200);
         timer.advance(11_000);
         assert!(moe(&mut timer));
     }

@@ -1,8 +1,8 @@
-//! Power control: the core's voltage stands as soon as it is asked for; and the supply, which
-//! may fall, with the detector that tells of it.
+//! Power control: the core's voltage settles at once; and the supply, which can fall, with
+//! its voltage detector.
 //!
-//! The detector compares at once: below its threshold, whichever is set, the supply is low,
-//! and the chip goes on until the supply is gone.
+//! The detector has no delay. A low supply is below every threshold that can be set; the
+//! chip runs until the supply is lost.
 //!
 //! Source: RM0440, 6.2.2 (programmable voltage detector) and 6.4 (registers).
 
@@ -17,26 +17,24 @@ const DETECTS: u32 = 1;
 /// Of SR2: the supply is below the threshold.
 const IS_LOW: u32 = 1 << 11;
 
-/// Cycles for which the board's capacitors carry the chip from the detector's threshold to the
-/// reset, at least; what the wiring has to hold to.
+/// Least core cycles for which the board's capacitors supply the chip between the detector's
+/// threshold and the reset: a requirement of the wiring.
 pub const HOLDS: u64 = HZ / 1000;
 
 /// CR1 to CR4, CR5 (with the boost of the main regulator), and the status registers,
-/// which report no change under way. Pull-ups in standby are not used.
-const REGISTERS: [Kept; 7] = [
+/// which report no change in progress. Pull-ups in standby are not used.
+const REGISTERS: [Kept; 5] = [
     Kept { offset: 0x00, reset: 0x200, mask: 0x4707 },
     Kept { offset: CR2, reset: 0, mask: 0xFFFF },
     Kept { offset: 0x08, reset: 0x8000, mask: 0xFFFF },
     Kept { offset: 0x0C, reset: 0, mask: 0xFFFF },
-    Kept { offset: 0x10, reset: 0, mask: 0 },
-    Kept { offset: SR2, reset: 0, mask: 0 },
     Kept { offset: 0x80, reset: 0x100, mask: 0x100 },
 ];
 
-/// How it goes on with a supply that has fallen below the threshold.
+/// What follows when the supply has been below the threshold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Then {
-    /// It is gone.
+    /// Power is lost.
     Gone,
     /// It comes back.
     Back,
@@ -46,36 +44,33 @@ pub enum Then {
 #[derive(Clone, Debug)]
 pub struct Pwr {
     registers: Registers,
-    /// The supply is low, up to this cycle, and then.
+    /// The supply is low until this cycle, and what follows.
     low: Option<(u64, Then)>,
 }
 
 impl Default for Pwr {
     fn default() -> Self {
-        Self { registers: Registers::new(&REGISTERS), low: None }
+        Self { registers: Registers::new(&REGISTERS, &[], &[0x10, SR2]), low: None }
     }
 }
 
 impl Pwr {
-    /// The supply falls below the threshold, for so long.
+    /// The supply is below the threshold until this cycle.
     pub const fn fall(&mut self, until: u64, then: Then) {
         self.low = Some((until, then));
     }
 
-    /// Line of the detector: on, and the supply low.
-    #[must_use]
-    pub fn tells(&self) -> bool {
+    /// Output of the detector: it is on and the supply is low.
+    pub fn signals_low(&self) -> bool {
         self.low.is_some() && self.registers.get(CR2) & DETECTS != 0
     }
 
-    /// Whether the supply is gone.
-    #[must_use]
+    /// Whether power is lost.
     pub fn is_gone(&self, now: u64) -> bool {
         self.low.is_some_and(|(until, then)| until <= now && then == Then::Gone)
     }
 
-    /// What a reset of the chip makes of it; only a supply that is gone comes back by that.
-    #[must_use]
+    /// State after a reset of the chip; a lost supply is back.
     pub fn after_reset(&self, now: u64) -> Self {
         let low = self.low.filter(|_| !self.is_gone(now));
         Self { low, ..Self::default() }
@@ -85,7 +80,7 @@ impl Pwr {
 impl Peripheral for Pwr {
     fn read(&mut self, offset: u32, _: u64) -> Option<u32> {
         let kept = self.registers.read(offset)?;
-        Some(if offset == SR2 && self.tells() { kept | IS_LOW } else { kept })
+        Some(if offset == SR2 && self.signals_low() { kept | IS_LOW } else { kept })
     }
 
     fn write(&mut self, offset: u32, write: Write, _: u64) -> Option<()> {
@@ -108,19 +103,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_low_supply_is_told_while_the_detector_is_on() {
+    fn a_low_supply_is_reported_while_the_detector_is_on() {
         let mut power = Pwr::default();
         power.fall(100, Then::Back);
         assert_eq!(power.read(SR2, 0), Some(0));
         power.write(CR2, Write { value: DETECTS, mask: u32::MAX }, 0).expect("modelled");
-        assert!(power.tells());
+        assert!(power.signals_low());
         assert_eq!((power.read(SR2, 0), power.deadline()), (Some(IS_LOW), 100));
         power.advance(100);
-        assert!(!power.tells() && !power.is_gone(100));
+        assert!(!power.signals_low() && !power.is_gone(100));
     }
 
     #[test]
-    fn a_supply_that_is_gone_comes_back_with_the_reset_alone() {
+    fn a_lost_supply_comes_back_with_the_reset_only() {
         let mut power = Pwr::default();
         power.fall(100, Then::Gone);
         power.advance(99);

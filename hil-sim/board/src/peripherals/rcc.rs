@@ -1,8 +1,5 @@
-//! Reset and clock control: oscillators that are ready as soon as they are on, clock
-//! and reset switches that are kept, and the cause of the last reset.
-//!
-//! Time is counted at the core's full clock from the start on; the few microseconds
-//! before the switch to it are not slower here.
+//! Reset and clock control: oscillators that are ready at once, clock and reset switches, and
+//! the cause of the last reset. The core runs at its full clock from the start.
 
 use super::registers::{Kept, Registers};
 use super::{Peripheral, Write};
@@ -19,50 +16,38 @@ const fn kept(offset: u32, reset: u32) -> Kept {
     Kept { offset, reset, mask: ALL }
 }
 
-/// CR, ICSCR, CFGR, PLLCFGR, CIER; the resets and clock enables of the buses; CCIPR,
-/// BDCR, CSR, CRRCR, CCIPR2.
-const REGISTERS: [Kept; 30] = [
+/// CIER; resets of the buses; clock enables that are zero after reset; CCIPR, CCIPR2.
+const WORDS: [u32; 13] =
+    [0x18, 0x28, 0x2C, 0x30, 0x38, 0x3C, 0x40, 0x4C, 0x50, 0x5C, 0x60, 0x88, 0x9C];
+/// Flags of ready clocks: none requests an interrupt.
+const READY: [u32; 2] = [0x1C, 0x20];
+/// CR, ICSCR, CFGR, PLLCFGR; the other clock enables; BDCR, CSR, CRRCR.
+const REGISTERS: [Kept; 15] = [
     Kept { offset: CR, reset: 0x500, mask: 0x010D_0500 },
     kept(0x04, 0x4000_0000),
     Kept { offset: CFGR, reset: 0x5, mask: 0x7F00_3FF3 },
     kept(0x0C, 0x1000),
-    kept(0x18, 0),
-    kept(0x28, 0),
-    kept(0x2C, 0),
-    kept(0x30, 0),
-    kept(0x38, 0),
-    kept(0x3C, 0),
-    kept(0x40, 0),
     kept(0x48, 0x100),
-    kept(0x4C, 0),
-    kept(0x50, 0),
     kept(0x58, 0x400),
-    kept(0x5C, 0),
-    kept(0x60, 0),
     kept(0x68, 0x130F),
     kept(0x6C, 0x0505_677F),
     kept(0x70, 0x111),
     kept(0x78, 0xD2FE_CD3F),
     kept(0x7C, 0x105),
     kept(0x80, 0x0437_F801),
-    kept(0x88, 0),
     Kept { offset: BDCR, reset: 0, mask: 0x0301_837D },
     Kept { offset: CSR, reset: 0, mask: 1 },
     Kept { offset: CRRCR, reset: 0, mask: 1 },
-    kept(0x9C, 0),
-    // Flags of ready clocks: none asks for an interrupt.
-    Kept { offset: 0x1C, reset: 0, mask: 0 },
-    Kept { offset: 0x20, reset: 0, mask: 0 },
 ];
 
 /// Why the chip started, as flags of `CSR`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
-    /// Power came up, or fell too low and came back.
+    /// Power-up, or a supply that was too low.
     Power,
     /// The independent watchdog.
     Watchdog,
-    /// The program or a debugger asked for it.
+    /// The program or a debugger requested it.
     Software,
     /// The reset pin was pulled from outside.
     Pin,
@@ -88,20 +73,20 @@ pub struct Rcc {
 }
 
 impl Rcc {
-    /// After a reset; `earlier` are the flags that no one has cleared yet.
-    #[must_use]
+    /// After a reset; `earlier` are the flags that were not cleared.
     pub fn new(cause: Cause, earlier: u32) -> Self {
-        Self { registers: Registers::new(&REGISTERS), flags: cause.flags() | earlier }
+        Self {
+            registers: Registers::new(&REGISTERS, &WORDS, &READY),
+            flags: cause.flags() | earlier,
+        }
     }
 
-    /// Flags of the causes of resets that no one has cleared.
-    #[must_use]
+    /// Flags of earlier resets that were not cleared.
     pub const fn flags(&self) -> u32 {
         self.flags
     }
 
     /// Whether the clock of a peripheral is on: bit of the enable register at `offset`.
-    #[must_use]
     pub fn is_clocked(&self, offset: u32, bit: u32) -> bool {
         self.registers.get(offset) >> bit & 1 != 0
     }
@@ -113,7 +98,7 @@ impl Peripheral for Rcc {
         Some(match offset {
             // HSI, HSE and PLL are ready when they are on.
             CR => value | (value & 0x0101_0100 & !0x100) << 1 | (value & 0x100) << 2,
-            // The clock in use is the one asked for.
+            // A selected clock is in use at once.
             CFGR => value | (value & 3) << 2,
             BDCR | CRRCR => value | (value & 1) << 1,
             CSR => value | (value & 1) << 1 | self.flags,

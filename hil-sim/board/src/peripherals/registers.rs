@@ -1,11 +1,11 @@
-//! Registers that only keep what is written.
+//! Registers that keep what is written to them.
 
-use super::Write;
+use super::{Peripheral, Write};
 
 /// A register that keeps some of its bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Kept {
-    /// Offset.
+    /// Offset in its block, bytes.
     pub offset: u32,
     /// Value after reset.
     pub reset: u32,
@@ -13,65 +13,57 @@ pub struct Kept {
     pub mask: u32,
 }
 
-/// Several of them.
+/// The value and the writable bits of each register, by word of the block.
 #[derive(Clone, Debug)]
-pub struct Registers {
-    kept: &'static [Kept],
-    values: Vec<u32>,
-    /// Place among these by word of the block, for those in its beginning.
-    places: [u8; WORDS],
-}
-
-/// Words of a block whose registers are found without a search.
-const WORDS: usize = 64;
-/// No register at a word.
-const NONE: u8 = u8::MAX;
+pub struct Registers(Vec<Option<(u32, u32)>>);
 
 impl Registers {
-    /// After reset.
-    #[must_use]
-    pub fn new(kept: &'static [Kept]) -> Self {
-        let mut places = [NONE; WORDS];
-        for (index, register) in kept.iter().enumerate() {
-            if let Some(place) = places.get_mut(register.offset as usize / 4) {
-                *place = index as u8;
-            }
+    /// After reset: these registers, those at the offsets `words`, which keep all 32 bits and
+    /// are zero after reset, and those at `zeros`, which read as zero and keep nothing.
+    pub fn new(kept: &[Kept], words: &[u32], zeros: &[u32]) -> Self {
+        let plain = |mask| move |offset: &u32| Kept { offset: *offset, reset: 0, mask };
+        let plain = words.iter().map(plain(u32::MAX)).chain(zeros.iter().map(plain(0)));
+        let mut registers = Vec::new();
+        for Kept { offset, reset, mask } in kept.iter().copied().chain(plain) {
+            let word = offset as usize / 4;
+            registers.resize(registers.len().max(word + 1), None);
+            registers[word] = Some((reset, mask));
         }
-        Self { kept, values: kept.iter().map(|register| register.reset).collect(), places }
+        Self(registers)
     }
 
-    fn index(&self, offset: u32) -> Option<usize> {
-        match self.places.get(offset as usize / 4) {
-            Some(&place) => (place != NONE && offset.is_multiple_of(4)).then_some(place.into()),
-            None => self.kept.iter().position(|register| register.offset == offset),
-        }
-    }
-
-    /// What a register holds; `None` if it is not among these.
-    #[must_use]
+    /// Value of a register; `None` if no model has it.
     pub fn read(&self, offset: u32) -> Option<u32> {
-        self.index(offset).map(|index| self.values[index])
+        self.0.get(offset as usize / 4).copied().flatten().map(|(value, _)| value)
     }
 
-    /// What a register holds, of which it is known that it is among these.
-    #[must_use]
+    /// Value of a register; 0 if no model has it.
     pub fn get(&self, offset: u32) -> u32 {
         self.read(offset).unwrap_or_default()
     }
 
-    /// Writes; `None` if it is not among these.
+    /// Writes the bits that can be written; `None` if no model has the register.
     pub fn write(&mut self, offset: u32, write: Write) -> Option<()> {
-        let index = self.index(offset)?;
-        let mask = write.mask & self.kept[index].mask;
-        self.values[index] = Write { mask, ..write }.onto(self.values[index]);
+        let (value, mask) = self.0.get_mut(offset as usize / 4)?.as_mut()?;
+        *value = Write { mask: write.mask & *mask, ..write }.onto(*value);
         Some(())
     }
 
-    /// Sets a register whatever may be written.
-    pub fn set(&mut self, offset: u32, value: u32) {
-        if let Some(index) = self.index(offset) {
-            self.values[index] = value;
+    /// Sets every bit of a register.
+    pub fn set(&mut self, offset: u32, new: u32) {
+        if let Some(Some((value, _))) = self.0.get_mut(offset as usize / 4) {
+            *value = new;
         }
+    }
+}
+
+impl Peripheral for Registers {
+    fn read(&mut self, offset: u32, _: u64) -> Option<u32> {
+        Self::read(self, offset)
+    }
+
+    fn write(&mut self, offset: u32, write: Write, _: u64) -> Option<()> {
+        Self::write(self, offset, write)
     }
 }
 
@@ -79,22 +71,19 @@ impl Registers {
 mod tests {
     use super::*;
 
-    const TWO: [Kept; 2] =
-        [Kept { offset: 0, reset: 0xF0, mask: 0xFF }, Kept { offset: 8, reset: 1, mask: u32::MAX }];
-
     #[test]
-    fn only_the_bits_that_can_be_written_change() {
-        let mut registers = Registers::new(&TWO);
-        assert_eq!(registers.write(0, Write { value: u32::MAX, mask: 0xFF0F }), Some(()));
-        assert_eq!(registers.read(0), Some(0xFF));
-        assert_eq!(registers.write(8, Write { value: 0x0200_0000, mask: 0xFF00_0000 }), Some(()));
-        assert_eq!(registers.get(8), 0x0200_0001);
-    }
-
-    #[test]
-    fn others_are_not_there() {
-        let mut registers = Registers::new(&TWO);
-        assert_eq!(registers.read(4), None);
-        assert_eq!(registers.write(4, Write { value: 0, mask: 0 }), None);
+    fn only_the_bits_that_can_be_written_change_and_other_registers_are_absent() {
+        let kept = [Kept { offset: 0, reset: 0xF0, mask: 0xFF }];
+        let mut registers = Registers::new(&kept, &[8], &[12]);
+        for (offset, value, mask, expected) in [
+            (0, u32::MAX, 0xFF0F, Some(0xFF)),
+            (8, 0x0200_0001, 0xFF00_0000, Some(0x0200_0000)),
+            (12, u32::MAX, u32::MAX, Some(0)),
+            (4, u32::MAX, u32::MAX, None),
+            (16, u32::MAX, u32::MAX, None),
+        ] {
+            let taken = registers.write(offset, Write { value, mask });
+            assert_eq!((taken, registers.read(offset)), (expected.map(|_| ()), expected));
+        }
     }
 }

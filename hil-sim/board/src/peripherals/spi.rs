@@ -22,11 +22,10 @@ const EMPTY: u32 = 1 << 1;
 const OVERRUN: u32 = 1 << 6;
 const BUSY: u32 = 1 << 7;
 
-const REGISTERS: [Kept; 4] = [
+const REGISTERS: [Kept; 3] = [
     Kept { offset: CR1, reset: 0, mask: PLAIN },
     Kept { offset: CR2, reset: 0x700, mask: 0x7FFF },
     Kept { offset: 0x10, reset: 7, mask: 0xFFFF },
-    Kept { offset: 0x1C, reset: 0, mask: 0 },
 ];
 
 /// A frame as it goes over the lines.
@@ -48,9 +47,9 @@ pub struct Spi {
     registers: Registers,
     /// Frame that waits to be sent.
     next: Option<u16>,
-    /// Frame on the lines, and when its last bit is over.
+    /// Frame on the lines, and the cycle at which it is complete.
     shifting: Option<(u16, u64)>,
-    /// Frame that has come.
+    /// Received frame.
     taken: Option<u16>,
     overrun: bool,
 }
@@ -58,7 +57,7 @@ pub struct Spi {
 impl Default for Spi {
     fn default() -> Self {
         Self {
-            registers: Registers::new(&REGISTERS),
+            registers: Registers::new(&REGISTERS, &[], &[0x1C]),
             next: None,
             shifting: None,
             taken: None,
@@ -80,20 +79,17 @@ impl Spi {
         2 << (self.registers.get(CR1) >> 3 & 7)
     }
 
-    /// Whether it asks DMA for the next word to send.
-    #[must_use]
+    /// Whether it requests the next word to send from DMA.
     pub fn wants_word(&self) -> bool {
         self.is_on() && self.registers.get(CR2) & 2 != 0 && self.next.is_none()
     }
 
-    /// Whether it asks DMA to take the word that has come.
-    #[must_use]
+    /// Whether it requests DMA to take the received word.
     pub fn has_word(&self) -> bool {
         self.registers.get(CR2) & 1 != 0 && self.taken.is_some()
     }
 
     /// Whether a frame is on the lines.
-    #[must_use]
     pub const fn is_busy(&self) -> bool {
         self.shifting.is_some()
     }
@@ -107,7 +103,7 @@ impl Spi {
         }
     }
 
-    /// The frame whose last bit is over, to be answered with [`Spi::answer`].
+    /// Takes the completed frame; [`Spi::answer`] gives its answer.
     pub fn over(&mut self, now: u64) -> Option<Frame> {
         let (sent, _) = self.shifting.filter(|(_, end)| *end <= now)?;
         self.shifting = None;
@@ -120,7 +116,7 @@ impl Spi {
         })
     }
 
-    /// What came in during the frame that is over.
+    /// Receives the answer to the completed frame.
     pub fn answer(&mut self, word: u16, now: u64) {
         if self.taken.is_some() {
             self.overrun = true;
@@ -155,7 +151,7 @@ impl Peripheral for Spi {
 
     fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
         match offset {
-            // Its flags go by reading.
+            // Reading clears its flags.
             SR => {}
             DR => {
                 if self.next.is_none() {
@@ -207,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn a_word_that_no_one_took_makes_the_next_an_overrun() {
+    fn a_word_after_one_that_was_not_read_is_an_overrun() {
         let mut spi = ready();
         for word in [1, 2] {
             write(&mut spi, DR, 0, 0);

@@ -25,19 +25,17 @@ pub struct Syscfg(Registers);
 
 impl Default for Syscfg {
     fn default() -> Self {
-        Self(Registers::new(&REGISTERS))
+        Self(Registers::new(&REGISTERS, &[], &[]))
     }
 }
 
 impl Syscfg {
     /// The port that line `line` (0 to 15) looks at: 0 is port A.
-    #[must_use]
     pub fn port(&self, line: u32) -> u32 {
         self.0.get(EXTICR + line / 4 * 4) >> (line % 4 * 4) & 0xF
     }
 
     /// Whether a locked-up core stops the motor timers.
-    #[must_use]
     pub fn lockup_breaks(&self) -> bool {
         self.0.get(CFGR2) & 1 != 0
     }

@@ -4,7 +4,6 @@
 //! Source: ARMv7-M Architecture Reference Manual, B3 and C1.
 
 mod control;
-mod counter;
 mod tick;
 
 use super::{Peripheral, Write};
@@ -12,8 +11,7 @@ use crate::exceptions::Exceptions;
 use crate::exceptions::number::INTERRUPT;
 
 pub use control::{Cause, Control};
-pub use counter::Counter;
-pub use tick::SysTick;
+pub use tick::{Counter, SysTick};
 
 /// The system control space from 0xE000_E000 on.
 #[derive(Clone, Debug)]
@@ -28,7 +26,6 @@ pub struct System {
 
 impl System {
     /// After reset, with the vectors at `vectors`.
-    #[must_use]
     pub fn new(vectors: u32) -> Self {
         Self {
             exceptions: Exceptions::default(),

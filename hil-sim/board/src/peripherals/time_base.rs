@@ -1,7 +1,7 @@
 //! A counter with four compare registers that keeps time: TIM2.
 //!
-//! It counts up with prescaler and reload, and raises a flag when it meets a compare
-//! register or starts over. Its registers are 32 bits wide.
+//! It counts up with prescaler and reload, and sets a flag when it reaches a compare
+//! register or overflows. Its registers are 32 bits wide.
 
 use super::registers::{Kept, Registers};
 use super::{Peripheral, Write};
@@ -17,26 +17,18 @@ const CCR1: u32 = 0x34;
 
 const ALL: u32 = u32::MAX;
 const ENABLE: u32 = 1;
-/// `URS`: only an overflow raises the update flag.
+/// `URS`: only an overflow sets the update flag.
 const OVERFLOW_ONLY: u32 = 1 << 2;
 /// Update and the four compares.
 const FLAGS: u32 = 0x1F;
 /// Directions, one-pulse mode, alternate clocks: none of them modelled.
 const PLAIN: u32 = ENABLE | 1 << 1 | OVERFLOW_ONLY | 1 << 7;
 
-const REGISTERS: [Kept; 12] = [
+const REGISTERS: [Kept; 4] = [
     Kept { offset: CR1, reset: 0, mask: PLAIN },
-    Kept { offset: 0x04, reset: 0, mask: 0 },
-    Kept { offset: 0x08, reset: 0, mask: 0 },
     Kept { offset: DIER, reset: 0, mask: FLAGS },
-    Kept { offset: 0x18, reset: 0, mask: 0 },
-    Kept { offset: 0x1C, reset: 0, mask: 0 },
     Kept { offset: PSC, reset: 0, mask: 0xFFFF },
     Kept { offset: ARR, reset: ALL, mask: ALL },
-    Kept { offset: CCR1, reset: 0, mask: ALL },
-    Kept { offset: CCR1 + 4, reset: 0, mask: ALL },
-    Kept { offset: CCR1 + 8, reset: 0, mask: ALL },
-    Kept { offset: CCR1 + 12, reset: 0, mask: ALL },
 ];
 
 /// The timer.
@@ -44,22 +36,26 @@ const REGISTERS: [Kept; 12] = [
 pub struct TimeBase {
     registers: Registers,
     flags: u32,
-    /// Cycle at which the counter stood at zero, while it runs.
+    /// Cycle at which the counter was zero, while it runs.
     origin: u64,
-    /// Counts up to which the flags are right.
+    /// Count up to which the flags are up to date.
     seen: u64,
-    /// Prescaler in use: a new one counts from the next start-over or update event.
+    /// Prescaler in use: a new one is active from the next overflow or update event.
     prescaler: u64,
-    /// Cycle at which a flag is raised next that is not up.
+    /// Cycle at which the next cleared flag is set.
     flag_due: u64,
-    /// The same of flags that ask for the interrupt.
+    /// The same of flags that request the interrupt.
     due: u64,
 }
 
 impl Default for TimeBase {
     fn default() -> Self {
         Self {
-            registers: Registers::new(&REGISTERS),
+            registers: Registers::new(
+                &REGISTERS,
+                &[CCR1, CCR1 + 4, CCR1 + 8, CCR1 + 12],
+                &[0x04, 0x08, 0x18, 0x1C],
+            ),
             flags: 0,
             origin: 0,
             seen: 0,
@@ -84,7 +80,7 @@ impl TimeBase {
         if self.runs() { (now - self.origin) / self.prescaler } else { self.seen }
     }
 
-    /// The first count behind `after` at which the counter shows `value`.
+    /// The first count after `after` at which the counter shows `value`.
     fn meets(&self, after: u64, value: u32) -> Option<u64> {
         let (period, value) = (self.period(), u64::from(value));
         if value >= period {
@@ -94,13 +90,13 @@ impl TimeBase {
         Some(if first > after { first } else { first + period })
     }
 
-    /// Value that raises flag `bit`: the counter itself starting over, or a compare.
+    /// Value that sets flag `bit`: zero for the overflow, or a compare.
     fn value_of(&self, bit: u32) -> u32 {
         if bit == 0 { 0 } else { self.registers.get(CCR1 + 4 * (bit - 1)) }
     }
 
     /// Brings the flags up to date.
-    fn look(&mut self, now: u64) {
+    fn update(&mut self, now: u64) {
         let counts = self.counts(now);
         if now >= self.flag_due {
             for bit in 0..5 {
@@ -109,13 +105,13 @@ impl TimeBase {
                 }
             }
             self.seen = counts;
-            self.look_ahead();
+            self.schedule();
         }
         self.seen = counts;
     }
 
-    /// Works out when flags are raised next.
-    fn look_ahead(&mut self) {
+    /// Computes when the next flags are set.
+    fn schedule(&mut self) {
         let next = |flags: u32| {
             let bits = (0..5).filter(|bit| flags >> bit & 1 != 0);
             let counts = bits.filter_map(|bit| self.meets(self.seen, self.value_of(bit))).min();
@@ -128,7 +124,7 @@ impl TimeBase {
         };
     }
 
-    /// Puts the counter to `value` at `now`.
+    /// Sets the counter to `value` at `now`.
     fn place(&mut self, value: u64, now: u64) {
         self.origin = now.wrapping_sub(value * self.prescaler);
         self.seen = value;
@@ -136,7 +132,7 @@ impl TimeBase {
 
     /// Changes a register.
     fn put(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
-        self.look(now);
+        self.update(now);
         match offset {
             SR => self.flags &= !(write.mask & !write.value),
             CNT => self.place(u64::from(write.value), now),
@@ -162,16 +158,15 @@ impl TimeBase {
         Some(())
     }
 
-    /// Whether it asks for its interrupt.
-    #[must_use]
-    pub fn asks(&self) -> bool {
+    /// Whether it requests its interrupt.
+    pub fn requests(&self) -> bool {
         self.flags & self.registers.get(DIER) != 0
     }
 }
 
 impl Peripheral for TimeBase {
     fn read(&mut self, offset: u32, now: u64) -> Option<u32> {
-        self.look(now);
+        self.update(now);
         match offset {
             CNT => Some((self.counts(now) % self.period()) as u32),
             SR => Some(self.flags),
@@ -182,7 +177,7 @@ impl Peripheral for TimeBase {
 
     fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
         let taken = self.put(offset, write, now);
-        self.look_ahead();
+        self.schedule();
         taken
     }
 
@@ -191,7 +186,7 @@ impl Peripheral for TimeBase {
     }
 
     fn advance(&mut self, now: u64) {
-        self.look(now);
+        self.update(now);
     }
 }
 
@@ -224,19 +219,19 @@ mod tests {
     }
 
     #[test]
-    fn a_compare_asks_when_it_is_met_and_not_before() {
+    fn a_compare_requests_its_interrupt_when_it_is_reached() {
         let mut timer = running();
         write(&mut timer, CCR1 + 4, 500, 1000);
         write(&mut timer, DIER, 1 << 2, 1000);
         let due = 1000 + 170 * 500;
         assert_eq!(timer.deadline(), due);
         timer.advance(due - 1);
-        assert!(!timer.asks());
+        assert!(!timer.requests());
         timer.advance(due);
-        assert!(timer.asks());
-        assert_eq!(timer.deadline(), u64::MAX, "it asks already");
+        assert!(timer.requests());
+        assert_eq!(timer.deadline(), u64::MAX, "already requested");
         write(&mut timer, SR, !(1 << 2), due + 5);
-        assert!(!timer.asks());
+        assert!(!timer.requests());
         assert_eq!(timer.deadline(), due + 170 * 65_536);
     }
 

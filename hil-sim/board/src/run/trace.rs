@@ -1,5 +1,5 @@
-//! What is kept of a run on the board: the plant's truth, what passed at the pins, and
-//! what the firmware says of itself in its log.
+//! The record of a run on the board: the plant's truth, inputs and outputs, and the firmware's
+//! log.
 
 use interstage::model::Planner;
 use sha2::Digest;
@@ -9,36 +9,21 @@ use crate::log::Line;
 use hil_sim::plant::ledger::Crossing;
 use hil_sim::plant::rig::{Truth, VirtualRig};
 use hil_sim::record::{
-    Controller, CrossingLine, Ended, LogLine, Recording, Report, Tally, Tick, true_line,
+    Controller, CrossingLine, Ended, LogLine, MODE_NAMES, Recording, Report, Tally, Tick, true_line,
 };
 use hil_sim::scenario::Scenario;
 
-/// What the log says of a mode, and its number in [`hil_sim::record::MODE_NAMES`].
-const MODES: [(&str, u8); 11] = [
-    ("boot", 0),
-    ("self-test", 1),
-    ("zeroing", 2),
-    ("idle", 3),
-    ("preloading", 4),
-    ("cruise", 5),
-    ("approach", 6),
-    ("crossing", 7),
-    ("settle", 8),
-    ("stopping", 9),
-    ("fault hold", 11),
-];
 const COMPLETE: u8 = 10;
 const FAULT_HOLD: u8 = 11;
-const IDLE: u8 = 3;
-/// Under way or coming to rest.
+/// Moving or stopping.
 const MOVING: std::ops::Range<u8> = 5..10;
 
 /// Values of the log's line about a crossing, in their order: milliseconds, step,
-/// position, residual, speed, preload, peak, lead, tread, gap measured, predicted, slip
+/// position, residual, speed, preload, peak, lead, compression, gap measured, predicted, slip
 /// margin, stiffness.
 const VALUES: usize = 13;
 
-/// What the firmware reported of a crossing.
+/// A crossing in the firmware's log.
 #[derive(Clone, Copy, Debug)]
 struct Reported {
     index: u8,
@@ -69,18 +54,13 @@ impl Trace {
         }
     }
 
-    /// Waiting for a command, by its own word.
-    pub(super) const fn is_idle(&self) -> bool {
-        self.mode == IDLE
-    }
-
-    /// Arrived, or held by a fault.
+    /// Whether it has arrived, or holds because of a fault.
     pub(super) const fn is_over(&self) -> bool {
         matches!(self.mode, COMPLETE | FAULT_HOLD)
     }
 
-    /// Looks at a millisecond that ended with the plant in `truth`.
-    pub(super) fn look(&mut self, passed: &Passed, lines: &[Line], truth: &Truth, keep_row: bool) {
+    /// Adds a millisecond that ended with the plant in `truth`.
+    pub(super) fn add(&mut self, passed: &Passed, lines: &[Line], truth: &Truth, keep_row: bool) {
         let t_s = self.tally.time_s();
         self.digest_pins(passed);
         for line in lines {
@@ -94,7 +74,7 @@ impl Trace {
         self.tally.close_tick(MOVING.contains(&self.mode), truth);
     }
 
-    /// Adds every bit that went into the board and came out of it.
+    /// Adds every bit of the board's inputs and outputs to the digest.
     fn digest_pins(&mut self, passed: &Passed) {
         let Passed { codes, drives } = passed;
         let digest = &mut self.tally.digest;
@@ -114,12 +94,12 @@ impl Trace {
         digest.update([u8::from(drives.drive_on), u8::from(drives.preload_on)]);
     }
 
-    /// Takes from a line of the log what it says.
+    /// Reads a line of the log.
     fn read(&mut self, t_s: f64, line: &Line) {
         let level = if line.level.is_empty() { "" } else { " " };
         let text = format!("{}{level}{}", line.level, line.text);
         self.tally.log.push(LogLine { t_s, text });
-        if let Some(mode) = line.behind("mode: ") {
+        if let Some(mode) = line.after("mode: ") {
             self.mode = number_of(mode);
         } else if line.text.contains("] stage ") {
             self.stage = line.numbers().get(1).map_or(self.stage, |number| *number as u8);
@@ -128,7 +108,7 @@ impl Trace {
         } else {
             let Tally { faults, limits, .. } = &mut self.tally;
             for (kind, reports) in [("] fault ", faults), ("] limit ", limits)] {
-                let said = line.behind(kind).and_then(|rest| rest.split_once(": "));
+                let said = line.after(kind).and_then(|rest| rest.split_once(": "));
                 if let Some((code, text)) = said
                     && let Ok(code) = code.parse()
                 {
@@ -138,7 +118,7 @@ impl Trace {
         }
     }
 
-    /// A row of what the plant and the pins tell, and the log.
+    /// A row from plant, outputs and log.
     fn row(&self, passed: &Passed, truth: &Truth) -> Tick {
         let controller = Controller {
             mode: self.mode,
@@ -160,29 +140,29 @@ impl Trace {
     }
 }
 
-/// Ledger line: the plant's truth with what the firmware logged of the same step.
+/// Ledger line: the plant's truth with the firmware's log of the same step.
 fn line(reported: &[Reported], crossing: &Crossing) -> CrossingLine {
     let said = reported.iter().find(|reported| u32::from(reported.index) == crossing.index as u32);
-    let told = |value: fn(&Reported) -> f64| said.map(value);
+    let logged = |value: fn(&Reported) -> f64| said.map(value);
     CrossingLine {
-        gap_predicted_mm: told(|r| r.predicted_mm),
-        gap_measured_mm: told(|r| r.measured_mm),
-        lead_time_s: told(|r| r.lead_s),
-        step_found_mm: told(|r| r.found_mm),
+        gap_predicted_mm: logged(|r| r.predicted_mm),
+        gap_measured_mm: logged(|r| r.measured_mm),
+        lead_time_s: logged(|r| r.lead_s),
+        step_found_mm: logged(|r| r.found_mm),
         ..true_line(crossing)
     }
 }
 
-/// Number of the mode that the log names so.
+/// Number of a mode from the log, in [`MODE_NAMES`].
 fn number_of(text: &str) -> u8 {
     if matches!(text, "deployed" | "retracted") {
         return COMPLETE;
     }
-    let found = MODES.iter().find(|(name, _)| text.contains(name));
-    found.map_or(FAULT_HOLD, |(_, number)| *number)
+    let found = MODE_NAMES.iter().position(|name| text.contains(name));
+    found.map_or(FAULT_HOLD, |number| number as u8)
 }
 
-/// What a line about a crossing says.
+/// Reads a line about a crossing.
 fn crossing(line: &Line) -> Option<Reported> {
     let values = line.numbers();
     let [_, index, found_mm, _, _, _, _, lead_s, _, measured_mm, predicted_mm, _, _] =

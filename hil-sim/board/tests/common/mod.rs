@@ -1,12 +1,18 @@
-//! The firmware for the emulated board, built once.
-
-pub(crate) mod reset;
+//! The firmware for the emulated board, built once, and a running board.
 
 use std::sync::OnceLock;
 
 use hil_sim::firmware::{self, Profile};
+use hil_sim::record::Run;
 use hil_sim::scenario::Scenario;
+use interstage::restart::Restart;
+use interstage::tick::Event;
+use rig_board::bench::{Bench, Passed};
+use rig_board::core::Register;
+use rig_board::faults::Fault;
 use rig_board::log::Strings;
+use rig_board::machine::Machine;
+use rig_board::peripherals::rcc::Cause;
 
 /// The image as it would be flashed.
 pub(crate) fn elf() -> &'static [u8] {
@@ -14,7 +20,7 @@ pub(crate) fn elf() -> &'static [u8] {
     ELF.get_or_init(|| firmware::image(Profile::Release).expect("the firmware builds"))
 }
 
-/// What its log is decoded with.
+/// The strings of its log.
 pub(crate) fn strings() -> &'static Strings {
     static STRINGS: OnceLock<Strings> = OnceLock::new();
     STRINGS.get_or_init(|| Strings::of(elf()).expect("it logs"))
@@ -24,4 +30,135 @@ pub(crate) fn strings() -> &'static Strings {
 pub(crate) fn scenario(sets: &[&str]) -> Scenario {
     let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
     Scenario::resolve(Some("prototype"), None, &sets).expect("a scenario")
+}
+
+/// A running board with its two logs.
+pub(crate) struct Board {
+    pub(crate) bench: Bench<'static>,
+    /// Lines of the text log.
+    pub(crate) log: Vec<String>,
+    /// Bytes of the binary log.
+    pub(crate) frames: Vec<u8>,
+}
+
+impl Board {
+    /// Before power-up, with these parameters of the scenario.
+    pub(crate) fn off(sets: &[&str]) -> Self {
+        let bench = Bench::new(elf(), strings(), &scenario(sets)).expect("a bench");
+        Self { bench, log: Vec::new(), frames: Vec::new() }
+    }
+
+    /// Powered up and idle.
+    pub(crate) fn idle() -> Self {
+        let mut board = Self::off(&[]);
+        board.until("mode: idle", 3000);
+        board
+    }
+
+    /// Deploying.
+    pub(crate) fn moving() -> Self {
+        let mut board = Self::idle();
+        board.send(b's');
+        board.until("deploying: cruise", 4000);
+        board.step();
+        board.frames.clear();
+        board
+    }
+
+    pub(crate) fn step(&mut self) -> Passed {
+        let (passed, lines) = self.bench.step().expect("runs");
+        self.log.extend(lines.into_iter().map(|line| line.text));
+        self.frames.extend(self.bench.take_frames());
+        passed
+    }
+
+    pub(crate) fn run(&mut self, milliseconds: u32) {
+        for _ in 0..milliseconds {
+            self.step();
+        }
+    }
+
+    /// Runs until the log has this text.
+    pub(crate) fn until(&mut self, text: &str, milliseconds: u32) {
+        let from = self.log.len();
+        for _ in 0..milliseconds {
+            self.step();
+            if self.log[from..].iter().any(|line| line.contains(text)) {
+                return;
+            }
+        }
+        panic!("no `{text}` in {milliseconds} ms: {:#?}", &self.log[from..]);
+    }
+
+    pub(crate) fn said(&self, text: &str) -> bool {
+        self.log.iter().any(|line| line.contains(text))
+    }
+
+    pub(crate) fn send(&mut self, letter: u8) {
+        assert!(self.bench.send(letter).expect("runs"), "the console listens");
+    }
+
+    /// Asserts that no bridge is enabled for so long.
+    pub(crate) fn assert_off(&mut self, milliseconds: u32) {
+        for _ in 0..milliseconds {
+            let drives = self.step().drives;
+            assert!(!drives.drive_on && !drives.preload_on);
+        }
+    }
+
+    pub(crate) fn position_mm(&self) -> f64 {
+        self.bench.plant().truth().position_mm
+    }
+
+    pub(crate) fn machine(&mut self) -> &mut Machine {
+        self.bench.machine_mut()
+    }
+
+    pub(crate) fn strike(&mut self, fault: Fault) {
+        fault.strike(self.machine()).expect("strikes");
+    }
+
+    /// Address of the first function whose name contains this.
+    pub(crate) fn function(&self, name: &str) -> u32 {
+        let functions = &self.bench.machine().image().functions;
+        let found = functions.iter().find(|function| function.name.contains(name));
+        found.unwrap_or_else(|| panic!("no function {name}")).range.start
+    }
+
+    pub(crate) fn set(&mut self, register: Register, value: u32) {
+        self.machine().set_register(register, value).expect("a register");
+    }
+
+    /// Cause and time, ms, of the reset within so many milliseconds, and when the drive was on
+    /// before it.
+    pub(crate) fn reset(&mut self, milliseconds: u32) -> (Cause, u32, Vec<bool>) {
+        let before = self.bench.machine().restarts().len();
+        let mut driven = Vec::new();
+        for after in 0..milliseconds {
+            let drives = self.step().drives;
+            driven.push(drives.drive_on && drives.drive != 0.0);
+            if let Some((_, cause)) = self.bench.machine().restarts().get(before) {
+                return (*cause, after, driven);
+            }
+        }
+        panic!("no reset in {milliseconds} ms: {:#?}", self.log);
+    }
+
+    /// The report of a start, during which nothing moves.
+    pub(crate) fn report(&mut self) -> Restart {
+        let mut lines = self.log.len();
+        for _ in 0..3000 {
+            self.assert_off(1);
+            if self.log[lines..].iter().any(|line| line.contains("mode: idle")) {
+                break;
+            }
+            lines = self.log.len();
+        }
+        let events = Run::of_stream(&std::mem::take(&mut self.frames)).events;
+        let mut reports = events.into_iter().filter_map(|entry| match entry.event {
+            Event::Restart(restart) => Some(restart),
+            _ => None,
+        });
+        reports.next_back().expect("a report")
+    }
 }

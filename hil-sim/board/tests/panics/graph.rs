@@ -25,7 +25,7 @@ pub(super) struct Graph {
 /// What an instruction does to the flow of the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Flow {
-    /// Goes on with the next one, or elsewhere in sight of the function's own tables.
+    /// Continues with the next one, or inside the function by a table.
     On,
     /// Branches there, perhaps coming back.
     To(u32),
@@ -96,7 +96,7 @@ impl Graph {
         Self { branches: branches.collect(), functions }
     }
 
-    /// Everything that can be reached from the roots, with the way there, the root
+    /// Everything that can be reached from the roots, with the path, the root
     /// first; not through functions that `ends` picks.
     pub(super) fn reach(
         &self,
@@ -146,7 +146,7 @@ fn branches(image: &Loaded, functions: &[Function], function: &Function) -> Vec<
             let second = if instruction.size == 4 { half(2) } else { None };
             match flow(first, second, address) {
                 Flow::To(to) if !function.range.contains(&to) => {
-                    // A branch to where no function stands says nothing of where it goes.
+                    // The target of a branch outside every function is unknown.
                     found.push(Branch { from: address, to: at(functions, to) });
                 }
                 Flow::Register => found.push(Branch { from: address, to: None }),
@@ -191,7 +191,7 @@ fn branches_lead_where_the_manual_says() {
 }
 
 #[test]
-fn what_is_reached_is_reached_by_a_way() {
+fn everything_reached_has_a_path() {
     let function = |n: u32| Function { range: 16 * n..16 * n + 16, name: format!("f{n}") };
     let to = |to| Branch { from: 0, to };
     let graph = Graph {

@@ -2,7 +2,7 @@
 //! to be harmless.
 //!
 //! The control tick's own code has none left: what is here is made by the compiler for
-//! every `async` function, or stands in the libraries under the tasks.
+//! every `async` function, or is in the libraries under the tasks.
 
 use super::names::Frame;
 
@@ -13,7 +13,7 @@ type Reason = &'static str;
 
 /// What a site looks like, and why it is never taken.
 struct Known {
-    /// Part of the name of the function that it stands in, or of one that this was inlined
+    /// Part of the name of the function that contains it, or of one that this was inlined
     /// into; the more inner ones are looked at first.
     function: &'static str,
     /// Beginning of the path of its file, empty for any.
@@ -32,13 +32,13 @@ const fn known(
     Known { function, file, calls, reason }
 }
 
-const BORROWED: Reason = "the cell stands in a mutex that masks interrupts, on one core, and \
+const BORROWED: Reason = "the cell is in a mutex that masks interrupts, on one core, and \
                           what is done with it there does not come back to it";
 const RESUMED: Reason = "made by the compiler for an `async` function that is polled after its \
                          end: the functions that wait for it poll it up to its end, and the \
                          tasks have none";
 const RING: Reason = "the ring's length is a constant other than 0, the channel's number that \
-                      of its own interrupt, and one code is asked for and given room";
+                      of its own interrupt, and one code is requested, with room for it";
 const WAKER: Reason = "every waker that the tasks meet is one of their executors': nothing else \
                        polls them";
 const DRIVER: Reason = "the time driver's queue is borrowed in a critical section alone";
@@ -46,7 +46,7 @@ const WAKES: Reason = "through a waker's table: the executors' `wake`, `clone` a
                        put a task in line, copy a pointer, or do nothing";
 
 /// What a branch into the machinery of panics may be. Those without a message are one
-/// function in the image, so that the place tells which it is.
+/// function in the image, so that the place identifies it.
 const PANICS: [Known; 10] = [
     known("embassy_sync::", "embassy-sync-", "", BORROWED),
     known("interstage::tasks::exchange::Exchange::sensors", "", "borrowed", BORROWED),

@@ -1,5 +1,5 @@
 //! Names of functions by address, from the image's debug information, so that what was
-//! inlined is still told apart.
+//! inlined keeps its name.
 
 use addr2line::Context;
 use gimli::{Dwarf, EndianSlice, LittleEndian, SectionId};

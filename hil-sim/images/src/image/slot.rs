@@ -1,4 +1,4 @@
-//! A static that one function after the other fills and uses.
+//! A static that the functions fill and use in turn.
 
 use core::cell::{Cell, UnsafeCell};
 use core::mem::MaybeUninit;

@@ -13,7 +13,7 @@ use embassy_stm32::pac::Interrupt;
 static ORDER: AtomicU32 = AtomicU32::new(0);
 /// Supervisor calls.
 pub(crate) static CALLS: AtomicU32 = AtomicU32::new(0);
-/// Beats of the system timer.
+/// Interrupts of the system timer.
 pub(crate) static BEATS: AtomicU32 = AtomicU32::new(0);
 /// Number of the exception that the last handler found itself in.
 pub(crate) static NUMBER: AtomicU32 = AtomicU32::new(0);
@@ -50,7 +50,7 @@ fn SysTick() {
     }
 }
 
-/// Less urgent: asks for the more urgent one while it runs.
+/// Less urgent: pends the more urgent one while it runs.
 #[interrupt]
 fn TIM3() {
     note(1);

@@ -11,8 +11,6 @@ mod checks;
 mod handlers;
 #[cfg(target_os = "none")]
 mod program;
-#[cfg(target_os = "none")]
-mod storage;
 
 /// For the emulated core alone.
 #[cfg(not(target_os = "none"))]

@@ -35,7 +35,7 @@ fn main() -> ! {
     }
 }
 
-/// Tells the host by a breakpoint elsewhere.
+/// A breakpoint outside of `main` reports it to the host.
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
     loop {

@@ -26,18 +26,18 @@ pub(super) struct Count {
     /// Addresses whose coming up is noted.
     marked: HashSet<u32>,
     /// Instructions whose cycles are known only when they are reached, by their halfword.
-    late: Vec<Option<Kind>>,
+    deferred: Vec<Option<Kind>>,
     /// Those of them that have a hook of their own.
     pub(super) hooked: Vec<(u32, Kind)>,
     /// Those that are still without it, and in a block that has just been met.
     pub(super) wanted: Vec<(u32, Kind)>,
-    /// One hook counts all late instructions instead.
+    /// One hook counts all deferred instructions instead.
     pub(super) common: bool,
-    /// Calls of that hook for instructions that are not late.
+    /// Calls of that hook for instructions that are not deferred.
     pub(super) needless: u32,
     /// Cycle at which a block was last met that had not been seen.
     pub(super) met: u64,
-    /// Beginning of the block under way.
+    /// Beginning of the current block.
     pub(super) block: u32,
     /// Where the program is if it does not branch.
     pub(super) next: u32,
@@ -51,14 +51,14 @@ pub(super) struct Count {
 impl Count {
     pub(super) fn new(counted: &Counted<'_>) -> Self {
         let halfwords = counted.bytes.len() / 2;
-        let mut late = vec![None; halfwords];
+        let mut deferred = vec![None; halfwords];
         for range in counted.code {
             let from = range.start.wrapping_sub(counted.base) as usize;
             let to = range.end.wrapping_sub(counted.base) as usize;
             let code = counted.bytes.get(from..to).unwrap_or_default();
             for (address, instruction, conditional) in thumb::sweep(code, range.start) {
-                if timing::is_late(&instruction, conditional) {
-                    late[(address - counted.base) as usize / 2] = Some(instruction.kind);
+                if timing::is_deferred(&instruction, conditional) {
+                    deferred[(address - counted.base) as usize / 2] = Some(instruction.kind);
                 }
             }
         }
@@ -67,7 +67,7 @@ impl Count {
             bytes: counted.bytes.to_vec(),
             blocks: vec![Block::default(); halfwords],
             marked: HashSet::new(),
-            late,
+            deferred,
             hooked: Vec::new(),
             wanted: Vec::new(),
             common: false,
@@ -88,8 +88,8 @@ impl Count {
 
     /// What decides about the cycles of the instruction at this address, if that is known
     /// only when it is reached.
-    pub(super) fn late(&self, address: u32) -> Option<Kind> {
-        *self.late.get(address.wrapping_sub(self.base) as usize / 2)?
+    pub(super) fn deferred(&self, address: u32) -> Option<Kind> {
+        *self.deferred.get(address.wrapping_sub(self.base) as usize / 2)?
     }
 
     /// Adds cycles.
@@ -137,7 +137,7 @@ impl Count {
             return false;
         }
         for at in (address..address.saturating_add(size)).step_by(2) {
-            if let Some(kind) = self.late(at)
+            if let Some(kind) = self.deferred(at)
                 && !self.hooked.contains(&(at, kind))
             {
                 self.wanted.push((at, kind));
@@ -160,10 +160,10 @@ impl Count {
         let offset = address.wrapping_sub(self.base) as usize;
         let Some(code) = self.bytes.get(offset..offset + size as usize) else { return block };
         // A block may begin under a condition, so the sweep of the whole code decides
-        // what is late, not this one.
+        // what is deferred, not this one.
         for (at, instruction, _) in thumb::sweep(code, address) {
-            let late = self.late(at).is_some();
-            let extra = if late { 0 } else { timing::extra(instruction.kind) };
+            let is_deferred = self.deferred(at).is_some();
+            let extra = if is_deferred { 0 } else { timing::extra(instruction.kind) };
             block.instructions += 1;
             block.cycles += 1 + extra as u16;
         }

@@ -105,7 +105,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
     /// [`Count::wants_hooks`]: super::count::Count::wants_hooks
     pub(super) fn hook_wanted(&mut self) -> Result<(), CoreError> {
         for (address, kind) in std::mem::take(&mut self.engine.get_data_mut().count.wanted) {
-            self.hook_late(address, kind)?;
+            self.hook_deferred(address, kind)?;
             let at = u64::from(address);
             engine("forget code", self.engine.ctl_remove_cache(at, at + 2))?;
         }
@@ -113,7 +113,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
     }
 
     /// Has the cycles of this instruction added whenever it is carried out.
-    fn hook_late(&mut self, address: u32, kind: Kind) -> Result<(), CoreError> {
+    fn hook_deferred(&mut self, address: u32, kind: Kind) -> Result<(), CoreError> {
         let at = u64::from(address);
         let hooked = self.engine.add_code_hook(at, at, move |uc, _, _| {
             if !uc.get_data().count.common {
@@ -125,11 +125,11 @@ impl<B: Bus + 'static> UnicornCore<B> {
         Ok(())
     }
 
-    /// Chooses what hooks late instructions.
+    /// Chooses what hooks deferred instructions.
     ///
     /// The engine goes through all hooks of instructions whenever it calls one, so that one
     /// hook for all of the code is fastest. But where it is there while a block is
-    /// translated, it is called for every instruction of that block. So each late
+    /// translated, it is called for every instruction of that block. So each deferred
     /// instruction has a hook of its own while blocks are being translated; when no new ones
     /// have come for a while these go, their calls in the translated code stay, and the
     /// common hook answers them.
@@ -148,7 +148,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
                     engine("remove a hook", self.engine.remove_hook(hook))?;
                 }
                 let common = self.engine.add_code_hook(first.into(), last.into(), |uc, at, _| {
-                    match uc.get_data().count.late(at as u32) {
+                    match uc.get_data().count.deferred(at as u32) {
                         Some(kind) => spend(uc, kind),
                         None => uc.get_data_mut().count.needless += 1,
                     }
@@ -166,7 +166,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
                 self.common = None;
                 engine("remove a hook", self.engine.remove_hook(hook))?;
                 for (address, kind) in again {
-                    self.hook_late(address, kind)?;
+                    self.hook_deferred(address, kind)?;
                 }
             }
             _ => {}

@@ -118,7 +118,7 @@ fn a_page_first_met_in_a_conditional_block_leaves_no_condition_behind() {
     core.set_register(Register::R(1), 0).expect("set");
     core.write(RAM, &9_u32.to_le_bytes()).expect("RAM");
     cost(&mut core);
-    let registers = [2, 3, 4].map(|r| core.register(Register::R(r)).expect("told"));
+    let registers = [2, 3, 4].map(|r| core.register(Register::R(r)).expect("a register"));
     assert_eq!(registers, [9, 7, 6]);
 }
 

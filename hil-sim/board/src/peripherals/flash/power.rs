@@ -1,21 +1,21 @@
-//! Power that goes, or a reset that comes, while the flash is at work.
+//! Loss of power, or a reset, during a flash operation.
 
 use super::{Change, Flash};
 use crate::peripherals::rcc::Cause;
 
-/// When power is to go, counted in operations from the moment at which this is set.
+/// When power is lost, counted in operations from when this is set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cut {
     /// In the middle of the n-th, from 1.
     Within(u64),
-    /// As soon as the n-th is over.
+    /// At the end of the n-th.
     After(u64),
-    /// Power stays, but the reset pin is pulled in the middle of the n-th.
+    /// Not power, but the reset pin, in the middle of the n-th.
     Pulled(u64),
 }
 
 impl Flash {
-    /// Has power go at this operation.
+    /// Sets the operation at which power is lost.
     pub fn cut_power(&mut self, cut: Cut) {
         self.cut = Some(match cut {
             Cut::Within(count) => Cut::Within(self.begun + count),
@@ -24,38 +24,36 @@ impl Flash {
         });
     }
 
-    /// Operations begun since the board was made.
-    #[must_use]
+    /// Operations begun so far.
     pub const fn begun(&self) -> u64 {
         self.begun
     }
 
-    /// When an operation that begins at `now` and would be over at `due` ends or is cut.
+    /// Cycle at which an operation from `now` to `due` ends or is interrupted.
     pub(super) fn cut_short(&self, due: u64, now: u64) -> u64 {
-        if self.is_torn() { now + (due - now) / 2 } else { due }
+        if self.cuts_current() { now + (due - now) / 2 } else { due }
     }
 
-    /// Whether the operation under way is not to come to its end.
-    fn is_torn(&self) -> bool {
+    /// Whether the current operation is interrupted.
+    fn cuts_current(&self) -> bool {
         [Some(Cut::Within(self.begun)), Some(Cut::Pulled(self.begun))].contains(&self.cut)
     }
 
-    /// Whether power goes with the operation whose time has come; it is then not over.
-    pub(super) fn goes_dark(&mut self) -> bool {
-        let within = self.is_torn();
+    /// Whether power is lost in the operation that is due.
+    pub(super) fn is_interrupted(&mut self) -> bool {
+        let within = self.cuts_current();
         self.ends |= within || self.cut == Some(Cut::After(self.begun));
         within
     }
 
-    /// What ends it all now.
-    #[must_use]
+    /// Cause of the reset that is due.
     pub fn ends_by(&self) -> Option<Cause> {
         let pulled = matches!(self.cut, Some(Cut::Pulled(_)));
         self.ends.then_some(if pulled { Cause::Pin } else { Cause::Power })
     }
 
-    /// A reset. What was under way stays half done: of a double word the lower word is
-    /// written, of a page or bank the first half erased.
+    /// A reset. A current operation is left half done: the lower word of a double word, the
+    /// first half of a page or bank.
     pub fn reset(&mut self) -> Option<Change> {
         let over = self.finished;
         let torn = self.operation.map(|operation| match operation.change {

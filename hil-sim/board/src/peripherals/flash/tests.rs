@@ -30,11 +30,11 @@ fn status(flash: &mut Flash) -> u32 {
     flash.read(SR, 0).expect("modelled")
 }
 
-/// Writes a double word where `before` stands and waits for its end.
+/// Writes a double word over `before` and waits for its end.
 fn program(flash: &mut Flash, address: u32, value: u64, before: [u8; 8]) -> Option<Change> {
     flash.store(address, 4, value as u32);
     flash.store(address + 4, 4, (value >> 32) as u32);
-    if flash.asks_for() == Some(address) {
+    if flash.needs() == Some(address) {
         flash.found(before, 0);
     }
     flash.advance(PROGRAM_CYCLES);
@@ -68,9 +68,9 @@ fn a_wrong_key_locks_it_until_reset() {
 fn a_double_word_takes_its_time_and_its_two_words() {
     let mut flash = programming();
     flash.store(PLACE, 4, 0x0403_0201);
-    assert_eq!((status(&mut flash), flash.asks_for()), (0, None));
+    assert_eq!((status(&mut flash), flash.needs()), (0, None));
     flash.store(PLACE + 4, 4, 0x0807_0605);
-    assert_eq!(flash.asks_for(), Some(PLACE));
+    assert_eq!(flash.needs(), Some(PLACE));
     flash.found(ERASED, 1000);
     assert_eq!((status(&mut flash), flash.deadline()), (BUSY, 1000 + PROGRAM_CYCLES));
     flash.advance(999 + PROGRAM_CYCLES);
@@ -147,15 +147,15 @@ fn the_end_and_errors_interrupt_where_that_is_wanted() {
     let mut flash = unlocked();
     write(&mut flash, CR, PROGRAM | END_INTERRUPT | ERROR_INTERRUPT, 0);
     assert!(program(&mut flash, PLACE, 1, ERASED).is_some());
-    assert!(flash.asks());
+    assert!(flash.requests());
     write(&mut flash, SR, END, 0);
-    assert!(!flash.asks());
+    assert!(!flash.requests());
     flash.store(PLACE, 1, 0);
-    assert!(flash.asks());
+    assert!(flash.requests());
 }
 
 #[test]
-fn power_that_goes_in_the_middle_leaves_half() {
+fn power_lost_in_an_operation_leaves_half_of_it() {
     let mut flash = programming();
     flash.cut_power(Cut::Within(2));
     assert!(program(&mut flash, PLACE, 1, ERASED).is_some() && flash.ends_by().is_none());
@@ -167,12 +167,12 @@ fn power_that_goes_in_the_middle_leaves_half() {
 }
 
 #[test]
-fn a_reset_in_the_middle_leaves_half_too() {
+fn a_reset_in_an_operation_leaves_half_of_it() {
     assert_eq!(erased_until(Cut::Pulled(1)), (Some(Cause::Pin), PAGE_BYTES / 2));
 }
 
 #[test]
-fn power_that_goes_behind_an_operation_finds_it_done() {
+fn power_lost_after_an_operation_finds_it_complete() {
     assert_eq!(erased_until(Cut::After(1)), (Some(Cause::Power), PAGE_BYTES));
 }
 

@@ -12,15 +12,15 @@ const READ_ANGLE: u16 = 0xFFFF;
 const ERROR: u16 = 1 << 14;
 /// Fastest clock that it takes, core cycles in a bit: 10 MHz.
 const FASTEST: u64 = 17;
-/// What the pull-up makes of a line that no one drives.
-const NOBODY: u16 = 0xFFFF;
+/// Frame on an open line with its pull-up.
+const PULLED_UP: u16 = 0xFFFF;
 
 /// The sensor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AngleSensor {
-    /// The frame that says the present angle, with parity and flag.
+    /// The frame of the present angle, with parity and flag.
     pub angle: u16,
-    /// Bits turned over on the way to the board.
+    /// Bits inverted on the line to the board.
     pub bit_errors: u16,
     /// The line to the board is broken.
     pub lost: bool,
@@ -31,24 +31,24 @@ impl AngleSensor {
     /// Exchanges a frame; `selected` says whether its select line was low throughout.
     pub fn exchange(&mut self, frame: Frame, selected: bool) -> u16 {
         if !selected || self.lost {
-            return NOBODY;
+            return PULLED_UP;
         }
-        let said = self.answer;
-        // Whoever samples on the other edge sees every bit one place late; one that is
-        // too fast for it gets what was there before.
-        let said = match (frame.mode, frame.bit_cycles >= FASTEST) {
-            (1, true) => said,
-            (_, true) => said >> 1,
+        let sent = self.answer;
+        // A master that samples on the other edge sees every bit one place later; one with too
+        // fast a clock reads zero.
+        let sent = match (frame.mode, frame.bit_cycles >= FASTEST) {
+            (1, true) => sent,
+            (_, true) => sent >> 1,
             (_, false) => 0,
         };
         let odd = frame.bits != 16 || frame.sent.count_ones() & 1 != 0;
         self.answer = match frame.sent {
             _ if odd => with_parity(ERROR),
             READ_ANGLE => self.angle,
-            // The other registers are not there: zero.
+            // Other registers are not modelled: zero.
             _ => 0,
         };
-        said ^ self.bit_errors
+        sent ^ self.bit_errors
     }
 }
 
@@ -79,7 +79,7 @@ mod tests {
     #[test]
     fn not_selected_it_leaves_the_line_to_the_pull_up() {
         let mut sensor = sensor();
-        assert_eq!(sensor.exchange(READ, false), NOBODY);
+        assert_eq!(sensor.exchange(READ, false), PULLED_UP);
         assert_eq!(sensor.exchange(READ, true), 0, "nor did it hear the command");
     }
 
@@ -87,8 +87,8 @@ mod tests {
     fn odd_parity_raises_the_error_flag() {
         let mut sensor = sensor();
         sensor.exchange(Frame { sent: 0x7FFF, ..READ }, true);
-        let said = sensor.exchange(READ, true);
-        assert_eq!((said & ERROR, said.count_ones() & 1), (ERROR, 0));
+        let sent = sensor.exchange(READ, true);
+        assert_eq!((sent & ERROR, sent.count_ones() & 1), (ERROR, 0));
     }
 
     #[test]

@@ -4,6 +4,7 @@ use super::Write;
 use crate::core::Fault;
 use crate::exceptions::Exceptions;
 use crate::exceptions::number::{BUS_FAULT, HARD_FAULT, PEND_SV, SYS_TICK, USAGE_FAULT};
+use crate::peripherals::registers::{Kept, Registers};
 
 const CPUID: u32 = 0xD00;
 const ICSR: u32 = 0xD04;
@@ -48,67 +49,48 @@ impl Cause {
     }
 }
 
+/// Registers that keep what is written.
+const REGISTERS: [Kept; 6] = [
+    Kept { offset: CPUID, reset: 0x410F_C241, mask: 0 },
+    Kept { offset: VTOR, reset: 0, mask: !0x7F },
+    Kept { offset: SCR, reset: 0, mask: 0x16 },
+    Kept { offset: CCR, reset: 0x200, mask: u32::MAX },
+    Kept { offset: SHCSR, reset: 0, mask: 0x7 << 16 },
+    Kept { offset: FPCCR, reset: 0xC000_0000, mask: u32::MAX },
+];
+
 /// The system control block.
 #[derive(Clone, Debug)]
 pub struct Control {
-    vectors: u32,
-    sleep: u32,
-    config: u32,
-    enables: u32,
+    registers: Registers,
+    /// Status of configurable faults and of the hard fault.
     faults: u32,
     hard: u32,
-    coprocessors: u32,
-    monitor: u32,
-    float_context: u32,
-    float_default: u32,
-    /// The program asks for a reset.
+    /// The program requests a reset.
     pub wants_reset: bool,
 }
 
 impl Control {
     pub(super) fn new(vectors: u32) -> Self {
-        Self {
-            vectors,
-            sleep: 0,
-            config: 0x200,
-            enables: 0,
-            faults: 0,
-            hard: 0,
-            coprocessors: 0,
-            monitor: 0,
-            float_context: 0xC000_0000,
-            float_default: 0,
-            wants_reset: false,
-        }
+        // The engine does not report the address of a fault.
+        let zeros = [DFSR, MMFAR, BFAR, AFSR];
+        let mut registers = Registers::new(&REGISTERS, &[CPACR, DEMCR, FPDSCR], &zeros);
+        registers.set(VTOR, vectors);
+        Self { registers, faults: 0, hard: 0, wants_reset: false }
     }
 
     /// Address of an exception's vector.
-    #[must_use]
     pub fn vector(&self, number: u8) -> u32 {
-        self.vectors + 4 * u32::from(number)
+        self.registers.get(VTOR) + 4 * u32::from(number)
     }
 
     /// `SLEEPONEXIT`: back in thread mode the core sleeps.
-    #[must_use]
-    pub const fn sleeps_on_exit(&self) -> bool {
-        self.sleep & 2 != 0
+    pub fn sleeps_on_exit(&self) -> bool {
+        self.registers.get(SCR) & 2 != 0
     }
 
-    /// `SEVONPEND`: an interrupt that becomes pending is an event.
-    #[must_use]
-    pub const fn pending_is_event(&self) -> bool {
-        self.sleep & 1 << 4 != 0
-    }
-
-    /// Status of configurable faults and of the hard fault.
-    #[must_use]
-    pub const fn status(&self) -> (u32, u32) {
-        (self.faults, self.hard)
-    }
-
-    /// Notes a fault and returns the exception to take for it: its own if that is
-    /// enabled and may preempt what runs, or else the hard fault. `None` if that runs
-    /// already: the core locks up.
+    /// Notes a fault and returns its exception: its own if that is enabled and preempts the
+    /// running one, else the hard fault. `None` if the hard fault is active: the core locks up.
     pub fn fault(&mut self, cause: Cause, exceptions: &Exceptions, masked: bool) -> Option<u8> {
         self.faults |= cause.status();
         let (own, enable) = match cause {
@@ -116,7 +98,7 @@ impl Control {
             _ => (BUS_FAULT, 1 << 17),
         };
         let priority = i16::from(exceptions.priority_set(own));
-        if self.enables & enable != 0 && !masked && priority < exceptions.level() {
+        if self.registers.get(SHCSR) & enable != 0 && !masked && priority < exceptions.level() {
             return Some(own);
         }
         if exceptions.level() <= -1 {
@@ -129,7 +111,6 @@ impl Control {
 
     pub(super) fn read(&self, offset: u32, exceptions: &Exceptions) -> Option<u32> {
         Some(match offset {
-            CPUID => 0x410F_C241,
             ICSR => {
                 let next = exceptions.urgent().map_or(0, |(number, _)| u32::from(number));
                 let pending = (0..4).any(|word| exceptions.pending(word) != 0);
@@ -140,20 +121,10 @@ impl Control {
                     | u32::from(exceptions.is_pending(SYS_TICK)) << 26
                     | u32::from(exceptions.is_pending(PEND_SV)) << 28
             }
-            VTOR => self.vectors,
             AIRCR => 0xFA05_0000 | u32::from(exceptions.group()) << 8,
-            SCR => self.sleep,
-            CCR => self.config,
-            SHCSR => self.enables,
             CFSR => self.faults,
             HFSR => self.hard,
-            // The engine does not tell the address of a fault.
-            DFSR | MMFAR | BFAR | AFSR => 0,
-            CPACR => self.coprocessors,
-            DEMCR => self.monitor,
-            FPCCR => self.float_context,
-            FPDSCR => self.float_default,
-            _ => return None,
+            _ => self.registers.read(offset)?,
         })
     }
 
@@ -174,24 +145,16 @@ impl Control {
                     }
                 }
             }
-            VTOR => self.vectors = write.onto(self.vectors) & !0x7F,
             AIRCR => {
                 if write.value >> 16 == 0x05FA {
                     exceptions.set_group((write.value >> 8 & 7) as u8);
                     self.wants_reset |= write.value & 4 != 0;
                 }
             }
-            SCR => self.sleep = write.onto(self.sleep) & 0x16,
-            CCR => self.config = write.onto(self.config),
-            SHCSR => self.enables = write.onto(self.enables) & 0x7 << 16,
             CFSR => self.faults &= !write.ones(),
             HFSR => self.hard &= !write.ones(),
-            DFSR => {}
-            CPACR => self.coprocessors = write.onto(self.coprocessors),
-            DEMCR => self.monitor = write.onto(self.monitor),
-            FPCCR => self.float_context = write.onto(self.float_context),
-            FPDSCR => self.float_default = write.onto(self.float_default),
-            _ => return None,
+            CPUID | MMFAR | BFAR | AFSR => return None,
+            _ => self.registers.write(offset, write)?,
         }
         Some(())
     }
@@ -213,11 +176,11 @@ mod tests {
     fn a_fault_without_a_handler_becomes_a_hard_fault() {
         let (mut control, exceptions) = (Control::new(0), Exceptions::default());
         assert_eq!(control.fault(UNDEFINED, &exceptions, false), Some(HARD_FAULT));
-        assert_eq!(control.status(), (1 << 16, 1 << 30));
+        assert_eq!((control.faults, control.hard), (1 << 16, 1 << 30));
     }
 
     #[test]
-    fn with_one_it_is_taken_unless_something_as_urgent_runs() {
+    fn a_fault_with_a_handler_takes_it_unless_an_equally_urgent_one_runs() {
         let (mut control, mut exceptions) = (Control::new(0), Exceptions::default());
         write(&mut control, &mut exceptions, SHCSR, 7 << 16);
         assert_eq!(control.fault(UNDEFINED, &exceptions, false), Some(USAGE_FAULT));

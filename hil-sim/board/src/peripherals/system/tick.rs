@@ -1,6 +1,6 @@
-//! The system timer.
+//! The core's two counters: the system timer, and the cycle counter of the data watchpoint unit.
 
-use super::Write;
+use super::super::{Peripheral, Write};
 
 const CSR: u32 = 0x10;
 const RVR: u32 = 0x14;
@@ -78,7 +78,7 @@ impl SysTick {
         if self.control & INTERRUPT != 0 { self.zero } else { u64::MAX }
     }
 
-    /// Whether it asks for its exception.
+    /// Updates it; returns whether it requests its exception.
     pub(super) fn advance(&mut self, now: u64) -> bool {
         if self.zero > now {
             return false;
@@ -89,14 +89,55 @@ impl SysTick {
     }
 }
 
+const CTRL: u32 = 0x0;
+const CYCCNT: u32 = 0x4;
+
+/// The cycle counter; the rest of its unit is not modelled.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counter {
+    on: bool,
+    origin: u64,
+    held: u32,
+}
+
+impl Peripheral for Counter {
+    fn read(&mut self, offset: u32, now: u64) -> Option<u32> {
+        match offset {
+            // Four comparators, and whether it counts.
+            CTRL => Some(4 << 28 | u32::from(self.on)),
+            CYCCNT if self.on => Some(now.wrapping_sub(self.origin) as u32),
+            CYCCNT => Some(self.held),
+            _ => None,
+        }
+    }
+
+    fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
+        let value = self.read(CYCCNT, now)?;
+        match offset {
+            // The unit's features are read-only.
+            CTRL if write.ones() & !(1 | 0xFF << 24) == 0 => {
+                self.on = write.onto(u32::from(self.on)) & 1 != 0;
+                self.held = value;
+            }
+            CYCCNT => self.held = write.onto(value),
+            _ => return None,
+        }
+        self.origin = now.wrapping_sub(u64::from(self.held));
+        Some(())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn all(value: u32) -> Write {
+        Write { value, mask: u32::MAX }
+    }
+
     #[test]
-    fn it_asks_every_period() {
+    fn the_system_timer_requests_its_exception_every_period() {
         let mut tick = SysTick::default();
-        let all = |value| Write { value, mask: u32::MAX };
         tick.write(RVR, all(999), 0).expect("modelled");
         tick.write(CSR, all(ENABLE | INTERRUPT | CORE_CLOCK), 100).expect("modelled");
         assert_eq!(tick.deadline(), 1100);
@@ -106,5 +147,17 @@ mod tests {
         assert_eq!(tick.deadline(), 2100);
         assert_eq!(tick.read(CSR, 1100).map(|csr| csr >> 16), Some(1));
         assert_eq!(tick.read(CSR, 1100).map(|csr| csr >> 16), Some(0));
+    }
+
+    #[test]
+    fn the_cycle_counter_counts_while_it_is_on() {
+        let mut counter = Counter::default();
+        assert_eq!(counter.read(CYCCNT, 500), Some(0));
+        counter.write(CTRL, all(4 << 28 | 1), 1000).expect("modelled");
+        assert_eq!(counter.read(CYCCNT, 1250), Some(250));
+        counter.write(CYCCNT, all(7), 2000).expect("modelled");
+        assert_eq!(counter.read(CYCCNT, 2003), Some(10));
+        counter.write(CTRL, all(0), 2010).expect("modelled");
+        assert_eq!(counter.read(CYCCNT, 9999), Some(17));
     }
 }
