@@ -13,7 +13,7 @@ mod set;
 pub mod slots;
 
 pub use compile::{CompileError, compile};
-pub use set::{Header, MAX_NAME, ParameterSet, Rest, SCHEMA, SetError};
+pub use set::{Header, MAX_NAME, ParameterSet, Refusal, Rest, SCHEMA, SetError};
 
 /// Longest set, bytes: two pages of flash less what its slot keeps beside it.
 pub const MAX_SET: usize = 4096 - 16;

@@ -7,9 +7,10 @@ use std::sync::OnceLock;
 
 use crate::common::{Bench, FixedFlash, forever};
 use interstage::hal::Line;
+use interstage::params::Refusal;
 use interstage::params::compile;
 use interstage::params::link::{FrameReader, ToBoard, ToHost, frame};
-use interstage::params::service::{Origin, Refusal, Request, Response, Service};
+use interstage::params::service::{Origin, Request, Response, Service};
 use interstage::rig::Rig;
 use interstage::tasks::{self, Exchange};
 

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::fmt::Debug;
 
 use interstage::fault::{Fault, Limit};
-use interstage::params::service::Refusal;
+use interstage::params::Refusal;
 use interstage::params::{SCHEMA, SetError};
 
 fn differ<T: Copy + Debug>(all: &[T], say: impl Fn(T) -> &'static str) {

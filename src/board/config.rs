@@ -80,12 +80,11 @@ pub(crate) enum HoldReason {
 }
 
 pub(crate) fn hold(threads: Spawner, parts: Parts, why: HoldReason) {
-    let Parts {
-        motors, light, wheel_encoder, preload_sensor, compression_sensor, arm_angle, ..
-    } = parts;
+    let Parts { motors, light, .. } = parts;
     // Left as they are until the next start: dropping them would only add code.
-    core::mem::forget((wheel_encoder, preload_sensor, compression_sensor, arm_angle));
-    core::mem::forget((parts.watchdog, parts.button, parts.console, parts.journal));
+    let sensors =
+        (parts.wheel_encoder, parts.preload_sensor, parts.compression_sensor, parts.arm_angle);
+    core::mem::forget((sensors, parts.watchdog, parts.button, parts.console, parts.journal));
     threads.spawn(stay_off(motors, light, why).unwrap());
 }
 

@@ -186,6 +186,7 @@ impl ReducedModel {
     }
 
     /// Radial force after this run, Q30.
+    #[inline(always)]
     fn force_part(&self, point: &Point, run: u32) -> i32 {
         let (shape, model) = (&self.shape, self.direction(point.direction));
         let w = centred(run);
@@ -195,17 +196,20 @@ impl ReducedModel {
     }
 
     /// Friction used under a radial reaction on this slope, both Q30.
+    #[inline(always)]
     fn used(&self, radial: i32, slope: i32) -> Ratio {
         if self.driven { self.shape.utilisation(radial, slope) } else { Ratio::ZERO }
     }
 
     /// Coefficients of a direction.
+    #[inline(always)]
     fn direction(&self, direction: Direction) -> &DirectionModel {
         &self.directions[direction as usize % 2]
     }
 }
 
 /// A part, unsigned Q32, as its difference from one half, signed Q32.
+#[inline(always)]
 const fn centred(part: u32) -> i32 {
     (part ^ 0x8000_0000) as i32
 }

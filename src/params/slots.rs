@@ -17,8 +17,7 @@
 //! out of force. The fold guards the sequence number: alone, a flipped bit in it would make the
 //! spare set the younger one.
 
-use super::service::Refusal;
-use super::{MAX_SET, ParameterSet, Rest, SetError};
+use super::{MAX_SET, ParameterSet, Refusal, Rest, SetError};
 use crate::model::Planner;
 pub use crate::restart::page::{PAGE_BYTES, WORD_BYTES};
 use crate::tick::Controller;

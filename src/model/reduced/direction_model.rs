@@ -40,6 +40,7 @@ impl Pair {
     }
 
     /// Both, 2^16 times.
+    #[inline(always)]
     const fn both(self) -> (i32, i32) {
         (self.0, self.0 << 16)
     }
@@ -85,11 +86,13 @@ pub(super) struct Guess {
 
 impl DirectionModel {
     /// Part of the crossing that is fast at the bits of a speed, `v / (v + v_half)`, Q32.
+    #[inline(always)]
     pub(super) fn fast_part(&self, speed: u32) -> u32 {
         part_of_sum(speed, self.half_speed)
     }
 
     /// Effective over instant stiffness at a fast part and a centred run, Q26.
+    #[inline(always)]
     pub(super) fn stiffness(&self, x: u32, w: i32) -> i32 {
         #[rustfmt::skip]
         let [a0, a1, a2, a3, a4, a5, b0, b1, b2, b3, b4, c0, c1, c2, c3, d0, d1, d2, e0, e1, f0,
@@ -109,6 +112,7 @@ impl DirectionModel {
     }
 
     /// The stiffening after one run, by the centred fast part.
+    #[inline(always)]
     fn along_speed(&self, w: i32) -> [i32; 6] {
         #[rustfmt::skip]
         let [a0, a1, a2, a3, a4, a5, b0, b1, b2, b3, b4, c0, c1, c2, c3, d0, d1, d2, e0, e1, f0,
@@ -124,6 +128,7 @@ impl DirectionModel {
     }
 
     /// Guess of the run, Q32, from the fast part and what the force exceeds the lift by.
+    #[inline(always)]
     pub(super) fn guess_run(&self, x: u32, excess: &Excess) -> Guess {
         let half = excess.normalised >> 30 & 1;
         let row = (2 * (LOWEST_OCTAVE - excess.octave) + half) as usize;
@@ -146,6 +151,7 @@ impl DirectionModel {
     /// Equation: from a guess, the step `2 d / (S' + sqrt(S'^2 + 2 S'' d))` to where the
     /// parabola has the residual d made up for, which holds up to where the stiffness is
     /// least.
+    #[inline(always)]
     pub(super) fn speed(&self, stiffness: i32, w: i32) -> Option<MillimetresPerSecond> {
         let [c0, c1, c2, c3, c4, c5] = self.along_speed(w);
         let guess = self.guess_fast_part(stiffness, w);
@@ -160,6 +166,7 @@ impl DirectionModel {
     }
 
     /// Guess of the fast part, Q32, from the stiffness and the run.
+    #[inline(always)]
     fn guess_fast_part(&self, stiffness: i32, w: i32) -> u32 {
         // Stiffnesses up to the instant one.
         let part = (stiffness.clamp(0, (1 << 26) - 1) as u32) << 6;
@@ -170,6 +177,7 @@ impl DirectionModel {
     }
 
     /// Speed at this fast part, `v_half x / (1 - x)`, saturating.
+    #[inline(always)]
     fn speed_of(&self, x: u32) -> MillimetresPerSecond {
         let slow = (!x).max(1);
         let shift = slow.leading_zeros();
@@ -185,6 +193,7 @@ impl DirectionModel {
 /// The step of x, Q31, that makes up for a lacking stiffness, Q26, from its slope, Q24, and
 /// half its second derivative, Q23; by a quarter at most. None where the parabola stays
 /// above.
+#[inline(always)]
 fn step(slope: i32, bend: i32, lacking: i32) -> Option<i32> {
     // Up to 8, 32 and a quarter: to the next power of two, which takes one instruction.
     let slope = slope.clamp(-(1 << 27), (1 << 27) - 1) << 4;

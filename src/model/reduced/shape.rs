@@ -76,6 +76,7 @@ impl Shape {
 
     /// A force as part of the unit, Q30, from 0 to a quarter: beyond what the longest run
     /// takes at rest.
+    #[inline(always)]
     pub(super) fn part(&self, force: Newtons) -> i32 {
         let bits = force.to_bits().max(0);
         bits.min(self.most_force) << self.force_places
@@ -83,6 +84,7 @@ impl Shape {
 
     /// Whether a force, its unscaled value or its run is beyond the model: one of four
     /// differences is negative.
+    #[inline(always)]
     pub(super) fn is_at_end(&self, force: Newtons, sought: i32, run: u32) -> bool {
         let half = (run >> 1) as i32;
         let force = self.most_force.saturating_sub(force.to_bits());
@@ -93,11 +95,13 @@ impl Shape {
 
     /// The force with the same run on the unscaled tread, Q30. A value that exceeds the format
     /// is beyond the model and saturates.
+    #[inline(always)]
     pub(super) fn unscaled(&self, force: i32, inverse_scale: i32) -> i32 {
         (high(force - self.middle_lifting, inverse_scale) << 4).saturating_add(self.middle_lifting)
     }
 
     /// The force with the same run on the scaled tread, Q30, below one half.
+    #[inline(always)]
     pub(super) fn scaled(&self, force: i32, scale: Ratio) -> i32 {
         let wide = i64::from(force - self.middle_lifting) * i64::from(scale.to_bits());
         // At most 4 times 3/4, over 16 places.
@@ -105,11 +109,13 @@ impl Shape {
     }
 
     /// A part of the unit, Q30, as a force.
+    #[inline(always)]
     pub(super) fn newtons(&self, part: i32) -> Newtons {
         Q16::from_bits(part >> self.force_places)
     }
 
     /// Run with this gap, Q32, within the model.
+    #[inline(always)]
     pub(super) fn run(&self, gap: Millimetres) -> u32 {
         // Gaps up to 32 mm; the ends below bound the rest.
         let bits = gap.to_bits().clamp(0, (32 << 16) - 1);
@@ -123,6 +129,7 @@ impl Shape {
     }
 
     /// Gap after this run, mm.
+    #[inline(always)]
     pub(super) fn gap(&self, run: u32) -> Millimetres {
         let [c0, c1, c2, c3, c4, c5] = self.gap;
         let gap = horner!(centred(run); c0, c1, c2, c3, c4, c5);
@@ -138,23 +145,27 @@ impl Shape {
     }
 
     /// Slope of the contact, Q30.
+    #[inline(always)]
     pub(super) fn slope(&self, w: i32) -> i32 {
         let [c0, c1, c2, c3, c4] = self.slope;
         horner!(w; c0, c1, c2, c3, c4)
     }
 
     /// Radial reaction over elastic force, Q30.
+    #[inline(always)]
     pub(super) fn cosine(&self, w: i32) -> i32 {
         let [c0, c1, c2, c3] = self.cosine;
         horner!(w; c0, c1, c2, c3)
     }
 
     /// What the lift of the load adds to the radial force, Q30.
+    #[inline(always)]
     pub(super) fn lifting(&self, w: i32) -> i32 {
         high(self.load, self.slope(w)) << 2
     }
 
     /// Radial reaction under this force, Q30, not negative.
+    #[inline(always)]
     pub(super) fn radial_part(&self, force: i32, slope: i32, w: i32) -> i32 {
         let elastic = force - (high(self.load, slope) << 2);
         high(elastic.max(0), self.cosine(w)) << 2
@@ -162,6 +173,7 @@ impl Shape {
 
     /// `T / C + s` of a driven wheel, from the radial reaction; a lift of more than twice the
     /// reaction counts as twice.
+    #[inline(always)]
     pub(super) fn utilisation(&self, radial: i32, slope: i32) -> Ratio {
         let least = self.load >> 1;
         let radial = (radial.max(least) | 1) as u32;
@@ -174,6 +186,7 @@ impl Shape {
 
     /// Elastic force after this run with a stiffness, Q26, over the instant one; Q30, not
     /// negative.
+    #[inline(always)]
     pub(super) fn elastic(&self, run: u32, stiffness: i32) -> i32 {
         let stiffness = stiffness.clamp(0, (1 << 27) - 1);
         high(self.relaxed(run) << 3, stiffness << 4) << 1
@@ -181,12 +194,14 @@ impl Shape {
 
     /// Stiffness over the instant one that carries an elastic force, Q30, after this run;
     /// Q26, 2 at most.
+    #[inline(always)]
     pub(super) fn stiffness_for(&self, elastic: i32, run: u32) -> i32 {
         let relaxed = self.relaxed(run).max(1) as u32;
         (fraction(elastic.max(0) as u32, relaxed << 3) >> 5) as i32
     }
 
     /// Relaxed force after this run, Q28, below 1.
+    #[inline(always)]
     fn relaxed(&self, run: u32) -> i32 {
         let [a0, a1, a2, a3, a4] = self.force;
         let half = (run >> 1) as i32;
@@ -196,6 +211,7 @@ impl Shape {
 
     /// The force beyond the lift of the load on the steepest slope, from 2^-7 to a quarter of
     /// the unit.
+    #[inline(always)]
     pub(super) fn beyond_lift(&self, sought: i32) -> Excess {
         let force = (sought - self.most_lifting).clamp(LEAST_EXCESS, (1 << 28) - 1);
         let octave = (force as u32).leading_zeros();
@@ -206,6 +222,7 @@ impl Shape {
     ///
     /// Equation: the guess and its derivative times the residual of the force there. A
     /// guess within 0.2 % with a derivative within 2 % leaves 1e-5 of the run.
+    #[inline(always)]
     pub(super) fn refine(
         &self,
         model: &DirectionModel,
@@ -229,11 +246,13 @@ impl Shape {
     }
 
     /// Impact stress, kPa, at a speed of [`speed`].
+    #[inline(always)]
     pub(super) fn impact_stress(&self, speed: u32) -> Q16 {
         Q16::from_bits(((u64::from(speed) * u64::from(self.stress)) >> 32) as i32)
     }
 
     /// Vibration that is left, um, at a speed of [`speed`].
+    #[inline(always)]
     pub(super) fn vibration(&self, speed: u32, radial: i32, run: u32) -> Q16 {
         // Normalised; divided by 18 bits of the run, Q(p - 2), rounded to the middle.
         let speed = speed | 1;
@@ -251,6 +270,7 @@ impl Shape {
 }
 
 /// Bits of a speed, mm/s, from 0 to 128, the nearer end outside.
+#[inline(always)]
 pub(super) fn speed(speed: MillimetresPerSecond) -> u32 {
     speed.to_bits().clamp(0, (1 << 23) - 1) as u32
 }

@@ -5,7 +5,8 @@ use anyhow::Result;
 
 use super::case::Case;
 use super::experiment::{Experiment, Run, marks as mark_runs};
-use super::history::{Histories, Points, Quantity, stage_ends_s};
+use super::histories::{Histories, stage_ends_s};
+use super::history::{Points, Quantity};
 use super::published::{AMPLITUDE_MM, CASES, COLLISION_N, LOG_S, STRESS};
 use super::simulation;
 use super::theory::{self, Drive, Lift};

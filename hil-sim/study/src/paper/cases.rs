@@ -2,7 +2,8 @@
 //! loads.
 
 use super::case::{Case, Loads};
-use super::history::{Histories, Quantity, panels};
+use super::histories::{Histories, panels};
+use super::history::Quantity;
 use super::published::{CASES, COLLISION_N};
 use super::transitions::{count_humps, first_rises, peaks_text};
 use crate::figure::{Claim, Figure, SOURCES, Series, Source};

@@ -88,7 +88,8 @@ mod tests {
     use crate::figure::Source;
     use crate::paper::case::{Case, Loads};
     use crate::paper::experiment;
-    use crate::paper::history::{Histories, Quantity};
+    use crate::paper::histories::Histories;
+    use crate::paper::history::Quantity;
 
     #[test]
     fn the_area_is_that_of_a_fine_sum() {

@@ -2,7 +2,8 @@
 
 use super::case::{Case, Loads};
 use super::experiment::STAGES;
-use super::history::{Histories, Quantity, panels};
+use super::histories::{Histories, panels};
+use super::history::Quantity;
 use crate::figure::{Claim, Figure, SOURCES, Source};
 
 /// Cases: the study's four at a third of their preload, which spans the 33 to 40 N that
