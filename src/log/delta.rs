@@ -14,7 +14,7 @@ use crate::units::{Duty, Q16};
 
 /// Fields of a record coded as differences, after the tick: the ages, and the quantities of
 /// [`Telemetry`].
-const NUMBERS: usize = 1 + Telemetry::COLUMNS.len();
+const NUMBERS: usize = 1 + Telemetry::QUANTITIES;
 
 /// Words of a record that are copied.
 const WORDS: usize = 6;

@@ -206,7 +206,7 @@ pub(super) mod tests {
 
     /// Any record that a tick can leave.
     pub(in crate::log) fn any_record() -> impl Strategy<Value = Record> {
-        let quantities = any::<[i32; Telemetry::COLUMNS.len()]>();
+        let quantities = any::<[i32; Telemetry::QUANTITIES]>();
         (
             (any::<u32>(), 0..18_usize, 1..=6_u8, any::<u8>(), quantities, any::<[i16; 2]>()),
             (any::<[u16; 4]>(), any::<[u8; 4]>(), any::<[u16; 2]>(), 0..1_u16 << 15),

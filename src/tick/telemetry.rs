@@ -4,10 +4,10 @@ use crate::estimate::ContactStage;
 use crate::supervise::Mode;
 use crate::units::{Duty, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Tick};
 
-/// Declares the row. Each quantity has one line with its unit and column name; field, position
-/// in the binary log and column come from it.
+/// Declares the row: each quantity has one line, and its position in the binary log is that of
+/// the line.
 macro_rules! telemetry {
-    ($($(#[$doc:meta])* $field:ident: $unit:ty = $column:literal,)*) => {
+    ($($(#[$doc:meta])* $field:ident: $unit:ty,)*) => {
         /// All control-rate quantities of one tick.
         #[derive(Clone, Copy, Debug, Default, PartialEq)]
         pub struct Telemetry {
@@ -27,17 +27,16 @@ macro_rules! telemetry {
         }
 
         impl Telemetry {
-            /// Columns of the quantities, in the order of [`quantities`](Self::quantities).
-            pub const COLUMNS: [&'static str; [$($column),*].len()] = [$($column),*];
-
+            /// Number of quantities.
+            pub const QUANTITIES: usize = [$(stringify!($field)),*].len();
 
             /// The quantities, in the order of their declaration.
-            pub const fn quantities(&self) -> [Q16; Self::COLUMNS.len()] {
+            pub const fn quantities(&self) -> [Q16; Self::QUANTITIES] {
                 [$(self.$field),*]
             }
 
             /// The row with these quantities.
-            pub const fn with_quantities(mut self, all: [Q16; Self::COLUMNS.len()]) -> Self {
+            pub const fn with_quantities(mut self, all: [Q16; Self::QUANTITIES]) -> Self {
                 [$(self.$field),*] = all;
                 self
             }
@@ -47,26 +46,26 @@ macro_rules! telemetry {
 
 telemetry! {
     /// Estimated axial position, mm.
-    position: Millimetres = "position_mm",
+    position: Millimetres,
     /// Estimated speed, mm/s.
-    speed: MillimetresPerSecond = "speed_mm_s",
+    speed: MillimetresPerSecond,
     /// Speed asked for by the profile, mm/s.
-    speed_ref: MillimetresPerSecond = "speed_ref_mm_s",
+    speed_ref: MillimetresPerSecond,
     /// Measured preload, N.
-    preload: Newtons = "preload_n",
+    preload: Newtons,
     /// Preload asked for, N.
-    preload_ref: Newtons = "preload_ref_n",
+    preload_ref: Newtons,
     /// Measured tread compression, mm.
-    compression: Millimetres = "compression_mm",
+    compression: Millimetres,
     /// Wheel centre's distance from the pillar axis, from the arm angle, mm.
-    radius: Millimetres = "radius_mm",
+    radius: Millimetres,
     /// Gap predicted for the step ahead, mm.
-    gap_predicted: Millimetres = "gap_predicted_mm",
+    gap_predicted: Millimetres,
     /// Friction left unused, by the model for the present contact.
-    slip_margin: Ratio = "slip_margin",
+    slip_margin: Ratio,
     /// Amplitude of the arm's mode: its largest since the approach to the latest step
     /// began, mm.
-    vibration: Millimetres = "vibration_mm",
+    vibration: Millimetres,
     /// Distance to the next corner touch, mm; 32767 when none is expected.
-    distance: Millimetres = "distance_mm",
+    distance: Millimetres,
 }

@@ -121,21 +121,8 @@ impl ControllerView {
 
 /// Adds every bit of the controller's output in this tick.
 fn digest(digest: &mut Sha256, seen: &Telemetry) {
-    let quantities = [
-        seen.position,
-        seen.speed,
-        seen.speed_ref,
-        seen.preload,
-        seen.preload_ref,
-        seen.compression,
-        seen.radius,
-        seen.gap_predicted,
-        seen.slip_margin,
-        seen.vibration,
-        seen.distance,
-    ];
     digest.update(seen.at.to_le_bytes());
-    for quantity in quantities {
+    for quantity in seen.quantities() {
         digest.update(quantity.to_bits().to_le_bytes());
     }
     digest.update([mode_number(seen.mode), seen.stage as u8, seen.level]);

@@ -1,8 +1,8 @@
 //! One row a tick: the controller's inputs and outputs, and the plant's truth beside them.
 //!
 //! The fields of [`Controller`] and [`TrueState`] are the columns of CSV, MCAP and JSON; serde
-//! derives their names, order and schema. A new column is a new field with its value in the
-//! function below it.
+//! derives their names, order and schema. A new column of the controller is a new field with its
+//! value in `unknown`, `of` and `telemetry`; one of the plant a field of `TrueState`.
 
 use interstage::log::{Flags, Record, codes};
 use interstage::sense::raw::{
@@ -417,25 +417,17 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_tick_keeps_every_bit(q in prop::array::uniform11(any::<i32>()), duties in any::<[i16; 2]>()) {
-            let q = q.map(Q16::from_bits);
+        fn a_tick_keeps_every_bit(
+            quantities in any::<[i32; Telemetry::QUANTITIES]>(),
+            [drive, pretightener] in any::<[i16; 2]>(),
+        ) {
             let telemetry = Telemetry {
                 at: 77,
-                position: q[0],
-                speed: q[1],
-                speed_ref: q[2],
-                preload: q[3],
-                preload_ref: q[4],
-                compression: q[5],
-                radius: q[6],
-                gap_predicted: q[7],
-                slip_margin: q[8],
-                vibration: q[9],
-                distance: q[10],
-                drive: Duty::from_bits(duties[0]),
-                pretightener: Duty::from_bits(duties[1]),
+                drive: Duty::from_bits(drive),
+                pretightener: Duty::from_bits(pretightener),
                 ..Telemetry::default()
-            };
+            }
+            .with_quantities(quantities.map(Q16::from_bits));
             let record = Record { telemetry, ..Record::default() };
             let controller = Controller::of(&record, &SensorFrame::default());
             prop_assert_eq!(controller.telemetry(), Some(telemetry));
@@ -443,6 +435,19 @@ mod tests {
             let tick = Tick { controller, truth: None };
             let text = serde_json::to_string(&tick).unwrap();
             prop_assert_eq!(serde_json::from_str::<Tick>(&text).unwrap(), tick);
+        }
+    }
+
+    #[test]
+    fn of_an_unknown_tick_only_the_time_is_a_number() {
+        let columns = |tick: &Controller| serde_json::to_value(tick).unwrap();
+        let known = columns(&Controller::of(&Record::default(), &SensorFrame::default()));
+        let unknown = columns(&Controller::unknown(5));
+        let numbers = known.as_object().unwrap().iter().filter(|(_, value)| value.is_f64());
+        let names: Vec<&String> = numbers.map(|(name, _)| name).collect();
+        assert!(names.len() > Telemetry::QUANTITIES, "{names:?}");
+        for name in names {
+            assert_eq!(unknown[name].is_null(), name != "t_s", "{name}");
         }
     }
 
