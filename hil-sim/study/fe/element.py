@@ -77,7 +77,7 @@ class Rubber:
         f = self.deformation(x)
         cof = self.cofactor(f)
         j = np.linalg.det(f)
-        if j.min() < 0.2:
+        if j.min() < 0.01:
             raise ArithmeticError("element collapsed")
         inv = np.linalg.inv(f)
         pq = np.einsum("egq,eq->eg", self.q, p)

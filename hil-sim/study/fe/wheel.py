@@ -71,7 +71,10 @@ class Wheel:
             if iteration == 1:
                 given[mesh.hub] = hub_shift[mesh.hub]
             given.reshape(-1)[held] = values - s.x.reshape(-1)[held]
-            stiffness, force, kept = self.rubber.system(s.x, s.p)
+            try:
+                stiffness, force, kept = self.rubber.system(s.x, s.p)
+            except ArithmeticError as error:
+                raise NotConverged(str(error)) from error
             free = np.setdiff1d((2 * self.inner[:, None] + np.arange(2)).ravel(), held)
             arm = (s.x + hub_shift * (iteration == 1))[mesh.hub] - s.centre
             columns, rows, wanted = [], [], []
@@ -119,15 +122,11 @@ class Wheel:
                 step[nf] if move_height else 0.0,
                 step[nf + move_height] if move_angle else 0.0,
             )
-            try:
-                if size < 1e-2:
-                    # Forces that belong to the corrected state, to first order.
-                    reaction = force + stiffness @ dx.reshape(-1)
-                    changed = s.contact.update(s.x, reaction)
-                    if size < tol and not changed:
-                        break
-            except ArithmeticError as error:
-                raise NotConverged(str(error)) from error
+            if size < 1e-2:
+                # Forces that belong to the corrected state, to first order.
+                changed = s.contact.update(s.x, force + stiffness @ dx.reshape(-1))
+                if size < tol and not changed:
+                    break
         else:
             raise NotConverged(f"{limit} iterations")
         s.force, s.iterations = force, iteration
