@@ -39,7 +39,7 @@ def build(thickness, grading):
     return Wheel(mesh, Rubber(mesh.nodes, mesh.elements, NU))
 
 
-def static_curve(thickness, h, grading=Grading(), most_load=np.inf, stride=0.25, driven=False):
+def static_curve(thickness, h, grading=Grading(), most_load=np.inf, stride=0.25, driven=False, pinned=0):
     """Relaxed rubber, from first touch to `most_load`, the wheel pushed at its axle without torque.
 
     Driven: the hub's torque replaces the push, the edge node grips, the walls have no friction.
@@ -47,9 +47,10 @@ def static_curve(thickness, h, grading=Grading(), most_load=np.inf, stride=0.25,
     wheel = build(thickness, grading)
     contact = Contact(wheel.mesh, h)
     contact.floor_open = False
-    contact.pin(0)
+    contact.pin(pinned)
     centre = first_touch(h)
-    state = wheel.rest(centre, np.arctan2(h - centre[1], -centre[0]), contact)
+    ahead = contact.arc[pinned] / RADIUS
+    state = wheel.rest(centre, np.arctan2(h - centre[1], -centre[0]) - ahead, contact)
     curve = Curve(thickness, h, elements=len(wheel.mesh.elements))
     step = stride
     mode = {"push": 0.0} if driven else {}

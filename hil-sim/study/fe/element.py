@@ -141,3 +141,36 @@ class Maxwell:
         keep, old, new = self.parts
         self.inner = keep * self.inner + old * self.past + new * now
         self.past = now
+
+
+class StressMaxwell(Maxwell):
+    """The same branch with another finite-strain law, S_1' = T' - S_1/tau.
+
+    T is the deviatoric second Piola-Kirchhoff stress of the branch's spring. Both laws agree at
+    small strain. The part of T along C^-1 joins the pressure within the step.
+    """
+
+    def __init__(self, rubber, x, ratio, tau):
+        super().__init__(rubber, x, ratio, tau)
+        self.past = self._spring(x)
+        self.inner = np.zeros_like(self.past)
+
+    def _spring(self, x):
+        f = self.rubber.deformation(x)
+        c = f.transpose(0, 1, 3, 2) @ f
+        trace = (c[..., 0, 0] + c[..., 1, 1] + 1) / 3
+        return self.mu * (np.eye(2) - trace[..., None, None] * np.linalg.inv(c))
+
+    def begin(self, dt):
+        z = dt / self.tau
+        keep = np.exp(-z)
+        mean = (1 - keep) / z
+        self.parts = keep, mean
+        self.rubber.a = (1 + self.mu * mean) * np.eye(2) + keep * self.inner - mean * self.past
+        self.rubber.m = 1 + self.mu * mean
+
+    def commit(self, x):
+        now = self._spring(x)
+        keep, mean = self.parts
+        self.inner = keep * self.inner + mean * (now - self.past)
+        self.past = now

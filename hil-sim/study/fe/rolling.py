@@ -48,7 +48,7 @@ def edge_inside(wheel, state, h):
     return 2 * int(np.argmin(np.abs(turn[::2])))
 
 
-def crossing(thickness, h, load, speed, ratio, tau, grading=Grading(), stride=0.1, run_up=12.0):
+def crossing(thickness, h, load, speed, ratio, tau, grading=Grading(), stride=0.1, run_up=12.0, law=Maxwell):
     """Release under `load` (per width and relaxed modulus) at `speed`, mm/s, from rest."""
     wheel = build(thickness, grading)
     height = RADIUS - 0.5
@@ -57,7 +57,7 @@ def crossing(thickness, h, load, speed, ratio, tau, grading=Grading(), stride=0.
         x = meet - run_up
         state = on_floor(wheel, load, x, np.arctan2(h - height, -meet) + run_up / RADIUS, h)
         height = state.centre[1]
-    memory = Maxwell(wheel.rubber, state.x, ratio, tau)
+    memory = law(wheel.rubber, state.x, ratio, tau)
     steps = iterations = 0
     thrust = 0.0
 
