@@ -39,11 +39,8 @@ def build(thickness, grading):
     return Wheel(mesh, Rubber(mesh.nodes, mesh.elements, NU))
 
 
-def static_curve(thickness, h, grading=Grading(), most_load=np.inf, stride=0.25, driven=False, pinned=0):
-    """Relaxed rubber, from first touch to `most_load`, the wheel pushed at its axle without torque.
-
-    Driven: the hub's torque replaces the push, the edge node grips, the walls have no friction.
-    """
+def static_curve(thickness, h, grading=Grading(), most_load=np.inf, stride=0.25, pinned=0):
+    """Relaxed rubber, from first touch to `most_load`, the wheel pushed at its axle without torque."""
     wheel = build(thickness, grading)
     contact = Contact(wheel.mesh, h)
     contact.floor_open = False
@@ -53,10 +50,9 @@ def static_curve(thickness, h, grading=Grading(), most_load=np.inf, stride=0.25,
     state = wheel.rest(centre, np.arctan2(h - centre[1], -centre[0]) - ahead, contact)
     curve = Curve(thickness, h, elements=len(wheel.mesh.elements))
     step = stride
-    mode = {"push": 0.0} if driven else {}
     while curve.load[-1:] < [most_load] and state.centre[0] < -0.3:
         try:
-            state = wheel.solve(state, step if curve.load else 0.2 * step, touch=True, **mode)
+            state = wheel.solve(state, step if curve.load else 0.2 * step, touch=True)
         except NotConverged as why:
             step /= 2
             if step < stride / 40:
