@@ -1,8 +1,9 @@
-"""Frictionless contact of rim nodes with the walls, as an active set.
+"""Contact of rim nodes with the walls, as an active set.
 
 The lower wall is y = 0, the riser x = 0, the upper wall y = h; the sharp edge is at (0, h). One rim
 node is pinned to the edge. Nodes ahead of it may bear on the upper wall, nodes behind it on the
-riser or the lower wall. A bearing node keeps one coordinate and is free along the wall.
+riser or the lower wall. A bearing node keeps one coordinate and is free along the wall;
+with `grip` a node on the step keeps both.
 """
 
 import numpy as np
@@ -21,6 +22,8 @@ class Contact:
         self.floor_open = True  # whether the lower wall is there
         self.sets = [np.zeros(n, bool) for _ in range(3)]
         self.seen = set()
+        self.grip = False  # whether nodes that bear on the step stay where they touched it
+        self.held_at = np.zeros((n, 2))
 
     def pin(self, place):
         self.edge = place
@@ -38,6 +41,10 @@ class Contact:
         """Degrees of freedom that are held, and where."""
         dofs = [2 * self.rim[self.sets[FLOOR]] + 1, 2 * self.rim[self.sets[FACE]], 2 * self.rim[self.sets[TOP]] + 1]
         values = [np.zeros(len(dofs[0])), np.zeros(len(dofs[1])), np.full(len(dofs[2]), self.h)]
+        if self.grip:
+            for kind, along in ((FACE, 1), (TOP, 0)):
+                dofs.append(2 * self.rim[self.sets[kind]] + along)
+                values.append(self.held_at[self.sets[kind], along])
         if self.edge is not None:
             node = self.rim[self.edge]
             dofs.append(np.array([2 * node, 2 * node + 1]))
@@ -62,6 +69,8 @@ class Contact:
         if changed and key in self.seen:
             return False  # a node at the end of a patch that neither bears nor clears
         self.seen.add(key)
+        fresh = (new[FACE] & ~self.sets[FACE]) | (new[TOP] & ~self.sets[TOP])
+        self.held_at = np.where(fresh[:, None], at, self.held_at)
         self.sets = new
         return changed
 

@@ -18,19 +18,25 @@ def depth(psi, x, y, h):
     return RADIUS - wall
 
 
-def static_gap(load, h):
+def carried(force, psi, driven):
+    """Vertical load of radial forces; driven: with equally used friction and no push at the axle."""
+    up, back = (force * np.cos(psi)).sum(), (force * np.sin(psi)).sum()
+    return up + (back**2 / up if driven and up > 0 else 0.0)
+
+
+def static_gap(load, h, driven=False):
     """The lower wall is released with the centre at the radius; only the step carries."""
     psi = np.linspace(-0.2, 1.4, 400001)
 
     def excess(x):
         d = np.maximum(depth(psi, x, RADIUS, h), 0.0)
-        return K_INF * WIDTH * RADIUS * np.trapezoid(d * np.cos(psi), psi) - load
+        return carried(K_INF * WIDTH * RADIUS * (psi[1] - psi[0]) * d, psi, driven) - load
 
     x = brentq(excess, -np.sqrt(RADIUS**2 - (RADIUS - h) ** 2), -0.05)
     return float(np.hypot(x, RADIUS) - RADIUS)
 
 
-def moving_gap(load, h, speed, elements=8640, stride=0.01, run_up=12.0):
+def moving_gap(load, h, speed, driven=False, elements=8640, stride=0.01, run_up=12.0):
     """Gap with memory, from a relaxed start on the lower wall."""
     k1 = K_INF * (STIFFENING - 1)
     pitch = 2 * np.pi / elements
@@ -45,17 +51,16 @@ def moving_gap(load, h, speed, elements=8640, stride=0.01, run_up=12.0):
         psi = angles - (x - start) / RADIUS
         seen = np.abs(psi) < 1.2
         ps = psi[seen]
-        carried = (keep * q + (mean - keep) * old)[seen]
-        cos = np.cos(ps)
+        kept = (keep * q + (mean - keep) * old)[seen]
 
         def loads(height):
             d = np.maximum(depth(ps, x, height, h), 0.0)
-            own = d * (1 - mean) + carried
+            own = d * (1 - mean) + kept
             p = K_INF * d if y is None else K_INF * d + k1 * (d - own)
-            return d, np.where(d > 0, np.maximum(p, 0.0), 0.0) * cos * area
+            return d, np.where(d > 0, np.maximum(p, 0.0), 0.0) * area
 
         low, high = (RADIUS - 4, RADIUS) if y is None else (y - 0.1, y + 0.1)
-        height = brentq(lambda a: loads(a)[1].sum() - load, low, high, xtol=1e-10)
+        height = brentq(lambda a: carried(loads(a)[1], ps, driven) - load, low, high, xtol=1e-10)
         d, force = loads(height)
         floor = force[x + height * np.tan(ps) < 0].sum()
         if floor_old is not None and floor <= 0:

@@ -1,6 +1,6 @@
 """A crossing of rubber with memory: the wheel rolls on the lower wall, meets the edge, climbs."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,9 +22,6 @@ class Release:
     steps: int
     iterations: int
     elements: int
-
-    def record(self):
-        return asdict(self)
 
 
 def on_floor(wheel, load, x, angle, h):
@@ -48,8 +45,14 @@ def edge_inside(wheel, state, h):
     return 2 * int(np.argmin(np.abs(turn[::2])))
 
 
-def crossing(thickness, h, load, speed, ratio, tau, grading=Grading(), stride=0.1, run_up=12.0, law=Maxwell):
-    """Release under `load` (per width and relaxed modulus) at `speed`, mm/s, from rest."""
+def crossing(
+    thickness, h, load, speed, ratio, tau, grading=Grading(), stride=0.1, run_up=12.0, law=Maxwell, driven=False
+):
+    """Release under `load` (per width and relaxed modulus) at `speed`, mm/s, from rest.
+
+    Pushed: no torque at the hub, no friction. Driven: torque instead of push while the wheel
+    climbs, and nodes that bear on the step stay where they touched it.
+    """
     wheel = build(thickness, grading)
     height = RADIUS - 0.5
     for _ in range(2):
@@ -68,7 +71,8 @@ def crossing(thickness, h, load, speed, ratio, tau, grading=Grading(), stride=0.
             state = state.copy()
             state.contact.floor_open = False
             state.contact.sets[FLOOR][:] = False
-        return wheel.solve(state, dx, load=load, angle=None if climbing else state.angle - dx / RADIUS)
+        push = 0.0 if driven and climbing else None
+        return wheel.solve(state, dx, load=load, angle=None if climbing else state.angle - dx / RADIUS, push=push)
 
     step = 2 * stride
     while state.centre[0] < -0.3:
@@ -89,6 +93,7 @@ def crossing(thickness, h, load, speed, ratio, tau, grading=Grading(), stride=0.
             place = edge_inside(wheel, state, h)
             if place is not None:
                 state.contact.pin(place)
+                state.contact.grip = driven
         near = state.contact.edge is not None or state.centre[0] > meet - 4 * stride
         step = min(1.5 * step, stride if near else 2 * stride)
     raise NotConverged("the lower wall is never released")

@@ -50,11 +50,12 @@ class Wheel:
         x = self.mesh.nodes @ turned(angle).T + centre
         return State(x, np.zeros((len(self.mesh.elements), 3)), np.array(centre, float), angle, contact)
 
-    def solve(self, start, travel, *, load=None, touch=False, angle=None, limit=40, tol=1e-9):
+    def solve(self, start, travel, *, load=None, touch=False, angle=None, push=None, limit=40, tol=1e-9):
         """State after the hub has moved by `travel` along the wall.
 
         Height: given by `load`, or by the lowest point on the lower wall without force (`touch`),
-        or kept. Angle: prescribed by `angle`, or free with zero torque.
+        or kept. Angle: prescribed by `angle`, or free with zero torque,
+        or free with the hub's horizontal force `push`.
         """
         s = start.copy()
         mesh, n = self.mesh, len(self.mesh.nodes)
@@ -87,8 +88,8 @@ class Wheel:
                 wanted.append(0.0 if touch else -load)
             if move_angle:
                 columns.append(turn)
-                rows.append(turn)
-                wanted.append(0.0)
+                rows.append(turn if push is None else unit(hub_x, np.ones(len(hub_x))))
+                wanted.append(0.0 if push is None else push)
             pick = unit_columns(free, 2 * n)
             right = sp.hstack([pick] + columns, format="csc")
             left = sp.hstack([pick] + rows, format="csc")
@@ -100,7 +101,7 @@ class Wheel:
             if touch:
                 extra[nf] = sp.csr_matrix((low[2], (np.zeros(3, int), 2 * low[1] + 1)), shape=(1, 2 * n)) @ right
                 residual[nf] = low[0]
-            if move_angle:
+            if move_angle and push is None:
                 extra[-1, -1] -= (force.reshape(n, 2)[mesh.hub] * arm).sum()
             matrix = matrix + extra.tocsr()
             try:
