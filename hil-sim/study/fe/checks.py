@@ -3,9 +3,10 @@
 import numpy as np
 
 from contact import Contact
-from crossing import NU, RADIUS, Wheel, first_touch, static_curve
+from crossing import NU, RADIUS, static_curve
 from element import Rubber
 from mesh import Grading, annulus
+from wheel import Wheel
 
 
 def patch():

@@ -47,6 +47,6 @@ def figure(rows, path, h=4.0):
         keys.append((f"finite elements, tread {thickness:g} mm", colour, 'stroke-dasharray="6 3"'))
     for k, (name, colour, dash) in enumerate(keys):
         y = TOP + 20 + 18 * k
-        out.append(f'<path d="M330 {y - 4}h30" stroke="{colour}" stroke-width="2" {dash}/>')
-        out.append(_text(366, y, name))
+        out.append(f'<path d="M312 {y - 4}h30" stroke="{colour}" stroke-width="2" {dash}/>')
+        out.append(_text(348, y, name))
     path.write_text("\n".join(out + ["</svg>"]) + "\n")

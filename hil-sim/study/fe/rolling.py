@@ -100,12 +100,15 @@ def crossing(
 
 
 def _release(advance, state, step, counts):
-    """Finds the part of the step after which the rim just touches the lower wall."""
-    low, high = 0.0, step
-    lowest = lambda dx: (lambda s: (s.contact.lowest(s.x)[0], s))(advance(state, dx, floor=False))
+    """Finds the part of the step after which the rim just touches the lower wall, by secants."""
+
+    def lowest(dx):
+        found = advance(state, dx, floor=False)
+        return found.contact.lowest(found.x)[0], found
+
+    low, high = 1e-3 * step, step
+    bottom, _ = lowest(low)
     top, after = lowest(high)
-    bottom, _ = lowest(1e-3 * step)
-    low = 1e-3 * step
     for _ in range(12):
         if abs(top) < 1e-6:
             break
@@ -116,4 +119,5 @@ def _release(advance, state, step, counts):
     else:
         raise NotConverged("the release is not found")
     thrust, steps, iterations, elements = counts
-    return Release(after.gap(RADIUS), float(after.centre[1]), float(after.centre[0]), thrust, steps, iterations, elements)
+    x, height = (float(v) for v in after.centre)
+    return Release(after.gap(RADIUS), height, x, thrust, steps, iterations, elements)
