@@ -10,7 +10,7 @@ mod board;
 #[cfg(not(target_os = "none"))]
 fn main() -> std::process::ExitCode {
     eprintln!("interstage is firmware for the NUCLEO-G474RE and does not run here.");
-    eprintln!("Flash it with `cargo flash`, or try it without a board: `cargo rig deploy`.");
+    eprintln!("Flash it with `cargo rig flash`, or try it without a board: `cargo rig deploy`.");
     std::process::ExitCode::from(2)
 }
 

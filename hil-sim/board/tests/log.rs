@@ -150,7 +150,7 @@ fn deployment(reader: Reader) -> (u32, Crossings, Ticks) {
 /// Ledgers that differ by no more than noise: the journal's time differs, and with it the
 /// cycle in which an interrupt is taken, which the loop amplifies as it does any noise. That
 /// the controller itself gives the same bits is seen in lockstep, where there is no such
-/// thing: `board_hil.rs`.
+/// thing: `hil.rs`.
 fn alike(name: &str, read: &(u32, Crossings, Ticks), other: &(u32, Crossings, Ticks)) {
     assert!(read.0.abs_diff(other.0) <= 20, "{name}: {} ms, {} ms", read.0, other.0);
     assert_eq!((read.1.len(), other.1.len()), (3, 3), "{name}");

@@ -196,7 +196,7 @@ impl Report<'_> {
             ((GEARBOX, "gearbox friction", "N", "drive effort on the smooth wall"), &itself),
             ((RADIUS, "rig.wheel_radius_mm", "mm", "shape of the climbs"), &itself),
             ((LOAD_GAIN, "preload sensor gain", "", "loads against the drive"), &f64::exp),
-            ((TREAD_GAIN, "displacement gain", "", "compression against the arm"), &f64::exp),
+            ((TREAD_GAIN, "compression sensor gain", "", "compression against the arm"), &f64::exp),
             ((CREEP, "plant.elastic_creep", "", "creep at the climbs"), &f64::exp),
             ((DRIVE, "drive force over nominal", "", "effort against load"), &f64::exp),
             ((ARM_ZERO, "sense.angle_zero_code", "codes", "arm angle at known radii"), &arm_zero),
@@ -271,7 +271,7 @@ impl Report<'_> {
         };
         [
             of("preload sensor zero", "N", |run| run.traces.preload_zero),
-            of("displacement zero", "mm", |run| run.traces.compression_zero),
+            of("compression sensor zero", "mm", |run| run.traces.compression_zero),
         ]
     }
 

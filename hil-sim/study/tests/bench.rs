@@ -43,7 +43,7 @@ fn a_quick_measurement_prints_one_object_with_its_keys() {
 }
 
 #[test]
-fn the_shipping_model_costs_less_than_500_cycles_and_answers_as_on_the_host() {
+fn the_shipping_model_costs_less_than_550_cycles_and_answers_as_on_the_host() {
     if !super::long() {
         return;
     }
@@ -51,7 +51,7 @@ fn the_shipping_model_costs_less_than_500_cycles_and_answers_as_on_the_host() {
     let mut variants = model::measure().unwrap();
     cycles::fill(&calls, &mut variants).unwrap();
     let fixed = &variants[0];
-    assert!(fixed.forward.cycles.unwrap() <= 500 && fixed.inverse.cycles.unwrap() <= 350);
+    assert!(fixed.forward.cycles.unwrap() <= 550 && fixed.inverse.cycles.unwrap() <= 350);
 }
 
 #[test]

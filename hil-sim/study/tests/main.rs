@@ -3,6 +3,7 @@
 mod bench;
 mod constants;
 mod docs;
+mod fe;
 mod paper;
 
 /// Whether the long tests run.
