@@ -25,8 +25,7 @@ fn ring_gap_mm(stiffening: f64, step_height_mm: f64, speed_mm_s: f64, preload_n:
         elements: 5760,
     };
     let axial = Axial::Pushed;
-    let case =
-        CrossingCase { ring, step_height_mm, speed_mm_s, preload_n, axial, stride_mm: 0.01 };
+    let case = CrossingCase { ring, step_height_mm, speed_mm_s, preload_n, axial, stride_mm: 0.01 };
     cross(&case).expect("balanced").gap_mm
 }
 
