@@ -82,7 +82,7 @@ enum Method {
 
 /// A crossing to compute.
 #[derive(Clone, Copy, Debug, Serialize)]
-struct Case {
+struct CrossingSetup {
     speed_mm_s: f64,
     preload_n: f64,
     #[serde(skip)]
@@ -119,7 +119,7 @@ struct Printed<'a> {
     rig: &'a str,
     direction: &'static str,
     #[serde(flatten)]
-    case: Case,
+    case: CrossingSetup,
     #[serde(flatten)]
     figures: Figures,
 }
@@ -138,7 +138,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     }
     let scenario = args.scenario.resolve()?;
     let loads = &scenario.rig.plant;
-    let case = Case {
+    let case = CrossingSetup {
         speed_mm_s: args.speed_mm_s,
         preload_n: args.preload_n,
         direction: if args.retract { Direction::Retract } else { Direction::Deploy },
@@ -201,7 +201,7 @@ fn human(printed: &Printed<'_>) -> String {
 }
 
 /// The ring with memory, as the plant has it.
-fn ring(rig: &Rig, case: &Case) -> Result<Figures, Failure> {
+fn ring(rig: &Rig, case: &CrossingSetup) -> Result<Figures, Failure> {
     let (elements, stride_mm) = FINENESS;
     let result = cross(&CrossingCase {
         ring: RingParameters::of(rig, elements),
@@ -228,9 +228,9 @@ fn ring(rig: &Rig, case: &Case) -> Result<Figures, Failure> {
 }
 
 /// The reduced model in f64.
-fn reduced(rig: &Rig, case: &Case) -> Figures {
+fn reduced(rig: &Rig, case: &CrossingSetup) -> Figures {
     let formula = Formula::new(rig);
-    let Case { speed_mm_s, preload_n, direction, load_n } = *case;
+    let CrossingSetup { speed_mm_s, preload_n, direction, load_n } = *case;
     let crossing = formula.crossing(direction, speed_mm_s, preload_n, load_n);
     let kind = Kind { direction, driven: load_n.is_some() };
     let longest = formula.gap_after_mm(formula.largest_run_mm(kind));
@@ -249,7 +249,7 @@ fn reduced(rig: &Rig, case: &Case) -> Figures {
 }
 
 /// The reduced model as the firmware runs it.
-fn fixed(rig: &Rig, case: &Case) -> Result<Figures, Failure> {
+fn fixed(rig: &Rig, case: &CrossingSetup) -> Result<Figures, Failure> {
     let model = ReducedModel::try_build_for(rig, case.load_n)?;
     let speed = Q16::from_num(case.speed_mm_s);
     let point = Point { direction: case.direction, speed, scale: Scale::NOMINAL };
@@ -267,7 +267,7 @@ fn fixed(rig: &Rig, case: &Case) -> Result<Figures, Failure> {
 }
 
 /// Work of a frictionless elastic climb, mJ: the preload times the step's height.
-fn elastic_work_mj(rig: &Rig, case: &Case) -> f64 {
+fn elastic_work_mj(rig: &Rig, case: &CrossingSetup) -> f64 {
     f64::from(case.direction.sign()) * case.preload_n * rig.rig.step_height_mm
 }
 
@@ -275,8 +275,8 @@ fn elastic_work_mj(rig: &Rig, case: &Case) -> f64 {
 mod tests {
     use super::*;
 
-    fn case(speed_mm_s: f64, preload_n: f64, load_n: Option<f64>) -> Case {
-        Case { speed_mm_s, preload_n, direction: Direction::Deploy, load_n }
+    fn case(speed_mm_s: f64, preload_n: f64, load_n: Option<f64>) -> CrossingSetup {
+        CrossingSetup { speed_mm_s, preload_n, direction: Direction::Deploy, load_n }
     }
 
     #[test]
@@ -285,7 +285,7 @@ mod tests {
         let close = |a: f64, b: f64, within: f64| assert!((a / b - 1.0).abs() < within);
         for direction in [Direction::Deploy, Direction::Retract] {
             for load_n in [None, Some(6.7)] {
-                let case = Case { direction, ..case(8.0, 40.0, load_n) };
+                let case = CrossingSetup { direction, ..case(8.0, 40.0, load_n) };
                 let (exact, got) = (reduced(&rig, &case), fixed(&rig, &case).unwrap());
                 close(got.gap_mm, exact.gap_mm, 5e-4);
                 close(got.corner_force_n, exact.corner_force_n, 2e-3);

@@ -136,7 +136,7 @@ pub fn identify(records: &[Record], scenario: &Scenario) -> Result<Identificatio
         records.iter().map(|record| Run::of(record, &coordinates)).collect::<Result<_, _>>()?;
     let contact = contact::fit(&runs, &coordinates)?;
     let actuator = actuator::fit(records, &runs, &contact.trajectories, contact.x[RADIUS])?;
-    let report = Report { scenario, coordinates: &coordinates, runs: &runs, contact: &contact };
+    let report = Document { scenario, coordinates: &coordinates, runs: &runs, contact: &contact };
     let mut parameters = report.contact_parameters();
     parameters.extend(report.actuator_parameters(&actuator));
     parameters.extend(report.zeros());
@@ -151,7 +151,7 @@ pub fn identify(records: &[Record], scenario: &Scenario) -> Result<Identificatio
     })
 }
 
-struct Report<'a> {
+struct Document<'a> {
     scenario: &'a Scenario,
     coordinates: &'a Coordinates,
     runs: &'a [Run],
@@ -161,7 +161,7 @@ struct Report<'a> {
 /// A coordinate as a parameter: its index, name, unit and evidence.
 type Shown<'a> = (usize, &'a str, &'static str, &'a str);
 
-impl Report<'_> {
+impl Document<'_> {
     /// The parameter of a coordinate: `of` takes it to the parameter's own unit.
     fn parameter(&self, (index, name, unit, by): Shown<'_>, of: &dyn Fn(f64) -> f64) -> Parameter {
         let (x, prior) = (self.contact.x[index], self.coordinates.priors()[index]);

@@ -17,11 +17,11 @@ use interstage::rig::Rig;
 use interstage::units::Direction;
 
 use data::Row;
-use design::{Case, Use};
+use design::{DesignPoint, Use};
 
 /// All crossings of the file, in its order.
 #[must_use]
-pub fn plan() -> Vec<(Case, Use)> {
+pub fn plan() -> Vec<(DesignPoint, Use)> {
     let formula = Formula::new(&Rig::fe());
     let mut all = Vec::new();
     for kind in Kind::ALL {

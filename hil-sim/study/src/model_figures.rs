@@ -10,7 +10,7 @@ use crate::figure::{Figure, Panel, Series, Source};
 use crate::paper::published::{AMPLITUDE_MM, CASES, COLLISION_N, STRESS};
 use crate::reference::rubber::{Rubber, THICKNESS_MM};
 use crate::reference::vibration::{Arm, CONSTRAINED_HZ, FREE_HZ, bending};
-use crate::reference::{Case, Resolution, collision, impact};
+use crate::reference::{ReferenceCase, Resolution, collision, impact};
 use hil_sim::plant::balance::BalanceError;
 use hil_sim::plant::crossing::{CrossingCase, CrossingResult, cross};
 
@@ -81,12 +81,15 @@ pub struct RubberFigures {
 }
 
 /// A crossing at the study's loads.
-fn case(speed_mm_s: f64, preload_n: f64) -> Case {
-    Case { resolution: Resolution::FIGURE, ..Case::new(Rig::fe(), speed_mm_s, preload_n) }
+fn case(speed_mm_s: f64, preload_n: f64) -> ReferenceCase {
+    ReferenceCase {
+        resolution: Resolution::FIGURE,
+        ..ReferenceCase::new(Rig::fe(), speed_mm_s, preload_n)
+    }
 }
 
 /// The same without inertia.
-fn still(case: &Case) -> Result<CrossingResult, BalanceError> {
+fn still(case: &ReferenceCase) -> Result<CrossingResult, BalanceError> {
     cross(&CrossingCase {
         ring: case.ring(),
         step_height_mm: case.rig.rig.step_height_mm,
@@ -105,7 +108,7 @@ pub fn compute() -> Result<ModelFigures> {
     let computed: Vec<(CaseFigures, f64)> =
         (0..3).into_par_iter().map(of_case).collect::<Result<_>>()?;
     let patch_mm2 = computed[0].1;
-    let first = Case::first();
+    let first = ReferenceCase::first();
     let rubbers = [
         ("the fitted tread", Rubber::of(&first)),
         ("sheets, tan delta 0.1 at 10 Hz", Rubber::of_sheets(0.1, 10.0)),

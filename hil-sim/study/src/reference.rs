@@ -4,7 +4,7 @@
 //! One file a stage, in the study's own order, each stage driven by the one before:
 //! [`rubber`] is the material, [`collision`] the force of a crossing, [`impact`] the stress
 //! waves that it sends through the tread, [`vibration`] the motion of the arm, a [`beam`].
-//! A [`Case`] describes a crossing. Only the three numbers of the tread that
+//! A [`ReferenceCase`] describes a crossing. Only the three numbers of the tread that
 //! `interstage::rig` names as fitted are fitted.
 
 pub mod beam;
@@ -14,5 +14,5 @@ pub mod impact;
 pub mod rubber;
 pub mod vibration;
 
-pub use case::{Case, Resolution};
+pub use case::{ReferenceCase, Resolution};
 pub use rubber::Rubber;

@@ -14,7 +14,7 @@ use interstage::rig::Rig;
 use interstage::units::Direction;
 use rayon::prelude::*;
 use rig_study::constants::data::{self, Row};
-use rig_study::constants::design::{Case, Use};
+use rig_study::constants::design::{DesignPoint, Use};
 use rig_study::constants::{fit, plan, source, stored};
 
 const DRIVEN_CLIMB: Kind = Kind { direction: Direction::Deploy, driven: true };
@@ -145,7 +145,7 @@ fn the_constants_are_fresh() {
     let rows = stored().unwrap();
     assert!(rows.iter().map(|row| (row.case, row.of)).eq(plan()), "other crossings than planned");
     let sample: Vec<Row> = rows.iter().step_by(61).copied().collect();
-    let cases: Vec<(Case, Use)> = sample.iter().map(|row| (row.case, row.of)).collect();
+    let cases: Vec<(DesignPoint, Use)> = sample.iter().map(|row| (row.case, row.of)).collect();
     let same = |a: f64, b: f64| (a - b).abs() <= 2e-9 * b.abs().max(1.0);
     for (stored, fresh) in sample.iter().zip(data::run_all(&cases, &|| {}).unwrap()) {
         assert!(

@@ -27,7 +27,7 @@ type Channels = (UpChannel, DownChannel);
 /// feed the watchdog. Only a restart ends that.
 pub(super) fn serve(channels: Channels, begin: impl FnOnce()) -> ! {
     count_cycles();
-    let mut line = Line { channels, reader: FrameReader::new() };
+    let mut line = HostConnection { channels, reader: FrameReader::new() };
     while line.take() != Some(ToBoard::Hello { protocol: PROTOCOL }) {}
     begin();
     let mut run = Run { next: FIRST, last: None, alone: false };
@@ -103,12 +103,12 @@ impl Run {
     }
 }
 
-struct Line {
+struct HostConnection {
     channels: Channels,
     reader: FrameReader,
 }
 
-impl Line {
+impl HostConnection {
     /// The next complete message that has arrived.
     fn take(&mut self) -> Option<ToBoard> {
         let mut byte = [0];

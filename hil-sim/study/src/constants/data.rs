@@ -8,7 +8,7 @@ use interstage::rig::Rig;
 use interstage::units::Direction;
 use rayon::prelude::*;
 
-use super::design::{Case, Use};
+use super::design::{DesignPoint, Use};
 use hil_sim::plant::balance::Axial;
 use hil_sim::plant::crossing::{CrossingCase, cross};
 use hil_sim::plant::ring::RingParameters;
@@ -23,7 +23,7 @@ pub const STRIDE_MM: f64 = 0.01;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
     /// The crossing.
-    pub case: Case,
+    pub case: DesignPoint,
     /// What it is for.
     pub of: Use,
     /// Gap, mm; 0 where the wheel sinks in so far that there is none.
@@ -44,7 +44,7 @@ pub fn path() -> PathBuf {
 ///
 /// # Errors
 /// If no height balances the preload.
-pub fn run(case: &Case, of: Use, elements: usize, stride_mm: f64) -> Result<Row> {
+pub fn run(case: &DesignPoint, of: Use, elements: usize, stride_mm: f64) -> Result<Row> {
     let result = cross(&CrossingCase {
         ring: RingParameters::of(&Rig::fe(), elements),
         step_height_mm: case.step_mm,
@@ -69,7 +69,7 @@ pub fn run(case: &Case, of: Use, elements: usize, stride_mm: f64) -> Result<Row>
 ///
 /// # Errors
 /// As [`run`].
-pub fn run_all(cases: &[(Case, Use)], progress: &(dyn Fn() + Sync)) -> Result<Vec<Row>> {
+pub fn run_all(cases: &[(DesignPoint, Use)], progress: &(dyn Fn() + Sync)) -> Result<Vec<Row>> {
     cases
         .par_iter()
         .map(|(case, of)| {
@@ -89,7 +89,7 @@ pub fn write(rows: &[Row]) -> String {
          kind,use,step_mm,speed_mm_s,preload_n,load_n,gap_mm,utilisation,corner_force_n\n"
     );
     for Row { case, of, gap_mm, utilisation, corner_force_n } in rows {
-        let Case { kind, step_mm, speed_mm_s, preload_n, load_n } = case;
+        let DesignPoint { kind, step_mm, speed_mm_s, preload_n, load_n } = case;
         let line = format!(
             "{},{},{step_mm},{speed_mm_s},{preload_n},{load_n},{gap_mm},{utilisation},{corner_force_n}\n",
             kind_name(*kind),
@@ -124,7 +124,7 @@ fn row(record: &csv::StringRecord) -> Result<Row> {
     let kind = Kind::ALL.into_iter().find(|kind| kind_name(*kind) == &record[0]);
     let of = [Use::Fit, Use::Tame, Use::Hold].into_iter().find(|of| use_name(*of) == &record[1]);
     Ok(Row {
-        case: Case {
+        case: DesignPoint {
             kind: kind.with_context(|| format!("no kind {:?}", &record[0]))?,
             step_mm: number(2)?,
             speed_mm_s: number(3)?,
@@ -164,7 +164,7 @@ mod tests {
     #[test]
     fn what_is_written_is_read_again() {
         let row = |kind, of, load_n| Row {
-            case: Case { kind, step_mm: 2.5, speed_mm_s: 31.25, preload_n: 40.0, load_n },
+            case: DesignPoint { kind, step_mm: 2.5, speed_mm_s: 31.25, preload_n: 40.0, load_n },
             of,
             gap_mm: 1.234_567_891,
             utilisation: 0.25,

@@ -6,7 +6,7 @@ use interstage::units::Direction;
 
 /// A crossing of the published wheel.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Case {
+pub struct DesignPoint {
     /// Direction, and whether it is driven.
     pub kind: Kind,
     /// Step height, mm.
@@ -54,11 +54,11 @@ pub fn count(kind: Kind, of: Use) -> usize {
 
 /// The crossings of one kind and use, of a wheel with these proportions.
 #[must_use]
-pub fn cases(formula: &Formula, kind: Kind, of: Use) -> Vec<Case> {
+pub fn cases(formula: &Formula, kind: Kind, of: Use) -> Vec<DesignPoint> {
     (0..count(kind, of)).filter_map(|index| case(formula, kind, of, index)).collect()
 }
 
-fn case(formula: &Formula, kind: Kind, of: Use, index: usize) -> Option<Case> {
+fn case(formula: &Formula, kind: Kind, of: Use, index: usize) -> Option<DesignPoint> {
     // Each set takes its own stretch of the sequence.
     let [speed, force, step, load] = match of {
         Use::Fit => low_discrepancy(index + 1).map(towards_ends),
@@ -102,7 +102,7 @@ fn case(formula: &Formula, kind: Kind, of: Use, index: usize) -> Option<Case> {
     };
     let load_n = if kind.driven { rounded(load * most_n.max(0.0)) } else { 0.0 };
     let limit = 2.0 * FORCE_END * shape.unit_force_n();
-    (3.0..limit).contains(&preload_n).then(|| Case {
+    (3.0..limit).contains(&preload_n).then(|| DesignPoint {
         kind,
         step_mm: rounded(step_mm),
         speed_mm_s: rounded(speed_mm_s),
@@ -146,7 +146,7 @@ mod tests {
                 assert!((0.0..=20.0).contains(&case.load_n), "{case:?}");
             }
             let fit = cases(&formula, kind, Use::Fit);
-            let reaches = |of: fn(&Case) -> f64, low: f64, high: f64| {
+            let reaches = |of: fn(&DesignPoint) -> f64, low: f64, high: f64| {
                 fit.iter().any(|c| of(c) < low) && fit.iter().any(|c| of(c) > high)
             };
             assert!(reaches(|c| c.speed_mm_s, 0.9, 110.0));

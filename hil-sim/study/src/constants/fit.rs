@@ -8,7 +8,7 @@ use interstage::model::formula::Formula;
 use nalgebra::{DMatrix, DVector};
 
 use super::data::Row;
-use super::design::{Case, Use};
+use super::design::{DesignPoint, Use};
 
 /// Gap below which the wheel has all but sunk in, mm: not fitted.
 const LEAST_GAP_MM: f64 = 0.01;
@@ -76,7 +76,7 @@ pub fn fit(formula: &Formula, kind: Kind, rows: &[Row]) -> Result<Vec<f64>> {
 /// Weight of a crossing: by the root of how its stiffness moves the gap, so that neither
 /// gap nor force is fitted at the other's cost, and falling outside the domain of use.
 fn weight(shape: &Formula, row: &Row, stiffness: f64) -> f64 {
-    let Case { kind, speed_mm_s, preload_n, load_n, .. } = row.case;
+    let DesignPoint { kind, speed_mm_s, preload_n, load_n, .. } = row.case;
     let force = |gap: f64| {
         let elastic = stiffness * shape.relaxed_force_n(kind, gap);
         elastic + load_n * shape.contact(gap).slope()
@@ -96,7 +96,7 @@ fn weight(shape: &Formula, row: &Row, stiffness: f64) -> f64 {
 /// 10 um, whichever is larger.
 #[must_use]
 pub fn gap_error(formula: &Formula, row: &Row) -> f64 {
-    let Case { kind, step_mm, speed_mm_s, preload_n, load_n } = row.case;
+    let DesignPoint { kind, step_mm, speed_mm_s, preload_n, load_n } = row.case;
     let shape = Formula { step_mm, ..*formula };
     let load = kind.driven.then_some(load_n);
     let gap = shape.gap_mm(kind.direction, speed_mm_s, preload_n, load);

@@ -12,7 +12,7 @@ use super::simulation;
 use super::theory::{self, Drive, Lift};
 use super::transitions::at;
 use crate::figure::{Claim, Figure, Mark, Panel, SOURCES, Series, Source};
-use crate::reference::{Case as Reference, Rubber};
+use crate::reference::{ReferenceCase, Rubber};
 
 const SECTION: &str = "Simulation analysis results";
 
@@ -67,7 +67,7 @@ impl Amplitudes {
             })
         };
         let cases = experiments[..3].iter().map(of).collect::<Result<_>>()?;
-        let first = Reference::first();
+        let first = ReferenceCase::first();
         let touch_pa = Rubber::of(&first).impedance() * first.closing_speed_mm_s() * 1e-3;
         Ok(Self { cases, touch_pa })
     }

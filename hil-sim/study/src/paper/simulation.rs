@@ -9,7 +9,7 @@ use super::measure::{corner_area_mm2, stress_kpa};
 use super::theory::{Drive, Lift};
 use crate::reference::collision::dynamic;
 use crate::reference::impact::Rod;
-use crate::reference::{Case as Reference, Rubber};
+use crate::reference::{ReferenceCase, Rubber};
 use hil_sim::plant::balance::{Axial, BalanceError};
 use hil_sim::plant::crossing::{CrossingCase, cross};
 use hil_sim::plant::ring::RingParameters;
@@ -78,7 +78,7 @@ pub fn deployment(case: &Case, arms: &Arms) -> Result<History> {
     let mut last_s = 0.0;
     for (level, &step) in steps.iter().enumerate() {
         let reference =
-            Reference::new(rig.clone(), case.speed_mm_s, case.pressing_n(level)).driven();
+            ReferenceCase::new(rig.clone(), case.speed_mm_s, case.pressing_n(level)).driven();
         let crossing = dynamic(&reference)?;
         let mut rod = Rod::tread(Rubber::of(&reference), CELLS);
         let before = crossing.samples.iter().filter(|sample| sample.t_s < 0.0);

@@ -25,7 +25,7 @@ impl Resolution {
 
 /// One crossing of one step while deploying.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Case {
+pub struct ReferenceCase {
     /// Wheel, tread, arm, step, moved mass.
     pub rig: Rig,
     /// Axial speed, mm/s, held; above 0.
@@ -39,7 +39,7 @@ pub struct Case {
     pub resolution: Resolution,
 }
 
-impl Case {
+impl ReferenceCase {
     /// A frictionless crossing of the rig's own step.
     #[must_use]
     pub fn new(rig: Rig, speed_mm_s: f64, preload_n: f64) -> Self {

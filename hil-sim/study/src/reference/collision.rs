@@ -9,7 +9,7 @@
 //! wheel touches the corner, the tread closes on it at `v sin(phi)`: millimetres per
 //! second, which the contact takes up within milliseconds.
 
-use super::case::Case;
+use super::case::ReferenceCase;
 use hil_sim::plant::balance::{Balance, BalanceError};
 use hil_sim::plant::ring::{Contact, Motion, Ring};
 use hil_sim::plant::wall::{Step, Wall};
@@ -74,7 +74,7 @@ impl Crossing {
 ///
 /// # Errors
 /// [`BalanceError`] if the preload cannot be carried before the step.
-pub fn dynamic(case: &Case) -> Result<Crossing, BalanceError> {
+pub fn dynamic(case: &ReferenceCase) -> Result<Crossing, BalanceError> {
     let radius = case.rig.rig.wheel_radius_mm;
     let height = case.rig.rig.step_height_mm;
     let wall = Wall::new(vec![Step { position_mm: 0.0, height_mm: height }]);
@@ -136,7 +136,7 @@ pub fn dynamic(case: &Case) -> Result<Crossing, BalanceError> {
 }
 
 /// The crossing with its time counted from the touch and its areas averaged.
-fn finished(mut samples: Vec<Sample>, touch_s: f64, case: &Case) -> Crossing {
+fn finished(mut samples: Vec<Sample>, touch_s: f64, case: &ReferenceCase) -> Crossing {
     let ring = case.ring();
     let pitch_mm = std::f64::consts::TAU * ring.radius_mm / ring.elements as f64;
     let areas = averaged(&samples, pitch_mm);
@@ -177,7 +177,7 @@ struct Mass {
 
 impl Mass {
     /// At rest at `y_mm`, in balance.
-    fn at_rest(case: &Case, y_mm: f64) -> Self {
+    fn at_rest(case: &ReferenceCase, y_mm: f64) -> Self {
         let (balance, mass_kg) = (case.balance(), case.rig.plant.moved_mass_kg);
         Self { balance, mass_kg, y_mm, rate_mm_s: 0.0, acceleration_mm_s2: 0.0 }
     }

@@ -11,7 +11,7 @@
 
 use super::Rubber;
 use super::beam::Beam;
-use super::case::Case;
+use super::case::ReferenceCase;
 use super::collision::Crossing;
 use super::rubber::THICKNESS_MM;
 
@@ -141,7 +141,7 @@ impl Rod {
 /// The stress at the hub is that on the face a transit before, to some thousandths of its
 /// peak.
 #[must_use]
-pub fn stress(case: &Case, crossing: &Crossing) -> Vec<(f64, f64)> {
+pub fn stress(case: &ReferenceCase, crossing: &Crossing) -> Vec<(f64, f64)> {
     let mut rod = Rod::tread(Rubber::of(case), CELLS);
     let first_s = crossing.samples[0].t_s;
     let (mut t, mut next) = (first_s, first_s);

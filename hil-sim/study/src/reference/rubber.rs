@@ -5,7 +5,7 @@
 
 use std::f64::consts::{LN_10, TAU};
 
-use super::case::Case;
+use super::case::ReferenceCase;
 
 /// Thickness of the tread, mm. Not published; chosen: with it the fitted relaxed
 /// stiffness, 0.6044e9 Pa/m, is a modulus of 4.8 MPa, that of the rubber's data sheets.
@@ -34,7 +34,7 @@ pub struct Rubber {
 impl Rubber {
     /// The fitted tread: its stiffness per area times its thickness.
     #[must_use]
-    pub fn of(case: &Case) -> Self {
+    pub fn of(case: &ReferenceCase) -> Self {
         let thick_m = THICKNESS_MM * 1e-3;
         Self {
             relaxed_pa: case.rig.tread.k_inf_pa_per_m * thick_m,
@@ -107,7 +107,7 @@ mod tests {
             assert!(loss > 0.0 && loss < 0.16, "{loss} dB");
         }
         // The fitted tread stiffens more, so its front is faster.
-        let fitted = Rubber::of(&Case::first());
+        let fitted = Rubber::of(&ReferenceCase::first());
         assert!((THICKNESS_MM / fitted.slow_speed_m_s() - 0.1228).abs() < 1e-4);
         assert!((THICKNESS_MM / fitted.front_speed_m_s() - 0.0598).abs() < 1e-4);
         assert!(fitted.loss_db(thick_m) < 0.002);

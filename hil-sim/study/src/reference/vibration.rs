@@ -12,7 +12,7 @@ use interstage::rig::Rig;
 use nalgebra::Complex;
 
 use super::beam::{Beam, BeamError, Ends, Shape, Tip};
-use super::case::Case;
+use super::case::ReferenceCase;
 use super::collision::Crossing;
 
 #[cfg(test)]
@@ -74,7 +74,7 @@ impl Arm {
     /// The arm with the tread as a spring to the wall: stiffness per area at once times the
     /// patch, mm^2, by its part across the arm.
     #[must_use]
-    pub fn on_tread(self, case: &Case, patch_mm2: f64) -> Self {
+    pub fn on_tread(self, case: &ReferenceCase, patch_mm2: f64) -> Self {
         let radial = case.instant_pa_per_m() * patch_mm2 * 1e-6;
         let spring_n_per_m = radial * self.angle_rad.cos().powi(2);
         Self { tip: Tip { spring_n_per_m, ..self.tip }, ..self }
@@ -236,7 +236,7 @@ pub struct Bending {
 ///
 /// # Errors
 /// [`BeamError`] if the arm is out of range.
-pub fn bending(case: &Case, crossing: &Crossing) -> Result<Vec<Bending>, BeamError> {
+pub fn bending(case: &ReferenceCase, crossing: &Crossing) -> Result<Vec<Bending>, BeamError> {
     let arm = Arm::of(&case.rig)?;
     let rolling: Vec<f64> =
         crossing.samples.iter().filter(|s| s.t_s < 0.0).map(|s| s.axial_n).collect();

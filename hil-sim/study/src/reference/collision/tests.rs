@@ -117,10 +117,13 @@ fn bisect(mut low: f64, mut high: f64, below: impl Fn(f64) -> bool) -> f64 {
 }
 
 /// The study's wheel with a tread that does not relax.
-fn without_memory(speed_mm_s: f64, preload_n: f64) -> (Case, Elastic) {
+fn without_memory(speed_mm_s: f64, preload_n: f64) -> (ReferenceCase, Elastic) {
     let mut rig = Rig::fe();
     rig.tread.stiffening = 1.0;
-    let case = Case { resolution: Resolution::FIGURE, ..Case::new(rig, speed_mm_s, preload_n) };
+    let case = ReferenceCase {
+        resolution: Resolution::FIGURE,
+        ..ReferenceCase::new(rig, speed_mm_s, preload_n)
+    };
     let ring = case.ring();
     let elastic = Elastic {
         radius_mm: ring.radius_mm,
@@ -131,13 +134,13 @@ fn without_memory(speed_mm_s: f64, preload_n: f64) -> (Case, Elastic) {
     (case, elastic)
 }
 
-fn coarse(case: Case) -> Case {
+fn coarse(case: ReferenceCase) -> ReferenceCase {
     let resolution = Resolution { elements: 1440, stride_mm: 0.02, step_s: 4e-4 };
-    Case { resolution, ..case }
+    ReferenceCase { resolution, ..case }
 }
 
 /// The crossing of the plant, without inertia.
-fn still(case: &Case) -> CrossingResult {
+fn still(case: &ReferenceCase) -> CrossingResult {
     cross(&CrossingCase {
         ring: case.ring(),
         step_height_mm: case.rig.rig.step_height_mm,
@@ -186,7 +189,7 @@ fn finer_rings_come_closer_to_the_closed_form() {
     let gap = elastic.gap_mm(100.0).unwrap();
     let error = |elements: usize| {
         let resolution = Resolution { elements, stride_mm: 14.4 / elements as f64, step_s: 1e-4 };
-        (still(&Case { resolution, ..case.clone() }).gap_mm / gap - 1.0).abs()
+        (still(&ReferenceCase { resolution, ..case.clone() }).gap_mm / gap - 1.0).abs()
     };
     let (few, more, many) = (error(720), error(1440), error(5760));
     assert!(few < 2e-3 && more < 5e-4 && many < 5e-5, "{few} {more} {many}");
@@ -196,7 +199,7 @@ fn finer_rings_come_closer_to_the_closed_form() {
 fn the_two_resolutions_are_converged() {
     let at = |elements: usize| {
         let resolution = Resolution { elements, stride_mm: 28.8 / elements as f64, step_s: 1e-4 };
-        let crossing = still(&Case { resolution, ..Case::first() });
+        let crossing = still(&ReferenceCase { resolution, ..ReferenceCase::first() });
         [crossing.gap_mm, crossing.corner_force_n]
     };
     let (history, figure, finest) = (at(2880), at(5760), at(11520));
@@ -226,14 +229,14 @@ fn a_stiff_tread_climbs_as_a_rigid_wheel() {
 
 #[test]
 fn the_tread_closes_on_the_corner_at_millimetres_per_second() {
-    let case = Case::first();
+    let case = ReferenceCase::first();
     assert!((case.climb_angle().to_degrees() - 32.86).abs() < 5e-3);
     assert!((case.closing_speed_mm_s() - 2.713).abs() < 1e-3);
 }
 
 #[test]
 fn slow_and_light_the_dynamic_form_is_the_quasi_static_one() {
-    let mut case = coarse(Case::first());
+    let mut case = coarse(ReferenceCase::first());
     case.rig.plant.moved_mass_kg = 1e-3;
     let (still, moving) = (still(&case), dynamic(&case).unwrap());
     let lift = |s: &&Sample| s.t_s > 0.0 && s.floor_n == 0.0;
@@ -248,7 +251,7 @@ fn inertia_is_small_at_millimetres_per_second_and_grows_with_speed() {
     // the centre, elements lose their hold one by one, which shakes the wheel by part of
     // an element's force, the less the finer the ring: left out.
     let excess = |speed: f64| {
-        let crossing = dynamic(&coarse(Case::new(Rig::fe(), speed, 100.0))).unwrap();
+        let crossing = dynamic(&coarse(ReferenceCase::new(Rig::fe(), speed, 100.0))).unwrap();
         let climbing = crossing.samples.iter().filter(|s| s.x_mm < -0.1);
         climbing.map(|s| (s.radial_n - 100.0).abs()).fold(0.0, f64::max)
     };
@@ -259,7 +262,7 @@ fn inertia_is_small_at_millimetres_per_second_and_grows_with_speed() {
 
 /// A wheel that has settled on the level wall, its ring, and the stiffness that carries
 /// it, N/m.
-fn settled(case: &Case) -> (Mass, Ring, f64) {
+fn settled(case: &ReferenceCase) -> (Mass, Ring, f64) {
     let mut ring = Ring::new(case.ring());
     let (mut height, mut stiffness) = (24.5, 0.0);
     for _ in 0..3 {
@@ -273,7 +276,7 @@ fn settled(case: &Case) -> (Mass, Ring, f64) {
 
 /// Height above rest, mm, and rate, mm/s, over `time_s` after a blow so small that no
 /// element comes or goes.
-fn ringing(case: &Case, blow_mm_s: f64, dt_s: f64, time_s: f64) -> Vec<(f64, f64)> {
+fn ringing(case: &ReferenceCase, blow_mm_s: f64, dt_s: f64, time_s: f64) -> Vec<(f64, f64)> {
     let (mut mass, mut ring, _) = settled(case);
     let rest = mass.y_mm;
     mass.rate_mm_s = blow_mm_s;
@@ -287,8 +290,8 @@ fn ringing(case: &Case, blow_mm_s: f64, dt_s: f64, time_s: f64) -> Vec<(f64, f64
     states.collect()
 }
 
-fn fast_relaxing() -> Case {
-    let mut case = Case::first();
+fn fast_relaxing() -> ReferenceCase {
+    let mut case = ReferenceCase::first();
     case.rig.tread.tau_s = 2e-3;
     case
 }
@@ -331,7 +334,7 @@ fn the_dynamic_form_is_of_second_order_in_its_step() {
 
 #[test]
 fn without_memory_a_ringing_wheel_keeps_its_energy() {
-    let mut case = Case::first();
+    let mut case = ReferenceCase::first();
     case.rig.tread.stiffening = 1.0;
     let stiffness_n_per_mm = 1e-3 * settled(&case).2;
     // Kinetic, mJ, and that of the contact linearised about rest.

@@ -164,7 +164,7 @@ fn a_slow_squeeze_finds_the_relaxed_spring() {
 
 #[test]
 fn the_hub_bears_what_the_face_does_a_transit_later() {
-    let case = Case { speed_mm_s: 8.0, ..Case::first() };
+    let case = ReferenceCase { speed_mm_s: 8.0, ..ReferenceCase::first() };
     let crossing = dynamic(&case).unwrap();
     let history = stress(&case, &crossing);
     let peak = history.iter().map(|point| point.1).fold(0.0, f64::max);

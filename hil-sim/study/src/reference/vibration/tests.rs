@@ -19,7 +19,7 @@ fn the_published_constrained_mode_is_met_by_a_stated_mass() {
 
 #[test]
 fn on_its_tread_the_arm_is_stiffer() {
-    let held = arm().on_tread(&Case::first(), 250.0);
+    let held = arm().on_tread(&ReferenceCase::first(), 250.0);
     let spring = held.tip.spring_n_per_m;
     assert!((spring / 304e3 - 1.0).abs() < 0.01, "{spring}");
     let (held, free) = (held.frequencies_hz(3).unwrap(), arm().frequencies_hz(3).unwrap());
@@ -95,7 +95,7 @@ fn a_sine_is_followed_as_its_straight_pieces_get_short() {
 
 /// The history at this speed, and the static deflection under its climbing force, mm.
 fn history(speed_mm_s: f64) -> (Vec<Bending>, f64) {
-    let case = Case { speed_mm_s, ..Case::first() };
+    let case = ReferenceCase { speed_mm_s, ..ReferenceCase::first() };
     let crossing = dynamic(&case).unwrap();
     let climb = crossing.peak_n() - crossing.samples[0].axial_n;
     (bending(&case, &crossing).unwrap(), climb * arm().compliance_m_per_n() * 1e3)
