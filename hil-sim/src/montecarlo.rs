@@ -22,8 +22,10 @@ pub struct RunLine {
     pub seed: u64,
     /// Whether it reached the end of travel with every step crossed and no fault.
     pub completed: bool,
-    /// From the start of motion to the end, s.
-    pub duration_s: f64,
+    /// From the accepted command to arrival, s, see [`Summary::duration_s`].
+    pub duration_s: Option<f64>,
+    /// From the start of motion to its end, s.
+    pub moving_s: f64,
     /// Largest gap at a step, or separation elsewhere, mm.
     pub max_gap_mm: f64,
     /// The same over the reference gap; none without reference.
@@ -57,6 +59,7 @@ impl RunLine {
             seed: summary.seed,
             completed: summary.completed && summary.faults.is_empty(),
             duration_s: summary.duration_s,
+            moving_s: summary.moving_s,
             max_gap_mm: summary.max_gap_mm,
             gap_over_ref: (summary.gap_ref_mm > 0.0)
                 .then(|| summary.max_gap_mm / summary.gap_ref_mm),

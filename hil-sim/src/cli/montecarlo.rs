@@ -103,7 +103,8 @@ fn figures(outcome: &montecarlo::Outcome) -> comfy_table::Table {
     plain(
         &["", "median", "95 %", "worst", "its seed"],
         [
-            spread("duration, s", outcome.duration_s, 2),
+            spread("from the command, s", outcome.duration_s, 2),
+            spread("moving, s", outcome.moving_s, 2),
             spread("gap over reference", outcome.gap_over_ref, 3),
             vec!["gap, mm".to_owned(), dash(), dash(), gap, seed(outcome.worst_gap_seed)],
             least("lead time, s", outcome.lead_time_s),

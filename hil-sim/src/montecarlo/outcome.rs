@@ -65,8 +65,10 @@ pub struct Outcome {
     pub faults: Vec<SeedReport>,
     /// Seeds of the runs that did not complete.
     pub incomplete: Vec<u64>,
-    /// Duration of the completed runs, s.
+    /// Duration of the completed runs from the accepted command to arrival, s.
     pub duration_s: Option<Quantiles>,
+    /// Part of it in which the wheel moved, s.
+    pub moving_s: Option<Quantiles>,
     /// Worst gap of each run over the reference.
     pub gap_over_ref: Option<Quantiles>,
     /// Least time by which the preload was reached before a corner touched, s.
@@ -94,7 +96,8 @@ impl Outcome {
             slip_events: lines.iter().map(|line| line.slip_events).sum(),
             faults: lines.iter().flat_map(faults).collect(),
             incomplete: lines.iter().filter(|line| !line.completed).map(|l| l.seed).collect(),
-            duration_s: quantiles(figure(&|line| line.completed.then_some(line.duration_s))),
+            duration_s: quantiles(figure(&|line| line.duration_s.filter(|_| line.completed))),
+            moving_s: quantiles(figure(&|line| line.completed.then_some(line.moving_s))),
             gap_over_ref: quantiles(figure(&|line| line.gap_over_ref)),
             lead_time_s: least(figure(&|line| line.least_lead_s)),
             slip_margin: least(figure(&|line| line.least_slip_margin)),
@@ -145,7 +148,8 @@ mod tests {
     use crate::record::Report;
 
     fn line(seed: u64, max_gap_mm: f64) -> RunLine {
-        RunLine { seed, completed: true, duration_s: 4.0, max_gap_mm, ..RunLine::default() }
+        let (duration_s, moving_s) = (Some(5.0), 4.0);
+        RunLine { seed, completed: true, duration_s, moving_s, max_gap_mm, ..RunLine::default() }
     }
 
     #[test]
@@ -180,7 +184,8 @@ mod tests {
         assert_eq!(codes, [(2, Some(121)), (3, None)]);
         let limits: Vec<_> = outcome.limits.iter().map(|l| (l.code, l.runs)).collect();
         assert_eq!(limits, [(205, 2), (209, 1)]);
-        assert_eq!(outcome.duration_s.map(|d| d.max), Some(4.0));
+        let longest = [outcome.duration_s, outcome.moving_s].map(|times| times.map(|d| d.max));
+        assert_eq!(longest, [Some(5.0), Some(4.0)]);
         assert_eq!(outcome.lead_time_s, None);
     }
 

@@ -1,5 +1,6 @@
 //! Records a run as it goes on.
 
+use interstage::supervise::Mode;
 use interstage::tick::{CrossingRecord, Entry, Event, Telemetry};
 use interstage::units::{Direction, Q16};
 use sha2::{Digest, Sha256};
@@ -55,8 +56,10 @@ impl RunRecorder {
                 Some((false, limit)) => tally.limits.push(limit),
                 None => {}
             }
-            if let Event::Crossing(record) = event {
-                seen.crossings.push((t_s, *record));
+            match event {
+                Event::Crossing(record) => seen.crossings.push((t_s, *record)),
+                Event::Mode(Mode::Preload(_)) => tally.accept_command(),
+                _ => {}
             }
         }
         seen.preload.push(truth.preload_n as f32);

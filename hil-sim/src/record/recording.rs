@@ -8,6 +8,7 @@ use std::path::Path;
 
 use interstage::log::ledger::Line;
 use interstage::supervise::Mode;
+use interstage::tick::Event;
 use mcap::records::Record;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
@@ -86,6 +87,20 @@ pub fn complete(recording: &mut Recording, run: &Run) {
     }
 }
 
+/// Tick that accepted the command which the first motion of the log follows from: there the
+/// preload began to build. None if it is not in the log, or on another start's clock.
+fn commanded(run: &Run) -> Option<u32> {
+    let mut before = None;
+    for entry in run.events.iter().filter(|_| run.boots.is_empty()) {
+        let Event::Mode(mode) = entry.event else { continue };
+        if mode.moves() {
+            return before.and_then(|(mode, at)| matches!(mode, Mode::Preload(_)).then_some(at));
+        }
+        before = Some((mode, entry.at));
+    }
+    None
+}
+
 /// A run as the controller reports it.
 fn summary(run: &Run) -> Summary {
     let moves = |row: &&Controller| row.mode().is_some_and(Mode::moves);
@@ -109,7 +124,8 @@ fn summary(run: &Run) -> Summary {
         controller: "recorded".to_owned(),
         direction: if retracts { "retract" } else { "deploy" }.to_owned(),
         rig: header.rig,
-        duration_s: between(|row| row.t_s),
+        duration_s: last.zip(commanded(run)).map(|(row, at)| row.t_s - 1e-3 * f64::from(at)),
+        moving_s: between(|row| row.t_s),
         total_s: run.rows.last().map_or(0.0, |row| row.t_s),
         travel_mm: between(|row| row.position_mm).abs(),
         gap_ref_mm: unknown,
@@ -157,7 +173,7 @@ fn crossing(run: &Run, line: &Line) -> CrossingLine {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::write_mcap;
+    use crate::record::{Boot, write_mcap};
     use crate::scenario::Scenario;
     use crate::session;
 
@@ -184,11 +200,30 @@ mod tests {
     }
 
     #[test]
+    fn a_log_without_the_command_has_no_duration() {
+        let stream = run().stream;
+        let whole = Run::of_stream(&stream);
+        assert!(commanded(&whole).is_some());
+        // A capture that began while the preload was building.
+        let from = whole.events.iter().position(|e| matches!(e.event, Event::Mode(Mode::Run(..))));
+        let events = whole.events[from.expect("it moved")..].to_vec();
+        let late = believed(&Run { events, ..whole.clone() }).summary;
+        assert_eq!(late.duration_s, None);
+        assert!(late.moving_s > 1.0);
+        // A restart in between: two clocks.
+        let restarted = Run { boots: vec![Boot::default()], ..whole };
+        assert_eq!(believed(&restarted).summary.duration_s, None);
+    }
+
+    #[test]
     fn a_log_without_truth_shows_what_the_controller_believes() {
         let truth = run();
         let believed = believed(&Run::of_stream(&truth.stream));
         assert!(believed.summary.completed);
-        assert!((believed.summary.duration_s - truth.summary.duration_s).abs() < 2e-3);
+        assert!((believed.summary.moving_s - truth.summary.moving_s).abs() < 2e-3);
+        let durations = [&believed, &truth].map(|run| run.summary.duration_s.expect("commanded"));
+        assert!((durations[0] - durations[1]).abs() < 2e-3, "{durations:?}");
+        assert!(durations[1] > truth.summary.moving_s + 0.1, "{durations:?}");
         assert_eq!(believed.summary.crossings.len(), 3);
         for (seen, real) in believed.summary.crossings.iter().zip(&truth.summary.crossings) {
             assert_eq!(seen.gap_measured_mm, real.gap_measured_mm);

@@ -74,8 +74,12 @@ pub struct Summary {
     pub rig: String,
     /// Seed of the plant's draw.
     pub seed: u64,
-    /// From the start of motion to the end of travel, s.
-    pub duration_s: f64,
+    /// From the accepted command to arrival, or to the end of the motion of a run that did not
+    /// arrive, s; none if the log has no such command or nothing moved.
+    pub duration_s: Option<f64>,
+    /// From the start of motion to its end, s: the duration without the preload that is built
+    /// before the wheel moves.
+    pub moving_s: f64,
     /// From boot to the end of the run, s.
     pub total_s: f64,
     /// Distance travelled, mm.

@@ -30,6 +30,7 @@ pub struct Tally {
     pub limits: Vec<Report>,
     gap_ref_mm: f64,
     start_mm: f64,
+    commanded: Option<f64>,
     run_started: Option<f64>,
     run_ended: f64,
     preload_sum: f64,
@@ -63,6 +64,14 @@ impl Tally {
     #[must_use]
     pub fn time_s(&self) -> f64 {
         f64::from(self.passed) * TICK_S
+    }
+
+    /// A command was accepted in this tick: from it on the duration counts, unless the drive
+    /// already moved.
+    pub fn accept_command(&mut self) {
+        if self.run_started.is_none() {
+            self.commanded = Some(self.time_s());
+        }
     }
 
     /// Ends a tick; `moves` if the drive moved in it.
@@ -101,7 +110,8 @@ impl Tally {
             direction: scenario.run.direction.name().into(),
             rig: scenario.preset.clone(),
             seed: scenario.run.seed,
-            duration_s: self.run_started.map_or(0.0, |from| self.run_ended - from),
+            duration_s: self.run_started.and(self.commanded).map(|from| self.run_ended - from),
+            moving_s: self.run_started.map_or(0.0, |from| self.run_ended - from),
             total_s,
             travel_mm: (truth.position_mm - self.start_mm).abs(),
             gap_ref_mm: self.gap_ref_mm,
@@ -170,6 +180,34 @@ mod tests {
         assert_eq!((tally.run_started, tally.run_ended), (Some(1e-3), 2e-3));
         assert_eq!((tally.preload_sum, tally.moving), (70.0, 2));
         assert_eq!((tally.worst_separation, tally.time_s()), (0.3, 4e-3));
+    }
+
+    #[test]
+    fn the_duration_counts_from_the_last_command_before_the_motion() {
+        let durations = |moves: bool, commands: &[usize]| {
+            let scenario = Scenario::default();
+            let plant = VirtualRig::new(scenario.plant(), 0.0, 0.0, TICK_S);
+            let mut tally = Tally::new(2.5, 0.0);
+            for tick in 0..10 {
+                if commands.contains(&tick) {
+                    tally.accept_command();
+                }
+                tally.close_tick(moves && (5..9).contains(&tick), plant.truth());
+            }
+            let ended = Ended {
+                target: "sil",
+                scenario: &scenario,
+                plant: &plant,
+                arrived: None,
+                wall_s: 1.0,
+            };
+            let summary = tally.finish(&ended, true_line).summary;
+            (summary.duration_s.map(|s| (1e3 * s).round()), (1e3 * summary.moving_s).round())
+        };
+        assert_eq!(durations(true, &[1, 3, 7]), (Some(5.0), 3.0));
+        // Without a command in the log nothing is claimed, nor without motion.
+        assert_eq!(durations(true, &[]), (None, 3.0));
+        assert_eq!(durations(false, &[1]), (None, 0.0));
     }
 
     #[test]

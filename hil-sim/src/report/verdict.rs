@@ -44,7 +44,11 @@ pub(crate) fn headline(summary: &Summary) -> String {
         1 => "1 crossing".to_owned(),
         n => format!("{n} crossings"),
     };
-    let travel = format!("{:.1} mm in {:.2} s, {crossings}", summary.travel_mm, summary.duration_s);
+    let moving = format!("{:.2} s of motion", summary.moving_s);
+    let time = summary.duration_s.map_or(moving.clone(), |duration_s| {
+        format!("{duration_s:.2} s from the command ({moving})")
+    });
+    let travel = format!("{:.1} mm in {time}, {crossings}", summary.travel_mm);
     match (summary.completed, summary.faults.first()) {
         (true, None) => format!("{verb} {travel}"),
         (true, Some(fault)) => {
@@ -84,7 +88,14 @@ mod tests {
         let mut summary = example::deploy().summary;
         (summary.gap_ref_mm, summary.max_gap_mm) = (1.62, 1.59);
         assert_eq!(Grade::of(&summary), Grade::Good);
-        assert!(headline(&summary).starts_with("Deployed "));
+        (summary.travel_mm, summary.moving_s) = (79.8, 4.264);
+        for (duration_s, time) in
+            [(Some(6.98), "6.98 s from the command (4.26 s of motion)"), (None, "4.26 s of motion")]
+        {
+            summary.duration_s = duration_s;
+            let expected = format!("Deployed 79.8 mm in {time}, 3 crossings");
+            assert_eq!(headline(&summary), expected);
+        }
         assert_eq!(
             gap_sentence(&summary),
             "worst gap 1.590 mm, 1.9 % below the reference of 1.620 mm"

@@ -16,6 +16,7 @@ fn five_rigs_complete_with_every_key_and_the_shards_are_the_whole() {
     assert!(all["slip_events"].is_u64() && all["faults"].is_array());
     assert_eq!(all["incomplete"], serde_json::json!([]));
     assert!(number(&all["duration_s"], "p50") <= number(&all["duration_s"], "max"));
+    assert!(number(&all["moving_s"], "max") < number(&all["duration_s"], "max"));
     assert!(number(&all["gap_over_ref"], "p95") > 0.5);
     assert!(all["lead_time_s"]["seed"].is_u64() && all["slip_margin"]["seed"].is_u64());
     let shards = ["1/2", "2/2"].map(|shard| campaign(&["-n", "5", "--shard", shard]));

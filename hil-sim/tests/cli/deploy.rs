@@ -4,15 +4,16 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::{code, is_empty, object, rig, rig_in, stdout};
+use super::{code, is_empty, number, object, rig, rig_in, stdout};
 
 /// Keys of the summary that others rely on.
-const KEYS: [&str; 12] = [
+const KEYS: [&str; 13] = [
     "completed",
     "target",
     "controller",
     "seed",
     "duration_s",
+    "moving_s",
     "travel_mm",
     "max_gap_mm",
     "slip_mm",
@@ -52,6 +53,7 @@ fn writes_its_files_and_prints_every_key() {
     assert_eq!((&summary["target"], &summary["seed"]), (&Value::from("sil"), &Value::from(0)));
     let crossings = summary["crossings"].as_array().unwrap();
     assert_eq!(crossings.len(), 3);
+    assert!(number(&summary, "duration_s") > number(&summary, "moving_s"));
     for crossing in crossings {
         assert_keys(crossing, &CROSSING_KEYS);
     }

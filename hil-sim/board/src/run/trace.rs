@@ -13,6 +13,7 @@ use hil_sim::record::{
 };
 use hil_sim::scenario::Scenario;
 
+const PRELOAD: u8 = 4;
 const COMPLETE: u8 = 10;
 const FAULT_HOLD: u8 = 11;
 /// Moving or stopping.
@@ -101,6 +102,9 @@ impl Trace {
         self.tally.log.push(LogLine { t_s, text });
         if let Some(mode) = line.after("mode: ") {
             self.mode = number_of(mode);
+            if self.mode == PRELOAD {
+                self.tally.accept_command();
+            }
         } else if line.text.contains("] stage ") {
             self.stage = line.numbers().get(1).map_or(self.stage, |number| *number as u8);
         } else if line.text.contains("] step ") {
