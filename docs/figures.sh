@@ -17,7 +17,9 @@ write deploy deploy --out target/figures
 write retract deploy --retract --no-files
 write montecarlo montecarlo -n 1000
 write montecarlo-retract montecarlo -n 1000 --retract
-write compare compare -n 200
+write compare compare -n 50
+write envelope envelope --out target/figures
+[ ! -f target/figures/envelope.svg ] || cp target/figures/envelope.svg docs/envelope.svg
 write faults-sil faults -n 100
 write faults-board faults --target board -n 20
 write paper paper

@@ -9,6 +9,7 @@ pub mod capture;
 mod compare;
 mod crossing;
 pub mod deploy;
+mod envelope;
 pub mod failure;
 pub mod faults;
 mod flash;
@@ -54,6 +55,7 @@ enum Verb {
     Report(report::Args),
     Crossing(crossing::Args),
     Compare(compare::Args),
+    Envelope(envelope::Args),
     Montecarlo(montecarlo::Args),
     Faults(faults::Args),
     Flash(flash::Args),
@@ -89,6 +91,7 @@ impl Verb {
             Self::Report(args) => report::run(args),
             Self::Crossing(args) => crossing::run(args),
             Self::Compare(args) => compare::run(args),
+            Self::Envelope(args) => envelope::run(args),
             Self::Montecarlo(args) => montecarlo::run(args),
             Self::Faults(args) => faults::run(args),
             Self::Flash(args) => flash::run(args),

@@ -1,64 +1,82 @@
-//! The four preload strategies on the same random rigs: how fast each deploys when all are
-//! held to the same worst gap.
+//! The four preload strategies on the same random rigs, with equal privileges: how fast each
+//! deploys when all are held to the same worst gap. Beside them the best run that the same
+//! plants allow, see [`crate::oracle`].
+
+mod tuning;
 
 use interstage::model::Planner;
 use interstage::units::Direction;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::record::Summary;
-use crate::report::verdict::SLIP_SEEN_MM;
+use crate::montecarlo::{self, RunLine};
+use crate::oracle::{self, Bounds};
 use crate::scenario::{ControllerKind, Scenario};
-use crate::session::{Options, RunError, run};
+use crate::session::RunError;
 
-/// Largest reserve below the reference gap that the tuning tries.
-const MOST_RESERVE: f64 = 0.25;
-/// How close to the reference the worst gap is tuned, relative.
-const TUNED_WITHIN: f64 = 0.002;
-/// Most evaluations of one tuning.
-const MOST_TRIES: usize = 9;
+pub use tuning::MOST_TRIES;
 
-/// How the speed is chosen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Policy {
-    /// Crossing speed at the steps, cruise speed between them, for every strategy.
-    StepAware,
-    /// One speed throughout, as a drive without look-ahead must; the scheduled one
-    /// keeps its own.
-    OneSpeed,
-}
+/// The strategies, the one that the others are compared with first.
+pub const STRATEGIES: [ControllerKind; 4] = [
+    ControllerKind::Scheduled,
+    ControllerKind::Constant,
+    ControllerKind::Limit,
+    ControllerKind::Reactive,
+];
+
+/// Name of the entry of the best runs.
+pub const ORACLE: &str = "oracle";
 
 /// One strategy over all rigs.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Entry {
-    /// Strategy.
+    /// Strategy, or [`ORACLE`].
     pub controller: &'static str,
-    /// How the speed is chosen.
-    pub policy: Policy,
-    /// Crossing speed prescribed, mm/s; none for the scheduled strategy.
-    pub crossing_speed_mm_s: Option<f64>,
-    /// Reserve below the reference gap; the scheduled strategy's tuning.
-    pub gap_reserve: f64,
+    /// Reserve below the reference gap that the planner aims at; the tuning. None for the
+    /// oracle.
+    pub gap_reserve: Option<f64>,
     /// Whether the worst gap was brought to the reference. At the least crossing speed it may
-    /// still be above, at the greatest below.
+    /// still be above, without any reserve below.
     pub tuned: bool,
-    /// Mean time from the accepted command to arrival, s; infinite if a run never moved.
-    pub duration_s: f64,
-    /// Mean time from start of motion to its end, s.
-    pub moving_s: f64,
-    /// Largest gap of all crossings, mm.
-    pub worst_gap_mm: f64,
-    /// Runs with gross slip.
+    /// Mean time from the accepted command to arrival over the completed runs, s.
+    pub duration_s: Option<f64>,
+    /// Mean time from the start of motion to arrival over the completed runs, s.
+    pub moving_s: Option<f64>,
+    /// Largest gap of all crossings, mm; none without runs.
+    pub worst_gap_mm: Option<f64>,
+    /// Least of the plant's friction less its utilisation in a crossing.
+    pub least_slip_margin: Option<f64>,
+    /// Crossings with gross slip, and runs that slipped elsewhere.
     pub slip_events: usize,
     /// Runs that did not complete.
     pub incomplete: usize,
-    /// Mean preload while moving, N.
-    pub mean_preload_n: f64,
-    /// Mean mechanical work of the drive, J.
-    pub energy_j: f64,
-    /// Mean friction work on the tread, J.
-    pub wear_j: f64,
+    /// Mean preload while moving, over the completed runs, N.
+    pub mean_preload_n: Option<f64>,
+}
+
+impl Entry {
+    /// The entry of these runs.
+    fn of(controller: &'static str, gap_reserve: Option<f64>, lines: &[RunLine]) -> Self {
+        let completed = || lines.iter().filter(|line| line.completed);
+        let mean = |of: &dyn Fn(&RunLine) -> Option<f64>| {
+            let values: Vec<f64> = completed().filter_map(of).collect();
+            (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+        };
+        let gaps = lines.iter().filter(|line| line.error.is_none()).map(|line| line.max_gap_mm);
+        let margins = lines.iter().filter_map(|line| line.least_slip_margin);
+        Self {
+            controller,
+            gap_reserve,
+            tuned: false,
+            duration_s: mean(&|line| line.duration_s),
+            moving_s: mean(&|line| Some(line.moving_s)),
+            worst_gap_mm: gaps.max_by(f64::total_cmp),
+            least_slip_margin: margins.min_by(f64::total_cmp),
+            slip_events: lines.iter().map(|line| line.slip_events).sum(),
+            incomplete: lines.len() - completed().count(),
+            mean_preload_n: mean(&|line| Some(line.mean_preload_n)),
+        }
+    }
 }
 
 /// A comparison.
@@ -70,217 +88,144 @@ pub struct Comparison {
     pub gap_ref_mm: f64,
     /// The strategies, all held to the same worst gap: the scheduled one first.
     pub entries: Vec<Entry>,
+    /// Seeds of plants for which the oracle found no run, and which bound it could not keep.
+    pub oracle_fails: Vec<(u64, String)>,
+    /// Runs of the scheduled strategy behind its entry, in the order of the seeds.
+    scheduled: Vec<RunLine>,
 }
 
 /// Compares over `runs` rigs of the scenario, seeds `first_seed` and up. `progress` is
 /// called after every run.
 ///
+/// Every strategy has the same planner with the same braking and friction check, and aims at the reference gap less a reserve. The reserve of each is
+/// tuned until its worst gap over all rigs is the reference; then the times are comparable.
+///
 /// # Errors
-/// [`RunError`] if the parameters do not make a rig or a plant fails.
+/// [`RunError`] if the parameters do not make a rig.
 pub fn compare(
     scenario: &Scenario,
     first_seed: u64,
     runs: usize,
     progress: &(dyn Fn() + Sync),
 ) -> Result<Comparison, RunError> {
-    let bench = Bench { scenario, first_seed, runs, progress };
     let direction: Direction = scenario.run.direction.into();
     let reference = Planner::try_build(&scenario.rig)?.gap_ref(direction).to_num::<f64>();
-    // A smaller reserve gives a larger gap: the variable is the reserve's negative.
-    let scheduled = bench.tune(reference, (-MOST_RESERVE, 0.0), |x| {
-        bench.evaluate(ControllerKind::Scheduled, Policy::StepAware, None, -x)
-    });
-    let mut entries = vec![scheduled?];
-    let drive = &scenario.rig.drive;
-    let speeds = (drive.min_crossing_speed_mm_s, drive.cruise_speed_mm_s);
-    for policy in [Policy::StepAware, Policy::OneSpeed] {
-        for kind in [ControllerKind::Constant, ControllerKind::Limit, ControllerKind::Reactive] {
-            let evaluate = |speed| bench.evaluate(kind, policy, Some(speed), 0.0);
-            entries.push(bench.tune(reference, speeds, evaluate)?);
+    let seeds: Vec<u64> = (first_seed..).take(runs).collect();
+    let mut comparison = Comparison {
+        runs,
+        gap_ref_mm: reference,
+        entries: Vec::new(),
+        oracle_fails: Vec::new(),
+        scheduled: Vec::new(),
+    };
+    for kind in STRATEGIES {
+        let (entry, lines) = tuning::tune(reference, |reserve| {
+            let mut scenario = scenario.clone();
+            scenario.run.controller = kind;
+            scenario.rig.control.gap_reserve = reserve;
+            let lines = montecarlo::run(&scenario, &seeds, progress)?;
+            Ok((Entry::of(kind.name(), Some(reserve), &lines), lines))
+        })?;
+        if kind == ControllerKind::Scheduled {
+            comparison.scheduled = lines;
         }
+        comparison.entries.push(entry);
     }
-    Ok(Comparison { runs, gap_ref_mm: reference, entries })
+    Ok(comparison)
 }
 
 /// Most runs that [`compare`] makes over so many rigs, for a progress bar.
 #[must_use]
 pub fn most_runs(rigs: usize) -> usize {
-    rigs * 7 * MOST_TRIES
+    rigs * STRATEGIES.len() * MOST_TRIES
 }
 
-struct Bench<'a> {
-    scenario: &'a Scenario,
-    first_seed: u64,
-    runs: usize,
-    progress: &'a (dyn Fn() + Sync),
-}
-
-impl Bench<'_> {
-    /// Brings the worst gap, which rises with the variable, to the reference by the
-    /// Illinois variant of regula falsi.
-    fn tune(
-        &self,
-        reference: f64,
-        range: (f64, f64),
-        evaluate: impl Fn(f64) -> Result<Entry, RunError>,
-    ) -> Result<Entry, RunError> {
-        let off = |entry: &Entry| entry.worst_gap_mm / reference - 1.0;
-        let (mut low, mut high) = range;
-        let at_low = evaluate(low)?;
-        let at_high = evaluate(high)?;
-        if off(&at_low) >= -TUNED_WITHIN {
-            return Ok(Entry { tuned: off(&at_low) <= TUNED_WITHIN, ..at_low });
-        }
-        if off(&at_high) <= TUNED_WITHIN {
-            return Ok(Entry { tuned: off(&at_high) >= -TUNED_WITHIN, ..at_high });
-        }
-        let (mut f_low, mut f_high) = (off(&at_low), off(&at_high));
-        // The fastest that keeps the reference, if the tries run out.
-        let mut best = at_low;
-        for _ in 2..MOST_TRIES {
-            let x = (low * f_high - high * f_low) / (f_high - f_low);
-            let x = x.clamp(low + 0.02 * (high - low), high - 0.02 * (high - low));
-            let entry = evaluate(x)?;
-            let f = off(&entry);
-            if f.abs() <= TUNED_WITHIN {
-                return Ok(Entry { tuned: true, ..entry });
-            }
-            if f < 0.0 {
-                (low, f_low) = (x, f);
-                f_high *= 0.5;
-                best = entry;
-            } else {
-                (high, f_high) = (x, f);
-                f_low *= 0.5;
-            }
-        }
-        Ok(best)
-    }
-
-    fn evaluate(
-        &self,
-        kind: ControllerKind,
-        policy: Policy,
-        speed: Option<f64>,
-        reserve: f64,
-    ) -> Result<Entry, RunError> {
-        let options =
-            Options { rows: false, speed: speed.map(|speed| (speed, policy == Policy::OneSpeed)) };
-        let summaries = (0..self.runs as u64)
-            .into_par_iter()
-            .map(|offset| {
-                let mut scenario = self.scenario.clone();
-                scenario.run.seed = self.first_seed + offset;
-                scenario.run.controller = kind;
-                scenario.rig.control.gap_reserve = reserve;
-                let result = run(&scenario, options).map(|recording| recording.summary);
-                (self.progress)();
-                result
+impl Comparison {
+    /// Adds the oracle: on each plant the best run within the worst gap and the least slip
+    /// margin of the scheduled run there. `progress` is called after every plant.
+    ///
+    /// # Errors
+    /// [`RunError`] if a plant fails.
+    pub fn add_oracle(
+        &mut self,
+        scenario: &Scenario,
+        effort: oracle::Effort,
+        progress: &(dyn Fn() + Sync),
+    ) -> Result<(), RunError> {
+        let reference = self.gap_ref_mm;
+        let lines = self
+            .scheduled
+            .par_iter()
+            .map(|line| {
+                let mut scenario = scenario.clone();
+                scenario.run.seed = line.seed;
+                let found = oracle::search(&scenario, &Bounds::of(line, reference), effort);
+                progress();
+                found.map(|run| run.line)
             })
             .collect::<Result<Vec<_>, _>>()?;
-        let mean = |f: fn(&Summary) -> f64| {
-            summaries.iter().map(f).sum::<f64>() / summaries.len().max(1) as f64
-        };
-        Ok(Entry {
-            controller: kind.name(),
-            policy,
-            crossing_speed_mm_s: speed,
-            gap_reserve: reserve,
-            tuned: false,
-            duration_s: mean(|s| s.duration_s.unwrap_or(f64::INFINITY)),
-            moving_s: mean(|s| s.moving_s),
-            worst_gap_mm: summaries.iter().map(|s| s.max_gap_mm).fold(0.0, f64::max),
-            slip_events: summaries.iter().filter(|s| s.slip_mm > SLIP_SEEN_MM).count(),
-            incomplete: summaries.iter().filter(|s| !s.completed).count(),
-            mean_preload_n: mean(|s| s.mean_preload_n),
-            energy_j: mean(|s| s.energy_j),
-            wear_j: mean(|s| s.wear_j),
-        })
+        let fails = |line: &RunLine| Some((line.seed, line.error.clone()?));
+        self.oracle_fails = lines.iter().filter_map(fails).collect();
+        self.entries.push(Entry { tuned: true, ..Entry::of(ORACLE, None, &lines) });
+        Ok(())
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::cell::Cell;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
     use super::*;
 
     #[test]
-    fn all_meet_the_reference_and_none_is_faster_than_the_schedule() {
+    fn every_strategy_is_held_to_the_reference_and_the_oracle_is_the_fastest() {
         let runs = AtomicUsize::new(0);
         let count = || {
             runs.fetch_add(1, Ordering::Relaxed);
         };
-        let comparison = compare(&Scenario::default(), 1, 2, &count).unwrap();
-        let runs = runs.into_inner();
-        assert!((50..=most_runs(2)).contains(&runs), "{runs}");
-        let [scheduled, others @ ..] = &comparison.entries[..] else { panic!("no entry") };
-        assert_eq!((scheduled.controller, others.len()), ("scheduled", 6));
-        for entry in &comparison.entries {
-            let off = entry.worst_gap_mm / comparison.gap_ref_mm - 1.0;
-            assert!(entry.tuned && off.abs() < 0.005, "{entry:?}");
-            assert_eq!((entry.slip_events, entry.incomplete), (0, 0), "{entry:?}");
-            // The limit throughout is as fast, at a higher preload.
-            let slack = if entry.controller == "limit" { 1.02 } else { 1.0 };
-            assert!(scheduled.duration_s <= slack * entry.duration_s, "{entry:?}");
-            assert!(entry.controller != "limit" || entry.mean_preload_n > scheduled.mean_preload_n);
-            let factor = entry.duration_s / scheduled.duration_s;
-            assert!(entry.controller != "constant" || factor > 1.3, "{entry:?}");
-        }
-    }
-
-    /// Tunes a worst gap that is this function of the variable, between 3 and 30, and
-    /// returns the entry with the number of evaluations.
-    fn tuned(gap: impl Fn(f64) -> f64) -> (Entry, usize) {
         let scenario = Scenario::default();
-        let bench = Bench { scenario: &scenario, first_seed: 1, runs: 0, progress: &|| {} };
-        let tries = Cell::new(0);
-        let entry = bench.tune(2.0, (3.0, 30.0), |speed| {
-            tries.set(tries.get() + 1);
-            Ok(Entry {
-                controller: "constant",
-                policy: Policy::StepAware,
-                crossing_speed_mm_s: Some(speed),
-                gap_reserve: 0.0,
-                tuned: false,
-                duration_s: 80.0 / speed,
-                moving_s: 80.0 / speed,
-                worst_gap_mm: gap(speed),
-                slip_events: 0,
-                incomplete: 0,
-                mean_preload_n: 0.0,
-                energy_j: 0.0,
-                wear_j: 0.0,
-            })
-        });
-        (entry.unwrap(), tries.get())
+        let mut comparison = compare(&scenario, 1, 1, &count).unwrap();
+        let runs = runs.into_inner();
+        assert!((STRATEGIES.len()..=most_runs(1)).contains(&runs), "{runs}");
+        comparison.add_oracle(&scenario, oracle::Effort::Coarse, &|| {}).unwrap();
+        let names: Vec<_> = comparison.entries.iter().map(|entry| entry.controller).collect();
+        assert_eq!(names, ["scheduled", "constant", "limit", "reactive", "oracle"]);
+        for entry in &comparison.entries {
+            let off = entry.worst_gap_mm.unwrap() / comparison.gap_ref_mm - 1.0;
+            assert!(!entry.tuned || entry.controller == ORACLE || off.abs() < 0.005, "{entry:?}");
+            assert_eq!((entry.slip_events, entry.incomplete), (0, 0), "{entry:?}");
+            assert!(entry.duration_s > entry.moving_s, "{entry:?}");
+        }
+        let [scheduled, .., oracle] = &comparison.entries[..] else { panic!("no entries") };
+        assert!(oracle.duration_s < scheduled.duration_s, "{oracle:?} {scheduled:?}");
+        assert!(oracle.worst_gap_mm <= scheduled.worst_gap_mm, "{oracle:?} {scheduled:?}");
+        assert!(oracle.least_slip_margin >= scheduled.least_slip_margin, "{oracle:?}");
     }
 
     #[test]
-    fn the_tuning_finds_the_speed_of_the_reference() {
-        let curves: [fn(f64) -> f64; 3] =
-            [|v| 1.5 + 0.05 * v, |v| 1.0 + 0.35 * v.sqrt(), |v| 2.6 - 4.0 / v];
-        for gap in curves {
-            let (entry, tries) = tuned(gap);
-            assert!(entry.tuned && tries <= MOST_TRIES, "{entry:?} {tries}");
-            assert!((entry.worst_gap_mm / 2.0 - 1.0).abs() <= TUNED_WITHIN, "{entry:?}");
-        }
-    }
-
-    #[test]
-    fn a_reference_out_of_reach_is_reported() {
-        // Always too large: the slowest. Always below: the fastest.
-        for (gap, speed) in [(2.5, 3.0), (1.5, 30.0)] {
-            let (entry, _) = tuned(|_| gap);
-            assert!(!entry.tuned);
-            assert_eq!(entry.crossing_speed_mm_s, Some(speed));
-        }
-        // Met at an end.
-        assert!(tuned(|v| if v < 3.5 { 2.0 } else { 2.5 }).0.tuned);
-        // Jumped over: the fastest that keeps it.
-        let (entry, tries) = tuned(|v| if v < 11.0 { 1.9 } else { 2.1 });
-        assert!(!entry.tuned && entry.worst_gap_mm < 2.0 && tries == MOST_TRIES, "{entry:?}");
-        assert!(entry.crossing_speed_mm_s > Some(9.0), "{entry:?}");
+    fn an_entry_takes_times_from_completed_runs_and_the_worst_of_all() {
+        let good = RunLine {
+            completed: true,
+            duration_s: Some(5.0),
+            moving_s: 4.0,
+            max_gap_mm: 2.0,
+            least_slip_margin: Some(0.3),
+            ..RunLine::default()
+        };
+        let slipped = RunLine {
+            duration_s: Some(120.0),
+            moving_s: 119.0,
+            max_gap_mm: 3.0,
+            slip_events: 2,
+            least_slip_margin: Some(0.0),
+            ..RunLine::default()
+        };
+        let failed = RunLine { error: Some("not finite".into()), ..RunLine::default() };
+        let entry = Entry::of("limit", Some(0.1), &[good.clone(), slipped, failed.clone(), good]);
+        assert_eq!((entry.duration_s, entry.moving_s), (Some(5.0), Some(4.0)));
+        assert_eq!((entry.worst_gap_mm, entry.least_slip_margin), (Some(3.0), Some(0.0)));
+        assert_eq!((entry.slip_events, entry.incomplete), (2, 2));
+        let none = Entry::of("limit", None, &[failed]);
+        assert_eq!((none.duration_s, none.worst_gap_mm, none.incomplete), (None, None, 1));
     }
 }

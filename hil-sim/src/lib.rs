@@ -3,14 +3,17 @@
 
 pub mod cli;
 pub mod compare;
+pub mod envelope;
 pub mod faults;
 pub mod files;
 pub mod firmware;
+pub mod fit_range;
 pub mod hil;
 pub mod identify;
 pub mod injector;
 pub mod live;
 pub mod montecarlo;
+pub mod oracle;
 pub mod params;
 pub mod plant;
 pub mod probe;

@@ -36,6 +36,8 @@ pub struct RunLine {
     pub least_lead_s: Option<f64>,
     /// Least of the plant's friction less the utilisation at its peak in a crossing.
     pub least_slip_margin: Option<f64>,
+    /// Mean true preload while moving, N.
+    pub mean_preload_n: f64,
     /// Faults.
     pub faults: Vec<Report>,
     /// Codes of the limits that occurred, each once, ascending.
@@ -66,6 +68,7 @@ impl RunLine {
             slip_events: slip_events(&summary),
             least_lead_s: least(&mut crossings.iter().filter_map(|c| c.lead_time_s)),
             least_slip_margin: least(&mut crossings.iter().map(|c| mu - c.peak_utilisation)),
+            mean_preload_n: summary.mean_preload_n,
             faults: summary.faults,
             limits,
             error: None,

@@ -1,26 +1,32 @@
-//! `rig compare`: the four strategies on the same random rigs.
+//! `rig compare`: the four strategies and the oracle on the same random rigs.
 
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use super::failure::{Failure, Outcome};
 use super::output;
 use super::scenario::RunArgs;
-use crate::compare::{self, Comparison, Policy};
+use crate::compare::{self, Comparison, Entry};
+use crate::oracle::Effort;
 use crate::progress;
 use crate::table::{number, plain};
 
-/// Compares four preload strategies on the same random rigs: constant at cruise,
-/// constant at the limit, reactive, scheduled.
+/// Compares four preload strategies on the same random rigs: scheduled, constant at cruise,
+/// constant at the limit, reactive; and the oracle, the best run that the plants allow.
 ///
-/// Each is tuned until its worst gap over all rigs is the reference; then the times
-/// are comparable. Once with the step-aware speed for all, once with one speed
-/// throughout for those without look-ahead.
+/// Every strategy has the same planner with the same braking and friction check. The reserve below the reference gap of each is tuned until its worst gap over all rigs is
+/// the reference; then the times are comparable. The oracle knows each plant in advance and
+/// has the same actuators; it keeps the worst gap and the least slip margin of the scheduled
+/// run on that plant.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// How many rigs: the seeds that follow --seed.
-    #[arg(short = 'n', value_name = "N", default_value_t = 200,
+    #[arg(short = 'n', value_name = "N", default_value_t = 20,
           value_parser = clap::value_parser!(u64).range(1..=100_000))]
     count: u64,
+
+    /// Leaves the oracle out, which takes most of the time.
+    #[arg(long)]
+    no_oracle: bool,
 
     #[command(flatten)]
     run: RunArgs,
@@ -33,75 +39,77 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let scenario = args.run.resolve()?;
     let rigs = args.count as usize;
-    let comparison = {
+    let mut comparison = {
         let bar = progress::bar("runs at most", compare::most_runs(rigs) as u64);
         compare::compare(&scenario, scenario.run.seed + 1, rigs, &|| bar.advance(1))?
     };
+    if !args.no_oracle {
+        let bar = progress::bar("plants of the oracle", rigs as u64);
+        comparison.add_oracle(&scenario, Effort::Full, &|| bar.advance(1))?;
+    }
     output::result(args.json, &machine(&comparison), || human(&comparison))?;
     Ok(Outcome::Good)
 }
 
-/// The JSON object: the entries by the names of their controllers, those with one speed apart.
+/// The JSON object.
 fn machine(comparison: &Comparison) -> Value {
-    let entries = |policy: Policy| -> Map<String, Value> {
-        let of_policy = comparison.entries.iter().filter(|entry| entry.policy == policy);
-        of_policy.map(|entry| (entry.controller.to_owned(), json!(entry))).collect()
-    };
     json!({
         "runs": comparison.runs,
         "gap_ref_mm": comparison.gap_ref_mm,
-        "controllers": entries(Policy::StepAware),
-        "one_speed": entries(Policy::OneSpeed),
+        "entries": comparison.entries,
     })
 }
 
 fn human(comparison: &Comparison) -> String {
     let head = [
         "controller",
-        "speed",
-        "crossing",
-        "command s",
-        "moving s",
+        "command s (ratio)",
+        "moving s (ratio)",
         "gap mm",
+        "margin",
         "slips",
         "short",
         "mean N",
-        "J",
-        "wear mJ",
+        "reserve",
     ];
+    let scheduled = &comparison.entries[0];
     let rows = comparison.entries.iter().map(|entry| {
         let mark = if entry.tuned { "" } else { "~" };
-        let speed = match entry.policy {
-            Policy::StepAware => "by steps",
-            Policy::OneSpeed => "one",
+        let time = |of: fn(&Entry) -> Option<f64>| {
+            let ratio = of(entry).zip(of(scheduled)).map(|(this, reference)| this / reference);
+            format!("{} ({})", number(of(entry), 3), number(ratio, 3))
         };
-        let crossing = entry
-            .crossing_speed_mm_s
-            .map_or_else(|| format!("-{:.1} %", entry.gap_reserve * 100.0), |v| format!("{v:.2}"));
+        let reserve = entry.gap_reserve.map(|reserve| format!("{:.1} %", reserve * 100.0));
         vec![
             entry.controller.to_owned(),
-            speed.to_owned(),
-            crossing,
-            number(entry.duration_s, 2),
-            number(entry.moving_s, 2),
+            time(|entry| entry.duration_s),
+            time(|entry| entry.moving_s),
             format!("{mark}{}", number(entry.worst_gap_mm, 3)),
+            number(entry.least_slip_margin, 3),
             entry.slip_events.to_string(),
             entry.incomplete.to_string(),
             number(entry.mean_preload_n, 1),
-            number(entry.energy_j, 2),
-            number(entry.wear_j * 1e3, 2),
+            reserve.unwrap_or_else(|| "-".to_owned()),
         ]
     });
     let mut text = format!(
-        "{} rigs, each strategy tuned to a worst gap of {:.3} mm\n{}\nspeed: by steps, slow at the \
-         steps alone; one, the same throughout. crossing: speed in mm/s, or\nthe reserve below the \
-         reference gap that the schedule aims at. short: incomplete runs.\n",
+        "{} rigs, each strategy tuned to a worst gap of {:.3} mm\n{}\ncommand: from the accepted \
+         command to arrival; moving: the wheel moves; means over completed runs,\nwith their \
+         ratios to the scheduled strategy. gap, margin (of friction): the worst of all runs.\n\
+         short: incomplete runs. reserve: how far below the reference gap the planner aims.\n",
         comparison.runs,
         comparison.gap_ref_mm,
         plain(&head, rows)
     );
     if comparison.entries.iter().any(|entry| !entry.tuned) {
-        text += "~ could not be brought to the reference gap within its range of speeds\n";
+        text += "~ could not be brought to the reference gap by its reserve\n";
+    }
+    if comparison.entries.iter().any(|entry| entry.controller == compare::ORACLE) {
+        text += "oracle: the fastest run found for each plant, all of it known in advance, with \
+                 the same actuators,\nat the worst gap and slip margin of the scheduled run there\n";
+    }
+    for (seed, why) in &comparison.oracle_fails {
+        text += &format!("oracle, seed {seed}: no run found, {why}\n");
     }
     text
 }

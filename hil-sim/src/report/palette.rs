@@ -58,6 +58,10 @@ pub const MODES: [RGBColor; 13] = [
     RGBColor(0xbc, 0xc1, 0xca),
 ];
 
+/// Pale fills for how a run ended: well, with slip, not at all.
+pub const OUTCOMES: [RGBColor; 3] =
+    [RGBColor(0xb9, 0xe3, 0xc3), RGBColor(0xfc, 0xe3, 0xa6), RGBColor(0xf4, 0xb8, 0xb8)];
+
 /// Pale fills for the contact stages, from number 1.
 pub const STAGES: [RGBColor; 6] = [
     RGBColor(0xe5, 0xe7, 0xeb),

@@ -107,6 +107,13 @@ impl Session {
         self
     }
 
+    /// The same session on a plant that is changed like this; the controller does not know.
+    #[must_use]
+    pub fn with_plant(mut self, change: impl FnOnce(&mut VirtualRig)) -> Self {
+        change(&mut self.plant);
+        self
+    }
+
     /// One millisecond with an operator's command or none.
     ///
     /// # Errors

@@ -1,8 +1,8 @@
-//! `rig montecarlo` and `rig faults`.
+//! `rig montecarlo`, `rig faults`, `rig compare` and `rig envelope`.
 
 use serde_json::Value;
 
-use super::{code, good, number, rig, stdout};
+use super::{code, good, number, object, refused, rig, rig_in, stdout};
 
 fn campaign(more: &[&str]) -> Value {
     good(&[&["montecarlo", "--json"], more].concat())
@@ -57,4 +57,60 @@ fn the_parts_of_a_fault_campaign_are_the_whole() {
         ["1/2", "2/2"].map(|part| lines(&good(&[&some[..], &["--shard", part]].concat())));
     assert_eq!((first.len(), second.len()), (2, 1));
     assert_eq!([first[0].clone(), second[0].clone(), first[1].clone()].to_vec(), lines(&all));
+}
+
+#[test]
+fn the_comparison_has_every_strategy_and_the_oracle() {
+    let compared = good(&["compare", "-n", "1", "--json"]);
+    assert_eq!(compared["runs"], 1);
+    let entries = compared["entries"].as_array().unwrap();
+    let names: Vec<&str> = entries.iter().map(|e| e["controller"].as_str().unwrap()).collect();
+    assert_eq!(names, ["scheduled", "constant", "limit", "reactive", "oracle"]);
+    for entry in entries {
+        assert!(number(entry, "duration_s") > number(entry, "moving_s"), "{entry}");
+        assert!(number(entry, "worst_gap_mm") > 1.0 && number(entry, "least_slip_margin") > 0.0);
+        assert_eq!((&entry["slip_events"], &entry["incomplete"]), (&0.into(), &0.into()));
+    }
+    let [scheduled, .., oracle] = &entries[..] else { panic!("{compared}") };
+    assert!(number(oracle, "duration_s") < number(scheduled, "duration_s"));
+    assert!(number(oracle, "worst_gap_mm") <= number(scheduled, "worst_gap_mm"));
+    let table = rig(&["compare", "-n", "1", "--no-oracle"]);
+    let text = stdout(&table);
+    assert!(text.contains("reactive") && !text.contains("oracle"), "{text}");
+    assert!(text.contains("command s") && text.lines().all(|line| line.chars().count() <= 100));
+}
+
+#[test]
+fn the_envelope_writes_its_picture_and_every_key() {
+    let directory = tempfile::tempdir().unwrap();
+    let output = rig_in(directory.path(), &["envelope", "-n", "2x2", "--json"]);
+    assert_eq!(code(&output), 0);
+    let found = object(&output);
+    let grid = found["grid"].as_array().unwrap();
+    assert_eq!(grid.len(), 2 * 2 * 2 * 4);
+    for cell in grid {
+        assert!([0.6, 1.3].contains(&number(cell, "friction")), "{cell}");
+        assert!([0.0, 30.0].contains(&number(cell, "load_n")), "{cell}");
+        assert!(cell["known"].is_boolean() && cell["controller"].is_string());
+        let completed = cell["completed"].as_bool().unwrap();
+        assert!(number(cell, "slip_mm") >= 0.0);
+        assert_eq!(cell["duration_s"].is_number(), completed, "{cell}");
+    }
+    for controller in ["scheduled", "constant", "limit", "reactive"] {
+        for part in ["known", "unknown"] {
+            assert!((0.0..=1.0).contains(&number(&found["area"][controller], part)));
+        }
+    }
+    let missing = found["not_contained"].as_array().unwrap();
+    assert_eq!(found["scheduled_contains_all"], missing.is_empty());
+    assert_eq!(found["files"], serde_json::json!(["out/envelope/envelope.svg"]));
+    let picture = directory.path().join("out/envelope/envelope.svg");
+    assert!(std::fs::read_to_string(picture).unwrap().contains("scheduled, known"));
+}
+
+#[test]
+fn a_grid_that_is_none_is_refused() {
+    for text in ["8", "1x7", "a x b"] {
+        refused(&["envelope", "-n", text], &["-n", text, "8x7"]);
+    }
 }

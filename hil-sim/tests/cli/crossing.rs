@@ -66,6 +66,26 @@ fn a_wheel_that_sinks_in_has_no_gap_and_exits_with_one() {
 }
 
 #[test]
+fn an_answer_outside_the_fit_says_so() {
+    for (speed, preload, fits) in
+        [(5.0, 100.0, true), (5.0, 300.0, false), (5.0, 1000.0, false), (150.0, 100.0, false)]
+    {
+        for method in ["reduced", "fixed"] {
+            let value = crossing(speed, preload, &["--method", method]);
+            assert_eq!(value["in_range"], fits, "{speed} {preload} {method}");
+            assert!(number(&value, "gap_mm") > 0.0);
+        }
+    }
+    // The ring has no range.
+    assert_eq!(crossing(150.0, 100.0, &[])["in_range"], true);
+    let asked = ["crossing", "--speed-mm-s", "5", "--preload-n", "300", "--method", "reduced"];
+    let text = stdout(&rig(&asked)).to_owned();
+    assert!(text.contains("Out of the range") && text.contains("preload 300"), "{text}");
+    let text = stdout(&rig(&["crossing", "--speed-mm-s", "5", "--preload-n", "100"])).to_owned();
+    assert!(!text.contains("range"), "{text}");
+}
+
+#[test]
 fn a_table_is_printed_for_people() {
     let output = rig(&["crossing", "--speed-mm-s", "5", "--preload-n", "33.3", "--driven"]);
     let text = stdout(&output);

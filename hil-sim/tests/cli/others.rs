@@ -28,7 +28,7 @@ fn help_lists_the_verbs_and_is_no_error() {
     for verb in ["modes", "bench", "paper"] {
         assert!(stdout(&output).contains(&format!("\n  {verb} ")), "{verb}");
     }
-    for verb in ["deploy", "crossing", "montecarlo", "keys", "test"] {
+    for verb in ["deploy", "crossing", "compare", "envelope", "montecarlo", "keys", "test"] {
         assert!(stdout(&output).contains(&format!("\n  {verb} ")), "{verb}");
         let help = rig(&[verb, "--help"]);
         assert_eq!(code(&help), 0, "{verb}");

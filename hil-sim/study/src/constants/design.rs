@@ -1,5 +1,6 @@
 //! Which crossings the reduced model is fitted to, and which it is checked on.
 
+use hil_sim::fit_range::PUBLISHED;
 use interstage::model::effective_stiffness::{FORCE_END, Kind};
 use interstage::model::formula::Formula;
 use interstage::units::Direction;
@@ -33,11 +34,8 @@ pub enum Use {
 
 /// Utilisation up to which loads are drawn for the fit; rubber holds about 1.5.
 const FIT_UTILISATION: f64 = 1.72;
-/// Utilisation up to which loads are drawn for the check.
-const HOLD_UTILISATION: f64 = 1.5;
-/// Largest load of the fit and of the check, N.
+/// Largest load of the fit, N.
 const FIT_LOAD_N: f64 = 22.0;
-const HOLD_LOAD_N: f64 = 20.0;
 
 /// Crossings of one kind and use, by default.
 #[must_use]
@@ -70,7 +68,10 @@ fn case(formula: &Formula, kind: Kind, of: Use, index: usize) -> Option<DesignPo
     let (speed_mm_s, step_mm) = match of {
         Use::Fit => (log_between(0.5, 200.0, speed), between(1.9, 6.1, step)),
         Use::Tame => (log_between(0.4, 250.0, speed), between(1.9, 6.1, step)),
-        Use::Hold => (log_between(1.0, 100.0, speed), between(2.0, 6.0, step)),
+        Use::Hold => {
+            let ((slow, fast), (low, high)) = (PUBLISHED.speed_mm_s, PUBLISHED.step_mm);
+            (log_between(slow, fast, speed), between(low, high, step))
+        }
     };
     let shape = Formula { step_mm, ..*formula };
     // Axial over radial reaction as the contact sets in, nearly.
@@ -82,8 +83,8 @@ fn case(formula: &Formula, kind: Kind, of: Use, index: usize) -> Option<DesignPo
             (preload, (preload * lifted(FIT_UTILISATION)).min(FIT_LOAD_N))
         }
         Use::Hold => {
-            let preload = log_between(15.0, 150.0, force);
-            (preload, (preload * lifted(HOLD_UTILISATION)).min(HOLD_LOAD_N))
+            let preload = log_between(PUBLISHED.preload_n.0, PUBLISHED.preload_n.1, force);
+            (preload, (preload * lifted(PUBLISHED.utilisation)).min(PUBLISHED.load_n))
         }
         Use::Tame => {
             let run = between(0.1, 0.98, force) * shape.largest_run_mm(kind);

@@ -1,0 +1,150 @@
+//! `rig envelope`: friction and load that each strategy copes with.
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+use serde_json::{Map, Value, json};
+
+use super::failure::{Failure, Outcome};
+use super::output::{self, WithFiles};
+use super::scenario::RunArgs;
+use crate::compare::STRATEGIES;
+use crate::envelope::{self, Cell, Envelope, Grid};
+use crate::files::{make_directory, write_text};
+use crate::progress;
+use crate::table::{number, plain};
+
+/// Over friction (0.6 to 1.3) and load on this wheel (0 to 30 N): which preload strategy
+/// completes without slip, and in which time.
+///
+/// Once with friction and load known to the controller, once unknown: the plant has them, and
+/// the controller believes those of the scenario. Durations count from the accepted command.
+/// Writes a picture, envelope.svg.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// Places of the grid: frictions by loads, 2 to 100 each.
+    #[arg(short = 'n', value_name = "FxL", default_value_t = Grid::USUAL)]
+    grid: Grid,
+
+    #[command(flatten)]
+    run: RunArgs,
+
+    /// Directory of the picture.
+    #[arg(long, value_name = "DIR", default_value = "out/envelope")]
+    out: PathBuf,
+
+    /// Writes no picture.
+    #[arg(long, conflicts_with = "out")]
+    no_files: bool,
+
+    /// Prints the outcome as one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Printed<'a> {
+    grid: &'a [Cell],
+    area: Map<String, Value>,
+    /// Whether the scheduled strategy completes without slip wherever another one does.
+    scheduled_contains_all: bool,
+    /// Where it does not.
+    not_contained: Vec<Value>,
+}
+
+pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
+    let scenario = args.run.resolve()?;
+    if args.out.exists() && !args.out.is_dir() {
+        let path = args.out.display();
+        return Err(Failure::input(format!("--out {path}: exists and is not a directory")));
+    }
+    let found = {
+        let bar = progress::bar("runs", args.grid.runs() as u64);
+        envelope::envelope(&scenario, args.grid, &|| bar.advance(1))?
+    };
+    let mut files = Vec::new();
+    if !args.no_files {
+        make_directory(&args.out)?;
+        let path = args.out.join("envelope.svg");
+        write_text(&path, &envelope::picture(&found))?;
+        files.push(path);
+    }
+    let printed = machine(&found);
+    let printed = WithFiles { result: &printed, files: &files };
+    output::result(args.json, &printed, || human(&found) + &output::wrote(&files))?;
+    Ok(Outcome::Good)
+}
+
+fn machine(found: &Envelope) -> Printed<'_> {
+    let area = |name: &str| (name.to_owned(), json!(found.area(name)));
+    let missing = found.not_contained();
+    let place = |cell: &&Cell| {
+        let Cell { friction, load_n, known, controller, .. } = *cell;
+        json!({ "friction": friction, "load_n": load_n, "known": known, "controller": controller })
+    };
+    Printed {
+        grid: &found.cells,
+        area: STRATEGIES.iter().map(|kind| area(kind.name())).collect(),
+        scheduled_contains_all: missing.is_empty(),
+        not_contained: missing.iter().map(place).collect(),
+    }
+}
+
+fn human(found: &Envelope) -> String {
+    let head = ["controller", "known", "unknown", "time known", "time unknown"];
+    let rows = STRATEGIES.map(|kind| {
+        let name = kind.name();
+        let area = found.area(name);
+        let percent = |part: f64| format!("{:.1} %", 100.0 * part);
+        let ratio = |known| number(found.time_ratio(name, known), 3);
+        vec![name.to_owned(), percent(area.known), percent(area.unknown), ratio(true), ratio(false)]
+    });
+    let mut text = format!(
+        "Part of the grid in which each strategy completes without slip, and its time over the\n\
+         scheduled strategy's where both do\n{}\n",
+        plain(&head, rows)
+    );
+    for (known, title) in [(true, "known"), (false, "unknown")] {
+        text += &format!(
+            "Friction and load {title} to the controller: s scheduled, c constant, l limit, \
+             r reactive\n{}\n",
+            letters(found, known)
+        );
+    }
+    text + &contained(found)
+}
+
+/// The strategies that complete without slip at each place, by their first letters.
+fn letters(found: &Envelope, known: bool) -> comfy_table::Table {
+    let frictions = found.frictions.iter().map(|friction| number(*friction, 2));
+    let head: Vec<String> = std::iter::once("load N".to_owned()).chain(frictions).collect();
+    let head: Vec<&str> = head.iter().map(String::as_str).collect();
+    let rows = found.loads_n.iter().rev().map(|load_n| {
+        let at = |friction: &f64| {
+            let good = found.cells.iter().filter(|cell| {
+                (cell.friction, cell.load_n, cell.known) == (*friction, *load_n, known)
+                    && cell.good()
+            });
+            good.map(|cell| &cell.controller[..1]).collect::<String>()
+        };
+        std::iter::once(number(*load_n, 1)).chain(found.frictions.iter().map(at)).collect()
+    });
+    plain(&head, rows)
+}
+
+/// Whether the scheduled region contains the others, and where not.
+fn contained(found: &Envelope) -> String {
+    let missing = found.not_contained();
+    if missing.is_empty() {
+        return "The scheduled strategy completes without slip wherever another one does.\n"
+            .to_owned();
+    }
+    let mut text =
+        "The scheduled strategy does not complete without slip where another does:\n".to_owned();
+    for Cell { friction, load_n, known, controller, .. } in missing {
+        let known = if *known { "known" } else { "unknown" };
+        text += &format!("  friction {friction:.2}, load {load_n:.1} N, {known}: {controller}\n");
+    }
+    text
+}

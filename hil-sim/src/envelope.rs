@@ -1,0 +1,262 @@
+//! Over friction and load on the wheel: which preload strategy completes without slip, and in
+//! which time. Once with both known to the controller, once with a controller that believes the
+//! nominal ones.
+
+mod grid;
+mod picture;
+
+use interstage::model::Planner;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::compare::STRATEGIES;
+use crate::report::verdict::SLIP_SEEN_MM;
+use crate::scenario::{ControllerKind, Scenario};
+use crate::session::{Options, RunError, Session, run_session};
+
+pub use grid::{Grid, GridError};
+pub use picture::picture;
+
+/// One strategy at one place of the grid.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Cell {
+    /// Friction of tread on wall.
+    pub friction: f64,
+    /// Axial load on this wheel, N.
+    pub load_n: f64,
+    /// Whether the controller knows both; else it believes the scenario's.
+    pub known: bool,
+    /// Strategy.
+    pub controller: &'static str,
+    /// Whether the drive reached the end of travel with every step crossed and no fault.
+    pub completed: bool,
+    /// Gross slip, mm; none if no run could be made.
+    pub slip_mm: Option<f64>,
+    /// From the accepted command to arrival, s; none if the run did not complete.
+    pub duration_s: Option<f64>,
+}
+
+impl Cell {
+    /// Whether it completed without slip.
+    #[must_use]
+    pub fn good(&self) -> bool {
+        self.completed && self.slip_mm.is_some_and(|slip_mm| slip_mm <= SLIP_SEEN_MM)
+    }
+
+    /// Whether this is another strategy's cell at the same place.
+    fn same_place(&self, other: &Self) -> bool {
+        (self.friction, self.load_n, self.known) == (other.friction, other.load_n, other.known)
+    }
+}
+
+/// Part of the grid in which a strategy completes without slip.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Area {
+    /// With friction and load known to the controller.
+    pub known: f64,
+    /// With a controller that believes the nominal ones.
+    pub unknown: f64,
+}
+
+/// The envelope.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Envelope {
+    /// Frictions, ascending.
+    pub frictions: Vec<f64>,
+    /// Loads on the wheel, ascending, N.
+    pub loads_n: Vec<f64>,
+    /// Friction and load that the controller believes, N.
+    pub nominal: (f64, f64),
+    /// Every cell: known first, then by friction, load and strategy.
+    pub cells: Vec<Cell>,
+}
+
+impl Envelope {
+    /// Part of the grid in which this strategy completes without slip.
+    #[must_use]
+    pub fn area(&self, controller: &str) -> Area {
+        let part = |known: bool| {
+            let of = |cell: &&Cell| cell.controller == controller && cell.known == known;
+            let all = self.cells.iter().filter(of);
+            let good = all.clone().filter(|cell| cell.good()).count();
+            good as f64 / all.count().max(1) as f64
+        };
+        Area { known: part(true), unknown: part(false) }
+    }
+
+    /// The cells in which another strategy completes without slip and the scheduled one does
+    /// not; none if its region contains those of the others.
+    #[must_use]
+    pub fn not_contained(&self) -> Vec<&Cell> {
+        let scheduled = |cell: &Cell| cell.controller == ControllerKind::Scheduled.name();
+        let lacks = |cell: &&Cell| {
+            self.cells.iter().any(|own| scheduled(own) && own.same_place(cell) && !own.good())
+        };
+        self.cells.iter().filter(|cell| cell.good() && !scheduled(cell)).filter(lacks).collect()
+    }
+
+    /// Mean of this strategy's time over the scheduled one's, in the cells where both complete
+    /// without slip; none without such a cell.
+    #[must_use]
+    pub fn time_ratio(&self, controller: &str, known: bool) -> Option<f64> {
+        let good = || self.cells.iter().filter(move |cell| cell.known == known && cell.good());
+        let of = |cell: &Cell, name: &str| cell.controller == name;
+        let ratios: Vec<f64> = good()
+            .filter(|cell| of(cell, controller))
+            .filter_map(|cell| {
+                let name = ControllerKind::Scheduled.name();
+                let own = good().find(|own| of(own, name) && own.same_place(cell))?;
+                Some(cell.duration_s? / own.duration_s?)
+            })
+            .collect();
+        (!ratios.is_empty()).then(|| ratios.iter().sum::<f64>() / ratios.len() as f64)
+    }
+}
+
+/// Runs every strategy at every place of the grid, on the plant of the scenario's seed with
+/// that friction and load; `progress` is called after every run.
+///
+/// # Errors
+/// [`RunError`] if the scenario itself makes no controller or its plant is refused. A place
+/// whose parameters make none, or whose plant fails, is a cell that did not complete.
+pub fn envelope(
+    scenario: &Scenario,
+    grid: Grid,
+    progress: &(dyn Fn() + Sync),
+) -> Result<Envelope, RunError> {
+    Planner::try_build(&scenario.rig)?;
+    scenario.plant().check(scenario.rig.preload.limit_n)?;
+    let (frictions, loads_n) = (grid.frictions(), grid.loads_n());
+    let mut places = Vec::new();
+    for known in [true, false] {
+        for &friction in &frictions {
+            for &load_n in &loads_n {
+                places.extend(STRATEGIES.map(|kind| (known, friction, load_n, kind)));
+            }
+        }
+    }
+    let cells = places
+        .into_par_iter()
+        .map(|(known, friction, load_n, kind)| {
+            let cell = cell(scenario, known, friction, load_n, kind);
+            progress();
+            cell
+        })
+        .collect();
+    let loads = &scenario.rig.plant;
+    let nominal = (loads.mu, loads.top_load_n * loads.top_load_share);
+    Ok(Envelope { frictions, loads_n, nominal, cells })
+}
+
+fn cell(
+    scenario: &Scenario,
+    known: bool,
+    friction: f64,
+    load_n: f64,
+    kind: ControllerKind,
+) -> Cell {
+    let mut scenario = scenario.clone();
+    scenario.run.controller = kind;
+    if known {
+        let loads = &mut scenario.rig.plant;
+        (loads.mu, loads.top_load_n, loads.top_load_share) = (friction, load_n, 1.0);
+    }
+    let run = || {
+        let session = Session::new(&scenario, Options::default())?;
+        // The plant has exactly these, whatever its seed draws.
+        let session = session.with_plant(|plant| {
+            plant.set_friction(friction);
+            plant.set_load(load_n);
+        });
+        run_session(session, &scenario)
+    };
+    let summary = run().ok().map(|recording| recording.summary);
+    let completed = summary.as_ref().is_some_and(|summary| summary.completed);
+    Cell {
+        friction,
+        load_n,
+        known,
+        controller: kind.name(),
+        completed,
+        slip_mm: summary.as_ref().map(|summary| summary.slip_mm),
+        duration_s: summary.and_then(|summary| summary.duration_s).filter(|_| completed),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use super::*;
+
+    /// A cell that completed without slip in this time, or did not.
+    fn made(controller: &'static str, friction: f64, duration_s: Option<f64>) -> Cell {
+        Cell {
+            friction,
+            load_n: 5.0,
+            known: true,
+            controller,
+            completed: duration_s.is_some(),
+            slip_mm: Some(0.0),
+            duration_s,
+        }
+    }
+
+    #[test]
+    fn areas_times_and_what_is_not_contained() {
+        let mut cells = vec![
+            made("scheduled", 0.6, None),
+            made("scheduled", 0.9, Some(5.0)),
+            made("scheduled", 1.2, Some(4.0)),
+            made("limit", 0.6, Some(9.0)),
+            made("limit", 0.9, Some(6.0)),
+            made("limit", 1.2, Some(4.0)),
+        ];
+        let nominal = (1.1, 6.7);
+        let envelope = |cells: &[Cell]| Envelope {
+            frictions: vec![0.6, 0.9, 1.2],
+            loads_n: vec![5.0],
+            nominal,
+            cells: cells.to_vec(),
+        };
+        let all = envelope(&cells);
+        assert_eq!(all.area("scheduled"), Area { known: 2.0 / 3.0, unknown: 0.0 });
+        assert_eq!(all.area("limit").known, 1.0);
+        let missing: Vec<f64> = all.not_contained().iter().map(|cell| cell.friction).collect();
+        assert_eq!(missing, [0.6]);
+        assert!((all.time_ratio("limit", true).unwrap() - 1.1).abs() < 1e-12);
+        assert_eq!(all.time_ratio("limit", false), None);
+        // With slip it has not done it.
+        cells[3].slip_mm = Some(1.0);
+        assert!(envelope(&cells).not_contained().is_empty());
+    }
+
+    #[test]
+    fn friction_that_the_controller_does_not_know_is_the_plant_s_alone() {
+        let count = AtomicUsize::new(0);
+        let progress = || {
+            count.fetch_add(1, Ordering::Relaxed);
+        };
+        let grid: Grid = "2x2".parse().unwrap();
+        let found = envelope(&Scenario::default(), grid, &progress).unwrap();
+        assert_eq!((found.cells.len(), count.into_inner()), (32, 32));
+        assert_eq!(grid.runs(), 32);
+        let cell = |known, friction, load_n| {
+            let at = |cell: &&Cell| {
+                (cell.known, cell.friction, cell.load_n) == (known, friction, load_n)
+                    && cell.controller == "scheduled"
+            };
+            found.cells.iter().find(at).expect("a cell of the grid").clone()
+        };
+        // With much friction and no load every strategy does it, known or not.
+        for known in [true, false] {
+            assert!(cell(known, 1.3, 0.0).good(), "{known}");
+            // 30 N hold on no wheel with so little friction.
+            assert!(!cell(known, 0.6, 30.0).good(), "{known}");
+        }
+        // Knowing it changes the run.
+        assert_ne!(cell(true, 1.3, 0.0).duration_s, cell(false, 1.3, 0.0).duration_s);
+        let drawn = picture(&found);
+        assert!(drawn.starts_with("<svg") && drawn.contains("reactive"));
+    }
+}

@@ -1,0 +1,91 @@
+//! The places of the envelope.
+
+use std::fmt;
+use std::str::FromStr;
+
+use crate::compare::STRATEGIES;
+
+/// Least and largest friction of tread on wall.
+const FRICTION: (f64, f64) = (0.6, 1.3);
+/// Least and largest load on the wheel, N.
+const LOAD_N: (f64, f64) = (0.0, 30.0);
+/// Fewest and most places along an axis.
+const PLACES: (usize, usize) = (2, 100);
+
+/// Numbers of frictions and loads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Grid {
+    frictions: usize,
+    loads: usize,
+}
+
+/// The text is no grid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("expected FRICTIONSxLOADS, each from 2 to 100, as in 8x7")]
+pub struct GridError;
+
+impl Grid {
+    /// Steps of 0.1 of friction and of 5 N.
+    pub const USUAL: Self = Self { frictions: 8, loads: 7 };
+
+    /// The frictions, ascending.
+    #[must_use]
+    pub fn frictions(self) -> Vec<f64> {
+        spread(FRICTION, self.frictions)
+    }
+
+    /// The loads on the wheel, ascending, N.
+    #[must_use]
+    pub fn loads_n(self) -> Vec<f64> {
+        spread(LOAD_N, self.loads)
+    }
+
+    /// Runs that it takes: each place known and unknown with every strategy.
+    #[must_use]
+    pub const fn runs(self) -> usize {
+        2 * self.frictions * self.loads * STRATEGIES.len()
+    }
+}
+
+/// So many numbers, evenly over the range, rounded to a millionth.
+fn spread((low, high): (f64, f64), count: usize) -> Vec<f64> {
+    let last = (count - 1) as f64;
+    let at = |index: usize| low + (high - low) * index as f64 / last;
+    (0..count).map(|index| (at(index) * 1e6).round() / 1e6).collect()
+}
+
+impl FromStr for Grid {
+    type Err = GridError;
+
+    fn from_str(text: &str) -> Result<Self, GridError> {
+        let (frictions, loads) = text.split_once(['x', 'X']).ok_or(GridError)?;
+        let number = |text: &str| {
+            let number = text.parse::<usize>().map_err(|_| GridError)?;
+            if (PLACES.0..=PLACES.1).contains(&number) { Ok(number) } else { Err(GridError) }
+        };
+        Ok(Self { frictions: number(frictions)?, loads: number(loads)? })
+    }
+}
+
+impl fmt::Display for Grid {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}x{}", self.frictions, self.loads)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_grid_is_read_and_spread_over_its_ranges() {
+        assert_eq!("8x7".parse(), Ok(Grid::USUAL));
+        assert_eq!(Grid::USUAL.to_string(), "8x7");
+        assert_eq!(Grid::USUAL.frictions(), [0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3]);
+        assert_eq!(Grid::USUAL.loads_n(), [0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0]);
+        assert_eq!(Grid::USUAL.runs(), 448);
+        for text in ["8", "1x7", "8x101", "x", "8x7x2", "-2x3", ""] {
+            assert_eq!(text.parse::<Grid>(), Err(GridError), "{text}");
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! The envelope as a picture: a map of friction and load for each strategy, known and unknown.
+
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, VPos};
+
+use super::{Cell, Envelope};
+use crate::compare::STRATEGIES;
+use crate::report::axis::{Scale, label};
+use crate::report::mesh;
+use crate::report::palette;
+use crate::report::svg::{self, Area, Drawn, SCALE, font};
+
+const S: i32 = SCALE as i32;
+/// Size, CSS pixels.
+const SIZE: (u32, u32) = (1200, 560);
+/// Height of a map's title.
+const HEAD: i32 = 26 * S;
+/// Height of the legend above all.
+const LEGEND: i32 = 28 * S;
+/// Text in a cell, CSS pixels.
+const CELL_PX: f64 = 10.0;
+
+/// The picture as SVG.
+#[must_use]
+pub fn picture(envelope: &Envelope) -> String {
+    svg::fixed(SIZE, |area| {
+        let (head, maps) = area.split_vertically(LEGEND);
+        legend(&head)?;
+        let places = [true, false].into_iter().flat_map(|known| STRATEGIES.map(|k| (known, k)));
+        for (area, (known, kind)) in maps.split_evenly((2, STRATEGIES.len())).iter().zip(places) {
+            map(envelope, area, known, kind.name())?;
+        }
+        Ok(())
+    })
+}
+
+/// What the colours say.
+fn legend(head: &Area) -> Drawn {
+    let mut left = 14 * S;
+    for (colour, text) in [
+        (palette::OUTCOMES[0], "completes without slip: seconds from the command"),
+        (palette::OUTCOMES[1], "completes, but slips"),
+        (palette::OUTCOMES[2], "does not complete"),
+    ] {
+        let box_ = [(left, 9 * S), (left + 18 * S, 21 * S)];
+        head.draw(&Rectangle::new(box_, colour.filled()))?;
+        let style = font(mesh::TEXT_PX, palette::TEXT, HPos::Left, VPos::Center);
+        head.draw(&Text::new(text, (left + 24 * S, 15 * S), style))?;
+        left += 50 * S + svg::text_width(text, mesh::TEXT_PX);
+    }
+    let style = font(mesh::TEXT_PX, palette::TEXT, HPos::Left, VPos::Center);
+    head.draw(&Circle::new((left + 8 * S, 15 * S), 5 * S, palette::TRUTH.stroke_width(3)))?;
+    head.draw(&Text::new("nominal", (left + 20 * S, 15 * S), style))
+}
+
+/// Half the distance of neighbours: a cell reaches so far to each side.
+fn half(values: &[f64]) -> f64 {
+    0.5 * (values[values.len() - 1] - values[0]) / (values.len() - 1) as f64
+}
+
+/// The map of one strategy.
+fn map(envelope: &Envelope, area: &Area, known: bool, controller: &'static str) -> Drawn {
+    let (head, body) = area.split_vertically(HEAD);
+    let part = envelope.area(controller);
+    let (what, part) = if known { ("known", part.known) } else { ("unknown", part.unknown) };
+    let title = format!("{controller}, {what}: {:.0} %", 100.0 * part);
+    let style = font(13.0, palette::TRUTH, HPos::Left, VPos::Center);
+    head.draw(&Text::new(title, (46 * S, HEAD / 2), style))?;
+    let (frictions, loads) = (&envelope.frictions, &envelope.loads_n);
+    let (dx, dy) = (half(frictions), half(loads));
+    let ends = |values: &[f64], by: f64| (values[0] - by, values[values.len() - 1] + by);
+    let (x, y) = (ends(frictions, dx), ends(loads, dy));
+    // Every second tick where there are many.
+    let ticks = |values: &[f64]| {
+        let every = values.len().div_ceil(8);
+        values.iter().copied().step_by(every).collect::<Vec<_>>()
+    };
+    let mut chart = ChartBuilder::on(&body)
+        .margin_left(4 * S)
+        .margin_right(10 * S)
+        .x_label_area_size(38 * S)
+        .y_label_area_size(42 * S)
+        .build_cartesian_2d(Scale::new(x, ticks(frictions)), Scale::new(y, ticks(loads)))?;
+    mesh::plain(&mut chart.configure_mesh())
+        .x_label_formatter(&|x| label(*x, 1))
+        .y_label_formatter(&|y| label(*y, 0))
+        .x_desc("friction")
+        .y_desc("load, N")
+        .draw()?;
+    let own = |cell: &&Cell| cell.known == known && cell.controller == controller;
+    for cell in envelope.cells.iter().filter(own) {
+        let (fx, fy) = (cell.friction, cell.load_n);
+        let (colour, text) = match (cell.good(), cell.completed) {
+            (true, _) => (palette::OUTCOMES[0], cell.duration_s),
+            (false, true) => (palette::OUTCOMES[1], cell.duration_s),
+            (false, false) => (palette::OUTCOMES[2], None),
+        };
+        let corners = [(fx - dx, fy - dy), (fx + dx, fy + dy)];
+        chart.draw_series([Rectangle::new(corners, colour.filled())])?;
+        if let Some(seconds) = text.filter(|_| frictions.len() <= 10 && loads.len() <= 12) {
+            let style = font(CELL_PX, palette::TEXT, HPos::Center, VPos::Center);
+            let text = Text::new(label(seconds, 1), (0, 0), style);
+            chart.draw_series([EmptyElement::at((fx, fy)) + text])?;
+        }
+    }
+    let ring = Circle::new(envelope.nominal, 9 * S, palette::TRUTH.stroke_width(3));
+    let (friction, load) = envelope.nominal;
+    let inside = (x.0..=x.1).contains(&friction) && (y.0..=y.1).contains(&load);
+    chart.draw_series(inside.then_some(ring))?;
+    Ok(())
+}
