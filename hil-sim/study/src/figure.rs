@@ -13,6 +13,9 @@ pub enum Source {
     Simulation,
     /// Means of ten runs of the virtual rig.
     Experiment,
+    /// Finite elements: in tables alone.
+    #[serde(rename = "finite elements")]
+    FiniteElements,
     /// Printed in the study.
     Published,
     /// Printed in the study, and what the tread's parameters are fitted to.
@@ -29,6 +32,7 @@ impl Source {
             Self::Theory => "theory",
             Self::Simulation => "simulation",
             Self::Experiment => "experiment, four means of ten",
+            Self::FiniteElements => "finite elements",
             Self::Published => "published",
             Self::Fitted => "published (fitted)",
             Self::Method(_) => "",
@@ -163,12 +167,16 @@ impl Mark {
         (published, fitted): (f64, bool),
         ours: &[(Source, f64)],
     ) -> Self {
-        let of = |&(source, value): &(Source, f64)| Ours {
-            source,
-            value,
-            deviation: value / published - 1.0,
-        };
-        Self { what, unit, published, fitted, ours: ours.iter().map(of).collect() }
+        let mut mark = Self { what, unit, published, fitted, ours: Vec::new() };
+        for &(source, value) in ours {
+            mark.add(source, value);
+        }
+        mark
+    }
+
+    /// Adds a source.
+    pub fn add(&mut self, source: Source, value: f64) {
+        self.ours.push(Ours { source, value, deviation: value / self.published - 1.0 });
     }
 }
 

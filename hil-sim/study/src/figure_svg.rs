@@ -92,7 +92,7 @@ fn stroke(source: Source) -> ShapeStyle {
         Source::Theory => palette::TRUTH.stroke_width(4),
         Source::Simulation => palette::SIMULATED.stroke_width(4),
         Source::Experiment => EXPERIMENT.stroke_width(3),
-        Source::Published | Source::Fitted => PUBLISHED.stroke_width(3),
+        Source::FiniteElements | Source::Published | Source::Fitted => PUBLISHED.stroke_width(3),
         Source::Method(number) => METHODS[number % METHODS.len()].stroke_width(3),
     }
 }
@@ -103,7 +103,7 @@ fn layer(source: Source) -> u8 {
         Source::Experiment => 0,
         Source::Theory => 1,
         Source::Simulation => 2,
-        Source::Published | Source::Fitted | Source::Method(_) => 3,
+        Source::FiniteElements | Source::Published | Source::Fitted | Source::Method(_) => 3,
     }
 }
 
@@ -213,7 +213,7 @@ fn beside(source: Source) -> i32 {
         Source::Simulation => -9 * S,
         Source::Experiment => 9 * S,
         Source::Published | Source::Fitted => 27 * S,
-        Source::Method(_) => 0,
+        Source::FiniteElements | Source::Method(_) => 0,
     }
 }
 
@@ -256,7 +256,7 @@ fn mark<'a>(at: (i32, i32), source: Source) -> [Drawable<'a>; 2] {
             // Undashed: a mark is too small for dashes.
             Circle::new(at, R, palette::SPEED.stroke_width(4)).into_dyn(),
         ],
-        Source::Experiment | Source::Method(_) => [
+        Source::Experiment | Source::FiniteElements | Source::Method(_) => [
             Circle::new(at, R - 1, WHITE.filled()).into_dyn(),
             Circle::new(at, R - 3, stroke(source).filled()).into_dyn(),
         ],

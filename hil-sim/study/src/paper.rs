@@ -11,6 +11,7 @@ pub mod amplitudes;
 pub mod case;
 pub mod cases;
 pub mod experiment;
+mod finite_elements;
 pub mod histories;
 pub mod history;
 pub mod hold;

@@ -66,9 +66,9 @@ fn every_drawn_rig_completes_without_fault_or_slip() {
         assert!(off.abs() < 0.5, "{name}: {off} mm from the end");
         // Between cruise speed throughout and 17 mm/s on average.
         assert!((2.9..4.9).contains(&summary.moving_s), "{name}: {}", summary.moving_s);
-        // The command comes before the preload is built; that takes two seconds at most.
+        // The command comes before the preload is built: 48 N at 85 % of 25 N/s.
         let before = summary.duration_s.expect("commanded") - summary.moving_s;
-        assert!((0.06..2.0).contains(&before), "{name}: {before}");
+        assert!((0.06..2.6).contains(&before), "{name}: {before}");
     }
 }
 

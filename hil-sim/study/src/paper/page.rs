@@ -38,9 +38,13 @@ pub fn markdown(study: &Study) -> String {
          Every result that the study's text describes, three times. **Theory** is the reduced model that the \
          controller uses. **Simulation** is the reference models. **Experiment** is the virtual rig with the \
          shipping controller, sensor noise and tolerances: forty rigs a case, four means of ten, as in the study. \
+         The three are one ring of rubber elements: the theory is fitted to the simulation, and the virtual rig's \
+         tread is the simulation's. That they agree on the contact is by construction. **Finite elements** are the \
+         independent column where they have a figure: a rubber continuum 8 mm thick, pushed without friction, its \
+         modulus calibrated to the ring's static gap at 100 N ([fe](../../hil-sim/study/fe/README.md)).\n\n\
          Filled diamonds are numbers that the study prints. To hollow ones a parameter is fitted: stiffness, \
-         stiffening and relaxation time of the tread to three gaps, a tip mass to one frequency. Nothing else is \
-         fitted.\n\n\
+         stiffening and relaxation time of the tread to three gaps, a tip mass to one frequency. A claim that holds \
+         because of a fit, to the study or of one source to another, is marked.\n\n\
          Of {} claims {held} hold, {fitted} of these because something is fitted to them, and {} do not. Code \
          judges each claim from the data of its figure. [paper.json](paper.json) has the data, the section of each \
          claim and what was found.\n",
@@ -68,7 +72,7 @@ fn section(page: &mut String, figure: &Figure, claims: &[Claim]) {
         figure.caption
     );
     if !figure.published.is_empty() {
-        *page += "\n| published | | theory | simulation | experiment |\n|---|---|---|---|---|\n";
+        *page += "\n| published | | theory | simulation | experiment | finite elements |\n|---|---|---|---|---|---|\n";
         for mark in &figure.published {
             *page += &mark_row(mark);
         }
@@ -97,12 +101,13 @@ fn mark_row(mark: &Mark) -> String {
         })
     };
     format!(
-        "| {} | {}{unit}{fitted} | {} | {} | {} |\n",
+        "| {} | {}{unit}{fitted} | {} | {} | {} | {} |\n",
         mark.what,
         figures(mark.published),
         ours(Source::Theory),
         ours(Source::Simulation),
-        ours(Source::Experiment)
+        ours(Source::Experiment),
+        ours(Source::FiniteElements)
     )
 }
 

@@ -93,7 +93,7 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
     let faster = all_pairs(all, |a, b| a.preload_n == b.preload_n && a.speed_mm_s < b.speed_mm_s);
     let pressed = all_pairs(all, |a, b| a.speed_mm_s == b.speed_mm_s && a.preload_n < b.preload_n);
     vec![
-        of("three-sources-agree").judged(
+        of("three-sources-agree").fitted().judged(
             "Collision, impact and vibration show the same trends in theory, simulation and \
              experiment.",
             shapes.iter().all(|&shape| shape > 0.9),
