@@ -17,6 +17,7 @@
 mod drive;
 mod leg;
 pub mod pattern;
+mod profile;
 
 use interstage::rig::Rig;
 
@@ -24,9 +25,10 @@ use crate::montecarlo::RunLine;
 use crate::report::verdict::SLIP_SEEN_MM;
 use crate::scenario::{Direction, Scenario};
 use crate::session::{RunError, initial_rig};
-use drive::{Driven, Limits};
+use drive::Driven;
 use leg::{Leg, Reached, Track};
 use pattern::pattern_search;
+use profile::Limits;
 
 /// Cost of a leg that breaks a bound, s, beside that of by how much.
 const BROKEN_S: f64 = 100.0;
@@ -102,8 +104,9 @@ pub fn search(scenario: &Scenario, bounds: &Bounds, effort: Effort) -> Result<Or
     let (plant, _) = initial_rig(scenario)?;
     let rig = &scenario.rig;
     let forward = scenario.run.direction == Direction::Deploy;
-    let track = Track::new(rig, plant.parameters(), bounds, forward);
-    let mut driven = Driven::new(plant, Limits::of(rig, forward));
+    let limits = Limits::of(rig, forward);
+    let track = Track::new(rig, plant.parameters(), bounds, limits);
+    let mut driven = Driven::new(plant, limits);
     let mut legs: Vec<Leg> = Vec::new();
     let mut fails = None;
     for index in 0..track.len() {
@@ -118,7 +121,7 @@ pub fn search(scenario: &Scenario, bounds: &Bounds, effort: Effort) -> Result<Or
             break;
         }
     }
-    if fails.is_none() && !driven.run_out(&track)? {
+    if fails.is_none() && !driven.run_out()? {
         fails = Some("the end of travel is not reached".to_owned());
     }
     let legs = legs.iter().map(|leg| (leg.speed_mm_s, leg.preload_n)).collect();

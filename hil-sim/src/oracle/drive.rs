@@ -2,9 +2,7 @@
 //! feed-forward from its true parameters and state, within the limits of motor, pre-tightener,
 //! acceleration and jerk.
 
-use interstage::rig::Rig;
-
-use super::leg::Track;
+use super::profile::{Limits, Motion, Slow};
 use crate::plant::actuators::Pretightener;
 use crate::plant::rig::{Drives, PlantError, VirtualRig};
 use crate::session::{LONGEST_S, TICK_S};
@@ -15,89 +13,6 @@ const CATCHES_UP_S: f64 = 0.02;
 const PREDICTS_EVERY: u32 = 8;
 /// Speed at which the wheel stands, mm/s.
 const STANDS_MM_S: f64 = 0.05;
-
-/// A stretch of the run that is crossed slowly: its ends, mm along the run, and its speed, mm/s.
-pub(super) type Slow = Option<(f64, f64, f64)>;
-
-/// Limits of the speed profile.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Limits {
-    cruise_mm_s: f64,
-    acceleration: f64,
-    jerk: f64,
-    /// Ends of the screw as force, N.
-    screw_n: (f64, f64),
-    forward: bool,
-}
-
-impl Limits {
-    pub(super) fn of(rig: &Rig, forward: bool) -> Self {
-        Self {
-            cruise_mm_s: rig.drive.cruise_speed_mm_s,
-            acceleration: rig.drive.acceleration_mm_s2,
-            jerk: rig.drive.jerk_mm_s3,
-            screw_n: (f64::NEG_INFINITY, 1.25 * rig.preload.limit_n),
-            forward,
-        }
-    }
-
-    /// Distance of a jerk-limited change of speed with this acceleration at its start, mm. One
-    /// that is still rising first comes to a peak.
-    fn way(&self, now: Motion, to: f64) -> f64 {
-        let rising = now.acceleration.max(0.0);
-        let until = rising / self.jerk;
-        let peak = now.speed + 0.5 * rising * until;
-        let change = (peak - to).max(0.0);
-        let knee = self.acceleration * self.acceleration / self.jerk;
-        let time = if change >= knee {
-            change / self.acceleration + self.acceleration / self.jerk
-        } else {
-            2.0 * (change / self.jerk).sqrt()
-        };
-        peak * until + 0.5 * (peak + to) * time
-    }
-}
-
-/// Reference of the tread along the run.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Motion {
-    /// mm/s.
-    speed: f64,
-    /// mm/s^2.
-    acceleration: f64,
-}
-
-impl Motion {
-    /// Advances to the speed that is wanted at this place, mm along the run.
-    fn step(&mut self, limits: &Limits, along: f64, slow: Slow, end: f64) {
-        let brakes = |at: f64, to: f64| self.speed > to && at - along <= limits.way(*self, to);
-        let mut wanted = limits.cruise_mm_s;
-        if let Some((from, to, speed)) = slow
-            && along < to
-            && (along >= from || brakes(from, speed))
-        {
-            wanted = speed;
-        }
-        if along >= end || brakes(end, 0.0) {
-            wanted = 0.0;
-        }
-        self.toward(limits, wanted);
-    }
-
-    /// One tick toward a speed with the least time that acceleration and jerk allow.
-    fn toward(&mut self, limits: &Limits, wanted: f64) {
-        let missing = wanted - self.speed;
-        let finest = limits.jerk * TICK_S;
-        if missing.abs() <= finest * TICK_S && self.acceleration.abs() <= finest {
-            (self.speed, self.acceleration) = (wanted, 0.0);
-            return;
-        }
-        let most = (2.0 * limits.jerk * missing.abs()).sqrt().min(limits.acceleration);
-        let change = most.copysign(missing) - self.acceleration;
-        self.acceleration += change.clamp(-finest, finest);
-        self.speed = (self.speed + self.acceleration * TICK_S).max(0.0);
-    }
-}
 
 /// The largest of what a run must bound, so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -170,26 +85,24 @@ impl Driven {
     }
 
     /// Coordinate along the run, mm.
-    pub(super) fn along_mm(&self, track: &Track<'_>) -> f64 {
-        track.sign * self.plant.truth().position_mm
+    pub(super) fn along_mm(&self) -> f64 {
+        self.limits.sign * self.plant.truth().position_mm
     }
 
     /// Time that the speed still missing to cruise costs behind this place, s.
     pub(super) fn missing_speed_s(&self) -> f64 {
-        let Limits { cruise_mm_s, acceleration, .. } = self.limits;
-        let missing = (cruise_mm_s - self.motion.speed).max(0.0);
-        missing * missing / (2.0 * acceleration * cruise_mm_s)
+        self.limits.missing_speed_s(self.motion)
     }
 
     /// To the end of travel; whether it gets there.
-    pub(super) fn run_out(&mut self, track: &Track<'_>) -> Result<bool, PlantError> {
+    pub(super) fn run_out(&mut self) -> Result<bool, PlantError> {
         let preload_n = self.plant.truth().preload_n;
         let mut moved = false;
         while self.time_s() < LONGEST_S {
-            self.step(track, 0.0, None, preload_n)?;
+            self.step(0.0, None, preload_n)?;
             moved |= self.motion.speed > 1.0;
             if moved && self.motion.speed < STANDS_MM_S {
-                let off = self.along_mm(track) - track.end_mm;
+                let off = self.along_mm() - self.limits.end_mm;
                 return Ok(off.abs() < 0.2);
             }
         }
@@ -199,18 +112,17 @@ impl Driven {
     /// One tick: at rest before `start_s`, slow in that stretch, toward that preload.
     pub(super) fn step(
         &mut self,
-        track: &Track<'_>,
         start_s: f64,
         slow: Slow,
         preload_n: f64,
     ) -> Result<(), PlantError> {
-        let along = self.along_mm(track);
+        let along = self.along_mm();
         if self.time_s() >= start_s {
-            self.motion.step(&self.limits, along, slow, track.end_mm);
+            self.motion.step(&self.limits, along, slow);
             self.moved_from.get_or_insert(self.tick);
         }
         if self.tick.is_multiple_of(PREDICTS_EVERY) {
-            self.rise_mm = self.rise_ahead(track, slow);
+            self.rise_mm = self.rise_ahead(slow);
         }
         let drives = Drives {
             drive: self.drive_duty(),
@@ -232,7 +144,7 @@ impl Driven {
     /// friction and the load of the last tick.
     fn drive_duty(&self) -> f64 {
         let p = &self.plant.parameters().drive;
-        let sign = if self.limits.forward { 1.0 } else { -1.0 };
+        let sign = self.limits.sign;
         if self.motion.speed == 0.0 {
             return 0.0;
         }
@@ -255,20 +167,20 @@ impl Driven {
 
     /// Rise of the centre over a radius above the outermost wall when dead time and lag are
     /// over, mm: the profile ahead on the geometry of a rigid wheel, with its present error.
-    fn rise_ahead(&self, track: &Track<'_>, slow: Slow) -> f64 {
+    fn rise_ahead(&self, slow: Slow) -> f64 {
         let p = self.plant.parameters();
         let truth = self.plant.truth();
-        let (mut motion, mut along) = (self.motion, self.along_mm(track));
+        let (mut motion, mut along) = (self.motion, self.along_mm());
         if self.moved_from.is_some() {
             let ticks = ((p.delay_s + p.lag_s) / TICK_S) as u32;
             for _ in 0..ticks {
-                motion.step(&self.limits, along, slow, track.end_mm);
+                motion.step(&self.limits, along, slow);
                 along += motion.speed * TICK_S;
             }
         }
         let rise = truth.height_mm - p.ring.radius_mm;
         let error = rise - self.rigid_rise(truth.position_mm);
-        error + self.rigid_rise(track.sign * along)
+        error + self.rigid_rise(self.limits.sign * along)
     }
 
     /// Rise of a rigid wheel here, mm.
@@ -304,26 +216,22 @@ impl Driven {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::oracle::Bounds;
     use crate::scenario::Scenario;
     use crate::session::initial_rig;
 
     /// The nominal plant and what it takes to drive it.
-    fn nominal() -> (Scenario, Driven) {
+    fn nominal() -> Driven {
         let scenario = Scenario::default();
         let (plant, _) = initial_rig(&scenario).unwrap();
-        let driven = Driven::new(plant, Limits::of(&scenario.rig, true));
-        (scenario, driven)
+        Driven::new(plant, Limits::of(&scenario.rig, true))
     }
 
     #[test]
     fn speed_and_preload_follow_their_profile_within_the_limits() {
-        let (scenario, mut driven) = nominal();
-        let bounds = Bounds { gap_mm: 2.5, slip_margin: 0.1 };
-        let track = Track::new(&scenario.rig, driven.plant().parameters(), &bounds, true);
+        let mut driven = nominal();
         let (mut before, mut rate) = (Motion::default(), 0.0f64);
-        while driven.along_mm(&track) < 4.0 {
-            driven.step(&track, 2.5, Some((20.0, 21.0, 8.0)), 48.0).unwrap();
+        while driven.along_mm() < 4.0 {
+            driven.step(2.5, Some((20.0, 21.0, 8.0)), 48.0).unwrap();
             let Motion { speed, acceleration } = driven.motion;
             assert!(acceleration.abs() <= 250.0 + 1e-9);
             assert!((acceleration - before.acceleration).abs() <= 5.0 + 1e-9);
@@ -341,12 +249,10 @@ mod tests {
 
     #[test]
     fn over_a_step_the_screw_follows_the_spring() {
-        let (scenario, mut driven) = nominal();
-        let bounds = Bounds { gap_mm: 2.5, slip_margin: 0.1 };
-        let track = Track::new(&scenario.rig, driven.plant().parameters(), &bounds, true);
+        let mut driven = nominal();
         let slow = Some((3.0, 8.0, 7.0));
-        while driven.along_mm(&track) < 20.0 {
-            driven.step(&track, 2.2, slow, 47.0).unwrap();
+        while driven.along_mm() < 20.0 {
+            driven.step(2.2, slow, 47.0).unwrap();
         }
         // Without following the climb would add 4.8 N.
         assert!((47.0..48.5).contains(&driven.peaks().preload_n), "{:?}", driven.peaks());

@@ -3,6 +3,7 @@
 use interstage::rig::Rig;
 
 use super::drive::Driven;
+use super::profile::Limits;
 use super::{BROKEN_S, Bounds};
 use crate::plant::draw::PlantParameters;
 use crate::report::verdict::SLIP_SEEN_MM;
@@ -49,12 +50,9 @@ impl Leg {
 
 /// The steps of a plant along the run, and what must be kept.
 pub(super) struct Track<'a> {
-    /// 1 out, -1 back: the coordinate is the position times this.
-    pub(super) sign: f64,
     /// Coordinates of the events, ascending, mm.
     events: Vec<f64>,
-    /// Coordinate of the end of travel, mm.
-    pub(super) end_mm: f64,
+    limits: Limits,
     bounds: &'a Bounds,
     limit_n: f64,
     /// Friction left unused on the continuous wall.
@@ -93,19 +91,18 @@ impl<'a> Track<'a> {
         rig: &Rig,
         plant: &PlantParameters,
         bounds: &'a Bounds,
-        forward: bool,
+        limits: Limits,
     ) -> Self {
-        let sign = if forward { 1.0 } else { -1.0 };
         // At the event the centre is a radius above the lower wall, this far from the face.
         let reach = plant.ring.radius_mm + bounds.gap_mm;
         let face_mm = (reach * reach - plant.ring.radius_mm.powi(2)).max(0.0).sqrt();
         let steps = plant.wall.steps().iter();
-        let mut events: Vec<f64> = steps.map(|step| sign * (step.position_mm - face_mm)).collect();
+        let mut events: Vec<f64> =
+            steps.map(|step| limits.sign * (step.position_mm - face_mm)).collect();
         events.sort_by(f64::total_cmp);
         Self {
-            sign,
             events,
-            end_mm: if forward { rig.rig.travel_mm } else { 0.0 },
+            limits,
             bounds,
             limit_n: rig.preload.limit_n,
             rolling_margin: rig.control.slip_margin,
@@ -124,12 +121,12 @@ impl<'a> Track<'a> {
         let next = self.events.get(index + 1).copied();
         // Steps close to one another share the distance.
         let last = next.map_or(event + LEG_MM, |next| (event + LEG_MM).min(0.5 * (event + next)));
-        let last = last.min(self.end_mm - 1.0).max(event + leg.after_mm.max(0.0) + 0.1);
+        let last = last.min(self.limits.end_mm - 1.0).max(event + leg.after_mm.max(0.0) + 0.1);
         let mut driven = from.clone();
         let until_s = driven.time_s() + LONGEST_S;
         let slow = Some((event - leg.before_mm, event + leg.after_mm, leg.speed_mm_s));
-        while driven.along_mm(self) < last && driven.time_s() < until_s {
-            driven.step(self, leg.start_s, slow, leg.preload_n)?;
+        while driven.along_mm() < last && driven.time_s() < until_s {
+            driven.step(leg.start_s, slow, leg.preload_n)?;
         }
         let plant = driven.plant();
         let crossing = plant.ledger().crossings().get(index);
