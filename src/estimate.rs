@@ -16,7 +16,7 @@ pub mod tread;
 pub mod vibration;
 
 use crate::model::corner_profile::CornerProfile;
-use crate::numeric::checked;
+use crate::numeric::{LowPass, checked};
 use crate::rig::{Rig, RigError};
 use crossing::CrossingWatch;
 use tread::TreadLaw;
@@ -27,11 +27,18 @@ pub use stage::ContactStage;
 pub use state::{EstimateState, Findings, LiftPoint, OpenCrossing};
 pub use steps::{Expectation, Steps};
 
-use crate::units::Millimetres;
+use crate::units::{Millimetres, Ratio};
 
 /// Wheel travel on a corner over the wheel radius beyond which the wheel slips: twice the
 /// travel of a crossing.
 const CORNER_TRAVEL_PART: f64 = 1.5;
+
+/// Part of the compression by which a loaded rubber wheel rolls on less than its undeformed
+/// radius (Clark, Mechanics of Pneumatic Tires).
+const ROLLING_COMPRESSION: f64 = 1.0 / 3.0;
+
+/// Time constant of the preload's memory over the relaxation time of the tread.
+const MEMORY_PART: f64 = 0.6;
 
 /// The estimator of a rig; its state is apart.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -39,8 +46,12 @@ pub struct Estimator {
     watch: CrossingWatch,
     tread: TreadLaw,
     steps: Steps,
+    /// Low-pass of the preload as the tread's memory makes it.
+    memory: LowPass,
     /// Wheel travel on a corner beyond which the wheel slips, mm.
     corner_travel: Millimetres,
+    /// Part by which the axle lags behind the tread per compression, 1/mm.
+    rolling_lag: Ratio,
 }
 
 impl Estimator {
@@ -51,9 +62,14 @@ impl Estimator {
             watch: CrossingWatch::try_build(rig)?,
             tread: TreadLaw::try_build(rig)?,
             steps: Steps::try_build(rig)?,
+            memory: LowPass::build(MEMORY_PART * rig.tread.tau_s),
             corner_travel: checked(
                 "rig.wheel_radius_mm",
                 CORNER_TRAVEL_PART * rig.rig.wheel_radius_mm,
+            )?,
+            rolling_lag: checked(
+                "rig.wheel_radius_mm",
+                ROLLING_COMPRESSION / rig.rig.wheel_radius_mm,
             )?,
         })
     }

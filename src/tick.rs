@@ -100,6 +100,10 @@ pub struct Controller {
     /// Inertia of rotor, gears and carriage at the tread, N s^2/mm.
     inertia: Q16,
     friction: Ratio,
+    /// Least useful speed of a crossing, mm/s.
+    least_speed: MillimetresPerSecond,
+    /// Preload that carries the load along the wall, N.
+    roll_preload: Newtons,
 }
 
 /// Data of a tick that the stages share.
@@ -155,7 +159,7 @@ impl Controller {
         output.events.clear();
         let acceleration = state.acceleration();
         let sensed = self.senses.step(&mut state.senses, input.now, &input.sensors, acceleration);
-        state.estimate.begin_tick(sensed.travel);
+        self.estimator.begin_tick(&mut state.estimate, &sensed);
         let arm_thrust = self.arm_thrust_max * sensed.tan_arm;
         let tick =
             &mut TickContext { now: input.now, sensed: &sensed, arm_thrust, trigger: None, output };

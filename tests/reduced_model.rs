@@ -48,6 +48,9 @@ fn a_prescribed_speed_is_planned() {
         direction: Direction::Deploy,
         step: 1,
         scale: Ratio::from_num(1),
+        reserve: Q16::ONE,
+        preload: Q16::from_num(50),
+        distance: Q16::from_num(4),
         review: None,
     };
     let planner = || Planner::try_build(&Rig::prototype()).unwrap();

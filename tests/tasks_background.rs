@@ -22,6 +22,9 @@ fn request(sequence: u32) -> PlanRequest {
         direction: Direction::Deploy,
         step: 1,
         scale: Ratio::from_num(1),
+        reserve: Ratio::ONE,
+        preload: Ratio::from_num(50),
+        distance: Ratio::from_num(4),
         review: None,
     }
 }

@@ -97,7 +97,8 @@ pub struct Comparison {
 /// Compares over `runs` rigs of the scenario, seeds `first_seed` and up. `progress` is
 /// called after every run.
 ///
-/// Every strategy has the same planner with the same braking and friction check, and aims at the reference gap less a reserve. The reserve of each is
+/// Every strategy has the same planner: it rolls while the preload builds, brakes late, keeps
+/// the same friction check and aims at the reference gap less a reserve. The reserve of each is
 /// tuned until its worst gap over all rigs is the reference; then the times are comparable.
 ///
 /// # Errors

@@ -1,5 +1,6 @@
 //! Runs many random rigs, one per seed, in parallel, and finds what limits them.
 
+mod drawn;
 mod outcome;
 mod shard;
 
@@ -7,12 +8,13 @@ use interstage::fault::Limit;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::record::{Report, Summary};
+use crate::record::{CrossingLine, Report, Summary};
 use crate::report::verdict::SLIP_SEEN_MM;
 use crate::scenario::Scenario;
-use crate::session::{self, Options, RunError};
+use crate::session::{self, LONGEST_S, Options, RunError};
 
-pub use outcome::{Least, LimitCount, Outcome, Quantiles, SeedReport};
+pub use drawn::Drawn;
+pub use outcome::{Least, LimitCount, Outcome, Quantiles, SeedReport, StepFound};
 pub use shard::{Shard, ShardError};
 
 /// The result of one run.
@@ -30,6 +32,16 @@ pub struct RunLine {
     pub max_gap_mm: f64,
     /// The same over the reference gap; none without reference.
     pub gap_over_ref: Option<f64>,
+    /// Gap of the first crossing over the reference.
+    pub first_gap_over_ref: Option<f64>,
+    /// Largest gap of the crossings after it over the reference.
+    pub later_gap_over_ref: Option<f64>,
+    /// Distance from the commanded end, mm, of a run that the controller calls complete.
+    pub end_off_mm: Option<f64>,
+    /// Steps that were found: number, and distance of the face on record from the true one, mm.
+    pub found_off_mm: Vec<(u8, f64)>,
+    /// Whether it ended short of the end and nothing reports it.
+    pub silent: bool,
     /// Crossings with gross slip, or 1 if the run slipped but none of them did.
     pub slip_events: usize,
     /// Least time by which the preload was reached before a corner touched, s.
@@ -49,17 +61,30 @@ pub struct RunLine {
 }
 
 impl RunLine {
-    /// The line of a finished run on a plant with friction `mu`.
+    /// The line of a finished run on a plant with friction `mu`, commanded to travel this far,
+    /// mm.
     #[must_use]
-    pub fn new(summary: Summary, mu: f64) -> Self {
+    pub fn new(summary: Summary, mu: f64, travel_mm: f64) -> Self {
         let crossings = &summary.crossings;
         let least = |values: &mut dyn Iterator<Item = f64>| values.min_by(f64::total_cmp);
         let mut limits: Vec<u16> = summary.limits.iter().map(|limit| limit.code).collect();
         limits.sort_unstable();
         limits.dedup();
+        let over_ref = |gap: f64| gap / summary.gap_ref_mm;
+        let gaps = || crossings.iter().map(|c| over_ref(c.gap_mm));
+        let referred = summary.gap_ref_mm > 0.0;
+        let completed = summary.completed && summary.faults.is_empty();
+        let reported = !summary.faults.is_empty() || limits.iter().any(|code| reports_end(*code));
+        let called_complete = summary.faults.is_empty() && summary.total_s < LONGEST_S;
+        let found = |c: &CrossingLine| Some((c.index, (c.step_found_mm? - c.step_mm).abs()));
         Self {
             seed: summary.seed,
-            completed: summary.completed && summary.faults.is_empty(),
+            completed,
+            first_gap_over_ref: gaps().next().filter(|_| referred),
+            later_gap_over_ref: gaps().skip(1).max_by(f64::total_cmp).filter(|_| referred),
+            end_off_mm: called_complete.then(|| (summary.travel_mm - travel_mm).abs()),
+            found_off_mm: crossings.iter().filter_map(found).collect(),
+            silent: !completed && !reported,
             duration_s: summary.duration_s,
             moving_s: summary.moving_s,
             max_gap_mm: summary.max_gap_mm,
@@ -75,6 +100,11 @@ impl RunLine {
             trace_digest: summary.trace_digest,
         }
     }
+}
+
+/// Whether a limit says that the run does not end where it should.
+fn reports_end(code: u16) -> bool {
+    [Limit::StepMissing, Limit::PositionUnconfirmed].iter().any(|limit| limit.code() == code)
 }
 
 /// Crossings with gross slip; a run that slipped only elsewhere counts as one.
@@ -110,7 +140,10 @@ fn one(scenario: &Scenario, seed: u64) -> Result<RunLine, RunError> {
     let mut scenario = scenario.clone();
     scenario.run.seed = seed;
     match session::run(&scenario, Options::default()) {
-        Ok(recording) => Ok(RunLine::new(recording.summary, scenario.plant().mu)),
+        Ok(recording) => {
+            let travel_mm = scenario.rig.rig.travel_mm;
+            Ok(RunLine::new(recording.summary, scenario.plant().mu, travel_mm))
+        }
         Err(error @ (RunError::Plant(_) | RunError::Refused(_))) => {
             Ok(RunLine { seed, error: Some(error.to_string()), ..RunLine::default() })
         }
@@ -127,7 +160,6 @@ fn limit_text(code: u16) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::CrossingLine;
 
     fn crossing(slip_mm: f64, lead: Option<f64>, peak_utilisation: f64) -> CrossingLine {
         CrossingLine { slip_mm, lead_time_s: lead, peak_utilisation, ..CrossingLine::default() }
@@ -154,15 +186,47 @@ mod tests {
             completed: true,
             max_gap_mm: 2.0,
             gap_ref_mm: 2.5,
+            travel_mm: 79.7,
+            total_s: 6.0,
             limits: vec![limit(205), limit(201), limit(205)],
             crossings: vec![crossing(0.0, Some(0.3), 0.7), crossing(0.0, Some(-0.1), 0.9)],
             ..Summary::default()
         };
-        let line = RunLine::new(summary, 1.0);
+        let line = RunLine::new(summary, 1.0, 80.0);
         assert_eq!(line.gap_over_ref, Some(0.8));
         assert_eq!(line.least_lead_s, Some(-0.1));
         assert!((line.least_slip_margin.unwrap() - 0.1).abs() < 1e-12);
         assert_eq!(line.limits, [201, 205]);
+        assert!((line.end_off_mm.unwrap() - 0.3).abs() < 1e-12 && !line.silent);
+    }
+
+    #[test]
+    fn first_and_later_gaps_and_found_steps_are_told_apart() {
+        let line = |index, gap_mm, found| CrossingLine {
+            index,
+            gap_mm,
+            step_mm: 18.0,
+            step_found_mm: found,
+            ..CrossingLine::default()
+        };
+        let crossings =
+            vec![line(1, 3.0, Some(18.5)), line(2, 2.0, None), line(3, 2.5, Some(17.9))];
+        let summary = Summary { gap_ref_mm: 2.0, crossings, ..Summary::default() };
+        let line = RunLine::new(summary, 1.0, 80.0);
+        assert_eq!((line.first_gap_over_ref, line.later_gap_over_ref), (Some(1.5), Some(1.25)));
+        assert_eq!(line.found_off_mm.iter().map(|found| found.0).collect::<Vec<_>>(), [1, 3]);
+        assert!((line.found_off_mm[1].1 - 0.1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_run_that_ends_short_is_silent_unless_a_fault_or_limit_says_so() {
+        let silent = |summary: Summary| RunLine::new(summary, 1.0, 80.0).silent;
+        let short = Summary { total_s: 5.0, limits: vec![limit(206)], ..Summary::default() };
+        assert!(silent(short.clone()));
+        assert!(!silent(Summary { completed: true, ..short.clone() }));
+        let missing = limit(Limit::StepMissing.code());
+        assert!(!silent(Summary { limits: vec![missing], ..short.clone() }));
+        assert!(!silent(Summary { faults: vec![limit(121)], ..short }));
     }
 
     #[test]

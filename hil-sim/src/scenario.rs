@@ -17,13 +17,14 @@ use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
 use crate::plant::draw::PlantParameters;
+use crate::plant::mismatch::Mismatch;
 use crate::plant::spread::{Noise, Spread};
 
 pub use error::ScenarioError;
 use keys::Kind;
 pub use keys::{KeyInfo, PRESETS};
 use merge::{COMMAND_LINE, Merged, Provenance};
-pub use run::{ControllerKind, Direction, RunOptions, StepAnomaly};
+pub use run::{ControllerKind, Direction, MismatchDraw, RunOptions, StepAnomaly};
 
 /// One rig, its mismatch, its noise and its run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -37,6 +38,8 @@ pub struct Scenario {
     pub spread: Spread,
     /// Noise and delay of the sensors.
     pub noise: Noise,
+    /// What the plant has and the controller is not told.
+    pub mismatch: Mismatch,
     /// Options of the run.
     pub run: RunOptions,
 }
@@ -89,6 +92,7 @@ impl Scenario {
             rig,
             spread: Spread::usual(),
             noise: Noise::usual(),
+            mismatch: Mismatch::default(),
             run: RunOptions::default(),
         }
     }
@@ -118,6 +122,16 @@ impl Scenario {
     pub fn plant(&self) -> PlantParameters {
         let seed = self.run.seed;
         PlantParameters::draw(&self.rig, &self.true_steps(), &self.spread, &self.noise, seed)
+            .with_mismatch(&self.drawn_mismatch())
+    }
+
+    /// The mismatch of the scenario's seed: as stated, or drawn wide. Seed 0 draws none.
+    #[must_use]
+    pub fn drawn_mismatch(&self) -> Mismatch {
+        match (self.run.mismatch, self.run.seed) {
+            (MismatchDraw::Wide, 1..) => self.mismatch.draw(self.run.seed),
+            _ => self.mismatch.clone(),
+        }
     }
 
     /// Steps of the nominal plant, ascending: position, mm, and how much higher than the

@@ -189,7 +189,7 @@ fn a_run_stopped_while_the_preload_builds_starts_again() {
         let scenario = scenario("prototype", direction, 0);
         let mut bench = Bench::idle(&scenario);
         bench.give(starter(direction));
-        bench.run_s(0.4);
+        bench.run_s(0.03);
         assert_eq!(bench.mode(), Mode::Preload(direction.into()));
         bench.give(Command::Stop);
         assert_eq!(bench.mode(), Mode::Idle);
@@ -251,7 +251,7 @@ fn a_session_goes_out_back_and_out_again() {
             let predicted = off(record.gap_predicted.to_num());
             // Three times the load presses the tread three times as deep. Its memory at lift-off,
             // which the measurement assumes fixed, is three times as large.
-            let bound = if rig == "fe" { 0.035 } else { 0.03 };
+            let bound = if rig == "fe" { 0.045 } else { 0.03 };
             assert!(measured.abs() < bound, "{rig} {crossing:?}: {measured}");
             assert!(predicted.abs() < 0.05, "{rig} {crossing:?}: {predicted}");
         }

@@ -11,7 +11,7 @@
 use crate::model::timing::SLEW_PART;
 use crate::numeric::{LowPass, LowPassState, between, checked};
 use crate::rig::{Rig, RigError};
-use crate::units::{Duty, Newtons, NewtonsPerSecond, Q16, TICK_HZ};
+use crate::units::{Duty, Newtons, NewtonsPerSecond, Q16, TICK_HZ, q16};
 
 /// Longest dead time modelled, ticks; the rig's parameters end there.
 pub const LONGEST_DELAY: usize = 256;
@@ -23,6 +23,11 @@ const FASTEST_CORRECTION: f64 = 3.0;
 /// Part of the slew that the correction may use: a preload sensor that reads wrong cannot make
 /// the preload run away faster than it is noticed.
 const CORRECTION_PART: f64 = 0.3;
+
+/// How far the model may be ahead of the preload before the reference waits, N.
+const LEAD: Newtons = q16(1_000_000);
+/// Part of its rate at which the reference then goes on: the slowest actuator that is no fault.
+const WAITING_PART: Q16 = q16(800_000);
 
 /// The actuator as known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -96,7 +101,10 @@ impl PreloadLoop {
             state.start(measured);
         }
         let change = between(target - state.reference, -self.step, self.step);
-        state.reference += change;
+        // An actuator that does not keep up is waited for, but not without end.
+        let behind = state.model.output() - measured;
+        let falls_back = if change < Q16::ZERO { behind < -LEAD } else { behind > LEAD };
+        state.reference += if falls_back { change * WAITING_PART } else { change };
         let delayed = state.exchange(self.delay);
         let expected = self.lag.step(&mut state.model, delayed);
         let rate = change * Q16::from_num(TICK_HZ as i16) - drift;

@@ -14,12 +14,15 @@ use crate::units::{
 /// Short of the wanted preload by no more than this part of the limit, it is reached:
 /// worth 1.2 % of the gap, less than the schedule's reserve.
 const REACHED_PART: Q16 = q16(20_000);
-/// Distance by which braking starts early, for the tick and the loop's lag, mm.
-const BRAKE_RESERVE: Millimetres = q16(300_000);
-/// Time that a preload needs after its reference, kept before a window, s.
-const SETTLING: Seconds = q16(150_000);
-/// Speed at which the last tenths of a millimetre are covered, mm/s.
-const END_CREEP: MillimetresPerSecond = q16(1_500_000);
+/// Time by which braking starts early, for detection, tick and the loop's lag, s.
+const BRAKE_LAG: Seconds = q16(10_000);
+/// Time that a preload needs after its reference, s.
+const SETTLING: Seconds = q16(80_000);
+/// Distance by which braking for the end starts early, mm.
+const END_RESERVE: Millimetres = q16(20_000);
+/// Speed at which the last tenth of a millimetre is covered, mm/s.
+const END_CREEP: MillimetresPerSecond = q16(2_000_000);
+
 /// Limits of a rig.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Schedule {
@@ -39,8 +42,12 @@ pub struct Course {
     pub remaining: Millimetres,
     /// A corner is detected and the lower wall has not been left (retract: reached).
     pub critical: bool,
+    /// The distance is that which the corner under the wheel shows.
+    pub felt: bool,
     /// The preload is already being raised for this step.
     pub ramping: bool,
+    /// The speed is already being brought down for the window of this step.
+    pub looking: bool,
     /// The speed is already being brought down for this step.
     pub braking: bool,
     /// Speed and acceleration of the profile, along the run, mm/s and mm/s^2.
@@ -49,8 +56,10 @@ pub struct Course {
     pub acceleration: MillimetresPerSecond2,
     /// Preload reference as far as it has come, N.
     pub reference: Newtons,
-    /// Measured preload, N.
+    /// Preload as the tread has it, N.
     pub preload: Newtons,
+    /// The preload is behind what the actuator's model expects.
+    pub preload_late: bool,
 }
 
 /// What is asked for.
@@ -62,6 +71,8 @@ pub struct Targets {
     pub preload: Newtons,
     /// The preload is raised for the step ahead; once so, until the step is behind.
     pub ramping: bool,
+    /// The speed is brought down for the window of the step ahead; likewise.
+    pub looking: bool,
     /// The speed is brought down for the step ahead; likewise.
     pub braking: bool,
     /// The step ahead already has an effect.
@@ -87,44 +98,77 @@ impl Schedule {
 
     /// What to ask for.
     pub fn targets(&self, steps: &Steps, plan: &Plan, course: &Course) -> Targets {
-        let to_window = steps.to_window(course.direction, course.distance);
-        let within = |way: Millimetres| to_window.is_some_and(|ahead| ahead <= way);
+        // To where crossing speed and preload must be reached, by the table or the felt corner.
+        let ahead = course.distance.map(|distance| distance - plan.slow_from);
+        let within = |from: Option<Millimetres>, way| from.is_some_and(|from| from <= way);
         // Out of sight of a step no braking can be due, whatever the speed is doing.
         let sight = self.sight(plan, course);
-        let braking = course.braking
+        let due = |from: Option<Millimetres>, speed| {
+            within(from, sight)
+                && within(from, self.brake_way(course, speed) + course.speed * BRAKE_LAG)
+        };
+        let window = course.distance.map(|distance| distance - plan.window_from);
+        let looking = course.looking || course.felt || due(window, plan.window_speed);
+        let braking = course.braking || course.felt && due(ahead, plan.cross_speed);
+        let earliest = if course.felt { ahead } else { ahead.map(|at| at - steps.tolerance()) };
+        let ramping = course.ramping
             || course.critical
-            || within(sight) && within(self.brake_way(course, plan.cross_speed) + BRAKE_RESERVE);
-        let ramping =
-            course.ramping || course.critical || within(self.ramp_way(plan, course.reference));
+            || within(earliest, self.ramp_way(plan, course.reference.min(plan.cruise_preload)));
         let preload = if ramping { plan.cross_preload } else { plan.cruise_preload };
-        let mut speed = if braking { plan.cross_speed } else { plan.cruise_speed };
+        let mut speed = match (looking, braking) {
+            (_, true) => plan.cross_speed,
+            (true, false) => plan.window_speed,
+            (false, false) => plan.cruise_speed,
+        };
         let mut waiting = false;
-        let short = plan.cross_preload - course.preload;
-        if let (false, true, Some(ahead)) = (course.critical, ramping, to_window)
+        // Without look-ahead the preload between the steps is the one to have there.
+        let due = if plan.look_ahead { plan.cross_preload } else { plan.cruise_preload };
+        let short = due - course.preload;
+        if let Some(distance) = course.distance
             && short > self.reached_within
-            && ahead > -steps.tolerance()
+            // On the edge alone a wheel that goes back cannot wait: its tread sinks in.
+            && !(course.critical && course.direction == Direction::Retract)
         {
-            // Arrive no sooner than the preload: at the window, not at the corner.
+            // Lift off with the preload, not before it.
             let needed = self.timing.ramp(short) + SETTLING;
-            let allowed = divide(ahead.max(Q16::ZERO), needed);
+            let earlier = short * plan.earlier_per_preload;
+            let allowed = self.arriving_in(needed, distance - plan.ready_from - earlier, course);
             if allowed < speed {
                 speed = allowed;
-                waiting = allowed < plan.cross_speed;
+                // A preload that rises as planned is not waited for.
+                waiting = allowed < plan.cross_speed && course.preload_late;
             }
         }
         Targets {
             speed: speed.min(self.end_speed(steps, course, sight)),
             preload,
             ramping,
+            looking,
             braking,
-            approaching: braking || ramping,
+            approaching: looking || ramping,
             waiting,
         }
     }
 
-    /// Distance before the window at which a preload now referenced at `reference` must
-    /// start to steps, mm: what it takes longer than the braking is driven at cruise
-    /// speed.
+    /// Speed at which what is `ahead` takes this time, mm/s, braking to it included.
+    fn arriving_in(
+        &self,
+        needed: Seconds,
+        ahead: Millimetres,
+        course: &Course,
+    ) -> MillimetresPerSecond {
+        let mean = divide(ahead.max(Q16::ZERO), needed);
+        let braking = self.timing.speed_change((course.speed - mean).max(Q16::ZERO));
+        if braking >= needed {
+            return mean;
+        }
+        let way = if course.speed > mean { self.brake_way(course, mean) } else { Q16::ZERO };
+        divide((ahead - way).max(Q16::ZERO), needed - braking)
+    }
+
+    /// Distance before the earliest place where the preload must be reached at which a preload now
+    /// referenced at `reference` must start to rise, mm: what it takes longer than the braking
+    /// is driven at cruise speed.
     fn ramp_way(&self, plan: &Plan, reference: Newtons) -> Millimetres {
         let missing = plan.cross_preload - reference;
         if !plan.look_ahead || plan.cross_preload <= plan.cruise_preload {
@@ -137,7 +181,7 @@ impl Schedule {
     /// Distance within which a step or the end can ask for another speed, mm.
     fn sight(&self, plan: &Plan, course: &Course) -> Millimetres {
         if course.speed <= plan.cruise_speed.max(plan.cross_speed) {
-            plan.brake_horizon + BRAKE_RESERVE
+            plan.brake_horizon + course.speed * BRAKE_LAG
         } else {
             Q16::MAX
         }
@@ -164,7 +208,7 @@ impl Schedule {
             Q16::MAX
         } else if steps.arrived(course.remaining) {
             Q16::ZERO
-        } else if course.remaining <= self.brake_way(course, END_CREEP) + BRAKE_RESERVE {
+        } else if course.remaining <= self.brake_way(course, END_CREEP) + END_RESERVE {
             END_CREEP
         } else {
             Q16::MAX
@@ -187,6 +231,9 @@ mod tests {
             direction,
             step: 2,
             scale: q16(1_000_000),
+            reserve: Q16::ONE,
+            preload: Q16::from_num(50),
+            distance: Q16::ZERO,
             review: None,
         });
         (rig.clone(), Schedule::try_build(&rig).unwrap(), Steps::try_build(&rig).unwrap(), plan)
@@ -198,12 +245,15 @@ mod tests {
             distance: Some(Q16::from_num(distance)),
             remaining: Q16::from_num(500),
             critical: false,
+            felt: false,
             ramping: false,
+            looking: false,
             braking: false,
             speed: Q16::from_num(speed),
             acceleration: Q16::ZERO,
             reference: Q16::from_num(preload),
             preload: Q16::from_num(preload),
+            preload_late: false,
         }
     }
 
@@ -222,33 +272,43 @@ mod tests {
         }
 
         #[test]
-        fn inside_the_window_speed_and_preload_are_those_of_the_crossing(
+        fn in_the_window_the_wheel_is_ready_for_a_corner_and_brakes_once_it_is_felt(
             back in any::<bool>(),
-            into in 0.0..3.0f64,
+            into in 0.0..1.0f64,
         ) {
             let (_, schedule, steps, plan) = setting(back);
-            let edge = steps.corner().first_contact(plan.direction) + steps.tolerance();
-            let distance = edge.to_num::<f64>() - into;
             let standing = plan.cross_preload.to_num::<f64>();
-            let got = schedule.targets(&steps, &plan, &course(&plan, distance, 8.0, standing));
-            prop_assert_eq!(got.speed, plan.cross_speed);
-            prop_assert_eq!(got.preload, plan.cross_preload);
-            prop_assert!(got.approaching && !got.waiting);
+            let at = |distance: Millimetres, felt| Course {
+                felt,
+                ..course(&plan, distance.to_num::<f64>() - into, 8.0, standing)
+            };
+            let looking = schedule.targets(&steps, &plan, &at(plan.window_from, false));
+            prop_assert_eq!(looking.speed, plan.window_speed);
+            prop_assert_eq!(looking.preload, plan.cross_preload);
+            prop_assert!(looking.looking && !looking.braking && !looking.waiting);
+            let felt = schedule.targets(&steps, &plan, &at(plan.slow_from, true));
+            prop_assert_eq!(felt.speed, plan.cross_speed);
+            prop_assert!(felt.braking && !felt.waiting);
         }
 
         #[test]
-        fn without_its_preload_the_wheel_does_not_enter_the_window(
+        fn without_its_preload_the_wheel_does_not_lift_off(
             back in any::<bool>(),
             ahead in 0.0..2.0f64,
         ) {
             let (rig, schedule, steps, plan) = setting(back);
-            let edge = steps.corner().first_contact(plan.direction) + steps.tolerance();
-            let distance = edge.to_num::<f64>() + ahead;
-            let got = schedule.targets(&steps, &plan, &course(&plan, distance, 8.0, 33.3));
+            let distance = plan.ready_from.to_num::<f64>() + ahead;
+            let at = Course { felt: true, ..course(&plan, distance, 8.0, 33.3) };
+            let got = schedule.targets(&steps, &plan, &at);
             // At most so fast that the missing preload is there first.
             let missing = plan.cross_preload.to_num::<f64>() - 33.3;
             let bound = ahead / (missing / rig.preload.slew_n_per_s);
             prop_assert!(got.speed.to_num::<f64>() <= bound + 1e-3, "{} {bound}", got.speed);
+            // It waits in earnest only for a preload that is behind its actuator.
+            prop_assert!(!got.waiting);
+            let late = Course { preload_late: true, ..at };
+            let late = schedule.targets(&steps, &plan, &late);
+            prop_assert_eq!(late.waiting, late.speed < plan.cross_speed);
         }
 
         #[test]
@@ -282,7 +342,7 @@ mod tests {
             let (rig, schedule, _, plan) = setting(back);
             let acceleration = Q16::from_num(rising * rig.drive.acceleration_mm_s2);
             let at = Course { acceleration, ..course(&plan, 0.0, speed, 40.0) };
-            let needs = schedule.brake_way(&at, plan.cross_speed) + BRAKE_RESERVE;
+            let needs = schedule.brake_way(&at, plan.cross_speed) + at.speed * BRAKE_LAG;
             prop_assert!(needs <= schedule.sight(&plan, &at), "{needs}");
         }
     }

@@ -19,6 +19,9 @@ use crate::units::{Millimetres, Q16, Ratio, q16};
 const HOLD: Millimetres = q16(80_000);
 /// Rise above the baseline that counts as a corner, mm: four steps of the angle code.
 const TOUCH: Millimetres = q16(160_000);
+/// Dip below the wall at which an edge left behind shows its place, mm: nearer to it the
+/// distance is not seen in the height.
+const DIP: Millimetres = q16(1_000_000);
 /// Ticks that it must last.
 const TOUCH_TICKS: u8 = 3;
 /// Rise below which a corner is taken for a false alarm, mm.
@@ -233,6 +236,29 @@ impl CrossingWatch {
             deepest: state.deepest,
             ..WatchState::default()
         };
+    }
+
+    /// Axial distance along the run to the face of the corner that carries, mm: the edge lies
+    /// `R - c` from the centre, with the centre's height above the wall from the baseline. None
+    /// while the corner is felt too little to show where it is.
+    pub fn to_face(
+        &self,
+        state: &WatchState,
+        direction: Direction,
+        seen: &WatchInput,
+    ) -> Option<Millimetres> {
+        let enough = match direction {
+            Direction::Deploy => TOUCH,
+            Direction::Retract => DIP,
+        };
+        if self.rise(state, direction, seen) < enough {
+            return None;
+        }
+        let height = state.baseline.output() + self.radius - seen.radius;
+        Some(match direction {
+            Direction::Deploy => self.measure(seen.compression, height).distance,
+            Direction::Retract => -self.measure(seen.compression, height + self.step).distance,
+        })
     }
 
     /// How far the wheel is off its baseline in the direction of the step, mm.

@@ -1,6 +1,7 @@
 //! Follows a crossing: what the watch detects becomes odometry, level and review.
 
 use super::crossing::{Contact, CrossingEvent, Lift, WatchInput};
+use super::odometry::Rolling;
 use super::restore::UNSURE_WITHIN;
 use super::{EstimateState, Estimator, Expectation, Findings, LiftPoint, OpenCrossing, Position};
 use crate::fault::{Fault, Limit};
@@ -19,6 +20,12 @@ pub struct Follow<'a> {
 }
 
 impl Estimator {
+    /// Begins a tick: position, and preload as the tread has it.
+    pub fn begin_tick(&self, state: &mut EstimateState, sensed: &SensedState) {
+        state.begin_tick(sensed.travel);
+        self.memory.step(&mut state.remembered, sensed.preload_filtered);
+    }
+
     /// One tick in which the drive moves.
     pub fn follow(&self, state: &mut EstimateState, tick: &Follow<'_>) -> Findings {
         let mut found = Findings::default();
@@ -26,6 +33,13 @@ impl Estimator {
         self.watch_slip(state, tick, &mut found);
         let seen = self.watch_input(state, tick.sensed);
         let event = self.watch.step(&mut state.watch, direction, &seen);
+        let rolling = Rolling {
+            radius: tick.sensed.radius.value,
+            lag: self.rolling_lag * tick.sensed.compression_filtered,
+            on_corner: state.on_corner(),
+        };
+        state.odometry.roll(tick.sensed.travel, &rolling, event.is_some());
+        state.begin_tick(tick.sensed.travel);
         if let Some(open) = state.crossing.as_mut() {
             open.peak_preload = open.peak_preload.max(tick.sensed.preload_filtered);
         }
@@ -43,7 +57,20 @@ impl Estimator {
                 self.touched(state, tick, &mut found);
             }
         }
+        self.feel(state, tick.sensed);
         found
+    }
+
+    /// Where the step is, from the moment at which its corner carries.
+    fn feel(&self, state: &mut EstimateState, sensed: &SensedState) {
+        let seen = self.watch_input(state, sensed);
+        let direction = state.direction;
+        let ahead = self.watch.to_face(&state.watch, direction, &seen);
+        let Some(open) = state.crossing.as_mut().filter(|open| open.felt.is_none()) else { return };
+        open.felt = ahead.map(|ahead| match direction {
+            Direction::Deploy => state.position + ahead,
+            Direction::Retract => state.position - ahead,
+        });
     }
 
     /// Late and missing steps.
@@ -88,6 +115,16 @@ impl Estimator {
     /// Distance along the run to the face of the step ahead, mm; none if no step is left.
     pub fn distance(&self, state: &EstimateState) -> Option<Millimetres> {
         self.steps.distance(state.next_step, state.direction, state.position)
+    }
+
+    /// Distance along the run to the face of the step ahead as its corner shows it, mm.
+    pub fn felt(&self, state: &EstimateState) -> Option<Millimetres> {
+        let open = state.crossing.as_ref().filter(|open| open.lift.is_none())?;
+        let face = open.felt.filter(|_| open.step > 0 && open.step == state.next_step)?;
+        Some(match state.direction {
+            Direction::Deploy => face - state.position,
+            Direction::Retract => state.position - face,
+        })
     }
 
     /// A wheel at rest under preload: the baseline follows its wall. Whether compression and
@@ -160,9 +197,11 @@ impl Estimator {
         let residual = table.map_or(Q16::ZERO, |table| face - table);
         open.lift = Some(LiftPoint {
             at: tick.now,
+            position: state.position,
             gap: lift.gap,
             speed: sensed.speed.value.abs(),
             preload: sensed.preload_filtered,
+            remembered: state.remembered_preload(),
             tan_arm: sensed.tan_arm,
             face,
             residual,

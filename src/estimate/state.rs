@@ -5,7 +5,13 @@ use super::odometry::Odometry;
 use super::tread::TreadState;
 use super::{Place, Position, PositionConfidence};
 use crate::fault::{Fault, Limit};
-use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Ratio, Tick, Travel};
+use crate::numeric::LowPassState;
+use crate::units::{
+    Direction, Millimetres, MillimetresPerSecond, Newtons, Ratio, Tick, Travel, q16,
+};
+
+/// Error of the place at which a lift-off is detected, mm: the steps of the angle code.
+const LIFT_WITHIN: Millimetres = q16(100_000);
 
 /// State of the estimator.
 #[derive(Clone, Debug, Default)]
@@ -17,6 +23,8 @@ pub struct EstimateState {
     /// Crossing watch.
     pub watch: WatchState,
     pub(super) tread: TreadState,
+    /// Preload behind the memory of the tread, N.
+    pub(super) remembered: LowPassState,
     /// Direction of the run.
     pub direction: Direction,
     /// Level by steps detected.
@@ -56,6 +64,8 @@ pub struct OpenCrossing {
     pub reported: bool,
     /// When the corner was first detected.
     pub touched_at: Tick,
+    /// Position of the face by the corner that carries, as soon as it shows, mm.
+    pub felt: Option<Millimetres>,
     /// Odometry at that time.
     pub from: Option<Travel>,
     /// Since when the crossing preload had been reached.
@@ -75,12 +85,16 @@ pub struct OpenCrossing {
 pub struct LiftPoint {
     /// When.
     pub at: Tick,
+    /// Position of the wheel, mm.
+    pub position: Millimetres,
     /// Gap with the nominal step height, mm.
     pub gap: Millimetres,
     /// Wheel speed, mm/s.
     pub speed: MillimetresPerSecond,
     /// Preload, N.
     pub preload: Newtons,
+    /// Preload behind the memory of the tread, N.
+    pub remembered: Newtons,
     /// Tangent of the arm angle.
     pub tan_arm: Ratio,
     /// Position of the face as found, mm.
@@ -123,6 +137,11 @@ impl EstimateState {
         state
     }
 
+    /// Preload behind the memory of the tread, N: what the tread has had time to take up.
+    pub fn remembered_preload(&self) -> Newtons {
+        self.remembered.output()
+    }
+
     /// Begins a tick at this travel of the wheel.
     pub fn begin_tick(&mut self, travel: Travel) {
         self.position = self.odometry.position(travel);
@@ -157,6 +176,13 @@ impl EstimateState {
         on_corner && self.crossing.as_ref().is_some_and(|crossing| crossing.lift.is_none())
     }
 
+    /// Speed at the lift-off that has just been detected: it is kept until the lower wall has
+    /// surely been left (retract: reached).
+    pub fn lifting(&self) -> Option<MillimetresPerSecond> {
+        let point = self.crossing.as_ref()?.lift?;
+        ((self.position - point.position).abs() < LIFT_WITHIN).then_some(point.speed)
+    }
+
     /// A corner is detected.
     pub fn on_corner(&self) -> bool {
         self.watch.contact != Contact::Wall
@@ -169,7 +195,9 @@ impl EstimateState {
 
     /// Whether something unexpected asks for crossing speed.
     pub fn slow_down(&self) -> bool {
-        self.late || self.known.is_searching() && self.next_step > 0 || self.critical()
+        let expected = self.crossing.as_ref().is_some_and(|crossing| crossing.expected);
+        let surprised = self.critical() && !expected;
+        self.late || self.known.is_searching() && self.next_step > 0 || surprised
     }
 
     /// What carries the wheel, as reported: a wheel that searches after a restart counts as on
@@ -191,7 +219,7 @@ impl EstimateState {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::units::{Q16, q16};
+    use crate::units::Q16;
 
     #[test]
     fn a_place_is_known_only_with_every_step_found_where_the_table_has_it() {

@@ -273,12 +273,16 @@ mod tests {
             direction,
             step: 255,
             scale: most,
+            reserve: Q16::ONE,
+            preload: most,
+            distance: most,
             review: Some(review),
         };
         let outcome = Outcome {
             gap_predicted: most,
             slip_margin: most,
             scale: most,
+            reserve: most,
             bounded: true,
             strange: true,
         };
@@ -294,6 +298,11 @@ mod tests {
             slip_margin: most,
             brake_way: most,
             brake_time: most,
+            window_speed: most,
+            window_from: most,
+            slow_from: most,
+            ready_from: most,
+            earlier_per_preload: most,
             brake_horizon: most,
             look_ahead: true,
             limits: [Some(Limit::SlipMarginLow); 3],

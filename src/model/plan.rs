@@ -29,7 +29,8 @@ pub struct Review {
     pub preload: Newtons,
     /// Tangent of the arm angle at lift-off.
     pub tan_arm: Ratio,
-    /// Measured gap, mm.
+    /// Measured gap of a step of nominal height, mm: how high this one is shows the sleeve, not
+    /// the tread.
     pub gap: Millimetres,
     /// Whether the gap may correct the stiffness: not after an odd crossing.
     pub trusted: bool,
@@ -46,6 +47,12 @@ pub struct PlanRequest {
     pub step: u8,
     /// Estimated over nominal stiffness.
     pub scale: Ratio,
+    /// Share of the rig's reserve below the reference gap.
+    pub reserve: Ratio,
+    /// Measured preload, N.
+    pub preload: Newtons,
+    /// Axial distance along the run to the face of the step, mm.
+    pub distance: Millimetres,
     /// The crossing just closed.
     pub review: Option<Review>,
 }
@@ -59,6 +66,9 @@ pub struct Outcome {
     pub slip_margin: Ratio,
     /// Corrected stiffness scale.
     pub scale: Ratio,
+    /// Share of the reserve that is kept from now on: half of the last one, and what this
+    /// crossing missed its prediction by.
+    pub reserve: Ratio,
     /// Whether the correction reached the end of its range.
     pub bounded: bool,
     /// Whether the measured gap implies a stiffness far from the estimated one.
@@ -90,6 +100,18 @@ pub struct Plan {
     pub brake_way: Millimetres,
     /// Time that this braking takes, s.
     pub brake_time: Seconds,
+    /// Speed through the window in which the corner may be felt, mm/s: from it the crossing
+    /// speed is reached in time.
+    pub window_speed: MillimetresPerSecond,
+    /// Distance to the face, along the run, at which that window begins, mm.
+    pub window_from: Millimetres,
+    /// Distance to the face, along the run, by which the crossing speed must be reached: that at
+    /// lift-off and what the tread remembers, mm.
+    pub slow_from: Millimetres,
+    /// The same for the preload, mm.
+    pub ready_from: Millimetres,
+    /// How much earlier the wheel lifts off per preload that it lacks, mm/N.
+    pub earlier_per_preload: Ratio,
     /// Distance before a step or the end within which braking can be due, mm.
     pub brake_horizon: Millimetres,
     /// Whether the preload is raised ahead of the step.

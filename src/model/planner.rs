@@ -10,8 +10,11 @@ use super::plan::{Outcome, Plan, PlanRequest, Review, Strategy};
 use super::reduced::{Point, ReducedModel, Scale};
 use super::timing::Timing;
 use crate::fault::Limit;
+use crate::numeric::{divide, sqrt};
 use crate::rig::MAX_STEPS;
-use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Ratio, Seconds, q16};
+use crate::units::{
+    Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Seconds, q16,
+};
 
 /// Largest correction of the stiffness scale by one crossing.
 const LARGEST_CORRECTION: Ratio = q16(100_000);
@@ -22,6 +25,32 @@ const OUTLIER: Ratio = q16(350_000);
 /// by three deviations makes 0.12 at the first crossing; the rest is the measurement, where a
 /// stiff guess costs most. Two of 1,500 random rigs exceed 0.20.
 const STRANGE: Ratio = q16(270_000);
+
+/// Travel before lift-off that the tread remembers, mm, beside what the lift-off comes earlier
+/// at the speed of the window: the speed before it hardly counts. On retract the corner carries
+/// alone all along, and its whole patch remembers.
+const MEMORY: [Millimetres; 2] = [q16(100_000), q16(2_000_000)];
+
+/// Travel at crossing speed, mm, with what detection and braking take.
+const SLOW_TRAVEL: [Millimetres; 2] = [q16(800_000), q16(2_400_000)];
+
+/// Height that the centre lacks at lift-off, mm: what the tread still keeps of its compression.
+const SHORT: Millimetres = q16(110_000);
+
+/// Bounds of the reserve that the crossings leave, as shares of the rig's.
+const LEAST_RESERVE: Ratio = q16(333_333);
+const MOST_RESERVE: Ratio = q16(2_000_000);
+
+/// Error of the place of a corner that is felt, with the travel until braking begins, mm.
+const FELT_WITHIN: Millimetres = q16(150_000);
+
+/// Preloads between that of cruise and the limit that are compared, and their distance as a
+/// part of the range.
+const PRELOADS: u32 = 16;
+const PRELOAD_STEP: Ratio = q16(62_500);
+
+/// Error of the model's inverse, N.
+const HOLDS_WITHIN: Newtons = q16(100_000);
 
 /// Sixteenths of the gap taken off until the slip margin holds, at most.
 const SLIP_TRIES: usize = 8;
@@ -40,8 +69,10 @@ pub struct Planner {
     coupling: Newtons,
     /// Gap to hold, deploy and retract, mm.
     gap_ref: [Millimetres; 2],
-    /// Gap aimed at, a reserve below it, mm.
-    target: [Millimetres; 2],
+    /// Part by which the gap aimed at is below it while no crossing has shown what the tread
+    /// does, and its reciprocal; 0 for none.
+    reserve: Ratio,
+    by_reserve: Q16,
     cruise_speed: MillimetresPerSecond,
     least_speed: MillimetresPerSecond,
     safe_speed: MillimetresPerSecond,
@@ -52,6 +83,11 @@ pub struct Planner {
     /// Whether the crossing speed also applies between the steps.
     uniform: bool,
     cruise_preload: Newtons,
+    radius: Millimetres,
+    /// Tolerance of a step's place, mm.
+    tolerance: Millimetres,
+    /// Distance to the face at which the corner shows where it is, deploy and retract, mm.
+    felt_at: [Millimetres; 2],
     /// Preload that the plan may ask for, N.
     most_preload: Newtons,
     /// Friction of tread on wall as far as known.
@@ -65,8 +101,9 @@ pub struct Planner {
 impl Planner {
     /// Answers a request.
     pub fn plan(&self, request: &PlanRequest) -> Plan {
-        let outcome = request.review.map(|review| self.review(&review, request.scale));
+        let outcome = request.review.map(|review| self.review(&review, request));
         let scale = outcome.map_or(request.scale, |o| o.scale);
+        let share = outcome.map_or(request.reserve, |o| o.reserve);
         let (cruise_speed, moved) = self.guard.below(self.cruise_speed);
         let limits = [moved.then_some(Limit::ResonanceAvoided), None, None];
         let mut plan = Plan {
@@ -77,18 +114,23 @@ impl Planner {
             cross_speed: cruise_speed,
             cruise_preload: self.between_steps(),
             cross_preload: self.between_steps(),
-            gap: self.target_of(request.direction),
+            gap: self.target(request.direction, share),
             slip_margin: self.usable,
             brake_way: Millimetres::ZERO,
             brake_time: Seconds::ZERO,
             brake_horizon: Millimetres::ZERO,
+            window_speed: cruise_speed,
+            window_from: Millimetres::ZERO,
+            slow_from: Millimetres::ZERO,
+            ready_from: Millimetres::ZERO,
+            earlier_per_preload: Ratio::ZERO,
             // Without look-ahead the preload rises when the step is detected, never before.
             look_ahead: self.strategy != Strategy::Reactive,
             limits,
             outcome,
         };
         if request.step > 0 {
-            self.crossing(request, scale, &mut plan);
+            self.crossing(&PlanRequest { scale, reserve: share, ..*request }, &mut plan);
         }
         if self.uniform {
             plan.cruise_speed = plan.cross_speed;
@@ -103,22 +145,23 @@ impl Planner {
     }
 
     /// Speed and preload at the step.
-    fn crossing(&self, request: &PlanRequest, scale: Ratio, plan: &mut Plan) {
-        let scale = Scale::new(scale);
-        let at = Point { direction: request.direction, speed: self.least_speed, scale };
-        let arm_thrust = self.arm_thrust_at(request.step);
-        let most = match self.strategy {
-            Strategy::Scheduled | Strategy::Limit => self.most_preload,
-            Strategy::Constant | Strategy::Reactive => self.cruise_preload,
+    fn crossing(&self, request: &PlanRequest, plan: &mut Plan) {
+        let at = Point {
+            direction: request.direction,
+            speed: self.least_speed,
+            scale: Scale::new(request.scale),
         };
-        let gap = self.gripping_gap(&at, request.direction);
-        let ceiling = self.prescribed_speed.unwrap_or(plan.cruise_speed);
+        let arm_thrust = self.arm_thrust_at(request.step);
         let floor = self.least_speed.min(plan.cruise_speed);
         // No faster than the pre-tightener can follow the spring over the corner.
-        let ceiling = ceiling.min(self.climb_speed.max(floor));
-        let found = self.model.speed(&at, gap, most + arm_thrust, floor.min(ceiling), ceiling);
-        let speed = self.prescribed_speed.unwrap_or(found);
-        let (speed, moved) = self.guard.below(speed.max(floor));
+        let ceiling = plan.cruise_speed.min(self.climb_speed.max(floor));
+        let (floor, ceiling) = match self.prescribed_speed {
+            Some(speed) => (speed, speed),
+            None => (floor, ceiling),
+        };
+        let Choice { preload: most, gap, speed, .. } =
+            self.choose(request, &at, arm_thrust, (floor, ceiling));
+        let (speed, moved) = self.guard.below(speed);
         if moved {
             add(&mut plan.limits, Limit::ResonanceAvoided);
         }
@@ -127,13 +170,13 @@ impl Planner {
         let at = Point { speed, ..at };
         let wanted = self.model.force(&at, gap) - arm_thrust;
         plan.cross_speed = speed;
-        if wanted > most && speed <= floor {
+        if wanted > most + HOLDS_WITHIN && speed <= floor {
             add(&mut plan.limits, Limit::SpeedFloor);
-        } else if wanted >= most * q16(980_000) && speed < self.safe_speed {
+        } else if wanted >= self.most_preload * q16(980_000) && speed < self.safe_speed {
             add(&mut plan.limits, Limit::PreloadLimited);
         }
         plan.cross_preload = match self.strategy {
-            Strategy::Scheduled => wanted.clamp(self.cruise_preload, most),
+            Strategy::Scheduled => wanted.clamp(self.cruise_preload, most.max(self.cruise_preload)),
             Strategy::Constant => self.cruise_preload,
             Strategy::Limit => self.most_preload,
             Strategy::Reactive => wanted.clamp(self.cruise_preload, self.most_preload),
@@ -146,18 +189,129 @@ impl Planner {
         if margin < self.friction - self.usable {
             add(&mut plan.limits, Limit::SlipMarginLow);
         }
+        self.window(&at, carried, plan);
     }
 
-    /// The target gap, or the largest below it that leaves the slip margin.
-    fn gripping_gap(&self, at: &Point, direction: Direction) -> Millimetres {
-        let mut gap = self.target_of(direction);
+    /// Where the corner may be felt, and where the crossing speed must be reached. The tread still
+    /// has the stiffness of the window's speed, with which the wheel would lift off earlier.
+    fn window(&self, at: &Point, carried: Newtons, plan: &mut Plan) {
+        let lift = self.lift(plan.direction, plan.gap);
+        plan.window_from = self.felt_at[plan.direction as usize] + self.tolerance;
+        plan.ready_from = lift + MEMORY[plan.direction as usize];
+        plan.slow_from = plan.ready_from;
+        plan.window_speed = self.window_speed(plan);
+        let fast = self.model.gap(&Point { speed: plan.window_speed, ..*at }, carried);
+        plan.slow_from += (self.lift(plan.direction, fast) - lift).max(Q16::ZERO);
+        plan.window_speed = self.window_speed(plan);
+        let less = carried * q16(100_000);
+        let gap = self.model.gap(at, carried - less);
+        let earlier = self.lift(plan.direction, gap) - lift;
+        plan.earlier_per_preload = divide(earlier.max(Q16::ZERO), less);
+    }
+
+    /// Speed from which the crossing speed is reached between where the corner is felt and where
+    /// it must be, mm/s.
+    fn window_speed(&self, plan: &Plan) -> MillimetresPerSecond {
+        let way = self.felt_at[plan.direction as usize] - FELT_WITHIN - plan.slow_from;
+        self.timing.fastest_into(way, plan.cross_speed, plan.cruise_speed).max(plan.cross_speed)
+    }
+
+    /// Distance along the run to the face at lift-off (retract: touch-down) with this gap, mm.
+    fn lift(&self, direction: Direction, gap: Millimetres) -> Millimetres {
+        // The tread's memory leaves the wall before the centre is as high as the free wheel's.
+        let height = match direction {
+            Direction::Deploy => self.radius - SHORT,
+            Direction::Retract => self.radius,
+        };
+        let reach = self.radius + gap;
+        let lift = sqrt((reach - height) * (reach + height));
+        match direction {
+            Direction::Deploy => lift,
+            Direction::Retract => -lift,
+        }
+    }
+
+    /// The preload, and with it the speed, with which the wheel is over the step soonest: more
+    /// preload takes time to build, less makes the crossing slow.
+    fn choose(
+        &self,
+        request: &PlanRequest,
+        at: &Point,
+        arm_thrust: Newtons,
+        bounds: (MillimetresPerSecond, MillimetresPerSecond),
+    ) -> Choice {
+        let (low, high) = match self.strategy {
+            Strategy::Scheduled => (self.cruise_preload, self.most_preload),
+            Strategy::Limit => (self.most_preload, self.most_preload),
+            Strategy::Constant => (self.cruise_preload, self.cruise_preload),
+            Strategy::Reactive => {
+                let reached = self.reached_on_corner(request, at, arm_thrust, bounds);
+                (reached, reached)
+            }
+        };
+        let mut best = self.gripping(request, at, high, arm_thrust, bounds);
+        for part in 1..=PRELOADS {
+            if high == low {
+                break;
+            }
+            let preload = high - (high - low) * Q16::from_num(part) * PRELOAD_STEP;
+            let choice = self.gripping(request, at, preload, arm_thrust, bounds);
+            if choice.better_than(&best) {
+                best = choice;
+            }
+        }
+        best
+    }
+
+    /// The most preload that a rise which begins at the corner still reaches before lift-off
+    /// (retract: touch-down), at the speed that this preload allows.
+    fn reached_on_corner(
+        &self,
+        request: &PlanRequest,
+        at: &Point,
+        arm_thrust: Newtons,
+        (floor, ceiling): (MillimetresPerSecond, MillimetresPerSecond),
+    ) -> Newtons {
+        let gap = self.target(request.direction, request.reserve);
+        let run = self.felt_at[request.direction as usize] - self.lift(request.direction, gap);
+        let step = (self.most_preload - self.cruise_preload) * PRELOAD_STEP;
+        let preload = |part: u32| self.cruise_preload + step * Q16::from_num(part);
+        let reached = (1..=PRELOADS).take_while(|&part| {
+            let speed = self.model.speed(at, gap, preload(part) + arm_thrust, floor, ceiling);
+            self.timing.preload_change(preload(part) - self.cruise_preload) <= divide(run, speed)
+        });
+        preload(reached.last().unwrap_or(0))
+    }
+
+    /// With this preload: the largest gap up to the target, and the speed with it, that leave
+    /// the slip margin.
+    fn gripping(
+        &self,
+        request: &PlanRequest,
+        at: &Point,
+        preload: Newtons,
+        arm_thrust: Newtons,
+        (floor, ceiling): (MillimetresPerSecond, MillimetresPerSecond),
+    ) -> Choice {
+        let mut gap = self.target(request.direction, request.reserve);
+        let (mut speed, mut holds) = (floor, false);
         for _ in 0..SLIP_TRIES {
-            if self.model.utilisation(at, gap) <= self.usable {
+            speed = self.model.speed(at, gap, preload + arm_thrust, floor, ceiling);
+            let at = Point { speed, ..*at };
+            let grips = self.model.utilisation(&at, gap) <= self.usable;
+            let carries = self.model.force(&at, gap) <= preload + arm_thrust + HOLDS_WITHIN;
+            holds = grips && carries;
+            if grips || speed <= floor {
                 break;
             }
             gap -= gap * q16(62_500);
         }
-        gap
+        let ready = self.timing.preload_change((preload - request.preload).max(Q16::ZERO));
+        let travels = divide(request.distance.max(Q16::ZERO), self.cruise_speed);
+        let slower = self.cruise_speed - speed;
+        let change = self.timing.speed_change(slower) * divide(slower, self.cruise_speed);
+        let time = ready.max(travels) + divide(SLOW_TRAVEL[at.direction as usize], speed) + change;
+        Choice { preload, gap, speed, time, holds }
     }
 
     /// Distance and time of braking before the step.
@@ -168,7 +322,8 @@ impl Planner {
     }
 
     /// Compares a crossing with the model and corrects the stiffness, bounded.
-    fn review(&self, review: &Review, scale: Ratio) -> Outcome {
+    fn review(&self, review: &Review, request: &PlanRequest) -> Outcome {
+        let scale = request.scale;
         let at =
             Point { direction: review.direction, speed: review.speed, scale: Scale::new(scale) };
         let force = review.preload + self.coupling * review.tan_arm;
@@ -177,6 +332,7 @@ impl Planner {
             gap_predicted: crossing.gap,
             slip_margin: crossing.slip_margin,
             scale,
+            reserve: request.reserve,
             bounded: false,
             strange,
         };
@@ -190,11 +346,14 @@ impl Planner {
         if off > OUTLIER * scale {
             return unchanged(strange);
         }
+        let missed = divide((review.gap - crossing.gap).abs(), review.gap.max(q16(100_000)));
+        let reserve = request.reserve.half() + missed * self.by_reserve;
+        let reserve = reserve.clamp(LEAST_RESERVE, MOST_RESERVE);
         let step = ((observed - scale) * self.gain).clamp(-LARGEST_CORRECTION, LARGEST_CORRECTION);
         let (low, high) = self.scale_range;
         let wanted = scale + step;
         let scale = wanted.clamp(low, high);
-        Outcome { scale, bounded: scale != wanted, ..unchanged(strange) }
+        Outcome { scale, reserve, bounded: scale != wanted, ..unchanged(strange) }
     }
 
     fn arm_thrust_at(&self, step: u8) -> Newtons {
@@ -209,8 +368,29 @@ impl Planner {
         }
     }
 
-    fn target_of(&self, direction: Direction) -> Millimetres {
-        self.target[direction as usize]
+    /// Gap aimed at with this share of the reserve, mm.
+    fn target(&self, direction: Direction, share: Ratio) -> Millimetres {
+        let gap = self.gap_ref(direction);
+        gap - gap * (self.reserve * share)
+    }
+}
+
+/// A preload with what it allows.
+#[derive(Clone, Copy, Debug)]
+struct Choice {
+    preload: Newtons,
+    gap: Millimetres,
+    speed: MillimetresPerSecond,
+    /// Until the step is behind, s, but for what is the same for every preload.
+    time: Seconds,
+    /// It holds the gap and keeps the slip margin.
+    holds: bool,
+}
+
+impl Choice {
+    /// Sooner over the step, if it holds; of those that do not, the highest preload is best.
+    fn better_than(&self, higher: &Self) -> bool {
+        self.holds && (!higher.holds || self.time < higher.time)
     }
 }
 
@@ -224,149 +404,6 @@ fn add(limits: &mut [Option<Limit>; 3], limit: Limit) {
 }
 
 #[cfg(test)]
+#[path = "planner/planner_tests.rs"]
 #[allow(clippy::float_arithmetic, reason = "the gaps are written in mm")]
-mod tests {
-    use super::*;
-    use crate::rig::Rig;
-    use crate::units::q16;
-
-    /// What the planner makes of a crossing whose gap is this much wider than it predicts, mm.
-    fn reviewed(wider: f64, trusted: bool) -> Outcome {
-        let planner = Planner::try_build(&Rig::prototype()).expect("a sound rig");
-        let scale = q16(1_000_000);
-        let mut review = Review {
-            direction: Direction::Deploy,
-            speed: q16(8_000_000),
-            preload: q16(47_000_000),
-            tan_arm: q16(1_000_000),
-            gap: Millimetres::from_num(2.5),
-            trusted: false,
-        };
-        let predicted = planner.review(&review, scale).gap_predicted;
-        review.gap = predicted + Millimetres::from_num(wider);
-        review.trusted = trusted;
-        planner.review(&review, scale)
-    }
-
-    #[test]
-    fn a_gap_that_no_tread_of_the_rig_makes_is_strange_and_moves_little() {
-        for wider in [0.0, 0.05, -0.05] {
-            assert!(!reviewed(wider, true).strange, "{wider}");
-        }
-        for wider in [0.5, -0.4] {
-            let outcome = reviewed(wider, true);
-            let moved = (outcome.scale - q16(1_000_000)).abs();
-            assert!(outcome.strange && moved <= LARGEST_CORRECTION, "{wider}: {outcome:?}");
-            // Of a crossing that is not trusted nothing is concluded.
-            assert!(!reviewed(wider, false).strange);
-        }
-    }
-
-    #[test]
-    fn a_gap_beyond_every_tread_corrects_nothing() {
-        for wider in [1.0, 1.5, -1.0] {
-            let outcome = reviewed(wider, true);
-            assert_eq!(outcome.scale, q16(1_000_000), "{wider}: {outcome:?}");
-            assert!(outcome.strange && !outcome.bounded);
-        }
-    }
-
-    #[test]
-    fn a_gap_that_the_friction_cannot_hold_is_made_smaller_until_it_can() {
-        let mut smaller = 0;
-        for mu in [0.5, 0.6, 0.7, 0.8, 0.9, 1.1] {
-            let mut rig = Rig::prototype();
-            rig.plant.mu = mu;
-            let Ok(planner) = Planner::try_build(&rig) else { continue };
-            for direction in Direction::ALL {
-                let scale = Scale::NOMINAL;
-                let at = Point { direction, speed: planner.least_speed, scale };
-                let (target, gap) =
-                    (planner.target_of(direction), planner.gripping_gap(&at, direction));
-                let grips = |gap| planner.model.utilisation(&at, gap) <= planner.usable;
-                if grips(target) {
-                    assert_eq!(gap, target, "{mu}");
-                    continue;
-                }
-                smaller += 1;
-                // By sixteenths, eight times at most.
-                let part = gap.to_num::<f64>() / target.to_num::<f64>();
-                assert!((0.59..0.94).contains(&part), "{mu} {part}");
-                assert!(grips(gap) || part < 0.6, "{mu} {gap}");
-            }
-        }
-        assert!(smaller > 0);
-    }
-
-    #[test]
-    fn a_crossing_slowed_by_its_preload_is_reported() {
-        let (mut limited, mut free) = (0, 0);
-        for gap_mm in [0.0, 1.5, 1.75, 2.0, 2.25, 2.5] {
-            for (planner, plan) in plans(|rig| rig.control.gap_ref_mm = gap_mm) {
-                let reported = plan.limits.contains(&Some(Limit::PreloadLimited));
-                let floored = plan.limits.contains(&Some(Limit::SpeedFloor));
-                let at_limit = plan.cross_preload >= planner.most_preload * q16(980_000);
-                let slow = plan.cross_speed < planner.safe_speed;
-                assert_eq!(reported, at_limit && slow && !floored, "{gap_mm} {plan:?}");
-                limited += u32::from(reported);
-                free += u32::from(!reported && !floored);
-            }
-        }
-        assert!(limited > 0 && free > 0, "{limited} {free}");
-    }
-
-    /// Plans of a rig that is changed like this, in both directions, for treads around the nominal.
-    fn plans(change: impl Fn(&mut Rig)) -> Vec<(Planner, Plan)> {
-        let mut rig = Rig::prototype();
-        change(&mut rig);
-        let Ok(planner) = Planner::try_build(&rig) else { return Vec::new() };
-        let cases = [0.8, 1.0, 1.25]
-            .into_iter()
-            .flat_map(|s| Direction::ALL.map(|direction| (s, direction)));
-        cases
-            .map(|(scale, direction)| {
-                let scale = Ratio::from_num(scale);
-                let request = PlanRequest { sequence: 1, direction, step: 2, scale, review: None };
-                (planner.clone(), planner.plan(&request))
-            })
-            .collect()
-    }
-
-    #[test]
-    fn a_crossing_that_no_speed_makes_narrow_enough_is_reported() {
-        let (mut floored, mut free) = (0, 0);
-        for gap_mm in [0.6, 0.8, 1.0, 1.25, 1.5, 2.0, 2.5] {
-            for (planner, plan) in plans(|rig| rig.control.gap_ref_mm = gap_mm) {
-                let reported = plan.limits.contains(&Some(Limit::SpeedFloor));
-                let slowest = plan.cross_speed <= planner.least_speed;
-                let hardest = plan.cross_preload == planner.most_preload;
-                let wide = plan.gap > planner.target_of(plan.direction);
-                assert_eq!(reported, slowest && hardest && wide, "{gap_mm} {plan:?}");
-                floored += u32::from(reported);
-                free += u32::from(!reported);
-            }
-        }
-        assert!(floored > 0 && free > 0, "{floored} {free}");
-    }
-
-    #[test]
-    fn a_crossing_that_leaves_too_little_friction_is_reported() {
-        let (mut slips, mut grips) = (0, 0);
-        for mu in [0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.1] {
-            for (planner, plan) in plans(|rig| rig.plant.mu = mu) {
-                let reported = plan.limits.contains(&Some(Limit::SlipMarginLow));
-                let wanted = planner.friction - planner.usable;
-                assert_eq!(reported, plan.slip_margin < wanted, "{mu} {plan:?}");
-                // Reported or not, the margin is what the friction leaves.
-                let margin = plan.slip_margin.to_num::<f64>();
-                assert!(
-                    margin < mu && (wanted.to_num::<f64>() - 0.1).abs() < 1e-4,
-                    "{mu} {margin}"
-                );
-                slips += u32::from(reported);
-                grips += u32::from(!reported);
-            }
-        }
-        assert!(slips > 0 && grips > 0, "{slips} {grips}");
-    }
-}
+mod tests;

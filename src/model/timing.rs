@@ -8,9 +8,9 @@ use crate::units::{
     Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, Q16, Seconds, q16,
 };
 
-/// Part of the actuator's slew that the reference uses; the rest is for feedback
-/// and for a spring that moves with the climb.
-pub const SLEW_PART: Q16 = q16(850_000);
+/// Part of the actuator's slew that the reference uses. A slower actuator is waited for
+/// ([`PreloadLoop`](crate::control::preload_loop::PreloadLoop)).
+pub const SLEW_PART: Q16 = q16(980_000);
 
 /// Limits of the speed profile and of the pre-tightener.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -71,6 +71,26 @@ impl Timing {
         self.speed_change(from - to) * mean
     }
 
+    /// Largest speed up to `most` from which the profile comes to `to` within this distance,
+    /// mm/s, to 1/128 of the range.
+    pub fn fastest_into(
+        &self,
+        way: Millimetres,
+        to: MillimetresPerSecond,
+        most: MillimetresPerSecond,
+    ) -> MillimetresPerSecond {
+        let (mut low, mut high) = (to, most.max(to));
+        for _ in 0..7 {
+            let middle = (low + high).half();
+            if self.brake_way(middle, to) <= way {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        low
+    }
+
     /// Time in which the jerk reduces this acceleration to zero, s.
     pub fn until_level(&self, acceleration: MillimetresPerSecond2) -> Seconds {
         self.by_acceleration.divide(acceleration) * self.build_up
@@ -99,6 +119,19 @@ impl Timing {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn from_the_fastest_speed_the_slower_one_is_reached_in_time() {
+        let timing = Timing::try_build(&Rig::prototype()).unwrap();
+        let (slow, most) = (q16(5_000_000), q16(30_000_000));
+        for way in [0.0, 0.3, 1.0, 2.0, 5.0].map(Q16::from_num) {
+            let fast = timing.fastest_into(way, slow, most);
+            assert!(timing.brake_way(fast, slow) <= way && fast >= slow && fast <= most);
+            // A hundredth of the range faster it is not.
+            let faster = fast + q16(250_000);
+            assert!(faster > most || timing.brake_way(faster, slow) > way, "{way} {fast}");
+        }
+    }
 
     #[test]
     fn the_latency_covers_delay_and_lag() {

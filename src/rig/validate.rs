@@ -5,7 +5,7 @@ use super::Rig;
 /// Preload kept free below the limit for regulation, relative to the limit: gain of the preload
 /// sensor, and the spring's compression in a climb beyond the feed-forward. On the presets no rig
 /// within its tolerances exceeds the limit with it.
-pub(crate) const REGULATION_PART: f64 = 0.04;
+pub(crate) const REGULATION_PART: f64 = 0.045;
 
 /// Least speed of the unloaded motor over the cruise speed, for regulation.
 const TOP_SPEED_RESERVE: f64 = 1.2;

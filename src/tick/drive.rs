@@ -21,17 +21,22 @@ impl Controller {
         direction: Direction,
     ) -> Course {
         let (steps, estimate) = (self.estimator.steps(), &state.estimate);
+        let felt = self.estimator.felt(estimate);
         Course {
             direction,
-            distance: steps.distance(estimate.next_step, direction, estimate.position),
+            distance: felt.or_else(|| self.estimator.distance(estimate)),
+            felt: felt.is_some(),
             remaining: steps.remaining(direction, estimate.position),
             critical: estimate.critical(),
             ramping: state.approach.ramping,
             braking: state.approach.braking,
+            looking: state.approach.looking,
             speed: state.profile.speed(),
             acceleration: state.profile.acceleration(),
             reference: state.preload_loop.reference(),
-            preload: tick.sensed.preload_filtered,
+            preload: estimate.remembered_preload(),
+            preload_late: state.preload_loop.due() - tick.sensed.preload_filtered
+                > self.schedule.reached_within(),
         }
     }
 
@@ -42,6 +47,7 @@ impl Controller {
             preload: state.preload_loop.reference(),
             ramping: state.approach.ramping,
             braking: state.approach.braking,
+            looking: state.approach.looking,
             approaching: false,
             waiting: false,
         };
@@ -56,6 +62,7 @@ impl Controller {
         let (step, cross_speed, cross_preload) = (plan.step, plan.cross_speed, plan.cross_preload);
         state.approach.ramping = targets.ramping;
         state.approach.braking = targets.braking;
+        state.approach.looking = targets.looking;
         if !running {
             targets.speed = Q16::ZERO;
             return targets;
@@ -66,6 +73,9 @@ impl Controller {
         if state.estimate.slow_down() || step != state.estimate.next_step {
             targets.speed = targets.speed.min(cross_speed);
             targets.preload = cross_preload;
+        }
+        if let Some(speed) = state.estimate.lifting() {
+            targets.speed = targets.speed.min(speed.max(self.least_speed));
         }
         self.note_preload(state, tick, cross_preload, &targets);
         let leg = state.leg(targets.approaching);

@@ -101,7 +101,8 @@ impl Controller {
         let reached = state.planning.plan.as_ref().is_some_and(|plan| {
             let course = self.course(state, tick, direction);
             let wanted = self.schedule.targets(self.estimator.steps(), plan, &course).preload;
-            (tick.sensed.preload_filtered - wanted).abs() <= self.schedule.reached_within()
+            let enough = wanted.min(self.roll_preload) - self.schedule.reached_within();
+            tick.sensed.preload_filtered >= enough
         });
         state.condition_ticks = if reached { state.condition_ticks + 1 } else { 0 };
         if state.condition_ticks >= STANDING_TICKS {

@@ -8,6 +8,9 @@ use crate::model::{Outcome, Plan, PlanRequest};
 use crate::supervise::Mode;
 use crate::units::{Newtons, Seconds, Tick, ticks_to_seconds};
 
+/// Ticks for which the drive may wait for the preload unreported: a spring that moves with the
+/// wheel takes that long to be followed.
+const WAIT_TICKS: u32 = 100;
 /// Ticks within which the model task must answer.
 const ANSWER_TICKS: u32 = 500;
 
@@ -25,6 +28,9 @@ impl Controller {
             direction: estimate.direction,
             step: estimate.next_step,
             scale: planning.scale,
+            reserve: planning.reserve,
+            preload: tick.sensed.preload_filtered,
+            distance: self.estimator.distance(estimate).unwrap_or_default(),
             review: planning.review,
         });
     }
@@ -50,6 +56,7 @@ impl Controller {
         }
         if let Some(outcome) = plan.outcome.as_ref() {
             planning.scale = outcome.scale;
+            planning.reserve = outcome.reserve;
             if outcome.bounded {
                 tick.log(Event::Limit(Limit::AdaptationBounded));
             }
@@ -90,7 +97,7 @@ impl Controller {
         let since = approach.standing_since.unwrap_or(tick.now);
         approach.standing_since = reached.then_some(since);
         approach.waiting = if targets.waiting { approach.waiting + 1 } else { 0 };
-        if targets.waiting && !approach.wait_reported {
+        if approach.waiting > WAIT_TICKS && !approach.wait_reported {
             approach.wait_reported = true;
             tick.log(Event::Limit(Limit::PreloadWait));
         }
@@ -176,6 +183,7 @@ mod tests {
             speed: q16(1_000_000),
             preload: q16(48_000_000),
             ramping: true,
+            looking: true,
             braking: true,
             approaching: true,
             waiting: true,

@@ -27,9 +27,9 @@ impl Controller {
             state.planning.review = open.lift.map(|point| Review {
                 direction: open.direction,
                 speed: point.speed,
-                preload: point.preload,
+                preload: point.remembered,
                 tan_arm: point.tan_arm,
-                gap: open.gap,
+                gap: point.gap,
                 trusted: open.expected && plausible,
             });
         }

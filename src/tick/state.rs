@@ -41,6 +41,8 @@ pub struct State {
 pub(super) struct Approach {
     /// The preload is being raised for the step.
     pub ramping: bool,
+    /// The speed is being brought down for the window of the step.
+    pub looking: bool,
     /// The speed is being brought down for the step.
     pub braking: bool,
     /// Time since which the crossing preload is reached.
@@ -61,6 +63,8 @@ pub(super) struct Planning {
     pub asked: u32,
     /// Estimated over nominal stiffness of the tread.
     pub scale: Ratio,
+    /// Share of the reserve below the reference gap.
+    pub reserve: Ratio,
     /// The last crossing, until its review is complete.
     pub closed: Option<OpenCrossing>,
     /// The review without an answer; part of every request until then.
@@ -69,7 +73,15 @@ pub(super) struct Planning {
 
 impl Default for Planning {
     fn default() -> Self {
-        Self { plan: None, sequence: 0, asked: 0, scale: Q16::ONE, closed: None, review: None }
+        Self {
+            plan: None,
+            sequence: 0,
+            asked: 0,
+            scale: Q16::ONE,
+            reserve: Q16::ONE,
+            closed: None,
+            review: None,
+        }
     }
 }
 
@@ -130,7 +142,7 @@ impl State {
         match self.estimate.contact() {
             Contact::Both | Contact::Corner => Leg::Crossing,
             Contact::Leaving => Leg::Settle,
-            Contact::Wall if approaching || self.estimate.is_late() => Leg::Approach,
+            Contact::Wall if approaching || self.estimate.slow_down() => Leg::Approach,
             Contact::Wall => Leg::Cruise,
         }
     }

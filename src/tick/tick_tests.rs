@@ -111,6 +111,7 @@ fn only_on_a_corner_the_climb_limits_the_speed() {
             speed: fast,
             preload: Q16::ZERO,
             ramping: false,
+            looking: true,
             braking: false,
             approaching: false,
             waiting: false,

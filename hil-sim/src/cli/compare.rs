@@ -13,7 +13,8 @@ use crate::table::{number, plain};
 /// Compares four preload strategies on the same random rigs: scheduled, constant at cruise,
 /// constant at the limit, reactive; and the oracle, the best run that the plants allow.
 ///
-/// Every strategy has the same planner with the same braking and friction check. The reserve below the reference gap of each is tuned until its worst gap over all rigs is
+/// Every strategy rolls while the preload builds, brakes late and has the same friction check.
+/// The reserve below the reference gap of each is tuned until its worst gap over all rigs is
 /// the reference; then the times are comparable. The oracle knows each plant in advance and
 /// has the same actuators; it keeps the worst gap and the least slip margin of the scheduled
 /// run on that plant.

@@ -15,6 +15,7 @@ use super::scenario::ScenarioArgs;
 use crate::fit_range::{Asked, FitRange};
 use crate::plant::balance::Axial;
 use crate::plant::crossing::{CrossingCase, cross};
+use crate::plant::mismatch::Mismatch;
 use crate::plant::ring::RingParameters;
 use crate::progress;
 use crate::table::{number, plain};
@@ -26,6 +27,9 @@ const MAX_PRELOAD_N: f64 = 1000.0;
 /// Elements of the ring and stride, mm: the gap is within 0.1 % of that at half the stride
 /// and twice the elements.
 const FINENESS: (usize, f64) = (5760, 0.005);
+/// The same where elements are coupled: the gap is within 0.1 % of that at half the stride and
+/// twice the elements.
+const FINENESS_COUPLED: (usize, f64) = (1440, 0.02);
 /// Gap from an end of the model within which it is at that end, mm.
 const NEAR_END_MM: f64 = 1e-7;
 
@@ -158,7 +162,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let figures = {
         let _progress = progress::spinner("crossing");
         match args.method {
-            Method::Ring => ring(&scenario.rig, &case)?,
+            Method::Ring => ring(&scenario.rig, &scenario.mismatch, &case)?,
             Method::Reduced => reduced(&scenario.rig, &case),
             Method::Fixed => fixed(&scenario.rig, &case)?,
         }
@@ -238,10 +242,11 @@ fn outside(rig: &Rig, case: &CrossingSetup, figures: &Figures) -> Vec<String> {
 }
 
 /// The ring with memory, as the plant has it.
-fn ring(rig: &Rig, case: &CrossingSetup) -> Result<Figures, Failure> {
-    let (elements, stride_mm) = FINENESS;
+fn ring(rig: &Rig, mismatch: &Mismatch, case: &CrossingSetup) -> Result<Figures, Failure> {
+    let coupled = mismatch.tread_thickness_mm > 0.0;
+    let (elements, stride_mm) = if coupled { FINENESS_COUPLED } else { FINENESS };
     let result = cross(&CrossingCase {
-        ring: RingParameters::of(rig, elements),
+        ring: RingParameters::of(rig, elements).with_mismatch(mismatch),
         step_height_mm: rig.rig.step_height_mm,
         speed_mm_s: case.speed_mm_s * f64::from(case.direction.sign()),
         preload_n: case.preload_n,

@@ -10,6 +10,9 @@ use crate::table::{number, plain};
 
 /// Runs many random rigs, each drawn from its own seed, and shows what limits them.
 ///
+/// Each draws what `spread.*` states; with --wide also what the controller is not told, all of
+/// `mismatch.*` within the wide ranges that `rig keys` lists.
+///
 /// The outcome depends on the seeds alone, not on the number of processors. The exit
 /// code is 1 if a run does not complete.
 #[derive(Debug, clap::Args)]
@@ -56,7 +59,7 @@ pub(super) fn campaign(
     let seeds = shard.seeds(scenario.run.seed, count);
     let bar = progress::bar("runs", seeds.len() as u64);
     let lines = montecarlo::run(scenario, &seeds, &|| bar.advance(1))?;
-    Ok(montecarlo::Outcome::of(&lines))
+    Ok(montecarlo::Outcome::of(&lines).drawn_from(scenario, &seeds))
 }
 
 pub(super) fn human(outcome: &montecarlo::Outcome) -> String {
@@ -68,6 +71,18 @@ pub(super) fn human(outcome: &montecarlo::Outcome) -> String {
     if !outcome.incomplete.is_empty() {
         let seeds: Vec<String> = outcome.incomplete.iter().map(u64::to_string).collect();
         text += &format!("  incomplete: seeds {}\n", seeds.join(", "));
+    }
+    if !outcome.silent.is_empty() {
+        let seeds: Vec<String> = outcome.silent.iter().map(u64::to_string).collect();
+        text += &format!("  of these without a word: seeds {}\n", seeds.join(", "));
+    }
+    if !outcome.drawn.is_empty() {
+        let rows = outcome
+            .drawn
+            .iter()
+            .map(|drawn| vec![drawn.key.clone(), number(drawn.least, 3), number(drawn.most, 3)]);
+        text += "What the controller is not told, beside the spread of the rigs\n";
+        text += &format!("{}\n", plain(&["", "least", "most"], rows));
     }
     text += "What limits it\n";
     for limit in &outcome.limits {
@@ -91,24 +106,35 @@ fn figures(outcome: &montecarlo::Outcome) -> comfy_table::Table {
     let seed = |seed: Option<u64>| seed.map_or_else(dash, |seed| seed.to_string());
     let spread = |name: &str, figure: Option<Quantiles>, decimals| {
         let number = |pick: fn(Quantiles) -> f64| number(figure.map(pick), decimals);
-        let quantiles = [number(|f| f.p50), number(|f| f.p95), number(|f| f.max)];
+        let quantiles =
+            [number(|f| f.p50), number(|f| f.p95), number(|f| f.p99), number(|f| f.max)];
         let seed = seed(figure.map(|f| f.seed));
         [vec![name.to_owned()], quantiles.to_vec(), vec![seed]].concat()
     };
     let least = |name: &str, figure: Option<Least>| {
         let worst = number(figure.map(|f| f.min), 3);
-        vec![name.to_owned(), dash(), dash(), worst, seed(figure.map(|f| f.seed))]
+        vec![name.to_owned(), dash(), dash(), dash(), worst, seed(figure.map(|f| f.seed))]
     };
     let gap = number(outcome.worst_gap_mm, 3);
+    let found = outcome
+        .steps_found
+        .iter()
+        .map(|step| spread(&format!("step {} found off by, mm", step.index), Some(step.off_mm), 3));
+    let head = ["", "median", "95 %", "99 %", "worst", "its seed"];
     plain(
-        &["", "median", "95 %", "worst", "its seed"],
+        &head,
         [
             spread("from the command, s", outcome.duration_s, 2),
             spread("moving, s", outcome.moving_s, 2),
             spread("gap over reference", outcome.gap_over_ref, 3),
-            vec!["gap, mm".to_owned(), dash(), dash(), gap, seed(outcome.worst_gap_seed)],
+            spread("  at the first step", outcome.first_gap_over_ref, 3),
+            spread("  at the later ones", outcome.later_gap_over_ref, 3),
+            vec!["gap, mm".to_owned(), dash(), dash(), dash(), gap, seed(outcome.worst_gap_seed)],
             least("lead time, s", outcome.lead_time_s),
             least("slip margin", outcome.slip_margin),
-        ],
+            spread("off the commanded end, mm", outcome.end_off_mm, 3),
+        ]
+        .into_iter()
+        .chain(found),
     )
 }

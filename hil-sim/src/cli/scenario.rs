@@ -59,6 +59,11 @@ pub struct RunArgs {
     #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(ControllerKind::NAMES))]
     controller: Option<String>,
 
+    /// Draws by the seed, too, what the controller is not told: all of `mismatch.*` within
+    /// its wide range.
+    #[arg(long)]
+    wide: bool,
+
     /// Seed of plant and noise; 0, the default, is the nominal plant.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
@@ -70,6 +75,9 @@ impl RunArgs {
         let mut sets = Vec::new();
         if self.retract {
             sets.push("run.direction=retract".to_owned());
+        }
+        if self.wide {
+            sets.push("run.mismatch=wide".to_owned());
         }
         if let Some(controller) = &self.controller {
             sets.push(format!("run.controller={controller}"));
@@ -84,7 +92,7 @@ impl RunArgs {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scenario::Direction;
+    use crate::scenario::{Direction, MismatchDraw};
 
     #[test]
     fn options_override_what_was_set() {
@@ -95,6 +103,7 @@ mod tests {
                 ..ScenarioArgs::default()
             },
             retract: true,
+            wide: true,
             controller: Some("limit".into()),
             seed: Some(5),
         };
@@ -104,5 +113,6 @@ mod tests {
         assert_eq!(scenario.run.seed, 5);
         assert_eq!(scenario.run.direction, Direction::Retract);
         assert_eq!(scenario.run.controller, ControllerKind::Limit);
+        assert_eq!(scenario.run.mismatch, MismatchDraw::Wide);
     }
 }

@@ -166,7 +166,7 @@ impl Coordinates {
             elastic_creep: x[CREEP].exp(),
             load_n: x[LOAD].exp(),
             spring_n_per_mm: 0.0,
-            modes_hz: Vec::new(),
+            modes: Vec::new(),
             ..self.nominal.clone()
         }
     }

@@ -2,15 +2,18 @@
 
 use serde::Serialize;
 
-use super::{RunLine, limit_text};
+use super::{Drawn, RunLine, drawn, limit_text};
+use crate::scenario::Scenario;
 
-/// Median, 95th percentile and maximum of a figure over the runs that have it.
+/// Median, 95th and 99th percentile and maximum of a figure over the runs that have it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Quantiles {
     /// Median.
     pub p50: f64,
     /// 95th percentile.
     pub p95: f64,
+    /// 99th percentile.
+    pub p99: f64,
     /// Largest.
     pub max: f64,
     /// Seed of the largest; the lowest of several.
@@ -48,6 +51,18 @@ pub struct LimitCount {
     pub runs: usize,
 }
 
+/// How far from the true face of a step the controller recorded it, mm.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct StepFound {
+    /// Step number, from 1.
+    pub index: u8,
+    /// Runs in which it was found.
+    pub runs: usize,
+    /// Distance, mm.
+    #[serde(flatten)]
+    pub off_mm: Quantiles,
+}
+
 /// A campaign; `rig montecarlo --json` prints it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Outcome {
@@ -65,18 +80,30 @@ pub struct Outcome {
     pub faults: Vec<SeedReport>,
     /// Seeds of the runs that did not complete.
     pub incomplete: Vec<u64>,
+    /// Seeds of those of them that no fault and no limit reports.
+    pub silent: Vec<u64>,
     /// Duration of the completed runs from the accepted command to arrival, s.
     pub duration_s: Option<Quantiles>,
     /// Part of it in which the wheel moved, s.
     pub moving_s: Option<Quantiles>,
     /// Worst gap of each run over the reference.
     pub gap_over_ref: Option<Quantiles>,
+    /// Gap of the first crossing over the reference.
+    pub first_gap_over_ref: Option<Quantiles>,
+    /// Worst gap of the crossings after it over the reference.
+    pub later_gap_over_ref: Option<Quantiles>,
+    /// Distance from the commanded end of the runs that the controller calls complete, mm.
+    pub end_off_mm: Option<Quantiles>,
+    /// Distances with which the steps were found.
+    pub steps_found: Vec<StepFound>,
     /// Least time by which the preload was reached before a corner touched, s.
     pub lead_time_s: Option<Least>,
     /// Least of the plant's friction less its utilisation.
     pub slip_margin: Option<Least>,
     /// Limits that occurred, by code.
     pub limits: Vec<LimitCount>,
+    /// What the runs have and the controller is not told.
+    pub drawn: Vec<Drawn>,
 }
 
 impl Outcome {
@@ -96,13 +123,25 @@ impl Outcome {
             slip_events: lines.iter().map(|line| line.slip_events).sum(),
             faults: lines.iter().flat_map(faults).collect(),
             incomplete: lines.iter().filter(|line| !line.completed).map(|l| l.seed).collect(),
+            silent: lines.iter().filter(|line| line.silent).map(|line| line.seed).collect(),
             duration_s: quantiles(figure(&|line| line.duration_s.filter(|_| line.completed))),
             moving_s: quantiles(figure(&|line| line.completed.then_some(line.moving_s))),
             gap_over_ref: quantiles(figure(&|line| line.gap_over_ref)),
+            first_gap_over_ref: quantiles(figure(&|line| line.first_gap_over_ref)),
+            later_gap_over_ref: quantiles(figure(&|line| line.later_gap_over_ref)),
+            end_off_mm: quantiles(figure(&|line| line.end_off_mm)),
+            steps_found: steps_found(lines),
             lead_time_s: least(figure(&|line| line.least_lead_s)),
             slip_margin: least(figure(&|line| line.least_slip_margin)),
             limits: limits(lines),
+            drawn: Vec::new(),
         }
+    }
+
+    /// The same with what these seeds of the scenario draw.
+    #[must_use]
+    pub fn drawn_from(self, scenario: &Scenario, seeds: &[u64]) -> Self {
+        Self { drawn: drawn::mismatch(scenario, seeds), ..self }
     }
 }
 
@@ -116,6 +155,22 @@ fn faults(line: &RunLine) -> impl Iterator<Item = SeedReport> {
     let failed =
         line.error.iter().map(move |text| SeedReport { seed, code: None, text: text.clone() });
     reported.chain(failed)
+}
+
+fn steps_found(lines: &[RunLine]) -> Vec<StepFound> {
+    let all = || lines.iter().flat_map(|line| &line.found_off_mm);
+    let most = all().map(|found| found.0).max().unwrap_or(0);
+    (1..=most)
+        .filter_map(|index| {
+            let of = |line: &RunLine| {
+                let found = line.found_off_mm.iter().find(|found| found.0 == index)?;
+                Some((found.1, line.seed))
+            };
+            let figures: Vec<(f64, u64)> = lines.iter().filter_map(of).collect();
+            let runs = figures.len();
+            Some(StepFound { index, runs, off_mm: quantiles(figures)? })
+        })
+        .collect()
 }
 
 fn limits(lines: &[RunLine]) -> Vec<LimitCount> {
@@ -132,7 +187,7 @@ fn quantiles(mut figures: Vec<(f64, u64)>) -> Option<Quantiles> {
     figures.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)));
     let (max, seed) = *figures.last()?;
     let at = |percent: usize| figures[(figures.len() * percent).div_ceil(100) - 1].0;
-    Some(Quantiles { p50: at(50), p95: at(95), max, seed })
+    Some(Quantiles { p50: at(50), p95: at(95), p99: at(99), max, seed })
 }
 
 fn least(figures: Vec<(f64, u64)>) -> Option<Least> {
@@ -180,6 +235,7 @@ mod tests {
         assert_eq!((outcome.runs, outcome.completed, outcome.slip_events), (3, 1, 2));
         assert_eq!((outcome.worst_gap_mm, outcome.worst_gap_seed), (Some(2.0), Some(1)));
         assert_eq!(outcome.incomplete, [2, 3]);
+        assert!(outcome.silent.is_empty());
         let codes: Vec<_> = outcome.faults.iter().map(|f| (f.seed, f.code)).collect();
         assert_eq!(codes, [(2, Some(121)), (3, None)]);
         let limits: Vec<_> = outcome.limits.iter().map(|l| (l.code, l.runs)).collect();
@@ -187,6 +243,20 @@ mod tests {
         let longest = [outcome.duration_s, outcome.moving_s].map(|times| times.map(|d| d.max));
         assert_eq!(longest, [Some(5.0), Some(4.0)]);
         assert_eq!(outcome.lead_time_s, None);
+    }
+
+    #[test]
+    fn steps_are_judged_each_by_the_runs_that_found_it() {
+        let of = |seed, found: &[(u8, f64)]| RunLine {
+            found_off_mm: found.to_vec(),
+            silent: seed == 2,
+            ..line(seed, 1.0)
+        };
+        let outcome = Outcome::of(&[of(1, &[(1, 0.2), (3, 0.1)]), of(2, &[(1, 0.4)])]);
+        let found = outcome.steps_found;
+        assert_eq!(found.iter().map(|s| (s.index, s.runs)).collect::<Vec<_>>(), [(1, 2), (3, 1)]);
+        assert_eq!((found[0].off_mm.p50, found[0].off_mm.max, found[0].off_mm.seed), (0.2, 0.4, 2));
+        assert_eq!(outcome.silent, [2]);
     }
 
     #[test]

@@ -237,6 +237,8 @@ mod tests {
             k_0: 0.6044 * 4.2235,
             tau_s: 0.1059,
             elements: 1440,
+            tread_thickness_mm: 0.0,
+            second_relaxation: 1.0,
         });
         let wall = Wall::new(vec![Step { position_mm: 13.0, height_mm: 4.0 }]).local(0.0);
         (ring, Motion { wall, height_mm: 24.8, turn_rad: 0.0, dt_s: 0.2 })

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::actuators::DriveMotor;
-use super::arm::Arm;
+use super::arm::{Arm, ModeParameters};
 use super::ring::RingParameters;
 use super::spread::{Noise, Spread};
 use super::wall::{Step, Wall};
@@ -37,11 +37,8 @@ pub struct PlantParameters {
     pub mu: f64,
     /// Creepage at 63 % of friction.
     pub elastic_creep: f64,
-    /// Whether a climb slows the carriage: around a corner the tread runs a longer way
-    /// than the axle, half a millimetre a step. Without it both run alike, as the
-    /// definition of a crossing has it, and a lossless climb gives 3 % more work than
-    /// the motor puts in.
-    pub climb_slows: bool,
+    /// Part of the compression by which the rolling radius is less than the undeformed one.
+    pub rolling_compression: f64,
     /// Axial load on this wheel, N.
     pub load_n: f64,
     /// Moved mass, kg.
@@ -58,10 +55,21 @@ pub struct PlantParameters {
     pub delay_s: f64,
     /// Largest force of the screw's position, N.
     pub seat_max_n: f64,
-    /// Modes of the arm, Hz.
-    pub modes_hz: Vec<f64>,
+    /// Modes of the arm.
+    pub modes: Vec<ModeParameters>,
     /// Torque ripple: amplitude, N, and its pitch at the tread, mm.
     pub ripple: (f64, f64),
+    /// Distance of the axis of rotation from the axis of the rim, mm.
+    pub run_out_mm: f64,
+    /// Play of the drive, mm at the tread.
+    pub backlash_mm: f64,
+    /// Coulomb friction in the arm's pivot, N at the wheel.
+    pub pivot_friction_n: f64,
+    /// What the compression sensor measures: from 0, the deepest point, to 1, the mean depth
+    /// of the patch that carries.
+    pub compression_patch: f64,
+    /// Compliance of its mounting, mm/N.
+    pub compression_compliance_mm_per_n: f64,
     /// Sensors as calibrated and as they are.
     pub sensors: SensorParameters,
 }
@@ -168,6 +176,8 @@ impl PlantParameters {
                 k_0: k_inf * stiffening,
                 tau_s,
                 elements: ELEMENTS,
+                tread_thickness_mm: 0.0,
+                second_relaxation: 1.0,
             },
             wall: Wall::new(steps),
             arm: Arm {
@@ -179,7 +189,7 @@ impl PlantParameters {
             stops_mm: (-STOP_ROOM_MM, rig.rig.travel_mm + STOP_ROOM_MM),
             mu,
             elastic_creep: rig.plant.elastic_creep,
-            climb_slows: false,
+            rolling_compression: 1.0 / 3.0,
             load_n: load,
             mass_kg: rig.plant.moved_mass_kg,
             drive: DriveMotor {
@@ -194,8 +204,13 @@ impl PlantParameters {
             lag_s,
             delay_s,
             seat_max_n: 1.25 * rig.preload.limit_n,
-            modes_hz: rig.drive.modes_hz.to_vec(),
+            modes: rig.drive.modes_hz.iter().map(|&hz| ModeParameters::at(hz)).collect(),
             ripple: (0.006 * rig.drive.force_limit_n, rig.drive.ripple_pitch_mm),
+            run_out_mm: 0.0,
+            backlash_mm: 0.0,
+            pivot_friction_n: 0.0,
+            compression_patch: 0.0,
+            compression_compliance_mm_per_n: 0.0,
             sensors: SensorParameters {
                 counts_per_turn: rig.sense.encoder_counts,
                 preload_full_scale_n: rig.sense.preload_full_scale_n,

@@ -13,6 +13,11 @@ pub const DEEPEST: f64 = 0.4;
 /// radius: from there the face leans on the wheel at the height of its axle.
 pub const HIGHEST: f64 = 0.85;
 
+/// Deepest that a corner may be pressed into a tread of coupled elements, parts of its
+/// thickness: small strains end there. The depth is that of independent elements, a seventh
+/// more than coupled ones give way.
+pub const CRUSHED: f64 = 0.65;
+
 /// A combination of parameters that cannot be computed, because it cannot be.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Refusal {
@@ -27,6 +32,20 @@ pub enum Refusal {
         k_inf_pa_per_m: f64,
         /// Depth, mm.
         depth_mm: f64,
+        /// Largest depth, mm.
+        most_mm: f64,
+    },
+    /// Preload on a corner of a thin tread.
+    #[error(
+        "preload.limit_n, with the load through the arm {force_n:.1} N, presses a corner {depth_mm:.1} mm deep into mismatch.tread_thickness_mm = {thickness_mm:.1}: at most {most_mm:.1} mm"
+    )]
+    Crushes {
+        /// Radial force, N.
+        force_n: f64,
+        /// Depth, mm.
+        depth_mm: f64,
+        /// Thickness of the tread, mm.
+        thickness_mm: f64,
         /// Largest depth, mm.
         most_mm: f64,
     },
@@ -70,6 +89,7 @@ impl Refusal {
     pub const fn name(&self) -> &'static str {
         match self {
             Self::Sinks { .. } => "preload sinks the wheel",
+            Self::Crushes { .. } => "preload crushes the tread",
             Self::Digs { .. } => "braked wheel digs itself in",
             Self::Towers { .. } => "corner as high as the hub",
         }
@@ -96,6 +116,11 @@ impl PlantParameters {
         let depth_mm = corner_depth(self, force_n);
         if depth_mm > most_mm || depth_mm.is_nan() {
             return Err(Refusal::Sinks { force_n, k_inf_pa_per_m, depth_mm, most_mm });
+        }
+        let thickness_mm = self.ring.tread_thickness_mm;
+        let most_mm = CRUSHED * thickness_mm;
+        if self.ring.is_coupled() && depth_mm > most_mm {
+            return Err(Refusal::Crushes { force_n, depth_mm, thickness_mm, most_mm });
         }
         let step_mm = self.wall.steps().iter().fold(0.0f64, |most, s| most.max(s.height_mm));
         let most_mm = HIGHEST * radius_mm;
@@ -174,6 +199,11 @@ mod tests {
         assert!(matches!(high.check(5.0), Err(Refusal::Digs { .. })));
         high.mass_kg = 0.1;
         assert_eq!(high.check(5.0), Ok(()));
+        let mut thin = nominal();
+        thin.ring.tread_thickness_mm = 5.0;
+        assert_eq!(thin.check(150.0), Ok(()));
+        let refusal = thin.check(190.0).unwrap_err();
+        assert!(refusal.to_string().contains("mismatch.tread_thickness_mm = 5.0"), "{refusal}");
         // The load presses too, through a trailing arm.
         let mut heavy = nominal();
         heavy.ring.k_inf = 0.02;

@@ -1,5 +1,6 @@
 //! The complete rig, a millisecond at a time.
 
+mod booking;
 mod contact;
 mod intervention;
 mod phases;
@@ -11,7 +12,9 @@ use super::actuators::Pretightener;
 use super::arm::{Mode, Ripple};
 use super::balance::BalanceError;
 use super::draw::PlantParameters;
+use super::energy::Energy;
 use super::ledger::Ledger;
+use super::play::{Pivot, Play};
 use super::ring::Ring;
 use super::rolling::{self, Steady};
 use contact::SettleTimer;
@@ -93,6 +96,8 @@ pub struct Truth {
     pub arm_rad: f64,
     /// Largest tread depth, mm.
     pub depth_mm: f64,
+    /// What the compression sensor looks at, mm.
+    pub compression_mm: f64,
     /// Force of corner and face, N.
     pub corner_n: f64,
     /// Force of the wall under the wheel, N.
@@ -155,13 +160,23 @@ pub struct VirtualRig {
     awake: bool,
     settle_timer: SettleTimer,
     preload: Pretightener,
+    pivot: Pivot,
+    play: Play,
     modes: Vec<Mode>,
     /// Sine and cosine of the ripple's phase.
     ripple_phase: (f64, f64),
     /// Elastic force of the modes, their mean, N.
     vibration_n: f64,
+    /// Force of the contact on the modes, N.
+    excitation_n: f64,
     truth: Truth,
     ledger: Ledger,
+    energy: Energy,
+    /// What the ring's elements had taken up at the end of the last stride, mJ.
+    taken_mj: f64,
+    /// Load on the tread by what the elements take up beyond the work of the contact's
+    /// resultants, N, signed as its motion.
+    inner_load_n: f64,
     /// Sliding bodily over the wall.
     sliding: bool,
     /// Held by the stop or latch that carries the load until the drive first turns.
@@ -200,8 +215,17 @@ impl VirtualRig {
     pub fn new(parameters: PlantParameters, position_mm: f64, preload_n: f64, dt_s: f64) -> Self {
         let local = parameters.wall.local(position_mm);
         let radius = parameters.ring.radius_mm;
-        let rest = rolling::solve(&parameters.ring, 0.0, radius - 0.1, |c| c.cosine_n - preload_n);
-        let rise = local.base_mm + rest.height_mm - radius;
+        let guess_mm = radius - 0.1;
+        let rest = rolling::solve(&parameters.ring, 0.0, guess_mm, |c| c.cosine_n - preload_n);
+        let mut ring = Ring::new(parameters.ring);
+        // Coupled elements have no closed form of steady rolling: they are always resolved.
+        let coupled = parameters.ring.is_coupled();
+        let at_rest = if coupled { ring.rest(local, guess_mm, preload_n).ok() } else { None };
+        let (height_mm, forces) = at_rest
+            .map_or((rest.height_mm, (rest.normal_n, rest.cosine_n, 0.0)), |solved| {
+                (solved.height_mm, (solved.contact.normal_n, solved.contact.cosine_n, 0.0))
+            });
+        let rise = local.base_mm + height_mm - radius;
         let seat = preload_n - parameters.spring_n_per_mm * rise;
         let range = (
             -parameters.spring_n_per_mm * parameters.wall.steps().len() as f64 * 5.0,
@@ -215,13 +239,14 @@ impl VirtualRig {
             seat,
             range,
         );
-        let modes = parameters.modes_hz.iter().map(|&hz| Mode::new(hz, 0.02, 0.2)).collect();
+        let modes = parameters.modes.iter().map(|&mode| Mode::new(mode)).collect();
         let mut rig = Self {
             resolution: Resolution::default(),
-            ring: Ring::new(parameters.ring),
+            taken_mj: ring.taken_mj(),
+            ring,
             steady: Steady::default(),
             ledger: Ledger::new(parameters.wall.steps().to_vec(), radius),
-            awake: false,
+            awake: coupled,
             settle_timer: SettleTimer {
                 tread_mm_s: 0.0,
                 pressing_n: preload_n,
@@ -231,20 +256,25 @@ impl VirtualRig {
             modes,
             ripple_phase: (0.0, 1.0),
             vibration_n: 0.0,
+            excitation_n: 0.0,
+            pivot: Pivot::new(parameters.pivot_friction_n),
+            play: Play::new(parameters.backlash_mm),
             truth: Truth {
                 position_mm,
-                height_mm: local.base_mm + rest.height_mm,
-                depth_mm: radius - rest.height_mm,
+                height_mm: local.base_mm + height_mm,
+                depth_mm: radius - height_mm,
                 friction: parameters.mu,
                 ..Truth::default()
             },
+            energy: Energy::default(),
+            inner_load_n: 0.0,
             sliding: false,
             latched: true,
             rolled_mm_s: 0.0,
             base_mm: local.base_mm,
             phases: Default::default(),
             phase: Phase::Smooth,
-            forces: (rest.normal_n, rest.cosine_n, 0.0),
+            forces,
             way_residual_mm: (0.0, 0.0),
             tread_load_n: 0.0,
             thrust_n: parameters.load_n,
@@ -282,6 +312,12 @@ impl VirtualRig {
     pub fn visiting_all(mut self) -> Self {
         self.ring = self.ring.visiting_all();
         self
+    }
+
+    /// Where the drive's work has gone.
+    #[must_use]
+    pub fn energy(&self) -> &Energy {
+        &self.energy
     }
 
     /// What is true now.
@@ -373,11 +409,12 @@ impl VirtualRig {
         }
         self.truth.position_mm = stride.position_mm;
         self.truth.rotation_rad += stride.turn_rad;
-        let local = self.parameters.wall.local(stride.position_mm);
+        let local = self.parameters.wall.local(stride.position_mm + self.eccentric().0);
         let settled = self.settled(&local, dt_s);
-        let awake = self.resolution.always_awake || !settled;
+        let coupled = self.parameters.ring.is_coupled();
+        let awake = self.resolution.always_awake || coupled || !settled;
         if awake && !self.awake {
-            self.wake(truth.position_mm);
+            self.wake(truth.position_mm + self.eccentric().0);
         }
         self.awake = awake;
         let done = if awake {
@@ -385,14 +422,44 @@ impl VirtualRig {
         } else {
             self.roll_steadily(&local, stride, finer)?
         };
-        if !done {
+        if done {
+            self.book(&truth, drives, &stride);
+        } else {
             (self.truth, self.settle_timer, self.latched) = (truth, settle_timer, latched);
         }
         Ok(done)
     }
 
-    /// Modes of the arm, forced by the torque ripple of motor and gearbox.
+    /// Where the rim's axis is from the axis of rotation, mm: ahead of it and above it.
+    fn eccentric(&self) -> (f64, f64) {
+        let out = self.parameters.run_out_mm;
+        if out == 0.0 {
+            return (0.0, 0.0);
+        }
+        let (sin, cos) = self.truth.rotation_rad.sin_cos();
+        (out * sin, out * cos)
+    }
+
+    /// Force of the contact on the arm's modes, N: what the tread has to push with against load
+    /// and step, by the torque that the motor on the arm holds against it. By the direction of
+    /// the contact's force, so that neither the modes' own force nor the carriage's inertia,
+    /// which both follow a tick late, drives them.
+    fn excitation_n(&self) -> f64 {
+        let (_, cosine, sine) = self.forces;
+        if cosine <= 0.0 {
+            return 0.0;
+        }
+        let (leans, load) = (sine / cosine, self.parameters.load_n);
+        let pressed = self.preload_now() + self.thrust_ratio() * self.thrust_n;
+        let carried = ((pressed - load * leans) / (1.0 + leans * leans)).max(0.0);
+        (load + leans * carried).min(self.parameters.mu * carried)
+    }
+
+    /// Modes of the arm, forced by the torque ripple of motor and gearbox and by the load that
+    /// the contact puts on the drive.
     fn vibrate(&mut self, dt_s: f64) {
+        let load_n = self.excitation_n();
+        let load = (std::mem::replace(&mut self.excitation_n, load_n), load_n);
         let (amplitude, pitch) = self.parameters.ripple;
         let spin = self.truth.tread_mm_s;
         let tread = self.truth.rotation_rad * self.parameters.ring.radius_mm;
@@ -405,7 +472,7 @@ impl VirtualRig {
         };
         let (mut deflection, mut sum) = (0.0, 0.0);
         for mode in &mut self.modes {
-            mode.step(&force, dt_s);
+            mode.step(&force, load, dt_s);
             deflection += mode.deflection_mm();
             sum += mode.force_n();
         }
@@ -415,20 +482,40 @@ impl VirtualRig {
 
     /// Preload of spring and screw at the present height.
     fn preload_now(&self) -> f64 {
-        let rise = self.truth.height_mm - self.parameters.ring.radius_mm;
+        let rise = self.truth.height_mm - self.eccentric().1 - self.parameters.ring.radius_mm;
         (self.preload.seat_n() + self.parameters.spring_n_per_mm * rise).max(0.0)
     }
 
     /// What follows from the state.
     fn derive(&mut self) {
+        let (ahead, above) = self.eccentric();
+        let compression_mm = self.compression_mm();
         let truth = &mut self.truth;
-        truth.radius_mm = self.parameters.wall_radius_mm - truth.height_mm;
+        truth.compression_mm = compression_mm;
+        truth.radius_mm = self.parameters.wall_radius_mm - (truth.height_mm - above);
         truth.arm_rad = self.parameters.arm.angle(truth.radius_mm);
         let radius = self.parameters.ring.radius_mm;
-        let local = self.parameters.wall.local(truth.position_mm);
+        let local = self.parameters.wall.local(truth.position_mm + ahead);
+        let base_mm = local.base_mm + local.root_mm;
         truth.root_clearance_mm = (local.ahead_mm < radius)
-            .then(|| away(local.ahead_mm, truth.height_mm - local.base_mm) - radius);
+            .then(|| away(local.ahead_mm, truth.height_mm - base_mm) - radius);
         self.truth.preload_n = self.preload_now();
+    }
+
+    /// What the compression sensor looks at, mm.
+    fn compression_mm(&self) -> f64 {
+        let (p, truth) = (&self.parameters, &self.truth);
+        let mut depth = truth.depth_mm;
+        if p.compression_patch > 0.0 {
+            let carrying = if truth.ring_awake {
+                self.ring.carrying_mm()
+            } else {
+                let height = truth.height_mm - self.base_mm;
+                rolling::carrying_mm(&p.ring, height, self.rolled_mm_s)
+            };
+            depth += p.compression_patch * (carrying - depth);
+        }
+        depth + p.compression_compliance_mm_per_n * truth.preload_n
     }
 
     fn check(&self) -> Result<(), PlantError> {

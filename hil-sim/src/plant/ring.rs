@@ -5,10 +5,16 @@
 //! p >= 0: the three-parameter solid per area. Elements turn with the wheel.
 //! Within a step delta runs linearly, and q is integrated exactly for it.
 //!
+//! With `tread_thickness_mm` the elements are coupled as a layer of incompressible rubber
+//! couples them (`coupled`); with `second_relaxation` the rubber relaxes twice (`law`).
+//!
 //! Only elements that can touch are visited (`window`), four at a time (`sweep`). The
 //! memory of the others is brought up to date in closed form when they come back.
 
+mod complementarity;
+mod coupled;
 mod law;
+mod layer;
 mod sweep;
 mod window;
 
@@ -16,7 +22,9 @@ use std::f64::consts::TAU;
 
 use interstage::rig::Rig;
 
+use super::balance::{Axial, Balance, BalanceError, Solved};
 use super::wall::LocalWall;
+use coupled::Coupled;
 use law::Law;
 use sweep::{Block, Lanes, Place, Sums};
 use window::{LANES, WIDEST, Window};
@@ -36,6 +44,11 @@ pub struct RingParameters {
     pub tau_s: f64,
     /// Elements around the ring.
     pub elements: usize,
+    /// Thickness of the tread, a layer of incompressible rubber bonded to the hub, mm;
+    /// 0: independent elements, of no thickness.
+    pub tread_thickness_mm: f64,
+    /// Spread s of two relaxations of equal share, at `tau_s / s` and `tau_s s`; 1: one.
+    pub second_relaxation: f64,
 }
 
 impl RingParameters {
@@ -51,7 +64,27 @@ impl RingParameters {
             k_0: k_inf * rig.tread.stiffening,
             tau_s: rig.tread.tau_s,
             elements,
+            tread_thickness_mm: 0.0,
+            second_relaxation: 1.0,
         }
+    }
+
+    /// Whether the elements are coupled.
+    #[must_use]
+    pub fn is_coupled(&self) -> bool {
+        self.tread_thickness_mm > 0.0
+    }
+
+    /// Whether the rubber relaxes twice.
+    #[must_use]
+    pub fn relaxes_twice(&self) -> bool {
+        self.second_relaxation > 1.0
+    }
+
+    /// Relaxation times, the faster one first, s.
+    #[must_use]
+    pub fn relaxations_s(&self) -> [f64; 2] {
+        [self.tau_s / self.second_relaxation, self.tau_s * self.second_relaxation]
     }
 }
 
@@ -137,6 +170,8 @@ pub struct Ring {
     /// Internal displacement and depth, mm.
     q: Vec<Lanes>,
     depth: Vec<Lanes>,
+    /// Internal displacement of the slower relaxation, mm, if there are two.
+    slow: Vec<Lanes>,
     /// When a block that is not active was last brought up to date, s.
     at: Vec<f64>,
     /// Blocks that are up to date.
@@ -149,6 +184,10 @@ pub struct Ring {
     ready: Ready,
     visit_all: bool,
     work: Work,
+    /// Work on the elements, mJ.
+    taken_mj: f64,
+    /// In place of all of the above elements where they are coupled.
+    coupled: Option<Box<Coupled>>,
 }
 
 /// The step that the blocks are laid out for.
@@ -179,6 +218,9 @@ pub struct Motion {
     pub dt_s: f64,
 }
 
+/// A step so long that all memory has caught up, s.
+const FOREVER_S: f64 = 1e9;
+
 /// How far below the height asked for the window still holds, per radius.
 const SLACK: f64 = 5e-4;
 
@@ -203,6 +245,7 @@ impl Ring {
             cos: lanes(f64::cos),
             q: vec![Lanes::ZERO; blocks],
             depth: vec![Lanes::ZERO; blocks],
+            slow: vec![Lanes::ZERO; if parameters.relaxes_twice() { blocks } else { 0 }],
             at: vec![0.0; blocks],
             active: Window::default(),
             rotation: 0.0,
@@ -211,6 +254,8 @@ impl Ring {
             ready: Ready::default(),
             visit_all: false,
             work: Work::default(),
+            taken_mj: 0.0,
+            coupled: parameters.is_coupled().then(|| Box::new(Coupled::new(&parameters))),
             parameters,
         }
     }
@@ -221,6 +266,12 @@ impl Ring {
     pub fn visiting_all(mut self) -> Self {
         self.visit_all = true;
         self
+    }
+
+    /// What the elements took up, mJ: stored in those in contact, the rest lost in them.
+    #[must_use]
+    pub fn taken_mj(&self) -> f64 {
+        self.taken_mj
     }
 
     /// Stiffness becomes this from now on, N/mm^3, relaxed and instant.
@@ -244,6 +295,9 @@ impl Ring {
     /// Contact after `motion`, leaving the elements as they are.
     #[must_use]
     pub fn trial(&mut self, motion: &Motion) -> Contact {
+        if self.coupled.is_some() {
+            return self.trial_coupled(motion);
+        }
         self.prepare(motion);
         self.count();
         let place = self.place(motion);
@@ -255,62 +309,166 @@ impl Ring {
         } else {
             -self.law.tangent * (motion.height_mm - p.radius_mm).abs()
         };
+        let (forces, slope) = (totals.sums.forces, totals.sums.slope);
+        let (cosine, sine) = motion.wall.tilt(forces);
+        let slope = motion.wall.tilt(slope);
         Contact {
             normal_n: patch * totals.normal,
-            cosine_n: patch * totals.sums.forces.0,
-            sine_n: patch * totals.sums.forces.1,
+            cosine_n: patch * cosine,
+            sine_n: patch * sine,
             floor_n: patch * totals.floor.0,
             step_cosine_n: patch * totals.step.0,
             step_sine_n: patch * totals.step.1,
             depth_mm: p.radius_mm - motion.wall.nearest(motion.height_mm),
             area_mm2: patch * totals.count,
             floor_pressure,
-            slope: (patch * totals.sums.slope.0, patch * totals.sums.slope.1),
+            slope: (patch * slope.0, patch * slope.1),
         }
     }
 
     /// Cosine and sine sums after `motion`, N, and their derivatives by the height, N/mm:
     /// the part of [`Ring::trial`] that a balance needs.
     pub(super) fn forces(&mut self, motion: &Motion) -> ((f64, f64), (f64, f64)) {
+        if self.coupled.is_some() {
+            let contact = self.trial_coupled(motion);
+            return ((contact.cosine_n, contact.sine_n), contact.slope);
+        }
         self.prepare(motion);
         self.count();
         let patch = self.patch();
-        let Sums { forces: (c, s), slope: (dc, ds) } =
+        let Sums { forces, slope } =
             sweep::sums(&self.ready.blocks, &self.place(motion), &self.law);
+        let ((c, s), (dc, ds)) = (motion.wall.tilt(forces), motion.wall.tilt(slope));
         ((patch * c, patch * s), (patch * dc, patch * ds))
+    }
+
+    /// Mean depth of the patch, mm, each part weighted with the pressure that it carries, and
+    /// by 5/4, so that on a level wall it is the deepest; zero off the wall.
+    #[must_use]
+    pub fn carrying_mm(&self) -> f64 {
+        if let Some(coupled) = &self.coupled {
+            return coupled.carrying_mm();
+        }
+        let p = &self.parameters;
+        let (mut carried, mut sum) = (0.0, 0.0);
+        for number in self.active.blocks() {
+            let index = number.rem_euclid(self.q.len() as i64) as usize;
+            let fast = self.q[index];
+            let q = self.slow.get(index).map_or(fast, |slow| Lanes::HALF * (fast + *slow));
+            let (depth, q) = (self.depth[index].to_array(), q.to_array());
+            for (depth, q) in depth.into_iter().zip(q) {
+                let pressure = (p.k_0 * depth - (p.k_0 - p.k_inf) * q).max(0.0);
+                if depth > 0.0 {
+                    (carried, sum) = (carried + pressure, sum + pressure * depth);
+                }
+            }
+        }
+        if carried > 0.0 { 1.25 * sum / carried } else { 0.0 }
+    }
+
+    fn trial_coupled(&mut self, motion: &Motion) -> Contact {
+        self.refresh_law(motion.dt_s);
+        let Self { coupled: Some(coupled), parameters, law, rotation, work, .. } = self else {
+            return Contact::default();
+        };
+        coupled.trial(parameters, law, *rotation, motion, work)
+    }
+
+    fn refresh_law(&mut self, dt_s: f64) {
+        if self.law.dt_s != dt_s {
+            self.law = Law::new(&self.parameters, dt_s);
+        }
     }
 
     /// Takes the ring through `motion`.
     pub fn commit(&mut self, motion: &Motion) {
+        if self.coupled.is_some() {
+            self.trial_coupled(motion);
+            if let Some(coupled) = &mut self.coupled {
+                self.taken_mj += coupled.commit(&self.parameters, &self.law);
+            }
+        } else {
+            self.commit_elements(motion);
+        }
+        self.time += motion.dt_s;
+        self.rotation += motion.turn_rad;
+        self.work.strides += 1;
+    }
+
+    fn commit_elements(&mut self, motion: &Motion) {
         self.prepare(motion);
         let place = self.place(motion);
         let end = self.time + motion.dt_s;
-        let Self { ready, active, law, q, depth, at, .. } = self;
+        let patch = self.patch();
+        let Self { ready, active, law, q, depth, slow, at, taken_mj, parameters, .. } = self;
         let count = q.len() as i64;
-        sweep::advance(&ready.blocks, &place, law, |number, depths, qs| {
-            let index = ready.indices[number];
-            (depth[index], q[index]) = (depths, qs);
-        });
+        let (k_0, excess) = (Lanes::splat(parameters.k_0), Lanes::splat(law.excess));
+        let pressure = |depth: Lanes, q: Lanes| {
+            let pressure = (k_0 * depth - excess * q).fast_max(Lanes::ZERO);
+            pressure & depth.simd_gt(Lanes::ZERO)
+        };
+        // Trapezia under pressure over depth, N/mm.
+        let mut work = Lanes::ZERO;
+        match law.second {
+            None => sweep::advance(&ready.blocks, &place, law, |number, depths, qs| {
+                let index = ready.indices[number];
+                let (old, new) = (pressure(depth[index], q[index]), pressure(depths, qs));
+                work += (old + new) * (depths - depth[index]);
+                (depth[index], q[index]) = (depths, qs);
+            }),
+            Some(second) => sweep::advance(&ready.blocks, &place, law, |number, depths, _| {
+                let index = ready.indices[number];
+                let before = depth[index];
+                let old = pressure(before, Lanes::HALF * (q[index] + slow[index]));
+                q[index] = law.first.advance(q[index], before, depths);
+                slow[index] = second.advance(slow[index], before, depths);
+                let new = pressure(depths, Lanes::HALF * (q[index] + slow[index]));
+                work += (old + new) * (depths - before);
+                depth[index] = depths;
+            }),
+        }
         // Out of reach: let go of within this step.
         for number in active.blocks().filter(|number| !ready.window.contains(*number)) {
             let index = number.rem_euclid(count) as usize;
-            q[index] =
-                Lanes::splat(law.keep) * q[index] + Lanes::splat(law.from_old) * depth[index];
-            depth[index] = Lanes::ZERO;
+            let old = std::mem::replace(&mut depth[index], Lanes::ZERO);
+            let memory = slow.get(index).map_or(q[index], |s| Lanes::HALF * (q[index] + *s));
+            work -= pressure(old, memory) * old;
+            q[index] = law.first.carry(q[index], old);
+            if let Some(second) = law.second {
+                slow[index] = second.carry(slow[index], old);
+            }
             at[index] = end;
         }
+        *taken_mj += 0.5 * patch * work.to_array().iter().sum::<f64>();
         self.active = self.ready.window;
         self.ready.of = None;
-        self.time = end;
-        self.rotation += motion.turn_rad;
-        self.work.strides += 1;
+    }
+
+    /// Brings the ring to rest on this wall under a radial load, N, from this height above
+    /// it, mm, its rubber relaxed; gives the contact and its height.
+    ///
+    /// # Errors
+    /// [`BalanceError`] if no height carries the load.
+    pub fn rest(
+        &mut self,
+        wall: LocalWall,
+        height_mm: f64,
+        load_n: f64,
+    ) -> Result<Solved, BalanceError> {
+        let motion = Motion { wall, height_mm, turn_rad: 0.0, dt_s: FOREVER_S };
+        let axial = Axial::Pushed;
+        let balance = Balance { preload_n: load_n, spring_n_per_mm: 0.0, arm_n: 0.0, axial };
+        let solved = balance.solve(self, motion)?;
+        self.commit(&Motion { height_mm: solved.height_mm, ..motion });
+        Ok(solved)
     }
 
     /// Puts the ring into the state that `profile` gives for an angle from straight
     /// down (rad) of at most `within_rad`: depth and internal displacement, both mm, at
     /// time `time_s`. Elsewhere it is unloaded and fresh.
-    pub fn seed(&mut self, time_s: f64, within_rad: f64, profile: impl Fn(f64) -> (f64, f64)) {
+    pub fn seed(&mut self, time_s: f64, within_rad: f64, profile: impl Fn(f64) -> (f64, [f64; 2])) {
         self.q.fill(Lanes::ZERO);
+        self.slow.fill(Lanes::ZERO);
         self.depth.fill(Lanes::ZERO);
         self.at.fill(time_s);
         self.rotation = 0.0;
@@ -322,16 +480,20 @@ impl Ring {
         let pitch = self.pitch();
         for number in self.active.blocks() {
             let index = number.rem_euclid(self.q.len() as i64) as usize;
-            let (mut depths, mut qs) = ([0.0; LANES], [0.0; LANES]);
+            let (mut depths, mut qs) = ([0.0; LANES], [[0.0; LANES]; 2]);
             for lane in 0..LANES {
                 let element = index * LANES + lane;
                 if element < self.parameters.elements {
                     let angle = element as f64 * pitch;
                     let angle = angle - TAU * (angle / TAU).round();
-                    (depths[lane], qs[lane]) = profile(angle);
+                    let (depth, [fast, slow]) = profile(angle);
+                    (depths[lane], qs[0][lane], qs[1][lane]) = (depth, fast, slow);
                 }
             }
-            (self.depth[index], self.q[index]) = (depths.into(), qs.into());
+            (self.depth[index], self.q[index]) = (depths.into(), qs[0].into());
+            if let Some(slow) = self.slow.get_mut(index) {
+                *slow = qs[1].into();
+            }
         }
         self.ready.of = None;
     }
@@ -358,6 +520,11 @@ impl Ring {
             height: y,
             rise: self.ready.rise,
             edge: self.ready.edge.then(|| (wall.edge(y), wall.drop_mm, self.pitch())),
+            round: (wall.edge_radius_mm > 0.0).then_some((
+                wall.edge_radius_mm,
+                wall.ahead_mm,
+                wall.behind_mm,
+            )),
         }
     }
 
@@ -384,9 +551,7 @@ impl Ring {
         let more =
             if self.ready.of == Some(of) { self.ready.lowest - motion.height_mm } else { 0.0 };
         let lowest = motion.height_mm - SLACK * radius - more;
-        if self.law.dt_s != motion.dt_s {
-            self.law = Law::new(&self.parameters, motion.dt_s);
-        }
+        self.refresh_law(motion.dt_s);
         let turned = self.rotation + motion.turn_rad;
         let (floor, step) = window::reach(&motion.wall, lowest, radius);
         let mut window = Window::default();
@@ -415,11 +580,11 @@ impl Ring {
     }
 
     fn lay_out(&mut self, turned: f64, ahead: f64) {
-        let Self { ready, active, law, q, depth, at, sin, cos, parameters, time, .. } = self;
+        let Self { ready, active, law, q, depth, slow, at, sin, cos, parameters, time, .. } = self;
         let count = q.len() as i64;
         let (turned_sin, turned_cos) = turned.sin_cos();
         let (turned_sin, turned_cos) = (Lanes::splat(turned_sin), Lanes::splat(turned_cos));
-        let (keep, from_old) = (Lanes::splat(law.keep), Lanes::splat(law.from_old));
+        let relaxations_s = parameters.relaxations_s();
         let on_face = Lanes::splat(ahead / parameters.radius_mm).fast_max(Lanes::splat(1e-9));
         let (radius, ahead) = (Lanes::splat(parameters.radius_mm), Lanes::splat(ahead));
         let (away, facing) = (Lanes::splat(AWAY), Lanes::splat(0.05));
@@ -428,12 +593,23 @@ impl Ring {
         ready.indices.clear();
         for number in ready.window.blocks() {
             let index = number.rem_euclid(count) as usize;
-            if !active.contains(number) && q[index] != Lanes::ZERO {
+            let remembers =
+                q[index] != Lanes::ZERO || slow.get(index).is_some_and(|s| *s != Lanes::ZERO);
+            if !active.contains(number) && remembers {
                 // Out of contact since: only the memory has decayed.
-                let kept = (-(*time - at[index]) / parameters.tau_s).exp();
-                let decayed = q[index] * Lanes::splat(kept);
-                q[index] = decayed & decayed.abs().simd_gt(Lanes::splat(1e-200));
+                let decayed = |q: Lanes, tau_s: f64| {
+                    let decayed = q * Lanes::splat((-(*time - at[index]) / tau_s).exp());
+                    decayed & decayed.abs().simd_gt(Lanes::splat(1e-200))
+                };
+                q[index] = decayed(q[index], relaxations_s[0]);
+                if let Some(slow) = slow.get_mut(index) {
+                    *slow = decayed(*slow, relaxations_s[1]);
+                }
                 at[index] = *time;
+            }
+            let mut carried = law.first.carry(q[index], depth[index]);
+            if let Some(second) = law.second {
+                carried = Lanes::HALF * (carried + second.carry(slow[index], depth[index]));
             }
             let (s, c) = (sin[index], cos[index]);
             let (sin, cos) = (s * turned_cos - c * turned_sin, c * turned_cos + s * turned_sin);
@@ -449,7 +625,7 @@ impl Ring {
                 sin,
                 sec: cos.simd_gt(facing).bitselect(Lanes::ONE / cos, away),
                 face,
-                carried: keep * q[index] + from_old * depth[index],
+                carried,
             });
             ready.indices.push(index);
         }

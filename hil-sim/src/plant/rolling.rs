@@ -32,7 +32,7 @@ pub fn at_height(ring: &RingParameters, height_mm: f64, speed_mm_s: f64) -> Roll
 fn sum(ring: &RingParameters, height_mm: f64, speed_mm_s: f64, nodes: usize) -> Rolling {
     let mut out = Rolling { height_mm, ..Rolling::default() };
     walk(ring, height_mm, speed_mm_s, nodes, |(sin, cos), step, depth, q| {
-        let pressure = ring.k_inf * depth + (ring.k_0 - ring.k_inf) * (depth - q);
+        let pressure = ring.k_inf * depth + (ring.k_0 - ring.k_inf) * (depth - 0.5 * (q[0] + q[1]));
         if pressure > 0.0 {
             let patch = step * ring.radius_mm * ring.width_mm;
             out.normal_n += pressure * patch;
@@ -235,10 +235,14 @@ impl Steady {
     }
 }
 
-/// Depth and internal displacement (mm) across the patch, by angle from straight
+/// Depth and internal displacements (mm) across the patch, by angle from straight
 /// down, for seeding the ring.
 #[must_use]
-pub fn profile(ring: &RingParameters, height_mm: f64, speed_mm_s: f64) -> Vec<(f64, f64, f64)> {
+pub fn profile(
+    ring: &RingParameters,
+    height_mm: f64,
+    speed_mm_s: f64,
+) -> Vec<(f64, f64, [f64; 2])> {
     let mut out = Vec::with_capacity(NODES);
     walk(ring, height_mm, speed_mm_s, NODES, |(sin, _), _, depth, q| {
         out.push((sin.asin(), depth, q));
@@ -247,14 +251,27 @@ pub fn profile(ring: &RingParameters, height_mm: f64, speed_mm_s: f64) -> Vec<(f
     out
 }
 
+/// Mean depth of the patch as [`super::ring::Ring::carrying_mm`] has it, mm.
+#[must_use]
+pub fn carrying_mm(ring: &RingParameters, height_mm: f64, speed_mm_s: f64) -> f64 {
+    let (mut carried, mut sum) = (0.0, 0.0);
+    walk(ring, height_mm, speed_mm_s, NODES, |_, _, depth, q| {
+        let memory = 0.5 * (q[0] + q[1]);
+        let pressure = (ring.k_0 * depth - (ring.k_0 - ring.k_inf) * memory).max(0.0);
+        (carried, sum) = (carried + pressure, sum + pressure * depth);
+    });
+    if carried > 0.0 { 1.25 * sum / carried } else { 0.0 }
+}
+
 /// Visits the patch from its leading to its trailing edge: sine and cosine of the angle,
-/// width of the node (rad), depth, internal displacement.
+/// width of the node (rad), depth, internal displacements: one twice if there is but one
+/// relaxation.
 fn walk(
     ring: &RingParameters,
     height_mm: f64,
     speed_mm_s: f64,
     nodes: usize,
-    mut visit: impl FnMut((f64, f64), f64, f64, f64),
+    mut visit: impl FnMut((f64, f64), f64, f64, [f64; 2]),
 ) {
     if height_mm >= ring.radius_mm {
         return;
@@ -262,13 +279,33 @@ fn walk(
     let half = (height_mm / ring.radius_mm).acos();
     let step = 2.0 * half / nodes as f64;
     let ahead = if speed_mm_s < 0.0 { -1.0 } else { 1.0 };
+    let [fast_s, slow_s] = ring.relaxations_s();
+    let fast = weights(step * ring.radius_mm, speed_mm_s, fast_s);
+    let slow = ring.relaxes_twice().then(|| weights(step * ring.radius_mm, speed_mm_s, slow_s));
+    let (mut q, mut before) = ([0.0; 2], 0.0);
+    let (mut sin, mut cos) = (half - 0.5 * step).sin_cos();
+    let (step_sin, step_cos) = step.sin_cos();
+    for _ in 0..nodes {
+        let depth = (ring.radius_mm - height_mm / cos).max(0.0);
+        // The first node lies half a step behind the edge; taking a whole step there
+        // errs by a part in the square of the node count.
+        let advance = |q: f64, (keep, mean): (f64, f64)| {
+            keep * q + (mean - keep) * before + (1.0 - mean) * depth
+        };
+        q[0] = advance(q[0], fast);
+        q[1] = slow.map_or(q[0], |slow| advance(q[1], slow));
+        before = depth;
+        visit((ahead * sin, cos), step, depth, q);
+        // On to the next: turned back by one step.
+        (sin, cos) = (sin * step_cos - cos * step_sin, cos * step_cos + sin * step_sin);
+    }
+}
+
+/// Decay over a node's travel, mm, and its mean over it.
+fn weights(travel_mm: f64, speed_mm_s: f64, tau_s: f64) -> (f64, f64) {
     // At rest the memory has caught up with the depth.
-    let ratio = if speed_mm_s == 0.0 {
-        f64::INFINITY
-    } else {
-        step * ring.radius_mm / (speed_mm_s.abs() * ring.tau_s)
-    };
-    let keep = (-ratio).exp();
+    let ratio =
+        if speed_mm_s == 0.0 { f64::INFINITY } else { travel_mm / (speed_mm_s.abs() * tau_s) };
     let mean = if ratio.is_infinite() {
         0.0
     } else if ratio < 1e-5 {
@@ -276,19 +313,7 @@ fn walk(
     } else {
         -(-ratio).exp_m1() / ratio
     };
-    let (mut q, mut before) = (0.0, 0.0);
-    let (mut sin, mut cos) = (half - 0.5 * step).sin_cos();
-    let (step_sin, step_cos) = step.sin_cos();
-    for _ in 0..nodes {
-        let depth = (ring.radius_mm - height_mm / cos).max(0.0);
-        // The first node lies half a step behind the edge; taking a whole step there
-        // errs by a part in the square of the node count.
-        q = keep * q + (mean - keep) * before + (1.0 - mean) * depth;
-        before = depth;
-        visit((ahead * sin, cos), step, depth, q);
-        // On to the next: turned back by one step.
-        (sin, cos) = (sin * step_cos - cos * step_sin, cos * step_cos + sin * step_sin);
-    }
+    ((-ratio).exp(), mean)
 }
 
 #[cfg(test)]
@@ -306,6 +331,8 @@ mod tests {
             k_0: 0.6044 * 4.2235,
             tau_s: 0.1059,
             elements: 5760,
+            tread_thickness_mm: 0.0,
+            second_relaxation: 1.0,
         }
     }
 

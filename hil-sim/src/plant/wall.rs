@@ -10,10 +10,39 @@ pub struct Step {
     pub height_mm: f64,
 }
 
+/// How the wall departs from level pieces with sharp edges.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Form {
+    /// Radius of the steps' edges, mm.
+    pub edge_radius_mm: f64,
+    /// Rise from position 0 to the length, mm.
+    pub taper_mm: f64,
+    /// Rise in the middle above the line between the ends, mm.
+    pub bend_mm: f64,
+    /// Length that taper and bend go by, mm.
+    pub length_mm: f64,
+}
+
+impl Form {
+    /// Rise of the wall at an axial position, mm, and its slope: a straight line and a
+    /// parabola, which go on beyond the ends.
+    #[must_use]
+    pub fn rise(&self, x_mm: f64) -> (f64, f64) {
+        if (self.taper_mm, self.bend_mm) == (0.0, 0.0) {
+            return (0.0, 0.0);
+        }
+        let part = x_mm / self.length_mm;
+        let rise = self.taper_mm * part + 4.0 * self.bend_mm * part * (1.0 - part);
+        let slope = self.taper_mm + 4.0 * self.bend_mm * (1.0 - 2.0 * part);
+        (rise, slope / self.length_mm)
+    }
+}
+
 /// The wall's profile: ascending steps, level 0 before the first.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Wall {
     steps: Vec<Step>,
+    form: Form,
 }
 
 /// The wall as the wheel sees it: heights relative to the wall under the centre.
@@ -31,6 +60,12 @@ pub struct LocalWall {
     pub behind_mm: f64,
     /// Height of the step behind, mm.
     pub drop_mm: f64,
+    /// Height of the root of the step ahead above the wall under the centre, mm.
+    pub root_mm: f64,
+    /// Rise of the wall per axial travel.
+    pub slope: f64,
+    /// Radius of the edges, mm.
+    pub edge_radius_mm: f64,
 }
 
 /// Direction of the edge behind, from straight down towards the back.
@@ -74,7 +109,15 @@ impl Wall {
     #[must_use]
     pub fn new(mut steps: Vec<Step>) -> Self {
         steps.sort_by(|a, b| a.position_mm.total_cmp(&b.position_mm));
-        Self { steps }
+        Self { steps, form: Form::default() }
+    }
+
+    /// The same wall of this form.
+    #[must_use]
+    pub fn with_form(mut self, form: Form) -> Self {
+        let plain = (form.edge_radius_mm, form.taper_mm, form.bend_mm) == (0.0, 0.0, 0.0);
+        self.form = if plain { Form::default() } else { form };
+        self
     }
 
     /// The steps, ascending.
@@ -86,23 +129,28 @@ impl Wall {
     /// The wall around axial position `x_mm`.
     #[must_use]
     pub fn local(&self, x_mm: f64) -> LocalWall {
+        let (rise_mm, slope) = self.form.rise(x_mm);
         let mut local = LocalWall {
-            base_mm: 0.0,
+            base_mm: rise_mm,
             level: 0,
             ahead_mm: f64::INFINITY,
             rise_mm: 0.0,
             behind_mm: f64::INFINITY,
             drop_mm: 0.0,
+            root_mm: 0.0,
+            slope,
+            edge_radius_mm: self.form.edge_radius_mm,
         };
         for step in &self.steps {
             if step.position_mm <= x_mm {
                 local.base_mm += step.height_mm;
                 local.level += 1;
                 local.behind_mm = x_mm - step.position_mm;
-                local.drop_mm = step.height_mm;
+                local.drop_mm = step.height_mm + rise_mm - self.form.rise(step.position_mm).0;
             } else {
                 local.ahead_mm = step.position_mm - x_mm;
-                local.rise_mm = step.height_mm;
+                local.root_mm = self.form.rise(step.position_mm).0 - rise_mm;
+                local.rise_mm = step.height_mm + local.root_mm;
                 break;
             }
         }
@@ -132,6 +180,13 @@ impl LocalWall {
         }
     }
 
+    /// Cosine and sine sums of a contact with the level wall, turned by the wall's slope.
+    #[inline]
+    #[must_use]
+    pub(super) fn tilt(&self, (cosine, sine): (f64, f64)) -> (f64, f64) {
+        (cosine - self.slope * sine, sine + self.slope * cosine)
+    }
+
     /// The edge behind as seen from the centre, `y` mm above the wall under it.
     #[must_use]
     pub fn edge(&self, y: f64) -> Edge {
@@ -146,8 +201,17 @@ impl LocalWall {
     /// of the wall: straight down or the corner ahead.
     #[must_use]
     pub fn nearest(&self, y: f64) -> f64 {
+        let round = self.edge_radius_mm;
         let over = y - self.rise_mm;
-        y.min((self.ahead_mm * self.ahead_mm + over * over).sqrt())
+        if round == 0.0 {
+            return y.min((self.ahead_mm * self.ahead_mm + over * over).sqrt());
+        }
+        let below = if self.behind_mm < round {
+            (round - self.behind_mm).hypot(y + round) - round
+        } else {
+            y
+        };
+        below.min((self.ahead_mm + round).hypot(over + round) - round)
     }
 }
 

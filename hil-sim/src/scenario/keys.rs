@@ -5,7 +5,8 @@ use interstage::rig::{ControlSettings, Drive, Geometry, Loads, Pretightener, Sen
 use serde::Serialize;
 use toml::{Table, Value};
 
-use super::run::{ControllerKind, Direction, RunOptions};
+use super::run::{ControllerKind, Direction, MismatchDraw, RunOptions};
+use crate::plant::mismatch::{FIELDS, Field, Mismatch};
 use crate::plant::spread::{Noise, Spread};
 
 /// Names of the presets.
@@ -51,6 +52,7 @@ impl Kind {
             ("preset", _) => Self::Word(&PRESETS),
             ("run.direction", _) => Self::Word(&Direction::NAMES),
             ("run.controller", _) => Self::Word(&ControllerKind::NAMES),
+            ("run.mismatch", _) => Self::Word(&MismatchDraw::NAMES),
             ("run.anomalies", _) => Self::Anomalies,
             ("run.faults", _) => Self::Faults,
             ("drive.modes_hz", _) => Self::Numbers(interstage::rig::MAX_MODES),
@@ -82,7 +84,8 @@ impl Kind {
 }
 
 /// Units by the end of a key, the longer ends first.
-const UNITS: [(&str, &str); 18] = [
+const UNITS: [(&str, &str); 19] = [
+    ("_mm_per_n", "mm/N"),
     ("_pa_per_m", "Pa/m"),
     ("_n_per_mm", "N/mm"),
     ("_n_per_s", "N/s"),
@@ -135,14 +138,16 @@ pub(super) fn leaves(table: &Table) -> Vec<(String, &Value)> {
     found
 }
 
+/// Every key of a section with its description.
+fn fields<T: DocumentedFields>(section: &str) -> Vec<(String, String)> {
+    let plain = |text: &str| text.replace(['`', '[', ']'], "").replace('\n', " ");
+    let fields = T::FIELD_NAMES.iter().zip(T::FIELD_DOCS);
+    fields.map(|(name, text)| (format!("{section}.{name}"), plain(text))).collect()
+}
+
 /// Every key with its description, the documentation of its field, in the order of
 /// declaration.
 fn descriptions() -> Vec<(String, String)> {
-    fn fields<T: DocumentedFields>(section: &str) -> Vec<(String, String)> {
-        let plain = |text: &str| text.replace(['`', '[', ']'], "").replace('\n', " ");
-        let fields = T::FIELD_NAMES.iter().zip(T::FIELD_DOCS);
-        fields.map(|(name, text)| (format!("{section}.{name}"), plain(text))).collect()
-    }
     let preset = ("preset".to_owned(), "Rig that the scenario starts from.".to_owned());
     [
         vec![preset],
@@ -155,9 +160,20 @@ fn descriptions() -> Vec<(String, String)> {
         fields::<ControlSettings>("control"),
         fields::<Spread>("spread"),
         fields::<Noise>("noise"),
+        mismatch(),
         fields::<RunOptions>("run"),
     ]
     .concat()
+}
+
+/// The keys of the mismatch, each with its ranges.
+fn mismatch() -> Vec<(String, String)> {
+    let described = fields::<Mismatch>("mismatch").into_iter().zip(FIELDS);
+    let with_range = |((key, text), field): ((String, String), &Field)| {
+        let ((low, high), (from, to)) = (field.range, field.wide);
+        (key, format!("{text} {low} to {high}, wide {from} to {to}."))
+    };
+    described.map(with_range).collect()
 }
 
 /// Every key of the scenario in `table`, in the order of declaration.

@@ -16,6 +16,9 @@ pub struct RunOptions {
     pub controller: ControllerKind,
     /// Seed of the plant's draw and of the noise; 0 draws the nominal plant.
     pub seed: u64,
+    /// Whether the seed draws the mismatch too: as stated, or wide.
+    #[serde(default)]
+    pub mismatch: MismatchDraw,
     /// Steps that are not where the step table says.
     pub anomalies: Vec<StepAnomaly>,
     /// Faults that come while it runs.
@@ -78,6 +81,22 @@ impl ControllerKind {
     pub const fn name(self) -> &'static str {
         Self::NAMES[self as usize]
     }
+}
+
+/// Where the plant's mismatch comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MismatchDraw {
+    /// As the scenario states it.
+    #[default]
+    Stated,
+    /// Drawn by the seed within the wide ranges; what is stated and not neutral stays.
+    Wide,
+}
+
+impl MismatchDraw {
+    /// Names as written in scenarios.
+    pub const NAMES: [&str; 2] = ["stated", "wide"];
 }
 
 /// One step that is not where the step table says. Steps count from 1 on

@@ -17,6 +17,10 @@ pub(super) fn check(scenario: &Scenario, from: &Provenance) -> Result<(), Scenar
     for (key, value, max) in ranges(scenario) {
         in_range(from.of(key), key, value, (0.0, max))?;
     }
+    for (field, value) in scenario.mismatch.values() {
+        let key = format!("mismatch.{}", field.name);
+        in_range(from.of(&key), &key, value, field.range)?;
+    }
     anomalies(scenario, from.of("run.anomalies"))?;
     spacing(scenario, from.of("run.anomalies"))?;
     faults(scenario, from.of("run.faults"))?;

@@ -332,7 +332,7 @@ pub fn read(sensors: &mut Sensors, plant: &VirtualRig) -> Codes {
     let sensed = Sensed {
         rotation_rad: truth.rotation_rad,
         preload_n: truth.preload_n,
-        depth_mm: truth.depth_mm,
+        depth_mm: truth.compression_mm,
         arm_rad: truth.arm_rad,
         bridges: truth.bridges,
     };

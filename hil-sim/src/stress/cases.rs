@@ -145,6 +145,8 @@ impl StressCase {
             k_0: k_inf * self.stiffening,
             tau_s: self.tau_s,
             elements: ELEMENTS,
+            tread_thickness_mm: 0.0,
+            second_relaxation: 1.0,
         }
     }
 

@@ -47,8 +47,6 @@ pub(super) fn plant(case: &StressCase) -> PlantParameters {
     plant.stops_mm = (-100.0, 100.0);
     plant.mu = case.mu;
     plant.ripple.0 = 0.006 * limit_n;
-    // The convention that keeps energy.
-    plant.climb_slows = true;
     plant.load_n = case.load_n;
     plant.spring_n_per_mm = case.spring_n_per_mm;
     plant.mass_kg = case.mass_kg;

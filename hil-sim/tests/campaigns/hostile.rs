@@ -238,6 +238,9 @@ fn asked(planner: &Planner, model: &ReducedModel) -> Option<String> {
                     direction,
                     step: 2,
                     scale: ratio,
+                    reserve: Q16::ONE,
+                    preload: Q16::from_num(33),
+                    distance: Q16::from_num(4),
                     review: Some(review),
                 };
                 let _ = planner.plan(&request);

@@ -60,6 +60,25 @@ fn the_parts_of_a_fault_campaign_are_the_whole() {
 }
 
 #[test]
+fn a_wide_campaign_names_what_it_drew_and_where_it_ended() {
+    let output = rig(&["montecarlo", "-n", "2", "--wide", "--json"]);
+    let all: Value = serde_json::from_str(stdout(&output)).expect("one object");
+    let drawn = all["drawn"].as_array().expect("what was drawn");
+    let friction = drawn.iter().find(|one| one["key"] == "mismatch.friction").expect("friction");
+    assert!((0.9..1.1).contains(&number(friction, "least")));
+    assert!(number(friction, "least") < number(friction, "most"));
+    assert!(all["silent"].is_array() && all["later_gap_over_ref"]["p99"].is_number());
+    assert!(all["first_gap_over_ref"]["max"].is_number() && all["end_off_mm"]["max"].is_number());
+    let steps = all["steps_found"].as_array().expect("steps");
+    assert!(steps.iter().all(|step| step["index"].is_u64() && step["p95"].is_number()));
+    // What is stated and not neutral is not drawn; without --wide nothing is.
+    let stated = rig(&["montecarlo", "-n", "1", "--set", "mismatch.weight_n=1", "--json"]);
+    let stated: Value = serde_json::from_str(stdout(&stated)).expect("one object");
+    assert_eq!(stated["drawn"].as_array().expect("one").len(), 1);
+    assert_eq!(stated["drawn"][0]["key"], "mismatch.weight_n");
+}
+
+#[test]
 fn the_comparison_has_every_strategy_and_the_oracle() {
     let compared = good(&["compare", "-n", "1", "--json"]);
     assert_eq!(compared["runs"], 1);

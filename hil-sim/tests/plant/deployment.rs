@@ -5,14 +5,12 @@ use hil_sim::plant::draw::PlantParameters;
 use hil_sim::plant::rig::{Resolution, Truth, VirtualRig};
 use hil_sim::plant::wall::{Step, Wall};
 
-use super::bench::{TICK_S, close, crossed, deploy, elastic, fine, ideal, nominal, off, pairs};
+use super::bench::{TICK_S, close, crossed, deploy, fine, ideal, nominal, off, pairs};
 
 /// As runs are computed.
 const USUAL: Resolution = Resolution { stride_mm: 0.02, always_awake: false };
 /// With the ring resolved everywhere.
 const AWAKE: Resolution = Resolution { always_awake: true, ..USUAL };
-/// For four times the elements.
-const FINE: Resolution = Resolution { stride_mm: 0.005, ..USUAL };
 
 /// Presets with their cruise preload, N.
 const PRESETS: [(&str, f64); 2] = [("prototype", 33.3), ("fe", 100.0)];
@@ -29,9 +27,19 @@ fn every_crossing_of_a_deployment_is_the_isolated_one() {
             assert_eq!(rig.ledger().crossings().len(), 3);
             for crossing in rig.ledger().crossings() {
                 assert_eq!(crossing.climbing, speed > 0.0);
-                close(crossing.gap_mm, alone.gap_mm, 0.004);
-                close(crossing.peak_utilisation, alone.mu_needed, 0.004);
-                close(crossing.speed_mm_s, speed.abs(), 1e-3);
+                // At lift-off the axle is a tenth slower than the tread, which relaxes more: 2 % of
+                // the gap at most.
+                let wider = off(crossing.gap_mm, alone.gap_mm);
+                assert!((-0.025..0.004).contains(&wider), "{wider}");
+                // A wheel that pivots is longer on the corner: the tread relaxes there, and the
+                // climb needs a little less friction.
+                let needed = off(crossing.peak_utilisation, alone.mu_needed);
+                assert!((-0.03..0.004).contains(&needed), "{needed}");
+                // The wheel pivots: no more than a rigid one at the touch of the corner, and its
+                // rolling radius is less than the undeformed one.
+                let pivots = 1.0 - 4.0 / 25.0;
+                let part = crossing.speed_mm_s / speed.abs();
+                assert!((pivots..0.99).contains(&part), "{part} {pivots}");
             }
         }
     }
@@ -82,7 +90,9 @@ fn on_a_long_wall_the_ring_sleeps() {
 fn assert_alike(a: &[Truth], b: &[Truth]) {
     assert!(a.len().abs_diff(b.len()) <= 1, "{} {}", a.len(), b.len());
     for (a, b) in a.iter().zip(b) {
-        assert!((a.position_mm - b.position_mm).abs() < 0.002, "{a:?} {b:?}");
+        // The axle's travel changes with the tread's where the wheel pivots, and an element is
+        // 0.109 mm.
+        assert!((a.position_mm - b.position_mm).abs() < 0.1 * 0.109, "{a:?} {b:?}");
         assert!((a.height_mm - b.height_mm).abs() < 0.02, "{a:?} {b:?}");
         assert!((a.utilisation - b.utilisation).abs() < 0.02, "{a:?} {b:?}");
     }
@@ -139,33 +149,5 @@ fn radial_inertia_may_be_neglected() {
             .fold(0.0f64, |most, bend| most.max(bend.abs() / squared));
         let force = 1e-3 * most * nominal(preset).mass_kg;
         assert!(force < 0.03 * preload, "{force}");
-    }
-}
-
-#[test]
-fn a_climb_that_slows_creates_no_work() {
-    for (preload, farther) in [(33.3, 0.52..0.60), (100.0, 0.39..0.45)] {
-        let rig = |slows| {
-            let mut plant = ideal("prototype");
-            plant.drive = nominal("prototype").drive;
-            plant.drive.friction_n = 0.0;
-            plant.ring = elastic(5760);
-            plant.climb_slows = slows;
-            deploy(plant, FINE, 10.0, preload, |_| {})
-        };
-        let gain = |rig: &VirtualRig| {
-            let truth = rig.truth();
-            let lifted = rig.parameters().load_n * truth.position_mm;
-            off(truth.work_mj, lifted + preload * 12.0)
-        };
-        let (slowed, alike) = (rig(true), rig(false));
-        // The rest is the motor's own kinetic energy and the patch's inner slip.
-        assert!((0.0..0.003).contains(&gain(&slowed)), "{}", gain(&slowed));
-        assert!((-0.035..-0.02).contains(&gain(&alike)), "{}", gain(&alike));
-        let truth = slowed.truth();
-        let longer = truth.rotation_rad * 25.0 - truth.position_mm;
-        assert!(farther.contains(&(longer / 3.0)), "{longer}");
-        let truth = alike.truth();
-        assert!((truth.rotation_rad * 25.0 - truth.position_mm).abs() < 0.01);
     }
 }

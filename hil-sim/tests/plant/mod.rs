@@ -3,8 +3,10 @@
 mod bench;
 mod crossing;
 mod deployment;
+mod energy;
 mod follow;
 mod grip;
+mod mismatch;
 mod precision;
 mod sensors;
 mod skipping;

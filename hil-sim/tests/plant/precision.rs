@@ -48,6 +48,8 @@ fn a_crossing_inside_a_deployment_is_within_its_error() {
         for (usual, fine) in usual.iter().zip(&fine) {
             assert!(off(usual.gap_mm, fine.gap_mm).abs() < 2.5e-3, "{usual:?} {fine:?}");
             assert!(off(usual.corner_n, fine.corner_n).abs() < 3e-3, "{usual:?} {fine:?}");
+            let used = [usual, fine].map(|crossing| crossing.peak_utilisation);
+            assert!(off(used[0], used[1]).abs() < 5e-3, "{usual:?} {fine:?}");
         }
     }
 }

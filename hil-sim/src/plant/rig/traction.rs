@@ -26,6 +26,8 @@ pub(super) enum Moves {
     Spins(f64),
     /// Motor, friction and inertia.
     Driven(Grip),
+    /// Free between the flanks of the gear, the wheel rolls along with the carriage.
+    Free(Grip),
 }
 
 /// A stride as predicted from the forces of the last.
@@ -50,10 +52,17 @@ impl Stride {
     /// How friction is used.
     pub(super) fn axial(&self) -> Axial {
         match self.moves {
-            Moves::Latched => Axial::Utilised(0.0),
+            Moves::Latched | Moves::Free(_) => Axial::Utilised(0.0),
             Moves::Spins(utilisation) => Axial::Utilised(utilisation),
             Moves::Driven(grip) => Axial::Carried(grip),
         }
+    }
+}
+
+impl Stride {
+    /// Mean force of the motor, N, with this load on the tread.
+    pub(super) fn motor_force_n(&self, tread_load_n: f64) -> f64 {
+        self.turn.force_n + self.turn.force_rises * tread_load_n
     }
 }
 
@@ -75,9 +84,13 @@ impl VirtualRig {
     pub(super) fn predict(&mut self, drives: &Drives, dt_s: f64) -> Stride {
         let p = &self.parameters;
         let tread = self.truth.tread_mm_s;
-        let turn = match self.imposed_speed_mm_s {
-            Some(imposed_speed_mm_s) => Turn::imposed(imposed_speed_mm_s),
-            None => p.drive.turn(tread, drives.drive, drives.drive_on, self.tread_load_n, dt_s),
+        let turn = match (self.imposed_speed_mm_s, self.play.motor_mm_s()) {
+            (Some(imposed_speed_mm_s), _) => Turn::imposed(imposed_speed_mm_s),
+            (None, Some(motor)) => p.drive.turn(motor, drives.drive, drives.drive_on, 0.0, dt_s),
+            (None, None) => {
+                let (on, load_n) = (drives.drive_on, self.tread_load_n);
+                p.drive.turn(tread, drives.drive, on, load_n, dt_s).against(self.offset_load_n())
+            }
         };
         if turn.free_mm_s != 0.0 {
             self.latched = false;
@@ -92,8 +105,8 @@ impl VirtualRig {
             speed: self.truth.speed_mm_s,
             tread: turn.free_mm_s,
             yields: turn.yields,
-            advance: self.advance(),
-            normal: if cosine > 0.0 { normal / cosine } else { 1.0 },
+            advance: self.rolling_part() * self.advance() - self.eccentric().1 / p.ring.radius_mm,
+            normal: self.rolling_part() * if cosine > 0.0 { normal / cosine } else { 1.0 },
         };
         let predicted = self.predict_speeds(&grip);
         let mut stride = Stride {
@@ -111,9 +124,15 @@ impl VirtualRig {
             return stride;
         }
         stride.moves = Moves::Driven(grip);
+        if self.play.motor_mm_s().is_some() {
+            let speed = grip.ended(0.0, cosine, sine).speed;
+            stride.moves = Moves::Free(grip);
+            stride.predicted = (speed, speed / grip.advance);
+            stride.tread_mm_s = stride.predicted.1;
+        }
         self.thrust_n = p.load_n;
         stride.travel_mm =
-            self.mean(self.truth.speed_mm_s, predicted.0) * dt_s + self.way_residual_mm.0;
+            self.mean(self.truth.speed_mm_s, stride.predicted.0) * dt_s + self.way_residual_mm.0;
         let (low, high) = p.stops_mm;
         let position = self.truth.position_mm + stride.travel_mm;
         if position < low || position > high {
@@ -140,7 +159,7 @@ impl VirtualRig {
     }
 
     /// Mean speed over a stride, mm/s: an imposed speed holds from the start on.
-    fn mean(&self, before: f64, end: f64) -> f64 {
+    pub(super) fn mean(&self, before: f64, end: f64) -> f64 {
         if self.imposed_speed_mm_s.is_some() { end } else { 0.5 * (before + end) }
     }
 
@@ -186,6 +205,16 @@ impl VirtualRig {
                 truth.tread_mm_s = ended.tread;
                 tread_load_n = ended.tread_load_n;
                 sliding = grip.slides(&ended);
+                self.play.pushed(truth.utilisation * cosine, ended.tread);
+            }
+            Moves::Free(grip) => {
+                truth.speed_mm_s = grip.ended(0.0, cosine, sine).speed;
+                truth.tread_mm_s = truth.speed_mm_s / grip.advance;
+                let motor = stride.turn.free_mm_s;
+                let farther = (0.5 * (before + truth.tread_mm_s) - motor) * stride.dt_s;
+                if !self.play.travelled(farther, motor) {
+                    truth.tread_mm_s = motor;
+                }
             }
         }
         // A wheel that has come to rest does not move on.
@@ -202,10 +231,32 @@ impl VirtualRig {
         self.tread_load_n = tread_load_n;
         let truth = &mut self.truth;
         truth.slip_mm += sliding * dt_s;
-        let creep = (truth.tread_mm_s - truth.speed_mm_s).abs() * dt_s;
+        let rolls = match stride.moves {
+            Moves::Driven(grip) | Moves::Free(grip) => grip.advance,
+            Moves::Latched | Moves::Spins(_) => 1.0,
+        };
+        let creep = (rolls * truth.tread_mm_s - truth.speed_mm_s).abs() * dt_s;
         truth.wear_mj += truth.utilisation.abs() * normal * creep;
-        let force = stride.turn.force_n + stride.turn.force_rises * tread_load_n;
-        truth.work_mj += (force * rolled).max(0.0);
+        truth.work_mj += (stride.motor_force_n(tread_load_n) * rolled).max(0.0);
+    }
+
+    /// Torque of the normal pressure, as load on the drive, N: of a rim whose axis lies ahead of
+    /// the axis of rotation, and of the inner load. Along the motion it relieves the drive of no
+    /// more than its load, and nothing drives the worm.
+    fn offset_load_n(&self) -> f64 {
+        let (_, cosine, _) = self.forces;
+        let sense = self.truth.tread_mm_s.signum();
+        let offset = cosine * self.eccentric().0 / self.parameters.ring.radius_mm;
+        let most = self.tread_load_n.abs();
+        (offset + sense * self.inner_load_n).clamp(-most, most)
+    }
+
+    /// Rolling radius over the undeformed one. A loaded rubber wheel rolls on `R - c/3` with
+    /// the compression c (Clark, Mechanics of Pneumatic Tires): the tread's speed is that of
+    /// the undeformed circle, its motor force likewise.
+    pub(super) fn rolling_part(&self) -> f64 {
+        1.0 - self.parameters.rolling_compression * self.truth.depth_mm
+            / self.parameters.ring.radius_mm
     }
 
     /// Axial travel of a gripping wheel per travel of its tread. With equal utilisation all
@@ -215,7 +266,7 @@ impl VirtualRig {
     /// that work is known from the last strides.
     fn advance(&self) -> f64 {
         let (normal, cosine, sine) = self.forces;
-        if !self.parameters.climb_slows || cosine <= 0.0 {
+        if cosine <= 0.0 {
             return 1.0;
         }
         let step = sine - self.truth.resistance_n;
@@ -225,10 +276,21 @@ impl VirtualRig {
 
     /// Learns how much more than by the direction of the step's force the wheel has risen.
     pub(super) fn learn_rise(&mut self, contact: &Contact, travel_mm: f64, rise_mm: f64) {
-        if self.parameters.climb_slows && contact.cosine_n > 0.0 {
+        if contact.cosine_n > 0.0 {
             let leans = contact.step_sine_n / contact.cosine_n;
             let more = rise_mm - (leans + self.tread_intake) * travel_mm;
             self.tread_intake += more * travel_mm.signum() / travel_mm.abs().max(LEARNING_MM);
+        }
+    }
+
+    /// Learns the inner load. Elements press along their rays, which are not normal to the wall:
+    /// the resultants do not do quite the work that the elements take up. What they lack is a
+    /// torque.
+    pub(super) fn learn_inner_load(&mut self, lacking_mj: f64, rolled_mm: f64) {
+        let rolled = rolled_mm.abs();
+        if rolled > 0.0 {
+            let part = 1.0 / rolled.max(LEARNING_MM);
+            self.inner_load_n += (lacking_mj - self.inner_load_n * rolled) * part;
         }
     }
 

@@ -38,6 +38,9 @@ pub(super) struct Place {
     /// Direction of the edge behind, height of the wall above the one behind it, mm, and
     /// the angle between elements, rad, if in reach.
     pub(super) edge: Option<(Edge, f64, f64)>,
+    /// Radius of the edges, if they are round, and the distances to the faces ahead and
+    /// behind, mm.
+    pub(super) round: Option<(f64, f64, f64)>,
 }
 
 /// Place and law, a number for every lane.
@@ -52,6 +55,9 @@ struct Given {
     tangent: Lanes,
     excess: Lanes,
     from_new: Lanes,
+    /// Radius of the edges, its square, and the axial distances of their arcs' centres ahead.
+    round: (Lanes, Lanes),
+    arcs: (Lanes, Lanes),
 }
 
 impl Given {
@@ -59,7 +65,10 @@ impl Given {
         let ((sin, cos), drop, pitch) = place
             .edge
             .map_or(((1.0, 0.0), 0.0, 1.0), |(edge, drop, pitch)| (edge.direction(), drop, pitch));
+        let (round, ahead, behind) = place.round.unwrap_or_default();
         Self {
+            round: (Lanes::splat(round), Lanes::splat(round * round)),
+            arcs: (Lanes::splat(ahead + round), Lanes::splat(round - behind)),
             radius: Lanes::splat(place.radius),
             height: Lanes::splat(place.height),
             rise: Lanes::splat(place.rise.unwrap_or(0.0)),
@@ -68,7 +77,7 @@ impl Given {
             per_pitch: Lanes::splat(1.0 / pitch),
             tangent: Lanes::splat(law.tangent),
             excess: Lanes::splat(law.excess),
-            from_new: Lanes::splat(law.from_new),
+            from_new: Lanes::splat(law.first.from_new),
         }
     }
 }
@@ -84,20 +93,57 @@ struct Met {
     face: Lanes,
     covered: Lanes,
     behind: Lanes,
+    /// Change of the depth by the height over that on a plane.
+    leans: Lanes,
+}
+
+/// Where the rays meet an arc of an edge, its centre `ahead` of the wheel's and `below` it:
+/// distance, change of it by the height over that on a plane, and square of the distance by
+/// which they pass the arc's centre.
+#[inline(always)]
+fn meet_arc(block: &Block, g: &Given, ahead: Lanes, below: Lanes) -> (Lanes, Lanes, Lanes) {
+    let along = ahead * block.sin + below * block.cos;
+    let past = ahead * block.cos - below * block.sin;
+    let half = (g.round.1 - past * past).fast_max(Lanes::ZERO).sqrt();
+    // Where a ray grazes the arc, a bound.
+    let least = Lanes::splat(0.1) * g.round.0;
+    let leans = (block.cos - past * block.sin / half.fast_max(least)) * block.cos;
+    (along - half, leans, past * past)
 }
 
 #[inline(always)]
-fn meet<const STEP: bool, const EDGE: bool>(block: &Block, g: &Given) -> Met {
+fn meet<const STEP: bool, const EDGE: bool, const ROUND: bool>(block: &Block, g: &Given) -> Met {
     let floor = g.radius - g.height * block.sec;
     let none = Lanes::ZERO;
-    let mut met = Met { depth: floor, step: none, face: none, covered: Lanes::ONE, behind: none };
+    let one = Lanes::ONE;
+    let mut met =
+        Met { depth: floor, step: none, face: none, covered: one, behind: none, leans: one };
+    if EDGE && ROUND {
+        let (distance, leans, _) = meet_arc(block, g, g.arcs.1, g.height + g.round.0);
+        let on_arc = (g.height * block.sin * block.sec).simd_lt(g.arcs.1);
+        met.depth = on_arc.bitselect(g.radius - distance, floor);
+        met.leans = on_arc.bitselect(leans, one);
+    }
     if STEP {
         let top = floor + g.rise * block.sec;
         let on_face = block.face.simd_lt(top);
-        let step = on_face.bitselect(block.face, top);
-        met.step = step.simd_gt(floor);
-        met.face = met.step & on_face;
-        met.depth = met.step.bitselect(step, floor);
+        let (mut step, mut face, mut leans) = (on_face.bitselect(block.face, top), on_face, one);
+        if ROUND {
+            let below = g.height - g.rise + g.round.0;
+            let (distance, by_height, past) = meet_arc(block, g, g.arcs.0, below);
+            let on_arc = past.simd_lt(g.round.1)
+                & (distance * block.sin).simd_lt(g.arcs.0)
+                & (distance * block.cos).simd_lt(below);
+            step = on_arc.bitselect(g.radius - distance, step);
+            leans = on_arc.bitselect(by_height, one);
+            face &= !on_arc;
+        }
+        met.step = step.simd_gt(met.depth);
+        met.face = met.step & face;
+        met.depth = met.step.bitselect(step, met.depth);
+        if ROUND {
+            met.leans = met.step.bitselect(leans, met.leans);
+        }
     }
     if EDGE {
         let within = (g.edge.0 * block.cos + g.edge.1 * block.sin) * g.per_pitch;
@@ -141,10 +187,17 @@ fn total(lanes: Lanes) -> f64 {
 
 /// Pressure of a block, its stiffness against the height, and its part in contact.
 #[inline(always)]
-fn bear<const EDGE: bool>(block: &Block, g: &Given, met: &Met) -> (Lanes, Lanes, Lanes) {
+fn bear<const EDGE: bool, const ROUND: bool>(
+    block: &Block,
+    g: &Given,
+    met: &Met,
+) -> (Lanes, Lanes, Lanes) {
     let (mut pressure, touches) = press(g, met.depth, block.carried);
     // On the face the depth does not change with the height.
     let mut moves = g.tangent & touches & !met.face;
+    if ROUND {
+        moves *= met.leans;
+    }
     let mut part = Lanes::ONE & touches;
     if EDGE {
         let (behind, there) = press(g, met.behind, block.carried);
@@ -157,12 +210,16 @@ fn bear<const EDGE: bool>(block: &Block, g: &Given, met: &Met) -> (Lanes, Lanes,
 }
 
 #[inline(always)]
-fn sums_of<const STEP: bool, const EDGE: bool>(blocks: &[Block], place: &Place, law: &Law) -> Sums {
+fn sums_of<const STEP: bool, const EDGE: bool, const ROUND: bool>(
+    blocks: &[Block],
+    place: &Place,
+    law: &Law,
+) -> Sums {
     let g = Given::new(place, law);
     let [mut c, mut s, mut dc, mut ds] = [Lanes::ZERO; 4];
     for block in blocks {
-        let met = meet::<STEP, EDGE>(block, &g);
-        let (pressure, moves, _) = bear::<EDGE>(block, &g, &met);
+        let met = meet::<STEP, EDGE, ROUND>(block, &g);
+        let (pressure, moves, _) = bear::<EDGE, ROUND>(block, &g, &met);
         c += pressure * block.cos;
         s += pressure * block.sin;
         dc -= moves;
@@ -172,7 +229,7 @@ fn sums_of<const STEP: bool, const EDGE: bool>(blocks: &[Block], place: &Place, 
 }
 
 #[inline(always)]
-fn totals_of<const STEP: bool, const EDGE: bool>(
+fn totals_of<const STEP: bool, const EDGE: bool, const ROUND: bool>(
     blocks: &[Block],
     place: &Place,
     law: &Law,
@@ -183,8 +240,8 @@ fn totals_of<const STEP: bool, const EDGE: bool>(
     let [mut dc, mut ds, mut count] = [Lanes::ZERO; 3];
     let mut highest = least;
     for block in blocks {
-        let met = meet::<STEP, EDGE>(block, &g);
-        let (pressure, moves, part) = bear::<EDGE>(block, &g, &met);
+        let met = meet::<STEP, EDGE, ROUND>(block, &g);
+        let (pressure, moves, part) = bear::<EDGE, ROUND>(block, &g, &met);
         let (floor, step) = (pressure & !met.step, pressure & met.step);
         normal += pressure;
         fc += floor * block.cos;
@@ -217,7 +274,7 @@ fn totals_of<const STEP: bool, const EDGE: bool>(
 
 /// Hands over the new depths and internal displacements, block after block.
 #[inline(always)]
-fn advance_of<const STEP: bool, const EDGE: bool>(
+fn advance_of<const STEP: bool, const EDGE: bool, const ROUND: bool>(
     blocks: &[Block],
     place: &Place,
     law: &Law,
@@ -227,7 +284,7 @@ fn advance_of<const STEP: bool, const EDGE: bool>(
     // What has all but decayed is gone, before it turns denormal and slow.
     let gone = Lanes::splat(1e-200);
     for (index, block) in blocks.iter().enumerate() {
-        let met = meet::<STEP, EDGE>(block, &g);
+        let met = meet::<STEP, EDGE, ROUND>(block, &g);
         let depth = if EDGE {
             met.covered.simd_gt(Lanes::ZERO).bitselect(met.depth, met.behind)
         } else {
@@ -242,11 +299,14 @@ fn advance_of<const STEP: bool, const EDGE: bool>(
 /// Picks the pass that looks at no more than what is in reach.
 macro_rules! by_wall {
     ($place:expr, $of:ident, $($argument:expr),*) => {
-        match ($place.rise.is_some(), $place.edge.is_some()) {
-            (false, false) => $of::<false, false>($($argument),*),
-            (true, false) => $of::<true, false>($($argument),*),
-            (false, true) => $of::<false, true>($($argument),*),
-            (true, true) => $of::<true, true>($($argument),*),
+        match ($place.rise.is_some(), $place.edge.is_some(), $place.round.is_some()) {
+            (false, false, _) => $of::<false, false, false>($($argument),*),
+            (true, false, false) => $of::<true, false, false>($($argument),*),
+            (false, true, false) => $of::<false, true, false>($($argument),*),
+            (true, true, false) => $of::<true, true, false>($($argument),*),
+            (true, false, true) => $of::<true, false, true>($($argument),*),
+            (false, true, true) => $of::<false, true, true>($($argument),*),
+            (true, true, true) => $of::<true, true, true>($($argument),*),
         }
     };
 }

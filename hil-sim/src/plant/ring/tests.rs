@@ -11,6 +11,8 @@ fn rubber(elements: usize) -> RingParameters {
         k_0: 0.6044 * 4.2235,
         tau_s: 0.1059,
         elements,
+        tread_thickness_mm: 0.0,
+        second_relaxation: 1.0,
     }
 }
 

@@ -1,0 +1,59 @@
+//! Books the energies of a stride, see [`Energy`](crate::plant::energy::Energy).
+
+use super::traction::{Moves, Stride};
+use super::{Drives, Truth, VirtualRig};
+
+impl VirtualRig {
+    /// Books a stride that began with this truth. The axial forces of its end act over the
+    /// travel by its mean speeds, as the step of time has it.
+    pub(super) fn book(&mut self, before: &Truth, drives: &Drives, stride: &Stride) {
+        let (normal, cosine, sine) = self.forces;
+        let (p, truth) = (&self.parameters, &self.truth);
+        let travel = self.mean(before.speed_mm_s, truth.speed_mm_s) * stride.dt_s;
+        let rolled = self.mean(before.tread_mm_s, truth.tread_mm_s) * stride.dt_s;
+        let above =
+            self.parameters.run_out_mm * (truth.rotation_rad.cos() - before.rotation_rad.cos());
+        // Of the rim's axis, and of the axle.
+        let lifted = truth.height_mm - before.height_mm;
+        let rise = lifted - above;
+        let part = self.rolling_part();
+        let advance = match stride.moves {
+            Moves::Driven(grip) | Moves::Free(grip) => grip.advance,
+            Moves::Latched | Moves::Spins(_) => part,
+        };
+        let slip = self.mean(
+            advance * before.tread_mm_s - before.speed_mm_s,
+            advance * truth.tread_mm_s - truth.speed_mm_s,
+        ) * stride.dt_s;
+        let traction_n = truth.utilisation * normal * part;
+        let kinetic =
+            p.mass_kg * truth.speed_mm_s.powi(2) + p.drive.mass_kg * truth.tread_mm_s.powi(2);
+        let spring = 0.5 * (before.preload_n + self.preload_now());
+        let pressed = cosine + truth.utilisation * sine;
+        let taken = self.ring.taken_mj();
+        let given_mj = sine * travel - cosine * lifted;
+        let inner_mj = self.inner_load_n * rolled.abs();
+        // While the ring sleeps, it goes on as it was.
+        let awake = truth.ring_awake;
+        let taken_mj = if awake { taken - self.taken_mj } else { given_mj + inner_mj };
+        // Where the worm holds a load along the motion, it holds less of it.
+        let inner = if self.tread_load_n == 0.0 { inner_mj } else { 0.0 };
+        let energy = &mut self.energy;
+        energy.motor_mj += stride.motor_force_n(self.tread_load_n) * rolled;
+        if drives.drive_on {
+            energy.gear_mj += p.drive.friction_n * rolled.abs();
+        }
+        energy.worm_mj += (-traction_n * rolled - inner).max(0.0);
+        energy.creep_mj += traction_n / advance * slip;
+        energy.contact_mj += given_mj;
+        energy.tread_mj += taken_mj;
+        energy.load_mj += p.load_n * travel;
+        energy.preload_mj += spring * rise;
+        energy.arm_mj += (pressed - spring) * rise;
+        energy.kinetic_mj = 0.5e-3 * kinetic;
+        self.taken_mj = taken;
+        // To a multiple of 2^-20 mJ: elements visited without need do not show in any bit.
+        let grid = 1.5 * 4_294_967_296.0;
+        self.learn_inner_load((taken_mj - given_mj + grid) - grid, rolled);
+    }
+}

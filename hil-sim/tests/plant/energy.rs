@@ -1,0 +1,68 @@
+//! The first law over complete climbs and descents.
+
+use hil_sim::plant::draw::PlantParameters;
+use hil_sim::plant::rig::{Resolution, VirtualRig};
+use hil_sim::scenario::Scenario;
+
+use super::bench::{TICK_S, nominal, roll};
+
+/// Half the stride and twice the elements of the usual setting.
+fn finer(mut plant: PlantParameters) -> PlantParameters {
+    plant.ring.elements *= 2;
+    plant
+}
+
+/// What is missing from the first law over the travel, as part of the energy that flows.
+fn missing(plant: PlantParameters, speed: f64, preload: f64) -> f64 {
+    let (from, to) = if speed > 0.0 { (0.0, 80.0) } else { (80.0, 0.0) };
+    let resolution = Resolution { stride_mm: 0.02, ..Resolution::default() };
+    let mut rig = VirtualRig::new(plant, from, preload, TICK_S).with_resolution(resolution);
+    // Under way, the wheel off the latch.
+    roll(&mut rig, speed, from + speed.signum(), 10.0, |_| ()).unwrap();
+    let start = *rig.energy();
+    assert!(roll(&mut rig, speed, to, 60.0, |_| ()).unwrap(), "stuck: {:?}", rig.truth());
+    let energy = rig.energy();
+    assert_eq!(rig.ledger().crossings().len(), 3);
+    assert_eq!(rig.truth().slip_mm, 0.0);
+    // On a descent the load drives, and most goes into the worm.
+    let released = -(energy.load_mj + energy.preload_mj + energy.arm_mj).min(0.0);
+    energy.missing_mj(&start) / (energy.motor_mj + released)
+}
+
+fn balances(plant: PlantParameters, speed: f64, preload: f64) {
+    let part = missing(finer(plant), speed, preload);
+    assert!(part.abs() < 3e-3, "{speed} mm/s, {preload} N: {part}");
+}
+
+#[test]
+fn the_drives_work_is_found_again_on_the_prototype() {
+    for (speed, preload) in [(8.0, 33.3), (25.0, 48.0), (-8.0, 33.3), (-25.0, 33.3)] {
+        balances(nominal("prototype"), speed, preload);
+    }
+}
+
+#[test]
+fn the_drives_work_is_found_again_under_the_loads_of_the_finite_elements() {
+    for (speed, preload) in [(5.0, 100.0), (12.0, 100.0), (-30.0, 100.0)] {
+        balances(nominal("fe"), speed, preload);
+    }
+}
+
+#[test]
+fn the_drives_work_is_found_again_under_a_heavy_load() {
+    for speed in [8.0, -8.0] {
+        let mut plant = nominal("prototype");
+        plant.load_n = 15.0;
+        balances(plant, speed, 45.0);
+    }
+}
+
+#[test]
+fn the_drives_work_is_found_again_on_random_rigs() {
+    for seed in 1..=3 {
+        let mut scenario = Scenario::default();
+        scenario.run.seed = seed;
+        balances(scenario.plant(), 10.0, 40.0);
+        balances(scenario.plant(), -10.0, 40.0);
+    }
+}
