@@ -194,7 +194,8 @@ pub struct ControlSettings {
     /// Friction utilisation that the schedule leaves unused, absolute. Chosen: the reduced
     /// model reads the need up to 0.06 too low.
     pub slip_margin: f64,
-    /// Largest deviation of the stiffness estimate from nominal, relative.
+    /// Largest deviation of the stiffness estimate below nominal, relative; above it four times
+    /// as much, which only makes the crossings slower.
     pub adaptation_range: f64,
     /// Part of an observed stiffness error taken over per crossing.
     pub adaptation_gain: f64,

@@ -102,8 +102,8 @@ pub struct Controller {
     friction: Ratio,
     /// Least useful speed of a crossing, mm/s.
     least_speed: MillimetresPerSecond,
-    /// Preload that carries the load along the wall, N.
-    roll_preload: Newtons,
+    /// Reciprocal of the friction that may be used along the wall.
+    by_grip: Q16,
 }
 
 /// Data of a tick that the stages share.

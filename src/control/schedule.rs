@@ -16,8 +16,6 @@ use crate::units::{
 const REACHED_PART: Q16 = q16(20_000);
 /// Time by which braking starts early, for detection, tick and the loop's lag, s.
 const BRAKE_LAG: Seconds = q16(10_000);
-/// Time that a preload needs after its reference, s.
-const SETTLING: Seconds = q16(80_000);
 /// Distance by which braking for the end starts early, mm.
 const END_RESERVE: Millimetres = q16(20_000);
 /// Speed at which the last tenth of a millimetre is covered, mm/s.
@@ -96,6 +94,11 @@ impl Schedule {
         self.reached_within
     }
 
+    /// Largest acceleration on the way from rest to this speed, mm/s^2.
+    pub fn peak_acceleration(&self, speed: MillimetresPerSecond) -> MillimetresPerSecond2 {
+        self.timing.peak_acceleration(speed)
+    }
+
     /// What to ask for.
     pub fn targets(&self, steps: &Steps, plan: &Plan, course: &Course) -> Targets {
         // To where crossing speed and preload must be reached, by the table or the felt corner.
@@ -114,7 +117,7 @@ impl Schedule {
         let ramping = course.ramping
             || course.critical
             || within(earliest, self.ramp_way(plan, course.reference.min(plan.cruise_preload)));
-        let preload = if ramping { plan.cross_preload } else { plan.cruise_preload };
+        let preload = if ramping { plan.ramp_preload } else { plan.cruise_preload };
         let mut speed = match (looking, braking) {
             (_, true) => plan.cross_speed,
             (true, false) => plan.window_speed,
@@ -129,10 +132,16 @@ impl Schedule {
             // On the edge alone a wheel that goes back cannot wait: its tread sinks in.
             && !(course.critical && course.direction == Direction::Retract)
         {
-            // Lift off with the preload, not before it.
-            let needed = self.timing.ramp(short) + SETTLING;
-            let earlier = short * plan.earlier_per_preload;
-            let allowed = self.arriving_in(needed, distance - plan.ready_from - earlier, course);
+            // Lift off with the preload, not before it; what is slow lies within that time.
+            let needed = self.timing.ramp(short);
+            let ready = distance - plan.ready_from - short * plan.earlier_per_preload;
+            let fast = ready - (plan.slow_from - plan.ready_from);
+            let slow = divide(plan.slow_from - plan.ready_from, plan.cross_speed);
+            let allowed = if fast > Q16::ZERO {
+                if needed > slow { self.arriving_in(needed - slow, fast, course) } else { Q16::MAX }
+            } else {
+                self.arriving_in(needed, ready, course)
+            };
             if allowed < speed {
                 speed = allowed;
                 // A preload that rises as planned is not waited for.

@@ -228,14 +228,14 @@ impl Estimator {
         let tolerance = self.steps.tolerance();
         let alike = |other: Millimetres| (residual - other).abs() <= tolerance;
         if state.known.is_searching() {
-            state.odometry.set(sensed.travel, state.position - residual);
+            state.odometry.set_by_step(sensed.travel, state.position - residual);
             state.known = Position::Located;
         } else if residual.abs() <= tolerance {
             state.odometry.correct(residual);
             state.displaced = None;
         } else if state.displaced.is_some_and(alike) {
             // Two in a row off by the same: the odometry is wrong.
-            state.odometry.set(sensed.travel, state.position - residual);
+            state.odometry.set_by_step(sensed.travel, state.position - residual);
             state.displaced = None;
         } else if state.displaced.is_some() {
             // Two in a row off by different distances: the odometry has lost its scale, or the

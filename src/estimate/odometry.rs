@@ -3,13 +3,12 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use crate::numeric::sqrt;
+use crate::numeric::{divide, sqrt};
 use crate::units::{Millimetres, Q16, Ratio, Travel, q16};
 
-/// Part of a step's residual that is taken for odometry error; the rest is left to the step's
-/// own tolerance. A sleeve is machined to 0.3 mm, odometry is off by less than 0.1 mm over the
-/// 22 mm between two steps.
-const CORRECTION: Ratio = q16(100_000);
+/// Steps whose tolerance weighs as much as the odometry from a sure position: a sleeve is
+/// machined to 0.3 mm, odometry is off by less than 0.1 mm over the 22 mm between two steps.
+const SURE: u8 = 9;
 
 /// Largest correction at one step, mm: beyond it the step is not the one expected.
 const LARGEST: Millimetres = q16(2_000_000);
@@ -22,6 +21,8 @@ const CHORD: Millimetres = q16(800_000);
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Odometry {
     offset: Travel,
+    /// Steps of the table that the offset is the mean of; [`SURE`] for a position that is known.
+    steps: u8,
     from: Option<Start>,
 }
 
@@ -53,7 +54,15 @@ impl Odometry {
     /// Declares that the wheel is at `position`.
     pub fn set(&mut self, travel: Travel, position: Millimetres) {
         self.offset = position.widen().saturating_sub(travel);
+        self.steps = SURE;
         self.from = None;
+    }
+
+    /// Declares that the wheel is at `position` because a step was found: as sure as that
+    /// step's place.
+    pub fn set_by_step(&mut self, travel: Travel, position: Millimetres) {
+        self.set(travel, position);
+        self.steps = 1;
     }
 
     /// Begins a run: what moved the arm since the last one was no rolling.
@@ -61,10 +70,12 @@ impl Odometry {
         self.from = None;
     }
 
-    /// Takes over part of the difference between where a step was found and where
-    /// the table has it, mm.
+    /// Takes over the part of the difference between where a step was found and where the
+    /// table has it, mm, by which the offset is the mean over the steps found.
     pub fn correct(&mut self, residual: Millimetres) {
-        let share = (residual * CORRECTION).clamp(-LARGEST, LARGEST);
+        let steps = (self.steps + 1).min(SURE + 1);
+        let share = divide(residual.clamp(-LARGEST, LARGEST), Q16::from_num(steps));
+        self.steps = steps.min(SURE);
         self.offset = self.offset.saturating_sub(share.widen());
     }
 
@@ -174,10 +185,26 @@ mod tests {
     }
 
     #[test]
-    fn a_tenth_of_a_residual_is_taken_over() {
+    fn of_a_sure_position_a_tenth_of_a_residual_is_taken_over() {
         let mut odometry = Odometry::default();
+        odometry.set(Travel::ZERO, Q16::ZERO);
         odometry.correct(Q16::from_num(0.5));
         let position: f64 = odometry.position(Travel::from_num(20)).to_num();
         assert!((position - 19.95).abs() < 1e-3, "{position}");
+    }
+
+    #[test]
+    fn a_position_that_steps_set_is_the_mean_over_their_places() {
+        let places = [0.3, -0.2, 0.2, -0.1];
+        let mut odometry = Odometry::default();
+        // The step at 20 mm is found; the table has it off by its place error.
+        odometry.set_by_step(Travel::ZERO, Q16::from_num(places[0]));
+        for found in 2..=places.len() {
+            let off: f64 = odometry.position(Travel::ZERO).to_num();
+            odometry.correct(Q16::from_num(off - places[found - 1]));
+            let mean = places[..found].iter().sum::<f64>() / found as f64;
+            let off: f64 = odometry.position(Travel::ZERO).to_num();
+            assert!((off - mean).abs() < 1e-3, "{off} {mean}");
+        }
     }
 }

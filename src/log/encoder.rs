@@ -303,6 +303,7 @@ mod tests {
             slow_from: most,
             ready_from: most,
             earlier_per_preload: most,
+            ramp_preload: most,
             brake_horizon: most,
             look_ahead: true,
             limits: [Some(Limit::SlipMarginLow); 3],

@@ -92,6 +92,9 @@ pub struct Plan {
     pub cruise_preload: Newtons,
     /// Preload at the step, N.
     pub cross_preload: Newtons,
+    /// Preload at which the rise for the step ends, N: beyond that at the step where the wheel
+    /// lifts off while it still rises.
+    pub ramp_preload: Newtons,
     /// Gap that this gives, mm.
     pub gap: Millimetres,
     /// Friction left unused at the step.

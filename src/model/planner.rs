@@ -16,11 +16,20 @@ use crate::units::{
     Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Seconds, q16,
 };
 
-/// Largest correction of the stiffness scale by one crossing.
+/// Largest correction of the stiffness scale by one crossing, and that towards a stiffer tread,
+/// which only makes the crossings slower.
 const LARGEST_CORRECTION: Ratio = q16(100_000);
+const LARGEST_STIFFER: Ratio = q16(1_000_000);
 
-/// Relative difference of an observed stiffness above which it is rejected.
+/// Correction towards a stiffer tread above which it is no noise, and the gain that it then has
+/// at least.
+const SURE: Ratio = q16(100_000);
+const SURE_GAIN: Ratio = q16(800_000);
+
+/// Relative difference of a softer and of a stiffer observed stiffness above which it is
+/// rejected: too stiff a guess only costs time.
 const OUTLIER: Ratio = q16(350_000);
+const OUTLIER_STIFFER: Ratio = q16(2_500_000);
 /// Relative difference of an observed stiffness above which it is reported. Rubber that is off
 /// by three deviations makes 0.12 at the first crossing; the rest is the measurement, where a
 /// stiff guess costs most. Two of 1,500 random rigs exceed 0.20.
@@ -48,6 +57,10 @@ const FELT_WITHIN: Millimetres = q16(150_000);
 /// part of the range.
 const PRELOADS: u32 = 16;
 const PRELOAD_STEP: Ratio = q16(62_500);
+
+/// Rise beyond the preload at the step that keeps the actuator's lag out of the time until it is
+/// reached, N: two lags at full slew.
+const BEYOND: Newtons = q16(3_000_000);
 
 /// Error of the model's inverse, N.
 const HOLDS_WITHIN: Newtons = q16(100_000);
@@ -114,6 +127,7 @@ impl Planner {
             cross_speed: cruise_speed,
             cruise_preload: self.between_steps(),
             cross_preload: self.between_steps(),
+            ramp_preload: self.between_steps(),
             gap: self.target(request.direction, share),
             slip_margin: self.usable,
             brake_way: Millimetres::ZERO,
@@ -159,7 +173,7 @@ impl Planner {
             Some(speed) => (speed, speed),
             None => (floor, ceiling),
         };
-        let Choice { preload: most, gap, speed, .. } =
+        let Choice { preload: most, gap, speed, rising, .. } =
             self.choose(request, &at, arm_thrust, (floor, ceiling));
         let (speed, moved) = self.guard.below(speed);
         if moved {
@@ -181,6 +195,10 @@ impl Planner {
             Strategy::Limit => self.most_preload,
             Strategy::Reactive => wanted.clamp(self.cruise_preload, self.most_preload),
         };
+        plan.ramp_preload = plan.cross_preload;
+        if self.strategy == Strategy::Scheduled && rising {
+            plan.ramp_preload = (plan.cross_preload + BEYOND).min(self.most_preload);
+        }
         let carried = plan.cross_preload.min(most) + arm_thrust;
         let crossing = self.model.crossing(&at, carried);
         plan.gap = crossing.gap;
@@ -307,11 +325,13 @@ impl Planner {
             gap -= gap * q16(62_500);
         }
         let ready = self.timing.preload_change((preload - request.preload).max(Q16::ZERO));
-        let travels = divide(request.distance.max(Q16::ZERO), self.cruise_speed);
         let slower = self.cruise_speed - speed;
         let change = self.timing.speed_change(slower) * divide(slower, self.cruise_speed);
-        let time = ready.max(travels) + divide(SLOW_TRAVEL[at.direction as usize], speed) + change;
-        Choice { preload, gap, speed, time, holds }
+        let slow = divide(SLOW_TRAVEL[at.direction as usize], speed);
+        let travels = divide(request.distance.max(Q16::ZERO), self.cruise_speed) + slow + change.half();
+        let rising = ready > travels;
+        let time = ready.max(travels) + change.half();
+        Choice { preload, gap, speed, time, rising, holds }
     }
 
     /// Distance and time of braking before the step.
@@ -342,14 +362,18 @@ impl Planner {
         let observed = self.model.observed_scale(&at, review.gap, force);
         let off = (observed - scale).abs();
         let strange = off > STRANGE * scale;
+        let stiffer = observed > scale;
         // Further off than any tread or tolerance, the measurement is wrong.
-        if off > OUTLIER * scale {
+        let outlier = if stiffer { OUTLIER_STIFFER } else { OUTLIER };
+        if off > outlier * scale {
             return unchanged(strange);
         }
         let missed = divide((review.gap - crossing.gap).abs(), review.gap.max(q16(100_000)));
         let reserve = request.reserve.half() + missed * self.by_reserve;
         let reserve = reserve.clamp(LEAST_RESERVE, MOST_RESERVE);
-        let step = ((observed - scale) * self.gain).clamp(-LARGEST_CORRECTION, LARGEST_CORRECTION);
+        let gain = if stiffer && off > SURE { self.gain.max(SURE_GAIN) } else { self.gain };
+        let most = if stiffer { LARGEST_STIFFER } else { LARGEST_CORRECTION };
+        let step = ((observed - scale) * gain).clamp(-LARGEST_CORRECTION, most);
         let (low, high) = self.scale_range;
         let wanted = scale + step;
         let scale = wanted.clamp(low, high);
@@ -383,6 +407,8 @@ struct Choice {
     speed: MillimetresPerSecond,
     /// Until the step is behind, s, but for what is the same for every preload.
     time: Seconds,
+    /// The wheel waits for it: it lifts off while the preload rises.
+    rising: bool,
     /// It holds the gap and keeps the slip margin.
     holds: bool,
 }

@@ -16,14 +16,15 @@ use crate::units::Duty;
 pub const LAG_TICKS: f64 = 1.0;
 /// Response of the low-pass to a step within a tick, Q15: `1 - exp(-1 / LAG_TICKS)`.
 const TAKES: i32 = 20_713;
+/// The same of a low-pass that is 15 % faster or slower.
+const TAKES_ENDS: [i32; 2] = [22_662, 19_035];
 /// Tolerance of the output, Q15 duty: five deviations of its noise, 0.002 each, and three of its
 /// zero, as much again; the voltage drop of the transistors is less.
 pub const BAND: i32 = 655;
 /// Tolerance relative to the expected output, as a shift: three deviations of supply, divider
 /// and reference together, 0.7 % each.
 pub const BAND_SHIFT: u32 = 5;
-/// Ticks for which the output must be off: a low-pass that is off by 15 % leaves 0.05 of the
-/// largest step after one tick, 0.04 after two, 0.02 after three.
+/// Ticks for which the output must be off.
 pub const OFF_TICKS: i8 = 4;
 /// Ticks without a conversion that count as a fault, as for the sensors.
 const SILENT_TICKS: u8 = 20;
@@ -45,16 +46,17 @@ pub struct Readback {
 struct Bridge {
     /// Duty commanded until now, Q15.
     commanded: i16,
-    lag: Lag,
-    /// Output a tick ago, Q15.
-    before: i32,
+    /// Through the fastest and the slowest low-pass.
+    lags: [Lag; 2],
+    /// Least and largest output a tick ago, Q15.
+    before: (i32, i32),
     /// Ticks for which it has been off; if negative, ticks until it is judged.
     off: i8,
 }
 
 impl Default for Bridge {
     fn default() -> Self {
-        Self { commanded: 0, lag: Lag(0), before: 0, off: -SETTLES }
+        Self { commanded: 0, lags: [Lag(0); 2], before: (0, 0), off: -SETTLES }
     }
 }
 
@@ -66,8 +68,12 @@ pub struct Lag(i32);
 impl Lag {
     /// Output after a tick under this duty, Q15.
     pub const fn step(&mut self, duty: i32) -> i32 {
+        self.step_by(duty, TAKES)
+    }
+
+    const fn step_by(&mut self, duty: i32, takes: i32) -> i32 {
         // |duty - output| <= 2^16: the product stays below 2^31.
-        self.0 += ((duty - self.0) * TAKES + (1 << 14)) >> 15;
+        self.0 += ((duty - self.0) * takes + (1 << 14)) >> 15;
         self.0
     }
 }
@@ -83,8 +89,8 @@ impl Readback {
     /// restart in motion, drives its motor as a generator: then its bridge is not judged.
     pub fn step(&mut self, found: Option<BridgeCodes>, coasts: bool) -> Option<Fault> {
         let Some(found) = found else {
-            self.drive.lag.step(self.drive.commanded.into());
-            self.pretightener.lag.step(self.pretightener.commanded.into());
+            self.drive.advance();
+            self.pretightener.advance();
             self.silent = self.silent.saturating_add(1);
             return (self.silent >= SILENT_TICKS).then_some(Fault::ReadbackStale);
         };
@@ -102,15 +108,26 @@ impl Readback {
 }
 
 impl Bridge {
+    /// Least and largest output after a tick under the duty.
+    fn advance(&mut self) -> (i32, i32) {
+        let duty = self.commanded.into();
+        let [fast, slow] = &mut self.lags;
+        let (fast, slow) =
+            (fast.step_by(duty, TAKES_ENDS[0]), slow.step_by(duty, TAKES_ENDS[1]));
+        (fast.min(slow), fast.max(slow))
+    }
+
     /// Whether it has been off for too long. The code was taken at some moment of the last two
     /// ticks: it may lie anywhere between the outputs of three.
     fn is_off(&mut self, code: BridgeCode) -> bool {
-        let (older, before) = (self.before, self.lag.0);
-        let now = self.lag.step(self.commanded.into());
+        let older = self.before;
+        let [fast, slow] = self.lags;
+        let before = (fast.0.min(slow.0), fast.0.max(slow.0));
+        let now = self.advance();
         self.before = before;
-        let (low, high) = if before < now { (before, now) } else { (now, before) };
-        let (low, high) = (low.min(older), high.max(older));
-        let band = BAND + (now.abs() >> BAND_SHIFT);
+        let low = now.0.min(before.0).min(older.0);
+        let high = now.1.max(before.1).max(older.1);
+        let band = BAND + (now.0.abs().max(now.1.abs()) >> BAND_SHIFT);
         let found = code.duty();
         let off = found < low - band || found > high + band;
         self.off = if off || self.off < 0 { self.off.saturating_add(1) } else { 0 };
@@ -256,7 +273,7 @@ mod tests {
         /// Supply, divider, zero, low-pass and moment all at the ends of what is foreseen.
         #[test]
         fn a_sound_bridge_raises_no_alarm(
-            steps in prop::collection::vec((-1.0..1.0f64, 4usize..30), 1..20),
+            steps in prop::collection::vec((-1.0..1.0f64, 1usize..30), 1..20),
             tau in 0.85..1.15f64,
             at in 0.05..1.0f64,
             late in any::<bool>(),
@@ -300,8 +317,13 @@ mod tests {
     #[test]
     fn off_by_the_band_is_borne_and_by_more_is_not() {
         let step = |given: i16, found: i32| {
-            let lag = Lag(given.into());
-            let mut bridge = Bridge { commanded: given, lag, before: given.into(), off: 0 };
+            let given_q15 = i32::from(given);
+            let mut bridge = Bridge {
+                commanded: given,
+                lags: [Lag(given_q15); 2],
+                before: (given_q15, given_q15),
+                off: 0,
+            };
             // The code's own steps are coarser than what is asked here.
             let code = BridgeCode::of(found);
             assert_eq!(code.duty(), found);

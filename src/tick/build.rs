@@ -20,8 +20,6 @@ const OBSERVER_RAD_S: f64 = 60.0;
 /// Part of the pre-tightener's slew that the spring may take while the wheel climbs.
 const CLIMB_PART: f64 = 0.9;
 
-/// Preload over that which the load needs along the wall.
-const ROLL_RESERVE: f64 = 1.25;
 
 impl Controller {
     /// Turns a rig into machine units, once; fails where a parameter is out of range or does
@@ -62,14 +60,9 @@ impl Controller {
                 "drive.min_crossing_speed_mm_s",
                 rig.drive.min_crossing_speed_mm_s,
             )?,
-            roll_preload: checked(
-                "plant.top_load_n",
-                (load
-                    + (rig.drive.reflected_mass_kg + rig.plant.moved_mass_kg)
-                        * 1e-3
-                        * rig.drive.acceleration_mm_s2)
-                    / (rig.plant.mu - rig.control.slip_margin)
-                    * ROLL_RESERVE,
+            by_grip: checked(
+                "control.slip_margin",
+                1.0 / (rig.plant.mu - rig.control.slip_margin),
             )?,
         })
     }

@@ -4,7 +4,7 @@ use super::{Controller, Event, State, TickContext};
 use crate::fault::{Fault, Limit};
 use crate::supervise::startup::{TEST_TICKS, all_answer, at_rest, silent, stowed};
 use crate::supervise::{Mode, Trigger, next};
-use crate::units::{Direction, Q16};
+use crate::units::{Direction, MillimetresPerSecond, Newtons, Q16};
 
 /// Ticks for which a preload must be reached before the drive starts.
 const STANDING_TICKS: u32 = 60;
@@ -100,8 +100,9 @@ impl Controller {
         }
         let reached = state.planning.plan.as_ref().is_some_and(|plan| {
             let course = self.course(state, tick, direction);
-            let wanted = self.schedule.targets(self.estimator.steps(), plan, &course).preload;
-            let enough = wanted.min(self.roll_preload) - self.schedule.reached_within();
+            let targets = self.schedule.targets(self.estimator.steps(), plan, &course);
+            let enough = targets.preload - self.schedule.reached_within();
+            let enough = enough.min(self.roll_preload(targets.speed));
             tick.sensed.preload_filtered >= enough
         });
         state.condition_ticks = if reached { state.condition_ticks + 1 } else { 0 };
@@ -110,6 +111,11 @@ impl Controller {
         } else if state.in_mode >= self.preload_timeout {
             tick.fail(Fault::PreloadNotReached);
         }
+    }
+
+    /// Preload with which the wheel comes to this speed on the wall without slip, N.
+    fn roll_preload(&self, speed: MillimetresPerSecond) -> Newtons {
+        (self.load + self.inertia * self.schedule.peak_acceleration(speed)) * self.by_grip
     }
 
     /// The end of travel, confirmed by the arm.

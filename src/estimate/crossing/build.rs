@@ -173,7 +173,7 @@ mod tests {
         ) {
             let direction = if back { Direction::Retract } else { Direction::Deploy };
             // Height at which the watch takes the lower wall for left.
-            let y = if back { 25.0 } else { 25.0 - 0.4 * 0.3 };
+            let y = if back { 25.0 } else { 25.0 - MEMORY * 0.3 };
             let exact = ((25.0 - depth).powi(2) + height * (2.0 * y - height)).sqrt() - 25.0;
             for sign in roll(depth, height, direction) {
                 match sign {
