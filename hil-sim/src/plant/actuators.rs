@@ -36,19 +36,6 @@ pub struct Turn {
 }
 
 impl Turn {
-    /// The same against this much more, N, signed as the motion that it resists.
-    pub(super) fn against(self, load_n: f64) -> Self {
-        if load_n == 0.0 || self.free_mm_s == 0.0 {
-            return self;
-        }
-        let free = self.free_mm_s - self.yields * load_n;
-        Self {
-            free_mm_s: if free * self.free_mm_s > 0.0 { free } else { 0.0 },
-            force_n: self.force_n + self.force_rises * load_n,
-            ..self
-        }
-    }
-
     /// The wheel turns at this speed, mm/s, whatever resists.
     pub(super) fn imposed(free_mm_s: f64) -> Self {
         Self { free_mm_s, ..Self::default() }

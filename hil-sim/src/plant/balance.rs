@@ -262,6 +262,7 @@ mod tests {
             yields: 0.025,
             advance: 1.0,
             normal: 1.02,
+            offset_n: 0.0,
         }
     }
 

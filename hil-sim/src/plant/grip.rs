@@ -42,6 +42,9 @@ pub struct Grip {
     pub advance: f64,
     /// Normal force over cosine sum.
     pub normal: f64,
+    /// Load on the tread beside traction, N, positive against its motion. It relieves the drive
+    /// of no more than its load.
+    pub offset_n: f64,
 }
 
 /// How a step ends.
@@ -65,13 +68,21 @@ impl Grip {
         }
         let most = self.mu * cosine;
         let mut asked = self.asked(self.tread, sine);
-        // Against its motion only does a load count for the worm.
-        let resists = asked * self.tread > 0.0;
-        let per_part = if resists { self.yields * self.normal * most } else { 0.0 };
         let lag = self.inertia * self.rolling * self.creep;
-        let mut whole = most + self.inertia * self.advance * per_part;
+        let per_part = self.yields * self.normal * most;
+        let sense = if asked * self.tread < 0.0 { -1.0 } else { 1.0 };
+        let mut whole = most;
         let mut used = Used::of(asked.abs(), whole, lag);
-        if resists && per_part * used.part > self.tread.abs() {
+        // Against its motion only does a load count for the worm.
+        let resists = self.load(sense * used.part * most) > 0.0;
+        if resists {
+            let slows = self.inertia * self.advance;
+            asked -= slows * self.yields * self.offset_n * sense_of(self.tread);
+            whole += slows * per_part;
+            used = Used::of(asked.abs(), whole, lag);
+        }
+        let sense = if asked * self.tread < 0.0 { -1.0 } else { 1.0 };
+        if resists && self.yields * self.load(sense * used.part * most) > self.tread.abs() {
             // Brought to rest within the step.
             (asked, whole) = (self.asked(0.0, sine), most);
             used = Used::of(asked.abs(), whole, lag);
@@ -85,13 +96,20 @@ impl Grip {
     #[must_use]
     pub fn ended(&self, utilisation: f64, cosine: f64, sine: f64) -> Ended {
         let traction = utilisation * cosine;
-        let tread_load_n = if traction * self.tread > 0.0 { traction * self.normal } else { 0.0 };
+        let sense = sense_of(self.tread);
+        let tread_load_n = sense * self.load(sense * traction);
         let tread = self.tread - self.yields * tread_load_n;
         let tread = if tread * self.tread > 0.0 { tread } else { 0.0 };
         let speed = self.speed + (traction - sine - self.load_n) / self.inertia;
         // What is held stands.
         let stands = tread == 0.0 && speed.abs() < STANDS_BELOW;
         Ended { tread, speed: if stands { 0.0 } else { speed }, tread_load_n }
+    }
+
+    /// Load on the tread, N, with this traction, positive along its motion: nothing drives the
+    /// worm.
+    fn load(&self, traction_n: f64) -> f64 {
+        if self.tread == 0.0 { 0.0 } else { (traction_n * self.normal + self.offset_n).max(0.0) }
     }
 
     /// Traction that takes the carriage to where a tread of this speed would without
@@ -107,6 +125,11 @@ impl Grip {
         let beyond = slip - SLIDES_FROM * self.creep * self.rolling;
         if beyond > STANDS_BELOW { beyond } else { 0.0 }
     }
+}
+
+/// Sign of a speed, zero for none.
+fn sense_of(speed: f64) -> f64 {
+    if speed == 0.0 { 0.0 } else { speed.signum() }
 }
 
 /// Part of friction in use.
@@ -195,6 +218,7 @@ mod tests {
             yields: 0.025,
             advance: 1.0,
             normal: 1.0,
+            offset_n: 0.0,
         }
     }
 
@@ -264,8 +288,15 @@ mod tests {
 
     #[test]
     fn slopes_are_those_of_the_utilisation() {
-        for (load_n, tread) in [(6.7, 8.0), (20.0, 7.0), (-20.0, 8.0), (36.0, 8.0), (30.0, 0.5)] {
-            let grip = Grip { load_n, tread, ..grip() };
+        for (load_n, tread, offset_n) in [
+            (6.7, 8.0, 0.0),
+            (20.0, 7.0, 3.0),
+            (20.0, 7.0, -3.0),
+            (-20.0, 8.0, 0.0),
+            (36.0, 8.0, 0.0),
+            (30.0, 0.5, 0.0),
+        ] {
+            let grip = Grip { load_n, tread, offset_n, ..grip() };
             let (c, s, h) = (33.3, 4.0, 1e-5);
             let used = |c, s| grip.utilisation(c, s).0;
             let by_cosine = (used(c + h, s) - used(c - h, s)) / (2.0 * h);

@@ -203,6 +203,8 @@ pub struct VirtualRig {
     drift: f64,
     /// Rise per axial travel beyond that along the step's force: the tread's own compression.
     tread_intake: f64,
+    /// Travel per travel of the tread of a gripping wheel, as far as the tread has taken it up.
+    advance: f64,
     /// Rise that no change of load explains while the wheel is at rest, mm/s.
     creep: f64,
     /// Derivatives of the resolved contact's cosine and sine sums by the height, N/mm.
@@ -281,6 +283,7 @@ impl VirtualRig {
             imposed_speed_mm_s: None,
             drift: 0.0,
             tread_intake: 0.0,
+            advance: 1.0,
             creep: 0.0,
             stiffness: None,
             parameters,
@@ -403,6 +406,7 @@ impl VirtualRig {
     /// `finer`: then nothing has happened.
     fn stride(&mut self, drives: &Drives, dt_s: f64, finer: bool) -> Result<bool, PlantError> {
         let (truth, settle_timer, latched) = (self.truth, self.settle_timer, self.latched);
+        let (_, cosine, sine) = self.forces;
         let stride = self.predict(drives, dt_s);
         if !stride.tread_mm_s.is_finite() {
             return Err(PlantError::NotFinite { time_s: truth.time_s, name: "tread speed" });
@@ -423,7 +427,7 @@ impl VirtualRig {
             self.roll_steadily(&local, stride, finer)?
         };
         if done {
-            self.book(&truth, drives, &stride);
+            self.book(&truth, (cosine, sine), drives, &stride);
         } else {
             (self.truth, self.settle_timer, self.latched) = (truth, settle_timer, latched);
         }

@@ -4,9 +4,15 @@ use super::traction::{Moves, Stride};
 use super::{Drives, Truth, VirtualRig};
 
 impl VirtualRig {
-    /// Books a stride that began with this truth. The axial forces of its end act over the
-    /// travel by its mean speeds, as the step of time has it.
-    pub(super) fn book(&mut self, before: &Truth, drives: &Drives, stride: &Stride) {
+    /// Books a stride that began with this truth and these cosine and sine sums, N. The axial
+    /// forces of its end act over the travel by its mean speeds, as the step of time has it.
+    pub(super) fn book(
+        &mut self,
+        before: &Truth,
+        from_n: (f64, f64),
+        drives: &Drives,
+        stride: &Stride,
+    ) {
         let (normal, cosine, sine) = self.forces;
         let (p, truth) = (&self.parameters, &self.truth);
         let travel = self.mean(before.speed_mm_s, truth.speed_mm_s) * stride.dt_s;
@@ -32,18 +38,18 @@ impl VirtualRig {
         let pressed = cosine + truth.utilisation * sine;
         let taken = self.ring.taken_mj();
         let given_mj = sine * travel - cosine * lifted;
+        // As the elements take it up: by the mean forces of the stride.
+        let between_mj = 0.5 * ((from_n.1 + sine) * travel - (from_n.0 + cosine) * lifted);
         let inner_mj = self.inner_load_n * rolled.abs();
         // While the ring sleeps, it goes on as it was.
         let awake = truth.ring_awake;
-        let taken_mj = if awake { taken - self.taken_mj } else { given_mj + inner_mj };
-        // Where the worm holds a load along the motion, it holds less of it.
-        let inner = if self.tread_load_n == 0.0 { inner_mj } else { 0.0 };
+        let taken_mj = if awake { taken - self.taken_mj } else { between_mj + inner_mj };
         let energy = &mut self.energy;
         energy.motor_mj += stride.motor_force_n(self.tread_load_n) * rolled;
         if drives.drive_on {
             energy.gear_mj += p.drive.friction_n * rolled.abs();
         }
-        energy.worm_mj += (-traction_n * rolled - inner).max(0.0);
+        energy.worm_mj += (-traction_n * rolled - inner_mj).max(0.0);
         energy.creep_mj += traction_n / advance * slip;
         energy.contact_mj += given_mj;
         energy.tread_mj += taken_mj;
@@ -54,6 +60,6 @@ impl VirtualRig {
         self.taken_mj = taken;
         // To a multiple of 2^-20 mJ: elements visited without need do not show in any bit.
         let grid = 1.5 * 4_294_967_296.0;
-        self.learn_inner_load((taken_mj - given_mj + grid) - grid, rolled);
+        self.learn_inner_load((taken_mj - between_mj + grid) - grid, rolled);
     }
 }

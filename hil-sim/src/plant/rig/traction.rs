@@ -14,6 +14,10 @@ const JAMMED_BELOW: f64 = 0.25;
 /// Travel over which the wheel's rise is learned, mm.
 const LEARNING_MM: f64 = 1.0;
 
+/// Travel over which a tread takes up another rolling motion, mm: the relaxation length of a
+/// tyre, here much less than the patch.
+const RELAXATION_MM: f64 = 0.1;
+
 /// Largest distance of a stride's end from its prediction, mm.
 const OFF_PREDICTION_MM: f64 = 0.01;
 
@@ -89,7 +93,7 @@ impl VirtualRig {
             (None, Some(motor)) => p.drive.turn(motor, drives.drive, drives.drive_on, 0.0, dt_s),
             (None, None) => {
                 let (on, load_n) = (drives.drive_on, self.tread_load_n);
-                p.drive.turn(tread, drives.drive, on, load_n, dt_s).against(self.offset_load_n())
+                p.drive.turn(tread, drives.drive, on, load_n, dt_s)
             }
         };
         if turn.free_mm_s != 0.0 {
@@ -105,7 +109,8 @@ impl VirtualRig {
             speed: self.truth.speed_mm_s,
             tread: turn.free_mm_s,
             yields: turn.yields,
-            advance: self.rolling_part() * self.advance() - self.eccentric().1 / p.ring.radius_mm,
+            advance: self.rolling_part() * self.advance - self.eccentric().1 / p.ring.radius_mm,
+            offset_n: self.offset_load_n(),
             normal: self.rolling_part() * if cosine > 0.0 { normal / cosine } else { 1.0 },
         };
         let predicted = self.predict_speeds(&grip);
@@ -227,6 +232,8 @@ impl VirtualRig {
         );
         let rolled = self.mean(before, tread) * stride.dt_s;
         let dt_s = stride.dt_s;
+        let taken_up = -(-rolled.abs() / RELAXATION_MM).exp_m1();
+        self.advance += taken_up * (self.advance() - self.advance);
         self.sliding = sliding > 0.0;
         self.tread_load_n = tread_load_n;
         let truth = &mut self.truth;
@@ -241,14 +248,12 @@ impl VirtualRig {
     }
 
     /// Torque of the normal pressure, as load on the drive, N: of a rim whose axis lies ahead of
-    /// the axis of rotation, and of the inner load. Along the motion it relieves the drive of no
-    /// more than its load, and nothing drives the worm.
+    /// the axis of rotation, and of the inner load. Positive against the motion.
     fn offset_load_n(&self) -> f64 {
         let (_, cosine, _) = self.forces;
         let sense = self.truth.tread_mm_s.signum();
         let offset = cosine * self.eccentric().0 / self.parameters.ring.radius_mm;
-        let most = self.tread_load_n.abs();
-        (offset + sense * self.inner_load_n).clamp(-most, most)
+        sense * offset + self.inner_load_n
     }
 
     /// Rolling radius over the undeformed one. A loaded rubber wheel rolls on `R - c/3` with
