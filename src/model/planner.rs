@@ -23,7 +23,7 @@ const LARGEST_STIFFER: Ratio = q16(1_000_000);
 
 /// Correction towards a stiffer tread above which it is no noise, and the gain that it then has
 /// at least.
-const SURE: Ratio = q16(100_000);
+const SURE: Ratio = q16(200_000);
 const SURE_GAIN: Ratio = q16(800_000);
 
 /// Relative difference of a softer and of a stiffer observed stiffness above which it is
@@ -372,7 +372,7 @@ impl Planner {
         let reserve = request.reserve.half() + missed * self.by_reserve;
         let reserve = reserve.clamp(LEAST_RESERVE, MOST_RESERVE);
         let gain = if stiffer && off > SURE { self.gain.max(SURE_GAIN) } else { self.gain };
-        let most = if stiffer { LARGEST_STIFFER } else { LARGEST_CORRECTION };
+        let most = if stiffer && off > SURE { LARGEST_STIFFER } else { LARGEST_CORRECTION };
         let step = ((observed - scale) * gain).clamp(-LARGEST_CORRECTION, most);
         let (low, high) = self.scale_range;
         let wanted = scale + step;

@@ -42,9 +42,9 @@ fn following_the_rotation_and_preload_of_a_run_gives_that_run() {
             height += t.height_mm - b.height_mm;
             count += 1.0;
         }
-        // The arm's modes vanish in the mean.
+        // The arm's modes vanish in the mean; what a step of time leaves grows with it.
         let mean: f64 = height / count;
-        assert!(mean.abs() < 2e-4, "{step}: {mean}");
+        assert!(mean.abs() < 1e-4 * step as f64, "{step}: {mean}");
     }
 }
 

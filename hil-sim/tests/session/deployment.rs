@@ -89,7 +89,7 @@ fn each_step_is_crossed_once_and_in_its_order() {
 
 #[test]
 fn gaps_stay_near_the_reference_with_the_preload_reached_before_every_corner() {
-    for Run { name, summary, nominal, .. } in RUNS.iter() {
+    for Run { name, scenario, summary, nominal, .. } in RUNS.iter() {
         // At the study's loads the gap is two thirds as large, and the same tolerances of
         // sleeve and tread weigh more: of a thousand drawn rigs the worst is 7 % above.
         let range = match (summary.rig.as_str(), nominal) {
@@ -101,10 +101,11 @@ fn gaps_stay_near_the_reference_with_the_preload_reached_before_every_corner() {
             let part = line.gap_mm / summary.gap_ref_mm;
             assert!(range.contains(&part), "{name} step {}: {part}", line.index);
             let lead = line.lead_time_s.expect("known in software");
-            // To the first step the wheel rolls while the preload builds: it is complete between
-            // the touch of the corner and lift-off.
+            // To the first step the wheel rolls while the preload builds, and lifts off once it
+            // has about that of cruise.
             let first = line.index == 1 && name.contains("deploy");
-            assert!(lead > if first { -0.3 } else { 0.0 }, "{name} step {}: {lead} s", line.index);
+            let enough = line.preload_n > 0.95 * scenario.rig.preload.cruise_n;
+            assert!(if first { enough } else { lead > 0.0 }, "{name}: {line:?}");
         }
         if *nominal && summary.rig == "prototype" {
             let worst = summary.crossings.iter().map(|line| line.gap_mm).fold(0.0, f64::max);
@@ -294,7 +295,9 @@ fn at_one_crossing_speed_the_scheduled_preload_leaves_the_smaller_gap() {
             assert!((ours.speed_mm_s - theirs.speed_mm_s).abs() < 1.0, "{ours:?} {theirs:?}");
             let part = ours.gap_mm / theirs.gap_mm;
             let name = direction.name();
-            assert!((0.91..0.98).contains(&part), "{name} step {}: {part}", ours.index);
+            // At this speed the cruise preload alone gives just the reference on retract; the
+            // schedule keeps its reserve of 1 % below it.
+            assert!((0.91..0.99).contains(&part), "{name} step {}: {part}", ours.index);
         }
     }
 }

@@ -145,7 +145,7 @@ fn a_reset_anywhere_is_followed_by_no_false_alarm() {
         let ends: Vec<_> = (1..=rigs())
             .into_par_iter()
             .map(|seed| {
-                let after = 2500 + (seed * 7919 % 4300) as u32;
+                let after = 1200 + (seed * 7919 % 3500) as u32;
                 (seed, resumed(seed, direction, after, false, direction).1)
             })
             .collect();
