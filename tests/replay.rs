@@ -2,10 +2,8 @@
 //! recorded one, to the bit.
 //!
 //! The recordings in `hil-sim/tests/data` are the frames that the image would send, in an MCAP
-//! file. After a wanted change of the controller they are recorded again: those of the scenarios
-//! beside them by `cargo rig capture --bare NAME.toml --out hil-sim/tests/data --name NAME`,
-//! the first two as `hil-sim/tests/logs.rs` says, those with resets as
-//! `hil-sim/examples/resets.rs` does, from the seeds 1 to 3.
+//! file. After an intended change of controller or plant they are recorded again by
+//! `INTERSTAGE_WRITE_FIXTURES=1 cargo test -p hil-sim --test main fixtures`.
 
 use std::path::Path;
 

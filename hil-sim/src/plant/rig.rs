@@ -2,15 +2,15 @@
 
 mod booking;
 mod contact;
+mod error;
 mod intervention;
 mod phases;
 mod traction;
-
-use std::f64::consts::TAU;
+mod truth;
+mod vibration;
 
 use super::actuators::Pretightener;
-use super::arm::{Mode, Ripple};
-use super::balance::BalanceError;
+use super::arm::Mode;
 use super::draw::PlantParameters;
 use super::energy::Energy;
 use super::ledger::Ledger;
@@ -20,7 +20,9 @@ use super::rolling::{self, Steady};
 use contact::SettleTimer;
 use traction::Stride;
 
+pub use error::PlantError;
 pub use phases::{PHASES, Phase, PhaseWork};
+pub use truth::Truth;
 
 /// Most ring steps in a call: 10 mm of travel at the usual stride.
 const MOST_STRIDES: f64 = 256.0;
@@ -68,86 +70,6 @@ impl Drives {
     pub fn worked(&self) -> [f64; 2] {
         [self.drive * (1.0 - self.lost[0]), self.preload * (1.0 - self.lost[1])]
     }
-}
-
-/// What is true after a step.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Truth {
-    /// Time, s.
-    pub time_s: f64,
-    /// Mean outputs of the bridges of drive and pre-tightener, parts of the supply. One that
-    /// is off shows what its motor generates.
-    pub bridges: [f64; 2],
-    /// Axial position of the wheel centre, mm.
-    pub position_mm: f64,
-    /// Axial speed, mm/s.
-    pub speed_mm_s: f64,
-    /// Tread speed by the wheel's spin, mm/s.
-    pub tread_mm_s: f64,
-    /// Angle turned, rad.
-    pub rotation_rad: f64,
-    /// Radial preload of the pre-tightener, N.
-    pub preload_n: f64,
-    /// Wheel centre's distance from the pillar axis, mm.
-    pub radius_mm: f64,
-    /// Height of the centre above the outermost wall, mm.
-    pub height_mm: f64,
-    /// Arm angle from the pillar, rad.
-    pub arm_rad: f64,
-    /// Largest tread depth, mm.
-    pub depth_mm: f64,
-    /// What the compression sensor looks at, mm.
-    pub compression_mm: f64,
-    /// Force of corner and face, N.
-    pub corner_n: f64,
-    /// Force of the wall under the wheel, N.
-    pub floor_n: f64,
-    /// Friction of tread on wall.
-    pub friction: f64,
-    /// Friction utilisation.
-    pub utilisation: f64,
-    /// Clearance of the nearest step root from the undeformed wheel, mm, if near.
-    pub root_clearance_mm: Option<f64>,
-    /// Separation of wheel and wall away from steps, mm.
-    pub separation_mm: f64,
-    /// Axial force of the wall under the wheel against the motion of its tread, N.
-    pub resistance_n: f64,
-    /// Radial force of the contact beyond what presses the wheel, N: zero but for what the
-    /// solution leaves.
-    pub unbalanced_n: f64,
-    /// Gross slip so far, mm.
-    pub slip_mm: f64,
-    /// Deflection of the arm by its modes, mm.
-    pub vibration_mm: f64,
-    /// Mechanical work of the drive so far, mJ.
-    pub work_mj: f64,
-    /// Friction work of creep and slip so far, mJ.
-    pub wear_mj: f64,
-    /// Whether the ring was resolved.
-    pub ring_awake: bool,
-}
-
-/// The rig left the set of states that mean something.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum PlantError {
-    /// No height of the wheel balances the radial forces.
-    #[error("plant at {time_s:.3} s, {position_mm:.3} mm: {source}")]
-    Balance {
-        /// When, s.
-        time_s: f64,
-        /// Where, mm.
-        position_mm: f64,
-        /// Why.
-        source: BalanceError,
-    },
-    /// A state is not a number.
-    #[error("plant at {time_s:.3} s: {name} is not finite")]
-    NotFinite {
-        /// When, s.
-        time_s: f64,
-        /// Which state.
-        name: &'static str,
-    },
 }
 
 /// The rig.
@@ -444,111 +366,9 @@ impl VirtualRig {
         (out * sin, out * cos)
     }
 
-    /// Force of the contact on the arm's modes, N: what the tread has to push with against load
-    /// and step, by the torque that the motor on the arm holds against it. By the direction of
-    /// the contact's force, so that neither the modes' own force nor the carriage's inertia,
-    /// which both follow a tick late, drives them.
-    fn excitation_n(&self) -> f64 {
-        let (_, cosine, sine) = self.forces;
-        if cosine <= 0.0 {
-            return 0.0;
-        }
-        let (leans, load) = (sine / cosine, self.parameters.load_n);
-        let pressed = self.preload_now() + self.thrust_ratio() * self.thrust_n;
-        let carried = ((pressed - load * leans) / (1.0 + leans * leans)).max(0.0);
-        (load + leans * carried).min(self.parameters.mu * carried)
-    }
-
-    /// Modes of the arm, forced by the torque ripple of motor and gearbox and by the load that
-    /// the contact puts on the drive.
-    fn vibrate(&mut self, dt_s: f64) {
-        let load_n = self.excitation_n();
-        let load = (std::mem::replace(&mut self.excitation_n, load_n), load_n);
-        let (amplitude, pitch) = self.parameters.ripple;
-        let spin = self.truth.tread_mm_s;
-        let tread = self.truth.rotation_rad * self.parameters.ring.radius_mm;
-        let to = (TAU * (tread / pitch).fract()).sin_cos();
-        let force = Ripple {
-            amplitude_n: if spin == 0.0 { 0.0 } else { amplitude },
-            omega: TAU * spin / pitch,
-            from: std::mem::replace(&mut self.ripple_phase, to),
-            to,
-        };
-        let (mut deflection, mut sum) = (0.0, 0.0);
-        for mode in &mut self.modes {
-            mode.step(&force, load, dt_s);
-            deflection += mode.deflection_mm();
-            sum += mode.force_n();
-        }
-        self.truth.vibration_mm = deflection;
-        self.vibration_n = sum / self.modes.len().max(1) as f64;
-    }
-
     /// Preload of spring and screw at the present height.
     fn preload_now(&self) -> f64 {
         let rise = self.truth.height_mm - self.eccentric().1 - self.parameters.ring.radius_mm;
         (self.preload.seat_n() + self.parameters.spring_n_per_mm * rise).max(0.0)
     }
-
-    /// What follows from the state.
-    fn derive(&mut self) {
-        let (ahead, above) = self.eccentric();
-        let compression_mm = self.compression_mm();
-        let truth = &mut self.truth;
-        truth.compression_mm = compression_mm;
-        truth.radius_mm = self.parameters.wall_radius_mm - (truth.height_mm - above);
-        truth.arm_rad = self.parameters.arm.angle(truth.radius_mm);
-        let radius = self.parameters.ring.radius_mm;
-        let local = self.parameters.wall.local(truth.position_mm + ahead);
-        let base_mm = local.base_mm + local.root_mm;
-        truth.root_clearance_mm = (local.ahead_mm < radius)
-            .then(|| away(local.ahead_mm, truth.height_mm - base_mm) - radius);
-        self.truth.preload_n = self.preload_now();
-    }
-
-    /// What the compression sensor looks at, mm.
-    fn compression_mm(&self) -> f64 {
-        let (p, truth) = (&self.parameters, &self.truth);
-        let mut depth = truth.depth_mm;
-        if p.compression_patch > 0.0 {
-            let carrying = if truth.ring_awake {
-                self.ring.carrying_mm()
-            } else {
-                let height = truth.height_mm - self.base_mm;
-                rolling::carrying_mm(&p.ring, height, self.rolled_mm_s)
-            };
-            depth += p.compression_patch * (carrying - depth);
-        }
-        depth + p.compression_compliance_mm_per_n * truth.preload_n
-    }
-
-    fn check(&self) -> Result<(), PlantError> {
-        let t = &self.truth;
-        // Causes first, so that the name is that of the origin.
-        let states = [
-            ("tread speed", t.tread_mm_s),
-            ("screw", self.preload.seat_n()),
-            ("vibration", self.vibration_n),
-            ("speed", t.speed_mm_s),
-            ("position", t.position_mm),
-            ("rotation", t.rotation_rad),
-            ("height", t.height_mm),
-            ("utilisation", t.utilisation),
-            ("slip", t.slip_mm),
-            ("work", t.work_mj + t.wear_mj),
-        ];
-        // One look at all of them: none finite makes the other finite again.
-        if states.iter().map(|(_, value)| value * 0.0).sum::<f64>() == 0.0 {
-            return Ok(());
-        }
-        match states.into_iter().find(|(_, value)| !value.is_finite()) {
-            Some((name, _)) => Err(PlantError::NotFinite { time_s: t.time_s, name }),
-            None => Ok(()),
-        }
-    }
-}
-
-/// Length of the hypotenuse, for lengths far from the ends of the range.
-fn away(x: f64, y: f64) -> f64 {
-    (x * x + y * y).sqrt()
 }

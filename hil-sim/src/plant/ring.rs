@@ -15,131 +15,24 @@ mod complementarity;
 mod coupled;
 mod law;
 mod layer;
+mod layout;
+mod parameters;
+mod resultants;
 mod sweep;
 mod window;
 
 use std::f64::consts::TAU;
 
-use interstage::rig::Rig;
-
 use super::balance::{Axial, Balance, BalanceError, Solved};
 use super::wall::LocalWall;
 use coupled::Coupled;
 use law::Law;
-use sweep::{Block, Lanes, Place, Sums};
-use window::{LANES, WIDEST, Window};
+use layout::Ready;
+use sweep::{Lanes, Place, Sums};
+use window::{LANES, Window};
 
-/// Wheel and rubber.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RingParameters {
-    /// Undeformed radius, mm.
-    pub radius_mm: f64,
-    /// Width, mm.
-    pub width_mm: f64,
-    /// Relaxed stiffness per area, N/mm^3 (1e9 Pa/m).
-    pub k_inf: f64,
-    /// Instant stiffness per area, N/mm^3.
-    pub k_0: f64,
-    /// Relaxation time, s.
-    pub tau_s: f64,
-    /// Elements around the ring.
-    pub elements: usize,
-    /// Thickness of the tread, a layer of incompressible rubber bonded to the hub, mm;
-    /// 0: independent elements, of no thickness.
-    pub tread_thickness_mm: f64,
-    /// Spread s of two relaxations of equal share, at `tau_s / s` and `tau_s s`; 1: one.
-    pub second_relaxation: f64,
-}
-
-impl RingParameters {
-    /// Wheel and rubber of a rig, by this many elements.
-    #[must_use]
-    pub fn of(rig: &Rig, elements: usize) -> Self {
-        // Pa/m to N/mm^3.
-        let k_inf = rig.tread.k_inf_pa_per_m * 1e-9;
-        Self {
-            radius_mm: rig.rig.wheel_radius_mm,
-            width_mm: rig.rig.wheel_width_mm,
-            k_inf,
-            k_0: k_inf * rig.tread.stiffening,
-            tau_s: rig.tread.tau_s,
-            elements,
-            tread_thickness_mm: 0.0,
-            second_relaxation: 1.0,
-        }
-    }
-
-    /// Whether the elements are coupled.
-    #[must_use]
-    pub fn is_coupled(&self) -> bool {
-        self.tread_thickness_mm > 0.0
-    }
-
-    /// Whether the rubber relaxes twice.
-    #[must_use]
-    pub fn relaxes_twice(&self) -> bool {
-        self.second_relaxation > 1.0
-    }
-
-    /// Relaxation times, the faster one first, s.
-    #[must_use]
-    pub fn relaxations_s(&self) -> [f64; 2] {
-        [self.tau_s / self.second_relaxation, self.tau_s * self.second_relaxation]
-    }
-}
-
-/// Resultants of the contact pressure.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Contact {
-    /// Sum of p over all contact, N.
-    pub normal_n: f64,
-    /// Sum of p cos(psi) over all contact, N.
-    pub cosine_n: f64,
-    /// Sum of p sin(psi) over all contact, N.
-    pub sine_n: f64,
-    /// The part of `cosine_n` carried by the floor, N.
-    pub floor_n: f64,
-    /// Sum of p cos(psi) over face and top of the step ahead, N.
-    pub step_cosine_n: f64,
-    /// Sum of p sin(psi) over face and top of the step ahead, N.
-    pub step_sine_n: f64,
-    /// Largest depth, at the point of the wall nearest to the centre, mm; negative is
-    /// clearance.
-    pub depth_mm: f64,
-    /// Arc in contact times width, mm^2.
-    pub area_mm2: f64,
-    /// Largest pressure on the floor before it is cut off at zero, N/mm^2; where no
-    /// element reaches the floor, minus what a fresh one would carry as deep in it as it
-    /// is away, so that the instant of a touch-down lies on a straight line.
-    pub floor_pressure: f64,
-    /// Derivatives of `cosine_n` and `sine_n` by the centre's height, N/mm.
-    pub slope: (f64, f64),
-}
-
-impl Contact {
-    /// The contact a little higher up, by its derivatives, its parts as the whole.
-    #[must_use]
-    pub fn moved(self, change_mm: f64) -> Self {
-        let cosine_n = self.cosine_n + self.slope.0 * change_mm;
-        let part = cosine_n / self.cosine_n;
-        Self {
-            normal_n: self.normal_n * part,
-            cosine_n,
-            sine_n: self.sine_n + self.slope.1 * change_mm,
-            floor_n: self.floor_n * part,
-            step_cosine_n: self.step_cosine_n * part,
-            step_sine_n: self.step_sine_n * part,
-            depth_mm: self.depth_mm - change_mm,
-            ..self
-        }
-    }
-
-    /// Magnitude of the step's force on the wheel, N.
-    #[must_use]
-    pub fn step_force_n(&self) -> f64 {
-        self.step_cosine_n.hypot(self.step_sine_n)
-    }
-}
+pub use parameters::RingParameters;
+pub use resultants::Contact;
 
 /// What a ring has been made to compute.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -190,21 +83,6 @@ pub struct Ring {
     coupled: Option<Box<Coupled>>,
 }
 
-/// The step that the blocks are laid out for.
-#[derive(Clone, Debug, Default)]
-struct Ready {
-    /// Wall, turn and length of the step.
-    of: Option<(LocalWall, f64, f64)>,
-    /// Least height that the window allows, mm.
-    lowest: f64,
-    window: Window,
-    blocks: Vec<Block>,
-    /// Where the blocks are kept.
-    indices: Vec<usize>,
-    rise: Option<f64>,
-    edge: bool,
-}
-
 /// One trial step: where the ring is taken to.
 #[derive(Clone, Copy, Debug)]
 pub struct Motion {
@@ -220,12 +98,6 @@ pub struct Motion {
 
 /// A step so long that all memory has caught up, s.
 const FOREVER_S: f64 = 1e9;
-
-/// How far below the height asked for the window still holds, per radius.
-const SLACK: f64 = 5e-4;
-
-/// Secant of elements that look away from the wall: none touches.
-const AWAY: f64 = 1e9;
 
 impl Ring {
     /// A ring at rest and unloaded.
@@ -525,109 +397,6 @@ impl Ring {
                 wall.ahead_mm,
                 wall.behind_mm,
             )),
-        }
-    }
-
-    /// Blocks between two angles from straight down, rad, once the wheel has turned.
-    fn span(&self, turned: f64, from: f64, to: f64) -> (i64, i64) {
-        let pitch = self.pitch();
-        let (count, blocks) = (self.parameters.elements as i64, self.q.len() as i64);
-        // Blocks are numbered on over the turns, the last of each may not be full.
-        let block = |element: i64| {
-            element.div_euclid(count) * blocks + element.rem_euclid(count) / LANES as i64
-        };
-        let (first, last) = ((turned + from) / pitch, (turned + to) / pitch);
-        (block(first.ceil() as i64), block(last.floor() as i64))
-    }
-
-    /// Lays the blocks out for a step, unless they are.
-    fn prepare(&mut self, motion: &Motion) {
-        let of = (motion.wall, motion.turn_rad, motion.dt_s);
-        if self.ready.of == Some(of) && motion.height_mm >= self.ready.lowest {
-            return;
-        }
-        let radius = self.parameters.radius_mm;
-        // Lower than predicted: by as much again.
-        let more =
-            if self.ready.of == Some(of) { self.ready.lowest - motion.height_mm } else { 0.0 };
-        let lowest = motion.height_mm - SLACK * radius - more;
-        self.refresh_law(motion.dt_s);
-        let turned = self.rotation + motion.turn_rad;
-        let (floor, step) = window::reach(&motion.wall, lowest, radius);
-        let mut window = Window::default();
-        if self.visit_all {
-            let (first, last) = self.span(turned, -WIDEST, WIDEST);
-            window.add(first, last);
-        } else {
-            let (first, last) = self.span(turned, -floor, floor);
-            window.add(first, last);
-            if let Some((from, to)) = step {
-                let (first, last) = self.span(turned, from, to);
-                window.add(first, last);
-            }
-        }
-        window.limit(self.q.len() as i64);
-        // Where the patch may end on the floor, and half an element more.
-        let chord = (radius * radius - lowest * lowest).max(0.0).sqrt();
-        let margin = radius * self.pitch() / floor.cos().max(0.05);
-        self.ready.rise = (self.visit_all || step.is_some()).then_some(motion.wall.rise_mm);
-        self.ready.edge = motion.wall.behind_mm < chord + margin
-            || (self.visit_all && motion.wall.behind_mm < f64::INFINITY);
-        self.ready.window = window;
-        self.ready.lowest = lowest;
-        self.ready.of = Some(of);
-        self.lay_out(turned, motion.wall.ahead_mm);
-    }
-
-    fn lay_out(&mut self, turned: f64, ahead: f64) {
-        let Self { ready, active, law, q, depth, slow, at, sin, cos, parameters, time, .. } = self;
-        let count = q.len() as i64;
-        let (turned_sin, turned_cos) = turned.sin_cos();
-        let (turned_sin, turned_cos) = (Lanes::splat(turned_sin), Lanes::splat(turned_cos));
-        let relaxations_s = parameters.relaxations_s();
-        let on_face = Lanes::splat(ahead / parameters.radius_mm).fast_max(Lanes::splat(1e-9));
-        let (radius, ahead) = (Lanes::splat(parameters.radius_mm), Lanes::splat(ahead));
-        let (away, facing) = (Lanes::splat(AWAY), Lanes::splat(0.05));
-        let step = ready.rise.is_some();
-        ready.blocks.clear();
-        ready.indices.clear();
-        for number in ready.window.blocks() {
-            let index = number.rem_euclid(count) as usize;
-            let remembers =
-                q[index] != Lanes::ZERO || slow.get(index).is_some_and(|s| *s != Lanes::ZERO);
-            if !active.contains(number) && remembers {
-                // Out of contact since: only the memory has decayed.
-                let decayed = |q: Lanes, tau_s: f64| {
-                    let decayed = q * Lanes::splat((-(*time - at[index]) / tau_s).exp());
-                    decayed & decayed.abs().simd_gt(Lanes::splat(1e-200))
-                };
-                q[index] = decayed(q[index], relaxations_s[0]);
-                if let Some(slow) = slow.get_mut(index) {
-                    *slow = decayed(*slow, relaxations_s[1]);
-                }
-                at[index] = *time;
-            }
-            let mut carried = law.first.carry(q[index], depth[index]);
-            if let Some(second) = law.second {
-                carried = Lanes::HALF * (carried + second.carry(slow[index], depth[index]));
-            }
-            let (s, c) = (sin[index], cos[index]);
-            let (sin, cos) = (s * turned_cos - c * turned_sin, c * turned_cos + s * turned_sin);
-            // The face is touched where it is nearer than the radius.
-            let near = sin.simd_gt(on_face);
-            let face = if step && near.any() {
-                near.bitselect(radius - ahead / sin, -away)
-            } else {
-                -away
-            };
-            ready.blocks.push(Block {
-                cos,
-                sin,
-                sec: cos.simd_gt(facing).bitselect(Lanes::ONE / cos, away),
-                face,
-                carried,
-            });
-            ready.indices.push(index);
         }
     }
 }

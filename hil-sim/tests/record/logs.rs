@@ -1,9 +1,8 @@
 //! Logs over a long time, as regression fixtures, and read by another program.
 //!
 //! The fixtures are written by
-//! `cargo rig capture --bare --seed 1 --out hil-sim/tests/data --name deploy` and the same
-//! with `--retract` and `--name retract`; again whenever the controller is meant to do
-//! something else.
+//! `INTERSTAGE_WRITE_FIXTURES=1 cargo test -p hil-sim --test main fixtures`, again whenever the
+//! controller or the plant is meant to do something else.
 
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};

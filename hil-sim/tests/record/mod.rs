@@ -1,4 +1,5 @@
 //! Logs: written, read, damaged, run again.
 
+mod fixtures;
 mod fuzz;
 mod logs;

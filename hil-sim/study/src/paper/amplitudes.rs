@@ -6,9 +6,9 @@ use anyhow::Result;
 use super::case::Case;
 use super::experiment::{Experiment, Run, marks as mark_runs};
 use super::finite_elements::{self, Crossing};
-use super::histories::{Histories, stage_ends_s};
+use super::histories::{Histories, stage_ends_mm};
 use super::history::{Points, Quantity};
-use super::published::{AMPLITUDE_MM, CASES, COLLISION_N, LOG_S, STRESS};
+use super::published::{AMPLITUDE_MM, CASES, COLLISION_N, STRESS};
 use super::simulation;
 use super::theory::{self, Drive, Lift};
 use super::transitions::at;
@@ -318,7 +318,7 @@ impl Amplitudes {
 /// Largest deflection of the arm over the gap of the same case.
 fn arm_over_gap(all: &[Histories], amplitudes: &Amplitudes) -> f64 {
     let of = |(one, three): (&Histories, &Three)| {
-        let arm = one.peaks(Quantity::Vibration, Source::Experiment)[0].1 * 1e-3;
+        let arm = one.peaks(Quantity::Vibration, Source::Experiment)[0].value * 1e-3;
         arm / three.value(Source::Experiment, &|lift: &Lift| lift.gap_mm)
     };
     all.iter().zip(&amplitudes.cases).map(of).fold(0.0, f64::max)
@@ -340,10 +340,9 @@ fn resemblance(all: &[Histories]) -> f64 {
 /// The first transition of a run; none if it was not completed.
 fn first(case: &Case, run: &Run) -> Option<Lift> {
     let reading = run.crossings.first()?;
-    let passed_s = stage_ends_s(case)[0];
+    let passed_mm = stage_ends_mm(case)[0];
     let most = |points: &Points| {
-        let times = (0..).map(|line| f64::from(line) * LOG_S);
-        let until = times.zip(points).take_while(|(time_s, _)| *time_s < passed_s);
+        let until = run.log.position_mm.iter().zip(points).take_while(|(mm, _)| **mm < passed_mm);
         until.map(|(_, point)| point.1).fold(0.0, f64::max)
     };
     Some(Lift {

@@ -27,7 +27,7 @@ pub fn cases() -> Vec<Case> {
 pub fn figure(all: &[Histories]) -> Figure {
     let mut panels = panels(all);
     for ((panel, one), force) in panels.iter_mut().zip(all).zip(COLLISION_N) {
-        let when = one.peaks(Quantity::Collision, Source::Simulation)[0].0;
+        let when = one.peaks(Quantity::Collision, Source::Simulation)[0].time_s;
         panel.series.push(Series::new(Source::Published, vec![(when, force)]));
     }
     let caption =
@@ -109,7 +109,7 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
         of("stress-of-collision-less-preload").judged(
             "The stress wave is determined by the difference between collision force and preload.",
             SOURCES.into_iter().all(|source| {
-                let of = |quantity| all.iter().map(move |one: &Histories| one.peaks(quantity, source)[0].1);
+                let of = |quantity| all.iter().map(move |one: &Histories| one.peaks(quantity, source)[0].value);
                 let less = of(collision).zip(all).map(|(force, one)| force - one.case.preload_n);
                 order(&less.collect::<Vec<_>>()) == order(&of(impact).collect::<Vec<_>>())
             }),
@@ -117,7 +117,7 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
                 "Collision less preload and impact of the four cases (simulation): {}.",
                 all.iter()
                     .map(|one| {
-                        let peak = |quantity| one.peaks(quantity, Source::Simulation)[0].1;
+                        let peak = |quantity| one.peaks(quantity, Source::Simulation)[0].value;
                         format!("{:.1} N, {:.0} kPa", peak(collision) - one.case.preload_n, peak(impact))
                     })
                     .collect::<Vec<_>>()

@@ -189,6 +189,7 @@ impl Watch {
         }
         let now = Instant {
             time_s: truth.time_s - self.moving_since.unwrap_or(f64::INFINITY),
+            position_mm: truth.position_mm,
             collision_n: axial,
             impact_kpa: impact_kpa(plant, axial),
             // The plant's own vibration is that of the torque ripple.

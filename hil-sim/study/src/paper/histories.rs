@@ -20,6 +20,17 @@ const BEFORE_MM: f64 = 3.0;
 /// Travel behind a step within which the wheel has left its edge, mm.
 const LEFT_MM: f64 = 2.0;
 
+/// The largest value of a transition.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Peak {
+    /// When, s.
+    pub time_s: f64,
+    /// Where the wheel is then, mm.
+    pub position_mm: f64,
+    /// The value.
+    pub value: f64,
+}
+
 /// The histories of one case.
 #[derive(Clone, Debug)]
 pub struct Histories {
@@ -73,22 +84,41 @@ impl Histories {
         }
     }
 
-    /// Largest value in each of the three transitions, and when it is reached.
+    /// Axial position of the wheel at the points of a source, mm; of the experiment the mean
+    /// of its means.
+    fn positions_mm(&self, source: Source) -> Vec<f64> {
+        match source {
+            Source::Theory => self.theory.position_mm.clone(),
+            Source::Simulation => self.simulation.position_mm.clone(),
+            _ => {
+                let count = self.means.len() as f64;
+                let sum = |i: usize| self.means.iter().map(|mean| mean.position_mm[i]).sum::<f64>();
+                (0..self.means[0].position_mm.len()).map(|i| sum(i) / count).collect()
+            }
+        }
+    }
+
+    /// Largest value in each of the three transitions. They are told apart by where the wheel
+    /// is: the experiment's is slower than the case while its preload rises.
     #[must_use]
-    pub fn peaks(&self, quantity: Quantity, source: Source) -> [(f64, f64); STAGES] {
+    pub fn peaks(&self, quantity: Quantity, source: Source) -> [Peak; STAGES] {
+        let positions_mm = self.positions_mm(source);
         let points = self.points(quantity, source);
-        let ends = stage_ends_s(&self.case);
+        let ends_mm = stage_ends_mm(&self.case);
         std::array::from_fn(|stage| {
-            let from = if stage == 0 { 0.0 } else { ends[stage - 1] };
-            let within = points.iter().filter(|p| p.0 >= from && p.0 < ends[stage]);
-            within.copied().fold((from, 0.0), |most, p| if p.1 > most.1 { p } else { most })
+            let from_mm = if stage == 0 { 0.0 } else { ends_mm[stage - 1] };
+            let all = positions_mm.iter().zip(&points);
+            let all =
+                all.map(|(&position_mm, &(time_s, value))| Peak { time_s, position_mm, value });
+            let within = all.filter(|p| (from_mm..ends_mm[stage]).contains(&p.position_mm));
+            within.fold(Peak::default(), |most, p| if p.value > most.value { p } else { most })
         })
     }
 
     /// The largest value of a stage from each source.
     #[must_use]
     pub fn stage(&self, quantity: Quantity, stage: usize) -> [f64; 3] {
-        SOURCES.map(|source| self.peaks(quantity, source)[stage].1)
+        SOURCES.map(|source| self.peaks(quantity, source)[stage].value)
     }
 
     /// Largest value after the third transition, beyond the largest before the first, over
@@ -96,15 +126,16 @@ impl Histories {
     #[must_use]
     pub fn left_over(&self, quantity: Quantity, source: Source) -> f64 {
         let points = self.points(quantity, source);
-        let speed = self.case.speed_mm_s;
+        let positions_mm = self.positions_mm(source);
         // The wheel's patch behind the last edge, and the arm's ring-down.
-        let after = stage_ends_s(&self.case)[STAGES - 1] + LEAVES_MM / speed + 0.2;
-        let before = BEFORE_MM / speed;
+        let after = stage_ends_mm(&self.case)[STAGES - 1] + LEAVES_MM + 0.2 * self.case.speed_mm_s;
         let most = |from: f64, to: f64| {
-            let within = points.iter().filter(|p| (from..=to).contains(&p.0));
-            within.map(|p| p.1.abs()).fold(0.0, f64::max)
+            let all = positions_mm.iter().zip(&points);
+            let within = all.filter(|(position_mm, _)| (from..=to).contains(*position_mm));
+            within.map(|(_, p)| p.1.abs()).fold(0.0, f64::max)
         };
-        (most(after, f64::INFINITY) - most(0.0, before)).max(0.0) / most(0.0, f64::INFINITY)
+        (most(after, f64::INFINITY) - most(f64::NEG_INFINITY, BEFORE_MM)).max(0.0)
+            / most(f64::NEG_INFINITY, f64::INFINITY)
     }
 
     /// The quantity as a plot.
@@ -160,11 +191,11 @@ fn thin(points: &[(f64, f64)]) -> Points {
     (0..shown.len()).filter(|&i| !flat(i)).map(|i| shown[i]).collect()
 }
 
-/// When the wheel has left each of the steps behind, s.
+/// Where the wheel has left each of the steps behind, mm.
 #[must_use]
-pub fn stage_ends_s(case: &Case) -> [f64; STAGES] {
+pub fn stage_ends_mm(case: &Case) -> [f64; STAGES] {
     let steps = case.loads.rig().rig.step_positions_mm;
-    std::array::from_fn(|stage| (steps[stage] + LEFT_MM) / case.speed_mm_s)
+    std::array::from_fn(|stage| steps[stage] + LEFT_MM)
 }
 
 #[cfg(test)]

@@ -13,6 +13,8 @@ pub type Points = Vec<(f64, f64)>;
 pub struct Instant {
     /// Time since the motion began, s.
     pub time_s: f64,
+    /// Axial position of the wheel, mm.
+    pub position_mm: f64,
     /// Collision force, N.
     pub collision_n: f64,
     /// Impact stress, kPa.
@@ -28,6 +30,8 @@ pub struct Instant {
 /// deflection the largest in the interval before.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct History {
+    /// Axial position of the wheel, mm.
+    pub position_mm: Vec<f64>,
     /// Axial force of the contact beyond rolling resistance, N.
     pub collision: Points,
     /// That force over the surface that the step cuts off, at the hub, kPa.
@@ -47,6 +51,7 @@ impl History {
         if now.time_s < due_s - 1e-9 {
             return false;
         }
+        self.position_mm.push(now.position_mm);
         self.collision.push((now.time_s, now.collision_n));
         self.impact.push((now.time_s, now.impact_kpa));
         self.vibration.push((now.time_s, self.largest_um));
@@ -62,7 +67,12 @@ impl History {
             let point = |line| (line as f64 * LOG_S, sum(line) / logs.len() as f64);
             (0..lines).map(point).collect()
         };
+        let position = |line| {
+            let sum = logs.iter().map(|log| log.position_mm[line]).sum::<f64>();
+            sum / logs.len() as f64
+        };
         Self {
+            position_mm: (0..lines).map(position).collect(),
             collision: mean(|log| &log.collision),
             impact: mean(|log| &log.impact),
             vibration: mean(|log| &log.vibration),

@@ -122,9 +122,12 @@ mod tests {
             let read = histories.peaks(quantity, Source::Experiment);
             let wanted = histories.peaks(quantity, Source::Simulation);
             for (read, wanted) in read.iter().zip(&wanted) {
-                // The log misses the tip of a peak by up to 0.05 s.
-                assert!((read.1 / wanted.1 - 1.0).abs() < 0.06, "{quantity:?} {read:?} {wanted:?}");
-                assert!((read.0 - wanted.0).abs() < 0.2, "{quantity:?} {read:?} {wanted:?}");
+                // Where, not when: the preload rises while the wheel approaches the first step,
+                // and a corner slows the wheel. The log has a line every 0.8 mm.
+                let off_mm = read.position_mm - wanted.position_mm;
+                assert!(off_mm.abs() < 0.8, "{quantity:?} {read:?} {wanted:?}");
+                let ratio = read.value / wanted.value;
+                assert!((ratio - 1.0).abs() < 0.06, "{quantity:?} {read:?} {wanted:?}");
             }
         }
     }

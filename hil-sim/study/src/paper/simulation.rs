@@ -104,6 +104,7 @@ pub fn deployment(case: &Case, arms: &Arms) -> Result<History> {
             modal.step(arms.across_n(level, collision_n), dt_s);
             let now = Instant {
                 time_s,
+                position_mm: step + sample.x_mm,
                 collision_n,
                 impact_kpa: 1e-3 * rod.hub_pa(),
                 arm_um: 1e6 * modal.deflection_m(),
@@ -118,7 +119,9 @@ pub fn deployment(case: &Case, arms: &Arms) -> Result<History> {
         last_s += QUIET_S;
         modal.step(0.0, QUIET_S);
         let arm_um = 1e6 * modal.deflection_m();
-        history.push(&Instant { time_s: last_s, arm_um, ..Instant::default() }, INTERVAL_S);
+        let position_mm = last_s * case.speed_mm_s;
+        let now = Instant { time_s: last_s, position_mm, arm_um, ..Instant::default() };
+        history.push(&now, INTERVAL_S);
     }
     Ok(history)
 }

@@ -136,6 +136,7 @@ pub fn deployment(case: &Case, arms: &Arms) -> Result<History, BalanceError> {
             if ahead > 0.0 { ahead } else { corner_area_mm2(size, -local.behind_mm, height) };
         let now = Instant {
             time_s: x / case.speed_mm_s,
+            position_mm: x,
             collision_n,
             impact_kpa: stress_kpa(collision_n, area),
             arm_um: 1e3 * arms.static_mm(local.level, collision_n),

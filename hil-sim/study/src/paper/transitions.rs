@@ -49,7 +49,7 @@ pub fn figure(all: &[Histories]) -> Figure {
 /// The peaks of the stages as text.
 pub(super) fn peaks_text(one: &Histories, quantity: Quantity) -> String {
     let of = |source| {
-        let peaks = one.peaks(quantity, source).map(|peak| format!("{:.1}", peak.1));
+        let peaks = one.peaks(quantity, source).map(|peak| format!("{:.1}", peak.value));
         peaks.join(", ")
     };
     let [theory, simulation, experiment] = SOURCES.map(of);
@@ -60,7 +60,7 @@ pub(super) fn peaks_text(one: &Histories, quantity: Quantity) -> String {
 pub(super) fn fall(one: &Histories, quantity: Quantity) -> bool {
     SOURCES.into_iter().all(|source| {
         let peaks = one.peaks(quantity, source);
-        peaks.windows(2).all(|pair| pair[1].1 < pair[0].1)
+        peaks.windows(2).all(|pair| pair[1].value < pair[0].value)
     })
 }
 
@@ -72,7 +72,7 @@ pub fn claims(all: &[Histories]) -> Vec<Claim> {
         all.iter().map(|one| likeness(one, quantity)).fold(f64::INFINITY, f64::min)
     });
     let fast = &all[2];
-    let first = |quantity| SOURCES.map(|source| fast.peaks(quantity, source)[0].0);
+    let first = |quantity| SOURCES.map(|source| fast.peaks(quantity, source)[0].time_s);
     let falls = |quantity| all.iter().all(|one| fall(one, quantity));
     let texts = |quantity: Quantity| {
         let all: Vec<String> = all.iter().map(|one| peaks_text(one, quantity)).collect();
