@@ -328,7 +328,8 @@ impl Planner {
         let slower = self.cruise_speed - speed;
         let change = self.timing.speed_change(slower) * divide(slower, self.cruise_speed);
         let slow = divide(SLOW_TRAVEL[at.direction as usize], speed);
-        let travels = divide(request.distance.max(Q16::ZERO), self.cruise_speed) + slow + change.half();
+        let travels =
+            divide(request.distance.max(Q16::ZERO), self.cruise_speed) + slow + change.half();
         let rising = ready > travels;
         let time = ready.max(travels) + change.half();
         Choice { preload, gap, speed, time, rising, holds }

@@ -81,7 +81,7 @@ impl Rig {
         rig.preload.spring_n_per_mm = 3.6;
         rig.preload.slew_n_per_s = 75.0;
         // At a third of the gap's range, the same tolerances weigh more.
-        rig.control.gap_reserve = 0.04;
+        rig.control.gap_reserve = 0.05;
         rig.drive.stall_force_n = 480.0;
         rig.drive.force_limit_n = 240.0;
         rig.drive.reflected_mass_kg = 120.0;

@@ -112,8 +112,7 @@ impl Bridge {
     fn advance(&mut self) -> (i32, i32) {
         let duty = self.commanded.into();
         let [fast, slow] = &mut self.lags;
-        let (fast, slow) =
-            (fast.step_by(duty, TAKES_ENDS[0]), slow.step_by(duty, TAKES_ENDS[1]));
+        let (fast, slow) = (fast.step_by(duty, TAKES_ENDS[0]), slow.step_by(duty, TAKES_ENDS[1]));
         (fast.min(slow), fast.max(slow))
     }
 

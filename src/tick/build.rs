@@ -20,7 +20,6 @@ const OBSERVER_RAD_S: f64 = 60.0;
 /// Part of the pre-tightener's slew that the spring may take while the wheel climbs.
 const CLIMB_PART: f64 = 0.9;
 
-
 impl Controller {
     /// Turns a rig into machine units, once; fails where a parameter is out of range or does
     /// not fit the others.

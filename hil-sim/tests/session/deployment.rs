@@ -92,8 +92,9 @@ fn gaps_stay_near_the_reference_with_the_preload_reached_before_every_corner() {
     for Run { name, scenario, summary, nominal, .. } in RUNS.iter() {
         // At the study's loads the gap is two thirds as large, and the same tolerances of
         // sleeve and tread weigh more: of a thousand drawn rigs the worst is 7 % above.
+        // There the measured gap is up to 5 % high, and the schedule keeps as much more below.
         let range = match (summary.rig.as_str(), nominal) {
-            ("fe", _) => 0.88..1.08,
+            ("fe", _) => 0.84..1.08,
             (_, true) => 0.95..1.0,
             _ => 0.88..1.05,
         };

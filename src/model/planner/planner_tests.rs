@@ -42,11 +42,8 @@ fn a_far_stiffer_tread_is_learned_at_once_and_noise_by_half() {
     let scale = |wider: f64| reviewed(wider, true).scale.to_num::<f64>();
     let observed = |wider: f64| {
         let planner = Planner::try_build(&Rig::prototype()).expect("a sound rig");
-        let at = Point {
-            direction: Direction::Deploy,
-            speed: q16(8_000_000),
-            scale: Scale::NOMINAL,
-        };
+        let at =
+            Point { direction: Direction::Deploy, speed: q16(8_000_000), scale: Scale::NOMINAL };
         let force = q16(47_000_000) + planner.coupling;
         let gap = planner.model.crossing(&at, force).gap + Millimetres::from_num(wider);
         planner.model.observed_scale(&at, gap, force).to_num::<f64>()
