@@ -39,7 +39,7 @@ pub(crate) const COLUMNS: [Column; 13] = {
         new("corner", "N", 1, |c| Some(c.corner_force_n)),
         Column { on_terminal: false, ..new("friction used", "", 2, |c| Some(c.peak_utilisation)) },
         new("lead", "s", 2, |c| c.lead_time_s),
-        new("slip", "mm", 3, |c| Some(c.slip_mm)),
+        new("slip", "mm", 2, |c| Some(c.slip_mm)),
         new("step at", "mm", 2, |c| Some(c.step_mm)),
         Column { truth: STEP, ..new("found at", "mm", 2, |c| c.step_found_mm) },
         Column {

@@ -151,7 +151,7 @@ fn a_value_out_of_range_is_named_with_its_range() {
 #[test]
 fn a_preload_limit_without_room_above_the_cruise_preload_is_refused() {
     for (text, limit, least, cruise) in
-        [("limit_n = 30", "30", "34.7", "33.3"), ("cruise_n = 60", "50", "62.5", "60")]
+        [("limit_n = 30", "30", "34.9", "33.3"), ("cruise_n = 60", "50", "62.8", "60")]
     {
         let room = format!("that is preload.cruise_n = {cruise} and room to regulate");
         let message = format!("preload.limit_n = {limit}: expected at least {least}, {room}");
