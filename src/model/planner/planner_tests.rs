@@ -91,6 +91,14 @@ fn the_friction_is_checked_at_the_speed_of_the_crossing() {
             let used = planner.model.utilisation(&Point { speed: found.speed, ..at }, found.gap);
             assert!(!found.holds || used <= planner.usable, "{mu} {direction:?} {used}");
             let target = planner.target(direction, Ratio::ONE);
+            // No gap is given up for nothing: with the next larger one it would slip.
+            let larger = divide(found.gap, q16(937_500));
+            if found.gap < target {
+                let (low, high) = bounds;
+                let speed = planner.model.speed(&at, larger, preload, low, high);
+                let used = planner.model.utilisation(&Point { speed, ..at }, larger);
+                assert!(used > planner.usable, "{mu} {direction:?} {used}");
+            }
             smaller += u32::from(found.gap < target);
             whole += u32::from(found.gap == target && found.speed > planner.least_speed);
         }
