@@ -144,6 +144,7 @@ impl Controller {
 mod tests {
     use super::super::tests::{sensed, within};
     use super::*;
+    use crate::rig::Rig;
     use crate::sense::{SensedState, Validity};
     use crate::supervise::Command;
     use crate::units::q16;
@@ -256,6 +257,21 @@ mod tests {
         assert_eq!(armed(Mode::Boot, Trigger::SensorsAnswer), (Mode::SelfTest, false));
         for from in [Mode::Idle, Mode::Complete(Direction::Retract)] {
             assert_eq!(armed(from, reset), (Mode::SelfTest, false), "{from:?}");
+        }
+    }
+
+    #[test]
+    fn the_wheel_rolls_once_its_preload_carries_load_and_acceleration() {
+        let rig = Rig::prototype();
+        let controller = Controller::try_build(&rig).expect("a sound rig");
+        let load = rig.plant.top_load_n * rig.plant.top_load_share;
+        let mass = rig.drive.reflected_mass_kg + rig.plant.moved_mass_kg;
+        for speed in [0.0, 1.0, 6.0, 12.5, 30.0] {
+            let peak = libm::sqrt(speed * rig.drive.jerk_mm_s3).min(rig.drive.acceleration_mm_s2);
+            let needed = load + mass * 1e-3 * peak;
+            let carried = controller.roll_preload(Q16::from_num(speed)).to_num::<f64>()
+                * (rig.plant.mu - rig.control.slip_margin);
+            assert!((carried / needed - 1.0).abs() < 0.01, "{speed}: {carried} {needed}");
         }
     }
 }
