@@ -19,7 +19,7 @@ use crate::model::corner_profile::CornerProfile;
 use crate::numeric::{LowPass, checked};
 use crate::rig::{Rig, RigError};
 use crossing::CrossingWatch;
-use tread::TreadLaw;
+use tread::Tread;
 
 pub use follow::Follow;
 pub use position::{Place, Position, PositionConfidence};
@@ -44,7 +44,7 @@ const MEMORY_PART: f64 = 0.6;
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Estimator {
     watch: CrossingWatch,
-    tread: TreadLaw,
+    tread: Tread,
     steps: Steps,
     /// Low-pass of the preload as the tread's memory makes it.
     memory: LowPass,
@@ -60,7 +60,7 @@ impl Estimator {
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
         Ok(Self {
             watch: CrossingWatch::try_build(rig)?,
-            tread: TreadLaw::try_build(rig)?,
+            tread: Tread::try_build(rig)?,
             steps: Steps::try_build(rig)?,
             memory: LowPass::build(MEMORY_PART * rig.tread.tau_s),
             corner_travel: checked(

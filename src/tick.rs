@@ -227,7 +227,8 @@ impl Controller {
             return;
         }
         let standing_since = state.approach.standing_since;
-        let follow = Follow { now: tick.now, sensed: tick.sensed, standing_since };
+        let pressed = tick.pressed();
+        let follow = Follow { now: tick.now, sensed: tick.sensed, pressed, standing_since };
         let found = self.estimator.follow(&mut state.estimate, &follow);
         self.take_findings(state, tick, found);
     }

@@ -15,6 +15,8 @@ pub struct Follow<'a> {
     pub now: Tick,
     /// Sensors.
     pub sensed: &'a SensedState,
+    /// Radial force on the wheel, N.
+    pub pressed: Newtons,
     /// Since when the crossing preload has been reached.
     pub standing_since: Option<Tick>,
 }
@@ -58,6 +60,11 @@ impl Estimator {
             }
         }
         self.feel(state, tick.sensed);
+        if state.watch.contact == Contact::Wall && !state.known.is_searching() {
+            let (travel, compression) = (tick.sensed.travel, tick.sensed.compression_filtered);
+            let tread = &mut state.tread;
+            found.tread = self.tread.roll(tread, direction, travel, tick.pressed, compression);
+        }
         found
     }
 
@@ -140,10 +147,10 @@ impl Estimator {
         self.watch.rest(&mut state.watch, &seen);
         let (preload, compression) = (sensed.preload_filtered, sensed.compression_filtered);
         if begin || state.on_corner() || state.known.is_searching() {
-            self.tread.begin(&mut state.tread, preload);
+            self.tread.begin(&mut state.tread, sensed.travel, preload, compression);
             return false;
         }
-        self.tread.step(&mut state.tread, preload, arm_thrust, compression)
+        self.tread.rest(&mut state.tread, preload, arm_thrust, compression)
             && !self.steps.may_touch(state.position)
     }
 

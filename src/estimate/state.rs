@@ -114,6 +114,8 @@ pub struct Findings {
     pub advanced: bool,
     /// A crossing that was observed from touch to end, and whether its gap is plausible.
     pub closed: Option<(OpenCrossing, bool)>,
+    /// Stiffness of the tread at rest over that of the rolling one, both over the known one.
+    pub tread: Option<Ratio>,
     /// A new plan is needed.
     pub replan: bool,
 }

@@ -40,6 +40,11 @@ const STRANGE: Ratio = q16(270_000);
 /// alone all along, and its whole patch remembers.
 const MEMORY: [Millimetres; 2] = [q16(100_000), q16(2_000_000)];
 
+/// Stiffness scale up to which the tread is as known, and by how much earlier than the model
+/// says, mm per scale, a stiffer one lifts off at the speed of the window.
+const KNOWN_SCALE: Ratio = q16(1_150_000);
+const EARLIER_PER_SCALE: Millimetres = q16(1_500_000);
+
 /// Travel at crossing speed, mm, with what detection and braking take.
 const SLOW_TRAVEL: [Millimetres; 2] = [q16(800_000), q16(2_400_000)];
 
@@ -207,12 +212,12 @@ impl Planner {
         if margin < self.friction - self.usable {
             add(&mut plan.limits, Limit::SlipMarginLow);
         }
-        self.window(&at, carried, plan);
+        self.window(request, &at, carried, plan);
     }
 
     /// Where the corner may be felt, and where the crossing speed must be reached. The tread still
     /// has the stiffness of the window's speed, with which the wheel would lift off earlier.
-    fn window(&self, at: &Point, carried: Newtons, plan: &mut Plan) {
+    fn window(&self, request: &PlanRequest, at: &Point, carried: Newtons, plan: &mut Plan) {
         let lift = self.lift(plan.direction, plan.gap);
         plan.window_from = self.felt_at[plan.direction as usize] + self.tolerance;
         plan.ready_from = lift + MEMORY[plan.direction as usize];
@@ -220,6 +225,7 @@ impl Planner {
         plan.window_speed = self.window_speed(plan);
         let fast = self.model.gap(&Point { speed: plan.window_speed, ..*at }, carried);
         plan.slow_from += (self.lift(plan.direction, fast) - lift).max(Q16::ZERO);
+        plan.slow_from += (request.scale - KNOWN_SCALE).max(Q16::ZERO) * EARLIER_PER_SCALE;
         plan.window_speed = self.window_speed(plan);
         let less = carried * q16(100_000);
         let gap = self.model.gap(at, carried - less);

@@ -2,6 +2,7 @@
 
 use super::grip::Grip;
 use super::ring::{Contact, Motion, Ring};
+use super::wall::LocalWall;
 
 /// How the wheel is moved along the sleeve.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,6 +68,9 @@ const FAR: f64 = 1e-4;
 /// Part of the preload that one step of Newton's method makes good.
 const NEAR: f64 = 1e-4;
 
+/// A step so long that all memory has caught up, s.
+const FOREVER_S: f64 = 1e9;
+
 impl Balance {
     /// Residual of the radial balance, N, its slope, N/mm, and the utilisation, from
     /// the contact's cosine and sine sums, N, and their derivatives by height, N/mm.
@@ -112,6 +116,24 @@ impl Balance {
     /// [`BalanceError`] if the preload cannot be carried.
     pub fn solve(&self, ring: &mut Ring, motion: Motion) -> Result<Solved, BalanceError> {
         self.search(ring, motion, None)
+    }
+
+    /// Brings a ring to rest on this wall under a radial load, N, from this height above it,
+    /// mm, its rubber relaxed.
+    ///
+    /// # Errors
+    /// [`BalanceError`] if no height carries the load.
+    pub fn rest(
+        ring: &mut Ring,
+        wall: LocalWall,
+        height_mm: f64,
+        preload_n: f64,
+    ) -> Result<Solved, BalanceError> {
+        let motion = Motion { wall, height_mm, turn_rad: 0.0, dt_s: FOREVER_S };
+        let balance = Self { preload_n, spring_n_per_mm: 0.0, arm_n: 0.0, axial: Axial::Pushed };
+        let solved = balance.solve(ring, motion)?;
+        ring.commit(&Motion { height_mm: solved.height_mm, ..motion });
+        Ok(solved)
     }
 
     /// The same where the height in `motion` is predicted so well that one step of Newton's

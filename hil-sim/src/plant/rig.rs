@@ -11,6 +11,7 @@ mod vibration;
 
 use super::actuators::Pretightener;
 use super::arm::Mode;
+use super::balance::Balance;
 use super::draw::PlantParameters;
 use super::energy::Energy;
 use super::ledger::Ledger;
@@ -144,7 +145,8 @@ impl VirtualRig {
         let mut ring = Ring::new(parameters.ring);
         // Coupled elements have no closed form of steady rolling: they are always resolved.
         let coupled = parameters.ring.is_coupled();
-        let at_rest = if coupled { ring.rest(local, guess_mm, preload_n).ok() } else { None };
+        let at_rest =
+            if coupled { Balance::rest(&mut ring, local, guess_mm, preload_n).ok() } else { None };
         let (height_mm, forces) = at_rest
             .map_or((rest.height_mm, (rest.normal_n, rest.cosine_n, 0.0)), |solved| {
                 (solved.height_mm, (solved.contact.normal_n, solved.contact.cosine_n, 0.0))

@@ -23,12 +23,11 @@ mod window;
 
 use std::f64::consts::TAU;
 
-use super::balance::{Axial, Balance, BalanceError, Solved};
 use super::wall::LocalWall;
 use coupled::Coupled;
-use law::Law;
+use law::{Lanes, Law};
 use layout::Ready;
-use sweep::{Lanes, Place, Sums};
+use sweep::{Place, Sums};
 use window::{LANES, Window};
 
 pub use parameters::RingParameters;
@@ -95,9 +94,6 @@ pub struct Motion {
     /// Length of the step, s.
     pub dt_s: f64,
 }
-
-/// A step so long that all memory has caught up, s.
-const FOREVER_S: f64 = 1e9;
 
 impl Ring {
     /// A ring at rest and unloaded.
@@ -314,25 +310,6 @@ impl Ring {
         *taken_mj += 0.5 * patch * work.to_array().iter().sum::<f64>();
         self.active = self.ready.window;
         self.ready.of = None;
-    }
-
-    /// Brings the ring to rest on this wall under a radial load, N, from this height above
-    /// it, mm, its rubber relaxed; gives the contact and its height.
-    ///
-    /// # Errors
-    /// [`BalanceError`] if no height carries the load.
-    pub fn rest(
-        &mut self,
-        wall: LocalWall,
-        height_mm: f64,
-        load_n: f64,
-    ) -> Result<Solved, BalanceError> {
-        let motion = Motion { wall, height_mm, turn_rad: 0.0, dt_s: FOREVER_S };
-        let axial = Axial::Pushed;
-        let balance = Balance { preload_n: load_n, spring_n_per_mm: 0.0, arm_n: 0.0, axial };
-        let solved = balance.solve(self, motion)?;
-        self.commit(&Motion { height_mm: solved.height_mm, ..motion });
-        Ok(solved)
     }
 
     /// Puts the ring into the state that `profile` gives for an angle from straight

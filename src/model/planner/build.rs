@@ -15,7 +15,7 @@ const RISE_MM: f64 = 0.16;
 const DIP_MM: f64 = 1.0;
 
 /// How much farther the stiffness estimate may rise than fall.
-const STIFFER_RANGE: f64 = 4.0;
+const STIFFER_RANGE: f64 = 10.0;
 
 /// Part of the pre-tightener's slew that the spring may use up while the wheel climbs.
 const CLIMB_PART: f64 = 0.9;

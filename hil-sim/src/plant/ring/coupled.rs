@@ -381,6 +381,7 @@ fn relative(law: &Law) -> (f64, [f64; 2]) {
 mod tests {
     use super::super::Ring;
     use super::*;
+    use crate::plant::balance::Balance;
     use crate::plant::wall::{Step, Wall};
     use interstage::rig::Rig;
 
@@ -402,7 +403,7 @@ mod tests {
     fn the_slope_is_the_derivative() {
         for (at, height_mm) in places() {
             let mut ring = Ring::new(rubber(8.0, 720));
-            ring.rest(wall(-40.0), 24.7, 30.0).unwrap();
+            Balance::rest(&mut ring, wall(-40.0), 24.7, 30.0).unwrap();
             let wall = wall(at);
             let motion = |height_mm| Motion { wall, height_mm, turn_rad: 0.002, dt_s: 0.01 };
             let contact = ring.trial(&motion(height_mm));
@@ -433,7 +434,7 @@ mod tests {
     #[test]
     fn what_is_pressed_in_bulges_out() {
         let mut ring = Ring::new(rubber(5.0, 720));
-        let solved = ring.rest(wall(-40.0), 24.7, 50.0).unwrap();
+        let solved = Balance::rest(&mut ring, wall(-40.0), 24.7, 50.0).unwrap();
         assert!((solved.contact.cosine_n - 50.0).abs() < 1e-3);
         let u = &ring.coupled.as_ref().unwrap().u;
         let deepest = u.iter().copied().fold(0.0, f64::max);
@@ -462,7 +463,7 @@ mod tests {
     fn a_free_rim_recovers_slowly() {
         let parameters = rubber(8.0, 720);
         let mut ring = Ring::new(parameters);
-        let pressed = ring.rest(wall(-40.0), 24.7, 50.0).unwrap().contact.depth_mm;
+        let pressed = Balance::rest(&mut ring, wall(-40.0), 24.7, 50.0).unwrap().contact.depth_mm;
         let free = |dt_s| Motion { wall: wall(-40.0), height_mm: 27.0, turn_rad: 0.0, dt_s };
         let deepest =
             |ring: &Ring| ring.coupled.as_ref().unwrap().u.iter().copied().fold(0.0, f64::max);

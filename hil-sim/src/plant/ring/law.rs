@@ -1,8 +1,12 @@
 //! The three-parameter solid over one step, integrated exactly for a depth that runs
 //! linearly in it.
 
+use wide::f64x4;
+
 use super::RingParameters;
-use super::sweep::Lanes;
+
+/// A number per element of a block.
+pub(super) type Lanes = f64x4;
 
 /// Displacement that counts as none, before it turns denormal and slow, mm.
 pub(super) const GONE: f64 = 1e-200;

@@ -1,6 +1,7 @@
 //! The blocks that a step visits, laid out once for all its trials.
 
-use super::sweep::{Block, Lanes};
+use super::law::Lanes;
+use super::sweep::Block;
 use super::window::{self, LANES, WIDEST, Window};
 use super::{Motion, Ring};
 use crate::plant::wall::LocalWall;

@@ -6,13 +6,8 @@
 //! once a step, and every height tried costs one pass over it. The lanes are added up by
 //! their place in the block, so that blocks which do not touch change no bit of a sum.
 
-use wide::f64x4;
-
 use super::super::wall::Edge;
-use super::law::Law;
-
-/// A number per element of a block.
-pub(super) type Lanes = f64x4;
+use super::law::{Lanes, Law};
 
 /// What a block brings into a step.
 #[derive(Clone, Copy, Debug, Default)]
