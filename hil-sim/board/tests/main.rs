@@ -12,6 +12,8 @@ mod log;
 mod panics;
 mod params;
 mod processor;
+mod registers;
 mod resets;
+mod rules;
 mod second;
 mod verbs;
