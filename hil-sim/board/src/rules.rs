@@ -7,7 +7,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-/// A rule. Sections are those of RM0440 unless another source is named.
+/// A rule, with its section or register in RM0440 unless another source is named.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Rule {
@@ -27,19 +27,19 @@ pub enum Rule {
     AdcDisabledOnly,
     /// DS12288, ADC characteristics: its clock is at most 60 MHz.
     AdcClock,
-    /// 28.6 (`TIMx_BDTR`): fields that `LOCK` protects keep their value.
+    /// `TIMx_BDTR`: fields that `LOCK` protects keep their value.
     TimerLock,
-    /// 28.6 (`TIMx_BDTR`): `LOCK` is written with the register's first write, and never again.
+    /// `TIMx_BDTR`: `LOCK` is written with the register's first write, and never again.
     TimerLockOnce,
-    /// 12.6 (`DMA_CCRx` and the following): a channel is set up only while it is disabled.
+    /// `DMA_CCRx` and the following: a channel is set up only while it is disabled.
     DmaEnabled,
     /// 9.3.8: the configuration of a locked pin stays until the next reset.
     PinLock,
-    /// 10.2 (`SYSCFG_CFGR2`): with `PVDL` the voltage detector's settings stay.
+    /// `SYSCFG_CFGR2`: with `PVDL` the voltage detector's settings stay.
     DetectorLock,
-    /// 7.4 (`RCC_PLLCFGR`): the PLL is set up only while it is off.
+    /// `RCC_PLLCFGR`: the PLL is set up only while it is off.
     PllOn,
-    /// 7.4 (`RCC_CR`): the source of the system clock stays on.
+    /// `RCC_CR`: the source of the system clock stays on.
     ClockInUse,
     /// 3.3.3: enough wait states for the clock, before the clock.
     WaitStates,
@@ -76,13 +76,13 @@ impl Rule {
             Self::AdcConfiguration => "RM0440 21.4.10: converter set up while it converts",
             Self::AdcDisabledOnly => "RM0440 21.4.10: set up while a converter is enabled",
             Self::AdcClock => "DS12288: converter clock above 60 MHz",
-            Self::TimerLock => "RM0440 28.6: field of a timer changed that LOCK protects",
-            Self::TimerLockOnce => "RM0440 28.6: LOCK changed after the first write of BDTR",
-            Self::DmaEnabled => "RM0440 12.6: DMA channel set up while it is enabled",
+            Self::TimerLock => "RM0440, TIMx_BDTR: field of a timer changed that LOCK protects",
+            Self::TimerLockOnce => "RM0440, TIMx_BDTR: LOCK changed after the first write of BDTR",
+            Self::DmaEnabled => "RM0440, DMA_CCRx: DMA channel set up while it is enabled",
             Self::PinLock => "RM0440 9.3.8: locked pin set up",
-            Self::DetectorLock => "RM0440 10.2: locked voltage detector set up",
-            Self::PllOn => "RM0440 7.4: PLL set up while it is on",
-            Self::ClockInUse => "RM0440 7.4: source of the system clock switched off",
+            Self::DetectorLock => "RM0440, SYSCFG_CFGR2: locked voltage detector set up",
+            Self::PllOn => "RM0440, RCC_PLLCFGR: PLL set up while it is on",
+            Self::ClockInUse => "RM0440, RCC_CR: source of the system clock switched off",
             Self::WaitStates => "RM0440 3.3.3: too few wait states for the clock",
             Self::Boost => "RM0440 6.1.5: above 150 MHz without the regulator's boost",
             Self::ClockStep => "RM0440 6.1.5: above 80 MHz in one step",

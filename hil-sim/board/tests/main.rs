@@ -4,6 +4,7 @@ mod common;
 mod cycles;
 mod faults;
 mod firmware;
+mod first_board;
 mod flash;
 mod gdb;
 mod hil;

@@ -6,8 +6,8 @@
 //! converter without regular ones, injected conversions of up to four channels. The code is
 //! that of the voltage at the end of the conversion.
 //!
-//! Source: RM0440, 21.4 (functions; 21.4.6 to 21.4.10 say what may follow what) and 21.7
-//! (registers); DS12288, ADC characteristics (times).
+//! Source: RM0440, 21.4.6 to 21.4.10 (what may follow what) and the registers; DS12288, ADC
+//! characteristics (times).
 
 use super::registers::{Kept, Registers};
 use super::{HZ, Peripheral, Write};

@@ -3,7 +3,7 @@
 //! Transfers between a peripheral and memory, one for each request: channels with their
 //! counters and flags. The chip connects the requests and moves the data.
 //!
-//! Source: RM0440, 12.4 (functions) and 12.6 (registers); 13.6 for the multiplexer.
+//! Source: RM0440, chapters of DMA and DMAMUX.
 
 use super::registers::{Kept, Registers};
 use super::{Peripheral, Write};

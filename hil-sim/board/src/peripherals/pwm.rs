@@ -1,6 +1,6 @@
 //! A timer with four PWM channels and a break input: TIM1 and TIM8.
 //!
-//! Source: RM0440, 28.3 (functions) and 28.6 (registers; `BDTR` has the lock).
+//! Source: RM0440, advanced-control timers; the lock is in `TIMx_BDTR`.
 
 use super::encoder::filter_cycles;
 use super::registers::{Kept, Registers};

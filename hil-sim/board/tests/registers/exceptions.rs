@@ -4,12 +4,12 @@
 pub(super) const RESETS: [(&str, &str); 7] = [
     (
         "EXTI.IMR1 EXTI.IMR2",
-        "by RM0440 15.3 the lines without an edge are not masked; the description's value has \
+        "by RM0440, EXTI_IMRx, the lines without an edge are not masked; the description's value has \
          bits that are no fields of its own",
     ),
-    ("TIM1.AF* TIM8.AF*", "by RM0440 28.6 BKINE and BK2INE are 1 after reset"),
-    ("RCC.CR", "by RM0440 7.4 HSI is on and ready; the description's bits are no fields"),
-    ("FLASH.ACR", "by RM0440 3.7 DBG_SWEN is 1 after reset"),
+    ("TIM1.AF* TIM8.AF*", "by RM0440, TIMx_AFx, BKINE and BK2INE are 1 after reset"),
+    ("RCC.CR", "by RM0440, RCC_CR, HSI is on and ready; the description's bits are no fields"),
+    ("FLASH.ACR", "by RM0440, FLASH_ACR, DBG_SWEN is 1 after reset"),
     ("CRC.DR16 CRC.DR8", "narrow views of DR, read here as a word"),
     ("GPIO*.IDR", "levels at the pins: pull-ups of the debug port, emergency stop, button"),
     ("DBGMCU.IDCODE", "the chip's identity, category 3, revision X"),
