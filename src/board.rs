@@ -32,7 +32,9 @@ pub(crate) use pins::{Angle, Bridges, Button, CompressionSensor, PreloadSensor, 
 pub(crate) use text_log::TextLog;
 
 use embassy_stm32::peripherals::{DMA1_CH1, DMA1_CH2};
-use embassy_stm32::{Config, bind_interrupts, dma, exti, flash as flash_driver, interrupt, rcc};
+use embassy_stm32::{
+    Config, Peripherals, bind_interrupts, dma, exti, flash as flash_driver, interrupt, pac, rcc,
+};
 use interstage::tasks::Exchange;
 
 /// What all tasks share.
@@ -64,7 +66,7 @@ const SYSCLK_HZ: u32 = 170_000_000;
 
 /// [`SYSCLK_HZ`] from the internal oscillator: 16 MHz / 4 x 85 / 2. Its 1 % suffices: positions
 /// come from the encoder, and every step is planned again.
-pub(crate) fn clocks() -> Config {
+fn clocks() -> Config {
     let mut config = Config::default();
     config.rcc.pll = Some(rcc::Pll {
         source: rcc::PllSource::HSI,
@@ -75,10 +77,22 @@ pub(crate) fn clocks() -> Config {
         divr: Some(rcc::PllRDiv::DIV2),
     });
     config.rcc.sys = rcc::Sysclk::PLL1_R;
-    // Above 150 MHz the core needs its higher voltage.
+    // Above 150 MHz the core needs its higher voltage, see `init`.
     config.rcc.boost = true;
     // All converters from the system clock; the driver divides it by four.
     config.rcc.mux.adc12sel = rcc::mux::Adcsel::SYS;
     config.rcc.mux.adc345sel = rcc::mux::Adcsel::SYS;
     config
+}
+
+/// Starts the chip, at its slow clock first: the regulator's boost comes before more than
+/// 150 MHz (RM0440, 6.1.5).
+///
+/// The driver's own switch for it does not reach the chip: stm32-metapac 21 has `R1MODE` at bit
+/// 0 of `PWR_CR5`, the manual and ST's headers have it at bit 8.
+pub(crate) fn init() -> Peripherals {
+    let mut p = embassy_stm32::init(Config::default());
+    pac::PWR.cr5().write_value(pac::pwr::regs::Cr5(0));
+    rcc::reinit(clocks().rcc, &mut p.RCC);
+    p
 }

@@ -69,7 +69,7 @@ mod firmware {
 
     /// Starts everything.
     fn begin(threads: Spawner, channels: Channels) {
-        let p = embassy_stm32::init(board::clocks());
+        let p = board::init();
         let waited = supply::watch();
         // First: a damaged image may not reach what follows.
         let image = image::verify();

@@ -7,7 +7,8 @@
 //!
 //! It masks no interrupt: a line of many numbers takes half a control tick, which would delay
 //! the next. All lines come from thread mode; one of an interrupt that finds another in
-//! progress is lost and counted.
+//! progress is lost and counted. The logger of `rtt-target` masks interrupts for a frame and
+//! panics when a second one comes in between.
 
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};

@@ -1,6 +1,7 @@
 //! The chip around the core: every peripheral at its address, and the connections between
 //! them: clocks, interrupt lines, DMA requests, pins.
 
+pub mod description;
 pub mod map;
 mod pins;
 mod stray;
@@ -15,14 +16,15 @@ use super::peripherals::flash::{Change, Flash};
 use super::peripherals::gpio::Gpio;
 use super::peripherals::iwdg::Iwdg;
 use super::peripherals::pwm::Pwm;
-use super::peripherals::pwr::{Pwr, Then};
-use super::peripherals::rcc::{Cause, Rcc};
+use super::peripherals::pwr::{self, Pwr, Then};
+use super::peripherals::rcc::{self, Cause, Rcc};
 use super::peripherals::registers::{Kept, Registers};
 use super::peripherals::spi::{self, AngleSensor, Spi};
 use super::peripherals::syscfg::Syscfg;
 use super::peripherals::system::{Counter, System};
 use super::peripherals::time_base::TimeBase;
 use super::peripherals::{Peripheral, Write};
+use super::rules::Rule;
 
 pub use pins::{Bridge, Motor, Pin};
 pub use stray::{Stray, Strays, Why};
@@ -358,6 +360,37 @@ impl Chip {
     }
 }
 
+impl Chip {
+    /// Notes the rule that the last access to a block broke.
+    fn note_broken_rule(
+        &mut self,
+        block: Block,
+        register: (&'static str, u32),
+        access: Access,
+        write: bool,
+    ) {
+        if let Some(rule) = self.block(block).take_broken_rule() {
+            self.strays.note(register, access, write, Why::Broken(rule));
+        }
+    }
+
+    /// The rule between several blocks that this write would break.
+    fn broken_rule(&mut self, block: Block, offset: u32, write: Write, now: u64) -> Option<Rule> {
+        match (block, offset) {
+            (Block::Rcc, rcc::CFGR) => {
+                let wait_states = self.flash.read(0, now)? & 0xF;
+                let boosts = self.power.read(pwr::CR5, now)? & pwr::R1MODE == 0;
+                self.rcc.broken_rule(write, wait_states, boosts, now)
+            }
+            (Block::Pwr, pwr::CR2) if self.syscfg.locks_detector() => {
+                let old = self.power.read(offset, now)?;
+                ((write.onto(old) ^ old) & 0xF != 0).then_some(Rule::DetectorLock)
+            }
+            _ => None,
+        }
+    }
+}
+
 /// Bits of an access in the lowest bytes of a word.
 const fn lowest(bytes: u32) -> u32 {
     if bytes >= 4 { u32::MAX } else { (1 << (8 * bytes)) - 1 }
@@ -371,6 +404,7 @@ impl Bus for Chip {
     fn read(&mut self, access: Access) -> u32 {
         let Some(Place { block, offset, name, .. }) = self.target(access, false) else { return 0 };
         let word = self.block(block).read(offset, access.now);
+        self.note_broken_rule(block, (name, offset), access, false);
         self.settle_after(block, offset, false, access.now);
         if word.is_none() {
             self.strays.note((name, offset), access, false, Why::NoModel);
@@ -381,11 +415,24 @@ impl Bus for Chip {
     fn write(&mut self, access: Access, value: u32) {
         let Some(Place { block, offset, name, .. }) = self.target(access, true) else { return };
         let (shift, kept) = (8 * (access.address & 3), lowest(access.size));
-        let write = Write { value: (value & kept) << shift, mask: kept << shift };
+        let mut write = Write { value: (value & kept) << shift, mask: kept << shift };
+        let (known, reserved) = description::writable(access.address & !3, write.ones());
+        if reserved != 0 {
+            self.strays.note((name, offset), access, true, Why::Reserved(reserved));
+        }
+        write.mask &= known;
+        write.value &= known;
+        if let Some(rule) = self.broken_rule(block, offset, write, access.now) {
+            self.strays.note((name, offset), access, true, Why::Broken(rule));
+            if rule.accepted().is_none() {
+                return;
+            }
+        }
         let sticks = self.defects.timer_flags_stick && (block, offset) == (Block::Time, 0x10);
         if !sticks && self.block(block).write(offset, write, access.now).is_none() {
             self.strays.note((name, offset), access, true, Why::NoModel);
         }
+        self.note_broken_rule(block, (name, offset), access, true);
         self.settle_after(block, offset, true, access.now);
     }
 

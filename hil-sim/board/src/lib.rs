@@ -22,6 +22,7 @@ pub mod params;
 pub mod peripherals;
 pub mod port;
 pub mod rtt;
+pub mod rules;
 pub mod run;
 pub mod spread;
 pub mod thumb;

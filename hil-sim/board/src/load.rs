@@ -55,7 +55,7 @@ pub struct Load {
     pub flash: u64,
     /// Bytes of RAM, the stack included.
     pub ram: u64,
-    /// Accesses to registers that no model has.
+    /// Accesses that no model has, to reserved bits, or against a rule of the chip.
     pub unmodelled: Vec<Stray>,
 }
 

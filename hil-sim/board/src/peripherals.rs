@@ -22,6 +22,8 @@ pub mod syscfg;
 pub mod system;
 pub mod time_base;
 
+use crate::rules::Rule;
+
 /// The core's clock, Hz.
 pub const HZ: u64 = 170_000_000;
 
@@ -47,12 +49,20 @@ impl Write {
 }
 
 /// A block of registers.
+///
+/// What a write may change is the chip's to know: it drops bits that are reserved or only read
+/// before the model sees them.
 pub trait Peripheral {
     /// Reads the word at this offset; `None` if no model has it.
     fn read(&mut self, offset: u32, now: u64) -> Option<u32>;
 
-    /// Writes to the word at this offset; `None` if no model has it.
+    /// Writes to the word at this offset; `None` if no model has it, or not this use of it.
     fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()>;
+
+    /// Takes the rule that the last access broke.
+    fn take_broken_rule(&mut self) -> Option<Rule> {
+        None
+    }
 
     /// Cycle at which something is due by itself.
     fn deadline(&self) -> u64 {

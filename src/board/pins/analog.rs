@@ -3,7 +3,8 @@
 //!
 //! Each converts continuously, and DMA writes its codes into a ring; a sample is the latest of
 //! them, by the channel's own count. Nothing is started or awaited, so that a sample needs no
-//! interrupt and no second poll of its task.
+//! interrupt and no second poll of its task. The library's `read_latest` counts the ring's rounds
+//! in an interrupt.
 
 use embassy_stm32::adc::{
     Adc, AdcChannel, AdcConfig, CONTINUOUS, DefaultInstance, Resolution, RingBufferedAdc, Rovsm,

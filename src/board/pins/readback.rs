@@ -1,7 +1,9 @@
 //! Readback of the bridges' outputs: one converter for both, in injected conversions.
 //!
 //! Taking the results, once a tick, starts the next conversions, which end long before the next
-//! tick. Each has its own result register: neither DMA nor an interrupt is needed.
+//! tick. Each has its own result register: neither DMA nor an interrupt is needed. The library's
+//! `InjectedAdc` reads the results without saying whether they are complete, and takes a trigger
+//! of the hardware.
 
 use embassy_stm32::Peri;
 use embassy_stm32::adc::{Adc, AdcChannel, AdcConfig, AnyAdcChannel, SampleTime};

@@ -1,13 +1,15 @@
-//! Accesses that no model answered.
+//! Accesses that no model answered, or that the chip does not allow.
 
 use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::Serialize;
 
+use super::description;
 use crate::core::Access;
+use crate::rules::Rule;
 
-/// Why an access was not answered.
+/// What is wrong with an access.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Why {
@@ -15,6 +17,10 @@ pub enum Why {
     NoModel,
     /// The peripheral's clock is off.
     NoClock,
+    /// These bits, written as 1, are reserved.
+    Reserved(u32),
+    /// The access broke a rule of the chip.
+    Broken(Rule),
 }
 
 /// Accesses of one kind to one register.
@@ -24,9 +30,11 @@ pub struct Stray {
     pub peripheral: &'static str,
     /// Offset of the register; its address if the peripheral is unknown.
     pub register: u32,
+    /// Name of the register in the vendor's description; empty if it has none.
+    pub name: &'static str,
     /// A write, else a read.
     pub write: bool,
-    /// Why it was not answered.
+    /// What is wrong with it.
     pub why: Why,
     /// Number of accesses.
     pub count: u64,
@@ -40,18 +48,43 @@ impl fmt::Display for Stray {
         let why = match self.why {
             Why::NoModel => "not modelled",
             Why::NoClock => "clock off",
+            Why::Reserved(bits) => {
+                return self.write(f, access, format_args!("reserved bits {bits:#x}"));
+            }
+            Why::Broken(rule) => return self.write(f, access, format_args!("{rule}")),
         };
-        let Self { peripheral, register, count, pc, .. } = self;
+        self.write(f, access, format_args!("{why}"))
+    }
+}
+
+impl Stray {
+    fn write(
+        &self,
+        f: &mut fmt::Formatter<'_>,
+        access: &str,
+        why: fmt::Arguments<'_>,
+    ) -> fmt::Result {
+        let Self { peripheral, register, name, count, pc, .. } = self;
+        let gap = if name.is_empty() { "" } else { " " };
         write!(
             f,
-            "{access} {peripheral} {register:#05x}: {why}, {count} times, first at {pc:#010x}"
+            "{access} {peripheral}{gap}{name} {register:#05x}: {why}, {count} times, first at {pc:#010x}"
         )
     }
 }
 
-/// All unanswered accesses.
+/// Registers whose reserved bits the firmware's libraries write as 1, and why that is accepted.
+const ACCEPTED: [(&str, &str, &str); 1] = [(
+    "TIM2",
+    "SR",
+    "embassy-stm32 0.6 writes the complement of the flags; where a 0 clears, a 1 does nothing",
+)];
+
+/// All such accesses.
 #[derive(Clone, Debug, Default)]
-pub struct Strays(BTreeMap<(&'static str, u32, bool, Why), Stray>);
+pub struct Strays(Kinds, Kinds);
+
+type Kinds = BTreeMap<(&'static str, u32, bool, Why), Stray>;
 
 impl Strays {
     pub(super) fn note(
@@ -62,8 +95,16 @@ impl Strays {
         why: Why,
     ) {
         let key = (peripheral, register, write, why);
-        let first = Stray { peripheral, register, write, why, count: 0, pc: access.pc };
-        self.0.entry(key).or_insert(first).count += 1;
+        let described = description::at(access.address & !3).first();
+        let (peripheral, name) = described.map_or((peripheral, ""), |r| (r.peripheral, r.name));
+        let first = Stray { peripheral, register, name, write, why, count: 0, pc: access.pc };
+        let accepted = match why {
+            Why::Broken(rule) => rule.accepted().is_some(),
+            Why::Reserved(_) => ACCEPTED.iter().any(|(of, n, _)| (*of, *n) == (peripheral, name)),
+            Why::NoModel | Why::NoClock => false,
+        };
+        let list = if accepted { &mut self.1 } else { &mut self.0 };
+        list.entry(key).or_insert(first).count += 1;
     }
 
     /// Each kind, in the order of peripheral and register.
@@ -71,7 +112,12 @@ impl Strays {
         self.0.values()
     }
 
-    /// Number of all accesses.
+    /// Those for which there is a reason: [`Rule::accepted`], and the time driver's flags.
+    pub fn accepted(&self) -> impl Iterator<Item = &Stray> {
+        self.1.values()
+    }
+
+    /// Number of all accesses, without the accepted ones.
     pub fn count(&self) -> u64 {
         self.0.values().map(|stray| stray.count).sum()
     }

@@ -5,9 +5,13 @@
 //! single or continuous, with sampling time and oversampling, DMA requests, overrun; on a
 //! converter without regular ones, injected conversions of up to four channels. The code is
 //! that of the voltage at the end of the conversion.
+//!
+//! Source: RM0440, 21.4.6 to 21.4.10 (what may follow what) and the registers; DS12288, ADC
+//! characteristics (times).
 
 use super::registers::{Kept, Registers};
-use super::{Peripheral, Write};
+use super::{HZ, Peripheral, Write};
+use crate::rules::Rule;
 
 const ISR: u32 = 0x00;
 const CR: u32 = 0x08;
@@ -47,8 +51,15 @@ const INJECTED_SEQUENCE: u32 = 1 << 6;
 /// Oversampling of regular and of injected conversions.
 const OVERSAMPLED: u32 = 1;
 const INJECTED_OVERSAMPLED: u32 = 1 << 1;
-/// Converter clocks that a calibration takes.
+/// Converter clocks that a calibration takes, from its end to the enabling, and from the enabling
+/// to `ADRDY`: a conversion.
 const CALIBRATION: u64 = 116;
+const REST: u64 = 4;
+const STABILISATION: u64 = 15;
+/// Core cycles that the regulator takes to start: 20 us.
+const REGULATOR_START: u64 = 20 * (HZ / 1_000_000);
+/// Highest clock of a converter, Hz.
+const HIGHEST_CLOCK: u64 = 60_000_000;
 
 /// IER, CFGR, CFGR2, sampling times, watchdogs, sequences, DIFSEL, CALFACT.
 const REGISTERS: [Kept; 14] = [
@@ -80,6 +91,13 @@ struct Converter {
     /// The current injected conversion: rank, and cycle at which it is done.
     injected: Option<(usize, u64)>,
     injected_data: [u32; 4],
+    /// Cycles at which the regulator has started, a rest after the calibration is over, and the
+    /// converter is ready; never while it is off.
+    regulated: u64,
+    rested: u64,
+    ready: u64,
+    calibrated: bool,
+    broken: Option<Rule>,
 }
 
 impl Converter {
@@ -92,7 +110,58 @@ impl Converter {
             done: u64::MAX,
             injected: None,
             injected_data: [0; 4],
+            regulated: u64::MAX,
+            rested: 0,
+            ready: u64::MAX,
+            calibrated: false,
+            broken: None,
         }
+    }
+
+    const fn is_enabled(&self) -> bool {
+        self.control & ENABLE != 0
+    }
+
+    const fn converts(&self) -> bool {
+        self.control & (START | INJECT) != 0
+    }
+
+    /// The rule that these commands would break.
+    fn broken_command(&self, ones: u32, clock: u64, now: u64) -> Option<Rule> {
+        let enabling = ones & ENABLE != 0 && !self.is_enabled();
+        let calibrating = ones & CALIBRATE != 0;
+        let starting = ones & (START | INJECT) & !self.control != 0;
+        if (enabling || calibrating) && now < self.regulated {
+            Some(Rule::AdcRegulator)
+        } else if calibrating && self.is_enabled() || enabling && !self.calibrated {
+            Some(Rule::AdcCalibration)
+        } else if enabling && (self.control & CALIBRATE != 0 || now < self.rested) {
+            Some(Rule::AdcEnable)
+        } else if starting && (!self.is_enabled() || now < self.ready) {
+            Some(Rule::AdcReady)
+        } else if ones & DISABLE != 0 && self.converts() {
+            Some(Rule::AdcDisable)
+        } else if starting && HZ / clock > HIGHEST_CLOCK {
+            Some(Rule::AdcClock)
+        } else {
+            None
+        }
+    }
+
+    /// Writes to a configuration register.
+    fn configure(&mut self, offset: u32, write: Write) -> Option<()> {
+        let old = self.registers.read(offset)?;
+        let changes = write.onto(old) != old;
+        self.broken = match offset {
+            // The queue of injected conversions is not written while they run.
+            JSQR if changes && self.control & INJECT != 0 => Some(Rule::AdcConfiguration),
+            // Interrupts, the queue and calibration factors have rules of their own.
+            0x04 | JSQR | 0xB4 => None,
+            0xB0 if changes && self.is_enabled() => Some(Rule::AdcDisabledOnly),
+            _ if changes && self.converts() => Some(Rule::AdcConfiguration),
+            _ => None,
+        };
+        if self.broken.is_some() { Some(()) } else { self.registers.write(offset, write) }
     }
 
     /// Channel of the regular conversion, or of the injected one of this rank.
@@ -145,21 +214,33 @@ impl Converter {
         if ones & !(known | CALIBRATE) != 0 {
             return None;
         }
+        self.broken = self.broken_command(ones, clock, now);
+        if self.broken.is_some() {
+            return Some(());
+        }
         let level = REGULATOR | DEEP | 1 << 30;
         self.control = self.control & !level | write.onto(self.control) & level;
+        if self.control & DEEP != 0 {
+            self.calibrated = false;
+        }
+        if self.control & (REGULATOR | DEEP) != REGULATOR {
+            self.regulated = u64::MAX;
+        } else if self.regulated == u64::MAX {
+            self.regulated = now + REGULATOR_START;
+        }
         let ready = self.control & REGULATOR != 0 && self.control & DEEP == 0;
         let idle = self.control & (START | INJECT | CALIBRATE) == 0;
         if ones & CALIBRATE != 0 && ready && self.control & ENABLE == 0 {
             self.control |= CALIBRATE;
             self.done = now + CALIBRATION * clock;
         }
-        if ones & ENABLE != 0 && ready && idle {
+        if ones & ENABLE != 0 && ready && idle && !self.is_enabled() {
             self.control |= ENABLE;
-            self.flags |= READY;
+            self.ready = now + STABILISATION * clock;
         }
         if ones & DISABLE != 0 && idle {
             self.control &= !ENABLE;
-            self.flags &= !READY;
+            self.ready = u64::MAX;
         }
         if ones & STOP != 0 {
             self.control &= !START;
@@ -185,7 +266,8 @@ impl Converter {
         Some(())
     }
 
-    fn read(&mut self, offset: u32) -> Option<u32> {
+    fn read(&mut self, offset: u32, now: u64) -> Option<u32> {
+        self.settle(now);
         match offset {
             ISR => Some(self.flags),
             CR => Some(self.control),
@@ -195,6 +277,14 @@ impl Converter {
             }
             JDR..=0x8C => self.injected_data.get((offset - JDR) as usize / 4).copied(),
             _ => self.registers.read(offset),
+        }
+    }
+
+    /// Sets `ADRDY` once, when the converter has become ready.
+    const fn settle(&mut self, now: u64) {
+        if self.ready <= now && self.ready != 0 {
+            self.ready = 0;
+            self.flags |= READY;
         }
     }
 
@@ -217,6 +307,8 @@ impl Converter {
         let done = std::mem::replace(&mut self.done, u64::MAX);
         if self.control & CALIBRATE != 0 {
             self.control &= !CALIBRATE;
+            self.calibrated = true;
+            self.rested = done + REST * clock;
             return;
         }
         let config = self.registers.get(CFGR);
@@ -249,11 +341,13 @@ pub struct Adc {
     common: u32,
     /// Codes of 16 bits at the inputs: converter, channel.
     inputs: [[u16; 20]; 2],
+    broken: Option<Rule>,
 }
 
 impl Default for Adc {
     fn default() -> Self {
-        Self { converters: [Converter::new(), Converter::new()], common: 0, inputs: [[0; 20]; 2] }
+        let converters = [Converter::new(), Converter::new()];
+        Self { converters, common: 0, inputs: [[0; 20]; 2], broken: None }
     }
 }
 
@@ -280,29 +374,40 @@ impl Adc {
 }
 
 impl Peripheral for Adc {
-    fn read(&mut self, offset: u32, _: u64) -> Option<u32> {
+    fn read(&mut self, offset: u32, now: u64) -> Option<u32> {
         match offset {
             CCR => Some(self.common),
-            0..COMMON => self.converters.get_mut((offset >> 8) as usize)?.read(offset & 0xFF),
+            0..COMMON => self.converters.get_mut((offset >> 8) as usize)?.read(offset & 0xFF, now),
             _ => None,
         }
     }
 
     fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
         if offset == CCR {
-            self.common = write.onto(self.common);
+            let next = write.onto(self.common);
+            if next != self.common && self.converters.iter().any(Converter::is_enabled) {
+                self.broken = Some(Rule::AdcDisabledOnly);
+            } else {
+                self.common = next;
+            }
             return Some(());
         }
         let clock = self.clock();
         let converter = self.converters.get_mut((offset >> 8) as usize)?;
         match offset & 0xFF {
             ISR => {
+                converter.settle(now);
                 converter.flags &= !write.ones();
                 Some(())
             }
             CR => converter.write_control(write, clock, now),
-            offset => converter.registers.write(offset, write),
+            offset => converter.configure(offset, write),
         }
+    }
+
+    fn take_broken_rule(&mut self) -> Option<Rule> {
+        let own = self.converters.iter_mut().find_map(|converter| converter.broken.take());
+        own.or(self.broken.take())
     }
 
     fn deadline(&self) -> u64 {
@@ -336,20 +441,34 @@ mod tests {
         adc.write(offset, Write { value, mask: ALL }, now)
     }
 
+    /// A cycle after which a converter that was started at cycle 0 is ready.
+    const BEGIN: u64 = 5_000;
+
+    /// Regulator, calibration, enabling, each in its time.
+    fn start(adc: &mut Adc, base: u32) {
+        write(adc, base + CR, REGULATOR, 0).expect("modelled");
+        write(adc, base + CR, REGULATOR | CALIBRATE, REGULATOR_START).expect("modelled");
+        adc.advance(adc.deadline());
+        let rested = REGULATOR_START + (CALIBRATION + REST) * adc.clock();
+        write(adc, base + CR, REGULATOR | ENABLE, rested).expect("modelled");
+        assert_eq!(adc.take_broken_rule(), None);
+        let flags = adc.read(base + ISR, BEGIN).expect("modelled");
+        assert_eq!(flags & READY, READY);
+    }
+
     /// ADC2 on channel 9, 256 conversions of 12.5 + 12.5 clocks at a quarter of the
     /// core's, DMA on.
     fn ready() -> Adc {
         let mut adc = Adc::default();
+        write(&mut adc, CCR, 2 << 18, 0).expect("modelled");
+        start(&mut adc, 0x100);
         for (offset, value) in [
-            (CCR, 2 << 18),
-            (0x100 + CR, REGULATOR),
-            (0x100 + CR, REGULATOR | ENABLE),
             (0x100 + CFGR, 1),
             (0x100 + CFGR2, 0x9D),
             (0x100 + SMPR1, 2 << 27),
             (0x100 + SQR1, 9 << 6),
         ] {
-            write(&mut adc, offset, value, 0).expect("modelled");
+            write(&mut adc, offset, value, BEGIN).expect("modelled");
         }
         adc
     }
@@ -358,8 +477,8 @@ mod tests {
     fn a_code_is_the_mean_of_its_conversions_and_takes_their_time() {
         let mut adc = ready();
         adc.set_input(1, 9, 51_234);
-        write(&mut adc, 0x100 + CR, REGULATOR | START, 1000).expect("modelled");
-        let due = 1000 + 256 * 25 * 4;
+        write(&mut adc, 0x100 + CR, REGULATOR | START, BEGIN).expect("modelled");
+        let due = BEGIN + 256 * 25 * 4;
         assert_eq!(adc.deadline(), due);
         adc.advance(due - 1);
         assert!(!adc.wants_dma(1));
@@ -374,7 +493,7 @@ mod tests {
         let mut adc = ready();
         write(&mut adc, 0x100 + CFGR2, 0, 0).expect("modelled");
         adc.set_input(1, 9, 51_234);
-        write(&mut adc, 0x100 + CR, REGULATOR | START, 0).expect("modelled");
+        write(&mut adc, 0x100 + CR, REGULATOR | START, BEGIN).expect("modelled");
         adc.advance(adc.deadline());
         assert_eq!(adc.read(0x100 + DR, 0), Some(51_234 / 16));
     }
@@ -384,7 +503,7 @@ mod tests {
         let mut adc = ready();
         for code in [1600, 3200] {
             adc.set_input(1, 9, code);
-            write(&mut adc, 0x100 + CR, REGULATOR | START, 0).expect("modelled");
+            write(&mut adc, 0x100 + CR, REGULATOR | START, BEGIN).expect("modelled");
             adc.advance(adc.deadline());
         }
         assert_eq!(adc.read(0x100 + ISR, 0).map(|flags| flags & OVERRUN), Some(OVERRUN));
@@ -395,9 +514,9 @@ mod tests {
     fn without_end_one_code_follows_the_other() {
         let mut adc = ready();
         write(&mut adc, 0x100 + CFGR, DMA | CONTINUOUS, 0).expect("modelled");
-        write(&mut adc, 0x100 + CR, REGULATOR | START, 1000).expect("modelled");
+        write(&mut adc, 0x100 + CR, REGULATOR | START, BEGIN).expect("modelled");
         for round in 1..4 {
-            let due = 1000 + round * 256 * 25 * 4;
+            let due = BEGIN + round * 256 * 25 * 4;
             assert_eq!(adc.deadline(), due);
             adc.set_input(1, 9, 100 * round as u16);
             // A delayed update does not delay the next code.
@@ -412,7 +531,7 @@ mod tests {
     fn after_an_overrun_it_requests_dma_only_when_the_flag_is_cleared() {
         let mut adc = ready();
         write(&mut adc, 0x100 + CFGR, DMA | CONTINUOUS, 0).expect("modelled");
-        write(&mut adc, 0x100 + CR, REGULATOR | START, 0).expect("modelled");
+        write(&mut adc, 0x100 + CR, REGULATOR | START, BEGIN).expect("modelled");
         adc.advance(adc.deadline());
         assert!(adc.wants_dma(1));
         adc.advance(adc.deadline());
@@ -427,19 +546,18 @@ mod tests {
         write(&mut adc, CR, CALIBRATE | DEEP, 0).expect("modelled");
         assert_eq!(adc.read(CR, 0).map(|control| control & CALIBRATE), Some(0));
         write(&mut adc, CR, REGULATOR, 0).expect("modelled");
-        write(&mut adc, CR, REGULATOR | CALIBRATE, 10).expect("modelled");
-        assert_eq!(adc.deadline(), 10 + CALIBRATION);
-        adc.advance(10 + CALIBRATION);
+        write(&mut adc, CR, REGULATOR | CALIBRATE, BEGIN).expect("modelled");
+        assert_eq!(adc.deadline(), BEGIN + CALIBRATION);
+        adc.advance(BEGIN + CALIBRATION);
         assert_eq!(adc.read(CR, 0), Some(REGULATOR));
     }
 
     #[test]
     fn injected_conversions_follow_one_another_into_registers_of_their_own() {
         let mut adc = Adc::default();
+        write(&mut adc, CCR, 2 << 18, 0).expect("modelled");
+        start(&mut adc, 0);
         for (offset, value) in [
-            (CCR, 2 << 18),
-            (CR, REGULATOR),
-            (CR, REGULATOR | ENABLE),
             (CFGR2, 8 << 5 | 7 << 2 | INJECTED_OVERSAMPLED),
             (SMPR1, 2 << 3),
             (SMPR1 + 4, 2 << 6),
@@ -449,10 +567,10 @@ mod tests {
         }
         adc.set_input(0, 12, 4095 << 4);
         adc.set_input(0, 1, 1234 << 4);
-        write(&mut adc, CR, REGULATOR | INJECT, 1000).expect("modelled");
+        write(&mut adc, CR, REGULATOR | INJECT, BEGIN).expect("modelled");
         let each = 256 * 25 * 4;
-        assert_eq!(adc.deadline(), 1000 + each);
-        adc.advance(1000 + each);
+        assert_eq!(adc.deadline(), BEGIN + each);
+        adc.advance(BEGIN + each);
         let flags = |adc: &mut Adc| adc.read(ISR, 0).map(|f| f & (INJECTED | INJECTED_SEQUENCE));
         assert_eq!(flags(&mut adc), Some(INJECTED));
         adc.advance(adc.deadline());
@@ -464,14 +582,14 @@ mod tests {
         assert_eq!(flags(&mut adc), Some(INJECTED));
         // Beside regular ones they are not modelled.
         write(&mut adc, CFGR, CONTINUOUS, 0).expect("modelled");
-        write(&mut adc, CR, REGULATOR | START, 0).expect("modelled");
-        assert_eq!(write(&mut adc, CR, REGULATOR | INJECT, 0), None);
+        write(&mut adc, CR, REGULATOR | START, BEGIN).expect("modelled");
+        assert_eq!(write(&mut adc, CR, REGULATOR | INJECT, BEGIN), None);
     }
 
     #[test]
     fn a_sequence_is_not_modelled() {
         let mut adc = ready();
         write(&mut adc, 0x100 + SQR1, 9 << 6 | 1, 0).expect("modelled");
-        assert_eq!(write(&mut adc, 0x100 + CR, REGULATOR | START, 0), None);
+        assert_eq!(write(&mut adc, 0x100 + CR, REGULATOR | START, BEGIN), None);
     }
 }

@@ -74,7 +74,8 @@ impl Peripheral for CrcUnit {
             }
             CR if write.ones() & SIZE != 0 => None,
             CR => {
-                self.registers.write(CR, write)?;
+                // The reset clears itself.
+                self.registers.write(CR, Write { value: write.value & !RESET, ..write })?;
                 if write.ones() & RESET != 0 {
                     self.sum = self.registers.get(INIT);
                 }

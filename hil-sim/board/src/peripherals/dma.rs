@@ -2,9 +2,12 @@
 //!
 //! Transfers between a peripheral and memory, one for each request: channels with their
 //! counters and flags. The chip connects the requests and moves the data.
+//!
+//! Source: RM0440, chapters of DMA and DMAMUX.
 
 use super::registers::{Kept, Registers};
 use super::{Peripheral, Write};
+use crate::rules::Rule;
 
 /// Channels of one controller.
 pub const CHANNELS: usize = 8;
@@ -24,6 +27,10 @@ const MEMORY_TO_MEMORY: u32 = 1 << 14;
 const COMPLETE: u32 = 1 << 1;
 const HALF: u32 = 1 << 2;
 const ERROR: u32 = 1 << 3;
+
+/// Bits of the configuration that may be written while a channel is enabled: itself and its
+/// interrupts.
+const ALWAYS: u32 = ENABLE | COMPLETE | HALF | ERROR;
 
 /// A channel.
 #[derive(Clone, Copy, Debug, Default)]
@@ -55,6 +62,7 @@ pub struct Move {
 #[derive(Clone, Debug, Default)]
 pub struct Dma {
     channels: [Channel; CHANNELS],
+    broken: Option<Rule>,
 }
 
 impl Dma {
@@ -150,18 +158,25 @@ impl Peripheral for Dma {
                 if next & MEMORY_TO_MEMORY != 0 {
                     return None;
                 }
+                if enabled && next & ENABLE != 0 && (next ^ c.config) & !ALWAYS != 0 {
+                    self.broken = Some(Rule::DmaEnabled);
+                    return Some(());
+                }
                 if next & ENABLE != 0 && !enabled {
                     (c.total, c.done) = (c.left, 0);
                 }
                 c.config = next;
             }
-            // These are locked while the channel is enabled.
-            _ if enabled => {}
+            _ if enabled => self.broken = Some(Rule::DmaEnabled),
             0x4 => c.left = write.onto(c.left) & 0xFFFF,
             0x8 => c.peripheral = write.onto(c.peripheral),
             _ => c.memory = write.onto(c.memory),
         }
         Some(())
+    }
+
+    fn take_broken_rule(&mut self) -> Option<Rule> {
+        self.broken.take()
     }
 }
 

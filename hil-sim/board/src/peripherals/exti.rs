@@ -12,10 +12,11 @@ const PR: u32 = 0x14;
 
 const ALL: u32 = u32::MAX;
 
-/// Both banks of masks and edges; nothing here drives the lines of the second.
+/// Masks of both banks: lines without an edge, of other peripherals, are not masked after reset.
+/// Nothing here drives the lines of the second bank.
 const REGISTERS: [Kept; 2] = [
     Kept { offset: IMR, reset: 0x1F84_0000, mask: ALL },
-    Kept { offset: 0x20, reset: 0xFF88, mask: ALL },
+    Kept { offset: 0x20, reset: 0xC3C, mask: ALL },
 ];
 
 /// External interrupts.

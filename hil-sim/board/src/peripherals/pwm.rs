@@ -1,8 +1,11 @@
 //! A timer with four PWM channels and a break input: TIM1 and TIM8.
+//!
+//! Source: RM0440, advanced-control timers; the lock is in `TIMx_BDTR`.
 
 use super::encoder::filter_cycles;
 use super::registers::{Kept, Registers};
 use super::{Peripheral, Write};
+use crate::rules::Rule;
 
 const CR1: u32 = 0x00;
 const SR: u32 = 0x10;
@@ -19,10 +22,15 @@ const AF1: u32 = 0x60;
 const ENABLE: u32 = 1;
 /// Counting up, edge-aligned, not one-shot.
 const PLAIN: u32 = ENABLE | 1 << 1 | 1 << 2 | 1 << 7;
+const ALL: u32 = u32::MAX;
 const MOE: u32 = 1 << 15;
 const BREAK_ENABLE: u32 = 1 << 12;
 const BREAK_HIGH: u32 = 1 << 13;
 const BREAK_FLAG: u32 = 1 << 7;
+
+/// Of `BDTR`: the level of the lock, and the fields that level 1 and level 2 protect.
+const LOCK: u32 = 3 << 8;
+const LOCKED: [u32; 2] = [0x3FFF_70FF, 0xC00];
 
 const REGISTERS: [Kept; 15] = [
     Kept { offset: CR1, reset: 0, mask: PLAIN | 0x300 },
@@ -55,6 +63,9 @@ pub struct Pwm {
     compares: [u32; 4],
     /// Cycle of the next update event.
     update: u64,
+    /// `BDTR` has been written: `LOCK` stays as it is.
+    lock_settled: bool,
+    broken: Option<Rule>,
     /// Level at the break input.
     pin: bool,
     /// Cycle at which the filter takes the break input for active.
@@ -74,6 +85,8 @@ impl Pwm {
             period: 0x1_0000,
             compares: [0; 4],
             update: u64::MAX,
+            lock_settled: false,
+            broken: None,
             pin,
             breaks: u64::MAX,
             locked_up: false,
@@ -82,6 +95,23 @@ impl Pwm {
 
     fn runs(&self) -> bool {
         self.registers.get(CR1) & ENABLE != 0
+    }
+
+    /// Bits of a register that the lock protects.
+    fn locked(&self, offset: u32) -> u32 {
+        let level = self.registers.get(BDTR) >> 8 & 3;
+        let from = |least: u32, bits: u32| if level >= least { bits } else { 0 };
+        match offset {
+            // Idle states of the outputs.
+            0x04 => from(1, 0x0005_FF00),
+            BDTR => from(1, LOCKED[0]) | from(2, LOCKED[1]),
+            AF1 | 0x64 => from(1, ALL),
+            // Polarities.
+            CCER => from(2, 0x0022_AAAA),
+            // Modes and preloads of the compares.
+            CCMR1 | 0x1C => from(3, 0x0101_7878),
+            _ => 0,
+        }
     }
 
     fn mode(&self, channel: u32) -> u32 {
@@ -185,7 +215,19 @@ impl Peripheral for Pwm {
         }
     }
 
-    fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
+    fn write(&mut self, offset: u32, mut write: Write, now: u64) -> Option<()> {
+        if let Some(old) = self.registers.read(offset) {
+            let changed = write.onto(old) ^ old;
+            let locked = self.locked(offset);
+            let settled = if offset == BDTR && self.lock_settled { LOCK } else { 0 };
+            self.broken = match (changed & locked != 0, changed & settled != 0) {
+                (true, _) => Some(Rule::TimerLock),
+                (_, true) => Some(Rule::TimerLockOnce),
+                _ => None,
+            };
+            write.mask &= !(locked | settled);
+            self.lock_settled |= offset == BDTR;
+        }
         match offset {
             SR => self.flags &= !(write.mask & !write.value),
             CNT => self.origin = now.wrapping_sub(u64::from(write.value) * self.prescaler),
@@ -227,6 +269,10 @@ impl Peripheral for Pwm {
         Some(())
     }
 
+    fn take_broken_rule(&mut self) -> Option<Rule> {
+        self.broken.take()
+    }
+
     fn deadline(&self) -> u64 {
         let trips = self.registers.get(BDTR) & MOE != 0;
         self.update.min(if trips { self.breaks } else { u64::MAX })
@@ -247,7 +293,6 @@ impl Peripheral for Pwm {
 mod tests {
     use super::*;
 
-    const ALL: u32 = u32::MAX;
     const PERIOD: u64 = 8500;
 
     fn write(timer: &mut Pwm, offset: u32, value: u32, now: u64) {

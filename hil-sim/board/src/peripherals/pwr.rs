@@ -9,8 +9,13 @@
 use super::registers::{Kept, Registers};
 use super::{HZ, Peripheral, Write};
 
-const CR2: u32 = 0x04;
+/// `CR2`, with the detector's settings.
+pub(crate) const CR2: u32 = 0x04;
 const SR2: u32 = 0x14;
+/// `CR5`.
+pub(crate) const CR5: u32 = 0x80;
+/// Of CR5: without the boost of range 1.
+pub(crate) const R1MODE: u32 = 1 << 8;
 
 /// Of CR2: the detector is on.
 const DETECTS: u32 = 1;
@@ -24,11 +29,11 @@ pub const HOLDS: u64 = HZ / 1000;
 /// CR1 to CR4, CR5 (with the boost of the main regulator), and the status registers,
 /// which report no change in progress. Pull-ups in standby are not used.
 const REGISTERS: [Kept; 5] = [
-    Kept { offset: 0x00, reset: 0x200, mask: 0x4707 },
+    Kept { offset: 0x00, reset: 0x200, mask: 0x470F },
     Kept { offset: CR2, reset: 0, mask: 0xFFFF },
     Kept { offset: 0x08, reset: 0x8000, mask: 0xFFFF },
     Kept { offset: 0x0C, reset: 0, mask: 0xFFFF },
-    Kept { offset: 0x80, reset: 0x100, mask: 0x100 },
+    Kept { offset: CR5, reset: R1MODE, mask: R1MODE },
 ];
 
 /// What follows when the supply has been below the threshold.

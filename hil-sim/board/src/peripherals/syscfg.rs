@@ -11,7 +11,7 @@ const CFGR2: u32 = 0x1C;
 
 const REGISTERS: [Kept; 7] = [
     Kept { offset: 0x00, reset: 0, mask: 0x107 },
-    Kept { offset: 0x04, reset: 0x7C00_0001, mask: 0xFDFF_0101 },
+    Kept { offset: 0x04, reset: 0x7C00_0001, mask: 0xFDFF_0301 },
     Kept { offset: EXTICR, reset: 0, mask: 0xFFFF },
     Kept { offset: EXTICR + 4, reset: 0, mask: 0xFFFF },
     Kept { offset: EXTICR + 8, reset: 0, mask: 0xFFFF },
@@ -33,6 +33,11 @@ impl Syscfg {
     /// The port that line `line` (0 to 15) looks at: 0 is port A.
     pub fn port(&self, line: u32) -> u32 {
         self.0.get(EXTICR + line / 4 * 4) >> (line % 4 * 4) & 0xF
+    }
+
+    /// Whether the settings of the supply's detector are locked: `PVDL`.
+    pub fn locks_detector(&self) -> bool {
+        self.0.get(CFGR2) & 1 << 2 != 0
     }
 
     /// Whether a locked-up core stops the motor timers.

@@ -1,0 +1,551 @@
+//! The chip's rules: a program that breaks one is reported by its name, and gets nothing.
+//!
+//! Registers and fields are those of ST's description, so that a position that a model has wrong
+//! shows here too.
+
+use rig_board::chip::description;
+use rig_board::chip::{Chip, Why};
+use rig_board::core::{Access, Bus};
+use rig_board::peripherals::HZ;
+use rig_board::peripherals::pwr::Then;
+use rig_board::rules::Rule;
+
+use crate::common::Board;
+
+/// Cycles in a microsecond.
+const US: u64 = HZ / 1_000_000;
+
+/// A chip with the clocks of its peripherals on, as a program sees it.
+struct Program {
+    chip: Chip,
+    now: u64,
+}
+
+/// Address of a register.
+fn address(register: &str) -> u32 {
+    let (peripheral, name) = register.split_once('.').expect("PERIPHERAL.REGISTER");
+    description::find(peripheral, name).unwrap_or_else(|| panic!("{register}")).address
+}
+
+/// A field's value in its place.
+fn field(register: &str, name: &str, value: u32) -> u32 {
+    let (peripheral, register) = register.split_once('.').expect("PERIPHERAL.REGISTER");
+    let register = description::find(peripheral, register).expect("described");
+    let field = register.fields.iter().find(|field| field.name == name);
+    let mask = field.unwrap_or_else(|| panic!("{name}")).mask;
+    value << mask.trailing_zeros() & mask
+}
+
+impl Program {
+    fn new() -> Self {
+        let mut program = Self { chip: Chip::new(0x0800_0000), now: 0 };
+        for (register, names) in [
+            ("RCC.AHB1ENR", &["DMA1EN", "DMAMUX1EN"][..]),
+            ("RCC.AHB2ENR", &["GPIOAEN", "GPIOBEN", "ADC12EN"]),
+            ("RCC.APB1ENR1", &["PWREN"]),
+            ("RCC.APB2ENR", &["TIM1EN", "SYSCFGEN"]),
+        ] {
+            for name in names {
+                program.set(register, &[(name, 1)]);
+            }
+        }
+        program
+    }
+
+    fn access(&self, register: &str) -> Access {
+        Access { address: address(register), size: 4, pc: 0, now: self.now }
+    }
+
+    fn read(&mut self, register: &str) -> u32 {
+        let access = self.access(register);
+        self.chip.read(access)
+    }
+
+    fn is_set(&mut self, register: &str, name: &str) -> bool {
+        self.read(register) & field(register, name, 1) != 0
+    }
+
+    fn write(&mut self, register: &str, value: u32) {
+        let access = self.access(register);
+        self.chip.write(access, value);
+    }
+
+    /// Reads a register, changes fields, writes it back.
+    fn set(&mut self, register: &str, fields: &[(&str, u32)]) {
+        let old = self.read(register);
+        let next = fields.iter().fold(old, |word, (name, value)| {
+            word & !field(register, name, u32::MAX) | field(register, name, *value)
+        });
+        self.write(register, next);
+    }
+
+    /// Lets time pass.
+    fn wait(&mut self, cycles: u64) {
+        self.now += cycles;
+        self.chip.advance(self.now);
+    }
+
+    /// The rules broken so far; anything else that was noted fails the test.
+    fn broken(&self) -> Vec<Rule> {
+        let strays = self.chip.strays();
+        let broken = strays.iter().chain(strays.accepted()).map(|stray| match stray.why {
+            Why::Broken(rule) => rule,
+            other => panic!("{other:?}: {stray}"),
+        });
+        broken.collect()
+    }
+
+    fn assert_broken(&self, rule: Rule) {
+        assert_eq!(self.broken(), [rule]);
+    }
+
+    /// ADC1 with its regulator on and calibrated.
+    fn calibrated() -> Self {
+        let mut program = Self::new();
+        program.set("ADC12_COMMON.CCR", &[("PRESC", 2)]);
+        program.set("ADC1.CR", &[("DEEPPWD", 0), ("ADVREGEN", 1)]);
+        program.wait(20 * US);
+        program.set("ADC1.CR", &[("ADCAL", 1)]);
+        program.wait(116 * 4);
+        assert!(!program.is_set("ADC1.CR", "ADCAL"));
+        program
+    }
+
+    /// And enabled and ready.
+    fn converter() -> Self {
+        let mut program = Self::calibrated();
+        program.wait(4 * 4);
+        program.set("ADC1.CR", &[("ADEN", 1)]);
+        assert!(!program.is_set("ADC1.ISR", "ADRDY"), "it takes its time");
+        program.wait(15 * 4);
+        assert!(program.is_set("ADC1.ISR", "ADRDY"));
+        assert_eq!(program.broken(), []);
+        program
+    }
+}
+
+#[test]
+fn adc_regulator_takes_20_us_before_anything_else() {
+    let mut program = Program::new();
+    program.set("ADC1.CR", &[("DEEPPWD", 0), ("ADVREGEN", 1)]);
+    program.wait(20 * US - 1);
+    program.set("ADC1.CR", &[("ADCAL", 1)]);
+    assert!(!program.is_set("ADC1.CR", "ADCAL"));
+    program.assert_broken(Rule::AdcRegulator);
+}
+
+#[test]
+fn adc_calibration_comes_before_the_enabling() {
+    let mut program = Program::new();
+    program.set("ADC1.CR", &[("DEEPPWD", 0), ("ADVREGEN", 1)]);
+    program.wait(20 * US);
+    program.set("ADC1.CR", &[("ADEN", 1)]);
+    assert!(!program.is_set("ADC1.CR", "ADEN"));
+    program.assert_broken(Rule::AdcCalibration);
+    let mut program = Program::converter();
+    program.set("ADC1.CR", &[("ADCAL", 1)]);
+    program.assert_broken(Rule::AdcCalibration);
+}
+
+#[test]
+fn adc_enabling_waits_four_clocks_after_the_calibration() {
+    let mut program = Program::calibrated();
+    program.wait(4 * 4 - 1);
+    program.set("ADC1.CR", &[("ADEN", 1)]);
+    assert!(!program.is_set("ADC1.CR", "ADEN"));
+    program.assert_broken(Rule::AdcEnable);
+}
+
+#[test]
+fn adc_converts_only_after_adrdy() {
+    let mut program = Program::calibrated();
+    program.wait(4 * 4);
+    program.set("ADC1.CR", &[("ADEN", 1)]);
+    program.set("ADC1.CR", &[("ADSTART", 1)]);
+    assert!(!program.is_set("ADC1.CR", "ADSTART"));
+    program.assert_broken(Rule::AdcReady);
+}
+
+#[test]
+fn adc_is_not_disabled_or_set_up_while_it_converts() {
+    let mut program = Program::converter();
+    program.set("ADC1.CFGR", &[("CONT", 1)]);
+    program.set("ADC1.CR", &[("ADSTART", 1)]);
+    assert_eq!(program.broken(), []);
+    program.set("ADC1.SMPR1", &[("SMP1", 3)]);
+    assert_eq!(program.read("ADC1.SMPR1"), 0);
+    program.assert_broken(Rule::AdcConfiguration);
+    let mut program = Program::converter();
+    program.set("ADC1.CFGR", &[("CONT", 1)]);
+    program.set("ADC1.CR", &[("ADSTART", 1)]);
+    program.set("ADC1.CR", &[("ADDIS", 1)]);
+    assert!(program.is_set("ADC1.CR", "ADEN"));
+    program.assert_broken(Rule::AdcDisable);
+}
+
+#[test]
+fn adc_common_and_differential_settings_want_disabled_converters() {
+    let mut program = Program::converter();
+    program.set("ADC12_COMMON.CCR", &[("PRESC", 3)]);
+    program.assert_broken(Rule::AdcDisabledOnly);
+    let mut program = Program::converter();
+    program.set("ADC1.DIFSEL", &[("DIFSEL1", 1)]);
+    program.assert_broken(Rule::AdcDisabledOnly);
+}
+
+#[test]
+fn adc_clock_is_at_most_60_mhz() {
+    let mut program = Program::new();
+    program.set("ADC12_COMMON.CCR", &[("PRESC", 1)]);
+    program.set("ADC1.CR", &[("DEEPPWD", 0), ("ADVREGEN", 1)]);
+    program.wait(20 * US);
+    program.set("ADC1.CR", &[("ADCAL", 1)]);
+    program.wait(10 * US);
+    program.set("ADC1.CR", &[("ADEN", 1)]);
+    program.wait(10 * US);
+    program.set("ADC1.CR", &[("ADSTART", 1)]);
+    program.assert_broken(Rule::AdcClock);
+}
+
+/// Each level of the lock, a field that it protects, and one that it leaves.
+#[test]
+fn timer_lock_keeps_what_its_level_protects() {
+    for (level, register, locked, free) in [
+        (1, "TIM1.BDTR", "BKE", "OSSR"),
+        (2, "TIM1.BDTR", "OSSR", "MOE"),
+        (2, "TIM1.CCER", "CC1P", "CC1E"),
+        (3, "TIM1.CCMR1_OUTPUT", "OC1M", "CC1S"),
+        (1, "TIM1.AF1", "BKINP", ""),
+    ] {
+        let mut program = Program::new();
+        program.set("TIM1.BDTR", &[("LOCK", level)]);
+        if !free.is_empty() {
+            program.set(register, &[(free, 1)]);
+            assert!(program.is_set(register, free), "{level} {register} {free}");
+        }
+        assert_eq!(program.broken(), [], "{level} {register} {free}");
+        program.set(register, &[(locked, 1)]);
+        assert!(!program.is_set(register, locked), "{level} {register} {locked}");
+        program.assert_broken(Rule::TimerLock);
+    }
+}
+
+#[test]
+fn timer_lock_is_settled_by_the_first_write() {
+    let mut program = Program::new();
+    program.set("TIM1.BDTR", &[("BKE", 1)]);
+    program.set("TIM1.BDTR", &[("LOCK", 1)]);
+    assert_eq!(program.read("TIM1.BDTR") & field("TIM1.BDTR", "LOCK", 3), 0);
+    program.assert_broken(Rule::TimerLockOnce);
+}
+
+/// PB12, the first timer's break, is open after power-up in a world that pulls it low.
+#[test]
+fn a_break_clears_moe_after_its_filter_and_keeps_it_cleared() {
+    let mut program = Program::new();
+    program.set("TIM1.BDTR", &[("BKE", 1), ("BKP", 1), ("BKF", 15)]);
+    program.set("TIM1.BDTR", &[("MOE", 1)]);
+    assert!(program.is_set("TIM1.BDTR", "MOE"), "closed: low");
+    // Active low, so that the closed contact breaks.
+    program.set("TIM1.BDTR", &[("BKP", 0)]);
+    program.wait(255);
+    assert!(program.is_set("TIM1.BDTR", "MOE"), "shorter than eight samples at a 32nd");
+    program.wait(1);
+    assert!(!program.is_set("TIM1.BDTR", "MOE"));
+    assert!(program.is_set("TIM1.SR", "BIF"));
+    program.set("TIM1.BDTR", &[("MOE", 1)]);
+    assert!(!program.is_set("TIM1.BDTR", "MOE"), "not while the break is active");
+    assert_eq!(program.broken(), []);
+}
+
+#[test]
+fn clocks_are_ready_after_their_time_and_used_when_they_are_ready() {
+    let mut program = Program::new();
+    program.set("RCC.CR", &[("PLLON", 1)]);
+    program.wait(40 * US - 1);
+    assert!(!program.is_set("RCC.CR", "PLLRDY"));
+    program.wait(1);
+    assert!(program.is_set("RCC.CR", "PLLRDY"));
+    program.set("RCC.CSR", &[("LSION", 1)]);
+    assert!(!program.is_set("RCC.CSR", "LSIRDY"));
+    program.wait(130 * US);
+    assert!(program.is_set("RCC.CSR", "LSIRDY"));
+    program.set("RCC.CR", &[("HSION", 0)]);
+    program.assert_broken(Rule::ClockInUse);
+}
+
+/// A PLL of 170 MHz; then what its use lacks.
+fn fast(steps: &[&str]) -> Program {
+    let mut program = Program::new();
+    let pll = [("PLLSRC", 2), ("PLLM", 3), ("PLLN", 85), ("PLLR", 0), ("PLLREN", 1)];
+    program.set("RCC.PLLCFGR", &pll);
+    program.set("RCC.CR", &[("PLLON", 1)]);
+    program.wait(40 * US);
+    if steps.contains(&"boost") {
+        program.set("PWR.CR5", &[("R1MODE", 0)]);
+    }
+    if steps.contains(&"wait states") {
+        program.set("FLASH.ACR", &[("LATENCY", 4)]);
+    }
+    if steps.contains(&"half") {
+        program.set("RCC.CFGR", &[("HPRE", 8)]);
+        program.set("RCC.CFGR", &[("SW", 3)]);
+        program.wait(US);
+        program.set("RCC.CFGR", &[("HPRE", 0)]);
+    } else {
+        program.set("RCC.CFGR", &[("SW", 3)]);
+    }
+    program
+}
+
+#[test]
+fn clock_of_170_mhz_wants_boost_wait_states_and_a_step_between() {
+    let mut program = fast(&["boost", "wait states", "half"]);
+    assert_eq!(program.broken(), []);
+    assert_eq!(program.read("RCC.CFGR") & field("RCC.CFGR", "SWS", 3), field("RCC.CFGR", "SWS", 3));
+    program.set("RCC.PLLCFGR", &[("PLLN", 80)]);
+    program.assert_broken(Rule::PllOn);
+    for (steps, rule) in [
+        (&["wait states", "half"][..], Rule::Boost),
+        (&["boost", "half"], Rule::WaitStates),
+        (&["boost", "wait states"], Rule::ClockStep),
+    ] {
+        let broken = fast(steps).broken();
+        assert!(broken.contains(&rule), "{steps:?}: {broken:?}");
+    }
+    let mut program = Program::new();
+    program.set("RCC.CR", &[("PLLON", 1)]);
+    program.wait(40 * US);
+    program.set("RCC.PLLCFGR", &[("PLLSRC", 2)]);
+    program.assert_broken(Rule::PllOn);
+}
+
+#[test]
+fn another_clock_than_the_emulated_one_is_reported() {
+    let mut program = Program::new();
+    program.set("RCC.PLLCFGR", &[("PLLSRC", 2), ("PLLM", 3), ("PLLN", 30), ("PLLREN", 1)]);
+    program.set("RCC.CR", &[("PLLON", 1)]);
+    program.set("FLASH.ACR", &[("LATENCY", 4)]);
+    program.set("RCC.CFGR", &[("SW", 3)]);
+    program.assert_broken(Rule::EmulatedClock);
+}
+
+#[test]
+fn dma_channel_is_set_up_only_while_it_is_disabled() {
+    for (register, name) in [
+        ("DMA1.CH1_NDTR", "NDT"),
+        ("DMA1.CH1_MAR", "MA"),
+        ("DMA1.CH1_PAR", "PA"),
+        ("DMA1.CH1_CR", "MINC"),
+    ] {
+        let mut program = Program::new();
+        program.set("DMA1.CH1_NDTR", &[("NDT", 4)]);
+        program.set("DMA1.CH1_CR", &[("EN", 1)]);
+        program.set("DMA1.CH1_CR", &[("TCIE", 1)]);
+        assert_eq!(program.broken(), [], "an interrupt may be enabled at any time");
+        let old = program.read(register);
+        program.set(register, &[(name, 1)]);
+        assert_eq!(program.read(register), old, "{register}");
+        program.assert_broken(Rule::DmaEnabled);
+    }
+}
+
+#[test]
+fn locked_pin_keeps_its_configuration() {
+    let mut program = Program::new();
+    let (key, pin) = (field("GPIOB.LCKR", "LCKK", 1), field("GPIOB.LCKR", "LCK12", 1));
+    // Another order locks nothing.
+    for word in [key | pin, pin, pin] {
+        program.write("GPIOB.LCKR", word);
+    }
+    assert_eq!(program.read("GPIOB.LCKR"), 0);
+    for word in [key | pin, pin, key | pin] {
+        program.write("GPIOB.LCKR", word);
+    }
+    assert_eq!(program.read("GPIOB.LCKR"), key | pin);
+    program.set("GPIOB.MODER", &[("MODER11", 1)]);
+    program.set("GPIOB.AFRH", &[("AFRH13", 5)]);
+    assert_eq!(program.broken(), []);
+    for (register, name) in [("GPIOB.MODER", "MODER12"), ("GPIOB.AFRH", "AFRH12")] {
+        let old = program.read(register);
+        program.set(register, &[(name, 1)]);
+        assert_eq!(program.read(register), old);
+    }
+    assert_eq!(program.broken(), [Rule::PinLock; 2]);
+}
+
+#[test]
+fn locked_voltage_detector_keeps_its_settings() {
+    let mut program = Program::new();
+    program.set("PWR.CR2", &[("PVDE", 1), ("PVDLS", 6)]);
+    program.set("SYSCFG.CFGR2", &[("PVDL", 1)]);
+    let old = program.read("PWR.CR2");
+    program.set("PWR.CR2", &[("PVDE", 0)]);
+    assert_eq!(program.read("PWR.CR2"), old);
+    program.assert_broken(Rule::DetectorLock);
+}
+
+#[test]
+fn a_one_in_a_reserved_bit_is_reported_by_name() {
+    let mut program = Program::new();
+    program.write("GPIOB.LCKR", 1 << 20);
+    let report: Vec<_> = program.chip.strays().iter().map(ToString::to_string).collect();
+    assert_eq!(report.len(), 1);
+    assert!(report[0].contains("write to GPIOB LCKR 0x01c: reserved bits 0x100000"), "{report:?}");
+}
+
+/// Each request arrives at the interrupt that the description has for it, and at no other.
+#[test]
+fn requests_arrive_at_the_interrupts_of_the_description() {
+    type Cause = fn(&mut Program);
+    fn software(program: &mut Program, line: u32) {
+        program.write("EXTI.IMR1", 1 << line);
+        program.write("EXTI.SWIER1", 1 << line);
+    }
+    fn failed_transfer(program: &mut Program, channel: usize) {
+        program.set(&format!("DMA1.CH{channel}_CR"), &[("TEIE", 1)]);
+        program.chip.moved(channel - 1, false, program.now);
+    }
+    let causes: [(&str, Cause); 9] = [
+        ("EXTI0", |program| software(program, 0)),
+        ("EXTI4", |program| software(program, 4)),
+        ("EXTI9_5", |program| software(program, 9)),
+        ("EXTI15_10", |program| software(program, 13)),
+        ("PVD_PVM", |program| {
+            program.set("EXTI.RTSR1", &[("RT16", 1)]);
+            program.set("EXTI.IMR1", &[("IM16", 1)]);
+            program.set("PWR.CR2", &[("PVDE", 1)]);
+            program.chip.supply_falls(u64::MAX, Then::Back, program.now);
+        }),
+        ("TIM2", |program| {
+            program.set("RCC.APB1ENR1", &[("TIM2EN", 1)]);
+            program.set("TIM2.DIER", &[("UIE", 1)]);
+            program.set("TIM2.EGR", &[("UG", 1)]);
+        }),
+        ("FLASH", |program| {
+            for key in [0x4567_0123, 0xCDEF_89AB] {
+                program.write("FLASH.KEYR", key);
+            }
+            program.set("FLASH.CR", &[("ERRIE", 1)]);
+            let at = Access { address: 0x0804_0000, size: 4, pc: 0, now: program.now };
+            program.chip.write_code(at, 0);
+        }),
+        ("DMA1_CH1", |program| failed_transfer(program, 1)),
+        ("DMA1_CH8", |program| failed_transfer(program, 8)),
+    ];
+    for (name, cause) in causes {
+        let mut program = Program::new();
+        cause(&mut program);
+        let pending: Vec<u32> = (0..128)
+            .filter(|number| {
+                let address = 0xE000_E200 + number / 32 * 4;
+                let at = Access { address, size: 4, pc: 0, now: program.now };
+                program.chip.read(at) >> (number % 32) & 1 != 0
+            })
+            .collect();
+        let number = description::interrupt(name).expect("described");
+        assert_eq!(pending, [u32::from(number)], "{name}");
+        assert_eq!(program.broken(), [], "{name}");
+    }
+}
+
+/// What reads as zero shows by its effect: set and reset of the ports, clearing of DMA's flags.
+#[test]
+fn commands_act_where_the_description_has_them() {
+    let mut program = Program::new();
+    for name in ["GPIOCEN", "GPIODEN", "GPIOEEN", "GPIOFEN", "GPIOGEN"] {
+        program.set("RCC.AHB2ENR", &[(name, 1)]);
+    }
+    for port in 'A'..='G' {
+        let [output, set, reset] = ["ODR", "BSRR", "BRR"].map(|name| format!("GPIO{port}.{name}"));
+        for pin in 0..16 {
+            let high = field(&output, &format!("ODR{pin}"), 1);
+            let [on, off] = ["BS", "BR"].map(|name| field(&set, &format!("{name}{pin}"), 1));
+            let off_alone = field(&reset, &format!("BR{pin}"), 1);
+            for (register, word, expected) in
+                [(&set, on, high), (&set, off, 0), (&set, on, high), (&reset, off_alone, 0)]
+            {
+                program.write(register, word);
+                assert_eq!(program.read(&output), expected, "{register} {pin}");
+            }
+        }
+    }
+    for channel in 1..=8 {
+        program.chip.moved(channel - 1, false, program.now);
+        let [error, any] =
+            ["TE", "G"].map(|name| field("DMA1.ISR", &format!("{name}IF{channel}"), 1));
+        assert_eq!(program.read("DMA1.ISR"), error | any);
+        program.write("DMA1.IFCR", field("DMA1.IFCR", &format!("CTEIF{channel}"), 1));
+        assert_eq!(program.read("DMA1.ISR"), 0);
+    }
+    assert_eq!(program.broken(), []);
+}
+
+/// Most kilohms at a slow channel for 2.5 to 640.5 clocks of 60 MHz, 12 bits. Source: DS12288,
+/// maximum ADC R_AIN.
+const MOST_KILOHMS: [(f64, f64); 7] =
+    [(6.5, 0.1), (12.5, 0.47), (24.5, 1.2), (47.5, 1.8), (92.5, 3.9), (247.5, 10.0), (640.5, 33.0)];
+
+/// What the sources at the analogue inputs may be, by the sampling time that the image sets.
+///
+/// Amplifiers drive PC2 and PC3 directly. The readback comes through the resistor of its
+/// low-pass, far above what the table allows: its capacitor gives the charge instead. The
+/// sampling capacitor of 5 pF takes from it less than half a code of 12 bits.
+#[test]
+fn sampling_times_suit_the_sources_that_the_hardware_page_names() {
+    let mut board = Board::off(&[]);
+    board.run(200);
+    let mut read = |register: &str| {
+        let at = Access { address: address(register), size: 4, pc: 0, now: board.machine().now() };
+        board.machine().chip_mut().read(at)
+    };
+    let page = include_str!("../../../docs/HARDWARE.md");
+    let clocks = [2.5, 6.5, 12.5, 24.5, 47.5, 92.5, 247.5, 640.5];
+    for (register, common, channel) in [
+        ("ADC1.SMPR1", "ADC12_COMMON.CCR", 8),
+        ("ADC2.SMPR1", "ADC12_COMMON.CCR", 9),
+        ("ADC3.SMPR1", "ADC345_COMMON.CCR", 1),
+        ("ADC3.SMPR2", "ADC345_COMMON.CCR", 12),
+    ] {
+        let name = format!("SMP{channel}");
+        let all = field(register, &name, 7);
+        let setting = (read(register) & all) >> all.trailing_zeros();
+        let presc = read(common) & field(common, "PRESC", 15);
+        assert_eq!(presc, field(common, "PRESC", 2), "{common}: a quarter of 170 MHz");
+        let microseconds = clocks[setting as usize] / 42.5;
+        let allowed = MOST_KILOHMS.iter().rev().find(|(clocks, _)| clocks / 60.0 <= microseconds);
+        let (_, kilohms) = allowed.expect("long enough for some source");
+        println!("{register} {name}: {microseconds:.3} us, sources up to {kilohms} kilohm");
+        let ohms = format!("at most {:.0} Ω", 1000.0 * kilohms);
+        assert!(page.contains(&ohms), "{register}: the page does not say {ohms}");
+    }
+    assert!(page.contains("samples for 0.3 µs"), "the page gives the sampling time");
+    assert!(page.contains("(10 kΩ, 100 nF of 5 %)"), "the page gives the readback's low-pass");
+    let (sampling_pf, reservoir_nf) = (5.0, 100.0 * 0.95);
+    let codes = 4096.0 * sampling_pf / (1000.0 * reservoir_nf);
+    assert!(codes < 0.5, "{codes} codes");
+}
+
+/// The oscillator's range over temperature, kHz. Source: DS12288, LSI characteristics.
+const LSI_KHZ: [f64; 2] = [29.5, 34.0];
+
+/// The time-out that the image sets, at both ends of its oscillator.
+///
+/// The hang is found, and the bridges are cut, before the watchdog bites; it bites within the
+/// time that the hardware page gives.
+#[test]
+fn the_watchdog_s_time_out_holds_at_both_ends_of_its_oscillator() {
+    /// `HANG_MS` of the firmware, with the millisecond in which it counts.
+    const FOUND_MS: f64 = 80.0;
+    let mut board = Board::idle();
+    let mut read = |register: &str| {
+        let at = Access { address: address(register), size: 4, pc: 0, now: board.machine().now() };
+        board.machine().chip_mut().read(at)
+    };
+    let counts = f64::from(read("IWDG.RLR") + 1) * f64::from(4_u32 << read("IWDG.PR"));
+    let [longest, shortest] = LSI_KHZ.map(|khz| counts / khz);
+    println!("{shortest:.1} to {longest:.1} ms");
+    assert!(shortest > FOUND_MS, "{shortest} ms");
+    assert!(longest < 110.0, "{longest} ms");
+    assert!(include_str!("../../../src/board/safety.rs").contains("const HANG_MS: u32 = 75;"));
+}
