@@ -6,6 +6,7 @@ mod pins;
 mod stray;
 
 use super::core::{Access, Bus};
+use super::exceptions::number::NMI;
 use super::peripherals::adc::{self, Adc};
 use super::peripherals::crc::CrcUnit;
 use super::peripherals::dma::{CHANNELS, Dma, Dmamux, Move};
@@ -93,6 +94,8 @@ pub struct Chip {
     bridges: [Bridge; 2],
     /// Faults of the hardware.
     pub defects: Defects,
+    /// The core has locked up.
+    locked_up: bool,
     strays: Strays,
     reset: Option<Cause>,
     deadline: u64,
@@ -132,6 +135,7 @@ impl Chip {
             inputs: [0; 4],
             bridges: [Bridge::default(); 2],
             defects: Defects::default(),
+            locked_up: false,
             strays: Strays::default(),
             reset: None,
             deadline: 0,
@@ -152,6 +156,11 @@ impl Chip {
             self.ports[port] = Gpio::new(port, driven, levels);
         }
         self.angle = old.angle;
+        match cause {
+            Cause::Power => self.angle.power_up(),
+            _ if old.spi.is_busy() => self.angle.cut_off(),
+            _ => {}
+        }
         self.wheel = old.wheel;
         self.bridges = old.bridges;
         self.defects = old.defects;
@@ -161,6 +170,11 @@ impl Chip {
         self.power = old.power.after_reset(now);
         self.settle(now);
         torn
+    }
+
+    /// Whether a frame is on the angle sensor's bus.
+    pub const fn angle_bus_is_busy(&self) -> bool {
+        self.spi.is_busy()
     }
 
     /// The supply is below the detector's threshold until this cycle.
@@ -210,13 +224,29 @@ impl Chip {
 
     /// The core has locked up.
     pub fn lock_up(&mut self, now: u64) {
-        if self.syscfg.lockup_breaks() {
-            for motor in &mut self.motors {
-                motor.lock_up(now);
-            }
-            self.advance(now);
-            self.settle(now);
-        }
+        self.locked_up = true;
+        self.break_motors(now);
+    }
+
+    /// A read of flash has found two wrong bits at this address: NMI, and a break if it is set
+    /// up.
+    pub fn find_two_wrong_bits(&mut self, address: u32, now: u64) {
+        self.flash.find_two_wrong_bits(address);
+        self.system.exceptions.pend(NMI, now);
+        self.break_motors(now);
+    }
+
+    fn break_motors(&mut self, now: u64) {
+        self.settle_pins(now);
+        self.advance(now);
+        self.settle(now);
+    }
+
+    /// Whether the chip itself breaks the motors' timers. Source: RM0440, `SYSCFG_CFGR2`.
+    pub(super) fn system_breaks(&self) -> bool {
+        self.locked_up && self.syscfg.lockup_breaks()
+            || self.power.signals_low() && self.syscfg.supply_breaks()
+            || self.flash.has_two_wrong_bits() && self.syscfg.flash_breaks()
     }
 
     /// The transfer that DMA makes next.
@@ -261,7 +291,12 @@ impl Chip {
             _ => false,
         };
         match block {
-            Block::Port(_) | Block::Syscfg | Block::Motor(_) | Block::Exti | Block::Pwr
+            Block::Port(_)
+            | Block::Syscfg
+            | Block::Motor(_)
+            | Block::Exti
+            | Block::Pwr
+            | Block::Flash
                 if write =>
             {
                 if matches!(block, Block::Port(_)) {

@@ -14,4 +14,5 @@ mod params;
 mod processor;
 mod resets;
 mod second;
+mod silicon;
 mod verbs;

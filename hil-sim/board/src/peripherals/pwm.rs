@@ -59,8 +59,8 @@ pub struct Pwm {
     pin: bool,
     /// Cycle at which the filter takes the break input for active.
     breaks: u64,
-    /// The core has locked up, which breaks too.
-    locked_up: bool,
+    /// A break by the chip itself: core locked up, supply low, flash damaged. It is not filtered.
+    system: bool,
 }
 
 impl Pwm {
@@ -76,7 +76,7 @@ impl Pwm {
             update: u64::MAX,
             pin,
             breaks: u64::MAX,
-            locked_up: false,
+            system: false,
         }
     }
 
@@ -116,10 +116,10 @@ impl Pwm {
         self.rearm(now);
     }
 
-    /// A lock-up of the core breaks the outputs.
-    pub fn lock_up(&mut self, now: u64) {
-        self.locked_up = true;
-        self.breaks = now;
+    /// Sets the level of the chip's own break.
+    pub fn set_system_break(&mut self, level: bool, now: u64) {
+        self.system = level;
+        self.rearm(now);
     }
 
     fn is_break_active(&self) -> bool {
@@ -129,12 +129,18 @@ impl Pwm {
         bdtr & BREAK_ENABLE != 0 && pin
     }
 
+    fn is_system_break(&self) -> bool {
+        self.registers.get(BDTR) & BREAK_ENABLE != 0 && self.system
+    }
+
     /// Starts or ends the wait for the filter.
     fn rearm(&mut self, now: u64) {
-        if self.is_break_active() {
+        if self.is_system_break() {
+            self.breaks = self.breaks.min(now);
+        } else if self.is_break_active() {
             let filter = filter_cycles(self.registers.get(BDTR) >> 16);
             self.breaks = self.breaks.min(now + filter);
-        } else if !self.locked_up {
+        } else {
             self.breaks = u64::MAX;
         }
     }
@@ -207,7 +213,8 @@ impl Peripheral for Pwm {
             BDTR => {
                 let held = self.registers.get(BDTR) & MOE;
                 self.registers.write(BDTR, write)?;
-                let active = self.locked_up || self.is_break_active() && self.breaks <= now;
+                let broken = self.is_break_active() && self.breaks <= now;
+                let active = self.is_system_break() || broken;
                 if active && held == 0 {
                     // While the break is active the outputs stay off.
                     self.registers.set(BDTR, self.registers.get(BDTR) & !MOE);
@@ -313,7 +320,7 @@ mod tests {
     #[test]
     fn a_locked_up_core_stops_it() {
         let mut timer = running();
-        timer.lock_up(500);
+        timer.set_system_break(true, 500);
         timer.advance(500);
         assert!(!moe(&mut timer));
         assert_eq!(timer.duty(0), 0.0);
