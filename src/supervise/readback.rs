@@ -32,7 +32,7 @@ pub const BAND_SHIFT: u32 = 5;
 /// presets' force limit takes half of the full duty, more in motion; the other half is for the
 /// spread of limit and winding, and for a wheel that is braked. A smaller duty never reaches the
 /// limit and is judged by itself.
-pub const REGULATED: i16 = 8192;
+const REGULATED: i16 = 8192;
 /// Ticks for which the output must be off.
 pub const OFF_TICKS: i8 = 4;
 /// Ticks without a conversion that count as a fault, as for the sensors.
