@@ -242,6 +242,34 @@ impl Chip {
         self.settle(now);
     }
 
+    /// A debugger halts the core for so many cycles from `now` on: what the freeze bits name
+    /// stands still with it. Source: RM0440, `DBGMCU_APB1FZR1` and `DBGMCU_APB2FZR`.
+    pub(crate) fn halt(&mut self, cycles: u64, now: u64) {
+        let frozen = [self.debug.get(0x08), self.debug.get(0x10)];
+        self.system.freeze(cycles);
+        self.counter.freeze(cycles);
+        if frozen[0] & 1 != 0 {
+            self.time.freeze(cycles, now);
+        }
+        if frozen[0] & 1 << 12 != 0 {
+            self.watchdog.freeze(cycles);
+        }
+        for (motor, bit) in self.motors.iter_mut().zip([11, 13]) {
+            if frozen[1] >> bit & 1 != 0 {
+                motor.freeze(true, cycles);
+            }
+        }
+        self.settle(now);
+    }
+
+    /// The core goes on.
+    pub(crate) fn resume(&mut self, now: u64) {
+        for motor in &mut self.motors {
+            motor.freeze(false, 0);
+        }
+        self.settle(now);
+    }
+
     /// Whether the chip itself breaks the motors' timers. Source: RM0440, `SYSCFG_CFGR2`.
     pub(super) fn system_breaks(&self) -> bool {
         self.locked_up && self.syscfg.lockup_breaks()

@@ -273,6 +273,23 @@ impl Machine {
         Ok(())
     }
 
+    /// A debugger halts the core for so many cycles; the chip goes on but for what it freezes.
+    /// Errors: as [`Machine::run_until`].
+    pub fn halt(&mut self, cycles: u64) -> Result<(), CoreError> {
+        let end = self.now() + cycles;
+        let now = self.now();
+        self.chip_mut().halt(cycles, now);
+        while self.now() < end {
+            self.advance_chip()?;
+            let now = self.now();
+            let next = self.chip().deadline().clamp(now + 1, end.max(now + 1));
+            self.core.pass(next - now);
+        }
+        let now = self.now();
+        self.chip_mut().resume(now);
+        Ok(())
+    }
+
     /// Books the polls that have begun and ended.
     fn note_tasks(&mut self) {
         self.core.take_marks(&mut self.marks);

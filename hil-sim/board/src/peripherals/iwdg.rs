@@ -74,6 +74,17 @@ impl Iwdg {
         self.acting.cycles()
     }
 
+    /// Stands still for so many cycles.
+    pub const fn freeze(&mut self, cycles: u64) {
+        self.expires = self.expires.saturating_add(cycles);
+        self.updated = self.updated.saturating_add(cycles);
+    }
+
+    /// Whether it counts.
+    pub const fn is_started(&self) -> bool {
+        self.started
+    }
+
     /// Whether it has expired.
     pub const fn has_expired(&self, now: u64) -> bool {
         self.expires <= now

@@ -61,6 +61,8 @@ pub struct Pwm {
     breaks: u64,
     /// A break by the chip itself: core locked up, supply low, flash damaged. It is not filtered.
     system: bool,
+    /// It stands still with the core: no output is on.
+    frozen: bool,
 }
 
 impl Pwm {
@@ -77,6 +79,7 @@ impl Pwm {
             pin,
             breaks: u64::MAX,
             system: false,
+            frozen: false,
         }
     }
 
@@ -97,7 +100,7 @@ impl Pwm {
     /// Part of the period in which channel `channel` (from 0) is high at its pin.
     pub fn duty(&self, channel: u32) -> f64 {
         let enable = self.registers.get(CCER) >> (4 * channel);
-        if self.registers.get(BDTR) & MOE == 0 || enable & 1 == 0 {
+        if self.frozen || self.registers.get(BDTR) & MOE == 0 || enable & 1 == 0 {
             return 0.0;
         }
         let part = f64::from(self.compares[channel as usize]) / self.period as f64;
@@ -114,6 +117,13 @@ impl Pwm {
     pub fn set_break(&mut self, pin: bool, now: u64) {
         self.pin = pin;
         self.rearm(now);
+    }
+
+    /// Stands still, without an output, or goes on after so many cycles of that.
+    pub const fn freeze(&mut self, frozen: bool, cycles: u64) {
+        self.frozen = frozen;
+        self.origin = self.origin.wrapping_add(cycles);
+        self.update = self.update.saturating_add(cycles);
     }
 
     /// Sets the level of the chip's own break.

@@ -39,6 +39,11 @@ impl System {
         }
     }
 
+    /// The system timer stands still for so many cycles.
+    pub fn freeze(&mut self, cycles: u64) {
+        self.tick.freeze(cycles);
+    }
+
     /// Priorities of four exceptions from `first` on, as a word.
     fn priorities(&self, first: u32) -> u32 {
         (0..4).fold(0, |word, byte| {
