@@ -17,8 +17,6 @@ pub enum Fault {
     ArmAngleStale = 104,
     /// The readback of the bridges stopped answering.
     ReadbackStale = 105,
-    /// The arm angle sensor has no magnet in range.
-    ArmAngleMagnet = 106,
     /// The preload sensor reads outside its range.
     PreloadSensorRange = 112,
     /// The compression sensor reads outside its range.
@@ -65,6 +63,9 @@ pub enum Fault {
     EmergencyStop = 151,
     /// The control tick was late by more than a period.
     TickOverrun = 160,
+    // Behind all others, whatever its code: logs have the place in this list.
+    /// The arm angle sensor has no magnet in range.
+    ArmAngleMagnet = 106,
 }
 
 impl Fault {
