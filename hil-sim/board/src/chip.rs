@@ -81,7 +81,7 @@ pub struct Chip {
     spi: Spi,
     /// Independent watchdog.
     pub watchdog: Iwdg,
-    /// Debug support: only kept, since no debugger halts the core.
+    /// Debug support: its freeze bits act while a debugger halts the core.
     debug: Registers,
     crc: CrcUnit,
     /// The angle sensor.
