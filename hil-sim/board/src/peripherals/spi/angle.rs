@@ -180,7 +180,8 @@ mod tests {
             sensor.exchange(Frame { sent: 0x4002, ..READ_ANGLE }, true);
         };
         let cut = |sensor: &mut AngleSensor| sensor.cut_off();
-        let causes: [(fn(&mut AngleSensor), u16); 4] =
+        type Cause = fn(&mut AngleSensor);
+        let causes: [(Cause, u16); 4] =
             [(odd, PARITY), (short, FRAMING), (unknown, INVALID), (cut, FRAMING)];
         for (cause, register) in causes {
             let mut sensor = sensor();
