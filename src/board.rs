@@ -4,7 +4,7 @@
 pub(crate) mod config;
 mod console;
 mod flash;
-mod flash_page;
+pub(crate) mod flash_page;
 pub(crate) mod guard;
 #[cfg(feature = "hil")]
 pub(crate) mod hil;
@@ -16,6 +16,7 @@ mod pins;
 mod retained;
 pub(crate) mod rtt;
 pub(crate) mod safety;
+mod stack;
 pub(crate) mod start;
 pub(crate) mod supply;
 mod text_log;
@@ -63,6 +64,16 @@ bind_interrupts!(pub(crate) struct Irqs {
 
 /// The core's clock, Hz.
 const SYSCLK_HZ: u32 = 170_000_000;
+
+/// Guards the stack and starts the clocks.
+pub(crate) fn init() -> Peripherals {
+    stack::guard();
+    let peripherals = embassy_stm32::init(clocks());
+    // At four wait states the core would wait at every line of code that the cache lacks. All
+    // code is in bank 1: the chip's prefetch may fail where code branches between the banks.
+    pac::FLASH.acr().modify(|w| w.set_prften(true));
+    peripherals
+}
 
 /// [`SYSCLK_HZ`] from the internal oscillator: 16 MHz / 4 x 85 / 2. Its 1 % suffices: positions
 /// come from the encoder, and every step is planned again.

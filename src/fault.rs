@@ -63,16 +63,20 @@ pub enum Fault {
     EmergencyStop = 151,
     /// The control tick was late by more than a period.
     TickOverrun = 160,
+    // Behind all others, whatever its code: logs have the place in this list.
+    /// The arm angle sensor has no magnet in range.
+    ArmAngleMagnet = 106,
 }
 
 impl Fault {
     /// Every fault, in the order of codes.
-    pub const ALL: [Self; 28] = [
+    pub const ALL: [Self; 29] = [
         Self::WheelEncoderStale,
         Self::PreloadSensorStale,
         Self::CompressionSensorStale,
         Self::ArmAngleStale,
         Self::ReadbackStale,
+        Self::ArmAngleMagnet,
         Self::PreloadSensorRange,
         Self::CompressionSensorRange,
         Self::ArmAngleRange,
@@ -111,6 +115,9 @@ impl Fault {
             Self::CompressionSensorStale => "the compression sensor stopped answering",
             Self::ArmAngleStale => "the arm angle sensor stopped answering or answers with errors",
             Self::ReadbackStale => "the readback of the bridges stopped answering",
+            Self::ArmAngleMagnet => {
+                "the magnet of the arm angle sensor is missing, too weak or too strong"
+            }
             Self::PreloadSensorRange => "the preload sensor reads outside its range",
             Self::CompressionSensorRange => "the compression sensor reads outside its range",
             Self::ArmAngleRange => "the arm angle lies outside the arm's reach",

@@ -27,7 +27,7 @@ mod firmware {
 
     use crate::board::config::{self, HoldReason};
     use crate::board::rtt::{self, Channels};
-    use crate::board::{self, EXCHANGE, guard, image, light, safety, start, supply};
+    use crate::board::{self, EXCHANGE, flash_page, guard, image, light, safety, start, supply};
     use crate::board::{Angle, Bridges, Button, Console, Guard, HostLine, Lamp, Parts, TextLog};
     use crate::board::{CompressionSensor, ParameterFlash, PreloadSensor, Wheel};
 
@@ -43,7 +43,8 @@ mod firmware {
     /// (system timer), and by critical sections, of which the longest wakes a task in the timer
     /// queue or copies a log entry, 3 us. Those of thread mode run in the middle between two
     /// ticks or directly after one, see [`tasks::mid_tick_deadline`]. On this executor the four
-    /// sensor tasks delay the tick; the longest exchanges two frames of 3 us. Model, log and
+    /// sensor tasks delay the tick; the longest exchanges two frames of 3 us, three after an
+    /// error. Model, log and
     /// operator run in thread mode and are preempted. The tick measures its own lateness, and a
     /// full period of it is a fault.
     static CONTROL: InterruptExecutor = InterruptExecutor::new();
@@ -80,6 +81,9 @@ mod firmware {
         let (mut parts, lamp, flash) = board::split(p, channels.console, channels.telemetry);
         parts.watchdog.place = restart.place();
         threads.spawn(light::show(lamp).unwrap());
+        if !flash_page::two_banks() {
+            return config::hold(threads, parts, HoldReason::OneBank);
+        }
         match image {
             Some(checksum) => threads.spawn(safety::watch_image(checksum).unwrap()),
             None => return config::hold(threads, parts, HoldReason::Image),

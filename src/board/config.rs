@@ -75,6 +75,8 @@ fn log_header(header: &Header) {
 pub(crate) enum HoldReason {
     /// A bit of the image has flipped: the code is no longer the tested one.
     Image,
+    /// The chip's option bytes make one bank of its flash.
+    OneBank,
     /// No controller can be read from the parameters.
     Parameters(SetError),
 }
@@ -95,6 +97,10 @@ async fn stay_off(mut motors: Bridges, mut light: Lamp, why: HoldReason) -> ! {
     loop {
         match why {
             HoldReason::Image => image::log_damaged(),
+            HoldReason::OneBank => defmt::error!(
+                "flash: one bank (option byte DBANK = 0); set it by `STM32_Programmer_CLI -c \
+                 port=SWD -ob DBANK=1`, then flash the image again"
+            ),
             HoldReason::Parameters(error @ SetError::Schema { found }) => {
                 defmt::error!("parameters: {=str}, {=u16}", error.sentence(), found);
             }

@@ -15,6 +15,12 @@ const END: u32 = 0x0808_0000;
 /// Begin of the second bank.
 const SECOND_BANK: u32 = 0x0804_0000;
 
+/// Whether the chip's option bytes leave its flash in two banks, as delivered. With one bank
+/// the numbers of pages mean other addresses, so that nothing here writes or erases.
+pub(crate) fn two_banks() -> bool {
+    FLASH.optr().read().dbank()
+}
+
 /// A page that is written by double words from its begin on.
 #[derive(Clone, Copy)]
 pub(super) struct Page(u32);
@@ -38,7 +44,7 @@ impl Page {
     #[inline(never)]
     pub(super) fn program(self, index: usize, [low, high]: Word) -> bool {
         let place = self.0 + (index * WORD_BYTES) as u32;
-        open();
+        let Some(open) = Open::begin() else { return false };
         FLASH.cr().write(|w| w.set_pg(true));
         // SAFETY: inside a page outside the image, which is only written through this pointer.
         // The chip takes the double word once both words have come.
@@ -46,42 +52,59 @@ impl Page {
             (place as *mut u32).write_volatile(low);
             ((place + 4) as *mut u32).write_volatile(high);
         }
-        close()
+        open.end()
     }
 
     /// Erases it, in about 22 ms.
     #[inline(never)]
     pub(super) fn erase(self) -> bool {
-        open();
+        let Some(open) = Open::begin() else { return false };
         FLASH.cr().write(|w| {
             w.set_per(true);
             w.set_bker(true);
             w.set_pnb(((self.0 - SECOND_BANK) / PAGE_BYTES as u32) as u8);
         });
         FLASH.cr().modify(|w| w.set_strt(true));
-        close()
+        open.end()
     }
 }
 
-/// Waits for an operation in progress, and unlocks.
-#[inline(never)]
-fn open() {
-    wait();
-    // Clears errors of earlier operations, which would block this one.
-    FLASH.sr().write_value(FLASH.sr().read());
-    if FLASH.cr().read().lock() {
-        FLASH.keyr().write_value(0x4567_0123);
-        FLASH.keyr().write_value(0xCDEF_89AB);
-    }
+/// The flash's interface, unlocked, and the data cache off: code from the first bank would fill
+/// it while the second is written, and its content may then be wrong (STM32G474 errata ES0430).
+struct Open {
+    cached: bool,
 }
 
-/// Waits for the end, and locks; returns whether it succeeded.
-#[inline(never)]
-fn close() -> bool {
-    wait();
-    let status = FLASH.sr().read();
-    FLASH.cr().write(|w| w.set_lock(true));
-    !(status.progerr() || status.pgaerr() || status.pgserr() || status.wrperr())
+impl Open {
+    /// Waits for an operation in progress, and unlocks; none if the flash has one bank.
+    #[inline(never)]
+    fn begin() -> Option<Self> {
+        if !two_banks() {
+            return None;
+        }
+        wait();
+        let cached = FLASH.acr().read().dcen();
+        FLASH.acr().modify(|w| w.set_dcen(false));
+        // Clears errors of earlier operations, which would block this one.
+        FLASH.sr().write_value(FLASH.sr().read());
+        if FLASH.cr().read().lock() {
+            FLASH.keyr().write_value(0x4567_0123);
+            FLASH.keyr().write_value(0xCDEF_89AB);
+        }
+        Some(Self { cached })
+    }
+
+    /// Waits for the end, and locks; returns whether it succeeded. The cache starts empty.
+    #[inline(never)]
+    fn end(self) -> bool {
+        wait();
+        let status = FLASH.sr().read();
+        FLASH.cr().write(|w| w.set_lock(true));
+        FLASH.acr().modify(|w| w.set_dcrst(true));
+        FLASH.acr().modify(|w| w.set_dcrst(false));
+        FLASH.acr().modify(|w| w.set_dcen(self.cached));
+        !(status.progerr() || status.pgaerr() || status.pgserr() || status.wrperr())
+    }
 }
 
 fn wait() {

@@ -13,6 +13,9 @@ use super::{retained, safety};
 /// Time-out of the watchdog, us, by the nominal 32 kHz of its oscillator.
 const TIMEOUT_US: u32 = 100_000;
 
+/// Polls for the update of the time-out, of four cycles at least: 1 ms, six times what it takes.
+const UPDATE_ROUNDS: u32 = 42_500;
+
 pub(crate) struct Guard {
     dog: IndependentWatchdog<'static, IWDG>,
     /// Position of the wheel by the record of the run before.
@@ -28,6 +31,12 @@ impl Guard {
     /// Starts it; only a reset stops it.
     pub(crate) fn start(&mut self) {
         self.dog.unleash();
+        // It counts from its reset value, half a second, up to the first feed after its own
+        // oscillator has taken the time-out over, five periods or so.
+        let updating = || pac::IWDG.sr().read().0 != 0;
+        let _ = (0..UPDATE_ROUNDS).any(|_| !updating());
+        self.dog.pet();
+        break_on_damage();
         safety::watch_feeding();
     }
 }
@@ -47,12 +56,17 @@ impl Watchdog for Guard {
     }
 }
 
-/// Connects a lock-up of the core to the break of the PWM timers, and stops the watchdog while a
-/// debugger halts the core.
+/// Connects a lock-up of the core and a supply that falls to the break of the PWM timers, and
+/// stops the watchdog while a debugger halts the core.
 pub(crate) fn arm() {
     // A locked-up core (a fault inside the fault handler, as after a stack overflow) executes
     // nothing any more: the timers cut the bridges themselves.
-    pac::SYSCFG.cfgr2().modify(|w| w.set_cll(true));
+    // A supply below the detector's threshold does the same before its interrupt; this locks
+    // the threshold.
+    pac::SYSCFG.cfgr2().modify(|w| {
+        w.set_cll(true);
+        w.set_pvdl(true);
+    });
     // Halted at a breakpoint, TIM1 and TIM8 stop with their outputs off, and the clock stops.
     pac::DBGMCU.apb1lfzr().modify(|w| {
         w.set_iwdg(true);
@@ -62,4 +76,10 @@ pub(crate) fn arm() {
         w.set_tim1(true);
         w.set_tim8(true);
     });
+}
+
+/// Connects a double word of flash with two wrong bits to the break. From here on: what a start
+/// reads may be torn by a lost supply, and the checks of sets and records reject it.
+fn break_on_damage() {
+    pac::SYSCFG.cfgr2().modify(|w| w.set_eccl(true));
 }

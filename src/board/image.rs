@@ -2,6 +2,7 @@
 
 use core::slice;
 
+use cortex_m::peripheral::{SYST, syst};
 use interstage::restart::image_checksum;
 
 use super::flash_page::IMAGE_CHECKSUMS;
@@ -37,20 +38,55 @@ pub(super) fn words() -> &'static [u32] {
     unsafe { slice::from_raw_parts(first, length / 4) }
 }
 
-/// Time for which the light is off and then on for a damaged image, cycles of the oscillator
-/// that the chip starts on.
-const SHOWN: u32 = 16_000_000 / 4;
+/// Half a period of 2 Hz, cycles of the oscillator that the chip starts on.
+const HALF_PERIOD: u32 = 16_000_000 / 4;
 
 /// Runs first of all, before statics have their values: shows a damaged image by the light, in
-/// case the code that would log it no longer works. A damaged image that restarts in a loop
-/// blinks. Needs only this function, [`checksums`] and some registers.
+/// case the code that would log it no longer works. The light is off for half a period, the
+/// checksum included, and then on: a damaged image that restarts in a loop blinks. Needs only
+/// this function, [`checksums`] and some registers.
 #[unsafe(export_name = "__pre_init")]
 extern "C" fn look() {
+    let clock = Clock::start();
     let (now, first) = checksums();
     if first.is_some_and(|first| first != now) {
-        cortex_m::asm::delay(SHOWN);
+        clock.wait_until(HALF_PERIOD);
         light::glow();
-        cortex_m::asm::delay(SHOWN);
+        clock.wait_until(2 * HALF_PERIOD);
+    }
+    clock.stop();
+}
+
+/// The system timer before anything else uses it. A counted loop takes two to four cycles a
+/// round on this core, depending on where it lies.
+struct Clock(&'static syst::RegisterBlock);
+
+impl Clock {
+    /// The greatest count of 24 bits.
+    const MOST: u32 = 0x00FF_FFFF;
+    /// On, by the core's clock, without an interrupt.
+    const ON: u32 = 1 << 2 | 1;
+
+    fn start() -> Self {
+        // SAFETY: the timer's registers, at their place in every core; nothing else runs yet.
+        let registers = unsafe { &*SYST::PTR };
+        // SAFETY: these values start the timer and nothing else.
+        unsafe {
+            registers.rvr.write(Self::MOST);
+            registers.cvr.write(0);
+            registers.csr.write(Self::ON);
+        }
+        Self(registers)
+    }
+
+    /// Waits until so many cycles after the start, one second at most.
+    fn wait_until(&self, cycles: u32) {
+        while Self::MOST - self.0.cvr.read() < cycles {}
+    }
+
+    fn stop(self) {
+        // SAFETY: switches the timer off.
+        unsafe { self.0.csr.write(0) }
     }
 }
 

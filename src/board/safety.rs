@@ -122,6 +122,13 @@ unsafe extern "C" fn hard_fault() {
     )
 }
 
+/// An access below the stack, see [`super::stack`]: the same.
+#[unsafe(naked)]
+#[unsafe(export_name = "MemoryManagement")]
+unsafe extern "C" fn memory_fault() {
+    naked_asm!("b {fault}", fault = sym hard_fault)
+}
+
 unsafe extern "C" fn fault_at(frame: u32) -> ! {
     cut();
     let (pc, lr) = returns(frame);

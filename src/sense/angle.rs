@@ -11,13 +11,46 @@ use crate::units::{Q16, Tick};
 /// positive outwards.
 pub type Codes = Q16;
 
+/// The error flag of a frame: something was wrong with a command, this one's or one before.
+const ERROR: u16 = 1 << 14;
+
+/// Of the sensor's diagnostics, register 0x3FFD, whose lowest eight bits are the automatic gain:
+/// offset compensation finished, overflow of the angle's computation, field too strong, field too
+/// weak. Source: ams, AS5048A data sheet, diagnostics.
+const COMPENSATED: u16 = 1 << 8;
+const OVERFLOW: u16 = 1 << 9;
+const TOO_STRONG: u16 = 1 << 10;
+const TOO_WEAK: u16 = 1 << 11;
+
+/// Whether a frame has the error flag.
+pub const fn is_flagged(frame: AngleFrame) -> bool {
+    frame.get() & ERROR != 0
+}
+
+/// Whether the sensor's diagnostics in this frame confirm a magnet that it can measure.
+///
+/// # Errors
+/// As [`decode`]: the frame says nothing.
+pub const fn field(diagnostics: AngleFrame) -> Result<bool, Reason> {
+    match decode(diagnostics) {
+        Ok(bits) => Ok(bits & (COMPENSATED | OVERFLOW | TOO_STRONG | TOO_WEAK) == COMPENSATED),
+        Err(reason) => Err(reason),
+    }
+}
+
 /// The 14-bit code of a frame with even parity and without the error flag, bit 14.
+///
+/// # Errors
+/// [`Reason::NoField`] for [`AngleFrame::NO_FIELD`], [`Reason::Parity`], [`Reason::SensorError`].
 pub const fn decode(frame: AngleFrame) -> Result<u16, Reason> {
+    if frame.get() == AngleFrame::NO_FIELD.get() {
+        return Err(Reason::NoField);
+    }
     let frame = frame.get();
     if !frame.count_ones().is_multiple_of(2) {
         return Err(Reason::Parity);
     }
-    if frame & 1 << 14 != 0 {
+    if frame & ERROR != 0 {
         return Err(Reason::SensorError);
     }
     Ok(frame & 0x3FFF)
@@ -117,7 +150,9 @@ mod tests {
     fn every_frame_is_judged() {
         for bits in 0..=u16::MAX {
             let ones = (0..16).filter(|bit| bits >> bit & 1 == 1).count();
-            let expected = if ones % 2 == 1 {
+            let expected = if bits == 0xC000 {
+                Err(Reason::NoField)
+            } else if ones % 2 == 1 {
                 Err(Reason::Parity)
             } else if bits >> 14 & 1 == 1 {
                 Err(Reason::SensorError)
@@ -126,6 +161,23 @@ mod tests {
             };
             assert_eq!(decode(AngleFrame::new(bits)), expected);
         }
+    }
+
+    #[test]
+    fn the_diagnostics_confirm_a_field_in_range_alone() {
+        let frame = |bits: u16| AngleFrame::new(bits | ((bits.count_ones() % 2) as u16) << 15);
+        for (bits, expected) in [
+            (0x0180, Ok(true)),
+            (0x01FF, Ok(true)),
+            (0x0080, Ok(false)),
+            (0x0380, Ok(false)),
+            (0x0500, Ok(false)),
+            (0x09FF, Ok(false)),
+            (0x4180, Err(Reason::SensorError)),
+        ] {
+            assert_eq!(field(frame(bits)), expected, "{bits:#x}");
+        }
+        assert_eq!(field(AngleFrame::new(0x0100)), Err(Reason::Parity));
     }
 
     #[test]

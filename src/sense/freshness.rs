@@ -67,6 +67,8 @@ pub enum Reason {
     Parity,
     /// The sensor reports an error of its own.
     SensorError,
+    /// The angle sensor has no magnet in range.
+    NoField,
 }
 
 /// Ticks from `at` to `now`. A time stamp up to a second ahead counts as zero: a sensor task may

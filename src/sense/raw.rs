@@ -47,6 +47,10 @@ impl AdcCode {
 pub struct AngleFrame(u16);
 
 impl AngleFrame {
+    /// In place of an angle whose sensor reports that its magnet is missing, too weak or too
+    /// strong: the error flag with code 0 and right parity.
+    pub const NO_FIELD: Self = Self(0xC000);
+
     /// A frame as shifted in from the bus.
     pub const fn new(frame: u16) -> Self {
         Self(frame)

@@ -51,9 +51,14 @@ const EFFORT_TICKS: u8 = 120;
 const STRAYED_PART: f64 = 0.25;
 /// Ticks for which it must deviate.
 const STRAYED_TICKS: u8 = 10;
-/// Equal codes in a row that count as stuck: with noise of half a code a converter repeats a code
-/// with a chance of 0.6, and 64 times with 1e-14.
-const STUCK: u8 = 64;
+/// Equal codes in a row that count as stuck if the preload has to change meanwhile, or if nothing
+/// is known of the sensor's noise.
+const STUCK: u16 = 64;
+/// Ticks of rest over which the changes of a code are counted: fewer than the self-test's.
+const NOISE_TICKS: u16 = 64;
+/// Chance of a run of equal codes that counts as stuck, as the negative of its natural logarithm:
+/// 1e-12.
+const RARE: u16 = 28;
 /// Change within a tick that no force can make, N: the spring yields 36 N/s at cruise speed.
 const JUMP_N: Newtons = q16(4_000_000);
 /// The same of the tread's compression, mm: it runs in at 20 mm/s.
@@ -69,6 +74,61 @@ pub(super) struct CrossCheck {
     bent: Millimetres,
     /// See [`STRAYED_PART`], N.
     strayed: Newtons,
+}
+
+/// How often the codes of preload and compression sensor change at rest, by their own noise.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Noise {
+    preload: CodeNoise,
+    compression: CodeNoise,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct CodeNoise {
+    value: Q16,
+    ticks: u16,
+    changes: u16,
+    /// Equal codes in a row that count as stuck.
+    stuck: u16,
+}
+
+impl Default for CodeNoise {
+    fn default() -> Self {
+        Self { value: Q16::ZERO, ticks: 0, changes: 0, stuck: STUCK }
+    }
+}
+
+impl Noise {
+    /// A tick in which both bridges are off.
+    pub(super) fn rest(&mut self, seen: &Compared) {
+        self.preload.rest(seen.preload);
+        self.compression.rest(seen.compression);
+    }
+}
+
+impl CodeNoise {
+    fn rest(&mut self, value: Q16) {
+        self.changes += u16::from(value != self.value);
+        self.value = value;
+        self.ticks += 1;
+        if self.ticks == NOISE_TICKS {
+            self.stuck = run_of(self.changes);
+            (self.ticks, self.changes) = (0, 0);
+        }
+    }
+}
+
+/// Equal codes in a row that are too rare by chance, of a sensor with so many changes in
+/// [`NOISE_TICKS`]: `p^n < e^-28`, with `-ln p >= c / 64`. Of few changes half counts, of many
+/// seven eighths, since they are a sample. A sensor without any is never stuck by its noise.
+const fn run_of(changes: u16) -> u16 {
+    // In halves of a change.
+    let sure = if changes < 16 { changes } else { 2 * changes - changes / 4 };
+    match (2 * RARE * NOISE_TICKS).checked_div(sure) {
+        Some(run) if run < STUCK => STUCK,
+        Some(run) => run,
+        None => u16::MAX,
+    }
 }
 
 /// State between ticks.
@@ -98,7 +158,9 @@ pub(super) struct CrossState {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct CodeState {
     value: Q16,
-    same: u8,
+    same: u16,
+    /// Preload that was due at the last change, N.
+    due: Newtons,
     erratic: u8,
 }
 
@@ -141,10 +203,12 @@ impl CrossCheck {
     pub(super) fn preload(
         &self,
         state: &mut CrossState,
-        preload: Newtons,
-        due: Newtons,
+        noise: &Noise,
+        seen: &Compared,
     ) -> Option<Fault> {
-        let unsound = judge(&mut state.preload, preload, JUMP_N);
+        let (preload, due) = (seen.preload, seen.preload_due);
+        let limits = Limits { stuck: noise.preload.stuck, jump: JUMP_N, due: self.telling() };
+        let unsound = judge(&mut state.preload, preload, due, &limits);
         let off = (preload - due).abs() > self.strayed;
         let strayed = lasts(&mut state.strayed, off, STRAYED_TICKS);
         if unsound {
@@ -154,14 +218,26 @@ impl CrossCheck {
         }
     }
 
+    /// Change of the preload that no sensor sleeps through, N: half of what counts as astray.
+    fn telling(&self) -> Newtons {
+        self.strayed.half()
+    }
+
     /// Every check of a tick in which the drive is on.
-    pub(super) fn step(&self, state: &mut CrossState, seen: &Compared) -> Option<Fault> {
+    pub(super) fn step(
+        &self,
+        state: &mut CrossState,
+        noise: &Noise,
+        seen: &Compared,
+    ) -> Option<Fault> {
         let bent = self.bends(state, seen);
         // Without a new reading the wheel's position is unknown.
         let fresh = seen.read_at == seen.now;
         let lags = fresh && lags(state, seen);
-        let preload = self.preload(state, seen.preload, seen.preload_due);
-        let unsound = judge(&mut state.compression, seen.compression, JUMP_MM);
+        let preload = self.preload(state, noise, seen);
+        let stuck = noise.compression.stuck;
+        let limits = Limits { stuck, jump: JUMP_MM, due: self.telling() };
+        let unsound = judge(&mut state.compression, seen.compression, seen.preload_due, &limits);
         let arm = fresh && arm_runs_ahead(state, seen);
         let effort = seen.effort.is_some_and(|effort| {
             let along = if seen.speed_ref < Q16::ZERO { -effort } else { effort };
@@ -235,17 +311,32 @@ fn arm_runs_ahead(state: &mut CrossState, seen: &Compared) -> bool {
     (seen.radius - radius).abs() > rolled + ARM_BEYOND
 }
 
+/// Bounds of a sensor's codes.
+struct Limits {
+    /// Equal codes in a row that its noise does not make.
+    stuck: u16,
+    /// Largest change in a tick.
+    jump: Q16,
+    /// Change of the preload that must show.
+    due: Newtons,
+}
+
 /// Whether a converter is stuck or jumps repeatedly.
-fn judge(state: &mut CodeState, value: Q16, jump: Q16) -> bool {
+fn judge(state: &mut CodeState, value: Q16, due: Newtons, limits: &Limits) -> bool {
     let change = (value - state.value).abs();
     state.value = value;
-    state.same = if change == Q16::ZERO { state.same.saturating_add(1) } else { 0 };
-    state.erratic = if change > jump {
+    if change == Q16::ZERO {
+        state.same = state.same.saturating_add(1);
+    } else {
+        (state.same, state.due) = (0, due);
+    }
+    let sleeps = state.same >= STUCK && (due - state.due).abs() > limits.due;
+    state.erratic = if change > limits.jump {
         state.erratic.saturating_add(JUMP_COUNTS)
     } else {
         state.erratic.saturating_sub(1)
     };
-    state.same >= STUCK || state.erratic >= ERRATIC
+    state.same >= limits.stuck || sleeps || state.erratic >= ERRATIC
 }
 
 /// Counts ticks while a condition lasts, and whether they are `enough`.
@@ -266,7 +357,7 @@ impl CrossState {
             preload: self.preload,
             ..Self::default()
         };
-        self.compression.value = seen.compression;
+        (self.compression.value, self.compression.due) = (seen.compression, seen.preload_due);
     }
 }
 

@@ -60,7 +60,7 @@ fn found(mut at: impl FnMut(f64) -> Rolls) -> Option<(Fault, i32)> {
             state.preload.value = seen.preload;
             state.begin(&seen);
         }
-        check.step(&mut state, &seen).map(|fault| (fault, tick - 100))
+        check.step(&mut state, &Noise::default(), &seen).map(|fault| (fault, tick - 100))
     })
 }
 
@@ -96,7 +96,7 @@ fn a_bridge_at_full_duty_from_the_first_tick_is_found_as_soon() {
         if tick == 0 {
             state.begin(&seen);
         }
-        check.step(&mut state, &seen) == Some(Fault::DriveRunaway)
+        check.step(&mut state, &Noise::default(), &seen) == Some(Fault::DriveRunaway)
     });
     assert!(found.is_some_and(|tick| tick <= 10), "{found:?}");
 }
@@ -191,8 +191,44 @@ fn a_stuck_code_is_found_and_one_bit_of_noise_is_not_stuck() {
     let mut state = CodeState::default();
     for tick in 0..10_000 {
         let value = Q16::from_bits(1000 + i32::from(tick % 60 == 0));
-        assert!(!judge(&mut state, value, JUMP_N), "{tick}");
+        assert!(!judge(&mut state, value, Q16::ZERO, &LIMITS), "{tick}");
     }
+}
+
+/// Bounds of a preload sensor whose noise is not known.
+const LIMITS: Limits = Limits { stuck: STUCK, jump: JUMP_N, due: Q16::MAX };
+
+#[test]
+fn a_run_of_equal_codes_is_judged_by_the_changes_at_rest() {
+    // Half a code of noise; a code that repeats by 0.97; none at all.
+    for (changes, expected) in [(64, 64), (26, 77), (2, 1792), (1, 3584), (0, u16::MAX)] {
+        assert_eq!(run_of(changes), expected, "{changes}");
+    }
+    for changes in 1..=64 {
+        let repeats: f64 = 1.0 - f64::from(changes) / f64::from(NOISE_TICKS);
+        let chance = repeats.powi(run_of(changes).into());
+        assert!(chance < 1e-12, "{changes}: {chance}");
+    }
+    let mut noise = CodeNoise::default();
+    for tick in 0..200 {
+        noise.rest(Q16::from_bits(tick / 2));
+    }
+    assert_eq!(noise.stuck, run_of(32), "the last complete count");
+}
+
+#[test]
+fn a_code_that_sleeps_through_a_change_of_the_preload_is_stuck() {
+    let sleeps = |rises: f64| {
+        let limits = Limits { stuck: u16::MAX, due: q16(4_000_000), ..LIMITS };
+        let mut state = CodeState::default();
+        (0..500).find(|tick| {
+            let due = Q16::from_num(rises * f64::from(*tick));
+            judge(&mut state, Q16::DELTA, due, &limits)
+        })
+    };
+    assert_eq!(sleeps(0.0), None);
+    assert_eq!(sleeps(0.025), Some(161));
+    assert_eq!(sleeps(-1.0), Some(64));
 }
 
 #[test]
@@ -201,11 +237,8 @@ fn a_jump_is_tolerated_and_repeated_jumps_are_not() {
         let mut state = CodeState::default();
         (0..5000).find(|tick| {
             let up = tick / every % 2 == 0;
-            judge(
-                &mut state,
-                Q16::from_num(if up { 20 } else { 30 }) + Q16::from_bits(*tick),
-                JUMP_N,
-            )
+            let value = Q16::from_num(if up { 20 } else { 30 }) + Q16::from_bits(*tick);
+            judge(&mut state, value, Q16::ZERO, &LIMITS)
         })
     };
     assert_eq!(jumps(2000), None);
@@ -252,8 +285,8 @@ proptest! {
                 speed_ref: Q16::from_bits(speed_ref),
                 effort: Some(Q16::from_bits(effort)),
             };
-            check.step(&mut state, &seen);
-            check.preload(&mut state, seen.preload, seen.preload_due);
+            check.step(&mut state, &Noise::default(), &seen);
+            check.preload(&mut state, &Noise::default(), &seen);
         }
     }
 }
@@ -317,8 +350,9 @@ fn off_by_exactly_the_threshold_is_tolerated() {
     assert!(drifts(OFF + Q16::DELTA) && drifts(-OFF - Q16::DELTA));
     let strays = |off: Newtons| {
         let mut state = CrossState::default();
-        let due = q16(40_000_000);
-        (0..50).find_map(|_| check.preload(&mut state, due + off, due))
+        let at = off_by(1, Q16::ZERO);
+        let seen = Compared { preload: at.preload_due + off, ..at };
+        (0..50).find_map(|_| check.preload(&mut state, &Noise::default(), &seen))
     };
     assert_eq!(strays(check.strayed), None);
     assert_eq!(strays(-check.strayed), None);
@@ -335,14 +369,15 @@ fn a_preload_astray_before_the_drive_starts_is_counted_on() {
         preload: q16(55_000_000) + Q16::from_bits(i32::from(tick.is_multiple_of(7))),
         ..off_by(tick, Q16::ZERO)
     };
-    let before = STRAYED_TICKS - 3;
+    let (before, noise) = (STRAYED_TICKS - 3, Noise::default());
     let mut state = CrossState::default();
     for tick in 0..Tick::from(before) {
         let seen = astray(tick);
-        assert_eq!(check.preload(&mut state, seen.preload, seen.preload_due), None);
+        assert_eq!(check.preload(&mut state, &noise, &seen), None);
     }
     state.begin(&astray(Tick::from(before)));
     let start = Tick::from(before);
-    let found: Vec<_> = (start..start + 3).map(|t| check.step(&mut state, &astray(t))).collect();
+    let found: Vec<_> =
+        (start..start + 3).map(|t| check.step(&mut state, &noise, &astray(t))).collect();
     assert_eq!(found, [None, None, Some(Fault::PretightenerRunaway)]);
 }

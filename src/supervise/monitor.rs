@@ -3,7 +3,7 @@
 #![deny(clippy::float_arithmetic)]
 
 use super::Mode;
-use super::crosscheck::{Compared, CrossCheck, CrossState};
+use super::crosscheck::{Compared, CrossCheck, CrossState, Noise};
 use super::readback::Readback;
 use crate::fault::Fault;
 use crate::numeric::checked;
@@ -43,6 +43,7 @@ pub struct MonitorState {
     /// The drive was on in the last tick.
     driving: bool,
     cross: CrossState,
+    noise: Noise,
     readback: Readback,
 }
 
@@ -145,11 +146,12 @@ impl Monitor {
             if !before {
                 state.cross.begin(&compared);
             }
-            self.cross.step(&mut state.cross, &compared)
+            self.cross.step(&mut state.cross, &state.noise, &compared)
         } else if matches!(seen.mode, Mode::Preload(_)) {
-            self.cross.preload(&mut state.cross, compared.preload, compared.preload_due)
+            self.cross.preload(&mut state.cross, &state.noise, &compared)
         } else {
             state.cross = CrossState::default();
+            state.noise.rest(&compared);
             None
         }
     }
@@ -182,7 +184,10 @@ fn sensor_fault(sensed: &SensedState) -> Option<Fault> {
             Fault::CompressionSensorStale,
             Fault::CompressionSensorRange,
         ))
-        .or(judge(sensed.radius.validity, Fault::ArmAngleStale, Fault::ArmAngleRange))
+        .or(match sensed.radius.validity {
+            Validity::Invalid(Reason::NoField) => Some(Fault::ArmAngleMagnet),
+            validity => judge(validity, Fault::ArmAngleStale, Fault::ArmAngleRange),
+        })
 }
 
 #[cfg(test)]
@@ -305,6 +310,54 @@ mod tests {
         assert!(stalled && tick < 60, "{fault:?} {tick}");
         let short = usize::from(PRELOAD_TICKS);
         assert_eq!(found(RUN, 8.0, 8.0, 40.0, 48.0), Some((Fault::PreloadNotReached, short)));
+    }
+
+    /// First fault of a drive whose preload sensor changes its code in one of `quiet` ticks, or
+    /// never from tick `stuck` on; the preload is built up at 25 N/s from tick 300, and the wheel
+    /// rolls from tick 3000.
+    fn with_noise(quiet: i32, stuck: i32) -> Option<(Fault, i32)> {
+        let monitor = Monitor::try_build(&Rig::prototype()).unwrap();
+        let mut state = MonitorState::default();
+        let mut preload = Q16::ZERO;
+        (1..30_000).find_map(|tick| {
+            let (mode, built) = match tick {
+                ..300 => (Mode::SelfTest, 0.0),
+                300..3000 => (Mode::Preload(Direction::Deploy), f64::from(tick - 300) * 0.025),
+                _ => (RUN, 33.3),
+            };
+            let (built, travel) = (built.min(33.3), 8e-3 * f64::from((tick - 3000).max(0)));
+            if tick < stuck {
+                let noise = if (tick.wrapping_mul(7919) % 1009) < 1009 / quiet { 200 } else { 0 };
+                preload = Q16::from_num(built) + Q16::from_bits(noise);
+            }
+            let mut sensed = sensed(if mode == RUN { 8.0 } else { 0.0 }, 0.0);
+            sensed.travel = Travel::from_num(travel);
+            sensed.speed.at = tick as Tick;
+            sensed.preload.value = preload;
+            sensed.compression.value += Q16::from_bits(if tick % 2 == 0 { 1 } else { -1 });
+            let seen = Observed {
+                now: tick as Tick,
+                speed_ref: sensed.speed.value,
+                preload_due: Q16::from_num(built),
+                ..observed(mode, &sensed)
+            };
+            monitor.step(&mut state, &seen).map(|fault| (fault, tick))
+        })
+    }
+
+    #[test]
+    fn a_sensor_is_stuck_by_its_own_noise() {
+        // One that changes its code in every other tick, and one that hardly does.
+        for quiet in [2, 40] {
+            assert_eq!(with_noise(quiet, i32::MAX), None, "{quiet}");
+        }
+        let (fault, tick) = with_noise(2, 10_000).expect("found");
+        assert!(fault == Fault::PreloadSensorImplausible && tick < 10_150, "{fault:?} {tick}");
+        let (fault, tick) = with_noise(40, 10_000).expect("found");
+        assert!(fault == Fault::PreloadSensorImplausible && tick < 13_000, "{fault:?} {tick}");
+        // Stuck from the start on, as soon as the preload has to rise.
+        let (fault, tick) = with_noise(2, 1).expect("found");
+        assert!(fault == Fault::PreloadSensorImplausible && tick < 500, "{fault:?} {tick}");
     }
 
     #[test]

@@ -2,6 +2,10 @@
 //! through a low-pass to a converter; the duty goes through the same low-pass here. A wrong duty
 //! shows within milliseconds.
 //!
+//! A bridge at its current limit gives less than its duty: as much as holds the limit, between
+//! [`REGULATED`] and the duty, of the same sign. That is no fault; less, more or the other sign
+//! is.
+//!
 //! Faults behind the output (a motor without force, a slipping gear, a jammed screw) are left to
 //! the comparison of the sensors in `crosscheck`.
 
@@ -24,6 +28,11 @@ pub const BAND: i32 = 655;
 /// Tolerance relative to the expected output, as a shift: three deviations of supply, divider
 /// and reference together, 0.7 % each.
 pub const BAND_SHIFT: u32 = 5;
+/// Least output of a bridge that regulates its current, Q15 duty: a quarter. At standstill the
+/// presets' force limit takes half of the full duty, more in motion; the other half is for the
+/// spread of limit and winding, and for a wheel that is braked. A smaller duty never reaches the
+/// limit and is judged by itself.
+const REGULATED: i16 = 8192;
 /// Ticks for which the output must be off.
 pub const OFF_TICKS: i8 = 4;
 /// Ticks without a conversion that count as a fault, as for the sensors.
@@ -46,8 +55,10 @@ pub struct Readback {
 struct Bridge {
     /// Duty commanded until now, Q15.
     commanded: i16,
-    /// Through the fastest and the slowest low-pass.
+    /// It through the fastest and the slowest low-pass.
     lags: [Lag; 2],
+    /// The same of what regulation at least leaves of it.
+    regulated: [Lag; 2],
     /// Least and largest output a tick ago, Q15.
     before: (i32, i32),
     /// Ticks for which it has been off; if negative, ticks until it is judged.
@@ -56,7 +67,8 @@ struct Bridge {
 
 impl Default for Bridge {
     fn default() -> Self {
-        Self { commanded: 0, lags: [Lag(0); 2], before: (0, 0), off: -SETTLES }
+        let lags = [Lag(0); 2];
+        Self { commanded: 0, lags, regulated: lags, before: (0, 0), off: -SETTLES }
     }
 }
 
@@ -110,18 +122,27 @@ impl Readback {
 impl Bridge {
     /// Least and largest output after a tick under the duty.
     fn advance(&mut self) -> (i32, i32) {
-        let duty = self.commanded.into();
-        let [fast, slow] = &mut self.lags;
-        let (fast, slow) = (fast.step_by(duty, TAKES_ENDS[0]), slow.step_by(duty, TAKES_ENDS[1]));
-        (fast.min(slow), fast.max(slow))
+        let least = self.commanded.clamp(-REGULATED, REGULATED);
+        for (lags, duty) in [(&mut self.lags, self.commanded), (&mut self.regulated, least)] {
+            let [fast, slow] = lags;
+            fast.step_by(duty.into(), TAKES_ENDS[0]);
+            slow.step_by(duty.into(), TAKES_ENDS[1]);
+        }
+        self.bounds()
+    }
+
+    /// Least and largest output now. Whatever the output is between the two duties, its low-pass
+    /// is between theirs.
+    fn bounds(&self) -> (i32, i32) {
+        let ([Lag(a), Lag(b)], [Lag(c), Lag(d)]) = (self.lags, self.regulated);
+        (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)))
     }
 
     /// Whether it has been off for too long. The code was taken at some moment of the last two
     /// ticks: it may lie anywhere between the outputs of three.
     fn is_off(&mut self, code: BridgeCode) -> bool {
         let older = self.before;
-        let [fast, slow] = self.lags;
-        let before = (fast.0.min(slow.0), fast.0.max(slow.0));
+        let before = self.bounds();
         let now = self.advance();
         self.before = before;
         let low = now.0.min(before.0).min(older.0);
@@ -222,6 +243,40 @@ mod tests {
     }
 
     #[test]
+    fn a_bridge_that_regulates_its_current_is_no_fault() {
+        for sense in [1.0, -1.0] {
+            // At standstill it regulates at half of the full duty, less as a wheel is braked.
+            for least in [0.27, 0.5, 0.7] {
+                let given: Vec<f64> = (0..300).map(|tick| [0.2, 0.9, 1.0][tick / 100]).collect();
+                // From tick to tick it finds another output.
+                let regulated = |(tick, duty): (usize, &f64)| {
+                    sense * duty.min(least + 0.05 * f64::from((tick % 3) as u8))
+                };
+                let outputs: Vec<f64> = given.iter().enumerate().map(regulated).collect();
+                let given: Vec<f64> = given.iter().map(|duty| sense * duty).collect();
+                assert_eq!(found(&given, &NOMINAL.codes(&outputs)), None, "{sense} {least}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_bridge_with_less_than_regulation_leaves_or_the_wrong_sign_is_found() {
+        for (asked, taken) in [
+            (0.9, 0.0),
+            (0.9, 0.15),
+            (0.9, -0.5),
+            (-0.9, 0.0),
+            (-0.9, 0.9),
+            // More than asked, and too little asked for the current to reach its limit.
+            (0.5, 0.7),
+            (0.2, 0.1),
+        ] {
+            let codes = NOMINAL.codes(&[taken; 40]);
+            assert!(found(&[asked; 40], &codes).is_some(), "{asked} {taken}");
+        }
+    }
+
+    #[test]
     fn what_a_coasting_wheel_generates_is_no_fault_until_it_rests() {
         let mut readback = settled();
         let step = |readback: &mut Readback, drive, pretightener, coasts| {
@@ -294,7 +349,7 @@ mod tests {
             prop_assert_eq!(found(&given, &codes), None);
         }
 
-        /// Whatever is off by twice the band and stays so.
+        /// Whatever is off by twice the band and stays so, beyond what regulation leaves.
         #[test]
         fn what_is_off_by_twice_the_band_is_found(
             asked in -0.9..0.9f64,
@@ -304,7 +359,8 @@ mod tests {
             gain in 0.979..1.021f64,
         ) {
             let off = 0.04 + asked.abs() / 16.0 + beyond;
-            let taken = if up { asked + off } else { asked - off };
+            let least = asked.clamp(-0.25, 0.25);
+            let taken = if up { asked.max(least) + off } else { asked.min(least) - off };
             let duties: Vec<f64> =
                 (0..60).map(|tick| if tick < 30 { asked } else { taken }).collect();
             let codes = Built { at, gain, ..NOMINAL }.codes(&duties);
@@ -320,6 +376,7 @@ mod tests {
             let mut bridge = Bridge {
                 commanded: given,
                 lags: [Lag(given_q15); 2],
+                regulated: [Lag(given_q15); 2],
                 before: (given_q15, given_q15),
                 off: 0,
             };

@@ -3,7 +3,7 @@
 #![deny(clippy::float_arithmetic)]
 
 use crate::fault::Fault;
-use crate::sense::SensedState;
+use crate::sense::{Reason, SensedState, Validity};
 use crate::units::{Millimetres, MillimetresPerSecond, Newtons, q16};
 
 /// Ticks of rest that the self-test watches.
@@ -31,6 +31,8 @@ pub fn silent(sensed: &SensedState) -> Fault {
         Fault::PreloadSensorStale
     } else if !sensed.compression.is_usable() {
         Fault::CompressionSensorStale
+    } else if sensed.radius.validity == Validity::Invalid(Reason::NoField) {
+        Fault::ArmAngleMagnet
     } else {
         Fault::ArmAngleStale
     }
@@ -54,7 +56,7 @@ mod tests {
     use super::*;
     use crate::rig::Rig;
     use crate::sense::raw::SensorFrame;
-    use crate::sense::{Reason, Senses, SensesState, Validity};
+    use crate::sense::{Senses, SensesState};
     use crate::units::Q16;
 
     /// Sensor values on this wall, at this speed, preload and compression.
@@ -124,5 +126,7 @@ mod tests {
             assert!(!all_answer(&seen), "{fault:?}");
             assert_eq!(silent(&seen), fault);
         }
+        all.radius.validity = Validity::Invalid(Reason::NoField);
+        assert_eq!(silent(&all), Fault::ArmAngleMagnet);
     }
 }

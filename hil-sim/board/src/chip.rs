@@ -7,6 +7,7 @@ mod pins;
 mod stray;
 
 use super::core::{Access, Bus};
+use super::exceptions::number::NMI;
 use super::peripherals::adc::{self, Adc};
 use super::peripherals::crc::CrcUnit;
 use super::peripherals::dma::{CHANNELS, Dma, Dmamux, Move};
@@ -82,7 +83,7 @@ pub struct Chip {
     spi: Spi,
     /// Independent watchdog.
     pub watchdog: Iwdg,
-    /// Debug support: only kept, since no debugger halts the core.
+    /// Debug support: its freeze bits act while a debugger halts the core.
     debug: Registers,
     crc: CrcUnit,
     /// The angle sensor.
@@ -95,6 +96,8 @@ pub struct Chip {
     bridges: [Bridge; 2],
     /// Faults of the hardware.
     pub defects: Defects,
+    /// The core has locked up.
+    locked_up: bool,
     strays: Strays,
     reset: Option<Cause>,
     deadline: u64,
@@ -134,6 +137,7 @@ impl Chip {
             inputs: [0; 4],
             bridges: [Bridge::default(); 2],
             defects: Defects::default(),
+            locked_up: false,
             strays: Strays::default(),
             reset: None,
             deadline: 0,
@@ -154,6 +158,11 @@ impl Chip {
             self.ports[port] = Gpio::new(port, driven, levels);
         }
         self.angle = old.angle;
+        match cause {
+            Cause::Power => self.angle.power_up(),
+            _ if old.spi.is_busy() => self.angle.cut_off(),
+            _ => {}
+        }
         self.wheel = old.wheel;
         self.bridges = old.bridges;
         self.defects = old.defects;
@@ -163,6 +172,11 @@ impl Chip {
         self.power = old.power.after_reset(now);
         self.settle(now);
         torn
+    }
+
+    /// Whether a frame is on the angle sensor's bus.
+    pub const fn angle_bus_is_busy(&self) -> bool {
+        self.spi.is_busy()
     }
 
     /// The supply is below the detector's threshold until this cycle.
@@ -212,13 +226,57 @@ impl Chip {
 
     /// The core has locked up.
     pub fn lock_up(&mut self, now: u64) {
-        if self.syscfg.lockup_breaks() {
-            for motor in &mut self.motors {
-                motor.lock_up(now);
-            }
-            self.advance(now);
-            self.settle(now);
+        self.locked_up = true;
+        self.break_motors(now);
+    }
+
+    /// A read of flash has found two wrong bits at this address: NMI, and a break if it is set
+    /// up.
+    pub fn find_two_wrong_bits(&mut self, address: u32, now: u64) {
+        self.flash.find_two_wrong_bits(address);
+        self.system.exceptions.pend(NMI, now);
+        self.break_motors(now);
+    }
+
+    fn break_motors(&mut self, now: u64) {
+        self.settle_pins(now);
+        self.advance(now);
+        self.settle(now);
+    }
+
+    /// A debugger halts the core for so many cycles from `now` on: what the freeze bits name
+    /// stands still with it. Source: RM0440, `DBGMCU_APB1FZR1` and `DBGMCU_APB2FZR`.
+    pub(crate) fn halt(&mut self, cycles: u64, now: u64) {
+        let frozen = [self.debug.get(0x08), self.debug.get(0x10)];
+        self.system.freeze(cycles);
+        self.counter.freeze(cycles);
+        if frozen[0] & 1 != 0 {
+            self.time.freeze(cycles, now);
         }
+        if frozen[0] & 1 << 12 != 0 {
+            self.watchdog.freeze(cycles);
+        }
+        for (motor, bit) in self.motors.iter_mut().zip([11, 13]) {
+            if frozen[1] >> bit & 1 != 0 {
+                motor.freeze(true, cycles);
+            }
+        }
+        self.settle(now);
+    }
+
+    /// The core goes on.
+    pub(crate) fn resume(&mut self, now: u64) {
+        for motor in &mut self.motors {
+            motor.freeze(false, 0);
+        }
+        self.settle(now);
+    }
+
+    /// Whether the chip itself breaks the motors' timers. Source: RM0440, `SYSCFG_CFGR2`.
+    pub(super) fn system_breaks(&self) -> bool {
+        self.locked_up && self.syscfg.lockup_breaks()
+            || self.power.signals_low() && self.syscfg.supply_breaks()
+            || self.flash.has_two_wrong_bits() && self.syscfg.flash_breaks()
     }
 
     /// The transfer that DMA makes next.
@@ -263,7 +321,12 @@ impl Chip {
             _ => false,
         };
         match block {
-            Block::Port(_) | Block::Syscfg | Block::Motor(_) | Block::Exti | Block::Pwr
+            Block::Port(_)
+            | Block::Syscfg
+            | Block::Motor(_)
+            | Block::Exti
+            | Block::Pwr
+            | Block::Flash
                 if write =>
             {
                 if matches!(block, Block::Port(_)) {

@@ -68,6 +68,8 @@ pub enum Fault {
     Read,
     /// A write without an answer.
     Write,
+    /// A read or write that the memory protection unit forbids.
+    Guarded,
     /// Any other.
     Other,
 }

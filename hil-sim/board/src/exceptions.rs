@@ -7,6 +7,8 @@ const COUNT: usize = 16 + 102;
 
 /// Exceptions with a number of their own in the architecture.
 pub mod number {
+    /// Non-maskable interrupt.
+    pub const NMI: u8 = 2;
     /// Hard fault.
     pub const HARD_FAULT: u8 = 3;
     /// Memory management fault.
@@ -178,7 +180,7 @@ impl Exceptions {
     /// Priority with all its bits.
     fn priority(&self, number: u8) -> i16 {
         match number {
-            2 => -2,
+            number::NMI => -2,
             number::HARD_FAULT => -1,
             _ => i16::from(self.priorities[usize::from(number)]),
         }

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use super::chip::map::PARAMETER_SETS;
 use super::core::CoreError;
 use super::machine::Machine;
 use super::peripherals::pwr::{HOLDS, Then};
@@ -18,6 +19,12 @@ pub enum Fault {
     BitErrors(u16),
     /// The angle sensor does not answer.
     AngleLost,
+    /// The angle sensor misses a clock edge of its next frame.
+    AngleDisturbed,
+    /// The angle sensor's magnet is gone.
+    MagnetLost,
+    /// A read of flash finds two wrong bits.
+    TwoWrongBits,
     /// Line A (0) or B (1) of the wheel encoder is broken.
     EncoderLine(usize),
     /// DMA moves nothing.
@@ -62,6 +69,8 @@ impl Fault {
             }
             Self::BitErrors(bits) => chip.angle.bit_errors = if on { bits } else { 0 },
             Self::AngleLost => chip.angle.lost = on,
+            Self::AngleDisturbed => chip.angle.disturbed = on,
+            Self::MagnetLost => chip.angle.set_magnet(!on),
             Self::EncoderLine(line) => chip.defects.encoder_lines[line & 1] = on,
             Self::DmaStalled => chip.defects.dma_stalled = on,
             Self::TimerFlags => chip.defects.timer_flags_stick = on,
@@ -70,6 +79,7 @@ impl Fault {
                 chip.settle(now);
             }
             _ if !on => {}
+            Self::TwoWrongBits => chip.find_two_wrong_bits(PARAMETER_SETS, now),
             Self::BrownOut => chip.supply_falls(now + HOLDS, Then::Gone, now),
             Self::SupplyDip => chip.supply_falls(now + HOLDS / 2, Then::Back, now),
             Self::SupplyCut => return machine.restart(Cause::Power),
@@ -99,14 +109,18 @@ pub struct Timed {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{0}`: expected <fault>@<seconds> with preload-sensor=<code>, compression-sensor=<code>, \
-     drive-readback=<code>, pretightener-readback=<code>, angle-bits=<mask>, angle-lost, encoder-a, encoder-b, dma-stalled, timer-flags, button-storm, \
-     brown-out, supply-cut, supply-dip, reset-pin, caught or flip=<address>.<bit>"
+     drive-readback=<code>, pretightener-readback=<code>, angle-bits=<mask>, angle-lost, \
+     angle-disturbed, magnet-lost, two-wrong-bits, encoder-a, encoder-b, dma-stalled, timer-flags, \
+     button-storm, brown-out, supply-cut, supply-dip, reset-pin, caught or flip=<address>.<bit>"
 )]
 pub struct Misspelt(String);
 
 /// Names of the faults without a value.
-const PLAIN: [(&str, Fault); 12] = [
+const PLAIN: [(&str, Fault); 15] = [
     ("angle-lost", Fault::AngleLost),
+    ("angle-disturbed", Fault::AngleDisturbed),
+    ("magnet-lost", Fault::MagnetLost),
+    ("two-wrong-bits", Fault::TwoWrongBits),
     ("encoder-a", Fault::EncoderLine(0)),
     ("encoder-b", Fault::EncoderLine(1)),
     ("dma-stalled", Fault::DmaStalled),

@@ -10,7 +10,7 @@ mod tasks;
 use super::chip::Chip;
 use super::core::unicorn::{Counted, UnicornCore};
 use super::core::{Access, Bus, Core, CoreError, Mark, Register, Stop};
-use super::elf::{FLASH, Loaded, RAM, named};
+use super::elf::{BELOW, FLASH, Loaded, RAM, named};
 use super::error::ImageError;
 use super::exceptions::number::SV_CALL;
 use super::peripherals::flash::Change;
@@ -53,7 +53,7 @@ impl Machine {
         let loaded = Loaded::of(elf)?;
         let counted = Counted { base: FLASH.base, bytes: &loaded.flash, code: &loaded.code };
         let chip = Chip::new(FLASH.base);
-        let mut core = UnicornCore::with_bus(&[FLASH, RAM], &counted, chip)?;
+        let mut core = UnicornCore::with_bus(&[FLASH, BELOW, RAM], &counted, chip)?;
         core.write(RAM.base, &vec![BLANK; RAM.size as usize])?;
         let mut machine = Self {
             core,
@@ -162,6 +162,7 @@ impl Machine {
 
     /// Sets the core to its state after a reset.
     fn start(&mut self) -> Result<(), CoreError> {
+        self.core.set_guards(Vec::new())?;
         // Thread mode on the main stack, no mask, floating point without a context.
         self.core.set_register(Register::Xpsr, 1 << 24)?;
         for register in
@@ -272,6 +273,23 @@ impl Machine {
         Ok(())
     }
 
+    /// A debugger halts the core for so many cycles; the chip goes on but for what it freezes.
+    /// Errors: as [`Machine::run_until`].
+    pub fn halt(&mut self, cycles: u64) -> Result<(), CoreError> {
+        let end = self.now() + cycles;
+        let now = self.now();
+        self.chip_mut().halt(cycles, now);
+        while self.now() < end {
+            self.advance_chip()?;
+            let now = self.now();
+            let next = self.chip().deadline().clamp(now + 1, end.max(now + 1));
+            self.core.pass(next - now);
+        }
+        let now = self.now();
+        self.chip_mut().resume(now);
+        Ok(())
+    }
+
     /// Books the polls that have begun and ended.
     fn note_tasks(&mut self) {
         self.core.take_marks(&mut self.marks);
@@ -313,6 +331,9 @@ impl Machine {
         let now = self.now();
         if self.chip().deadline() > now {
             return Ok(());
+        }
+        if let Some(guards) = self.chip_mut().system.mpu.take_change() {
+            self.core.set_guards(guards)?;
         }
         self.chip_mut().advance(now);
         while let Some(due) = self.chip().next_move() {

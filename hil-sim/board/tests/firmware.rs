@@ -35,8 +35,9 @@ fn ran(sets: &[&str]) -> Ran {
     run::run(elf(), &scenario(sets), false, |_, _| {}).expect("a run")
 }
 
-/// The software on the same rig, started at several moments: sensor noise differs, and
-/// with it what the controller believes of the rubber and the speeds that it plans.
+/// The software on the same rig, zeroed again and started at several moments: sensor noise
+/// differs, and with it the sensors' zeros, what the controller believes of the rubber and the
+/// speeds that it plans. The board has zeros of a moment of its own too.
 fn software(sets: &[&str]) -> Vec<Summary> {
     let scenario = scenario(sets);
     let start = match scenario.run.direction {
@@ -46,11 +47,11 @@ fn software(sets: &[&str]) -> Vec<Summary> {
     (0..8)
         .map(|moment| {
             let mut session = Session::new(&scenario, Options::default()).expect("a session");
-            let (mut wait, mut sent) = (10 * moment, false);
+            let (mut wait, mut commands) = (10 * moment, [Command::Reset, start].into_iter());
             while !matches!(session.mode(), Mode::Complete(_) | Mode::FaultHold(_)) {
-                let idle = session.mode() == Mode::Idle && !sent;
-                sent |= idle && wait == 0;
-                session.step((idle && wait == 0).then_some(start)).expect("runs");
+                let idle = session.mode() == Mode::Idle;
+                let command = if idle && wait == 0 { commands.next() } else { None };
+                session.step(command).expect("runs");
                 wait -= u32::from(idle && wait > 0);
             }
             session.finish(1.0).summary

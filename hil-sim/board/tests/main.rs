@@ -17,4 +17,5 @@ mod registers;
 mod resets;
 mod rules;
 mod second;
+mod silicon;
 mod verbs;

@@ -88,6 +88,24 @@ impl DriveMotor {
         }
     }
 
+    /// Output of the bridge, part of the supply, at tread speed `speed`: the duty, or what is
+    /// left of it where the bridge regulates its current. Of the duty the motor works with
+    /// `worked`; the rest is lost behind the bridge.
+    #[must_use]
+    pub fn bridge_output(&self, duty: f64, worked: f64, speed: f64) -> f64 {
+        let ideal = self.stall_n * (worked - speed / self.no_load_mm_s);
+        let excess = ideal - ideal.clamp(-self.limit_n, self.limit_n);
+        let left = duty - excess / self.stall_n;
+        // It regulates towards no output, never through it.
+        if left * duty <= 0.0 {
+            0.0
+        } else if left.abs() < duty.abs() {
+            left
+        } else {
+            duty
+        }
+    }
+
     /// Speed after `dt_s` against a constant force: at the current limit evenly
     /// accelerated as far as that goes, then as the motor's own lag has it.
     fn accelerate(&self, speed: f64, duty: f64, resist: f64, dt_s: f64) -> f64 {
@@ -214,6 +232,28 @@ mod tests {
         let sense = turn.free_mm_s.signum();
         let next = turn.free_mm_s - sense * turn.yields * (load_n * sense).max(0.0);
         if next * sense <= 0.0 { 0.0 } else { next }
+    }
+
+    #[test]
+    fn a_bridge_at_its_current_limit_puts_out_what_holds_the_limit() {
+        for (duty, speed, expected) in [
+            (0.3, 0.0, 0.3),
+            (0.5, 0.0, 0.5),
+            (0.9, 0.0, 0.5),
+            (0.9, 30.0, 0.9),
+            (1.0, 12.0, 0.7),
+            (1.0, -12.0, 0.3),
+            (0.4, -60.0, 0.0),
+            (0.0, 60.0, 0.0),
+        ] {
+            for sense in [1.0, -1.0] {
+                let duty = sense * duty;
+                let output = DRIVE.bridge_output(duty, duty, sense * speed);
+                assert!((output - sense * expected).abs() < 1e-12, "{duty} {speed}: {output}");
+            }
+        }
+        // A motor that draws no current leaves the bridge alone.
+        assert_eq!(DRIVE.bridge_output(1.0, 0.0, 0.0), 1.0);
     }
 
     #[test]

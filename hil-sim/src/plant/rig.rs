@@ -290,9 +290,10 @@ impl VirtualRig {
         self.vibrate(dt_s);
         self.truth.time_s += dt_s;
         // The self-locking screw stops at once; the wheel turns on for some milliseconds.
-        let generated = self.truth.tread_mm_s / self.parameters.drive.no_load_mm_s;
+        let (motor, speed) = (&self.parameters.drive, self.truth.tread_mm_s);
+        let output = motor.bridge_output(drives.drive, drive, speed);
         self.truth.bridges = [
-            if drives.drive_on { drives.drive } else { generated },
+            if drives.drive_on { output } else { speed / motor.no_load_mm_s },
             if drives.preload_on { drives.preload } else { 0.0 },
         ];
         self.derive();

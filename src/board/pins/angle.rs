@@ -2,6 +2,10 @@
 //!
 //! A frame takes 3 us, a reading two of them. The driver busy-waits: the bus clocks by itself,
 //! so the wait always ends.
+//!
+//! Each frame carries the answer to the command before. An error in a command raises the error
+//! flag of every later answer until the error register is read; so each flagged answer is
+//! followed by that read, and the reading after it is good again.
 
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{Level, Output, Pull, Speed};
@@ -12,10 +16,14 @@ use embassy_stm32::spi::mode::Master;
 use embassy_stm32::spi::{Config, MODE_1, Spi};
 use embassy_stm32::time::Hertz;
 use interstage::hal::AngleBus;
+use interstage::sense::angle::{field, is_flagged};
 use interstage::sense::raw::{AngleFrame, BusFault};
 
-/// Read, register 0x3FFF (angle), even parity.
+/// Commands that read a register, bit 14, with even parity in bit 15: the angle at 0x3FFF,
+/// diagnostics and gain at 0x3FFD, the errors at 0x0001.
 const READ_ANGLE: u16 = 0xFFFF;
+const READ_DIAGNOSTICS: u16 = 0x7FFD;
+const READ_ERRORS: u16 = 0x4001;
 
 /// 170 MHz / 32. The sensor takes 10 MHz; the next divider would give 10.6.
 const CLOCK: Hertz = Hertz(5_312_500);
@@ -30,6 +38,10 @@ const FRAME_ROUNDS: u32 = 500;
 pub(crate) struct Angle {
     _bus: Spi<'static, Blocking, Master>,
     select: Output<'static>,
+    /// The next answer is that of the diagnostics.
+    diagnosed: bool,
+    /// The magnet's field by the last diagnostics.
+    field: bool,
 }
 
 impl Angle {
@@ -51,27 +63,40 @@ impl Angle {
         // With nothing selected, sets the bus to frames of 16 bits once: the driver would do it
         // for each frame, which takes half as long as the frame.
         let _ = bus.blocking_transfer_in_place(&mut [READ_ANGLE]);
-        Self { _bus: bus, select }
+        let mut angle = Self { _bus: bus, select, diagnosed: false, field: true };
+        // A reset in the middle of a frame is an error.
+        let _ = angle.exchange(READ_ERRORS);
+        angle
     }
 
-    /// Sends the read command and returns the answer to the command before.
-    fn exchange(&mut self) -> Result<u16, BusFault> {
+    /// Sends a command and returns the answer to the command before.
+    fn exchange(&mut self, command: u16) -> Result<AngleFrame, BusFault> {
         self.select.set_low();
         cortex_m::asm::delay(SELECT_ROUNDS);
-        pac::SPI1.dr16().write_value(READ_ANGLE);
+        pac::SPI1.dr16().write_value(command);
         let come = (0..FRAME_ROUNDS).any(|_| pac::SPI1.sr().read().rxne());
         let word = pac::SPI1.dr16().read();
         self.select.set_high();
-        if come { Ok(word) } else { Err(BusFault::Transfer) }
+        cortex_m::asm::delay(SELECT_ROUNDS);
+        if come { Ok(AngleFrame::new(word)) } else { Err(BusFault::Transfer) }
     }
 }
 
 impl AngleBus for Angle {
     async fn frame(&mut self) -> Result<AngleFrame, BusFault> {
-        // Two frames, because the answer to the last call's command is a full
-        // sampling period old.
-        self.exchange()?;
-        cortex_m::asm::delay(SELECT_ROUNDS);
-        self.exchange().map(AngleFrame::new)
+        // Two frames, because the angle has to be of now. The first one's answer is that of the
+        // last call's second command: the diagnostics come at no cost.
+        let before = self.exchange(READ_ANGLE)?;
+        let angle = self.exchange(READ_DIAGNOSTICS)?;
+        if core::mem::replace(&mut self.diagnosed, true)
+            && let Ok(field) = field(before)
+        {
+            self.field = field;
+        }
+        if is_flagged(angle) {
+            self.diagnosed = false;
+            self.exchange(READ_ERRORS)?;
+        }
+        Ok(if self.field { angle } else { AngleFrame::NO_FIELD })
     }
 }

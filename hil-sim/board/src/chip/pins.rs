@@ -208,7 +208,9 @@ impl Chip {
         });
         let supply = u32::from(self.power.signals_low()) << super::SUPPLY_LINE;
         self.exti.sample(levels.fold(supply, |word, line| word | 1 << line));
+        let broken = self.system_breaks();
         for (index, wired) in BRIDGES.iter().enumerate() {
+            self.motors[index].set_system_break(broken, now);
             let reaches = self.role(wired.stop) == Role::Alternate(wired.stop_function);
             let open = reaches && self.level(wired.stop);
             self.motors[index].set_break(open, now);

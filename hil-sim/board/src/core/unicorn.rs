@@ -75,6 +75,8 @@ struct Inside<B> {
 /// A Cortex-M4 on Unicorn.
 pub struct UnicornCore<B: Bus + 'static = NoBus> {
     engine: Unicorn<'static, Inside<B>>,
+    /// Places without access: address and bytes.
+    guards: Vec<(u32, u32)>,
     /// Hooks of deferred instructions, by their addresses.
     own: Vec<(u32, UcHookId)>,
     /// The hook of all of them.
@@ -105,7 +107,12 @@ impl<B: Bus + 'static> UnicornCore<B> {
         let inside = Inside { count: Count::new(counted), bus, marks: Vec::new() };
         // The flag for the microcontroller profile would select another core.
         let new = Unicorn::new_with_data(Arch::ARM, Mode::THUMB, inside);
-        let mut core = Self { engine: engine("start", new)?, own: Vec::new(), common: None };
+        let mut core = Self {
+            engine: engine("start", new)?,
+            guards: Vec::new(),
+            own: Vec::new(),
+            common: None,
+        };
         let model = core.engine.ctl_set_cpu_model(ArmCpuModel::CORTEX_M4 as i32);
         engine("select the core", model)?;
         core.translate_pages(memories)?;
@@ -133,6 +140,27 @@ impl<B: Bus + 'static> UnicornCore<B> {
     /// The bus, to be changed between two runs.
     pub fn bus_mut(&mut self) -> &mut B {
         &mut self.engine.get_data_mut().bus
+    }
+
+    /// Sets the places, address and bytes, that the program may not access; everything else in
+    /// RAM it may. The host's accesses are not affected.
+    /// Errors: [`CoreError::Engine`] if a place is no whole number of pages of a memory.
+    pub fn set_guards(&mut self, guards: Vec<(u32, u32)>) -> Result<(), CoreError> {
+        for (base, size) in std::mem::replace(&mut self.guards, guards) {
+            let freed = self.engine.mem_protect(base.into(), size.into(), Prot::ALL);
+            engine("free a memory", freed)?;
+        }
+        for (base, size) in &self.guards {
+            let kept = self.engine.mem_protect((*base).into(), (*size).into(), Prot::NONE);
+            engine("guard a memory", kept)?;
+        }
+        Ok(())
+    }
+
+    /// Whether the program may not access some of these bytes.
+    pub fn is_guarded(&self, address: u32, bytes: u32) -> bool {
+        let within = |(base, size): &(u32, u32)| address < base + size && *base < address + bytes;
+        self.guards.iter().any(within)
     }
 
     /// Sets what the engine may use a page for. By default every page is code, and the engine
@@ -332,8 +360,10 @@ fn fault(error: uc_error) -> Fault {
     match error {
         uc_error::INSN_INVALID => Fault::Undefined,
         uc_error::FETCH_UNMAPPED | uc_error::FETCH_PROT | uc_error::FETCH_UNALIGNED => Fault::Fetch,
-        uc_error::READ_UNMAPPED | uc_error::READ_PROT | uc_error::READ_UNALIGNED => Fault::Read,
-        uc_error::WRITE_UNMAPPED | uc_error::WRITE_PROT | uc_error::WRITE_UNALIGNED => Fault::Write,
+        uc_error::READ_UNMAPPED | uc_error::READ_UNALIGNED => Fault::Read,
+        uc_error::WRITE_UNMAPPED | uc_error::WRITE_UNALIGNED => Fault::Write,
+        // Flash can be read, and a write to it is answered by its interface.
+        uc_error::READ_PROT | uc_error::WRITE_PROT => Fault::Guarded,
         _ => Fault::Other,
     }
 }

@@ -29,8 +29,13 @@ impl Machine {
             frame::change_handler(&mut self.core, number)?;
             return self.start_handler(number, CHAIN);
         }
+        let (base, bytes) = frame::next(&self.core)?;
+        if self.core.is_guarded(base, bytes) {
+            self.core.set_register(Register::Sp, base)?;
+            return self.stacking_failed(number, back, Cause::GuardedStacking);
+        }
         if !frame::push(&mut self.core, back)? {
-            return self.stacking_failed(number, back);
+            return self.stacking_failed(number, back, Cause::Stacking);
         }
         let depth = self.chip().system.exceptions.depth();
         frame::go_to_handler(&mut self.core, number, depth > 0)?;
@@ -93,9 +98,9 @@ impl Machine {
     }
 
     /// There is no memory for the frame of exception `number`.
-    fn stacking_failed(&mut self, number: u8, back: u32) -> Result<(), CoreError> {
+    fn stacking_failed(&mut self, number: u8, back: u32, cause: Cause) -> Result<(), CoreError> {
         let exceptions = self.chip().system.exceptions.clone();
-        let fault = self.chip_mut().system.control.fault(Cause::Stacking, &exceptions, true);
+        let fault = self.chip_mut().system.control.fault(cause, &exceptions, true);
         if number == HARD_FAULT || fault.is_none() {
             self.pc = back;
             self.lock_up();

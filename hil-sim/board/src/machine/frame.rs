@@ -26,13 +26,19 @@ const RETURN_PROCESS: u32 = 1 << 2;
 const SAVED: [Register; 6] =
     [Register::R(0), Register::R(1), Register::R(2), Register::R(3), Register::R(12), Register::Lr];
 
+/// Where the next frame lies: its address and its bytes.
+pub(super) fn next(core: &impl Core) -> Result<(u32, u32), CoreError> {
+    let float = core.register(Register::Control)? & FLOAT_CONTEXT != 0;
+    let bytes = if float { EXTENDED } else { BASIC };
+    Ok((core.register(Register::Sp)?.wrapping_sub(bytes) & !7, bytes))
+}
+
 /// Pushes a frame that returns to `back`; false if there is no memory for it.
 pub(super) fn push(core: &mut impl Core, back: u32) -> Result<bool, CoreError> {
     let status = core.register(Register::Xpsr)?;
     let float = core.register(Register::Control)? & FLOAT_CONTEXT != 0;
     let stack = core.register(Register::Sp)?;
-    let bytes = if float { EXTENDED } else { BASIC };
-    let base = stack.wrapping_sub(bytes) & !7;
+    let (base, bytes) = next(core)?;
     let mut frame = Vec::with_capacity(bytes as usize);
     for register in SAVED {
         frame.extend(core.register(register)?.to_le_bytes());

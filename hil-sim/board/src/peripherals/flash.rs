@@ -1,10 +1,16 @@
 //! The flash's interface: locks, programming by double words, erasing by pages and banks, and
-//! its errors. Wait states and caches are kept and have no effect.
+//! its errors. Wait states, prefetch and instruction cache are kept and have no effect.
+//!
+//! The data cache holds no data either. What would corrupt it on the chip is counted: an
+//! operation begun while it is on (code runs from the other bank meanwhile), and switching it
+//! on after an operation without a reset of its content.
 //!
 //! A double word of 64 bits is written as two words, the lower one first, into erased flash.
 //! The machine holds the memory: it supplies the old content, and applies the [`Change`].
 //!
-//! Source: RM0440, 5.3 (operations) and 5.7 (registers), dual bank as delivered.
+//! Source: RM0440, 3.3 (operations, caches) and 3.7 (registers); ES0430 (STM32G474 errata),
+//! "Data cache might be corrupted during Flash memory read-while-write operation". Dual bank as
+//! delivered; with the option bit `DBANK` cleared a page has 4 KiB and there is no second bank.
 
 mod power;
 #[cfg(test)]
@@ -15,9 +21,20 @@ use super::{HZ, Peripheral, Write};
 
 pub use power::Cut;
 
+const ACR: u32 = 0x00;
 const KEYR: u32 = 0x08;
 const SR: u32 = 0x10;
 const CR: u32 = 0x14;
+const ECCR: u32 = 0x18;
+const OPTR: u32 = 0x20;
+
+/// Of the access control register: data cache on, and reset of its content.
+const DATA_CACHE: u32 = 1 << 10;
+const DATA_CACHE_RESET: u32 = 1 << 12;
+/// Of the option register: two banks.
+const DBANK: u32 = 1 << 22;
+/// Of the ECC register: two wrong bits in a double word were read; address in bits 0 to 18.
+const TWO_WRONG_BITS: u32 = 1 << 31;
 
 const LOCK: u32 = 1 << 31;
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
@@ -67,10 +84,10 @@ const PAGE_BYTES: u32 = 2 * 1024;
 const PROGRAM_CYCLES: u64 = 82 * (HZ / 1_000_000);
 const ERASE_CYCLES: u64 = 22 * (HZ / 1000);
 
-/// ACR, ECCR, OPTR (as delivered: two banks).
+/// ACR, and OPTR as delivered.
 const REGISTERS: [Kept; 2] = [
-    Kept { offset: 0x00, reset: 0x0004_0600, mask: 0x0004_7F0F },
-    Kept { offset: 0x20, reset: 0xFFEF_F8AA, mask: 0 },
+    Kept { offset: ACR, reset: 0x0004_0600, mask: 0x0004_7F0F },
+    Kept { offset: OPTR, reset: 0xFFEF_F8AA, mask: 0 },
 ];
 
 /// Change of the memory by an operation.
@@ -115,6 +132,14 @@ pub struct Flash {
     wanted: Option<(u32, [u8; 8])>,
     operation: Option<Operation>,
     finished: Option<Change>,
+    /// ECC register.
+    ecc: u32,
+    /// One bank, by an option byte.
+    single_bank: bool,
+    /// An operation has changed what the data cache may hold.
+    stale: bool,
+    /// Uses of the data cache that corrupt it, resets or not.
+    cache_hazards: u64,
     /// Operations begun so far, resets or not.
     begun: u64,
     cut: Option<Cut>,
@@ -124,7 +149,7 @@ pub struct Flash {
 impl Default for Flash {
     fn default() -> Self {
         Self {
-            registers: Registers::new(&REGISTERS, &[], &[0x18]),
+            registers: Registers::new(&REGISTERS, &[], &[]),
             keys: Some(0),
             control: 0xC000_0000,
             flags: 0,
@@ -132,6 +157,10 @@ impl Default for Flash {
             wanted: None,
             operation: None,
             finished: None,
+            ecc: 0,
+            single_bank: false,
+            stale: false,
+            cache_hazards: 0,
             begun: 0,
             cut: None,
             ends: false,
@@ -189,6 +218,10 @@ impl Flash {
             return;
         }
         let (address, size) = match (page, banks) {
+            // The bank's bit has no meaning with one bank.
+            (true, _) if self.single_bank => {
+                (BASE + 2 * PAGE_BYTES * (self.control >> 3 & 0x7F), 2 * PAGE_BYTES)
+            }
             (true, _) => {
                 let bank = if self.control & SECOND_BANK != 0 { BANK_BYTES } else { 0 };
                 (BASE + bank + PAGE_BYTES * (self.control >> 3 & 0x7F), PAGE_BYTES)
@@ -202,8 +235,49 @@ impl Flash {
 
     fn begin(&mut self, change: Change, before: [u8; 8], due: u64, now: u64) {
         self.begun += 1;
+        self.stale = true;
+        self.cache_hazards += u64::from(self.caches_data());
         let due = self.cut_short(due, now);
         self.operation = Some(Operation { change, before, due });
+    }
+
+    fn caches_data(&self) -> bool {
+        self.registers.get(ACR) & DATA_CACHE != 0
+    }
+
+    /// Uses of the data cache that corrupt its content on the chip.
+    pub const fn cache_hazards(&self) -> u64 {
+        self.cache_hazards
+    }
+
+    /// Sets the option byte: one bank of 4 KiB pages, or two as delivered.
+    pub fn set_single_bank(&mut self, single: bool) {
+        self.single_bank = single;
+        let options = self.registers.get(OPTR) & !DBANK;
+        self.registers.set(OPTR, options | if single { 0 } else { DBANK });
+    }
+
+    /// A read has found two wrong bits in the double word at this address.
+    pub const fn find_two_wrong_bits(&mut self, address: u32) {
+        self.ecc = TWO_WRONG_BITS | (address - BASE) >> 3 & 0x7_FFFF;
+    }
+
+    /// Whether two wrong bits are reported and not yet cleared.
+    pub const fn has_two_wrong_bits(&self) -> bool {
+        self.ecc & TWO_WRONG_BITS != 0
+    }
+
+    fn write_access(&mut self, write: Write) -> Option<()> {
+        let before = self.caches_data();
+        self.registers.write(ACR, write)?;
+        // The content can be reset only while the cache is off.
+        if write.ones() & DATA_CACHE_RESET != 0 && !before {
+            self.stale = false;
+        }
+        if !before && self.caches_data() {
+            self.cache_hazards += u64::from(self.stale);
+        }
+        Some(())
     }
 
     /// Takes the change of a finished operation.
@@ -246,6 +320,7 @@ impl Peripheral for Flash {
         match offset {
             SR => Some(self.flags | if self.is_busy() { BUSY } else { 0 }),
             CR => Some(self.control),
+            ECCR => Some(self.ecc),
             _ => self.registers.read(offset),
         }
     }
@@ -261,6 +336,8 @@ impl Peripheral for Flash {
                 }
             }
             SR => self.flags &= !write.ones(),
+            ACR => self.write_access(write)?,
+            ECCR => self.ecc &= !(write.ones() & TWO_WRONG_BITS),
             CR => self.write_control(write, now)?,
             _ => self.registers.write(offset, write)?,
         }

@@ -12,11 +12,41 @@ const WINR: u32 = 0x10;
 /// over temperature).
 const LSI_HZ: u64 = 32_000;
 
-/// The watchdog.
+/// Periods of its oscillator after which a written prescaler or reload value acts.
+const UPDATE: u64 = 5;
+
+/// Of the status: an update of prescaler and reload value is in progress.
+const UPDATING: u32 = 3;
+
+/// Prescaler and reload value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Iwdg {
+struct Time {
     prescaler: u32,
     reload: u32,
+}
+
+impl Time {
+    /// After reset: the longest time of the fastest prescaler, 512 ms.
+    const RESET: Self = Self { prescaler: 0, reload: 0xFFF };
+
+    /// Core cycles.
+    fn cycles(self) -> u64 {
+        let divider = 4_u64 << self.prescaler.min(6);
+        (u64::from(self.reload) + 1) * divider * HZ / LSI_HZ
+    }
+}
+
+/// The watchdog.
+///
+/// Once started it counts down from the reset value; what was written to prescaler and reload
+/// register acts from the first refresh on that follows the update. An update takes periods of
+/// the oscillator, which runs only after the start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Iwdg {
+    written: Time,
+    acting: Time,
+    /// Cycle at which what was written acts.
+    updated: u64,
     window: u32,
     open: bool,
     /// Cycle at which it expires, once started.
@@ -27,8 +57,9 @@ pub struct Iwdg {
 impl Default for Iwdg {
     fn default() -> Self {
         Self {
-            prescaler: 0,
-            reload: 0xFFF,
+            written: Time::RESET,
+            acting: Time::RESET,
+            updated: 0,
             window: 0xFFF,
             open: false,
             expires: u64::MAX,
@@ -40,8 +71,18 @@ impl Default for Iwdg {
 impl Iwdg {
     /// Core cycles from a refresh to expiry.
     pub fn timeout(&self) -> u64 {
-        let divider = 4_u64 << self.prescaler.min(6);
-        (u64::from(self.reload) + 1) * divider * HZ / LSI_HZ
+        self.acting.cycles()
+    }
+
+    /// Stands still for so many cycles.
+    pub const fn freeze(&mut self, cycles: u64) {
+        self.expires = self.expires.saturating_add(cycles);
+        self.updated = self.updated.saturating_add(cycles);
+    }
+
+    /// Whether it counts.
+    pub const fn is_started(&self) -> bool {
+        self.started
     }
 
     /// Whether it has expired.
@@ -50,39 +91,63 @@ impl Iwdg {
     }
 
     fn refresh(&mut self, now: u64) {
+        self.settle(now);
         if self.started {
             self.expires = now + self.timeout();
         }
     }
+
+    /// An update that is over acts.
+    fn settle(&mut self, now: u64) {
+        if self.started && self.updated <= now {
+            self.acting = self.written;
+        }
+    }
+
+    fn start(&mut self, now: u64) {
+        if !self.started {
+            self.started = true;
+            self.updated = now + UPDATE * HZ / LSI_HZ;
+            self.expires = now + Time::RESET.cycles();
+        }
+    }
+
+    fn set(&mut self, written: Time, now: u64) {
+        self.settle(now);
+        self.written = written;
+        self.updated = now + UPDATE * HZ / LSI_HZ;
+    }
+
+    fn updates(&self, now: u64) -> bool {
+        self.written != self.acting && !(self.started && self.updated <= now)
+    }
 }
 
 impl Peripheral for Iwdg {
-    fn read(&mut self, offset: u32, _: u64) -> Option<u32> {
+    fn read(&mut self, offset: u32, now: u64) -> Option<u32> {
         match offset {
-            // A write is complete at once.
-            KR | SR => Some(0),
-            PR => Some(self.prescaler),
-            RLR => Some(self.reload),
+            KR => Some(0),
+            SR => Some(if self.updates(now) { UPDATING } else { 0 }),
+            PR => Some(self.written.prescaler),
+            RLR => Some(self.written.reload),
             WINR => Some(self.window),
             _ => None,
         }
     }
 
     fn write(&mut self, offset: u32, write: Write, now: u64) -> Option<()> {
+        let written = self.written;
         match (offset, write.value & 0xFFFF) {
             (KR, key) => {
                 self.open = key == 0x5555;
                 match key {
                     0xAAAA => self.refresh(now),
-                    0xCCCC => {
-                        self.started = true;
-                        self.refresh(now);
-                    }
+                    0xCCCC => self.start(now),
                     _ => {}
                 }
             }
-            (PR, value) if self.open => self.prescaler = value & 7,
-            (RLR, value) if self.open => self.reload = value & 0xFFF,
+            (PR, value) if self.open => self.set(Time { prescaler: value & 7, ..written }, now),
+            (RLR, value) if self.open => self.set(Time { reload: value & 0xFFF, ..written }, now),
             // A window that forbids early refreshes is not modelled.
             (WINR, value) if value & 0xFFF != 0xFFF => return None,
             (WINR, _) => self.refresh(now),
@@ -107,15 +172,35 @@ mod tests {
 
     #[test]
     fn it_expires_after_its_time_unless_it_is_refreshed() {
-        let mut dog = Iwdg::default();
-        for (offset, value) in [(KR, 0xCCCC), (KR, 0x5555), (PR, 0), (RLR, 799), (KR, 0xAAAA)] {
-            write(&mut dog, offset, value, 0);
-        }
+        let mut dog = started();
+        let fed = UPDATE * HZ / LSI_HZ;
+        write(&mut dog, KR, 0xAAAA, fed);
         // 800 * 4 / 32 kHz = 100 ms.
         assert_eq!(dog.timeout(), HZ / 10);
-        assert!(!dog.has_expired(HZ / 10 - 1) && dog.has_expired(HZ / 10));
+        let end = fed + HZ / 10;
+        assert!(!dog.has_expired(end - 1) && dog.has_expired(end));
         write(&mut dog, KR, 0xAAAA, HZ / 20);
-        assert!(!dog.has_expired(HZ / 10));
+        assert!(!dog.has_expired(end));
+    }
+
+    #[test]
+    fn its_first_time_is_the_longest_until_it_is_refreshed_after_the_update() {
+        let longest = 4096 * 4 * HZ / LSI_HZ;
+        let mut dog = started();
+        assert!(!dog.has_expired(longest - 1) && dog.has_expired(longest));
+        assert_eq!(dog.read(SR, 0), Some(UPDATING));
+        write(&mut dog, KR, 0xAAAA, 1);
+        assert!(!dog.has_expired(longest), "the update is not over");
+        assert_eq!(dog.read(SR, UPDATE * HZ / LSI_HZ), Some(0));
+    }
+
+    /// Set before its start, as embassy does.
+    fn started() -> Iwdg {
+        let mut dog = Iwdg::default();
+        for (offset, value) in [(KR, 0x5555), (PR, 0), (RLR, 799), (KR, 0xCCCC)] {
+            write(&mut dog, offset, value, 0);
+        }
+        dog
     }
 
     #[test]

@@ -70,8 +70,10 @@ pub struct Pwm {
     pin: bool,
     /// Cycle at which the filter takes the break input for active.
     breaks: u64,
-    /// The core has locked up, which breaks too.
-    locked_up: bool,
+    /// A break by the chip itself: core locked up, supply low, flash damaged. It is not filtered.
+    system: bool,
+    /// It stands still with the core: no output is on.
+    frozen: bool,
 }
 
 impl Pwm {
@@ -89,7 +91,8 @@ impl Pwm {
             broken: None,
             pin,
             breaks: u64::MAX,
-            locked_up: false,
+            system: false,
+            frozen: false,
         }
     }
 
@@ -127,7 +130,7 @@ impl Pwm {
     /// Part of the period in which channel `channel` (from 0) is high at its pin.
     pub fn duty(&self, channel: u32) -> f64 {
         let enable = self.registers.get(CCER) >> (4 * channel);
-        if self.registers.get(BDTR) & MOE == 0 || enable & 1 == 0 {
+        if self.frozen || self.registers.get(BDTR) & MOE == 0 || enable & 1 == 0 {
             return 0.0;
         }
         let part = f64::from(self.compares[channel as usize]) / self.period as f64;
@@ -146,10 +149,17 @@ impl Pwm {
         self.rearm(now);
     }
 
-    /// A lock-up of the core breaks the outputs.
-    pub fn lock_up(&mut self, now: u64) {
-        self.locked_up = true;
-        self.breaks = now;
+    /// Stands still, without an output, or goes on after so many cycles of that.
+    pub const fn freeze(&mut self, frozen: bool, cycles: u64) {
+        self.frozen = frozen;
+        self.origin = self.origin.wrapping_add(cycles);
+        self.update = self.update.saturating_add(cycles);
+    }
+
+    /// Sets the level of the chip's own break.
+    pub fn set_system_break(&mut self, level: bool, now: u64) {
+        self.system = level;
+        self.rearm(now);
     }
 
     fn is_break_active(&self) -> bool {
@@ -159,12 +169,18 @@ impl Pwm {
         bdtr & BREAK_ENABLE != 0 && pin
     }
 
+    fn is_system_break(&self) -> bool {
+        self.registers.get(BDTR) & BREAK_ENABLE != 0 && self.system
+    }
+
     /// Starts or ends the wait for the filter.
     fn rearm(&mut self, now: u64) {
-        if self.is_break_active() {
+        if self.is_system_break() {
+            self.breaks = self.breaks.min(now);
+        } else if self.is_break_active() {
             let filter = filter_cycles(self.registers.get(BDTR) >> 16);
             self.breaks = self.breaks.min(now + filter);
-        } else if !self.locked_up {
+        } else {
             self.breaks = u64::MAX;
         }
     }
@@ -249,7 +265,8 @@ impl Peripheral for Pwm {
             BDTR => {
                 let held = self.registers.get(BDTR) & MOE;
                 self.registers.write(BDTR, write)?;
-                let active = self.locked_up || self.is_break_active() && self.breaks <= now;
+                let broken = self.is_break_active() && self.breaks <= now;
+                let active = self.is_system_break() || broken;
                 if active && held == 0 {
                     // While the break is active the outputs stay off.
                     self.registers.set(BDTR, self.registers.get(BDTR) & !MOE);
@@ -358,7 +375,7 @@ mod tests {
     #[test]
     fn a_locked_up_core_stops_it() {
         let mut timer = running();
-        timer.lock_up(500);
+        timer.set_system_break(true, 500);
         timer.advance(500);
         assert!(!moe(&mut timer));
         assert_eq!(timer.duty(0), 0.0);

@@ -44,6 +44,16 @@ impl Syscfg {
     pub fn lockup_breaks(&self) -> bool {
         self.0.get(CFGR2) & 1 != 0
     }
+
+    /// Whether a supply below the detector's threshold does.
+    pub fn supply_breaks(&self) -> bool {
+        self.0.get(CFGR2) & 1 << 2 != 0
+    }
+
+    /// Whether two wrong bits in flash do.
+    pub fn flash_breaks(&self) -> bool {
+        self.0.get(CFGR2) & 1 << 3 != 0
+    }
 }
 
 impl Peripheral for Syscfg {

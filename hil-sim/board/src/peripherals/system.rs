@@ -4,6 +4,7 @@
 //! Source: ARMv7-M Architecture Reference Manual, B3 and C1.
 
 mod control;
+mod mpu;
 mod tick;
 
 use super::{Peripheral, Write};
@@ -11,6 +12,7 @@ use crate::exceptions::Exceptions;
 use crate::exceptions::number::INTERRUPT;
 
 pub use control::{Cause, Control};
+pub use mpu::Mpu;
 pub use tick::{Counter, SysTick};
 
 /// The system control space from 0xE000_E000 on.
@@ -22,6 +24,8 @@ pub struct System {
     pub control: Control,
     /// System timer.
     pub tick: SysTick,
+    /// Memory protection unit.
+    pub mpu: Mpu,
 }
 
 impl System {
@@ -31,7 +35,13 @@ impl System {
             exceptions: Exceptions::default(),
             control: Control::new(vectors),
             tick: SysTick::default(),
+            mpu: Mpu::default(),
         }
+    }
+
+    /// The system timer stands still for so many cycles.
+    pub fn freeze(&mut self, cycles: u64) {
+        self.tick.freeze(cycles);
     }
 
     /// Priorities of four exceptions from `first` on, as a word.
@@ -78,6 +88,7 @@ impl Peripheral for System {
             0x300..=0x30C => self.exceptions.active(word & 3),
             0x400..=0x464 => self.priorities(u32::from(INTERRUPT) + offset - 0x400),
             0xD18..=0xD20 => self.priorities(4 + offset - 0xD18),
+            0xD90..=0xDA0 => self.mpu.read(offset)?,
             _ => self.control.read(offset, &self.exceptions)?,
         })
     }
@@ -92,6 +103,7 @@ impl Peripheral for System {
             0x280..=0x28C => self.unpend(word & 3, ones),
             0x400..=0x464 => self.set_priorities(u32::from(INTERRUPT) + offset - 0x400, write),
             0xD18..=0xD20 => self.set_priorities(4 + offset - 0xD18, write),
+            0xD90..=0xDA0 => self.mpu.write(offset, write)?,
             // Software trigger: the number of an interrupt.
             0xF00 => self.exceptions.pend(INTERRUPT.saturating_add((ones & 0x1FF) as u8), now),
             _ => self.control.write(offset, write, &mut self.exceptions, now)?,
@@ -100,7 +112,8 @@ impl Peripheral for System {
     }
 
     fn deadline(&self) -> u64 {
-        self.tick.deadline()
+        // A change of the protection acts before the next block.
+        if self.mpu.has_changed() { 0 } else { self.tick.deadline() }
     }
 
     fn advance(&mut self, now: u64) {

@@ -124,6 +124,13 @@ impl TimeBase {
         };
     }
 
+    /// Stands still for so many cycles from `now` on.
+    pub fn freeze(&mut self, cycles: u64, now: u64) {
+        self.update(now);
+        self.origin = self.origin.wrapping_add(cycles);
+        self.schedule();
+    }
+
     /// Sets the counter to `value` at `now`.
     fn place(&mut self, value: u64, now: u64) {
         self.origin = now.wrapping_sub(value * self.prescaler);

@@ -64,7 +64,10 @@ impl Flash {
             Change::Erased { address, size } => Change::Erased { address, size: size / 2 },
         });
         let cut = self.cut.filter(|_| !self.ends);
-        *self = Self { begun: self.begun, cut, ..Self::default() };
+        let (begun, cache_hazards) = (self.begun, self.cache_hazards);
+        let single_bank = self.single_bank;
+        *self = Self { begun, cache_hazards, cut, ..Self::default() };
+        self.set_single_bank(single_bank);
         over.or(torn)
     }
 }

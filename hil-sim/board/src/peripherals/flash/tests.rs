@@ -194,3 +194,44 @@ fn option_bytes_are_not_modelled() {
     let mut flash = unlocked();
     assert_eq!(flash.write(CR, Write { value: 1 << 17, mask: ALL }, 0), None);
 }
+
+#[test]
+fn the_data_cache_is_off_during_an_operation_and_reset_after_it() {
+    let access = |flash: &mut Flash, value: u32| write(flash, ACR, value, 0);
+    let hazards = |before: &[u32], after: &[u32]| {
+        let mut flash = unlocked();
+        before.iter().for_each(|value| access(&mut flash, *value));
+        write(&mut flash, CR, PROGRAM, 0);
+        program(&mut flash, PLACE, 1, ERASED).expect("programmed");
+        after.iter().for_each(|value| access(&mut flash, *value));
+        flash.cache_hazards()
+    };
+    assert_eq!(hazards(&[], &[]), 1, "it is on after reset");
+    assert_eq!(hazards(&[0], &[DATA_CACHE]), 1, "its content is old");
+    assert_eq!(hazards(&[0], &[DATA_CACHE_RESET, 0, DATA_CACHE]), 0);
+    // A reset has no effect while it is on.
+    let late = [DATA_CACHE, DATA_CACHE | DATA_CACHE_RESET, 0, DATA_CACHE];
+    assert_eq!(hazards(&[0], &late), 2);
+}
+
+#[test]
+fn with_one_bank_a_page_has_four_kibibytes_and_the_bank_s_bit_no_meaning() {
+    let mut flash = unlocked();
+    flash.set_single_bank(true);
+    assert_eq!(flash.read(OPTR, 0).map(|options| options & DBANK), Some(0));
+    write(&mut flash, CR, PAGE | SECOND_BANK | 124 << 3 | START, 0);
+    flash.advance(ERASE_CYCLES);
+    let erased = Change::Erased { address: BASE + 124 * 4096, size: 4096 };
+    assert_eq!(flash.take_change(), Some(erased));
+    flash.reset();
+    assert_eq!(flash.read(OPTR, 0).map(|options| options & DBANK), Some(0), "it is an option byte");
+}
+
+#[test]
+fn two_wrong_bits_are_reported_until_they_are_cleared() {
+    let mut flash = Flash::default();
+    flash.find_two_wrong_bits(PLACE + 16);
+    assert_eq!(flash.read(ECCR, 0), Some(TWO_WRONG_BITS | (BANK_BYTES + 16) >> 3));
+    write(&mut flash, ECCR, TWO_WRONG_BITS, 0);
+    assert!(!flash.has_two_wrong_bits());
+}

@@ -3,7 +3,9 @@
 use super::Write;
 use crate::core::Fault;
 use crate::exceptions::Exceptions;
-use crate::exceptions::number::{BUS_FAULT, HARD_FAULT, PEND_SV, SYS_TICK, USAGE_FAULT};
+use crate::exceptions::number::{
+    BUS_FAULT, HARD_FAULT, MEM_MANAGE, PEND_SV, SYS_TICK, USAGE_FAULT,
+};
 use crate::peripherals::registers::{Kept, Registers};
 
 const CPUID: u32 = 0xD00;
@@ -31,6 +33,8 @@ pub enum Cause {
     Program(Fault),
     /// Stacking at the entry of an exception.
     Stacking,
+    /// The same where the memory protection unit allows no access.
+    GuardedStacking,
     /// Unstacking at its return.
     Unstacking,
 }
@@ -42,6 +46,9 @@ impl Cause {
             Self::Program(Fault::Undefined) => 1 << 16,
             Self::Program(Fault::Fetch) => 1 << 8,
             Self::Program(Fault::Read | Fault::Write | Fault::Other) => 1 << 9,
+            // DACCVIOL, MSTKERR.
+            Self::Program(Fault::Guarded) => 1 << 1,
+            Self::GuardedStacking => 1 << 4,
             // STKERR, UNSTKERR.
             Self::Stacking => 1 << 12,
             Self::Unstacking => 1 << 11,
@@ -95,6 +102,7 @@ impl Control {
         self.faults |= cause.status();
         let (own, enable) = match cause {
             Cause::Program(Fault::Undefined) => (USAGE_FAULT, 1 << 18),
+            Cause::Program(Fault::Guarded) | Cause::GuardedStacking => (MEM_MANAGE, 1 << 16),
             _ => (BUS_FAULT, 1 << 17),
         };
         let priority = i16::from(exceptions.priority_set(own));

@@ -29,6 +29,11 @@ impl Default for SysTick {
 }
 
 impl SysTick {
+    /// Stands still for so many cycles, as the core does.
+    pub(super) const fn freeze(&mut self, cycles: u64) {
+        self.zero = self.zero.saturating_add(cycles);
+    }
+
     /// Cycles of the core in a count.
     const fn step(&self) -> u64 {
         if self.control & CORE_CLOCK != 0 { 1 } else { 8 }
@@ -98,6 +103,13 @@ pub struct Counter {
     on: bool,
     origin: u64,
     held: u32,
+}
+
+impl Counter {
+    /// Stands still for so many cycles, as the core does.
+    pub const fn freeze(&mut self, cycles: u64) {
+        self.origin = self.origin.wrapping_add(cycles);
+    }
 }
 
 impl Peripheral for Counter {
