@@ -105,14 +105,16 @@ pub struct Controller {
     pub tick: u32,
     /// Time since boot, s.
     pub t_s: f64,
-    /// Number of the mode, see [`MODE_NAMES`].
+    /// Number of the mode; its name of [`MODE_NAMES`] in the columns.
+    #[serde(with = "mode_column")]
     pub mode: u8,
     /// The mode is one of retraction.
     #[serde(with = "bit")]
     pub retracts: bool,
     /// Code of the fault that is held; 0 for none.
     pub fault: u8,
-    /// Contact stage, 1 to 6.
+    /// Contact stage, 1 to 6; its name of [`STAGE_NAMES`] in the columns.
+    #[serde(with = "stage_column")]
     pub stage: u8,
     /// Sleeve level: 0 at the outermost wall.
     pub level: u8,
@@ -128,8 +130,11 @@ pub struct Controller {
     pub compression_code: Option<u16>,
     /// When it was taken, ticks.
     pub compression_at: Option<u32>,
-    /// Frame of the arm angle sensor, undecoded.
+    /// Code of the arm angle sensor, 14 bits, 16384 a turn.
     pub arm_angle_code: Option<u16>,
+    /// What is wrong with its frame: 0 nothing, 1 the sensor's error flag is set, 2 the parity is
+    /// odd, 3 both.
+    pub arm_angle_error: u8,
     /// When it was taken, ticks.
     pub arm_angle_at: Option<u32>,
     /// Code of the drive's bridge, 12 bits, 2048 without voltage; none if none was taken.
@@ -160,7 +165,7 @@ pub struct Controller {
     pub slip_margin: f64,
     /// Amplitude of the arm's mode, mm.
     pub vibration_mm: f64,
-    /// Distance to the next face, mm; 32768 when none is left.
+    /// Distance to the next face, mm; `NaN` when none is left.
     pub distance_mm: f64,
     /// Duty of the drive, -1 to 1.
     pub drive_duty: f64,
@@ -174,7 +179,53 @@ pub struct Controller {
     pub pretightener_on: bool,
 }
 
-/// Yes and no as 1 and 0, so that every column is a number.
+/// The controller's distance when no face is left.
+const NO_FACE: Q16 = Q16::MAX;
+
+/// Bits of an angle frame: the code, the sensor's error flag, the parity.
+const ANGLE: u16 = 0x3FFF;
+const ERROR_FLAG: u16 = 1 << 14;
+const PARITY: u16 = 1 << 15;
+
+/// What is wrong with a frame, see [`Controller::arm_angle_error`].
+fn angle_error(frame: AngleFrame) -> u8 {
+    let bits = frame.get();
+    let odd = !bits.count_ones().is_multiple_of(2);
+    u8::from(bits & ERROR_FLAG != 0) | u8::from(odd) << 1
+}
+
+/// The frame of a code and of what is wrong with it.
+fn angle_frame(code: u16, error: u8) -> AngleFrame {
+    let bits = code & ANGLE | if error & 1 != 0 { ERROR_FLAG } else { 0 };
+    let odd = !bits.count_ones().is_multiple_of(2);
+    AngleFrame::new(bits | if odd != (error & 2 != 0) { PARITY } else { 0 })
+}
+
+/// A column of names, from this number on.
+macro_rules! named {
+    ($module:ident, $names:expr, $first:expr) => {
+        mod $module {
+            use serde::de::Error as _;
+            use serde::{Deserialize, Deserializer, Serializer};
+
+            pub(super) fn serialize<S: Serializer>(number: &u8, to: S) -> Result<S::Ok, S::Error> {
+                let name = $names.get(usize::from(*number).wrapping_sub($first));
+                to.serialize_str(name.copied().unwrap_or("unknown"))
+            }
+
+            pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<u8, D::Error> {
+                let name = String::deserialize(from)?;
+                let place = $names.iter().position(|known| *known == name);
+                let place = place.ok_or_else(|| D::Error::custom(format!("no name: {name}")))?;
+                Ok((place + $first) as u8)
+            }
+        }
+    };
+}
+named!(mode_column, super::MODE_NAMES, 0);
+named!(stage_column, super::STAGE_NAMES, 1);
+
+/// Yes and no as 1 and 0, which viewers can plot.
 mod bit {
     use serde::{Deserialize, Deserializer, Serializer};
 
@@ -244,7 +295,8 @@ impl Controller {
             preload_at: preload_sensor.map(|sample| sample.at),
             compression_code: compression_sensor.map(|sample| sample.code.get()),
             compression_at: compression_sensor.map(|sample| sample.at),
-            arm_angle_code: arm_angle.map(|sample| sample.code.get()),
+            arm_angle_code: arm_angle.map(|sample| sample.code.get() & ANGLE),
+            arm_angle_error: arm_angle.map_or(0, |sample| angle_error(sample.code)),
             arm_angle_at: arm_angle.map(|sample| sample.at),
             drive_code: bridges.map(|codes| codes.drive.get()),
             pretightener_code: bridges.map(|codes| codes.pretightener.get()),
@@ -260,7 +312,7 @@ impl Controller {
             gap_predicted_mm: seen.gap_predicted.to_num(),
             slip_margin: seen.slip_margin.to_num(),
             vibration_mm: seen.vibration.to_num(),
-            distance_mm: seen.distance.to_num(),
+            distance_mm: if seen.distance == NO_FACE { f64::NAN } else { seen.distance.to_num() },
             drive_duty: f64::from(seen.drive.to_bits()) / DUTY,
             pretightener_duty: f64::from(seen.pretightener.to_bits()) / DUTY,
             drive_on: flags.has(Flags::DRIVE),
@@ -287,7 +339,9 @@ impl Controller {
             ),
             preload_sensor: sample(self.preload_code, self.preload_at, AdcCode::new),
             compression_sensor: sample(self.compression_code, self.compression_at, AdcCode::new),
-            arm_angle: sample(self.arm_angle_code, self.arm_angle_at, AngleFrame::new),
+            arm_angle: sample(self.arm_angle_code, self.arm_angle_at, |code| {
+                angle_frame(code, self.arm_angle_error)
+            }),
             bridges: bridges.map(|(drive, pretightener)| BridgeCodes {
                 drive: BridgeCode::new(drive),
                 pretightener: BridgeCode::new(pretightener),
@@ -334,7 +388,7 @@ impl Controller {
             gap_predicted: q(self.gap_predicted_mm)?,
             slip_margin: q(self.slip_margin)?,
             vibration: q(self.vibration_mm)?,
-            distance: q(self.distance_mm)?,
+            distance: q(self.distance_mm).unwrap_or(NO_FACE),
             drive: duty(self.drive_duty),
             pretightener: duty(self.pretightener_duty),
         })
@@ -436,6 +490,28 @@ mod tests {
             let text = serde_json::to_string(&tick).unwrap();
             prop_assert_eq!(serde_json::from_str::<Tick>(&text).unwrap(), tick);
         }
+    }
+
+    #[test]
+    fn every_frame_of_the_arm_comes_back_and_its_code_has_no_parity() {
+        for bits in 0..=u16::MAX {
+            let sample = Sample { code: AngleFrame::new(bits), at: 9 };
+            let sensors = SensorFrame { arm_angle: Some(sample), ..SensorFrame::default() };
+            let tick = Controller::of(&Record::default(), &sensors);
+            assert_eq!(tick.sensors(), sensors, "{bits:#06x}");
+            assert_eq!(tick.arm_angle_code, Some(bits & 0x3FFF));
+            let is_good = interstage::sense::angle::decode(sample.code).is_ok();
+            assert_eq!(tick.arm_angle_error == 0, is_good, "{bits:#06x}");
+        }
+    }
+
+    #[test]
+    fn no_face_ahead_is_no_number() {
+        let telemetry = Telemetry { distance: Q16::MAX, ..Telemetry::default() };
+        let record = Record { telemetry, ..Record::default() };
+        let tick = Controller::of(&record, &SensorFrame::default());
+        assert!(tick.distance_mm.is_nan());
+        assert_eq!(tick.telemetry(), Some(telemetry));
     }
 
     #[test]

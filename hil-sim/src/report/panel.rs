@@ -171,11 +171,14 @@ impl Panel {
         axis::padded((range.0 - missing, range.1 + missing), 0.06)
     }
 
-    /// Everything that the legend names, in its order.
+    /// Everything that the legend names, in its order: what has a point.
     fn legend(&self) -> Vec<(&'static str, Sample<'_>)> {
-        let lines = self.lines.iter().map(|line| (line.name, Sample::Line(line.look)));
+        let has_points = |points: &[(f64, f64)]| points.iter().any(|point| point.1.is_finite());
+        let lines = self.lines.iter().filter(|line| has_points(&line.points));
+        let lines = lines.map(|line| (line.name, Sample::Line(line.look)));
         let levels = self.levels.iter().map(|&(name, look, _)| (name, Sample::Line(look)));
-        let marks = self.marks.iter().map(|marks| (marks.name, Sample::Mark(marks)));
+        let marks = self.marks.iter().filter(|marks| has_points(&marks.points));
+        let marks = marks.map(|marks| (marks.name, Sample::Mark(marks)));
         lines.chain(levels).chain(marks).collect()
     }
 

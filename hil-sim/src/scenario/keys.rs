@@ -195,29 +195,49 @@ pub(super) fn hint(key: &str, known: &[String]) -> String {
     }
 }
 
+/// The known word nearest to `word`, if any is near.
+pub(crate) fn nearest_word<'a>(word: &str, known: &'a [String]) -> Option<&'a str> {
+    let edits = |other: &String| strsim::damerau_levenshtein(word, other);
+    known
+        .iter()
+        .min_by_key(|other| edits(other))
+        .filter(|other| edits(other) <= 1 + word.len() / 4)
+        .map(String::as_str)
+}
+
 /// The known key nearest to `key`, if any is near.
 fn nearest<'a>(key: &str, known: &'a [String]) -> Option<&'a str> {
     known
         .iter()
         .map(|candidate| (distance(key, candidate), candidate.as_str()))
         .min()
-        .filter(|&(distance, _)| distance <= 2 + key.len() / 6)
+        .filter(|&(distance, _)| distance <= 3 + key.len() / 8)
         .map(|(_, candidate)| candidate)
 }
 
-/// Edits from `key` to `candidate`. The wrong section costs one edit, a forgotten
-/// unit or a wrong one as well.
+/// How far `candidate` is from `key`: edits, twice as far in a short name. The wrong section
+/// costs one, so does the wrong unit or none, and each word that was left out.
 fn distance(key: &str, candidate: &str) -> usize {
-    let edits = strsim::damerau_levenshtein(key, candidate);
     let ((section, found), (its_section, wanted)) = (split(key), split(candidate));
-    if wanted.is_empty() || found.is_empty() {
-        return edits;
+    if its_section.is_empty() && !section.is_empty() {
+        // A section is no key of another one.
+        return usize::MAX;
     }
-    let leaf = 1 + strsim::damerau_levenshtein(found, wanted);
-    let same_stem = wanted.strip_prefix(found).is_some_and(|rest| rest.starts_with('_'))
-        || stem(found) == stem(wanted);
-    let stem = if same_stem { 1 + usize::from(section != its_section) } else { edits };
-    edits.min(leaf).min(stem)
+    let edits = |a: &str, b: &str| {
+        let edits = strsim::damerau_levenshtein(a, b);
+        if a.len() < 6 { 2 * edits } else { edits }
+    };
+    let elsewhere = usize::from(!section.is_empty() && section != its_section);
+    if found == wanted {
+        return elsewhere;
+    }
+    let (ours, its) = (stem(found), stem(wanted));
+    let words = || ours.split('_').filter(|word| !word.is_empty());
+    let has_all = words().all(|word| its.split('_').any(|other| other == word));
+    let left_out = its.split('_').count().saturating_sub(words().count());
+    let of_words =
+        if has_all && words().next().is_some() { 1 + left_out + elsewhere } else { usize::MAX };
+    edits(key, candidate).min(of_words).min(1 + elsewhere + edits(ours, its))
 }
 
 /// Section and name; a key without a dot is a name without section.
@@ -246,6 +266,13 @@ mod tests {
             ("rig.step_height", "rig.step_height_mm"),
             ("seed", "run.seed"),
             ("drive.cruise_speed_m_s", "drive.cruise_speed_mm_s"),
+            ("sead", "run.seed"),
+            ("tread.mu", "plant.mu"),
+            ("rig.friction", "mismatch.friction"),
+            ("tread.thickness_mm", "mismatch.tread_thickness_mm"),
+            ("mass_kg", "plant.moved_mass_kg"),
+            ("plant.mass_kg", "plant.moved_mass_kg"),
+            ("limit", "preload.limit_n"),
         ] {
             assert_eq!(nearest(key, &known), Some(wanted), "{key}");
         }
@@ -253,7 +280,9 @@ mod tests {
 
     #[test]
     fn does_not_guess_when_nothing_is_near() {
-        assert_eq!(nearest("colour.of_the_sleeve", &known()), None);
+        for key in ["colour.of_the_sleeve", "preload.max_n", "preload.noise_n"] {
+            assert_eq!(nearest(key, &known()), None, "{key}");
+        }
     }
 
     #[test]

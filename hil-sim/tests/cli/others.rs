@@ -39,6 +39,34 @@ fn help_lists_the_verbs_and_is_no_error() {
     assert!(stdout(&rig(&["--version"])).starts_with("rig "));
 }
 
+/// A program in the place of cargo, which says and writes this.
+#[cfg(unix)]
+fn cargo_that(says: &str) -> (tempfile::TempDir, std::path::PathBuf) {
+    use std::os::unix::fs::PermissionsExt;
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("cargo");
+    let artifact =
+        r#"{"reason":"compiler-artifact","target":{"name":"rig-study"},"executable":"/bin/true"}"#;
+    std::fs::write(&path, format!("#!/bin/sh\nprintf '{says}' >&2\necho '{artifact}'\n")).unwrap();
+    std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).unwrap();
+    (directory, path)
+}
+
+#[cfg(unix)]
+#[test]
+fn a_build_is_announced_only_when_something_is_built() {
+    let started = |says: &str| {
+        let (_directory, cargo) = cargo_that(says);
+        let mut rig = Command::new(env!("CARGO_BIN_EXE_rig"));
+        let output = rig.env("CARGO", cargo).arg("modes").output().expect("the command starts");
+        assert_eq!(code(&output), 0, "{}", stderr(&output));
+        stderr(&output)
+    };
+    assert_eq!(started("    Finished dev\\n"), "");
+    let text = started("   Compiling a v1\\n    Building [=> ] 30/42: a\\r    Finished dev\\n");
+    assert_eq!(text, "building the study, once: 12 units to compile\n");
+}
+
 fn flash_by(program: &str, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_rig"))
         .env("PROBE_RS", program)
