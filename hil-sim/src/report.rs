@@ -10,7 +10,7 @@ pub(crate) mod ledger;
 pub mod mesh;
 mod page;
 pub mod palette;
-mod panel;
+pub(crate) mod panel;
 mod panels;
 pub mod svg;
 mod tables;

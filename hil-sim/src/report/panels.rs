@@ -115,7 +115,7 @@ impl<'a> View<'a> {
     /// A line of one field.
     pub(super) fn line(&self, name: &'static str, look: Look, of: impl Fn(&Tick) -> f64) -> Line {
         let points = self.rows.iter().map(|row| (self.across.of(row), of(row))).collect();
-        Line { name, look, points }
+        Line { name: name.into(), look, points }
     }
 
     /// Marks at lift-off of the crossings that have the value.

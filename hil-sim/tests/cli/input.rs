@@ -127,7 +127,7 @@ fn an_error_names_the_key_that_was_set_and_the_bound_that_it_broke() {
         ),
         ("drive.cruise_speed_mm_s=90", &["drive.cruise_speed_mm_s = 90", "at most"]),
         ("drive.cruise_speed_mm_s=4", &["drive.cruise_speed_mm_s = 4", "at least 5"]),
-        ("control.safe_speed_mm_s=30", &["control.safe_speed_mm_s = 30", "at most"]),
+        ("control.safe_speed_mm_s=60", &["control.safe_speed_mm_s = 60", "at most"]),
         (
             "rig.step_positions_mm=18,40,95",
             &["rig.step_positions_mm", "step 3 is at 95 mm", "at most 80"],
