@@ -3,6 +3,7 @@
 
 pub mod axis;
 mod band;
+mod beside;
 mod compare;
 mod crossings;
 mod decimate;
@@ -16,6 +17,7 @@ pub mod svg;
 mod tables;
 pub(crate) mod verdict;
 
+pub use beside::beside_svg;
 pub use compare::{Difference, compare_html, differences};
 pub use page::{Section, html};
 pub use panels::overview_svg;

@@ -109,7 +109,7 @@ impl Scenario {
     /// Every key with its unit, value, what it takes, and its description.
     #[must_use]
     pub fn keys(&self) -> Vec<KeyInfo> {
-        keys::list(&self.table())
+        keys::list(&self.table(), &validate::all_ranges(self))
     }
 
     /// The keys whose value is not the preset's, in the order of their sections, without those of

@@ -175,8 +175,9 @@ impl Rig {
         self.rig.wall_radius_mm - self.rig.step_height_mm * level as f64 - self.rig.wheel_radius_mm
     }
 
-    fn ranges(&self) -> Result<(), RigError> {
-        let table: [(&'static str, f64, f64, f64); 44] = [
+    /// Keys with their value and its least and largest value.
+    pub const fn bounds(&self) -> [(&'static str, f64, f64, f64); 44] {
+        [
             ("rig.wheel_radius_mm", self.rig.wheel_radius_mm, 10.0, 150.0),
             ("rig.wheel_width_mm", self.rig.wheel_width_mm, 1.0, 200.0),
             ("rig.step_height_mm", self.rig.step_height_mm, 1.5, 8.0),
@@ -221,8 +222,11 @@ impl Rig {
             ("control.slip_margin", self.control.slip_margin, 0.0, 1.0),
             ("control.adaptation_range", self.control.adaptation_range, 0.0, 0.9),
             ("control.adaptation_gain", self.control.adaptation_gain, 0.0, 1.0),
-        ];
-        for (key, value, min, max) in table {
+        ]
+    }
+
+    fn ranges(&self) -> Result<(), RigError> {
+        for (key, value, min, max) in self.bounds() {
             // Written so that a NaN fails.
             if !(value >= min && value <= max) {
                 return Err(RigError::OutOfRange { key, value, min, max });

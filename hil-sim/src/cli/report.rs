@@ -8,7 +8,7 @@ use super::failure::{Failure, Outcome};
 use super::output::{self, WithFiles};
 use crate::files::{make_directory, vacant_for, write_text};
 use crate::record::{Recording, recording};
-use crate::report::{Difference, compare_html, differences, html};
+use crate::report::{Difference, beside_svg, compare_html, differences, html};
 use crate::table;
 
 /// The page of a log as `deploy` writes it, or of two logs crossing by crossing.
@@ -28,6 +28,10 @@ pub(super) struct Args {
     /// Where the page goes; by default beside the first log.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+
+    /// With two logs: writes both in the same plots over time into this file, SVG.
+    #[arg(long, value_name = "FILE", requires = "other")]
+    picture: Option<PathBuf>,
 
     /// Prints the ledger or the differences as one JSON object.
     #[arg(long)]
@@ -65,8 +69,13 @@ fn two(args: &Args, first: &Recording, path: &Path) -> Result<Outcome, Failure> 
     let second = recording(path).map_err(Failure::input)?;
     let names = (args.log.display().to_string(), path.display().to_string());
     let text = compare_html((&names.0, first), (&names.1, &second));
-    let files = [page(args, "compare.html", &text)?];
+    let mut files = vec![page(args, "compare.html", &text)?];
     write_text(&files[0], &text)?;
+    if let Some(picture) = &args.picture {
+        let [a, b] = titles([(&names.0, first), (&names.1, &second)]);
+        write_text(picture, &beside_svg([(&a, first), (&b, &second)]))?;
+        files.push(picture.clone());
+    }
     let differences = differences(first, &second);
     let printed = json!({ "differences": differences, "files": files });
     let missing = [(&names.0, first), (&names.1, &second)].map(|(name, log)| {
@@ -78,6 +87,16 @@ fn two(args: &Args, first: &Recording, path: &Path) -> Result<Outcome, Failure> 
         human(&differences) + &missing.concat() + &output::wrote(&files)
     })?;
     Ok(Outcome::of(is_complete))
+}
+
+/// Names of two runs: their strategies, or their logs where those are the same.
+fn titles(runs: [(&String, &Recording); 2]) -> [String; 2] {
+    let [a, b] = runs.map(|(_, run)| &run.summary.controller);
+    if a == b {
+        runs.map(|(name, _)| name.clone())
+    } else {
+        [a, b].map(|name| format!("{name} preload"))
+    }
 }
 
 fn human(differences: &[Difference]) -> String {

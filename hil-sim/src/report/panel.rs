@@ -74,7 +74,7 @@ pub(crate) enum Shape {
 
 /// Marks of a plot.
 pub(crate) struct Marks {
-    pub(crate) name: &'static str,
+    pub(crate) name: Cow<'static, str>,
     pub(crate) shape: Shape,
     pub(crate) colour: RGBColor,
     /// Shift to the right, drawing units, so that marks of one place are side by side.
@@ -180,7 +180,7 @@ impl Panel {
         let lines = lines.map(|line| (&*line.name, Sample::Line(line.look)));
         let levels = self.levels.iter().map(|&(name, look, _)| (name, Sample::Line(look)));
         let marks = self.marks.iter().filter(|marks| has_points(&marks.points));
-        let marks = marks.map(|marks| (marks.name, Sample::Mark(marks)));
+        let marks = marks.map(|marks| (&*marks.name, Sample::Mark(marks)));
         lines.chain(levels).chain(marks).collect()
     }
 

@@ -127,7 +127,13 @@ impl<'a> View<'a> {
     ) -> Marks {
         let crossings = &self.recording.summary.crossings;
         let at = |c: &CrossingLine| Some((self.across.at(self.rows, c.lift_s), of(c)?));
-        Marks { name, shape, colour, shift, points: crossings.iter().filter_map(at).collect() }
+        Marks {
+            name: name.into(),
+            shape,
+            colour,
+            shift,
+            points: crossings.iter().filter_map(at).collect(),
+        }
     }
 
     /// Every plot of the run, in the order of the page.

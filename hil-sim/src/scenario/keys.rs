@@ -24,6 +24,10 @@ pub struct KeyInfo {
     pub value: Value,
     /// What it takes.
     pub expected: String,
+    /// Least and largest value; none of words and lists.
+    pub range: Option<(f64, f64)>,
+    /// Whether it is a property of the rig, to be measured there, not a choice.
+    pub measure: bool,
     /// What it is.
     pub description: String,
 }
@@ -166,23 +170,52 @@ fn descriptions() -> Vec<(String, String)> {
     .concat()
 }
 
-/// The keys of the mismatch, each with its ranges.
+/// The keys of the mismatch, each with the range of its wide draw.
 fn mismatch() -> Vec<(String, String)> {
     let described = fields::<Mismatch>("mismatch").into_iter().zip(FIELDS);
     let with_range = |((key, text), field): ((String, String), &Field)| {
-        let ((low, high), (from, to)) = (field.range, field.wide);
-        (key, format!("{text} {low} to {high}, wide {from} to {to}."))
+        let (from, to) = field.wide;
+        (key, format!("{text} Wide {from} to {to}."))
     };
     described.map(with_range).collect()
 }
 
-/// Every key of the scenario in `table`, in the order of declaration.
-pub(super) fn list(table: &Table) -> Vec<KeyInfo> {
+/// Sections of properties of the rig, and what is a choice in them.
+const PROPERTIES: [&str; 6] = ["rig", "tread", "plant", "preload", "drive", "sense"];
+const CHOICES: [&str; 9] = [
+    "rig.step_tolerance_mm",
+    "preload.cruise_n",
+    "preload.limit_n",
+    "drive.cruise_speed_mm_s",
+    "drive.min_crossing_speed_mm_s",
+    "drive.acceleration_mm_s2",
+    "drive.jerk_mm_s3",
+    "drive.guard_band",
+    "sense.stale_after_s",
+];
+
+/// Whether a key is a property of the rig.
+fn is_measured(key: &str) -> bool {
+    PROPERTIES.contains(&split(key).0) && !CHOICES.contains(&key)
+}
+
+/// Every key of the scenario in `table`, in the order of declaration, with the ranges in
+/// `ranges`.
+pub(super) fn list(table: &Table, ranges: &[(String, (f64, f64))]) -> Vec<KeyInfo> {
     let values = leaves(table);
+    let range = |key: &str| ranges.iter().find(|(name, _)| name == key).map(|(_, range)| *range);
     let info = |(key, description): (String, String)| {
         let (_, value) = values.iter().find(|(name, _)| *name == key)?;
         let expected = Kind::of(&key, value).expected(&key);
-        Some(KeyInfo { unit: unit(&key), value: (*value).clone(), expected, description, key })
+        Some(KeyInfo {
+            unit: unit(&key),
+            value: (*value).clone(),
+            expected,
+            range: range(&key),
+            measure: is_measured(&key),
+            description,
+            key,
+        })
     };
     descriptions().into_iter().filter_map(info).collect()
 }
@@ -288,7 +321,7 @@ mod tests {
     #[test]
     fn every_key_has_a_description_and_every_description_a_key() {
         let table = Table::try_from(crate::scenario::Scenario::default()).expect("a table");
-        let listed = list(&table);
+        let listed = list(&table, &[]);
         assert_eq!(listed.len(), leaves(&table).len());
         assert_eq!(listed.len(), descriptions().len());
         assert!(listed.iter().all(|key| key.description.len() > 4));

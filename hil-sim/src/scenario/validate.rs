@@ -73,6 +73,15 @@ fn in_range(
     Err(ScenarioError::out_of_range(origin, key, value, (min, max)))
 }
 
+/// Every key that is a number with its least and largest value.
+pub(super) fn all_ranges(scenario: &Scenario) -> Vec<(String, (f64, f64))> {
+    let rig = scenario.rig.bounds().map(|(key, _, min, max)| (key.to_owned(), (min, max)));
+    let plant = ranges(scenario).map(|(key, _, max)| (key.to_owned(), (0.0, max)));
+    let mismatch = scenario.mismatch.values();
+    let mismatch = mismatch.map(|(field, _)| (format!("mismatch.{}", field.name), field.range));
+    rig.into_iter().chain(plant).chain(mismatch).collect()
+}
+
 /// Keys with their value and largest value; the least is 0.
 fn ranges(scenario: &Scenario) -> [(&'static str, f64, f64); 29] {
     let (s, n) = (&scenario.spread, &scenario.noise);

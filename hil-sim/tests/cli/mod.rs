@@ -8,6 +8,7 @@ mod kept;
 mod logs;
 mod others;
 mod read_back;
+mod sweep;
 
 use std::path::Path;
 use std::process::{Command, Output};

@@ -22,6 +22,45 @@ fn keys_are_listed_with_unit_default_and_description() {
 }
 
 #[test]
+fn keys_are_found_by_a_pattern_with_range_and_mark() {
+    let found = good(&["keys", "--json", "FRICTION"]);
+    let keys = found["keys"].as_array().unwrap();
+    assert!(keys.len() > 2 && keys.len() < 20, "{}", keys.len());
+    let of = |name: &str| keys.iter().find(|key| key["key"] == name).unwrap();
+    // Its description has the word.
+    assert_eq!(
+        (&of("plant.mu")["range"][1], &of("plant.mu")["measure"]),
+        (&3.0.into(), &true.into())
+    );
+    assert_eq!(of("mismatch.friction")["measure"], false);
+    let text = stdout(&rig(&["keys", "limit_n"])).to_owned();
+    assert!(text.contains("5 to 180") && !text.contains("tread"), "{text}");
+    super::refused(&["keys", "sleeve colour"], &["sleeve colour", "`rig keys`"]);
+    let all = good(&["keys", "--json"]);
+    let without: Vec<&str> = all["keys"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|key| key["default"].is_number() && key["range"].is_null())
+        .map(|key| key["key"].as_str().unwrap())
+        .collect();
+    assert!(without.is_empty(), "numbers without a range: {without:?}");
+}
+
+#[test]
+fn a_shell_completes_verbs_and_options_and_help_takes_a_verb() {
+    for shell in ["bash", "zsh", "fish"] {
+        let output = rig(&["completions", shell]);
+        assert_eq!(code(&output), 0);
+        for word in ["montecarlo", "sweep", "seed"] {
+            assert!(stdout(&output).contains(word), "{shell} {word}");
+        }
+    }
+    let (help, option) = (rig(&["help", "sweep"]), rig(&["sweep", "--help"]));
+    assert_eq!((code(&help), stdout(&help)), (0, stdout(&option)));
+}
+
+#[test]
 fn help_lists_the_verbs_and_is_no_error() {
     let output = rig(&["--help"]);
     assert_eq!(code(&output), 0);
