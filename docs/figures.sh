@@ -12,9 +12,9 @@ write() {
     mv "$figures/$name.json.part" "$figures/$name.json"
 }
 wanted=$*
-write deploy deploy --no-files
-# The README's picture: a wall with a fourth less friction, which the constant preload does not
-# climb, so that its run ends with 1.
+write deploy deploy --out target/figures/deploy
+# The README's picture: less friction than nominal. The constant preload does not climb there, so
+# that its run ends with 1.
 case " $wanted " in *" picture "* | "  ")
     for controller in constant scheduled; do
         cargo rig deploy --set plant.mu=0.8 --controller $controller \
