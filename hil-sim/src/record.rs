@@ -3,6 +3,7 @@
 //! [`tick`] lists the columns. [`Decoder`] and [`Run`] read the controller's binary log;
 //! [`Writer`] and [`write_all`] write MCAP, CSV and JSON, [`recording`] reads them.
 
+mod columns;
 mod csv_file;
 mod decoder;
 mod drawn;

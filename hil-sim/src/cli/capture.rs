@@ -70,7 +70,12 @@ pub fn write(
     let stopped = Arc::new(AtomicBool::new(false));
     let stop = Arc::clone(&stopped);
     // Without it Ctrl-C ends the program at once, and the files say that they were cut off.
-    let _ = ctrlc::set_handler(move || stop.store(true, Ordering::Relaxed));
+    // The second one does so where the source gives nothing.
+    let _ = ctrlc::set_handler(move || {
+        if stop.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    });
     let mut described =
         Described { csv: files.get(1).cloned(), parameters: parameters.clone(), known: None };
     let mut writer =
