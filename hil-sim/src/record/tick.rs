@@ -5,9 +5,7 @@
 //! value in `unknown`, `of` and `telemetry`; one of the plant a field of `TrueState`.
 
 use interstage::log::{Flags, Record, codes};
-use interstage::sense::raw::{
-    AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
-};
+use interstage::sense::raw::{AdcCode, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame};
 use interstage::supervise::Mode;
 use interstage::tick::Telemetry;
 use interstage::units::{Duty, Q16};

@@ -15,13 +15,13 @@ fn ends_with(expected: i32, at: &Path, arguments: &[&str]) -> std::process::Outp
     output
 }
 
-/// The parameters that `rig identify` finds in a log: name, value, interval.
-fn identified(at: &Path, log: &str) -> Vec<(String, Option<f64>, Option<f64>, Option<f64>)> {
+/// The parameters that `rig identify` finds in a log: name; value, low and high end.
+fn identified(at: &Path, log: &str) -> Vec<(String, [Option<f64>; 3])> {
     let found = object(&ends_with(0, at, &["identify", log, "--json"]));
     let all = found["parameters"].as_array().expect("a list").clone();
-    let of = |p: &Value, key: &str| p[key].as_f64();
+    let of = |p: &Value| ["value", "low", "high"].map(|key| p[key].as_f64());
     let name = |p: &Value| p["name"].as_str().expect("a name").to_owned();
-    all.iter().map(|p| (name(p), of(p, "value"), of(p, "low"), of(p, "high"))).collect()
+    all.iter().map(|p| (name(p), of(p))).collect()
 }
 
 #[test]
