@@ -33,8 +33,8 @@ fn keys_are_found_by_a_pattern_with_range_and_mark() {
         (&3.0.into(), &true.into())
     );
     assert_eq!(of("mismatch.friction")["measure"], false);
-    let text = stdout(&rig(&["keys", "limit_n"])).to_owned();
-    assert!(text.contains("5 to 180") && !text.contains("tread"), "{text}");
+    let text = stdout(&rig(&["keys", "Preload.limit"])).to_owned();
+    assert!(text.contains("5 to 180") && !text.contains("drive."), "{text}");
     super::refused(&["keys", "sleeve colour"], &["sleeve colour", "`rig keys`"]);
     let all = good(&["keys", "--json"]);
     let without: Vec<&str> = all["keys"]
