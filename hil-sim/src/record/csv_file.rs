@@ -118,7 +118,7 @@ mod tests {
             for (cell, column) in row.iter().zip(&columns) {
                 let fits = match column["datatype"].as_str() {
                     Some("integer") => cell.is_empty() || cell.parse::<u64>().is_ok(),
-                    Some(_) => cell.parse::<f64>().is_ok(),
+                    Some(_) => cell.is_empty() || cell.parse::<f64>().is_ok(),
                     None => column["datatype"]["format"].as_str().unwrap().contains(cell),
                 };
                 assert!(fits, "{cell} in {column}");

@@ -164,8 +164,8 @@ pub struct Controller {
     pub slip_margin: f64,
     /// Amplitude of the arm's mode, mm.
     pub vibration_mm: f64,
-    /// Distance to the next face, mm; `NaN` when none is left.
-    pub distance_mm: f64,
+    /// Distance to the next face, mm; none when no face is left.
+    pub distance_mm: Option<f64>,
     /// Duty of the drive, -1 to 1.
     pub drive_duty: f64,
     /// Duty of the pre-tightener, -1 to 1.
@@ -210,7 +210,7 @@ impl Controller {
             gap_predicted_mm: unknown,
             slip_margin: unknown,
             vibration_mm: unknown,
-            distance_mm: unknown,
+            distance_mm: None,
             drive_duty: unknown,
             pretightener_duty: unknown,
             ..nothing
@@ -255,7 +255,7 @@ impl Controller {
             gap_predicted_mm: seen.gap_predicted.to_num(),
             slip_margin: seen.slip_margin.to_num(),
             vibration_mm: seen.vibration.to_num(),
-            distance_mm: if seen.distance == NO_FACE { f64::NAN } else { seen.distance.to_num() },
+            distance_mm: (seen.distance != NO_FACE).then(|| seen.distance.to_num()),
             drive_duty: f64::from(seen.drive.to_bits()) / DUTY,
             pretightener_duty: f64::from(seen.pretightener.to_bits()) / DUTY,
             drive_on: flags.has(Flags::DRIVE),
@@ -331,7 +331,7 @@ impl Controller {
             gap_predicted: q(self.gap_predicted_mm)?,
             slip_margin: q(self.slip_margin)?,
             vibration: q(self.vibration_mm)?,
-            distance: q(self.distance_mm).unwrap_or(NO_FACE),
+            distance: self.distance_mm.map_or(NO_FACE, Q16::from_num),
             drive: duty(self.drive_duty),
             pretightener: duty(self.pretightener_duty),
         })
@@ -440,7 +440,7 @@ mod tests {
         let telemetry = Telemetry { distance: Q16::MAX, ..Telemetry::default() };
         let record = Record { telemetry, ..Record::default() };
         let tick = Controller::of(&record, &SensorFrame::default());
-        assert!(tick.distance_mm.is_nan());
+        assert_eq!(tick.distance_mm, None);
         assert_eq!(tick.telemetry(), Some(telemetry));
     }
 

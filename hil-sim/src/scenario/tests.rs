@@ -245,7 +245,7 @@ fn faults_are_read_and_written_back() {
 #[test]
 fn every_mistake_of_a_fault_is_named() {
     for (target, kind, rest, message) in [
-        ("angel", "off", "at_s = 1", "target = \"angel\": expected \"encoder\""),
+        ("angel", "off", "at_s = 1", "target = \"angel\": no such target, did you mean \"angle\"?"),
         ("model", "off", "at_s = 1", "kind = \"off\": expected \"hung\""),
         ("model", "hung", "", "at_s = nothing: expected one of at_s, at_mm and at_crossing"),
         ("model", "hung", "at_s = 1\nat_mm = 2", "at_s = at_s and at_mm: expected one of"),
