@@ -157,7 +157,7 @@ fn a_preload_limit_without_room_above_the_cruise_preload_is_refused() {
         ),
         ("cruise_n = 60", "preload.cruise_n = 60: expected at most 47.8, as preload.limit_n = 50"),
     ] {
-        refused_files(&[(&format!("[preload]\n{text}\n"), &message)]);
+        refused_files(&[(&format!("[preload]\n{text}\n"), message)]);
     }
 }
 
