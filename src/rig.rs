@@ -9,7 +9,7 @@ mod presets;
 mod validate;
 
 pub(crate) use validate::REGULATION_PART;
-pub use validate::RigError;
+pub use validate::{Bound, RigError};
 
 /// Most steps a step table may hold.
 pub const MAX_STEPS: usize = 8;

@@ -53,7 +53,7 @@ impl Recorded {
         for message in mcap::MessageStream::new(&bytes).expect(name) {
             let message = message.expect(name);
             if message.channel.topic == "/frames" {
-                let frame = Frame::open(&message.data).unwrap();
+                let frame = Frame::open(data(&message.data)).unwrap();
                 // Frames are counted from each start on.
                 if frame.head.sequence == 0 {
                     boots.push(Boot::default());
@@ -67,6 +67,13 @@ impl Recorded {
     fn ticks(&self) -> usize {
         self.0.iter().map(|boot| boot.ticks.len()).sum()
     }
+}
+
+/// The frame in a protobuf message with one field of bytes; a frame alone begins otherwise.
+fn data(message: &[u8]) -> &[u8] {
+    let [0x0A, rest @ ..] = message else { return message };
+    let length = rest.iter().position(|byte| byte & 0x80 == 0).map_or(0, |last| last + 1);
+    &rest[length..]
 }
 
 fn add(boot: &mut Boot, body: Body<'_>) {

@@ -7,6 +7,7 @@
 
 pub mod capture;
 mod compare;
+mod completions;
 mod crossing;
 pub mod deploy;
 mod envelope;
@@ -27,6 +28,7 @@ mod report;
 pub mod scenario;
 pub mod source;
 mod stress;
+mod sweep;
 mod test;
 
 use std::ffi::OsString;
@@ -40,7 +42,7 @@ use failure::{Failure, Outcome};
 /// Virtual rig for a rubber-wheeled drive that climbs the steps of a telescoping
 /// sleeve.
 #[derive(Debug, Parser)]
-#[command(name = "rig", bin_name = "cargo rig", version, disable_help_subcommand = true)]
+#[command(name = "rig", bin_name = "cargo rig", version)]
 struct Cli {
     #[command(subcommand)]
     verb: Verb,
@@ -50,6 +52,7 @@ struct Cli {
 enum Verb {
     Deploy(deploy::Args),
     Capture(capture::Args),
+    Completions(completions::Args),
     Live(live::Args),
     Replay(replay::Args),
     Report(report::Args),
@@ -63,6 +66,7 @@ enum Verb {
     Keys(keys::Args),
     Params(params::Args),
     Stress(stress::Args),
+    Sweep(sweep::Args),
     Test(test::Args),
     /// Natural frequencies of the drive arm by the wave-vector method.
     Modes(Passed),
@@ -86,6 +90,7 @@ impl Verb {
         match self {
             Self::Deploy(args) => deploy::run(args),
             Self::Capture(args) => capture::run(args),
+            Self::Completions(args) => completions::run(args),
             Self::Live(args) => live::run(args),
             Self::Replay(args) => replay::run(args),
             Self::Report(args) => report::run(args),
@@ -99,6 +104,7 @@ impl Verb {
             Self::Keys(args) => keys::run(args),
             Self::Params(args) => params::run(args),
             Self::Stress(args) => stress::run(args),
+            Self::Sweep(args) => sweep::run(args),
             Self::Test(args) => test::run(args),
             Self::Modes(_) | Self::Bench(_) | Self::Paper(_) => {
                 Ok(Outcome::Code(provision::go_on(Extra::Study)?))

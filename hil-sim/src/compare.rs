@@ -63,6 +63,7 @@ impl Entry {
             (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
         };
         let gaps = lines.iter().filter(|line| line.error.is_none()).map(|line| line.max_gap_mm);
+        let gaps = gaps.filter(|gap| gap.is_finite());
         let margins = lines.iter().filter_map(|line| line.least_slip_margin);
         Self {
             controller,

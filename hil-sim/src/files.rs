@@ -49,6 +49,28 @@ pub(crate) fn atomic_write(
     write().map_err(|source| FileError { path: path.to_owned(), what, source })
 }
 
+/// `path` if nothing is there or what is there is the same by `is_same`; else the first of
+/// `name-2`, `name-3` and so on of which this holds, so that nothing is replaced.
+pub(crate) fn vacant(path: &Path, is_same: impl Fn(&Path) -> bool) -> PathBuf {
+    let is_free = |path: &Path| !path.exists() || is_same(path);
+    if is_free(path) {
+        return path.to_owned();
+    }
+    // A folder's name may have dots.
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let (stem, ending) = match name.rsplit_once('.') {
+        Some((stem, ending)) if !path.is_dir() => (stem, format!(".{ending}")),
+        _ => (&*name, String::new()),
+    };
+    let numbered = |n: u32| path.with_file_name(format!("{stem}-{n}{ending}"));
+    (2..).map(numbered).find(|path| is_free(path)).unwrap_or_else(|| path.to_owned())
+}
+
+/// [`vacant`] for a file with this text.
+pub(crate) fn vacant_for(path: &Path, text: &str) -> PathBuf {
+    vacant(path, |path| fs::read(path).is_ok_and(|there| there == text.as_bytes()))
+}
+
 /// Writes `text` to `path`; if that fails, the file stays as it was.
 ///
 /// # Errors
@@ -73,6 +95,21 @@ pub fn make_directory(directory: &Path) -> Result<(), FileError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_there_keeps_its_name_unless_it_is_the_same() {
+        let directory = tempfile::tempdir().unwrap();
+        let at = |name: &str| directory.path().join(name);
+        assert_eq!(vacant_for(&at("a.b.html"), "one"), at("a.b.html"));
+        write_text(&at("a.b.html"), "one").unwrap();
+        assert_eq!(vacant_for(&at("a.b.html"), "one"), at("a.b.html"));
+        assert_eq!(vacant_for(&at("a.b.html"), "two"), at("a.b-2.html"));
+        write_text(&at("a.b-2.html"), "two").unwrap();
+        assert_eq!(vacant_for(&at("a.b.html"), "two"), at("a.b-2.html"));
+        assert_eq!(vacant_for(&at("a.b.html"), "three"), at("a.b-3.html"));
+        make_directory(&at("run-tau=0.2")).unwrap();
+        assert_eq!(vacant(&at("run-tau=0.2"), |_| false), at("run-tau=0.2-2"));
+    }
 
     #[test]
     fn a_file_that_fails_half_way_leaves_the_old_one() {

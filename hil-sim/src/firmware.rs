@@ -1,11 +1,13 @@
 //! Builds the firmware image and measures its flash and RAM.
 
+mod building;
+
 use std::env;
 use std::ffi::OsString;
 use std::io;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitStatus, Output, Stdio};
+use std::process::{Command, ExitStatus, Output};
 
 use object::read::elf::ElfFile32;
 use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, elf};
@@ -133,7 +135,7 @@ pub fn ensure_target() -> Result<(), FirmwareError> {
 }
 
 /// Builds the image, adding the target first if it is missing, and returns its path.
-/// cargo's progress and messages go to standard error.
+/// Progress and cargo's messages go to standard error.
 ///
 /// # Errors
 /// [`FirmwareError`] if the target is not available or the build fails.
@@ -163,20 +165,25 @@ pub fn build_binary(
     // Flags from the environment would displace the linker arguments of
     // `.cargo/config.toml`.
     cargo.env_remove("RUSTFLAGS").env_remove("CARGO_ENCODED_RUSTFLAGS");
-    executable(&mut cargo, binary)
+    executable(&mut cargo, "the firmware", binary)
 }
 
 /// `cargo build` of this in the workspace, for [`executable`].
 pub(crate) fn build_command(arguments: &[&str]) -> Command {
     let mut cargo = Command::new(tool("CARGO", "cargo"));
     cargo.current_dir(workspace()).arg("build").args(arguments);
-    cargo.args(["--message-format", "json-render-diagnostics"]).stderr(Stdio::inherit());
+    cargo.args(["--message-format", "json-render-diagnostics"]);
     cargo
 }
 
-/// Runs a [`build_command`] and returns the path of the binary, as cargo names it.
-pub(crate) fn executable(cargo: &mut Command, binary: &str) -> Result<PathBuf, FirmwareError> {
-    let built = output(cargo)?;
+/// Runs a [`build_command`] of `what`, with progress if there is something to build, and returns
+/// the path of the binary, as cargo names it.
+pub(crate) fn executable(
+    cargo: &mut Command,
+    what: &str,
+    binary: &str,
+) -> Result<PathBuf, FirmwareError> {
+    let built = building::run(cargo, what).map_err(|source| could_not_start(cargo, source))?;
     if !built.status.success() {
         return Err(FirmwareError::Build(binary.to_owned(), built.status));
     }

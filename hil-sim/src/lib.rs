@@ -25,5 +25,6 @@ pub mod report;
 pub mod scenario;
 pub mod session;
 pub mod stress;
+pub mod sweep;
 pub mod table;
 pub mod testing;

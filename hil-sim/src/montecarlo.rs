@@ -88,8 +88,8 @@ impl RunLine {
             duration_s: summary.duration_s,
             moving_s: summary.moving_s,
             max_gap_mm: summary.max_gap_mm,
-            gap_over_ref: (summary.gap_ref_mm > 0.0)
-                .then(|| summary.max_gap_mm / summary.gap_ref_mm),
+            gap_over_ref: (referred && summary.max_gap_mm.is_finite())
+                .then(|| over_ref(summary.max_gap_mm)),
             slip_events: slip_events(&summary),
             least_lead_s: least(&mut crossings.iter().filter_map(|c| c.lead_time_s)),
             least_slip_margin: least(&mut crossings.iter().map(|c| mu - c.peak_utilisation)),

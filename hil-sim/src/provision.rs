@@ -55,18 +55,18 @@ pub enum ProvisionError {
 }
 
 /// Builds this part of `rig` with the tools it needs and returns the binary. A second call
-/// builds nothing. cargo's messages go to standard error.
+/// builds nothing and says nothing. Progress and cargo's messages go to standard error.
 ///
 /// # Errors
 /// [`ProvisionError`] if tools are not available or the build fails.
 pub fn featured(extra: Extra) -> Result<PathBuf, ProvisionError> {
-    let (_, binary, arguments) = extra.build();
+    let (what, binary, arguments) = extra.build();
     let mut cargo = firmware::build_command(arguments);
     cargo.args(["--bin", binary]);
     if extra == Extra::Board {
         Tools::ready()?.apply(&mut cargo);
     }
-    Ok(firmware::executable(&mut cargo, binary)?)
+    Ok(firmware::executable(&mut cargo, what, binary)?)
 }
 
 /// Runs that part of `rig`, built first if need be, with the arguments of this process, and
@@ -75,7 +75,6 @@ pub fn featured(extra: Extra) -> Result<PathBuf, ProvisionError> {
 /// # Errors
 /// As [`featured`].
 pub fn go_on(extra: Extra) -> Result<u8, ProvisionError> {
-    eprintln!("this needs {}; the first time it takes some minutes to build", extra.build().0);
     let mut command = Command::new(featured(extra)?);
     command.args(env::args_os().skip(1));
     let status = command.status().map_err(|e| firmware::could_not_start(&command, e))?;

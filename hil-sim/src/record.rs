@@ -3,7 +3,10 @@
 //! [`tick`] lists the columns. [`Decoder`] and [`Run`] read the controller's binary log;
 //! [`Writer`] and [`write_all`] write MCAP, CSV and JSON, [`recording`] reads them.
 
+mod columns;
+mod csv_file;
 mod decoder;
+mod drawn;
 pub(crate) mod json;
 mod ledger;
 mod mcap_file;
@@ -19,15 +22,16 @@ pub mod tick;
 mod view;
 mod write;
 
+pub use csv_file::{Metadata, write_metadata};
 pub use decoder::{Counts, Decoder, Item, Mark};
 pub use ledger::LedgerLine;
-pub use mcap_file::{FRAMES, Topic, messages, write_mcap};
+pub use mcap_file::{FRAMES, Topic, messages, unwrapped, write_mcap};
 pub use probed::Probed;
 pub use read::{ReadError, pieces};
 pub(crate) use recorder::RunRecorder;
 pub use recorder::text;
 pub use recording::{complete, recording};
-pub use run::{Boot, Header, Run, Since};
+pub use run::{Boot, Cut, Header, Run, Since, Unknown};
 pub use source::{Bytes, Source, SourceError, Virtual, letter, starter};
 pub use summary::{CrossingLine, LogLine, Recording, Report, Summary};
 pub use tally::{Ended, Tally, true_line};

@@ -363,7 +363,7 @@ mod tests {
         assert!(staged.iter().all(|name| row.contains_key(*name)));
         let given = |name: &str| {
             ["tick", "t_s", "command", "flags"].contains(&name)
-                || ["_code", "_at", "_on"].iter().any(|end| name.ends_with(end))
+                || ["_code", "_at", "_on", "_error"].iter().any(|end| name.ends_with(end))
         };
         let missing: Vec<_> =
             row.keys().filter(|n| !given(n) && !staged.contains(&&n[..])).collect();

@@ -3,6 +3,7 @@
 
 pub mod axis;
 mod band;
+mod beside;
 mod compare;
 mod crossings;
 mod decimate;
@@ -10,12 +11,13 @@ pub(crate) mod ledger;
 pub mod mesh;
 mod page;
 pub mod palette;
-mod panel;
+pub(crate) mod panel;
 mod panels;
 pub mod svg;
 mod tables;
 pub(crate) mod verdict;
 
+pub use beside::beside_svg;
 pub use compare::{Difference, compare_html, differences};
 pub use page::{Section, html};
 pub use panels::overview_svg;

@@ -22,6 +22,7 @@ use crate::plant::spread::{Noise, Spread};
 
 pub use error::ScenarioError;
 use keys::Kind;
+pub(crate) use keys::nearest_word;
 pub use keys::{KeyInfo, PRESETS};
 use merge::{COMMAND_LINE, Merged, Provenance};
 pub use run::{ControllerKind, Direction, MismatchDraw, RunOptions, StepAnomaly};
@@ -108,7 +109,21 @@ impl Scenario {
     /// Every key with its unit, value, what it takes, and its description.
     #[must_use]
     pub fn keys(&self) -> Vec<KeyInfo> {
-        keys::list(&self.table())
+        keys::list(&self.table(), &validate::all_ranges(self))
+    }
+
+    /// The keys whose value is not the preset's, in the order of their sections, without those of
+    /// a run's own: direction, controller and seed.
+    #[must_use]
+    pub fn overrides(&self) -> serde_json::Map<String, serde_json::Value> {
+        const OWN: [&str; 4] = ["preset", "run.direction", "run.controller", "run.seed"];
+        let (ours, preset) = (self.table(), Self::named(&self.preset).unwrap_or_default().table());
+        let preset = keys::leaves(&preset);
+        let differs = |(key, value): &(String, &Value)| {
+            !OWN.contains(&&**key) && !preset.contains(&(key.clone(), *value))
+        };
+        let changed = keys::leaves(&ours).into_iter().filter(differs);
+        changed.map(|(key, value)| (key, serde_json::json!(value))).collect()
     }
 
     /// The complete scenario as TOML; reading it back gives the same scenario.
@@ -197,6 +212,19 @@ impl Scenario {
 
     fn table(&self) -> Table {
         Table::try_from(self).expect("numbers, words and lists are always TOML")
+    }
+}
+
+/// A value as short as it can be written: no decimals without need, no blanks, no quotes.
+#[must_use]
+pub fn brief(value: &serde_json::Value) -> String {
+    match value {
+        serde_json::Value::Number(number) => {
+            number.as_f64().map_or_else(|| number.to_string(), |number| number.to_string())
+        }
+        serde_json::Value::String(text) => text.clone(),
+        serde_json::Value::Array(list) => list.iter().map(brief).collect::<Vec<_>>().join(","),
+        other => other.to_string(),
     }
 }
 

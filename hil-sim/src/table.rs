@@ -1,6 +1,7 @@
 //! A run on the terminal: verdict, ledger, faults, limits and the paths of its files. At most
 //! [`WIDTH`] columns wide.
 
+use std::io::IsTerminal;
 use std::path::PathBuf;
 
 use comfy_table::presets::UTF8_HORIZONTAL_ONLY;
@@ -9,7 +10,7 @@ use comfy_table::{Cell, CellAlignment, ContentArrangement, Table, TableComponent
 use crate::cli::output::wrote;
 use crate::record::{CrossingLine, Report, Summary};
 use crate::report::ledger::COLUMNS;
-use crate::report::verdict::{gap_sentence, headline};
+use crate::report::verdict::{Grade, gap_sentence, headline, origin, reservations, slip_sentence};
 
 /// Most columns that the output takes.
 pub const WIDTH: u16 = 100;
@@ -18,7 +19,10 @@ pub const WIDTH: u16 = 100;
 /// line feed.
 #[must_use]
 pub fn run(summary: &Summary, files: &[PathBuf]) -> String {
-    let mut text = wrapped(&headline(summary), "");
+    let mut text = painted(&wrapped(&headline(summary), ""), Grade::of(summary), is_coloured());
+    for missing in &summary.missing {
+        text += &wrapped(&format!("incomplete log: {missing}"), "  ");
+    }
     text += &wrapped(&details(summary), "  ");
     if !summary.crossings.is_empty() {
         text += &format!("{}\n", ledger(&summary.crossings));
@@ -59,17 +63,26 @@ fn cell(column: usize, text: String) -> Cell {
     Cell::new(text).set_alignment(side)
 }
 
+/// Whether standard output shows colours: a terminal, unless `NO_COLOR` is set.
+fn is_coloured() -> bool {
+    std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|no| no.is_empty())
+}
+
+/// The lines of `text` in the colour of the grade.
+fn painted(text: &str, grade: Grade, is_coloured: bool) -> String {
+    if !is_coloured {
+        return text.to_owned();
+    }
+    text.lines().map(|line| format!("\u{1b}[{}m{line}\u{1b}[0m\n", grade.ansi())).collect()
+}
+
 fn details(s: &Summary) -> String {
-    format!(
-        "{}; gross slip {} mm; {} controller on {}, rig {}, seed {}; {:.0} times real time",
-        gap_sentence(s),
-        number(s.slip_mm, 3),
-        s.controller,
-        s.target,
-        s.rig,
-        s.seed,
-        s.real_time_factor
-    )
+    let mut parts: Vec<String> = reservations(s).into_iter().map(str::to_owned).collect();
+    parts.extend([gap_sentence(s), slip_sentence(s), origin(s)]);
+    if !s.measured {
+        parts.push(format!("{:.0} times real time", s.real_time_factor));
+    }
+    parts.join("; ")
 }
 
 fn ledger(crossings: &[CrossingLine]) -> Table {
@@ -142,6 +155,14 @@ mod tests {
         assert!(line.contains(" - "), "the missing measurement is shown: {line}");
         assert!(text.contains(" predicted "), "no heading is broken: {text}");
         assert!(text.ends_with("  wrote out/run/report.html\n"));
+    }
+
+    #[test]
+    fn the_headline_has_the_colour_of_its_grade_on_a_terminal() {
+        for (grade, colour) in [(Grade::Good, 32), (Grade::Fair, 33), (Grade::Bad, 31)] {
+            assert_eq!(painted("a\n", grade, false), "a\n");
+            assert_eq!(painted("a\n", grade, true), format!("\u{1b}[{colour}ma\u{1b}[0m\n"));
+        }
     }
 
     #[test]

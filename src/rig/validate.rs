@@ -33,14 +33,24 @@ pub enum RigError {
         /// Least position allowed there, mm.
         least_mm: f64,
     },
-    /// The preload limit does not lie above the cruise preload by what regulation needs.
-    LimitBelowCruise {
-        /// The limit, N.
-        limit_n: f64,
-        /// The cruise preload, N.
-        cruise_n: f64,
-        /// Least limit for it, N.
-        least_n: f64,
+    /// A step lies beyond the travel.
+    StepBeyondTravel {
+        /// Position of the offending step in the table, from 1.
+        step: usize,
+        /// Its position, mm.
+        position_mm: f64,
+        /// The travel, mm.
+        travel_mm: f64,
+    },
+    /// Two values that do not go together: the upper one has to be at least `ratio` times the
+    /// lower one.
+    Pair {
+        /// Key and value of the upper one.
+        upper: (&'static str, f64),
+        /// Key and value of the lower one.
+        lower: (&'static str, f64),
+        /// Least upper value over the lower one.
+        ratio: f64,
     },
     /// The arm cannot reach a wall at this radius.
     OutOfReach {
@@ -61,11 +71,16 @@ impl core::fmt::Display for RigError {
             }
             Self::StepOrder { step, position_mm, least_mm } => write!(
                 f,
-                "rig.step_positions_mm: step {step} stands at {position_mm} mm, expected at least {least_mm} mm (ascending, inside the travel, with room for the wheel)"
+                "rig.step_positions_mm: step {step} is at {position_mm} mm, expected at least {least_mm:.1} mm: the wheel has to finish one step before it touches the next"
             ),
-            Self::LimitBelowCruise { limit_n, cruise_n, least_n } => write!(
+            Self::StepBeyondTravel { step, position_mm, travel_mm } => write!(
                 f,
-                "preload.limit_n = {limit_n}: expected at least {least_n:.1}, that is preload.cruise_n = {cruise_n} and room to regulate"
+                "rig.step_positions_mm: step {step} is at {position_mm} mm, expected at most {travel_mm} mm, which is rig.travel_mm"
+            ),
+            Self::Pair { upper: (upper, value), lower: (lower, other), ratio } => write!(
+                f,
+                "{upper} = {value}: expected at least {:.1}, as {lower} = {other}",
+                other * ratio
             ),
             Self::OutOfReach { radius_mm, min_mm, max_mm } => write!(
                 f,
@@ -77,26 +92,82 @@ impl core::fmt::Display for RigError {
 
 impl core::error::Error for RigError {}
 
+impl RigError {
+    /// The keys that take part, the one that its text begins with first.
+    pub const fn keys(&self) -> &[&'static str] {
+        match self {
+            Self::OutOfRange { key, .. } => core::slice::from_ref(key),
+            Self::StepOrder { .. } => &[
+                "rig.step_positions_mm",
+                "rig.wheel_radius_mm",
+                "rig.step_height_mm",
+                "rig.step_tolerance_mm",
+            ],
+            Self::StepBeyondTravel { .. } => &["rig.step_positions_mm", "rig.travel_mm"],
+            Self::Pair { upper, .. } => core::slice::from_ref(&upper.0),
+            Self::OutOfReach { .. } => &[
+                "rig.arm_length_mm",
+                "rig.arm_pivot_radius_mm",
+                "rig.wall_radius_mm",
+                "rig.wheel_radius_mm",
+                "rig.step_height_mm",
+                "rig.step_positions_mm",
+            ],
+        }
+    }
+
+    /// The same from the side of the other value, where there are two: its key, its value, and
+    /// the bound of it that is broken: at least, or else at most.
+    pub fn other_side(&self) -> Option<(&'static str, f64, Bound)> {
+        match *self {
+            Self::StepBeyondTravel { position_mm, travel_mm, .. } => {
+                Some(("rig.travel_mm", travel_mm, Bound::AtLeast(position_mm)))
+            }
+            Self::Pair { upper: (_, value), lower: (key, lower), ratio } => {
+                Some((key, lower, Bound::AtMost(value / ratio)))
+            }
+            _ => None,
+        }
+    }
+}
+
+/// The bound of a value that another one sets.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Bound {
+    /// The least value.
+    AtLeast(f64),
+    /// The largest value.
+    AtMost(f64),
+}
+
 impl Rig {
     /// Checks every value against its range and the values against one another.
     pub fn validate(&self) -> Result<(), RigError> {
         self.ranges()?;
         self.step_table()?;
-        let (limit_n, cruise_n) = (self.preload.limit_n, self.preload.cruise_n);
-        let least_n = cruise_n / (1.0 - REGULATION_PART);
-        if limit_n < least_n {
-            return Err(RigError::LimitBelowCruise { limit_n, cruise_n, least_n });
-        }
-        let (top, cruise) = (self.drive.no_load_speed_mm_s, self.drive.cruise_speed_mm_s);
-        if top < TOP_SPEED_RESERVE * cruise {
-            return Err(RigError::OutOfRange {
-                key: "drive.no_load_speed_mm_s",
-                value: top,
-                min: TOP_SPEED_RESERVE * cruise,
-                max: 300.0,
-            });
-        }
+        self.pairs()?;
         self.reach()
+    }
+
+    /// Values that bound one another.
+    fn pairs(&self) -> Result<(), RigError> {
+        let cruise = ("drive.cruise_speed_mm_s", self.drive.cruise_speed_mm_s);
+        let safe = ("control.safe_speed_mm_s", self.control.safe_speed_mm_s);
+        let least = ("drive.min_crossing_speed_mm_s", self.drive.min_crossing_speed_mm_s);
+        let top = ("drive.no_load_speed_mm_s", self.drive.no_load_speed_mm_s);
+        let limit = ("preload.limit_n", self.preload.limit_n);
+        let pressed = ("preload.cruise_n", self.preload.cruise_n);
+        for (upper, lower, ratio) in [
+            (safe, least, 1.0),
+            (cruise, safe, 1.0),
+            (top, cruise, TOP_SPEED_RESERVE),
+            (limit, pressed, 1.0 / (1.0 - REGULATION_PART)),
+        ] {
+            if upper.1 < lower.1 * ratio {
+                return Err(RigError::Pair { upper, lower, ratio });
+            }
+        }
+        Ok(())
     }
 
     /// Wheel-centre radius with an undeformed wheel on the wall of `level`, mm.
@@ -104,8 +175,9 @@ impl Rig {
         self.rig.wall_radius_mm - self.rig.step_height_mm * level as f64 - self.rig.wheel_radius_mm
     }
 
-    fn ranges(&self) -> Result<(), RigError> {
-        let table: [(&'static str, f64, f64, f64); 45] = [
+    /// Keys with their value and its least and largest value.
+    pub const fn bounds(&self) -> [(&'static str, f64, f64, f64); 44] {
+        [
             ("rig.wheel_radius_mm", self.rig.wheel_radius_mm, 10.0, 150.0),
             ("rig.wheel_width_mm", self.rig.wheel_width_mm, 1.0, 200.0),
             ("rig.step_height_mm", self.rig.step_height_mm, 1.5, 8.0),
@@ -150,14 +222,11 @@ impl Rig {
             ("control.slip_margin", self.control.slip_margin, 0.0, 1.0),
             ("control.adaptation_range", self.control.adaptation_range, 0.0, 0.9),
             ("control.adaptation_gain", self.control.adaptation_gain, 0.0, 1.0),
-            (
-                "control.safe_speed_mm_s",
-                self.control.safe_speed_mm_s,
-                self.drive.min_crossing_speed_mm_s,
-                self.drive.cruise_speed_mm_s,
-            ),
-        ];
-        for (key, value, min, max) in table {
+        ]
+    }
+
+    fn ranges(&self) -> Result<(), RigError> {
+        for (key, value, min, max) in self.bounds() {
             // Written so that a NaN fails.
             if !(value >= min && value <= max) {
                 return Err(RigError::OutOfRange { key, value, min, max });
@@ -192,12 +261,14 @@ impl Rig {
         let run = libm::sqrt(radius * radius - below * below);
         let mut least = run + 2.0 * self.rig.step_tolerance_mm;
         for (index, &position) in self.rig.step_positions_mm.iter().enumerate() {
-            if !(position >= least && position <= self.rig.travel_mm) {
-                return Err(RigError::StepOrder {
-                    step: index + 1,
-                    position_mm: position,
-                    least_mm: least,
-                });
+            let (step, position_mm) = (index + 1, position);
+            let travel_mm = self.rig.travel_mm;
+            if position > travel_mm {
+                return Err(RigError::StepBeyondTravel { step, position_mm, travel_mm });
+            }
+            // A NaN fails.
+            if position < least || position.is_nan() {
+                return Err(RigError::StepOrder { step, position_mm, least_mm: least });
             }
             least = position + run + 2.0 * self.rig.step_tolerance_mm;
         }

@@ -18,6 +18,7 @@ use crate::plant::crossing::{CrossingCase, cross};
 use crate::plant::mismatch::Mismatch;
 use crate::plant::ring::RingParameters;
 use crate::progress;
+use crate::scenario::Scenario;
 use crate::table::{number, plain};
 
 /// Fastest crossing, mm/s.
@@ -80,7 +81,7 @@ pub(super) struct Args {
 /// What computes a crossing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
-enum Method {
+pub(super) enum Method {
     /// Ring of tread elements with memory, f64: the converged physics.
     Ring,
     /// Reduced model, f64: closed forms in the gap.
@@ -91,25 +92,58 @@ enum Method {
 
 /// A crossing to compute.
 #[derive(Clone, Copy, Debug, Serialize)]
-struct CrossingSetup {
-    speed_mm_s: f64,
-    preload_n: f64,
+pub(super) struct CrossingSetup {
+    pub(super) speed_mm_s: f64,
+    pub(super) preload_n: f64,
     #[serde(skip)]
-    direction: Direction,
+    pub(super) direction: Direction,
     /// Axial load lifted by friction, N; none pushes a frictionless wheel.
     #[serde(skip_serializing_if = "Option::is_none")]
-    load_n: Option<f64>,
+    pub(super) load_n: Option<f64>,
+}
+
+impl CrossingSetup {
+    /// Refuses a speed or preload out of range, by the names that they were given with.
+    pub(super) fn check(&self, [speed, preload]: [&str; 2]) -> Result<(), Failure> {
+        for (option, value, max, unit) in [
+            (speed, self.speed_mm_s, MAX_SPEED_MM_S, "mm/s"),
+            (preload, self.preload_n, MAX_PRELOAD_N, "N"),
+        ] {
+            // A NaN fails too.
+            if !(value > 0.0 && value <= max) {
+                return Err(Failure::input(format!(
+                    "{option} {value}: expected a value above 0, at most {max} {unit}"
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    /// The figures by this method, and what of them is out of its range.
+    pub(super) fn compute(
+        &self,
+        method: Method,
+        scenario: &Scenario,
+    ) -> Result<(Figures, Vec<String>), Failure> {
+        let rig = &scenario.rig;
+        let figures = match method {
+            Method::Ring => return Ok((ring(rig, &scenario.mismatch, self)?, Vec::new())),
+            Method::Reduced => reduced(rig, self),
+            Method::Fixed => fixed(rig, self)?,
+        };
+        Ok((figures, outside(rig, self, &figures)))
+    }
 }
 
 /// What a method gives.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
-struct Figures {
-    gap_mm: f64,
-    corner_force_n: f64,
-    climb_work_mj: f64,
-    embedding_mm: f64,
+pub(super) struct Figures {
+    pub(super) gap_mm: f64,
+    pub(super) corner_force_n: f64,
+    pub(super) climb_work_mj: f64,
+    pub(super) embedding_mm: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
-    mu_needed: Option<f64>,
+    pub(super) mu_needed: Option<f64>,
     /// Stress increment of the first touch; the quasi-static ring has none.
     #[serde(skip_serializing_if = "Option::is_none")]
     impact_stress_pa: Option<f64>,
@@ -140,36 +174,19 @@ struct Printed<'a> {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
-    for (option, value, max, unit) in [
-        ("--speed-mm-s", args.speed_mm_s, MAX_SPEED_MM_S, "mm/s"),
-        ("--preload-n", args.preload_n, MAX_PRELOAD_N, "N"),
-    ] {
-        // A NaN fails too.
-        if !(value > 0.0 && value <= max) {
-            return Err(Failure::input(format!(
-                "{option} {value}: expected a value above 0, at most {max} {unit}"
-            )));
-        }
-    }
-    let scenario = args.scenario.resolve()?;
-    let loads = &scenario.rig.plant;
-    let case = CrossingSetup {
+    let mut case = CrossingSetup {
         speed_mm_s: args.speed_mm_s,
         preload_n: args.preload_n,
         direction: if args.retract { Direction::Retract } else { Direction::Deploy },
-        load_n: args.driven.then_some(loads.top_load_n * loads.top_load_share),
+        load_n: None,
     };
-    let figures = {
+    case.check(["--speed-mm-s", "--preload-n"])?;
+    let scenario = args.scenario.resolve()?;
+    let loads = &scenario.rig.plant;
+    case.load_n = args.driven.then_some(loads.top_load_n * loads.top_load_share);
+    let (figures, outside) = {
         let _progress = progress::spinner("crossing");
-        match args.method {
-            Method::Ring => ring(&scenario.rig, &scenario.mismatch, &case)?,
-            Method::Reduced => reduced(&scenario.rig, &case),
-            Method::Fixed => fixed(&scenario.rig, &case)?,
-        }
-    };
-    let outside = match args.method {
-        Method::Ring => Vec::new(),
-        Method::Reduced | Method::Fixed => outside(&scenario.rig, &case, &figures),
+        case.compute(args.method, &scenario)?
     };
     let printed = Printed {
         in_range: outside.is_empty(),

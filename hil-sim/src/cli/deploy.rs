@@ -4,15 +4,18 @@ pub mod looped;
 
 use std::path::{Path, PathBuf};
 
+use serde_json::Value;
+use sha2::{Digest, Sha256};
+
 use super::failure::{Failure, Outcome};
 use super::output::{self, WithFiles};
 use super::scenario::RunArgs;
 use super::source::TARGETS;
-use crate::files::write_text;
+use crate::files::{vacant, write_text};
 use crate::firmware::FirmwareError;
 use crate::provision::{self, Extra};
-use crate::record::Recording;
-use crate::scenario::Scenario;
+use crate::record::{Recording, Summary};
+use crate::scenario::{Scenario, brief};
 use crate::{progress, record, report, session, table};
 
 /// A deployment in closed loop, or the retraction.
@@ -104,13 +107,43 @@ pub fn conclude(
         }
     }
     let files = match directory {
-        Some(directory) => write(recording, &[], directory)?,
+        Some(directory) => write(recording, &[], &place(args, &recording.summary, directory))?,
         None => Vec::new(),
     };
     let summary = &recording.summary;
     let printed = WithFiles { result: summary, files: &files };
     output::result(args.json, &printed, || table::run(summary, &files))?;
     Ok(Outcome::of(summary.completed && summary.faults.is_empty()))
+}
+
+/// The folder of this run: `directory`, unless it holds another run. A folder that was asked for
+/// is taken even then, and standard error says so; else the run gets a number behind its name.
+#[must_use]
+pub fn place(args: &Args, summary: &Summary, directory: &Path) -> PathBuf {
+    let ours = identity(serde_json::to_value(summary).ok());
+    let there = |folder: &Path| {
+        let text = std::fs::read(folder.join("summary.json")).ok()?;
+        identity(serde_json::from_slice(&text).ok())
+    };
+    let folder = if args.out.is_some() {
+        directory.to_owned()
+    } else {
+        vacant(directory, |folder| there(folder).is_none() || there(folder) == ours)
+    };
+    let shown = directory.display();
+    if folder != directory {
+        eprintln!("{shown} holds another run; this one goes to {}", folder.display());
+    } else if there(&folder).is_some_and(|there| Some(there) != ours) {
+        eprintln!("{shown}: replaces another run");
+    }
+    folder
+}
+
+/// What makes a run the one that it is: its summary without how long it took to compute.
+fn identity(summary: Option<Value>) -> Option<Value> {
+    let mut summary = summary?;
+    summary.as_object_mut()?.remove("real_time_factor");
+    Some(summary)
 }
 
 /// An image that has been built.
@@ -142,8 +175,8 @@ fn directory(args: &Args, scenario: &Scenario) -> Result<PathBuf, Failure> {
             "board" if args.hil => "-board-hil".to_owned(),
             other => format!("-{other}"),
         };
-        Path::new("out")
-            .join(format!("{direction}-{rig}-{controller}-{}{board}", scenario.run.seed))
+        let (seed, tag) = (scenario.run.seed, tag(args, scenario));
+        Path::new("out").join(format!("{direction}-{rig}-{controller}-{seed}{board}{tag}"))
     });
     // Reported before the run, not after it.
     if directory.exists() && !directory.is_dir() {
@@ -151,6 +184,29 @@ fn directory(args: &Args, scenario: &Scenario) -> Result<PathBuf, Failure> {
         return Err(Failure::input(format!("--out {path}: exists and is not a directory")));
     }
     Ok(directory)
+}
+
+/// Longest list of overrides in the name of a folder, letters.
+const LONGEST_TAG: usize = 60;
+
+/// The overrides as part of a name: those that a scenario file, which names the run itself, does
+/// not have; too long a list by its hash.
+fn tag(args: &Args, scenario: &Scenario) -> String {
+    let mut overrides = scenario.overrides();
+    if let Some(file) = args.run.scenario.file()
+        && let Ok(of_file) = Scenario::resolve(Some(&scenario.preset), Some(file), &[])
+    {
+        let of_file = of_file.overrides();
+        overrides.retain(|key, value| of_file.get(key) != Some(value));
+    }
+    let list: String =
+        overrides.iter().map(|(key, value)| format!("-{key}={}", brief(value))).collect();
+    let is_plain = |letter: char| letter.is_ascii_alphanumeric() || "-._=,+".contains(letter);
+    if list.len() <= LONGEST_TAG && list.chars().all(is_plain) {
+        return list;
+    }
+    let hash: String = Sha256::digest(&list).iter().take(4).map(|b| format!("{b:02x}")).collect();
+    format!("-set-{hash}")
 }
 
 /// Writes logs, summary, the page with `more` sections, and the overview picture.
@@ -193,12 +249,31 @@ mod tests {
             ("--retract --rig fe --controller limit --seed 7", "out/retract-fe-limit-7"),
             ("--target board", "out/deploy-prototype-scheduled-0-board"),
             ("--target board --hil", "out/deploy-prototype-scheduled-0-board-hil"),
+            ("--set tread.tau_s=0.20", "out/deploy-prototype-scheduled-0-tread.tau_s=0.2"),
+            ("--set tread.tau_s=0.1059 --set run.seed=4", "out/deploy-prototype-scheduled-4"),
+            (
+                "--wide --set rig.step_positions_mm=18,40.5",
+                "out/deploy-prototype-scheduled-0-rig.step_positions_mm=18,40.5-run.mismatch=wide",
+            ),
             ("--out here", "here"),
         ] {
             let args = parsed(arguments);
             let directory = directory(&args, &args.run.resolve().unwrap()).unwrap();
             assert_eq!(directory, Path::new(expected), "{arguments}");
         }
+    }
+
+    #[test]
+    fn many_overrides_become_a_name_of_bounded_length() {
+        let name = |more: &str| {
+            let faults = "run.faults=[{target=\"tread\",kind=\"torn\",at_s=2.0}]";
+            let args = parsed(&format!("--set {faults} --set preload.limit_n=52 {more}"));
+            directory(&args, &args.run.resolve().unwrap()).unwrap()
+        };
+        let (one, other) = (name("--set plant.mu=0.9"), name("--set plant.mu=0.8"));
+        assert_ne!(one, other);
+        let text = one.file_name().unwrap().to_str().unwrap();
+        assert!(text.len() < 120 && !text.contains(['/', '"', ' ', '{']), "{text}");
     }
 
     #[test]

@@ -139,7 +139,7 @@ mod tests {
 
     #[test]
     fn a_rig_that_cannot_be_built_is_bad_input_and_a_plant_that_fails_is_not() {
-        let rig = RigError::LimitBelowCruise { limit_n: 1.0, cruise_n: 2.0, least_n: 2.1 };
+        let rig = RigError::OutOfReach { radius_mm: 1.0, min_mm: 2.0, max_mm: 2.1 };
         assert!(matches!(Failure::from(RunError::Rig(rig)), Failure::Input(_)));
         let balance = BalanceError { preload_n: 1.0, residual_n: 1.0, height_mm: 1.0 };
         assert!(matches!(Failure::from(balance), Failure::Run(_)));

@@ -6,6 +6,7 @@ use super::{montecarlo, output};
 use crate::faults::campaign::{Campaign, Case, MatrixRow, Outcome as Matrix};
 use crate::montecarlo::Shard;
 use crate::progress;
+use crate::scenario::nearest_word;
 use crate::table::{number, plain};
 
 /// Breaks everything that can break, each fault at random instants of random rigs, out and
@@ -56,6 +57,13 @@ impl Args {
         let wanted: Vec<Case> = all.iter().filter(|c| c.is_one_of(&self.only)).copied().collect();
         if wanted.is_empty() {
             let names: Vec<String> = all.iter().map(Case::name).collect();
+            let first = |name: &String| name.split(' ').next().unwrap_or_default().to_owned();
+            let words: Vec<String> = names.iter().map(first).chain(names.clone()).collect();
+            let near = self.only.iter().find_map(|text| Some((text, nearest_word(text, &words)?)));
+            if let Some((text, near)) = near {
+                let what = format!("--only {text}: no such fault, did you mean \"{near}\"?");
+                return Err(Failure::input(what));
+            }
             let (text, names) = (self.only.join(", "), names.join(", "));
             return Err(Failure::input(format!("--only {text}: no such fault; faults: {names}")));
         }

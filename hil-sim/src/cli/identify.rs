@@ -22,7 +22,7 @@ use crate::{files, progress};
 /// picture of the residuals of each log.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// Logs of deployments: log.mcap or log.csv.
+    /// Logs of deployments: log.mcap, or log.csv with its metadata beside it.
     #[arg(value_name = "LOG", required_unless_present = "published", conflicts_with = "published")]
     logs: Vec<PathBuf>,
 
@@ -42,9 +42,10 @@ pub(super) struct Args {
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
 
-    /// Directory of the parameter file and the pictures.
-    #[arg(long, value_name = "DIR", default_value = "out/identify")]
-    out: PathBuf,
+    /// Directory of the parameter file and the pictures; by default out/identify, with a number
+    /// if that has another result.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
 
     /// Prints the result as one JSON object.
     #[arg(long)]
@@ -65,9 +66,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     if args.published {
         return by_published(args, &given);
     }
-    let records: Vec<Record> =
-        args.logs.iter().map(|path| Record::read(path, &given)).collect::<Result<_, _>>()?;
     let unnamed = args.rig.is_none() && args.scenario.is_none() && args.set.is_empty();
+    let named = (!unnamed).then_some(&given);
+    let records: Vec<Record> =
+        args.logs.iter().map(|path| Record::read(path, named)).collect::<Result<_, _>>()?;
     let scenario = match records.first() {
         Some(record) if unnamed => record.scenario.clone(),
         _ => given,
@@ -76,7 +78,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         let _progress = progress::spinner("identify");
         identify(&records, &scenario)?
     };
-    let files = write(&found, &records, &args.out)?;
+    let files = write(&found, &records, args.out.as_deref())?;
     print(args, &found, &files)
 }
 
@@ -86,14 +88,26 @@ fn print(args: &Args, found: &Identification, files: &[PathBuf]) -> Result<Outco
     Ok(Outcome::Good)
 }
 
+/// The parameter file, and the directory where none is asked for.
+const FILE: &str = "identified.toml";
+const USUAL: &str = "out/identify";
+
 fn write(
     found: &Identification,
     records: &[Record],
-    directory: &Path,
+    asked: Option<&Path>,
 ) -> Result<Vec<PathBuf>, Failure> {
-    files::make_directory(directory)?;
-    let mut files = vec![directory.join("identified.toml")];
-    files::write_text(&files[0], &found.to_toml())?;
+    let text = found.to_toml();
+    let is_same = |folder: &Path| {
+        std::fs::read(folder.join(FILE)).is_ok_and(|there| there == text.as_bytes())
+    };
+    let directory = asked.map_or_else(|| files::vacant(Path::new(USUAL), is_same), Path::to_owned);
+    if directory.join(FILE).exists() && !is_same(&directory) {
+        eprintln!("{}: replaces another result", directory.join(FILE).display());
+    }
+    files::make_directory(&directory)?;
+    let mut files = vec![directory.join(FILE)];
+    files::write_text(&files[0], &text)?;
     for (index, record) in records.iter().enumerate() {
         let rows: Vec<&Residuals> =
             found.residuals.iter().filter(|of| of.log == record.name).collect();

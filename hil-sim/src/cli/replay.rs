@@ -2,21 +2,18 @@
 
 use std::path::{Path, PathBuf};
 
-use interstage::log::identity::fingerprint;
-use interstage::rig::Rig;
 use serde::Serialize;
 
 use super::failure::{Failure, Outcome};
 use super::output;
-use crate::record::{Mark, Run};
+use crate::record::{Cut, Mark, Run, Unknown};
 use crate::replay::{Replayed, replay};
-use crate::scenario::Scenario;
 
 /// Runs recorded logs through the controller again; it must give the same bits.
 ///
 /// The parameters are those in the log, or the preset that it names. The exit code is 1 at
-/// the first difference, which is shown, or if a part of a log cannot be run again because
-/// something before it is missing.
+/// the first difference, which is shown, if a part of a log cannot be run again because
+/// something before it is missing, or if the file is cut off.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Logs: MCAP, CSV of rows, or bytes of the channel.
@@ -43,6 +40,7 @@ struct Printed {
 struct Log {
     file: PathBuf,
     equal: bool,
+    cut: Option<Cut>,
     #[serde(flatten)]
     result: Replayed,
 }
@@ -52,31 +50,24 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let mut logs = Vec::new();
     for file in &args.logs {
         let run = Run::read(file).map_err(Failure::input)?;
-        let rig = parameters(file, &run, &args.set)?;
-        let result = replay(&run, &rig)?;
-        logs.push(Log { file: file.clone(), equal: result.is_equal(), result });
+        let scenario = run.scenario(&args.set).map_err(|error| unknown(file, &error))?;
+        let result = replay(&run, &scenario.rig)?;
+        let (equal, cut) = (result.is_equal() && run.cut.is_none(), run.cut);
+        logs.push(Log { file: file.clone(), equal, cut, result });
     }
     let printed = Printed { equal: logs.iter().all(|log| log.equal), logs };
     output::result(args.json, &printed, || printed.logs.iter().map(human).collect())?;
     Ok(Outcome::of(printed.equal))
 }
 
-/// The parameters of the controller that made a log.
-fn parameters(file: &Path, run: &Run, sets: &[String]) -> Result<Rig, Failure> {
-    let header = run.header.as_ref();
-    let name = header.map_or("prototype", |header| header.rig.as_str());
-    let rig = match &run.parameters {
-        Some(toml) => Scenario::parse("parameters of the log", toml, sets)?.rig,
-        None => Scenario::resolve(Some(name), None, sets)?.rig,
+/// The parameters of the controller that made a log are not known.
+fn unknown(file: &Path, error: &Unknown) -> Failure {
+    let advice = match error {
+        Unknown::Unnamed => ": give it with --set preset=NAME and what differs from it",
+        Unknown::Other(..) => ": give the others with --set",
+        Unknown::Wrong(_) => "",
     };
-    let here = format!("{:08x}", fingerprint(&rig));
-    match header.map(|header| &header.parameters) {
-        Some(made) if *made != here => Err(Failure::input(format!(
-            "{}: made with parameters {made}, these are {here}: give the others with --set",
-            file.display()
-        ))),
-        _ => Ok(rig),
-    }
+    Failure::input(format!("{}: {error}{advice}", file.display()))
 }
 
 fn human(log: &Log) -> String {
@@ -88,6 +79,7 @@ fn human(log: &Log) -> String {
         }
         None => format!("{file}: {} ticks equal\n", result.ticks),
     };
+    text += &log.cut.map_or_else(String::new, |cut| format!("  incomplete log: {cut}\n"));
     if let Some((tick, mark)) = result.missing {
         let why = match mark {
             Mark::Joined { .. } => "it does not begin with the target's start",

@@ -6,18 +6,18 @@ use serde_json::json;
 
 use super::failure::{Failure, Outcome};
 use super::output::{self, WithFiles};
-use crate::files::{make_directory, write_text};
+use crate::files::{make_directory, vacant_for, write_text};
 use crate::record::{Recording, recording};
-use crate::report::{Difference, compare_html, differences, html};
+use crate::report::{Difference, beside_svg, compare_html, differences, html};
 use crate::table;
 
 /// The page of a log as `deploy` writes it, or of two logs crossing by crossing.
 ///
-/// A log of the virtual rig contains the truth; a captured one shows the controller's
-/// estimates.
+/// A log of the virtual rig contains the truth; a captured one shows what the controller
+/// measured. The exit code is 1 if a part of a log is missing.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
-    /// The log: MCAP, CSV of rows, or bytes of the binary channel.
+    /// The log: MCAP, or bytes of the binary channel.
     #[arg(value_name = "LOG")]
     log: PathBuf,
 
@@ -28,6 +28,10 @@ pub(super) struct Args {
     /// Where the page goes; by default beside the first log.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+
+    /// With two logs: writes both in the same plots over time into this file, SVG.
+    #[arg(long, value_name = "FILE", requires = "other")]
+    picture: Option<PathBuf>,
 
     /// Prints the ledger or the differences as one JSON object.
     #[arg(long)]
@@ -42,9 +46,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     }
 }
 
-/// Where the page goes.
-fn page(args: &Args, ending: &str) -> Result<PathBuf, Failure> {
-    let page = args.out.clone().unwrap_or_else(|| args.log.with_extension(ending));
+/// Where a page with this text goes: beside the first log a page of another content is kept.
+fn page(args: &Args, ending: &str, text: &str) -> Result<PathBuf, Failure> {
+    let beside = || vacant_for(&args.log.with_extension(ending), text);
+    let page = args.out.clone().unwrap_or_else(beside);
     if let Some(directory) = page.parent().filter(|directory| !directory.as_os_str().is_empty()) {
         make_directory(directory)?;
     }
@@ -52,22 +57,46 @@ fn page(args: &Args, ending: &str) -> Result<PathBuf, Failure> {
 }
 
 fn one(args: &Args, recording: &Recording) -> Result<Outcome, Failure> {
-    let files = [page(args, "html")?];
-    write_text(&files[0], &html(recording, &[]))?;
+    let text = html(recording, &[]);
+    let files = [page(args, "html", &text)?];
+    write_text(&files[0], &text)?;
     let printed = WithFiles { result: &recording.summary, files: &files };
     output::result(args.json, &printed, || table::run(&recording.summary, &files))?;
-    Ok(Outcome::Good)
+    Ok(Outcome::of(recording.summary.missing.is_empty()))
 }
 
 fn two(args: &Args, first: &Recording, path: &Path) -> Result<Outcome, Failure> {
     let second = recording(path).map_err(Failure::input)?;
-    let files = [page(args, "compare.html")?];
     let names = (args.log.display().to_string(), path.display().to_string());
-    write_text(&files[0], &compare_html((&names.0, first), (&names.1, &second)))?;
+    let text = compare_html((&names.0, first), (&names.1, &second));
+    let mut files = vec![page(args, "compare.html", &text)?];
+    write_text(&files[0], &text)?;
+    if let Some(picture) = &args.picture {
+        let [a, b] = titles([(&names.0, first), (&names.1, &second)]);
+        write_text(picture, &beside_svg([(&a, first), (&b, &second)]))?;
+        files.push(picture.clone());
+    }
     let differences = differences(first, &second);
     let printed = json!({ "differences": differences, "files": files });
-    output::result(args.json, &printed, || human(&differences) + &output::wrote(&files))?;
-    Ok(Outcome::Good)
+    let missing = [(&names.0, first), (&names.1, &second)].map(|(name, log)| {
+        let lines = log.summary.missing.iter();
+        lines.map(|what| format!("  {name}: incomplete log: {what}\n")).collect::<String>()
+    });
+    let is_complete = missing.concat().is_empty();
+    output::result(args.json, &printed, || {
+        human(&differences) + &missing.concat() + &output::wrote(&files)
+    })?;
+    Ok(Outcome::of(is_complete))
+}
+
+/// Names of two runs: their strategies, or their logs where those are the same.
+fn titles(runs: [(&String, &Recording); 2]) -> [String; 2] {
+    let [a, b] = runs.map(|(_, run)| &run.summary.controller);
+    if a == b {
+        runs.map(|(name, _)| name.clone())
+    } else {
+        [a, b].map(|name| format!("{name} preload"))
+    }
 }
 
 fn human(differences: &[Difference]) -> String {

@@ -65,8 +65,13 @@ pub struct RunArgs {
     wide: bool,
 
     /// Seed of plant and noise; 0, the default, is the nominal plant.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     seed: Option<u64>,
+}
+
+/// Reads a seed.
+fn seed(text: &str) -> Result<u64, &'static str> {
+    text.parse().map_err(|_| "expected a whole number, 0 or more")
 }
 
 impl RunArgs {

@@ -86,7 +86,14 @@ pub fn minimise<M: Model>(model: &M, start: &[f64]) -> Result<Fitted<M::At>, Ide
     let settled = report.termination.was_successful()
         || matches!(report.termination, TerminationReason::NoImprovementPossible(_));
     if !settled {
-        return Err(IdentifyError::NoFit(format!("{:?}", report.termination)));
+        let why = match report.termination {
+            TerminationReason::User(_) => {
+                "the model cannot follow these logs; is their rig another one?".to_owned()
+            }
+            TerminationReason::LostPatience => "too many steps".to_owned(),
+            other => format!("{other:?}"),
+        };
+        return Err(IdentifyError::NoFit(why));
     }
     match (problem.jacobian(), problem.residuals(), problem.at) {
         (Some(jacobian), Some(residuals), Some(at)) => {

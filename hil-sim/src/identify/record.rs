@@ -8,6 +8,7 @@ use std::path::Path;
 
 use interstage::sense::angle;
 use interstage::sense::raw::{EncoderCount, SensorFrame};
+use interstage::supervise::Mode;
 
 use super::IdentifyError;
 use crate::plant::rig::Drives;
@@ -57,18 +58,24 @@ pub struct Record {
 }
 
 impl Record {
-    /// Reads a log; `scenario` is the rig's where the log does not say.
+    /// Reads a log; `given` is the rig of a log without parameters.
     ///
     /// # Errors
-    /// [`IdentifyError::Log`] if it cannot be read or is no log of a run.
-    pub fn read(path: &Path, scenario: &Scenario) -> Result<Self, IdentifyError> {
+    /// [`IdentifyError::Log`] if it cannot be read, is no log of a run, or its rig is not known.
+    pub fn read(path: &Path, given: Option<&Scenario>) -> Result<Self, IdentifyError> {
         let name = path.display().to_string();
         let bad = |why| IdentifyError::Log(name.clone(), why);
         let run = Run::read(path).map_err(|error| bad(error.reason()))?;
-        let scenario = match &run.parameters {
-            Some(text) => Scenario::parse(&name, text, &[]).map_err(|e| bad(e.to_string()))?,
-            None => scenario.clone(),
+        let mut scenario = match (&run.parameters, given) {
+            (None, Some(given)) => given.clone(),
+            _ => run.scenario(&[]).map_err(|error| {
+                bad(format!("{error}: give the rig with --rig, --scenario or --set"))
+            })?,
         };
+        if let Some(row) = run.rows.iter().find(|row| row.mode().is_some_and(Mode::moves)) {
+            scenario.run.direction =
+                if row.retracts { Direction::Retract } else { Direction::Deploy };
+        }
         let mut reader = Reader::new(&scenario);
         let sample = |row: &Controller| {
             let driven = Drives {
@@ -256,7 +263,7 @@ mod tests {
         let (csv, mcap) = (directory.path().join("log.csv"), directory.path().join("log.mcap"));
         write_csv(&recording, &csv).unwrap();
         write_mcap(&recording, &mcap).unwrap();
-        let [csv, mcap] = [csv, mcap].map(|path| Record::read(&path, &scenario).unwrap());
+        let [csv, mcap] = [csv, mcap].map(|path| Record::read(&path, Some(&scenario)).unwrap());
         assert_eq!(csv.samples.len(), mcap.samples.len());
         assert_eq!(mcap.scenario, scenario);
         assert_eq!(csv.samples, mcap.samples);
@@ -278,7 +285,7 @@ mod tests {
     fn what_is_no_log_is_refused_in_a_line_with_its_name() {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("notes.csv");
-        let refused = || Record::read(&path, &Scenario::default()).unwrap_err().to_string();
+        let refused = || Record::read(&path, None).unwrap_err().to_string();
         assert!(refused().contains("notes.csv: No such file"), "{}", refused());
         std::fs::write(&path, "a,b\n1,2\n").unwrap();
         assert!(refused().contains("notes.csv: it holds no tick"), "{}", refused());

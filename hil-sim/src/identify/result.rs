@@ -347,7 +347,11 @@ impl Identification {
     /// The scenario file: the identified values, with their intervals in a comment above.
     #[must_use]
     pub fn to_toml(&self) -> String {
-        let mut text = String::from("# Identified from logs; 95 % intervals:\n");
+        let mut logs: Vec<&str> = self.residuals.iter().map(|left| &*left.log).collect();
+        logs.dedup();
+        let logs = logs.join(", ");
+        let logs = if logs.is_empty() { "logs" } else { &*logs };
+        let mut text = format!("# Identified from {logs}; 95 % intervals:\n");
         for p in self.parameters.iter().filter(|p| p.identified) {
             if let (Some(low), Some(high)) = (p.low, p.high) {
                 text += &format!("#   {} = {} ({low} to {high}) {}\n", p.name, p.value, p.unit);

@@ -113,8 +113,10 @@ impl Outcome {
         let figure = |pick: &dyn Fn(&RunLine) -> Option<f64>| -> Vec<(f64, u64)> {
             lines.iter().filter_map(|line| Some((pick(line)?, line.seed))).collect()
         };
-        // A plant that failed has no gap.
-        let gaps = quantiles(figure(&|line| line.error.is_none().then_some(line.max_gap_mm)));
+        // A plant that failed has no gap, nor has a run without a crossing.
+        let gaps = quantiles(figure(&|line| {
+            line.error.is_none().then_some(line.max_gap_mm).filter(|gap| gap.is_finite())
+        }));
         Self {
             runs: lines.len(),
             completed: lines.iter().filter(|line| line.completed).count(),

@@ -69,7 +69,7 @@ pub enum Refusal {
     },
     /// Step and depth together.
     #[error(
-        "rig.step_height_mm = {step_mm:.1}, the corner {depth_mm:.1} mm deep in the tread, stands as high as the hub of a wheel of {radius_mm:.1} mm: at most {most_mm:.1} mm together"
+        "rig.step_height_mm = {step_mm:.1}, the corner {depth_mm:.1} mm deep in the tread, reaches as high as the hub of a wheel of {radius_mm:.1} mm: at most {most_mm:.1} mm together"
     )]
     Towers {
         /// Step, mm.

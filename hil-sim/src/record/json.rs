@@ -25,6 +25,11 @@ pub(crate) fn schema(title: &str, example: &impl Serialize, required: &[&str]) -
     json!({ "title": title, "type": "object", "properties": properties, "required": required })
 }
 
+/// States the texts that a property may have.
+pub(crate) fn enumerate(schema: &mut Value, property: &str, names: &[&str]) {
+    schema["properties"][property] = json!({ "type": "string", "enum": names });
+}
+
 /// The form of a log line that viewers show in their log panel.
 pub(crate) fn log_schema() -> Value {
     json!({

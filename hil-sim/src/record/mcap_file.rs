@@ -13,13 +13,56 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::{
-    Controller, CrossingLine, Decoder, Item, LedgerLine, Recording, Summary, Tick, TrueState, json,
-    pieces, text,
+    Controller, CrossingLine, Decoder, Item, LedgerLine, MODE_NAMES, Recording, STAGE_NAMES,
+    Summary, Tick, TrueState, json, pieces, text,
 };
 use crate::files::{Failure, FileError, atomic_write};
 
-/// Topic that carries the frames as they were on the channel.
+/// Topic that carries the frames as they were on the channel, each in a protobuf message, which
+/// viewers can open.
 pub const FRAMES: &str = "/frames";
+
+/// A field of a protobuf message: its number, wire type 2, length and bytes.
+fn field(number: u8, bytes: &[u8]) -> Vec<u8> {
+    let mut message = vec![number << 3 | 2];
+    let mut length = bytes.len();
+    while length > 0x7F {
+        message.push(length as u8 | 0x80);
+        length >>= 7;
+    }
+    message.push(length as u8);
+    message.extend(bytes);
+    message
+}
+
+/// A frame as message `interstage.Frame { bytes data = 1; }`.
+fn wrapped(frame: &[u8]) -> Vec<u8> {
+    field(1, frame)
+}
+
+/// The frame of a message; files of earlier versions have the frame alone.
+#[must_use]
+pub fn unwrapped(message: &[u8]) -> &[u8] {
+    let after = message.iter().skip(1).position(|byte| byte & 0x80 == 0).map_or(0, |at| at + 2);
+    let frame = message.get(after..).unwrap_or_default();
+    let head = message.len() - frame.len();
+    let is_wrapped = field(1, frame).get(..head) == message.get(..head);
+    if after > 0 && is_wrapped { frame } else { message }
+}
+
+/// The `FileDescriptorSet` of `interstage.Frame`, by the numbers of `descriptor.proto`.
+fn frame_schema() -> Vec<u8> {
+    // One field of type bytes (12), number 1, optional (1).
+    let data = [field(1, b"data"), vec![3 << 3, 1, 4 << 3, 1, 5 << 3, 12]].concat();
+    let message = [field(1, b"Frame"), field(2, &data)].concat();
+    let file = [
+        field(1, b"interstage/frame.proto"),
+        field(2, b"interstage"),
+        field(4, &message),
+        field(12, b"proto3"),
+    ];
+    field(1, &file.concat())
+}
 
 /// Levels of a log line, as viewers know them.
 const INFO: u8 = 2;
@@ -63,7 +106,7 @@ impl Topic {
         }
     }
 
-    /// Schema of its messages; null for frames.
+    /// JSON schema of its messages; null for frames, which are protobuf.
     pub(crate) fn schema(self) -> Value {
         match self {
             Self::Tick => {
@@ -72,7 +115,10 @@ impl Topic {
                     &interstage::sense::raw::SensorFrame::default(),
                 );
                 let tick = Tick { controller, truth: Some(TrueState::default()) };
-                json::schema("interstage.Tick", &tick, &["tick", "t_s", "mode"])
+                let mut schema = json::schema("interstage.Tick", &tick, &["tick", "t_s", "mode"]);
+                json::enumerate(&mut schema, "mode", &MODE_NAMES);
+                json::enumerate(&mut schema, "stage", &STAGE_NAMES);
+                schema
             }
             Self::Log => json::log_schema(),
             Self::Ledger => {
@@ -166,7 +212,10 @@ impl<W: Write + Seek> McapFile<W> {
 
     fn channel(&mut self, topic: Topic) -> Result<u16, Failure> {
         let (schema, encoding) = match topic.schema() {
-            Value::Null => (0, "interstage-frames"),
+            Value::Null => {
+                let bytes = frame_schema();
+                (self.out.add_schema("interstage.Frame", "protobuf", &bytes)?, "protobuf")
+            }
             schema => {
                 let name = schema["title"].as_str().unwrap_or(topic.name());
                 let bytes = serde_json::to_vec(&schema)?;
@@ -174,6 +223,11 @@ impl<W: Write + Seek> McapFile<W> {
             }
         };
         Ok(self.out.add_channel(schema, topic.name(), encoding, &BTreeMap::new())?)
+    }
+
+    /// Adds a frame.
+    pub(super) fn frame(&mut self, ns: u64, frame: &[u8]) -> Result<(), Failure> {
+        self.message(ns, Topic::Frames, &wrapped(frame))
     }
 
     /// Passes everything to the system as complete chunks.
@@ -197,7 +251,8 @@ impl<W: Write + Seek> McapFile<W> {
 pub fn write_mcap(recording: &Recording, path: &Path) -> Result<(), FileError> {
     atomic_write(path, |out| {
         let mut file = McapFile::new(out)?;
-        file.metadata("run", about(&recording.summary))?;
+        let ticks = ("ticks".to_owned(), recording.rows.len().to_string());
+        file.metadata("run", about(&recording.summary).into_iter().chain([ticks]))?;
         file.parameters(&recording.parameters)?;
         let mut all = Vec::new();
         for tick in &recording.rows {
@@ -218,7 +273,7 @@ pub fn write_mcap(recording: &Recording, path: &Path) -> Result<(), FileError> {
                     t_s = f64::from(record.at()) * 1e-3;
                 }
             });
-            all.push((t_s, Topic::Frames, frame.to_vec()));
+            all.push((t_s, Topic::Frames, wrapped(frame)));
         }
         // A stable sort: messages of one time keep their order.
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -292,6 +347,18 @@ mod tests {
         assert_eq!(read("parameters")["toml"], recording.parameters);
         assert_eq!(read("run")["version"], env!("CARGO_PKG_VERSION"));
         assert_eq!(read("run")["seed"], recording.summary.seed.to_string());
+    }
+
+    #[test]
+    fn a_frame_comes_back_from_its_message_and_a_bare_one_stays() {
+        for length in [0, 1, 9, 127, 128, 300, 20_000] {
+            let frame: Vec<u8> = (0..length).map(|i| (i * 7 % 251) as u8).collect();
+            assert_eq!(unwrapped(&wrapped(&frame)), frame, "{length}");
+        }
+        let (options, rows) = (crate::session::Options::default(), true);
+        let options = crate::session::Options { rows, ..options };
+        let stream = crate::session::run(&crate::scenario::Scenario::default(), options).unwrap();
+        assert!(pieces(&stream.stream).all(|frame| unwrapped(frame) == frame));
     }
 
     #[test]

@@ -2,8 +2,10 @@
 
 use std::path::Path;
 
+use super::csv_file::{self, Metadata as TableMetadata};
+use super::mcap_file::unwrapped;
 use super::tick::OFF;
-use super::{Controller, Decoder, FRAMES, Run};
+use super::{Controller, Decoder, FRAMES, Mark, Run};
 use interstage::log::frame::{Found, find};
 use mcap::records::{Metadata, Record};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -19,6 +21,9 @@ pub enum ReadError {
     /// The file at this path cannot be read.
     #[error("{0}: {1}")]
     File(String, std::io::Error),
+    /// The table at this path has neither ledger nor events, which a report shows.
+    #[error("{0}: a table of ticks has no crossings and no events: give the log.mcap of the run")]
+    Table(String),
     /// The file at this path is no log, and why.
     #[error("{0}: no log of the controller: {1}")]
     Content(String, String),
@@ -30,6 +35,7 @@ impl ReadError {
     pub fn reason(&self) -> String {
         match self {
             Self::File(_, why) => why.to_string(),
+            Self::Table(_) => "a table of ticks".to_owned(),
             Self::Content(_, why) => why.clone(),
         }
     }
@@ -60,8 +66,8 @@ pub fn pieces(stream: &[u8]) -> impl Iterator<Item = &[u8]> {
 }
 
 impl Run {
-    /// Reads a log of any form: MCAP with the controller's frames, CSV of rows, or the
-    /// bytes of the channel. A file that was cut off is read up to there.
+    /// Reads a log of any form: MCAP with the controller's frames, CSV of rows with the metadata
+    /// beside it, or the bytes of the channel. A file that was cut off is read up to there.
     ///
     /// # Errors
     /// [`ReadError`] if the file cannot be read or holds no tick.
@@ -71,9 +77,15 @@ impl Run {
         let run = if bytes.starts_with(MCAP) {
             of_mcap(&bytes)
         } else if bytes.starts_with(CSV) {
-            of_csv(&bytes).map_err(no_log)?
+            of_csv(&bytes, csv_file::metadata_of(path).map_err(no_log)?).map_err(no_log)?
         } else {
-            Self::of_stream(&bytes)
+            let mut run = Self::of_stream(&bytes);
+            // The beginning of a frame at the end.
+            if matches!(run.marks.last(), Some((at, Mark::Garbage { .. })) if *at == run.rows.len())
+            {
+                run.cut_off(None, None);
+            }
+            run
         };
         if run.rows.is_empty() {
             return Err(no_log("it holds no tick".to_owned()));
@@ -88,9 +100,15 @@ const LONGEST_RECORD: usize = 1 << 26;
 /// Largest ratio of a chunk's content to its size in the file: the limit of LZ4.
 const EXPANSION: u64 = 256;
 
+/// Whether the first bytes are those of a table.
+pub(super) fn is_table(bytes: &[u8]) -> bool {
+    bytes.starts_with(CSV)
+}
+
 /// The file up to the first record whose length cannot be true: longer than the rest of the
-/// file, or a chunk larger than LZ4 can expand to. The reader would allocate that length.
-fn credible(bytes: &[u8]) -> &[u8] {
+/// file, or a chunk larger than LZ4 can expand to. The reader would allocate that length. And
+/// the bytes that this record lacks.
+fn credible(bytes: &[u8]) -> (&[u8], Option<u64>) {
     const CHUNK: u8 = 6;
     // An opcode and a length; in a chunk two times come before the length of its content.
     const HEAD: usize = 9;
@@ -100,17 +118,28 @@ fn credible(bytes: &[u8]) -> &[u8] {
         let rest = (bytes.len() - at - HEAD) as u64;
         let holds = if bytes[at] == CHUNK { number(at + HEAD + 16).unwrap_or(0) } else { 0 };
         if length > rest || holds > length.saturating_mul(EXPANSION) {
-            return &bytes[..at];
+            let lacks = length.saturating_sub(rest);
+            return (&bytes[..at], (1..=LONGEST_RECORD as u64).contains(&lacks).then_some(lacks));
         }
         at += HEAD + length as usize;
     }
-    bytes
+    (bytes, None)
+}
+
+/// The end of an MCAP file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct End {
+    /// The footer is there.
+    pub(super) is_complete: bool,
+    /// Bytes that the last record lacks, if it ends within one.
+    pub(super) lacks_bytes: Option<u64>,
 }
 
 /// Hands over the records of an MCAP file, those of its chunks one by one, up to the end or to
 /// where the file was cut off or damaged.
-pub(super) fn records(bytes: &[u8], mut take: impl FnMut(Record<'_>)) {
-    let mut rest = credible(bytes);
+pub(super) fn records(bytes: &[u8], mut take: impl FnMut(Record<'_>)) -> End {
+    let (mut rest, lacks_bytes) = credible(bytes);
+    let mut end = End { is_complete: false, lacks_bytes };
     let options = LinearReaderOptions::default()
         .with_skip_end_magic(true)
         .with_record_length_limit(LONGEST_RECORD);
@@ -124,11 +153,13 @@ pub(super) fn records(bytes: &[u8], mut take: impl FnMut(Record<'_>)) {
                 rest = later;
             }
             LinearReadEvent::Record { data, opcode } => match mcap::parse_record(opcode, data) {
+                Ok(Record::Footer(_)) => end.is_complete = true,
                 Ok(record) => take(record),
-                Err(_) => return,
+                Err(_) => return end,
             },
         }
     }
+    end
 }
 
 /// The rig's parameters, if this is where a file has them.
@@ -136,27 +167,42 @@ pub(super) fn parameters(metadata: &Metadata) -> Option<String> {
     metadata.metadata.get("toml").filter(|_| metadata.name == "parameters").cloned()
 }
 
+/// The number of ticks, if this is where a file has it.
+pub(super) fn stated_ticks(metadata: &Metadata) -> Option<u64> {
+    metadata.metadata.get("ticks").filter(|_| metadata.name == "run")?.parse().ok()
+}
+
 fn of_mcap(bytes: &[u8]) -> Run {
-    let (mut decoder, mut run, mut frames) = (Decoder::new(), Run::default(), None);
-    records(bytes, |record| match record {
+    let (mut decoder, mut run) = (Decoder::new(), Run::default());
+    let (mut frames, mut total) = (None, None);
+    let end = records(bytes, |record| match record {
         Record::Channel(channel) if channel.topic == FRAMES => frames = Some(channel.id),
         Record::Message { header, data } if Some(header.channel_id) == frames => {
-            decoder.read(&data, &mut |item| run.add(&item));
+            decoder.read(unwrapped(&data), &mut |item| run.add(&item));
         }
         Record::Metadata(metadata) => {
-            run.parameters = run.parameters.take().or(parameters(&metadata))
+            total = total.or(stated_ticks(&metadata));
+            run.parameters = run.parameters.take().or(parameters(&metadata));
         }
         _ => {}
     });
     decoder.finish(&mut |item| run.add(&item));
     run.counts = *decoder.counts();
+    if !end.is_complete {
+        run.cut_off(total, end.lacks_bytes);
+    }
     run
 }
 
 /// Reads the controller's columns. Ticks that did not run and an incomplete last row are left
 /// out.
-fn of_csv(bytes: &[u8]) -> Result<Run, String> {
-    let mut run = Run::default();
+fn of_csv(bytes: &[u8], metadata: TableMetadata) -> Result<Run, String> {
+    let TableMetadata { header, parameters, ticks: total } = metadata;
+    let mut run = Run { header, parameters, ..Run::default() };
+    // A last row without its line feed may lack digits.
+    let ends_within = bytes.last() != Some(&b'\n');
+    let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1);
+    let bytes = &bytes[..whole];
     let mut reader = csv::Reader::from_reader(bytes);
     let head = reader.headers().map_err(|error| error.to_string())?.clone();
     let columns = serde_json::to_value(Controller::default()).unwrap_or_default();
@@ -165,17 +211,19 @@ fn of_csv(bytes: &[u8]) -> Result<Run, String> {
     {
         return Err(format!("it lacks the column {name}"));
     }
-    let mut rows = reader.records().peekable();
-    while let Some(row) = rows.next() {
-        match row.and_then(|row| row.deserialize::<Controller>(Some(&head))) {
-            Ok(row) if row.mode == OFF => {}
-            Ok(row) => run.rows.push(row),
-            Err(_) if rows.peek().is_none() => break,
-            Err(error) => return Err(error.to_string()),
+    for row in reader.records() {
+        let row = row.and_then(|row| row.deserialize::<Controller>(Some(&head)));
+        let row = row.map_err(|error| error.to_string())?;
+        // A tick that did not run.
+        if row.mode != OFF {
+            run.rows.push(row);
         }
     }
     run.counts.bytes = bytes.len() as u64;
     run.counts.ticks = run.rows.len() as u64;
+    if ends_within || total.is_some_and(|total| total > run.counts.ticks) {
+        run.cut_off(total, None);
+    }
     Ok(run)
 }
 
@@ -200,16 +248,18 @@ mod tests {
         };
         let head = [MCAP, b"0\r\n"].concat();
         let good = [head, record(1, 3, b"abc"), record(6, 40, &[0; 40])].concat();
-        assert_eq!(credible(&good), good);
+        assert_eq!(credible(&good), (&good[..], None));
         let long = [good.clone(), record(5, 1 << 62, b"xyz")].concat();
-        assert_eq!(credible(&long), good);
+        assert_eq!(credible(&long), (&good[..], None));
+        let short = [good.clone(), record(5, 10, b"xyz")].concat();
+        assert_eq!(credible(&short), (&good[..], Some(7)));
         // A chunk of 24 bytes that claims to hold more than 6 KiB.
         let mut body = [0; 24];
         body[16..].copy_from_slice(&10_000_u64.to_le_bytes());
         let swollen = [good.clone(), record(6, 24, &body)].concat();
-        assert_eq!(credible(&swollen), good);
+        assert_eq!(credible(&swollen), (&good[..], None));
         for cut in 0..good.len() {
-            assert!(credible(&good[..cut]).len() <= cut);
+            assert!(credible(&good[..cut]).0.len() <= cut);
         }
     }
 
@@ -242,8 +292,14 @@ mod tests {
         let bytes = csv.into_inner().unwrap();
         let (_directory, path) = file(&bytes);
         assert_eq!(Run::read(&path).unwrap().rows, run.rows);
-        let (_directory, path) = file(&bytes[..bytes.len() - 40]);
-        assert_eq!(Run::read(&path).unwrap().rows, run.rows[..79]);
+        assert_eq!(Run::read(&path).unwrap().cut, None);
+        for lacks in [1, 40] {
+            let (_directory, path) = file(&bytes[..bytes.len() - lacks]);
+            let read = Run::read(&path).unwrap();
+            assert_eq!(read.rows, run.rows[..79], "without its last {lacks} bytes");
+            let cut = read.cut.expect("it is noticed");
+            assert_eq!((cut.at_s, cut.missing_ticks), (run.rows[78].t_s, None));
+        }
     }
 
     #[test]

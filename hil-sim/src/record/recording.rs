@@ -7,15 +7,18 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use interstage::log::ledger::Line;
+use interstage::model::Planner;
 use interstage::supervise::Mode;
 use interstage::tick::Event;
+use interstage::units;
 use mcap::records::Record;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use super::read::{MCAP, ReadError, content, parameters, records};
+use super::read::{MCAP, ReadError, content, is_table, parameters, records};
 use super::recorder::{reported, text};
 use super::{Controller, CrossingLine, LedgerLine, LogLine, Recording, Run, Summary, Tick};
+use crate::scenario::Scenario;
 
 /// Reads the recording of any log.
 ///
@@ -23,12 +26,15 @@ use super::{Controller, CrossingLine, LedgerLine, LogLine, Recording, Run, Summa
 /// [`ReadError`] if the file cannot be read or is no log.
 pub fn recording(path: &Path) -> Result<Recording, ReadError> {
     let bytes = content(path)?;
+    if is_table(&bytes) {
+        return Err(ReadError::Table(path.display().to_string()));
+    }
     if bytes.starts_with(MCAP)
         && let Some(recording) = with_truth(&bytes)
     {
         return Ok(recording);
     }
-    Ok(believed(&Run::read(path)?))
+    Ok(measured(&Run::read(path)?))
 }
 
 /// The recording in the log of a deployment; none if there is no summary in it.
@@ -37,7 +43,7 @@ fn with_truth(bytes: &[u8]) -> Option<Recording> {
         serde_json::from_slice(data).ok()
     }
     let (mut recording, mut summary, mut topics) = (Recording::default(), None, HashMap::new());
-    records(bytes, |record| match record {
+    let end = records(bytes, |record| match record {
         Record::Channel(channel) => drop(topics.insert(channel.id, channel.topic)),
         Record::Metadata(metadata) => recording.parameters.extend(parameters(&metadata)),
         Record::Message { header, data } => match topics.get(&header.channel_id).map(|t| &**t) {
@@ -52,13 +58,13 @@ fn with_truth(bytes: &[u8]) -> Option<Recording> {
         },
         _ => {}
     });
-    recording.summary = summary?;
+    recording.summary = summary.filter(|_| end.is_complete)?;
     Some(recording)
 }
 
-/// The recording of a log without truth.
+/// The recording of a log without truth: what the controller measured.
 #[must_use]
-pub(crate) fn believed(run: &Run) -> Recording {
+pub(crate) fn measured(run: &Run) -> Recording {
     let mut summary = summary(run);
     let mut log = Vec::new();
     for entry in &run.events {
@@ -72,8 +78,15 @@ pub(crate) fn believed(run: &Run) -> Recording {
     }
     summary.completed &= summary.faults.is_empty();
     summary.crossings = run.ledger.iter().map(|line| crossing(run, line)).collect();
+    let gaps = summary.crossings.iter().filter_map(|line| line.gap_measured_mm);
+    summary.max_gap_mm = gaps.fold(f64::NAN, f64::max);
+    if !summary.crossings.is_empty() {
+        summary.slip_mm = summary.crossings.iter().map(|line| line.slip_mm).sum();
+    }
     let rows = run.rows.iter().map(|row| Tick { controller: *row, truth: None }).collect();
-    let parameters = run.parameters.clone().unwrap_or_default();
+    let parameters = run
+        .scenario(&[])
+        .map_or_else(|_| run.parameters.clone().unwrap_or_default(), |scenario| scenario.to_toml());
     Recording { summary, rows, log, parameters, ..Recording::default() }
 }
 
@@ -113,22 +126,37 @@ fn summary(run: &Run) -> Summary {
         _ => 0.0,
     };
     let header = run.header.clone().unwrap_or_default();
+    let scenario = run.scenario(&[]).ok();
+    let direction = if retracts { units::Direction::Retract } else { units::Direction::Deploy };
+    // The reference that this controller planned for.
+    let gap_ref = scenario.as_ref().and_then(|scenario| {
+        let planner = Planner::try_build(&scenario.rig).ok()?;
+        Some(planner.gap_ref(direction).to_num())
+    });
     let unknown = f64::NAN;
     Summary {
+        measured: true,
+        missing: run.missing(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        overrides: scenario.as_ref().map(Scenario::overrides).unwrap_or_default(),
+        seed: scenario.as_ref().map_or(0, |scenario| scenario.run.seed),
         completed: run
             .rows
             .last()
             .and_then(Controller::mode)
             .is_some_and(|mode| matches!(mode, Mode::Complete(_))),
         target: format!("log of version {}, build {}", header.version, header.build),
-        controller: "recorded".to_owned(),
+        controller: scenario
+            .as_ref()
+            .map_or("unknown", |scenario| scenario.run.controller.name())
+            .to_owned(),
         direction: if retracts { "retract" } else { "deploy" }.to_owned(),
         rig: header.rig,
         duration_s: last.zip(commanded(run)).map(|(row, at)| row.t_s - 1e-3 * f64::from(at)),
         moving_s: between(|row| row.t_s),
         total_s: run.rows.last().map_or(0.0, |row| row.t_s),
         travel_mm: between(|row| row.position_mm).abs(),
-        gap_ref_mm: unknown,
+        gap_ref_mm: gap_ref.unwrap_or(unknown),
         max_gap_mm: unknown,
         slip_mm: unknown,
         mean_preload_n: preload / moving.len() as f64,
@@ -159,8 +187,8 @@ fn crossing(run: &Run, line: &Line) -> CrossingLine {
         gap_measured_mm: Some(seen.gap_measured_mm),
         corner_force_n: f64::NAN,
         lead_time_s: Some(seen.lead_time_s),
-        // The ledger's slip includes creep and tolerances.
-        slip_mm: f64::NAN,
+        // Creep and the tolerances of the steps are part of it.
+        slip_mm: seen.slip_mm,
         touch_s: touch.map_or(seen.t_s, |row| row.t_s),
         lift_s: lift.or(span.last()).map_or(seen.t_s, |row| row.t_s),
         step_mm: seen.step_found_mm - seen.residual_mm,
@@ -174,7 +202,6 @@ fn crossing(run: &Run, line: &Line) -> CrossingLine {
 mod tests {
     use super::*;
     use crate::record::{Boot, write_mcap};
-    use crate::scenario::Scenario;
     use crate::session;
 
     fn run() -> Recording {
@@ -207,18 +234,18 @@ mod tests {
         // A capture that began while the preload was building.
         let from = whole.events.iter().position(|e| matches!(e.event, Event::Mode(Mode::Run(..))));
         let events = whole.events[from.expect("it moved")..].to_vec();
-        let late = believed(&Run { events, ..whole.clone() }).summary;
+        let late = measured(&Run { events, ..whole.clone() }).summary;
         assert_eq!(late.duration_s, None);
         assert!(late.moving_s > 1.0);
         // A restart in between: two clocks.
         let restarted = Run { boots: vec![Boot::default()], ..whole };
-        assert_eq!(believed(&restarted).summary.duration_s, None);
+        assert_eq!(measured(&restarted).summary.duration_s, None);
     }
 
     #[test]
     fn a_log_without_truth_shows_what_the_controller_believes() {
         let truth = run();
-        let believed = believed(&Run::of_stream(&truth.stream));
+        let believed = measured(&Run::of_stream(&truth.stream));
         assert!(believed.summary.completed);
         assert!((believed.summary.moving_s - truth.summary.moving_s).abs() < 2e-3);
         let durations = [&believed, &truth].map(|run| run.summary.duration_s.expect("commanded"));

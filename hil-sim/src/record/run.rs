@@ -2,6 +2,7 @@
 
 use interstage::log::Identity;
 use interstage::log::capture::CaptureChunk;
+use interstage::log::identity::fingerprint;
 use interstage::log::ledger::Line;
 use interstage::model::{Plan, PlanRequest};
 use interstage::restart::Restart;
@@ -9,6 +10,7 @@ use interstage::tick::{Entry, Event};
 use serde::{Deserialize, Serialize};
 
 use super::{Controller, Counts, Decoder, Item, Mark};
+use crate::scenario::{Scenario, ScenarioError};
 
 /// Firmware and parameters that made a log.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -41,6 +43,44 @@ impl From<&Identity> for Header {
             corner_mm: identity.corner.to_num(),
         }
     }
+}
+
+/// Where a file ends before its log does.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Cut {
+    /// Time of the last tick that is there, s since boot.
+    pub at_s: f64,
+    /// Ticks that are missing behind it; none if the file does not say how many it had.
+    pub missing_ticks: Option<u64>,
+    /// Bytes that its last record lacks, if it ends within one whose length is known.
+    pub lacks_bytes: Option<u64>,
+}
+
+impl std::fmt::Display for Cut {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "the file is cut off at {:.3} s: ", self.at_s)?;
+        match (self.missing_ticks, self.lacks_bytes) {
+            (Some(ticks), _) => write!(f, "{ticks} ticks behind it are missing"),
+            (None, Some(bytes)) => {
+                write!(f, "its last record lacks {bytes} bytes, and what followed is not known")
+            }
+            (None, None) => f.write_str("it does not say how much followed"),
+        }
+    }
+}
+
+/// Why the parameters of the controller that made a log are not known.
+#[derive(Debug, thiserror::Error)]
+pub enum Unknown {
+    /// Neither parameters nor the name of a rig are in the log.
+    #[error("its rig is not known")]
+    Unnamed,
+    /// It was made with parameters of this hash; those at hand have the other one.
+    #[error("made with parameters {0}, these are {1}")]
+    Other(String, String),
+    /// The parameters that it has, or what is laid over them, are wrong.
+    #[error(transparent)]
+    Wrong(#[from] ScenarioError),
 }
 
 /// Numbers of items before a start of the target.
@@ -101,9 +141,49 @@ pub struct Run {
     pub counts: Counts,
     /// The rig's parameters as TOML, if the file has them.
     pub parameters: Option<String>,
+    /// Where the file was cut off, if it was.
+    pub cut: Option<Cut>,
 }
 
 impl Run {
+    /// The scenario that the log was made with: the parameters in it, or the preset that it names
+    /// if that has their hash, with these overrides, each `key=value`.
+    ///
+    /// # Errors
+    /// [`Unknown`] if the log does not say.
+    pub fn scenario(&self, sets: &[String]) -> Result<Scenario, Unknown> {
+        let scenario = match (&self.parameters, &self.header) {
+            (Some(toml), _) => Scenario::parse("parameters of the log", toml, sets)?,
+            (None, Some(header)) => Scenario::resolve(Some(&header.rig), None, sets)?,
+            (None, None) if sets.is_empty() => return Err(Unknown::Unnamed),
+            (None, None) => Scenario::resolve(None, None, sets)?,
+        };
+        let here = format!("{:08x}", fingerprint(&scenario.rig));
+        match &self.header {
+            Some(header) if header.parameters != here => {
+                Err(Unknown::Other(header.parameters.clone(), here))
+            }
+            _ => Ok(scenario),
+        }
+    }
+
+    /// What is missing of the log, in sentences; none if nothing is known to be.
+    #[must_use]
+    pub fn missing(&self) -> Vec<String> {
+        let Counts { lost_frames, lost_ticks, .. } = self.counts;
+        let lost = (lost_frames + lost_ticks > 0)
+            .then(|| format!("{lost_frames} frames and {lost_ticks} ticks are missing in it"));
+        self.cut.map(|cut| cut.to_string()).into_iter().chain(lost).collect()
+    }
+
+    /// Marks the file as cut off behind its last tick. `total` is the number of ticks that it
+    /// states, `lacks_bytes` what its last record lacks.
+    pub(super) fn cut_off(&mut self, total: Option<u64>, lacks_bytes: Option<u64>) {
+        let at_s = self.rows.last().map_or(0.0, |row| row.t_s);
+        let missing_ticks = total.map(|total| total.saturating_sub(self.counts.ticks));
+        self.cut = Some(Cut { at_s, missing_ticks, lacks_bytes });
+    }
+
     /// Reads the bytes of the binary channel.
     #[must_use]
     pub fn of_stream(bytes: &[u8]) -> Self {

@@ -1,6 +1,7 @@
 //! The summary of a run and its parts.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
+use serde_json::{Map, Value};
 
 use super::Tick;
 
@@ -74,6 +75,23 @@ pub struct Summary {
     pub rig: String,
     /// Seed of the plant's draw.
     pub seed: u64,
+    /// Version of this program.
+    #[serde(default)]
+    pub version: String,
+    /// Keys of the scenario whose value is not the preset's, apart from those that have a field
+    /// of their own here.
+    #[serde(default)]
+    pub overrides: Map<String, Value>,
+    /// The plant of the seed: the value of each key that is drawn.
+    #[serde(default)]
+    pub drawn: Map<String, Value>,
+    /// Whether the figures are the controller's measurements, as in a log without the plant's
+    /// truth.
+    #[serde(default)]
+    pub measured: bool,
+    /// What is missing of the log that this was read from, in sentences.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub missing: Vec<String>,
     /// From the accepted command to arrival, or to the end of the motion of a run that did not
     /// arrive, s; none if the log has no such command or nothing moved.
     pub duration_s: Option<f64>,
@@ -86,9 +104,12 @@ pub struct Summary {
     pub travel_mm: f64,
     /// Reference gap of the schedule, mm.
     pub gap_ref_mm: f64,
-    /// Largest gap at a step, or separation elsewhere, mm.
+    /// Largest gap at a step, or separation elsewhere, mm; none (`NaN`) without a crossing.
+    #[serde(default = "nan", deserialize_with = "or_nan")]
     pub max_gap_mm: f64,
-    /// Gross slip, mm.
+    /// Gross slip, mm; of a measured run the tread's travel beyond the axial travel up to the
+    /// last step found, creep included.
+    #[serde(default = "nan", deserialize_with = "or_nan")]
     pub slip_mm: f64,
     /// Mean true preload while moving, N.
     pub mean_preload_n: f64,
@@ -124,4 +145,13 @@ pub struct Recording {
     pub parameters: String,
     /// The binary log as it was on its channel; empty if it was not kept.
     pub stream: Vec<u8>,
+}
+
+fn nan() -> f64 {
+    f64::NAN
+}
+
+/// A number, or `NaN` where JSON has null.
+fn or_nan<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(from)?.unwrap_or(f64::NAN))
 }

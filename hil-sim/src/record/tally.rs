@@ -4,7 +4,7 @@
 use interstage::units::Direction;
 use sha2::{Digest, Sha256};
 
-use super::{CrossingLine, LogLine, Recording, Report, Summary, Tick};
+use super::{CrossingLine, LogLine, Recording, Report, Summary, Tick, drawn};
 use crate::plant::ledger::Crossing;
 use crate::plant::rig::{Truth, VirtualRig};
 use crate::scenario::Scenario;
@@ -102,6 +102,7 @@ impl Tally {
         });
         let crossings: Vec<CrossingLine> = plant.ledger().crossings().iter().map(line).collect();
         let worst = crossings.iter().map(|c| c.gap_mm).fold(self.worst_separation, f64::max);
+        let has_gap = !crossings.is_empty() || worst > 0.0;
         let total_s = self.time_s();
         let summary = Summary {
             completed: there && crossings.len() == steps && self.faults.is_empty(),
@@ -110,12 +111,17 @@ impl Tally {
             direction: scenario.run.direction.name().into(),
             rig: scenario.preset.clone(),
             seed: scenario.run.seed,
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            overrides: scenario.overrides(),
+            drawn: drawn::of(plant.parameters(), scenario),
+            measured: false,
+            missing: Vec::new(),
             duration_s: self.run_started.and(self.commanded).map(|from| self.run_ended - from),
             moving_s: self.run_started.map_or(0.0, |from| self.run_ended - from),
             total_s,
             travel_mm: (truth.position_mm - self.start_mm).abs(),
             gap_ref_mm: self.gap_ref_mm,
-            max_gap_mm: worst,
+            max_gap_mm: if has_gap { worst } else { f64::NAN },
             slip_mm: truth.slip_mm,
             mean_preload_n: self.preload_sum / f64::from(self.moving.max(1)),
             energy_j: truth.work_mj * 1e-3,

@@ -5,15 +5,14 @@
 //! value in `unknown`, `of` and `telemetry`; one of the plant a field of `TrueState`.
 
 use interstage::log::{Flags, Record, codes};
-use interstage::sense::raw::{
-    AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
-};
+use interstage::sense::raw::{AdcCode, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame};
 use interstage::supervise::Mode;
 use interstage::tick::Telemetry;
 use interstage::units::{Duty, Q16};
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 
+use super::columns::{ANGLE, angle_error, angle_frame, bit, mode_column, stage_column};
 use crate::plant::rig::Truth;
 
 /// Names of the numbers in [`Controller::mode`].
@@ -105,14 +104,16 @@ pub struct Controller {
     pub tick: u32,
     /// Time since boot, s.
     pub t_s: f64,
-    /// Number of the mode, see [`MODE_NAMES`].
+    /// Number of the mode; its name of [`MODE_NAMES`] in the columns.
+    #[serde(with = "mode_column")]
     pub mode: u8,
     /// The mode is one of retraction.
     #[serde(with = "bit")]
     pub retracts: bool,
     /// Code of the fault that is held; 0 for none.
     pub fault: u8,
-    /// Contact stage, 1 to 6.
+    /// Contact stage, 1 to 6; its name of [`STAGE_NAMES`] in the columns.
+    #[serde(with = "stage_column")]
     pub stage: u8,
     /// Sleeve level: 0 at the outermost wall.
     pub level: u8,
@@ -128,8 +129,11 @@ pub struct Controller {
     pub compression_code: Option<u16>,
     /// When it was taken, ticks.
     pub compression_at: Option<u32>,
-    /// Frame of the arm angle sensor, undecoded.
+    /// Code of the arm angle sensor, 14 bits, 16384 a turn.
     pub arm_angle_code: Option<u16>,
+    /// What is wrong with its frame: 0 nothing, 1 the sensor's error flag is set, 2 the parity is
+    /// odd, 3 both.
+    pub arm_angle_error: u8,
     /// When it was taken, ticks.
     pub arm_angle_at: Option<u32>,
     /// Code of the drive's bridge, 12 bits, 2048 without voltage; none if none was taken.
@@ -160,8 +164,8 @@ pub struct Controller {
     pub slip_margin: f64,
     /// Amplitude of the arm's mode, mm.
     pub vibration_mm: f64,
-    /// Distance to the next face, mm; 32768 when none is left.
-    pub distance_mm: f64,
+    /// Distance to the next face, mm; none when no face is left.
+    pub distance_mm: Option<f64>,
     /// Duty of the drive, -1 to 1.
     pub drive_duty: f64,
     /// Duty of the pre-tightener, -1 to 1.
@@ -174,18 +178,8 @@ pub struct Controller {
     pub pretightener_on: bool,
 }
 
-/// Yes and no as 1 and 0, so that every column is a number.
-mod bit {
-    use serde::{Deserialize, Deserializer, Serializer};
-
-    pub(super) fn serialize<S: Serializer>(bit: &bool, to: S) -> Result<S::Ok, S::Error> {
-        to.serialize_u8((*bit).into())
-    }
-
-    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<bool, D::Error> {
-        u8::deserialize(from).map(|bit| bit != 0)
-    }
-}
+/// The controller's distance when no face is left.
+const NO_FACE: Q16 = Q16::MAX;
 
 impl Default for Controller {
     fn default() -> Self {
@@ -216,7 +210,7 @@ impl Controller {
             gap_predicted_mm: unknown,
             slip_margin: unknown,
             vibration_mm: unknown,
-            distance_mm: unknown,
+            distance_mm: None,
             drive_duty: unknown,
             pretightener_duty: unknown,
             ..nothing
@@ -244,7 +238,8 @@ impl Controller {
             preload_at: preload_sensor.map(|sample| sample.at),
             compression_code: compression_sensor.map(|sample| sample.code.get()),
             compression_at: compression_sensor.map(|sample| sample.at),
-            arm_angle_code: arm_angle.map(|sample| sample.code.get()),
+            arm_angle_code: arm_angle.map(|sample| sample.code.get() & ANGLE),
+            arm_angle_error: arm_angle.map_or(0, |sample| angle_error(sample.code)),
             arm_angle_at: arm_angle.map(|sample| sample.at),
             drive_code: bridges.map(|codes| codes.drive.get()),
             pretightener_code: bridges.map(|codes| codes.pretightener.get()),
@@ -260,7 +255,7 @@ impl Controller {
             gap_predicted_mm: seen.gap_predicted.to_num(),
             slip_margin: seen.slip_margin.to_num(),
             vibration_mm: seen.vibration.to_num(),
-            distance_mm: seen.distance.to_num(),
+            distance_mm: (seen.distance != NO_FACE).then(|| seen.distance.to_num()),
             drive_duty: f64::from(seen.drive.to_bits()) / DUTY,
             pretightener_duty: f64::from(seen.pretightener.to_bits()) / DUTY,
             drive_on: flags.has(Flags::DRIVE),
@@ -287,7 +282,9 @@ impl Controller {
             ),
             preload_sensor: sample(self.preload_code, self.preload_at, AdcCode::new),
             compression_sensor: sample(self.compression_code, self.compression_at, AdcCode::new),
-            arm_angle: sample(self.arm_angle_code, self.arm_angle_at, AngleFrame::new),
+            arm_angle: sample(self.arm_angle_code, self.arm_angle_at, |code| {
+                angle_frame(code, self.arm_angle_error)
+            }),
             bridges: bridges.map(|(drive, pretightener)| BridgeCodes {
                 drive: BridgeCode::new(drive),
                 pretightener: BridgeCode::new(pretightener),
@@ -334,7 +331,7 @@ impl Controller {
             gap_predicted: q(self.gap_predicted_mm)?,
             slip_margin: q(self.slip_margin)?,
             vibration: q(self.vibration_mm)?,
-            distance: q(self.distance_mm)?,
+            distance: self.distance_mm.map_or(NO_FACE, Q16::from_num),
             drive: duty(self.drive_duty),
             pretightener: duty(self.pretightener_duty),
         })
@@ -436,6 +433,15 @@ mod tests {
             let text = serde_json::to_string(&tick).unwrap();
             prop_assert_eq!(serde_json::from_str::<Tick>(&text).unwrap(), tick);
         }
+    }
+
+    #[test]
+    fn no_face_ahead_is_no_number() {
+        let telemetry = Telemetry { distance: Q16::MAX, ..Telemetry::default() };
+        let record = Record { telemetry, ..Record::default() };
+        let tick = Controller::of(&record, &SensorFrame::default());
+        assert_eq!(tick.distance_mm, None);
+        assert_eq!(tick.telemetry(), Some(telemetry));
     }
 
     #[test]

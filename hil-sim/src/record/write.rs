@@ -8,9 +8,11 @@ use std::path::{Path, PathBuf};
 
 use interstage::log::frame::LONGEST;
 
+use super::csv_file::{Metadata, write_metadata};
 use super::mcap_file::{McapFile, TICK_NS};
+use super::tick::OFF;
 use super::{
-    Controller, Counts, Decoder, Header, Item, Mark, Recording, Tick, Topic, messages, pieces,
+    Controller, Counts, Decoder, Header, Item, Mark, Recording, Run, Tick, Topic, messages, pieces,
     write_mcap,
 };
 use crate::files::{Failure, FileError, atomic_write, make_directory, with_causes};
@@ -53,8 +55,9 @@ pub fn write_csv(recording: &Recording, path: &Path) -> Result<(), FileError> {
     })
 }
 
-/// Writes `log.csv`, `log.mcap` and `summary.json`, the object that `rig deploy --json`
-/// prints, into `directory`, which is made if it is missing, and returns their paths.
+/// Writes `log.csv` with its metadata, `log.mcap` and `summary.json`, the object that
+/// `rig deploy --json` prints, into `directory`, which is made if it is missing, and returns
+/// their paths.
 ///
 /// # Errors
 /// The first file that cannot be written; those before it stay.
@@ -63,12 +66,17 @@ pub fn write_all(recording: &Recording, directory: &Path) -> Result<Vec<PathBuf>
     let [csv, mcap, summary] =
         ["log.csv", "log.mcap", "summary.json"].map(|name| directory.join(name));
     write_csv(recording, &csv)?;
+    let header = Run::of_stream(&recording.stream).header;
+    let parameters = Some(recording.parameters.clone());
+    let ticks = recording.rows.iter().filter(|row| row.controller.mode != OFF).count() as u64;
+    let metadata = Metadata { header, parameters, ticks: Some(ticks) };
+    let described = write_metadata(&csv, &metadata, true)?;
     write_mcap(recording, &mcap)?;
     atomic_write(&summary, |out| {
         serde_json::to_writer_pretty(&mut *out, &recording.summary)?;
         Ok(out.write_all(b"\n")?)
     })?;
-    Ok(vec![csv, mcap, summary])
+    Ok(vec![csv, described, mcap, summary])
 }
 
 /// Writes a log that grows to an MCAP file and a CSV file, of which each may be absent.
@@ -119,6 +127,11 @@ impl<M: Write + Seek, C: Write> Writer<M, C> {
         })
     }
 
+    /// The target's identity, as soon as it has come.
+    pub const fn header(&self) -> Option<&Header> {
+        self.header.as_ref()
+    }
+
     /// What has been read so far.
     pub const fn counts(&self) -> &Counts {
         self.decoder.counts()
@@ -163,7 +176,7 @@ impl<M: Write + Seek, C: Write> Writer<M, C> {
         self.decoder.read(frame, &mut |item| items.push(item));
         self.items(&items, see)?;
         if let Some(mcap) = &mut self.mcap {
-            mcap.message(self.now, Topic::Frames, frame)?;
+            mcap.frame(self.now, frame)?;
         }
         Ok(())
     }
@@ -180,7 +193,7 @@ impl<M: Write + Seek, C: Write> Writer<M, C> {
                     }
                 }
                 Item::Mark(Mark::Restart) => self.start = self.now,
-                Item::Identity(identity) => self.header(Header::from(identity))?,
+                Item::Identity(identity) => self.identify(Header::from(identity))?,
                 _ => {}
             }
             if let (Some(mcap), Some((topic, body))) = (&mut self.mcap, messages(item))
@@ -193,15 +206,18 @@ impl<M: Write + Seek, C: Write> Writer<M, C> {
     }
 
     /// Adds the target's identity if it is new.
-    fn header(&mut self, header: Header) -> Result<(), Failure> {
-        if let Some(mcap) = self.mcap.as_mut().filter(|_| self.header.as_ref() != Some(&header)) {
+    fn identify(&mut self, header: Header) -> Result<(), Failure> {
+        if self.header.as_ref() == Some(&header) {
+            return Ok(());
+        }
+        if let Some(mcap) = &mut self.mcap {
             let value = serde_json::to_value(&header)?;
             let pairs = value.as_object().into_iter().flatten().map(|(key, value)| {
                 (key.clone(), value.as_str().map_or_else(|| value.to_string(), str::to_owned))
             });
             mcap.metadata("identity", pairs)?;
-            self.header = Some(header);
         }
+        self.header = Some(header);
         Ok(())
     }
 
@@ -305,6 +321,7 @@ mod tests {
         assert_eq!(counts, run.counts);
         assert_eq!(csv.rows, run.rows);
         assert_eq!(mcap.parameters.as_deref(), Some("[run]\nseed = 0\n"));
+        assert_eq!((mcap.cut, csv.cut), (None, None));
         assert_eq!(Run { parameters: None, ..mcap }, run);
     }
 
@@ -332,7 +349,10 @@ mod tests {
         let file = disks.0.content();
         let mut before = 0;
         for tenth in 4..10 {
-            let rows = read(&file[..file.len() * tenth / 10]).rows.len();
+            let run = read(&file[..file.len() * tenth / 10]);
+            let rows = run.rows.len();
+            let cut = run.cut.expect("it is noticed");
+            assert_eq!((cut.at_s, cut.missing_ticks), (run.rows[rows - 1].t_s, None));
             assert!(rows >= before && rows > 500, "{rows} rows of {tenth} tenths");
             before = rows;
         }
@@ -361,7 +381,7 @@ mod tests {
         let recording = example::deploy();
         let files = write_all(&recording, &folder).unwrap();
         assert_eq!(std::fs::read_dir(&folder).unwrap().count(), files.len());
-        let summary = std::fs::read_to_string(&files[2]).unwrap();
+        let summary = std::fs::read_to_string(&files[3]).unwrap();
         assert_eq!(serde_json::from_str::<Summary>(&summary).unwrap(), recording.summary);
         let mut reader = csv::Reader::from_path(&files[0]).unwrap();
         let head = reader.headers().unwrap().clone();

@@ -111,10 +111,10 @@ fn plots(a: &Recording, b: &Recording) -> String {
     let (a, b) = (View::new(a, Across::Position), View::new(b, Across::Position));
     let mut html = String::new();
     for (title, y_name, of) in plots {
-        let line = |name, colour, view: &View| {
+        let line = |name: &'static str, colour, view: &View| {
             let moving = view.rows.iter().filter(|row| (5..=9).contains(&row.controller.mode));
             let points = moving.map(|row| (row.position_mm(), of(row))).collect();
-            Line { name, look: Look::Other(colour), points }
+            Line { name: name.into(), look: Look::Other(colour), points }
         };
         let panel = Panel {
             x: (a.x.0.min(b.x.0), a.x.1.max(b.x.1)),

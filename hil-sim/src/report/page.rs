@@ -2,10 +2,9 @@
 
 use super::panels::{Across, View};
 use super::svg::{self, escape};
-use super::verdict::{Grade, gap_sentence, headline};
+use super::verdict::{Grade, gap_sentence, headline, origin, reservations, slip_sentence};
 use super::{band, crossings, tables};
 use crate::record::Recording;
-use crate::table::number;
 
 const STYLE: &str = include_str!("style.css");
 /// Size of a plot of the run, CSS pixels.
@@ -27,22 +26,19 @@ pub struct Section {
 pub fn html(recording: &Recording, more: &[Section]) -> String {
     let s = &recording.summary;
     let title = escape(&format!("{} on {}, seed {}", s.direction, s.rig, s.seed));
-    let grade = match Grade::of(s) {
-        Grade::Good => "good",
-        Grade::Fair => "fair",
-        Grade::Bad => "bad",
-    };
+    let grade = Grade::of(s).name();
+    let remarks = reservations(s).into_iter().map(str::to_owned);
+    let remarks = remarks.chain(s.missing.iter().map(|what| format!("incomplete log: {what}")));
+    let remarks: String =
+        remarks.map(|text| format!("<p class=\"remark\">{}</p>\n", escape(&text))).collect();
     let mut page = head(&title);
     page += &format!(
-        "<header class=\"{grade}\">\n<p class=\"what\">interstage · {} controller · {} · rig {} · seed {}</p>\n\
-<h1>{}</h1>\n<p>{}; gross slip {} mm; {}</p>\n</header>\n",
-        escape(&s.controller),
-        escape(&s.target),
-        escape(&s.rig),
-        s.seed,
+        "<header class=\"{grade}\">\n<p class=\"what\">interstage · {}</p>\n\
+<h1>{}</h1>\n{remarks}<p>{}; {}; {}</p>\n</header>\n",
+        escape(&origin(s)),
         escape(&headline(s)),
         capital(&gap_sentence(s)),
-        number(s.slip_mm, 3),
+        slip_sentence(s),
         count(s.faults.len(), "fault") + ", " + &count(s.limits.len(), "limit") + " reported",
     );
     page += &section("Summary", &tables::summary(s));
@@ -51,9 +47,14 @@ pub fn html(recording: &Recording, more: &[Section]) -> String {
         &format!(
             "{}<p class=\"note\">The gap of a crossing is the clearance between the step root \
 and the undeformed wheel at the instant at which the lower wall stops carrying load (on retraction: \
- begins to). Errors are against the true value. Lead: how long before the corner touched \
-the preload was reached.</p>\n",
-            tables::ledger(&s.crossings)
+ begins to). {} Lead: how long before the corner touched the preload was reached.</p>\n",
+            tables::ledger(&s.crossings),
+            if s.measured {
+                "This log is a controller's: every figure is measured or estimated by it, and where \
+ a step was found is compared with the step table. Slip includes creep and the steps' tolerances."
+            } else {
+                "Errors are against the true value."
+            }
         ),
     );
     page += &section("Faults and limits", &tables::reports(s));

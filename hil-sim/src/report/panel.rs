@@ -1,6 +1,8 @@
 //! One plot: lines, marks, levels and shaded spans on one pair of axes, with the
 //! title and the legend above it, where they cover no data.
 
+use std::borrow::Cow;
+
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, VPos};
 
@@ -25,7 +27,7 @@ const TITLE_PX: f64 = 14.0;
 
 /// What a line shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Look {
+pub(crate) enum Look {
     /// A sensor's reading: thin, below the others.
     Measured(RGBColor),
     /// True state of the plant: dark and wide.
@@ -55,54 +57,54 @@ impl Look {
 }
 
 /// A line of a plot.
-pub(super) struct Line {
+pub(crate) struct Line {
     /// Its name in the legend.
-    pub(super) name: &'static str,
-    pub(super) look: Look,
-    pub(super) points: Vec<(f64, f64)>,
+    pub(crate) name: Cow<'static, str>,
+    pub(crate) look: Look,
+    pub(crate) points: Vec<(f64, f64)>,
 }
 
 /// Shape of a mark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Shape {
+pub(crate) enum Shape {
     Dot,
     Ring,
     Triangle,
 }
 
 /// Marks of a plot.
-pub(super) struct Marks {
-    pub(super) name: &'static str,
-    pub(super) shape: Shape,
-    pub(super) colour: RGBColor,
+pub(crate) struct Marks {
+    pub(crate) name: Cow<'static, str>,
+    pub(crate) shape: Shape,
+    pub(crate) colour: RGBColor,
     /// Shift to the right, drawing units, so that marks of one place are side by side.
-    pub(super) shift: i32,
-    pub(super) points: Vec<(f64, f64)>,
+    pub(crate) shift: i32,
+    pub(crate) points: Vec<(f64, f64)>,
 }
 
 /// One plot.
-pub(super) struct Panel {
-    pub(super) title: String,
+pub(crate) struct Panel {
+    pub(crate) title: String,
     /// Name of the vertical axis, with its unit.
-    pub(super) y_name: &'static str,
+    pub(crate) y_name: &'static str,
     /// Name of the horizontal axis, with its unit; none hides the axis.
-    pub(super) x_name: Option<&'static str>,
-    pub(super) x: (f64, f64),
+    pub(crate) x_name: Option<&'static str>,
+    pub(crate) x: (f64, f64),
     /// Vertical range, where the data are not to decide.
-    pub(super) y: Option<(f64, f64)>,
+    pub(crate) y: Option<(f64, f64)>,
     /// Least vertical span, so that noise is not blown up.
-    pub(super) least_span: f64,
-    pub(super) lines: Vec<Line>,
-    pub(super) marks: Vec<Marks>,
+    pub(crate) least_span: f64,
+    pub(crate) lines: Vec<Line>,
+    pub(crate) marks: Vec<Marks>,
     /// Horizontal lines with their names.
-    pub(super) levels: Vec<(&'static str, Look, f64)>,
+    pub(crate) levels: Vec<(&'static str, Look, f64)>,
     /// Spans of x that are shaded.
-    pub(super) shades: Vec<(f64, f64)>,
+    pub(crate) shades: Vec<(f64, f64)>,
 }
 
 impl Panel {
     /// Draws it into `area`.
-    pub(super) fn draw(&self, area: &Area) -> Drawn {
+    pub(crate) fn draw(&self, area: &Area) -> Drawn {
         let (head, body) = area.split_vertically(self.head_height(area));
         self.draw_head(&head)?;
         let y = self.y_range();
@@ -171,11 +173,14 @@ impl Panel {
         axis::padded((range.0 - missing, range.1 + missing), 0.06)
     }
 
-    /// Everything that the legend names, in its order.
-    fn legend(&self) -> Vec<(&'static str, Sample<'_>)> {
-        let lines = self.lines.iter().map(|line| (line.name, Sample::Line(line.look)));
+    /// Everything that the legend names, in its order: what has a point.
+    fn legend(&self) -> Vec<(&str, Sample<'_>)> {
+        let has_points = |points: &[(f64, f64)]| points.iter().any(|point| point.1.is_finite());
+        let lines = self.lines.iter().filter(|line| has_points(&line.points));
+        let lines = lines.map(|line| (&*line.name, Sample::Line(line.look)));
         let levels = self.levels.iter().map(|&(name, look, _)| (name, Sample::Line(look)));
-        let marks = self.marks.iter().map(|marks| (marks.name, Sample::Mark(marks)));
+        let marks = self.marks.iter().filter(|marks| has_points(&marks.points));
+        let marks = marks.map(|marks| (&*marks.name, Sample::Mark(marks)));
         lines.chain(levels).chain(marks).collect()
     }
 

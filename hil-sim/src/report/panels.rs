@@ -115,7 +115,7 @@ impl<'a> View<'a> {
     /// A line of one field.
     pub(super) fn line(&self, name: &'static str, look: Look, of: impl Fn(&Tick) -> f64) -> Line {
         let points = self.rows.iter().map(|row| (self.across.of(row), of(row))).collect();
-        Line { name, look, points }
+        Line { name: name.into(), look, points }
     }
 
     /// Marks at lift-off of the crossings that have the value.
@@ -127,7 +127,13 @@ impl<'a> View<'a> {
     ) -> Marks {
         let crossings = &self.recording.summary.crossings;
         let at = |c: &CrossingLine| Some((self.across.at(self.rows, c.lift_s), of(c)?));
-        Marks { name, shape, colour, shift, points: crossings.iter().filter_map(at).collect() }
+        Marks {
+            name: name.into(),
+            shape,
+            colour,
+            shift,
+            points: crossings.iter().filter_map(at).collect(),
+        }
     }
 
     /// Every plot of the run, in the order of the page.

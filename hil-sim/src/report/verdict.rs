@@ -1,6 +1,8 @@
 //! A run in one sentence.
 
 use crate::record::Summary;
+use crate::scenario::brief;
+use crate::table::number;
 
 /// How a run went.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,13 +19,50 @@ pub(crate) enum Grade {
 /// Gross slip from which a run no longer counts as free of slip, mm.
 pub(crate) const SLIP_SEEN_MM: f64 = 0.05;
 
+/// A run's faults of the second grade, in words; empty for the others.
+pub(crate) fn reservations(summary: &Summary) -> Vec<&'static str> {
+    if Grade::of(summary) != Grade::Fair {
+        return Vec::new();
+    }
+    let gap = match gap_excess(summary) {
+        Some(excess) if excess > 0.0 => Some("over the reference gap"),
+        Some(excess) if excess.is_nan() => Some("gap unknown"),
+        _ => None,
+    };
+    gap.into_iter().chain((slips(summary)).then_some("the wheel slipped")).collect()
+}
+
+/// Whether the wheel slipped. What a log without truth measures includes creep and the steps'
+/// tolerances, so that it shows no slip.
+fn slips(summary: &Summary) -> bool {
+    !summary.measured && summary.slip_mm > SLIP_SEEN_MM
+}
+
 impl Grade {
+    /// Its name in the style of a page.
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Good => "good",
+            Self::Fair => "fair",
+            Self::Bad => "bad",
+        }
+    }
+
+    /// Its colour on a terminal: green, amber, red.
+    pub(crate) const fn ansi(self) -> u8 {
+        match self {
+            Self::Good => 32,
+            Self::Fair => 33,
+            Self::Bad => 31,
+        }
+    }
+
     /// Grade of a run.
     pub(crate) fn of(summary: &Summary) -> Self {
         if !summary.completed || !summary.faults.is_empty() {
             Self::Bad
         } else if gap_excess(summary).is_some_and(|excess| excess > 0.0 || excess.is_nan())
-            || summary.slip_mm > SLIP_SEEN_MM
+            || slips(summary)
         {
             Self::Fair
         } else {
@@ -35,6 +74,27 @@ impl Grade {
 /// Worst gap over the reference, relative: positive is worse. None without reference.
 pub(crate) fn gap_excess(summary: &Summary) -> Option<f64> {
     (summary.gap_ref_mm > 0.0).then(|| summary.max_gap_mm / summary.gap_ref_mm - 1.0)
+}
+
+/// Slip and its name, as half a sentence.
+pub(crate) fn slip_sentence(summary: &Summary) -> String {
+    format!("{} {} mm", slip_name(summary), number(summary.slip_mm, 3))
+}
+
+/// What the slip of this summary is.
+pub(crate) fn slip_name(summary: &Summary) -> &'static str {
+    if summary.measured { "measured slip with creep" } else { "gross slip" }
+}
+
+/// What ran and with which parameters, as half a sentence: overrides and seed included.
+pub(crate) fn origin(summary: &Summary) -> String {
+    let Summary { controller, target, rig, seed, overrides, measured, .. } = summary;
+    let rig = if rig.is_empty() { "unknown" } else { rig };
+    let mut parts = vec![format!("{controller} controller on {target}"), format!("rig {rig}")];
+    // The seed of a measured plant is that of its parameters, if it has any.
+    parts.extend((!measured || *seed > 0).then(|| format!("seed {seed}")));
+    parts.extend(overrides.iter().map(|(key, value)| format!("{key} = {}", brief(value))));
+    parts.join(", ")
 }
 
 /// The headline: the outcome of the run.
@@ -54,6 +114,7 @@ pub(crate) fn headline(summary: &Summary) -> String {
         (true, Some(fault)) => {
             format!("{verb} {travel}, with fault {}: {}", fault.code, fault.text)
         }
+        (false, None) if !summary.missing.is_empty() => format!("Log ends after {travel}"),
         (false, None) => format!("Did not complete: {travel}"),
         (false, Some(fault)) => {
             format!("Did not complete: fault {} after {travel}: {}", fault.code, fault.text)
@@ -64,15 +125,18 @@ pub(crate) fn headline(summary: &Summary) -> String {
 /// The worst gap beside the reference, as a half-sentence.
 pub(crate) fn gap_sentence(summary: &Summary) -> String {
     if !summary.max_gap_mm.is_finite() {
-        return "worst gap unknown".to_owned();
+        let none =
+            if summary.crossings.is_empty() { "no crossing, so no gap" } else { "gap unknown" };
+        return none.to_owned();
     }
-    let worst = format!("worst gap {:.3} mm", summary.max_gap_mm);
+    let by = if summary.measured { "measured " } else { "" };
+    let worst = format!("worst {by}gap {:.3} mm", summary.max_gap_mm);
     match gap_excess(summary) {
         None => worst,
         Some(excess) => format!(
             "{worst}, {:.1} % {} the reference of {:.3} mm",
             100.0 * excess.abs(),
-            if excess > 0.0 { "above" } else { "below" },
+            if excess > 0.0 { "over" } else { "below" },
             summary.gap_ref_mm
         ),
     }
@@ -118,6 +182,31 @@ mod tests {
         let mut summary = example::deploy().summary;
         summary.max_gap_mm = f64::NAN;
         assert_eq!(Grade::of(&summary), Grade::Fair);
-        assert_eq!(gap_sentence(&summary), "worst gap unknown");
+        assert_eq!(gap_sentence(&summary), "gap unknown");
+        assert_eq!(reservations(&summary), ["gap unknown"]);
+    }
+
+    #[test]
+    fn just_over_the_reference_has_its_grade_and_its_word() {
+        let mut summary = example::deploy().summary;
+        (summary.gap_ref_mm, summary.max_gap_mm) = (2.0, 2.000_001);
+        assert_eq!(Grade::of(&summary), Grade::Fair);
+        assert_eq!(reservations(&summary), ["over the reference gap"]);
+        summary.slip_mm = 0.2;
+        assert_eq!(reservations(&summary), ["over the reference gap", "the wheel slipped"]);
+        // With creep in it, a measured slip is no gross slip.
+        summary.measured = true;
+        assert_eq!(reservations(&summary), ["over the reference gap"]);
+        assert!(slip_sentence(&summary).starts_with("measured slip"));
+        summary.max_gap_mm = 2.0;
+        assert_eq!((Grade::of(&summary), reservations(&summary)), (Grade::Good, vec![]));
+    }
+
+    #[test]
+    fn a_log_that_is_cut_off_is_not_said_to_have_failed() {
+        let mut summary = Summary { missing: vec!["cut off".to_owned()], ..Summary::default() };
+        assert!(headline(&summary).starts_with("Log ends after "));
+        summary.max_gap_mm = f64::NAN;
+        assert_eq!(gap_sentence(&summary), "no crossing, so no gap");
     }
 }

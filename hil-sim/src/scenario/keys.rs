@@ -24,6 +24,10 @@ pub struct KeyInfo {
     pub value: Value,
     /// What it takes.
     pub expected: String,
+    /// Least and largest value; none of words and lists.
+    pub range: Option<(f64, f64)>,
+    /// Whether it is a property of the rig, to be measured there, not a choice.
+    pub measure: bool,
     /// What it is.
     pub description: String,
 }
@@ -166,23 +170,52 @@ fn descriptions() -> Vec<(String, String)> {
     .concat()
 }
 
-/// The keys of the mismatch, each with its ranges.
+/// The keys of the mismatch, each with the range of its wide draw.
 fn mismatch() -> Vec<(String, String)> {
     let described = fields::<Mismatch>("mismatch").into_iter().zip(FIELDS);
     let with_range = |((key, text), field): ((String, String), &Field)| {
-        let ((low, high), (from, to)) = (field.range, field.wide);
-        (key, format!("{text} {low} to {high}, wide {from} to {to}."))
+        let (from, to) = field.wide;
+        (key, format!("{text} Wide {from} to {to}."))
     };
     described.map(with_range).collect()
 }
 
-/// Every key of the scenario in `table`, in the order of declaration.
-pub(super) fn list(table: &Table) -> Vec<KeyInfo> {
+/// Sections of properties of the rig, and what is a choice in them.
+const PROPERTIES: [&str; 6] = ["rig", "tread", "plant", "preload", "drive", "sense"];
+const CHOICES: [&str; 9] = [
+    "rig.step_tolerance_mm",
+    "preload.cruise_n",
+    "preload.limit_n",
+    "drive.cruise_speed_mm_s",
+    "drive.min_crossing_speed_mm_s",
+    "drive.acceleration_mm_s2",
+    "drive.jerk_mm_s3",
+    "drive.guard_band",
+    "sense.stale_after_s",
+];
+
+/// Whether a key is a property of the rig.
+fn is_measured(key: &str) -> bool {
+    PROPERTIES.contains(&split(key).0) && !CHOICES.contains(&key)
+}
+
+/// Every key of the scenario in `table`, in the order of declaration, with the ranges in
+/// `ranges`.
+pub(super) fn list(table: &Table, ranges: &[(String, (f64, f64))]) -> Vec<KeyInfo> {
     let values = leaves(table);
+    let range = |key: &str| ranges.iter().find(|(name, _)| name == key).map(|(_, range)| *range);
     let info = |(key, description): (String, String)| {
         let (_, value) = values.iter().find(|(name, _)| *name == key)?;
         let expected = Kind::of(&key, value).expected(&key);
-        Some(KeyInfo { unit: unit(&key), value: (*value).clone(), expected, description, key })
+        Some(KeyInfo {
+            unit: unit(&key),
+            value: (*value).clone(),
+            expected,
+            range: range(&key),
+            measure: is_measured(&key),
+            description,
+            key,
+        })
     };
     descriptions().into_iter().filter_map(info).collect()
 }
@@ -195,29 +228,49 @@ pub(super) fn hint(key: &str, known: &[String]) -> String {
     }
 }
 
+/// The known word nearest to `word`, if any is near.
+pub(crate) fn nearest_word<'a>(word: &str, known: &'a [String]) -> Option<&'a str> {
+    let edits = |other: &String| strsim::damerau_levenshtein(word, other);
+    known
+        .iter()
+        .min_by_key(|other| edits(other))
+        .filter(|other| edits(other) <= 1 + word.len() / 4)
+        .map(String::as_str)
+}
+
 /// The known key nearest to `key`, if any is near.
 fn nearest<'a>(key: &str, known: &'a [String]) -> Option<&'a str> {
     known
         .iter()
         .map(|candidate| (distance(key, candidate), candidate.as_str()))
         .min()
-        .filter(|&(distance, _)| distance <= 2 + key.len() / 6)
+        .filter(|&(distance, _)| distance <= 3 + key.len() / 8)
         .map(|(_, candidate)| candidate)
 }
 
-/// Edits from `key` to `candidate`. The wrong section costs one edit, a forgotten
-/// unit or a wrong one as well.
+/// How far `candidate` is from `key`: edits, twice as far in a short name. The wrong section
+/// costs one, so does the wrong unit or none, and each word that was left out.
 fn distance(key: &str, candidate: &str) -> usize {
-    let edits = strsim::damerau_levenshtein(key, candidate);
     let ((section, found), (its_section, wanted)) = (split(key), split(candidate));
-    if wanted.is_empty() || found.is_empty() {
-        return edits;
+    if its_section.is_empty() && !section.is_empty() {
+        // A section is no key of another one.
+        return usize::MAX;
     }
-    let leaf = 1 + strsim::damerau_levenshtein(found, wanted);
-    let same_stem = wanted.strip_prefix(found).is_some_and(|rest| rest.starts_with('_'))
-        || stem(found) == stem(wanted);
-    let stem = if same_stem { 1 + usize::from(section != its_section) } else { edits };
-    edits.min(leaf).min(stem)
+    let edits = |a: &str, b: &str| {
+        let edits = strsim::damerau_levenshtein(a, b);
+        if a.len() < 6 { 2 * edits } else { edits }
+    };
+    let elsewhere = usize::from(!section.is_empty() && section != its_section);
+    if found == wanted {
+        return elsewhere;
+    }
+    let (ours, its) = (stem(found), stem(wanted));
+    let words = || ours.split('_').filter(|word| !word.is_empty());
+    let has_all = words().all(|word| its.split('_').any(|other| other == word));
+    let left_out = its.split('_').count().saturating_sub(words().count());
+    let of_words =
+        if has_all && words().next().is_some() { 1 + left_out + elsewhere } else { usize::MAX };
+    of_words.min(1 + elsewhere + edits(ours, its))
 }
 
 /// Section and name; a key without a dot is a name without section.
@@ -246,6 +299,12 @@ mod tests {
             ("rig.step_height", "rig.step_height_mm"),
             ("seed", "run.seed"),
             ("drive.cruise_speed_m_s", "drive.cruise_speed_mm_s"),
+            ("sead", "run.seed"),
+            ("tread.mu", "plant.mu"),
+            ("rig.friction", "mismatch.friction"),
+            ("tread.thickness_mm", "mismatch.tread_thickness_mm"),
+            ("plant.mass_kg", "plant.moved_mass_kg"),
+            ("limit", "preload.limit_n"),
         ] {
             assert_eq!(nearest(key, &known), Some(wanted), "{key}");
         }
@@ -253,13 +312,15 @@ mod tests {
 
     #[test]
     fn does_not_guess_when_nothing_is_near() {
-        assert_eq!(nearest("colour.of_the_sleeve", &known()), None);
+        for key in ["colour.of_the_sleeve", "preload.max_n", "preload.noise_n"] {
+            assert_eq!(nearest(key, &known()), None, "{key}");
+        }
     }
 
     #[test]
     fn every_key_has_a_description_and_every_description_a_key() {
         let table = Table::try_from(crate::scenario::Scenario::default()).expect("a table");
-        let listed = list(&table);
+        let listed = list(&table, &[]);
         assert_eq!(listed.len(), leaves(&table).len());
         assert_eq!(listed.len(), descriptions().len());
         assert!(listed.iter().all(|key| key.description.len() > 4));

@@ -30,6 +30,11 @@ impl Provenance {
         self.written.get(key).unwrap_or(&self.preset)
     }
 
+    /// Whether a file or an override has the key.
+    pub(super) fn is_written(&self, key: &str) -> bool {
+        self.written.contains_key(key)
+    }
+
     /// Where the first key of `message` that is not the preset's own was written.
     pub(super) fn of_message(&self, message: &str) -> &str {
         let written = message.split([' ', ':', ',']).find_map(|word| self.written.get(word));

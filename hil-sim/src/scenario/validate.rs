@@ -1,8 +1,10 @@
 //! Checks a scenario, after the rig's own checks.
 
+use interstage::rig::{Bound, RigError};
+
 use super::injection::entry;
 use super::merge::Provenance;
-use super::{Scenario, ScenarioError, StepAnomaly};
+use super::{Scenario, ScenarioError, StepAnomaly, keys};
 
 /// Largest offset of an early or late step, mm.
 const MAX_OFFSET_MM: f64 = 20.0;
@@ -13,7 +15,7 @@ const MAX_HIGHER_MM: f64 = 4.0;
 /// Checks every value against its range and the values against one another.
 pub(super) fn check(scenario: &Scenario, from: &Provenance) -> Result<(), ScenarioError> {
     let refused = |message: String| ScenarioError::at(from.of_message(&message), &message);
-    scenario.rig.validate().map_err(|error| refused(error.to_string()))?;
+    scenario.rig.validate().map_err(|error| of_rig(&error, scenario, from))?;
     for (key, value, max) in ranges(scenario) {
         in_range(from.of(key), key, value, (0.0, max))?;
     }
@@ -28,6 +30,36 @@ pub(super) fn check(scenario: &Scenario, from: &Provenance) -> Result<(), Scenar
     checked.map_err(|refusal| refused(refusal.to_string()))
 }
 
+/// What is wrong with the rig, said of the key that was written, not of another one that does not
+/// go with it.
+fn of_rig(error: &RigError, scenario: &Scenario, from: &Provenance) -> ScenarioError {
+    let text = error.to_string();
+    let [first, others @ ..] = error.keys() else { return ScenarioError::at("scenario", text) };
+    if from.is_written(first) {
+        return ScenarioError::at(from.of(first), text);
+    }
+    if let Some((key, value, bound)) = error.other_side().filter(|side| from.is_written(side.0)) {
+        let expected = match bound {
+            Bound::AtLeast(least) => format!("at least {least:.1}"),
+            Bound::AtMost(most) => format!("at most {most:.1}"),
+        };
+        let place = text.split(": ").next().unwrap_or(first);
+        return ScenarioError::wrong(from.of(key), key, value, format!("{expected}, as {place}"));
+    }
+    let table = scenario.table();
+    let value = |key: &str| {
+        let leaf = keys::leaves(&table).into_iter().find(|(name, _)| name == key)?;
+        Some(leaf.1.to_string())
+    };
+    match others.iter().find(|key| from.is_written(key)) {
+        Some(key) => {
+            let value = value(key).unwrap_or_default();
+            ScenarioError::at(from.of(key), format!("{key} = {value} does not fit {text}"))
+        }
+        None => ScenarioError::at(from.of(first), text),
+    }
+}
+
 fn in_range(
     origin: &str,
     key: &str,
@@ -39,6 +71,15 @@ fn in_range(
         return Ok(());
     }
     Err(ScenarioError::out_of_range(origin, key, value, (min, max)))
+}
+
+/// Every key that is a number with its least and largest value.
+pub(super) fn all_ranges(scenario: &Scenario) -> Vec<(String, (f64, f64))> {
+    let rig = scenario.rig.bounds().map(|(key, _, min, max)| (key.to_owned(), (min, max)));
+    let plant = ranges(scenario).map(|(key, _, max)| (key.to_owned(), (0.0, max)));
+    let mismatch = scenario.mismatch.values();
+    let mismatch = mismatch.map(|(field, _)| (format!("mismatch.{}", field.name), field.range));
+    rig.into_iter().chain(plant).chain(mismatch).collect()
 }
 
 /// Keys with their value and largest value; the least is 0.

@@ -6,7 +6,7 @@ use toml::{Table, Value};
 
 use super::error::ScenarioError;
 use super::injection::{self, CATALOGUE, HARDWARE};
-use super::keys::Kind;
+use super::keys::{Kind, nearest_word};
 use super::run::StepAnomaly;
 
 /// Key and text of `key=value`.
@@ -159,6 +159,15 @@ impl Entry<'_> {
             }
             other => {
                 let found = other.map_or_else(|| "nothing".to_owned(), Value::to_string);
+                let near =
+                    other.and_then(Value::as_str).and_then(|word| nearest_word(word, &known));
+                if let Some(near) = near {
+                    let what = format!(
+                        "{} = {found}: no such {name}, did you mean \"{near}\"?",
+                        self.key(name)
+                    );
+                    return Err(ScenarioError::at(self.origin, what));
+                }
                 let known: Vec<String> = known.iter().map(|word| format!("\"{word}\"")).collect();
                 Err(self.wrong(name, &found, &known.join(" or ")))
             }

@@ -58,9 +58,16 @@ fn writes_its_files_and_prints_every_key() {
         assert_keys(crossing, &CROSSING_KEYS);
     }
     let files = summary["files"].as_array().unwrap();
-    assert_eq!(files.len(), 5);
+    assert_eq!(files.len(), 6);
     let run = Path::new("out/deploy-prototype-scheduled-0");
-    for name in ["report.html", "log.mcap", "log.csv", "summary.json", "overview.svg"] {
+    for name in [
+        "report.html",
+        "log.mcap",
+        "log.csv",
+        "log.csv-metadata.json",
+        "summary.json",
+        "overview.svg",
+    ] {
         let file = run.join(name);
         assert!(files.contains(&Value::from(file.to_str().unwrap())), "{name}");
         assert!(directory.path().join(&file).metadata().unwrap().len() > 100, "{name}");

@@ -122,7 +122,7 @@ fn a_log_of_other_parameters_is_refused_until_they_are_given() {
         .expect("a file")
         .map(|message| message.expect("intact"))
         .filter(|message| message.channel.topic == hil_sim::record::FRAMES)
-        .flat_map(|message| message.data.to_vec())
+        .flat_map(|message| hil_sim::record::unwrapped(&message.data).to_vec())
         .collect();
     std::fs::write(directory.path().join("line.bin"), frames).expect("written");
     refused_in(directory.path(), &["replay", "line.bin"], &["made with parameters"]);

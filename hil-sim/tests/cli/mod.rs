@@ -4,8 +4,11 @@ mod campaigns;
 mod crossing;
 mod deploy;
 mod input;
+mod kept;
 mod logs;
 mod others;
+mod read_back;
+mod sweep;
 
 use std::path::Path;
 use std::process::{Command, Output};

@@ -22,6 +22,45 @@ fn keys_are_listed_with_unit_default_and_description() {
 }
 
 #[test]
+fn keys_are_found_by_a_pattern_with_range_and_mark() {
+    let found = good(&["keys", "--json", "FRICTION"]);
+    let keys = found["keys"].as_array().unwrap();
+    assert!(keys.len() > 2 && keys.len() < 20, "{}", keys.len());
+    let of = |name: &str| keys.iter().find(|key| key["key"] == name).unwrap();
+    // Its description has the word.
+    assert_eq!(
+        (&of("plant.mu")["range"][1], &of("plant.mu")["measure"]),
+        (&3.0.into(), &true.into())
+    );
+    assert_eq!(of("mismatch.friction")["measure"], false);
+    let text = stdout(&rig(&["keys", "Preload.limit"])).to_owned();
+    assert!(text.contains("5 to 180") && !text.contains("drive."), "{text}");
+    super::refused(&["keys", "sleeve colour"], &["sleeve colour", "`rig keys`"]);
+    let all = good(&["keys", "--json"]);
+    let without: Vec<&str> = all["keys"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|key| key["default"].is_number() && key["range"].is_null())
+        .map(|key| key["key"].as_str().unwrap())
+        .collect();
+    assert!(without.is_empty(), "numbers without a range: {without:?}");
+}
+
+#[test]
+fn a_shell_completes_verbs_and_options_and_help_takes_a_verb() {
+    for shell in ["bash", "zsh", "fish"] {
+        let output = rig(&["completions", shell]);
+        assert_eq!(code(&output), 0);
+        for word in ["montecarlo", "sweep", "seed"] {
+            assert!(stdout(&output).contains(word), "{shell} {word}");
+        }
+    }
+    let (help, option) = (rig(&["help", "sweep"]), rig(&["sweep", "--help"]));
+    assert_eq!((code(&help), stdout(&help)), (0, stdout(&option)));
+}
+
+#[test]
 fn help_lists_the_verbs_and_is_no_error() {
     let output = rig(&["--help"]);
     assert_eq!(code(&output), 0);
@@ -37,6 +76,34 @@ fn help_lists_the_verbs_and_is_no_error() {
     let text = stdout(&rig(&["deploy", "--help"])).to_owned();
     assert!(text.contains("board") && text.contains("probe"), "{text}");
     assert!(stdout(&rig(&["--version"])).starts_with("rig "));
+}
+
+/// A program in the place of cargo, which says and writes this.
+#[cfg(unix)]
+fn cargo_that(says: &str) -> (tempfile::TempDir, std::path::PathBuf) {
+    use std::os::unix::fs::PermissionsExt;
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("cargo");
+    let artifact =
+        r#"{"reason":"compiler-artifact","target":{"name":"rig-study"},"executable":"/bin/true"}"#;
+    std::fs::write(&path, format!("#!/bin/sh\nprintf '{says}' >&2\necho '{artifact}'\n")).unwrap();
+    std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).unwrap();
+    (directory, path)
+}
+
+#[cfg(unix)]
+#[test]
+fn a_build_is_announced_only_when_something_is_built() {
+    let started = |says: &str| {
+        let (_directory, cargo) = cargo_that(says);
+        let mut rig = Command::new(env!("CARGO_BIN_EXE_rig"));
+        let output = rig.env("CARGO", cargo).arg("modes").output().expect("the command starts");
+        assert_eq!(code(&output), 0, "{}", stderr(&output));
+        stderr(&output)
+    };
+    assert_eq!(started("    Finished dev\\n"), "");
+    let text = started("   Compiling a v1\\n    Building [=> ] 30/42: a\\r    Finished dev\\n");
+    assert_eq!(text, "building the study, once: 12 units to compile\n");
 }
 
 fn flash_by(program: &std::path::Path, arguments: &[&str]) -> Output {

@@ -12,8 +12,13 @@ with open(sys.argv[1], "rb") as file:
     for schema, channel, message in reader.iter_messages(log_time_order=False):
         topic = channel.topic
         counts[topic] = counts.get(topic, 0) + 1
-        if channel.message_encoding != "json":
-            frames += message.data
+        if channel.message_encoding == "protobuf":
+            # One field of bytes: its tag, its length in groups of seven bits, its bytes.
+            length = 1
+            while message.data[length] & 0x80:
+                length += 1
+            assert message.data[0] == 0x0A and schema.encoding == "protobuf"
+            frames += message.data[length + 1 :]
             continue
         assert message.log_time >= before, f"{topic} goes back in time"
         before = message.log_time

@@ -61,7 +61,7 @@ fn stream(mcap: &[u8]) -> Vec<u8> {
     messages
         .filter_map(Result::ok)
         .filter(|message| message.channel.topic == hil_sim::record::FRAMES)
-        .flat_map(|message| message.data.to_vec())
+        .flat_map(|message| hil_sim::record::unwrapped(&message.data).to_vec())
         .collect()
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use hil_sim::cli::deploy::{Args, looped, read, write};
+use hil_sim::cli::deploy::{Args, looped, place, read, write};
 use hil_sim::cli::failure::{Failure, Outcome};
 use hil_sim::cli::output;
 use hil_sim::firmware::{self, Profile};
@@ -59,6 +59,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
     let mut files = Vec::new();
     if let Some(directory) = directory {
         let section = Section { title: TITLE, body: ran.load.html(&missed) };
+        let directory = place(args, &ran.recording.summary, &directory);
         files = write(&ran.recording, &[section], &directory)?;
         let log = directory.join("log.txt");
         let lines = ran.recording.log.iter();

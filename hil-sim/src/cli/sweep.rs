@@ -1,0 +1,282 @@
+//! `rig sweep`: a key over a range, or several over a grid.
+
+use std::path::{Path, PathBuf};
+
+use interstage::units::Direction as Way;
+use rayon::prelude::*;
+use serde_json::{Map, Value, json};
+
+use super::crossing::{CrossingSetup, Method};
+use super::failure::{Failure, Outcome};
+use super::output;
+use super::scenario::RunArgs;
+use crate::files::{make_directory, vacant_for, write_text};
+use crate::progress::{self, Progress};
+use crate::scenario::{Direction, Scenario, brief};
+use crate::session::{self, Options};
+use crate::sweep::{self, Axis, MOST, Plot};
+use crate::table::{number, plain};
+
+/// Names of the pseudo-keys of an isolated crossing.
+const SPEED: &str = "speed_mm_s";
+const PRELOAD: &str = "preload_n";
+
+/// Runs a deployment, or one isolated crossing, for each value of a key, or at each place of a
+/// grid of several: table, CSV and picture.
+///
+/// A deployment gives its worst gap, duration and slip. With --crossing the rows are crossings
+/// at constant speed and preload, which are keys there: speed_mm_s and preload_n.
+#[derive(Debug, clap::Args)]
+pub(super) struct Args {
+    /// A key and its values, may be repeated: KEY=LOW..HIGH:COUNT, evenly; LOW..HIGH:COUNTlog,
+    /// evenly in the logarithm; or KEY=A,B,C.
+    #[arg(long, value_name = "KEY=VALUES", required_unless_present = "crossing")]
+    key: Vec<Axis>,
+
+    /// One isolated crossing a row; without --key its gap against speed at cruise preload and
+    /// at the limit.
+    #[arg(long)]
+    crossing: bool,
+
+    /// With --crossing: what computes it.
+    #[arg(long, value_enum, requires = "crossing", default_value_t = Method::Ring)]
+    method: Method,
+
+    /// With --crossing: driven by torque against this wheel's share of the top load.
+    #[arg(long, requires = "crossing")]
+    driven: bool,
+
+    #[command(flatten)]
+    run: RunArgs,
+
+    /// Directory of table and picture; by default one in out, named after the keys.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+
+    /// Writes no files.
+    #[arg(long, conflicts_with = "out")]
+    no_files: bool,
+
+    /// Prints the rows as one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+type Row = Map<String, Value>;
+
+/// What is found at each place: columns with their headings and decimals, and what is plotted.
+struct Measure {
+    columns: &'static [(&'static str, &'static str, usize)],
+    plots: Vec<Plot>,
+}
+
+pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
+    let base = args.run.resolve()?;
+    let axes = axes(args, &base)?;
+    let places = sweep::places(&axes);
+    // Everything is checked before anything is run.
+    let points: Vec<Point> = places
+        .iter()
+        .map(|place| Point::of(args, &base, &axes, place))
+        .collect::<Result<_, _>>()?;
+    let measure = if args.crossing { of_crossing(args.driven) } else { of_run() };
+    let rows = {
+        let bar =
+            progress::bar(if args.crossing { "crossings" } else { "runs" }, points.len() as u64);
+        let one = |(point, place): (&Point, &Vec<&str>)| {
+            Ok(sweep::row(&axes, place, point.found(args.method, &bar)?))
+        };
+        points.par_iter().zip(&places).map(one).collect::<Result<Vec<Row>, Failure>>()?
+    };
+    let files = if args.no_files { Vec::new() } else { write(args, &axes, &rows, &measure)? };
+    let printed = json!({ "rows": rows, "files": files });
+    output::result(args.json, &printed, || human(&axes, &rows, &measure) + &output::wrote(&files))?;
+    Ok(Outcome::Good)
+}
+
+/// The keys that were given, or the usual ones of a crossing.
+fn axes(args: &Args, base: &Scenario) -> Result<Vec<Axis>, Failure> {
+    let mut axes = args.key.clone();
+    if axes.is_empty() {
+        let preload = &base.rig.preload;
+        let usual = [
+            format!("{SPEED}=2..30:15"),
+            format!("{PRELOAD}={},{}", preload.cruise_n, preload.limit_n),
+        ];
+        axes = usual
+            .iter()
+            .map(|text| text.parse())
+            .collect::<Result<_, _>>()
+            .map_err(Failure::run)?;
+    }
+    for (index, axis) in axes.iter().enumerate() {
+        if axes[..index].iter().any(|other| other.key == axis.key) {
+            return Err(Failure::input(format!("--key {}: given twice", axis.key)));
+        }
+        if !args.crossing && [SPEED, PRELOAD].contains(&&*axis.key) {
+            return Err(Failure::input(format!("--key {}: takes --crossing", axis.key)));
+        }
+    }
+    let count = axes.iter().try_fold(1_usize, |count, axis| count.checked_mul(axis.values.len()));
+    match count {
+        Some(1..=MOST) => Ok(axes),
+        _ => Err(Failure::input(format!("--key: a grid of more than {MOST} places"))),
+    }
+}
+
+/// A place of the grid.
+struct Point {
+    scenario: Scenario,
+    crossing: Option<CrossingSetup>,
+}
+
+impl Point {
+    fn of(args: &Args, base: &Scenario, axes: &[Axis], place: &[&str]) -> Result<Self, Failure> {
+        let all = || axes.iter().map(|axis| &*axis.key).zip(place.iter().copied());
+        let own = |key: &str| args.crossing && [SPEED, PRELOAD].contains(&key);
+        let keys = all().filter(|(key, _)| !own(key));
+        let sets: Vec<String> = keys.map(|(key, value)| format!("{key}={value}")).collect();
+        let scenario = base.clone().with(&sets)?;
+        if !args.crossing {
+            return Ok(Self { scenario, crossing: None });
+        }
+        let given = |name: &str, usual: f64| match all().find(|(key, _)| *key == name) {
+            Some((_, text)) => text
+                .parse()
+                .map_err(|_| Failure::input(format!("--key {name}={text}: expected a number"))),
+            None => Ok(usual),
+        };
+        let loads = &scenario.rig.plant;
+        let setup = CrossingSetup {
+            speed_mm_s: given(SPEED, scenario.rig.control.safe_speed_mm_s)?,
+            preload_n: given(PRELOAD, scenario.rig.preload.cruise_n)?,
+            direction: match scenario.run.direction {
+                Direction::Deploy => Way::Deploy,
+                Direction::Retract => Way::Retract,
+            },
+            load_n: args.driven.then_some(loads.top_load_n * loads.top_load_share),
+        };
+        setup.check(["--key speed_mm_s", "--key preload_n"])?;
+        Ok(Self { scenario, crossing: Some(setup) })
+    }
+
+    /// What is found here.
+    fn found(&self, method: Method, bar: &Progress) -> Result<Row, Failure> {
+        let found = match &self.crossing {
+            Some(setup) => {
+                let (figures, outside) = setup.compute(method, &self.scenario)?;
+                let mut found = json!(figures);
+                found["in_range"] = outside.is_empty().into();
+                found
+            }
+            None => {
+                let summary = session::run(&self.scenario, Options::default())?.summary;
+                let over_ref = summary.max_gap_mm / summary.gap_ref_mm;
+                json!({
+                    "completed": summary.completed,
+                    "max_gap_mm": summary.max_gap_mm,
+                    "gap_over_ref": (summary.gap_ref_mm > 0.0).then_some(over_ref),
+                    "duration_s": summary.duration_s,
+                    "slip_mm": summary.slip_mm,
+                    "faults": summary.faults.iter().map(|fault| fault.code).collect::<Vec<_>>(),
+                })
+            }
+        };
+        bar.advance(1);
+        Ok(found.as_object().cloned().unwrap_or_default())
+    }
+}
+
+fn of_run() -> Measure {
+    let plot = |column, title, y_name, level| Plot { column, title, y_name, level };
+    Measure {
+        columns: &[
+            ("completed", "completed", 0),
+            ("max_gap_mm", "worst gap\nmm", 3),
+            ("gap_over_ref", "over\nreference", 4),
+            ("duration_s", "duration\ns", 2),
+            ("slip_mm", "slip\nmm", 3),
+            ("faults", "faults", 0),
+        ],
+        plots: vec![
+            plot("max_gap_mm", "Worst gap", "gap, mm", None),
+            plot("duration_s", "Duration from the command", "duration, s", None),
+            plot("slip_mm", "Gross slip", "slip, mm", None),
+        ],
+    }
+}
+
+fn of_crossing(is_driven: bool) -> Measure {
+    let columns: &[_] = &[
+        ("gap_mm", "gap\nmm", 3),
+        ("corner_force_n", "corner\nN", 2),
+        ("embedding_mm", "embedding\nmm", 3),
+        ("climb_work_mj", "work\nmJ", 1),
+        ("in_range", "in range", 0),
+        ("mu_needed", "friction\nneeded", 3),
+    ];
+    let plot = |column, title, y_name| Plot { column, title, y_name, level: None };
+    let mut plots = vec![
+        plot("gap_mm", "Gap of the crossing", "gap, mm"),
+        plot("corner_force_n", "Corner force", "force, N"),
+    ];
+    if is_driven {
+        plots.push(plot("mu_needed", "Friction needed", "friction"));
+    }
+    Measure { columns: if is_driven { columns } else { &columns[..5] }, plots }
+}
+
+fn write(
+    args: &Args,
+    axes: &[Axis],
+    rows: &[Row],
+    measure: &Measure,
+) -> Result<Vec<PathBuf>, Failure> {
+    let keys: Vec<&str> = axes.iter().map(|axis| &*axis.key).collect();
+    let what = if args.crossing { "crossing" } else { "deploy" };
+    let usual = || Path::new("out").join(format!("sweep-{what}-{}", keys.join("-")));
+    let directory = args.out.clone().unwrap_or_else(usual);
+    let columns: Vec<String> = keys
+        .iter()
+        .copied()
+        .chain(measure.columns.iter().map(|column| column.0))
+        .map(str::to_owned)
+        .collect();
+    let table = sweep::csv(&columns, rows).map_err(Failure::run)?;
+    let directory = if args.out.is_some() {
+        directory
+    } else {
+        // Another sweep of these keys keeps its folder.
+        let file = |folder: &Path| folder.join("sweep.csv");
+        crate::files::vacant(&directory, |folder| vacant_for(&file(folder), &table) == file(folder))
+    };
+    make_directory(&directory)?;
+    let mut files = vec![directory.join("sweep.csv")];
+    write_text(&files[0], &table)?;
+    if let Some(picture) = sweep::picture(axes, rows, &measure.plots) {
+        files.push(directory.join("sweep.svg"));
+        write_text(&files[1], &picture)?;
+    }
+    Ok(files)
+}
+
+fn human(axes: &[Axis], rows: &[Row], measure: &Measure) -> String {
+    let head: Vec<&str> = axes
+        .iter()
+        .map(|axis| &*axis.key)
+        .chain(measure.columns.iter().map(|column| column.1))
+        .collect();
+    let cell = |row: &Row, name: &str, decimals: usize| match row.get(name) {
+        None | Some(Value::Null) => "-".to_owned(),
+        Some(Value::Bool(yes)) => if *yes { "yes" } else { "no" }.to_owned(),
+        Some(Value::Number(value)) => number(value.as_f64(), decimals),
+        Some(Value::Array(list)) if list.is_empty() => "-".to_owned(),
+        Some(other) => brief(other),
+    };
+    let lines = rows.iter().map(|row| {
+        let keys = axes.iter().map(|axis| brief(&row[&axis.key]));
+        keys.chain(measure.columns.iter().map(|(name, _, decimals)| cell(row, name, *decimals)))
+            .collect()
+    });
+    format!("{}\n", plain(&head, lines))
+}

@@ -1,0 +1,95 @@
+//! Two runs on one rig in the same plots over time: what the one holds and the other does not.
+
+use plotters::style::RGBColor;
+
+use super::axis;
+use super::palette;
+use super::panel::{Line, Look, Marks, Panel, Shape};
+use super::panels::{Across, View};
+use super::svg;
+use crate::record::{CrossingLine, Recording, Tick};
+
+/// Size, CSS pixels.
+const SIZE: (u32, u32) = (1000, 860);
+/// More height for the last plot, which has the time axis.
+const AXIS_HEIGHT: u32 = 36;
+/// Colours of the two.
+const COLOURS: [RGBColor; 2] = [palette::PRELOAD, palette::SPEED];
+
+/// The picture of two runs with their names: preload, position, slip and gap.
+#[must_use]
+pub fn beside_svg(runs: [(&str, &Recording); 2]) -> String {
+    let views = runs.map(|(_, run)| View::new(run, Across::Time));
+    let x = (0.0, views[0].x.1.max(views[1].x.1));
+    let line = |of: &dyn Fn(&Tick) -> f64| -> Vec<Line> {
+        let all = views.iter().zip(runs).zip(COLOURS);
+        all.map(|((view, (name, _)), colour)| {
+            let points = view.rows.iter().map(|row| (row.controller.t_s, of(row))).collect();
+            Line { name: name.to_owned().into(), look: Look::Other(colour), points }
+        })
+        .collect()
+    };
+    let panel = |title: &str, y_name, of: &dyn Fn(&Tick) -> f64| Panel {
+        x,
+        x_name: None,
+        lines: line(of),
+        shades: Vec::new(),
+        ..views[0].panel(title, y_name)
+    };
+    let mut preload = panel("Preload", "preload, N", &|row| row.controller.preload_n);
+    preload.levels = views[0].limit_n.iter().map(|&n| ("limit", Look::Limit, n)).collect();
+    let position = panel("Position on the sleeve", "position, mm", &Tick::position_mm);
+    let mut slip = panel("Gross slip of the wheel", "slip, mm", &|row| row.of_truth(|t| t.slip_mm));
+    slip.least_span = 2.0;
+    let mut last = gap(&views, runs, panel("Gap at the steps", "gap, mm", &|_| f64::NAN));
+    last.x_name = Some(Across::Time.name());
+    let height = svg::SCALE * (SIZE.1 - AXIS_HEIGHT) / 4;
+    svg::fixed(SIZE, |area| {
+        let mut rest = area.clone();
+        for panel in [&preload, &position, &slip] {
+            let (top, below) = rest.split_vertically(height);
+            panel.draw(&top)?;
+            rest = below;
+        }
+        last.draw(&rest)
+    })
+}
+
+/// The gap of every crossing, beside the reference.
+fn gap(views: &[View; 2], runs: [(&str, &Recording); 2], mut panel: Panel) -> Panel {
+    let own = |line: &CrossingLine| {
+        let gap = Some(line.gap_mm).filter(|gap| gap.is_finite());
+        Some((line.lift_s, gap.or(line.gap_measured_mm)?))
+    };
+    panel.lines.clear();
+    let all = views.iter().zip(runs).zip(COLOURS);
+    panel.marks = all
+        .map(|((view, (name, _)), colour)| {
+            let points = view.recording.summary.crossings.iter().filter_map(own).collect();
+            Marks { name: name.to_owned().into(), shape: Shape::Dot, colour, shift: 0, points }
+        })
+        .collect();
+    let reference = runs.iter().map(|(_, run)| run.summary.gap_ref_mm).find(|gap| *gap > 0.0);
+    panel.levels = reference.iter().map(|&gap| ("reference gap", Look::Limit, gap)).collect();
+    let gaps = panel.marks.iter().flat_map(|marks| &marks.points).map(|point| point.1);
+    let range = axis::extent(gaps.chain(reference));
+    panel.y = range.map(|(low, high)| (0.8 * low, 1.15 * high));
+    panel
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::example;
+
+    #[test]
+    fn both_runs_are_in_every_plot() {
+        let (a, b) = (example::deploy(), example::faulted());
+        let svg = beside_svg([("scheduled preload", &a), ("constant preload", &b)]);
+        // The first has a gap at each of three steps, the second at one.
+        for name in ["scheduled preload", "constant preload"] {
+            assert_eq!(svg.matches(name).count(), 4, "{name}");
+        }
+        assert!(svg.contains("reference gap") && !svg.contains("NaN"));
+    }
+}

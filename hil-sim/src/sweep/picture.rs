@@ -1,0 +1,85 @@
+//! A sweep as a picture: each figure over the first key that has numbers, a line for each
+//! combination of the others.
+
+use serde_json::{Map, Value};
+
+use super::Axis;
+use crate::report::axis;
+use crate::report::palette;
+use crate::report::panel::{Line, Look, Panel};
+use crate::report::svg;
+use crate::scenario::brief;
+
+/// Size of a plot, CSS pixels.
+const SIZE: (u32, u32) = (1000, 280);
+
+/// Colours of the lines, in their order.
+const COLOURS: [plotters::style::RGBColor; 6] = [
+    palette::SPEED,
+    palette::PRELOAD,
+    palette::GAP,
+    palette::SLIP,
+    palette::COMPRESSION,
+    palette::RADIUS,
+];
+
+/// A figure of the rows that is plotted.
+#[derive(Clone, Copy, Debug)]
+pub struct Plot {
+    /// Its name in the rows.
+    pub column: &'static str,
+    /// Its title.
+    pub title: &'static str,
+    /// Name of its axis, with the unit.
+    pub y_name: &'static str,
+    /// A level with its name.
+    pub level: Option<(&'static str, f64)>,
+}
+
+/// The picture as SVG; none if no key has numbers.
+#[must_use]
+pub fn picture(axes: &[Axis], rows: &[Map<String, Value>], plots: &[Plot]) -> Option<String> {
+    let is_numeric = |axis: &&Axis| axis.values.iter().all(|value| value.parse::<f64>().is_ok());
+    let x = axes.iter().find(is_numeric)?;
+    let others: Vec<&Axis> = axes.iter().filter(|axis| axis.key != x.key).collect();
+    let group = |row: &Map<String, Value>| {
+        let parts = others.iter().map(|axis| format!("{} = {}", axis.key, brief(&row[&axis.key])));
+        parts.collect::<Vec<_>>().join(", ")
+    };
+    let mut names: Vec<String> = rows.iter().map(group).collect();
+    names.dedup();
+    let mut seen = std::collections::HashSet::new();
+    names.retain(|name| seen.insert(name.clone()));
+    let number = |row: &Map<String, Value>, key: &str| row[key].as_f64().unwrap_or(f64::NAN);
+    let range = axis::extent(rows.iter().map(|row| number(row, &x.key)))?;
+    let size = (SIZE.0, SIZE.1 * plots.len() as u32);
+    // The text lives as long as the process, which ends after the picture.
+    let x_name: &'static str = x.key.clone().leak();
+    Some(svg::fixed(size, |area| {
+        for (area, plot) in area.split_evenly((plots.len(), 1)).iter().zip(plots) {
+            let line = |(place, name): (usize, &String)| {
+                let own = rows.iter().filter(|row| group(row) == *name);
+                let mut points: Vec<(f64, f64)> =
+                    own.map(|row| (number(row, &x.key), number(row, plot.column))).collect();
+                points.sort_by(|a, b| a.0.total_cmp(&b.0));
+                let name = if name.is_empty() { plot.title } else { name };
+                let look = Look::Other(COLOURS[place % COLOURS.len()]);
+                Line { name: name.to_owned().into(), look, points }
+            };
+            let panel = Panel {
+                title: plot.title.to_owned(),
+                y_name: plot.y_name,
+                x_name: Some(x_name),
+                x: range,
+                y: None,
+                least_span: 0.0,
+                lines: names.iter().enumerate().map(line).collect(),
+                marks: Vec::new(),
+                levels: plot.level.iter().map(|(name, at)| (*name, Look::Limit, *at)).collect(),
+                shades: Vec::new(),
+            };
+            panel.draw(area)?;
+        }
+        Ok(())
+    }))
+}

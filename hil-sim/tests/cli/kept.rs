@@ -1,0 +1,148 @@
+//! A run's files say what the run was, and no run takes another one's place unasked.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use super::{code, number, object, refused_in, rig_in, stderr, stdout};
+
+fn good(at: &Path, arguments: &[&str]) -> std::process::Output {
+    let output = rig_in(at, arguments);
+    assert_eq!(code(&output), 0, "{arguments:?}: {}", stderr(&output));
+    output
+}
+
+/// Where a command wrote the file of this name.
+fn wrote(found: &Value, name: &str) -> PathBuf {
+    let files = found["files"].as_array().expect("files").iter();
+    let mut paths = files.map(|file| PathBuf::from(file.as_str().expect("a path")));
+    paths.find(|path| path.ends_with(name)).unwrap_or_else(|| panic!("{name}: {found}"))
+}
+
+#[test]
+fn folder_banner_and_summary_carry_overrides_draw_and_version() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    let arguments =
+        ["deploy", "--seed", "3", "--set", "tread.tau_s=0.2", "--set", "preload.limit_n=52"];
+    let output = good(at, &arguments);
+    let text = stdout(&output).replace("\n  ", " ");
+    assert!(text.contains("seed 3, preload.limit_n = 52, tread.tau_s = 0.2"), "{text}");
+    let folder = at.join("out/deploy-prototype-scheduled-3-preload.limit_n=52-tread.tau_s=0.2");
+    let summary: Value =
+        serde_json::from_slice(&std::fs::read(folder.join("summary.json")).unwrap()).unwrap();
+    assert_eq!(number(&summary["overrides"], "tread.tau_s"), 0.2);
+    assert_eq!(number(&summary["overrides"], "preload.limit_n"), 52.0);
+    assert_eq!(summary["overrides"].as_object().unwrap().len(), 2, "{}", summary["overrides"]);
+    assert_eq!(summary["version"], env!("CARGO_PKG_VERSION"));
+    // The seed's draw is near its nominal value, and not on it.
+    let tau = number(&summary["drawn"], "tread.tau_s");
+    assert!(tau != 0.2 && (tau / 0.2 - 1.0).abs() < 0.5, "{tau}");
+    assert!(number(&summary["drawn"], "plant.mu") > 0.5);
+    let page = std::fs::read_to_string(folder.join("report.html")).unwrap();
+    assert!(page.contains("tread.tau_s = 0.2"));
+}
+
+#[test]
+fn another_run_keeps_its_folder() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    let file = at.join("bench.toml");
+    std::fs::write(&file, "[tread]\ntau_s = 0.2\n").unwrap();
+    let first = object(&good(at, &["deploy", "bench.toml", "--json"]));
+    let again = object(&good(at, &["deploy", "bench.toml", "--json"]));
+    assert_eq!(first["files"], again["files"], "the same run");
+    // The same name, another run.
+    std::fs::write(&file, "[tread]\ntau_s = 0.21\n").unwrap();
+    let output = good(at, &["deploy", "bench.toml", "--json"]);
+    let other = object(&output);
+    assert_ne!(wrote(&first, "summary.json"), wrote(&other, "summary.json"));
+    let digest = |found: &Value| {
+        let text = std::fs::read(at.join(wrote(found, "summary.json"))).unwrap();
+        serde_json::from_slice::<Value>(&text).unwrap()["trace_digest"].clone()
+    };
+    assert_eq!(digest(&first), first["trace_digest"]);
+    assert_eq!(digest(&other), other["trace_digest"]);
+    // Who names the folder gets it, and is told.
+    good(at, &["deploy", "--out", "mine"]);
+    let output = good(at, &["deploy", "--seed", "2", "--out", "mine"]);
+    assert!(stderr(&output).contains("mine: replaces"), "{}", stderr(&output));
+}
+
+#[test]
+fn comparisons_captures_and_identifications_keep_what_is_there() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    for (seed, name) in [("1", "a"), ("2", "b"), ("3", "c")] {
+        good(at, &["deploy", "--seed", seed, "--out", name]);
+    }
+    let compared = |other: &str| {
+        let found = object(&good(at, &["report", "a/log.mcap", other, "--json"]));
+        at.join(found["files"][0].as_str().unwrap())
+    };
+    let (b, c) = (compared("b/log.mcap"), compared("c/log.mcap"));
+    assert_ne!(b, c);
+    assert!(std::fs::read_to_string(&b).unwrap().contains("b/log.mcap"));
+    assert_eq!(compared("b/log.mcap"), b, "the same page");
+
+    let identified = |log: &str| {
+        let found = object(&good(at, &["identify", log, "--json"]));
+        at.join(wrote(&found, "identified.toml"))
+    };
+    let (a, b) = (identified("a/log.mcap"), identified("b/log.mcap"));
+    assert_ne!(a, b);
+    assert!(std::fs::read_to_string(&a).unwrap().contains("a/log.mcap"), "its log is named");
+    assert_eq!(identified("a/log.mcap"), a, "the same result");
+
+    let caught = |arguments: &[&str]| {
+        let output = good(at, &[&["capture", "--json"], arguments].concat());
+        at.join(wrote(&object(&output), "log.mcap").parent().unwrap())
+    };
+    let first = caught(&["--seed", "1"]);
+    let bytes = std::fs::read(first.join("log.mcap")).unwrap();
+    good(at, &["capture", "--seed", "2"]);
+    assert!(bytes == std::fs::read(first.join("log.mcap")).unwrap(), "the first capture");
+    refused_in(at, &["capture", "--name", "log"], &["log.mcap", "--name"]);
+}
+
+#[test]
+fn a_run_without_a_crossing_has_no_gap() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    // The first step is a wall to a wheel without grip.
+    let ice = ["deploy", "--set", "plant.mu=0.05", "--out", "ice"];
+    let output = rig_in(at, &ice);
+    assert_eq!(code(&output), 1, "{}", stderr(&output));
+    let text = stdout(&output);
+    assert!(text.contains("no crossing, so no gap"), "{text}");
+    assert!(!text.contains("below the reference"), "{text}");
+    let summary: Value =
+        serde_json::from_slice(&std::fs::read(at.join("ice/summary.json")).unwrap()).unwrap();
+    assert_eq!(
+        (&summary["max_gap_mm"], &summary["crossings"]),
+        (&Value::Null, &Value::Array(vec![]))
+    );
+    // The log gives the same back.
+    let read = object(&rig_in(at, &["report", "ice/log.mcap", "--json"]));
+    assert_eq!(read["trace_digest"], summary["trace_digest"]);
+    assert!(read["max_gap_mm"].is_null());
+}
+
+#[test]
+fn a_gap_over_the_reference_is_amber_and_has_its_word_everywhere() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    let output = good(
+        at,
+        &["deploy", "--controller", "constant", "--set", "control.gap_ref_mm=2.0", "--out", "run"],
+    );
+    let found: Value =
+        serde_json::from_slice(&std::fs::read(at.join("run/summary.json")).unwrap()).unwrap();
+    assert!(number(&found, "max_gap_mm") > number(&found, "gap_ref_mm"), "{found}");
+    let text = stdout(&output);
+    assert!(text.contains("over the reference gap"), "{text}");
+    let page = std::fs::read_to_string(at.join("run/report.html")).unwrap();
+    assert!(page.contains("<header class=\"fair\">") && page.contains("over the reference gap"));
+    // Colour is for terminals alone.
+    assert!(!text.contains('\u{1b}'));
+}

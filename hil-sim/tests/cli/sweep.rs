@@ -1,0 +1,88 @@
+//! `rig sweep`.
+
+use super::{code, number, object, refused, rig_in, stderr, stdout};
+
+#[test]
+fn a_grid_of_deployments_has_rows_table_and_picture() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    let keys = ["--key", "tread.tau_s=0.05..0.2:3", "--key", "run.controller=scheduled,constant"];
+    let output = rig_in(at, &[&["sweep", "--json"], &keys[..]].concat());
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    let found = object(&output);
+    let rows = found["rows"].as_array().unwrap();
+    assert_eq!(rows.len(), 6);
+    // A row is the run that deploy makes there.
+    let arguments = "deploy --json --no-files --controller constant --set tread.tau_s=0.125";
+    let run = object(&rig_in(at, &arguments.split(' ').collect::<Vec<_>>()));
+    let row = &rows[3];
+    assert_eq!((number(row, "tread.tau_s"), &row["run.controller"]), (0.125, &"constant".into()));
+    for key in ["max_gap_mm", "duration_s", "slip_mm", "completed"] {
+        assert_eq!(row[key], run[key], "{key}");
+    }
+    // A slower tread opens a larger gap at the same speed and preload or crosses slower.
+    assert!(number(&rows[4], "duration_s") > number(&rows[0], "duration_s"));
+    let files: Vec<_> = found["files"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|file| at.join(file.as_str().unwrap()))
+        .collect();
+    let table = std::fs::read_to_string(&files[0]).unwrap();
+    assert_eq!(table.lines().count(), 7);
+    assert!(table.starts_with("tread.tau_s,run.controller,completed,max_gap_mm,"), "{table}");
+    let picture = std::fs::read_to_string(&files[1]).unwrap();
+    for text in ["Worst gap", "Duration", "slip", "tread.tau_s", "run.controller = constant"] {
+        assert!(picture.contains(text), "{text}");
+    }
+    // Other values of the same key leave it alone.
+    let other = ["sweep", "--key", "tread.tau_s=0.1,0.2", "--key", "run.controller=limit"];
+    let output = rig_in(at, &other);
+    assert!(stdout(&output).contains("-2/sweep.csv"), "{}", stdout(&output));
+    assert_eq!(std::fs::read_to_string(&files[0]).unwrap(), table);
+}
+
+#[test]
+fn a_crossing_is_swept_as_it_is_computed_alone() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    let arguments = "sweep --crossing --method reduced --no-files --json --key speed_mm_s=5,8 \
+                     --key preload_n=33.3,50";
+    let found = object(&rig_in(at, &arguments.split_whitespace().collect::<Vec<_>>()));
+    let rows = found["rows"].as_array().unwrap();
+    assert_eq!(rows.len(), 4);
+    let alone = "crossing --method reduced --speed-mm-s 8 --preload-n 50 --json";
+    let alone = object(&rig_in(at, &alone.split(' ').collect::<Vec<_>>()));
+    for key in ["gap_mm", "corner_force_n", "embedding_mm", "in_range"] {
+        assert_eq!(rows[3][key], alone[key], "{key}");
+    }
+    // Without keys: gap against speed at cruise preload and at the limit.
+    let arguments = ["sweep", "--crossing", "--method", "reduced", "--json"];
+    let usual = object(&rig_in(at, &arguments));
+    let rows = usual["rows"].as_array().unwrap();
+    assert_eq!(rows.len(), 30);
+    let of = |preload: f64| {
+        let rows = rows.iter().filter(move |row| number(row, "preload_n") == preload);
+        rows.map(|row| number(row, "gap_mm")).collect::<Vec<_>>()
+    };
+    let (cruise, limit) = (of(33.3), of(50.0));
+    assert!(cruise.is_sorted() && limit.is_sorted(), "a faster crossing opens a larger gap");
+    assert!(cruise.iter().zip(&limit).all(|(a, b)| a > b), "more preload holds a smaller one");
+}
+
+#[test]
+fn what_cannot_be_swept_is_refused_before_anything_runs() {
+    for (key, names) in [
+        ("tread.tau=0.1,0.2", &["did you mean tread.tau_s?"][..]),
+        ("tread.tau_s=0.1..0.2", &["--key", "LOW..HIGH:COUNT"]),
+        ("tread.tau_s=0.1,0", &["tread.tau_s = 0", "0.001 to 10"]),
+        ("speed_mm_s=5,6", &["speed_mm_s: takes --crossing"]),
+        ("run.seed=0..9999:9999", &["run.seed"]),
+    ] {
+        refused(&["sweep", "--key", key], names);
+    }
+    refused(&["sweep"], &["--key"]);
+    refused(&["sweep", "--crossing", "--key", "speed_mm_s=0,5"], &["--key speed_mm_s 0"]);
+    let twice = ["sweep", "--key", "plant.mu=1,2", "--key", "plant.mu=1,2"];
+    refused(&twice, &["plant.mu: given twice"]);
+}
