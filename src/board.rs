@@ -65,16 +65,6 @@ bind_interrupts!(pub(crate) struct Irqs {
 /// The core's clock, Hz.
 const SYSCLK_HZ: u32 = 170_000_000;
 
-/// Guards the stack and starts the clocks.
-pub(crate) fn init() -> Peripherals {
-    stack::guard();
-    let peripherals = embassy_stm32::init(clocks());
-    // At four wait states the core would wait at every line of code that the cache lacks. All
-    // code is in bank 1: the chip's prefetch may fail where code branches between the banks.
-    pac::FLASH.acr().modify(|w| w.set_prften(true));
-    peripherals
-}
-
 /// [`SYSCLK_HZ`] from the internal oscillator: 16 MHz / 4 x 85 / 2. Its 1 % suffices: positions
 /// come from the encoder, and every step is planned again.
 fn clocks() -> Config {
@@ -96,14 +86,18 @@ fn clocks() -> Config {
     config
 }
 
-/// Starts the chip, at its slow clock first: the regulator's boost comes before more than
-/// 150 MHz (RM0440, 6.1.5).
+/// Guards the stack and starts the chip, at its slow clock first: the regulator's boost comes
+/// before more than 150 MHz (RM0440, 6.1.5).
 ///
 /// The driver's own switch for it does not reach the chip: stm32-metapac 21 has `R1MODE` at bit
 /// 0 of `PWR_CR5`, the manual and ST's headers have it at bit 8.
 pub(crate) fn init() -> Peripherals {
+    stack::guard();
     let mut p = embassy_stm32::init(Config::default());
     pac::PWR.cr5().write_value(pac::pwr::regs::Cr5(0));
     rcc::reinit(clocks().rcc, &mut p.RCC);
+    // At four wait states the core would wait at every line of code that the cache lacks. All
+    // code is in bank 1: the chip's prefetch may fail where code branches between the banks.
+    pac::FLASH.acr().modify(|w| w.set_prften(true));
     p
 }

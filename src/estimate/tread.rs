@@ -34,7 +34,7 @@ const SPACING: f64 = 1.0 / 40.0;
 /// half a patch.
 const AHEAD: usize = 19;
 /// Where the rolling tread is observed, over the wheel's radius.
-const ROLLING: [f64; 2] = [0.04, 0.15];
+const ROLLING: [f64; 2] = [0.03, 0.12];
 /// A sum counts 1/256 of its terms, so that a second of 1,000 N fits.
 const LONGEST: u16 = 4096;
 
