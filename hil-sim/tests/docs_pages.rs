@@ -85,6 +85,21 @@ fn every_command_of_the_pages_exists_with_its_options() {
     assert!(seen > 60, "{seen} commands");
 }
 
+#[test]
+fn the_first_deployment_s_page_names_what_to_measure() {
+    let page = fs::read_to_string(root().join("docs/GETTING_STARTED.md")).expect("the page");
+    let output = rig_in(&root(), &["keys", "--json"]);
+    let listed: serde_json::Value = serde_json::from_slice(&output.stdout).expect("keys");
+    let keys = listed["keys"].as_array().expect("keys");
+    let name = |key: &serde_json::Value| key["key"].as_str().expect("a name").to_owned();
+    let measured: Vec<String> =
+        keys.iter().filter(|key| key["measure"] == true).map(name).collect();
+    assert!(measured.len() > 20, "{measured:?}");
+    for key in measured {
+        assert!(page.contains(&format!("`{key}`")), "{key}");
+    }
+}
+
 /// The anchor that a heading gets: lower case, without punctuation, hyphens for blanks.
 fn anchor(heading: &str) -> String {
     let text = heading.trim_start_matches('#').trim().to_lowercase();
