@@ -4,6 +4,7 @@ mod campaigns;
 mod cli;
 mod commands;
 mod common;
+mod docs_pages;
 mod identify;
 mod modes_page;
 mod plant;

@@ -1,0 +1,219 @@
+//! The pages that a user reads: their commands, links, drawings and examples.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use crate::cli::{code, rig_in, stderr};
+
+/// Verbs that another program of the workspace runs; the command's own help lists them.
+const ELSEWHERE: [&str; 3] = ["bench", "modes", "paper"];
+
+/// The workspace.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().expect("the workspace")
+}
+
+/// README, `docs/*.md` and the examples' page, with their places.
+fn pages() -> Vec<(PathBuf, String)> {
+    let root = root();
+    let docs = fs::read_dir(root.join("docs")).expect("docs").map(|entry| entry.unwrap().path());
+    let mut paths: Vec<PathBuf> =
+        docs.filter(|path| path.extension().is_some_and(|ending| ending == "md")).collect();
+    paths.extend([root.join("README.md"), root.join("examples/README.md")]);
+    paths.sort();
+    let page = |path: PathBuf| {
+        let text = fs::read_to_string(&path).expect("a page");
+        (path, text)
+    };
+    paths.into_iter().map(page).collect()
+}
+
+/// Every `cargo rig ...` of a page, up to the end of the code or of the line.
+fn commands(text: &str) -> Vec<&str> {
+    let starts = text.split("cargo rig ").skip(1);
+    starts.map(|rest| rest.split(['`', '\n', '#', '|']).next().unwrap_or_default().trim()).collect()
+}
+
+/// What `rig ARGUMENTS --help` prints.
+fn help(arguments: &[&str]) -> String {
+    let arguments = [arguments, &["--help"]].concat();
+    let output = rig_in(&root(), &arguments);
+    assert_eq!(code(&output), 0, "{arguments:?}: {}", stderr(&output));
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// Whether a text has this word, alone or before `=`, `,` or a blank.
+fn has_word(text: &str, word: &str) -> bool {
+    text.split(|c: char| c.is_whitespace() || "=,[]`".contains(c)).any(|found| found == word)
+}
+
+#[test]
+fn every_command_of_the_pages_exists_with_its_options() {
+    let verbs = help(&[]);
+    let mut helps: BTreeMap<String, String> = BTreeMap::new();
+    let mut seen = 0;
+    for (path, text) in pages() {
+        for command in commands(&text) {
+            let shown = format!("{}: cargo rig {command}", path.display());
+            let words: Vec<&str> = command.split_whitespace().take_while(|w| *w != "--").collect();
+            let (Some(verb), options) =
+                (words.first(), words.iter().filter(|w| w.starts_with("--")))
+            else {
+                panic!("{shown}: no verb");
+            };
+            assert!(
+                verbs.lines().any(|line| line.split_whitespace().next() == Some(verb)),
+                "{shown}"
+            );
+            seen += 1;
+            if ELSEWHERE.contains(verb) {
+                continue;
+            }
+            let mut place = vec![*verb];
+            if *verb == "params" {
+                place.extend(words.get(1).filter(|word| !word.starts_with('-')));
+            }
+            let known = helps.entry(place.join(" ")).or_insert_with(|| help(&place));
+            for option in options {
+                let option = option.split('=').next().unwrap_or_default();
+                assert!(has_word(known, option), "{shown}: no {option}");
+            }
+        }
+    }
+    assert!(seen > 60, "{seen} commands");
+}
+
+#[test]
+fn the_first_deployment_s_page_names_what_to_measure() {
+    let page = fs::read_to_string(root().join("docs/GETTING_STARTED.md")).expect("the page");
+    let output = rig_in(&root(), &["keys", "--json"]);
+    let listed: serde_json::Value = serde_json::from_slice(&output.stdout).expect("keys");
+    let keys = listed["keys"].as_array().expect("keys");
+    let name = |key: &serde_json::Value| key["key"].as_str().expect("a name").to_owned();
+    let measured: Vec<String> =
+        keys.iter().filter(|key| key["measure"] == true).map(name).collect();
+    assert!(measured.len() > 20, "{measured:?}");
+    for key in measured {
+        assert!(page.contains(&format!("`{key}`")), "{key}");
+    }
+}
+
+/// The anchor that a heading gets: lower case, without punctuation, hyphens for blanks.
+fn anchor(heading: &str) -> String {
+    let text = heading.trim_start_matches('#').trim().to_lowercase();
+    let kept = text.chars().filter(|c| c.is_alphanumeric() || " -_".contains(*c));
+    kept.map(|c| if c == ' ' { '-' } else { c }).collect()
+}
+
+#[test]
+fn every_link_of_the_pages_leads_somewhere() {
+    let mut seen = 0;
+    for (path, text) in pages() {
+        let links = text.split("](").skip(1).filter_map(|rest| rest.split_once(')'));
+        for (link, _) in links.filter(|(link, _)| !link.starts_with("http")) {
+            let shown = format!("{}: {link}", path.display());
+            let (file, place) = link.split_once('#').unwrap_or((link, ""));
+            let there =
+                if file.is_empty() { path.clone() } else { path.parent().unwrap().join(file) };
+            assert!(there.exists(), "{shown}: no such file");
+            if !place.is_empty() {
+                let target = fs::read_to_string(&there).expect("a page");
+                let mut headings = target.lines().filter(|line| line.starts_with('#'));
+                assert!(
+                    headings.any(|heading| anchor(heading) == place),
+                    "{shown}: no such heading"
+                );
+            }
+            seen += 1;
+        }
+    }
+    assert!(seen > 100, "{seen} links");
+}
+
+#[test]
+fn the_drawings_are_what_their_script_writes() {
+    let docs = root().join("docs");
+    let folder = tempfile::tempdir().expect("a temporary directory");
+    let output = Command::new("python3")
+        .arg(docs.join("drawings.py"))
+        .arg(folder.path())
+        .output()
+        .expect("python3 starts");
+    assert!(output.status.success(), "{}", stderr(&output));
+    let mut seen = 0;
+    for entry in fs::read_dir(folder.path()).expect("the drawings") {
+        let made = entry.unwrap().path();
+        let name = made.file_name().unwrap();
+        let kept = fs::read_to_string(docs.join(name)).expect("a committed drawing");
+        let same = fs::read_to_string(&made).unwrap() == kept;
+        assert!(same, "{name:?}: run `python3 docs/drawings.py`");
+        let name = name.to_str().unwrap();
+        assert!(pages().iter().any(|(_, text)| text.contains(&format!("]({name})"))), "{name}");
+        seen += 1;
+    }
+    assert_eq!(seen, 5);
+}
+
+/// The figure behind a word of a printed summary.
+fn figure(text: &str, before: &str) -> Option<f64> {
+    text.split_once(before)?.1.split_whitespace().next()?.trim_end_matches(',').parse().ok()
+}
+
+/// Each command on the examples' page ends as the block behind it says, within 0.2 s and 0.05 mm.
+#[test]
+fn the_examples_end_as_their_page_says() {
+    let page = fs::read_to_string(root().join("examples/README.md")).expect("the page");
+    let blocks: Vec<&str> = page.split("```").skip(1).step_by(2).collect();
+    let mut seen = 0;
+    for pair in blocks.windows(2) {
+        let (Some(command), Some(printed)) =
+            (pair[0].strip_prefix("sh\ncargo rig "), pair[1].strip_prefix("text\n"))
+        else {
+            continue;
+        };
+        let mut arguments: Vec<&str> = command.split_whitespace().collect();
+        arguments.push("--no-files");
+        let output = rig_in(&root(), &arguments);
+        let made = String::from_utf8_lossy(&output.stdout);
+        let complete = printed.starts_with("Deployed ");
+        assert_eq!(code(&output), i32::from(!complete), "{command}: {made}");
+        let outcome = |text: &str| text.split(" after ").next().unwrap().to_owned();
+        assert!(complete || outcome(&made) == outcome(printed), "{command}: {made}");
+        for (before, within) in [("mm in ", 0.2), ("worst gap ", 0.05)] {
+            let [now, then] = [made.as_ref(), printed].map(|text| figure(text, before));
+            let near = now.zip(then).map_or(now == then, |(now, then)| (now - then).abs() < within);
+            assert!(near, "{command}: `{before}` {then:?} on the page, now {now:?}");
+        }
+        seen += 1;
+    }
+    assert_eq!(seen, 5);
+}
+
+#[test]
+fn a_log_is_drawn_and_a_table_without_its_columns_is_refused() {
+    let folder = tempfile::tempdir().expect("a temporary directory");
+    let run = rig_in(folder.path(), &["deploy", "--out", "run"]);
+    assert_eq!(code(&run), 0, "{}", stderr(&run));
+    let draw = |log: &str, step: &str| {
+        let script = root().join("examples/plot_log.py");
+        let mut python = Command::new("python3");
+        python.current_dir(folder.path()).arg(script).args([log, step, "out.svg"]);
+        python.output().expect("python3 starts")
+    };
+    let output = draw("run/log.csv", "2");
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert!(fs::read_to_string(folder.path().join("out.svg")).unwrap().ends_with("</svg>\n"));
+    let gap = figure(std::str::from_utf8(&output.stdout).unwrap(), "gap ").expect("a gap");
+    let summary = fs::read_to_string(folder.path().join("run/summary.json")).unwrap();
+    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+    let truth = summary["crossings"][1]["gap_mm"].as_f64().expect("a gap");
+    assert!((gap - truth).abs() < 0.1, "{gap} and {truth} mm");
+    fs::write(folder.path().join("bad.csv"), "tick,level\n0,0\n").unwrap();
+    for (log, step, why) in [("run/log.csv", "9", "step 9"), ("bad.csv", "1", "bad.csv")] {
+        let refused = draw(log, step);
+        assert_eq!(refused.status.code(), Some(1));
+        assert!(stderr(&refused).contains(why) && !stderr(&refused).contains("Traceback"));
+    }
+}
