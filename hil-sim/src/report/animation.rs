@@ -48,8 +48,13 @@ that wall lets go."
         "{instant} At that instant the <b>gap</b> is open between the step's root and the wheel. \
 Rubber needs time to yield: the faster the crossing, the stiffer the tread and the larger the gap. \
 More preload presses the tread deeper into the corner and closes the gap again, and it gives the \
-wheel more friction to climb with. So the controller raises the preload from the {cruise_n} N of \
-the smooth wall, early enough for the slow pre-tightener."
+wheel more friction. So the controller raises the preload from the {cruise_n} N of \
+the smooth wall, early enough for the slow pre-tightener.{}",
+        if scene.gap_ref_mm > 0.0 {
+            format!(" The gap must not exceed its reference of {:.2} mm.", scene.gap_ref_mm)
+        } else {
+            String::new()
+        }
     )
 }
 
@@ -140,12 +145,15 @@ fn still(g: &Geometry, c: &Event, (x, y): (f64, f64), title: &str, gap: Option<f
     let lower = upper - c.step_mm;
     // Relative to the root of the step, y downwards as SVG has it.
     let (cx, cy) = (x - face, lower - y);
-    let mut marks = format!(
-        "<path class=\"measure\" d=\"M{cx:.2},{cy:.2}V5M0,0V5M{cx:.2},3.5H0\"/>\n\
+    let mut marks = String::new();
+    if cx < -0.5 {
+        marks += &format!(
+            "<path class=\"measure\" d=\"M{cx:.2},{cy:.2}V5M0,0V5M{cx:.2},3.5H0\"/>\n\
 <text x=\"{:.2}\" y=\"9\" text-anchor=\"middle\">{:.1} mm</text>\n",
-        0.5 * cx,
-        cx.abs(),
-    );
+            0.5 * cx,
+            cx.abs(),
+        );
+    }
     let away = cx.hypot(cy);
     if let Some(gap) = gap {
         let rim = (cx * (1.0 - r / away), cy * (1.0 - r / away));
@@ -155,7 +163,7 @@ fn still(g: &Geometry, c: &Event, (x, y): (f64, f64), title: &str, gap: Option<f
         );
     }
     format!(
-        "<figure class=\"still\"><svg viewBox=\"-44 -56 68 68\" role=\"img\" aria-label=\"{title}\">\n\
+        "<figure class=\"still\"><svg viewBox=\"-43 -55 74 67\" role=\"img\" aria-label=\"{title}\">\n\
 <circle class=\"rubber\" cx=\"{cx:.2}\" cy=\"{cy:.2}\" r=\"{r}\"/><circle class=\"hub\" cx=\"{cx:.2}\" cy=\"{cy:.2}\" r=\"{:.2}\"/>\n\
 <path class=\"sleeve\" d=\"M-60,20V0H0V{:.2}H60V20Z\"/>\n\
 <circle class=\"outline\" cx=\"{cx:.2}\" cy=\"{cy:.2}\" r=\"{r}\"/>\n{marks}</svg>\n\
@@ -213,7 +221,8 @@ mod tests {
 const row = rowAt(scene, t), p = pose(scene, row);\n\
 const arm = Math.hypot(p.pivot[0] - p.x, p.pivot[1] - p.y);\n\
 const gap = Math.hypot(p.root[0] - p.rim[0], p.root[1] - p.rim[1]);\n\
-return [p.x, p.y, gap, p.edge[0], p.edge[1], arm, p.spring_mm, phase(scene, row).length];\n\
+return [p.x, p.y, gap, p.edge[0], p.edge[1], arm, p.spring_mm, phase(scene, row).length, \
+current(scene, t).index];\n\
 }});\nconsole.log(JSON.stringify(out));\n",
             scene.json()
         );
@@ -240,6 +249,7 @@ return [p.x, p.y, gap, p.edge[0], p.edge[1], arm, p.spring_mm, phase(scene, row)
                 assert!((drawn - is).abs() < within, "at {t_s}: {drawn} {is}");
             }
             assert!(drawn[7] > 40.0);
+            assert!((drawn[8] - f64::from(crossing.index)).abs() < 1e-9, "another crossing");
         }
     }
 }

@@ -72,7 +72,7 @@ pub(super) fn draw(view: &View, area: &Area) -> Drawn {
         body.draw(&Text::new(lane.name, (LEFT - 8 * S, middle), name))?;
         for (start, end, value) in spans(view, lane.of) {
             let (label, colour) = (lane.show)(value);
-            let (left, right) = (x_of(start), x_of(end));
+            let (left, right) = (x_of(start.max(view.x.0)), x_of(end.min(view.x.1)));
             if right <= left {
                 continue;
             }

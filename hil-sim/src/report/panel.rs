@@ -197,19 +197,19 @@ impl Panel {
             let part = (x - self.x.0) / (self.x.1 - self.x.0);
             LEFT + (part * f64::from(wide as i32 - LEFT - RIGHT)).round() as i32
         };
-        // A name that would be on another one is left out; the one before the line comes first.
-        let mut end = 0;
-        for rule in rules {
-            let width = text_width(rule.name, RULE_PX);
-            let (from, side) = match to_pixel(rule.x) {
-                x if rule.touch => (x - width, (x, HPos::Right)),
-                x => (x, (x, HPos::Left)),
-            };
-            if from >= end {
+        // Touches before faces; a name that would be on another one is left out.
+        let mut taken: Vec<(i32, i32)> = Vec::new();
+        let (touches, faces): (Vec<&Rule>, Vec<&Rule>) = rules.partition(|rule| rule.touch);
+        for rule in touches.into_iter().chain(faces) {
+            let (x, width) = (to_pixel(rule.x), text_width(rule.name, RULE_PX));
+            let is_left = rule.touch || x + width > wide as i32;
+            let (at, side) = if is_left { (x - 4, HPos::Right) } else { (x + 4, HPos::Left) };
+            let from = if is_left { at - width } else { at };
+            if taken.iter().all(|other| from >= other.1 || from + width <= other.0) {
                 let colour = if rule.touch { palette::TOUCH } else { palette::FACE };
-                let style = font(RULE_PX, colour, side.1, VPos::Center);
-                body.draw(&Text::new(rule.name, (side.0, RULES / 2), style))?;
-                end = from + width;
+                let style = font(RULE_PX, colour, side, VPos::Center);
+                body.draw(&Text::new(rule.name, (at, RULES / 2), style))?;
+                taken.push((from, from + width));
             }
         }
         Ok(())

@@ -251,7 +251,7 @@ impl<'a> View<'a> {
     }
 
     pub(super) fn slip_margin(&self) -> Panel {
-        let mut panel = self.panel("Slip margin", "friction left unused, ratio");
+        let mut panel = self.panel("Slip margin", "unused friction, ratio");
         panel.least_span = 0.2;
         panel.lines = vec![
             self.line("by the model", Look::Estimate(palette::SLIP), |row| {
@@ -281,7 +281,7 @@ fn rules(rows: &[Tick], across: Across, line: &CrossingLine) -> Vec<Rule> {
     let long = matches!(across, Across::Since(_));
     let touch = Rule {
         x: across.at(rows, line.touch_s),
-        name: if long { "corner touches " } else { "touch " },
+        name: if long { "corner touches" } else { "touch" },
         touch: true,
     };
     let from = rows.partition_point(|row| row.controller.t_s < line.touch_s.min(line.lift_s));
@@ -292,11 +292,7 @@ fn rules(rows: &[Tick], across: Across, line: &CrossingLine) -> Vec<Rule> {
         Across::Position => Some(line.step_mm),
         _ => passed.map(|row| across.of(row)),
     };
-    let face = face_x.map(|x| Rule {
-        x,
-        name: if long { " face of the step" } else { " face" },
-        touch: false,
-    });
+    let face = face_x.map(|x| Rule { x, name: "face", touch: false });
     [touch].into_iter().chain(face).collect()
 }
 

@@ -30,13 +30,12 @@ function pose(scene, row) {
   const ahead = g.steps.find(([face]) => face > x);
   const root = ahead && ahead[0] - x < g.wheel_radius_mm ? [ahead[0], wallAt(g, x)] : null;
   const away = root && Math.hypot(root[0] - x, root[1] - y);
-  // The edge that carries is the nearest one, before or behind the axle.
-  const edges = g.steps.map(([face]) => [face, wallAt(g, face)]);
-  edges.sort((a, b) => Math.abs(a[0] - x) - Math.abs(b[0] - x));
   const rise = g.wall_radius_mm - g.arm_pivot_radius_mm - y;
   const run = g.pivot_side * Math.sqrt(Math.max(0, g.arm_length_mm ** 2 - rise ** 2));
   return {
-    x, y, floor: wallAt(g, x), edge: edges[0],
+    x, y, floor: wallAt(g, x),
+    // The edge that carries.
+    edge: ahead ? [ahead[0], wallAt(g, ahead[0])] : null,
     root: root && away > 0 ? root : null,
     // Point of the undeformed wheel that is next to the root.
     rim: root && away > 0 && [0, 1].map((i) => [x, y][i] + (root[i] - [x, y][i]) * g.wheel_radius_mm / away),
@@ -46,11 +45,19 @@ function pose(scene, row) {
   };
 }
 
-// What happens at time t, in words.
+// The crossing that an instant belongs to: the one under way, or the next.
+function current(scene, t) {
+  return scene.crossings.find((c, i) => {
+    const next = scene.crossings[i + 1];
+    return t < Math.min(c.lift_s + 0.8, next ? (c.lift_s + next.touch_s) / 2 : Infinity);
+  });
+}
+
+// What happens at a row, in words.
 function phase(scene, row) {
   const n = (value, digits) => (value === null || !Number.isFinite(value) ? "unknown" : value.toFixed(digits));
   const t = row.t_s;
-  const next = scene.crossings.find((c) => t < Math.max(c.touch_s, c.lift_s) + 0.8);
+  const next = current(scene, t);
   const said = scene.measured ? "measured " : "";
   const state = `${t.toFixed(2)} s: ${n(row.speed_mm_s, 1)} mm/s, ${said}preload ${n(row.preload_n, 1)} N of ${n(row.preload_ref_n, 1)} N wanted. `;
   if (!next) return state + "No step is left ahead.";
@@ -65,7 +72,7 @@ function phase(scene, row) {
     return state + at + (scene.retracts ? "the wheel rolls over the edge and down; the lower wall does not carry yet."
       : "the edge takes the load from the lower wall. The rubber must still fill the corner when the wall lets go.");
   }
-  const gap = `${said}gap ${n(next.gap_mm, 2)} mm`;
+  const gap = `${said}gap ${n(next.gap_mm, 2)} mm (reference ${n(scene.gap_ref_mm, 2)} mm)`;
   if (scene.retracts) return `${state}${at}the lower wall carries again, ${gap}.`;
   return state + at + (over > 0 ? `the lower wall has let go, ${gap}; the wheel climbs on the edge.` : `the axle has passed the face, ${gap}.`);
 }
@@ -120,10 +127,10 @@ function start(scene) {
     label("preloadtext", p.x, p.y + length(row.preload_n) + 1, "middle", small);
     const floor = row.floor_force_n || 0, corner = row.corner_force_n || 0;
     arrow("floor", [p.x, p.floor - length(floor)], [p.x, p.floor], row.floor_force_n, "wall");
-    label("floortext", p.x - 2, p.floor - length(floor) - 0.2 * small, "end", small);
-    const [ex, ey] = p.edge, away = Math.hypot(p.x - ex, p.y - ey) || 1;
+    label("floortext", p.x - 2, p.floor - length(floor) - 1.3 * small, "end", small);
+    const [ex, ey] = p.edge || [p.x, p.floor], away = Math.hypot(p.x - ex, p.y - ey) || 1;
     const tail = [ex - (p.x - ex) / away * length(corner), ey - (p.y - ey) / away * length(corner)];
-    arrow("corner", tail, p.edge, row.corner_force_n, "corner");
+    arrow("corner", tail, [ex, ey], p.edge && row.corner_force_n, "corner");
     label("cornertext", Math.min(tail[0] + 1, p.x + 44 - 9 * small), tail[1] - small, "start", small);
 
     const gap = p.root && row.root_clearance_mm !== null ? row.root_clearance_mm : null;
@@ -131,9 +138,9 @@ function start(scene) {
     if (gap !== null) {
       set("gapline", { d: `M${p.root[0]},${-p.root[1]}L${p.rim[0]},${-p.rim[1]}` });
       $("gaptext").textContent = `clearance ${gap.toFixed(2)} mm`;
-      label("gaptext", p.root[0] + 1.5, p.root[1] + 12, "start", small);
+      label("gaptext", Math.min(p.root[0] + 6, p.x + 45 - 11 * small), p.edge[1] + 1.2, "start", small);
     }
-    const c = scene.crossings.find((c) => now < Math.max(c.touch_s, c.lift_s) + 0.8);
+    const c = scene.retracts ? null : current(scene, now);
     const touch = c && c.face_mm - c.touch_mm;
     set("touchline", { d: c ? `M${touch},${-(p.floor - 6)}V${-(p.floor + 4)}` : "" });
 
@@ -220,5 +227,5 @@ function start(scene) {
   choose();
 }
 
-if (typeof document === "undefined") module.exports = { rowAt, pose, phase };
+if (typeof document === "undefined") module.exports = { rowAt, pose, current, phase };
 else start(JSON.parse(document.getElementById("scene").textContent));

@@ -36,6 +36,8 @@ pub(super) struct Scene {
     pub(super) measured: bool,
     /// The run retracts.
     pub(super) retracts: bool,
+    /// Reference of the gap, mm; unknown in a log without parameters.
+    pub(super) gap_ref_mm: f64,
     pub(super) geometry: Geometry,
     pub(super) crossings: Vec<Event>,
     pub(super) columns: [&'static str; COLUMNS.len()],
@@ -169,7 +171,8 @@ impl Scene {
         let rows = thinned(&rows, &crossings);
         let rows = rows.into_iter().map(|row| values(&geometry, row)).collect();
         let columns = COLUMNS.map(|column| column.0);
-        Some(Self { measured, retracts, geometry, crossings, columns, rows })
+        let gap_ref_mm = summary.gap_ref_mm;
+        Some(Self { measured, retracts, gap_ref_mm, geometry, crossings, columns, rows })
     }
 
     /// As JSON that can be a script's content.
