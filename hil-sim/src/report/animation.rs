@@ -128,13 +128,20 @@ the tread's patch reaches it."
             .to_owned();
     }
     let Event { touch_mm, touch_rigid_mm, compression_mm, step_mm, .. } = c;
-    format!(
+    let rigid = format!(
         "A wheel of radius R = {:.2} mm touches the edge of a step h = {step_mm:.2} mm already \
-sqrt(R² − (R − h)²) = {touch_rigid_mm:.1} mm before the face. Here it {} {touch_mm:.1} mm before \
-it: the tread, compressed by {compression_mm:.2} mm, lowers the axle, so that the edge is reached a \
-little earlier.",
+sqrt(R² − (R − h)²) = {touch_rigid_mm:.1} mm before the face.",
         scene.geometry.wheel_radius_mm,
-        if scene.measured { "was found to touch" } else { "touched" },
+    );
+    if scene.measured {
+        return format!(
+            "{rigid} The controller noticed it {touch_mm:.1} mm before the face, by the rising \
+compression: the marks are where it noticed the touch."
+        );
+    }
+    format!(
+        "{rigid} Here it touched {touch_mm:.1} mm before it: the tread, compressed by \
+{compression_mm:.2} mm, lowers the axle, so that the edge is reached a little earlier."
     )
 }
 

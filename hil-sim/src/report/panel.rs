@@ -178,7 +178,8 @@ impl Panel {
             let ends = [(rule.x, y.0), (rule.x, y.1)];
             chart.draw_series([PathElement::new(ends, colour.stroke_width(3))])?;
         }
-        let columns = (wide as i32 - LEFT - RIGHT).max(1) as usize / 2;
+        // Two CSS pixels: the lowest and highest values of a column stay.
+        let columns = (wide as i32 - LEFT - RIGHT).max(1) as usize / 4;
         let mut lines: Vec<&Line> = self.lines.iter().collect();
         lines.sort_by_key(|line| line.look.style().0);
         for line in lines {
@@ -348,7 +349,8 @@ mod tests {
             };
             let [left, right, top, bottom] = panel.frame((540, 250));
             let svg = svg::fluid((540, 250), "", |area| panel.draw(area));
-            let line = svg.split("<polyline").find(|line| line.contains("#1F2937")).unwrap();
+            let line =
+                svg.split("<polyline").rfind(|line| line.contains("stroke=\"#1F2937\"")).unwrap();
             let points = line.split("points=\"").nth(1).unwrap().split('"').next().unwrap();
             let mut ends = points.split_whitespace().map(|point| {
                 let (x, y) = point.split_once(',').unwrap();

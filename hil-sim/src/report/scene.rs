@@ -10,8 +10,10 @@ use serde_json::{Map, Value};
 use crate::record::{CrossingLine, Recording, Tick};
 use crate::scenario::Scenario;
 
-/// Rows kept of a crossing's surroundings, and of the rest of the run.
-const ROWS: (usize, usize) = (500, 1500);
+/// Rows kept of a crossing's surroundings, at most.
+const ROWS_OF_ONE: usize = 500;
+/// Rows kept around all crossings together, and of the rest of the run, at most.
+const ROWS: (usize, usize) = (2500, 1500);
 /// Surroundings of a crossing: before the first touch and after lift-off, s.
 pub(super) const AROUND_S: (f64, f64) = (0.5, 0.8);
 
@@ -260,7 +262,7 @@ fn values(geometry: &Geometry, row: &Tick) -> [f64; COLUMNS.len()] {
     })
 }
 
-/// At most [`ROWS`] of the rows, dense around the crossings, the first and the last kept.
+/// About [`ROWS`] of the rows at most, dense around the crossings, the first and the last kept.
 fn thinned<'a>(rows: &[&'a Tick], crossings: &[Event]) -> Vec<&'a Tick> {
     let near = |row: &Tick| {
         let t_s = row.controller.t_s;
@@ -273,7 +275,7 @@ fn thinned<'a>(rows: &[&'a Tick], crossings: &[Event]) -> Vec<&'a Tick> {
     let mut kept: Vec<&Tick> = Vec::new();
     for piece in rows.chunk_by(|a, b| near(a) == near(b)) {
         let (count, most) = match near(piece[0]) {
-            Some(_) => (piece.len(), ROWS.0),
+            Some(_) => (piece.len(), ROWS_OF_ONE.min(ROWS.0 / crossings.len())),
             None => (far, ROWS.1),
         };
         kept.extend(piece.iter().step_by(count.div_ceil(most).max(1)));
@@ -293,7 +295,7 @@ mod tests {
     fn the_rows_are_the_runs_own() {
         let recording = example::deploy();
         let scene = Scene::new(&recording).unwrap();
-        assert!(scene.rows.len() > 1000 && scene.rows.len() <= 3 * ROWS.0 + ROWS.1 + 10);
+        assert!(scene.rows.len() > 1000 && scene.rows.len() <= 3 * ROWS_OF_ONE + ROWS.1 + 10);
         for shown in &scene.rows {
             let row = &recording.rows[(1e3 * shown[0]).round() as usize];
             let truth = row.truth.unwrap();
