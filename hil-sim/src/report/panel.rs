@@ -350,7 +350,7 @@ mod tests {
             let [left, right, top, bottom] = panel.frame((540, 250));
             let svg = svg::fluid((540, 250), "", |area| panel.draw(area));
             let line =
-                svg.split("<polyline").rfind(|line| line.contains("stroke=\"#1F2937\"")).unwrap();
+                svg.rsplit("<polyline").find(|line| line.contains("stroke=\"#1F2937\"")).unwrap();
             let points = line.split("points=\"").nth(1).unwrap().split('"').next().unwrap();
             let mut ends = points.split_whitespace().map(|point| {
                 let (x, y) = point.split_once(',').unwrap();
