@@ -194,7 +194,7 @@ function start(scene) {
   }
 
   function choose() {
-    const c = scene.crossings.find((c) => String(c.index) === $("choice").value);
+    const c = scene.crossings[$("choice").value];
     const [a, b] = c ? [Math.min(c.touch_s, c.lift_s), Math.max(c.touch_s, c.lift_s)] : [0, 0];
     [from, to] = c ? [Math.max(first, a - 0.5), Math.min(last, b + 0.8)] : [first, last];
     set("scrub", { min: from, max: to });
@@ -217,7 +217,8 @@ function start(scene) {
     frame = requestAnimationFrame(tick);
   }
 
-  for (const c of scene.crossings) $("choice").append(new Option(`crossing ${c.index}`, c.index));
+  // A step may be crossed more than once.
+  scene.crossings.forEach((c, place) => $("choice").append(new Option(`step ${c.index}, ${c.touch_s.toFixed(1)} s`, place)));
   $("choice").append(new Option("the run", "run"));
   $("choice").addEventListener("change", choose);
   $("scrub").addEventListener("input", () => { now = Number($("scrub").value); draw(); });
