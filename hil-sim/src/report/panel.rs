@@ -356,7 +356,7 @@ mod tests {
                 let (x, y) = point.split_once(',').unwrap();
                 (x.parse::<i32>().unwrap(), y.parse::<i32>().unwrap())
             });
-            let (first, last) = (ends.next().unwrap(), ends.last().unwrap());
+            let (first, last) = (ends.next().unwrap(), ends.next_back().unwrap());
             let near = |a: i32, b: i32| (a - b).abs() <= 3;
             assert!(near(first.0, left) && near(first.1, bottom), "{first:?} {left} {bottom}");
             assert!(near(last.0, right) && near(last.1, top), "{last:?} {right} {top}");
