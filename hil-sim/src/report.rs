@@ -1,6 +1,7 @@
-//! A run as one self-contained HTML page: verdict, ledger of the crossings, plots
-//! over time and over position, each crossing enlarged, log, faults, parameters.
+//! A run as one self-contained HTML page: verdict, ledger of the crossings, the
+//! wheel at the steps as an animation, plots over time and over position, each crossing enlarged, log, faults, parameters.
 
+mod animation;
 pub mod axis;
 mod band;
 mod beside;
@@ -13,6 +14,7 @@ mod page;
 pub mod palette;
 pub(crate) mod panel;
 mod panels;
+mod scene;
 pub mod svg;
 mod tables;
 pub(crate) mod verdict;

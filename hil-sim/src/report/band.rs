@@ -46,6 +46,13 @@ fn level(number: u8) -> (String, RGBColor) {
     (number.to_string(), palette::LEVELS[place % palette::LEVELS.len()])
 }
 
+/// Where the bands are in a picture of `size` CSS pixels: left, right, top and bottom, in drawing
+/// units.
+pub(super) fn frame(size: (u32, u32)) -> [i32; 4] {
+    let (wide, high) = ((size.0 * SCALE) as i32, (size.1 * SCALE) as i32);
+    [LEFT, wide - RIGHT, HEAD, high - 44 * S]
+}
+
 /// Draws the bands of `view` into `area`.
 pub(super) fn draw(view: &View, area: &Area) -> Drawn {
     let (head, body) = area.split_vertically(HEAD);
@@ -65,7 +72,7 @@ pub(super) fn draw(view: &View, area: &Area) -> Drawn {
         body.draw(&Text::new(lane.name, (LEFT - 8 * S, middle), name))?;
         for (start, end, value) in spans(view, lane.of) {
             let (label, colour) = (lane.show)(value);
-            let (left, right) = (x_of(start), x_of(end));
+            let (left, right) = (x_of(start.max(view.x.0)), x_of(end.min(view.x.1)));
             if right <= left {
                 continue;
             }

@@ -34,6 +34,7 @@ pub fn beside_svg(runs: [(&str, &Recording); 2]) -> String {
         x_name: None,
         lines: line(of),
         shades: Vec::new(),
+        rules: Vec::new(),
         ..views[0].panel(title, y_name)
     };
     let mut preload = panel("Preload", "preload, N", &|row| row.controller.preload_n);

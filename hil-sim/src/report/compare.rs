@@ -120,6 +120,7 @@ fn plots(a: &Recording, b: &Recording) -> String {
             x: (a.x.0.min(b.x.0), a.x.1.max(b.x.1)),
             lines: vec![line("A", palette::SPEED, &a), line("B", palette::PRELOAD, &b)],
             shades: Vec::new(),
+            rules: Vec::new(),
             ..a.panel(title, y_name)
         };
         html += &format!("<figure>{}</figure>\n", svg::fluid(SIZE, title, |area| panel.draw(area)));

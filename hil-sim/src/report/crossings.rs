@@ -2,10 +2,10 @@
 //! lift-off.
 
 use super::axis;
+use super::page;
 use super::palette;
 use super::panel::{Look, Panel};
 use super::panels::{Across, View};
-use super::svg;
 use crate::record::{CrossingLine, Recording};
 
 /// Shown before the corner touches, s.
@@ -33,7 +33,7 @@ fn one(recording: &Recording, line: &CrossingLine) -> String {
     html += "<div class=\"grid\">\n";
     for panel in panels(&view) {
         let name = format!("Crossing {}: {}", line.index, panel.title);
-        html += &format!("<figure>{}</figure>\n", svg::fluid(SIZE, &name, |area| panel.draw(area)));
+        html += &page::figure(&panel, view.across, SIZE, &name);
     }
     html + "</div>\n"
 }
@@ -48,7 +48,8 @@ fn view<'a>(recording: &'a Recording, line: &CrossingLine) -> View<'a> {
     View { rows: &rows[from..to], x, ..View::new(recording, Across::Since(first)) }
 }
 
-fn panels(view: &View) -> [Panel; 6] {
+/// The plots that have something to show.
+fn panels(view: &View) -> Vec<Panel> {
     let mut clearance = view.gap();
     clearance.title = "Clearance at the step root".to_owned();
     let mut forces = view.panel("Forces of corner and lower wall", "force, N");
@@ -63,13 +64,14 @@ fn panels(view: &View) -> [Panel; 6] {
     let shown = preload.lines.iter().flat_map(|line| &line.points).map(|point| point.1);
     let range = axis::padded(axis::extent(shown).unwrap_or((0.0, 1.0)), 0.08);
     preload.levels.retain(|level| level.2 <= range.1 + 0.5 * (range.1 - range.0));
-    [preload, view.speed(), clearance, forces, view.compression(), view.slip_margin()]
+    let all = [preload, view.speed(), clearance, forces, view.compression(), view.slip_margin()];
+    all.into_iter().filter(Panel::has_data).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::example;
+    use crate::report::{example, svg};
 
     #[test]
     fn every_crossing_has_its_plots() {
@@ -97,5 +99,16 @@ mod tests {
         assert_eq!(html(&recording).matches("No rows were recorded").count(), 3);
         recording.summary.crossings.clear();
         assert!(html(&recording).contains("No step was crossed"));
+    }
+
+    #[test]
+    fn a_legend_names_what_its_plot_shows() {
+        let recording = example::deploy();
+        for (line, measured) in recording.summary.crossings.iter().zip([true, false, true]) {
+            let view = view(&recording, line);
+            let panel = &panels(&view)[2];
+            let text = svg::fluid(SIZE, "", |area| panel.draw(area));
+            assert_eq!(text.contains("\nmeasured\n"), measured, "crossing {}", line.index);
+        }
     }
 }

@@ -1,9 +1,11 @@
 //! The page around the plots.
 
-use super::panels::{Across, View};
+use super::panel::Panel;
+use super::panels::{Across, View, motion};
+use super::scene::Scene;
 use super::svg::{self, escape};
 use super::verdict::{Grade, gap_sentence, headline, origin, reservations, slip_sentence};
-use super::{band, crossings, tables};
+use super::{animation, band, crossings, tables};
 use crate::record::Recording;
 
 const STYLE: &str = include_str!("style.css");
@@ -21,7 +23,8 @@ pub struct Section {
     pub body: String,
 }
 
-/// The page of `recording`, with `more` sections. It needs no other file and no script.
+/// The page of `recording`, with `more` sections. It needs no other file; without its
+/// script it lacks the animation alone.
 #[must_use]
 pub fn html(recording: &Recording, more: &[Section]) -> String {
     let s = &recording.summary;
@@ -58,7 +61,11 @@ and the undeformed wheel at the instant at which the lower wall stops carrying l
         ),
     );
     page += &section("Faults and limits", &tables::reports(s));
-    page += &section("The run", &plots(recording));
+    let scene = Scene::new(recording);
+    if !recording.rows.is_empty() {
+        page += &section("Why the preload rises", &animation::html(scene.as_ref()));
+    }
+    page += &section("The run", &plots(recording, scene.as_ref()));
     page += &section("The crossings enlarged", &crossings::html(recording));
     for Section { title, body } in more {
         page += &section(title, body);
@@ -68,10 +75,11 @@ and the undeformed wheel at the instant at which the lower wall stops carrying l
     page += &section("Parameters", &folded("Parameters used, as TOML", &parameters));
     page += &format!(
         "<footer>\n<p>Written by hil-sim {} with the controller interstage {}.</p>\n\
-<p>Trace digest, SHA-256: <code>{}</code></p>\n</footer>\n</main>\n</body>\n</html>\n",
+<p>Trace digest, SHA-256: <code>{}</code></p>\n</footer>\n</main>\n{}</body>\n</html>\n",
         env!("CARGO_PKG_VERSION"),
         env!("CARGO_PKG_VERSION"),
         escape(&s.trace_digest),
+        scene.as_ref().map(animation::script).unwrap_or_default(),
     );
     page
 }
@@ -94,18 +102,30 @@ fn folded(title: &str, body: &str) -> String {
 }
 
 /// The plots over time and over position, one of the two shown.
-fn plots(recording: &Recording) -> String {
+fn plots(recording: &Recording, scene: Option<&Scene>) -> String {
     if recording.rows.is_empty() {
         return "<p>No rows were recorded.</p>\n".to_owned();
     }
     let time = stack(recording, Across::Time);
     let position = stack(recording, Across::Position);
+    let touch = scene.and_then(|scene| Some((scene, scene.crossings.first()?)));
+    let touch =
+        touch.map_or_else(String::new, |(scene, c)| " ".to_owned() + &animation::touch(scene, c));
+    let hidden_s = Across::Time.range(&recording.rows).0;
+    let from = motion(&recording.rows).filter(|_| hidden_s > recording.rows[0].controller.t_s);
+    let from = from.map_or_else(String::new, |row| {
+        format!(
+            " The wheel moves from {:.2} s; the first {hidden_s:.2} s, at rest, are in the log's tables only.",
+            row.controller.t_s
+        )
+    });
     format!(
         "<input type=\"radio\" name=\"across\" id=\"time\" checked>\
 <label for=\"time\">over time</label>\n\
 <input type=\"radio\" name=\"across\" id=\"position\">\
 <label for=\"position\">over position</label>\n\
-<p class=\"note\">Shaded: from the first touch of the corner to the instant of the gap.</p>\n\
+<p class=\"note\">Shaded: from the first touch of the corner (dotted) to the instant of the gap. \
+Grey line: the axle passes the face of the step.{touch}{from}</p>\n\
 <div class=\"time\">\n{time}</div>\n<div class=\"position\">\n{position}</div>\n"
     )
 }
@@ -113,13 +133,32 @@ fn plots(recording: &Recording) -> String {
 fn stack(recording: &Recording, across: Across) -> String {
     let view = View::new(recording, across);
     let mut html = String::new();
-    for panel in view.all() {
+    for panel in view.all().into_iter().filter(Panel::has_data) {
         let name = format!("{}, {}", panel.title, across.name());
-        html += &format!("<figure>{}</figure>\n", svg::fluid(SIZE, &name, |area| panel.draw(area)));
+        html += &figure(&panel, across, SIZE, &name);
     }
     let name = format!("Mode, contact stage and sleeve level, {}", across.name());
     let bands = svg::fluid(BAND_SIZE, &name, |area| band::draw(&view, area));
-    html + &format!("<figure>{bands}{}</figure>\n", band::legend(&recording.rows))
+    let frame = attributes(view.x, across, band::frame(BAND_SIZE));
+    html + &format!("<figure {frame}>{bands}{}</figure>\n", band::legend(&recording.rows))
+}
+
+/// A plot, with what the script needs to place its cursor.
+pub(super) fn figure(panel: &Panel, across: Across, size: (u32, u32), name: &str) -> String {
+    let frame = attributes(panel.x, across, panel.frame(size));
+    format!("<figure {frame}>{}</figure>\n", svg::fluid(size, name, |area| panel.draw(area)))
+}
+
+/// Axis, time at its zero, its range, and the place of the plot in the picture: left, right, top
+/// and bottom.
+fn attributes(x: (f64, f64), across: Across, [left, right, top, bottom]: [i32; 4]) -> String {
+    format!(
+        "data-across=\"{}\" data-since=\"{}\" data-frame=\"{} {} {left} {right} {top} {bottom}\"",
+        across.axis(),
+        across.since_s(),
+        x.0,
+        x.1
+    )
 }
 
 fn count(n: usize, what: &str) -> String {

@@ -10,6 +10,11 @@ pub const WANTED: RGBColor = RGBColor(0x6b, 0x72, 0x80);
 /// Limits; drawn dashed, see [`DASHES`].
 pub const LIMIT: RGBColor = RGBColor(0xb9, 0x1c, 0x1c);
 
+/// First touch of a corner; drawn dashed, see [`DASHES`].
+pub const TOUCH: RGBColor = RGBColor(0xb4, 0x53, 0x09);
+/// Face of a step.
+pub const FACE: RGBColor = RGBColor(0x64, 0x74, 0x8b);
+
 /// Simulated by the reference models; drawn dashed, see [`DASHES`].
 pub const SIMULATED: RGBColor = RGBColor(0x1c, 0x6f, 0xd6);
 
@@ -38,8 +43,8 @@ pub const GRID: RGBColor = RGBColor(0xe9, 0xeb, 0xef);
 pub const SHADE: RGBColor = RGBColor(0xfa, 0xf1, 0xdf);
 
 /// Stroke colours that are drawn dashed, as SVG writes them, with their dashes.
-pub const DASHES: [(&str, &str); 3] =
-    [("#6B7280", "11 7"), ("#B91C1C", "22 8"), ("#1C6FD6", "16 8")];
+pub const DASHES: [(&str, &str); 4] =
+    [("#6B7280", "11 7"), ("#B91C1C", "22 8"), ("#1C6FD6", "16 8"), ("#B45309", "5 6")];
 
 /// Pale fills for the modes, by mode number.
 pub const MODES: [RGBColor; 13] = [

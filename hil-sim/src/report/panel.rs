@@ -24,13 +24,16 @@ pub(super) const RIGHT: i32 = 18 * S;
 /// Height of the row of a legend below the title.
 const LEGEND: i32 = 20 * S;
 const TITLE_PX: f64 = 14.0;
+/// Height of the row with the names of the rules.
+const RULES: i32 = 16 * S;
+const RULE_PX: f64 = 11.0;
 
 /// What a line shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Look {
-    /// A sensor's reading: thin, below the others.
+    /// A sensor's reading: thin, above the truth.
     Measured(RGBColor),
-    /// True state of the plant: dark and wide.
+    /// True state of the plant: dark and wide, below the others.
     Truth,
     /// Another true state of the plant.
     Other(RGBColor),
@@ -43,12 +46,12 @@ pub(crate) enum Look {
 }
 
 impl Look {
-    /// Order of drawing, wide or noisy lines below thin ones, and the stroke.
+    /// Order of drawing, wide lines below thin ones, and the stroke.
     fn style(self) -> (u8, ShapeStyle) {
         match self {
-            Self::Measured(colour) => (0, colour.stroke_width(2)),
+            Self::Truth => (0, palette::TRUTH.stroke_width(7)),
             Self::Other(colour) => (1, colour.stroke_width(4)),
-            Self::Truth => (2, palette::TRUTH.stroke_width(5)),
+            Self::Measured(colour) => (2, colour.stroke_width(3)),
             Self::Estimate(colour) => (3, colour.stroke_width(3)),
             Self::Wanted => (4, palette::WANTED.stroke_width(3)),
             Self::Limit => (5, palette::LIMIT.stroke_width(2)),
@@ -100,16 +103,44 @@ pub(crate) struct Panel {
     pub(crate) levels: Vec<(&'static str, Look, f64)>,
     /// Spans of x that are shaded.
     pub(crate) shades: Vec<(f64, f64)>,
+    /// Vertical lines with their names.
+    pub(crate) rules: Vec<Rule>,
+}
+
+/// A vertical line of a plot.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Rule {
+    pub(crate) x: f64,
+    pub(crate) name: &'static str,
+    /// The first touch of a corner, dashed; else the face of a step.
+    pub(crate) touch: bool,
 }
 
 impl Panel {
+    /// Where the plot is in a picture of `size` CSS pixels: left, right, top and bottom, in
+    /// drawing units.
+    pub(crate) fn frame(&self, size: (u32, u32)) -> [i32; 4] {
+        let (wide, high) = ((size.0 * SCALE) as i32, (size.1 * SCALE) as i32);
+        let top = self.head_height(wide) + self.top();
+        [LEFT, wide - RIGHT, top, high - self.bottom()]
+    }
+
+    /// Height above the plot: the names of the rules.
+    fn top(&self) -> i32 {
+        if self.rules.is_empty() { 2 * S } else { RULES }
+    }
+
+    /// Height below the plot.
+    fn bottom(&self) -> i32 {
+        if self.x_name.is_some() { 40 * S } else { 6 * S }
+    }
+
     /// Draws it into `area`.
     pub(crate) fn draw(&self, area: &Area) -> Drawn {
-        let (head, body) = area.split_vertically(self.head_height(area));
+        let (head, body) = area.split_vertically(self.head_height(area.dim_in_pixel().0 as i32));
         self.draw_head(&head)?;
         let y = self.y_range();
         let (wide, high) = body.dim_in_pixel();
-        let bottom = if self.x_name.is_some() { 40 * S } else { 6 * S };
         let most_x = (wide as i32 / (75 * S)).max(2) as usize;
         let most_y = (high as i32 / (27 * S)).clamp(2, 7) as usize;
         let (x_ticks, x_decimals) = axis::ticks(self.x, most_x);
@@ -117,8 +148,8 @@ impl Panel {
         let mut chart = ChartBuilder::on(&body)
             .margin_left(MARGIN)
             .margin_right(RIGHT)
-            .margin_top(2 * S)
-            .x_label_area_size(bottom)
+            .margin_top(self.top())
+            .x_label_area_size(self.bottom())
             .y_label_area_size(LEFT - MARGIN)
             .build_cartesian_2d(Scale::new(self.x, x_ticks), Scale::new(y, y_ticks))?;
         for &(from, to) in &self.shades {
@@ -137,11 +168,18 @@ impl Panel {
             .x_desc(self.x_name.unwrap_or_default())
             .y_desc(self.y_name)
             .draw()?;
-        for &(_, look, level) in &self.levels {
+        for &(_, look, level) in self.levels.iter().filter(|level| (y.0..=y.1).contains(&level.2)) {
             let ends = [(self.x.0, level), (self.x.1, level)];
             chart.draw_series([PathElement::new(ends, look.style().1)])?;
         }
-        let columns = (wide as i32 - LEFT - RIGHT).max(1) as usize / 2;
+        let rules = self.rules.iter().filter(|rule| (self.x.0..=self.x.1).contains(&rule.x));
+        for rule in rules.clone() {
+            let colour = if rule.touch { palette::TOUCH } else { palette::FACE };
+            let ends = [(rule.x, y.0), (rule.x, y.1)];
+            chart.draw_series([PathElement::new(ends, colour.stroke_width(3))])?;
+        }
+        // Two CSS pixels: the lowest and highest values of a column stay.
+        let columns = (wide as i32 - LEFT - RIGHT).max(1) as usize / 4;
         let mut lines: Vec<&Line> = self.lines.iter().collect();
         lines.sort_by_key(|line| line.look.style().0);
         for line in lines {
@@ -154,6 +192,25 @@ impl Panel {
             for &point in shown {
                 let [rim, body] = mark(marks, (marks.shift, 0));
                 chart.draw_series([EmptyElement::at(point) + rim + body])?;
+            }
+        }
+        let to_pixel = |x: f64| {
+            let part = (x - self.x.0) / (self.x.1 - self.x.0);
+            LEFT + (part * f64::from(wide as i32 - LEFT - RIGHT)).round() as i32
+        };
+        // Touches before faces; a name that would be on another one is left out.
+        let mut taken: Vec<(i32, i32)> = Vec::new();
+        let (touches, faces): (Vec<&Rule>, Vec<&Rule>) = rules.partition(|rule| rule.touch);
+        for rule in touches.into_iter().chain(faces) {
+            let (x, width) = (to_pixel(rule.x), text_width(rule.name, RULE_PX));
+            let is_left = rule.touch || x + width > wide as i32;
+            let (at, side) = if is_left { (x - 4, HPos::Right) } else { (x + 4, HPos::Left) };
+            let from = if is_left { at - width } else { at };
+            if taken.iter().all(|other| from >= other.1 || from + width <= other.0) {
+                let colour = if rule.touch { palette::TOUCH } else { palette::FACE };
+                let style = font(RULE_PX, colour, side, VPos::Center);
+                body.draw(&Text::new(rule.name, (at, RULES / 2), style))?;
+                taken.push((from, from + width));
             }
         }
         Ok(())
@@ -173,22 +230,32 @@ impl Panel {
         axis::padded((range.0 - missing, range.1 + missing), 0.06)
     }
 
-    /// Everything that the legend names, in its order: what has a point.
+    /// Whether something is drawn.
+    pub(crate) fn has_data(&self) -> bool {
+        let points = self.lines.iter().flat_map(|line| &line.points);
+        let marks = self.marks.iter().flat_map(|marks| &marks.points);
+        points.chain(marks).any(|point| point.1.is_finite())
+    }
+
+    /// Everything that the legend names, in its order: what has a point in the plot.
     fn legend(&self) -> Vec<(&str, Sample<'_>)> {
-        let has_points = |points: &[(f64, f64)]| points.iter().any(|point| point.1.is_finite());
+        let y = self.y_range();
+        let has_points =
+            |points: &[(f64, f64)]| points.iter().any(|point| inside(*point, self.x, y));
         let lines = self.lines.iter().filter(|line| has_points(&line.points));
         let lines = lines.map(|line| (&*line.name, Sample::Line(line.look)));
-        let levels = self.levels.iter().map(|&(name, look, _)| (name, Sample::Line(look)));
+        let levels = self.levels.iter().filter(|level| (y.0..=y.1).contains(&level.2));
+        let levels = levels.map(|&(name, look, _)| (name, Sample::Line(look)));
         let marks = self.marks.iter().filter(|marks| has_points(&marks.points));
         let marks = marks.map(|marks| (&*marks.name, Sample::Mark(marks)));
         lines.chain(levels).chain(marks).collect()
     }
 
     /// One row, or two where title and legend do not fit side by side.
-    fn head_height(&self, area: &Area) -> i32 {
+    fn head_height(&self, wide: i32) -> i32 {
         let legend: i32 = self.legend().iter().map(Sample::width).sum();
         let title = text_width(&self.title, TITLE_PX);
-        let fits = title + legend + RIGHT + 24 * S <= area.dim_in_pixel().0 as i32;
+        let fits = title + legend + RIGHT + 24 * S <= wide;
         if fits { HEAD } else { HEAD + LEGEND }
     }
 
@@ -254,5 +321,45 @@ fn mark<'a>(marks: &Marks, at: (i32, i32)) -> [DynElement<'static, SVGBackend<'a
             TriangleMarker::new(at, R + 4, WHITE.filled()).into_dyn(),
             TriangleMarker::new(at, R + 1, marks.colour.filled()).into_dyn(),
         ],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::svg;
+
+    #[test]
+    fn the_frame_is_where_the_plot_is() {
+        let x = (10.0, 20.0);
+        let corners = vec![(10.0, 1.0), (20.0, 5.0)];
+        for rules in [vec![], vec![Rule { x: 12.0, name: "face", touch: false }]] {
+            let panel = Panel {
+                title: "t".to_owned(),
+                y_name: "y, mm",
+                x_name: Some("x, s"),
+                x,
+                y: Some((1.0, 5.0)),
+                least_span: 0.0,
+                lines: vec![Line { name: "a".into(), look: Look::Truth, points: corners.clone() }],
+                marks: Vec::new(),
+                levels: Vec::new(),
+                shades: Vec::new(),
+                rules,
+            };
+            let [left, right, top, bottom] = panel.frame((540, 250));
+            let svg = svg::fluid((540, 250), "", |area| panel.draw(area));
+            let line =
+                svg.rsplit("<polyline").find(|line| line.contains("stroke=\"#1F2937\"")).unwrap();
+            let points = line.split("points=\"").nth(1).unwrap().split('"').next().unwrap();
+            let mut ends = points.split_whitespace().map(|point| {
+                let (x, y) = point.split_once(',').unwrap();
+                (x.parse::<i32>().unwrap(), y.parse::<i32>().unwrap())
+            });
+            let (first, last) = (ends.next().unwrap(), ends.next_back().unwrap());
+            let near = |a: i32, b: i32| (a - b).abs() <= 3;
+            assert!(near(first.0, left) && near(first.1, bottom), "{first:?} {left} {bottom}");
+            assert!(near(last.0, right) && near(last.1, top), "{last:?} {right} {top}");
+        }
     }
 }

@@ -4,12 +4,17 @@ use plotters::style::RGBColor;
 
 use super::axis;
 use super::palette;
-use super::panel::{Line, Look, Marks, Panel, Shape};
+use super::panel::{Line, Look, Marks, Panel, Rule, Shape};
 use super::svg;
 use crate::record::{CrossingLine, Recording, Tick};
 
 /// From one mark of a crossing to the next, drawing units.
 const SIDE: i32 = 22;
+
+/// Largest part of the time axis before the first motion.
+const BEFORE_MOTION: f64 = 0.12;
+/// Travel that counts as motion, mm.
+const MOTION_MM: f64 = 0.01;
 
 /// Size of the overview, CSS pixels.
 const OVERVIEW: (u32, u32) = (1000, 820);
@@ -57,14 +62,36 @@ impl Across {
         }
     }
 
-    /// Range of all rows.
+    /// Name of the time axis in the page's script.
+    pub(super) fn axis(self) -> &'static str {
+        if self == Self::Position { "position" } else { "time" }
+    }
+
+    /// Time at the axis' zero, s.
+    pub(super) fn since_s(self) -> f64 {
+        if let Self::Since(start_s) = self { start_s } else { 0.0 }
+    }
+
+    /// Range of the rows. Over time it begins shortly before the first motion.
     pub(super) fn range(self, rows: &[Tick]) -> (f64, f64) {
         let range = axis::extent(rows.iter().map(|row| self.of(row))).unwrap_or((0.0, 1.0));
         match self {
-            Self::Time | Self::Since(_) => (range.0, range.1.max(range.0 + 1e-3)),
+            Self::Time | Self::Since(_) => {
+                let end = range.1.max(range.0 + 1e-3);
+                let motion = motion(rows).map(|row| self.of(row));
+                let before =
+                    |start: f64| start - BEFORE_MOTION / (1.0 - BEFORE_MOTION) * (end - start);
+                (motion.map_or(range.0, |start| before(start).max(range.0)), end)
+            }
             Self::Position => axis::padded(range, 0.01),
         }
     }
+}
+
+/// The first row in motion; none if nothing moves.
+pub(super) fn motion(rows: &[Tick]) -> Option<&Tick> {
+    let first = rows.iter().map(Tick::position_mm).find(|position| position.is_finite())?;
+    rows.iter().find(|row| (row.position_mm() - first).abs() > MOTION_MM)
 }
 
 /// The run as the plots need it.
@@ -74,6 +101,8 @@ pub(super) struct View<'a> {
     pub(super) across: Across,
     pub(super) x: (f64, f64),
     pub(super) shades: Vec<(f64, f64)>,
+    /// First touches and faces.
+    pub(super) rules: Vec<Rule>,
     /// Largest preload, N, if the parameters have it.
     pub(super) limit_n: Option<f64>,
 }
@@ -92,6 +121,12 @@ impl<'a> View<'a> {
             across,
             x: across.range(rows),
             shades: recording.summary.crossings.iter().map(span).collect(),
+            rules: recording
+                .summary
+                .crossings
+                .iter()
+                .flat_map(|c| rules(rows, across, c))
+                .collect(),
             limit_n: parameter(&recording.parameters, "preload", "limit_n"),
         }
     }
@@ -109,6 +144,7 @@ impl<'a> View<'a> {
             marks: Vec::new(),
             levels: Vec::new(),
             shades: self.shades.clone(),
+            rules: self.rules.clone(),
         }
     }
 
@@ -170,6 +206,14 @@ impl<'a> View<'a> {
             self.line("true", Look::Truth, |row| row.of_truth(|t| t.preload_true_n)),
         ];
         panel.levels = self.limit_n.iter().map(|&n| ("limit", Look::Limit, n)).collect();
+        // The build-up at rest would take most of the height.
+        let moving = motion(self.rows).map_or(f64::NEG_INFINITY, |row| self.across.of(row));
+        if self.across == Across::Time {
+            let shown = panel.lines.iter().flat_map(|line| &line.points);
+            let shown = shown.filter(|point| point.0 >= moving).map(|point| point.1);
+            let levels = panel.levels.iter().map(|level| level.2);
+            panel.y = axis::extent(shown.chain(levels)).map(|range| axis::padded(range, 0.06));
+        }
         panel
     }
 
@@ -207,7 +251,7 @@ impl<'a> View<'a> {
     }
 
     pub(super) fn slip_margin(&self) -> Panel {
-        let mut panel = self.panel("Slip margin", "friction left unused");
+        let mut panel = self.panel("Slip margin", "unused friction, ratio");
         panel.least_span = 0.2;
         panel.lines = vec![
             self.line("by the model", Look::Estimate(palette::SLIP), |row| {
@@ -230,6 +274,26 @@ impl<'a> View<'a> {
         ];
         panel
     }
+}
+
+/// Where the corner first touched and where the axle passed the face.
+fn rules(rows: &[Tick], across: Across, line: &CrossingLine) -> Vec<Rule> {
+    let long = matches!(across, Across::Since(_));
+    let touch = Rule {
+        x: across.at(rows, line.touch_s),
+        name: if long { "corner touches" } else { "touch" },
+        touch: true,
+    };
+    let from = rows.partition_point(|row| row.controller.t_s < line.touch_s.min(line.lift_s));
+    let ahead = |row: &Tick| row.position_mm() < line.step_mm;
+    let side = rows.get(from).map(ahead);
+    let passed = rows[from..].iter().find(|row| Some(ahead(row)) != side);
+    let face_x = match across {
+        Across::Position => Some(line.step_mm),
+        _ => passed.map(|row| across.of(row)),
+    };
+    let face = face_x.map(|x| Rule { x, name: "face", touch: false });
+    [touch].into_iter().chain(face).collect()
 }
 
 /// Speed, preload, gap and radius of a run over time, stacked, as an SVG of 1000 x 820.

@@ -75,7 +75,7 @@ mod tests {
 
     #[test]
     fn dashed_colours_get_their_dashes() {
-        let dashed = [palette::WANTED, palette::LIMIT, palette::SIMULATED];
+        let dashed = [palette::WANTED, palette::LIMIT, palette::SIMULATED, palette::TOUCH];
         assert_eq!(dashed.len(), palette::DASHES.len());
         for (colour, (text, _)) in dashed.iter().zip(palette::DASHES) {
             assert_eq!(format!("#{:02X}{:02X}{:02X}", colour.0, colour.1, colour.2), text);

@@ -77,6 +77,7 @@ pub fn picture(axes: &[Axis], rows: &[Map<String, Value>], plots: &[Plot]) -> Op
                 marks: Vec::new(),
                 levels: plot.level.iter().map(|(name, at)| (*name, Look::Limit, *at)).collect(),
                 shades: Vec::new(),
+                rules: Vec::new(),
             };
             panel.draw(area)?;
         }

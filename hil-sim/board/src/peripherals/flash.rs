@@ -35,6 +35,8 @@ const DATA_CACHE_RESET: u32 = 1 << 12;
 const DBANK: u32 = 1 << 22;
 /// Of the ECC register: two wrong bits in a double word were read; address in bits 0 to 18.
 const TWO_WRONG_BITS: u32 = 1 << 31;
+/// Its interrupt for one wrong bit, which this flash never has.
+const ONE_WRONG_INTERRUPT: u32 = 1 << 24;
 
 const LOCK: u32 = 1 << 31;
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
@@ -337,7 +339,11 @@ impl Peripheral for Flash {
             }
             SR => self.flags &= !write.ones(),
             ACR => self.write_access(write)?,
-            ECCR => self.ecc &= !(write.ones() & TWO_WRONG_BITS),
+            ECCR => {
+                let interrupt = write.onto(self.ecc) & ONE_WRONG_INTERRUPT;
+                self.ecc &= !(write.ones() & TWO_WRONG_BITS) & !ONE_WRONG_INTERRUPT;
+                self.ecc |= interrupt;
+            }
             CR => self.write_control(write, now)?,
             _ => self.registers.write(offset, write)?,
         }

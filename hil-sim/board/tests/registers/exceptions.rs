@@ -23,7 +23,10 @@ pub(super) const FIELDS: [(&str, &str); 10] = [
     ("IWDG.KR.KEY", "a command: reads as 0"),
     ("EXTI.SWIER1.*", "a command: the model clears it at once, the chip with the flag"),
     ("SPI1.DR8.DR SPI1.DR.DR CRC.DR*", "what is written is not what is read"),
-    ("DMA1.IFCR.* RCC.CSR.RMVF FLASH.SR.* CRC.CR.RESET", "cleared or reset by 1; reads as 0"),
+    (
+        "DMA1.IFCR.* RCC.CSR.RMVF FLASH.SR.* FLASH.ECCR.ECCC* FLASH.ECCR.ECCD* CRC.CR.RESET",
+        "cleared or reset by 1; reads as 0",
+    ),
     ("FLASH.CR.STRT FLASH.CR.OPTLOCK", "set alone; cleared by the end of the operation or a key"),
     ("GPIO*.BSRR.* GPIO*.BRR.*", "a command: reads as 0"),
     ("GPIO*.LCKR.*", "takes effect by the sequence of its key"),

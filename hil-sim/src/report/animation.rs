@@ -1,0 +1,262 @@
+//! The section that shows why the preload rises: a sentence for each crossing, still pictures of
+//! its two instants, and the animation that a script draws.
+
+use super::scene::{Event, Geometry, Scene};
+use super::tables::table;
+use crate::table::number;
+
+/// The animation's controls and pictures, hidden until the script runs.
+const STAGE: &str = include_str!("scene.html");
+/// The script.
+const SCRIPT: &str = include_str!("scene.js");
+
+/// The section's content, as HTML.
+pub(super) fn html(scene: Option<&Scene>) -> String {
+    let Some(scene) = scene else {
+        return "<p>The rows or the rig's parameters are not in this log, so the wheel cannot be \
+drawn.</p>\n"
+            .to_owned();
+    };
+    let mut html = format!("<p>{}</p>\n", why(scene));
+    html += &sentences(scene);
+    html += STAGE;
+    html += &format!("<p class=\"note\">{}</p>\n", legend(scene));
+    if let Some(first) = scene.crossings.first() {
+        html += &stills(scene, first);
+    }
+    html
+}
+
+/// The script with its data, for the end of the page.
+pub(super) fn script(scene: &Scene) -> String {
+    format!(
+        "<script type=\"application/json\" id=\"scene\">{}</script>\n<script>\n{SCRIPT}</script>\n",
+        scene.json()
+    )
+}
+
+fn why(scene: &Scene) -> String {
+    let cruise_n = number(scene.geometry.cruise_n, 1);
+    let instant = if scene.retracts {
+        "The wheel rolls over the edge, and for a moment the edge alone carries it until it \
+reaches the lower wall."
+    } else {
+        "The wheel climbs over the edge, and the edge takes the load from the lower wall until \
+that wall lets go."
+    };
+    format!(
+        "{instant} At that instant the <b>gap</b> is open between the step's root and the wheel. \
+Rubber needs time to yield: the faster the crossing, the stiffer the tread and the larger the gap. \
+More preload presses the tread deeper into the corner and closes the gap again, and it gives the \
+wheel more friction. So the controller raises the preload from the {cruise_n} N of \
+the smooth wall, early enough for the slow pre-tightener.{}",
+        if scene.gap_ref_mm > 0.0 {
+            format!(" The gap must not exceed its reference of {:.2} mm.", scene.gap_ref_mm)
+        } else {
+            String::new()
+        }
+    )
+}
+
+/// What the preload did at each crossing.
+fn sentences(scene: &Scene) -> String {
+    if scene.crossings.is_empty() {
+        return "<p>No step was crossed.</p>\n".to_owned();
+    }
+    let head = [
+        "step",
+        "speed<br>mm/s",
+        "preload<br>N",
+        "gap<br>mm",
+        "gap with the preload of the smooth wall<br>mm, by the model",
+        "first touch before the face<br>mm",
+    ];
+    let rows = scene.crossings.iter().map(|c| {
+        vec![
+            c.index.to_string(),
+            number(c.speed_mm_s, 2),
+            number(c.preload_n, 1),
+            number(c.gap_mm, 2),
+            number(c.gap_at_cruise_mm, 2),
+            if scene.retracts { number(None, 0) } else { number(c.touch_mm, 1) },
+        ]
+    });
+    table("ledger", &head.map(str::to_owned), rows.collect())
+}
+
+fn legend(scene: &Scene) -> String {
+    let forces = if scene.measured {
+        "This is a captured log: position, radius, compression and preload are those that the \
+controller measured or estimated, the clearance follows from them, and the forces of corner and \
+wall are not measured."
+    } else {
+        "Arrows: preload on the axle, force of the wall under it, force of the corner, drawn from \
+the edge towards the axle."
+    };
+    format!(
+        "{forces} Lengths are true to scale, the pillar is at the top. Dashed: the undeformed \
+wheel; the sleeve covers what is pressed flat. The spring shortens by its true deflection; its \
+length, the hub and the screw are only drawn. A click in a plot goes to its instant."
+    )
+}
+
+/// Both instants of a crossing as still pictures, and where the corner first touches.
+fn stills(scene: &Scene, c: &Event) -> String {
+    let at = |t_s: f64| {
+        let place = scene.rows.partition_point(|row| row[0] < t_s).min(scene.rows.len() - 1);
+        (scene.rows[place][1], scene.geometry.wall_radius_mm - scene.rows[place][2])
+    };
+    let names = if scene.retracts {
+        ["The edge takes the load", "The lower wall carries again"]
+    } else {
+        ["First touch of the corner", "The lower wall lets go"]
+    };
+    let first = still(&scene.geometry, c, at(c.touch_s), names[0], None);
+    let gap = Some(c.gap_mm).filter(|gap| gap.is_finite());
+    let second = still(&scene.geometry, c, at(c.lift_s), names[1], gap);
+    format!(
+        "<div class=\"stills\">\n{first}{second}</div>\n<p class=\"note\">{}</p>\n",
+        touch(scene, c)
+    )
+}
+
+/// Why the corner touches so far before the face.
+pub(super) fn touch(scene: &Scene, c: &Event) -> String {
+    if scene.retracts {
+        return "Retracting, the wheel comes from the upper wall: the edge takes the load when \
+the tread's patch reaches it."
+            .to_owned();
+    }
+    let Event { touch_mm, touch_rigid_mm, compression_mm, step_mm, .. } = c;
+    let rigid = format!(
+        "A wheel of radius R = {:.2} mm touches the edge of a step h = {step_mm:.2} mm already \
+sqrt(R² − (R − h)²) = {touch_rigid_mm:.1} mm before the face.",
+        scene.geometry.wheel_radius_mm,
+    );
+    if scene.measured {
+        return format!(
+            "{rigid} The controller noticed it {touch_mm:.1} mm before the face, by the rising \
+compression: the marks are where it noticed the touch."
+        );
+    }
+    format!(
+        "{rigid} Here it touched {touch_mm:.1} mm before it: the tread, compressed by \
+{compression_mm:.2} mm, lowers the axle, so that the edge is reached a little earlier."
+    )
+}
+
+/// The wheel with its axle at `(x, y)` at the step of `c`.
+fn still(g: &Geometry, c: &Event, (x, y): (f64, f64), title: &str, gap: Option<f64>) -> String {
+    let (r, face) = (g.wheel_radius_mm, c.face_mm);
+    let upper = g.wall_mm(face);
+    let lower = upper - c.step_mm;
+    // Relative to the root of the step, y downwards as SVG has it.
+    let (cx, cy) = (x - face, lower - y);
+    let mut marks = String::new();
+    if cx < -0.5 {
+        marks += &format!(
+            "<path class=\"measure\" d=\"M{cx:.2},{cy:.2}V5M0,0V5M{cx:.2},3.5H0\"/>\n\
+<text x=\"{:.2}\" y=\"9\" text-anchor=\"middle\">{:.1} mm</text>\n",
+            0.5 * cx,
+            cx.abs(),
+        );
+    }
+    let away = cx.hypot(cy);
+    if let Some(gap) = gap {
+        let rim = (cx * (1.0 - r / away), cy * (1.0 - r / away));
+        marks += &format!(
+            "<path class=\"gap\" d=\"M0,0L{:.2},{:.2}\"/>\n<text class=\"gap\" x=\"2\" y=\"3.4\">gap {gap:.2} mm</text>\n",
+            rim.0, rim.1
+        );
+    }
+    format!(
+        "<figure class=\"still\"><svg viewBox=\"-43 -55 74 67\" role=\"img\" aria-label=\"{title}\">\n\
+<circle class=\"rubber\" cx=\"{cx:.2}\" cy=\"{cy:.2}\" r=\"{r}\"/><circle class=\"hub\" cx=\"{cx:.2}\" cy=\"{cy:.2}\" r=\"{:.2}\"/>\n\
+<path class=\"sleeve\" d=\"M-60,20V0H0V{:.2}H60V20Z\"/>\n\
+<circle class=\"outline\" cx=\"{cx:.2}\" cy=\"{cy:.2}\" r=\"{r}\"/>\n{marks}</svg>\n\
+<figcaption>Step {}: {title}</figcaption></figure>\n",
+        0.7 * r,
+        -c.step_mm,
+        c.index,
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write as _;
+    use std::process::{Command, Stdio};
+
+    use super::*;
+    use crate::report::example;
+
+    #[test]
+    fn the_pictures_say_where_the_corner_touches_and_why() {
+        let scene = Scene::new(&example::deploy()).unwrap();
+        let html = html(Some(&scene));
+        assert!(html.contains("= 13.6 mm before the face"), "{html}");
+        assert_eq!(html.matches("<figcaption>").count(), 2);
+    }
+
+    #[test]
+    fn measured_figures_are_said_to_be_measured() {
+        let mut recording = example::deploy();
+        assert!(!html(Scene::new(&recording).as_ref()).contains("captured log"));
+        recording.rows.iter_mut().for_each(|row| row.truth = None);
+        assert!(html(Scene::new(&recording).as_ref()).contains("captured log"));
+        assert!(html(None).contains("cannot be drawn"));
+    }
+
+    /// Runs the script's own functions where there is a `node`.
+    #[test]
+    fn the_script_draws_the_geometry_of_the_rig() {
+        let spawned = Command::new("node")
+            .args(["--input-type=commonjs", "-"])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn();
+        let Ok(mut node) = spawned else {
+            eprintln!("left out: there is no node");
+            return;
+        };
+        let recording = example::deploy();
+        let scene = Scene::new(&recording).unwrap();
+        let times = scene.crossings.iter().flat_map(|c| [c.touch_s, c.lift_s]);
+        let times: Vec<f64> = times.map(|t_s| (1e3 * t_s).floor() * 1e-3).collect();
+        let program = format!(
+            "{SCRIPT}\nconst scene = {};\nconst out = {times:?}.map((t) => {{\n\
+const row = rowAt(scene, t), p = pose(scene, row);\n\
+const arm = Math.hypot(p.pivot[0] - p.x, p.pivot[1] - p.y);\n\
+const gap = Math.hypot(p.root[0] - p.rim[0], p.root[1] - p.rim[1]);\n\
+return [p.x, p.y, gap, p.edge[0], p.edge[1], arm, p.spring_mm, phase(scene, row).length, \
+current(scene, t).index];\n\
+}});\nconsole.log(JSON.stringify(out));\n",
+            scene.json()
+        );
+        node.stdin.take().unwrap().write_all(program.as_bytes()).unwrap();
+        let done = node.wait_with_output().unwrap();
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        let out: Vec<Vec<f64>> = serde_json::from_slice(&done.stdout).unwrap();
+        assert_eq!(out.len(), 6);
+        for (place, (t_s, drawn)) in times.iter().zip(&out).enumerate() {
+            let row = &recording.rows[(1e3 * t_s).round() as usize];
+            let truth = row.truth.unwrap();
+            let crossing = &scene.crossings[place / 2];
+            let spring_mm = 45.0 - truth.preload_true_n / (2.0 * 1.2);
+            // Rows that were thinned out are interpolated.
+            for (drawn, is, within) in [
+                (drawn[0], truth.position_true_mm, 0.02),
+                (drawn[1], 150.0 - truth.radius_true_mm, 0.02),
+                (drawn[2], truth.root_clearance_mm, 0.02),
+                (drawn[3], crossing.face_mm, 1e-9),
+                (drawn[4], 4.0 * (1.0 + (place / 2) as f64), 1e-9),
+                (drawn[5], 145.0, 1e-6),
+                (drawn[6], spring_mm, 0.05),
+            ] {
+                assert!((drawn - is).abs() < within, "at {t_s}: {drawn} {is}");
+            }
+            assert!(drawn[7] > 40.0);
+            assert!((drawn[8] - f64::from(crossing.index)).abs() < 1e-9, "another crossing");
+        }
+    }
+}

@@ -1,0 +1,379 @@
+//! What the animation of a run shows: geometry of the rig, events of the crossings and the
+//! run's own rows, thinned.
+
+use interstage::model::formula::Formula;
+use interstage::rig::Rig;
+use interstage::units::Direction;
+use serde::Serialize;
+use serde_json::{Map, Value};
+
+use crate::record::{CrossingLine, Recording, Tick};
+use crate::scenario::Scenario;
+
+/// Rows kept of a crossing's surroundings, at most.
+const ROWS_OF_ONE: usize = 500;
+/// Rows kept around all crossings together, and of the rest of the run, at most.
+const ROWS: (usize, usize) = (2500, 1500);
+/// Surroundings of a crossing: before the first touch and after lift-off, s.
+pub(super) const AROUND_S: (f64, f64) = (0.5, 0.8);
+
+/// Names of the columns of [`Scene::rows`], with their decimals. `NaN` becomes null.
+pub(super) const COLUMNS: [(&str, i32); 10] = [
+    ("t_s", 3),
+    ("position_mm", 3),
+    ("radius_mm", 3),
+    ("compression_mm", 3),
+    ("preload_n", 2),
+    ("preload_ref_n", 2),
+    ("corner_force_n", 2),
+    ("floor_force_n", 2),
+    ("root_clearance_mm", 3),
+    ("speed_mm_s", 2),
+];
+
+/// A run as the script draws it.
+#[derive(Debug, Serialize)]
+pub(super) struct Scene {
+    /// The rows are what the controller measured: no truth is known.
+    pub(super) measured: bool,
+    /// The run retracts.
+    pub(super) retracts: bool,
+    /// Reference of the gap, mm; unknown in a log without parameters.
+    pub(super) gap_ref_mm: f64,
+    pub(super) geometry: Geometry,
+    pub(super) crossings: Vec<Event>,
+    pub(super) columns: [&'static str; COLUMNS.len()],
+    pub(super) rows: Vec<[f64; COLUMNS.len()]>,
+}
+
+/// Geometry of rig and sleeve.
+#[derive(Debug, Serialize)]
+pub(super) struct Geometry {
+    /// Undeformed wheel radius R, mm.
+    pub(super) wheel_radius_mm: f64,
+    /// Outermost wall from the pillar axis, mm.
+    pub(super) wall_radius_mm: f64,
+    /// Arm length, mm.
+    pub(super) arm_length_mm: f64,
+    /// Arm's pivot from the pillar axis, mm.
+    pub(super) arm_pivot_radius_mm: f64,
+    /// Side of the pivot: 1 ahead of the wheel in the direction of deployment, -1 behind it.
+    pub(super) pivot_side: f64,
+    /// Spring rate seen at the wheel, N/mm.
+    pub(super) spring_n_per_mm: f64,
+    /// Preload on the smooth wall, N.
+    pub(super) cruise_n: f64,
+    /// Largest preload, N.
+    pub(super) limit_n: f64,
+    /// Position of each face and height of its step, mm, ascending.
+    pub(super) steps: Vec<(f64, f64)>,
+}
+
+impl Geometry {
+    /// That of `rig`, with what the seed drew of it.
+    fn new(rig: &Rig, drawn: &Map<String, Value>) -> Self {
+        let list = |key: &str| -> Option<Vec<f64>> {
+            drawn.get(key)?.as_array()?.iter().map(Value::as_f64).collect()
+        };
+        let number = |key: &str, stated| drawn.get(key).and_then(Value::as_f64).unwrap_or(stated);
+        let faces = list("rig.step_positions_mm");
+        let faces = faces.unwrap_or_else(|| rig.rig.step_positions_mm.to_vec());
+        let heights = list("rig.step_height_mm").unwrap_or_default();
+        let height = |place| heights.get(place).copied().unwrap_or(rig.rig.step_height_mm);
+        Self {
+            wheel_radius_mm: number("rig.wheel_radius_mm", rig.rig.wheel_radius_mm),
+            wall_radius_mm: rig.rig.wall_radius_mm,
+            arm_length_mm: rig.rig.arm_length_mm,
+            arm_pivot_radius_mm: rig.rig.arm_pivot_radius_mm,
+            pivot_side: if rig.plant.arm_coupling < 0.0 { -1.0 } else { 1.0 },
+            spring_n_per_mm: number("preload.spring_n_per_mm", rig.preload.spring_n_per_mm),
+            cruise_n: rig.preload.cruise_n,
+            limit_n: rig.preload.limit_n,
+            steps: faces.into_iter().enumerate().map(|(n, face)| (face, height(n))).collect(),
+        }
+    }
+
+    /// Height of the wall at `position_mm` above the outermost one, mm.
+    pub(super) fn wall_mm(&self, position_mm: f64) -> f64 {
+        self.steps.iter().filter(|step| step.0 <= position_mm).map(|step| step.1).sum()
+    }
+
+    /// Clearance of the next step's root from the undeformed wheel, mm; `NaN` if the step is
+    /// farther away than the wheel reaches.
+    pub(super) fn clearance_mm(&self, position_mm: f64, radius_mm: f64) -> f64 {
+        let faces = self.steps.iter().map(|step| step.0 - position_mm);
+        let ahead = faces.filter(|ahead| *ahead > 0.0).fold(f64::INFINITY, f64::min);
+        let height = self.wall_radius_mm - radius_mm - self.wall_mm(position_mm);
+        if ahead < self.wheel_radius_mm {
+            ahead.hypot(height) - self.wheel_radius_mm
+        } else {
+            f64::NAN
+        }
+    }
+
+    /// Distance before the face at which the wheel touches the edge of a step: `sqrt(R^2 -
+    /// (R - h - c)^2)`, since the compression c lowers the axle; mm.
+    pub(super) fn touch_mm(&self, step_mm: f64, compression_mm: f64) -> f64 {
+        let r = self.wheel_radius_mm;
+        (r * r - (r - step_mm - compression_mm).powi(2)).sqrt()
+    }
+
+    /// Height of the step whose face is nearest to `position_mm`, mm.
+    fn step_mm(&self, position_mm: f64) -> f64 {
+        let away = |step: &&(f64, f64)| (step.0 - position_mm).abs();
+        let nearest = self.steps.iter().min_by(|a, b| away(a).total_cmp(&away(b)));
+        nearest.map_or(f64::NAN, |step| step.1)
+    }
+}
+
+/// One crossing.
+#[derive(Debug, Serialize)]
+pub(super) struct Event {
+    /// Step number, from 1.
+    pub(super) index: u8,
+    /// First touch of the corner, s.
+    pub(super) touch_s: f64,
+    /// Lift-off from the lower wall (retract: touch-down), s.
+    pub(super) lift_s: f64,
+    /// Position of the face, mm.
+    pub(super) face_mm: f64,
+    /// Height of the step, mm.
+    pub(super) step_mm: f64,
+    /// Distance before the face at the first touch, mm.
+    pub(super) touch_mm: f64,
+    /// The same by the geometry alone, without compression, mm.
+    pub(super) touch_rigid_mm: f64,
+    /// Compression of the tread at the first touch, mm.
+    pub(super) compression_mm: f64,
+    /// Speed and preload at the instant of the gap, mm/s and N.
+    pub(super) speed_mm_s: f64,
+    pub(super) preload_n: f64,
+    /// Gap, mm: true, or measured where there is no truth.
+    pub(super) gap_mm: f64,
+    /// Gap at that speed with the preload of the smooth wall, by the reduced model, mm.
+    pub(super) gap_at_cruise_mm: f64,
+}
+
+impl Scene {
+    /// The scene of `recording`; none without rows or known parameters.
+    pub(super) fn new(recording: &Recording) -> Option<Self> {
+        let summary = &recording.summary;
+        let scenario = Scenario::parse("parameters", &recording.parameters, &[]).ok()?;
+        let known = recording.rows.iter().filter(|row| row.position_mm().is_finite());
+        let rows: Vec<&Tick> = known.collect();
+        rows.first()?;
+        let measured = rows.iter().all(|row| row.truth.is_none());
+        let drawn = if measured { Map::new() } else { summary.drawn.clone() };
+        let geometry = Geometry::new(&scenario.rig, &drawn);
+        let retracts = summary.direction == "retract";
+        let direction = if retracts { Direction::Retract } else { Direction::Deploy };
+        let model = (Formula::new(&scenario.rig), direction, load_n(&scenario.rig));
+        let event = |line: &CrossingLine| event(&geometry, &rows, line, &model);
+        let crossings: Vec<Event> = summary.crossings.iter().map(event).collect();
+        let rows = thinned(&rows, &crossings);
+        let rows = rows.into_iter().map(|row| values(&geometry, row)).collect();
+        let columns = COLUMNS.map(|column| column.0);
+        let gap_ref_mm = summary.gap_ref_mm;
+        Some(Self { measured, retracts, gap_ref_mm, geometry, crossings, columns, rows })
+    }
+
+    /// As JSON that can be a script's content.
+    pub(super) fn json(&self) -> String {
+        serde_json::to_string(self).expect("numbers and words").replace('<', "\\u003c")
+    }
+}
+
+/// Axial load on the wheel, N.
+fn load_n(rig: &Rig) -> f64 {
+    rig.plant.top_load_n * rig.plant.top_load_share
+}
+
+fn event(
+    geometry: &Geometry,
+    rows: &[&Tick],
+    line: &CrossingLine,
+    (model, direction, load_n): &(Formula, Direction, f64),
+) -> Event {
+    let at = rows.partition_point(|row| row.controller.t_s < line.touch_s).min(rows.len() - 1);
+    let compression_mm = compression_mm(rows[at]);
+    let gap_mm = if line.gap_mm.is_finite() { Some(line.gap_mm) } else { line.gap_measured_mm };
+    let gap_mm = gap_mm.unwrap_or(f64::NAN);
+    // The model is held to the run's own gap; then the preload above the smooth wall's is taken
+    // away.
+    let force_n = model.force_n(*direction, line.speed_mm_s, gap_mm, Some(*load_n));
+    let less_n = force_n - (line.preload_n - geometry.cruise_n);
+    let step_mm = geometry.step_mm(line.step_mm);
+    Event {
+        index: line.index,
+        touch_s: line.touch_s,
+        lift_s: line.lift_s,
+        face_mm: line.step_mm,
+        step_mm,
+        touch_mm: line.step_mm - rows[at].position_mm(),
+        touch_rigid_mm: geometry.touch_mm(step_mm, 0.0),
+        compression_mm,
+        speed_mm_s: line.speed_mm_s,
+        preload_n: line.preload_n,
+        gap_mm,
+        gap_at_cruise_mm: if less_n > 0.0 {
+            model.gap_mm(*direction, line.speed_mm_s, less_n, Some(*load_n))
+        } else {
+            f64::NAN
+        },
+    }
+}
+
+fn compression_mm(row: &Tick) -> f64 {
+    row.truth.map_or(row.controller.compression_mm, |truth| truth.compression_true_mm)
+}
+
+/// The values of [`COLUMNS`].
+fn values(geometry: &Geometry, row: &Tick) -> [f64; COLUMNS.len()] {
+    let c = &row.controller;
+    let values = match &row.truth {
+        Some(t) => [
+            c.t_s,
+            t.position_true_mm,
+            t.radius_true_mm,
+            t.compression_true_mm,
+            t.preload_true_n,
+            c.preload_ref_n,
+            t.corner_force_n,
+            t.floor_force_n,
+            t.root_clearance_mm,
+            t.speed_true_mm_s,
+        ],
+        None => [
+            c.t_s,
+            c.position_mm,
+            c.radius_mm,
+            c.compression_mm,
+            c.preload_n,
+            c.preload_ref_n,
+            f64::NAN,
+            f64::NAN,
+            geometry.clearance_mm(c.position_mm, c.radius_mm),
+            c.wheel_speed_mm_s,
+        ],
+    };
+    std::array::from_fn(|place| {
+        let scale = 10_f64.powi(COLUMNS[place].1);
+        (values[place] * scale).round() / scale
+    })
+}
+
+/// About [`ROWS`] of the rows at most, dense around the crossings, the first and the last kept.
+fn thinned<'a>(rows: &[&'a Tick], crossings: &[Event]) -> Vec<&'a Tick> {
+    let near = |row: &Tick| {
+        let t_s = row.controller.t_s;
+        crossings.iter().position(|crossing| {
+            let (a, b) = (crossing.touch_s, crossing.lift_s);
+            (a.min(b) - AROUND_S.0..=a.max(b) + AROUND_S.1).contains(&t_s)
+        })
+    };
+    let far = rows.iter().filter(|row| near(row).is_none()).count();
+    let mut kept: Vec<&Tick> = Vec::new();
+    for piece in rows.chunk_by(|a, b| near(a) == near(b)) {
+        let (count, most) = match near(piece[0]) {
+            Some(_) => (piece.len(), ROWS_OF_ONE.min(ROWS.0 / crossings.len())),
+            None => (far, ROWS.1),
+        };
+        kept.extend(piece.iter().step_by(count.div_ceil(most).max(1)));
+    }
+    if kept.last().map(|row| row.controller.tick) != rows.last().map(|row| row.controller.tick) {
+        kept.extend(rows.last());
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::example;
+
+    #[test]
+    fn the_rows_are_the_runs_own() {
+        let recording = example::deploy();
+        let scene = Scene::new(&recording).unwrap();
+        assert!(scene.rows.len() > 1000 && scene.rows.len() <= 3 * ROWS_OF_ONE + ROWS.1 + 10);
+        for shown in &scene.rows {
+            let row = &recording.rows[(1e3 * shown[0]).round() as usize];
+            let truth = row.truth.unwrap();
+            for (shown, is, within) in [
+                (shown[1], truth.position_true_mm, 6e-4),
+                (shown[2], truth.radius_true_mm, 6e-4),
+                (shown[3], truth.compression_true_mm, 6e-4),
+                (shown[4], truth.preload_true_n, 6e-3),
+                (shown[6], truth.corner_force_n, 6e-3),
+                (shown[7], truth.floor_force_n, 6e-3),
+                (shown[9], truth.speed_true_mm_s, 6e-3),
+            ] {
+                assert!((shown - is).abs() < within, "{shown} {is}");
+            }
+        }
+        let last = recording.rows.last().unwrap().controller.t_s;
+        assert!((scene.rows.last().unwrap()[0] - last).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_geometry_gives_the_plants_clearance() {
+        let recording = example::deploy();
+        let geometry = Scene::new(&recording).unwrap().geometry;
+        let mut seen = 0;
+        for truth in recording.rows.iter().filter_map(|row| row.truth) {
+            let by_geometry = geometry.clearance_mm(truth.position_true_mm, truth.radius_true_mm);
+            assert_eq!(by_geometry.is_nan(), truth.root_clearance_mm.is_nan());
+            if by_geometry.is_finite() {
+                assert!((by_geometry - truth.root_clearance_mm).abs() < 1e-6);
+                seen += 1;
+            }
+        }
+        assert!(seen > 1000);
+    }
+
+    #[test]
+    fn the_corner_touches_where_circle_and_edge_meet() {
+        let recording = example::deploy();
+        let scene = Scene::new(&recording).unwrap();
+        assert_eq!(scene.crossings.len(), 3);
+        for crossing in &scene.crossings {
+            assert!(
+                (crossing.touch_rigid_mm - (25.0_f64.powi(2) - 21.0_f64.powi(2)).sqrt()).abs()
+                    < 1e-9
+            );
+            let touch = scene.geometry.touch_mm(crossing.step_mm, crossing.compression_mm);
+            assert!((crossing.touch_mm - touch).abs() < 0.1, "{crossing:?} {touch}");
+            assert!(crossing.touch_mm > crossing.touch_rigid_mm, "compression touches earlier");
+        }
+    }
+
+    #[test]
+    fn less_preload_would_leave_a_larger_gap() {
+        for crossing in &Scene::new(&example::deploy()).unwrap().crossings {
+            assert!(
+                crossing.preload_n > 34.0 && crossing.gap_at_cruise_mm > crossing.gap_mm + 0.01
+            );
+            assert!(crossing.gap_at_cruise_mm < 3.44, "the free wheel's gap is the largest");
+        }
+    }
+
+    #[test]
+    fn a_log_without_truth_is_shown_by_its_measurements() {
+        let mut recording = example::deploy();
+        recording.rows.iter_mut().for_each(|row| row.truth = None);
+        let scene = Scene::new(&recording).unwrap();
+        assert!(scene.measured);
+        assert!(scene.rows.iter().all(|row| row[6].is_nan() && row[7].is_nan()));
+        let clearances = scene.rows.iter().map(|row| row[8]).filter(|gap| gap.is_finite());
+        let least = clearances.fold(f64::INFINITY, f64::min);
+        assert!((2.0..3.0).contains(&least), "{least}");
+        assert!(!scene.json().contains("NaN"));
+    }
+
+    #[test]
+    fn a_run_with_unknown_parameters_has_no_scene() {
+        let mut recording = example::deploy();
+        recording.parameters = "not parameters".to_owned();
+        assert!(Scene::new(&recording).is_none());
+    }
+}
