@@ -11,4 +11,4 @@ mod senses;
 pub mod speed;
 
 pub use freshness::{Reading, Reason, Validity};
-pub use senses::{SensedState, Senses, SensesState, Tuning};
+pub use senses::{FILTER_LAG, SensedState, Senses, SensesState, Tuning};

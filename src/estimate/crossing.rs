@@ -116,6 +116,8 @@ pub enum CrossingEvent {
         height: Millimetres,
         /// Gap with that height; with the nominal one if that is not plausible.
         gap: Millimetres,
+        /// By how much that height changes the distance to the face at the lift.
+        shift: Millimetres,
         /// The height lies within what a sleeve may be off.
         plausible: bool,
     },
@@ -206,7 +208,7 @@ impl CrossingWatch {
     /// wall.
     pub fn to_edge(&self, level: u8, radius: Millimetres, compression: Millimetres) -> Millimetres {
         let height = self.wall(level) + self.radius - radius;
-        self.measure(compression, height).distance
+        self.measure(compression, height, self.step).distance
     }
 
     /// Turns back, from now on in `direction`; the baseline is that of the wall which the
@@ -256,8 +258,10 @@ impl CrossingWatch {
         }
         let height = state.baseline.output() + self.radius - seen.radius;
         Some(match direction {
-            Direction::Deploy => self.measure(seen.compression, height).distance,
-            Direction::Retract => -self.measure(seen.compression, height + self.step).distance,
+            Direction::Deploy => self.measure(seen.compression, height, self.step).distance,
+            Direction::Retract => {
+                -self.measure(seen.compression, height + self.step, self.step).distance
+            }
         })
     }
 
@@ -338,7 +342,7 @@ impl CrossingWatch {
                 Direction::Deploy => Contact::Corner,
                 Direction::Retract => Contact::Both,
             };
-            let lift = self.measure(seen.compression, self.radius - short);
+            let lift = self.measure(seen.compression, self.radius - short, self.step);
             state.lift = Some(lift);
             return Some(CrossingEvent::Lifted(lift));
         }
@@ -397,11 +401,14 @@ impl CrossingWatch {
         let height = (state.baseline.output() - state.next.output()).abs();
         let plausible = (height - self.step).abs() <= HEIGHT_TOLERANCE;
         let used = if plausible { height } else { self.step };
-        let gap = state.lift.map_or(Q16::ZERO, |lift| self.gap(lift.depth, lift.height, used));
+        let (gap, shift) = state.lift.map_or((Q16::ZERO, Q16::ZERO), |lift| {
+            let by_height = self.measure(lift.depth, lift.height, used);
+            (by_height.gap, by_height.distance - lift.distance)
+        });
         state.baseline = state.next;
         state.contact = Contact::Wall;
         state.ticks = 0;
-        Some(CrossingEvent::GapClosed { height, gap, plausible })
+        Some(CrossingEvent::GapClosed { height, gap, shift, plausible })
     }
 
     /// A corner begins to carry.
@@ -417,22 +424,17 @@ impl CrossingWatch {
         };
     }
 
-    fn measure(&self, depth: Millimetres, height: Millimetres) -> Lift {
+    /// What a lift-off shows with this depth at the corner and the centre this high above the
+    /// lower wall, for a step of height h, mm: `y^2 - (y-h)^2 = h (2y - h)`.
+    fn measure(&self, depth: Millimetres, height: Millimetres, step: Millimetres) -> Lift {
         let reach = self.radius - depth;
-        let over = height - self.step;
+        let over = height - step;
+        let chord = step * (height + over);
         Lift {
             depth,
             height,
-            gap: self.gap(depth, height, self.step),
+            gap: sqrt((reach * reach + chord).max(Q16::ZERO)) - self.radius,
             distance: sqrt((reach * reach - over * over).max(Q16::ZERO)),
         }
-    }
-
-    /// Gap with this depth at the corner and the centre this high above the lower
-    /// wall, for a step of height h, mm: `y^2 - (y-h)^2 = h (2y - h)`.
-    fn gap(&self, depth: Millimetres, height: Millimetres, step: Millimetres) -> Millimetres {
-        let reach = self.radius - depth;
-        let chord = step * (height + height - step);
-        sqrt((reach * reach + chord).max(Q16::ZERO)) - self.radius
     }
 }

@@ -5,7 +5,7 @@ use super::odometry::Rolling;
 use super::restore::UNSURE_WITHIN;
 use super::{EstimateState, Estimator, Expectation, Findings, LiftPoint, OpenCrossing, Position};
 use crate::fault::{Fault, Limit};
-use crate::sense::SensedState;
+use crate::sense::{FILTER_LAG, SensedState};
 use crate::units::{Direction, Millimetres, Newtons, Q16, Tick};
 
 /// What the estimator is given in a tick.
@@ -51,7 +51,8 @@ impl Estimator {
             Some(CrossingEvent::Released) => state.crossing = None,
             Some(CrossingEvent::Lifted(lift)) => self.lifted(state, tick, lift, &mut found),
             Some(CrossingEvent::Passed) => passed(state),
-            Some(CrossingEvent::GapClosed { gap, plausible, .. }) => {
+            Some(CrossingEvent::GapClosed { gap, shift, plausible, .. }) => {
+                refine(state, shift);
                 close(state, gap, plausible, &mut found);
             }
             Some(CrossingEvent::Retouched { gap }) => {
@@ -73,10 +74,11 @@ impl Estimator {
         let seen = self.watch_input(state, sensed);
         let direction = state.direction;
         let ahead = self.watch.to_face(&state.watch, direction, &seen);
+        let position = position_of_radius(state, sensed);
         let Some(open) = state.crossing.as_mut().filter(|open| open.felt.is_none()) else { return };
         open.felt = ahead.map(|ahead| match direction {
-            Direction::Deploy => state.position + ahead,
-            Direction::Retract => state.position - ahead,
+            Direction::Deploy => position + ahead,
+            Direction::Retract => position - ahead,
         });
     }
 
@@ -199,7 +201,7 @@ impl Estimator {
         let Some(mut open) = state.crossing else { return };
         let sensed = tick.sensed;
         let table = self.steps.face(open.step);
-        let seen = state.position + lift.distance;
+        let seen = position_of_radius(state, sensed) + lift.distance;
         let face = if open.resumed { table.unwrap_or(seen) } else { seen };
         let residual = table.map_or(Q16::ZERO, |table| face - table);
         open.lift = Some(LiftPoint {
@@ -303,6 +305,23 @@ fn passed(state: &mut EstimateState) {
             state.level = state.level.saturating_sub(1);
             state.extra = state.extra.saturating_sub(extra);
         }
+    }
+}
+
+/// Where the wheel was when its centre had the radius that the low-pass of the angle shows
+/// now, mm.
+fn position_of_radius(state: &EstimateState, sensed: &SensedState) -> Millimetres {
+    state.position - sensed.speed.value * FILTER_LAG
+}
+
+/// The step's height is measured: its face lies `shift` further out.
+fn refine(state: &mut EstimateState, shift: Millimetres) {
+    let observed = state.crossing.as_mut().filter(|open| !open.resumed && !open.turned);
+    let Some(point) = observed.and_then(|open| open.lift.as_mut()) else { return };
+    point.face += shift;
+    point.residual += shift;
+    if state.displaced.is_none() {
+        state.odometry.refine(shift);
     }
 }
 

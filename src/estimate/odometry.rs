@@ -79,6 +79,12 @@ impl Odometry {
         self.offset = self.offset.saturating_sub(share.widen());
     }
 
+    /// The step found last lies `shift` further out than its residual had it, mm.
+    pub fn refine(&mut self, shift: Millimetres) {
+        let share = divide(shift, Q16::from_num(self.steps.max(1)));
+        self.offset = self.offset.saturating_sub(share.widen());
+    }
+
     /// Converts what the tread has travelled to axial travel once it makes a chord, or `now`.
     ///
     /// The wheel rolls by `ds = (1 - lag) ds_0` where its tread turns by ds_0; with the rise dy of the

@@ -10,13 +10,16 @@ use super::raw::SensorFrame;
 use super::speed::{self, SpeedState, Speedometer};
 use crate::rig::{Rig, RigError};
 use crate::units::{
-    Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, Ratio, TICK_HZ, Tick, Travel,
+    Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, Ratio, Seconds, TICK_HZ,
+    Tick, Travel, q16,
 };
 
 /// Time constant of the low-pass of preload and compression sensor, s. Chosen: reduces a
 /// millisecond's noise to a third and costs the preload loop 5 ms beside the 140 ms of its
 /// actuator; equal, so that both see a crossing with the same lag.
 const FILTER_S: f64 = 0.005;
+/// The same as machine units, s: by so much a filtered ramp is late.
+pub const FILTER_LAG: Seconds = q16(5_000);
 
 /// Choices of the filters; the defaults hold for both rigs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,7 +41,7 @@ impl Default for Tuning {
             speed_bandwidth_rad_s: speed::BANDWIDTH_RAD_S,
             preload_sensor_tau_s: FILTER_S,
             tread_tau_s: FILTER_S,
-            arm_tau_s: 0.005,
+            arm_tau_s: FILTER_S,
         }
     }
 }
