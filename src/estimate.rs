@@ -3,6 +3,7 @@
 
 #![deny(clippy::float_arithmetic)]
 
+mod creep;
 pub mod crossing;
 mod follow;
 pub mod odometry;
@@ -18,6 +19,7 @@ pub mod vibration;
 use crate::model::corner_profile::CornerProfile;
 use crate::numeric::{LowPass, checked};
 use crate::rig::{Rig, RigError};
+use creep::Creep;
 use crossing::CrossingWatch;
 use tread::Tread;
 
@@ -52,6 +54,7 @@ pub struct Estimator {
     corner_travel: Millimetres,
     /// Part by which the axle lags behind the tread per compression, 1/mm.
     rolling_lag: Ratio,
+    creep: Creep,
 }
 
 impl Estimator {
@@ -71,6 +74,7 @@ impl Estimator {
                 "rig.wheel_radius_mm",
                 ROLLING_COMPRESSION / rig.rig.wheel_radius_mm,
             )?,
+            creep: Creep::try_build(rig)?,
         })
     }
 
