@@ -1,4 +1,5 @@
-//! Elastic creep: a tread that pulls runs ahead of its wheel.
+//! Elastic creep: a tread that pulls runs ahead of its wheel. On the continuous wall alone: over a
+//! corner the chord's own error, 0.03 mm the other way, is as large.
 
 #![deny(clippy::float_arithmetic)]
 

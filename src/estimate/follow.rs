@@ -35,12 +35,13 @@ impl Estimator {
         self.watch_slip(state, tick, &mut found);
         let seen = self.watch_input(state, tick.sensed);
         let event = self.watch.step(&mut state.watch, direction, &seen);
-        let creep = self.creep.outwards(tick.pressed);
+        let on_corner = state.on_corner();
+        let creep = if on_corner { Q16::ZERO } else { self.creep.outwards(tick.pressed) };
         let rolling = Rolling {
             radius: tick.sensed.radius.value,
             lag: self.rolling_lag * tick.sensed.compression_filtered
                 + creep * Q16::from_num(direction.sign()),
-            on_corner: state.on_corner(),
+            on_corner,
         };
         state.odometry.roll(tick.sensed.travel, &rolling, event.is_some());
         state.begin_tick(tick.sensed.travel);
