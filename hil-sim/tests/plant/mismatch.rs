@@ -37,15 +37,22 @@ fn run_out_waves_arm_and_speed_with_the_wheels_turn() {
     plant.stops_mm = (-1.0, 400.0);
     let mut rig = VirtualRig::new(plant, 0.0, 33.3, TICK_S);
     let (mut radius, mut ratio) = ((f64::MAX, 0.0f64), (f64::MAX, 0.0f64));
+    let (mut seen, mut sums) = (0.0, [0.0; 3]);
     roll(&mut rig, 20.0, 170.0, 20.0, |rig| {
         let truth = rig.truth();
         if truth.position_mm > 10.0 {
             radius = (radius.0.min(truth.radius_mm), radius.1.max(truth.radius_mm));
             let per_tread = truth.speed_mm_s / truth.tread_mm_s;
             ratio = (ratio.0.min(per_tread), ratio.1.max(per_tread));
+            seen += 1.0;
+            let terms = [truth.radius_mm, per_tread, truth.radius_mm * per_tread];
+            sums = [0, 1, 2].map(|index| sums[index] + terms[index]);
         }
     })
     .unwrap();
+    // The axle nearer to the wall is on the shorter lever: it is slow there.
+    let [radii, ratios, products] = sums.map(|sum| sum / seen);
+    close(products - radii * ratios, -0.5 * 0.1 * (0.1 / 25.0), 0.1);
     close(radius.1 - radius.0, 0.2, 0.02);
     close(ratio.1 - ratio.0, 0.2 / 25.0, 0.05);
     // After whole turns it is where a true wheel is.

@@ -181,7 +181,11 @@ mod tests {
                         let distance = ((25.0 - depth).powi(2) - (y - 4.0).powi(2)).sqrt();
                         prop_assert!((lift.distance.to_num::<f64>() - distance).abs() < 1e-3);
                     }
-                    CrossingEvent::GapClosed { height: h, gap, plausible } => {
+                    CrossingEvent::GapClosed { height: h, gap, shift, plausible } => {
+                        let far = |h: f64| ((25.0 - depth).powi(2) - (y - h).powi(2)).sqrt();
+                        let used = if plausible { height } else { 4.0 };
+                        let moved = far(used) - far(4.0);
+                        prop_assert!((shift.to_num::<f64>() - moved).abs() < 0.03, "{shift} {moved}");
                         prop_assert_eq!(plausible, (height - 4.0).abs() < 0.12);
                         prop_assert!((h.to_num::<f64>() - height).abs() < 0.02);
                         prop_assert!((gap.to_num::<f64>() - exact).abs() < 0.02, "{gap} {exact}");
