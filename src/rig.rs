@@ -146,7 +146,7 @@ pub struct Drive {
     pub reflected_mass_kg: f64,
     /// Speed on the smooth wall, mm/s.
     pub cruise_speed_mm_s: f64,
-    /// Least speed while crossing, mm/s. Chosen: 2, because a tread stiffer or slower than known
+    /// Least speed while crossing, mm/s. Chosen: 1.5, because a tread stiffer or slower than known
     /// needs less than the lowest published, 2.9741.
     pub min_crossing_speed_mm_s: f64,
     /// Largest acceleration of the profile, mm/s^2.

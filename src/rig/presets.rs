@@ -45,7 +45,7 @@ impl Rig {
                 force_limit_n: 80.0,
                 reflected_mass_kg: 40.0,
                 cruise_speed_mm_s: 30.0,
-                min_crossing_speed_mm_s: 2.0,
+                min_crossing_speed_mm_s: 1.5,
                 acceleration_mm_s2: 250.0,
                 jerk_mm_s3: 5000.0,
                 ripple_pitch_mm: 0.1309,
