@@ -239,6 +239,10 @@ impl FaultInjector {
                 Target::Pretightener => {
                     drives.lost[1] = fault.drive(active, &mut drives.preload, drives.preload_on);
                 }
+                // The button's other contact is in the motors' supply.
+                Target::StopWire if active && fault.injection.kind == Kind::Shorted => {
+                    (drives.drive, drives.preload) = (0.0, 0.0);
+                }
                 _ => continue,
             }
             let worked = drives.worked();
@@ -335,6 +339,10 @@ impl Active {
             Kind::Reversed => -*duty,
             Kind::Delayed => self.pipeline.front().copied().unwrap_or(*duty),
             Kind::Runaway => self.injection.magnitude(),
+            Kind::Regulating => {
+                let most = self.injection.magnitude().abs();
+                duty.clamp(-most, most)
+            }
             _ => *duty,
         };
         match kind {

@@ -1,5 +1,6 @@
 //! The watchdog, and the bridges' reaction to a debugger or a locked-up core.
 
+use cortex_m::peripheral::DWT;
 use embassy_stm32::Peri;
 use embassy_stm32::pac;
 use embassy_stm32::peripherals::IWDG;
@@ -37,6 +38,7 @@ impl Guard {
         let _ = (0..UPDATE_ROUNDS).any(|_| !updating());
         self.dog.pet();
         break_on_damage();
+        count_cycles();
         safety::watch_feeding();
     }
 }
@@ -49,6 +51,10 @@ impl Watchdog for Guard {
 
     fn keep(&mut self, snapshot: &DriveSnapshot) {
         retained::keep(snapshot);
+    }
+
+    fn cycles(&self) -> u32 {
+        DWT::cycle_count()
     }
 
     fn place(&self) -> Option<Place> {
@@ -76,6 +82,14 @@ pub(crate) fn arm() {
         w.set_tim1(true);
         w.set_tim8(true);
     });
+}
+
+/// Starts the core's counter of cycles.
+pub(crate) fn count_cycles() {
+    // SAFETY: nothing else writes these registers.
+    let mut core = unsafe { cortex_m::Peripherals::steal() };
+    core.DCB.enable_trace();
+    core.DWT.enable_cycle_counter();
 }
 
 /// Connects a double word of flash with two wrong bits to the break. From here on: what a start

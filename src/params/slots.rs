@@ -17,6 +17,10 @@
 //! out of force. The fold guards the sequence number: alone, a flipped bit in it would make the
 //! spare set the younger one.
 
+mod mend;
+
+pub use mend::mend;
+
 use super::{MAX_SET, ParameterSet, Refusal, Rest, SetError};
 use crate::model::Planner;
 pub use crate::restart::page::{PAGE_BYTES, WORD_BYTES};
@@ -66,6 +70,12 @@ impl From<FlashFault> for Refusal {
 pub trait SetMemory {
     /// The content of a slot, [`SLOT_BYTES`] long.
     fn bytes(&self, slot: Slot) -> &[u8];
+
+    /// Whether every double word of a slot can be read without an error that the chip cannot
+    /// correct, as after a write that lost its power.
+    fn is_readable(&self, _slot: Slot) -> bool {
+        true
+    }
 
     /// Erases one page of a slot to 0xFF; takes about 25 ms.
     ///

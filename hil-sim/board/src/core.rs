@@ -160,6 +160,10 @@ pub trait Bus {
         false
     }
 
+    /// Reads or executes bytes of flash of which some are wrong, see
+    /// [`unicorn::UnicornCore::set_spoilt`].
+    fn read_spoilt(&mut self, _access: Access) {}
+
     /// Cycle at which something happens by itself; the core stops at the first block after it.
     fn deadline(&self) -> u64 {
         u64::MAX

@@ -43,6 +43,10 @@ impl<B: Bus + 'static> UnicornCore<B> {
             if block.marked {
                 note(uc, at);
             }
+            let inside = uc.get_data_mut();
+            if !inside.spoilt.is_empty() {
+                inside.look_for_spoilt(at, size);
+            }
         });
         engine("hook blocks", blocks)?;
         let traps = uc.add_intr_hook(|uc, number| {
