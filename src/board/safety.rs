@@ -11,17 +11,17 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::peripheral::SCB;
 use cortex_m::peripheral::syst::SystClkSource;
 use cortex_m_rt::exception;
-use embassy_stm32::pac;
 use embassy_time::{Duration, Timer};
 use interstage::restart::{Stopped, image_checksum};
 use interstage::tasks::mid_tick_deadline;
 
+use super::registers::{FLASH, SYSCFG, TIM1, TIM8};
 use super::{EXCHANGE, SYSCLK_HZ, image, retained};
 
 /// Switches both bridges off until the next start.
 pub(super) fn cut() {
-    pac::TIM1.bdtr().modify(|w| w.set_moe(false));
-    pac::TIM8.bdtr().modify(|w| w.set_moe(false));
+    TIM1.bdtr().modify(|w| w.set_moe(false));
+    TIM8.bdtr().modify(|w| w.set_moe(false));
 }
 
 /// Ends the program: bridges off, the reason kept, a restart.
@@ -153,13 +153,13 @@ pub(super) fn unreadable() -> u32 {
 /// so the program continues; stopping would leave a board that never starts again.
 #[exception]
 unsafe fn NonMaskableInt() {
-    let status = pac::FLASH.eccr().read();
+    let status = FLASH.eccr().read();
     if !status.eccd() {
         return;
     }
     UNREADABLE.store(unreadable().wrapping_add(1), Ordering::Relaxed);
-    pac::FLASH.eccr().modify(|w| w.set_eccd(true));
-    if !status.bk_ecc() && pac::SYSCFG.cfgr2().read().eccl() {
+    FLASH.eccr().modify(|w| w.set_eccd(true));
+    if !status.bk_ecc() && SYSCFG.cfgr2().read().eccl() {
         end(Stopped::Image);
     }
 }

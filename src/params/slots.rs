@@ -16,6 +16,10 @@
 //! committed slot that is no longer intact is reported, unless the other slot shows that it was
 //! out of force. The fold guards the sequence number: alone, a flipped bit in it would make the
 //! spare set the younger one.
+//!
+//! Not `sequential-storage`: it skips an item that is damaged, so that an older set would come
+//! into force unasked, and it copies an item into RAM as a whole, to read it and to store it. A
+//! set is read where it lies, and arrives in pieces.
 
 mod mend;
 

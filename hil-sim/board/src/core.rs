@@ -121,6 +121,8 @@ impl Meter {
 pub struct Mark {
     /// Cycles so far, including the block that begins there.
     pub cycles: u64,
+    /// Cycles that the flash would have cost so far, see [`super::accelerator`].
+    pub waits: u64,
     /// Where.
     pub address: u32,
     /// Value of R0.

@@ -17,7 +17,7 @@ use super::peripherals::flash::Change;
 use super::peripherals::rcc::Cause as Restart;
 use super::peripherals::system::Cause;
 
-pub use profile::{Poll, Profile};
+pub use profile::{Clock, Poll, Profile};
 
 use tasks::Tasks;
 
@@ -78,6 +78,22 @@ impl Machine {
     /// Cycles since the start.
     pub fn now(&self) -> u64 {
         self.core.meter().cycles
+    }
+
+    /// Counts what the flash's wait states cost from now on, see [`crate::accelerator`].
+    /// Errors: [`CoreError::Engine`] if the engine refuses.
+    pub fn count_waits(&mut self) -> Result<(), CoreError> {
+        self.core.count_waits(FLASH)
+    }
+
+    /// Cycles that the flash would have cost since then.
+    pub fn waits(&self) -> u64 {
+        self.core.waits()
+    }
+
+    /// Cycles so far, and what the flash would have cost.
+    fn clock(&self) -> Clock {
+        Clock { cycles: self.now(), waits: self.waits() }
     }
 
     /// The chip.
@@ -180,7 +196,7 @@ impl Machine {
         self.pc = self.word(FLASH.base + 4)? & !1;
         self.asleep = None;
         self.halted = None;
-        self.profile.restart(self.core.meter().cycles);
+        self.profile.restart(self.clock());
         Ok(())
     }
 
@@ -306,9 +322,10 @@ impl Machine {
     fn note_tasks(&mut self) {
         self.core.take_marks(&mut self.marks);
         for mark in self.marks.drain(..) {
+            let at = Clock { cycles: mark.cycles, waits: mark.waits };
             match self.tasks.begins(mark.address, mark.r0) {
-                Some(task) => self.profile.begin(task, mark.cycles),
-                None => self.profile.end(mark.cycles),
+                Some(task) => self.profile.begin(task, at),
+                None => self.profile.end(at),
             }
         }
     }
@@ -399,7 +416,7 @@ impl Machine {
 
     fn fall_asleep(&mut self, how: Asleep) {
         self.asleep = Some(how);
-        let now = self.now();
+        let now = self.clock();
         self.profile.sleep(now);
     }
 
@@ -418,7 +435,7 @@ impl Machine {
         let now = self.now();
         if wakes {
             self.asleep = None;
-            self.profile.wake(now);
+            self.profile.wake(self.clock());
             return;
         }
         let next = self.chip().deadline().clamp(now, cycle);

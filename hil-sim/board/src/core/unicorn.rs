@@ -213,6 +213,26 @@ impl<B: Bus + 'static> UnicornCore<B> {
         engine("forget code", self.engine.ctl_flush_tb())
     }
 
+    /// Counts what the flash's wait states cost from now on, see [`crate::accelerator`]. Slow: the
+    /// engine calls a hook at every read.
+    /// Errors: [`CoreError::Engine`] if the engine refuses.
+    pub fn count_waits(&mut self, flash: Memory) -> Result<(), CoreError> {
+        self.engine.get_data_mut().count.count_waits();
+        let (first, last) = (flash.base.into(), (flash.base + (flash.size - 1)).into());
+        let read = self.engine.add_mem_hook(HookType::MEM_READ, first, last, |uc, _, at, _, _| {
+            uc.get_data_mut().count.load(at as u32);
+            true
+        });
+        engine("hook reads", read)?;
+        // Translated code calls such a hook only if it was there.
+        engine("forget code", self.engine.ctl_flush_tb())
+    }
+
+    /// Cycles that the flash would have cost since [`UnicornCore::count_waits`].
+    pub fn waits(&self) -> u64 {
+        self.engine.get_data().count.waits()
+    }
+
     /// Sets what the engine may use a page for. By default every page is code, and the engine
     /// searches for translated blocks at every write to RAM, which takes most of its time.
     /// Here RAM is data until the program executes in it.
