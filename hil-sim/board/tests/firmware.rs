@@ -78,13 +78,13 @@ type Quantity = (&'static str, fn(&CrossingLine) -> f64, f64);
 
 /// From the command on a few things differ: it reaches the bridges 0.05 ms later and rounded to a
 /// part in 8500, and the codes of a moving part are means over 0.15 ms. So the runs part in
-/// the last bits, and the noise of the sensors' rounding with them. The measured gap passes
-/// it on: the speed planned for the next step changes by 60 mm/s a millimetre of it. The bounds
-/// are twice the largest difference of five seeds.
+/// the last bits, and the noise of the sensors' rounding with them. Bounds of gap, preload and
+/// force are twice the largest difference of five rigs. The speed of a step is planned from the
+/// gap measured at the one before: it changes by 60 mm/s a millimetre of that.
 const QUANTITIES: [Quantity; 4] = [
     ("gap, mm", |c| c.gap_mm, 0.004),
     ("preload, N", |c| c.preload_n, 0.08),
-    ("speed, mm/s", |c| c.speed_mm_s, 0.15),
+    ("speed, mm/s", |c| c.speed_mm_s, 60.0 * 0.004),
     ("corner force, N", |c| c.corner_force_n, 0.36),
 ];
 
