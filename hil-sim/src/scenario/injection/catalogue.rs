@@ -70,6 +70,7 @@ fn distorted(
 /// Faults of a motor and its bridge.
 fn actuator(target: Target) -> [Entry; 7] {
     let weak = "gives this part of its duty, its bridge being sound";
+    let regulates = "regulates its current to that of this duty at standstill";
     let runaway = "takes this duty whatever is asked while its bridge is on, in the bridge";
     [
         plain(target, Kind::Stalled, "gives no force, its bridge being sound"),
@@ -78,7 +79,7 @@ fn actuator(target: Target) -> [Entry; 7] {
         plain(target, Kind::Reversed, "turns the other way, in the bridge"),
         delayed(target, 0.1, "acts this much later, in the bridge"),
         one(target, Kind::Runaway, 1.0, (-1.0, 1.0), "duty", runaway),
-        one(target, Kind::Regulating, 0.5, (0.0, 1.0), "duty", "regulates to so much at most"),
+        one(target, Kind::Regulating, 0.5, (0.0, 1.0), "duty", regulates),
     ]
 }
 
