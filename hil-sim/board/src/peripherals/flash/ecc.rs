@@ -68,7 +68,7 @@ impl Ecc {
         };
         let flag = if wrong == Wrong::One { ONE } else { TWO };
         self.register &= ONE_INTERRUPT | ONE;
-        self.register |= flag | bank | place / WORD;
+        self.register |= flag | bank | (place / WORD);
     }
 }
 
