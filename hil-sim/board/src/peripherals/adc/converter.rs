@@ -8,9 +8,9 @@ use crate::rules::Rule;
 const ALL: u32 = u32::MAX;
 
 /// Of the configuration: DMA, keep the newest code, one conversion after the other.
-const DMA: u32 = 1;
-const OVERWRITE: u32 = 1 << 12;
-const CONTINUOUS: u32 = 1 << 13;
+pub(super) const DMA: u32 = 1;
+pub(super) const OVERWRITE: u32 = 1 << 12;
+pub(super) const CONTINUOUS: u32 = 1 << 13;
 
 pub(super) const ENABLE: u32 = 1;
 pub(super) const DISABLE: u32 = 1 << 1;

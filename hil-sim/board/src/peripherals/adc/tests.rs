@@ -1,6 +1,5 @@
 use super::converter::*;
 use super::*;
-use crate::peripherals::HZ;
 
 const ALL: u32 = u32::MAX;
 
