@@ -16,7 +16,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             println!("cargo::rustc-link-arg-bins=--defsym=_stack_size=20K");
         } else if env::var_os("CARGO_FEATURE_HIL").is_some() {
             // One more level than otherwise: the host's line below all tasks.
-            println!("cargo::rustc-link-arg-bins=--defsym=_stack_size=10K");
+            println!("cargo::rustc-link-arg-bins=--defsym=_stack_size=14K");
         }
     }
     Ok(())

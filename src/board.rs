@@ -13,6 +13,7 @@ pub(crate) mod light;
 mod line;
 #[cfg(not(feature = "hil"))]
 mod pins;
+pub(crate) mod registers;
 mod retained;
 pub(crate) mod rtt;
 pub(crate) mod safety;
@@ -34,9 +35,10 @@ pub(crate) use text_log::TextLog;
 
 use embassy_stm32::peripherals::{DMA1_CH1, DMA1_CH2};
 use embassy_stm32::{
-    Config, Peripherals, bind_interrupts, dma, exti, flash as flash_driver, interrupt, pac, rcc,
+    Config, Peripherals, bind_interrupts, dma, exti, flash as flash_driver, interrupt, rcc,
 };
 use interstage::tasks::Exchange;
+use registers::{Cr5, PWR};
 
 /// What all tasks share.
 pub(crate) static EXCHANGE: Exchange = Exchange::new();
@@ -94,10 +96,10 @@ fn clocks() -> Config {
 pub(crate) fn init() -> Peripherals {
     stack::guard();
     let mut p = embassy_stm32::init(Config::default());
-    pac::PWR.cr5().write_value(pac::pwr::regs::Cr5(0));
+    PWR.cr5().write_value(Cr5(0));
     rcc::reinit(clocks().rcc, &mut p.RCC);
     // At four wait states the core would wait at every line of code that the cache lacks. All
     // code is in bank 1: the chip's prefetch may fail where code branches between the banks.
-    pac::FLASH.acr().modify(|w| w.set_prften(true));
+    registers::FLASH.acr().modify(|w| w.set_prften(true));
     p
 }

@@ -8,8 +8,9 @@ use crate::log::Identity;
 use crate::restart::DriveSnapshot;
 use crate::sense::raw::{AdcCode, AngleFrame, BridgeCodes, BusFault, EncoderCount};
 use crate::supervise::Command;
+use crate::tasks::TickCycles;
 use crate::tick::Entry;
-use crate::units::MotorCommand;
+use crate::units::{MotorCommand, Tick};
 
 /// The wheel encoder's counter.
 pub trait WheelEncoder {
@@ -64,6 +65,11 @@ pub trait Watchdog {
     /// Keeps the snapshot of this tick where a restart finds it, if the board can.
     fn keep(&mut self, snapshot: &DriveSnapshot);
 
+    /// The core's counter of cycles, which wraps; 0 without one.
+    fn cycles(&self) -> u32 {
+        0
+    }
+
     /// Position of the wheel by the record of the run before, if there is one.
     fn place(&self) -> Option<Place> {
         None
@@ -98,6 +104,9 @@ pub trait Journal {
     fn send(&mut self, _frame: &[u8]) -> bool {
         false
     }
+
+    /// Writes what the control tick took since the last such line, as [`Journal::write`] does.
+    fn write_cycles(&mut self, _at: Tick, _cycles: TickCycles) {}
 
     /// Identity for the head of the binary log.
     fn identity(&self) -> Identity {

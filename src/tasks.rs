@@ -20,6 +20,7 @@
 
 mod background;
 mod clock;
+mod cycles;
 mod exchange;
 mod liveness;
 mod motors;
@@ -27,6 +28,7 @@ mod sensors;
 
 pub use background::{journal, link, model, operator};
 pub use clock::{clock, mid_tick_deadline};
+pub use cycles::TickCycles;
 pub use exchange::{COMMANDS, ENTRIES, Exchange, TickIo};
 pub use liveness::{CHECK_IN_TICKS, TaskId};
 pub use motors::{TickIoCell, motors, record};

@@ -73,6 +73,11 @@ struct Active {
     pipeline: VecDeque<f64>,
     /// Angle of the wheel at the middle of the torn sector, rad.
     torn_rad: f64,
+    /// Speed of an actuator's motor, parts of its speed without load; of the drive that of the
+    /// tread over this many mm/s, of the pre-tightener its duty with this lag, ticks.
+    turns: f64,
+    no_load_mm_s: f64,
+    lag_ticks: f64,
 }
 
 impl FaultInjector {
@@ -96,6 +101,9 @@ impl FaultInjector {
             kept: None,
             pipeline: VecDeque::new(),
             torn_rad: 0.0,
+            turns: 0.0,
+            no_load_mm_s: scenario.rig.drive.no_load_speed_mm_s,
+            lag_ticks: scenario.rig.preload.lag_s / TICK_S,
         };
         (!injections.is_empty()).then(|| Self {
             faults: injections.iter().map(active).collect(),
@@ -151,6 +159,9 @@ impl FaultInjector {
             if due && fault.since_s.is_none() {
                 fault.since_s = Some(t_s);
                 fault.torn_rad = truth.rotation_rad;
+            }
+            if fault.injection.target == Target::Drive {
+                fault.turns = truth.tread_mm_s / fault.no_load_mm_s;
             }
             let ends = |since_s: f64| fault.injection.duration_s.map(|s| since_s + s);
             fault.over = fault.since_s.and_then(ends).is_some_and(|end_s| t_s >= end_s);
@@ -239,6 +250,10 @@ impl FaultInjector {
                 Target::Pretightener => {
                     drives.lost[1] = fault.drive(active, &mut drives.preload, drives.preload_on);
                 }
+                // The button's other contact is in the motors' supply.
+                Target::StopWire if active && fault.injection.kind == Kind::Shorted => {
+                    (drives.drive, drives.preload) = (0.0, 0.0);
+                }
                 _ => continue,
             }
             let worked = drives.worked();
@@ -315,6 +330,14 @@ impl Active {
         matches!(self.injection.target, Wheel | Tread | Spring | Load)
     }
 
+    /// What a bridge leaves of a duty that keeps the motor's current, the duty beyond its speed, to
+    /// the magnitude. It regulates towards no output, never through it.
+    fn regulated(&self, duty: f64) -> f64 {
+        let most = self.injection.magnitude().abs();
+        let left = duty.clamp(self.turns - most, self.turns + most);
+        if left * duty <= 0.0 { 0.0 } else { duty.signum() * left.abs().min(duty.abs()) }
+    }
+
     /// Puts in the duty of the faulty bridge. Returns the part that is lost behind it.
     fn drive(&mut self, active: bool, duty: &mut f64, on: bool) -> f64 {
         let kind = self.injection.kind;
@@ -335,8 +358,12 @@ impl Active {
             Kind::Reversed => -*duty,
             Kind::Delayed => self.pipeline.front().copied().unwrap_or(*duty),
             Kind::Runaway => self.injection.magnitude(),
+            Kind::Regulating => self.regulated(*duty),
             _ => *duty,
         };
+        if self.injection.target == Target::Pretightener {
+            self.turns += (*duty - self.turns) / self.lag_ticks.max(1.0);
+        }
         match kind {
             Kind::Stalled => 1.0,
             Kind::Weak => 1.0 - self.injection.magnitude(),
@@ -420,6 +447,22 @@ mod tests {
         assert_eq!(drive(0.010, 0.49), (None, None));
         assert_eq!(drive(0.011, 0.45), (Some(0.011), None));
         assert_eq!(drive(0.012, 0.40), (Some(0.011), Some(0.012)));
+    }
+
+    #[test]
+    fn a_bridge_regulates_by_the_speed_of_its_motor() {
+        let mut injector = injector(Target::Drive, Kind::Regulating, 0.5);
+        let mut given = |speed_part: f64, drive: f64| {
+            let tread_mm_s = speed_part * injector.faults[0].no_load_mm_s;
+            injector.begin(0.020, &Truth { tread_mm_s, ..Truth::default() });
+            injector.drives(Drives { drive, drive_on: true, ..Drives::default() }).drive
+        };
+        let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} {b}");
+        near(given(0.0, 0.9), 0.5);
+        near(given(0.25, 0.9), 0.75);
+        near(given(0.25, 0.6), 0.6);
+        near(given(-0.7, 0.3), 0.0);
+        near(given(0.8, -0.1), 0.0);
     }
 
     #[test]

@@ -1,11 +1,13 @@
 //! From the set of parameters to what the tasks run on.
 
 use embassy_executor::Spawner;
+use embassy_futures::block_on;
 use embassy_time::Timer;
 use interstage::hal::{Indicator, Light, Motors};
 use interstage::log::{Identity, identity};
 use interstage::model::Planner;
 use interstage::params::service::{Service, in_force};
+use interstage::params::slots::mend;
 use interstage::params::{Header, ParameterSet, SetError};
 use interstage::tick::Controller;
 use interstage::units::MotorCommand;
@@ -28,8 +30,11 @@ pub(crate) type Constants = (&'static Controller, &'static Planner, Identity);
 /// A stored set that is damaged or that the firmware cannot run is not replaced by another one:
 /// the drive would move by parameters that nobody chose.
 pub(crate) fn build(
-    flash: ParameterFlash,
+    mut flash: ParameterFlash,
 ) -> (Result<Constants, SetError>, Service<ParameterFlash>) {
+    if block_on(mend(&mut flash)).is_err() {
+        defmt::error!("parameters: what a lost supply left could not be erased");
+    }
     let Ok((_, set)) = in_force(&flash, PROTOTYPE) else {
         return (Err(SetError::Damaged), Service::new(flash, PROTOTYPE, 0));
     };

@@ -3,14 +3,12 @@
 //! They are in the second bank: while a page of it is erased or a double word programmed, the
 //! core still reads code from the first, so the control tick continues.
 
-use cortex_m_rt::exception;
 use embassy_stm32::Peri;
 use embassy_stm32::flash::{Async, Flash};
-use embassy_stm32::pac;
 use embassy_stm32::peripherals::FLASH;
 use interstage::params::slots::{FlashFault, PAGE_BYTES, SLOT_BYTES, SetMemory, Slot, WORD_BYTES};
 
-use super::Irqs;
+use super::{Irqs, safety};
 
 const BASE: usize = 0x0800_0000;
 
@@ -42,6 +40,15 @@ impl SetMemory for ParameterFlash {
         unsafe { core::slice::from_raw_parts(start, SLOT_BYTES) }
     }
 
+    fn is_readable(&self, slot: Slot) -> bool {
+        let before = safety::unreadable();
+        for word in self.bytes(slot).chunks(WORD_BYTES) {
+            // SAFETY: a byte of flash. Volatile: what counts is that it is read.
+            let _ = word.first().map(|byte| unsafe { core::ptr::from_ref(byte).read_volatile() });
+        }
+        safety::unreadable() == before
+    }
+
     async fn erase(&mut self, slot: Slot, page: usize) -> Result<(), FlashFault> {
         let from = (offset_of(slot) + page * PAGE_BYTES) as u32;
         self.0.erase(from, from + PAGE_BYTES as u32).await.map_err(|_| FlashFault)
@@ -55,16 +62,5 @@ impl SetMemory for ParameterFlash {
     ) -> Result<(), FlashFault> {
         let at = (offset_of(slot) + offset) as u32;
         self.0.write(at, &word).await.map_err(|_| FlashFault)
-    }
-}
-
-/// The chip reports an uncorrectable double word here, as after a write that lost its power.
-/// The checks of sets and records reject it, so the program continues: stopping would leave a
-/// board that never starts again.
-#[exception]
-unsafe fn NonMaskableInt() {
-    let status = pac::FLASH.eccr().read();
-    if status.eccd() {
-        pac::FLASH.eccr().modify(|w| w.set_eccd(true));
     }
 }

@@ -1,13 +1,15 @@
 //! Blocking writes of double words to the chip's second flash bank: for code that runs before
 //! the tasks or after them. The library's driver belongs to the task of the parameter sets, and
-//! these writes have no task to lend it.
+//! these writes have no task to lend it; one of them comes from an interrupt, maybe in the middle
+//! of an operation of that driver.
 //!
 //! The last pages of the 512 KiB are in use: one for image checksums, one for records of a lost
 //! supply, then the two slots of a parameter set.
 
-use embassy_stm32::pac::FLASH;
 use interstage::params::slots::SLOT_BYTES;
 use interstage::restart::page::{self, PAGE_BYTES, WORD_BYTES, Word};
+
+use super::registers::FLASH;
 
 /// End of flash in memory.
 const END: u32 = 0x0808_0000;

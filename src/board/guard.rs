@@ -1,13 +1,14 @@
 //! The watchdog, and the bridges' reaction to a debugger or a locked-up core.
 
+use cortex_m::peripheral::DWT;
 use embassy_stm32::Peri;
-use embassy_stm32::pac;
 use embassy_stm32::peripherals::IWDG;
 use embassy_stm32::wdg::IndependentWatchdog;
 use interstage::estimate::Place;
 use interstage::hal::Watchdog;
 use interstage::restart::DriveSnapshot;
 
+use super::registers::{self, DBGMCU, SYSCFG};
 use super::{retained, safety};
 
 /// Time-out of the watchdog, us, by the nominal 32 kHz of its oscillator.
@@ -33,10 +34,11 @@ impl Guard {
         self.dog.unleash();
         // It counts from its reset value, half a second, up to the first feed after its own
         // oscillator has taken the time-out over, five periods or so.
-        let updating = || pac::IWDG.sr().read().0 != 0;
+        let updating = || registers::IWDG.sr().read().0 != 0;
         let _ = (0..UPDATE_ROUNDS).any(|_| !updating());
         self.dog.pet();
         break_on_damage();
+        count_cycles();
         safety::watch_feeding();
     }
 }
@@ -51,6 +53,10 @@ impl Watchdog for Guard {
         retained::keep(snapshot);
     }
 
+    fn cycles(&self) -> u32 {
+        DWT::cycle_count()
+    }
+
     fn place(&self) -> Option<Place> {
         self.place
     }
@@ -63,23 +69,31 @@ pub(crate) fn arm() {
     // nothing any more: the timers cut the bridges themselves.
     // A supply below the detector's threshold does the same before its interrupt; this locks
     // the threshold.
-    pac::SYSCFG.cfgr2().modify(|w| {
+    SYSCFG.cfgr2().modify(|w| {
         w.set_cll(true);
         w.set_pvdl(true);
     });
     // Halted at a breakpoint, TIM1 and TIM8 stop with their outputs off, and the clock stops.
-    pac::DBGMCU.apb1lfzr().modify(|w| {
+    DBGMCU.apb1lfzr().modify(|w| {
         w.set_iwdg(true);
         w.set_tim2(true);
     });
-    pac::DBGMCU.apb2fzr().modify(|w| {
+    DBGMCU.apb2fzr().modify(|w| {
         w.set_tim1(true);
         w.set_tim8(true);
     });
 }
 
+/// Starts the core's counter of cycles.
+pub(crate) fn count_cycles() {
+    // SAFETY: nothing else writes these registers.
+    let mut core = unsafe { cortex_m::Peripherals::steal() };
+    core.DCB.enable_trace();
+    core.DWT.enable_cycle_counter();
+}
+
 /// Connects a double word of flash with two wrong bits to the break. From here on: what a start
 /// reads may be torn by a lost supply, and the checks of sets and records reject it.
 fn break_on_damage() {
-    pac::SYSCFG.cfgr2().modify(|w| w.set_eccl(true));
+    SYSCFG.cfgr2().modify(|w| w.set_eccl(true));
 }

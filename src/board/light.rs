@@ -3,12 +3,12 @@
 use embassy_futures::select::{Either, select};
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AnyPin, Level, Output, Speed};
-use embassy_stm32::pac;
-use embassy_stm32::pac::gpio::vals::Moder;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Timer};
 use interstage::hal::{Indicator, Light};
+
+use super::registers::{GPIOA, Moder, RCC};
 
 /// Half a period of 4 Hz.
 const HALF_PERIOD: Duration = Duration::from_millis(125);
@@ -17,9 +17,9 @@ static WANTED: Signal<CriticalSectionRawMutex, Light> = Signal::new();
 
 /// Switches it on by registers alone, before anything else runs.
 pub(super) fn glow() {
-    pac::RCC.ahb2enr().modify(|w| w.set_gpioaen(true));
-    pac::GPIOA.bsrr().write(|w| w.set_bs(5, true));
-    pac::GPIOA.moder().modify(|w| w.set_moder(5, Moder::OUTPUT));
+    RCC.ahb2enr().modify(|w| w.set_gpioaen(true));
+    GPIOA.bsrr().write(|w| w.set_bs(5, true));
+    GPIOA.moder().modify(|w| w.set_moder(5, Moder::OUTPUT));
 }
 
 /// Signals [`show`].

@@ -9,7 +9,7 @@ mod wheel;
 
 use embassy_stm32::gpio::AnyPin;
 use embassy_stm32::peripherals::{ADC1, ADC2};
-use embassy_stm32::{Peri, Peripherals, pac};
+use embassy_stm32::{Peri, Peripherals};
 use rtt_target::DownChannel;
 
 use super::rtt::Frames;
@@ -39,23 +39,13 @@ pub(crate) fn split(
 ) -> (Parts, Peri<'static, AnyPin>, ParameterFlash) {
     let parts = Parts {
         wheel_encoder: Wheel::new(p.TIM5, p.PA0, p.PA1),
-        preload_sensor: Analog::new(
-            (p.ADC1, pac::ADC1),
-            p.PC2,
-            (p.DMA1_CH1, pac::DMA1.ch(0)),
-            &PRELOAD_SENSOR,
-        ),
-        compression_sensor: Analog::new(
-            (p.ADC2, pac::ADC2),
-            p.PC3,
-            (p.DMA1_CH2, pac::DMA1.ch(1)),
-            &COMPRESSION_SENSOR,
-        ),
+        preload_sensor: Analog::new(p.ADC1, p.PC2, p.DMA1_CH1, &PRELOAD_SENSOR),
+        compression_sensor: Analog::new(p.ADC2, p.PC3, p.DMA1_CH2, &COMPRESSION_SENSOR),
         arm_angle: Angle::new(p.SPI1, (p.PB3, p.PA7, p.PA6), p.PB10),
         motors: Bridges {
-            drive: Bridge::new((p.TIM1, pac::TIM1), p.PA8, p.PA9.into(), p.PA10.into(), p.PB12),
-            preload: Bridge::new((p.TIM8, pac::TIM8), p.PC6, p.PC8.into(), p.PC9.into(), p.PB7),
-            readback: Readback::new((p.ADC3, pac::ADC3), p.PB0, p.PB1),
+            drive: Bridge::new(p.TIM1, p.PA8, p.PA9.into(), p.PA10.into(), p.PB12),
+            preload: Bridge::new(p.TIM8, p.PC6, p.PC8.into(), p.PC9.into(), p.PB7),
+            readback: Readback::new(p.ADC3, p.PB0, p.PB1),
         },
         watchdog: Guard::new(p.IWDG),
         button: Button::new(p.PC13, p.EXTI13),

@@ -1,6 +1,6 @@
 //! Cuts the bridges when the software fails, and ends the program.
 //!
-//! Panics and hard faults end here. So does a hang: shortly before the watchdog bites, the
+//! Panics, hard faults and damaged code end here. So does a hang: shortly before the watchdog bites, the
 //! system timer's interrupt, which has the highest priority, finds it unfed. Each path cuts the
 //! bridges first, then writes what it knows where the next start finds it.
 
@@ -10,17 +10,18 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 use cortex_m::peripheral::SCB;
 use cortex_m::peripheral::syst::SystClkSource;
-use embassy_stm32::pac;
+use cortex_m_rt::exception;
 use embassy_time::{Duration, Timer};
 use interstage::restart::{Stopped, image_checksum};
 use interstage::tasks::mid_tick_deadline;
 
+use super::registers::{FLASH, SYSCFG, TIM1, TIM8};
 use super::{EXCHANGE, SYSCLK_HZ, image, retained};
 
 /// Switches both bridges off until the next start.
 pub(super) fn cut() {
-    pac::TIM1.bdtr().modify(|w| w.set_moe(false));
-    pac::TIM8.bdtr().modify(|w| w.set_moe(false));
+    TIM1.bdtr().modify(|w| w.set_moe(false));
+    TIM8.bdtr().modify(|w| w.set_moe(false));
 }
 
 /// Ends the program: bridges off, the reason kept, a restart.
@@ -135,6 +136,32 @@ unsafe extern "C" fn fault_at(frame: u32) -> ! {
     // SAFETY: reads of these registers have no effect.
     let (cfsr, hfsr) = unsafe { ((*SCB::PTR).cfsr.read(), (*SCB::PTR).hfsr.read()) };
     end(Stopped::Fault { pc, lr, cfsr, hfsr })
+}
+
+/// Double words that could not be read, since the start.
+static UNREADABLE: AtomicU32 = AtomicU32::new(0);
+
+pub(super) fn unreadable() -> u32 {
+    UNREADABLE.load(Ordering::Relaxed)
+}
+
+/// A double word of flash has two wrong bits, which the chip reports and cannot correct.
+///
+/// While the drive runs, one in the first bank is in the image: the chip has cut the bridges, see
+/// [`super::guard`], and the next start reports the image. At a start the image's checksum finds
+/// it. In the second bank, a write has lost its power: the checks of sets and records reject it,
+/// so the program continues; stopping would leave a board that never starts again.
+#[exception]
+unsafe fn NonMaskableInt() {
+    let status = FLASH.eccr().read();
+    if !status.eccd() {
+        return;
+    }
+    UNREADABLE.store(unreadable().wrapping_add(1), Ordering::Relaxed);
+    FLASH.eccr().modify(|w| w.set_eccd(true));
+    if !status.bk_ecc() && SYSCFG.cfgr2().read().eccl() {
+        end(Stopped::Image);
+    }
 }
 
 #[panic_handler]

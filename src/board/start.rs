@@ -1,8 +1,8 @@
 //! What a start reports of the run before.
 
-use embassy_stm32::pac;
 use interstage::restart::{DriveSnapshot, Reset, Restart, Stopped};
 
+use super::registers::RCC;
 use super::{retained, supply};
 
 /// Report of the run before this start, which may have `waited` for its supply. Call once,
@@ -23,7 +23,7 @@ pub(crate) fn report(waited: bool) -> Restart {
         restart.reset = Reset::Power;
     }
     retained::keep_only(restart.at_start());
-    pac::RCC.csr().modify(|w| w.set_rmvf(true));
+    RCC.csr().modify(|w| w.set_rmvf(true));
     supply::take(found);
     log(&restart);
     restart
@@ -31,7 +31,7 @@ pub(crate) fn report(waited: bool) -> Restart {
 
 /// Why the chip started, by flags that accumulate until they are cleared.
 fn reset() -> Reset {
-    let flags = pac::RCC.csr().read();
+    let flags = RCC.csr().read();
     // Every internal reset pulls the pin too; a supply that comes up sets the brown-out flag.
     if flags.iwdgrstf() {
         Reset::Watchdog

@@ -5,11 +5,11 @@
 //! capacitors last for a millisecond (see `docs/HARDWARE.md`); a record takes a third of that.
 
 use embassy_stm32::interrupt::{self, InterruptExt};
-use embassy_stm32::pac::{EXTI, PWR};
 use interstage::restart::Stopped;
 use interstage::restart::flash_log::{self, Latest};
 
 use super::flash_page::RECORDS;
+use super::registers::{EXTI, PWR};
 use super::{retained, safety};
 
 /// Threshold of the chip's detector: 2.9 V falling, 3.0 V rising.

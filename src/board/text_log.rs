@@ -5,8 +5,9 @@ use interstage::estimate::ContactStage;
 use interstage::hal::Journal;
 use interstage::log::Identity;
 use interstage::supervise::{Command, Leg, Mode};
+use interstage::tasks::TickCycles;
 use interstage::tick::{CrossingRecord, Entry, Event};
-use interstage::units::{Direction, Q16};
+use interstage::units::{Direction, Q16, Tick};
 
 use super::rtt::{self, Frames};
 
@@ -32,6 +33,10 @@ impl TextLog {
 impl Journal for TextLog {
     fn send(&mut self, frame: &[u8]) -> bool {
         self.frames.send(frame)
+    }
+
+    fn write_cycles(&mut self, at: Tick, TickCycles { mean, most }: TickCycles) {
+        info!("[{=u32} ms] tick: {=u32} cycles on average, {=u32} at most", at, mean, most);
     }
 
     fn identity(&self) -> Identity {

@@ -70,6 +70,10 @@ const BEYOND: Newtons = q16(3_000_000);
 /// Error of the model's inverse, N.
 const HOLDS_WITHIN: Newtons = q16(100_000);
 
+/// Speed below which still less saves too little friction for the time that it takes, mm/s: the
+/// study's lowest, with the dip of a driven wheel.
+const LEAST_FOR_GRIP: MillimetresPerSecond = q16(3_360_000);
+
 /// Sixteenths of the gap taken off until the slip margin holds, at most.
 const SLIP_TRIES: usize = 8;
 
@@ -318,7 +322,7 @@ impl Planner {
         (floor, ceiling): (MillimetresPerSecond, MillimetresPerSecond),
     ) -> Choice {
         let mut gap = self.target(request.direction, request.reserve);
-        let (mut speed, mut holds) = (floor, false);
+        let (mut speed, mut holds, mut floor) = (floor, false, floor);
         for _ in 0..SLIP_TRIES {
             speed = self.model.speed(at, gap, preload + arm_thrust, floor, ceiling);
             let at = Point { speed, ..*at };
@@ -329,6 +333,7 @@ impl Planner {
                 break;
             }
             gap -= gap * q16(62_500);
+            floor = floor.max(LEAST_FOR_GRIP).min(ceiling);
         }
         let ready = self.timing.preload_change((preload - request.preload).max(Q16::ZERO));
         let slower = self.cruise_speed - speed;

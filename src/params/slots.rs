@@ -16,6 +16,14 @@
 //! committed slot that is no longer intact is reported, unless the other slot shows that it was
 //! out of force. The fold guards the sequence number: alone, a flipped bit in it would make the
 //! spare set the younger one.
+//!
+//! Not `sequential-storage`: it skips an item that is damaged, so that an older set would come
+//! into force unasked, and it copies an item into RAM as a whole, to read it and to store it. A
+//! set is read where it lies, and arrives in pieces.
+
+mod mend;
+
+pub use mend::mend;
 
 use super::{MAX_SET, ParameterSet, Refusal, Rest, SetError};
 use crate::model::Planner;
@@ -66,6 +74,12 @@ impl From<FlashFault> for Refusal {
 pub trait SetMemory {
     /// The content of a slot, [`SLOT_BYTES`] long.
     fn bytes(&self, slot: Slot) -> &[u8];
+
+    /// Whether every double word of a slot can be read without an error that the chip cannot
+    /// correct, as after a write that lost its power.
+    fn is_readable(&self, _slot: Slot) -> bool {
+        true
+    }
 
     /// Erases one page of a slot to 0xFF; takes about 25 ms.
     ///

@@ -99,6 +99,9 @@ pub async fn journal(
     light.show(shown);
     loop {
         exchange.liveness.check_in(TaskId::Journal, uptime());
+        if let Some(cycles) = exchange.cycles.due(exchange.at_rest()) {
+            journal.write_cycles(uptime(), cycles);
+        }
         if exchange.light() != shown {
             shown = exchange.light();
             light.show(shown);

@@ -2,6 +2,7 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
+use super::cycles::CycleCount;
 use super::liveness::{Liveness, PERIODS};
 use crate::hal::Light;
 use crate::log::Record;
@@ -43,6 +44,7 @@ pub struct TickIo {
 /// Everything the tasks share: one in a `static`, or one per test.
 pub struct Exchange {
     pub(super) liveness: Liveness,
+    pub(super) cycles: CycleCount,
     /// Wakes each sensor's task, by [`TaskId`](super::TaskId): the tick for which it reads.
     pub(super) sensor_ticks: [Signal<Raw, Tick>; PERIODS.len()],
     pub(super) tick_started: Signal<Raw, ()>,
@@ -68,6 +70,7 @@ impl Exchange {
     pub const fn new() -> Self {
         Self {
             liveness: Liveness::new(),
+            cycles: CycleCount::new(),
             sensor_ticks: [const { Signal::new() }; PERIODS.len()],
             tick_started: Signal::new(),
             tick_ended: Signal::new(),

@@ -34,6 +34,7 @@ pub async fn motors(
     loop {
         exchange.tick_started.wait().await;
         exchange.liveness.in_tick(true);
+        let began = watchdog.cycles();
         let now = uptime();
         let Ok(mut tick) = latest.try_lock() else {
             // No task holds this borrow across an await; the watchdog catches one that does.
@@ -56,6 +57,7 @@ pub async fn motors(
             watchdog.feed();
         }
         last = now;
+        exchange.cycles.note(watchdog.cycles().wrapping_sub(began));
         exchange.tick_ended.signal(());
         exchange.liveness.in_tick(false);
     }

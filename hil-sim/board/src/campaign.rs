@@ -30,7 +30,7 @@ use hil_sim::faults::sets;
 use hil_sim::params::set_of;
 use hil_sim::record::{Run, letter};
 use hil_sim::scenario::Scenario;
-use hil_sim::scenario::injection::{Injection, Target};
+use hil_sim::scenario::injection::{Injection, Kind, Target};
 use parameters::Parameters;
 use restart::Hold;
 
@@ -236,7 +236,9 @@ fn watched(
     let reset = scenario.run.faults.first().is_some_and(Injection::resets_board);
     let mut hold = reset.then(|| store_kept(&mut board, scenario)).transpose()?;
     let early = scenario.run.faults.is_empty();
-    let of_image = scenario.run.faults.iter().any(|fault| fault.target == Target::Image);
+    // One wrong bit is corrected by the chip.
+    let damages = |f: &Injection| f.target == Target::Image && f.kind != Kind::OneWrongBit;
+    let of_image = scenario.run.faults.iter().any(damages);
     let (mut during, mut after_s) = (None, 0.0);
     let (mut worst_mm, mut back_s) = (0.0f64, None);
     while board.bench.time_s() < LONGEST_S && after_s < AFTER_S {
@@ -274,7 +276,7 @@ fn watched(
         after_s = if over { after_s + 1e-3 } else { 0.0 };
     }
     let (gap_part, crossed) = crossed(board.bench.plant(), twin, worst_mm);
-    if scenario.run.faults.first().is_some_and(|fault| fault.target.is_of_sets()) {
+    if scenario.run.faults.first().is_some_and(|fault| fault.target.is_of_start()) {
         return parameters::judged(board, judge, scenario, twin, (gap_part, crossed));
     }
     let restart = match (board.image_s, board.light_s) {

@@ -13,13 +13,16 @@ use hil_sim::firmware::{self, Profile, build_binary};
 use hil_sim::params::Client;
 use hil_sim::progress;
 use hil_sim::scenario::Scenario;
+use serde::Serialize;
 
 use crate::campaign::{self, Firmware};
 use crate::capture::Emulated;
-use crate::cycles::{self, Step};
+use crate::cycles::{self, Step, TickCycles};
 use crate::image::Image;
+use crate::load;
 use crate::log::Strings;
 use crate::params::EmulatedBoard;
+use crate::run::{self, RunOptions};
 
 /// The verbs of `rig` on the emulated board; `rig` starts this program where one needs it.
 #[derive(Debug, Parser)]
@@ -43,7 +46,8 @@ enum Verb {
 /// Textbook cycles of the measuring image's functions.
 ///
 /// With a script, the results of its steps; without one, the control tick over a deployment
-/// and a retraction of the prototype.
+/// and a retraction of the prototype, and its task in the firmware over a deployment, with and
+/// without the flash's wait states.
 #[derive(Debug, clap::Args)]
 struct CyclesArgs {
     /// Steps to carry out, a JSON array: see `rig_board::cycles::Step`.
@@ -53,6 +57,16 @@ struct CyclesArgs {
     /// Prints one JSON object, as is the default.
     #[arg(long)]
     json: bool,
+}
+
+/// What the control tick costs.
+#[derive(Serialize)]
+struct Measured {
+    /// By itself.
+    #[serde(flatten)]
+    tick: TickCycles,
+    /// Its task in the firmware.
+    firmware: load::Cost,
 }
 
 /// Runs the command with the arguments of this process.
@@ -129,8 +143,12 @@ fn cycles(args: &CyclesArgs) -> Result<Outcome, Failure> {
         let done = cycles::run(&mut image, &steps).map_err(Failure::run)?;
         output::result(true, &done, none)?;
     } else {
-        let tick = cycles::tick(&mut image, &Scenario::default());
-        output::result(true, &tick.map_err(Failure::run)?, none)?;
+        let tick = cycles::tick(&mut image, &Scenario::default()).map_err(Failure::run)?;
+        let elf = firmware::image(Profile::Release)?;
+        let options = RunOptions { wait_states: true, ..RunOptions::default() };
+        let ran = run::run_with(&elf, &Scenario::default(), &options, |_, _| {});
+        let firmware = ran.map_err(Failure::run)?.load.tick;
+        output::result(true, &Measured { tick, firmware }, none)?;
     }
     Ok(Outcome::Good)
 }

@@ -121,6 +121,8 @@ impl Meter {
 pub struct Mark {
     /// Cycles so far, including the block that begins there.
     pub cycles: u64,
+    /// Cycles that the flash would have cost so far, see [`super::accelerator`].
+    pub waits: u64,
     /// Where.
     pub address: u32,
     /// Value of R0.
@@ -159,6 +161,10 @@ pub trait Bus {
     fn write_code(&mut self, _access: Access, _value: u32) -> bool {
         false
     }
+
+    /// Reads or executes bytes of flash of which some are wrong, see
+    /// [`unicorn::UnicornCore::set_spoilt`].
+    fn read_spoilt(&mut self, _access: Access) {}
 
     /// Cycle at which something happens by itself; the core stops at the first block after it.
     fn deadline(&self) -> u64 {

@@ -5,7 +5,8 @@
 //! lines stay high, the angle sensor does not answer. Lost ticks are an interrupt line that
 //! stays active; a hanging task loops in its next poll. In the stored parameters a bit is
 //! inverted, or a host saves new ones as soon as the drive rests, and power is lost or the
-//! reset pin is pulled during a flash operation.
+//! reset pin is pulled during a flash operation. With a short of the emergency stop's wire, its
+//! button is pressed.
 
 mod save;
 
@@ -17,7 +18,7 @@ use super::elf::FLASH;
 use super::faults::Fault;
 use super::machine::Machine;
 use super::peripherals::HZ;
-use super::peripherals::flash::Cut;
+use super::peripherals::flash::{Cut, Wrong};
 use hil_sim::faults::sets;
 use hil_sim::injector::FaultInjector;
 use hil_sim::params::set_of;
@@ -59,8 +60,8 @@ pub(super) struct BoardInjector {
     waits: bool,
     /// Ticks are being lost.
     losing: bool,
-    /// A reset within the millisecond, after this part of it.
-    reset: Option<(Fault, f64)>,
+    /// A reset or a halt within the millisecond, after this part of it.
+    within: Option<(Fault, f64)>,
     /// Encoder and angle sensor are silent.
     silent: [bool; 2],
     /// State of the noise on the host's line, while it is flooded.
@@ -78,7 +79,7 @@ impl BoardInjector {
             struck_later_s: None,
             waits: false,
             losing: false,
-            reset: None,
+            within: None,
             silent: [false; 2],
             flood: None,
             save: None,
@@ -129,24 +130,30 @@ impl BoardInjector {
             return bit.strike(machine);
         }
         match register(injection) {
-            Some(fault) if on && injection.resets_board() => {
+            Some(fault) if on && (injection.resets_board() || injection.kind == Kind::Halted) => {
                 // At a cycle that depends on the seed.
-                self.reset = Some((fault, (self.seed as f64 * 0.618_034).fract()));
+                self.within = Some((fault, (self.seed as f64 * 0.618_034).fract()));
                 Ok(())
             }
-            Some(fault) => fault.switch(machine, on),
+            Some(fault) => {
+                if fault == Fault::StopShorted {
+                    // The button is pressed, and the short hides it.
+                    Fault::StopTorn.switch(machine, on)?;
+                }
+                fault.switch(machine, on)
+            }
             None => Ok(()),
         }
     }
 
-    /// Runs the board to a reset, or to the poll of a task that is to hang, `until` this cycle
+    /// Runs the board to a reset or halt, or to the poll of a task that is to hang, `until` this cycle
     /// at most.
     pub(super) fn run_to_strike(
         &mut self,
         machine: &mut Machine,
         until: u64,
     ) -> Result<(), CoreError> {
-        if let Some((fault, part)) = self.reset.take() {
+        if let Some((fault, part)) = self.within.take() {
             let now = machine.now();
             machine.run_on(now + (part * until.saturating_sub(now) as f64) as u64)?;
             fault.strike(machine)?;
@@ -257,7 +264,7 @@ fn cut(injection: &Injection) -> Cut {
     }
 }
 
-/// The bit of the image or of a parameter set that is inverted; none for another fault, or if
+/// The bit of the image or of a parameter set that is wrong; none for another fault, or if
 /// the image has no such set.
 fn flipped(machine: &Machine, injection: &Injection) -> Result<Option<Fault>, CoreError> {
     let bit = injection.magnitude() as u32;
@@ -274,7 +281,11 @@ fn flipped(machine: &Machine, injection: &Injection) -> Result<Option<Fault>, Co
         }
         _ => return Ok(None),
     };
-    Ok(place.map(|place| Fault::BitFlip(place + bit / 8, (bit % 8) as u8)))
+    Ok(place.map(|place| match injection.kind {
+        Kind::OneWrongBit => Fault::WrongBits(place + bit / 8, Wrong::One),
+        Kind::TwoWrongBits => Fault::WrongBits(place + bit / 8, Wrong::Two),
+        _ => Fault::BitFlip(place + bit / 8, (bit % 8) as u8),
+    }))
 }
 
 /// The fault of registers and lines for an injection.
@@ -284,7 +295,12 @@ fn register(injection: &Injection) -> Option<Fault> {
         (Target::PreloadSensorConverter, _) => Fault::StuckCode(0, word),
         (Target::TreadConverter, _) => Fault::StuckCode(1, word),
         (Target::AngleBus, Kind::BitErrors) => Fault::BitErrors(word),
+        (Target::AngleBus, Kind::Disturbed) => Fault::AngleDisturbed,
         (Target::AngleBus, _) => Fault::AngleLost,
+        (Target::Magnet, _) => Fault::MagnetLost,
+        (Target::StopWire, Kind::Shorted) => Fault::StopShorted,
+        (Target::StopWire, _) => Fault::StopTorn,
+        (Target::OptionBytes, _) => Fault::OneBank,
         (Target::EncoderLineA, _) => Fault::EncoderLine(0),
         (Target::EncoderLineB, _) => Fault::EncoderLine(1),
         (Target::Dma, _) => Fault::DmaStalled,
@@ -295,6 +311,7 @@ fn register(injection: &Injection) -> Option<Fault> {
         (Target::Supply, Kind::Weak) => Fault::SupplyDip,
         (Target::Supply, _) => Fault::SupplyCut,
         (Target::ResetPin, _) => Fault::ResetPin,
+        (Target::Debugger, Kind::Halted) => Fault::Halted(word),
         (Target::Debugger, _) => Fault::Software,
         _ => return None,
     })

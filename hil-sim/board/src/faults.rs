@@ -3,9 +3,12 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::chip::map::PARAMETER_SETS;
+use super::chip::Pin;
 use super::core::CoreError;
+use super::elf::FLASH;
 use super::machine::Machine;
+use super::peripherals::HZ;
+use super::peripherals::flash::Wrong;
 use super::peripherals::pwr::{HOLDS, Then};
 use super::peripherals::rcc::Cause;
 
@@ -23,8 +26,17 @@ pub enum Fault {
     AngleDisturbed,
     /// The angle sensor's magnet is gone.
     MagnetLost,
-    /// A read of flash finds two wrong bits.
-    TwoWrongBits,
+    /// Bits of the double word of flash at this address are wrong: one, which the chip corrects,
+    /// or two, which a read of it reports; of these the data's or the correction's own.
+    WrongBits(u32, Wrong),
+    /// The option bytes make one bank of the flash.
+    OneBank,
+    /// The wire of the emergency stop is shorted to ground.
+    StopShorted,
+    /// The wire of the emergency stop is torn.
+    StopTorn,
+    /// A debugger halts the core for so many milliseconds.
+    Halted(u16),
     /// Line A (0) or B (1) of the wheel encoder is broken.
     EncoderLine(usize),
     /// DMA moves nothing.
@@ -78,8 +90,19 @@ impl Fault {
                 chip.defects.button_storm = on;
                 chip.settle(now);
             }
+            Self::OneBank => chip.flash.set_single_bank(on),
+            Self::StopShorted => {
+                chip.defects.stop_shorted = on;
+                chip.settle(now);
+            }
+            Self::StopTorn => {
+                for pin in [Pin::STOP_DRIVE, Pin::STOP_PRELOAD] {
+                    chip.drive(pin, on, now);
+                }
+            }
             _ if !on => {}
-            Self::TwoWrongBits => chip.find_two_wrong_bits(PARAMETER_SETS, now),
+            Self::WrongBits(address, wrong) => return machine.spoil(address, wrong),
+            Self::Halted(milliseconds) => machine.halt(u64::from(milliseconds) * (HZ / 1000)),
             Self::BrownOut => chip.supply_falls(now + HOLDS, Then::Gone, now),
             Self::SupplyDip => chip.supply_falls(now + HOLDS / 2, Then::Back, now),
             Self::SupplyCut => return machine.restart(Cause::Power),
@@ -110,17 +133,21 @@ pub struct Timed {
 #[error(
     "`{0}`: expected <fault>@<seconds> with preload-sensor=<code>, compression-sensor=<code>, \
      drive-readback=<code>, pretightener-readback=<code>, angle-bits=<mask>, angle-lost, \
-     angle-disturbed, magnet-lost, two-wrong-bits, encoder-a, encoder-b, dma-stalled, timer-flags, \
-     button-storm, brown-out, supply-cut, supply-dip, reset-pin, caught or flip=<address>.<bit>"
+     angle-disturbed, magnet-lost, encoder-a, encoder-b, dma-stalled, timer-flags, button-storm, \
+     one-bank, stop-shorted, stop-torn, halted=<milliseconds>, one-wrong-bit=<address>, \
+     two-wrong-bits=<address>, wrong-check-bits=<address>, brown-out, supply-cut, supply-dip, software-reset, reset-pin, caught \
+     or flip=<address>.<bit>"
 )]
 pub struct Misspelt(String);
 
 /// Names of the faults without a value.
-const PLAIN: [(&str, Fault); 15] = [
+const PLAIN: [(&str, Fault); 17] = [
     ("angle-lost", Fault::AngleLost),
     ("angle-disturbed", Fault::AngleDisturbed),
     ("magnet-lost", Fault::MagnetLost),
-    ("two-wrong-bits", Fault::TwoWrongBits),
+    ("one-bank", Fault::OneBank),
+    ("stop-shorted", Fault::StopShorted),
+    ("stop-torn", Fault::StopTorn),
     ("encoder-a", Fault::EncoderLine(0)),
     ("encoder-b", Fault::EncoderLine(1)),
     ("dma-stalled", Fault::DmaStalled),
@@ -136,6 +163,12 @@ const PLAIN: [(&str, Fault); 15] = [
 /// Names of the analogue inputs that can be stuck, in the order of [`Fault::StuckCode`].
 const INPUTS: [&str; 4] =
     ["preload-sensor", "compression-sensor", "drive-readback", "pretightener-readback"];
+/// Names of the faults of flash, with an address.
+const WRONG: [(&str, Wrong); 3] = [
+    ("one-wrong-bit", Wrong::One),
+    ("two-wrong-bits", Wrong::Two),
+    ("wrong-check-bits", Wrong::Check),
+];
 
 /// A number in decimal or, after 0x, in hexadecimal.
 fn number(text: &str) -> Option<u32> {
@@ -154,7 +187,14 @@ fn fault(text: &str) -> Option<Fault> {
         let bit = bit.parse().ok().filter(|bit| *bit < 8)?;
         return Some(Fault::BitFlip(number(address)?, bit));
     }
-    let half = u16::try_from(number(value)?).ok()?;
+    let value = number(value)?;
+    if let Some((_, wrong)) = WRONG.into_iter().find(|(known, _)| *known == name) {
+        return FLASH.holds(value).then_some(Fault::WrongBits(value, wrong));
+    }
+    let half = u16::try_from(value).ok()?;
+    if name == "halted" {
+        return Some(Fault::Halted(half));
+    }
     if name == "angle-bits" {
         return Some(Fault::BitErrors(half));
     }
@@ -180,6 +220,11 @@ impl fmt::Display for Fault {
             Self::StuckCode(input, code) => write!(f, "{}={code:#x}", INPUTS[input & 3]),
             Self::BitErrors(mask) => write!(f, "angle-bits={mask:#x}"),
             Self::BitFlip(address, bit) => write!(f, "flip={address:#x}.{bit}"),
+            Self::Halted(milliseconds) => write!(f, "halted={milliseconds}"),
+            Self::WrongBits(address, wrong) => {
+                let named = WRONG.iter().find(|(_, known)| *known == wrong);
+                write!(f, "{}={address:#x}", named.map_or("", |(name, _)| name))
+            }
             plain => {
                 let named = PLAIN.iter().find(|(_, fault)| *fault == plain);
                 f.write_str(named.map_or("encoder-b", |(name, _)| name))
@@ -197,6 +242,8 @@ mod tests {
         let mut faults = PLAIN.map(|(_, fault)| fault).to_vec();
         faults.extend([0, 1, 2, 3].map(|input| Fault::StuckCode(input, 0x1234)));
         faults.extend([Fault::BitErrors(0x8000), Fault::BitFlip(0x0800_1234, 7)]);
+        faults.extend([Fault::Halted(50), Fault::WrongBits(0x0800_1238, Wrong::One)]);
+        faults.push(Fault::WrongBits(0x0807_E000, Wrong::Two));
         for fault in faults {
             let timed = format!("{fault}@5.25").parse();
             assert_eq!(timed, Ok(Timed { at_s: 5.25, fault }));
@@ -213,6 +260,7 @@ mod tests {
             "tread@1",
             "compression-sensor=70000@1",
             "flip=1.9@1",
+            "two-wrong-bits=0x20000000@1",
         ] {
             let error = text.parse::<Timed>().expect_err("misspelt").to_string();
             assert!(error.starts_with(&format!("`{text}`")), "{error}");

@@ -1,6 +1,7 @@
 //! The emulated board: the processor core, what its instructions cost, the chip around
 //! it, and images that run on it.
 
+pub mod accelerator;
 pub mod bench;
 pub mod campaign;
 pub mod capture;

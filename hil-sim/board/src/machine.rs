@@ -17,7 +17,7 @@ use super::peripherals::flash::Change;
 use super::peripherals::rcc::Cause as Restart;
 use super::peripherals::system::Cause;
 
-pub use profile::{Poll, Profile};
+pub use profile::{Clock, Poll, Profile};
 
 use tasks::Tasks;
 
@@ -43,6 +43,8 @@ pub struct Machine {
     tasks: Tasks,
     marks: Vec<Mark>,
     restarts: Vec<(u64, Restart)>,
+    /// Cycle up to which a debugger halts the core.
+    halted: Option<u64>,
     loaded: Loaded,
 }
 
@@ -63,6 +65,7 @@ impl Machine {
             tasks: Tasks::of(&loaded),
             marks: Vec::new(),
             restarts: Vec::new(),
+            halted: None,
             loaded,
         };
         for address in machine.tasks.marks() {
@@ -75,6 +78,22 @@ impl Machine {
     /// Cycles since the start.
     pub fn now(&self) -> u64 {
         self.core.meter().cycles
+    }
+
+    /// Counts what the flash's wait states cost from now on, see [`crate::accelerator`].
+    /// Errors: [`CoreError::Engine`] if the engine refuses.
+    pub fn count_waits(&mut self) -> Result<(), CoreError> {
+        self.core.count_waits(FLASH)
+    }
+
+    /// Cycles that the flash would have cost since then.
+    pub fn waits(&self) -> u64 {
+        self.core.waits()
+    }
+
+    /// Cycles so far, and what the flash would have cost.
+    fn clock(&self) -> Clock {
+        Clock { cycles: self.now(), waits: self.waits() }
     }
 
     /// The chip.
@@ -176,7 +195,8 @@ impl Machine {
         self.core.set_register(Register::Sp, stack)?;
         self.pc = self.word(FLASH.base + 4)? & !1;
         self.asleep = None;
-        self.profile.restart(self.core.meter().cycles);
+        self.halted = None;
+        self.profile.restart(self.clock());
         Ok(())
     }
 
@@ -184,6 +204,9 @@ impl Machine {
     /// nothing of these and the program executes next.
     fn executes(&mut self, cycle: u64) -> Result<bool, CoreError> {
         self.advance_chip()?;
+        if self.stays_halted(cycle) {
+            return Ok(false);
+        }
         if self.asleep.is_some() {
             self.sleep(cycle);
             return Ok(false);
@@ -273,30 +296,36 @@ impl Machine {
         Ok(())
     }
 
-    /// A debugger halts the core for so many cycles; the chip goes on but for what it freezes.
-    /// Errors: as [`Machine::run_until`].
-    pub fn halt(&mut self, cycles: u64) -> Result<(), CoreError> {
-        let end = self.now() + cycles;
+    /// A debugger halts the core for so many cycles from now on; the chip goes on but for what
+    /// it freezes. A reset ends it.
+    pub fn halt(&mut self, cycles: u64) {
         let now = self.now();
+        self.halted = Some(now + cycles);
         self.chip_mut().halt(cycles, now);
-        while self.now() < end {
-            self.advance_chip()?;
-            let now = self.now();
-            let next = self.chip().deadline().clamp(now + 1, end.max(now + 1));
-            self.core.pass(next - now);
-        }
+    }
+
+    /// Passes time while a debugger halts the core, up to this cycle at most; false if none does.
+    fn stays_halted(&mut self, cycle: u64) -> bool {
+        let Some(end) = self.halted else { return false };
         let now = self.now();
+        if now < end {
+            let next = self.chip().deadline().min(end).min(cycle).max(now + 1);
+            self.core.pass(next - now);
+            return true;
+        }
+        self.halted = None;
         self.chip_mut().resume(now);
-        Ok(())
+        false
     }
 
     /// Books the polls that have begun and ended.
     fn note_tasks(&mut self) {
         self.core.take_marks(&mut self.marks);
         for mark in self.marks.drain(..) {
+            let at = Clock { cycles: mark.cycles, waits: mark.waits };
             match self.tasks.begins(mark.address, mark.r0) {
-                Some(task) => self.profile.begin(task, mark.cycles),
-                None => self.profile.end(mark.cycles),
+                Some(task) => self.profile.begin(task, at),
+                None => self.profile.end(at),
             }
         }
     }
@@ -359,11 +388,12 @@ impl Machine {
     /// Applies a change by the flash's interface to the memory.
     fn apply(&mut self, change: Change) -> Result<(), CoreError> {
         match change {
-            Change::Programmed { address, bytes } => self.core.write(address, &bytes),
+            Change::Programmed { address, bytes } => self.core.write(address, &bytes)?,
             Change::Erased { address, size } => {
-                self.core.write(address, &vec![0xFF; size as usize])
+                self.core.write(address, &vec![0xFF; size as usize])?;
             }
         }
+        self.core.set_spoilt(self.core.bus().flash.spoilt())
     }
 
     /// Moves a word for DMA; false if an address holds nothing.
@@ -386,7 +416,7 @@ impl Machine {
 
     fn fall_asleep(&mut self, how: Asleep) {
         self.asleep = Some(how);
-        let now = self.now();
+        let now = self.clock();
         self.profile.sleep(now);
     }
 
@@ -405,7 +435,7 @@ impl Machine {
         let now = self.now();
         if wakes {
             self.asleep = None;
-            self.profile.wake(now);
+            self.profile.wake(self.clock());
             return;
         }
         let next = self.chip().deadline().clamp(now, cycle);

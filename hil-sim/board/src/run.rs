@@ -74,6 +74,8 @@ pub struct RunOptions {
     pub rows: bool,
     /// Faults of the hardware during the run.
     pub faults: Vec<Timed>,
+    /// Count the flash's wait states; takes three times as long.
+    pub wait_states: bool,
 }
 
 /// Runs a scenario on the board with the image in `elf`, and keeps `rows` if that is true.
@@ -101,6 +103,9 @@ pub fn run_with(
     let strings = Strings::of(elf)?;
     let mut bench = Bench::new(elf, &strings, scenario)?;
     store(bench.machine_mut(), scenario)?;
+    if options.wait_states {
+        bench.machine_mut().count_waits()?;
+    }
     let mut trace = Trace::new(scenario, bench.plant());
     bench.start_when_idle();
     let started = Instant::now();

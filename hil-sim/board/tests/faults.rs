@@ -38,6 +38,15 @@ fn faults_on_the_board_are_detected_or_tolerated_and_every_bound_is_kept() {
         ("host-line flooding", None),
         ("supply off", None),
         ("journal-task hung", None),
+        ("angle-bus disturbed", None),
+        ("magnet gone", Some(106)),
+        ("drive regulating", None),
+        ("pretightener regulating", None),
+        ("stop-wire off", Some(151)),
+        ("stop-wire shorted", Some(128)),
+        // The motors lose their power for the halt, so the wheel lags.
+        ("debugger halted", Some(123)),
+        ("image one-wrong-bit", None),
     ];
     let outcome = matrix(&faults.map(|(name, _)| name));
     let failures: Vec<_> = outcome.matrix.iter().flat_map(|line| &line.failures).collect();
@@ -80,6 +89,9 @@ fn parameters_in_flash_are_the_old_ones_the_new_ones_or_named_as_damaged() {
         ("stored-set bit-errors", Some("parameters damaged")),
         ("spare-set bit-errors", None),
         ("image-set bit-errors", Some("parameters damaged")),
+        ("stored-set two-wrong-bits", Some("parameters damaged")),
+        ("spare-set two-wrong-bits", None),
+        ("option-bytes off", Some("flash: one bank")),
         ("parameter-save torn", Some("reset by supply")),
         ("parameter-save reset", Some("reset by pin")),
     ];

@@ -39,18 +39,21 @@ impl Board {
         let bench = Bench::new(elf(), strings(), &scenario).expect("a bench");
         let probe = Probe::of(bench.machine()).expect("a control block");
         let mut board = Self { bench, probe, reader: FrameReader::new(), number: 0 };
-        board.until_idle();
+        board.until("mode: idle");
         board
     }
 
-    fn until_idle(&mut self) {
+    /// Runs until the log has this text.
+    fn until(&mut self, text: &str) {
+        let mut said = Vec::new();
         for _ in 0..3000 {
             let (_, lines) = self.bench.step().expect("runs");
-            if lines.iter().any(|line| line.text.contains("mode: idle")) {
+            said.extend(lines.into_iter().map(|line| line.text));
+            if said.iter().any(|line| line.contains(text)) {
                 return;
             }
         }
-        panic!("it does not come up");
+        panic!("no `{text}`: {said:#?}");
     }
 
     fn restarts(&self) -> usize {
@@ -121,7 +124,7 @@ fn a_stored_set_is_active_after_a_loss_of_power() {
     let stored = (Origin::Stored { sequence: 1 }, "changed".to_owned());
     assert_eq!(board.active(), stored);
     board.bench.machine_mut().restart(Cause::Power).expect("restarts");
-    board.until_idle();
+    board.until("mode: idle");
     assert_eq!(board.active(), stored);
     let strays = board.bench.machine().chip().strays().count();
     assert_eq!(strays, 0);
@@ -145,13 +148,20 @@ fn power_lost_in_any_write_leaves_the_old_set_or_the_new() {
             if board.restarts() == 0 {
                 board.bench.step().expect("runs");
             }
-            board.until_idle();
+            board.until("mode: idle");
             assert_eq!(board.restarts(), 1, "{cut:?}");
             let (origin, name) = board.active();
             // Intact; a half-written header reads as an erased number.
             let new = origin != Origin::Image && name == "changed";
             assert!(new || origin == Origin::Image, "{cut:?}: {origin:?} {name}");
             assert!(new || !done, "{cut:?}: it had said that it is stored");
+            // What the supply tore is not read any more: the chip would cut the bridges.
+            board.bench.send(b's').expect("runs");
+            board.until("mode: preloading to deploy");
+            assert_eq!(board.active(), (origin, name), "{cut:?}");
+            board.until("deploying: cruise");
+            board.bench.send(b'x').expect("runs");
+            board.until("mode: idle");
             // A half-written set does not block the next save.
             assert!(board.store(&set), "{cut:?}");
             assert_eq!(board.active().1, "changed", "{cut:?}");

@@ -3,14 +3,15 @@
 //! Registers and fields are those of ST's description, so that a position that a model has wrong
 //! shows here too.
 
+mod adc;
+mod sources;
+
 use rig_board::chip::description;
 use rig_board::chip::{Chip, Why};
 use rig_board::core::{Access, Bus};
 use rig_board::peripherals::HZ;
 use rig_board::peripherals::pwr::Then;
 use rig_board::rules::Rule;
-
-use crate::common::Board;
 
 /// Cycles in a microsecond.
 const US: u64 = HZ / 1_000_000;
@@ -122,89 +123,6 @@ impl Program {
         assert_eq!(program.broken(), []);
         program
     }
-}
-
-#[test]
-fn adc_regulator_takes_20_us_before_anything_else() {
-    let mut program = Program::new();
-    program.set("ADC1.CR", &[("DEEPPWD", 0), ("ADVREGEN", 1)]);
-    program.wait(20 * US - 1);
-    program.set("ADC1.CR", &[("ADCAL", 1)]);
-    assert!(!program.is_set("ADC1.CR", "ADCAL"));
-    program.assert_broken(Rule::AdcRegulator);
-}
-
-#[test]
-fn adc_calibration_comes_before_the_enabling() {
-    let mut program = Program::new();
-    program.set("ADC1.CR", &[("DEEPPWD", 0), ("ADVREGEN", 1)]);
-    program.wait(20 * US);
-    program.set("ADC1.CR", &[("ADEN", 1)]);
-    assert!(!program.is_set("ADC1.CR", "ADEN"));
-    program.assert_broken(Rule::AdcCalibration);
-    let mut program = Program::converter();
-    program.set("ADC1.CR", &[("ADCAL", 1)]);
-    program.assert_broken(Rule::AdcCalibration);
-}
-
-#[test]
-fn adc_enabling_waits_four_clocks_after_the_calibration() {
-    let mut program = Program::calibrated();
-    program.wait(4 * 4 - 1);
-    program.set("ADC1.CR", &[("ADEN", 1)]);
-    assert!(!program.is_set("ADC1.CR", "ADEN"));
-    program.assert_broken(Rule::AdcEnable);
-}
-
-#[test]
-fn adc_converts_only_after_adrdy() {
-    let mut program = Program::calibrated();
-    program.wait(4 * 4);
-    program.set("ADC1.CR", &[("ADEN", 1)]);
-    program.set("ADC1.CR", &[("ADSTART", 1)]);
-    assert!(!program.is_set("ADC1.CR", "ADSTART"));
-    program.assert_broken(Rule::AdcReady);
-}
-
-#[test]
-fn adc_is_not_disabled_or_set_up_while_it_converts() {
-    let mut program = Program::converter();
-    program.set("ADC1.CFGR", &[("CONT", 1)]);
-    program.set("ADC1.CR", &[("ADSTART", 1)]);
-    assert_eq!(program.broken(), []);
-    program.set("ADC1.SMPR1", &[("SMP1", 3)]);
-    assert_eq!(program.read("ADC1.SMPR1"), 0);
-    program.assert_broken(Rule::AdcConfiguration);
-    let mut program = Program::converter();
-    program.set("ADC1.CFGR", &[("CONT", 1)]);
-    program.set("ADC1.CR", &[("ADSTART", 1)]);
-    program.set("ADC1.CR", &[("ADDIS", 1)]);
-    assert!(program.is_set("ADC1.CR", "ADEN"));
-    program.assert_broken(Rule::AdcDisable);
-}
-
-#[test]
-fn adc_common_and_differential_settings_want_disabled_converters() {
-    let mut program = Program::converter();
-    program.set("ADC12_COMMON.CCR", &[("PRESC", 3)]);
-    program.assert_broken(Rule::AdcDisabledOnly);
-    let mut program = Program::converter();
-    program.set("ADC1.DIFSEL", &[("DIFSEL1", 1)]);
-    program.assert_broken(Rule::AdcDisabledOnly);
-}
-
-#[test]
-fn adc_clock_is_at_most_60_mhz() {
-    let mut program = Program::new();
-    program.set("ADC12_COMMON.CCR", &[("PRESC", 1)]);
-    program.set("ADC1.CR", &[("DEEPPWD", 0), ("ADVREGEN", 1)]);
-    program.wait(20 * US);
-    program.set("ADC1.CR", &[("ADCAL", 1)]);
-    program.wait(10 * US);
-    program.set("ADC1.CR", &[("ADEN", 1)]);
-    program.wait(10 * US);
-    program.set("ADC1.CR", &[("ADSTART", 1)]);
-    program.assert_broken(Rule::AdcClock);
 }
 
 /// Each level of the lock, a field that it protects, and one that it leaves.
@@ -479,73 +397,4 @@ fn commands_act_where_the_description_has_them() {
         assert_eq!(program.read("DMA1.ISR"), 0);
     }
     assert_eq!(program.broken(), []);
-}
-
-/// Most kilohms at a slow channel for 2.5 to 640.5 clocks of 60 MHz, 12 bits. Source: DS12288,
-/// maximum ADC R_AIN.
-const MOST_KILOHMS: [(f64, f64); 7] =
-    [(6.5, 0.1), (12.5, 0.47), (24.5, 1.2), (47.5, 1.8), (92.5, 3.9), (247.5, 10.0), (640.5, 33.0)];
-
-/// What the sources at the analogue inputs may be, by the sampling time that the image sets.
-///
-/// Amplifiers drive PC2 and PC3 directly. The readback comes through the resistor of its
-/// low-pass, far above what the table allows: its capacitor gives the charge instead. The
-/// sampling capacitor of 5 pF takes from it less than half a code of 12 bits.
-#[test]
-fn sampling_times_suit_the_sources_that_the_hardware_page_names() {
-    let mut board = Board::off(&[]);
-    board.run(200);
-    let mut read = |register: &str| {
-        let at = Access { address: address(register), size: 4, pc: 0, now: board.machine().now() };
-        board.machine().chip_mut().read(at)
-    };
-    let page = include_str!("../../../docs/HARDWARE.md");
-    let clocks = [2.5, 6.5, 12.5, 24.5, 47.5, 92.5, 247.5, 640.5];
-    for (register, common, channel) in [
-        ("ADC1.SMPR1", "ADC12_COMMON.CCR", 8),
-        ("ADC2.SMPR1", "ADC12_COMMON.CCR", 9),
-        ("ADC3.SMPR1", "ADC345_COMMON.CCR", 1),
-        ("ADC3.SMPR2", "ADC345_COMMON.CCR", 12),
-    ] {
-        let name = format!("SMP{channel}");
-        let all = field(register, &name, 7);
-        let setting = (read(register) & all) >> all.trailing_zeros();
-        let presc = read(common) & field(common, "PRESC", 15);
-        assert_eq!(presc, field(common, "PRESC", 2), "{common}: a quarter of 170 MHz");
-        let microseconds = clocks[setting as usize] / 42.5;
-        let allowed = MOST_KILOHMS.iter().rev().find(|(clocks, _)| clocks / 60.0 <= microseconds);
-        let (_, kilohms) = allowed.expect("long enough for some source");
-        println!("{register} {name}: {microseconds:.3} us, sources up to {kilohms} kilohm");
-        let ohms = format!("at most {:.0} Ω", 1000.0 * kilohms);
-        assert!(page.contains(&ohms), "{register}: the page does not say {ohms}");
-    }
-    assert!(page.contains("samples for 0.3 µs"), "the page gives the sampling time");
-    assert!(page.contains("(10 kΩ, 100 nF of 5 %)"), "the page gives the readback's low-pass");
-    let (sampling_pf, reservoir_nf) = (5.0, 100.0 * 0.95);
-    let codes = 4096.0 * sampling_pf / (1000.0 * reservoir_nf);
-    assert!(codes < 0.5, "{codes} codes");
-}
-
-/// The oscillator's range over temperature, kHz. Source: DS12288, LSI characteristics.
-const LSI_KHZ: [f64; 2] = [29.5, 34.0];
-
-/// The time-out that the image sets, at both ends of its oscillator.
-///
-/// The hang is found, and the bridges are cut, before the watchdog bites; it bites within the
-/// time that the hardware page gives.
-#[test]
-fn the_watchdog_s_time_out_holds_at_both_ends_of_its_oscillator() {
-    /// `HANG_MS` of the firmware, with the millisecond in which it counts.
-    const FOUND_MS: f64 = 80.0;
-    let mut board = Board::idle();
-    let mut read = |register: &str| {
-        let at = Access { address: address(register), size: 4, pc: 0, now: board.machine().now() };
-        board.machine().chip_mut().read(at)
-    };
-    let counts = f64::from(read("IWDG.RLR") + 1) * f64::from(4_u32 << read("IWDG.PR"));
-    let [longest, shortest] = LSI_KHZ.map(|khz| counts / khz);
-    println!("{shortest:.1} to {longest:.1} ms");
-    assert!(shortest > FOUND_MS, "{shortest} ms");
-    assert!(longest < 110.0, "{longest} ms");
-    assert!(include_str!("../../../src/board/safety.rs").contains("const HANG_MS: u32 = 75;"));
 }

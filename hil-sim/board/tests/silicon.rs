@@ -6,6 +6,8 @@ use rig_board::bench::{Bench, STEP};
 use rig_board::chip::Pin;
 use rig_board::core::Register;
 use rig_board::faults::Fault;
+use rig_board::peripherals::flash::Wrong;
+use rig_board::peripherals::iwdg::LSI_RANGE_HZ;
 use rig_board::peripherals::rcc::Cause;
 use rig_board::peripherals::{HZ, Peripheral};
 
@@ -130,25 +132,74 @@ fn a_tick_that_never_comes_is_cut_after_the_watchdog_s_own_time() {
 }
 
 #[test]
+fn the_watchdog_ends_a_hang_and_nothing_else_at_both_ends_of_its_oscillator() {
+    for hz in LSI_RANGE_HZ {
+        let under_way = || {
+            let mut board = Board::off(&[]);
+            board.machine().chip_mut().watchdog.set_oscillator(hz);
+            board.until("mode: idle", 3000);
+            board.send(b's');
+            board.until("deploying: approach", 8000);
+            assert!(board.machine().restarts().is_empty(), "{hz} Hz");
+            board
+        };
+        // With interrupts masked it alone ends it, 800 times four periods after the last feed.
+        let mut board = under_way();
+        board.set(Register::Primask, 1);
+        board.machine().hang().expect("hangs");
+        let (cause, after, _) = board.reset(150);
+        let timeout_ms = 3200.0 * 1e3 / hz as f64;
+        assert_eq!(cause, Cause::Watchdog, "{hz} Hz");
+        assert!((timeout_ms - 1.5..=timeout_ms).contains(&f64::from(after)), "{hz} Hz: {after}");
+        // Otherwise the software is earlier: bridges off, and the hang named.
+        let mut board = under_way();
+        board.machine().hang().expect("hangs");
+        let (_, after, driven) = board.reset(300);
+        let cut = driven.iter().rposition(|on| *on).expect("it was driven") as u32;
+        assert!(cut + 10 < after, "{hz} Hz: cut after {cut}, reset after {after} ms");
+        let stopped = board.report().crash.map(|crash| crash.stopped);
+        assert!(matches!(stopped, Some(Stopped::Hang { .. })), "{hz} Hz: {stopped:?}");
+    }
+}
+
+/// A line a second under way, by the core's own counter: what the tick takes, without its task's
+/// wake-up and with what preempts it.
+#[test]
+fn the_log_states_the_cycles_of_the_tick() {
+    let mut board = Board::moving();
+    let tick = board.machine().tasks().position(|name| name == "motors");
+    board.until("cycles on average", 1200);
+    board.machine().profile_mut().take_polls();
+    let from = board.log.len();
+    board.until("cycles on average", 1200);
+    let polls = board.machine().profile_mut().take_polls().into_iter();
+    let polls: Vec<u64> =
+        polls.filter(|poll| Some(poll.task) == tick).map(|poll| poll.cycles).collect();
+    let line = board.log[from..].iter().find(|line| line.contains("tick: ")).expect("a line");
+    let (_, numbers) = line.split_once("tick: ").expect("its numbers");
+    let numbers: Vec<u64> = numbers.split(' ').filter_map(|word| word.parse().ok()).collect();
+    let [mean, most] = numbers[..] else { panic!("{line}") };
+    let emulated = polls.iter().sum::<u64>() / polls.len() as u64;
+    let worst = polls.into_iter().max().unwrap_or(0);
+    // The waking of the task is not in it.
+    assert!((1..500).contains(&emulated.saturating_sub(mean)), "{line}; emulated {emulated}");
+    assert!((1..500).contains(&worst.saturating_sub(most)), "{line}; emulated {worst}");
+}
+
+#[test]
 fn a_low_supply_and_a_damaged_flash_cut_the_bridges_without_the_software() {
-    for fault in [Fault::SupplyDip, Fault::TwoWrongBits] {
+    for damage in [false, true] {
         let mut board = Board::moving();
         board.set(Register::Faultmask, 1);
         let hang = board.machine();
         hang.hang().expect("hangs");
+        // The code that it hangs in.
+        let place = Fault::WrongBits(hang.pc(), Wrong::Two);
+        let fault = if damage { place } else { Fault::SupplyDip };
         fault.strike(hang).expect("strikes");
         board.step();
         assert!(!board.step().drives.drive.abs().gt(&0.0), "{fault}");
     }
-}
-
-#[test]
-fn two_wrong_bits_at_rest_are_no_reason_to_stop() {
-    let mut board = Board::idle();
-    board.strike(Fault::TwoWrongBits);
-    board.run(100);
-    assert!(board.machine().restarts().is_empty(), "{:#?}", board.log);
-    assert!(!board.machine().chip().flash.has_two_wrong_bits(), "the handler clears it");
 }
 
 /// A probe that attaches halts the core for some milliseconds, and the timers freeze with it.
@@ -157,12 +208,10 @@ fn a_core_halted_by_a_debugger_drives_nothing_and_then_goes_on() {
     for milliseconds in [1, 5, 50] {
         let mut board = Board::moving();
         let before = board.position_mm();
+        board.strike(Fault::Halted(milliseconds));
         for millisecond in 0..milliseconds {
-            board.machine().halt(STEP).expect("halts");
-            while board.bench.is_due() {
-                let (passed, _) = board.bench.close().expect("runs");
-                assert!(millisecond == 0 || passed.drives.drive == 0.0, "{passed:?}");
-            }
+            let drives = board.step().drives;
+            assert!(millisecond == 0 || drives.drive == 0.0, "{drives:?}");
         }
         let moved = board.position_mm() - before;
         assert!(moved < 0.1, "{milliseconds} ms: {moved} mm");
@@ -214,4 +263,53 @@ fn the_light_of_a_damaged_image_blinks_twice_a_second() {
     let periods: Vec<f64> = rises.windows(2).map(|pair| pair[1] - pair[0]).collect();
     assert!(periods.len() >= 4, "{rises:?}");
     assert!(periods.iter().all(|period| (0.45..=0.56).contains(period)), "{periods:.2?} s");
+}
+
+/// Of the flash: the ECC register.
+const ECC: u32 = 0x18;
+/// A function that runs every millisecond.
+const EVERY_MILLISECOND: &str = "safety::look_at";
+
+/// Two wrong bits in code that runs every millisecond, of the correction or of the code itself.
+/// The start that follows compares the image, of which the first are no part.
+#[test]
+fn two_wrong_bits_in_code_that_runs_end_it_and_are_no_emergency_stop() {
+    for wrong in [Wrong::Check, Wrong::Two] {
+        let mut board = Board::moving();
+        let place = board.function(EVERY_MILLISECOND);
+        board.strike(Fault::WrongBits(place, wrong));
+        let (cause, after, driven) = board.reset(150);
+        assert_eq!(cause, Cause::Software, "{:#?}", board.log);
+        assert!(after < 30 && !driven[2..].contains(&true), "{after} ms: {driven:?}");
+        board.run(600);
+        assert!(!board.said("fault 151"), "{:#?}", board.log);
+        match wrong {
+            Wrong::Check => assert!(board.said("a bit of the image had"), "{:#?}", board.log),
+            _ => assert!(board.said("image: "), "{:#?}", board.log),
+        }
+        board.assert_off(300);
+    }
+}
+
+#[test]
+fn one_wrong_bit_in_code_that_runs_is_corrected() {
+    let mut board = Board::moving();
+    let place = board.function(EVERY_MILLISECOND);
+    board.strike(Fault::WrongBits(place, Wrong::One));
+    board.until("mode: deployed", 20_000);
+    assert!(!board.said("] fault ") && board.machine().restarts().is_empty());
+    let ecc = board.machine().chip_mut().flash.read(ECC, 0).expect("a register");
+    assert_eq!(ecc >> 30, 1, "it was read, and corrected");
+}
+
+#[test]
+fn a_shorted_stop_wire_hides_the_button_until_the_motors_lack_their_supply() {
+    let mut board = Board::moving();
+    board.strike(Fault::StopShorted);
+    board.strike(Fault::StopTorn);
+    board.run(100);
+    assert!(!board.said("] fault "), "only the contact in the motors' supply cuts");
+    let mut board = Board::moving();
+    board.strike(Fault::StopTorn);
+    board.until("fault 151", 20);
 }

@@ -9,7 +9,7 @@ use rtt_target::{ChannelMode, DownChannel, UpChannel};
 
 use super::clock;
 use super::host_io::HOST_IO;
-use crate::board::EXCHANGE;
+use crate::board::{EXCHANGE, guard};
 
 /// Cycles of a millisecond.
 const MILLISECOND: u32 = 170_000;
@@ -26,7 +26,7 @@ type Channels = (UpChannel, DownChannel);
 /// so that the controller finds the fault, switches the bridges off and holds, and the ticks
 /// feed the watchdog. Only a restart ends that.
 pub(super) fn serve(channels: Channels, begin: impl FnOnce()) -> ! {
-    count_cycles();
+    guard::count_cycles();
     let mut line = HostConnection { channels, reader: FrameReader::new() };
     while line.take() != Some(ToBoard::Hello { protocol: PROTOCOL }) {}
     begin();
@@ -49,14 +49,6 @@ pub(super) fn serve(channels: Channels, begin: impl FnOnce()) -> ! {
             run.alone = true;
         }
     }
-}
-
-/// Starts the cycle counter, which measures the silence.
-fn count_cycles() {
-    // SAFETY: nothing else uses these two peripherals.
-    let mut core = unsafe { cortex_m::Peripherals::steal() };
-    core.DCB.enable_trace();
-    core.DWT.enable_cycle_counter();
 }
 
 struct Run {

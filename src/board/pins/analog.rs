@@ -11,9 +11,6 @@ use embassy_stm32::adc::{
     RxDma, SampleTime, Trovs,
 };
 use embassy_stm32::interrupt::typelevel::Binding;
-use embassy_stm32::pac::adc::Adc as Registers;
-use embassy_stm32::pac::adc::vals::Exten;
-use embassy_stm32::pac::bdma::Ch as Channel;
 use embassy_stm32::{Peri, dma};
 use embassy_time::{Duration, Timer};
 use interstage::hal::AnalogInput;
@@ -21,6 +18,7 @@ use interstage::sense::raw::{AdcCode, BusFault};
 use static_cell::StaticCell;
 
 use crate::board::Irqs;
+use crate::board::registers::{Adc as Registers, DmaChannel as Channel, Exten, Peripheral};
 
 /// `OVSR` for 256 conversions a code.
 const RATIO_256: u8 = 7;
@@ -60,13 +58,13 @@ pub(crate) struct Analog<T: DefaultInstance> {
     _converter: RingBufferedAdc<'static, T>,
 }
 
-impl<T: DefaultInstance> Analog<T> {
+impl<T: DefaultInstance + Peripheral<Registers = Registers>> Analog<T> {
     /// Calibrates the converter and starts converting `pin` through this DMA channel. Each ring
     /// serves once.
-    pub(crate) fn new<D: RxDma<T>>(
-        (adc, registers): (Peri<'static, T>, Registers),
+    pub(crate) fn new<D: RxDma<T> + Peripheral<Registers = Channel>>(
+        adc: Peri<'static, T>,
         pin: impl AdcChannel<T> + 'static,
-        (dma, channel): (Peri<'static, D>, Channel),
+        dma: Peri<'static, D>,
         ring: &'static Ring,
     ) -> Self
     where
@@ -93,13 +91,17 @@ impl<T: DefaultInstance> Analog<T> {
         );
         converter.start();
         // No interrupt at the ring's half or end.
+        let channel = D::registers();
         channel.cr().modify(|w| {
             w.set_htie(false);
             w.set_tcie(false);
         });
+        let registers = T::registers();
         Self { registers, channel, written, left: RING as u16, _converter: converter }
     }
+}
 
+impl<T: DefaultInstance> Analog<T> {
     /// The latest code, if one has arrived since the last call.
     fn latest(&mut self) -> Option<AdcCode> {
         let left = self.channel.ndtr().read().ndt();

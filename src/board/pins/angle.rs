@@ -10,7 +10,6 @@
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{Level, Output, Pull, Speed};
 use embassy_stm32::mode::Blocking;
-use embassy_stm32::pac;
 use embassy_stm32::peripherals::{PA6, PA7, PB3, PB10, SPI1};
 use embassy_stm32::spi::mode::Master;
 use embassy_stm32::spi::{Config, MODE_1, Spi};
@@ -18,6 +17,8 @@ use embassy_stm32::time::Hertz;
 use interstage::hal::AngleBus;
 use interstage::sense::angle::{field, is_flagged};
 use interstage::sense::raw::{AngleFrame, BusFault};
+
+use crate::board::registers;
 
 /// Commands that read a register, bit 14, with even parity in bit 15: the angle at 0x3FFF,
 /// diagnostics and gain at 0x3FFD, the errors at 0x0001.
@@ -73,9 +74,9 @@ impl Angle {
     fn exchange(&mut self, command: u16) -> Result<AngleFrame, BusFault> {
         self.select.set_low();
         cortex_m::asm::delay(SELECT_ROUNDS);
-        pac::SPI1.dr16().write_value(command);
-        let come = (0..FRAME_ROUNDS).any(|_| pac::SPI1.sr().read().rxne());
-        let word = pac::SPI1.dr16().read();
+        registers::SPI1.dr16().write_value(command);
+        let come = (0..FRAME_ROUNDS).any(|_| registers::SPI1.sr().read().rxne());
+        let word = registers::SPI1.dr16().read();
         self.select.set_high();
         cortex_m::asm::delay(SELECT_ROUNDS);
         if come { Ok(AngleFrame::new(word)) } else { Err(BusFault::Transfer) }

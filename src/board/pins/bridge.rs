@@ -5,7 +5,6 @@ use core::mem::ManuallyDrop;
 
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AfType, AnyPin, Flex, Level, Output, OutputType, Pull, Speed};
-use embassy_stm32::pac::timer::TimAdv;
 use embassy_stm32::peripherals::{TIM1, TIM8};
 use embassy_stm32::time::khz;
 use embassy_stm32::timer::complementary_pwm::{
@@ -21,6 +20,7 @@ use interstage::sense::raw::BridgeCodes;
 use interstage::units::MotorCommand;
 
 use super::readback::Readback;
+use crate::board::registers::{Peripheral, TimAdv};
 
 /// One bridge in phase/enable control: PWM chops, the direction line sets the sign, the enable
 /// line wakes the bridge.
@@ -37,13 +37,13 @@ pub(crate) struct Bridge<T: AdvancedInstance4Channel> {
     _stop: ManuallyDrop<Flex<'static>>,
 }
 
-impl<T: AdvancedInstance4Channel> Bridge<T> {
+impl<T: AdvancedInstance4Channel + Peripheral<Registers = TimAdv>> Bridge<T> {
     /// A bridge that is off.
     ///
     /// `stop` is the emergency stop: a contact to ground that opens. High, and so
     /// a broken wire too, takes the PWM away in hardware, whatever the software does.
     pub(crate) fn new<S: BreakInputPin<T, BkIn1>>(
-        (timer, registers): (Peri<'static, T>, TimAdv),
+        timer: Peri<'static, T>,
         pwm: Peri<'static, impl TimerPin<T, Ch1>>,
         forward: Peri<'static, AnyPin>,
         enable: Peri<'static, AnyPin>,
@@ -83,7 +83,7 @@ impl<T: AdvancedInstance4Channel> Bridge<T> {
         let period = pwm.get_max_duty();
         Self {
             pwm: ManuallyDrop::new(pwm),
-            registers,
+            registers: T::registers(),
             period,
             forward: ManuallyDrop::new(forward),
             enable: ManuallyDrop::new(enable),

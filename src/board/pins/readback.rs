@@ -7,9 +7,10 @@
 
 use embassy_stm32::Peri;
 use embassy_stm32::adc::{Adc, AdcChannel, AdcConfig, AnyAdcChannel, SampleTime};
-use embassy_stm32::pac::adc::Adc as Registers;
 use embassy_stm32::peripherals::ADC3;
 use interstage::sense::raw::{BridgeCode, BridgeCodes};
+
+use crate::board::registers::{Adc as Registers, Peripheral};
 
 /// `OVSR` for 256 conversions a code: 151 us, three periods of the bridges' PWM.
 const RATIO_256: u8 = 7;
@@ -23,12 +24,13 @@ pub(crate) struct Readback {
 }
 
 impl Readback {
-    /// Calibrates the converter with these registers and starts the first conversions.
+    /// Calibrates the converter and starts the first conversions.
     pub(crate) fn new(
-        (adc, registers): (Peri<'static, ADC3>, Registers),
+        adc: Peri<'static, ADC3>,
         drive: impl AdcChannel<ADC3> + 'static,
         preload: impl AdcChannel<ADC3> + 'static,
     ) -> Self {
+        let registers = ADC3::registers();
         // Dropping the driver leaves the converter on and calibrated.
         let _ = Adc::new(adc, AdcConfig::default());
         let pins = [drive.degrade_adc(), preload.degrade_adc()];

@@ -2,12 +2,12 @@
 
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::Pull;
-use embassy_stm32::pac;
-use embassy_stm32::pac::timer::vals::FilterValue;
 use embassy_stm32::peripherals::{PA0, PA1, TIM5};
 use embassy_stm32::timer::qei::{Config, Qei, QeiMode};
 use interstage::hal::WheelEncoder;
 use interstage::sense::raw::EncoderCount;
+
+use crate::board::registers::{self, FilterValue};
 
 pub(crate) struct Wheel(Qei<'static, TIM5>);
 
@@ -28,7 +28,7 @@ impl Wheel {
         let counter = Qei::new(timer, a, b, config);
         // An edge counts after 8 equal samples at 170 MHz / 32, 1.5 us: far below the 120 us
         // between two counts at 160 mm/s, far above the ringing that the bridges couple in.
-        pac::TIM5.ccmr_input(0).modify(|w| {
+        registers::TIM5.ccmr_input(0).modify(|w| {
             w.set_icf(0, FilterValue::FDTS_DIV32_N8);
             w.set_icf(1, FilterValue::FDTS_DIV32_N8);
         });

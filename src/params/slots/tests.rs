@@ -1,5 +1,7 @@
 //! Power lost at every operation, and everything else that can be wrong.
 
+use std::collections::BTreeSet;
+
 use embassy_futures::block_on;
 use proptest::prelude::*;
 
@@ -16,12 +18,20 @@ pub(in crate::params) struct Flash {
     /// Random bits of what an operation cut short leaves.
     noise: u64,
     operations: usize,
+    /// Double words that cannot be read, by slot and offset.
+    torn: BTreeSet<(usize, usize)>,
 }
 
 impl Flash {
     pub(in crate::params) fn blank() -> Self {
         let slots = [vec![0xFF; SLOT_BYTES], vec![0xFF; SLOT_BYTES]];
-        Self { slots, left: None, noise: 0x9E37_79B9_7F4A_7C15, operations: 0 }
+        Self {
+            slots,
+            left: None,
+            noise: 0x9E37_79B9_7F4A_7C15,
+            operations: 0,
+            torn: BTreeSet::new(),
+        }
     }
 
     /// Turns a bit of this byte over in the place in force.
@@ -60,9 +70,17 @@ impl SetMemory for Flash {
         &self.slots[slot as usize]
     }
 
+    fn is_readable(&self, slot: Slot) -> bool {
+        self.torn.iter().all(|(torn, _)| *torn != slot as usize)
+    }
+
     async fn erase(&mut self, slot: Slot, page: usize) -> Result<(), FlashFault> {
         let complete = self.operate()?;
         let range = page * PAGE_BYTES..(page + 1) * PAGE_BYTES;
+        self.torn.retain(|(in_slot, at)| *in_slot != slot as usize || !range.contains(at));
+        if !complete {
+            self.torn.extend(range.clone().step_by(WORD_BYTES).map(|at| (slot as usize, at)));
+        }
         for at in range {
             let bits = if complete { u64::MAX } else { self.random() };
             self.slots[slot as usize][at] |= bits as u8;
@@ -79,6 +97,9 @@ impl SetMemory for Flash {
         assert!(offset.is_multiple_of(WORD_BYTES), "{offset}");
         let complete = self.operate()?;
         let kept = if complete { 0 } else { self.random() };
+        if !complete {
+            self.torn.insert((slot as usize, offset));
+        }
         let place = &mut self.slots[slot as usize][offset..offset + WORD_BYTES];
         assert!(place.iter().all(|byte| *byte == 0xFF), "programmed twice");
         for (index, (to, from)) in place.iter_mut().zip(word).enumerate() {
@@ -159,6 +180,10 @@ fn power_lost_at_any_operation_leaves_the_old_set_or_the_new() {
                 flash.noise = flash.noise.wrapping_mul(2 * seed + 1);
                 assert_eq!(block_on(save(&mut flash, &new)), Err(Refusal::Flash), "{cut}");
                 let mut after = flash.restart();
+                let before = name(&after);
+                block_on(mend(&mut after)).unwrap();
+                assert!(after.torn.is_empty(), "cut at {cut}: {:?}", after.torn);
+                assert_eq!(name(&after), before, "cut at {cut}");
                 match name(&after).as_deref() {
                     Some("old") => kept += 1,
                     // The last operation may have been complete in effect.
@@ -172,6 +197,17 @@ fn power_lost_at_any_operation_leaves_the_old_set_or_the_new() {
         }
         assert!(kept > 3 * (uncut.operations - 2), "{kept}, {torn_headers}");
     }
+}
+
+#[test]
+fn a_damaged_set_in_force_is_not_mended_away() {
+    let mut flash = Flash::blank();
+    block_on(save(&mut flash, &set("only"))).unwrap();
+    flash.slots[0][500] ^= 3;
+    flash.torn.insert((0, 496));
+    block_on(mend(&mut flash)).unwrap();
+    assert_eq!(stored(&flash), Err(Damaged(Slot::A)));
+    assert!(!flash.torn.is_empty());
 }
 
 #[test]

@@ -1,4 +1,5 @@
-//! Faults of the stored parameters: inverted bits in flash, and interrupted saves.
+//! Faults of what a start reads: wrong bits in the stored parameters, interrupted saves, and
+//! option bytes that make one bank of the flash.
 //!
 //! They do not affect the current run, whose constants are in RAM; the next start finds them.
 //! So the run is judged as any other, then the board is restarted. It must run on the active
@@ -22,6 +23,8 @@ use hil_sim::scenario::injection::{Injection, Onset, Target};
 const HELD: &str = "parameters damaged";
 /// The same in the log.
 const DAMAGED: &str = "parameters: the set is damaged";
+/// A start that holds for its option bytes, in the matrix and in the log.
+const ONE_BANK: &str = "flash: one bank";
 /// Beginning of the log's line about the rig of a start that runs.
 const RUNS: &str = "rig ";
 
@@ -32,12 +35,15 @@ pub(super) struct Parameters {
     rig: Option<String>,
     /// First line about damage, ms after the start.
     damaged: Option<u64>,
+    /// The damage is that of the option bytes.
+    one_bank: bool,
 }
 
 impl Parameters {
     /// Reads a line of the log, `up` milliseconds after the start.
     pub(super) fn read(&mut self, text: &str, up: u64) {
-        if text.starts_with(DAMAGED) || text.starts_with(IMAGE) {
+        self.one_bank |= text.starts_with(ONE_BANK);
+        if self.one_bank || text.starts_with(DAMAGED) || text.starts_with(IMAGE) {
             self.damaged.get_or_insert(up);
         }
         if let Some((name, _)) = text.strip_prefix(RUNS).and_then(|rest| rest.split_once(", ")) {
@@ -70,14 +76,19 @@ pub(super) fn judged(
     let mut harms = judge.harms();
     harms.extend(harm(&board, scenario, injection)?);
     let held = board.parameters.holds();
-    let lost = matches!(injection.target, Target::StoredSet | Target::ImageSet);
+    use Target::{ImageSet, OptionBytes, StoredSet};
+    let lost = matches!(injection.target, StoredSet | ImageSet | OptionBytes);
     if held && !lost {
         harms.push("holds although its parameters are intact".to_owned());
     }
     if saving.is_some() && before && !crossed {
         harms.push("does not complete after the save".to_owned());
     }
-    let why = if board.image_s.is_some() { IMAGE_DAMAGED } else { HELD };
+    let why = match (board.image_s, board.parameters.one_bank) {
+        (Some(_), _) => IMAGE_DAMAGED,
+        (None, true) => ONE_BANK,
+        (None, false) => HELD,
+    };
     let restart = if held { Some(why) } else { board.restart().filter(|_| saving.is_some()) };
     if held {
         (finding, end) = (Finding::Found, "hold");

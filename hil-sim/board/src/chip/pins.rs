@@ -212,7 +212,7 @@ impl Chip {
         for (index, wired) in BRIDGES.iter().enumerate() {
             self.motors[index].set_system_break(broken, now);
             let reaches = self.role(wired.stop) == Role::Alternate(wired.stop_function);
-            let open = reaches && self.level(wired.stop);
+            let open = reaches && self.level(wired.stop) && !self.defects.stop_shorted;
             self.motors[index].set_break(open, now);
             let is_output = self.role(wired.pwm) == Role::Alternate(wired.pwm_function);
             let duty = if is_output { self.motors[index].duty(0) } else { 0.0 };

@@ -50,7 +50,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         gdb::serve(&listener, &elf, &scenario, show).map_err(Failure::run)?;
         return Ok(Outcome::Good);
     }
-    let options = RunOptions { rows: directory.is_some(), faults };
+    let options = RunOptions { rows: directory.is_some(), faults, wait_states: true };
     let ran = {
         let _progress = (!args.log).then(|| progress::spinner(scenario.run.direction.name()));
         run::run_with(&elf, &scenario, &options, show).map_err(Failure::run)?

@@ -10,8 +10,8 @@ mod hooks;
 use std::collections::HashSet;
 
 use unicorn_engine::{
-    Arch, ArmCpuModel, MemType, Mode, Prot, RegisterARM, TlbEntry, TlbType, UcHookId, Unicorn,
-    uc_error,
+    Arch, ArmCpuModel, HookType, MemType, Mode, Prot, RegisterARM, TlbEntry, TlbType, UcHookId,
+    Unicorn, uc_error,
 };
 
 use self::count::Count;
@@ -29,6 +29,13 @@ pub struct Memory {
     pub size: u32,
     /// What the program may do there.
     pub access: Access,
+}
+
+impl Memory {
+    /// Whether this address lies in it.
+    pub const fn holds(self, address: u32) -> bool {
+        address >= self.base && address - self.base < self.size
+    }
 }
 
 /// What a program may do in a memory.
@@ -70,6 +77,19 @@ struct Inside<B> {
     count: Count,
     bus: B,
     marks: Vec<Mark>,
+    /// Places of flash of which reads are reported to the bus: address and bytes.
+    spoilt: Vec<(u32, u32)>,
+}
+
+impl<B: Bus> Inside<B> {
+    /// The program reads or executes these bytes of flash.
+    fn look_for_spoilt(&mut self, address: u32, size: u32) {
+        let within = |(base, bytes): &(u32, u32)| address < base + bytes && *base < address + size;
+        if self.spoilt.iter().any(within) {
+            let (pc, now) = (self.count.block, self.count.meter.cycles);
+            self.bus.read_spoilt(Touch { address, size, pc, now });
+        }
+    }
 }
 
 /// A Cortex-M4 on Unicorn.
@@ -81,6 +101,8 @@ pub struct UnicornCore<B: Bus + 'static = NoBus> {
     own: Vec<(u32, UcHookId)>,
     /// The hook of all of them.
     common: Option<UcHookId>,
+    /// The hook of reads of spoilt flash.
+    reads: Option<UcHookId>,
 }
 
 /// The engine as a hook sees it.
@@ -104,7 +126,8 @@ impl<B: Bus + 'static> UnicornCore<B> {
     /// Errors: as [`UnicornCore::new`].
     pub fn with_bus(memories: &[Memory], counted: &Counted<'_>, bus: B) -> Result<Self, CoreError> {
         let ranges = bus.ranges();
-        let inside = Inside { count: Count::new(counted), bus, marks: Vec::new() };
+        let inside =
+            Inside { count: Count::new(counted), bus, marks: Vec::new(), spoilt: Vec::new() };
         // The flag for the microcontroller profile would select another core.
         let new = Unicorn::new_with_data(Arch::ARM, Mode::THUMB, inside);
         let mut core = Self {
@@ -112,6 +135,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
             guards: Vec::new(),
             own: Vec::new(),
             common: None,
+            reads: None,
         };
         let model = core.engine.ctl_set_cpu_model(ArmCpuModel::CORTEX_M4 as i32);
         engine("select the core", model)?;
@@ -161,6 +185,52 @@ impl<B: Bus + 'static> UnicornCore<B> {
     pub fn is_guarded(&self, address: u32, bytes: u32) -> bool {
         let within = |(base, size): &(u32, u32)| address < base + size && *base < address + bytes;
         self.guards.iter().any(within)
+    }
+
+    /// Sets the places of flash, address and bytes, whose reads the bus is told of. Slow while
+    /// there are some: the engine calls a hook at every read.
+    /// Errors: [`CoreError::Engine`] if the engine refuses.
+    pub fn set_spoilt(&mut self, spoilt: Vec<(u32, u32)>) -> Result<(), CoreError> {
+        if self.engine.get_data().spoilt == spoilt {
+            return Ok(());
+        }
+        if let Some(hook) = self.reads.take() {
+            engine("remove a hook", self.engine.remove_hook(hook))?;
+        }
+        let first = spoilt.first().map(|(base, _)| *base);
+        let last = spoilt.last().map(|(base, size)| base + (size - 1));
+        self.engine.get_data_mut().spoilt = spoilt;
+        if let (Some(first), Some(last)) = (first, last) {
+            // A read that begins before such a place may reach into it.
+            let (first, kind) = (u64::from(first - 3), HookType::MEM_READ);
+            let read = self.engine.add_mem_hook(kind, first, last.into(), |uc, _, at, size, _| {
+                uc.get_data_mut().look_for_spoilt(at as u32, size as u32);
+                true
+            });
+            self.reads = Some(engine("hook reads", read)?);
+        }
+        // Translated code calls such a hook only if it was there.
+        engine("forget code", self.engine.ctl_flush_tb())
+    }
+
+    /// Counts what the flash's wait states cost from now on, see [`crate::accelerator`]. Slow: the
+    /// engine calls a hook at every read.
+    /// Errors: [`CoreError::Engine`] if the engine refuses.
+    pub fn count_waits(&mut self, flash: Memory) -> Result<(), CoreError> {
+        self.engine.get_data_mut().count.count_waits();
+        let (first, last) = (flash.base.into(), (flash.base + (flash.size - 1)).into());
+        let read = self.engine.add_mem_hook(HookType::MEM_READ, first, last, |uc, _, at, _, _| {
+            uc.get_data_mut().count.load(at as u32);
+            true
+        });
+        engine("hook reads", read)?;
+        // Translated code calls such a hook only if it was there.
+        engine("forget code", self.engine.ctl_flush_tb())
+    }
+
+    /// Cycles that the flash would have cost since [`UnicornCore::count_waits`].
+    pub fn waits(&self) -> u64 {
+        self.engine.get_data().count.waits()
     }
 
     /// Sets what the engine may use a page for. By default every page is code, and the engine

@@ -3,6 +3,7 @@
 use super::Machine;
 use crate::core::{Core, CoreError, Register};
 use crate::elf::FLASH;
+use crate::peripherals::flash::Wrong;
 
 impl Machine {
     /// Reads memory, as a debug probe does.
@@ -32,6 +33,22 @@ impl Machine {
     /// Errors: [`CoreError::Engine`] if nothing lies there.
     pub fn poke(&mut self, address: u32, bytes: &[u8]) -> Result<(), CoreError> {
         self.core.write(address, bytes)
+    }
+
+    /// Makes bits of the double word of flash at this address wrong: one, which the chip corrects,
+    /// or two, which also change in the memory.
+    /// Errors: [`CoreError::Engine`] if the engine fails.
+    pub fn spoil(&mut self, address: u32, wrong: Wrong) -> Result<(), CoreError> {
+        let address = address & !7;
+        if wrong == Wrong::Two {
+            let mut bytes = [0; 8];
+            self.core.read(address, &mut bytes)?;
+            // The lowest bit of the first word and of the second.
+            let flipped = u64::from_le_bytes(bytes) ^ (1 << 32 | 1);
+            self.core.write(address, &flipped.to_le_bytes())?;
+        }
+        self.chip_mut().flash.spoil(address, wrong);
+        self.core.set_spoilt(self.core.bus().flash.spoilt())
     }
 
     /// A register of the core.

@@ -44,7 +44,7 @@ impl Machine {
 
     /// Continues with the handler of an exception after so many cycles.
     fn start_handler(&mut self, number: u8, cycles: u64) -> Result<(), CoreError> {
-        let now = self.now();
+        let now = self.clock();
         self.core.pass(cycles);
         self.chip_mut().system.exceptions.enter(number);
         self.profile.enter(now);
@@ -57,7 +57,7 @@ impl Machine {
     pub(super) fn leave(&mut self, value: u32) -> Result<(), CoreError> {
         let now = self.now();
         let left = self.chip_mut().system.exceptions.leave(now);
-        self.profile.leave(now);
+        self.profile.leave(self.clock());
         if left == HARD_FAULT {
             self.core.set_register(Register::Faultmask, 0)?;
         }

@@ -9,6 +9,17 @@ pub struct Poll {
     pub began: u64,
     /// Its own cycles, without interrupts that preempted it.
     pub cycles: u64,
+    /// What the flash's wait states would have added to them, if that is counted.
+    pub waits: u64,
+}
+
+/// A time: textbook cycles, and the waits of the flash up to then.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Clock {
+    /// Cycles.
+    pub cycles: u64,
+    /// Waits.
+    pub waits: u64,
 }
 
 /// Polls of tasks, and sleep.
@@ -17,38 +28,47 @@ pub struct Profile {
     /// The current poll in thread mode and in each active exception.
     levels: Vec<Option<Poll>>,
     polls: Vec<Poll>,
-    /// Cycle up to which the time is booked.
-    booked: u64,
+    /// Time up to which everything is booked.
+    booked: Clock,
     asleep: bool,
     slept: u64,
 }
 
 impl Default for Profile {
     fn default() -> Self {
-        Self { levels: vec![None], polls: Vec::new(), booked: 0, asleep: false, slept: 0 }
+        Self {
+            levels: vec![None],
+            polls: Vec::new(),
+            booked: Clock::default(),
+            asleep: false,
+            slept: 0,
+        }
     }
 }
 
 impl Profile {
     /// Books the time since the last call on the running poll or on sleep.
-    fn book(&mut self, now: u64) {
-        let cycles = now.saturating_sub(self.booked);
-        self.booked = self.booked.max(now);
+    fn book(&mut self, now: Clock) {
+        let cycles = now.cycles.saturating_sub(self.booked.cycles);
+        let waits = now.waits.saturating_sub(self.booked.waits);
+        self.booked.cycles = self.booked.cycles.max(now.cycles);
+        self.booked.waits = self.booked.waits.max(now.waits);
         if self.asleep {
             self.slept += cycles;
         } else if let Some(Some(task)) = self.levels.last_mut() {
             task.cycles += cycles;
+            task.waits += waits;
         }
     }
 
     /// An exception is taken.
-    pub(super) fn enter(&mut self, now: u64) {
+    pub(super) fn enter(&mut self, now: Clock) {
         self.book(now);
         self.levels.push(None);
     }
 
     /// The exception that runs returns.
-    pub(super) fn leave(&mut self, now: u64) {
+    pub(super) fn leave(&mut self, now: Clock) {
         self.book(now);
         if self.levels.len() > 1 {
             self.levels.pop();
@@ -56,30 +76,30 @@ impl Profile {
     }
 
     /// A poll begins on the running level.
-    pub(super) fn begin(&mut self, task: usize, now: u64) {
+    pub(super) fn begin(&mut self, task: usize, now: Clock) {
         self.book(now);
         if let Some(level) = self.levels.last_mut() {
-            *level = Some(Poll { task, began: now, cycles: 0 });
+            *level = Some(Poll { task, began: now.cycles, cycles: 0, waits: 0 });
         }
     }
 
     /// The poll on the running level ends.
-    pub(super) fn end(&mut self, now: u64) {
+    pub(super) fn end(&mut self, now: Clock) {
         self.book(now);
         self.polls.extend(self.levels.last_mut().and_then(Option::take));
     }
 
-    pub(super) fn sleep(&mut self, now: u64) {
+    pub(super) fn sleep(&mut self, now: Clock) {
         self.book(now);
         self.asleep = true;
     }
 
-    pub(super) fn wake(&mut self, now: u64) {
+    pub(super) fn wake(&mut self, now: Clock) {
         self.book(now);
         self.asleep = false;
     }
 
-    pub(super) fn restart(&mut self, now: u64) {
+    pub(super) fn restart(&mut self, now: Clock) {
         self.book(now);
         self.levels = vec![None];
         self.asleep = false;
@@ -103,17 +123,19 @@ mod tests {
     #[test]
     fn a_task_is_not_charged_for_what_preempts_it() {
         let mut profile = Profile::default();
-        profile.begin(3, 100);
-        profile.enter(110);
-        profile.begin(7, 130);
-        profile.end(150);
-        profile.leave(160);
-        profile.end(170);
-        profile.sleep(180);
-        profile.wake(200);
+        // A wait in every ten cycles.
+        let at = |cycles| Clock { cycles, waits: cycles / 10 };
+        profile.begin(3, at(100));
+        profile.enter(at(110));
+        profile.begin(7, at(130));
+        profile.end(at(150));
+        profile.leave(at(160));
+        profile.end(at(170));
+        profile.sleep(at(180));
+        profile.wake(at(200));
         let polls = profile.take_polls();
-        assert_eq!(polls[0], Poll { task: 7, began: 130, cycles: 20 });
-        assert_eq!(polls[1], Poll { task: 3, began: 100, cycles: 20 });
+        assert_eq!(polls[0], Poll { task: 7, began: 130, cycles: 20, waits: 2 });
+        assert_eq!(polls[1], Poll { task: 3, began: 100, cycles: 20, waits: 2 });
         assert!(profile.take_polls().is_empty());
         assert_eq!(profile.slept(), 20);
     }

@@ -12,6 +12,7 @@
 //! "Data cache might be corrupted during Flash memory read-while-write operation". Dual bank as
 //! delivered; with the option bit `DBANK` cleared a page has 4 KiB and there is no second bank.
 
+mod ecc;
 mod power;
 #[cfg(test)]
 mod tests;
@@ -19,6 +20,8 @@ mod tests;
 use super::registers::{Kept, Registers};
 use super::{HZ, Peripheral, Write};
 
+use ecc::Ecc;
+pub use ecc::Wrong;
 pub use power::Cut;
 
 const ACR: u32 = 0x00;
@@ -33,10 +36,6 @@ const DATA_CACHE: u32 = 1 << 10;
 const DATA_CACHE_RESET: u32 = 1 << 12;
 /// Of the option register: two banks.
 const DBANK: u32 = 1 << 22;
-/// Of the ECC register: two wrong bits in a double word were read; address in bits 0 to 18.
-const TWO_WRONG_BITS: u32 = 1 << 31;
-/// Its interrupt for one wrong bit, which this flash never has.
-const ONE_WRONG_INTERRUPT: u32 = 1 << 24;
 
 const LOCK: u32 = 1 << 31;
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
@@ -134,8 +133,7 @@ pub struct Flash {
     wanted: Option<(u32, [u8; 8])>,
     operation: Option<Operation>,
     finished: Option<Change>,
-    /// ECC register.
-    ecc: u32,
+    ecc: Ecc,
     /// One bank, by an option byte.
     single_bank: bool,
     /// An operation has changed what the data cache may hold.
@@ -159,7 +157,7 @@ impl Default for Flash {
             wanted: None,
             operation: None,
             finished: None,
-            ecc: 0,
+            ecc: Ecc::default(),
             single_bank: false,
             stale: false,
             cache_hazards: 0,
@@ -259,16 +257,6 @@ impl Flash {
         self.registers.set(OPTR, options | if single { 0 } else { DBANK });
     }
 
-    /// A read has found two wrong bits in the double word at this address.
-    pub const fn find_two_wrong_bits(&mut self, address: u32) {
-        self.ecc = TWO_WRONG_BITS | (address - BASE) >> 3 & 0x7_FFFF;
-    }
-
-    /// Whether two wrong bits are reported and not yet cleared.
-    pub const fn has_two_wrong_bits(&self) -> bool {
-        self.ecc & TWO_WRONG_BITS != 0
-    }
-
     fn write_access(&mut self, write: Write) -> Option<()> {
         let before = self.caches_data();
         self.registers.write(ACR, write)?;
@@ -322,7 +310,7 @@ impl Peripheral for Flash {
         match offset {
             SR => Some(self.flags | if self.is_busy() { BUSY } else { 0 }),
             CR => Some(self.control),
-            ECCR => Some(self.ecc),
+            ECCR => Some(self.ecc.register),
             _ => self.registers.read(offset),
         }
     }
@@ -339,11 +327,7 @@ impl Peripheral for Flash {
             }
             SR => self.flags &= !write.ones(),
             ACR => self.write_access(write)?,
-            ECCR => {
-                let interrupt = write.onto(self.ecc) & ONE_WRONG_INTERRUPT;
-                self.ecc &= !(write.ones() & TWO_WRONG_BITS) & !ONE_WRONG_INTERRUPT;
-                self.ecc |= interrupt;
-            }
+            ECCR => self.ecc.write(write),
             CR => self.write_control(write, now)?,
             _ => self.registers.write(offset, write)?,
         }
@@ -361,6 +345,7 @@ impl Peripheral for Flash {
             && !self.is_interrupted()
         {
             self.operation = None;
+            self.written(operation.change);
             self.finished = Some(operation.change);
             if self.control & END_INTERRUPT != 0 {
                 self.flags |= END;

@@ -8,9 +8,10 @@ const RLR: u32 = 0x08;
 const SR: u32 = 0x0C;
 const WINR: u32 = 0x10;
 
-/// Nominal frequency of its oscillator, Hz; the chip's may be 4 % off (29.5 to 34 kHz
-/// over temperature).
-const LSI_HZ: u64 = 32_000;
+/// Nominal frequency of its oscillator, Hz.
+pub const LSI_HZ: u64 = 32_000;
+/// The chip's own, over temperature and supply, Hz. Source: DS12288, LSI characteristics.
+pub const LSI_RANGE_HZ: [u64; 2] = [29_500, 34_000];
 
 /// Periods of its oscillator after which a written prescaler or reload value acts.
 const UPDATE: u64 = 5;
@@ -29,10 +30,10 @@ impl Time {
     /// After reset: the longest time of the fastest prescaler, 512 ms.
     const RESET: Self = Self { prescaler: 0, reload: 0xFFF };
 
-    /// Core cycles.
-    fn cycles(self) -> u64 {
+    /// Core cycles, with the oscillator at this frequency.
+    fn cycles(self, lsi_hz: u64) -> u64 {
         let divider = 4_u64 << self.prescaler.min(6);
-        (u64::from(self.reload) + 1) * divider * HZ / LSI_HZ
+        (u64::from(self.reload) + 1) * divider * HZ / lsi_hz
     }
 }
 
@@ -52,6 +53,8 @@ pub struct Iwdg {
     /// Cycle at which it expires, once started.
     expires: u64,
     started: bool,
+    /// Frequency of its oscillator, Hz.
+    lsi_hz: u64,
 }
 
 impl Default for Iwdg {
@@ -64,14 +67,26 @@ impl Default for Iwdg {
             open: false,
             expires: u64::MAX,
             started: false,
+            lsi_hz: LSI_HZ,
         }
     }
 }
 
 impl Iwdg {
+    /// Sets the frequency of its oscillator, Hz, before it is started.
+    pub const fn set_oscillator(&mut self, lsi_hz: u64) {
+        self.lsi_hz = lsi_hz;
+    }
+
+    /// After a reset of the chip: as it came up, with the same oscillator.
+    #[must_use]
+    pub fn after_reset(&self) -> Self {
+        Self { lsi_hz: self.lsi_hz, ..Self::default() }
+    }
+
     /// Core cycles from a refresh to expiry.
     pub fn timeout(&self) -> u64 {
-        self.acting.cycles()
+        self.acting.cycles(self.lsi_hz)
     }
 
     /// Stands still for so many cycles.
@@ -107,15 +122,15 @@ impl Iwdg {
     fn start(&mut self, now: u64) {
         if !self.started {
             self.started = true;
-            self.updated = now + UPDATE * HZ / LSI_HZ;
-            self.expires = now + Time::RESET.cycles();
+            self.updated = now + UPDATE * HZ / self.lsi_hz;
+            self.expires = now + Time::RESET.cycles(self.lsi_hz);
         }
     }
 
     fn set(&mut self, written: Time, now: u64) {
         self.settle(now);
         self.written = written;
-        self.updated = now + UPDATE * HZ / LSI_HZ;
+        self.updated = now + UPDATE * HZ / self.lsi_hz;
     }
 
     fn updates(&self, now: u64) -> bool {

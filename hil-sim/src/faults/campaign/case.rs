@@ -15,6 +15,9 @@ const STORM_S: f64 = 0.25;
 /// Duration of random commands, s.
 const COMMANDS_S: f64 = 1.0;
 
+/// Times for which a debugger halts the core, ms: a read of memory, an attachment, a look.
+const HALTS_MS: [f64; 4] = [5.0, 1.0, 50.0, 500.0];
+
 /// A fault of the matrix.
 #[derive(Clone, Copy, Debug)]
 pub enum Case {
@@ -127,6 +130,7 @@ impl Case {
             Kind::Stuck if entry.target.is_hardware() && !entry.unit.is_empty() => {
                 [entry.magnitude, 0.0, 12_000.0, 65_535.0][instant % 4]
             }
+            Kind::Halted => HALTS_MS[instant % 4],
             _ => entry.magnitude,
         }
     }
@@ -145,7 +149,9 @@ impl Case {
             Kind::BitErrors if stored && instant % 4 == 1 => {
                 random.random_range(0..sets::seal_bits())
             }
-            Kind::BitErrors => random.random_range(0..sets::bits(set.len(), stored)),
+            Kind::BitErrors | Kind::TwoWrongBits => {
+                random.random_range(0..sets::bits(set.len(), stored))
+            }
             _ => random.random_range(1..=sets::operations(set.len())),
         };
         Some(f64::from(number))
@@ -159,7 +165,10 @@ impl Case {
             Self::Injected(entry) => {
                 let mut at_s = twin.instant(instant, &mut random);
                 let mut magnitude = Self::magnitude(entry, instant);
-                if entry.target.is_of_sets() {
+                if entry.target == Target::OptionBytes {
+                    // The chip loads them at its start.
+                    at_s = 0.0;
+                } else if entry.target.is_of_sets() {
                     magnitude = Self::measure(entry, base, instant, &mut random).unwrap_or(1.0);
                     // One of three before the board starts.
                     at_s = if instant.is_multiple_of(3) { 0.0 } else { at_s };

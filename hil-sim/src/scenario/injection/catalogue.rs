@@ -68,8 +68,9 @@ fn distorted(
 }
 
 /// Faults of a motor and its bridge.
-fn actuator(target: Target) -> [Entry; 6] {
+fn actuator(target: Target) -> [Entry; 7] {
     let weak = "gives this part of its duty, its bridge being sound";
+    let regulates = "regulates its current to that of this duty at standstill";
     let runaway = "takes this duty whatever is asked while its bridge is on, in the bridge";
     [
         plain(target, Kind::Stalled, "gives no force, its bridge being sound"),
@@ -78,6 +79,7 @@ fn actuator(target: Target) -> [Entry; 6] {
         plain(target, Kind::Reversed, "turns the other way, in the bridge"),
         delayed(target, 0.1, "acts this much later, in the bridge"),
         one(target, Kind::Runaway, 1.0, (-1.0, 1.0), "duty", runaway),
+        one(target, Kind::Regulating, 0.5, (0.0, 1.0), "duty", regulates),
     ]
 }
 
@@ -132,6 +134,11 @@ const CUT: &str = "power goes in the middle of an operation of the flash";
 const PULLED: &str = "the reset pin is pulled in the middle of an operation of the flash";
 const CAUGHT: &str = "is caught in a loop in one of its turns";
 
+const CORRECTED: &str = "the double word of a bit has one that is wrong, and corrected";
+const REPORTED: &str = "the double word of a bit has two that are wrong";
+/// Bits of the image, and more.
+const IN_IMAGE: (f64, f64) = (0.0, 1_048_575.0);
+
 /// By its number from the beginning; of the image's, from behind its last bit on again.
 const fn turned(target: Target) -> Entry {
     one(target, Kind::BitErrors, 1000.0, (0.0, 32_767.0), "from its first", TURNED)
@@ -139,12 +146,15 @@ const fn turned(target: Target) -> Entry {
 
 /// Those of the board itself, in the order of the matrix.
 pub const HARDWARE: &[Entry] = {
-    use Kind::{BitErrors, Flooding, Gone, Hung, Off, Reset, Stalled, Stuck, Torn, Weak};
+    use Kind::{
+        BitErrors, Disturbed, Flooding, Gone, Halted, Hung, Off, OneWrongBit, Reset, Shorted,
+        Stalled, Stuck, Torn, TwoWrongBits, Weak,
+    };
     use Target::{
         AngleBus, ArmAngleTask, CompressionSensorTask, Debugger, Dma, EncoderLineA, EncoderLineB,
-        HostLine, Image, ImageSet, Interrupt, JournalTask, LineTask, ModelTask, ParameterSave,
-        PreloadSensorConverter, PreloadSensorTask, Processor, ResetPin, SpareSet, StoredSet,
-        Supply, TickTask, Timer, TreadConverter, WheelEncoderTask,
+        HostLine, Image, ImageSet, Interrupt, JournalTask, LineTask, Magnet, ModelTask,
+        OptionBytes, ParameterSave, PreloadSensorConverter, PreloadSensorTask, Processor, ResetPin,
+        SpareSet, StopWire, StoredSet, Supply, TickTask, Timer, TreadConverter, WheelEncoderTask,
     };
     &[
         one(PreloadSensorConverter, Stuck, 30_000.0, (0.0, 65_535.0), "of 65535", GIVES),
@@ -174,9 +184,19 @@ pub const HARDWARE: &[Entry] = {
         turned(StoredSet),
         turned(SpareSet),
         turned(ImageSet),
-        one(Image, BitErrors, 100_000.0, (0.0, 1_048_575.0), "from its first", TURNED),
+        one(Image, BitErrors, 100_000.0, IN_IMAGE, "from its first", TURNED),
         one(ParameterSave, Torn, 100.0, (1.0, 10_000.0), "from its first", CUT),
         one(ParameterSave, Reset, 100.0, (1.0, 10_000.0), "from its first", PULLED),
+        plain(AngleBus, Disturbed, "one frame misses a clock edge"),
+        plain(Magnet, Gone, "has come off"),
+        plain(StopWire, Off, "is torn"),
+        plain(StopWire, Shorted, "is shorted to ground, and the button cuts the motors' supply"),
+        one(Debugger, Halted, 50.0, (1.0, 1000.0), "ms", "halts the core for so long"),
+        one(Image, OneWrongBit, 100_000.0, IN_IMAGE, "from its first", CORRECTED),
+        one(Image, TwoWrongBits, 100_000.0, IN_IMAGE, "from its first", REPORTED),
+        one(StoredSet, TwoWrongBits, 1000.0, (0.0, 32_767.0), "from its first", REPORTED),
+        one(SpareSet, TwoWrongBits, 1000.0, (0.0, 32_767.0), "from its first", REPORTED),
+        plain(OptionBytes, Off, "make one bank of the flash"),
     ]
 };
 

@@ -94,6 +94,12 @@ pub enum Target {
     ParameterSave,
     /// The image in flash, after its first start.
     Image,
+    /// Magnet of the arm angle sensor.
+    Magnet,
+    /// Wire of the emergency stop.
+    StopWire,
+    /// Option bytes of the chip.
+    OptionBytes,
 }
 
 /// How it breaks.
@@ -148,6 +154,18 @@ pub enum Kind {
     Reset,
     /// Starts again with its record.
     Recorded,
+    /// Regulates its current.
+    Regulating,
+    /// Misses a clock edge.
+    Disturbed,
+    /// Has one wrong bit, which is corrected.
+    OneWrongBit,
+    /// Has two wrong bits, which are reported.
+    TwoWrongBits,
+    /// Halts the core.
+    Halted,
+    /// Is shorted.
+    Shorted,
 }
 
 /// The name of a word of the scenario.
@@ -182,7 +200,8 @@ impl Target {
     #[must_use]
     pub const fn resets_board(self, kind: Kind) -> bool {
         match self {
-            Self::ResetPin | Self::Debugger | Self::Processor => true,
+            Self::ResetPin | Self::Processor => true,
+            Self::Debugger => matches!(kind, Kind::Reset),
             Self::Supply => !matches!(kind, Kind::Weak),
             _ => false,
         }
@@ -192,6 +211,12 @@ impl Target {
     #[must_use]
     pub const fn is_of_sets(self) -> bool {
         matches!(self, Self::StoredSet | Self::SpareSet | Self::ImageSet | Self::ParameterSave)
+    }
+
+    /// Whether it is memory that is read at a start.
+    #[must_use]
+    pub const fn is_of_start(self) -> bool {
+        self.is_of_sets() || matches!(self, Self::OptionBytes)
     }
 
     /// Whether a fault of it changes forces or motion of the plant directly.
@@ -207,7 +232,8 @@ impl Kind {
     /// puts out another duty than it was given. The others lie behind: in motor and gear.
     #[must_use]
     pub const fn is_in_bridge(self) -> bool {
-        matches!(self, Self::Stuck | Self::Reversed | Self::Delayed | Self::Runaway)
+        use Kind::{Delayed, Regulating, Reversed, Runaway, Stuck};
+        matches!(self, Stuck | Reversed | Delayed | Runaway | Regulating)
     }
 
     /// Its name in scenarios.

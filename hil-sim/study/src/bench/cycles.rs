@@ -53,6 +53,28 @@ pub struct Tick {
     pub mean: f64,
     /// The costliest tick.
     pub worst: u64,
+    /// Its task in the firmware.
+    pub firmware: Firmware,
+}
+
+/// Cycles of the control tick's task in the firmware, over a deployment.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Firmware {
+    /// Mean textbook cycles.
+    pub mean: f64,
+    /// Most textbook cycles.
+    pub worst: u64,
+    /// With the flash's wait states.
+    pub with_waits: WithWaits,
+}
+
+/// Cycles with the flash's wait states.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WithWaits {
+    /// Mean.
+    pub mean: f64,
+    /// Most.
+    pub worst: u64,
 }
 
 /// Starts the emulated core, which is built first if need be.
@@ -63,6 +85,7 @@ pub fn run() -> Result<Measured> {
     #[derive(Deserialize)]
     struct TickCost {
         tick: Cost,
+        firmware: Firmware,
     }
     let binary = featured(Extra::Board)?;
     let name = format!("rig-study-{}.json", std::process::id());
@@ -74,9 +97,9 @@ pub fn run() -> Result<Measured> {
     let mut calls: Vec<Calls> = done?;
     let built = calls.remove(0);
     ensure!(built.values == [1], "the core cannot build the models");
-    let TickCost { tick } = start(&binary, &[])?;
+    let TickCost { tick, firmware } = start(&binary, &[])?;
     let mean = tick.cycles as f64 / tick.calls.max(1) as f64;
-    Ok((calls, Tick { mean, worst: tick.max }))
+    Ok((calls, Tick { mean, worst: tick.max, firmware }))
 }
 
 /// Runs `rig-board cycles` with these arguments.

@@ -109,7 +109,13 @@ fn model_table(report: &Report) -> String {
     });
     let head = ["reduced model", "max error", "RMS error", "cycles", "host ns"];
     let tick = report.tick.map_or_else(String::new, |tick| {
-        format!("control tick: {:.0} cycles on average, {} at most\n", tick.mean, tick.worst)
+        let (task, waits) = (tick.firmware, tick.firmware.with_waits);
+        let line = |what: &str, mean: f64, worst: u64| {
+            format!("{what}: {mean:.0} cycles on average, {worst} at most\n")
+        };
+        line("control tick", tick.mean, tick.worst)
+            + &line("its task in the firmware", task.mean, task.worst)
+            + &line("the same with the flash's wait states", waits.mean, waits.worst)
     });
     format!("{}\n{tick}\n", plain(&head, rows))
 }
@@ -148,7 +154,7 @@ fn page(report: &Report) -> String {
     let mut text = format!(
         "# Performance\n\nWritten by `cargo rig bench --peers --docs`; do not edit.\n\n\
          Run time against error. Times are processor time of one thread on {machine}, the least of several runs. \
-         Cycles are textbook Cortex-M4 cycles of the emulated core, without flash wait states. Errors and cycles do \
+         Cycles are textbook Cortex-M4 cycles of the emulated core, without flash wait states unless they are named. Errors and cycles do \
          not depend on the machine, and tests hold them.\n\n\
          ![Error against cycles of the reduced model, and against time of the plant](figures/performance.svg)\n\n\
          ## Reduced model\n\n\

@@ -3,6 +3,7 @@
 use std::collections::HashSet;
 
 use super::{Counted, Meter, Stop};
+use crate::accelerator::{Accelerator, WORD};
 use crate::thumb::{self, Kind};
 use crate::timing::{self, REFILL};
 
@@ -46,7 +47,14 @@ pub(super) struct Count {
     pub(super) limit: u64,
     /// Why a hook stopped the engine.
     pub(super) stop: Option<Stop>,
+    /// The flash's interface, if its waits are counted.
+    pub(super) flash: Option<Accelerator>,
+    /// Double words of the block that begins at a halfword, and the cycles spent in each.
+    words: Vec<Option<Words>>,
 }
+
+/// Addresses of double words, and the cycles spent in each.
+type Words = Box<[(u32, u16)]>;
 
 impl Count {
     pub(super) fn new(counted: &Counted<'_>) -> Self {
@@ -78,6 +86,59 @@ impl Count {
             meter: Meter::default(),
             limit: u64::MAX,
             stop: None,
+            flash: None,
+            words: Vec::new(),
+        }
+    }
+
+    /// Counts the waits of the flash from now on.
+    pub(super) fn count_waits(&mut self) {
+        self.flash = Some(Accelerator::default());
+        self.words = vec![None; self.bytes.len() / 2];
+    }
+
+    /// Cycles that the flash would have cost so far.
+    pub(super) fn waits(&self) -> u64 {
+        self.flash.as_ref().map_or(0, |flash| flash.waits)
+    }
+
+    /// The core executes this block, now.
+    fn fetch(&mut self, address: u32, size: u32) {
+        let at = self.halfword(address);
+        let Some(flash) = &mut self.flash else { return };
+        let Some(words) = self.words.get_mut(at) else { return };
+        let bytes = &self.bytes;
+        let words = words.get_or_insert_with(|| {
+            let mut words: Vec<(u32, u16)> = Vec::new();
+            let code = bytes.get(2 * at..2 * at + size as usize).unwrap_or_default();
+            for (place, instruction, _) in thumb::sweep(code, address) {
+                let word = place & !(WORD - 1);
+                if words.last().is_none_or(|(last, _)| *last != word) {
+                    words.push((word, 0));
+                }
+                if let Some((_, cycles)) = words.last_mut() {
+                    *cycles += 1 + timing::extra(instruction.kind) as u16;
+                }
+                // An instruction may reach into the next double word.
+                let last = (place + instruction.size - 1) & !(WORD - 1);
+                if last != word {
+                    words.push((last, 0));
+                }
+            }
+            words.into()
+        });
+        let mut now = self.meter.cycles;
+        for (word, cycles) in words {
+            flash.execute(*word, now);
+            now += u64::from(*cycles);
+        }
+    }
+
+    /// The program reads data at this address.
+    pub(super) fn load(&mut self, address: u32) {
+        let now = self.meter.cycles;
+        if let Some(flash) = &mut self.flash {
+            flash.load(address, now);
         }
     }
 
@@ -105,6 +166,9 @@ impl Count {
             self.spend(REFILL);
         }
         (self.block, self.next) = (address, address.wrapping_add(size));
+        if self.flash.is_some() {
+            self.fetch(address, size);
+        }
         self.meter.instructions += u64::from(block.instructions);
         self.spend(block.cycles.into());
     }

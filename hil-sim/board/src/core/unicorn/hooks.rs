@@ -43,6 +43,10 @@ impl<B: Bus + 'static> UnicornCore<B> {
             if block.marked {
                 note(uc, at);
             }
+            let inside = uc.get_data_mut();
+            if !inside.spoilt.is_empty() {
+                inside.look_for_spoilt(at, size);
+            }
         });
         engine("hook blocks", blocks)?;
         let traps = uc.add_intr_hook(|uc, number| {
@@ -197,7 +201,8 @@ fn halt<B>(uc: &mut Hooked<'_, B>, stop: Stop) {
 fn note<B>(uc: &mut Hooked<'_, B>, address: u32) {
     let r0 = uc.reg_read(RegisterARM::R0).unwrap_or_default() as u32;
     let inside = uc.get_data_mut();
-    inside.marks.push(Mark { cycles: inside.count.meter.cycles, address, r0 });
+    let (cycles, waits) = (inside.count.meter.cycles, inside.count.waits());
+    inside.marks.push(Mark { cycles, waits, address, r0 });
 }
 
 /// Whether the masks let an exception of this priority through.

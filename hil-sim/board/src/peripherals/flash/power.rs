@@ -53,7 +53,7 @@ impl Flash {
     }
 
     /// A reset. A current operation is left half done: the lower word of a double word, the
-    /// first half of a page or bank.
+    /// first half of a page or bank. The error correction finds the rest undefined.
     pub fn reset(&mut self) -> Option<Change> {
         let over = self.finished;
         let torn = self.operation.map(|operation| match operation.change {
@@ -63,10 +63,14 @@ impl Flash {
             }
             Change::Erased { address, size } => Change::Erased { address, size: size / 2 },
         });
+        if let Some(operation) = self.operation {
+            self.torn(operation.change);
+        }
         let cut = self.cut.filter(|_| !self.ends);
         let (begun, cache_hazards) = (self.begun, self.cache_hazards);
         let single_bank = self.single_bank;
-        *self = Self { begun, cache_hazards, cut, ..Self::default() };
+        let ecc = self.ecc.after_reset();
+        *self = Self { begun, cache_hazards, cut, ecc, ..Self::default() };
         self.set_single_bank(single_bank);
         over.or(torn)
     }

@@ -228,10 +228,51 @@ fn with_one_bank_a_page_has_four_kibibytes_and_the_bank_s_bit_no_meaning() {
 }
 
 #[test]
-fn two_wrong_bits_are_reported_until_they_are_cleared() {
+fn wrong_bits_are_reported_by_a_read_until_they_are_cleared() {
     let mut flash = Flash::default();
-    flash.find_two_wrong_bits(PLACE + 16);
-    assert_eq!(flash.read(ECCR, 0), Some(TWO_WRONG_BITS | (BANK_BYTES + 16) >> 3));
-    write(&mut flash, ECCR, TWO_WRONG_BITS, 0);
+    flash.spoil(PLACE + 16, Wrong::Two);
+    assert!(!flash.read_memory(PLACE + 12, 4) && !flash.read_memory(PLACE + 24, 4));
+    assert!(flash.read_memory(PLACE + 14, 4), "it reaches into the double word");
+    assert_eq!(flash.read(ECCR, 0), Some(ecc::TWO | ecc::BANK | 2));
+    assert!(!flash.read_memory(PLACE + 16, 4), "one report until it is cleared");
+    write(&mut flash, ECCR, ecc::TWO, 0);
     assert!(!flash.has_two_wrong_bits());
+    flash.reset();
+    assert!(flash.read_memory(PLACE + 16, 1), "the memory keeps them");
+}
+
+#[test]
+fn one_wrong_bit_is_corrected_and_noted() {
+    const ONE: u32 = 1 << 30;
+    let mut flash = Flash::default();
+    flash.spoil(BASE + 24, Wrong::One);
+    assert!(!flash.read_memory(BASE + 24, 4));
+    assert_eq!(flash.read(ECCR, 0), Some(ONE | 3));
+    write(&mut flash, ECCR, ONE, 0);
+    assert_eq!(flash.read(ECCR, 0).map(|ecc| ecc & (ONE | ecc::TWO)), Some(0));
+}
+
+#[test]
+fn what_loses_its_power_in_a_write_has_wrong_bits_until_it_is_erased() {
+    let mut flash = programming();
+    flash.store(PLACE, 4, 1);
+    flash.store(PLACE + 4, 4, 2);
+    flash.found(ERASED, 0);
+    assert!(flash.reset().is_some());
+    assert_eq!(flash.spoilt(), [(PLACE, 8)]);
+    let mut erasing = |cut: bool| {
+        for key in KEYS {
+            write(&mut flash, KEYR, key, 0);
+        }
+        write(&mut flash, CR, PAGE | SECOND_BANK | START, 0);
+        if cut {
+            flash.reset();
+        } else {
+            flash.advance(ERASE_CYCLES);
+            flash.take_change();
+        }
+        flash.spoilt()
+    };
+    assert_eq!(erasing(true), [(PLACE + PAGE_BYTES / 2, PAGE_BYTES / 2)]);
+    assert_eq!(erasing(false), []);
 }

@@ -1,0 +1,129 @@
+//! Error correction: double words whose bits are wrong, and what a read of them reports.
+//!
+//! Each double word has eight bits of correction. One wrong bit is corrected, two are reported by
+//! the NMI, and the data comes as it is. A double word whose write lost its power has correction
+//! bits that do not fit it; so have those of a page whose erasing was interrupted.
+//!
+//! Source: RM0440, 3.3.2 (error code correction) and 3.7.7 (`FLASH_ECCR`).
+
+use std::collections::BTreeMap;
+
+use super::{BANK_BYTES, BASE, Change, Flash, Write};
+
+/// Bytes that are corrected together.
+const WORD: u32 = 8;
+
+/// Of the ECC register: two wrong bits in a double word were read, or one, which was corrected;
+/// bank and place of the double word; the interrupt for one.
+pub(super) const TWO: u32 = 1 << 31;
+const ONE: u32 = 1 << 30;
+pub(super) const BANK: u32 = 1 << 21;
+const ONE_INTERRUPT: u32 = 1 << 24;
+
+/// How many bits of a double word are wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wrong {
+    /// One, which is corrected.
+    One,
+    /// Two, which are reported.
+    Two,
+    /// Two of those that are for correction: the data is right, and they are reported too.
+    Check,
+}
+
+/// Double words with wrong bits, by their addresses, and the register.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Ecc {
+    words: BTreeMap<u32, Wrong>,
+    pub(super) register: u32,
+}
+
+impl Ecc {
+    /// Forgets the double words of a range, which is written again.
+    fn forget(&mut self, address: u32, size: u32) {
+        self.words.retain(|at, _| !(address..address + size).contains(at));
+    }
+
+    /// The memory as it is, and the register cleared.
+    pub(super) fn after_reset(&mut self) -> Self {
+        Self { words: std::mem::take(&mut self.words), register: 0 }
+    }
+
+    /// An access to its register.
+    pub(super) const fn write(&mut self, write: Write) {
+        let interrupt = write.onto(self.register) & ONE_INTERRUPT;
+        self.register &= !(write.ones() & (TWO | ONE)) & !ONE_INTERRUPT;
+        self.register |= interrupt;
+    }
+
+    /// Bits were found wrong in the double word at this address; the first report stays until it
+    /// is cleared.
+    fn report(&mut self, address: u32, wrong: Wrong) {
+        if self.register & TWO != 0 || wrong == Wrong::One && self.register & ONE != 0 {
+            return;
+        }
+        let (bank, place) = match address - BASE {
+            offset if offset < BANK_BYTES => (0, offset),
+            offset => (BANK, offset - BANK_BYTES),
+        };
+        let flag = if wrong == Wrong::One { ONE } else { TWO };
+        self.register &= ONE_INTERRUPT | ONE;
+        self.register |= flag | bank | (place / WORD);
+    }
+}
+
+impl Flash {
+    /// Makes bits of the double word at this address wrong, until it is erased.
+    pub fn spoil(&mut self, address: u32, wrong: Wrong) {
+        self.ecc.words.insert(address & !(WORD - 1), wrong);
+    }
+
+    /// Double words with wrong bits: first address and bytes of each run of them.
+    pub fn spoilt(&self) -> Vec<(u32, u32)> {
+        let mut runs: Vec<(u32, u32)> = Vec::new();
+        for &at in self.ecc.words.keys() {
+            match runs.last_mut() {
+                Some((first, bytes)) if *first + *bytes == at => *bytes += WORD,
+                _ => runs.push((at, WORD)),
+            }
+        }
+        runs
+    }
+
+    /// The core reads these bytes; returns whether two wrong bits were found, which is an NMI.
+    pub fn read_memory(&mut self, address: u32, size: u32) -> bool {
+        let from = address & !(WORD - 1);
+        let found = self.ecc.words.range(from..address.saturating_add(size));
+        let found: Vec<(u32, Wrong)> = found.map(|(at, wrong)| (*at, *wrong)).collect();
+        let before = self.ecc.register & TWO;
+        for (at, wrong) in found {
+            self.ecc.report(at, wrong);
+        }
+        self.ecc.register & TWO != before
+    }
+
+    /// Whether two wrong bits are reported and not yet cleared.
+    pub const fn has_two_wrong_bits(&self) -> bool {
+        self.ecc.register & TWO != 0
+    }
+
+    /// A change of the memory is done.
+    pub(super) fn written(&mut self, change: Change) {
+        match change {
+            Change::Programmed { address, .. } => self.ecc.forget(address, WORD),
+            Change::Erased { address, size } => self.ecc.forget(address, size),
+        }
+    }
+
+    /// A change of the memory was interrupted: of an erasure the second half is undefined.
+    pub(super) fn torn(&mut self, change: Change) {
+        match change {
+            Change::Programmed { address, .. } => self.spoil(address, Wrong::Two),
+            Change::Erased { address, size } => {
+                self.ecc.forget(address, size);
+                let rest = address + size / 2..address + size;
+                rest.step_by(WORD as usize).for_each(|at| self.spoil(at, Wrong::Two));
+            }
+        }
+    }
+}

@@ -1,0 +1,47 @@
+//! What a lost supply left half written, made readable before the drive runs.
+//!
+//! The chip's error correction reports such double words whenever they are read, and once the
+//! drive runs it then cuts the bridges.
+
+use super::{Damaged, Draft, PAGE_BYTES, Refusal, SLOT_BYTES, SetMemory, Slot, WORD_BYTES, stored};
+
+/// Erases what cannot be read. A set in force that is intact, though a part of its slot is not,
+/// is saved again first. A damaged set in force stays as it is: the start reports it.
+///
+/// # Errors
+/// [`Refusal`] if the set cannot be saved again, or the flash failed.
+pub async fn mend(memory: &mut impl SetMemory) -> Result<(), Refusal> {
+    let torn = |memory: &_, slot| !SetMemory::is_readable(memory, slot);
+    let in_force = match stored(memory) {
+        Ok(found) => found.map(|stored| (stored.slot, stored.set.len())),
+        Err(Damaged(_)) => return Ok(()),
+    };
+    if let Some((slot, length)) = in_force
+        && torn(memory, slot)
+    {
+        save_again(memory, slot, length).await?;
+    }
+    let in_force = stored(memory)?.map(|stored| stored.slot);
+    for slot in [Slot::A, Slot::B] {
+        if in_force != Some(slot) && torn(memory, slot) {
+            for page in 0..SLOT_BYTES / PAGE_BYTES {
+                memory.erase(slot, page).await?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Saves the set in force, which is in this slot, into the other one.
+async fn save_again(memory: &mut impl SetMemory, slot: Slot, length: usize) -> Result<(), Refusal> {
+    let mut draft = Draft::begin(memory, length).await?;
+    while draft.missing() > 0 {
+        let from = super::PREFIX + length - draft.missing();
+        let part = draft.missing().min(WORD_BYTES);
+        let mut word = [0xFF; WORD_BYTES];
+        let bytes = memory.bytes(slot).get(from..from + part).ok_or(Refusal::Length)?;
+        word.iter_mut().zip(bytes).for_each(|(to, byte)| *to = *byte);
+        draft.append(memory, word.get(..part).unwrap_or_default()).await?;
+    }
+    draft.seal(memory).await
+}
