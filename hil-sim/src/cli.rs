@@ -17,6 +17,7 @@ mod flash;
 mod identify;
 mod keys;
 pub mod live;
+mod log_files;
 mod montecarlo;
 pub mod output;
 pub mod params;
