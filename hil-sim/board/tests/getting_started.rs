@@ -51,19 +51,13 @@ fn run(place: &Path, arguments: &[&str]) -> String {
     printed
 }
 
-/// As the page says it, with the emulated board for the probe's; a view without a terminal. What
-/// the emulated board runs with are the parameters that it holds.
+/// As the page says it, with the emulated board for the probe's; a view without a terminal.
 #[cfg(unix)]
 fn follow(place: &Path, command: &str) -> String {
     let on_board = command.replace("--target probe", "--target board");
     let mut arguments: Vec<&str> = on_board.split_whitespace().collect();
-    let runs = ["live", "capture"].contains(&arguments[0]) && on_board.contains("--target board");
     if arguments[0] == "live" {
         arguments.extend(["--headless", "--fast", "--listen", "127.0.0.1:0"]);
-    }
-    if runs {
-        run(place, &["params", "save", "held.toml", "--target", "board"]);
-        arguments.extend(["--scenario", "held.toml"]);
     }
     run(place, &arguments)
 }
