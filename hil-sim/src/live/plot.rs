@@ -48,8 +48,6 @@ pub(super) struct Plot {
     least: f64,
     /// Later ones are drawn on top.
     curves: &'static [Curve],
-    /// How many of the first curves the axis has to show completely.
-    fitted: usize,
 }
 
 /// Every plot; a small terminal shows the first four.
@@ -61,7 +59,6 @@ pub(super) const PLOTS: [Plot; 6] = [
             ("wanted", Color::Gray, Look::Line, |row| row.seen.speed_ref_mm_s),
             ("measured", Color::Cyan, Look::Line, |row| row.seen.wheel_speed_mm_s),
         ],
-        fitted: 2,
     },
     Plot {
         title: "preload, N",
@@ -70,35 +67,30 @@ pub(super) const PLOTS: [Plot; 6] = [
             ("wanted", Color::Gray, Look::Line, |row| row.seen.preload_ref_n),
             ("measured", Color::Yellow, Look::Line, |row| row.seen.preload_n),
         ],
-        fitted: 2,
     },
     Plot {
         title: "gap, mm",
         least: 1.5,
         curves: &[
             ("wanted", Color::Gray, Look::Line, |row| row.gap_ref_mm),
-            ("measured", Color::LightRed, Look::Marks, |row| row.gap_mm),
             ("clearance", Color::Magenta, Look::Dots, |row| row.clearance_mm),
+            ("measured", Color::LightRed, Look::Marks, |row| row.gap_mm),
         ],
-        fitted: 2,
     },
     Plot {
         title: "compression, mm",
         least: 0.2,
         curves: &[("measured", Color::Green, Look::Line, |row| row.seen.compression_mm)],
-        fitted: 1,
     },
     Plot {
         title: "wheel centre to axis, mm",
         least: 2.0,
         curves: &[("by the arm", Color::Magenta, Look::Line, |row| row.seen.radius_mm)],
-        fitted: 1,
     },
     Plot {
         title: "slip margin",
         least: 0.2,
         curves: &[("estimated", Color::Cyan, Look::Line, |row| row.seen.slip_margin)],
-        fitted: 1,
     },
 ];
 
@@ -110,7 +102,9 @@ impl Plot {
             all.filter(|point| point.1.is_finite()).collect()
         };
         let lines: Vec<_> = self.curves.iter().map(|(.., of)| points(*of)).collect();
-        let fitted = lines.iter().take(self.fitted).flatten().map(|point| point.1);
+        // Before a step and behind it the clearance is unrelated to the gap.
+        let shown = self.curves.iter().zip(&lines).filter(|(curve, _)| curve.2 != Look::Dots);
+        let fitted = shown.flat_map(|(_, line)| line).map(|point| point.1);
         let (low, high) = range(fitted, self.least);
         let sets = self.curves.iter().zip(&lines).map(|((_, colour, look, _), points)| {
             let (marker, kind) = match look {

@@ -261,7 +261,7 @@ mod tests {
             "recorded to out/live/log.mcap",
             "speed, mm/s ─wanted ─measured",
             "preload, N ─wanted ─measured",
-            "gap, mm ─wanted •measured ─clearance",
+            "gap, mm ─wanted ─clearance •measured",
             "compression, mm ─measured",
             "mode: deployed",
             "SPACE or x stop",

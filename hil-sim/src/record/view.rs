@@ -94,7 +94,7 @@ impl View {
                 row.preload_ref_n
             );
             let contact = format!(
-                " compression {:4.2} mm  radius {:6.2} mm  gap predicted {:4.2} mm  slip margin {:5.2}",
+                " compression {:4.2} mm  radius {:5.1} mm  gap predicted {:4.2} mm  slip margin {:5.2}",
                 row.compression_mm, row.radius_mm, row.gap_predicted_mm, row.slip_margin
             );
             state + &motion + &contact
