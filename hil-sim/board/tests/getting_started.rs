@@ -35,9 +35,9 @@ fn blocks(page: &str) -> Vec<Block<'_>> {
     blocks
 }
 
-/// Runs a command, which must end well, and returns what it prints.
+/// Runs a command, which must end with this code.
 #[cfg(unix)]
-fn run(place: &Path, arguments: &[&str]) -> String {
+fn run(place: &Path, arguments: &[&str], code: i32) {
     let probe_rs = place.join("probe-rs");
     let output = Command::new(program(arguments))
         .current_dir(place)
@@ -46,20 +46,25 @@ fn run(place: &Path, arguments: &[&str]) -> String {
         .output()
         .expect("starts");
     let said = String::from_utf8_lossy(&output.stderr);
-    let printed = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(output.status.success(), "cargo rig {}: {said}{printed}", arguments.join(" "));
-    printed
+    let printed = String::from_utf8_lossy(&output.stdout);
+    let shown = format!("cargo rig {}: {said}{printed}", arguments.join(" "));
+    assert_eq!(output.status.code(), Some(code), "{shown}");
 }
 
-/// As the page says it, with the emulated board for the probe's; a view without a terminal.
+/// As the page says it, with the emulated board for the probe's, a view without a terminal and a
+/// bring-up without a hand. One with a mistake in the wiring has to find it.
 #[cfg(unix)]
-fn follow(place: &Path, command: &str) -> String {
+fn follow(place: &Path, command: &str) {
     let on_board = command.replace("--target probe", "--target board");
     let mut arguments: Vec<&str> = on_board.split_whitespace().collect();
     if arguments[0] == "live" {
         arguments.extend(["--headless", "--fast", "--listen", "127.0.0.1:0"]);
     }
-    run(place, &arguments)
+    if arguments[0] == "bringup" {
+        let more = [&["--target", "board"][..], &["--yes"]];
+        arguments.extend(more.into_iter().filter(|more| !on_board.contains(more[0])).flatten());
+    }
+    run(place, &arguments, i32::from(arguments.contains(&"--mistake")));
 }
 
 #[cfg(unix)]
