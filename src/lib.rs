@@ -1,11 +1,53 @@
-//! Controller of a rubber-wheeled drive that climbs the steps inside a
-//! telescoping sleeve: it raises the radial preload ahead of each step in
-//! proportion to the speed, so that the gap between wheel and wall stays as on
-//! the smooth wall.
+//! Controller of a rubber-wheeled drive that climbs the steps inside a telescoping sleeve. It raises
+//! the radial preload ahead of each step as far as the speed requires, so that the gap between wheel
+//! and wall stays as it is at the safe, slow speed.
 //!
-//! The control tick ([`tick`]) is fixed point, without allocation and without
-//! waiting; the async [`tasks`] around it are generic over one board trait
-//! ([`hal`]). All of it builds on the host, where the virtual rig runs it.
+//! One call of [`tick::Controller::step`] is one millisecond:
+//!
+//! 1. [`sense`]: sensor codes become speed, preload, compression and radius, each with its age.
+//! 2. [`estimate`]: position between the steps, contact stage, and the gap of a crossing.
+//! 3. [`supervise`]: the operator's commands, modes, faults and limits, by one transition table.
+//! 4. [`control`]: the schedule of speed and preload, then the loops that follow it. What a
+//!    crossing needs comes from the reduced [`model`], outside the tick.
+//! 5. [`tick::Output`]: the commands of both bridges, and a row for the [`log`].
+//!
+//! A tick is fixed point, without allocation and without waiting, and time is an argument. The async
+//! [`tasks`] around it are generic over one board trait ([`hal`]). All of it builds on the host,
+//! where the virtual rig runs it:
+//!
+//! ```
+//! use interstage::rig::Rig;
+//! use interstage::sense::raw::{AdcCode, AngleFrame, EncoderCount, Sample, SensorFrame};
+//! use interstage::tick::{Controller, Input, State};
+//!
+//! // The rig, once: a parameter that is out of range is refused here.
+//! let rig = Rig::prototype();
+//! let controller = Controller::try_build(&rig)?;
+//! let mut state = State::default();
+//!
+//! // Sensors of a rig at the stow end, without preload. The wheel's centre is 125 mm from the axis.
+//! let arm_rad = ((150.0 - 25.0 - rig.rig.arm_pivot_radius_mm) / rig.rig.arm_length_mm).asin();
+//! let arm = (arm_rad / core::f64::consts::TAU * 16384.0 + rig.sense.angle_zero_code).round() as u16;
+//! let parity = (arm.count_ones() % 2) as u16;
+//! // Five per cent of the converter's range is zero.
+//! let unloaded = AdcCode::new(3277);
+//! let frame = |at| SensorFrame {
+//!     wheel_encoder: Some(Sample { code: EncoderCount::new(0), at }),
+//!     preload_sensor: Some(Sample { code: unloaded, at }),
+//!     compression_sensor: Some(Sample { code: unloaded, at }),
+//!     arm_angle: Some(Sample { code: AngleFrame::new(arm | parity << 15), at }),
+//!     bridges: None,
+//! };
+//!
+//! // Without a command nothing moves, whatever the sensors say.
+//! for now in 0..100 {
+//!     let input = Input { now, sensors: frame(now), ..Input::default() };
+//!     let output = controller.step(&mut state, &input);
+//!     assert!(state.mode().is_at_rest());
+//!     assert!(!output.drive.enable && !output.preload.enable);
+//! }
+//! # Ok::<(), interstage::rig::RigError>(())
+//! ```
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]

@@ -17,6 +17,7 @@ mod flash;
 mod identify;
 mod keys;
 pub mod live;
+mod log_files;
 mod montecarlo;
 pub mod output;
 pub mod params;
@@ -116,7 +117,27 @@ impl Verb {
 /// Runs the command with the arguments of this process.
 #[must_use]
 pub fn main() -> ExitCode {
+    let arguments: Vec<OsString> = std::env::args_os().skip(1).collect();
+    if let Some(verb) = helped_elsewhere(&arguments) {
+        return match provision::go_on_with(Extra::Study, [verb.into(), "--help".into()]) {
+            Ok(code) => ExitCode::from(code),
+            Err(error) => failed(&error.into()),
+        };
+    }
     run(|cli: &Cli| cli.verb.run())
+}
+
+/// The verb of `help VERB`, if another part of `rig` has it and knows its options.
+fn helped_elsewhere(arguments: &[OsString]) -> Option<&'static str> {
+    let [help, verb] = arguments else { return None };
+    let verb = ["modes", "bench", "paper"].into_iter().find(|known| verb == known)?;
+    (help == "help").then_some(verb)
+}
+
+/// Prints why a verb could not do its work.
+fn failed(failure: &Failure) -> ExitCode {
+    eprintln!("error: {failure}");
+    failure.code()
 }
 
 /// Parses the arguments of this process and runs the verb. Errors are one line.
@@ -127,10 +148,7 @@ pub fn run<C: Parser>(run: impl FnOnce(&C) -> Result<Outcome, Failure>) -> ExitC
     };
     match run(&cli) {
         Ok(outcome) => outcome.code(),
-        Err(failure) => {
-            eprintln!("error: {failure}");
-            failure.code()
-        }
+        Err(failure) => failed(&failure),
     }
 }
 

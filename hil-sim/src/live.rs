@@ -1,7 +1,8 @@
 //! Shows a growing log on the terminal and publishes it on the network.
 
+mod plot;
 mod screen;
 mod server;
 
-pub use screen::Screen;
+pub use screen::{Known, Screen};
 pub use server::Server;

@@ -5,14 +5,17 @@
 //! wheels from PyPI in a virtual environment in the target directory. Nothing is installed
 //! elsewhere, and only builds started here use them.
 
+mod python;
 mod tools;
 
 use std::env;
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::Command;
 
 use crate::firmware::{self, FirmwareError};
 
+pub use python::python;
 pub use tools::Tools;
 
 /// A part of `rig` that is a binary of its own.
@@ -75,8 +78,19 @@ pub fn featured(extra: Extra) -> Result<PathBuf, ProvisionError> {
 /// # Errors
 /// As [`featured`].
 pub fn go_on(extra: Extra) -> Result<u8, ProvisionError> {
+    go_on_with(extra, env::args_os().skip(1))
+}
+
+/// The same with these arguments.
+///
+/// # Errors
+/// As [`featured`].
+pub fn go_on_with(
+    extra: Extra,
+    arguments: impl IntoIterator<Item = OsString>,
+) -> Result<u8, ProvisionError> {
     let mut command = Command::new(featured(extra)?);
-    command.args(env::args_os().skip(1));
+    command.args(arguments);
     let status = command.status().map_err(|e| firmware::could_not_start(&command, e))?;
     Ok(firmware::exit_code(status))
 }

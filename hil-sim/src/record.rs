@@ -36,7 +36,7 @@ pub use source::{Bytes, Source, SourceError, Virtual, letter, starter};
 pub use summary::{CrossingLine, LogLine, Recording, Report, Summary};
 pub use tally::{Ended, Tally, true_line};
 pub use tick::{
-    Controller, MODE_NAMES, STAGE_NAMES, Tick, TrueState, mode_name, mode_number, stage_name,
+    Controller, MODE_NAMES, STAGE_NAMES, Tick, TrueState, mode_number, mode_words, stage_name,
 };
 pub use view::View;
 pub use write::{WriteError, Writer, write_all, write_csv};

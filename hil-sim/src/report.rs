@@ -23,6 +23,7 @@ pub use beside::beside_svg;
 pub use compare::{Difference, compare_html, differences};
 pub use page::{Section, html};
 pub use panels::overview_svg;
+pub(crate) use scene::Geometry;
 
 #[cfg(test)]
 mod tests;

@@ -2,8 +2,12 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+
+use hil_sim::testing::long;
+use serde_json::Value;
 
 use crate::cli::{code, rig_in, stderr};
 
@@ -216,4 +220,125 @@ fn a_log_is_drawn_and_a_table_without_its_columns_is_refused() {
         assert_eq!(refused.status.code(), Some(1));
         assert!(stderr(&refused).contains(why) && !stderr(&refused).contains("Traceback"));
     }
+}
+
+/// With the long samples: the same picture by pandas as by Python's own reader of tables.
+#[test]
+fn pandas_draws_a_log_alike() {
+    if !long() {
+        return;
+    }
+    let python = match hil_sim::provision::python("examples", &["pandas==3.1.1"]) {
+        Ok(python) => python,
+        Err(why) => {
+            // Not `eprintln`: the tests' program keeps that to itself.
+            let _ = writeln!(std::io::stderr(), "left out: a log drawn with pandas. {why:#}");
+            return;
+        }
+    };
+    let folder = tempfile::tempdir().expect("a temporary directory");
+    let run = rig_in(folder.path(), &["capture", "--out", "run"]);
+    assert_eq!(code(&run), 0, "{}", stderr(&run));
+    let script = root().join("examples/plot_log.py");
+    let draw = |isolated: bool, out: &str| {
+        let mut command = Command::new(&python);
+        // `-S` leaves the environment's packages out.
+        command.args(isolated.then_some("-S")).arg(&script).args(["run/log.csv", "3", out]);
+        let output = command.current_dir(folder.path()).output().expect("it starts");
+        assert!(output.status.success(), "{}", stderr(&output));
+        fs::read_to_string(folder.path().join(out)).expect("a picture")
+    };
+    let has_pandas = |isolated: bool| {
+        let mut command = Command::new(&python);
+        command.args(isolated.then_some("-S")).args(["-c", "import pandas"]);
+        command.output().expect("it starts").status.success()
+    };
+    assert!(has_pandas(false) && !has_pandas(true));
+    let (by_pandas, by_csv) = (draw(false, "pandas.svg"), draw(true, "csv.svg"));
+    assert!(by_pandas.contains("gap") && by_pandas == by_csv);
+}
+
+/// Fields of each topic of a log.
+fn fields(log: &Path) -> BTreeMap<String, Vec<String>> {
+    let bytes = fs::read(log).expect("a log");
+    let mut topics = BTreeMap::new();
+    for message in mcap::MessageStream::new(&bytes).expect("a log") {
+        let channel = message.expect("intact").channel;
+        let schema = channel.schema.as_ref().expect("a schema");
+        let Ok(schema) = serde_json::from_slice::<Value>(&schema.data) else { continue };
+        let properties = schema["properties"].as_object().expect("properties");
+        topics.insert(channel.topic.clone(), properties.keys().cloned().collect());
+    }
+    topics
+}
+
+/// The panels of a layout of Foxglove: the leaves of its tree.
+fn panels<'a>(tree: &'a Value, found: &mut Vec<&'a str>) {
+    match tree.as_str() {
+        Some(panel) => found.push(panel),
+        None => {
+            assert!(["row", "column"].map(Value::from).contains(&tree["direction"]), "{tree}");
+            panels(&tree["first"], found);
+            panels(&tree["second"], found);
+        }
+    }
+}
+
+/// Writes each curve of a layout of PlotJuggler on a line, its plots' places checked.
+const CURVES: &str = "import sys, xml.etree.ElementTree as tree
+root = tree.parse(sys.argv[1]).getroot()
+assert root.tag == 'root'
+for split in root.findall('tabbed_widget/Tab/Container/DockSplitter'):
+    areas = split.findall('DockArea')
+    assert int(split.get('count')) == len(areas) == len(split.get('sizes').split(';'))
+    assert split.get('orientation') in '|-'
+    for area in areas:
+        plot = area.find('plot')
+        assert plot.get('mode') == 'TimeSeries'
+        for curve in plot.findall('curve'):
+            print(curve.get('name'))
+";
+
+#[test]
+fn layouts_of_viewers_name_what_a_log_has() {
+    let folder = tempfile::tempdir().expect("a temporary directory");
+    let run = rig_in(folder.path(), &["capture", "--out", "run"]);
+    assert_eq!(code(&run), 0, "{}", stderr(&run));
+    let topics = fields(&folder.path().join("run/log.mcap"));
+    let has = |topic: &str, field: &str| {
+        topics.get(topic).is_some_and(|fields| fields.iter().any(|name| name == field))
+    };
+    let layouts = root().join("examples/layouts");
+
+    let text = fs::read_to_string(layouts.join("foxglove.json")).expect("a layout");
+    let layout: Value = serde_json::from_str(&text).expect("JSON");
+    let mut shown = Vec::new();
+    panels(&layout["layout"], &mut shown);
+    let configured = layout["configById"].as_object().expect("panels");
+    assert_eq!(shown.len(), configured.len(), "{shown:?}");
+    let mut seen = 0;
+    for panel in shown {
+        let panel = &configured[panel];
+        for path in panel["paths"].as_array().into_iter().flatten() {
+            let path = path["value"].as_str().expect("a path");
+            let (topic, field) = path.split_once('.').expect("a field of a topic");
+            assert!(has(topic, field), "{path}");
+            seen += 1;
+        }
+        if let Some(topic) = panel["topicToRender"].as_str() {
+            assert!(topics.contains_key(topic), "{topic}");
+        }
+    }
+    assert!(seen >= 8, "{seen} paths");
+
+    let mut python = Command::new("python3");
+    let output = python.args(["-c", CURVES]).arg(layouts.join("plotjuggler.xml")).output();
+    let output = output.expect("python3 starts");
+    assert!(output.status.success(), "{}", stderr(&output));
+    let curves = String::from_utf8(output.stdout).expect("text");
+    for curve in curves.lines() {
+        let (topic, field) = curve.rsplit_once('/').expect("a field of a topic");
+        assert!(has(topic, field), "{curve}");
+    }
+    assert!(curves.lines().count() >= 8, "{curves}");
 }

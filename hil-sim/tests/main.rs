@@ -1,5 +1,6 @@
 //! All tests of this crate that need more than one of its modules: one program.
 
+mod browser;
 mod campaigns;
 mod cli;
 mod commands;

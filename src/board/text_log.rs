@@ -4,7 +4,7 @@ use defmt::{error, info, warn};
 use interstage::estimate::ContactStage;
 use interstage::hal::Journal;
 use interstage::log::Identity;
-use interstage::supervise::{Command, Leg, Mode};
+use interstage::supervise::Mode;
 use interstage::tasks::TickCycles;
 use interstage::tick::{CrossingRecord, Entry, Event};
 use interstage::units::{Direction, Q16, Tick};
@@ -54,13 +54,13 @@ impl Journal for TextLog {
             Event::Mode(Mode::FaultHold(fault)) => {
                 error!("[{=u32} ms] mode: fault hold, {=u16}", at, fault.code());
             }
-            Event::Mode(mode) => info!("[{=u32} ms] mode: {=str}", at, of_mode(mode)),
+            Event::Mode(mode) => info!("[{=u32} ms] mode: {=str}", at, mode.words()),
             Event::Stage(stage) => {
                 info!("[{=u32} ms] stage {=u8}: {=str}", at, stage as u8, of_stage(stage));
             }
-            Event::Command(command) => info!("[{=u32} ms] {=str}", at, of_command(command)),
+            Event::Command(command) => info!("[{=u32} ms] {=str}", at, command.word()),
             Event::Refused(command) => {
-                warn!("[{=u32} ms] refused in this mode: {=str}", at, of_command(command));
+                warn!("[{=u32} ms] refused in this mode: {=str}", at, command.word());
             }
             Event::Fault(fault) => {
                 error!("[{=u32} ms] fault {=u16}: {=str}", at, fault.code(), fault.sentence());
@@ -107,15 +107,6 @@ fn of_direction(direction: Direction) -> &'static str {
     }
 }
 
-fn of_command(command: Command) -> &'static str {
-    match command {
-        Command::Start => "start",
-        Command::Stop => "stop",
-        Command::Retract => "retract",
-        Command::Reset => "reset",
-    }
-}
-
 fn of_stage(stage: ContactStage) -> &'static str {
     match stage {
         ContactStage::Initial => "initial",
@@ -124,33 +115,5 @@ fn of_stage(stage: ContactStage) -> &'static str {
         ContactStage::Sliding => "sliding on the corner",
         ContactStage::Rolling => "rolling over the corner",
         ContactStage::Continuous => "continuous wall",
-    }
-}
-
-fn of_mode(mode: Mode) -> &'static str {
-    match mode {
-        Mode::Boot => "boot",
-        Mode::SelfTest => "self-test",
-        Mode::Zero => "zeroing",
-        Mode::Idle => "idle",
-        Mode::Preload(Direction::Deploy) => "preloading to deploy",
-        Mode::Preload(Direction::Retract) => "preloading to retract",
-        Mode::Run(Direction::Deploy, leg) => match leg {
-            Leg::Cruise => "deploying: cruise",
-            Leg::Approach => "deploying: approach",
-            Leg::Crossing => "deploying: crossing",
-            Leg::Settle => "deploying: settle",
-        },
-        Mode::Run(Direction::Retract, leg) => match leg {
-            Leg::Cruise => "retracting: cruise",
-            Leg::Approach => "retracting: approach",
-            Leg::Crossing => "retracting: crossing",
-            Leg::Settle => "retracting: settle",
-        },
-        Mode::Stopping(Direction::Deploy) => "stopping while deploying",
-        Mode::Stopping(Direction::Retract) => "stopping while retracting",
-        Mode::Complete(Direction::Deploy) => "deployed",
-        Mode::Complete(Direction::Retract) => "retracted",
-        Mode::FaultHold(_) => "fault hold",
     }
 }

@@ -56,6 +56,16 @@ pub enum Mode {
 impl Command {
     /// Every command.
     pub const ALL: [Self; 4] = [Self::Start, Self::Stop, Self::Retract, Self::Reset];
+
+    /// Its name, as the logs have it.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Start => "start",
+            Self::Stop => "stop",
+            Self::Retract => "retract",
+            Self::Reset => "reset",
+        }
+    }
 }
 
 impl Mode {
@@ -84,6 +94,36 @@ impl Mode {
             Self::Complete(Retract),
         ]
     };
+
+    /// The mode in words, as the logs have it.
+    pub const fn words(self) -> &'static str {
+        use Direction::{Deploy, Retract};
+        match self {
+            Self::Boot => "boot",
+            Self::SelfTest => "self-test",
+            Self::Zero => "zeroing",
+            Self::Idle => "idle",
+            Self::Preload(Deploy) => "preloading to deploy",
+            Self::Preload(Retract) => "preloading to retract",
+            Self::Run(Deploy, leg) => match leg {
+                Leg::Cruise => "deploying: cruise",
+                Leg::Approach => "deploying: approach",
+                Leg::Crossing => "deploying: crossing",
+                Leg::Settle => "deploying: settle",
+            },
+            Self::Run(Retract, leg) => match leg {
+                Leg::Cruise => "retracting: cruise",
+                Leg::Approach => "retracting: approach",
+                Leg::Crossing => "retracting: crossing",
+                Leg::Settle => "retracting: settle",
+            },
+            Self::Stopping(Deploy) => "stopping while deploying",
+            Self::Stopping(Retract) => "stopping while retracting",
+            Self::Complete(Deploy) => "deployed",
+            Self::Complete(Retract) => "retracted",
+            Self::FaultHold(_) => "fault hold",
+        }
+    }
 
     /// Whether nothing is driven in this mode, neither wheel nor pre-tightener.
     pub const fn is_at_rest(self) -> bool {

@@ -27,7 +27,7 @@ pub struct Emulated<'a> {
 }
 
 impl<'a> Emulated<'a> {
-    /// A board with this image. Without an operator (`attended`) the drive starts as soon as
+    /// A board with this image and the scenario's parameters. Without an operator (`attended`) the drive starts as soon as
     /// it is idle, and the source ends when the drive has arrived.
     /// Errors: [`SourceError::Other`] if `elf` is no image of the board.
     pub fn new(
@@ -37,6 +37,7 @@ impl<'a> Emulated<'a> {
         attended: bool,
     ) -> Result<Self, SourceError> {
         let mut bench = Bench::new(elf, strings, scenario).map_err(broken)?;
+        crate::run::store(bench.machine_mut(), scenario).map_err(broken)?;
         if !attended {
             bench.start_when_idle();
         }

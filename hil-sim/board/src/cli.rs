@@ -94,14 +94,14 @@ fn capture(args: &capture::Args) -> Result<Outcome, Failure> {
     let scenario = args.source.scenario()?;
     let (elf, strings) = image(&scenario)?;
     let mut source = Emulated::new(&elf, &strings, &scenario, false).map_err(Failure::run)?;
-    capture::write(args, &mut source, Some(&scenario))
+    capture::write(args, &mut source, &scenario)
 }
 
 fn live(args: &live::Args) -> Result<Outcome, Failure> {
     let scenario = args.source.scenario()?;
     let (elf, strings) = image(&scenario)?;
     let source = Emulated::new(&elf, &strings, &scenario, !args.headless);
-    live::watch(args, &mut source.map_err(Failure::run)?)
+    live::watch(args, &mut source.map_err(Failure::run)?, &scenario)
 }
 
 fn faults(args: &faults::Args) -> Result<Outcome, Failure> {

@@ -7,6 +7,7 @@ mod firmware;
 mod first_board;
 mod flash;
 mod gdb;
+mod getting_started;
 mod hil;
 mod kept;
 mod log;

@@ -1,14 +1,19 @@
 //! `rig live`: a log as it grows, on the terminal and over the network.
 
 use std::io::IsTerminal;
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
+use interstage::supervise::Command;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers};
 
 use super::failure::{Failure, Outcome};
+use super::log_files::{LogFiles, Stop};
+use super::output;
 use super::source::SourceArgs;
-use crate::live::{Screen, Server};
-use crate::record::{Decoder, Item, Source, messages};
+use crate::live::{Known, Screen, Server};
+use crate::record::{Counts, Decoder, Item, Source, messages};
+use crate::scenario::Scenario;
 
 /// Time between two frames of the screen.
 const REDRAW: Duration = Duration::from_millis(50);
@@ -16,8 +21,9 @@ const REDRAW: Duration = Duration::from_millis(50);
 /// Shows the controller's log as it arrives: plots, contact stage, faults, and keys for
 /// start, stop and retract.
 ///
-/// The same goes out over a WebSocket in the Foxglove protocol, for Foxglove, Lichtblick
-/// and PlotJuggler.
+/// The space bar stops the drive, as `x` does. Ending the view does not. The same goes out over
+/// a WebSocket in the Foxglove protocol, for Foxglove, Lichtblick and PlotJuggler, with the
+/// layouts in examples/layouts.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Where the log comes from.
@@ -33,6 +39,10 @@ pub struct Args {
     #[arg(long)]
     pub headless: bool,
 
+    /// Writes the log into this directory while it is shown, as `rig capture` does.
+    #[arg(long, value_name = "DIR")]
+    record: Option<PathBuf>,
+
     /// As fast as it goes instead of in real time.
     #[arg(long)]
     fast: bool,
@@ -43,7 +53,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     if !args.headless && !std::io::stdout().is_terminal() {
         return Err(Failure::input("standard output is no terminal: use --headless"));
     }
-    args.source.open(!args.headless, |source, _| watch(args, source))
+    args.source.open(!args.headless, |source, scenario| watch(args, source, scenario))
 }
 
 /// A terminal that is restored however the view ends.
@@ -55,72 +65,142 @@ impl Drop for Display {
     }
 }
 
+/// Reads a log, and keeps it if that is asked for.
+enum Reader {
+    Shown(Box<Decoder>),
+    Kept(Box<LogFiles>),
+}
+
+impl Reader {
+    fn take(&mut self, bytes: &[u8], see: &mut impl FnMut(&Item)) -> Result<(), Failure> {
+        match self {
+            Self::Shown(decoder) => {
+                decoder.read(bytes, &mut |item| see(&item));
+                Ok(())
+            }
+            Self::Kept(files) => files.take(bytes, see),
+        }
+    }
+
+    const fn counts(&self) -> &Counts {
+        match self {
+            Self::Shown(decoder) => decoder.counts(),
+            Self::Kept(files) => files.counts(),
+        }
+    }
+
+    fn news(&mut self) -> Vec<String> {
+        match self {
+            Self::Shown(_) => Vec::new(),
+            Self::Kept(files) => files.news(),
+        }
+    }
+
+    /// Completes the files.
+    fn finish(self) -> Result<(Counts, Vec<PathBuf>), Failure> {
+        match self {
+            Self::Shown(decoder) => Ok((*decoder.counts(), Vec::new())),
+            Self::Kept(files) => files.finish(&mut |_| {}),
+        }
+    }
+}
+
 /// Shows what `source` gives until it ends or the operator quits.
-pub fn watch(args: &Args, source: &mut dyn Source) -> Result<Outcome, Failure> {
+pub fn watch(
+    args: &Args,
+    source: &mut dyn Source,
+    scenario: &Scenario,
+) -> Result<Outcome, Failure> {
     let server = Server::bind(&args.listen)
         .map_err(|error| Failure::input(format!("--listen {}: {error}", args.listen)))?;
+    let mut places = format!("ws://{}", server.address());
+    let mut reader = match &args.record {
+        Some(folder) => {
+            let files = LogFiles::new(folder, None, false, scenario)?;
+            places += &format!("   recorded to {}", files.mcap().display());
+            Reader::Kept(Box::new(files))
+        }
+        None => Reader::Shown(Box::default()),
+    };
     if args.headless {
-        eprintln!("listening at ws://{}", server.address());
+        eprintln!("listening at {places}");
     }
+    // In a terminal's raw mode Ctrl-C is a key.
+    let stop = args.headless.then(Stop::by_ctrl_c);
     let mut display = if args.headless {
         None
     } else {
         Some(Display(ratatui::try_init().map_err(Failure::run)?))
     };
-    let (mut screen, mut decoder) = (Screen::default(), Decoder::new());
+    let mut screen = Screen::new(Known::of(&scenario.rig).map_err(Failure::input)?, places);
     let mut clock = Clock::new(args.fast);
     let mut drawn = Instant::now();
     while let Some(bytes) = source.read().map_err(Failure::run)? {
-        decoder.read(&bytes, &mut |item| {
-            screen.see(&item);
-            if let Item::Tick(record, _) = &item {
+        reader.take(&bytes, &mut |item| {
+            screen.see(item);
+            if let Item::Tick(record, _) = item {
                 clock.tick(record.at());
             }
-            if let Some((topic, body)) = messages(&item) {
+            if let Some((topic, body)) = messages(item) {
                 server.publish(topic, clock.now_ns(), body);
             }
-        });
-        for line in source.news() {
+        })?;
+        for line in source.news().into_iter().chain(reader.news()) {
             screen.note(line);
         }
-        screen.count(decoder.counts());
+        screen.count(reader.counts());
         clock.wait();
+        if stop.as_ref().is_some_and(Stop::is_wanted) {
+            break;
+        }
         if drawn.elapsed() < REDRAW {
             continue;
         }
         drawn = Instant::now();
         if let Some(Display(terminal)) = &mut display {
-            let drawn = terminal.draw(|frame| screen.draw(frame, decoder.counts()));
+            let drawn = terminal.draw(|frame| screen.draw(frame, reader.counts()));
             drawn.map_err(Failure::run)?;
-            match key()? {
-                Some(QUIT) => break,
-                Some(letter) => source.send(letter).map_err(Failure::run)?,
-                None => {}
+            let letters = keys()?;
+            for letter in letters.iter().filter(|letter| **letter != QUIT) {
+                source.send(*letter).map_err(Failure::run)?;
+            }
+            if letters.contains(&QUIT) {
+                break;
             }
         }
     }
-    Ok(Outcome::of(decoder.counts().is_complete()))
+    drop(display);
+    let (counts, files) = reader.finish()?;
+    output::print(&output::wrote(&files))?;
+    Ok(Outcome::of(counts.is_complete()))
 }
 
 /// Key that ends the view; Escape and Ctrl-C do too.
 const QUIT: u8 = b'q';
 
-/// The key that was pressed, if one was and has a meaning.
-fn key() -> Result<Option<u8>, Failure> {
-    if !event::poll(Duration::ZERO).map_err(Failure::run)? {
-        return Ok(None);
+/// The letters of all keys that were pressed since the last call.
+fn keys() -> Result<Vec<u8>, Failure> {
+    let mut letters = Vec::new();
+    while event::poll(Duration::ZERO).map_err(Failure::run)? {
+        letters.extend(letter(&event::read().map_err(Failure::run)?));
     }
-    let Event::Key(key) = event::read().map_err(Failure::run)? else { return Ok(None) };
+    Ok(letters)
+}
+
+/// The letter of a key that has a meaning.
+fn letter(event: &Event) -> Option<u8> {
+    let Event::Key(key) = event else { return None };
     if key.kind != KeyEventKind::Press {
-        return Ok(None);
+        return None;
     }
-    Ok(match key.code {
+    match key.code {
         KeyCode::Esc => Some(QUIT),
         // In raw mode the terminal does not end the program.
         KeyCode::Char('c') if key.modifiers.contains(KeyModifiers::CONTROL) => Some(QUIT),
+        KeyCode::Char(' ') => Some(crate::record::letter(Command::Stop)),
         KeyCode::Char(letter @ ('q' | 's' | 'x' | 'r' | '0')) => Some(letter as u8),
         _ => None,
-    })
+    }
 }
 
 /// The log's time and this host's.
@@ -154,5 +234,29 @@ impl Clock {
         let Some(first) = self.first.filter(|_| !self.fast) else { return };
         let passed = Duration::from_millis(u64::from(self.tick.wrapping_sub(first)));
         std::thread::sleep(passed.saturating_sub(self.began.elapsed()).min(REDRAW));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ratatui::crossterm::event::KeyEvent;
+
+    use super::*;
+
+    #[test]
+    fn the_space_bar_and_x_stop_and_what_ends_the_view_sends_nothing() {
+        let of = |code, modifiers| letter(&Event::Key(KeyEvent::new(code, modifiers)));
+        let plain = |letter| of(KeyCode::Char(letter), KeyModifiers::NONE);
+        let stop = Some(crate::record::letter(Command::Stop));
+        assert_eq!((plain(' '), plain('x')), (stop, stop));
+        let command = |command| Some(crate::record::letter(command));
+        assert_eq!(
+            (plain('s'), plain('r'), plain('0')),
+            (command(Command::Start), command(Command::Retract), command(Command::Reset))
+        );
+        let ends = [of(KeyCode::Esc, KeyModifiers::NONE), plain('q')];
+        assert_eq!(ends, [Some(QUIT); 2]);
+        assert_eq!(of(KeyCode::Char('c'), KeyModifiers::CONTROL), Some(QUIT));
+        assert_eq!((plain('c'), of(KeyCode::Enter, KeyModifiers::NONE)), (None, None));
     }
 }

@@ -18,19 +18,19 @@ const ELSEWHERE: [&str; 4] = ["preset", "spread.", "noise.", "run."];
 
 /// Reads and changes the parameters that a board, or a file, holds.
 ///
-/// A change is checked before it is sent, stored beside the active set, and becomes active
-/// completely or not at all; a board uses it from its next start.
+/// A change is checked before it is sent, and becomes active completely or not at all; a board
+/// uses it from its next start. `restore FILE` names each property of the rig that the file does
+/// not state.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(subcommand)]
     action: Action,
 
-    /// The place: a file with one set of parameters.
+    /// Those in this file, which holds one set of parameters.
     #[arg(long, global = true, value_name = "FILE", conflicts_with_all = ["target", "flash"])]
     file: Option<PathBuf>,
 
-    /// The place: board, the firmware on the emulated board, over its binary line; or
-    /// probe, a real board.
+    /// Those of a board: probe, a real one; or board, the emulated one.
     #[arg(long, global = true, value_name = "TARGET", value_parser = ["board", "probe"])]
     pub target: Option<String>,
 
@@ -69,8 +69,8 @@ enum Action {
         /// The file.
         from: Option<PathBuf>,
     },
-    /// Computes the constants again from the stored rig, for a board whose firmware has
-    /// another schema than its parameters.
+    /// Makes a set that other firmware has stored usable by this one: the rig stays, and what
+    /// the controller computes from it is computed again.
     Migrate,
     /// Shows what differs from the defaults, or from a scenario file.
     Diff {
@@ -104,9 +104,10 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         (None, Some(_)) => {
             Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Board)?))
         }
-        (None, None) => {
-            Err(Failure::input("where? expected --file FILE, --target board or --target probe"))
-        }
+        (None, None) => Err(Failure::input(
+            "whose parameters? give --target probe (a real board), --target board (the \
+                 emulated one) or --file FILE",
+        )),
     }
 }
 
@@ -157,6 +158,7 @@ pub fn act(args: &Args, store: &mut impl Store) -> Result<Outcome, Failure> {
         }
         Action::Restore { from: Some(path) } => {
             let new = Scenario::resolve(None, Some(path), &[])?;
+            remind(path, &new)?;
             replace(args, store, &scenario, &new, &stem(path))
         }
         Action::Restore { from: None } => {
@@ -173,6 +175,30 @@ pub fn act(args: &Args, store: &mut impl Store) -> Result<Outcome, Failure> {
             show_changes(args, &held, false, &other, &scenario)
         }
     }
+}
+
+/// Asks for the properties of the rig that the file does not state: no default of them is safe on
+/// another rig than the preset's.
+fn remind(path: &Path, new: &Scenario) -> Result<(), Failure> {
+    let text = std::fs::read_to_string(path).map_err(Failure::input)?;
+    let stated: toml::Table = toml::from_str(&text).map_err(Failure::input)?;
+    let is_stated = |key: &str| {
+        let (section, name) = key.split_once('.').unwrap_or(("", key));
+        stated.get(section).and_then(Value::as_table).is_some_and(|table| table.contains_key(name))
+    };
+    let assumed = |info: &KeyInfo| info.measure && !is_stated(&info.key);
+    let keys: Vec<String> =
+        held_keys(new).into_iter().filter(assumed).map(|info| info.key).collect();
+    if !keys.is_empty() {
+        eprintln!(
+            "{}: does not state these properties of the rig; the preset `{}` stands in for them. \
+             Measure yours and add them: {}",
+            path.display(),
+            new.preset,
+            keys.join(", ")
+        );
+    }
+    Ok(())
 }
 
 /// Makes the rig of `new` active and shows the changes.

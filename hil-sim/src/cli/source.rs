@@ -23,28 +23,28 @@ pub struct SourceArgs {
     stream: Option<PathBuf>,
 
     /// What runs the controller: sil, this host; board, the firmware on an emulated board; or
-    /// probe, a real board, which is not changed; its probe may be unplugged for up to two
-    /// minutes.
+    /// probe, a real board, which is not changed: give the scenario file that it holds, so that
+    /// the log has its parameters. Its probe may be unplugged for up to two minutes.
     #[arg(long, value_name = "TARGET", default_value = "sil", value_parser = TARGETS)]
     target: String,
 }
 
 impl SourceArgs {
     /// Opens the source, `attended` by an operator or not, and hands it to `act` with the
-    /// scenario that it runs.
+    /// scenario that it runs, or is said to run.
     pub(super) fn open(
         &self,
         attended: bool,
-        act: impl FnOnce(&mut dyn Source, Option<&Scenario>) -> Result<Outcome, Failure>,
+        act: impl FnOnce(&mut dyn Source, &Scenario) -> Result<Outcome, Failure>,
     ) -> Result<Outcome, Failure> {
-        if let Some(path) = &self.stream {
-            return act(&mut opened(path)?, None);
-        }
         let scenario = self.run.resolve()?;
+        if let Some(path) = &self.stream {
+            return act(&mut opened(path)?, &scenario);
+        }
         match self.target.as_str() {
-            "sil" => act(&mut Virtual::new(&scenario, attended)?, Some(&scenario)),
+            "sil" => act(&mut Virtual::new(&scenario, attended)?, &scenario),
             "board" => Ok(Outcome::Code(provision::go_on(Extra::Board)?)),
-            _ => probe(act),
+            _ => probe(&scenario, act),
         }
     }
 
@@ -65,14 +65,16 @@ fn opened(path: &Path) -> Result<Bytes, Failure> {
 
 #[cfg(not(feature = "probe"))]
 fn probe(
-    _: impl FnOnce(&mut dyn Source, Option<&Scenario>) -> Result<Outcome, Failure>,
+    _: &Scenario,
+    _: impl FnOnce(&mut dyn Source, &Scenario) -> Result<Outcome, Failure>,
 ) -> Result<Outcome, Failure> {
     Ok(Outcome::Code(provision::go_on(Extra::Probe)?))
 }
 
 #[cfg(feature = "probe")]
 fn probe(
-    act: impl FnOnce(&mut dyn Source, Option<&Scenario>) -> Result<Outcome, Failure>,
+    scenario: &Scenario,
+    act: impl FnOnce(&mut dyn Source, &Scenario) -> Result<Outcome, Failure>,
 ) -> Result<Outcome, Failure> {
-    act(&mut crate::record::Probed::new(super::probe::reconnecting()?), None)
+    act(&mut crate::record::Probed::new(super::probe::reconnecting()?), scenario)
 }

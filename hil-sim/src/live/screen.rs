@@ -2,73 +2,120 @@
 
 use std::collections::VecDeque;
 
+use interstage::estimate::ContactStage;
+use interstage::log::identity::fingerprint;
+use interstage::model::Planner;
+use interstage::restart::Reset;
+use interstage::rig::{Rig, RigError};
+use interstage::supervise::Mode;
+use interstage::tick::{Entry, Event};
+use interstage::units::Direction;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Modifier, Style};
-use ratatui::symbols::Marker;
 use ratatui::text::Line;
-use ratatui::widgets::{Axis, Block, Chart, Dataset, GraphType, Paragraph};
+use ratatui::widgets::{Block, Paragraph};
 
-use interstage::restart::Reset;
-use interstage::supervise::Mode;
-use interstage::tick::{Entry, Event};
+use super::plot::{PLOTS, Row, SPAN_S};
+use crate::record::{Controller, Counts, Item, LedgerLine, Mark, View, text};
+use crate::report::Geometry;
 
-use crate::record::{Controller, Counts, Item, Mark, View, text};
-
-/// Time span of the plots, s.
-const SPAN_S: f64 = 10.0;
 /// Ticks between two points of a plot.
 const EVERY: u32 = 10;
 /// Lines of the log that are kept.
 const LINES: usize = 64;
+/// Least width of a terminal that has all plots, and least height with the larger log.
+const WIDE: (u16, u16) = (120, 36);
 
 /// The last line: what the keys do.
-const KEYS: &str = " s start   x stop   r retract   0 reset   q quit ";
+const KEYS: &str = " s start   SPACE or x stop   r retract   0 reset   q quit: the drive runs on ";
 
-/// A line of a plot: name, colour, value.
-type Curve = (&'static str, Color, fn(&Controller) -> f64);
+/// What the log is compared with.
+pub struct Known {
+    geometry: Geometry,
+    /// Reference gap in each direction, mm.
+    gap_ref_mm: [f64; 2],
+    /// Hash of the rig's parameters.
+    hash: u32,
+}
 
-/// Plots: title with unit, least span, and curves; later ones are drawn on top.
-const PLOTS: [(&str, f64, &[Curve]); 4] = [
-    (
-        "speed, mm/s",
-        2.0,
-        &[
-            ("reference", Color::Gray, |row| row.speed_ref_mm_s),
-            ("estimated", Color::Cyan, |row| row.wheel_speed_mm_s),
-        ],
-    ),
-    (
-        "preload, N",
-        4.0,
-        &[
-            ("reference", Color::Gray, |row| row.preload_ref_n),
-            ("measured", Color::Yellow, |row| row.preload_n),
-        ],
-    ),
-    ("tread compression, mm", 0.2, &[("measured", Color::Green, |row| row.compression_mm)]),
-    ("wheel centre from the axis, mm", 2.0, &[("by the arm", Color::Magenta, |row| row.radius_mm)]),
-];
+impl Known {
+    /// The rig that the target is said to have.
+    ///
+    /// # Errors
+    /// [`RigError`] if no controller can be made of it.
+    pub fn of(rig: &Rig) -> Result<Self, RigError> {
+        let planner = Planner::try_build(rig)?;
+        Ok(Self {
+            geometry: Geometry::of_rig(rig),
+            gap_ref_mm: Direction::ALL.map(|direction| planner.gap_ref(direction).to_num()),
+            hash: fingerprint(rig),
+        })
+    }
+}
 
 /// The state of the terminal.
-#[derive(Default)]
 pub struct Screen {
+    known: Known,
+    /// Where the log goes: address, files.
+    places: String,
     view: View,
-    rows: VecDeque<Controller>,
+    rows: VecDeque<Row>,
+    /// Time since boot at which the lower wall last let go, or carried again, s.
+    lifted_s: f64,
+    stage: u8,
+    is_other: bool,
     lines: VecDeque<(Color, String)>,
 }
 
 impl Screen {
+    /// Before the first item. `places` says where the log goes.
+    #[must_use]
+    pub fn new(known: Known, places: String) -> Self {
+        Self {
+            known,
+            places,
+            view: View::default(),
+            rows: VecDeque::new(),
+            lifted_s: f64::NAN,
+            stage: 0,
+            is_other: false,
+            lines: VecDeque::new(),
+        }
+    }
+
     /// Takes an item.
     pub fn see(&mut self, item: &Item) {
         self.view.see(item);
         match item {
-            Item::Tick(record, sensors) if record.at().is_multiple_of(EVERY) => {
+            Item::Tick(record, sensors) => {
                 let row = Controller::of(record, sensors);
-                self.rows.push_back(row);
-                while self.rows.front().is_some_and(|first| first.t_s < row.t_s - SPAN_S) {
-                    self.rows.pop_front();
+                let on_corner = [ContactStage::StaticFriction, ContactStage::Sliding];
+                let was_there =
+                    on_corner.iter().all(|at| [self.stage, row.stage].contains(&(*at as u8)));
+                if was_there {
+                    self.lifted_s = row.t_s;
                 }
+                self.stage = row.stage;
+                if record.at().is_multiple_of(EVERY) {
+                    self.add_row(row);
+                }
+            }
+            Item::Ledger(line) => {
+                let gap_mm = LedgerLine::from(line).gap_measured_mm;
+                let near = |row: &&mut Row| (row.seen.t_s - self.lifted_s).abs() <= 0.01;
+                if let Some(row) = self.rows.iter_mut().rev().find(near) {
+                    row.gap_mm = gap_mm;
+                }
+            }
+            Item::Identity(identity) if identity.parameters != self.known.hash => {
+                if !self.is_other {
+                    self.note(
+                        "the target has other parameters: clearance and wanted gap are not its own"
+                            .to_owned(),
+                    );
+                }
+                self.is_other = true;
             }
             Item::Event(entry) => {
                 let t_s = f64::from(entry.at) * 1e-3;
@@ -81,6 +128,15 @@ impl Screen {
                 self.note(mark.to_string());
             }
             _ => {}
+        }
+    }
+
+    fn add_row(&mut self, seen: Controller) {
+        let clearance_mm = self.known.geometry.clearance_mm(seen.position_mm, seen.radius_mm);
+        let gap_ref_mm = self.known.gap_ref_mm[usize::from(seen.retracts)];
+        self.rows.push_back(Row { seen, clearance_mm, gap_ref_mm, gap_mm: f64::NAN });
+        while self.rows.front().is_some_and(|first| first.seen.t_s < seen.t_s - SPAN_S) {
+            self.rows.pop_front();
         }
     }
 
@@ -103,27 +159,38 @@ impl Screen {
 
     /// Draws everything.
     pub fn draw(&self, frame: &mut Frame<'_>, counts: &Counts) {
+        let Rect { width, height, .. } = frame.area();
+        let log_lines = if height < WIDE.1 { 4 } else { 10 };
         let [head, plots, log, keys] = Layout::vertical([
-            Constraint::Length(4),
-            Constraint::Min(12),
-            Constraint::Length(8),
+            Constraint::Length(5),
+            Constraint::Min(8),
+            Constraint::Length(log_lines),
             Constraint::Length(1),
         ])
         .areas(frame.area());
-        let state = self.view.row().map_or("  no tick yet".to_owned(), |_| self.view.state_text());
-        let state = format!("{state}\n {}", self.view.rates_text(counts));
-        frame.render_widget(Paragraph::new(state).style(self.style()), head);
-        let [upper, lower] = Layout::vertical([Constraint::Fill(1); 2]).areas(plots);
-        let cells =
-            [upper, lower].map(|row| Layout::horizontal([Constraint::Fill(1); 2]).areas::<2>(row));
-        for (plot, area) in PLOTS.iter().zip(cells.into_iter().flatten()) {
-            self.plot(frame, plot, area);
+        let state = self.view.row().map_or(" no tick yet".to_owned(), |_| self.view.state_text());
+        let [upper, lower] =
+            Layout::vertical([Constraint::Length(3), Constraint::Length(2)]).areas(head);
+        frame.render_widget(Paragraph::new(state).style(self.style()), upper);
+        let connection = format!(" {}\n {}", self.view.rates_text(counts), self.places);
+        frame.render_widget(Paragraph::new(connection), lower);
+
+        let columns = if width < WIDE.0 { 2 } else { 3 };
+        let rows = Layout::vertical([Constraint::Fill(1); 2]).split(plots);
+        let cells = rows.iter().flat_map(|row| {
+            Layout::horizontal(vec![Constraint::Fill(1); columns]).split(*row).to_vec()
+        });
+        let end_s = self.rows.back().map_or(SPAN_S, |row| row.seen.t_s.max(SPAN_S));
+        for (plot, area) in PLOTS.iter().zip(cells) {
+            plot.draw(frame, area, &self.rows, end_s);
         }
+
         let skip = self.lines.len().saturating_sub(usize::from(log.height.saturating_sub(2)));
         let lines = self.lines.iter().skip(skip);
         let lines: Vec<Line<'_>> =
             lines.map(|(colour, text)| Line::styled(text, Style::new().fg(*colour))).collect();
-        frame.render_widget(Paragraph::new(lines).block(Block::bordered().title("log")), log);
+        let block = Block::bordered().title("log; the plots show its last 10 s");
+        frame.render_widget(Paragraph::new(lines).block(block), log);
         let style = Style::new().fg(Color::Black).bg(Color::Gray);
         frame.render_widget(Paragraph::new(KEYS).style(style), keys);
     }
@@ -137,49 +204,6 @@ impl Screen {
             _ => strong,
         }
     }
-
-    fn plot(
-        &self,
-        frame: &mut Frame<'_>,
-        &(title, least, curves): &(&'static str, f64, &[Curve]),
-        area: Rect,
-    ) {
-        let points = |of: fn(&Controller) -> f64| -> Vec<(f64, f64)> {
-            self.rows.iter().map(|row| (row.t_s, of(row))).collect()
-        };
-        let lines: Vec<_> = curves.iter().map(|(.., of)| points(*of)).collect();
-        let (low, high) = range(lines.iter().flatten().map(|point| point.1), least);
-        let end = self.rows.back().map_or(SPAN_S, |row| row.t_s.max(SPAN_S));
-        let sets = curves.iter().zip(&lines).map(|((name, colour, _), points)| {
-            Dataset::default()
-                .name(*name)
-                .marker(Marker::Braille)
-                .graph_type(GraphType::Line)
-                .style(Style::new().fg(*colour))
-                .data(points)
-        });
-        let axis = |low: f64, high: f64, labels: &[f64]| {
-            let labels = labels.iter().map(|value| Line::from(format!("{value:.1}")));
-            Axis::default().bounds([low, high]).labels(labels.collect::<Vec<_>>())
-        };
-        let chart = Chart::new(sets.collect())
-            .block(Block::bordered().title(title))
-            .x_axis(axis(end - SPAN_S, end, &[end - SPAN_S, end]))
-            .y_axis(axis(low, high, &[low, 0.5 * (low + high), high]));
-        frame.render_widget(chart, area);
-    }
-}
-
-/// Range of the values, at least so wide.
-fn range(values: impl Iterator<Item = f64>, least: f64) -> (f64, f64) {
-    let values = values.filter(|value| value.is_finite());
-    let (low, high) =
-        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
-    if low > high {
-        return (0.0, least);
-    }
-    let lacking = (least - (high - low)).max(0.0);
-    (low - 0.5 * lacking, high + 0.5 * lacking)
 }
 
 fn colour(entry: &Entry) -> Color {
@@ -196,59 +220,89 @@ fn colour(entry: &Entry) -> Color {
 mod tests {
     use ratatui::Terminal;
     use ratatui::backend::TestBackend;
-    use ratatui::buffer::Buffer;
 
     use super::*;
     use crate::record::Decoder;
     use crate::scenario::Scenario;
     use crate::session;
 
-    /// The screen at the end of a run.
-    fn drawn() -> Buffer {
+    fn screen() -> Screen {
+        let known = Known::of(&Scenario::default().rig).unwrap();
+        Screen::new(known, "ws://127.0.0.1:8765   recorded to out/live/log.mcap".to_owned())
+    }
+
+    /// The lines of a terminal of this size at the end of a run.
+    fn drawn(scenario: &Scenario, width: u16, height: u16) -> Vec<String> {
         let options = session::Options { rows: true, ..session::Options::default() };
-        let stream = session::run(&Scenario::default(), options).unwrap().stream;
-        let (mut screen, mut decoder) = (Screen::default(), Decoder::new());
+        let stream = session::run(scenario, options).unwrap().stream;
+        let (mut screen, mut decoder) = (screen(), Decoder::new());
         decoder.read(&stream, &mut |item| screen.see(&item));
-        let mut terminal = Terminal::new(TestBackend::new(110, 36)).unwrap();
-        terminal.draw(|frame| screen.draw(frame, decoder.counts())).unwrap();
-        terminal.backend().buffer().clone()
+        lines(&screen, decoder.counts(), width, height)
     }
 
-    fn text(buffer: &Buffer) -> String {
-        buffer.content().iter().map(|cell| cell.symbol()).collect()
+    fn lines(screen: &Screen, counts: &Counts, width: u16, height: u16) -> Vec<String> {
+        let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
+        terminal.draw(|frame| screen.draw(frame, counts)).unwrap();
+        let cells = terminal.backend().buffer().content();
+        let text = |line: &[ratatui::buffer::Cell]| line.iter().map(|cell| cell.symbol()).collect();
+        cells.chunks(width.into()).map(text).collect()
     }
 
     #[test]
-    fn state_plots_log_and_keys_are_there() {
-        let text = text(&drawn());
-        for part in [
-            "complete",
+    fn small_and_large_terminals_have_state_legends_log_and_keys() {
+        let always = [
+            "deployed",
+            "contact: continuous",
             "level 3",
-            "speed, mm/s",
-            "preload, N",
-            "tread compression, mm",
-            "crossing 3 at",
-            "r retract",
+            " N",
+            "slip margin ",
             "lost 0 frames",
-        ] {
-            assert!(text.contains(part), "{part}");
+            "ws://127.0.0.1:8765",
+            "recorded to out/live/log.mcap",
+            "speed, mm/s ─wanted ─measured",
+            "preload, N ─wanted ─measured",
+            "gap, mm ─wanted ─clearance •measured",
+            "compression, mm ─measured",
+            "mode: deployed",
+            "SPACE or x stop",
+            "the drive runs on",
+        ];
+        let wide =
+            ["wheel centre to axis, mm ─by the arm", "slip margin ─estimated", "crossing 3 at"];
+        for (width, height, more) in [(80, 24, &wide[..0]), (140, 50, &wide)] {
+            let lines = drawn(&Scenario::default(), width, height);
+            let text = lines.join("\n");
+            for part in always.iter().chain(more) {
+                assert!(text.contains(part), "{width}x{height}: no {part} in\n{text}");
+            }
+            // Nothing ends at the edge: the last column of the lines above the plots is free.
+            for line in &lines[..5] {
+                assert!(line.ends_with(' '), "{line}");
+            }
+            let dots = |c: &char| ('\u{2801}'..='\u{28ff}').contains(c);
+            assert!(text.chars().filter(dots).count() > 100, "{text}");
+            // Three crossings, three gaps, and the one of the legend.
+            assert_eq!(text.matches('•').count(), 4, "{text}");
         }
-        let dots = text.chars().filter(|letter| ('\u{2801}'..='\u{28ff}').contains(letter)).count();
-        assert!(dots > 100, "{dots} cells of the plots");
     }
 
     #[test]
-    fn nothing_yet_is_drawn_too() {
-        let mut terminal = Terminal::new(TestBackend::new(60, 26)).unwrap();
-        let screen = Screen::default();
-        terminal.draw(|frame| screen.draw(frame, &Counts::default())).unwrap();
-        assert!(text(terminal.backend().buffer()).contains("no tick yet"));
+    fn nothing_yet_is_drawn_too_and_a_tiny_terminal_ends_nothing() {
+        for (width, height) in [(60, 26), (20, 5), (1, 1)] {
+            let lines = lines(&screen(), &Counts::default(), width, height);
+            assert!(width < 60 || lines.join("\n").contains("no tick yet"));
+        }
     }
 
     #[test]
-    fn a_range_is_never_narrower_than_asked() {
-        assert_eq!(range([1.0, 2.0].into_iter(), 4.0), (-0.5, 3.5));
-        assert_eq!(range([f64::NAN].into_iter(), 4.0), (0.0, 4.0));
-        assert_eq!(range([0.0, 9.0].into_iter(), 4.0), (0.0, 9.0));
+    fn parameters_that_are_not_the_target_s_are_told() {
+        let slow = ["drive.cruise_speed_mm_s=20".to_owned()];
+        let scenario = Scenario::default().with(&slow).unwrap();
+        let options = session::Options { rows: true, ..session::Options::default() };
+        let stream = session::run(&scenario, options).unwrap().stream;
+        let (mut screen, mut decoder) = (screen(), Decoder::new());
+        decoder.read(&stream[..40_000], &mut |item| screen.see(&item));
+        let said = |text: &str| screen.lines.iter().filter(|line| line.1.contains(text)).count();
+        assert_eq!(said("other parameters"), 1);
     }
 }

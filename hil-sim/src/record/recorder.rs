@@ -6,7 +6,9 @@ use interstage::units::{Direction, Q16};
 use sha2::{Digest, Sha256};
 
 use super::tally::{Ended, TICK_S, Tally, true_line};
-use super::{Controller, CrossingLine, LogLine, Recording, Report, Tick, mode_number};
+use super::{
+    Controller, CrossingLine, LogLine, Recording, Report, Tick, mode_number, mode_words, stage_name,
+};
 use crate::plant::ledger::Crossing;
 use crate::plant::rig::{Truth, VirtualRig};
 use crate::scenario::Scenario;
@@ -147,10 +149,13 @@ pub(super) fn reported(t_s: f64, event: &Event) -> Option<(bool, Report)> {
 #[must_use]
 pub fn text(event: &Event) -> String {
     match event {
-        Event::Mode(mode) => format!("mode {mode:?}"),
-        Event::Stage(stage) => format!("contact stage {} ({stage:?})", *stage as u8),
-        Event::Command(command) => format!("command {command:?}"),
-        Event::Refused(command) => format!("command {command:?} refused in this mode"),
+        Event::Mode(mode) => format!("mode: {}", mode_words(*mode)),
+        Event::Stage(stage) => {
+            let stage = *stage as u8;
+            format!("contact stage {stage}: {}", stage_name(stage))
+        }
+        Event::Command(command) => format!("command: {}", command.word()),
+        Event::Refused(command) => format!("command refused in this mode: {}", command.word()),
         Event::Fault(fault) => format!("fault {}: {}", fault.code(), fault.sentence()),
         Event::Limit(limit) => format!("limit {}: {}", limit.code(), limit.sentence()),
         Event::Lost(entries) => format!("{entries} log entries lost"),

@@ -133,6 +133,9 @@ fn summary(run: &Run) -> Summary {
         let planner = Planner::try_build(&scenario.rig).ok()?;
         Some(planner.gap_ref(direction).to_num())
     });
+    // A host's build has no hash.
+    let has_hash = header.build.bytes().any(|digit| digit != b'0');
+    let build = if has_hash { format!(", build {}", header.build) } else { String::new() };
     let unknown = f64::NAN;
     Summary {
         measured: true,
@@ -145,7 +148,7 @@ fn summary(run: &Run) -> Summary {
             .last()
             .and_then(Controller::mode)
             .is_some_and(|mode| matches!(mode, Mode::Complete(_))),
-        target: format!("log of version {}, build {}", header.version, header.build),
+        target: format!("log of version {}{build}", header.version),
         controller: scenario
             .as_ref()
             .map_or("unknown", |scenario| scenario.run.controller.name())

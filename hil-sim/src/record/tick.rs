@@ -45,10 +45,13 @@ pub fn mode_number(mode: Mode) -> u8 {
     split(mode).0
 }
 
-/// Name of a mode, without its direction.
+/// A mode in words, with its direction and the code of a fault that is held.
 #[must_use]
-pub fn mode_name(mode: Mode) -> &'static str {
-    MODE_NAMES[usize::from(mode_number(mode))]
+pub fn mode_words(mode: Mode) -> String {
+    match mode {
+        Mode::FaultHold(fault) => format!("{}, {}", mode.words(), fault.code()),
+        _ => mode.words().to_owned(),
+    }
 }
 
 /// Name of a contact stage's number.
@@ -465,7 +468,9 @@ mod tests {
             let tick = Controller { mode: number, retracts, fault, ..Controller::default() };
             assert_eq!(tick.mode(), Some(mode));
             assert!(
-                format!("{mode:?}").to_lowercase().contains(&mode_name(mode)[..4].replace('-', ""))
+                format!("{mode:?}")
+                    .to_lowercase()
+                    .contains(&MODE_NAMES[usize::from(number)][..4].replace('-', ""))
             );
         }
         for (mode, retracts) in [(OFF, false), (3, true), (FAULT_HOLD, false), (200, true)] {

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use super::{Controller, Counts, Item, Mark, mode_name, stage_name, text};
+use super::{Controller, Counts, Item, Mark, mode_words, stage_name, text};
 
 /// The latest items of a log, and its rates.
 pub struct View {
@@ -64,7 +64,7 @@ impl View {
     pub fn rates_text(&self, counts: &Counts) -> String {
         let (ticks, bytes) = self.rates;
         format!(
-            "rig {}  {} ticks  {ticks:.0} ticks/s  {:.1} kB/s  lost {} frames, {} ticks  restarts {}",
+            "rig {}  {} ticks, {ticks:.0}/s, {:.0} kB/s  lost {} frames, {} ticks  restarts {}",
             self.rig,
             counts.ticks,
             bytes * 1e-3,
@@ -74,26 +74,30 @@ impl View {
         )
     }
 
-    /// Time, mode, contact and the quantities of the latest tick; empty before the first.
+    /// Time, mode, contact and the quantities of the latest tick, in lines of at most 80 letters;
+    /// empty before the first.
     #[must_use]
     pub fn state_text(&self) -> String {
         self.row.map_or_else(String::new, |row| {
-            format!(
-                "  {:9.3} s  {:10}  contact: {:16} level {}\n  position {:8.3} mm   speed {:7.3} of {:7.3} mm/s   preload {:6.2} of {:6.2} N\n  compression {:6.3} mm   radius {:8.3} mm   gap predicted {:6.3} mm   slip margin {:5.2}",
-                row.t_s,
-                row.mode().map_or("?", mode_name),
-                stage_name(row.stage),
-                row.level,
+            let mode = row.mode().map_or_else(|| "unknown mode".to_owned(), mode_words);
+            let stage = stage_name(row.stage);
+            let state = format!(
+                " {:9.2} s  {mode:25}  contact: {stage:15}  level {}\n",
+                row.t_s, row.level
+            );
+            let motion = format!(
+                " position {:6.2} mm   speed {:5.2} of {:5.2} mm/s   preload {:5.1} of {:5.1} N\n",
                 row.position_mm,
                 row.wheel_speed_mm_s,
                 row.speed_ref_mm_s,
                 row.preload_n,
-                row.preload_ref_n,
-                row.compression_mm,
-                row.radius_mm,
-                row.gap_predicted_mm,
-                row.slip_margin,
-            )
+                row.preload_ref_n
+            );
+            let contact = format!(
+                " compression {:4.2} mm  radius {:5.1} mm  gap predicted {:4.2} mm  slip margin {:5.2}",
+                row.compression_mm, row.radius_mm, row.gap_predicted_mm, row.slip_margin
+            );
+            state + &motion + &contact
         })
     }
 
@@ -122,7 +126,7 @@ mod tests {
         let (mut view, mut decoder) = (View::default(), Decoder::new());
         decoder.read(&stream, &mut |item| view.see(&item));
         let text = view.text(decoder.counts());
-        for part in ["rig prototype", "complete", "level 3", "lost 0 frames", "position"] {
+        for part in ["rig prototype", "deployed", "level 3", "lost 0 frames", "position"] {
             assert!(text.contains(part), "{part} in {text}");
         }
         assert!(!view.count(decoder.counts()), "too early for a rate");

@@ -127,6 +127,15 @@ impl<M: Write + Seek, C: Write> Writer<M, C> {
         })
     }
 
+    /// Adds the controller's parameters, as TOML, to the MCAP file.
+    ///
+    /// # Errors
+    /// [`WriteError`] if it cannot grow any more.
+    pub fn parameters(&mut self, toml: &str) -> Result<(), WriteError> {
+        let written = self.mcap.as_mut().map_or(Ok(()), |mcap| mcap.parameters(toml));
+        written.map_err(|source| self.failed(source))
+    }
+
     /// The target's identity, as soon as it has come.
     pub const fn header(&self) -> Option<&Header> {
         self.header.as_ref()

@@ -121,7 +121,7 @@ fn stills(scene: &Scene, c: &Event) -> String {
 }
 
 /// Why the corner touches so far before the face.
-pub(super) fn touch(scene: &Scene, c: &Event) -> String {
+fn touch(scene: &Scene, c: &Event) -> String {
     if scene.retracts {
         return "Retracting, the wheel comes from the upper wall: the edge takes the load when \
 the tread's patch reaches it."

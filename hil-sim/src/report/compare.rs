@@ -93,7 +93,8 @@ fn table(differences: &[Difference]) -> String {
             let change =
                 change.map_or_else(|| number(None, 0), |change| format!("{change:+.decimals$}"));
             let (a, b) = (number(*a, *decimals), number(*b, *decimals));
-            vec![index.to_string(), format!("{quantity}, {unit}"), a, b, change]
+            let unit = if unit.is_empty() { String::new() } else { format!(", {unit}") };
+            vec![index.to_string(), format!("{quantity}{unit}"), a, b, change]
         });
     tables::table("ledger", &head, rows.collect())
 }

@@ -65,7 +65,7 @@ and the undeformed wheel at the instant at which the lower wall stops carrying l
     if !recording.rows.is_empty() {
         page += &section("Why the preload rises", &animation::html(scene.as_ref()));
     }
-    page += &section("The run", &plots(recording, scene.as_ref()));
+    page += &section("The run", &plots(recording));
     page += &section("The crossings enlarged", &crossings::html(recording));
     for Section { title, body } in more {
         page += &section(title, body);
@@ -102,15 +102,12 @@ fn folded(title: &str, body: &str) -> String {
 }
 
 /// The plots over time and over position, one of the two shown.
-fn plots(recording: &Recording, scene: Option<&Scene>) -> String {
+fn plots(recording: &Recording) -> String {
     if recording.rows.is_empty() {
         return "<p>No rows were recorded.</p>\n".to_owned();
     }
     let time = stack(recording, Across::Time);
     let position = stack(recording, Across::Position);
-    let touch = scene.and_then(|scene| Some((scene, scene.crossings.first()?)));
-    let touch =
-        touch.map_or_else(String::new, |(scene, c)| " ".to_owned() + &animation::touch(scene, c));
     let hidden_s = Across::Time.range(&recording.rows).0;
     let from = motion(&recording.rows).filter(|_| hidden_s > recording.rows[0].controller.t_s);
     let from = from.map_or_else(String::new, |row| {
@@ -125,7 +122,7 @@ fn plots(recording: &Recording, scene: Option<&Scene>) -> String {
 <input type=\"radio\" name=\"across\" id=\"position\">\
 <label for=\"position\">over position</label>\n\
 <p class=\"note\">Shaded: from the first touch of the corner (dotted) to the instant of the gap. \
-Grey line: the axle passes the face of the step.{touch}{from}</p>\n\
+Grey line: the axle passes the face of the step.{from}</p>\n\
 <div class=\"time\">\n{time}</div>\n<div class=\"position\">\n{position}</div>\n"
     )
 }

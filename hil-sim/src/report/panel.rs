@@ -259,14 +259,16 @@ impl Panel {
         if fits { HEAD } else { HEAD + LEGEND }
     }
 
-    /// Title on the left, legend on the right or below.
+    /// Title on the left, legend behind it or below: a narrow screen shows the left end first.
     fn draw_head(&self, head: &Area) -> Drawn {
-        let (wide, high) = head.dim_in_pixel();
+        let high = head.dim_in_pixel().1;
         let style = font(TITLE_PX, palette::TRUTH, HPos::Left, VPos::Center);
         head.draw(&Text::new(self.title.clone(), (8 * S, HEAD / 2), style))?;
         let middle = if high as i32 > HEAD { HEAD - 4 * S + LEGEND / 2 } else { HEAD / 2 };
-        let mut right = wide as i32 - RIGHT;
-        for entry in self.legend().iter().rev() {
+        let legend = self.legend();
+        let behind = if high as i32 > HEAD { 0 } else { text_width(&self.title, TITLE_PX) };
+        let mut right = 8 * S + behind + legend.iter().map(Sample::width).sum::<i32>();
+        for entry in legend.iter().rev() {
             let (name, sample) = entry;
             let style = font(TEXT_PX, palette::TEXT, HPos::Left, VPos::Center);
             let text = right - text_width(name, TEXT_PX);

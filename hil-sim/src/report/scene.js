@@ -60,7 +60,10 @@ function phase(scene, row) {
   const next = current(scene, t);
   const said = scene.measured ? "measured " : "";
   const state = `${t.toFixed(2)} s: ${n(row.speed_mm_s, 1)} mm/s, ${said}preload ${n(row.preload_n, 1)} N of ${n(row.preload_ref_n, 1)} N wanted. `;
-  if (!next) return state + "No step is left ahead.";
+  if (!next) {
+    const ahead = scene.geometry.steps.some(([face]) => (scene.retracts ? face < row.position_mm : face > row.position_mm));
+    return state + (ahead ? "The wheel does not get over the next step in this run." : "No step is left ahead.");
+  }
   const at = `Step ${next.index}: `;
   const over = Math.sign(next.face_mm - row.position_mm) * (scene.retracts ? -1 : 1);
   if (t < next.touch_s) {

@@ -48,7 +48,7 @@ pub(super) struct Scene {
 
 /// Geometry of rig and sleeve.
 #[derive(Debug, Serialize)]
-pub(super) struct Geometry {
+pub(crate) struct Geometry {
     /// Undeformed wheel radius R, mm.
     pub(super) wheel_radius_mm: f64,
     /// Outermost wall from the pillar axis, mm.
@@ -70,6 +70,11 @@ pub(super) struct Geometry {
 }
 
 impl Geometry {
+    /// That of `rig` as the controller knows it.
+    pub(crate) fn of_rig(rig: &Rig) -> Self {
+        Self::new(rig, &Map::new())
+    }
+
     /// That of `rig`, with what the seed drew of it.
     fn new(rig: &Rig, drawn: &Map<String, Value>) -> Self {
         let list = |key: &str| -> Option<Vec<f64>> {
@@ -100,7 +105,7 @@ impl Geometry {
 
     /// Clearance of the next step's root from the undeformed wheel, mm; `NaN` if the step is
     /// farther away than the wheel reaches.
-    pub(super) fn clearance_mm(&self, position_mm: f64, radius_mm: f64) -> f64 {
+    pub(crate) fn clearance_mm(&self, position_mm: f64, radius_mm: f64) -> f64 {
         let faces = self.steps.iter().map(|step| step.0 - position_mm);
         let ahead = faces.filter(|ahead| *ahead > 0.0).fold(f64::INFINITY, f64::min);
         let height = self.wall_radius_mm - radius_mm - self.wall_mm(position_mm);

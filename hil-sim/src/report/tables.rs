@@ -27,26 +27,36 @@ pub(super) fn summary(s: &Summary) -> String {
         ("Direction", s.direction.clone()),
         ("Rig", s.rig.clone()),
         ("Seed", s.seed.to_string()),
-        ("From command to arrival", number(s.duration_s, 3) + " s"),
-        ("Moving", number(s.moving_s, 3) + " s"),
-        ("From boot to end", number(s.total_s, 3) + " s"),
-        ("Travel", number(s.travel_mm, 2) + " mm"),
+        ("From command to arrival", with_unit(s.duration_s, 3, "s")),
+        ("Moving", with_unit(s.moving_s, 3, "s")),
+        ("From boot to end", with_unit(s.total_s, 3, "s")),
+        ("Travel", with_unit(s.travel_mm, 2, "mm")),
         (
             if s.measured { "Worst measured gap" } else { "Worst gap" },
-            number(s.max_gap_mm, 4) + " mm",
+            with_unit(s.max_gap_mm, 4, "mm"),
         ),
-        ("Reference gap", number(s.gap_ref_mm, 4) + " mm"),
-        (if s.measured { "Measured slip" } else { "Gross slip" }, number(s.slip_mm, 3) + " mm"),
-        ("Mean preload", number(s.mean_preload_n, 2) + " N"),
-        ("Drive energy", number(s.energy_j, 3) + " J"),
-        ("Friction work", number(s.wear_j, 3) + " J"),
-        ("Real-time factor", number(s.real_time_factor, 1)),
+        ("Reference gap", with_unit(s.gap_ref_mm, 4, "mm")),
+        (if s.measured { "Measured slip" } else { "Gross slip" }, with_unit(s.slip_mm, 3, "mm")),
+        ("Mean preload", with_unit(s.mean_preload_n, 2, "N")),
+        ("Drive energy", with_unit(s.energy_j, 3, "J")),
+        ("Friction work", with_unit(s.wear_j, 3, "J")),
+        (
+            "Real-time factor",
+            if s.measured { String::new() } else { number(s.real_time_factor, 1) },
+        ),
     ];
     let cells: String = pairs
         .iter()
+        .filter(|(_, value)| !value.is_empty())
         .map(|(name, value)| format!("<div><dt>{name}</dt><dd>{}</dd></div>\n", escape(value)))
         .collect();
     format!("<dl>\n{cells}</dl>\n")
+}
+
+/// A value with its unit; empty if it is not known.
+fn with_unit(value: impl Into<Option<f64>>, decimals: usize, unit: &str) -> String {
+    let value = value.into().filter(|value| value.is_finite());
+    value.map_or_else(String::new, |value| format!("{} {unit}", number(value, decimals)))
 }
 
 /// The ledger of the crossings.
@@ -118,6 +128,16 @@ mod tests {
         };
         assert_eq!(show(1.5, Some(1.55)), "1.550<small>+50 µm, +3.3 %</small>");
         assert_eq!((show(1.5, None), show(f64::NAN, Some(1.55))), ("-".into(), "1.550".into()));
+    }
+
+    #[test]
+    fn what_is_not_known_is_left_out_of_the_summary() {
+        let known = Summary { max_gap_mm: 2.5, ..Summary::default() };
+        assert!(summary(&known).contains("<dd>2.5000 mm</dd>"), "{}", summary(&known));
+        let unknown = summary(&Summary { max_gap_mm: f64::NAN, energy_j: f64::NAN, ..known });
+        for part in ["Worst gap", "Drive energy", "<dd>-"] {
+            assert!(!unknown.contains(part), "{part} in {unknown}");
+        }
     }
 
     #[test]

@@ -109,6 +109,39 @@ fn a_view_without_terminal_ends_by_itself() {
 }
 
 #[test]
+fn a_view_records_what_it_shows() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let view = ["live", "--headless", "--fast", "--listen", "127.0.0.1:0", "--record", "kept"];
+    let output = rig_in(directory.path(), &[&view[..], &["--set", "tread.tau_s=0.11"]].concat());
+    assert_eq!(code(&output), 0, "{}", stderr(&output));
+    assert!(stdout(&output).contains("wrote kept/log.mcap"), "{}", stdout(&output));
+    let replayed = rig_in(directory.path(), &["replay", "kept/log.mcap", "kept/log.csv", "--json"]);
+    let replayed = object(&replayed);
+    assert_eq!(replayed["equal"], true, "{replayed}");
+    assert!(number(&replayed["logs"][0], "ticks") > 5000.0);
+}
+
+#[test]
+fn a_log_of_other_parameters_than_those_given_has_none_and_says_so() {
+    let set = ["--set", "drive.cruise_speed_mm_s=20"];
+    let scenario = Scenario::default().with(&[set[1].to_owned()]).expect("a scenario");
+    let options = session::Options { rows: true, ..session::Options::default() };
+    let stream = session::run(&scenario, options).expect("a run").stream;
+    let (directory, line) = file("line.bin", &stream);
+    let at = directory.path();
+    let output = rig_in(at, &["capture", "--stream", name(&line), "--out", "without"]);
+    assert_eq!(code(&output), 0);
+    assert!(stderr(&output).contains("runs with parameters"), "{}", stderr(&output));
+    assert_eq!(code(&rig_in(at, &["replay", "without/log.mcap"])), 2);
+    let given = ["capture", "--stream", name(&line), "--out", "with", set[0], set[1]];
+    let output = rig_in(at, &given);
+    assert!(!stderr(&output).contains("runs with parameters"), "{}", stderr(&output));
+    for log in ["with/log.mcap", "with/log.csv"] {
+        assert_eq!(code(&rig_in(at, &["replay", log])), 0, "{log}");
+    }
+}
+
+#[test]
 fn a_log_of_other_parameters_is_refused_until_they_are_given() {
     let directory = tempfile::tempdir().expect("a directory");
     let set = ["--set", "tread.tau_s=0.11"];

@@ -78,15 +78,18 @@ fn help_lists_the_verbs_and_is_no_error() {
     assert!(stdout(&rig(&["--version"])).starts_with("rig "));
 }
 
-/// A program in the place of cargo, which says and writes this.
+/// A program in the place of cargo, which says this and has built that program.
 #[cfg(unix)]
-fn cargo_that(says: &str) -> (tempfile::TempDir, std::path::PathBuf) {
+fn cargo_that(says: &str, built: &str) -> (tempfile::TempDir, std::path::PathBuf) {
     use std::os::unix::fs::PermissionsExt;
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("cargo");
-    let artifact =
-        r#"{"reason":"compiler-artifact","target":{"name":"rig-study"},"executable":"/bin/true"}"#;
-    std::fs::write(&path, format!("#!/bin/sh\nprintf '{says}' >&2\necho '{artifact}'\n")).unwrap();
+    let artifact = r#"{"reason":"compiler-artifact","target":{"name":"rig-study"},"executable":"#;
+    std::fs::write(
+        &path,
+        format!("#!/bin/sh\nprintf '{says}' >&2\necho '{artifact}\"{built}\"}}'\n"),
+    )
+    .unwrap();
     std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).unwrap();
     (directory, path)
 }
@@ -95,7 +98,7 @@ fn cargo_that(says: &str) -> (tempfile::TempDir, std::path::PathBuf) {
 #[test]
 fn a_build_is_announced_only_when_something_is_built() {
     let started = |says: &str| {
-        let (_directory, cargo) = cargo_that(says);
+        let (_directory, cargo) = cargo_that(says, "/bin/true");
         let mut rig = Command::new(env!("CARGO_BIN_EXE_rig"));
         let output = rig.env("CARGO", cargo).arg("modes").output().expect("the command starts");
         assert_eq!(code(&output), 0, "{}", stderr(&output));
@@ -104,6 +107,17 @@ fn a_build_is_announced_only_when_something_is_built() {
     assert_eq!(started("    Finished dev\\n"), "");
     let text = started("   Compiling a v1\\n    Building [=> ] 30/42: a\\r    Finished dev\\n");
     assert_eq!(text, "building the study, once: 12 units to compile\n");
+}
+
+#[cfg(unix)]
+#[test]
+fn help_of_a_verb_of_another_part_is_that_part_s() {
+    let (_directory, cargo) = cargo_that("", "/bin/echo");
+    for verb in ["modes", "bench", "paper"] {
+        let mut rig = Command::new(env!("CARGO_BIN_EXE_rig"));
+        let output = rig.env("CARGO", &cargo).args(["help", verb]).output().expect("starts");
+        assert_eq!((code(&output), stdout(&output)), (0, &*format!("{verb} --help\n")));
+    }
 }
 
 fn flash_by(program: &std::path::Path, arguments: &[&str]) -> Output {
@@ -164,4 +178,31 @@ fn probe_rs_has_to_be_there_and_new_enough() {
     let text = stderr(&output);
     assert!(text.contains("probe-rs 0.31.0") && text.contains("0.32"), "{text}");
     let _ = std::fs::remove_file(old);
+}
+
+#[test]
+fn a_file_that_becomes_active_is_asked_for_what_no_default_knows() {
+    let directory = tempfile::tempdir().unwrap();
+    let at = directory.path();
+    let restored = |file: &str, text: &str| {
+        std::fs::write(at.join(file), text).unwrap();
+        let arguments = ["params", "restore", file, "--file", "board.set"];
+        let output = super::rig_in(at, &arguments);
+        assert_eq!(code(&output), 0, "{}", stderr(&output));
+        stderr(&output)
+    };
+    let said = restored("mine.toml", "[rig]\nwheel_radius_mm = 25.0\n");
+    assert_eq!(said.lines().count(), 1, "{said}");
+    for part in ["mine.toml", "`prototype`", "rig.step_positions_mm", "plant.arm_coupling"] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    // It states this one, and the other is a choice.
+    for other in ["rig.wheel_radius_mm", "drive.cruise_speed_mm_s"] {
+        assert!(!said.contains(other), "{other}: {said}");
+    }
+    let saved = ["params", "save", "all.toml", "--file", "board.set"];
+    assert_eq!(code(&super::rig_in(at, &saved)), 0);
+    let all = std::fs::read_to_string(at.join("all.toml")).unwrap();
+    assert_eq!(restored("all.toml", &all), "");
+    super::refused_in(at, &["params", "get"], &["--target", "--file"]);
 }

@@ -1,6 +1,5 @@
 //! Python with pinned packages in a virtual environment under the target directory.
 
-use std::env;
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -17,6 +16,9 @@ pub(super) struct Python {
     pub(super) folder: PathBuf,
 }
 
+/// Folder of the environment in the target directory.
+const FOLDER: &str = "peers";
+
 /// The folder of the scripts.
 fn scripts() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("peers")
@@ -24,20 +26,10 @@ fn scripts() -> PathBuf {
 
 /// Makes the environment, unless it has these packages already.
 pub(super) fn provide(say: &dyn Fn(&str)) -> Result<Python> {
-    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let target = env::var_os("CARGO_TARGET_DIR").map_or(workspace.join("target"), PathBuf::from);
-    let folder = target.join("peers");
+    say("setting up Python");
     let wanted = fs::read_to_string(scripts().join("requirements.txt"))?;
-    let stamp = folder.join("requirements.txt");
-    let program = folder.join("bin/python");
-    if fs::read_to_string(&stamp).ok().as_ref() != Some(&wanted) || !program.is_file() {
-        say("setting up Python");
-        fs::create_dir_all(&folder)?;
-        output(Command::new("python3").args(["-m", "venv"]).arg(&folder), b"")?;
-        let install = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r"];
-        output(Command::new(&program).args(install).arg(scripts().join("requirements.txt")), b"")?;
-        fs::write(&stamp, &wanted)?;
-    }
+    let program = hil_sim::provision::python(FOLDER, &wanted.lines().collect::<Vec<_>>())?;
+    let folder = program.ancestors().nth(2).context("no folder")?.to_owned();
     Ok(Python { program, folder })
 }
 

@@ -1,0 +1,183 @@
+//! Files of a log that grows, for `capture` and `live`.
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use interstage::log::identity::fingerprint;
+
+use super::failure::Failure;
+use crate::files::make_directory;
+use crate::record::{Counts, Header, Item, Metadata, WriteError, Writer, write_metadata};
+use crate::scenario::Scenario;
+
+/// Ctrl-C as a request to end with complete files.
+pub(super) struct Stop(Arc<AtomicBool>);
+
+impl Stop {
+    pub(super) fn by_ctrl_c() -> Self {
+        let wanted = Arc::new(AtomicBool::new(false));
+        let seen = Arc::clone(&wanted);
+        // Without it Ctrl-C ends the program at once, and the files say that they were cut off.
+        // The second one does so where the source gives nothing.
+        let _ = ctrlc::set_handler(move || {
+            if seen.swap(true, Ordering::Relaxed) {
+                std::process::exit(130);
+            }
+        });
+        Self(wanted)
+    }
+
+    pub(super) fn is_wanted(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+/// An MCAP file and a table with its metadata.
+pub(super) struct LogFiles {
+    writer: Writer<BufWriter<File>, BufWriter<File>>,
+    folder: PathBuf,
+    mcap: PathBuf,
+    /// None if it is left out.
+    csv: Option<PathBuf>,
+    /// What the target is said to run with: hash and TOML.
+    given: (String, String),
+    /// The target's identity, as soon as it has come.
+    header: Option<Header>,
+    /// What it runs with, if that is what was given.
+    parameters: Option<String>,
+    news: Vec<String>,
+}
+
+impl LogFiles {
+    /// Begins the files `name` in `folder`; without a name `log`, with a number if that is there.
+    /// `bare` leaves the table and the decoded ticks out.
+    pub(super) fn new(
+        folder: &Path,
+        name: Option<&str>,
+        bare: bool,
+        scenario: &Scenario,
+    ) -> Result<Self, Failure> {
+        make_directory(folder)?;
+        let name = free_name(folder, name)?;
+        let mcap = folder.join(format!("{name}.mcap"));
+        let csv = (!bare).then(|| folder.join(format!("{name}.csv")));
+        let table = csv.as_deref().map(created).transpose()?;
+        let writer = Writer::new(Some(created(&mcap)?), table, None, !bare);
+        let given = (format!("{:08x}", fingerprint(&scenario.rig)), scenario.to_toml());
+        Ok(Self {
+            writer: writer.map_err(|error| failed(folder, error))?,
+            folder: folder.to_owned(),
+            mcap,
+            csv,
+            given,
+            header: None,
+            parameters: None,
+            news: Vec::new(),
+        })
+    }
+
+    /// The file with the frames.
+    pub(super) fn mcap(&self) -> &Path {
+        &self.mcap
+    }
+
+    /// Takes bytes in pieces of any size; passes each item to `see`.
+    pub(super) fn take(
+        &mut self,
+        bytes: &[u8],
+        see: &mut impl FnMut(&Item),
+    ) -> Result<(), Failure> {
+        self.writer.take(bytes, see).map_err(|error| failed(&self.folder, error))?;
+        if self.writer.header().is_some() && self.header.as_ref() != self.writer.header() {
+            self.header = self.writer.header().cloned();
+            self.identified()?;
+        }
+        Ok(())
+    }
+
+    /// The target has said what it runs with: parameters that have its hash belong to the log.
+    fn identified(&mut self) -> Result<(), Failure> {
+        let (hash, toml) = &self.given;
+        match &self.header {
+            Some(header) if header.parameters == *hash => {
+                let written = self.writer.parameters(toml);
+                written.map_err(|error| failed(&self.folder, error))?;
+                self.parameters = Some(toml.clone());
+            }
+            Some(header) => self.news.push(format!(
+                "the target runs with parameters {}, those given are {hash}: the log has none \
+                 (`rig params save FILE` writes a board's; give that file)",
+                header.parameters
+            )),
+            None => {}
+        }
+        // The number of ticks follows at the end.
+        let metadata = Metadata {
+            header: self.header.clone(),
+            parameters: self.parameters.clone(),
+            ticks: None,
+        };
+        self.csv.as_ref().map_or(Ok(()), |csv| {
+            write_metadata(csv, &metadata, false)?;
+            Ok(())
+        })
+    }
+
+    /// What has been read so far.
+    pub(super) const fn counts(&self) -> &Counts {
+        self.writer.counts()
+    }
+
+    /// What the operator should know, a line each, since the last call.
+    pub(super) fn news(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.news)
+    }
+
+    /// Completes the files and returns what was read, and their paths.
+    pub(super) fn finish(
+        self,
+        see: &mut impl FnMut(&Item),
+    ) -> Result<(Counts, Vec<PathBuf>), Failure> {
+        let Self { writer, folder, mcap, csv, header, parameters, .. } = self;
+        let counts = writer.finish(see).map_err(|error| failed(&folder, error))?;
+        let metadata = Metadata { header, parameters, ticks: Some(counts.ticks) };
+        let described =
+            csv.as_ref().map(|csv| write_metadata(csv, &metadata, false)).transpose()?;
+        Ok((counts, [Some(mcap), csv, described].into_iter().flatten().collect()))
+    }
+}
+
+fn failed(folder: &Path, error: WriteError) -> Failure {
+    Failure::run(format!("{}: {error}", folder.display()))
+}
+
+/// The name of the files: what is there is kept.
+fn free_name(folder: &Path, asked: Option<&str>) -> Result<String, Failure> {
+    let taken = |name: &str| {
+        let all = ["mcap", "csv"].map(|ending| folder.join(format!("{name}.{ending}")));
+        all.into_iter().find(|path| path.exists())
+    };
+    match asked {
+        Some(name) => match taken(name) {
+            Some(path) => {
+                let path = path.display();
+                Err(Failure::input(format!("{path}: is there already; give another --name")))
+            }
+            None => Ok(name.to_owned()),
+        },
+        None => {
+            let numbered = (2..).map(|n: u32| format!("log-{n}"));
+            let mut names = std::iter::once("log".to_owned()).chain(numbered);
+            Ok(names.find(|name| taken(name).is_none()).unwrap_or_default())
+        }
+    }
+}
+
+fn created(path: &Path) -> Result<BufWriter<File>, Failure> {
+    let file = File::create(path);
+    let file = file.map_err(|error| Failure::input(format!("{}: {error}", path.display())))?;
+    Ok(BufWriter::new(file))
+}

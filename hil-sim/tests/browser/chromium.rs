@@ -1,0 +1,181 @@
+//! A headless Chromium, steered over the DevTools protocol.
+
+use std::env;
+use std::io::{BufRead, BufReader};
+use std::net::TcpStream;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use serde_json::{Value, json};
+use tungstenite::{Message, WebSocket};
+
+/// Programs that are tried, behind the one in the variable `CHROME`.
+const PROGRAMS: [&str; 5] =
+    ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome"];
+/// What the browser says on standard error before the address of its socket.
+const LISTENING: &str = "DevTools listening on ";
+/// Longest wait for an answer.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// The browser's program, if this machine has one.
+pub(super) fn program() -> Option<PathBuf> {
+    let named = env::var_os("CHROME").map(PathBuf::from);
+    let found = |name: &PathBuf| {
+        let mut command = Command::new(name);
+        command.arg("--version").stdin(Stdio::null()).output().is_ok_and(|o| o.status.success())
+    };
+    named.into_iter().chain(PROGRAMS.map(PathBuf::from)).find(found)
+}
+
+/// A browser with one page.
+pub(super) struct Browser {
+    child: Child,
+    socket: WebSocket<TcpStream>,
+    session: Value,
+    calls: u64,
+    /// Events of the page since it was opened.
+    events: Vec<Value>,
+    _profile: tempfile::TempDir,
+}
+
+impl Drop for Browser {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Browser {
+    pub(super) fn start(program: &Path) -> Self {
+        let profile = tempfile::tempdir().expect("a temporary directory");
+        let mut child = Command::new(program)
+            .args(["--headless=new", "--no-sandbox", "--disable-gpu", "--no-first-run"])
+            .args(["--hide-scrollbars", "--remote-debugging-port=0"])
+            .arg(format!("--user-data-dir={}", profile.path().display()))
+            .arg("about:blank")
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the browser starts");
+        let mut said = BufReader::new(child.stderr.take().expect("standard error")).lines();
+        let address = said
+            .by_ref()
+            .map_while(Result::ok)
+            .find_map(|line| line.strip_prefix(LISTENING).map(str::to_owned))
+            .expect("the browser names its socket");
+        // Unread, its standard error would fill up.
+        std::thread::spawn(move || said.for_each(drop));
+        let host = address.trim_start_matches("ws://").split('/').next().unwrap_or_default();
+        let stream = TcpStream::connect(host).expect("the browser listens");
+        stream.set_read_timeout(Some(PATIENCE)).expect("a socket");
+        let (socket, _) = tungstenite::client(&address, stream).expect("the browser agrees");
+        let mut browser = Self {
+            child,
+            socket,
+            session: Value::Null,
+            calls: 0,
+            events: Vec::new(),
+            _profile: profile,
+        };
+        let page = browser.call("Target.createTarget", &json!({ "url": "about:blank" }));
+        let attach = json!({ "targetId": page["targetId"], "flatten": true });
+        browser.session = browser.call("Target.attachToTarget", &attach)["sessionId"].clone();
+        for domain in ["Page", "Runtime", "Log"] {
+            browser.call(&format!("{domain}.enable"), &json!({}));
+        }
+        browser
+    }
+
+    /// Calls a method of the protocol.
+    pub(super) fn call(&mut self, method: &str, parameters: &Value) -> Value {
+        self.calls += 1;
+        let mut request = json!({ "id": self.calls, "method": method, "params": parameters });
+        if !self.session.is_null() {
+            request["sessionId"] = self.session.clone();
+        }
+        self.socket.send(Message::text(request.to_string())).expect("the browser is there");
+        loop {
+            let message = self.socket.read().unwrap_or_else(|error| panic!("{method}: {error}"));
+            let Ok(text) = message.to_text() else { continue };
+            let Ok(mut answer) = serde_json::from_str::<Value>(text) else { continue };
+            if answer["id"] == self.calls {
+                assert!(answer["error"].is_null(), "{method}: {}", answer["error"]);
+                return answer["result"].take();
+            }
+            self.events.push(answer);
+        }
+    }
+
+    /// The value of an expression in the page; promises are awaited.
+    pub(super) fn value(&mut self, expression: &str) -> Value {
+        let asked =
+            json!({ "expression": expression, "returnByValue": true, "awaitPromise": true });
+        let mut answer = self.call("Runtime.evaluate", &asked);
+        let thrown = &answer["exceptionDetails"];
+        assert!(thrown.is_null(), "{expression}: {thrown}");
+        answer["result"]["value"].take()
+    }
+
+    /// The number that an expression has.
+    pub(super) fn number(&mut self, expression: &str) -> f64 {
+        let value = self.value(expression);
+        value.as_f64().unwrap_or_else(|| panic!("{expression}: {value}"))
+    }
+
+    /// Opens a page in a window of this width and waits until it has been drawn.
+    pub(super) fn open(&mut self, page: &Path, width: u32) {
+        self.events.clear();
+        self.resize(width, 1.0);
+        let page = page.canonicalize().expect("a page");
+        let url = format!("file://{}", page.display());
+        self.call("Page.navigate", &json!({ "url": url }));
+        for _ in 0..600 {
+            if self.value("document.readyState + location.protocol") == "completefile:" {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        panic!("{url} did not load");
+    }
+
+    /// Sets the width of the window, CSS pixels, and how many pixels of the screen are one of them.
+    pub(super) fn resize(&mut self, width: u32, scale: f64) {
+        let size =
+            json!({ "width": width, "height": 900, "deviceScaleFactor": scale, "mobile": false });
+        self.call("Emulation.setDeviceMetricsOverride", &size);
+    }
+
+    /// Chooses medium and colours.
+    pub(super) fn media(&mut self, medium: &str, colours: &str) {
+        let feature = json!([{ "name": "prefers-color-scheme", "value": colours }]);
+        self.call("Emulation.setEmulatedMedia", &json!({ "media": medium, "features": feature }));
+    }
+
+    /// Presses and releases the left button at a point of the window.
+    pub(super) fn click(&mut self, x: f64, y: f64) {
+        for kind in ["mousePressed", "mouseReleased"] {
+            let event = json!({ "type": kind, "x": x, "y": y, "button": "left", "clickCount": 1 });
+            self.call("Input.dispatchMouseEvent", &event);
+        }
+    }
+
+    /// Errors that the page has caused since it was opened.
+    pub(super) fn errors(&mut self) -> Vec<String> {
+        // What has happened until now has come when this is answered.
+        self.value("1");
+        let is_error = |event: &&Value| {
+            let parameters = &event["params"];
+            match event["method"].as_str() {
+                Some("Runtime.exceptionThrown") => true,
+                Some("Runtime.consoleAPICalled") => {
+                    ["error", "assert"].map(Value::from).contains(&parameters["type"])
+                }
+                Some("Log.entryAdded") => parameters["entry"]["level"] == "error",
+                _ => false,
+            }
+        };
+        self.events.iter().filter(is_error).map(|event| event["params"].to_string()).collect()
+    }
+}
