@@ -2,6 +2,7 @@
 //! it, and images that run on it.
 
 pub mod bench;
+pub mod bringup;
 pub mod campaign;
 pub mod capture;
 pub mod chip;
@@ -27,3 +28,4 @@ pub mod run;
 pub mod spread;
 pub mod thumb;
 pub mod timing;
+pub mod wiring;
