@@ -250,3 +250,17 @@ pub fn run(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_manual_has_each_check_with_what_is_done_and_expected() {
+        let page = include_str!("../../docs/HARDWARE.md");
+        for CheckInfo { name, stage, does, expected } in CHECKS {
+            let row = format!("| {} | {name} | {does} | {expected} |", stage.name());
+            assert!(page.contains(&row), "{row}");
+        }
+    }
+}

@@ -19,6 +19,9 @@ pub const DRIVE_DUTY: i16 = 9830;
 pub const PRELOAD_DUTY: i16 = 13_107;
 /// Ticks after which a request that is not repeated has run out.
 pub const DEAD_MAN_TICKS: u16 = 200;
+/// Ticks for which the drive's bridge stays on at zero duty after a motion. It brakes the wheel,
+/// which would otherwise drive its motor as a generator: that is another output than none.
+const BRAKE_TICKS: u16 = 150;
 /// Longest motion, ticks.
 pub const MOTION_TICKS: u16 = 2500;
 /// Longest travel of the tread in a motion, mm.
@@ -82,6 +85,8 @@ pub struct ServiceState {
     moving: u16,
     /// The motion has ended by a bound.
     ended: bool,
+    /// Ticks for which the wheel is still braked.
+    braking: u16,
     /// As the mode was entered.
     entry: ServiceView,
     /// As the motion began.
@@ -100,8 +105,20 @@ impl ServiceState {
         core::mem::replace(&mut self.asked, request) != request
     }
 
+    /// Whether the drive's bridge stays on without a duty.
+    pub const fn brakes(&self) -> bool {
+        self.braking > 0
+    }
+
     /// Duties of a tick of the mode, and the limit that has ended a motion in it.
     pub fn step(&mut self, seen: &ServiceView) -> (ServiceDuties, Option<Limit>) {
+        let (duties, limit) = self.judge(seen);
+        let drives = duties.drive != Duty::ZERO;
+        self.braking = if drives { BRAKE_TICKS } else { self.braking.saturating_sub(1) };
+        (duties, limit)
+    }
+
+    fn judge(&mut self, seen: &ServiceView) -> (ServiceDuties, Option<Limit>) {
         self.age = self.age.saturating_add(1);
         if self.asked.is_rest() || !self.asked.is_allowed() {
             self.moving = 0;
@@ -252,6 +269,23 @@ mod tests {
             let (ticks, limit) = lasts(&mut entered(), press(3000), pressed);
             assert!((500..=502).contains(&ticks) && limit == bounded, "{ticks}");
         }
+    }
+
+    #[test]
+    fn a_wheel_that_was_driven_is_braked_for_a_while() {
+        let mut state = entered();
+        assert!(!state.brakes());
+        state.ask(drive(3000));
+        state.step(&seen(0.0, 0.0, 0.0));
+        state.ask(ServiceDuties::REST);
+        let braked = (0..1000).take_while(|_| {
+            state.step(&seen(0.0, 0.0, 0.0));
+            state.brakes()
+        });
+        assert_eq!(braked.count(), usize::from(BRAKE_TICKS) - 1);
+        state.ask(press(3000));
+        state.step(&seen(0.0, 0.0, 0.0));
+        assert!(!state.brakes(), "the screw locks itself");
     }
 
     #[test]

@@ -48,6 +48,10 @@ impl Controller {
             Duty::ZERO => MotorCommand::OFF,
             duty => MotorCommand::on(duty),
         };
-        (command(duties.drive), command(duties.pretightener))
+        let drive = match command(duties.drive) {
+            MotorCommand::OFF if state.service.brakes() => MotorCommand::on(Duty::ZERO),
+            drive => drive,
+        };
+        (drive, command(duties.pretightener))
     }
 }

@@ -1,12 +1,24 @@
 //! The first power-up on the emulated board: a sound one, and each mistake in the wiring.
 
+use std::path::Path;
+use std::process::{Command, Stdio};
+
 use hil_sim::bringup::{self, Line, Progress, Stdin};
+use hil_sim::record::Run;
+use hil_sim::replay::replay;
 use hil_sim::scenario::Scenario;
+use interstage::params::Refusal;
+use interstage::params::link::{FrameReader, ToBoard, ToHost, frame};
+use interstage::params::service::{Request, Response};
+use interstage::supervise::ServiceDuties;
+use interstage::units::Duty;
 use rig_board::bench::Bench;
 use rig_board::bringup::Attended;
+use rig_board::chip::Pin;
 use rig_board::wiring::Mistake;
+use serde_json::Value;
 
-use crate::common::{elf, strings};
+use crate::common::{Board, elf, strings};
 
 /// The power-up of a board with these mistakes, every motion allowed.
 fn power_up(mistakes: &[Mistake]) -> Progress {
@@ -95,4 +107,128 @@ fn each_mistake_in_the_wiring_is_named_and_nothing_else_is_blamed() {
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Sends a request down the board's line.
+fn send(board: &mut Board, request: Request) {
+    let bytes = frame(&ToBoard::Parameters(1, request)).expect("it fits");
+    assert_eq!(board.bench.line_send(&bytes).expect("runs"), bytes.len());
+}
+
+/// The board's answer within some milliseconds.
+fn answer(board: &mut Board) -> Response {
+    board.run(20);
+    let mut reader = FrameReader::new();
+    let bytes = board.bench.line_take().expect("runs");
+    let answers = bytes.into_iter().filter_map(|byte| reader.take(byte));
+    let ToHost::Parameters(1, response) = answers.last().expect("an answer") else {
+        panic!("another number");
+    };
+    response
+}
+
+const PRESS: ServiceDuties =
+    ServiceDuties { drive: Duty::ZERO, pretightener: Duty::from_bits(6000) };
+const DRIVE: ServiceDuties =
+    ServiceDuties { drive: Duty::from_bits(6000), pretightener: Duty::ZERO };
+
+/// A board in the service mode.
+fn serving() -> Board {
+    let mut board = Board::idle();
+    send(&mut board, Request::Service(ServiceDuties::REST));
+    board.until("mode: service", 50);
+    board
+}
+
+#[test]
+fn a_host_that_falls_silent_loses_the_motor_within_a_fifth_of_a_second() {
+    let mut board = serving();
+    for _ in 0..6 {
+        send(&mut board, Request::Service(PRESS));
+        board.run(50);
+        assert!(board.step().drives.preload_on);
+    }
+    let silent = (0..1000).find(|_| !board.step().drives.preload_on).expect("it ends");
+    // The last word was 51 ms ago, and is read every 10 ms.
+    assert!((140..=162).contains(&silent), "{silent} ms");
+    assert!(board.said("the host fell silent"), "{:#?}", board.log);
+    board.assert_off(1000);
+    // The controller can be run again from its log, to the bit.
+    let run = Run::of_stream(&board.frames);
+    let replayed = replay(&run, &Scenario::default().rig).expect("a sound rig");
+    assert!(replayed.difference.is_none() && replayed.ticks > 1000, "{replayed:?}");
+}
+
+#[test]
+fn the_service_mode_is_refused_in_motion_and_ends_with_the_emergency_stop() {
+    let mut board = Board::moving();
+    for duties in [ServiceDuties::REST, DRIVE] {
+        send(&mut board, Request::Service(duties));
+        assert_eq!(answer(&mut board), Response::Refused(Refusal::NotService));
+    }
+    assert!(!board.said("mode: service"));
+    board.until("mode: deployed", 20_000);
+    let mut board = serving();
+    for _ in 0..3 {
+        send(&mut board, Request::Service(DRIVE));
+        board.run(50);
+    }
+    assert!(board.step().drives.drive > 0.1);
+    let now = board.machine().now();
+    for pin in [Pin::STOP_DRIVE, Pin::STOP_PRELOAD] {
+        board.machine().chip_mut().drive(pin, true, now);
+    }
+    board.step();
+    assert!(board.step().drives.drive == 0.0);
+    board.until("fault hold, 151", 5);
+    board.assert_off(200);
+}
+
+/// `rig bringup` on the emulated board, as a user has it, with this standard input closed.
+fn verb(place: &Path, arguments: &[&str]) -> (Option<i32>, Value, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_rig-board"))
+        .current_dir(place)
+        .args(["bringup", "--target", "board", "--out", "up", "--json"])
+        .args(arguments)
+        .stdin(Stdio::null())
+        .output()
+        .expect("starts");
+    let printed = serde_json::from_slice(&output.stdout).unwrap_or(Value::Null);
+    (output.status.code(), printed, String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+#[test]
+fn the_verb_moves_nothing_unconfirmed_and_goes_on_where_it_was_broken_off() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let place = folder.path();
+    let (code, _, said) = verb(place, &[]);
+    assert_eq!(code, Some(1), "{said}");
+    let last = said.lines().last().expect("it says why");
+    assert!(last.starts_with("error: not confirmed: ") && last.contains("DRIVE"), "{said}");
+    let (code, printed, said) = verb(place, &["--yes"]);
+    assert_eq!((code, &printed["complete"]), (Some(0), &true.into()), "{said}");
+    assert_eq!(said.matches("passed before").count(), 3, "{said}");
+    let checks = printed["checks"].as_array().expect("checks");
+    assert_eq!(checks.len(), bringup::CHECKS.len());
+    for check in checks {
+        for key in ["name", "ok", "measured", "expected", "advice"] {
+            assert!(!check[key].is_null(), "{check}");
+        }
+    }
+    let page = std::fs::read_to_string(place.join("up/report.html")).expect("a page");
+    assert!(page.contains("wired as it should be") && page.contains("drive.no_load_speed_mm_s"));
+    // What it proposes is what `params` takes.
+    let restored = Command::new(env!("CARGO_BIN_EXE_rig-board"))
+        .current_dir(place)
+        .args(["params", "restore", "up/proposed.toml", "--target", "board", "--json"])
+        .output()
+        .expect("starts");
+    let restored: Value = serde_json::from_slice(&restored.stdout).expect("one object");
+    for key in printed["proposed"].as_object().expect("keys").keys() {
+        assert_eq!(restored["parameters"][key].to_string(), printed["proposed"][key], "{key}");
+    }
+    let (code, printed, _) = verb(place, &["--yes", "--again", "--mistake", "encoder-swapped"]);
+    assert_eq!((code, &printed["complete"]), (Some(1), &false.into()));
+    let (code, _, said) = verb(place, &["--mistake", "gremlins"]);
+    assert!(code == Some(2) && said.contains("gremlins"), "{said}");
 }
