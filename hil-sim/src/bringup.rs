@@ -132,10 +132,10 @@ pub const CHECKS: &[CheckInfo] = &[
     info(
         "pre-tightener bridge",
         Stage::Pretightener,
-        "30 % for 0.5 s, its readback",
-        "30 %, the other bridge 0",
+        "25 % for 0.55 s, its readback",
+        "25 %, the other bridge 0",
     ),
-    info("preload rises", Stage::Pretightener, "30 % for 0.5 s", "preload and compression rise"),
+    info("preload rises", Stage::Pretightener, "the same", "preload and compression rise"),
     info(
         "preload against tread",
         Stage::Pretightener,
@@ -144,7 +144,7 @@ pub const CHECKS: &[CheckInfo] = &[
     ),
     info("arm direction", Stage::Pretightener, "the same", "the angle's code grows"),
     info("preload scale", Stage::Pretightener, "the same", "as spring and tread, within 25 %"),
-    info("preload released", Stage::Pretightener, "-30 % until slack", "below 2 N, then idle"),
+    info("preload released", Stage::Pretightener, "backwards until slack", "below 2 N, then idle"),
 ];
 
 /// A check of this name.
@@ -206,12 +206,17 @@ pub fn run(
     keep: &mut dyn FnMut(&Progress),
 ) -> Result<(), BringupError> {
     let expected = progress.expected.clone();
+    let mut supplied = false;
     for stage in Stage::ALL {
         if progress.is_done(stage) {
             say(&format!("{}: passed before", stage.name()));
             continue;
         }
         say(&format!("{}:", stage.name()));
+        if !matches!(stage, Stage::Board | Stage::Sensors) && !supplied {
+            operator.act(Action::SwitchOn)?;
+            supplied = true;
+        }
         let mut proposed = progress.proposed.clone();
         let session =
             &mut Session { line, operator, expected: &expected, proposed: &mut proposed, say };

@@ -22,8 +22,9 @@ const PERIPHERALS: u32 = 0x4000_0000;
 pub struct Attended<'a>(Rc<RefCell<Bench<'a>>>);
 
 impl<'a> Attended<'a> {
-    /// This bench.
-    pub fn new(bench: Bench<'a>) -> Self {
+    /// This bench, its motor supply switched off.
+    pub fn new(mut bench: Bench<'a>) -> Self {
+        bench.wiring_mut().switched_off = true;
         Self(Rc::new(RefCell::new(bench)))
     }
 
@@ -107,6 +108,7 @@ impl<O: Operator> Operator for Person<'_, O> {
         self.tread_mm = tread_mm(&bench);
         let wiring = bench.wiring_mut();
         match action {
+            Action::SwitchOn => wiring.switched_off = false,
             Action::PressStop => wiring.stop_pressed = true,
             Action::ReleaseStop => wiring.stop_pressed = false,
             Action::Unplug(sensor) => wiring.unplugged.push(sensor),

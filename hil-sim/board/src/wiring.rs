@@ -123,6 +123,8 @@ pub struct Wiring {
     mistakes: Vec<Mistake>,
     /// The emergency stop is pressed.
     pub stop_pressed: bool,
+    /// The motor supply is switched off.
+    pub switched_off: bool,
     /// Sensors that a hand has unplugged.
     pub unplugged: Vec<Sensor>,
 }
@@ -155,7 +157,7 @@ impl Wiring {
     #[must_use]
     pub fn is_supplied(&self) -> bool {
         let cut = self.stop_pressed && !self.has(Mistake::StopSupply);
-        !cut && !self.has(Mistake::SupplyOff)
+        !cut && !self.switched_off && !self.has(Mistake::SupplyOff)
     }
 
     /// Applies what is constant, and the hand, to the chip's pins.

@@ -84,7 +84,7 @@ const FOUND: &[(Mistake, &str, &str)] = &[
     (Mistake::PretightenerLeads, "preload rises", "pre-tightener's leads are swapped"),
     (Mistake::PreloadReversed, "preload rises", "preload sensor's bridge is reversed"),
     (Mistake::CompressionReversed, "preload rises", "compression sensor is reversed"),
-    (Mistake::SensorsExchanged, "preload against tread", "compression sensor are exchanged"),
+    (Mistake::SensorsExchanged, "preload lead", "compression sensor are exchanged"),
     (Mistake::ArmInwards, "arm direction", "codes grow inwards"),
     (Mistake::PreloadGain, "preload scale", "preload sensor's scale is wrong by 1.5"),
 ];

@@ -92,12 +92,12 @@ pub(super) fn counted(rows: &[Record]) -> Counted {
     Counted { sum, range: high - low, changes }
 }
 
-/// Compression at which the relaxed tread carries a preload, mm: a cylinder on a bed of
+/// Radial force that the relaxed tread carries at a compression, N: a cylinder on a bed of
 /// independent elements, p = k delta, so that P = 4/3 k L sqrt(2 R) delta^(3/2).
-pub(super) fn compression_mm(rig: &Rig, preload_n: f64) -> f64 {
+pub(super) fn preload_n(rig: &Rig, compression_mm: f64) -> f64 {
     let (radius, width) = (rig.rig.wheel_radius_mm * 1e-3, rig.rig.wheel_width_mm * 1e-3);
     let per = 4.0 / 3.0 * rig.tread.k_inf_pa_per_m * width * (2.0 * radius).sqrt();
-    (preload_n.max(0.0) / per).powf(2.0 / 3.0) * 1e3
+    per * (compression_mm.max(0.0) * 1e-3).powf(1.5)
 }
 
 #[cfg(test)]
@@ -125,8 +125,8 @@ mod tests {
             rig.rig.wheel_radius_mm - rest.height_mm
         };
         for preload in [3.0, 10.0, 30.0] {
-            let (bed, ring) = (compression_mm(&rig, preload), at(preload));
-            assert!((bed / ring - 1.0).abs() < 0.03, "{preload} N: {bed} {ring}");
+            let bed = preload_n(&rig, at(preload));
+            assert!((bed / preload - 1.0).abs() < 0.03, "{preload} N: {bed}");
         }
     }
 

@@ -3,7 +3,7 @@
 use interstage::log::Record;
 use interstage::supervise::Mode;
 
-use super::figures::{Counted, Scale, angle, compression_mm, counted, mean, output, turned};
+use super::figures::{Counted, Scale, angle, counted, mean, output, preload_n, turned};
 use super::line::{Motion, drive as drive_by, press};
 use super::{BringupError, Check, Question, Seen, Session, check};
 
@@ -13,12 +13,13 @@ const PORT_A: u32 = 0x4800_0010;
 const SLOW: f64 = 0.15;
 const FAST: f64 = 0.30;
 /// Duty of the pre-tightener, and the steps of preload, ms.
-const PRESS: f64 = 0.30;
-const STEPS_MS: [u32; 3] = [500, 800, 500];
+const PRESS: f64 = 0.25;
+const STEPS_MS: [u32; 3] = [550, 850, 550];
 /// Rest behind a step, ms; the tread's memory is a tenth of a second. Its second half is judged.
 const REST_MS: u32 = 500;
-/// Changes that count as one: preload, N, and compression, mm; ten deviations of their means.
-const CHANGED: (f64, f64) = (0.7, 0.015);
+/// Changes that count as one: preload, N, and compression, mm. A tread that was rolled creeps by
+/// less for a second.
+const CHANGED: (f64, f64) = (0.7, 0.025);
 
 /// The drive, wheel free.
 pub(super) fn drive(session: &mut Session<'_, '_>) -> Result<Vec<Check>, BringupError> {
@@ -45,7 +46,7 @@ pub(super) fn drive(session: &mut Session<'_, '_>) -> Result<Vec<Check>, Bringup
     let counts = counted(driven(&slow, 0));
     (session.say)(&format!("  {} counts", counts.sum));
     let turned = session.operator.look(Question::Turned)?;
-    let shift = Shift::over(&slow, &Scale::of(&session.expected.rig));
+    let shift = preload_change(&slow, &Scale::of(&session.expected.rig));
     checks.extend(turns(&slow, counts, shift, lines, turned));
     if checks.iter().any(|check| !check.ok) {
         return Ok(checks);
@@ -162,36 +163,18 @@ fn silent_bridge(session: &mut Session<'_, '_>, slow: &Motion) -> Result<Check, 
     Ok(check("drive bridge", false, format!("0 %{}", fault(slow)), advice))
 }
 
-/// Change of preload and compression by a motion.
-#[derive(Clone, Copy, Debug)]
-struct Shift {
-    preload: f64,
-    compression: f64,
-}
-
-impl Shift {
-    fn over(motion: &Motion, scale: &Scale) -> Self {
-        let rows = &motion.rows;
-        let ends = |of: &dyn Fn(&Record) -> f64| {
-            let before = mean(rows.iter().take(15).map(of)).0;
-            mean(rows.iter().rev().take(100).map(of)).0 - before
-        };
-        Self {
-            preload: ends(&|row| scale.preload(row)),
-            compression: ends(&|row| scale.compression(row)),
-        }
-    }
-
-    fn is_none(self) -> bool {
-        self.preload.abs() < CHANGED.0 && self.compression.abs() < CHANGED.1
-    }
+/// Change of the preload by a motion, N.
+fn preload_change(motion: &Motion, scale: &Scale) -> f64 {
+    let rows = &motion.rows;
+    let before = mean(rows.iter().take(15).map(|row| scale.preload(row))).0;
+    mean(rows.iter().rev().take(100).map(|row| scale.preload(row))).0 - before
 }
 
 /// What the encoder, an eye and the other sensors make of the first motion of the drive.
 fn turns(
     motion: &Motion,
     counts: Counted,
-    shift: Shift,
+    preload_change: f64,
     lines: [[bool; 2]; 2],
     seen: Seen,
 ) -> Vec<Check> {
@@ -227,11 +210,10 @@ fn turns(
                   turns outwards, swap A (PA0) and B (PA1); if inwards, the motor's leads"
                 .to_owned(),
         }
-    } else if !shift.is_none() {
+    } else if preload_change.abs() > CHANGED.0 && !matches!(seen, Seen::Outwards | Seen::Inwards) {
         format!(
-            "the motors are exchanged: the drive's bridge moves the pre-tightener (preload {:+.1} \
-             N, compression {:+.3} mm)",
-            shift.preload, shift.compression
+            "the motors are exchanged: the drive's bridge moves the pre-tightener (preload \
+             {preload_change:+.1} N)"
         )
     } else if counts.changes > 5 {
         let stuck: Vec<&str> = ["A (PA0)", "B (PA1)"]
@@ -265,6 +247,8 @@ fn turns(
 struct Level {
     preload: f64,
     compression: f64,
+    /// Compression from the zero that the controller has taken.
+    pressed: f64,
     angle: f64,
 }
 
@@ -275,6 +259,7 @@ impl Level {
         Self {
             preload: mean(last().map(|row| scale.preload(row))).0,
             compression: mean(last().map(|row| scale.compression(row))).0,
+            pressed: mean(last().map(|row| row.telemetry.compression.to_num())).0,
             angle: first + mean(last().map(|row| turned(first, angle(row)))).0,
         }
     }
@@ -283,6 +268,7 @@ impl Level {
         Self {
             preload: self.preload - before.preload,
             compression: self.compression - before.compression,
+            pressed: self.pressed,
             angle: turned(before.angle, self.angle),
         }
     }
@@ -292,7 +278,7 @@ impl Level {
     }
 
     fn text(self) -> String {
-        let Self { preload, compression, angle } = self;
+        let Self { preload, compression, angle, .. } = self;
         format!(
             "preload {preload:+.2} N, compression {compression:+.4} mm, angle {angle:+.1} codes"
         )
@@ -302,7 +288,7 @@ impl Level {
 /// The pre-tightener: direction, sensors, scale; and back.
 pub(super) fn pretightener(session: &mut Session<'_, '_>) -> Result<Vec<Check>, BringupError> {
     session.operator.confirm(
-        "Wheel on the wall at the stow end: the PRE-TIGHTENER presses it, 30 % for 0.5 s.",
+        "Wheel on the wall at the stow end: the PRE-TIGHTENER presses it, 25 % for 0.55 s.",
     )?;
     let scale = Scale::of(&session.expected.rig);
     let base = Level::of(&session.line.listen(REST_MS)?, &scale);
@@ -395,7 +381,7 @@ fn rises(
 /// The three steps together: each time of duty, s, and the level it led to.
 fn judge(session: &mut Session<'_, '_>, levels: &[(f64, Level)]) -> Vec<Check> {
     let rig = &session.expected.rig;
-    let [(t_1, first), (t_2, second), .., (_, last)] = levels else { return Vec::new() };
+    let [(t_1, first), (t_2, second), (t_3, last)] = levels else { return Vec::new() };
     let power = (last.compression / first.compression).ln() / (last.preload / first.preload).ln();
     let exchanged = !(power < 1.0);
     let mut checks = vec![check(
@@ -416,12 +402,16 @@ fn judge(session: &mut Session<'_, '_>, levels: &[(f64, Level)]) -> Vec<Check> {
          and the sensor does not?"
     };
     checks.push(check("arm direction", last.angle > 1.0, last.text(), advice));
-    // Two durations give rate and dead time: P = slew u (T - D).
-    let slew = (second.preload - 2.0 * first.preload) / (PRESS * (t_2 - t_1));
-    let dead_s = t_1 - first.preload / (PRESS * slew);
+    // Two durations give rate and dead time, P = slew u (T - D); the outer steps are alike.
+    let (short, long) =
+        (last.preload - second.preload + first.preload, second.preload - first.preload);
+    let (short, t_short) = (short / 2.0, (t_1 + t_3) / 2.0);
+    let slew = (long - short) / (PRESS * (t_2 - t_short));
+    let dead_s = t_short - short / (PRESS * slew);
     let by_spring = slew / rig.preload.slew_n_per_s;
-    let at = |preload: f64| compression_mm(rig, preload);
-    let by_tread = (last.compression / at(last.preload)).powf(-1.5);
+    // Differences: the arm's thrust presses the wheel as well.
+    let carried = preload_n(rig, last.pressed) - preload_n(rig, first.pressed);
+    let by_tread = (last.preload - first.preload) / carried;
     let off = |ratio: f64| !(0.8..=1.25).contains(&ratio);
     let rounded = (slew * 10.0).round() / 10.0;
     let advice = if off(by_spring) && off(by_tread) && (by_spring > 1.0) == (by_tread > 1.0) {

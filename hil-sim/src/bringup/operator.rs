@@ -26,6 +26,8 @@ impl fmt::Display for Sensor {
 /// What a hand is asked to do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Action {
+    /// Switch the motor supply on, its current limit low.
+    SwitchOn,
     /// Press the emergency stop and hold it.
     PressStop,
     /// Release it.
@@ -41,13 +43,14 @@ pub enum Action {
 impl fmt::Display for Action {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::SwitchOn => f.write_str(
+                "Switch the motor supply on, with a low current limit. Nothing may move.",
+            ),
             Self::PressStop => f.write_str("Press the emergency stop and leave it pressed."),
             Self::ReleaseStop => f.write_str("Release the emergency stop."),
             Self::Unplug(sensor) => write!(f, "Unplug the {sensor}."),
             Self::Plug(sensor) => write!(f, "Plug the {sensor} in again."),
-            Self::HoldReset => {
-                f.write_str("Motor supply on: hold the board's reset button for 2 s.")
-            }
+            Self::HoldReset => f.write_str("Hold the board's reset button for 2 s."),
         }
     }
 }

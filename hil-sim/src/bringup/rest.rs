@@ -118,7 +118,13 @@ pub(super) fn sensors(session: &mut Session<'_, '_>) -> Result<Vec<Check>, Bring
     for (sensor, place, name) in
         [(Sensor::Preload, 1, "preload lead"), (Sensor::Compression, 2, "compression lead")]
     {
-        checks.push(lead(session, sensor, place, name)?);
+        let found = lead(session, sensor, place, name)?;
+        let good = found.ok;
+        checks.push(found);
+        if !good {
+            session.line.reset()?;
+            return Ok(checks);
+        }
     }
     let mode = session.line.reset()?;
     let measured = match mode {
@@ -220,9 +226,15 @@ fn lead(
     let (code, _) = mean(rows.iter().skip(50).map(|row| part(row.codes[place])));
     session.operator.act(Action::Plug(sensor))?;
     session.line.listen(100)?;
+    let (other, _) = mean(rows.iter().skip(50).map(|row| part(row.codes[3 - place])));
     let pin = if sensor == Sensor::Preload { "PC2" } else { "PC3" };
-    let advice = format!(
-        "the pull-down of 100 kOhm at {pin} is missing: a {sensor} that is torn off is not noticed"
-    );
+    let advice = if code > RANGE.0 && other < RANGE.0 {
+        "preload and compression sensor are exchanged: swap PC2 and PC3".to_owned()
+    } else {
+        format!(
+            "the pull-down of 100 kOhm at {pin} is missing: a {sensor} that is torn off is not \
+             noticed"
+        )
+    };
     Ok(check(name, code < RANGE.0, format!("{:.1} % of the converter", 100.0 * code), &advice))
 }
