@@ -168,7 +168,7 @@ pub enum BringupError {
     #[error(transparent)]
     Line(#[from] crate::params::StoreError),
     /// The user did not confirm.
-    #[error("not confirmed: {0}; nothing was moved. The next call goes on from here")]
+    #[error("not confirmed: {0} Nothing was moved; the next call goes on from here")]
     Declined(String),
     /// Nothing is left of the scripted answers.
     #[error("no answer to: {0}")]

@@ -180,7 +180,8 @@ fn the_service_mode_is_refused_in_motion_and_ends_with_the_emergency_stop() {
     }
     board.step();
     assert!(board.step().drives.drive == 0.0);
-    board.until("fault hold, 151", 5);
+    board.run(5);
+    assert!(board.said("fault hold, 151"), "{:#?}", board.log);
     board.assert_off(200);
 }
 

@@ -122,7 +122,10 @@ impl<'p> Line<'p> {
         }
     }
 
+    /// The same from now on: what the channel has kept from before, as while somebody was asked,
+    /// is not heard.
     pub(super) fn listen(&mut self, milliseconds: u32) -> Result<Vec<Record>, BringupError> {
+        self.listener().pass()?;
         self.listen_and(milliseconds, |_| Ok(()))
     }
 

@@ -383,7 +383,7 @@ fn judge(session: &mut Session<'_, '_>, levels: &[(f64, Level)]) -> Vec<Check> {
     let rig = &session.expected.rig;
     let [(t_1, first), (t_2, second), (t_3, last)] = levels else { return Vec::new() };
     let power = (last.compression / first.compression).ln() / (last.preload / first.preload).ln();
-    let exchanged = !(power < 1.0);
+    let exchanged = power.is_nan() || power >= 1.0;
     let mut checks = vec![check(
         "preload against tread",
         !exchanged,
@@ -430,11 +430,9 @@ fn judge(session: &mut Session<'_, '_>, levels: &[(f64, Level)]) -> Vec<Check> {
             "the pre-tightener is of another speed or spring: set preload.slew_n_per_s = {rounded}"
         )
     };
-    if off(by_spring) == off(by_tread) && !off(by_tread) || off(by_spring) && !off(by_tread) {
+    if !off(by_spring) {
         session.proposed.rig.preload.slew_n_per_s = rounded;
-    }
-    let delay = dead_s - rig.preload.lag_s;
-    if !off(by_spring) && delay > 0.0 {
+        let delay = (dead_s - rig.preload.lag_s).max(0.0);
         session.proposed.rig.preload.delay_s = (delay * 1000.0).round() / 1000.0;
     }
     checks.push(check(

@@ -150,7 +150,10 @@ impl<R: BufRead, W: Write> Stdin<R, W> {
         let mut line = String::new();
         match self.input.read_line(&mut line) {
             Ok(1..) => Ok(line.trim().to_lowercase()),
-            _ => Err(BringupError::NoAnswer(prompt.to_owned())),
+            _ => {
+                let _ = writeln!(self.prompts);
+                Err(BringupError::NoAnswer(prompt.to_owned()))
+            }
         }
     }
 }

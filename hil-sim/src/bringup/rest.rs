@@ -180,7 +180,7 @@ fn arm(session: &mut Session<'_, '_>, rows: &[Record]) -> Vec<Check> {
     let rig = &session.expected.rig;
     let sound = |row: &&Record| {
         let frame = row.codes[3];
-        row.ages[3] != NEVER && frame & 1 << 14 == 0 && frame.count_ones() % 2 == 0
+        row.ages[3] != NEVER && frame & 1 << 14 == 0 && frame.count_ones().is_multiple_of(2)
     };
     let good: Vec<&Record> = rows.iter().filter(sound).collect();
     let no_field = rows.iter().filter(|row| row.codes[3] == AngleFrame::NO_FIELD.get()).count();
