@@ -432,8 +432,6 @@ fn judge(session: &mut Session<'_, '_>, levels: &[(f64, Level)]) -> Vec<Check> {
     };
     if !off(by_spring) {
         session.proposed.rig.preload.slew_n_per_s = rounded;
-        let delay = (dead_s - rig.preload.lag_s).max(0.0);
-        session.proposed.rig.preload.delay_s = (delay * 1000.0).round() / 1000.0;
     }
     checks.push(check(
         "preload scale",
