@@ -80,8 +80,8 @@ fn snapshots() -> Vec<(Mode, Snapshot)> {
                 let snapshot = Snapshot { state: state.clone(), input, plan };
                 found.entry(format!("{:?}", state.mode())).or_insert((state.mode(), snapshot));
             }
-            let over = matches!(state.mode(), Mode::Complete(Direction::Retract)) && within > 5
-                || before == Mode::Service && within > 5
+            let ends = [Mode::Complete(Direction::Retract), Mode::Service];
+            let over = ends.contains(&state.mode()) && within > 5
                 || stop_at.is_some() && matches!(before, Mode::Stopping(_)) && within > 5;
             if over {
                 break;
