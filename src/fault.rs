@@ -181,11 +181,15 @@ pub enum Limit {
     CompressionStrange = 212,
     /// The position is that of a record which no step ahead can confirm.
     PositionUnconfirmed = 213,
+    /// A motion of the service mode has reached a bound.
+    ServiceBounded = 214,
+    /// The host has not repeated its request in the service mode.
+    ServiceSilent = 215,
 }
 
 impl Limit {
     /// Every limit, in the order of codes.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 15] = [
         Self::StepEarly,
         Self::StepLate,
         Self::StepMissing,
@@ -199,6 +203,8 @@ impl Limit {
         Self::GapStrange,
         Self::CompressionStrange,
         Self::PositionUnconfirmed,
+        Self::ServiceBounded,
+        Self::ServiceSilent,
     ];
 
     /// The stable code.
@@ -228,6 +234,8 @@ impl Limit {
                 "compression of the tread and preload do not belong together"
             }
             Self::PositionUnconfirmed => "the position is of a record that no step ahead confirms",
+            Self::ServiceBounded => "a motion in the service mode has reached a bound",
+            Self::ServiceSilent => "the host fell silent in the service mode",
         }
     }
 }

@@ -9,6 +9,7 @@ mod event;
 mod modes;
 mod plans;
 mod report;
+mod serve;
 mod state;
 mod telemetry;
 
@@ -22,7 +23,7 @@ use crate::fault::Fault;
 use crate::model::{Plan, PlanRequest};
 use crate::sense::raw::SensorFrame;
 use crate::sense::{SensedState, Senses};
-use crate::supervise::{Command, Mode, Monitor, Observed, Trigger, next};
+use crate::supervise::{Command, Mode, Monitor, Observed, ServiceDuties, Trigger, next};
 use crate::units::{
     Millimetres, MillimetresPerSecond, MotorCommand, Newtons, Q16, Ratio, Seconds, Tick,
 };
@@ -46,6 +47,8 @@ pub struct Input {
     pub sensors: SensorFrame,
     /// Operator command since the last tick.
     pub command: Option<Command>,
+    /// Duties that the host asks for in the service mode, since the last tick.
+    pub service: Option<ServiceDuties>,
     /// Answer to an earlier [`Output::request`].
     pub plan: Option<Plan>,
     /// This tick starts more than a period late.
@@ -168,6 +171,7 @@ impl Controller {
         self.look_for_faults(state, tick, input);
         self.transit(state, tick);
         self.take_command(state, tick, input.command);
+        self.take_service(state, tick, input.service);
         self.advance_mode(state, tick);
         self.transit(state, tick);
         self.follow_contact(state, tick);

@@ -10,4 +10,5 @@ mod tasks_background;
 mod tasks_link;
 mod tasks_motors;
 mod tasks_sensors;
+mod tasks_service;
 mod words;

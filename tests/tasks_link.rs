@@ -16,7 +16,7 @@ use interstage::tasks::{self, Exchange};
 
 /// Both ends of a line; clones share it.
 #[derive(Clone, Default)]
-struct Wire(Rc<RefCell<Ends>>);
+pub(crate) struct Wire(Rc<RefCell<Ends>>);
 
 #[derive(Default)]
 struct Ends {
@@ -46,12 +46,12 @@ impl Line for Wire {
 }
 
 impl Wire {
-    fn ask(&self, number: u16, request: Request) {
+    pub(crate) fn ask(&self, number: u16, request: Request) {
         let frame = frame(&ToBoard::Parameters(number, request)).expect("it fits");
         self.0.borrow_mut().to_board.extend(&frame);
     }
 
-    fn answers(&self) -> Vec<ToHost> {
+    pub(crate) fn answers(&self) -> Vec<ToHost> {
         let mut gatherer = FrameReader::new();
         let bytes = std::mem::take(&mut self.0.borrow_mut().to_host);
         bytes.into_iter().filter_map(|byte| gatherer.take(byte)).collect()
@@ -65,9 +65,14 @@ fn image() -> &'static [u8] {
 
 fn bench() -> (Bench, Wire, &'static Exchange) {
     let (mut bench, wire, exchange) = (Bench::new(), Wire::default(), forever(Exchange::default()));
+    spawn_link(&mut bench, &wire, exchange);
+    (bench, wire, exchange)
+}
+
+/// Adds the task at the line.
+pub(crate) fn spawn_link(bench: &mut Bench, wire: &Wire, exchange: &'static Exchange) {
     let (line, service) = (wire.clone(), Service::new(FixedFlash::blank(), image(), 0xAFFE));
     bench.spawn(async move { tasks::link(line, service, exchange).await });
-    (bench, wire, exchange)
 }
 
 #[test]

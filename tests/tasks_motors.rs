@@ -17,18 +17,18 @@ use interstage::tick::{Controller, Entry, Event};
 use interstage::units::{Direction, MotorCommand};
 
 /// All tasks of the firmware on a mocked board: at rest, unloaded, stowed.
-struct Board {
-    bench: Bench,
-    exchange: &'static Exchange,
-    wheel: Sensor,
-    preload_sensor: Sensor,
+pub(crate) struct Board {
+    pub(crate) bench: Bench,
+    pub(crate) exchange: &'static Exchange,
+    pub(crate) wheel: Sensor,
+    pub(crate) preload_sensor: Sensor,
     tread: Sensor,
     arm: Sensor,
-    operator: Operator,
-    motors: Record<(MotorCommand, MotorCommand)>,
-    bridges: Bridges,
-    watchdog: Dog,
-    journal: Record<Entry>,
+    pub(crate) operator: Operator,
+    pub(crate) motors: Record<(MotorCommand, MotorCommand)>,
+    pub(crate) bridges: Bridges,
+    pub(crate) watchdog: Dog,
+    pub(crate) journal: Record<Entry>,
     light: Record<Light>,
 }
 
@@ -92,12 +92,12 @@ impl Board {
         board
     }
 
-    fn mode(&self) -> Mode {
+    pub(crate) fn mode(&self) -> Mode {
         self.exchange.telemetry().expect("a tick has run").mode
     }
 
     /// Lets the tasks run until that mode; gives up after `limit_ms`.
-    fn reach(&mut self, mode: Mode, limit_ms: u32) {
+    pub(crate) fn reach(&mut self, mode: Mode, limit_ms: u32) {
         let end = now_ms() + limit_ms;
         while now_ms() < end {
             self.bench.run_ms(1);
@@ -108,13 +108,13 @@ impl Board {
         panic!("{mode:?} not reached in {limit_ms} ms, but {:?}", self.mode());
     }
 
-    fn idle() -> Self {
+    pub(crate) fn idle() -> Self {
         let mut board = Self::new();
         board.reach(Mode::Idle, 3000);
         board
     }
 
-    fn bridges_are_off(&self) -> bool {
+    pub(crate) fn bridges_are_off(&self) -> bool {
         self.motors.items().last() == Some(&(MotorCommand::OFF, MotorCommand::OFF))
     }
 }

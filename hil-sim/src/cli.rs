@@ -5,6 +5,7 @@
 //! code is 0 on success, 1 if a run, log or check failed, 2 for bad input; an error is one
 //! line.
 
+pub mod bringup;
 pub mod capture;
 mod compare;
 mod completions;
@@ -52,6 +53,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Verb {
     Deploy(deploy::Args),
+    Bringup(bringup::Args),
     Capture(capture::Args),
     Completions(completions::Args),
     Live(live::Args),
@@ -90,6 +92,7 @@ impl Verb {
     fn run(&self) -> Result<Outcome, Failure> {
         match self {
             Self::Deploy(args) => deploy::run(args),
+            Self::Bringup(args) => bringup::run(args),
             Self::Capture(args) => capture::run(args),
             Self::Completions(args) => completions::run(args),
             Self::Live(args) => live::run(args),

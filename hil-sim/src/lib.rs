@@ -1,6 +1,7 @@
 //! The virtual rig: a physical plant for the controller, the scenarios of its runs, and the
 //! reports on them.
 
+pub mod bringup;
 pub mod cli;
 pub mod compare;
 pub mod envelope;

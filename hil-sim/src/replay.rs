@@ -146,6 +146,7 @@ impl Replay<'_> {
             now: row.tick,
             sensors: row.sensors(),
             command: flags.command(),
+            service: flags.has(Flags::SERVICE).then(|| self.since.service(row.tick)),
             plan: flags.has(Flags::PLAN).then(|| self.plan(row.tick)).flatten(),
             overrun: flags.has(Flags::OVERRUN),
             emergency_stop: flags.has(Flags::EMERGENCY),

@@ -69,6 +69,7 @@ fn name(mode: Mode) -> String {
         Mode::Complete(Direction::Deploy) => "Deployed".into(),
         Mode::Complete(Direction::Retract) => "Retracted".into(),
         Mode::FaultHold(_) => "FaultHold".into(),
+        Mode::Service => "Service".into(),
     }
 }
 
@@ -89,6 +90,7 @@ fn label(trigger: Trigger) -> String {
         Trigger::Leg(Leg::Settle) => "settle".into(),
         Trigger::AtRest => "at rest".into(),
         Trigger::Arrived => "arrived".into(),
+        Trigger::Service => "host on the line".into(),
         Trigger::Fault(fault) => format!("fault {}", fault.code()),
     }
 }

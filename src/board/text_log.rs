@@ -4,10 +4,10 @@ use defmt::{error, info, warn};
 use interstage::estimate::ContactStage;
 use interstage::hal::Journal;
 use interstage::log::Identity;
-use interstage::supervise::Mode;
+use interstage::supervise::{Mode, ServiceDuties};
 use interstage::tasks::TickCycles;
 use interstage::tick::{CrossingRecord, Entry, Event};
-use interstage::units::{Direction, Q16, Tick};
+use interstage::units::{Direction, Duty, Q16, Tick};
 
 use super::rtt::{self, Frames};
 
@@ -72,6 +72,14 @@ impl Journal for TextLog {
                 warn!("[{=u32} ms] {=u32} log entries lost", at, entries);
             }
             Event::Crossing(record) => crossing(at, &record),
+            Event::Service(ServiceDuties { drive, pretightener }) => {
+                let percent = |duty: Duty| i32::from(duty.to_bits()) * 100 / 32_768;
+                let (drive, pretightener) = (percent(drive), percent(pretightener));
+                info!(
+                    "[{=u32} ms] service: drive {=i32} %, pre-tightener {=i32} %",
+                    at, drive, pretightener
+                );
+            }
             // Logged by the start, before the journal ran.
             Event::Restart(_) => {}
         }

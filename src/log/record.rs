@@ -56,6 +56,8 @@ impl Flags {
     const MOST_EVENTS: u16 = 0b1111;
     /// It was given the readback of the bridges.
     pub const READBACK: Self = Self(1 << 14);
+    /// It was given a request of the service mode: the latest of the events.
+    pub const SERVICE: Self = Self(1 << 15);
 
     fn of(input: &Input, output: &Output) -> Self {
         let bit = |set: bool, flag: Self| if set { flag.0 } else { 0 };
@@ -69,6 +71,7 @@ impl Flags {
                 | bit(output.drive.enable, Self::DRIVE)
                 | bit(output.preload.enable, Self::PRELOAD)
                 | bit(input.sensors.bridges.is_some(), Self::READBACK)
+                | bit(input.service.is_some(), Self::SERVICE)
                 | (output.events.len() as u16) << Self::EVENTS,
         )
     }
@@ -154,13 +157,14 @@ impl Record {
         }
     }
 
-    /// Input of the tick except the plan; `before` as for
+    /// Input of the tick except the plan and the service mode's duties; `before` as for
     /// [`Record::sensors`].
     pub fn input(&self, before: &SensorFrame) -> Input {
         Input {
             now: self.at(),
             sensors: self.sensors(before),
             command: self.flags.command(),
+            service: None,
             plan: None,
             overrun: self.flags.has(Flags::OVERRUN),
             emergency_stop: self.flags.has(Flags::EMERGENCY),
@@ -208,8 +212,8 @@ pub(super) mod tests {
     pub(in crate::log) fn any_record() -> impl Strategy<Value = Record> {
         let quantities = any::<[i32; Telemetry::QUANTITIES]>();
         (
-            (any::<u32>(), 0..18_usize, 1..=6_u8, any::<u8>(), quantities, any::<[i16; 2]>()),
-            (any::<[u16; 4]>(), any::<[u8; 4]>(), any::<[u16; 2]>(), 0..1_u16 << 15),
+            (any::<u32>(), 0..19_usize, 1..=6_u8, any::<u8>(), quantities, any::<[i16; 2]>()),
+            (any::<[u16; 4]>(), any::<[u8; 4]>(), any::<[u16; 2]>(), any::<u16>()),
         )
             .prop_map(
                 |((at, mode, stage, level, q, duties), (codes, ages, bridges, flags))| {
@@ -259,7 +263,7 @@ pub(super) mod tests {
             };
             let command = command.map(|index| Command::ALL[index]);
             let input =
-                Input { now, sensors, command, plan: None, overrun, emergency_stop };
+                Input { now, sensors, command, service: None, plan: None, overrun, emergency_stop };
             let output = Output {
                 telemetry: Telemetry { at: now, ..Telemetry::default() },
                 ..Output::default()

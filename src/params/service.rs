@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::slots::{Damaged, Draft, SetMemory, stored};
 use super::{MAX_NAME, ParameterSet, Refusal, SCHEMA};
+use crate::supervise::ServiceDuties;
 
 /// Most bytes of a set in one request or answer; full double words.
 pub const PIECE: usize = 48;
@@ -38,6 +39,11 @@ pub enum Request {
     Restore,
     /// Restart, with the set then in force.
     Restart,
+    /// Enter the service mode from idle, or drive in it; see
+    /// [`service`](crate::supervise::service). To be repeated while it shall last.
+    Service(ServiceDuties),
+    /// Leave the service mode, or a fault hold, through the self-test.
+    Reset,
 }
 
 /// Answers of the board.
@@ -136,7 +142,12 @@ impl<M: SetMemory> Service<M> {
                     draft.seal(&mut self.memory).await?;
                 }
             }
-            Request::Restart | Request::Describe | Request::Read { .. } => {}
+            // Service mode and reset are the tick's.
+            Request::Restart
+            | Request::Describe
+            | Request::Read { .. }
+            | Request::Service(_)
+            | Request::Reset => {}
         }
         Ok(())
     }

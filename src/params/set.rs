@@ -99,6 +99,13 @@ pub enum Refusal {
     Schema,
     /// The set in force is damaged.
     Lost,
+    /// The drive is neither idle nor in the service mode, or a motion is asked for before the
+    /// service mode.
+    NotService,
+    /// The service mode does not drive with this duty, or with two motors at once.
+    Duty,
+    /// Too many commands wait for the control tick.
+    Busy,
 }
 
 impl Refusal {
@@ -113,6 +120,11 @@ impl Refusal {
             Self::Damaged => "the new set arrived damaged",
             Self::Schema => "the new set is of another schema than the firmware",
             Self::Lost => "the set in force is damaged: restore the image's, or one from a file",
+            Self::NotService => {
+                "the drive is not in the service mode, which it enters from idle alone"
+            }
+            Self::Duty => "the service mode drives one motor at a time, with a small duty",
+            Self::Busy => "too many commands wait for the control tick",
         }
     }
 }

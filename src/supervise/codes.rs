@@ -21,6 +21,7 @@ pub const fn of_mode(mode: Mode) -> u8 {
         Mode::Stopping(direction) => (9, direction),
         Mode::Complete(direction) => (10, direction),
         Mode::FaultHold(fault) => return fault.code() as u8,
+        Mode::Service => return 4 + 2 * OF_DIRECTION,
     };
     match direction {
         Direction::Deploy => first,

@@ -51,6 +51,9 @@ pub enum Mode {
     Complete(Direction),
     /// A fault is latched; bridges off, gears holding, preload in the spring.
     FaultHold(Fault),
+    // Behind all others: logs have the place in this list.
+    /// At rest, or moved a little by a host on the line; see [`service`](super::service).
+    Service,
 }
 
 impl Command {
@@ -70,7 +73,7 @@ impl Command {
 
 impl Mode {
     /// Every mode but the fault holds, of which there is one per [`Fault`].
-    pub const WITHOUT_FAULT: [Self; 18] = {
+    pub const WITHOUT_FAULT: [Self; 19] = {
         use Direction::{Deploy, Retract};
         use Leg::{Approach, Crossing, Cruise, Settle};
         [
@@ -92,6 +95,7 @@ impl Mode {
             Self::Run(Retract, Settle),
             Self::Stopping(Retract),
             Self::Complete(Retract),
+            Self::Service,
         ]
     };
 
@@ -122,15 +126,16 @@ impl Mode {
             Self::Complete(Deploy) => "deployed",
             Self::Complete(Retract) => "retracted",
             Self::FaultHold(_) => "fault hold",
+            Self::Service => "service",
         }
     }
 
     /// Whether nothing is driven in this mode, neither wheel nor pre-tightener.
     pub const fn is_at_rest(self) -> bool {
-        !matches!(self, Self::Preload(_) | Self::Run(..) | Self::Stopping(_))
+        !matches!(self, Self::Preload(_) | Self::Run(..) | Self::Stopping(_) | Self::Service)
     }
 
-    /// Whether the drive may turn in this mode.
+    /// Whether the controller turns the drive in this mode.
     pub const fn moves(self) -> bool {
         matches!(self, Self::Run(..) | Self::Stopping(_))
     }
@@ -145,8 +150,9 @@ mod tests {
         let run = Mode::Run(Direction::Deploy, Leg::Settle);
         let stopping = Mode::Stopping(Direction::Retract);
         let preload = Mode::Preload(Direction::Deploy);
-        assert!([run, stopping, preload].iter().all(|mode| !mode.is_at_rest()));
+        assert!([run, stopping, preload, Mode::Service].iter().all(|mode| !mode.is_at_rest()));
         assert!(run.moves() && stopping.moves() && !preload.moves());
+        assert!(!Mode::Service.moves());
         let held = Mode::FaultHold(Fault::TickOverrun);
         let complete = Mode::Complete(Direction::Deploy);
         for mode in [Mode::Boot, Mode::SelfTest, Mode::Zero, Mode::Idle, complete, held] {

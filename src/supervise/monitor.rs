@@ -21,6 +21,8 @@ const OVERPRESSURE_TICKS: u16 = 10;
 const BEYOND: MillimetresPerSecond = q16(5_000_000);
 /// Ticks that this must last.
 const RUNAWAY_TICKS: u16 = 12;
+/// Ticks for which a wheel turns on, by its observer, after a drive of the service mode.
+const COAST_TICKS: u16 = 150;
 /// Ticks for which a preload may be short of the actuator's model, which includes dead time and
 /// lag: for their tolerance.
 const PRELOAD_TICKS: u16 = 400;
@@ -40,6 +42,8 @@ pub struct MonitorState {
     overpressure: u16,
     runaway: u16,
     short: u16,
+    /// Ticks for which the wheel may still turn after a drive of the service mode.
+    coasts: u16,
     /// The drive was on in the last tick.
     driving: bool,
     cross: CrossState,
@@ -97,10 +101,14 @@ impl Monitor {
         // With the bridges off nothing could relieve it; a preload that falls as planned is being
         // relieved.
         let pressed = preload > self.overpressure
-            && (seen.mode.moves() || acting && preload - seen.preload_due > self.short);
+            && (seen.mode.moves()
+                || seen.mode == Mode::Service
+                || acting && preload - seen.preload_due > self.short);
         lasting(&mut state.overpressure, pressed);
         lasting(&mut state.short, acting && seen.preload_due - preload > self.short);
-        let turns = !seen.mode.moves() && speed.abs() > BEYOND;
+        let serving = seen.mode == Mode::Service && state.readback.drives();
+        state.coasts = if serving { COAST_TICKS } else { state.coasts.saturating_sub(1) };
+        let turns = !seen.mode.moves() && speed.abs() > BEYOND && state.coasts == 0;
         lasting(&mut state.runaway, turns);
         let lost = sensor_fault(seen.sensed);
         // The self-test ends once the wheel rests.
@@ -151,7 +159,10 @@ impl Monitor {
             self.cross.preload(&mut state.cross, &state.noise, &compared)
         } else {
             state.cross = CrossState::default();
-            state.noise.rest(&compared);
+            // A motion of the service mode is no noise.
+            if seen.mode != Mode::Service {
+                state.noise.rest(&compared);
+            }
             None
         }
     }
@@ -358,6 +369,31 @@ mod tests {
         // Stuck from the start on, as soon as the preload has to rise.
         let (fault, tick) = with_noise(2, 1).expect("found");
         assert!(fault == Fault::PreloadSensorImplausible && tick < 500, "{fault:?} {tick}");
+    }
+
+    #[test]
+    fn in_the_service_mode_overpressure_and_a_wheel_that_nothing_drives_are_faults() {
+        let press = usize::from(OVERPRESSURE_TICKS);
+        let service = Mode::Service;
+        assert_eq!(found(service, 0.0, 0.0, 56.0, 0.0), Some((Fault::Overpressure, press)));
+        let run = usize::from(RUNAWAY_TICKS);
+        assert_eq!(found(service, 8.0, 0.0, 0.0, 0.0), Some((Fault::DriveRunaway, run)));
+        assert_eq!(found(service, 0.0, 0.0, 16.0, 0.0), None);
+        // Driven, it may turn, and for a moment after.
+        let monitor = Monitor::try_build(&Rig::prototype()).unwrap();
+        let mut state = MonitorState::default();
+        let turning = sensed(8.0, 0.0);
+        let fault = (0..1000).find_map(|tick| {
+            let duty = Duty::from_bits(if tick < 500 { 4369 } else { 0 });
+            let code = BridgeCode::of(duty.to_bits().into());
+            let codes = BridgeCodes { drive: code, pretightener: BridgeCode::of(0) };
+            state.set_duties(duty, Duty::ZERO);
+            let seen = Observed { bridges: Some(codes), ..observed(service, &turning) };
+            monitor.step(&mut state, &seen).map(|fault| (fault, tick))
+        });
+        // At a step of the duty the readback's own lag is within its tolerance.
+        let until = 500 + usize::from(COAST_TICKS) + run - 2;
+        assert_eq!(fault, Some((Fault::DriveRunaway, until)));
     }
 
     #[test]

@@ -97,6 +97,11 @@ impl Readback {
         self.pretightener.commanded = pretightener.to_bits();
     }
 
+    /// Whether the drive has been given a duty.
+    pub const fn drives(&self) -> bool {
+        self.drive.commanded != 0
+    }
+
     /// One tick with the readback of the duties set before it. A wheel that may coast, as after a
     /// restart in motion, drives its motor as a generator: then its bridge is not judged.
     pub fn step(&mut self, found: Option<BridgeCodes>, coasts: bool) -> Option<Fault> {

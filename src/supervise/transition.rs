@@ -26,13 +26,15 @@ pub enum Trigger {
     AtRest,
     /// The end of travel is reached and the arm confirms the level.
     Arrived,
+    /// The host asks for the service mode.
+    Service,
     /// A fault was found.
     Fault(Fault),
 }
 
 impl Trigger {
     /// Every trigger but the faults, of which there is one per [`Fault`].
-    pub const WITHOUT_FAULT: [Self; 15] = [
+    pub const WITHOUT_FAULT: [Self; 16] = [
         Self::SensorsAnswer,
         Self::TestPassed { stowed: true },
         Self::TestPassed { stowed: false },
@@ -48,12 +50,14 @@ impl Trigger {
         Self::Leg(Leg::Settle),
         Self::AtRest,
         Self::Arrived,
+        Self::Service,
     ];
 }
 
 /// The mode after `trigger` in `mode`; none if the mode ignores it. A fault leads to the fault
 /// hold from every mode, and the first fault is kept. During motion, start and retract mean
-/// stop.
+/// stop. The service mode is entered from idle alone, by the host's line alone; every command leads
+/// out of it through the self-test.
 pub const fn next(mode: Mode, trigger: Trigger) -> Option<Mode> {
     use Command::{Reset, Retract, Start, Stop};
     use Direction::{Deploy, Retract as Back};
@@ -77,6 +81,8 @@ pub const fn next(mode: Mode, trigger: Trigger) -> Option<Mode> {
         (M::Run(direction, _), T::Command(Stop | Start | Retract)) => M::Stopping(direction),
         (M::Run(direction, _), T::Arrived) => M::Complete(direction),
         (M::Stopping(_), T::AtRest) => M::Idle,
+        (M::Idle, T::Service) => M::Service,
+        (M::Service, T::Command(_)) => M::SelfTest,
         _ => return None,
     })
 }
@@ -115,6 +121,22 @@ mod tests {
             for trigger in triggers() {
                 let starts = next(mode, trigger).is_some_and(Mode::moves) && !mode.moves();
                 assert!(!starts || trigger == Trigger::PreloadReached, "{mode:?} {trigger:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_service_mode_is_entered_from_idle_alone_and_left_by_the_self_test_alone() {
+        for mode in modes() {
+            for trigger in triggers() {
+                let after = next(mode, trigger);
+                if after == Some(Mode::Service) {
+                    assert_eq!((mode, trigger), (Mode::Idle, Trigger::Service));
+                }
+                if mode == Mode::Service {
+                    let out = matches!(after, None | Some(Mode::SelfTest | Mode::FaultHold(_)));
+                    assert!(out, "{trigger:?} {after:?}");
+                }
             }
         }
     }

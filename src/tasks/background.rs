@@ -52,7 +52,7 @@ pub async fn operator(mut source: impl CommandSource, exchange: &Exchange) -> ! 
     }
 }
 
-/// Answers the host's requests about the parameters, one after the other. It checks in like an
+/// Answers the host's requests about parameters and service mode, one after the other. It checks in like an
 /// operator's task: a flash that never becomes ready is a hang.
 pub async fn link<M: SetMemory>(
     mut line: impl Line,
@@ -70,7 +70,11 @@ pub async fn link<M: SetMemory>(
         }
         let Some(ToBoard::Parameters(number, request)) = reader.take(byte[0]) else { continue };
         let restarts = request == Request::Restart;
-        let response = service.answer(request, exchange.at_rest()).await;
+        let response = match request {
+            Request::Service(duties) => exchange.serve(duties),
+            Request::Reset => exchange.reset(),
+            request => service.answer(request, exchange.at_rest()).await,
+        };
         let done = response == Response::Done;
         if let Some(frame) = frame(&ToHost::Parameters(number, response)) {
             // A host that does not read asks again.

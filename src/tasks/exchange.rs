@@ -7,9 +7,11 @@ use super::liveness::{Liveness, PERIODS};
 use crate::hal::Light;
 use crate::log::Record;
 use crate::model::{Plan, PlanRequest};
+use crate::params::Refusal;
+use crate::params::service::Response;
 use crate::restart::MissedCheckIns;
 use crate::sense::raw::{AdcCode, AngleFrame, EncoderCount, Sample, SensorFrame};
-use crate::supervise::{Command, Mode};
+use crate::supervise::{Command, Mode, ServiceDuties};
 use crate::tick::{Entry, Input, Output, Telemetry};
 use crate::units::Tick;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex as Raw;
@@ -56,6 +58,7 @@ pub struct Exchange {
     pub(super) request: Slot<PlanRequest>,
     pub(super) answer: Slot<Plan>,
     pub(super) commands: Channel<Raw, Command, COMMANDS>,
+    pub(super) service: Slot<ServiceDuties>,
     pub(super) entries: Channel<Raw, Entry, ENTRIES>,
     pub(super) records: Channel<Raw, Record, RECORDS>,
     /// Plan and request for the log, with their ticks.
@@ -81,6 +84,7 @@ impl Exchange {
             request: Channel::new(),
             answer: Channel::new(),
             commands: Channel::new(),
+            service: Channel::new(),
             entries: Channel::new(),
             records: Channel::new(),
             logged_plan: Channel::new(),
@@ -112,6 +116,7 @@ impl Exchange {
             now,
             sensors: self.sensors(),
             command: self.commands.try_receive().ok(),
+            service: self.service.try_receive().ok(),
             plan: self.answer.try_receive().ok(),
             overrun,
             emergency_stop: false,
@@ -180,6 +185,28 @@ impl Exchange {
         self.telemetry().is_none_or(|row| row.mode.is_at_rest())
     }
 
+    /// Passes duties of the service mode to the tick, which has the last word.
+    pub(super) fn serve(&self, duties: ServiceDuties) -> Response {
+        let mode = self.telemetry().map(|row| row.mode);
+        match mode {
+            _ if !duties.is_allowed() => Response::Refused(Refusal::Duty),
+            Some(Mode::Idle) if !duties.is_rest() => Response::Refused(Refusal::NotService),
+            Some(Mode::Idle | Mode::Service) => {
+                replace(&self.service, duties);
+                Response::Done
+            }
+            _ => Response::Refused(Refusal::NotService),
+        }
+    }
+
+    /// Passes the host's reset to the tick.
+    pub(super) fn reset(&self) -> Response {
+        match self.commands.try_send(Command::Reset) {
+            Ok(()) => Response::Done,
+            Err(_) => Response::Refused(Refusal::Busy),
+        }
+    }
+
     /// Log entries dropped since boot because the journal did not keep up.
     pub fn lost_entries(&self) -> u32 {
         self.lost_entries.load(Ordering::Relaxed)
@@ -207,7 +234,7 @@ pub(super) fn replace<T>(slot: &Slot<T>, value: T) {
 const fn light_of(mode: Mode) -> Light {
     match mode {
         Mode::Boot | Mode::SelfTest | Mode::Zero | Mode::Idle | Mode::Complete(_) => Light::Off,
-        Mode::Preload(_) | Mode::Run(..) | Mode::Stopping(_) => Light::On,
+        Mode::Preload(_) | Mode::Run(..) | Mode::Stopping(_) | Mode::Service => Light::On,
         Mode::FaultHold(_) => Light::Alarm,
     }
 }

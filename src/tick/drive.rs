@@ -112,11 +112,15 @@ impl Controller {
     pub(super) fn actuate(
         &self,
         state: &mut State,
-        tick: &TickContext<'_>,
+        tick: &mut TickContext<'_>,
         targets: &Targets,
     ) -> (MotorCommand, MotorCommand) {
         match state.mode {
             Mode::Run(..) | Mode::Stopping(_) => {}
+            Mode::Service => {
+                state.halt();
+                return self.serve(state, tick);
+            }
             Mode::Preload(_) => {
                 state.profile.halt();
                 state.speed_loop.reset();

@@ -3,7 +3,7 @@
 use crate::estimate::ContactStage;
 use crate::fault::{Fault, Limit};
 use crate::restart::Restart;
-use crate::supervise::{Command, Mode};
+use crate::supervise::{Command, Mode, ServiceDuties};
 use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Ratio, Seconds, Tick};
 
 /// One line of the log.
@@ -36,6 +36,8 @@ pub enum Event {
     Lost(u32),
     /// The board has started; its report of the run before.
     Restart(Restart),
+    /// The host asked for these duties, other than before, in the service mode or for it.
+    Service(ServiceDuties),
 }
 
 /// Crossing as the controller observed it.

@@ -1,5 +1,6 @@
 //! Conditions and time-outs of the modes.
 
+use super::serve::view;
 use super::{Controller, Event, State, TickContext};
 use crate::fault::{Fault, Limit};
 use crate::supervise::startup::{TEST_TICKS, all_answer, at_rest, silent, stowed};
@@ -36,7 +37,11 @@ impl Controller {
     }
 
     fn enter(&self, state: &mut State, tick: &mut TickContext<'_>, before: Mode) {
+        if before == Mode::Service || state.mode == Mode::Service {
+            state.forget();
+        }
         match state.mode {
+            Mode::Service => state.service.enter(&view(tick.sensed)),
             Mode::SelfTest => tick.output.rearm = matches!(before, Mode::FaultHold(_)),
             Mode::Zero => state.senses.begin_zero(),
             Mode::Preload(direction) => self.begin_run(state, tick, direction),

@@ -8,6 +8,7 @@ use crate::estimate::vibration::VibrationTracking;
 use crate::estimate::{ContactStage, EstimateState, OpenCrossing, Place, PositionConfidence};
 use crate::model::{Plan, Review};
 use crate::sense::SensesState;
+use crate::supervise::service::ServiceState;
 use crate::supervise::{Leg, Mode, MonitorState};
 use crate::units::{Direction, MillimetresPerSecond, MillimetresPerSecond2, Q16, Ratio, Tick};
 
@@ -32,6 +33,7 @@ pub struct State {
     pub(super) preload_loop: PreloadLoopState,
     pub(super) planning: Planning,
     pub(super) approach: Approach,
+    pub(super) service: ServiceState,
     /// Ticks for which a corner has been detected, up to [`BLEND_TICKS`].
     corner_blend_ticks: u8,
 }
@@ -145,6 +147,17 @@ impl State {
             Contact::Wall if approaching || self.estimate.slow_down() => Leg::Approach,
             Contact::Wall => Leg::Cruise,
         }
+    }
+
+    /// Forgets where the wheel is and what the run so far has shown, as a start without a record.
+    pub(super) fn forget(&mut self) {
+        self.estimate = EstimateState::default();
+        self.monitor = MonitorState::default();
+        self.vibration = VibrationTracking::default();
+        self.approach = Approach::default();
+        let sequence = self.planning.sequence;
+        self.planning = Planning { sequence, ..Planning::default() };
+        self.halt();
     }
 
     /// Stops loops and profile where they are.

@@ -33,7 +33,7 @@ impl Direction {
 
 /// Signed duty of a bridge, Q15: -32768 is full reverse, 32767 full forward,
 /// LSB 3.1e-5. Forward deploys (drive) or raises the preload (pre-tightener).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Duty(i16);
 
 impl Duty {

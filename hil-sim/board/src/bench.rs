@@ -10,6 +10,7 @@ use super::fault_injector::{BoardInjector, FaultTimes, Saving};
 use super::log::{Line, Reader, Strings};
 use super::machine::Machine;
 use super::peripherals::HZ;
+use super::peripherals::rcc::Cause;
 use super::rtt::Probe;
 use hil_sim::injector::FaultInjector;
 use hil_sim::plant::rig::{Drives, VirtualRig};
@@ -17,6 +18,8 @@ use hil_sim::plant::sensors::{Codes, Sensors};
 use hil_sim::record::{letter, starter};
 use hil_sim::scenario::{Direction, Scenario};
 use hil_sim::session;
+
+use super::wiring::{Mistake, Wiring};
 
 /// Step of the plant, s and cycles.
 const STEP_S: f64 = 1e-3;
@@ -53,6 +56,8 @@ pub struct Bench<'a> {
     frames: Option<Vec<u8>>,
     /// The faults of the scenario, if it has some.
     injector: Option<BoardInjector>,
+    /// Between the pins and the plant.
+    wiring: Wiring,
     /// The letter that starts the drive.
     start: u8,
     /// The drive starts when it is idle.
@@ -66,7 +71,20 @@ impl<'a> Bench<'a> {
     /// the wheel unloaded at the stow end, for retraction pressed at the end of travel.
     /// Errors: [`ImageError`] if the image is none, or lacks its log.
     pub fn new(elf: &[u8], strings: &'a Strings, scenario: &Scenario) -> Result<Self, ImageError> {
-        let parameters = scenario.plant();
+        Self::wired(elf, strings, scenario, &[])
+    }
+
+    /// The same with mistakes in the wiring.
+    /// Errors: as [`Bench::new`].
+    pub fn wired(
+        elf: &[u8],
+        strings: &'a Strings,
+        scenario: &Scenario,
+        mistakes: &[Mistake],
+    ) -> Result<Self, ImageError> {
+        let wiring = Wiring::with(mistakes);
+        let mut parameters = scenario.plant();
+        wiring.build(&mut parameters);
         let (position, preload) = match scenario.run.direction {
             Direction::Deploy => (0.0, 0.0),
             Direction::Retract => (scenario.rig.rig.travel_mm, scenario.rig.preload.cruise_n),
@@ -89,10 +107,12 @@ impl<'a> Bench<'a> {
             frames: Some(Vec::new()),
             injector: FaultInjector::of(scenario)
                 .map(|faults| BoardInjector::new(faults, scenario)),
+            wiring,
             start: letter(starter(scenario.run.direction)),
             starts: false,
             idle: false,
         };
+        bench.connect();
         bench.set_sensors(codes);
         Ok(bench)
     }
@@ -193,6 +213,7 @@ impl<'a> Bench<'a> {
             Some(injector) => injector.faults.drives(drives),
             None => drives,
         };
+        let taken = self.wiring.drives(taken);
         self.plant.step(&taken, STEP_S)?;
         let mut codes = session::read(&mut self.sensors, &self.plant);
         if let Some(injector) = &mut self.injector {
@@ -226,8 +247,50 @@ impl<'a> Bench<'a> {
         self.starts
     }
 
+    /// The wiring, for a hand at it; [`Bench::connect`] applies the change.
+    pub const fn wiring_mut(&mut self) -> &mut Wiring {
+        &mut self.wiring
+    }
+
+    /// Applies the wiring to the chip's pins.
+    pub fn connect(&mut self) {
+        let now = self.machine.now();
+        self.wiring.connect(self.machine.chip_mut(), now);
+    }
+
+    /// The wiring.
+    pub const fn wiring(&self) -> &Wiring {
+        &self.wiring
+    }
+
+    /// A hand holds the board in reset for so many milliseconds.
+    /// Errors: as [`Bench::step`].
+    pub fn hold_reset(&mut self, milliseconds: u32) -> Result<(), BoardError> {
+        for _ in 0..milliseconds {
+            self.machine.restart(Cause::Pin)?;
+            self.connect();
+            self.machine.halt(STEP - 1)?;
+            let [drive, preload] = {
+                let now = self.machine.now();
+                self.machine.chip_mut().take_motors(now)
+            };
+            let drives = Drives {
+                drive: drive.duty,
+                drive_on: drive.enabled > 0.5,
+                preload: preload.duty,
+                preload_on: preload.enabled > 0.5,
+                ..Drives::default()
+            };
+            self.plant.step(&self.wiring.drives(drives), STEP_S)?;
+        }
+        self.machine.restart(Cause::Pin)?;
+        self.connect();
+        Ok(())
+    }
+
     /// Applies these codes to the sensors' lines.
     fn set_sensors(&mut self, codes: Codes) {
+        let codes = self.wiring.codes(codes);
         // Noise on the lines can exceed the wheel's own speed.
         let turned =
             codes.wheel_encoder.since(self.codes.wheel_encoder).clamp(-MOST_COUNTS, MOST_COUNTS);

@@ -44,6 +44,10 @@ const REQUESTS: [u32; 4] = [5, 36, 10, 11];
 pub struct Defects {
     /// Lines of the wheel encoder that are broken: the pull-up holds them high.
     pub encoder_lines: [bool; 2],
+    /// They are exchanged.
+    pub encoder_swapped: bool,
+    /// PWM and enable of the drive's bridge have no pull-down: high while nothing drives them.
+    pub drive_bridge_floats: bool,
     /// Codes, in parts of 2^16, that the inputs of preload sensor, compression sensor, drive's
     /// and pre-tightener's bridge read instead of their voltages.
     pub stuck_codes: [Option<u16>; 4],

@@ -8,13 +8,15 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use hil_sim::cli::failure::{Failure, Outcome};
-use hil_sim::cli::{capture, faults, live, output, params};
+use hil_sim::cli::{bringup, capture, faults, live, output, params};
 use hil_sim::firmware::{self, Profile, build_binary};
 use hil_sim::params::Client;
 use hil_sim::progress;
 use hil_sim::scenario::Scenario;
 use serde::Serialize;
 
+use crate::bench::Bench;
+use crate::bringup::Attended;
 use crate::campaign::{self, Firmware};
 use crate::capture::Emulated;
 use crate::cycles::{self, Step, TickCycles};
@@ -23,6 +25,7 @@ use crate::load;
 use crate::log::Strings;
 use crate::params::EmulatedBoard;
 use crate::run::{self, RunOptions};
+use crate::wiring::Mistake;
 
 /// The verbs of `rig` on the emulated board; `rig` starts this program where one needs it.
 #[derive(Debug, Parser)]
@@ -35,6 +38,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Verb {
     Deploy(hil_sim::cli::deploy::Args),
+    Bringup(bringup::Args),
     Capture(capture::Args),
     Live(live::Args),
     Faults(faults::Args),
@@ -73,6 +77,7 @@ struct Measured {
 pub fn main() -> ExitCode {
     hil_sim::cli::run(|cli: &Cli| match &cli.verb {
         Verb::Deploy(args) => deploy::run(args),
+        Verb::Bringup(args) => bring_up(args),
         Verb::Capture(args) => capture(args),
         Verb::Live(args) => live(args),
         Verb::Faults(args) => faults(args),
@@ -88,6 +93,21 @@ fn image(scenario: &Scenario) -> Result<(Vec<u8>, Strings), Failure> {
     let elf = firmware::image(Profile::Release)?;
     let strings = Strings::of(&elf).map_err(Failure::run)?;
     Ok((elf, strings))
+}
+
+/// The first power-up of the emulated board, with the mistakes in its wiring that are asked for.
+fn bring_up(args: &bringup::Args) -> Result<Outcome, Failure> {
+    let mistake = |name: &String| {
+        let parsed: Result<Mistake, String> = name.parse();
+        parsed.map_err(|error| Failure::input(format!("--mistake {name}: {error}")))
+    };
+    let mistakes: Vec<Mistake> = args.mistake.iter().map(mistake).collect::<Result<_, _>>()?;
+    let scenario = Scenario::default();
+    let (elf, strings) = image(&scenario)?;
+    let bench = Bench::wired(&elf, &strings, &scenario, &mistakes).map_err(Failure::run)?;
+    let mut board = Attended::new(bench);
+    let mut person = board.person(bringup::person(args));
+    bringup::carry_out(args, &mut board, &mut person)
 }
 
 fn capture(args: &capture::Args) -> Result<Outcome, Failure> {

@@ -3,6 +3,7 @@
 
 pub mod accelerator;
 pub mod bench;
+pub mod bringup;
 pub mod campaign;
 pub mod capture;
 pub mod chip;
@@ -28,3 +29,4 @@ pub mod run;
 pub mod spread;
 pub mod thumb;
 pub mod timing;
+pub mod wiring;

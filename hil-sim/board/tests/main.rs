@@ -1,5 +1,6 @@
 //! The firmware, and other images, on the emulated board.
 
+mod bringup;
 mod common;
 mod cycles;
 mod faults;

@@ -222,6 +222,7 @@ impl Judge {
             Mode::Idle => "idle",
             Mode::Boot | Mode::SelfTest | Mode::Zero => "start",
             Mode::Preload(_) | Mode::Run(..) | Mode::Stopping(_) => "under way",
+            Mode::Service => "service",
         }
     }
 }

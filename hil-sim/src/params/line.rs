@@ -66,6 +66,11 @@ impl<W: Wire> Client<W> {
         self.wire
     }
 
+    /// The line, to listen to it.
+    pub const fn wire_mut(&mut self) -> &mut W {
+        &mut self.wire
+    }
+
     /// One request, one answer; ignores answers to earlier requests.
     ///
     /// # Errors

@@ -1,8 +1,8 @@
 //! Records a run as it goes on.
 
-use interstage::supervise::Mode;
+use interstage::supervise::{Mode, ServiceDuties};
 use interstage::tick::{CrossingRecord, Entry, Event, Telemetry};
-use interstage::units::{Direction, Q16};
+use interstage::units::{Direction, Duty, Q16};
 use sha2::{Digest, Sha256};
 
 use super::tally::{Ended, TICK_S, Tally, true_line};
@@ -160,6 +160,11 @@ pub fn text(event: &Event) -> String {
         Event::Limit(limit) => format!("limit {}: {}", limit.code(), limit.sentence()),
         Event::Lost(entries) => format!("{entries} log entries lost"),
         Event::Restart(restart) => restart.to_string(),
+        Event::Service(ServiceDuties { drive, pretightener }) => {
+            let percent = |duty: Duty| 100.0 * f64::from(duty.to_bits()) / 32_768.0;
+            let (drive, preload) = (percent(*drive), percent(*pretightener));
+            format!("service: drive {drive:.1} %, pre-tightener {preload:.1} %")
+        }
         Event::Crossing(c) => format!(
             "crossing {} at {:.2} mm ({:+.2}): {:.2} mm/s, {:.1} N, gap {:.3} mm measured, \
              {:.3} mm predicted, lead {:.2} s, stiffness x{:.3}",

@@ -6,6 +6,7 @@ use interstage::log::identity::fingerprint;
 use interstage::log::ledger::Line;
 use interstage::model::{Plan, PlanRequest};
 use interstage::restart::Restart;
+use interstage::supervise::ServiceDuties;
 use interstage::tick::{Entry, Event};
 use serde::{Deserialize, Serialize};
 
@@ -113,6 +114,18 @@ impl Since<'_> {
             Event::Restart(restart) => Some(restart),
             _ => None,
         })
+    }
+
+    /// Duties that the host asked for in the service mode, as of this tick: only a change is an
+    /// event.
+    #[must_use]
+    pub fn service(&self, tick: u32) -> ServiceDuties {
+        let before = self.events.iter().rev().filter(|entry| entry.at <= tick);
+        let mut asked = before.filter_map(|entry| match entry.event {
+            Event::Service(duties) => Some(duties),
+            _ => None,
+        });
+        asked.next().unwrap_or(ServiceDuties::REST)
     }
 }
 

@@ -16,7 +16,7 @@ use super::columns::{ANGLE, angle_error, angle_frame, bit, mode_column, stage_co
 use crate::plant::rig::Truth;
 
 /// Names of the numbers in [`Controller::mode`].
-pub const MODE_NAMES: [&str; 13] = [
+pub const MODE_NAMES: [&str; 14] = [
     "boot",
     "self-test",
     "zero",
@@ -30,10 +30,12 @@ pub const MODE_NAMES: [&str; 13] = [
     "complete",
     "fault hold",
     "off",
+    "service",
 ];
 const FAULT_HOLD: u8 = 11;
 /// The number of a tick in which the controller did not run.
 pub const OFF: u8 = 12;
+const SERVICE: u8 = 13;
 
 /// Names of the contact stages, from number 1.
 pub const STAGE_NAMES: [&str; 6] =
@@ -63,6 +65,8 @@ pub fn stage_name(stage: u8) -> &'static str {
 /// First of the retracting modes in the firmware's numbers, and their offset from those that
 /// deploy.
 const RETRACTING: (u8, u8) = (11, 7);
+/// The service mode in the firmware's numbers, behind the modes with a direction.
+const SERVING: u8 = 18;
 /// First code of a fault.
 const FAULT: u8 = 101;
 
@@ -70,6 +74,7 @@ const FAULT: u8 = 101;
 fn split(mode: Mode) -> (u8, bool, u8) {
     match codes::of_mode(mode) {
         fault @ FAULT.. => (FAULT_HOLD, false, fault),
+        SERVING => (SERVICE, false, 0),
         code if code >= RETRACTING.0 => (code - RETRACTING.1, true, 0),
         code => (code, false, 0),
     }
@@ -306,6 +311,7 @@ impl Controller {
     pub fn mode(&self) -> Option<Mode> {
         let code = match (self.mode, self.retracts) {
             (FAULT_HOLD, _) => self.fault,
+            (SERVICE, false) => SERVING,
             (number, _) if number > FAULT_HOLD => return None,
             (number, true) => number + RETRACTING.1,
             (number, false) => number,

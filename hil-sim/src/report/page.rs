@@ -84,6 +84,17 @@ and the undeformed wheel at the instant at which the lower wall stops carrying l
     page
 }
 
+/// A page of its own: title, grade (`good`, `fair`, `bad`), headline and sections.
+#[must_use]
+pub fn page_of(title: &str, grade: &str, headline: &str, body: &str) -> String {
+    let (title, headline) = (escape(title), escape(headline));
+    head(&title)
+        + &format!(
+            "<header class=\"{grade}\">\n<p class=\"what\">interstage · {title}</p>\n\
+<h1>{headline}</h1>\n</header>\n{body}</main>\n</body>\n</html>\n"
+        )
+}
+
 /// The beginning of a page, up to its content.
 pub(super) fn head(title: &str) -> String {
     format!(
@@ -166,7 +177,8 @@ fn count(n: usize, what: &str) -> String {
     }
 }
 
-fn capital(text: &str) -> String {
+/// A text with a capital at its beginning.
+pub(crate) fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }

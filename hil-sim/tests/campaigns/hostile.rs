@@ -91,6 +91,7 @@ fn fed(
                 let all = [Command::Start, Command::Reset, Command::Retract, Command::Stop];
                 all[random.random_range(0..4)]
             }),
+            service: None,
             plan: answer.take(),
             overrun: feed == Feed::Garbage && random.random_range(0..50) == 0,
             emergency_stop: feed == Feed::Garbage && random.random_range(0..400) == 0,

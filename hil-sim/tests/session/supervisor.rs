@@ -12,9 +12,9 @@ use interstage::model::{Plan, Planner};
 use interstage::sense::raw::{
     AdcCode, AngleFrame, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame,
 };
-use interstage::supervise::{Command, Mode};
+use interstage::supervise::{Command, Mode, ServiceDuties};
 use interstage::tick::{Controller, Event, Input, Output, State};
-use interstage::units::{Direction, MotorCommand};
+use interstage::units::{Direction, Duty, MotorCommand};
 use proptest::prelude::*;
 
 /// The controller in the middle of a mode, and what it was last given.
@@ -38,7 +38,8 @@ fn snapshots() -> Vec<(Mode, Snapshot)> {
     let mut found: BTreeMap<String, (Mode, Snapshot)> = BTreeMap::new();
     let boot = Snapshot { state: State::default(), input: Input::default(), plan: None };
     found.insert("Boot".to_owned(), (Mode::Boot, boot));
-    for stop_at in [None, Some(Direction::Deploy), Some(Direction::Retract)] {
+    let runs = [None, Some(Direction::Deploy), Some(Direction::Retract)];
+    for (stop_at, serves) in runs.map(|stop| (stop, false)).into_iter().chain([(None, true)]) {
         let parameters = scenario.plant();
         let mut sensors = Sensors::new(parameters.sensors.clone(), 1);
         let mut plant = VirtualRig::new(parameters, 0.0, 0.0, 1e-3);
@@ -55,14 +56,22 @@ fn snapshots() -> Vec<(Mode, Snapshot)> {
             }
             let before = state.mode();
             let command = match before {
-                Mode::Idle if within > 20 => Some(Command::Start),
+                Mode::Idle if within > 20 && !serves => Some(Command::Start),
                 Mode::Complete(Direction::Deploy) if within > 20 => Some(Command::Retract),
                 Mode::Run(direction, _) if stop_at == Some(direction) && within > 20 => {
                     Some(Command::Stop)
                 }
                 _ => None,
             };
-            let input = Input { now, sensors: frame, command, plan, ..Input::default() };
+            let service = match before {
+                Mode::Idle if serves => Some(ServiceDuties::REST),
+                Mode::Service if within == 2 => Some(ServiceDuties {
+                    pretightener: Duty::from_bits(3000),
+                    ..ServiceDuties::REST
+                }),
+                _ => None,
+            };
+            let input = Input { now, sensors: frame, command, service, plan, ..Input::default() };
             let output = controller.step(&mut state, &input);
             plan = output.request.map(|request| planner.plan(&request));
             plant.step(&drives(output.drive, output.preload), 1e-3).expect("a sound plant");
@@ -71,7 +80,8 @@ fn snapshots() -> Vec<(Mode, Snapshot)> {
                 let snapshot = Snapshot { state: state.clone(), input, plan };
                 found.entry(format!("{:?}", state.mode())).or_insert((state.mode(), snapshot));
             }
-            let over = matches!(state.mode(), Mode::Complete(Direction::Retract)) && within > 5
+            let ends = [Mode::Complete(Direction::Retract), Mode::Service];
+            let over = ends.contains(&state.mode()) && within > 5
                 || stop_at.is_some() && matches!(before, Mode::Stopping(_)) && within > 5;
             if over {
                 break;
@@ -85,6 +95,13 @@ fn snapshots() -> Vec<(Mode, Snapshot)> {
 fn check(before: Mode, output: &Output) -> Result<(), String> {
     let mode = output.telemetry.mode;
     let off = |bridge: MotorCommand| bridge == MotorCommand::OFF;
+    if mode == Mode::Service {
+        let duties = ServiceDuties {
+            drive: output.telemetry.drive,
+            pretightener: output.telemetry.pretightener,
+        };
+        return if duties.is_allowed() { Ok(()) } else { Err(format!("{duties:?}")) };
+    }
     if mode.is_at_rest() && !(off(output.drive) && off(output.preload)) {
         return Err(format!("{before:?} to {mode:?} with a bridge on"));
     }
@@ -212,10 +229,21 @@ fn tick() -> impl Strategy<Value = Tick> {
         sample(prop_oneof![3 => 3700u16..4600, 1 => any::<u16>()]),
         prop::option::weighted(0.98, readback),
         prop::option::weighted(0.1, prop::sample::select(Command::ALL.to_vec())),
+        prop::option::weighted(0.1, service()),
         prop::bool::weighted(0.02),
         prop::bool::weighted(0.02),
         any::<bool>(),
     )
+}
+
+/// Duties that a host asks for, allowed or not.
+fn service() -> impl Strategy<Value = ServiceDuties> {
+    let duty = || prop_oneof![2 => Just(0), 2 => -12_000_i16..12_000, 1 => any::<i16>()];
+    let duties = |(drive, preload)| ServiceDuties {
+        drive: Duty::from_bits(drive),
+        pretightener: Duty::from_bits(preload),
+    };
+    (duty(), duty()).prop_map(duties)
 }
 
 /// The values of [`tick`].
@@ -226,6 +254,7 @@ type Tick = (
     Option<(u16, u32)>,
     Option<Option<BridgeCode>>,
     Option<Command>,
+    Option<ServiceDuties>,
     bool,
     bool,
     bool,
@@ -247,7 +276,8 @@ proptest! {
         let (mut echo, mut sound) = (Echo::default(), input.sensors.bridges.unwrap_or_default());
         for (now, tick) in (input.now + 1..).zip(ticks) {
             let before = state.mode();
-            let (wheel, preload, compression, arm, bridges, command, overrun, stop, plans) = tick;
+            let (wheel, preload, compression, arm, bridges, command, service, overrun, stop, plans) =
+                tick;
             count = count.wrapping_add_signed(wheel.map_or(0, |(by, _)| by));
             let at = |age: u32| now.saturating_sub(age);
             let adc = |(code, age)| Sample { code: AdcCode::new(code), at: at(age) };
@@ -267,6 +297,7 @@ proptest! {
                 now,
                 sensors,
                 command,
+                service,
                 plan: plan.filter(|_| plans),
                 overrun,
                 emergency_stop: stop,

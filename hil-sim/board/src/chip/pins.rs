@@ -146,6 +146,11 @@ impl Chip {
             self.wheel += (position - self.wheel).signum();
             self.encoder.set_lines(self.wheel_lines(), cycles / edges);
         }
+        // An open line has its pull-up.
+        let [a, b] = self.outside_lines();
+        for (pin, level) in WHEEL.into_iter().zip([a, b]) {
+            self.ports[pin.0].drive(pin.1, level);
+        }
     }
 
     /// Passes the present levels of the lines to the encoder's counter.
@@ -156,9 +161,15 @@ impl Chip {
     /// Levels at the inputs of the encoder's counter; low until its pins are configured.
     fn wheel_lines(&self) -> [bool; 2] {
         let wired = WHEEL.iter().all(|pin| self.role(*pin) == Role::Alternate(WHEEL_FUNCTION));
-        let lines = lines_at(self.wheel);
+        self.outside_lines().map(|level| wired && level.unwrap_or(true))
+    }
+
+    /// Levels that the encoder gives its lines at the board; none of one that is broken.
+    fn outside_lines(&self) -> [Option<bool>; 2] {
+        let [a, b] = lines_at(self.wheel);
+        let lines = if self.defects.encoder_swapped { [b, a] } else { [a, b] };
         let broken = self.defects.encoder_lines;
-        [wired && (lines[0] || broken[0]), wired && (lines[1] || broken[1])]
+        [0, 1].map(|line| (!broken[line]).then_some(lines[line]))
     }
 
     /// Voltages at the analogue inputs of preload sensor, compression sensor and the bridges of drive
@@ -215,10 +226,13 @@ impl Chip {
             let open = reaches && self.level(wired.stop) && !self.defects.stop_shorted;
             self.motors[index].set_break(open, now);
             let is_output = self.role(wired.pwm) == Role::Alternate(wired.pwm_function);
-            let duty = if is_output { self.motors[index].duty(0) } else { 0.0 };
+            let floats = index == 0 && self.defects.drive_bridge_floats;
+            let pwm = if floats { 1.0 } else { 0.0 };
+            let duty = if is_output { self.motors[index].duty(0) } else { pwm };
             let out = |pin: Pin| self.ports[pin.0].puts_out(pin.1);
             let sense = if out(wired.forward) { 1.0 } else { -1.0 };
-            let on = out(wired.enable);
+            let high = floats && self.role(wired.enable) != Role::Output;
+            let on = out(wired.enable) || high;
             self.bridges[index].set(sense * duty, on, now);
         }
     }

@@ -1,0 +1,271 @@
+//! Mistakes in the wiring of a rig, between the chip's pins and the plant: what a first power-up
+//! has to find.
+
+use hil_sim::bringup::Sensor;
+use hil_sim::plant::draw::PlantParameters;
+use hil_sim::plant::rig::Drives;
+use hil_sim::plant::sensors::Codes;
+use interstage::sense::raw::{AdcCode, AngleFrame, BridgeCode, BridgeCodes};
+
+use super::chip::{Chip, Pin};
+
+/// Code of a sensor without load: 5 % of the converter.
+const ZERO: i32 = 3277;
+/// Code of an open input whose pull-down is missing: it keeps some charge.
+const FLOATING: u16 = 21_000;
+/// By how much the angle's zero code is off, codes.
+const ANGLE_OFF: i32 = 900;
+/// Friction of a wheel that cannot be turned, N.
+const BLOCKED_N: f64 = 1e4;
+
+macro_rules! mistakes {
+    ($($(#[$doc:meta])* $name:ident: $text:literal,)*) => {
+        /// A mistake.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum Mistake {
+            $($(#[$doc])* $name,)*
+        }
+
+        impl Mistake {
+            /// Every mistake.
+            pub const ALL: &[Self] = &[$(Self::$name),*];
+
+            /// Its name on the command line.
+            #[must_use]
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$name => $text,)*
+                }
+            }
+        }
+    };
+}
+
+mistakes! {
+    /// The option byte DBANK is 0.
+    OneBank: "one-bank",
+    /// The angle encoder is not connected.
+    AngleOpen: "angle-open",
+    /// Its magnet is missing.
+    MagnetMissing: "magnet-missing",
+    /// Its magnet is turned over: the codes grow inwards from the right one at the stow end.
+    ArmInwards: "arm-inwards",
+    /// The angle's zero code is far off.
+    AngleZero: "angle-zero",
+    /// The preload sensor is not connected.
+    PreloadOpen: "preload-open",
+    /// Its bridge is reversed.
+    PreloadReversed: "preload-reversed",
+    /// Preload and compression sensor are exchanged.
+    SensorsExchanged: "sensors-exchanged",
+    /// The compression sensor is not connected.
+    CompressionOpen: "compression-open",
+    /// It is reversed.
+    CompressionReversed: "compression-reversed",
+    /// Line A of the wheel encoder is not connected.
+    EncoderA: "encoder-a",
+    /// Line B of the wheel encoder is not connected.
+    EncoderB: "encoder-b",
+    /// Neither is connected.
+    EncoderOpen: "encoder-open",
+    /// Lines A and B are exchanged.
+    EncoderSwapped: "encoder-swapped",
+    /// The drive motor's leads are exchanged.
+    DriveLeads: "drive-leads",
+    /// Both of these are.
+    BothSwapped: "both-swapped",
+    /// The pre-tightener's leads are exchanged.
+    PretightenerLeads: "pretightener-leads",
+    /// The motors are exchanged.
+    MotorsExchanged: "motors-exchanged",
+    /// The inputs of the drive's readback are exchanged.
+    ReadbackSwapped: "readback-swapped",
+    /// The readbacks of the bridges are exchanged.
+    ReadbacksExchanged: "readbacks-exchanged",
+    /// The reference of the drive's readback is missing.
+    ReadbackReference: "readback-reference",
+    /// The motor supply is off.
+    SupplyOff: "supply-off",
+    /// The emergency stop's contact is open.
+    StopOpen: "stop-open",
+    /// Its line is shorted to ground.
+    StopShorted: "stop-shorted",
+    /// Its second contact does not cut the motors' supply.
+    StopSupply: "stop-supply",
+    /// The preload sensor shows 1.5 times the preload.
+    PreloadGain: "preload-gain",
+    /// The preload sensor has ten times its noise.
+    PreloadNoise: "preload-noise",
+    /// The compression sensor has ten times its noise.
+    CompressionNoise: "compression-noise",
+    /// The wheel cannot be turned.
+    WheelBlocked: "wheel-blocked",
+    /// The pull-down at the preload sensor's input is missing.
+    PreloadPullDown: "preload-pull-down",
+    /// The pull-downs at the drive's bridge are missing.
+    BridgePullDowns: "bridge-pull-downs",
+}
+
+impl std::str::FromStr for Mistake {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        Self::ALL.iter().find(|mistake| mistake.name() == text).copied().ok_or_else(|| {
+            let names: Vec<&str> = Self::ALL.iter().map(|mistake| mistake.name()).collect();
+            format!("expected one of {}", names.join(", "))
+        })
+    }
+}
+
+/// The wiring of a rig, and what a hand does with it.
+#[derive(Clone, Debug, Default)]
+pub struct Wiring {
+    mistakes: Vec<Mistake>,
+    /// The emergency stop is pressed.
+    pub stop_pressed: bool,
+    /// The motor supply is switched off.
+    pub switched_off: bool,
+    /// Sensors that a hand has unplugged.
+    pub unplugged: Vec<Sensor>,
+}
+
+impl Wiring {
+    /// A rig with these mistakes.
+    #[must_use]
+    pub fn with(mistakes: &[Mistake]) -> Self {
+        Self { mistakes: mistakes.to_vec(), ..Self::default() }
+    }
+
+    fn has(&self, mistake: Mistake) -> bool {
+        self.mistakes.contains(&mistake)
+    }
+
+    /// The plant as built.
+    pub fn build(&self, plant: &mut PlantParameters) {
+        if self.has(Mistake::PreloadNoise) {
+            plant.sensors.noise.preload_sensor_n *= 10.0;
+        }
+        if self.has(Mistake::CompressionNoise) {
+            plant.sensors.noise.compression_sensor_mm *= 10.0;
+        }
+        if self.has(Mistake::WheelBlocked) {
+            plant.drive.friction_n = BLOCKED_N;
+        }
+    }
+
+    /// The motors' supply is there.
+    #[must_use]
+    pub fn is_supplied(&self) -> bool {
+        let cut = self.stop_pressed && !self.has(Mistake::StopSupply);
+        !cut && !self.switched_off && !self.has(Mistake::SupplyOff)
+    }
+
+    /// Applies what is constant, and the hand, to the chip's pins.
+    pub fn connect(&self, chip: &mut Chip, now: u64) {
+        chip.flash.set_single_bank(self.has(Mistake::OneBank));
+        chip.angle.lost = self.has(Mistake::AngleOpen);
+        chip.angle.set_magnet(!self.has(Mistake::MagnetMissing));
+        let open = self.has(Mistake::EncoderOpen);
+        chip.defects.encoder_lines =
+            [open || self.has(Mistake::EncoderA), open || self.has(Mistake::EncoderB)];
+        chip.defects.encoder_swapped =
+            self.has(Mistake::EncoderSwapped) || self.has(Mistake::BothSwapped);
+        chip.defects.drive_bridge_floats = self.has(Mistake::BridgePullDowns);
+        let pressed = self.stop_pressed && !self.has(Mistake::StopShorted);
+        let open = pressed || self.has(Mistake::StopOpen);
+        chip.drive(Pin::STOP_DRIVE, open, now);
+        chip.drive(Pin::STOP_PRELOAD, open, now);
+    }
+
+    /// What the motors get of what the bridges put out.
+    #[must_use]
+    pub fn drives(&self, mut drives: Drives) -> Drives {
+        if !self.is_supplied() {
+            (drives.drive_on, drives.preload_on) = (false, false);
+        }
+        if self.has(Mistake::MotorsExchanged) {
+            std::mem::swap(&mut drives.drive, &mut drives.preload);
+            std::mem::swap(&mut drives.drive_on, &mut drives.preload_on);
+        }
+        if self.has(Mistake::DriveLeads) || self.has(Mistake::BothSwapped) {
+            drives.drive = -drives.drive;
+        }
+        if self.has(Mistake::PretightenerLeads) {
+            drives.preload = -drives.preload;
+        }
+        drives
+    }
+
+    /// What the board gets of what the sensors and bridges give.
+    #[must_use]
+    pub fn codes(&self, mut codes: Codes) -> Codes {
+        codes.bridges = self.readback(codes.bridges);
+        codes.arm_angle = self.arm(codes.arm_angle);
+        let [mut preload, mut compression] =
+            [codes.preload_sensor, codes.compression_sensor].map(|code| i32::from(code.get()));
+        if self.has(Mistake::PreloadReversed) {
+            preload = 2 * ZERO - preload;
+        }
+        if self.has(Mistake::CompressionReversed) {
+            compression = 2 * ZERO - compression;
+        }
+        if self.has(Mistake::PreloadGain) {
+            preload = ZERO + (preload - ZERO) * 3 / 2;
+        }
+        if self.has(Mistake::PreloadOpen) || self.unplugged.contains(&Sensor::Preload) {
+            let floats = self.has(Mistake::PreloadPullDown);
+            preload = if floats { FLOATING.into() } else { 0 };
+        }
+        if self.has(Mistake::CompressionOpen) || self.unplugged.contains(&Sensor::Compression) {
+            compression = 0;
+        }
+        if self.has(Mistake::SensorsExchanged) {
+            std::mem::swap(&mut preload, &mut compression);
+        }
+        let code = |code: i32| AdcCode::new(code.clamp(0, 65_535) as u16);
+        (codes.preload_sensor, codes.compression_sensor) = (code(preload), code(compression));
+        codes
+    }
+
+    /// The readback of bridges whose motors, by [`Wiring::drives`], have got something else.
+    fn readback(&self, codes: BridgeCodes) -> BridgeCodes {
+        let mirrored = |code: BridgeCode| {
+            BridgeCode::new((2 * BridgeCode::CENTRE).saturating_sub(code.get()).min(4095))
+        };
+        let BridgeCodes { mut drive, mut pretightener } = codes;
+        if self.has(Mistake::MotorsExchanged) {
+            std::mem::swap(&mut drive, &mut pretightener);
+        }
+        if self.has(Mistake::DriveLeads) || self.has(Mistake::BothSwapped) {
+            drive = mirrored(drive);
+        }
+        if self.has(Mistake::PretightenerLeads) {
+            pretightener = mirrored(pretightener);
+        }
+        if self.has(Mistake::ReadbackSwapped) {
+            drive = mirrored(drive);
+        }
+        if self.has(Mistake::ReadbackReference) {
+            drive = BridgeCode::new(drive.get().saturating_sub(BridgeCode::CENTRE));
+        }
+        if self.has(Mistake::ReadbacksExchanged) {
+            std::mem::swap(&mut drive, &mut pretightener);
+        }
+        BridgeCodes { drive, pretightener }
+    }
+
+    /// The angle's frame with the magnet turned over at the stow end, or the zero elsewhere.
+    fn arm(&self, frame: AngleFrame) -> AngleFrame {
+        /// Code at the stow end of the prototype.
+        const STOWED: i32 = 4112;
+        let mut code = i32::from(frame.get() & 0x3FFF);
+        if self.has(Mistake::ArmInwards) {
+            code = 2 * STOWED - code;
+        }
+        if self.has(Mistake::AngleZero) {
+            code += ANGLE_OFF;
+        }
+        let bits = (code & 0x3FFF) as u16;
+        AngleFrame::new(bits | ((bits.count_ones() & 1) as u16) << 15)
+    }
+}

@@ -1,0 +1,234 @@
+//! The first power-up on the emulated board: a sound one, and each mistake in the wiring.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use hil_sim::bringup::{self, Line, Progress, Stdin};
+use hil_sim::record::Run;
+use hil_sim::replay::replay;
+use hil_sim::scenario::Scenario;
+use interstage::params::Refusal;
+use interstage::params::link::{FrameReader, ToBoard, ToHost, frame};
+use interstage::params::service::{Request, Response};
+use interstage::supervise::ServiceDuties;
+use interstage::units::Duty;
+use rig_board::bench::Bench;
+use rig_board::bringup::Attended;
+use rig_board::chip::Pin;
+use rig_board::wiring::Mistake;
+use serde_json::Value;
+
+use crate::common::{Board, elf, strings};
+
+/// The power-up of a board with these mistakes, every motion allowed.
+fn power_up(mistakes: &[Mistake]) -> Progress {
+    let scenario = Scenario::default();
+    let bench = Bench::wired(elf(), strings(), &scenario, mistakes).expect("a bench");
+    let mut board = Attended::new(bench);
+    let mut person = board.person(Stdin::new(std::io::empty(), std::io::sink(), true));
+    let mut progress = Progress::new(scenario);
+    let mut line = Line::new(&mut board);
+    let (mut said, mut kept) = (Vec::new(), 0);
+    let mut say = |text: &str| said.push(text.to_owned());
+    let ended = bringup::run(&mut line, &mut person, &mut progress, &mut say, &mut |_| kept += 1);
+    ended.unwrap_or_else(|error| panic!("{mistakes:?}: {error}: {said:#?}"));
+    assert!(kept > 0);
+    progress
+}
+
+#[test]
+fn a_sound_board_passes_every_check_and_its_parameters_are_found() {
+    let progress = power_up(&[]);
+    let failed: Vec<_> = progress.checks().filter(|check| !check.ok).collect();
+    assert!(failed.is_empty() && progress.is_complete(), "{failed:#?}");
+    let done: Vec<&str> = progress.checks().map(|check| check.name.as_str()).collect();
+    let all: Vec<&str> = bringup::CHECKS.iter().map(|info| info.name).collect();
+    assert_eq!(done, all);
+    let (found, rig) = (&progress.proposed.rig, Scenario::default().rig);
+    let near = |found: f64, known: f64, within: f64| {
+        assert!((found - known).abs() <= within, "{found} for {known}");
+    };
+    near(found.sense.angle_zero_code, rig.sense.angle_zero_code, 2.0);
+    near(found.drive.no_load_speed_mm_s, rig.drive.no_load_speed_mm_s, 3.0);
+    near(found.preload.slew_n_per_s, rig.preload.slew_n_per_s, 1.5);
+}
+
+/// Each mistake, the check that finds it, and what its advice says.
+const FOUND: &[(Mistake, &str, &str)] = &[
+    (Mistake::OneBank, "option bytes", "DBANK=1"),
+    (Mistake::StopOpen, "stop contact", "contact is open"),
+    (Mistake::ReadbackReference, "readback at rest", "drive's readback (PB0): 0 V at rest"),
+    (Mistake::PreloadOpen, "preload sensor", "preload sensor is open"),
+    (Mistake::PreloadNoise, "preload noise", "preload sensor's noise"),
+    (Mistake::CompressionOpen, "compression sensor", "compression sensor is open"),
+    (Mistake::CompressionNoise, "compression noise", "compression sensor's noise"),
+    (Mistake::AngleOpen, "angle sensor", "does not answer"),
+    (Mistake::MagnetMissing, "angle sensor", "magnet is missing"),
+    (Mistake::AngleZero, "angle zero", "zero code is far off"),
+    (Mistake::PreloadPullDown, "preload lead", "100 kOhm at PC2"),
+    (Mistake::StopShorted, "stop pressed", "shorted to ground"),
+    (Mistake::StopSupply, "stop cuts supply", "second contact does not cut"),
+    (Mistake::BridgePullDowns, "held in reset", "pull-down of 10 kOhm"),
+    (Mistake::ReadbackSwapped, "drive bridge", "inputs of the drive's readback are swapped"),
+    (Mistake::ReadbacksExchanged, "drive bridge", "readbacks are exchanged"),
+    (Mistake::SupplyOff, "drive bridge", "motor supply is off"),
+    (Mistake::EncoderA, "drive turns", "line A (PA0) is missing"),
+    (Mistake::EncoderB, "drive turns", "line B (PA1) is missing"),
+    (Mistake::EncoderOpen, "drive turns", "encoder is not connected"),
+    (Mistake::EncoderSwapped, "drive turns", "encoder's lines A and B are swapped"),
+    (Mistake::DriveLeads, "drive turns", "drive motor's leads are swapped"),
+    (Mistake::BothSwapped, "drive direction", "both the encoder's lines and the drive motor's"),
+    (Mistake::WheelBlocked, "drive turns", "wheel is blocked, or the drive motor's leads"),
+    (Mistake::MotorsExchanged, "drive turns", "motors are exchanged"),
+    (Mistake::PretightenerLeads, "preload rises", "pre-tightener's leads are swapped"),
+    (Mistake::PreloadReversed, "preload rises", "preload sensor's bridge is reversed"),
+    (Mistake::CompressionReversed, "preload rises", "compression sensor is reversed"),
+    (Mistake::SensorsExchanged, "preload lead", "compression sensor are exchanged"),
+    (Mistake::ArmInwards, "arm direction", "codes grow inwards"),
+    (Mistake::PreloadGain, "preload scale", "preload sensor's scale is wrong by 1.5"),
+];
+
+#[test]
+fn each_mistake_in_the_wiring_is_named_and_nothing_else_is_blamed() {
+    assert!(Mistake::ALL.iter().all(|known| FOUND.iter().any(|(mistake, ..)| mistake == known)));
+    let only = std::env::var("RIG_MISTAKE").ok();
+    let mut wrong = Vec::new();
+    for (mistake, name, phrase) in FOUND {
+        if only.as_ref().is_some_and(|only| only != mistake.name()) {
+            continue;
+        }
+        let progress = power_up(&[*mistake]);
+        let failed: Vec<_> = progress.checks().filter(|check| !check.ok).collect();
+        let named =
+            matches!(&failed[..], [one] if one.name == *name && one.advice.contains(phrase));
+        if !named {
+            wrong.push(format!("{}: {failed:#?}", mistake.name()));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Sends a request down the board's line.
+fn send(board: &mut Board, request: Request) {
+    let bytes = frame(&ToBoard::Parameters(1, request)).expect("it fits");
+    assert_eq!(board.bench.line_send(&bytes).expect("runs"), bytes.len());
+}
+
+/// The board's answer within some milliseconds.
+fn answer(board: &mut Board) -> Response {
+    board.run(20);
+    let mut reader = FrameReader::new();
+    let bytes = board.bench.line_take().expect("runs");
+    let answers = bytes.into_iter().filter_map(|byte| reader.take(byte));
+    let ToHost::Parameters(1, response) = answers.last().expect("an answer") else {
+        panic!("another number");
+    };
+    response
+}
+
+const PRESS: ServiceDuties =
+    ServiceDuties { drive: Duty::ZERO, pretightener: Duty::from_bits(6000) };
+const DRIVE: ServiceDuties =
+    ServiceDuties { drive: Duty::from_bits(6000), pretightener: Duty::ZERO };
+
+/// A board in the service mode.
+fn serving() -> Board {
+    let mut board = Board::idle();
+    send(&mut board, Request::Service(ServiceDuties::REST));
+    board.until("mode: service", 50);
+    board
+}
+
+#[test]
+fn a_host_that_falls_silent_loses_the_motor_within_a_fifth_of_a_second() {
+    let mut board = serving();
+    for _ in 0..6 {
+        send(&mut board, Request::Service(PRESS));
+        board.run(50);
+        assert!(board.step().drives.preload_on);
+    }
+    let silent = (0..1000).find(|_| !board.step().drives.preload_on).expect("it ends");
+    // The last word was 51 ms ago, and is read every 10 ms.
+    assert!((140..=162).contains(&silent), "{silent} ms");
+    assert!(board.said("the host fell silent"), "{:#?}", board.log);
+    board.assert_off(1000);
+    // The controller can be run again from its log, to the bit.
+    let run = Run::of_stream(&board.frames);
+    let replayed = replay(&run, &Scenario::default().rig).expect("a sound rig");
+    assert!(replayed.difference.is_none() && replayed.ticks > 1000, "{replayed:?}");
+}
+
+#[test]
+fn the_service_mode_is_refused_in_motion_and_ends_with_the_emergency_stop() {
+    let mut board = Board::moving();
+    for duties in [ServiceDuties::REST, DRIVE] {
+        send(&mut board, Request::Service(duties));
+        assert_eq!(answer(&mut board), Response::Refused(Refusal::NotService));
+    }
+    assert!(!board.said("mode: service"));
+    board.until("mode: deployed", 20_000);
+    let mut board = serving();
+    for _ in 0..3 {
+        send(&mut board, Request::Service(DRIVE));
+        board.run(50);
+    }
+    assert!(board.step().drives.drive > 0.1);
+    let now = board.machine().now();
+    for pin in [Pin::STOP_DRIVE, Pin::STOP_PRELOAD] {
+        board.machine().chip_mut().drive(pin, true, now);
+    }
+    board.step();
+    assert!(board.step().drives.drive == 0.0);
+    board.run(5);
+    assert!(board.said("fault hold, 151"), "{:#?}", board.log);
+    board.assert_off(200);
+}
+
+/// `rig bringup` on the emulated board, as a user has it, with this standard input closed.
+fn verb(place: &Path, arguments: &[&str]) -> (Option<i32>, Value, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_rig-board"))
+        .current_dir(place)
+        .args(["bringup", "--target", "board", "--out", "up", "--json"])
+        .args(arguments)
+        .stdin(Stdio::null())
+        .output()
+        .expect("starts");
+    let printed = serde_json::from_slice(&output.stdout).unwrap_or(Value::Null);
+    (output.status.code(), printed, String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+#[test]
+fn the_verb_moves_nothing_unconfirmed_and_goes_on_where_it_was_broken_off() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let place = folder.path();
+    let (code, _, said) = verb(place, &[]);
+    assert_eq!(code, Some(1), "{said}");
+    let last = said.lines().last().expect("it says why");
+    assert!(last.starts_with("error: not confirmed: ") && last.contains("DRIVE"), "{said}");
+    let (code, printed, said) = verb(place, &["--yes"]);
+    assert_eq!((code, &printed["complete"]), (Some(0), &true.into()), "{said}");
+    assert_eq!(said.matches("passed before").count(), 3, "{said}");
+    let checks = printed["checks"].as_array().expect("checks");
+    assert_eq!(checks.len(), bringup::CHECKS.len());
+    for check in checks {
+        for key in ["name", "ok", "measured", "expected", "advice"] {
+            assert!(!check[key].is_null(), "{check}");
+        }
+    }
+    let page = std::fs::read_to_string(place.join("up/report.html")).expect("a page");
+    assert!(page.contains("wired as it should be") && page.contains("drive.no_load_speed_mm_s"));
+    // What it proposes is what `params` takes.
+    let restored = Command::new(env!("CARGO_BIN_EXE_rig-board"))
+        .current_dir(place)
+        .args(["params", "restore", "up/proposed.toml", "--target", "board", "--json"])
+        .output()
+        .expect("starts");
+    let restored: Value = serde_json::from_slice(&restored.stdout).expect("one object");
+    for key in printed["proposed"].as_object().expect("keys").keys() {
+        assert_eq!(restored["parameters"][key].to_string(), printed["proposed"][key], "{key}");
+    }
+    let (code, printed, _) = verb(place, &["--yes", "--again", "--mistake", "encoder-swapped"]);
+    assert_eq!((code, &printed["complete"]), (Some(1), &false.into()));
+    let (code, _, said) = verb(place, &["--mistake", "gremlins"]);
+    assert!(code == Some(2) && said.contains("gremlins"), "{said}");
+}

@@ -1,0 +1,199 @@
+//! What only a person at the rig can do, see or allow.
+
+use std::fmt;
+use std::io::{BufRead, Write};
+
+use super::BringupError;
+
+/// A sensor with a plug.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sensor {
+    /// Preload sensor.
+    Preload,
+    /// Compression sensor.
+    Compression,
+}
+
+impl fmt::Display for Sensor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Preload => "preload sensor",
+            Self::Compression => "compression sensor",
+        })
+    }
+}
+
+/// What a hand is asked to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Action {
+    /// Switch the motor supply on, its current limit low.
+    SwitchOn,
+    /// Press the emergency stop and hold it.
+    PressStop,
+    /// Release it.
+    ReleaseStop,
+    /// Unplug a sensor.
+    Unplug(Sensor),
+    /// Plug it in again.
+    Plug(Sensor),
+    /// Hold the board's reset button for two seconds.
+    HoldReset,
+}
+
+impl fmt::Display for Action {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::SwitchOn => f.write_str(
+                "Switch the motor supply on, with a low current limit. Nothing may move.",
+            ),
+            Self::PressStop => f.write_str("Press the emergency stop and leave it pressed."),
+            Self::ReleaseStop => f.write_str("Release the emergency stop."),
+            Self::Unplug(sensor) => write!(f, "Unplug the {sensor}."),
+            Self::Plug(sensor) => write!(f, "Plug the {sensor} in again."),
+            Self::HoldReset => f.write_str("Hold the board's reset button for 2 s."),
+        }
+    }
+}
+
+/// What an eye is asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Question {
+    /// How the wheel turned in the last motion.
+    Turned,
+    /// Whether the motors have their supply.
+    Supplied,
+    /// How the wheel or the screw moved while the reset button was held.
+    MovedInReset,
+}
+
+impl Question {
+    /// The answers with the letters that stand for them.
+    #[must_use]
+    pub const fn answers(self) -> &'static [(char, Seen)] {
+        match self {
+            Self::Turned => &[('o', Seen::Outwards), ('i', Seen::Inwards), ('n', Seen::Nothing)],
+            Self::Supplied => &[('y', Seen::Yes), ('n', Seen::Nothing)],
+            Self::MovedInReset => &[('y', Seen::Yes), ('n', Seen::Nothing)],
+        }
+    }
+}
+
+impl fmt::Display for Question {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Turned => {
+                "Which way did the wheel turn: outwards as to deploy, inwards, or not (o/i/n)?"
+            }
+            Self::Supplied => {
+                "Emergency stop still pressed: do the bridges' supply pins have voltage (y/n)?"
+            }
+            Self::MovedInReset => "Did the wheel or the screw move meanwhile (y/n)?",
+        })
+    }
+}
+
+/// What an eye has seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Seen {
+    /// The wheel turned as to deploy.
+    Outwards,
+    /// It turned as to retract.
+    Inwards,
+    /// Yes.
+    Yes,
+    /// No, or nothing.
+    Nothing,
+    /// Nobody looked.
+    Unknown,
+}
+
+/// The person at the rig.
+pub trait Operator {
+    /// Allows a motion.
+    ///
+    /// # Errors
+    /// [`BringupError::Declined`] if it is not allowed.
+    fn confirm(&mut self, motion: &str) -> Result<(), BringupError>;
+
+    /// Does something at the rig; returns when it is done.
+    ///
+    /// # Errors
+    /// [`BringupError`] if nobody does it.
+    fn act(&mut self, action: Action) -> Result<(), BringupError>;
+
+    /// Looks at the rig.
+    ///
+    /// # Errors
+    /// [`BringupError`] if nobody answers.
+    fn look(&mut self, question: Question) -> Result<Seen, BringupError>;
+}
+
+/// A person at the terminal, or the lines of a script.
+pub struct Stdin<R, W> {
+    input: R,
+    prompts: W,
+    /// Allows every motion unasked.
+    yes: bool,
+}
+
+impl<R: BufRead, W: Write> Stdin<R, W> {
+    /// Answers from `input` to prompts at `prompts`; with `yes` motions are not asked for.
+    pub const fn new(input: R, prompts: W, yes: bool) -> Self {
+        Self { input, prompts, yes }
+    }
+
+    /// The next line, lower case.
+    fn ask(&mut self, prompt: &str) -> Result<String, BringupError> {
+        // A prompt that nobody reads is not answered either.
+        let _ = write!(self.prompts, "{prompt} ");
+        let _ = self.prompts.flush();
+        let mut line = String::new();
+        match self.input.read_line(&mut line) {
+            Ok(1..) => Ok(line.trim().to_lowercase()),
+            _ => {
+                let _ = writeln!(self.prompts);
+                Err(BringupError::NoAnswer(prompt.to_owned()))
+            }
+        }
+    }
+}
+
+impl<R: BufRead, W: Write> Operator for Stdin<R, W> {
+    fn confirm(&mut self, motion: &str) -> Result<(), BringupError> {
+        if self.yes {
+            return Ok(());
+        }
+        match self.ask(&format!("{motion} Go on (y/n)?")) {
+            Ok(answer) if answer.starts_with('y') => Ok(()),
+            _ => Err(BringupError::Declined(motion.to_owned())),
+        }
+    }
+
+    fn act(&mut self, action: Action) -> Result<(), BringupError> {
+        self.ask(&format!("{action} Then Enter.")).map(|_| ())
+    }
+
+    fn look(&mut self, question: Question) -> Result<Seen, BringupError> {
+        let answer = self.ask(&question.to_string())?;
+        let first = answer.chars().next();
+        let seen = question.answers().iter().find(|(letter, _)| Some(*letter) == first);
+        Ok(seen.map_or(Seen::Unknown, |(_, seen)| *seen))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_script_answers_and_its_end_allows_nothing() {
+        let mut script = Stdin::new(&b"y\n\no\nn\nno\n"[..], Vec::new(), false);
+        assert!(script.confirm("The wheel turns.").is_ok());
+        assert!(script.act(Action::PressStop).is_ok());
+        assert_eq!(script.look(Question::Turned).unwrap(), Seen::Outwards);
+        assert_eq!(script.look(Question::Supplied).unwrap(), Seen::Nothing);
+        assert!(matches!(script.confirm("Again."), Err(BringupError::Declined(_))));
+        assert!(matches!(script.confirm("Again."), Err(BringupError::Declined(_))));
+        assert!(matches!(script.act(Action::ReleaseStop), Err(BringupError::NoAnswer(_))));
+    }
+}

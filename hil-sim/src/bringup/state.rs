@@ -1,0 +1,112 @@
+//! How far a power-up has come, kept in a file.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::{Check, Stage};
+use crate::files::{FileError, write_text};
+use crate::scenario::Scenario;
+
+/// The file: scenarios as TOML, stages as they are.
+#[derive(Serialize, Deserialize)]
+struct Kept {
+    expected: String,
+    proposed: String,
+    stages: Vec<(Stage, Vec<Check>)>,
+}
+
+/// Results so far.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Progress {
+    /// The rig as the board's parameters have it.
+    pub expected: Scenario,
+    /// The same with what was measured.
+    pub proposed: Scenario,
+    stages: Vec<(Stage, Vec<Check>)>,
+}
+
+impl Progress {
+    /// Nothing yet, for a rig.
+    #[must_use]
+    pub fn new(expected: Scenario) -> Self {
+        Self { proposed: expected.clone(), expected, stages: Vec::new() }
+    }
+
+    /// The progress that a file has for this rig; none if it is not there, or of another rig.
+    #[must_use]
+    pub fn read(path: &Path, expected: &Scenario) -> Option<Self> {
+        let text = std::fs::read_to_string(path).ok()?;
+        let kept: Kept = serde_json::from_str(&text).ok()?;
+        if kept.expected != expected.to_toml() {
+            return None;
+        }
+        let proposed = Scenario::parse("proposed", &kept.proposed, &[]).ok()?;
+        Some(Self { expected: expected.clone(), proposed, stages: kept.stages })
+    }
+
+    /// Keeps it in a file.
+    ///
+    /// # Errors
+    /// [`FileError`] if the file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), FileError> {
+        let (expected, proposed) = (self.expected.to_toml(), self.proposed.to_toml());
+        let kept = Kept { expected, proposed, stages: self.stages.clone() };
+        // Numbers and texts always have a JSON form.
+        write_text(path, &serde_json::to_string_pretty(&kept).unwrap_or_default())
+    }
+
+    /// Takes the checks of a stage, in place of those of an earlier attempt.
+    pub(super) fn add(&mut self, stage: Stage, checks: Vec<Check>) {
+        self.stages.retain(|(known, _)| *known != stage);
+        self.stages.push((stage, checks));
+    }
+
+    /// Whether a stage has passed.
+    #[must_use]
+    pub fn is_done(&self, stage: Stage) -> bool {
+        self.stages.iter().any(|(known, checks)| {
+            *known == stage && !checks.is_empty() && checks.iter().all(|check| check.ok)
+        })
+    }
+
+    /// Whether every stage has passed.
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        Stage::ALL.iter().all(|stage| self.is_done(*stage))
+    }
+
+    /// Every check so far.
+    pub fn checks(&self) -> impl Iterator<Item = &Check> {
+        self.stages.iter().flat_map(|(_, checks)| checks)
+    }
+
+    /// The stages so far.
+    #[must_use]
+    pub fn stages(&self) -> &[(Stage, Vec<Check>)] {
+        &self.stages
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bringup::check;
+
+    #[test]
+    fn progress_goes_on_for_the_same_rig_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("bringup.json");
+        let mut progress = Progress::new(Scenario::default());
+        progress.proposed.rig.drive.no_load_speed_mm_s = 58.7;
+        progress.add(Stage::Board, vec![check("firmware", true, "500 ticks".to_owned(), "")]);
+        progress.add(Stage::Sensors, vec![check("self-test", false, "boot".to_owned(), "wait")]);
+        progress.write(&path).unwrap();
+        let back = Progress::read(&path, &Scenario::default()).expect("the same rig");
+        assert_eq!(back, progress);
+        assert!(back.is_done(Stage::Board) && !back.is_done(Stage::Sensors));
+        let mut other = Scenario::default();
+        other.rig.drive.stall_force_n += 1.0;
+        assert_eq!(Progress::read(&path, &other), None);
+    }
+}

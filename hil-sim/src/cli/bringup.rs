@@ -1,0 +1,152 @@
+//! `rig bringup`: the first power-up of a rig.
+
+use std::io;
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use super::failure::{Failure, Outcome};
+use super::output;
+use crate::bringup::{self, Check, Line, Operator, Progress, Stdin};
+use crate::files::{make_directory, write_text};
+use crate::probe::Port;
+use crate::scenario::{PRESETS, Scenario};
+
+/// Checks the wiring of a rig at its first power-up, stage by stage.
+///
+/// Reads the board, judges each sensor, then moves each motor a little in the firmware's
+/// service mode, which has the bounds; asks before each motion. Writes what it found, a page,
+/// and the parameters that it proposes, for `rig params restore`. A call that was broken off
+/// goes on where it ended. The exit code is 1 if a check fails.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The board: probe, a real one, or board, the emulated one.
+    #[arg(long, value_name = "TARGET", default_value = "probe", value_parser = ["board", "probe"])]
+    target: String,
+
+    /// Directory of the files.
+    #[arg(long, value_name = "DIR", default_value = "out/bringup")]
+    pub out: PathBuf,
+
+    /// Allows every motion unasked; what a hand has to do is still asked for.
+    #[arg(long)]
+    pub yes: bool,
+
+    /// Begins again with the first stage.
+    #[arg(long)]
+    again: bool,
+
+    /// A mistake in the emulated board's wiring, to be found; may be given several times.
+    #[arg(long, value_name = "NAME")]
+    pub mistake: Vec<String>,
+
+    /// Prints the result as one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Printed<'a> {
+    complete: bool,
+    checks: Vec<&'a Check>,
+    /// Key and measured value of each parameter that is to change.
+    proposed: std::collections::BTreeMap<String, String>,
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// [`Failure`] if it cannot be run as asked.
+pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    if args.target == "board" {
+        return Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Board)?));
+    }
+    if !args.mistake.is_empty() {
+        return Err(Failure::input("--mistake: only the emulated board has mistakes to choose"));
+    }
+    on_probe(args)
+}
+
+#[cfg(not(feature = "probe"))]
+fn on_probe(_: &Args) -> Result<Outcome, Failure> {
+    Ok(Outcome::Code(crate::provision::go_on(crate::provision::Extra::Probe)?))
+}
+
+#[cfg(feature = "probe")]
+fn on_probe(args: &Args) -> Result<Outcome, Failure> {
+    let mut port = super::probe::reconnecting()?;
+    let mut operator = person(args);
+    carry_out(args, &mut port, &mut operator)
+}
+
+/// The person at the terminal.
+#[must_use]
+pub fn person(args: &Args) -> Stdin<io::StdinLock<'static>, io::Stderr> {
+    Stdin::new(io::stdin().lock(), io::stderr(), args.yes)
+}
+
+/// Carries it out at this port.
+///
+/// # Errors
+/// [`Failure`] if it is broken off.
+pub fn carry_out(
+    args: &Args,
+    port: &mut dyn Port,
+    operator: &mut dyn Operator,
+) -> Result<Outcome, Failure> {
+    make_directory(&args.out)?;
+    let file = |name: &str| args.out.join(name);
+    let mut line = Line::new(port);
+    // A board that does not run yet has no parameters to ask for.
+    let expected = match line.held() {
+        Ok(held) => {
+            let preset = PRESETS.iter().find(|preset| **preset == held.name);
+            Scenario::of_rig(preset.unwrap_or(&PRESETS[0]), held.rig)
+        }
+        Err(crate::params::StoreError::Silent { .. }) => Scenario::default(),
+        Err(error) => return Err(Failure::run(error)),
+    };
+    let state = file("bringup.json");
+    let kept = Progress::read(&state, &expected).filter(|_| !args.again);
+    let mut progress = kept.unwrap_or_else(|| Progress::new(expected));
+    let mut unwritten = None;
+    let ended = bringup::run(
+        &mut line,
+        operator,
+        &mut progress,
+        &mut |text| eprintln!("{text}"),
+        &mut |progress| unwritten = progress.write(&state).err().or(unwritten.take()),
+    );
+    if let Some(error) = unwritten {
+        return Err(error.into());
+    }
+    let files = [state.clone(), file("report.html"), file("proposed.toml")];
+    write_text(&files[1], &bringup::html(&progress))?;
+    write_text(&files[2], &progress.proposed.to_toml())?;
+    ended.map_err(Failure::run)?;
+    let proposed = bringup::proposals(&progress);
+    let printed = Printed {
+        complete: progress.is_complete(),
+        checks: progress.checks().collect(),
+        proposed: proposed.into_iter().map(|(key, _, is)| (key, is)).collect(),
+    };
+    let printed = output::WithFiles { result: &printed, files: &files };
+    output::result(args.json, &printed, || human(&progress) + &output::wrote(&files))?;
+    Ok(Outcome::of(progress.is_complete()))
+}
+
+fn human(progress: &Progress) -> String {
+    let failed: Vec<&Check> = progress.checks().filter(|check| !check.ok).collect();
+    let mut text = match failed.len() {
+        0 => "every check passed\n".to_owned(),
+        _ => String::new(),
+    };
+    for check in failed {
+        text += &format!("{}: {}\n  {}\n", check.name, check.measured, check.advice);
+    }
+    for (key, was, is) in bringup::proposals(progress) {
+        text += &format!("  propose {key} = {is} (was {was})\n");
+    }
+    text
+}

@@ -1,0 +1,57 @@
+//! The service mode in the tick.
+
+use super::{Controller, Event, State, TickContext};
+use crate::sense::SensedState;
+use crate::supervise::service::ServiceView;
+use crate::supervise::{Mode, ServiceDuties, Trigger};
+use crate::units::{Duty, MotorCommand};
+
+/// What the bounds of the service mode look at.
+pub(super) const fn view(sensed: &SensedState) -> ServiceView {
+    ServiceView {
+        travel: sensed.travel,
+        preload: sensed.preload_filtered,
+        compression: sensed.compression_filtered,
+    }
+}
+
+impl Controller {
+    /// Takes a request of the host. Asking for rest enters the mode from idle; in any other mode
+    /// it is logged and changes nothing.
+    pub(super) fn take_service(
+        &self,
+        state: &mut State,
+        tick: &mut TickContext<'_>,
+        request: Option<ServiceDuties>,
+    ) {
+        let Some(request) = request else { return };
+        if state.service.ask(request) {
+            tick.log(Event::Service(request));
+        }
+        if state.mode == Mode::Idle && request.is_rest() {
+            tick.trigger(Trigger::Service);
+        }
+    }
+
+    /// Commands of drive and pre-tightener in the service mode.
+    pub(super) fn serve(
+        &self,
+        state: &mut State,
+        tick: &mut TickContext<'_>,
+    ) -> (MotorCommand, MotorCommand) {
+        let (duties, limit) = state.service.step(&view(tick.sensed));
+        if let Some(limit) = limit {
+            tick.log(Event::Limit(limit));
+        }
+        // A bridge without a duty stays off.
+        let command = |duty| match duty {
+            Duty::ZERO => MotorCommand::OFF,
+            duty => MotorCommand::on(duty),
+        };
+        let drive = match command(duties.drive) {
+            MotorCommand::OFF if state.service.brakes() => MotorCommand::on(Duty::ZERO),
+            drive => drive,
+        };
+        (drive, command(duties.pretightener))
+    }
+}
