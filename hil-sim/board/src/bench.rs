@@ -269,7 +269,9 @@ impl<'a> Bench<'a> {
         for _ in 0..milliseconds {
             self.machine.restart(Cause::Pin)?;
             self.connect();
-            self.machine.halt(STEP - 1)?;
+            let end = self.machine.now() + STEP - 1;
+            self.machine.halt(STEP - 1);
+            self.machine.run_on(end)?;
             let [drive, preload] = {
                 let now = self.machine.now();
                 self.machine.chip_mut().take_motors(now)
