@@ -13,6 +13,10 @@ pub(crate) mod light;
 mod line;
 #[cfg(not(feature = "hil"))]
 mod pins;
+#[cfg_attr(
+    feature = "hil",
+    expect(unused_imports, dead_code, reason = "the loop's image has no drivers of sensors")
+)]
 pub(crate) mod registers;
 mod retained;
 pub(crate) mod rtt;
