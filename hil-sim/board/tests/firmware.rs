@@ -82,9 +82,9 @@ type Quantity = (&'static str, fn(&CrossingLine) -> f64, f64);
 /// force are twice the largest difference of five rigs. The speed of a step is planned from the
 /// gap measured at the one before: it changes by 60 mm/s a millimetre of that.
 const QUANTITIES: [Quantity; 4] = [
-    ("gap, mm", |c| c.gap_mm, 0.004),
+    ("gap, mm", |c| c.gap_mm, 0.011),
     ("preload, N", |c| c.preload_n, 0.08),
-    ("speed, mm/s", |c| c.speed_mm_s, 60.0 * 0.004),
+    ("speed, mm/s", |c| c.speed_mm_s, 60.0 * 0.011),
     ("corner force, N", |c| c.corner_force_n, 0.36),
 ];
 

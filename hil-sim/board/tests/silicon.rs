@@ -276,7 +276,8 @@ const EVERY_MILLISECOND: &str = "safety::look_at";
 fn two_wrong_bits_in_code_that_runs_end_it_and_are_no_emergency_stop() {
     for wrong in [Wrong::Check, Wrong::Two] {
         let mut board = Board::moving();
-        let place = board.function(EVERY_MILLISECOND);
+        // Its first whole double word: the one before is also another function's.
+        let place = board.function(EVERY_MILLISECOND).next_multiple_of(8);
         board.strike(Fault::WrongBits(place, wrong));
         let (cause, after, driven) = board.reset(150);
         assert_eq!(cause, Cause::Software, "{:#?}", board.log);
