@@ -10,7 +10,7 @@ use std::ops::Range;
 use nalgebra::DMatrix;
 
 use super::IdentifyError;
-use super::coordinates::{CREEP, Coordinates, FRICTION, ROLLING};
+use super::coordinates::{CREEP, Coordinates, FRICTION};
 use super::forward::{Channels, Run, Trajectory, derivatives, quotient, simulate};
 use super::least_squares::{Model, consider, minimise, robust};
 use super::noise::Noise;
@@ -32,10 +32,6 @@ const WIDENED: f64 = 1.18 * 1.9;
 const HELD_LN: f64 = 0.02;
 /// Deviation of the held creep law, logarithm.
 const HELD_CREEP_LN: f64 = 1e-5;
-
-/// Error of the rolling compression by the model, one deviation: what it makes of creep and of
-/// jitter, by the hidden rigs of seeds 1 to 10.
-const ROLLING_MODEL: f64 = 8e-3;
 
 /// The result.
 #[derive(Clone, Debug)]
@@ -147,7 +143,6 @@ pub fn fit(runs: &[Run], coordinates: &Coordinates) -> Result<Contact, IdentifyE
     let data = blocks.last().map_or(0, |block| block.end);
     let mut covariance = robust(&fitted.jacobian, &fitted.residuals, &blocks, WIDENED)?;
     consider(&mut covariance, &fitted.jacobian, data, CREEP, creep.deviation)?;
-    covariance[(ROLLING, ROLLING)] += ROLLING_MODEL * ROLLING_MODEL;
     let residuals = model.remaining(&fitted.x, &fitted.at);
     Ok(Contact { covariance, trajectories: fitted.at, x: fitted.x, residuals })
 }

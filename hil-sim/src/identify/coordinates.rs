@@ -33,11 +33,9 @@ pub const ARM_ZERO: usize = 9;
 pub const CREEP: usize = 10;
 /// Force of the drive over nominal, logarithm.
 pub const DRIVE: usize = 11;
-/// Part of the compression by which the rolling radius is less than the undeformed one.
-pub const ROLLING: usize = 12;
 /// First of the steps: all positions as the wheel's turn has them at its nominal radius,
 /// mm, so that a wheel of another radius meets them at the same turn; then all heights, mm.
-pub const STEPS: usize = 13;
+pub const STEPS: usize = 12;
 
 /// Deviation of what only the logs can show: a factor of two (one standard
 /// deviation), and lengths, forces and angles beyond any tolerance.
@@ -50,8 +48,6 @@ const UNKNOWN_HEIGHT_MM: f64 = 0.5;
 /// law, relative: no scenario states them.
 const DRIVE_REL: f64 = 0.01;
 const CREEP_REL: f64 = 0.05;
-/// What tyre textbooks leave open of a third.
-const ROLLING_PART: f64 = 0.1;
 /// Deviation of a coordinate that is stated without tolerance.
 const EXACT: f64 = 1e-6;
 
@@ -107,7 +103,6 @@ impl Coordinates {
             free(0.0, UNKNOWN_ARM_MRAD),
             known(nominal.elastic_creep.ln(), CREEP_REL),
             known(0.0, DRIVE_REL),
-            known(nominal.rolling_compression, ROLLING_PART),
         ];
         let all = nominal.wall.steps().iter();
         priors.extend(all.clone().map(|step| free(step.position_mm, UNKNOWN_POSITION_MM)));
@@ -170,7 +165,6 @@ impl Coordinates {
             mu: x[FRICTION].exp(),
             elastic_creep: x[CREEP].exp(),
             load_n: x[LOAD].exp(),
-            rolling_compression: x[ROLLING],
             spring_n_per_mm: 0.0,
             modes: Vec::new(),
             ..self.nominal.clone()
@@ -222,7 +216,7 @@ mod tests {
         let worn = nominal.ring.radius_mm - plant.ring.radius_mm;
         assert!((worn - 0.5 * scenario.spread.wear_mm).abs() < 1e-12);
         assert_eq!(means.len(), STEPS + 6);
-        assert_eq!((coordinates.position(2), coordinates.height(2)), (15, 18));
+        assert_eq!((coordinates.position(2), coordinates.height(2)), (14, 17));
     }
 
     #[test]

@@ -11,8 +11,8 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::coordinates::{
-    ARM_ZERO, CREEP, Coordinates, DRIVE, FRICTION, GEARBOX, LOAD, LOAD_GAIN, RADIUS, ROLLING,
-    STIFFENING, STIFFNESS, TAU, TREAD_GAIN,
+    ARM_ZERO, CREEP, Coordinates, DRIVE, FRICTION, GEARBOX, LOAD, LOAD_GAIN, RADIUS, STIFFENING,
+    STIFFNESS, TAU, TREAD_GAIN,
 };
 use super::record::{Record, TICK_S};
 use super::traces::{Bin, Effort, Traces, at};
@@ -203,14 +203,13 @@ impl Trajectory {
 
 /// Coordinates by which simulations are differenced, and by how much to either side: so
 /// far that the ring's elements, which meet a corner one by one, do not show.
-const MOVED: [(usize, f64); 8] = [
+const MOVED: [(usize, f64); 7] = [
     (STIFFNESS, 0.01),
     (STIFFENING, 0.01),
     (TAU, 0.02),
     (FRICTION, 0.03),
     (LOAD, 0.02),
     (RADIUS, 0.04),
-    (ROLLING, 0.05),
     (CREEP, 0.05),
 ];
 /// By how much the steps are moved, mm, in position and height.

@@ -10,8 +10,8 @@ use super::IdentifyError;
 use super::actuator::{self, Actuator};
 use super::contact::{self, Contact};
 use super::coordinates::{
-    ARM_ZERO, CREEP, Coordinates, DRIVE, FRICTION, GEARBOX, LOAD, LOAD_GAIN, RADIUS, ROLLING,
-    STIFFENING, STIFFNESS, TAU, TREAD_GAIN,
+    ARM_ZERO, CREEP, Coordinates, DRIVE, FRICTION, GEARBOX, LOAD, LOAD_GAIN, RADIUS, STIFFENING,
+    STIFFNESS, TAU, TREAD_GAIN,
 };
 use super::forward::{CHANNELS, Run};
 use super::noise::Noise;
@@ -185,10 +185,9 @@ impl Document<'_> {
         let itself = |x: f64| x;
         let pressed = "compression under known preload, at rest";
         let rolling = "compression at rest and rolling";
-        let under = "turn between the steps under several preloads";
         let speeds = "compression and lift at several speeds";
         let arm_zero = |mrad: f64| zero_code + 16_384.0 * 1e-3 * mrad / TURN;
-        let all: [(Shown<'_>, &dyn Fn(f64) -> f64); 13] = [
+        let all: [(Shown<'_>, &dyn Fn(f64) -> f64); 12] = [
             ((STIFFNESS, "tread.k_inf_pa_per_m", "Pa/m", pressed), &|x| 1e9 * x.exp()),
             ((STIFFENING, "tread.stiffening", "", rolling), &f64::exp),
             ((TAU, "tread.tau_s", "s", speeds), &f64::exp),
@@ -196,7 +195,6 @@ impl Document<'_> {
             ((LOAD, "plant.top_load_n", "N", "arm thrust and drive effort"), &|x| x.exp() / share),
             ((GEARBOX, "gearbox friction", "N", "drive effort on the smooth wall"), &itself),
             ((RADIUS, "rig.wheel_radius_mm", "mm", "shape of the climbs"), &itself),
-            ((ROLLING, "mismatch.rolling_compression", "", under), &itself),
             ((LOAD_GAIN, "preload sensor gain", "", "loads against the drive"), &f64::exp),
             ((TREAD_GAIN, "compression sensor gain", "", "compression against the arm"), &f64::exp),
             ((CREEP, "plant.elastic_creep", "", "creep at the climbs"), &f64::exp),

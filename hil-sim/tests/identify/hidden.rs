@@ -7,7 +7,6 @@
 use hil_sim::identify::record::{Reader, Record};
 use hil_sim::identify::result::identify;
 use hil_sim::plant::draw::PlantParameters;
-use hil_sim::plant::mismatch::Mismatch;
 use hil_sim::plant::sensors::Sensors;
 use hil_sim::scenario::{ControllerKind, Scenario};
 use hil_sim::session::{Options, Session, drives, read};
@@ -81,8 +80,6 @@ fn widened(seed: u64) -> Scenario {
     wide.spread.delay_rel = 0.20;
     wide.spread.lag_rel = 0.20;
     wide.spread.slew_rel = 0.10;
-    let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x0150_11ed);
-    wide.mismatch.rolling_compression = random.random_range(0.2..0.5);
     wide.run.seed = seed;
     wide
 }
@@ -97,7 +94,6 @@ fn hidden(p: &PlantParameters, known: &Scenario, zeros: (f64, f64)) -> Vec<(Stri
         ("tread.tau_s", p.ring.tau_s),
         ("plant.mu", p.mu),
         ("plant.top_load_n", p.load_n / known.rig.plant.top_load_share),
-        ("mismatch.rolling_compression", p.rolling_compression),
         ("sense.angle_zero_code", zero_code),
         ("preload.delay_s", p.delay_s),
         ("preload.lag_s", p.lag_s),
@@ -124,9 +120,7 @@ fn log(index: usize, wide: &Scenario, zeros: (f64, f64)) -> Record {
     let noise = wide.run.seed.wrapping_mul(31).wrapping_add(1 + index as u64);
     let mut sensors = Sensors::new(session.plant().parameters().sensors.clone(), noise);
     let (mut arm, mut samples) = (None, Vec::new());
-    // Nothing of the hidden rolling radius is handed on.
-    let stated = Scenario { mismatch: Mismatch::default(), ..scenario.clone() };
-    let mut reader = Reader::new(&stated);
+    let mut reader = Reader::new(&scenario);
     let mut start = Some(Command::Start);
     while samples.len() < LONGEST
         && !matches!(session.mode(), Mode::Complete(_) | Mode::FaultHold(_))
@@ -152,6 +146,5 @@ fn log(index: usize, wide: &Scenario, zeros: (f64, f64)) -> Record {
     }
     // The log names the nominal rig; the draw is hidden.
     scenario.run.seed = 0;
-    scenario.mismatch = Mismatch::default();
     Record::new(name, scenario, samples).expect("a sound record")
 }
