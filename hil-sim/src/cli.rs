@@ -31,6 +31,7 @@ pub mod scenario;
 pub mod source;
 mod stress;
 mod sweep;
+pub mod terminal;
 mod test;
 
 use std::ffi::OsString;

@@ -11,12 +11,13 @@ use super::failure::{Failure, Outcome};
 use super::output::{self, WithFiles};
 use super::scenario::RunArgs;
 use super::source::TARGETS;
+use super::terminal;
 use crate::files::{vacant, write_text};
 use crate::firmware::FirmwareError;
 use crate::provision::{self, Extra};
 use crate::record::{Recording, Summary};
 use crate::scenario::{Scenario, brief};
-use crate::{progress, record, report, session, table};
+use crate::{progress, record, report, session};
 
 /// A deployment in closed loop, or the retraction.
 ///
@@ -112,7 +113,7 @@ pub fn conclude(
     };
     let summary = &recording.summary;
     let printed = WithFiles { result: summary, files: &files };
-    output::result(args.json, &printed, || table::run(summary, &files))?;
+    output::result(args.json, &printed, || terminal::run(summary, &files))?;
     Ok(Outcome::of(summary.completed && summary.faults.is_empty()))
 }
 

@@ -6,6 +6,7 @@ use serde_json::json;
 
 use super::failure::{Failure, Outcome};
 use super::output::{self, WithFiles};
+use super::terminal;
 use crate::files::{make_directory, vacant_for, write_text};
 use crate::record::{Recording, recording};
 use crate::report::{Difference, beside_svg, compare_html, differences, html};
@@ -61,7 +62,7 @@ fn one(args: &Args, recording: &Recording) -> Result<Outcome, Failure> {
     let files = [page(args, "html", &text)?];
     write_text(&files[0], &text)?;
     let printed = WithFiles { result: &recording.summary, files: &files };
-    output::result(args.json, &printed, || table::run(&recording.summary, &files))?;
+    output::result(args.json, &printed, || terminal::run(&recording.summary, &files))?;
     Ok(Outcome::of(recording.summary.missing.is_empty()))
 }
 

@@ -2,10 +2,9 @@
 //! lift-off.
 
 use super::axis;
-use super::page;
 use super::palette;
 use super::panel::{Look, Panel};
-use super::panels::{Across, View};
+use super::panels::{Across, View, figure};
 use crate::record::{CrossingLine, Recording};
 
 /// Shown before the corner touches, s.
@@ -33,7 +32,7 @@ fn one(recording: &Recording, line: &CrossingLine) -> String {
     html += "<div class=\"grid\">\n";
     for panel in panels(&view) {
         let name = format!("Crossing {}: {}", line.index, panel.title);
-        html += &page::figure(&panel, view.across, SIZE, &name);
+        html += &figure(&panel, view.across, SIZE, &name);
     }
     html + "</div>\n"
 }

@@ -1,7 +1,7 @@
 //! The page around the plots.
 
 use super::panel::Panel;
-use super::panels::{Across, View, motion};
+use super::panels::{Across, View, attributes, figure, motion};
 use super::scene::Scene;
 use super::svg::{self, escape};
 use super::verdict::{Grade, gap_sentence, headline, origin, reservations, slip_sentence};
@@ -149,24 +149,6 @@ fn stack(recording: &Recording, across: Across) -> String {
     let bands = svg::fluid(BAND_SIZE, &name, |area| band::draw(&view, area));
     let frame = attributes(view.x, across, band::frame(BAND_SIZE));
     html + &format!("<figure {frame}>{bands}{}</figure>\n", band::legend(&recording.rows))
-}
-
-/// A plot, with what the script needs to place its cursor.
-pub(super) fn figure(panel: &Panel, across: Across, size: (u32, u32), name: &str) -> String {
-    let frame = attributes(panel.x, across, panel.frame(size));
-    format!("<figure {frame}>{}</figure>\n", svg::fluid(size, name, |area| panel.draw(area)))
-}
-
-/// Axis, time at its zero, its range, and the place of the plot in the picture: left, right, top
-/// and bottom.
-fn attributes(x: (f64, f64), across: Across, [left, right, top, bottom]: [i32; 4]) -> String {
-    format!(
-        "data-across=\"{}\" data-since=\"{}\" data-frame=\"{} {} {left} {right} {top} {bottom}\"",
-        across.axis(),
-        across.since_s(),
-        x.0,
-        x.1
-    )
 }
 
 fn count(n: usize, what: &str) -> String {

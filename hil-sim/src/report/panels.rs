@@ -321,6 +321,28 @@ pub(super) fn parameter(parameters: &str, section: &str, name: &str) -> Option<f
     value.as_float().or_else(|| value.as_integer().map(|n| n as f64))
 }
 
+/// A plot, with what the script needs to place its cursor.
+pub(super) fn figure(panel: &Panel, across: Across, size: (u32, u32), name: &str) -> String {
+    let frame = attributes(panel.x, across, panel.frame(size));
+    format!("<figure {frame}>{}</figure>\n", svg::fluid(size, name, |area| panel.draw(area)))
+}
+
+/// Axis, time at its zero, its range, and the place of the plot in the picture: left, right, top
+/// and bottom.
+pub(super) fn attributes(
+    x: (f64, f64),
+    across: Across,
+    [left, right, top, bottom]: [i32; 4],
+) -> String {
+    format!(
+        "data-across=\"{}\" data-since=\"{}\" data-frame=\"{} {} {left} {right} {top} {bottom}\"",
+        across.axis(),
+        across.since_s(),
+        x.0,
+        x.1
+    )
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

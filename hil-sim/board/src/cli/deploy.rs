@@ -5,11 +5,12 @@ use std::path::{Path, PathBuf};
 use hil_sim::cli::deploy::{Args, looped, place, read, write};
 use hil_sim::cli::failure::{Failure, Outcome};
 use hil_sim::cli::output;
+use hil_sim::cli::terminal;
 use hil_sim::firmware::{self, Profile};
 use hil_sim::record::Summary;
 use hil_sim::report::Section;
 use hil_sim::scenario::Scenario;
-use hil_sim::{files, progress, table};
+use hil_sim::{files, progress};
 
 use crate::gdb;
 use crate::load::{Load, TITLE};
@@ -73,7 +74,9 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         eprintln!("warning: {stray}");
     }
     let printed = Printed { summary, account: &ran.load, missed: &missed, files: &files };
-    output::result(args.json, &printed, || table::run(summary, &files) + &ran.load.text(&missed))?;
+    output::result(args.json, &printed, || {
+        terminal::run(summary, &files) + &ran.load.text(&missed)
+    })?;
     let clean = ran.load.unmodelled.is_empty();
     Ok(Outcome::of(summary.completed && summary.faults.is_empty() && clean))
 }

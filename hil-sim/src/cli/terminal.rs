@@ -1,0 +1,139 @@
+//! A run on the terminal: verdict, ledger, faults, limits and the paths of its files.
+
+use std::io::IsTerminal;
+use std::path::PathBuf;
+
+use comfy_table::Table;
+
+use super::output::wrote;
+use crate::record::{CrossingLine, Report, Summary};
+use crate::report::ledger::COLUMNS;
+use crate::report::verdict::{Grade, gap_sentence, headline, origin, reservations, slip_sentence};
+use crate::table::{WIDTH, number, plain};
+
+/// The run of `summary` as text, with the paths of `files` at the end. Ends with a
+/// line feed.
+#[must_use]
+pub fn run(summary: &Summary, files: &[PathBuf]) -> String {
+    let mut text = painted(&wrapped(&headline(summary), ""), Grade::of(summary), is_coloured());
+    for missing in &summary.missing {
+        text += &wrapped(&format!("incomplete log: {missing}"), "  ");
+    }
+    text += &wrapped(&details(summary), "  ");
+    if !summary.crossings.is_empty() {
+        text += &format!("{}\n", ledger(&summary.crossings));
+    }
+    for fault in &summary.injected {
+        text += &wrapped(&format!("injected: {fault}"), "  ");
+    }
+    for (kind, reports) in [("fault", &summary.faults), ("limit", &summary.limits)] {
+        for report in reports {
+            text += &wrapped(&report_line(kind, report), "  ");
+        }
+    }
+    text + &wrote(files)
+}
+
+/// Whether standard output shows colours: a terminal, unless `NO_COLOR` is set.
+fn is_coloured() -> bool {
+    std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|no| no.is_empty())
+}
+
+/// The lines of `text` in the colour of the grade.
+fn painted(text: &str, grade: Grade, is_coloured: bool) -> String {
+    if !is_coloured {
+        return text.to_owned();
+    }
+    text.lines().map(|line| format!("\u{1b}[{}m{line}\u{1b}[0m\n", grade.ansi())).collect()
+}
+
+fn details(s: &Summary) -> String {
+    let mut parts: Vec<String> = reservations(s).into_iter().map(str::to_owned).collect();
+    parts.extend([gap_sentence(s), slip_sentence(s), origin(s)]);
+    if !s.measured {
+        parts.push(format!("{:.0} times real time", s.real_time_factor));
+    }
+    parts.join("; ")
+}
+
+fn ledger(crossings: &[CrossingLine]) -> Table {
+    let columns = || COLUMNS.iter().filter(|column| column.on_terminal);
+    let names: Vec<String> = columns().map(|c| format!("{}\n{}", c.name, c.unit)).collect();
+    let head: Vec<&str> = std::iter::once("step").chain(names.iter().map(String::as_str)).collect();
+    let rows = crossings.iter().map(|line| {
+        let cells = columns().map(|column| number((column.of)(line), column.decimals));
+        std::iter::once(line.index.to_string()).chain(cells).collect()
+    });
+    plain(&head, rows)
+}
+
+fn report_line(kind: &str, report: &Report) -> String {
+    format!("{kind} {} at {:.3} s: {}", report.code, report.t_s, report.text)
+}
+
+/// `text` broken at blanks to the width, each line after `indent`.
+fn wrapped(text: &str, indent: &str) -> String {
+    let most = usize::from(WIDTH) - indent.len();
+    let mut lines = vec![String::new()];
+    for word in text.split_whitespace() {
+        let line = lines.last_mut().expect("there is always one");
+        if line.is_empty() {
+            line.push_str(word);
+        } else if line.chars().count() + 1 + word.chars().count() <= most {
+            line.push(' ');
+            line.push_str(word);
+        } else {
+            lines.push(word.to_owned());
+        }
+    }
+    lines.iter().map(|line| format!("{indent}{line}\n")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::example;
+
+    #[test]
+    fn nothing_is_wider_than_the_terminal() {
+        for recording in [example::deploy(), example::faulted()] {
+            let text = run(&recording.summary, &[]);
+            for line in text.lines() {
+                assert!(line.chars().count() <= usize::from(WIDTH), "{line}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_ledger_line_takes_one_line_of_text() {
+        let summary = example::deploy().summary;
+        let text = run(&summary, &[PathBuf::from("out/run/report.html")]);
+        let c = &summary.crossings[1];
+        // By its number: a gap may equal another crossing's prediction.
+        let number = c.index.to_string();
+        let mut lines = text.lines();
+        let first = |line: &&str| line.split_whitespace().next() == Some(number.as_str());
+        let line = lines.find(first).expect(&text);
+        assert!(line.contains(&format!(" {:.3} ", c.gap_mm)), "{line}");
+        assert!(line.contains(&format!(" {:.2} ", c.step_mm)), "{line}");
+        assert!(line.contains(" - "), "the missing measurement is shown: {line}");
+        assert!(text.contains(" predicted "), "no heading is broken: {text}");
+        assert!(text.ends_with("  wrote out/run/report.html\n"));
+    }
+
+    #[test]
+    fn the_headline_has_the_colour_of_its_grade_on_a_terminal() {
+        for (grade, colour) in [(Grade::Good, 32), (Grade::Fair, 33), (Grade::Bad, 31)] {
+            assert_eq!(painted("a\n", grade, false), "a\n");
+            assert_eq!(painted("a\n", grade, true), format!("\u{1b}[{colour}ma\u{1b}[0m\n"));
+        }
+    }
+
+    #[test]
+    fn faults_and_limits_are_listed() {
+        let text = run(&example::faulted().summary, &[]);
+        assert!(text.starts_with("Did not complete: fault 121"));
+        assert!(text.contains("  fault 121 at "));
+        assert!(text.contains("  limit 201 at "));
+    }
+}
