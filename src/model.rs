@@ -11,5 +11,5 @@ pub mod planner;
 pub mod reduced;
 pub mod timing;
 
-pub use plan::{Outcome, Plan, PlanRequest, Review, Strategy};
+pub use plan::{LimitedBy, Outcome, Plan, PlanRequest, Review, Strategy};
 pub use planner::Planner;

@@ -19,6 +19,7 @@ mod source;
 mod summary;
 mod tally;
 pub mod tick;
+mod time_lost;
 mod view;
 mod write;
 
@@ -38,5 +39,6 @@ pub use tally::{Ended, Tally, true_line};
 pub use tick::{
     Controller, MODE_NAMES, STAGE_NAMES, Tick, TrueState, mode_number, mode_words, stage_name,
 };
+pub use time_lost::TimeLost;
 pub use view::View;
 pub use write::{WriteError, Writer, write_all, write_csv};

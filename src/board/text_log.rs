@@ -4,6 +4,7 @@ use defmt::{error, info, warn};
 use interstage::estimate::ContactStage;
 use interstage::hal::Journal;
 use interstage::log::Identity;
+use interstage::model::LimitedBy;
 use interstage::supervise::{Mode, ServiceDuties};
 use interstage::tasks::TickCycles;
 use interstage::tick::{CrossingRecord, Entry, Event};
@@ -90,7 +91,7 @@ impl Journal for TextLog {
 fn crossing(at: u32, record: &CrossingRecord) {
     let value = Q16::to_num::<f32>;
     info!(
-        "[{=u32} ms] step {=u8} {=str}: at {=f32} mm ({=f32} off), {=f32} mm/s, preload {=f32} N (peak {=f32}) {=f32} s ahead, tread {=f32} mm, gap {=f32} mm (predicted {=f32}), slip margin {=f32}, stiffness x{=f32}",
+        "[{=u32} ms] step {=u8} {=str}: at {=f32} mm ({=f32} off), {=f32} mm/s, preload {=f32} N (peak {=f32}) {=f32} s ahead, tread {=f32} mm, gap {=f32} mm (predicted {=f32}), slip margin {=f32}, stiffness x{=f32}, limited by {=str}",
         at,
         record.index,
         of_direction(record.direction),
@@ -105,6 +106,7 @@ fn crossing(at: u32, record: &CrossingRecord) {
         value(record.gap_predicted),
         value(record.slip_margin),
         value(record.stiffness_scale),
+        record.limited_by.map_or("no plan", LimitedBy::words),
     );
 }
 

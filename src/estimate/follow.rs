@@ -5,6 +5,7 @@ use super::odometry::Rolling;
 use super::restore::UNSURE_WITHIN;
 use super::{EstimateState, Estimator, Expectation, Findings, LiftPoint, OpenCrossing, Position};
 use crate::fault::{Fault, Limit};
+use crate::model::LimitedBy;
 use crate::sense::{FILTER_LAG, SensedState};
 use crate::units::{Direction, Millimetres, Newtons, Q16, Tick};
 
@@ -19,6 +20,8 @@ pub struct Follow<'a> {
     pub pressed: Newtons,
     /// Since when the crossing preload has been reached.
     pub standing_since: Option<Tick>,
+    /// What keeps the crossing ahead from being faster, by its plan.
+    pub limited_by: Option<LimitedBy>,
 }
 
 impl Estimator {
@@ -178,6 +181,7 @@ impl Estimator {
             reported: expectation == Expectation::Ahead,
             touched_at: tick.now,
             standing_since: tick.standing_since,
+            limited_by: tick.limited_by.filter(|_| belongs),
             peak_preload: tick.sensed.preload_filtered,
             ..OpenCrossing::default()
         });

@@ -5,6 +5,7 @@ use super::odometry::Odometry;
 use super::tread::TreadState;
 use super::{Place, Position, PositionConfidence};
 use crate::fault::{Fault, Limit};
+use crate::model::LimitedBy;
 use crate::numeric::LowPassState;
 use crate::units::{
     Direction, Millimetres, MillimetresPerSecond, Newtons, Ratio, Tick, Travel, q16,
@@ -70,6 +71,8 @@ pub struct OpenCrossing {
     pub from: Option<Travel>,
     /// Since when the crossing preload had been reached.
     pub standing_since: Option<Tick>,
+    /// What kept it from being faster, by its plan.
+    pub limited_by: Option<LimitedBy>,
     /// Largest preload so far, N.
     pub peak_preload: Newtons,
     /// Lift-off.

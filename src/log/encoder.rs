@@ -135,7 +135,7 @@ mod tests {
     use super::super::ledger::tests::crossing;
     use super::*;
     use crate::fault::Limit;
-    use crate::model::{Outcome, Plan, PlanRequest, Review};
+    use crate::model::{LimitedBy, Outcome, Plan, PlanRequest, Review};
     use crate::supervise::Mode;
     use crate::tick::CrossingRecord;
 
@@ -258,6 +258,7 @@ mod tests {
             lead_time: most,
             slip_margin: most,
             stiffness_scale: most,
+            limited_by: Some(LimitedBy::Drive),
         };
         let review = Review {
             direction: Direction::Retract,
@@ -306,6 +307,7 @@ mod tests {
             ramp_preload: most,
             brake_horizon: most,
             look_ahead: true,
+            limited_by: LimitedBy::Drive,
             limits: [Some(Limit::SlipMarginLow); 3],
             outcome: Some(outcome),
         };

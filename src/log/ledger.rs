@@ -123,6 +123,7 @@ pub(super) mod tests {
             lead_time: q(0.3),
             slip_margin: q(0.4),
             stiffness_scale: q(scale),
+            limited_by: None,
         }
     }
 

@@ -18,6 +18,43 @@ pub enum Strategy {
     Reactive,
 }
 
+/// What keeps the crossing of a step from being faster.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LimitedBy {
+    /// The preload is as high as it may be.
+    #[default]
+    Preload,
+    /// The pre-tightener's slew: more preload would take longer to build than it saves.
+    Slew,
+    /// The slip margin: the gap is made smaller than the wanted one.
+    Friction,
+    /// The band of a mode below the speed that gap and margin allow.
+    Resonance,
+    /// The least crossing speed: gap or margin would ask for less.
+    LeastSpeed,
+    /// The drive's cruise speed, or that at which the pre-tightener still follows the spring.
+    Drive,
+}
+
+impl LimitedBy {
+    /// All of them.
+    pub const ALL: [Self; 6] =
+        [Self::Preload, Self::Slew, Self::Friction, Self::Resonance, Self::LeastSpeed, Self::Drive];
+
+    /// In words.
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Preload => "preload",
+            Self::Slew => "slew",
+            Self::Friction => "friction",
+            Self::Resonance => "resonance",
+            Self::LeastSpeed => "least speed",
+            Self::Drive => "drive",
+        }
+    }
+}
+
 /// A closed crossing, for the model to compare with its prediction.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Review {
@@ -119,6 +156,8 @@ pub struct Plan {
     pub brake_horizon: Millimetres,
     /// Whether the preload is raised ahead of the step.
     pub look_ahead: bool,
+    /// What keeps the crossing from being faster.
+    pub limited_by: LimitedBy,
     /// Limits met, in the order found.
     pub limits: [Option<Limit>; 3],
     /// Review of the step behind.

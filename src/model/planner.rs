@@ -6,7 +6,7 @@
 mod build;
 
 use super::guard::Guard;
-use super::plan::{Outcome, Plan, PlanRequest, Review, Strategy};
+use super::plan::{LimitedBy, Outcome, Plan, PlanRequest, Review, Strategy};
 use super::reduced::{Point, ReducedModel, Scale};
 use super::timing::Timing;
 use crate::fault::Limit;
@@ -149,6 +149,7 @@ impl Planner {
             earlier_per_preload: Ratio::ZERO,
             // Without look-ahead the preload rises when the step is detected, never before.
             look_ahead: self.strategy != Strategy::Reactive,
+            limited_by: LimitedBy::Drive,
             limits,
             outcome,
         };
@@ -182,12 +183,21 @@ impl Planner {
             Some(speed) => (speed, speed),
             None => (floor, ceiling),
         };
-        let Choice { preload: most, gap, speed, rising, .. } =
-            self.choose(request, &at, arm_thrust, (floor, ceiling));
+        let choice = self.choose(request, &at, arm_thrust, (floor, ceiling));
+        let Choice { preload: most, gap, speed, rising, .. } = choice;
         let (speed, moved) = self.guard.below(speed);
         if moved {
             add(&mut plan.limits, Limit::ResonanceAvoided);
         }
+        plan.limited_by = if moved && speed >= floor {
+            LimitedBy::Resonance
+        } else {
+            self.limited_by(
+                &choice,
+                self.target(request.direction, request.reserve),
+                (floor, ceiling),
+            )
+        };
         // A band that reaches below the floor is entered: too slow would be worse.
         let speed = speed.max(floor);
         let at = Point { speed, ..at };
@@ -217,6 +227,30 @@ impl Planner {
             add(&mut plan.limits, Limit::SlipMarginLow);
         }
         self.window(request, &at, carried, plan);
+    }
+
+    /// What keeps a crossing of this choice from being faster.
+    fn limited_by(
+        &self,
+        choice: &Choice,
+        target: Millimetres,
+        (floor, ceiling): (MillimetresPerSecond, MillimetresPerSecond),
+    ) -> LimitedBy {
+        let most = match self.strategy {
+            Strategy::Constant => self.cruise_preload,
+            _ => self.most_preload,
+        };
+        if choice.speed >= ceiling {
+            LimitedBy::Drive
+        } else if choice.speed <= floor {
+            LimitedBy::LeastSpeed
+        } else if choice.gap < target {
+            LimitedBy::Friction
+        } else if choice.preload < most {
+            LimitedBy::Slew
+        } else {
+            LimitedBy::Preload
+        }
     }
 
     /// Where the corner may be felt, and where the crossing speed must be reached. The tread still

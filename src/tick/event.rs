@@ -2,6 +2,7 @@
 
 use crate::estimate::ContactStage;
 use crate::fault::{Fault, Limit};
+use crate::model::LimitedBy;
 use crate::restart::Restart;
 use crate::supervise::{Command, Mode, ServiceDuties};
 use crate::units::{Direction, Millimetres, MillimetresPerSecond, Newtons, Ratio, Seconds, Tick};
@@ -70,4 +71,6 @@ pub struct CrossingRecord {
     pub slip_margin: Ratio,
     /// Stiffness scale after this crossing's correction.
     pub stiffness_scale: Ratio,
+    /// What kept it from being faster, by its plan; none for a step that the table lacks.
+    pub limited_by: Option<LimitedBy>,
 }

@@ -124,6 +124,7 @@ fn record(tick: &mut TickContext<'_>, open: &OpenCrossing, outcome: &Outcome) {
         lead_time: lead_time(open, point.at),
         slip_margin: outcome.slip_margin,
         stiffness_scale: outcome.scale,
+        limited_by: open.limited_by,
     }));
 }
 

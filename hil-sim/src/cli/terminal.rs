@@ -7,7 +7,7 @@ use comfy_table::Table;
 
 use super::output::wrote;
 use crate::record::{CrossingLine, Report, Summary};
-use crate::report::ledger::COLUMNS;
+use crate::report::ledger::{COLUMNS, limited_by};
 use crate::report::verdict::{Grade, gap_sentence, headline, origin, reservations, slip_sentence};
 use crate::table::{WIDTH, number, plain};
 
@@ -22,6 +22,9 @@ pub fn run(summary: &Summary, files: &[PathBuf]) -> String {
     text += &wrapped(&details(summary), "  ");
     if !summary.crossings.is_empty() {
         text += &format!("{}\n", ledger(&summary.crossings));
+    }
+    if let Some(lost) = &summary.lost {
+        text += &wrapped(&lost.sentence(), "  ");
     }
     for fault in &summary.injected {
         text += &wrapped(&format!("injected: {fault}"), "  ");
@@ -59,10 +62,14 @@ fn details(s: &Summary) -> String {
 fn ledger(crossings: &[CrossingLine]) -> Table {
     let columns = || COLUMNS.iter().filter(|column| column.on_terminal);
     let names: Vec<String> = columns().map(|c| format!("{}\n{}", c.name, c.unit)).collect();
-    let head: Vec<&str> = std::iter::once("step").chain(names.iter().map(String::as_str)).collect();
+    let head: Vec<&str> = std::iter::once("step")
+        .chain(names.iter().map(String::as_str))
+        .chain(["limited\nby"])
+        .collect();
     let rows = crossings.iter().map(|line| {
         let cells = columns().map(|column| number((column.of)(line), column.decimals));
-        std::iter::once(line.index.to_string()).chain(cells).collect()
+        let by = limited_by(line).to_owned();
+        std::iter::once(line.index.to_string()).chain(cells).chain([by]).collect()
     });
     plain(&head, rows)
 }

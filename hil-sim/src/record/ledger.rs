@@ -1,6 +1,7 @@
 //! A line of the crossings' ledger with names and units.
 
 use interstage::log::ledger::Line;
+use interstage::model::LimitedBy;
 use interstage::units::{Direction, Q16};
 use serde::{Deserialize, Serialize};
 
@@ -45,6 +46,9 @@ pub struct LedgerLine {
     pub stiffness_scale: f64,
     /// Its change per crossing, the newest weighing a quarter.
     pub trend: f64,
+    /// What kept it from being faster, by its plan.
+    #[serde(default)]
+    pub limited_by: Option<LimitedBy>,
 }
 
 impl From<&Line> for LedgerLine {
@@ -71,6 +75,7 @@ impl From<&Line> for LedgerLine {
             slip_mm: num(line.slip),
             stiffness_scale: num(crossing.stiffness_scale),
             trend: num(line.trend),
+            limited_by: crossing.limited_by,
         }
     }
 }

@@ -69,7 +69,7 @@ impl RunRecorder {
         if let Some(controller) = columns {
             tally.rows.push(Tick { controller, truth: Some(truth.into()) });
         }
-        tally.close_tick(telemetry.mode.moves(), truth);
+        tally.close_tick(mode_number(telemetry.mode), truth);
     }
 
     /// The record of a run on `target` that took `wall_s` to compute. `arrived` is the
@@ -104,6 +104,7 @@ impl ControllerView {
             gap_measured_mm: num(|r| r.gap_measured),
             lead_time_s: Some(self.lead_time(crossing.touch_s)),
             step_found_mm: num(|r| r.position),
+            limited_by: reported.and_then(|(_, r)| r.limited_by),
             ..true_line(crossing)
         }
     }

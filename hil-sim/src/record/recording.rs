@@ -17,6 +17,7 @@ use serde_json::Value;
 
 use super::read::{MCAP, ReadError, content, is_table, parameters, records};
 use super::recorder::{reported, text};
+use super::time_lost::{TimeLost, TimeSplit};
 use super::{Controller, CrossingLine, LedgerLine, LogLine, Recording, Run, Summary, Tick};
 use crate::scenario::Scenario;
 
@@ -114,6 +115,16 @@ fn commanded(run: &Run) -> Option<u32> {
     None
 }
 
+/// Where the time of a run that arrived goes, by the controller's position.
+fn lost(run: &Run, scenario: Option<&Scenario>) -> Option<TimeLost> {
+    let arrived = run.rows.last()?.mode().is_some_and(|mode| matches!(mode, Mode::Complete(_)));
+    let cruise_mm_s =
+        scenario.filter(|_| arrived && commanded(run).is_some())?.rig.drive.cruise_speed_mm_s;
+    let mut split = TimeSplit::default();
+    run.rows.iter().for_each(|row| split.add(row.t_s, row.mode, row.position_mm));
+    Some(split.lost(cruise_mm_s))
+}
+
 /// A run as the controller reports it.
 fn summary(run: &Run) -> Summary {
     let moves = |row: &&Controller| row.mode().is_some_and(Mode::moves);
@@ -156,6 +167,7 @@ fn summary(run: &Run) -> Summary {
         direction: if retracts { "retract" } else { "deploy" }.to_owned(),
         rig: header.rig,
         duration_s: last.zip(commanded(run)).map(|(row, at)| row.t_s - 1e-3 * f64::from(at)),
+        lost: lost(run, scenario.as_ref()),
         moving_s: between(|row| row.t_s),
         total_s: run.rows.last().map_or(0.0, |row| row.t_s),
         travel_mm: between(|row| row.position_mm).abs(),
@@ -198,6 +210,7 @@ fn crossing(run: &Run, line: &Line) -> CrossingLine {
         step_found_mm: Some(seen.step_found_mm),
         peak_preload_n: seen.peak_preload_n,
         peak_utilisation: f64::NAN,
+        limited_by: seen.limited_by,
     }
 }
 

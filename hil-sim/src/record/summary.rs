@@ -1,9 +1,10 @@
 //! The summary of a run and its parts.
 
+use interstage::model::LimitedBy;
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::{Map, Value};
 
-use super::Tick;
+use super::{Tick, TimeLost};
 
 /// Ledger line of one crossing: the plant's truth beside the controller's view.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -38,6 +39,9 @@ pub struct CrossingLine {
     pub peak_preload_n: f64,
     /// Largest friction utilisation during the crossing.
     pub peak_utilisation: f64,
+    /// What kept it from being faster, by the controller's plan.
+    #[serde(default)]
+    pub limited_by: Option<LimitedBy>,
 }
 
 /// A fault or limit that the controller reported.
@@ -98,6 +102,9 @@ pub struct Summary {
     /// From the start of motion to its end, s: the duration without the preload that is built
     /// before the wheel moves.
     pub moving_s: f64,
+    /// Where the duration goes beside travel at cruise speed.
+    #[serde(default)]
+    pub lost: Option<TimeLost>,
     /// From boot to the end of the run, s.
     pub total_s: f64,
     /// Distance travelled, mm.

@@ -4,6 +4,8 @@
 use interstage::units::Direction;
 use sha2::{Digest, Sha256};
 
+use super::tick::MOVES;
+use super::time_lost::TimeSplit;
 use super::{CrossingLine, LogLine, Recording, Report, Summary, Tick, drawn};
 use crate::plant::ledger::Crossing;
 use crate::plant::rig::{Truth, VirtualRig};
@@ -36,6 +38,7 @@ pub struct Tally {
     preload_sum: f64,
     moving: u32,
     worst_separation: f64,
+    split: TimeSplit,
     passed: u32,
 }
 
@@ -74,10 +77,11 @@ impl Tally {
         }
     }
 
-    /// Ends a tick; `moves` if the drive moved in it.
-    pub fn close_tick(&mut self, moves: bool, truth: &Truth) {
-        if moves {
-            let t_s = self.time_s();
+    /// Ends a tick in the mode of this number.
+    pub fn close_tick(&mut self, mode: u8, truth: &Truth) {
+        let t_s = self.time_s();
+        self.split.add(t_s, mode, truth.position_mm);
+        if MOVES.contains(&mode) {
             self.run_started.get_or_insert(t_s);
             self.run_ended = t_s;
             self.preload_sum += truth.preload_n;
@@ -102,10 +106,12 @@ impl Tally {
         });
         let crossings: Vec<CrossingLine> = plant.ledger().crossings().iter().map(line).collect();
         let worst = crossings.iter().map(|c| c.gap_mm).fold(self.worst_separation, f64::max);
+        let completed = there && crossings.len() == steps && self.faults.is_empty();
+        let cruise_mm_s = scenario.rig.drive.cruise_speed_mm_s;
         let has_gap = !crossings.is_empty() || worst > 0.0;
         let total_s = self.time_s();
         let summary = Summary {
-            completed: there && crossings.len() == steps && self.faults.is_empty(),
+            completed,
             target: target.into(),
             controller: scenario.run.controller.name().into(),
             direction: scenario.run.direction.name().into(),
@@ -118,6 +124,7 @@ impl Tally {
             missing: Vec::new(),
             duration_s: self.run_started.and(self.commanded).map(|from| self.run_ended - from),
             moving_s: self.run_started.map_or(0.0, |from| self.run_ended - from),
+            lost: completed.then(|| self.split.lost(cruise_mm_s)),
             total_s,
             travel_mm: (truth.position_mm - self.start_mm).abs(),
             gap_ref_mm: self.gap_ref_mm,
@@ -162,6 +169,7 @@ pub fn true_line(crossing: &Crossing) -> CrossingLine {
         step_found_mm: None,
         peak_preload_n: crossing.peak_preload_n,
         peak_utilisation: crossing.peak_utilisation,
+        limited_by: None,
     }
 }
 
@@ -181,7 +189,7 @@ mod tests {
         for (moves, preload, separation) in
             [(false, 90.0, 9.0), (true, 30.0, 0.1), (true, 40.0, 0.3), (false, 90.0, 9.0)]
         {
-            tally.close_tick(moves, &truth(preload, separation));
+            tally.close_tick(if moves { 5 } else { 3 }, &truth(preload, separation));
         }
         assert_eq!((tally.run_started, tally.run_ended), (Some(1e-3), 2e-3));
         assert_eq!((tally.preload_sum, tally.moving), (70.0, 2));
@@ -198,7 +206,8 @@ mod tests {
                 if commands.contains(&tick) {
                     tally.accept_command();
                 }
-                tally.close_tick(moves && (5..9).contains(&tick), plant.truth());
+                let under_way = moves && (5..9).contains(&tick);
+                tally.close_tick(if under_way { 5 } else { 3 }, plant.truth());
             }
             let ended = Ended {
                 target: "sil",

@@ -1,5 +1,7 @@
 //! The columns of the crossings' ledger, for page, terminal and comparison.
 
+use interstage::model::LimitedBy;
+
 use crate::record::CrossingLine;
 
 /// The true value that a column is compared with, and the error as text.
@@ -36,10 +38,10 @@ pub(crate) const COLUMNS: [Column; 13] = {
         new("speed", "mm/s", 2, |c| Some(c.speed_mm_s)),
         new("preload", "N", 2, |c| Some(c.preload_n)),
         Column { on_terminal: false, ..new("peak preload", "N", 2, |c| Some(c.peak_preload_n)) },
-        new("corner", "N", 1, |c| Some(c.corner_force_n)),
+        Column { on_terminal: false, ..new("corner", "N", 1, |c| Some(c.corner_force_n)) },
         Column { on_terminal: false, ..new("friction used", "", 2, |c| Some(c.peak_utilisation)) },
         new("lead", "s", 2, |c| c.lead_time_s),
-        new("slip", "mm", 2, |c| Some(c.slip_mm)),
+        Column { on_terminal: false, ..new("slip", "mm", 2, |c| Some(c.slip_mm)) },
         new("step at", "mm", 2, |c| Some(c.step_mm)),
         Column { truth: STEP, ..new("found at", "mm", 2, |c| c.step_found_mm) },
         Column {
@@ -48,6 +50,11 @@ pub(crate) const COLUMNS: [Column; 13] = {
         },
     ]
 };
+
+/// What kept a crossing from being faster, in words.
+pub(crate) fn limited_by(line: &CrossingLine) -> &'static str {
+    line.limited_by.map_or("-", LimitedBy::words)
+}
 
 fn gap_error(error: f64, truth: f64) -> String {
     format!("{:+.0} µm, {:+.1} %", 1e3 * error, 100.0 * error / truth)

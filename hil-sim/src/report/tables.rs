@@ -1,6 +1,6 @@
 //! The tables of the page.
 
-use super::ledger::{COLUMNS, Column};
+use super::ledger::{COLUMNS, Column, limited_by};
 use super::svg::escape;
 use crate::record::{CrossingLine, LogLine, Report, Summary};
 use crate::table::number;
@@ -50,7 +50,8 @@ pub(super) fn summary(s: &Summary) -> String {
         .filter(|(_, value)| !value.is_empty())
         .map(|(name, value)| format!("<div><dt>{name}</dt><dd>{}</dd></div>\n", escape(value)))
         .collect();
-    format!("<dl>\n{cells}</dl>\n")
+    let lost = s.lost.as_ref().map(|lost| format!("<p>{}.</p>\n", lost.sentence()));
+    format!("<dl>\n{cells}</dl>\n{}", lost.unwrap_or_default())
 }
 
 /// A value with its unit; empty if it is not known.
@@ -65,10 +66,12 @@ pub(super) fn ledger(crossings: &[CrossingLine]) -> String {
         return "<p>No step was crossed.</p>\n".to_owned();
     }
     let names = COLUMNS.iter().map(|column| format!("{}<br>{}", column.name, column.unit));
-    let head: Vec<String> = std::iter::once("step".to_owned()).chain(names).collect();
+    let head = std::iter::once("step".to_owned()).chain(names).chain(["limited<br>by".to_owned()]);
+    let head: Vec<String> = head.collect();
     let rows = crossings.iter().map(|line| {
         let cells = COLUMNS.iter().map(|column| cell(column, line));
-        std::iter::once(line.index.to_string()).chain(cells).collect()
+        let by = limited_by(line).to_owned();
+        std::iter::once(line.index.to_string()).chain(cells).chain([by]).collect()
     });
     table("ledger", &head, rows.collect())
 }

@@ -1,7 +1,7 @@
 //! The record of a run on the board: the plant's truth, inputs and outputs, and the firmware's
 //! log.
 
-use interstage::model::Planner;
+use interstage::model::{LimitedBy, Planner};
 use sha2::Digest;
 
 use crate::bench::Passed;
@@ -16,8 +16,6 @@ use hil_sim::scenario::Scenario;
 const PRELOAD: u8 = 4;
 const COMPLETE: u8 = 10;
 const FAULT_HOLD: u8 = 11;
-/// Moving or stopping.
-const MOVING: std::ops::Range<u8> = 5..10;
 
 /// Values of the log's line about a crossing, in their order: milliseconds, step,
 /// position, residual, speed, preload, peak, lead, compression, gap measured, predicted, slip
@@ -32,6 +30,7 @@ struct Reported {
     lead_s: f64,
     measured_mm: f64,
     predicted_mm: f64,
+    limited_by: Option<LimitedBy>,
 }
 
 /// A run's record as it grows.
@@ -72,7 +71,7 @@ impl Trace {
             let row = self.row(passed, truth);
             self.tally.rows.push(row);
         }
-        self.tally.close_tick(MOVING.contains(&self.mode), truth);
+        self.tally.close_tick(self.mode, truth);
     }
 
     /// Adds every bit of the board's inputs and outputs to the digest.
@@ -153,6 +152,7 @@ fn line(reported: &[Reported], crossing: &Crossing) -> CrossingLine {
         gap_measured_mm: logged(|r| r.measured_mm),
         lead_time_s: logged(|r| r.lead_s),
         step_found_mm: logged(|r| r.found_mm),
+        limited_by: said.and_then(|r| r.limited_by),
         ..true_line(crossing)
     }
 }
@@ -171,7 +171,9 @@ fn crossing(line: &Line) -> Option<Reported> {
     let values = line.numbers();
     let [_, index, found_mm, _, _, _, _, lead_s, _, measured_mm, predicted_mm, _, _] =
         <[f64; VALUES]>::try_from(values).ok()?;
-    Some(Reported { index: index as u8, found_mm, lead_s, measured_mm, predicted_mm })
+    let limited_by = line.text.split_once("limited by ").map(|(_, words)| words.trim());
+    let limited_by = LimitedBy::ALL.into_iter().find(|by| Some(by.words()) == limited_by);
+    Some(Reported { index: index as u8, found_mm, lead_s, measured_mm, predicted_mm, limited_by })
 }
 
 #[cfg(test)]

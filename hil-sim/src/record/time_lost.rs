@@ -1,0 +1,134 @@
+//! Where the time of a run goes.
+
+use serde::{Deserialize, Serialize};
+
+use super::tick::{CROSSES, MOVES, PRELOADS};
+
+/// What a run takes longer than its travel at cruise speed, s. With that travel the parts add up
+/// to the duration.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TimeLost {
+    /// At rest, until the preload carries the wheel.
+    pub preload_s: f64,
+    /// Before the steps: acceleration at the start, waiting for the preload, the window in which
+    /// the step may come.
+    pub approach_s: f64,
+    /// On the corners, and until the wheel is fast again behind them.
+    pub crossing_s: f64,
+    /// Behind the last step: braking for the end of travel.
+    pub end_s: f64,
+}
+
+impl TimeLost {
+    /// In one sentence.
+    #[must_use]
+    pub fn sentence(&self) -> String {
+        let Self { preload_s, approach_s, crossing_s, end_s } = self;
+        format!(
+            "Time beside travel at cruise speed: {preload_s:.2} s until the preload carries the wheel, \
+             {approach_s:.2} s before the steps, {crossing_s:.2} s on them, {end_s:.2} s at the end"
+        )
+    }
+}
+
+/// Time and travel of a part of the run.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Part {
+    time_s: f64,
+    travel_mm: f64,
+}
+
+impl Part {
+    fn add(&mut self, other: Self) {
+        self.time_s += other.time_s;
+        self.travel_mm += other.travel_mm;
+    }
+
+    fn lost_s(self, cruise_mm_s: f64) -> f64 {
+        self.time_s - self.travel_mm / cruise_mm_s
+    }
+}
+
+/// The parts of a run as it goes on.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct TimeSplit {
+    preload: Part,
+    approach: Part,
+    crossing: Part,
+    /// Between the steps: before a step it becomes part of the approach.
+    open: Part,
+    last: Option<(f64, u8, f64)>,
+    moved: bool,
+}
+
+impl TimeSplit {
+    /// Takes the tick at `t_s`, in the mode of this number at that position.
+    pub(super) fn add(&mut self, t_s: f64, mode: u8, position_mm: f64) {
+        let (from_s, before, from_mm) =
+            self.last.replace((t_s, mode, position_mm)).unwrap_or((t_s, mode, position_mm));
+        let part = Part { time_s: t_s - from_s, travel_mm: (position_mm - from_mm).abs() };
+        match before {
+            PRELOADS if !self.moved => self.preload.add(part),
+            _ if !self.moved => self.preload = Part::default(),
+            _ if !MOVES.contains(&before) => {}
+            _ if CROSSES.contains(&before) => {
+                self.approach.add(std::mem::take(&mut self.open));
+                self.crossing.add(part);
+            }
+            _ => self.open.add(part),
+        }
+        self.moved |= MOVES.contains(&mode);
+    }
+
+    /// What the parts take longer than their travel at this speed, mm/s.
+    pub(super) fn lost(&self, cruise_mm_s: f64) -> TimeLost {
+        TimeLost {
+            preload_s: self.preload.lost_s(cruise_mm_s),
+            approach_s: self.approach.lost_s(cruise_mm_s),
+            crossing_s: self.crossing.lost_s(cruise_mm_s),
+            end_s: self.open.lost_s(cruise_mm_s),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_part_loses_what_it_takes_longer_than_at_cruise_speed() {
+        // Mode, ticks of 1 s, mm in each: two steps, and a build-up that was given up before.
+        let run = [
+            (PRELOADS, 9, 0.0),
+            (3, 2, 0.0),
+            (PRELOADS, 3, 0.0),
+            (5, 2, 10.0),
+            (6, 2, 5.0),
+            (7, 4, 2.0),
+            (8, 1, 10.0),
+            (5, 1, 10.0),
+            (6, 1, 5.0),
+            (7, 1, 5.0),
+            (5, 2, 2.5),
+            (10, 7, 0.0),
+        ];
+        let (mut split, mut t_s, mut position_mm) = (TimeSplit::default(), 0.0, 80.0);
+        for (mode, ticks, mm) in run {
+            for _ in 0..ticks {
+                split.add(t_s, mode, position_mm);
+                (t_s, position_mm) = (t_s + 1.0, position_mm - mm);
+            }
+        }
+        let lost = split.lost(10.0);
+        let expected =
+            TimeLost { preload_s: 3.0, approach_s: 1.5, crossing_s: 3.2 + 0.5, end_s: 1.5 };
+        for (got, wanted) in [
+            (lost.preload_s, expected.preload_s),
+            (lost.approach_s, expected.approach_s),
+            (lost.crossing_s, expected.crossing_s),
+            (lost.end_s, expected.end_s),
+        ] {
+            assert!((got - wanted).abs() < 1e-9, "{lost:?} {expected:?}");
+        }
+    }
+}
