@@ -112,6 +112,7 @@ fn assert_alike(board: &Recording, scenario: &Scenario) {
                 "step {index}: {what} {value} on the board, {expected} in software"
             );
         }
+        assert_eq!(on_board.limited_by, in_software.limited_by, "step {}", on_board.index);
         let found = on_board.step_found_mm.expect("the firmware logged the crossing");
         assert!((found - on_board.step_mm).abs() < 0.5, "found at {found}");
     }

@@ -1,5 +1,6 @@
 //! Records a run as it goes on.
 
+use interstage::model::LimitedBy;
 use interstage::supervise::{Mode, ServiceDuties};
 use interstage::tick::{CrossingRecord, Entry, Event, Telemetry};
 use interstage::units::{Direction, Duty, Q16};
@@ -168,7 +169,7 @@ pub fn text(event: &Event) -> String {
         }
         Event::Crossing(c) => format!(
             "crossing {} at {:.2} mm ({:+.2}): {:.2} mm/s, {:.1} N, gap {:.3} mm measured, \
-             {:.3} mm predicted, lead {:.2} s, stiffness x{:.3}",
+             {:.3} mm predicted, lead {:.2} s, stiffness x{:.3}, limited by {}",
             c.index,
             c.position.to_num::<f64>(),
             c.residual.to_num::<f64>(),
@@ -178,6 +179,7 @@ pub fn text(event: &Event) -> String {
             c.gap_predicted.to_num::<f64>(),
             c.lead_time.to_num::<f64>(),
             c.stiffness_scale.to_num::<f64>(),
+            c.limited_by.map_or("no plan", LimitedBy::words),
         ),
     }
 }

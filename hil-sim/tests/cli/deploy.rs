@@ -24,7 +24,7 @@ const KEYS: [&str; 13] = [
 ];
 
 /// The same of each crossing.
-const CROSSING_KEYS: [&str; 9] = [
+const CROSSING_KEYS: [&str; 10] = [
     "index",
     "speed_mm_s",
     "preload_n",
@@ -33,6 +33,7 @@ const CROSSING_KEYS: [&str; 9] = [
     "gap_measured_mm",
     "corner_force_n",
     "lead_time_s",
+    "limited_by",
     "slip_mm",
 ];
 

@@ -116,6 +116,21 @@ fn gaps_stay_near_the_reference_with_the_preload_reached_before_every_corner() {
 }
 
 #[test]
+fn the_duration_is_the_travel_at_cruise_speed_and_what_each_part_loses() {
+    for Run { name, scenario, summary, .. } in RUNS.iter() {
+        let lost = summary.lost.expect("it arrived");
+        let parts = [lost.preload_s, lost.approach_s, lost.crossing_s, lost.end_s];
+        assert!(parts.iter().all(|part| *part > 0.0), "{name}: {lost:?}");
+        let at_cruise = summary.travel_mm / scenario.rig.drive.cruise_speed_mm_s;
+        let sum = at_cruise + parts.iter().sum::<f64>();
+        let off = sum - summary.duration_s.expect("commanded");
+        assert!(off.abs() < 0.01, "{name}: {sum} s, off by {off}");
+        // What limits a crossing is known of each.
+        assert!(summary.crossings.iter().all(|line| line.limited_by.is_some()), "{name}");
+    }
+}
+
+#[test]
 fn the_gap_is_measured_and_predicted() {
     for Run { name, summary, nominal, .. } in RUNS.iter() {
         // A drawn plant has gains and heights off that no sensor of the rig can show; at the

@@ -219,3 +219,35 @@ fn a_crossing_that_leaves_too_little_friction_is_reported() {
     }
     assert!(slips > 0 && grips > 0, "{slips} {grips}");
 }
+
+#[test]
+fn a_plan_names_what_keeps_the_crossing_from_being_faster() {
+    let named = |mu: f64, change: &dyn Fn(&mut PlanRequest), rig: &dyn Fn(&mut Rig)| {
+        let mut prototype = Rig::prototype();
+        prototype.plant.mu = mu;
+        rig(&mut prototype);
+        let mut request = request(Direction::Deploy);
+        change(&mut request);
+        Planner::try_build(&prototype).expect("a sound rig").plan(&request).limited_by
+    };
+    let as_it_is = |_: &mut PlanRequest| {};
+    let from_nothing = |request: &mut PlanRequest| {
+        (request.step, request.preload, request.distance) = (1, Q16::ZERO, q16(18_000_000));
+    };
+    let prototype = |_: &mut Rig| {};
+    assert_eq!(named(1.1, &as_it_is, &prototype), LimitedBy::Preload);
+    assert_eq!(named(1.1, &from_nothing, &prototype), LimitedBy::Slew);
+    assert_eq!(named(0.75, &as_it_is, &prototype), LimitedBy::Friction);
+    let stiff = |request: &mut PlanRequest| request.scale = q16(3_000_000);
+    assert_eq!(named(1.1, &stiff, &prototype), LimitedBy::LeastSpeed);
+    let slow_drive = |rig: &mut Rig| {
+        (rig.drive.cruise_speed_mm_s, rig.control.safe_speed_mm_s) = (6.0, 5.0);
+    };
+    assert_eq!(named(1.1, &as_it_is, &slow_drive), LimitedBy::Drive);
+    // Back from the preload between the steps, the speed that holds the gap excites a mode.
+    let back = |request: &mut PlanRequest| {
+        (request.direction, request.step) = (Direction::Retract, 3);
+        (request.preload, request.distance) = (q16(33_300_000), q16(18_000_000));
+    };
+    assert_eq!(named(1.1, &back, &prototype), LimitedBy::Resonance);
+}
