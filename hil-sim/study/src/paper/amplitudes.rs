@@ -105,7 +105,7 @@ impl Amplitudes {
         let impact = SOURCES.map(impact).into_iter().chain([published_by(stress)]);
         let mut force = categories("Collision force (Fig. 13)", "force, N", force);
         force.least_y = Some((40.0, 65.0));
-        let title = "Impact stress over that at 5 mm/s, 100 N (Fig. 14)";
+        let title = "Impact stress, ratio to the first (Fig. 14)";
         let impact = categories(title, "ratio", impact);
         let mut published = marks("collision force", "N", COLLISION_N, false, |source, i| {
             self.values(source, |lift| lift.collision_n)[i]
@@ -302,7 +302,7 @@ impl Amplitudes {
                 "The gap is the amplitude of a vibration that stress waves excite.",
                 arm_over_gap(all, self) > 0.5,
                 format!(
-                    "The largest deflection of the arm in the experiment is {:.2} of the gap.",
+                    "The largest deflection of the arm in the experiment, with its bending under the force, is {:.2} of the gap.",
                     arm_over_gap(all, self)
                 ),
                 "The gap is the quasi-static clearance under a wheel that floor and corner carry; it is \
@@ -362,8 +362,8 @@ fn beside(marks: &mut [Mark], pick: impl Fn(Crossing) -> f64) {
 }
 
 fn categories(title: &str, y: &str, series: impl Iterator<Item = Series>) -> Panel {
-    let names = CASES[..3].iter().map(|(v, p)| format!("{v} mm/s, {p} N")).collect();
-    Panel::of_categories(title, ("speed and preload", names), y, series.collect())
+    let names = CASES[..3].iter().map(|(v, p)| format!("{v}, {p} N")).collect();
+    Panel::of_categories(title, ("speed in mm/s, preload", names), y, series.collect())
 }
 
 fn numbered(values: [f64; 3]) -> Vec<(f64, f64)> {
