@@ -147,7 +147,7 @@ def mechanism():
     # Angle.
     d.line(pivot, (pivot[0], top + 150), color=SOFT, dash="6 5")
     d.arc(*pivot, 120, -90, -90 + degrees(angle) - 4, color=GREEN)
-    d.text(pivot[0] + 96, top + 28, "arm angle α, code or degrees", "0 along the pillar, + outwards",
+    d.text(pivot[0] + 96, top + 28, "arm angle α, sensor code", "0 along the pillar, + outwards",
            color=GREEN)
     # Preload, load, drive force, travel, turn.
     d.arrow((wheel[0] + 14, wheel[1]), (wheel[0] + 84, wheel[1]), color=BLUE, width=4)

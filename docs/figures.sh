@@ -31,7 +31,7 @@ write compare compare -n 50
 write envelope envelope --out target/figures
 [ ! -f target/figures/envelope.svg ] || cp target/figures/envelope.svg docs/envelope.svg
 write faults-sil faults -n 100
-write faults-board faults --target board -n 20
+write faults-board faults --target board -n 1
 write paper paper
 write bench bench --peers
 write stress stress

@@ -121,14 +121,16 @@ impl Fault {
             Self::PreloadSensorRange => "the preload sensor reads outside its range",
             Self::CompressionSensorRange => "the compression sensor reads outside its range",
             Self::ArmAngleRange => "the arm angle lies outside the arm's reach",
-            Self::PreloadSensorImplausible => "the preload sensor reads what no force can be",
-            Self::CompressionSensorImplausible => "the compression sensor reads what no tread does",
+            Self::PreloadSensorImplausible => "the preload sensor reads what no force explains",
+            Self::CompressionSensorImplausible => {
+                "the compression sensor reads what no tread explains"
+            }
             Self::Overpressure => "the preload exceeded its limit",
             Self::PreloadNotReached => "the preload did not reach its reference in time",
             Self::DriveStalled => "the wheel stands still although driven",
-            Self::DriveRunaway => "the wheel turns otherwise than commanded",
-            Self::StepsDisagree => "two steps in a row are off the table by different ways",
-            Self::DutyMismatch => "duty and speed of the drive do not belong together",
+            Self::DriveRunaway => "the wheel does not turn as commanded",
+            Self::StepsDisagree => "two steps in a row are off the table by different distances",
+            Self::DutyMismatch => "duty and speed of the drive do not match",
             Self::ArmMismatch => "the arm moves farther than the wheel turns",
             Self::PretightenerRunaway => "the preload strays from its reference",
             Self::DriveBridge => "the drive's bridge puts out another duty than it was given",
@@ -139,7 +141,7 @@ impl Fault {
             Self::StepsLost => "two steps of the table in a row were not found",
             Self::WheelSlips => "the wheel turns at a corner without getting over it",
             Self::PositionUnknown => {
-                "the position is not known and no step lies ahead that could tell it: go the other way"
+                "the position is not known and no step lies ahead that could give it: go the other way"
             }
             Self::ModelSilent => "the model task does not answer",
             Self::EmergencyStop => "the emergency stop cut the bridges",
@@ -227,13 +229,13 @@ impl Limit {
             }
             Self::ResonanceAvoided => "a speed was moved out of a structural mode's band",
             Self::AdaptationBounded => "the stiffness estimate reached the end of its range",
-            Self::PreloadWait => "waiting before a corner for the preload to stand",
+            Self::PreloadWait => "waiting before a corner until the preload is reached",
             Self::SlipMarginLow => "the friction utilisation leaves less than the wanted margin",
             Self::GapStrange => "the measured gap is not the predicted one",
-            Self::CompressionStrange => {
-                "compression of the tread and preload do not belong together"
+            Self::CompressionStrange => "compression of the tread and preload do not match",
+            Self::PositionUnconfirmed => {
+                "the position comes from a record, and no step ahead can confirm it"
             }
-            Self::PositionUnconfirmed => "the position is of a record that no step ahead confirms",
             Self::ServiceBounded => "a motion in the service mode has reached a bound",
             Self::ServiceSilent => "the host fell silent in the service mode",
         }

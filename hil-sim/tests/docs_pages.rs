@@ -14,6 +14,10 @@ use crate::cli::{code, rig_in, stderr};
 /// Verbs that another program of the workspace runs; the command's own help lists them.
 const ELSEWHERE: [&str; 3] = ["bench", "modes", "paper"];
 
+/// Bound of the words of all pages, without code and tables: more than an hour's reading helps
+/// nobody to find the sentence that is needed.
+const MOST_WORDS: usize = 15_000;
+
 /// The workspace.
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").canonicalize().expect("the workspace")
@@ -102,6 +106,29 @@ fn the_first_deployment_s_page_names_what_to_measure() {
     for key in measured {
         assert!(page.contains(&format!("`{key}`")), "{key}");
     }
+}
+
+/// Words of a page outside code and rows of tables.
+fn words(text: &str) -> usize {
+    let mut in_code = false;
+    let lines = text.lines().filter(|line| {
+        let is_fence = line.trim_start().starts_with("```");
+        in_code ^= is_fence;
+        !(in_code || is_fence || line.starts_with('|'))
+    });
+    lines.map(|line| line.split_whitespace().count()).sum()
+}
+
+#[test]
+fn the_pages_stay_readable_in_an_hour() {
+    assert_eq!(words("two words\n| a row |\n```sh\ncode\n```\nthree more words"), 5);
+    let study = root().join("docs/paper/README.md");
+    let study = (study.clone(), fs::read_to_string(study).expect("the study's page"));
+    let counts: Vec<(usize, PathBuf)> =
+        pages().into_iter().chain([study]).map(|(path, text)| (words(&text), path)).collect();
+    let sum: usize = counts.iter().map(|(count, _)| count).sum();
+    assert!(sum < MOST_WORDS, "{sum} words, at most {MOST_WORDS}: {counts:?}");
+    assert!(sum > MOST_WORDS / 2, "{sum} words: are these the pages?");
 }
 
 /// The anchor that a heading gets: lower case, without punctuation, hyphens for blanks.

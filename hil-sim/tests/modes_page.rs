@@ -83,7 +83,7 @@ fn label(trigger: Trigger) -> String {
         Trigger::Command(Command::Stop) => "stop".into(),
         Trigger::Command(Command::Retract) => "retract".into(),
         Trigger::Command(Command::Reset) => "reset".into(),
-        Trigger::PreloadReached => "preload stands".into(),
+        Trigger::PreloadReached => "preload reached".into(),
         Trigger::Leg(Leg::Cruise) => "cruise".into(),
         Trigger::Leg(Leg::Approach) => "approach".into(),
         Trigger::Leg(Leg::Crossing) => "crossing".into(),

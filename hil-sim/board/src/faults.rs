@@ -133,7 +133,7 @@ pub struct Timed {
 #[error(
     "`{0}`: expected <fault>@<seconds> with preload-sensor=<code>, compression-sensor=<code>, \
      drive-readback=<code>, pretightener-readback=<code>, angle-bits=<mask>, angle-lost, \
-     angle-disturbed, magnet-lost, encoder-a, encoder-b, dma-stalled, timer-flags, button-storm, \
+     angle-disturbed, magnet-lost, encoder-line-a, encoder-line-b, dma-stalled, timer-flags, button-storm, \
      one-bank, stop-shorted, stop-torn, halted=<milliseconds>, one-wrong-bit=<address>, \
      two-wrong-bits=<address>, wrong-check-bits=<address>, brown-out, supply-cut, supply-dip, software-reset, reset-pin, caught \
      or flip=<address>.<bit>"
@@ -148,8 +148,8 @@ const PLAIN: [(&str, Fault); 17] = [
     ("one-bank", Fault::OneBank),
     ("stop-shorted", Fault::StopShorted),
     ("stop-torn", Fault::StopTorn),
-    ("encoder-a", Fault::EncoderLine(0)),
-    ("encoder-b", Fault::EncoderLine(1)),
+    ("encoder-line-a", Fault::EncoderLine(0)),
+    ("encoder-line-b", Fault::EncoderLine(1)),
     ("dma-stalled", Fault::DmaStalled),
     ("timer-flags", Fault::TimerFlags),
     ("button-storm", Fault::ButtonStorm),
@@ -227,7 +227,7 @@ impl fmt::Display for Fault {
             }
             plain => {
                 let named = PLAIN.iter().find(|(_, fault)| *fault == plain);
-                f.write_str(named.map_or("encoder-b", |(name, _)| name))
+                f.write_str(named.map_or("encoder-line-b", |(name, _)| name))
             }
         }
     }

@@ -4,6 +4,13 @@
 //! A peripheral answers accesses to its registers and says by itself when something of
 //! its own is due. What leads from one to another (interrupt lines, DMA requests, pins)
 //! is [`super::chip`]'s.
+//!
+//! To add one: implement [`Peripheral`] in a file here (`read` and `write` by offset, `None` for a
+//! register that does not exist; `deadline` and `advance` if something happens by itself; registers
+//! that only keep what is written go into a table of `Kept`). Add its address and clock in
+//! `chip/map.rs`, a field in `Chip` and an arm in `Chip::block`; its interrupt line, deadline and DMA
+//! requests in `Chip::settle_lines`; its pins in `chip/pins.rs`. Test it against the register
+//! description; in a run `unmodelled` must stay empty.
 
 pub mod adc;
 pub mod crc;

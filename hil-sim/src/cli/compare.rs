@@ -65,7 +65,7 @@ fn human(comparison: &Comparison) -> String {
     let head = [
         "controller",
         "command s (ratio)",
-        "moving s (ratio)",
+        "in motion s (ratio)",
         "gap mm",
         "margin",
         "slips",

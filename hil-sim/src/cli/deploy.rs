@@ -41,9 +41,9 @@ pub struct Args {
     pub hil: bool,
 
     /// Fault of the emulated board's hardware and its time, may be repeated:
-    /// preload-sensor=0x8000@5.2, compression-sensor=CODE, angle-bits=MASK, angle-lost, encoder-a,
-    /// encoder-b, dma-stalled, timer-flags, brown-out, supply-cut, supply-dip or
-    /// flip=ADDRESS.BIT, each at its seconds from power-up.
+    /// preload-sensor=0x8000@5.2, compression-sensor=CODE, angle-bits=MASK, angle-lost,
+    /// encoder-line-a, encoder-line-b, dma-stalled, timer-flags, brown-out, supply-cut, supply-dip
+    /// or flip=ADDRESS.BIT, each at its seconds from power-up.
     #[arg(long, value_name = "FAULT@S")]
     pub board_fault: Vec<String>,
 
@@ -281,7 +281,7 @@ mod tests {
     fn options_of_the_emulated_board_are_refused_elsewhere() {
         for (arguments, named) in [
             ("--hil", "--hil"),
-            ("--target probe --board-fault encoder-a@1", "--board-fault encoder-a@1"),
+            ("--target probe --board-fault encoder-line-a@1", "--board-fault encoder-line-a@1"),
             ("--gdb :3333", "--gdb :3333"),
         ] {
             let error = takes_board(&parsed(arguments)).unwrap_err().to_string();

@@ -125,7 +125,7 @@ fn figures(outcome: &montecarlo::Outcome) -> comfy_table::Table {
         &head,
         [
             spread("from the command, s", outcome.duration_s, 2),
-            spread("moving, s", outcome.moving_s, 2),
+            spread("in motion, s", outcome.moving_s, 2),
             spread("gap over reference", outcome.gap_over_ref, 3),
             spread("  at the first step", outcome.first_gap_over_ref, 3),
             spread("  at the later ones", outcome.later_gap_over_ref, 3),

@@ -11,14 +11,14 @@ use crate::report::palette;
 use crate::report::svg::{self, Area, Drawn, SCALE, font};
 
 const S: i32 = SCALE as i32;
-/// Size, CSS pixels.
-const SIZE: (u32, u32) = (1200, 560);
+/// Size, CSS pixels: its text can still be read at a width of 400.
+const SIZE: (u32, u32) = (640, 1160);
 /// Height of a map's title.
 const HEAD: i32 = 26 * S;
 /// Height of the legend above all.
-const LEGEND: i32 = 28 * S;
+const LEGEND: i32 = 52 * S;
 /// Text in a cell, CSS pixels.
-const CELL_PX: f64 = 10.0;
+const CELL_PX: f64 = 11.0;
 
 /// The picture as SVG.
 #[must_use]
@@ -26,8 +26,8 @@ pub fn picture(envelope: &Envelope) -> String {
     svg::fixed(SIZE, |area| {
         let (head, maps) = area.split_vertically(LEGEND);
         legend(&head)?;
-        let places = [true, false].into_iter().flat_map(|known| STRATEGIES.map(|k| (known, k)));
-        for (area, (known, kind)) in maps.split_evenly((2, STRATEGIES.len())).iter().zip(places) {
+        let places = STRATEGIES.into_iter().flat_map(|kind| [true, false].map(|k| (k, kind)));
+        for (area, (known, kind)) in maps.split_evenly((STRATEGIES.len(), 2)).iter().zip(places) {
             map(envelope, area, known, kind.name())?;
         }
         Ok(())
@@ -36,21 +36,18 @@ pub fn picture(envelope: &Envelope) -> String {
 
 /// What the colours say.
 fn legend(head: &Area) -> Drawn {
-    let mut left = 14 * S;
-    for (colour, text) in [
-        (palette::OUTCOMES[0], "completes without slip: seconds from the command"),
-        (palette::OUTCOMES[1], "completes, but slips"),
-        (palette::OUTCOMES[2], "does not complete"),
+    let style = || font(mesh::TEXT_PX, palette::TEXT, HPos::Left, VPos::Center);
+    for (colour, text, (left, middle)) in [
+        (palette::OUTCOMES[0], "completes without slip: seconds from the command", (14, 15)),
+        (palette::OUTCOMES[1], "completes, but slips", (14, 37)),
+        (palette::OUTCOMES[2], "does not complete", (234, 37)),
     ] {
-        let box_ = [(left, 9 * S), (left + 18 * S, 21 * S)];
+        let box_ = [(left * S, (middle - 6) * S), ((left + 18) * S, (middle + 6) * S)];
         head.draw(&Rectangle::new(box_, colour.filled()))?;
-        let style = font(mesh::TEXT_PX, palette::TEXT, HPos::Left, VPos::Center);
-        head.draw(&Text::new(text, (left + 24 * S, 15 * S), style))?;
-        left += 50 * S + svg::text_width(text, mesh::TEXT_PX);
+        head.draw(&Text::new(text, ((left + 24) * S, middle * S), style()))?;
     }
-    let style = font(mesh::TEXT_PX, palette::TEXT, HPos::Left, VPos::Center);
-    head.draw(&Circle::new((left + 8 * S, 15 * S), 5 * S, palette::TRUTH.stroke_width(3)))?;
-    head.draw(&Text::new("nominal", (left + 20 * S, 15 * S), style))
+    head.draw(&Circle::new((442 * S, 37 * S), 5 * S, palette::TRUTH.stroke_width(3)))?;
+    head.draw(&Text::new("nominal", (454 * S, 37 * S), style()))
 }
 
 /// Half the distance of neighbours: a cell reaches so far to each side.

@@ -100,7 +100,7 @@ pub struct Summary {
     /// arrive, s; none if the log has no such command or nothing moved.
     pub duration_s: Option<f64>,
     /// From the start of motion to its end, s: the duration without the preload that is built
-    /// before the wheel moves.
+    /// before the wheel moves. A wait before a corner counts.
     pub moving_s: f64,
     /// Where the duration goes beside travel at cruise speed.
     #[serde(default)]

@@ -1,8 +1,12 @@
 //! One row a tick: the controller's inputs and outputs, and the plant's truth beside them.
 //!
 //! The fields of [`Controller`] and [`TrueState`] are the columns of CSV, MCAP and JSON; serde
-//! derives their names, order and schema. A new column of the controller is a new field with its
-//! value in `unknown`, `of` and `telemetry`; one of the plant a field of `TrueState`.
+//! derives their names, order and schema.
+//!
+//! A new column of the plant is a field of [`TrueState`]. One of the controller is a line in
+//! `src/tick/telemetry.rs`, its value in `src/tick/report.rs`, its field in [`Controller`] with
+//! its value in `unknown`, `of` and `telemetry`, and its stage in `replay.rs`. It changes the binary layout: raise `SCHEMA` in
+//! `src/log/identity.rs` and record the runs in `hil-sim/tests/data` again.
 
 use interstage::log::{Flags, Record, codes};
 use interstage::sense::raw::{AdcCode, BridgeCode, BridgeCodes, EncoderCount, Sample, SensorFrame};

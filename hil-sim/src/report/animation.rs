@@ -42,7 +42,7 @@ fn why(scene: &Scene) -> String {
 reaches the lower wall."
     } else {
         "The wheel climbs over the edge, and the edge takes the load from the lower wall until \
-that wall lets go."
+that wall carries none."
     };
     format!(
         "{instant} At that instant the <b>gap</b> is open between the step's root and the wheel. \
@@ -109,7 +109,7 @@ fn stills(scene: &Scene, c: &Event) -> String {
     let names = if scene.retracts {
         ["The edge takes the load", "The lower wall carries again"]
     } else {
-        ["First touch of the corner", "The lower wall lets go"]
+        ["First touch of the corner", "Lift-off from the lower wall"]
     };
     let first = still(&scene.geometry, c, at(c.touch_s), names[0], None);
     let gap = Some(c.gap_mm).filter(|gap| gap.is_finite());

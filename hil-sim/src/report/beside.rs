@@ -9,8 +9,8 @@ use super::panels::{Across, View};
 use super::svg;
 use crate::record::{CrossingLine, Recording, Tick};
 
-/// Size, CSS pixels.
-const SIZE: (u32, u32) = (1000, 860);
+/// Size, CSS pixels: its text can still be read at 400.
+const SIZE: (u32, u32) = (640, 860);
 /// More height for the last plot, which has the time axis.
 const AXIS_HEIGHT: u32 = 36;
 /// Colours of the two.

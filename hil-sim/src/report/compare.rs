@@ -124,7 +124,8 @@ fn plots(a: &Recording, b: &Recording) -> String {
             rules: Vec::new(),
             ..a.panel(title, y_name)
         };
-        html += &format!("<figure>{}</figure>\n", svg::fluid(SIZE, title, |area| panel.draw(area)));
+        let plot = svg::fluid(SIZE, title, |area| panel.draw(area));
+        html += &format!("<figure class=\"wide\">{plot}</figure>\n");
     }
     html
 }

@@ -73,11 +73,11 @@ function phase(scene, row) {
   }
   if (t < next.lift_s) {
     return state + at + (scene.retracts ? "the wheel rolls over the edge and down; the lower wall does not carry yet."
-      : "the edge takes the load from the lower wall. The rubber must still fill the corner when the wall lets go.");
+      : "the edge takes the load from the lower wall. What the rubber does not fill at lift-off is the gap.");
   }
   const gap = `${said}gap ${n(next.gap_mm, 2)} mm (reference ${n(scene.gap_ref_mm, 2)} mm)`;
   if (scene.retracts) return `${state}${at}the lower wall carries again, ${gap}.`;
-  return state + at + (over > 0 ? `the lower wall has let go, ${gap}; the wheel climbs on the edge.` : `the axle has passed the face, ${gap}.`);
+  return state + at + (over > 0 ? `lifted off the lower wall, ${gap}; the wheel climbs on the edge.` : `the axle has passed the face, ${gap}.`);
 }
 
 function start(scene) {

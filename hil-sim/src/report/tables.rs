@@ -28,7 +28,7 @@ pub(super) fn summary(s: &Summary) -> String {
         ("Rig", s.rig.clone()),
         ("Seed", s.seed.to_string()),
         ("From command to arrival", with_unit(s.duration_s, 3, "s")),
-        ("Moving", with_unit(s.moving_s, 3, "s")),
+        ("In motion", with_unit(s.moving_s, 3, "s")),
         ("From boot to end", with_unit(s.total_s, 3, "s")),
         ("Travel", with_unit(s.travel_mm, 2, "mm")),
         (

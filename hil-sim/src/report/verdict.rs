@@ -104,7 +104,7 @@ pub(crate) fn headline(summary: &Summary) -> String {
         1 => "1 crossing".to_owned(),
         n => format!("{n} crossings"),
     };
-    let moving = format!("{:.2} s of motion", summary.moving_s);
+    let moving = format!("{:.2} s in motion", summary.moving_s);
     let time = summary.duration_s.map_or(moving.clone(), |duration_s| {
         format!("{duration_s:.2} s from the command ({moving})")
     });
@@ -154,7 +154,7 @@ mod tests {
         assert_eq!(Grade::of(&summary), Grade::Good);
         (summary.travel_mm, summary.moving_s) = (79.8, 4.264);
         for (duration_s, time) in
-            [(Some(6.98), "6.98 s from the command (4.26 s of motion)"), (None, "4.26 s of motion")]
+            [(Some(6.98), "6.98 s from the command (4.26 s in motion)"), (None, "4.26 s in motion")]
         {
             summary.duration_s = duration_s;
             let expected = format!("Deployed 79.8 mm in {time}, 3 crossings");

@@ -14,7 +14,7 @@ pub enum Source {
     /// Means of ten runs of the virtual rig.
     Experiment,
     /// Finite elements: in tables alone.
-    #[serde(rename = "finite elements")]
+    #[serde(rename = "continuum")]
     FiniteElements,
     /// Printed in the study.
     Published,
@@ -32,7 +32,7 @@ impl Source {
             Self::Theory => "theory",
             Self::Simulation => "simulation",
             Self::Experiment => "experiment, four means of ten",
-            Self::FiniteElements => "finite elements",
+            Self::FiniteElements => "continuum",
             Self::Published => "published",
             Self::Fitted => "published (fitted)",
             Self::Method(_) => "",

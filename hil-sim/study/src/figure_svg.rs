@@ -13,12 +13,14 @@ use hil_sim::report::palette;
 use hil_sim::report::svg::{Area, Drawn, SCALE, fixed, font, text_width};
 
 const S: i32 = SCALE as i32;
-/// Width of a figure, CSS pixels.
-const WIDTH: u32 = 1040;
+/// Width of a figure, CSS pixels: its text can still be read at 400.
+const WIDTH: u32 = 640;
+/// Most plots side by side.
+const COLUMNS: usize = 2;
 /// Height of a row of plots.
-const ROW: u32 = 270;
-/// Height of the row with the legend.
-const HEAD: u32 = 34;
+const ROW: u32 = 240;
+/// Height of a line of the legend.
+const LINE: u32 = 26;
 /// Height of a plot's title.
 const TITLE: u32 = 26;
 const TITLE_PX: f64 = 13.0;
@@ -41,11 +43,17 @@ const METHODS: [RGBColor; 7] = [
 /// The figure as SVG.
 #[must_use]
 pub fn svg(figure: &Figure) -> String {
-    let rows = figure.panels.len().div_ceil(figure.columns.max(1)) as u32;
-    fixed((WIDTH, HEAD + rows * ROW), |area| {
-        let (head, body) = area.split_vertically(HEAD * SCALE);
-        legend(figure, &head)?;
-        let cells = body.split_evenly((rows as usize, figure.columns));
+    let columns = figure.columns.clamp(1, COLUMNS);
+    let rows = figure.panels.len().div_ceil(columns) as u32;
+    let entries = entries(figure);
+    let places = places(&entries);
+    let head = places.last().map_or(0, |place| place.1 + LINE as i32 * S / 2) as u32 / SCALE + 4;
+    fixed((WIDTH, head + rows * ROW), |area| {
+        let (head, body) = area.split_vertically(head * SCALE);
+        for (entry, &place) in entries.iter().zip(&places) {
+            legend(entry, place, &head)?;
+        }
+        let cells = body.split_evenly((rows as usize, columns));
         for (panel, cell) in figure.panels.iter().zip(&cells) {
             draw(panel, cell)?;
         }
@@ -53,38 +61,57 @@ pub fn svg(figure: &Figure) -> String {
     })
 }
 
-fn legend(figure: &Figure, head: &Area) -> Drawn {
+/// Entries of the legend: each source with its name, and the band over all runs (none).
+fn entries(figure: &Figure) -> Vec<(Option<Source>, &str)> {
     let series = || figure.panels.iter().flat_map(|panel| &panel.series);
-    let entries: BTreeSet<(Source, &str)> = series().map(Series::legend).collect();
-    let middle = (HEAD * SCALE) as i32 / 2;
-    let mut left = 16 * S;
-    let name = |text: &str, left: &mut i32| {
-        let style = font(TEXT_PX, palette::TEXT, HPos::Left, VPos::Center);
-        let at = *left + 34 * S;
-        *left = at + text_width(text, TEXT_PX) + 14 * S;
-        head.draw(&Text::new(text.to_owned(), (at, middle), style))
+    let sources: BTreeSet<(Source, &str)> = series().map(Series::legend).collect();
+    let band =
+        series().any(|one| !one.range.is_empty()).then_some((None, "range of all forty runs"));
+    sources.into_iter().map(|(source, text)| (Some(source), text)).chain(band).collect()
+}
+
+/// Left end and middle of each entry, in lines that fit the width, drawing units.
+fn places(entries: &[(Option<Source>, &str)]) -> Vec<(i32, i32)> {
+    let (first, line) = (16 * S, LINE as i32 * S);
+    let (mut left, mut middle) = (first, line / 2 + 2 * S);
+    let place = |(_, text): &(Option<Source>, &str)| {
+        let wide = 34 * S + text_width(text, TEXT_PX);
+        if left > first && left + wide > WIDTH as i32 * S {
+            (left, middle) = (first, middle + line);
+        }
+        let at = left;
+        left += wide + 14 * S;
+        (at, middle)
     };
-    for (source, text) in entries {
-        let centre = (left + 14 * S, middle);
-        if matches!(source, Source::Published | Source::Fitted) {
+    entries.iter().map(place).collect()
+}
+
+fn legend(
+    &(source, text): &(Option<Source>, &str),
+    (left, middle): (i32, i32),
+    head: &Area,
+) -> Drawn {
+    let centre = (left + 14 * S, middle);
+    match source {
+        Some(source @ (Source::Published | Source::Fitted)) => {
             for part in diamond(centre, source) {
                 head.draw(&part)?;
             }
-        } else {
+        }
+        Some(source) => {
             let ends = [(left, middle), (left + 28 * S, middle)];
             head.draw(&PathElement::new(ends, stroke(source)))?;
+            if matches!(source, Source::Method(_)) {
+                head.draw(&Circle::new(centre, 4 * S, stroke(source).filled()))?;
+            }
         }
-        if matches!(source, Source::Method(_)) {
-            head.draw(&Circle::new(centre, 4 * S, stroke(source).filled()))?;
+        None => {
+            let corners = [(left, middle - 7 * S), (left + 28 * S, middle + 7 * S)];
+            head.draw(&Rectangle::new(corners, BAND.filled()))?;
         }
-        name(text, &mut left)?;
     }
-    if series().any(|one| !one.range.is_empty()) {
-        let corners = [(left, middle - 7 * S), (left + 28 * S, middle + 7 * S)];
-        head.draw(&Rectangle::new(corners, BAND.filled()))?;
-        name("range of all forty runs", &mut left)?;
-    }
-    Ok(())
+    let style = font(TEXT_PX, palette::TEXT, HPos::Left, VPos::Center);
+    head.draw(&Text::new(text.to_owned(), (left + 34 * S, middle), style))
 }
 
 fn stroke(source: Source) -> ShapeStyle {

@@ -3,6 +3,18 @@
 //! Most of an instruction's cost is known at the first execution of its block. A cost that
 //! depends on operands or on a condition is deferred to a hook on that instruction, which the
 //! engine calls only if the instruction is executed.
+//!
+//! Properties of the engine (2.1.5) that matter here:
+//! - The core is chosen by `Mode::THUMB` and the model `CORTEX_M4`; the flag for the
+//!   microcontroller profile would select another core. The floating-point unit is always on.
+//! - A block hook comes before the block. A stop in it skips that block, which is not counted.
+//! - A hook on a single instruction is not called if a condition skips it. The engine searches all
+//!   hooks at each call, so only instructions that the program reaches get one.
+//! - By default the engine searches for translated code after every write to RAM, which takes more
+//!   than half of its time. A hook of ours provides the pages, and RAM is data until the program
+//!   runs in it.
+//! - If an access inside a conditional block meets its page for the first time, the engine skips
+//!   instructions after the block. The hook prevents that.
 
 mod count;
 mod hooks;

@@ -154,14 +154,12 @@ fn page(report: &Report) -> String {
     let mut text = format!(
         "# Performance\n\nWritten by `cargo rig bench --peers --docs`; do not edit.\n\n\
          Run time against error. Times are processor time of one thread on {machine}, the least of several runs. \
-         Cycles are textbook Cortex-M4 cycles of the emulated core, without flash wait states unless they are named. Errors and cycles do \
-         not depend on the machine, and tests hold them.\n\n\
-         ![Error against cycles of the reduced model, and against time of the plant](figures/performance.svg)\n\n\
+         Cycles are textbook Cortex-M4 cycles of the emulated core, without flash wait states unless they are named. Tests hold errors and cycles.\n\n\
+         [![Error against cycles of the reduced model, and against time of the plant](figures/performance.svg)](figures/performance.svg)\n\n\
          ## Reduced model\n\n\
          Gap from speed and force, and force from speed and gap, over 1 to 100 mm/s, 15 to 150 N, both directions, \
          both presets and steps of 2 to 6 mm, against the formulas of [`formula.rs`](../src/model/formula.rs) in f64. \
-         *fixed* is the shipping model: one step from a tabulated guess, in fixed point. *f32* and *f64* solve the \
-         same equations by Newton's method. The gap's error is relative to the gap or 0.1 mm, whichever is larger. \
+         *fixed* is the shipping model; *f32* and *f64* solve the same equations by Newton's method. The gap's error is relative to the gap or 0.1 mm, whichever is larger. \
          Promised are errors below 1e-4.\n\n```text\n{}```\n\n\
          ## Plant\n\n\
          Gap and largest axial force of twelve crossings (three speeds and preloads, pushed and driven, both \
@@ -178,9 +176,8 @@ fn page(report: &Report) -> String {
              The published crossing (5 mm/s, 100 N, frictionless, quasi-static) by the plant's *ring*, by {scipy} and by {mujoco}. \
              *LSODA*, *RK23* and *DOP853* solve the ring's own equations with the height eliminated; *Radau* and *BDF* \
              solve them with a small damper beside the contact, which makes them stiff. The equations are compiled. \
-             MuJoCo's disc has normal springs fitted to the ring at 80 and 120 N; it has no rubber with memory and no \
-             distributed pressure.\n\n\
-             ![Error against time by method](figures/peers.svg)\n\n```text\n{}```\n",
+             MuJoCo's disc has normal springs fitted to the ring at 80 and 120 N, and no memory.\n\n\
+             [![Error against time by method](figures/peers.svg)](figures/peers.svg)\n\n```text\n{}```\n",
             peers_table(peers)
         );
     }

@@ -105,7 +105,7 @@ impl Amplitudes {
         let impact = SOURCES.map(impact).into_iter().chain([published_by(stress)]);
         let mut force = categories("Collision force (Fig. 13)", "force, N", force);
         force.least_y = Some((40.0, 65.0));
-        let title = "Impact stress over that at 5 mm/s, 100 N (Fig. 14)";
+        let title = "Impact stress, ratio to the first (Fig. 14)";
         let impact = categories(title, "ratio", impact);
         let mut published = marks("collision force", "N", COLLISION_N, false, |source, i| {
             self.values(source, |lift| lift.collision_n)[i]
@@ -120,11 +120,10 @@ impl Amplitudes {
             "First transition. Theory and simulation: pushed over a frictionless wall; theory at \
              the instant at which the lower wall stops carrying, simulation the largest of the \
              crossing. Experiment: the virtual rig at the study's loads, torque-driven, largest \
-             value of its 0.1 s log. Finite elements: the largest force until the lower wall is \
-             released. The unit of the published stress is doubtful, so \
-             that ratios are given here; ours are of hundreds of kPa, and the wave alone that the touch launches at \
-             5 mm/s (impedance times closing speed, at once over the entire face) is {:.0} Pa. Nothing in \
-             this figure is fitted.",
+             value of its 0.1 s log. Continuum: the largest force until the lower wall is \
+             released. The unit of the published stress is doubtful, so ratios are given; ours \
+             are of hundreds of kPa, and the wave that the touch launches at 5 mm/s has {:.0} Pa. \
+             Nothing in this figure is fitted.",
             self.touch_pa
         );
         let title = "Collision force and impact stress of the finite-element cases";
@@ -146,13 +145,12 @@ impl Amplitudes {
         beside(&mut published, |crossing| crossing.gap_mm);
         let [slow, fast] = [5.0, 8.0].map(|speed| finite_elements::gap_range_mm(speed, 100.0));
         let caption = format!(
-            "Stiffness, stiffening and relaxation time of the tread are fitted to the three \
-             published amplitudes with the frictionless ring, which is theory and simulation of \
-             the first plot: their agreement there is no validation. The experiment drives itself \
-             by friction against a third of the 60 N, which opens the gap by some per cent, and \
-             so do theory and simulation of the other plots: the clearance between the root of \
-             the first step and the undeformed wheel until the centre passes the step. The gap is \
-             its value when the lower wall stops carrying. Finite elements: for treads of 5 to 12 mm \
+            "The tread is fitted to the three published amplitudes with the frictionless ring, \
+             which is theory and simulation of the first plot: their agreement there is no \
+             validation. In the experiment and in the other plots the wheel drives itself against \
+             a third of the 60 N, which opens the gap by some per cent. These plots show the \
+             clearance between the root of the first step and the undeformed wheel; the gap is \
+             its value when the lower wall stops carrying. Continuum: for treads of 5 to 12 mm \
              the gap is {:.3} to {:.3} mm at 5 mm/s and {:.3} to {:.3} mm at 8 mm/s, 100 N.",
             slow.0, slow.1, fast.0, fast.1
         );
@@ -304,11 +302,11 @@ impl Amplitudes {
                 "The gap is the amplitude of a vibration that stress waves excite.",
                 arm_over_gap(all, self) > 0.5,
                 format!(
-                    "The largest deflection of the arm in the experiment is {:.2} of the gap.",
+                    "The largest deflection of the arm in the experiment, with its bending under the force, is {:.2} of the gap.",
                     arm_over_gap(all, self)
                 ),
                 "The gap is the quasi-static clearance under a wheel that floor and corner carry; it is \
-                 there at rest as well. Inertia of the impact is about a newton, and waves cross the tread \
+                 there at rest as well. Inertia of the impact is below 0.5 N, and waves cross the tread \
                  in a tenth of a millisecond.",
             ),
         ]
@@ -364,8 +362,8 @@ fn beside(marks: &mut [Mark], pick: impl Fn(Crossing) -> f64) {
 }
 
 fn categories(title: &str, y: &str, series: impl Iterator<Item = Series>) -> Panel {
-    let names = CASES[..3].iter().map(|(v, p)| format!("{v} mm/s, {p} N")).collect();
-    Panel::of_categories(title, ("speed and preload", names), y, series.collect())
+    let names = CASES[..3].iter().map(|(v, p)| format!("{v}, {p} N")).collect();
+    Panel::of_categories(title, ("speed in mm/s, preload", names), y, series.collect())
 }
 
 fn numbered(values: [f64; 3]) -> Vec<(f64, f64)> {

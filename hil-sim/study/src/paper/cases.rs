@@ -32,10 +32,9 @@ pub fn figure(all: &[Histories]) -> Figure {
     }
     let caption =
         "The study's four cases at its own loads (60 N on top, of which this wheel lifts a \
-                   third), over the three transitions; quantities and sources as in figure 24. The \
-                   study's figure has theory alone. The published marks are its finite-element \
-                   collision forces of the first transition (figure 13), drawn at the time of our \
-                   peak; it prints no other value of these curves."
+                   third); quantities and sources as in figure 24. The study's figure has theory \
+                   alone. The marks are its finite-element forces of the first transition \
+                   (figure 13), at the time of our peak."
             .to_owned();
     let title = "Collision, impact and vibration of the four cases";
     Figure::new("fig11", title, caption, CASES.len(), panels)

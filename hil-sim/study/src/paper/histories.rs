@@ -159,7 +159,7 @@ impl Histories {
     /// The clearance at the first step as a plot.
     #[must_use]
     pub fn clearance_panel(&self) -> Panel {
-        let title = format!("Clearance at the first step (Fig. 16): {}", self.case.name());
+        let title = format!("Clearance (Fig. 16): {}", self.case.name());
         let [theory, simulation] =
             self.clearance().map(|points| points.into_iter().step_by(SHOWN_OF).collect());
         let means = self.means.iter().map(|m| m.clearance_until(self.first_passed_s - 0.2));

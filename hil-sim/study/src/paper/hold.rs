@@ -121,7 +121,7 @@ impl Hold {
             experiment,
         ];
         let title = "Preload that holds the gap of 5 mm/s, 33.3 N";
-        let cases = ("speed and preload", CASES.map(|(v, p)| format!("{v} mm/s, {p} N")).to_vec());
+        let cases = ("speed in mm/s, preload", CASES.map(|(v, p)| format!("{v}, {p} N")).to_vec());
         let panels = vec![
             Panel::new(title, "speed, mm/s", "preload, N", preload),
             Panel::of_categories("Gap without and with more preload", cases, "gap, mm", gap),

@@ -101,9 +101,8 @@ impl Modes {
             "The arm with {:.1} g at the wheel's end, the mass with which its first constrained mode is \
                  the published one: fitted. Theory: the classical frequency equations of a beam with a point \
                  mass. Simulation: the wave-vector method (equations 54 and 55). The free arm's seventh mode is its \
-                 first bending mode, after six of a rigid body. The virtual rig is given the two \
-                 published frequencies as parameters and is no test of them; the study's table of six \
-                 constrained modes is not published.",
+                 first bending mode, after six of a rigid body. The virtual rig has the two \
+                 published frequencies as parameters and is no test of them.",
             self.tip_mass_kg * 1e3
         );
         let published = vec![

@@ -38,16 +38,14 @@ pub fn markdown(study: &Study) -> String {
          Every result that the study's text describes, three times. **Theory** is the reduced model that the \
          controller uses. **Simulation** is the reference models. **Experiment** is the virtual rig with the \
          shipping controller, sensor noise and tolerances: forty rigs a case, four means of ten, as in the study. \
-         The three are one ring of rubber elements: the theory is fitted to the simulation, and the virtual rig's \
-         tread is the simulation's. That they agree on the contact is by construction. **Finite elements** are the \
-         independent column where they have a figure: a rubber continuum 8 mm thick, pushed without friction, its \
-         modulus calibrated to the ring's static gap at 100 N ([fe](../../hil-sim/study/fe/README.md)).\n\n\
-         Filled diamonds are numbers that the study prints. To hollow ones a parameter is fitted: stiffness, \
-         stiffening and relaxation time of the tread to three gaps, a tip mass to one frequency. A claim that holds \
-         because of a fit, to the study or of one source to another, is marked.\n\n\
+         The three are one ring of rubber elements, so they agree on the contact by construction. **Continuum** \
+         is independent of them: this project's own finite elements ([fe](../../hil-sim/study/fe/README.md)), a \
+         rubber 8 mm thick, pushed without friction, with one modulus calibrated to the ring. What is fitted to \
+         what: [PLANT.md](../PLANT.md#what-is-fitted-and-what-is-independent).\n\n\
+         Filled diamonds are numbers that the study prints; to hollow ones a parameter is fitted. A claim that \
+         holds because of a fit, to the study or of one source to another, is marked.\n\n\
          Of {} claims {held} hold, {fitted} of these because something is fitted to them, and {} do not. Code \
-         judges each claim from the data of its figure. [paper.json](paper.json) has the data, the section of each \
-         claim and what was found.\n",
+         judges each claim from the data of its figure, which are in [paper.json](paper.json).\n",
         study.claims.len(),
         study.claims.len() - held,
     );
@@ -72,7 +70,7 @@ fn section(page: &mut String, figure: &Figure, claims: &[Claim]) {
         figure.caption
     );
     if !figure.published.is_empty() {
-        *page += "\n| published | | theory | simulation | experiment | finite elements |\n|---|---|---|---|---|---|\n";
+        *page += "\n| published | | theory | simulation | experiment | continuum |\n|---|---|---|---|---|---|\n";
         for mark in &figure.published {
             *page += &mark_row(mark);
         }

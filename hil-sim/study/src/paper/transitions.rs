@@ -35,12 +35,7 @@ pub fn figure(all: &[Histories]) -> Figure {
                    collision that lies across it. Theory: an elastic ring of the reduced model's \
                    effective stiffness, the arm as under a still force. Simulation: the reference \
                    models, a ring with memory and inertia, waves in the tread to the hub, six modes \
-                   of the arm. Experiment: the virtual rig logged every 0.1 s, four means of ten; \
-                   forces are the plant's own, for which the rig has no sensor, and the arm's \
-                   deflection, the largest since the last line of the log, includes the shaking by \
-                   the drive's torque ripple. At 8 mm/s the three transitions take the 10 s of the \
-                   study; its own table of cases is not published, and no value of its curves is \
-                   printed."
+                   of the arm. Experiment: the virtual rig logged every 0.1 s, four means of ten; forces are the plant's own. The study prints no value of its curves."
         .to_owned();
     let title = "Collision, impact and vibration over the three transitions";
     Figure::new("fig24", title, caption, CASES.len(), panels(all))
