@@ -27,7 +27,7 @@ esac
 write retract deploy --retract --no-files
 write montecarlo montecarlo -n 1000
 write montecarlo-retract montecarlo -n 1000 --retract
-write compare compare -n 50
+write compare compare -n 200
 write envelope envelope --out target/figures
 [ ! -f target/figures/envelope.svg ] || cp target/figures/envelope.svg docs/envelope.svg
 write faults-sil faults -n 100

@@ -200,6 +200,19 @@ mod tests {
     }
 
     #[test]
+    fn a_step_that_is_refined_counts_as_if_it_had_been_found_there() {
+        let [mut late, mut at_once] = [Odometry::default(); 2];
+        for odometry in [&mut late, &mut at_once] {
+            odometry.set_by_step(Travel::ZERO, Q16::ZERO);
+        }
+        late.correct(Q16::from_num(0.5));
+        late.refine(Q16::from_num(-0.2));
+        at_once.correct(Q16::from_num(0.3));
+        let [late, at_once] = [late, at_once].map(|odometry| odometry.position(Travel::ZERO));
+        assert!((late - at_once).abs() < q16(100), "{late} {at_once}");
+    }
+
+    #[test]
     fn a_position_that_steps_set_is_the_mean_over_their_places() {
         let places = [0.3, -0.2, 0.2, -0.1];
         let mut odometry = Odometry::default();
