@@ -187,11 +187,13 @@ pub enum Limit {
     ServiceBounded = 214,
     /// The host has not repeated its request in the service mode.
     ServiceSilent = 215,
+    /// A debugger has halted the core; meanwhile the motors were off and time stood still.
+    CoreHalted = 216,
 }
 
 impl Limit {
     /// Every limit, in the order of codes.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::StepEarly,
         Self::StepLate,
         Self::StepMissing,
@@ -207,6 +209,7 @@ impl Limit {
         Self::PositionUnconfirmed,
         Self::ServiceBounded,
         Self::ServiceSilent,
+        Self::CoreHalted,
     ];
 
     /// The stable code.
@@ -238,6 +241,7 @@ impl Limit {
             }
             Self::ServiceBounded => "a motion in the service mode has reached a bound",
             Self::ServiceSilent => "the host fell silent in the service mode",
+            Self::CoreHalted => "a debugger halted the core, and the motors were off meanwhile",
         }
     }
 }

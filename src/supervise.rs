@@ -4,6 +4,7 @@ pub mod codes;
 mod crosscheck;
 mod mode;
 mod monitor;
+mod motor;
 mod readback;
 pub mod service;
 pub mod startup;

@@ -5,11 +5,13 @@
 //! last. Every check has its line in [`CHECKS`]; what a failed one advises is beside its
 //! measurement.
 
+mod drive;
 mod figures;
 mod line;
 mod motion;
 mod operator;
 mod page;
+mod pretightener;
 mod rest;
 mod state;
 mod stop;
@@ -224,8 +226,8 @@ pub fn run(
             Stage::Board => rest::board(session),
             Stage::Sensors => rest::sensors(session),
             Stage::Stop => stop::run(session),
-            Stage::Drive => motion::drive(session),
-            Stage::Pretightener => motion::pretightener(session),
+            Stage::Drive => drive::drive(session),
+            Stage::Pretightener => pretightener::pretightener(session),
         };
         let checks = match checks {
             Ok(checks) => checks,

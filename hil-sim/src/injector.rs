@@ -74,7 +74,8 @@ struct Active {
     /// Angle of the wheel at the middle of the torn sector, rad.
     torn_rad: f64,
     /// Speed of an actuator's motor, parts of its speed without load; of the drive that of the
-    /// tread over this many mm/s, of the pre-tightener its duty with this lag, ticks.
+    /// tread over this many mm/s, of the pre-tightener its bridge's output with the lag of the
+    /// drawn plant, ticks.
     turns: f64,
     no_load_mm_s: f64,
     lag_ticks: f64,
@@ -86,6 +87,7 @@ impl FaultInjector {
     pub fn of(scenario: &Scenario) -> Option<Self> {
         let injections = &scenario.run.faults;
         let turn_mm = std::f64::consts::TAU * scenario.rig.rig.wheel_radius_mm;
+        let plant = scenario.plant();
         let active = |injection: &Injection| Active {
             injection: *injection,
             since_s: None,
@@ -102,8 +104,8 @@ impl FaultInjector {
             pipeline: VecDeque::new(),
             torn_rad: 0.0,
             turns: 0.0,
-            no_load_mm_s: scenario.rig.drive.no_load_speed_mm_s,
-            lag_ticks: scenario.rig.preload.lag_s / TICK_S,
+            no_load_mm_s: plant.drive.no_load_mm_s,
+            lag_ticks: plant.lag_s / TICK_S,
         };
         (!injections.is_empty()).then(|| Self {
             faults: injections.iter().map(active).collect(),
@@ -348,23 +350,28 @@ impl Active {
                 self.pipeline.pop_front();
             }
         }
-        if !active || !on {
+        let acts = active && on;
+        if acts {
+            let kept = *self.kept.get_or_insert(*duty);
+            *duty = match kind {
+                Kind::Off => 0.0,
+                Kind::Stuck => kept,
+                Kind::Reversed => -*duty,
+                Kind::Delayed => self.pipeline.front().copied().unwrap_or(*duty),
+                Kind::Runaway => self.injection.magnitude(),
+                Kind::Regulating => self.regulated(*duty),
+                _ => *duty,
+            };
+        } else {
             self.kept = None;
-            return 0.0;
         }
-        let kept = *self.kept.get_or_insert(*duty);
-        *duty = match kind {
-            Kind::Stuck => kept,
-            Kind::Reversed => -*duty,
-            Kind::Delayed => self.pipeline.front().copied().unwrap_or(*duty),
-            Kind::Runaway => self.injection.magnitude(),
-            Kind::Regulating => self.regulated(*duty),
-            _ => *duty,
-        };
         if self.injection.target == Target::Pretightener {
-            self.turns += (*duty - self.turns) / self.lag_ticks.max(1.0);
+            // The self-locking screw stops at once.
+            let turns = self.turns + (*duty - self.turns) / self.lag_ticks.max(1.0);
+            self.turns = if on { turns } else { 0.0 };
         }
         match kind {
+            _ if !acts => 0.0,
             Kind::Stalled => 1.0,
             Kind::Weak => 1.0 - self.injection.magnitude(),
             _ => 0.0,
@@ -416,6 +423,7 @@ mod tests {
             near(duties(kind, 0.005)[8], 0.009);
         }
         near(duties(Kind::Stalled, 0.0)[19], 0.0);
+        near(duties(Kind::Off, 0.0)[19], 0.0);
         near(duties(Kind::Stuck, 0.0)[19], 0.010);
         near(duties(Kind::Weak, 0.5)[19], 0.010);
         near(duties(Kind::Reversed, 0.0)[19], -0.020);
@@ -425,7 +433,9 @@ mod tests {
 
     #[test]
     fn a_fault_behind_the_bridge_does_not_show_at_its_output() {
-        for (kind, seen) in [(Kind::Stalled, false), (Kind::Weak, false), (Kind::Reversed, true)] {
+        for (kind, seen) in
+            [(Kind::Stalled, false), (Kind::Weak, false), (Kind::Off, true), (Kind::Reversed, true)]
+        {
             let mut injector = injector(Target::Pretightener, kind, 0.4);
             injector.begin(0.020, &Truth::default());
             let asked = Drives { preload: 0.5, preload_on: true, ..Drives::default() };

@@ -1,6 +1,7 @@
 //! A log run again: recorded inputs through the controller on this host, whose outputs must
 //! be the recorded ones to the bit.
 
+use interstage::fault::Limit;
 use interstage::log::{Flags, Record};
 use interstage::model::{Plan, PlanRequest, Planner};
 use interstage::rig::{Rig, RigError};
@@ -227,10 +228,7 @@ impl Replay<'_> {
     /// Entries of a tick in the log and in the replay; none of either if the log lacks them.
     fn events(&mut self, tick: u32, output: &Output) -> (Vec<Entry>, Vec<Entry>) {
         let from = self.since.events.iter().filter(|entry| entry.at == tick);
-        let logged: Vec<Entry> = from
-            .filter(|entry| !matches!(entry.event, Event::Lost(_) | Event::Restart(_)))
-            .copied()
-            .collect();
+        let logged: Vec<Entry> = from.filter(|entry| !is_of_board(entry.event)).copied().collect();
         if logged.len() != output.events.len() {
             return (Vec::new(), Vec::new());
         }
@@ -259,6 +257,11 @@ const STAGES: [(&str, &[&str]); 8] = [
     ("loops", &["drive_duty", "pretightener_duty"]),
     ("vibration", &["vibration_mm"]),
 ];
+
+/// Whether the board reports it, not the controller.
+const fn is_of_board(event: Event) -> bool {
+    matches!(event, Event::Lost(_) | Event::Restart(_) | Event::Limit(Limit::CoreHalted))
+}
 
 #[cfg(test)]
 mod tests {

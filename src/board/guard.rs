@@ -1,15 +1,17 @@
 //! The watchdog, and the bridges' reaction to a debugger or a locked-up core.
 
-use cortex_m::peripheral::DWT;
+use cortex_m::peripheral::{DWT, SCB};
 use embassy_stm32::Peri;
 use embassy_stm32::peripherals::IWDG;
 use embassy_stm32::wdg::IndependentWatchdog;
 use interstage::estimate::Place;
+use interstage::fault::Limit;
 use interstage::hal::Watchdog;
 use interstage::restart::DriveSnapshot;
+use interstage::tick::{Entry, Event};
 
 use super::registers::{self, DBGMCU, SYSCFG};
-use super::{retained, safety};
+use super::{EXCHANGE, retained, safety};
 
 /// Time-out of the watchdog, us, by the nominal 32 kHz of its oscillator.
 const TIMEOUT_US: u32 = 100_000;
@@ -37,6 +39,8 @@ impl Guard {
         let updating = || registers::IWDG.sr().read().0 != 0;
         let _ = (0..UPDATE_ROUNDS).any(|_| !updating());
         self.dog.pet();
+        // A probe that flashes the image or resets the chip halts it.
+        was_halted();
         break_on_damage();
         count_cycles();
         safety::watch_feeding();
@@ -51,6 +55,10 @@ impl Watchdog for Guard {
 
     fn keep(&mut self, snapshot: &DriveSnapshot) {
         retained::keep(snapshot);
+        if was_halted() {
+            let event = Event::Limit(Limit::CoreHalted);
+            EXCHANGE.log(Entry { at: snapshot.tick, event });
+        }
     }
 
     fn cycles(&self) -> u32 {
@@ -82,6 +90,20 @@ pub(crate) fn arm() {
         w.set_tim1(true);
         w.set_tim8(true);
     });
+}
+
+/// Whether a debugger has halted the core since the last call: by request, breakpoint or
+/// watchpoint. Neither the clock nor the watchdog can tell, which stop with the core. Source:
+/// ARMv7-M, the debug fault status register, whose bits stay set until a one is written.
+fn was_halted() -> bool {
+    // SAFETY: nothing else uses this register, and a write of ones clears it alone.
+    let status = unsafe { &(*SCB::PTR).dfsr };
+    let halts = status.read();
+    if halts != 0 {
+        // SAFETY: as above.
+        unsafe { status.write(halts) };
+    }
+    halts != 0
 }
 
 /// Starts the core's counter of cycles.

@@ -4,7 +4,7 @@
 
 use super::Mode;
 use super::crosscheck::{Compared, CrossCheck, CrossState, Noise};
-use super::readback::Readback;
+use super::readback::{Readback, ReadbackState};
 use crate::fault::Fault;
 use crate::numeric::checked;
 use crate::rig::{Rig, RigError};
@@ -34,6 +34,7 @@ pub struct Monitor {
     /// Preload error that counts as short, N.
     short: Newtons,
     cross: CrossCheck,
+    readback: Readback,
 }
 
 /// How long each condition has lasted, ticks.
@@ -48,7 +49,7 @@ pub struct MonitorState {
     driving: bool,
     cross: CrossState,
     noise: Noise,
-    readback: Readback,
+    readback: ReadbackState,
 }
 
 /// Inputs of the monitor.
@@ -86,6 +87,7 @@ impl Monitor {
             )?,
             short: checked("preload.cruise_n", 0.1 * rig.preload.cruise_n)?,
             cross: CrossCheck::try_build(rig)?,
+            readback: Readback::build(rig),
         })
     }
 
@@ -112,7 +114,8 @@ impl Monitor {
         lasting(&mut state.runaway, turns);
         let lost = sensor_fault(seen.sensed);
         // The self-test ends once the wheel rests.
-        let bridge = state.readback.step(seen.bridges, seen.mode == Mode::SelfTest);
+        let coasts = seen.mode == Mode::SelfTest;
+        let bridge = self.readback.step(&mut state.readback, seen.bridges, coasts);
         let crossed = self.cross_check(state, seen);
         if seen.emergency_stop {
             Some(Fault::EmergencyStop)

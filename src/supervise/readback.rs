@@ -2,16 +2,19 @@
 //! through a low-pass to a converter; the duty goes through the same low-pass here. A wrong duty
 //! shows within milliseconds.
 //!
-//! A bridge at its current limit gives less than its duty: as much as holds the limit, between
-//! [`REGULATED`] and the duty, of the same sign. That is no fault; less, more or the other sign
-//! is.
+//! A bridge at its current limit gives less than its duty, of the same sign: as much as holds
+//! the limit. With the motor at rest or turning with its duty that is [`REGULATED`] at least.
+//! A motor that still turns against its duty adds its own voltage to the current, and the bridge
+//! gives less by that, down to nothing. So much is no fault; less, more or the other sign is.
 //!
 //! Faults behind the output (a motor without force, a slipping gear, a jammed screw) are left to
 //! the comparison of the sensors in `crosscheck`.
 
 #![deny(clippy::float_arithmetic)]
 
+use super::motor::{Motor, Turning};
 use crate::fault::Fault;
+use crate::rig::Rig;
 use crate::sense::raw::{BridgeCode, BridgeCodes};
 use crate::units::Duty;
 
@@ -28,7 +31,8 @@ pub const BAND: i32 = 655;
 /// Tolerance relative to the expected output, as a shift: three deviations of supply, divider
 /// and reference together, 0.7 % each.
 pub const BAND_SHIFT: u32 = 5;
-/// Least output of a bridge that regulates its current, Q15 duty: a quarter. At standstill the
+/// Least output of a bridge that regulates its current and whose motor does not turn against its
+/// duty, Q15 duty: a quarter. At standstill the
 /// presets' force limit takes half of the full duty, more in motion; the other half is for the
 /// spread of limit and winding, and for a wheel that is braked. A smaller duty never reaches the
 /// limit and is judged by itself.
@@ -42,9 +46,16 @@ const SILENT_TICKS: u8 = 20;
 /// before a restart.
 const SETTLES: i8 = 7;
 
+/// Both bridges' motors.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct Readback {
+    drive: Motor,
+    pretightener: Motor,
+}
+
 /// State of both bridges' comparison.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Readback {
+pub struct ReadbackState {
     drive: Bridge,
     pretightener: Bridge,
     /// Ticks without a conversion.
@@ -59,6 +70,8 @@ struct Bridge {
     lags: [Lag; 2],
     /// The same of what regulation at least leaves of it.
     regulated: [Lag; 2],
+    /// What the motor's speed may be.
+    turning: Turning,
     /// Least and largest output a tick ago, Q15.
     before: (i32, i32),
     /// Ticks for which it has been off; if negative, ticks until it is judged.
@@ -68,7 +81,8 @@ struct Bridge {
 impl Default for Bridge {
     fn default() -> Self {
         let lags = [Lag(0); 2];
-        Self { commanded: 0, lags, regulated: lags, before: (0, 0), off: -SETTLES }
+        let turning = Turning::default();
+        Self { commanded: 0, lags, regulated: lags, turning, before: (0, 0), off: -SETTLES }
     }
 }
 
@@ -91,6 +105,44 @@ impl Lag {
 }
 
 impl Readback {
+    /// The motors of a rig. The drive's follows its bridge as its torque over speed accelerates
+    /// the rotor.
+    #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
+    pub fn build(rig: &Rig) -> Self {
+        let drive = &rig.drive;
+        let drive_s =
+            1e-3 * drive.reflected_mass_kg * drive.no_load_speed_mm_s / drive.stall_force_n;
+        Self { drive: Motor::build(drive_s), pretightener: Motor::build(rig.preload.lag_s) }
+    }
+
+    /// One tick with the readback of the duties set before it. A wheel that may coast, as after a
+    /// restart in motion, drives its motor as a generator: then its bridge is not judged.
+    pub fn step(
+        &self,
+        state: &mut ReadbackState,
+        found: Option<BridgeCodes>,
+        coasts: bool,
+    ) -> Option<Fault> {
+        let Some(found) = found else {
+            state.drive.advance(&self.drive);
+            state.pretightener.advance(&self.pretightener);
+            state.silent = state.silent.saturating_add(1);
+            return (state.silent >= SILENT_TICKS).then_some(Fault::ReadbackStale);
+        };
+        state.silent = 0;
+        let drive = state.drive.is_off(&self.drive, found.drive);
+        let pretightener = state.pretightener.is_off(&self.pretightener, found.pretightener);
+        if drive && !coasts {
+            return Some(Fault::DriveBridge);
+        }
+        if coasts {
+            state.drive.off = state.drive.off.min(0);
+        }
+        pretightener.then_some(Fault::PretightenerBridge)
+    }
+}
+
+impl ReadbackState {
     /// Sets the duties until the next tick; 0 with the bridge off.
     pub const fn set_duties(&mut self, drive: Duty, pretightener: Duty) {
         self.drive.commanded = drive.to_bits();
@@ -101,33 +153,17 @@ impl Readback {
     pub const fn drives(&self) -> bool {
         self.drive.commanded != 0
     }
-
-    /// One tick with the readback of the duties set before it. A wheel that may coast, as after a
-    /// restart in motion, drives its motor as a generator: then its bridge is not judged.
-    pub fn step(&mut self, found: Option<BridgeCodes>, coasts: bool) -> Option<Fault> {
-        let Some(found) = found else {
-            self.drive.advance();
-            self.pretightener.advance();
-            self.silent = self.silent.saturating_add(1);
-            return (self.silent >= SILENT_TICKS).then_some(Fault::ReadbackStale);
-        };
-        self.silent = 0;
-        let drive = self.drive.is_off(found.drive);
-        let pretightener = self.pretightener.is_off(found.pretightener);
-        if drive && !coasts {
-            return Some(Fault::DriveBridge);
-        }
-        if coasts {
-            self.drive.off = self.drive.off.min(0);
-        }
-        pretightener.then_some(Fault::PretightenerBridge)
-    }
 }
 
 impl Bridge {
     /// Least and largest output after a tick under the duty.
-    fn advance(&mut self) -> (i32, i32) {
-        let least = self.commanded.clamp(-REGULATED, REGULATED);
+    fn advance(&mut self, motor: &Motor) -> (i32, i32) {
+        // The speed before the tick, when it is farthest from the duty, in Q15.
+        let against = self.turning.against(self.commanded).to_bits() >> 1;
+        // Between 0 and REGULATED.
+        let leaves = (i32::from(REGULATED) - against).max(0) as i16;
+        let least = self.commanded.clamp(-leaves, leaves);
+        motor.step(&mut self.turning, self.commanded);
         for (lags, duty) in [(&mut self.lags, self.commanded), (&mut self.regulated, least)] {
             let [fast, slow] = lags;
             fast.step_by(duty.into(), TAKES_ENDS[0]);
@@ -145,10 +181,10 @@ impl Bridge {
 
     /// Whether it has been off for too long. The code was taken at some moment of the last two
     /// ticks: it may lie anywhere between the outputs of three.
-    fn is_off(&mut self, code: BridgeCode) -> bool {
+    fn is_off(&mut self, motor: &Motor, code: BridgeCode) -> bool {
         let older = self.before;
         let before = self.bounds();
-        let now = self.advance();
+        let now = self.advance(motor);
         self.before = before;
         let low = now.0.min(before.0).min(older.0);
         let high = now.1.max(before.1).max(older.1);
@@ -163,6 +199,7 @@ impl Bridge {
 #[cfg(test)]
 #[allow(clippy::float_arithmetic, reason = "the reference is in f64")]
 mod tests {
+    use super::super::motor::LAG_ENDS;
     use super::*;
     use proptest::prelude::*;
 
@@ -197,19 +234,24 @@ mod tests {
     }
 
     /// Begun long ago.
-    fn settled() -> Readback {
-        let mut readback = Readback::default();
+    fn settled() -> ReadbackState {
+        let mut readback = ReadbackState::default();
         (readback.drive.off, readback.pretightener.off) = (0, 0);
         readback
     }
 
     /// First fault of a drive with these duties, and its tick. The other bridge is off.
     fn found(duties: &[f64], codes: &[BridgeCode]) -> Option<(Fault, usize)> {
-        let mut readback = settled();
+        found_with(Readback::build(&Rig::prototype()).drive, duties, codes)
+    }
+
+    /// The same with this motor.
+    fn found_with(motor: Motor, duties: &[f64], codes: &[BridgeCode]) -> Option<(Fault, usize)> {
+        let (readback, mut state) = (Readback { drive: motor, ..Readback::default() }, settled());
         duties.iter().zip(codes).enumerate().find_map(|(tick, (duty, code))| {
-            readback.set_duties(q15(*duty), Duty::ZERO);
-            let pretightener = BridgeCode::of(0);
-            let fault = readback.step(Some(BridgeCodes { drive: *code, pretightener }), false);
+            state.set_duties(q15(*duty), Duty::ZERO);
+            let codes = BridgeCodes { drive: *code, pretightener: BridgeCode::of(0) };
+            let fault = readback.step(&mut state, Some(codes), false);
             fault.map(|fault| (fault, tick))
         })
     }
@@ -281,49 +323,88 @@ mod tests {
         }
     }
 
+    /// Outputs of a bridge that keeps its motor's current, the output beyond the speed, to this
+    /// part of that at standstill and full duty; the motor follows with this lag, ticks.
+    fn regulated(most: f64, lag: f64, duties: &[f64]) -> Vec<f64> {
+        let mut speed = 0.0;
+        let output = |duty: &f64| {
+            // Towards no output, never through it.
+            let left = duty.clamp(speed - most, speed + most);
+            let left =
+                if left * duty <= 0.0 { 0.0 } else { duty.signum() * left.abs().min(duty.abs()) };
+            speed = left + (speed - left) * (-1.0 / lag).exp();
+            left
+        };
+        duties.iter().map(output).collect()
+    }
+
+    #[test]
+    fn a_dead_bridge_is_found_while_its_motor_turns_against_the_duty() {
+        // As long as the slowest motor takes to fall to the least limit, and 7 ms.
+        let motors = Readback::build(&Rig::prototype());
+        for (motor, most) in [(motors.drive, 40), (motors.pretightener, 130)] {
+            for after in [-0.9, -0.3, -0.13] {
+                let given: Vec<f64> =
+                    (0..900).map(|tick| if tick < 500 { 0.9 } else { after }).collect();
+                let dead = |(tick, duty): (usize, &f64)| if tick < 500 { *duty } else { 0.0 };
+                let taken: Vec<f64> = given.iter().enumerate().map(dead).collect();
+                let (_, tick) = found_with(motor, &given, &NOMINAL.codes(&taken)).expect("found");
+                assert!((500..500 + most).contains(&tick), "{after}: {tick}");
+                // One that keeps its duty is found at once.
+                let (_, tick) =
+                    found_with(motor, &given, &NOMINAL.codes(&[0.9; 900])).expect("found");
+                assert!((503..=505).contains(&tick), "{after}: {tick}");
+            }
+        }
+    }
+
     #[test]
     fn what_a_coasting_wheel_generates_is_no_fault_until_it_rests() {
-        let mut readback = settled();
-        let step = |readback: &mut Readback, drive, pretightener, coasts| {
+        let (readback, mut state) = (Readback::build(&Rig::prototype()), settled());
+        let mut step = |drive, pretightener, coasts| {
             let [drive, pretightener] = [drive, pretightener].map(BridgeCode::of);
-            readback.step(Some(BridgeCodes { drive, pretightener }), coasts)
+            readback.step(&mut state, Some(BridgeCodes { drive, pretightener }), coasts)
         };
         for _ in 0..100 {
-            assert_eq!(step(&mut readback, 16_000, 0, true), None);
+            assert_eq!(step(16_000, 0, true), None);
         }
-        let rested: Vec<_> = (0..4).map(|_| step(&mut readback, 16_000, 0, false)).collect();
+        let rested: Vec<_> = (0..4).map(|_| step(16_000, 0, false)).collect();
         assert_eq!(rested, [None, None, None, Some(Fault::DriveBridge)]);
         // The screw does not coast.
-        let screw: Vec<_> = (0..4).map(|_| step(&mut readback, 0, 9000, true)).collect();
+        let screw: Vec<_> = (0..4).map(|_| step(0, 9000, true)).collect();
         assert_eq!(screw, [None, None, None, Some(Fault::PretightenerBridge)]);
     }
 
     #[test]
     fn what_the_low_pass_keeps_of_a_run_before_the_start_is_no_fault() {
+        let readback = Readback::build(&Rig::prototype());
         for duty in [-1.0_f64, 0.3, 1.0] {
-            let mut readback = Readback::default();
+            let mut state = ReadbackState::default();
             for tick in 0..40 {
                 let left = duty * (-f64::from(tick) / LAG_TICKS).exp() + 0.006;
                 let code = BridgeCode::of((left * 32_768.0) as i32);
                 let codes = BridgeCodes { drive: code, pretightener: code };
-                assert_eq!(readback.step(Some(codes), false), None, "{duty} {tick}");
+                assert_eq!(readback.step(&mut state, Some(codes), false), None, "{duty} {tick}");
             }
         }
         // One that goes on driving is.
-        let mut readback = Readback::default();
+        let mut state = ReadbackState::default();
         let code = BridgeCode::of(20_000);
         let codes = BridgeCodes { drive: BridgeCode::of(0), pretightener: code };
-        let found = (1..40).find(|_| readback.step(Some(codes), false).is_some());
+        let found = (1..40).find(|_| readback.step(&mut state, Some(codes), false).is_some());
         assert_eq!(found, Some(i32::from(SETTLES + OFF_TICKS)));
     }
 
     #[test]
     fn each_bridge_has_its_own_fault_and_silence_has_one() {
-        let mut readback = settled();
+        let (readback, mut state) = (Readback::build(&Rig::prototype()), settled());
         let codes = BridgeCodes { drive: BridgeCode::of(0), pretightener: BridgeCode::of(9000) };
-        let faults: Vec<_> = (0..4).map(|_| readback.step(Some(codes), false)).collect();
-        assert_eq!(faults, [None, None, None, Some(Fault::PretightenerBridge)]);
-        let silent: Vec<_> = (0..20).map(|_| readback.step(None, false)).collect();
+        let mut faults = |codes, ticks| -> Vec<_> {
+            (0..ticks).map(|_| readback.step(&mut state, codes, false)).collect()
+        };
+        let pressed = faults(Some(codes), 4);
+        assert_eq!(pressed, [None, None, None, Some(Fault::PretightenerBridge)]);
+        let silent = faults(None, 20);
         assert!(silent[..19].iter().all(Option::is_none));
         assert_eq!(silent[19], Some(Fault::ReadbackStale));
     }
@@ -354,6 +435,26 @@ mod tests {
             prop_assert_eq!(found(&given, &codes), None);
         }
 
+        /// At any limit, whatever is asked and however fast the motor follows.
+        #[test]
+        fn a_bridge_that_regulates_raises_no_alarm_while_its_motor_turns(
+            steps in prop::collection::vec((-1.0..1.0f64, 1usize..200), 1..20),
+            most in 0.25..1.0f64,
+            lag in LAG_ENDS[0]..LAG_ENDS[1],
+            tau in 0.85..1.15f64,
+            at in 0.05..1.0f64,
+            gain in 0.979..1.021f64,
+            offset in -0.006..0.006f64,
+            noise in -0.008..0.008f64,
+        ) {
+            let given: Vec<f64> =
+                steps.iter().flat_map(|(duty, ticks)| vec![*duty; *ticks]).collect();
+            let taken = regulated(most, 60.0 * lag, &given);
+            let built = Built { tau: tau * LAG_TICKS, at, gain, offset: offset + noise };
+            let motor = Motor::build(0.06);
+            prop_assert_eq!(found_with(motor, &given, &built.codes(&taken)), None);
+        }
+
         /// Whatever is off by twice the band and stays so, beyond what regulation leaves.
         #[test]
         fn what_is_off_by_twice_the_band_is_found(
@@ -382,13 +483,15 @@ mod tests {
                 commanded: given,
                 lags: [Lag(given_q15); 2],
                 regulated: [Lag(given_q15); 2],
+                turning: Turning::default(),
                 before: (given_q15, given_q15),
                 off: 0,
             };
+            let motor = Motor::default();
             // The code's own steps are coarser than what is asked here.
             let code = BridgeCode::of(found);
             assert_eq!(code.duty(), found);
-            (0..20).any(|_| bridge.is_off(code))
+            (0..20).any(|_| bridge.is_off(&motor, code))
         };
         // Duties and bands of whole steps of the code: 655 and 5 of 160.
         for given in [160_i16, -160] {

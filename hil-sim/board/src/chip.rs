@@ -157,6 +157,9 @@ impl Chip {
         let old = std::mem::replace(self, Self::new(vectors));
         // A loss of power clears the flags of earlier resets.
         let earlier = if cause == Cause::Power { 0 } else { old.rcc.flags() };
+        if cause != Cause::Power {
+            self.system.control.keep(&old.system.control);
+        }
         self.rcc = Rcc::new(cause, earlier);
         for (port, (driven, levels)) in old.ports.iter().map(Gpio::outside).enumerate() {
             self.ports[port] = Gpio::new(port, driven, levels);
@@ -245,7 +248,7 @@ impl Chip {
     /// stands still with it. Source: RM0440, `DBGMCU_APB1FZR1` and `DBGMCU_APB2FZR`.
     pub(crate) fn halt(&mut self, cycles: u64, now: u64) {
         let frozen = [self.debug.get(0x08), self.debug.get(0x10)];
-        self.system.freeze(cycles);
+        self.system.halt(cycles);
         self.counter.freeze(cycles);
         if frozen[0] & 1 != 0 {
             self.time.freeze(cycles, now);

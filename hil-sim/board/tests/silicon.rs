@@ -217,6 +217,25 @@ fn a_core_halted_by_a_debugger_drives_nothing_and_then_goes_on() {
         assert!(moved < 0.1, "{milliseconds} ms: {moved} mm");
         board.until("mode: deployed", 20_000);
         assert!(!board.said("] fault "), "{:#?}", board.log);
+        let reports = board.log.iter().filter(|line| line.contains("limit 216: a debugger halted"));
+        assert_eq!(reports.count(), 1, "{:#?}", board.log);
+        assert!(board.machine().restarts().is_empty(), "the watchdog stood still");
+    }
+}
+
+/// On a corner, where the wheel is pushed while its motor has no power: the run can end in a
+/// fault, whose own text is not the cause. The log has that before it.
+#[test]
+fn a_fault_after_a_long_halt_of_the_core_has_its_cause_before_it_in_the_log() {
+    for milliseconds in [500, 1000] {
+        let mut board = Board::moving();
+        board.until("sliding on the corner", 5000);
+        board.run(150);
+        board.strike(Fault::Halted(milliseconds));
+        board.run(u32::from(milliseconds) + 300);
+        let at = |text: &str| board.log.iter().position(|line| line.contains(text));
+        let (halt, fault) = (at("limit 216: a debugger halted"), at("] fault "));
+        assert!(halt.is_some() && fault > halt, "{:#?}", board.log);
         assert!(board.machine().restarts().is_empty(), "the watchdog stood still");
     }
 }

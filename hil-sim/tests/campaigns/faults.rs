@@ -37,6 +37,16 @@ fn urgent_faults_are_found_at_once() {
 }
 
 #[test]
+fn a_bridge_that_regulates_its_current_is_no_fault_of_the_bridge() {
+    let outcome = campaign(200, |name| name.ends_with("regulating"));
+    assert_eq!((outcome.undetected, outcome.unheld), (0, 0), "{outcome:#?}");
+    assert_eq!(outcome.matrix.len(), 2);
+    for line in &outcome.matrix {
+        assert!(line.codes.keys().all(|code| !matches!(code, 128 | 129)), "{line:?}");
+    }
+}
+
+#[test]
 fn a_silent_sensor_is_named_within_its_age() {
     let sensors = ["encoder off", "preload-sensor off", "compression-sensor off", "angle off"];
     let outcome = campaign(4, |name| sensors.contains(&name));

@@ -39,8 +39,9 @@ impl System {
         }
     }
 
-    /// The system timer stands still for so many cycles.
-    pub fn freeze(&mut self, cycles: u64) {
+    /// A debugger halts the core for so many cycles: the system timer stands still.
+    pub fn halt(&mut self, cycles: u64) {
+        self.control.halt();
         self.tick.freeze(cycles);
     }
 

@@ -18,6 +18,10 @@ const COMMANDS_S: f64 = 1.0;
 /// Times for which a debugger halts the core, ms: a read of memory, an attachment, a look.
 const HALTS_MS: [f64; 4] = [5.0, 1.0, 50.0, 500.0];
 
+/// Currents that a bridge regulates, parts of that at standstill and full duty: the prescribed
+/// one first, and the least that the readback allows.
+const LIMITS: [f64; 4] = [0.5, 0.25, 0.75, 0.5];
+
 /// A fault of the matrix.
 #[derive(Clone, Copy, Debug)]
 pub enum Case {
@@ -131,6 +135,7 @@ impl Case {
                 [entry.magnitude, 0.0, 12_000.0, 65_535.0][instant % 4]
             }
             Kind::Halted => HALTS_MS[instant % 4],
+            Kind::Regulating => LIMITS[instant % 4],
             _ => entry.magnitude,
         }
     }

@@ -68,12 +68,13 @@ fn distorted(
 }
 
 /// Faults of a motor and its bridge.
-fn actuator(target: Target) -> [Entry; 7] {
+fn actuator(target: Target) -> [Entry; 8] {
     let weak = "gives this part of its duty, its bridge being sound";
     let regulates = "regulates its current to that of this duty at standstill";
     let runaway = "takes this duty whatever is asked while its bridge is on, in the bridge";
     [
         plain(target, Kind::Stalled, "gives no force, its bridge being sound"),
+        plain(target, Kind::Off, "puts out nothing, in the bridge"),
         plain(target, Kind::Stuck, "keeps its last duty, in the bridge"),
         one(target, Kind::Weak, 0.4, (0.0, 1.0), "x", weak),
         plain(target, Kind::Reversed, "turns the other way, in the bridge"),

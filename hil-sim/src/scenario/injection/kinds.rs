@@ -232,8 +232,8 @@ impl Kind {
     /// puts out another duty than it was given. The others lie behind: in motor and gear.
     #[must_use]
     pub const fn is_in_bridge(self) -> bool {
-        use Kind::{Delayed, Regulating, Reversed, Runaway, Stuck};
-        matches!(self, Stuck | Reversed | Delayed | Runaway | Regulating)
+        use Kind::{Delayed, Off, Regulating, Reversed, Runaway, Stuck};
+        matches!(self, Off | Stuck | Reversed | Delayed | Runaway | Regulating)
     }
 
     /// Its name in scenarios.

@@ -1,0 +1,179 @@
+//! The drive's motor in the service mode: its bridge, its encoder's lines, direction, speed.
+
+use super::figures::{Counted, Scale, counted, mean};
+use super::line::{Motion, drive as drive_by, press};
+use super::motion::{CHANGED, bridge, driven, fault};
+use super::{BringupError, Check, Question, Seen, Session, check};
+
+/// Input data of port A, with the wheel encoder's lines.
+const PORT_A: u32 = 0x4800_0010;
+/// Duties of the drive.
+const SLOW: f64 = 0.15;
+const FAST: f64 = 0.30;
+
+/// The drive, wheel free.
+pub(super) fn drive(session: &mut Session<'_, '_>) -> Result<Vec<Check>, BringupError> {
+    session.operator.confirm(
+        "Wheel free of the wall, current limit low: the DRIVE turns outwards, 15 % for 0.6 s.",
+    )?;
+    // Levels that each line of the encoder has had: low, high.
+    let mut lines = [[false; 2]; 2];
+    let slow = session.line.move_and(drive_by(SLOW), 600, 300, |line| {
+        let port = line.word(PORT_A)?;
+        for (pin, seen) in lines.iter_mut().enumerate() {
+            seen[(port >> pin & 1) as usize] = true;
+        }
+        Ok(())
+    })?;
+    let (bridge, silent) = bridge(&slow, 0, SLOW);
+    let mut checks = vec![bridge];
+    if silent {
+        checks = vec![silent_bridge(session, &slow)?];
+    }
+    if !checks[0].ok {
+        return Ok(checks);
+    }
+    let counts = counted(driven(&slow, 0));
+    (session.say)(&format!("  {} counts", counts.sum));
+    let turned = session.operator.look(Question::Turned)?;
+    let shift = preload_change(&slow, &Scale::of(&session.expected.rig));
+    checks.extend(turns(&slow, counts, shift, lines, turned));
+    if checks.iter().any(|check| !check.ok) {
+        return Ok(checks);
+    }
+    session.operator.confirm("The DRIVE turns outwards, 30 % for 0.5 s, and back for 0.8 s.")?;
+    let fast = session.line.moved(drive_by(FAST), 500, 300)?;
+    session.line.moved(drive_by(-FAST), 800, 300)?;
+    let scale = Scale::of(&session.expected.rig);
+    let speed = |motion: &Motion| {
+        let rows = driven(motion, 0);
+        let steady = &rows[rows.len() / 2..];
+        let seconds = steady.len().saturating_sub(1).max(1) as f64 * 1e-3;
+        counted(steady).sum as f64 * scale.count_mm / seconds
+    };
+    let (v_slow, v_fast) = (speed(&slow), speed(&fast));
+    let no_load = (v_fast - v_slow) / (FAST - SLOW);
+    let wanted = session.expected.rig.drive.no_load_speed_mm_s;
+    let near = (no_load / wanted - 1.0).abs() <= 0.25;
+    let friction = SLOW - v_slow / no_load;
+    let rounded = (no_load * 10.0).round() / 10.0;
+    if no_load > 1.0 {
+        session.proposed.rig.drive.no_load_speed_mm_s = rounded;
+    }
+    checks.push(check(
+        "drive speed",
+        near,
+        format!("{no_load:.1} mm/s at full duty, parameter {wanted:.1}"),
+        &format!(
+            "the motor, its supply's voltage, sense.encoder_counts or rig.wheel_radius_mm is \
+             another: one turn of the wheel by hand must give sense.encoder_counts. If that is \
+             right, set drive.no_load_speed_mm_s = {rounded}"
+        ),
+    ));
+    if near {
+        checks.push(check(
+            "drive friction",
+            friction < 0.08,
+            format!("{:.1} % of duty", 100.0 * friction),
+            "the drive is stiff: gearbox, bearing, or the wheel drags on the wall",
+        ));
+    }
+    Ok(checks)
+}
+
+/// The drive's bridge puts out nothing: the other one tells whether the supply is off.
+fn silent_bridge(session: &mut Session<'_, '_>, slow: &Motion) -> Result<Check, BringupError> {
+    session
+        .operator
+        .confirm("The PRE-TIGHTENER turns for 0.1 s: does its bridge put out anything?")?;
+    session.line.reset()?;
+    let other = session.line.moved(press(SLOW), 100, 100)?;
+    let (_, silent) = bridge(&other, 1, SLOW);
+    let advice = if silent {
+        "the motor supply is off: neither bridge puts out anything. Check supply, fuse and the \
+         emergency stop's second contact"
+    } else {
+        "the drive's bridge puts out nothing, the other does: its enable (PA10) and PWM (PA8), its \
+         supply pins"
+    };
+    Ok(check("drive bridge", false, format!("0 %{}", fault(slow)), advice))
+}
+
+/// Change of the preload by a motion, N.
+fn preload_change(motion: &Motion, scale: &Scale) -> f64 {
+    let rows = &motion.rows;
+    let before = mean(rows.iter().take(15).map(|row| scale.preload(row))).0;
+    mean(rows.iter().rev().take(100).map(|row| scale.preload(row))).0 - before
+}
+
+/// What the encoder, an eye and the other sensors make of the first motion of the drive.
+fn turns(
+    motion: &Motion,
+    counts: Counted,
+    preload_change: f64,
+    lines: [[bool; 2]; 2],
+    seen: Seen,
+) -> Vec<Check> {
+    let eye = match seen {
+        Seen::Outwards => "outwards",
+        Seen::Inwards => "inwards",
+        Seen::Nothing => "not",
+        _ => "not observed",
+    };
+    let shown = format!("{} counts, seen to turn: {eye}{}", counts.sum, fault(motion));
+    if counts.sum > 20 {
+        let advice = match seen {
+            Seen::Inwards => {
+                "both the encoder's lines and the drive motor's leads are swapped: swap A and B, \
+                 and the motor's leads"
+            }
+            Seen::Nothing => "the encoder counts although the wheel does not turn: its coupling",
+            _ => {
+                "nobody looked: with both encoder lines and motor leads swapped the unit would \
+                  run the wrong way, and no sensor shows it here. Run again and look"
+            }
+        };
+        return vec![
+            check("drive turns", true, shown, ""),
+            check("drive direction", seen == Seen::Outwards, eye.to_owned(), advice),
+        ];
+    }
+    let advice = if counts.sum < -20 {
+        match seen {
+            Seen::Outwards => "the encoder's lines A and B are swapped".to_owned(),
+            Seen::Inwards => "the drive motor's leads are swapped".to_owned(),
+            _ => "A and B of the encoder are swapped, or the drive motor's leads: if the wheel \
+                  turns outwards, swap A (PA0) and B (PA1); if inwards, the motor's leads"
+                .to_owned(),
+        }
+    } else if preload_change.abs() > CHANGED.0 && !matches!(seen, Seen::Outwards | Seen::Inwards) {
+        format!(
+            "the motors are exchanged: the drive's bridge moves the pre-tightener (preload \
+             {preload_change:+.1} N)"
+        )
+    } else if counts.changes > 5 {
+        let stuck: Vec<&str> = ["A (PA0)", "B (PA1)"]
+            .into_iter()
+            .zip(lines)
+            .filter(|(_, seen)| *seen != [true; 2])
+            .map(|(name, _)| name)
+            .collect();
+        match stuck[..] {
+            [line] => format!("the encoder's line {line} is missing: its level never changes"),
+            _ => "the encoder's line A or B is missing: measure PA0 and PA1 while the wheel is \
+                  turned by hand; the one that does not change"
+                .to_owned(),
+        }
+    } else {
+        match seen {
+            Seen::Outwards | Seen::Inwards => {
+                "the wheel encoder is not connected: neither line changes although the wheel turns"
+                    .to_owned()
+            }
+            _ => "the wheel is blocked, or the drive motor's leads are open: turn the wheel by \
+                  hand; if it is free, measure the motor's resistance at the bridge"
+                .to_owned(),
+        }
+    };
+    vec![check("drive turns", false, shown, &advice)]
+}

@@ -1,0 +1,242 @@
+//! The pre-tightener's motor in the service mode: its bridge, direction, sensors, scale.
+
+use interstage::log::Record;
+use interstage::supervise::Mode;
+
+use super::figures::{Scale, angle, counted, mean, preload_n, turned};
+use super::line::{Motion, press};
+use super::motion::{CHANGED, bridge, driven, fault};
+use super::{BringupError, Check, Session, check};
+
+/// Duty of the pre-tightener, and the steps of preload, ms.
+const PRESS: f64 = 0.25;
+const STEPS_MS: [u32; 3] = [550, 850, 550];
+/// Rest behind a step, ms; the tread's memory is a tenth of a second. Its second half is judged.
+const REST_MS: u32 = 500;
+
+/// Means at rest.
+#[derive(Clone, Copy, Debug, Default)]
+struct Level {
+    preload: f64,
+    compression: f64,
+    /// Compression from the zero that the controller has taken.
+    pressed: f64,
+    angle: f64,
+}
+
+impl Level {
+    fn of(rows: &[Record], scale: &Scale) -> Self {
+        let last = || rows.iter().rev().take(REST_MS as usize / 2);
+        let first = last().next().map_or(0.0, angle);
+        Self {
+            preload: mean(last().map(|row| scale.preload(row))).0,
+            compression: mean(last().map(|row| scale.compression(row))).0,
+            pressed: mean(last().map(|row| row.telemetry.compression.to_num())).0,
+            angle: first + mean(last().map(|row| turned(first, angle(row)))).0,
+        }
+    }
+
+    fn since(self, before: Self) -> Self {
+        Self {
+            preload: self.preload - before.preload,
+            compression: self.compression - before.compression,
+            pressed: self.pressed,
+            angle: turned(before.angle, self.angle),
+        }
+    }
+
+    fn is_none(self) -> bool {
+        self.preload.abs() < CHANGED.0 && self.compression.abs() < CHANGED.1
+    }
+
+    fn text(self) -> String {
+        let Self { preload, compression, angle, .. } = self;
+        format!(
+            "preload {preload:+.2} N, compression {compression:+.4} mm, angle {angle:+.1} codes"
+        )
+    }
+}
+
+/// The pre-tightener: direction, sensors, scale; and back.
+pub(super) fn pretightener(session: &mut Session<'_, '_>) -> Result<Vec<Check>, BringupError> {
+    session.operator.confirm(
+        "Wheel on the wall at the stow end: the PRE-TIGHTENER presses it, 25 % for 0.55 s.",
+    )?;
+    let scale = Scale::of(&session.expected.rig);
+    let base = Level::of(&session.line.listen(REST_MS)?, &scale);
+    let first = session.line.moved(press(PRESS), STEPS_MS[0], REST_MS)?;
+    let mut checks = vec![bridge(&first, 1, PRESS).0];
+    if !checks[0].ok {
+        return Ok(checks);
+    }
+    let change = Level::of(&first.rows, &scale).since(base);
+    (session.say)(&format!("  {}", change.text()));
+    let rises = rises(session, &first, change, base, &scale)?;
+    let good = rises.ok;
+    checks.push(rises);
+    if !good {
+        release(session, base, &scale, STEPS_MS[0])?;
+        return Ok(checks);
+    }
+    session.operator.confirm("The PRE-TIGHTENER presses on, to about 12 N.")?;
+    let mut levels = vec![(driven(&first, 1).len() as f64 * 1e-3, change)];
+    for milliseconds in &STEPS_MS[1..] {
+        let motion = session.line.moved(press(PRESS), *milliseconds, REST_MS)?;
+        let level = Level::of(&motion.rows, &scale).since(base);
+        (session.say)(&format!("  {}", level.text()));
+        levels.push((driven(&motion, 1).len() as f64 * 1e-3, level));
+    }
+    checks.extend(judge(session, &levels));
+    let (left, mode) = release(session, base, &scale, STEPS_MS.iter().sum())?;
+    let (measured, good) = (left.text(), left.preload < 2.0 && mode == Some(Mode::Idle));
+    let advice = "the preload does not come off: turn the pre-tightener back by hand";
+    checks.push(check("preload released", good, measured, advice));
+    Ok(checks)
+}
+
+/// What the first step of preload has done.
+fn rises(
+    session: &mut Session<'_, '_>,
+    first: &Motion,
+    change: Level,
+    base: Level,
+    scale: &Scale,
+) -> Result<Check, BringupError> {
+    let up = |value: f64, least: f64| if value.abs() < least { 0.0 } else { value.signum() };
+    let preload = up(change.preload, CHANGED.0);
+    let compression = up(change.compression, CHANGED.1);
+    let shown = change.text() + &fault(first);
+    let advice = match (preload as i32, compression as i32) {
+        (1, 1) if first.mode == Mode::Service => {
+            return Ok(check("preload rises", true, shown, ""));
+        }
+        (1, 1) => "the motion ended in a fault".to_owned(),
+        (-1, 1) => "the preload sensor's bridge is reversed: swap its two signal leads".to_owned(),
+        (1, -1) => {
+            "the compression sensor is reversed: swap its signal leads, or its sense at the \
+                    amplifier"
+                .to_owned()
+        }
+        (0, 1) => {
+            "the preload sensor shows nothing of a preload that compresses the tread: where it \
+                   is mounted, its amplifier"
+                .to_owned()
+        }
+        (1, 0) => "the compression sensor shows nothing of a preload that the other sensor shows: \
+                   where it is mounted, its amplifier"
+            .to_owned(),
+        (-1, -1) => {
+            "the pre-tightener's leads are swapped: preload and compression fall".to_owned()
+        }
+        _ if counted(driven(first, 1)).range > 20 => {
+            "the motors are exchanged: the pre-tightener's bridge turns the wheel".to_owned()
+        }
+        _ => {
+            session.operator.confirm("Nothing moved: the PRE-TIGHTENER turns back for 1.2 s.")?;
+            let back = session.line.moved(press(-PRESS), 1200, REST_MS)?;
+            let change = Level::of(&back.rows, scale).since(base);
+            if change.is_none() {
+                "the pre-tightener does not move, or the wheel is clear of the wall: its motor's \
+                 leads; turn the screw by hand until the wheel touches"
+                    .to_owned()
+            } else {
+                format!(
+                    "the pre-tightener's leads are swapped: backwards it presses ({})",
+                    change.text()
+                )
+            }
+        }
+    };
+    Ok(check("preload rises", false, shown, &advice))
+}
+
+/// The three steps together: each time of duty, s, and the level it led to.
+fn judge(session: &mut Session<'_, '_>, levels: &[(f64, Level)]) -> Vec<Check> {
+    let rig = &session.expected.rig;
+    let [(t_1, first), (t_2, second), (t_3, last)] = levels else { return Vec::new() };
+    let power = (last.compression / first.compression).ln() / (last.preload / first.preload).ln();
+    let exchanged = power.is_nan() || power >= 1.0;
+    let mut checks = vec![check(
+        "preload against tread",
+        !exchanged,
+        format!("compression grows as preload^{power:.2}"),
+        "preload and compression sensor are exchanged: a tread grows stiffer under load (0.67), \
+         these show it the other way round. Swap PC2 and PC3",
+    )];
+    if exchanged {
+        return checks;
+    }
+    let inwards = last.angle < 0.0;
+    let advice = if inwards {
+        "the arm's codes grow inwards: turn the magnet over, then measure sense.angle_zero_code"
+    } else {
+        "the arm's code does not follow the tread's compression: the magnet turns with the arm, \
+         and the sensor does not?"
+    };
+    checks.push(check("arm direction", last.angle > 1.0, last.text(), advice));
+    // Two durations give rate and dead time, P = slew u (T - D); the outer steps are alike.
+    let (short, long) =
+        (last.preload - second.preload + first.preload, second.preload - first.preload);
+    let (short, t_short) = (short / 2.0, (t_1 + t_3) / 2.0);
+    let slew = (long - short) / (PRESS * (t_2 - t_short));
+    let dead_s = t_short - short / (PRESS * slew);
+    let by_spring = slew / rig.preload.slew_n_per_s;
+    // Differences: the arm's thrust presses the wheel as well.
+    let carried = preload_n(rig, last.pressed) - preload_n(rig, first.pressed);
+    let by_tread = (last.preload - first.preload) / carried;
+    let off = |ratio: f64| !(0.8..=1.25).contains(&ratio);
+    let rounded = (slew * 10.0).round() / 10.0;
+    let advice = if off(by_spring) && off(by_tread) && (by_spring > 1.0) == (by_tread > 1.0) {
+        format!(
+            "the preload sensor's scale is wrong by {:.2}, or spring and tread both are: hang a \
+             known weight on it and set sense.preload_full_scale_n = {:.0}",
+            (by_spring * by_tread).sqrt(),
+            rig.sense.preload_full_scale_n / (by_spring * by_tread).sqrt(),
+        )
+    } else if off(by_tread) {
+        "the compression sensor's scale is wrong, or the tread is another: press it by a feeler \
+         gauge; `rig identify` finds the tread"
+            .to_owned()
+    } else {
+        format!(
+            "the pre-tightener is of another speed or spring: set preload.slew_n_per_s = {rounded}"
+        )
+    };
+    if !off(by_spring) {
+        session.proposed.rig.preload.slew_n_per_s = rounded;
+    }
+    checks.push(check(
+        "preload scale",
+        !off(by_spring) && !off(by_tread),
+        format!(
+            "{slew:.1} N/s at full duty ({by_spring:.2} of the parameter), {by_tread:.2} of the \
+             tread's stiffness, dead time and lag {dead_s:.3} s"
+        ),
+        &advice,
+    ));
+    checks
+}
+
+/// Takes the preload back, and leaves the service mode; what is left, and the mode.
+fn release(
+    session: &mut Session<'_, '_>,
+    base: Level,
+    scale: &Scale,
+    raised_ms: u32,
+) -> Result<(Level, Option<Mode>), BringupError> {
+    if session.line.mode()? != Some(Mode::Service) && session.line.reset()? != Some(Mode::Idle) {
+        return Ok((base, None));
+    }
+    let mut left = Level::default();
+    let mut spent = 0;
+    // As long as it was raised, and some more: dead times add up.
+    while spent < raised_ms + 1500 {
+        let motion = session.line.moved(press(-PRESS), 400, REST_MS)?;
+        left = Level::of(&motion.rows, scale).since(base);
+        spent += 400;
+        if left.is_none() || motion.mode != Mode::Service {
+            break;
+        }
+    }
+    Ok((left, session.line.reset()?))
+}
