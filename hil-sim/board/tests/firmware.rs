@@ -306,3 +306,18 @@ fn bit_errors_that_pass_are_ridden_out() {
     assert!(!board.said("] fault "), "{:#?}", board.log);
     board.until("mode: deployed", 20_000);
 }
+
+/// Numbers become machine units on the host. So the board needs neither libm nor micromath, nor
+/// the compiler's functions for f64, which the core lacks.
+#[test]
+fn the_image_contains_no_function_of_a_mathematics_library() {
+    let board = Board::off(&[]);
+    let functions = &board.bench.machine().image().functions;
+    assert!(functions.len() > 100);
+    let of_library = |name: &str| {
+        ["libm::", "micromath::", "::float::", "::math::"].iter().any(|part| name.contains(part))
+            || ["__aeabi_d", "__aeabi_f"].iter().any(|start| name.starts_with(start))
+    };
+    let found: Vec<_> = functions.iter().filter(|f| of_library(&f.name)).collect();
+    assert!(found.is_empty(), "{:#?}", found.iter().map(|f| &f.name).collect::<Vec<_>>());
+}
