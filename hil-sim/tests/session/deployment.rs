@@ -114,7 +114,7 @@ fn steps_of_any_height_and_place_are_found_where_they_are() {
         println!("step {}: mean {mean:.3} mm, 95 % within {most:.3} mm", step + 1);
         // Of a thousand 0.046, 0.060 and 0.087 mm.
         assert!(most < [0.06, 0.08, 0.11][step], "step {}: {most} mm", step + 1);
-        assert!(mean.abs() < 0.03, "step {}: {mean} mm on average", step + 1);
+        assert!(mean.abs() < 0.04, "step {}: {mean} mm on average", step + 1);
     }
 }
 
