@@ -13,8 +13,9 @@
 //! - By default the engine searches for translated code after every write to RAM, which takes more
 //!   than half of its time. A hook of ours provides the pages, and RAM is data until the program
 //!   runs in it.
-//! - If an access inside a conditional block meets its page for the first time, the engine skips
-//!   instructions after the block. The hook prevents that.
+//! - Before the hook of an access the engine sets its IT state to that of the access. If the
+//!   access lies inside a conditional block, instructions after the block are then skipped or
+//!   undefined. So each such hook empties that state.
 
 mod count;
 mod hooks;
@@ -125,6 +126,11 @@ fn engine<T>(what: &'static str, result: Result<T, impl std::fmt::Debug>) -> Res
     result.map_err(|error| CoreError::Engine { what, why: format!("{error:?}") })
 }
 
+/// Empties the IT state, which the engine has set to that of the access under way.
+fn forget_condition<B: Bus>(uc: &mut Hooked<'_, B>) -> Result<(), uc_error> {
+    uc.reg_write(RegisterARM::EPSR, THUMB)
+}
+
 impl UnicornCore {
     /// A core with these memories and nothing else, counting the cycles of `counted`.
     /// Errors: [`CoreError::Engine`] if the engine cannot be had or a memory overlaps.
@@ -217,7 +223,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
             let (first, kind) = (u64::from(first - 3), HookType::MEM_READ);
             let read = self.engine.add_mem_hook(kind, first, last.into(), |uc, _, at, size, _| {
                 uc.get_data_mut().look_for_spoilt(at as u32, size as u32);
-                true
+                forget_condition(uc).is_ok()
             });
             self.reads = Some(engine("hook reads", read)?);
         }
@@ -233,7 +239,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
         let (first, last) = (flash.base.into(), (flash.base + (flash.size - 1)).into());
         let read = self.engine.add_mem_hook(HookType::MEM_READ, first, last, |uc, _, at, _, _| {
             uc.get_data_mut().count.load(at as u32);
-            true
+            forget_condition(uc).is_ok()
         });
         engine("hook reads", read)?;
         // Translated code calls such a hook only if it was there.
@@ -258,9 +264,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
             if access == MemType::FETCH {
                 run.insert(page);
             } else {
-                // The engine has set its IT state to that of the access. Inside a translated
-                // block it has to be empty, or the following instructions are skipped.
-                uc.reg_write(RegisterARM::EPSR, THUMB).ok()?;
+                forget_condition(uc).ok()?;
             }
             let is_data = data.iter().any(|range| range.contains(&page)) && !run.contains(&page);
             // The engine checks the permissions of the memory itself.

@@ -4,7 +4,7 @@ use unicorn_engine::{HookType, RegisterARM};
 
 use super::{
     BREAKPOINT, Bus, CALL, CoreError, Counted, Fault, Hooked, Inside, Mark, RETURN, RETURN_BITS,
-    SEV, Stop, Touch, UnicornCore, WFE, engine, general, passes,
+    SEV, Stop, Touch, UnicornCore, WFE, engine, forget_condition, general, passes,
 };
 use crate::thumb::{self, Kind};
 use crate::timing;
@@ -82,7 +82,7 @@ impl<B: Bus + 'static> UnicornCore<B> {
                 pc: uc.pc_read().unwrap_or_default() as u32 & !1,
                 now: uc.get_data().count.meter.cycles,
             };
-            uc.get_data_mut().bus.write_code(access, value as u32)
+            uc.get_data_mut().bus.write_code(access, value as u32) && forget_condition(uc).is_ok()
         });
         engine("hook writes to code", protected)?;
         for range in counted.code {

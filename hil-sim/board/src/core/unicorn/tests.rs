@@ -135,3 +135,19 @@ fn a_program_may_write_what_it_runs_in_ram() {
         assert_eq!(core.register(Register::R(5)), Ok(value));
     }
 }
+
+#[test]
+fn a_counted_read_in_a_conditional_block_leaves_no_condition_behind() {
+    // cmp r1, #0; itt ne; ldrbne r2, [r0], #1; cmpne r0, r3; beq.w to the breakpoint;
+    // movs r4, #5; adds r4, #1. The branch lies across two pages: a block of its own.
+    let piece = [0x2900, 0xBF1C, 0xF810, 0x2B01, 0x4298, 0xF000, 0x8001, 0x2405, 0x3401];
+    let mut code = vec![0xBF00; (0x400 - 12) / 2];
+    code.extend(piece);
+    let mut core = core(&code);
+    core.count_waits(Memory { base: FLASH, size: 0x1000, access: Access::Code }).expect("set");
+    for (register, value) in [(0, FLASH), (1, 1), (3, 0)] {
+        core.set_register(Register::R(register), value).expect("set");
+    }
+    cost(&mut core);
+    assert_eq!(core.register(Register::R(4)), Ok(6));
+}
