@@ -4,6 +4,7 @@
 use crate::common::{
     Bench, DIRECTIONS, Moment, NO_SLIP_MM, RIGS, check_each, end_mm, opposite, scenario, starter,
 };
+use hil_sim::plant::ledger::Crossing;
 use hil_sim::scenario::{Direction, Scenario};
 use hil_sim::testing::long;
 use interstage::estimate::ContactStage as Stage;
@@ -208,10 +209,21 @@ fn assert_sound_records(bench: &Bench, scenario: &Scenario, name: &str) {
     for record in bench.records() {
         let residual = record.residual.to_num::<f64>();
         assert!(residual.abs() < 0.5, "{name}: {record:?}");
-        let part = record.gap_measured.to_num::<f64>() / gap_ref(scenario, record.direction);
-        // At the study's loads the measured gap is up to 5 % above the true one.
-        let most = if name.starts_with("fe") { 1.06 } else { 1.05 };
+        // What the plant's ledger lacks, turned back before it counted there, has no truth.
+        let same = |crossing: &&Crossing| {
+            crossing.index == usize::from(record.index)
+                && crossing.climbing == (record.direction == units::Direction::Deploy)
+        };
+        let truths = bench.crossings().iter().filter(same).map(|crossing| crossing.gap_mm);
+        let measured = record.gap_measured.to_num::<f64>();
+        let truth = truths.min_by(|a, b| (a - measured).abs().total_cmp(&(b - measured).abs()));
+        // At the study's loads the measured gap is up to 6 % above the true one. A wheel that is
+        // turned back on the corner just after touch-down leaves the lower wall at 19 mm/s: 1.07.
+        let (most, off) = if name.starts_with("fe") { (1.08, 0.06) } else { (1.05, 0.03) };
+        let part = truth.unwrap_or(measured) / gap_ref(scenario, record.direction);
         assert!((0.65..most).contains(&part), "{name}: {part} {record:?}");
+        let error = measured / truth.unwrap_or(measured) - 1.0;
+        assert!(error.abs() < off, "{name}: {truth:?} mm, {record:?}");
     }
 }
 
