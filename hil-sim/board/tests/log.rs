@@ -266,7 +266,7 @@ fn minutes_of_deploying_and_retracting_are_logged_without_a_gap_or_drift() {
     if !hil_sim::testing::long() {
         return;
     }
-    const ROUNDS: usize = 24;
+    const ROUNDS: usize = 34;
     let mut board = Board::off(&["run.seed=1"]);
     board.until("mode: idle", 3000);
     let (mut decoder, mut truths) = (Decoder::new(), VecDeque::new());
@@ -334,10 +334,11 @@ fn minutes_of_deploying_and_retracting_are_logged_without_a_gap_or_drift() {
         assert!(*position < POSITION_MM, "round {round}: {position} mm");
         assert!(*preload < PRELOAD_N, "round {round}: {preload} N");
     }
-    // The engine's caches are full after eight rounds; the log in memory may grow.
+    // The engine's caches are full after eight rounds; the log in memory may grow. What the
+    // bench keeps of a round is less than 1 MiB.
     if let (Some(before), Some(after)) = (settled, resident()) {
         let grown = (after - log.capacity() as u64).saturating_sub(before);
-        assert!(grown < (16 << 20), "{grown} bytes");
+        assert!(grown < (ROUNDS as u64 - 8) << 20, "{grown} bytes");
     }
     let run = Run::of_stream(&log);
     assert_eq!(run.ledger.len(), 3 * ROUNDS);
