@@ -13,7 +13,7 @@ use interstage::fault::Fault;
 use interstage::sense::raw::SensorFrame;
 use interstage::supervise::{Command, Mode};
 use interstage::tick::{CrossingRecord, Entry, Event, Telemetry};
-use interstage::units::MotorCommand;
+use interstage::units::{Direction as Course, MotorCommand};
 
 /// Both directions of a run.
 pub(crate) const DIRECTIONS: [Direction; 2] = [Direction::Deploy, Direction::Retract];
@@ -184,6 +184,18 @@ impl Bench {
     /// The plant's ledger.
     pub(crate) fn crossings(&self) -> &[Crossing] {
         self.session.plant().ledger().crossings()
+    }
+
+    /// The true gap that this record measured, mm; none if the crossing was turned back before it
+    /// counted in the plant's ledger.
+    pub(crate) fn true_gap_mm(&self, record: &CrossingRecord) -> Option<f64> {
+        let same = |crossing: &&Crossing| {
+            crossing.index == usize::from(record.index)
+                && crossing.climbing == (record.direction == Course::Deploy)
+        };
+        let off = |gap_mm: &f64| (gap_mm - record.gap_measured.to_num::<f64>()).abs();
+        let gaps = self.crossings().iter().filter(same).map(|crossing| crossing.gap_mm);
+        gaps.min_by(|a, b| off(a).total_cmp(&off(b)))
     }
 
     /// The controller's ledger.
