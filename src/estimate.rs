@@ -7,6 +7,7 @@ mod creep;
 pub mod crossing;
 mod follow;
 pub mod odometry;
+mod pace;
 mod position;
 mod restore;
 mod run;

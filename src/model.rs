@@ -2,6 +2,7 @@
 
 pub mod constants;
 pub mod corner_profile;
+pub mod dip;
 pub mod effective_stiffness;
 pub mod formula;
 pub mod guard;
@@ -11,5 +12,5 @@ pub mod planner;
 pub mod reduced;
 pub mod timing;
 
-pub use plan::{LimitedBy, Outcome, Plan, PlanRequest, Review, Strategy};
+pub use plan::{Approach, LimitedBy, Outcome, Plan, PlanRequest, Review, Strategy};
 pub use planner::Planner;

@@ -48,6 +48,7 @@ fn a_prescribed_speed_is_planned() {
         direction: Direction::Deploy,
         step: 1,
         scale: Ratio::from_num(1),
+        unknown: false,
         reserve: Q16::ONE,
         preload: Q16::from_num(50),
         distance: Q16::from_num(4),

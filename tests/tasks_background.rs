@@ -22,6 +22,7 @@ fn request(sequence: u32) -> PlanRequest {
         direction: Direction::Deploy,
         step: 1,
         scale: Ratio::from_num(1),
+        unknown: false,
         reserve: Ratio::ONE,
         preload: Ratio::from_num(50),
         distance: Ratio::from_num(4),

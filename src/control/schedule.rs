@@ -8,18 +8,21 @@ use crate::model::timing::Timing;
 use crate::numeric::{checked, divide};
 use crate::rig::{Rig, RigError};
 use crate::units::{
-    Direction, Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, Q16, Seconds, q16,
+    Direction, Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, Q16, Ratio,
+    Seconds, q16,
 };
 
 /// Short of the wanted preload by no more than this part of the limit, it is reached:
 /// worth 1.2 % of the gap, less than the schedule's reserve.
 const REACHED_PART: Q16 = q16(20_000);
+/// Speed over the slowest one at which the wheel may speed up again.
+const SLOWEST_WITHIN: Ratio = q16(1_100_000);
 /// Time by which braking starts early, for detection, tick and the loop's lag, s.
 const BRAKE_LAG: Seconds = q16(10_000);
 /// Distance by which braking for the end starts early, mm.
 const END_RESERVE: Millimetres = q16(20_000);
 /// Speed at which the last tenth of a millimetre is covered, mm/s.
-const END_CREEP: MillimetresPerSecond = q16(2_000_000);
+const END_CREEP: MillimetresPerSecond = q16(5_000_000);
 
 /// Limits of a rig.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -27,6 +30,8 @@ pub struct Schedule {
     timing: Timing,
     /// Short of the wanted preload by no more than this, it is reached, N.
     reached_within: Newtons,
+    /// Travel of the tread over that of the axle where the lower wall stops carrying.
+    around_corner: Ratio,
 }
 
 /// Where the wheel is on its run.
@@ -48,6 +53,8 @@ pub struct Course {
     pub looking: bool,
     /// The speed is already being brought down for this step.
     pub braking: bool,
+    /// The wheel already speeds up again for this step.
+    pub released: bool,
     /// Speed and acceleration of the profile, along the run, mm/s and mm/s^2.
     pub speed: MillimetresPerSecond,
     /// See `speed`.
@@ -73,6 +80,8 @@ pub struct Targets {
     pub looking: bool,
     /// The speed is brought down for the step ahead; likewise.
     pub braking: bool,
+    /// The wheel speeds up again on the corner; likewise.
+    pub released: bool,
     /// The step ahead already has an effect.
     pub approaching: bool,
     /// The speed is held back because the preload is not reached yet.
@@ -86,6 +95,10 @@ impl Schedule {
         Ok(Self {
             timing: Timing::try_build(rig)?,
             reached_within: checked("preload.limit_n", rig.preload.limit_n)? * REACHED_PART,
+            around_corner: checked(
+                "rig.step_height_mm",
+                0.97 / (1.0 - rig.rig.step_height_mm / rig.rig.wheel_radius_mm),
+            )?,
         })
     }
 
@@ -102,25 +115,31 @@ impl Schedule {
     /// What to ask for.
     pub fn targets(&self, steps: &Steps, plan: &Plan, course: &Course) -> Targets {
         // To where crossing speed and preload must be reached, by the table or the felt corner.
-        let ahead = course.distance.map(|distance| distance - plan.slow_from);
+        let ahead = course.distance.map(|distance| distance - plan.approach.slow_from);
         let within = |from: Option<Millimetres>, way| from.is_some_and(|from| from <= way);
         // Out of sight of a step no braking can be due, whatever the speed is doing.
         let sight = self.sight(plan, course);
-        let due = |from: Option<Millimetres>, speed| {
-            within(from, sight)
-                && within(from, self.brake_way(course, speed) + course.speed * BRAKE_LAG)
+        let due = |from: Option<Millimetres>, speed, lag: Seconds| {
+            within(from, sight) && within(from, self.brake_way(course, speed) + course.speed * lag)
         };
-        let window = course.distance.map(|distance| distance - plan.window_from);
-        let looking = course.looking || course.felt || due(window, plan.window_speed);
-        let braking = course.braking || course.felt && due(ahead, plan.cross_speed);
+        // A wheel that stays slow must be slow in time; of one that speeds up again at once the
+        // slowest place may come later. Around the corner its tread runs farther than the axle.
+        let (felt, lag) = if plan.approach.release_time > Q16::ZERO {
+            (ahead.map(|ahead| ahead * self.around_corner), Q16::ZERO)
+        } else {
+            (ahead, BRAKE_LAG)
+        };
+        let window = course.distance.map(|distance| distance - plan.approach.window_from);
+        let looking = course.looking || course.felt || due(window, plan.approach.window_speed, lag);
+        let braking = course.braking || course.felt && due(felt, plan.approach.slowest_speed, lag);
         let earliest = if course.felt { ahead } else { ahead.map(|at| at - steps.tolerance()) };
         let ramping = course.ramping
             || course.critical
             || within(earliest, self.ramp_way(plan, course.reference.min(plan.cruise_preload)));
         let preload = if ramping { plan.ramp_preload } else { plan.cruise_preload };
         let mut speed = match (looking, braking) {
-            (_, true) => plan.cross_speed,
-            (true, false) => plan.window_speed,
+            (_, true) => plan.approach.slowest_speed,
+            (true, false) => plan.approach.window_speed,
             (false, false) => plan.cruise_speed,
         };
         let mut waiting = false;
@@ -134,9 +153,11 @@ impl Schedule {
         {
             // Lift off with the preload, not before it; what is slow lies within that time.
             let needed = self.timing.ramp(short);
-            let ready = distance - plan.ready_from - short * plan.earlier_per_preload;
-            let fast = ready - (plan.slow_from - plan.ready_from);
-            let slow = divide(plan.slow_from - plan.ready_from, plan.cross_speed);
+            let ready_from = plan.approach.ready_from + short * plan.approach.earlier_per_preload;
+            let ready = distance - ready_from;
+            let slow_way = (plan.approach.slow_from - ready_from).max(Q16::ZERO);
+            let fast = ready - slow_way;
+            let slow = divide(slow_way, plan.approach.slowest_speed);
             let allowed = if fast > Q16::ZERO {
                 if needed > slow { self.arriving_in(needed - slow, fast, course) } else { Q16::MAX }
             } else {
@@ -145,8 +166,19 @@ impl Schedule {
             if allowed < speed {
                 speed = allowed;
                 // A preload that rises as planned is not waited for.
-                waiting = allowed < plan.cross_speed && course.preload_late;
+                waiting = allowed < plan.approach.slowest_speed && course.preload_late;
             }
+        }
+        let short = short - self.reached_within;
+        let released = course.released
+            || course.felt
+                && within(course.distance, plan.approach.release_from)
+                && course.speed <= plan.approach.slowest_speed * SLOWEST_WITHIN
+                && (short <= Q16::ZERO
+                    || !course.preload_late
+                        && self.timing.ramp(short) <= plan.approach.release_time);
+        if released {
+            speed = plan.cruise_speed;
         }
         Targets {
             speed: speed.min(self.end_speed(steps, course, sight)),
@@ -154,6 +186,7 @@ impl Schedule {
             ramping,
             looking,
             braking,
+            released,
             approaching: looking || ramping,
             waiting,
         }
@@ -215,7 +248,10 @@ impl Schedule {
     ) -> MillimetresPerSecond {
         if course.remaining > sight {
             Q16::MAX
-        } else if steps.arrived(course.remaining) {
+        } else if steps.arrived(course.remaining)
+            || course.speed <= END_CREEP + q16(1_000_000)
+                && course.remaining <= self.timing.brake_way(course.speed, Q16::ZERO) - END_RESERVE
+        {
             Q16::ZERO
         } else if course.remaining <= self.brake_way(course, END_CREEP) + END_RESERVE {
             END_CREEP
@@ -240,6 +276,7 @@ mod tests {
             direction,
             step: 2,
             scale: q16(1_000_000),
+            unknown: false,
             reserve: Q16::ONE,
             preload: Q16::from_num(50),
             distance: Q16::ZERO,
@@ -258,6 +295,7 @@ mod tests {
             ramping: false,
             looking: false,
             braking: false,
+            released: false,
             speed: Q16::from_num(speed),
             acceleration: Q16::ZERO,
             reference: Q16::from_num(preload),
@@ -291,13 +329,23 @@ mod tests {
                 felt,
                 ..course(&plan, distance.to_num::<f64>() - into, 8.0, standing)
             };
-            let looking = schedule.targets(&steps, &plan, &at(plan.window_from, false));
-            prop_assert_eq!(looking.speed, plan.window_speed);
+            let looking = schedule.targets(&steps, &plan, &at(plan.approach.window_from, false));
+            prop_assert_eq!(looking.speed, plan.approach.window_speed);
             prop_assert_eq!(looking.preload, plan.cross_preload);
             prop_assert!(looking.looking && !looking.braking && !looking.waiting);
-            let felt = schedule.targets(&steps, &plan, &at(plan.slow_from, true));
-            prop_assert_eq!(felt.speed, plan.cross_speed);
+            let felt = schedule.targets(&steps, &plan, &at(plan.approach.slow_from, true));
             prop_assert!(felt.braking && !felt.waiting);
+            // As slow as planned and with its preload it speeds up again before it lifts off.
+            let from = plan.approach.release_from.to_num::<f64>();
+            let there = plan.approach.slow_from.to_num::<f64>() - into < from;
+            prop_assert_eq!(felt.released, there);
+            let speed = if there { plan.cruise_speed } else { plan.approach.slowest_speed };
+            prop_assert_eq!(felt.speed, speed);
+            let fast = Course { speed: q16(20_000_000), ..at(plan.approach.slow_from, true) };
+            let fast = schedule.targets(&steps, &plan, &fast);
+            prop_assert!(!fast.released && fast.speed == plan.approach.slowest_speed);
+            let short = Course { preload: q16(33_300_000), ..at(plan.approach.slow_from, true) };
+            prop_assert!(!schedule.targets(&steps, &plan, &short).released);
         }
 
         #[test]
@@ -306,7 +354,7 @@ mod tests {
             ahead in 0.0..2.0f64,
         ) {
             let (rig, schedule, steps, plan) = setting(back);
-            let distance = plan.ready_from.to_num::<f64>() + ahead;
+            let distance = plan.approach.ready_from.to_num::<f64>() + ahead;
             let at = Course { felt: true, ..course(&plan, distance, 8.0, 33.3) };
             let got = schedule.targets(&steps, &plan, &at);
             // At most so fast that the missing preload is there first.
@@ -317,7 +365,7 @@ mod tests {
             prop_assert!(!got.waiting);
             let late = Course { preload_late: true, ..at };
             let late = schedule.targets(&steps, &plan, &late);
-            prop_assert_eq!(late.waiting, late.speed < plan.cross_speed);
+            prop_assert_eq!(late.waiting, late.speed < plan.approach.slowest_speed);
         }
 
         #[test]

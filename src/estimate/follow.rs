@@ -3,6 +3,7 @@
 use super::crossing::{Contact, CrossingEvent, Lift, WatchInput};
 use super::odometry::Rolling;
 use super::restore::UNSURE_WITHIN;
+use super::tread::Shown;
 use super::{EstimateState, Estimator, Expectation, Findings, LiftPoint, OpenCrossing, Position};
 use crate::fault::{Fault, Limit};
 use crate::model::LimitedBy;
@@ -29,6 +30,7 @@ impl Estimator {
     pub fn begin_tick(&self, state: &mut EstimateState, sensed: &SensedState) {
         state.begin_tick(sensed.travel);
         self.memory.step(&mut state.remembered, sensed.preload_filtered);
+        state.pace.step(sensed.speed.value);
     }
 
     /// One tick in which the drive moves.
@@ -70,7 +72,8 @@ impl Estimator {
         if state.watch.contact == Contact::Wall && !state.known.is_searching() {
             let (travel, compression) = (tick.sensed.travel, tick.sensed.compression_filtered);
             let tread = &mut state.tread;
-            found.tread = self.tread.roll(tread, direction, travel, tick.pressed, compression);
+            let shown = self.tread.roll(tread, direction, travel, tick.pressed, compression);
+            found.stiffness = shown.map(Shown::stiffness);
         }
         found
     }
@@ -215,7 +218,7 @@ impl Estimator {
             at: tick.now,
             position: state.position,
             gap: lift.gap,
-            speed: sensed.speed.value.abs(),
+            speed: state.pace.speed(FILTER_LAG, sensed.speed.value),
             preload: sensed.preload_filtered,
             remembered: state.remembered_preload(),
             tan_arm: sensed.tan_arm,

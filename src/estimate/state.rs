@@ -2,6 +2,7 @@
 
 use super::crossing::{Contact, WatchState};
 use super::odometry::Odometry;
+use super::pace::Pace;
 use super::tread::TreadState;
 use super::{Place, Position, PositionConfidence};
 use crate::fault::{Fault, Limit};
@@ -11,8 +12,9 @@ use crate::units::{
     Direction, Millimetres, MillimetresPerSecond, Newtons, Ratio, Tick, Travel, q16,
 };
 
-/// Error of the place at which a lift-off is detected, mm: the steps of the angle code.
-const LIFT_WITHIN: Millimetres = q16(100_000);
+/// Error of the place at which a lift-off is detected, mm: the steps of the angle code, and the
+/// tolerance of the step's height on a wheel that creeps.
+const LIFT_WITHIN: Millimetres = q16(300_000);
 
 /// State of the estimator.
 #[derive(Clone, Debug, Default)]
@@ -26,6 +28,8 @@ pub struct EstimateState {
     pub(super) tread: TreadState,
     /// Preload behind the memory of the tread, N.
     pub(super) remembered: LowPassState,
+    /// Speed behind it.
+    pub(super) pace: Pace,
     /// Direction of the run.
     pub direction: Direction,
     /// Level by steps detected.
@@ -92,7 +96,7 @@ pub struct LiftPoint {
     pub position: Millimetres,
     /// Gap with the nominal step height, mm.
     pub gap: Millimetres,
-    /// Wheel speed, mm/s.
+    /// Wheel speed as the tread remembers it, mm/s.
     pub speed: MillimetresPerSecond,
     /// Preload, N.
     pub preload: Newtons,
@@ -117,8 +121,8 @@ pub struct Findings {
     pub advanced: bool,
     /// A crossing that was observed from touch to end, and whether its gap is plausible.
     pub closed: Option<(OpenCrossing, bool)>,
-    /// Stiffness of the tread at rest over that of the rolling one, both over the known one.
-    pub tread: Option<Ratio>,
+    /// Stiffness to expect of the first crossing, over the known one.
+    pub stiffness: Option<Ratio>,
     /// A new plan is needed.
     pub replan: bool,
 }

@@ -135,7 +135,7 @@ mod tests {
     use super::super::ledger::tests::crossing;
     use super::*;
     use crate::fault::Limit;
-    use crate::model::{LimitedBy, Outcome, Plan, PlanRequest, Review};
+    use crate::model::{Approach, LimitedBy, Outcome, Plan, PlanRequest, Review};
     use crate::supervise::Mode;
     use crate::tick::CrossingRecord;
 
@@ -274,6 +274,7 @@ mod tests {
             direction,
             step: 255,
             scale: most,
+            unknown: false,
             reserve: Q16::ONE,
             preload: most,
             distance: most,
@@ -299,11 +300,17 @@ mod tests {
             slip_margin: most,
             brake_way: most,
             brake_time: most,
-            window_speed: most,
-            window_from: most,
-            slow_from: most,
-            ready_from: most,
-            earlier_per_preload: most,
+            approach: Approach {
+                window_from: most,
+                window_speed: most,
+                slow_from: most,
+                slowest_speed: most,
+                ready_from: most,
+                earlier_per_preload: most,
+                release_from: most,
+                release_time: most,
+                lift: most,
+            },
             ramp_preload: most,
             brake_horizon: most,
             look_ahead: true,

@@ -84,6 +84,8 @@ pub struct PlanRequest {
     pub step: u8,
     /// Estimated over nominal stiffness.
     pub scale: Ratio,
+    /// The tread has shown before the first crossing that it is not as known.
+    pub unknown: bool,
     /// Share of the rig's reserve below the reference gap.
     pub reserve: Ratio,
     /// Measured preload, N.
@@ -112,6 +114,29 @@ pub struct Outcome {
     pub strange: bool,
 }
 
+/// How the wheel comes to a step. Distances are axial, along the run, to the face of the step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Approach {
+    /// Where the corner may first be felt, mm.
+    pub window_from: Millimetres,
+    /// Speed from there on, mm/s: from it the slowest is reached in time.
+    pub window_speed: MillimetresPerSecond,
+    /// Where the wheel must be slowest, mm: at lift-off, less what the tread remembers.
+    pub slow_from: Millimetres,
+    /// Speed down to which it brakes, mm/s.
+    pub slowest_speed: MillimetresPerSecond,
+    /// Where the preload must be reached, mm.
+    pub ready_from: Millimetres,
+    /// How much earlier the wheel lifts off per preload that it lacks, mm/N.
+    pub earlier_per_preload: Ratio,
+    /// Where it may speed up again, mm; lift-off (retract: touch-down), if only behind that.
+    pub release_from: Millimetres,
+    /// Time from there to lift-off, s; 0 if it speeds up behind it.
+    pub release_time: Seconds,
+    /// Lift-off (retract: touch-down), mm.
+    pub lift: Millimetres,
+}
+
 /// Speed and preload up to the next step and over it.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Plan {
@@ -123,7 +148,7 @@ pub struct Plan {
     pub direction: Direction,
     /// Speed between the steps, mm/s.
     pub cruise_speed: MillimetresPerSecond,
-    /// Speed at the step, mm/s.
+    /// Speed at the step as the tread remembers it, mm/s.
     pub cross_speed: MillimetresPerSecond,
     /// Preload between the steps, N.
     pub cruise_preload: Newtons,
@@ -140,18 +165,8 @@ pub struct Plan {
     pub brake_way: Millimetres,
     /// Time that this braking takes, s.
     pub brake_time: Seconds,
-    /// Speed through the window in which the corner may be felt, mm/s: from it the crossing
-    /// speed is reached in time.
-    pub window_speed: MillimetresPerSecond,
-    /// Distance to the face, along the run, at which that window begins, mm.
-    pub window_from: Millimetres,
-    /// Distance to the face, along the run, by which the crossing speed must be reached: that at
-    /// lift-off and what the tread remembers, mm.
-    pub slow_from: Millimetres,
-    /// The same for the preload, mm.
-    pub ready_from: Millimetres,
-    /// How much earlier the wheel lifts off per preload that it lacks, mm/N.
-    pub earlier_per_preload: Ratio,
+    /// How the wheel comes to the step.
+    pub approach: Approach,
     /// Distance before a step or the end within which braking can be due, mm.
     pub brake_horizon: Millimetres,
     /// Whether the preload is raised ahead of the step.

@@ -2,15 +2,19 @@
 
 #![deny(clippy::float_arithmetic)]
 
+mod approach;
 #[allow(clippy::float_arithmetic, reason = "SI to machine units, once at start")]
 mod build;
 
+pub use approach::KNOWN_SCALE;
+
+use super::dip::Dip;
 use super::guard::Guard;
-use super::plan::{LimitedBy, Outcome, Plan, PlanRequest, Review, Strategy};
+use super::plan::{Approach, LimitedBy, Outcome, Plan, PlanRequest, Review, Strategy};
 use super::reduced::{Point, ReducedModel, Scale};
 use super::timing::Timing;
 use crate::fault::Limit;
-use crate::numeric::{divide, sqrt};
+use crate::numeric::divide;
 use crate::rig::MAX_STEPS;
 use crate::units::{
     Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Seconds, q16,
@@ -35,37 +39,17 @@ const OUTLIER_STIFFER: Ratio = q16(2_500_000);
 /// stiff guess costs most. Two of 1,500 random rigs exceed 0.20.
 const STRANGE: Ratio = q16(270_000);
 
-/// Travel before lift-off that the tread remembers, mm, beside what the lift-off comes earlier
-/// at the speed of the window: the speed before it hardly counts. On retract the corner carries
-/// alone all along, and its whole patch remembers.
-const MEMORY: [Millimetres; 2] = [q16(100_000), q16(2_000_000)];
-
-/// Stiffness scale up to which the tread is as known, and by how much earlier than the model
-/// says, mm per scale, a stiffer one lifts off at the speed of the window.
-const KNOWN_SCALE: Ratio = q16(1_150_000);
-const EARLIER_PER_SCALE: Millimetres = q16(1_500_000);
-
-/// Travel at crossing speed, mm, with what detection and braking take.
-const SLOW_TRAVEL: [Millimetres; 2] = [q16(800_000), q16(2_400_000)];
-
-/// Height that the centre lacks at lift-off, mm: what the tread still keeps of its compression.
-const SHORT: Millimetres = q16(110_000);
-
 /// Bounds of the reserve that the crossings leave, as shares of the rig's.
 const LEAST_RESERVE: Ratio = q16(333_333);
 const MOST_RESERVE: Ratio = q16(2_000_000);
-
-/// Error of the place of a corner that is felt, with the travel until braking begins, mm.
-const FELT_WITHIN: Millimetres = q16(150_000);
 
 /// Preloads between that of cruise and the limit that are compared, and their distance as a
 /// part of the range.
 const PRELOADS: u32 = 16;
 const PRELOAD_STEP: Ratio = q16(62_500);
 
-/// Rise beyond the preload at the step that keeps the actuator's lag out of the time until it is
-/// reached, N: two lags at full slew.
-const BEYOND: Newtons = q16(3_000_000);
+/// Part of the cruise preload with which the wheel may cross while the preload is being built up.
+const BUILDING: Ratio = q16(850_000);
 
 /// Error of the model's inverse, N.
 const HOLDS_WITHIN: Newtons = q16(100_000);
@@ -84,6 +68,7 @@ pub struct Planner {
     model: ReducedModel,
     guard: Guard,
     timing: Timing,
+    dip: Dip,
     strategy: Strategy,
     /// Radial force that the arm's inclination adds at each step, N.
     arm_thrust: heapless::Vec<Newtons, MAX_STEPS>,
@@ -110,6 +95,8 @@ pub struct Planner {
     tolerance: Millimetres,
     /// Distance to the face at which the corner shows where it is, deploy and retract, mm.
     felt_at: [Millimetres; 2],
+    /// Preload with which the wheel may start at full acceleration, N.
+    start_preload: Newtons,
     /// Preload that the plan may ask for, N.
     most_preload: Newtons,
     /// Friction of tread on wall as far as known.
@@ -142,11 +129,11 @@ impl Planner {
             brake_way: Millimetres::ZERO,
             brake_time: Seconds::ZERO,
             brake_horizon: Millimetres::ZERO,
-            window_speed: cruise_speed,
-            window_from: Millimetres::ZERO,
-            slow_from: Millimetres::ZERO,
-            ready_from: Millimetres::ZERO,
-            earlier_per_preload: Ratio::ZERO,
+            approach: Approach {
+                window_speed: cruise_speed,
+                slowest_speed: cruise_speed,
+                ..Approach::default()
+            },
             // Without look-ahead the preload rises when the step is detected, never before.
             look_ahead: self.strategy != Strategy::Reactive,
             limited_by: LimitedBy::Drive,
@@ -209,14 +196,18 @@ impl Planner {
             add(&mut plan.limits, Limit::PreloadLimited);
         }
         plan.cross_preload = match self.strategy {
-            Strategy::Scheduled => wanted.clamp(self.cruise_preload, most.max(self.cruise_preload)),
+            Strategy::Scheduled => {
+                let least = self.least_preload(request);
+                wanted.clamp(least, most.max(least))
+            }
             Strategy::Constant => self.cruise_preload,
             Strategy::Limit => self.most_preload,
             Strategy::Reactive => wanted.clamp(self.cruise_preload, self.most_preload),
         };
         plan.ramp_preload = plan.cross_preload;
-        if self.strategy == Strategy::Scheduled && rising {
-            plan.ramp_preload = (plan.cross_preload + BEYOND).min(self.most_preload);
+        // Until the step behind has been reviewed, the tread may turn out stiffer.
+        if self.strategy == Strategy::Scheduled && (rising || request.review.is_none()) {
+            plan.ramp_preload = self.most_preload;
         }
         let carried = plan.cross_preload.min(most) + arm_thrust;
         let crossing = self.model.crossing(&at, carried);
@@ -226,7 +217,9 @@ impl Planner {
         if margin < self.friction - self.usable {
             add(&mut plan.limits, Limit::SlipMarginLow);
         }
-        self.window(request, &at, carried, plan);
+        plan.approach = self.approach(request, &at, carried, plan.gap);
+        plan.approach.earlier_per_preload =
+            self.earlier_per_preload(&at, carried, plan.approach.lift);
     }
 
     /// What keeps a crossing of this choice from being faster.
@@ -253,46 +246,6 @@ impl Planner {
         }
     }
 
-    /// Where the corner may be felt, and where the crossing speed must be reached. The tread still
-    /// has the stiffness of the window's speed, with which the wheel would lift off earlier.
-    fn window(&self, request: &PlanRequest, at: &Point, carried: Newtons, plan: &mut Plan) {
-        let lift = self.lift(plan.direction, plan.gap);
-        plan.window_from = self.felt_at[plan.direction as usize] + self.tolerance;
-        plan.ready_from = lift + MEMORY[plan.direction as usize];
-        plan.slow_from = plan.ready_from;
-        plan.window_speed = self.window_speed(plan);
-        let fast = self.model.gap(&Point { speed: plan.window_speed, ..*at }, carried);
-        plan.slow_from += (self.lift(plan.direction, fast) - lift).max(Q16::ZERO);
-        plan.slow_from += (request.scale - KNOWN_SCALE).max(Q16::ZERO) * EARLIER_PER_SCALE;
-        plan.window_speed = self.window_speed(plan);
-        let less = carried * q16(100_000);
-        let gap = self.model.gap(at, carried - less);
-        let earlier = self.lift(plan.direction, gap) - lift;
-        plan.earlier_per_preload = divide(earlier.max(Q16::ZERO), less);
-    }
-
-    /// Speed from which the crossing speed is reached between where the corner is felt and where
-    /// it must be, mm/s.
-    fn window_speed(&self, plan: &Plan) -> MillimetresPerSecond {
-        let way = self.felt_at[plan.direction as usize] - FELT_WITHIN - plan.slow_from;
-        self.timing.fastest_into(way, plan.cross_speed, plan.cruise_speed).max(plan.cross_speed)
-    }
-
-    /// Distance along the run to the face at lift-off (retract: touch-down) with this gap, mm.
-    fn lift(&self, direction: Direction, gap: Millimetres) -> Millimetres {
-        // The tread's memory leaves the wall before the centre is as high as the free wheel's.
-        let height = match direction {
-            Direction::Deploy => self.radius - SHORT,
-            Direction::Retract => self.radius,
-        };
-        let reach = self.radius + gap;
-        let lift = sqrt((reach - height) * (reach + height));
-        match direction {
-            Direction::Deploy => lift,
-            Direction::Retract => -lift,
-        }
-    }
-
     /// The preload, and with it the speed, with which the wheel is over the step soonest: more
     /// preload takes time to build, less makes the crossing slow.
     fn choose(
@@ -303,7 +256,7 @@ impl Planner {
         bounds: (MillimetresPerSecond, MillimetresPerSecond),
     ) -> Choice {
         let (low, high) = match self.strategy {
-            Strategy::Scheduled => (self.cruise_preload, self.most_preload),
+            Strategy::Scheduled => (self.least_preload(request), self.most_preload),
             Strategy::Limit => (self.most_preload, self.most_preload),
             Strategy::Constant => (self.cruise_preload, self.cruise_preload),
             Strategy::Reactive => {
@@ -369,22 +322,30 @@ impl Planner {
             gap -= gap * q16(62_500);
             floor = floor.max(LEAST_FOR_GRIP).min(ceiling);
         }
-        let ready = self.timing.preload_change((preload - request.preload).max(Q16::ZERO));
-        let slower = self.cruise_speed - speed;
-        let change = self.timing.speed_change(slower) * divide(slower, self.cruise_speed);
-        let slow = divide(SLOW_TRAVEL[at.direction as usize], speed);
-        let travels =
-            divide(request.distance.max(Q16::ZERO), self.cruise_speed) + slow + change.half();
+        let at = Point { speed, ..*at };
+        let approach = self.approach(request, &at, preload + arm_thrust, gap);
+        let until = |preload: Newtons| {
+            self.timing.preload_change((preload - request.preload).max(Q16::ZERO))
+        };
+        // Below the cruise preload a wheel that stays slow would wait for long on the corner.
+        holds &= preload >= self.cruise_preload || approach.release_time > Seconds::ZERO;
+        let ready = until(preload);
+        let starts = if request.preload < self.start_preload {
+            until(self.start_preload)
+        } else {
+            Seconds::ZERO
+        };
+        let travels = starts + self.travels(request.distance, &approach);
         let rising = ready > travels;
-        let time = ready.max(travels) + change.half();
+        let time = ready.max(travels) + self.lost(approach.slowest_speed, self.cruise_speed);
         Choice { preload, gap, speed, time, rising, holds }
     }
 
     /// Distance and time of braking before the step.
     fn braking(&self, plan: &mut Plan) {
         plan.brake_horizon = self.timing.longest_brake_way(plan.cruise_speed.max(plan.cross_speed));
-        plan.brake_way = self.timing.brake_way(plan.cruise_speed, plan.cross_speed);
-        plan.brake_time = self.timing.speed_change(plan.cruise_speed - plan.cross_speed);
+        plan.brake_way = self.timing.brake_way(plan.cruise_speed, plan.approach.slowest_speed);
+        plan.brake_time = self.timing.speed_change(plan.cruise_speed - plan.approach.slowest_speed);
     }
 
     /// Compares a crossing with the model and corrects the stiffness, bounded.
@@ -429,6 +390,12 @@ impl Planner {
     fn arm_thrust_at(&self, step: u8) -> Newtons {
         let index = usize::from(step).saturating_sub(1);
         self.arm_thrust.get(index).copied().unwrap_or(Newtons::ZERO)
+    }
+
+    /// Least preload for the step ahead, N: that of cruise, or less while it is being built up.
+    fn least_preload(&self, request: &PlanRequest) -> Newtons {
+        let least = self.cruise_preload * BUILDING;
+        request.preload.clamp(least, self.cruise_preload)
     }
 
     fn between_steps(&self) -> Newtons {

@@ -2,7 +2,7 @@
 
 use super::{Controller, State, TickContext};
 use crate::control::schedule::{Course, Targets};
-use crate::numeric::divide;
+use crate::numeric::{between, divide};
 use crate::supervise::{Mode, Trigger};
 use crate::units::{
     Direction, Millimetres, MillimetresPerSecond, MotorCommand, Newtons, NewtonsPerSecond, Q16,
@@ -30,6 +30,7 @@ impl Controller {
             critical: estimate.critical(),
             ramping: state.approach.ramping,
             braking: state.approach.braking,
+            released: state.approach.released,
             looking: state.approach.looking,
             speed: state.profile.speed(),
             acceleration: state.profile.acceleration(),
@@ -47,6 +48,7 @@ impl Controller {
             preload: state.preload_loop.reference(),
             ramping: state.approach.ramping,
             braking: state.approach.braking,
+            released: state.approach.released,
             looking: state.approach.looking,
             approaching: false,
             waiting: false,
@@ -62,6 +64,7 @@ impl Controller {
         let (step, cross_speed, cross_preload) = (plan.step, plan.cross_speed, plan.cross_preload);
         state.approach.ramping = targets.ramping;
         state.approach.braking = targets.braking;
+        state.approach.released = targets.released;
         state.approach.looking = targets.looking;
         if !running {
             targets.speed = Q16::ZERO;
@@ -74,7 +77,9 @@ impl Controller {
             targets.speed = targets.speed.min(cross_speed);
             targets.preload = cross_preload;
         }
-        if let Some(speed) = state.estimate.lifting() {
+        if let Some(speed) = state.estimate.lifting()
+            && !state.approach.sped_up
+        {
             targets.speed = targets.speed.min(speed.max(self.least_speed));
         }
         self.note_preload(state, tick, cross_preload, &targets);
@@ -139,7 +144,7 @@ impl Controller {
         let (climb, drift) = if blend == Q16::ZERO {
             (Q16::ZERO, Q16::ZERO)
         } else {
-            self.corner(state, tick, blend)
+            self.corner(state, tick, targets.speed, blend)
         };
         let load = self.load + climb + self.inertia * state.acceleration();
         let measured = tick.sensed.speed.value;
@@ -152,14 +157,19 @@ impl Controller {
         &self,
         state: &State,
         tick: &TickContext<'_>,
+        target: MillimetresPerSecond,
         blend: Ratio,
     ) -> (Newtons, NewtonsPerSecond) {
         let (corner, direction) = (self.estimator.corner(), state.estimate.direction);
         let slope = blend * corner.drive_slope(direction, self.ahead(state, Q16::ZERO));
-        // The slope under the wheel when this tick's duty moves the screw.
-        let travel = state.signed_speed() * self.preload_latency;
-        let later = blend * corner.slope(self.ahead(state, travel));
-        (tick.pressed() * slope, self.spring * later * state.signed_speed())
+        // Slope and speed of the wheel when this tick's duty moves the screw.
+        let speed = state.profile.speed();
+        let change = state.profile.acceleration() * self.preload_latency;
+        let later = between(speed + change, speed.min(target), speed.max(target));
+        let sign = Q16::from_num(direction.sign());
+        let travel = sign * (speed + later).half() * self.preload_latency;
+        let steep = blend * corner.slope(self.ahead(state, travel));
+        (tick.pressed() * slope, sign * self.spring * steep * later)
     }
 
     fn regulate(

@@ -28,6 +28,7 @@ impl Controller {
             direction: estimate.direction,
             step: estimate.next_step,
             scale: planning.scale,
+            unknown: planning.unknown,
             reserve: planning.reserve,
             preload: tick.sensed.preload_filtered,
             distance: self.estimator.distance(estimate).unwrap_or_default(),
@@ -186,6 +187,7 @@ mod tests {
             ramping: true,
             looking: true,
             braking: true,
+            released: false,
             approaching: true,
             waiting: true,
         };

@@ -5,19 +5,12 @@ use crate::control::schedule::Targets;
 use crate::estimate::crossing::Contact;
 use crate::estimate::{ContactStage, Findings};
 use crate::model::Review;
+use crate::model::planner::KNOWN_SCALE;
 use crate::numeric::part;
 use crate::supervise::{Leg, Mode};
-use crate::units::{Duty, MotorCommand, Q16, Ratio, q16};
+use crate::units::{Duty, MotorCommand, Q16, q16};
 
 use super::state::Approach;
-
-/// Stiffness at rest over that of the rolling tread up to which the tread is as known: three
-/// deviations of random rigs, 0.99 +- 0.012.
-const RATIO_WITHIN: Ratio = q16(1_030_000);
-/// By how much a crossing is stiffer than known, per ratio beyond that. Fitted to 160 rigs drawn
-/// from the wide ranges: the stiffness that the first crossing shows grows with the power 2.6 of
-/// the ratio, +- 24 %; too stiff a guess only costs time.
-const SCALE_PER_RATIO: Q16 = q16(4_000_000);
 
 impl Controller {
     pub(super) fn take_findings(
@@ -28,7 +21,8 @@ impl Controller {
     ) {
         found.limits.into_iter().for_each(|limit| tick.log(Event::Limit(limit)));
         if found.advanced {
-            state.approach = Approach::default();
+            let sped_up = state.approach.released;
+            state.approach = Approach { sped_up, ..Approach::default() };
         }
         if let Some((open, plausible)) = found.closed {
             state.planning.closed = Some(open);
@@ -42,12 +36,11 @@ impl Controller {
             });
         }
         // What a crossing has shown goes before what the tread shows ahead of it.
-        let ratio = found.tread.filter(|_| state.planning.scale == Q16::ONE).unwrap_or(Q16::ONE);
-        let stiffer = ratio > RATIO_WITHIN;
-        if stiffer {
-            state.planning.scale += (ratio - RATIO_WITHIN) * SCALE_PER_RATIO;
-        }
-        if found.replan || stiffer {
+        let shown = found.stiffness.filter(|_| state.planning.scale == Q16::ONE);
+        let stiffer = shown.filter(|stiffness| *stiffness > Q16::ONE);
+        state.planning.scale = stiffer.unwrap_or(state.planning.scale);
+        state.planning.unknown |= stiffer.is_some_and(|stiffness| stiffness > KNOWN_SCALE);
+        if found.replan || stiffer.is_some() {
             self.ask(state, tick);
         }
         if let Some(fault) = found.fault {

@@ -47,6 +47,10 @@ pub(super) struct Approach {
     pub looking: bool,
     /// The speed is being brought down for the step.
     pub braking: bool,
+    /// The wheel speeds up again on the corner.
+    pub released: bool,
+    /// It did so on the corner behind, before it lifted off.
+    pub sped_up: bool,
     /// Time since which the crossing preload is reached.
     pub standing_since: Option<Tick>,
     /// Waiting for the preload has been reported.
@@ -65,6 +69,8 @@ pub(super) struct Planning {
     pub asked: u32,
     /// Estimated over nominal stiffness of the tread.
     pub scale: Ratio,
+    /// The tread has shown before the first crossing that it is not as known.
+    pub unknown: bool,
     /// Share of the reserve below the reference gap.
     pub reserve: Ratio,
     /// The last crossing, until its review is complete.
@@ -80,6 +86,7 @@ impl Default for Planning {
             sequence: 0,
             asked: 0,
             scale: Q16::ONE,
+            unknown: false,
             reserve: Q16::ONE,
             closed: None,
             review: None,

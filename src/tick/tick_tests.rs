@@ -113,6 +113,7 @@ fn only_on_a_corner_the_climb_limits_the_speed() {
             ramping: false,
             looking: true,
             braking: false,
+            released: false,
             approaching: false,
             waiting: false,
         };

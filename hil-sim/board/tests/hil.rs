@@ -153,10 +153,10 @@ fn commands(reads: impl Fn(u32) -> bool) -> (Vec<Taken>, Vec<u8>) {
 fn a_reader_that_stalls_or_is_not_there_changes_no_bit_of_the_control_trace() {
     let (read, log) = commands(|_| true);
     let run = Run::of_stream(&log);
-    assert!(run.is_complete() && run.rows.len() > 5000, "{:?}", run.marks);
+    assert!(run.is_complete() && run.rows.len() > 4000, "{:?}", run.marks);
     let (absent, nothing) = commands(|_| false);
     assert!(nothing.is_empty() && absent == read, "absent");
-    let (stalled, part) = commands(|tick| tick % 1000 < 300);
+    let (stalled, part) = commands(|tick| (500..800).contains(&(tick % 1000)));
     assert!(stalled == read, "stalled");
     let part = Run::of_stream(&part);
     assert!(part.counts.lost_frames > 100, "{:?}", part.counts);

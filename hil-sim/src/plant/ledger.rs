@@ -2,6 +2,10 @@
 
 use super::wall::Step;
 
+/// Travel of the tread over which the speed before lift-off counts, mm; as in the controller's
+/// `estimate::pace`.
+pub const REMEMBERED_MM: f64 = 0.5;
+
 /// What is looked at every ring step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moment {
@@ -42,7 +46,8 @@ pub struct Crossing {
     pub lift_s: f64,
     /// Clearance of the step root from the undeformed wheel at that instant, mm.
     pub gap_mm: f64,
-    /// Speed at that instant, mm/s.
+    /// Speed of the crossing: travel over time before that instant, with a weight that falls by e
+    /// in [`REMEMBERED_MM`], mm/s.
     pub speed_mm_s: f64,
     /// Preload at that instant, N.
     pub preload_n: f64,
@@ -71,6 +76,8 @@ struct Open {
     crossing: Crossing,
     slip_before: f64,
     last: Moment,
+    /// Time per travel as the tread remembers it, s/mm.
+    pace: f64,
     /// The gap is known: the line stands at the end of the list.
     listed: bool,
 }
@@ -101,6 +108,9 @@ impl Ledger {
             }
             return;
         }
+        let travel = (now.position_mm - open.last.position_mm).abs();
+        let time = now.time_s - open.last.time_s;
+        open.pace += (time - open.pace * travel) / REMEMBERED_MM;
         let crossing = &mut open.crossing;
         crossing.corner_n = crossing.corner_n.max(now.corner_n);
         crossing.peak_preload_n = crossing.peak_preload_n.max(now.preload_n);
@@ -143,7 +153,7 @@ impl Ledger {
         let height = mix(open.last.height_mm, now.height_mm) - now.base_mm;
         crossing.gap_mm = ahead.hypot(height) - self.radius_mm;
         crossing.lift_s = mix(open.last.time_s, now.time_s);
-        crossing.speed_mm_s = mix(open.last.speed_mm_s, now.speed_mm_s).abs();
+        crossing.speed_mm_s = 1.0 / open.pace;
         crossing.preload_n = mix(open.last.preload_n, now.preload_n);
         open.listed = true;
     }
@@ -170,6 +180,7 @@ impl Ledger {
             },
             slip_before: now.slip_mm,
             last: *now,
+            pace: 1.0 / now.speed_mm_s.abs().max(0.1),
             listed: false,
         })
     }

@@ -239,6 +239,7 @@ fn asked(planner: &Planner, model: &ReducedModel) -> Option<String> {
                     direction,
                     step: 2,
                     scale: ratio,
+                    unknown: false,
                     reserve: Q16::ONE,
                     preload: Q16::from_num(33),
                     distance: Q16::from_num(4),

@@ -20,8 +20,8 @@ fn a_grid_of_deployments_has_rows_table_and_picture() {
     for key in ["max_gap_mm", "duration_s", "slip_mm", "completed"] {
         assert_eq!(row[key], run[key], "{key}");
     }
-    // A slower tread opens a larger gap at the same speed and preload or crosses slower.
-    assert!(number(&rows[4], "duration_s") > number(&rows[0], "duration_s"));
+    // A slower tread opens a larger gap, also at the safe speed that gives the reference.
+    assert!(number(&rows[4], "max_gap_mm") > number(&rows[0], "max_gap_mm") + 0.02);
     let files: Vec<_> = found["files"]
         .as_array()
         .unwrap()

@@ -1,6 +1,7 @@
 //! From a rig to the planner's machine units, once at start.
 
 use super::Planner;
+use crate::model::dip::Dip;
 use crate::model::formula::Formula;
 use crate::model::guard::Guard;
 use crate::model::plan::Strategy;
@@ -62,11 +63,13 @@ impl Planner {
         let references = [reference(Direction::Deploy), reference(Direction::Retract)];
         let gap = |value: f64| checked("control.gap_ref_mm", value);
         let reserve = rig.control.gap_reserve;
+        let mass_kg = rig.drive.reflected_mass_kg + rig.plant.moved_mass_kg;
         let range = rig.control.adaptation_range;
         Ok(Self {
             model,
             guard: Guard::try_build(rig)?,
             timing: Timing::try_build(rig)?,
+            dip: Dip::try_build(rig)?,
             strategy,
             arm_thrust,
             coupling: checked("plant.arm_coupling", coupling)?,
@@ -94,6 +97,11 @@ impl Planner {
             felt_at: felt_at(rig)?,
             tolerance: checked("rig.step_tolerance_mm", rig.rig.step_tolerance_mm)?,
             cruise_preload: checked("preload.cruise_n", rig.preload.cruise_n)?,
+            start_preload: checked(
+                "control.slip_margin",
+                (load + mass_kg * 1e-3 * rig.drive.acceleration_mm_s2)
+                    / (rig.plant.mu - rig.control.slip_margin),
+            )?,
             most_preload: checked(
                 "preload.limit_n",
                 rig.preload.limit_n * (1.0 - REGULATION_PART),
@@ -145,6 +153,7 @@ mod tests {
             direction: if back { Direction::Retract } else { Direction::Deploy },
             step,
             scale: Q16::from_num(scale),
+            unknown: false,
             reserve: Q16::ONE,
             preload: Q16::from_num(50),
             distance: Q16::ZERO,
