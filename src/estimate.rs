@@ -5,9 +5,9 @@
 
 mod creep;
 pub mod crossing;
+mod crossing_speed;
 mod follow;
 pub mod odometry;
-mod pace;
 mod position;
 mod restore;
 mod run;

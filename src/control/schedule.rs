@@ -19,10 +19,9 @@ const REACHED_PART: Q16 = q16(20_000);
 const SLOWEST_WITHIN: Ratio = q16(1_100_000);
 /// Time by which braking starts early, for detection, tick and the loop's lag, s.
 const BRAKE_LAG: Seconds = q16(10_000);
-/// Distance by which braking for the end starts early, mm.
-const END_RESERVE: Millimetres = q16(20_000);
-/// Speed at which the last tenth of a millimetre is covered, mm/s.
-const END_CREEP: MillimetresPerSecond = q16(5_000_000);
+/// Distance by which braking for the end starts late, mm: the ticks make the profile's braking
+/// shorter by as much.
+const END_LATE: Millimetres = q16(30_000);
 
 /// Limits of a rig.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -155,9 +154,9 @@ impl Schedule {
             let needed = self.timing.ramp(short);
             let ready_from = plan.approach.ready_from + short * plan.approach.earlier_per_preload;
             let ready = distance - ready_from;
-            let slow_way = (plan.approach.slow_from - ready_from).max(Q16::ZERO);
-            let fast = ready - slow_way;
-            let slow = divide(slow_way, plan.approach.slowest_speed);
+            let slow_distance = (plan.approach.slow_from - ready_from).max(Q16::ZERO);
+            let fast = ready - slow_distance;
+            let slow = divide(slow_distance, plan.approach.slowest_speed);
             let allowed = if fast > Q16::ZERO {
                 if needed > slow { self.arriving_in(needed - slow, fast, course) } else { Q16::MAX }
             } else {
@@ -171,7 +170,8 @@ impl Schedule {
         }
         let short = short - self.reached_within;
         let released = course.released
-            || course.felt
+            || plan.approach.release_time > Q16::ZERO
+                && course.felt
                 && within(course.distance, plan.approach.release_from)
                 && course.speed <= plan.approach.slowest_speed * SLOWEST_WITHIN
                 && (short <= Q16::ZERO
@@ -238,23 +238,16 @@ impl Schedule {
         peak * until_peak + self.timing.brake_way(peak, speed)
     }
 
-    /// Speed towards the end of travel, mm/s: free until braking must begin, then a creep
-    /// that is left within a few hundredths of a millimetre.
+    /// Speed towards the end of travel, mm/s: free until braking to rest must begin.
     fn end_speed(
         &self,
         steps: &Steps,
         course: &Course,
         sight: Millimetres,
     ) -> MillimetresPerSecond {
-        if course.remaining > sight {
-            Q16::MAX
-        } else if steps.arrived(course.remaining)
-            || course.speed <= END_CREEP + q16(1_000_000)
-                && course.remaining <= self.timing.brake_way(course.speed, Q16::ZERO) - END_RESERVE
-        {
+        let due = || course.remaining <= self.brake_way(course, Q16::ZERO) - END_LATE;
+        if steps.arrived(course.remaining) || course.remaining <= sight && due() {
             Q16::ZERO
-        } else if course.remaining <= self.brake_way(course, END_CREEP) + END_RESERVE {
-            END_CREEP
         } else {
             Q16::MAX
         }
@@ -337,7 +330,7 @@ mod tests {
             prop_assert!(felt.braking && !felt.waiting);
             // As slow as planned and with its preload it speeds up again before it lifts off.
             let from = plan.approach.release_from.to_num::<f64>();
-            let there = plan.approach.slow_from.to_num::<f64>() - into < from;
+            let there = !back && plan.approach.slow_from.to_num::<f64>() - into < from;
             prop_assert_eq!(felt.released, there);
             let speed = if there { plan.cruise_speed } else { plan.approach.slowest_speed };
             prop_assert_eq!(felt.speed, speed);
@@ -379,13 +372,12 @@ mod tests {
                 distance: None,
                 ..course(&plan, 0.0, speed, 33.3)
             };
-            let got = schedule.targets(&steps, &plan, &at).speed.to_num::<f64>();
-            let way = schedule.timing.brake_way(Q16::from_num(speed), END_CREEP).to_num::<f64>();
-            if remaining < way {
-                prop_assert_eq!(got, END_CREEP.to_num::<f64>());
-            } else if remaining > way + 0.4 {
-                prop_assert_eq!(got, plan.cruise_speed.to_num::<f64>());
-            }
+            let got = schedule.targets(&steps, &plan, &at).speed;
+            let way = schedule.timing.brake_way(Q16::from_num(speed), Q16::ZERO) - END_LATE;
+            let way = way.to_num::<f64>();
+            prop_assume!((remaining - way).abs() > 1e-3);
+            let wanted = if remaining < way { Q16::ZERO } else { plan.cruise_speed };
+            prop_assert_eq!(got, wanted);
         }
     }
 

@@ -30,7 +30,7 @@ impl Estimator {
     pub fn begin_tick(&self, state: &mut EstimateState, sensed: &SensedState) {
         state.begin_tick(sensed.travel);
         self.memory.step(&mut state.remembered, sensed.preload_filtered);
-        state.pace.step(sensed.speed.value);
+        state.crossing_speed.step(sensed.speed.value);
     }
 
     /// One tick in which the drive moves.
@@ -218,7 +218,8 @@ impl Estimator {
             at: tick.now,
             position: state.position,
             gap: lift.gap,
-            speed: state.pace.speed(FILTER_LAG, sensed.speed.value),
+            speed: state.crossing_speed.speed(FILTER_LAG, sensed.speed.value),
+            held: sensed.speed.value,
             preload: sensed.preload_filtered,
             remembered: state.remembered_preload(),
             tan_arm: sensed.tan_arm,

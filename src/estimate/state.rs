@@ -1,8 +1,8 @@
 //! What the estimator remembers between ticks, and what it reports of one.
 
 use super::crossing::{Contact, WatchState};
+use super::crossing_speed::CrossingSpeed;
 use super::odometry::Odometry;
-use super::pace::Pace;
 use super::tread::TreadState;
 use super::{Place, Position, PositionConfidence};
 use crate::fault::{Fault, Limit};
@@ -29,7 +29,7 @@ pub struct EstimateState {
     /// Preload behind the memory of the tread, N.
     pub(super) remembered: LowPassState,
     /// Speed behind it.
-    pub(super) pace: Pace,
+    pub(super) crossing_speed: CrossingSpeed,
     /// Direction of the run.
     pub direction: Direction,
     /// Level by steps detected.
@@ -98,6 +98,8 @@ pub struct LiftPoint {
     pub gap: Millimetres,
     /// Wheel speed as the tread remembers it, mm/s.
     pub speed: MillimetresPerSecond,
+    /// Wheel speed in that tick, mm/s.
+    pub held: MillimetresPerSecond,
     /// Preload, N.
     pub preload: Newtons,
     /// Preload behind the memory of the tread, N.
@@ -189,7 +191,7 @@ impl EstimateState {
     /// surely been left (retract: reached).
     pub fn lifting(&self) -> Option<MillimetresPerSecond> {
         let point = self.crossing.as_ref()?.lift?;
-        ((self.position - point.position).abs() < LIFT_WITHIN).then_some(point.speed)
+        ((self.position - point.position).abs() < LIFT_WITHIN).then_some(point.held)
     }
 
     /// A corner is detected.

@@ -9,8 +9,6 @@ use crate::units::{Millimetres, MillimetresPerSecond, Ratio, Seconds, q16};
 /// Travel over which the speed before lift-off counts, mm. With the mean over it, 130 crossings of
 /// the ring whose speed dips open the gap of a constant speed to 5 % of that speed.
 const REMEMBERED: Millimetres = q16(600_000);
-/// Part of the time to full acceleration by which the wheel speeds up before lift-off.
-const RELEASE_PART: f64 = 1.0;
 
 /// With the slowest speed v, the jerk j and the time t before lift-off, the way from the slowest
 /// place is `v t + j t^3 / 6`, and over the travel D that the tread remembers the mean speed is
@@ -33,7 +31,7 @@ impl Dip {
         let remembered = REMEMBERED.to_num::<f64>();
         // Half of the remembered travel is left to the slowest speed.
         let most = libm::cbrt(3.0 * remembered / jerk);
-        let time = (RELEASE_PART * rig.drive.acceleration_mm_s2 / jerk).min(most);
+        let time = (rig.drive.acceleration_mm_s2 / jerk).min(most);
         let gained = jerk * time * time * time / 6.0;
         Ok(Self {
             time: checked("drive.jerk_mm_s3", time)?,
@@ -42,8 +40,8 @@ impl Dip {
         })
     }
 
-    /// Way before lift-off at which the wheel is slowest, mm: at most what the tread remembers.
-    pub fn way(&self, slowest: MillimetresPerSecond) -> Millimetres {
+    /// Distance to lift-off at which the wheel is slowest, mm: at most what the tread remembers.
+    pub fn distance(&self, slowest: MillimetresPerSecond) -> Millimetres {
         (slowest * self.time + self.gained).min(REMEMBERED)
     }
 }
@@ -70,8 +68,8 @@ mod tests {
             // From the slowest place on with full jerk, for that time; before it at rest in speed.
             let sped_up = slowest * time + jerk * time.powi(3) / 6.0;
             prop_assume!(sped_up < 0.6);
-            let way = dip.way(Q16::from_num(slowest)).to_num::<f64>();
-            prop_assert!((way - sped_up).abs() < 1e-3, "{way} {sped_up}");
+            let distance = dip.distance(Q16::from_num(slowest)).to_num::<f64>();
+            prop_assert!((distance - sped_up).abs() < 1e-3, "{distance} {sped_up}");
             let mean = 0.6 / (time + (0.6 - sped_up) / slowest);
             let got = slowest / dip.part.to_num::<f64>();
             prop_assert!((got / mean - 1.0).abs() < 2e-3, "{got} {mean}");

@@ -161,7 +161,7 @@ pub struct Plan {
     pub gap: Millimetres,
     /// Friction left unused at the step.
     pub slip_margin: Ratio,
-    /// Braking distance from cruise to crossing speed, mm.
+    /// Braking distance from cruise to the slowest speed, mm.
     pub brake_way: Millimetres,
     /// Time that this braking takes, s.
     pub brake_time: Seconds,

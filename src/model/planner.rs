@@ -58,8 +58,9 @@ const HOLDS_WITHIN: Newtons = q16(100_000);
 /// study's lowest, with the dip of a driven wheel.
 const LEAST_FOR_GRIP: MillimetresPerSecond = q16(3_360_000);
 
-/// Sixteenths of the gap taken off until the slip margin holds, at most.
-const SLIP_TRIES: usize = 8;
+/// Halvings by which the gap is found that leaves the slip margin: to 0.4 % of it, which is 3 % of
+/// the speed.
+const GRIP_HALVINGS: usize = 7;
 
 /// The model side of the schedule; runs outside the tick. The default is a place to read one
 /// into.
@@ -110,6 +111,8 @@ pub struct Planner {
 impl Planner {
     /// Answers a request.
     pub fn plan(&self, request: &PlanRequest) -> Plan {
+        let (softest, stiffest) = self.scale_range;
+        let request = &PlanRequest { scale: request.scale.max(softest).min(stiffest), ..*request };
         let outcome = request.review.map(|review| self.review(&review, request));
         let scale = outcome.map_or(request.scale, |o| o.scale);
         let share = outcome.map_or(request.reserve, |o| o.reserve);
@@ -197,8 +200,8 @@ impl Planner {
         }
         plan.cross_preload = match self.strategy {
             Strategy::Scheduled => {
-                let least = self.least_preload(request);
-                wanted.clamp(least, most.max(least))
+                // Below that of cruise only where the choice is.
+                wanted.max(most.min(self.cruise_preload)).min(most)
             }
             Strategy::Constant => self.cruise_preload,
             Strategy::Limit => self.most_preload,
@@ -308,27 +311,36 @@ impl Planner {
         arm_thrust: Newtons,
         (floor, ceiling): (MillimetresPerSecond, MillimetresPerSecond),
     ) -> Choice {
-        let mut gap = self.target(request.direction, request.reserve);
-        let (mut speed, mut holds, mut floor) = (floor, false, floor);
-        for _ in 0..SLIP_TRIES {
-            speed = self.model.speed(at, gap, preload + arm_thrust, floor, ceiling);
-            let at = Point { speed, ..*at };
-            let grips = self.model.utilisation(&at, gap) <= self.usable;
-            let carries = self.model.force(&at, gap) <= preload + arm_thrust + HOLDS_WITHIN;
-            holds = grips && carries;
-            if grips || speed <= floor {
-                break;
+        let target = self.target(request.direction, request.reserve);
+        let carried = preload + arm_thrust;
+        let speed_at = |gap, floor| self.model.speed(at, gap, carried, floor, ceiling);
+        let grips =
+            |gap, speed| self.model.utilisation(&Point { speed, ..*at }, gap) <= self.usable;
+        let (mut gap, mut speed) = (target, speed_at(target, floor));
+        if !grips(gap, speed) && speed > floor {
+            let floor = LEAST_FOR_GRIP.max(floor).min(ceiling);
+            let mut part = target.half();
+            gap = part;
+            for _ in 0..GRIP_HALVINGS {
+                part = part.half();
+                let larger = gap + part;
+                let speed = speed_at(larger, floor);
+                if grips(larger, speed) || speed <= floor {
+                    gap = larger;
+                }
             }
-            gap -= gap * q16(62_500);
-            floor = floor.max(LEAST_FOR_GRIP).min(ceiling);
+            speed = speed_at(gap, floor);
         }
         let at = Point { speed, ..*at };
-        let approach = self.approach(request, &at, preload + arm_thrust, gap);
+        let carries = self.model.force(&at, gap) <= carried + HOLDS_WITHIN;
+        let holds = carries && grips(gap, speed);
+        let approach = self.approach(request, &at, carried, gap);
         let until = |preload: Newtons| {
             self.timing.preload_change((preload - request.preload).max(Q16::ZERO))
         };
         // Below the cruise preload a wheel that stays slow would wait for long on the corner.
-        holds &= preload >= self.cruise_preload || approach.release_time > Seconds::ZERO;
+        let holds =
+            holds && (preload >= self.cruise_preload || approach.release_time > Seconds::ZERO);
         let ready = until(preload);
         let starts = if request.preload < self.start_preload {
             until(self.start_preload)

@@ -77,6 +77,7 @@ impl Controller {
             targets.speed = targets.speed.min(cross_speed);
             targets.preload = cross_preload;
         }
+        state.approach.sped_up &= !state.estimate.critical();
         if let Some(speed) = state.estimate.lifting()
             && !state.approach.sped_up
         {

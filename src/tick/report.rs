@@ -21,7 +21,7 @@ impl Controller {
     ) {
         found.limits.into_iter().for_each(|limit| tick.log(Event::Limit(limit)));
         if found.advanced {
-            let sped_up = state.approach.released;
+            let sped_up = state.approach.released && state.estimate.lifting().is_some();
             state.approach = Approach { sped_up, ..Approach::default() };
         }
         if let Some((open, plausible)) = found.closed {

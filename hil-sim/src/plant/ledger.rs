@@ -2,8 +2,8 @@
 
 use super::wall::Step;
 
-/// Travel of the tread over which the speed before lift-off counts, mm; as in the controller's
-/// `estimate::pace`.
+/// Travel of the axle over which the speed before lift-off counts, mm. The controller's
+/// `estimate::crossing_speed` has the same for the tread, which is what it can measure.
 pub const REMEMBERED_MM: f64 = 0.5;
 
 /// What is looked at every ring step.
@@ -77,7 +77,7 @@ struct Open {
     slip_before: f64,
     last: Moment,
     /// Time per travel as the tread remembers it, s/mm.
-    pace: f64,
+    slowness: f64,
     /// The gap is known: the line stands at the end of the list.
     listed: bool,
 }
@@ -110,7 +110,7 @@ impl Ledger {
         }
         let travel = (now.position_mm - open.last.position_mm).abs();
         let time = now.time_s - open.last.time_s;
-        open.pace += (time - open.pace * travel) / REMEMBERED_MM;
+        open.slowness += (time - open.slowness * travel) / REMEMBERED_MM;
         let crossing = &mut open.crossing;
         crossing.corner_n = crossing.corner_n.max(now.corner_n);
         crossing.peak_preload_n = crossing.peak_preload_n.max(now.preload_n);
@@ -153,7 +153,7 @@ impl Ledger {
         let height = mix(open.last.height_mm, now.height_mm) - now.base_mm;
         crossing.gap_mm = ahead.hypot(height) - self.radius_mm;
         crossing.lift_s = mix(open.last.time_s, now.time_s);
-        crossing.speed_mm_s = 1.0 / open.pace;
+        crossing.speed_mm_s = 1.0 / open.slowness;
         crossing.preload_n = mix(open.last.preload_n, now.preload_n);
         open.listed = true;
     }
@@ -180,7 +180,7 @@ impl Ledger {
             },
             slip_before: now.slip_mm,
             last: *now,
-            pace: 1.0 / now.speed_mm_s.abs().max(0.1),
+            slowness: 1.0 / now.speed_mm_s.abs().max(0.1),
             listed: false,
         })
     }

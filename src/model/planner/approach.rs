@@ -70,9 +70,9 @@ impl Planner {
         if direction == Direction::Retract || !known || slowest_speed < self.least_speed {
             return slow;
         }
-        // A tread that is as known: the wheel speeds up again before it lifts off. Its slowest
-        // place may come as late as the lift-off, and the window's end where steps are made.
-        let dip = self.dip.way(slowest_speed);
+        // A tread that is as known: the wheel speeds up again before it lifts off. It may be
+        // slowest as late as at lift-off, and half the tolerance is enough for the window.
+        let dip = self.dip.distance(slowest_speed);
         let slow_from = lift + earlier.max(dip);
         let later = if earlier > dip { dip * q16(750_000) } else { dip };
         let mut window_speed = speed_into(felt - slow_from + later, slowest_speed);

@@ -93,7 +93,7 @@ fn the_friction_is_checked_at_the_speed_of_the_crossing() {
             assert!(!found.holds || used <= planner.usable, "{mu} {direction:?} {used}");
             let target = planner.target(direction, Ratio::ONE);
             // No gap is given up for nothing: with the next larger one it would slip.
-            let larger = divide(found.gap, q16(937_500));
+            let larger = divide(found.gap, q16(992_000));
             if found.gap < target {
                 let (low, high) = bounds;
                 let speed = planner.model.speed(&at, larger, preload, low, high);

@@ -20,15 +20,15 @@ const LEAST: Travel = Travel::lit("0.005");
 /// Time per travel of the last 0.5 mm, s/mm, Q31.32: its mean, with a weight that falls by e in
 /// that travel. It is what the rubber had to relax in, so the time is averaged and not the speed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Pace(Travel);
+pub(super) struct CrossingSpeed(Travel);
 
-impl Default for Pace {
+impl Default for CrossingSpeed {
     fn default() -> Self {
         Self(MOST)
     }
 }
 
-impl Pace {
+impl CrossingSpeed {
     /// One tick at this speed, of either sign.
     pub(super) fn step(&mut self, speed: MillimetresPerSecond) {
         let missing = Q16::ONE - Q16::narrow(self.0) * speed.abs();
@@ -38,8 +38,8 @@ impl Pace {
 
     /// The remembered speed, mm/s, as it was `ago` before, if the wheel has had this speed since.
     pub(super) fn speed(&self, ago: Seconds, speed: MillimetresPerSecond) -> MillimetresPerSecond {
-        let pace = Q16::narrow(self.0);
-        let then = pace + (pace * speed.abs() - Q16::ONE) * (ago * RATE);
+        let slowness = Q16::narrow(self.0);
+        let then = slowness + (slowness * speed.abs() - Q16::ONE) * (ago * RATE);
         divide(Q16::ONE, then.max(Q16::narrow(LEAST)))
     }
 }
@@ -51,21 +51,21 @@ mod tests {
     use proptest::prelude::*;
 
     /// The same filter in f64, one tick.
-    fn exact(pace: f64, speed: f64) -> f64 {
-        (pace + (1.0 - pace * speed) / 500.0).clamp(0.005, 8.0)
+    fn exact(slowness: f64, speed: f64) -> f64 {
+        (slowness + (1.0 - slowness * speed) / 500.0).clamp(0.005, 8.0)
     }
 
     #[test]
     fn of_a_dip_the_slowest_part_counts_most() {
-        let mut pace = Pace::default();
+        let mut crossing = CrossingSpeed::default();
         let mut last = 0.0;
-        // 30 mm/s down to 10 and up to 14 again, as over a corner.
+        // 30 mm/s down to 10 and up to 18 again, as over a corner.
         let dip = (0..200).map(|_| 30.0).chain((0..80).map(|t| 30.0 - 0.25 * f64::from(t)));
-        for speed in dip.chain((0..40).map(|t| 10.0 + 0.1 * f64::from(t))) {
-            pace.step(Q16::from_num(speed));
+        for speed in dip.chain((0..40).map(|t| 10.0 + 0.2 * f64::from(t))) {
+            crossing.step(Q16::from_num(speed));
             last = speed;
         }
-        let remembered: f64 = pace.speed(Q16::ZERO, Q16::from_num(last)).to_num();
+        let remembered: f64 = crossing.speed(Q16::ZERO, Q16::from_num(last)).to_num();
         assert!((13.0..14.0).contains(&remembered), "{remembered}");
     }
 
@@ -75,24 +75,24 @@ mod tests {
             speeds in proptest::collection::vec(-60.0..60.0f64, 1..5),
             ticks in 1..400usize,
         ) {
-            let (mut pace, mut reference) = (Pace::default(), 8.0);
+            let (mut crossing, mut reference) = (CrossingSpeed::default(), 8.0);
             for speed in &speeds {
                 for _ in 0..ticks {
-                    pace.step(Q16::from_num(*speed));
+                    crossing.step(Q16::from_num(*speed));
                     reference = exact(reference, speed.abs());
                 }
             }
-            let got: f64 = Q16::narrow(pace.0).to_num();
+            let got: f64 = Q16::narrow(crossing.0).to_num();
             prop_assert!((got - reference).abs() < 2e-4 + 4e-3 * reference, "{got} {reference}");
         }
 
         #[test]
         fn a_constant_speed_is_remembered_as_it_is(speed in 1.0..60.0f64, ago in 0.0..0.01f64) {
-            let mut pace = Pace::default();
+            let mut crossing = CrossingSpeed::default();
             for _ in 0..4000 {
-                pace.step(Q16::from_num(speed));
+                crossing.step(Q16::from_num(speed));
             }
-            let got: f64 = pace.speed(Q16::from_num(ago), Q16::from_num(speed)).to_num();
+            let got: f64 = crossing.speed(Q16::from_num(ago), Q16::from_num(speed)).to_num();
             prop_assert!((got - speed).abs() < 0.01 + 2e-3 * speed, "{got}");
         }
 
@@ -102,15 +102,15 @@ mod tests {
             to in 5.0..20.0f64,
             ticks in 1..8u32,
         ) {
-            let mut pace = Pace::default();
+            let mut crossing = CrossingSpeed::default();
             for _ in 0..1000 {
-                pace.step(Q16::from_num(from));
+                crossing.step(Q16::from_num(from));
             }
             for _ in 0..ticks {
-                pace.step(Q16::from_num(to));
+                crossing.step(Q16::from_num(to));
             }
             let ago = Q16::from_num(f64::from(ticks) * 1e-3);
-            let got: f64 = pace.speed(ago, Q16::from_num(to)).to_num();
+            let got: f64 = crossing.speed(ago, Q16::from_num(to)).to_num();
             prop_assert!((got - from).abs() < 0.05 * from + 0.1 * (to - from).abs(), "{got}");
         }
     }
