@@ -187,10 +187,10 @@ impl EstimateState {
         on_corner && self.crossing.as_ref().is_some_and(|crossing| crossing.lift.is_none())
     }
 
-    /// Speed at the lift-off that has just been detected: it is kept until the lower wall has
-    /// surely been left (retract: reached).
+    /// Speed at the lift-off that has just been detected, mm/s: it is kept until the lower wall has
+    /// surely been left. None on retract, where the wall is reached.
     pub fn lifting(&self) -> Option<MillimetresPerSecond> {
-        let point = self.crossing.as_ref()?.lift?;
+        let point = self.crossing.as_ref()?.lift.filter(|_| self.direction == Direction::Deploy)?;
         ((self.position - point.position).abs() < LIFT_WITHIN).then_some(point.held)
     }
 
