@@ -170,8 +170,7 @@ impl Schedule {
         }
         let short = short - self.reached_within;
         let released = course.released
-            || plan.approach.release_time > Q16::ZERO
-                && course.felt
+            || course.felt
                 && within(course.distance, plan.approach.release_from)
                 && course.speed <= plan.approach.slowest_speed * SLOWEST_WITHIN
                 && (short <= Q16::ZERO
@@ -330,7 +329,7 @@ mod tests {
             prop_assert!(felt.braking && !felt.waiting);
             // As slow as planned and with its preload it speeds up again before it lifts off.
             let from = plan.approach.release_from.to_num::<f64>();
-            let there = !back && plan.approach.slow_from.to_num::<f64>() - into < from;
+            let there = plan.approach.slow_from.to_num::<f64>() - into < from;
             prop_assert_eq!(felt.released, there);
             let speed = if there { plan.cruise_speed } else { plan.approach.slowest_speed };
             prop_assert_eq!(felt.speed, speed);

@@ -47,8 +47,9 @@ pub struct CrossingWatch {
     /// Baseline of the outermost wall by the table, mm.
     outermost: Millimetres,
     /// Part of the compression before a step that the tread still has when the lower
-    /// wall stops carrying.
+    /// wall stops carrying, and the most that it still has, over the half width of the patch.
     memory: Ratio,
+    most_kept: Ratio,
     baseline: LowPass,
     settle: LowPass,
 }
@@ -329,7 +330,10 @@ impl CrossingWatch {
     ) -> Option<CrossingEvent> {
         // Height of the centre that the tread's memory still lacks at this instant.
         let short = match direction {
-            Direction::Deploy => state.flat * self.memory,
+            Direction::Deploy => {
+                let flat = state.flat.max(Q16::ZERO);
+                (flat * self.memory).min(sqrt(flat * (self.radius + self.radius)) * self.most_kept)
+            }
             Direction::Retract => Q16::ZERO,
         };
         let free = match direction {

@@ -129,9 +129,10 @@ pub struct Approach {
     pub ready_from: Millimetres,
     /// How much earlier the wheel lifts off per preload that it lacks, mm/N.
     pub earlier_per_preload: Ratio,
-    /// Where it may speed up again, mm; lift-off (retract: touch-down), if only behind that.
+    /// Where it may speed up again, mm: before lift-off, or at that of the model (retract:
+    /// touch-down).
     pub release_from: Millimetres,
-    /// Time from there to lift-off, s; 0 if it speeds up behind it.
+    /// Time from there to lift-off, s; 0 if it speeds up there.
     pub release_time: Seconds,
     /// Lift-off (retract: touch-down), mm.
     pub lift: Millimetres,

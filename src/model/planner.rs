@@ -54,9 +54,9 @@ const BUILDING: Ratio = q16(850_000);
 /// Error of the model's inverse, N.
 const HOLDS_WITHIN: Newtons = q16(100_000);
 
-/// Speed below which still less saves too little friction for the time that it takes, mm/s: the
-/// study's lowest, with the dip of a driven wheel.
-const LEAST_FOR_GRIP: MillimetresPerSecond = q16(3_360_000);
+/// Speed below which less of it no longer saves friction worth the time, mm/s: about the least
+/// crossing speed of a wheel that dips.
+const LEAST_FOR_GRIP: MillimetresPerSecond = q16(2_000_000);
 
 /// Halvings by which the gap is found that leaves the slip margin: to 0.4 % of it, which is 3 % of
 /// the speed.
