@@ -214,7 +214,7 @@ fn assert_sound_records(bench: &Bench, scenario: &Scenario, name: &str) {
         let truth = bench.true_gap_mm(&record);
         // At the study's loads a wheel that is turned back on the corner just after touch-down
         // leaves the lower wall at 19 mm/s: 1.07.
-        let (most, off) = if name.starts_with("fe") { (1.08, 0.04) } else { (1.05, 0.03) };
+        let (most, off) = if name.starts_with("fe") { (1.08, 0.05) } else { (1.05, 0.03) };
         let part = truth.unwrap_or(measured) / gap_ref(scenario, record.direction);
         assert!((0.65..most).contains(&part), "{name}: {part} {record:?}");
         let error = measured / truth.unwrap_or(measured) - 1.0;
