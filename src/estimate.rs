@@ -55,6 +55,8 @@ pub struct Estimator {
     corner_travel: Millimetres,
     /// Part by which the axle lags behind the tread per compression, 1/mm.
     rolling_lag: Ratio,
+    /// The same of a wheel in the middle of its life.
+    worn: Ratio,
     creep: Creep,
 }
 
@@ -74,6 +76,10 @@ impl Estimator {
             rolling_lag: checked(
                 "rig.wheel_radius_mm",
                 ROLLING_COMPRESSION / rig.rig.wheel_radius_mm,
+            )?,
+            worn: checked(
+                "rig.wheel_wear_mm",
+                0.5 * rig.rig.wheel_wear_mm / rig.rig.wheel_radius_mm,
             )?,
             creep: Creep::try_build(rig)?,
         })

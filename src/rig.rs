@@ -47,6 +47,9 @@ pub struct Rig {
 pub struct Geometry {
     /// Undeformed wheel radius R, mm. Published: 25.
     pub wheel_radius_mm: f64,
+    /// Loss of wheel radius at which the wheel is changed, mm; the odometry reckons with half of
+    /// it. Chosen.
+    pub wheel_wear_mm: f64,
     /// Wheel width L, mm. Published: 28.
     pub wheel_width_mm: f64,
     /// Step height h between neighbouring sleeves, mm. Published: 4.

@@ -105,8 +105,8 @@ pub struct Controller {
     friction: Ratio,
     /// Least useful speed of a crossing, mm/s.
     least_speed: MillimetresPerSecond,
-    /// Reciprocal of the friction that may be used along the wall.
-    by_grip: Q16,
+    /// Preload with which the wheel may roll along the wall, N.
+    rolling_preload: Newtons,
 }
 
 /// Data of a tick that the stages share.

@@ -32,8 +32,8 @@ pub const ORACLE: &str = "oracle";
 pub struct Entry {
     /// Strategy, or [`ORACLE`].
     pub controller: &'static str,
-    /// Reserve below the reference gap that the planner aims at; the tuning. None for the
-    /// oracle.
+    /// Part of the reference gap by which the planner's own one is below it; the tuning. None for
+    /// the oracle.
     pub gap_reserve: Option<f64>,
     /// Whether the worst gap was brought to the reference. At the least crossing speed it may
     /// still be above, without any reserve below.
@@ -99,8 +99,9 @@ pub struct Comparison {
 /// called after every run.
 ///
 /// Every strategy has the same planner: it rolls while the preload builds, brakes late, keeps
-/// the same friction check and aims at the reference gap less a reserve. The reserve of each is
-/// tuned until its worst gap over all rigs is the reference; then the times are comparable.
+/// the same friction check and aims at a gap that lies below the reference by a reserve. The
+/// reserve of each is tuned until its worst gap over all rigs is the reference; then the times are
+/// comparable.
 ///
 /// # Errors
 /// [`RunError`] if the parameters do not make a rig.
@@ -124,7 +125,8 @@ pub fn compare(
         let (entry, lines) = tuning::tune(reference, |reserve| {
             let mut scenario = scenario.clone();
             scenario.run.controller = kind;
-            scenario.rig.control.gap_reserve = reserve;
+            // Not the rig's own reserve: the crossings earn that back.
+            scenario.rig.control.gap_ref_mm = reference * (1.0 - reserve);
             let lines = montecarlo::run(&scenario, &seeds, progress)?;
             Ok((Entry::of(kind.name(), Some(reserve), &lines), lines))
         })?;

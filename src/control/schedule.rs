@@ -19,6 +19,9 @@ const REACHED_PART: Q16 = q16(20_000);
 const SLOWEST_WITHIN: Ratio = q16(1_100_000);
 /// Time by which braking starts early, for detection, tick and the loop's lag, s.
 const BRAKE_LAG: Seconds = q16(10_000);
+/// Time for which a wheel that is slow stays short of where it would lift off with the preload of
+/// now, s.
+const HELD_FOR: Seconds = q16(100_000);
 /// Distance by which braking for the end starts late, mm: the ticks make the profile's braking
 /// shorter by as much.
 const END_LATE: Millimetres = q16(30_000);
@@ -106,11 +109,6 @@ impl Schedule {
         self.reached_within
     }
 
-    /// Largest acceleration on the way from rest to this speed, mm/s^2.
-    pub fn peak_acceleration(&self, speed: MillimetresPerSecond) -> MillimetresPerSecond2 {
-        self.timing.peak_acceleration(speed)
-    }
-
     /// What to ask for.
     pub fn targets(&self, steps: &Steps, plan: &Plan, course: &Course) -> Targets {
         // To where crossing speed and preload must be reached, by the table or the felt corner.
@@ -153,14 +151,15 @@ impl Schedule {
             // Lift off with the preload, not before it; what is slow lies within that time.
             let needed = self.timing.ramp(short);
             let ready_from = plan.approach.ready_from + short * plan.approach.earlier_per_preload;
-            let ready = distance - ready_from;
-            let slow_distance = (plan.approach.slow_from - ready_from).max(Q16::ZERO);
-            let fast = ready - slow_distance;
+            let fast = distance - ready_from.max(plan.approach.slow_from);
+            let slow_distance = (plan.approach.slow_from - plan.approach.ready_from).max(Q16::ZERO);
             let slow = divide(slow_distance, plan.approach.slowest_speed);
             let allowed = if fast > Q16::ZERO {
                 if needed > slow { self.arriving_in(needed - slow, fast, course) } else { Q16::MAX }
             } else {
-                self.arriving_in(needed, ready, course)
+                let ready = self.arriving_in(needed.min(HELD_FOR), distance - ready_from, course);
+                let lifting = distance - plan.approach.ready_from;
+                self.arriving_in(needed, lifting, course).min(ready)
             };
             if allowed < speed {
                 speed = allowed;

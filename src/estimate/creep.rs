@@ -1,5 +1,5 @@
-//! Elastic creep: a tread that pulls runs ahead of its wheel. On the continuous wall alone: over a
-//! corner the chord's own error, 0.03 mm the other way, is as large.
+//! Elastic creep: a tread that pulls runs ahead of its wheel. Over a corner, too, it is reckoned as
+//! on the wall: the tread creeps more there, and the chord errs the other way by about as much more.
 
 #![deny(clippy::float_arithmetic)]
 

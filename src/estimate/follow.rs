@@ -41,10 +41,11 @@ impl Estimator {
         let seen = self.watch_input(state, tick.sensed);
         let event = self.watch.step(&mut state.watch, direction, &seen);
         let on_corner = state.on_corner();
-        let creep = if on_corner { Q16::ZERO } else { self.creep.outwards(tick.pressed) };
+        let creep = self.creep.outwards(tick.pressed);
         let rolling = Rolling {
             radius: tick.sensed.radius.value,
-            lag: self.rolling_lag * tick.sensed.compression_filtered
+            lag: self.worn
+                + self.rolling_lag * tick.sensed.compression_filtered
                 + creep * Q16::from_num(direction.sign()),
             on_corner,
         };
@@ -214,6 +215,8 @@ impl Estimator {
         let seen = position_of_radius(state, sensed) + lift.distance;
         let face = if open.resumed { table.unwrap_or(seen) } else { seen };
         let residual = table.map_or(Q16::ZERO, |table| face - table);
+        let corrects = open.step > 0 && !open.turned;
+        let left = if corrects { self.correct(state, sensed, residual, found) } else { residual };
         open.lift = Some(LiftPoint {
             at: tick.now,
             position: state.position,
@@ -223,36 +226,34 @@ impl Estimator {
             preload: sensed.preload_filtered,
             remembered: state.remembered_preload(),
             tan_arm: sensed.tan_arm,
-            face,
-            residual,
+            // As the corrected odometry has it.
+            face: face - (residual - left),
+            residual: left,
         });
         state.crossing = Some(open);
         if open.step > 0 {
-            if !open.turned {
-                self.correct(state, sensed, residual, found);
-            }
             state.begin_tick(sensed.travel);
             self.advance(state, found);
         }
         found.replan = true;
     }
 
-    /// Corrects the odometry by a step's residual.
+    /// Corrects the odometry by a step's residual; what is left of it, mm.
     fn correct(
         &self,
         state: &mut EstimateState,
         sensed: &SensedState,
         residual: Millimetres,
         found: &mut Findings,
-    ) {
+    ) -> Millimetres {
         let tolerance = self.steps.tolerance();
         let alike = |other: Millimetres| (residual - other).abs() <= tolerance;
         if state.known.is_searching() {
             state.odometry.set_by_step(sensed.travel, state.position - residual);
             state.known = Position::Located;
         } else if residual.abs() <= tolerance {
-            state.odometry.correct(residual);
             state.displaced = None;
+            return state.odometry.correct(state.position, residual);
         } else if state.displaced.is_some_and(alike) {
             // Two in a row off by the same: the odometry is wrong.
             state.odometry.set_by_step(sensed.travel, state.position - residual);
@@ -266,6 +267,7 @@ impl Estimator {
             state.displaced = Some(residual);
             report_displaced(state, residual, found);
         }
+        residual
     }
 
     /// Input of the crossing watch.
@@ -329,11 +331,9 @@ fn position_of_radius(state: &EstimateState, sensed: &SensedState) -> Millimetre
 fn refine(state: &mut EstimateState, shift: Millimetres) {
     let observed = state.crossing.as_mut().filter(|open| !open.resumed && !open.turned);
     let Some(point) = observed.and_then(|open| open.lift.as_mut()) else { return };
-    point.face += shift;
-    point.residual += shift;
-    if state.displaced.is_none() {
-        state.odometry.refine(shift);
-    }
+    let left = if state.displaced.is_none() { state.odometry.refine(shift) } else { shift };
+    point.face += left;
+    point.residual += left;
 }
 
 /// The crossing is behind: reports it for review, unless only half of it was observed.

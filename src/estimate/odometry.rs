@@ -1,14 +1,22 @@
 //! Axial position: the wheel's travel, less what rolling over corners takes, corrected at
-//! every recognised step.
+//! every recognised step. What the steps show of the wheel's rolling radius corrects the travel
+//! after them, and is kept from run to run.
 
 #![deny(clippy::float_arithmetic)]
 
 use crate::numeric::{divide, sqrt};
 use crate::units::{Millimetres, Q16, Ratio, Travel, q16};
 
-/// Steps whose tolerance weighs as much as the odometry from a sure position: a sleeve is
-/// machined to 0.3 mm, odometry is off by less than 0.1 mm over the 22 mm between two steps.
-const SURE: u8 = 9;
+/// Variance of a known position over that of a step's place: 0.03 mm. A sleeve is machined to
+/// 0.3 mm, which is a deviation of 0.17 mm.
+const KNOWN: Ratio = q16(30_000);
+/// The same of the travel after 64 mm while no step has shown the wheel's radius: 0.13 %, a wheel
+/// that is made and worn to 0.05 mm.
+const UNKNOWN_RADIUS: Ratio = q16(250_000);
+/// Reciprocal of these 64 mm.
+const PER_REACH: Q16 = q16(15_625);
+/// Largest correction of the travel, relative.
+const MOST_SCALE: Ratio = q16(20_000);
 
 /// Largest correction at one step, mm: beyond it the step is not the one expected.
 const LARGEST: Millimetres = q16(2_000_000);
@@ -18,12 +26,39 @@ const LARGEST: Millimetres = q16(2_000_000);
 const CHORD: Millimetres = q16(800_000);
 
 /// Offset of the position from the wheel's travel, and the chord that is not converted yet.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+///
+/// Offset and scale of the travel are the least-squares estimate from the residuals of the
+/// steps: a Kalman filter with these two states, in units of a step's tolerance and of
+/// 64 mm (Kalman 1960).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Odometry {
     offset: Travel,
-    /// Steps of the table that the offset is the mean of; [`SURE`] for a position that is known.
-    steps: u8,
+    /// Part by which the axle goes farther than the tread on its radius as known.
+    scale: Ratio,
+    /// Position from which the travel counts, mm.
+    origin: Millimetres,
+    /// Variances of position and scale, and their covariance.
+    variance: [Ratio; 2],
+    covariance: Ratio,
+    /// Parts of the last residual that position and scale took over.
+    share: Ratio,
+    gain: Ratio,
     from: Option<Start>,
+}
+
+impl Default for Odometry {
+    fn default() -> Self {
+        Self {
+            offset: Travel::ZERO,
+            scale: Ratio::ZERO,
+            origin: Millimetres::ZERO,
+            variance: [KNOWN, UNKNOWN_RADIUS],
+            covariance: Ratio::ZERO,
+            share: Ratio::ZERO,
+            gain: Ratio::ZERO,
+            from: None,
+        }
+    }
 }
 
 /// How the wheel rolls in a tick.
@@ -53,16 +88,21 @@ impl Odometry {
 
     /// Declares that the wheel is at `position`.
     pub fn set(&mut self, travel: Travel, position: Millimetres) {
-        self.offset = position.widen().saturating_sub(travel);
-        self.steps = SURE;
-        self.from = None;
+        *self = Self {
+            offset: position.widen().saturating_sub(travel),
+            origin: position,
+            scale: self.scale,
+            variance: [KNOWN, self.variance[1]],
+            ..Self::default()
+        };
     }
 
     /// Declares that the wheel is at `position` because a step was found: as sure as that
     /// step's place.
     pub fn set_by_step(&mut self, travel: Travel, position: Millimetres) {
         self.set(travel, position);
-        self.steps = 1;
+        self.variance[0] = Ratio::ONE;
+        self.share = Ratio::ONE;
     }
 
     /// Begins a run: what moved the arm since the last one was no rolling.
@@ -70,25 +110,41 @@ impl Odometry {
         self.from = None;
     }
 
-    /// Takes over the part of the difference between where a step was found and where the
-    /// table has it, mm, by which the offset is the mean over the steps found.
-    pub fn correct(&mut self, residual: Millimetres) {
-        let steps = (self.steps + 1).min(SURE + 1);
-        let share = divide(residual.clamp(-LARGEST, LARGEST), Q16::from_num(steps));
-        self.steps = steps.min(SURE);
-        self.offset = self.offset.saturating_sub(share.widen());
+    /// Takes over its part of the difference between where a step was found, near `position`, and
+    /// where the table has it, mm; what is left of it.
+    pub fn correct(&mut self, position: Millimetres, residual: Millimetres) -> Millimetres {
+        let residual = residual.clamp(-LARGEST, LARGEST);
+        let reach = (position - self.origin) * PER_REACH;
+        let [place, scale] = self.variance;
+        let (of_place, of_scale) =
+            (place + reach * self.covariance, self.covariance + reach * scale);
+        let expected = of_place + reach * of_scale;
+        let all = Ratio::ONE + expected;
+        let (gain_of_place, gain) = (divide(of_place, all), divide(of_scale, all));
+        self.variance = [
+            (place - gain_of_place * of_place).max(Q16::ZERO),
+            (scale - gain * of_scale).max(Q16::ZERO),
+        ];
+        self.covariance -= gain_of_place * of_scale;
+        (self.share, self.gain) = (divide(expected, all), gain);
+        self.refine(residual)
     }
 
-    /// The step found last lies `shift` further out than its residual had it, mm.
-    pub fn refine(&mut self, shift: Millimetres) {
-        let share = divide(shift, Q16::from_num(self.steps.max(1)));
-        self.offset = self.offset.saturating_sub(share.widen());
+    /// The step found last lies `shift` further out than its residual had it, mm; what is left of
+    /// that.
+    pub fn refine(&mut self, shift: Millimetres) -> Millimetres {
+        let taken = shift * self.share;
+        self.offset = self.offset.saturating_sub(taken.widen());
+        let scale = self.scale - shift * self.gain * PER_REACH;
+        self.scale = scale.clamp(-MOST_SCALE, MOST_SCALE);
+        shift - taken
     }
 
     /// Converts what the tread has travelled to axial travel once it makes a chord, or `now`.
     ///
-    /// The wheel rolls by `ds = (1 - lag) ds_0` where its tread turns by ds_0; with the rise dy of the
-    /// centre the axle advances by dx, `dx^2 + dy^2 = ds^2` (first order in the compression).
+    /// The wheel rolls by `ds = (1 - lag + scale) ds_0` where its tread turns by ds_0; with the rise
+    /// dy of the centre the axle advances by dx, `dx^2 + dy^2 = ds^2` (first order in the
+    /// compression).
     /// `on_corner`: the rise counts; on the wall it is noise.
     pub fn roll(&mut self, travel: Travel, rolling: &Rolling, now: bool) {
         let Some(from) = self.from else {
@@ -101,7 +157,7 @@ impl Odometry {
             return;
         }
         self.from = Some(Start { travel, radius: rolling.radius });
-        let rolled = tread - tread * rolling.lag;
+        let rolled = tread - tread * (rolling.lag - self.scale);
         let rise = if rolling.on_corner { rolling.radius - from.radius } else { Q16::ZERO };
         let advanced = sqrt((rolled * rolled - rise * rise).max(Q16::ZERO));
         let lost = if signed < Q16::ZERO { advanced - tread } else { tread - advanced };
@@ -190,40 +246,73 @@ mod tests {
         assert_eq!(odometry.position(Travel::from_num(5)), Q16::from_num(5));
     }
 
+    /// Least squares over position and scale in f64, from residuals at these distances.
+    fn least_squares(place: f64, found: &[(f64, f64)]) -> (f64, f64) {
+        let scale = UNKNOWN_RADIUS.to_num::<f64>() / (64.0 * 64.0);
+        let (mut a, mut b, mut c, mut p, mut q) = (1.0 / place, 0.0, 1.0 / scale, 0.0, 0.0);
+        for (x, r) in found {
+            a += 1.0;
+            b += x;
+            c += x * x;
+            p += r;
+            q += x * r;
+        }
+        let det = a * c - b * b;
+        ((c * p - b * q) / det, (a * q - b * p) / det)
+    }
+
+    proptest! {
+        #[test]
+        fn steps_give_position_and_radius_by_least_squares(
+            back in any::<bool>(),
+            by_step in any::<bool>(),
+            places in proptest::collection::vec(-0.3..0.3f64, 1..8),
+            stretch in -0.003..0.003f64,
+            shift in -0.1..0.1f64,
+        ) {
+            let sign = if back { -1.0 } else { 1.0 };
+            let (mut odometry, mut travel) = (Odometry::default(), Travel::ZERO);
+            if by_step {
+                odometry.set_by_step(travel, Q16::from_num(50));
+            } else {
+                odometry.set(travel, Q16::from_num(50));
+            }
+            let place = odometry.variance[0].to_num::<f64>();
+            let rolling = Rolling { radius: Q16::ZERO, lag: Q16::ZERO, on_corner: false };
+            odometry.roll(travel, &rolling, true);
+            // Every 20 mm of the tread a step; the table has it off by its place, and by how much
+            // farther the tread runs.
+            let mut found = Vec::new();
+            for off in places {
+                let x = sign * 20.0 * (found.len() + 1) as f64;
+                found.push((x, x * stretch + off));
+                for _ in 0..20 {
+                    travel += Travel::from_num(sign);
+                    odometry.roll(travel, &rolling, true);
+                }
+                let position = odometry.position(travel);
+                let residual = position - Q16::from_num(50.0 + x - x * stretch - off);
+                // Found a little off at first.
+                let shift = Q16::from_num(shift);
+                let left = odometry.correct(position, residual - shift) + odometry.refine(shift);
+                prop_assert!((odometry.position(travel) - position + residual - left).abs() < q16(1_000));
+                let (offset, scale) = least_squares(place, &found);
+                let exact = 50.0 + x - offset - x * scale;
+                let got: f64 = odometry.position(travel).to_num();
+                prop_assert!((got - exact).abs() < 0.01, "{got} {exact}");
+            }
+        }
+    }
+
     #[test]
-    fn of_a_sure_position_a_tenth_of_a_residual_is_taken_over() {
+    fn the_radius_found_is_kept_from_run_to_run() {
         let mut odometry = Odometry::default();
         odometry.set(Travel::ZERO, Q16::ZERO);
-        odometry.correct(Q16::from_num(0.5));
-        let position: f64 = odometry.position(Travel::from_num(20)).to_num();
-        assert!((position - 19.95).abs() < 1e-3, "{position}");
-    }
-
-    #[test]
-    fn a_step_that_is_refined_counts_as_if_it_had_been_found_there() {
-        let [mut late, mut at_once] = [Odometry::default(); 2];
-        for odometry in [&mut late, &mut at_once] {
-            odometry.set_by_step(Travel::ZERO, Q16::ZERO);
-        }
-        late.correct(Q16::from_num(0.5));
-        late.refine(Q16::from_num(-0.2));
-        at_once.correct(Q16::from_num(0.3));
-        let [late, at_once] = [late, at_once].map(|odometry| odometry.position(Travel::ZERO));
-        assert!((late - at_once).abs() < q16(100), "{late} {at_once}");
-    }
-
-    #[test]
-    fn a_position_that_steps_set_is_the_mean_over_their_places() {
-        let places = [0.3, -0.2, 0.2, -0.1];
-        let mut odometry = Odometry::default();
-        // The step at 20 mm is found; the table has it off by its place error.
-        odometry.set_by_step(Travel::ZERO, Q16::from_num(places[0]));
-        for found in 2..=places.len() {
-            let off: f64 = odometry.position(Travel::ZERO).to_num();
-            odometry.correct(Q16::from_num(off - places[found - 1]));
-            let mean = places[..found].iter().sum::<f64>() / found as f64;
-            let off: f64 = odometry.position(Travel::ZERO).to_num();
-            assert!((off - mean).abs() < 1e-3, "{off} {mean}");
-        }
+        odometry.correct(Q16::from_num(60), Q16::from_num(0.5));
+        let scale = odometry.scale;
+        assert!(scale < Q16::ZERO);
+        odometry.set(Travel::ZERO, Q16::ZERO);
+        assert_eq!(odometry.scale, scale);
+        assert!(odometry.variance[1] < UNKNOWN_RADIUS);
     }
 }

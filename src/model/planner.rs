@@ -49,7 +49,7 @@ const PRELOADS: u32 = 16;
 const PRELOAD_STEP: Ratio = q16(62_500);
 
 /// Part of the cruise preload with which the wheel may cross while the preload is being built up.
-const BUILDING: Ratio = q16(850_000);
+const BUILDING: Ratio = q16(900_000);
 
 /// Error of the model's inverse, N.
 const HOLDS_WITHIN: Newtons = q16(100_000);
@@ -96,8 +96,8 @@ pub struct Planner {
     tolerance: Millimetres,
     /// Distance to the face at which the corner shows where it is, deploy and retract, mm.
     felt_at: [Millimetres; 2],
-    /// Preload with which the wheel may start at full acceleration, N.
-    start_preload: Newtons,
+    /// Preload with which the wheel may roll along the wall, N.
+    rolling_preload: Newtons,
     /// Preload that the plan may ask for, N.
     most_preload: Newtons,
     /// Friction of tread on wall as far as known.
@@ -342,8 +342,8 @@ impl Planner {
         let holds =
             holds && (preload >= self.cruise_preload || approach.release_time > Seconds::ZERO);
         let ready = until(preload);
-        let starts = if request.preload < self.start_preload {
-            until(self.start_preload)
+        let starts = if request.preload < self.rolling_preload {
+            until(self.rolling_preload)
         } else {
             Seconds::ZERO
         };

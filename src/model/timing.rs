@@ -64,11 +64,6 @@ impl Timing {
         }
     }
 
-    /// Largest acceleration in that change, mm/s^2: `sqrt(D j)` below the knee.
-    pub fn peak_acceleration(&self, change: MillimetresPerSecond) -> MillimetresPerSecond2 {
-        self.acceleration * sqrt(self.by_knee.divide(change.max(Q16::ZERO).min(self.knee)))
-    }
-
     /// Distance of that change between two speeds, mm: the S-curve is symmetric, so its
     /// duration times the mean speed.
     pub fn brake_way(&self, from: MillimetresPerSecond, to: MillimetresPerSecond) -> Millimetres {

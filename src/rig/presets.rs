@@ -13,6 +13,7 @@ impl Rig {
         Self {
             rig: Geometry {
                 wheel_radius_mm: 25.0,
+                wheel_wear_mm: 0.05,
                 wheel_width_mm: 28.0,
                 step_height_mm: 4.0,
                 step_positions_mm: list(&[18.0, 40.0, 62.0]),

@@ -7,6 +7,10 @@ use super::Rig;
 /// within its tolerances exceeds the limit with it.
 pub(crate) const REGULATION_PART: f64 = 0.045;
 
+/// Reserve of the preload with which the wheel begins to roll: load, friction and a preload sensor
+/// near its zero are known less well than under way.
+const ROLLING_RESERVE: f64 = 1.5;
+
 /// Least speed of the unloaded motor over the cruise speed, for regulation.
 const TOP_SPEED_RESERVE: f64 = 1.2;
 
@@ -175,10 +179,23 @@ impl Rig {
         self.rig.wall_radius_mm - self.rig.step_height_mm * level as f64 - self.rig.wheel_radius_mm
     }
 
+    /// Preload with which the wheel may roll along the wall, N: its tread carries load and
+    /// carriage, not the inertia of the rotor behind it. A trailing arm presses it on besides,
+    /// which is left as a reserve; what a leading one lifts it by counts.
+    pub fn rolling_preload_n(&self) -> f64 {
+        let load = self.plant.top_load_n * self.plant.top_load_share
+            + 1e-3 * self.plant.moved_mass_kg * self.drive.acceleration_mm_s2;
+        let sine =
+            (self.centre_radius_mm(0) - self.rig.arm_pivot_radius_mm) / self.rig.arm_length_mm;
+        let lifted = (-self.plant.arm_coupling).max(0.0) * sine / libm::sqrt(1.0 - sine * sine);
+        ROLLING_RESERVE * load * (1.0 / (self.plant.mu - self.control.slip_margin) + lifted)
+    }
+
     /// Keys with their value and its least and largest value.
-    pub const fn bounds(&self) -> [(&'static str, f64, f64, f64); 44] {
+    pub const fn bounds(&self) -> [(&'static str, f64, f64, f64); 45] {
         [
             ("rig.wheel_radius_mm", self.rig.wheel_radius_mm, 10.0, 150.0),
+            ("rig.wheel_wear_mm", self.rig.wheel_wear_mm, 0.0, 5.0),
             ("rig.wheel_width_mm", self.rig.wheel_width_mm, 1.0, 200.0),
             ("rig.step_height_mm", self.rig.step_height_mm, 1.5, 8.0),
             ("rig.step_tolerance_mm", self.rig.step_tolerance_mm, 0.05, 5.0),

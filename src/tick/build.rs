@@ -59,10 +59,7 @@ impl Controller {
                 "drive.min_crossing_speed_mm_s",
                 rig.drive.min_crossing_speed_mm_s,
             )?,
-            by_grip: checked(
-                "control.slip_margin",
-                1.0 / (rig.plant.mu - rig.control.slip_margin),
-            )?,
+            rolling_preload: checked("control.slip_margin", rig.rolling_preload_n())?,
         })
     }
 

@@ -5,7 +5,7 @@ use super::{Controller, Event, State, TickContext};
 use crate::fault::{Fault, Limit};
 use crate::supervise::startup::{TEST_TICKS, all_answer, at_rest, silent, stowed};
 use crate::supervise::{Mode, Trigger, next};
-use crate::units::{Direction, MillimetresPerSecond, Newtons, Q16};
+use crate::units::{Direction, Q16};
 
 /// Ticks for which a preload must be reached before the drive starts.
 const STANDING_TICKS: u32 = 60;
@@ -107,8 +107,7 @@ impl Controller {
             let course = self.course(state, tick, direction);
             let targets = self.schedule.targets(self.estimator.steps(), plan, &course);
             let enough = targets.preload - self.schedule.reached_within();
-            let enough = enough.min(self.roll_preload(targets.speed));
-            tick.sensed.preload_filtered >= enough
+            tick.sensed.preload_filtered >= enough.min(self.rolling_preload)
         });
         state.condition_ticks = if reached { state.condition_ticks + 1 } else { 0 };
         if state.condition_ticks >= STANDING_TICKS {
@@ -116,11 +115,6 @@ impl Controller {
         } else if state.in_mode >= self.preload_timeout {
             tick.fail(Fault::PreloadNotReached);
         }
-    }
-
-    /// Preload with which the wheel comes to this speed on the wall without slip, N.
-    fn roll_preload(&self, speed: MillimetresPerSecond) -> Newtons {
-        (self.load + self.inertia * self.schedule.peak_acceleration(speed)) * self.by_grip
     }
 
     /// The end of travel, confirmed by the arm.
@@ -149,7 +143,6 @@ impl Controller {
 mod tests {
     use super::super::tests::{sensed, within};
     use super::*;
-    use crate::rig::Rig;
     use crate::sense::{SensedState, Validity};
     use crate::supervise::Command;
     use crate::units::q16;
@@ -262,21 +255,6 @@ mod tests {
         assert_eq!(armed(Mode::Boot, Trigger::SensorsAnswer), (Mode::SelfTest, false));
         for from in [Mode::Idle, Mode::Complete(Direction::Retract)] {
             assert_eq!(armed(from, reset), (Mode::SelfTest, false), "{from:?}");
-        }
-    }
-
-    #[test]
-    fn the_wheel_rolls_once_its_preload_carries_load_and_acceleration() {
-        let rig = Rig::prototype();
-        let controller = Controller::try_build(&rig).expect("a sound rig");
-        let load = rig.plant.top_load_n * rig.plant.top_load_share;
-        let mass = rig.drive.reflected_mass_kg + rig.plant.moved_mass_kg;
-        for speed in [0.0, 1.0, 6.0, 12.5, 30.0] {
-            let peak = libm::sqrt(speed * rig.drive.jerk_mm_s3).min(rig.drive.acceleration_mm_s2);
-            let needed = load + mass * 1e-3 * peak;
-            let carried = controller.roll_preload(Q16::from_num(speed)).to_num::<f64>()
-                * (rig.plant.mu - rig.control.slip_margin);
-            assert!((carried / needed - 1.0).abs() < 0.01, "{speed}: {carried} {needed}");
         }
     }
 }

@@ -66,3 +66,14 @@ fn the_drives_work_is_found_again_on_random_rigs() {
         balances(scenario.plant(), -10.0, 40.0);
     }
 }
+
+#[test]
+fn the_drives_work_is_found_again_with_a_wheel_off_its_axis() {
+    for run_out_mm in [0.1, 0.3] {
+        for speed in [10.0, -10.0] {
+            let mut plant = nominal("prototype");
+            plant.run_out_mm = run_out_mm;
+            balances(plant, speed, 45.0);
+        }
+    }
+}

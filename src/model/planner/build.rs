@@ -63,7 +63,6 @@ impl Planner {
         let references = [reference(Direction::Deploy), reference(Direction::Retract)];
         let gap = |value: f64| checked("control.gap_ref_mm", value);
         let reserve = rig.control.gap_reserve;
-        let mass_kg = rig.drive.reflected_mass_kg + rig.plant.moved_mass_kg;
         let range = rig.control.adaptation_range;
         Ok(Self {
             model,
@@ -97,11 +96,7 @@ impl Planner {
             felt_at: felt_at(rig)?,
             tolerance: checked("rig.step_tolerance_mm", rig.rig.step_tolerance_mm)?,
             cruise_preload: checked("preload.cruise_n", rig.preload.cruise_n)?,
-            start_preload: checked(
-                "control.slip_margin",
-                (load + mass_kg * 1e-3 * rig.drive.acceleration_mm_s2)
-                    / (rig.plant.mu - rig.control.slip_margin),
-            )?,
+            rolling_preload: checked("control.slip_margin", rig.rolling_preload_n())?,
             most_preload: checked(
                 "preload.limit_n",
                 rig.preload.limit_n * (1.0 - REGULATION_PART),

@@ -17,11 +17,12 @@ impl VirtualRig {
         let (p, truth) = (&self.parameters, &self.truth);
         let travel = self.mean(before.speed_mm_s, truth.speed_mm_s) * stride.dt_s;
         let rolled = self.mean(before.tread_mm_s, truth.tread_mm_s) * stride.dt_s;
-        let above =
-            self.parameters.run_out_mm * (truth.rotation_rad.cos() - before.rotation_rad.cos());
+        let ((sin, cos), (sin_before, cos_before)) =
+            (truth.rotation_rad.sin_cos(), before.rotation_rad.sin_cos());
         // Of the rim's axis, and of the axle.
+        let carried = travel + p.run_out_mm * (sin - sin_before);
         let lifted = truth.height_mm - before.height_mm;
-        let rise = lifted - above;
+        let rise = lifted - p.run_out_mm * (cos - cos_before);
         let part = self.rolling_part();
         let advance = match stride.moves {
             Moves::Driven(grip) | Moves::Free(grip) => grip.advance,
@@ -37,19 +38,20 @@ impl VirtualRig {
         let spring = 0.5 * (before.preload_n + self.preload_now());
         let pressed = cosine + truth.utilisation * sine;
         let taken = self.ring.taken_mj();
-        let given_mj = sine * travel - cosine * lifted;
+        let given_mj = sine * carried - cosine * lifted;
         // As the elements take it up: by the mean forces of the stride.
-        let between_mj = 0.5 * ((from_n.1 + sine) * travel - (from_n.0 + cosine) * lifted);
+        let between_mj = 0.5 * ((from_n.1 + sine) * carried - (from_n.0 + cosine) * lifted);
         let inner_mj = self.inner_load_n * rolled.abs();
         // While the ring sleeps, it goes on as it was.
         let awake = truth.ring_awake;
         let taken_mj = if awake { taken - self.taken_mj } else { between_mj + inner_mj };
+        let offset_n = self.eccentric_load_n();
         let energy = &mut self.energy;
         energy.motor_mj += stride.motor_force_n(self.tread_load_n) * rolled;
         if drives.drive_on {
             energy.gear_mj += p.drive.friction_n * rolled.abs();
         }
-        energy.worm_mj += (-traction_n * rolled - inner_mj).max(0.0);
+        energy.worm_mj += (-(traction_n + offset_n) * rolled - inner_mj).max(0.0);
         energy.creep_mj += traction_n / advance * slip;
         energy.contact_mj += given_mj;
         energy.tread_mj += taken_mj;

@@ -248,12 +248,16 @@ impl VirtualRig {
     }
 
     /// Torque of the normal pressure, as load on the drive, N: of a rim whose axis lies ahead of
-    /// the axis of rotation, and of the inner load. Positive against the motion.
+    /// and above the axis of rotation, and of the inner load. Positive against the motion.
     fn offset_load_n(&self) -> f64 {
-        let (_, cosine, _) = self.forces;
-        let sense = self.truth.tread_mm_s.signum();
-        let offset = cosine * self.eccentric().0 / self.parameters.ring.radius_mm;
-        sense * offset + self.inner_load_n
+        self.truth.tread_mm_s.signum() * self.eccentric_load_n() + self.inner_load_n
+    }
+
+    /// That of the rim alone, positive against rolling outwards.
+    pub(super) fn eccentric_load_n(&self) -> f64 {
+        let (_, cosine, sine) = self.forces;
+        let (ahead, above) = self.eccentric();
+        (cosine * ahead + sine * above) / self.parameters.ring.radius_mm
     }
 
     /// Rolling radius over the undeformed one. A loaded rubber wheel rolls on `R - c/3` with
