@@ -226,7 +226,7 @@ impl Estimator {
             preload: sensed.preload_filtered,
             remembered: state.remembered_preload(),
             tan_arm: sensed.tan_arm,
-            // As the corrected odometry has it.
+            // As an odometry has it that this step has corrected by a part.
             face: face - (residual - left),
             residual: left,
         });
@@ -330,8 +330,12 @@ fn position_of_radius(state: &EstimateState, sensed: &SensedState) -> Millimetre
 /// The step's height is measured: its face lies `shift` further out.
 fn refine(state: &mut EstimateState, shift: Millimetres) {
     let observed = state.crossing.as_mut().filter(|open| !open.resumed && !open.turned);
-    let Some(point) = observed.and_then(|open| open.lift.as_mut()) else { return };
-    let left = if state.displaced.is_none() { state.odometry.refine(shift) } else { shift };
+    let Some((open_step, point)) = observed.and_then(|open| Some((open.step, open.lift.as_mut()?)))
+    else {
+        return;
+    };
+    let corrects = state.displaced.is_none() && open_step > 0;
+    let left = if corrects { state.odometry.refine(shift) } else { shift };
     point.face += left;
     point.residual += left;
 }

@@ -24,7 +24,7 @@ impl Estimator {
         let turned = state.direction != direction;
         state.direction = direction;
         state.leaving = None;
-        state.odometry.begin_run();
+        state.odometry.begin_run(state.position);
         // A crossing that began in its middle has no measured wall to turn back to.
         let between = state.crossing.as_ref().is_some_and(|open| open.resumed);
         // Away from the end that it went to in doubt, steps lie ahead that set the position.

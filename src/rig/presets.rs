@@ -63,7 +63,7 @@ impl Rig {
             control: ControlSettings {
                 gap_ref_mm: 0.0,
                 safe_speed_mm_s: 5.0,
-                gap_reserve: 0.01,
+                gap_reserve: 0.014,
                 slip_margin: 0.10,
                 adaptation_range: 0.25,
                 adaptation_gain: 0.5,

@@ -8,8 +8,9 @@ use super::Rig;
 pub(crate) const REGULATION_PART: f64 = 0.045;
 
 /// Reserve of the preload with which the wheel begins to roll: load, friction and a preload sensor
-/// near its zero are known less well than under way.
-const ROLLING_RESERVE: f64 = 1.5;
+/// near its zero are known less well than under way, and a tread that rests under more preload
+/// shows better what it is.
+const ROLLING_RESERVE: f64 = 2.0;
 
 /// Least speed of the unloaded motor over the cruise speed, for regulation.
 const TOP_SPEED_RESERVE: f64 = 1.2;
@@ -195,7 +196,7 @@ impl Rig {
     pub const fn bounds(&self) -> [(&'static str, f64, f64, f64); 45] {
         [
             ("rig.wheel_radius_mm", self.rig.wheel_radius_mm, 10.0, 150.0),
-            ("rig.wheel_wear_mm", self.rig.wheel_wear_mm, 0.0, 5.0),
+            ("rig.wheel_wear_mm", self.rig.wheel_wear_mm, 0.0, 0.2),
             ("rig.wheel_width_mm", self.rig.wheel_width_mm, 1.0, 200.0),
             ("rig.step_height_mm", self.rig.step_height_mm, 1.5, 8.0),
             ("rig.step_tolerance_mm", self.rig.step_tolerance_mm, 0.05, 5.0),

@@ -257,4 +257,20 @@ mod tests {
             assert_eq!(armed(from, reset), (Mode::SelfTest, false), "{from:?}");
         }
     }
+
+    #[test]
+    fn the_wheel_rolls_once_its_preload_carries_twice_load_and_carriage() {
+        for coupling in [1.0, 0.0, -1.0] {
+            let mut rig = crate::rig::Rig::prototype();
+            rig.plant.arm_coupling = coupling;
+            let controller = Controller::try_build(&rig).expect("a sound rig");
+            let mut load = rig.plant.top_load_n * rig.plant.top_load_share;
+            load += 1e-3 * rig.plant.moved_mass_kg * rig.drive.acceleration_mm_s2;
+            // A leading arm, at an angle of which the sine is 105 / 145, lifts the wheel.
+            let lifted = 2.0 * load * f64::max(-coupling, 0.0) * 1.05;
+            let pressed = controller.rolling_preload.to_num::<f64>() - lifted;
+            let carried = pressed * (rig.plant.mu - rig.control.slip_margin);
+            assert!((carried / load - 2.0).abs() < 0.01, "{coupling}: {carried} {load}");
+        }
+    }
 }

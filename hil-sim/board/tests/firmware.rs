@@ -84,14 +84,14 @@ const MEASURED_MM: f64 = 0.024;
 /// part in 8500, and the codes of a moving part are means over 0.15 ms. So the runs part in
 /// the last bits, and the noise of the sensors' rounding with them. Bounds of gap, preload and
 /// force are twice the largest difference of five rigs; at the first step the preload still rises,
-/// by 0.025 N a millisecond. The speed of a step is planned from the
+/// by 0.025 N a millisecond, and the force may be largest while it falls again. The speed of a step is planned from the
 /// gap measured at the one before: it changes by 60 mm/s a millimetre of that, and the gap by
 /// 0.027 mm a mm/s of speed.
 const QUANTITIES: [Quantity; 4] = [
     ("gap, mm", |c| c.gap_mm, 0.011, 60.0 * 0.027),
     ("preload, N", |c| c.preload_n, 0.35, 0.0),
     ("speed, mm/s", |c| c.speed_mm_s, 60.0 * 0.011, 60.0),
-    ("corner force, N", |c| c.corner_force_n, 0.36, 0.0),
+    ("corner force, N", |c| c.corner_force_n, 2.4, 0.0),
 ];
 
 /// Until something moves, board and software read the same codes to the bit; then the runs stay

@@ -258,7 +258,7 @@ type Ends = (&'static str, fn(&mut Rig) -> &mut f64, f64, f64);
 /// The parameters and their ends, as the rig's validation has them.
 const ENDS: [Ends; 32] = [
     ("rig.wheel_radius_mm", |r| &mut r.rig.wheel_radius_mm, 10.0, 30.0),
-    ("rig.wheel_wear_mm", |r| &mut r.rig.wheel_wear_mm, 0.0, 5.0),
+    ("rig.wheel_wear_mm", |r| &mut r.rig.wheel_wear_mm, 0.0, 0.2),
     ("rig.wheel_width_mm", |r| &mut r.rig.wheel_width_mm, 1.0, 200.0),
     ("rig.step_height_mm", |r| &mut r.rig.step_height_mm, 1.5, 8.0),
     ("rig.step_tolerance_mm", |r| &mut r.rig.step_tolerance_mm, 0.05, 1.0),

@@ -32,7 +32,7 @@ impl VirtualRig {
             advance * before.tread_mm_s - before.speed_mm_s,
             advance * truth.tread_mm_s - truth.speed_mm_s,
         ) * stride.dt_s;
-        let traction_n = truth.utilisation * normal * part;
+        let traction_n = truth.utilisation * (normal * part - self.eccentric_lever());
         let kinetic =
             p.mass_kg * truth.speed_mm_s.powi(2) + p.drive.mass_kg * truth.tread_mm_s.powi(2);
         let spring = 0.5 * (before.preload_n + self.preload_now());

@@ -111,7 +111,11 @@ impl VirtualRig {
             yields: turn.yields,
             advance: self.rolling_part() * self.advance - self.eccentric().1 / p.ring.radius_mm,
             offset_n: self.offset_load_n(),
-            normal: self.rolling_part() * if cosine > 0.0 { normal / cosine } else { 1.0 },
+            normal: if cosine > 0.0 {
+                (self.rolling_part() * normal - self.eccentric_lever()) / cosine
+            } else {
+                self.rolling_part()
+            },
         };
         let predicted = self.predict_speeds(&grip);
         let mut stride = Stride {
@@ -253,7 +257,14 @@ impl VirtualRig {
         self.truth.tread_mm_s.signum() * self.eccentric_load_n() + self.inner_load_n
     }
 
-    /// That of the rim alone, positive against rolling outwards.
+    /// What the rim's axis, off the axis of rotation, takes off the lever of the friction, N.
+    pub(super) fn eccentric_lever(&self) -> f64 {
+        let (_, cosine, sine) = self.forces;
+        let (ahead, above) = self.eccentric();
+        (cosine * above - sine * ahead) / self.parameters.ring.radius_mm
+    }
+
+    /// Load of the normal pressure on a rim off its axis, N, positive against rolling outwards.
     pub(super) fn eccentric_load_n(&self) -> f64 {
         let (_, cosine, sine) = self.forces;
         let (ahead, above) = self.eccentric();
