@@ -306,7 +306,7 @@ mod tests {
             let (_, schedule, steps, plan) = setting(back);
             let got = schedule.targets(&steps, &plan, &course(&plan, distance, speed, preload));
             prop_assert!(got.speed >= Q16::ZERO && got.speed <= plan.cruise_speed);
-            prop_assert!(got.preload == plan.cruise_preload || got.preload == plan.cross_preload);
+            prop_assert!(got.preload == plan.cruise_preload || got.preload == plan.ramp_preload);
         }
 
         #[test]
@@ -322,7 +322,7 @@ mod tests {
             };
             let looking = schedule.targets(&steps, &plan, &at(plan.approach.window_from, false));
             prop_assert_eq!(looking.speed, plan.approach.window_speed);
-            prop_assert_eq!(looking.preload, plan.cross_preload);
+            prop_assert_eq!(looking.preload, plan.ramp_preload);
             prop_assert!(looking.looking && !looking.braking && !looking.waiting);
             let felt = schedule.targets(&steps, &plan, &at(plan.approach.slow_from, true));
             prop_assert!(felt.braking && !felt.waiting);

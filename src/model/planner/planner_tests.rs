@@ -177,8 +177,8 @@ fn only_a_tread_as_known_is_crossed_with_a_dip_and_below_the_cruise_preload() {
 fn the_reserve_is_halved_by_a_crossing_as_predicted_and_grows_with_what_is_missed() {
     let after = |wider: f64| reviewed(wider, true).reserve.to_num::<f64>();
     assert!((after(0.0) - 0.5).abs() < 0.01, "{}", after(0.0));
-    // 1 % of the gap missed is the prototype's reserve.
-    let grown = after(0.01 * 2.5);
+    // As much of the gap missed as the prototype's reserve.
+    let grown = after(Rig::prototype().control.gap_reserve * 2.5);
     assert!((1.3..1.7).contains(&grown), "{grown}");
     assert_eq!(reviewed(0.15, true).reserve, MOST_RESERVE);
     assert_eq!(reviewed(0.15, false).reserve, Ratio::ONE);
