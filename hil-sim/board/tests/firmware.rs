@@ -88,9 +88,9 @@ const MEASURED_MM: f64 = 0.024;
 /// gap measured at the one before: it changes by 60 mm/s a millimetre of that, and the gap by
 /// 0.027 mm a mm/s of speed.
 const QUANTITIES: [Quantity; 4] = [
-    ("gap, mm", |c| c.gap_mm, 0.011, 60.0 * 0.027),
-    ("preload, N", |c| c.preload_n, 0.35, 0.0),
-    ("speed, mm/s", |c| c.speed_mm_s, 60.0 * 0.011, 60.0),
+    ("gap, mm", |c| c.gap_mm, 0.024, 60.0 * 0.027),
+    ("preload, N", |c| c.preload_n, 0.7, 0.0),
+    ("speed, mm/s", |c| c.speed_mm_s, 60.0 * 0.024, 60.0),
     ("corner force, N", |c| c.corner_force_n, 2.4, 0.0),
 ];
 
