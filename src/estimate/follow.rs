@@ -217,6 +217,7 @@ impl Estimator {
         let residual = table.map_or(Q16::ZERO, |table| face - table);
         let corrects = open.step > 0 && !open.turned;
         let left = if corrects { self.correct(state, sensed, residual, found) } else { residual };
+        state.begin_tick(sensed.travel);
         open.lift = Some(LiftPoint {
             at: tick.now,
             position: state.position,
@@ -226,13 +227,12 @@ impl Estimator {
             preload: sensed.preload_filtered,
             remembered: state.remembered_preload(),
             tan_arm: sensed.tan_arm,
-            // As an odometry has it that this step has corrected by a part.
+            // As the odometry has it once this step has corrected it.
             face: face - (residual - left),
             residual: left,
         });
         state.crossing = Some(open);
         if open.step > 0 {
-            state.begin_tick(sensed.travel);
             self.advance(state, found);
         }
         found.replan = true;
@@ -251,23 +251,26 @@ impl Estimator {
         if state.known.is_searching() {
             state.odometry.set_by_step(sensed.travel, state.position - residual);
             state.known = Position::Located;
+            Q16::ZERO
         } else if residual.abs() <= tolerance {
             state.displaced = None;
-            return state.odometry.correct(state.position, residual);
+            state.odometry.correct(state.position, residual)
         } else if state.displaced.is_some_and(alike) {
             // Two in a row off by the same: the odometry is wrong.
             state.odometry.set_by_step(sensed.travel, state.position - residual);
             state.displaced = None;
+            Q16::ZERO
         } else if state.displaced.is_some() {
             // Two in a row off by different distances: the odometry has lost its scale, or the
             // table is wrong throughout.
             found.fault.get_or_insert(Fault::StepsDisagree);
+            residual
         } else {
             // One alone: the step is displaced.
             state.displaced = Some(residual);
             report_displaced(state, residual, found);
+            residual
         }
-        residual
     }
 
     /// Input of the crossing watch.
@@ -405,6 +408,35 @@ mod tests {
                 };
                 assert!(!clear(bound) && clear(bound + Q16::DELTA), "{direction:?} {known:?}");
             }
+        }
+    }
+
+    #[test]
+    fn a_step_that_sets_the_position_has_its_crossing_there() {
+        let (sensed, estimator) = (sensed(0, 0.0, 0.3), estimator());
+        let tick = Follow {
+            now: 0,
+            sensed: &sensed,
+            pressed: Q16::ZERO,
+            standing_since: None,
+            limited_by: None,
+        };
+        let place = estimator.steps.face(1).expect("a first step");
+        // A search from 13 mm before it, and the second step in a row that is 3 mm off.
+        for (known, displaced, off) in
+            [(Position::Searching, None, -13), (Position::Located, Some(3), 3)]
+        {
+            let off = Q16::from_num(off);
+            let mut state = EstimateState { known, next_step: 1, ..EstimateState::default() };
+            state.displaced = displaced.map(Q16::from_num);
+            state.set_position(sensed.travel, place + off);
+            state.crossing = Some(OpenCrossing { step: 1, ..OpenCrossing::default() });
+            let lift =
+                Lift { depth: Q16::ZERO, height: Q16::ZERO, gap: Q16::ZERO, distance: Q16::ZERO };
+            estimator.lifted(&mut state, &tick, lift, &mut Findings::default());
+            let point = state.crossing.and_then(|open| open.lift).expect("lifted");
+            assert_eq!((point.face, point.position, point.residual), (place, place, Q16::ZERO));
+            assert!(!estimator.clear_of(&state));
         }
     }
 

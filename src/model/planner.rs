@@ -36,7 +36,7 @@ const OUTLIER: Ratio = q16(350_000);
 const OUTLIER_STIFFER: Ratio = q16(2_500_000);
 /// Relative difference of an observed stiffness above which it is reported. Rubber that is off
 /// by three deviations makes 0.12 at the first crossing; the rest is the measurement, where a
-/// stiff guess costs most. Two of 1,500 random rigs exceed 0.20.
+/// stiff guess costs most. One in a hundred random rigs exceeds it at one of its crossings.
 const STRANGE: Ratio = q16(270_000);
 
 /// Bounds of the reserve that the crossings leave, as shares of the rig's.

@@ -11,6 +11,8 @@ pub(crate) const REGULATION_PART: f64 = 0.045;
 /// near its zero are known less well than under way, and a tread that rests under more preload
 /// shows better what it is.
 const ROLLING_RESERVE: f64 = 2.0;
+/// Friction coefficient, less its margin, with which a wheel is still reckoned to roll.
+const LEAST_GRIP: f64 = 1e-3;
 
 /// Least speed of the unloaded motor over the cruise speed, for regulation.
 const TOP_SPEED_RESERVE: f64 = 1.2;
@@ -182,14 +184,16 @@ impl Rig {
 
     /// Preload with which the wheel may roll along the wall, N: its tread carries load and
     /// carriage, not the inertia of the rotor behind it. A trailing arm presses it on besides,
-    /// which is left as a reserve; what a leading one lifts it by counts.
+    /// which is left as a reserve; what a leading one lifts it by counts. The limit where the
+    /// friction is no more than its margin.
     pub fn rolling_preload_n(&self) -> f64 {
         let load = self.plant.top_load_n * self.plant.top_load_share
             + 1e-3 * self.plant.moved_mass_kg * self.drive.acceleration_mm_s2;
         let sine =
             (self.centre_radius_mm(0) - self.rig.arm_pivot_radius_mm) / self.rig.arm_length_mm;
         let lifted = (-self.plant.arm_coupling).max(0.0) * sine / libm::sqrt(1.0 - sine * sine);
-        ROLLING_RESERVE * load * (1.0 / (self.plant.mu - self.control.slip_margin) + lifted)
+        let grip = (self.plant.mu - self.control.slip_margin).max(LEAST_GRIP);
+        (ROLLING_RESERVE * load * (1.0 / grip + lifted)).min(self.preload.limit_n)
     }
 
     /// Keys with their value and its least and largest value.
