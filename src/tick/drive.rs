@@ -147,7 +147,7 @@ impl Controller {
         } else {
             self.corner(state, tick, targets.speed, blend)
         };
-        let load = self.load + climb + self.inertia * state.acceleration();
+        let load = resisting(wanted, self.load + climb) + self.inertia * state.acceleration();
         let measured = tick.sensed.speed.value;
         let duty = self.speed_loop.step(&mut state.speed_loop, wanted, measured, load);
         (MotorCommand::on(duty), self.regulate(state, tick, targets, drift))
@@ -193,4 +193,10 @@ impl Controller {
         let table = self.estimator.steps().next_face(at);
         state.estimate.extra_face(at).or(table).unwrap_or(Q16::MAX)
     }
+}
+
+/// Part of an axial load, N, positive against motion outwards, that the drive feels at this
+/// speed: its worm holds a load along the motion.
+fn resisting(speed: MillimetresPerSecond, load: Newtons) -> Newtons {
+    if speed < Q16::ZERO { load.min(Q16::ZERO) } else { load.max(Q16::ZERO) }
 }

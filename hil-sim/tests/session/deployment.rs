@@ -73,6 +73,19 @@ fn every_drawn_rig_completes_without_fault_or_slip() {
 }
 
 #[test]
+fn a_wheel_with_the_whole_load_or_none_completes_both_ways() {
+    for (share, direction) in ["0", "1"].iter().flat_map(|share| DIRECTIONS.map(|d| (share, d))) {
+        let sets = [
+            format!("plant.top_load_share={share}"),
+            format!("run.direction={}", direction.name()),
+        ];
+        let scenario = Scenario::resolve(Some("prototype"), None, &sets).expect("a scenario");
+        let summary = run(&scenario, Options::default()).expect("a run").summary;
+        assert!(summary.completed && summary.slip_mm < NO_SLIP_MM, "{sets:?}: {summary:?}");
+    }
+}
+
+#[test]
 fn each_step_is_crossed_once_and_in_its_order() {
     for run in RUNS.iter() {
         let Run { name, summary, rows, .. } = run;
