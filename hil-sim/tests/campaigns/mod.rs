@@ -1,5 +1,6 @@
 //! Faults, holds and the stress of plant and controller.
 
+mod envelope;
 mod faults;
 mod holds;
 mod hostile;

@@ -30,6 +30,9 @@ const FELT_WITHIN: Millimetres = q16(150_000);
 /// would still relax when it does.
 const MOST_EARLIER: Millimetres = q16(600_000);
 
+/// Part of the predicted gap at which the wheel has surely lifted off.
+const SURELY_LIFTED: Ratio = q16(750_000);
+
 impl Planner {
     /// How the wheel comes to a crossing with this gap.
     pub(super) fn approach(
@@ -53,6 +56,14 @@ impl Planner {
         let earlier = (self.lift(direction, fast) - lift).max(Q16::ZERO)
             + (request.scale - KNOWN_SCALE).max(Q16::ZERO) * EARLIER_PER_SCALE;
         let slow_from = ready_from + earlier;
+        // At the least speed nothing is left to correct a gap with: the wheel stays slow until it
+        // has surely lifted off.
+        let release_from = match direction {
+            Direction::Deploy if at.speed <= self.least_speed => {
+                self.lift(direction, gap * SURELY_LIFTED)
+            }
+            _ => lift,
+        };
         let slow = Approach {
             window_from: felt + self.tolerance,
             window_speed: speed_into(felt - FELT_WITHIN - slow_from, at.speed),
@@ -60,7 +71,7 @@ impl Planner {
             slowest_speed: at.speed,
             ready_from,
             earlier_per_preload: Ratio::ZERO,
-            release_from: lift,
+            release_from,
             release_time: Seconds::ZERO,
             lift,
         };

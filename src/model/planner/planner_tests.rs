@@ -252,6 +252,18 @@ fn a_crossing_that_leaves_too_little_friction_is_reported() {
 }
 
 #[test]
+fn at_the_least_speed_the_wheel_stays_slow_beyond_the_predicted_lift_off() {
+    let planner = Planner::try_build(&Rig::prototype()).expect("a sound rig");
+    for (scale, beyond) in [(1_300_000, false), (3_000_000, true)] {
+        let request = PlanRequest { scale: q16(scale), ..request(Direction::Deploy) };
+        let plan = planner.plan(&request);
+        assert_eq!(plan.cross_speed == planner.least_speed, beyond, "{plan:?}");
+        let further = plan.approach.lift - plan.approach.release_from;
+        assert_eq!(further > q16(500_000), beyond, "{further}");
+    }
+}
+
+#[test]
 fn a_plan_names_what_keeps_the_crossing_from_being_faster() {
     let named = |mu: f64, change: &dyn Fn(&mut PlanRequest), rig: &dyn Fn(&mut Rig)| {
         let mut prototype = Rig::prototype();
