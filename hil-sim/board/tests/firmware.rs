@@ -4,6 +4,7 @@ use hil_sim::plant::rig::Drives;
 use hil_sim::record::{Controller, CrossingLine, Recording, Run, starter};
 use hil_sim::scenario::Scenario;
 use hil_sim::session::{self, Options, Session};
+use interstage::model::LimitedBy::{Preload, Slew};
 use interstage::restart::{Reset, Restart};
 use interstage::supervise::Mode;
 use rig_board::chip::Pin;
@@ -86,7 +87,8 @@ const MEASURED_MM: f64 = 0.042;
 /// deviations of the difference over the rigs of seeds 1 to 24, at the step where it is largest:
 /// the first, where the preload still rises, or the third. The speed of a step is planned from the
 /// gap measured at the one before: it changes by 60 mm/s a millimetre of that, and the gap by
-/// 0.027 mm a mm/s of speed.
+/// 0.027 mm a mm/s of speed. Whether the preload's limit or its slew bounds a crossing may change
+/// with it.
 const QUANTITIES: [Quantity; 4] = [
     ("gap, mm", |c| c.gap_mm, 0.025, 60.0 * 0.027),
     ("preload, N", |c| c.preload_n, 0.46, 0.0),
@@ -120,7 +122,9 @@ fn assert_alike(board: &Recording, scenario: &Scenario) {
                 "step {index}: {what} {value} on the board, {expected} in software"
             );
         }
-        assert_eq!(on_board.limited_by, in_software.limited_by, "step {}", on_board.index);
+        let named = [on_board.limited_by, in_software.limited_by];
+        let by_preload = named.iter().all(|by| matches!(by, Some(Preload | Slew)));
+        assert!(named[0] == named[1] || by_preload, "step {}: {named:?}", on_board.index);
         let measured = [on_board, in_software].map(|line| line.gap_measured_mm.expect("measured"));
         before = (measured[0] - measured[1]).abs();
         assert!(before < MEASURED_MM, "step {}: measured {measured:?}", on_board.index);

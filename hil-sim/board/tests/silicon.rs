@@ -96,9 +96,12 @@ fn a_stack_that_overflows_ends_at_the_protection_whatever_lies_below_ram() {
     // So close to its end that an exception's frame crosses it; and beyond by a push.
     for left in [16, 0] {
         let mut board = Board::moving();
+        // Between two ticks the core sleeps, and nothing is popped first.
+        let machine = board.machine();
+        machine.run_on(machine.now() + HZ / 2500).expect("runs");
         let end = board.bench.machine().image().symbol("_stack_end").expect("a symbol");
         if left == 0 {
-            let push = board.function("interstage::tick::");
+            let push = board.function("interstage::tick::Controller::step_into");
             board.set(Register::Pc, push);
         }
         board.set(Register::Sp, end + left);
