@@ -198,7 +198,7 @@ impl Balance {
             let (residual, slope, utilisation) = self.residual(forces, slopes, height - radius);
             // Carried; or closed in on a kink, or on an end without a balance.
             let closed = high - low < 1e-13 * radius;
-            if residual == 0.0 && forces.0 == 0.0 && height != start && !closed {
+            if residual.abs() <= tolerance && forces.0 == 0.0 && height != start && !closed {
                 // Nothing presses, and nothing is touched: back to where it stood at most.
                 if height > start {
                     high = height;
@@ -358,6 +358,24 @@ mod tests {
         assert!(solved.contact.normal_n < 1e-6, "{solved:?}");
         // The corner may lie between two elements.
         assert!((0.0..0.055).contains(&solved.contact.depth_mm), "{solved:?}");
+    }
+
+    #[test]
+    fn a_wheel_that_nothing_presses_stays_with_the_wall() {
+        let (mut ring, motion) = climbing();
+        let wall = Wall::new(vec![Step { position_mm: 23.6, height_mm: 17.3 }]).local(0.0);
+        // Lifted by the arm from a high corner, it is not carried on to where the spring takes
+        // hold, 4 to 9 mm above.
+        for tenths in 50..110 {
+            let arm_n = -20.0 - 0.1 * f64::from(tenths);
+            let axial = Axial::Carried(carried(5.2));
+            let balance = Balance { preload_n: 20.0, spring_n_per_mm: 1.2, arm_n, axial };
+            for height_mm in [24.0, 24.5, 25.0] {
+                let motion = Motion { wall, height_mm, ..motion };
+                let solved = balance.solve_near(&mut ring, motion).unwrap();
+                assert!(solved.height_mm < 25.7, "{arm_n} N: {solved:?}");
+            }
+        }
     }
 
     #[test]

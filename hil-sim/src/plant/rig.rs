@@ -223,13 +223,15 @@ impl VirtualRig {
         self
     }
 
-    /// The same rig, its wheel already rolling at this speed, mm/s.
+    /// The same rig, its wheel already rolling steadily at this speed, mm/s.
     #[must_use]
     pub fn with_speed(mut self, speed_mm_s: f64) -> Self {
         self.truth.tread_mm_s = speed_mm_s;
         self.truth.speed_mm_s = speed_mm_s;
         self.rolled_mm_s = speed_mm_s;
         self.latched = false;
+        self.roll_on();
+        self.derive();
         self
     }
 

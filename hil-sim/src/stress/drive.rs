@@ -80,7 +80,7 @@ pub(super) fn run(case: &StressCase, plant: &PlantParameters) -> Result<Drove, P
     // The screw does not move.
     let seat_n = before.preload_n - plant.spring_n_per_mm * (before.height_mm - RADIUS_MM);
     let (mut first, rest_mm) = (0.0, before.depth_mm);
-    let (mut arm_work, mut misplaced, mut force) = (0.0, 0.0, 0.0f64);
+    let (mut arm_work, mut modes, mut force) = (0.0, 0.0f64, 0.0f64);
     let mut fastest = case.speed_mm_s;
     for tick in 0..ticks {
         let part = tick as f64 / ticks as f64;
@@ -95,13 +95,10 @@ pub(super) fn run(case: &StressCase, plant: &PlantParameters) -> Result<Drove, P
         arm_work += plant.load_n * slope * rise;
         force = force.max(force_of(&now));
         fastest = fastest.max(now.speed_mm_s.abs()).max(now.tread_mm_s.abs());
-        // Rolling resistance acts on the carriage, even of a sliding wheel, where it should act
-        // on the tread.
-        let slid = (now.tread_mm_s - now.speed_mm_s) * case.dt_s;
-        misplaced += (now.resistance_n * slid).max(0.0);
+        // Motion of the wheel takes nothing from the arm's modes.
+        modes = modes.max(arm_work - rig.energy().arm_mj);
         let held = mechanical(plant, &now, seat_n) + arm_work - now.work_mj;
         if tick == 0 {
-            // The speed is set in no time: the wheel rises in the first step.
             first = held;
         }
         let gained = held - first;
@@ -119,7 +116,7 @@ pub(super) fn run(case: &StressCase, plant: &PlantParameters) -> Result<Drove, P
     let stored = pressed * (rest_mm + out.depth_mm.min(1.0));
     let grain = std::f64::consts::TAU * RADIUS_MM / ELEMENTS as f64;
     let stride = (fastest * case.dt_s).min(LONGEST_MM);
-    out.allowed_mj = stored + force * (grain + stride) + misplaced;
+    out.allowed_mj = stored + force * grain + (force + plant.load_n) * stride + modes;
     Ok(out)
 }
 

@@ -42,9 +42,8 @@ impl VirtualRig {
         // As the elements take it up: by the mean forces of the stride.
         let between_mj = 0.5 * ((from_n.1 + sine) * carried - (from_n.0 + cosine) * lifted);
         let inner_mj = self.inner_load_n * rolled.abs();
-        // While the ring sleeps, it goes on as it was.
-        let awake = truth.ring_awake;
-        let taken_mj = if awake { taken - self.taken_mj } else { between_mj + inner_mj };
+        // While the ring sleeps, its elements take up what the resultants do: steady rolling.
+        let taken_mj = if truth.ring_awake { taken - self.taken_mj } else { between_mj };
         let offset_n = self.eccentric_load_n();
         let energy = &mut self.energy;
         energy.motor_mj += stride.motor_force_n(self.tread_load_n) * rolled;

@@ -205,6 +205,19 @@ impl VirtualRig {
         Ok(true)
     }
 
+    /// Brings a wheel on the continuous wall to the height of steady rolling at its speed; one
+    /// that nothing carries there stays where it is.
+    pub(super) fn roll_on(&mut self) {
+        let local = self.parameters.wall.local(self.truth.position_mm + self.eccentric().0);
+        let (load, guess) = (Axial::Driven(self.thrust_n), self.truth.height_mm - local.base_mm);
+        if let Ok(solved) = self.roll_balanced(&local, load, self.truth.tread_mm_s, guess) {
+            self.truth.height_mm = solved.height_mm + local.base_mm;
+            self.truth.depth_mm = solved.contact.depth_mm;
+            let contact = &solved.contact;
+            self.forces = (contact.normal_n, contact.cosine_n, contact.sine_n);
+        }
+    }
+
     fn roll_balanced(
         &mut self,
         local: &LocalWall,
