@@ -123,9 +123,9 @@ impl PreloadLoopState {
         self.running = false;
     }
 
-    /// Reference after the slew limit, N.
-    pub const fn reference(&self) -> Newtons {
-        self.reference
+    /// Reference after the slew limit, N; what is measured while the loop does not run.
+    pub const fn reference(&self, measured: Newtons) -> Newtons {
+        if self.running { self.reference } else { measured }
     }
 
     /// Preload that the actuator should have reached by now, N.

@@ -34,7 +34,7 @@ impl Controller {
             looking: state.approach.looking,
             speed: state.profile.speed(),
             acceleration: state.profile.acceleration(),
-            reference: state.preload_loop.reference(),
+            reference: state.preload_loop.reference(tick.sensed.preload.value),
             preload: estimate.remembered_preload(),
             preload_late: state.preload_loop.due() - tick.sensed.preload_filtered
                 > self.schedule.reached_within(),
@@ -45,7 +45,7 @@ impl Controller {
     pub(super) fn targets(&self, state: &mut State, tick: &mut TickContext<'_>) -> Targets {
         let hold = Targets {
             speed: Q16::ZERO,
-            preload: state.preload_loop.reference(),
+            preload: state.preload_loop.reference(tick.sensed.preload.value),
             ramping: state.approach.ramping,
             braking: state.approach.braking,
             released: state.approach.released,
@@ -61,7 +61,8 @@ impl Controller {
         let Some(plan) = state.planning.plan.as_ref() else { return hold };
         let course = self.course(state, tick, direction);
         let mut targets = self.schedule.targets(self.estimator.steps(), plan, &course);
-        let (step, cross_speed, cross_preload) = (plan.step, plan.cross_speed, plan.cross_preload);
+        let (step, cross_speed) = (plan.step, plan.cross_speed);
+        let (cross_preload, ramp_preload) = (plan.cross_preload, plan.ramp_preload);
         state.approach.ramping = targets.ramping;
         state.approach.braking = targets.braking;
         state.approach.released = targets.released;
@@ -73,9 +74,10 @@ impl Controller {
         let found = self.estimator.watch_expectation(&mut state.estimate);
         self.take_findings(state, tick, found);
         self.limit_climb(state, &mut targets);
-        if state.estimate.slow_down() || step != state.estimate.next_step {
+        let surprised = state.estimate.slow_down();
+        if surprised || step != state.estimate.next_step {
             targets.speed = targets.speed.min(cross_speed);
-            targets.preload = cross_preload;
+            targets.preload = if surprised { cross_preload } else { ramp_preload };
         }
         state.approach.sped_up &= !state.estimate.critical();
         if let Some(speed) = state.estimate.lifting()

@@ -210,6 +210,27 @@ fn the_preload_uses_its_limit_and_never_exceeds_it() {
 }
 
 #[test]
+fn the_pretightener_does_not_start_or_lift_off_with_a_tick_of_the_wrong_sign() {
+    let sliding = 4;
+    for Run { name, rows, .. } in RUNS.iter().filter(|run| run.deploys()) {
+        let (mut starts, mut lifts) = (0, 0);
+        for pair in rows.windows(2) {
+            let [before, now] = [&pair[0].controller, &pair[1].controller];
+            if now.mode == mode("preload") && before.mode != now.mode {
+                starts += 1;
+                assert!(now.pretightener_duty.abs() < 0.1, "{name}: {}", now.pretightener_duty);
+            }
+            if now.stage == sliding && before.stage != now.stage {
+                lifts += 1;
+                let change = now.preload_ref_n - before.preload_ref_n;
+                assert!(change > -0.01, "{name} at {} s: {change} N", now.t_s);
+            }
+        }
+        assert!(starts == 1 && lifts > 2, "{name}: {starts} starts, {lifts} crossings");
+    }
+}
+
+#[test]
 fn a_crossing_is_never_slower_than_the_least_speed() {
     for Run { name, scenario, summary, rows, .. } in RUNS.iter() {
         let least = scenario.rig.drive.min_crossing_speed_mm_s;
