@@ -266,7 +266,7 @@ fn minutes_of_deploying_and_retracting_are_logged_without_a_gap_or_drift() {
     if !hil_sim::testing::long() {
         return;
     }
-    const ROUNDS: usize = 34;
+    const ROUNDS: usize = 36;
     let mut board = Board::off(&["run.seed=1"]);
     board.until("mode: idle", 3000);
     let (mut decoder, mut truths) = (Decoder::new(), VecDeque::new());
