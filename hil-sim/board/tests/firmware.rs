@@ -3,7 +3,7 @@
 use hil_sim::plant::rig::Drives;
 use hil_sim::record::{Controller, CrossingLine, Recording, Run, starter};
 use hil_sim::scenario::Scenario;
-use hil_sim::session::{self, Options, Session};
+use hil_sim::session::{Options, Session};
 use interstage::model::LimitedBy::{Preload, Slew};
 use interstage::restart::{Reset, Restart};
 use interstage::supervise::Mode;
@@ -171,27 +171,21 @@ fn a_retraction_is_that_of_the_software_and_the_same_again() {
     assert_as_in_software(&["run.seed=1", "run.direction=retract"]);
 }
 
-/// The board against the same deployment in software, by processor time of
-/// this thread, the best of alternating runs: a slow hook or repeated translation would show.
+/// Processor time of this thread against the time of the rig, the best of three runs: a slow hook
+/// or repeated translation would show.
 #[test]
 fn a_deployment_is_far_ahead_of_the_rig() {
-    const MOST: f64 = 60.0;
+    const AHEAD: f64 = 2.0;
     if !hil_sim::testing::long() {
         return;
     }
-    let timed = |run: &dyn Fn()| {
+    let ahead = |_| {
         let begun = cpu_time::ThreadTime::now();
-        run();
-        begun.elapsed().as_secs_f64()
+        let load = ran(&["run.seed=1"]).load;
+        load.cycles as f64 / load.clock_hz as f64 / begun.elapsed().as_secs_f64()
     };
-    let sets = ["run.seed=1"];
-    let (mut board, mut software) = (f64::INFINITY, f64::INFINITY);
-    for _ in 0..4 {
-        board = board.min(timed(&|| drop(ran(&sets))));
-        let run = || drop(session::run(&scenario(&sets), Options::default()).expect("a run"));
-        software = software.min(timed(&run));
-    }
-    assert!(board <= MOST * software, "{board:.3} s on the board, {software:.4} s in software");
+    let best = (0..3).map(ahead).fold(0.0, f64::max);
+    assert!(best >= AHEAD, "{best:.2} times as fast as the rig");
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use std::collections::HashSet;
 
+use super::hooks::NEEDLESS;
 use super::{Counted, Meter, Stop};
 use crate::accelerator::{Accelerator, WORD};
 use crate::thumb::{self, Kind};
@@ -36,6 +37,8 @@ pub(super) struct Count {
     pub(super) common: bool,
     /// Calls of that hook for instructions that are not deferred.
     pub(super) needless: u32,
+    /// Such calls after which blocks are translated again.
+    pub(super) patience: u32,
     /// Cycle at which a block was last met that had not been seen.
     pub(super) met: u64,
     /// Beginning of the current block.
@@ -80,6 +83,7 @@ impl Count {
             wanted: Vec::new(),
             common: false,
             needless: 0,
+            patience: NEEDLESS,
             met: 0,
             block: 0,
             next: 0,

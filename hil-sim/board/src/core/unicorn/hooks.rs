@@ -11,8 +11,9 @@ use crate::timing;
 
 /// Cycles without a new block after which the code in use is taken to be translated.
 const QUIET: u64 = 500_000;
-/// Needless calls of the common hook after which blocks are translated again.
-const NEEDLESS: u32 = 10_000;
+/// Needless calls of the common hook after which blocks are translated again; each time twice as
+/// many, because a block that runs seldom is translated under that hook again and again.
+pub(super) const NEEDLESS: u32 = 10_000;
 
 impl<B: Bus + 'static> UnicornCore<B> {
     /// Hooks what is counted, reported or has to stop the program.
@@ -159,7 +160,8 @@ impl<B: Bus + 'static> UnicornCore<B> {
                 });
                 self.common = Some(engine("hook all instructions", common)?);
             }
-            Some(hook) if count.needless > NEEDLESS => {
+            Some(hook) if count.needless > count.patience => {
+                count.patience = count.patience.saturating_mul(2);
                 count.common = false;
                 count.forget();
                 let own = &self.own;
