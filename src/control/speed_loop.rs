@@ -2,7 +2,7 @@
 
 #![deny(clippy::float_arithmetic)]
 
-use crate::numeric::checked;
+use crate::numeric::{between, checked};
 use crate::rig::{Rig, RigError};
 use crate::units::{Duty, MillimetresPerSecond, Newtons, Q16, Ratio, Travel, per_tick, q16};
 
@@ -17,6 +17,11 @@ const MOST_ERROR: MillimetresPerSecond = q16(4_000_000);
 const FULL: Ratio = q16(1_000_000);
 /// Most that the integral part may contribute, duty.
 const INTEGRAL_LIMIT: Ratio = q16(500_000);
+
+/// What a wheel lacks, over what its measured error shows while the load rises: the measured
+/// speed and the drive lag behind. Chosen by the nominal crossings, which stay as fast as without
+/// handing over.
+const LAGS: Ratio = q16(2_500_000);
 
 /// Gains.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -49,6 +54,28 @@ impl SpeedLoop {
         })
     }
 
+    /// Of a load this part is fed forward from now on. The integral part yields as much, but for
+    /// what the wheel still lacks by its error, mm/s: it has carried the load so far.
+    pub fn hand_over(
+        &self,
+        state: &mut SpeedLoopState,
+        load: Newtons,
+        part: Ratio,
+        error: MillimetresPerSecond,
+    ) {
+        let whole = self.forward(load);
+        let lacks = error * self.per_speed * LAGS;
+        let lacks = between(lacks, whole.min(Q16::ZERO), whole.max(Q16::ZERO));
+        let limit = INTEGRAL_LIMIT.widen();
+        state.integral =
+            state.integral.saturating_sub(((whole - lacks) * part).widen()).clamp(-limit, limit);
+    }
+
+    /// Duty that a load needs.
+    fn forward(&self, load: Newtons) -> Ratio {
+        Q16::from_bits((load * self.per_load).to_bits() >> 8)
+    }
+
     /// Duty for `wanted` speed at `measured` speed against `load`, all signed
     /// outwards. The integral holds while the duty saturates in the same direction.
     pub fn step(
@@ -59,8 +86,7 @@ impl SpeedLoop {
         load: Newtons,
     ) -> Duty {
         let error = wanted - measured;
-        let load_part = Q16::from_bits((load * self.per_load).to_bits() >> 8);
-        let forward = wanted * self.per_speed + load_part;
+        let forward = wanted * self.per_speed + self.forward(load);
         let whole = forward + self.proportional * error + state.value();
         let pushing = if error < Q16::ZERO { whole > -FULL } else { whole < FULL };
         if pushing {
@@ -135,6 +161,31 @@ mod tests {
         }
     }
 
+    /// What handing a load over changes of the duty at this error, and the duty of the load.
+    fn handed(load: f64, error: f64) -> (f64, f64) {
+        let control = SpeedLoop::try_build(&Rig::prototype()).unwrap();
+        let mut state = SpeedLoopState::default();
+        for _ in 0..32 {
+            let (load, error) = (Q16::from_num(load), Q16::from_num(error));
+            control.hand_over(&mut state, load, q16(31_250), error);
+        }
+        let forward: f64 = control.forward(Q16::from_num(load)).to_num();
+        (forward + state.value().to_num::<f64>(), forward)
+    }
+
+    #[test]
+    fn what_the_integral_carried_is_taken_from_it() {
+        for load in [12.0, -12.0] {
+            assert!(handed(load, 0.0).0.abs() < 1e-3, "{:?}", handed(load, 0.0));
+            // A wheel that does not lag gets nothing, one that stands all of it.
+            assert!(handed(load, -load.signum()).0.abs() < 1e-3);
+            let (change, forward) = handed(load, 50.0 * load.signum());
+            assert!((change - forward).abs() < 1e-3 && forward.abs() > 0.07);
+            let (change, _) = handed(load, 0.6 * load.signum());
+            assert!((change.abs() - 0.025).abs() < 1e-3, "{change}");
+        }
+    }
+
     proptest! {
         #[test]
         fn no_input_overflows(wanted in any::<i32>(), measured in any::<i32>(), load in any::<i32>()) {
@@ -143,6 +194,7 @@ mod tests {
             let at = |bits| Q16::from_bits(bits);
             for _ in 0..3 {
                 control.step(&mut state, at(wanted), at(measured), at(load));
+                control.hand_over(&mut state, at(load), Q16::ONE, at(measured));
             }
             prop_assert!(state.value().abs() <= INTEGRAL_LIMIT);
         }

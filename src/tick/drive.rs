@@ -142,15 +142,20 @@ impl Controller {
         self.profile.step(&mut state.profile, targets.speed);
         // Only detected corners are fed forward: the table may be wrong. The feed-forward is
         // blended in, or the drive would jump.
-        let blend = state.blend_corner();
+        let (blend, added) = state.blend_corner();
         let wanted = state.signed_speed();
         let (climb, drift) = if blend == Q16::ZERO {
             (Q16::ZERO, Q16::ZERO)
         } else {
-            self.corner(state, tick, targets.speed, blend)
+            self.corner(state, tick, targets.speed)
         };
-        let load = resisting(wanted, self.load + climb) + self.inertia * state.acceleration();
         let measured = tick.sensed.speed.value;
+        let level = resisting(wanted, self.load);
+        let climb = |part: Ratio| resisting(wanted, self.load + climb * part) - level;
+        let error = wanted - measured;
+        self.speed_loop.hand_over(&mut state.speed_loop, climb(Q16::ONE), added, error);
+        let (climb, drift) = (climb(blend), drift * blend);
+        let load = level + climb + self.inertia * state.acceleration();
         let duty = self.speed_loop.step(&mut state.speed_loop, wanted, measured, load);
         (MotorCommand::on(duty), self.regulate(state, tick, targets, drift))
     }
@@ -161,17 +166,16 @@ impl Controller {
         state: &State,
         tick: &TickContext<'_>,
         target: MillimetresPerSecond,
-        blend: Ratio,
     ) -> (Newtons, NewtonsPerSecond) {
         let (corner, direction) = (self.estimator.corner(), state.estimate.direction);
-        let slope = blend * corner.drive_slope(direction, self.ahead(state, Q16::ZERO));
+        let slope = corner.drive_slope(direction, self.ahead(state, Q16::ZERO));
         // Slope and speed of the wheel when this tick's duty moves the screw.
         let speed = state.profile.speed();
         let change = state.profile.acceleration() * self.preload_latency;
         let later = between(speed + change, speed.min(target), speed.max(target));
         let sign = Q16::from_num(direction.sign());
         let travel = sign * (speed + later).half() * self.preload_latency;
-        let steep = blend * corner.slope(self.ahead(state, travel));
+        let steep = corner.slope(self.ahead(state, travel));
         (tick.pressed() * slope, sign * self.spring * steep * later)
     }
 

@@ -131,15 +131,19 @@ impl State {
         }
     }
 
-    /// Part of a corner's feed-forward that is blended in, 0 to 1, after one more tick.
-    pub(super) fn blend_corner(&mut self) -> Ratio {
+    /// Part of a corner's feed-forward that is blended in, 0 to 1, after one more tick, and what
+    /// this tick adds to it.
+    pub(super) fn blend_corner(&mut self) -> (Ratio, Ratio) {
+        // BLEND_TICKS is 2^5: bits of Q16 shifted.
+        let part = |ticks: u8| Q16::from_bits(i32::from(ticks) << 11);
+        let before = part(self.corner_blend_ticks);
         self.corner_blend_ticks = if self.estimate.on_corner() {
             self.corner_blend_ticks.saturating_add(1).min(BLEND_TICKS)
         } else {
             self.corner_blend_ticks.saturating_sub(1)
         };
-        // BLEND_TICKS is 2^5: bits of Q16 shifted.
-        Q16::from_bits(i32::from(self.corner_blend_ticks) << 11)
+        let blend = part(self.corner_blend_ticks);
+        (blend, (blend - before).max(Q16::ZERO))
     }
 
     /// The feed-forward of a corner applies in full from now on.
@@ -184,14 +188,16 @@ mod tests {
     fn a_corner_is_blended_in_over_its_ticks_or_at_once() {
         let mut state = State::default();
         state.estimate.watch.contact = Contact::Both;
-        let parts: Vec<Ratio> = (0..40).map(|_| state.blend_corner()).collect();
+        let parts: Vec<_> = (0..40).map(|_| state.blend_corner().0).collect();
         assert_eq!((parts[0], parts[15], parts[31]), (q16(31_250), q16(500_000), q16(1_000_000)));
         assert_eq!(parts[39], q16(1_000_000));
         let mut state = State::default();
         state.estimate.watch.contact = Contact::Corner;
         state.blend_at_once();
-        assert_eq!(state.blend_corner(), q16(1_000_000));
+        assert_eq!(state.blend_corner(), (q16(1_000_000), Q16::ZERO));
         state.estimate.watch.contact = Contact::Wall;
-        assert_eq!(state.blend_corner(), q16(968_750));
+        assert_eq!(state.blend_corner(), (q16(968_750), Q16::ZERO));
+        state.estimate.watch.contact = Contact::Both;
+        assert_eq!(state.blend_corner(), (q16(1_000_000), q16(31_250)));
     }
 }

@@ -5,3 +5,4 @@ mod deployment;
 mod restarts;
 mod supervisor;
 mod tasks_on_the_plant;
+mod treads;
