@@ -124,9 +124,9 @@ fn steps_of_any_height_and_place_are_found_where_they_are() {
         let mean = off.iter().sum::<f64>() / off.len() as f64;
         off.iter_mut().for_each(|off| *off = off.abs());
         off.sort_by(f64::total_cmp);
-        let most = off[off.len() * 95 / 100];
+        let most = off[(off.len() * 95).div_ceil(100) - 1];
         println!("step {}: mean {mean:.3} mm, 95 % within {most:.3} mm", step + 1);
-        // Of these 0.067, 0.081 and 0.09 mm; the wheel speeds up while it lifts off.
+        // Of these 0.057, 0.073 and 0.101 mm; the wheel speeds up while it lifts off.
         assert!(most < [0.07, 0.09, 0.11][step], "step {}: {most} mm", step + 1);
         assert!(mean.abs() < 0.04, "step {}: {mean} mm on average", step + 1);
     }
