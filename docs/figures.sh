@@ -1,6 +1,7 @@
 #!/bin/sh
-# Writes docs/figures/*.json and the README's picture again: about an hour on two cores, most
-# of it the campaign on the emulated board. Names of figures as arguments write those alone.
+# Writes docs/figures, PERFORMANCE.md and the README's pictures again: two hours on two cores,
+# most of it the campaign on the emulated board and the comparison. Names of figures as
+# arguments write those alone.
 set -eu
 cd "$(dirname "$0")/.."
 figures=docs/figures
@@ -33,5 +34,4 @@ write envelope envelope --out target/figures
 write faults-sil faults -n 100
 write faults-board faults --target board -n 1
 case " $wanted " in *" paper "* | "  ") cargo rig paper > /dev/null ;; esac
-write bench bench --peers
-write stress stress
+case " $wanted " in *" bench "* | "  ") cargo rig bench --peers --docs > /dev/null ;; esac

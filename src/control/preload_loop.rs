@@ -163,7 +163,7 @@ mod tests {
         let control = PreloadLoop::try_build(&rig).unwrap();
         let mut state = PreloadLoopState::default();
         let depth = (rig.preload.delay_s * delay * 1e3).round() as usize;
-        let mut way: std::collections::VecDeque<f64> = vec![0.0; depth].into();
+        let mut dead_time: std::collections::VecDeque<f64> = vec![0.0; depth].into();
         let (mut force, mut rate) = (33.3, 0.0);
         (0..(seconds * 1e3) as usize)
             .map(|_| {
@@ -173,8 +173,8 @@ mod tests {
                     Q16::from_num(force),
                     Q16::ZERO,
                 );
-                way.push_back(f64::from(out.to_bits()) / 32768.0);
-                let command = way.pop_front().unwrap() * rig.preload.slew_n_per_s * slew;
+                dead_time.push_back(f64::from(out.to_bits()) / 32768.0);
+                let command = dead_time.pop_front().unwrap() * rig.preload.slew_n_per_s * slew;
                 rate += (command - rate) * 1e-3 / (rig.preload.lag_s * lag);
                 force += rate * 1e-3;
                 force

@@ -113,11 +113,13 @@ impl Schedule {
     pub fn targets(&self, steps: &Steps, plan: &Plan, course: &Course) -> Targets {
         // To where crossing speed and preload must be reached, by the table or the felt corner.
         let ahead = course.distance.map(|distance| distance - plan.approach.slow_from);
-        let within = |from: Option<Millimetres>, way| from.is_some_and(|from| from <= way);
+        let within =
+            |from: Option<Millimetres>, distance| from.is_some_and(|from| from <= distance);
         // Out of sight of a step no braking can be due, whatever the speed is doing.
         let sight = self.sight(plan, course);
         let due = |from: Option<Millimetres>, speed, lag: Seconds| {
-            within(from, sight) && within(from, self.brake_way(course, speed) + course.speed * lag)
+            within(from, sight)
+                && within(from, self.brake_distance(course, speed) + course.speed * lag)
         };
         // A wheel that stays slow must be slow in time; of one that speeds up again at once the
         // slowest place may come later. Around the corner its tread runs farther than the axle.
@@ -132,7 +134,10 @@ impl Schedule {
         let earliest = if course.felt { ahead } else { ahead.map(|at| at - steps.tolerance()) };
         let ramping = course.ramping
             || course.critical
-            || within(earliest, self.ramp_way(plan, course.reference.min(plan.cruise_preload)));
+            || within(
+                earliest,
+                self.ramp_distance(plan, course.reference.min(plan.cruise_preload)),
+            );
         let preload = if ramping { plan.ramp_preload } else { plan.cruise_preload };
         let mut speed = match (looking, braking) {
             (_, true) => plan.approach.slowest_speed,
@@ -202,20 +207,21 @@ impl Schedule {
         if braking >= needed {
             return mean;
         }
-        let way = if course.speed > mean { self.brake_way(course, mean) } else { Q16::ZERO };
-        divide((ahead - way).max(Q16::ZERO), needed - braking)
+        let braked =
+            if course.speed > mean { self.brake_distance(course, mean) } else { Q16::ZERO };
+        divide((ahead - braked).max(Q16::ZERO), needed - braking)
     }
 
     /// Distance before the earliest place where the preload must be reached at which a preload now
     /// referenced at `reference` must start to rise, mm: what it takes longer than the braking
     /// is driven at cruise speed.
-    fn ramp_way(&self, plan: &Plan, reference: Newtons) -> Millimetres {
+    fn ramp_distance(&self, plan: &Plan, reference: Newtons) -> Millimetres {
         let missing = plan.cross_preload - reference;
         if !plan.look_ahead || plan.cross_preload <= plan.cruise_preload {
-            return if plan.look_ahead { plan.brake_way } else { Q16::MIN };
+            return if plan.look_ahead { plan.brake_distance } else { Q16::MIN };
         }
         let needed = self.timing.preload_change(missing.max(Q16::ZERO));
-        plan.brake_way + (needed - plan.brake_time).max(Q16::ZERO) * plan.cruise_speed
+        plan.brake_distance + (needed - plan.brake_time).max(Q16::ZERO) * plan.cruise_speed
     }
 
     /// Distance within which a step or the end can ask for another speed, mm.
@@ -229,11 +235,11 @@ impl Schedule {
 
     /// Distance in which the profile comes from its speed to `speed`, mm. Acceleration
     /// still under way is first taken back: until then the speed rises to a peak.
-    fn brake_way(&self, course: &Course, speed: MillimetresPerSecond) -> Millimetres {
+    fn brake_distance(&self, course: &Course, speed: MillimetresPerSecond) -> Millimetres {
         let rising = course.acceleration.max(Q16::ZERO);
         let until_peak = self.timing.until_level(rising);
         let peak = course.speed + rising * until_peak * q16(500_000);
-        peak * until_peak + self.timing.brake_way(peak, speed)
+        peak * until_peak + self.timing.brake_distance(peak, speed)
     }
 
     /// Speed towards the end of travel, mm/s: free until braking to rest must begin.
@@ -243,7 +249,7 @@ impl Schedule {
         course: &Course,
         sight: Millimetres,
     ) -> MillimetresPerSecond {
-        let due = || course.remaining <= self.brake_way(course, Q16::ZERO) - END_LATE;
+        let due = || course.remaining <= self.brake_distance(course, Q16::ZERO) - END_LATE;
         if steps.arrived(course.remaining) || course.remaining <= sight && due() {
             Q16::ZERO
         } else {
@@ -371,10 +377,10 @@ mod tests {
                 ..course(&plan, 0.0, speed, 33.3)
             };
             let got = schedule.targets(&steps, &plan, &at).speed;
-            let way = schedule.timing.brake_way(Q16::from_num(speed), Q16::ZERO) - END_LATE;
-            let way = way.to_num::<f64>();
-            prop_assume!((remaining - way).abs() > 1e-3);
-            let wanted = if remaining < way { Q16::ZERO } else { plan.cruise_speed };
+            let least = schedule.timing.brake_distance(Q16::from_num(speed), Q16::ZERO) - END_LATE;
+            let least = least.to_num::<f64>();
+            prop_assume!((remaining - least).abs() > 1e-3);
+            let wanted = if remaining < least { Q16::ZERO } else { plan.cruise_speed };
             prop_assert_eq!(got, wanted);
         }
     }
@@ -389,7 +395,7 @@ mod tests {
             let (rig, schedule, _, plan) = setting(back);
             let acceleration = Q16::from_num(rising * rig.drive.acceleration_mm_s2);
             let at = Course { acceleration, ..course(&plan, 0.0, speed, 40.0) };
-            let needs = schedule.brake_way(&at, plan.cross_speed) + at.speed * BRAKE_LAG;
+            let needs = schedule.brake_distance(&at, plan.cross_speed) + at.speed * BRAKE_LAG;
             prop_assert!(needs <= schedule.sight(&plan, &at), "{needs}");
         }
     }
@@ -398,13 +404,13 @@ mod tests {
     fn who_does_not_look_ahead_raises_nothing_ahead() {
         for back in [false, true] {
             let (_, schedule, _, plan) = setting(back);
-            let way = |plan: &Plan| schedule.ramp_way(plan, plan.cruise_preload);
+            let ramp = |plan: &Plan| schedule.ramp_distance(plan, plan.cruise_preload);
             let blind = Plan { look_ahead: false, ..plan };
             let level = Plan { cross_preload: plan.cruise_preload, ..plan };
             let neither = Plan { look_ahead: false, ..level };
-            assert!(plan.cross_preload > plan.cruise_preload && way(&plan) >= plan.brake_way);
-            assert_eq!(way(&level), plan.brake_way);
-            assert_eq!([way(&blind), way(&neither)], [Q16::MIN; 2]);
+            assert!(plan.cross_preload > plan.cruise_preload && ramp(&plan) >= plan.brake_distance);
+            assert_eq!(ramp(&level), plan.brake_distance);
+            assert_eq!([ramp(&blind), ramp(&neither)], [Q16::MIN; 2]);
         }
     }
 }

@@ -298,7 +298,7 @@ mod tests {
             cross_preload: most,
             gap: most,
             slip_margin: most,
-            brake_way: most,
+            brake_distance: most,
             brake_time: most,
             approach: Approach {
                 window_from: most,

@@ -10,14 +10,14 @@ use crate::units::{Millimetres, MillimetresPerSecond, Ratio, Seconds, q16};
 /// the ring whose speed dips open the gap of a constant speed to 5 % of that speed.
 const REMEMBERED: Millimetres = q16(600_000);
 
-/// With the slowest speed v, the jerk j and the time t before lift-off, the way from the slowest
-/// place is `v t + j t^3 / 6`, and over the travel D that the tread remembers the mean speed is
-/// `v / (1 - j t^3 / 6D)`. Source: kinematics.
+/// With the slowest speed v, the jerk j and the time t before lift-off, the distance from the
+/// slowest place is `v t + j t^3 / 6`, and over the travel D that the tread remembers the mean
+/// speed is `v / (1 - j t^3 / 6D)`. Source: kinematics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Dip {
     /// Time before lift-off, s.
     pub time: Seconds,
-    /// Way in it beyond that of the slowest speed, mm.
+    /// Travel in it beyond that at the slowest speed, mm.
     gained: Millimetres,
     /// The slowest speed, as a part of that which the tread remembers.
     pub part: Ratio,

@@ -163,7 +163,7 @@ pub struct Plan {
     /// Friction left unused at the step.
     pub slip_margin: Ratio,
     /// Braking distance from cruise to the slowest speed, mm.
-    pub brake_way: Millimetres,
+    pub brake_distance: Millimetres,
     /// Time that this braking takes, s.
     pub brake_time: Seconds,
     /// How the wheel comes to the step.

@@ -129,7 +129,7 @@ impl Planner {
             ramp_preload: self.between_steps(),
             gap: self.target(request.direction, share),
             slip_margin: self.usable,
-            brake_way: Millimetres::ZERO,
+            brake_distance: Millimetres::ZERO,
             brake_time: Seconds::ZERO,
             brake_horizon: Millimetres::ZERO,
             approach: Approach {
@@ -355,8 +355,10 @@ impl Planner {
 
     /// Distance and time of braking before the step.
     fn braking(&self, plan: &mut Plan) {
-        plan.brake_horizon = self.timing.longest_brake_way(plan.cruise_speed.max(plan.cross_speed));
-        plan.brake_way = self.timing.brake_way(plan.cruise_speed, plan.approach.slowest_speed);
+        plan.brake_horizon =
+            self.timing.longest_brake_distance(plan.cruise_speed.max(plan.cross_speed));
+        plan.brake_distance =
+            self.timing.brake_distance(plan.cruise_speed, plan.approach.slowest_speed);
         plan.brake_time = self.timing.speed_change(plan.cruise_speed - plan.approach.slowest_speed);
     }
 

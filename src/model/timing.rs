@@ -66,7 +66,11 @@ impl Timing {
 
     /// Distance of that change between two speeds, mm: the S-curve is symmetric, so its
     /// duration times the mean speed.
-    pub fn brake_way(&self, from: MillimetresPerSecond, to: MillimetresPerSecond) -> Millimetres {
+    pub fn brake_distance(
+        &self,
+        from: MillimetresPerSecond,
+        to: MillimetresPerSecond,
+    ) -> Millimetres {
         let mean = (from + to) * q16(500_000);
         self.speed_change(from - to) * mean
     }
@@ -75,14 +79,14 @@ impl Timing {
     /// mm/s, to 1/128 of the range.
     pub fn fastest_into(
         &self,
-        way: Millimetres,
+        distance: Millimetres,
         to: MillimetresPerSecond,
         most: MillimetresPerSecond,
     ) -> MillimetresPerSecond {
         let (mut low, mut high) = (to, most.max(to));
         for _ in 0..7 {
             let middle = (low + high).half();
-            if self.brake_way(middle, to) <= way {
+            if self.brake_distance(middle, to) <= distance {
                 low = middle;
             } else {
                 high = middle;
@@ -108,7 +112,7 @@ impl Timing {
 
     /// Upper bound of the braking distance from up to `cruise` at any acceleration, mm: the
     /// highest speed that it leads to, for as long as it takes to lose all of it.
-    pub fn longest_brake_way(&self, cruise: MillimetresPerSecond) -> Millimetres {
+    pub fn longest_brake_distance(&self, cruise: MillimetresPerSecond) -> Millimetres {
         let peak = cruise + (self.acceleration * self.build_up).half();
         self.speed_change(peak) * peak + q16(100_000)
     }
@@ -124,12 +128,15 @@ mod tests {
     fn from_the_fastest_speed_the_slower_one_is_reached_in_time() {
         let timing = Timing::try_build(&Rig::prototype()).unwrap();
         let (slow, most) = (q16(5_000_000), q16(30_000_000));
-        for way in [0.0, 0.3, 1.0, 2.0, 5.0].map(Q16::from_num) {
-            let fast = timing.fastest_into(way, slow, most);
-            assert!(timing.brake_way(fast, slow) <= way && fast >= slow && fast <= most);
+        for distance in [0.0, 0.3, 1.0, 2.0, 5.0].map(Q16::from_num) {
+            let fast = timing.fastest_into(distance, slow, most);
+            assert!(timing.brake_distance(fast, slow) <= distance && fast >= slow && fast <= most);
             // A hundredth of the range faster it is not.
             let faster = fast + q16(250_000);
-            assert!(faster > most || timing.brake_way(faster, slow) > way, "{way} {fast}");
+            assert!(
+                faster > most || timing.brake_distance(faster, slow) > distance,
+                "{distance} {fast}"
+            );
         }
     }
 
@@ -154,8 +161,8 @@ mod tests {
             let rising = q(rising * rig.drive.acceleration_mm_s2);
             let until = timing.until_level(rising);
             let peak = q(cruise * part) + (rising * until).half();
-            let distance = (peak * until) + timing.brake_way(peak, q(cruise * to));
-            let longest = timing.longest_brake_way(q(cruise));
+            let distance = (peak * until) + timing.brake_distance(peak, q(cruise * to));
+            let longest = timing.longest_brake_distance(q(cruise));
             prop_assert!(distance <= longest, "{distance} {longest}");
         }
 
@@ -169,7 +176,7 @@ mod tests {
                 if change >= a * a / j { change / a + a / j } else { 2.0 * (change / j).sqrt() };
             let got = timing.speed_change(Q16::from_num(from - to)).to_num::<f64>();
             prop_assert!((got - exact).abs() < 2e-4 + 1e-3 * exact, "{got} {exact}");
-            let distance = timing.brake_way(Q16::from_num(from), Q16::from_num(to));
+            let distance = timing.brake_distance(Q16::from_num(from), Q16::from_num(to));
             let distance = distance.to_num::<f64>();
             let error = (distance - exact * 0.5 * (from + to)).abs();
             prop_assert!(error < 0.02 + 1e-3 * distance, "{distance}");

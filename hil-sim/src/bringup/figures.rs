@@ -106,10 +106,14 @@ mod tests {
 
     #[test]
     fn the_angle_goes_the_short_way_round() {
-        for (from, to, way) in
+        for (from, to, expected) in
             [(10.0, 20.0, 10.0), (16_380.0, 4.0, 8.0), (4.0, 16_380.0, -8.0), (0.0, 8000.0, 8000.0)]
         {
-            assert!((turned(from, to) - way).abs() < 1e-9, "{from} {to}: {}", turned(from, to));
+            assert!(
+                (turned(from, to) - expected).abs() < 1e-9,
+                "{from} {to}: {}",
+                turned(from, to)
+            );
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use interstage::units::Direction as Way;
+use interstage::units;
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 
@@ -151,8 +151,8 @@ impl Point {
             speed_mm_s: given(SPEED, scenario.rig.control.safe_speed_mm_s)?,
             preload_n: given(PRELOAD, scenario.rig.preload.cruise_n)?,
             direction: match scenario.run.direction {
-                Direction::Deploy => Way::Deploy,
-                Direction::Retract => Way::Retract,
+                Direction::Deploy => units::Direction::Deploy,
+                Direction::Retract => units::Direction::Retract,
             },
             load_n: args.driven.then_some(loads.top_load_n * loads.top_load_share),
         };

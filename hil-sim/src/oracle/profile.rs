@@ -41,7 +41,7 @@ impl Limits {
 
     /// Distance of a jerk-limited change of speed with this acceleration at its start, mm. One
     /// that is still rising first comes to a peak.
-    fn way(&self, now: Motion, to: f64) -> f64 {
+    fn braking_distance(&self, now: Motion, to: f64) -> f64 {
         let rising = now.acceleration.max(0.0);
         let until = rising / self.jerk;
         let peak = now.speed + 0.5 * rising * until;
@@ -68,7 +68,8 @@ pub(super) struct Motion {
 impl Motion {
     /// Advances to the speed that is wanted at this place, mm along the run.
     pub(super) fn step(&mut self, limits: &Limits, along: f64, slow: Slow) {
-        let brakes = |at: f64, to: f64| self.speed > to && at - along <= limits.way(*self, to);
+        let brakes =
+            |at: f64, to: f64| self.speed > to && at - along <= limits.braking_distance(*self, to);
         let mut wanted = limits.cruise_mm_s;
         if let Some((from, to, speed)) = slow
             && along < to

@@ -128,7 +128,7 @@ impl DriveMotor {
     }
 }
 
-/// Pre-tightener: duty commands screw speed; the spring turns way into force.
+/// Pre-tightener: duty commands screw speed; the spring turns travel into force.
 #[derive(Clone, Debug)]
 pub struct Pretightener {
     /// Force rate at full duty, N/s, as seen at the wheel.

@@ -115,7 +115,7 @@ pub struct VirtualRig {
     forces: (f64, f64, f64),
     /// Travel by the speeds of the last stride beyond the predicted one: of the carriage and
     /// of the tread, mm.
-    way_residual_mm: (f64, f64),
+    distance_residual_mm: (f64, f64),
     /// Force that resisted the tread in the last stride, N, signed as its speed.
     tread_load_n: f64,
     /// Static thrust on the arm, N: the load, or at an end stop what the wheel pushes with.
@@ -201,7 +201,7 @@ impl VirtualRig {
             phases: Default::default(),
             phase: Phase::Smooth,
             forces,
-            way_residual_mm: (0.0, 0.0),
+            distance_residual_mm: (0.0, 0.0),
             tread_load_n: 0.0,
             thrust_n: parameters.load_n,
             imposed_speed_mm_s: None,
@@ -277,10 +277,10 @@ impl VirtualRig {
         self.preload.step(preload, drives.preload_on, dt_s);
         let mut left_s = dt_s;
         while left_s > 0.0 {
-            let way = self.farthest(left_s);
-            let exchanges = (way / EXCHANGE_MM).ceil().max(1.0);
+            let distance = self.farthest(left_s);
+            let exchanges = (distance / EXCHANGE_MM).ceil().max(1.0);
             let part_s = left_s / exchanges;
-            let parts = way / exchanges / self.resolution.stride_mm;
+            let parts = distance / exchanges / self.resolution.stride_mm;
             let parts = parts.ceil().clamp(1.0, MOST_STRIDES);
             for _ in 0..parts as usize {
                 self.roll(worked, part_s / parts)?;

@@ -207,7 +207,7 @@ fn wild(request: &PlanRequest, planner: &Planner, random: &mut ChaCha8Rng) -> Pl
         &mut plan.cross_preload,
         &mut plan.gap,
         &mut plan.slip_margin,
-        &mut plan.brake_way,
+        &mut plan.brake_distance,
         &mut plan.brake_time,
     ] {
         *field = any();

@@ -49,8 +49,8 @@ impl Planner {
         let direction = at.direction;
         let lift = self.lift(direction, gap);
         let felt = self.felt_at[direction as usize];
-        let speed_into = |way, slowest: MillimetresPerSecond| {
-            self.timing.fastest_into(way, slowest, self.cruise_speed).max(slowest)
+        let speed_into = |distance, slowest: MillimetresPerSecond| {
+            self.timing.fastest_into(distance, slowest, self.cruise_speed).max(slowest)
         };
         let ready_from = lift + MEMORY[direction as usize];
         let window_speed = speed_into(felt - FELT_WITHIN - ready_from, at.speed);
@@ -138,9 +138,9 @@ impl Planner {
     pub(super) fn travels(&self, distance: Millimetres, to: &Approach) -> Seconds {
         let cruised = (distance - to.lift).max(Q16::ZERO);
         let end = to.release_from;
-        let slow = |way: Millimetres, speed| {
-            let way = way.max(Q16::ZERO);
-            divide(way, speed) - divide(way, self.cruise_speed)
+        let slow = |distance: Millimetres, speed| {
+            let distance = distance.max(Q16::ZERO);
+            divide(distance, speed) - divide(distance, self.cruise_speed)
         };
         divide(cruised, self.cruise_speed)
             + self.lost(to.window_speed, self.cruise_speed)
@@ -149,7 +149,7 @@ impl Planner {
             + slow(to.slow_from - end, to.slowest_speed)
     }
 
-    /// Time that a change between these speeds takes longer than its way at cruise speed, s.
+    /// Time that a change between these speeds takes longer than its distance at cruise speed, s.
     pub(super) fn lost(&self, slow: MillimetresPerSecond, fast: MillimetresPerSecond) -> Seconds {
         let mean = (slow + fast).half();
         let share = divide(self.cruise_speed - mean, self.cruise_speed);

@@ -175,7 +175,7 @@ mod tests {
                 prop_assert!(preload >= rig.preload.cruise_n - 1e-3);
                 prop_assert!(preload <= rig.preload.limit_n * (1.0 - REGULATION_PART) + 1e-3);
             }
-            prop_assert!(plan.brake_way >= Q16::ZERO && plan.brake_time >= Q16::ZERO);
+            prop_assert!(plan.brake_distance >= Q16::ZERO && plan.brake_time >= Q16::ZERO);
         }
 
         #[test]

@@ -142,9 +142,9 @@ fn the_crossing_speed_is_reached_before_lift_off_and_in_time_from_the_window() {
             } else {
                 planner.tolerance
             };
-            let way = planner.timing.brake_way(to.window_speed, to.slowest_speed);
+            let distance = planner.timing.brake_distance(to.window_speed, to.slowest_speed);
             let room = to.window_from - tolerance - to.slow_from + (to.release_from - lift);
-            assert!(to.window_speed == to.slowest_speed || way <= room, "{plan:?}");
+            assert!(to.window_speed == to.slowest_speed || distance <= room, "{plan:?}");
         }
     }
 }

@@ -140,8 +140,8 @@ impl VirtualRig {
             stride.tread_mm_s = stride.predicted.1;
         }
         self.thrust_n = p.load_n;
-        stride.travel_mm =
-            self.mean(self.truth.speed_mm_s, stride.predicted.0) * dt_s + self.way_residual_mm.0;
+        stride.travel_mm = self.mean(self.truth.speed_mm_s, stride.predicted.0) * dt_s
+            + self.distance_residual_mm.0;
         let (low, high) = p.stops_mm;
         let position = self.truth.position_mm + stride.travel_mm;
         if position < low || position > high {
@@ -162,7 +162,7 @@ impl VirtualRig {
             self.thrust_n = if spins { friction * cosine - sine } else { p.load_n };
         }
         stride.position_mm = self.truth.position_mm + stride.travel_mm;
-        let rolled = self.mean(tread, stride.tread_mm_s) * dt_s + self.way_residual_mm.1;
+        let rolled = self.mean(tread, stride.tread_mm_s) * dt_s + self.distance_residual_mm.1;
         stride.turn_rad = rolled / p.ring.radius_mm;
         stride
     }
@@ -230,7 +230,7 @@ impl VirtualRig {
         let moves = truth.speed_mm_s != 0.0 || truth.tread_mm_s != 0.0;
         let dt_s = if moves { stride.dt_s } else { 0.0 };
         let (speed, tread) = (truth.speed_mm_s, truth.tread_mm_s);
-        self.way_residual_mm = (
+        self.distance_residual_mm = (
             self.mean(0.0, speed - stride.predicted.0) * dt_s,
             self.mean(0.0, tread - stride.predicted.1) * dt_s,
         );

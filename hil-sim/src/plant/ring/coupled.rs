@@ -291,7 +291,7 @@ impl Coupled {
                 out.area_mm2 += patch;
             }
             if met.floor {
-                // Off the wall: minus what its own compliance would make of the way there.
+                // Off the wall: minus what its own compliance would make of that distance.
                 let raw = if touching[i] {
                     stiffer * modulus * pressure
                 } else {
