@@ -11,6 +11,7 @@ pub mod odometry;
 mod position;
 mod restore;
 mod run;
+mod slip;
 mod stage;
 mod state;
 mod steps;
@@ -26,8 +27,9 @@ use tread::Tread;
 
 pub use follow::Follow;
 pub use position::{Place, Position, PositionConfidence};
+pub use slip::CornerSlip;
 pub use stage::ContactStage;
-pub use state::{EstimateState, Findings, LiftPoint, OpenCrossing};
+pub use state::{EstimateState, Findings, LiftPoint, OpenCrossing, Slip};
 pub use steps::{Expectation, Steps};
 
 use crate::units::{Millimetres, Ratio};
@@ -35,6 +37,9 @@ use crate::units::{Millimetres, Ratio};
 /// Wheel travel on a corner over the wheel radius beyond which the wheel slips: twice the
 /// travel of a crossing.
 const CORNER_TRAVEL_PART: f64 = 1.5;
+
+/// Least distance from an edge at which the wheel's height tells it, over the wheel radius.
+const TELLING_PART: f64 = 0.25;
 
 /// Part of the compression by which a loaded rubber wheel rolls on less than its undeformed
 /// radius (Clark, Mechanics of Pneumatic Tires).
@@ -53,6 +58,8 @@ pub struct Estimator {
     memory: LowPass,
     /// Wheel travel on a corner beyond which the wheel slips, mm.
     corner_travel: Millimetres,
+    /// Least distance from an edge at which the wheel's height tells it, mm.
+    telling: Millimetres,
     /// Part by which the axle lags behind the tread per compression, 1/mm.
     rolling_lag: Ratio,
     /// The same of a wheel in the middle of its life.
@@ -73,6 +80,7 @@ impl Estimator {
                 "rig.wheel_radius_mm",
                 CORNER_TRAVEL_PART * rig.rig.wheel_radius_mm,
             )?,
+            telling: checked("rig.wheel_radius_mm", TELLING_PART * rig.rig.wheel_radius_mm)?,
             rolling_lag: checked(
                 "rig.wheel_radius_mm",
                 ROLLING_COMPRESSION / rig.rig.wheel_radius_mm,

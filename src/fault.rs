@@ -66,11 +66,13 @@ pub enum Fault {
     // Behind all others, whatever its code: logs have the place in this list.
     /// The arm angle sensor has no magnet in range.
     ArmAngleMagnet = 106,
+    /// At the end of travel the position is less certain than the end has to be.
+    PlaceUnconfirmed = 135,
 }
 
 impl Fault {
     /// Every fault, in the order of codes.
-    pub const ALL: [Self; 29] = [
+    pub const ALL: [Self; 30] = [
         Self::WheelEncoderStale,
         Self::PreloadSensorStale,
         Self::CompressionSensorStale,
@@ -96,6 +98,7 @@ impl Fault {
         Self::StepsLost,
         Self::WheelSlips,
         Self::PositionUnknown,
+        Self::PlaceUnconfirmed,
         Self::ModelSilent,
         Self::SelfTest,
         Self::EmergencyStop,
@@ -143,6 +146,9 @@ impl Fault {
             Self::PositionUnknown => {
                 "the position is not known and no step lies ahead that could give it: go the other way"
             }
+            Self::PlaceUnconfirmed => {
+                "place unconfirmed: the end of travel is reached by a position that no step bears out"
+            }
             Self::ModelSilent => "the model task does not answer",
             Self::EmergencyStop => "the emergency stop cut the bridges",
             Self::SelfTest => "a sensor was not at rest or not at zero in the self-test",
@@ -189,11 +195,17 @@ pub enum Limit {
     ServiceSilent = 215,
     /// A debugger has halted the core; meanwhile the motors were off and time stood still.
     CoreHalted = 216,
+    /// The measured gap of a crossing is wider than the reference by more than 3 %.
+    GapWide = 217,
+    /// The wheel slipped on a corner.
+    WheelSlipped = 218,
+    /// A step is not as high as the table has it.
+    StepHeight = 219,
 }
 
 impl Limit {
     /// Every limit, in the order of codes.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 19] = [
         Self::StepEarly,
         Self::StepLate,
         Self::StepMissing,
@@ -210,6 +222,9 @@ impl Limit {
         Self::ServiceBounded,
         Self::ServiceSilent,
         Self::CoreHalted,
+        Self::GapWide,
+        Self::WheelSlipped,
+        Self::StepHeight,
     ];
 
     /// The stable code.
@@ -241,6 +256,9 @@ impl Limit {
             }
             Self::ServiceBounded => "a motion in the service mode has reached a bound",
             Self::ServiceSilent => "the host fell silent in the service mode",
+            Self::GapWide => "the measured gap is more than 3 % over the reference",
+            Self::WheelSlipped => "the wheel slipped on a corner",
+            Self::StepHeight => "a step is not as high as the table has it",
             Self::CoreHalted => "a debugger halted the core, and the motors were off meanwhile",
         }
     }

@@ -233,8 +233,15 @@ impl Controller {
         let standing_since = state.approach.standing_since;
         let pressed = tick.pressed();
         let limited_by = state.planning.plan.as_ref().map(|plan| plan.limited_by);
-        let follow =
-            Follow { now: tick.now, sensed: tick.sensed, pressed, standing_since, limited_by };
+        let short = self.schedule.most_preload() - tick.sensed.preload_filtered;
+        let follow = Follow {
+            now: tick.now,
+            sensed: tick.sensed,
+            pressed,
+            most_pressed: short <= self.schedule.reached_within(),
+            standing_since,
+            limited_by,
+        };
         let found = self.estimator.follow(&mut state.estimate, &follow);
         self.take_findings(state, tick, found);
     }

@@ -81,6 +81,16 @@ impl Journal for TextLog {
                     at, drive, pretightener
                 );
             }
+            Event::Slip(slip) => {
+                let value = Q16::to_num::<f32>;
+                warn!(
+                    "[{=u32} ms] slipped {=f32} mm (one sigma {=f32}) at {=f32} mm",
+                    at,
+                    value(slip.amount),
+                    value(slip.sigma),
+                    value(slip.position)
+                );
+            }
             // Logged by the start, before the journal ran.
             Event::Restart(_) => {}
         }

@@ -30,12 +30,17 @@ const RELEASE: Millimetres = q16(60_000);
 const RELEASE_TICKS: u8 = 60;
 /// Short of the full step height, the wheel counts as over the corner, mm.
 const OVER: Millimetres = q16(400_000);
-/// Rise above the wall expected behind a step that counts as the next corner, mm: a
-/// height tolerance more than a corner on a measured wall.
+/// Rise above the wall expected behind a step that counts as the next corner where one is
+/// expected, mm: a touch, on a wall known to the angle code's steps. Elsewhere the step behind
+/// may be higher than its table.
 const AGAIN: Millimetres = q16(320_000);
-/// Deviation of a measured step height from the table that a sleeve may have, with the
-/// error of the arm, mm; more shows that the wall was not yet reached.
-const HEIGHT_TOLERANCE: Millimetres = q16(120_000);
+/// Largest deviation of a step's height from its table, mm: a quarter of the published step. More
+/// shows that the wall was not yet reached.
+pub const HEIGHT_MOST: Millimetres = q16(1_000_000);
+/// Falls of a retracting wheel at which its compression is kept, over the range of heights.
+const FALLS: usize = 32;
+/// Reciprocal of their distance, 1/mm.
+const PER_FALL: Q16 = q16(16_000_000);
 /// Ticks over which the new wall's baseline is averaged.
 const SETTLE_TICKS: u8 = 50;
 
@@ -85,6 +90,8 @@ pub struct WatchState {
     /// Compression on the wall before the step, mm.
     flat: Millimetres,
     lift: Option<Lift>,
+    /// Compression as the wheel first sank so far; 0 where it has not.
+    depths: [Millimetres; FALLS],
 }
 
 /// The instant at which the lower wall stops (retract: begins) to carry.
@@ -113,13 +120,15 @@ pub enum CrossingEvent {
     Passed,
     /// The next wall's baseline is known: step height and the gap with it, mm.
     GapClosed {
-        /// Measured step height.
+        /// Measured step height; the nominal one if that is not plausible.
         height: Millimetres,
-        /// Gap with that height; with the nominal one if that is not plausible.
+        /// Gap with that height.
         gap: Millimetres,
+        /// Gap of a wheel as deep in the corner at the nominal height.
+        as_table: Millimetres,
         /// By how much that height changes the distance to the face at the lift.
         shift: Millimetres,
-        /// The height lies within what a sleeve may be off.
+        /// The measured height lies within [`HEIGHT_MOST`] of the table.
         plausible: bool,
     },
     /// The next corner carries before the wall between was measured; the gap of the
@@ -139,6 +148,8 @@ pub struct WatchInput {
     pub compression: Millimetres,
     /// A step is expected here: hold the baseline.
     pub near: bool,
+    /// By its travel the wheel is too far for the corner that it is on.
+    pub over: bool,
     /// The wheel is clear of the step behind.
     pub clear: bool,
 }
@@ -285,6 +296,9 @@ impl CrossingWatch {
         let rise = self.rise(state, direction, seen);
         if state.contact != Contact::Wall {
             state.deepest = state.deepest.max(seen.compression);
+            if direction == Direction::Retract {
+                self.keep_depth(state, seen);
+            }
         }
         match state.contact {
             Contact::Wall => self.on_wall(state, direction, seen, rise),
@@ -341,16 +355,22 @@ impl CrossingWatch {
             Direction::Retract => seen.radius >= state.baseline.output() + self.step,
         };
         // A step lower than its table is over before the arm says so.
-        if state.lift.is_none() && (free || rise >= self.step - OVER) {
+        if state.lift.is_none() && (free || rise >= self.step - OVER || seen.over) {
             state.contact = match direction {
                 Direction::Deploy => Contact::Corner,
                 Direction::Retract => Contact::Both,
             };
-            let lift = self.measure(seen.compression, self.radius - short, self.step);
+            let height = match direction {
+                Direction::Deploy => self.radius - short,
+                Direction::Retract => {
+                    state.baseline.output() + self.step + self.radius - seen.radius
+                }
+            };
+            let lift = self.measure(seen.compression, height, self.step);
             state.lift = Some(lift);
             return Some(CrossingEvent::Lifted(lift));
         }
-        if state.lift.is_some() && rise >= self.step - OVER {
+        if state.lift.is_some() && (rise >= self.step - OVER || seen.clear) {
             state.contact = Contact::Leaving;
             state.ticks = 0;
             return Some(CrossingEvent::Passed);
@@ -378,7 +398,8 @@ impl CrossingWatch {
         let ground = seen.radius - seen.compression;
         // Off the wall that the table promises: the next corner already touches.
         let beyond = rise - self.step;
-        state.again = if beyond > AGAIN { state.again + 1 } else { 0 };
+        let again = if seen.near { AGAIN } else { AGAIN + HEIGHT_MOST };
+        state.again = if beyond > again { state.again + 1 } else { 0 };
         if state.again >= TOUCH_TICKS {
             let shift = match direction {
                 Direction::Deploy => -self.step,
@@ -403,16 +424,49 @@ impl CrossingWatch {
             return None;
         }
         let height = (state.baseline.output() - state.next.output()).abs();
-        let plausible = (height - self.step).abs() <= HEIGHT_TOLERANCE;
-        let used = if plausible { height } else { self.step };
-        let (gap, shift) = state.lift.map_or((Q16::ZERO, Q16::ZERO), |lift| {
-            let by_height = self.measure(lift.depth, lift.height, used);
-            (by_height.gap, by_height.distance - lift.distance)
+        let plausible = (height - self.step).abs() <= HEIGHT_MOST;
+        let height = if plausible { height } else { self.step };
+        let [gap, as_table, shift] = state.lift.map_or([Q16::ZERO; 3], |lift| match direction {
+            Direction::Deploy => {
+                let seen = self.measure(lift.depth, lift.height, height);
+                [seen.gap, lift.gap, seen.distance - lift.distance]
+            }
+            // The lower wall carries from the height on that is known now. The edge was seen
+            // from the upper wall.
+            Direction::Retract => {
+                let depth = self.depth_at(state, height).unwrap_or(lift.depth);
+                let gap = |step| self.measure(depth, self.radius, step).gap;
+                [gap(height), gap(self.step), Q16::ZERO]
+            }
         });
         state.baseline = state.next;
         state.contact = Contact::Wall;
         state.ticks = 0;
-        Some(CrossingEvent::GapClosed { height, gap, shift, plausible })
+        Some(CrossingEvent::GapClosed { height, gap, as_table, shift, plausible })
+    }
+
+    /// Place in the kept depths of a wheel that has sunk by `fall`, and the part beyond it.
+    fn fall_index(&self, fall: Millimetres) -> Option<(usize, Ratio)> {
+        let place = (fall - self.step + HEIGHT_MOST) * PER_FALL;
+        let index = usize::try_from(place.floor()).ok()?;
+        Some((index, place - Q16::from_num(index as i32)))
+    }
+
+    fn keep_depth(&self, state: &mut WatchState, seen: &WatchInput) {
+        let kept = self.fall_index(seen.radius - state.baseline.output());
+        let slot = kept.and_then(|(index, _)| state.depths.get_mut(index));
+        if let Some(slot) = slot.filter(|slot| **slot == Q16::ZERO) {
+            *slot = seen.compression;
+        }
+    }
+
+    /// Compression as the wheel had sunk by `fall`, mm, if that was seen: by the two falls before
+    /// it, since behind it the lower wall may carry.
+    fn depth_at(&self, state: &WatchState, fall: Millimetres) -> Option<Millimetres> {
+        let (index, part) = self.fall_index(fall)?;
+        let before = *state.depths.get(index.checked_sub(1)?)?;
+        let here = *state.depths.get(index)?;
+        (here > Q16::ZERO && before > Q16::ZERO).then(|| here + (here - before) * part)
     }
 
     /// A corner begins to carry.
@@ -421,6 +475,7 @@ impl CrossingWatch {
         state.again = 0;
         state.deepest = seen.compression;
         state.lift = None;
+        state.depths = [Q16::ZERO; FALLS];
         // On retract the wheel is on the edge alone as soon as it dips.
         state.contact = match direction {
             Direction::Deploy => Contact::Both,

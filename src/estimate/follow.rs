@@ -4,11 +4,20 @@ use super::crossing::{Contact, CrossingEvent, Lift, WatchInput};
 use super::odometry::Rolling;
 use super::restore::UNSURE_WITHIN;
 use super::tread::Shown;
-use super::{EstimateState, Estimator, Expectation, Findings, LiftPoint, OpenCrossing, Position};
+use super::{
+    EstimateState, Estimator, Expectation, Findings, LiftPoint, OpenCrossing, Position, Slip,
+};
 use crate::fault::{Fault, Limit};
 use crate::model::LimitedBy;
 use crate::sense::{FILTER_LAG, SensedState};
-use crate::units::{Direction, Millimetres, Newtons, Q16, Tick};
+use crate::units::{Direction, Millimetres, Newtons, Q16, Tick, q16};
+
+/// Ticks for which a wheel may slip under the most preload that there is: five times those in which
+/// the published tread relaxes.
+const HOPELESS_TICKS: u32 = 500;
+/// Deviation of a step's height from which it is reported, mm: three steps of the angle code, and
+/// the tolerance of a sleeve, 0.05.
+const HEIGHT_SEEN: Millimetres = q16(120_000);
 
 /// What the estimator is given in a tick.
 #[derive(Clone, Copy, Debug)]
@@ -19,6 +28,8 @@ pub struct Follow<'a> {
     pub sensed: &'a SensedState,
     /// Radial force on the wheel, N.
     pub pressed: Newtons,
+    /// The preload is as high as it may be.
+    pub most_pressed: bool,
     /// Since when the crossing preload has been reached.
     pub standing_since: Option<Tick>,
     /// What keeps the crossing ahead from being faster, by its plan.
@@ -60,16 +71,17 @@ impl Estimator {
             Some(CrossingEvent::Released) => state.crossing = None,
             Some(CrossingEvent::Lifted(lift)) => self.lifted(state, tick, lift, &mut found),
             Some(CrossingEvent::Passed) => passed(state),
-            Some(CrossingEvent::GapClosed { gap, shift, plausible, .. }) => {
-                refine(state, shift);
-                close(state, gap, plausible, &mut found);
+            Some(CrossingEvent::GapClosed { height, gap, as_table, shift, plausible }) => {
+                let measured = Measured { height, gap, as_table, shift, plausible };
+                self.close(state, tick.sensed, &measured, &mut found);
             }
             Some(CrossingEvent::Retouched { gap }) => {
-                close(state, gap, false, &mut found);
+                self.close(state, tick.sensed, &self.as_table(gap), &mut found);
                 self.touched(state, tick, &mut found);
             }
         }
         self.feel(state, tick.sensed);
+        self.hold_to_corner(state, tick.sensed);
         if state.watch.contact == Contact::Wall && !state.known.is_searching() {
             let (travel, compression) = (tick.sensed.travel, tick.sensed.compression_filtered);
             let tread = &mut state.tread;
@@ -123,10 +135,10 @@ impl Estimator {
     }
 
     /// Ends a crossing that is past its lift-off, at the end of travel.
-    pub fn close_crossing(&self, state: &mut EstimateState) -> Findings {
+    pub fn close_crossing(&self, state: &mut EstimateState, sensed: &SensedState) -> Findings {
         let mut found = Findings::default();
         if let Some(point) = state.crossing.as_ref().and_then(|open| open.lift) {
-            close(state, point.gap, false, &mut found);
+            self.close(state, sensed, &self.as_table(point.gap), &mut found);
         }
         found
     }
@@ -191,14 +203,46 @@ impl Estimator {
         });
     }
 
-    /// A wheel that turns on a corner far longer than a crossing takes slips.
+    /// A wheel that turns on a corner far longer than a crossing takes slips, as does one that
+    /// goes on slipping under all the preload that there is.
     fn watch_slip(&self, state: &mut EstimateState, tick: &Follow<'_>, found: &mut Findings) {
         let on_corner = matches!(state.watch.contact, Contact::Both | Contact::Corner);
         let Some(open) = state.crossing.as_mut().filter(|_| on_corner) else { return };
         let from = *open.from.get_or_insert(tick.sensed.travel);
         let turned = tick.sensed.travel.saturating_sub(from).saturating_abs();
-        if turned > self.corner_travel.widen() {
+        let hopeless = tick.most_pressed && open.slip.is_slipping();
+        let since = *open.hopeless_since.get_or_insert(tick.now);
+        if !hopeless {
+            open.hopeless_since = None;
+        }
+        if turned > self.corner_travel.widen()
+            || hopeless && tick.now.wrapping_sub(since) > HOPELESS_TICKS
+        {
             found.fault = Some(Fault::WheelSlips);
+            found.slip = slip_of(open, state.position);
+        }
+    }
+
+    /// Takes the place from the corner under a wheel that slips on it. Nearer to the edge than a
+    /// quarter of the wheel's radius the height hardly shows the distance; back on the lower
+    /// wall the tread is no longer deepest at the corner.
+    fn hold_to_corner(&self, state: &mut EstimateState, sensed: &SensedState) {
+        let touched_down = state.direction == Direction::Retract;
+        match state.watch.contact {
+            Contact::Corner => {}
+            Contact::Both if !touched_down => {}
+            _ => return,
+        }
+        let seen = self.watch_input(state, sensed);
+        let Some(ahead) = self.watch.to_face(&state.watch, state.direction, &seen) else { return };
+        let position = position_of_radius(state, sensed);
+        let Some(open) = state.crossing.as_mut().filter(|_| ahead.abs() > self.telling) else {
+            return;
+        };
+        let lost = open.slip.step(sensed.travel, position + ahead.abs());
+        if lost > Q16::ZERO {
+            state.odometry.slip(lost, open.slip.sigma());
+            state.begin_tick(sensed.travel);
         }
     }
 
@@ -214,10 +258,16 @@ impl Estimator {
         let table = self.steps.face(open.step);
         let seen = position_of_radius(state, sensed) + lift.distance;
         let face = if open.resumed { table.unwrap_or(seen) } else { seen };
-        let residual = table.map_or(Q16::ZERO, |table| face - table);
-        let corrects = open.step > 0 && !open.turned;
-        let left = if corrects { self.correct(state, sensed, residual, found) } else { residual };
-        state.begin_tick(sensed.travel);
+        let searching = state.known.is_searching() && open.step > 0 && !open.turned;
+        let face = match table.filter(|_| searching) {
+            Some(table) => {
+                state.odometry.set_by_step(sensed.travel, state.position - (face - table));
+                state.known = Position::Located;
+                state.begin_tick(sensed.travel);
+                table
+            }
+            None => face,
+        };
         open.lift = Some(LiftPoint {
             at: tick.now,
             position: state.position,
@@ -227,9 +277,8 @@ impl Estimator {
             preload: sensed.preload_filtered,
             remembered: state.remembered_preload(),
             tan_arm: sensed.tan_arm,
-            // As the odometry has it once this step has corrected it.
-            face: face - (residual - left),
-            residual: left,
+            face,
+            residual: Q16::ZERO,
         });
         state.crossing = Some(open);
         if open.step > 0 {
@@ -248,11 +297,7 @@ impl Estimator {
     ) -> Millimetres {
         let tolerance = self.steps.tolerance();
         let alike = |other: Millimetres| (residual - other).abs() <= tolerance;
-        if state.known.is_searching() {
-            state.odometry.set_by_step(sensed.travel, state.position - residual);
-            state.known = Position::Located;
-            Q16::ZERO
-        } else if residual.abs() <= tolerance {
+        if residual.abs() <= tolerance {
             state.displaced = None;
             state.odometry.correct(state.position, residual)
         } else if state.displaced.is_some_and(alike) {
@@ -273,6 +318,51 @@ impl Estimator {
         }
     }
 
+    /// A step whose wall behind it was not measured.
+    fn as_table(&self, gap: Millimetres) -> Measured {
+        let (height, shift) = (self.steps.height(), Q16::ZERO);
+        Measured { height, gap, as_table: gap, shift, plausible: false }
+    }
+
+    /// The crossing is behind: its step corrects the position, and it is reported for review,
+    /// unless only half of it was observed.
+    fn close(
+        &self,
+        state: &mut EstimateState,
+        sensed: &SensedState,
+        measured: &Measured,
+        found: &mut Findings,
+    ) {
+        let higher = measured.height - self.steps.height();
+        state.raised += higher * Q16::from_num(state.direction.sign());
+        let Some(mut open) = state.crossing else { return };
+        if let Some(mut point) = open.lift {
+            if !open.resumed && !open.turned {
+                point.face += measured.shift;
+                if let Some(table) = self.steps.face(open.step) {
+                    let residual = point.face - table;
+                    point.residual = self.correct(state, sensed, residual, found);
+                    point.face = table + point.residual;
+                    state.begin_tick(sensed.travel);
+                }
+            }
+            point.gap = measured.as_table;
+            open.lift = Some(point);
+        }
+        state.crossing = None;
+        open.gap = measured.gap;
+        open.height = measured.height;
+        open.deepest = state.watch.deepest;
+        found.slip = slip_of(&open, open.lift.map_or(state.position, |point| point.face));
+        if higher.abs() > HEIGHT_SEEN {
+            found.limit(Limit::StepHeight);
+        }
+        if open.lift.is_some() && !open.turned {
+            found.closed = Some((open, measured.plausible));
+            found.replan = true;
+        }
+    }
+
     /// Input of the crossing watch.
     pub(super) fn watch_input(&self, state: &EstimateState, sensed: &SensedState) -> WatchInput {
         let to_window = self.steps.to_window(state.direction, self.distance(state));
@@ -280,8 +370,19 @@ impl Estimator {
             radius: sensed.radius.value,
             compression: sensed.compression_filtered,
             near: to_window.is_some_and(|ahead| ahead <= Q16::ZERO),
+            over: self.is_over(state),
             clear: self.clear_of(state),
         }
+    }
+
+    /// Whether a retracting wheel is further from the edge that it came over than an undeformed one
+    /// could be with the edge still under it.
+    fn is_over(&self, state: &EstimateState) -> bool {
+        let felt = state.crossing.as_ref().and_then(|open| open.felt);
+        state.direction == Direction::Retract
+            && felt.is_some_and(|face| {
+                face - state.position > self.corner().first_contact(Direction::Deploy)
+            })
     }
 
     /// Whether the wheel has left the corner of the last step behind.
@@ -330,28 +431,19 @@ fn position_of_radius(state: &EstimateState, sensed: &SensedState) -> Millimetre
     state.position - sensed.speed.value * FILTER_LAG
 }
 
-/// The step's height is measured: its face lies `shift` further out.
-fn refine(state: &mut EstimateState, shift: Millimetres) {
-    let observed = state.crossing.as_mut().filter(|open| !open.resumed && !open.turned);
-    let Some((open_step, point)) = observed.and_then(|open| Some((open.step, open.lift.as_mut()?)))
-    else {
-        return;
-    };
-    let corrects = state.displaced.is_none() && open_step > 0;
-    let left = if corrects { state.odometry.refine(shift) } else { shift };
-    point.face += left;
-    point.residual += left;
+/// What the wall behind a step shows of the crossing.
+struct Measured {
+    height: Millimetres,
+    gap: Millimetres,
+    as_table: Millimetres,
+    shift: Millimetres,
+    plausible: bool,
 }
 
-/// The crossing is behind: reports it for review, unless only half of it was observed.
-fn close(state: &mut EstimateState, gap: Millimetres, plausible: bool, found: &mut Findings) {
-    let Some(mut open) = state.crossing.take() else { return };
-    open.gap = gap;
-    open.deepest = state.watch.deepest;
-    if open.lift.is_some() && !open.turned {
-        found.closed = Some((open, plausible));
-        found.replan = true;
-    }
+/// Slip of a crossing so far, if any.
+fn slip_of(open: &OpenCrossing, position: Millimetres) -> Option<Slip> {
+    let (amount, sigma) = (open.slip.lost, open.slip.sigma());
+    (amount > Q16::ZERO).then_some(Slip { position, amount, sigma })
 }
 
 /// Reports a step outside its window, unless it has been reported already.
@@ -418,25 +510,61 @@ mod tests {
             now: 0,
             sensed: &sensed,
             pressed: Q16::ZERO,
+            most_pressed: false,
             standing_since: None,
             limited_by: None,
         };
         let place = estimator.steps.face(1).expect("a first step");
-        // A search from 13 mm before it, and the second step in a row that is 3 mm off.
-        for (known, displaced, off) in
-            [(Position::Searching, None, -13), (Position::Located, Some(3), 3)]
-        {
-            let off = Q16::from_num(off);
-            let mut state = EstimateState { known, next_step: 1, ..EstimateState::default() };
-            state.displaced = displaced.map(Q16::from_num);
-            state.set_position(sensed.travel, place + off);
-            state.crossing = Some(OpenCrossing { step: 1, ..OpenCrossing::default() });
-            let lift =
-                Lift { depth: Q16::ZERO, height: Q16::ZERO, gap: Q16::ZERO, distance: Q16::ZERO };
-            estimator.lifted(&mut state, &tick, lift, &mut Findings::default());
-            let point = state.crossing.and_then(|open| open.lift).expect("lifted");
-            assert_eq!((point.face, point.position, point.residual), (place, place, Q16::ZERO));
-            assert!(!estimator.clear_of(&state));
+        // A search from 13 mm before it.
+        let mut state =
+            EstimateState { known: Position::Searching, next_step: 1, ..EstimateState::default() };
+        state.set_position(sensed.travel, place - q16(13_000_000));
+        state.crossing = Some(OpenCrossing { step: 1, ..OpenCrossing::default() });
+        let lift =
+            Lift { depth: Q16::ZERO, height: Q16::ZERO, gap: Q16::ZERO, distance: Q16::ZERO };
+        estimator.lifted(&mut state, &tick, lift, &mut Findings::default());
+        let point = state.crossing.and_then(|open| open.lift).expect("lifted");
+        assert_eq!((point.face, point.position, point.residual), (place, place, Q16::ZERO));
+        assert!(!estimator.clear_of(&state));
+    }
+
+    #[test]
+    fn of_two_steps_in_a_row_that_are_off_alike_the_second_sets_the_position() {
+        let (sensed, estimator) = (sensed(0, 0.0, 0.3), estimator());
+        let place = estimator.steps.face(2).expect("a second step");
+        let off = q16(3_000_000);
+        let mut state = EstimateState { known: Position::Located, ..EstimateState::default() };
+        state.displaced = Some(off);
+        state.set_position(sensed.travel, place + off);
+        let lift = Some(LiftPoint { face: place + off, ..LiftPoint::default() });
+        state.crossing = Some(OpenCrossing { step: 2, lift, ..OpenCrossing::default() });
+        assert_eq!(estimator.sigma(&state), off);
+        let mut found = Findings::default();
+        estimator.close(&mut state, &sensed, &estimator.as_table(Q16::ZERO), &mut found);
+        assert_eq!((state.position, state.displaced), (place, None));
+        assert!(estimator.sigma(&state) < q16(200_000));
+        let (closed, _) = found.closed.expect("closed");
+        assert_eq!(closed.lift.map(|point| point.face), Some(place));
+    }
+
+    #[test]
+    fn a_step_off_its_height_is_reported_and_its_gap_learned_from_as_the_table_has_it() {
+        let (sensed, estimator) = (sensed(0, 0.0, 0.3), estimator());
+        for (height, reported) in [(4_100_000, false), (4_200_000, true), (3_500_000, true)] {
+            let mut state = EstimateState { known: Position::Located, ..EstimateState::default() };
+            let face = estimator.steps.face(1).expect("a first step");
+            let lift = Some(LiftPoint { face, ..LiftPoint::default() });
+            state.crossing = Some(OpenCrossing { step: 1, lift, ..OpenCrossing::default() });
+            let (gap, as_table) = (q16(2_700_000), q16(2_600_000));
+            let measured =
+                Measured { height: q16(height), gap, as_table, shift: Q16::ZERO, plausible: true };
+            let mut found = Findings::default();
+            estimator.close(&mut state, &sensed, &measured, &mut found);
+            assert_eq!(found.limits.contains(&Limit::StepHeight), reported, "{height}");
+            let (closed, trusted) = found.closed.expect("closed");
+            let learned = closed.lift.expect("lifted").gap;
+            assert_eq!((closed.gap, learned, trusted), (gap, as_table, true));
+            assert_eq!(state.raised, q16(height) - q16(4_000_000));
         }
     }
 

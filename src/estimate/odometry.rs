@@ -7,8 +7,10 @@
 use crate::numeric::{between, divide, sqrt};
 use crate::units::{Millimetres, Q16, Ratio, Travel, q16};
 
-/// Variance of a known position over that of a step's place: 0.03 mm. A sleeve is machined to
-/// 0.3 mm, which is a deviation of 0.17 mm.
+/// Deviation of a step's place, mm: a sleeve is machined to 0.3 mm, evenly spread; its reciprocal.
+const PLACE: Millimetres = q16(173_205);
+const PER_PLACE: Q16 = q16(5_773_503);
+/// Variance of a known position over that of a step's place: 0.03 mm.
 const KNOWN: Ratio = q16(30_000);
 /// What the variance of the position grows by from step to step: 0.03 mm, on a corner above all.
 const WANDERS: Ratio = q16(30_000);
@@ -42,9 +44,6 @@ pub struct Odometry {
     /// Variances of position and scale, and their covariance.
     variance: [Ratio; 2],
     covariance: Ratio,
-    /// Parts of the last residual that position and scale took over.
-    share: Ratio,
-    gain: Ratio,
     from: Option<Start>,
 }
 
@@ -56,8 +55,6 @@ impl Default for Odometry {
             origin: Millimetres::ZERO,
             variance: [KNOWN, UNKNOWN_RADIUS],
             covariance: Ratio::ZERO,
-            share: Ratio::ZERO,
-            gain: Ratio::ZERO,
             from: None,
         }
     }
@@ -102,7 +99,6 @@ impl Odometry {
     pub fn set_by_step(&mut self, travel: Travel, position: Millimetres) {
         self.set(travel, position);
         self.variance[0] = Ratio::ONE;
-        self.share = Ratio::ONE;
     }
 
     /// Begins a run at `position`: what moved the arm since the last one was no rolling.
@@ -116,6 +112,22 @@ impl Odometry {
             variance: [between(place + reach * both, KNOWN, Ratio::ONE), UNKNOWN_RADIUS],
             ..Self::default()
         };
+    }
+
+    /// One sigma of `position`, mm.
+    pub fn sigma(&self, position: Millimetres) -> Millimetres {
+        let reach = (position - self.origin) * PER_REACH;
+        let [place, scale] = self.variance;
+        let all = place + reach * (self.covariance + self.covariance + reach * scale);
+        sqrt(all.max(Q16::ZERO)) * PLACE
+    }
+
+    /// The wheel has slipped: the axle is `lost` further in than the tread's travel has it, give or
+    /// take `sigma`, mm.
+    pub fn slip(&mut self, lost: Millimetres, sigma: Millimetres) {
+        self.offset = self.offset.saturating_sub(lost.widen());
+        let parts = sigma * PER_PLACE;
+        self.variance[0] += parts * parts;
     }
 
     /// Takes over its part of the difference between where a step was found, near `position`, and
@@ -134,19 +146,12 @@ impl Odometry {
             (scale - gain * of_scale).max(Q16::ZERO),
         ];
         self.covariance -= gain_of_place * of_scale;
-        (self.share, self.gain) = (divide(expected, all), gain);
         let most = residual.clamp(-LARGEST, LARGEST);
-        residual - most + self.refine(most)
-    }
-
-    /// The step found last lies `shift` further out than its residual had it, mm; what is left of
-    /// that.
-    pub fn refine(&mut self, shift: Millimetres) -> Millimetres {
-        let taken = shift * self.share;
+        let taken = most * divide(expected, all);
         self.offset = self.offset.saturating_sub(taken.widen());
-        let scale = self.scale - shift * self.gain * PER_REACH;
+        let scale = self.scale - most * gain * PER_REACH;
         self.scale = scale.clamp(-MOST_SCALE, MOST_SCALE);
-        shift - taken
+        residual - taken
     }
 
     /// Converts what the tread has travelled to axial travel once it makes a chord, or `now`.
@@ -281,7 +286,6 @@ mod tests {
             by_step in any::<bool>(),
             places in proptest::collection::vec(-0.3..0.3f64, 1..8),
             stretch in -0.003..0.003f64,
-            shift in -0.1..0.1f64,
         ) {
             let sign = if back { -1.0 } else { 1.0 };
             let (mut odometry, mut travel) = (Odometry::default(), Travel::ZERO);
@@ -305,9 +309,7 @@ mod tests {
                 }
                 let position = odometry.position(travel);
                 let residual = position - Q16::from_num(50.0 + x - x * stretch - off);
-                // Found a little off at first.
-                let shift = Q16::from_num(shift);
-                let left = odometry.correct(position, residual - shift) + odometry.refine(shift);
+                let left = odometry.correct(position, residual);
                 prop_assert!((odometry.position(travel) - position + residual - left).abs() < q16(1_000));
                 let (offset, scale) = least_squares(place, &found);
                 let exact = 50.0 + x - offset - x * scale;

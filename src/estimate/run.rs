@@ -1,14 +1,18 @@
 //! Before and at the end of a run: where the wheel is, what lies ahead, whether it has arrived.
 
 use super::crossing::Contact;
+use super::restore::UNSURE_WITHIN;
 use super::{EstimateState, Estimator, Findings, OpenCrossing, Position, PositionConfidence};
 use crate::fault::Fault;
 use crate::sense::SensedState;
-use crate::units::{Direction, Q16, Ratio, Tick, q16};
+use crate::units::{Direction, Millimetres, Q16, Ratio, Tick, q16};
 
 /// Off a whole number of steps by no more than this, the arm shows a level: half the
 /// hysteresis of a corner, and the tolerances of sleeve and arm.
 const LEVEL_WITHIN: Ratio = q16(120_000);
+
+/// Largest sigma of the position with which a run has arrived, mm.
+const PLACE_WITHIN: Millimetres = q16(500_000);
 
 impl Estimator {
     /// Before a run: step ahead and baseline. Whether the run begins on a corner after a
@@ -127,14 +131,32 @@ impl Estimator {
         self.steps.ahead_of_level(behind, state.direction)
     }
 
-    /// Whether the arm confirms the level at the end of travel.
-    pub fn confirms_end(&self, state: &EstimateState, sensed: &SensedState) -> bool {
+    /// Whether the arm confirms the level at the end of travel, and the steps the place.
+    pub fn confirms_end(&self, state: &EstimateState, sensed: &SensedState) -> Result<(), Fault> {
         let expected = match state.direction {
             Direction::Deploy => (self.steps.count() + state.extra).saturating_sub(state.missed),
             Direction::Retract => 0,
         };
         let on_wall = matches!(state.watch.contact, Contact::Wall | Contact::Leaving);
-        on_wall && sensed.level == expected && !state.known.is_searching()
+        // Steps that are not as high as the table has them add up.
+        let off = (sensed.steps_up - Q16::from_num(expected)).abs() * self.steps.height();
+        let level =
+            sensed.level == expected || off <= self.steps.height().half() + state.raised.abs();
+        if !on_wall || !level || state.known.is_searching() {
+            Err(Fault::LevelMismatch)
+        } else if self.sigma(state) > PLACE_WITHIN {
+            Err(Fault::PlaceUnconfirmed)
+        } else {
+            Ok(())
+        }
+    }
+
+    /// One sigma of the position, mm: that of the odometry; or, after a step that was found
+    /// elsewhere, by how much, until the next one decides; or of what a record has.
+    pub fn sigma(&self, state: &EstimateState) -> Millimetres {
+        let displaced = state.displaced.map_or(Q16::ZERO, Q16::abs);
+        let by_record = if state.known.is_unsure() { UNSURE_WITHIN } else { Q16::ZERO };
+        state.odometry.sigma(state.position).max(displaced).max(by_record)
     }
 }
 
@@ -262,7 +284,7 @@ mod tests {
             for shown in 0..=4 {
                 let state = EstimateState { missed, extra, ..state(direction, 0.0, 0) };
                 let confirmed = estimator().confirms_end(&state, &sensed(shown, 0.0, 0.3));
-                assert_eq!(confirmed, shown == level, "{missed} {extra} {shown}");
+                assert_eq!(confirmed.is_ok(), shown == level, "{missed} {extra} {shown}");
             }
         }
     }

@@ -4,12 +4,12 @@ use super::crossing::{Contact, WatchState};
 use super::crossing_speed::CrossingSpeed;
 use super::odometry::Odometry;
 use super::tread::TreadState;
-use super::{Place, Position, PositionConfidence};
+use super::{CornerSlip, Place, Position, PositionConfidence};
 use crate::fault::{Fault, Limit};
 use crate::model::LimitedBy;
 use crate::numeric::LowPassState;
 use crate::units::{
-    Direction, Millimetres, MillimetresPerSecond, Newtons, Ratio, Tick, Travel, q16,
+    Direction, Millimetres, MillimetresPerSecond, Newtons, Q16, Ratio, Tick, Travel, q16,
 };
 
 /// Error of the place at which a lift-off is detected, mm: the steps of the angle code, and the
@@ -50,6 +50,8 @@ pub struct EstimateState {
     pub(super) missed_in_a_row: u8,
     /// Steps climbed that the table lacks, since the stow end.
     pub(super) extra: u8,
+    /// By how much the walls passed lie further in than by the table, mm.
+    pub(super) raised: Millimetres,
 }
 
 /// A crossing under way.
@@ -71,6 +73,10 @@ pub struct OpenCrossing {
     pub touched_at: Tick,
     /// Position of the face by the corner that carries, as soon as it shows, mm.
     pub felt: Option<Millimetres>,
+    /// Slip on it.
+    pub slip: CornerSlip,
+    /// Since when it slips under the most preload that there is.
+    pub hopeless_since: Option<Tick>,
     /// Odometry at that time.
     pub from: Option<Travel>,
     /// Since when the crossing preload had been reached.
@@ -83,6 +89,8 @@ pub struct OpenCrossing {
     pub lift: Option<LiftPoint>,
     /// Gap when closed, mm.
     pub gap: Millimetres,
+    /// Height of the step when closed, mm.
+    pub height: Millimetres,
     /// Largest compression when closed, mm.
     pub deepest: Millimetres,
 }
@@ -94,7 +102,7 @@ pub struct LiftPoint {
     pub at: Tick,
     /// Position of the wheel, mm.
     pub position: Millimetres,
-    /// Gap with the nominal step height, mm.
+    /// Gap with the nominal step height, mm: of a wheel as deep in the corner.
     pub gap: Millimetres,
     /// Wheel speed as the tread remembers it, mm/s.
     pub speed: MillimetresPerSecond,
@@ -112,6 +120,17 @@ pub struct LiftPoint {
     pub residual: Millimetres,
 }
 
+/// Slip of the wheel, as measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct Slip {
+    /// Where, mm.
+    pub position: Millimetres,
+    /// Travel of the tread that moved no axle, mm.
+    pub amount: Millimetres,
+    /// One sigma of it, mm.
+    pub sigma: Millimetres,
+}
+
 /// What a stage of the estimate has found in a tick.
 #[derive(Debug, Default)]
 pub struct Findings {
@@ -119,6 +138,8 @@ pub struct Findings {
     pub limits: heapless::Vec<Limit, 4>,
     /// The fault found, if any.
     pub fault: Option<Fault>,
+    /// A slip that has come to its end.
+    pub slip: Option<Slip>,
     /// Another step is ahead.
     pub advanced: bool,
     /// A crossing that was observed from touch to end, and whether its gap is plausible.
@@ -192,6 +213,13 @@ impl EstimateState {
     pub fn lifting(&self) -> Option<MillimetresPerSecond> {
         let point = self.crossing.as_ref()?.lift.filter(|_| self.direction == Direction::Deploy)?;
         ((self.position - point.position).abs() < LIFT_WITHIN).then_some(point.held)
+    }
+
+    /// The wheel slips on a corner now, or has slipped on it.
+    pub fn slips(&self) -> (bool, bool) {
+        let on_corner = matches!(self.watch.contact, Contact::Both | Contact::Corner);
+        let slip = self.crossing.as_ref().filter(|_| on_corner).map(|open| open.slip);
+        slip.map_or((false, false), |slip| (slip.is_slipping(), slip.lost > Q16::ZERO))
     }
 
     /// A corner is detected.

@@ -20,6 +20,7 @@ pub struct Steps {
     /// Positions of the faces from the stow end, mm.
     faces: heapless::Vec<Millimetres, MAX_STEPS>,
     travel: Millimetres,
+    height: Millimetres,
     tolerance: Millimetres,
     /// Distance to the face by which a step must have been detected, deploy and retract, mm.
     detected_by: [Millimetres; 2],
@@ -59,6 +60,7 @@ impl Steps {
             corner: CornerProfile::try_build(rig)?,
             faces,
             travel: checked("rig.travel_mm", rig.rig.travel_mm)?,
+            height: checked("rig.step_height_mm", h)?,
             tolerance: checked("rig.step_tolerance_mm", rig.rig.step_tolerance_mm)?,
             detected_by: [
                 checked("rig.step_height_mm", deploy)?,
@@ -76,6 +78,11 @@ impl Steps {
     /// Number of steps.
     pub fn count(&self) -> u8 {
         self.faces.len() as u8
+    }
+
+    /// Height of a step by the table, mm.
+    pub const fn height(&self) -> Millimetres {
+        self.height
     }
 
     /// Half-width of the window in which a step is expected, mm.

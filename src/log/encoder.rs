@@ -255,6 +255,8 @@ mod tests {
             compression: most,
             gap_predicted: most,
             gap_measured: most,
+            height: most,
+            slip: most,
             lead_time: most,
             slip_margin: most,
             stiffness_scale: most,
@@ -266,6 +268,7 @@ mod tests {
             preload: most,
             tan_arm: most,
             gap: most,
+            seen: most,
             trusted: true,
         };
         let direction = Direction::Retract;
@@ -287,6 +290,7 @@ mod tests {
             reserve: most,
             bounded: true,
             strange: true,
+            wide: true,
         };
         let plan = Plan {
             sequence: u32::MAX,

@@ -69,6 +69,8 @@ pub struct Review {
     /// Measured gap of a step of nominal height, mm: how high this one is shows the sleeve, not
     /// the tread.
     pub gap: Millimetres,
+    /// Measured gap at the step as it is, mm.
+    pub seen: Millimetres,
     /// Whether the gap may correct the stiffness: not after an odd crossing.
     pub trusted: bool,
 }
@@ -112,6 +114,8 @@ pub struct Outcome {
     pub bounded: bool,
     /// Whether the measured gap implies a stiffness far from the estimated one.
     pub strange: bool,
+    /// Whether the measured gap is wider than the reference by more than 3 %.
+    pub wide: bool,
 }
 
 /// How the wheel comes to a step. Distances are axial, along the run, to the face of the step.

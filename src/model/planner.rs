@@ -39,6 +39,10 @@ const OUTLIER_STIFFER: Ratio = q16(2_500_000);
 /// stiff guess costs most. One in a hundred random rigs exceeds it at one of its crossings.
 const STRANGE: Ratio = q16(270_000);
 
+/// Measured gap over the reference from which it is reported: twice the error of the measurement
+/// on coupled treads.
+const WIDE: Ratio = q16(1_030_000);
+
 /// Bounds of the reserve that the crossings leave, as shares of the rig's.
 const LEAST_RESERVE: Ratio = q16(333_333);
 const MOST_RESERVE: Ratio = q16(2_000_000);
@@ -376,6 +380,7 @@ impl Planner {
             reserve: request.reserve,
             bounded: false,
             strange,
+            wide: review.seen > self.gap_ref(review.direction) * WIDE,
         };
         if !review.trusted {
             return unchanged(false);

@@ -85,6 +85,14 @@ impl Controller {
         {
             targets.speed = targets.speed.min(speed.max(self.least_speed));
         }
+        // A wheel that slips grips by more preload alone.
+        let (slipping, slipped) = state.estimate.slips();
+        if slipped {
+            targets.preload = self.schedule.most_preload();
+        }
+        if slipping {
+            targets.speed = targets.speed.min(self.least_speed);
+        }
         self.note_preload(state, tick, cross_preload, &targets);
         let leg = state.leg(targets.approaching);
         if state.mode != Mode::Run(direction, leg) {

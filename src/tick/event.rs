@@ -1,6 +1,6 @@
 //! Log entries.
 
-use crate::estimate::ContactStage;
+use crate::estimate::{ContactStage, Slip};
 use crate::fault::{Fault, Limit};
 use crate::model::LimitedBy;
 use crate::restart::Restart;
@@ -39,6 +39,8 @@ pub enum Event {
     Restart(Restart),
     /// The host asked for these duties, other than before, in the service mode or for it.
     Service(ServiceDuties),
+    /// A slip of the wheel on a corner has come to its end.
+    Slip(Slip),
 }
 
 /// Crossing as the controller observed it.
@@ -64,6 +66,10 @@ pub struct CrossingRecord {
     pub gap_predicted: Millimetres,
     /// Gap measured from compression and arm angle, mm.
     pub gap_measured: Millimetres,
+    /// Height of the step as measured, mm; that of the table if the wall behind it was not.
+    pub height: Millimetres,
+    /// Slip measured on the corner, mm.
+    pub slip: Millimetres,
     /// Time for which the wanted preload was reached before the corner touched, s; negative when
     /// it was late.
     pub lead_time: Seconds,

@@ -125,15 +125,14 @@ impl Controller {
             return;
         }
         // A crossing still open gets its record first.
-        let found = self.estimator.close_crossing(&mut state.estimate);
+        let found = self.estimator.close_crossing(&mut state.estimate, tick.sensed);
         self.take_findings(state, tick, found);
         if state.planning.closed.is_some() {
             return;
         }
-        if self.estimator.confirms_end(&state.estimate, tick.sensed) {
-            tick.trigger(Trigger::Arrived);
-        } else {
-            tick.fail(Fault::LevelMismatch);
+        match self.estimator.confirms_end(&state.estimate, tick.sensed) {
+            Ok(()) => tick.trigger(Trigger::Arrived),
+            Err(fault) => tick.fail(fault),
         }
     }
 }

@@ -64,6 +64,9 @@ impl Controller {
             if outcome.strange {
                 tick.log(Event::Limit(Limit::GapStrange));
             }
+            if outcome.wide {
+                tick.log(Event::Limit(Limit::GapWide));
+            }
             planning.review = None;
             if let Some(open) = planning.closed.take() {
                 record(tick, &open, outcome);
@@ -122,6 +125,8 @@ fn record(tick: &mut TickContext<'_>, open: &OpenCrossing, outcome: &Outcome) {
         compression: open.deepest,
         gap_predicted: outcome.gap_predicted,
         gap_measured: open.gap,
+        height: open.height,
+        slip: open.slip.lost,
         lead_time: lead_time(open, point.at),
         slip_margin: outcome.slip_margin,
         stiffness_scale: outcome.scale,

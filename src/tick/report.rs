@@ -4,6 +4,7 @@ use super::{Controller, Event, State, Telemetry, TickContext};
 use crate::control::schedule::Targets;
 use crate::estimate::crossing::Contact;
 use crate::estimate::{ContactStage, Findings};
+use crate::fault::Limit;
 use crate::model::Review;
 use crate::model::planner::KNOWN_SCALE;
 use crate::numeric::part;
@@ -20,6 +21,10 @@ impl Controller {
         found: Findings,
     ) {
         found.limits.into_iter().for_each(|limit| tick.log(Event::Limit(limit)));
+        if let Some(slip) = found.slip {
+            tick.log(Event::Limit(Limit::WheelSlipped));
+            tick.log(Event::Slip(slip));
+        }
         if found.advanced {
             let sped_up = state.approach.released && state.estimate.lifting().is_some();
             state.approach = Approach { sped_up, ..Approach::default() };
@@ -32,6 +37,7 @@ impl Controller {
                 preload: point.remembered,
                 tan_arm: point.tan_arm,
                 gap: point.gap,
+                seen: open.gap,
                 trusted: open.expected && plausible,
             });
         }

@@ -42,6 +42,12 @@ pub struct LedgerLine {
     pub slip_margin: f64,
     /// Travel of the tread beyond the axial travel since the last step found, mm.
     pub slip_mm: f64,
+    /// Slip measured on the corner, mm.
+    #[serde(default)]
+    pub slip_measured_mm: Option<f64>,
+    /// Measured height of the step, mm.
+    #[serde(default)]
+    pub height_measured_mm: Option<f64>,
     /// Stiffness scale after this crossing.
     pub stiffness_scale: f64,
     /// Its change per crossing, the newest weighing a quarter.
@@ -73,6 +79,8 @@ impl From<&Line> for LedgerLine {
             lead_time_s: num(crossing.lead_time),
             slip_margin: num(crossing.slip_margin),
             slip_mm: num(line.slip),
+            slip_measured_mm: Some(num(crossing.slip)),
+            height_measured_mm: Some(num(crossing.height)),
             stiffness_scale: num(crossing.stiffness_scale),
             trend: num(line.trend),
             limited_by: crossing.limited_by,

@@ -103,6 +103,8 @@ impl ControllerView {
         CrossingLine {
             gap_predicted_mm: num(|r| r.gap_predicted),
             gap_measured_mm: num(|r| r.gap_measured),
+            slip_measured_mm: num(|r| r.slip),
+            height_measured_mm: num(|r| r.height),
             lead_time_s: Some(self.lead_time(crossing.touch_s)),
             step_found_mm: num(|r| r.position),
             limited_by: reported.and_then(|(_, r)| r.limited_by),
@@ -166,6 +168,11 @@ pub fn text(event: &Event) -> String {
             let percent = |duty: Duty| 100.0 * f64::from(duty.to_bits()) / 32_768.0;
             let (drive, preload) = (percent(*drive), percent(*pretightener));
             format!("service: drive {drive:.1} %, pre-tightener {preload:.1} %")
+        }
+        Event::Slip(slip) => {
+            let [at, amount, sigma] =
+                [slip.position, slip.amount, slip.sigma].map(|value| value.to_num::<f64>());
+            format!("slipped {amount:.2} mm (one sigma {sigma:.2}) at {at:.1} mm")
         }
         Event::Crossing(c) => format!(
             "crossing {} at {:.2} mm ({:+.2}): {:.2} mm/s, {:.1} N, gap {:.3} mm measured, \

@@ -27,6 +27,12 @@ pub struct CrossingLine {
     pub lead_time_s: Option<f64>,
     /// Gross slip during the crossing, mm.
     pub slip_mm: f64,
+    /// Slip on the corner that the controller measured, mm.
+    #[serde(default)]
+    pub slip_measured_mm: Option<f64>,
+    /// Height of the step that the controller measured, mm.
+    #[serde(default)]
+    pub height_measured_mm: Option<f64>,
     /// True time of the corner's first touch, s.
     pub touch_s: f64,
     /// True time of lift-off (touch-down on retract), s.

@@ -163,6 +163,8 @@ pub fn true_line(crossing: &Crossing) -> CrossingLine {
         corner_force_n: crossing.corner_n,
         lead_time_s: None,
         slip_mm: crossing.slip_mm,
+        slip_measured_mm: None,
+        height_measured_mm: None,
         touch_s: crossing.touch_s,
         lift_s: crossing.lift_s,
         step_mm: crossing.step_mm,

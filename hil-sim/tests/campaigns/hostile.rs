@@ -232,8 +232,15 @@ fn asked(planner: &Planner, model: &ReducedModel) -> Option<String> {
                 }
                 let _ = (model.force(&point, a), model.utilisation(&point, a), model.depth(a));
                 let _ = model.observed_scale(&point, a, b);
-                let review =
-                    Review { direction, speed, preload: a, tan_arm: b, gap: ratio, trusted: true };
+                let review = Review {
+                    direction,
+                    speed,
+                    preload: a,
+                    tan_arm: b,
+                    gap: ratio,
+                    seen: ratio,
+                    trusted: true,
+                };
                 let request = PlanRequest {
                     sequence: 1,
                     direction,

@@ -222,6 +222,7 @@ mod tests {
                 preload: q(preload),
                 tan_arm: q(1.0),
                 gap: q(gap),
+                seen: q(gap),
                 trusted: true,
             };
             let plan = planner.plan(&PlanRequest { review: Some(review), ..request(false, 1, scale) });

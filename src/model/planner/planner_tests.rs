@@ -14,6 +14,7 @@ fn reviewed(wider: f64, trusted: bool) -> Outcome {
         preload: q16(47_000_000),
         tan_arm: q16(1_000_000),
         gap: Millimetres::from_num(2.5),
+        seen: Millimetres::from_num(2.5),
         trusted: false,
     };
     let request = PlanRequest { scale, ..request(Direction::Deploy) };
