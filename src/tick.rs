@@ -233,7 +233,8 @@ impl Controller {
         let standing_since = state.approach.standing_since;
         let pressed = tick.pressed();
         let limited_by = state.planning.plan.as_ref().map(|plan| plan.limited_by);
-        let short = self.schedule.most_preload() - tick.sensed.preload_filtered;
+        let most = state.planning.plan.as_ref().map_or(Q16::MAX, |plan| plan.most_preload);
+        let short = most - tick.sensed.preload_filtered;
         let follow = Follow {
             now: tick.now,
             sensed: tick.sensed,

@@ -6,7 +6,7 @@ use crate::estimate::Steps;
 use crate::model::Plan;
 use crate::model::timing::Timing;
 use crate::numeric::{checked, divide};
-use crate::rig::{REGULATION_PART, Rig, RigError};
+use crate::rig::{Rig, RigError};
 use crate::units::{
     Direction, Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, Q16, Ratio,
     Seconds, q16,
@@ -32,8 +32,6 @@ pub struct Schedule {
     timing: Timing,
     /// Short of the wanted preload by no more than this, it is reached, N.
     reached_within: Newtons,
-    /// Highest preload that is asked for, N.
-    most_preload: Newtons,
     /// Travel of the tread over that of the axle where the lower wall stops carrying.
     around_corner: Ratio,
 }
@@ -99,10 +97,6 @@ impl Schedule {
         Ok(Self {
             timing: Timing::try_build(rig)?,
             reached_within: checked("preload.limit_n", rig.preload.limit_n)? * REACHED_PART,
-            most_preload: checked(
-                "preload.limit_n",
-                rig.preload.limit_n * (1.0 - REGULATION_PART),
-            )?,
             around_corner: checked(
                 "rig.step_height_mm",
                 0.97 / (1.0 - rig.rig.step_height_mm / rig.rig.wheel_radius_mm),
@@ -113,11 +107,6 @@ impl Schedule {
     /// Short of the wanted preload by no more than this, it is reached, N.
     pub const fn reached_within(&self) -> Newtons {
         self.reached_within
-    }
-
-    /// Highest preload that is asked for, N.
-    pub const fn most_preload(&self) -> Newtons {
-        self.most_preload
     }
 
     /// What to ask for.

@@ -194,7 +194,7 @@ impl Estimator {
             step: if belongs { state.next_step } else { 0 },
             direction: state.direction,
             expected: belongs && !searching && expectation != Expectation::Ahead,
-            reported: expectation == Expectation::Ahead,
+            reported: expectation == Expectation::Ahead || state.late,
             touched_at: tick.now,
             standing_since: tick.standing_since,
             limited_by: tick.limited_by.filter(|_| belongs),
@@ -236,9 +236,9 @@ impl Estimator {
         let seen = self.watch_input(state, sensed);
         let Some(ahead) = self.watch.to_face(&state.watch, state.direction, &seen) else { return };
         let position = position_of_radius(state, sensed);
-        let Some(open) = state.crossing.as_mut().filter(|_| ahead.abs() > self.telling) else {
-            return;
-        };
+        // Of a crossing that began in its middle the wall below was not measured.
+        let told = |open: &&mut OpenCrossing| !open.turned && ahead.abs() > self.telling;
+        let Some(open) = state.crossing.as_mut().filter(told) else { return };
         let lost = open.slip.step(sensed.travel, position + ahead.abs());
         if lost > Q16::ZERO {
             state.odometry.slip(lost, open.slip.sigma());
@@ -258,16 +258,20 @@ impl Estimator {
         let table = self.steps.face(open.step);
         let seen = position_of_radius(state, sensed) + lift.distance;
         let face = if open.resumed { table.unwrap_or(seen) } else { seen };
-        let searching = state.known.is_searching() && open.step > 0 && !open.turned;
-        let face = match table.filter(|_| searching) {
-            Some(table) => {
-                state.odometry.set_by_step(sensed.travel, state.position - (face - table));
-                state.known = Position::Located;
-                state.begin_tick(sensed.travel);
-                table
-            }
-            None => face,
-        };
+        let mut residual = table.map_or(Q16::ZERO, |table| face - table);
+        let corrects = open.step > 0 && !open.turned;
+        let before = residual;
+        if corrects && state.known.is_searching() {
+            state.odometry.set_by_step(sensed.travel, state.position - residual);
+            state.known = Position::Located;
+            (residual, open.corrected) = (Q16::ZERO, true);
+        } else if corrects && residual.abs() <= self.steps.tolerance() {
+            state.displaced = None;
+            residual = state.odometry.correct(state.position, residual);
+            open.corrected = true;
+        }
+        // Further off, it is judged when the step's height is known.
+        state.begin_tick(sensed.travel);
         open.lift = Some(LiftPoint {
             at: tick.now,
             position: state.position,
@@ -277,8 +281,9 @@ impl Estimator {
             preload: sensed.preload_filtered,
             remembered: state.remembered_preload(),
             tan_arm: sensed.tan_arm,
-            face,
-            residual: Q16::ZERO,
+            // As the odometry has it once this step has corrected it.
+            face: face - (before - residual),
+            residual,
         });
         state.crossing = Some(open);
         if open.step > 0 {
@@ -338,13 +343,17 @@ impl Estimator {
         let Some(mut open) = state.crossing else { return };
         if let Some(mut point) = open.lift {
             if !open.resumed && !open.turned {
-                point.face += measured.shift;
-                if let Some(table) = self.steps.face(open.step) {
-                    let residual = point.face - table;
-                    point.residual = self.correct(state, sensed, residual, found);
-                    point.face = table + point.residual;
-                    state.begin_tick(sensed.travel);
-                }
+                let left = match self.steps.face(open.step) {
+                    None => measured.shift,
+                    Some(_) if open.corrected => state.odometry.refine(measured.shift),
+                    Some(_) => {
+                        let residual = point.residual + measured.shift;
+                        self.correct(state, sensed, residual, found) - point.residual
+                    }
+                };
+                point.face += left;
+                point.residual += left;
+                state.begin_tick(sensed.travel);
             }
             point.gap = measured.as_table;
             open.lift = Some(point);
@@ -452,7 +461,7 @@ fn report_displaced(state: &EstimateState, residual: Millimetres, found: &mut Fi
         Direction::Deploy => residual < Q16::ZERO,
         Direction::Retract => residual > Q16::ZERO,
     };
-    let reported = state.crossing.is_some_and(|open| open.reported) || state.late;
+    let reported = state.crossing.is_some_and(|open| open.reported);
     if !reported {
         found.limit(if early { Limit::StepEarly } else { Limit::StepLate });
     }
@@ -536,9 +545,8 @@ mod tests {
         let mut state = EstimateState { known: Position::Located, ..EstimateState::default() };
         state.displaced = Some(off);
         state.set_position(sensed.travel, place + off);
-        let lift = Some(LiftPoint { face: place + off, ..LiftPoint::default() });
+        let lift = Some(LiftPoint { face: place + off, residual: off, ..LiftPoint::default() });
         state.crossing = Some(OpenCrossing { step: 2, lift, ..OpenCrossing::default() });
-        assert_eq!(estimator.sigma(&state), off);
         let mut found = Findings::default();
         estimator.close(&mut state, &sensed, &estimator.as_table(Q16::ZERO), &mut found);
         assert_eq!((state.position, state.displaced), (place, None));

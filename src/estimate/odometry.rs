@@ -44,6 +44,9 @@ pub struct Odometry {
     /// Variances of position and scale, and their covariance.
     variance: [Ratio; 2],
     covariance: Ratio,
+    /// Parts of the last residual that position and scale took over.
+    share: Ratio,
+    gain: Ratio,
     from: Option<Start>,
 }
 
@@ -55,6 +58,8 @@ impl Default for Odometry {
             origin: Millimetres::ZERO,
             variance: [KNOWN, UNKNOWN_RADIUS],
             covariance: Ratio::ZERO,
+            share: Ratio::ZERO,
+            gain: Ratio::ZERO,
             from: None,
         }
     }
@@ -99,6 +104,7 @@ impl Odometry {
     pub fn set_by_step(&mut self, travel: Travel, position: Millimetres) {
         self.set(travel, position);
         self.variance[0] = Ratio::ONE;
+        self.share = Ratio::ONE;
     }
 
     /// Begins a run at `position`: what moved the arm since the last one was no rolling.
@@ -146,12 +152,19 @@ impl Odometry {
             (scale - gain * of_scale).max(Q16::ZERO),
         ];
         self.covariance -= gain_of_place * of_scale;
+        (self.share, self.gain) = (divide(expected, all), gain);
         let most = residual.clamp(-LARGEST, LARGEST);
-        let taken = most * divide(expected, all);
+        residual - most + self.refine(most)
+    }
+
+    /// The step found last lies `shift` further out than its residual had it, mm; what is left of
+    /// that.
+    pub fn refine(&mut self, shift: Millimetres) -> Millimetres {
+        let taken = shift * self.share;
         self.offset = self.offset.saturating_sub(taken.widen());
-        let scale = self.scale - most * gain * PER_REACH;
+        let scale = self.scale - shift * self.gain * PER_REACH;
         self.scale = scale.clamp(-MOST_SCALE, MOST_SCALE);
-        residual - taken
+        shift - taken
     }
 
     /// Converts what the tread has travelled to axial travel once it makes a chord, or `now`.
@@ -286,6 +299,7 @@ mod tests {
             by_step in any::<bool>(),
             places in proptest::collection::vec(-0.3..0.3f64, 1..8),
             stretch in -0.003..0.003f64,
+            shift in -0.1..0.1f64,
         ) {
             let sign = if back { -1.0 } else { 1.0 };
             let (mut odometry, mut travel) = (Odometry::default(), Travel::ZERO);
@@ -309,7 +323,9 @@ mod tests {
                 }
                 let position = odometry.position(travel);
                 let residual = position - Q16::from_num(50.0 + x - x * stretch - off);
-                let left = odometry.correct(position, residual);
+                // Found a little off at first.
+                let shift = Q16::from_num(shift);
+                let left = odometry.correct(position, residual - shift) + odometry.refine(shift);
                 prop_assert!((odometry.position(travel) - position + residual - left).abs() < q16(1_000));
                 let (offset, scale) = least_squares(place, &found);
                 let exact = 50.0 + x - offset - x * scale;

@@ -1,7 +1,6 @@
 //! Before and at the end of a run: where the wheel is, what lies ahead, whether it has arrived.
 
 use super::crossing::Contact;
-use super::restore::UNSURE_WITHIN;
 use super::{EstimateState, Estimator, Findings, OpenCrossing, Position, PositionConfidence};
 use crate::fault::Fault;
 use crate::sense::SensedState;
@@ -151,12 +150,10 @@ impl Estimator {
         }
     }
 
-    /// One sigma of the position, mm: that of the odometry; or, after a step that was found
-    /// elsewhere, by how much, until the next one decides; or of what a record has.
+    /// One sigma of the position, mm: that of the odometry, with the slip that was measured. A
+    /// displaced step and an old record have limits of their own.
     pub fn sigma(&self, state: &EstimateState) -> Millimetres {
-        let displaced = state.displaced.map_or(Q16::ZERO, Q16::abs);
-        let by_record = if state.known.is_unsure() { UNSURE_WITHIN } else { Q16::ZERO };
-        state.odometry.sigma(state.position).max(displaced).max(by_record)
+        state.odometry.sigma(state.position)
     }
 }
 

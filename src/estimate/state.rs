@@ -69,6 +69,8 @@ pub struct OpenCrossing {
     pub resumed: bool,
     /// That it is not where the table has it has been reported.
     pub reported: bool,
+    /// Its step has corrected the position.
+    pub corrected: bool,
     /// When the corner was first detected.
     pub touched_at: Tick,
     /// Position of the face by the corner that carries, as soon as it shows, mm.

@@ -316,6 +316,7 @@ mod tests {
                 lift: most,
             },
             ramp_preload: most,
+            most_preload: most,
             brake_horizon: most,
             look_ahead: true,
             limited_by: LimitedBy::Drive,

@@ -162,6 +162,8 @@ pub struct Plan {
     /// Preload at which the rise for the step ends, N: beyond that at the step where the wheel
     /// lifts off while it still rises.
     pub ramp_preload: Newtons,
+    /// Highest preload that the strategy allows, N: for a wheel that slips.
+    pub most_preload: Newtons,
     /// Gap that this gives, mm.
     pub gap: Millimetres,
     /// Friction left unused at the step.

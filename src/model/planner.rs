@@ -131,6 +131,10 @@ impl Planner {
             cruise_preload: self.between_steps(),
             cross_preload: self.between_steps(),
             ramp_preload: self.between_steps(),
+            most_preload: match self.strategy {
+                Strategy::Constant => self.cruise_preload,
+                _ => self.most_preload,
+            },
             gap: self.target(request.direction, share),
             slip_margin: self.usable,
             brake_distance: Millimetres::ZERO,
@@ -190,6 +194,7 @@ impl Planner {
                 &choice,
                 self.target(request.direction, request.reserve),
                 (floor, ceiling),
+                plan.most_preload,
             )
         };
         // A band that reaches below the floor is entered: too slow would be worse.
@@ -235,11 +240,8 @@ impl Planner {
         choice: &Choice,
         target: Millimetres,
         (floor, ceiling): (MillimetresPerSecond, MillimetresPerSecond),
+        most: Newtons,
     ) -> LimitedBy {
-        let most = match self.strategy {
-            Strategy::Constant => self.cruise_preload,
-            _ => self.most_preload,
-        };
         if choice.speed >= ceiling {
             LimitedBy::Drive
         } else if choice.speed <= floor {

@@ -63,6 +63,7 @@ impl Controller {
         let mut targets = self.schedule.targets(self.estimator.steps(), plan, &course);
         let (step, cross_speed) = (plan.step, plan.cross_speed);
         let (cross_preload, ramp_preload) = (plan.cross_preload, plan.ramp_preload);
+        let most_preload = plan.most_preload;
         state.approach.ramping = targets.ramping;
         state.approach.braking = targets.braking;
         state.approach.released = targets.released;
@@ -88,7 +89,7 @@ impl Controller {
         // A wheel that slips grips by more preload alone.
         let (slipping, slipped) = state.estimate.slips();
         if slipped {
-            targets.preload = self.schedule.most_preload();
+            targets.preload = most_preload;
         }
         if slipping {
             targets.speed = targets.speed.min(self.least_speed);

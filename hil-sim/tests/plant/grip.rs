@@ -4,6 +4,7 @@ use hil_sim::plant::rig::{Drives, PlantError, Resolution, VirtualRig};
 use hil_sim::plant::wall::Wall;
 use hil_sim::scenario::Scenario;
 use hil_sim::session::{Options, run};
+use interstage::fault::Fault;
 
 use super::bench::{TICK_S, close, deploy, drive, ideal, nominal, roll, steps};
 
@@ -23,7 +24,8 @@ fn with_too_little_friction_a_run_does_not_complete() {
         let recording = run(&scenario(preset, &[&set]), options).unwrap();
         let summary = &recording.summary;
         assert!(!summary.completed, "{preset} at {friction}");
-        assert!(summary.slip_mm > 10.0, "{}", summary.slip_mm);
+        let faults: Vec<u16> = summary.faults.iter().map(|fault| fault.code).collect();
+        assert!(summary.slip_mm > 0.5 && !faults.is_empty(), "{faults:?} {}", summary.slip_mm);
         for tick in &recording.rows {
             let row = tick.truth.expect("the plant's truth");
             let numbers = [row.position_true_mm, row.corner_force_n, row.floor_force_n];
@@ -98,7 +100,10 @@ fn the_whole_load_stops_a_run_unless_the_arm_helps() {
     };
     for coupling in ["plant.arm_coupling=0", "plant.arm_coupling=-1"] {
         let stuck = summary(coupling);
-        assert!(!stuck.completed && stuck.slip_mm > 10.0, "{coupling}: {stuck:?}");
+        // It stops while it slips, and names how far.
+        let named = |text: &str| stuck.faults.iter().any(|fault| fault.text == text);
+        assert!(!stuck.completed && stuck.slip_mm > 1.0, "{coupling}: {stuck:?}");
+        assert!(named(Fault::WheelSlips.sentence()), "{coupling}: {stuck:?}");
     }
     let helped = summary("plant.arm_coupling=1");
     assert!(helped.completed && helped.slip_mm == 0.0, "{helped:?}");

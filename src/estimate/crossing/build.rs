@@ -97,10 +97,7 @@ mod tests {
                 Direction::Retract => x < -15.0,
             };
             // The next step is far.
-            let near = match direction {
-                Direction::Deploy => (-16.0..0.0).contains(&x),
-                Direction::Retract => (0.0..16.0).contains(&x),
-            };
+            let near = x.abs() < 16.0 && state.contact != Contact::Leaving;
             let over = direction == Direction::Retract && x < -14.0;
             let now = WatchInput { near, over, clear, ..seen(150.0 - y, compression) };
             if index == 0 {
@@ -193,7 +190,9 @@ mod tests {
                         // Back, a lower step is over before the arm says so.
                         let told = !back || height > 3.89;
                         let off = (lift.distance.to_num::<f64>() - distance).abs();
-                        prop_assert!(!told || off < 1e-3, "{off}");
+                        // The walk goes on by up to 0.01 mm after the wheel has come down.
+                        let within = if back { 1e-2 } else { 1e-3 };
+                        prop_assert!(!told || off < within, "{off}");
                     }
                     CrossingEvent::GapClosed { height: h, gap, shift, plausible, .. } => {
                         let far = |h: f64| ((25.0 - depth).powi(2) - (y - h).powi(2)).sqrt();
