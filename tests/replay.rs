@@ -205,7 +205,7 @@ fn every_recorded_run_is_replayed_to_the_bit() {
         // step higher than the table has it.
         ("astray", 3, Some(Deploy)),
         ("back", 1, None),
-        ("higher", 3, None),
+        ("higher", 3, Some(Deploy)),
         // Commands on a corner that end at the start, at the end; buttons pressed at random.
         ("back-again", 4, Some(Retract)),
         ("on-again", 3, Some(Deploy)),

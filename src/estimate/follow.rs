@@ -241,7 +241,7 @@ impl Estimator {
         let Some(open) = state.crossing.as_mut().filter(told) else { return };
         let lost = open.slip.step(sensed.travel, position + ahead.abs());
         if lost > Q16::ZERO {
-            state.odometry.slip(lost, open.slip.sigma());
+            state.odometry.slip(lost, open.slip.sigma_of(lost));
             state.begin_tick(sensed.travel);
         }
     }
@@ -265,12 +265,11 @@ impl Estimator {
             state.odometry.set_by_step(sensed.travel, state.position - residual);
             state.known = Position::Located;
             (residual, open.corrected) = (Q16::ZERO, true);
-        } else if corrects && residual.abs() <= self.steps.tolerance() {
-            state.displaced = None;
-            residual = state.odometry.correct(state.position, residual);
+        } else if corrects && self.is_explained(state, residual) {
+            residual = self.correct(state, sensed, residual, found);
             open.corrected = true;
         }
-        // Further off, it is judged when the step's height is known.
+        // Another one is judged when the step's height is known.
         state.begin_tick(sensed.travel);
         open.lift = Some(LiftPoint {
             at: tick.now,
@@ -292,6 +291,13 @@ impl Estimator {
         found.replan = true;
     }
 
+    /// Whether a step is off by no more than its tolerance, or by as much as the one before it.
+    fn is_explained(&self, state: &EstimateState, residual: Millimetres) -> bool {
+        let before = state.displaced.unwrap_or(Q16::ZERO);
+        let tolerance = self.steps.tolerance();
+        residual.abs() <= tolerance || (residual - before).abs() <= tolerance
+    }
+
     /// Corrects the odometry by a step's residual; what is left of it, mm.
     fn correct(
         &self,
@@ -300,12 +306,10 @@ impl Estimator {
         residual: Millimetres,
         found: &mut Findings,
     ) -> Millimetres {
-        let tolerance = self.steps.tolerance();
-        let alike = |other: Millimetres| (residual - other).abs() <= tolerance;
-        if residual.abs() <= tolerance {
+        if residual.abs() <= self.steps.tolerance() {
             state.displaced = None;
             state.odometry.correct(state.position, residual)
-        } else if state.displaced.is_some_and(alike) {
+        } else if self.is_explained(state, residual) {
             // Two in a row off by the same: the odometry is wrong.
             state.odometry.set_by_step(sensed.travel, state.position - residual);
             state.displaced = None;

@@ -28,6 +28,10 @@ impl Estimator {
         state.direction = direction;
         state.leaving = None;
         state.odometry.begin_run(state.position);
+        if let Some(open) = state.crossing.as_mut() {
+            open.slip.begin_run();
+            open.hopeless_since = None;
+        }
         // A crossing that began in its middle has no measured wall to turn back to.
         let between = state.crossing.as_ref().is_some_and(|open| open.resumed);
         // Away from the end that it went to in doubt, steps lie ahead that set the position.

@@ -13,6 +13,9 @@ const WINDOW: Millimetres = q16(400_000);
 /// chord by a tenth.
 const BEGINS: Ratio = q16(500_000);
 const GOES_ON: Ratio = q16(250_000);
+/// Largest distance that a face seems to move beyond the tread's travel, mm: a window in which the
+/// axle slides back by as much.
+const MOST: Millimetres = q16(800_000);
 /// Windows without slip after which the wheel grips again.
 const GRIPS_AFTER: u8 = 2;
 
@@ -48,6 +51,11 @@ impl CornerSlip {
         if turned < WINDOW && moved < WINDOW {
             return Q16::ZERO;
         }
+        // More than the tread turned and the axle slides back is a sensor that errs.
+        if moved > turned + MOST {
+            *self = Self { from: Some((travel, face)), lost: self.lost, ..Self::default() };
+            return Q16::ZERO;
+        }
         let doubtful = moved > turned * GOES_ON;
         let slips = if self.slipping > 0 { doubtful } else { moved > turned * BEGINS };
         let lost = match (slips, self.slipping) {
@@ -62,6 +70,11 @@ impl CornerSlip {
         lost
     }
 
+    /// A run begins: nothing is known of how wheel and axle moved since the last one.
+    pub(super) fn begin_run(&mut self) {
+        *self = Self { lost: self.lost, ..Self::default() };
+    }
+
     /// The wheel slips now.
     pub const fn is_slipping(&self) -> bool {
         self.slipping > 0
@@ -70,6 +83,11 @@ impl CornerSlip {
     /// One sigma of the slip so far, mm.
     pub fn sigma(&self) -> Millimetres {
         WINDOW_SIGMA + self.lost * PART_SIGMA
+    }
+
+    /// One sigma that the last `lost` of it adds to the position, mm.
+    pub(super) fn sigma_of(&self, lost: Millimetres) -> Millimetres {
+        lost * PART_SIGMA + if lost < self.lost { Q16::ZERO } else { WINDOW_SIGMA }
     }
 }
 
