@@ -218,7 +218,7 @@ fn every_recorded_run_is_replayed_to_the_bit() {
         // Preload sensor stuck, compression sensor too high, encoder losing counts, arm angle
         // jumping.
         ("stuck", 0, None),
-        ("tread-gain", 3, None),
+        ("tread-gain", 3, Some(Deploy)),
         ("encoder-gain", 1, None),
         ("arm-offset", 1, None),
     ] {
