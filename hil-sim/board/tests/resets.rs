@@ -77,6 +77,8 @@ fn a_hard_fault_is_reported_with_where_and_why() {
 fn a_stack_that_overflows_is_reported_too() {
     let mut board = Board::moving();
     let end = board.bench.machine().image().symbol("_stack_end").expect("a symbol");
+    // In a task: an interrupt may be so far that it needs no more stack.
+    into_poll(&mut board, "journal", 300);
     board.set(Register::Sp, end + 16);
     let (_, after, driven) = board.reset(150);
     assert_cut(&driven, 2);
@@ -153,6 +155,8 @@ fn the_task_that_hangs_is_named_whichever_it_is() {
 fn an_interrupt_that_never_ceases_ends_in_a_reset_that_names_the_starved_tick() {
     let mut board = Board::moving();
     let at = board.position_mm();
+    // Between two ticks.
+    into_poll(&mut board, "journal", 300);
     board.strike(Fault::ButtonStorm);
     let (cause, after, driven) = board.reset(150);
     assert_eq!(cause, Cause::Watchdog);
