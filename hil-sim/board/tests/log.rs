@@ -166,6 +166,9 @@ fn alike(name: &str, read: &(u32, Crossings, Ticks), other: &(u32, Crossings, Ti
 fn neither_telemetry_nor_its_reader_changes_when_the_tick_begins_or_what_it_takes() {
     /// What two runs may differ by, relative.
     const SAME: f64 = 0.02;
+    /// And the extremes of their beginnings, cycles: those of one tick in thousands, by what it
+    /// happens to coincide with. 1 us, a thousandth of the period.
+    const EXTREMES: f64 = 170.0;
     let read = deployment(Reader::There);
     let off = |one: f64, other: f64| (one / other - 1.0).abs();
     for (name, reader) in
@@ -176,15 +179,14 @@ fn neither_telemetry_nor_its_reader_changes_when_the_tick_begins_or_what_it_take
         let (cost, jitter) = (other.2.cost(), other.2.jitter());
         for (what, one, other) in [
             ("deviation of its beginning", read.2.jitter()[0], jitter[0]),
-            ("earliest to latest beginning", read.2.jitter()[1], jitter[1]),
+            ("mean cycles", read.2.cost()[0], cost[0]),
+            ("most cycles", read.2.cost()[1], cost[1]),
         ] {
             assert!(off(one, other) <= SAME, "{name}: {what}: {one:.1}, {other:.1}");
         }
-        for (what, one, other) in
-            [("mean", read.2.cost()[0], cost[0]), ("most", read.2.cost()[1], cost[1])]
-        {
-            assert!(off(one, other) <= SAME, "{name}: {what} cycles: {one:.1}, {other:.1}");
-        }
+        let (one, other) = (read.2.jitter()[1], jitter[1]);
+        println!("{name}: earliest to latest beginning: {one}, {other} cycles");
+        assert!((one - other).abs() <= EXTREMES, "{name}: extremes: {one}, {other}");
     }
 }
 

@@ -73,21 +73,6 @@ fn a_hard_fault_is_reported_with_where_and_why() {
     assert!(restart.snapshot.is_some());
 }
 
-#[test]
-fn a_stack_that_overflows_is_reported_too() {
-    let mut board = Board::moving();
-    let end = board.bench.machine().image().symbol("_stack_end").expect("a symbol");
-    // In a task: an interrupt may be so far that it needs no more stack.
-    into_poll(&mut board, "journal", 300);
-    board.set(Register::Sp, end + 16);
-    let (_, after, driven) = board.reset(150);
-    assert_cut(&driven, 2);
-    assert!(after < 60, "the record ends it, not the watchdog: {after} ms");
-    let restart = board.report();
-    assert!(matches!(restart.crash.expect("a crash").stopped, Stopped::Fault { .. }));
-    assert!(restart.snapshot.is_some());
-}
-
 /// Tasks by their functions in `main.rs`, their names in the record, and cycles into the middle
 /// of a poll.
 const TASKS: [(&str, &str, u64); 8] = [

@@ -108,10 +108,12 @@ fn a_stack_that_overflows_ends_at_the_protection_whatever_lies_below_ram() {
         let (_, after, driven) = board.reset(150);
         assert!(!driven[2..].contains(&true), "{driven:?}");
         assert!(after < 60, "the record ends it, not the watchdog: {after} ms");
-        match board.report().crash.expect("a crash").stopped {
+        let restart = board.report();
+        match restart.crash.expect("a crash").stopped {
             Stopped::Fault { cfsr, .. } => assert_ne!(cfsr & FORBIDDEN, 0, "{cfsr:#x}"),
             other => panic!("{other:?}"),
         }
+        assert!(restart.snapshot.is_some());
     }
 }
 
