@@ -42,6 +42,8 @@ pub struct RunLine {
     pub found_off_mm: Vec<(u8, f64)>,
     /// Whether it ended short of the end and nothing reports it.
     pub silent: bool,
+    /// Whether it ended without a fault although something was wrong that nothing reports.
+    pub unreported: bool,
     /// Crossings with gross slip, or 1 if the run slipped but none of them did.
     pub slip_events: usize,
     /// Least time by which the preload was reached before a corner touched, s.
@@ -85,6 +87,7 @@ impl RunLine {
             end_off_mm: called_complete.then(|| (summary.travel_mm - travel_mm).abs()),
             found_off_mm: crossings.iter().filter_map(found).collect(),
             silent: !completed && !reported,
+            unreported: summary.faults.is_empty() && is_unreported(&summary, &limits, travel_mm),
             duration_s: summary.duration_s,
             moving_s: summary.moving_s,
             max_gap_mm: summary.max_gap_mm,
@@ -105,6 +108,22 @@ impl RunLine {
 /// Whether a limit says that the run does not end where it should.
 fn reports_end(code: u16) -> bool {
     [Limit::StepMissing, Limit::PositionUnconfirmed].iter().any(|limit| limit.code() == code)
+}
+
+/// Slip beyond what is named, mm and part of it; distance from the end, mm; and gap over the
+/// reference, from which a run that names none of them is wrong in silence.
+const UNNAMED: (f64, f64) = (0.5, 0.2);
+const END_MM: f64 = 1.0;
+const GAP: f64 = 1.1;
+
+/// Whether a run slipped, ended elsewhere or opened a gap without a word of it.
+fn is_unreported(summary: &Summary, limits: &[u16], travel_mm: f64) -> bool {
+    let named: f64 = summary.crossings.iter().filter_map(|c| c.slip_measured_mm).sum();
+    let unnamed = (summary.slip_mm - named).abs() > UNNAMED.0.max(UNNAMED.1 * summary.slip_mm);
+    let wide = summary.max_gap_mm > GAP * summary.gap_ref_mm && summary.gap_ref_mm > 0.0;
+    unnamed
+        || (summary.travel_mm - travel_mm).abs() > END_MM
+        || wide && !limits.contains(&Limit::GapWide.code())
 }
 
 /// Crossings with gross slip; a run that slipped only elsewhere counts as one.

@@ -51,6 +51,13 @@ impl Default for Scenario {
     }
 }
 
+/// Half-width of the heights in the adversarial draw, mm: steps up to half a millimetre off.
+const ADVERSARIAL_HEIGHT_MM: f64 = 0.5;
+
+/// Ranges of the adversarial draw other than the wide ones: friction down to where nothing holds,
+/// and a load of more than twice the one that is known.
+const ADVERSARIAL: &[(&str, (f64, f64))] = &[("friction", (0.6, 1.1)), ("weight_n", (0.0, 8.0))];
+
 impl Scenario {
     /// The scenario of a preset: its rig, with the usual spread and noise.
     ///
@@ -135,8 +142,11 @@ impl Scenario {
     /// The plant of the scenario's seed.
     #[must_use]
     pub fn plant(&self) -> PlantParameters {
-        let seed = self.run.seed;
-        PlantParameters::draw(&self.rig, &self.true_steps(), &self.spread, &self.noise, seed)
+        let (seed, mut spread) = (self.run.seed, self.spread.clone());
+        if self.run.mismatch == MismatchDraw::Adversarial {
+            spread.step_height_mm = spread.step_height_mm.max(ADVERSARIAL_HEIGHT_MM);
+        }
+        PlantParameters::draw(&self.rig, &self.true_steps(), &spread, &self.noise, seed)
             .with_mismatch(&self.drawn_mismatch())
     }
 
@@ -144,7 +154,8 @@ impl Scenario {
     #[must_use]
     pub fn drawn_mismatch(&self) -> Mismatch {
         match (self.run.mismatch, self.run.seed) {
-            (MismatchDraw::Wide, 1..) => self.mismatch.draw(self.run.seed),
+            (MismatchDraw::Wide, seed @ 1..) => self.mismatch.draw(seed, &[]),
+            (MismatchDraw::Adversarial, seed @ 1..) => self.mismatch.draw(seed, ADVERSARIAL),
             _ => self.mismatch.clone(),
         }
     }

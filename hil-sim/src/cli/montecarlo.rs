@@ -5,16 +5,18 @@ use super::output;
 use super::scenario::RunArgs;
 use crate::montecarlo::{self, Least, Quantiles, Shard};
 use crate::progress;
-use crate::scenario::Scenario;
+use crate::scenario::{MismatchDraw, Scenario};
 use crate::table::{number, plain};
 
 /// Runs many random rigs, each drawn from its own seed, and shows what limits them.
 ///
 /// Each draws what `spread.*` states; with --wide also what the controller is not told, all of
-/// `mismatch.*` within the wide ranges that `rig keys` lists.
+/// `mismatch.*` within the wide ranges that `rig keys` lists. With --adversarial friction, load
+/// and heights of the steps are far beyond the rig's design: runs may end in a fault, but not in
+/// silence.
 ///
 /// The outcome depends on the seeds alone, not on the number of processors. The exit
-/// code is 1 if a run does not complete.
+/// code is 1 if a run does not complete; of adversarial ones, if a run is unreported.
 #[derive(Debug, clap::Args)]
 pub(super) struct Args {
     /// How many: the seeds that follow --seed.
@@ -47,7 +49,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, Failure> {
         outcome.slip_events
     );
     output::result(args.json, &outcome, || head + &human(&outcome))?;
-    Ok(Outcome::of(outcome.completed == outcome.runs))
+    let sound = match scenario.run.mismatch {
+        MismatchDraw::Adversarial => outcome.unreported.is_empty(),
+        _ => outcome.completed == outcome.runs,
+    };
+    Ok(Outcome::of(sound))
 }
 
 /// Runs this part of `count` rigs, with a progress bar.
@@ -75,6 +81,10 @@ pub(super) fn human(outcome: &montecarlo::Outcome) -> String {
     if !outcome.silent.is_empty() {
         let seeds: Vec<String> = outcome.silent.iter().map(u64::to_string).collect();
         text += &format!("  of these without a word: seeds {}\n", seeds.join(", "));
+    }
+    if !outcome.unreported.is_empty() {
+        let seeds: Vec<String> = outcome.unreported.iter().map(u64::to_string).collect();
+        text += &format!("  slip, end or gap wrong and unreported: seeds {}\n", seeds.join(", "));
     }
     if !outcome.drawn.is_empty() {
         let rows = outcome

@@ -64,6 +64,11 @@ pub struct RunArgs {
     #[arg(long)]
     wide: bool,
 
+    /// As --wide, with friction, load and heights of the steps far beyond the rig's design: to
+    /// see whether what goes wrong is reported.
+    #[arg(long, conflicts_with = "wide")]
+    adversarial: bool,
+
     /// Seed of plant and noise; 0, the default, is the nominal plant.
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     seed: Option<u64>,
@@ -83,6 +88,9 @@ impl RunArgs {
         }
         if self.wide {
             sets.push("run.mismatch=wide".to_owned());
+        }
+        if self.adversarial {
+            sets.push("run.mismatch=adversarial".to_owned());
         }
         if let Some(controller) = &self.controller {
             sets.push(format!("run.controller={controller}"));
@@ -109,6 +117,7 @@ mod tests {
             },
             retract: true,
             wide: true,
+            adversarial: false,
             controller: Some("limit".into()),
             seed: Some(5),
         };

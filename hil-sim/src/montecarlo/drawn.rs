@@ -26,7 +26,7 @@ pub(super) fn mismatch(scenario: &Scenario, seeds: &[u64]) -> Vec<Drawn> {
         scenario.drawn_mismatch()
     };
     // As stated, all of them are the same.
-    let seeds = if scenario.run.mismatch == MismatchDraw::Wide { seeds } else { &seeds[..1] };
+    let seeds = if scenario.run.mismatch != MismatchDraw::Stated { seeds } else { &seeds[..1] };
     let drawn: Vec<Mismatch> = seeds.iter().map(|seed| of(*seed)).collect();
     let range = |index: usize| {
         let values = drawn.iter().filter_map(|one| Some(one.values().nth(index)?.1));

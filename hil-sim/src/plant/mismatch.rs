@@ -125,15 +125,16 @@ fields! {
 
 impl Mismatch {
     /// The wide draw of a seed: each value evenly within its range, a factor evenly in its
-    /// logarithm. A value that is not neutral stays.
+    /// logarithm. A value that is not neutral stays. `beyond`: names with another range.
     #[must_use]
-    pub fn draw(&self, seed: u64) -> Self {
+    pub fn draw(&self, seed: u64, beyond: &[(&str, (f64, f64))]) -> Self {
         // Another stream than that of the spread and those of the sensors.
         let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x0031_5a7c_0000_0000);
         let mut drawn = self.clone();
         for field in FIELDS {
             let part: f64 = random.random();
-            let (low, high) = field.wide;
+            let other = beyond.iter().find(|(name, _)| *name == field.name);
+            let (low, high) = other.map_or(field.wide, |(_, range)| *range);
             let value = if field.neutral == 1.0 {
                 low * (high / low).powf(part)
             } else {
@@ -232,8 +233,8 @@ mod tests {
     #[test]
     fn the_wide_draw_fills_its_ranges_and_keeps_what_was_set() {
         let set = Mismatch { backlash_mm: 0.4, ..Mismatch::default() };
-        let draws: Vec<Mismatch> = (1..=500).map(|seed| set.draw(seed)).collect();
-        assert_eq!(draws[4], set.draw(5));
+        let draws: Vec<Mismatch> = (1..=500).map(|seed| set.draw(seed, &[])).collect();
+        assert_eq!(draws[4], set.draw(5, &[]));
         for (index, field) in FIELDS.iter().enumerate() {
             let (low, high) = field.wide;
             assert!(field.range.0 <= low && low < high && high <= field.range.1);

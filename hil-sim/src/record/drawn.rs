@@ -32,7 +32,7 @@ pub(super) fn of(plant: &PlantParameters, scenario: &Scenario) -> Map<String, Va
     ];
     let mut all: Map<String, Value> =
         drawn.into_iter().map(|(key, value)| (key.to_owned(), value)).collect();
-    if scenario.run.mismatch == MismatchDraw::Wide && scenario.run.seed > 0 {
+    if scenario.run.mismatch != MismatchDraw::Stated && scenario.run.seed > 0 {
         let mismatch = scenario.drawn_mismatch();
         let values = mismatch.values();
         all.extend(values.map(|(field, value)| (format!("mismatch.{}", field.name), json!(value))));

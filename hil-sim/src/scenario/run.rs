@@ -92,11 +92,14 @@ pub enum MismatchDraw {
     Stated,
     /// Drawn by the seed within the wide ranges; what is stated and not neutral stays.
     Wide,
+    /// The same, with friction, load and heights of the steps far beyond what the rig is designed
+    /// for: to see whether what goes wrong is reported.
+    Adversarial,
 }
 
 impl MismatchDraw {
     /// Names as written in scenarios.
-    pub const NAMES: [&str; 2] = ["stated", "wide"];
+    pub const NAMES: [&str; 3] = ["stated", "wide", "adversarial"];
 }
 
 /// One step that is not where the step table says. Steps count from 1 on
