@@ -256,7 +256,13 @@ impl Estimator {
         let Some(mut open) = state.crossing else { return };
         let sensed = tick.sensed;
         let table = self.steps.face(open.step);
-        let seen = position_of_radius(state, sensed) + lift.distance;
+        let mut seen = position_of_radius(state, sensed) + lift.distance;
+        if state.direction == Direction::Retract && !open.turned {
+            let lost = open.slip.end(sensed.travel, seen);
+            state.odometry.slip(lost, open.slip.sigma_of(lost));
+            state.begin_tick(sensed.travel);
+            seen -= lost;
+        }
         let face = if open.resumed { table.unwrap_or(seen) } else { seen };
         let mut residual = table.map_or(Q16::ZERO, |table| face - table);
         let corrects = open.step > 0 && !open.turned;

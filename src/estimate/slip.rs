@@ -16,6 +16,9 @@ const GOES_ON: Ratio = q16(250_000);
 /// Largest distance that a face seems to move beyond the tread's travel, mm: a window in which the
 /// axle slides back by as much.
 const MOST: Millimetres = q16(800_000);
+/// Least distance that a face must seem to move in a shorter window, mm: three steps of the arm's
+/// code, as the place of an edge shows them.
+const SEEN: Millimetres = q16(120_000);
 /// Windows without slip after which the wheel grips again.
 const GRIPS_AFTER: u8 = 2;
 
@@ -70,6 +73,19 @@ impl CornerSlip {
         lost
     }
 
+    /// The corner no longer shows the place: what the window that is cut off has of slip, mm. In
+    /// the last milliseconds before it touches down a wheel that holds back a load slips first.
+    pub(super) fn end(&mut self, travel: Travel, face: Millimetres) -> Millimetres {
+        let Some((from, was)) = self.from.take() else { return Q16::ZERO };
+        let turned = Q16::narrow(travel.saturating_sub(from)).abs();
+        let moved = face - was + self.doubtful;
+        let part = if self.slipping > 0 { GOES_ON } else { BEGINS };
+        let slips = moved > SEEN + turned * part && moved <= turned + MOST;
+        let lost = if slips { moved } else { Q16::ZERO };
+        self.lost += lost;
+        lost
+    }
+
     /// A run begins: nothing is known of how wheel and axle moved since the last one.
     pub(super) fn begin_run(&mut self) {
         *self = Self { lost: self.lost, ..Self::default() };
@@ -87,7 +103,8 @@ impl CornerSlip {
 
     /// One sigma that the last `lost` of it adds to the position, mm.
     pub(super) fn sigma_of(&self, lost: Millimetres) -> Millimetres {
-        lost * PART_SIGMA + if lost < self.lost { Q16::ZERO } else { WINDOW_SIGMA }
+        let begins = lost > Q16::ZERO && lost == self.lost;
+        lost * PART_SIGMA + if begins { WINDOW_SIGMA } else { Q16::ZERO }
     }
 }
 
