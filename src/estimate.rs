@@ -7,6 +7,7 @@ mod creep;
 pub mod crossing;
 mod crossing_speed;
 mod follow;
+mod landing;
 pub mod odometry;
 mod position;
 mod restore;

@@ -277,6 +277,18 @@ impl CrossingWatch {
         })
     }
 
+    /// Radius of the undeformed wheel, mm.
+    pub const fn radius(&self) -> Millimetres {
+        self.radius
+    }
+
+    /// Distance from a face at which an undeformed wheel on this ground touches its edge, mm, over the
+    /// wall above: `sqrt(R^2 - (R - f)^2)`.
+    pub fn reach(&self, state: &WatchState, ground: Millimetres) -> Millimetres {
+        let fallen = (ground - state.baseline.output()).clamp(Q16::ZERO, self.step + HEIGHT_MOST);
+        sqrt(fallen * (self.radius + self.radius - fallen))
+    }
+
     /// How far the wheel is off its baseline in the direction of the step, mm.
     pub fn rise(&self, state: &WatchState, direction: Direction, seen: &WatchInput) -> Millimetres {
         let rise = state.baseline.output() - (seen.radius - seen.compression);

@@ -1,6 +1,7 @@
 //! Follows a crossing: what the watch detects becomes odometry, level and review.
 
 use super::crossing::{Contact, CrossingEvent, Lift, WatchInput};
+use super::landing::OnEdge;
 use super::odometry::Rolling;
 use super::restore::UNSURE_WITHIN;
 use super::tread::Shown;
@@ -224,14 +225,11 @@ impl Estimator {
     }
 
     /// Takes the place from the corner under a wheel that slips on it. Nearer to the edge than a
-    /// quarter of the wheel's radius the height hardly shows the distance; back on the lower
-    /// wall the tread is no longer deepest at the corner.
+    /// quarter of the wheel's radius the height hardly shows the distance.
     fn hold_to_corner(&self, state: &mut EstimateState, sensed: &SensedState) {
-        let touched_down = state.direction == Direction::Retract;
-        match state.watch.contact {
-            Contact::Corner => {}
-            Contact::Both if !touched_down => {}
-            _ => return,
+        match (state.watch.contact, state.direction) {
+            (Contact::Wall, _) | (Contact::Leaving, Direction::Deploy) => return,
+            _ => {}
         }
         let seen = self.watch_input(state, sensed);
         let Some(ahead) = self.watch.to_face(&state.watch, state.direction, &seen) else { return };
@@ -239,9 +237,20 @@ impl Estimator {
         // Of a crossing that began in its middle the wall below was not measured.
         let told = |open: &&mut OpenCrossing| !open.turned && ahead.abs() > self.telling;
         let Some(open) = state.crossing.as_mut().filter(told) else { return };
-        let lost = open.slip.step(sensed.travel, position + ahead.abs());
+        let lost = match state.direction {
+            Direction::Deploy => open.slip.step(sensed.travel, position + ahead),
+            Direction::Retract => {
+                let fall = self.watch.rise(&state.watch, state.direction, &seen) + seen.compression;
+                let at = OnEdge { travel: sensed.travel, position, fall, depth: seen.compression };
+                let Some(landing) = open.slide.step(self.watch.radius(), &at) else { return };
+                open.landing = Some(landing);
+                open.slip.lost += landing.slid;
+                landing.lost
+            }
+        };
         if lost > Q16::ZERO {
-            state.odometry.slip(lost, open.slip.sigma_of(lost));
+            let sigma = open.slip.sigma_of(lost.min(open.slip.lost));
+            state.odometry.slip(lost, sigma);
             state.begin_tick(sensed.travel);
         }
     }
@@ -256,22 +265,17 @@ impl Estimator {
         let Some(mut open) = state.crossing else { return };
         let sensed = tick.sensed;
         let table = self.steps.face(open.step);
-        let mut seen = position_of_radius(state, sensed) + lift.distance;
-        if state.direction == Direction::Retract && !open.turned {
-            let lost = open.slip.end(sensed.travel, seen);
-            state.odometry.slip(lost, open.slip.sigma_of(lost));
-            state.begin_tick(sensed.travel);
-            seen -= lost;
-        }
+        let seen = position_of_radius(state, sensed) + lift.distance;
+        let retracts = state.direction == Direction::Retract;
         let face = if open.resumed { table.unwrap_or(seen) } else { seen };
         let mut residual = table.map_or(Q16::ZERO, |table| face - table);
         let corrects = open.step > 0 && !open.turned;
         let before = residual;
-        if corrects && state.known.is_searching() {
+        if corrects && state.known.is_searching() && !retracts {
             state.odometry.set_by_step(sensed.travel, state.position - residual);
             state.known = Position::Located;
             (residual, open.corrected) = (Q16::ZERO, true);
-        } else if corrects && self.is_explained(state, residual) {
+        } else if corrects && !retracts && self.is_explained(state, residual) {
             residual = self.correct(state, sensed, residual, found);
             open.corrected = true;
         }
@@ -297,10 +301,16 @@ impl Estimator {
         found.replan = true;
     }
 
-    /// Whether a step is off by no more than its tolerance, or by as much as the one before it.
+    /// Largest residual of a step that is where the table has it, mm: its tolerance, and three
+    /// sigma of the position.
+    fn tolerated(&self, state: &EstimateState) -> Millimetres {
+        self.steps.tolerance() + self.sigma(state) * q16(3_000_000)
+    }
+
+    /// Whether a step is off by no more than is tolerated, or by as much as the one before it.
     fn is_explained(&self, state: &EstimateState, residual: Millimetres) -> bool {
         let before = state.displaced.unwrap_or(Q16::ZERO);
-        let tolerance = self.steps.tolerance();
+        let tolerance = self.tolerated(state);
         residual.abs() <= tolerance || (residual - before).abs() <= tolerance
     }
 
@@ -312,7 +322,7 @@ impl Estimator {
         residual: Millimetres,
         found: &mut Findings,
     ) -> Millimetres {
-        if residual.abs() <= self.steps.tolerance() {
+        if residual.abs() <= self.tolerated(state) {
             state.displaced = None;
             state.odometry.correct(state.position, residual)
         } else if self.is_explained(state, residual) {
@@ -353,11 +363,32 @@ impl Estimator {
         let Some(mut open) = state.crossing else { return };
         if let Some(mut point) = open.lift {
             if !open.resumed && !open.turned {
+                // How low the wall lies that takes a retracting wheel was not known at the lift.
+                let landing = open.landing.or_else(|| {
+                    let landing = open.slide.landing()?;
+                    open.slip.lost += landing.slid;
+                    state.odometry.slip(landing.lost, open.slip.sigma_of(landing.slid));
+                    state.begin_tick(sensed.travel);
+                    Some(landing)
+                });
+                let shift = landing.map_or(measured.shift, |landing| landing.face - point.face);
+                if state.known.is_searching() && open.step > 0 {
+                    self.count_down(state, sensed, &mut open);
+                    found.advanced = true;
+                }
                 let left = match self.steps.face(open.step) {
-                    None => measured.shift,
-                    Some(_) if open.corrected => state.odometry.refine(measured.shift),
+                    Some(table) if state.known.is_searching() => {
+                        let left = table - point.face;
+                        let position = state.position + left - shift;
+                        state.odometry.set_by_step(sensed.travel, position);
+                        state.known = Position::Located;
+                        (point.residual, open.corrected) = (-left, true);
+                        left
+                    }
+                    None => shift,
+                    Some(_) if open.corrected => state.odometry.refine(shift),
                     Some(_) => {
-                        let residual = point.residual + measured.shift;
+                        let residual = point.residual + shift;
                         self.correct(state, sensed, residual, found) - point.residual
                     }
                 };
@@ -382,6 +413,15 @@ impl Estimator {
         }
     }
 
+    /// A step found by a search on the way down is the one above the wall that the arm shows behind
+    /// it: between walls, steps off their heights might have been taken for another level.
+    fn count_down(&self, state: &mut EstimateState, sensed: &SensedState, open: &mut OpenCrossing) {
+        let level = sensed.steps_up.round().clamp(0, i32::from(self.steps.count().saturating_sub(1))) as u8;
+        state.level = level;
+        state.next_step = level;
+        open.step = level + 1;
+    }
+
     /// Input of the crossing watch.
     pub(super) fn watch_input(&self, state: &EstimateState, sensed: &SensedState) -> WatchInput {
         let to_window = self.steps.to_window(state.direction, self.distance(state));
@@ -390,7 +430,7 @@ impl Estimator {
             compression: sensed.compression_filtered,
             near: to_window.is_some_and(|ahead| ahead <= Q16::ZERO),
             over: self.is_over(state),
-            clear: self.clear_of(state),
+            clear: self.clear_of(state, sensed),
         }
     }
 
@@ -405,18 +445,25 @@ impl Estimator {
     }
 
     /// Whether the wheel has left the corner of the last step behind.
-    fn clear_of(&self, state: &EstimateState) -> bool {
-        let followed = state.crossing.as_ref().and_then(|open| open.lift).map(|point| point.face);
+    fn clear_of(&self, state: &EstimateState, sensed: &SensedState) -> bool {
+        let landed = |open: &OpenCrossing| open.landing.map(|landing| landing.face);
+        let lifted = |open: &OpenCrossing| open.lift.map(|point| landed(open).unwrap_or(point.face));
+        let followed = state.crossing.as_ref().and_then(lifted);
         let Some(face) = followed.or(state.leaving) else { return true };
-        let past = match state.direction {
-            Direction::Deploy => state.position - face,
-            Direction::Retract => face - state.position,
+        let nominal = self.corner().first_contact(state.direction.opposite());
+        let (past, reach) = match state.direction {
+            Direction::Deploy => (state.position - face, nominal),
+            // From a higher step the edge is met farther out.
+            Direction::Retract => {
+                let fallen = sensed.radius.value - sensed.compression_filtered;
+                (face - state.position, nominal.max(self.watch.reach(&state.watch, fallen)))
+            }
         };
         // The patch must be clear of the edge: on the upper wall behind the centre, on the
         // lower wall ahead of it. By the table, a doubtful record has that face elsewhere.
         let unsure = state.known.is_unsure() && followed.is_some();
         let doubt = if unsure { UNSURE_WITHIN } else { Q16::ZERO };
-        past > self.corner().first_contact(state.direction.opposite()) + doubt
+        past > reach + doubt
     }
 
     /// On to the next step.
@@ -513,9 +560,10 @@ mod tests {
                 let estimator = estimator();
                 let doubt = if known.is_unsure() { UNSURE_WITHIN } else { Q16::ZERO };
                 let bound = estimator.corner().first_contact(direction.opposite()) + doubt;
+                let level = sensed(0, 0.0, 0.3);
                 let mut clear = |past: Millimetres| {
                     state.position = face + past * Q16::from_num(direction.sign());
-                    estimator.clear_of(&state)
+                    estimator.clear_of(&state, &level)
                 };
                 assert!(!clear(bound) && clear(bound + Q16::DELTA), "{direction:?} {known:?}");
             }
@@ -544,7 +592,7 @@ mod tests {
         estimator.lifted(&mut state, &tick, lift, &mut Findings::default());
         let point = state.crossing.and_then(|open| open.lift).expect("lifted");
         assert_eq!((point.face, point.position, point.residual), (place, place, Q16::ZERO));
-        assert!(!estimator.clear_of(&state));
+        assert!(!estimator.clear_of(&state, &sensed));
     }
 
     #[test]

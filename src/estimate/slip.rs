@@ -16,16 +16,13 @@ const GOES_ON: Ratio = q16(250_000);
 /// Largest distance that a face seems to move beyond the tread's travel, mm: a window in which the
 /// axle slides back by as much.
 const MOST: Millimetres = q16(800_000);
-/// Least distance that a face must seem to move in a shorter window, mm: three steps of the arm's
-/// code, as the place of an edge shows them.
-const SEEN: Millimetres = q16(120_000);
 /// Windows without slip after which the wheel grips again.
 const GRIPS_AFTER: u8 = 2;
 
 /// One sigma of a measured slip, mm, and the part of it that adds: what a window hides at
 /// both ends, and how the face moves without slip.
 const WINDOW_SIGMA: Millimetres = q16(100_000);
-const PART_SIGMA: Ratio = q16(100_000);
+const PART_SIGMA: Ratio = q16(200_000);
 
 /// Slip of one crossing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -36,7 +33,7 @@ pub struct CornerSlip {
     doubtful: Millimetres,
     /// Windows until the wheel counts as gripping.
     slipping: u8,
-    /// Slip so far, mm: travel of the tread that moved no axle.
+    /// Slip so far, mm: travel of the tread that moved no axle, or of the axle that no tread made.
     pub lost: Millimetres,
 }
 
@@ -73,19 +70,6 @@ impl CornerSlip {
         lost
     }
 
-    /// The corner no longer shows the place: what the window that is cut off has of slip, mm. In
-    /// the last milliseconds before it touches down a wheel that holds back a load slips first.
-    pub(super) fn end(&mut self, travel: Travel, face: Millimetres) -> Millimetres {
-        let Some((from, was)) = self.from.take() else { return Q16::ZERO };
-        let turned = Q16::narrow(travel.saturating_sub(from)).abs();
-        let moved = face - was + self.doubtful;
-        let part = if self.slipping > 0 { GOES_ON } else { BEGINS };
-        let slips = moved > SEEN + turned * part && moved <= turned + MOST;
-        let lost = if slips { moved } else { Q16::ZERO };
-        self.lost += lost;
-        lost
-    }
-
     /// A run begins: nothing is known of how wheel and axle moved since the last one.
     pub(super) fn begin_run(&mut self) {
         *self = Self { lost: self.lost, ..Self::default() };
@@ -103,7 +87,7 @@ impl CornerSlip {
 
     /// One sigma that the last `lost` of it adds to the position, mm.
     pub(super) fn sigma_of(&self, lost: Millimetres) -> Millimetres {
-        let begins = lost > Q16::ZERO && lost == self.lost;
+        let begins = lost == self.lost;
         lost * PART_SIGMA + if begins { WINDOW_SIGMA } else { Q16::ZERO }
     }
 }

@@ -1,6 +1,7 @@
 //! What the estimator remembers between ticks, and what it reports of one.
 
 use super::crossing::{Contact, WatchState};
+use super::landing::{Landing, Slide};
 use super::crossing_speed::CrossingSpeed;
 use super::odometry::Odometry;
 use super::tread::TreadState;
@@ -75,6 +76,10 @@ pub struct OpenCrossing {
     pub touched_at: Tick,
     /// Position of the face by the corner that carries, as soon as it shows, mm.
     pub felt: Option<Millimetres>,
+    /// Slide of a retracting wheel before it lands, and its landing.
+    pub slide: Slide,
+    /// See `slide`.
+    pub landing: Option<Landing>,
     /// Slip on it.
     pub slip: CornerSlip,
     /// Since when it slips under the most preload that there is.
