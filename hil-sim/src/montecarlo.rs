@@ -110,18 +110,21 @@ fn reports_end(code: u16) -> bool {
     [Limit::StepMissing, Limit::PositionUnconfirmed].iter().any(|limit| limit.code() == code)
 }
 
-/// Slip beyond what is named, mm and part of it; distance from the end, mm; and gap over the
-/// reference, from which a run that names none of them is wrong in silence.
+/// Slip that is named wrong by more than this, mm, and by more than this part of it; distance from
+/// the end, mm; and gap over the reference, from which a run that names none of them is wrong in
+/// silence.
 const UNNAMED: (f64, f64) = (0.5, 0.2);
 const END_MM: f64 = 1.0;
 const GAP: f64 = 1.1;
 
 /// Whether a run slipped, ended elsewhere or opened a gap without a word of it.
 fn is_unreported(summary: &Summary, limits: &[u16], travel_mm: f64) -> bool {
-    let named: f64 = summary.crossings.iter().filter_map(|c| c.slip_measured_mm).sum();
-    let unnamed = (summary.slip_mm - named).abs() > UNNAMED.0.max(UNNAMED.1 * summary.slip_mm);
+    let off = |slip: f64, named: f64| (slip - named).abs() > UNNAMED.0.max(UNNAMED.1 * slip);
+    let crossings = &summary.crossings;
+    let crossed: f64 = crossings.iter().map(|c| c.slip_mm).sum();
     let wide = summary.max_gap_mm > GAP * summary.gap_ref_mm && summary.gap_ref_mm > 0.0;
-    unnamed
+    crossings.iter().any(|c| off(c.slip_mm, c.slip_measured_mm.unwrap_or(0.0)))
+        || off(summary.slip_mm - crossed, 0.0)
         || (summary.travel_mm - travel_mm).abs() > END_MM
         || wide && !limits.contains(&Limit::GapWide.code())
 }

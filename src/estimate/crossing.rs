@@ -411,12 +411,12 @@ impl CrossingWatch {
         // Off the wall that the table promises: the next corner already touches.
         let beyond = rise - self.step;
         let again = if seen.near { AGAIN } else { AGAIN + HEIGHT_MOST };
-        // Nor does a wall rise while it is measured.
+        // A wall that is measured does not rise.
         let drift = match direction {
             Direction::Deploy => state.next.output() - ground,
             Direction::Retract => ground - state.next.output(),
         };
-        let touches = beyond > again || state.ticks > 0 && drift > TOUCH;
+        let touches = if state.ticks > 0 { drift > TOUCH } else { beyond > again };
         state.again = if touches { state.again + 1 } else { 0 };
         if state.again >= TOUCH_TICKS {
             let shift = match direction {

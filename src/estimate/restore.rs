@@ -185,7 +185,9 @@ impl Estimator {
         let level = sensed.level.min(steps);
         let (radius, compression) = (sensed.radius.value, sensed.compression_filtered);
         let height = self.watch.height_over(level, radius, compression);
-        if height.abs() <= within {
+        // A wall may lie off its height, but only an edge presses the tread in so far.
+        let edge = self.tread.may_rest_on_edge(sensed.preload_filtered, compression);
+        if height.abs() <= within || !edge {
             Ground::Wall(level)
         } else if height > Q16::ZERO && level < steps {
             Ground::Corner(level + 1)

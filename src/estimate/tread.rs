@@ -152,6 +152,14 @@ impl Tread {
         })
     }
 
+    /// Whether a wheel at rest may be on an edge, which presses the tread in twice as far: on a wall
+    /// that compression, relaxed, would carry twice the preload. Under little preload it may.
+    pub fn may_rest_on_edge(&self, preload: Newtons, compression: Millimetres) -> bool {
+        let depth = |index| self.depth(index, Q16::ZERO, compression);
+        let carried = (0..ELEMENTS).map(depth).fold(Q16::ZERO, |sum, depth| sum + depth);
+        preload < self.least || carried * self.rate > preload + preload
+    }
+
     /// The wheel is at rest here and has been pressed like this for long.
     pub fn begin(
         &self,
