@@ -8,7 +8,7 @@
 mod presets;
 mod validate;
 
-pub(crate) use validate::REGULATION_PART;
+pub(crate) use validate::{CLIMB_PART, REGULATION_PART};
 pub use validate::{Bound, RigError};
 
 /// Most steps a step table may hold.

@@ -7,6 +7,14 @@ use super::Rig;
 /// within its tolerances exceeds the limit with it.
 pub(crate) const REGULATION_PART: f64 = 0.045;
 
+/// Part of the pre-tightener's slew that the spring may take while the wheel climbs.
+pub(crate) const CLIMB_PART: f64 = 0.9;
+/// Steepest rise of the wheel over a corner, that behind lift-off.
+const LIFT_SLOPE: f64 = 0.5;
+/// Part by which the least planned speed exceeds the least useful one: creep of the tread and
+/// the dip under the corner's load take up to a tenth.
+const DIP_PART: f64 = 0.12;
+
 /// Reserve of the preload with which the wheel begins to roll: load, friction and a preload sensor
 /// near its zero are known less well than under way, and a tread that rests under more preload
 /// shows better what it is.
@@ -194,6 +202,24 @@ impl Rig {
         let lifted = (-self.plant.arm_coupling).max(0.0) * sine / libm::sqrt(1.0 - sine * sine);
         let grip = (self.plant.mu - self.control.slip_margin).max(LEAST_GRIP);
         (ROLLING_RESERVE * load * (1.0 / grip + lifted)).min(self.preload.limit_n)
+    }
+
+    /// Dead time and lag of the pre-tightener, s.
+    pub const fn preload_latency_s(&self) -> f64 {
+        self.preload.delay_s + self.preload.lag_s
+    }
+
+    /// Speed at which the pre-tightener just follows the spring at lift-off, mm/s: by its slew, and
+    /// with what the spring does in its dead time and lag within the part of regulation.
+    pub fn climb_speed_mm_s(&self) -> f64 {
+        let late = REGULATION_PART * self.preload.limit_n / self.preload_latency_s();
+        late.min(CLIMB_PART * self.preload.slew_n_per_s)
+            / (LIFT_SLOPE * self.preload.spring_n_per_mm)
+    }
+
+    /// Least speed that is planned for a crossing, mm/s.
+    pub const fn least_planned_speed_mm_s(&self) -> f64 {
+        self.drive.min_crossing_speed_mm_s * (1.0 + DIP_PART)
     }
 
     /// Keys with their value and its least and largest value.

@@ -47,8 +47,10 @@ const EFFORT: (Ratio, Ratio) = (q16(-50_000), q16(130_000));
 /// settles after a corner.
 const EFFORT_TICKS: u8 = 120;
 /// Deviation of the preload from its model, part of the cruise preload: 0.18 at the ramps of an
-/// actuator whose dead time, lag and slew are all off.
+/// actuator whose dead time, lag and slew are all off. At least what the slew makes in 1.25 times
+/// dead time and lag: half of it with these off by half, and the spring's and the sensor's part.
 const STRAYED_PART: f64 = 0.25;
+const STRAYED_LATENCIES: f64 = 1.25;
 /// Ticks for which it must deviate.
 const STRAYED_TICKS: u8 = 10;
 /// Equal codes in a row that count as stuck if the preload has to change meanwhile, or if nothing
@@ -178,6 +180,8 @@ pub(super) struct Compared {
     pub(super) preload: Newtons,
     /// Preload that the actuator should have reached by now, N.
     pub(super) preload_due: Newtons,
+    /// Preload beyond that and what the spring's own motion makes, N.
+    pub(super) preload_off: Newtons,
     /// Compression of the tread, mm.
     pub(super) compression: Millimetres,
     /// Speed reference, signed outwards, mm/s.
@@ -193,9 +197,11 @@ impl CrossCheck {
     pub(super) fn try_build(rig: &Rig) -> Result<Self, RigError> {
         let turn_mm = 2.0 * core::f64::consts::PI * rig.rig.wheel_radius_mm;
         let count_mm = turn_mm / rig.sense.encoder_counts;
+        let late = STRAYED_LATENCIES * rig.preload.slew_n_per_s * rig.preload_latency_s();
+        let strayed = late.max(STRAYED_PART * rig.preload.cruise_n);
         Ok(Self {
             bent: checked("sense.encoder_counts", BENT_COUNTS * count_mm)?,
-            strayed: checked("preload.cruise_n", STRAYED_PART * rig.preload.cruise_n)?,
+            strayed: checked("preload.slew_n_per_s", strayed)?,
         })
     }
 
@@ -209,13 +215,18 @@ impl CrossCheck {
         let (preload, due) = (seen.preload, seen.preload_due);
         let limits = Limits { stuck: noise.preload.stuck, jump: JUMP_N, due: self.telling() };
         let unsound = judge(&mut state.preload, preload, due, &limits);
-        let off = (preload - due).abs() > self.strayed;
+        let off = seen.preload_off.abs() > self.strayed;
         let strayed = lasts(&mut state.strayed, off, STRAYED_TICKS);
         if unsound {
             Some(Fault::PreloadSensorImplausible)
         } else {
             strayed.then_some(Fault::PretightenerRunaway)
         }
+    }
+
+    /// Deviation of the preload from its model that is a fault, N.
+    pub(super) const fn strayed(&self) -> Newtons {
+        self.strayed
     }
 
     /// Change of the preload that no sensor sleeps through, N: half of what counts as astray.

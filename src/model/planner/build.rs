@@ -18,17 +18,8 @@ const DIP_MM: f64 = 1.0;
 /// How much farther the stiffness estimate may rise than fall.
 const STIFFER_RANGE: f64 = 10.0;
 
-/// Part of the pre-tightener's slew that the spring may use up while the wheel climbs.
-const CLIMB_PART: f64 = 0.9;
 /// Reserve below which the crossings do not change it.
 const LEAST_RESERVE: f64 = 1e-3;
-/// Steepest rise of the wheel over a corner, that behind lift-off.
-const LIFT_SLOPE: f64 = 0.5;
-
-/// Part by which the least planned speed exceeds the least useful one: creep of the tread and
-/// the dip under the corner's load take up to a tenth.
-const DIP_PART: f64 = 0.12;
-
 impl Planner {
     /// The scheduler of a rig.
     pub fn try_build(rig: &Rig) -> Result<Self, RigError> {
@@ -81,14 +72,12 @@ impl Planner {
             cruise_speed: checked("drive.cruise_speed_mm_s", rig.drive.cruise_speed_mm_s)?,
             least_speed: checked(
                 "drive.min_crossing_speed_mm_s",
-                rig.drive.min_crossing_speed_mm_s * (1.0 + DIP_PART),
+                rig.least_planned_speed_mm_s(),
             )?,
             safe_speed: checked("control.safe_speed_mm_s", rig.control.safe_speed_mm_s)?,
             climb_speed: checked(
                 "preload.spring_n_per_mm",
-                (CLIMB_PART * rig.preload.slew_n_per_s
-                    / (rig.preload.spring_n_per_mm * LIFT_SLOPE))
-                    .min(1000.0),
+                rig.climb_speed_mm_s().min(1000.0),
             )?,
             prescribed_speed: None,
             uniform: false,
@@ -202,7 +191,7 @@ mod tests {
                 * (1.0 - rig.control.gap_reserve);
             // At the least speed the limit may not suffice; else the target is met, or
             // undercut where the cruise preload alone does.
-            let floor = speed < rig.drive.min_crossing_speed_mm_s * (1.0 + DIP_PART) + 0.01;
+            let floor = speed < rig.least_planned_speed_mm_s() + 0.01;
             prop_assert!(floor || gap < target * 1.002, "{gap} {target}");
         }
 
